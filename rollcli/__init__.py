@@ -1,0 +1,49 @@
+"""The roll angle of a stereo rig, from disparity maps.
+
+The functions below are loaded when first used, so that ``import rollcli`` (and with it
+``rollcli --version``) costs nothing.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from rollcli.errors import RollcliError as RollcliError
+    from rollcli.estimator.estimate import RollEstimate as RollEstimate
+    from rollcli.estimator.estimate import estimate_roll as estimate_roll
+    from rollcli.files.encodings import read_disparity as read_disparity
+    from rollcli.imaging.derotate import derotate as derotate
+    from rollcli.imaging.stereo import compute_disparity as compute_disparity
+    from rollcli.imaging.vdisparity import v_disparity as v_disparity
+
+_HOMES = {
+    "RollEstimate": "rollcli.estimator.estimate",
+    "RollcliError": "rollcli.errors",
+    "compute_disparity": "rollcli.imaging.stereo",
+    "derotate": "rollcli.imaging.derotate",
+    "estimate_roll": "rollcli.estimator.estimate",
+    "read_disparity": "rollcli.files.encodings",
+    "v_disparity": "rollcli.imaging.vdisparity",
+}
+__all__ = [  # noqa: F822 (resolved by __getattr__)
+    "RollEstimate",
+    "RollcliError",
+    "__version__",
+    "compute_disparity",
+    "derotate",
+    "estimate_roll",
+    "read_disparity",
+    "v_disparity",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOMES:
+        return getattr(import_module(_HOMES[name]), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,1 @@
+"""Many frames: one job a frame, workers, order, resume, counts."""

@@ -1,0 +1,1 @@
+"""The experiments of the paper, and accuracy against known angles."""

@@ -1,0 +1,1 @@
+"""What OpenCV does for us: stereo matching, de-rotation, v-disparity images."""

@@ -1,0 +1,1 @@
+"""Road stereo pairs with known roll, by ray casting."""
