@@ -27,7 +27,7 @@ _HOMES = {
     "read_disparity": "rollcli.files.encodings",
     "v_disparity": "rollcli.imaging.vdisparity",
 }
-__all__ = [  # noqa: F822 (resolved by __getattr__)
+__all__ = [
     "RollEstimate",
     "RollcliError",
     "__version__",

@@ -8,7 +8,10 @@ from rollcli import __version__
 
 # name -> (module, one-line help): `rollcli --help` needs no command's module
 COMMANDS = {
-    "estimate": ("rollcli.cli.estimate", "The roll of each disparity map or stereo pair, as CSV or JSON Lines."),
+    "estimate": (
+        "rollcli.cli.estimate",
+        "The roll of each disparity map or stereo pair, as CSV or JSON Lines.",
+    ),
     "disparity": ("rollcli.cli.disparity", "Stereo pairs to disparity maps with OpenCV SGBM."),
     "derotate": ("rollcli.cli.derotate", "Rotate maps by one angle, or by the angles of a result."),
     "vdisparity": ("rollcli.cli.vdisparity", "v-disparity images of maps."),
@@ -35,7 +38,9 @@ class LazyGroup(click.Group):
             formatter.write_dl([(name, text) for name, (_, text) in COMMANDS.items()])
 
 
-@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"], "auto_envvar_prefix": "ROLLCLI"})
+@click.group(
+    cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"], "auto_envvar_prefix": "ROLLCLI"}
+)
 @click.version_option(__version__, prog_name="rollcli")
 def main() -> None:
     """Estimate the roll angle of a stereo rig from disparity maps or stereo pairs."""

@@ -1,0 +1,248 @@
+"""The energy of [GD] eq. 9, its gradient (eq. 12-13), its curvature and its parabola, from moments alone.
+
+[GD]: Fan, Wang, Liu, Pitas, "A Robust Roll Angle Estimation Algorithm Based on Gradient Descent",
+arXiv:1906.01894.
+
+Moved to the centroid of the pixels and freed of its best plane, a map is a plane (c1, c2) and a residual r
+that is orthogonal to 1, p and q. In the frame rotated by theta the plane is ``cx x + cy y``; `cy y` and the
+constant belong to the road, so the road has to explain ``e = r + cx x`` by a parabola in y. What is left of
+`e` is small near the minimum: nothing large cancels, unlike in ``d'd - d'YJd``.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollcli.errors import EstimationError
+from rollcli.estimator.moments import Floats, Grid, Moments
+
+# x^i y^j of the rotated frame that the energy and its two derivatives need, as (i, j)
+_OF_WEIGHTS = ((2, 0), (1, 1), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3), (2, 2), (1, 3), (0, 4))
+_OF_RESIDUAL = ((2, 0), (1, 1), (0, 2))
+_SINGULAR = 1e-10  # a variance below this share of its square scale is rounding error
+
+
+class Terms(NamedTuple):
+    """The energy at one angle, or at many: each entry a float, or an array shaped like the angles.
+
+    Attributes
+    ----------
+    value : float or ndarray
+        E_min(theta), the weighted sum of squared residuals, px^2.
+    gradient, curvature : float or ndarray
+        Its first and second derivative with respect to theta, px^2/rad and px^2/rad^2.
+    """
+
+    value: Any
+    gradient: Any
+    curvature: Any
+
+
+@dataclass(frozen=True)
+class Energy:
+    """E_min as a function of theta, with period pi. Make it with `Energy.of`.
+
+    Attributes
+    ----------
+    weight : float
+        The sum of the pixels' weights.
+    peak : float
+        The largest disparity used, px: the unit of the normalised energy.
+    parabolic : bool
+        Whether the road is a parabola in y or a line.
+    grid : Grid
+        Normalised coordinates with their origin at the centroid of the pixels.
+    plane : tuple of float
+        The pixels' best plane c0 + c1 p + c2 q on `grid`, px.
+    rest : float
+        Weighted sum of squared residuals of that plane, px^2.
+    forms : ndarray, shape (13, 12)
+        The rotated moments as polynomials in cos(theta) and sin(theta).
+    """
+
+    weight: float
+    peak: float
+    parabolic: bool
+    grid: Grid
+    plane: tuple[float, float, float]
+    rest: float
+    forms: Floats
+
+    @classmethod
+    def of(cls, moments: Moments, peak: float, *, parabolic: bool = True) -> Energy:
+        """Reduce the moments of a map.
+
+        Parameters
+        ----------
+        moments : Moments
+        peak : float
+            The largest disparity among the pixels, px.
+        parabolic : bool
+            The road model: d = a0 + a1 y + a2 y^2, or its first two terms.
+
+        Raises
+        ------
+        EstimationError
+            When the pixels do not determine a plane, or every angle fits them equally well.
+        """
+        n = moments.weight
+        if n <= 0:
+            raise EstimationError("no valid pixel: all are zero, negative, not finite or masked out")
+        p, q = moments.s[1, 0] / n, moments.s[0, 1] / n
+        s = _shift(5, p) @ moments.s @ _shift(5, q).T
+        t = _shift(3, p) @ moments.t @ _shift(3, q).T
+        spread = s[2, 0] * s[0, 2] - s[1, 1] ** 2
+        if spread <= _SINGULAR * (s[2, 0] + s[0, 2]) ** 2:
+            raise EstimationError("the valid pixels lie on one line: they do not determine a roll angle")
+        dc0 = t[0, 0] / n
+        dc1 = (s[0, 2] * t[1, 0] - s[1, 1] * t[0, 1]) / spread
+        dc2 = (s[2, 0] * t[0, 1] - s[1, 1] * t[1, 0]) / spread
+        c0, c1, c2 = moments.plane
+        rest = max(0.0, float(moments.rr - dc0 * t[0, 0] - dc1 * t[1, 0] - dc2 * t[0, 1]))
+        sources = [s[i, j] for i, j in _monomials(2)]
+        residual = [t[i, j] - dc0 * s[i, j] - dc1 * s[i + 1, j] - dc2 * s[i, j + 1] for i, j in _monomials(2)]
+        higher = [s[i, j] for k in (3, 4) for i, j in _monomials(k)]
+        grid = moments.grid
+        centred = Grid(grid.centre_u + p * grid.scale, grid.centre_v + q * grid.scale, grid.scale)
+        plane = (float(c0 + c1 * p + c2 * q + dc0), float(c1 + dc1), float(c2 + dc2))
+        energy = cls(
+            n, peak, parabolic, centred, plane, rest, _rotations() @ np.array(sources + residual + higher)
+        )
+        if energy.slope_energy + abs(np.array(residual)).max() ** 2 / n <= 1e-18 * n * max(peak, 1e-300) ** 2:
+            raise EstimationError(
+                "the disparity is the same everywhere: every roll angle fits it equally well"
+            )
+        return energy
+
+    @property
+    def slope_energy(self) -> float:
+        """What the best plane explains beyond its mean, px^2."""
+        xx, xy, yy = self.forms[0, 0], self.forms[1, 0], self.forms[2, 0]
+        _, c1, c2 = self.plane
+        return float(c1 * c1 * xx + 2 * c1 * c2 * xy + c2 * c2 * yy)
+
+    @property
+    def normaliser(self) -> float:
+        """Factor to half the mean squared residual of d / max(d), the unit in which lambda(0) = 26 holds."""
+        return 1 / (2 * self.weight * self.peak**2)
+
+    def at(self, theta: Any) -> Terms:
+        """Evaluate energy, gradient and curvature.
+
+        Parameters
+        ----------
+        theta : float or ndarray
+            Radians.
+
+        Returns
+        -------
+        Terms
+        """
+        xx, xy, yy, xxx, xxy, xyy, yyy, xxyy, xyyy, yyyy, rxx, rxy, ryy, cx, cy = self._rotated(theta)
+        n = self.weight
+        skew, mean = yyy / yy, yy / n  # phi = y^2 - skew y - mean is orthogonal to 1 and y
+        per_phi = self._inverse(yyyy - yyy * skew - yy * mean, yyyy)
+        phi = ryy + cx * (xyy - skew * xy)
+        b2 = phi * per_phi
+        b1 = cx * xy / yy - skew * b2
+        b0 = -mean * b2
+        value = self.rest + cx * cx * (xx - xy * xy / yy) - phi * b2
+        slope, bend = cy + b1, 2 * b2  # of the road's parabola, at the centroid
+        res_x = cx * xx - b1 * xy - b2 * xyy
+        res_xy = rxy + cx * xxy - b0 * xy - b1 * xyy - b2 * xyyy
+        res_xx = rxx + cx * xxx - b0 * xx - b1 * xxy - b2 * xxyy
+        gradient = 2 * (slope * res_x + bend * res_xy)
+        # the coefficients turn with theta too: what their turning saves
+        z0 = bend * xy
+        z1 = slope * xy + bend * xyy - res_x
+        z2 = slope * xyy + bend * xyyy - 2 * res_xy
+        saved = z0 * z0 / n + z1 * z1 / yy + (z2 - skew * z1 - mean * z0) ** 2 * per_phi
+        moved = slope * slope * xx + 2 * slope * bend * xxy + bend * bend * xxyy
+        return Terms(value, gradient, 2 * (moved - saved - bend * res_xx))
+
+    def parabola(self, theta: float) -> tuple[float, float, float]:
+        """Return (a0, a1, a2) of the road d = a0 + a1 y + a2 y^2 at `theta`, in pixels.
+
+        y = v cos(theta) - u sin(theta) is measured from the centre of the top-left pixel.
+        """
+        _, xy, yy, _, _, xyy, yyy, _, _, yyyy, _, _, ryy, cx, cy = self._rotated(theta)
+        skew, mean = yyy / yy, yy / self.weight
+        b2 = (ryy + cx * (xyy - skew * xy)) * self._inverse(yyyy - yyy * skew - yy * mean, yyyy)
+        slope = (cy + cx * xy / yy - skew * b2) / self.grid.scale
+        bend = b2 / self.grid.scale**2
+        level = self.plane[0] - mean * b2
+        y = self.grid.centre_v * math.cos(theta) - self.grid.centre_u * math.sin(theta)
+        a0, a1, a2 = level - slope * y + bend * y * y, slope - 2 * bend * y, bend
+        return float(a0), float(a1), float(a2)
+
+    def rmse(self, theta: float) -> float:
+        """Root of the mean squared residual at `theta`, px."""
+        return math.sqrt(max(0.0, self.at(theta).value) / self.weight)
+
+    def denominator(self, theta: Any) -> Any:
+        """Return det(Y'Y) / weight: E_min is a quotient of trigonometric polynomials over it."""
+        _, _, yy, _, _, _, yyy, _, _, yyyy, *_ = self._rotated(theta)
+        if not self.parabolic:
+            return yy
+        return yy * yyyy - yyy * yyy - yy**3 / self.weight
+
+    def _rotated(self, theta: Any) -> list[Any]:
+        """Return the moments in the frame rotated by theta, then the plane's slopes along x and y."""
+        c, s = np.cos(theta), np.sin(theta)
+        cc, cs, ss = c * c, c * s, s * s
+        basis = np.array(
+            [cc, cs, ss, cc * c, cc * s, c * ss, ss * s, cc * cc, cc * cs, cc * ss, cs * ss, ss * ss]
+        )
+        rotated: list[Any] = list(self.forms @ basis) if basis.ndim > 1 else (self.forms @ basis).tolist()
+        _, c1, c2 = self.plane
+        return [*rotated, c1 * c + c2 * s, c2 * c - c1 * s]
+
+    def _inverse(self, norm: Any, scale: Any) -> Any:
+        """Return 1 / norm, or 0, which drops the square: for a line, or where y has two values only."""
+        if not self.parabolic:
+            return 0.0
+        if isinstance(norm, float):
+            return 1 / norm if norm > _SINGULAR * scale else 0.0
+        regular = norm > _SINGULAR * scale
+        return np.where(regular, 1 / np.where(regular, norm, 1), 0.0)
+
+
+def _shift(size: int, by: float) -> Floats:
+    """Return the matrix that takes sums of p^k to sums of (p - by)^k."""
+    return np.array(
+        [[math.comb(i, k) * (-by) ** (i - k) if k <= i else 0.0 for k in range(size)] for i in range(size)]
+    )
+
+
+def _monomials(degree: int) -> list[tuple[int, int]]:
+    return [(degree - j, j) for j in range(degree + 1)]
+
+
+@cache
+def _rotations() -> NDArray[np.float64]:
+    """Return the map from moments on the grid to `Energy.forms`, shape (13, 12, 15).
+
+    x^i y^j = (c p + s q)^i (c q - s p)^j, expanded into c^a s^b times p^k q^l. Sources: the weights' moments
+    of degree 2, the residual's of degree 2, the weights' of degree 3 and 4.
+    """
+    basis = [pair for degree in (2, 3, 4) for pair in _monomials(degree)]
+    source = {("w", m): k for k, m in enumerate(_monomials(2))}
+    source |= {("r", m): 3 + k for k, m in enumerate(_monomials(2))}
+    source |= {("w", m): 6 + k for k, m in enumerate([*_monomials(3), *_monomials(4)])}
+    rows = [("w", m) for m in _OF_WEIGHTS] + [("r", m) for m in _OF_RESIDUAL]
+    tensor = np.zeros((len(rows), len(basis), len(source)))
+    for row, (kind, (i, j)) in enumerate(rows):
+        for k in range(i + 1):  # k factors p out of x, l factors q out of y
+            for m in range(j + 1):
+                sines = i - k + j - m
+                power = (k + j - m, i - k + m)
+                sign = (-1) ** (j - m)
+                column = basis.index((i + j - sines, sines))
+                tensor[row, column, source[kind, power]] += sign * math.comb(i, k) * math.comb(j, m)
+    return tensor
