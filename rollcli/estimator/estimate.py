@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from rollcli.errors import EstimationError, UsageError
 from rollcli.estimator.energy import Energy
 from rollcli.estimator.exact import exact, minima
+from rollcli.estimator.golden_section import golden_section
 from rollcli.estimator.gradient_descent import LAMBDA0, TOLERANCE, gradient_descent
 from rollcli.estimator.moments import map_moments
 from rollcli.estimator.solution import Solution
@@ -169,6 +170,8 @@ def estimate_roll(
 def _solve(energy: Energy, method: str, tolerance: float, lambda0: float | Literal["auto"]) -> Solution:
     if method == "gd":
         return gradient_descent(energy, tolerance, lambda0)
+    if method == "gss":
+        return golden_section(energy, tolerance)
     if method == "exact":
         return exact(energy)
     raise UsageError(f"method {method!r} is not one of {', '.join(METHODS)}")
