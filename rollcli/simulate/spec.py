@@ -1,0 +1,207 @@
+"""What one simulated frame is: the rig, the scene and the seeds, all that its bytes depend on."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from rollcli.errors import UsageError
+from rollcli.simulate.camera import Camera, stereo_rig
+
+SCENES = ("bare", "open", "street", "verge")
+SIZE = (640, 480)
+FOCAL_PER_WIDTH = 0.58  # the KITTI cameras' field of view
+BASELINE = 0.54
+HEIGHT = 1.65
+NOISE = 1.5
+MAX_PITCH = math.radians(60)
+MAX_CURVATURE = 0.01
+
+# streams of random numbers of a frame: each part draws from its own, so that one cannot shift another
+_POSE, _SCENE, _SENSOR = range(3)
+
+
+@dataclass(frozen=True)
+class FrameSpec:
+    """One frame to render; equal specs give equal bytes.
+
+    Parameters
+    ----------
+    scene : str
+        One of `SCENES`.
+    roll, pitch : float
+        Radians. Positive roll: the rig's right end is up. Positive pitch: it looks down at the road.
+    curvature : float
+        Second derivative of the road's height along the driving direction, 1/m; a sag is positive, a
+        crest negative.
+    size : tuple of int
+        Width and height, pixels.
+    focal : float
+        Focal length, pixels.
+    baseline, height : float
+        Metres; the height is that of the left camera over the road.
+    noise : float
+        Standard deviation of the sensor's noise, grey levels of 255.
+    gain : float
+        Brightness of the right view relative to the left one.
+    colour : bool
+        Three channels (BGR) or one.
+    seed, index : int
+        The random content is drawn from these two.
+    """
+
+    scene: str = "street"
+    roll: float = 0.0
+    pitch: float = 0.0
+    curvature: float = 0.0
+    size: tuple[int, int] = SIZE
+    focal: float = FOCAL_PER_WIDTH * SIZE[0]
+    baseline: float = BASELINE
+    height: float = HEIGHT
+    noise: float = NOISE
+    gain: float = 1.0
+    colour: bool = True
+    seed: int = 0
+    index: int = 0
+
+    def __post_init__(self) -> None:
+        for problem in _problems(self):
+            raise UsageError(problem)
+
+    @property
+    def cameras(self) -> tuple[Camera, Camera]:
+        """The left and the right camera."""
+        return stereo_rig(self.size, self.focal, self.roll, self.pitch, self.height, self.baseline)
+
+    def scene_rng(self) -> np.random.Generator:
+        """Random numbers for what stands where and what it looks like."""
+        return _stream(self.seed, self.index, _SCENE)
+
+    def sensor_rng(self) -> np.random.Generator:
+        """Random numbers for the noise of both views."""
+        return _stream(self.seed, self.index, _SENSOR)
+
+
+def draw_specs(
+    n: int,
+    *,
+    scene: str = "mixed",
+    roll: tuple[float, float] = (math.radians(-10), math.radians(10)),
+    pitch: tuple[float, float] = (math.radians(-2), math.radians(6)),
+    curvature: tuple[float, float] | None = None,
+    size: tuple[int, int] = SIZE,
+    focal: float | None = None,
+    baseline: float = BASELINE,
+    height: float = HEIGHT,
+    noise: float = NOISE,
+    gain: float = 1.0,
+    colour: bool = True,
+    seed: int = 0,
+) -> list[FrameSpec]:
+    """The specs of `n` frames; the i-th is the same whatever `n` is.
+
+    Parameters
+    ----------
+    n : int
+        How many.
+    scene : str
+        One of `SCENES`, or ``mixed``: each frame draws one of them.
+    roll, pitch : tuple of float
+        Lowest and highest angle, radians; drawn evenly.
+    curvature : tuple of float or None
+        Lowest and highest vertical curvature, 1/m, drawn evenly. None: ``bare`` is flat, in the
+        other scenes every second frame is flat and the others lie within +-0.001 (a radius of 1 km).
+    focal : float or None
+        Pixels; None: 0.58 times the width.
+
+    Other parameters are those of `FrameSpec`.
+
+    Raises
+    ------
+    UsageError
+        A number that cannot be, or numbers that contradict each other.
+    """
+    if n < 1:
+        raise UsageError(f"at least one frame must be asked for, not {n}")
+    if scene not in (*SCENES, "mixed"):
+        raise UsageError(f"no such scene: {scene}; choose one of {', '.join((*SCENES, 'mixed'))}")
+    if seed < 0:
+        raise UsageError(f"the seed must be 0 or more, not {seed}")
+    for name, span in (("roll", roll), ("pitch", pitch), ("curvature", curvature or (0.0, 0.0))):
+        if not span[0] <= span[1]:
+            raise UsageError(f"the range of the {name} is empty: its lower end comes first")
+    specs = []
+    for index in range(n):
+        rng = _stream(seed, index, _POSE)
+        theta, phi = rng.uniform(*roll), rng.uniform(*pitch)
+        kind = SCENES[rng.integers(len(SCENES))] if scene == "mixed" else scene
+        bend = rng.choice([0.0, 1.0]) * rng.uniform(-0.001, 0.001)
+        if curvature is not None:
+            bend = rng.uniform(*curvature)
+        elif kind == "bare":
+            bend = 0.0
+        specs.append(
+            FrameSpec(
+                scene=kind,
+                roll=float(theta),
+                pitch=float(phi),
+                curvature=float(bend),
+                size=size,
+                focal=FOCAL_PER_WIDTH * size[0] if focal is None else focal,
+                baseline=baseline,
+                height=height,
+                noise=noise,
+                gain=gain,
+                colour=colour,
+                seed=seed,
+                index=index,
+            )
+        )
+    return specs
+
+
+def _stream(seed: int, index: int, part: int) -> np.random.Generator:
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(index, part)))
+
+
+def _problems(spec: FrameSpec) -> Iterator[str]:
+    """What cannot be, in words; nothing when the spec is sound."""
+    width, height = spec.size
+    numbers = (
+        spec.roll,
+        spec.pitch,
+        spec.curvature,
+        spec.focal,
+        spec.baseline,
+        spec.height,
+        spec.noise,
+        spec.gain,
+    )
+    if not all(map(math.isfinite, numbers)):
+        yield "every number of a simulated rig must be finite"
+    if spec.scene not in SCENES:
+        yield f"no such scene: {spec.scene}; choose one of {', '.join(SCENES)}"
+    if not (16 <= width <= 16384 and 16 <= height <= 16384):
+        yield f"a size of {width}x{height} is not one of 16 to 16384 pixels each way"
+    if spec.focal <= 0:
+        yield f"the focal length must be more than 0 px, not {spec.focal:g}"
+    if spec.baseline <= 0:
+        yield f"the baseline must be more than 0 m, not {spec.baseline:g}"
+    if abs(spec.roll) > math.pi / 2:
+        yield f"a roll of {math.degrees(spec.roll):g} degrees is beyond +-90"
+    if abs(spec.pitch) > MAX_PITCH:
+        yield f"a pitch of {math.degrees(spec.pitch):g} degrees is beyond +-60"
+    if abs(spec.curvature) > MAX_CURVATURE:
+        yield f"a curvature of {spec.curvature:g} per metre is beyond +-{MAX_CURVATURE:g} (a radius of 100 m)"
+    if spec.noise < 0:
+        yield f"the noise must be 0 or more grey levels, not {spec.noise:g}"
+    if spec.gain <= 0:
+        yield f"the gain must be more than 0, not {spec.gain:g}"
+    if spec.height <= 0:
+        yield f"at a height of {spec.height:g} m the camera is under the road: the height must be more than 0"
+    elif spec.height + spec.baseline * math.sin(spec.roll) * math.cos(spec.pitch) <= 0:
+        yield (
+            f"at a roll of {math.degrees(spec.roll):g} degrees the right camera is under the road: "
+            f"mount the rig higher than {spec.height:g} m or closer together than {spec.baseline:g} m"
+        )
