@@ -1,0 +1,70 @@
+"""Files that appear whole or not at all: written beside their target, then renamed onto it."""
+
+import contextlib
+import os
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import BinaryIO
+
+from rollcli.errors import OutputError
+
+
+def output_error(path: str | Path, error: OSError) -> OutputError:
+    """One line for a write that failed, naming the target rather than the temporary file."""
+    return OutputError(f"{path}: cannot be written: {(error.strerror or str(error)).lower()}")
+
+
+@contextlib.contextmanager
+def atomic_file(path: str | Path) -> Iterator[BinaryIO]:
+    """Open a binary file that takes its name when the block ends, and vanishes when the block fails.
+
+    Parameters
+    ----------
+    path : str or Path
+        The target; parent folders are made. An existing file is replaced in one step.
+
+    Yields
+    ------
+    BinaryIO
+        The temporary file, in the target's folder so that the rename crosses no file system.
+
+    Raises
+    ------
+    OutputError
+        The target cannot be written (full disk, no permission, a folder of that name, ...).
+    """
+    target = Path(path)
+    temporary = None
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        if target.is_dir():
+            raise IsADirectoryError(None, "is a folder")
+        descriptor, temporary = tempfile.mkstemp(
+            prefix=f".{target.name[:100]}.", suffix=".part", dir=target.parent
+        )
+        with os.fdopen(descriptor, "wb") as file:
+            yield file
+        # mkstemp makes private files; a result has the permissions any new file would have
+        Path(temporary).chmod(0o666 & ~_umask())
+        Path(temporary).replace(target)
+        temporary = None
+    except OSError as error:
+        raise output_error(path, error) from error
+    finally:
+        if temporary is not None:
+            with contextlib.suppress(OSError):
+                Path(temporary).unlink()
+
+
+def write_atomic(path: str | Path, data: bytes) -> None:
+    """Write `data` to `path`, whole or not at all; see `atomic_file`."""
+    with atomic_file(path) as file:
+        file.write(data)
+
+
+def _umask() -> int:
+    # the mask can only be read by setting it; a second thread between the calls would see 0o077, never less
+    mask = os.umask(0o077)
+    os.umask(mask)
+    return mask

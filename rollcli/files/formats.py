@@ -1,0 +1,171 @@
+"""Map and image files to arrays and back, through bytes.
+
+Bytes, because OpenCV's own file functions fail on non-ASCII names on Windows and print what they dislike.
+What a file is, its first bytes say; its name's ending decides nothing.
+"""
+
+import os
+import stat
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from rollcli.errors import InputError, OutputError
+from rollcli.files import npy, pfm, png, tiff
+from rollcli.files.stored import PICTURE_FLAGS, Stored, native
+
+__all__ = ["Stored", "decode_stored", "encode_stored", "read_bytes", "read_image", "read_stored"]
+
+_MAX_BYTES = 2**32
+_PICTURES = (b"\xff\xd8\xff", b"BM", b"P2", b"P3", b"P5", b"P6")
+_KNOWN = {
+    b"\xff\xd8\xff": "a JPEG image",
+    b"PK\x03\x04": "a ZIP or NPZ archive",
+    b"BM": "a BMP image",
+    b"GIF8": "a GIF image",
+    b"%PDF": "a PDF document",
+    b"\x1f\x8b": "a gzip file",
+    b"\x89HDF": "an HDF5 file",
+}
+
+
+def read_bytes(path: str | Path) -> bytes:
+    """The bytes of a regular file.
+
+    Raises
+    ------
+    InputError
+        It does not exist, may not be read, is empty, or is no regular file.
+    """
+    try:
+        # not blocking: a named pipe would otherwise wait for its writer for ever
+        descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+        with os.fdopen(descriptor, "rb") as file:
+            status = os.fstat(file.fileno())
+            if not stat.S_ISREG(status.st_mode):
+                raise InputError(f"{path}: is not a regular file")
+            if status.st_size > _MAX_BYTES:
+                raise InputError(f"{path}: has {status.st_size} bytes; no disparity map is that large")
+            data = file.read()
+    except IsADirectoryError:
+        raise InputError(f"{path}: is a folder, not a file") from None
+    except FileNotFoundError:
+        dangling = Path(path).is_symlink()
+        raise InputError(f"{path}: {'is a link to nothing' if dangling else 'no such file'}") from None
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
+    if not data:
+        raise InputError(f"{path}: is empty")
+    return data
+
+
+def read_stored(path: str | Path) -> Stored:
+    """Read a disparity map file: the numbers as they are stored; see `decode_stored`."""
+    return decode_stored(read_bytes(path), str(path))
+
+
+def decode_stored(data: bytes, name: str) -> Stored:
+    """Decode a map file of any readable format.
+
+    Parameters
+    ----------
+    data : bytes
+        A whole PNG, TIFF, NPY or PFM file.
+    name : str
+        What error messages call it.
+
+    Returns
+    -------
+    Stored
+        values of shape (H, W), not yet pixels: see `encodings.to_disparity`.
+
+    Raises
+    ------
+    InputError
+        Not such a file, truncated, damaged, not single-channel, or with no real numbers.
+    """
+    stored = _decoded(data, name)
+    if stored.values.dtype.kind == "b":
+        raise InputError(f"{name}: holds true and false: that is a mask, not a disparity map")
+    return stored
+
+
+def encode_stored(values: NDArray[Any], format: str, nodata: tuple[float, ...] = ()) -> bytes:  # noqa: A002
+    """Encode numbers as a map file.
+
+    Parameters
+    ----------
+    values : ndarray, shape (H, W)
+        PNG holds uint8 and uint16, PFM float32, TIFF and NPY any real dtype.
+    format : str
+        "png", "tiff", "npy" or "pfm".
+    nodata : tuple of float
+        The stored values that mean no data; written as GDAL's tag to a TIFF.
+
+    Raises
+    ------
+    OutputError
+        The format does not hold such numbers.
+    """
+    if format == "png":
+        return png.encode_png(values)
+    if format == "tiff":
+        return tiff.encode_tiff(values, nodata)
+    if format == "npy":
+        return npy.encode_npy(values)
+    if format == "pfm":
+        return pfm.encode_pfm(values)
+    raise OutputError(f"{format}: unknown map format; png, tiff, npy and pfm are written")
+
+
+def read_image(path: str | Path) -> NDArray[Any]:
+    """Read a camera image for stereo matching: grey (H, W) or BGR (H, W, 3), uint8 or uint16.
+
+    Raises
+    ------
+    InputError
+        No such image, truncated, damaged, or of other numbers.
+    """
+    data, name = read_bytes(path), str(path)
+    if data.startswith(png.SIGNATURE):
+        return png.picture(data, name)
+    if data.startswith(tiff.SIGNATURES):
+        return tiff.picture(data, name)
+    if not data.startswith(_PICTURES):
+        what = "a PNG, JPEG, TIFF, BMP, PGM or PPM file"
+        raise InputError(f"{name}: is {_what(data)}; a camera image is {what}")
+    pixels = cv2.imdecode(np.frombuffer(data, np.uint8), PICTURE_FLAGS)
+    if pixels is None:
+        raise InputError(f"{name}: is a damaged image")
+    return pixels
+
+
+def decode_mask(data: bytes, name: str) -> NDArray[np.bool_]:
+    """A mask from any map or PNG file: True where any colour is non-zero; shape (H, W)."""
+    pixels = png.picture(data, name) if data.startswith(png.SIGNATURE) else _decoded(data, name).values
+    mask: NDArray[np.bool_] = (pixels if pixels.ndim == 2 else pixels.max(axis=2)) != 0
+    return mask
+
+
+def _decoded(data: bytes, name: str) -> Stored:
+    if data.startswith(png.SIGNATURE):
+        return Stored(png.grey_values(data, name), "png")
+    if data.startswith(tiff.SIGNATURES):
+        return tiff.decode_tiff(data, name)
+    if data.startswith(npy.MAGIC):
+        return Stored(native(npy.decode_npy(data, name)), "npy")
+    if data.startswith(pfm.MAGICS):
+        return Stored(native(pfm.decode_pfm(data, name)), "pfm")
+    raise InputError(f"{name}: is {_what(data)}; a disparity map is a PNG, TIFF, NPY or PFM file")
+
+
+def _what(data: bytes) -> str:
+    """What a file that cannot be read seems to be."""
+    for signature, what in _KNOWN.items():
+        if data.startswith(signature):
+            return what
+    text = all(byte in b"\t\n\r\f" or byte >= 32 for byte in data[:200]) and b"\x7f" not in data[:200]
+    return "text" if text else "no file of a known format"

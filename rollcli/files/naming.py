@@ -1,0 +1,109 @@
+"""What file names say: their natural order, and which left image goes with which right one."""
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+# the marks of a left and of a right image: a word or letter of its own, leftImg8bit, m1_L1, 000123r
+_WORDS = (
+    r"(?<![A-Za-z])(?:left|LEFT)(?![a-z])|(?<![A-Z])Left(?![a-z])|(?<![A-Za-z])[lL](?![A-Za-z])",
+    r"(?<![A-Za-z])(?:right|RIGHT)(?![a-z])|(?<![A-Z])Right(?![a-z])|(?<![A-Za-z])[rR](?![A-Za-z])",
+)
+# numbers count as marks after such a word, or at the end of a name: im0, image_02, cam1/000.png, 000123_0
+_NUMBERS = (("0", "1"), ("2", "3"), ("1", "2"), ("1", "5"))
+_NUMBERED = (
+    r"((?<![A-Za-z])(?:im|img|image|cam|camera|view)[_-]?|(?<=[A-Za-z0-9])[_-](?=0*{0}$))0*{0}(?![0-9])"
+)
+
+
+def natural_key(name: str) -> tuple[tuple[tuple[int, int, str, str], ...], ...]:
+    """A sort key that puts frame2 before frame10, folder by folder."""
+    return tuple(
+        tuple(_run_key(run) for run in re.findall(r"[0-9]+|[^0-9]+", part)) for part in name.split("/")
+    )
+
+
+def _run_key(run: str) -> tuple[int, int, str, str]:
+    if "0" <= run[0] <= "9":
+        digits = run.lstrip("0")  # not int(): Python refuses numbers of thousands of digits
+        return 0, len(digits), digits, run
+    return 1, 0, run, ""
+
+
+@dataclass(frozen=True)
+class Matching:
+    """Which names go together; all numbers are positions in the lists given.
+
+    Attributes
+    ----------
+    pairs : list of (int, int)
+        Left and right.
+    ambiguous : tuple of lists of int, or None
+        Left and right names that share one key, when they are more than two.
+    """
+
+    pairs: list[tuple[int, int]]
+    ambiguous: tuple[list[int], list[int]] | None
+
+
+def match_names(lefts: Sequence[str], rights: Sequence[str], *, marked: bool = False) -> Matching:
+    """Match names that are equal but for their endings; where none are, by their left and right marks.
+
+    Parameters
+    ----------
+    lefts, rights : sequence of str
+        Relative paths with "/" separators; marks in folder names count too (image_2/0.png, image_3/0.png).
+    marked : bool
+        Only marks count: both sides hold the same files, and each is a left or a right one.
+
+    Notes
+    -----
+    One rule serves all names: were equal names and marks mixed, a frame_0 without a partner could pair with
+    the frame_1 of another moment.
+    """
+    if not marked:
+        equal = _matching(_grouped(map(_stem, lefts)), _grouped(map(_stem, rights)))
+        if equal.pairs:
+            return equal
+    attempts = [
+        _matching(
+            _grouped(_unmarked(each, left_mark, 0, marked) for each in lefts),
+            _grouped(_unmarked(each, right_mark, 1, marked) for each in rights),
+        )
+        for left_mark, right_mark in _NUMBERS
+    ]
+    return max(attempts, key=lambda each: len(each.pairs))
+
+
+def _matching(left_of: dict[str, list[int]], right_of: dict[str, list[int]]) -> Matching:
+    shared = [key for key in left_of if key in right_of]
+    ambiguous = [
+        (left_of[key], right_of[key]) for key in shared if len(left_of[key]) + len(right_of[key]) > 2
+    ]
+    return Matching(
+        pairs=[(left_of[key][0], right_of[key][0]) for key in shared],
+        ambiguous=ambiguous[0] if ambiguous else None,
+    )
+
+
+def _grouped(keys: Iterable[str | None]) -> dict[str, list[int]]:
+    groups: dict[str, list[int]] = {}
+    for position, key in enumerate(keys):
+        if key is not None:
+            groups.setdefault(key, []).append(position)
+    return groups
+
+
+def _stem(relative: str) -> str:
+    folder, slash, name = relative.rpartition("/")
+    return folder + slash + (name.rpartition(".")[0] or name)
+
+
+def _unmarked(relative: str, number: str, side: int, marked: bool) -> str | None:
+    """The path without its ending and its marks; None when `marked` and there are none."""
+    parts = []
+    for part in _stem(relative).split("/"):
+        without = re.sub(_WORDS[side], "*", part)
+        parts.append(re.sub(_NUMBERED.format(number), r"\1*", without))
+    key = "/".join(parts)
+    return None if marked and "*" not in key else key
