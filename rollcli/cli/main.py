@@ -1,10 +1,16 @@
-"""The `rollcli` group: commands are imported when they are called."""
+"""The `rollcli` group: commands are imported when they are called, and every error ends as one line."""
 
+import os
+import sys
+from collections.abc import Callable
+from functools import partial
 from importlib import import_module
+from typing import Any
 
 import click
 
 from rollcli import __version__
+from rollcli.errors import InputError, RollcliError, UsageError
 
 # name -> (module, one-line help): `rollcli --help` needs no command's module
 COMMANDS = {
@@ -19,6 +25,7 @@ COMMANDS = {
     "evaluate": ("rollcli.cli.evaluate", "The paper's experiments; accuracy against known angles."),
     "report": ("rollcli.cli.report", "An HTML report of a result."),
 }
+FAILED, USAGE, INTERRUPTED = 1, 2, 130
 
 
 class LazyGroup(click.Group):
@@ -37,10 +44,84 @@ class LazyGroup(click.Group):
         with formatter.section("Commands"):
             formatter.write_dl([(name, text) for name, (_, text) in COMMANDS.items()])
 
+    def invoke(self, ctx: click.Context) -> Any:
+        try:
+            return super().invoke(ctx)
+        except BrokenPipeError:  # here, since click would call it a failure
+            _leave_closed_pipe()
+            return ctx.exit(0)
+
+    def main(self, *args: Any, standalone_mode: bool = True, **extra: Any) -> Any:
+        program = partial(super().main, *args, standalone_mode=False, **extra)
+
+        if not standalone_mode:
+            return program()
+        sys.exit(exit_status(program))
+
+
+def exit_status(program: Callable[[], Any]) -> int:
+    """Run the program; what goes wrong is one line on stderr and the documented status."""
+    try:
+        status = program()
+    except click.ClickException as error:
+        return _say(_with_hint(error), error.exit_code)
+    except (click.Abort, KeyboardInterrupt):
+        return _say("interrupted", INTERRUPTED)
+    except RollcliError as error:
+        return _say(str(error), USAGE if isinstance(error, UsageError | InputError) else FAILED)
+    except MemoryError:
+        return _say("out of memory", FAILED)
+    return status if isinstance(status, int) else 0
+
+
+def _with_hint(error: click.ClickException) -> str:
+    message = error.format_message()
+    ctx = getattr(error, "ctx", None)
+    return f"{message} (see '{ctx.command_path} --help')" if ctx is not None else message
+
+
+def _say(message: str, status: int) -> int:
+    click.echo("rollcli: " + " ".join(message.split()), err=True)
+    return status
+
+
+def _leave_closed_pipe() -> None:
+    """The reader has had enough: let the interpreter flush what is left to nowhere."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 1)
+    os.close(nowhere)
+
+
+def _print_versions(ctx: click.Context, param: click.Parameter, asked: bool) -> None:
+    if asked and not ctx.resilient_parsing:
+        from rollcli.cli.versions import versions
+
+        click.echo("\n".join(f"{name} {version}" for name, version in versions()))
+        ctx.exit()
+
 
 @click.group(
-    cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"], "auto_envvar_prefix": "ROLLCLI"}
+    cls=LazyGroup,
+    name="rollcli",
+    invoke_without_command=True,
+    context_settings={
+        "help_option_names": ["-h", "--help"],
+        "auto_envvar_prefix": "ROLLCLI",
+        "show_default": True,
+        "max_content_width": 100,
+    },
 )
-@click.version_option(__version__, prog_name="rollcli")
-def main() -> None:
+@click.version_option(__version__, prog_name="rollcli", message="%(prog)s %(version)s")
+@click.option(
+    "--versions",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_print_versions,
+    help="Show the versions of Python and of each dependency.",
+)
+@click.pass_context
+def main(ctx: click.Context) -> None:
     """Estimate the roll angle of a stereo rig from disparity maps or stereo pairs."""
+    if ctx.invoked_subcommand is None:
+        click.echo(ctx.get_help())

@@ -1,0 +1,88 @@
+"""One frame in, one row out."""
+
+import math
+import time
+from dataclasses import replace
+from typing import Any
+
+import cv2
+import numpy as np
+
+from rollcli.batch.images import write_images
+from rollcli.batch.job import Frame, Outcome, failed
+from rollcli.batch.options import FrameOptions, MethodOptions
+from rollcli.batch.region import region_mask
+from rollcli.batch.source import Source, read_source
+from rollcli.errors import EstimationError, InputError, UsageError
+from rollcli.estimator.estimate import RollEstimate, estimate_roll
+from rollcli.files.results import Row
+
+# what may be wrong with a frame without being wrong with the batch
+_FAULTS = (InputError, EstimationError, UsageError, OSError, MemoryError, cv2.error, np.linalg.LinAlgError)
+# more of the map than this at the end of the searched range: the range was too short for the scene
+_MUCH_AT_END = 0.05
+
+
+def run_frame(frame: Frame, options: FrameOptions) -> Outcome:
+    """Do one frame; whatever is wrong with it becomes an `error` row.
+
+    Raises
+    ------
+    OutputError
+        An image cannot be written: that ends the run.
+    """
+    start = time.perf_counter()
+    try:
+        outcome = _measured(frame, options)
+    except _FAULTS as error:
+        outcome = failed(frame, str(error) or type(error).__name__)
+    elapsed = 1000 * (time.perf_counter() - start)
+    return replace(outcome, row=replace(outcome.row, elapsed_ms=elapsed))
+
+
+def _measured(frame: Frame, options: FrameOptions) -> Outcome:
+    source = read_source(frame, options)
+    mask = region_mask(frame.mask, options.region, source.disparity.shape)
+    estimate = estimate_roll(source.disparity, mask=mask, **_arguments(options.method))
+    write_images(frame, source, estimate, options)
+    return Outcome(_row(frame, source, estimate), source.encoding, source.warning, source.searched)
+
+
+def _arguments(options: MethodOptions) -> dict[str, Any]:
+    return {
+        "method": options.method,
+        "model": options.model,
+        "road": options.road,
+        "lambda0": options.lambda0,
+        "tolerance": math.radians(options.tolerance_deg),
+        "max_roll": math.radians(options.max_roll_deg),
+        "seed": options.seed,
+    }
+
+
+def _row(frame: Frame, source: Source, estimate: RollEstimate) -> Row:
+    reasons = [estimate.message] if estimate.message else []
+    if source.end_fraction > _MUCH_AT_END:
+        share = f"{source.end_fraction:.0%} of the map lies at the end of the searched range"
+        reasons.append(f"{share}; use a larger --num-disparities")
+    alpha0, alpha1, alpha2 = estimate.alpha
+    return Row(
+        file=frame.file,
+        right_file=frame.right_file,
+        status="suspect" if reasons else estimate.status,
+        roll_deg=math.degrees(estimate.theta),
+        roll_ci95_deg=None if estimate.ci95 is None else math.degrees(estimate.ci95),
+        method=estimate.method,
+        iterations=estimate.iterations,
+        converged=estimate.converged,
+        global_minimum=estimate.global_minimum,
+        rmse_px=estimate.rmse,
+        alpha0=alpha0,
+        alpha1=alpha1,
+        alpha2=alpha2,
+        valid_fraction=estimate.valid_fraction,
+        road_fraction=estimate.road_fraction,
+        width=estimate.width,
+        height=estimate.height,
+        message="; ".join(reasons),
+    )

@@ -1,0 +1,195 @@
+"""Where rows go: to a stream, or row by row to a file that a later run can take up again."""
+
+import contextlib
+import os
+import stat
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Protocol
+
+from rollcli.batch.lock import lock
+from rollcli.errors import UsageError
+from rollcli.files.atomic import output_error
+from rollcli.files.results import Format, Row, format_header, format_row
+
+
+class RowSink(Protocol):
+    """Takes rows in order; a row that was appended has left this process."""
+
+    def begin(self) -> None: ...
+
+    def append(self, row: Row) -> None: ...
+
+
+class RowStream:
+    """Rows to stdout, a pipe or a device: there is nothing to resume."""
+
+    def __init__(self, descriptor: int, name: str, form: Format, timing: bool) -> None:
+        self._descriptor, self._name = descriptor, name
+        self._form, self._timing = form, timing
+
+    def begin(self) -> None:
+        """Write the header."""
+        self._write(format_header(self._form, self._timing))
+
+    def append(self, row: Row) -> None:
+        """Write one row."""
+        self._write(format_row(row, self._form, self._timing))
+
+    def _write(self, data: bytes) -> None:
+        try:
+            while data:
+                data = data[os.write(self._descriptor, data) :]
+        except BrokenPipeError:
+            raise
+        except OSError as error:
+            raise output_error(self._name, error) from error
+
+
+class ResultFile:
+    """Rows to a regular file, locked against a second run.
+
+    Attributes
+    ----------
+    kept : bytes
+        The whole rows of an interrupted run, header included; empty unless resumed.
+    descriptor : int
+        The locked file: workers hold it too, so that the lock outlasts a killed run until they have ended.
+    """
+
+    def __init__(self, descriptor: int, name: str, form: Format, timing: bool, kept: bytes) -> None:
+        self.descriptor, self.kept = descriptor, kept
+        self._name, self._form, self._timing = name, form, timing
+
+    def empty(self, *, keep: bool) -> None:
+        """Leave nothing but the rows that are kept, if they are."""
+        self.kept = self.kept if keep else b""
+        try:
+            os.ftruncate(self.descriptor, len(self.kept))
+            os.lseek(self.descriptor, 0, os.SEEK_END)
+        except OSError as error:
+            raise output_error(self._name, error) from error
+
+    def begin(self) -> None:
+        """Write the header, unless it is among what was kept."""
+        if not self.kept:
+            self._append(format_header(self._form, self._timing))
+
+    def append(self, row: Row) -> None:
+        """Write one row, whole or not at all."""
+        self._append(format_row(row, self._form, self._timing))
+
+    def _append(self, line: bytes) -> None:
+        try:
+            before = os.lseek(self.descriptor, 0, os.SEEK_CUR)
+            written = os.write(self.descriptor, line)
+            if written < len(line):
+                # the next write says what was wrong: the disk is full, or a limit is reached
+                os.write(self.descriptor, line[written:])
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                os.ftruncate(self.descriptor, before)
+            raise output_error(self._name, error) from error
+
+
+@contextlib.contextmanager
+def open_sink(name: str, form: Format, *, resume: bool, overwrite: bool, timing: bool) -> Iterator[RowSink]:
+    """Open the place for the rows; nothing that is there is touched yet.
+
+    Raises
+    ------
+    UsageError
+        A result exists and neither resume nor overwrite is given, or another run is writing it.
+    OutputError
+        It cannot be written.
+    """
+    check_result(name, resume=resume, overwrite=overwrite)
+    if name == "-" or _is_stream(name):
+        yield from _open_stream(name, form, timing)
+        return
+    descriptor = _open_file(name)
+    try:
+        lock(descriptor, name)
+        check_result(name, resume=resume, overwrite=overwrite)  # now that no one else can write it
+        kept = whole_rows(_read_all(descriptor), form) if resume else b""
+        yield ResultFile(descriptor, name, form, timing, kept)
+    finally:
+        os.close(descriptor)
+
+
+def check_result(name: str, *, resume: bool, overwrite: bool) -> None:
+    """Refuse to touch a result that is there, unless told how; an empty file is none."""
+    if resume and overwrite:
+        raise UsageError("give either --resume or --overwrite")
+    if name == "-" or _is_stream(name):
+        if resume:
+            raise UsageError("--resume needs a result file: name it with --output")
+        return
+    if not (resume or overwrite) and _size(name):
+        raise UsageError(f"{name}: exists already; give --resume to continue it or --overwrite to replace it")
+
+
+def _size(name: str) -> int:
+    try:
+        return Path(name).stat().st_size
+    except OSError:
+        return 0
+
+
+def _is_stream(name: str) -> bool:
+    """A device or pipe that exists."""
+    try:
+        mode = Path(name).stat().st_mode
+    except OSError:
+        return False
+    return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
+
+
+def _open_stream(name: str, form: Format, timing: bool) -> Iterator[RowSink]:
+    if name == "-":
+        yield RowStream(1, "standard output", form, timing)
+        return
+    try:
+        descriptor = os.open(name, os.O_WRONLY)
+    except OSError as error:
+        raise output_error(name, error) from error
+    try:
+        yield RowStream(descriptor, name, form, timing)
+    finally:
+        os.close(descriptor)
+
+
+def _open_file(name: str) -> int:
+    try:
+        Path(name).parent.mkdir(parents=True, exist_ok=True)
+        return os.open(
+            name, os.O_RDWR | os.O_CREAT | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0), 0o666
+        )
+    except OSError as error:
+        raise output_error(name, error) from error
+
+
+def _read_all(descriptor: int) -> bytes:
+    with open(descriptor, "rb", closefd=False) as file:
+        return file.read()
+
+
+def kept_rows(name: str, form: Format) -> bytes:
+    """The whole rows of a result that is there, without taking it."""
+    try:
+        return whole_rows(Path(name).read_bytes(), form)
+    except OSError:
+        return b""
+
+
+def whole_rows(data: bytes, form: Format) -> bytes:
+    """The data up to the end of the last row that is whole.
+
+    A row of CSV ends at a newline outside quotes: a file name may hold newlines.
+    """
+    end = data.rfind(b"\n") + 1
+    if form == "jsonl":
+        return data[:end]
+    while end and data.count(b'"', 0, end) % 2:
+        end = data.rfind(b"\n", 0, end - 1) + 1
+    return data[:end]

@@ -1,0 +1,170 @@
+"""A run: the plan, the workers, the rows in order, and the exit status."""
+
+import contextlib
+import os
+from collections.abc import Generator, Iterable, Sequence
+
+from rollcli.batch.job import Frame, Outcome, do
+from rollcli.batch.options import EstimateOptions
+from rollcli.batch.outputs import image_paths, remove_leftovers
+from rollcli.batch.plan import Plan, make_plan
+from rollcli.batch.record import RunRecord, check_resumable
+from rollcli.batch.report import INTERRUPTED, Report
+from rollcli.batch.result_file import ResultFile, RowSink, check_result, kept_rows, open_sink
+from rollcli.batch.signals import Stop, stop_on_signals
+from rollcli.errors import OutputError
+from rollcli.files.results import parse_rows, read_run, run_path
+
+_BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+
+
+def run(options: EstimateOptions, resume_command: str = "") -> int:
+    """Do what was asked.
+
+    Parameters
+    ----------
+    options : EstimateOptions
+    resume_command : str
+        What to type to continue this run, for the message when it is interrupted.
+
+    Returns
+    -------
+    int
+        The exit status: 0 all frames have an angle, 3 some have not, 130 interrupted.
+
+    Raises
+    ------
+    UsageError, OutputError
+        Exit statuses 2 and 1.
+    """
+    plan = make_plan(options)
+    if options.running.dry_run:
+        _list(plan, options)
+        return 0
+    for name in _BLAS_THREADS:
+        os.environ.setdefault(name, "1")  # before NumPy is loaded, here and in the workers
+    given, report = options.result, Report(len(plan.frames), options)
+    with open_sink(
+        plan.output,
+        plan.format,
+        resume=given.resume,
+        overwrite=options.running.overwrite,
+        timing=given.timing,
+    ) as sink:
+        record, done = _take_up(sink, plan, options, report)
+        try:
+            with stop_on_signals() as stop, report:
+                _work(plan.frames[done:], options, sink, record, report, stop)
+        except OutputError as error:
+            hint = f"; {report.done} rows are kept, continue with --resume" if record else ""
+            raise OutputError(f"{error}{hint}") from error
+    return _end(plan, record, report, stop, resume_command)
+
+
+def _take_up(
+    sink: RowSink, plan: Plan, options: EstimateOptions, report: Report
+) -> tuple[RunRecord | None, int]:
+    """Begin the result, or continue it; the record of the run, and how many rows are there already."""
+    if not isinstance(sink, ResultFile):
+        sink.begin()
+        return None, 0
+    record = RunRecord(plan, options)
+    rows = parse_rows(sink.kept, plan.output) if sink.kept else ()
+    if rows:
+        earlier = read_run(plan.output)
+        check_resumable(rows, earlier, record, plan)
+        record.continue_from(earlier or {})
+        report.keep(rows)
+    if options.result.resume or options.running.overwrite:
+        remove_leftovers(plan.frames[len(rows) :], options.images, plan.output)
+    # in this order a run that is killed in between can be resumed: an empty file is taken for a new one
+    sink.empty(keep=bool(rows))
+    record.write({})
+    sink.begin()
+    return record, len(rows)
+
+
+def _work(
+    frames: Sequence[Frame],
+    options: EstimateOptions,
+    sink: RowSink,
+    record: RunRecord | None,
+    report: Report,
+    stop: Stop,
+) -> None:
+    """Each frame's row, once its images are written."""
+    held = sink.descriptor if isinstance(sink, ResultFile) else None
+    with contextlib.closing(_outcomes(frames, options, held, stop)) as outcomes:
+        for outcome in outcomes:
+            if record is not None:
+                record.saw(outcome.encoding, outcome.searched)
+            sink.append(outcome.row)
+            report.add(outcome)
+            if options.result.fail_fast and outcome.row.status == "error":
+                report.stopped_early = True
+                return
+    report.stopped_early = stop.asked and report.done < report.total
+
+
+def _outcomes(
+    frames: Sequence[Frame], options: EstimateOptions, held: int | None, stop: Stop
+) -> Generator[Outcome, None, None]:
+    """Outcomes in order, from this process, from a pool of processes, or from a cluster."""
+    if options.result.scheduler is not None:
+        from rollcli.batch.cluster import cluster_outcomes
+
+        return cluster_outcomes(frames, options, stop)
+    jobs = min(options.running.jobs or _usable_processors(), len(frames))
+    if jobs <= 1:
+        return _here(frames, options, stop)
+    from rollcli.batch.pool import pool_outcomes  # one worker needs no pool
+
+    return pool_outcomes(frames, options.frame, jobs, held, stop)
+
+
+def _here(frames: Iterable[Frame], options: EstimateOptions, stop: Stop) -> Generator[Outcome, None, None]:
+    from rollcli.batch.threads import use_one_thread
+
+    use_one_thread()
+    each = options.frame
+    for frame in frames:
+        if stop.asked:
+            return
+        yield do(frame, each)
+
+
+def _usable_processors() -> int:
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:  # not on macOS and Windows
+        return os.cpu_count() or 1
+
+
+def _end(plan: Plan, record: RunRecord | None, report: Report, stop: Stop, resume_command: str) -> int:
+    if not report.stopped_early and record is not None:
+        record.write(report.totals)
+    report.note(report.summary())
+    if stop.asked and report.stopped_early:
+        report.say(f"interrupted; continue with: {resume_command}" if record else "interrupted")
+        return INTERRUPTED
+    return report.status
+
+
+def _list(plan: Plan, options: EstimateOptions) -> None:
+    """Say what would be read and written, a line each."""
+    given = options.result
+    check_result(plan.output, resume=given.resume, overwrite=options.running.overwrite)
+    done = (
+        len(parse_rows(kept, plan.output))
+        if given.resume and (kept := kept_rows(plan.output, plan.format))
+        else 0
+    )
+    lines = []
+    for frame in plan.frames[done:]:
+        lines += [f"read  {path}" for path in frame.reads()]
+        lines += [f"write {path}" for _, path in image_paths(frame, options.images)]
+    if plan.output != "-":
+        lines += [f"write {plan.output}", f"write {run_path(plan.output)}"]
+    data = "".join(f"{line}\n" for line in lines).encode("utf-8", "surrogateescape")
+    while data:
+        data = data[os.write(1, data) :]

@@ -1,0 +1,65 @@
+"""The disparity of a frame: read from a map, or matched from a pair."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from numpy.typing import NDArray
+
+from rollcli.batch.options import FrameOptions
+from rollcli.files.encodings import to_disparity
+from rollcli.files.formats import Stored, read_image, read_stored
+
+if TYPE_CHECKING:
+    from rollcli.batch.job import Frame
+
+
+@dataclass(frozen=True)
+class Source:
+    """The disparity of a frame, and where it comes from.
+
+    Attributes
+    ----------
+    disparity : ndarray, shape (H, W)
+        Pixels; 0 is no data.
+    stored : Stored or None
+        What the map file holds; None for a pair.
+    encoding, warning : str
+        How the stored numbers were read, and why that may be wrong.
+    searched : tuple of int, or None
+        First and last disparity searched, px; pairs only.
+    end_fraction : float
+        Share of the map at the end of the searched range; pairs only.
+    """
+
+    disparity: NDArray[Any]
+    stored: Stored | None = None
+    encoding: str = ""
+    warning: str = ""
+    searched: tuple[int, int] | None = None
+    end_fraction: float = 0.0
+
+
+def read_source(frame: "Frame", options: FrameOptions) -> Source:
+    """Read the frame's map, or match its pair.
+
+    Raises
+    ------
+    InputError
+        A file cannot be read as what it should be.
+    """
+    return _match(frame, options) if frame.right_file else _read(frame, options)
+
+
+def _read(frame: "Frame", options: FrameOptions) -> Source:
+    stored = read_stored(frame.path)
+    given = options.encoding
+    found = to_disparity(stored, encoding=given.encoding, scale=given.scale, invalid=given.invalid)
+    return Source(found.disparity, stored, found.encoding.value, found.warning or "")
+
+
+def _match(frame: "Frame", options: FrameOptions) -> Source:
+    from rollcli.imaging.stereo import match_pair
+
+    match = match_pair(read_image(frame.path), read_image(frame.right_path), options.stereo)
+    searched = (match.min_disparity, match.min_disparity + match.num_disparities - 1)
+    return Source(match.disparity, searched=searched, end_fraction=match.end_fraction)

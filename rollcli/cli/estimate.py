@@ -1,0 +1,80 @@
+"""`rollcli estimate`: the main job."""
+
+import shlex
+import sys
+from typing import Any
+
+import click
+
+from rollcli.batch.options import EstimateOptions, ResultOptions
+from rollcli.cli.command import command, option, record
+from rollcli.cli.config import config_option
+from rollcli.cli.options import (
+    PATH,
+    encoding_options,
+    image_options,
+    input_options,
+    method_options,
+    pair_options,
+    region_options,
+    running_options,
+    stereo_options,
+)
+from rollcli.cli.types import Shard
+
+result_options = record(
+    "result",
+    "Result",
+    ResultOptions,
+    option("-o", "--output", type=PATH, metavar="FILE", default="-", help="Where the rows go (-: stdout)."),
+    option(
+        "--format",
+        type=click.Choice(["csv", "jsonl"]),
+        help="CSV or JSON Lines.  [default: by FILE's ending, else csv]",
+    ),
+    option("--resume", is_flag=True, help="Keep the rows of an interrupted run and do the rest."),
+    option(
+        "--shard",
+        type=Shard(),
+        default=(1, 1),
+        show_default=False,
+        help="Take every N-th frame from the I-th.  [default: 1/1]",
+    ),
+    option("--fail-fast", is_flag=True, help="Stop at the first frame that fails."),
+    option("--timing", is_flag=True, help="Add the column elapsed_ms: milliseconds spent on the frame."),
+    option("--scheduler", metavar="ADDRESS", help="Run on this Dask cluster, such as tcp://host:8786."),
+)
+
+
+@command()
+@input_options
+@pair_options
+@result_options
+@image_options
+@encoding_options
+@region_options
+@method_options
+@stereo_options
+@running_options
+@config_option
+@click.pass_context
+def estimate(ctx: click.Context, /, **records: Any) -> None:
+    """The roll angle of each disparity map or stereo pair, one row a frame.
+
+    INPUTS are maps (PNG, TIFF, NPY, PFM), folders of them, quoted patterns, or - for paths on stdin.
+
+    \b
+    rollcli estimate maps/ -o rolls.csv
+    rollcli estimate --left cam/left --right cam/right -o rolls.csv --derotated upright/
+    """
+    options = EstimateOptions(**records)
+
+    from rollcli.batch.run import run  # what a run needs is loaded when there is one
+
+    ctx.exit(run(options, resume_command=_resume_command()))
+
+
+def _resume_command() -> str:
+    """This command, to continue what it began."""
+    words = [word for word in sys.argv[1:] if word not in ("--overwrite", "--resume")]
+    return shlex.join(["rollcli", *words, "--resume"])

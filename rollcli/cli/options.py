@@ -1,0 +1,241 @@
+"""The options that commands share, each declared once; a decorator hands its group over as one record."""
+
+from typing import Any
+
+import click
+
+from rollcli.batch.options import (
+    EncodingOptions,
+    ImageOptions,
+    InputOptions,
+    MethodOptions,
+    PairOptions,
+    RegionOptions,
+    RunningOptions,
+)
+from rollcli.cli.command import option, record
+from rollcli.cli.types import Number, NumberOrNan, Polygon, Roi
+from rollcli.imaging.stereo_options import StereoOptions
+
+PATH = click.Path()  # whether it exists is said by who reads it, in the same words for every way to name it
+
+
+def _stereo(*, num_disparities: int | str, sgbm_mode: str, **values: Any) -> StereoOptions:
+    searched = None if num_disparities == "auto" else int(num_disparities)
+    return StereoOptions(num_disparities=searched, mode=sgbm_mode, **values)
+
+
+def _method(*, tolerance: float, max_roll: float, **values: Any) -> MethodOptions:
+    return MethodOptions(tolerance_deg=tolerance, max_roll_deg=max_roll, **values)
+
+
+input_options = record(
+    "inputs",
+    "Input",
+    InputOptions,
+    click.argument("inputs", nargs=-1, type=PATH),
+    option(
+        "--files-from",
+        type=PATH,
+        metavar="FILE",
+        help="Read further inputs from FILE, one a line (-: stdin).",
+    ),
+    option("--recursive", is_flag=True, help="Look into the folders of folders too."),
+    option(
+        "--include", multiple=True, metavar="GLOB", help="Of folders, take only files that match. Repeatable."
+    ),
+    option("--exclude", multiple=True, metavar="GLOB", help="Leave out files that match. Repeatable."),
+)
+
+pair_options = record(
+    "pairs",
+    "Stereo pairs instead of maps",
+    PairOptions,
+    option(
+        "--left", type=PATH, metavar="PATH", help="The left images: a file, a folder or a quoted pattern."
+    ),
+    option(
+        "--right", type=PATH, metavar="PATH", help="The right images: a file, a folder or a quoted pattern."
+    ),
+    option(
+        "--match",
+        type=click.Choice(["name", "order"]),
+        default="name",
+        help="By name (the same but for left/right, l/r, L1/R1, image_2/image_3, im0/im1 …), or by order.",
+    ),
+)
+
+stereo_options = record(
+    "stereo",
+    "Stereo matching (OpenCV SGBM)",
+    _stereo,
+    option(
+        "--num-disparities",
+        type=Number("PX", above=0, whole=True, auto=True),
+        default="auto",
+        help="Width of the searched range, pixels, a multiple of 16; auto: found from each pair.",
+    ),
+    option(
+        "--min-disparity",
+        type=Number("PX", whole=True),
+        default=0,
+        help="Smallest disparity searched, pixels.",
+    ),
+    option(
+        "--block-size",
+        type=Number("PX", at_least=1, whole=True),
+        default=5,
+        help="Side of the matched block, pixels, odd.",
+    ),
+    option(
+        "--sgbm-mode",
+        type=click.Choice(["sgbm", "hh", "3way"]),
+        default="sgbm",
+        help="OpenCV's variants: 5 directions, 8 (slow, much memory) or 3 (fast).",
+    ),
+    option(
+        "--uniqueness",
+        type=Number("PERCENT", at_least=0, at_most=100, whole=True),
+        default=10,
+        help="Margin by which the best match must win, percent.",
+    ),
+    option(
+        "--speckle-size",
+        type=Number("PX", at_least=0, whole=True),
+        default=100,
+        help="Drop patches of up to this many pixels; 0: keep all.",
+    ),
+    option(
+        "--speckle-range",
+        type=Number("PX", at_least=0, whole=True),
+        default=2,
+        help="Disparity step within a patch, pixels.",
+    ),
+    option(
+        "--downscale",
+        type=Number("F", at_least=1),
+        default=1.0,
+        help="Match at 1/F of the size; maps and pixel columns then refer to that size.",
+    ),
+)
+
+encoding_options = record(
+    "encoding",
+    "What the stored numbers mean",
+    EncodingOptions,
+    option(
+        "--encoding",
+        type=click.Choice(["auto", "px", "kitti", "cityscapes", "sgbm"]),
+        default="auto",
+        help="px: pixels as they are; kitti: p/256; cityscapes: (p-1)/256; sgbm: p/16, negative is no data; "
+        "auto: float and uint8 are px, uint16 is kitti, int16 is sgbm.",
+    ),
+    option("--scale", type=Number("F", above=0), help="Pixels = stored number * F, instead of an encoding."),
+    option(
+        "--invalid",
+        type=NumberOrNan(),
+        multiple=True,
+        help="A further stored value that means no data (always: nan, inf, <= 0). Repeatable.",
+    ),
+)
+
+region_options = record(
+    "region",
+    "Which pixels",
+    RegionOptions,
+    option(
+        "--mask",
+        type=PATH,
+        metavar="PATH",
+        help="Use only non-zero pixels: one mask for all, or a folder with one of the same stem each.",
+    ),
+    option("--roi", type=Roi(), help="Use only this rectangle, pixels; X1 and Y1 are the first left out."),
+    option("--polygon", type=Polygon(), help="Use only the inside of these corners, pixels."),
+)
+
+method_options = record(
+    "method",
+    "Method",
+    _method,
+    option(
+        "--method",
+        type=click.Choice(["gd", "gss", "exact", "plane", "areas"]),
+        default="gd",
+        help="gd: gradient descent; gss: golden section search; exact: the global minimum, in closed form; "
+        "plane: one least-squares plane; areas: planes of many small areas.",
+    ),
+    option(
+        "--model",
+        type=click.Choice(["parabola", "line"]),
+        default="parabola",
+        help="Disparity of the road as a function of the row.",
+    ),
+    option(
+        "--road",
+        type=click.Choice(["auto", "all"]),
+        default="auto",
+        help="auto: find the road first; all: use every valid pixel, as the paper does.",
+    ),
+    option(
+        "--lambda0",
+        type=Number("FLOAT", above=0, auto=True),
+        default=26.0,
+        help="First learning rate of gd, rad^2 per unit of energy; auto: 1 / curvature.",
+    ),
+    option(
+        "--tolerance",
+        type=Number("DEG", above=0, at_most=90),
+        default=1e-4,
+        help="Stop when the angle moves by less than this, degrees.",
+    ),
+    option(
+        "--max-roll",
+        type=Number("DEG", above=0, at_most=90),
+        default=45.0,
+        help="Largest |roll| that road finding considers, degrees.",
+    ),
+    option(
+        "--seed",
+        type=Number("INT", at_least=0, whole=True),
+        default=0,
+        help="Seed of road finding's samples.",
+    ),
+)
+
+save_as_option = option(
+    "--save-as",
+    type=click.Choice(["png", "tiff", "npy"]),
+    default="png",
+    help="Format of maps computed from pairs: 16-bit KITTI PNG, float32 TIFF or float32 NPY.",
+)
+
+image_options = record(
+    "images",
+    "Images to write, named after their input",
+    ImageOptions,
+    option(
+        "--derotated", type=PATH, metavar="DIR", help="The map rotated upright; type and format of the input."
+    ),
+    option(
+        "--vdisparity", type=PATH, metavar="DIR", help="The v-disparity image with the road's parabola, PNG."
+    ),
+    option("--disparity", type=PATH, metavar="DIR", help="The disparity map that was computed from a pair."),
+    option("--road-mask", type=PATH, metavar="DIR", help="The found road, drawn over the map, PNG."),
+    save_as_option,
+)
+
+running_options = record(
+    "running",
+    "Running",
+    RunningOptions,
+    option(
+        "-j",
+        "--jobs",
+        type=Number("N", at_least=1, whole=True),
+        help="Worker processes.  [default: the usable processors]",
+    ),
+    option("--overwrite", is_flag=True, help="Replace results and images that are there."),
+    option("--dry-run", is_flag=True, help="List what would be read and written, and do nothing."),
+    option("-q", "--quiet", is_flag=True, help="Say nothing but errors on stderr."),
+    option("-v", "--verbose", is_flag=True, help="Say more on stderr."),
+)

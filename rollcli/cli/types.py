@@ -1,0 +1,120 @@
+"""Option values that click has no type for: each turns text, or a value of a TOML file, into numbers."""
+
+import math
+import re
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    _ParamType = click.ParamType[Any]  # generic to type checkers only, before click 8.4
+else:
+    _ParamType = click.ParamType
+
+
+class Number(_ParamType):
+    """A finite number within bounds, with its unit as the placeholder; "auto" where that is allowed."""
+
+    def __init__(
+        self,
+        unit: str,
+        *,
+        above: float = -math.inf,
+        at_least: float = -math.inf,
+        at_most: float = math.inf,
+        auto: bool = False,
+        whole: bool = False,
+    ) -> None:
+        self.name = unit
+        self.above, self.at_least, self.at_most = above, at_least, at_most
+        self.auto, self.whole = auto, whole
+
+    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
+        return f"{self.name}|auto" if self.auto else self.name
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float | str:
+        if self.auto and value == "auto":
+            return "auto"
+        try:
+            number = int(value) if self.whole and not isinstance(value, float) else float(value)
+        except (TypeError, ValueError, OverflowError):
+            number = math.nan
+        fits = math.isfinite(number) and self.above < number and self.at_least <= number <= self.at_most
+        if not fits or isinstance(value, bool) or (self.whole and number != int(number)):
+            self.fail(f"{value!r} is not {self.describe()}", param, ctx)
+        return int(number) if self.whole else number
+
+    def describe(self) -> str:
+        """What would be accepted, in words."""
+        words = "a whole number" if self.whole else "a number"
+        bounds = [
+            f"above {self.above:g}" if self.above > -math.inf else "",
+            f"of at least {self.at_least:g}" if self.at_least > -math.inf else "",
+            f"of at most {self.at_most:g}" if self.at_most < math.inf else "",
+        ]
+        return " ".join(
+            filter(None, [words, " and ".join(filter(None, bounds)), "or auto" if self.auto else ""])
+        )
+
+
+class NumberOrNan(_ParamType):
+    """Any number that a pixel may hold: also nan and inf."""
+
+    name = "VALUE"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        try:
+            return float(value)
+        except (TypeError, ValueError):
+            self.fail(f"{value!r} is not a number", param, ctx)
+
+
+class Roi(_ParamType):
+    """Four whole numbers with X0 < X1 and Y0 < Y1."""
+
+    name = "X0,Y0,X1,Y1"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[int, int, int, int]:
+        text = ",".join(map(str, value)) if isinstance(value, (list, tuple)) else str(value)
+        found = re.fullmatch(r"\s*(\d+)\s*,\s*(\d+)\s*,\s*(\d+)\s*,\s*(\d+)\s*", text)
+        x0, y0, x1, y1 = (int(number) for number in found.groups()) if found else (0, 0, 0, 0)
+        if not (x0 < x1 and y0 < y1):
+            self.fail(f"{text!r} is not X0,Y0,X1,Y1 in whole pixels with X0 < X1 and Y0 < Y1", param, ctx)
+        return x0, y0, x1, y1
+
+
+class Polygon(_ParamType):
+    """Three or more corners."""
+
+    name = "'x,y x,y x,y …'"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[tuple[float, float], ...]:
+        corners = value.split() if isinstance(value, str) else value
+        try:
+            points = [tuple(map(float, c.split(",") if isinstance(c, str) else c)) for c in corners]
+        except (TypeError, ValueError):
+            points = []
+        if len(points) < 3 or not all(len(p) == 2 and all(map(math.isfinite, p)) for p in points):
+            self.fail(f"{value!r} is not three or more corners such as '0,375 600,180 1242,375'", param, ctx)
+        return tuple((p[0], p[1]) for p in points)
+
+
+class Shard(_ParamType):
+    """I/N with 1 <= I <= N."""
+
+    name = "I/N"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[int, int]:
+        if isinstance(value, tuple):
+            return value  # the default
+        found = re.fullmatch(r"(\d{1,9})/(\d{1,9})", str(value))
+        part, parts = (int(found[1]), int(found[2])) if found else (0, 0)
+        if not 1 <= part <= parts:
+            self.fail(f"{value!r} is not I/N with I from 1 to N, such as 2/8", param, ctx)
+        return part, parts

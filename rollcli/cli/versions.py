@@ -1,0 +1,35 @@
+"""The versions a bug report needs, without importing what they are of."""
+
+import platform
+from collections.abc import Iterator
+from importlib.metadata import PackageNotFoundError, version
+
+from rollcli import __version__
+
+OPENCV = (
+    "opencv-python-headless",
+    "opencv-python",
+    "opencv-contrib-python-headless",
+    "opencv-contrib-python",
+)
+REQUIRED = ("numpy", OPENCV, "click", "tqdm", "tifffile")
+OPTIONAL = ("imagecodecs", "dask", "distributed", "plotly", "jinja2")
+
+
+def versions() -> Iterator[tuple[str, str]]:
+    """(name, version) of rollcli, Python and each package it uses; of extras, those that are installed."""
+    yield "rollcli", __version__
+    yield "Python", f"{platform.python_version()} ({platform.python_implementation()}, {platform.platform()})"
+    for names in REQUIRED:
+        yield _installed(names) or (names if isinstance(names, str) else names[0], "not installed")
+    yield from filter(None, map(_installed, OPTIONAL))
+
+
+def _installed(names: str | tuple[str, ...]) -> tuple[str, str] | None:
+    """The first of several packages that bring the same module."""
+    for name in (names,) if isinstance(names, str) else names:
+        try:
+            return name, version(name)
+        except PackageNotFoundError:
+            continue
+    return None

@@ -1,0 +1,217 @@
+"""Results, one row a frame: CSV (RFC 4180 quoting, lines end in \\n) or JSON Lines, written and read back."""
+
+import csv
+import io
+import json
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any, Literal
+
+from rollcli.errors import InputError
+
+Format = Literal["csv", "jsonl"]
+# file names are bytes: those that are not UTF-8 come back as the bytes they were
+TEXT = {"encoding": "utf-8", "errors": "surrogateescape"}
+
+
+@dataclass(frozen=True)
+class Row:
+    """What is known of one frame; None where there is nothing to say. The columns of a result, in order."""
+
+    file: str
+    right_file: str = ""
+    status: str = "error"
+    roll_deg: float | None = None
+    roll_ci95_deg: float | None = None
+    method: str = ""
+    iterations: int | None = None
+    converged: bool | None = None
+    global_minimum: bool | None = None
+    rmse_px: float | None = None
+    alpha0: float | None = None
+    alpha1: float | None = None
+    alpha2: float | None = None
+    valid_fraction: float | None = None
+    road_fraction: float | None = None
+    width: int | None = None
+    height: int | None = None
+    message: str = ""
+    elapsed_ms: float | None = None
+
+
+TIMING = "elapsed_ms"
+COLUMNS = tuple(field.name for field in fields(Row) if field.name != TIMING)
+_REQUIRED = ("file", "status", "roll_deg")
+# a millionth of a degree is far below any map's noise; nine digits keep alpha2, which is small, whole
+_DIGITS = {
+    "roll_deg": ".6f",
+    "roll_ci95_deg": ".6f",
+    "rmse_px": ".6g",
+    "alpha0": ".9g",
+    "alpha1": ".9g",
+    "alpha2": ".9g",
+    "valid_fraction": ".6f",
+    "road_fraction": ".6f",
+    "elapsed_ms": ".3f",
+}
+
+
+@dataclass(frozen=True)
+class Result:
+    """A result file: its rows in order, and the run that made them (FILE.run.json), if that is there."""
+
+    rows: tuple[Row, ...]
+    run: Mapping[str, Any] | None
+
+
+def columns(timing: bool = False) -> tuple[str, ...]:
+    """The names of the columns, in order."""
+    return (*COLUMNS, TIMING) if timing else COLUMNS
+
+
+def format_header(form: Format, timing: bool = False) -> bytes:
+    """What stands before the first row."""
+    return ",".join(columns(timing)).encode() + b"\n" if form == "csv" else b""
+
+
+def format_row(row: Row, form: Format, timing: bool = False) -> bytes:
+    """One line; the same row gives the same bytes."""
+    texts = {name: _text(name, getattr(row, name)) for name in columns(timing)}
+    if form == "csv":
+        buffer = io.StringIO()
+        csv.writer(buffer, lineterminator="\n").writerow(texts.values())
+        return buffer.getvalue().encode(**TEXT)
+    values = {name: _json_value(name, getattr(row, name), text) for name, text in texts.items()}
+    return json.dumps(values).encode() + b"\n"
+
+
+def _text(name: str, value: Any) -> str:
+    if value is None or (isinstance(value, float) and not math.isfinite(value)):
+        return ""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    text = format(value, _DIGITS[name]) if name in _DIGITS else str(value)
+    if name in _DIGITS and float(text) == 0:
+        return text.lstrip("-")
+    # rounding must not leave the half-open range (-90, 90]
+    return "90.000000" if name == "roll_deg" and text == "-90.000000" else text
+
+
+def _json_value(name: str, value: Any, text: str) -> Any:
+    """The number that the CSV shows, so that both forms say the same."""
+    if name in _DIGITS:
+        return float(text) if text else None
+    return value
+
+
+def read_result(path: str | Path) -> Result:
+    """Read a result that `rollcli estimate` wrote.
+
+    Parameters
+    ----------
+    path : str or Path
+        CSV or JSON Lines; which of them is seen from the first character.
+
+    Returns
+    -------
+    Result
+        `run` is the content of FILE.run.json, or None where there is none. Further columns are left out;
+        columns other than file, status and roll_deg may be missing and are then None.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, or is not a result of `rollcli estimate`; the line is named.
+    """
+    return Result(parse_rows(_read(path), path), read_run(path))
+
+
+def parse_rows(data: bytes, name: str | Path) -> tuple[Row, ...]:
+    """The rows of a result's bytes; `name` is what errors call it."""
+    text = data.removeprefix(b"\xef\xbb\xbf").decode(**TEXT)
+    lines = _json_lines(text, name) if text.lstrip().startswith("{") else _csv_lines(text, name)
+    return tuple(_row(values, f"{name}: line {number}") for number, values in lines)
+
+
+def run_path(path: str | Path) -> Path:
+    """Where the record of the run lies: FILE.run.json."""
+    return Path(f"{path}.run.json")
+
+
+def read_run(path: str | Path) -> Mapping[str, Any] | None:
+    """The record of the run that wrote the result `path`, or None where there is none."""
+    record = run_path(path)
+    if not record.exists():
+        return None
+    try:
+        run = json.loads(_read(record))
+    except ValueError as error:
+        raise InputError(f"{record}: is not JSON: {error}") from error
+    if not isinstance(run, dict):
+        raise InputError(f"{record}: is not the record of a run")
+    return run
+
+
+def _read(path: str | Path) -> bytes:
+    try:
+        return Path(path).read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from error
+
+
+def _csv_lines(text: str, path: str | Path) -> Iterable[tuple[int, dict[str, str]]]:
+    lines = csv.reader(io.StringIO(text, newline=""), strict=True)
+    try:
+        header = next(lines, [])
+        missing = [name for name in _REQUIRED if name not in header]
+        if missing:
+            raise InputError(
+                f"{path}: is not a result of rollcli estimate: it has no column {', '.join(missing)}"
+            )
+        for line in lines:
+            if line and len(line) != len(header):
+                raise InputError(
+                    f"{path}: line {lines.line_num}: {len(line)} values for {len(header)} columns"
+                )
+            if line:
+                yield lines.line_num, dict(zip(header, line, strict=True))
+    except csv.Error as error:
+        raise InputError(f"{path}: line {lines.line_num}: is not CSV: {error}") from error
+
+
+def _json_lines(text: str, path: str | Path) -> Iterable[tuple[int, dict[str, Any]]]:
+    for number, line in enumerate(text.split("\n"), 1):
+        if not line.strip():
+            continue
+        try:
+            values = json.loads(line)
+        except ValueError as error:
+            raise InputError(f"{path}: line {number}: is not JSON: {error}") from error
+        missing = [name for name in _REQUIRED if not isinstance(values, dict) or name not in values]
+        if missing:
+            raise InputError(f"{path}: line {number}: is no row of rollcli estimate: no {', '.join(missing)}")
+        yield number, values
+
+
+def _row(values: Mapping[str, Any], where: str) -> Row:
+    return Row(**{field.name: _value(field.name, values.get(field.name), where) for field in fields(Row)})
+
+
+_FLAGS = {"converged", "global_minimum"}
+_COUNTS = {"iterations", "width", "height"}
+
+
+def _value(name: str, value: Any, where: str) -> Any:
+    """The value of a column from its text (CSV) or JSON value."""
+    if name not in _DIGITS and name not in _FLAGS and name not in _COUNTS:
+        return "" if value is None else str(value)
+    if value is None or value == "":
+        return None
+    try:
+        if name in _FLAGS:
+            return {"true": True, "false": False}[str(value).lower()]
+        return int(value) if name in _COUNTS else float(value)
+    except (KeyError, ValueError, TypeError) as error:
+        raise InputError(f"{where}: {value!r} is no value for {name}") from error

@@ -1,0 +1,82 @@
+"""`rollcli estimate` from the outside: the contract of names, columns, statuses and streams."""
+
+import csv
+import io
+import json
+
+import pytest
+
+from tests.program import rollcli, write_maps
+
+COLUMNS = (
+    "file,right_file,status,roll_deg,roll_ci95_deg,method,iterations,converged,global_minimum,rmse_px,"
+    "alpha0,alpha1,alpha2,valid_fraction,road_fraction,width,height,message"
+)
+
+
+@pytest.fixture
+def maps(tmp_path):
+    write_maps(tmp_path / "maps", 12)
+    return tmp_path
+
+
+def test_the_columns_are_those_of_the_contract(maps):
+    done = rollcli("estimate", "maps", cwd=maps)
+    assert done.status == 0
+    assert done.out.splitlines()[0] == COLUMNS
+
+
+def test_rows_come_in_natural_order_with_the_known_angle(maps):
+    rows = list(csv.DictReader(io.StringIO(rollcli("estimate", "maps", cwd=maps).out)))
+    assert [row["file"] for row in rows] == [f"maps/frame{i}.png" for i in range(12)]
+    assert [float(row["roll_deg"]) for row in rows] == pytest.approx(
+        [0.01 * i * 57.29578 for i in range(12)], abs=0.05
+    )
+
+
+def test_any_number_of_workers_gives_the_same_bytes(maps):
+    for jobs in (1, 2, 3):
+        images = ["--derotated", f"d{jobs}", "--vdisparity", f"v{jobs}", "--road-mask", f"r{jobs}"]
+        rollcli("estimate", "maps", "-j", str(jobs), "-o", f"{jobs}.csv", *images, cwd=maps)
+    for jobs in (2, 3):
+        assert (maps / f"{jobs}.csv").read_bytes() == (maps / "1.csv").read_bytes()
+        for kind in "dvr":
+            one, other = maps / f"{kind}1", maps / f"{kind}{jobs}"
+            assert {p.name: p.read_bytes() for p in other.iterdir()} == {
+                p.name: p.read_bytes() for p in one.iterdir()
+            }
+
+
+def test_a_frame_that_fails_has_a_row_that_says_why_and_the_others_still_come(maps):
+    (maps / "maps" / "frame3.png").write_bytes(b"")
+    done = rollcli("estimate", "maps", "-j2", cwd=maps)
+    rows = list(csv.DictReader(io.StringIO(done.out)))
+    assert done.status == 3
+    assert [row["status"] for row in rows].count("error") == 1
+    assert (rows[3]["status"], rows[3]["roll_deg"], rows[3]["message"]) == (
+        "error",
+        "",
+        "maps/frame3.png: is empty",
+    )
+
+
+def test_json_lines_say_the_same_as_csv(maps):
+    rows = list(csv.DictReader(io.StringIO(rollcli("estimate", "maps", cwd=maps).out)))
+    lines = [
+        json.loads(line)
+        for line in rollcli("estimate", "maps", "--format", "jsonl", cwd=maps).out.splitlines()
+    ]
+    assert list(lines[0]) == COLUMNS.split(",")
+    assert [line["roll_deg"] for line in lines] == [float(row["roll_deg"]) for row in rows]
+    assert lines[0]["converged"] is True
+
+
+def test_an_existing_result_is_refused(maps):
+    assert rollcli("estimate", "maps", "-o", "rolls.csv", cwd=maps).status == 0
+    before = (maps / "rolls.csv").read_bytes()
+    done = rollcli("estimate", "maps", "-o", "rolls.csv", cwd=maps)
+    assert done.status == 2
+    assert "--resume" in done.err
+    assert "--overwrite" in done.err
+    assert (maps / "rolls.csv").read_bytes() == before
+    assert rollcli("estimate", "maps", "-o", "rolls.csv", "--overwrite", cwd=maps).status == 0

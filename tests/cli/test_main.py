@@ -1,0 +1,70 @@
+"""The group: what it says of itself, and how errors end."""
+
+import subprocess
+import sys
+
+import pytest
+
+import rollcli as package
+from tests.program import environment, rollcli
+
+
+def test_version_is_the_packages(tmp_path):
+    assert rollcli("--version", cwd=tmp_path).out == f"rollcli {package.__version__}\n"
+
+
+def test_versions_names_python_and_every_dependency(tmp_path):
+    done = rollcli("--versions", cwd=tmp_path)
+    names = [line.split()[0] for line in done.out.splitlines()]
+    assert names[:7] == ["rollcli", "Python", "numpy", "opencv-python-headless", "click", "tqdm", "tifffile"]
+    assert "not installed" not in done.out
+
+
+@pytest.mark.parametrize("arguments", [["--version"], ["--help"], ["estimate", "--help"]])
+def test_help_and_version_load_neither_numpy_nor_opencv(tmp_path, arguments):
+    code = f"""
+import sys
+sys.argv = ["rollcli", *{arguments}]
+from rollcli.__main__ import main
+try:
+    main()
+except SystemExit:
+    pass
+print([name for name in ("numpy", "cv2", "tqdm", "tifffile", "multiprocessing") if name in sys.modules])
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=tmp_path,
+        env=environment(),
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["--nothing"],
+        ["nothing"],
+        ["estimate", "--nothing"],
+        ["estimate", "--tolerance", "nan", "x"],
+        ["estimate"],
+    ],
+)
+def test_a_usage_error_is_one_line_and_status_2(tmp_path, arguments):
+    done = rollcli(*arguments, cwd=tmp_path)
+    assert (done.status, done.out) == (2, "")
+    assert done.err.startswith("rollcli: ")
+    assert done.err.count("\n") == 1
+
+
+def test_the_program_alone_shows_its_commands(tmp_path):
+    done = rollcli(cwd=tmp_path)
+    assert done.status == 0
+    assert "estimate" in done.out
+
+
+def test_help_calls_the_program_rollcli(tmp_path):
+    assert rollcli("--help", cwd=tmp_path).out.startswith("Usage: rollcli ")

@@ -1,0 +1,69 @@
+"""The program as a user runs it, and maps for it to read."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+class Finished(NamedTuple):
+    """What a run of the program left."""
+
+    status: int
+    out: str
+    err: str
+
+
+def command(*arguments: str | Path) -> list[str]:
+    """The command line of the program under test."""
+    return [sys.executable, "-m", "rollcli", *map(str, arguments)]
+
+
+def environment(**variables: str) -> dict[str, str]:
+    """This environment without settings of rollcli's, with the given variables."""
+    kept = {name: value for name, value in os.environ.items() if not name.startswith("ROLLCLI")}
+    path = os.pathsep.join(filter(None, [str(ROOT), kept.get("PYTHONPATH")]))
+    return {**kept, "PYTHONPATH": path, "PYTHONWARNINGS": "default", **variables}
+
+
+def rollcli(*arguments: str | Path, cwd: Path, stdin: str = "", **variables: str) -> Finished:
+    """Run the program to its end; a traceback is always a failure."""
+    done = subprocess.run(
+        command(*arguments),
+        cwd=cwd,
+        input=stdin,
+        env=environment(**variables),
+        capture_output=True,
+        text=True,
+        errors="surrogateescape",
+        timeout=120,
+        check=False,
+    )
+    assert "Traceback" not in done.stderr, done.stderr
+    return Finished(done.returncode, done.stdout, done.stderr)
+
+
+def road_map(roll: float = 0.0, *, width: int = 160, height: int = 120, noise: float = 0.05, seed: int = 0):
+    """Disparity (px) of a flat road that fills the map, rolled by `roll` radians."""
+    v, u = np.mgrid[:height, :width]
+    y = v * np.cos(roll) - u * np.sin(roll)
+    clean = 20 + 0.3 * (y - y.min())
+    return (clean + np.random.default_rng(seed).normal(0, noise, clean.shape)).astype(np.float32)
+
+
+def write_kitti(path: Path, disparity) -> None:
+    """A map as a 16-bit KITTI PNG."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(cv2.imencode(".png", np.rint(disparity * 256).astype(np.uint16))[1])
+
+
+def write_maps(folder: Path, count: int, **size: int) -> None:
+    """`count` maps frame0.png, frame1.png, ..., each rolled a little more."""
+    for index in range(count):
+        write_kitti(folder / f"frame{index}.png", road_map(0.01 * index, seed=index, **size))
