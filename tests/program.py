@@ -49,6 +49,12 @@ def rollcli(*arguments: str | Path, cwd: Path, stdin: str = "", **variables: str
     return Finished(done.returncode, done.stdout, done.stderr)
 
 
+def contents(folder: Path) -> dict[str, bytes]:
+    """Every file below a folder, by its relative path."""
+    files = (path for path in folder.rglob("*") if path.is_file())
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
+
+
 def road_map(roll: float = 0.0, *, width: int = 160, height: int = 120, noise: float = 0.05, seed: int = 0):
     """Disparity (px) of a flat road that fills the map, rolled by `roll` radians."""
     v, u = np.mgrid[:height, :width]
