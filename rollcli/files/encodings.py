@@ -1,5 +1,6 @@
 """Stored numbers to pixels of disparity and back."""
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
@@ -9,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.errors import UsageError
+from rollcli.errors import OutputError, UsageError
 from rollcli.files.formats import Stored, decode_mask, read_bytes, read_stored
 
 
@@ -75,13 +76,14 @@ def to_disparity(
     """
     used = resolve_encoding(encoding, stored.values.dtype, scale)
     factor = _SCALE[used] if scale is None else scale
-    if not (np.isfinite(factor) and factor > 0):
-        raise UsageError(f"scale {factor}: must be a positive number (pixels per stored unit)")
-    values = stored.values
-    disparity = _scaled(values, used, factor)
-    _blank(disparity, values, (*invalid, *stored.nodata, *_saturated(values.dtype)))
-    warning = _doubt(values, used) if encoding == "auto" and scale is None else None
-    return DisparityMap(disparity, used, factor, stored, warning)
+    if not (math.isfinite(factor) and factor > 0):
+        raise UsageError(f"scale {factor}: must be a positive number, pixels per stored unit")
+    with np.errstate(all="ignore"):  # numbers too large for float32 become inf, and inf no data
+        disparity = _scaled(stored.values, used, factor)
+        _blank(disparity, stored.values, (*invalid, *stored.nodata, *_saturated(stored.values)))
+    doubt = _doubt(stored.values, used) if encoding == "auto" and scale is None else ""
+    warning = "; ".join(each for each in (stored.note, doubt) if each)
+    return DisparityMap(disparity, used, factor, stored, warning or None)
 
 
 def read_disparity(
@@ -98,18 +100,36 @@ def read_disparity(
 def from_disparity(
     disparity: NDArray[Any], encoding: str, dtype: Any = np.uint16, *, scale: float | None = None
 ) -> NDArray[Any]:
-    """Turn pixels of disparity back into numbers to store; no data (<= 0) becomes 0, or -16 for sgbm.
+    """Turn pixels of disparity back into numbers to store.
 
-    Whole-number types are rounded, and clipped at their ends.
+    Parameters
+    ----------
+    disparity : ndarray, shape (H, W)
+        Pixels; NaN, inf and <= 0 are no data, stored as 0 (-16 in sgbm, as OpenCV does).
+    encoding : {"px", "kitti", "cityscapes", "sgbm"}
+        How a number stands for a disparity.
+    dtype : dtype
+        Of the result; whole-number types are rounded, but never down to no data.
+    scale : float, optional
+        Pixels per stored unit, in place of the encoding's own.
+
+    Raises
+    ------
+    OutputError
+        More than one in a hundred disparities is too large for the dtype. Fewer become no data.
     """
     used, kind = Encoding(encoding), np.dtype(dtype)
     factor = _SCALE[used] if scale is None else scale
-    numbers = disparity.astype(np.float64) / factor + (used is Encoding.CITYSCAPES)
+    valid = np.isfinite(disparity) & (disparity > 0)
+    first = int(used is Encoding.CITYSCAPES)
+    numbers = np.where(valid, disparity, 0).astype(np.float64) / factor + first
     if kind.kind in "iu":
-        limits = np.iinfo(kind)
-        numbers = np.clip(np.rint(numbers), limits.min, limits.max)
+        numbers = np.maximum(np.rint(numbers), first + 1)
+        top = np.iinfo(kind).max - 1  # the last number means no data
+        valid = _without_overflow(numbers, valid, top, top * factor)
     empty = -16 if used is Encoding.SGBM and kind.kind == "i" else 0
-    return np.where(disparity > 0, numbers, empty).astype(kind)
+    stored: NDArray[Any] = np.where(valid, numbers, empty).astype(kind)
+    return stored
 
 
 def read_mask(path: str | Path) -> NDArray[np.bool_]:
@@ -130,16 +150,15 @@ def resolve_encoding(encoding: str, dtype: np.dtype[Any], scale: float | None) -
 
 def _scaled(values: NDArray[Any], encoding: Encoding, scale: float) -> NDArray[Any]:
     """Pixels; whatever is not a positive finite number becomes 0."""
-    real = np.float64 if values.dtype.itemsize >= 8 and values.dtype.kind == "f" else np.float32
+    real = np.float64 if values.dtype.kind == "f" and values.dtype.itemsize >= 8 else np.float32
     if values.dtype.kind == "u" and encoding is not Encoding.CITYSCAPES:
-        product: NDArray[Any] = np.multiply(values, real(scale), dtype=real)
+        product: NDArray[Any] = np.multiply(values, real(scale), dtype=real)  # one pass: the usual case
         return product
     pixels: NDArray[Any] = np.fmax(values, 0).astype(real)  # fmax: NaN gives way to 0
     if encoding is Encoding.CITYSCAPES:
         pixels = np.fmax(pixels - real(1), real(0))
-    if scale != 1:
-        pixels *= real(scale)
-    if values.dtype.kind == "f" and not np.isfinite(pixels.max()):
+    pixels *= real(scale)
+    if not np.isfinite(pixels.max()):
         pixels[np.isinf(pixels)] = 0
     return pixels
 
@@ -147,18 +166,36 @@ def _scaled(values: NDArray[Any], encoding: Encoding, scale: float) -> NDArray[A
 def _blank(disparity: NDArray[Any], values: NDArray[Any], invalid: tuple[float, ...]) -> None:
     """Set to 0 the pixels whose stored value means no data."""
     for value in invalid:
-        if value > 0 and np.isfinite(value):
+        if value > 0 and math.isfinite(value):  # the others are no data already
             disparity[values == value] = 0
 
 
-def _saturated(dtype: np.dtype[Any]) -> tuple[float, ...]:
-    return (65535.0,) if dtype == np.uint16 else ()
+def _saturated(values: NDArray[Any]) -> tuple[float, ...]:
+    """The last number of 16 bits, where a map holds it: what was too large, or unknown."""
+    if values.dtype not in (np.uint16, np.int16) or (top := values.max()) < np.iinfo(values.dtype).max:
+        return ()
+    return (float(top),)
 
 
-def _doubt(values: NDArray[Any], encoding: Encoding) -> str | None:
+def _doubt(values: NDArray[Any], encoding: Encoding) -> str:
+    """Why the encoding that "auto" took cannot be right, or nothing."""
     if encoding is Encoding.KITTI and 0 < (top := int(values.max())) < _WHOLE_PIXELS_BELOW:
         return (
-            f"uint16 values stay at {top}, read as kitti (/256) that is {top / 256:.2f} px: "
-            "they look like whole pixels; use --encoding px"
+            f"uint16 numbers up to {top}, read as kitti (/256), are disparities up to {top / 256:.2f} px: "
+            "they look like whole pixels (--encoding px)"
         )
-    return None
+    return ""
+
+
+def _without_overflow(
+    numbers: NDArray[Any], valid: NDArray[np.bool_], top: int, top_px: float
+) -> NDArray[np.bool_]:
+    """The valid pixels that can be stored."""
+    fits: NDArray[np.bool_] = valid & (numbers <= top)
+    lost = np.count_nonzero(valid) - np.count_nonzero(fits)
+    if lost > 0.01 * np.count_nonzero(valid):
+        raise OutputError(
+            f"disparities up to {top_px * float(numbers[valid].max()) / top:.0f} px do not fit numbers "
+            f"that end at {top_px:.0f} px: store them as TIFF or NPY"
+        )
+    return fits

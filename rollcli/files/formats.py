@@ -9,18 +9,16 @@ import stat
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError, OutputError
-from rollcli.files import npy, pfm, png, tiff
-from rollcli.files.stored import PICTURE_FLAGS, Stored, native
+from rollcli.files import npy, pfm, pictures, png, tiff
+from rollcli.files.stored import Stored, native
 
 __all__ = ["Stored", "decode_stored", "encode_stored", "read_bytes", "read_image", "read_stored"]
 
 _MAX_BYTES = 2**32
-_PICTURES = (b"\xff\xd8\xff", b"BM", b"P2", b"P3", b"P5", b"P6")
 _KNOWN = {
     b"\xff\xd8\xff": "a JPEG image",
     b"PK\x03\x04": "a ZIP or NPZ archive",
@@ -134,13 +132,10 @@ def read_image(path: str | Path) -> NDArray[Any]:
         return png.picture(data, name)
     if data.startswith(tiff.SIGNATURES):
         return tiff.picture(data, name)
-    if not data.startswith(_PICTURES):
-        what = "a PNG, JPEG, TIFF, BMP, PGM or PPM file"
-        raise InputError(f"{name}: is {_what(data)}; a camera image is {what}")
-    pixels = cv2.imdecode(np.frombuffer(data, np.uint8), PICTURE_FLAGS)
-    if pixels is None:
-        raise InputError(f"{name}: is a damaged image")
-    return pixels
+    if data.startswith(pictures.SIGNATURES):
+        return pictures.decode_picture(data, name)
+    what = "a PNG, JPEG, TIFF, BMP, PGM or PPM file"
+    raise InputError(f"{name}: is {_what(data)}; a camera image is {what}")
 
 
 def decode_mask(data: bytes, name: str) -> NDArray[np.bool_]:

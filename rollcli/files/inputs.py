@@ -110,8 +110,9 @@ def pair_inputs(
     left, right : str
         Two files are a pair whatever their names are. Both may be one folder that holds both sides.
     match : {"name", "order"}
-        name: the same name, or the same once left and right marks are taken away (left/right, l/r,
-        L1/R1, im0/im1, image_2/image_3, ...), in folder names too. order: the first with the first, in natural order.
+        name: the same name, or the same once left and right marks are taken away (left/right, l/r, L1/R1,
+        im0/im1, image_2/image_3, ...), in folder names too.
+        order: the first with the first, in natural order.
     recursive, include, exclude, skip
         As in `find_inputs`.
 

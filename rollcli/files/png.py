@@ -1,7 +1,8 @@
 """PNG [ISO/IEC 15948] through OpenCV, which is shown only files that are whole.
 
 libpng writes its complaints straight to the terminal, and a header may claim any size. So the chunks are
-walked first: signature, lengths, checksums and the size that the compressed data can reach.
+walked first (signature, lengths, checksums, order, and the size that the compressed data can reach), and
+OpenCV gets a file of nothing but what decides the pixels.
 """
 
 import struct
@@ -13,22 +14,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError, OutputError
-from rollcli.files.stored import PICTURE_FLAGS, require_pixels_fit
+from rollcli.files.stored import PICTURE_FLAGS, require_decoded_fits
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
-GREY, COLOUR, PALETTE, GREY_ALPHA, COLOUR_ALPHA = 0, 2, 3, 4, 6
-_CHANNELS = {GREY: 1, COLOUR: 3, PALETTE: 1, GREY_ALPHA: 2, COLOUR_ALPHA: 4}
+_GREY, _COLOUR, _PALETTE, _GREY_ALPHA, _COLOUR_ALPHA = 0, 2, 3, 4, 6
+_CHANNELS = {_GREY: 1, _COLOUR: 3, _PALETTE: 1, _GREY_ALPHA: 2, _COLOUR_ALPHA: 4}
 _DEPTHS = {
-    GREY: (1, 2, 4, 8, 16),
-    PALETTE: (1, 2, 4, 8),
-    COLOUR: (8, 16),
-    GREY_ALPHA: (8, 16),
-    COLOUR_ALPHA: (8, 16),
+    _GREY: (1, 2, 4, 8, 16),
+    _COLOUR: (8, 16),
+    _PALETTE: (1, 2, 4, 8),
+    _GREY_ALPHA: (8, 16),
+    _COLOUR_ALPHA: (8, 16),
 }
-# what decides the pixels; the rest (colour profiles, times, texts, orientation) only makes libpng complain
-_DECISIVE = {b"IHDR", b"PLTE", b"IDAT", b"IEND"}
-_MAX_INFLATION = 1032  # deflate cannot expand further
-_SMALL = 1 << 16
+_MAX_SIDE = 1_000_000  # libpng's own limit
+_MAX_EXPANSION = 1032  # of Deflate
+# Checksums can be right over wrong data. Inflating all of it twice would cost 70 % more time: only the start of
+# small files is inflated beforehand, which is where headers lie
+_SMALL, _FOREHAND = 1 << 14, 1 << 16
+# of the seven passes of an interlaced image: first column, first row, column step, row step
+_ADAM7 = ((0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (1, 0, 2, 2), (0, 1, 1, 2))
 
 
 class _Header(NamedTuple):
@@ -40,28 +44,33 @@ class _Header(NamedTuple):
     filtering: int
     interlace: int
 
+    def row_bytes(self, width: int) -> int:
+        """Bytes of a row of `width` pixels, after its filter byte."""
+        return (width * self.depth * _CHANNELS[self.colour] + 7) // 8
+
 
 def grey_values(data: bytes, name: str) -> NDArray[Any]:
     """The values of a single-channel PNG as they are stored; shape (H, W), uint8 or uint16.
 
     A palette of greys stands for its greys; fully transparent pixels hold no data and become 0.
     """
-    header, pixels = _decode(data, name, cv2.IMREAD_UNCHANGED)
-    if header.colour == GREY:
+    header, pixels = _decoded(data, name, cv2.IMREAD_UNCHANGED)
+    if header.colour == _GREY:
         # OpenCV spreads 1, 2 and 4 bits over 0..255
         return pixels if header.depth >= 8 else pixels // (255 // (2**header.depth - 1))
-    if header.colour == GREY_ALPHA:
-        return np.where(pixels[..., -1] > 0, pixels[..., 0], 0).astype(pixels.dtype)
-    grey: NDArray[Any] = pixels[..., 0]
-    if header.colour == PALETTE and bool((pixels == grey[..., None]).all()):
-        return np.ascontiguousarray(grey)
-    what = "a palette" if header.colour == PALETTE else f"{_CHANNELS[header.colour]} channels"
+    grey: NDArray[Any] = np.ascontiguousarray(pixels[..., 0])
+    if header.colour == _GREY_ALPHA:
+        grey[pixels[..., -1] == 0] = 0
+        return grey
+    if header.colour == _PALETTE and bool((pixels == grey[..., None]).all()):
+        return grey
+    what = "a palette" if header.colour == _PALETTE else f"{_CHANNELS[header.colour]} channels"
     raise InputError(f"{name}: is a colour image ({what}); a disparity map has one channel")
 
 
 def picture(data: bytes, name: str) -> NDArray[Any]:
     """The pixels of a camera image: grey (H, W) or BGR (H, W, 3), uint8 or uint16."""
-    return _decode(data, name, PICTURE_FLAGS)[1]
+    return _decoded(data, name, PICTURE_FLAGS)[1]
 
 
 def encode_png(values: NDArray[Any]) -> bytes:
@@ -71,55 +80,100 @@ def encode_png(values: NDArray[Any]) -> bytes:
     return bytes(cv2.imencode(".png", values)[1])
 
 
-def _decode(data: bytes, name: str, flags: int) -> tuple[_Header, NDArray[Any]]:
-    header, checked = _checked(data, name)
-    pixels = cv2.imdecode(np.frombuffer(checked, np.uint8), flags)
+def _decoded(data: bytes, name: str, flags: int) -> tuple[_Header, NDArray[Any]]:
+    header, chunks = _checked(data, name)
+    pixels = cv2.imdecode(np.frombuffer(b"".join(chunks), np.uint8), flags)
     if pixels is None:
         raise InputError(f"{name}: is a damaged PNG: its pixel data are wrong")
     return header, pixels
 
 
-def _checked(data: bytes, name: str) -> tuple[_Header, bytes]:
-    """The header, and a file of only the chunks that decide the pixels; InputError if it is not whole."""
-    view, position, kept, compressed = memoryview(data), len(SIGNATURE), [memoryview(SIGNATURE)], 0
-    kind = header = None
+def _checked(data: bytes, name: str) -> tuple[_Header, list[bytes]]:
+    """The header, and the chunks that decide the pixels; InputError if the file is not whole."""
+    view, position = memoryview(data), len(SIGNATURE)
+    header, palette, image, kind = None, b"", [], b""
     while kind != b"IEND":
-        if position + 12 > len(data):
-            raise InputError(f"{name}: is a truncated PNG: it ends after {len(data)} bytes")
-        length = int.from_bytes(view[position : position + 4], "big")
-        kind = data[position + 4 : position + 8]
-        end = position + 12 + length
-        if end > len(data):
+        end = position + 12 + int.from_bytes(view[position : position + 4], "big")
+        if end > len(data) or position + 12 > len(data):
             raise InputError(f"{name}: is a truncated PNG: it ends after {len(data)} bytes")
         if zlib.crc32(view[position + 4 : end - 4]) != int.from_bytes(view[end - 4 : end], "big"):
             raise InputError(f"{name}: is a damaged PNG: wrong checksum {position} bytes in")
-        if header is None:
-            header = _parse_header(kind, data[position + 8 : end - 4], name)
-        if kind in _DECISIVE:
-            kept.append(view[position:end])
-        compressed += length if kind == b"IDAT" else 0
+        kind = data[position + 4 : position + 8]
+        if (header is None) != (kind == b"IHDR"):
+            raise InputError(f"{name}: is a damaged PNG: its header is not first, or not alone")
+        if kind == b"IDAT":
+            image.append(data[position:end])
+        elif kind == b"IHDR":
+            header = _header(data[position + 8 : end - 4], name)
+        elif kind == b"PLTE":
+            palette = data[position + 8 : end - 4]
+        elif kind != b"IEND" and kind[:1].isupper():
+            raise InputError(f"{name}: is no standard PNG: chunk {kind.decode('latin-1')!r} is unknown")
         position = end
     assert header is not None
-    _require_size(header, compressed, name)
-    return header, b"".join(kept)
+    _require_data(header, image, name)
+    chunks = [SIGNATURE, _chunk(b"IHDR", struct.pack(">IIBBBBB", *header)), *image, _chunk(b"IEND", b"")]
+    if header.colour == _PALETTE:
+        chunks.insert(2, _chunk(b"PLTE", _full_palette(header, palette, name)))
+    return header, chunks
 
 
-def _parse_header(kind: bytes, body: bytes, name: str) -> _Header:
-    if kind != b"IHDR" or len(body) != 13:
-        raise InputError(f"{name}: is a damaged PNG: it does not start with a header")
+def _header(body: bytes, name: str) -> _Header:
+    if len(body) != 13:
+        raise InputError(f"{name}: is a damaged PNG: its header has {len(body)} bytes, not 13")
     header = _Header(*struct.unpack(">IIBBBBB", body))
-    if header.depth not in _DEPTHS.get(header.colour, ()) or header.interlace > 1:
+    sane = header.depth in _DEPTHS.get(header.colour, ()) and header.interlace <= 1
+    if not sane or header.compression or header.filtering or max(header[:2]) > _MAX_SIDE:
         raise InputError(f"{name}: is a damaged PNG: its header makes no sense")
     if header.width == 0 or header.height == 0:
         raise InputError(f"{name}: has no pixels ({header.width} x {header.height})")
-    require_pixels_fit(header.width, header.height, name)
     return header
 
 
-def _require_size(header: _Header, compressed: int, name: str) -> None:
-    needed = header.width * header.height * header.depth * _CHANNELS[header.colour] // 8
-    if needed > _MAX_INFLATION * compressed:
-        raise InputError(
-            f"{name}: its header claims {header.width} x {header.height} pixels, "
-            f"more than {compressed} bytes of PNG data can hold"
-        )
+def _require_data(header: _Header, image: list[bytes], name: str) -> None:
+    """Refuse a header that claims more than the compressed data hold."""
+    compressed = sum(len(chunk) - 12 for chunk in image)
+    claim = f"its header claims {header.width} x {header.height} pixels"
+    require_decoded_fits(header.height * header.row_bytes(header.width), claim, name)
+    if header.height * header.row_bytes(header.width) > _MAX_EXPANSION * compressed:
+        raise InputError(f"{name}: {claim}, more than {compressed} bytes can hold")
+    if compressed <= _SMALL and not _begins_well(header, b"".join(chunk[8:-4] for chunk in image)):
+        raise InputError(f"{name}: is a damaged PNG: its pixel data do not match {claim}")
+
+
+def _begins_well(header: _Header, compressed: bytes) -> bool:
+    """Whether the data hold what the header says, in rows with filters that exist; see _FOREHAND."""
+    starts, size = _row_starts(header)
+    inflater = zlib.decompressobj()
+    try:
+        plain = inflater.decompress(compressed, min(size + 1, _FOREHAND))
+    except zlib.error:
+        return False
+    if size < _FOREHAND and (len(plain) != size or not inflater.eof or inflater.unused_data):
+        return False
+    return len(plain) >= min(size, _FOREHAND) and all(
+        not plain[each.start : each.stop : each.step].translate(None, b"\0\1\2\3\4") for each in starts
+    )
+
+
+def _row_starts(header: _Header) -> tuple[list[range], int]:
+    """Where the rows of each pass start in the inflated data, and how many bytes these are."""
+    starts, size = [], 0
+    for column, row, across, down in _ADAM7 if header.interlace else ((0, 0, 1, 1),):
+        width, height = -(-(header.width - column) // across), -(-(header.height - row) // down)
+        if width > 0 and height > 0:
+            stride = 1 + header.row_bytes(width)
+            starts.append(range(size, size + height * stride, stride))
+            size += height * stride
+    return starts, size
+
+
+def _full_palette(header: _Header, palette: bytes, name: str) -> bytes:
+    """The palette with an entry for every number that a pixel can hold."""
+    if not palette or len(palette) % 3 or len(palette) > 3 * 2**header.depth:
+        raise InputError(f"{name}: is a damaged PNG: its palette is missing or wrong")
+    return palette.ljust(3 * 2**header.depth, b"\0")
+
+
+def _chunk(kind: bytes, body: bytes) -> bytes:
+    return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rollcli.errors import InputError
 
 # a compressed file may claim any size in a few bytes: more than this is refused before memory is taken
-MAX_COMPRESSED_PIXELS = 2**27
+_MAX_DECODED = 2**28
 
 # a camera image as it lies in the file, grey or BGR: turning it by its EXIF tag would break rectification
 PICTURE_FLAGS = cv2.IMREAD_ANYDEPTH | cv2.IMREAD_ANYCOLOR | cv2.IMREAD_IGNORE_ORIENTATION
@@ -28,11 +28,14 @@ class Stored:
         "png", "tiff", "npy" or "pfm".
     nodata : tuple of float
         The stored values that the file itself says mean no data (GDAL's tag).
+    note : str
+        What a user should know about how the file was read, or "".
     """
 
     values: NDArray[Any]
     format: str
     nodata: tuple[float, ...] = ()
+    note: str = ""
 
 
 def require_map_shape(shape: tuple[int, ...], name: str) -> None:
@@ -43,12 +46,11 @@ def require_map_shape(shape: tuple[int, ...], name: str) -> None:
         raise InputError(f"{name}: has no pixels (shape {shape})")
 
 
-def require_pixels_fit(width: int, height: int, name: str) -> None:
-    """Refuse a compressed image whose header claims more pixels than any map has."""
-    if width * height > MAX_COMPRESSED_PIXELS:
+def require_decoded_fits(size: int, claim: str, name: str) -> None:
+    """Refuse a compressed image of more bytes than any map has."""
+    if size > _MAX_DECODED:
         raise InputError(
-            f"{name}: its header claims {width} x {height} pixels; "
-            f"compressed maps of up to {MAX_COMPRESSED_PIXELS // 10**6} million pixels are read"
+            f"{name}: {claim}; compressed images of up to {_MAX_DECODED >> 20} MB of pixels are read"
         )
 
 

@@ -46,7 +46,7 @@ def derotate(
         )
     valid = _validity(disparity, invalid)
     if roll == 0:
-        return disparity.copy()
+        return np.array(disparity)
     matrix, size = _rotation(disparity.shape, roll, expand)
     weight = _warp(valid.astype(np.float32), matrix, size, cv2.INTER_LINEAR)
     total = _warp(

@@ -13,12 +13,12 @@ WRITTEN = [
 ]
 
 
-@pytest.mark.parametrize(("format", "kind"), WRITTEN)
-def test_what_is_written_is_read_back_unchanged(format, kind):
+@pytest.mark.parametrize(("form", "kind"), WRITTEN)
+def test_what_is_written_is_read_back_unchanged(form, kind):
     values = np.random.default_rng(1).uniform(1, 200, (37, 53)).astype(kind)
 
-    stored = decode_stored(encode_stored(values, format), "map")
+    stored = decode_stored(encode_stored(values, form), "map")
 
-    assert stored.format == format
+    assert stored.format == form
     assert stored.values.dtype == values.dtype
     np.testing.assert_array_equal(stored.values, values)
