@@ -141,7 +141,7 @@ def make_tiff(
 ):
     """A TIFF file of (H, W) or (H, W, channels) numbers.
 
-    tile is (rows, columns); page_kind is the NewSubfileType of the second and later pages (1: a reduced copy).
+    tile is (rows, columns); page_kind the NewSubfileType of the second and later pages (1: a reduced copy).
     """
     image = pixels if pixels.ndim == 3 else pixels[..., None]
     height, width, channels = image.shape

@@ -31,9 +31,9 @@ def image_paths(frame: "Frame", images: ImageOptions) -> Iterator[tuple[str, str
         yield kind, posixpath.join(folder, stem + endings[kind])
 
 
-# how atomic files are called before they take their name: the first hundred characters of it, and chance
+# how atomic files are called before they take their name: by the first hundred characters of it
 _PREFIX = 100
-_PART = re.compile(r"\.(.+)\.[a-z0-9_]{8}\.part", re.DOTALL)
+_PART = re.compile(r"\.(.+)\.part", re.DOTALL)
 
 
 def remove_leftovers(frames: Iterable["Frame"], images: ImageOptions, output: str | None) -> None:

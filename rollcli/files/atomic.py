@@ -1,8 +1,6 @@
 """Files that appear whole or not at all: written beside their target, then renamed onto it."""
 
 import contextlib
-import os
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
@@ -35,36 +33,23 @@ def atomic_file(path: str | Path) -> Iterator[BinaryIO]:
         The target cannot be written (full disk, no permission, a folder of that name, ...).
     """
     target = Path(path)
-    temporary = None
+    # not a random name: what a killed process leaves lying, the next run takes over
+    temporary = target.with_name(f".{target.name[:100]}.part")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         if target.is_dir():
-            raise IsADirectoryError(None, "is a folder")
-        descriptor, temporary = tempfile.mkstemp(
-            prefix=f".{target.name[:100]}.", suffix=".part", dir=target.parent
-        )
-        with os.fdopen(descriptor, "wb") as file:
+            raise OutputError(f"{path}: cannot be written: is a folder")
+        with temporary.open("wb") as file:
             yield file
-        # mkstemp makes private files; a result has the permissions any new file would have
-        Path(temporary).chmod(0o666 & ~_umask())
-        Path(temporary).replace(target)
-        temporary = None
+        temporary.replace(target)
     except OSError as error:
         raise output_error(path, error) from error
     finally:
-        if temporary is not None:
-            with contextlib.suppress(OSError):
-                Path(temporary).unlink()
+        with contextlib.suppress(OSError):
+            temporary.unlink()
 
 
 def write_atomic(path: str | Path, data: bytes) -> None:
     """Write `data` to `path`, whole or not at all; see `atomic_file`."""
     with atomic_file(path) as file:
         file.write(data)
-
-
-def _umask() -> int:
-    # the mask can only be read by setting it; a second thread between the calls would see 0o077, never less
-    mask = os.umask(0o077)
-    os.umask(mask)
-    return mask

@@ -5,6 +5,7 @@ What a file is, its first bytes say; its name's ending decides nothing.
 """
 
 import os
+import re
 import stat
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.errors import InputError, OutputError
+from rollcli.errors import InputError, UsageError
 from rollcli.files import npy, pfm, pictures, png, tiff
 from rollcli.files.stored import Stored, native
 
@@ -28,6 +29,7 @@ _KNOWN = {
     b"\x1f\x8b": "a gzip file",
     b"\x89HDF": "an HDF5 file",
 }
+_TEXT = re.compile(rb"[\t\n\r\f\x20-\x7e]{8}")  # no format begins with eight printable characters
 
 
 def read_bytes(path: str | Path) -> bytes:
@@ -54,10 +56,14 @@ def read_bytes(path: str | Path) -> bytes:
         dangling = Path(path).is_symlink()
         raise InputError(f"{path}: {'is a link to nothing' if dangling else 'no such file'}") from None
     except (OSError, ValueError) as error:
-        raise InputError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
+        raise InputError(f"{path}: cannot be read: {_lowered(error)}") from None
     if not data:
         raise InputError(f"{path}: is empty")
     return data
+
+
+def _lowered(error: OSError | ValueError) -> str:
+    return str(getattr(error, "strerror", None) or error).lower()
 
 
 def read_stored(path: str | Path) -> Stored:
@@ -107,6 +113,8 @@ def encode_stored(values: NDArray[Any], format: str, nodata: tuple[float, ...] =
     ------
     OutputError
         The format does not hold such numbers.
+    UsageError
+        There is no such format.
     """
     if format == "png":
         return png.encode_png(values)
@@ -116,7 +124,7 @@ def encode_stored(values: NDArray[Any], format: str, nodata: tuple[float, ...] =
         return npy.encode_npy(values)
     if format == "pfm":
         return pfm.encode_pfm(values)
-    raise OutputError(f"{format}: unknown map format; png, tiff, npy and pfm are written")
+    raise UsageError(f"{format}: unknown map format; png, tiff, npy and pfm are written")
 
 
 def read_image(path: str | Path) -> NDArray[Any]:
@@ -162,5 +170,6 @@ def _what(data: bytes) -> str:
     for signature, what in _KNOWN.items():
         if data.startswith(signature):
             return what
-    text = all(byte in b"\t\n\r\f" or byte >= 32 for byte in data[:200]) and b"\x7f" not in data[:200]
-    return "text" if text else "no file of a known format"
+    if len(data) < 8:
+        return f"only {len(data)} bytes long"
+    return "text" if _TEXT.match(data) else "no file of a known format"

@@ -10,16 +10,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.errors import InputError
+from rollcli.errors import InputError, OutputError
 
 MAGICS = (b"Pf", b"PF")
-_HEADER = re.compile(rb"P([fF])\s+(\d{1,9})\s+(\d{1,9})\s+([-+.\deE]{1,40})[ \t]*\r?\n")
+_GAP = rb"(?:\s|#[^\n]*\n)+"
+_FLOAT = rb"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,3})?)"
+_HEADER = re.compile(rb"P([fF])" + 2 * (_GAP + rb"(\d{1,9})") + _GAP + _FLOAT + rb"[ \t]*\r?\n")
 
 
 def decode_pfm(data: bytes, name: str) -> NDArray[Any]:
     """The float32 values of a single-channel PFM file, top row first."""
     header = _HEADER.match(data, 0, min(len(data), 1000))
-    if header is None:
+    if header is None or float(header[4]) == 0:
         raise InputError(f"{name}: its PFM header cannot be read (expected: Pf, width height, scale)")
     if header[1] == b"F":
         raise InputError(f"{name}: is a colour PFM (PF); a disparity map has one channel (Pf)")
@@ -38,5 +40,7 @@ def decode_pfm(data: bytes, name: str) -> NDArray[Any]:
 
 def encode_pfm(values: NDArray[Any]) -> bytes:
     """A little-endian single-channel PFM file of float32 values."""
+    if values.dtype != np.float32:
+        raise OutputError(f"a PFM holds float32, not {values.dtype}: write TIFF or NPY instead")
     height, width = values.shape
     return b"Pf\n%d %d\n-1.0\n" % (width, height) + values[::-1].astype("<f4").tobytes()

@@ -28,8 +28,8 @@ _DEPTHS = {
 }
 _MAX_SIDE = 1_000_000  # libpng's own limit
 _MAX_EXPANSION = 1032  # of Deflate
-# Checksums can be right over wrong data. Inflating all of it twice would cost 70 % more time: only the start of
-# small files is inflated beforehand, which is where headers lie
+# Checksums can be right over wrong data. Inflating all of it twice would cost 70 % more time: only the start
+# of small files is, which is where headers lie
 _SMALL, _FOREHAND = 1 << 14, 1 << 16
 # of the seven passes of an interlaced image: first column, first row, column step, row step
 _ADAM7 = ((0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (1, 0, 2, 2), (0, 1, 1, 2))

@@ -1,9 +1,16 @@
-"""Map files are read as they are stored, whatever their format."""
+"""Map files are read as they are stored, whatever they are called; what cannot be read is named."""
 
+import os
+import subprocess
+import sys
+
+import cv2
 import numpy as np
 import pytest
 
-from rollcli.files.formats import decode_stored, encode_stored
+from rollcli.errors import InputError, OutputError, UsageError
+from rollcli.files.formats import decode_stored, encode_stored, read_bytes, read_image, read_stored
+from tests.making import disparity_map, make_npy, make_png, make_tiff
 
 WRITTEN = [
     *[("png", kind) for kind in ("u1", "u2")],
@@ -22,3 +29,181 @@ def test_what_is_written_is_read_back_unchanged(form, kind):
     assert stored.format == form
     assert stored.values.dtype == values.dtype
     np.testing.assert_array_equal(stored.values, values)
+
+
+def test_numbers_that_a_format_cannot_hold_are_refused():
+    for form, kind in (("png", "f4"), ("png", "i2"), ("pfm", "f8"), ("pfm", "u1")):
+        with pytest.raises(OutputError, match="write TIFF or NPY instead"):
+            encode_stored(np.ones((2, 2), kind), form)
+    with pytest.raises(UsageError, match="jpg: unknown map format"):
+        encode_stored(np.ones((2, 2)), "jpg")
+
+
+def test_the_content_decides_and_not_the_ending(tmp_path):
+    path = tmp_path / "map.pfm"
+    path.write_bytes(make_npy(disparity_map()))
+
+    assert read_stored(path).format == "npy"
+
+
+def test_names_of_any_alphabet_are_read(tmp_path):
+    path = tmp_path / "Straße 道路 🛣.png"
+    path.write_bytes(make_png(np.ones((2, 3), np.uint16)))
+
+    assert read_stored(path).values.shape == (2, 3)
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        (b"", "is empty"),
+        (b"frame,roll\n1,2\n", r"is text; a disparity map is a PNG, TIFF, NPY or PFM file"),
+        (b"\x89PN", "is only 3 bytes long"),
+        (bytes(1000), "is no file of a known format"),
+        (b"\xff\xd8\xff\xe0" + bytes(100), "is a JPEG image"),
+        (b"PK\x03\x04" + bytes(100), "is a ZIP or NPZ archive"),
+        (b"GIF89a" + bytes(100), "is a GIF image"),
+    ],
+)
+def test_what_is_no_map_is_named(tmp_path, content, reason):
+    path = tmp_path / "map.png"
+    path.write_bytes(content)
+
+    with pytest.raises(InputError, match=rf"map.png: {reason}"):
+        read_stored(path)
+
+
+def test_paths_that_are_no_files_are_named(tmp_path):
+    dangling = tmp_path / "dangling.png"
+    dangling.symlink_to(tmp_path / "gone.png")
+    loop = tmp_path / "loop.png"
+    loop.symlink_to(loop)
+
+    for path, reason in (
+        (tmp_path, "is a folder, not a file"),
+        (tmp_path / "none.png", "no such file"),
+        (dangling, "is a link to nothing"),
+        (loop, "cannot be read"),
+        (tmp_path / ("x" * 300), "cannot be read"),
+        ("a\0b.png", "cannot be read"),
+    ):
+        with pytest.raises(InputError, match=reason):
+            read_bytes(path)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes on this system")
+def test_a_named_pipe_is_refused_at_once(tmp_path):
+    os.mkfifo(tmp_path / "pipe.png")
+
+    with pytest.raises(InputError, match="is not a regular file"):
+        read_bytes(tmp_path / "pipe.png")
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may read everything")
+def test_a_file_without_permission_is_named(tmp_path):
+    path = tmp_path / "map.png"
+    path.write_bytes(b"x")
+    path.chmod(0)
+
+    with pytest.raises(InputError, match=r"map.png: cannot be read: permission denied"):
+        read_bytes(path)
+
+
+def test_a_file_too_large_for_any_map_is_refused_unread(tmp_path):
+    path = tmp_path / "map.npy"
+    with path.open("wb") as file:
+        file.truncate(2**40)
+
+    with pytest.raises(InputError, match=r"map.npy: has 1099511627776 bytes"):
+        read_bytes(path)
+
+
+IMAGE = np.random.default_rng(0).integers(0, 256, (20, 30, 3), dtype=np.uint8)
+
+
+@pytest.mark.parametrize("ending", [".png", ".bmp", ".tif"])
+def test_camera_images_of_lossless_formats_are_read(tmp_path, ending):
+    (tmp_path / f"a{ending}").write_bytes(cv2.imencode(ending, IMAGE)[1].tobytes())
+    (tmp_path / f"b{ending}").write_bytes(cv2.imencode(ending, IMAGE[..., 0])[1].tobytes())
+
+    np.testing.assert_array_equal(read_image(tmp_path / f"a{ending}"), IMAGE)
+    grey = read_image(tmp_path / f"b{ending}")
+    np.testing.assert_array_equal(grey if grey.ndim == 2 else grey[..., 0], IMAGE[..., 0])
+
+
+@pytest.mark.parametrize(("ending", "image"), [(".ppm", IMAGE), (".pgm", IMAGE[..., 0])])
+def test_portable_pixmaps_are_read(tmp_path, ending, image):
+    (tmp_path / f"a{ending}").write_bytes(cv2.imencode(ending, image)[1].tobytes())
+
+    np.testing.assert_array_equal(read_image(tmp_path / f"a{ending}"), image)
+
+
+@pytest.mark.parametrize("ending", [".png", ".pgm", ".tif"])
+def test_camera_images_of_16_bits_are_read(tmp_path, ending):
+    image = IMAGE[..., 0].astype(np.uint16) * 257
+    (tmp_path / f"a{ending}").write_bytes(cv2.imencode(ending, image)[1].tobytes())
+
+    np.testing.assert_array_equal(read_image(tmp_path / f"a{ending}"), image)
+
+
+def test_jpegs_are_read_upright_or_not_as_they_are_stored(tmp_path):
+    (tmp_path / "a.jpg").write_bytes(cv2.imencode(".jpg", IMAGE)[1].tobytes())
+
+    assert read_image(tmp_path / "a.jpg").shape == IMAGE.shape
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        (cv2.imencode(".jpg", IMAGE)[1].tobytes()[:-200], "is a truncated JPEG"),
+        (cv2.imencode(".bmp", IMAGE)[1].tobytes()[:-200], "is truncated: 30 x 20 pixels"),
+        (cv2.imencode(".bmp", IMAGE)[1].tobytes()[:30], "is a damaged or an unusual BMP"),
+        (cv2.imencode(".ppm", IMAGE)[1].tobytes()[:-1], "is truncated: 30 x 20 pixels need 1800 bytes, 1799"),
+        (b"P5\n1000000 1000000\n255\n" + bytes(100), "is truncated"),
+        (b"P5\n" + b"# " * 5000, "its header cannot be read"),
+        (b"P5\n0 3\n255\n", "has no pixels"),
+        (b"P5\n3 3\n65536\n" + bytes(99), "its header cannot be read"),
+        (make_npy(np.ones((3, 3))), "a camera image is a PNG, JPEG, TIFF"),
+        (b"hello world", "is text; a camera image is"),
+    ],
+)
+def test_what_is_no_camera_image_is_named(tmp_path, content, reason):
+    path = tmp_path / "left.png"
+    path.write_bytes(content)
+
+    with pytest.raises(InputError, match=rf"left.png: .*{reason}"):
+        read_image(path)
+
+
+def test_nothing_is_printed_about_damaged_files(tmp_path):
+    """Beside what test_png.py has: OpenCV, tifffile and NumPy are silent too."""
+    values = disparity_map().astype(np.float32)
+    tiff = make_tiff(values, "lzw", rows_per_strip=5, pages=2)
+    wholes = {
+        "a.tif": tiff,
+        "b.npy": make_npy(values),
+        "c.bmp": cv2.imencode(".bmp", IMAGE)[1].tobytes(),
+        "d.ppm": cv2.imencode(".ppm", IMAGE)[1].tobytes(),
+    }
+    for name, whole in wholes.items():
+        for length in range(5, len(whole), len(whole) // 20):
+            (tmp_path / f"{length}{name}").write_bytes(whole[:length])
+            (tmp_path / f"{length}x{name}").write_bytes(whole[:length] + b"\xff\0\xff" + whole[length + 3 :])
+    script = (
+        "import sys, pathlib\n"
+        "from rollcli.errors import InputError\n"
+        "from rollcli.files.formats import read_image, read_stored\n"
+        "for path in pathlib.Path(sys.argv[1]).iterdir():\n"
+        "    for read in (read_image, read_stored):\n"
+        "        try:\n"
+        "            read(path)\n"
+        "        except InputError:\n"
+        "            print('refused')\n"
+    )
+
+    done = subprocess.run(
+        [sys.executable, "-c", script, tmp_path], capture_output=True, text=True, check=True
+    )
+
+    assert done.stderr == ""
+    assert done.stdout.count("refused") > 80

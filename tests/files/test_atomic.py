@@ -1,0 +1,133 @@
+"""A file is there whole or not at all."""
+
+import os
+import stat
+import subprocess
+import sys
+
+import pytest
+
+from rollcli.errors import OutputError
+from rollcli.files.atomic import atomic_file, write_atomic
+
+
+def names_in(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_a_file_is_written_with_its_folders(tmp_path):
+    write_atomic(tmp_path / "a" / "b" / "map.png", b"data")
+
+    assert (tmp_path / "a" / "b" / "map.png").read_bytes() == b"data"
+
+
+def test_an_existing_file_is_replaced(tmp_path):
+    (tmp_path / "map.png").write_bytes(b"old and longer")
+
+    write_atomic(tmp_path / "map.png", b"new")
+
+    assert (tmp_path / "map.png").read_bytes() == b"new"
+
+
+def test_nothing_is_there_before_the_block_ends(tmp_path):
+    with atomic_file(tmp_path / "map.png") as file:
+        file.write(b"half")
+        assert not (tmp_path / "map.png").exists()
+
+    assert names_in(tmp_path) == ["map.png"]
+
+
+def test_what_a_killed_process_left_is_taken_over(tmp_path):
+    script = (
+        "import os, sys\n"
+        "from rollcli.files.atomic import atomic_file\n"
+        "with atomic_file(sys.argv[1]) as file:\n"
+        "    file.write(b'half of a longer file')\n"
+        "    file.flush()\n"
+        "    os._exit(9)\n"
+    )
+    subprocess.run([sys.executable, "-c", script, tmp_path / "map.png"], check=False)
+    assert len(names_in(tmp_path)) == 1
+
+    write_atomic(tmp_path / "map.png", b"data")
+
+    assert names_in(tmp_path) == ["map.png"]
+    assert (tmp_path / "map.png").read_bytes() == b"data"
+
+
+def test_a_block_that_fails_leaves_what_was_there(tmp_path):
+    (tmp_path / "map.png").write_bytes(b"old")
+
+    def fail():
+        with atomic_file(tmp_path / "map.png") as file:
+            file.write(b"new")
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        fail()
+
+    assert names_in(tmp_path) == ["map.png"]
+    assert (tmp_path / "map.png").read_bytes() == b"old"
+
+
+@pytest.mark.skipif(os.name == "nt", reason="POSIX permissions")
+@pytest.mark.parametrize("mask", [0o022, 0o077, 0o002])
+def test_permissions_are_those_of_any_new_file(tmp_path, mask):
+    before = os.umask(mask)
+    try:
+        write_atomic(tmp_path / "map.png", b"")
+    finally:
+        os.umask(before)
+
+    assert stat.S_IMODE((tmp_path / "map.png").stat().st_mode) == 0o666 & ~mask
+
+
+def test_a_name_as_long_as_the_system_allows_is_written(tmp_path):
+    name = "é" * 120 + ".png"
+
+    write_atomic(tmp_path / name, b"data")
+
+    assert names_in(tmp_path) == [name]
+
+
+def test_what_cannot_be_written_is_named_in_one_line(tmp_path):
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "file").write_bytes(b"")
+
+    for path in (tmp_path / "folder", tmp_path / "file" / "map.png", tmp_path / ("x" * 300)):
+        with pytest.raises(OutputError, match="cannot be written: ") as caught:
+            write_atomic(path, b"data")
+        assert str(caught.value).startswith(str(path))
+        assert "\n" not in str(caught.value)
+
+    assert names_in(tmp_path) == ["file", "folder"]
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write everywhere")
+def test_a_folder_without_permission_is_named(tmp_path):
+    tmp_path.chmod(0o500)
+
+    with pytest.raises(OutputError, match="permission denied"):
+        write_atomic(tmp_path / "map.png", b"data")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="resource limits are POSIX")
+def test_a_full_disk_leaves_nothing_behind(tmp_path):
+    script = (
+        "import resource, signal, sys\n"
+        "from rollcli.errors import OutputError\n"
+        "from rollcli.files.atomic import write_atomic\n"
+        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))\n"
+        "try:\n"
+        "    write_atomic(sys.argv[1], bytes(5000))\n"
+        "except OutputError as error:\n"
+        "    print(error)\n"
+    )
+    target = tmp_path / "map.png"
+
+    done = subprocess.run([sys.executable, "-c", script, target], capture_output=True, text=True, check=True)
+
+    assert done.stdout == f"{target}: cannot be written: file too large\n"
+    assert done.stderr == ""
+    assert names_in(tmp_path) == []

@@ -1,0 +1,179 @@
+"""Stored numbers become pixels, and no data becomes 0, whatever a file calls it."""
+
+import numpy as np
+import pytest
+
+from rollcli.errors import OutputError, UsageError
+from rollcli.files.encodings import Encoding, from_disparity, read_disparity, read_mask, to_disparity
+from rollcli.files.formats import Stored, encode_stored
+from tests.making import disparity_map, make_png, make_tiff
+
+
+def stored(values, dtype, **more):
+    return Stored(np.array([values], dtype), "npy", **more)
+
+
+def pixels(values, dtype, **options):
+    return to_disparity(stored(values, dtype), **options).disparity[0].tolist()
+
+
+@pytest.mark.parametrize(
+    ("dtype", "encoding", "scale"),
+    [
+        ("u1", Encoding.PX, 1),
+        ("u2", Encoding.KITTI, 1 / 256),
+        ("i2", Encoding.SGBM, 1 / 16),
+        ("i4", Encoding.PX, 1),
+        ("u4", Encoding.PX, 1),
+        ("f2", Encoding.PX, 1),
+        ("f4", Encoding.PX, 1),
+        ("f8", Encoding.PX, 1),
+    ],
+)
+def test_auto_goes_by_the_type(dtype, encoding, scale):
+    result = to_disparity(stored([0, 32, 64], dtype))
+
+    assert result.encoding is encoding
+    assert result.scale == scale
+    assert result.disparity.dtype == (np.float64 if dtype == "f8" else np.float32)
+    assert result.disparity.flags.c_contiguous
+    assert result.disparity[0].tolist() == [0, 32 * scale, 64 * scale]
+
+
+def test_each_encoding_reads_numbers_its_own_way():
+    assert pixels([0, 1, 257, 512], "u2", encoding="kitti") == [0, 1 / 256, 257 / 256, 2]
+    assert pixels([0, 1, 257, 513], "u2", encoding="cityscapes") == [0, 0, 1, 2]
+    assert pixels([-16, 0, 16, 24], "i2", encoding="sgbm") == [0, 0, 1, 1.5]
+    assert pixels([0, 1, 257], "u2", encoding="px") == [0, 1, 257]
+
+
+def test_a_scale_stands_in_for_the_encoding():
+    result = to_disparity(stored([0, 8], "u2"), scale=0.25)
+
+    assert result.encoding is Encoding.PX
+    assert result.disparity[0].tolist() == [0, 2]
+    assert pixels([0, 9], "u2", encoding="cityscapes", scale=0.25) == [0, 2]
+
+
+@pytest.mark.parametrize("scale", [0, -1, float("nan"), float("inf")])
+def test_a_scale_that_is_no_factor_is_refused(scale):
+    with pytest.raises(UsageError, match="must be a positive number"):
+        to_disparity(stored([1], "f4"), scale=scale)
+
+
+def test_an_unknown_encoding_is_refused_with_those_there_are():
+    with pytest.raises(UsageError, match="'middlebury' is unknown: choose one of auto, px, kitti"):
+        to_disparity(stored([1], "f4"), encoding="middlebury")
+
+
+@pytest.mark.parametrize("dtype", ["f2", "f4", "f8", "g"])
+@pytest.mark.parametrize("encoding", ["px", "kitti", "cityscapes", "sgbm"])
+def test_nothing_that_is_no_number_is_left(dtype, encoding):
+    values = np.array([np.nan, -np.inf, np.inf, -1, -0.0, 0, 32], dtype)
+
+    result = pixels(values, dtype, encoding=encoding)
+
+    assert result[:-1] == [0] * 6
+    assert result[-1] > 0
+
+
+def test_numbers_too_large_for_pixels_are_no_data():
+    assert pixels([1e300], "f8", scale=1e20) == [0]
+    assert pixels([np.longdouble("1e400")], "g") == [0]
+
+
+def test_saturated_numbers_are_no_data():
+    assert pixels([65534, 65535], "u2") == [65534 / 256, 0]
+    assert pixels([32766, 32767], "i2") == [32766 / 16, 0]
+    assert pixels([254, 255], "u1") == [254, 255]
+
+
+def test_further_values_are_compared_as_they_are_stored():
+    assert pixels([256, 512], "u2", invalid=(256.0,)) == [0, 2]
+    assert pixels([0.5, 1.5], "f2", invalid=(1.5, 1e30)) == [0.5, 0]
+    assert pixels([1, 2], "f4", invalid=(float("nan"), -1.0, float("inf"))) == [1, 2]
+
+
+def test_the_value_that_the_file_calls_no_data_is_no_data():
+    values = stored([1, 9999], "f4", nodata=(9999.0,))
+
+    assert to_disparity(values).disparity[0].tolist() == [1, 0]
+
+
+def test_whole_pixels_read_as_kitti_are_doubted_under_auto_alone():
+    few = stored([0, 511], "u2")
+
+    assert "--encoding px" in to_disparity(few).warning
+    assert to_disparity(few, encoding="kitti").warning is None
+    assert to_disparity(few, scale=1.0).warning is None
+    assert to_disparity(stored([0, 512], "u2")).warning is None
+    assert to_disparity(stored([0, 0], "u2")).warning is None
+
+
+def test_a_note_of_the_file_reaches_the_user():
+    assert to_disparity(stored([1], "f4", note="two pages")).warning == "two pages"
+
+
+def test_the_stored_numbers_are_left_alone():
+    values = np.array([[65535, -1, 5]], np.float32)
+    values.flags.writeable = False
+
+    to_disparity(Stored(values, "tiff"), invalid=(5.0,))
+
+    assert values.tolist() == [[65535, -1, 5]]
+
+
+@pytest.mark.parametrize(
+    ("encoding", "dtype"),
+    [("kitti", "u2"), ("cityscapes", "u2"), ("sgbm", "i2"), ("px", "f4"), ("px", "f8"), ("px", "f2")],
+)
+def test_pixels_survive_the_way_there_and_back(encoding, dtype):
+    disparity = np.abs(disparity_map())
+
+    numbers = from_disparity(disparity, encoding, dtype)
+    again = to_disparity(Stored(numbers, "npy"), encoding=encoding).disparity
+
+    assert numbers.dtype == np.dtype(dtype)
+    np.testing.assert_array_equal(again > 0, disparity > 0)
+    np.testing.assert_allclose(again, disparity, atol=1 / 30)
+
+
+def test_no_data_is_stored_as_each_encoding_has_it():
+    empty = np.array([[0, -1, np.nan, np.inf, 2]])
+
+    assert from_disparity(empty, "sgbm", "i2").tolist() == [[-16, -16, -16, -16, 32]]
+    assert from_disparity(empty, "kitti").tolist() == [[0, 0, 0, 0, 512]]
+    assert from_disparity(empty, "cityscapes").tolist() == [[0, 0, 0, 0, 513]]
+
+
+def test_a_small_disparity_is_not_rounded_to_no_data():
+    assert from_disparity(np.array([[1e-4]]), "kitti").tolist() == [[1]]
+    assert from_disparity(np.array([[1e-4]]), "cityscapes").tolist() == [[2]]
+
+
+def test_disparities_beyond_the_numbers_are_refused_and_a_few_are_dropped():
+    disparity = np.full((20, 20), 100.0)
+    disparity[0, 0] = 300
+    assert from_disparity(disparity, "kitti")[0, :2].tolist() == [0, 25600]
+
+    disparity[0] = 300
+    with pytest.raises(OutputError, match="disparities up to 300 px do not fit numbers that end at 256 px"):
+        from_disparity(disparity, "kitti")
+
+
+def test_a_file_is_read_in_one_call(tmp_path):
+    path = tmp_path / "map.png"
+    path.write_bytes(encode_stored(np.array([[0, 512, 768]], np.uint16), "png"))
+
+    assert read_disparity(path).tolist() == [[0, 2, 3]]
+    assert read_disparity(str(path), invalid=768).tolist() == [[0, 2, 0]]
+    assert read_disparity(path, encoding="px").tolist() == [[0, 512, 768]]
+
+
+def test_masks_of_maps_and_images_are_read(tmp_path):
+    mask = np.eye(4, dtype=np.uint8)
+    (tmp_path / "a.png").write_bytes(make_png(mask, 8))
+    (tmp_path / "b.tif").write_bytes(make_tiff(mask.astype(np.float32)))
+
+    assert read_mask(tmp_path / "a.png").tolist() == mask.astype(bool).tolist()
+    assert read_mask(tmp_path / "b.tif").tolist() == mask.astype(bool).tolist()

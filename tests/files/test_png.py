@@ -1,0 +1,217 @@
+"""PNG files of every kind are read, and damaged ones never reach libpng."""
+
+import struct
+import subprocess
+import sys
+import zlib
+
+import cv2
+import numpy as np
+import pytest
+
+from rollcli.errors import InputError, OutputError
+from rollcli.files.formats import decode_mask, decode_stored, encode_stored
+from rollcli.files.png import picture
+from tests.making import disparity_map, make_png, png_file, png_header, png_rows
+
+GREYS = bytes(np.repeat(np.arange(256, dtype=np.uint8), 3))
+
+
+def values_of(depth, height=37, width=53):
+    return (disparity_map(height, width) % 2**depth).astype(np.uint16 if depth == 16 else np.uint8)
+
+
+def kitti_png(height=37, width=53):
+    return encode_stored((disparity_map(height, width) * 256).astype(np.uint16), "png")
+
+
+@pytest.mark.parametrize("interlace", [False, True])
+@pytest.mark.parametrize("depth", [1, 2, 4, 8, 16])
+def test_every_bit_depth_is_read_as_it_is_stored(depth, interlace):
+    values = values_of(depth)
+
+    stored = decode_stored(make_png(values, depth, interlace=interlace), "map.png")
+
+    assert stored.values.dtype == values.dtype
+    np.testing.assert_array_equal(stored.values, values)
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 5), (3, 2), (5, 1), (8, 8)])
+def test_small_interlaced_images_have_empty_passes(size):
+    values = values_of(16, *size)
+
+    np.testing.assert_array_equal(decode_stored(make_png(values, interlace=True), "x").values, values)
+
+
+@pytest.mark.parametrize("depth", [8, 16])
+def test_transparent_pixels_hold_no_data(depth):
+    values = values_of(depth) | 1
+    alpha = np.full_like(values, 2**depth - 1)
+    alpha[:10] = 0
+
+    stored = decode_stored(make_png(np.dstack([values, alpha]), depth, colour=4), "map.png")
+
+    np.testing.assert_array_equal(stored.values[10:], values[10:])
+    assert not stored.values[:10].any()
+
+
+def test_a_palette_of_greys_is_read_and_one_of_colours_is_not():
+    values = values_of(8)
+
+    stored = decode_stored(make_png(values, 8, colour=3, palette=GREYS), "map.png")
+    np.testing.assert_array_equal(stored.values, values)
+
+    with pytest.raises(InputError, match=r"map.png: is a colour image \(a palette\)"):
+        decode_stored(make_png(values, 8, colour=3, palette=bytes(range(256)) * 3), "map.png")
+
+
+@pytest.mark.parametrize(("colour", "channels"), [(2, 3), (6, 4)])
+def test_colour_images_are_no_maps(colour, channels):
+    pixels = np.zeros((5, 7, channels), np.uint8)
+
+    with pytest.raises(InputError, match=rf"map.png: is a colour image \({channels} channels\)"):
+        decode_stored(make_png(pixels, 8, colour), "map.png")
+
+
+def test_masks_are_read_from_any_kind_of_png():
+    mask = values_of(1).astype(bool)
+    colours = np.zeros((*mask.shape, 3), np.uint8)
+    colours[mask, 1] = 128
+    label_palette = bytes(3) + bytes([128, 0, 0]) * 3
+
+    for file in (
+        make_png(mask.astype(np.uint8), 1),
+        make_png(mask.astype(np.uint8), 2, colour=3, palette=label_palette),
+        make_png(colours, 8, colour=2),
+    ):
+        np.testing.assert_array_equal(decode_mask(file, "mask.png"), mask)
+
+
+def test_an_orientation_tag_does_not_turn_a_camera_image():
+    turned = b"Exif\0\0MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0"
+    values = values_of(8)
+
+    assert picture(make_png(values, 8, extra=[(b"eXIf", turned[6:])]), "x").shape == values.shape
+
+
+def test_a_png_holds_no_floats():
+    with pytest.raises(OutputError, match="write TIFF or NPY instead"):
+        encode_stored(np.ones((3, 3)), "png")
+
+
+@pytest.mark.parametrize("keep", [8, 12, 20, 33, 40, 500, -1, -12, -13])
+def test_a_truncated_file_is_refused(keep):
+    with pytest.raises(InputError, match=r"^map.png: is a truncated PNG"):
+        decode_stored(kitti_png()[:keep], "map.png")
+
+
+def test_a_flipped_byte_is_noticed_wherever_it_lies():
+    whole = kitti_png(5, 7)
+
+    for position in range(8, len(whole)):
+        damaged = bytearray(whole)
+        damaged[position] ^= 0x10
+        with pytest.raises(InputError, match=r"^map.png: is (a truncated|a damaged|no standard) PNG"):
+            decode_stored(bytes(damaged), "map.png")
+
+
+def test_what_follows_the_end_does_not_matter():
+    values = values_of(16)
+
+    np.testing.assert_array_equal(decode_stored(make_png(values) + b"trailer", "x").values, values)
+
+
+@pytest.mark.parametrize("side", [100_000, 1_000_000])
+def test_a_header_that_claims_too_much_is_refused(side):
+    file = png_file(png_header(side, side), (b"IDAT", zlib.compress(bytes(10**7))), (b"IEND", b""))
+
+    with pytest.raises(InputError, match=f"header claims {side} x {side} pixels"):
+        decode_stored(file, "map.png")
+
+
+# files that are wrong although each checksum is right: what libpng would print about
+ROWS = png_rows(values_of(16), 16)
+DATA = zlib.compress(ROWS)
+END = (b"IEND", b"")
+HEADER = png_header(53, 37)
+WRONG = {
+    "no data": [HEADER, END],
+    "empty data": [HEADER, (b"IDAT", b""), END],
+    "half the compressed data": [HEADER, (b"IDAT", DATA[: len(DATA) // 2]), END],
+    "half the rows": [HEADER, (b"IDAT", zlib.compress(ROWS[: len(ROWS) // 2])), END],
+    "too many rows": [HEADER, (b"IDAT", zlib.compress(ROWS + bytes(500))), END],
+    "more after the data": [HEADER, (b"IDAT", DATA + b"more"), END],
+    "wrong sum of the data": [HEADER, (b"IDAT", DATA[:-4] + b"abcd"), END],
+    "no deflate data": [HEADER, (b"IDAT", b"x" * 500), END],
+    "a filter that does not exist": [HEADER, (b"IDAT", zlib.compress(b"\x09" + ROWS[1:])), END],
+    "a bit depth that does not exist": [png_header(53, 37, depth=7), (b"IDAT", DATA), END],
+    "a colour type that does not exist": [png_header(53, 37, colour=5), (b"IDAT", DATA), END],
+    "no pixels": [png_header(0, 37), (b"IDAT", DATA), END],
+    "two headers": [HEADER, HEADER, (b"IDAT", DATA), END],
+    "a header at the end": [(b"IDAT", DATA), HEADER, END],
+    "a short header": [(b"IHDR", bytes(5)), (b"IDAT", DATA), END],
+    "an unknown critical chunk": [HEADER, (b"CgBI", b""), (b"IDAT", DATA), END],
+    "no palette": [png_header(53, 37, 8, 3), (b"IDAT", DATA), END],
+    "half a colour": [png_header(53, 37, 8, 3), (b"PLTE", b"ab"), (b"IDAT", DATA), END],
+}
+PRINTS = """
+import sys
+from rollcli.errors import InputError
+from rollcli.files.formats import decode_stored
+data = sys.stdin.buffer.read()
+try:
+    print(decode_stored(data, "map.png").values.sum())
+except InputError as error:
+    print(error)
+"""
+
+
+@pytest.mark.parametrize("what", WRONG)
+def test_a_file_that_is_wrong_behind_right_checksums_is_refused(what):
+    with pytest.raises(InputError, match=r"^map.png: "):
+        decode_stored(png_file(*WRONG[what]), "map.png")
+
+
+def prints_nothing(files):
+    """Decode the files in a process of its own, and see what reaches its terminal."""
+    script = PRINTS.replace("sys.stdin.buffer.read()", "None").replace(
+        "data = None", "files = eval(sys.stdin.read())"
+    )
+    script = script.replace("try:", "for data in files:\n  try:").replace("    print", "      print")
+    script = script.replace("except", "  except")
+    done = subprocess.run(
+        [sys.executable, "-c", script], input=repr(files), capture_output=True, text=True, check=True
+    )
+    assert len(done.stdout.splitlines()) == len(files)
+    return done.stderr == ""
+
+
+def test_neither_opencv_nor_libpng_prints_about_damaged_files():
+    whole = kitti_png()
+    noisy = [
+        (b"iCCP", b"x\0\0" + zlib.compress(b"abc")),
+        (b"gAMA", bytes(4)),
+        (b"tIME", bytes(3)),
+        (b"PLTE", b"ab"),
+        (b"cHRM", b"1"),
+    ]
+    palette = png_file(
+        png_header(2, 1, 8, 3), (b"PLTE", bytes(3)), (b"IDAT", zlib.compress(b"\0\7\7")), END
+    )  # index 7 of 1
+
+    assert prints_nothing(
+        [
+            *[png_file(*chunks) for chunks in WRONG.values()],
+            *[whole[:length] for length in range(8, len(whole), 211)],
+            make_png(values_of(16), extra=noisy),
+            palette,
+        ]
+    )
+
+
+def test_a_large_frame_is_what_opencv_decodes():
+    values = (disparity_map(375, 1242) * 256).astype(np.uint16)
+    file = cv2.imencode(".png", values)[1].tobytes()
+
+    assert struct.unpack(">II", file[16:24]) == (1242, 375)
+    np.testing.assert_array_equal(decode_stored(file, "x").values, values)
