@@ -6,6 +6,7 @@ combination of ``sum w u^i v^j`` (i + j <= 4), ``sum w d u^i v^j`` (i + j <= 2) 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,8 +15,12 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-_ROWS = 64  # rows of a block: it and its mask stay in the second-level cache
-_LANES = 8  # columns of the power matrix: BLAS multiplies by 8 columns faster than by 5
+_ROWS = 64  # rows of a block at most: it stays in the cache, and its sums of integer powers exact in float32
+_ONE_THREAD = 1 << 19  # multiplications; above, OpenBLAS wakes threads, which costs more than it saves here
+_SMALL = 1 << 17  # pixels; up to here double precision takes no time that anyone would notice
+_PLANE_BITS = 20  # of the 24 that a float32 has, for the plane's value at any pixel
+_CHOOSE = np.array([[float(math.comb(j, k)) for k in range(5)] for j in range(5)])
+_REST = np.maximum(np.subtract.outer(np.arange(5), np.arange(5)), 0)  # j - k
 _GUESS_SIDE = 20  # the first fit looks at about this many rows and columns
 
 
@@ -112,25 +117,21 @@ def map_moments(
     q = (np.arange(origin[0], origin[0] + height) - grid.centre_v) / grid.scale
     if disparity.dtype.kind != "f" or disparity.dtype.itemsize < 4:
         disparity = disparity.astype(np.float32 if disparity.dtype.itemsize <= 2 else np.float64)
-    if plane is None:
-        plane = _first_fit(disparity, weights, p, q)
     with np.errstate(invalid="ignore", over="ignore"):
-        weight_rows, residual_rows, rr = _row_sums(disparity, weights, p, q, plane)
-    if not np.isfinite(rr):  # NaN or inf among the pixels: rare enough to look only now
-        known = np.where(np.isfinite(disparity), disparity, 0)
-        weight_rows, residual_rows, rr = _row_sums(known, weights, p, q, plane)
-    powers = np.vander(q, 5, increasing=True).T
-    s = (powers @ weight_rows[:, :5]).T
-    t = (powers[:3] @ residual_rows[:, :3]).T
-    return Moments(grid, plane, s, t, rr)
+        if plane is None:
+            plane = _exact_steps(_first_fit(disparity, weights, p, q), grid.scale)
+        sums = _block_sums(disparity, weights, p, q, grid.scale, plane)
+        if not np.isfinite(sums[2]):  # NaN or inf among the pixels: rare enough to look only now
+            known = np.where(np.isfinite(disparity), disparity, 0)
+            sums = _block_sums(known, weights, p, q, grid.scale, plane)
+    return Moments(grid, plane, *sums)
 
 
 def point_moments(
     p: Floats, q: Floats, disparity: Floats, weights: Floats, grid: Grid, plane: tuple[float, float, float]
 ) -> Moments:
     """Sum scattered pixels, given by their normalised coordinates; all arrays have shape (N,)."""
-    rows = np.vander(p, 5, increasing=True)
-    columns = np.vander(q, 5, increasing=True)
+    rows, columns = _powers(p).T, _powers(q).T
     residual = disparity - (plane[0] + plane[1] * p + plane[2] * q)
     pull = weights * residual
     s = (rows * weights[:, None]).T @ columns
@@ -138,47 +139,87 @@ def point_moments(
     return Moments(grid, plane, s, t, float(pull @ residual))
 
 
-def _row_sums(
+def _block_sums(
     disparity: NDArray[Any],
     weights: NDArray[Any] | None,
     p: Floats,
     q: Floats,
+    scale: float,
     plane: tuple[float, float, float],
 ) -> tuple[Floats, Floats, float]:
-    """Sum along the rows: w p^k and w r p^k, shape (H, 8) each; then sum w r^2."""
-    height, width = disparity.shape
-    powers = np.zeros((width, _LANES), np.float32)
-    powers[:, :5] = np.vander(p, 5, increasing=True)
+    """Sum w p^i q^j, w r p^i q^j and w r^2: down the columns of blocks of rows, then along the rows."""
+    width = disparity.shape[1]
+    precision = np.float64 if disparity.size <= _SMALL else np.float32
+    rows = min(_ROWS, max(8, _ONE_THREAD // (5 * width)))
+    steps = np.arange(rows) - float(rows // 2)
+    powers = _powers(steps).astype(precision)
     along = (plane[0] + plane[1] * p).astype(disparity.dtype)
-    # The plane's part along q is one constant a block, exact per row again below: one operation less a pixel.
-    middle = np.repeat(q[_ROWS // 2 :: _ROWS], _ROWS)[:height]
-    middle = np.concatenate([middle, np.full(height - len(middle), q[-1])])
-    stack = np.empty((2 * _ROWS, width), np.float32)
-    sums = np.empty((2, height, _LANES))
+    middles = q[::rows] + (rows // 2) / scale
+    columns = np.empty((len(middles), 9, width), precision)  # 5 of w, then of w r 4: BLAS is faster than at 3
+    mask, residual = np.empty((2, rows, width), precision)
     squares = 0.0
-    for top in range(0, height, _ROWS):
-        block = disparity[top : top + _ROWS]
+    for k, middle in enumerate(middles):
+        block = disparity[k * rows : (k + 1) * rows]
         n = len(block)
-        mask, residual = stack[:n], stack[n : 2 * n]
-        np.copyto(mask, block > 0)
+        m, r = mask[:n], residual[:n]
+        np.copyto(m, block > 0)
         if weights is not None:
-            mask *= weights[top : top + n]
-        offset = along + along.dtype.type(plane[2] * middle[top])
-        np.subtract(block, offset, out=residual, casting="same_kind")
+            m *= weights[k * rows : (k + 1) * rows]
+        # within a block the plane's part along q is constant here, and exact below
+        np.subtract(block, along + along.dtype.type(plane[2] * middle), out=r, casting="same_kind")
         if weights is None:
-            residual *= mask
-            squares += float(np.vdot(residual, residual))
+            r *= m
+            squares += float(np.vdot(r, r))
         else:
-            raw = residual * (mask > 0)
-            residual *= mask
-            squares += float(np.vdot(residual, raw))
-        product = stack[: 2 * n] @ powers
-        sums[:, top : top + n] = product.reshape(2, n, _LANES)
-    weight_rows, residual_rows = sums
-    rest = plane[2] * (q - middle)
-    squares += float(rest @ (rest * weight_rows[:, 0] - 2 * residual_rows[:, 0]))
-    residual_rows -= rest[:, None] * weight_rows
-    return weight_rows, residual_rows, squares
+            raw = r * (m > 0)
+            r *= m
+            squares += float(np.vdot(r, raw))
+        np.matmul(powers[:, :n], m, out=columns[k, :5])
+        np.matmul(powers[:4, :n], r, out=columns[k, 5:])
+    across = _along_rows(columns, p)
+    s, t = across[:, :5], across[:, 5:8, :3]  # per block: powers of the step, powers of p
+    slope = plane[2] / scale
+    squares -= slope * float((2 * t[:, 1, 0] - slope * s[:, 2, 0]).sum())
+    t -= slope * s[:, 1:4, :3]
+    to_q = _from_steps(middles, scale)
+    return (to_q @ s).sum(axis=0).T, (to_q[:, :3, :3] @ t).sum(axis=0).T, squares
+
+
+def _along_rows(columns: NDArray[Any], p: Floats) -> Floats:
+    """Return the sums of columns (B, 9, W) times p^0 to p^4, shape (B, 9, 5)."""
+    blocks, kinds, width = columns.shape
+    powers = np.zeros((width, 8))  # BLAS is faster at 8 than at 5
+    powers[:, :5] = _powers(p).T
+    some = max(1, _ONE_THREAD // (kinds * 8 * width))
+    parts = [
+        columns[k : k + some].reshape(-1, width).astype(np.float64) @ powers for k in range(0, blocks, some)
+    ]
+    return np.concatenate(parts).reshape(blocks, kinds, 8)[..., :5]
+
+
+def _powers(x: Floats) -> Floats:
+    """Return x^0 to x^4, shape (5, N); several times faster than `np.vander`."""
+    powers = np.ones((5, len(x)))
+    for k in range(1, 5):
+        np.multiply(powers[k - 1], x, out=powers[k])
+    return powers
+
+
+def _from_steps(middles: Floats, scale: float) -> Floats:
+    """Return the matrices from powers of a step to powers of q = middle + step / scale, shape (B, 5, 5)."""
+    matrices: Floats = _CHOOSE * _powers(middles).T[:, _REST] / scale ** np.arange(5)
+    return matrices
+
+
+def _exact_steps(plane: tuple[float, float, float], scale: float) -> tuple[float, float, float]:
+    """Round a plane so that its value at any pixel is exact in float32: rounding there would tilt it."""
+    largest = sum(abs(c) for c in plane)
+    if not 1e-30 < largest < 1e30:
+        return plane
+    quantum = 2.0 ** (math.frexp(largest)[1] - _PLANE_BITS)
+    c0, c1, c2 = plane
+    per_unit = quantum * scale
+    return round(c0 / quantum) * quantum, round(c1 / per_unit) * per_unit, round(c2 / per_unit) * per_unit
 
 
 def _first_fit(
@@ -189,16 +230,20 @@ def _first_fit(
     rows = slice(height // _GUESS_SIDE // 2, None, max(1, height // _GUESS_SIDE))
     columns = slice(width // _GUESS_SIDE // 2, None, max(1, width // _GUESS_SIDE))
     sample = disparity[rows, columns]
-    used = (sample > 0) & np.isfinite(sample)
+    used = (sample > 0) & (sample < np.inf)
     if weights is not None:
         used &= weights[rows, columns] > 0
-    v, u = np.nonzero(used)
-    if len(v) == 0:
+    x, y = _powers(p[columns])[:3], _powers(q[rows])[:3]
+    s = y @ used @ x.T
+    t = y[:2] @ np.where(used, sample, 0) @ x[:2].T
+    n = float(s[0, 0])
+    if n == 0:
         return 0.0, 0.0, 0.0
-    design = np.stack([np.ones(len(v)), p[columns][u], q[rows][v]])
-    values = sample[used].astype(np.float64)
-    normal = design @ design.T
-    if np.linalg.cond(normal) > 1e8:
-        return float(values.mean()), 0.0, 0.0
-    c0, c1, c2 = np.linalg.solve(normal, design @ values)
-    return float(c0), float(c1), float(c2)
+    p0, q0, mean = float(s[0, 1]) / n, float(s[1, 0]) / n, float(t[0, 0]) / n
+    pp, pq, qq = s[0, 2] - n * p0 * p0, s[1, 1] - n * p0 * q0, s[2, 0] - n * q0 * q0
+    spread = pp * qq - pq * pq
+    if spread <= 1e-8 * (pp + qq) ** 2:
+        return mean, 0.0, 0.0
+    dp, dq = t[0, 1] - n * p0 * mean, t[1, 0] - n * q0 * mean
+    c1, c2 = float((qq * dp - pq * dq) / spread), float((pp * dq - pq * dp) / spread)
+    return mean - c1 * p0 - c2 * q0, c1, c2
