@@ -94,6 +94,8 @@ class Energy:
         n = moments.weight
         if n <= 0:
             raise EstimationError("no valid pixel: all are zero, negative, not finite or masked out")
+        if not math.isfinite(moments.rr):
+            raise EstimationError(f"disparities up to {peak:g}: the squares of such numbers overflow")
         p, q = moments.s[1, 0] / n, moments.s[0, 1] / n
         s = _shift(5, p) @ moments.s @ _shift(5, q).T
         t = _shift(3, p) @ moments.t @ _shift(3, q).T
@@ -170,10 +172,18 @@ class Energy:
         """Return (a0, a1, a2) of the road d = a0 + a1 y + a2 y^2 at `theta`, in pixels.
 
         y = v cos(theta) - u sin(theta) is measured from the centre of the top-left pixel.
+
+        Raises
+        ------
+        EstimationError
+            When y takes only two values, so that the normal equations are singular.
         """
         _, xy, yy, _, _, xyy, yyy, _, _, yyyy, _, _, ryy, cx, cy = self._rotated(theta)
         skew, mean = yyy / yy, yy / self.weight
-        b2 = (ryy + cx * (xyy - skew * xy)) * self._inverse(yyyy - yyy * skew - yy * mean, yyyy)
+        per_phi = self._inverse(yyyy - yyy * skew - yy * mean, yyyy)
+        if self.parabolic and not per_phi > 0:
+            raise EstimationError("the valid pixels lie on two lines: they do not determine a parabola")
+        b2 = (ryy + cx * (xyy - skew * xy)) * per_phi
         slope = (cy + cx * xy / yy - skew * b2) / self.grid.scale
         bend = b2 / self.grid.scale**2
         level = self.plane[0] - mean * b2

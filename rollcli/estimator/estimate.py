@@ -9,18 +9,18 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rollcli.errors import EstimationError, UsageError
+from rollcli.errors import UsageError
 from rollcli.estimator.energy import Energy
 from rollcli.estimator.exact import exact, minima
 from rollcli.estimator.golden_section import golden_section
 from rollcli.estimator.gradient_descent import LAMBDA0, TOLERANCE, gradient_descent
 from rollcli.estimator.moments import map_moments
+from rollcli.estimator.pixels import require_pixels
 from rollcli.estimator.solution import Solution
 
 METHODS = ("gd", "gss", "exact", "plane", "areas")
 MODELS = ("parabola", "line")
 ROADS = ("auto", "all")
-MIN_PIXELS = 100
 MAX_ROLL_LIMIT = math.radians(89)
 
 
@@ -128,11 +128,7 @@ def estimate_roll(
                 f"the mask is {_size(usable)}, the map {_size(values)}: give a mask of the map's size"
             )
         valid &= usable
-    count = int(np.count_nonzero(valid))
-    if count == 0:
-        raise EstimationError("no valid pixel: all are zero, negative, not finite or masked out")
-    if count < MIN_PIXELS:
-        raise EstimationError(f"only {count} valid pixels: at least {MIN_PIXELS} are needed")
+    count = require_pixels(valid)
     peak = float(values.max(where=valid, initial=0))
     energy = Energy.of(map_moments(values, valid), peak, parabolic=model == "parabola")
     solution = _solve(energy, method, tolerance, lambda0)

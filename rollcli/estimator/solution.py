@@ -41,4 +41,4 @@ class Solution:
 def principal(theta: float) -> float:
     """Return the angle in (-pi/2, pi/2] that describes the same rotation of rows as `theta`."""
     wrapped = math.remainder(theta, math.pi)
-    return wrapped if wrapped > -math.pi / 2 else wrapped + math.pi
+    return wrapped if wrapped > -math.pi / 2 + 1e-12 else math.pi / 2
