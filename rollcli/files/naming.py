@@ -10,7 +10,8 @@ _WORDS = (
     r"(?<![A-Za-z])(?:right|RIGHT)(?![a-z])|(?<![A-Z])Right(?![a-z])|(?<![A-Za-z])[rR](?![A-Za-z])",
 )
 # numbers count as marks after such a word, or at the end of a name: im0, image_02, cam1/000.png, 000123_0
-_NUMBERS = (("0", "1"), ("2", "3"), ("1", "2"), ("1", "5"))
+_NEVER = "(?!)"
+_NUMBERS = ((_NEVER, _NEVER), ("0", "1"), ("2", "3"), ("1", "2"), ("1", "5"), ("2", "6"))
 _NUMBERED = (
     r"((?<![A-Za-z])(?:im|img|image|cam|camera|view)[_-]?|(?<=[A-Za-z0-9])[_-](?=0*{0}$))0*{0}(?![0-9])"
 )

@@ -1,0 +1,128 @@
+"""Which files lie behind one argument: a file, a folder or a pattern."""
+
+import fnmatch
+import glob
+import os
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from rollcli.errors import UsageError
+
+
+class Search:
+    """What is taken from folders and patterns.
+
+    Parameters
+    ----------
+    endings : sequence of str
+        What counts as readable, lower case.
+    recursive : bool
+        Look into the folders of folders.
+    include, exclude : sequence of str
+        Globs on names and relative paths.
+    skip : sequence of path
+        Folders never looked into: where results go.
+    """
+
+    def __init__(
+        self,
+        endings: Sequence[str],
+        recursive: bool = False,
+        include: Sequence[str] = (),
+        exclude: Sequence[str] = (),
+        skip: Sequence[str | Path] = (),
+    ) -> None:
+        self._endings = tuple(endings)
+        self._recursive = recursive
+        self._include, self._exclude = tuple(include), tuple(exclude)
+        self._skip = {os.path.realpath(folder) for folder in skip}
+
+    def files(self, argument: str, *, literal: bool = False) -> Iterator[tuple[Path, str]]:
+        """Each file behind `argument`, and its path below the folder or pattern.
+
+        Parameters
+        ----------
+        argument : str
+            A file, which may not exist, a folder or a pattern; what exists is never taken for a pattern.
+        literal : bool
+            It is no pattern.
+
+        Raises
+        ------
+        UsageError
+            A folder cannot be read or is one of `skip`, or a folder or pattern holds nothing.
+        """
+        path = Path(argument)
+        if path.is_dir():
+            return self._wanted(argument, self._in_folder(path), "folder")
+        if literal or not glob.has_magic(argument) or os.path.lexists(path):
+            return iter([(path, path.name)])
+        return self._wanted(argument, self._in_pattern(argument), "pattern")
+
+    def _wanted(
+        self, argument: str, files: Iterator[tuple[Path, str]], kind: str
+    ) -> Iterator[tuple[Path, str]]:
+        """Those among the files that --include and --exclude let through; none at all is an error."""
+        none = True
+        for path, relative in files:
+            names = (relative, path.name)
+            if (not self._include or _match(names, self._include)) and not _match(names, self._exclude):
+                none = False
+                yield path, relative
+        if none:
+            hint = "; --recursive looks into its folders" if kind == "folder" and not self._recursive else ""
+            raise UsageError(f"{argument}: no input found in this {kind} ({' '.join(self._endings)}){hint}")
+
+    def _in_folder(self, folder: Path) -> Iterator[tuple[Path, str]]:
+        """Readable files, hidden ones aside."""
+        if os.path.realpath(folder) in self._skip:
+            raise UsageError(f"{folder}: is an input and an output folder; write the results elsewhere")
+        seen: set[str] = set()
+        for root, folders, files in os.walk(folder, onerror=_fail, followlinks=True):
+            seen.add(os.path.realpath(root))
+            folders[:] = sorted(name for name in folders if self._enters(Path(root, name), seen))
+            for name in files:
+                path = Path(root, name)
+                if not name.startswith(".") and self._reads(name) and _is_file(path):
+                    yield path, path.relative_to(folder).as_posix()
+
+    def _enters(self, folder: Path, seen: set[str]) -> bool:
+        if not self._recursive or folder.name.startswith("."):
+            return False
+        real = os.path.realpath(folder)
+        return real not in self._skip and real not in seen  # links may make a circle
+
+    def _in_pattern(self, pattern: str) -> Iterator[tuple[Path, str]]:
+        """Files that match; a pattern that names an ending gets what it asks for, others readable files."""
+        ending = Path(pattern).suffix
+        at_its_word = ending != "" and not glob.has_magic(ending)
+        base = _fixed_part(pattern)
+        for match in glob.iglob(pattern, recursive=True):  # noqa: PTH207 (Path.glob takes no absolute pattern)
+            path = Path(match)
+            relative = Path(os.path.relpath(path, base))
+            inside = {os.path.realpath(base / parent) for parent in relative.parents[:-1]}
+            if self._skip.isdisjoint(inside) and (at_its_word or self._reads(match)) and _is_file(path):
+                yield path, relative.as_posix()
+
+    def _reads(self, name: str) -> bool:
+        return name.lower().endswith(self._endings)
+
+
+def _match(names: tuple[str, str], patterns: tuple[str, ...]) -> bool:
+    return any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns for name in names)
+
+
+def _fail(error: OSError) -> None:
+    raise UsageError(f"{error.filename}: this folder cannot be read: {(error.strerror or '').lower()}")
+
+
+def _is_file(path: Path) -> bool:
+    """A file, or a link to nothing: that gets a row that says so."""
+    return path.is_file() or (path.is_symlink() and not path.exists())
+
+
+def _fixed_part(pattern: str) -> Path:
+    """The folder before the first wildcard."""
+    parts = Path(pattern).parts
+    fixed = next((i for i, part in enumerate(parts) if glob.has_magic(part)), len(parts))
+    return Path(*parts[:fixed])
