@@ -1,45 +1,58 @@
-# rollcli: set-up, tests and the sample run. `make help` lists the targets.
+# rollcli: set-up, the sample run, tests. `make` alone lists the targets.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+TOUCH := $(BIN)/python -c "import pathlib, sys; pathlib.Path(sys.argv[1]).touch()"
+REMOVE := $(PYTHON) -c "import glob, os, shutil, sys; [shutil.rmtree(p) if os.path.isdir(p) else os.remove(p) for a in sys.argv[1:] for p in glob.glob(a)]"
 
 .DEFAULT_GOAL := help
-.PHONY: help run test lint format types bench fuzz clean
+.PHONY: help run test lint types format bench fuzz clean
 
-help:  ## list the targets
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+help:
+	@echo "make run     install into .venv, and estimate the roll of sample_data into out/"
+	@echo "make test    run the whole test suite"
+	@echo "make lint    ruff: style and format"
+	@echo "make types   mypy, strict"
+	@echo "make format  let ruff rewrite the code"
+	@echo "make bench   run every benchmark of tests/benchmarks"
+	@echo "make fuzz    throw broken files at the readers for a while"
+	@echo "make clean   remove all that make made"
 
 $(BIN)/.run: pyproject.toml
-	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
-	@touch $@
+	@$(PYTHON) -c "import sys; sys.version_info >= (3, 10) or sys.exit('rollcli needs Python 3.10 or later: make PYTHON=python3.12 ...')"
+	@echo "installing rollcli into $(VENV) ..."
+	@$(PYTHON) -m venv $(VENV)
+	@$(PIP) --editable .
+	@$(TOUCH) $@
 
 $(BIN)/.dev: $(BIN)/.run
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev,report,cluster]'
-	@touch $@
+	@echo "installing what the tests need into $(VENV) ..."
+	@$(PIP) --editable '.[dev,report,cluster]'
+	@$(TOUCH) $@
 
-run: $(BIN)/.run  ## install, and estimate the roll of sample_data into out/
+run: $(BIN)/.run
 	$(BIN)/rollcli estimate sample_data/maps --overwrite -o out/rolls.csv --derotated out/derotated --vdisparity out/vdisparity
 
-test: $(BIN)/.dev  ## run the whole test suite
+test: $(BIN)/.dev
 	$(BIN)/python -m pytest
 
-lint: $(BIN)/.dev  ## ruff: style and format
+lint: $(BIN)/.dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 
-types: $(BIN)/.dev  ## mypy, strict
+types: $(BIN)/.dev
 	$(BIN)/mypy
 
-format: $(BIN)/.dev  ## let ruff rewrite the code
+format: $(BIN)/.dev
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-bench: $(BIN)/.dev  ## run every benchmark in tests/benchmarks
-	@for b in tests/benchmarks/bench_*.py; do echo "== $$b"; $(BIN)/python $$b || exit 1; done
+bench: $(BIN)/.dev
+	@for each in tests/benchmarks/bench_*.py; do echo "== $$each"; $(BIN)/python $$each || exit 1; done
 
-fuzz: $(BIN)/.dev  ## throw broken files at the readers for a while
+fuzz: $(BIN)/.dev
 	$(BIN)/python -m tests.fuzz
 
-clean:  ## remove what make made
-	rm -rf $(VENV) out build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+clean:
+	@$(REMOVE) $(VENV) out build "*.egg-info" .pytest_cache .mypy_cache .ruff_cache .hypothesis

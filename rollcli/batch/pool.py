@@ -17,8 +17,8 @@ from typing import Any
 
 from rollcli.batch.job import Frame, Outcome, do, failed
 from rollcli.batch.options import FrameOptions
+from rollcli.batch.setup import prepare_worker
 from rollcli.batch.signals import Stop
-from rollcli.batch.threads import use_one_thread
 from rollcli.batch.workers import in_order
 
 _IN_FLIGHT_PER_WORKER = 4
@@ -127,7 +127,7 @@ def _prepare(held: _Held) -> None:
     """What a worker does before its first frame."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    use_one_thread()
+    prepare_worker()
 
 
 def _end_with_parent() -> None:

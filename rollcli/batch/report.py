@@ -16,6 +16,7 @@ INTERRUPTED = 130
 FRAMES_FAILED = 3
 _LINE_EVERY_S = 30.0
 _FAILURES_SHOWN = 5
+_FRAMES = ("frames", "frame")
 _MEANING = {
     "px": "pixels as stored",
     "kitti": "stored / 256",
@@ -141,7 +142,7 @@ class Report:
         counts, seconds = self.counts, time.monotonic() - self._start
         kept = f" ({self._kept} kept)" if self._kept else ""
         return (
-            f"{self.done} frames{kept}: {counts['ok']} ok, {counts['suspect']} suspect, "
+            f"{self.done} {_FRAMES[self.done == 1]}{kept}: {counts['ok']} ok, {counts['suspect']} suspect, "
             f"{counts['error']} failed; {seconds:.1f} s, {self._speed()}"
         )
 

@@ -11,11 +11,10 @@ from rollcli.batch.plan import Plan, make_plan
 from rollcli.batch.record import RunRecord, check_resumable
 from rollcli.batch.report import INTERRUPTED, Report
 from rollcli.batch.result_file import ResultFile, RowSink, check_result, kept_rows, open_sink
+from rollcli.batch.setup import limit_blas_threads, prepare_worker
 from rollcli.batch.signals import Stop, stop_on_signals
 from rollcli.errors import OutputError
 from rollcli.files.results import parse_rows, read_run, run_path
-
-_BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 
 
 def run(options: EstimateOptions, resume_command: str = "") -> int:
@@ -41,8 +40,7 @@ def run(options: EstimateOptions, resume_command: str = "") -> int:
     if options.running.dry_run:
         _list(plan, options)
         return 0
-    for name in _BLAS_THREADS:
-        os.environ.setdefault(name, "1")  # before NumPy is loaded, here and in the workers
+    limit_blas_threads()
     given, report = options.result, Report(len(plan.frames), options)
     with open_sink(
         plan.output,
@@ -123,9 +121,7 @@ def _outcomes(
 
 
 def _here(frames: Iterable[Frame], options: EstimateOptions, stop: Stop) -> Generator[Outcome, None, None]:
-    from rollcli.batch.threads import use_one_thread
-
-    use_one_thread()
+    prepare_worker()
     each = options.frame
     for frame in frames:
         if stop.asked:
