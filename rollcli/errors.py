@@ -17,5 +17,9 @@ class EstimationError(RollcliError):
     """The pixels do not determine a roll angle; costs that frame, not the batch."""
 
 
+class ClusterError(RollcliError):
+    """The cluster cannot do the work (exit status 1)."""
+
+
 class OutputError(RollcliError):
     """A result cannot be written: the program cannot do its job (exit status 1)."""

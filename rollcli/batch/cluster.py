@@ -1,16 +1,141 @@
 """Workers on a Dask cluster: the same frames, sent to an executor elsewhere (extra `cluster`)."""
 
+import os
+import secrets
 from collections.abc import Generator, Sequence
+from concurrent.futures import CancelledError, Future
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
-from rollcli.batch.job import Frame, Outcome
-from rollcli.batch.options import EstimateOptions
+from rollcli import __version__
+from rollcli.batch.job import Frame, Outcome, do, failed
+from rollcli.batch.options import FrameOptions
+from rollcli.batch.outputs import remove_leftovers
+from rollcli.batch.setup import prepare_worker
 from rollcli.batch.signals import Stop
-from rollcli.errors import UsageError
+from rollcli.batch.workers import in_order
+from rollcli.errors import ClusterError, UsageError
+from rollcli.files.atomic import write_atomic
+
+_CONNECT_S, _FIRST_WORKER_S = "6s", 5
+_IN_FLIGHT_PER_THREAD = 4
+_LOST = "every worker that tried it died: killed for memory, perhaps, or crashed"
 
 
 def cluster_outcomes(
-    frames: Sequence[Frame], options: EstimateOptions, stop: Stop
+    frames: Sequence[Frame], options: FrameOptions, address: str, stop: Stop
 ) -> Generator[Outcome, None, None]:
-    """The outcome of each frame, in order, from the workers of a scheduler."""
-    raise UsageError("--scheduler is not there yet")
-    yield
+    """The outcome of each frame, in order, from the workers of the scheduler at `address`.
+
+    Raises
+    ------
+    ClusterError
+        No scheduler or no worker answers, a worker has not this rollcli or does not see the files, or the
+        scheduler is lost.
+    """
+    options = replace(options, root=str(Path.cwd()))
+    client = _connect(address)
+    try:
+        _check_workers(client, frames, options)
+        client.register_plugin(_worker_plugin())
+        yield from in_order(frames, ClusterCrew(client, options), stop)
+    except CancelledError as error:
+        raise ClusterError(f"{address}: the connection to the scheduler is lost") from error
+    finally:
+        client.close(timeout=2)
+        remove_leftovers(frames, options.images)  # of workers that died
+
+
+class ClusterCrew:
+    """The cluster's own executor; Dask itself gives a lost frame to another worker."""
+
+    broken = False
+
+    def __init__(self, client: Any, options: FrameOptions) -> None:
+        from distributed import KilledWorker
+
+        self.deaths: tuple[type[BaseException], ...] = (KilledWorker,)
+        self.window = _IN_FLIGHT_PER_THREAD * sum(client.nthreads().values())
+        self._options, self._executor = options, client.get_executor(pure=False)
+
+    def submit(self, frame: Frame) -> "Future[Outcome]":
+        """Start a frame on whichever worker is free."""
+        future: Future[Outcome] = self._executor.submit(do, frame, self._options)
+        return future
+
+    def again(self, frame: Frame) -> Outcome:
+        """Several workers have tried it already."""
+        return failed(frame, _LOST)
+
+    def renew(self) -> None:
+        """Workers are the cluster's own affair."""
+
+
+def _connect(address: str) -> Any:
+    try:
+        import dask
+
+        dask.config.set({"logging.distributed": "critical"})  # read on import; errors end as our own line
+        from distributed import Client
+    except ImportError as error:
+        raise UsageError("--scheduler needs the extra cluster: pip install 'rollcli[cluster]'") from error
+    try:
+        client = Client(address, timeout=_CONNECT_S, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise ClusterError(f"{address}: no Dask scheduler answers there") from error
+    try:
+        client.wait_for_workers(1, timeout=_FIRST_WORKER_S)
+    except TimeoutError as error:
+        client.close(timeout=1)
+        raise ClusterError(f"{address}: has no workers; start some: dask worker {address}") from error
+    return client
+
+
+def _worker_plugin() -> Any:
+    from distributed import WorkerPlugin
+
+    class PrepareWorker(WorkerPlugin):
+        """Sets up every worker process, also of workers that come later."""
+
+        name = "rollcli"
+
+        def setup(self, worker: Any) -> None:
+            prepare_worker()
+
+    return PrepareWorker()
+
+
+def _check_workers(client: Any, frames: Sequence[Frame], options: FrameOptions) -> None:
+    """Ask every worker whether it is this rollcli and sees the files and folders that this process sees."""
+    sample = {path for frame in (*frames[:1], *frames[-1:]) for path in frame.reads() if Path(path).exists()}
+    sizes = {options.at(path): Path(path).stat().st_size for path in sample}
+    name = f".rollcli-{secrets.token_hex(8)}"
+    marks = [Path(options.at(folder), name) for _, folder in options.images.folders()]
+    try:
+        for mark in marks:
+            write_atomic(mark, b"")
+        answers = client.run(probe, __version__, sizes, [str(mark) for mark in marks], on_error="return")
+    finally:
+        for mark in marks:
+            mark.unlink(missing_ok=True)
+    for worker, answer in answers.items():
+        problem = answer if isinstance(answer, str) else f"cannot run rollcli {__version__}: {answer}"
+        if problem:
+            raise ClusterError(f"worker {worker}: {problem}")
+
+
+def probe(version: str, sizes: dict[str, int], marks: list[str]) -> str:
+    """What keeps this worker from doing frames; empty if nothing does. Runs on the worker."""
+    if version != __version__:
+        return f"has rollcli {__version__}, this is {version}"
+    for path, size in sizes.items():
+        if not Path(path).is_file() or Path(path).stat().st_size != size:
+            return f"does not see {path}; inputs must lie on storage that the workers share"
+    for mark in marks:
+        folder = Path(mark).parent
+        if not Path(mark).exists():
+            return f"does not see {folder}; image folders must lie on storage that the workers share"
+        if not os.access(folder, os.W_OK):
+            return f"cannot write to {folder}"
+    return ""

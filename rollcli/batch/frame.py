@@ -42,7 +42,7 @@ def run_frame(frame: Frame, options: FrameOptions) -> Outcome:
 
 def _measured(frame: Frame, options: FrameOptions) -> Outcome:
     source = read_source(frame, options)
-    mask = region_mask(frame.mask, options.region, source.disparity.shape)
+    mask = region_mask(frame.mask, options, source.disparity.shape)
     estimate = estimate_roll(source.disparity, mask=mask, **_arguments(options.method))
     write_images(frame, source, estimate, options)
     return Outcome(_row(frame, source, estimate), source.encoding, source.warning, source.searched)

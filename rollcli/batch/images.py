@@ -30,7 +30,7 @@ def write_images(frame: "Frame", source: "Source", estimate: "RollEstimate", opt
         An image cannot be written.
     """
     for kind, path in image_paths(frame, options.images):
-        write_atomic(path, _ENCODERS[kind](source, estimate, options))
+        write_atomic(options.at(path), _ENCODERS[kind](source, estimate, options))
 
 
 def _derotated(source: "Source", estimate: "RollEstimate", options: FrameOptions) -> bytes:

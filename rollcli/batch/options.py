@@ -4,6 +4,7 @@ Nothing heavy is imported here, since the command line imports this module to sh
 """
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
 from rollcli.imaging.stereo_options import StereoOptions
@@ -106,13 +107,21 @@ class RunningOptions:
 
 @dataclass(frozen=True)
 class FrameOptions:
-    """What decides the row and the images of a frame: all that a worker is told."""
+    """What decides the row and the images of a frame: all that a worker is told.
+
+    `root` is where relative paths start, for workers elsewhere.
+    """
 
     encoding: EncodingOptions
     stereo: StereoOptions
     region: RegionOptions
     method: MethodOptions
     images: ImageOptions
+    root: str = ""
+
+    def at(self, path: str) -> str:
+        """Where a path is for this worker."""
+        return str(Path(self.root, path)) if self.root else path
 
 
 @dataclass(frozen=True)

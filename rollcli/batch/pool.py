@@ -42,6 +42,8 @@ def pool_outcomes(
 class PoolCrew:
     """A pool of `jobs` processes; `held` is an open file that they hold as long as they live."""
 
+    deaths: tuple[type[BaseException], ...] = (BrokenExecutor,)
+
     def __init__(self, jobs: int, options: FrameOptions, held: int | None) -> None:
         self.window = _IN_FLIGHT_PER_WORKER * jobs
         self.broken = False

@@ -7,12 +7,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.batch.options import RegionOptions
+from rollcli.batch.options import FrameOptions, RegionOptions
 from rollcli.errors import InputError
 from rollcli.files.encodings import read_mask
 
 
-def region_mask(path: str | None, options: RegionOptions, shape: tuple[int, ...]) -> NDArray[np.bool_] | None:
+def region_mask(mask: str | None, options: FrameOptions, shape: tuple[int, ...]) -> NDArray[np.bool_] | None:
     """Pixels inside all that is given, shape (H, W); None when nothing is given.
 
     Raises
@@ -20,14 +20,15 @@ def region_mask(path: str | None, options: RegionOptions, shape: tuple[int, ...]
     InputError
         The mask cannot be read or has another size, or no pixel is left.
     """
-    if path is None and options.roi is None and options.polygon is None:
+    region = options.region
+    if mask is None and region.roi is None and region.polygon is None:
         return None
-    allowed = _drawn(options, shape)
-    if path is not None:
-        mask = _mask_file(path)
-        if mask.shape != shape:
-            raise InputError(f"the mask {path} is {_size(mask.shape)}, the map {_size(shape)}")
-        allowed = allowed & mask
+    allowed = _drawn(region, shape)
+    if mask is not None:
+        usable = _mask_file(options.at(mask), mask)
+        if usable.shape != shape:
+            raise InputError(f"the mask {mask} is {_size(usable.shape)}, the map {_size(shape)}")
+        allowed = allowed & usable
     if not allowed.any():
         raise InputError(f"no pixel of this {_size(shape)} map lies inside the mask, --roi and --polygon")
     return allowed
@@ -46,8 +47,8 @@ def _drawn(options: RegionOptions, shape: tuple[int, ...]) -> NDArray[np.bool_]:
 
 
 @lru_cache(maxsize=1)  # one mask for all frames is read once
-def _mask_file(path: str) -> NDArray[np.bool_]:
-    return read_mask(path)
+def _mask_file(path: str, name: str) -> NDArray[np.bool_]:
+    return read_mask(path, name)
 
 
 def _size(shape: tuple[int, ...]) -> str:

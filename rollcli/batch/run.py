@@ -74,7 +74,7 @@ def _take_up(
         record.continue_from(earlier or {})
         report.keep(rows)
     if options.result.resume or options.running.overwrite:
-        remove_leftovers(plan.frames[len(rows) :], options.images, plan.output)
+        remove_leftovers(plan.frames[len(rows) :], options.images)
     # in this order a run that is killed in between can be resumed: an empty file is taken for a new one
     sink.empty(keep=bool(rows))
     record.write({})
@@ -111,7 +111,7 @@ def _outcomes(
     if options.result.scheduler is not None:
         from rollcli.batch.cluster import cluster_outcomes
 
-        return cluster_outcomes(frames, options, stop)
+        return cluster_outcomes(frames, options.frame, options.result.scheduler, stop)
     jobs = min(options.running.jobs or _usable_processors(), len(frames))
     if jobs <= 1:
         return _here(frames, options, stop)

@@ -51,7 +51,7 @@ def read_source(frame: "Frame", options: FrameOptions) -> Source:
 
 
 def _read(frame: "Frame", options: FrameOptions) -> Source:
-    stored = read_stored(frame.path)
+    stored = read_stored(options.at(frame.path), frame.file)
     given = options.encoding
     found = to_disparity(stored, encoding=given.encoding, scale=given.scale, invalid=given.invalid)
     return Source(found.disparity, stored, found.encoding.value, found.warning or "")
@@ -60,6 +60,8 @@ def _read(frame: "Frame", options: FrameOptions) -> Source:
 def _match(frame: "Frame", options: FrameOptions) -> Source:
     from rollcli.imaging.stereo import match_pair
 
-    match = match_pair(read_image(frame.path), read_image(frame.right_path), options.stereo)
+    left = read_image(options.at(frame.path), frame.file)
+    right = read_image(options.at(frame.right_path), frame.right_file)
+    match = match_pair(left, right, options.stereo)
     searched = (match.min_disparity, match.min_disparity + match.num_disparities - 1)
     return Source(match.disparity, searched=searched, end_fraction=match.end_fraction)

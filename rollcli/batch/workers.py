@@ -2,7 +2,7 @@
 
 from collections import deque
 from collections.abc import Generator, Iterable
-from concurrent.futures import BrokenExecutor, Future
+from concurrent.futures import Future
 from typing import Protocol
 
 from rollcli.batch.job import Frame, Outcome
@@ -16,15 +16,18 @@ class Crew(Protocol):
     ----------
     window : int
         How many frames may be in flight: enough that nobody waits, few enough that memory stays bounded.
+    deaths : tuple of exception types
+        How the future of a lost frame ends.
     broken : bool
         A worker has died, and with it every frame in flight is lost.
     """
 
     window: int
+    deaths: tuple[type[BaseException], ...]
     broken: bool
 
     def submit(self, frame: Frame) -> "Future[Outcome]":
-        """Start a frame; a lost one ends with BrokenExecutor."""
+        """Start a frame; if its worker dies, the future ends with one of `deaths`."""
 
     def again(self, frame: Frame) -> Outcome:
         """Do a lost frame once more, alone; if that kills its worker too, its row is an error."""
@@ -53,7 +56,7 @@ def in_order(frames: Iterable[Frame], crew: Crew, stop: Stop) -> Generator[Outco
         frame, future = flying.popleft()
         try:
             outcome = future.result()
-        except BrokenExecutor:
+        except crew.deaths:
             if stop.asked:
                 return  # whoever asked has ended the workers too
             outcome = crew.again(frame)

@@ -1,11 +1,15 @@
 """Files that appear whole or not at all: written beside their target, then renamed onto it."""
 
 import contextlib
+import hashlib
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
 from rollcli.errors import OutputError
+
+_LONGEST_NAME = 240  # bytes; file systems allow 255 with what is added
 
 
 def output_error(path: str | Path, error: OSError) -> OutputError:
@@ -33,8 +37,7 @@ def atomic_file(path: str | Path) -> Iterator[BinaryIO]:
         The target cannot be written (full disk, no permission, a folder of that name, ...).
     """
     target = Path(path)
-    # not a random name: what a killed process leaves lying, the next run takes over
-    temporary = target.with_name(f".{target.name[:100]}.part")
+    temporary = part_of(target)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         if target.is_dir():
@@ -47,6 +50,13 @@ def atomic_file(path: str | Path) -> Iterator[BinaryIO]:
     finally:
         with contextlib.suppress(OSError):
             temporary.unlink()
+
+
+def part_of(target: Path) -> Path:
+    """The temporary file of a target: no random name, so that the next run takes over what a killed one left."""
+    name = os.fsencode(target.name)
+    short = target.name if len(name) <= _LONGEST_NAME else hashlib.sha256(name).hexdigest()
+    return target.with_name(f".{short}.part")
 
 
 def write_atomic(path: str | Path, data: bytes) -> None:

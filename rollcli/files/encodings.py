@@ -132,9 +132,9 @@ def from_disparity(
     return stored
 
 
-def read_mask(path: str | Path) -> NDArray[np.bool_]:
-    """Read a mask: True where any channel is non-zero; shape (H, W)."""
-    return decode_mask(read_bytes(path), str(path))
+def read_mask(path: str | Path, name: str | None = None) -> NDArray[np.bool_]:
+    """Read a mask: True where any channel is non-zero; shape (H, W). Errors call it `name`, or its path."""
+    return decode_mask(read_bytes(path, name), name or str(path))
 
 
 def resolve_encoding(encoding: str, dtype: np.dtype[Any], scale: float | None) -> Encoding:

@@ -32,33 +32,34 @@ _KNOWN = {
 _TEXT = re.compile(rb"[\t\n\r\f\x20-\x7e]{8}")  # no format begins with eight printable characters
 
 
-def read_bytes(path: str | Path) -> bytes:
-    """The bytes of a regular file.
+def read_bytes(path: str | Path, name: str | None = None) -> bytes:
+    """The bytes of a regular file; `name` is what errors call it, by default its path.
 
     Raises
     ------
     InputError
         It does not exist, may not be read, is empty, or is no regular file.
     """
+    name = name or str(path)
     try:
         # not blocking: a named pipe would otherwise wait for its writer for ever
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
         with os.fdopen(descriptor, "rb") as file:
             status = os.fstat(file.fileno())
             if not stat.S_ISREG(status.st_mode):
-                raise InputError(f"{path}: is not a regular file")
+                raise InputError(f"{name}: is not a regular file")
             if status.st_size > _MAX_BYTES:
-                raise InputError(f"{path}: has {status.st_size} bytes; no disparity map is that large")
+                raise InputError(f"{name}: has {status.st_size} bytes; no disparity map is that large")
             data = file.read()
     except IsADirectoryError:
-        raise InputError(f"{path}: is a folder, not a file") from None
+        raise InputError(f"{name}: is a folder, not a file") from None
     except FileNotFoundError:
         dangling = Path(path).is_symlink()
-        raise InputError(f"{path}: {'is a link to nothing' if dangling else 'no such file'}") from None
+        raise InputError(f"{name}: {'is a link to nothing' if dangling else 'no such file'}") from None
     except (OSError, ValueError) as error:
-        raise InputError(f"{path}: cannot be read: {_lowered(error)}") from None
+        raise InputError(f"{name}: cannot be read: {_lowered(error)}") from None
     if not data:
-        raise InputError(f"{path}: is empty")
+        raise InputError(f"{name}: is empty")
     return data
 
 
@@ -66,9 +67,9 @@ def _lowered(error: OSError | ValueError) -> str:
     return str(getattr(error, "strerror", None) or error).lower()
 
 
-def read_stored(path: str | Path) -> Stored:
+def read_stored(path: str | Path, name: str | None = None) -> Stored:
     """Read a disparity map file: the numbers as they are stored; see `decode_stored`."""
-    return decode_stored(read_bytes(path), str(path))
+    return decode_stored(read_bytes(path, name), name or str(path))
 
 
 def decode_stored(data: bytes, name: str) -> Stored:
@@ -127,15 +128,17 @@ def encode_stored(values: NDArray[Any], format: str, nodata: tuple[float, ...] =
     raise UsageError(f"{format}: unknown map format; png, tiff, npy and pfm are written")
 
 
-def read_image(path: str | Path) -> NDArray[Any]:
+def read_image(path: str | Path, name: str | None = None) -> NDArray[Any]:
     """Read a camera image for stereo matching: grey (H, W) or BGR (H, W, 3), uint8 or uint16.
+
+    Errors call the file `name`, by default its path.
 
     Raises
     ------
     InputError
         No such image, truncated, damaged, or of other numbers.
     """
-    data, name = read_bytes(path), str(path)
+    data, name = read_bytes(path, name), name or str(path)
     if data.startswith(png.SIGNATURE):
         return png.picture(data, name)
     if data.startswith(tiff.SIGNATURES):
