@@ -1,8 +1,8 @@
 """Files that appear whole or not at all: written beside their target, then renamed onto it."""
 
 import contextlib
-import hashlib
 import os
+import zlib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
@@ -53,9 +53,9 @@ def atomic_file(path: str | Path) -> Iterator[BinaryIO]:
 
 
 def part_of(target: Path) -> Path:
-    """The temporary file of a target: no random name, so that the next run takes over what a killed one left."""
+    """The temporary file of a target; not a random name: what a killed run leaves, the next one takes over."""
     name = os.fsencode(target.name)
-    short = target.name if len(name) <= _LONGEST_NAME else hashlib.sha256(name).hexdigest()
+    short = target.name if len(name) <= _LONGEST_NAME else f"{zlib.crc32(name):08x}"
     return target.with_name(f".{short}.part")
 
 
