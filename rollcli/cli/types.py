@@ -118,3 +118,41 @@ class Shard(_ParamType):
         if not 1 <= part <= parts:
             self.fail(f"{value!r} is not I/N with I from 1 to N, such as 2/8", param, ctx)
         return part, parts
+
+
+class Span(_ParamType):
+    """A:B, from the lowest to the highest; one number stands for both."""
+
+    name = "A:B"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[float, float]:
+        if isinstance(value, tuple):
+            return value  # the default
+        try:
+            ends = [float(end) for end in str(value).split(":")]
+        except ValueError:
+            ends = []
+        if len(ends) not in (1, 2) or not all(map(math.isfinite, ends)) or ends[0] > ends[-1]:
+            self.fail(f"{value!r} is not A:B with A <= B, such as -5:5, nor a single number", param, ctx)
+        return ends[0], ends[-1]
+
+
+class Size(_ParamType):
+    """WxH in whole pixels."""
+
+    name = "WxH"
+
+    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
+        return self.name  # click would turn it into capitals
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[int, int]:
+        if isinstance(value, tuple):
+            return value  # the default
+        found = re.fullmatch(r"(\d{1,6})[xX×](\d{1,6})", str(value))
+        if found is None:
+            self.fail(f"{value!r} is not WxH in whole pixels, such as 640x480", param, ctx)
+        return int(found[1]), int(found[2])

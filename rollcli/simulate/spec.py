@@ -2,19 +2,28 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rollcli.errors import UsageError
 from rollcli.simulate.camera import Camera, stereo_rig
+from rollcli.simulate.options import (
+    BASELINE,
+    FOCAL_PER_WIDTH,
+    HEIGHT,
+    MIXED,
+    NOISE,
+    PITCH_DEG,
+    ROLL_DEG,
+    SCENES,
+    SIZE,
+)
 
-SCENES = ("bare", "open", "street", "verge")
-SIZE = (640, 480)
-FOCAL_PER_WIDTH = 0.58  # the KITTI cameras' field of view
-BASELINE = 0.54
-HEIGHT = 1.65
-NOISE = 1.5
+Span = tuple[float, float]
+
+_ROLL = (math.radians(ROLL_DEG[0]), math.radians(ROLL_DEG[1]))
+_PITCH = (math.radians(PITCH_DEG[0]), math.radians(PITCH_DEG[1]))
 MAX_PITCH = math.radians(60)
 MAX_CURVATURE = 0.01
 
@@ -86,10 +95,10 @@ class FrameSpec:
 def draw_specs(
     n: int,
     *,
-    scene: str = "mixed",
-    roll: tuple[float, float] = (math.radians(-10), math.radians(10)),
-    pitch: tuple[float, float] = (math.radians(-2), math.radians(6)),
-    curvature: tuple[float, float] | None = None,
+    scene: str = MIXED,
+    roll: Span = _ROLL,
+    pitch: Span = _PITCH,
+    curvature: Span | None = None,
     size: tuple[int, int] = SIZE,
     focal: float | None = None,
     baseline: float = BASELINE,
@@ -124,41 +133,44 @@ def draw_specs(
     """
     if n < 1:
         raise UsageError(f"at least one frame must be asked for, not {n}")
-    if scene not in (*SCENES, "mixed"):
-        raise UsageError(f"no such scene: {scene}; choose one of {', '.join((*SCENES, 'mixed'))}")
+    if scene not in (*SCENES, MIXED):
+        raise UsageError(f"no such scene: {scene}; choose one of {', '.join((*SCENES, MIXED))}")
     if seed < 0:
         raise UsageError(f"the seed must be 0 or more, not {seed}")
     for name, span in (("roll", roll), ("pitch", pitch), ("curvature", curvature or (0.0, 0.0))):
         if not span[0] <= span[1]:
             raise UsageError(f"the range of the {name} is empty: its lower end comes first")
-    specs = []
-    for index in range(n):
-        rng = _stream(seed, index, _POSE)
-        theta, phi = rng.uniform(*roll), rng.uniform(*pitch)
-        kind = SCENES[rng.integers(len(SCENES))] if scene == "mixed" else scene
-        bend = rng.choice([0.0, 1.0]) * rng.uniform(-0.001, 0.001)
-        if curvature is not None:
-            bend = rng.uniform(*curvature)
-        elif kind == "bare":
-            bend = 0.0
-        specs.append(
-            FrameSpec(
-                scene=kind,
-                roll=float(theta),
-                pitch=float(phi),
-                curvature=float(bend),
-                size=size,
-                focal=FOCAL_PER_WIDTH * size[0] if focal is None else focal,
-                baseline=baseline,
-                height=height,
-                noise=noise,
-                gain=gain,
-                colour=colour,
-                seed=seed,
-                index=index,
-            )
-        )
-    return specs
+    rig = FrameSpec(
+        size=size,
+        focal=FOCAL_PER_WIDTH * size[0] if focal is None else focal,
+        baseline=baseline,
+        height=height,
+        noise=noise,
+        gain=gain,
+        colour=colour,
+        seed=seed,
+    )
+    for lowest_or_highest in zip(roll, pitch, curvature or (0.0, 0.0), strict=True):
+        _posed(rig, *lowest_or_highest)  # what cannot be is refused whatever is drawn
+    return [_draw(rig, index, scene, roll, pitch, curvature) for index in range(n)]
+
+
+def _draw(
+    rig: FrameSpec, index: int, scene: str, roll: Span, pitch: Span, curvature: Span | None
+) -> FrameSpec:
+    rng = _stream(rig.seed, index, _POSE)
+    theta, phi = rng.uniform(*roll), rng.uniform(*pitch)
+    kind = SCENES[rng.integers(len(SCENES))] if scene == MIXED else scene
+    bend = rng.choice([0.0, 1.0]) * rng.uniform(-0.001, 0.001)
+    if curvature is not None:
+        bend = rng.uniform(*curvature)
+    elif kind == "bare":
+        bend = 0.0
+    return replace(_posed(rig, float(theta), float(phi), float(bend)), scene=kind, index=index)
+
+
+def _posed(rig: FrameSpec, roll: float, pitch: float, curvature: float) -> FrameSpec:
+    return replace(rig, roll=roll, pitch=pitch, curvature=curvature)
 
 
 def _stream(seed: int, index: int, part: int) -> np.random.Generator:

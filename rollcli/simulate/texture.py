@@ -37,16 +37,17 @@ class NoiseTile:
         sides = _SIDE >> np.arange(len(levels))
         self._starts = np.concatenate([[0], np.cumsum(sides**2)[:-1]]).astype(np.int32)
         self._bits = np.log2(sides).astype(np.int32)
+        self._scales = (sides / _SIDE).astype(np.float32)
+        self._masks = (sides - 1).astype(np.int32)
 
     def sample(self, x: Values, y: Values, level: NDArray[np.int32]) -> Values:
         """The noise at (x, y), texels of level 0, averaged over 2^level texels; bilinear between texels."""
-        level = np.clip(level, 0, len(self._starts) - 1)
-        start, bits = self._starts[level], self._bits[level]
-        scale = np.float32(0.5) ** level.astype(np.float32)
+        level = np.minimum(np.maximum(level, 0), len(self._starts) - 1)
+        start, bits, mask = (table[level] for table in (self._starts, self._bits, self._masks))
+        scale = self._scales[level]
         x, y = x * scale - np.float32(0.5), y * scale - np.float32(0.5)
         floor_x, floor_y = np.floor(x), np.floor(y)
         wx, wy = x - floor_x, y - floor_y
-        mask = (np.int32(1) << bits) - np.int32(1)
         column, row = floor_x.astype(np.int32) & mask, floor_y.astype(np.int32) & mask
         right = (column + np.int32(1)) & mask
         above, below = start + (row << bits), start + (((row + np.int32(1)) & mask) << bits)
@@ -82,7 +83,8 @@ def coarse(p: Values, q: Values, w: Values, offset: float = 0.0) -> Values:
 
 
 def _sample(tile: NoiseTile, x: Values, y: Values, w: Values, texel: float) -> Values:
-    level = np.rint(np.log2(np.maximum(w / np.float32(texel), np.float32(1)))).astype(np.int32)
+    # the exponent's bits of a float32 are floor(log2): this is rint(log2(w / texel)), several times faster
+    level = ((w * np.float32(np.sqrt(2) / texel)).view(np.int32) >> 23) - np.int32(127)
     scale = np.float32(1 / texel)
     return tile.sample(x * scale, y * scale, level)
 
@@ -105,3 +107,10 @@ def bars(x: Values, period: float, width: float, w: Values) -> Values:
 
     half = w * np.float32(0.5)
     return np.asarray((integral(x + half) - integral(x - half)) / w, np.float32)
+
+
+def cell(column: Values, row: Values) -> Values:
+    """A number in [0, 1) that belongs to a cell of a grid."""
+    # the classic shader hash, in float64: in float32 its sine would differ between platforms
+    mixed = np.sin(column * 12.9898 + row * 78.233) * 43758.5453
+    return np.asarray(mixed - np.floor(mixed), np.float32)

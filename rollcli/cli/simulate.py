@@ -1,0 +1,114 @@
+"""`rollcli simulate`: stereo pairs whose roll is known."""
+
+from typing import Any
+
+import click
+
+from rollcli.batch.options import RunningOptions
+from rollcli.cli.command import command, option, record
+from rollcli.cli.options import PATH, running_options
+from rollcli.cli.types import Number, Size, Span
+from rollcli.simulate.options import (
+    BASELINE,
+    FOCAL_PER_WIDTH,
+    FRAMES,
+    HEIGHT,
+    MIXED,
+    NOISE,
+    PITCH_DEG,
+    ROLL_DEG,
+    SCENES,
+    SIZE,
+    SimulateOptions,
+)
+
+simulate_options = record(
+    "options",
+    "What to render",
+    SimulateOptions,
+    option("--frames", type=Number("N", at_least=1, whole=True), default=FRAMES, help="How many pairs."),
+    option(
+        "--scene",
+        type=click.Choice([*SCENES, MIXED]),
+        default=MIXED,
+        help="bare: only a road; open: kerbs and cars; street: house fronts too; verge: sloping grass; "
+        "mixed: each frame one of these.",
+    ),
+    option(
+        "--roll",
+        type=Span(),
+        default=ROLL_DEG,
+        show_default=False,
+        help="Degrees, drawn evenly from A to B; positive: the right end of the rig is up.  "
+        f"[default: {ROLL_DEG[0]:g}:{ROLL_DEG[1]:g}]",
+    ),
+    option(
+        "--pitch",
+        type=Span(),
+        default=PITCH_DEG,
+        show_default=False,
+        help="Degrees, drawn evenly from A to B; positive: the rig looks down.  "
+        f"[default: {PITCH_DEG[0]:g}:{PITCH_DEG[1]:g}]",
+    ),
+    option(
+        "--curvature",
+        type=Span(),
+        help="Of the road's height, 1/m, drawn evenly from A to B; positive: a sag; negative: a crest.  "
+        "[default: half of the frames flat, half within +-0.001; bare is flat]",
+    ),
+    option(
+        "--size",
+        type=Size(),
+        default=SIZE,
+        show_default=False,
+        help=f"Of the images, pixels.  [default: {SIZE[0]}x{SIZE[1]}]",
+    ),
+    option(
+        "--focal",
+        type=Number("PX", above=0),
+        help=f"Focal length, pixels.  [default: {FOCAL_PER_WIDTH:g} times the width]",
+    ),
+    option(
+        "--baseline", type=Number("M", above=0), default=BASELINE, help="Between the two cameras, metres."
+    ),
+    option("--height", type=Number("M"), default=HEIGHT, help="Of the left camera above the road, metres."),
+    option(
+        "--noise",
+        type=Number("SIGMA", at_least=0),
+        default=NOISE,
+        help="Of the sensor, standard deviation in grey levels of 255.",
+    ),
+    option(
+        "--gain",
+        type=Number("F", above=0),
+        default=1.0,
+        help="Brightness of the right view relative to the left one.",
+    ),
+    option("--grey", is_flag=True, help="Grey images.  [default: colour]"),
+    option(
+        "--seed",
+        type=Number("INT", at_least=0, whole=True),
+        default=0,
+        help="Of all that is drawn; the same seed gives the same files.",
+    ),
+)
+
+
+@command()
+@click.argument("folder", metavar="DIR", type=PATH)
+@simulate_options
+@running_options
+def simulate(folder: str, options: SimulateOptions, running: RunningOptions, **_: Any) -> None:
+    """Render road stereo pairs with known roll into DIR.
+
+    Writes DIR/left and DIR/right (8-bit PNG), DIR/disparity (the true disparity of the left view, 16-bit
+    KITTI PNG) and DIR/truth.csv.
+
+    \b
+    rollcli simulate rig/ --frames 200 --size 1280x720 --focal 700 --baseline 0.3 --height 1.4
+    rollcli estimate --left rig/left --right rig/right -o rig/rolls.csv
+    rollcli evaluate accuracy rig/rolls.csv --truth rig/truth.csv
+    """
+    from rollcli.simulate.run import run
+
+    run(folder, options, running)

@@ -1,0 +1,204 @@
+"""A folder of rendered frames: left, right, disparity and truth.csv, the same bytes whatever the workers."""
+
+import csv
+import io
+import math
+import os
+import re
+import signal
+from collections.abc import Iterator, Sequence
+from concurrent.futures import BrokenExecutor, ProcessPoolExecutor
+from dataclasses import dataclass
+from itertools import repeat
+from multiprocessing import get_context
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from rollcli.errors import OutputError, UsageError
+from rollcli.files.atomic import output_error, write_atomic
+from rollcli.files.encodings import from_disparity
+from rollcli.files.formats import encode_stored
+from rollcli.simulate.options import SimulateOptions
+from rollcli.simulate.render import render_frame
+from rollcli.simulate.spec import FrameSpec, draw_specs
+
+COLUMNS = (
+    "file",
+    "roll_deg",
+    "pitch_deg",
+    "scene",
+    "focal_px",
+    "baseline_m",
+    "height_m",
+    "curvature_per_m",
+    "seed",
+)
+_PARTS = ("left", "right", "disparity")
+_TRUTH = "truth.csv"
+_OURS = re.compile(r"frame_\d{4,}\.png")
+_KITTI_TOP = 65534 / 256  # the largest disparity that a KITTI PNG holds, pixels
+
+
+@dataclass(frozen=True)
+class Dataset:
+    """Where frames are written, and which: frame i is named after stems[i]."""
+
+    folder: Path
+    specs: tuple[FrameSpec, ...]
+
+    @property
+    def stems(self) -> list[str]:
+        """frame_0001, frame_0002, ..."""
+        digits = max(4, len(str(len(self.specs))))
+        return [f"frame_{number:0{digits}d}" for number in range(1, len(self.specs) + 1)]
+
+    def files(self) -> list[Path]:
+        """Everything that is written, truth.csv last."""
+        images = [self.folder / part / f"{stem}.png" for stem in self.stems for part in _PARTS]
+        return [*images, self.folder / _TRUTH]
+
+
+def plan_dataset(folder: str | Path, options: SimulateOptions, *, overwrite: bool = False) -> Dataset:
+    """Draw the frames and see that they can be written.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Where to write; made if it is not there.
+    options : SimulateOptions
+        What to render.
+    overwrite : bool
+        Whether a folder with files in it may be written to.
+
+    Raises
+    ------
+    UsageError
+        Options that contradict each other, or a folder with files in it.
+    """
+    specs = draw_specs(
+        options.frames,
+        scene=options.scene,
+        roll=_radians(options.roll),
+        pitch=_radians(options.pitch),
+        curvature=options.curvature,
+        size=options.size,
+        focal=options.focal,
+        baseline=options.baseline,
+        height=options.height,
+        noise=options.noise,
+        gain=options.gain,
+        colour=not options.grey,
+        seed=options.seed,
+    )
+    for spec in specs:
+        _require_storable(spec)
+    _require_free(Path(folder), overwrite)
+    return Dataset(Path(folder), tuple(specs))
+
+
+def write_dataset(dataset: Dataset, jobs: int = 1) -> Iterator[str]:
+    """Render and write the frames; yields each one's stem when it is on disk, and truth.csv last.
+
+    Frames of an earlier simulation in the same folder are removed first. Until truth.csv is there, the
+    folder is not complete.
+
+    Raises
+    ------
+    OutputError
+        A file cannot be written, or a worker died.
+    """
+    _clear(dataset)
+    tasks = (dataset.specs, repeat(dataset.folder), dataset.stems)
+    jobs = min(jobs, len(dataset.specs))
+    if jobs <= 1:
+        yield from map(_write_frame, *tasks)
+    else:
+        try:
+            with ProcessPoolExecutor(jobs, get_context("spawn"), _ignore_interrupt) as pool:
+                yield from pool.map(_write_frame, *tasks)
+        except BrokenExecutor as error:
+            raise OutputError("a worker process died: out of memory, perhaps; try fewer --jobs") from error
+    write_atomic(dataset.folder / _TRUTH, _truth(dataset))
+    yield _TRUTH
+
+
+def _write_frame(spec: FrameSpec, folder: Path, stem: str) -> str:
+    frame = render_frame(spec)
+    for part, image in (("left", frame.left), ("right", frame.right)):
+        write_atomic(folder / part / f"{stem}.png", _png(image))
+    stored = from_disparity(frame.disparity, "kitti", np.uint16)
+    write_atomic(folder / "disparity" / f"{stem}.png", encode_stored(stored, "png"))
+    return stem
+
+
+def _png(image: NDArray[np.uint8]) -> bytes:
+    # noise hardly compresses: more effort than 1 only takes time
+    _, data = cv2.imencode(".png", image, [cv2.IMWRITE_PNG_COMPRESSION, 1])
+    return data.tobytes()
+
+
+def _truth(dataset: Dataset) -> bytes:
+    text = io.StringIO()
+    rows = csv.writer(text, lineterminator="\n")
+    rows.writerow(COLUMNS)
+    for stem, spec in zip(dataset.stems, dataset.specs, strict=True):
+        angles = (f"{math.degrees(angle):.9f}" for angle in (spec.roll, spec.pitch))
+        rig = (f"{number:.10g}" for number in (spec.focal, spec.baseline, spec.height, spec.curvature))
+        rows.writerow((stem, *angles, spec.scene, *rig, spec.seed))
+    return text.getvalue().encode()
+
+
+def _require_storable(spec: FrameSpec) -> None:
+    """The nearest road in view must fit a KITTI PNG."""
+    width, height = spec.size
+    y = (height - 1) / 2 * math.cos(spec.roll) + (width - 1) / 2 * abs(math.sin(spec.roll))
+    top = spec.baseline / spec.height * (y * math.cos(spec.pitch) + spec.focal * math.sin(spec.pitch))
+    if top > _KITTI_TOP:
+        raise UsageError(
+            f"the road would reach a disparity of {top:.0f} px, and a KITTI PNG ends at 256: "
+            "take smaller images, a shorter baseline or a higher rig"
+        )
+
+
+def _require_free(folder: Path, overwrite: bool) -> None:
+    try:
+        if folder.exists() and not folder.is_dir():
+            raise UsageError(f"{folder}: is a file, not a folder to write to")
+        if not overwrite and folder.is_dir() and any(folder.iterdir()):
+            raise UsageError(f"{folder}: there are files in it; --overwrite writes there all the same")
+    except OSError as error:
+        raise output_error(folder, error) from error
+
+
+def _clear(dataset: Dataset) -> None:
+    """Remove the frames that an earlier simulation left: a pair without a row would be in the way."""
+    try:
+        for path in (dataset.folder / _TRUTH, *_earlier_frames(dataset.folder)):
+            path.unlink(missing_ok=True)
+    except OSError as error:
+        raise output_error(dataset.folder, error) from error
+
+
+def _earlier_frames(folder: Path) -> list[Path]:
+    folders = [folder / part for part in _PARTS if (folder / part).is_dir()]
+    return [path for each in folders for path in each.iterdir() if _OURS.fullmatch(path.name)]
+
+
+def _radians(span: Sequence[float]) -> tuple[float, float]:
+    return math.radians(span[0]), math.radians(span[1])
+
+
+def _ignore_interrupt() -> None:
+    """Ctrl-C ends the program that asked for the frames; its workers end with it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def usable_processors() -> int:
+    """How many processors this process may use."""
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:  # not on macOS and Windows
+        return os.cpu_count() or 1

@@ -1,0 +1,78 @@
+"""The light of a scene: sun, sky, the shadows that things cast and the dimness below cars."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollcli.simulate.solids import Solid
+from rollcli.simulate.surfaces import Surface
+from rollcli.simulate.texture import Values, coarse
+from rollcli.simulate.vectors import Array, dot, turn
+
+
+@dataclass(frozen=True)
+class Light:
+    """The sun's direction (3,), the share of light that comes from everywhere, and the exposure.
+
+    Under an overcast sky (`ambient` above 0.6) nothing casts a shadow.
+    """
+
+    sun: Array
+    ambient: float
+    exposure: float
+    clouds: float
+
+    @property
+    def sunny(self) -> bool:
+        """Whether things cast shadows."""
+        return self.ambient < 0.6
+
+
+def draw_light(rng: np.random.Generator) -> Light:
+    """Every second scene has sun."""
+    height, azimuth = rng.uniform(0.45, 1.2), rng.uniform(-np.pi, np.pi)
+    sun = np.array([np.cos(height) * np.sin(azimuth), np.sin(height), np.cos(height) * np.cos(azimuth)])
+    ambient = rng.uniform(0.28, 0.45) if rng.random() < 0.5 else rng.uniform(0.7, 0.9)
+    return Light(sun, float(ambient), float(rng.uniform(1.2, 1.6)), float(rng.uniform(0, 1000)))
+
+
+def in_shadow(points: Array, sun: Array, casters: Sequence[Surface]) -> NDArray[np.bool_]:
+    """Which of the points (3, N) have a caster between them and the sun."""
+    shadow = np.zeros(points.shape[1], bool)
+    # seen along the sun's rays, a caster covers what lies within its outline
+    across = np.cross(sun, [0.0, 1.0, 0.0])
+    axes = np.array([across / np.linalg.norm(across), np.cross(across, sun) / np.linalg.norm(across)])
+    seen = np.stack([dot(axis, points) for axis in axes])
+    for caster in casters:
+        corners = caster.bounds()
+        inside = ~shadow
+        if corners is not None:
+            outline = axes @ corners
+            for place, low, high in zip(seen, outline.min(axis=1), outline.max(axis=1), strict=True):
+                inside &= (place > low) & (place < high)
+        at = np.flatnonzero(inside)
+        if len(at):
+            toward = np.broadcast_to(sun[:, None], (3, len(at)))
+            shadow[at] = np.isfinite(caster.intersect(points[:, at], toward))
+    return shadow
+
+
+def air_below(points: Array, car: Solid) -> Values:
+    """The share of the sky's light that reaches ground points (3, N) near and below a car."""
+    right, _, ahead = turn(car.frame, points - car.place[:, None])
+    away = np.maximum(np.abs(right) - 0.75, 0) ** 2 + np.maximum(np.abs(ahead) - 2.0, 0) ** 2
+    return np.asarray(1 - 0.85 * np.exp(-away / 0.35**2), np.float32)
+
+
+def sky(light: Light, direction: Array) -> Values:
+    """The sky's colour (N, 3) along directions (3, N): pale at the horizon, with clouds."""
+    x, y, z = (direction / np.linalg.norm(direction, axis=0)).astype(np.float32)
+    rise = np.clip(y, 0, 1)
+    flat = np.float32(60) / (rise + np.float32(0.15))
+    noise = coarse(x * flat, z * flat, np.full_like(x, 0.5), light.clouds)
+    cloud = np.clip(0.5 + 0.5 * noise, 0, 1) * np.sqrt(rise)
+    clear, pale = np.array([1.0, 0.80, 0.62], np.float32), np.array([0.98, 0.95, 0.92], np.float32)
+    mix = np.minimum(np.maximum(1 - 1.6 * rise, 0) + 0.8 * cloud, 1)[:, None]
+    return np.asarray(clear + mix * (pale - clear), np.float32)

@@ -1,0 +1,19 @@
+"""Products of many vectors at once, stored as (3, N): without BLAS, whose threads would cost more here."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Vectors = NDArray[Any]
+
+
+def dot(a: Vectors, b: Vectors) -> Vectors:
+    """a . b for each vector; each of the two is (3, N), (3, 1) or (3,)."""
+    return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+
+
+def turn(axes: Array, vectors: Vectors) -> Vectors:
+    """The components of `vectors` along the rows of `axes` (3, 3)."""
+    return np.stack([dot(axis, vectors) for axis in axes])
