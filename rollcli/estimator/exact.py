@@ -2,8 +2,8 @@
 
 E_min = d'd - N/D, where N and D = det(Y'Y) are homogeneous of degree 6 in cos(theta) and sin(theta). Its
 derivative is (N D' - N' D) / D^2, and this numerator is a trigonometric polynomial of degree 5 in 2 theta:
-as METHOD's degree-10 polynomial in tan(theta), but well conditioned at every angle, 90 degrees included.
-Its 11 Fourier coefficients follow from samples of E' D^2 without error; the roots of the polynomial in
+a polynomial of degree 10 in tan(theta), but well conditioned at every angle, 90 degrees included. Its 11
+Fourier coefficients follow from samples of E' D^2 without error; the roots of the polynomial in
 z = exp(2 i theta) near the unit circle are all the angles at which E_min can have a minimum.
 """
 
@@ -20,7 +20,7 @@ from rollcli.estimator.solution import Solution, principal
 
 _DEGREE = 5
 _SAMPLES = 16  # more than 2 * _DEGREE + 1
-_ANGLES = np.arange(_SAMPLES) * (np.pi / _SAMPLES)
+_ANGLES: Floats = np.linspace(0, np.pi, _SAMPLES, endpoint=False)
 _POLISH = 8
 
 
@@ -52,12 +52,12 @@ def minima(energy: Energy) -> list[Minimum]:
     if not energy.parabolic:
         return [_line_minimum(energy)]
     starts = _stationary_angles(energy)
+    polished = [_polished(energy, start) for start in starts]
+    settled = [theta for theta, step in polished if step < 1e-6] or [theta for theta, _ in polished]
     found: list[Minimum] = []
-    for start in starts:
-        theta = principal(_polished(energy, start))
-        value = float(energy.at(theta).value)
+    for theta in map(principal, settled):
         if all(abs(math.remainder(theta - other.theta, math.pi)) > 1e-7 for other in found):
-            found.append(Minimum(theta, value))
+            found.append(Minimum(theta, float(energy.at(theta).value)))
     lowest = min(found, key=lambda m: m.energy)
     same = 1e-12 * (energy.rest + energy.slope_energy)
     return sorted(found, key=lambda m: (m.energy if m.energy > lowest.energy + same else -1.0, abs(m.theta)))
@@ -72,8 +72,9 @@ def _line_minimum(energy: Energy) -> Minimum:
 
 def _stationary_angles(energy: Energy) -> Floats:
     """Return angles near every local minimum, at least one, radians."""
-    terms = energy.at(_ANGLES)
-    spectrum = np.fft.fft(terms.gradient * energy.denominator(_ANGLES) ** 2)
+    angles, stretch = _unwhitened(energy, _ANGLES)
+    terms = energy.at(angles)
+    spectrum = np.fft.fft(terms.gradient * energy.denominator(angles) ** 2 * stretch**10)
     # z^5 times the series is a polynomial in z; numpy wants the highest power first
     coefficients = np.concatenate([spectrum[_DEGREE::-1], spectrum[: -_DEGREE - 1 : -1]])
     largest = np.abs(coefficients).max()
@@ -82,24 +83,40 @@ def _stationary_angles(energy: Energy) -> Floats:
     roots = np.roots(np.where(np.abs(coefficients) > 1e-15 * largest, coefficients, 0))
     # A double root may leave the circle by the square root of rounding; the angle of any other root is
     # harmless, for only those that the polish confirms as minima are compared.
-    angles = np.angle(roots[np.abs(np.log(np.maximum(np.abs(roots), 1e-300))) < 0.1]) / 2
-    candidates = np.concatenate([angles, _ANGLES[[int(np.argmin(terms.value))]]])
+    near = roots[np.abs(np.log(np.maximum(np.abs(roots), 1e-300))) < 0.1]
+    critical, _ = _unwhitened(energy, np.angle(near) / 2)
+    candidates = np.concatenate([critical, angles[[int(np.argmin(terms.value))]]])
     curvature = energy.at(candidates).curvature
     upward = candidates[curvature > 0]
     return upward if len(upward) else candidates
 
 
-def _polished(energy: Energy, theta: float) -> float:
-    """Newton's method on the gradient, as long as the energy does not rise."""
+def _unwhitened(energy: Energy, angles: Floats) -> tuple[Floats, Floats]:
+    """Return the theta of angles in the frame where the pixels spread alike in all directions.
+
+    There the polynomial is well conditioned even if all pixels lie in a narrow strip. The second result is
+    the length of y's unit vector on its way back: E' D^2 goes with its 10th power.
+    """
+    xx, xy, yy = energy.forms[:3, 0]
+    root = math.sqrt(xx * yy - xy * xy)
+    size = math.sqrt(xx + yy + 2 * root)  # (C + root I) / size is the square root of C = [[xx, xy], [xy, yy]]
+    a, b, c = (yy + root) / size, -xy / size, (xx + root) / size  # its inverse, up to a factor
+    u, v = -np.sin(angles), np.cos(angles)
+    u, v = a * u + b * v, b * u + c * v
+    length = np.hypot(u, v) / math.sqrt(a * c - b * b)
+    return np.arctan2(-u, v), length
+
+
+def _polished(energy: Energy, theta: float) -> tuple[float, float]:
+    """Newton's method on the gradient, as long as the energy does not rise; then abs(the next step)."""
     now = energy.at(theta)
+    step = math.inf
     for _ in range(_POLISH):
         if not now.curvature > 0:
-            break
+            return theta, math.inf
         step = -now.gradient / now.curvature
         then = energy.at(theta + step)
-        if then.value > now.value:
+        if then.value > now.value or abs(step) < 1e-15:
             break
         theta, now = theta + step, then
-        if abs(step) < 1e-15:
-            break
-    return theta
+    return theta, abs(step)
