@@ -29,7 +29,7 @@ def environment(**variables: str) -> dict[str, str]:
     """This environment without settings of rollcli's, with the given variables."""
     kept = {name: value for name, value in os.environ.items() if not name.startswith("ROLLCLI")}
     path = os.pathsep.join(filter(None, [str(ROOT), kept.get("PYTHONPATH")]))
-    return {**kept, "PYTHONPATH": path, "PYTHONWARNINGS": "default", **variables}
+    return {**kept, "PYTHONPATH": path, **variables}
 
 
 def rollcli(*arguments: str | Path, cwd: Path, stdin: str = "", **variables: str) -> Finished:

@@ -22,7 +22,7 @@ from rollcli.batch.signals import Stop
 from rollcli.batch.workers import in_order
 
 _IN_FLIGHT_PER_WORKER = 4
-_DIED = "its worker died twice: killed for memory, perhaps, or crashed"
+_DIED = "its worker died each time: killed for memory, perhaps, or crashed"
 
 
 def pool_outcomes(
@@ -61,13 +61,16 @@ class PoolCrew:
         return future
 
     def again(self, frame: Frame) -> Outcome:
-        """Do a lost frame in a process of its own."""
+        """Do a lost frame in a process of its own.
+
+        Which frame in flight took the worker with it is not known: one that dies alone, for certain for
+        the first time, is tried once more.
+        """
         self.broken = True
-        with self._start(1) as pool:
-            try:
+        for _ in range(2):
+            with self._start(1) as pool, contextlib.suppress(BrokenExecutor):
                 return pool.submit(do, frame, self._options).result()
-            except BrokenExecutor:
-                return failed(frame, _DIED)
+        return failed(frame, _DIED)
 
     def renew(self) -> None:
         """A new pool in place of the broken one."""

@@ -3,12 +3,13 @@
 import contextlib
 import os
 import stat
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Protocol
 
 from rollcli.batch.lock import lock
-from rollcli.errors import UsageError
+from rollcli.errors import OutputError, UsageError
 from rollcli.files.atomic import output_error
 from rollcli.files.results import Format, Row, format_header, format_row
 
@@ -125,15 +126,13 @@ def check_result(name: str, *, resume: bool, overwrite: bool) -> None:
         if resume:
             raise UsageError("--resume needs a result file: name it with --output")
         return
-    if not (resume or overwrite) and _size(name):
+    if not (resume or overwrite) and _holds_something(name):
         raise UsageError(f"{name}: exists already; give --resume to continue it or --overwrite to replace it")
 
 
-def _size(name: str) -> int:
-    try:
-        return Path(name).stat().st_size
-    except OSError:
-        return 0
+def _holds_something(name: str) -> bool:
+    path = Path(name)
+    return path.is_file() and path.stat().st_size > 0
 
 
 def _is_stream(name: str) -> bool:
@@ -147,6 +146,8 @@ def _is_stream(name: str) -> bool:
 
 def _open_stream(name: str, form: Format, timing: bool) -> Iterator[RowSink]:
     if name == "-":
+        if sys.stdout is None:  # Python's word for a closed one; its number may be another file's by now
+            raise OutputError("standard output: is closed")
         yield RowStream(1, "standard output", form, timing)
         return
     try:

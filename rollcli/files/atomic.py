@@ -53,7 +53,7 @@ def atomic_file(path: str | Path) -> Iterator[BinaryIO]:
 
 
 def part_of(target: Path) -> Path:
-    """The temporary file of a target; not a random name: what a killed run leaves, the next one takes over."""
+    """The temporary file of a target; not a random name: what a killed run leaves, the next takes over."""
     name = os.fsencode(target.name)
     short = target.name if len(name) <= _LONGEST_NAME else f"{zlib.crc32(name):08x}"
     return target.with_name(f".{short}.part")

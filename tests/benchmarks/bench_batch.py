@@ -1,6 +1,6 @@
 """What a batch costs: CPU time per frame against bare decoding, and what a second worker brings.
 
-python tests/benchmarks/bench_batch.py [frames] [repeats]
+python tests/benchmarks/bench_batch.py [frames] [rounds]
 """
 
 import os
@@ -28,40 +28,49 @@ print(time.process_time() - start)
 """
 
 
-def bare_seconds(folder: Path) -> float:
+def decoding(folder: Path) -> float:
     """CPU seconds of decoding alone, start-up left out."""
     done = subprocess.run([sys.executable, "-c", BARE, folder], capture_output=True, text=True, check=True)
     return float(done.stdout)
 
 
-def rollcli_seconds(folder: Path, jobs: int) -> tuple[float, float]:
+def estimate(folder: Path, jobs: int) -> tuple[float, float]:
     """Wall and CPU seconds of the whole program, start-up and workers included."""
-    line = command("estimate", folder, "-q", "-j", str(jobs), "-o", folder.parent / "rolls.csv", "--overwrite")
+    result = folder.with_name("rolls.csv")
+    line = command("estimate", folder, "-q", "-j", str(jobs), "-o", result, "--overwrite")
     before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
     subprocess.run(line, env=environment(), check=True)
     wall, after = time.perf_counter() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
     return wall, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
-def main() -> None:
-    """Print one table; the figures of a round are taken one after the other, and the median round counts."""
-    frames, repeats = (int(text) for text in (*sys.argv[1:], 300, 5)[:2]) if len(sys.argv) < 3 else map(int, sys.argv[1:3])
+def measure(frames: int, rounds: int) -> dict[str, float]:
+    """The median of each figure; those of a round are taken right after each other."""
+    found = []
     with tempfile.TemporaryDirectory() as folder:
         maps = Path(folder, "maps")
-        for index in range(frames):
-            write_kitti(maps / f"{index:04}.png", road_map(0.002 * (index % 50), width=1242, height=375, seed=index))
-        rounds = []
-        for _ in range(repeats):
-            bare = bare_seconds(maps)
-            (wall1, cpu1), (wall2, cpu2) = rollcli_seconds(maps, 1), rollcli_seconds(maps, 2)
-            rounds.append((bare, cpu1, cpu1 / bare, wall1, wall2, wall1 / wall2, cpu2))
-    bare, cpu1, share, wall1, wall2, gain, cpu2 = (statistics.median(column) for column in zip(*rounds, strict=True))
-    each = 1000 / frames
-    print(f"{frames} 16-bit PNGs of 1242x375, {os.cpu_count()} processors, median of {repeats} rounds")
-    print(f"cv2.imdecode alone     {bare * each:7.2f} ms CPU a frame")
-    print(f"estimate -j1 -q        {cpu1 * each:7.2f} ms CPU a frame   {share:.2f} x decoding (to reach: 1.8)")
-    print(f"estimate -j2 -q        {cpu2 * each:7.2f} ms CPU a frame")
-    print(f"-j1 {wall1:.2f} s, -j2 {wall2:.2f} s: -j2 is {gain:.2f} x as fast (to reach: 1.7)")
+        for i in range(frames):
+            write_kitti(maps / f"{i:04}.png", road_map(0.002 * (i % 50), width=1242, height=375, seed=i))
+        for _ in range(rounds):
+            bare, (wall1, cpu1), (wall2, cpu2) = decoding(maps), estimate(maps, 1), estimate(maps, 2)
+            found.append(
+                {"bare": bare, "cpu1": cpu1, "cpu2": cpu2, "wall1": wall1, "wall2": wall2}
+                | {"share": cpu1 / bare, "gain": wall1 / wall2}
+            )
+    return {name: statistics.median(each[name] for each in found) for name in found[0]}
+
+
+def main() -> None:
+    """Print one table."""
+    frames, rounds = [int(text) for text in sys.argv[1:3]] + [300, 5][len(sys.argv) - 1 :]
+    found = measure(frames, rounds)
+    cpu = {name: 1000 * found[name] / frames for name in ("bare", "cpu1", "cpu2")}
+    print(f"{frames} 16-bit PNGs of 1242x375, {os.cpu_count()} processors, median of {rounds} rounds")
+    print(f"cv2.imdecode alone  {cpu['bare']:6.2f} ms CPU a frame")
+    print(f"estimate -j1 -q     {cpu['cpu1']:6.2f} ms, {found['share']:.2f} x decoding (at most 1.8)")
+    print(f"estimate -j2 -q     {cpu['cpu2']:6.2f} ms")
+    wall = f"-j1 {found['wall1']:.2f} s, -j2 {found['wall2']:.2f} s"
+    print(f"{wall}: {found['gain']:.2f} x as fast (at least 1.7)")
 
 
 if __name__ == "__main__":

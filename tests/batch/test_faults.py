@@ -1,0 +1,228 @@
+"""Full disks, lost files, dead workers, closed pipes: the documented status, one line, and nothing lost."""
+
+import os
+import resource
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.program import ROOT, command, contents, environment, rollcli, write_maps
+
+FRAMES = 12
+
+
+@pytest.fixture
+def maps(tmp_path):
+    write_maps(tmp_path / "maps", FRAMES)
+    return tmp_path
+
+
+def one_line(done):
+    """The only line of an error."""
+    assert done.err.count("\n") == 1
+    return done.err
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_a_full_device_ends_the_run_with_status_1(maps, jobs):
+    done = rollcli("estimate", "maps", "-o", "/dev/full", "-q", "-j", jobs, cwd=maps)
+    assert done.status == 1
+    assert "/dev/full: cannot be written: no space left on device" in one_line(done)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
+def test_a_full_standard_output_ends_the_run_with_status_1(maps):
+    line = command("estimate", "maps", "-q")
+    with Path("/dev/full").open("wb") as full:
+        done = subprocess.run(
+            line, cwd=maps, env=environment(), stdout=full, stderr=subprocess.PIPE, check=False
+        )
+    assert done.returncode == 1
+    assert done.stderr.decode() == "rollcli: standard output: cannot be written: no space left on device\n"
+
+
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_a_result_that_may_not_grow_keeps_its_whole_rows_and_is_resumed_later(maps, jobs):
+    arguments = ("estimate", "maps", "-o", "rolls.csv", "-q", "-j", jobs)
+    rollcli("estimate", "maps", "-o", "whole.csv", "-q", cwd=maps)
+    whole = (maps / "whole.csv").read_bytes()
+    limited = subprocess.run(
+        command(*arguments),
+        cwd=maps,
+        env=environment(),
+        capture_output=True,
+        text=True,
+        check=False,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (1500, 1500)),
+    )
+    assert limited.returncode == 1
+    assert "rolls.csv" in limited.stderr
+    assert limited.stderr.count("\n") == 1
+    kept = (maps / "rolls.csv").read_bytes()
+    assert whole.startswith(kept)
+    assert kept.endswith(b"\n")
+    assert rollcli(*arguments, "--resume", cwd=maps).status == 0
+    assert (maps / "rolls.csv").read_bytes() == whole
+
+
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_a_full_disk_of_images_keeps_the_rows_before_it(maps, jobs):
+    disk = maps / "disk"
+    disk.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=100k", "tmpfs", disk]
+    mounted = subprocess.run(mount, capture_output=True, check=False)
+    if mounted.returncode:
+        pytest.skip("a small file system cannot be mounted here")
+    try:
+        arguments = ("estimate", "maps", "-o", "rolls.csv", "-q", "-j", jobs, "--derotated", "disk/upright")
+        done = rollcli(*arguments, cwd=maps)
+        assert done.status == 1
+        assert "no space left" in one_line(done)
+        rows = (maps / "rolls.csv").read_text().splitlines()[1:]
+        assert 0 < len(rows) < FRAMES
+        for row in rows:
+            name = row.split(",")[0].removeprefix("maps/")
+            assert (disk / "upright" / name).stat().st_size > 0
+        subprocess.run(["mount", "-o", "remount,size=8m", disk], check=True)
+        assert rollcli(*arguments, "--resume", cwd=maps).status == 0
+        assert len(contents(disk)) == FRAMES
+    finally:
+        subprocess.run(["umount", disk], check=True)
+
+
+def test_an_output_folder_that_cannot_be_made_ends_the_run_with_status_1(maps):
+    (maps / "file").touch()
+    done = rollcli("estimate", "maps", "-o", "file/rolls.csv", cwd=maps)
+    assert (done.status, "file/rolls.csv: cannot be written" in one_line(done)) == (1, True)
+    done = rollcli("estimate", "maps", "-q", "--derotated", "file/upright", cwd=maps)
+    assert (done.status, "cannot be written" in one_line(done)) == (1, True)
+
+
+def test_an_output_that_is_a_folder_ends_the_run_with_status_1(maps):
+    (maps / "out").mkdir()
+    done = rollcli("estimate", "maps", "-o", "out", cwd=maps)
+    assert (done.status, "out: cannot be written: is a directory" in one_line(done)) == (1, True)
+
+
+def test_a_map_that_vanishes_while_running_costs_its_row(maps):
+    gone = maps / "maps" / "frame11.png"
+    code = f"""
+import pathlib, sys
+import rollcli.batch.run as run
+plan = run.make_plan
+def planned(options):
+    made = plan(options)
+    pathlib.Path({str(gone)!r}).unlink()
+    return made
+run.make_plan = planned
+sys.argv = ["rollcli", "estimate", "maps", "-j1"]
+from rollcli.__main__ import main
+main()
+"""
+    line = [sys.executable, "-c", code]
+    done = subprocess.run(line, cwd=maps, env=environment(), capture_output=True, text=True, check=False)
+    assert done.returncode == 3
+    assert done.stdout.splitlines()[-1].endswith("maps/frame11.png: no such file")
+    assert done.stdout.count(",ok,") == FRAMES - 1
+
+
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_a_closed_pipe_ends_the_run_quietly(maps, jobs):
+    run = subprocess.Popen(
+        command("estimate", "maps", "-j", jobs, "-q"),
+        cwd=maps,
+        env=environment(),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
+    run.stdout.readline()
+    run.stdout.close()
+    err = run.stderr.read()
+    run.stderr.close()
+    assert run.wait(60) == 0
+    assert err == b""
+
+
+def test_a_closed_standard_output_is_an_error_in_one_line(maps):
+    line = " ".join(command("estimate", "maps", "-q")) + " >&-"
+    done = subprocess.run(
+        ["sh", "-c", line], cwd=maps, env=environment(), capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 1
+    assert done.stderr == "rollcli: standard output: is closed\n"
+
+
+# Python imports sitecustomize as it starts: in a worker, reading certain maps then kills it
+SITECUSTOMIZE = """
+import os, pathlib, signal, sys
+if "spawn_main" in " ".join(sys.orig_argv):
+    import rollcli.files.formats as formats
+    read = formats.read_stored
+    def read_stored(path, name=None):
+        deaths = list(pathlib.Path(".").glob(f"died-of-{pathlib.Path(path).stem}-*"))
+        if pathlib.Path(path).stem in DEADLY and len(deaths) < TIMES:
+            pathlib.Path(f"died-of-{pathlib.Path(path).stem}-{os.getpid()}").touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        return read(path, name)
+    formats.read_stored = read_stored
+"""
+
+
+def run_with_deaths(maps, deadly, times):
+    """A run in which reading certain frames kills the worker, so many times each."""
+    (maps / "hook").mkdir()
+    settings = f"DEADLY, TIMES = {deadly!r}, {times}\n"
+    (maps / "hook" / "sitecustomize.py").write_text(settings + SITECUSTOMIZE)
+    path = os.pathsep.join([str(maps / "hook"), str(ROOT)])
+    arguments = ("estimate", "maps", "-j2", "-o", "rolls.csv", "-q")
+    return rollcli(*arguments, cwd=maps, PYTHONPATH=path)
+
+
+def test_a_worker_that_dies_once_costs_nothing(maps):
+    rollcli("estimate", "maps", "-o", "undisturbed.csv", "-q", cwd=maps)
+    done = run_with_deaths(maps, ["frame3", "frame8"], 1)
+    assert done.status == 0
+    assert len(list(maps.glob("died-of-*"))) == 2
+    assert (maps / "rolls.csv").read_bytes() == (maps / "undisturbed.csv").read_bytes()
+
+
+def test_a_frame_that_kills_its_worker_each_time_is_an_error_row_and_the_batch_goes_on(maps):
+    done = run_with_deaths(maps, ["frame3"], 99)
+    assert done.status == 3
+    rows = (maps / "rolls.csv").read_text().splitlines()[1:]
+    assert len(rows) == FRAMES
+    assert [row for row in rows if ",error," in row] == [
+        "maps/frame3.png,,error,,,,,,,,,,,,,,,"
+        '"maps/frame3.png: its worker died each time: killed for memory, perhaps, or crashed"'
+    ]
+
+
+def test_workers_end_with_a_run_that_is_killed(maps):
+    write_maps(maps / "more", 300, width=300, height=200)
+    run = subprocess.Popen(
+        command("estimate", "more", "-j2", "-o", "rolls.csv", "-q"),
+        cwd=maps,
+        env=environment(),
+        start_new_session=True,
+    )
+    while not ((maps / "rolls.csv").exists() and (maps / "rolls.csv").stat().st_size > 2000):
+        time.sleep(0.01)
+    run.kill()
+    run.wait()
+    give_up = time.monotonic() + 10
+    while alive_in_group(run.pid) and time.monotonic() < give_up:
+        time.sleep(0.02)
+    assert not alive_in_group(run.pid)
+
+
+def alive_in_group(group):
+    try:
+        os.killpg(group, signal.SIGCONT)
+    except ProcessLookupError:
+        return False
+    return True

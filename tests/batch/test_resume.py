@@ -1,0 +1,218 @@
+"""What survives when a run is killed, interrupted or started twice."""
+
+import json
+import os
+import shlex
+import signal
+import subprocess
+import time
+
+import pytest
+
+from tests.program import command, contents, environment, road_map, rollcli, write_kitti, write_maps
+
+FRAMES = 40
+IMAGES = ("--derotated", "upright", "--vdisparity", "v")
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory):
+    """A folder of maps with the result and images of a run that nothing disturbed."""
+    folder = tmp_path_factory.mktemp("undisturbed")
+    write_maps(folder / "maps", FRAMES, width=300, height=200)
+    (folder / "maps" / "frame7.png").write_bytes(b"no map")
+    assert rollcli("estimate", "maps", "-o", "rolls.csv", *IMAGES, cwd=folder).status == 3
+    return folder
+
+
+@pytest.fixture
+def folder(undisturbed, tmp_path):
+    """The same maps, and nothing else."""
+    (tmp_path / "maps").symlink_to(undisturbed / "maps")
+    return tmp_path
+
+
+def results(folder):
+    """Everything but the maps."""
+    return {name: data for name, data in contents(folder).items() if not name.startswith("maps/")}
+
+
+def start(folder, *arguments):
+    """A run in a process group of its own, as a shell would start it."""
+    return subprocess.Popen(
+        command("estimate", "maps", "-o", "rolls.csv", *IMAGES, *arguments),
+        cwd=folder,
+        env=environment(),
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+
+
+def wait_for_rows(folder, count, run):
+    """Until so many rows are there."""
+    result, give_up = folder / "rolls.csv", time.monotonic() + 60
+    while run.poll() is None and not (result.exists() and result.read_bytes().count(b"\n") > count):
+        assert time.monotonic() < give_up
+        time.sleep(0.002)
+
+
+def kill(run):
+    run.kill()
+    run.wait()
+    run.stderr.close()
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_a_run_killed_again_and_again_ends_in_the_same_bytes_and_leaves_nothing_else(
+    undisturbed, folder, jobs
+):
+    for rows in (0, 9, 21):
+        run = start(folder, "-j", str(jobs), *(["--resume"] if rows else []))
+        wait_for_rows(folder, rows, run)
+        kill(run)
+    done = rollcli("estimate", "maps", "-o", "rolls.csv", *IMAGES, "--resume", cwd=folder)
+    assert done.status == 3
+    assert results(folder) == results(undisturbed)
+
+
+def test_a_half_written_last_line_is_dropped_on_resume(undisturbed, folder):
+    whole = (undisturbed / "rolls.csv").read_bytes()
+    for name, data in results(undisturbed).items():
+        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / name).write_bytes(data)
+    (folder / "rolls.csv").write_bytes(whole[: len(whole) // 2])
+    assert rollcli("estimate", "maps", "-o", "rolls.csv", *IMAGES, "--resume", cwd=folder).status == 3
+    assert results(folder) == results(undisturbed)
+
+
+def test_resume_does_not_do_again_what_is_done(undisturbed, folder):
+    run = start(folder, "-j1")
+    wait_for_rows(folder, 10, run)
+    kill(run)
+    before = {path: path.stat().st_mtime_ns for path in (folder / "upright").iterdir()}
+    done = (folder / "rolls.csv").read_text().splitlines()[1:-1]
+    rollcli("estimate", "maps", "-o", "rolls.csv", *IMAGES, "--resume", cwd=folder)
+    for line in done:
+        path = folder / "upright" / line.split(",")[0].removeprefix("maps/")
+        assert line.split(",")[2] == "error" or path.stat().st_mtime_ns == before[path]
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_ctrl_c_keeps_what_is_done_and_prints_the_command_that_resumes(undisturbed, folder, jobs):
+    run = start(folder, "-j", str(jobs))
+    wait_for_rows(folder, 4, run)
+    os.killpg(run.pid, signal.SIGINT)  # a terminal sends it to the workers as well
+    _, err = run.communicate(timeout=60)
+    assert run.returncode == 130
+    assert "Traceback" not in err
+    line = err.splitlines()[-1].partition("continue with: ")[2]
+    assert line.startswith("rollcli estimate maps -o rolls.csv")
+    assert rollcli(*shlex.split(line)[1:], cwd=folder).status == 3
+    assert results(folder) == results(undisturbed)
+
+
+def test_sigterm_stops_a_run_as_ctrl_c_does(undisturbed, folder):
+    run = start(folder, "-j2")
+    wait_for_rows(folder, 4, run)
+    run.terminate()
+    assert (run.communicate(timeout=60), run.returncode)[1] == 130
+    assert rollcli("estimate", "maps", "-o", "rolls.csv", *IMAGES, "--resume", cwd=folder).status == 3
+    assert results(folder) == results(undisturbed)
+
+
+def test_a_second_run_on_the_same_result_is_refused(folder):
+    first = start(folder, "-j1")
+    wait_for_rows(folder, 1, first)
+    first.send_signal(signal.SIGSTOP)
+    for flag in ("--resume", "--overwrite"):
+        done = rollcli("estimate", "maps", "-o", "rolls.csv", *IMAGES, flag, cwd=folder)
+        assert done.status == 2
+        assert "another run" in done.err
+    first.send_signal(signal.SIGCONT)
+    first.communicate(timeout=60)
+    assert first.returncode == 3
+
+
+@pytest.fixture
+def interrupted(tmp_path):
+    """A result of 5 of 10 frames."""
+    write_maps(tmp_path / "maps", 10)
+    rollcli("estimate", "maps", "-o", "rolls.csv", cwd=tmp_path)
+    lines = (tmp_path / "rolls.csv").read_text().splitlines(keepends=True)
+    (tmp_path / "rolls.csv").write_text("".join(lines[:6]))
+    return tmp_path
+
+
+def refused(folder, *arguments):
+    """The one line that refuses to resume; the result stays as it was."""
+    before = (folder / "rolls.csv").read_bytes()
+    done = rollcli("estimate", "maps", "-o", "rolls.csv", "--resume", *arguments, cwd=folder)
+    assert done.status == 2
+    assert done.err.count("\n") == 1
+    assert (folder / "rolls.csv").read_bytes() == before
+    return done.err
+
+
+def test_a_resume_with_other_options_says_which(interrupted):
+    assert "--tolerance was 0.0001, is now 0.01" in refused(interrupted, "--tolerance", "0.01")
+    assert "--derotated was not given, is now upright" in refused(interrupted, "--derotated", "upright")
+
+
+def test_a_resume_by_another_version_says_which(interrupted):
+    record = interrupted / "rolls.csv.run.json"
+    record.write_text(record.read_text().replace('"rollcli": "', '"rollcli": "0.0.'))
+    assert "begun by rollcli 0.0." in refused(interrupted)
+
+
+def test_a_resume_with_changed_inputs_is_refused(interrupted):
+    write_kitti(interrupted / "maps" / "frame2.png", road_map(0.3))
+    assert "changed" in refused(interrupted)
+
+
+def test_a_resume_with_more_or_other_inputs_is_refused(interrupted):
+    write_kitti(interrupted / "maps" / "frame10.png", road_map())
+    assert "10 frames, now there are 11" in refused(interrupted)
+    (interrupted / "maps" / "frame3.png").unlink()
+    assert "maps/frame3.png, where now maps/frame4.png" in refused(interrupted)
+
+
+def test_a_resume_without_the_record_of_the_run_is_refused(interrupted):
+    (interrupted / "rolls.csv.run.json").unlink()
+    assert "rolls.csv.run.json" in refused(interrupted)
+
+
+def test_a_result_of_another_program_is_not_resumed(interrupted):
+    (interrupted / "rolls.csv").write_text("a,b\n1,2\n")
+    assert "no column" in refused(interrupted)
+
+
+def test_other_ways_to_run_do_not_hinder_a_resume(interrupted):
+    done = rollcli(
+        "estimate", "maps", "-o", "rolls.csv", "--resume", "-j2", "-v", "--fail-fast", cwd=interrupted
+    )
+    assert done.status == 0
+    assert (interrupted / "rolls.csv").read_text().count("\n") == 11
+
+
+def test_the_record_holds_version_options_encoding_conventions_and_counts(undisturbed):
+    record = json.loads((undisturbed / "rolls.csv.run.json").read_text())
+    assert record["counts"] == {"frames": FRAMES, "ok": FRAMES - 1, "suspect": 0, "error": 1}
+    assert record["encoding"] == ["kitti"]
+    assert record["options"]["method"] == "gd"
+    assert "counter-clockwise" in record["conventions"]["roll_deg"]
+
+
+def test_fail_fast_stops_at_the_first_failure_and_can_be_resumed(undisturbed, folder):
+    done = rollcli("estimate", "maps", "-o", "rolls.csv", *IMAGES, "--fail-fast", "-j2", cwd=folder)
+    rows = (folder / "rolls.csv").read_text().splitlines()
+    assert (done.status, len(rows)) == (3, 9)
+    rollcli("estimate", "maps", "-o", "rolls.csv", *IMAGES, "--resume", cwd=folder)
+    assert results(folder) == results(undisturbed)
+
+
+@pytest.mark.parametrize("flag", [[], ["--resume"], ["--overwrite"]])
+def test_an_empty_file_is_no_result(tmp_path, flag):
+    write_maps(tmp_path / "maps", 2)
+    (tmp_path / "rolls.csv").touch()
+    assert rollcli("estimate", "maps", "-o", "rolls.csv", *flag, cwd=tmp_path).status == 0
