@@ -1,0 +1,260 @@
+"""Which pixels are road: the plane that best explains what lies ahead of the rig.
+
+Planes through triples of pixels are judged by what they leave unexplained. Three things tell a road from the
+walls, verges and sky that may cover more of the image: nothing lies below a road; around each of its pixels
+the map rises as the road itself does; and it is what the rig drives on, so it fills the corridor straight
+ahead, a few camera heights wide. All three are measured in units of the hypothesis itself: they need neither
+the focal length nor the scale of the disparities.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollcli.errors import EstimationError
+from rollcli.estimator.sample import Sample, Singles
+
+_DRAWS = 1536  # triples drawn; about half are planes that could be a road
+_HYPOTHESES = 512
+_FIRST_PIXELS = 600  # all hypotheses are judged on these,
+_FIRST_BESIDE = 0.2
+_OF_EACH_ROLL = 4
+_SECOND = 48  # this many on the next,
+_SECOND_PIXELS = 1000
+_REFINED = 5  # and these are fitted and judged on
+_THIRD_PIXELS = 2400
+_FITS = 4
+_RADIUS = 0.35  # of a triple, in half image lengths
+_MIN_AREA = 0.004  # twice the area of its triangle, to be well conditioned
+_BELOW = 1.5  # cost of a coherent pixel under the road; one that is merely not on it costs 1
+_OFF_SLOPE = 0.2  # weight of a pixel around which the map does not rise as the road does
+_SLOPE_SHARE = 0.4  # of the road's own slope: how far the map's may be off
+_CORE, _CORRIDOR = 0.5, 1.5  # half-widths of the corridor, in camera heights
+_BESIDE = 0.05  # weight of a pixel far beside it
+_LEAST = 0.05  # share of the pixels that a corridor should weigh
+RIVAL_ANGLE = math.radians(2)
+
+
+@dataclass(frozen=True)
+class Road:
+    """The plane that was found.
+
+    Attributes
+    ----------
+    plane : ndarray, shape (3,)
+        d = c0 + c1 x + c2 y on the sample's grid.
+    score : float
+        The share of the road-like pixels in its corridor that lie on it, less those below it; up to 1.
+    rival : float
+        The best score of a plane whose roll differs by more than 2 degrees.
+    """
+
+    plane: NDArray[np.float64]
+    score: float
+    rival: float
+
+    @property
+    def theta(self) -> float:
+        """The plane's roll, radians."""
+        return math.atan2(-self.plane[1], self.plane[2])
+
+
+def find_road(sample: Sample, max_roll: float, seed: int) -> Road:
+    """Find the plane of the road.
+
+    Parameters
+    ----------
+    sample : Sample
+    max_roll : float
+        The largest abs(roll) considered, radians; more than 0, less than pi / 2.
+    seed : int
+        Of the triples drawn.
+
+    Returns
+    -------
+    Road
+
+    Raises
+    ------
+    EstimationError
+        When no plane through the pixels rises downward in the image, as a road's disparity does.
+    """
+    planes = _planes(sample, max_roll, seed)
+    if len(planes) == 0:
+        raise EstimationError("no road: nowhere does the disparity grow downward, as it does on a road")
+    planes = planes[_varied(_first_costs(sample, planes), _rolls(planes))]
+    second = _Judge.of(sample, _SECOND_PIXELS)
+    scores = second.scores(planes)
+    third = _Judge.of(sample, _THIRD_PIXELS)
+    fitted = third.fitted(planes[_shortlist(planes, scores)])
+    kept = np.abs(fitted[:, 1]) <= math.tan(max_roll) * fitted[:, 2]
+    fitted = fitted[kept] if kept.any() else planes[_best(-scores, 1)]
+    final = third.scores(fitted)
+    winner = int(np.argmax(final))
+    rolls, others = _rolls(fitted), _rolls(planes)
+    far = np.abs(rolls - rolls[winner]) > RIVAL_ANGLE
+    rival = max(final[far].max(initial=-1), scores[np.abs(others - rolls[winner]) > RIVAL_ANGLE].max(initial=-1))
+    return Road(fitted[winner].astype(np.float64), float(final[winner]), float(rival))
+
+
+def road_weights(sample: Sample, plane: NDArray[np.float64]) -> Singles:
+    """Return 0.2 to 1 for each pixel: how well the map's slopes around it agree with the plane's."""
+    slopes = _slope_weights(sample.slopes, sample.slope_noise, plane[None].astype(np.float32))
+    return slopes[0]
+
+
+def _planes(sample: Sample, max_roll: float, seed: int) -> Singles:
+    """Return planes (K, 3) through triples of neighbouring coherent pixels, disparity growing downward."""
+    rising = (sample.slopes[2:] > 0) & (sample.slopes[2:] < 1e8)
+    pool = np.flatnonzero((sample.coherence >= 0.5) & rising.any(0))
+    if len(pool) < 3:
+        return np.empty((0, 3), np.float32)
+    pool = pool[np.argsort(sample.cell[1, pool], kind="stable")]
+    x, y, d = sample.x, sample.y, sample.d
+    first, second, third = _draws(seed)
+    central = pool[np.abs(x[pool]) < _RADIUS]  # the road is more likely there
+    both = np.concatenate([pool, central])
+    a = both[(first * len(both)).astype(np.intp)]
+    from_, to = np.searchsorted(x[pool], np.stack([x[a] - _RADIUS, x[a] + _RADIUS]))
+    b = pool[from_ + (second * (to - from_)).astype(np.intp)]
+    c = pool[from_ + (third * (to - from_)).astype(np.intp)]
+    x1, y1, d1 = x[b] - x[a], y[b] - y[a], d[b] - d[a]
+    x2, y2, d2 = x[c] - x[a], y[c] - y[a], d[c] - d[a]
+    area = x1 * y2 - x2 * y1
+    wide = (np.abs(area) > _MIN_AREA) & (np.maximum(np.abs(y1), np.abs(y2)) < _RADIUS)
+    area = np.where(wide, area, 1)
+    c1, c2 = (d1 * y2 - d2 * y1) / area, (x1 * d2 - x2 * d1) / area
+    good = np.flatnonzero(wide & (c2 > 0) & (np.abs(c1) <= math.tan(max_roll) * c2))[:_HYPOTHESES]
+    c1, c2, a = c1[good], c2[good], a[good]
+    return np.stack([d[a] - c1 * x[a] - c2 * y[a], c1, c2], 1)
+
+
+@lru_cache(maxsize=8)
+def _draws(seed: int) -> NDArray[np.float64]:
+    """Return three numbers in [0, 1) for each triple: shape (3, _DRAWS)."""
+    return np.random.default_rng(seed).random((3, _DRAWS))
+
+
+def _first_costs(sample: Sample, planes: Singles) -> Singles:
+    """Return a cheap cost for each plane, with one guess of the road's slope for the corridor of all."""
+    few = slice(None, None, max(1, len(sample.d) // _FIRST_PIXELS))
+    x, y, d, tolerance = sample.x[few], sample.y[few], sample.d[few], sample.tolerance[few]
+    rising = ((sample.slopes[2:, few] > 0) & (sample.slopes[2:, few] < 1e8)).any(0)
+    slope = np.median(planes[:, 2])
+    side = np.square(x * slope / d)
+    weight = np.where(rising, np.float32(1), np.float32(_OFF_SLOPE)) * (_FIRST_BESIDE + (1-_FIRST_BESIDE)*np.exp(side * np.float32(-1 / _CORRIDOR**2)))
+    lowest = np.sqrt(1 + _BELOW * sample.coherence[few])
+    off = _with_minus_one(planes) @ (np.stack([np.ones_like(x), x, y, d]) / tolerance)
+    np.minimum(off, lowest, out=off)
+    np.maximum(off, -1, out=off)
+    np.square(off, out=off)
+    costs: Singles = off @ weight
+    return costs
+
+
+@dataclass(frozen=True)
+class _Judge:
+    """Some of a sample's pixels, laid out for judging many planes at once."""
+
+    x: Singles
+    y: Singles
+    d: Singles
+    scaled: Singles  # 1, x, y, d over the tolerance, shape (4, N)
+    lowest: Singles
+    slopes: Singles
+    slope_noise: float
+
+    @classmethod
+    def of(cls, sample: Sample, pixels: int) -> _Judge:
+        few = slice(None, None, max(1, round(len(sample.d) / pixels)))
+        x, y, d = sample.x[few], sample.y[few], sample.d[few]
+        scaled = np.stack([np.ones_like(x), x, y, d]) / sample.tolerance[few]
+        lowest = np.sqrt(1 + _BELOW * sample.coherence[few])
+        return cls(x, y, d, scaled, lowest, sample.slopes[:, few], sample.slope_noise)
+
+    def scores(self, planes: Singles) -> Singles:
+        """Return the score of each plane (K, 3); see `Road.score`."""
+        off = _with_minus_one(planes) @ self.scaled
+        np.minimum(off, self.lowest, out=off)
+        np.maximum(off, -1, out=off)
+        np.square(off, out=off)
+        off -= 1
+        slope, corridor = self._weights(planes)
+        reached = corridor * slope
+        gain = np.where(off < 0, reached, corridor) * off
+        scores: Singles = -gain.sum(1) / (reached.sum(1) + _LEAST * len(self.d))
+        return scores
+
+    def fitted(self, planes: Singles) -> Singles:
+        """Fit each plane (K, 3) to the pixels on it, a few times over."""
+        slope, corridor = self._weights(planes)
+        fixed = slope * corridor
+        design = self.scaled[:3]
+        for fit in range(_FITS):
+            off = _with_minus_one(planes) @ self.scaled
+            weight = fixed * np.maximum(0, 1 - off * off / (4 if fit < _FITS // 2 else 1))
+            pulled = weight[:, None, :] * design
+            normal = (pulled @ design.T).astype(np.float64)
+            right = (pulled @ self.scaled[3]).astype(np.float64)
+            ridge = 1e-9 * np.trace(normal, axis1=1, axis2=2)[:, None, None] * np.eye(3) + 1e-30 * np.eye(3)
+            planes = np.linalg.solve(normal + ridge, right[..., None])[..., 0].astype(np.float32)
+        return planes
+
+    def _weights(self, planes: Singles) -> tuple[Singles, Singles]:
+        """Return, for each plane and pixel, the agreement of slopes and the place in the corridor."""
+        c1, c2 = planes[:, 1:2], planes[:, 2:3]
+        # x' / d in units of the plane's slope is the way to the side in camera heights, whatever the rig
+        side = np.square((self.x * c2 - self.y * c1) / self.d)
+        corridor = np.exp(side * np.float32(-1 / _CORRIDOR**2)) + np.exp(side * np.float32(-1 / _CORE**2))
+        corridor *= np.float32((1 - _BESIDE) / 2)
+        corridor += np.float32(_BESIDE)
+        return _slope_weights(self.slopes, self.slope_noise, planes), corridor
+
+
+def _slope_weights(slopes: Singles, slope_noise: float, planes: Singles) -> Singles:
+    """Return (K, N) weights: the map's one-sided slopes, the better of each pair, against the planes'."""
+    c1, c2 = planes[:, 1:2], planes[:, 2:3]
+    left, right, up, down = slopes
+    apart = np.square(np.minimum(np.abs(left - c1), np.abs(right - c1)))
+    apart += np.square(np.minimum(np.abs(up - c2), np.abs(down - c2)))
+    apart /= -2 * (np.float32(_SLOPE_SHARE**2) * (c1 * c1 + c2 * c2) + np.float32(slope_noise**2))
+    np.exp(apart, out=apart)
+    apart *= np.float32(1 - _OFF_SLOPE)
+    apart += np.float32(_OFF_SLOPE)
+    return apart
+
+
+def _varied(costs: Singles, rolls: Singles) -> NDArray[np.intp]:
+    """Return the cheapest planes, few of each roll: a wide verge must not crowd out the road."""
+    order = _best(costs, len(costs))
+    bins = np.floor(rolls[order] / RIVAL_ANGLE).astype(np.int64)
+    by_bin = np.argsort(bins, kind="stable")
+    starts = np.searchsorted(bins[by_bin], bins[by_bin])
+    rank = np.empty_like(by_bin)
+    rank[by_bin] = np.arange(len(order)) - starts
+    return order[rank < _OF_EACH_ROLL][:_SECOND]
+
+
+def _shortlist(planes: Singles, scores: Singles) -> NDArray[np.intp]:
+    """Return the best few, one of them a rival of the best: it may win once fitted."""
+    order = _best(-scores, len(scores))
+    rolls = _rolls(planes)
+    rivals = order[np.abs(rolls[order] - rolls[order[0]]) > RIVAL_ANGLE]
+    return np.concatenate([order[: _REFINED - 1], rivals[:1]])
+
+
+def _rolls(planes: Singles) -> Singles:
+    return np.arctan2(-planes[:, 1], planes[:, 2])
+
+
+def _best(costs: Singles, count: int) -> NDArray[np.intp]:
+    return np.argsort(costs, kind="stable")[:count]
+
+
+def _with_minus_one(planes: Singles) -> Singles:
+    return np.concatenate([planes, np.full((len(planes), 1), -1, np.float32)], 1)

@@ -1,0 +1,153 @@
+"""A few thousand pixels of a map, and what the map says about each from its neighbours."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollcli.errors import EstimationError
+from rollcli.estimator.moments import Grid
+
+Singles = NDArray[np.float32]
+
+_PIXELS = 6000  # aimed at
+_NOISE_SHARE = 0.012  # of the median disparity: what matching gets wrong on real roads, whatever the scale
+_UNEVEN_SHARE = 0.02  # of a pixel's own disparity: 2 % of the camera's height, 3 cm on a car
+_QUANTUM_SHARE = 0.7  # of the smallest step: whole-pixel maps are off by up to half a step
+_COHERENT_SHARE = 0.03
+_NO_SLOPE = np.float32(1e9)  # agrees with no road
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Valid pixels on a regular grid of a map; arrays of shape (N,) unless said otherwise.
+
+    Attributes
+    ----------
+    grid : Grid
+        Of x and y.
+    x, y : ndarray of float32
+        Normalised coordinates (p and q of `Grid`), right and down.
+    d : ndarray of float32
+        Disparity, px of the map's own unit; more than 0.
+    tolerance : ndarray of float32
+        How far a road's disparity may be off here: matching noise and uneven ground, px.
+    noise : float
+        The part of it that does not grow with the disparity, px.
+    coherence : ndarray of float32
+        The share of the valid ones among four neighbours whose disparity is within tolerance.
+    slopes : ndarray of float32, shape (4, N)
+        One-sided derivatives of d to the left, right, up and down, px per unit of x or y; 1e9 where the
+        neighbour is no data.
+    slope_noise : float
+        What the noise makes of a slope, px per unit.
+    cell : ndarray of int32, shape (2, N)
+        Row and column of each pixel among the sampled ones.
+    spacing : float
+        Distance of neighbouring sampled pixels in units of x and y.
+    """
+
+    grid: Grid
+    x: Singles
+    y: Singles
+    d: Singles
+    tolerance: Singles
+    noise: float
+    coherence: Singles
+    slopes: Singles
+    slope_noise: float
+    cell: NDArray[np.int32]
+    spacing: float
+
+
+def take_sample(disparity: NDArray[Any], usable: NDArray[np.bool_] | None = None) -> Sample:
+    """Sample a map.
+
+    Parameters
+    ----------
+    disparity : ndarray, shape (H, W)
+        Finite or NaN; <= 0 and NaN are no data.
+    usable : ndarray of bool, shape (H, W), optional
+        Pixels that may be taken; neighbours outside still count as neighbours.
+
+    Returns
+    -------
+    Sample
+
+    Raises
+    ------
+    EstimationError
+        When too few pixels are valid to look for a road among them.
+    """
+    height, width = disparity.shape
+    grid = Grid.of_shape(height, width)
+    reach = int(min(16, max(3, round(max(height, width) / 310)), max(1, min(height, width) // 8)))
+    step = max(1, int(math.sqrt(height * width / _PIXELS)))
+    taken = _taken(disparity, usable, reach, step)
+    count = np.count_nonzero(taken)
+    if count < 0.45 * _PIXELS and step > 1:
+        step = max(1, int(step * math.sqrt(max(count, 50) / (0.6 * _PIXELS))))
+        taken = _taken(disparity, usable, reach, step)
+    chosen = np.flatnonzero(taken)
+    if len(chosen) < 50:
+        raise EstimationError(f"only {len(chosen)} valid pixels away from the border: too few to find a road in")
+    first = reach + (step // 2) % step
+
+    def at(dv: int, du: int) -> Singles:
+        return _strided(disparity, reach, step, dv, du).ravel()[chosen].astype(np.float32)
+
+    rows, columns = np.divmod(chosen, taken.shape[1])
+    d = at(0, 0)
+    around = np.stack([at(0, -reach), at(0, reach), at(-reach, 0), at(reach, 0)])
+    with np.errstate(invalid="ignore"):
+        known = around > 0
+    steps = np.where(known, around - d, _NO_SLOPE)
+    jumps = np.abs(steps)
+    middle = len(d) // 2
+    typical = float(np.partition(d, middle)[middle])
+    noise = max(_NOISE_SHARE * typical, _QUANTUM_SHARE * _quantum(jumps))
+    tolerance = np.hypot(np.float32(noise), np.float32(_UNEVEN_SHARE) * d)
+    near = jumps <= np.maximum(tolerance, np.float32(_COHERENT_SHARE * typical))
+    coherence = near.sum(0, dtype=np.float32) / np.maximum(known.sum(0, dtype=np.float32), 1)
+    per_unit = grid.scale / reach
+    slopes = steps * np.array([-per_unit, per_unit, -per_unit, per_unit], np.float32)[:, None]
+    return Sample(
+        grid=grid,
+        x=((columns * step + first - grid.centre_u) / grid.scale).astype(np.float32),
+        y=((rows * step + first - grid.centre_v) / grid.scale).astype(np.float32),
+        d=d,
+        tolerance=tolerance,
+        noise=noise,
+        coherence=coherence,
+        slopes=slopes,
+        slope_noise=noise * per_unit,
+        cell=np.stack([rows, columns]).astype(np.int32),
+        spacing=step / grid.scale,
+    )
+
+
+def _strided(array: NDArray[Any], reach: int, step: int, dv: int = 0, du: int = 0) -> NDArray[Any]:
+    """Return every step-th pixel, moved by (dv, du), that has neighbours at `reach` on all sides."""
+    height, width = array.shape
+    first = reach + (step // 2) % step
+    return array[first + dv : height - reach + dv : step, first + du : width - reach + du : step]
+
+
+def _taken(
+    disparity: NDArray[Any], usable: NDArray[np.bool_] | None, reach: int, step: int
+) -> NDArray[np.bool_]:
+    with np.errstate(invalid="ignore"):
+        taken: NDArray[np.bool_] = _strided(disparity, reach, step) > 0
+    return taken if usable is None else taken & _strided(usable, reach, step)
+
+
+def _quantum(jumps: Singles) -> float:
+    """Return the smallest step between neighbours (5th percentile): 1 in a map of whole pixels, 0 if none."""
+    some = jumps[1::2, ::4].ravel()
+    some = some[(some > 0) & (some < _NO_SLOPE)]
+    place = len(some) // 20
+    return float(np.partition(some, place)[place]) if len(some) else 0.0

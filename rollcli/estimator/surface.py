@@ -1,0 +1,132 @@
+"""From the road's plane to its pixels: a parabola fitted ever more strictly."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollcli.errors import EstimationError
+from rollcli.estimator.moments import Floats
+from rollcli.estimator.road import Road, road_weights
+from rollcli.estimator.sample import Sample
+
+_ROUNDS = 6
+_START = 2.0  # tolerances within which a pixel counts at first,
+_STRICT = 4.0  # in the end this many standard deviations,
+_LEAST = 0.2  # though not less than this many tolerances
+_EDGE, _EDGE_POWER = 0.75, 8  # half-width of the part of the image that counts, and how sharply it ends
+_DROP = 3.0  # farther than this many tolerances from the plane, a pixel is not looked at again
+MIN_PIXELS = 30
+
+
+@dataclass(frozen=True)
+class Surface:
+    """The pixels of the road, and how they lie around its parabola; arrays of shape (N,).
+
+    Attributes
+    ----------
+    x, y, d : ndarray
+        Normalised coordinates and disparity, px.
+    weights : ndarray
+        More than 0, at most 1.
+    residuals : ndarray
+        Road minus disparity, px.
+    theta : float
+        Roll of the fit, radians.
+    alpha : tuple of float
+        The parabola in the rolled, normalised y.
+    limit : float
+        Where the weight ends, in tolerances.
+    share : float
+        The share of the sampled pixels that is road.
+    moved : float
+        How far the roll moved from the plane's, radians.
+    """
+
+    x: Floats
+    y: Floats
+    d: Floats
+    weights: Floats
+    residuals: Floats
+    theta: float
+    alpha: tuple[float, float, float]
+    limit: float
+    share: float
+    moved: float
+
+
+def fit_surface(sample: Sample, road: Road, *, parabolic: bool) -> Surface:
+    """Fit the road's parabola and its roll to the pixels near the road's plane.
+
+    Gauss-Newton on (a0, a1, a2, theta) with Tukey's biweight, whose width shrinks from two tolerances to four
+    standard deviations: an even road gets a strict fit that leaves a far kerb outside, a worn one a lenient
+    fit.
+
+    Parameters
+    ----------
+    sample : Sample
+    road : Road
+    parabolic : bool
+        The road model: parabola or line.
+
+    Returns
+    -------
+    Surface
+
+    Raises
+    ------
+    EstimationError
+        When hardly any pixel lies on the road.
+    """
+    c0, c1, c2 = road.plane
+    off = (c0 + c1 * sample.x + c2 * sample.y - sample.d) / sample.tolerance
+    near = np.flatnonzero(np.abs(off) < _DROP)
+    x, y, d = sample.x[near].astype(np.float64), sample.y[near].astype(np.float64), sample.d[near].astype(np.float64)
+    tolerance = sample.tolerance[near].astype(np.float64)
+    place = road_weights(sample, road.plane)[near] * np.exp(-np.abs(x / _EDGE) ** _EDGE_POWER)
+    theta, alpha, limit = road.theta, np.array([c0, math.hypot(c1, c2), 0.0]), _START
+    residuals = off[near] * tolerance
+    design = np.empty((5, len(near)))
+    design[0], design[4] = 1, d
+    for turn in range(_ROUNDS):
+        weights = _biweight(residuals, limit * tolerance) * place
+        if np.count_nonzero(weights) < MIN_PIXELS:
+            raise EstimationError("no road: hardly a pixel lies on the best plane that was found")
+        cosine, sine = math.cos(theta), math.sin(theta)
+        design[1] = y * cosine - x * sine
+        design[2] = design[1] * design[1] if parabolic else 0
+        design[3] = -(x * cosine + y * sine) * (alpha[1] + 2 * alpha[2] * design[1])
+        products = (design * weights) @ design.T
+        normal = products[:4, :4] + np.diag(1e-10 * np.diag(products)[:4] + 1e-300)
+        a0, a1, a2, turned = np.linalg.solve(normal, products[:4, 4])
+        theta, alpha = theta + max(-0.2, min(0.2, turned)), np.array([a0, a1, a2])
+        level = y * math.cos(theta) - x * math.sin(theta)
+        residuals = a0 + level * (a1 + level * a2) - d
+        spread = np.abs(residuals[weights > 0]) / tolerance[weights > 0]
+        middle = len(spread) // 2
+        deviation = 1.4826 * float(np.partition(spread, middle)[middle])
+        limit = max(_LEAST, min(limit, _STRICT * deviation))
+    weights = _biweight(residuals, limit * tolerance) * place
+    used = weights > 0
+    if np.count_nonzero(used) < MIN_PIXELS:
+        raise EstimationError("no road: hardly a pixel lies on the best plane that was found")
+    return Surface(
+        x=x[used],
+        y=y[used],
+        d=d[used],
+        weights=weights[used],
+        residuals=residuals[used],
+        theta=theta,
+        alpha=(float(alpha[0]), float(alpha[1]), float(alpha[2])),
+        limit=limit,
+        share=float(np.count_nonzero(used) / len(sample.d)),
+        moved=abs(theta - road.theta),
+    )
+
+
+def _biweight(residuals: Floats, limits: Floats) -> NDArray[np.float64]:
+    scaled = np.maximum(0, 1 - np.square(residuals / limits))
+    return scaled * scaled
