@@ -62,14 +62,16 @@ def _arguments(options: MethodOptions) -> dict[str, Any]:
 
 def _row(frame: Frame, source: Source, estimate: RollEstimate) -> Row:
     reasons = [estimate.message] if estimate.message else []
+    status = estimate.status
     if source.end_fraction > _MUCH_AT_END:
+        status = "suspect"
         share = f"{source.end_fraction:.0%} of the map lies at the end of the searched range"
         reasons.append(f"{share}; use a larger --num-disparities")
     alpha0, alpha1, alpha2 = estimate.alpha
     return Row(
         file=frame.file,
         right_file=frame.right_file,
-        status="suspect" if reasons else estimate.status,
+        status=status,
         roll_deg=math.degrees(estimate.theta),
         roll_ci95_deg=None if estimate.ci95 is None else math.degrees(estimate.ci95),
         method=estimate.method,

@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rollcli.errors import UsageError
+from rollcli.errors import EstimationError, UsageError
+from rollcli.estimator import verdict
 from rollcli.estimator.energy import Energy
 from rollcli.estimator.exact import exact, minima
 from rollcli.estimator.golden_section import golden_section
 from rollcli.estimator.gradient_descent import LAMBDA0, TOLERANCE, gradient_descent
-from rollcli.estimator.moments import map_moments
+from rollcli.estimator.interval import half_width
+from rollcli.estimator.moments import map_moments, point_moments
 from rollcli.estimator.pixels import require_pixels
+from rollcli.estimator.road import Road, find_road
+from rollcli.estimator.sample import take_sample
 from rollcli.estimator.solution import Solution
+from rollcli.estimator.surface import Surface, fit_surface, whole_surface
 
 METHODS = ("gd", "gss", "exact", "plane", "areas")
 MODELS = ("parabola", "line")
@@ -67,12 +72,24 @@ class RollEstimate:
     road_fraction: float
     width: int
     height: int
-    _mask: NDArray[np.bool_] | None = field(default=None, repr=False, compare=False)
+    _usable: NDArray[np.bool_] | None = field(default=None, repr=False, compare=False)
+    _surface: Surface | None = field(default=None, repr=False, compare=False)
 
     def road_mask(self, disparity: ArrayLike) -> NDArray[np.bool_]:
-        """Return the pixels of `disparity` (H, W) that were used as road."""
-        used = np.asarray(disparity) > 0
-        return used if self._mask is None else used & self._mask
+        """Return the pixels of the map (H, W) that were used as road.
+
+        Parameters
+        ----------
+        disparity : array_like, shape (H, W)
+            The map that was estimated.
+
+        Returns
+        -------
+        ndarray of bool, shape (H, W)
+        """
+        values = np.asarray(disparity)
+        used = _valid(values, self._usable)
+        return used if self._surface is None else used & self._surface.covers(values)
 
 
 def estimate_roll(
@@ -120,35 +137,34 @@ def estimate_roll(
         When the pixels do not determine an angle.
     """
     values = _checked_map(disparity)
-    valid = (values > 0) & (values < np.inf)
-    if mask is not None:
-        usable = np.asarray(mask) != 0
-        if usable.shape != values.shape:
-            raise UsageError(
-                f"the mask is {_size(usable)}, the map {_size(values)}: give a mask of the map's size"
-            )
-        valid &= usable
+    _check_arguments(method, model, road, lambda0, tolerance, max_roll)
+    usable = None if mask is None else _checked_mask(mask, values)
+    valid = _valid(values, usable)
     count = require_pixels(valid)
-    peak = float(values.max(where=valid, initial=0))
-    energy = Energy.of(map_moments(values, valid), peak, parabolic=model == "parabola")
+    if road == "auto":
+        pixels = _find(values, usable, max_roll, seed, parabolic=model == "parabola")
+    else:
+        pixels = _take_all(values, valid, parabolic=model == "parabola")
+    energy, surface = pixels.energy, pixels.surface
     solution = _solve(energy, method, tolerance, lambda0)
-    reasons = []
-    if not solution.outcome.converged:
-        reasons.append(solution.outcome.value)
-    lowest = minima(energy)[0]
+    lowest, *others = minima(energy)
     slack = 1e-9 * (energy.rest + energy.slope_energy)
     is_global = float(energy.at(solution.theta).value) <= lowest.energy + slack
-    if not is_global:
-        reasons.append(f"a lower minimum of the energy lies at {math.degrees(lowest.theta):.4f} degrees")
-    _, c1, c2 = energy.plane
-    if c2 * math.cos(solution.theta) - c1 * math.sin(solution.theta) < 0:
-        reasons.append("disparity grows upward, as it does in a depth map")
+    notes = []
+    if not is_global and pixels.road is not None:
+        notes.append(f"replaced a local minimum of the energy at {math.degrees(solution.theta):.4f} degrees")
+        solution, is_global = replace(solution, theta=lowest.theta), True
+    ci95 = None if surface is None else half_width(surface, solution.theta)
+    doubts = verdict.of_solution(solution, energy, lowest, others, is_global=is_global)
+    if pixels.road is not None and surface is not None:
+        doubts += verdict.of_road(pixels.road, surface, max_roll)
+    doubts += verdict.of_interval(ci95)
     height, width = values.shape
     return RollEstimate(
         theta=solution.theta,
-        ci95=None,
-        status="suspect" if reasons else "ok",
-        message="; ".join(reasons),
+        ci95=ci95,
+        status="suspect" if doubts else "ok",
+        message="; ".join(doubts + notes),
         method=method,
         iterations=solution.iterations,
         converged=solution.outcome.converged,
@@ -156,11 +172,44 @@ def estimate_roll(
         rmse=energy.rmse(solution.theta),
         alpha=energy.parabola(solution.theta),
         valid_fraction=count / values.size,
-        road_fraction=1.0,
+        road_fraction=1.0 if pixels.road is None or surface is None else surface.share,
         width=width,
         height=height,
-        _mask=None if mask is None else usable,
+        _usable=usable,
+        _surface=None if pixels.road is None else surface,
     )
+
+
+@dataclass(frozen=True)
+class _Pixels:
+    """What an angle rests on; `road` is None where every valid pixel was taken."""
+
+    energy: Energy
+    surface: Surface | None
+    road: Road | None
+
+
+def _find(
+    values: NDArray[Any], usable: NDArray[np.bool_] | None, max_roll: float, seed: int, *, parabolic: bool
+) -> _Pixels:
+    """Find the road, and sum its pixels by their weights."""
+    sample = take_sample(values, usable)
+    found = find_road(sample, max_roll, seed)
+    surface = fit_surface(sample, found, parabolic=parabolic)
+    _, slope, _ = surface.alpha
+    plane = (surface.alpha[0], -slope * math.sin(surface.theta), slope * math.cos(surface.theta))
+    moments = point_moments(surface.x, surface.y, surface.d, surface.weights, sample.grid, plane)
+    return _Pixels(Energy.of(moments, float(surface.d.max()), parabolic=parabolic), surface, found)
+
+
+def _take_all(values: NDArray[Any], valid: NDArray[np.bool_], *, parabolic: bool) -> _Pixels:
+    """Sum every valid pixel, as the paper does; a sample of them tells how sure that is."""
+    energy = Energy.of(map_moments(values, valid), float(values[valid].max()), parabolic=parabolic)
+    try:
+        surface = whole_surface(take_sample(values, valid), energy)
+    except EstimationError:  # too small a map to be sampled: an angle without an interval
+        surface = None
+    return _Pixels(energy, surface, None)
 
 
 def _solve(energy: Energy, method: str, tolerance: float, lambda0: float | Literal["auto"]) -> Solution:
@@ -168,9 +217,27 @@ def _solve(energy: Energy, method: str, tolerance: float, lambda0: float | Liter
         return gradient_descent(energy, tolerance, lambda0)
     if method == "gss":
         return golden_section(energy, tolerance)
-    if method == "exact":
-        return exact(energy)
-    raise UsageError(f"method {method!r} is not one of {', '.join(METHODS)}")
+    return exact(energy)
+
+
+def _check_arguments(
+    method: str, model: str, road: str, lambda0: float | Literal["auto"], tolerance: float, max_roll: float
+) -> None:
+    for name, value, choices in (
+        ("method", method, METHODS),
+        ("model", model, MODELS),
+        ("road", road, ROADS),
+    ):
+        if value not in choices:
+            raise UsageError(f"{name} {value!r}: choose one of {', '.join(choices)}")
+    if lambda0 != "auto" and not 0 < lambda0 < math.inf:
+        raise UsageError(f"lambda0 {lambda0}: give a positive number, or auto")
+    if not tolerance > 0:
+        raise UsageError(f"a tolerance of {math.degrees(tolerance):g} degrees: give a positive angle")
+    if not 0 < max_roll <= MAX_ROLL_LIMIT * (1 + 1e-12):
+        raise UsageError(
+            f"a largest roll of {math.degrees(max_roll):g} degrees: give more than 0, at most 89"
+        )
 
 
 def _checked_map(disparity: ArrayLike) -> NDArray[Any]:
@@ -180,6 +247,24 @@ def _checked_map(disparity: ArrayLike) -> NDArray[Any]:
             f"a disparity map is a 2-D array of real numbers, not {values.ndim}-D {values.dtype}"
         )
     return values
+
+
+def _checked_mask(mask: ArrayLike, values: NDArray[Any]) -> NDArray[np.bool_]:
+    usable = np.asarray(mask) != 0
+    if usable.shape != values.shape:
+        raise UsageError(
+            f"the mask is {_size(usable)}, the map {_size(values)}: give a mask of the map's size"
+        )
+    return usable
+
+
+def _valid(values: NDArray[Any], usable: NDArray[np.bool_] | None) -> NDArray[np.bool_]:
+    valid: NDArray[np.bool_] = values > 0
+    if values.dtype.kind == "f":
+        valid &= values < np.inf
+    if usable is not None:
+        valid &= usable
+    return valid
 
 
 def _size(array: NDArray[Any]) -> str:

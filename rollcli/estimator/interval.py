@@ -16,13 +16,13 @@ from rollcli.estimator.moments import Floats
 from rollcli.estimator.surface import Surface
 
 _GROUPS = 6
-_EFFECTIVE_PIXELS = 2000  # neighbouring pixels repeat each other: more do not tell more
-_KAPPA = 0.65  # fitted by tests/benchmarks/fit_interval.py
+_EFFECTIVE_PIXELS = 200  # neighbouring pixels repeat each other: more do not tell more
+_KAPPA = 0.72  # fitted by tests/benchmarks/fit_interval.py
 # 97.5 % quantiles of Student's t for 1, 2, ... degrees of freedom
 _T975 = (12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228, 2.201, 2.179)
 
 
-def half_width(surface: Surface, theta: float, alpha: tuple[float, float, float]) -> float:
+def half_width(surface: Surface, theta: float) -> float:
     """Return the half-width of the 95 % interval of the roll angle.
 
     Parameters
@@ -31,8 +31,6 @@ def half_width(surface: Surface, theta: float, alpha: tuple[float, float, float]
         The road's pixels and their weights.
     theta : float
         The roll that was estimated from them, radians.
-    alpha : tuple of float
-        The parabola in the normalised y of that roll.
 
     Returns
     -------
@@ -42,41 +40,39 @@ def half_width(surface: Surface, theta: float, alpha: tuple[float, float, float]
     cosine, sine = math.cos(theta), math.sin(theta)
     across = surface.x * cosine + surface.y * sine
     along = surface.y * cosine - surface.x * sine
-    slope = alpha[1] + 2 * alpha[2] * along
-    design = np.stack([np.ones_like(along), along, along * along, -across * slope])
-    residuals = surface.d - (alpha[0] + along * (alpha[1] + along * alpha[2]))
+    a0, a1, a2 = surface.parabola(theta)
+    square = along * along * surface.parabolic
+    design = np.stack([np.ones_like(along), along, square, -across * (a1 + 2 * a2 * along)])
+    residuals = surface.d - (a0 + along * (a1 + along * a2))
+    # each pixel's part of the normal equations, flattened: 16 products, then 4 right-hand sides
     weighted = design * surface.weights
-    normal = weighted @ design.T
+    parts = np.concatenate([(weighted[:, None] * design).reshape(16, -1), weighted * residuals])
+    total = parts.sum(1)
+    normal = total[:16].reshape(4, 4)
     inverse = np.linalg.inv(normal + np.diag(1e-12 * np.diag(normal) + 1e-300))
-    pull = weighted * residuals
-    step = inverse @ pull.sum(1)
-    by_band = _groups(along, np.ones_like(along))
-    by_column = _groups(across, surface.weights * np.square(design[3]))
-    bands = _spread(by_band, design, weighted, pull, normal, step)
-    columns = _spread(by_column, design, weighted, pull, normal, step)
-    total = surface.weights.sum()
-    variance = float(surface.weights @ np.square(residuals)) / total
-    white = variance * inverse[3, 3] * max(1.0, total / _EFFECTIVE_PIXELS)
-    return _KAPPA * math.sqrt(bands**2 + columns**2 / 2 + 1.96**2 * white)
+    step = inverse @ total[16:]
+    bands = _spread(_by_group(parts, along, np.ones_like(along)), normal, step)
+    columns = _spread(_by_group(parts, across, parts[15]), normal, step)
+    weight = float(surface.weights.sum())
+    variance = float(surface.weights @ np.square(residuals)) / weight
+    white = variance * inverse[3, 3] * max(1.0, weight / _EFFECTIVE_PIXELS)
+    return _KAPPA * math.sqrt(bands**2 + columns**2 + 1.96**2 * white)
 
 
-def _groups(position: Floats, share: Floats) -> list[np.ndarray]:
-    """Return the pixels of each of six groups of equal total `share`, cut along `position`."""
+def _by_group(parts: Floats, position: Floats, share: Floats) -> Floats:
+    """Return the sums (20, 6) over six groups of equal total `share`, cut along `position`."""
     order = np.argsort(position)
     heights = np.cumsum(share[order])
-    cuts = np.searchsorted(heights, heights[-1] * np.arange(1, _GROUPS) / _GROUPS)
-    return np.split(order, cuts)
+    starts = np.searchsorted(heights, heights[-1] * np.arange(_GROUPS) / _GROUPS)
+    sums: Floats = np.add.reduceat(parts[:, order], np.minimum(starts, len(order) - 1), axis=1)
+    return sums
 
 
-def _spread(
-    groups: list[np.ndarray], design: Floats, weighted: Floats, pull: Floats, normal: Floats, step: Floats
-) -> float:
+def _spread(sums: Floats, normal: Floats, step: Floats) -> float:
     """Return t * sqrt(sum of squared moves of theta) as one group after the other is left out."""
-    parts = np.stack([weighted[:, g] @ design[:, g].T for g in groups])
-    pulls = np.stack([pull[:, g].sum(1) for g in groups])
-    left = normal - parts
+    parts, pulls = sums[:16].T.reshape(-1, 4, 4), sums[16:].T
     ridge = 1e-9 * np.trace(normal) / 4 * np.eye(4)
-    moves = np.linalg.solve(left + ridge, (pulls - parts @ step)[..., None])[:, 3, 0]
+    moves = np.linalg.solve(normal - parts + ridge, (pulls - parts @ step)[..., None])[:, 3, 0]
     leverage = parts[:, 3, 3] / normal[3, 3]
     freedom = max(1.0, 1 / float(np.square(leverage).sum()) - 1)
     return _student(freedom) * math.sqrt(float(np.square(moves).sum()))

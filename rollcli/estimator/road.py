@@ -17,18 +17,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import EstimationError
-from rollcli.estimator.sample import Sample, Singles
+from rollcli.estimator.sample import NO_SLOPE, Sample, Singles
 
-_DRAWS = 1536  # triples drawn; about half are planes that could be a road
+_DRAWS = 1024  # triples drawn; about half are planes that could be a road
 _HYPOTHESES = 512
-_FIRST_PIXELS = 600  # all hypotheses are judged on these,
+_FIRST_PIXELS = 450  # all hypotheses are judged on these,
 _FIRST_BESIDE = 0.2
 _OF_EACH_ROLL = 4
-_SECOND = 48  # this many on the next,
-_SECOND_PIXELS = 1000
+_SECOND = 40  # this many on the next,
+_SECOND_PIXELS = 800
 _REFINED = 5  # and these are fitted and judged on
-_THIRD_PIXELS = 2400
-_FITS = 4
+_THIRD_PIXELS = 1500
+_FITS = 3
 _RADIUS = 0.35  # of a triple, in half image lengths
 _MIN_AREA = 0.004  # twice the area of its triangle, to be well conditioned
 _BELOW = 1.5  # cost of a coherent pixel under the road; one that is merely not on it costs 1
@@ -98,23 +98,26 @@ def find_road(sample: Sample, max_roll: float, seed: int) -> Road:
     winner = int(np.argmax(final))
     rolls, others = _rolls(fitted), _rolls(planes)
     far = np.abs(rolls - rolls[winner]) > RIVAL_ANGLE
-    rival = max(final[far].max(initial=-1), scores[np.abs(others - rolls[winner]) > RIVAL_ANGLE].max(initial=-1))
+    rival = max(
+        final[far].max(initial=-1), scores[np.abs(others - rolls[winner]) > RIVAL_ANGLE].max(initial=-1)
+    )
     return Road(fitted[winner].astype(np.float64), float(final[winner]), float(rival))
 
 
-def road_weights(sample: Sample, plane: NDArray[np.float64]) -> Singles:
-    """Return 0.2 to 1 for each pixel: how well the map's slopes around it agree with the plane's."""
-    slopes = _slope_weights(sample.slopes, sample.slope_noise, plane[None].astype(np.float32))
-    return slopes[0]
+def road_weights(sample: Sample, plane: NDArray[np.float64], near: NDArray[np.intp]) -> Singles:
+    """Return 0.2 to 1 for each of some pixels: how well the map's slopes around it agree with the plane's."""
+    weights: Singles = _slope_weights(
+        sample.slopes[:, near], sample.slope_noise, plane[None].astype(np.float32)
+    )
+    return weights[0]
 
 
 def _planes(sample: Sample, max_roll: float, seed: int) -> Singles:
     """Return planes (K, 3) through triples of neighbouring coherent pixels, disparity growing downward."""
-    rising = (sample.slopes[2:] > 0) & (sample.slopes[2:] < 1e8)
-    pool = np.flatnonzero((sample.coherence >= 0.5) & rising.any(0))
+    pool = np.flatnonzero((sample.coherence >= 0.5) & _rising(sample.slopes))
     if len(pool) < 3:
         return np.empty((0, 3), np.float32)
-    pool = pool[np.argsort(sample.cell[1, pool], kind="stable")]
+    pool = pool[np.argsort(sample.column[pool], kind="stable")]
     x, y, d = sample.x, sample.y, sample.d
     first, second, third = _draws(seed)
     central = pool[np.abs(x[pool]) < _RADIUS]  # the road is more likely there
@@ -142,19 +145,42 @@ def _draws(seed: int) -> NDArray[np.float64]:
 
 def _first_costs(sample: Sample, planes: Singles) -> Singles:
     """Return a cheap cost for each plane, with one guess of the road's slope for the corridor of all."""
-    few = slice(None, None, max(1, len(sample.d) // _FIRST_PIXELS))
-    x, y, d, tolerance = sample.x[few], sample.y[few], sample.d[few], sample.tolerance[few]
-    rising = ((sample.slopes[2:, few] > 0) & (sample.slopes[2:, few] < 1e8)).any(0)
-    slope = np.median(planes[:, 2])
-    side = np.square(x * slope / d)
-    weight = np.where(rising, np.float32(1), np.float32(_OFF_SLOPE)) * (_FIRST_BESIDE + (1-_FIRST_BESIDE)*np.exp(side * np.float32(-1 / _CORRIDOR**2)))
-    lowest = np.sqrt(1 + _BELOW * sample.coherence[few])
-    off = _with_minus_one(planes) @ (np.stack([np.ones_like(x), x, y, d]) / tolerance)
-    np.minimum(off, lowest, out=off)
+    few = slice(None, None, max(1, round(len(sample.d) / _FIRST_PIXELS)))
+    x, d = sample.x[few], sample.d[few]
+    side = np.square(x * np.median(planes[:, 2]) / d)
+    corridor = _FIRST_BESIDE + (1 - _FIRST_BESIDE) * np.exp(side * np.float32(-1 / _CORRIDOR**2))
+    weight = np.where(_rising(sample.slopes[:, few]), corridor, corridor * np.float32(_OFF_SLOPE))
+    scaled = np.stack([np.ones_like(x), x, sample.y[few], d]) / sample.tolerance[few]
+    costs: Singles = _excess(planes, scaled, _caps(sample.coherence[few])) @ weight
+    return costs
+
+
+def _excess(planes: Singles, scaled: Singles, caps: Singles) -> Singles:
+    """Return squared residuals in tolerances (K, N), at most 1 above a plane and more below it."""
+    off = _residuals(planes, scaled)
+    np.minimum(off, caps, out=off)
     np.maximum(off, -1, out=off)
     np.square(off, out=off)
-    costs: Singles = off @ weight
-    return costs
+    return off
+
+
+def _residuals(planes: Singles, scaled: Singles) -> Singles:
+    """Return plane minus disparity in tolerances, (K, N); `scaled` holds 1, x, y and d."""
+    minus = np.full((len(planes), 1), -1, np.float32)
+    residuals: Singles = np.concatenate([planes, minus], 1) @ scaled
+    return residuals
+
+
+def _caps(coherence: Singles) -> Singles:
+    caps: Singles = np.sqrt(1 + np.float32(_BELOW) * coherence)
+    return caps
+
+
+def _rising(slopes: Singles) -> NDArray[np.bool_]:
+    """Return where the disparity grows downward, above the pixel or below it."""
+    up, down = slopes[2:]
+    rising: NDArray[np.bool_] = ((up > 0) & (up < NO_SLOPE)) | ((down > 0) & (down < NO_SLOPE))
+    return rising
 
 
 @dataclass(frozen=True)
@@ -165,7 +191,7 @@ class _Judge:
     y: Singles
     d: Singles
     scaled: Singles  # 1, x, y, d over the tolerance, shape (4, N)
-    lowest: Singles
+    caps: Singles
     slopes: Singles
     slope_noise: float
 
@@ -174,35 +200,29 @@ class _Judge:
         few = slice(None, None, max(1, round(len(sample.d) / pixels)))
         x, y, d = sample.x[few], sample.y[few], sample.d[few]
         scaled = np.stack([np.ones_like(x), x, y, d]) / sample.tolerance[few]
-        lowest = np.sqrt(1 + _BELOW * sample.coherence[few])
-        return cls(x, y, d, scaled, lowest, sample.slopes[:, few], sample.slope_noise)
+        return cls(x, y, d, scaled, _caps(sample.coherence[few]), sample.slopes[:, few], sample.slope_noise)
 
     def scores(self, planes: Singles) -> Singles:
         """Return the score of each plane (K, 3); see `Road.score`."""
-        off = _with_minus_one(planes) @ self.scaled
-        np.minimum(off, self.lowest, out=off)
-        np.maximum(off, -1, out=off)
-        np.square(off, out=off)
-        off -= 1
+        excess = _excess(planes, self.scaled, self.caps)
+        excess -= 1
         slope, corridor = self._weights(planes)
         reached = corridor * slope
-        gain = np.where(off < 0, reached, corridor) * off
-        scores: Singles = -gain.sum(1) / (reached.sum(1) + _LEAST * len(self.d))
+        lost = np.einsum("kn,kn->k", np.where(excess < 0, reached, corridor), excess)
+        scores: Singles = -lost / (reached.sum(1) + np.float32(_LEAST * len(self.d)))
         return scores
 
     def fitted(self, planes: Singles) -> Singles:
         """Fit each plane (K, 3) to the pixels on it, a few times over."""
         slope, corridor = self._weights(planes)
         fixed = slope * corridor
-        design = self.scaled[:3]
+        products = (self.scaled[:3, None] * self.scaled[None]).reshape(12, -1)
         for fit in range(_FITS):
-            off = _with_minus_one(planes) @ self.scaled
-            weight = fixed * np.maximum(0, 1 - off * off / (4 if fit < _FITS // 2 else 1))
-            pulled = weight[:, None, :] * design
-            normal = (pulled @ design.T).astype(np.float64)
-            right = (pulled @ self.scaled[3]).astype(np.float64)
-            ridge = 1e-9 * np.trace(normal, axis1=1, axis2=2)[:, None, None] * np.eye(3) + 1e-30 * np.eye(3)
-            planes = np.linalg.solve(normal + ridge, right[..., None])[..., 0].astype(np.float32)
+            off = np.square(_residuals(planes, self.scaled))
+            weight = fixed * np.maximum(0, 1 - off * np.float32(0.25 if fit == 0 else 1))
+            sums = (weight @ products.T).astype(np.float64).reshape(-1, 3, 4)
+            ridge = 1e-9 * np.trace(sums, axis1=1, axis2=2)[:, None, None] * np.eye(3) + 1e-30 * np.eye(3)
+            planes = np.linalg.solve(sums[..., :3] + ridge, sums[..., 3:])[..., 0].astype(np.float32)
         return planes
 
     def _weights(self, planes: Singles) -> tuple[Singles, Singles]:
@@ -222,7 +242,7 @@ def _slope_weights(slopes: Singles, slope_noise: float, planes: Singles) -> Sing
     left, right, up, down = slopes
     apart = np.square(np.minimum(np.abs(left - c1), np.abs(right - c1)))
     apart += np.square(np.minimum(np.abs(up - c2), np.abs(down - c2)))
-    apart /= -2 * (np.float32(_SLOPE_SHARE**2) * (c1 * c1 + c2 * c2) + np.float32(slope_noise**2))
+    apart *= -0.5 / (np.float32(_SLOPE_SHARE**2) * (c1 * c1 + c2 * c2) + np.float32(slope_noise**2))
     np.exp(apart, out=apart)
     apart *= np.float32(1 - _OFF_SLOPE)
     apart += np.float32(_OFF_SLOPE)
@@ -254,7 +274,3 @@ def _rolls(planes: Singles) -> Singles:
 
 def _best(costs: Singles, count: int) -> NDArray[np.intp]:
     return np.argsort(costs, kind="stable")[:count]
-
-
-def _with_minus_one(planes: Singles) -> Singles:
-    return np.concatenate([planes, np.full((len(planes), 1), -1, np.float32)], 1)

@@ -16,10 +16,10 @@ Singles = NDArray[np.float32]
 
 _PIXELS = 6000  # aimed at
 _NOISE_SHARE = 0.012  # of the median disparity: what matching gets wrong on real roads, whatever the scale
-_UNEVEN_SHARE = 0.02  # of a pixel's own disparity: 2 % of the camera's height, 3 cm on a car
+UNEVEN_SHARE = 0.02  # of a pixel's own disparity: 2 % of the camera's height, 3 cm on a car
 _QUANTUM_SHARE = 0.7  # of the smallest step: whole-pixel maps are off by up to half a step
 _COHERENT_SHARE = 0.03
-_NO_SLOPE = np.float32(1e9)  # agrees with no road
+NO_SLOPE = np.float32(1e9)  # agrees with no road
 
 
 @dataclass(frozen=True)
@@ -45,10 +45,8 @@ class Sample:
         neighbour is no data.
     slope_noise : float
         What the noise makes of a slope, px per unit.
-    cell : ndarray of int32, shape (2, N)
-        Row and column of each pixel among the sampled ones.
-    spacing : float
-        Distance of neighbouring sampled pixels in units of x and y.
+    column : ndarray of uint16
+        Column of each pixel among the sampled ones.
     """
 
     grid: Grid
@@ -60,8 +58,7 @@ class Sample:
     coherence: Singles
     slopes: Singles
     slope_noise: float
-    cell: NDArray[np.int32]
-    spacing: float
+    column: NDArray[np.uint16]
 
 
 def take_sample(disparity: NDArray[Any], usable: NDArray[np.bool_] | None = None) -> Sample:
@@ -85,16 +82,18 @@ def take_sample(disparity: NDArray[Any], usable: NDArray[np.bool_] | None = None
     """
     height, width = disparity.shape
     grid = Grid.of_shape(height, width)
-    reach = int(min(16, max(3, round(max(height, width) / 310)), max(1, min(height, width) // 8)))
+    reach = min(16, max(3, round(max(height, width) / 310)), max(1, min(height, width) // 8))
     step = max(1, int(math.sqrt(height * width / _PIXELS)))
     taken = _taken(disparity, usable, reach, step)
-    count = np.count_nonzero(taken)
+    count = int(np.count_nonzero(taken))
     if count < 0.45 * _PIXELS and step > 1:
         step = max(1, int(step * math.sqrt(max(count, 50) / (0.6 * _PIXELS))))
         taken = _taken(disparity, usable, reach, step)
     chosen = np.flatnonzero(taken)
     if len(chosen) < 50:
-        raise EstimationError(f"only {len(chosen)} valid pixels away from the border: too few to find a road in")
+        raise EstimationError(
+            f"only {len(chosen)} valid pixels away from the border: too few to find a road in"
+        )
     first = reach + (step // 2) % step
 
     def at(dv: int, du: int) -> Singles:
@@ -105,16 +104,17 @@ def take_sample(disparity: NDArray[Any], usable: NDArray[np.bool_] | None = None
     around = np.stack([at(0, -reach), at(0, reach), at(-reach, 0), at(reach, 0)])
     with np.errstate(invalid="ignore"):
         known = around > 0
-    steps = np.where(known, around - d, _NO_SLOPE)
+    steps = np.where(known, around - d, NO_SLOPE)
     jumps = np.abs(steps)
     middle = len(d) // 2
     typical = float(np.partition(d, middle)[middle])
     noise = max(_NOISE_SHARE * typical, _QUANTUM_SHARE * _quantum(jumps))
-    tolerance = np.hypot(np.float32(noise), np.float32(_UNEVEN_SHARE) * d)
+    tolerance = np.sqrt(np.float32(noise) ** 2 + np.square(np.float32(UNEVEN_SHARE) * d))
     near = jumps <= np.maximum(tolerance, np.float32(_COHERENT_SHARE * typical))
     coherence = near.sum(0, dtype=np.float32) / np.maximum(known.sum(0, dtype=np.float32), 1)
     per_unit = grid.scale / reach
     slopes = steps * np.array([-per_unit, per_unit, -per_unit, per_unit], np.float32)[:, None]
+    slopes[~known] = NO_SLOPE
     return Sample(
         grid=grid,
         x=((columns * step + first - grid.centre_u) / grid.scale).astype(np.float32),
@@ -125,8 +125,7 @@ def take_sample(disparity: NDArray[Any], usable: NDArray[np.bool_] | None = None
         coherence=coherence,
         slopes=slopes,
         slope_noise=noise * per_unit,
-        cell=np.stack([rows, columns]).astype(np.int32),
-        spacing=step / grid.scale,
+        column=columns.astype(np.uint16),
     )
 
 
@@ -148,6 +147,6 @@ def _taken(
 def _quantum(jumps: Singles) -> float:
     """Return the smallest step between neighbours (5th percentile): 1 in a map of whole pixels, 0 if none."""
     some = jumps[1::2, ::4].ravel()
-    some = some[(some > 0) & (some < _NO_SLOPE)]
+    some = some[(some > 0) & (some < NO_SLOPE)]
     place = len(some) // 20
     return float(np.partition(some, place)[place]) if len(some) else 0.0

@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import EstimationError
-from rollcli.estimator.moments import Floats
+from rollcli.estimator.energy import Energy
+from rollcli.estimator.moments import Floats, Grid
 from rollcli.estimator.road import Road, road_weights
-from rollcli.estimator.sample import Sample
+from rollcli.estimator.sample import UNEVEN_SHARE, Sample
 
 _ROUNDS = 6
 _START = 2.0  # tolerances within which a pixel counts at first,
 _STRICT = 4.0  # in the end this many standard deviations,
 _LEAST = 0.2  # though not less than this many tolerances
-_EDGE, _EDGE_POWER = 0.75, 8  # half-width of the part of the image that counts, and how sharply it ends
+_EDGE = 0.75  # half-width of the part of the image that counts; it ends as exp(-(x / _EDGE)^8)
 _DROP = 3.0  # farther than this many tolerances from the plane, a pixel is not looked at again
 MIN_PIXELS = 30
 
@@ -32,30 +34,57 @@ class Surface:
         Normalised coordinates and disparity, px.
     weights : ndarray
         More than 0, at most 1.
-    residuals : ndarray
-        Road minus disparity, px.
     theta : float
         Roll of the fit, radians.
     alpha : tuple of float
         The parabola in the rolled, normalised y.
+    grid : Grid
+        Of x and y.
+    noise : float
+        `Sample.noise`, px.
     limit : float
         Where the weight ends, in tolerances.
     share : float
         The share of the sampled pixels that is road.
     moved : float
         How far the roll moved from the plane's, radians.
+    parabolic : bool
+        The road model: parabola or line.
     """
 
     x: Floats
     y: Floats
     d: Floats
     weights: Floats
-    residuals: Floats
     theta: float
     alpha: tuple[float, float, float]
+    grid: Grid
+    noise: float
     limit: float
     share: float
     moved: float
+    parabolic: bool
+
+    def covers(self, disparity: NDArray[Any]) -> NDArray[np.bool_]:
+        """Return which pixels of a map (H, W) lie on the surface."""
+        height, width = disparity.shape
+        x = (np.arange(width) - self.grid.centre_u) / self.grid.scale
+        y = (np.arange(height) - self.grid.centre_v) / self.grid.scale
+        level = y[:, None] * math.cos(self.theta) - x * math.sin(self.theta)
+        a0, a1, a2 = self.alpha
+        off = np.abs(a0 + level * (a1 + level * a2) - disparity)
+        covered: NDArray[np.bool_] = off < self.limit * np.hypot(self.noise, UNEVEN_SHARE * disparity)
+        return covered
+
+    def parabola(self, theta: float) -> tuple[float, float, float]:
+        """Return the best (a0, a1, a2) at a given roll, on the normalised y."""
+        level = self.y * math.cos(theta) - self.x * math.sin(theta)
+        design = np.stack([np.ones_like(level), level, level * level * self.parabolic])
+        weighted = design * self.weights
+        normal = weighted @ design.T
+        ridge = np.diag(1e-12 * np.diag(normal) + 1e-300)
+        a0, a1, a2 = np.linalg.solve(normal + ridge, weighted @ self.d)
+        return float(a0), float(a1), float(a2)
 
 
 def fit_surface(sample: Sample, road: Road, *, parabolic: bool) -> Surface:
@@ -84,14 +113,18 @@ def fit_surface(sample: Sample, road: Road, *, parabolic: bool) -> Surface:
     c0, c1, c2 = road.plane
     off = (c0 + c1 * sample.x + c2 * sample.y - sample.d) / sample.tolerance
     near = np.flatnonzero(np.abs(off) < _DROP)
-    x, y, d = sample.x[near].astype(np.float64), sample.y[near].astype(np.float64), sample.d[near].astype(np.float64)
+    x, y, d = (
+        sample.x[near].astype(np.float64),
+        sample.y[near].astype(np.float64),
+        sample.d[near].astype(np.float64),
+    )
     tolerance = sample.tolerance[near].astype(np.float64)
-    place = road_weights(sample, road.plane)[near] * np.exp(-np.abs(x / _EDGE) ** _EDGE_POWER)
+    place = road_weights(sample, road.plane, near) * np.exp(-np.square(np.square(np.square(x / _EDGE))))
     theta, alpha, limit = road.theta, np.array([c0, math.hypot(c1, c2), 0.0]), _START
     residuals = off[near] * tolerance
     design = np.empty((5, len(near)))
     design[0], design[4] = 1, d
-    for turn in range(_ROUNDS):
+    for _ in range(_ROUNDS):
         weights = _biweight(residuals, limit * tolerance) * place
         if np.count_nonzero(weights) < MIN_PIXELS:
             raise EstimationError("no road: hardly a pixel lies on the best plane that was found")
@@ -118,15 +151,37 @@ def fit_surface(sample: Sample, road: Road, *, parabolic: bool) -> Surface:
         y=y[used],
         d=d[used],
         weights=weights[used],
-        residuals=residuals[used],
         theta=theta,
         alpha=(float(alpha[0]), float(alpha[1]), float(alpha[2])),
+        grid=sample.grid,
+        noise=sample.noise,
         limit=limit,
         share=float(np.count_nonzero(used) / len(sample.d)),
         moved=abs(theta - road.theta),
+        parabolic=parabolic,
     )
 
 
-def _biweight(residuals: Floats, limits: Floats) -> NDArray[np.float64]:
-    scaled = np.maximum(0, 1 - np.square(residuals / limits))
+def whole_surface(sample: Sample, energy: Energy) -> Surface:
+    """Return the surface that every sampled pixel is taken to lie on."""
+    pixels = len(sample.d)
+    _, c1, c2 = energy.plane
+    return Surface(
+        x=sample.x.astype(np.float64),
+        y=sample.y.astype(np.float64),
+        d=sample.d.astype(np.float64),
+        weights=np.ones(pixels),
+        theta=math.atan2(-c1, c2),
+        alpha=(0.0, 0.0, 0.0),
+        grid=sample.grid,
+        noise=sample.noise,
+        limit=math.inf,
+        share=1.0,
+        moved=0.0,
+        parabolic=energy.parabolic,
+    )
+
+
+def _biweight(residuals: Floats, limits: Floats) -> Floats:
+    scaled: Floats = np.maximum(0, 1 - np.square(residuals / limits))
     return scaled * scaled

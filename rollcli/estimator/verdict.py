@@ -1,0 +1,58 @@
+"""Why an angle may be doubtful, in words."""
+
+from __future__ import annotations
+
+import math
+
+from rollcli.estimator.energy import Energy
+from rollcli.estimator.exact import Minimum
+from rollcli.estimator.road import RIVAL_ANGLE, Road
+from rollcli.estimator.solution import Solution
+from rollcli.estimator.surface import Surface
+
+WIDEST_INTERVAL = math.radians(0.25)
+LEAST_SCORE = 0.1
+RIVAL_SHARE = 0.85
+LONGEST_MOVE = math.radians(1)
+NEAR_MINIMUM = 1.1
+BOUND_SHARE = 0.99
+
+
+def of_solution(
+    solution: Solution, energy: Energy, lowest: Minimum, others: list[Minimum], *, is_global: bool
+) -> list[str]:
+    """Doubts that the energy raises."""
+    doubts = []
+    if not solution.outcome.converged:
+        doubts.append(solution.outcome.value)
+    if not is_global:
+        doubts.append(f"a lower minimum of the energy lies at {math.degrees(lowest.theta):.4f} degrees")
+    for other in others:
+        apart = abs(math.remainder(other.theta - solution.theta, math.pi))
+        if is_global and apart > RIVAL_ANGLE and other.energy < NEAR_MINIMUM * lowest.energy:
+            doubts.append(f"the energy is nearly as low at {math.degrees(other.theta):.2f} degrees")
+    _, c1, c2 = energy.plane
+    if c2 * math.cos(solution.theta) - c1 * math.sin(solution.theta) < 0:
+        doubts.append("the disparity grows upward, as it does in a depth map")
+    return doubts
+
+
+def of_road(road: Road, surface: Surface, max_roll: float) -> list[str]:
+    """Doubts about which surface was found."""
+    doubts = []
+    if road.score < LEAST_SCORE:
+        doubts.append("little of what lies ahead looks like a road")
+    elif road.rival > RIVAL_SHARE * road.score:
+        doubts.append("another plane, with another roll, explains the map nearly as well")
+    if surface.moved > LONGEST_MOVE:
+        doubts.append(f"the road's pixels moved the roll by {math.degrees(surface.moved):.1f} degrees")
+    if abs(surface.theta) > BOUND_SHARE * max_roll:
+        doubts.append("the roll is at its bound, --max-roll")
+    return doubts
+
+
+def of_interval(ci95: float | None) -> list[str]:
+    """Doubts about the precision."""
+    if ci95 is None or ci95 <= WIDEST_INTERVAL:
+        return []
+    return [f"the interval is wide: +-{math.degrees(ci95):.2f} degrees"]
