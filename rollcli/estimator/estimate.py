@@ -250,7 +250,7 @@ def _checked_map(disparity: ArrayLike) -> NDArray[Any]:
 
 
 def _checked_mask(mask: ArrayLike, values: NDArray[Any]) -> NDArray[np.bool_]:
-    usable = np.asarray(mask) != 0
+    usable: NDArray[np.bool_] = np.asarray(mask) != 0
     if usable.shape != values.shape:
         raise UsageError(
             f"the mask is {_size(usable)}, the map {_size(values)}: give a mask of the map's size"

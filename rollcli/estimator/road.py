@@ -106,10 +106,9 @@ def find_road(sample: Sample, max_roll: float, seed: int) -> Road:
 
 def road_weights(sample: Sample, plane: NDArray[np.float64], near: NDArray[np.intp]) -> Singles:
     """Return 0.2 to 1 for each of some pixels: how well the map's slopes around it agree with the plane's."""
-    weights: Singles = _slope_weights(
-        sample.slopes[:, near], sample.slope_noise, plane[None].astype(np.float32)
-    )
-    return weights[0]
+    one = plane[None].astype(np.float32)
+    weights: Singles = _slope_weights(sample.slopes[:, near], sample.slope_noise, one)[0]
+    return weights
 
 
 def _planes(sample: Sample, max_roll: float, seed: int) -> Singles:
@@ -240,7 +239,7 @@ def _slope_weights(slopes: Singles, slope_noise: float, planes: Singles) -> Sing
     """Return (K, N) weights: the map's one-sided slopes, the better of each pair, against the planes'."""
     c1, c2 = planes[:, 1:2], planes[:, 2:3]
     left, right, up, down = slopes
-    apart = np.square(np.minimum(np.abs(left - c1), np.abs(right - c1)))
+    apart: Singles = np.square(np.minimum(np.abs(left - c1), np.abs(right - c1)))
     apart += np.square(np.minimum(np.abs(up - c2), np.abs(down - c2)))
     apart *= -0.5 / (np.float32(_SLOPE_SHARE**2) * (c1 * c1 + c2 * c2) + np.float32(slope_noise**2))
     np.exp(apart, out=apart)
