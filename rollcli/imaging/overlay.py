@@ -6,21 +6,28 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-_ROAD = (80, 220, 60)  # BGR
+_ROAD = (220, 230, 40)  # BGR
+_TINT = 0.5
 
 
 def draw_disparity(disparity: NDArray[Any]) -> NDArray[np.uint8]:
-    """A map in colour: dark blue is far, yellow is near, black is no data; BGR uint8, shape (H, W, 3)."""
-    valid = np.isfinite(disparity) & (disparity > 0)
-    top = float(np.percentile(disparity[valid], 99)) if valid.any() else 1.0
-    grey = (np.clip(np.where(valid, disparity, 0) / top, 0, 1) * 255).astype(np.uint8)
-    picture = cv2.applyColorMap(grey, cv2.COLORMAP_VIRIDIS).astype(np.uint8, copy=False)
-    picture[~valid] = 0
-    return picture
+    """A map in colour: dark is far, bright is near, black is no data.
+
+    Parameters
+    ----------
+    disparity : ndarray, shape (H, W)
+        Pixels; NaN, inf and <= 0 are no data.
+
+    Returns
+    -------
+    ndarray of uint8, shape (H, W, 3)
+        BGR.
+    """
+    return _colours()[_levels(disparity)]
 
 
 def draw_road(disparity: NDArray[Any], mask: NDArray[Any]) -> NDArray[np.uint8]:
-    """The map in colour with the road tinted; BGR uint8, shape (H, W, 3).
+    """A map in colour, as `draw_disparity` has it, with the road tinted and outlined.
 
     Parameters
     ----------
@@ -28,8 +35,34 @@ def draw_road(disparity: NDArray[Any], mask: NDArray[Any]) -> NDArray[np.uint8]:
         Pixels; NaN, inf and <= 0 are no data.
     mask : ndarray, shape (H, W)
         Non-zero where the road is.
+
+    Returns
+    -------
+    ndarray of uint8, shape (H, W, 3)
+        BGR.
     """
-    picture = draw_disparity(disparity)
-    road = np.asarray(mask) != 0
-    picture[road] = (picture[road] * 0.45 + np.array(_ROAD) * 0.55).astype(np.uint8)
-    return picture
+    levels = _levels(disparity)
+    road = (np.asarray(mask) != 0).astype(np.uint8)
+    colours = _colours()
+    tinted = (colours * (1 - _TINT) + np.array(_ROAD) * _TINT).astype(np.uint8)
+    picture = np.where(road[..., None] > 0, tinted[levels], colours[levels])
+    outlines, _ = cv2.findContours(road, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    return cv2.drawContours(picture, outlines, -1, _ROAD, 1).astype(np.uint8, copy=False)
+
+
+def _levels(disparity: NDArray[Any]) -> NDArray[np.uint8]:
+    """0 for no data, 1..255 for small to large disparities."""
+    values = np.asarray(disparity)
+    valid = np.isfinite(values) & (values > 0)
+    if not valid.any():
+        return np.zeros(values.shape, np.uint8)
+    top = float(np.percentile(values[valid], 99))  # a few outliers would leave the rest dark
+    return np.where(valid, np.clip(np.where(valid, values, 0) * (255 / top), 1, 255), 0).astype(np.uint8)
+
+
+def _colours() -> NDArray[np.uint8]:
+    """BGR of each level, shape (256, 3); even the smallest disparity differs from no data."""
+    ramp = np.linspace(40, 255, 256).astype(np.uint8)
+    colours = cv2.applyColorMap(ramp, cv2.COLORMAP_INFERNO).reshape(256, 3).astype(np.uint8, copy=False)
+    colours[0] = 0
+    return colours

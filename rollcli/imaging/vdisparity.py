@@ -1,5 +1,6 @@
 """v-disparity: the histogram of each row of a disparity map [Labayrade, Aubert, Tarel 2002]."""
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,6 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import UsageError
+
+_MAX_BINS = 1024
+_MIN_WIDTH = 256  # of a picture, pixels
+_LABEL_WIDTH = 48
+_DASH = 8
+_ROAD = (255, 255, 0)  # BGR: cyan, which the colours of the counts do not have
+_TICK = (190, 190, 190)
 
 
 @dataclass(frozen=True)
@@ -19,7 +27,7 @@ class VDisparity:
     counts : ndarray of int32, shape (H, bins)
         counts[v, b]: valid pixels of row v with a disparity in bin b; a row sums to its valid pixels.
     max_disparity : float
-        Pixels; the bins divide 0..max_disparity evenly, the last one also holds what lies beyond.
+        Pixels; the bins divide 0..max_disparity evenly, and the last also holds what lies beyond.
     """
 
     counts: NDArray[np.int32]
@@ -36,33 +44,47 @@ def v_disparity(
     disparity : ndarray, shape (H, W)
         Pixels; NaN, inf and <= 0 are no data.
     bins : int, optional
-        Number of bins; by default one a pixel of disparity, 256 at least, 1024 at most.
+        By default one a pixel for maps of whole pixels, else four a pixel and at least 256; at most 1024.
     max_disparity : float, optional
-        Pixels; by default the largest of the map.
+        Pixels; by default just above the largest of the map.
 
     Raises
     ------
     UsageError
-        bins or max_disparity is not positive.
+        bins or max_disparity is not positive, or the array is not 2-D.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> v_disparity(np.array([[1, 2, 2], [0, 3, 3]])).counts
+    array([[0, 1, 2, 0],
+           [0, 0, 0, 2]], dtype=int32)
     """
-    valid = np.isfinite(disparity) & (disparity > 0)
+    values = np.asarray(disparity)
+    if values.ndim != 2:
+        raise UsageError(f"a disparity map is 2-D, not of shape {values.shape}")
+    valid = np.isfinite(values) & (values > 0)
+    pixels = np.where(valid, values, 0).astype(np.float64)
     if max_disparity is None:
-        max_disparity = float(disparity[valid].max()) if valid.any() else 1.0
-    if bins is None:
-        bins = int(np.clip(np.ceil(max_disparity), 256, 1024))
-    if bins < 1 or not max_disparity > 0:
+        max_disparity = math.floor(pixels.max(initial=0)) + 1.0
+    if not 0 < max_disparity < math.inf or (bins is not None and bins < 1):
         raise UsageError(f"bins {bins} and max-disparity {max_disparity}: both must be positive")
-    rows, _ = np.nonzero(valid)
-    columns = np.minimum((disparity[valid] * (bins / max_disparity)).astype(np.int64), bins - 1)
-    height = disparity.shape[0]
-    counts = np.bincount(rows * bins + columns, minlength=height * bins).reshape(height, bins)
-    return VDisparity(counts.astype(np.int32), max_disparity)
+    if bins is None:
+        whole = bool((pixels == np.rint(pixels)).all())
+        bins = min(math.ceil(max_disparity) if whole else max(256, math.ceil(4 * max_disparity)), _MAX_BINS)
+    height = len(values)
+    shares = np.minimum(pixels, max_disparity) / max_disparity
+    cells = np.minimum(shares * bins, bins - 1).astype(np.int64)
+    cells[~valid] = bins  # one bin more, for what is no data
+    cells += np.arange(height)[:, None] * (bins + 1)
+    counts = np.bincount(cells.ravel(), minlength=height * (bins + 1)).reshape(height, bins + 1)
+    return VDisparity(np.ascontiguousarray(counts[:, :-1], dtype=np.int32), max_disparity)
 
 
 def draw_v_disparity(
     histogram: VDisparity, alpha: tuple[float, float, float] | None = None, offset: float = 0.0
 ) -> NDArray[np.uint8]:
-    """A picture of the counts: log scale, bright where many; the road's parabola over it.
+    """A picture of the counts to look at: log scale, bright where many; the road's parabola over it.
 
     Parameters
     ----------
@@ -75,18 +97,20 @@ def draw_v_disparity(
 
     Returns
     -------
-    ndarray of uint8, shape (H, bins, 3)
-        BGR.
+    ndarray of uint8, shape (H, width, 3)
+        BGR; a row of the picture is a row of the map.
     """
-    scale = np.log1p(histogram.counts)
-    grey = (scale * (255 / max(float(scale.max()), 1.0))).astype(np.uint8)
+    counts = histogram.counts
+    if counts.shape[1] < _MIN_WIDTH:
+        counts = np.repeat(counts, -(-_MIN_WIDTH // counts.shape[1]), axis=1)
+    light = np.log1p(counts)
+    # a column of saturated disparities would leave the rest dark
+    top = float(np.percentile(light[counts > 0], 99.9)) if counts.any() else 1.0
+    grey = np.minimum(light * (255 / top), 255).astype(np.uint8)
     picture = cv2.applyColorMap(grey, cv2.COLORMAP_INFERNO).astype(np.uint8, copy=False)
+    _draw_scale(picture, histogram.max_disparity)
     if alpha is not None:
-        rows = np.arange(len(picture))
-        y = rows + offset
-        columns = (alpha[0] + alpha[1] * y + alpha[2] * y**2) * (picture.shape[1] / histogram.max_disparity)
-        points = np.column_stack([columns, rows])[(columns >= 0) & (columns < picture.shape[1])]
-        cv2.polylines(picture, [np.rint(points).astype(np.int32)], False, (120, 255, 80), 1, cv2.LINE_AA)
+        _draw_road(picture, np.polynomial.Polynomial(alpha), offset, histogram.max_disparity)
     return picture
 
 
@@ -96,4 +120,26 @@ def row_offset(theta: float, width: int, height: int) -> float:
     y = v cos - u sin is measured from the top-left pixel of the map as it was; `derotate` keeps the centre.
     """
     u, v = (width - 1) / 2, (height - 1) / 2
-    return float(v * np.cos(theta) - u * np.sin(theta) - v)
+    return v * math.cos(theta) - u * math.sin(theta) - v
+
+
+def _draw_road(picture: NDArray[np.uint8], road: Any, offset: float, max_disparity: float) -> None:
+    """The road's curve, dashed so that what it lies on can be seen."""
+    height, width = picture.shape[:2]
+    for top in range(0, height, 2 * _DASH):
+        rows = np.arange(top, min(top + _DASH, height))
+        columns = road(rows + offset) * (width / max_disparity)
+        points = np.column_stack([columns, rows])[(columns >= 0) & (columns < width)]
+        cv2.polylines(picture, [np.rint(points).astype(np.int32)], False, _ROAD, 1, cv2.LINE_AA)
+
+
+def _draw_scale(picture: NDArray[np.uint8], max_disparity: float) -> None:
+    """Disparities along the upper edge, in pixels; steps of a power of two, wide enough for their numbers."""
+    per_pixel = picture.shape[1] / max_disparity
+    step = 2.0 ** math.ceil(math.log2(_LABEL_WIDTH / per_pixel))
+    for disparity in np.arange(step, max_disparity, step):
+        column = round(disparity * per_pixel)
+        cv2.line(picture, (column, 0), (column, 4), _TICK, 1)
+        for colour, thickness in (((0, 0, 0), 3), (_TICK, 1)):  # readable on the brightest counts too
+            text, place, font = f"{disparity:g}", (column + 3, 10), cv2.FONT_HERSHEY_SIMPLEX
+            cv2.putText(picture, text, place, font, 0.3, colour, thickness, cv2.LINE_AA)

@@ -1,0 +1,38 @@
+"""Pictures of maps: what is no data stays black, and the road stands out."""
+
+import numpy as np
+
+from rollcli.imaging.overlay import draw_disparity, draw_road
+
+
+def test_no_data_is_black_and_data_never_is():
+    values = np.array([[0, np.nan, -1, np.inf], [0.001, 1, 50, 100]])
+
+    picture = draw_disparity(values)
+
+    assert picture.shape == (2, 4, 3)
+    assert picture.dtype == np.uint8
+    assert not picture[0].any()
+    assert picture[1].any(axis=1).all()
+
+
+def test_larger_disparities_are_brighter():
+    brightness = draw_disparity(np.arange(1.0, 100.0)[None]).astype(int).sum(axis=2)[0]
+
+    assert brightness[-1] > brightness[50] > brightness[0]
+
+
+def test_the_road_is_tinted_and_nothing_else():
+    values = np.tile(np.linspace(5, 60, 40), (30, 1))
+    mask = np.zeros(values.shape, bool)
+    mask[15:, 10:30] = True
+
+    plain, drawn = draw_disparity(values), draw_road(values, mask)
+
+    changed = (plain != drawn).any(axis=2)
+    np.testing.assert_array_equal(changed, mask)
+
+
+def test_empty_maps_and_empty_masks_are_drawn():
+    assert not draw_disparity(np.zeros((3, 4))).any()
+    assert draw_road(np.ones((3, 4)), np.zeros((3, 4))).shape == (3, 4, 3)
