@@ -13,6 +13,8 @@ from rollcli.errors import OutputError, UsageError
 from rollcli.files.atomic import output_error
 from rollcli.files.results import Format, Row, format_header, format_row
 
+_MORE_THAN_A_HEADER = 1000  # bytes
+
 
 class RowSink(Protocol):
     """Takes rows in order; a row that was appended has left this process."""
@@ -119,20 +121,25 @@ def open_sink(name: str, form: Format, *, resume: bool, overwrite: bool, timing:
 
 
 def check_result(name: str, *, resume: bool, overwrite: bool) -> None:
-    """Refuse to touch a result that is there, unless told how; an empty file is none."""
+    """Refuse to touch a result that is there, unless told how."""
     if resume and overwrite:
         raise UsageError("give either --resume or --overwrite")
     if name == "-" or _is_stream(name):
         if resume:
             raise UsageError("--resume needs a result file: name it with --output")
         return
-    if not (resume or overwrite) and _holds_something(name):
+    if not (resume or overwrite) and _has_rows(name):
         raise UsageError(f"{name}: exists already; give --resume to continue it or --overwrite to replace it")
 
 
-def _holds_something(name: str) -> bool:
+def _has_rows(name: str) -> bool:
+    """A file that holds more than the header of a run that came to nothing."""
     path = Path(name)
-    return path.is_file() and path.stat().st_size > 0
+    if not path.is_file():
+        return False
+    with path.open("rb") as file:
+        start = file.read(_MORE_THAN_A_HEADER)
+    return start not in (b"", format_header("csv"), format_header("csv", timing=True))
 
 
 def _is_stream(name: str) -> bool:

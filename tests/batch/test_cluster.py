@@ -1,0 +1,127 @@
+"""A real Dask scheduler and two real workers, on this machine."""
+
+import json
+import subprocess
+import sys
+import time
+
+import pytest
+
+from tests.program import command, contents, environment, rollcli, write_maps
+
+pytest.importorskip("distributed", reason="the extra cluster is not installed")
+
+from rollcli import __version__
+from rollcli.batch.cluster import probe
+
+FRAMES = 60
+IMAGES = ("--derotated", "upright", "--vdisparity", "v")
+
+
+LOCAL = ("--host", "127.0.0.1", "--no-dashboard")
+ONE_PROCESS = ("--nthreads", "1", "--no-nanny")
+
+
+@pytest.fixture
+def scheduler(tmp_path):
+    """The address of a scheduler that has no workers yet."""
+    state = tmp_path / "scheduler.json"
+    process = dask("scheduler", tmp_path, *LOCAL, "--port", "0", "--scheduler-file", state)
+    try:
+        wait_for(lambda: state.exists() and state.read_text().endswith("}"))
+        yield json.loads(state.read_text())["address"]
+    finally:
+        end(process)
+
+
+@pytest.fixture
+def workers(tmp_path, scheduler):
+    """Two worker processes, each in a folder of its own."""
+    processes = []
+    try:
+        for name in ("one", "two"):
+            (tmp_path / name).mkdir()
+            processes.append(
+                dask("worker", tmp_path / name, scheduler, *LOCAL, "--nthreads", "1", "--no-nanny")
+            )
+        yield processes
+    finally:
+        for process in processes:
+            end(process)
+
+
+def end(process):
+    process.kill()
+    process.wait()
+
+
+def dask(kind, folder, *arguments):
+    """A Dask process that works in a folder of its own, as on another machine."""
+    with (folder / f"{kind}.log").open("wb") as log:
+        return subprocess.Popen(
+            [sys.executable, "-m", f"distributed.cli.dask_{kind}", *map(str, arguments)],
+            cwd=folder,
+            env=environment(),
+            stdout=log,
+            stderr=subprocess.STDOUT,
+        )
+
+
+def wait_for(condition):
+    give_up = time.monotonic() + 60
+    while not (found := condition()):
+        assert time.monotonic() < give_up
+        time.sleep(0.02)
+    return found
+
+
+def test_a_cluster_that_loses_a_worker_gives_the_bytes_of_a_local_run(tmp_path, scheduler, workers):
+    local, far = tmp_path / "local", tmp_path / "far"
+    for folder in (local, far):
+        write_maps(folder / "maps", FRAMES, width=300, height=200)
+        (folder / "maps" / "frame5.png").write_bytes(b"")
+    assert rollcli("estimate", "maps", "-o", "rolls.csv", *IMAGES, cwd=local).status == 3
+    line = command("estimate", "maps", "-o", "rolls.csv", *IMAGES, "--scheduler", scheduler)
+    run = subprocess.Popen(line, cwd=far, env=environment(), stderr=subprocess.PIPE, text=True)
+    result = far / "rolls.csv"
+    wait_for(lambda: run.poll() is not None or (result.exists() and result.read_bytes().count(b"\n") > 8))
+    workers[0].kill()
+    _, err = run.communicate(timeout=120)
+    assert run.returncode == 3, err
+    assert result.read_bytes().count(b"\n") == FRAMES + 1
+    record = "rolls.csv.run.json"  # holds the times of the inputs, which differ
+    assert differing(contents(local), contents(far)) <= {record}
+    counts = [json.loads((folder / record).read_text())["counts"] for folder in (local, far)]
+    assert counts[0] == counts[1]
+
+
+def differing(one, other):
+    return {name for name in one.keys() | other.keys() if one.get(name) != other.get(name)}
+
+
+def test_a_worker_that_has_no_such_program_or_files_is_named(tmp_path):
+    there = tmp_path / "a.png"
+    there.write_bytes(b"123")
+    assert probe(__version__, {str(there): 3}, [str(tmp_path / "a.png")]) == ""
+    assert "this is 0.0" in probe("0.0", {}, [])
+    assert f"does not see {tmp_path / 'b.png'}" in probe(__version__, {str(tmp_path / "b.png"): 3}, [])
+    assert "does not see" in probe(__version__, {str(there): 4}, [])
+    assert "image folders must lie on storage" in probe(__version__, {}, [str(tmp_path / "v" / "mark")])
+
+
+def test_a_scheduler_that_does_not_answer_ends_the_run_within_15_seconds(tmp_path):
+    write_maps(tmp_path / "maps", 2)
+    start = time.monotonic()
+    done = rollcli("estimate", "maps", "-o", "rolls.csv", "--scheduler", "tcp://127.0.0.1:9", cwd=tmp_path)
+    assert time.monotonic() - start < 15
+    assert done.status == 1
+    assert "tcp://127.0.0.1:9: no Dask scheduler answers there" in done.err
+    assert done.err.count("\n") == 1
+
+
+def test_a_scheduler_without_workers_ends_the_run(tmp_path, scheduler):
+    write_maps(tmp_path / "maps", 2)
+    done = rollcli("estimate", "maps", "-o", "rolls.csv", "--scheduler", scheduler, cwd=tmp_path)
+    assert done.status == 1
+    assert f"{scheduler}: has no workers" in done.err
+    assert rollcli("estimate", "maps", "-o", "rolls.csv", cwd=tmp_path).status == 0

@@ -1,0 +1,91 @@
+"""--config and the environment."""
+
+import json
+
+import pytest
+
+from tests.program import rollcli, write_maps
+
+
+@pytest.fixture
+def maps(tmp_path):
+    write_maps(tmp_path / "maps", 1)
+    return tmp_path
+
+
+def options_of(folder, *arguments, **variables):
+    """The effective options of a run, from its record."""
+    done = rollcli("estimate", "maps", "-o", "rolls.csv", "--overwrite", *arguments, cwd=folder, **variables)
+    assert done.status == 0, done.err
+    return json.loads((folder / "rolls.csv.run.json").read_text())["options"]
+
+
+def test_a_config_file_sets_options_of_every_kind(maps):
+    (maps / "rollcli.toml").write_text(
+        'method = "exact"\nmax-roll = 30\ntolerance = 0.01\nlambda0 = "auto"\nroi = [0, 0, 100, 100]\n'
+        'invalid = [1, 2.5]\npolygon = "0,0 150,0 150,110"\ntiming = true\nsave_as = "npy"\nseed = 3\n'
+    )
+    options = options_of(maps, "--config", "rollcli.toml")
+    assert options["method"] == "exact"
+    assert options["max-roll"] == 30
+    assert options["lambda0"] == "auto"
+    assert options["roi"] == [0, 0, 100, 100]
+    assert options["invalid"] == [1, 2.5]
+    assert options["polygon"] == [[0, 0], [150, 0], [150, 110]]
+    assert (options["timing"], options["save-as"], options["seed"]) == (True, "npy", 3)
+
+
+def test_flags_win_over_the_environment_and_the_environment_over_the_config(maps):
+    (maps / "rollcli.toml").write_text("seed = 1\nmax-roll = 11\ntolerance = 0.1\n")
+    environment = {"ROLLCLI_ESTIMATE_MAX_ROLL": "22", "ROLLCLI_ESTIMATE_TOLERANCE": "0.2"}
+    options = options_of(maps, "--config", "rollcli.toml", "--tolerance", "0.3", **environment)
+    assert (options["seed"], options["max-roll"], options["tolerance"]) == (1, 22, 0.3)
+
+
+def test_the_config_file_itself_may_come_from_the_environment(maps):
+    (maps / "rollcli.toml").write_text('road = "all"\n')
+    assert options_of(maps, ROLLCLI_ESTIMATE_CONFIG="rollcli.toml")["road"] == "all"
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "key"),
+    [
+        ("ENCODING", "px", "encoding"),
+        ("TIMING", "1", "timing"),
+        ("INVALID", "5 6", "invalid"),
+        ("ROI", "0,0,90,90", "roi"),
+    ],
+)
+def test_every_kind_of_option_reads_the_environment(maps, name, value, key):
+    expected = {"encoding": "px", "timing": True, "invalid": [5, 6], "roi": [0, 0, 90, 90]}[key]
+    assert options_of(maps, **{f"ROLLCLI_ESTIMATE_{name}": value})[key] == expected
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("lamda0 = 1", "there is no option 'lamda0'; the nearest is 'lambda0'"),
+        ("[estimate]\nseed = 1", "there is no option 'estimate'"),
+        ("seed = 1.5", "'seed': 1.5 is not a whole number"),
+        ("seed = -1", "'seed': -1 is not a whole number of at least 0"),
+        ("seed = true", "'seed': True is not a whole number"),
+        ('method = "best"', "'method': 'best' is not one of"),
+        ("method = 3", "'method' is a text in quotes, not 3"),
+        ('timing = "yes"', "'timing' is true or false, not 'yes'"),
+        ("roi = [5, 5, 5, 9]", "'roi': '5,5,5,9' is not X0,Y0,X1,Y1"),
+        ("seed = ", "is not TOML"),
+        ('config = "other.toml"', "there is no option 'config'"),
+    ],
+)
+def test_what_is_wrong_with_a_config_file_is_said_with_its_name(maps, text, reason):
+    (maps / "rollcli.toml").write_text(text)
+    done = rollcli("estimate", "maps", "--config", "rollcli.toml", cwd=maps)
+    assert done.status == 2
+    assert done.err.startswith("rollcli: rollcli.toml: ")
+    assert reason in done.err
+    assert done.err.count("\n") == 1
+
+
+def test_a_missing_config_file_is_an_error(maps):
+    done = rollcli("estimate", "maps", "--config", "none.toml", cwd=maps)
+    assert (done.status, "none.toml: cannot be read" in done.err) == (2, True)

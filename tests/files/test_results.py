@@ -1,0 +1,122 @@
+"""Rows to text and back."""
+
+import json
+import math
+
+import pytest
+
+from rollcli.errors import InputError
+from rollcli.files.results import COLUMNS, Row, columns, format_header, format_row, parse_rows, read_result
+
+ROW = Row(
+    file="maps/a.png",
+    status="suspect",
+    roll_deg=-1.25,
+    roll_ci95_deg=0.0123456789,
+    method="gd",
+    iterations=4,
+    converged=True,
+    global_minimum=False,
+    rmse_px=0.123456789,
+    alpha0=-45.0018767123,
+    alpha1=0.300002217,
+    alpha2=-3.83765039123e-09,
+    valid_fraction=0.597333,
+    road_fraction=0.5,
+    width=1242,
+    height=375,
+    message='one, "two"',
+)
+FAILED = Row(file="maps/b.png", status="error", message="maps/b.png: is empty")
+
+
+def test_a_row_of_csv_has_fixed_digits_and_rfc_4180_quotes():
+    assert format_row(ROW, "csv") == (
+        b"maps/a.png,,suspect,-1.250000,0.012346,gd,4,true,false,0.123457,-45.0018767,0.300002217,"
+        b'-3.83765039e-09,0.597333,0.500000,1242,375,"one, ""two"""\n'
+    )
+
+
+def test_an_error_row_holds_no_numbers():
+    assert format_row(FAILED, "csv") == b"maps/b.png,,error" + b"," * 15 + b"maps/b.png: is empty\n"
+
+
+def test_timing_is_a_column_of_its_own_at_the_end():
+    assert columns(timing=True) == (*COLUMNS, "elapsed_ms")
+    assert format_row(Row("a", elapsed_ms=1.23456), "csv", timing=True).endswith(b",1.235\n")
+
+
+@pytest.mark.parametrize("form", ["csv", "jsonl"])
+@pytest.mark.parametrize("row", [ROW, FAILED, Row("new\nline,\udcff.png", message="a"), Row("ü/雨.png")])
+def test_what_is_written_is_read_back(form, row):
+    data = format_header(form) + format_row(row, form)
+    (back,) = parse_rows(data, "rolls")
+    assert (back.file, back.status, back.message, back.converged) == (
+        row.file,
+        row.status,
+        row.message,
+        row.converged,
+    )
+    assert format_row(back, form) == format_row(row, form)
+
+
+def test_json_shows_the_numbers_that_csv_shows():
+    values = json.loads(format_row(ROW, "jsonl"))
+    assert values["roll_ci95_deg"] == 0.012346
+    assert values["iterations"] == 4
+    assert json.loads(format_row(FAILED, "jsonl"))["roll_deg"] is None
+
+
+@pytest.mark.parametrize(
+    ("theta_deg", "text"),
+    [(-1e-9, "0.000000"), (0.0, "0.000000"), (-89.9999999, "90.000000"), (90.0, "90.000000")],
+)
+def test_rounding_makes_no_negative_zero_and_stays_within_the_half_open_range(theta_deg, text):
+    assert format_row(Row("a", roll_deg=theta_deg), "csv").split(b",")[3].decode() == text
+
+
+def test_numbers_that_are_not_finite_are_left_empty():
+    assert format_row(Row("a", rmse_px=math.nan, alpha0=math.inf), "csv") == b"a,,error" + b"," * 15 + b"\n"
+
+
+def test_a_result_is_read_with_the_record_of_its_run(tmp_path):
+    path = tmp_path / "rolls.csv"
+    path.write_bytes(format_header("csv") + format_row(ROW, "csv"))
+    assert read_result(path).run is None
+    (tmp_path / "rolls.csv.run.json").write_text('{"rollcli": "1"}')
+    result = read_result(path)
+    assert result.run == {"rollcli": "1"}
+    assert result.rows[0].roll_deg == -1.25
+
+
+def test_further_columns_and_a_byte_order_mark_do_no_harm(tmp_path):
+    path = tmp_path / "edited.csv"
+    path.write_bytes(b"\xef\xbb\xbfroll_deg,note,file,status\r\n1.5,mine,a.png,ok\r\n\r\n")
+    (row,) = read_result(path).rows
+    assert (row.file, row.roll_deg, row.method, row.width) == ("a.png", 1.5, "", None)
+
+
+@pytest.mark.parametrize(
+    ("data", "reason"),
+    [
+        (b"", "no column file, status, roll_deg"),
+        (b"frame,roll\n1,2\n", "not a result of rollcli estimate: it has no column file"),
+        (b"file,status,roll_deg\na,ok,much\n", "line 2: 'much' is no value for roll_deg"),
+        (b"file,status,roll_deg\na,ok\n", "line 2: 2 values for 3 columns"),
+        (b'file,status,roll_deg\n"a,ok,1\n', "is not CSV"),
+        (b"\x89PNG\r\n\x1a\n\x00", "not a result"),
+        (b'{"a": 1}\n', "line 1: is no row of rollcli estimate: no file"),
+        (b'{"a": \n', "line 1: is not JSON"),
+    ],
+)
+def test_what_is_no_result_is_refused_with_its_line(tmp_path, data, reason):
+    path = tmp_path / "rolls"
+    path.write_bytes(data)
+    with pytest.raises(InputError, match=reason) as caught:
+        read_result(path)
+    assert str(caught.value).startswith(str(path))
+
+
+def test_a_missing_result_is_an_input_error(tmp_path):
+    with pytest.raises(InputError, match="no such file"):
+        read_result(tmp_path / "none.csv")
