@@ -5,11 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from rollcli.simulate.render import true_disparity
+from rollcli.simulate.render import render_frame, true_disparity
 from rollcli.simulate.spec import FrameSpec
 
+SMALL = {"size": (320, 240), "focal": 186.0}
 
-def plane_roll(disparity: np.ndarray, used: np.ndarray) -> float:
+
+def plane_roll(disparity, used):
     """theta of METHOD.md, degrees: atan(-c1 / c2) of the plane c0 + c1 u + c2 v through the used pixels."""
     v, u = np.nonzero(used)
     design = np.stack([np.ones(len(u)), u - u.mean(), v - v.mean()], axis=1)
@@ -17,22 +19,98 @@ def plane_roll(disparity: np.ndarray, used: np.ndarray) -> float:
     return math.degrees(math.atan(-c1 / c2))
 
 
+def rotated_rows(shape, roll):
+    """y of METHOD.md at each pixel: v cos(theta) - u sin(theta)."""
+    v, u = np.indices(shape)
+    return v * math.cos(roll) - u * math.sin(roll)
+
+
 @pytest.mark.parametrize("roll_deg", [-80, -45, -7.3, 0, 1e-3, 12, 45, 80])
 @pytest.mark.parametrize("pitch_deg", [-3, 0, 11])
 @pytest.mark.parametrize("scene", ["bare", "street"])
-def test_roll_is_the_angle_of_the_plane_through_a_flat_road_at_any_pitch(
-    roll_deg: float, pitch_deg: float, scene: str
-) -> None:
-    spec = FrameSpec(
-        scene, math.radians(roll_deg), math.radians(pitch_deg), size=(320, 240), focal=186, seed=4
-    )
+def test_roll_is_the_angle_of_the_plane_through_a_flat_road_at_any_pitch(roll_deg, pitch_deg, scene):
+    spec = FrameSpec(scene, math.radians(roll_deg), math.radians(pitch_deg), seed=4, **SMALL)
     disparity, road = true_disparity(spec)
     assert road.sum() > 2000
     assert plane_roll(disparity, road) == pytest.approx(roll_deg, abs=1e-6)
 
 
-def test_a_rig_rolled_counter_clockwise_sees_its_right_side_farther_from_the_road() -> None:
-    disparity, road = true_disparity(FrameSpec("bare", roll=math.radians(10), size=(320, 240), focal=186))
-    row = disparity[-1]
+@pytest.mark.parametrize("curvature", [-0.004, -0.001, 0.001, 0.004])
+@pytest.mark.parametrize("roll_deg", [-30, 8])
+def test_on_a_crest_or_a_sag_the_disparity_of_the_road_depends_on_the_rotated_row_alone(curvature, roll_deg):
+    spec = FrameSpec("open", math.radians(roll_deg), math.radians(3), curvature, seed=7, **SMALL)
+    disparity, road = true_disparity(spec)
+    y, d = rotated_rows(road.shape, spec.roll)[road], disparity[road]
+    order = np.argsort(y)
+    y, d = y[order], d[order]
+    # in this order neighbours come from far columns: they would scatter if d were no function of y
+    assert np.all(np.diff(d) > -1e-9)
+    between = d[:-2] + (d[2:] - d[:-2]) * (y[1:-1] - y[:-2]) / np.maximum(y[2:] - y[:-2], 1e-12)
+    below_crest = y[1:-1] > y.min() + 3  # above, d falls as steeply as the road
+    assert np.abs(d[1:-1] - between)[below_crest].max() < 1e-3
+    # and curved: no plane goes through it
+    v, u = np.nonzero(road)
+    design = np.stack([np.ones(len(u)), u, v], axis=1)
+    rest = disparity[road] - design @ np.linalg.lstsq(design, disparity[road], rcond=None)[0]
+    assert np.abs(rest).max() > 0.05
+
+
+def test_a_rig_rolled_counter_clockwise_looks_farther_to_its_right():
+    disparity, road = true_disparity(FrameSpec("bare", roll=math.radians(10), **SMALL))
     assert road[-1].any()
-    assert np.all(np.diff(row) < 0)
+    assert np.all(np.diff(disparity[-1]) < 0)
+
+
+def rotation(roll, pitch):
+    """World from camera (X right, Y up, Z ahead; x right, y down, z ahead): roll, then pitch, as matrices."""
+    flip = np.diag([1.0, -1.0, 1.0])
+    turn = np.array([[np.cos(roll), np.sin(roll), 0], [-np.sin(roll), np.cos(roll), 0], [0, 0, 1]])
+    tilt = np.array([[1, 0, 0], [0, np.cos(pitch), np.sin(pitch)], [0, -np.sin(pitch), np.cos(pitch)]])
+    return flip @ tilt @ turn
+
+
+@pytest.mark.parametrize("curvature", [0.0, 0.002, -0.002])
+@pytest.mark.parametrize(("roll_deg", "pitch_deg"), [(0, 0), (25, 4), (-60, -2)])
+def test_points_from_the_disparity_lie_on_the_road(curvature, roll_deg, pitch_deg):
+    spec = FrameSpec("verge", math.radians(roll_deg), math.radians(pitch_deg), curvature, seed=2, **SMALL)
+    disparity, road = true_disparity(spec)
+    v, u = np.nonzero(road)
+    depth = spec.focal * spec.baseline / disparity[road]
+    rays = np.stack([(u - 159.5) / spec.focal, (v - 119.5) / spec.focal, np.ones(len(u))])
+    turned = rotation(spec.roll, spec.pitch)
+    x, y, z = turned @ (depth * rays) + np.array([[0.0], [spec.height], [0.0]])
+    assert np.abs(y - curvature / 2 * z**2).max() < 1e-9
+    # the right camera is a baseline along the rig's own x axis, and sees the point that much to the left
+    right = np.array([0.0, spec.height, 0.0]) + turned @ [spec.baseline, 0.0, 0.0]
+    seen = turned.T @ (np.stack([x, y, z]) - right[:, None])
+    assert np.allclose(spec.focal * seen[0] / seen[2] + 159.5, u - disparity[road], atol=1e-9)
+    assert np.allclose(spec.focal * seen[1] / seen[2] + 119.5, v, atol=1e-9)
+
+
+def test_the_sky_has_no_disparity_and_everything_else_has():
+    frame = render_frame(FrameSpec("bare", roll=math.radians(20), **SMALL))
+    y = rotated_rows((240, 320), frame.roll)
+    below_horizon = y - y[119:121, 159:161].mean()
+    assert np.all(frame.disparity[below_horizon > 0.5] > 0)
+    assert not np.any(frame.disparity[below_horizon < 0])
+
+
+def test_a_frames_disparity_is_the_true_one_in_single_precision():
+    spec = FrameSpec("street", seed=3, **SMALL)
+    frame, (disparity, road) = render_frame(spec), true_disparity(spec)
+    assert frame.disparity.dtype == np.float32
+    assert np.array_equal(frame.disparity, disparity.astype(np.float32))
+    assert np.array_equal(frame.road, road)
+
+
+def test_sidewalks_stand_ten_to_twenty_centimetres_above_the_road():
+    for seed in range(8):
+        spec = FrameSpec("street", seed=seed, pitch=math.radians(10), **SMALL)
+        disparity, road = true_disparity(spec)
+        row = 200
+        plane = np.polyfit(np.nonzero(road[row])[0], disparity[row, road[row]], 1)
+        right_of_road = np.nonzero(road[row])[0].max() + 12  # past the kerb's face
+        if right_of_road < 320 and not road[row, right_of_road]:
+            beside, level = disparity[row, right_of_road], np.polyval(plane, right_of_road)
+            height = spec.height * (1 - level / beside)
+            assert 0.10 <= height <= 0.20 or height > 0.25, "a kerb, or something that stands on the sidewalk"

@@ -1,0 +1,94 @@
+"""`rollcli simulate` as a user runs it."""
+
+import pytest
+
+from rollcli.cli.main import main
+from tests.program import contents, rollcli
+
+TINY = ("--frames", "2", "--size", "64x48")
+
+
+def test_it_writes_pairs_maps_and_truth_and_says_so(tmp_path):
+    asked = ("--scene", "street", "--roll", "-5:5", "--jobs", "1")
+    done = rollcli("simulate", "rig", *TINY, *asked, cwd=tmp_path)
+    assert (done.status, done.out) == (0, "")
+    assert "2 frames in rig" in done.err
+    files = contents(tmp_path / "rig")
+    assert sorted(files)[:2] == ["disparity/frame_0001.png", "disparity/frame_0002.png"]
+    assert files["truth.csv"].count(b"\n") == 3
+
+
+def test_one_number_is_a_range_of_its_own(tmp_path):
+    done = rollcli("simulate", "rig", *TINY, "--roll", "-12.5", "--pitch", "3", "-q", "-j1", cwd=tmp_path)
+    assert (done.status, done.err) == (0, "")
+    assert b"frame_0002,-12.500000000,3.000000000," in (tmp_path / "rig/truth.csv").read_bytes()
+
+
+def test_a_dry_run_lists_the_files_and_writes_none(tmp_path):
+    done = rollcli("simulate", "rig", *TINY, "--dry-run", cwd=tmp_path)
+    assert done.status == 0
+    lines = [line.replace("\\", "/") for line in done.out.splitlines()]
+    assert lines[0] == "write rig/left/frame_0001.png"
+    assert lines[-1] == "write rig/truth.csv"
+    assert len(lines) == 7
+    assert not (tmp_path / "rig").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--roll", "-95:5"], "beyond +-90"),
+        (["--roll", "5:-5"], "A <= B"),
+        (["--roll", "much"], "'much' is not A:B"),
+        (["--pitch", "0:80"], "beyond +-60"),
+        (["--size", "640"], "640x480"),
+        (["--size", "0x480"], "0x480"),
+        (["--size", "99999x99999"], "99999x99999"),
+        (["--height", "0"], "under the road"),
+        (["--height", "-1"], "under the road"),
+        (["--height", "0.2", "--roll", "-80"], "right camera is under the road"),
+        (["--focal", "0"], "--focal"),
+        (["--baseline", "-1"], "--baseline"),
+        (["--frames", "0"], "--frames"),
+        (["--noise", "-1"], "--noise"),
+        (["--gain", "0"], "--gain"),
+        (["--scene", "beach"], "beach"),
+        (["--seed", "-1"], "--seed"),
+        (["--curvature", "1"], "curvature of 1 per metre"),
+    ],
+)
+def test_what_cannot_be_is_one_line_and_status_2_and_nothing_is_written(
+    tmp_path, monkeypatch, capsys, arguments, said
+):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as ended:
+        main(["simulate", "rig", *arguments])
+    err = capsys.readouterr().err
+    assert ended.value.code == 2
+    assert said in err
+    assert err.count("\n") == 1
+    assert not (tmp_path / "rig").exists()
+
+
+def test_a_folder_with_files_in_it_needs_overwrite(tmp_path):
+    (tmp_path / "rig").mkdir()
+    (tmp_path / "rig/notes.txt").write_text("mine")
+    refused = rollcli("simulate", "rig", *TINY, cwd=tmp_path)
+    assert (refused.status, refused.err.count("\n")) == (2, 1)
+    assert "--overwrite" in refused.err
+    done = rollcli("simulate", "rig", *TINY, "--overwrite", "-j1", cwd=tmp_path)
+    assert done.status == 0
+    assert (tmp_path / "rig/notes.txt").read_text() == "mine"
+
+
+def test_a_folder_that_cannot_be_written_is_status_1(tmp_path):
+    (tmp_path / "file").write_text("")
+    done = rollcli("simulate", "file/rig", *TINY, cwd=tmp_path)
+    assert (done.status, done.err.count("\n")) == (1, 1)
+
+
+def test_help_loads_neither_numpy_nor_opencv(tmp_path):
+    done = rollcli("simulate", "--help", cwd=tmp_path, PYTHONPROFILEIMPORTTIME="1")
+    loaded = {line.rpartition("|")[2].strip() for line in done.err.splitlines()}
+    assert done.status == 0
+    assert not loaded & {"numpy", "cv2", "tqdm"}

@@ -1,0 +1,115 @@
+"""The folder that `rollcli simulate` writes."""
+
+import csv
+import math
+
+import cv2
+import numpy as np
+import pytest
+
+from rollcli.errors import OutputError, UsageError
+from rollcli.files.encodings import read_disparity
+from rollcli.simulate import dataset as module
+from rollcli.simulate.dataset import plan_dataset, write_dataset
+from rollcli.simulate.options import SimulateOptions
+from rollcli.simulate.render import render_frame
+from tests.program import contents
+
+TINY = SimulateOptions(frames=3, size=(64, 48), seed=9)
+
+
+def simulate(folder, options=TINY, jobs=1, overwrite=False):
+    return list(write_dataset(plan_dataset(folder, options, overwrite=overwrite), jobs))
+
+
+def rows(folder):
+    return list(csv.DictReader((folder / "truth.csv").read_text().splitlines()))
+
+
+def test_the_folder_holds_left_right_disparity_and_truth(tmp_path):
+    done = simulate(tmp_path / "rig")
+    stems = ["frame_0001", "frame_0002", "frame_0003"]
+    assert done == [*stems, "truth.csv"]
+    expected = {f"{part}/{stem}.png" for part in ("left", "right", "disparity") for stem in stems}
+    assert set(contents(tmp_path / "rig")) == {*expected, "truth.csv"}
+
+
+def test_truth_has_the_documented_columns_and_each_frames_values(tmp_path):
+    simulate(tmp_path)
+    first = (tmp_path / "truth.csv").read_text().splitlines()[0]
+    assert first == "file,roll_deg,pitch_deg,scene,focal_px,baseline_m,height_m,curvature_per_m,seed"
+    specs = plan_dataset(tmp_path, TINY, overwrite=True).specs
+    for number, (row, spec) in enumerate(zip(rows(tmp_path), specs, strict=True), 1):
+        assert row["file"] == f"frame_{number:04d}"
+        assert float(row["roll_deg"]) == pytest.approx(math.degrees(spec.roll), abs=1e-9)
+        assert float(row["pitch_deg"]) == pytest.approx(math.degrees(spec.pitch), abs=1e-9)
+        assert float(row["curvature_per_m"]) == pytest.approx(spec.curvature)
+        assert (row["scene"], float(row["focal_px"]), row["seed"]) == (spec.scene, 37.12, "9")
+        assert (float(row["baseline_m"]), float(row["height_m"])) == (0.54, 1.65)
+
+
+def test_images_are_the_rendered_frame(tmp_path):
+    simulate(tmp_path)
+    specs = plan_dataset(tmp_path / "x", TINY).specs
+    for stem, spec in (("frame_0001", specs[0]), ("frame_0003", specs[2])):
+        frame = render_frame(spec)
+        for part, image in (("left", frame.left), ("right", frame.right)):
+            data = np.frombuffer((tmp_path / part / f"{stem}.png").read_bytes(), np.uint8)
+            assert np.array_equal(cv2.imdecode(data, cv2.IMREAD_UNCHANGED), image)
+        stored = read_disparity(tmp_path / "disparity" / f"{stem}.png")
+        assert np.array_equal(stored > 0, frame.disparity > 0)
+        assert np.abs(stored - frame.disparity).max() <= 1 / 512 + 1e-6 or stored.min() == 1 / 256
+
+
+def test_the_files_are_the_same_whatever_the_jobs_are(tmp_path):
+    simulate(tmp_path / "one", jobs=1)
+    simulate(tmp_path / "two", jobs=2)
+    assert contents(tmp_path / "one") == contents(tmp_path / "two")
+
+
+def test_grey_images_have_one_channel(tmp_path):
+    simulate(tmp_path, SimulateOptions(frames=1, size=(64, 48), grey=True))
+    data = np.frombuffer((tmp_path / "left" / "frame_0001.png").read_bytes(), np.uint8)
+    assert cv2.imdecode(data, cv2.IMREAD_UNCHANGED).shape == (48, 64)
+
+
+def test_overwriting_leaves_no_frame_of_an_earlier_simulation_and_no_other_file_is_touched(tmp_path):
+    simulate(tmp_path)
+    (tmp_path / "left" / "mine.png").write_bytes(b"mine")
+    simulate(tmp_path, SimulateOptions(frames=1, size=(64, 48)), overwrite=True)
+    left = sorted(path.name for path in (tmp_path / "left").iterdir())
+    assert left == ["frame_0001.png", "mine.png"]
+    assert len(rows(tmp_path)) == 1
+
+
+def test_a_folder_with_files_in_it_is_refused(tmp_path):
+    (tmp_path / "notes.txt").write_text("mine")
+    with pytest.raises(UsageError, match="--overwrite"):
+        plan_dataset(tmp_path, TINY)
+
+
+def test_an_empty_folder_is_taken(tmp_path):
+    assert plan_dataset(tmp_path, TINY).folder == tmp_path
+
+
+def test_a_file_in_place_of_the_folder_is_refused(tmp_path):
+    (tmp_path / "rig").write_text("")
+    with pytest.raises(UsageError, match="not a folder"):
+        plan_dataset(tmp_path / "rig", TINY, overwrite=True)
+
+
+def test_disparities_beyond_what_the_file_can_hold_are_refused(tmp_path):
+    with pytest.raises(UsageError, match="KITTI PNG ends at 256"):
+        plan_dataset(tmp_path, SimulateOptions(frames=1, size=(1920, 1400), height=1.0))
+
+
+def test_truth_appears_only_when_every_frame_is_there(tmp_path, monkeypatch):
+    def fail_at_second(spec):
+        if spec.index == 1:
+            raise OutputError("disk full")
+        return render_frame(spec)
+
+    monkeypatch.setattr(module, "render_frame", fail_at_second)
+    with pytest.raises(OutputError):
+        simulate(tmp_path)
+    assert set(contents(tmp_path)) == {f"{part}/frame_0001.png" for part in ("left", "right", "disparity")}

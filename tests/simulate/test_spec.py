@@ -1,0 +1,97 @@
+"""Which rigs can be asked for, and that what is drawn depends on the seed and the frame's number alone."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rollcli.errors import UsageError
+from rollcli.simulate.options import SCENES
+from rollcli.simulate.render import render_frame
+from rollcli.simulate.spec import FrameSpec, draw_specs
+
+TINY = {"size": (64, 48), "focal": 37.0}
+
+
+@pytest.mark.parametrize(
+    ("wrong", "named"),
+    [
+        ({"roll": math.radians(90.5)}, "roll of 90.5 degrees is beyond"),
+        ({"pitch": math.radians(-61)}, "pitch of -61 degrees"),
+        ({"height": 0.0}, "under the road"),
+        ({"height": -1.65}, "under the road"),
+        ({"height": 0.3, "roll": math.radians(-60)}, "right camera is under the road"),
+        ({"size": (8, 480)}, "8x480"),
+        ({"size": (0, 0)}, "0x0"),
+        ({"focal": 0.0}, "focal length"),
+        ({"baseline": -0.1}, "baseline"),
+        ({"noise": -1.0}, "noise"),
+        ({"gain": 0.0}, "gain"),
+        ({"curvature": 0.02}, "curvature of 0.02"),
+        ({"scene": "beach"}, "no such scene: beach"),
+        ({"focal": math.nan}, "finite"),
+    ],
+)
+def test_a_rig_that_cannot_be_is_refused_and_the_reason_named(wrong, named):
+    with pytest.raises(UsageError, match=named):
+        FrameSpec(**wrong)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"n": 0},
+        {"scene": "beach"},
+        {"seed": -1},
+        {"roll": (0.2, 0.1)},
+        {"roll": (-2.0, 0.1)},
+        {"pitch": (0.0, 2.0)},
+        {"height": 0.3, "roll": (-1.0, 1.0)},
+    ],
+)
+def test_draws_that_cannot_be_are_refused_before_anything_is_drawn(wrong):
+    with pytest.raises(UsageError):
+        draw_specs(**{"n": 3, **wrong})
+
+
+def test_a_frame_is_the_same_however_many_are_drawn():
+    assert draw_specs(3, seed=5) == draw_specs(30, seed=5)[:3]
+
+
+def test_other_seeds_and_other_frames_are_other_scenes():
+    first, second = draw_specs(2, scene="street", seed=5, **TINY)
+    third = draw_specs(1, scene="street", seed=6, **TINY)[0]
+    pictures = [render_frame(replace(each, roll=0.0, pitch=0.05)).left for each in (first, second, third)]
+    assert not np.array_equal(pictures[0], pictures[1])
+    assert not np.array_equal(pictures[0], pictures[2])
+
+
+def test_a_spec_gives_the_same_frame_each_time():
+    spec = draw_specs(1, scene="open", seed=3, **TINY)[0]
+    once, twice = render_frame(spec), render_frame(spec)
+    assert once.left.tobytes() == twice.left.tobytes()
+    assert once.right.tobytes() == twice.right.tobytes()
+    assert once.disparity.tobytes() == twice.disparity.tobytes()
+
+
+def test_angles_are_drawn_evenly_from_the_range():
+    rolls = np.degrees([spec.roll for spec in draw_specs(2000, roll=(-0.5, 0.25), seed=1)])
+    counts, _ = np.histogram(rolls, 5, (math.degrees(-0.5), math.degrees(0.25)))
+    assert counts.sum() == 2000
+    assert counts.min() > 330
+
+
+def test_mixed_draws_every_scene_and_only_a_bare_road_is_always_flat():
+    specs = draw_specs(400, seed=2)
+    flat = {kind: np.mean([s.curvature == 0 for s in specs if s.scene == kind]) for kind in SCENES}
+    assert flat.pop("bare") == 1
+    assert all(0.3 < share < 0.7 for share in flat.values())
+
+
+def test_a_curvature_that_is_asked_for_holds_for_every_scene():
+    assert all(0.001 <= spec.curvature <= 0.002 for spec in draw_specs(40, curvature=(0.001, 0.002)))
+
+
+def test_the_focal_length_follows_the_width():
+    assert draw_specs(1, size=(1000, 300))[0].focal == pytest.approx(580)
