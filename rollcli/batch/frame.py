@@ -5,20 +5,15 @@ import time
 from dataclasses import replace
 from typing import Any
 
-import cv2
-import numpy as np
-
+from rollcli.batch.faults import guarded
 from rollcli.batch.images import write_images
-from rollcli.batch.job import Frame, Outcome, failed
+from rollcli.batch.job import Frame, Outcome
 from rollcli.batch.options import FrameOptions, MethodOptions
 from rollcli.batch.region import region_mask
 from rollcli.batch.source import Source, read_source
-from rollcli.errors import EstimationError, InputError, UsageError
 from rollcli.estimator.estimate import RollEstimate, estimate_roll
 from rollcli.files.results import Row
 
-# what may be wrong with a frame without being wrong with the batch
-_FAULTS = (InputError, EstimationError, UsageError, OSError, MemoryError, cv2.error, np.linalg.LinAlgError)
 # more of the map than this at the end of the searched range: the range was too short for the scene
 _MUCH_AT_END = 0.05
 
@@ -32,10 +27,7 @@ def run_frame(frame: Frame, options: FrameOptions) -> Outcome:
         An image cannot be written: that ends the run.
     """
     start = time.perf_counter()
-    try:
-        outcome = _measured(frame, options)
-    except _FAULTS as error:
-        outcome = failed(frame, str(error) or type(error).__name__)
+    outcome = guarded(frame, lambda: _measured(frame, options))
     elapsed = 1000 * (time.perf_counter() - start)
     return replace(outcome, row=replace(outcome.row, elapsed_ms=elapsed))
 

@@ -13,25 +13,23 @@ import threading
 from collections.abc import Generator, Iterable, Iterator
 from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
 from multiprocessing import active_children, connection, context, parent_process, reduction
-from typing import Any
+from typing import Any, Generic
 
-from rollcli.batch.job import Frame, Outcome, do, failed
-from rollcli.batch.options import FrameOptions
 from rollcli.batch.setup import prepare_worker
 from rollcli.batch.signals import Stop
-from rollcli.batch.workers import in_order
+from rollcli.batch.workers import Done, Task, Work, in_order
 
 _IN_FLIGHT_PER_WORKER = 4
 _DIED = "its worker died each time: killed for memory, perhaps, or crashed"
 
 
-def pool_outcomes(
-    frames: Iterable[Frame], options: FrameOptions, jobs: int, held: int | None, stop: Stop
-) -> Generator[Outcome, None, None]:
-    """The outcome of each frame, in order, from `jobs` processes; `held` is a file that they keep open."""
-    crew = PoolCrew(jobs, options, held)
+def done_by_pool(
+    tasks: Iterable[Task], work: Work[Task, Done], jobs: int, held: int | None, stop: Stop
+) -> Generator[Done, None, None]:
+    """What each task gives, in order, from `jobs` processes; `held` is a file that they keep open."""
+    crew = PoolCrew(jobs, work, held)
     try:
-        yield from in_order(frames, crew, stop)
+        yield from in_order(tasks, crew, stop)
     except KeyboardInterrupt:  # asked twice
         crew.close(at_once=True)
         raise
@@ -39,38 +37,38 @@ def pool_outcomes(
         crew.close()
 
 
-class PoolCrew:
+class PoolCrew(Generic[Task, Done]):
     """A pool of `jobs` processes; `held` is an open file that they hold as long as they live."""
 
     deaths: tuple[type[BaseException], ...] = (BrokenExecutor,)
 
-    def __init__(self, jobs: int, options: FrameOptions, held: int | None) -> None:
+    def __init__(self, jobs: int, work: Work[Task, Done], held: int | None) -> None:
         self.window = _IN_FLIGHT_PER_WORKER * jobs
         self.broken = False
-        self._jobs, self._options, self._held = jobs, options, _Held(held)
+        self._jobs, self._work, self._held = jobs, work, _Held(held)
         self._pool = self._start(jobs)
 
-    def submit(self, frame: Frame) -> "Future[Outcome]":
-        """Start a frame; if a worker has died, the future says so."""
+    def submit(self, task: Task) -> "Future[Done]":
+        """Start a task; if a worker has died, the future says so."""
         try:
-            future = self._pool.submit(do, frame, self._options)
+            future = self._pool.submit(self._work.do, task)
         except BrokenExecutor as error:
             future = Future()
             future.set_exception(error)
             self.broken = True
         return future
 
-    def again(self, frame: Frame) -> Outcome:
-        """Do a lost frame in a process of its own.
+    def again(self, task: Task) -> Done:
+        """Do a lost task in a process of its own.
 
-        Which frame in flight took the worker with it is not known: one that dies alone, for certain for
+        Which task in flight took the worker with it is not known: one that dies alone, for certain for
         the first time, is tried once more.
         """
         self.broken = True
         for _ in range(2):
             with self._start(1) as pool, contextlib.suppress(BrokenExecutor):
-                return pool.submit(do, frame, self._options).result()
-        return failed(frame, _DIED)
+                return pool.submit(self._work.do, task).result()
+        return self._work.lost(task, _DIED)
 
     def renew(self) -> None:
         """A new pool in place of the broken one."""
@@ -79,7 +77,7 @@ class PoolCrew:
         self.broken = False
 
     def close(self, at_once: bool = False) -> None:
-        """End the workers, after the frames that they are at or at once."""
+        """End the workers, after the tasks that they are at or at once."""
         for process in active_children() if at_once else ():
             process.kill()
         self._pool.shutdown(cancel_futures=True)
@@ -129,7 +127,7 @@ def _received(duplicate: Any) -> _Held:
 
 
 def _prepare(held: _Held) -> None:
-    """What a worker does before its first frame."""
+    """What a worker does before its first task."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     prepare_worker()

@@ -3,10 +3,11 @@
 import sys
 import time
 from collections import Counter
+from collections.abc import Sequence
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
-from rollcli.batch.options import EstimateOptions
+from rollcli.batch.options import EncodingOptions, RunningOptions
 from rollcli.files.results import Row
 
 if TYPE_CHECKING:
@@ -29,13 +30,30 @@ class Report:
     """Counts, progress and messages of one run, all on stderr.
 
     A bar on a terminal; elsewhere a line every half minute; nothing but errors when quiet.
+
+    Parameters
+    ----------
+    total : int
+        Frames to do.
+    running : RunningOptions
+        How much to say.
+    encoding : EncodingOptions
+        An encoding that was found rather than given is said.
+    statuses : sequence of str
+        What a row can come to, besides "error".
     """
 
-    def __init__(self, total: int, options: EstimateOptions) -> None:
+    def __init__(
+        self,
+        total: int,
+        running: RunningOptions,
+        encoding: EncodingOptions,
+        statuses: Sequence[str] = ("ok", "suspect"),
+    ) -> None:
         self.counts: Counter[str] = Counter()
         self.total, self.stopped_early = total, False
-        self._options = options.running
-        self._auto = options.encoding.encoding == "auto" and options.encoding.scale is None
+        self._options, self._statuses = running, statuses
+        self._auto = encoding.encoding == "auto" and encoding.scale is None
         self._kept = 0
         self._shown: set[str] = set()
         self._failures = 0
@@ -141,10 +159,10 @@ class Report:
         """The last line of a run."""
         counts, seconds = self.counts, time.monotonic() - self._start
         kept = f" ({self._kept} kept)" if self._kept else ""
-        return (
-            f"{self.done} {_FRAMES[self.done == 1]}{kept}: {counts['ok']} ok, {counts['suspect']} suspect, "
-            f"{counts['error']} failed; {seconds:.1f} s, {self._speed()}"
-        )
+        ends = [f"{counts[status]} {status}" for status in self._statuses]
+        ends.append(f"{counts['error']} failed")
+        of = f"{self.done} {_FRAMES[self.done == 1]}{kept}"
+        return f"{of}: {', '.join(ends)}; {seconds:.1f} s, {self._speed()}"
 
     @property
     def status(self) -> int:

@@ -1,18 +1,21 @@
 """A run: the plan, the workers, the rows in order, and the exit status."""
 
 import contextlib
-import os
-from collections.abc import Generator, Iterable, Sequence
+from collections.abc import Generator, Sequence
+from functools import partial
 
-from rollcli.batch.job import Frame, Outcome, do
+from rollcli.batch.dry_run import list_files
+from rollcli.batch.job import Frame, Outcome, do, failed
+from rollcli.batch.local import done_locally
 from rollcli.batch.options import EstimateOptions
 from rollcli.batch.outputs import image_paths, remove_leftovers
 from rollcli.batch.plan import Plan, make_plan
 from rollcli.batch.record import RunRecord, check_resumable
 from rollcli.batch.report import INTERRUPTED, Report
 from rollcli.batch.result_file import ResultFile, RowSink, check_result, kept_rows, open_sink
-from rollcli.batch.setup import limit_blas_threads, prepare_worker
+from rollcli.batch.setup import limit_blas_threads
 from rollcli.batch.signals import Stop, stop_on_signals
+from rollcli.batch.workers import Work
 from rollcli.errors import OutputError
 from rollcli.files.results import parse_rows, read_run, run_path
 
@@ -41,7 +44,7 @@ def run(options: EstimateOptions, resume_command: str = "") -> int:
         _list(plan, options)
         return 0
     limit_blas_threads()
-    given, report = options.result, Report(len(plan.frames), options)
+    given, report = options.result, Report(len(plan.frames), options.running, options.encoding)
     with open_sink(
         plan.output,
         plan.format,
@@ -112,28 +115,8 @@ def _outcomes(
         from rollcli.batch.cluster import cluster_outcomes
 
         return cluster_outcomes(frames, options.frame, options.result.scheduler, stop)
-    jobs = min(options.running.jobs or _usable_processors(), len(frames))
-    if jobs <= 1:
-        return _here(frames, options, stop)
-    from rollcli.batch.pool import pool_outcomes  # one worker needs no pool
-
-    return pool_outcomes(frames, options.frame, jobs, held, stop)
-
-
-def _here(frames: Iterable[Frame], options: EstimateOptions, stop: Stop) -> Generator[Outcome, None, None]:
-    prepare_worker()
-    each = options.frame
-    for frame in frames:
-        if stop.asked:
-            return
-        yield do(frame, each)
-
-
-def _usable_processors() -> int:
-    try:
-        return len(os.sched_getaffinity(0))
-    except AttributeError:  # not on macOS and Windows
-        return os.cpu_count() or 1
+    work = Work(partial(do, options=options.frame), failed)
+    return done_locally(frames, work, options.running.jobs, stop, held)
 
 
 def _end(plan: Plan, record: RunRecord | None, report: Report, stop: Stop, resume_command: str) -> int:
@@ -155,12 +138,7 @@ def _list(plan: Plan, options: EstimateOptions) -> None:
         if given.resume and (kept := kept_rows(plan.output, plan.format))
         else 0
     )
-    lines = []
-    for frame in plan.frames[done:]:
-        lines += [f"read  {path}" for path in frame.reads()]
-        lines += [f"write {path}" for _, path in image_paths(frame, options.images)]
+    frames = plan.frames[done:]
+    list_files((frame.reads(), (path for _, path in image_paths(frame, options.images))) for frame in frames)
     if plan.output != "-":
-        lines += [f"write {plan.output}", f"write {run_path(plan.output)}"]
-    data = "".join(f"{line}\n" for line in lines).encode("utf-8", "surrogateescape")
-    while data:
-        data = data[os.write(1, data) :]
+        list_files([((), (plan.output, str(run_path(plan.output))))])
