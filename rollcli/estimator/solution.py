@@ -13,6 +13,7 @@ class Outcome(Enum):
     CONVERGED = "converged"
     STEP_LIMIT = "no convergence within the iterations allowed"
     STUCK = "no step lowers the energy, yet its gradient is not zero"
+    DRIFTED = "the areas that agree do not look like a road"
 
     @property
     def converged(self) -> bool:
