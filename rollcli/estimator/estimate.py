@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rollcli.errors import EstimationError, UsageError
 from rollcli.estimator import verdict
+from rollcli.estimator.areas import areas
 from rollcli.estimator.energy import Energy
 from rollcli.estimator.exact import exact, minima
 from rollcli.estimator.golden_section import golden_section
@@ -18,12 +19,14 @@ from rollcli.estimator.gradient_descent import LAMBDA0, TOLERANCE, gradient_desc
 from rollcli.estimator.interval import half_width
 from rollcli.estimator.moments import map_moments, point_moments
 from rollcli.estimator.pixels import require_pixels
+from rollcli.estimator.plane_fit import AreaSolution, plane_fit
 from rollcli.estimator.road import Road, find_road
 from rollcli.estimator.sample import take_sample
 from rollcli.estimator.solution import Solution
 from rollcli.estimator.surface import Surface, fit_surface, whole_surface
 
-METHODS = ("gd", "gss", "exact", "plane", "areas")
+AREA_METHODS = ("plane", "areas")
+METHODS = ("gd", "gss", "exact", *AREA_METHODS)
 MODELS = ("parabola", "line")
 ROADS = ("auto", "all")
 MAX_ROLL_LIMIT = math.radians(89)
@@ -145,8 +148,12 @@ def estimate_roll(
         pixels = _find(values, usable, max_roll, seed, parabolic=model == "parabola")
     else:
         pixels = _take_all(values, valid, parabolic=model == "parabola")
+    solution: Solution
+    if method in AREA_METHODS:
+        pixels, solution = _solve_area(values, valid, pixels, method, max_roll, chosen=usable is not None)
+    else:
+        solution = _solve(pixels.energy, method, tolerance, lambda0)
     energy, surface = pixels.energy, pixels.surface
-    solution = _solve(energy, method, tolerance, lambda0)
     lowest, *others = minima(energy)
     slack = 1e-9 * (energy.rest + energy.slope_energy)
     is_global = float(energy.at(solution.theta).value) <= lowest.energy + slack
@@ -168,25 +175,31 @@ def estimate_roll(
         method=method,
         iterations=solution.iterations,
         converged=solution.outcome.converged,
-        global_minimum=is_global,
+        global_minimum=None if method in AREA_METHODS else is_global,
         rmse=energy.rmse(solution.theta),
         alpha=energy.parabola(solution.theta),
         valid_fraction=count / values.size,
-        road_fraction=1.0 if pixels.road is None or surface is None else surface.share,
+        road_fraction=pixels.share,
         width=width,
         height=height,
-        _usable=usable,
-        _surface=None if pixels.road is None else surface,
+        _usable=usable if pixels.area is None else pixels.area,
+        _surface=None if pixels.road is None or pixels.area is not None else surface,
     )
 
 
 @dataclass(frozen=True)
 class _Pixels:
-    """What an angle rests on; `road` is None where every valid pixel was taken."""
+    """What an angle rests on.
+
+    `road` is None where it was not looked for, `area` where the method does not choose the pixels itself;
+    `share` is that of the valid pixels which were used.
+    """
 
     energy: Energy
     surface: Surface | None
     road: Road | None
+    share: float
+    area: NDArray[np.bool_] | None = None
 
 
 def _find(
@@ -199,17 +212,44 @@ def _find(
     _, slope, _ = surface.alpha
     plane = (surface.alpha[0], -slope * math.sin(surface.theta), slope * math.cos(surface.theta))
     moments = point_moments(surface.x, surface.y, surface.d, surface.weights, sample.grid, plane)
-    return _Pixels(Energy.of(moments, float(surface.d.max()), parabolic=parabolic), surface, found)
+    return _Pixels(
+        Energy.of(moments, float(surface.d.max()), parabolic=parabolic), surface, found, surface.share
+    )
 
 
 def _take_all(values: NDArray[Any], valid: NDArray[np.bool_], *, parabolic: bool) -> _Pixels:
     """Sum every valid pixel, as the paper does; a sample of them tells how sure that is."""
     energy = Energy.of(map_moments(values, valid), float(values[valid].max()), parabolic=parabolic)
+    return _Pixels(energy, _sampled_surface(values, valid, energy), None, 1.0)
+
+
+def _sampled_surface(values: NDArray[Any], used: NDArray[np.bool_], energy: Energy) -> Surface | None:
     try:
-        surface = whole_surface(take_sample(values, valid), energy)
+        return whole_surface(take_sample(values, used), energy)
     except EstimationError:  # too small a map to be sampled: an angle without an interval
-        surface = None
-    return _Pixels(energy, surface, None)
+        return None
+
+
+def _solve_area(
+    values: NDArray[Any],
+    valid: NDArray[np.bool_],
+    pixels: _Pixels,
+    method: str,
+    max_roll: float,
+    *,
+    chosen: bool,
+) -> tuple[_Pixels, AreaSolution]:
+    """Fit planes to a part of the pixels; `chosen` says that the user's mask is the area of "plane"."""
+    road = valid
+    if pixels.road is not None and pixels.surface is not None:
+        road = valid & pixels.surface.covers(values)
+    if method == "areas":
+        solution = areas(values, road, max_roll)
+    else:
+        solution = plane_fit(values, road, (slice(None), slice(None)) if chosen else None)
+    surface = _sampled_surface(values, solution.used, solution.energy)
+    share = np.count_nonzero(solution.used) / np.count_nonzero(valid)
+    return _Pixels(solution.energy, surface, pixels.road, share, solution.used), solution
 
 
 def _solve(energy: Energy, method: str, tolerance: float, lambda0: float | Literal["auto"]) -> Solution:
