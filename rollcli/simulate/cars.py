@@ -1,4 +1,6 @@
-"""A car, put together from convex solids."""
+"""Cars and trucks, put together from convex solids."""
+
+from typing import NamedTuple
 
 import numpy as np
 
@@ -9,23 +11,31 @@ from rollcli.simulate.vectors import Array
 
 Outline = tuple[tuple[float, float], ...]
 
-# convex outlines seen from the right, (ahead, up) in metres, clockwise
-_BODY: Outline = (
-    (-2.10, 0.28),
-    (-2.20, 0.55),
-    (-2.12, 0.95),
-    (0.95, 0.95),
-    (2.02, 0.80),
-    (2.15, 0.50),
-    (2.08, 0.26),
-)
-_CABIN: Outline = ((-1.95, 0.93), (-1.45, 1.42), (0.25, 1.42), (1.10, 0.93))
-_ROOF: Outline = ((-1.50, 1.39), (-1.42, 1.46), (0.22, 1.46), (0.30, 1.39))
-_WHEEL: Outline = tuple((0.32 * np.cos(a), 0.32 + 0.32 * np.sin(a)) for a in np.arange(10) * -np.pi / 5)
-_TAIL: Outline = ((-2.23, 0.68), (-2.23, 0.85), (-2.0, 0.85), (-2.0, 0.68))
-_HEAD: Outline = ((1.95, 0.58), (1.95, 0.72), (2.16, 0.72), (2.16, 0.58))
-_GRILLE: Outline = ((1.95, 0.45), (1.95, 0.62), (2.17, 0.62), (2.17, 0.45))
-_PLATE: Outline = ((-2.22, 0.50), (-2.22, 0.61), (-2.0, 0.61), (-2.0, 0.50))
+
+class _Shape(NamedTuple):
+    """A convex outline seen from the right, (ahead, up) in metres, clockwise, drawn out to both sides.
+
+    `taper` leans the sides inward; `centre` is to the right of the middle.
+    """
+
+    outline: Outline
+    material: int
+    half_width: float
+    taper: float = 0.0
+    centre: float = 0.0
+
+
+def _rectangle(back: float, front: float, low: float, high: float) -> Outline:
+    return ((back, low), (back, high), (front, high), (front, low))
+
+
+def _wheel(ahead: float, radius: float) -> Outline:
+    angles = np.arange(10) * -np.pi / 5
+    return tuple((ahead + radius * float(np.cos(a)), radius + radius * float(np.sin(a))) for a in angles)
+
+
+_FAR = 40.0  # metres: beyond, a vehicle is drawn without its small parts
+_SILHOUETTE = 5
 
 _PAINTS: tuple[tuple[float, Tint], ...] = (
     (0.70, GREY),
@@ -35,11 +45,11 @@ _PAINTS: tuple[tuple[float, Tint], ...] = (
     (0.22, (1.3, 0.7, 0.4)),
     (0.20, (0.6, 1.0, 0.6)),
 )
-_GLASS, _TYRE, _LAMPS, _PLATES = range(len(_PAINTS), len(_PAINTS) + 4)
+_GLASS, _BLACK, _RED, _WHITE, _CARGO = range(len(_PAINTS), len(_PAINTS) + 5)
 
 
 def car_materials(offset: float) -> list[Material]:
-    """What `car` needs: paints, glass, tyres, lamps and plates, in the order that it counts on."""
+    """What `vehicle` counts on, in this order: paints, glass, tyres, red and white lights, cargo boxes."""
     paints: list[Material] = [CarPaint(level, tint=tint, offset=offset) for level, tint in _PAINTS]
     return [
         *paints,
@@ -47,52 +57,82 @@ def car_materials(offset: float) -> list[Material]:
         Plain(0.03, 0.3, 0.1),
         Plain(0.45, 0.05, 0.05, tint=(0.15, 0.15, 1.0)),
         Plain(0.7, 0.1, 0.1),
+        Plain(0.55, 0.04, 0.08, joint=1.1, tint=(0.97, 0.99, 1.0), offset=offset),
     ]
 
 
-def car(
+def vehicle(
     rng: np.random.Generator, course: Course, lateral: float, z: float, first_material: int, oncoming: bool
 ) -> Solid:
-    """A car that stands at (lateral, z) on the road, its nose ahead or toward us.
+    """A car, or one time in six a truck, at (lateral, z) on the road, its nose ahead or toward us.
 
     Its materials are those of `car_materials`, from `first_material` on.
     """
-    paint = int(rng.integers(len(_PAINTS)))
-    tall = float(rng.uniform(0.95, 1.25))
-    shapes: tuple[tuple[Outline, float, float, float, int], ...] = (
-        (_BODY, 0.0, 0.90, 0.10, paint),
-        (_CABIN, 0.0, 0.86, 0.35, _GLASS),
-        (_ROOF, 0.0, 0.72, 0.35, paint),
-        (_shift(_WHEEL, 1.35), 0.0, 0.89, 0.0, _TYRE),
-        (_shift(_WHEEL, -1.35), 0.0, 0.89, 0.0, _TYRE),
-        (_TAIL, 0.62, 0.13, 0.0, _LAMPS),
-        (_TAIL, -0.62, 0.13, 0.0, _LAMPS),
-        (_HEAD, 0.62, 0.15, 0.0, _PLATES),
-        (_HEAD, -0.62, 0.15, 0.0, _PLATES),
-        (_GRILLE, 0.0, 0.40, 0.0, _TYRE),
-        (_PLATE, 0.0, 0.26, 0.0, _PLATES),
+    paint, tall = int(rng.integers(len(_PAINTS))), float(rng.uniform(0.95, 1.25))
+    shapes = _truck(paint) if rng.random() < 1 / 6 else _car(paint)
+    if z > _FAR:
+        shapes = shapes[:_SILHOUETTE]
+    parts = tuple(_extrude(shape, tall, first_material + shape.material) for shape in shapes)
+    corners = np.array([point for shape in shapes for point in shape.outline])
+    half_width = max(shape.half_width + abs(shape.centre) for shape in shapes)
+    extent = np.array(
+        [
+            [-half_width, half_width],
+            [0.0, tall * corners[:, 1].max()],
+            [corners[:, 0].min(), corners[:, 0].max()],
+        ]
     )
-    parts = tuple(
-        _extrude(np.array(outline) * [1, tall], centre, half, taper, first_material + material)
-        for outline, centre, half, taper, material in shapes
-    )
-    extent = np.array([[-0.95, 0.95], [0.0, 1.5 * tall], [-2.25, 2.2]])
     about = np.array([[-1.0], [1.0], [-1.0]]) if oncoming else 1.0
     return Solid(about * course.frame(z), course.point(lateral, z), parts, extent)
 
 
-def _shift(outline: Outline, ahead: float) -> Outline:
-    return tuple((a + ahead, b) for a, b in outline)
+def _car(paint: int) -> tuple[_Shape, ...]:
+    hood, tail = (0.95, 0.95), (-2.12, 0.95)
+    body = ((-2.10, 0.28), (-2.20, 0.55), tail, hood, (2.02, 0.80), (2.15, 0.50), (2.08, 0.26))
+    cabin = ((-1.95, 0.93), (-1.45, 1.42), (0.25, 1.42), (1.10, 0.93))
+    roof = ((-1.50, 1.39), (-1.42, 1.46), (0.22, 1.46), (0.30, 1.39))
+    rear, front = _rectangle(-2.23, -2.0, 0.68, 0.85), _rectangle(1.95, 2.16, 0.58, 0.72)
+    return (
+        _Shape(body, paint, 0.90, taper=0.10),
+        _Shape(cabin, _GLASS, 0.86, taper=0.35),
+        _Shape(roof, paint, 0.72, taper=0.35),
+        _Shape(_wheel(1.35, 0.32), _BLACK, 0.89),
+        _Shape(_wheel(-1.35, 0.32), _BLACK, 0.89),
+        _Shape(rear, _RED, 0.13, centre=0.62),
+        _Shape(rear, _RED, 0.13, centre=-0.62),
+        _Shape(front, _WHITE, 0.15, centre=0.62),
+        _Shape(front, _WHITE, 0.15, centre=-0.62),
+        _Shape(_rectangle(1.95, 2.17, 0.45, 0.62), _BLACK, 0.40),
+        _Shape(_rectangle(-2.22, -2.0, 0.50, 0.61), _WHITE, 0.26),
+    )
 
 
-def _extrude(outline: Array, centre: float, half_width: float, taper: float, material: int) -> Part:
-    """The solid of a convex outline (k, 2), `half_width` to each side; `taper` leans the sides inward."""
+def _truck(paint: int) -> tuple[_Shape, ...]:
+    cab = ((2.0, 0.5), (2.0, 2.45), (3.2, 2.45), (3.7, 1.5), (3.7, 0.5))
+    rear = _rectangle(-3.93, -3.7, 0.70, 0.88)
+    return (
+        _Shape(_rectangle(-3.9, 1.8, 0.95, 3.0), _CARGO, 1.22),
+        _Shape(cab, paint, 1.15),
+        _Shape(_rectangle(-3.85, 3.5, 0.55, 0.95), _BLACK, 0.9),
+        _Shape(_wheel(2.7, 0.42), _BLACK, 1.12),
+        _Shape(_wheel(-2.4, 0.42), _BLACK, 1.18),
+        _Shape(((2.5, 1.55), (2.5, 2.3), (3.31, 2.3), (3.72, 1.55)), _GLASS, 1.17),
+        _Shape(rear, _RED, 0.15, centre=0.95),
+        _Shape(rear, _RED, 0.15, centre=-0.95),
+        _Shape(_rectangle(-3.92, -3.7, 0.70, 0.82), _WHITE, 0.26),
+        _Shape(_rectangle(3.5, 3.73, 0.70, 0.85), _WHITE, 1.05),
+    )
+
+
+def _extrude(shape: _Shape, tall: float, material: int) -> Part:
+    """The solid of a shape made `tall` times as high."""
+    outline: Array = np.array(shape.outline) * [1.0, tall]
     edges = np.roll(outline, -1, axis=0) - outline
     out = np.stack([np.zeros(len(edges)), edges[:, 0], -edges[:, 1]], axis=1)
-    normals = np.concatenate([out, [[1.0, taper, 0.0], [-1.0, taper, 0.0]]])
-    reach = half_width + taper * outline[:, 1].min()
+    normals = np.concatenate([out, [[1.0, shape.taper, 0.0], [-1.0, shape.taper, 0.0]]])
+    reach = shape.half_width + shape.taper * outline[:, 1].min()
     heights = out[:, 2] * outline[:, 0] + out[:, 1] * outline[:, 1]
-    offsets = np.concatenate([heights, [reach + centre, reach - centre]])
+    offsets = np.concatenate([heights, [reach + shape.centre, reach - shape.centre]])
     length = np.linalg.norm(normals, axis=1)
     return Part(normals / length[:, None], offsets / length, material)
 

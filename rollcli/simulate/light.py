@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from rollcli.simulate.solids import Solid
 from rollcli.simulate.surfaces import Surface
 from rollcli.simulate.texture import Values, coarse
-from rollcli.simulate.vectors import Array, dot, turn
+from rollcli.simulate.vectors import Array, dots
 
 
 @dataclass(frozen=True)
@@ -44,12 +44,12 @@ def in_shadow(points: Array, sun: Array, casters: Sequence[Surface]) -> NDArray[
     # seen along the sun's rays, a caster covers what lies within its outline
     across = np.cross(sun, [0.0, 1.0, 0.0])
     axes = np.array([across / np.linalg.norm(across), np.cross(across, sun) / np.linalg.norm(across)])
-    seen = np.stack([dot(axis, points) for axis in axes])
+    seen = dots(axes, points)
     for caster in casters:
         corners = caster.bounds()
         inside = ~shadow
         if corners is not None:
-            outline = axes @ corners
+            outline = dots(axes, corners)
             for place, low, high in zip(seen, outline.min(axis=1), outline.max(axis=1), strict=True):
                 inside &= (place > low) & (place < high)
         at = np.flatnonzero(inside)
@@ -61,7 +61,7 @@ def in_shadow(points: Array, sun: Array, casters: Sequence[Surface]) -> NDArray[
 
 def air_below(points: Array, car: Solid) -> Values:
     """The share of the sky's light that reaches ground points (3, N) near and below a car."""
-    right, _, ahead = turn(car.frame, points - car.place[:, None])
+    right, _, ahead = dots(car.frame, points - car.place[:, None])
     away = np.maximum(np.abs(right) - 0.75, 0) ** 2 + np.maximum(np.abs(ahead) - 2.0, 0) ** 2
     return np.asarray(1 - 0.85 * np.exp(-away / 0.35**2), np.float32)
 

@@ -113,7 +113,9 @@ class Asphalt(_Tinted):
             base[at] += np.float32(patch.change) * inside
         for seam in self.seams:
             # a line of tar that wanders with the blotches of the surface
-            base *= 1 - 0.45 * band(p + 0.12 * blotch, seam - 0.02, seam + 0.02, w)
+            at = np.flatnonzero(np.abs(p - np.float32(seam)) < 0.6)
+            place = p[at] + np.float32(0.12) * blotch[at]
+            base[at] *= 1 - np.float32(0.45) * band(place, seam - 0.02, seam + 0.02, w[at])
         base = self.level * np.maximum(base, np.float32(0.15))
         wear = np.clip(0.8 + 0.18 * grain + 0.15 * blotch, 0, 1)
         for mark in self.marks:

@@ -5,7 +5,7 @@
 
 import numpy as np
 
-from rollcli.simulate.cars import box, car, car_materials
+from rollcli.simulate.cars import box, car_materials, vehicle
 from rollcli.simulate.facade import Facade
 from rollcli.simulate.materials import WARM, Leaves, Paving, Plain, Tint
 from rollcli.simulate.scene import FAR, Scene, draw, draw_offset
@@ -57,7 +57,7 @@ def add_houses(
     n = 24
     widths, storeys = rng.uniform(7, 16, n), rng.uniform(2.8, 3.4, n)
     edges = -20 + np.concatenate([[0.0], np.cumsum(widths)])
-    heights = storeys * rng.integers(2, 5, n) + rng.uniform(0.3, 1.0, n)
+    heights = storeys * rng.integers(2, 5, n) + rng.uniform(0.3, 0.8, n)
     heights[rng.random(n) < 0.1] = 0.0
     levels, bays = rng.uniform(0.25, 0.65, n), rng.uniform(2.2, 3.6, n)
     tints = np.stack([rng.uniform(0.6, 1.0, n), rng.uniform(0.85, 1.0, n), np.ones(n)], axis=1)
@@ -129,19 +129,19 @@ def add_cars(scene: Scene, rng: np.random.Generator, way: Way) -> None:
     """One ahead, one oncoming, and parked ones, each there or not."""
     places: list[tuple[float, float]] = []
     if rng.random() < 0.5:
-        places.append((way.shift + rng.normal(0, 0.2), rng.uniform(8, 40)))
-    if rng.random() < 0.5:
-        places.append((way.shift - way.lane + rng.normal(0, 0.2), rng.uniform(10, 60)))
+        places.append((way.shift + rng.normal(0, 0.2), rng.uniform(9, 40)))
+    if rng.random() < 0.5 and not way.single:
+        places.append((way.shift - way.lane + rng.normal(0, 0.2), rng.uniform(9, 60)))
     if way.parking:
         for edge in (way.left + 1.15, way.right - 1.15):
             z = rng.uniform(6, 12)
             while z < 70:
                 if rng.random() < 0.6:
                     places.append((edge + rng.normal(0, 0.05), z))
-                z += rng.uniform(5.5, 7.5)
+                z += rng.uniform(8.2, 10)
     first, middle = len(scene.materials), way.shift - way.lane / 2
     scene.materials += car_materials(draw_offset(rng))
-    scene.cars += [car(rng, way.course, float(x), float(z), first, x < middle) for x, z in places]
+    scene.cars += [vehicle(rng, way.course, float(x), float(z), first, x < middle) for x, z in places]
     scene.surfaces += scene.cars
 
 

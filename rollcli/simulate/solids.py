@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from rollcli.simulate.surfaces import NEAR, Chart
 from rollcli.simulate.texture import coarse, fine
-from rollcli.simulate.vectors import Array, dot, turn
+from rollcli.simulate.vectors import Array, dots
 
-_UP = np.eye(3)[:, 1:2]
+_UP = np.eye(3, dtype=np.float32)[:, 1:2]
 
 
 class Part(NamedTuple):
@@ -34,29 +34,24 @@ class Solid:
     extent: Array
 
     def intersect(self, origin: Array, direction: Array) -> Array:
-        o = turn(self.frame, origin - self.place[:, None])
-        r = turn(self.frame, direction)
+        o = dots(self.frame, origin - self.place[:, None])
+        r = dots(self.frame, direction)
         first = np.full(r.shape[1], np.inf)
         for normals, offsets, _ in self.parts:
-            enter, leave = np.full(first.shape, -np.inf), np.full(first.shape, np.inf)
-            for normal, offset in zip(normals, offsets, strict=True):
-                # + 0.0 makes -0.0 positive: a ray along a face and outside of it then leaves at -inf
-                toward = dot(normal, r) + 0.0
-                with np.errstate(divide="ignore", invalid="ignore"):
-                    t = (offset - dot(normal, o)) / toward
-                inward = toward < 0
-                np.maximum(enter, t, out=enter, where=inward)
-                np.minimum(leave, t, out=leave, where=~inward)
+            # + 0.0 makes -0.0 positive: a ray along a face and outside of it then leaves at -inf
+            toward, room = dots(normals, r) + 0.0, offsets[:, None] - dots(normals, o)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                t = room / toward
+            inward = toward < 0
+            enter = np.where(inward, t, -np.inf).max(axis=0)
+            leave = np.where(inward, np.inf, t).min(axis=0)
             np.minimum(first, enter, out=first, where=(enter < leave) & (enter > NEAR))
         return first
 
     def chart(self, points: Array) -> Chart:
-        local = turn(self.frame, points - self.place[:, None])
+        local = dots(self.frame, points - self.place[:, None])
         # a point on a part's surface is level with one of its faces and behind the others
-        heights = [
-            np.stack([dot(n, local) - d for n, d in zip(normals, offsets, strict=True)])
-            for normals, offsets, _ in self.parts
-        ]
+        heights = [dots(normals, local) - offsets[:, None] for normals, offsets, _ in self.parts]
         owner = np.argmin([np.abs(h.max(axis=0)) for h in heights], axis=0)
         normal = np.empty((points.shape[1], 3))
         for k, part in enumerate(self.parts):
@@ -67,7 +62,7 @@ class Solid:
         first, second = np.array([2, 0, 0])[flat], np.array([1, 2, 1])[flat]
         each = np.arange(points.shape[1])
         return Chart(
-            turn(self.frame.T, normal.T),
+            dots(self.frame.T, normal.T),
             local[first, each],
             local[second, each],
             self.frame[first].T,

@@ -14,6 +14,6 @@ def dot(a: Vectors, b: Vectors) -> Vectors:
     return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
-def turn(axes: Array, vectors: Vectors) -> Vectors:
-    """The components of `vectors` along the rows of `axes` (3, 3)."""
-    return np.stack([dot(axis, vectors) for axis in axes])
+def dots(axes: Vectors, vectors: Vectors) -> Vectors:
+    """The components (K, N) of `vectors` (3, N) along each of `axes` (K, 3)."""
+    return np.asarray(np.einsum("ki,in->kn", axes, vectors))

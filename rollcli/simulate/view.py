@@ -166,7 +166,7 @@ def _read(scene: Scene, surface: Surface, rays: Rays, direction: Values, at: Ind
     chart = surface.chart(points)
     # a face seen from behind is lit as seen
     facing = -np.sign(dot(chart.normal, direction))
-    lambert = facing * dot(chart.normal, scene.light.sun)
+    lambert = facing * dot(chart.normal, scene.light.sun.astype(np.float32))
     sun = np.maximum(lambert / np.sqrt(dot(chart.normal, chart.normal)), 0)
     if scene.light.sunny and isinstance(surface, Ground | Wall):
         casters = [s for s in scene.surfaces if not isinstance(s, Ground)]

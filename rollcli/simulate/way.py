@@ -12,13 +12,14 @@ from rollcli.simulate.surfaces import Course
 
 @dataclass(frozen=True)
 class Way:
-    """Two lanes between two edges (lateral, metres); ours, the right one, has its middle at `shift`."""
+    """One or two lanes between two edges (lateral, metres); the middle of ours, the right one, is `shift`."""
 
     course: Course
     left: float
     right: float
     lane: float
     shift: float
+    single: bool
     parking: bool
 
     @property
@@ -28,22 +29,27 @@ class Way:
 
 
 def draw_way(rng: np.random.Generator, spec: FrameSpec) -> Way:
-    """Half of the roads bend; some have room to park."""
+    """Half of the roads bend; country roads can have a single lane, others room to park."""
     bend = float(rng.choice([0.0, 1.0])) * draw(rng, -1 / 250, 1 / 250)
     heading = float(rng.normal(0, 0.015))
     course = Course(heading, 0.0 if spec.scene == "bare" else bend, spec.curvature)
     lane, shift = draw(rng, 2.8, 3.7), float(rng.normal(0, 0.25))
-    parking = bool(rng.random() < 0.4)
-    shoulder = 2.2 if parking else draw(rng, 0.2, 0.6)
-    return Way(course, shift - 1.5 * lane - shoulder, shift + 0.5 * lane + shoulder, lane, shift, parking)
+    country = spec.scene in ("bare", "verge")
+    single = bool(rng.random() < 0.3) and country
+    parking = bool(rng.random() < 0.4) and not country
+    shoulder = 2.2 if parking else draw(rng, 0.1, 0.6)
+    left = shift - (0.5 if single else 1.5) * lane - shoulder
+    return Way(course, left, shift + 0.5 * lane + shoulder, lane, shift, single, parking)
 
 
 def draw_asphalt(rng: np.random.Generator, way: Way) -> Asphalt:
     """Its marks, gutters, mended patches and seams."""
     middle, left, right = (way.shift + x * way.lane for x in (-0.5, -1.5, 0.5))
-    marks = [Mark(middle, 0.13, 12.0, 6.0) if rng.random() < 0.8 else Mark(middle, 0.13)]
-    if rng.random() < 0.6:
-        marks += [Mark(left, 0.12), Mark(right, 0.12)]
+    marks = []
+    if not way.single:
+        marks.append(Mark(middle, 0.13, 12.0, 6.0) if rng.random() < 0.8 else Mark(middle, 0.13))
+        if rng.random() < 0.6:
+            marks += [Mark(left, 0.12), Mark(right, 0.12)]
     gutters = ((way.left, way.left + 0.35), (way.right - 0.35, way.right))
     patches = [Patch(start, end, -50, FAR, -0.2) for start, end in gutters]
     for _ in range(rng.integers(1, 6)):
@@ -52,10 +58,10 @@ def draw_asphalt(rng: np.random.Generator, way: Way) -> Asphalt:
         patches.append(Patch(x, x + wide, z, z + long, draw(rng, -0.35, 0.2)))
     return Asphalt(
         draw(rng, 0.16, 0.30),
-        draw(rng, 0.05, 0.2),
+        draw(rng, 0.04, 0.2),
         wheels=(way.shift + 0.25 * way.lane, way.lane / 2),
         marks=tuple(marks),
         patches=tuple(patches),
-        seams=tuple(rng.uniform(way.left, way.right, rng.integers(1, 4))),
+        seams=tuple(draw(rng, way.left, way.right) for _ in range(rng.integers(1, 4))),
         offset=draw_offset(rng),
     )
