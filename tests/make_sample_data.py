@@ -41,7 +41,7 @@ def make(folder: Path) -> None:
     maps, exact = folder / "maps", folder / "disparity" / f"{EXACT}.png"
     write_atomic(maps / exact.name, exact.read_bytes())
     shutil.rmtree(exact.parent)
-    for stem in dataset.stems:
+    for stem in [task.stem for task in dataset.tasks]:
         if stem != EXACT:
             left, right = (read_image(folder / side / f"{stem}.png") for side in ("left", "right"))
             stored, ending = _stored(stem, compute_disparity(left, right, mode="3way"))

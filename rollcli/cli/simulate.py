@@ -1,7 +1,5 @@
 """`rollcli simulate`: stereo pairs whose roll is known."""
 
-from typing import Any
-
 import click
 
 from rollcli.batch.options import RunningOptions
@@ -98,7 +96,8 @@ simulate_options = record(
 @click.argument("folder", metavar="DIR", type=PATH)
 @simulate_options
 @running_options
-def simulate(folder: str, options: SimulateOptions, running: RunningOptions, **_: Any) -> None:
+@click.pass_context
+def simulate(ctx: click.Context, /, folder: str, options: SimulateOptions, running: RunningOptions) -> None:
     """Render road stereo pairs with known roll into DIR.
 
     Writes DIR/left and DIR/right (8-bit PNG), DIR/disparity (the true disparity of the left view, 16-bit
@@ -111,4 +110,4 @@ def simulate(folder: str, options: SimulateOptions, running: RunningOptions, **_
     """
     from rollcli.simulate.run import run
 
-    run(folder, options, running)
+    ctx.exit(run(folder, options, running))

@@ -3,20 +3,18 @@
 import csv
 import io
 import math
-import os
 import re
-import signal
 from collections.abc import Iterator, Sequence
-from concurrent.futures import BrokenExecutor, ProcessPoolExecutor
 from dataclasses import dataclass
-from itertools import repeat
-from multiprocessing import get_context
 from pathlib import Path
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from rollcli.batch.local import done_locally
+from rollcli.batch.signals import Stop
+from rollcli.batch.workers import Work
 from rollcli.errors import OutputError, UsageError
 from rollcli.files.atomic import output_error, write_atomic
 from rollcli.files.encodings import from_disparity
@@ -43,22 +41,36 @@ _KITTI_TOP = 65534 / 256  # the largest disparity that a KITTI PNG holds, pixels
 
 
 @dataclass(frozen=True)
+class Task:
+    """A frame to render and the names of its files."""
+
+    spec: FrameSpec
+    folder: Path
+    stem: str
+
+    def image(self, part: str) -> Path:
+        """The file of "left", "right" or "disparity"."""
+        return self.folder / part / f"{self.stem}.png"
+
+
+@dataclass(frozen=True)
 class Dataset:
-    """Where frames are written, and which: frame i is named after stems[i]."""
+    """Which frames are written, and where."""
 
     folder: Path
     specs: tuple[FrameSpec, ...]
 
     @property
-    def stems(self) -> list[str]:
-        """frame_0001, frame_0002, ..."""
+    def tasks(self) -> list[Task]:
+        """The frames with their names: frame_0001, frame_0002, ..."""
         digits = max(4, len(str(len(self.specs))))
-        return [f"frame_{number:0{digits}d}" for number in range(1, len(self.specs) + 1)]
+        return [
+            Task(spec, self.folder, f"frame_{number:0{digits}d}") for number, spec in enumerate(self.specs, 1)
+        ]
 
     def files(self) -> list[Path]:
         """Everything that is written, truth.csv last."""
-        images = [self.folder / part / f"{stem}.png" for stem in self.stems for part in _PARTS]
-        return [*images, self.folder / _TRUTH]
+        return [*(task.image(part) for task in self.tasks for part in _PARTS), self.folder / _TRUTH]
 
 
 def plan_dataset(folder: str | Path, options: SimulateOptions, *, overwrite: bool = False) -> Dataset:
@@ -99,11 +111,19 @@ def plan_dataset(folder: str | Path, options: SimulateOptions, *, overwrite: boo
     return Dataset(Path(folder), tuple(specs))
 
 
-def write_dataset(dataset: Dataset, jobs: int = 1) -> Iterator[str]:
-    """Render and write the frames; yields each one's stem when it is on disk, and truth.csv last.
+def write_dataset(dataset: Dataset, jobs: int | None = 1, stop: Stop | None = None) -> Iterator[str]:
+    """Render and write the frames; yields each one's stem once it is on disk, in order.
 
-    Frames of an earlier simulation in the same folder are removed first. Until truth.csv is there, the
-    folder is not complete.
+    Frames of an earlier simulation in the same folder are removed first. truth.csv comes last: until it is
+    there, the folder is not complete.
+
+    Parameters
+    ----------
+    dataset : Dataset
+    jobs : int or None
+        Worker processes; None: the usable processors.
+    stop : Stop, optional
+        No frame is begun once this is asked for; truth.csv then is not written.
 
     Raises
     ------
@@ -111,27 +131,25 @@ def write_dataset(dataset: Dataset, jobs: int = 1) -> Iterator[str]:
         A file cannot be written, or a worker died.
     """
     _clear(dataset)
-    tasks = (dataset.specs, repeat(dataset.folder), dataset.stems)
-    jobs = min(jobs, len(dataset.specs))
-    if jobs <= 1:
-        yield from map(_write_frame, *tasks)
-    else:
-        try:
-            with ProcessPoolExecutor(jobs, get_context("spawn"), _ignore_interrupt) as pool:
-                yield from pool.map(_write_frame, *tasks)
-        except BrokenExecutor as error:
-            raise OutputError("a worker process died: out of memory, perhaps; try fewer --jobs") from error
-    write_atomic(dataset.folder / _TRUTH, _truth(dataset))
-    yield _TRUTH
+    written = 0
+    for stem in done_locally(dataset.tasks, Work(_write_frame, _lost), jobs, stop or Stop()):
+        written += 1
+        yield stem
+    if written == len(dataset.specs):
+        write_atomic(dataset.folder / _TRUTH, _truth(dataset))
 
 
-def _write_frame(spec: FrameSpec, folder: Path, stem: str) -> str:
-    frame = render_frame(spec)
-    for part, image in (("left", frame.left), ("right", frame.right)):
-        write_atomic(folder / part / f"{stem}.png", _png(image))
+def _write_frame(task: Task) -> str:
+    frame = render_frame(task.spec)
+    write_atomic(task.image("left"), _png(frame.left))
+    write_atomic(task.image("right"), _png(frame.right))
     stored = from_disparity(frame.disparity, "kitti", np.uint16)
-    write_atomic(folder / "disparity" / f"{stem}.png", encode_stored(stored, "png"))
-    return stem
+    write_atomic(task.image("disparity"), encode_stored(stored, "png"))
+    return task.stem
+
+
+def _lost(task: Task, reason: str) -> str:
+    raise OutputError(f"{task.image('left')}: cannot be rendered: {reason}; try fewer --jobs")
 
 
 def _png(image: NDArray[np.uint8]) -> bytes:
@@ -144,10 +162,11 @@ def _truth(dataset: Dataset) -> bytes:
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
     rows.writerow(COLUMNS)
-    for stem, spec in zip(dataset.stems, dataset.specs, strict=True):
+    for task in dataset.tasks:
+        spec = task.spec
         angles = (f"{math.degrees(angle):.9f}" for angle in (spec.roll, spec.pitch))
         rig = (f"{number:.10g}" for number in (spec.focal, spec.baseline, spec.height, spec.curvature))
-        rows.writerow((stem, *angles, spec.scene, *rig, spec.seed))
+        rows.writerow((task.stem, *angles, spec.scene, *rig, spec.seed))
     return text.getvalue().encode()
 
 
@@ -189,16 +208,3 @@ def _earlier_frames(folder: Path) -> list[Path]:
 
 def _radians(span: Sequence[float]) -> tuple[float, float]:
     return math.radians(span[0]), math.radians(span[1])
-
-
-def _ignore_interrupt() -> None:
-    """Ctrl-C ends the program that asked for the frames; its workers end with it."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
-def usable_processors() -> int:
-    """How many processors this process may use."""
-    try:
-        return len(os.sched_getaffinity(0))
-    except AttributeError:  # not on macOS and Windows
-        return os.cpu_count() or 1

@@ -1,26 +1,51 @@
-"""A simulation from the command line: what it says and what it writes."""
+"""A simulation from the command line: what it writes, and what it says meanwhile."""
 
 import sys
 import time
 
 from rollcli.batch.options import RunningOptions
-from rollcli.simulate.dataset import plan_dataset, usable_processors, write_dataset
+from rollcli.batch.signals import stop_on_signals
+from rollcli.simulate.dataset import Dataset, plan_dataset, write_dataset
 from rollcli.simulate.options import SimulateOptions
 
+INTERRUPTED = 130
 
-def run(folder: str, options: SimulateOptions, running: RunningOptions) -> None:
-    """Do what was asked; `UsageError` and `OutputError` say what went wrong."""
+
+def run(folder: str, options: SimulateOptions, running: RunningOptions) -> int:
+    """Do what was asked; the exit status.
+
+    Raises
+    ------
+    UsageError, OutputError
+        Exit statuses 2 and 1.
+    """
     dataset = plan_dataset(folder, options, overwrite=running.overwrite)
     if running.dry_run:
         sys.stdout.writelines(f"write {path}\n" for path in dataset.files())
-        return
+        return 0
+    start, total = time.monotonic(), len(dataset.specs)
+    done = _write(dataset, running)
+    if done < total:
+        _say(f"interrupted after {done} of {total} frames; start again with --overwrite")
+        return INTERRUPTED
+    if not running.quiet:
+        _say(f"{total} frames in {dataset.folder}; {time.monotonic() - start:.1f} s")
+    return 0
+
+
+def _write(dataset: Dataset, running: RunningOptions) -> int:
+    """Write the frames, and truth.csv if that is all of them; how many there are."""
     from tqdm import tqdm
 
-    start, hidden = time.monotonic(), running.quiet or not sys.stderr.isatty()
-    done = write_dataset(dataset, running.jobs or usable_processors())
-    for stem in tqdm(done, total=len(dataset.specs) + 1, unit=" frames", disable=hidden):
-        if running.verbose and not running.quiet:
-            tqdm.write(f"rollcli: {stem} written", file=sys.stderr)
-    if not running.quiet:
-        seconds = time.monotonic() - start
-        sys.stderr.write(f"rollcli: {len(dataset.specs)} frames in {dataset.folder}; {seconds:.1f} s\n")
+    done, hidden = 0, running.quiet or not sys.stderr.isatty()
+    with stop_on_signals() as stop, tqdm(total=len(dataset.specs), unit=" frames", disable=hidden) as bar:
+        for stem in write_dataset(dataset, running.jobs, stop):
+            done += 1
+            bar.update()
+            if running.verbose and not running.quiet:
+                bar.write(f"rollcli: {stem} written", file=sys.stderr)
+    return done
+
+
+def _say(message: str) -> None:
+    sys.stderr.write(f"rollcli: {message}\n")

@@ -1,9 +1,14 @@
 """`rollcli simulate` as a user runs it."""
 
+import signal
+import subprocess
+import sys
+import time
+
 import pytest
 
 from rollcli.cli.main import main
-from tests.program import contents, rollcli
+from tests.program import command, contents, environment, rollcli
 
 TINY = ("--frames", "2", "--size", "64x48")
 
@@ -92,3 +97,19 @@ def test_help_loads_neither_numpy_nor_opencv(tmp_path):
     loaded = {line.rpartition("|")[2].strip() for line in done.err.splitlines()}
     assert done.status == 0
     assert not loaded & {"numpy", "cv2", "tqdm"}
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_ctrl_c_ends_it_with_status_130_and_without_truth(tmp_path, jobs):
+    line = command("simulate", "rig", "--frames", "5000", "--size", "64x48", "-j", jobs)
+    with subprocess.Popen(line, cwd=tmp_path, env=environment(), stderr=subprocess.PIPE, text=True) as run:
+        while not (tmp_path / "rig/disparity/frame_0003.png").exists():
+            time.sleep(0.02)
+            assert run.poll() is None
+        run.send_signal(signal.SIGINT)
+        _, err = run.communicate(timeout=30)
+    assert run.returncode == 130
+    assert err.count("\n") == 1
+    assert "of 5000 frames; start again with --overwrite" in err
+    assert not (tmp_path / "rig/truth.csv").exists()
