@@ -8,7 +8,7 @@ from rollcli.batch.job import Frame
 from rollcli.errors import UsageError
 
 
-def check_one_owner(writes: Iterable[tuple[Frame, Sequence[str]]]) -> None:
+def check_one_owner(writes: Iterable[tuple[Frame, Iterable[str]]]) -> None:
     """Every file is written for one frame.
 
     Parameters
@@ -32,7 +32,7 @@ def check_one_owner(writes: Iterable[tuple[Frame, Sequence[str]]]) -> None:
                 )
 
 
-def check_inputs_are_kept(reads: Iterable[str], writes: Iterable[str]) -> None:
+def check_inputs_are_kept(reads: Sequence[str], writes: Iterable[str]) -> None:
     """Nothing that is read is written.
 
     Raises
@@ -40,7 +40,9 @@ def check_inputs_are_kept(reads: Iterable[str], writes: Iterable[str]) -> None:
     UsageError
         Names the file, however differently it was spelled.
     """
-    written = {_place(path) for path in writes}
+    folders = {_real_folder(os.path.split(path)[0]) for path in reads}
+    # only what is written beside an input can replace one
+    written = {_place(path) for path in writes if _real_folder(os.path.split(path)[0]) in folders}
     for path in reads if written else ():
         if _place(path) in written:
             raise UsageError(f"{path}: would be replaced by an output; write somewhere else")

@@ -1,7 +1,7 @@
 """The frames behind what a user named: maps, or stereo pairs, each with its mask."""
 
 from collections.abc import Sequence
-from pathlib import Path
+from pathlib import Path, PurePath
 
 from rollcli.batch.job import Frame
 from rollcli.batch.options import InputOptions, PairOptions, RegionOptions
@@ -62,8 +62,8 @@ def _frame(left: Input, right: Input | None, masks: "_Masks") -> Frame:
     return Frame(
         file=left.name,
         right_file=right.name if right else "",
-        path=str(left.path),
-        right_path=str(right.path) if right else "",
+        path=left.location,
+        right_path=right.location if right else "",
         relative=left.relative,
         mask=masks.of(left),
     )
@@ -76,7 +76,7 @@ class _Masks:
         self.one, self.by_stem = region.mask if region else None, None
         if self.one is not None and Path(self.one).is_dir():
             found = find_inputs([self.one], recursive=True)
-            self.by_stem = {Path(each.name).stem: str(each.path) for each in found}
+            self.by_stem = {Path(each.name).stem: each.location for each in found}
         elif self.one is not None and not Path(self.one).is_file():
             raise UsageError(f"{self.one}: no such mask file or folder")
 
@@ -85,6 +85,6 @@ class _Masks:
         if self.by_stem is None:
             return self.one
         try:
-            return self.by_stem[left.path.stem]
+            return self.by_stem[PurePath(left.name).stem]
         except KeyError:
             raise UsageError(f"{left.name}: has no mask of its name in {self.one}") from None

@@ -1,6 +1,8 @@
 """What a run will read and write, decided and checked before anything runs."""
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import chain
 from typing import Literal
 
 from rollcli.batch.checks import check_inputs_are_kept, check_nothing_is_there, check_one_owner
@@ -35,14 +37,19 @@ def make_plan(options: EstimateOptions) -> Plan:
     part, parts = options.result.shard
     frames = _find_frames(options)
     output = options.result.output
-    images = [[path for _, path in image_paths(frame, options.images)] for frame in frames]
     results = [] if output == STDOUT else [output, str(run_path(output))]
-    check_one_owner(zip(frames, images, strict=True))
-    reads = (path for frame in frames for path in frame.reads())
-    check_inputs_are_kept(reads, [*results, *(path for paths in images for path in paths)])
+    check_one_owner((frame, _images([frame], options)) for frame in frames)
+    reads = [path for frame in frames for path in frame.reads()]
+    check_inputs_are_kept(reads, chain(results, _images(frames, options)))
+    frames = frames[part - 1 :: parts]
     if not (options.running.overwrite or options.result.resume):
-        check_nothing_is_there(path for paths in images[part - 1 :: parts] for path in paths)
-    return Plan(frames[part - 1 :: parts], output, options.result.format or _format(output))
+        check_nothing_is_there(_images(frames, options))
+    return Plan(frames, output, options.result.format or _format(output))
+
+
+def _images(frames: Iterable[Frame], options: EstimateOptions) -> Iterator[str]:
+    """Every image that is written; one by one, since a list of them would be most of our memory."""
+    return (path for frame in frames for _, path in image_paths(frame, options.images))
 
 
 def _format(output: str) -> Literal["csv", "jsonl"]:

@@ -16,13 +16,13 @@ IMAGE_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm
 _NAMED = 3  # how many files a message lists
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Input:
     """A file to work on.
 
     Attributes
     ----------
-    path : Path
+    location : str
         Where it is.
     name : str
         As the user named it, with "/" separators: what a result's column `file` says.
@@ -30,12 +30,17 @@ class Input:
         Its path below the folder or pattern it was found in: where outputs keep it.
     """
 
-    path: Path
+    location: str
     name: str
     relative: str
 
+    @property
+    def path(self) -> Path:
+        """Where it is; made when asked for, since a path takes ten times the memory of its text."""
+        return Path(self.location)
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, slots=True)
 class Pair:
     """A left and a right image that belong together."""
 
@@ -85,17 +90,24 @@ def find_inputs(
         Nothing is found at all, or a folder or pattern holds nothing, or a list cannot be read.
     """
     search = Search(endings, recursive, include, exclude, skip)
-    found: dict[tuple[str, str], Input] = {}
+    found: list[Input] = []
+    seen: set[str] = set()
     real = functools.cache(os.path.realpath)  # one folder holds thousands of files
     for argument, literal in _arguments(inputs, files_from, stdin):
         for path, relative in search.files(argument, literal=literal):
             # links to files stay themselves: each may be a frame
-            identity = (str(real(path.parent)), path.name)
-            found.setdefault(identity, Input(path, path.as_posix(), relative))
-    if not any(os.path.lexists(each.path) for each in found.values()):
-        named = ", ".join(each.name for each in list(found.values())[:_NAMED])
+            identity = f"{real(path.parent)}/{path.name}"
+            if identity not in seen:
+                seen.add(identity)
+                location = str(path)
+                name = location if os.sep == "/" else path.as_posix()  # one text, not two
+                found.append(Input(location, name, relative))
+    del seen  # before the keys of the sort take its place
+    if not any(os.path.lexists(each.location) for each in found):
+        named = ", ".join(each.name for each in found[:_NAMED])
         raise UsageError(f"no input found: {named + ': no such file' if named else 'the list is empty'}")
-    return sorted(found.values(), key=lambda each: natural_key(each.name))
+    found.sort(key=lambda each: natural_key(each.name))
+    return found
 
 
 def pair_inputs(

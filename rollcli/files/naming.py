@@ -17,18 +17,24 @@ _NUMBERED = (
 )
 
 
-def natural_key(name: str) -> tuple[tuple[tuple[int, int, str, str], ...], ...]:
-    """A sort key that puts frame2 before frame10, folder by folder."""
-    return tuple(
-        tuple(_run_key(run) for run in re.findall(r"[0-9]+|[^0-9]+", part)) for part in name.split("/")
-    )
+def natural_key(name: str) -> str:
+    """A sort key that puts frame2 before frame10, folder by folder.
+
+    A string, since a batch has a hundred thousand of them: a folder ends with the lowest character, numbers
+    come before text, and a number is told by its length first.
+    """
+    return "\0".join("".join(map(_run_key, _RUNS.findall(part))) for part in name.split("/"))
 
 
-def _run_key(run: str) -> tuple[int, int, str, str]:
+_RUNS = re.compile(r"[0-9]+|[^0-9]+")
+_NUMBER, _TEXT, _MOST_DIGITS = "\1", "\2", 50_000
+
+
+def _run_key(run: str) -> str:
     if "0" <= run[0] <= "9":
         digits = run.lstrip("0")  # not int(): Python refuses numbers of thousands of digits
-        return 0, len(digits), digits, run
-    return 1, 0, run, ""
+        return f"{_NUMBER}{chr(min(len(digits), _MOST_DIGITS) + 3)}{digits}{run}"
+    return _TEXT + run
 
 
 @dataclass(frozen=True)
