@@ -9,27 +9,24 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rollcli.errors import EstimationError, UsageError
+from rollcli.errors import UsageError
 from rollcli.estimator import verdict
-from rollcli.estimator.areas import areas
 from rollcli.estimator.energy import Energy
-from rollcli.estimator.exact import exact, minima
+from rollcli.estimator.exact import Minimum, exact, minima
 from rollcli.estimator.golden_section import golden_section
 from rollcli.estimator.gradient_descent import LAMBDA0, TOLERANCE, gradient_descent
 from rollcli.estimator.interval import half_width
-from rollcli.estimator.moments import map_moments, point_moments
 from rollcli.estimator.pixels import require_pixels
-from rollcli.estimator.plane_fit import AreaSolution, plane_fit
-from rollcli.estimator.road import Road, find_road
-from rollcli.estimator.sample import take_sample
-from rollcli.estimator.solution import Solution
-from rollcli.estimator.surface import Surface, fit_surface, whole_surface
+from rollcli.estimator.selection import Pixels, take_all, take_area, take_road
+from rollcli.estimator.solution import Solution, apart
+from rollcli.estimator.surface import Surface
 
 AREA_METHODS = ("plane", "areas")
 METHODS = ("gd", "gss", "exact", *AREA_METHODS)
 MODELS = ("parabola", "line")
 ROADS = ("auto", "all")
 MAX_ROLL_LIMIT = math.radians(89)
+_SAME_BASIN = math.radians(0.01)
 
 
 @dataclass(frozen=True)
@@ -145,24 +142,28 @@ def estimate_roll(
     valid = _valid(values, usable)
     count = require_pixels(valid)
     if road == "auto":
-        pixels = _find(values, usable, max_roll, seed, parabolic=model == "parabola")
+        pixels = take_road(values, usable, max_roll, seed, parabolic=model == "parabola")
     else:
-        pixels = _take_all(values, valid, parabolic=model == "parabola")
+        pixels = take_all(values, valid, parabolic=model == "parabola")
+    notes: list[str] = []
     solution: Solution
     if method in AREA_METHODS:
-        pixels, solution = _solve_area(values, valid, pixels, method, max_roll, chosen=usable is not None)
+        pixels, solution = take_area(values, valid, pixels, method, max_roll, chosen=usable is not None)
+        basins = minima(pixels.energy)
     else:
         solution = _solve(pixels.energy, method, tolerance, lambda0)
+        basins = minima(pixels.energy)
+        meant = solution.theta if pixels.road is None else _meant(basins, pixels)
+        if apart(solution.theta, meant) > max(10 * tolerance, _SAME_BASIN):
+            notes.append(
+                f"replaced the minimum that {method} found, {math.degrees(solution.theta):.4f} degrees"
+            )
+            solution = replace(solution, theta=meant)
     energy, surface = pixels.energy, pixels.surface
-    lowest, *others = minima(energy)
     slack = 1e-9 * (energy.rest + energy.slope_energy)
-    is_global = float(energy.at(solution.theta).value) <= lowest.energy + slack
-    notes = []
-    if not is_global and pixels.road is not None:
-        notes.append(f"replaced a local minimum of the energy at {math.degrees(solution.theta):.4f} degrees")
-        solution, is_global = replace(solution, theta=lowest.theta), True
+    is_global = float(energy.at(solution.theta).value) <= basins[0].energy + slack
     ci95 = None if surface is None else half_width(surface, solution.theta)
-    doubts = verdict.of_solution(solution, energy, lowest, others, is_global=is_global)
+    doubts = verdict.of_solution(solution, energy, basins, is_global=is_global)
     if pixels.road is not None and surface is not None:
         doubts += verdict.of_road(pixels.road, surface, max_roll)
     doubts += verdict.of_interval(ci95)
@@ -183,73 +184,16 @@ def estimate_roll(
         width=width,
         height=height,
         _usable=usable if pixels.area is None else pixels.area,
-        _surface=None if pixels.road is None or pixels.area is not None else surface,
+        _surface=surface if pixels.road is not None and pixels.area is None else None,
     )
 
 
-@dataclass(frozen=True)
-class _Pixels:
-    """What an angle rests on.
-
-    `road` is None where it was not looked for, `area` where the method does not choose the pixels itself;
-    `share` is that of the valid pixels which were used.
-    """
-
-    energy: Energy
-    surface: Surface | None
-    road: Road | None
-    share: float
-    area: NDArray[np.bool_] | None = None
-
-
-def _find(
-    values: NDArray[Any], usable: NDArray[np.bool_] | None, max_roll: float, seed: int, *, parabolic: bool
-) -> _Pixels:
-    """Find the road, and sum its pixels by their weights."""
-    sample = take_sample(values, usable)
-    found = find_road(sample, max_roll, seed)
-    surface = fit_surface(sample, found, parabolic=parabolic)
-    _, slope, _ = surface.alpha
-    plane = (surface.alpha[0], -slope * math.sin(surface.theta), slope * math.cos(surface.theta))
-    moments = point_moments(surface.x, surface.y, surface.d, surface.weights, sample.grid, plane)
-    return _Pixels(
-        Energy.of(moments, float(surface.d.max()), parabolic=parabolic), surface, found, surface.share
-    )
-
-
-def _take_all(values: NDArray[Any], valid: NDArray[np.bool_], *, parabolic: bool) -> _Pixels:
-    """Sum every valid pixel, as the paper does; a sample of them tells how sure that is."""
-    energy = Energy.of(map_moments(values, valid), float(values[valid].max()), parabolic=parabolic)
-    return _Pixels(energy, _sampled_surface(values, valid, energy), None, 1.0)
-
-
-def _sampled_surface(values: NDArray[Any], used: NDArray[np.bool_], energy: Energy) -> Surface | None:
-    try:
-        return whole_surface(take_sample(values, used), energy)
-    except EstimationError:  # too small a map to be sampled: an angle without an interval
-        return None
-
-
-def _solve_area(
-    values: NDArray[Any],
-    valid: NDArray[np.bool_],
-    pixels: _Pixels,
-    method: str,
-    max_roll: float,
-    *,
-    chosen: bool,
-) -> tuple[_Pixels, AreaSolution]:
-    """Fit planes to a part of the pixels; `chosen` says that the user's mask is the area of "plane"."""
-    road = valid
-    if pixels.road is not None and pixels.surface is not None:
-        road = valid & pixels.surface.covers(values)
-    if method == "areas":
-        solution = areas(values, road, max_roll)
-    else:
-        solution = plane_fit(values, road, (slice(None), slice(None)) if chosen else None)
-    surface = _sampled_surface(values, solution.used, solution.energy)
-    share = np.count_nonzero(solution.used) / np.count_nonzero(valid)
-    return _Pixels(solution.energy, surface, pixels.road, share, solution.used), solution
+def _meant(basins: list[Minimum], pixels: Pixels) -> float:
+    """Return the minimum that belongs to the road: a thin strip of it can have a deeper one elsewhere."""
+    if pixels.surface is None:
+        return basins[0].theta
+    theta = pixels.surface.theta
+    return min(basins, key=lambda basin: apart(basin.theta, theta)).theta
 
 
 def _solve(energy: Energy, method: str, tolerance: float, lambda0: float | Literal["auto"]) -> Solution:

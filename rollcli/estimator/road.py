@@ -31,6 +31,7 @@ _THIRD_PIXELS = 1500
 _FITS = 3
 _RADIUS = 0.35  # of a triple, in half image lengths
 _MIN_AREA = 0.004  # twice the area of its triangle, to be well conditioned
+_LEAST_RISE = 4.0  # tolerances that a road rises by within the radius
 _BELOW = 1.5  # cost of a coherent pixel under the road; one that is merely not on it costs 1
 _OFF_SLOPE = 0.2  # weight of a pixel around which the map does not rise as the road does
 _SLOPE_SHARE = 0.4  # of the road's own slope: how far the map's may be off
@@ -131,7 +132,8 @@ def _planes(sample: Sample, max_roll: float, seed: int) -> Singles:
     wide = (np.abs(area) > _MIN_AREA) & (np.maximum(np.abs(y1), np.abs(y2)) < _RADIUS)
     area = np.where(wide, area, 1)
     c1, c2 = (d1 * y2 - d2 * y1) / area, (x1 * d2 - x2 * d1) / area
-    good = np.flatnonzero(wide & (c2 > 0) & (np.abs(c1) <= math.tan(max_roll) * c2))[:_HYPOTHESES]
+    steep = c2 * _RADIUS > _LEAST_RISE * sample.tolerance[a]  # a wall's noise is not a road
+    good = np.flatnonzero(wide & steep & (np.abs(c1) <= math.tan(max_roll) * c2))[:_HYPOTHESES]
     c1, c2, a = c1[good], c2[good], a[good]
     return np.stack([d[a] - c1 * x[a] - c2 * y[a], c1, c2], 1)
 

@@ -43,3 +43,8 @@ def principal(theta: float) -> float:
     """Return the angle in (-pi/2, pi/2] that describes the same rotation of rows as `theta`."""
     wrapped = math.remainder(theta, math.pi)
     return wrapped if wrapped > -math.pi / 2 + 1e-12 else math.pi / 2
+
+
+def apart(theta: float, other: float) -> float:
+    """Return the angle between two rolls, at most pi / 2."""
+    return abs(math.remainder(theta - other, math.pi))

@@ -7,7 +7,7 @@ import math
 from rollcli.estimator.energy import Energy
 from rollcli.estimator.exact import Minimum
 from rollcli.estimator.road import RIVAL_ANGLE, Road
-from rollcli.estimator.solution import Solution
+from rollcli.estimator.solution import Solution, apart
 from rollcli.estimator.surface import Surface
 
 WIDEST_INTERVAL = math.radians(0.25)
@@ -18,18 +18,17 @@ NEAR_MINIMUM = 1.1
 BOUND_SHARE = 0.99
 
 
-def of_solution(
-    solution: Solution, energy: Energy, lowest: Minimum, others: list[Minimum], *, is_global: bool
-) -> list[str]:
-    """Doubts that the energy raises."""
+def of_solution(solution: Solution, energy: Energy, basins: list[Minimum], *, is_global: bool) -> list[str]:
+    """Doubts that the energy raises; `basins` are its minima, the lowest first."""
     doubts = []
     if not solution.outcome.converged:
         doubts.append(solution.outcome.value)
+    lowest = basins[0]
     if not is_global:
         doubts.append(f"a lower minimum of the energy lies at {math.degrees(lowest.theta):.4f} degrees")
-    for other in others:
-        apart = abs(math.remainder(other.theta - solution.theta, math.pi))
-        if is_global and apart > RIVAL_ANGLE and other.energy < NEAR_MINIMUM * lowest.energy:
+    for other in basins[1:]:
+        near = other.energy < NEAR_MINIMUM * lowest.energy
+        if is_global and near and apart(other.theta, solution.theta) > RIVAL_ANGLE:
             doubts.append(f"the energy is nearly as low at {math.degrees(other.theta):.2f} degrees")
     _, c1, c2 = energy.plane
     if c2 * math.cos(solution.theta) - c1 * math.sin(solution.theta) < 0:
