@@ -17,7 +17,8 @@ from rollcli.estimator.sample import UNEVEN_SHARE, Sample
 
 _ROUNDS = 6
 _START = 2.0  # tolerances within which a pixel counts at first,
-_STRICT = 4.0  # in the end this many standard deviations,
+_STRICT = 5.0  # in the end this many standard deviations,
+_EVEN = 0.35
 _LEAST = 0.2  # though not less than this many tolerances
 _EDGE = 0.75  # half-width of the part of the image that counts; it ends as exp(-(x / _EDGE)^8)
 _DROP = 3.0  # farther than this many tolerances from the plane, a pixel is not looked at again
@@ -119,7 +120,7 @@ def fit_surface(sample: Sample, road: Road, *, parabolic: bool) -> Surface:
         sample.d[near].astype(np.float64),
     )
     tolerance = sample.tolerance[near].astype(np.float64)
-    place = road_weights(sample, road.plane, near) * np.exp(-np.square(np.square(np.square(x / _EDGE))))
+    place = np.square(road_weights(sample, road.plane, near)) * np.exp(-np.square(np.square(np.square(x / _EDGE))))
     theta, alpha, limit = road.theta, np.array([c0, math.hypot(c1, c2), 0.0]), _START
     residuals = off[near] * tolerance
     design = np.empty((5, len(near)))
@@ -141,7 +142,7 @@ def fit_surface(sample: Sample, road: Road, *, parabolic: bool) -> Surface:
         spread = np.abs(residuals[weights > 0]) / tolerance[weights > 0]
         middle = len(spread) // 2
         deviation = 1.4826 * float(np.partition(spread, middle)[middle])
-        limit = max(_LEAST, min(limit, _STRICT * deviation))
+        limit = max(_LEAST, min(limit, (_STRICT if deviation > _EVEN else 3.0) * deviation))
     weights = _biweight(residuals, limit * tolerance) * place
     used = weights > 0
     if np.count_nonzero(used) < MIN_PIXELS:
