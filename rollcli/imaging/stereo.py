@@ -1,6 +1,7 @@
 """Disparity maps from stereo pairs with OpenCV's semi-global matching [Hirschmüller 2008]."""
 
-from dataclasses import dataclass, replace
+import math
+from dataclasses import dataclass
 from typing import Any
 
 import cv2
@@ -8,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError
+from rollcli.imaging.disparity_range import largest_disparity
 from rollcli.imaging.stereo_options import StereoOptions as StereoOptions
 
 MODES = {
@@ -15,7 +17,12 @@ MODES = {
     "hh": cv2.STEREO_SGBM_MODE_HH,
     "3way": cv2.STEREO_SGBM_MODE_SGBM_3WAY,
 }
+Views = tuple[NDArray[np.uint8], NDArray[np.uint8]]
+"""Left and right."""
+
 _SUBPIXELS = 16  # OpenCV stores sixteenths of a pixel
+_SMALL_WIDTH = 320  # px, to find the range at
+_SMALL = StereoOptions(mode="3way", speckle_size=50, speckle_range=1)
 
 
 @dataclass(frozen=True)
@@ -65,48 +72,79 @@ def compute_disparity(left: NDArray[Any], right: NDArray[Any], **options: Any) -
 
 def match_pair(left: NDArray[Any], right: NDArray[Any], options: StereoOptions) -> StereoMatch:
     """The disparity map of a rectified pair, with the range that was searched; see `compute_disparity`."""
-    left, right = _prepared(left, options.downscale), _prepared(right, options.downscale)
-    if left.shape != right.shape:
+    if left.shape[:2] != right.shape[:2]:
         sizes = " and ".join(f"{each.shape[1]}x{each.shape[0]}" for each in (left, right))
         raise InputError(f"left and right image differ in size: {sizes}")
-    if options.num_disparities is None:
-        options = replace(options, num_disparities=_find_range(left, right, options))
-    disparity = _match(left, right, options)
-    assert options.num_disparities is not None
-    end = options.min_disparity + options.num_disparities - 2
+    views = _prepared(left, right, options.downscale)
+    first, count = options.min_disparity, options.num_disparities
+    if count is None:
+        count = _find_range(views) - first
+    width = views[0].shape[1]
+    count = _usable_range(count, first, width, options.block_size)
+    if count < 16:
+        raise InputError(f"images {width} px wide are too narrow to match from disparity {first} on")
+    disparity = _match(views, first, count, options)
     valid = np.count_nonzero(disparity)
     return StereoMatch(
         disparity=disparity,
-        min_disparity=options.min_disparity,
-        num_disparities=options.num_disparities,
-        end_fraction=np.count_nonzero(disparity >= end) / valid if valid else 0.0,
+        min_disparity=first,
+        num_disparities=count,
+        end_fraction=np.count_nonzero(disparity >= first + count - 2) / valid if valid else 0.0,
     )
 
 
-def _prepared(image: NDArray[Any], downscale: float) -> NDArray[np.uint8]:
+def _prepared(left: NDArray[Any], right: NDArray[Any], downscale: float) -> Views:
     """Grey, 8 bits, at the size to match at."""
-    if image.dtype == np.uint16:
-        # a camera's 12 bits in 16 would come out black at a fixed shift
-        image = cv2.convertScaleAbs(image, alpha=255 / max(int(image.max()), 1))
-    if image.dtype != np.uint8 or image.ndim not in (2, 3):
+    # cameras leave some of 16 bits unused: a fixed shift would make their images black
+    brightest = max(int(left.max(initial=1)), int(right.max(initial=1)))
+    return _plain(left, brightest, downscale), _plain(right, brightest, downscale)
+
+
+def _plain(image: NDArray[Any], brightest: int, downscale: float) -> NDArray[np.uint8]:
+    if image.dtype not in (np.uint8, np.uint16) or not (image.ndim == 2 or image.shape[2:] == (3,)):
         raise InputError(
-            f"an image of {image.dtype} and shape {image.shape} cannot be matched; 8 or 16 bits are"
+            f"an image of {image.dtype} and shape {image.shape} cannot be matched: "
+            "grey and BGR images of 8 and 16 bits can"
         )
-    if image.ndim == 3:
-        image = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
-    if downscale != 1:
-        size = tuple(max(1, round(side / downscale)) for side in image.shape[::-1])
-        image = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
-    return image
+    if image.dtype == np.uint16:
+        image = cv2.convertScaleAbs(image, alpha=255 / brightest)
+    grey = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) if image.ndim == 3 else image
+    return _shrunk(grey.astype(np.uint8, copy=False), downscale)
 
 
-def _match(left: NDArray[np.uint8], right: NDArray[np.uint8], options: StereoOptions) -> NDArray[np.float32]:
-    """OpenCV SGBM over the given range; pixels, no data is 0."""
-    assert options.num_disparities is not None
+def _shrunk(image: NDArray[Any], factor: float) -> NDArray[np.uint8]:
+    if factor == 1:
+        return image
+    height, width = (max(1, round(side / factor)) for side in image.shape)
+    return cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
+
+
+def _find_range(views: Views) -> int:
+    """Disparities from 0 to this are worth a search, pixels."""
+    width = views[0].shape[1]
+    factor = max(1.0, width / _SMALL_WIDTH)
+    small = _shrunk(views[0], factor), _shrunk(views[1], factor)
+
+    def match(count: float) -> NDArray[np.float32]:
+        usable = _usable_range(math.ceil(count), 0, small[0].shape[1], _SMALL.block_size)
+        return _match(small, 0, usable, _SMALL) if usable >= 16 else np.zeros(small[0].shape, np.float32)
+
+    top = largest_disparity(match, small[0].shape[1])
+    return int(width // 8 if top is None else math.ceil(1.1 * top * factor) + 8)
+
+
+def _usable_range(count: int, first: int, width: int, block_size: int) -> int:
+    """A multiple of 16, as OpenCV wants it, that leaves columns to match; 0 where there is none."""
+    furthest = (width - block_size - max(0, first, -first)) // 16 * 16
+    return min(-(-max(1, count) // 16) * 16, furthest)
+
+
+def _match(views: Views, first: int, count: int, options: StereoOptions) -> NDArray[np.float32]:
+    """OpenCV SGBM over `count` disparities from `first` on; pixels, no data is 0."""
     area = options.block_size**2
     matcher = cv2.StereoSGBM.create(
-        minDisparity=options.min_disparity,
-        numDisparities=_multiple_of_16(options.num_disparities),
+        minDisparity=first,
+        numDisparities=count,
         blockSize=options.block_size,
         P1=8 * area,
         P2=32 * area,
@@ -116,25 +154,6 @@ def _match(left: NDArray[np.uint8], right: NDArray[np.uint8], options: StereoOpt
         speckleRange=options.speckle_range,
         mode=MODES[options.mode],
     )
-    sixteenths = matcher.compute(left, right)
+    sixteenths = matcher.compute(*views)
     disparity: NDArray[np.float32] = np.maximum(sixteenths, 0) / np.float32(_SUBPIXELS)
     return disparity
-
-
-def _find_range(left: NDArray[np.uint8], right: NDArray[np.uint8], options: StereoOptions) -> int:
-    """The range that the pair itself shows when matched small, with a margin."""
-    factor = max(1.0, left.shape[1] / 320)
-    small_left, small_right = _prepared(left, factor), _prepared(right, factor)
-    half = _multiple_of_16(small_left.shape[1] // 2)
-    found = _match(
-        small_left, small_right, replace(options, num_disparities=half, min_disparity=0, speckle_size=50)
-    )
-    valid = found[found > 0]
-    if valid.size == 0:
-        return 64
-    top = float(np.percentile(valid, 99.5)) * factor
-    return _multiple_of_16(round(1.1 * top) + 16 - options.min_disparity)
-
-
-def _multiple_of_16(value: int) -> int:
-    return max(16, -(-value // 16) * 16)

@@ -5,6 +5,16 @@ from dataclasses import dataclass
 from rollcli.errors import UsageError
 
 MODES = ("sgbm", "hh", "3way")
+_LARGEST = 2000  # px: OpenCV stores sixteenths in 16 bits
+_LIMITS = {
+    "num_disparities": (1, _LARGEST),
+    "min_disparity": (-_LARGEST, _LARGEST),
+    "block_size": (1, 21),  # larger ones overflow OpenCV's sums of costs
+    "uniqueness": (0, 99),  # at 100 OpenCV divides by zero
+    "speckle_size": (0, 10**6),
+    "speckle_range": (0, 1000),
+    "downscale": (1, 64),
+}
 
 
 @dataclass(frozen=True)
@@ -19,8 +29,9 @@ class StereoOptions:
         Where the range starts.
     block_size : int
         Side of the matched block, odd.
-    mode : {"sgbm", "hh", "3way"}
-        OpenCV's variants: five directions, eight (slow, much memory), three (fast).
+    mode : {"3way", "sgbm", "hh"}
+        OpenCV's variants: three directions (fast, and on real roads the nearest to lidar), five, eight (slow,
+        much memory).
     uniqueness : int
         Per cent by which the best match must win.
     speckle_size : int
@@ -34,18 +45,18 @@ class StereoOptions:
     num_disparities: int | None = None
     min_disparity: int = 0
     block_size: int = 5
-    mode: str = "sgbm"
+    mode: str = "3way"
     uniqueness: int = 10
     speckle_size: int = 100
     speckle_range: int = 2
     downscale: float = 1.0
 
     def __post_init__(self) -> None:
-        if self.num_disparities is not None and self.num_disparities < 1:
-            raise UsageError(f"num-disparities {self.num_disparities}: must be at least 1")
-        if self.block_size < 1 or self.block_size % 2 == 0:
-            raise UsageError(f"block-size {self.block_size}: must be odd and positive")
+        for name, (low, high) in _LIMITS.items():
+            value = getattr(self, name)
+            if value is not None and not low <= value <= high:
+                raise UsageError(f"{name.replace('_', '-')} {value}: must be from {low} to {high}")
+        if self.block_size % 2 == 0:
+            raise UsageError(f"block-size {self.block_size}: must be odd")
         if self.mode not in MODES:
             raise UsageError(f"sgbm-mode {self.mode!r}: choose one of {', '.join(MODES)}")
-        if not self.downscale >= 1:
-            raise UsageError(f"downscale {self.downscale}: must be at least 1")

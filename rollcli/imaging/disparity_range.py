@@ -1,0 +1,52 @@
+"""How far to search: the disparity range of a pair, found by matching it small."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Matcher = Callable[[float], NDArray[Any]]
+"""The disparity map, in pixels with 0 for no data, of a search as wide as given, pixels."""
+
+_ROUNDS = 4
+_MIN_SHARE = 0.01  # of the pixels, to say anything
+
+
+def largest_disparity(match: Matcher, width: int) -> float | None:
+    """The largest disparity of a pair, outliers aside.
+
+    Parameters
+    ----------
+    match : callable
+        Matches the pair within a range.
+    width : int
+        Of the images, pixels.
+
+    Returns
+    -------
+    float or None
+        Pixels; None where nothing can be matched.
+
+    Notes
+    -----
+    A search over half the width finds any disparity that a pair can have, but leaves out the left half of
+    the image. What it finds starts a narrower one, which grows for as long as it meets its end. Where there
+    is nothing to match, any candidate wins, and with more of them another one: so only what a search twice as
+    wide finds too is believed.
+    """
+    top = _top(match(width / 2), 98)
+    for _ in range(_ROUNDS):
+        if top is None:
+            return None
+        searched = 1.4 * top + 4
+        narrow, wide = match(searched), match(min(2 * searched, width / 2))
+        top = _top(np.where(np.abs(narrow - wide) < 1, narrow, 0), 99)
+        if top is not None and top < 0.85 * searched:
+            return top
+    return top
+
+
+def _top(disparity: NDArray[Any], percentile: float) -> float | None:
+    valid = disparity[disparity > 0]
+    return float(np.percentile(valid, percentile)) if valid.size > _MIN_SHARE * disparity.size else None

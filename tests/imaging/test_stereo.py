@@ -1,0 +1,222 @@
+"""Pairs are matched over a range that they show themselves."""
+
+import math
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from rollcli.errors import InputError, UsageError
+from rollcli.estimator.estimate import estimate_roll
+from rollcli.files.formats import read_image
+from rollcli.files.inputs import pair_inputs
+from rollcli.imaging.stereo import StereoOptions, compute_disparity, match_pair
+from rollcli.simulate.render import render_frame
+from rollcli.simulate.spec import FrameSpec
+
+SHARED = Path(__file__).parents[2].parent / "shared"
+ROADS = {"m1_L1": -3.47, "m1_L5": -1.62, "m2_L9": -2.54, "m2_L18": -4.30, "m3_L3": 2.36}
+
+
+def pair_at(disparity, shape=(120, 400), seed=0):
+    """A random texture, seen again `disparity` pixels (a number, or one a row) further left."""
+    texture = np.random.default_rng(seed).integers(0, 256, (shape[0], 2 * shape[1]), dtype=np.uint8)
+    texture = cv2.GaussianBlur(texture, (3, 3), 0)
+    columns = np.arange(shape[1]) + shape[1] // 2
+    shifts = np.broadcast_to(np.rint(disparity).astype(int), shape[0])
+    right = np.stack([row[columns + shift] for row, shift in zip(texture, shifts, strict=True)])
+    return texture[:, columns], right
+
+
+@pytest.fixture(scope="module")
+def street():
+    return render_frame(FrameSpec(scene="street", roll=math.radians(4), size=(320, 240), seed=3))
+
+
+@pytest.mark.parametrize("mode", ["3way", "sgbm", "hh"])
+def test_a_shifted_image_gives_its_shift(mode):
+    left, right = pair_at(23)
+
+    match = match_pair(left, right, StereoOptions(mode=mode))
+
+    inside = match.disparity[:, match.num_disparities + 5 : -5]
+    assert match.disparity.dtype == np.float32
+    assert match.disparity.shape == left.shape
+    assert (np.abs(inside - 23) < 0.5).mean() > 0.95
+
+
+@pytest.mark.parametrize("largest", [5, 40, 110, 170])
+def test_the_range_found_holds_the_disparities_and_not_much_more(largest):
+    left, right = pair_at(np.linspace(largest / 4, largest, 120))
+
+    match = match_pair(left, right, StereoOptions())
+
+    assert largest + 2 <= match.num_disparities <= 1.3 * largest + 48
+    assert match.end_fraction < 0.01
+
+
+def test_the_range_does_not_follow_what_cannot_be_matched():
+    left, right = pair_at(20)
+    left[:, :250] = right[:, :200] = 255  # a low sun
+
+    assert match_pair(left, right, StereoOptions()).num_disparities <= 80
+
+
+def test_a_range_that_is_too_short_is_seen_at_its_end():
+    left, right = pair_at(np.linspace(10, 40, 120))
+
+    assert match_pair(left, right, StereoOptions(num_disparities=32)).end_fraction > 0.04
+    assert match_pair(left, right, StereoOptions(num_disparities=64)).end_fraction < 0.001
+
+
+def test_a_given_range_is_rounded_up_and_kept_within_the_image():
+    left, right = pair_at(20)
+
+    assert match_pair(left, right, StereoOptions(num_disparities=50)).num_disparities == 64
+    assert match_pair(left, right, StereoOptions(num_disparities=2000)).num_disparities == 384
+
+
+def test_a_range_may_start_anywhere():
+    left, right = pair_at(150)
+
+    match = match_pair(left, right, StereoOptions(min_disparity=128, num_disparities=32))
+
+    assert (match.min_disparity, match.num_disparities) == (128, 32)
+    assert np.median(match.disparity[match.disparity > 0]) == pytest.approx(150, abs=0.1)
+
+
+def test_disparities_below_zero_are_no_data():
+    left, right = pair_at(-10)
+
+    disparity = compute_disparity(left, right, min_disparity=-32, num_disparities=64)
+
+    assert (disparity >= 0).all()
+    assert (disparity > 0).mean() < 0.05
+
+
+def test_matching_small_gives_a_small_map_in_its_own_pixels():
+    left, right = pair_at(40)
+
+    disparity = compute_disparity(left, right, downscale=2)
+
+    assert disparity.shape == (60, 200)
+    assert np.median(disparity[disparity > 0]) == pytest.approx(20, abs=0.1)
+
+
+def test_colour_grey_and_16_bits_give_much_the_same(street):
+    grey = [cv2.cvtColor(view, cv2.COLOR_BGR2GRAY) for view in (street.left, street.right)]
+    twelve_bits = [view.astype(np.uint16) * 16 for view in grey]
+
+    from_colour = compute_disparity(street.left, street.right)
+
+    np.testing.assert_array_equal(compute_disparity(*grey), from_colour)
+    both = (compute_disparity(*twelve_bits) > 0) & (from_colour > 0)
+    assert both.sum() > 0.9 * (from_colour > 0).sum()
+    assert np.median(np.abs(compute_disparity(*twelve_bits) - from_colour)[both]) < 0.1
+
+
+def test_a_rendered_street_is_matched_as_it_is(street):
+    disparity = compute_disparity(street.left, street.right)
+
+    both = (disparity > 0) & (street.disparity > 0)
+    errors = np.abs(disparity - street.disparity)[both]
+    assert both.mean() > 0.4
+    assert np.median(errors) < 0.3
+    assert (errors > 3).mean() < 0.05
+
+
+def test_the_same_pair_gives_the_same_map_whatever_the_threads(street):
+    threads = cv2.getNumThreads()
+    maps = []
+    try:
+        for count in (1, 2, 5):
+            cv2.setNumThreads(count)
+            maps.append(compute_disparity(street.left, street.right))
+    finally:
+        cv2.setNumThreads(threads)
+
+    np.testing.assert_array_equal(maps[0], maps[1])
+    np.testing.assert_array_equal(maps[0], maps[2])
+
+
+def test_a_pair_without_texture_has_no_disparities():
+    flat = np.full((120, 400), 90, np.uint8)
+
+    match = match_pair(flat, flat, StereoOptions())
+
+    assert not match.disparity.any()
+    assert match.end_fraction == 0
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (2, 3), (5, 20), (300, 10)])
+def test_images_too_narrow_to_match_are_refused(shape):
+    image = np.zeros(shape, np.uint8)
+
+    with pytest.raises(InputError, match="px wide are too narrow"):
+        compute_disparity(image, image)
+
+
+def test_images_of_different_size_are_refused():
+    with pytest.raises(InputError, match="differ in size: 400x120 and 399x120"):
+        compute_disparity(np.zeros((120, 400), np.uint8), np.zeros((120, 399), np.uint8))
+
+
+@pytest.mark.parametrize(
+    "image", [np.zeros((120, 400)), np.zeros((120, 400, 2), np.uint8), np.zeros(400, np.uint8)]
+)
+def test_what_is_no_image_is_refused(image):
+    with pytest.raises(InputError, match="cannot be matched"):
+        compute_disparity(image, image)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"num_disparities": 0},
+        {"num_disparities": 10**9},
+        {"min_disparity": 10**9},
+        {"block_size": 4},
+        {"block_size": 0},
+        {"block_size": 99},
+        {"uniqueness": 100},
+        {"uniqueness": -1},
+        {"speckle_size": -1},
+        {"speckle_range": -1},
+        {"downscale": 0.5},
+        {"downscale": math.nan},
+        {"mode": "bm"},
+    ],
+)
+def test_options_that_make_no_sense_are_refused(options):
+    name = next(iter(options)).replace("_", "-")
+
+    with pytest.raises(UsageError, match=name):
+        StereoOptions(**options)
+
+
+@pytest.mark.skipif(not (SHARED / "roads").is_dir(), reason="no real road pairs at ../shared/roads")
+def test_real_road_pairs_need_and_get_a_wide_range():
+    for pair in pair_inputs(str(SHARED / "roads" / "left"), str(SHARED / "roads" / "right")):
+        match = match_pair(
+            read_image(pair.left.path), read_image(pair.right.path), StereoOptions(downscale=4)
+        )
+        inside = match.disparity[:, match.num_disparities :]
+
+        assert 4 * match.num_disparities > 331
+        assert match.end_fraction < 0.001
+        assert (inside > 0).mean() > 0.9
+        roll_deg = math.degrees(estimate_roll(match.disparity, road="all").theta)
+        assert roll_deg == pytest.approx(ROADS[pair.left.path.stem], abs=0.15)
+
+
+@pytest.mark.skipif(not (SHARED / "streets").is_dir(), reason="no real street pairs at ../shared/streets")
+def test_real_street_pairs_get_a_range_that_fits():
+    for pair in pair_inputs(str(SHARED / "streets" / "left"), str(SHARED / "streets" / "right")):
+        match = match_pair(
+            read_image(pair.left.path), read_image(pair.right.path), StereoOptions(downscale=2)
+        )
+
+        assert 32 <= match.num_disparities <= 112
+        assert match.end_fraction < 0.03
+        assert (match.disparity[:, match.num_disparities :] > 0).mean() > 0.6
