@@ -90,14 +90,15 @@ def areas(
 
 
 def _fitted(grams: Floats) -> Floats:
-    """Return the least-squares planes (c0, c1, c2) of areas (N, 4, 4); c1 = c2 = 0 where undetermined."""
+    """Return the least-squares planes (c0, c1, c2) of areas (N, 4, 4), level where it is undetermined."""
     n = grams[:, 0, 0]
     p, q, d = (grams[:, 0, k] / n for k in (1, 2, 3))
     pp, qq = grams[:, 1, 1] - n * p * p, grams[:, 2, 2] - n * q * q
     pq = grams[:, 1, 2] - n * p * q
     pd, qd = grams[:, 1, 3] - n * p * d, grams[:, 2, 3] - n * q * d
     spread = pp * qq - pq * pq
-    flat = spread <= _SINGULAR * (pp + qq) ** 2
+    rounding = _SINGULAR * d * np.sqrt(n * (pp + qq))  # a constant area must not rise by rounding alone
+    flat = (spread <= _SINGULAR * (pp + qq) ** 2) | (np.hypot(pd, qd) <= rounding)
     spread = np.where(flat, np.inf, spread)
     c1, c2 = (qq * pd - pq * qd) / spread, (pp * qd - pq * pd) / spread
     return np.stack([d - c1 * p - c2 * q, c1, c2], axis=-1)

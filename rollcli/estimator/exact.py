@@ -109,14 +109,15 @@ def _unwhitened(energy: Energy, angles: Floats) -> tuple[Floats, Floats]:
 
 def _polished(energy: Energy, theta: float) -> tuple[float, float]:
     """Newton's method on the gradient, as long as the energy does not rise; then abs(the next step)."""
+    noise = 1e-14 * (energy.rest + energy.slope_energy)
     now = energy.at(theta)
-    step = math.inf
     for _ in range(_POLISH):
         if not now.curvature > 0:
             return theta, math.inf
         step = -now.gradient / now.curvature
         then = energy.at(theta + step)
-        if then.value > now.value or abs(step) < 1e-15:
-            break
+        # within rounding of the energy, the gradient still tells better from worse
+        if then.value > now.value + noise or not abs(then.gradient) < abs(now.gradient):
+            return theta, abs(step)
         theta, now = theta + step, then
     return theta, abs(step)

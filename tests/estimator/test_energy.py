@@ -1,0 +1,172 @@
+"""The energy, its derivatives and its parabola."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rollcli.errors import EstimationError
+from rollcli.estimator.energy import Energy
+from rollcli.estimator.exact import exact
+from rollcli.estimator.moments import map_moments
+from rollcli.evaluate.textbook import Textbook
+from tests.estimator.maps import bent_road, degrees_apart, energy_of, flat_road, random_maps, repeatable
+
+ANGLES = np.linspace(-math.pi / 2, math.pi / 2, 181)
+angles = st.floats(-math.pi / 2, math.pi / 2)
+
+
+def least_squares(disparity, theta, degree=2):
+    """The residual energy of an n x 3 (or n x 2) least-squares fit, and its coefficients."""
+    v, u = np.nonzero(disparity > 0)
+    y = v * math.cos(theta) - u * math.sin(theta)
+    centre, scale = y.mean(), np.ptp(y)
+    design = np.vander((y - centre) / scale, degree + 1, increasing=True)
+    d = disparity[v, u]
+    alpha, *_ = np.linalg.lstsq(design, d, rcond=None)
+    return float(np.sum((d - design @ alpha) ** 2)), np.polynomial.Polynomial(alpha)((y - centre) / scale)
+
+
+def central(function, theta, step=2e-3):
+    """The derivative by central differences over two steps [Richardson], so that its error is step^4."""
+    near = function(theta + step) - function(theta - step)
+    far = function(theta + 2 * step) - function(theta - 2 * step)
+    return (8 * near - far) / (12 * step)
+
+
+@repeatable
+@given(random_maps(), angles)
+def test_energy_is_that_of_a_least_squares_fit(disparity, theta):
+    energy = energy_of(disparity)
+    scale = energy.rest + energy.slope_energy
+    expected, _ = least_squares(disparity, theta)
+    assert energy.at(theta).value == pytest.approx(expected, rel=1e-9, abs=1e-9 * scale)
+
+
+@repeatable
+@given(random_maps(), angles)
+def test_energy_of_the_line_model_is_that_of_a_straight_fit(disparity, theta):
+    energy = energy_of(disparity, parabolic=False)
+    expected, _ = least_squares(disparity, theta, degree=1)
+    assert energy.at(theta).value == pytest.approx(expected, rel=1e-9, abs=1e-9 * energy.rest)
+
+
+@repeatable
+@given(random_maps(), angles, st.booleans())
+def test_gradient_and_curvature_agree_with_central_differences(disparity, theta, parabolic):
+    energy = energy_of(disparity, parabolic=parabolic)
+    terms, everywhere = energy.at(theta), energy.at(ANGLES)
+    slope = central(lambda t: energy.at(t).value, theta)
+    bend = central(lambda t: energy.at(t).gradient, theta)
+    assert terms.gradient == pytest.approx(slope, rel=1e-6, abs=1e-8 * np.abs(everywhere.gradient).max())
+    assert terms.curvature == pytest.approx(bend, rel=1e-6, abs=1e-8 * np.abs(everywhere.curvature).max())
+
+
+@repeatable
+@given(random_maps(), angles)
+def test_energy_and_gradient_are_those_of_the_textbook_form(disparity, theta):
+    energy, textbook = energy_of(disparity), Textbook.of(disparity)
+    scale = energy.rest + energy.slope_energy
+    assert energy.at(theta).value == pytest.approx(textbook.energy(theta), rel=1e-8, abs=1e-8 * scale)
+    largest = np.abs(energy.at(ANGLES).gradient).max()
+    assert energy.at(theta).gradient == pytest.approx(textbook.gradient(theta), rel=1e-8, abs=1e-8 * largest)
+
+
+@repeatable
+@given(random_maps(), angles)
+def test_energy_has_period_pi(disparity, theta):
+    energy = energy_of(disparity)
+    assert energy.at(theta + math.pi).value == pytest.approx(energy.at(theta).value, rel=1e-9)
+
+
+def test_an_array_of_angles_gives_what_each_angle_gives():
+    energy = energy_of(bent_road(12, noise=0.5))
+    together = energy.at(ANGLES)
+    for k in (0, 40, 90, 180):
+        alone = energy.at(float(ANGLES[k]))
+        for name in ("value", "gradient", "curvature"):
+            expected = pytest.approx(getattr(alone, name), rel=1e-12, abs=1e-6)
+            assert getattr(together, name)[k] == expected
+
+
+@repeatable
+@given(random_maps(), angles)
+def test_the_parabola_is_the_least_squares_fit_in_pixels(disparity, theta):
+    energy = energy_of(disparity)
+    a0, a1, a2 = energy.parabola(theta)
+    v, u = np.nonzero(disparity > 0)
+    y = v * math.cos(theta) - u * math.sin(theta)
+    _, fitted = least_squares(disparity, theta)
+    np.testing.assert_allclose(a0 + a1 * y + a2 * y * y, fitted, atol=1e-6 * disparity.max())
+
+
+def test_rmse_is_the_root_of_the_mean_squared_residual():
+    disparity = bent_road(10, noise=0.25)
+    energy = energy_of(disparity)
+    assert energy.rmse(math.radians(10)) == pytest.approx(0.25, rel=0.02)
+
+
+@pytest.mark.parametrize("roll_deg", [-33, -4, 0, 11, 45])
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_shifting_scaling_or_adding_a_constant_leaves_the_angle(roll_deg, dtype):
+    disparity = bent_road(roll_deg, width=400, height=380, noise=2.0).astype(dtype)
+    disparity[:, ::5] = 0
+    angle = exact(energy_of(disparity)).theta
+    shifted = np.pad(disparity, ((31, 0), (57, 12)))
+    added = np.where(disparity > 0, disparity.astype(np.float64) + 100, 0)
+    for changed in (shifted, disparity * dtype(0.0625), disparity.astype(np.float64) * 7.3, added):
+        assert degrees_apart(exact(energy_of(changed)).theta, angle) < 1e-6
+
+
+@pytest.mark.parametrize("roll_deg", [-45, -44.5, -20, -1, 0, 0.01, 3, 27, 44, 45])
+def test_the_exact_map_of_a_flat_road_gives_its_roll(roll_deg):
+    disparity = flat_road(roll_deg)
+    assert math.degrees(exact(energy_of(disparity)).theta) == pytest.approx(roll_deg, abs=0.005)
+
+
+LINE = "the valid pixels lie on one line"
+
+
+def kept(mask):
+    return bent_road(5, width=60, height=60, noise=0.1) * mask
+
+
+V, U = np.mgrid[:60, :60]
+
+
+@pytest.mark.parametrize(
+    ("disparity", "reason"),
+    [
+        (np.zeros((60, 60)), "no valid pixel"),
+        (np.full((60, 60), 7.3), "the same everywhere"),
+        (np.full((600, 600), 7.3, np.float32), "the same everywhere"),
+        (kept(U == 9), LINE),
+        (kept(V == 9), LINE),
+        (kept(U == V), LINE),
+        (kept((U == 3) & (V == 4)), LINE),
+        (bent_road(5) * 1e200, "overflow"),
+    ],
+)
+def test_pixels_that_do_not_determine_a_roll_are_refused_with_the_reason(disparity, reason):
+    with pytest.raises(EstimationError, match=reason):
+        energy_of(disparity)
+
+
+def test_a_line_across_a_large_map_is_seen_in_spite_of_single_precision():
+    v, u = np.mgrid[:600, :900]
+    with pytest.raises(EstimationError, match=LINE):
+        energy_of(np.where(2 * u == 3 * v, 5 + u / 100, 0).astype(np.float32))
+
+
+def test_a_parabola_through_two_lines_of_pixels_is_refused():
+    two = kept((U == V) | (U == V + 5))
+    with pytest.raises(EstimationError, match="two lines"):
+        energy_of(two).parabola(math.radians(45))
+
+
+def test_all_weight_masked_out_is_no_valid_pixel():
+    disparity = bent_road(5)
+    with pytest.raises(EstimationError, match="no valid pixel"):
+        Energy.of(map_moments(disparity, np.zeros(disparity.shape, bool)), 90.0)

@@ -1,0 +1,105 @@
+"""The sums of a map."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rollcli.estimator.moments import Grid, map_moments, point_moments
+from tests.estimator.maps import bent_road, random_maps, repeatable
+
+DEGREES_4 = [(i, j) for i in range(5) for j in range(5 - i)]
+DEGREES_2 = [(i, j) for i in range(3) for j in range(3 - i)]
+
+
+def assert_same(one, other, rtol=1e-9):
+    for i, j in DEGREES_4:
+        np.testing.assert_allclose(one.s[i, j], other.s[i, j], rtol=rtol, atol=rtol * other.weight)
+    scale = np.sqrt(other.rr * other.weight)
+    for i, j in DEGREES_2:
+        np.testing.assert_allclose(one.t[i, j], other.t[i, j], rtol=rtol, atol=rtol * scale)
+    np.testing.assert_allclose(one.rr, other.rr, rtol=rtol)
+
+
+def pixel_by_pixel(disparity, like, weights=None):
+    """The same sums over the list of valid pixels."""
+    v, u = np.nonzero(disparity > 0)
+    p, q = (u - like.grid.centre_u) / like.grid.scale, (v - like.grid.centre_v) / like.grid.scale
+    w = np.ones(len(u)) if weights is None else weights[v, u].astype(float)
+    return point_moments(p, q, disparity[v, u].astype(float), w, like.grid, like.plane)
+
+
+@repeatable
+@given(random_maps())
+def test_one_pass_sums_what_a_loop_over_the_pixels_sums(disparity):
+    moments = map_moments(disparity)
+    assert_same(moments, pixel_by_pixel(disparity, moments))
+
+
+def test_single_precision_of_large_maps_costs_nothing_that_matters():
+    disparity = bent_road(7, width=700, height=400, noise=0.3).astype(np.float32)
+    disparity[::7, ::3] = 0
+    moments = map_moments(disparity)
+    exact = pixel_by_pixel(disparity, moments)
+    np.testing.assert_allclose(np.tril(moments.s[:, ::-1]), np.tril(exact.s[:, ::-1]), rtol=1e-9, atol=1e-6)
+    assert_same(moments, exact, rtol=1e-6)
+
+
+@repeatable
+@given(random_maps(), st.integers(1, 49), st.integers(1, 49))
+def test_moments_add_over_tiles(disparity, row, column):
+    whole = map_moments(disparity)
+    row, column = min(row, disparity.shape[0] - 1), min(column, disparity.shape[1] - 1)
+    tiles = [
+        map_moments(
+            disparity[rows, columns], grid=whole.grid, origin=(rows.start, columns.start), plane=whole.plane
+        )
+        for rows in (slice(0, row), slice(row, disparity.shape[0]))
+        for columns in (slice(0, column), slice(column, disparity.shape[1]))
+    ]
+    assert_same(sum(tiles[1:], tiles[0]), whole)
+
+
+def test_moments_on_different_grids_do_not_add():
+    disparity = bent_road(3)
+    with pytest.raises(ValueError, match="one grid"):
+        map_moments(disparity) + map_moments(disparity[:50])
+
+
+def test_weights_count_as_often_as_they_say():
+    disparity = bent_road(5, noise=0.1)
+    weights = np.random.default_rng(1).integers(0, 3, disparity.shape).astype(np.float32)
+    moments = map_moments(disparity, weights)
+    assert_same(moments, pixel_by_pixel(disparity, moments, weights))
+    assert moments.weight == weights.sum()
+
+
+@pytest.mark.parametrize("nothing", [0, -1, -16, np.nan, np.inf, -np.inf])
+def test_no_data_weighs_nothing_however_it_is_written(nothing):
+    disparity = bent_road(5, noise=0.1)
+    hole = np.random.default_rng(2).random(disparity.shape) < 0.3
+    clean, holed = np.where(hole, 0, disparity), np.where(hole, nothing, disparity)
+    plane = (80.0, 0.0, 0.0)
+    assert_same(map_moments(holed, plane=plane), map_moments(clean, plane=plane))
+
+
+@pytest.mark.parametrize("dtype", ["uint8", "int16", ">u2", "float16", ">f4", "float64", "int64"])
+def test_any_real_dtype_gives_the_same_sums(dtype):
+    whole = np.rint(bent_road(5, width=40, height=30))
+    plane = (80.0, 0.0, 0.0)
+    assert_same(map_moments(whole.astype(dtype), plane=plane), map_moments(whole, plane=plane))
+
+
+def test_memory_order_makes_no_difference():
+    disparity = bent_road(5, noise=0.1)
+    assert_same(map_moments(np.asfortranarray(disparity)), map_moments(disparity))
+
+
+def test_an_empty_map_weighs_nothing():
+    assert map_moments(np.zeros((40, 50))).weight == 0
+
+
+def test_the_grid_is_centred_and_reaches_one_along_the_longer_side():
+    grid = Grid.of_shape(height=101, width=201)
+    assert (grid.centre_u, grid.centre_v) == (100, 50)
+    assert (0 - grid.centre_u) / grid.scale == pytest.approx(-1, abs=0.01)

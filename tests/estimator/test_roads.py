@@ -1,0 +1,68 @@
+"""The solvers on real road pairs; see the README of that folder for what is known of them."""
+
+import functools
+import math
+
+import pytest
+
+from rollcli.estimator.energy import Energy
+from rollcli.estimator.estimate import estimate_roll
+from rollcli.estimator.exact import minima
+from rollcli.estimator.golden_section import golden_section
+from rollcli.estimator.gradient_descent import gradient_descent
+from rollcli.estimator.moments import map_moments
+from rollcli.files.formats import read_image
+from rollcli.imaging.stereo import StereoOptions, match_pair
+from tests.estimator.maps import ROADS, degrees_apart
+
+ROLL_DEG = {"m1_L1": -3.47, "m1_L5": -1.62, "m2_L9": -2.54, "m2_L18": -4.30, "m3_L3": 2.36}
+HALF_SIZE = StereoOptions(num_disparities=256, block_size=5, mode="3way", downscale=2)
+DELTAS = [math.pi / k for k in (1.8e3, 1.8e4, 1.8e5, 1.8e6)]
+PAPER = [3, 4, 4, 4]  # [GD] Table I, iterations of gradient descent
+
+pytestmark = pytest.mark.skipif(not ROADS.is_dir(), reason=f"the real road pairs are not at {ROADS}")
+
+
+@functools.cache
+def disparity_of(stem):
+    left, right = ROADS / "left" / f"{stem}.png", ROADS / "right" / f"{stem.replace('L', 'R')}.png"
+    return match_pair(read_image(left), read_image(right), HALF_SIZE).disparity
+
+
+@functools.cache
+def energy_of(stem):
+    disparity = disparity_of(stem)
+    return Energy.of(map_moments(disparity), float(disparity.max()))
+
+
+@pytest.fixture(params=ROLL_DEG)
+def stem(request):
+    return request.param
+
+
+def test_gradient_descent_converges_within_6_iterations_to_the_known_angle(stem):
+    found = estimate_roll(disparity_of(stem), road="all")
+    assert found.converged
+    assert found.global_minimum
+    assert found.iterations <= 6
+    assert math.degrees(found.theta) == pytest.approx(ROLL_DEG[stem], abs=0.15)
+
+
+def test_gradient_descents_iterations_are_within_one_of_the_papers(stem):
+    counts = [gradient_descent(energy_of(stem), delta).iterations for delta in DELTAS]
+    assert all(abs(count - paper) <= 1 for count, paper in zip(counts, PAPER, strict=True)), counts
+
+
+def test_golden_sections_iterations_are_the_papers(stem):
+    assert [golden_section(energy_of(stem), delta).iterations for delta in DELTAS] == [16, 21, 26, 30]
+
+
+def test_exact_agrees_with_gradient_descent(stem):
+    best, *_ = minima(energy_of(stem))
+    assert degrees_apart(best.theta, gradient_descent(energy_of(stem)).theta) < 1e-6
+
+
+def test_agreeing_areas_give_the_angle_of_a_robust_fit(stem):
+    found = estimate_roll(disparity_of(stem), method="areas", road="all")
+    robust = {"m1_L1": -3.41, "m1_L5": -1.53, "m2_L9": -2.53, "m2_L18": -4.27, "m3_L3": 2.39}[stem]
+    assert math.degrees(found.theta) == pytest.approx(robust, abs=0.1)
