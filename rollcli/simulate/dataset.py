@@ -37,7 +37,7 @@ COLUMNS = (
 _PARTS = ("left", "right", "disparity")
 _TRUTH = "truth.csv"
 _OURS = re.compile(r"frame_\d{4,}\.png")
-_KITTI_TOP = 65534 / 256  # the largest disparity that a KITTI PNG holds, pixels
+KITTI_TOP = 65534 / 256  # pixels: larger disparities are written as no data
 
 
 @dataclass(frozen=True)
@@ -67,6 +67,11 @@ class Dataset:
         return [
             Task(spec, self.folder, f"frame_{number:0{digits}d}") for number, spec in enumerate(self.specs, 1)
         ]
+
+    @property
+    def nearest_disparity(self) -> float:
+        """The largest disparity of a flat road in any frame, pixels."""
+        return max(_nearest_disparity(spec) for spec in self.specs)
 
     def files(self) -> list[Path]:
         """Everything that is written, truth.csv last."""
@@ -105,8 +110,6 @@ def plan_dataset(folder: str | Path, options: SimulateOptions, *, overwrite: boo
         colour=not options.grey,
         seed=options.seed,
     )
-    for spec in specs:
-        _require_storable(spec)
     _require_free(Path(folder), overwrite)
     return Dataset(Path(folder), tuple(specs))
 
@@ -143,13 +146,20 @@ def _write_frame(task: Task) -> str:
     frame = render_frame(task.spec)
     write_atomic(task.image("left"), _png(frame.left))
     write_atomic(task.image("right"), _png(frame.right))
-    stored = from_disparity(frame.disparity, "kitti", np.uint16)
+    near = frame.disparity > KITTI_TOP
+    stored = from_disparity(np.where(near, 0, frame.disparity), "kitti", np.uint16)
     write_atomic(task.image("disparity"), encode_stored(stored, "png"))
     return task.stem
 
 
 def _lost(task: Task, reason: str) -> str:
     raise OutputError(f"{task.image('left')}: cannot be rendered: {reason}; try fewer --jobs")
+
+
+def _nearest_disparity(spec: FrameSpec) -> float:
+    width, height = spec.size
+    y = (height - 1) / 2 * math.cos(spec.roll) + (width - 1) / 2 * abs(math.sin(spec.roll))
+    return spec.baseline / spec.height * (y * math.cos(spec.pitch) + spec.focal * math.sin(spec.pitch))
 
 
 def _png(image: NDArray[np.uint8]) -> bytes:
@@ -168,18 +178,6 @@ def _truth(dataset: Dataset) -> bytes:
         rig = (f"{number:.10g}" for number in (spec.focal, spec.baseline, spec.height, spec.curvature))
         rows.writerow((task.stem, *angles, spec.scene, *rig, spec.seed))
     return text.getvalue().encode()
-
-
-def _require_storable(spec: FrameSpec) -> None:
-    """The nearest road in view must fit a KITTI PNG."""
-    width, height = spec.size
-    y = (height - 1) / 2 * math.cos(spec.roll) + (width - 1) / 2 * abs(math.sin(spec.roll))
-    top = spec.baseline / spec.height * (y * math.cos(spec.pitch) + spec.focal * math.sin(spec.pitch))
-    if top > _KITTI_TOP:
-        raise UsageError(
-            f"the road would reach a disparity of {top:.0f} px, and a KITTI PNG ends at 256: "
-            "take smaller images, a shorter baseline or a higher rig"
-        )
 
 
 def _require_free(folder: Path, overwrite: bool) -> None:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from rollcli.simulate.build import build_scene
 from rollcli.simulate.sensor import expose
 from rollcli.simulate.spec import FrameSpec
-from rollcli.simulate.view import Pixels, look, see
+from rollcli.simulate.view import depths, look
 
 
 @dataclass(frozen=True)
@@ -59,8 +59,6 @@ def render_frame(spec: FrameSpec) -> Frame:
 
 def true_disparity(spec: FrameSpec) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """The left view's disparity in full precision (H, W), 0 in the sky, and its road pixels; no pictures."""
-    scene, camera = build_scene(spec), spec.cameras[0]
-    seen = see(scene, Pixels.all_of(camera))
-    shape = (camera.height, camera.width)
-    road = seen.material == scene.road
-    return (spec.focal * spec.baseline / seen.depth).reshape(shape), road.reshape(shape)
+    scene = build_scene(spec)
+    depth, material = depths(scene, spec.cameras[0])
+    return spec.focal * spec.baseline / depth, material == scene.road

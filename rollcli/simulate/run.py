@@ -5,7 +5,7 @@ import time
 
 from rollcli.batch.options import RunningOptions
 from rollcli.batch.signals import stop_on_signals
-from rollcli.simulate.dataset import Dataset, plan_dataset, write_dataset
+from rollcli.simulate.dataset import KITTI_TOP, Dataset, plan_dataset, write_dataset
 from rollcli.simulate.options import SimulateOptions
 
 INTERRUPTED = 130
@@ -23,6 +23,11 @@ def run(folder: str, options: SimulateOptions, running: RunningOptions) -> int:
     if running.dry_run:
         sys.stdout.writelines(f"write {path}\n" for path in dataset.files())
         return 0
+    if dataset.nearest_disparity > KITTI_TOP and not running.quiet:
+        _say(
+            f"the road reaches {dataset.nearest_disparity:.0f} px of disparity: what exceeds "
+            f"{KITTI_TOP:.0f} px does not fit a KITTI PNG and has no data in {dataset.folder}/disparity"
+        )
     start, total = time.monotonic(), len(dataset.specs)
     done = _write(dataset, running)
     if done < total:

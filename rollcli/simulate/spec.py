@@ -215,5 +215,5 @@ def _problems(spec: FrameSpec) -> Iterator[str]:
     elif spec.height + spec.baseline * math.sin(spec.roll) * math.cos(spec.pitch) <= 0:
         yield (
             f"at a roll of {math.degrees(spec.roll):g} degrees the right camera is under the road: "
-            f"mount the rig higher than {spec.height:g} m or closer together than {spec.baseline:g} m"
+            f"mount the rig higher than {spec.height:g} m, or its cameras closer than {spec.baseline:g} m"
         )

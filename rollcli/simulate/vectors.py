@@ -1,5 +1,6 @@
 """Products of many vectors at once, stored as (3, N): without BLAS, whose threads would cost more here."""
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -17,3 +18,11 @@ def dot(a: Vectors, b: Vectors) -> Vectors:
 def dots(axes: Vectors, vectors: Vectors) -> Vectors:
     """The components (K, N) of `vectors` (3, N) along each of `axes` (K, 3)."""
     return np.asarray(np.einsum("ki,in->kn", axes, vectors))
+
+
+def groups(labels: NDArray[np.int16], n: int) -> Iterator[tuple[int, NDArray[np.intp]]]:
+    """Each label from 0 to n - 1 that occurs, and where."""
+    order = np.argsort(labels, kind="stable")
+    starts = np.searchsorted(labels[order], np.arange(n + 1))
+    for k in np.flatnonzero(np.diff(starts)):
+        yield int(k), order[starts[k] : starts[k + 1]]

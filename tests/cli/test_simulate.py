@@ -99,6 +99,13 @@ def test_help_loads_neither_numpy_nor_opencv(tmp_path):
     assert not loaded & {"numpy", "cv2", "tqdm"}
 
 
+def test_disparities_too_large_for_the_file_are_told(tmp_path):
+    near = ("--height", "0.2", "--baseline", "2", "--roll", "0", "--frames", "1", "--size", "64x48")
+    done = rollcli("simulate", "rig", *near, "-j1", cwd=tmp_path)
+    assert done.status == 0
+    assert "does not fit a KITTI PNG and has no data in rig/disparity" in done.err
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
 @pytest.mark.parametrize("jobs", ["1", "2"])
 def test_ctrl_c_ends_it_with_status_130_and_without_truth(tmp_path, jobs):

@@ -98,9 +98,13 @@ def test_a_file_in_place_of_the_folder_is_refused(tmp_path):
         plan_dataset(tmp_path / "rig", TINY, overwrite=True)
 
 
-def test_disparities_beyond_what_the_file_can_hold_are_refused(tmp_path):
-    with pytest.raises(UsageError, match="KITTI PNG ends at 256"):
-        plan_dataset(tmp_path, SimulateOptions(frames=1, size=(1920, 1400), height=1.0))
+def test_disparities_beyond_what_the_file_can_hold_are_no_data(tmp_path):
+    options = SimulateOptions(frames=1, size=(64, 48), baseline=2, height=0.2, roll=(0, 0), pitch=(5, 5))
+    simulate(tmp_path, options)
+    (spec,) = plan_dataset(tmp_path, options, overwrite=True).specs
+    stored, disparity = read_disparity(tmp_path / "disparity/frame_0001.png"), render_frame(spec).disparity
+    assert disparity.max() > 256
+    assert np.array_equal(stored == 0, (disparity > 65534 / 256) | (disparity == 0))
 
 
 def test_truth_appears_only_when_every_frame_is_there(tmp_path, monkeypatch):

@@ -93,6 +93,16 @@ def test_a_stereo_matcher_finds_the_road_as_well_as_on_real_pairs(scene):
     assert np.mean(error > 1) < 0.03
 
 
+def test_a_picture_is_the_same_rendered_in_one_band_of_rows_or_in_many(monkeypatch):
+    whole = render_frame(STREET)
+    monkeypatch.setattr("rollcli.simulate.view._BAND", 17 * 320)
+    banded = render_frame(STREET)
+    assert np.array_equal(whole.left, banded.left)
+    assert np.array_equal(whole.right, banded.right)
+    assert np.array_equal(whole.disparity, banded.disparity)
+    assert np.array_equal(whole.road, banded.road)
+
+
 def test_colour_and_grey_show_the_same_picture():
     grey, colour = render_frame(STREET).left, render_frame(replace(STREET, colour=True)).left
     assert grey.shape == (240, 320)

@@ -1,0 +1,41 @@
+"""The light that rays carry, from what they meet."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollcli.simulate.light import sky
+from rollcli.simulate.materials import Material
+from rollcli.simulate.scene import Scene
+from rollcli.simulate.see import NONE
+from rollcli.simulate.texture import Values
+from rollcli.simulate.vectors import Array, groups
+
+_MAX_TAPS = 8
+
+
+def shade(scene: Scene, direction: Array, kinds: NDArray[np.int16], reads: Values) -> Values:
+    """The light (N, 3) that rays carry which go in `direction` (3, N); `kinds` and `reads` as in `Seen`."""
+    light = np.empty((len(kinds), 3), np.float32)
+    nothing = kinds == NONE
+    light[nothing] = sky(scene.light, direction[:, nothing])
+    ambient = np.float32(scene.light.ambient)
+    strength = np.float32(scene.light.exposure) * (ambient * reads[7] + (1 - ambient) * reads[6])
+    for k, at in groups(kinds, len(scene.materials)):
+        material, mine = scene.materials[k], reads[:6].take(at, axis=1)
+        bright = _albedo(material, mine) * strength[at]
+        light[at] = bright[:, None] * material.colour(mine[0], mine[1])
+    return light
+
+
+def _albedo(material: Material, reads: Values) -> Values:
+    """Albedo over each pixel's footprint: taps along its long axis, each as wide as its short one."""
+    albedo = np.empty(reads.shape[1], np.float32)
+    power = np.ceil(np.log2(np.clip(reads[4] / reads[5], 1, _MAX_TAPS)) - 0.5).astype(np.int16)
+    for k, at in groups(power, power.max() + 1):
+        p, q, long_p, long_q, long, short = reads.take(at, axis=1)
+        taps = 1 << k
+        steps = (((np.arange(taps) + 0.5) / taps - 0.5)[:, None]).astype(np.float32)
+        width = np.tile(np.maximum(short, long / np.float32(taps)), taps)
+        values = material.albedo((p + steps * long_p).ravel(), (q + steps * long_q).ravel(), width)
+        albedo[at] = values.reshape(taps, -1).mean(axis=0)
+    return albedo
