@@ -73,3 +73,16 @@ def write_maps(folder: Path, count: int, **size: int) -> None:
     """`count` maps frame0.png, frame1.png, ..., each rolled a little more."""
     for index in range(count):
         write_kitti(folder / f"frame{index}.png", road_map(0.01 * index, seed=index, **size))
+
+
+def write_pair(folder: Path, name: str, disparity, seed: int = 0) -> None:
+    """A textured stereo pair with this disparity (px), as folder/left/name and folder/right/name."""
+    height, width = disparity.shape
+    texture = np.random.default_rng(seed).uniform(0, 255, (height, width + 64)).astype(np.float32)
+    texture = cv2.GaussianBlur(texture, (0, 0), 1.0)
+    v, u = np.mgrid[:height, :width].astype(np.float32)
+    seen = cv2.remap(texture, u - disparity + 32, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT)
+    for side, image in (("left", seen), ("right", texture[:, 32 : 32 + width])):
+        path = folder / side / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(cv2.imencode(".png", image.astype(np.uint8))[1])

@@ -1,5 +1,6 @@
 """What a run says while it runs and at its end, and the exit status it comes to."""
 
+import os
 import sys
 import time
 from collections import Counter
@@ -17,6 +18,7 @@ INTERRUPTED = 130
 FRAMES_FAILED = 3
 _LINE_EVERY_S = 30.0
 _FAILURES_SHOWN = 5
+_UNKNOWN_WIDTH = 80
 _FRAMES = ("frames", "frame")
 _MEANING = {
     "px": "pixels as stored",
@@ -64,7 +66,15 @@ class Report:
         if not self._options.quiet and sys.stderr.isatty():
             from tqdm import tqdm  # only where there is someone to look
 
-            self._bar = tqdm(total=self.total, initial=self._kept, unit=" frames", dynamic_ncols=True)
+            width = os.get_terminal_size(sys.stderr.fileno()).columns
+            self._bar = tqdm(
+                total=self.total,
+                initial=self._kept,
+                unit=" frames",
+                leave=False,  # the summary follows
+                dynamic_ncols=width > 0,
+                ncols=None if width else _UNKNOWN_WIDTH,
+            )
         return self
 
     def __exit__(

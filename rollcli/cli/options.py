@@ -15,7 +15,7 @@ from rollcli.batch.options import (
 )
 from rollcli.cli.command import option, record
 from rollcli.cli.types import Number, NumberOrNan, Polygon, Roi
-from rollcli.imaging.stereo_options import StereoOptions
+from rollcli.imaging.stereo_options import MODES, StereoOptions
 
 PATH = click.Path()  # whether it exists is said by who reads it, in the same words for every way to name it
 
@@ -78,43 +78,43 @@ stereo_options = record(
     option(
         "--min-disparity",
         type=Number("PX", whole=True),
-        default=0,
+        default=StereoOptions.min_disparity,
         help="Smallest disparity searched, pixels.",
     ),
     option(
         "--block-size",
         type=Number("PX", at_least=1, whole=True),
-        default=5,
+        default=StereoOptions.block_size,
         help="Side of the matched block, pixels, odd.",
     ),
     option(
         "--sgbm-mode",
-        type=click.Choice(["sgbm", "hh", "3way"]),
-        default="sgbm",
-        help="OpenCV's variants: 5 directions, 8 (slow, much memory) or 3 (fast).",
+        type=click.Choice(list(MODES)),
+        default=StereoOptions.mode,
+        help="OpenCV's variants: 3way (fast), sgbm (5 directions), hh (8: slow, much memory).",
     ),
     option(
         "--uniqueness",
         type=Number("PERCENT", at_least=0, at_most=100, whole=True),
-        default=10,
+        default=StereoOptions.uniqueness,
         help="Margin by which the best match must win, percent.",
     ),
     option(
         "--speckle-size",
         type=Number("PX", at_least=0, whole=True),
-        default=100,
+        default=StereoOptions.speckle_size,
         help="Drop patches of up to this many pixels; 0: keep all.",
     ),
     option(
         "--speckle-range",
         type=Number("PX", at_least=0, whole=True),
-        default=2,
+        default=StereoOptions.speckle_range,
         help="Disparity step within a patch, pixels.",
     ),
     option(
         "--downscale",
         type=Number("F", at_least=1),
-        default=1.0,
+        default=StereoOptions.downscale,
         help="Match at 1/F of the size; maps and pixel columns then refer to that size.",
     ),
 )
@@ -160,44 +160,44 @@ method_options = record(
     option(
         "--method",
         type=click.Choice(["gd", "gss", "exact", "plane", "areas"]),
-        default="gd",
-        help="gd: gradient descent; gss: golden section search; exact: the global minimum, in closed form; "
+        default=MethodOptions.method,
+        help="gd: gradient descent; gss: golden section search; exact: the global minimum, from the roots of a polynomial; "
         "plane: one least-squares plane; areas: planes of many small areas.",
     ),
     option(
         "--model",
         type=click.Choice(["parabola", "line"]),
-        default="parabola",
+        default=MethodOptions.model,
         help="Disparity of the road as a function of the row.",
     ),
     option(
         "--road",
         type=click.Choice(["auto", "all"]),
-        default="auto",
+        default=MethodOptions.road,
         help="auto: find the road first; all: use every valid pixel, as the paper does.",
     ),
     option(
         "--lambda0",
         type=Number("FLOAT", above=0, auto=True),
-        default=26.0,
+        default=MethodOptions.lambda0,
         help="First learning rate of gd, rad^2 per unit of energy; auto: 1 / curvature.",
     ),
     option(
         "--tolerance",
         type=Number("DEG", above=0, at_most=90),
-        default=1e-4,
+        default=MethodOptions.tolerance_deg,
         help="Stop when the angle moves by less than this, degrees.",
     ),
     option(
         "--max-roll",
-        type=Number("DEG", above=0, at_most=90),
-        default=45.0,
+        type=Number("DEG", above=0, at_most=89),
+        default=MethodOptions.max_roll_deg,
         help="Largest |roll| that road finding considers, degrees.",
     ),
     option(
         "--seed",
         type=Number("INT", at_least=0, whole=True),
-        default=0,
+        default=MethodOptions.seed,
         help="Seed of road finding's samples.",
     ),
 )

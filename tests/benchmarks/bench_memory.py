@@ -22,8 +22,8 @@ OWN = "resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss"
 def peak(folder: Path, jobs: int) -> float:
     """MiB of the largest process of a run over the folder: the program itself, or one of its workers."""
     result = folder.with_suffix(f".{jobs}.csv")
-    line = command("estimate", folder, "-q", "-j", str(jobs), "-o", result, "--derotated", folder.with_suffix(".up"))
-    line += ["--overwrite"]
+    images = ("--derotated", folder.with_suffix(f".{jobs}.up"))
+    line = command("estimate", folder, "-q", "-j", str(jobs), "-o", result, *images)
     run = [sys.executable, "-c", RUN.format(OWN), *line]
     done = subprocess.run(run, env=environment(), capture_output=True, text=True, check=True)
     return float(done.stdout) / 1024

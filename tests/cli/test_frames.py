@@ -1,0 +1,129 @@
+"""Which frames and which pixels `estimate` takes."""
+
+import csv
+import io
+import subprocess
+
+import numpy as np
+import pytest
+
+from tests.program import command, environment, road_map, rollcli, write_kitti, write_maps, write_pair
+
+
+def column(text, name):
+    return [row[name] for row in csv.DictReader(io.StringIO(text))]
+
+
+@pytest.fixture
+def maps(tmp_path):
+    write_maps(tmp_path / "maps", 7)
+    return tmp_path
+
+
+def test_shards_joined_with_standard_tools_are_the_whole(maps):
+    whole = rollcli("estimate", "maps", cwd=maps).out
+    for part in (1, 2, 3):
+        rollcli("estimate", "maps", "--shard", f"{part}/3", "-o", f"part{part}.csv", cwd=maps)
+    assert column((maps / "part2.csv").read_text(), "file") == ["maps/frame1.png", "maps/frame4.png"]
+    join = (
+        "head -n 1 part1.csv; for part in 1 2 3; do tail -n +2 part$part.csv > body$part; done; "
+        "paste -d '\\n' body1 body2 body3 | sed '/^$/d'"
+    )
+    joined = subprocess.run(["sh", "-c", join], cwd=maps, capture_output=True, text=True, check=True)
+    assert joined.stdout == whole
+
+
+@pytest.mark.parametrize("shard", ["0/3", "4/3", "1", "a/b"])
+def test_a_shard_that_makes_no_sense_is_refused(maps, shard):
+    done = rollcli("estimate", "maps", "--shard", shard, cwd=maps)
+    assert (done.status, "is not I/N" in done.err) == (2, True)
+
+
+def test_paths_come_on_standard_input_and_from_lists(maps):
+    listed = "maps/frame2.png\nmaps/frame0.png\n"
+    (maps / "list.txt").write_text(listed)
+    expected = ["maps/frame0.png", "maps/frame2.png"]
+    assert column(rollcli("estimate", "-", cwd=maps, stdin=listed).out, "file") == expected
+    assert column(rollcli("estimate", "--files-from", "list.txt", cwd=maps).out, "file") == expected
+    assert column(rollcli("estimate", "maps/*[02].png", cwd=maps).out, "file") == expected
+
+
+def test_a_file_name_that_is_no_text_comes_back_as_it_is(tmp_path):
+    name = b"fr\xe4me,\xff.png"
+    write_kitti(tmp_path / "a.png", road_map())
+    (tmp_path / "a.png").rename(tmp_path / name.decode("utf-8", "surrogateescape"))
+    done = subprocess.run(
+        command("estimate", "."), cwd=tmp_path, env=environment(), capture_output=True, check=True
+    )
+    assert done.stdout.splitlines()[1].startswith(b'"' + name + b'",,ok,')
+
+
+@pytest.fixture
+def two_roads(tmp_path):
+    """A map whose left half is rolled one way and whose right half the other."""
+    one, other = road_map(0.1), road_map(-0.05)
+    write_kitti(tmp_path / "map.png", np.hstack([one[:, :80], other[:, 80:]]))
+    left = np.zeros(one.shape)
+    left[:, :80] = 1
+    write_kitti(tmp_path / "mask.png", left)
+    write_kitti(tmp_path / "masks" / "map.png", left)
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("arguments", "roll"),
+    [
+        (["--mask", "mask.png"], 0.1),
+        (["--mask", "masks"], 0.1),
+        (["--roi", "0,0,80,120"], 0.1),
+        (["--roi", "80,0,160,120"], -0.05),
+        (["--polygon", "80,0 159,0 159,119 80,119"], -0.05),
+    ],
+)
+def test_a_region_decides_which_pixels_are_used(two_roads, arguments, roll):
+    done = rollcli("estimate", "map.png", "--road", "all", *arguments, cwd=two_roads)
+    assert float(column(done.out, "roll_deg")[0]) == pytest.approx(np.degrees(roll), abs=0.1)
+
+
+def test_a_region_outside_of_the_map_costs_the_frame(two_roads):
+    done = rollcli("estimate", "map.png", "--roi", "500,500,600,600", cwd=two_roads)
+    assert done.status == 3
+    assert column(done.out, "message") == [
+        "map.png: no pixel of this 160x120 map lies inside the mask, --roi and --polygon"
+    ]
+
+
+def test_a_mask_of_another_size_costs_the_frame(two_roads):
+    write_kitti(two_roads / "small.png", np.ones((10, 10)))
+    done = rollcli("estimate", "map.png", "--mask", "small.png", cwd=two_roads)
+    assert done.status == 3
+    assert column(done.out, "message") == ["map.png: the mask small.png is 10x10, the map 160x120"]
+
+
+def test_a_frame_without_its_mask_is_named_before_anything_runs(two_roads):
+    write_kitti(two_roads / "other.png", road_map())
+    done = rollcli("estimate", "map.png", "other.png", "--mask", "masks", cwd=two_roads)
+    assert (done.status, done.out) == (2, "")
+    assert "other.png: has no mask of its name in masks" in done.err
+    assert rollcli("estimate", "map.png", "--mask", "none.png", cwd=two_roads).status == 2
+
+
+def test_pairs_say_which_disparities_were_searched(tmp_path):
+    write_pair(tmp_path, "a.png", road_map(0.05, width=320, height=160) / 2)
+    done = rollcli("estimate", "--left", "left", "--right", "right", cwd=tmp_path)
+    assert column(done.out, "right_file") == ["right/a.png"]
+    assert float(column(done.out, "roll_deg")[0]) == pytest.approx(np.degrees(0.05), abs=0.3)
+    assert "left/a.png: searched disparities from 0 to" in done.err
+
+
+def test_a_range_that_is_too_short_makes_the_row_suspect(tmp_path):
+    write_pair(tmp_path, "a.png", road_map(0.05, width=320, height=160) / 2)
+    short = ("--num-disparities", "32", "--road", "all")
+    done = rollcli("estimate", "--left", "left", "--right", "right", *short, cwd=tmp_path)
+    assert column(done.out, "status") == ["suspect"]
+    assert "end of the searched range" in done.out
+
+
+def test_maps_and_pairs_are_not_mixed(maps):
+    assert "--left and --right" in rollcli("estimate", "maps", "--left", "a", "--right", "b", cwd=maps).err
+    assert "together" in rollcli("estimate", "--left", "maps", cwd=maps).err

@@ -1,0 +1,118 @@
+"""The images that `estimate` writes: their names, and what they never replace."""
+
+import cv2
+import numpy as np
+import pytest
+
+from tests.program import contents, road_map, rollcli, write_kitti, write_maps, write_pair
+
+
+@pytest.fixture
+def maps(tmp_path):
+    write_maps(tmp_path / "maps", 2)
+    return tmp_path
+
+
+def names(folder):
+    return sorted(contents(folder))
+
+
+def test_images_keep_the_folders_and_the_format_of_their_input(tmp_path):
+    write_kitti(tmp_path / "maps" / "day" / "a.png", road_map(0.1))
+    np.save(tmp_path / "maps" / "b.npy", road_map(0.1))
+    images = ("--derotated", "up", "--vdisparity", "v", "--road-mask", "road")
+    assert rollcli("estimate", "maps", "--recursive", *images, cwd=tmp_path).status == 0
+    assert names(tmp_path / "up") == ["b.npy", "day/a.png"]
+    assert names(tmp_path / "v") == names(tmp_path / "road") == ["b.png", "day/a.png"]
+    data = np.frombuffer((tmp_path / "up" / "day" / "a.png").read_bytes(), np.uint8)
+    upright = cv2.imdecode(data, cv2.IMREAD_UNCHANGED)
+    assert (upright.dtype, upright.shape) == (np.uint16, (120, 160))
+    assert np.load(tmp_path / "up" / "b.npy").dtype == np.float32
+
+
+@pytest.mark.parametrize(("kind", "ending"), [("png", ".png"), ("tiff", ".tif"), ("npy", ".npy")])
+def test_the_maps_of_pairs_are_saved_in_the_chosen_format(tmp_path, kind, ending):
+    write_pair(tmp_path, "a.png", road_map(0.05, width=320, height=160) / 2)
+    pair = ("--left", "left", "--right", "right", "--num-disparities", "48")
+    images = ("--disparity", "maps", "--derotated", "up", "--save-as", kind)
+    done = rollcli("estimate", *pair, *images, cwd=tmp_path)
+    assert done.status == 0, done.err
+    assert names(tmp_path / "maps") == names(tmp_path / "up") == [f"a{ending}"]
+    row, again = done.out.splitlines()[1], rollcli("estimate", "maps", cwd=tmp_path).out.splitlines()[1]
+    assert row.startswith("left/a.png,right/a.png,ok,")
+    assert float(again.split(",")[3]) == pytest.approx(float(row.split(",")[3]), abs=0.01)
+
+
+def refused(folder, *arguments):
+    """The one line of a usage error; nothing was written."""
+    before = contents(folder)
+    done = rollcli("estimate", *arguments, cwd=folder)
+    assert (done.status, done.out) == (2, "")
+    assert done.err.count("\n") == 1
+    assert contents(folder) == before
+    return done.err
+
+
+def test_two_frames_with_one_image_are_refused_before_anything_runs(tmp_path):
+    write_maps(tmp_path / "maps", 1)
+    np.save(tmp_path / "maps" / "frame0.npy", road_map())
+    line = refused(tmp_path, "maps", "--vdisparity", "v")
+    assert "maps/frame0.npy and maps/frame0.png would both write v/frame0.png" in line
+    assert rollcli("estimate", "maps", "--derotated", "up", cwd=tmp_path).status == 0
+    write_maps(tmp_path / "more", 1)
+    line = refused(tmp_path, "maps/frame0.png", "more/frame0.png", "--derotated", "down")
+    assert "name their common folder with --recursive" in line
+
+
+def test_no_output_replaces_an_input(maps):
+    assert "would be replaced" in refused(maps, "maps/*.png", "--derotated", "maps/../maps", "--overwrite")
+    assert "would be replaced" in refused(maps, "maps", "-o", "maps/frame0.png", "--overwrite")
+    (maps / "mask.png").write_bytes((maps / "maps" / "frame0.png").read_bytes())
+    assert "would be replaced" in refused(
+        maps, "maps", "--mask", "mask.png", "-o", "./mask.png", "--overwrite"
+    )
+
+
+def test_images_that_are_there_are_replaced_only_when_told_so(maps):
+    assert rollcli("estimate", "maps", "--derotated", "up", cwd=maps).status == 0
+    assert "up/frame0.png: exists already; give --overwrite" in refused(maps, "maps", "--derotated", "up")
+    assert rollcli("estimate", "maps", "--derotated", "up", "--overwrite", cwd=maps).status == 0
+
+
+def test_image_folders_inside_the_input_are_no_input(maps):
+    arguments = ("estimate", "maps", "--recursive", "--derotated", "maps/up", "--overwrite")
+    first = rollcli(*arguments, cwd=maps)
+    assert rollcli(*arguments, cwd=maps).out == first.out
+    assert first.out.count("\n") == 3
+
+
+def test_computed_maps_are_asked_of_pairs_only(maps):
+    assert "--disparity writes maps computed from --left and --right" in refused(
+        maps, "maps", "--disparity", "d"
+    )
+
+
+def test_a_dry_run_lists_what_is_read_and_written_and_does_nothing(maps):
+    before = contents(maps)
+    done = rollcli("estimate", "maps", "-o", "rolls.csv", "--vdisparity", "v", "--dry-run", cwd=maps)
+    assert done.status == 0
+    assert done.out.splitlines() == [
+        "read  maps/frame0.png",
+        "write v/frame0.png",
+        "read  maps/frame1.png",
+        "write v/frame1.png",
+        "write rolls.csv",
+        "write rolls.csv.run.json",
+    ]
+    assert contents(maps) == before
+
+
+def test_the_format_follows_the_ending_of_the_result(maps):
+    rollcli("estimate", "maps", "-o", "new/rolls.jsonl", cwd=maps)
+    assert (maps / "new" / "rolls.jsonl").read_text().startswith('{"file": "maps/frame0.png"')
+
+
+def test_a_named_pipe_takes_rows_as_they_come(maps):
+    done = rollcli("estimate", "maps", "-q", "-o", "/dev/stdout", cwd=maps)
+    assert done.out.count("\n") == 3
+    assert not list(maps.glob("*.run.json"))
