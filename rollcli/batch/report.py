@@ -18,7 +18,7 @@ INTERRUPTED = 130
 FRAMES_FAILED = 3
 _LINE_EVERY_S = 30.0
 _FAILURES_SHOWN = 5
-_UNKNOWN_WIDTH = 80
+_UNKNOWN_SIZE = {"ncols": 80, "nrows": 24}  # of a terminal that does not tell
 _FRAMES = ("frames", "frame")
 _MEANING = {
     "px": "pixels as stored",
@@ -66,15 +66,9 @@ class Report:
         if not self._options.quiet and sys.stderr.isatty():
             from tqdm import tqdm  # only where there is someone to look
 
-            width = os.get_terminal_size(sys.stderr.fileno()).columns
-            self._bar = tqdm(
-                total=self.total,
-                initial=self._kept,
-                unit=" frames",
-                leave=False,  # the summary follows
-                dynamic_ncols=width > 0,
-                ncols=None if width else _UNKNOWN_WIDTH,
-            )
+            known = os.get_terminal_size(sys.stderr.fileno()).columns > 0
+            size = {"dynamic_ncols": True} if known else _UNKNOWN_SIZE
+            self._bar = tqdm(total=self.total, initial=self._kept, unit=" frames", leave=False, **size)
         return self
 
     def __exit__(

@@ -161,8 +161,8 @@ method_options = record(
         "--method",
         type=click.Choice(["gd", "gss", "exact", "plane", "areas"]),
         default=MethodOptions.method,
-        help="gd: gradient descent; gss: golden section search; exact: the global minimum, from the roots of a polynomial; "
-        "plane: one least-squares plane; areas: planes of many small areas.",
+        help="gd: gradient descent; gss: golden section search; exact: the global minimum, from polynomial "
+        "roots; plane: one least-squares plane; areas: planes of many small areas.",
     ),
     option(
         "--model",
