@@ -1,0 +1,98 @@
+"""HTML pages with charts that open from disk without a network: what every page shares.
+
+A page extends `page.html` and puts `Chart` objects where it wants them. plotly (its script alone) and jinja2
+are the extra `report` and imported here only, when a page is made.
+"""
+
+from __future__ import annotations
+
+import html
+import importlib.util
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from rollcli.errors import UsageError
+
+_NEEDED = ("plotly", "jinja2")
+
+
+@dataclass(frozen=True)
+class Chart:
+    """A chart as plotly's script takes it; prints itself in a template.
+
+    Attributes
+    ----------
+    name : str
+        Its id on the page, and the name of the picture that a reader saves.
+    label : str
+        What it shows, for those who cannot see it.
+    data : sequence of mapping
+        The traces. No NaN: None where there is no value. A colour may be "@" and a name of the page's own
+        colours, such as "@c1", "@ok" or "@muted": these follow light and dark mode.
+    layout : mapping
+        Titles, ranges, kinds of axes; fonts, margins and colours are the page's.
+    """
+
+    name: str
+    label: str
+    data: Sequence[Mapping[str, Any]]
+    layout: Mapping[str, Any] = field(default_factory=dict)
+
+    def __html__(self) -> str:
+        """The chart's place and its content; file names in it cannot end the script."""
+        content = json.dumps({"data": self.data, "layout": self.layout}, allow_nan=False)
+        for mark in "<>&\u2028\u2029":
+            content = content.replace(mark, f"\\u{ord(mark):04x}")
+        name = html.escape(self.name)
+        return (
+            f'<div class="chart" id="{name}" role="img" aria-label="{html.escape(self.label)}"></div>'
+            f'<script type="application/json" data-chart="{name}">{content}</script>'
+        )
+
+
+def require_extra(what: str) -> None:
+    """Refuse, before any work is done, where the extra `report` is not installed; `what` needs it.
+
+    Raises
+    ------
+    UsageError
+        Says what to install.
+    """
+    missing = [name for name in _NEEDED if importlib.util.find_spec(name) is None]
+    if missing:
+        raise UsageError(f'{what} needs {" and ".join(missing)}: pip install "rollcli[report]"')
+
+
+def render_page(package: str, template: str, **values: Any) -> bytes:
+    """Fill a template that extends `page.html`; whatever it prints is escaped.
+
+    Parameters
+    ----------
+    package : str
+        Whose folder `templates` holds the template.
+    template : str
+        Its name.
+    **values
+        What it prints; `title` is required by `page.html`.
+
+    Returns
+    -------
+    bytes
+        The page, UTF-8, with plotly's script inside.
+    """
+    from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
+    from markupsafe import Markup
+    from plotly.offline import get_plotlyjs
+
+    environment = Environment(
+        loader=ChoiceLoader([PackageLoader(package), PackageLoader("rollcli.report")]),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    script = Markup(get_plotlyjs())
+    page = environment.get_template(template).render(plotly_script=script, **values)
+    return page.encode("utf-8", "replace")
