@@ -9,6 +9,8 @@ import pytest
 from rollcli.batch.options import MethodOptions
 from rollcli.cli.main import COMMANDS, main
 from rollcli.estimator.estimate import estimate_roll
+from rollcli.files.results import columns
+from tests.program import ROOT
 
 ESTIMATE = main.get_command(click.Context(main), "estimate")
 
@@ -30,3 +32,15 @@ def test_every_option_has_a_help_text(param):
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_command_that_is_there_has_a_line_of_help(name):
     assert COMMANDS[name][1].endswith(".")
+
+
+def test_every_option_is_documented_in_the_readme():
+    readme = (ROOT / "README.md").read_text("utf-8")
+    flags = [flag for param in ESTIMATE.params if isinstance(param, click.Option) for flag in param.opts]
+    assert [flag for flag in flags if f"`{flag}`" not in readme and f"`{flag} " not in readme] == []
+
+
+def test_every_column_and_exit_status_is_documented_in_the_readme():
+    readme = (ROOT / "README.md").read_text("utf-8")
+    assert [name for name in columns(timing=True) if f"`{name}`" not in readme] == []
+    assert all(f"\n| {status} | " in readme for status in (0, 1, 2, 3, 130))
