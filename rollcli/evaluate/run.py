@@ -1,0 +1,79 @@
+"""`evaluate` from the command line: what is read and written, and what is said meanwhile."""
+
+from __future__ import annotations
+
+import os
+import sys
+
+from rollcli.batch.checks import check_inputs_are_kept, check_nothing_is_there
+from rollcli.batch.dry_run import list_files
+from rollcli.batch.options import RunningOptions
+from rollcli.batch.report import FRAMES_FAILED
+from rollcli.evaluate.accuracy import Accuracy, assess
+from rollcli.evaluate.accuracy_text import FORMATS
+from rollcli.evaluate.truth import read_truth
+from rollcli.files.atomic import write_atomic
+from rollcli.files.results import read_result
+
+_STDOUT = "-"
+
+
+def run_accuracy(result: str, truth: str, form: str, output: str, running: RunningOptions) -> int:
+    """Compare a result with known angles.
+
+    Parameters
+    ----------
+    result, truth : str
+        Files: what `rollcli estimate` wrote, and a CSV with `file` and `roll_deg`.
+    form : {"table", "csv", "json"}
+    output : str
+        A file, or "-" for stdout.
+    running : RunningOptions
+
+    Returns
+    -------
+    int
+        The exit status: 3 when a frame of the truth has no angle.
+
+    Raises
+    ------
+    UsageError, InputError
+        Exit status 2: a file is not what it should be, or nothing in them matches.
+    OutputError
+        Exit status 1.
+    """
+    writes = [] if output == _STDOUT else [output]
+    check_inputs_are_kept([result, truth], writes)
+    if not running.overwrite:
+        check_nothing_is_there(writes)
+    if running.dry_run:
+        list_files([((result, truth), writes)])
+        return 0
+    accuracy = assess(read_result(result).rows, read_truth(truth), result)
+    _name_unmatched(accuracy, result, truth, running)
+    data = FORMATS[form](accuracy).encode("utf-8", "surrogateescape")
+    if output == _STDOUT:
+        _to_stdout(data)
+    else:
+        write_atomic(output, data)
+    return FRAMES_FAILED if accuracy.no_angle else 0
+
+
+def _name_unmatched(accuracy: Accuracy, result: str, truth: str, running: RunningOptions) -> None:
+    """Say which frames could not be compared, a line each."""
+    if running.quiet:
+        return
+    for stem in accuracy.no_angle:
+        say(f"{stem}: in {truth}, without an angle in {result}")
+    for name in accuracy.no_truth:
+        say(f"{name}: in {result}, without a known angle in {truth}")
+
+
+def _to_stdout(data: bytes) -> None:
+    while data:
+        data = data[os.write(1, data) :]
+
+
+def say(message: str) -> None:
+    """One line on stderr."""
+    sys.stderr.write(f"rollcli: {message}\n")

@@ -1,0 +1,98 @@
+"""`rollcli evaluate` as a user runs it."""
+
+import json
+
+import pytest
+
+from tests.program import rollcli
+
+RESULT = """file,status,roll_deg,roll_ci95_deg
+maps/a.png,ok,1.100000,0.200000
+maps/b.png,suspect,2.700000,0.200000
+maps/c.png,error,,
+maps/d.png,ok,4.000000,
+"""
+TRUTH = "file,roll_deg\na,1\nb,2\n"
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "rolls.csv").write_text(RESULT)
+    (tmp_path / "truth.csv").write_text(TRUTH)
+    return tmp_path
+
+
+def accuracy(folder, *arguments):
+    return rollcli("evaluate", "accuracy", "rolls.csv", "--truth", "truth.csv", *arguments, cwd=folder)
+
+
+def test_accuracy_prints_a_table_and_names_what_has_no_known_angle(folder):
+    done = accuracy(folder)
+    assert done.status == 0
+    assert "frames compared           2 (1 suspect)" in done.out
+    assert "worst                     0.7000 degrees  maps/b.png" in done.out
+    assert "inside the 95 % interval  50.0 % (1 of 2)" in done.out
+    assert done.err.splitlines() == [
+        f"rollcli: maps/{name}.png: in rolls.csv, without a known angle in truth.csv" for name in "cd"
+    ]
+
+
+def test_accuracy_ends_with_3_when_a_known_frame_has_no_angle(folder):
+    (folder / "truth.csv").write_text(TRUTH + "c,3\ne,5\n")
+    done = accuracy(folder, "--format", "json")
+    assert done.status == 3
+    assert json.loads(done.out)["no_angle"] == ["c", "e"]
+    assert "rollcli: c: in truth.csv, without an angle in rolls.csv\n" in done.err
+    assert "rollcli: e: in truth.csv, without an angle in rolls.csv\n" in done.err
+
+
+def test_accuracy_writes_a_file_and_refuses_to_replace_it(folder):
+    assert accuracy(folder, "--format", "csv", "-o", "figures.csv", "-q") == (0, "", "")
+    assert (folder / "figures.csv").read_text().startswith("count,median_deg,")
+    again = accuracy(folder, "-o", "figures.csv")
+    assert again.status == 2
+    assert "figures.csv: exists already; give --overwrite" in again.err
+    assert accuracy(folder, "-o", "figures.csv", "--overwrite").status == 0
+    assert (folder / "figures.csv").read_text().startswith("frames compared")
+
+
+def test_accuracy_never_replaces_what_it_reads(folder):
+    done = accuracy(folder, "-o", "truth.csv", "--overwrite")
+    assert done.status == 2
+    assert "would be replaced" in done.err
+    assert (folder / "truth.csv").read_text() == TRUTH
+
+
+def test_accuracy_dry_run_lists_files_and_does_nothing(folder):
+    done = accuracy(folder, "--dry-run", "-o", "figures.csv")
+    assert done.out.splitlines() == ["read  rolls.csv", "read  truth.csv", "write figures.csv"]
+    assert not (folder / "figures.csv").exists()
+
+
+@pytest.mark.parametrize(
+    ("result", "truth", "reason"),
+    [
+        ("file,angle\na,1\n", TRUTH, "is not a result of rollcli estimate"),
+        (RESULT, "name,roll\na,1\n", "truth.csv: has no column file, roll_deg"),
+        (RESULT, "file,roll_deg\nz,1\n", "no row has the stem of a frame of the truth"),
+        (RESULT, "file,roll_deg\nx/a,1\ny/a,2\n", "have the same stem"),
+        (None, TRUTH, "rolls.csv: cannot be read: no such file"),
+    ],
+)
+def test_accuracy_of_what_is_no_result_is_one_line_and_status_2(folder, result, truth, reason):
+    (folder / "truth.csv").write_text(truth)
+    if result is None:
+        (folder / "rolls.csv").unlink()
+    else:
+        (folder / "rolls.csv").write_text(result)
+    done = accuracy(folder)
+    assert (done.status, done.out) == (2, "")
+    assert reason in done.err
+    assert done.err.count("\n") == 1
+
+
+def test_evaluate_alone_shows_its_commands(tmp_path):
+    done = rollcli("evaluate", cwd=tmp_path)
+    assert done.status == 0
+    assert "accuracy" in done.out
+    assert "paper" in done.out

@@ -1,0 +1,162 @@
+"""Errors of a result against known angles."""
+
+import csv
+import io
+import json
+import math
+
+import pytest
+
+from rollcli.errors import InputError, UsageError
+from rollcli.evaluate.accuracy import assess
+from rollcli.evaluate.accuracy_text import as_csv, as_json, as_table
+from rollcli.evaluate.truth import read_truth, stem_of
+from rollcli.files.results import Row
+
+
+def rows(*angles, ci95=None, folder="maps/", ending=".png", status="ok"):
+    """Rows frame1, frame2, ... with these angles; None is a row without one."""
+    return [
+        Row(
+            f"{folder}frame{k}{ending}",
+            status="error" if angle is None else status,
+            roll_deg=angle,
+            roll_ci95_deg=None if angle is None else ci95,
+        )
+        for k, angle in enumerate(angles, 1)
+    ]
+
+
+def truth(*degrees):
+    return {f"frame{k}": math.radians(angle) for k, angle in enumerate(degrees, 1)}
+
+
+def write_truth(path, text):
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return path
+
+
+def test_the_figures_are_those_of_the_absolute_errors():
+    found = assess(rows(1.1, 2.0, 2.4, 5.0), truth(1, 2, 3, 4))  # errors 0.1, 0, -0.6, 1
+    assert found.count == 4
+    assert found.median_deg == pytest.approx(0.35)
+    assert found.p95_deg == pytest.approx(0.6 + 0.85 * 0.4)
+    assert (found.worst_deg, found.worst_file) == (pytest.approx(1), "maps/frame4.png")
+    assert found.bias_deg == pytest.approx(0.125)
+    assert found.share_above_0_5_deg == 0.5
+
+
+def test_angles_half_a_turn_apart_are_the_same():
+    assert assess(rows(89.9), truth(-89.9)).worst_deg == pytest.approx(0.2)
+
+
+def test_coverage_counts_the_truths_inside_their_interval():
+    found = assess(rows(1.0, 2.0, 3.0, 4.0, ci95=0.25), truth(1.2, 2.3, 3.0, 3.76))
+    assert (found.coverage_95, found.intervals) == (0.75, 4)
+
+
+def test_without_intervals_there_is_no_coverage():
+    found = assess(rows(1.0), truth(1))
+    assert (found.coverage_95, found.intervals) == (None, 0)
+
+
+def test_frames_match_by_stem_whatever_their_folder_and_ending():
+    named = {"frame1": 0.0}
+    for folder, ending in (("", ".npy"), ("a/b/", ".PNG"), ("c:\\maps\\", ".tiff"), ("left/", ".jpg")):
+        assert assess(rows(0.0, folder=folder, ending=ending), named).count == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "stem"),
+    [
+        ("img.0001", "img.0001"),
+        ("img.0001.png", "img.0001"),
+        ("a/b.c/d.npy", "d"),
+        (".png", ".png"),
+        ("x", "x"),
+    ],
+)
+def test_a_stem_loses_only_the_ending_of_an_image(name, stem):
+    assert stem_of(name) == stem
+
+
+def test_frames_without_an_angle_or_a_truth_are_named():
+    found = assess(rows(1.0, None, 3.0), {**truth(1, 2), "frame9": 0.0})
+    assert found.count == 1
+    assert found.no_angle == ("frame2", "frame9")
+    assert found.no_truth == ("maps/frame3.png",)
+
+
+def test_suspect_frames_are_compared_and_counted():
+    found = assess(
+        rows(1.0, status="suspect") + rows(2.0, folder="x", ending="b.png"), {"frame1": 0, "xframe1b": 0}
+    )
+    assert (found.count, found.ok, found.suspect) == (2, 1, 1)
+
+
+def test_when_nothing_matches_the_error_says_what_was_looked_for():
+    with pytest.raises(
+        UsageError, match=r"r\.csv: no row has the stem .* holds maps/frame1\.png, the truth other"
+    ):
+        assess(rows(1.0), {"other": 0.0}, "r.csv")
+
+
+def test_two_rows_of_one_stem_are_refused_by_name():
+    with pytest.raises(UsageError, match=r"a/frame1\.png and b/frame1\.png have the same stem"):
+        assess(rows(1.0, folder="a/") + rows(1.0, folder="b/"), truth(1))
+
+
+def test_all_frames_in_error_leave_no_figures():
+    found = assess(rows(None), truth(1))
+    assert (found.count, found.median_deg, found.worst_deg, found.worst_file) == (0, None, None, "")
+    assert "-" in as_table(found)
+    assert next(csv.DictReader(io.StringIO(as_csv(found))))["median_deg"] == ""
+    assert json.loads(as_json(found))["median_deg"] is None
+
+
+def test_the_three_forms_say_the_same():
+    found = assess(rows(1.125, 2.0, None, ci95=0.2), {**truth(1, 2, 3)})
+    line = next(csv.DictReader(io.StringIO(as_csv(found))))
+    values = json.loads(as_json(found))
+    assert float(line["median_deg"]) == values["median_deg"] == 0.0625
+    assert line["no_angle"] == "1"
+    assert values["no_angle"] == ["frame3"]
+    table = as_table(found)
+    assert "median error              0.0625 degrees" in table
+    assert "inside the 95 % interval  100.0 % (2 of 2)" in table
+
+
+def test_truth_is_read_by_its_columns_whatever_else_is_there(tmp_path):
+    path = write_truth(
+        tmp_path / "t.csv", b"\xef\xbb\xbfpitch_deg,roll_deg,file\r\n0,-3.5,a/x.png\r\n1,2,y\r\n"
+    )
+    assert read_truth(path) == {"x": math.radians(-3.5), "y": math.radians(2)}
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("", "has no column file, roll_deg"),
+        ("file,roll\na,1\n", "has no column roll_deg"),
+        ("file,roll_deg\n", "holds no angle"),
+        ("file,roll_deg\na,\n", "line 2: roll_deg is ''"),
+        ("file,roll_deg\na,1\nb,x\n", "line 3: roll_deg is 'x'"),
+        ("file,roll_deg\na,nan\n", "line 2: roll_deg is 'nan'"),
+        ("file,roll_deg\na\n", "line 2: roll_deg is None"),
+        ('file,roll_deg\n"a,1\n', "is not CSV"),
+        (b"\x89PNG\r\n\x1a\n\x00\xff", "has no column"),
+    ],
+)
+def test_a_truth_that_holds_no_angles_is_refused_with_the_line(tmp_path, text, reason):
+    with pytest.raises(InputError, match=reason):
+        read_truth(write_truth(tmp_path / "t.csv", text))
+
+
+def test_a_truth_that_is_not_there_is_refused(tmp_path):
+    with pytest.raises(InputError, match="no such file"):
+        read_truth(tmp_path / "t.csv")
+
+
+def test_a_truth_with_two_frames_of_one_stem_is_refused(tmp_path):
+    with pytest.raises(UsageError, match=r"a\.png and b/a have the same stem"):
+        read_truth(write_truth(tmp_path / "t.csv", "file,roll_deg\na.png,1\nb/a,2\n"))
