@@ -82,7 +82,7 @@ def take_sample(disparity: NDArray[Any], usable: NDArray[np.bool_] | None = None
     """
     height, width = disparity.shape
     grid = Grid.of_shape(height, width)
-    reach = min(16, max(3, round(max(height, width) / 310)), max(1, min(height, width) // 8))
+    reach = reach_of(height, width)
     step = max(1, int(math.sqrt(height * width / _PIXELS)))
     taken = _taken(disparity, usable, reach, step)
     count = int(np.count_nonzero(taken))
@@ -127,6 +127,11 @@ def take_sample(disparity: NDArray[Any], usable: NDArray[np.bool_] | None = None
         slope_noise=noise * per_unit,
         column=columns.astype(np.uint16),
     )
+
+
+def reach_of(height: int, width: int) -> int:
+    """Return how far away a pixel's neighbours are looked for, px."""
+    return min(16, max(3, round(max(height, width) / 310)), max(1, min(height, width) // 8))
 
 
 def _strided(array: NDArray[Any], reach: int, step: int, dv: int = 0, du: int = 0) -> NDArray[Any]:

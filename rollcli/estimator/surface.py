@@ -13,7 +13,7 @@ from rollcli.errors import EstimationError
 from rollcli.estimator.energy import Energy
 from rollcli.estimator.moments import Floats, Grid
 from rollcli.estimator.road import Road, road_weights
-from rollcli.estimator.sample import UNEVEN_SHARE, Sample
+from rollcli.estimator.sample import UNEVEN_SHARE, Sample, reach_of
 
 _ROUNDS = 6
 _START = 2.0  # tolerances within which a pixel counts at first,
@@ -21,6 +21,7 @@ _STRICT = 5.0  # in the end this many standard deviations,
 _EVEN = 0.35
 _LEAST = 0.2  # though not less than this many tolerances
 _EDGE = 0.75  # half-width of the part of the image that counts; it ends as exp(-(x / _EDGE)^8)
+_STEADY = 0.5  # of the road's own rise: how far that of the map may be off
 _DROP = 3.0  # farther than this many tolerances from the plane, a pixel is not looked at again
 MIN_PIXELS = 30
 
@@ -67,15 +68,25 @@ class Surface:
     parabolic: bool
 
     def covers(self, disparity: NDArray[Any]) -> NDArray[np.bool_]:
-        """Return which pixels of a map (H, W) lie on the surface."""
+        """Return which pixels of a map (H, W) lie on the surface and rise as it does."""
         height, width = disparity.shape
         x = (np.arange(width) - self.grid.centre_u) / self.grid.scale
         y = (np.arange(height) - self.grid.centre_v) / self.grid.scale
         level = y[:, None] * math.cos(self.theta) - x * math.sin(self.theta)
         a0, a1, a2 = self.alpha
-        off = np.abs(a0 + level * (a1 + level * a2) - disparity)
-        covered: NDArray[np.bool_] = off < self.limit * np.hypot(self.noise, UNEVEN_SHARE * disparity)
-        return covered
+        road = a0 + level * (a1 + level * a2)
+        tolerance = np.hypot(self.noise, UNEVEN_SHARE * disparity)
+        on_it: NDArray[np.bool_] = np.abs(road - disparity) < self.limit * tolerance
+        # where a wall passes through the surface it is as near as the road, but it does not rise
+        reach = min(reach_of(height, width), height - 1)
+        off = disparity - road
+        steady = np.abs(off[reach:] - off[:-reach]) < np.maximum(
+            tolerance[reach:], _STEADY * np.abs(road[reach:] - road[:-reach])
+        )
+        rises = np.zeros_like(on_it)
+        rises[reach:] |= steady
+        rises[:-reach] |= steady
+        return on_it & rises
 
     def parabola(self, theta: float) -> tuple[float, float, float]:
         """Return the best (a0, a1, a2) at a given roll, on the normalised y."""
@@ -120,7 +131,9 @@ def fit_surface(sample: Sample, road: Road, *, parabolic: bool) -> Surface:
         sample.d[near].astype(np.float64),
     )
     tolerance = sample.tolerance[near].astype(np.float64)
-    place = np.square(road_weights(sample, road.plane, near)) * np.exp(-np.square(np.square(np.square(x / _EDGE))))
+    place = np.square(road_weights(sample, road.plane, near)) * np.exp(
+        -np.square(np.square(np.square(x / _EDGE)))
+    )
     theta, alpha, limit = road.theta, np.array([c0, math.hypot(c1, c2), 0.0]), _START
     residuals = off[near] * tolerance
     design = np.empty((5, len(near)))

@@ -11,7 +11,7 @@ from rollcli.estimator.solution import Solution, apart
 from rollcli.estimator.surface import Surface
 
 WIDEST_INTERVAL = math.radians(0.25)
-LEAST_SCORE = 0.1
+LEAST_SCORE = 0.13
 RIVAL_SHARE = 0.85
 LONGEST_MOVE = math.radians(1)
 NEAR_MINIMUM = 1.1
