@@ -35,8 +35,8 @@ _LEAST_RISE = 4.0  # tolerances that a road rises by within the radius
 _BELOW = 1.5  # cost of a coherent pixel under the road; one that is merely not on it costs 1
 _OFF_SLOPE = 0.2  # weight of a pixel around which the map does not rise as the road does
 _SLOPE_SHARE = 0.4  # of the road's own slope: how far the map's may be off
-_CORE, _CORRIDOR = 0.5, 1.5  # half-widths of the corridor, in camera heights
-_BESIDE = 0.05  # weight of a pixel far beside it
+_CORE, _CORRIDOR = 0.4, 1.0  # half-widths of the corridor, in camera heights
+_BESIDE = 0.02  # weight of a pixel far beside it
 _LEAST = 0.05  # share of the pixels that a corridor should weigh
 RIVAL_ANGLE = math.radians(2)
 

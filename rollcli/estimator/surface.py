@@ -20,8 +20,10 @@ _START = 2.0  # tolerances within which a pixel counts at first,
 _STRICT = 5.0  # in the end this many standard deviations,
 _EVEN = 0.35
 _LEAST = 0.2  # though not less than this many tolerances
-_EDGE = 0.75  # half-width of the part of the image that counts; it ends as exp(-(x / _EDGE)^8)
+_POWER = 8
+_EDGE = 0.65  # half-width of the part of the image that counts; it ends as exp(-(x / _EDGE)^8)
 _STEADY = 0.5  # of the road's own rise: how far that of the map may be off
+_AHEAD = 1e9
 _DROP = 3.0  # farther than this many tolerances from the plane, a pixel is not looked at again
 MIN_PIXELS = 30
 
@@ -131,9 +133,9 @@ def fit_surface(sample: Sample, road: Road, *, parabolic: bool) -> Surface:
         sample.d[near].astype(np.float64),
     )
     tolerance = sample.tolerance[near].astype(np.float64)
-    place = np.square(road_weights(sample, road.plane, near)) * np.exp(
-        -np.square(np.square(np.square(x / _EDGE)))
-    )
+    across = x * math.cos(road.theta) + y * math.sin(road.theta)
+    place = np.square(road_weights(sample, road.plane, near)) * np.exp(-((across / _EDGE) ** _POWER))
+    ahead = np.abs(across) * math.hypot(c1, c2) < _AHEAD * d
     theta, alpha, limit = road.theta, np.array([c0, math.hypot(c1, c2), 0.0]), _START
     residuals = off[near] * tolerance
     design = np.empty((5, len(near)))
@@ -152,7 +154,10 @@ def fit_surface(sample: Sample, road: Road, *, parabolic: bool) -> Surface:
         theta, alpha = theta + max(-0.2, min(0.2, turned)), np.array([a0, a1, a2])
         level = y * math.cos(theta) - x * math.sin(theta)
         residuals = a0 + level * (a1 + level * a2) - d
-        spread = np.abs(residuals[weights > 0]) / tolerance[weights > 0]
+        judged = weights > 0
+        if np.count_nonzero(judged & ahead) >= MIN_PIXELS:
+            judged &= ahead
+        spread = np.abs(residuals[judged]) / tolerance[judged]
         middle = len(spread) // 2
         deviation = 1.4826 * float(np.partition(spread, middle)[middle])
         limit = max(_LEAST, min(limit, (_STRICT if deviation > _EVEN else 3.0) * deviation))
