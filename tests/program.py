@@ -72,7 +72,7 @@ def write_kitti(path: Path, disparity) -> None:
 def write_maps(folder: Path, count: int, **size: int) -> None:
     """`count` maps frame0.png, frame1.png, ..., each rolled a little more."""
     for index in range(count):
-        write_kitti(folder / f"frame{index}.png", road_map(0.01 * index, seed=index, **size))
+        write_kitti(folder / f"frame{index}.png", road_map(0.01 * (index % 40), seed=index, **size))
 
 
 def write_pair(folder: Path, name: str, disparity, seed: int = 0) -> None:
