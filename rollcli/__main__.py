@@ -1,11 +1,22 @@
 """``python -m rollcli``: the same program as ``rollcli``."""
 
+import sys
+from types import TracebackType
+
 
 def main() -> None:
-    """Run the program."""
+    """Run the program; should it fail for a reason that nobody thought of, that is one line too."""
+    sys.excepthook = _one_line
     from rollcli.cli.main import main as program  # here: each worker process imports this module anew
 
     program(prog_name="rollcli")
+
+
+def _one_line(kind: type[BaseException], error: BaseException, at: TracebackType | None) -> None:
+    while at is not None and at.tb_next is not None:
+        at = at.tb_next
+    where = f"{at.tb_frame.f_code.co_filename}:{at.tb_lineno}" if at else "nowhere"
+    sys.stderr.write(f"rollcli: internal error, please report it: {kind.__name__}: {error} ({where})\n")
 
 
 if __name__ == "__main__":

@@ -1,7 +1,6 @@
 """Workers on a Dask cluster: the same frames, sent to an executor elsewhere (extra `cluster`)."""
 
 import os
-import secrets
 from collections.abc import Generator, Sequence
 from concurrent.futures import CancelledError, Future
 from dataclasses import replace
@@ -9,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from rollcli import __version__
-from rollcli.batch.job import Frame, Outcome, do, failed
+from rollcli.batch.job import Frame, Outcome, do, lost
 from rollcli.batch.options import FrameOptions
 from rollcli.batch.outputs import remove_leftovers
 from rollcli.batch.setup import prepare_worker
@@ -66,7 +65,7 @@ class ClusterCrew:
 
     def again(self, frame: Frame) -> Outcome:
         """Several workers have tried it already."""
-        return failed(frame, _LOST)
+        return lost(frame, _LOST, self._options.images)
 
     def renew(self) -> None:
         """Workers are the cluster's own affair."""
@@ -78,6 +77,7 @@ def _connect(address: str) -> Any:
 
         dask.config.set({"logging.distributed": "critical"})  # read on import; errors end as our own line
         from distributed import Client
+        from distributed import TimeoutError as DaskTimeoutError  # before Python 3.11 not the built-in one
     except ImportError as error:
         raise UsageError("--scheduler needs the extra cluster: pip install 'rollcli[cluster]'") from error
     try:
@@ -86,7 +86,7 @@ def _connect(address: str) -> Any:
         raise ClusterError(f"{address}: no Dask scheduler answers there") from error
     try:
         client.wait_for_workers(1, timeout=_FIRST_WORKER_S)
-    except TimeoutError as error:
+    except DaskTimeoutError as error:
         client.close(timeout=1)
         raise ClusterError(f"{address}: has no workers; start some: dask worker {address}") from error
     return client
@@ -110,8 +110,7 @@ def _check_workers(client: Any, frames: Sequence[Frame], options: FrameOptions) 
     """Ask every worker whether it is this rollcli and sees the files and folders that this process sees."""
     sample = {path for frame in (*frames[:1], *frames[-1:]) for path in frame.reads() if Path(path).exists()}
     sizes = {options.at(path): Path(path).stat().st_size for path in sample}
-    name = f".rollcli-{secrets.token_hex(8)}"
-    marks = [Path(options.at(folder), name) for _, folder in options.images.folders()]
+    marks = [Path(options.at(folder), ".rollcli-check") for _, folder in options.images.folders()]
     try:
         for mark in marks:
             write_atomic(mark, b"")

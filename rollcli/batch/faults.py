@@ -3,12 +3,12 @@
 from collections.abc import Callable
 
 import cv2
-import numpy as np
 
 from rollcli.batch.job import Frame, Outcome, failed
 from rollcli.errors import EstimationError, InputError, UsageError
 
-FAULTS = (InputError, EstimationError, UsageError, OSError, MemoryError, cv2.error, np.linalg.LinAlgError)
+_NUMBERS = (ArithmeticError, ValueError)  # that some step cannot deal with
+FAULTS = (InputError, EstimationError, UsageError, OSError, MemoryError, cv2.error, *_NUMBERS)
 
 
 def guarded(frame: Frame, work: Callable[[], Outcome]) -> Outcome:

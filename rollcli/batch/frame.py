@@ -9,6 +9,7 @@ from rollcli.batch.faults import guarded
 from rollcli.batch.images import write_images
 from rollcli.batch.job import Frame, Outcome
 from rollcli.batch.options import FrameOptions, MethodOptions
+from rollcli.batch.outputs import remove_images
 from rollcli.batch.region import region_mask
 from rollcli.batch.source import Source, read_source
 from rollcli.estimator.estimate import RollEstimate, estimate_roll
@@ -28,6 +29,8 @@ def run_frame(frame: Frame, options: FrameOptions) -> Outcome:
     """
     start = time.perf_counter()
     outcome = guarded(frame, lambda: _measured(frame, options))
+    if outcome.row.status == "error":
+        remove_images(frame, options.images, options.root)
     elapsed = 1000 * (time.perf_counter() - start)
     return replace(outcome, row=replace(outcome.row, elapsed_ms=elapsed))
 

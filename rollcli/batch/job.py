@@ -3,7 +3,8 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from rollcli.batch.options import FrameOptions
+from rollcli.batch.options import FrameOptions, ImageOptions
+from rollcli.batch.outputs import remove_images
 from rollcli.files.results import Row
 
 
@@ -72,3 +73,9 @@ def failed(frame: Frame, reason: str) -> Outcome:
     line = " ".join(reason.split())
     named = line if line.startswith((frame.file, frame.right_file or frame.file)) else f"{frame.file}: {line}"
     return Outcome(Row(frame.file, frame.right_file, "error", message=named))
+
+
+def lost(frame: Frame, reason: str, images: ImageOptions) -> Outcome:
+    """The row of a frame whose worker died; what it wrote is removed, since an error row has no images."""
+    remove_images(frame, images)
+    return failed(frame, reason)

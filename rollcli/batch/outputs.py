@@ -1,5 +1,6 @@
 """Where the images of a frame lie."""
 
+import contextlib
 import posixpath
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -28,8 +29,17 @@ def image_paths(frame: "Frame", images: ImageOptions) -> Iterator[tuple[str, str
         yield kind, posixpath.join(folder, stem + endings[kind])
 
 
+def remove_images(frame: "Frame", images: ImageOptions, root: str = "") -> None:
+    """Remove what was written for a frame: one that has no angle has no images either."""
+    for _, path in image_paths(frame, images):
+        for written in (Path(root, path), part_of(Path(root, path))):
+            with contextlib.suppress(OSError):  # that there is no such file, or no such folder
+                written.unlink()
+
+
 def remove_leftovers(frames: Iterable["Frame"], images: ImageOptions) -> None:
     """Remove the temporary files that killed workers left beside what they were writing; no others."""
     for frame in frames:
         for _, path in image_paths(frame, images):
-            part_of(Path(path)).unlink(missing_ok=True)
+            with contextlib.suppress(OSError):
+                part_of(Path(path)).unlink()

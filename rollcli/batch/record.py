@@ -82,29 +82,38 @@ def check_resumable(
         raise UsageError(
             f"{plan.output}: cannot be resumed without {run_path(plan.output).name}; --overwrite starts anew"
         )
-    for difference in _differences(rows, run, record.fixed, plan.frames):
+    for difference in _differences(rows, run, record.fixed, plan):
         raise UsageError(f"{plan.output}: cannot be resumed: {difference}; --overwrite starts anew")
 
 
 def _differences(
-    rows: Sequence[Row], was: Mapping[str, Any], now: Mapping[str, Any], frames: Sequence[Frame]
+    rows: Sequence[Row], was: Mapping[str, Any], now: Mapping[str, Any], plan: Plan
 ) -> Iterator[str]:
     if was.get("rollcli") != now["rollcli"]:
         yield f"it was begun by rollcli {was.get('rollcli')}, this is {now['rollcli']}"
-    options_was, options_now = was.get("options", {}), json.loads(json.dumps(now["options"]))
+    options_was, options_now = dict(was.get("options") or {}), json.loads(json.dumps(now["options"]))
     for key in (*options_now, *(key for key in options_was if key not in options_now)):
         if options_was.get(key) != options_now.get(key):
             yield f"--{key} was {_shown(options_was.get(key))}, is now {_shown(options_now.get(key))}"
-    for row, frame in zip(rows, frames, strict=False):
+    for row, frame in zip(rows, plan.frames, strict=False):
         if (row.file, row.right_file) != (frame.file, frame.right_file):
             yield f"the inputs differ: its row is of {row.file}, where now {frame.file} is"
-    inputs_was, inputs_now = was.get("inputs", {}), now["inputs"]
+    inputs_was, inputs_now = dict(was.get("inputs") or {}), now["inputs"]
     if inputs_was.get("frames") != inputs_now["frames"]:
         yield f"it was begun with {inputs_was.get('frames')} frames, now there are {inputs_now['frames']}"
     if inputs_was.get("names") != inputs_now["names"]:
         yield "the names of the inputs differ"
     if inputs_was != inputs_now:
-        yield "the inputs have changed since (size or time of change)"
+        yield f"{_changed(plan) or 'an input'} has changed since"
+
+
+def _changed(plan: Plan) -> str | None:
+    """The first input that is younger than the record of the run, or gone."""
+    begun = run_path(plan.output).stat().st_mtime_ns
+    for path in (path for frame in plan.frames for path in frame.reads()):
+        if not Path(path).exists() or Path(path).stat().st_mtime_ns > begun:
+            return path
+    return None
 
 
 def _shown(value: Any) -> str:

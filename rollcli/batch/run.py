@@ -5,7 +5,7 @@ from collections.abc import Generator, Sequence
 from functools import partial
 
 from rollcli.batch.dry_run import list_files
-from rollcli.batch.job import Frame, Outcome, do, failed
+from rollcli.batch.job import Frame, Outcome, do, lost
 from rollcli.batch.local import done_locally
 from rollcli.batch.options import EstimateOptions
 from rollcli.batch.outputs import image_paths, remove_leftovers
@@ -56,10 +56,12 @@ def run(options: EstimateOptions, resume_command: str = "") -> int:
         try:
             with stop_on_signals() as stop, report:
                 _work(plan.frames[done:], options, sink, record, report, stop)
+        except KeyboardInterrupt:  # asked twice: without waiting for the frames in flight
+            report.stopped_early = True
         except OutputError as error:
             hint = f"; {report.done} rows are kept, continue with --resume" if record else ""
             raise OutputError(f"{error}{hint}") from error
-    return _end(plan, record, report, stop, resume_command)
+        return _end(record, report, stop, resume_command)
 
 
 def _take_up(
@@ -115,11 +117,11 @@ def _outcomes(
         from rollcli.batch.cluster import cluster_outcomes
 
         return cluster_outcomes(frames, options.frame, options.result.scheduler, stop)
-    work = Work(partial(do, options=options.frame), failed)
+    work = Work(partial(do, options=options.frame), partial(lost, images=options.images))
     return done_locally(frames, work, options.running.jobs, stop, held)
 
 
-def _end(plan: Plan, record: RunRecord | None, report: Report, stop: Stop, resume_command: str) -> int:
+def _end(record: RunRecord | None, report: Report, stop: Stop, resume_command: str) -> int:
     if not report.stopped_early and record is not None:
         record.write(report.totals)
     report.note(report.summary())

@@ -167,7 +167,7 @@ def test_a_resume_by_another_version_says_which(interrupted):
 
 def test_a_resume_with_changed_inputs_is_refused(interrupted):
     write_kitti(interrupted / "maps" / "frame2.png", road_map(0.3))
-    assert "changed" in refused(interrupted)
+    assert "maps/frame2.png has changed since" in refused(interrupted)
 
 
 def test_a_resume_with_more_or_other_inputs_is_refused(interrupted):

@@ -62,3 +62,19 @@ def test_the_program_alone_shows_its_commands(tmp_path):
 
 def test_help_calls_the_program_rollcli(tmp_path):
     assert rollcli("--help", cwd=tmp_path).out.startswith("Usage: rollcli ")
+
+
+def test_what_nobody_thought_of_is_one_line_too(tmp_path):
+    code = """
+import sys
+import rollcli.batch.run
+rollcli.batch.run.make_plan = lambda options: {}["key"]
+sys.argv = ["rollcli", "estimate", "."]
+from rollcli.__main__ import main
+main()
+"""
+    line = [sys.executable, "-c", code]
+    done = subprocess.run(line, cwd=tmp_path, env=environment(), capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr.startswith("rollcli: internal error, please report it: KeyError: 'key' (")
+    assert done.stderr.count("\n") == 1

@@ -116,3 +116,11 @@ def test_a_named_pipe_takes_rows_as_they_come(maps):
     done = rollcli("estimate", "maps", "-q", "-o", "/dev/stdout", cwd=maps)
     assert done.out.count("\n") == 3
     assert not list(maps.glob("*.run.json"))
+
+
+def test_a_frame_that_fails_leaves_no_image_of_an_earlier_run(maps):
+    arguments = ("estimate", "maps", "--derotated", "up", "--overwrite")
+    rollcli(*arguments, cwd=maps)
+    (maps / "maps" / "frame0.png").write_bytes(b"")
+    assert rollcli(*arguments, cwd=maps).status == 3
+    assert names(maps / "up") == ["frame1.png"]
