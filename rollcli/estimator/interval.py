@@ -23,7 +23,13 @@ _T975 = (12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228, 
 
 
 def half_width(surface: Surface, theta: float) -> float:
-    """Return the half-width of the 95 % interval of the roll angle.
+    """Return the half-width of the 95 % interval of the roll angle, radians; see `moves`."""
+    bands, columns, white = moves(surface, theta)
+    return _KAPPA * math.sqrt(bands**2 + columns**2 + white**2)
+
+
+def moves(surface: Surface, theta: float) -> tuple[float, float, float]:
+    """Return what the interval is made of.
 
     Parameters
     ----------
@@ -34,8 +40,10 @@ def half_width(surface: Surface, theta: float) -> float:
 
     Returns
     -------
-    float
-        Radians.
+    bands, columns : float
+        By the jackknife over bands along the road and over columns across it, radians.
+    white : float
+        By the textbook formula, for as many pixels as could be independent, radians.
     """
     cosine, sine = math.cos(theta), math.sin(theta)
     across = surface.x * cosine + surface.y * sine
@@ -55,13 +63,13 @@ def half_width(surface: Surface, theta: float) -> float:
     columns = _spread(_by_group(parts, across, parts[15]), normal, step)
     weight = float(surface.weights.sum())
     variance = float(surface.weights @ np.square(residuals)) / weight
-    white = variance * inverse[3, 3] * max(1.0, weight / _EFFECTIVE_PIXELS)
-    return _KAPPA * math.sqrt(bands**2 + columns**2 + 1.96**2 * white)
+    white = 1.96 * math.sqrt(variance * inverse[3, 3] * max(1.0, weight / _EFFECTIVE_PIXELS))
+    return bands, columns, white
 
 
 def _by_group(parts: Floats, position: Floats, share: Floats) -> Floats:
     """Return the sums (20, 6) over six groups of equal total `share`, cut along `position`."""
-    order = np.argsort(position)
+    order = np.argsort(position, kind="stable")
     heights = np.cumsum(share[order])
     starts = np.searchsorted(heights, heights[-1] * np.arange(_GROUPS) / _GROUPS)
     sums: Floats = np.add.reduceat(parts[:, order], np.minimum(starts, len(order) - 1), axis=1)
