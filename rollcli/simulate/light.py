@@ -62,8 +62,10 @@ def in_shadow(points: Array, sun: Array, casters: Sequence[Surface]) -> NDArray[
 def air_below(points: Array, car: Solid) -> Values:
     """The share of the sky's light that reaches ground points (3, N) near and below a car."""
     right, _, ahead = dots(car.frame, points - car.place[:, None])
-    away = np.maximum(np.abs(right) - 0.75, 0) ** 2 + np.maximum(np.abs(ahead) - 2.0, 0) ** 2
-    return np.asarray(1 - 0.85 * np.exp(-away / 0.35**2), np.float32)
+    across, _, along = car.extent
+    beside = np.maximum(np.maximum(across[0] - right, right - across[1]) + 0.2, 0)
+    beyond = np.maximum(np.maximum(along[0] - ahead, ahead - along[1]) + 0.2, 0)
+    return np.asarray(1 - 0.85 * np.exp(-(beside**2 + beyond**2) / 0.35**2), np.float32)
 
 
 def sky(light: Light, direction: Array) -> Values:

@@ -14,14 +14,17 @@ from rollcli.simulate.texture import Values
 from rollcli.simulate.vectors import Array, Vectors, dot, groups
 
 NONE = -1  # the material of the sky
+# the rows of `Seen.reads`
+P, Q, LONG_P, LONG_Q, LONG, SHORT, SUN, AIR = range(8)
 
 
 @dataclass(frozen=True)
 class Seen:
     """For N rays: depth (inf: sky), indices of surface and material (-1: sky), and what shading needs there.
 
-    `reads` (8, N) holds texture coordinates p and q; the long axis of the pixel's footprint on them, as p, q
-    and length; the footprint's short length, all in metres; the share of the sun's light, and of the sky's.
+    `reads` (8, N) holds texture coordinates P and Q; the long axis of the pixel's footprint on them as LONG_P
+    and LONG_Q, its length LONG, and the footprint's length across, SHORT, all in metres; the share of the
+    sun's light, SUN, and of the sky's, AIR.
     """
 
     depth: Array
@@ -75,7 +78,9 @@ def _read(scene: Scene, surface: Surface, rays: Rays, direction: Values, at: Ind
         lit = np.flatnonzero(sun)
         sun[lit[in_shadow(points[:, lit], scene.light.sun, casters)]] = 0
     seen.material[at] = chart.material
-    for row, values in enumerate((chart.p, chart.q, *_footprint(chart, direction, depth, rays), sun)):
+    footprint = _footprint(chart, direction, depth, rays)
+    found = (chart.p, chart.q, *footprint, sun)
+    for row, values in zip((P, Q, LONG_P, LONG_Q, LONG, SHORT, SUN), found, strict=True):
         seen.reads[row][at] = values
 
 
@@ -86,7 +91,7 @@ def _dim_below_cars(scene: Scene, pixels: Pixels, seen: Seen) -> None:
         window = pixels.window(car.bounds(margin=1.0))
         near = np.flatnonzero(ground) if window is None else window[ground[window]]
         points = pixels.rays.origin + seen.depth[near] * pixels.rays.direction[:, near]
-        seen.reads[7][near] *= air_below(points, car)
+        seen.reads[AIR][near] *= air_below(points, car)
 
 
 def _footprint(chart: Chart, direction: Vectors, depth: Vectors, rays: Rays) -> tuple[Vectors, ...]:

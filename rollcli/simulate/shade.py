@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from rollcli.simulate.light import sky
 from rollcli.simulate.materials import Material
 from rollcli.simulate.scene import Scene
-from rollcli.simulate.see import NONE
+from rollcli.simulate.see import AIR, LONG, NONE, SHORT, SUN, P, Q
 from rollcli.simulate.texture import Values
 from rollcli.simulate.vectors import Array, groups
 
@@ -19,18 +19,18 @@ def shade(scene: Scene, direction: Array, kinds: NDArray[np.int16], reads: Value
     nothing = kinds == NONE
     light[nothing] = sky(scene.light, direction[:, nothing])
     ambient = np.float32(scene.light.ambient)
-    strength = np.float32(scene.light.exposure) * (ambient * reads[7] + (1 - ambient) * reads[6])
+    strength = np.float32(scene.light.exposure) * (ambient * reads[AIR] + (1 - ambient) * reads[SUN])
     for k, at in groups(kinds, len(scene.materials)):
-        material, mine = scene.materials[k], reads[:6].take(at, axis=1)
+        material, mine = scene.materials[k], reads[: SHORT + 1].take(at, axis=1)
         bright = _albedo(material, mine) * strength[at]
-        light[at] = bright[:, None] * material.colour(mine[0], mine[1])
+        light[at] = bright[:, None] * material.colour(mine[P], mine[Q])
     return light
 
 
 def _albedo(material: Material, reads: Values) -> Values:
     """Albedo over each pixel's footprint: taps along its long axis, each as wide as its short one."""
     albedo = np.empty(reads.shape[1], np.float32)
-    power = np.ceil(np.log2(np.clip(reads[4] / reads[5], 1, _MAX_TAPS)) - 0.5).astype(np.int16)
+    power = np.ceil(np.log2(np.clip(reads[LONG] / reads[SHORT], 1, _MAX_TAPS)) - 0.5).astype(np.int16)
     for k, at in groups(power, power.max() + 1):
         p, q, long_p, long_q, long, short = reads.take(at, axis=1)
         taps = 1 << k

@@ -138,8 +138,7 @@ class Crown:
     def chart(self, points: Array) -> Chart:
         x, y, z = points - self.centre[:, None]
         normal = np.array([x, y * (self.radius / self.half_height) ** 2, z])
-        away = np.maximum(np.hypot(x, z), 0.1)
-        around = np.array([-z, np.zeros_like(x), x]) / away
+        around = np.array([-z, np.zeros_like(x), x]) * (self.radius / np.maximum(x * x + z * z, 0.01))
         return Chart(normal, self.radius * np.arctan2(x, -z), y, around, _UP, self.material)
 
     def bounds(self) -> Array | None:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from rollcli.simulate.camera import Camera
 from rollcli.simulate.pixels import Pixels
 from rollcli.simulate.scene import Scene
-from rollcli.simulate.see import Seen, see
+from rollcli.simulate.see import SUN, Seen, see
 from rollcli.simulate.shade import shade
 from rollcli.simulate.texture import Values
 from rollcli.simulate.vectors import Array
@@ -78,7 +78,7 @@ def _look(scene: Scene, camera: Camera, rows: range) -> View:
 
 def _edges(seen: Seen, width: int) -> NDArray[np.bool_]:
     """Pixels of which a neighbour shows something else, or lies in shadow where they do not."""
-    shadow = seen.reads[6] == 0
+    shadow = seen.reads[SUN] == 0
     kind = (seen.surface.astype(np.int32) << 17) + (seen.material.astype(np.int32) << 1) + shadow
     kind = kind.reshape(-1, width)
     edge = np.zeros(kind.shape, bool)
