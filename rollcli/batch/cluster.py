@@ -10,7 +10,7 @@ from typing import Any
 from rollcli import __version__
 from rollcli.batch.job import Frame, Outcome, do, lost
 from rollcli.batch.options import FrameOptions
-from rollcli.batch.outputs import remove_leftovers
+from rollcli.batch.outputs import remove_image_leftovers
 from rollcli.batch.setup import prepare_worker
 from rollcli.batch.signals import Stop
 from rollcli.batch.workers import in_order
@@ -43,7 +43,7 @@ def cluster_outcomes(
         raise ClusterError(f"{address}: the connection to the scheduler is lost") from error
     finally:
         client.close(timeout=2)
-        remove_leftovers(frames, options.images)  # of workers that died
+        remove_image_leftovers(frames, options.images)  # of workers that died
 
 
 class ClusterCrew:

@@ -15,9 +15,6 @@ from rollcli.batch.source import Source, read_source
 from rollcli.estimator.estimate import RollEstimate, estimate_roll
 from rollcli.files.results import Row
 
-# more of the map than this at the end of the searched range: the range was too short for the scene
-_MUCH_AT_END = 0.05
-
 
 def run_frame(frame: Frame, options: FrameOptions) -> Outcome:
     """Do one frame; whatever is wrong with it becomes an `error` row.
@@ -58,10 +55,9 @@ def _arguments(options: MethodOptions) -> dict[str, Any]:
 def _row(frame: Frame, source: Source, estimate: RollEstimate) -> Row:
     reasons = [estimate.message] if estimate.message else []
     status = estimate.status
-    if source.end_fraction > _MUCH_AT_END:
+    if source.doubt:
         status = "suspect"
-        share = f"{source.end_fraction:.0%} of the map lies at the end of the searched range"
-        reasons.append(f"{share}; use a larger --num-disparities")
+        reasons.append(source.doubt)
     alpha0, alpha1, alpha2 = estimate.alpha
     return Row(
         file=frame.file,

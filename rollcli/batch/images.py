@@ -1,15 +1,16 @@
 """The images of a frame, drawn and written."""
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.batch.options import FrameOptions, ImageOptions
+from rollcli.batch.options import FrameOptions
 from rollcli.batch.outputs import image_paths
 from rollcli.files.atomic import write_atomic
-from rollcli.files.encodings import from_disparity
-from rollcli.files.formats import encode_stored
+from rollcli.files.encodings import Encoding, from_disparity
+from rollcli.files.formats import Stored, encode_stored
 from rollcli.files.png import encode_png
 from rollcli.imaging.derotate import derotate
 from rollcli.imaging.overlay import draw_road
@@ -33,14 +34,28 @@ def write_images(frame: "Frame", source: "Source", estimate: "RollEstimate", opt
         write_atomic(options.at(path), _ENCODERS[kind](source, estimate, options))
 
 
+def encode_turned(
+    stored: Stored, roll: float, encoding: str, invalid: Iterable[float], *, expand: bool = False
+) -> bytes:
+    """A map rotated by `roll` radians, as a file of its own type, encoding and format."""
+    no_data = [*invalid, *stored.nodata]
+    if encoding == Encoding.CITYSCAPES:
+        no_data.append(1)  # (1 - 1) / 256: a disparity of nothing
+    turned = derotate(stored.values, roll, expand=expand, invalid=no_data)
+    return encode_stored(turned, stored.format, stored.nodata)
+
+
+def encode_computed(disparity: NDArray[Any], save_as: str) -> bytes:
+    """A computed map as a file: KITTI's 16 bits in a PNG, pixels as they are elsewhere."""
+    if save_as == "png":
+        return encode_stored(from_disparity(disparity, "kitti", np.uint16), "png")
+    return encode_stored(disparity.astype(np.float32, copy=False), save_as)
+
+
 def _derotated(source: "Source", estimate: "RollEstimate", options: FrameOptions) -> bytes:
     if source.stored is None:
-        return _encoded(derotate(source.disparity, estimate.theta), options.images)
-    stored = source.stored
-    invalid = (*options.encoding.invalid, *stored.nodata)
-    return encode_stored(
-        derotate(stored.values, estimate.theta, invalid=invalid), stored.format, stored.nodata
-    )
+        return encode_computed(derotate(source.disparity, estimate.theta), options.images.save_as)
+    return encode_turned(source.stored, estimate.theta, source.encoding, options.encoding.invalid)
 
 
 def _v_disparity(source: "Source", estimate: "RollEstimate", options: FrameOptions) -> bytes:
@@ -50,7 +65,7 @@ def _v_disparity(source: "Source", estimate: "RollEstimate", options: FrameOptio
 
 
 def _disparity(source: "Source", estimate: "RollEstimate", options: FrameOptions) -> bytes:
-    return _encoded(source.disparity, options.images)
+    return encode_computed(source.disparity, options.images.save_as)
 
 
 def _road_mask(source: "Source", estimate: "RollEstimate", options: FrameOptions) -> bytes:
@@ -63,10 +78,3 @@ _ENCODERS = {
     "disparity": _disparity,
     "road_mask": _road_mask,
 }
-
-
-def _encoded(disparity: NDArray[Any], images: ImageOptions) -> bytes:
-    """A computed map: KITTI's 16 bits in a PNG, pixels as they are elsewhere."""
-    if images.save_as == "png":
-        return encode_stored(from_disparity(disparity, "kitti", np.uint16), "png")
-    return encode_stored(disparity.astype(np.float32, copy=False), images.save_as)

@@ -3,7 +3,7 @@
 Nothing heavy is imported here, since the command line imports this module to show its help.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
@@ -112,11 +112,11 @@ class FrameOptions:
     `root` is where relative paths start, for workers elsewhere.
     """
 
-    encoding: EncodingOptions
-    stereo: StereoOptions
-    region: RegionOptions
-    method: MethodOptions
-    images: ImageOptions
+    encoding: EncodingOptions = EncodingOptions()
+    stereo: StereoOptions = field(default_factory=StereoOptions)
+    region: RegionOptions = RegionOptions()
+    method: MethodOptions = MethodOptions()
+    images: ImageOptions = ImageOptions()
     root: str = ""
 
     def at(self, path: str) -> str:

@@ -12,21 +12,26 @@ from rollcli.files.atomic import part_of
 if TYPE_CHECKING:
     from rollcli.batch.job import Frame
 
-_ENDINGS = {"png": ".png", "tiff": ".tif", "npy": ".npy"}
+MAP_ENDINGS = {"png": ".png", "tiff": ".tif", "npy": ".npy"}
 
 
 def image_paths(frame: "Frame", images: ImageOptions) -> Iterator[tuple[str, str]]:
     """(kind, path) of each image that this frame gets: its name and folders below the image folder."""
-    stem, ending = posixpath.splitext(frame.relative)
-    computed = _ENDINGS[images.save_as]
+    computed = MAP_ENDINGS[images.save_as]
     endings = {
-        "derotated": computed if frame.right_file else ending,
+        "derotated": computed if frame.right_file else None,
         "vdisparity": ".png",
         "disparity": computed,
         "road_mask": ".png",
     }
     for kind, folder in images.folders():
-        yield kind, posixpath.join(folder, stem + endings[kind])
+        yield kind, output_path(frame, folder, endings[kind])
+
+
+def output_path(frame: "Frame", folder: str, ending: str | None = None) -> str:
+    """Where a file of this frame lies below `folder`; it keeps the frame's ending unless one is given."""
+    stem, own = posixpath.splitext(frame.relative)
+    return posixpath.join(folder, stem + (own if ending is None else ending))
 
 
 def remove_images(frame: "Frame", images: ImageOptions, root: str = "") -> None:
@@ -37,9 +42,13 @@ def remove_images(frame: "Frame", images: ImageOptions, root: str = "") -> None:
                 written.unlink()
 
 
-def remove_leftovers(frames: Iterable["Frame"], images: ImageOptions) -> None:
+def remove_leftovers(paths: Iterable[str]) -> None:
     """Remove the temporary files that killed workers left beside what they were writing; no others."""
-    for frame in frames:
-        for _, path in image_paths(frame, images):
-            with contextlib.suppress(OSError):
-                part_of(Path(path)).unlink()
+    for path in paths:
+        with contextlib.suppress(OSError):  # that there is no such file, or no such folder
+            part_of(Path(path)).unlink()
+
+
+def remove_image_leftovers(frames: Iterable["Frame"], images: ImageOptions) -> None:
+    """Remove them for every image of these frames."""
+    remove_leftovers(path for frame in frames for _, path in image_paths(frame, images))

@@ -8,7 +8,7 @@ from rollcli.batch.dry_run import list_files
 from rollcli.batch.job import Frame, Outcome, do, lost
 from rollcli.batch.local import done_locally
 from rollcli.batch.options import EstimateOptions
-from rollcli.batch.outputs import image_paths, remove_leftovers
+from rollcli.batch.outputs import image_paths, remove_image_leftovers
 from rollcli.batch.plan import Plan, make_plan
 from rollcli.batch.record import RunRecord, check_resumable
 from rollcli.batch.report import INTERRUPTED, Report
@@ -79,7 +79,7 @@ def _take_up(
         record.continue_from(earlier or {})
         report.keep(rows)
     if options.result.resume or options.running.overwrite:
-        remove_leftovers(plan.frames[len(rows) :], options.images)
+        remove_image_leftovers(plan.frames[len(rows) :], options.images)
     # in this order a run that is killed in between can be resumed: an empty file is taken for a new one
     sink.empty(keep=bool(rows))
     record.write({})

@@ -11,6 +11,10 @@ from rollcli.files.formats import Stored, read_image, read_stored
 
 if TYPE_CHECKING:
     from rollcli.batch.job import Frame
+    from rollcli.imaging.stereo import StereoMatch
+
+# more of the map than this at the end of the searched range: the range was too short for the scene
+_MUCH_AT_END = 0.05
 
 
 @dataclass(frozen=True)
@@ -27,8 +31,8 @@ class Source:
         How the stored numbers were read, and why that may be wrong.
     searched : tuple of int, or None
         First and last disparity searched, px; pairs only.
-    end_fraction : float
-        Share of the map at the end of the searched range; pairs only.
+    doubt : str
+        Why the map itself may be wrong; empty when there is no reason.
     """
 
     disparity: NDArray[Any]
@@ -36,7 +40,7 @@ class Source:
     encoding: str = ""
     warning: str = ""
     searched: tuple[int, int] | None = None
-    end_fraction: float = 0.0
+    doubt: str = ""
 
 
 def read_source(frame: "Frame", options: FrameOptions) -> Source:
@@ -64,4 +68,11 @@ def _match(frame: "Frame", options: FrameOptions) -> Source:
     right = read_image(options.at(frame.right_path), frame.right_file)
     match = match_pair(left, right, options.stereo)
     searched = (match.min_disparity, match.min_disparity + match.num_disparities - 1)
-    return Source(match.disparity, searched=searched, end_fraction=match.end_fraction)
+    return Source(match.disparity, searched=searched, doubt=_doubt(match))
+
+
+def _doubt(match: "StereoMatch") -> str:
+    if match.end_fraction <= _MUCH_AT_END:
+        return ""
+    share = f"{match.end_fraction:.0%} of the map lies at the end of the searched range"
+    return f"{share}; use a larger --num-disparities"

@@ -46,7 +46,25 @@ result_options = record(
 )
 
 
-@command()
+@command(
+    examples=[
+        ("A folder of maps", "rollcli estimate maps/ -o rolls.csv"),
+        (
+            "Stereo pairs, with the maps turned upright and their v-disparity images",
+            "rollcli estimate --left cam/left --right cam/right -o rolls.csv --derotated upright/ "
+            "--vdisparity vdisparity/",
+        ),
+        ("Go on where an interrupted run has stopped", "rollcli estimate maps/ -o rolls.csv --resume"),
+        (
+            "Another program's list of files, angles to yet another one",
+            "find . -name '*_disp.png' | rollcli estimate - | sort -t, -gk4",
+        ),
+        (
+            "The paper's setting: every pixel is road",
+            "rollcli estimate crops/ --road all --method gd -o rolls.csv",
+        ),
+    ]
+)
 @input_options
 @pair_options
 @result_options
@@ -63,9 +81,7 @@ def estimate(ctx: click.Context, /, **records: Any) -> None:
 
     INPUTS are maps (PNG, TIFF, NPY, PFM), folders of them, quoted patterns, or - for paths on stdin.
 
-    \b
-    rollcli estimate maps/ -o rolls.csv
-    rollcli estimate --left cam/left --right cam/right -o rolls.csv --derotated upright/
+    A positive roll means that the rig is rolled counter-clockwise seen from behind: its right end is up.
     """
     options = EstimateOptions(**records)
 

@@ -29,6 +29,14 @@ def _method(*, tolerance: float, max_roll: float, **values: Any) -> MethodOption
     return MethodOptions(tolerance_deg=tolerance, max_roll_deg=max_roll, **values)
 
 
+_folders = (
+    option("--recursive", is_flag=True, help="Look into the folders of folders too."),
+    option(
+        "--include", multiple=True, metavar="GLOB", help="Of folders, take only files that match. Repeatable."
+    ),
+    option("--exclude", multiple=True, metavar="GLOB", help="Leave out files that match. Repeatable."),
+)
+
 input_options = record(
     "inputs",
     "Input",
@@ -40,16 +48,14 @@ input_options = record(
         metavar="FILE",
         help="Read further inputs from FILE, one a line (-: stdin).",
     ),
-    option("--recursive", is_flag=True, help="Look into the folders of folders too."),
-    option(
-        "--include", multiple=True, metavar="GLOB", help="Of folders, take only files that match. Repeatable."
-    ),
-    option("--exclude", multiple=True, metavar="GLOB", help="Leave out files that match. Repeatable."),
+    *_folders,
 )
+
+folder_options = record("inputs", "Input", InputOptions, *_folders)
 
 pair_options = record(
     "pairs",
-    "Stereo pairs instead of maps",
+    "Stereo pairs",
     PairOptions,
     option(
         "--left", type=PATH, metavar="PATH", help="The left images: a file, a folder or a quoted pattern."
@@ -204,9 +210,20 @@ method_options = record(
 
 save_as_option = option(
     "--save-as",
+    section="Output",
     type=click.Choice(["png", "tiff", "npy"]),
     default="png",
     help="Format of maps computed from pairs: 16-bit KITTI PNG, float32 TIFF or float32 NPY.",
+)
+
+output_folder_option = option(
+    "-o",
+    "--output",
+    type=PATH,
+    metavar="DIR",
+    required=True,
+    section="Output",
+    help="Where the files go, named after their input; folders below the named ones are kept.",
 )
 
 image_options = record(

@@ -92,7 +92,16 @@ simulate_options = record(
 )
 
 
-@command()
+@command(
+    examples=[
+        (
+            "Render, estimate, and compare with the truth",
+            "rollcli simulate rig/ --frames 200 --size 1280x720 --focal 700 --baseline 0.3 --height 1.4",
+        ),
+        ("", "rollcli estimate --left rig/left --right rig/right -o rig/rolls.csv"),
+        ("", "rollcli evaluate accuracy rig/rolls.csv --truth rig/truth.csv"),
+    ]
+)
 @click.argument("folder", metavar="DIR", type=PATH)
 @simulate_options
 @running_options
@@ -102,11 +111,6 @@ def simulate(ctx: click.Context, /, folder: str, options: SimulateOptions, runni
 
     Writes DIR/left and DIR/right (8-bit PNG), DIR/disparity (the true disparity of the left view, 16-bit
     KITTI PNG) and DIR/truth.csv.
-
-    \b
-    rollcli simulate rig/ --frames 200 --size 1280x720 --focal 700 --baseline 0.3 --height 1.4
-    rollcli estimate --left rig/left --right rig/right -o rig/rolls.csv
-    rollcli evaluate accuracy rig/rolls.csv --truth rig/truth.csv
     """
     from rollcli.simulate.run import run
 

@@ -8,12 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rollcli.errors import UsageError
-from rollcli.files.naming import match_names, natural_key
+from rollcli.files.naming import listed, match_names, natural_key
 from rollcli.files.search import Search
 
 MAP_ENDINGS = (".png", ".tif", ".tiff", ".npy", ".pfm")
 IMAGE_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm")
-_NAMED = 3  # how many files a message lists
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +103,7 @@ def find_inputs(
                 found.append(Input(location, name, relative))
     del seen  # before the keys of the sort take its place
     if not any(os.path.lexists(each.location) for each in found):
-        named = ", ".join(each.name for each in found[:_NAMED])
+        named = listed(each.name for each in found)
         raise UsageError(f"no input found: {named + ': no such file' if named else 'the list is empty'}")
     found.sort(key=lambda each: natural_key(each.name))
     return found
@@ -172,8 +171,7 @@ def _by_name(lefts: list[Input], rights: list[Input]) -> list[Pair]:
     paired = {_place(each) for pair in pairs for each in (pair.left, pair.right)}
     alone = list(dict.fromkeys(each.name for each in (*lefts, *rights) if _place(each) not in paired))
     if alone:
-        more = f" and {len(alone) - _NAMED} more" if len(alone) > _NAMED else ""
-        raise UsageError(f"no partner found for {', '.join(alone[:_NAMED])}{more}")
+        raise UsageError(f"no partner found for {listed(alone)}")
     return pairs
 
 

@@ -15,6 +15,14 @@ _NUMBERS = ((_NEVER, _NEVER), ("0", "1"), ("2", "3"), ("1", "2"), ("1", "5"), ("
 _NUMBERED = (
     r"((?<![A-Za-z])(?:im|img|image|cam|camera|view)[_-]?|(?<=[A-Za-z0-9])[_-](?=0*{0}$))0*{0}(?![0-9])"
 )
+_LISTED = 3  # how many files a message names
+
+
+def listed(names: Iterable[str]) -> str:
+    """The first few names, and how many more there are."""
+    every = list(names)
+    more = f" and {len(every) - _LISTED} more" if len(every) > _LISTED else ""
+    return ", ".join(every[:_LISTED]) + more
 
 
 def natural_key(name: str) -> str:

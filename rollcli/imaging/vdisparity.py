@@ -123,6 +123,23 @@ def row_offset(theta: float, width: int, height: int) -> float:
     return v * math.cos(theta) - u * math.sin(theta) - v
 
 
+def profile(alpha: tuple[float, float, float], theta: float, width: int) -> tuple[float, float, float]:
+    """The road's disparity along the middle column of a map, as a parabola of the row.
+
+    Parameters
+    ----------
+    alpha : tuple of float
+        The road: d = a0 + a1 y + a2 y^2, pixels, y measured as the method does.
+    theta : float
+        Roll of the map, radians.
+    width : int
+        Of the map, pixels.
+    """
+    a0, a1, a2 = alpha
+    start, step = -(width - 1) / 2 * math.sin(theta), math.cos(theta)  # y = start + step * row
+    return a0 + a1 * start + a2 * start**2, (a1 + 2 * a2 * start) * step, a2 * step**2
+
+
 def _draw_road(picture: NDArray[np.uint8], road: Any, offset: float, max_disparity: float) -> None:
     """The road's curve, dashed so that what it lies on can be seen."""
     height, width = picture.shape[:2]

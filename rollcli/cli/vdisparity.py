@@ -1,0 +1,60 @@
+"""`rollcli vdisparity`: row by row, how often each disparity occurs."""
+
+from typing import Any
+
+import click
+
+from rollcli.cli.command import command, option, record
+from rollcli.cli.config import config_option
+from rollcli.cli.options import encoding_options, input_options, output_folder_option, running_options
+from rollcli.cli.types import Number
+from rollcli.convert.options import CountOptions, VDisparityOptions
+
+count_options = record(
+    "count",
+    "Counting",
+    CountOptions,
+    option(
+        "--bins",
+        type=Number("N", at_least=1, at_most=65535, whole=True),
+        help="Columns of the histogram.  [default: one a pixel of disparity for maps of whole pixels, else "
+        "four; 256 to 1024]",
+    ),
+    option(
+        "--max-disparity",
+        type=Number("PX", above=0),
+        help="Right end of the histogram, pixels; its last bin also holds what lies beyond.  "
+        "[default: just above the map's largest]",
+    ),
+    option(
+        "--counts",
+        is_flag=True,
+        help="Write the counts too, as a 32-bit TIFF beside the picture; a row sums to its valid pixels.",
+    ),
+)
+
+
+@command(
+    examples=[
+        ("Pictures to look at", "rollcli vdisparity maps/ -o vdisparity/"),
+        ("Counts to compute with", "rollcli vdisparity maps/ --counts --max-disparity 128 -o vdisparity/"),
+    ]
+)
+@input_options
+@count_options
+@output_folder_option
+@encoding_options
+@running_options
+@config_option
+@click.pass_context
+def vdisparity(ctx: click.Context, /, **records: Any) -> None:
+    """Draw the v-disparity image of each map: the histogram of each row's disparities.
+
+    INPUTS are maps (PNG, TIFF, NPY, PFM), folders of them, quoted patterns, or - for paths on stdin. The
+    picture is an 8-bit PNG, on a log scale, rows of the picture being rows of the map. Where a road is found,
+    its disparity along the middle column is drawn as a dashed curve: on a de-rotated map the road's pixels
+    lie on it.
+    """
+    from rollcli.convert.vdisparity import count_maps
+
+    ctx.exit(count_maps(VDisparityOptions(**records)))

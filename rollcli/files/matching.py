@@ -1,0 +1,69 @@
+"""Which row of a table is about which file: by name, wherever the table was made."""
+
+from collections import defaultdict
+from collections.abc import Sequence
+
+from rollcli.errors import UsageError
+from rollcli.files.naming import listed
+
+
+def match_paths(names: Sequence[str], rows: Sequence[str], table: str) -> list[int | None]:
+    """Find the row of each name.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Paths with "/" separators.
+    rows : sequence of str
+        The paths that the rows of a table are about. They need not exist here, and their endings may differ:
+        the same stem is a match. Of several, the one with the most equal folders before it.
+    table : str
+        What errors call the table.
+
+    Returns
+    -------
+    list of int or None
+        For each name the position of its row; no row is there twice.
+
+    Raises
+    ------
+    UsageError
+        Several rows fit one name equally well, or one row fits several names.
+    """
+    by_stem: dict[str, list[int]] = defaultdict(list)
+    parts = [_parts(row) for row in rows]
+    for position, (stem, *_) in enumerate(parts):
+        by_stem[stem].append(position)
+    found: list[int | None] = []
+    owner: dict[int, str] = {}
+    for name in names:
+        wanted = _parts(name)
+        best = _closest(wanted, {at: parts[at] for at in by_stem.get(wanted[0], ())})
+        if len(best) > 1:
+            raise UsageError(f"{table}: more than one row fits {name}: {listed(rows[at] for at in best)}")
+        found.append(best[0] if best else None)
+        if best and owner.setdefault(best[0], name) != name:
+            raise UsageError(f"{table}: the row of {rows[best[0]]} fits {owner[best[0]]} and {name}")
+    return found
+
+
+def _parts(path: str) -> list[str]:
+    """From the stem up to the root."""
+    *folders, name = path.split("/")
+    return [name.rpartition(".")[0] or name, *reversed(folders)]
+
+
+def _closest(wanted: Sequence[str], candidates: dict[int, list[str]]) -> list[int]:
+    """Those that share the most folders with what is wanted."""
+    shared = {at: _common(wanted, each) for at, each in candidates.items()}
+    most = max(shared.values(), default=0)
+    return [at for at, count in shared.items() if count == most]
+
+
+def _common(one: Sequence[str], other: Sequence[str]) -> int:
+    count = 0
+    for mine, yours in zip(one, other, strict=False):
+        if mine != yours:
+            break
+        count += 1
+    return count

@@ -1,0 +1,254 @@
+"""`rollcli derotate`: maps keep what they are, and every map gets its own angle."""
+
+import math
+import shutil
+from itertools import product
+
+import numpy as np
+import pytest
+
+from rollcli.batch.options import EncodingOptions, InputOptions, RunningOptions
+from rollcli.convert.derotate import derotate_maps
+from rollcli.convert.options import DerotateOptions, TurnOptions
+from rollcli.estimator.estimate import estimate_roll
+from rollcli.files.encodings import from_disparity, read_disparity
+from rollcli.files.formats import encode_stored, read_stored
+from tests.program import contents, road_map, rollcli, write_kitti, write_maps
+
+TYPES = {
+    "png": ["u1", "u2"],
+    "tiff": ["u1", "i1", "u2", "i2", "u4", "i4", "f4", "f8"],
+    "npy": ["u1", "i1", "u2", "i2", "u4", "i4", "f2", "f4", "f8"],
+    "pfm": ["f4"],
+}
+STEPS = {"px": 1, "kitti": 1 / 256, "cityscapes": 1 / 256, "sgbm": 1 / 16}
+KINDS = [(form, dtype) for form, dtypes in TYPES.items() for dtype in dtypes]
+COMBINATIONS = [
+    (form, dtype, encoding)
+    for (form, dtype), encoding in product(KINDS, STEPS)
+    if encoding == "px" or dtype[1] > "1"
+]
+
+
+def derotated(folder, roll_deg, *, encoding="auto", expand=False, invalid=()):
+    """Every map of folder/maps rotated into folder/out, in this process; the exit status."""
+    return derotate_maps(
+        DerotateOptions(
+            InputOptions((str(folder / "maps"),)),
+            TurnOptions(roll_deg, None, expand),
+            str(folder / "out"),
+            EncodingOptions(encoding, invalid=invalid),
+            RunningOptions(jobs=1, quiet=True, overwrite=True),
+        )
+    )
+
+
+def written(folder, form, dtype, encoding):
+    """A rolled road with holes, stored as asked for; where it is, and what it became."""
+    disparity = road_map(math.radians(4), height=90) / 2 + 8
+    disparity[20:30, 40:60] = 0
+    stored = from_disparity(disparity, encoding, np.dtype(dtype))
+    ending = "tif" if form == "tiff" else form
+    (folder / "maps").mkdir()
+    (folder / "maps" / f"a.{ending}").write_bytes(encode_stored(stored, form))
+    return folder / "maps" / f"a.{ending}", folder / "out" / f"a.{ending}"
+
+
+@pytest.mark.parametrize(("form", "dtype", "encoding"), COMBINATIONS)
+def test_a_map_keeps_its_format_type_and_encoding(tmp_path, form, dtype, encoding):
+    before, after = written(tmp_path, form, dtype, encoding)
+
+    assert derotated(tmp_path, 4, encoding=encoding) == 0
+
+    stored = read_stored(after)
+    assert (stored.format, stored.values.dtype) == (form, np.dtype(dtype))
+    assert stored.values.shape == read_stored(before).values.shape
+    level = read_disparity(after, encoding=encoding)
+    assert level.max() == pytest.approx(read_disparity(before, encoding=encoding).max(), rel=0.15)
+    roll = estimate_roll(level, road="all").theta
+    assert math.degrees(roll) == pytest.approx(0, abs=0.05 + 2 * STEPS[encoding])
+
+
+@pytest.mark.parametrize(("form", "dtype", "encoding"), COMBINATIONS)
+def test_by_nothing_a_map_keeps_its_pixels(tmp_path, form, dtype, encoding):
+    before, after = written(tmp_path, form, dtype, encoding)
+
+    assert derotated(tmp_path, 0, encoding=encoding) == 0
+
+    np.testing.assert_array_equal(read_stored(after).values, read_stored(before).values)
+
+
+@pytest.mark.parametrize(("form", "dtype", "encoding"), COMBINATIONS)
+def test_there_and_back_no_invalid_pixel_turns_valid_and_values_stay(tmp_path, form, dtype, encoding):
+    before, after = written(tmp_path, form, dtype, encoding)
+    original = read_disparity(before, encoding=encoding)
+
+    derotated(tmp_path, 7, encoding=encoding)
+    before.write_bytes(after.read_bytes())
+    derotated(tmp_path, -7, encoding=encoding)
+
+    back = read_disparity(after, encoding=encoding)
+    assert not (back > 0)[original == 0].any()
+    both = (back > 0) & (original > 0)
+    assert both.sum() > 0.6 * (original > 0).sum()
+    # the road rises by 0.15 px a row and holds noise of 0.025 px; numbers are rounded twice
+    assert np.abs(back - original)[both].max() < 0.4 + STEPS[encoding]
+
+
+def test_further_invalid_numbers_stay_what_they_are(tmp_path):
+    disparity = road_map(0.05)
+    disparity[:20] = 99
+    write_kitti(tmp_path / "maps" / "a.png", disparity)
+
+    derotated(tmp_path, 10, invalid=(99 * 256.0,))
+
+    level = read_stored(tmp_path / "out" / "a.png").values
+    assert level.max() < 98 * 256
+
+
+def test_expanding_keeps_the_corners(tmp_path):
+    disparity = np.zeros((60, 100), np.float32)
+    corners = ([0, 0, -1, -1], [0, -1, 0, -1])
+    for (row, column), value in zip([(0, 0), (0, 1), (1, 0), (1, 1)], [10, 20, 30, 40], strict=True):
+        disparity[-5 * row : 60 if row else 5, -5 * column : 100 if column else 5] = value
+    (tmp_path / "maps").mkdir()
+    (tmp_path / "maps" / "a.npy").write_bytes(encode_stored(disparity, "npy"))
+
+    derotated(tmp_path, 30)
+    cut = read_stored(tmp_path / "out" / "a.npy").values
+    derotated(tmp_path, 30, expand=True)
+    whole = read_stored(tmp_path / "out" / "a.npy").values
+
+    assert disparity[corners].tolist() == [10, 20, 30, 40]
+    assert set(np.unique(np.rint(cut))) < {0, 10, 20, 30, 40}
+    assert set(np.unique(np.rint(whole))) == {0, 10, 20, 30, 40}
+    assert whole.shape > disparity.shape
+
+
+@pytest.fixture(scope="module")
+def estimated(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("estimated")
+    write_maps(folder / "maps", 4)
+    line = ["estimate", "maps", "-o", "rolls.csv", "--derotated", "upright"]
+    assert rollcli(*line, cwd=folder).status == 0
+    return folder
+
+
+@pytest.fixture
+def folder(tmp_path, estimated):
+    return shutil.copytree(estimated, tmp_path, dirs_exist_ok=True)
+
+
+def test_each_map_gets_the_angle_of_its_row(folder):
+    done = rollcli("derotate", "maps", "--from", "rolls.csv", "-o", "out", "-j2", cwd=folder)
+
+    assert (done.status, done.out) == (0, "")
+    assert sorted(contents(folder / "out")) == [f"frame{i}.png" for i in range(4)]
+    for index in range(4):
+        level = estimate_roll(read_disparity(folder / "out" / f"frame{index}.png"), road="all")
+        assert math.degrees(level.theta) == pytest.approx(0, abs=0.1)
+
+
+def test_any_number_of_workers_gives_the_same_files(folder):
+    for jobs in ("1", "2"):
+        rollcli("derotate", "maps", "--from", "rolls.csv", "-o", f"out{jobs}", "-j", jobs, cwd=folder)
+    assert contents(folder / "out1") == contents(folder / "out2")
+
+
+def test_the_same_map_comes_from_estimate_and_from_derotate(folder):
+    rollcli("derotate", "maps", "--from", "rolls.csv", "-o", "out", cwd=folder)
+    for index in range(4):
+        one, other = (
+            read_stored(folder / each / f"frame{index}.png").values.astype(int) for each in ("upright", "out")
+        )
+        # the result holds millionths of a degree, which may round a number the other way
+        assert np.abs(one - other).max() <= 1
+        assert (one != other).mean() < 0.001
+
+
+def test_maps_are_matched_with_rows_of_another_folder_and_ending_by_stem(folder):
+    (folder / "elsewhere").mkdir()
+    for index in range(4):
+        stored = read_stored(folder / "maps" / f"frame{index}.png").values
+        (folder / "elsewhere" / f"frame{index}.tif").write_bytes(encode_stored(stored, "tiff"))
+    assert rollcli("derotate", "elsewhere", "--from", "rolls.csv", "-o", "out", cwd=folder).status == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["maps/frame1.png", "--from", "rolls.csv"], ["rolls.csv", "maps/frame0.png, maps/frame2.png"]),
+        (["maps", "more", "--from", "rolls.csv"], ["rolls.csv: has no row for more/frame9.png"]),
+        (["maps", "copy", "--from", "rolls.csv"], ["maps/frame1.png", "copy/frame1.png"]),
+        (["maps"], ["--roll", "--from"]),
+        (["maps", "--roll", "3", "--from", "rolls.csv"], ["--roll", "--from"]),
+        (["maps", "--from", "maps/frame0.png"], ["maps/frame0.png: is not"]),
+        (["maps", "--from", "other.csv"], ["other.csv", "no column", "status"]),
+        (["maps", "--from", "nothing.csv"], ["nothing.csv: cannot be read"]),
+        (["maps", "--roll", "much"], ["'much' is not a number"]),
+    ],
+)
+def test_what_does_not_fit_is_refused_and_named_before_anything_is_written(folder, arguments, words):
+    write_kitti(folder / "more" / "frame9.png", road_map())
+    write_kitti(folder / "copy" / "frame1.png", road_map())
+    (folder / "other.csv").write_text("file,angle\nmaps/frame0.png,3\n")
+
+    done = rollcli("derotate", *arguments, "-o", "out", cwd=folder)
+
+    assert done.status == 2
+    assert done.err.count("\n") == 1
+    for word in words:
+        assert word in done.err
+    assert not (folder / "out").exists()
+
+
+def test_a_map_whose_row_has_no_angle_fails_and_the_others_are_done(folder):
+    lines = (folder / "rolls.csv").read_text().splitlines()
+    lines[2] = "maps/frame1.png,,error" + "," * 15
+    (folder / "rolls.csv").write_text("\n".join(lines) + "\n")
+
+    done = rollcli("derotate", "maps", "--from", "rolls.csv", "-o", "out", cwd=folder)
+
+    assert done.status == 3
+    assert "maps/frame1.png: has no angle in rolls.csv" in done.err
+    assert sorted(contents(folder / "out")) == ["frame0.png", "frame2.png", "frame3.png"]
+
+
+def test_its_own_results_never_become_inputs(folder):
+    for _ in range(2):
+        done = rollcli(
+            "derotate", "maps", "--recursive", "--roll", "2", "-o", "maps/out", "--overwrite", cwd=folder
+        )
+        assert done.status == 0
+    assert sorted(contents(folder / "maps" / "out")) == [f"frame{i}.png" for i in range(4)]
+    done = rollcli("derotate", "maps", "--roll", "2", "-o", "maps", "--overwrite", cwd=folder)
+    assert done.status == 2
+    assert "write the results elsewhere" in done.err
+    done = rollcli("derotate", "maps/frame1.png", "--roll", "2", "-o", "maps", "--overwrite", cwd=folder)
+    assert done.status == 2
+    assert "maps/frame1.png: would be replaced" in done.err
+
+
+def test_what_is_there_is_kept_unless_it_may_be_overwritten(folder):
+    (folder / "out").mkdir()
+    (folder / "out" / "frame2.png").write_text("mine")
+    line = ["derotate", "maps", "--roll", "2", "-o", "out"]
+
+    assert rollcli(*line, cwd=folder).status == 2
+    assert contents(folder / "out") == {"frame2.png": b"mine"}
+    assert rollcli(*line, "--overwrite", cwd=folder).status == 0
+    assert len(contents(folder / "out")) == 4
+
+
+def test_a_dry_run_lists_and_writes_nothing(folder):
+    done = rollcli("derotate", "maps", "--roll", "2", "-o", "out", "--dry-run", cwd=folder)
+    assert done.out.splitlines()[:2] == ["read  maps/frame0.png", "write out/frame0.png"]
+    assert (done.status, (folder / "out").exists()) == (0, False)
+
+
+def test_a_broken_map_costs_itself_alone(folder):
+    (folder / "maps" / "frame2.png").write_bytes(b"")
+    done = rollcli("derotate", "maps", "--roll", "2", "-o", "out", cwd=folder)
+    assert done.status == 3
+    assert "maps/frame2.png: is empty" in done.err
+    assert len(contents(folder / "out")) == 3

@@ -1,0 +1,32 @@
+"""Rows of a table and the files they are about."""
+
+import pytest
+
+from rollcli.errors import UsageError
+from rollcli.files.matching import match_paths
+
+
+@pytest.mark.parametrize(
+    ("names", "rows", "expected"),
+    [
+        (["a.png", "b.png"], ["b.tif", "a.tif"], [1, 0]),
+        (["../maps/a.png"], ["/data/maps/a.png"], [0]),
+        (["maps/a.png", "maps/c.png"], ["left/a.png"], [0, None]),
+        (["out/x/0.png", "out/y/0.png"], ["left/y/0.png", "left/x/0.png"], [1, 0]),
+        (["a.b.png"], ["a.png", "a.b.png"], [1]),
+        ([".hidden"], [".hidden"], [0]),
+        ([], ["a.png"], []),
+    ],
+)
+def test_the_same_stem_is_a_match_and_folders_decide_between_several(names, rows, expected):
+    assert match_paths(names, rows, "rolls.csv") == expected
+
+
+def test_rows_that_fit_equally_well_are_named():
+    with pytest.raises(UsageError, match=r"rolls.csv: more than one row fits maps/0.png: a/0.png, b/0.png"):
+        match_paths(["maps/0.png"], ["a/0.png", "b/0.png", "c/1.png"], "rolls.csv")
+
+
+def test_one_row_for_two_files_is_refused():
+    with pytest.raises(UsageError, match=r"the row of left/0.png fits a/0.png and b/0.png"):
+        match_paths(["a/0.png", "b/0.png"], ["left/0.png"], "rolls.csv")
