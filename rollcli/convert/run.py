@@ -89,7 +89,7 @@ def convert(
 def _check(conversions: Sequence[Conversion], *, overwrite: bool) -> None:
     writes = [path for each in conversions for path in each.writes]
     check_one_owner((each.frame, each.writes) for each in conversions)
-    check_inputs_are_kept((path for each in conversions for path in each.frame.reads()), writes)
+    check_inputs_are_kept([path for each in conversions for path in each.frame.reads()], writes)
     if not overwrite:
         check_nothing_is_there(writes)
 

@@ -6,20 +6,13 @@ import csv
 import io
 import math
 from collections.abc import Iterable, Iterator
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 
 from rollcli.errors import InputError, UsageError
-from rollcli.files.inputs import IMAGE_ENDINGS, MAP_ENDINGS
+from rollcli.files.matching import stem_of
 from rollcli.files.results import TEXT
 
 _NEEDED = ("file", "roll_deg")
-_ENDINGS = {*MAP_ENDINGS, *IMAGE_ENDINGS}
-
-
-def stem_of(name: str) -> str:
-    """Return a frame's name without its folders and its ending; a truth may leave out both."""
-    path = PurePosixPath(name.replace("\\", "/"))
-    return path.stem if path.suffix.lower() in _ENDINGS else path.name
 
 
 def by_stem(names: Iterable[str], where: str) -> dict[str, int]:

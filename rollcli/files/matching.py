@@ -2,9 +2,19 @@
 
 from collections import defaultdict
 from collections.abc import Sequence
+from pathlib import PurePosixPath
 
 from rollcli.errors import UsageError
+from rollcli.files.inputs import IMAGE_ENDINGS, MAP_ENDINGS
 from rollcli.files.naming import listed
+
+_ENDINGS = {*MAP_ENDINGS, *IMAGE_ENDINGS}
+
+
+def stem_of(name: str) -> str:
+    """A frame's name without its folders and its ending; a table may leave out both."""
+    path = PurePosixPath(name.replace("\\", "/"))
+    return path.stem if path.suffix.lower() in _ENDINGS else path.name
 
 
 def match_paths(names: Sequence[str], rows: Sequence[str], table: str) -> list[int | None]:
@@ -49,8 +59,8 @@ def match_paths(names: Sequence[str], rows: Sequence[str], table: str) -> list[i
 
 def _parts(path: str) -> list[str]:
     """From the stem up to the root."""
-    *folders, name = path.split("/")
-    return [name.rpartition(".")[0] or name, *reversed(folders)]
+    folders = PurePosixPath(path.replace("\\", "/")).parent.parts
+    return [stem_of(path), *reversed(folders)]
 
 
 def _closest(wanted: Sequence[str], candidates: dict[int, list[str]]) -> list[int]:

@@ -10,7 +10,8 @@ import pytest
 from rollcli.errors import InputError, UsageError
 from rollcli.evaluate.accuracy import assess
 from rollcli.evaluate.accuracy_text import as_csv, as_json, as_table
-from rollcli.evaluate.truth import read_truth, stem_of
+from rollcli.evaluate.truth import read_truth
+from rollcli.files.matching import stem_of
 from rollcli.files.results import Row
 
 
