@@ -36,19 +36,27 @@ def output_path(frame: "Frame", folder: str, ending: str | None = None) -> str:
 
 def remove_images(frame: "Frame", images: ImageOptions, root: str = "") -> None:
     """Remove what was written for a frame: one that has no angle has no images either."""
-    for _, path in image_paths(frame, images):
-        for written in (Path(root, path), part_of(Path(root, path))):
-            with contextlib.suppress(OSError):  # that there is no such file, or no such folder
-                written.unlink()
+    remove_outputs(str(Path(root, path)) for _, path in image_paths(frame, images))
+
+
+def remove_outputs(paths: Iterable[str]) -> None:
+    """Remove files that a frame which has failed left or had before, temporary ones too."""
+    for path in map(Path, paths):
+        _remove(path)
+        _remove(part_of(path))
 
 
 def remove_leftovers(paths: Iterable[str]) -> None:
     """Remove the temporary files that killed workers left beside what they were writing; no others."""
     for path in paths:
-        with contextlib.suppress(OSError):  # that there is no such file, or no such folder
-            part_of(Path(path)).unlink()
+        _remove(part_of(Path(path)))
 
 
 def remove_image_leftovers(frames: Iterable["Frame"], images: ImageOptions) -> None:
     """Remove them for every image of these frames."""
     remove_leftovers(path for frame in frames for _, path in image_paths(frame, images))
+
+
+def _remove(path: Path) -> None:
+    with contextlib.suppress(OSError):  # that there is no such file, or no such folder
+        path.unlink()

@@ -9,7 +9,7 @@ from rollcli.batch.dry_run import list_files
 from rollcli.batch.job import Frame, Outcome, failed
 from rollcli.batch.local import done_locally
 from rollcli.batch.options import EncodingOptions, RunningOptions
-from rollcli.batch.outputs import remove_leftovers
+from rollcli.batch.outputs import remove_leftovers, remove_outputs
 from rollcli.batch.report import INTERRUPTED, Report
 from rollcli.batch.setup import limit_blas_threads
 from rollcli.batch.signals import stop_on_signals
@@ -95,4 +95,5 @@ def _check(conversions: Sequence[Conversion], *, overwrite: bool) -> None:
 
 
 def _lost(conversion: Conversion, reason: str) -> Outcome:
+    remove_outputs(conversion.writes)
     return failed(conversion.frame, reason)

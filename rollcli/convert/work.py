@@ -8,6 +8,7 @@ from rollcli.batch.faults import guarded
 from rollcli.batch.images import encode_computed, encode_turned
 from rollcli.batch.job import Outcome
 from rollcli.batch.options import EncodingOptions, FrameOptions
+from rollcli.batch.outputs import remove_outputs
 from rollcli.batch.source import Source, read_source
 from rollcli.convert.options import CountOptions
 from rollcli.convert.run import Conversion
@@ -67,7 +68,10 @@ def _done(conversion: Conversion, options: FrameOptions, make: Callable[[Source]
         row = Row(frame.file, frame.right_file, "ok")
         return Outcome(row, source.encoding, source.warning or source.doubt, source.searched)
 
-    return guarded(frame, work)
+    outcome = guarded(frame, work)
+    if outcome.row.status == "error":
+        remove_outputs(conversion.writes)  # an older file would pass for this run's
+    return outcome
 
 
 def _road(source: Source) -> tuple[float, float, float] | None:

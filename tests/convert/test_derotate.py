@@ -248,7 +248,9 @@ def test_a_dry_run_lists_and_writes_nothing(folder):
 
 def test_a_broken_map_costs_itself_alone(folder):
     (folder / "maps" / "frame2.png").write_bytes(b"")
-    done = rollcli("derotate", "maps", "--roll", "2", "-o", "out", cwd=folder)
+    (folder / "out").mkdir()
+    (folder / "out" / "frame2.png").write_text("of an earlier run")
+    done = rollcli("derotate", "maps", "--roll", "2", "-o", "out", "--overwrite", cwd=folder)
     assert done.status == 3
     assert "maps/frame2.png: is empty" in done.err
     assert len(contents(folder / "out")) == 3
