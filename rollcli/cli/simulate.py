@@ -1,5 +1,7 @@
 """`rollcli simulate`: stereo pairs whose roll is known."""
 
+from typing import Any
+
 import click
 
 from rollcli.batch.options import RunningOptions
@@ -20,10 +22,15 @@ from rollcli.simulate.options import (
     SimulateOptions,
 )
 
+
+def _options(*, roll: tuple[float, float], pitch: tuple[float, float], **values: Any) -> SimulateOptions:
+    return SimulateOptions(roll_deg=roll, pitch_deg=pitch, **values)
+
+
 simulate_options = record(
     "options",
     "What to render",
-    SimulateOptions,
+    _options,
     option("--frames", type=Number("N", at_least=1, whole=True), default=FRAMES, help="How many pairs."),
     option(
         "--scene",

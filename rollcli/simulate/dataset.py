@@ -98,8 +98,8 @@ def plan_dataset(folder: str | Path, options: SimulateOptions, *, overwrite: boo
     specs = draw_specs(
         options.frames,
         scene=options.scene,
-        roll=_radians(options.roll),
-        pitch=_radians(options.pitch),
+        roll=_radians(options.roll_deg),
+        pitch=_radians(options.pitch_deg),
         curvature=options.curvature,
         size=options.size,
         focal=options.focal,
@@ -174,8 +174,9 @@ def _truth(dataset: Dataset) -> bytes:
     rows.writerow(COLUMNS)
     for task in dataset.tasks:
         spec = task.spec
-        angles = (f"{math.degrees(angle):.9f}" for angle in (spec.roll, spec.pitch))
-        rig = (f"{number:.10g}" for number in (spec.focal, spec.baseline, spec.height, spec.curvature))
+        # + 0.0 turns -0.0 into 0
+        angles = (f"{math.degrees(angle) + 0.0:.9f}" for angle in (spec.roll, spec.pitch))
+        rig = (f"{number + 0.0:.10g}" for number in (spec.focal, spec.baseline, spec.height, spec.curvature))
         rows.writerow((task.stem, *angles, spec.scene, *rig, spec.seed))
     return text.getvalue().encode()
 
@@ -200,8 +201,12 @@ def _clear(dataset: Dataset) -> None:
 
 
 def _earlier_frames(folder: Path) -> list[Path]:
-    folders = [folder / part for part in _PARTS if (folder / part).is_dir()]
-    return [path for each in folders for path in each.iterdir() if _OURS.fullmatch(path.name)]
+    """What looks like ours: frame_0001.png and so on, where left, right and disparity all have it."""
+    folders = [folder / part for part in _PARTS]
+    if not all(each.is_dir() for each in folders):
+        return []
+    names = set.intersection(*({path.name for path in each.iterdir()} for each in folders))
+    return [each / name for name in names if _OURS.fullmatch(name) for each in folders]
 
 
 def _radians(span: Sequence[float]) -> tuple[float, float]:

@@ -20,16 +20,16 @@ PITCH_DEG = (-2.0, 6.0)
 
 @dataclass(frozen=True)
 class SimulateOptions:
-    """What to render; the names and units are those of `rollcli simulate`.
+    """What to render, as `rollcli simulate` is asked.
 
-    `roll` and `pitch` are (lowest, highest) in degrees, `curvature` the same in 1/m or None: by scene;
+    `roll_deg` and `pitch_deg` are (lowest, highest), `curvature` the same in 1/m, or None: by scene;
     `size` is (width, height) in pixels; `focal` in pixels or None: `FOCAL_PER_WIDTH` times the width.
     """
 
     frames: int = FRAMES
     scene: str = MIXED
-    roll: tuple[float, float] = ROLL_DEG
-    pitch: tuple[float, float] = PITCH_DEG
+    roll_deg: tuple[float, float] = ROLL_DEG
+    pitch_deg: tuple[float, float] = PITCH_DEG
     curvature: tuple[float, float] | None = None
     size: tuple[int, int] = SIZE
     focal: float | None = None

@@ -75,10 +75,11 @@ def test_grey_images_have_one_channel(tmp_path):
 
 def test_overwriting_leaves_no_frame_of_an_earlier_simulation_and_no_other_file_is_touched(tmp_path):
     simulate(tmp_path)
-    (tmp_path / "left" / "mine.png").write_bytes(b"mine")
+    for name in ("mine.png", "frame_0099.png"):
+        (tmp_path / "left" / name).write_bytes(b"mine")
     simulate(tmp_path, SimulateOptions(frames=1, size=(64, 48)), overwrite=True)
     left = sorted(path.name for path in (tmp_path / "left").iterdir())
-    assert left == ["frame_0001.png", "mine.png"]
+    assert left == ["frame_0001.png", "frame_0099.png", "mine.png"]
     assert len(rows(tmp_path)) == 1
 
 
@@ -99,7 +100,9 @@ def test_a_file_in_place_of_the_folder_is_refused(tmp_path):
 
 
 def test_disparities_beyond_what_the_file_can_hold_are_no_data(tmp_path):
-    options = SimulateOptions(frames=1, size=(64, 48), baseline=2, height=0.2, roll=(0, 0), pitch=(5, 5))
+    options = SimulateOptions(
+        frames=1, size=(64, 48), baseline=2, height=0.2, roll_deg=(0, 0), pitch_deg=(5, 5)
+    )
     simulate(tmp_path, options)
     (spec,) = plan_dataset(tmp_path, options, overwrite=True).specs
     stored, disparity = read_disparity(tmp_path / "disparity/frame_0001.png"), render_frame(spec).disparity
