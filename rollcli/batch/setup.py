@@ -18,7 +18,10 @@ def prepare_worker() -> None:
     """Set up this process: the frames are what runs in parallel, and each needs the same memory again."""
     import cv2
 
+    from rollcli.files.quiet import silence_decoders
+
     cv2.setNumThreads(1)
+    silence_decoders()
     _keep_freed_memory()
 
 

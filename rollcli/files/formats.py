@@ -129,16 +129,18 @@ def encode_stored(values: NDArray[Any], format: str, nodata: tuple[float, ...] =
 
 
 def read_image(path: str | Path, name: str | None = None) -> NDArray[Any]:
-    """Read a camera image for stereo matching: grey (H, W) or BGR (H, W, 3), uint8 or uint16.
+    """Read a camera image; errors call it `name`, by default its path. See `decode_image`."""
+    return decode_image(read_bytes(path, name), name or str(path))
 
-    Errors call the file `name`, by default its path.
+
+def decode_image(data: bytes, name: str) -> NDArray[Any]:
+    """Decode a camera image: grey (H, W) or BGR (H, W, 3), uint8 or uint16.
 
     Raises
     ------
     InputError
         No such image, truncated, damaged, or of other numbers.
     """
-    data, name = read_bytes(path, name), name or str(path)
     if data.startswith(png.SIGNATURE):
         return png.picture(data, name)
     if data.startswith(tiff.SIGNATURES):

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError
+from rollcli.files.quiet import decoding
 from rollcli.files.stored import PICTURE_FLAGS, native, require_decoded_fits
 
 SIGNATURES = (b"\xff\xd8\xff", b"BM", b"P5", b"P6")
@@ -24,7 +25,8 @@ def decode_picture(data: bytes, name: str) -> NDArray[Any]:
     elif data.rfind(b"\xff\xd9") < data.rfind(b"\xff\xda"):  # no end of image after the last start of scan
         raise InputError(f"{name}: is a truncated JPEG")
     try:
-        pixels = cv2.imdecode(np.frombuffer(data, np.uint8), PICTURE_FLAGS)
+        with decoding():
+            pixels = cv2.imdecode(np.frombuffer(data, np.uint8), PICTURE_FLAGS)
     except cv2.error:  # a size beyond OpenCV's limits
         pixels = None
     if pixels is None:
@@ -58,7 +60,14 @@ def _require_whole_bmp(data: bytes, name: str) -> None:
         int.from_bytes(data[first : first + count], "little", signed=first in (18, 22))
         for first, count in ((10, 4), (14, 4), (18, 4), (22, 4), (28, 2), (30, 4))
     )
-    if len(data) < 54 or size < 40 or width <= 0 or height == 0 or packing != 0 or bits not in (8, 24, 32):
+    if (
+        len(data) < 54
+        or not 40 <= size < 200
+        or width <= 0
+        or height == 0
+        or packing != 0
+        or bits not in (8, 24, 32)
+    ):
         raise InputError(
             f"{name}: is a damaged or an unusual BMP; 8, 24 and 32 bits without compression are read"
         )

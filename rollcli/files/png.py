@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError, OutputError
+from rollcli.files.quiet import decoding
 from rollcli.files.stored import PICTURE_FLAGS, require_decoded_fits
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
@@ -82,7 +83,8 @@ def encode_png(values: NDArray[Any]) -> bytes:
 
 def _decoded(data: bytes, name: str, flags: int) -> tuple[_Header, NDArray[Any]]:
     header, chunks = _checked(data, name)
-    pixels = cv2.imdecode(np.frombuffer(b"".join(chunks), np.uint8), flags)
+    with decoding():
+        pixels = cv2.imdecode(np.frombuffer(b"".join(chunks), np.uint8), flags)
     if pixels is None:
         raise InputError(f"{name}: is a damaged PNG: its pixel data are wrong")
     return header, pixels

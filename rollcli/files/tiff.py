@@ -22,7 +22,7 @@ SIGNATURES = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 _NONE, _LZW, _DEFLATE, _OLD_DEFLATE, _PACKBITS = 1, 5, 8, 32946, 32773
 # how many bytes one byte can stand for
 _MAX_EXPANSION = {_NONE: 1, _LZW: 2732, _DEFLATE: 1032, _OLD_DEFLATE: 1032, _PACKBITS: 64}
-_HORIZONTAL, _FLOATING_POINT = 2, 3
+_NO_PREDICTOR, _HORIZONTAL, _FLOATING_POINT = 1, 2, 3
 _WHITE_IS_ZERO, _RGB, _PALETTE = 0, 2, 3
 _CHUNKY = 1
 _LARGE_TILE = 2**22  # pixels; a small image may lie in one large tile
@@ -37,7 +37,9 @@ _DAMAGE = (
     ArithmeticError,
     RuntimeError,
     MemoryError,
+    ImportError,
     struct.error,
+    zlib.error,
 )
 # what tifffile logs about damage is raised here
 logging.getLogger("tifffile").addHandler(logging.NullHandler())
@@ -101,7 +103,7 @@ def _with_first_page(data: bytes, name: str, decode: Any) -> Any:
         with tifffile.TiffFile(io.BytesIO(data)) as file:
             return decode(file, file.pages[0])
     except (tifffile.TiffFileError, *_DAMAGE) as error:
-        reason = (str(error).strip("'\"").splitlines() or [type(error).__name__])[0][:120]
+        reason = " ".join(str(error).strip("'\"").split())[:120] or type(error).__name__
         raise InputError(f"{name}: is a damaged or truncated TIFF ({reason})") from None
 
 
@@ -115,14 +117,30 @@ def _pixels(page: Any, data: bytes, name: str) -> NDArray[Any]:
     if page.dtype is None or page.dtype.kind not in "biuf":
         raise InputError(f"{name}: its pixels are no real numbers")
     _require_size(page, width * height * samples, data, name)
-    plain = int(page.bitspersample) in (8, 16, 32, 64) and (samples == 1 or page.planarconfig == _CHUNKY)
-    if int(page.compression) in _MAX_EXPANSION and plain and int(page.fillorder) == 1:
-        return _from_segments(page, (height, width, samples), data, name)
+    across, down = _part_size(page, name)
+    chunky = samples == 1 or page.planarconfig == _CHUNKY
+    parts = -(-width // across) * -(-height // down) * (1 if chunky else samples)
+    if len(page.dataoffsets) != parts:
+        raise InputError(f"{name}: is a damaged TIFF: {len(page.dataoffsets)} parts, not {parts}")
+    usual = int(page.compression) in _MAX_EXPANSION and int(page.bitspersample) in (8, 16, 32, 64)
+    if usual and chunky and int(page.fillorder) == 1:
+        return _from_parts(page, (height, width, samples), (down, across), data, name)
     return _decoded_by_tifffile(page, name).reshape(height, width, samples)
 
 
+def _part_size(page: Any, name: str) -> tuple[int, int]:
+    """Columns and rows of a strip or tile, pixels."""
+    if not page.is_tiled:
+        return int(page.imagewidth), min(int(page.rowsperstrip), int(page.imagelength))
+    across, down = int(page.tilewidth), int(page.tilelength)
+    if across * down > 4 * page.imagewidth * page.imagelength + _LARGE_TILE:
+        size = f"{page.imagewidth} x {page.imagelength}"
+        raise InputError(f"{name}: is a damaged TIFF: tiles of {across} x {down} for {size} pixels")
+    return across, down
+
+
 def _require_size(page: Any, numbers: int, data: bytes, name: str) -> None:
-    """Refuse segments beyond the file's end, and sizes that the bytes cannot hold."""
+    """Refuse parts beyond the file's end, and sizes that the bytes cannot hold."""
     stored = sum(page.databytecounts)
     for offset, count in zip(page.dataoffsets, page.databytecounts, strict=True):
         if offset + count > len(data):
@@ -146,32 +164,26 @@ def _decoded_by_tifffile(page: Any, name: str) -> NDArray[Any]:
     return values
 
 
-def _from_segments(page: Any, shape: tuple[int, int, int], data: bytes, name: str) -> NDArray[Any]:
-    """Decode strips or tiles and put them in their places; shape is (H, W, channels)."""
+def _from_parts(
+    page: Any, shape: tuple[int, int, int], part: tuple[int, int], data: bytes, name: str
+) -> NDArray[Any]:
+    """Decode strips or tiles of `part` (rows, columns) and put them in their places; shape (H, W, channels)."""
     height, width, samples = shape
-    across, down = width, min(int(page.rowsperstrip), height)
-    if page.is_tiled:
-        across, down = int(page.tilewidth), int(page.tilelength)
-        if across * down > 4 * width * height + _LARGE_TILE:
-            raise InputError(
-                f"{name}: is a damaged TIFF: tiles of {across} x {down} for {width} x {height} pixels"
-            )
-    columns, rows = -(-width // across), -(-height // down)
-    if len(page.dataoffsets) != columns * rows:
-        raise InputError(f"{name}: is a damaged TIFF: {len(page.dataoffsets)} parts, not {columns * rows}")
+    down, across = part
+    columns = -(-width // across)
     values = np.empty(shape, page.dtype.newbyteorder("="))
     for index, (offset, count) in enumerate(zip(page.dataoffsets, page.databytecounts, strict=True)):
         top, left = index // columns * down, index % columns * across
-        lines = down if page.is_tiled else min(down, height - top)
+        rows = down if page.is_tiled else min(down, height - top)  # the last strip is short
         try:
-            segment = _segment(page, data[offset : offset + count], (lines, across, samples))
+            numbers = _part(page, data[offset : offset + count], (rows, across, samples))
         except (zlib.error, LzwError, EOFError) as error:
             raise InputError(f"{name}: is a damaged TIFF: its compressed data are wrong ({error})") from None
-        values[top : top + lines, left : left + across] = segment[: height - top, : width - left]
+        values[top : top + rows, left : left + across] = numbers[: height - top, : width - left]
     return values
 
 
-def _segment(page: Any, packed: bytes, shape: tuple[int, int, int]) -> NDArray[Any]:
+def _part(page: Any, packed: bytes, shape: tuple[int, int, int]) -> NDArray[Any]:
     """One strip or tile, shape (rows, columns, channels): compression, byte order and predictor undone."""
     rows, columns, samples = shape
     dtype = page.dtype.newbyteorder(page.parent.byteorder)
@@ -179,12 +191,14 @@ def _segment(page: Any, packed: bytes, shape: tuple[int, int, int]) -> NDArray[A
     plain = _decompressed(int(page.compression), packed, size)
     if len(plain) < size:
         raise EOFError(f"{len(plain)} of {size} bytes")
-    if page.predictor == _FLOATING_POINT:
+    if page.predictor == _FLOATING_POINT and dtype.kind == "f":
         return _unpredicted_floats(plain, shape, dtype)
     values: NDArray[Any] = np.frombuffer(plain, dtype, rows * columns * samples).reshape(shape)
     if page.predictor == _HORIZONTAL:
         bits = native(values).view(f"u{dtype.itemsize}")  # differences are taken of the bits, modulo 2^n
         values = np.cumsum(bits, axis=1, dtype=bits.dtype).view(dtype.newbyteorder("="))
+    elif page.predictor != _NO_PREDICTOR:
+        raise ValueError(f"predictor {page.predictor} of {dtype}")
     return values
 
 

@@ -75,14 +75,10 @@ def test_a_truncated_file_is_refused_wherever_it_ends():
             decode_stored(whole[:length], "map.npy")
 
 
-@pytest.mark.parametrize(
-    "header",
-    [
-        "{'descr': '<f4', 'fortran_order': False, 'shape': (1000000, 1000000)}",
-        "{'descr': '<f4', 'fortran_order': False, 'shape': (%s, 1)}" % 10**300,
-    ],
-)
-def test_a_header_that_claims_too_much_is_refused(header):
+@pytest.mark.parametrize("shape", ["(1000000, 1000000)", f"({10**17}, {10**17})"])
+def test_a_header_that_claims_too_much_is_refused(shape):
+    header = f"{{'descr': '<f4', 'fortran_order': False, 'shape': {shape}}}"
+
     with pytest.raises(InputError, match="is truncated: shape"):
         decode_stored(npy_header(header) + bytes(1000), "map.npy")
 
@@ -98,7 +94,8 @@ def test_a_header_that_claims_too_much_is_refused(header):
         "{'descr': '<f4', 'fortran_order': False, 'shape': (-1, -1)}",
         "{'descr': '<f4', 'fortran_order': False, 'shape': (True, 2.0)}",
         "__import__('os').system('true')",
-        "{'descr': '<f4', 'fortran_order': False, 'shape': (1, 1)}" + " " * 20_000,
+        f"{{'descr': '<f4', 'fortran_order': False, 'shape': ({10**300}, 1)}}",
+        " " * 20_000 + "{'descr': '<f4', 'fortran_order': False, 'shape': (1, 1)}",
         "[1, 2]",
         "'\0'",
         "1" * 5000,

@@ -1,0 +1,43 @@
+"""A short run of the fuzzer's files; `make fuzz` runs it for longer, with limits on time and memory."""
+
+from random import Random
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.fuzz.cases import CASES
+from tests.fuzz.child import read_all_ways
+from tests.fuzz.corpus import corpus
+from tests.fuzz.mutations import at_random, every_region, with_repairs
+
+FILES = {name: data for name, data in corpus().items() if name != "large.png"}
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_whole_files_are_read(name):
+    assert read_all_ways(FILES[name]) == "read"
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_file_broken_anywhere_is_read_or_refused_in_one_line(name):
+    answers = [read_all_ways(each) for broken in every_region(FILES[name]) for each in with_repairs(broken)]
+
+    assert answers.count("refused") > len(answers) / 10
+
+
+@settings(deadline=None, max_examples=300)
+@given(st.sampled_from(sorted(FILES)), st.integers(0, 2**32))
+def test_a_file_broken_at_random_is_read_or_refused_in_one_line(name, seed):
+    for each in with_repairs(at_random(FILES[name], Random(seed))):
+        assert read_all_ways(each) in ("read", "refused")
+
+
+@given(st.binary(max_size=200), st.sampled_from([b"", *{data[:8] for data in FILES.values()}]))
+def test_any_bytes_are_read_or_refused_in_one_line(data, start):
+    assert read_all_ways(start + data) in ("read", "refused")
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_what_was_found_before_stays_fixed(case):
+    assert read_all_ways(CASES[case]) == "refused"

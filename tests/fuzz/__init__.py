@@ -1,0 +1,1 @@
+"""Broken files for the readers: `python -m tests.fuzz --seconds 60`."""

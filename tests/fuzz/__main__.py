@@ -1,0 +1,112 @@
+"""Throw broken files at the readers for a while, and keep what they stumble over.
+
+Every file must be read or refused with one line: no other exception, no crash, no more than two seconds and a
+gigabyte, and nothing on the terminal.
+"""
+
+import argparse
+import hashlib
+import itertools
+import select
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from random import Random
+from typing import IO
+
+from tests.fuzz.corpus import corpus
+from tests.fuzz.mutations import at_random, every_region, with_repairs
+
+HANG = 2.0
+KEPT = Path("out/fuzz")
+
+
+class Reader:
+    """A child process that reads files, and is replaced when one is its end."""
+
+    def __init__(self) -> None:
+        self._printed: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115 (lives as long as this)
+        self._start()
+
+    def _start(self) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "tests.fuzz.child"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self._printed,
+        )
+        self.read(b"warm up", patience=60)
+
+    def read(self, data: bytes, patience: float = HANG) -> str:
+        """What became of a file: "read", "refused", or a find."""
+        before = self._printed.seek(0, 2)
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._process.stdin.write(struct.pack("<I", len(data)) + data)
+        self._process.stdin.flush()
+        ready, _, _ = select.select([self._process.stdout], [], [], patience)
+        answer = self._process.stdout.readline().decode().strip() if ready else ""
+        if not answer:
+            answer = f"ended with {self._process.wait()}" if ready else f"no answer within {patience} s"
+            self.close()
+            self._start()
+        elif self._printed.seek(0, 2) > before:
+            self._printed.seek(before)
+            answer = f"printed {self._printed.read().decode(errors='replace').strip()!r}"
+        return answer
+
+    def close(self) -> None:
+        """End the child."""
+        self._process.kill()
+        self._process.communicate()
+
+
+def broken_files(seed: int) -> Iterator[tuple[str, bytes]]:
+    """(name of the whole file, broken file): each region of each file, then places at random without end."""
+    files = corpus()
+    for name, whole in files.items():
+        for broken in every_region(whole):
+            yield from ((name, each) for each in with_repairs(broken))
+    random = Random(seed)
+    names = list(files)
+    for _ in itertools.count():
+        name = random.choice(names)
+        yield from ((name, each) for each in with_repairs(at_random(files[name], random)))
+
+
+def main() -> int:
+    """Run for the given time; 1 when something was found."""
+    parser = argparse.ArgumentParser(prog="python -m tests.fuzz", description=__doc__.splitlines()[0])
+    parser.add_argument("--seconds", type=float, default=60, help="how long (default: 60)")
+    parser.add_argument(
+        "--seed", type=int, default=int(time.time()), help="for random places (default: the time)"
+    )
+    options = parser.parse_args()
+    print(f"seed {options.seed}, {options.seconds:g} s")
+    end = time.monotonic() + options.seconds
+    counts: Counter[str] = Counter()
+    finds: dict[str, Path] = {}
+    reader = Reader()
+    for name, data in broken_files(options.seed):
+        answer = reader.read(data)
+        counts[answer if answer in ("read", "refused") else "finds"] += 1
+        if answer not in ("read", "refused") and answer not in finds:
+            KEPT.mkdir(parents=True, exist_ok=True)
+            finds[answer] = KEPT / f"{hashlib.sha256(data).hexdigest()[:12]}-{name}"
+            finds[answer].write_bytes(data)
+            print(f"{finds[answer]}: {answer}")
+        if time.monotonic() > end:
+            break
+    reader.close()
+    tally = ", ".join(f"{counts[each]} {each}" for each in ("refused", "read", "finds"))
+    print(f"{sum(counts.values())} files: {tally}")
+    return 1 if finds else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
