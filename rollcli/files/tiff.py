@@ -167,7 +167,7 @@ def _decoded_by_tifffile(page: Any, name: str) -> NDArray[Any]:
 def _from_parts(
     page: Any, shape: tuple[int, int, int], part: tuple[int, int], data: bytes, name: str
 ) -> NDArray[Any]:
-    """Decode strips or tiles of `part` (rows, columns) and put them in their places; shape (H, W, channels)."""
+    """Decode strips or tiles of `part` (rows, columns) into their places; shape is (H, W, channels)."""
     height, width, samples = shape
     down, across = part
     columns = -(-width // across)
