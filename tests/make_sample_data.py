@@ -44,7 +44,7 @@ def make(folder: Path) -> None:
     for stem in [task.stem for task in dataset.tasks]:
         if stem != EXACT:
             left, right = (read_image(folder / side / f"{stem}.png") for side in ("left", "right"))
-            stored, ending = _stored(stem, compute_disparity(left, right, mode="3way", num_disparities=112))
+            stored, ending = _stored(stem, compute_disparity(left, right, mode="3way", num_disparities=80))
             write_atomic(maps / f"{stem}.{ending}", encode_stored(stored, ending))
 
 
