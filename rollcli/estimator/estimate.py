@@ -144,7 +144,7 @@ def estimate_roll(
     if road == "auto":
         pixels = take_road(values, usable, max_roll, seed, parabolic=model == "parabola")
     else:
-        pixels = take_all(values, valid, parabolic=model == "parabola")
+        pixels = take_all(values, usable, parabolic=model == "parabola")
     notes: list[str] = []
     solution: Solution
     if method in AREA_METHODS:

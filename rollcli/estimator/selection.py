@@ -49,13 +49,17 @@ def take_road(
     )
 
 
-def take_all(values: NDArray[Any], valid: NDArray[np.bool_], *, parabolic: bool) -> Pixels:
+def take_all(values: NDArray[Any], usable: NDArray[np.bool_] | None, *, parabolic: bool) -> Pixels:
     """Sum every valid pixel, as the paper does; a sample of them tells how sure that is."""
-    energy = Energy.of(map_moments(values, valid), float(values[valid].max()), parabolic=parabolic)
-    return Pixels(energy, _sampled_surface(values, valid, energy), None, 1.0)
+    used = values if usable is None else np.where(usable, values, 0)
+    peak = float(used.max())
+    if not math.isfinite(peak):
+        peak = float(used[np.isfinite(used)].max())
+    energy = Energy.of(map_moments(used), peak, parabolic=parabolic)
+    return Pixels(energy, _sampled_surface(values, usable, energy), None, 1.0)
 
 
-def _sampled_surface(values: NDArray[Any], used: NDArray[np.bool_], energy: Energy) -> Surface | None:
+def _sampled_surface(values: NDArray[Any], used: NDArray[np.bool_] | None, energy: Energy) -> Surface | None:
     try:
         return whole_surface(take_sample(values, used), energy)
     except EstimationError:  # too small a map to be sampled: an angle without an interval

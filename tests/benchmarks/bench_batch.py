@@ -15,7 +15,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
-from tests.program import command, environment, road_map, write_kitti  # noqa: E402
+from tests.program import command, environment, road_map, write_kitti
 
 BARE = """
 import sys, time, cv2, numpy as np

@@ -16,13 +16,13 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
-from rollcli.files.encodings import read_disparity  # noqa: E402
-from rollcli.files.formats import read_image  # noqa: E402
-from rollcli.imaging.stereo import compute_disparity  # noqa: E402
-from rollcli.simulate.dataset import plan_dataset, write_dataset  # noqa: E402
-from rollcli.simulate.options import SCENES, SimulateOptions  # noqa: E402
-from rollcli.simulate.render import render_frame  # noqa: E402
-from rollcli.simulate.spec import draw_specs  # noqa: E402
+from rollcli.files.encodings import read_disparity
+from rollcli.files.formats import read_image
+from rollcli.imaging.stereo import compute_disparity
+from rollcli.simulate.dataset import plan_dataset, write_dataset
+from rollcli.simulate.options import SCENES, SimulateOptions
+from rollcli.simulate.render import render_frame
+from rollcli.simulate.spec import draw_specs
 
 MODES = ("3way", "sgbm", "hh")
 STREETS = ROOT.parent / "shared" / "streets"
