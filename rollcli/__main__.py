@@ -13,6 +13,9 @@ def main() -> None:
 
 
 def _one_line(kind: type[BaseException], error: BaseException, at: TracebackType | None) -> None:
+    if issubclass(kind, KeyboardInterrupt):  # before there was anything to resume
+        sys.stderr.write("rollcli: interrupted\n")
+        return
     while at is not None and at.tb_next is not None:
         at = at.tb_next
     where = f"{at.tb_frame.f_code.co_filename}:{at.tb_lineno}" if at else "nowhere"
