@@ -1,12 +1,16 @@
 """``python -m rollcli``: the same program as ``rollcli``."""
 
+import os
 import sys
+from pathlib import Path
 from types import TracebackType
 
 
 def main() -> None:
     """Run the program; should it fail for a reason that nobody thought of, that is one line too."""
     sys.excepthook = _one_line
+    if sys.stderr is None:  # closed: what we say goes nowhere
+        sys.stderr = Path(os.devnull).open("w")  # noqa: SIM115 (open as long as the program runs)
     from rollcli.cli.main import main as program  # here: each worker process imports this module anew
 
     program(prog_name="rollcli")

@@ -153,6 +153,6 @@ def _fingerprint(frames: list[Frame]) -> dict[str, Any]:
 def _state(path: str) -> bytes:
     try:
         found = Path(path).stat()
-    except OSError:
+    except (OSError, ValueError):  # the latter for names that no file can have
         return b"missing\0"
     return b"%d %d\0" % (found.st_size, found.st_mtime_ns)

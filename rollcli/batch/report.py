@@ -132,15 +132,19 @@ class Report:
             self.note(f"{name}: warning: {outcome.warning}", topic="warning")
         if searched is not None:
             how = f"{name}: searched disparities from {searched[0]} to {searched[1]} px"
-            self.note(how, topic="searched")
-            self.detail(how)
+            if self._options.verbose:
+                self.detail(how)
+            else:
+                self.note(how, topic="searched")
 
     def _tell_failure(self, row: Row) -> None:
         self._failures += 1
+        if self._options.quiet:
+            return
         if self._failures <= _FAILURES_SHOWN or self._options.verbose:
-            self.note(row.message)
+            self.say(row.message)
         elif self._failures == _FAILURES_SHOWN + 1:
-            self.note("further failures are in the result alone; -v shows all")
+            self.say("further failures are in the result alone; -v shows all")
 
     def _progress(self) -> None:
         if self._bar is not None:
@@ -148,12 +152,9 @@ class Report:
             self._bar.update()
         elif time.monotonic() - self._last_line >= _LINE_EVERY_S:
             self._last_line = time.monotonic()
-            self.detail_or_progress()
-
-    def detail_or_progress(self) -> None:
-        """The line that stands for the bar where there is no terminal."""
-        if not self._options.quiet:
-            self.say(f"{self.done} of {self.total} frames, {self.counts['error']} failed, {self._speed()}")
+            if not self._options.quiet:
+                failed = self.counts["error"]
+                self.say(f"{self.done} of {self.total} frames, {failed} failed, {self._speed()}")
 
     def _speed(self) -> str:
         seconds = time.monotonic() - self._start

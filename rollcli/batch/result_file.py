@@ -41,8 +41,7 @@ class RowStream:
 
     def _write(self, data: bytes) -> None:
         try:
-            while data:
-                data = data[os.write(self._descriptor, data) :]
+            _write_all(self._descriptor, data)
         except BrokenPipeError:
             raise
         except OSError as error:
@@ -85,14 +84,16 @@ class ResultFile:
     def _append(self, line: bytes) -> None:
         try:
             before = os.lseek(self.descriptor, 0, os.SEEK_CUR)
-            written = os.write(self.descriptor, line)
-            if written < len(line):
-                # the next write says what was wrong: the disk is full, or a limit is reached
-                os.write(self.descriptor, line[written:])
+            _write_all(self.descriptor, line)
         except OSError as error:
             with contextlib.suppress(OSError):
                 os.ftruncate(self.descriptor, before)
             raise output_error(self._name, error) from error
+
+
+def _write_all(descriptor: int, data: bytes) -> None:
+    while data:  # a full disk takes a part first, and says so the next time
+        data = data[os.write(descriptor, data) :]
 
 
 @contextlib.contextmanager
@@ -134,11 +135,11 @@ def check_result(name: str, *, resume: bool, overwrite: bool) -> None:
 
 def _has_rows(name: str) -> bool:
     """A file that holds more than the header of a run that came to nothing."""
-    path = Path(name)
-    if not path.is_file():
-        return False
-    with path.open("rb") as file:
-        start = file.read(_MORE_THAN_A_HEADER)
+    try:
+        with Path(name).open("rb") as file:
+            start = file.read(_MORE_THAN_A_HEADER)
+    except OSError:
+        return False  # not there, or what is wrong with it is said when it is to be written
     return start not in (b"", format_header("csv"), format_header("csv", timing=True))
 
 

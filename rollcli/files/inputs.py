@@ -206,5 +206,6 @@ def _stdin_lines(stdin: Iterable[str] | None) -> Iterator[str]:
 
 
 def _lines(data: bytes) -> Iterator[str]:
-    """Paths one a line; bytes, because file names need not be text of any encoding."""
-    return (os.fsdecode(line) for line in data.replace(b"\r\n", b"\n").split(b"\n") if line)
+    """Paths one a line, or as `find -print0` writes them; bytes, for file names need not be text."""
+    lines = data.split(b"\0") if b"\0" in data else data.replace(b"\r\n", b"\n").split(b"\n")
+    return (os.fsdecode(line) for line in lines if line)

@@ -343,3 +343,11 @@ def test_a_missing_side_is_named(here):
 
     with pytest.raises(UsageError, match="no input found: r: no such file"):
         pair_inputs("l", "r")
+
+
+def test_a_list_may_be_separated_as_find_print0_does(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("a\nb.png", "c.png"):
+        Path(name).touch()
+    Path("list").write_bytes(b"a\nb.png\0c.png\0")
+    assert [each.name for each in find_inputs((), files_from="list")] == ["a\nb.png", "c.png"]
