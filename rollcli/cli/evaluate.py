@@ -5,8 +5,38 @@ from typing import Any
 import click
 
 from rollcli.batch.options import RunningOptions
-from rollcli.cli.command import Command, option
-from rollcli.cli.options import PATH, running_options
+from rollcli.cli.command import Command, option, record
+from rollcli.cli.options import PATH, encoding_options, input_options, region_options, running_options
+from rollcli.cli.types import Number, Turns
+from rollcli.evaluate.options import TIMED, TURNS_DEG, ExperimentOptions, PaperOptions
+
+experiment_options = record(
+    "experiments",
+    "Experiments",
+    ExperimentOptions,
+    option(
+        "-o", "--output", type=PATH, metavar="DIR", required=True, help="Where paper.html and its CSVs go."
+    ),
+    option(
+        "--turns",
+        type=Turns(),
+        default=TURNS_DEG,
+        show_default=False,
+        help="Rotate each map by these angles, degrees.  [default: -20:20:2]",
+    ),
+    option(
+        "--timed",
+        type=Number("N", at_least=1, whole=True),
+        default=TIMED,
+        help="Take the run times on the first N maps; the paper's n x 3 form is slow.",
+    ),
+    option(
+        "--truth",
+        type=PATH,
+        metavar="FILE",
+        help="Known angles of the maps: CSV with file and roll_deg.  [default: each map's own estimate]",
+    ),
+)
 
 
 @click.group(invoke_without_command=True)
@@ -47,6 +77,28 @@ def accuracy(
     \b
     rollcli evaluate accuracy rig/rolls.csv --truth rig/truth.csv
     """
-    from rollcli.evaluate.run import run_accuracy
+    from rollcli.evaluate.run_accuracy import run_accuracy
 
     ctx.exit(run_accuracy(result, truth, form, output, running))
+
+
+@evaluate.command(cls=Command)
+@input_options
+@experiment_options
+@encoding_options
+@region_options
+@running_options
+@click.pass_context
+def paper(ctx: click.Context, /, **records: Any) -> None:
+    """Repeat the paper's tables and figures on these maps, and write them as CSV and one HTML page of charts.
+
+    Iterations and run times of golden section and gradient descent (Tables I and II), the first learning
+    rate (Fig. 3), accuracy after known rotations (Fig. 6), and the same accuracy for the other methods. Every
+    valid pixel is used, as in the paper. The page needs the extra: pip install "rollcli[report]".
+
+    \b
+    rollcli evaluate paper maps/ -o paper/
+    """
+    from rollcli.evaluate.run_paper import run_paper
+
+    ctx.exit(run_paper(PaperOptions(**records)))

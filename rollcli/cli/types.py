@@ -156,3 +156,24 @@ class Size(_ParamType):
         if found is None:
             self.fail(f"{value!r} is not WxH in whole pixels, such as 640x480", param, ctx)
         return int(found[1]), int(found[2])
+
+
+class Turns(_ParamType):
+    """A:B:STEP with A <= B and a step above 0, all within a quarter turn; at most 1000 angles."""
+
+    name = "A:B:STEP"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[float, float, float]:
+        if isinstance(value, tuple):
+            return value  # the default
+        try:
+            first, last, step = map(float, str(value).split(":"))
+        except ValueError:
+            first, last, step = 0.0, -1.0, 1.0
+        if not (-90 <= first <= last <= 90 and step > 0 and last - first <= 1000 * step):
+            self.fail(
+                f"{value!r} is not A:B:STEP in degrees with -90 <= A <= B <= 90, such as -20:20:2", param, ctx
+            )
+        return first, last, step

@@ -1,4 +1,4 @@
-"""`evaluate` from the command line: what is read and written, and what is said meanwhile."""
+"""`evaluate accuracy` from the command line: what is read and written, and what is said meanwhile."""
 
 from __future__ import annotations
 
@@ -64,9 +64,9 @@ def _name_unmatched(accuracy: Accuracy, result: str, truth: str, running: Runnin
     if running.quiet:
         return
     for stem in accuracy.no_angle:
-        say(f"{stem}: in {truth}, without an angle in {result}")
+        _say(f"{stem}: in {truth}, without an angle in {result}")
     for name in accuracy.no_truth:
-        say(f"{name}: in {result}, without a known angle in {truth}")
+        _say(f"{name}: in {result}, without a known angle in {truth}")
 
 
 def _to_stdout(data: bytes) -> None:
@@ -74,6 +74,6 @@ def _to_stdout(data: bytes) -> None:
         data = data[os.write(1, data) :]
 
 
-def say(message: str) -> None:
+def _say(message: str) -> None:
     """One line on stderr."""
     sys.stderr.write(f"rollcli: {message}\n")

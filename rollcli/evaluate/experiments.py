@@ -1,0 +1,187 @@
+"""The paper's experiments on one map: iterations, the first learning rate, and rotations by known angles."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from numpy.typing import NDArray
+
+from rollcli.errors import EstimationError
+from rollcli.estimator.areas import areas
+from rollcli.estimator.energy import Energy
+from rollcli.estimator.estimate import estimate_roll
+from rollcli.estimator.exact import exact, minima
+from rollcli.estimator.golden_section import golden_section
+from rollcli.estimator.gradient_descent import LAMBDA0, gradient_descent
+from rollcli.estimator.moments import map_moments
+from rollcli.estimator.plane_fit import plane_fit
+from rollcli.evaluate.rotate import rotate_nearest
+
+DELTAS = tuple(math.pi / k for k in (1.8e3, 1.8e4, 1.8e5, 1.8e6))
+LAMBDAS = tuple(float(rate) for rate in range(1, 101))
+SOLVERS = ("gd", "gss", "exact")
+METHODS = ("gd", "line", "plane", "areas", "auto")
+_LARGEST_ROLL = math.radians(89)
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What the experiments say about one map; angles in radians.
+
+    Attributes
+    ----------
+    file : str
+    width, height, pixels : int
+        Of the map, and how many of its pixels are valid.
+    theta : float
+        The exact minimum.
+    gss, gd : tuple of int
+        Iterations for each of `DELTAS` (Table I).
+    sweep : tuple of tuple
+        Iterations of gd for each of `DELTAS` and `LAMBDAS` (Fig. 3); None where it ended farther than
+        delta from every minimum: a small rate makes the first steps shorter than delta.
+    solver_errors : dict of str to tuple
+        For each of `SOLVERS`, per rotation, the error for each of `DELTAS` (Fig. 6).
+    method_errors : dict of str to tuple
+        For each of `METHODS`, per rotation, the error, or None where the method found no angle.
+    """
+
+    file: str
+    width: int
+    height: int
+    pixels: int
+    theta: float
+    gss: tuple[int, ...]
+    gd: tuple[int, ...]
+    sweep: tuple[tuple[int | None, ...], ...]
+    solver_errors: dict[str, tuple[tuple[float, ...], ...]]
+    method_errors: dict[str, tuple[float | None, ...]]
+
+
+def examine(
+    file: str,
+    disparity: NDArray[Any],
+    turns: Sequence[float],
+    truth: float | None = None,
+    *,
+    chosen: bool = False,
+) -> Findings:
+    """Run every experiment but the run times on one map.
+
+    Parameters
+    ----------
+    file : str
+        What the map is called.
+    disparity : ndarray, shape (H, W)
+        Pixels; 0 is no data.
+    turns : sequence of float
+        The angles that the map is rotated by, radians.
+    truth : float, optional
+        The map's known roll, radians. Without it, an estimate is held against the exact minimum of the map
+        before it was rotated, and that of a method which does not solve this energy against its own.
+    chosen : bool
+        The valid pixels are the chosen area of the method "plane".
+
+    Returns
+    -------
+    Findings
+
+    Raises
+    ------
+    EstimationError
+        The pixels do not determine an angle.
+    """
+    energy = _energy(disparity)
+    theta = exact(energy).theta
+    height, width = disparity.shape
+    methods = _methods(max(map(abs, turns), default=0.0), chosen)
+    rotated = [rotate_nearest(disparity, turn) for turn in turns]
+    return Findings(
+        file=file,
+        width=width,
+        height=height,
+        pixels=round(energy.weight),
+        theta=theta,
+        gss=tuple(golden_section(energy, delta).iterations for delta in DELTAS),
+        gd=tuple(gradient_descent(energy, delta).iterations for delta in DELTAS),
+        sweep=_sweep(energy),
+        solver_errors=_solver_errors(rotated, turns, theta if truth is None else truth),
+        method_errors={
+            name: _method_errors(method, disparity, rotated, turns, truth) for name, method in methods.items()
+        },
+    )
+
+
+def _energy(disparity: NDArray[Any], *, parabolic: bool = True) -> Energy:
+    return Energy.of(map_moments(disparity), float(disparity.max()), parabolic=parabolic)
+
+
+def _sweep(energy: Energy) -> tuple[tuple[int | None, ...], ...]:
+    ends = [minimum.theta for minimum in minima(energy)]
+
+    def iterations(delta: float, rate: float) -> int | None:
+        found = gradient_descent(energy, delta, rate)
+        return found.iterations if min(_apart(found.theta, end) for end in ends) <= delta else None
+
+    return tuple(tuple(iterations(delta, rate) for rate in LAMBDAS) for delta in DELTAS)
+
+
+def _solver_errors(
+    rotated: Sequence[NDArray[Any]], turns: Sequence[float], base: float
+) -> dict[str, tuple[tuple[float, ...], ...]]:
+    energies = [_energy(each) for each in rotated]
+    solvers: dict[str, Callable[[Energy, float], float]] = {
+        "gd": lambda energy, delta: gradient_descent(energy, delta, LAMBDA0).theta,
+        "gss": lambda energy, delta: golden_section(energy, delta).theta,
+        "exact": lambda energy, delta: exact(energy).theta,
+    }
+    return {
+        name: tuple(
+            tuple(_apart(solve(energy, delta), base + turn) for delta in DELTAS)
+            for energy, turn in zip(energies, turns, strict=True)
+        )
+        for name, solve in solvers.items()
+    }
+
+
+def _methods(largest_turn: float, chosen: bool) -> dict[str, Callable[[NDArray[Any]], float]]:
+    """Return each method as a function from a map to its angle."""
+    max_roll = min(_LARGEST_ROLL, math.radians(45) + max(0.0, largest_turn - math.radians(20)))
+    area = (slice(None), slice(None)) if chosen else None
+    return {
+        "gd": lambda disparity: gradient_descent(_energy(disparity), DELTAS[-1]).theta,
+        "line": lambda disparity: exact(_energy(disparity, parabolic=False)).theta,
+        "plane": lambda disparity: plane_fit(disparity, area=area).theta,
+        "areas": lambda disparity: areas(disparity, max_roll=max_roll).theta,
+        "auto": lambda disparity: estimate_roll(disparity, road="auto", max_roll=max_roll).theta,
+    }
+
+
+def _method_errors(
+    method: Callable[[NDArray[Any]], float],
+    disparity: NDArray[Any],
+    rotated: Sequence[NDArray[Any]],
+    turns: Sequence[float],
+    truth: float | None,
+) -> tuple[float | None, ...]:
+    base = _angle(method, disparity) if truth is None else truth
+    found = [_angle(method, each) for each in rotated]
+    return tuple(
+        None if base is None or theta is None else _apart(theta, base + turn)
+        for theta, turn in zip(found, turns, strict=True)
+    )
+
+
+def _angle(method: Callable[[NDArray[Any]], float], disparity: NDArray[Any]) -> float | None:
+    try:
+        return method(disparity)
+    except EstimationError:
+        return None
+
+
+def _apart(one: float, other: float) -> float:
+    """Return how far two angles are apart, as rotations of rows."""
+    return abs(math.remainder(one - other, math.pi))

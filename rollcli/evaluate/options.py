@@ -1,0 +1,68 @@
+"""What the paper's experiments were asked to do; light, since the command line imports it for its help."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rollcli.batch.options import (
+    EncodingOptions,
+    FrameOptions,
+    ImageOptions,
+    InputOptions,
+    MethodOptions,
+    RegionOptions,
+    RunningOptions,
+)
+from rollcli.imaging.stereo_options import StereoOptions
+
+TURNS_DEG = (-20.0, 20.0, 2.0)
+TIMED = 3
+
+
+@dataclass(frozen=True)
+class ExperimentOptions:
+    """Where the figures go, and what is varied.
+
+    Attributes
+    ----------
+    output : str
+        A folder.
+    turns : tuple of float
+        First and last angle that maps are rotated by, and the step; degrees.
+    timed : int
+        How many maps, from the first, the run times are taken on.
+    truth : str or None
+        A CSV of known angles.
+    """
+
+    output: str
+    turns: tuple[float, float, float] = TURNS_DEG
+    timed: int = TIMED
+    truth: str | None = None
+
+    @property
+    def turns_deg(self) -> tuple[float, ...]:
+        """Every angle that maps are rotated by, degrees."""
+        first, last, step = self.turns
+        return tuple(first + step * k for k in range(int((last - first) / step + 1e-9) + 1))
+
+
+@dataclass(frozen=True)
+class PaperOptions:
+    """Everything that `rollcli evaluate paper` was asked."""
+
+    inputs: InputOptions
+    encoding: EncodingOptions
+    region: RegionOptions
+    experiments: ExperimentOptions
+    running: RunningOptions
+
+    @property
+    def frame(self) -> FrameOptions:
+        """How a map is read."""
+        return FrameOptions(self.encoding, StereoOptions(), self.region, MethodOptions(), ImageOptions())
+
+    @property
+    def has_region(self) -> bool:
+        """Whether the user chose the pixels."""
+        return self.region != RegionOptions()

@@ -1,0 +1,133 @@
+"""`evaluate paper` from the command line: maps to workers, their findings to tables and one page."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rollcli.batch.checks import check_inputs_are_kept, check_nothing_is_there
+from rollcli.batch.dry_run import list_files
+from rollcli.batch.frames import map_frames
+from rollcli.batch.job import Frame
+from rollcli.batch.local import done_locally
+from rollcli.batch.report import INTERRUPTED, Report
+from rollcli.batch.setup import limit_blas_threads
+from rollcli.batch.signals import stop_on_signals
+from rollcli.batch.workers import Work
+from rollcli.errors import UsageError
+from rollcli.evaluate.options import PaperOptions
+from rollcli.evaluate.truth import read_truth
+from rollcli.files.atomic import write_atomic
+from rollcli.files.matching import stem_of
+from rollcli.report.page import require_extra
+
+if TYPE_CHECKING:
+    from rollcli.evaluate.experiments import Findings
+    from rollcli.evaluate.timing import Times
+
+PAGE = "paper.html"
+TABLES = ("maps", "table1_iterations", "table2_runtime", "fig3_lambda0", "fig6_accuracy", "methods_accuracy")
+
+
+def run_paper(options: PaperOptions) -> int:
+    """Repeat the paper's experiments on maps.
+
+    Parameters
+    ----------
+    options : PaperOptions
+
+    Returns
+    -------
+    int
+        The exit status: 3 when a map gave no angle, 130 when interrupted.
+
+    Raises
+    ------
+    UsageError, InputError
+        Exit status 2.
+    OutputError
+        Exit status 1.
+    """
+    require_extra("the page of charts")
+    folder, running = options.experiments.output, options.running
+    frames = map_frames(options.inputs, region=options.region, skip=[folder])
+    truth = _known_angles(frames, options)
+    writes = [str(Path(folder, name)) for name in (*(f"{name}.csv" for name in TABLES), PAGE)]
+    reads = [path for frame in frames for path in frame.reads()]
+    check_inputs_are_kept(reads, writes)
+    if not running.overwrite:
+        check_nothing_is_there(writes)
+    if running.dry_run:
+        list_files([(reads, writes)])
+        return 0
+    limit_blas_threads()  # the paper's run times are those of one thread
+    return _run(frames, truth, options)
+
+
+def _known_angles(frames: list[Frame], options: PaperOptions) -> Mapping[str, float]:
+    if options.experiments.truth is None:
+        return {}
+    truth = read_truth(options.experiments.truth)
+    for frame in frames:
+        if stem_of(frame.file) not in truth:
+            raise UsageError(f"{frame.file}: has no known angle in {options.experiments.truth}")
+    return truth
+
+
+def _run(frames: list[Frame], truth: Mapping[str, float], options: PaperOptions) -> int:
+    from rollcli.evaluate.job import examine_file, lost
+
+    work = Work(partial(examine_file, options=options, truth=truth), lost)
+    report = Report(len(frames), options.running, options.encoding, statuses=("ok",))
+    found: list[Findings] = []
+    failed: list[tuple[str, str]] = []
+    with (
+        stop_on_signals() as stop,
+        report,
+        contextlib.closing(done_locally(frames, work, options.running.jobs, stop)) as all_examined,
+    ):
+        for examined in all_examined:
+            report.add(examined.outcome)
+            if examined.findings is None:
+                failed.append((examined.outcome.row.file, examined.outcome.row.message))
+            else:
+                found.append(examined.findings)
+    if stop.asked:
+        report.say(f"interrupted after {report.done} of {report.total} maps; nothing is written")
+        return INTERRUPTED
+    report.note(report.summary())
+    if not found:
+        report.say("no map gave an angle: there is nothing to tabulate")
+        return report.status
+    times = _time(frames, found, options, report)
+    _write(found, failed, times, options)
+    report.note(f"{Path(options.experiments.output, PAGE)} and {len(TABLES)} tables are written")
+    return report.status
+
+
+def _time(frames: list[Frame], found: list[Findings], options: PaperOptions, report: Report) -> list[Times]:
+    """Take the run times on the first maps, in this process alone."""
+    from rollcli.evaluate.job import read_pixels
+    from rollcli.evaluate.timing import time_solvers
+
+    good = {findings.file for findings in found}
+    chosen = [frame for frame in frames if frame.file in good][: options.experiments.timed]
+    report.note(f"run times, on {len(chosen)} of the maps")
+    return [time_solvers(read_pixels(frame, options)[1]) for frame in chosen]
+
+
+def _write(
+    found: list[Findings], failed: list[tuple[str, str]], times: list[Times], options: PaperOptions
+) -> None:
+    from rollcli.evaluate.paper_page import paper_page
+    from rollcli.evaluate.tables import all_tables
+
+    tables = all_tables(found, failed, times)
+    folder = Path(options.experiments.output)
+    page = paper_page(tables, found, failed, times, options)
+    for name in TABLES:
+        write_atomic(folder / f"{name}.csv", tables[name].csv())
+    write_atomic(folder / PAGE, page)

@@ -1,0 +1,185 @@
+"""`rollcli evaluate paper` as a user runs it."""
+
+import csv
+import importlib.util
+import re
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+from rollcli.cli.main import main
+from rollcli.evaluate.run_paper import PAGE, TABLES
+from tests.estimator.maps import bent_road
+from tests.program import contents, rollcli
+
+FAST = ("--turns", "-8:8:8", "--timed", "1")
+FILES = {PAGE, *(f"{name}.csv" for name in TABLES)}
+
+needs_extra = pytest.mark.skipif(
+    not all(map(importlib.util.find_spec, ("plotly", "jinja2"))), reason="the extra `report` is not installed"
+)
+
+
+def write_maps(folder, *names):
+    folder.mkdir()
+    for k, name in enumerate(names):
+        np.save(folder / name, bent_road(2 * k - 3, width=160, height=120, noise=0.1).astype(np.float32))
+
+
+def paper(folder, *arguments):
+    return rollcli("evaluate", "paper", "maps", "-o", "out", *FAST, *arguments, cwd=folder)
+
+
+def read(path):
+    return list(csv.DictReader(path.read_text().splitlines()))
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("paper")
+    write_maps(folder / "maps", "a.npy", "b.npy", "<script>alert(1)<script>.npy")
+    (folder / "maps/empty.npy").write_bytes(b"")
+    return folder, paper(folder, "-j1")
+
+
+@needs_extra
+def test_it_writes_one_page_and_a_csv_for_each_table(done):
+    folder, run = done
+    assert set(contents(folder / "out")) == FILES
+    assert run.out == ""
+    assert "4 frames: 3 ok, 1 failed" in run.err
+
+
+@needs_extra
+def test_a_map_that_cannot_be_read_is_named_and_ends_it_with_3(done):
+    folder, run = done
+    assert run.status == 3
+    assert "maps/empty.npy" in run.err
+    assert read(folder / "out/maps.csv")[-1]["message"].startswith("maps/empty.npy: ")
+    assert "maps/empty.npy: " in (folder / "out" / PAGE).read_text()
+
+
+@needs_extra
+def test_golden_section_takes_the_papers_iterations(done):
+    rows = read(done[0] / "out/table1_iterations.csv")
+    ours = [(row["paper"], row["mean"], row["min"], row["max"]) for row in rows if row["solver"] == "gss"]
+    assert ours == [(count,) * 4 for count in ("16", "21", "26", "30")]
+
+
+@needs_extra
+def test_the_page_needs_no_network_and_shows_file_names_as_text(done):
+    page = (done[0] / "out" / PAGE).read_text()
+    assert not re.search(r'<(script|link|img|iframe)[^>]+(src|href)="?(https?:)?//', page)
+    assert "&lt;script&gt;alert(1)" in page
+    assert "<script>alert(1)" not in page
+    assert page.count("data-chart=") == 5
+
+
+@needs_extra
+def test_the_tables_do_not_depend_on_the_workers(done, tmp_path):
+    folder, _ = done
+    shutil.copytree(folder / "maps", tmp_path / "maps")
+    paper(tmp_path, "-j2", "-q")
+    for name in set(TABLES) - {"table2_runtime"}:
+        assert (tmp_path / f"out/{name}.csv").read_bytes() == (folder / f"out/{name}.csv").read_bytes()
+
+
+@needs_extra
+def test_every_chart_is_drawn_in_a_browser_without_an_error(done, tmp_path):
+    browser = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    if browser is None:
+        pytest.skip("no Chromium to open the page with")
+    flags = [
+        "--headless",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--no-first-run",
+        "--disable-background-networking",
+    ]
+    flags += ["--disable-sync", "--disable-component-update", "--enable-logging=stderr", "--v=0"]
+    page = (done[0] / "out" / PAGE).as_uri()
+    opened = subprocess.run(
+        [browser, *flags, f"--user-data-dir={tmp_path}", "--virtual-time-budget=5000", "--dump-dom", page],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=True,
+    )
+    assert len(re.findall(r'class="chart js-plotly-plot"', opened.stdout)) == 5
+    assert opened.stdout.count('class="main-svg"') >= 5
+    assert "CONSOLE" not in opened.stderr
+
+
+@needs_extra
+def test_what_is_there_is_kept_unless_overwrite_is_given(done):
+    folder, _ = done
+    before = contents(folder / "out")
+    again = paper(folder)
+    assert again.status == 2
+    assert "exists already; give --overwrite" in again.err
+    assert contents(folder / "out") == before
+
+
+@needs_extra
+def test_a_dry_run_lists_the_files_and_writes_none(tmp_path):
+    write_maps(tmp_path / "maps", "a.npy")
+    run = paper(tmp_path, "--dry-run")
+    assert run.status == 0
+    lines = run.out.replace("\\", "/").splitlines()
+    assert lines[0] == "read  maps/a.npy"
+    assert {line.removeprefix("write out/") for line in lines[1:]} == FILES
+    assert not (tmp_path / "out").exists()
+
+
+@needs_extra
+def test_known_angles_are_what_estimates_are_held_against(tmp_path):
+    write_maps(tmp_path / "maps", "a.npy")  # rolled by -3 degrees
+    (tmp_path / "truth.csv").write_text("file,roll_deg\na,-2.5\n")
+    assert paper(tmp_path, "--truth", "truth.csv", "-q", "-j1").status == 0
+    exact = [row for row in read(tmp_path / "out/fig6_accuracy.csv") if row["solver"] == "exact"]
+    assert float(exact[0]["mean_deg"]) == pytest.approx(0.5, abs=0.05)
+
+
+@needs_extra
+def test_maps_without_a_known_angle_are_refused_by_name(tmp_path):
+    write_maps(tmp_path / "maps", "a.npy", "b.npy")
+    (tmp_path / "truth.csv").write_text("file,roll_deg\na,-2.5\n")
+    run = paper(tmp_path, "--truth", "truth.csv")
+    assert (run.status, run.err) == (2, "rollcli: maps/b.npy: has no known angle in truth.csv\n")
+
+
+@needs_extra
+def test_maps_that_give_no_angle_leave_nothing_and_end_with_3(tmp_path):
+    (tmp_path / "maps").mkdir()
+    np.save(tmp_path / "maps/flat.npy", np.full((60, 80), 7, np.float32))
+    run = paper(tmp_path, "-j1")
+    assert run.status == 3
+    assert "the same everywhere" in run.err
+    assert "no map gave an angle" in run.err
+    assert not (tmp_path / "out").exists()
+
+
+@needs_extra
+@pytest.mark.parametrize("turns", ["-20", "5:-5:1", "-5:5:0", "-100:100:1", "a:b:c", "0:90:0.01", "0:5:nan"])
+def test_rotations_that_make_no_sense_are_refused_with_an_example(tmp_path, turns):
+    write_maps(tmp_path / "maps", "a.npy")
+    run = rollcli("evaluate", "paper", "maps", "-o", "out", "--turns", turns, cwd=tmp_path)
+    assert run.status == 2
+    assert "such as -20:20:2" in run.err
+
+
+@pytest.mark.parametrize("missing", ["plotly", "jinja2"])
+def test_without_the_extra_it_says_what_to_install_before_any_work(tmp_path, monkeypatch, capsys, missing):
+    there = importlib.util.find_spec
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == missing else there(name))
+    monkeypatch.chdir(tmp_path)
+    write_maps(tmp_path / "maps", "a.npy")
+    with pytest.raises(SystemExit) as exit_:
+        main(["evaluate", "paper", "maps", "-o", "out"])
+    assert exit_.value.code == 2
+    said = capsys.readouterr().err
+    assert missing in said
+    assert 'pip install "rollcli[report]"' in said
+    assert not (tmp_path / "out").exists()
