@@ -23,7 +23,7 @@ def draw_disparity(disparity: NDArray[Any]) -> NDArray[np.uint8]:
     ndarray of uint8, shape (H, W, 3)
         BGR.
     """
-    return _colours()[_levels(disparity)]
+    return _coloured(_levels(disparity), _colours())
 
 
 def draw_road(disparity: NDArray[Any], mask: NDArray[Any]) -> NDArray[np.uint8]:
@@ -45,7 +45,8 @@ def draw_road(disparity: NDArray[Any], mask: NDArray[Any]) -> NDArray[np.uint8]:
     road = (np.asarray(mask) != 0).astype(np.uint8)
     colours = _colours()
     tinted = (colours * (1 - _TINT) + np.array(_ROAD) * _TINT).astype(np.uint8)
-    picture = np.where(road[..., None] > 0, tinted[levels], colours[levels])
+    picture = _coloured(levels, colours)
+    cv2.copyTo(_coloured(levels, tinted), road, picture)
     outlines, _ = cv2.findContours(road, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     return cv2.drawContours(picture, outlines, -1, _ROAD, 1).astype(np.uint8, copy=False)
 
@@ -58,6 +59,10 @@ def _levels(disparity: NDArray[Any]) -> NDArray[np.uint8]:
         return np.zeros(values.shape, np.uint8)
     top = float(np.percentile(values[valid], 99))  # a few outliers would leave the rest dark
     return np.where(valid, np.clip(np.where(valid, values, 0) * (255 / top), 1, 255), 0).astype(np.uint8)
+
+
+def _coloured(levels: NDArray[np.uint8], colours: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    return cv2.applyColorMap(levels, colours.reshape(256, 1, 3)).astype(np.uint8, copy=False)
 
 
 def _colours() -> NDArray[np.uint8]:
