@@ -28,6 +28,10 @@ _KNOWN = {
     b"%PDF": "a PDF document",
     b"\x1f\x8b": "a gzip file",
     b"\x89HDF": "an HDF5 file",
+    b"\x80\x02": "a Python pickle, which is never loaded",
+    b"\x80\x03": "a Python pickle, which is never loaded",
+    b"\x80\x04": "a Python pickle, which is never loaded",
+    b"\x80\x05": "a Python pickle, which is never loaded",
 }
 _TEXT = re.compile(rb"[\t\n\r\f\x20-\x7e]{8}")  # no format begins with eight printable characters
 

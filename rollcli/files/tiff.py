@@ -102,9 +102,8 @@ def _with_first_page(data: bytes, name: str, decode: Any) -> Any:
     try:
         with tifffile.TiffFile(io.BytesIO(data)) as file:
             return decode(file, file.pages[0])
-    except (tifffile.TiffFileError, *_DAMAGE) as error:
-        reason = " ".join(str(error).strip("'\"").split())[:120] or type(error).__name__
-        raise InputError(f"{name}: is a damaged or truncated TIFF ({reason})") from None
+    except (tifffile.TiffFileError, *_DAMAGE):
+        raise InputError(f"{name}: is a damaged or truncated TIFF") from None
 
 
 def _pixels(page: Any, data: bytes, name: str) -> NDArray[Any]:
@@ -157,10 +156,11 @@ def _decoded_by_tifffile(page: Any, name: str) -> NDArray[Any]:
     """Rare compressions, bit depths and layouts, which may need imagecodecs."""
     try:
         values: NDArray[Any] = page.asarray()
-    except (ValueError, KeyError) as error:
-        if "imagecodecs" not in str(error):
-            raise
-        raise InputError(f"{name}: its compression needs another package: pip install imagecodecs") from None
+    except _DAMAGE as error:
+        how = f"compression {int(page.compression)}, {page.bitspersample} bits a number"
+        missing = isinstance(error, ImportError) or "imagecodecs" in str(error)
+        hint = ": pip install imagecodecs" if missing else ""
+        raise InputError(f"{name}: its pixels cannot be decoded ({how}){hint}") from None
     return values
 
 

@@ -1,6 +1,7 @@
 """TIFF files of every usual kind are read, with or without imagecodecs."""
 
 import struct
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -161,3 +162,22 @@ def test_camera_images_are_read_in_grey_and_in_colour():
     )
     with pytest.raises(InputError, match="holds float32 numbers"):
         picture(make_tiff(values_of("f4")), "x")
+
+
+@pytest.mark.skipif(bool(find_spec("imagecodecs")), reason="imagecodecs is installed here")
+def test_compressions_of_another_package_name_it():
+    field = struct.pack("<HHIHH", 259, 3, 1, 8, 0)
+    file = make_tiff(values_of("u2"), "deflate").replace(field, struct.pack("<HHIHH", 259, 3, 1, 50000, 0))
+
+    with pytest.raises(
+        InputError,
+        match=r"cannot be decoded \(compression 50000, 16 bits a number\): pip install imagecodecs",
+    ):
+        decode_stored(file, "map.tif")
+
+
+@pytest.mark.parametrize("kind", ["i1", "u4", "i4"])
+def test_whole_numbers_of_any_size_are_read(kind):
+    values = disparity_map().astype(kind)
+
+    np.testing.assert_array_equal(decode_stored(make_tiff(values, "lzw", ">", 2), "map.tif").values, values)
