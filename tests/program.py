@@ -26,10 +26,10 @@ def command(*arguments: str | Path) -> list[str]:
 
 
 def environment(**variables: str) -> dict[str, str]:
-    """This environment without settings of rollcli's, with the given variables."""
+    """This environment without settings of rollcli's, with these; one process where no more are asked for."""
     kept = {name: value for name, value in os.environ.items() if not name.startswith("ROLLCLI")}
     path = os.pathsep.join(filter(None, [str(ROOT), kept.get("PYTHONPATH")]))
-    return {**kept, "PYTHONPATH": path, **variables}
+    return {**kept, "PYTHONPATH": path, "ROLLCLI_ESTIMATE_JOBS": "1", **variables}
 
 
 def rollcli(*arguments: str | Path, cwd: Path, stdin: str = "", **variables: str) -> Finished:
