@@ -12,18 +12,18 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
-import cv2  # noqa: E402
-import numpy as np  # noqa: E402
+import cv2
+import numpy as np
 
-from rollcli.files.encodings import to_disparity  # noqa: E402
-from rollcli.files.formats import decode_stored, encode_stored  # noqa: E402
-from rollcli.imaging.derotate import derotate  # noqa: E402
-from rollcli.imaging.overlay import draw_road  # noqa: E402
-from rollcli.imaging.stereo import StereoOptions, match_pair  # noqa: E402
-from rollcli.imaging.vdisparity import draw_v_disparity, v_disparity  # noqa: E402
-from rollcli.simulate.render import render_frame  # noqa: E402
-from rollcli.simulate.spec import FrameSpec  # noqa: E402
-from tests.making import disparity_map, make_tiff  # noqa: E402
+from rollcli.files.encodings import to_disparity
+from rollcli.files.formats import decode_stored, encode_stored
+from rollcli.imaging.derotate import derotate
+from rollcli.imaging.overlay import draw_road
+from rollcli.imaging.stereo import StereoOptions, match_pair
+from rollcli.imaging.vdisparity import draw_v_disparity, v_disparity
+from rollcli.simulate.render import render_frame
+from rollcli.simulate.spec import FrameSpec
+from tests.making import disparity_map, make_tiff
 
 SIZE = (1242, 375)
 
