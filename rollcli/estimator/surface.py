@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,18 +12,20 @@ from numpy.typing import NDArray
 from rollcli.errors import EstimationError
 from rollcli.estimator.energy import Energy
 from rollcli.estimator.moments import Floats, Grid
+from rollcli.estimator.profile import falls_away
 from rollcli.estimator.road import Road, road_weights
 from rollcli.estimator.sample import UNEVEN_SHARE, Sample, reach_of
 
 _ROUNDS = 6
-_START = 2.0  # tolerances within which a pixel counts at first,
+_START = 2.0  # tolerances within which a pixel counts at first;
 _STRICT = 5.0  # in the end this many standard deviations,
-_EVEN = 0.35
-_LEAST = 0.2  # though not less than this many tolerances
-_POWER = 8
+_NARROW = 3.5  # this many of those in the corridor ahead,
+_EVEN = 0.35  # or three, of a road that deviates by less than this, in tolerances,
+_LEAST = 0.2  # but at least this many tolerances
+_AHEAD = 0.8  # half-width of the corridor ahead, in camera heights
+_SAME = math.radians(0.02)
 _EDGE = 0.65  # half-width of the part of the image that counts; it ends as exp(-(x / _EDGE)^8)
 _STEADY = 0.5  # of the road's own rise: how far that of the map may be off
-_AHEAD = 1e9
 _DROP = 3.0  # farther than this many tolerances from the plane, a pixel is not looked at again
 MIN_PIXELS = 30
 
@@ -104,9 +106,10 @@ class Surface:
 def fit_surface(sample: Sample, road: Road, *, parabolic: bool) -> Surface:
     """Fit the road's parabola and its roll to the pixels near the road's plane.
 
-    Gauss-Newton on (a0, a1, a2, theta) with Tukey's biweight, whose width shrinks from two tolerances to four
-    standard deviations: an even road gets a strict fit that leaves a far kerb outside, a worn one a lenient
-    fit.
+    Gauss-Newton on (a0, a1, a2, theta) with Tukey's biweight, whose width shrinks from two tolerances as far
+    as the pixels' own spread allows. Ground beside the road keeps the fit wide where it is nearly as high.
+    Where that ground falls away or rises from the road's edge like a verge, the spread of the corridor ahead
+    counts instead, which leaves it out.
 
     Parameters
     ----------
@@ -124,61 +127,110 @@ def fit_surface(sample: Sample, road: Road, *, parabolic: bool) -> Surface:
     EstimationError
         When hardly any pixel lies on the road.
     """
-    c0, c1, c2 = road.plane
-    off = (c0 + c1 * sample.x + c2 * sample.y - sample.d) / sample.tolerance
-    near = np.flatnonzero(np.abs(off) < _DROP)
-    x, y, d = (
-        sample.x[near].astype(np.float64),
-        sample.y[near].astype(np.float64),
-        sample.d[near].astype(np.float64),
+    near = _Near.of(sample, road)
+    wide = near.fit(road, parabolic=parabolic, narrow=False)
+    if wide.limit <= _STRICT * _EVEN:
+        return near.surface(wide, sample, road, parabolic=parabolic)
+    narrow = near.fit(road, parabolic=parabolic, narrow=True)
+    verge = abs(narrow.theta - wide.theta) > _SAME and falls_away(
+        near.x, near.y, near.d, near.place > 0.1, narrow.theta, narrow.alpha
     )
-    tolerance = sample.tolerance[near].astype(np.float64)
-    across = x * math.cos(road.theta) + y * math.sin(road.theta)
-    place = np.square(road_weights(sample, road.plane, near)) * np.exp(-((across / _EDGE) ** _POWER))
-    ahead = np.abs(across) * math.hypot(c1, c2) < _AHEAD * d
-    theta, alpha, limit = road.theta, np.array([c0, math.hypot(c1, c2), 0.0]), _START
-    residuals = off[near] * tolerance
-    design = np.empty((5, len(near)))
-    design[0], design[4] = 1, d
-    for _ in range(_ROUNDS):
-        weights = _biweight(residuals, limit * tolerance) * place
+    return near.surface(narrow if verge else wide, sample, road, parabolic=parabolic)
+
+
+class _Fit(NamedTuple):
+    """Roll, parabola, and where the weights end, in tolerances."""
+
+    theta: float
+    alpha: tuple[float, float, float]
+    limit: float
+
+
+@dataclass(frozen=True)
+class _Near:
+    """The pixels near a road's plane, with what stays the same through all fits."""
+
+    x: Floats
+    y: Floats
+    d: Floats
+    tolerance: Floats
+    place: Floats
+    ahead: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, sample: Sample, road: Road) -> _Near:
+        c0, c1, c2 = road.plane
+        off = (c0 + c1 * sample.x + c2 * sample.y - sample.d) / sample.tolerance
+        near = np.flatnonzero(np.abs(off) < _DROP)
+        kept = (sample.x, sample.y, sample.d, sample.tolerance)
+        x, y, d, tolerance = (pixels[near].astype(np.float64) for pixels in kept)
+        across = x * math.cos(road.theta) + y * math.sin(road.theta)
+        place = np.square(road_weights(sample, road.plane, near)) * np.exp(-((across / _EDGE) ** 8))
+        return cls(x, y, d, tolerance, place, np.abs(across) * math.hypot(c1, c2) < _AHEAD * d)
+
+    def fit(self, road: Road, *, parabolic: bool, narrow: bool) -> _Fit:
+        """Start from the road's plane; `narrow`: the corridor ahead tells how wide the weights may be."""
+        c0, c1, c2 = road.plane
+        theta, alpha, limit = road.theta, (float(c0), math.hypot(c1, c2), 0.0), _START
+        design = np.empty((5, len(self.x)))
+        design[0], design[4] = 1, self.d
+        strict = _NARROW if narrow else _STRICT
+        for _ in range(_ROUNDS):
+            weights = self.weights(theta, alpha, limit)
+            cosine, sine = math.cos(theta), math.sin(theta)
+            design[1] = self.y * cosine - self.x * sine
+            design[2] = design[1] * design[1] if parabolic else 0
+            design[3] = -(self.x * cosine + self.y * sine) * (alpha[1] + 2 * alpha[2] * design[1])
+            products = (design * weights) @ design.T
+            normal = products[:4, :4] + np.diag(1e-10 * np.diag(products)[:4] + 1e-300)
+            a0, a1, a2, turned = np.linalg.solve(normal, products[:4, 4])
+            theta, alpha = theta + max(-0.2, min(0.2, float(turned))), (float(a0), float(a1), float(a2))
+            deviation = self._deviation(theta, alpha, weights > 0, narrow=narrow)
+            limit = max(_LEAST, min(limit, (strict if deviation > _EVEN else 3.0) * deviation))
+        return _Fit(theta, alpha, limit)
+
+    def weights(self, theta: float, alpha: tuple[float, float, float], limit: float) -> Floats:
+        """Return the weights, 0 to 1; refuse a surface with hardly a pixel on it."""
+        off = self._off(theta, alpha) / limit
+        inside = np.maximum(0, 1 - off * off)
+        weights: Floats = inside * inside * self.place
         if np.count_nonzero(weights) < MIN_PIXELS:
             raise EstimationError("no road: hardly a pixel lies on the best plane that was found")
-        cosine, sine = math.cos(theta), math.sin(theta)
-        design[1] = y * cosine - x * sine
-        design[2] = design[1] * design[1] if parabolic else 0
-        design[3] = -(x * cosine + y * sine) * (alpha[1] + 2 * alpha[2] * design[1])
-        products = (design * weights) @ design.T
-        normal = products[:4, :4] + np.diag(1e-10 * np.diag(products)[:4] + 1e-300)
-        a0, a1, a2, turned = np.linalg.solve(normal, products[:4, 4])
-        theta, alpha = theta + max(-0.2, min(0.2, turned)), np.array([a0, a1, a2])
-        level = y * math.cos(theta) - x * math.sin(theta)
-        residuals = a0 + level * (a1 + level * a2) - d
-        judged = weights > 0
-        if np.count_nonzero(judged & ahead) >= MIN_PIXELS:
-            judged &= ahead
-        spread = np.abs(residuals[judged]) / tolerance[judged]
+        return weights
+
+    def surface(self, fit: _Fit, sample: Sample, road: Road, *, parabolic: bool) -> Surface:
+        """Return the pixels that a fit leaves, and the fit."""
+        weights = self.weights(*fit)
+        used = weights > 0
+        return Surface(
+            x=self.x[used],
+            y=self.y[used],
+            d=self.d[used],
+            weights=weights[used],
+            theta=fit.theta,
+            alpha=fit.alpha,
+            grid=sample.grid,
+            noise=sample.noise,
+            limit=fit.limit,
+            share=float(np.count_nonzero(used) / len(sample.d)),
+            moved=abs(fit.theta - road.theta),
+            parabolic=parabolic,
+        )
+
+    def _off(self, theta: float, alpha: tuple[float, float, float]) -> Floats:
+        level = self.y * math.cos(theta) - self.x * math.sin(theta)
+        off: Floats = (alpha[0] + level * (alpha[1] + level * alpha[2]) - self.d) / self.tolerance
+        return off
+
+    def _deviation(
+        self, theta: float, alpha: tuple[float, float, float], used: NDArray[np.bool_], *, narrow: bool
+    ) -> float:
+        """Return a robust standard deviation of the pixels used, in tolerances."""
+        if narrow and np.count_nonzero(used & self.ahead) >= MIN_PIXELS:
+            used = used & self.ahead
+        spread = np.abs(self._off(theta, alpha)[used])
         middle = len(spread) // 2
-        deviation = 1.4826 * float(np.partition(spread, middle)[middle])
-        limit = max(_LEAST, min(limit, (_STRICT if deviation > _EVEN else 3.0) * deviation))
-    weights = _biweight(residuals, limit * tolerance) * place
-    used = weights > 0
-    if np.count_nonzero(used) < MIN_PIXELS:
-        raise EstimationError("no road: hardly a pixel lies on the best plane that was found")
-    return Surface(
-        x=x[used],
-        y=y[used],
-        d=d[used],
-        weights=weights[used],
-        theta=theta,
-        alpha=(float(alpha[0]), float(alpha[1]), float(alpha[2])),
-        grid=sample.grid,
-        noise=sample.noise,
-        limit=limit,
-        share=float(np.count_nonzero(used) / len(sample.d)),
-        moved=abs(theta - road.theta),
-        parabolic=parabolic,
-    )
+        return 1.4826 * float(np.partition(spread, middle)[middle])
 
 
 def whole_surface(sample: Sample, energy: Energy) -> Surface:
@@ -199,8 +251,3 @@ def whole_surface(sample: Sample, energy: Energy) -> Surface:
         moved=0.0,
         parabolic=energy.parabolic,
     )
-
-
-def _biweight(residuals: Floats, limits: Floats) -> Floats:
-    scaled: Floats = np.maximum(0, 1 - np.square(residuals / limits))
-    return scaled * scaled
