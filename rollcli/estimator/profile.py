@@ -51,16 +51,17 @@ def falls_away(
     used = used & (road > 0.1 * d)
     height = d[used] / road[used] - 1
     side = (x * math.cos(theta) + y * math.sin(theta))[used] * abs(alpha[1]) / road[used]
-    place = np.floor(side / _BIN).astype(np.int64)
-    return any(_is_verge(_medians(place, height, direction)) for direction in (1, -1))
+    medians = _medians(np.floor(side / _BIN) + _BINS, height)
+    return _is_verge(medians[_BINS:]) or _is_verge(medians[_BINS - 1 :: -1])
 
 
-def _medians(place: NDArray[np.int64], height: Floats, direction: int) -> list[float]:
-    """Return the median height of each bin from the middle outward; NaN where hardly a pixel is."""
-    medians = []
-    for k in range(_BINS):
-        inside = height[place == (k if direction > 0 else -1 - k)]
-        medians.append(float(np.median(inside)) if len(inside) >= _MIN_PIXELS else math.nan)
+def _medians(places: Floats, heights: Floats) -> list[float]:
+    """Return the median height of each bin, left to right; NaN where hardly a pixel is."""
+    order = np.lexsort((heights, places))
+    bounds = np.searchsorted(places[order], np.arange(2 * _BINS + 1))
+    counts = np.diff(bounds)
+    middles = np.minimum(bounds[:-1] + counts // 2, len(order) - 1)
+    medians: list[float] = np.where(counts >= _MIN_PIXELS, heights[order[middles]], math.nan).tolist()
     return medians
 
 

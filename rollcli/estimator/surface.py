@@ -175,8 +175,9 @@ class _Near:
         design = np.empty((5, len(self.x)))
         design[0], design[4] = 1, self.d
         strict = _NARROW if narrow else _STRICT
+        off = self._off(theta, alpha)
         for _ in range(_ROUNDS):
-            weights = self.weights(theta, alpha, limit)
+            weights = self._weights(off, limit)
             cosine, sine = math.cos(theta), math.sin(theta)
             design[1] = self.y * cosine - self.x * sine
             design[2] = design[1] * design[1] if parabolic else 0
@@ -185,22 +186,14 @@ class _Near:
             normal = products[:4, :4] + np.diag(1e-10 * np.diag(products)[:4] + 1e-300)
             a0, a1, a2, turned = np.linalg.solve(normal, products[:4, 4])
             theta, alpha = theta + max(-0.2, min(0.2, float(turned))), (float(a0), float(a1), float(a2))
-            deviation = self._deviation(theta, alpha, weights > 0, narrow=narrow)
+            off = self._off(theta, alpha)
+            deviation = self._deviation(off, weights > 0, narrow=narrow)
             limit = max(_LEAST, min(limit, (strict if deviation > _EVEN else 3.0) * deviation))
         return _Fit(theta, alpha, limit)
 
-    def weights(self, theta: float, alpha: tuple[float, float, float], limit: float) -> Floats:
-        """Return the weights, 0 to 1; refuse a surface with hardly a pixel on it."""
-        off = self._off(theta, alpha) / limit
-        inside = np.maximum(0, 1 - off * off)
-        weights: Floats = inside * inside * self.place
-        if np.count_nonzero(weights) < MIN_PIXELS:
-            raise EstimationError("no road: hardly a pixel lies on the best plane that was found")
-        return weights
-
     def surface(self, fit: _Fit, sample: Sample, road: Road, *, parabolic: bool) -> Surface:
         """Return the pixels that a fit leaves, and the fit."""
-        weights = self.weights(*fit)
+        weights = self._weights(self._off(fit.theta, fit.alpha), fit.limit)
         used = weights > 0
         return Surface(
             x=self.x[used],
@@ -218,17 +211,24 @@ class _Near:
         )
 
     def _off(self, theta: float, alpha: tuple[float, float, float]) -> Floats:
+        """Return road minus disparity in tolerances."""
         level = self.y * math.cos(theta) - self.x * math.sin(theta)
         off: Floats = (alpha[0] + level * (alpha[1] + level * alpha[2]) - self.d) / self.tolerance
         return off
 
-    def _deviation(
-        self, theta: float, alpha: tuple[float, float, float], used: NDArray[np.bool_], *, narrow: bool
-    ) -> float:
+    def _weights(self, off: Floats, limit: float) -> Floats:
+        """Return the weights, 0 to 1; refuse a surface with hardly a pixel on it."""
+        inside = np.maximum(0, 1 - np.square(off / limit))
+        weights: Floats = inside * inside * self.place
+        if np.count_nonzero(weights) < MIN_PIXELS:
+            raise EstimationError("no road: hardly a pixel lies on the best plane that was found")
+        return weights
+
+    def _deviation(self, off: Floats, used: NDArray[np.bool_], *, narrow: bool) -> float:
         """Return a robust standard deviation of the pixels used, in tolerances."""
         if narrow and np.count_nonzero(used & self.ahead) >= MIN_PIXELS:
             used = used & self.ahead
-        spread = np.abs(self._off(theta, alpha)[used])
+        spread = np.abs(off[used])
         middle = len(spread) // 2
         return 1.4826 * float(np.partition(spread, middle)[middle])
 
