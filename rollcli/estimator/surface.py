@@ -27,6 +27,7 @@ _SAME = math.radians(0.02)
 _EDGE = 0.65  # half-width of the part of the image that counts; it ends as exp(-(x / _EDGE)^8)
 _STEADY = 0.5  # of the road's own rise: how far that of the map may be off
 _DROP = 3.0  # farther than this many tolerances from the plane, a pixel is not looked at again
+_PIXELS = 3000  # looked at; more of them would repeat each other
 MIN_PIXELS = 30
 
 
@@ -156,17 +157,21 @@ class _Near:
     tolerance: Floats
     place: Floats
     ahead: NDArray[np.bool_]
+    every: int  # of so many pixels, one
 
     @classmethod
     def of(cls, sample: Sample, road: Road) -> _Near:
         c0, c1, c2 = road.plane
         off = (c0 + c1 * sample.x + c2 * sample.y - sample.d) / sample.tolerance
         near = np.flatnonzero(np.abs(off) < _DROP)
+        every = -(-len(near) // _PIXELS) or 1
+        near = near[::every]
         kept = (sample.x, sample.y, sample.d, sample.tolerance)
         x, y, d, tolerance = (pixels[near].astype(np.float64) for pixels in kept)
         across = x * math.cos(road.theta) + y * math.sin(road.theta)
-        place = np.square(road_weights(sample, road.plane, near)) * np.exp(-((across / _EDGE) ** 8))
-        return cls(x, y, d, tolerance, place, np.abs(across) * math.hypot(c1, c2) < _AHEAD * d)
+        edge = np.square(np.square(np.square(across / _EDGE)))
+        place = np.square(road_weights(sample, road.plane, near)) * np.exp(-edge)
+        return cls(x, y, d, tolerance, place, np.abs(across) * math.hypot(c1, c2) < _AHEAD * d, every)
 
     def fit(self, road: Road, *, parabolic: bool, narrow: bool) -> _Fit:
         """Start from the road's plane; `narrow`: the corridor ahead tells how wide the weights may be."""
@@ -205,7 +210,7 @@ class _Near:
             grid=sample.grid,
             noise=sample.noise,
             limit=fit.limit,
-            share=float(np.count_nonzero(used) / len(sample.d)),
+            share=float(np.count_nonzero(used)) * self.every / len(sample.d),
             moved=abs(fit.theta - road.theta),
             parabolic=parabolic,
         )
