@@ -106,8 +106,8 @@ def from_disparity(
     ----------
     disparity : ndarray, shape (H, W)
         Pixels; NaN, inf and <= 0 are no data, stored as 0 (-16 in sgbm, as OpenCV does).
-    encoding : {"px", "kitti", "cityscapes", "sgbm"}
-        How a number stands for a disparity.
+    encoding : {"auto", "px", "kitti", "cityscapes", "sgbm"}
+        How a number stands for a disparity; auto goes by the dtype.
     dtype : dtype
         Of the result; whole-number types are rounded, but never down to no data.
     scale : float, optional
@@ -115,10 +115,13 @@ def from_disparity(
 
     Raises
     ------
+    UsageError
+        Unknown encoding.
     OutputError
         More than one in a hundred disparities is too large for the dtype. Fewer become no data.
     """
-    used, kind = Encoding(encoding), np.dtype(dtype)
+    kind = np.dtype(dtype)
+    used = resolve_encoding(encoding, kind, scale)
     factor = _SCALE[used] if scale is None else scale
     valid = np.isfinite(disparity) & (disparity > 0)
     first = int(used is Encoding.CITYSCAPES)

@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 
 from rollcli.errors import InputError, UsageError
 from rollcli.files import npy, pfm, pictures, png, tiff
-from rollcli.files.stored import Stored, native
-
-__all__ = ["Stored", "decode_stored", "encode_stored", "read_bytes", "read_image", "read_stored"]
+from rollcli.files.stored import Stored as Stored
+from rollcli.files.stored import native
 
 _MAX_BYTES = 2**32
 _KNOWN = {
@@ -28,10 +27,7 @@ _KNOWN = {
     b"%PDF": "a PDF document",
     b"\x1f\x8b": "a gzip file",
     b"\x89HDF": "an HDF5 file",
-    b"\x80\x02": "a Python pickle, which is never loaded",
-    b"\x80\x03": "a Python pickle, which is never loaded",
-    b"\x80\x04": "a Python pickle, which is never loaded",
-    b"\x80\x05": "a Python pickle, which is never loaded",
+    **dict.fromkeys((b"\x80\x02", b"\x80\x03", b"\x80\x04", b"\x80\x05"), "a pickle, which is never loaded"),
 }
 _TEXT = re.compile(rb"[\t\n\r\f\x20-\x7e]{8}")  # no format begins with eight printable characters
 
@@ -61,14 +57,11 @@ def read_bytes(path: str | Path, name: str | None = None) -> bytes:
         dangling = Path(path).is_symlink()
         raise InputError(f"{name}: {'is a link to nothing' if dangling else 'no such file'}") from None
     except (OSError, ValueError) as error:
-        raise InputError(f"{name}: cannot be read: {_lowered(error)}") from None
+        reason = str(getattr(error, "strerror", None) or error).lower()
+        raise InputError(f"{name}: cannot be read: {reason}") from None
     if not data:
         raise InputError(f"{name}: is empty")
     return data
-
-
-def _lowered(error: OSError | ValueError) -> str:
-    return str(getattr(error, "strerror", None) or error).lower()
 
 
 def read_stored(path: str | Path, name: str | None = None) -> Stored:
@@ -156,8 +149,9 @@ def decode_image(data: bytes, name: str) -> NDArray[Any]:
 
 
 def decode_mask(data: bytes, name: str) -> NDArray[np.bool_]:
-    """A mask from any map or PNG file: True where any colour is non-zero; shape (H, W)."""
-    pixels = png.picture(data, name) if data.startswith(png.SIGNATURE) else _decoded(data, name).values
+    """A mask from a map, or a picture that is no JPEG: True where any colour is non-zero; shape (H, W)."""
+    drawn = data.startswith((png.SIGNATURE, *pictures.LOSSLESS))
+    pixels = decode_image(data, name) if drawn else _decoded(data, name).values
     mask: NDArray[np.bool_] = (pixels if pixels.ndim == 2 else pixels.max(axis=2)) != 0
     return mask
 

@@ -201,6 +201,8 @@ def _arguments(
 
 def _stdin_lines(stdin: Iterable[str] | None) -> Iterator[str]:
     if stdin is None:
+        if sys.stdin is None:
+            raise UsageError("-: stdin is closed; nothing can be read from it")
         return _lines(sys.stdin.buffer.read())
     return (name for line in stdin if (name := line.rstrip("\r\n")))
 

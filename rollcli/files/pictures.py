@@ -11,7 +11,8 @@ from rollcli.errors import InputError
 from rollcli.files.quiet import decoding
 from rollcli.files.stored import PICTURE_FLAGS, native, require_decoded_fits
 
-SIGNATURES = (b"\xff\xd8\xff", b"BM", b"P5", b"P6")
+LOSSLESS = (b"BM", b"P5", b"P6")
+SIGNATURES = (b"\xff\xd8\xff", *LOSSLESS)
 _GAP = rb"(?:\s|#[^\n]*\n)+"
 _PNM = re.compile(rb"P([56])" + 2 * (_GAP + rb"(\d{1,9})") + _GAP + rb"(\d{1,5})\s")
 

@@ -52,6 +52,8 @@ class Search:
         UsageError
             A folder cannot be read or is one of `skip`, or a folder or pattern holds nothing.
         """
+        if not argument:
+            raise UsageError("an input has an empty name: is a variable unset?")
         path = Path(argument)
         if path.is_dir():
             return self._wanted(argument, self._in_folder(path), "folder")

@@ -78,7 +78,7 @@ def picture(data: bytes, name: str) -> NDArray[Any]:
 
 
 def encode_tiff(values: NDArray[Any], nodata: tuple[float, ...] = ()) -> bytes:
-    """A Deflate-compressed single-page TIFF file of any real dtype."""
+    """A single-page TIFF file of any real dtype; not compressed, so that its bytes depend on no library."""
     import tifffile
 
     tags = [(_GDAL_NODATA, "s", 0, f"{nodata[0]:.17g}", True)] if nodata else []
@@ -89,7 +89,6 @@ def encode_tiff(values: NDArray[Any], nodata: tuple[float, ...] = ()) -> bytes:
         photometric="minisblack",
         metadata=None,
         software=False,
-        compression="zlib",
         extratags=tags,
     )
     return buffer.getvalue()

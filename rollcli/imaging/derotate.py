@@ -123,8 +123,9 @@ def _centred(shape: tuple[int, int]) -> tuple[NDArray[np.float64], NDArray[np.fl
 def _validity(values: NDArray[Any], invalid: Iterable[float]) -> NDArray[np.bool_]:
     valid: NDArray[np.bool_] = np.isfinite(values) & (values > 0)
     saturated = [np.iinfo(values.dtype).max] if values.dtype in (np.uint16, np.int16) else []
-    for value in (*invalid, *saturated):
-        valid &= values != value
+    with np.errstate(over="ignore"):  # a value may lie beyond what the dtype holds
+        for value in (*invalid, *saturated):
+            valid &= values != value
     return valid
 
 

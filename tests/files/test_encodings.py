@@ -1,9 +1,10 @@
 """Stored numbers become pixels, and no data becomes 0, whatever a file calls it."""
 
+import cv2
 import numpy as np
 import pytest
 
-from rollcli.errors import OutputError, UsageError
+from rollcli.errors import InputError, OutputError, UsageError
 from rollcli.files.encodings import Encoding, from_disparity, read_disparity, read_mask, to_disparity
 from rollcli.files.formats import Stored, encode_stored
 from tests.making import disparity_map, make_png, make_tiff
@@ -138,6 +139,13 @@ def test_pixels_survive_the_way_there_and_back(encoding, dtype):
     np.testing.assert_allclose(again, disparity, atol=1 / 30)
 
 
+def test_storing_too_goes_by_the_type_and_knows_its_encodings():
+    assert from_disparity(np.array([[2.0]]), "auto", "u2").tolist() == [[512]]
+    assert from_disparity(np.array([[2.0]]), "auto", "i2").tolist() == [[32]]
+    with pytest.raises(UsageError, match="'middlebury' is unknown"):
+        from_disparity(np.array([[2.0]]), "middlebury")
+
+
 def test_no_data_is_stored_as_each_encoding_has_it():
     empty = np.array([[0, -1, np.nan, np.inf, 2]])
 
@@ -174,6 +182,11 @@ def test_masks_of_maps_and_images_are_read(tmp_path):
     mask = np.eye(4, dtype=np.uint8)
     (tmp_path / "a.png").write_bytes(make_png(mask, 8))
     (tmp_path / "b.tif").write_bytes(make_tiff(mask.astype(np.float32)))
+    (tmp_path / "c.bmp").write_bytes(cv2.imencode(".bmp", mask * 255)[1].tobytes())
+    (tmp_path / "d.pgm").write_bytes(cv2.imencode(".pgm", mask)[1].tobytes())
+    (tmp_path / "e.jpg").write_bytes(cv2.imencode(".jpg", mask)[1].tobytes())
 
-    assert read_mask(tmp_path / "a.png").tolist() == mask.astype(bool).tolist()
-    assert read_mask(tmp_path / "b.tif").tolist() == mask.astype(bool).tolist()
+    for name in ("a.png", "b.tif", "c.bmp", "d.pgm"):
+        assert read_mask(tmp_path / name).tolist() == mask.astype(bool).tolist()
+    with pytest.raises(InputError, match="is a JPEG image"):  # its zeros are not all zero
+        read_mask(tmp_path / "e.jpg")

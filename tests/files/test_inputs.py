@@ -208,6 +208,21 @@ def test_what_gives_nothing_is_named(here, inputs, reason):
         find_inputs(inputs, stdin=[])
 
 
+def test_an_empty_name_is_not_the_working_folder(here):
+    here("f1.png")
+
+    with pytest.raises(UsageError, match="empty name"):
+        find_inputs([""])
+
+
+def test_a_closed_stdin_is_named(here, monkeypatch):
+    here("f1.png")
+    monkeypatch.setattr(sys, "stdin", None)
+
+    with pytest.raises(UsageError, match="stdin is closed"):
+        find_inputs(["-"])
+
+
 def test_a_list_that_cannot_be_read_is_named(here):
     here("maps/f1.png")
 

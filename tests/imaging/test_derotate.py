@@ -156,6 +156,12 @@ def test_further_values_are_no_data():
     assert set(np.unique(level)) == {0, 50}
 
 
+def test_a_value_beyond_the_type_is_no_trouble():
+    values = np.full(SHAPE, 50, np.float16)
+
+    assert (derotate(values, 0.1, invalid=[1e30, -3.4e38]) > 0).any()
+
+
 @pytest.mark.parametrize("roll_deg", [3, 30, -60, 90])
 def test_an_enlarged_result_keeps_the_corners_and_the_centre(roll_deg):
     theta = math.radians(roll_deg)
