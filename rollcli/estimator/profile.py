@@ -66,14 +66,13 @@ def _medians(places: Floats, heights: Floats) -> list[float]:
 
 
 def _is_verge(heights: list[float]) -> bool:
-    """Judge the first three bins that are off the road."""
-    for first in range(2, len(heights) - 1):
+    """Judge the first three bins that are off the road, from the middle outward."""
+    for first in range(2, len(heights) - 2):
         beside = heights[first : first + 3]
-        if not abs(beside[0]) > _LEVEL or any(map(math.isnan, beside[:2])):
+        if not abs(beside[0]) > _LEVEL or any(map(math.isnan, beside)):
             continue
-        known = [h for h in beside if not math.isnan(h)]
-        rise = (known[-1] - known[0]) / (len(known) - 1)
+        rise = (beside[2] - beside[0]) / 2
         edge = heights[first - 1]
-        jump = known[0] - (0.0 if math.isnan(edge) else edge)
+        jump = beside[0] - (0.0 if math.isnan(edge) else edge)
         return abs(rise) > _SLOPE * _BIN and jump * rise > 0 and abs(jump) < _STEP * abs(rise)
     return False
