@@ -130,10 +130,10 @@ def _effective(plan: Plan, options: EstimateOptions) -> dict[str, Any]:
         "timing": options.result.timing,
         "shard": "/".join(map(str, options.result.shard)),
     }
-    return {_NAMES.get(key, key).replace("_", "-"): value for key, value in values.items()}
+    return {OPTION_NAMES.get(key, key).replace("_", "-"): value for key, value in values.items()}
 
 
-_NAMES = {"tolerance_deg": "tolerance", "max_roll_deg": "max-roll", "mode": "sgbm-mode"}
+OPTION_NAMES = {"tolerance_deg": "tolerance", "max_roll_deg": "max-roll", "mode": "sgbm-mode"}
 
 
 def _fingerprint(frames: list[Frame]) -> dict[str, Any]:

@@ -32,7 +32,7 @@ class Command(click.Command):
     Parameters
     ----------
     examples : sequence of (str, str)
-        What for, and the command line.
+        What for, and the command line; several lines are steps.
     """
 
     def __init__(self, *args: Any, examples: Sequence[tuple[str, str]] = (), **attributes: Any) -> None:
@@ -52,9 +52,9 @@ class Command(click.Command):
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         if self.examples:
             with formatter.section("Examples"):
-                for purpose, line in self.examples:
-                    formatter.write(f"{'':>{formatter.current_indent}}# {purpose}\n")
-                    formatter.write(f"{'':>{formatter.current_indent}}{line}\n")
+                for purpose, steps in self.examples:
+                    for line in (f"# {purpose}", *steps.splitlines()):
+                        formatter.write(f"{'':>{formatter.current_indent}}{line}\n")
         with formatter.section("Environment"):
             formatter.write_text(
                 f"Each option also reads {ctx.auto_envvar_prefix}_<OPTION>; flags win over it."

@@ -103,10 +103,10 @@ simulate_options = record(
     examples=[
         (
             "Render, estimate, and compare with the truth",
-            "rollcli simulate rig/ --frames 200 --size 1280x720 --focal 700 --baseline 0.3 --height 1.4",
+            "rollcli simulate rig/ --frames 200 --size 1280x720 --focal 700 --baseline 0.3 --height 1.4\n"
+            "rollcli estimate --left rig/left --right rig/right -o rig/rolls.csv\n"
+            "rollcli evaluate accuracy rig/rolls.csv --truth rig/truth.csv",
         ),
-        ("", "rollcli estimate --left rig/left --right rig/right -o rig/rolls.csv"),
-        ("", "rollcli evaluate accuracy rig/rolls.csv --truth rig/truth.csv"),
     ]
 )
 @click.argument("folder", metavar="DIR", type=PATH)

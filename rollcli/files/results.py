@@ -41,6 +41,7 @@ class Row:
     elapsed_ms: float | None = None
 
 
+STATUSES = ("ok", "suspect", "error")
 TIMING = "elapsed_ms"
 COLUMNS = tuple(field.name for field in fields(Row) if field.name != TIMING)
 _REQUIRED = ("file", "status", "roll_deg")
@@ -205,6 +206,8 @@ _COUNTS = {"iterations", "width", "height"}
 
 def _value(name: str, value: Any, where: str) -> Any:
     """The value of a column from its text (CSV) or JSON value."""
+    if name == "status" and value not in STATUSES:
+        raise InputError(f"{where}: {value!r} is no status: {', '.join(STATUSES)}")
     if name not in _DIGITS and name not in _FLAGS and name not in _COUNTS:
         return "" if value is None else str(value)
     if value is None or value == "":
@@ -212,6 +215,12 @@ def _value(name: str, value: Any, where: str) -> Any:
     try:
         if name in _FLAGS:
             return {"true": True, "false": False}[str(value).lower()]
-        return int(value) if name in _COUNTS else float(value)
-    except (KeyError, ValueError, TypeError) as error:
+        return int(value) if name in _COUNTS else _finite(float(value))
+    except (KeyError, ValueError, TypeError, OverflowError) as error:
         raise InputError(f"{where}: {value!r} is no value for {name}") from error
+
+
+def _finite(number: float) -> float:
+    if not math.isfinite(number):
+        raise ValueError(number)
+    return number

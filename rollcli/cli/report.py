@@ -1,0 +1,68 @@
+"""`rollcli report`: a result to look at."""
+
+from typing import Any
+
+import click
+
+from rollcli.cli.command import command, option
+from rollcli.cli.config import config_option
+from rollcli.cli.options import PATH, running_options
+from rollcli.cli.types import Number
+from rollcli.report.options import GALLERY, ReportOptions
+
+
+@command(
+    examples=[
+        (
+            "A page from a result; pictures are made from the maps that it names",
+            "rollcli report rolls.csv -o rolls.html",
+        ),
+        (
+            "Pictures as estimate wrote them",
+            "rollcli estimate maps/ -o out/rolls.csv --derotated out/upright --vdisparity out/vdisparity\n"
+            "rollcli report out/rolls.csv --images out -o out/rolls.html",
+        ),
+    ]
+)
+@click.argument("result", type=PATH)
+@option(
+    "-o",
+    "--output",
+    type=PATH,
+    metavar="FILE.html",
+    required=True,
+    section="Page",
+    help="Where the page goes.",
+)
+@option("--title", metavar="TEXT", section="Page", help="Its heading.  [default: what it is about]")
+@option(
+    "--images",
+    type=PATH,
+    metavar="DIR",
+    section="Page",
+    help="Take pictures from here: the folder of the folders that estimate wrote images to, or one of "
+    "these.  [default: make them from the inputs]",
+)
+@option(
+    "--gallery",
+    type=Number("N", at_least=0, whole=True),
+    default=GALLERY,
+    section="Page",
+    help="How many frames to show in pictures: the widest intervals, suspect ones, and some evenly spread.",
+)
+@running_options
+@config_option
+@click.pass_context
+def report(ctx: click.Context, /, **options: Any) -> None:
+    """Make an HTML page of RESULT, which `rollcli estimate` wrote as CSV or JSON Lines.
+
+    It shows the roll over the frames with its 95 % interval, suspect and failed frames marked; how often
+    each roll occurs; a summary; and a gallery of maps before and after de-rotation with their v-disparity
+    images. One file that opens from disk without a network.
+
+    Files are looked for where the result's names say, from here or from the result's folder. The page needs
+    the extra: pip install "rollcli[report]".
+    """
+    from rollcli.report.run import make_report
+
+    ctx.exit(make_report(ReportOptions(**options)))

@@ -1,0 +1,92 @@
+"""What the page of a report shows, ready to be printed by its template."""
+
+import base64
+from collections.abc import Sequence
+from typing import Any
+
+from rollcli import __version__
+from rollcli.files.results import Result, Row
+from rollcli.report.choice import SPREAD, SUSPECT, WIDEST, Choice
+from rollcli.report.histogram import histogram
+from rollcli.report.options import ReportOptions
+from rollcli.report.page import render_page
+from rollcli.report.pictures import Pictures
+from rollcli.report.roll_chart import roll_chart
+from rollcli.report.summary import degrees, option_lines, summarize
+from rollcli.report.view import outside
+
+_LISTED = 100  # doubtful frames on the page; the result has all
+
+
+def report_page(result: Result, options: ReportOptions, shown: Sequence[tuple[Choice, Pictures]]) -> bytes:
+    """The page, HTML, UTF-8."""
+    rows, summary = result.rows, summarize(result.rows)
+    doubtful = sorted(
+        ((number, row) for number, row in enumerate(rows, 1) if row.status != "ok"),
+        key=lambda each: each[1].status,  # errors before suspects
+    )
+    return render_page(
+        "rollcli.report",
+        "report.html",
+        title=options.title or f"Roll of {_frames(len(rows))}",
+        result=options.result,
+        version=(result.run or {}).get("rollcli"),
+        page_version=__version__,
+        summary=summary,
+        degrees=degrees,
+        options=option_lines(result.run),
+        encodings=(result.run or {}).get("encoding") or [],
+        roll_chart=roll_chart(rows),
+        histogram=histogram(rows) if summary.median is not None else None,
+        outside=outside(rows),
+        doubtful=doubtful[:_LISTED],
+        more_doubtful=max(0, len(doubtful) - _LISTED),
+        gallery=[_card(rows, choice, pictures) for choice, pictures in shown],
+        chosen=_chosen_text(rows, [choice for choice, _ in shown]),
+    )
+
+
+def _frames(count: int) -> str:
+    return f"{count:,} frame" + ("" if count == 1 else "s")
+
+
+def _chosen_text(rows: Sequence[Row], choices: Sequence[Choice]) -> str:
+    """Which frames the gallery shows, in words."""
+    angled = sum(row.roll_deg is not None for row in rows)
+    if len(choices) in (0, angled):
+        return "Every frame that has an angle."
+    counts = {reason: sum(each.reason == reason for each in choices) for reason in (WIDEST, SUSPECT, SPREAD)}
+    parts = {
+        WIDEST: "the {} with the widest interval",
+        SUSPECT: "{} of the other suspect ones",
+        SPREAD: "{} evenly spread over the rest",
+    }
+    words = [parts[reason].format(count) for reason, count in counts.items() if count]
+    listed = " and ".join(filter(None, [", ".join(words[:-1]), words[-1]]))
+    return f"{len(choices)} of {_frames(angled)} that have an angle: {listed}."
+
+
+def _card(rows: Sequence[Row], choice: Choice, pictures: Pictures) -> dict[str, Any]:
+    row, aspect = rows[choice.place], pictures.aspect
+    roll = degrees(row.roll_deg, 3)
+    beside = min(max(0.28 * aspect, 0.5), 1.2)  # of a v-disparity: room for its numbers, and no more
+    return {
+        "number": choice.place + 1,
+        "row": row,
+        "reason": choice.reason,
+        "missing": pictures.missing,
+        "pairs": [
+            [
+                ("Map", "map", _data_uri(pictures.map), aspect),
+                ("v-disparity", "v-disparity of the map", _data_uri(pictures.map_counts), beside),
+            ],
+            [
+                (f"De-rotated by {roll}", f"map de-rotated by {roll}", _data_uri(pictures.level), aspect),
+                ("v-disparity", "v-disparity once de-rotated", _data_uri(pictures.level_counts), beside),
+            ],
+        ],
+    }
+
+
+def _data_uri(data: bytes | None) -> str | None:
+    return None if data is None else "data:image/webp;base64," + base64.b64encode(data).decode()

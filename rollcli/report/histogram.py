@@ -1,0 +1,50 @@
+"""How often each roll occurs."""
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from rollcli.files.results import Row
+from rollcli.report.page import Chart
+from rollcli.report.summary import degrees
+from rollcli.report.view import view
+
+_BINS = 40
+_ROUND = (1, 2, 2.5, 5, 10)
+
+
+def histogram(rows: Sequence[Row]) -> Chart:
+    """How many frames have which roll, suspect ones on top of the others."""
+    low, high = view(rows)
+    step = _step((high - low) / _BINS)
+    edges = np.arange(math.floor(low / step), math.ceil(high / step) + 1) * step
+    spans = [f"{degrees(start, 3)} to {degrees(end, 3)}" for start, end in pairwise(edges.tolist())]
+    data = []
+    for status, colour in (("ok", "@c1"), ("suspect", "@suspect")):
+        rolls = [row.roll_deg for row in rows if row.roll_deg is not None and row.status == status]
+        bars = {
+            "type": "bar",
+            "name": status,
+            "x": np.round(edges[:-1] + step / 2, 6).tolist(),
+            "y": np.histogram(rolls, edges)[0].tolist(),
+            "width": step,
+            "marker": {"color": colour, "line": {"color": "@card", "width": 1}},
+            "customdata": spans,
+            "hovertemplate": "%{customdata}<br>%{y} frames<extra></extra>",
+        }
+        data += [bars] if rolls else []
+    layout = {
+        "barmode": "stack",
+        "showlegend": len(data) > 1,
+        "xaxis": {"title": {"text": "roll, degrees"}, "range": [low, high], "zeroline": False},
+        "yaxis": {"title": {"text": "frames"}, "rangemode": "tozero"},
+    }
+    return Chart("histogram", "How many frames have which roll", data, layout)
+
+
+def _step(least: float) -> float:
+    """The next round number: 1, 2, 2.5 or 5 times a power of ten."""
+    power = 10.0 ** math.floor(math.log10(least))
+    return next(each * power for each in _ROUND if each * power >= least * (1 - 1e-9))

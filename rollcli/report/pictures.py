@@ -1,0 +1,124 @@
+"""The pictures of a frame: its map and the map de-rotated, each with its v-disparity image."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from rollcli.batch.faults import FAULTS
+from rollcli.batch.options import FrameOptions
+from rollcli.batch.source import read_source
+from rollcli.errors import InputError
+from rollcli.files.encodings import read_disparity, to_disparity
+from rollcli.files.formats import read_image, read_stored
+from rollcli.imaging.derotate import derotate
+from rollcli.imaging.overlay import draw_disparity
+from rollcli.imaging.vdisparity import draw_v_disparity, row_offset, v_disparity
+from rollcli.report.sources import Subject
+
+# small enough that a page with a dozen frames opens at once, large enough to see a stripe of noise
+_WIDEST, _MOST_BINS, _QUALITY = 1280, 320, 82
+
+Made = TypeVar("Made")
+
+
+@dataclass(frozen=True)
+class Pictures:
+    """WebP files of a frame; where there is no map to show, `missing` says why."""
+
+    map: bytes | None = None
+    map_counts: bytes | None = None
+    level: bytes | None = None
+    level_counts: bytes | None = None
+    aspect: float = 2.0  # width by height of the map
+    missing: str = ""
+
+    @property
+    def empty(self) -> bool:
+        """There is nothing to show at all."""
+        return self.map is self.level is self.level_counts is None
+
+
+def take_pictures(subject: Subject, options: FrameOptions) -> Pictures:
+    """Take what can be taken: from the images of the subject, else from its map or pair."""
+    disparity, missing = _attempt(lambda: _map(subject, options))
+    level, _ = _attempt(lambda: _level(subject, disparity, options))
+    counts, _ = _attempt(lambda: _level_counts(subject, disparity, level))
+    shown = disparity if disparity is not None else level
+    return Pictures(
+        map=None if disparity is None else _encoded(draw_disparity(disparity)),
+        map_counts=None if disparity is None else _encoded(_counts(disparity, disparity)),
+        level=None if level is None else _encoded(draw_disparity(level)),
+        level_counts=None if counts is None else _encoded(counts),
+        aspect=2.0 if shown is None else round(shown.shape[1] / shown.shape[0], 4),
+        missing=missing,
+    )
+
+
+def no_pictures(_: Subject, reason: str) -> Pictures:
+    """Those of a frame whose worker died."""
+    return Pictures(missing=reason)
+
+
+def _attempt(make: Callable[[], Made]) -> tuple[Made | None, str]:
+    try:
+        return make(), ""
+    except FAULTS as error:
+        return None, str(error) or type(error).__name__
+
+
+def _map(subject: Subject, options: FrameOptions) -> NDArray[Any]:
+    if "disparity" in subject.images:
+        return read_disparity(subject.images["disparity"])
+    return read_source(subject.frame, options).disparity
+
+
+def _level(subject: Subject, disparity: NDArray[Any] | None, options: FrameOptions) -> NDArray[Any]:
+    """The map de-rotated: as `estimate` wrote it, else made."""
+    if "derotated" in subject.images:
+        stored, given = read_stored(subject.images["derotated"]), options.encoding
+        encoding = "auto" if subject.frame.right_file else given.encoding
+        return to_disparity(stored, encoding=encoding, scale=given.scale, invalid=given.invalid).disparity
+    return derotate(_required(disparity), subject.theta)
+
+
+def _level_counts(
+    subject: Subject, disparity: NDArray[Any] | None, level: NDArray[Any] | None
+) -> NDArray[Any]:
+    if "vdisparity" in subject.images:
+        return read_image(subject.images["vdisparity"])
+    level = _required(level)
+    height, width = level.shape
+    scale = level if disparity is None else disparity
+    return _counts(level, scale, subject.alpha, row_offset(subject.theta, width, height))
+
+
+def _counts(
+    disparity: NDArray[Any],
+    scale: NDArray[Any],
+    alpha: tuple[float, float, float] | None = None,
+    offset: float = 0.0,
+) -> NDArray[Any]:
+    """The picture of the v-disparity, from 0 to the largest disparity of `scale`: two are comparable."""
+    histogram = v_disparity(scale)
+    bins = min(histogram.counts.shape[1], _MOST_BINS)
+    counted = v_disparity(disparity, bins=bins, max_disparity=histogram.max_disparity)
+    return draw_v_disparity(counted, alpha, offset)
+
+
+def _required(made: NDArray[Any] | None) -> NDArray[Any]:
+    if made is None:
+        raise InputError("there is no map to make it from")
+    return made
+
+
+def _encoded(picture: NDArray[Any]) -> bytes:
+    height, width = picture.shape[:2]
+    if width > _WIDEST:
+        size = (_WIDEST, max(1, round(height * _WIDEST / width)))
+        picture = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
+    _, data = cv2.imencode(".webp", np.ascontiguousarray(picture), [cv2.IMWRITE_WEBP_QUALITY, _QUALITY])
+    return data.tobytes()

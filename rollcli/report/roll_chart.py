@@ -1,0 +1,123 @@
+"""The roll over the frames."""
+
+import html
+from collections.abc import Sequence
+from typing import Any
+
+from rollcli.files.results import Row
+from rollcli.report.page import Chart
+from rollcli.report.summary import degrees
+from rollcli.report.view import view
+
+_MANY = 400  # up to so many frames each has a dot, and marks are large
+_LONGEST_NAME = 44  # in a hover label, so that it fits a narrow screen
+_FAILED_AT = 0.035  # of the chart's height
+
+Numbered = Sequence[tuple[int, Row]]
+
+
+def roll_chart(rows: Sequence[Row]) -> Chart:
+    """The roll of each frame: a line, its interval as a band, suspect and failed frames marked."""
+    numbered = list(enumerate(rows, 1))
+    suspect = [each for each in numbered if each[1].status == "suspect"]
+    failed = [each for each in numbered if each[1].status == "error"]
+    line = [each for each in numbered if each[1].status != "suspect"]
+    data = [_band(line), _line(line)]
+    data += [_suspect(suspect)] if suspect else []
+    data += [_failed(failed)] if failed else []
+    for trace in data:
+        trace["marker"] = {"size": 8 if len(rows) <= _MANY else 6, **trace.get("marker", {})}
+    margin = max(0.5, 0.01 * len(rows))
+    layout = {
+        "hovermode": "closest",
+        "hoverdistance": -1,
+        "xaxis": {"title": {"text": "frame"}, "range": [1 - margin, len(rows) + margin], "zeroline": False},
+        "yaxis": {"title": {"text": "roll, degrees"}, "range": list(view(rows)), "zeroline": True},
+        "yaxis2": {"overlaying": "y", "range": [0, 1], "visible": False, "fixedrange": True},
+    }
+    what = (
+        f"Roll in degrees over {len(rows)} frames; {len(suspect)} suspect and {len(failed)} failed are marked"
+    )
+    return Chart("roll", what, data, layout)
+
+
+def _line(numbered: Numbered) -> dict[str, Any]:
+    """Broken where frames have failed."""
+    return {
+        "mode": "lines+markers" if len(numbered) <= _MANY else "lines",
+        "name": "roll",
+        "line": {"color": "@c1", "width": 1.5},
+        "marker": {"color": "@c1", "size": 5},
+        **_points(numbered),
+    }
+
+
+def _suspect(numbered: Numbered) -> dict[str, Any]:
+    widths = [row.roll_ci95_deg or 0.0 for _, row in numbered]
+    return {
+        "mode": "markers",
+        "name": "suspect",
+        "marker": {"color": "@suspect", "symbol": "diamond"},
+        "error_y": {"type": "data", "array": widths, "color": "@suspect", "thickness": 1, "width": 0},
+        **_points(numbered),
+    }
+
+
+def _failed(numbered: Numbered) -> dict[str, Any]:
+    """Along the lower edge, since they have no angle."""
+    cross = {"color": "@error", "symbol": "x-thin", "line": {"color": "@error", "width": 2}}
+    points = {**_points(numbered), "y": [_FAILED_AT] * len(numbered), "yaxis": "y2"}
+    return {"mode": "markers", "name": "failed", "marker": cross, **points}
+
+
+def _points(numbered: Numbered) -> dict[str, Any]:
+    return {
+        "type": "scatter",
+        "x": [number for number, _ in numbered],
+        "y": [row.roll_deg for _, row in numbered],
+        "customdata": [_described(row) for _, row in numbered],
+        "hovertemplate": "%{customdata}<extra></extra>",
+    }
+
+
+def _band(numbered: Numbered) -> dict[str, Any]:
+    """One polygon for each stretch of frames that have an interval; None parts them."""
+    x: list[int | None] = []
+    y: list[float | None] = []
+    for stretch in _stretches(numbered):
+        along = [number for number, _ in stretch]
+        ends = [((row.roll_deg or 0.0), (row.roll_ci95_deg or 0.0)) for _, row in stretch]
+        x += [*along, *reversed(along), None]
+        y += [round(roll + half, 4) for roll, half in ends]
+        y += [*(round(roll - half, 4) for roll, half in reversed(ends)), None]
+    return {
+        "type": "scatter",
+        "mode": "lines",
+        "name": "95 % interval",
+        "x": x,
+        "y": y,
+        "fill": "toself",
+        "fillcolor": "@band",
+        "line": {"color": "@band", "width": 1},  # a frame alone is seen too
+        "hoverinfo": "skip",
+    }
+
+
+def _stretches(numbered: Numbered) -> list[list[tuple[int, Row]]]:
+    stretches: list[list[tuple[int, Row]]] = [[]]
+    for number, row in numbered:
+        if row.roll_ci95_deg is not None:
+            stretches[-1].append((number, row))
+        elif stretches[-1]:
+            stretches.append([])
+    return [stretch for stretch in stretches if stretch]
+
+
+def _described(row: Row) -> str:
+    """What a hover label says; plotly takes tags and entities in it for its own."""
+    name = row.file if len(row.file) <= _LONGEST_NAME else f"…{row.file[1 - _LONGEST_NAME :]}"
+    if row.roll_deg is None:
+        return f"{html.escape(name)}<br>failed"
+    interval = "" if row.roll_ci95_deg is None else f" ± {degrees(row.roll_ci95_deg, 3, sign=False)}"
+    doubt = "<br>suspect" if row.status == "suspect" else ""
+    return f"{html.escape(name)}<br>{degrees(row.roll_deg, 3)}{interval}{doubt}"

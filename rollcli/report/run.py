@@ -1,0 +1,106 @@
+"""`rollcli report`: a result to one HTML page."""
+
+import contextlib
+from collections.abc import Sequence
+from functools import partial
+from typing import TYPE_CHECKING
+
+from rollcli.batch.checks import check_inputs_are_kept, check_nothing_is_there
+from rollcli.batch.dry_run import list_files
+from rollcli.batch.local import done_locally
+from rollcli.batch.options import EncodingOptions, FrameOptions
+from rollcli.batch.recorded import recorded_options
+from rollcli.batch.report import FRAMES_FAILED, INTERRUPTED, Report
+from rollcli.batch.signals import stop_on_signals
+from rollcli.batch.workers import Work
+from rollcli.errors import InputError
+from rollcli.files.atomic import write_atomic
+from rollcli.files.results import Result, read_result, run_path
+from rollcli.report.choice import Choice, choose
+from rollcli.report.options import ReportOptions
+from rollcli.report.page import require_extra
+from rollcli.report.sources import Subject, subjects
+
+if TYPE_CHECKING:
+    from rollcli.report.pictures import Pictures
+
+_REASONS = 3  # how many are told
+
+
+def make_report(options: ReportOptions) -> int:
+    """Write the page.
+
+    Parameters
+    ----------
+    options : ReportOptions
+
+    Returns
+    -------
+    int
+        The exit status: 0, 3 when pictures are missing, 130 when interrupted.
+
+    Raises
+    ------
+    UsageError, InputError
+        Exit status 2.
+    OutputError
+        Exit status 1.
+    """
+    require_extra("report")
+    result = read_result(options.result)
+    if not result.rows:
+        raise InputError(f"{options.result}: has no rows: there is nothing to report")
+    recorded = recorded_options(result.run, str(run_path(options.result)))
+    chosen = choose(result.rows, options.gallery)
+    rows = [result.rows[each.place] for each in chosen]
+    found = subjects(rows, options.result, options.images, recorded.images)
+    reads = [
+        options.result,
+        *(path for each in found for path in (*each.frame.reads(), *each.images.values())),
+    ]
+    check_inputs_are_kept(reads, [options.output])
+    if not options.running.overwrite:
+        check_nothing_is_there([options.output])
+    if options.running.dry_run:
+        list_files([(reads, [options.output])])
+        return 0
+    return _write(options, result, chosen, found, recorded)
+
+
+def _write(
+    options: ReportOptions,
+    result: Result,
+    chosen: Sequence[Choice],
+    found: Sequence[Subject],
+    recorded: FrameOptions,
+) -> int:
+    from rollcli.report.content import report_page
+
+    report = Report(len(found), options.running, EncodingOptions())
+    pictures = _take(found, recorded, options.running.jobs)
+    if len(pictures) < len(found):
+        report.say("interrupted; nothing is written")
+        return INTERRUPTED
+    page = report_page(result, options, list(zip(chosen, pictures, strict=True)))
+    write_atomic(options.output, page)
+    missing = [each.missing for each in pictures if each.empty]
+    for reason in missing[:_REASONS]:
+        report.say(f"no picture of {reason}")
+    if missing:
+        report.say(
+            f"{len(missing)} of {len(pictures)} frames lack pictures: run where estimate ran, name what it "
+            "wrote with --images, or leave pictures out with --gallery 0"
+        )
+    report.note(
+        f"{options.output}: {len(result.rows)} rows, pictures of {len(found)}, {len(page) / 1e6:.1f} MB"
+    )
+    return FRAMES_FAILED if missing else 0
+
+
+def _take(found: Sequence[Subject], recorded: FrameOptions, jobs: int | None) -> "list[Pictures]":
+    """The pictures of each subject, fewer when interrupted."""
+    from rollcli.report.pictures import no_pictures, take_pictures
+
+    work = Work(partial(take_pictures, options=recorded), no_pictures)
+    with stop_on_signals() as stop, contextlib.closing(done_locally(found, work, jobs, stop)) as taken:
+        return list(taken)

@@ -1,0 +1,119 @@
+"""Where the pictures of a row come from: images that `estimate` wrote, or its inputs."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+
+from rollcli.batch.job import Frame
+from rollcli.batch.options import ImageOptions
+from rollcli.errors import UsageError
+from rollcli.files.inputs import MAP_ENDINGS
+from rollcli.files.naming import listed
+from rollcli.files.results import Row
+
+KINDS = ("derotated", "vdisparity", "disparity")
+
+
+@dataclass(frozen=True, slots=True)
+class Subject:
+    """A frame to take pictures of.
+
+    Attributes
+    ----------
+    frame : Frame
+        Where its map or its pair is.
+    theta : float
+        Its roll, radians.
+    alpha : tuple of float, or None
+        The road's parabola, px.
+    images : dict of str to str
+        The files that `estimate` wrote for it, by kind.
+    """
+
+    frame: Frame
+    theta: float
+    alpha: tuple[float, float, float] | None
+    images: dict[str, str]
+
+
+def subjects(rows: Sequence[Row], result: str, images: str | None, recorded: ImageOptions) -> list[Subject]:
+    """Find the files of rows that have an angle.
+
+    Parameters
+    ----------
+    rows : sequence of Row
+    result : str
+        The result's path: names that do not exist from here are looked for beside it.
+    images : str or None
+        The folder of images, or of folders of images, that `estimate` wrote.
+    recorded : ImageOptions
+        Which folders the run wrote them to.
+
+    Raises
+    ------
+    UsageError
+        There is no such folder, or there are no images of some rows in it.
+    """
+    found = [_images(row, images, recorded) if images is not None else {} for row in rows]
+    if images is not None and not Path(images).is_dir():
+        raise UsageError(f"{images}: no such folder of images")
+    without = [row.file for row, files in zip(rows, found, strict=True) if images is not None and not files]
+    if without:
+        raise UsageError(
+            f"{images}: has no image of {listed(without)}: name the folder where estimate has put what it "
+            "wrote, or leave --images out to have the pictures made from the inputs"
+        )
+    return [_subject(row, Path(result).parent, files) for row, files in zip(rows, found, strict=True)]
+
+
+def _subject(row: Row, folder: Path, images: dict[str, str]) -> Subject:
+    frame = Frame(
+        file=row.file,
+        right_file=row.right_file,
+        path=_located(row.file, folder),
+        right_path=_located(row.right_file, folder),
+        relative=row.file,
+        mask=None,
+    )
+    alpha = (row.alpha0, row.alpha1, row.alpha2)
+    whole = None if None in alpha else alpha
+    return Subject(frame, math.radians(row.roll_deg or 0.0), whole, images)  # type: ignore[arg-type]
+
+
+def _located(name: str, folder: Path) -> str:
+    """A file named from where `estimate` ran: here, or else from the result's folder."""
+    beside = folder / name
+    return str(beside) if name and not Path(name).exists() and beside.exists() else name
+
+
+def _images(row: Row, images: str, recorded: ImageOptions) -> dict[str, str]:
+    return {kind: path for kind in KINDS if (path := _image(kind, row, Path(images), recorded))}
+
+
+def _image(kind: str, row: Row, images: Path, recorded: ImageOptions) -> str | None:
+    for folder in _folders(kind, images, getattr(recorded, kind)):
+        for name in _tails(row.file):
+            for ending in (".png",) if kind == "vdisparity" else MAP_ENDINGS:
+                if (path := folder / f"{name}{ending}").is_file():
+                    return str(path)
+    return None
+
+
+def _folders(kind: str, images: Path, recorded: str | None) -> Iterator[Path]:
+    """Where images of a kind may be: in the folder named, under the name it had or the option's."""
+    names = {Path(recorded).name, kind} if recorded is not None else {kind}
+    for name in sorted(names):
+        yield images / name
+    if images.resolve().name in names or (
+        recorded is not None and images.resolve() == Path(recorded).resolve()
+    ):
+        yield images
+
+
+def _tails(file: str) -> Iterator[str]:
+    """The path without its ending, then without its first folder, and so on: what was named is unknown."""
+    path = PurePosixPath(file)
+    parts = path.with_suffix("").parts
+    for first in range(1 if path.is_absolute() else 0, len(parts)):
+        yield "/".join(parts[first:])

@@ -1,0 +1,65 @@
+"""What a result says as a whole, in numbers and in words."""
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rollcli.files.results import STATUSES, Row
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Figures of the frames that have an angle; degrees, None where there is nothing to take them of."""
+
+    counts: Mapping[str, int]
+    median: float | None
+    middle: tuple[float, float] | None  # 5th and 95th percentile
+    extremes: tuple[float, float] | None
+    half_width: float | None  # median
+
+    @property
+    def frames(self) -> int:
+        """All of them."""
+        return sum(self.counts.values())
+
+
+def summarize(rows: Sequence[Row]) -> Summary:
+    """Take the figures of a result."""
+    found = Counter(row.status for row in rows)
+    rolls = [row.roll_deg for row in rows if row.roll_deg is not None]
+    widths = [row.roll_ci95_deg for row in rows if row.roll_ci95_deg is not None]
+    return Summary(
+        counts={status: found[status] for status in STATUSES},
+        median=float(np.median(rolls)) if rolls else None,
+        middle=(float(np.percentile(rolls, 5)), float(np.percentile(rolls, 95))) if rolls else None,
+        extremes=(min(rolls), max(rolls)) if rolls else None,
+        half_width=float(np.median(widths)) if widths else None,
+    )
+
+
+def degrees(angle: float | None, digits: int = 2, *, sign: bool = True) -> str:
+    """An angle to read: with its sign, a true minus, and its unit."""
+    if angle is None:
+        return "–"
+    text = f"{angle:+.{digits}f}" if sign and round(angle, digits) else f"{abs(angle):.{digits}f}"
+    return text.replace("-", "−") + "°"
+
+
+def option_lines(run: Mapping[str, Any] | None) -> list[tuple[str, str]]:
+    """The options of the run by their names on the command line, those that were not given left out."""
+    options = (run or {}).get("options", {})
+    return [(f"--{name}", _shown(value)) for name, value in options.items() if value not in (None, [], False)]
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, list):
+        return (
+            " ".join(map(_shown, value))
+            if value and isinstance(value[0], list)
+            else ",".join(map(_shown, value))
+        )
+    return f"{value:g}" if isinstance(value, float) and math.isfinite(value) else str(value)

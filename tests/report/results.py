@@ -1,0 +1,31 @@
+"""Results for reports to show."""
+
+from pathlib import Path
+
+from rollcli.files.results import Row, format_header, format_row
+
+
+def row(
+    name: str, roll: float | None = 1.0, width: float | None = 0.05, status: str = "ok", message: str = ""
+) -> Row:
+    """A row of a 160 x 120 map."""
+    if roll is None:
+        return Row(name, status="error", message=message or f"{name}: is empty")
+    return Row(
+        name,
+        status=status,
+        roll_deg=roll,
+        roll_ci95_deg=width,
+        method="gd",
+        alpha0=20.0,
+        alpha1=0.3,
+        alpha2=0.0,
+        width=160,
+        height=120,
+        message=message,
+    )
+
+
+def write_result(path: Path, rows, form="csv") -> None:
+    """A result without a record of its run."""
+    path.write_bytes(b"".join([format_header(form), *(format_row(each, form) for each in rows)]))

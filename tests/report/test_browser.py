@@ -1,0 +1,166 @@
+"""The page as a browser shows it."""
+
+import contextlib
+import re
+
+import pytest
+
+from tests.program import road_map, rollcli, write_kitti, write_maps
+
+NAME = "maps/<script>alert(1)</script>.png"
+
+
+@pytest.fixture(scope="module")
+def url(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("report")
+    write_maps(folder / "maps", 12)
+    write_kitti(folder / NAME, road_map(0.02))
+    (folder / "maps" / "frame5.png").write_bytes(b"")
+    rollcli("estimate", "maps", "--recursive", "-o", "rolls.csv", "--max-roll", "5", cwd=folder)
+    assert rollcli("report", "rolls.csv", "-o", "page.html", cwd=folder).status == 0
+    return (folder / "page.html").as_uri()
+
+
+@pytest.fixture
+def opened(browser, url):
+    """Opens the page; a message on the console, a dialog or a request for anything outside of it fails."""
+    complaints = []
+    with contextlib.ExitStack() as stack:
+
+        def open_page(width=1280, scheme="light"):
+            context = browser.new_context(
+                viewport={"width": width, "height": 900}, color_scheme=scheme, offline=True
+            )
+            stack.callback(context.close)
+            page = context.new_page()
+            page.on("console", lambda message: complaints.append(message.text))
+            page.on("pageerror", lambda error: complaints.append(str(error)))
+            page.on("dialog", lambda dialog: complaints.append(dialog.message))
+            page.on("request", lambda request: complaints.extend(outside(request.url, url)))
+            page.goto(url)
+            page.wait_for_selector("#roll .main-svg")
+            return page
+
+        yield open_page
+    assert complaints == []
+
+
+def outside(requested, url):
+    return [] if requested == url or requested.startswith(("data:", "blob:")) else [requested]
+
+
+def luminance(colour):
+    """Relative luminance of a CSS colour, as WCAG 2 has it."""
+    parts = [int(part) / 255 for part in re.findall(r"\d+", colour)[:3]]
+    linear = [part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def contrast(one, other):
+    low, high = sorted((luminance(one), luminance(other)))
+    return (high + 0.05) / (low + 0.05)
+
+
+def style(page, selector, name):
+    return page.locator(selector).first.evaluate(f"element => getComputedStyle(element).{name}")
+
+
+def test_the_charts_are_there(opened):
+    page = opened()
+    assert page.title() == "Roll of 13 frames"
+    assert page.locator("#roll .scatterlayer .trace").count() >= 3
+    assert page.locator("#histogram .bars .point").count() >= 5
+    legend = page.locator("#roll .legendtext").all_text_contents()
+    assert [text for text in ("95 % interval", "roll", "failed") if text not in legend] == []
+
+
+def test_hovering_shows_the_name_of_the_frame_as_text(opened):
+    page = opened()
+    box = page.locator("#roll .nsewdrag").first.bounding_box()
+    shown = []
+    for height in (0.5, 0.965):  # failed frames are marked along the lower edge
+        for step in range(40):
+            page.mouse.move(box["x"] + box["width"] * step / 39, box["y"] + box["height"] * height)
+            page.wait_for_timeout(30)
+            shown += page.locator("#roll .hovertext").all_text_contents()
+    for name in ("maps/frame3.png", "maps/frame5.pngfailed", NAME):
+        assert any(text.startswith(name) for text in shown), (name, set(shown))
+
+
+def test_a_click_enlarges_and_keys_move_on_and_close(opened):
+    page = opened()
+    button = page.locator(".pictures button").nth(1)
+    small = button.locator("img").bounding_box()
+    button.click()
+    dialog = page.locator("dialog")
+    assert dialog.is_visible()
+    large = dialog.locator("img")
+    assert large.bounding_box()["height"] > 2 * small["height"]
+    assert large.evaluate("image => image.complete && image.naturalWidth > 0")
+    caption = dialog.locator("p").inner_text()
+    page.keyboard.press("ArrowRight")
+    assert dialog.locator("p").inner_text() != caption
+    page.keyboard.press("ArrowLeft")
+    assert dialog.locator("p").inner_text() == caption
+    page.keyboard.press("Escape")
+    assert not dialog.is_visible()
+    assert page.evaluate("document.activeElement.dataset.caption") == caption
+
+
+def test_the_keyboard_alone_opens_a_picture_and_its_buttons_are_named(opened):
+    page = opened()
+    page.locator(".pictures button").first.focus()
+    page.keyboard.press("Enter")
+    page.get_by_role("button", name="Next picture").click()
+    page.get_by_role("button", name="Close").click()
+    assert not page.locator("dialog").is_visible()
+    names = page.locator(".pictures button").evaluate_all("all => all.map(each => each.ariaLabel)")
+    assert all(name.startswith("Enlarge: ") for name in names)
+    assert len(set(names)) == len(names) == 4 * 12
+
+
+@pytest.mark.parametrize("width", [400, 1280])
+def test_nothing_is_cut_off_or_too_small_to_read(opened, width):
+    page = opened(width=width)
+    assert page.evaluate("document.documentElement.scrollWidth") == width
+    too_wide = page.evaluate(
+        """() => [...document.querySelectorAll("main *")].filter(
+            each => each.getBoundingClientRect().right > innerWidth + 1 && !each.closest(".wide, .chart")
+        ).map(each => each.outerHTML.slice(0, 80))"""
+    )
+    assert too_wide == []
+    sizes = page.evaluate(
+        """() => [...document.querySelectorAll("main *")].filter(
+            each => [...each.childNodes].some(node => node.nodeType === 3 && node.data.trim())
+                && !each.closest("dialog, script") && each.getClientRects().length
+        ).map(each => [parseFloat(getComputedStyle(each).fontSize), each.outerHTML.slice(0, 80)])"""
+    )
+    assert min(sizes)[0] >= 11, min(sizes)
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_text_stands_out_in_light_and_dark_mode(opened, scheme):
+    page = opened(scheme=scheme)
+    ground, card = style(page, "body", "backgroundColor"), style(page, "section", "backgroundColor")
+    assert (luminance(card) < 0.05) == (scheme == "dark")
+    assert contrast(style(page, "h1", "color"), ground) > 7
+    for selector in ("td", ".note", "figure p", ".pictures span", ".pill", ".options span"):
+        assert contrast(style(page, selector, "color"), card) > 4, selector
+    for selector in ("#roll .xtick text", "#roll .legendtext", "#histogram .ytick text"):
+        assert contrast(style(page, selector, "fill"), card) > 7, selector
+
+
+def test_charts_follow_when_the_mode_changes(opened):
+    page = opened(scheme="light")
+    before = style(page, "#roll .xtick text", "fill")
+    page.emulate_media(color_scheme="dark")
+    page.wait_for_function(
+        "before => getComputedStyle(document.querySelector('#roll .xtick text')).fill !== before", arg=before
+    )
+    assert contrast(style(page, "#roll .xtick text", "fill"), style(page, "section", "backgroundColor")) > 7
+
+
+def test_the_chart_offers_nothing_that_leaves_this_computer(opened):
+    titles = opened().locator(".modebar-btn").evaluate_all("all => all.map(each => each.dataset.title)")
+    assert titles
+    assert not [title for title in titles if re.search("share|cloud|plotly|edit", title, re.I)]

@@ -1,0 +1,106 @@
+"""What the charts hold."""
+
+import numpy as np
+import pytest
+
+from rollcli.report.histogram import histogram
+from rollcli.report.roll_chart import roll_chart
+from rollcli.report.summary import degrees, option_lines, summarize
+from rollcli.report.view import outside, view
+from tests.report.results import row
+
+ROWS = [
+    row("a.png", 1.0, 0.1),
+    row("b.png", 2.0, 0.2),
+    row("c.png", 1.5, 0.9, "suspect"),
+    row("d.png", None),
+    row("e.png", -1.0, 0.1),
+    row("f.png", 0.5, None),
+    row("<b>g</b>&amp;.png", 0.0, 0.3),
+]
+
+
+def traces(rows):
+    return {trace["name"]: trace for trace in roll_chart(rows).data}
+
+
+def test_the_line_breaks_where_frames_have_failed_and_leaves_suspect_ones_to_their_marks():
+    shown = traces(ROWS)
+    assert (shown["roll"]["x"], shown["roll"]["y"]) == ([1, 2, 4, 5, 6, 7], [1.0, 2.0, None, -1.0, 0.5, 0.0])
+    assert (shown["suspect"]["x"], shown["suspect"]["error_y"]["array"]) == ([3], [0.9])
+    assert (shown["failed"]["x"], shown["failed"]["yaxis"]) == ([4], "y2")
+
+
+def test_the_band_is_the_interval_and_breaks_where_there_is_none():
+    band = traces(ROWS)["95 % interval"]
+    assert band["x"] == [1, 2, 2, 1, None, 5, 5, None, 7, 7, None]
+    assert band["y"] == [1.1, 2.2, 1.8, 0.9, None, -0.9, -1.1, None, 0.3, -0.3, None]
+
+
+def test_hover_labels_show_names_as_they_are():
+    labels = traces(ROWS)["roll"]["customdata"]
+    assert labels[0] == "a.png<br>+1.000° ± 0.100°"
+    assert labels[-1].startswith("&lt;b&gt;g&lt;/b&gt;&amp;amp;.png<br>0.000°")
+    long = traces([row("folder/" * 20 + "frame.png")])["roll"]["customdata"][0].partition("<br>")[0]
+    assert len(long) == 44
+    assert long.endswith("folder/frame.png")
+
+
+def test_every_angle_within_the_view_is_in_the_histogram():
+    rng = np.random.default_rng(0)
+    rows = [
+        row(f"{i}.png", roll, 0.1, "ok" if i % 7 else "suspect")
+        for i, roll in enumerate(rng.normal(2, 1, 500))
+    ]
+    bars = {trace["name"]: trace for trace in histogram(rows).data}
+    assert sum(bars["ok"]["y"]) == sum(i % 7 > 0 for i in range(500))
+    assert sum(bars["ok"]["y"] + bars["suspect"]["y"]) == 500 - outside(rows)
+    assert 20 <= len(bars["ok"]["y"]) <= 50
+
+
+def test_an_angle_far_off_does_not_flatten_the_others():
+    rows = [row(f"{i}.png", 1 + i / 100) for i in range(100)] + [row("off.png", -80.0, 0.1, "suspect")]
+    low, high = view(rows)
+    assert 0.5 < low < 1 < 2 < high < 2.5
+    assert outside(rows) == 1
+    assert outside(rows[:-1]) == 0
+
+
+@pytest.mark.parametrize("rows", [[row("a.png", 3.0, None)], [row("a.png", None)], [row("a.png", 3.0, 40.0)]])
+def test_a_single_row_of_any_kind_has_a_chart(rows):
+    low, high = view(rows)
+    assert low < high
+    assert sum(len(trace["x"]) for trace in roll_chart(rows).data) >= 1
+
+
+def test_the_summary_counts_and_takes_the_median():
+    summary = summarize(ROWS)
+    assert summary.counts == {"ok": 5, "suspect": 1, "error": 1}
+    assert (summary.frames, summary.median, summary.extremes, summary.half_width) == (
+        7,
+        0.75,
+        (-1.0, 2.0),
+        0.2,
+    )
+    assert summarize([row("a.png", None)]).median is None
+
+
+@pytest.mark.parametrize(
+    ("angle", "text"), [(1.234, "+1.23°"), (-1.235, "−1.24°"), (-0.001, "0.00°"), (0.0, "0.00°"), (None, "–")]
+)
+def test_angles_are_printed_with_a_sign_unless_they_are_nothing(angle, text):
+    assert degrees(angle) == text
+
+
+def test_options_are_listed_as_they_are_typed():
+    run = {
+        "options": {
+            "lambda0": 26.0,
+            "mask": None,
+            "roi": [0, 1, 2, 3],
+            "polygon": [[0, 1.5], [2, 3]],
+            "timing": False,
+        }
+    }
+    assert option_lines(run) == [("--lambda0", "26"), ("--roi", "0,1,2,3"), ("--polygon", "0,1.5 2,3")]
+    assert option_lines(None) == []

@@ -1,0 +1,224 @@
+"""`rollcli report` from the outside."""
+
+import html
+import json
+import re
+import shutil
+
+import numpy as np
+import pytest
+
+from rollcli.errors import UsageError
+from rollcli.report import page
+from tests.program import contents, road_map, rollcli, write_kitti, write_maps
+from tests.report.results import row, write_result
+
+PICTURES = re.compile(r'src="data:image/webp;base64,([^"]+)"')
+
+
+@pytest.fixture(scope="module")
+def estimated(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("estimated")
+    write_maps(folder / "maps", 4)
+    (folder / "maps" / "frame2.png").write_bytes(b"")
+    images = ["--derotated", "out/upright", "--vdisparity", "out/v"]
+    assert rollcli("estimate", "maps", "-o", "out/rolls.csv", *images, "-j1", cwd=folder).status == 3
+    return folder
+
+
+@pytest.fixture
+def folder(tmp_path, estimated):
+    return shutil.copytree(estimated, tmp_path, dirs_exist_ok=True)
+
+
+def report(folder, *arguments):
+    return rollcli("report", *arguments, "-o", "page.html", cwd=folder)
+
+
+def page_of(folder):
+    return (folder / "page.html").read_text("utf-8")
+
+
+def test_a_page_holds_everything_it_shows(folder):
+    done = report(folder, "out/rolls.csv")
+    assert (done.status, done.out) == (0, "")
+    text = page_of(folder)
+    assert len(PICTURES.findall(text)) == 4 * 3
+    assert "maps/frame2.png: is empty" in text
+    # plotly's script names addresses of maps that it could draw; the page itself asks for nothing
+    outside_of_scripts = re.sub(r"<script.*?</script>", "", text, flags=re.S)
+    assert not re.search(r"(src|href|url)\s*[=(]\s*[\"']?(https?:|//)", outside_of_scripts)
+    assert "<script src" not in text
+
+
+def test_the_summary_says_options_version_counts_and_the_sign(folder):
+    report(folder, "out/rolls.csv")
+    text = html.unescape(
+        re.sub(r"\s+", " ", re.sub(r"<(script|style).*?</\1>|<[^>]+>", " ", page_of(folder), flags=re.S))
+    )
+    run = json.loads((folder / "out" / "rolls.csv.run.json").read_text())
+    assert f"rollcli {run['rollcli']}" in text
+    assert "4: 3 ok, 0 suspect, 1 failed" in text
+    assert "--max-roll 45" in text
+    assert "median roll" in text
+    assert "its right end is up" in text
+    assert "Every frame that has an angle." in text
+
+
+def test_any_number_of_workers_gives_the_same_page(folder):
+    pages = []
+    for jobs in ("1", "2"):
+        assert report(folder, "out/rolls.csv", "-j", jobs, "--overwrite").status == 0
+        pages.append(page_of(folder))
+    assert pages[0] == pages[1]
+
+
+def test_json_lines_and_a_title(folder):
+    rollcli("estimate", "maps", "-o", "rolls.jsonl", cwd=folder)
+    assert report(folder, "rolls.jsonl", "--title", "Rig <7> & co").status == 0
+    assert "<title>Rig &lt;7&gt; &amp; co</title>" in page_of(folder)
+
+
+@pytest.mark.parametrize("images", ["out", "out/upright", "out/v"])
+def test_pictures_come_from_the_images_that_estimate_wrote(folder, images):
+    shutil.rmtree(folder / "maps")
+    done = report(folder, "out/rolls.csv", "--images", images)
+    assert done.status == 0, done.err
+    # of the map itself nothing is left; the level map gives its v-disparity too
+    assert len(PICTURES.findall(page_of(folder))) == (3 if images == "out/v" else 6)
+    assert "maps/frame0.png: no such file" in page_of(folder)
+
+
+def test_pairs_are_shown_from_their_computed_maps_or_matched_anew(tmp_path):
+    rollcli("simulate", "rig", "--frames", "2", "--size", "200x120", "-q", cwd=tmp_path)
+    line = [
+        "estimate",
+        "--left",
+        "rig/left",
+        "--right",
+        "rig/right",
+        "-o",
+        "rolls.csv",
+        "--disparity",
+        "maps",
+    ]
+    rollcli(*line, "--save-as", "npy", "--num-disparities", "32", cwd=tmp_path)
+    assert report(tmp_path, "rolls.csv", "--images", "maps").status == 0
+    from_maps = PICTURES.findall(page_of(tmp_path))
+    shutil.rmtree(tmp_path / "maps")
+    assert report(tmp_path, "rolls.csv", "--overwrite").status == 0
+    assert PICTURES.findall(page_of(tmp_path)) == from_maps
+    assert len(from_maps) == 8
+
+
+def test_files_are_found_from_the_results_folder_too(folder, tmp_path):
+    (folder / "out" / "rolls.csv").rename(folder / "rolls.csv")
+    (folder / "elsewhere").mkdir()
+    done = rollcli("report", "../rolls.csv", "-o", "page.html", cwd=folder / "elsewhere")
+    assert done.status == 0
+    assert len(PICTURES.findall((folder / "elsewhere" / "page.html").read_text("utf-8"))) == 12
+
+
+def test_maps_that_are_gone_leave_a_page_that_says_so_and_status_3(folder):
+    (folder / "maps" / "frame1.png").unlink()
+    done = report(folder, "out/rolls.csv")
+    assert done.status == 3
+    assert "maps/frame1.png: no such file" in done.err
+    assert "1 of 3 frames lack pictures" in done.err
+    assert len(PICTURES.findall(page_of(folder))) == 8
+    assert report(folder, "out/rolls.csv", "--gallery", "0", "--overwrite").status == 0
+    assert not PICTURES.search(page_of(folder))
+
+
+def test_names_of_frames_are_text_wherever_they_stand(tmp_path):
+    name = "maps/<script>alert(1)</script>.png"
+    write_kitti(tmp_path / name, road_map(0.02))
+    rollcli("estimate", "maps", "--recursive", "-o", "rolls.csv", cwd=tmp_path)
+    assert report(tmp_path, "rolls.csv").status == 0
+    text = page_of(tmp_path)
+    assert "<script>alert(1)" not in text
+    assert "maps/&lt;script&gt;alert(1)&lt;/script&gt;.png" in text
+
+
+def test_ten_thousand_frames_stay_under_30_mb(tmp_path):
+    noise = np.random.default_rng(0).uniform(1, 90, (375, 1242))  # no picture is larger than one of noise
+    write_kitti(tmp_path / "map.png", noise)
+    rows = [row("map.png", 0.001 * i, status="suspect" if i % 50 else "ok") for i in range(10_000)]
+    write_result(tmp_path / "rolls.csv", rows)
+    assert report(tmp_path, "rolls.csv").status == 0
+    assert (tmp_path / "page.html").stat().st_size < 30e6
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ("frame,angle\n1,2\n", "no column file, status, roll_deg"),
+        ("file,status\na.png,ok\n", "no column roll_deg"),
+        ("file,status,roll_deg\n", "has no rows"),
+        ("file,status,roll_deg\na.png,ok,much\n", "line 2: 'much' is no value for roll_deg"),
+        ("file,status,roll_deg\na.png,ok,nan\n", "line 2: 'nan' is no value for roll_deg"),
+        ("file,status,roll_deg\na.png,fine,2\n", "line 2: 'fine' is no status"),
+        ("file,status,roll_deg\na.png,ok\n", "line 2: 2 values for 3 columns"),
+        ("\x89PNG\r\n\x1a\n", "no column"),
+        ("", "no column"),
+    ],
+)
+def test_what_is_no_result_is_refused_in_one_line(tmp_path, content, words):
+    (tmp_path / "rolls.csv").write_text(content, newline="")
+    done = report(tmp_path, "rolls.csv")
+    assert (done.status, done.err.count("\n")) == (2, 1)
+    assert done.err.startswith("rollcli: rolls.csv: ")
+    assert words in done.err
+    assert not (tmp_path / "page.html").exists()
+
+
+@pytest.mark.parametrize(
+    "record",
+    ["no JSON", "[]", '{"options": 3}', '{"options": {"scale": "big"}}', '{"options": {"invalid": ["x"]}}'],
+)
+def test_a_damaged_record_of_the_run_is_refused_in_one_line(folder, record):
+    (folder / "out" / "rolls.csv.run.json").write_text(record)
+    done = report(folder, "out/rolls.csv")
+    assert (done.status, done.err.count("\n")) == (2, 1)
+    assert "out/rolls.csv.run.json: is not" in done.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["nothing.csv"], "nothing.csv: cannot be read"),
+        (["out/rolls.csv", "--images", "nothing"], "nothing: no such folder of images"),
+        (["out/rolls.csv", "--images", "maps"], "maps: has no image of maps/frame0.png"),
+        (["out/rolls.csv", "--gallery", "-1"], "'-1' is not a whole number"),
+    ],
+)
+def test_what_is_missing_is_named_before_anything_is_written(folder, arguments, words):
+    done = report(folder, *arguments)
+    assert done.status == 2
+    assert words in done.err
+    assert not (folder / "page.html").exists()
+
+
+def test_a_page_that_is_there_is_kept_and_inputs_are_never_replaced(folder):
+    (folder / "page.html").write_text("mine")
+    assert report(folder, "out/rolls.csv").status == 2
+    assert page_of(folder) == "mine"
+    before = contents(folder / "maps")
+    for target in ("out/rolls.csv", "maps/frame0.png"):
+        done = rollcli("report", "out/rolls.csv", "-o", target, "--overwrite", cwd=folder)
+        assert done.status == 2
+        assert "would be replaced" in done.err
+    assert contents(folder / "maps") == before
+
+
+def test_a_dry_run_lists_and_writes_nothing(folder):
+    done = report(folder, "out/rolls.csv", "--dry-run")
+    assert done.out.splitlines()[0] == "read  out/rolls.csv"
+    assert done.out.splitlines()[-1] == "write page.html"
+    assert not (folder / "page.html").exists()
+
+
+def test_without_the_extra_it_says_what_to_install(monkeypatch):
+    monkeypatch.setattr(page, "_NEEDED", ("jinja2", "no_such_package"))
+    with pytest.raises(UsageError, match=r'report needs no_such_package: pip install "rollcli\[report\]"'):
+        page.require_extra("report")
