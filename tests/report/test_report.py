@@ -188,7 +188,7 @@ def test_a_damaged_record_of_the_run_is_refused_in_one_line(folder, record):
     [
         (["nothing.csv"], "nothing.csv: cannot be read"),
         (["out/rolls.csv", "--images", "nothing"], "nothing: no such folder of images"),
-        (["out/rolls.csv", "--images", "maps"], "maps: has no image of maps/frame0.png"),
+        (["out/rolls.csv", "--images", "maps"], "maps: has no image of maps/frame"),
         (["out/rolls.csv", "--gallery", "-1"], "'-1' is not a whole number"),
     ],
 )
