@@ -8,6 +8,7 @@ road being even across: camber and the wrong surface are not in the residuals.
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -17,7 +18,7 @@ from rollcli.estimator.surface import Surface
 
 _GROUPS = 6
 _EFFECTIVE_PIXELS = 200  # neighbouring pixels repeat each other: more do not tell more
-_KAPPA = 0.72  # fitted by tests/benchmarks/fit_interval.py
+_KAPPA = 0.7  # fitted by tests/benchmarks/fit_interval.py
 # 97.5 % quantiles of Student's t for 1, 2, ... degrees of freedom
 _T975 = (12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228, 2.201, 2.179)
 
@@ -49,41 +50,45 @@ def moves(surface: Surface, theta: float) -> tuple[float, float, float]:
     across = surface.x * cosine + surface.y * sine
     along = surface.y * cosine - surface.x * sine
     a0, a1, a2 = surface.parabola(theta)
-    square = along * along * surface.parabolic
-    design = np.stack([np.ones_like(along), along, square, -across * (a1 + 2 * a2 * along)])
-    residuals = surface.d - (a0 + along * (a1 + along * a2))
-    # each pixel's part of the normal equations, flattened: 16 products, then 4 right-hand sides
-    weighted = design * surface.weights
-    parts = np.concatenate([(weighted[:, None] * design).reshape(16, -1), weighted * residuals])
-    total = parts.sum(1)
-    normal = total[:16].reshape(4, 4)
+    rows = np.empty((5, len(along)))
+    rows[0], rows[1], rows[2] = 1, along, along * along * surface.parabolic
+    rows[3] = -across * (a1 + 2 * a2 * along)
+    rows[4] = surface.d - (a0 + along * (a1 + along * a2))
+    weights = surface.weights
+    bands = _by_group(rows, weights, along, np.ones_like(along))
+    columns = _by_group(rows, weights, across, weights * np.square(rows[3]))
+    total = bands.sum(0)
+    normal = total[:4, :4]
     inverse = np.linalg.inv(normal + np.diag(1e-12 * np.diag(normal) + 1e-300))
-    step = inverse @ total[16:]
-    bands = _spread(_by_group(parts, along, np.ones_like(along)), normal, step)
-    columns = _spread(_by_group(parts, across, parts[15]), normal, step)
-    weight = float(surface.weights.sum())
-    variance = float(surface.weights @ np.square(residuals)) / weight
-    white = 1.96 * math.sqrt(variance * inverse[3, 3] * max(1.0, weight / _EFFECTIVE_PIXELS))
-    return bands, columns, white
+    step = inverse @ total[:4, 4]
+    independent = max(1.0, total[0, 0] / _EFFECTIVE_PIXELS)
+    white = 1.96 * math.sqrt(total[4, 4] / total[0, 0] * inverse[3, 3] * independent)
+    return _spread(bands, normal, step), _spread(columns, normal, step), white
 
 
-def _by_group(parts: Floats, position: Floats, share: Floats) -> Floats:
-    """Return the sums (20, 6) over six groups of equal total `share`, cut along `position`."""
+def _by_group(rows: Floats, weights: Floats, position: Floats, share: Floats) -> Floats:
+    """Return the weighted products (6, 5, 5) of six groups of equal total `share`, cut along `position`.
+
+    Of the five rows four are the design's; with the fifth, the residuals, a product is a group's normal
+    equations, right-hand side included.
+    """
     order = np.argsort(position, kind="stable")
     heights = np.cumsum(share[order])
-    starts = np.searchsorted(heights, heights[-1] * np.arange(_GROUPS) / _GROUPS)
-    sums: Floats = np.add.reduceat(parts[:, order], np.minimum(starts, len(order) - 1), axis=1)
-    return sums
+    cuts = np.searchsorted(heights, heights[-1] * np.arange(1, _GROUPS) / _GROUPS)
+    bounds = [0, *cuts.tolist(), len(order)]
+    sorted_rows = rows[:, order]
+    weighted = sorted_rows * weights[order]
+    return np.stack([weighted[:, a:b] @ sorted_rows[:, a:b].T for a, b in itertools.pairwise(bounds)])
 
 
-def _spread(sums: Floats, normal: Floats, step: Floats) -> float:
+def _spread(groups: Floats, normal: Floats, step: Floats) -> float:
     """Return t * sqrt(sum of squared moves of theta) as one group after the other is left out."""
-    parts, pulls = sums[:16].T.reshape(-1, 4, 4), sums[16:].T
+    parts, pulls = groups[:, :4, :4], groups[:, :4, 4]
     ridge = 1e-9 * np.trace(normal) / 4 * np.eye(4)
-    moves = np.linalg.solve(normal - parts + ridge, (pulls - parts @ step)[..., None])[:, 3, 0]
+    moved = np.linalg.solve(normal - parts + ridge, (pulls - parts @ step)[..., None])[:, 3, 0]
     leverage = parts[:, 3, 3] / normal[3, 3]
     freedom = max(1.0, 1 / float(np.square(leverage).sum()) - 1)
-    return _student(freedom) * math.sqrt(float(np.square(moves).sum()))
+    return _student(freedom) * math.sqrt(float(np.square(moved).sum()))
 
 
 def _student(freedom: float) -> float:
