@@ -20,7 +20,7 @@ from rollcli.errors import EstimationError
 from rollcli.estimator.sample import NO_SLOPE, Sample, Singles
 
 _DRAWS = 1024  # triples drawn; about half are planes that could be a road
-_HYPOTHESES = 512
+_HYPOTHESES = 384
 _FIRST_PIXELS = 450  # all hypotheses are judged on these,
 _FIRST_BESIDE = 0.2
 _OF_EACH_ROLL = 4
