@@ -1,5 +1,6 @@
 """Workers on a Dask cluster: the same frames, sent to an executor elsewhere (extra `cluster`)."""
 
+import logging
 import os
 from collections.abc import Generator, Sequence
 from concurrent.futures import CancelledError, Future
@@ -73,13 +74,11 @@ class ClusterCrew:
 
 def _connect(address: str) -> Any:
     try:
-        import dask
-
-        dask.config.set({"logging.distributed": "critical"})  # read on import; errors end as our own line
         from distributed import Client
         from distributed import TimeoutError as DaskTimeoutError  # before Python 3.11 not the built-in one
     except ImportError as error:
         raise UsageError("--scheduler needs the extra cluster: pip install 'rollcli[cluster]'") from error
+    logging.disable()  # Dask's tracebacks: what goes wrong ends as a line of our own
     try:
         client = Client(address, timeout=_CONNECT_S, set_as_default=False)
     except (OSError, ValueError) as error:

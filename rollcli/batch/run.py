@@ -16,7 +16,7 @@ from rollcli.batch.result_file import ResultFile, RowSink, check_result, kept_ro
 from rollcli.batch.setup import limit_blas_threads
 from rollcli.batch.signals import Stop, stop_on_signals
 from rollcli.batch.workers import Work
-from rollcli.errors import OutputError
+from rollcli.errors import ClusterError, OutputError
 from rollcli.files.results import parse_rows, read_run, run_path
 
 
@@ -58,9 +58,9 @@ def run(options: EstimateOptions, resume_command: str = "") -> int:
                 _work(plan.frames[done:], options, sink, record, report, stop)
         except KeyboardInterrupt:  # asked twice: without waiting for the frames in flight
             report.stopped_early = True
-        except OutputError as error:
-            hint = f"; {report.done} rows are kept, continue with --resume" if record else ""
-            raise OutputError(f"{error}{hint}") from error
+        except (OutputError, ClusterError) as error:
+            hint = f"; {report.done} rows are kept, continue with --resume" if record and report.done else ""
+            raise type(error)(f"{error}{hint}") from error
         return _end(record, report, stop, resume_command)
 
 
