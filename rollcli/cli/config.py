@@ -1,6 +1,5 @@
 """`--config FILE`: a TOML file of option values, below flags and the environment."""
 
-import difflib
 import sys
 from pathlib import Path
 from typing import Any
@@ -8,11 +7,6 @@ from typing import Any
 import click
 
 from rollcli.cli.command import option
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 
 def _use(ctx: click.Context, param: click.Parameter, path: str | None) -> None:
@@ -32,6 +26,11 @@ def _use(ctx: click.Context, param: click.Parameter, path: str | None) -> None:
 
 
 def _load(path: str) -> dict[str, Any]:
+    if sys.version_info >= (3, 11):  # here: every --help imports this module
+        import tomllib
+    else:
+        import tomli as tomllib
+
     try:
         return tomllib.loads(Path(path).read_text("utf-8"))
     except OSError as error:
@@ -41,6 +40,8 @@ def _load(path: str) -> dict[str, Any]:
 
 
 def _nearest(name: str, options: dict[str, click.Option]) -> str:
+    import difflib
+
     close = difflib.get_close_matches(name, options, n=1, cutoff=0)
     return f"; the nearest is {close[0].replace('_', '-')!r}" if close else ""
 
