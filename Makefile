@@ -7,7 +7,7 @@ TOUCH := $(BIN)/python -c "import pathlib, sys; pathlib.Path(sys.argv[1]).touch(
 REMOVE := $(PYTHON) -c "import glob, os, shutil, sys; [shutil.rmtree(p) if os.path.isdir(p) else os.remove(p) for a in sys.argv[1:] for p in glob.glob(a)]"
 
 .DEFAULT_GOAL := help
-.PHONY: help run test lint types format bench fuzz clean
+.PHONY: help run test lint types format readme bench fuzz clean
 
 help:
 	@echo "make run     install into .venv, and estimate the roll of sample_data into out/"
@@ -15,6 +15,7 @@ help:
 	@echo "make lint    ruff: style and format"
 	@echo "make types   mypy, strict"
 	@echo "make format  let ruff rewrite the code"
+	@echo "make readme  list the commands' options in the README"
 	@echo "make bench   run every benchmark of tests/benchmarks"
 	@echo "make fuzz    throw broken files at the readers for a while"
 	@echo "make clean   remove all that make made"
@@ -47,6 +48,9 @@ types: $(BIN)/.dev
 format: $(BIN)/.dev
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
+
+readme: $(BIN)/.dev
+	$(BIN)/python -m tests.readme_tables
 
 bench: $(BIN)/.dev
 	@for each in tests/benchmarks/bench_*.py; do echo "== $$each"; $(BIN)/python $$each || exit 1; done

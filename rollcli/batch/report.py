@@ -139,12 +139,10 @@ class Report:
 
     def _tell_failure(self, row: Row) -> None:
         self._failures += 1
-        if self._options.quiet:
-            return
         if self._failures <= _FAILURES_SHOWN or self._options.verbose:
             self.say(row.message)
         elif self._failures == _FAILURES_SHOWN + 1:
-            self.say("further failures are in the result alone; -v shows all")
+            self.say("further failures are not named here; -v names all")
 
     def _progress(self) -> None:
         if self._bar is not None:

@@ -6,6 +6,7 @@ import click
 
 from rollcli.batch.options import RunningOptions
 from rollcli.cli.command import Command, option, record
+from rollcli.cli.config import config_option
 from rollcli.cli.options import PATH, encoding_options, input_options, region_options, running_options
 from rollcli.cli.types import Number, Turns
 from rollcli.evaluate.options import TIMED, TURNS_DEG, ExperimentOptions, PaperOptions
@@ -47,24 +48,43 @@ def evaluate(ctx: click.Context) -> None:
         click.echo(ctx.get_help())
 
 
-@evaluate.command(cls=Command)
+@evaluate.command(
+    cls=Command,
+    examples=[
+        (
+            "Angles against those of `simulate`",
+            "rollcli evaluate accuracy rig/rolls.csv --truth rig/truth.csv",
+        )
+    ],
+)
 @click.argument("result", type=PATH)
 @option(
     "--truth",
     type=PATH,
     metavar="FILE",
     required=True,
+    section="Figures",
     help="The known angles: CSV with the columns file and roll_deg, degrees.",
 )
-@option("-o", "--output", type=PATH, metavar="FILE", default="-", help="Where the figures go (-: stdout).")
+@option(
+    "-o",
+    "--output",
+    type=PATH,
+    metavar="FILE",
+    default="-",
+    section="Figures",
+    help="Where the figures go (-: stdout).",
+)
 @option(
     "--format",
     "form",
     type=click.Choice(["table", "csv", "json"]),
     default="table",
+    section="Figures",
     help="To read, or for programs: degrees, and shares from 0 to 1.",
 )
 @running_options
+@config_option
 @click.pass_context
 def accuracy(
     ctx: click.Context, /, result: str, truth: str, output: str, form: str, running: RunningOptions, **_: Any
@@ -73,21 +93,21 @@ def accuracy(
 
     Frames are matched by the stem of their file. Those without a partner are named on stderr; exit status 3
     when a frame of the truth has no angle.
-
-    \b
-    rollcli evaluate accuracy rig/rolls.csv --truth rig/truth.csv
     """
     from rollcli.evaluate.run_accuracy import run_accuracy
 
     ctx.exit(run_accuracy(result, truth, form, output, running))
 
 
-@evaluate.command(cls=Command)
+@evaluate.command(
+    cls=Command, examples=[("The page, and its CSVs", "rollcli evaluate paper maps/ -o paper/")]
+)
 @input_options
 @experiment_options
 @encoding_options
 @region_options
 @running_options
+@config_option
 @click.pass_context
 def paper(ctx: click.Context, /, **records: Any) -> None:
     """Repeat the paper's tables and figures on these maps, and write them as CSV and one HTML page of charts.
@@ -95,9 +115,6 @@ def paper(ctx: click.Context, /, **records: Any) -> None:
     Iterations and run times of golden section and gradient descent (Tables I and II), the first learning
     rate (Fig. 3), accuracy after known rotations (Fig. 6), and the same accuracy for the other methods. Every
     valid pixel is used, as in the paper. The page needs the extra: pip install "rollcli[report]".
-
-    \b
-    rollcli evaluate paper maps/ -o paper/
     """
     from rollcli.evaluate.run_paper import run_paper
 

@@ -6,6 +6,7 @@ import click
 
 from rollcli.batch.options import RunningOptions
 from rollcli.cli.command import command, option, record
+from rollcli.cli.config import config_option
 from rollcli.cli.options import PATH, running_options
 from rollcli.cli.types import Number, Size, Span
 from rollcli.simulate.options import (
@@ -112,6 +113,7 @@ simulate_options = record(
 @click.argument("folder", metavar="DIR", type=PATH)
 @simulate_options
 @running_options
+@config_option
 @click.pass_context
 def simulate(ctx: click.Context, /, folder: str, options: SimulateOptions, running: RunningOptions) -> None:
     """Render road stereo pairs with known roll into DIR.

@@ -92,6 +92,14 @@ def read_disparity(
     """Read a disparity map: pixels, shape (H, W), float32 (float64 if the file holds that); no data is 0.
 
     Parameters are those of `to_disparity`; the file may be PNG, TIFF, NPY or PFM.
+
+    Examples
+    --------
+    >>> import os, tempfile
+    >>> path = os.path.join(tempfile.mkdtemp(), "map.npy")
+    >>> np.save(path, np.array([[0, 256, 640]], np.uint16))
+    >>> read_disparity(path)  # unsigned 16 bits are read as KITTI's: 256 to a pixel, 0 is no data
+    array([[0. , 1. , 2.5]], dtype=float32)
     """
     values = () if invalid is None else (invalid,)
     return to_disparity(read_stored(path), encoding=encoding, scale=scale, invalid=values).disparity

@@ -68,6 +68,14 @@ def compute_disparity(left: NDArray[Any], right: NDArray[Any], **options: Any) -
         The images differ in size, or are too small to match.
     UsageError
         An option makes no sense.
+
+    Examples
+    --------
+    >>> left = np.random.default_rng(0).integers(0, 256, (60, 200), dtype=np.uint8)
+    >>> right = np.roll(left, -12, axis=1)
+    >>> disparity = compute_disparity(left, right, num_disparities=32)
+    >>> float(np.median(disparity[disparity > 0]))
+    12.0
     """
     return match_pair(left, right, StereoOptions(**options)).disparity
 

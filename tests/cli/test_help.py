@@ -1,0 +1,61 @@
+"""Each command's manual page."""
+
+import shlex
+import subprocess
+import sys
+
+import click
+import pytest
+
+from tests.program import environment
+from tests.readme_tables import commands
+
+COMMANDS = dict(commands())
+HELP = """
+import sys
+sys.argv = ["rollcli", *{words}, "--help"]
+from rollcli.__main__ import main
+try:
+    main()
+except SystemExit:
+    pass
+print([name for name in "numpy cv2 tqdm tifffile plotly jinja2 dask".split() if name in sys.modules])
+"""
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_it_has_examples_and_statuses_and_loads_nothing_heavy(tmp_path, name):
+    line = [sys.executable, "-c", HELP.format(words=name.split())]
+    done = subprocess.run(line, cwd=tmp_path, env=environment(), capture_output=True, text=True, check=True)
+    *page, loaded = done.stdout.splitlines()
+    assert loaded == "[]"
+    for heading in ("Running:", "Examples:", "Environment:", "Exit status:"):
+        assert heading in page
+    assert page[0].startswith(f"Usage: rollcli {name} ")
+    assert page.index("Examples:") > page.index("Running:")
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_its_examples_are_commands_that_the_program_takes(name):
+    ctx = COMMANDS[name]
+    lines = [line for _, steps in ctx.command.examples for line in steps.splitlines()]
+    for line in lines:
+        for words in parts(line):
+            command = COMMANDS[" ".join(words[:2]) if words[0] == "evaluate" else words[0]].command
+            arguments = words[2:] if words[0] == "evaluate" else words[1:]
+            assert isinstance(command.make_context(name, arguments), click.Context)
+    assert any(words[: len(name.split())] == name.split() for line in lines for words in parts(line))
+
+
+def parts(line):
+    """The words after `rollcli` of each part of a pipe that starts it."""
+    return [shlex.split(part)[1:] for part in line.split("|") if part.split()[0] == "rollcli"]
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_option_says_what_it_does(name):
+    for param in COMMANDS[name].command.params:
+        if isinstance(param, click.Option):
+            assert (param.help or "").rstrip("]").endswith(".") or "[default:" in (param.help or ""), (
+                param.name
+            )

@@ -1,0 +1,141 @@
+"""What the README says is so."""
+
+import re
+import shutil
+import subprocess
+import sys
+
+import pytest
+
+from tests.program import ROOT, environment, rollcli
+from tests.readme_tables import with_tables
+
+README = (ROOT / "README.md").read_text("utf-8")
+needs_make = pytest.mark.skipif(shutil.which("make") is None, reason="make is not installed")
+
+
+def test_its_tables_of_options_are_those_of_the_commands():
+    assert with_tables(README) == README, "run: make readme"
+
+
+def test_its_links_and_pictures_lead_somewhere():
+    headings = {
+        re.sub(r"[^\w -]", "", each.lower()).replace(" ", "-")
+        for each in re.findall(r"^#+ (.*)", README, re.M)
+    }
+    targets = re.findall(r"\]\(([^)]+)\)", README)
+    assert targets
+    for target in targets:
+        if target.startswith("#"):
+            assert target[1:] in headings, target
+        elif not target.startswith("https://"):
+            assert (ROOT / target).is_file(), target
+
+
+def test_every_command_it_shows_exists():
+    shown = set(re.findall(r"^\s*rollcli ([a-z]+)", README, flags=re.M))
+    assert shown >= {"estimate", "report", "derotate", "vdisparity", "disparity", "simulate", "evaluate"}
+    listed = rollcli("--help", cwd=ROOT).out
+    assert [name for name in shown if f"\n  {name} " not in listed] == []
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A folder with stereo pairs and the README's Makefile, which has been run."""
+    folder = tmp_path_factory.mktemp("make")
+    rollcli("simulate", ".", "--frames", "3", "--size", "200x150", "--scene", "open", "-q", cwd=folder)
+    (recipe,) = (
+        each for each in re.findall(r"```make\n(.*?)```", README, flags=re.S) if "maps/%.png" in each
+    )
+    (folder / "Makefile").write_text(recipe)
+    (folder / "bin").mkdir()
+    program = folder / "bin" / "rollcli"
+    program.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m rollcli "$@"\n')
+    program.chmod(0o755)
+    done = make(folder)
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+@pytest.fixture
+def pairs(tmp_path, made):
+    return shutil.copytree(made, tmp_path, dirs_exist_ok=True)  # keeps the times of files
+
+
+def make(folder):
+    variables = environment()
+    variables["PATH"] = f"{folder / 'bin'}:{variables['PATH']}"
+    line = ["make", "-j", "2", "rolls.html"]
+    return subprocess.run(
+        line, cwd=folder, env=variables, capture_output=True, text=True, timeout=120, check=False
+    )
+
+
+def touch(path):
+    path.write_bytes(path.read_bytes())
+
+
+@needs_make
+def test_its_makefile_makes_a_page_from_pairs_and_then_has_nothing_to_do(pairs):
+    assert (pairs / "rolls.html").read_text("utf-8").count("maps/frame_0003.png") >= 1
+    again = make(pairs)
+    assert again.returncode == 0
+    assert "up to date" in again.stdout
+
+
+@needs_make
+def test_its_makefile_does_anew_what_a_changed_pair_asks_for(pairs):
+    touch(pairs / "right" / "frame_0002.png")
+    ran = [line.split()[:2] for line in make(pairs).stdout.splitlines()]
+    assert ran == [["rollcli", "disparity"], ["rollcli", "estimate"], ["rollcli", "report"]]
+
+
+@needs_make
+def test_its_makefile_stops_at_a_pair_that_cannot_be_matched(pairs):
+    (pairs / "right" / "frame_0002.png").write_bytes(b"no image")
+    before = (pairs / "rolls.csv").read_bytes()
+    done = make(pairs)
+    assert done.returncode != 0
+    assert "right/frame_0002.png: is" in done.stderr
+    assert "rollcli estimate" not in done.stdout
+    assert (pairs / "rolls.csv").read_bytes() == before
+    assert make(pairs).returncode != 0
+
+
+@needs_make
+def test_its_makefile_stops_at_a_map_without_an_angle(pairs):
+    (pairs / "maps" / "other.png").write_bytes(b"no map")
+    touch(pairs / "maps" / "frame_0001.png")
+    for _ in range(2):
+        done = make(pairs)
+        assert done.returncode != 0
+        assert "maps/other.png: is" in done.stderr
+        assert "rollcli report" not in done.stdout
+        assert not (pairs / "rolls.csv").exists()
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_completion_is_there_for_each_shell_it_names(tmp_path, shell):
+    assert f"_ROLLCLI_COMPLETE={shell}_source rollcli" in README
+    if shell == "bash" and shutil.which("bash") is None:
+        pytest.skip("bash, which is asked for its version, is not installed")
+    script = rollcli(cwd=tmp_path, _ROLLCLI_COMPLETE=f"{shell}_source")
+    assert script.status == 0
+    assert f"_ROLLCLI_COMPLETE={shell}_complete" in script.out
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        ("rollcli e", {"estimate", "evaluate"}),
+        ("rollcli estimate --me", {"--method"}),
+        ("rollcli estimate --method g", {"gd", "gss"}),
+        ("rollcli derotate --fr", {"--from"}),
+        ("rollcli evaluate ", {"accuracy", "paper"}),
+    ],
+)
+def test_commands_options_and_choices_complete(tmp_path, words, expected):
+    position = str(words.count(" "))
+    variables = {"_ROLLCLI_COMPLETE": "bash_complete", "COMP_WORDS": words, "COMP_CWORD": position}
+    found = {line.partition(",")[2] for line in rollcli(cwd=tmp_path, **variables).out.splitlines()}
+    assert found == expected
