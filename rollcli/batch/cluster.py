@@ -50,8 +50,6 @@ def cluster_outcomes(
 class ClusterCrew:
     """The cluster's own executor; Dask itself gives a lost frame to another worker."""
 
-    broken = False
-
     def __init__(self, client: Any, options: FrameOptions) -> None:
         from distributed import KilledWorker
 
@@ -67,9 +65,6 @@ class ClusterCrew:
     def again(self, frame: Frame) -> Outcome:
         """Several workers have tried it already."""
         return lost(frame, _LOST, self._options.images)
-
-    def renew(self) -> None:
-        """Workers are the cluster's own affair."""
 
 
 def _connect(address: str) -> Any:

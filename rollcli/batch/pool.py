@@ -1,26 +1,22 @@
 """Worker processes on this machine.
 
-Processes, not threads: decoding leaves the interpreter alone but the estimator's many small NumPy calls do
-not, and a worker that dies takes no other with it. Spawned, never forked: a fork copies locks that other
-threads hold.
+Processes, not threads: decoding leaves the interpreter alone, but the estimator's many small NumPy calls do
+not, and a worker that dies takes no other with it. And not those of concurrent.futures: they break as a whole
+when one dies, without a word on which task did it, and hand out with threads that take time from the workers.
 """
 
-import contextlib
-import os
-import signal
-import sys
-import threading
-from collections.abc import Generator, Iterable, Iterator
-from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
-from multiprocessing import active_children, connection, context, parent_process, reduction
-from typing import Any, Generic
+from collections import deque
+from collections.abc import Generator, Iterable
+from multiprocessing import connection
+from typing import Generic
 
-from rollcli.batch.setup import prepare_worker
 from rollcli.batch.signals import Stop
+from rollcli.batch.worker import Worker
 from rollcli.batch.workers import Done, Task, Work, in_order
 
-_IN_FLIGHT_PER_WORKER = 4
-_DIED = "its worker died each time: killed for memory, perhaps, or crashed"
+_TASKS_PER_WORKER = 2  # one that it works on, and one that it finds when that is done
+_IN_FLIGHT_PER_WORKER = 4  # more, since a slow task holds back those after it
+_DIED = "its worker died twice: killed for memory, perhaps, or crashed"
 
 
 def done_by_pool(
@@ -31,111 +27,122 @@ def done_by_pool(
     try:
         yield from in_order(tasks, crew, stop)
     except KeyboardInterrupt:  # asked twice
-        crew.close(at_once=True)
+        crew.kill()
         raise
     finally:
         crew.close()
 
 
-class PoolCrew(Generic[Task, Done]):
-    """A pool of `jobs` processes; `held` is an open file that they hold as long as they live."""
+class WorkerDiedError(Exception):
+    """The process that worked on a task has ended."""
 
-    deaths: tuple[type[BaseException], ...] = (BrokenExecutor,)
+
+class PoolCrew(Generic[Task, Done]):
+    """Processes that take tasks in turn; they make progress while someone waits for a result."""
+
+    deaths: tuple[type[BaseException], ...] = (WorkerDiedError,)
 
     def __init__(self, jobs: int, work: Work[Task, Done], held: int | None) -> None:
         self.window = _IN_FLIGHT_PER_WORKER * jobs
-        self.broken = False
-        self._jobs, self._work, self._held = jobs, work, _Held(held)
-        self._pool = self._start(jobs)
+        self._work, self._held = work, held
+        self._team = [Worker(work.do, held) for _ in range(jobs)]
+        self._backlog: deque[Ticket[Task, Done]] = deque()
 
-    def submit(self, task: Task) -> "Future[Done]":
-        """Start a task; if a worker has died, the future says so."""
-        try:
-            future = self._pool.submit(self._work.do, task)
-        except BrokenExecutor as error:
-            future = Future()
-            future.set_exception(error)
-            self.broken = True
-        return future
+    def submit(self, task: Task) -> "Ticket[Task, Done]":
+        """Take a task; its result is waited for with the ticket."""
+        ticket = Ticket(self, task)
+        self._backlog.append(ticket)
+        self._hand_out()
+        return ticket
 
     def again(self, task: Task) -> Done:
-        """Do a lost task in a process of its own.
+        """Do a task once more whose worker has died, with all memory to itself."""
+        held_back, self._backlog = self._backlog, deque()
+        while any(worker.asked for worker in self._team):
+            self.make_progress()
+        try:
+            return self.submit(task).result()
+        except WorkerDiedError:
+            return self._work.lost(task, _DIED)
+        finally:
+            self._backlog.extend(held_back)
 
-        Which task in flight took the worker with it is not known: one that dies alone, for certain for
-        the first time, is tried once more.
-        """
-        self.broken = True
-        for _ in range(2):
-            with self._start(1) as pool, contextlib.suppress(BrokenExecutor):
-                return pool.submit(self._work.do, task).result()
-        return self._work.lost(task, _DIED)
+    def cancel(self, ticket: "Ticket[Task, Done]") -> bool:
+        """Give a task back that no worker has."""
+        if ticket not in self._backlog:
+            return False
+        self._backlog.remove(ticket)
+        return True
 
-    def renew(self) -> None:
-        """A new pool in place of the broken one."""
-        self._pool.shutdown()
-        self._pool = self._start(self._jobs)
-        self.broken = False
+    def make_progress(self) -> None:
+        """Wait until a worker has something to say, and keep all of them busy."""
+        speaking = connection.wait([worker.pipe for worker in self._team if worker.asked])
+        for place, worker in enumerate(self._team):
+            if worker.pipe in speaking:
+                self._listen(place, worker)
+        self._hand_out()
 
-    def close(self, at_once: bool = False) -> None:
-        """End the workers, after the tasks that they are at or at once."""
-        for process in active_children() if at_once else ():
-            process.kill()
-        self._pool.shutdown(cancel_futures=True)
+    def kill(self) -> None:
+        """End the workers at once."""
+        for worker in self._team:
+            worker.kill()
 
-    def _start(self, jobs: int) -> ProcessPoolExecutor:
-        return ProcessPoolExecutor(jobs, _Context(), _prepare, (self._held,))
+    def close(self) -> None:
+        """End the workers, after what they are at."""
+        for worker in self._team:
+            worker.close()
 
+    def _hand_out(self) -> None:
+        for _ in range(_TASKS_PER_WORKER):
+            for place, worker in enumerate(self._team):
+                if self._backlog and len(worker.asked) < _TASKS_PER_WORKER:
+                    self._ask(place, worker, self._backlog.popleft())
 
-class _Process(context.SpawnProcess):
-    """A process that Ctrl-C does not reach: only the run decides when work ends."""
+    def _ask(self, place: int, worker: Worker, ticket: "Ticket[Task, Done]") -> None:
+        worker.asked.append(ticket)
+        try:
+            worker.pipe.send(ticket.task)
+        except OSError:  # it has died meanwhile, with nothing to do: that is no task's fault
+            if len(worker.asked) == 1:
+                self._replace(place, worker)
 
-    def start(self) -> None:
-        with _signals_blocked():  # a child inherits what is blocked, from its first instruction
-            super().start()
+    def _listen(self, place: int, worker: Worker) -> None:
+        try:
+            answer = worker.pipe.recv()
+        except (EOFError, OSError):
+            worker.asked.popleft().settle(None, WorkerDiedError())
+            self._replace(place, worker)
+        else:
+            worker.asked.popleft().settle(*answer)
 
-
-class _Context(context.SpawnContext):
-    Process = _Process
-
-
-@contextlib.contextmanager
-def _signals_blocked() -> Iterator[None]:
-    if sys.platform == "win32":
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-class _Held:
-    """An open file that a spawned process receives, open."""
-
-    def __init__(self, descriptor: int | None) -> None:
-        self.descriptor = descriptor
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        if self.descriptor is None or sys.platform == "win32":
-            return _Held, (None,)
-        return _received, (reduction.DupFd(self.descriptor),)
-
-
-def _received(duplicate: Any) -> _Held:
-    return _Held(duplicate.detach())
-
-
-def _prepare(held: _Held) -> None:
-    """What a worker does before its first task."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-    prepare_worker()
+    def _replace(self, place: int, worker: Worker) -> None:
+        """A new worker in place of a dead one; what that was asked for after its last task goes to others."""
+        self._backlog.extendleft(reversed(worker.asked))
+        worker.close()
+        self._team[place] = Worker(self._work.do, self._held)
 
 
-def _end_with_parent() -> None:
-    """A killed run leaves no workers that go on writing."""
-    parent = parent_process()
-    if parent is not None:
-        connection.wait([parent.sentinel])
-        os._exit(1)
+class Ticket(Generic[Task, Done]):
+    """A task that is under way; what `concurrent.futures.Future` is elsewhere."""
+
+    def __init__(self, crew: PoolCrew[Task, Done], task: Task) -> None:
+        self.task = task
+        self._crew = crew
+        self._answer: tuple[Done, Exception | None] | None = None
+
+    def settle(self, value: Done, error: Exception | None) -> None:
+        """Say how the task ended."""
+        self._answer = value, error
+
+    def result(self) -> Done:
+        """Wait for what the task gives; raises what it raised, or WorkerDiedError."""
+        while self._answer is None:
+            self._crew.make_progress()
+        value, error = self._answer
+        if error is not None:
+            raise error
+        return value
+
+    def cancel(self) -> bool:
+        """Give the task back, unless a worker has it."""
+        return self._crew.cancel(self)

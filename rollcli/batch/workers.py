@@ -2,14 +2,15 @@
 
 from collections import deque
 from collections.abc import Callable, Generator, Iterable
-from concurrent.futures import Future
 from dataclasses import dataclass
+from itertools import islice
 from typing import Generic, Protocol, TypeVar
 
 from rollcli.batch.signals import Stop
 
 Task = TypeVar("Task", contravariant=True)
 Done = TypeVar("Done")
+Result = TypeVar("Result", covariant=True)
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,17 @@ class Work(Generic[Task, Done]):
     lost: Callable[[Task, str], Done]
 
 
-class Crew(Protocol[Task, Done]):
+class Ticket(Protocol[Result]):
+    """A task that is under way: a `concurrent.futures.Future`, or what does for one."""
+
+    def result(self) -> Result:
+        """Wait for what the task gives."""
+
+    def cancel(self) -> bool:
+        """Give the task back, unless a worker has it already."""
+
+
+class Crew(Protocol[Task, Result]):
     """Workers, wherever they are.
 
     Attributes
@@ -36,45 +47,32 @@ class Crew(Protocol[Task, Done]):
     window : int
         How many tasks may be in flight: enough that nobody waits, few enough that memory stays bounded.
     deaths : tuple of exception types
-        How the future of a lost task ends.
-    broken : bool
-        A worker has died, and with it every task in flight is lost.
+        What `result` of a task raises whose worker has died.
     """
 
     window: int
     deaths: tuple[type[BaseException], ...]
-    broken: bool
 
-    def submit(self, task: Task) -> "Future[Done]":
-        """Start a task; if its worker dies, the future ends with one of `deaths`."""
+    def submit(self, task: Task) -> Ticket[Result]:
+        """Start a task."""
 
-    def again(self, task: Task) -> Done:
-        """Do a lost task once more, alone; if that kills its worker too, it is lost for good."""
-
-    def renew(self) -> None:
-        """Replace workers that have died."""
+    def again(self, task: Task) -> Result:
+        """Do a task once more whose worker has died; if that dies too, what a lost task gives."""
 
 
 def in_order(tasks: Iterable[Task], crew: Crew[Task, Done], stop: Stop) -> Generator[Done, None, None]:
-    """What each task gives, in the tasks' order.
-
-    Takes no new tasks when asked to stop, nor while lost ones are done once more: what died for want of
-    memory gets all of it.
-    """
-    source, flying = iter(tasks), deque[tuple[Task, "Future[Done]"]]()
+    """What each task gives, in the tasks' order; when asked to stop, of those that are worked on already."""
+    source, flying = iter(tasks), deque[tuple[Task, Ticket[Done]]]()
     while True:
-        if crew.broken and not flying:
-            crew.renew()
-        while len(flying) < crew.window and not (stop.asked or crew.broken):
-            task = next(source, None)
-            if task is None:
-                break
+        for task in islice(source, 0 if stop.asked else crew.window - len(flying)):
             flying.append((task, crew.submit(task)))
+        while stop.asked and flying and flying[-1][1].cancel():
+            flying.pop()
         if not flying:
             return
-        task, future = flying.popleft()
+        task, ticket = flying.popleft()
         try:
-            done = future.result()
+            done = ticket.result()
         except crew.deaths:
             if stop.asked:
                 return  # whoever asked has ended the workers too

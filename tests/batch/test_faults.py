@@ -191,14 +191,15 @@ def test_a_worker_that_dies_once_costs_nothing(maps):
     assert (maps / "rolls.csv").read_bytes() == (maps / "undisturbed.csv").read_bytes()
 
 
-def test_a_frame_that_kills_its_worker_each_time_is_an_error_row_and_the_batch_goes_on(maps):
+def test_a_frame_that_kills_its_worker_twice_is_an_error_row_and_the_batch_goes_on(maps):
     done = run_with_deaths(maps, ["frame3"], 99)
     assert done.status == 3
+    assert len(list(maps.glob("died-of-*"))) == 2
     rows = (maps / "rolls.csv").read_text().splitlines()[1:]
     assert len(rows) == FRAMES
     assert [row for row in rows if ",error," in row] == [
         "maps/frame3.png,,error,,,,,,,,,,,,,,,"
-        '"maps/frame3.png: its worker died each time: killed for memory, perhaps, or crashed"'
+        '"maps/frame3.png: its worker died twice: killed for memory, perhaps, or crashed"'
     ]
 
 
