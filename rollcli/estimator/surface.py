@@ -157,21 +157,21 @@ class _Near:
     tolerance: Floats
     place: Floats
     ahead: NDArray[np.bool_]
-    every: int  # of so many pixels, one
+    share: float  # of the sampled pixels: how many are near
 
     @classmethod
     def of(cls, sample: Sample, road: Road) -> _Near:
         c0, c1, c2 = road.plane
         off = (c0 + c1 * sample.x + c2 * sample.y - sample.d) / sample.tolerance
         near = np.flatnonzero(np.abs(off) < _DROP)
-        every = -(-len(near) // _PIXELS) or 1
-        near = near[::every]
+        share = len(near) / len(sample.d)
+        near = near[:: -(-len(near) // _PIXELS) or 1]
         kept = (sample.x, sample.y, sample.d, sample.tolerance)
         x, y, d, tolerance = (pixels[near].astype(np.float64) for pixels in kept)
         across = x * math.cos(road.theta) + y * math.sin(road.theta)
         edge = np.square(np.square(np.square(across / _EDGE)))
         place = np.square(road_weights(sample, road.plane, near)) * np.exp(-edge)
-        return cls(x, y, d, tolerance, place, np.abs(across) * math.hypot(c1, c2) < _AHEAD * d, every)
+        return cls(x, y, d, tolerance, place, np.abs(across) * math.hypot(c1, c2) < _AHEAD * d, share)
 
     def fit(self, road: Road, *, parabolic: bool, narrow: bool) -> _Fit:
         """Start from the road's plane; `narrow`: the corridor ahead tells how wide the weights may be."""
@@ -210,7 +210,7 @@ class _Near:
             grid=sample.grid,
             noise=sample.noise,
             limit=fit.limit,
-            share=float(np.count_nonzero(used)) * self.every / len(sample.d),
+            share=float(np.count_nonzero(used)) / len(used) * self.share,
             moved=abs(fit.theta - road.theta),
             parabolic=parabolic,
         )

@@ -227,3 +227,9 @@ def test_a_real_street_that_is_rotated_moves_the_angle_as_much(streets):
     for turn_deg in (-6, -2, 3, 8):
         turned = derotate(disparity, -math.radians(turn_deg))
         assert math.degrees(estimate_roll(turned).theta - start) == pytest.approx(turn_deg, abs=0.15)
+
+
+def test_the_road_is_at_most_all_of_the_map():
+    disparity, _ = true_disparity(FrameSpec(scene="bare", roll=0.2, pitch=0.05, seed=5))
+
+    assert 0.9 < estimate_roll(disparity).road_fraction <= 1
