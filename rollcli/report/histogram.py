@@ -3,8 +3,10 @@
 import math
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rollcli.files.results import Row
 from rollcli.report.page import Chart
@@ -12,14 +14,18 @@ from rollcli.report.summary import degrees
 from rollcli.report.view import view
 
 _BINS = 40
+_NARROWEST = 0.1  # degrees
+_FEW = 6
 _ROUND = (1, 2, 2.5, 5, 10)
 
 
 def histogram(rows: Sequence[Row]) -> Chart:
     """How many frames have which roll, suspect ones on top of the others."""
     low, high = view(rows)
-    step = _step((high - low) / _BINS)
-    edges = np.arange(math.floor(low / step), math.ceil(high / step) + 1) * step
+    shown = [row.roll_deg for row in rows if row.roll_deg is not None and low <= row.roll_deg <= high]
+    low, high = min(shown, default=low), max(shown, default=high)
+    step = _step(max(high - low, _NARROWEST) / _BINS)
+    edges = np.arange(math.floor(low / step), math.floor(high / step) + 2) * step
     spans = [f"{degrees(start, 3)} to {degrees(end, 3)}" for start, end in pairwise(edges.tolist())]
     data = []
     for status, colour in (("ok", "@c1"), ("suspect", "@suspect")):
@@ -38,10 +44,22 @@ def histogram(rows: Sequence[Row]) -> Chart:
     layout = {
         "barmode": "stack",
         "showlegend": len(data) > 1,
-        "xaxis": {"title": {"text": "roll, degrees"}, "range": [low, high], "zeroline": False},
-        "yaxis": {"title": {"text": "frames"}, "rangemode": "tozero"},
+        "xaxis": {"title": {"text": "roll, degrees"}, "range": _padded(edges, step), "zeroline": False},
+        "yaxis": {"title": {"text": "frames"}, "rangemode": "tozero", **_whole_ticks(shown, edges)},
     }
     return Chart("histogram", "How many frames have which roll", data, layout)
+
+
+def _whole_ticks(rolls: Sequence[float], edges: NDArray[Any]) -> dict[str, Any]:
+    """There are no half frames."""
+    highest = int(np.histogram(rolls, edges)[0].max())
+    return {"dtick": 1} if highest <= _FEW else {}
+
+
+def _padded(edges: NDArray[Any], step: float) -> list[float]:
+    """A single bar has some room about it."""
+    margin = max(step, 0.02 * float(np.ptp(edges)))
+    return [float(edges[0]) - margin, float(edges[-1]) + margin]
 
 
 def _step(least: float) -> float:

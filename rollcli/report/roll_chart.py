@@ -1,7 +1,8 @@
 """The roll over the frames."""
 
 import html
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
+from itertools import pairwise
 from typing import Any
 
 from rollcli.files.results import Row
@@ -12,6 +13,9 @@ from rollcli.report.view import view
 _MANY = 400  # up to so many frames each has a dot, and marks are large
 _LONGEST_NAME = 44  # in a hover label, so that it fits a narrow screen
 _FAILED_AT = 0.035  # of the chart's height
+_BRIDGED = 3  # so many suspect frames in a row do not break the line
+
+_VALUES = ("x", "y", "customdata")
 
 Numbered = Sequence[tuple[int, Row]]
 
@@ -21,8 +25,9 @@ def roll_chart(rows: Sequence[Row]) -> Chart:
     numbered = list(enumerate(rows, 1))
     suspect = [each for each in numbered if each[1].status == "suspect"]
     failed = [each for each in numbered if each[1].status == "error"]
-    line = [each for each in numbered if each[1].status != "suspect"]
-    data = [_band(line), _line(line)]
+    sure = [each for each in numbered if each[1].status == "ok" and each[1].roll_deg is not None]
+    failures = {number for number, row in numbered if row.roll_deg is None}
+    data = [_band(sure, failures), _line(sure, failures)]
     data += [_suspect(suspect)] if suspect else []
     data += [_failed(failed)] if failed else []
     for trace in data:
@@ -41,14 +46,16 @@ def roll_chart(rows: Sequence[Row]) -> Chart:
     return Chart("roll", what, data, layout)
 
 
-def _line(numbered: Numbered) -> dict[str, Any]:
-    """Broken where frames have failed."""
+def _line(numbered: Numbered, failures: Set[int]) -> dict[str, Any]:
+    parts = [_points(stretch) for stretch in _stretches(numbered, failures)]
+    joined = {name: [each for part in parts for each in (*part[name], None)] for name in _VALUES}
     return {
         "mode": "lines+markers" if len(numbered) <= _MANY else "lines",
         "name": "roll",
         "line": {"color": "@c1", "width": 1.5},
         "marker": {"color": "@c1", "size": 5},
-        **_points(numbered),
+        **_points(()),
+        **joined,
     }
 
 
@@ -80,11 +87,12 @@ def _points(numbered: Numbered) -> dict[str, Any]:
     }
 
 
-def _band(numbered: Numbered) -> dict[str, Any]:
+def _band(numbered: Numbered, failures: Set[int]) -> dict[str, Any]:
     """One polygon for each stretch of frames that have an interval; None parts them."""
     x: list[int | None] = []
     y: list[float | None] = []
-    for stretch in _stretches(numbered):
+    bare = {number for number, row in numbered if row.roll_ci95_deg is None}
+    for stretch in _stretches([each for each in numbered if each[0] not in bare], failures | bare):
         along = [number for number, _ in stretch]
         ends = [((row.roll_deg or 0.0), (row.roll_ci95_deg or 0.0)) for _, row in stretch]
         x += [*along, *reversed(along), None]
@@ -103,14 +111,14 @@ def _band(numbered: Numbered) -> dict[str, Any]:
     }
 
 
-def _stretches(numbered: Numbered) -> list[list[tuple[int, Row]]]:
-    stretches: list[list[tuple[int, Row]]] = [[]]
-    for number, row in numbered:
-        if row.roll_ci95_deg is not None:
-            stretches[-1].append((number, row))
-        elif stretches[-1]:
-            stretches.append([])
-    return [stretch for stretch in stretches if stretch]
+def _stretches(numbered: Numbered, breaks: Set[int]) -> list[Numbered]:
+    """Runs of frames with no break and no more than a few suspect frames between two of them."""
+    ends = [
+        place
+        for place, ((before, _), (after, _)) in enumerate(pairwise(numbered), 1)
+        if after - before > _BRIDGED + 1 or not breaks.isdisjoint(range(before + 1, after))
+    ]
+    return [numbered[start:end] for start, end in pairwise([0, *ends, len(numbered)]) if end > start]
 
 
 def _described(row: Row) -> str:

@@ -26,7 +26,8 @@ def traces(rows):
 
 def test_the_line_breaks_where_frames_have_failed_and_leaves_suspect_ones_to_their_marks():
     shown = traces(ROWS)
-    assert (shown["roll"]["x"], shown["roll"]["y"]) == ([1, 2, 4, 5, 6, 7], [1.0, 2.0, None, -1.0, 0.5, 0.0])
+    assert shown["roll"]["x"] == [1, 2, None, 5, 6, 7, None]
+    assert shown["roll"]["y"] == [1.0, 2.0, None, -1.0, 0.5, 0.0, None]
     assert (shown["suspect"]["x"], shown["suspect"]["error_y"]["array"]) == ([3], [0.9])
     assert (shown["failed"]["x"], shown["failed"]["yaxis"]) == ([4], "y2")
 
@@ -37,10 +38,18 @@ def test_the_band_is_the_interval_and_breaks_where_there_is_none():
     assert band["y"] == [1.1, 2.2, 1.8, 0.9, None, -0.9, -1.1, None, 0.3, -0.3, None]
 
 
+@pytest.mark.parametrize(("suspects", "broken"), [(1, False), (3, False), (4, True)])
+def test_a_few_suspect_frames_in_a_row_do_not_break_the_line_many_do(suspects, broken):
+    between = [row(f"s{i}.png", 9.0, 1.0, "suspect") for i in range(suspects)]
+    shown = traces([row("a.png"), row("b.png"), *between, row("c.png"), row("d.png")])
+    for name in ("roll", "95 % interval"):
+        assert (None in shown[name]["x"][:-1]) == broken
+
+
 def test_hover_labels_show_names_as_they_are():
     labels = traces(ROWS)["roll"]["customdata"]
     assert labels[0] == "a.png<br>+1.000° ± 0.100°"
-    assert labels[-1].startswith("&lt;b&gt;g&lt;/b&gt;&amp;amp;.png<br>0.000°")
+    assert labels[-2].startswith("&lt;b&gt;g&lt;/b&gt;&amp;amp;.png<br>0.000°")
     long = traces([row("folder/" * 20 + "frame.png")])["roll"]["customdata"][0].partition("<br>")[0]
     assert len(long) == 44
     assert long.endswith("folder/frame.png")
