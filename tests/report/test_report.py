@@ -13,7 +13,7 @@ from rollcli.report import page
 from tests.program import contents, road_map, rollcli, write_kitti, write_maps
 from tests.report.results import row, write_result
 
-PICTURES = re.compile(r'src="data:image/webp;base64,([^"]+)"')
+PICTURES = re.compile(r'<img src="data:image/webp;base64,([^"]+)"')
 
 
 @pytest.fixture(scope="module")
