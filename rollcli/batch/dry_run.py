@@ -1,7 +1,8 @@
 """What --dry-run says, on stdout."""
 
-import os
 from collections.abc import Iterable
+
+from rollcli.files.stream import write_stdout
 
 
 def list_files(frames: Iterable[tuple[Iterable[str], Iterable[str]]]) -> None:
@@ -10,6 +11,4 @@ def list_files(frames: Iterable[tuple[Iterable[str], Iterable[str]]]) -> None:
     for reads, writes in frames:
         lines += [f"read  {path}\n" for path in reads]
         lines += [f"write {path}\n" for path in writes]
-    data = "".join(lines).encode("utf-8", "surrogateescape")
-    while data:
-        data = data[os.write(1, data) :]
+    write_stdout("".join(lines).encode("utf-8", "surrogateescape"))

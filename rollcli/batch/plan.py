@@ -12,8 +12,7 @@ from rollcli.batch.options import EstimateOptions
 from rollcli.batch.outputs import image_paths
 from rollcli.errors import UsageError
 from rollcli.files.results import run_path
-
-STDOUT = "-"
+from rollcli.files.stream import STDOUT
 
 
 @dataclass(frozen=True)

@@ -3,15 +3,15 @@
 import contextlib
 import os
 import stat
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Protocol
 
 from rollcli.batch.lock import lock
-from rollcli.errors import OutputError, UsageError
+from rollcli.errors import UsageError
 from rollcli.files.atomic import output_error
 from rollcli.files.results import Format, Row, format_header, format_row
+from rollcli.files.stream import STDOUT, STDOUT_NAME, stdout_descriptor, write_stream
 
 _MORE_THAN_A_HEADER = 1000  # bytes
 
@@ -40,12 +40,7 @@ class RowStream:
         self._write(format_row(row, self._form, self._timing))
 
     def _write(self, data: bytes) -> None:
-        try:
-            _write_all(self._descriptor, data)
-        except BrokenPipeError:
-            raise
-        except OSError as error:
-            raise output_error(self._name, error) from error
+        write_stream(self._descriptor, data, self._name)
 
 
 class ResultFile:
@@ -108,7 +103,7 @@ def open_sink(name: str, form: Format, *, resume: bool, overwrite: bool, timing:
         It cannot be written.
     """
     check_result(name, resume=resume, overwrite=overwrite)
-    if name == "-" or _is_stream(name):
+    if name == STDOUT or _is_stream(name):
         yield from _open_stream(name, form, timing)
         return
     descriptor = _open_file(name)
@@ -125,7 +120,7 @@ def check_result(name: str, *, resume: bool, overwrite: bool) -> None:
     """Refuse to touch a result that is there, unless told how."""
     if resume and overwrite:
         raise UsageError("give either --resume or --overwrite")
-    if name == "-" or _is_stream(name):
+    if name == STDOUT or _is_stream(name):
         if resume:
             raise UsageError("--resume needs a result file: name it with --output")
         return
@@ -153,10 +148,8 @@ def _is_stream(name: str) -> bool:
 
 
 def _open_stream(name: str, form: Format, timing: bool) -> Iterator[RowSink]:
-    if name == "-":
-        if sys.stdout is None:  # Python's word for a closed one; its number may be another file's by now
-            raise OutputError("standard output: is closed")
-        yield RowStream(1, "standard output", form, timing)
+    if name == STDOUT:
+        yield RowStream(stdout_descriptor(), STDOUT_NAME, form, timing)
         return
     try:
         descriptor = os.open(name, os.O_WRONLY)

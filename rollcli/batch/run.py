@@ -18,6 +18,7 @@ from rollcli.batch.signals import Stop, stop_on_signals
 from rollcli.batch.workers import Work
 from rollcli.errors import ClusterError, OutputError
 from rollcli.files.results import parse_rows, read_run, run_path
+from rollcli.files.stream import STDOUT
 
 
 def run(options: EstimateOptions, resume_command: str = "") -> int:
@@ -142,5 +143,5 @@ def _list(plan: Plan, options: EstimateOptions) -> None:
     )
     frames = plan.frames[done:]
     list_files((frame.reads(), (path for _, path in image_paths(frame, options.images))) for frame in frames)
-    if plan.output != "-":
+    if plan.output != STDOUT:
         list_files([((), (plan.output, str(run_path(plan.output))))])

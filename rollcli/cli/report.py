@@ -32,7 +32,7 @@ from rollcli.report.options import GALLERY, ReportOptions
     metavar="FILE.html",
     required=True,
     section="Page",
-    help="Where the page goes.",
+    help="Where the page goes (-: stdout).",
 )
 @option("--title", metavar="TEXT", section="Page", help="Its heading.  [default: what it is about]")
 @option(

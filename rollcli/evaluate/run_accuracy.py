@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 
 from rollcli.batch.checks import check_inputs_are_kept, check_nothing_is_there
@@ -14,8 +13,7 @@ from rollcli.evaluate.accuracy_text import FORMATS
 from rollcli.evaluate.truth import read_truth
 from rollcli.files.atomic import write_atomic
 from rollcli.files.results import read_result
-
-_STDOUT = "-"
+from rollcli.files.stream import STDOUT, write_stdout
 
 
 def run_accuracy(result: str, truth: str, form: str, output: str, running: RunningOptions) -> int:
@@ -42,7 +40,7 @@ def run_accuracy(result: str, truth: str, form: str, output: str, running: Runni
     OutputError
         Exit status 1.
     """
-    writes = [] if output == _STDOUT else [output]
+    writes = [] if output == STDOUT else [output]
     check_inputs_are_kept([result, truth], writes)
     if not running.overwrite:
         check_nothing_is_there(writes)
@@ -52,8 +50,8 @@ def run_accuracy(result: str, truth: str, form: str, output: str, running: Runni
     accuracy = assess(read_result(result).rows, read_truth(truth), result)
     _name_unmatched(accuracy, result, truth, running)
     data = FORMATS[form](accuracy).encode("utf-8", "surrogateescape")
-    if output == _STDOUT:
-        _to_stdout(data)
+    if output == STDOUT:
+        write_stdout(data)
     else:
         write_atomic(output, data)
     return FRAMES_FAILED if accuracy.no_angle else 0
@@ -67,11 +65,6 @@ def _name_unmatched(accuracy: Accuracy, result: str, truth: str, running: Runnin
         _say(f"{stem}: in {truth}, without an angle in {result}")
     for name in accuracy.no_truth:
         _say(f"{name}: in {result}, without a known angle in {truth}")
-
-
-def _to_stdout(data: bytes) -> None:
-    while data:
-        data = data[os.write(1, data) :]
 
 
 def _say(message: str) -> None:

@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import math
+import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -44,6 +45,7 @@ class Row:
 STATUSES = ("ok", "suspect", "error")
 TIMING = "elapsed_ms"
 COLUMNS = tuple(field.name for field in fields(Row) if field.name != TIMING)
+STDIN = "-"
 _REQUIRED = ("file", "status", "roll_deg")
 # a millionth of a degree is far below any map's noise; nine digits keep alpha2, which is small, whole
 _DIGITS = {
@@ -157,7 +159,7 @@ def read_run(path: str | Path) -> Mapping[str, Any] | None:
 
 def _read(path: str | Path) -> bytes:
     try:
-        return Path(path).read_bytes()
+        return sys.stdin.buffer.read() if str(path) == STDIN else Path(path).read_bytes()
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from error
 
@@ -209,7 +211,10 @@ def _value(name: str, value: Any, where: str) -> Any:
     if name == "status" and value not in STATUSES:
         raise InputError(f"{where}: {value!r} is no status: {', '.join(STATUSES)}")
     if name not in _DIGITS and name not in _FLAGS and name not in _COUNTS:
-        return "" if value is None else str(value)
+        text = "" if value is None else str(value)
+        if "\0" in text:  # names no file anywhere
+            raise InputError(f"{where}: {text!r} is no value for {name}")
+        return text
     if value is None or value == "":
         return None
     try:

@@ -16,6 +16,7 @@ from rollcli.batch.workers import Work
 from rollcli.errors import InputError
 from rollcli.files.atomic import write_atomic
 from rollcli.files.results import Result, read_result, run_path
+from rollcli.files.stream import STDOUT, write_stdout
 from rollcli.report.choice import Choice, choose
 from rollcli.report.options import ReportOptions
 from rollcli.report.page import require_extra
@@ -58,11 +59,12 @@ def make_report(options: ReportOptions) -> int:
         options.result,
         *(path for each in found for path in (*each.frame.reads(), *each.images.values())),
     ]
-    check_inputs_are_kept(reads, [options.output])
+    writes = [] if options.output == STDOUT else [options.output]
+    check_inputs_are_kept(reads, writes)
     if not options.running.overwrite:
-        check_nothing_is_there([options.output])
+        check_nothing_is_there(writes)
     if options.running.dry_run:
-        list_files([(reads, [options.output])])
+        list_files([(reads, writes)])
         return 0
     return _write(options, result, chosen, found, recorded)
 
@@ -82,7 +84,10 @@ def _write(
         report.say("interrupted; nothing is written")
         return INTERRUPTED
     page = report_page(result, options, list(zip(chosen, pictures, strict=True)))
-    write_atomic(options.output, page)
+    if options.output == STDOUT:
+        write_stdout(page)
+    else:
+        write_atomic(options.output, page)
     missing = [each.missing for each in pictures if each.empty]
     for reason in missing[:_REASONS]:
         report.say(f"no picture of {reason}")
@@ -91,9 +96,7 @@ def _write(
             f"{len(missing)} of {len(pictures)} frames lack pictures: run where estimate ran, name what it "
             "wrote with --images, or leave pictures out with --gallery 0"
         )
-    report.note(
-        f"{options.output}: {len(result.rows)} rows, pictures of {len(found)}, {len(page) / 1e6:.1f} MB"
-    )
+    report.note(f"{options.output}: pictures of {len(found)} frames, {len(page) / 1e6:.1f} MB")
     return FRAMES_FAILED if missing else 0
 
 

@@ -158,6 +158,10 @@ def test_ten_thousand_frames_stay_under_30_mb(tmp_path):
         ("file,status,roll_deg\na.png,ok,much\n", "line 2: 'much' is no value for roll_deg"),
         ("file,status,roll_deg\na.png,ok,nan\n", "line 2: 'nan' is no value for roll_deg"),
         ("file,status,roll_deg\na.png,fine,2\n", "line 2: 'fine' is no status"),
+        (
+            '{"file": "a\\u0000.png", "status": "ok", "roll_deg": 2}\n',
+            "line 1: 'a\\x00.png' is no value for file",
+        ),
         ("file,status,roll_deg\na.png,ok\n", "line 2: 2 values for 3 columns"),
         ("\x89PNG\r\n\x1a\n", "no column"),
         ("", "no column"),
@@ -222,3 +226,13 @@ def test_without_the_extra_it_says_what_to_install(monkeypatch):
     monkeypatch.setattr(page, "_NEEDED", ("jinja2", "no_such_package"))
     with pytest.raises(UsageError, match=r'report needs no_such_package: pip install "rollcli\[report\]"'):
         page.require_extra("report")
+
+
+def test_a_result_from_a_pipe_and_a_page_to_one(folder):
+    result = (folder / "out" / "rolls.csv").read_text()
+    done = rollcli("report", "-", "-o", "-", "--gallery", "1", "-q", cwd=folder, stdin=result)
+    assert (done.status, done.err) == (0, "")
+    assert done.out.startswith("<!doctype html>")
+    assert done.out.endswith("</html>")
+    assert len(PICTURES.findall(done.out)) == 4
+    assert not (folder / "-").exists()
