@@ -1,13 +1,18 @@
 """What the README says is so."""
 
+import math
 import re
 import shutil
 import subprocess
 import sys
 
+import cv2
+import numpy as np
 import pytest
 
+from rollcli import estimate_roll, read_disparity
 from tests.program import ROOT, environment, rollcli
+from tests.readme_picture import MAP, PICTURE, picture
 from tests.readme_tables import with_tables
 
 README = (ROOT / "README.md").read_text("utf-8")
@@ -30,6 +35,17 @@ def test_its_links_and_pictures_lead_somewhere():
             assert target[1:] in headings, target
         elif not target.startswith("https://"):
             assert (ROOT / target).is_file(), target
+
+
+def test_its_picture_and_the_angle_below_it_are_those_of_a_run():
+    shown = cv2.imread(str(PICTURE), cv2.IMREAD_UNCHANGED)
+    made = picture()
+    assert shown.shape == made.shape
+    assert np.abs(shown.astype(int) - made).mean() < 1
+    assert PICTURE.stat().st_size < 300_000
+    roll = estimate_roll(read_disparity(MAP))
+    angle, half = math.degrees(roll.theta), math.degrees(roll.ci95)
+    assert f"{angle:.2f}° ± {half:.2f}°".replace("-", "−") in README
 
 
 def test_every_command_it_shows_exists():
