@@ -58,6 +58,7 @@ def test_every_command_it_shows_exists():
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
     """A folder with stereo pairs and the README's Makefile, which has been run."""
+    pytest.importorskip("plotly", reason="plotly, of the extra report, is not here")
     folder = tmp_path_factory.mktemp("make")
     rollcli("simulate", ".", "--frames", "3", "--size", "200x150", "--scene", "open", "-q", cwd=folder)
     (recipe,) = (

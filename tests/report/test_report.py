@@ -13,6 +13,9 @@ from rollcli.report import page
 from tests.program import contents, road_map, rollcli, write_kitti, write_maps
 from tests.report.results import row, write_result
 
+pytest.importorskip("plotly", reason="plotly, of the extra report, is not here")
+pytest.importorskip("jinja2", reason="jinja2, of the extra report, is not here")
+
 PICTURES = re.compile(r'<img src="data:image/webp;base64,([^"]+)"')
 
 
