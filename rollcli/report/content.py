@@ -20,7 +20,7 @@ _LISTED = 100  # doubtful frames on the page; the result has all
 
 def report_page(result: Result, options: ReportOptions, shown: Sequence[tuple[Choice, Pictures]]) -> bytes:
     """The page, HTML, UTF-8."""
-    rows, summary = result.rows, summarize(result.rows)
+    rows, run, summary = result.rows, result.run or {}, summarize(result.rows)
     doubtful = sorted(
         ((number, row) for number, row in enumerate(rows, 1) if row.status != "ok"),
         key=lambda each: each[1].status,  # errors before suspects
@@ -30,12 +30,12 @@ def report_page(result: Result, options: ReportOptions, shown: Sequence[tuple[Ch
         "report.html",
         title=options.title or f"Roll of {_frames(len(rows))}",
         result=options.result,
-        version=(result.run or {}).get("rollcli"),
+        version=run.get("rollcli"),
         page_version=__version__,
         summary=summary,
         degrees=degrees,
         options=option_lines(result.run),
-        encodings=(result.run or {}).get("encoding") or [],
+        encodings=", ".join(map(str, run["encoding"])) if isinstance(run.get("encoding"), list) else "",
         roll_chart=roll_chart(rows),
         histogram=histogram(rows) if summary.median is not None else None,
         outside=outside(rows),

@@ -55,9 +55,9 @@ def subjects(rows: Sequence[Row], result: str, images: str | None, recorded: Ima
     UsageError
         There is no such folder, or there are no images of some rows in it.
     """
-    found = [_images(row, images, recorded) if images is not None else {} for row in rows]
     if images is not None and not Path(images).is_dir():
         raise UsageError(f"{images}: no such folder of images")
+    found = [_images(row, images, recorded) if images is not None else {} for row in rows]
     without = [row.file for row, files in zip(rows, found, strict=True) if images is not None and not files]
     if without:
         raise UsageError(

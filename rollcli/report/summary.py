@@ -1,6 +1,5 @@
 """What a result says as a whole, in numbers and in words."""
 
-import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -52,14 +51,12 @@ def degrees(angle: float | None, digits: int = 2, *, sign: bool = True) -> str:
 def option_lines(run: Mapping[str, Any] | None) -> list[tuple[str, str]]:
     """The options of the run by their names on the command line, those that were not given left out."""
     options = (run or {}).get("options", {})
-    return [(f"--{name}", _shown(value)) for name, value in options.items() if value not in (None, [], False)]
+    given = {name: value for name, value in options.items() if value is not False and value not in (None, [])}
+    return [(f"--{name}", _shown(value)) for name, value in given.items()]
 
 
 def _shown(value: Any) -> str:
     if isinstance(value, list):
-        return (
-            " ".join(map(_shown, value))
-            if value and isinstance(value[0], list)
-            else ",".join(map(_shown, value))
-        )
-    return f"{value:g}" if isinstance(value, float) and math.isfinite(value) else str(value)
+        between = " " if isinstance(value[0], list) else ","
+        return between.join(map(_shown, value))
+    return f"{value:g}" if isinstance(value, float) else str(value)

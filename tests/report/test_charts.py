@@ -102,14 +102,7 @@ def test_angles_are_printed_with_a_sign_unless_they_are_nothing(angle, text):
 
 
 def test_options_are_listed_as_they_are_typed():
-    run = {
-        "options": {
-            "lambda0": 26.0,
-            "mask": None,
-            "roi": [0, 1, 2, 3],
-            "polygon": [[0, 1.5], [2, 3]],
-            "timing": False,
-        }
-    }
-    assert option_lines(run) == [("--lambda0", "26"), ("--roi", "0,1,2,3"), ("--polygon", "0,1.5 2,3")]
+    options = {"lambda0": 26.0, "mask": None, "roi": [0, 1, 2, 3], "polygon": [[0, 1.5], [2, 3]]}
+    shown = option_lines({"options": {**options, "timing": False, "invalid": [], "seed": 0}})
+    assert shown == [("--lambda0", "26"), ("--roi", "0,1,2,3"), ("--polygon", "0,1.5 2,3"), ("--seed", "0")]
     assert option_lines(None) == []
