@@ -20,7 +20,7 @@ from rollcli.estimator.solution import Solution, principal
 
 _DEGREE = 5
 _SAMPLES = 16  # more than 2 * _DEGREE + 1
-_ANGLES: Floats = np.linspace(0, np.pi, _SAMPLES, endpoint=False)
+_ANGLES: Floats = np.linspace(0, np.pi, _SAMPLES, endpoint=False, dtype=np.float64)
 _POLISH = 8
 
 

@@ -113,8 +113,8 @@ def map_moments(
     """
     height, width = disparity.shape
     grid = grid or Grid.of_shape(height, width)
-    p = (np.arange(origin[1], origin[1] + width) - grid.centre_u) / grid.scale
-    q = (np.arange(origin[0], origin[0] + height) - grid.centre_v) / grid.scale
+    p = (np.arange(origin[1], origin[1] + width, dtype=np.float64) - grid.centre_u) / grid.scale
+    q = (np.arange(origin[0], origin[0] + height, dtype=np.float64) - grid.centre_v) / grid.scale
     if disparity.dtype.kind != "f" or disparity.dtype.itemsize < 4:
         disparity = disparity.astype(np.float32 if disparity.dtype.itemsize <= 2 else np.float64)
     with np.errstate(invalid="ignore", over="ignore"):
@@ -151,7 +151,7 @@ def _block_sums(
     width = disparity.shape[1]
     precision = np.float64 if disparity.size <= _SMALL else np.float32
     rows = min(_ROWS, max(8, _ONE_THREAD // (5 * width)))
-    steps = np.arange(rows) - float(rows // 2)
+    steps = np.arange(rows, dtype=np.float64) - rows // 2
     powers = _powers(steps).astype(precision)
     along = (plane[0] + plane[1] * p).astype(disparity.dtype)
     middles = q[::rows] + (rows // 2) / scale

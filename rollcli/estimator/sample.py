@@ -111,7 +111,8 @@ def take_sample(disparity: NDArray[Any], usable: NDArray[np.bool_] | None = None
     noise = max(_NOISE_SHARE * typical, _QUANTUM_SHARE * _quantum(jumps))
     tolerance = np.sqrt(np.float32(noise) ** 2 + np.square(np.float32(UNEVEN_SHARE) * d))
     near = jumps <= np.maximum(tolerance, np.float32(_COHERENT_SHARE * typical))
-    coherence = near.sum(0, dtype=np.float32) / np.maximum(known.sum(0, dtype=np.float32), 1)
+    coherence = near.sum(0, dtype=np.float32)
+    coherence /= np.maximum(known.sum(0, dtype=np.float32), 1)
     per_unit = grid.scale / reach
     slopes = steps * np.array([-per_unit, per_unit, -per_unit, per_unit], np.float32)[:, None]
     slopes[~known] = NO_SLOPE
@@ -151,7 +152,7 @@ def _taken(
 
 def _quantum(jumps: Singles) -> float:
     """Return the smallest step between neighbours (5th percentile): 1 in a map of whole pixels, 0 if none."""
-    some = jumps[1::2, ::4].ravel()
+    some: Singles = jumps[1::2, ::4].ravel()
     some = some[(some > 0) & (some < NO_SLOPE)]
     place = len(some) // 20
     return float(np.partition(some, place)[place]) if len(some) else 0.0

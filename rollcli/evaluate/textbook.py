@@ -103,5 +103,4 @@ class Textbook:
 
     def _alpha(self, Y: Floats) -> Floats:
         """Return J d = (Y'Y)^-1 Y'd [GD eq. 7]."""
-        alpha: Floats = np.linalg.solve(Y.T @ Y, Y.T @ self.d)
-        return alpha
+        return np.asarray(np.linalg.solve(Y.T @ Y, Y.T @ self.d), np.float64)

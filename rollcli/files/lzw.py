@@ -85,7 +85,7 @@ def _spelled(letters: NDArray[np.uint8], parents: NDArray[Any], lengths: NDArray
     """The strings one after the other, each written from its last letter to its first."""
     ends = np.cumsum(lengths, dtype=np.int64)
     text = np.empty(int(ends[-1]), np.uint8)
-    current = np.arange(len(lengths), dtype=np.int32)
+    current: NDArray[Any] = np.arange(len(lengths), dtype=np.int32)
     place = ends - 1
     left = lengths
     while len(current):

@@ -165,5 +165,5 @@ def _match(views: Views, first: int, count: int, options: StereoOptions) -> NDAr
         mode=MODES[options.mode],
     )
     sixteenths = matcher.compute(*views)
-    disparity: NDArray[np.float32] = np.maximum(sixteenths, 0) / np.float32(_SUBPIXELS)
+    disparity: NDArray[np.float32] = np.divide(np.maximum(sixteenths, 0), _SUBPIXELS, dtype=np.float32)
     return disparity

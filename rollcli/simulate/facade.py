@@ -1,10 +1,14 @@
 """House fronts: plaster, plinths, windows and doors, one look a house."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rollcli.simulate.texture import Values, band, bars, cell, coarse, fine
+
+_RIM = np.float32(0.1)  # the width of window frames, metres
 
 
 @dataclass(frozen=True)
@@ -22,7 +26,7 @@ class Facade:
     storeys: Values
     bays: Values
 
-    def _house(self, p: Values) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
+    def _house(self, p: Values) -> NDArray[Any]:
         return np.clip(np.searchsorted(self.edges, p) - 1, 0, len(self.levels) - 1)
 
     def colour(self, p: Values, q: Values) -> Values:
@@ -41,7 +45,7 @@ class Facade:
         low = np.where(door, np.float32(-1), np.float32(0.31) * storey)
         left, right, high = 0.30 * bay, 0.70 * bay, 0.79 * storey
         glass = band(x, left, right, w) * band(y, low, high, w)
-        frame = band(x, left - 0.1, right + 0.1, w) * band(y, low - 0.1, high + 0.1, w) - glass
+        frame = band(x, left - _RIM, right + _RIM, w) * band(y, low - _RIM, high + _RIM, w) - glass
         glass *= 1 - 0.8 * band(x, 0.49 * bay, 0.51 * bay, w)
         pane = (0.04 + 0.2 * own * y / storey) * (1 + 0.5 * np.clip(blotch, -1, 1))
         wall += np.maximum(frame, 0) * (np.float32(0.65) - wall)

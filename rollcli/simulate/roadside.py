@@ -82,7 +82,7 @@ def add_hedge(scene: Scene, rng: np.random.Generator, way: Way, lateral: float, 
     """A clipped hedge along the road."""
     tint = (0.42, 1.0, 0.62)
     material = scene.material(Leaves(draw(rng, 0.08, 0.16), 0.4, tint=tint, offset=draw_offset(rng)))
-    edges = np.arange(-20.0, 120.0, 1.0)
+    edges = np.arange(-20.0, 120.0, 1.0, dtype=np.float64)
     tops = base + draw(rng, 0.9, 1.8) + rng.uniform(-0.08, 0.08, len(edges) - 1)
     scene.surfaces.append(Wall(way.course, lateral, base, edges, tops, material))
 
@@ -100,7 +100,7 @@ def add_posts(
     metal = scene.material(Plain(draw(rng, 0.2, 0.6), 0.05, 0.05))
     gap = draw(rng, 18, 35)
     for z in np.arange(draw(rng, 6, gap), 90, gap):
-        scene.surfaces.append(Post(way.course.point(lateral, z, level), radius, height, metal))
+        scene.surfaces.append(Post(way.course.point(lateral, float(z), level), radius, height, metal))
 
 
 def add_trees(

@@ -161,7 +161,7 @@ def _draw(
     rng = _stream(rig.seed, index, _POSE)
     theta, phi = rng.uniform(*roll), rng.uniform(*pitch)
     kind = SCENES[rng.integers(len(SCENES))] if scene == MIXED else scene
-    bend = rng.choice([0.0, 1.0]) * rng.uniform(-0.001, 0.001)
+    bend: float = rng.choice([0.0, 1.0]) * rng.uniform(-0.001, 0.001)
     if curvature is not None:
         bend = rng.uniform(*curvature)
     elif kind == "bare":
