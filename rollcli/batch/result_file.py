@@ -2,7 +2,6 @@
 
 import contextlib
 import os
-import stat
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Protocol
@@ -11,7 +10,14 @@ from rollcli.batch.lock import lock
 from rollcli.errors import UsageError
 from rollcli.files.atomic import output_error
 from rollcli.files.results import Format, Row, format_header, format_row
-from rollcli.files.stream import STDOUT, STDOUT_NAME, stdout_descriptor, write_stream
+from rollcli.files.stream import (
+    STDOUT,
+    STDOUT_NAME,
+    is_stream,
+    open_stream,
+    stdout_descriptor,
+    write_stream,
+)
 
 _MORE_THAN_A_HEADER = 1000  # bytes
 
@@ -103,7 +109,7 @@ def open_sink(name: str, form: Format, *, resume: bool, overwrite: bool, timing:
         It cannot be written.
     """
     check_result(name, resume=resume, overwrite=overwrite)
-    if name == STDOUT or _is_stream(name):
+    if is_stream(name):
         yield from _open_stream(name, form, timing)
         return
     descriptor = _open_file(name)
@@ -120,7 +126,7 @@ def check_result(name: str, *, resume: bool, overwrite: bool) -> None:
     """Refuse to touch a result that is there, unless told how."""
     if resume and overwrite:
         raise UsageError("give either --resume or --overwrite")
-    if name == STDOUT or _is_stream(name):
+    if is_stream(name):
         if resume:
             raise UsageError("--resume needs a result file: name it with --output")
         return
@@ -138,23 +144,11 @@ def _has_rows(name: str) -> bool:
     return start not in (b"", format_header("csv"), format_header("csv", timing=True))
 
 
-def _is_stream(name: str) -> bool:
-    """A device or pipe that exists."""
-    try:
-        mode = Path(name).stat().st_mode
-    except OSError:
-        return False
-    return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
-
-
 def _open_stream(name: str, form: Format, timing: bool) -> Iterator[RowSink]:
     if name == STDOUT:
         yield RowStream(stdout_descriptor(), STDOUT_NAME, form, timing)
         return
-    try:
-        descriptor = os.open(name, os.O_WRONLY)
-    except OSError as error:
-        raise output_error(name, error) from error
+    descriptor = open_stream(name)
     try:
         yield RowStream(descriptor, name, form, timing)
     finally:

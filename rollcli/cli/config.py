@@ -7,6 +7,7 @@ from typing import Any
 import click
 
 from rollcli.cli.command import option
+from rollcli.cli.types import FilePath
 
 
 def _use(ctx: click.Context, param: click.Parameter, path: str | None) -> None:
@@ -69,7 +70,7 @@ def _key(declared: click.Option) -> str:
 
 config_option = option(
     "--config",
-    type=click.Path(),
+    type=FilePath(),
     metavar="FILE",
     is_eager=True,
     expose_value=False,

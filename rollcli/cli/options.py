@@ -14,10 +14,10 @@ from rollcli.batch.options import (
     RunningOptions,
 )
 from rollcli.cli.command import option, record
-from rollcli.cli.types import Number, NumberOrNan, Polygon, Roi
+from rollcli.cli.types import FilePath, Number, NumberOrNan, Polygon, Roi
 from rollcli.imaging.stereo_options import MODES, StereoOptions
 
-PATH = click.Path()  # whether it exists is said by who reads it, in the same words for every way to name it
+PATH = FilePath()  # whether it exists is said by who reads it, in the same words for every way to name it
 
 
 def _stereo(*, num_disparities: int | str, sgbm_mode: str, **values: Any) -> StereoOptions:

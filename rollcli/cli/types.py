@@ -12,6 +12,15 @@ else:
     _ParamType = click.ParamType
 
 
+class FilePath(click.Path):
+    """The name of a file or folder; an empty one, which would mean the current folder, is refused."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if value == "":
+            self.fail("the name is empty: is a variable unset?", param, ctx)
+        return super().convert(value, param, ctx)
+
+
 class Number(_ParamType):
     """A finite number within bounds, with its unit as the placeholder; "auto" where that is allowed."""
 

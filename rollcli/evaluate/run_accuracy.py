@@ -11,9 +11,8 @@ from rollcli.batch.report import FRAMES_FAILED
 from rollcli.evaluate.accuracy import Accuracy, assess
 from rollcli.evaluate.accuracy_text import FORMATS
 from rollcli.evaluate.truth import read_truth
-from rollcli.files.atomic import write_atomic
 from rollcli.files.results import read_result
-from rollcli.files.stream import STDOUT, write_stdout
+from rollcli.files.stream import is_stream, write_output
 
 
 def run_accuracy(result: str, truth: str, form: str, output: str, running: RunningOptions) -> int:
@@ -40,7 +39,7 @@ def run_accuracy(result: str, truth: str, form: str, output: str, running: Runni
     OutputError
         Exit status 1.
     """
-    writes = [] if output == STDOUT else [output]
+    writes = [] if is_stream(output) else [output]
     check_inputs_are_kept([result, truth], writes)
     if not running.overwrite:
         check_nothing_is_there(writes)
@@ -50,10 +49,7 @@ def run_accuracy(result: str, truth: str, form: str, output: str, running: Runni
     accuracy = assess(read_result(result).rows, read_truth(truth), result)
     _name_unmatched(accuracy, result, truth, running)
     data = FORMATS[form](accuracy).encode("utf-8", "surrogateescape")
-    if output == STDOUT:
-        write_stdout(data)
-    else:
-        write_atomic(output, data)
+    write_output(output, data)
     return FRAMES_FAILED if accuracy.no_angle else 0
 
 

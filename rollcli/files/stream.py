@@ -1,13 +1,62 @@
 """Bytes to standard output, pipes and devices."""
 
 import os
+import stat
 import sys
+from pathlib import Path
 
 from rollcli.errors import OutputError
-from rollcli.files.atomic import output_error
+from rollcli.files.atomic import output_error, write_atomic
 
 STDOUT = "-"  # how the command line names it
 STDOUT_NAME = "standard output"
+
+
+def is_stream(name: str) -> bool:
+    """Standard output, or a device or pipe that exists: nothing that could be replaced by a file."""
+    if name == STDOUT:
+        return True
+    try:
+        mode = Path(name).stat().st_mode
+    except OSError:
+        return False
+    return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
+
+
+def write_output(name: str, data: bytes) -> None:
+    """Write to standard output, into a device or pipe, or as a file that is whole or not there.
+
+    Raises
+    ------
+    OutputError
+        It cannot be written.
+    BrokenPipeError
+        The reader has had enough.
+    """
+    if name == STDOUT:
+        write_stdout(data)
+    elif is_stream(name):
+        descriptor = open_stream(name)
+        try:
+            write_stream(descriptor, data, name)
+        finally:
+            os.close(descriptor)
+    else:
+        write_atomic(name, data)
+
+
+def open_stream(name: str) -> int:
+    """Open a device or pipe to write to.
+
+    Raises
+    ------
+    OutputError
+        It cannot be written.
+    """
+    try:
+        return os.open(name, os.O_WRONLY)
+    except OSError as error:
+        raise output_error(name, error) from error
 
 
 def write_stdout(data: bytes) -> None:

@@ -14,9 +14,8 @@ from rollcli.batch.report import FRAMES_FAILED, INTERRUPTED, Report
 from rollcli.batch.signals import stop_on_signals
 from rollcli.batch.workers import Work
 from rollcli.errors import InputError
-from rollcli.files.atomic import write_atomic
 from rollcli.files.results import Result, read_result, run_path
-from rollcli.files.stream import STDOUT, write_stdout
+from rollcli.files.stream import is_stream, write_output
 from rollcli.report.choice import Choice, choose
 from rollcli.report.options import ReportOptions
 from rollcli.report.page import require_extra
@@ -59,7 +58,7 @@ def make_report(options: ReportOptions) -> int:
         options.result,
         *(path for each in found for path in (*each.frame.reads(), *each.images.values())),
     ]
-    writes = [] if options.output == STDOUT else [options.output]
+    writes = [] if is_stream(options.output) else [options.output]
     check_inputs_are_kept(reads, writes)
     if not options.running.overwrite:
         check_nothing_is_there(writes)
@@ -84,10 +83,7 @@ def _write(
         report.say("interrupted; nothing is written")
         return INTERRUPTED
     page = report_page(result, options, list(zip(chosen, pictures, strict=True)))
-    if options.output == STDOUT:
-        write_stdout(page)
-    else:
-        write_atomic(options.output, page)
+    write_output(options.output, page)
     missing = [each.missing for each in pictures if each.empty]
     for reason in missing[:_REASONS]:
         report.say(f"no picture of {reason}")

@@ -11,6 +11,7 @@ from rollcli.cli.main import COMMANDS, main
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.files.results import columns
 from tests.program import ROOT
+from tests.readme_tables import commands
 
 ESTIMATE = main.get_command(click.Context(main), "estimate")
 
@@ -44,3 +45,17 @@ def test_every_column_and_exit_status_is_documented_in_the_readme():
     readme = (ROOT / "README.md").read_text("utf-8")
     assert [name for name in columns(timing=True) if f"`{name}`" not in readme] == []
     assert all(f"\n| {status} | " in readme for status in (0, 1, 2, 3, 130))
+
+
+PATHS = [
+    (ctx, param)
+    for _, ctx in commands()
+    for param in ctx.command.params
+    if isinstance(param.type, click.Path)
+]
+
+
+@pytest.mark.parametrize(("ctx", "param"), PATHS, ids=lambda each: getattr(each, "name", None) or "of")
+def test_an_empty_name_is_never_taken_for_the_current_folder(ctx, param):
+    with pytest.raises(click.BadParameter, match="the name is empty: is a variable unset"):
+        param.type_cast_value(ctx, ("",) if param.nargs == -1 else "")

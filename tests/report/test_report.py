@@ -2,8 +2,10 @@
 
 import html
 import json
+import os
 import re
 import shutil
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -239,3 +241,13 @@ def test_a_result_from_a_pipe_and_a_page_to_one(folder):
     assert done.out.endswith("</html>")
     assert len(PICTURES.findall(done.out)) == 4
     assert not (folder / "-").exists()
+
+
+def test_a_page_to_a_device_or_pipe_goes_into_it_and_leaves_it_there(folder):
+    pipe = folder / "pipe"
+    os.mkfifo(pipe)
+    with ThreadPoolExecutor() as reader:
+        page = reader.submit(pipe.read_text, "utf-8")
+        assert rollcli("report", "out/rolls.csv", "-o", "pipe", "--gallery", "0", cwd=folder).status == 0
+    assert page.result().endswith("</html>")
+    assert pipe.is_fifo()
