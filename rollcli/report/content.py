@@ -12,7 +12,7 @@ from rollcli.report.options import ReportOptions
 from rollcli.report.page import render_page
 from rollcli.report.pictures import Pictures
 from rollcli.report.roll_chart import roll_chart
-from rollcli.report.summary import degrees, option_lines, summarize
+from rollcli.report.summary import degrees, frame_count, option_lines, summarize
 from rollcli.report.view import outside
 
 _LISTED = 100  # doubtful frames on the page; the result has all
@@ -28,7 +28,7 @@ def report_page(result: Result, options: ReportOptions, shown: Sequence[tuple[Ch
     return render_page(
         "rollcli.report",
         "report.html",
-        title=options.title or f"Roll of {_frames(len(rows))}",
+        title=options.title or f"Roll of {frame_count(len(rows))}",
         result=options.result,
         version=run.get("rollcli"),
         page_version=__version__,
@@ -46,10 +46,6 @@ def report_page(result: Result, options: ReportOptions, shown: Sequence[tuple[Ch
     )
 
 
-def _frames(count: int) -> str:
-    return f"{count:,} frame" + ("" if count == 1 else "s")
-
-
 def _chosen_text(rows: Sequence[Row], choices: Sequence[Choice]) -> str:
     """Which frames the gallery shows, in words."""
     angled = sum(row.roll_deg is not None for row in rows)
@@ -58,12 +54,12 @@ def _chosen_text(rows: Sequence[Row], choices: Sequence[Choice]) -> str:
     counts = {reason: sum(each.reason == reason for each in choices) for reason in (WIDEST, SUSPECT, SPREAD)}
     parts = {
         WIDEST: "the {} with the widest interval",
-        SUSPECT: "{} of the other suspect ones",
-        SPREAD: "{} evenly spread over the rest",
+        SUSPECT: "{} of the other suspect ones" if counts[WIDEST] else "{} of the suspect ones",
+        SPREAD: "{} evenly spread" + (" over the rest" if len(choices) > counts[SPREAD] else ""),
     }
     words = [parts[reason].format(count) for reason, count in counts.items() if count]
     listed = " and ".join(filter(None, [", ".join(words[:-1]), words[-1]]))
-    return f"{len(choices)} of {_frames(angled)} that have an angle: {listed}."
+    return f"{len(choices)} of {frame_count(angled)} that have an angle: {listed}."
 
 
 def _card(rows: Sequence[Row], choice: Choice, pictures: Pictures) -> dict[str, Any]:
@@ -75,6 +71,7 @@ def _card(rows: Sequence[Row], choice: Choice, pictures: Pictures) -> dict[str, 
         "row": row,
         "reason": choice.reason,
         "missing": pictures.missing,
+        "empty": pictures.empty,
         "pairs": [
             [
                 ("Map", "map", _data_uri(pictures.map), aspect),

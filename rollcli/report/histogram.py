@@ -13,8 +13,8 @@ from rollcli.report.page import Chart
 from rollcli.report.summary import degrees
 from rollcli.report.view import view
 
-_BINS = 40
-_NARROWEST = 0.1  # degrees
+_MOST_BINS = 40
+_NARROWEST = 0.01  # degrees
 _FEW = 6
 _ROUND = (1, 2, 2.5, 5, 10)
 
@@ -24,7 +24,7 @@ def histogram(rows: Sequence[Row]) -> Chart:
     low, high = view(rows)
     shown = [row.roll_deg for row in rows if row.roll_deg is not None and low <= row.roll_deg <= high]
     low, high = min(shown, default=low), max(shown, default=high)
-    step = _step(max(high - low, _NARROWEST) / _BINS)
+    step = _step(max((high - low) / _bins(len(shown)), _NARROWEST))
     edges = np.arange(math.floor(low / step), math.floor(high / step) + 2) * step
     spans = [f"{degrees(start, 3)} to {degrees(end, 3)}" for start, end in pairwise(edges.tolist())]
     data = []
@@ -33,7 +33,8 @@ def histogram(rows: Sequence[Row]) -> Chart:
         bars = {
             "type": "bar",
             "name": status,
-            "x": np.round(edges[:-1] + step / 2, 6).tolist(),
+            "x": np.round(edges[:-1], 6).tolist(),
+            "offset": 0,
             "y": np.histogram(rolls, edges)[0].tolist(),
             "width": step,
             "marker": {"color": colour, "line": {"color": "@card", "width": 1}},
@@ -43,11 +44,16 @@ def histogram(rows: Sequence[Row]) -> Chart:
         data += [bars] if rolls else []
     layout = {
         "barmode": "stack",
-        "showlegend": len(data) > 1,
+        "showlegend": [trace["name"] for trace in data] != ["ok"],
         "xaxis": {"title": {"text": "roll, degrees"}, "range": _padded(edges, step), "zeroline": False},
         "yaxis": {"title": {"text": "frames"}, "rangemode": "tozero", **_whole_ticks(shown, edges)},
     }
     return Chart("histogram", "How many frames have which roll", data, layout)
+
+
+def _bins(count: int) -> int:
+    """A few for few frames, so that bars are higher than one."""
+    return min(_MOST_BINS, max(5, math.ceil(2 * math.sqrt(count))))
 
 
 def _whole_ticks(rolls: Sequence[float], edges: NDArray[Any]) -> dict[str, Any]:
@@ -57,8 +63,9 @@ def _whole_ticks(rolls: Sequence[float], edges: NDArray[Any]) -> dict[str, Any]:
 
 
 def _padded(edges: NDArray[Any], step: float) -> list[float]:
-    """A single bar has some room about it."""
-    margin = max(step, 0.02 * float(np.ptp(edges)))
+    """A single bar is no wall."""
+    width = float(np.ptp(edges))
+    margin = max(0.02 * width, (_FEW * step - width) / 2)
     return [float(edges[0]) - margin, float(edges[-1]) + margin]
 
 

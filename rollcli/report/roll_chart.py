@@ -11,6 +11,7 @@ from rollcli.report.summary import degrees
 from rollcli.report.view import view
 
 _MANY = 400  # up to so many frames each has a dot, and marks are large
+_FEW = 10
 _LONGEST_NAME = 44  # in a hover label, so that it fits a narrow screen
 _FAILED_AT = 0.035  # of the chart's height
 _BRIDGED = 3  # so many suspect frames in a row do not break the line
@@ -27,16 +28,21 @@ def roll_chart(rows: Sequence[Row]) -> Chart:
     failed = [each for each in numbered if each[1].status == "error"]
     sure = [each for each in numbered if each[1].status == "ok" and each[1].roll_deg is not None]
     failures = {number for number, row in numbered if row.roll_deg is None}
-    data = [_band(sure, failures), _line(sure, failures)]
-    data += [_suspect(suspect)] if suspect else []
-    data += [_failed(failed)] if failed else []
+    data = [_band(sure, failures), _line(sure, failures), _suspect(suspect), _failed(failed)]
+    data = [trace for trace in data if trace["x"]]  # plotly's legend stumbles over what is empty
     for trace in data:
         trace["marker"] = {"size": 8 if len(rows) <= _MANY else 6, **trace.get("marker", {})}
     margin = max(0.5, 0.01 * len(rows))
     layout = {
         "hovermode": "closest",
         "hoverdistance": -1,
-        "xaxis": {"title": {"text": "frame"}, "range": [1 - margin, len(rows) + margin], "zeroline": False},
+        "showlegend": True,
+        "xaxis": {
+            "title": {"text": "frame"},
+            "range": [1 - margin, len(rows) + margin],
+            "zeroline": False,
+            **({"dtick": 1} if len(rows) <= _FEW else {}),  # there are no half frames
+        },
         "yaxis": {"title": {"text": "roll, degrees"}, "range": list(view(rows)), "zeroline": True},
         "yaxis2": {"overlaying": "y", "range": [0, 1], "visible": False, "fixedrange": True},
     }

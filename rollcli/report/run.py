@@ -20,6 +20,7 @@ from rollcli.report.choice import Choice, choose
 from rollcli.report.options import ReportOptions
 from rollcli.report.page import require_extra
 from rollcli.report.sources import Subject, subjects
+from rollcli.report.summary import frame_count
 
 if TYPE_CHECKING:
     from rollcli.report.pictures import Pictures
@@ -89,10 +90,11 @@ def _write(
         report.say(f"no picture of {reason}")
     if missing:
         report.say(
-            f"{len(missing)} of {len(pictures)} frames lack pictures: run where estimate ran, name what it "
-            "wrote with --images, or leave pictures out with --gallery 0"
+            f"{len(missing)} of {frame_count(len(pictures))} without pictures: run where estimate ran, name "
+            "what it wrote with --images, or leave pictures out with --gallery 0"
         )
-    report.note(f"{options.output}: pictures of {len(found)} frames, {len(page) / 1e6:.1f} MB")
+    shown = len(pictures) - len(missing)
+    report.note(f"{options.output}: pictures of {frame_count(shown)}, {len(page) / 1e6:.1f} MB")
     return FRAMES_FAILED if missing else 0
 
 

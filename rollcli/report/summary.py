@@ -60,3 +60,8 @@ def _shown(value: Any) -> str:
         between = " " if isinstance(value[0], list) else ","
         return between.join(map(_shown, value))
     return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def frame_count(count: int) -> str:
+    """How many frames, in words."""
+    return f"{count:,} frame" + ("" if count == 1 else "s")

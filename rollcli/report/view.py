@@ -11,6 +11,8 @@ _WIDEST = 1.0  # degrees: a wider interval is seen to leave the view
 def view(rows: Sequence[Row]) -> tuple[float, float]:
     """The ends of the view, degrees: all angles that are ok, and suspect ones unless they lie far off."""
     angled = [row for row in rows if row.roll_deg is not None]
+    if not angled:
+        return -1.0, 1.0
     low, high = _span([row for row in angled if row.status == "ok"] or angled)
     beyond = _BEYOND * (high - low) + 0.5
     low, high = _span(row for row in angled if low - beyond <= (row.roll_deg or 0.0) <= high + beyond)
@@ -31,4 +33,4 @@ def _span(rows: Iterable[Row]) -> tuple[float, float]:
         for row in rows
         for side in (-1, 1)
     ]
-    return min(ends, default=0.0), max(ends, default=0.0)
+    return min(ends), max(ends)

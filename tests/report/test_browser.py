@@ -6,6 +6,7 @@ import re
 import pytest
 
 from tests.program import road_map, rollcli, write_kitti, write_maps
+from tests.report.results import row, write_result
 
 pytest.importorskip("plotly", reason="plotly, of the extra report, is not here")
 pytest.importorskip("jinja2", reason="jinja2, of the extra report, is not here")
@@ -29,7 +30,7 @@ PLACE = """name => {
 def url(tmp_path_factory):
     folder = tmp_path_factory.mktemp("report")
     write_maps(folder / "maps", 12)
-    write_kitti(folder / NAME, road_map(0.02))
+    write_kitti(folder / NAME, road_map(0.02, width=480))
     (folder / "maps" / "frame5.png").write_bytes(b"")
     rollcli("estimate", "maps", "--recursive", "-o", "rolls.csv", "--max-roll", "5", cwd=folder)
     assert rollcli("report", "rolls.csv", "-o", "page.html", cwd=folder).status == 0
@@ -42,7 +43,7 @@ def opened(browser, url):
     complaints = []
     with contextlib.ExitStack() as stack:
 
-        def open_page(width=1280, scheme="light"):
+        def open_page(width=1280, scheme="light", url=url):
             context = browser.new_context(
                 viewport={"width": width, "height": 900}, color_scheme=scheme, offline=True
             )
@@ -89,6 +90,23 @@ def test_the_charts_are_there(opened):
     assert [text for text in ("95 % interval", "roll", "failed") if text not in legend] == []
 
 
+@pytest.mark.parametrize(
+    "rows",
+    [
+        [row("a.png", None)] * 30,
+        [row("a.png", 3.0, None, "suspect")],
+        [row("a.png", 3.0, None)] * 3,
+        [row("a.png", 0.0, 0.0)] * 500,
+    ],
+)
+def test_a_result_of_one_kind_of_frame_has_a_page_without_complaint(opened, tmp_path, rows):
+    write_result(tmp_path / "rolls.csv", rows)
+    done = rollcli("report", "rolls.csv", "-o", "page.html", "--gallery", "0", cwd=tmp_path)
+    assert done.status == 0
+    page = opened(url=(tmp_path / "page.html").as_uri())
+    assert page.locator("#roll .legendtext").count() >= 1
+
+
 def test_hovering_shows_the_name_of_the_frame_as_text(opened):
     page = opened()
     for name in ("maps/frame3.png", "maps/frame5.png", NAME):
@@ -132,6 +150,29 @@ def test_the_keyboard_alone_opens_a_picture_and_its_buttons_are_named(opened):
     assert len(set(names)) == len(names) == 4 * 12
 
 
+def test_an_enlarged_wide_map_leaves_no_empty_space_and_the_buttons_stay_where_they_are(opened):
+    page = opened()
+    page.locator(f".pictures button[data-caption='{NAME}: map']").click()
+    shown, next_one = page.locator("dialog img"), page.get_by_role("button", name="Next picture")
+    image, place = shown.bounding_box(), next_one.bounding_box()
+    assert image["width"] / image["height"] == pytest.approx(4, rel=0.01)
+    assert page.locator("dialog").bounding_box()["height"] - image["height"] < 100
+    next_one.click()
+    assert shown.bounding_box()["height"] > 1.5 * image["height"]
+    assert next_one.bounding_box() == place
+
+
+def test_on_a_narrow_screen_a_wide_map_is_enlarged_beyond_the_screen_and_is_moved_about(opened):
+    page = opened(width=400)
+    button = page.locator(".pictures button").first
+    small = button.locator("img").bounding_box()
+    button.click()
+    large = page.locator("dialog img").bounding_box()
+    assert large["height"] > 2 * small["height"]
+    assert large["width"] / large["height"] == pytest.approx(4 / 3, rel=0.01)
+    assert page.evaluate("document.querySelector('dialog div').scrollLeft") > 0
+
+
 @pytest.mark.parametrize("width", [400, 1280])
 def test_nothing_is_cut_off_or_too_small_to_read(opened, width):
     page = opened(width=width)
@@ -157,8 +198,9 @@ def test_text_stands_out_in_light_and_dark_mode(opened, scheme):
     ground, card = style(page, "body", "backgroundColor"), style(page, "section", "backgroundColor")
     assert (luminance(card) < 0.05) == (scheme == "dark")
     assert contrast(style(page, "h1", "color"), ground) > 7
-    for selector in ("td", ".note", "figure p", ".pictures span", ".pill", ".options span"):
-        assert contrast(style(page, selector, "color"), card) > 4, selector
+    texts = ("td", ".note", "figure p", ".pictures span", ".pill.suspect", ".pill.error", ".options span")
+    for selector in texts:
+        assert contrast(style(page, selector, "color"), card) > 4.5, selector
     for selector in ("#roll .xtick text", "#roll .legendtext", "#histogram .ytick text"):
         assert contrast(style(page, selector, "fill"), card) > 7, selector
 

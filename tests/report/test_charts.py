@@ -67,6 +67,17 @@ def test_every_angle_within_the_view_is_in_the_histogram():
     assert 20 <= len(bars["ok"]["y"]) <= 50
 
 
+@pytest.mark.parametrize("count", [1, 2, 18, 40])
+def test_few_frames_have_few_bars_and_single_ones_are_no_walls(count):
+    chart = histogram([row(f"{i}.png", 3 + i / 100) for i in range(count)])
+    (bars,) = chart.data
+    low, high = chart.layout["xaxis"]["range"]
+    assert sum(bars["y"]) == count
+    assert len(bars["y"]) <= 2 * np.sqrt(count) + 4
+    assert bars["width"] >= 0.01
+    assert bars["width"] < (high - low) / 4
+
+
 def test_an_angle_far_off_does_not_flatten_the_others():
     rows = [row(f"{i}.png", 1 + i / 100) for i in range(100)] + [row("off.png", -80.0, 0.1, "suspect")]
     low, high = view(rows)
@@ -80,6 +91,22 @@ def test_a_single_row_of_any_kind_has_a_chart(rows):
     low, high = view(rows)
     assert low < high
     assert sum(len(trace["x"]) for trace in roll_chart(rows).data) >= 1
+
+
+@pytest.mark.parametrize(
+    ("rows", "named"),
+    [
+        ([row("a.png", None)], ["failed"]),
+        ([row("a.png", 3.0, None, "suspect")], ["suspect"]),
+        ([row("a.png", 3.0, 0.1)], ["95 % interval", "roll"]),
+    ],
+)
+def test_the_legend_names_what_is_there_even_if_it_is_one_thing(rows, named):
+    chart = roll_chart(rows)
+    assert chart.layout["showlegend"]
+    assert [trace["name"] for trace in chart.data] == named
+    assert chart.layout["xaxis"]["dtick"] == 1
+    assert "dtick" not in roll_chart(rows * 100).layout["xaxis"]
 
 
 def test_the_summary_counts_and_takes_the_median():

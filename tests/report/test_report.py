@@ -129,8 +129,10 @@ def test_maps_that_are_gone_leave_a_page_that_says_so_and_status_3(folder):
     done = report(folder, "out/rolls.csv")
     assert done.status == 3
     assert "maps/frame1.png: no such file" in done.err
-    assert "1 of 3 frames lack pictures" in done.err
+    assert "1 of 3 frames without pictures" in done.err
     assert len(PICTURES.findall(page_of(folder))) == 8
+    assert page_of(folder).count("maps/frame1.png: no such file") == 1
+    assert "page.html: pictures of 2 frames, " in done.err
     assert report(folder, "out/rolls.csv", "--gallery", "0", "--overwrite").status == 0
     assert not PICTURES.search(page_of(folder))
 
