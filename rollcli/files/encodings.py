@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.errors import OutputError, UsageError
+from rollcli.errors import InputError, UsageError
 from rollcli.files.formats import Stored, decode_mask, read_bytes, read_stored
 
 
@@ -125,7 +125,7 @@ def from_disparity(
     ------
     UsageError
         Unknown encoding.
-    OutputError
+    InputError
         More than one in a hundred disparities is too large for the dtype. Fewer become no data.
     """
     kind = np.dtype(dtype)
@@ -205,8 +205,8 @@ def _without_overflow(
     fits: NDArray[np.bool_] = valid & (numbers <= top)
     lost = np.count_nonzero(valid) - np.count_nonzero(fits)
     if lost > 0.01 * np.count_nonzero(valid):
-        raise OutputError(
+        raise InputError(
             f"disparities up to {top_px * float(numbers[valid].max()) / top:.0f} px do not fit numbers "
-            f"that end at {top_px:.0f} px: store them as TIFF or NPY"
+            f"that end at {top_px:.0f} px: give --save-as tiff or npy"
         )
     return fits

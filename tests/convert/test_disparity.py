@@ -1,5 +1,6 @@
 """`rollcli disparity`: one map a pair, as stereo matching has it."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 from rollcli.files.encodings import read_disparity
 from rollcli.files.formats import read_image, read_stored
 from rollcli.imaging.stereo import compute_disparity
-from tests.program import ROOT, contents, rollcli
+from tests.program import ROOT, contents, road_map, rollcli, write_pair
 
 ROADS = ROOT.parent / "shared" / "roads"
 
@@ -71,6 +72,19 @@ def test_a_pair_that_cannot_be_matched_costs_itself_alone(pairs, tmp_path):
     assert done.status == 3
     assert f"left/{first.name}: " in done.err
     assert len(contents(tmp_path / "maps")) in (1, 2)  # the second is an image, if no left one
+
+
+@pytest.mark.parametrize("program", [["disparity", "-o"], ["estimate", "-o", "rolls.csv", "--disparity"]])
+def test_a_pair_too_near_for_16_bits_costs_itself_alone_and_says_what_to_do(tmp_path, program):
+    for name, near in (("a.png", 0), ("b.png", 280), ("c.png", 0)):
+        write_pair(tmp_path, name, road_map(0.02, width=900) / 2 + near)
+    line = [*program, "maps", "--left", "left", "--right", "right", "--num-disparities", "352"]
+    done = rollcli(*line, cwd=tmp_path)
+    assert done.status == 3
+    assert re.search("left/b.png: disparities up to 3.. px do not fit .* 256 px: give --save-as", done.err)
+    assert sorted(contents(tmp_path / "maps")) == ["a.png", "c.png"]
+    assert rollcli(*line, "--save-as", "tiff", "--overwrite", cwd=tmp_path).status == 0
+    assert read_disparity(tmp_path / "maps" / "b.tif").max() > 300
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from rollcli.errors import InputError, OutputError, UsageError
+from rollcli.errors import InputError, UsageError
 from rollcli.files.encodings import Encoding, from_disparity, read_disparity, read_mask, to_disparity
 from rollcli.files.formats import Stored, encode_stored
 from tests.making import disparity_map, make_png, make_tiff
@@ -165,7 +165,7 @@ def test_disparities_beyond_the_numbers_are_refused_and_a_few_are_dropped():
     assert from_disparity(disparity, "kitti")[0, :2].tolist() == [0, 25600]
 
     disparity[0] = 300
-    with pytest.raises(OutputError, match="disparities up to 300 px do not fit numbers that end at 256 px"):
+    with pytest.raises(InputError, match="disparities up to 300 px do not fit numbers that end at 256 px"):
         from_disparity(disparity, "kitti")
 
 
