@@ -12,7 +12,7 @@ from rollcli.convert.options import DerotateOptions, TurnOptions
 
 
 def _turn(*, roll: float | None, **values: Any) -> TurnOptions:
-    return TurnOptions(roll_deg=roll, **values)
+    return TurnOptions(roll_deg=roll, result=values.pop("from"), **values)
 
 
 turn_options = record(
@@ -26,7 +26,6 @@ turn_options = record(
     ),
     option(
         "--from",
-        "result",
         type=PATH,
         metavar="RESULT",
         help="The angle of each map, from what `rollcli estimate` wrote; matched by stem.",

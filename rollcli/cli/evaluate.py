@@ -50,6 +50,7 @@ def evaluate(ctx: click.Context) -> None:
 
 @evaluate.command(
     cls=Command,
+    short_help="Errors of a result against known angles.",
     examples=[
         (
             "Angles against those of `simulate`",
@@ -77,7 +78,6 @@ def evaluate(ctx: click.Context) -> None:
 )
 @option(
     "--format",
-    "form",
     type=click.Choice(["table", "csv", "json"]),
     default="table",
     section="Figures",
@@ -87,7 +87,7 @@ def evaluate(ctx: click.Context) -> None:
 @config_option
 @click.pass_context
 def accuracy(
-    ctx: click.Context, /, result: str, truth: str, output: str, form: str, running: RunningOptions, **_: Any
+    ctx: click.Context, /, result: str, truth: str, output: str, running: RunningOptions, **options: Any
 ) -> None:
     """How far the angles of RESULT, which estimate wrote, are from known ones.
 
@@ -96,11 +96,13 @@ def accuracy(
     """
     from rollcli.evaluate.run_accuracy import run_accuracy
 
-    ctx.exit(run_accuracy(result, truth, form, output, running))
+    ctx.exit(run_accuracy(result, truth, options["format"], output, running))
 
 
 @evaluate.command(
-    cls=Command, examples=[("The page, and its CSVs", "rollcli evaluate paper maps/ -o paper/")]
+    cls=Command,
+    short_help="The paper's tables and figures on your maps.",
+    examples=[("The page, and its CSVs", "rollcli evaluate paper maps/ -o paper/")],
 )
 @input_options
 @experiment_options

@@ -213,7 +213,7 @@ save_as_option = option(
     section="Output",
     type=click.Choice(["png", "tiff", "npy"]),
     default="png",
-    help="Format of maps computed from pairs: 16-bit KITTI PNG, float32 TIFF or float32 NPY.",
+    help="Format of maps computed from pairs: 16-bit KITTI PNG (to 256 px), float32 TIFF or float32 NPY.",
 )
 
 output_folder_option = option(

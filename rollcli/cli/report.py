@@ -34,14 +34,14 @@ from rollcli.report.options import GALLERY, ReportOptions
     section="Page",
     help="Where the page goes (-: stdout).",
 )
-@option("--title", metavar="TEXT", section="Page", help="Its heading.  [default: what it is about]")
+@option("--title", metavar="TEXT", section="Page", help="Its heading.  [default: Roll of N frames]")
 @option(
     "--images",
     type=PATH,
     metavar="DIR",
     section="Page",
-    help="Take pictures from here: the folder of the folders that estimate wrote images to, or one of "
-    "these.  [default: make them from the inputs]",
+    help="A folder that estimate wrote images to, or the folder above: show these.  [default: make them "
+    "from the inputs]",
 )
 @option(
     "--gallery",
@@ -60,7 +60,7 @@ def report(ctx: click.Context, /, **options: Any) -> None:
     each roll occurs; a summary; and a gallery of maps before and after de-rotation with their v-disparity
     images. One file that opens from disk without a network.
 
-    Files are looked for where the result's names say, from here or from the result's folder. The page needs
+    Inputs are looked for under the names that RESULT gives them, from here or from its folder. The page needs
     the extra: pip install "rollcli[report]".
     """
     from rollcli.report.run import make_report

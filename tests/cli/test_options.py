@@ -59,3 +59,14 @@ PATHS = [
 def test_an_empty_name_is_never_taken_for_the_current_folder(ctx, param):
     with pytest.raises(click.BadParameter, match="the name is empty: is a variable unset"):
         param.type_cast_value(ctx, ("",) if param.nargs == -1 else "")
+
+
+OPTIONS = [
+    (ctx, param) for _, ctx in commands() for param in ctx.command.params if isinstance(param, click.Option)
+]
+
+
+@pytest.mark.parametrize(("ctx", "param"), OPTIONS, ids=lambda each: getattr(each, "name", None) or "of")
+def test_the_environment_and_config_files_call_an_option_by_its_flag(ctx, param):
+    flag = max(param.opts, key=len).removeprefix("--")
+    assert param.name == flag.replace("-", "_")
