@@ -123,14 +123,23 @@ def test_its_makefile_stops_at_a_pair_that_cannot_be_matched(pairs):
 
 @needs_make
 def test_its_makefile_stops_at_a_map_without_an_angle(pairs):
-    (pairs / "maps" / "other.png").write_bytes(b"no map")
-    touch(pairs / "maps" / "frame_0001.png")
+    (pairs / "maps" / "frame_0001.png").write_bytes(b"no map")
     for _ in range(2):
         done = make(pairs)
         assert done.returncode != 0
-        assert "maps/other.png: is" in done.stderr
+        assert "maps/frame_0001.png: is" in done.stderr
         assert "rollcli report" not in done.stdout
         assert not (pairs / "rolls.csv").exists()
+
+
+@needs_make
+def test_its_makefile_leaves_out_the_map_of_a_pair_that_is_gone(pairs):
+    for side in ("left", "right"):
+        (pairs / side / "frame_0002.png").unlink()
+    touch(pairs / "left" / "frame_0001.png")
+    assert make(pairs).returncode == 0
+    files = [line.split(",")[0] for line in (pairs / "rolls.csv").read_text().splitlines()[1:]]
+    assert files == ["maps/frame_0001.png", "maps/frame_0003.png"]
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])

@@ -1,0 +1,25 @@
+"""What keeps the project in order agrees with what the project says of itself."""
+
+import re
+
+from tests.program import ROOT
+
+
+def found(pattern, *parts):
+    """Every match in a file of the project; there is at least one."""
+    matches = re.findall(pattern, ROOT.joinpath(*parts).read_text("utf-8"))
+    assert matches, (pattern, parts)
+    return matches
+
+
+def test_hooks_check_with_the_oldest_ruff_that_developers_may_have():
+    (oldest,) = found(r'"ruff>=([\d.]+)"', "pyproject.toml")
+    (rev,) = found(r"ruff-pre-commit\n\s+rev: v([\d.]+)", ".pre-commit-config.yaml")
+    assert rev == oldest
+
+
+def test_ci_runs_on_every_python_that_the_package_names():
+    named = found(r"Python :: (3\.\d+)", "pyproject.toml")
+    (matrix,) = found(r"python: \[(.*)\]", ".github", "workflows", "ci.yml")
+    assert re.findall(r"[\d.]+", matrix) == named
+    assert found(r"run: (\S+)", ".github", "workflows", "ci.yml") == [".ci/run"]
