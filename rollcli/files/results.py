@@ -83,11 +83,16 @@ def format_row(row: Row, form: Format, timing: bool = False) -> bytes:
     """One line; the same row gives the same bytes."""
     texts = {name: _text(name, getattr(row, name)) for name in columns(timing)}
     if form == "csv":
-        buffer = io.StringIO()
-        csv.writer(buffer, lineterminator="\n").writerow(texts.values())
-        return buffer.getvalue().encode(**TEXT)
+        return (",".join(map(_quoted, texts.values())) + "\n").encode(**TEXT)
     values = {name: _json_value(name, getattr(row, name), text) for name, text in texts.items()}
     return json.dumps(values).encode() + b"\n"
+
+
+def _quoted(text: str) -> str:
+    """A field of CSV; the csv module quotes a carriage return only from Python 3.13 on."""
+    if not any(special in text for special in ',"\r\n'):
+        return text
+    return '"' + text.replace('"', '""') + '"'
 
 
 def _text(name: str, value: Any) -> str:
@@ -150,7 +155,7 @@ def read_run(path: str | Path) -> Mapping[str, Any] | None:
         return None
     try:
         run = json.loads(_read(record))
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise InputError(f"{record}: is not JSON: {error}") from error
     if not isinstance(run, dict):
         raise InputError(f"{record}: is not the record of a run")

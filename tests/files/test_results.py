@@ -37,6 +37,13 @@ def test_a_row_of_csv_has_fixed_digits_and_rfc_4180_quotes():
     )
 
 
+@pytest.mark.parametrize("text", ["a,b", 'a"b', "a\nb", "a\rb", "\r"])
+def test_what_csv_gives_a_meaning_is_quoted(text):
+    line = format_row(Row(file=text), "csv")
+    assert line.startswith(b'"' + text.replace('"', '""').encode() + b'",')
+    assert parse_rows(format_header("csv") + line, "x") == (Row(file=text),)
+
+
 def test_an_error_row_holds_no_numbers():
     assert format_row(FAILED, "csv") == b"maps/b.png,,error" + b"," * 15 + b"maps/b.png: is empty\n"
 
