@@ -70,8 +70,8 @@ def do(frame: Frame, options: FrameOptions) -> Outcome:
 
 def failed(frame: Frame, reason: str) -> Outcome:
     """The row of a frame without an angle; one line that names the file."""
-    line = " ".join(reason.split())
-    named = line if line.startswith((frame.file, frame.right_file or frame.file)) else f"{frame.file}: {line}"
+    line, *names = (" ".join(text.split()) for text in (reason, frame.file, frame.right_file or frame.file))
+    named = line if line.startswith(tuple(names)) else f"{names[0]}: {line}"
     return Outcome(Row(frame.file, frame.right_file, "error", message=named))
 
 
