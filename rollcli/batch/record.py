@@ -42,8 +42,8 @@ class RunRecord:
 
     def continue_from(self, earlier: Mapping[str, Any]) -> None:
         """Take over what the interrupted run has seen."""
-        self._encodings.update(earlier.get("encoding") or ())
-        self._searched = list(earlier.get("disparities_searched_px") or ())
+        self._encodings.update(earlier["encoding"])
+        self._searched = list(earlier["disparities_searched_px"])
 
     def saw(self, encoding: str, searched: tuple[int, int] | None) -> None:
         """Note how a frame was read; on file before its row is."""
@@ -70,41 +70,69 @@ class RunRecord:
 
 def check_resumable(
     rows: Sequence[Row], run: Mapping[str, Any] | None, record: RunRecord, plan: Plan
-) -> None:
+) -> Mapping[str, Any]:
     """Refuse to continue a result that another version, other options or other inputs began.
+
+    Returns
+    -------
+    mapping
+        The record of the run that began it.
 
     Raises
     ------
     UsageError
         Says what differs.
     """
+    record_name = run_path(plan.output).name
     if run is None:
-        raise UsageError(
-            f"{plan.output}: cannot be resumed without {run_path(plan.output).name}; --overwrite starts anew"
-        )
+        raise not_resumable(plan.output, f"there is no {record_name}")
+    if not _is_whole(run):
+        raise not_resumable(plan.output, f"{record_name} is damaged")
     for difference in _differences(rows, run, record.fixed, plan):
-        raise UsageError(f"{plan.output}: cannot be resumed: {difference}; --overwrite starts anew")
+        raise not_resumable(plan.output, difference)
+    return run
+
+
+def not_resumable(name: str, reason: str) -> UsageError:
+    """The error that refuses to continue a result, in one line that says what to do."""
+    return UsageError(f"{name}: cannot be resumed: {reason}; --overwrite starts anew")
 
 
 def _differences(
     rows: Sequence[Row], was: Mapping[str, Any], now: Mapping[str, Any], plan: Plan
 ) -> Iterator[str]:
-    if was.get("rollcli") != now["rollcli"]:
-        yield f"it was begun by rollcli {was.get('rollcli')}, this is {now['rollcli']}"
-    options_was, options_now = dict(was.get("options") or {}), json.loads(json.dumps(now["options"]))
+    if was["rollcli"] != now["rollcli"]:
+        yield f"it was begun by rollcli {was['rollcli']}, this is {now['rollcli']}"
+    options_was, options_now = was["options"], json.loads(json.dumps(now["options"]))
     for key in (*options_now, *(key for key in options_was if key not in options_now)):
         if options_was.get(key) != options_now.get(key):
             yield f"--{key} was {_shown(options_was.get(key))}, is now {_shown(options_now.get(key))}"
     for row, frame in zip(rows, plan.frames, strict=False):
         if (row.file, row.right_file) != (frame.file, frame.right_file):
             yield f"the inputs differ: its row is of {row.file}, where now {frame.file} is"
-    inputs_was, inputs_now = dict(was.get("inputs") or {}), now["inputs"]
+    if len(rows) > len(plan.frames):
+        yield f"it has {len(rows)} rows, and there are {len(plan.frames)} frames"
+    inputs_was, inputs_now = was["inputs"], now["inputs"]
     if inputs_was.get("frames") != inputs_now["frames"]:
         yield f"it was begun with {inputs_was.get('frames')} frames, now there are {inputs_now['frames']}"
     if inputs_was.get("names") != inputs_now["names"]:
         yield "the names of the inputs differ"
     if inputs_was != inputs_now:
         yield f"{_changed(plan) or 'an input'} has changed since"
+
+
+def _is_whole(run: Mapping[str, Any]) -> bool:
+    """Whether all is there that a run has recorded, each of its kind."""
+    encodings, searched = run.get("encoding"), run.get("disparities_searched_px")
+    return (
+        isinstance(run.get("rollcli"), str)
+        and isinstance(run.get("options"), dict)
+        and isinstance(run.get("inputs"), dict)
+        and isinstance(encodings, list)
+        and all(isinstance(each, str) for each in encodings)
+        and isinstance(searched, list)
+        and all(isinstance(each, int) for each in searched)
+    )
 
 
 def _changed(plan: Plan) -> str | None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Protocol
 
 from rollcli.batch.lock import lock
-from rollcli.errors import UsageError
+from rollcli.errors import OutputError, UsageError
 from rollcli.files.atomic import output_error
 from rollcli.files.results import Format, Row, format_header, format_row
 from rollcli.files.stream import (
@@ -20,6 +20,8 @@ from rollcli.files.stream import (
 )
 
 _MORE_THAN_A_HEADER = 1000  # bytes
+_HEADERS = (format_header("csv"), format_header("csv", timing=True))
+_STARTS = (*_HEADERS, b'{"file": "')
 
 
 class RowSink(Protocol):
@@ -82,7 +84,16 @@ class ResultFile:
         """Write one row, whole or not at all."""
         self._append(format_row(row, self._form, self._timing))
 
+    def is_there(self) -> bool:
+        """Whether the rows still go to the file of this name."""
+        try:
+            return os.path.samestat(Path(self._name).stat(), os.fstat(self.descriptor))
+        except OSError:
+            return False
+
     def _append(self, line: bytes) -> None:
+        if not self.is_there():
+            raise OutputError(f"{self._name}: was moved or removed while this run was writing it")
         try:
             before = os.lseek(self.descriptor, 0, os.SEEK_CUR)
             _write_all(self.descriptor, line)
@@ -116,7 +127,7 @@ def open_sink(name: str, form: Format, *, resume: bool, overwrite: bool, timing:
     try:
         lock(descriptor, name)
         check_result(name, resume=resume, overwrite=overwrite)  # now that no one else can write it
-        kept = whole_rows(_read_all(descriptor), form) if resume else b""
+        kept = _taken_up(_read_all(descriptor), name, form) if resume else b""
         yield ResultFile(descriptor, name, form, timing, kept)
     finally:
         os.close(descriptor)
@@ -141,7 +152,7 @@ def _has_rows(name: str) -> bool:
             start = file.read(_MORE_THAN_A_HEADER)
     except OSError:
         return False  # not there, or what is wrong with it is said when it is to be written
-    return start not in (b"", format_header("csv"), format_header("csv", timing=True))
+    return start not in (b"", *_HEADERS)
 
 
 def _open_stream(name: str, form: Format, timing: bool) -> Iterator[RowSink]:
@@ -173,9 +184,20 @@ def _read_all(descriptor: int) -> bytes:
 def kept_rows(name: str, form: Format) -> bytes:
     """The whole rows of a result that is there, without taking it."""
     try:
-        return whole_rows(Path(name).read_bytes(), form)
+        data = Path(name).read_bytes()
     except OSError:
         return b""
+    return _taken_up(data, name, form)
+
+
+def _taken_up(data: bytes, name: str, form: Format) -> bytes:
+    """The whole rows of what a run has left; what is no such thing must not be emptied."""
+    if not any(data.startswith(start) or start.startswith(data) for start in _STARTS):
+        raise UsageError(
+            f"{name}: is not a result as rollcli estimate writes it; "
+            "give another --output, or --overwrite to replace it"
+        )
+    return whole_rows(data, form)
 
 
 def whole_rows(data: bytes, form: Format) -> bytes:

@@ -1,8 +1,9 @@
 """A run: the plan, the workers, the rows in order, and the exit status."""
 
 import contextlib
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from functools import partial
+from typing import Any
 
 from rollcli.batch.dry_run import list_files
 from rollcli.batch.job import Frame, Outcome, do, lost
@@ -10,14 +11,14 @@ from rollcli.batch.local import done_locally
 from rollcli.batch.options import EstimateOptions
 from rollcli.batch.outputs import image_paths, remove_image_leftovers
 from rollcli.batch.plan import Plan, make_plan
-from rollcli.batch.record import RunRecord, check_resumable
+from rollcli.batch.record import RunRecord, check_resumable, not_resumable
 from rollcli.batch.report import INTERRUPTED, Report
 from rollcli.batch.result_file import ResultFile, RowSink, check_result, kept_rows, open_sink
 from rollcli.batch.setup import limit_blas_threads
 from rollcli.batch.signals import Stop, stop_on_signals
 from rollcli.batch.workers import Work
-from rollcli.errors import ClusterError, OutputError
-from rollcli.files.results import parse_rows, read_run, run_path
+from rollcli.errors import ClusterError, InputError, OutputError
+from rollcli.files.results import Row, parse_rows, read_run, run_path
 from rollcli.files.stream import STDOUT
 
 
@@ -60,8 +61,7 @@ def run(options: EstimateOptions, resume_command: str = "") -> int:
         except KeyboardInterrupt:  # asked twice: without waiting for the frames in flight
             report.stopped_early = True
         except (OutputError, ClusterError) as error:
-            hint = f"; {report.done} rows are kept, continue with --resume" if record and report.done else ""
-            raise type(error)(f"{error}{hint}") from error
+            raise type(error)(f"{error}{_hint(sink, report)}") from error
         return _end(record, report, stop, resume_command)
 
 
@@ -73,11 +73,9 @@ def _take_up(
         sink.begin()
         return None, 0
     record = RunRecord(plan, options)
-    rows = parse_rows(sink.kept, plan.output) if sink.kept else ()
+    rows, earlier = _kept(sink, plan)
     if rows:
-        earlier = read_run(plan.output)
-        check_resumable(rows, earlier, record, plan)
-        record.continue_from(earlier or {})
+        record.continue_from(check_resumable(rows, earlier, record, plan))
         report.keep(rows)
     if options.result.resume or options.running.overwrite:
         remove_image_leftovers(plan.frames[len(rows) :], options.images)
@@ -86,6 +84,23 @@ def _take_up(
     record.write({})
     sink.begin()
     return record, len(rows)
+
+
+def _kept(sink: ResultFile, plan: Plan) -> tuple[tuple[Row, ...], Mapping[str, Any] | None]:
+    """The rows of an interrupted run and its record."""
+    if not sink.kept:
+        return (), None
+    try:
+        rows = parse_rows(sink.kept, plan.output)
+        return rows, read_run(plan.output) if rows else None
+    except InputError as error:
+        raise not_resumable(plan.output, str(error)) from error
+
+
+def _hint(sink: RowSink, report: Report) -> str:
+    if not isinstance(sink, ResultFile) or not report.done or not sink.is_there():
+        return ""
+    return f"; {report.done} rows are kept, continue with --resume"
 
 
 def _work(

@@ -74,7 +74,8 @@ def test_a_result_that_may_not_grow_keeps_its_whole_rows_and_is_resumed_later(ma
 def test_a_full_disk_of_images_keeps_the_rows_before_it(maps, jobs):
     disk = maps / "disk"
     disk.mkdir()
-    mount = ["mount", "-t", "tmpfs", "-o", "size=100k", "tmpfs", disk]
+    # room for more than the eight images that two workers may be ahead of the first row with
+    mount = ["mount", "-t", "tmpfs", "-o", "size=200k", "tmpfs", disk]
     mounted = subprocess.run(mount, capture_output=True, check=False)
     if mounted.returncode:
         pytest.skip("a small file system cannot be mounted here")
@@ -107,6 +108,28 @@ def test_an_output_that_is_a_folder_ends_the_run_with_status_1(maps):
     (maps / "out").mkdir()
     done = rollcli("estimate", "maps", "-o", "out", cwd=maps)
     assert (done.status, "out: cannot be written: is a directory" in one_line(done)) == (1, True)
+
+
+@pytest.mark.parametrize(("jobs", "moved"), [("1", True), ("2", False)])
+def test_a_result_that_is_moved_or_removed_while_running_ends_the_run_with_status_1(maps, jobs, moved):
+    write_maps(maps / "maps", 300)
+    run = subprocess.Popen(
+        command("estimate", "maps", "-o", "rolls.csv", "-q", "-j", jobs),
+        cwd=maps,
+        env=environment(),
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    result = maps / "rolls.csv"
+    wait_for_bytes(result, 2000)
+    if moved:
+        result.rename(maps / "moved.csv")
+    else:
+        result.unlink()
+    _, err = run.communicate(timeout=60)
+    assert run.returncode == 1
+    assert err == "rollcli: rolls.csv: was moved or removed while this run was writing it\n"
+    assert not result.exists()
 
 
 def test_a_map_that_vanishes_while_running_costs_its_row(maps):
@@ -211,14 +234,20 @@ def test_workers_end_with_a_run_that_is_killed(maps):
         env=environment(),
         start_new_session=True,
     )
-    while not ((maps / "rolls.csv").exists() and (maps / "rolls.csv").stat().st_size > 2000):
-        time.sleep(0.01)
+    wait_for_bytes(maps / "rolls.csv", 2000)
     run.kill()
     run.wait()
     give_up = time.monotonic() + 10
     while alive_in_group(run.pid) and time.monotonic() < give_up:
         time.sleep(0.02)
     assert not alive_in_group(run.pid)
+
+
+def wait_for_bytes(result, size):
+    give_up = time.monotonic() + 60
+    while not (result.exists() and result.stat().st_size > size):
+        assert time.monotonic() < give_up
+        time.sleep(0.01)
 
 
 def alive_in_group(group):

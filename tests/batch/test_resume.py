@@ -9,6 +9,8 @@ import time
 
 import pytest
 
+from rollcli.batch.result_file import whole_rows
+from rollcli.files.results import parse_rows
 from tests.program import command, contents, environment, road_map, rollcli, write_kitti, write_maps
 
 FRAMES = 40
@@ -182,9 +184,67 @@ def test_a_resume_without_the_record_of_the_run_is_refused(interrupted):
     assert "rolls.csv.run.json" in refused(interrupted)
 
 
-def test_a_result_of_another_program_is_not_resumed(interrupted):
-    (interrupted / "rolls.csv").write_text("a,b\n1,2\n")
-    assert "no column" in refused(interrupted)
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("rollcli", None),
+        ("options", [1]),
+        ("inputs", "x"),
+        ("encoding", [1]),
+        ("disparities_searched_px", 5),
+    ],
+)
+def test_a_resume_with_a_damaged_record_is_refused(interrupted, key, value):
+    record = interrupted / "rolls.csv.run.json"
+    record.write_text(json.dumps({**json.loads(record.read_text()), key: value}))
+    assert "rolls.csv.run.json is damaged; --overwrite starts anew" in refused(interrupted)
+
+
+@pytest.mark.parametrize("text", ["", "{", "[" * 20_000, "[]"])
+def test_a_resume_with_a_record_that_is_none_is_refused(interrupted, text):
+    (interrupted / "rolls.csv.run.json").write_text(text)
+    assert "rolls.csv.run.json: is not" in (error := refused(interrupted))
+    assert error.endswith("; --overwrite starts anew\n")
+
+
+@pytest.mark.parametrize("data", [b"a,b\n1,2\n", b"my notes", b"\x89PNG", b"[1]"])
+def test_a_file_of_another_program_is_not_resumed(interrupted, data):
+    (interrupted / "rolls.csv").write_bytes(data)
+    assert "is not a result as rollcli estimate writes it" in refused(interrupted)
+
+
+@pytest.mark.parametrize("edit", [("file,", "\ufefffile,"), ("\n", "\r\n"), ("roll_deg", "Roll")])
+def test_a_result_that_an_editor_has_changed_is_not_resumed(interrupted, edit):
+    result = interrupted / "rolls.csv"
+    result.write_bytes(result.read_text().replace(*edit).encode())
+    assert "is not a result as rollcli estimate writes it" in refused(interrupted)
+
+
+def test_a_result_with_more_rows_than_frames_is_not_resumed(interrupted):
+    rollcli("estimate", "maps", "-o", "rolls.csv", "--resume", cwd=interrupted)
+    whole = (interrupted / "rolls.csv").read_text()
+    (interrupted / "rolls.csv").write_text(whole + whole.partition("\n")[2])
+    assert "it has 20 rows, and there are 10 frames" in refused(interrupted)
+
+
+@pytest.mark.parametrize("ending", ["csv", "jsonl"])
+def test_a_result_cut_anywhere_is_resumed_to_the_same_bytes(tmp_path, ending):
+    names = ['comma, "quote".png', "new\nline.png", "return\rhere.png", "umlaut ü.png", b"no text \xff.png"]
+    (tmp_path / "maps").mkdir()
+    for name in names:
+        (tmp_path / "maps" / os.fsdecode(name)).write_bytes(b"no map")
+    result = tmp_path / f"rolls.{ending}"
+    assert rollcli("estimate", "maps", "-o", result.name, cwd=tmp_path).status == 3
+    whole = result.read_bytes()
+    rows = parse_rows(whole, "whole")
+    assert len(rows) == len(names)
+    for end in range(len(whole) + 1):
+        kept = whole_rows(whole[:end], ending)
+        assert parse_rows(kept, "kept") == rows[: kept.count(b"error")] if kept else end < len(whole)
+    for end in (whole.index(b"ne.png") - 1, len(whole) - 2):
+        result.write_bytes(whole[:end])
+        assert rollcli("estimate", "maps", "-o", result.name, "--resume", cwd=tmp_path).status == 3
+        assert result.read_bytes() == whole
 
 
 def test_other_ways_to_run_do_not_hinder_a_resume(interrupted):
