@@ -28,10 +28,12 @@ def roll_chart(rows: Sequence[Row]) -> Chart:
     failed = [each for each in numbered if each[1].status == "error"]
     sure = [each for each in numbered if each[1].status == "ok" and each[1].roll_deg is not None]
     failures = {number for number, row in numbered if row.roll_deg is None}
-    data = [_band(sure, failures), _line(sure, failures), _suspect(suspect), _failed(failed)]
+    many = len(rows) > _MANY
+    # what is sure lies on top: suspect marks of a long run would hide it
+    data = [_band(sure, failures), _suspect(suspect, bars=not many), _line(sure, failures), _failed(failed)]
     data = [trace for trace in data if trace["x"]]  # plotly's legend stumbles over what is empty
     for trace in data:
-        trace["marker"] = {"size": 8 if len(rows) <= _MANY else 6, **trace.get("marker", {})}
+        trace["marker"] = {"size": 5 if many else 8, **trace.get("marker", {})}
     margin = max(0.5, 0.01 * len(rows))
     layout = {
         "hovermode": "closest",
@@ -41,6 +43,7 @@ def roll_chart(rows: Sequence[Row]) -> Chart:
             "title": {"text": "frame"},
             "range": [1 - margin, len(rows) + margin],
             "zeroline": False,
+            "tickformat": ",d",
             **({"dtick": 1} if len(rows) <= _FEW else {}),  # there are no half frames
         },
         "yaxis": {"title": {"text": "roll, degrees"}, "range": list(view(rows)), "zeroline": True},
@@ -65,13 +68,15 @@ def _line(numbered: Numbered, failures: Set[int]) -> dict[str, Any]:
     }
 
 
-def _suspect(numbered: Numbered) -> dict[str, Any]:
+def _suspect(numbered: Numbered, *, bars: bool) -> dict[str, Any]:
     widths = [row.roll_ci95_deg or 0.0 for _, row in numbered]
+    bar = {"type": "data", "array": widths, "color": "@suspect", "thickness": 1, "width": 0}
     return {
         "mode": "markers",
         "name": "suspect",
+        "legendrank": 1001,  # after the line
         "marker": {"color": "@suspect", "symbol": "diamond"},
-        "error_y": {"type": "data", "array": widths, "color": "@suspect", "thickness": 1, "width": 0},
+        **({"error_y": bar} if bars else {}),
         **_points(numbered),
     }
 
@@ -80,7 +85,7 @@ def _failed(numbered: Numbered) -> dict[str, Any]:
     """Along the lower edge, since they have no angle."""
     cross = {"color": "@error", "symbol": "x-thin", "line": {"color": "@error", "width": 2}}
     points = {**_points(numbered), "y": [_FAILED_AT] * len(numbered), "yaxis": "y2"}
-    return {"mode": "markers", "name": "failed", "marker": cross, **points}
+    return {"mode": "markers", "name": "failed", "legendrank": 1002, "marker": cross, **points}
 
 
 def _points(numbered: Numbered) -> dict[str, Any]:

@@ -93,6 +93,13 @@ def test_a_single_row_of_any_kind_has_a_chart(rows):
     assert sum(len(trace["x"]) for trace in roll_chart(rows).data) >= 1
 
 
+@pytest.mark.parametrize(("frames", "bars"), [(400, True), (402, False)])
+def test_suspect_marks_lie_below_the_line_and_have_no_bars_in_long_runs(frames, bars):
+    shown = traces([row("a.png"), row("b.png", 9.0, 1.0, "suspect")] * (frames // 2))
+    assert list(shown) == ["95 % interval", "suspect", "roll"]
+    assert ("error_y" in shown["suspect"]) == bars
+
+
 @pytest.mark.parametrize(
     ("rows", "named"),
     [

@@ -91,7 +91,7 @@ def test_pictures_come_from_the_images_that_estimate_wrote(folder, images):
     assert done.status == 0, done.err
     # of the map itself nothing is left; the level map gives its v-disparity too
     assert len(PICTURES.findall(page_of(folder))) == (3 if images == "out/v" else 6)
-    assert "maps/frame0.png: no such file" in page_of(folder)
+    assert page_of(folder).count("maps/frame0.png: no such file") == 1
 
 
 def test_pairs_are_shown_from_their_computed_maps_or_matched_anew(tmp_path):
