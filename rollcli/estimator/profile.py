@@ -7,6 +7,7 @@ a step; a verge starts at the road's height and rises or falls from there.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,24 +20,32 @@ _MIN_PIXELS = 12  # of a bin
 _LEVEL = 0.006  # a bin within this height belongs to the road
 _SLOPE = 0.032  # a verge rises or falls at least this much
 _STEP = 1.6  # a first bin that differs by this many times the rise of the next ones is a kerb
+_CORE, _LANE = 2, 4  # bins from the middle: not looked at; a lane has no edge before these
+_MARGIN = 0.5  # bins: how far before the first bin of a verge the road ends
 
 
-def falls_away(
-    x: Floats,
-    y: Floats,
-    d: Floats,
-    used: NDArray[np.bool_],
-    theta: float,
-    alpha: tuple[float, float, float],
-) -> bool:
-    """Tell whether the ground falls away or rises from an edge of the road, without a kerb.
+class Edges(NamedTuple):
+    """How far the road reaches to the left and to the right, in camera heights; inf where no edge is seen."""
+
+    left: float
+    right: float
+
+    def hold(self, side: Floats) -> NDArray[np.bool_]:
+        """Return which pixels, this far to the right, lie between the edges."""
+        held: NDArray[np.bool_] = (side > -self.left) & (side < self.right)
+        return held
+
+
+NO_EDGES = Edges(math.inf, math.inf)
+
+
+def sides(x: Floats, y: Floats, theta: float, alpha: tuple[float, float, float]) -> Floats:
+    """Return how far to the right of the middle each pixel of a road lies, in camera heights.
 
     Parameters
     ----------
-    x, y, d : ndarray, shape (N,)
-        Normalised coordinates and disparity of the pixels near the road, px.
-    used : ndarray of bool, shape (N,)
-        Pixels to look at.
+    x, y : ndarray
+        Normalised coordinates, to be broadcast.
     theta : float
         Roll of the road, radians.
     alpha : tuple of float
@@ -44,15 +53,48 @@ def falls_away(
 
     Returns
     -------
-    bool
+    ndarray
     """
-    level = y * math.cos(theta) - x * math.sin(theta)
-    road = alpha[0] + level * (alpha[1] + level * alpha[2])
+    road = _road(x, y, theta, alpha)
+    across: Floats = (x * math.cos(theta) + y * math.sin(theta)) * abs(alpha[1])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return across / np.maximum(road, 0)
+
+
+def find_edges(
+    x: Floats,
+    y: Floats,
+    d: Floats,
+    used: NDArray[np.bool_],
+    theta: float,
+    alpha: tuple[float, float, float],
+) -> Edges:
+    """Find where the ground falls away or rises from the edges of the road, without a kerb.
+
+    Parameters
+    ----------
+    x, y, d : ndarray, shape (N,)
+        Normalised coordinates and disparity of the pixels near the road, px.
+    used : ndarray of bool, shape (N,)
+        Pixels to look at.
+    theta, alpha
+        As in `sides`.
+
+    Returns
+    -------
+    Edges
+    """
+    road = _road(x, y, theta, alpha)
     used = used & (road > 0.1 * d)
     height = d[used] / road[used] - 1
-    side = (x * math.cos(theta) + y * math.sin(theta))[used] * abs(alpha[1]) / road[used]
+    side = sides(x[used], y[used], theta, alpha)
     medians = _medians(np.floor(side / _BIN) + _BINS, height)
-    return _is_verge(medians[_BINS:]) or _is_verge(medians[_BINS - 1 :: -1])
+    return Edges(_edge(medians[_BINS - 1 :: -1]), _edge(medians[_BINS:]))
+
+
+def _road(x: Floats, y: Floats, theta: float, alpha: tuple[float, float, float]) -> Floats:
+    level = y * math.cos(theta) - x * math.sin(theta)
+    return alpha[0] + level * (alpha[1] + level * alpha[2])
 
 
 def _medians(places: Floats, heights: Floats) -> list[float]:
@@ -65,14 +107,17 @@ def _medians(places: Floats, heights: Floats) -> list[float]:
     return medians
 
 
-def _is_verge(heights: list[float]) -> bool:
-    """Judge the first three bins that are off the road, from the middle outward."""
-    for first in range(2, len(heights) - 2):
+def _edge(heights: list[float]) -> float:
+    """Return where a verge begins, by the first three bins that are off the road, from the middle outward."""
+    for first in range(_CORE, len(heights) - 2):
         beside = heights[first : first + 3]
         if not abs(beside[0]) > _LEVEL or any(map(math.isnan, beside)):
             continue
+        if first < _LANE:
+            break
         rise = (beside[2] - beside[0]) / 2
-        edge = heights[first - 1]
-        jump = beside[0] - (0.0 if math.isnan(edge) else edge)
-        return abs(rise) > _SLOPE * _BIN and jump * rise > 0 and abs(jump) < _STEP * abs(rise)
-    return False
+        before = heights[first - 1]
+        jump = beside[0] - (0.0 if math.isnan(before) else before)
+        verge = abs(rise) > _SLOPE * _BIN and jump * rise > 0 and abs(jump) < _STEP * abs(rise)
+        return (first - _MARGIN) * _BIN if verge else math.inf
+    return math.inf

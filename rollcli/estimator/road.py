@@ -27,7 +27,7 @@ _OF_EACH_ROLL = 4
 _SECOND = 32  # this many on the next,
 _SECOND_PIXELS = 640
 _REFINED = 5  # and these are fitted and judged on
-_THIRD_PIXELS = 1200
+_THIRD_PIXELS = 2400
 _FITS = 4
 _RADIUS = 0.35  # of a triple, in half image lengths
 _MIN_AREA = 0.004  # twice the area of its triangle, to be well conditioned
@@ -36,8 +36,12 @@ _BELOW = 1.5  # cost of a coherent pixel under the road; one that is merely not 
 _OFF_SLOPE = 0.2  # weight of a pixel around which the map does not rise as the road does
 _SLOPE_SHARE = 0.4  # of the road's own slope: how far the map's may be off
 _CORE, _CORRIDOR = 0.4, 1.0  # half-widths of the corridor, in camera heights
-_BESIDE = 0.02  # weight of a pixel far beside it
+_BESIDE = 0.05  # weight of a pixel far beside it
+_NEAR = 1.5  # typical disparities: weights grow up to here, for what is near ahead is the road driven on
+_HORIZON = 3.0  # half image lengths from the centre; a plane whose horizon is farther away is rather a wall
 _LEAST = 0.05  # share of the pixels that a corridor should weigh
+_INCOHERENT = 0.3  # a pixel with less coherence is noise,
+_AT_LEAST = 0.3  # where the road's disparity is at least this, in typical ones: farther away edges are close
 RIVAL_ANGLE = math.radians(2)
 
 
@@ -50,14 +54,18 @@ class Road:
     plane : ndarray, shape (3,)
         d = c0 + c1 x + c2 y on the sample's grid.
     score : float
-        The share of the road-like pixels in its corridor that lie on it, less those below it; up to 1.
+        The share of the road-like pixels in its corridor that lie on it, less those below it; up to 1. Less
+        for a plane that looks like a wall, since its horizon is far outside of the image.
     rival : float
         The best score of a plane whose roll differs by more than 2 degrees.
+    noise : float
+        The share of its corridor that is noise: pixels that differ from those around them.
     """
 
     plane: NDArray[np.float64]
     score: float
     rival: float
+    noise: float
 
     @property
     def theta(self) -> float:
@@ -102,7 +110,8 @@ def find_road(sample: Sample, max_roll: float, seed: int) -> Road:
     rival = max(
         final[far].max(initial=-1), scores[np.abs(others - rolls[winner]) > RIVAL_ANGLE].max(initial=-1)
     )
-    return Road(fitted[winner].astype(np.float64), float(final[winner]), float(rival))
+    plane = fitted[winner].astype(np.float64)
+    return Road(plane, float(final[winner]), float(rival), _noise_share(sample, plane))
 
 
 def road_weights(sample: Sample, plane: NDArray[np.float64], near: NDArray[np.intp]) -> Singles:
@@ -193,6 +202,7 @@ class _Judge:
     d: Singles
     scaled: Singles  # 1, x, y, d over the tolerance, shape (4, N)
     caps: Singles
+    near: Singles  # weights of mean 1
     slopes: Singles
     slope_noise: float
 
@@ -201,7 +211,10 @@ class _Judge:
         few = slice(None, None, max(1, round(len(sample.d) / pixels)))
         x, y, d = sample.x[few], sample.y[few], sample.d[few]
         scaled = np.stack([np.ones_like(x), x, y, d]) / sample.tolerance[few]
-        return cls(x, y, d, scaled, _caps(sample.coherence[few]), sample.slopes[:, few], sample.slope_noise)
+        near = np.minimum(d, np.float32(_NEAR * sample.typical))
+        near /= near.mean()
+        caps = _caps(sample.coherence[few])
+        return cls(x, y, d, scaled, caps, near, sample.slopes[:, few], sample.slope_noise)
 
     def scores(self, planes: Singles) -> Singles:
         """Return the score of each plane (K, 3); see `Road.score`."""
@@ -211,7 +224,8 @@ class _Judge:
         reached = corridor * slope
         lost = np.einsum("kn,kn->k", np.where(excess < 0, reached, corridor), excess)
         scores: Singles = -lost / (reached.sum(1) + np.float32(_LEAST * len(self.d)))
-        return scores
+        steep = np.square(planes[:, 0]) / (np.square(planes[:, 1]) + np.square(planes[:, 2]))
+        return np.where(scores > 0, scores / (1 + steep * np.float32(_HORIZON**-2)), scores)
 
     def fitted(self, planes: Singles) -> Singles:
         """Fit each plane (K, 3) to the pixels on it, a few times over."""
@@ -234,7 +248,21 @@ class _Judge:
         corridor = np.exp(side * np.float32(-1 / _CORRIDOR**2)) + np.exp(side * np.float32(-1 / _CORE**2))
         corridor *= np.float32((1 - _BESIDE) / 2)
         corridor += np.float32(_BESIDE)
+        corridor *= self.near
         return _slope_weights(self.slopes, self.slope_noise, planes), corridor
+
+
+def _noise_share(sample: Sample, plane: NDArray[np.float64]) -> float:
+    """Return the share of the plane's corridor in which neighbouring pixels disagree."""
+    few = slice(None, None, max(1, len(sample.d) // _THIRD_PIXELS))
+    c0, c1, c2 = plane
+    x, y = sample.x[few], sample.y[few]
+    road = c0 + c1 * x + c2 * y
+    seen = road > _AT_LEAST * sample.typical
+    side = (x * c2 - y * c1)[seen] / road[seen]  # by the road's disparity, for that of noise says nothing
+    weight = np.exp(-np.square(side / _CORRIDOR))
+    noisy = weight @ (sample.coherence[few][seen] < _INCOHERENT)
+    return float(noisy / weight.sum()) if weight.sum() > 0 else 1.0
 
 
 def _slope_weights(slopes: Singles, slope_noise: float, planes: Singles) -> Singles:

@@ -14,10 +14,10 @@ from rollcli.estimator.moments import Grid
 
 Singles = NDArray[np.float32]
 
-_PIXELS = 6000  # aimed at
+_PIXELS = 16000  # aimed at
 _NOISE_SHARE = 0.012  # of the median disparity: what matching gets wrong on real roads, whatever the scale
 UNEVEN_SHARE = 0.02  # of a pixel's own disparity: 2 % of the camera's height, 3 cm on a car
-_QUANTUM_SHARE = 0.7  # of the smallest step: whole-pixel maps are off by up to half a step
+_QUANTUM_SHARE = 0.35  # of the smallest step: rounding is off by 0.29 steps, root mean square
 _COHERENT_SHARE = 0.03
 NO_SLOPE = np.float32(1e9)  # agrees with no road
 
@@ -36,6 +36,8 @@ class Sample:
         Disparity, px of the map's own unit; more than 0.
     tolerance : ndarray of float32
         How far a road's disparity may be off here: matching noise and uneven ground, px.
+    typical : float
+        The median disparity, px.
     noise : float
         The part of it that does not grow with the disparity, px.
     coherence : ndarray of float32
@@ -54,6 +56,7 @@ class Sample:
     y: Singles
     d: Singles
     tolerance: Singles
+    typical: float
     noise: float
     coherence: Singles
     slopes: Singles
@@ -122,6 +125,7 @@ def take_sample(disparity: NDArray[Any], usable: NDArray[np.bool_] | None = None
         y=((rows * step + first - grid.centre_v) / grid.scale).astype(np.float32),
         d=d,
         tolerance=tolerance,
+        typical=typical,
         noise=noise,
         coherence=coherence,
         slopes=slopes,

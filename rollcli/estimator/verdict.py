@@ -11,8 +11,9 @@ from rollcli.estimator.solution import Solution, apart
 from rollcli.estimator.surface import Surface
 
 WIDEST_INTERVAL = math.radians(0.25)
-LEAST_SCORE = 0.13
+LEAST_SCORE = 0.16
 RIVAL_SHARE = 0.85
+MOST_NOISE = 0.25
 LONGEST_MOVE = math.radians(1)
 NEAR_MINIMUM = 1.1
 BOUND_SHARE = 0.99
@@ -43,6 +44,8 @@ def of_road(road: Road, surface: Surface, max_roll: float) -> list[str]:
         doubts.append("little of what lies ahead looks like a road")
     elif road.rival > RIVAL_SHARE * road.score:
         doubts.append("another plane, with another roll, explains the map nearly as well")
+    if road.noise > MOST_NOISE:
+        doubts.append(f"noise fills {road.noise:.0%} of what lies ahead")
     if surface.moved > LONGEST_MOVE:
         doubts.append(f"the road's pixels moved the roll by {math.degrees(surface.moved):.1f} degrees")
     if abs(surface.theta) > BOUND_SHARE * max_roll:

@@ -1,37 +1,60 @@
-"""The profile across a road tells a verge from a kerb."""
+"""The profile across a road tells where a verge ends it, and a verge from a kerb."""
 
 import numpy as np
 import pytest
 
-from rollcli.estimator.profile import falls_away
+from rollcli.estimator.profile import NO_EDGES, find_edges
 
 SLOPE = 200.0  # px of disparity per unit of y
 
 
-def ground(height_at):
-    """Pixels of a level road of half-width 1 camera height, and of what `height_at` says beside it."""
+def edges(height_at, half_width=1.0):
+    """Of a level road, with ground beside it whose height `height_at` says, all in camera heights."""
     rng = np.random.default_rng(6)
     x, y = rng.uniform(-1, 1, 20000), rng.uniform(0.05, 0.4, 20000)
     road = SLOPE * y
     side = x * SLOPE / road
-    d = road * (1 + np.where(np.abs(side) < 1, 0, height_at(np.abs(side) - 1))) + rng.normal(0, 0.1, x.shape)
+    beyond = np.abs(side) - half_width
+    d = road * (1 + np.where(beyond < 0, 0, height_at(beyond))) + rng.normal(0, 0.1, x.shape)
     near = np.abs(d / road - 1) < 0.08
-    return falls_away(x[near], y[near], d[near], np.ones(near.sum(), bool), 0.0, (0.0, SLOPE, 0.0))
+    return find_edges(x[near], y[near], d[near], np.ones(near.sum(), bool), 0.0, (0.0, SLOPE, 0.0))
 
 
 @pytest.mark.parametrize("slope", [-0.1, -0.05, 0.05, 0.1])
-def test_ground_that_slopes_from_the_edge_is_a_verge(slope):
-    assert ground(lambda beyond: slope * beyond)
+@pytest.mark.parametrize("half_width", [1.0, 1.3])
+def test_the_road_ends_where_the_ground_begins_to_slope(slope, half_width):
+    found = edges(lambda beyond: slope * beyond, half_width)
+
+    assert found.left == pytest.approx(half_width, abs=0.3)
+    assert found.right == pytest.approx(half_width, abs=0.3)
+
+
+def test_each_side_has_an_edge_of_its_own():
+    rng = np.random.default_rng(7)
+    x, y = rng.uniform(-1, 1, 20000), rng.uniform(0.05, 0.4, 20000)
+    road = SLOPE * y
+    side = x * SLOPE / road
+    d = road * (1 + np.maximum(0, 0.08 * (side - 1.2)))
+    near = np.abs(d / road - 1) < 0.08
+
+    found = find_edges(x[near], y[near], d[near], np.ones(near.sum(), bool), 0.0, (0.0, SLOPE, 0.0))
+
+    assert found.left == np.inf
+    assert found.right == pytest.approx(1.2, abs=0.3)
 
 
 @pytest.mark.parametrize("height", [0.015, 0.03, -0.03])
-def test_a_kerb_and_level_ground_behind_it_is_none(height):
-    assert not ground(lambda beyond: height + 0 * beyond)
+def test_a_kerb_and_level_ground_behind_it_is_no_edge(height):
+    assert edges(lambda beyond: height + 0 * beyond) == NO_EDGES
 
 
-def test_a_kerb_and_a_slight_slope_behind_it_is_none():
-    assert not ground(lambda beyond: 0.025 + 0.02 * beyond)
+def test_a_kerb_and_a_slight_slope_behind_it_is_no_edge():
+    assert edges(lambda beyond: 0.025 + 0.02 * beyond) == NO_EDGES
 
 
-def test_a_road_as_wide_as_the_picture_has_none():
-    assert not ground(lambda beyond: 0 * beyond)
+def test_a_road_as_wide_as_the_picture_has_no_edge():
+    assert edges(lambda beyond: 0 * beyond) == NO_EDGES
+
+
+def test_a_strip_that_is_narrower_than_a_lane_is_no_road_of_its_own():
+    assert edges(lambda beyond: 0.08 * beyond, half_width=0.55) == NO_EDGES

@@ -1,0 +1,143 @@
+"""A robust fit of the road's parabola and roll to the pixels near its plane."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from rollcli.errors import EstimationError
+from rollcli.estimator.moments import Floats
+from rollcli.estimator.profile import Edges, sides
+from rollcli.estimator.road import Road, road_weights
+from rollcli.estimator.sample import Sample
+
+_ROUNDS = 6
+_START = 2.0  # tolerances within which a pixel counts at first;
+_PLAIN = 3.0  # in the end this many standard deviations,
+_WIDE = 5.0  # or this many of an uneven road, since its rises and dips are no noise,
+_LANE = 3.5  # or this many of an uneven lane ahead,
+_LEAST = 0.2  # but at least this many tolerances
+_SMOOTH, _UNEVEN = 0.35, 0.55  # standard deviations of even and of uneven roads, in tolerances
+_OF_BIWEIGHT = 1.25  # times the weighted root mean square it is a normal distribution's standard deviation
+_AHEAD = 0.8  # half-width of the lane ahead, in camera heights
+_EDGE = 0.65  # half-width of the part of the image that counts; it ends as exp(-(x / _EDGE)^8)
+_DROP = 3.0  # farther than this many tolerances from the plane, a pixel is not looked at again
+_PIXELS = 4000  # looked at; more of them would repeat each other
+MIN_PIXELS = 30
+
+
+class Fit(NamedTuple):
+    """Roll, parabola on the rolled, normalised y, and where the weights end, in tolerances."""
+
+    theta: float
+    alpha: tuple[float, float, float]
+    limit: float
+
+
+@dataclass(frozen=True)
+class Near:
+    """The pixels near a road's plane, with what stays the same through all fits; arrays of shape (N,).
+
+    Attributes
+    ----------
+    x, y, d, tolerance : ndarray
+        As in `Sample`.
+    place : ndarray
+        Weights from 0 to 1 by place in the image and by slopes.
+    ahead : ndarray
+        1 for those in the lane ahead, else 0.
+    stride : int
+        How many near pixels of the sample each of them stands for.
+    """
+
+    x: Floats
+    y: Floats
+    d: Floats
+    tolerance: Floats
+    place: Floats
+    ahead: Floats
+    stride: int
+
+    @classmethod
+    def of(cls, sample: Sample, road: Road) -> Near:
+        """Take them from a sample."""
+        c0, c1, c2 = road.plane
+        off = (c0 + c1 * sample.x + c2 * sample.y - sample.d) / sample.tolerance
+        near = np.flatnonzero(np.abs(off) < _DROP)
+        stride = -(-len(near) // _PIXELS) or 1
+        near = near[
+            near % stride == 0
+        ]  # by place in the sample: one pixel more leaves the others as they are
+        kept = (sample.x, sample.y, sample.d, sample.tolerance)
+        x, y, d, tolerance = (pixels[near].astype(np.float64) for pixels in kept)
+        across = x * math.cos(road.theta) + y * math.sin(road.theta)
+        edge = np.square(np.square(np.square(across / _EDGE)))
+        place = np.square(road_weights(sample, road.plane, near)) * np.exp(-edge)
+        ahead = (np.abs(across) * math.hypot(c1, c2) < _AHEAD * d).astype(np.float64)
+        return cls(x, y, d, tolerance, place, ahead, stride)
+
+    def within(self, edges: Edges, fit: Fit) -> Near:
+        """Return those between the edges of the road of a fit."""
+        kept = edges.hold(sides(self.x, self.y, fit.theta, fit.alpha))
+        pixels = {name: getattr(self, name)[kept] for name in ("x", "y", "d", "tolerance", "place", "ahead")}
+        return replace(self, **pixels)
+
+    def fit(self, road: Road, *, parabolic: bool, ahead: bool = False) -> Fit:
+        """Fit (a0, a1, a2, theta), starting from the road's plane.
+
+        Gauss-Newton with Tukey's biweight, whose width shrinks from two tolerances as far as the pixels' own
+        spread allows; with `ahead`, the spread of those in the lane ahead.
+        """
+        c0, c1, c2 = road.plane
+        fit = Fit(road.theta, (float(c0), math.hypot(c1, c2), 0.0), _START)
+        design = np.empty((5, len(self.x)))
+        design[0], design[4] = 1, self.d
+        off = self._off(fit)
+        for _ in range(_ROUNDS):
+            weights = self._weights(off, fit.limit)
+            cosine, sine = math.cos(fit.theta), math.sin(fit.theta)
+            design[1] = self.y * cosine - self.x * sine
+            design[2] = design[1] * design[1] if parabolic else 0
+            design[3] = -(self.x * cosine + self.y * sine) * (fit.alpha[1] + 2 * fit.alpha[2] * design[1])
+            products = (design * weights) @ design.T
+            normal = products[:4, :4] + np.diag(1e-10 * np.diag(products)[:4] + 1e-300)
+            a0, a1, a2, turned = np.linalg.solve(normal, products[:4, 4])
+            theta = fit.theta + max(-0.2, min(0.2, float(turned)))
+            fit = Fit(theta, (float(a0), float(a1), float(a2)), fit.limit)
+            off = self._off(fit)
+            fit = fit._replace(limit=min(fit.limit, self._width(off, weights, ahead=ahead)))
+        return fit
+
+    def weights(self, fit: Fit) -> Floats:
+        """Return the weights that a fit leaves, 0 to 1."""
+        return self._weights(self._off(fit), fit.limit)
+
+    def _off(self, fit: Fit) -> Floats:
+        """Return road minus disparity in tolerances."""
+        level = self.y * math.cos(fit.theta) - self.x * math.sin(fit.theta)
+        a0, a1, a2 = fit.alpha
+        off: Floats = (a0 + level * (a1 + level * a2) - self.d) / self.tolerance
+        return off
+
+    def _weights(self, off: Floats, limit: float) -> Floats:
+        """Return the weights; refuse a surface with hardly a pixel on it."""
+        inside = np.maximum(0, 1 - np.square(off / limit))
+        weights: Floats = inside * inside * self.place
+        if np.count_nonzero(weights) < MIN_PIXELS:
+            raise EstimationError("no road: hardly a pixel lies on the best plane that was found")
+        return weights
+
+    def _width(self, off: Floats, weights: Floats, *, ahead: bool) -> float:
+        """Return how wide the weights should be, from the spread of the pixels that have some.
+
+        Every step is smooth: a pixel more or less must not turn the road.
+        """
+        if ahead and np.count_nonzero(weights * self.ahead) >= MIN_PIXELS:
+            weights = weights * self.ahead
+        deviation = _OF_BIWEIGHT * math.sqrt(float(weights @ np.square(off)) / float(weights.sum()))
+        uneven = max(0.0, min(1.0, (deviation - _SMOOTH) / (_UNEVEN - _SMOOTH)))
+        times = _PLAIN + uneven * ((_LANE if ahead else _WIDE) - _PLAIN)
+        return max(_LEAST, times * deviation)
