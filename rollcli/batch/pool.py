@@ -26,10 +26,9 @@ def done_by_pool(
     crew = PoolCrew(jobs, work, held)
     try:
         yield from in_order(tasks, crew, stop)
-    except KeyboardInterrupt:  # asked twice
-        crew.kill()
-        raise
     finally:
+        if stop.at_once:
+            crew.kill()
         crew.close()
 
 

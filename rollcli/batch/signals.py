@@ -8,18 +8,25 @@ from types import FrameType
 
 
 class Stop:
-    """Whether the run was asked to stop."""
+    """Whether the run was asked to stop, and whether that was at once."""
 
     asked = False
+    at_once = False
 
 
 @contextlib.contextmanager
 def stop_on_signals() -> Iterator[Stop]:
-    """Turn the signals into a request for as long as the block lasts."""
+    """Turn the signals into a request for as long as the block lasts.
+
+    A run that was asked is about to end: from then on, and after the block, a third Ctrl-C changes nothing.
+    """
     stop = Stop()
 
     def ask(number: int, frame: FrameType | None) -> None:
+        if stop.at_once:
+            return
         if stop.asked:
+            stop.at_once = True
             raise KeyboardInterrupt
         stop.asked = True
 
@@ -31,4 +38,4 @@ def stop_on_signals() -> Iterator[Stop]:
         yield stop
     finally:
         for number, handler in before.items():
-            signal.signal(number, handler)
+            signal.signal(number, signal.SIG_IGN if stop.asked else handler)

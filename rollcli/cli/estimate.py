@@ -1,7 +1,5 @@
 """`rollcli estimate`: the main job."""
 
-import shlex
-import sys
 from typing import Any
 
 import click
@@ -20,6 +18,7 @@ from rollcli.cli.options import (
     running_options,
     stereo_options,
 )
+from rollcli.cli.resume import one_start, resume_command
 from rollcli.cli.types import Shard
 
 result_options = record(
@@ -83,14 +82,8 @@ def estimate(ctx: click.Context, /, **records: Any) -> None:
 
     A positive roll means that the rig is rolled counter-clockwise seen from behind: its right end is up.
     """
-    options = EstimateOptions(**records)
+    options = one_start(ctx, EstimateOptions(**records))
 
     from rollcli.batch.run import run  # what a run needs is loaded when there is one
 
-    ctx.exit(run(options, resume_command=_resume_command()))
-
-
-def _resume_command() -> str:
-    """This command, to continue what it began."""
-    words = [word for word in sys.argv[1:] if word not in ("--overwrite", "--resume")]
-    return shlex.join(["rollcli", *words, "--resume"])
+    ctx.exit(run(options, resume_command=resume_command(ctx)))

@@ -75,9 +75,19 @@ def exit_status(program: Callable[[], Any]) -> int:
 
 
 def _with_hint(error: click.ClickException) -> str:
-    message = error.format_message()
+    message = _from_environment(error) or error.format_message()
     ctx = getattr(error, "ctx", None)
     return f"{message} (see '{ctx.command_path} --help')" if ctx is not None else message
+
+
+def _from_environment(error: click.ClickException) -> str:
+    """What is wrong with a variable, which the user does not see on the command line; else nothing."""
+    if not isinstance(error, click.BadParameter) or error.ctx is None or error.param is None:
+        return ""
+    name = str(error.param.name)
+    if error.ctx.get_parameter_source(name) is not click.core.ParameterSource.ENVIRONMENT:
+        return ""
+    return f"{error.ctx.auto_envvar_prefix}_{name.upper()}: {error.message}"
 
 
 def _say(message: str, status: int) -> int:

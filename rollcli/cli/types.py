@@ -73,9 +73,10 @@ class NumberOrNan(_ParamType):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         try:
-            return float(value)
+            number = None if isinstance(value, bool) else float(value)
         except (TypeError, ValueError):
-            self.fail(f"{value!r} is not a number", param, ctx)
+            number = None
+        return self.fail(f"{value!r} is not a number", param, ctx) if number is None else number
 
 
 class Roi(_ParamType):

@@ -51,9 +51,9 @@ def start(folder, *arguments):
     )
 
 
-def wait_for_rows(folder, count, run):
+def wait_for_rows(folder, count, run, name="rolls.csv"):
     """Until so many rows are there."""
-    result, give_up = folder / "rolls.csv", time.monotonic() + 60
+    result, give_up = folder / name, time.monotonic() + 60
     while run.poll() is None and not (result.exists() and result.read_bytes().count(b"\n") > count):
         assert time.monotonic() < give_up
         time.sleep(0.002)
@@ -112,6 +112,101 @@ def test_ctrl_c_keeps_what_is_done_and_prints_the_command_that_resumes(undisturb
     assert line.startswith("rollcli estimate maps -o rolls.csv")
     assert rollcli(*shlex.split(line)[1:], cwd=folder).status == 3
     assert results(folder) == results(undisturbed)
+
+
+def test_the_command_that_resumes_can_be_pasted_whatever_its_words_are(undisturbed, tmp_path):
+    program = tmp_path / "bin" / "rollcli"
+    program.parent.mkdir()
+    program.write_text(f'#!/bin/sh\nexec {shlex.join(command())} "$@"\n')
+    program.chmod(0o755)
+    folder = '-it\'s "mine"'
+    (tmp_path / folder).symlink_to(undisturbed / "maps")
+    (tmp_path / "a b.toml").write_text("overwrite = true\nseed = 3\n")
+    path = os.pathsep.join([str(program.parent), os.environ["PATH"]])
+    settings = {"ROLLCLI_ESTIMATE_INVALID": "5 6", "ROLLCLI_ESTIMATE_TIMING": "0"}
+    run = subprocess.Popen(
+        command("estimate", "-o", "my rolls.csv", "--config", "a b.toml", "--", folder),
+        cwd=tmp_path,
+        env=environment(PATH=path, ROLLCLI_ESTIMATE_ROAD="all", **settings),
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    wait_for_rows(tmp_path, 4, run, "my rolls.csv")
+    run.send_signal(signal.SIGINT)
+    _, err = run.communicate(timeout=60)
+    assert run.returncode == 130
+    line = err.splitlines()[-1].partition("continue with: ")[2]
+    pasted = subprocess.run(
+        ["sh", "-c", line],
+        cwd=tmp_path,
+        env=environment(PATH=path),  # what was set for one command is no longer there
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert pasted.returncode == 3, pasted.stderr
+    assert "kept" in pasted.stderr
+    assert (tmp_path / "my rolls.csv").read_bytes().count(b"\n") == FRAMES + 1
+
+
+def test_the_command_that_resumes_a_list_says_that_it_is_needed_again(undisturbed, tmp_path):
+    maps = sorted(map(str, (undisturbed / "maps").iterdir()))
+    with (tmp_path / "list").open("w") as names:
+        names.write("\n".join(maps))
+    with (tmp_path / "list").open() as names:
+        run = subprocess.Popen(
+            command("estimate", "-", "-o", "rolls.csv"),
+            cwd=tmp_path,
+            env=environment(),
+            stdin=names,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+    wait_for_rows(tmp_path, 4, run)
+    run.send_signal(signal.SIGINT)
+    _, err = run.communicate(timeout=60)
+    assert err.endswith("--resume  # with the same list on stdin\n")
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_ctrl_c_again_and_again_ends_at_once_in_one_piece(undisturbed, folder, jobs):
+    run = start(folder, "-j", str(jobs))
+    wait_for_rows(folder, 4, run)
+    err = interrupt_until_it_ends(run)
+    assert "Traceback" not in err
+    assert "interrupted; continue with: rollcli estimate maps" in err
+    assert rollcli("estimate", "maps", "-o", "rolls.csv", *IMAGES, "--resume", cwd=folder).status == 3
+    assert results(folder) == results(undisturbed)
+
+
+def test_ctrl_c_twice_ends_a_run_whose_worker_has_been_stopped(folder):
+    run = start(folder, "-j2")
+    wait_for_rows(folder, 4, run)
+    stopped = workers_of(run)[0]
+    os.kill(stopped, signal.SIGSTOP)
+    interrupt_until_it_ends(run)
+    assert run.returncode == 130
+    with pytest.raises(ProcessLookupError):
+        os.kill(stopped, 0)
+
+
+def interrupt_until_it_ends(run):
+    """Ctrl-C by someone without patience; what the run said."""
+    give_up = time.monotonic() + 60
+    while run.poll() is None:
+        assert time.monotonic() < give_up
+        run.send_signal(signal.SIGINT)
+        time.sleep(0.005)
+    return run.communicate()[1]
+
+
+def workers_of(run):
+    """The worker processes of a run, oldest first."""
+    listed = subprocess.run(
+        ["ps", "-A", "-ww", "-o", "ppid=,pid=,args="], capture_output=True, text=True, check=True
+    ).stdout.splitlines()
+    found = [line.split(None, 2) for line in listed]
+    return [int(pid) for parent, pid, args in found if int(parent) == run.pid and "spawn_main" in args]
 
 
 def test_sigterm_stops_a_run_as_ctrl_c_does(undisturbed, folder):

@@ -62,6 +62,36 @@ def test_every_kind_of_option_reads_the_environment(maps, name, value, key):
 
 
 @pytest.mark.parametrize(
+    ("name", "value", "reason"),
+    [
+        ("SEED", "1.5", "'1.5' is not a whole number of at least 0"),
+        ("ROAD", "none", "'none' is not one of 'auto', 'all'."),
+        ("QUIET", "perhaps", "'perhaps' is not a valid boolean."),
+        ("INVALID", "5 x", "'x' is not a number"),
+        ("SHARD", "3/2", "'3/2' is not I/N"),
+    ],
+)
+def test_what_is_wrong_with_the_environment_is_said_with_the_name_of_the_variable(maps, name, value, reason):
+    done = rollcli("estimate", "maps", cwd=maps, **{f"ROLLCLI_ESTIMATE_{name}": value})
+    assert done.status == 2
+    assert done.err.startswith(f"rollcli: ROLLCLI_ESTIMATE_{name}: {reason}")
+    assert done.err.count("\n") == 1
+
+
+def test_resume_and_overwrite_exclude_each_other_unless_one_is_said_nearer(maps):
+    (maps / "rollcli.toml").write_text("overwrite = true\n")
+    both = ("estimate", "maps", "-o", "rolls.csv", "-v", "--resume")
+    kept = "1 frame (1 kept)"
+    rollcli("estimate", "maps", "-o", "rolls.csv", cwd=maps)
+    assert rollcli(*both, "--overwrite", cwd=maps).status == 2
+    assert kept in rollcli(*both, "--config", "rollcli.toml", cwd=maps).err
+    assert kept in rollcli(*both, cwd=maps, ROLLCLI_ESTIMATE_OVERWRITE="1").err
+    again = ("estimate", "maps", "-o", "rolls.csv", "--overwrite")
+    done = rollcli(*again, cwd=maps, ROLLCLI_ESTIMATE_RESUME="1")
+    assert (done.status, kept in done.err) == (0, False)
+
+
+@pytest.mark.parametrize(
     ("text", "reason"),
     [
         ("lamda0 = 1", "there is no option 'lamda0'; the nearest is 'lambda0'"),
@@ -69,6 +99,7 @@ def test_every_kind_of_option_reads_the_environment(maps, name, value, key):
         ("seed = 1.5", "'seed': 1.5 is not a whole number"),
         ("seed = -1", "'seed': -1 is not a whole number of at least 0"),
         ("seed = true", "'seed': True is not a whole number"),
+        ("invalid = [true]", "'invalid': True is not a number"),
         ('method = "best"', "'method': 'best' is not one of"),
         ("method = 3", "'method' is a text in quotes, not 3"),
         ('timing = "yes"', "'timing' is true or false, not 'yes'"),

@@ -1,0 +1,66 @@
+"""The command that continues an interrupted run, and which of --resume and --overwrite is meant."""
+
+import shlex
+import shutil
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import click
+from click.core import ParameterSource
+
+from rollcli.batch.options import EstimateOptions
+
+_STARTS = ("--overwrite", "--resume")
+_NEAREST_FIRST = [ParameterSource.COMMANDLINE, ParameterSource.ENVIRONMENT, ParameterSource.DEFAULT_MAP]
+
+
+def one_start(ctx: click.Context, options: EstimateOptions) -> EstimateOptions:
+    """The options with --resume or --overwrite: flags win over the environment, and that over --config."""
+    if not (options.result.resume and options.running.overwrite):
+        return options
+    resume, overwrite = (_distance(ctx, name) for name in ("resume", "overwrite"))
+    if resume < overwrite:
+        return replace(options, running=replace(options.running, overwrite=False))
+    if overwrite < resume:
+        return replace(options, result=replace(options.result, resume=False))
+    return options
+
+
+def _distance(ctx: click.Context, name: str) -> int:
+    source = ctx.get_parameter_source(name)
+    return _NEAREST_FIRST.index(source) if source in _NEAREST_FIRST else len(_NEAREST_FIRST)
+
+
+def resume_command(ctx: click.Context) -> str:
+    """This command, to be pasted into any shell: what the environment says is spelled out."""
+    words = sys.argv[1:]
+    end = words.index("--") if "--" in words else len(words)
+    options = [word for word in words[:end] if word not in _STARTS]
+    line = [_program(), *options, *_from_environment(ctx), "--resume", *words[end:]]
+    return shlex.join(line) + ("  # with the same list on stdin" if _reads_stdin(ctx) else "")
+
+
+def _program() -> str:
+    """The name of the program, or where it is when the shell would not find it."""
+    called = sys.argv[0]
+    return called if Path(called).name == "rollcli" and not shutil.which("rollcli") else "rollcli"
+
+
+def _reads_stdin(ctx: click.Context) -> bool:
+    given = ctx.params.get("inputs") or ()
+    return "-" in given or ctx.params.get("files_from") == "-"
+
+
+def _from_environment(ctx: click.Context) -> Iterator[str]:
+    for param in ctx.command.params:
+        flag = param.opts[-1]
+        if ctx.get_parameter_source(str(param.name)) is not ParameterSource.ENVIRONMENT or flag in _STARTS:
+            continue
+        value = param.value_from_envvar(ctx)
+        if isinstance(param, click.Option) and param.is_flag:
+            yield from [flag] if param.type_cast_value(ctx, value) else []
+        else:
+            for text in value if isinstance(value, list | tuple) else [value]:
+                yield from (flag, str(text))
