@@ -1,5 +1,6 @@
 """Workers on a Dask cluster: the same frames, sent to an executor elsewhere (extra `cluster`)."""
 
+import asyncio
 import logging
 import os
 from collections.abc import Generator, Sequence
@@ -18,9 +19,41 @@ from rollcli.batch.workers import in_order
 from rollcli.errors import ClusterError, UsageError
 from rollcli.files.atomic import write_atomic
 
-_CONNECT_S, _FIRST_WORKER_S = "6s", 5
+_CONNECT_S, _FIRST_WORKER_S = 6, 5
 _IN_FLIGHT_PER_THREAD = 4
 _LOST = "every worker that tried it died: killed for memory, perhaps, or crashed"
+
+
+def check_scheduler(address: str) -> None:
+    """See that a scheduler answers, before anything is touched.
+
+    Not left to Dask's client: one that cannot connect takes its time, and ends with a traceback.
+
+    Raises
+    ------
+    UsageError
+        That is no address, or the extra `cluster` is not installed.
+    ClusterError
+        Nobody answers there, or nobody who speaks as a scheduler does.
+    """
+    _silence_dask()
+    try:
+        asyncio.run(asyncio.wait_for(_open_and_close(address), _CONNECT_S + 2))
+    except (ValueError, TypeError) as error:  # the latter for TLS that is not set up
+        raise UsageError(
+            f"--scheduler {address!r}: {error}; an address looks like tcp://host:8786"
+        ) from error
+    # the last for servers of another kind: their first bytes are taken for a size
+    except (OSError, asyncio.TimeoutError, MemoryError) as error:
+        raise ClusterError(f"{address}: no Dask scheduler answers there") from error
+
+
+async def _open_and_close(address: str) -> None:
+    from distributed.comm.core import connect
+    from distributed.security import Security
+
+    comm = await connect(address, timeout=_CONNECT_S, **Security().get_connection_args("client"))
+    await comm.close()
 
 
 def cluster_outcomes(
@@ -67,16 +100,22 @@ class ClusterCrew:
         return lost(frame, _LOST, self._options.images)
 
 
-def _connect(address: str) -> Any:
+def _silence_dask() -> None:
+    """No lines of Dask's own: what goes wrong ends as one of ours."""
     try:
-        from distributed import Client
-        from distributed import TimeoutError as DaskTimeoutError  # before Python 3.11 not the built-in one
+        import distributed  # noqa: F401 (it sets up its logging when it is loaded)
     except ImportError as error:
         raise UsageError("--scheduler needs the extra cluster: pip install 'rollcli[cluster]'") from error
-    logging.disable()  # Dask's tracebacks: what goes wrong ends as a line of our own
+    logging.disable()
+
+
+def _connect(address: str) -> Any:
+    from distributed import Client
+    from distributed import TimeoutError as DaskTimeoutError  # before Python 3.11 not the built-in one
+
     try:
         client = Client(address, timeout=_CONNECT_S, set_as_default=False)
-    except (OSError, ValueError) as error:
+    except OSError as error:
         raise ClusterError(f"{address}: no Dask scheduler answers there") from error
     try:
         client.wait_for_workers(1, timeout=_FIRST_WORKER_S)

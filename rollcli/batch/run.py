@@ -46,6 +46,10 @@ def run(options: EstimateOptions, resume_command: str = "") -> int:
         _list(plan, options)
         return 0
     limit_blas_threads()
+    if options.result.scheduler is not None:
+        from rollcli.batch.cluster import check_scheduler
+
+        check_scheduler(options.result.scheduler)
     given, report = options.result, Report(len(plan.frames), options.running, options.encoding)
     with open_sink(
         plan.output,

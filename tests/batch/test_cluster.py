@@ -1,8 +1,10 @@
 """A real Dask scheduler and two real workers, on this machine."""
 
 import json
+import socket
 import subprocess
 import sys
+import threading
 import time
 
 import pytest
@@ -117,6 +119,41 @@ def test_a_scheduler_that_does_not_answer_ends_the_run_within_15_seconds(tmp_pat
     assert done.status == 1
     assert "tcp://127.0.0.1:9: no Dask scheduler answers there" in done.err
     assert done.err.count("\n") == 1
+
+
+@pytest.mark.parametrize("greeting", [b"", b"HTTP/1.1 400 Bad Request\r\nServer: x\r\n\r\n"])
+def test_a_server_that_is_no_scheduler_ends_the_run_within_15_seconds(tmp_path, greeting):
+    write_maps(tmp_path / "maps", 1)
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        answering = threading.Thread(target=greet, args=(server, greeting), daemon=True)
+        answering.start()
+        address = f"127.0.0.1:{server.getsockname()[1]}"
+        start = time.monotonic()
+        done = rollcli("estimate", "maps", "-o", "rolls.csv", "--scheduler", address, cwd=tmp_path)
+        assert time.monotonic() - start < 15
+    assert (done.status, done.err) == (1, f"rollcli: {address}: no Dask scheduler answers there\n")
+
+
+def greet(server, greeting):
+    """Say something to whoever comes, and wait until he goes."""
+    caller, _ = server.accept()
+    with caller:
+        caller.sendall(greeting)
+        while caller.recv(1000):
+            pass
+
+
+@pytest.mark.parametrize("address", ["", "node0", "http://node0:8786", "tcp://node0:x", "tls://node0:8786"])
+def test_what_is_no_address_is_refused_and_the_result_that_is_there_is_kept(tmp_path, address):
+    write_maps(tmp_path / "maps", 1)
+    rollcli("estimate", "maps", "-o", "rolls.csv", cwd=tmp_path)
+    before = contents(tmp_path)
+    arguments = ("-o", "rolls.csv", "--overwrite", "--scheduler", address)
+    done = rollcli("estimate", "maps", *arguments, cwd=tmp_path)
+    assert done.status == 2
+    assert done.err.startswith(f"rollcli: --scheduler {address!r}: ")
+    assert done.err.endswith("; an address looks like tcp://host:8786\n")
+    assert contents(tmp_path) == before
 
 
 def test_a_scheduler_without_workers_ends_the_run(tmp_path, scheduler):
