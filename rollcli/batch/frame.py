@@ -58,6 +58,8 @@ def _row(frame: Frame, source: Source, estimate: RollEstimate) -> Row:
     if source.doubt:
         status = "suspect"
         reasons.append(source.doubt)
+    if source.note:
+        reasons.append(source.note)
     alpha0, alpha1, alpha2 = estimate.alpha
     return Row(
         file=frame.file,

@@ -12,7 +12,7 @@ from rollcli.imaging.stereo_options import StereoOptions
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
-_NUMBERS = ("scale", "num_disparities")  # options that are none by default
+_NUMBERS = ("scale", "num_disparities", "vertical_offset")  # options that are none by default
 Options = TypeVar("Options", bound="DataclassInstance")
 
 

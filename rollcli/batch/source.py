@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from rollcli.batch.options import FrameOptions
 from rollcli.files.encodings import to_disparity
 from rollcli.files.formats import Stored, read_image, read_stored
+from rollcli.imaging.stereo_options import StereoOptions
 
 if TYPE_CHECKING:
     from rollcli.batch.job import Frame
@@ -33,6 +34,8 @@ class Source:
         First and last disparity searched, px; pairs only.
     doubt : str
         Why the map itself may be wrong; empty when there is no reason.
+    note : str
+        What was done about the pair; empty when nothing.
     """
 
     disparity: NDArray[Any]
@@ -41,6 +44,7 @@ class Source:
     warning: str = ""
     searched: tuple[int, int] | None = None
     doubt: str = ""
+    note: str = ""
 
 
 def read_source(frame: "Frame", options: FrameOptions) -> Source:
@@ -68,7 +72,7 @@ def _match(frame: "Frame", options: FrameOptions) -> Source:
     right = read_image(options.at(frame.right_path), frame.right_file)
     match = match_pair(left, right, options.stereo)
     searched = (match.min_disparity, match.min_disparity + match.num_disparities - 1)
-    return Source(match.disparity, searched=searched, doubt=_doubt(match))
+    return Source(match.disparity, searched=searched, doubt=_doubt(match), note=_note(match, options.stereo))
 
 
 def _doubt(match: "StereoMatch") -> str:
@@ -76,3 +80,10 @@ def _doubt(match: "StereoMatch") -> str:
         return ""
     share = f"{match.end_fraction:.0%} of the map lies at the end of the searched range"
     return f"{share}; use a larger --num-disparities"
+
+
+def _note(match: "StereoMatch", given: StereoOptions) -> str:
+    if given.vertical_offset is not None or match.vertical_offset == 0:
+        return ""
+    side = "lower" if match.vertical_offset > 0 else "higher"
+    return f"corrected: the right image lay {abs(match.vertical_offset):.2f} px {side} than the left one"

@@ -20,9 +20,12 @@ from rollcli.imaging.stereo_options import MODES, StereoOptions
 PATH = FilePath()  # whether it exists is said by who reads it, in the same words for every way to name it
 
 
-def _stereo(*, num_disparities: int | str, sgbm_mode: str, **values: Any) -> StereoOptions:
+def _stereo(
+    *, num_disparities: int | str, sgbm_mode: str, vertical_offset: float | str, **values: Any
+) -> StereoOptions:
     searched = None if num_disparities == "auto" else int(num_disparities)
-    return StereoOptions(num_disparities=searched, mode=sgbm_mode, **values)
+    offset = None if vertical_offset == "auto" else float(vertical_offset)
+    return StereoOptions(num_disparities=searched, mode=sgbm_mode, vertical_offset=offset, **values)
 
 
 def _method(*, tolerance: float, max_roll: float, **values: Any) -> MethodOptions:
@@ -122,6 +125,12 @@ stereo_options = record(
         type=Number("F", at_least=1),
         default=StereoOptions.downscale,
         help="Match at 1/F of the size; maps and pixel columns then refer to that size.",
+    ),
+    option(
+        "--vertical-offset",
+        type=Number("PX", auto=True),
+        default="auto",
+        help="How much lower the right image lies, pixels; auto: measured, and corrected from 0.15 on.",
     ),
 )
 

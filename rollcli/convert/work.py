@@ -66,7 +66,7 @@ def _done(conversion: Conversion, options: FrameOptions, make: Callable[[Source]
         for path, data in zip(conversion.writes, make(source), strict=True):
             write_atomic(path, data)
         row = Row(frame.file, frame.right_file, "ok")
-        return Outcome(row, source.encoding, source.warning or source.doubt, source.searched)
+        return Outcome(row, source.encoding, source.warning or source.doubt or source.note, source.searched)
 
     outcome = guarded(frame, work)
     if outcome.row.status == "error":

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError
+from rollcli.imaging.alignment import moved_up, vertical_offset
 from rollcli.imaging.disparity_range import largest_disparity
 from rollcli.imaging.stereo_options import StereoOptions as StereoOptions
 
@@ -25,6 +26,9 @@ _SMALL_STEP_COST, _LARGE_STEP_COST = 4, 16
 _SUBPIXELS = 16  # OpenCV stores sixteenths of a pixel
 _SMALL_WIDTH = 320  # px, to find the range at
 _SMALL = StereoOptions(mode="3way", speckle_size=50, speckle_range=1)
+_ALIGNED = 0.15  # px: a smaller vertical offset is not worth another match
+_ALIGNMENTS = 3
+_HIDDEN = 1.3  # a map that was matched with the offset hides a part of it: this many times what it shows
 
 
 @dataclass(frozen=True)
@@ -39,12 +43,15 @@ class StereoMatch:
         The range searched.
     end_fraction : float
         Share of the valid pixels within a pixel of the range's end: if large, the range was too short.
+    vertical_offset : float
+        By how much the right image was moved up before it was matched, px.
     """
 
     disparity: NDArray[np.float32]
     min_disparity: int
     num_disparities: int
     end_fraction: float
+    vertical_offset: float
 
 
 def compute_disparity(left: NDArray[Any], right: NDArray[Any], **options: Any) -> NDArray[np.float32]:
@@ -93,14 +100,33 @@ def match_pair(left: NDArray[Any], right: NDArray[Any], options: StereoOptions) 
     count = _usable_range(count, first, width, options.block_size)
     if count < 16:
         raise InputError(f"images {width} px wide are too narrow to match from disparity {first} on")
-    disparity = _match(views, first, count, options)
+    disparity, offset = _aligned_match(views, first, count, options)
     valid = np.count_nonzero(disparity)
     return StereoMatch(
         disparity=disparity,
         min_disparity=first,
         num_disparities=count,
         end_fraction=np.count_nonzero(disparity >= first + count - 2) / valid if valid else 0.0,
+        vertical_offset=offset,
     )
+
+
+def _aligned_match(
+    views: Views, first: int, count: int, options: StereoOptions
+) -> tuple[NDArray[np.float32], float]:
+    """The disparity of views brought to equal height, and how much lower the right one was."""
+    left, right = views
+    offset = options.vertical_offset or 0.0
+    level = moved_up(right, offset)
+    disparity = _match((left, level), first, count, options)
+    for _ in range(_ALIGNMENTS if options.vertical_offset is None else 0):
+        more = vertical_offset(left, level, disparity)
+        if abs(more) < _ALIGNED:
+            break
+        offset += _HIDDEN * more
+        level = moved_up(right, offset)
+        disparity = _match((left, level), first, count, options)
+    return disparity, offset
 
 
 def _prepared(left: NDArray[Any], right: NDArray[Any], downscale: float) -> Views:

@@ -14,6 +14,7 @@ _LIMITS = {
     "speckle_size": (0, 10**6),
     "speckle_range": (0, 1000),
     "downscale": (1, 64),
+    "vertical_offset": (-100, 100),
 }
 
 
@@ -40,6 +41,8 @@ class StereoOptions:
         Disparity step that ends an island, pixels.
     downscale : float
         Match at 1/downscale of the size.
+    vertical_offset : float or None
+        How much lower the right image lies, pixels of the size matched at; None: measured from the pair.
     """
 
     num_disparities: int | None = None
@@ -50,6 +53,7 @@ class StereoOptions:
     speckle_size: int = 100
     speckle_range: int = 2
     downscale: float = 1.0
+    vertical_offset: float | None = None
 
     def __post_init__(self) -> None:
         for name, (low, high) in _LIMITS.items():

@@ -2,8 +2,10 @@
 
 import csv
 import io
+import re
 import subprocess
 
+import cv2
 import numpy as np
 import pytest
 
@@ -122,6 +124,18 @@ def test_a_range_that_is_too_short_makes_the_row_suspect(tmp_path):
     done = rollcli("estimate", "--left", "left", "--right", "right", *short, cwd=tmp_path)
     assert column(done.out, "status") == ["suspect"]
     assert "end of the searched range" in done.out
+
+
+def test_a_pair_whose_views_are_not_level_is_corrected_and_says_so(tmp_path):
+    write_pair(tmp_path, "a.png", road_map(0.05, width=320, height=160) / 2)
+    right = cv2.imread(str(tmp_path / "right" / "a.png"), cv2.IMREAD_UNCHANGED)
+    cv2.imwrite(str(tmp_path / "right" / "a.png"), np.roll(right, 1, axis=0))
+    pair = ("--left", "left", "--right", "right")
+
+    done = rollcli("estimate", *pair, cwd=tmp_path)
+    assert re.search(r"corrected: the right image lay (0\.[89]|1\.[01])\d px lower", done.out)
+    assert float(column(done.out, "roll_deg")[0]) == pytest.approx(np.degrees(0.05), abs=0.3)
+    assert "corrected" not in rollcli("estimate", *pair, "--vertical-offset", "1", cwd=tmp_path).out
 
 
 def test_maps_and_pairs_are_not_mixed(maps):
