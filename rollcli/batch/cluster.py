@@ -4,7 +4,7 @@ import asyncio
 import logging
 import os
 from collections.abc import Generator, Sequence
-from concurrent.futures import CancelledError, Future
+from concurrent.futures import CancelledError, Future, wait
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ from rollcli.batch.workers import in_order
 from rollcli.errors import ClusterError, UsageError
 from rollcli.files.atomic import write_atomic
 
-_CONNECT_S, _FIRST_WORKER_S = 6, 5
+_CONNECT_S, _FIRST_WORKER_S, _LOOK_EVERY_S = 6, 5, 2
 _IN_FLIGHT_PER_THREAD = 4
 _LOST = "every worker that tried it died: killed for memory, perhaps, or crashed"
 
@@ -88,12 +88,14 @@ class ClusterCrew:
 
         self.deaths: tuple[type[BaseException], ...] = (KilledWorker,)
         self.window = _IN_FLIGHT_PER_THREAD * sum(client.nthreads().values())
-        self._options, self._executor = options, client.get_executor(pure=False)
+        self._client, self._options = client, options
+        self._executor = client.get_executor(pure=False)
 
-    def submit(self, frame: Frame) -> "Future[Outcome]":
+    def submit(self, frame: Frame) -> "ClusterTicket":
         """Start a frame on whichever worker is free."""
-        future: Future[Outcome] = self._executor.submit(do, frame, self._options)
-        return future
+        if self._client.status == "closed":
+            raise CancelledError
+        return ClusterTicket(self._executor.submit(do, frame, self._options), self._client)
 
     def again(self, frame: Frame) -> Outcome:
         """Several workers have tried it already."""
@@ -107,6 +109,24 @@ def _silence_dask() -> None:
     except ImportError as error:
         raise UsageError("--scheduler needs the extra cluster: pip install 'rollcli[cluster]'") from error
     logging.disable()
+
+
+class ClusterTicket:
+    """A future that does not outlive its client: what is sent while a connection breaks is never answered."""
+
+    def __init__(self, future: "Future[Outcome]", client: Any) -> None:
+        self._future, self._client = future, client
+
+    def result(self) -> Outcome:
+        """Wait for the outcome; CancelledError when the scheduler is lost."""
+        while not wait([self._future], timeout=_LOOK_EVERY_S).done:
+            if self._client.status == "closed":
+                raise CancelledError
+        return self._future.result()
+
+    def cancel(self) -> bool:
+        """Give the frame back, unless it is done."""
+        return self._future.cancel()
 
 
 def _connect(address: str) -> Any:

@@ -6,6 +6,8 @@ import subprocess
 import sys
 import threading
 import time
+from concurrent.futures import CancelledError, Future
+from types import SimpleNamespace
 
 import pytest
 
@@ -14,7 +16,7 @@ from tests.program import command, contents, environment, rollcli, write_maps
 pytest.importorskip("distributed", reason="the extra cluster is not installed")
 
 from rollcli import __version__
-from rollcli.batch.cluster import probe
+from rollcli.batch.cluster import ClusterTicket, probe
 
 FRAMES = 60
 IMAGES = ("--derotated", "upright", "--vdisparity", "v")
@@ -25,15 +27,21 @@ ONE_PROCESS = ("--nthreads", "1", "--no-nanny")
 
 
 @pytest.fixture
-def scheduler(tmp_path):
-    """The address of a scheduler that has no workers yet."""
+def scheduler_process(tmp_path):
+    """A scheduler that has no workers yet, and its address."""
     state = tmp_path / "scheduler.json"
     process = dask("scheduler", tmp_path, *LOCAL, "--port", "0", "--scheduler-file", state)
     try:
         wait_for(lambda: state.exists() and state.read_text().endswith("}"))
-        yield json.loads(state.read_text())["address"]
+        yield process, json.loads(state.read_text())["address"]
     finally:
         end(process)
+
+
+@pytest.fixture
+def scheduler(scheduler_process):
+    """The address of the scheduler."""
+    return scheduler_process[1]
 
 
 @pytest.fixture
@@ -99,6 +107,30 @@ def test_a_cluster_that_loses_a_worker_gives_the_bytes_of_a_local_run(tmp_path, 
 
 def differing(one, other):
     return {name for name in one.keys() | other.keys() if one.get(name) != other.get(name)}
+
+
+def test_a_scheduler_that_is_lost_ends_the_run_which_goes_on_without_it(tmp_path, scheduler_process, workers):
+    process, scheduler = scheduler_process
+    write_maps(tmp_path / "maps", 200, width=300, height=200)
+    arguments = ("estimate", "maps", "-q", "-o", "rolls.csv", *IMAGES)
+    line = command(*arguments, "--scheduler", scheduler)
+    run = subprocess.Popen(line, cwd=tmp_path, env=environment(), stderr=subprocess.PIPE, text=True)
+    result = tmp_path / "rolls.csv"
+    wait_for(lambda: run.poll() is not None or (result.exists() and result.read_bytes().count(b"\n") > 8))
+    process.kill()
+    _, err = run.communicate(timeout=60)
+    assert run.returncode == 1
+    assert err.startswith(f"rollcli: {scheduler}: the connection to the scheduler is lost; ")
+    assert err.endswith(" rows are kept, continue with --resume\n")
+    assert rollcli(*arguments, "--resume", cwd=tmp_path).status == 0
+    assert result.read_bytes().count(b"\n") == 201
+    assert not list(tmp_path.rglob("*.part"))
+
+
+def test_nobody_waits_for_what_was_sent_while_the_connection_broke():
+    client = SimpleNamespace(status="closed")
+    with pytest.raises(CancelledError):
+        ClusterTicket(Future(), client).result()
 
 
 def test_a_worker_that_has_no_such_program_or_files_is_named(tmp_path):
