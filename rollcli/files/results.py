@@ -209,6 +209,9 @@ def _row(values: Mapping[str, Any], where: str) -> Row:
 
 _FLAGS = {"converged", "global_minimum"}
 _COUNTS = {"iterations", "width", "height"}
+# what lies outside is another program's idea of a roll
+_ANY = (-math.inf, math.inf)
+_BOUNDS = {"roll_deg": (-90.0, 90.0), "roll_ci95_deg": (0.0, math.inf)}
 
 
 def _value(name: str, value: Any, where: str) -> Any:
@@ -225,12 +228,12 @@ def _value(name: str, value: Any, where: str) -> Any:
     try:
         if name in _FLAGS:
             return {"true": True, "false": False}[str(value).lower()]
-        return int(value) if name in _COUNTS else _finite(float(value))
+        return int(value) if name in _COUNTS else _within(float(value), *_BOUNDS.get(name, _ANY))
     except (KeyError, ValueError, TypeError, OverflowError) as error:
         raise InputError(f"{where}: {value!r} is no value for {name}") from error
 
 
-def _finite(number: float) -> float:
-    if not math.isfinite(number):
+def _within(number: float, low: float, high: float) -> float:
+    if not (math.isfinite(number) and low <= number <= high):
         raise ValueError(number)
     return number

@@ -164,6 +164,8 @@ def test_ten_thousand_frames_stay_under_30_mb(tmp_path):
         ("file,status,roll_deg\n", "has no rows"),
         ("file,status,roll_deg\na.png,ok,much\n", "line 2: 'much' is no value for roll_deg"),
         ("file,status,roll_deg\na.png,ok,nan\n", "line 2: 'nan' is no value for roll_deg"),
+        ("file,status,roll_deg\na.png,ok,359.2\n", "line 2: '359.2' is no value for roll_deg"),
+        ("file,status,roll_deg,roll_ci95_deg\na.png,ok,2,-1\n", "line 2: '-1' is no value for roll_ci95_deg"),
         ("file,status,roll_deg\na.png,fine,2\n", "line 2: 'fine' is no status"),
         (
             '{"file": "a\\u0000.png", "status": "ok", "roll_deg": 2}\n',
