@@ -111,7 +111,7 @@ def differing(one, other):
 
 def test_a_scheduler_that_is_lost_ends_the_run_which_goes_on_without_it(tmp_path, scheduler_process, workers):
     process, scheduler = scheduler_process
-    write_maps(tmp_path / "maps", 200, width=300, height=200)
+    write_maps(tmp_path / "maps", 100, width=300, height=200)
     arguments = ("estimate", "maps", "-q", "-o", "rolls.csv", *IMAGES)
     line = command(*arguments, "--scheduler", scheduler)
     run = subprocess.Popen(line, cwd=tmp_path, env=environment(), stderr=subprocess.PIPE, text=True)
@@ -123,7 +123,7 @@ def test_a_scheduler_that_is_lost_ends_the_run_which_goes_on_without_it(tmp_path
     assert err.startswith(f"rollcli: {scheduler}: the connection to the scheduler is lost; ")
     assert err.endswith(" rows are kept, continue with --resume\n")
     assert rollcli(*arguments, "--resume", cwd=tmp_path).status == 0
-    assert result.read_bytes().count(b"\n") == 201
+    assert result.read_bytes().count(b"\n") == 101
     assert not list(tmp_path.rglob("*.part"))
 
 
