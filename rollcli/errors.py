@@ -21,5 +21,9 @@ class ClusterError(RollcliError):
     """The cluster cannot do the work (exit status 1)."""
 
 
+class WorkerError(RollcliError):
+    """Worker processes cannot be started (exit status 1)."""
+
+
 class OutputError(RollcliError):
     """A result cannot be written: the program cannot do its job (exit status 1)."""

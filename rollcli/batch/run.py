@@ -17,7 +17,7 @@ from rollcli.batch.result_file import ResultFile, RowSink, check_result, kept_ro
 from rollcli.batch.setup import limit_blas_threads
 from rollcli.batch.signals import Stop, stop_on_signals
 from rollcli.batch.workers import Work
-from rollcli.errors import ClusterError, InputError, OutputError
+from rollcli.errors import ClusterError, InputError, OutputError, WorkerError
 from rollcli.files.results import Row, parse_rows, read_run, run_path
 from rollcli.files.stream import STDOUT
 
@@ -64,7 +64,7 @@ def run(options: EstimateOptions, resume_command: str = "") -> int:
                 _work(plan.frames[done:], options, sink, record, report, stop)
         except KeyboardInterrupt:  # asked twice: without waiting for the frames in flight
             report.stopped_early = True
-        except (OutputError, ClusterError) as error:
+        except (OutputError, ClusterError, WorkerError) as error:
             raise type(error)(f"{error}{_hint(sink, report)}") from error
         return _end(record, report, stop, resume_command)
 

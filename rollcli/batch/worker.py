@@ -14,7 +14,7 @@ from types import TracebackType
 from typing import Any
 
 from rollcli.batch.setup import prepare_worker
-from rollcli.errors import RollcliError
+from rollcli.errors import RollcliError, WorkerError
 
 
 class Worker:
@@ -29,6 +29,11 @@ class Worker:
     held : int or None
         An open file that the process holds as long as it lives.
 
+    Raises
+    ------
+    WorkerError
+        The system starts no further process.
+
     Attributes
     ----------
     asked : deque
@@ -37,11 +42,14 @@ class Worker:
 
     def __init__(self, do: Callable[[Any], Any], held: int | None) -> None:
         spawn = multiprocessing.get_context("spawn")
-        self.pipe, far = spawn.Pipe()
         self.asked: deque[Any] = deque()
-        self._process = spawn.Process(target=_serve, args=(far, do, _Held(held)), daemon=True)
-        with _no_ctrl_c():  # a child inherits what is blocked: only the run decides when work ends
-            self._process.start()
+        try:
+            self.pipe, far = spawn.Pipe()
+            self._process = spawn.Process(target=_serve, args=(far, do, _Held(held)), daemon=True)
+            with _no_ctrl_c():  # a child inherits what is blocked: only the run decides when work ends
+                self._process.start()
+        except OSError as error:
+            raise _unable(error) from error
         far.close()
 
     def kill(self) -> None:
@@ -58,14 +66,29 @@ def _serve(pipe: "Connection[Any, Any]", do: Callable[[Any], Any], held: "_Held"
     """What the process does; `held` is open as long as it lives."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    prepare_worker()
+    unable = _prepare()
     with contextlib.suppress(EOFError, OSError):  # the other side is closed: all is done
         while True:
             task = pipe.recv()
             with _Outcome() as outcome:
+                if unable is not None:
+                    raise unable
                 outcome.value = do(task)
             pipe.send((outcome.value, outcome.error))
     os._exit(0)  # there is nothing to tidy up, and taking NumPy and OpenCV down takes longer than two frames
+
+
+def _prepare() -> WorkerError | None:
+    """What keeps this process from working: not the fault of any task."""
+    try:
+        prepare_worker()
+    except (ImportError, OSError, MemoryError) as error:  # no memory left for NumPy or OpenCV
+        return _unable(error)
+    return None
+
+
+def _unable(error: Exception) -> WorkerError:
+    return WorkerError(f"a worker process cannot start: {error}; try fewer of them, with --jobs")
 
 
 def _end_with_parent() -> None:

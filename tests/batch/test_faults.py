@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -224,6 +225,31 @@ def test_a_frame_that_kills_its_worker_twice_is_an_error_row_and_the_batch_goes_
         "maps/frame3.png,,error,,,,,,,,,,,,,,,"
         '"maps/frame3.png: its worker died twice: killed for memory, perhaps, or crashed"'
     ]
+
+
+def cannot_start(maps, **how):
+    """The one line of a run whose two workers cannot start."""
+    line = command("estimate", "maps", "-j2", "-o", "rolls.csv", "-q")
+    done = subprocess.run(line, cwd=maps, capture_output=True, text=True, check=False, **how)
+    assert done.returncode == 1
+    assert done.stderr.startswith("rollcli: a worker process cannot start: ")
+    assert done.stderr.endswith("; try fewer of them, with --jobs\n")
+    assert done.stderr.count("\n") == 1
+    assert (maps / "rolls.csv").read_bytes().count(b"\n") == 1  # no frame has to answer for it
+    return done.stderr
+
+
+def test_too_few_open_files_for_workers_end_the_run_in_one_line(maps):
+    limit = partial(resource.setrlimit, resource.RLIMIT_NOFILE, (14, 14))
+    assert "Too many open files" in cannot_start(maps, env=environment(), preexec_fn=limit)
+
+
+def test_a_worker_that_cannot_load_its_libraries_ends_the_run_in_one_line(maps):
+    hook = "import sys\nif 'spawn_main' in ' '.join(sys.orig_argv): sys.modules['cv2'] = None\n"
+    (maps / "hook").mkdir()
+    (maps / "hook" / "sitecustomize.py").write_text(hook)
+    path = os.pathsep.join([str(maps / "hook"), str(ROOT)])
+    assert "cv2" in cannot_start(maps, env=environment(PYTHONPATH=path))
 
 
 def test_workers_end_with_a_run_that_is_killed(maps):
