@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import sys
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
@@ -42,14 +43,57 @@ def atomic_file(path: str | Path) -> Iterator[BinaryIO]:
         target.parent.mkdir(parents=True, exist_ok=True)
         if target.is_dir():
             raise OutputError(f"{path}: cannot be written: is a folder")
-        with temporary.open("wb") as file:
-            yield file
-        temporary.replace(target)
+        with _alone(temporary) as file:
+            try:
+                yield file
+                file.close()
+                temporary.replace(target)
+            except BaseException:
+                with contextlib.suppress(OSError):
+                    temporary.unlink()
+                raise
     except OSError as error:
         raise output_error(path, error) from error
+
+
+@contextlib.contextmanager
+def _alone(temporary: Path) -> Iterator[BinaryIO]:
+    """The temporary file, empty; who writes the same target at this moment is waited for.
+
+    A cluster may give a frame to a second worker while the first, given up as lost, is still writing.
+    """
+    flags = os.O_WRONLY | os.O_CREAT | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
+    while True:
+        with os.fdopen(os.open(temporary, flags, 0o666), "wb") as file, _locked(file):
+            if _is_still(temporary, file):
+                file.truncate()
+                yield file
+                return
+
+
+@contextlib.contextmanager
+def _locked(file: BinaryIO) -> Iterator[None]:
+    """Keep others from the file until the block ends, also when the file is closed before."""
+    if sys.platform == "win32":  # which keeps others from replacing an open file anyway
+        yield
+        return
+    import fcntl
+
+    held = os.dup(file.fileno())
+    try:
+        with contextlib.suppress(OSError):  # a file system without locks
+            fcntl.flock(held, fcntl.LOCK_EX)
+        yield
     finally:
-        with contextlib.suppress(OSError):
-            temporary.unlink()
+        os.close(held)
+
+
+def _is_still(path: Path, file: BinaryIO) -> bool:
+    """Whether the file has this name, and not its target's by now."""
+    try:
+        return os.path.samestat(path.stat(), os.fstat(file.fileno()))
+    except FileNotFoundError:
+        return False
 
 
 def part_of(target: Path) -> Path:

@@ -55,6 +55,26 @@ def test_what_a_killed_process_left_is_taken_over(tmp_path):
     assert (tmp_path / "map.png").read_bytes() == b"data"
 
 
+def test_two_processes_may_write_one_file_at_the_same_time(tmp_path):
+    script = (
+        "import sys\n"
+        "from rollcli.files.atomic import write_atomic\n"
+        "for _ in range(300):\n"
+        "    write_atomic(sys.argv[1], bytes(100_000))\n"
+    )
+    target = tmp_path / "map.png"
+    line = [sys.executable, "-c", script, target]
+    writers = [subprocess.Popen(line, stderr=subprocess.PIPE) for _ in range(2)]
+    sizes = set()
+    while any(writer.poll() is None for writer in writers):
+        if target.exists():
+            sizes.add(len(target.read_bytes()))
+
+    assert [writer.communicate()[1] for writer in writers] == [b"", b""]
+    assert sizes == {100_000}
+    assert names_in(tmp_path) == ["map.png"]
+
+
 def test_a_block_that_fails_leaves_what_was_there(tmp_path):
     (tmp_path / "map.png").write_bytes(b"old")
 
