@@ -32,14 +32,14 @@ _FITS = 4
 _RADIUS = 0.35  # of a triple, in half image lengths
 _MIN_AREA = 0.004  # twice the area of its triangle, to be well conditioned
 _LEAST_RISE = 4.0  # tolerances that a road rises by within the radius
-_BELOW = 1.5  # cost of a coherent pixel under the road; one that is merely not on it costs 1
+_BELOW = 0.7  # what a coherent pixel under the road costs beyond one that is merely not on it
 _OFF_SLOPE = 0.2  # weight of a pixel around which the map does not rise as the road does
 _SLOPE_SHARE = 0.4  # of the road's own slope: how far the map's may be off
 _CORE, _CORRIDOR = 0.4, 1.0  # half-widths of the corridor, in camera heights
-_BESIDE = 0.05  # weight of a pixel far beside it
+_BESIDE = 0.04  # weight of a pixel far beside it
 _NEAR = 1.5  # typical disparities: weights grow up to here, for what is near ahead is the road driven on
 _HORIZON = 3.0  # half image lengths from the centre; a plane whose horizon is farther away is rather a wall
-_LEAST = 0.05  # share of the pixels that a corridor should weigh
+_LEAST, _LEAST_CORE = 0.05, 0.02  # shares of the pixels that the corridor and its core should weigh
 _INCOHERENT = 0.3  # a pixel with less coherence is noise,
 _AT_LEAST = 0.3  # where the road's disparity is at least this, in typical ones: farther away edges are close
 RIVAL_ANGLE = math.radians(2)
@@ -54,8 +54,9 @@ class Road:
     plane : ndarray, shape (3,)
         d = c0 + c1 x + c2 y on the sample's grid.
     score : float
-        The share of the road-like pixels in its corridor that lie on it, less those below it; up to 1. Less
-        for a plane that looks like a wall, since its horizon is far outside of the image.
+        The share of the road-like pixels ahead that lie on it, less those below it, up to 1: the mean of that
+        in its corridor and of that in the core of it, of which a wide verge has nothing. Less for a plane
+        that looks like a wall, since its horizon is far outside of the image.
     rival : float
         The best score of a plane whose roll differs by more than 2 degrees.
     noise : float
@@ -220,16 +221,16 @@ class _Judge:
         """Return the score of each plane (K, 3); see `Road.score`."""
         excess = _excess(planes, self.scaled, self.caps)
         excess -= 1
-        slope, corridor = self._weights(planes)
-        reached = corridor * slope
-        lost = np.einsum("kn,kn->k", np.where(excess < 0, reached, corridor), excess)
-        scores: Singles = -lost / (reached.sum(1) + np.float32(_LEAST * len(self.d)))
-        steep = np.square(planes[:, 0]) / (np.square(planes[:, 1]) + np.square(planes[:, 2]))
+        slope, core, corridor = self._weights(planes)
+        scores = _explained(excess, slope, core, _LEAST_CORE) + _explained(excess, slope, corridor, _LEAST)
+        scores /= 2
+        rise = np.square(planes[:, 1]) + np.square(planes[:, 2])
+        steep = np.square(planes[:, 0]) / np.maximum(rise, np.float32(1e-30))
         return np.where(scores > 0, scores / (1 + steep * np.float32(_HORIZON**-2)), scores)
 
     def fitted(self, planes: Singles) -> Singles:
         """Fit each plane (K, 3) to the pixels on it, a few times over."""
-        slope, corridor = self._weights(planes)
+        slope, _, corridor = self._weights(planes)
         fixed = slope * corridor
         products = (self.scaled[:3, None] * self.scaled[None]).reshape(12, -1)
         for fit in range(_FITS):
@@ -240,16 +241,26 @@ class _Judge:
             planes = np.linalg.solve(sums[..., :3] + ridge, sums[..., 3:])[..., 0].astype(np.float32)
         return planes
 
-    def _weights(self, planes: Singles) -> tuple[Singles, Singles]:
-        """Return, for each plane and pixel, the agreement of slopes and the place in the corridor."""
+    def _weights(self, planes: Singles) -> tuple[Singles, Singles, Singles]:
+        """Return, for each plane and pixel, the agreement of slopes and the places in core and corridor."""
         c1, c2 = planes[:, 1:2], planes[:, 2:3]
         # x' / d in units of the plane's slope is the way to the side in camera heights, whatever the rig
         side = np.square((self.x * c2 - self.y * c1) / self.d)
-        corridor = np.exp(side * np.float32(-1 / _CORRIDOR**2)) + np.exp(side * np.float32(-1 / _CORE**2))
+        core = np.exp(side * np.float32(-1 / _CORE**2))
+        corridor = np.exp(side * np.float32(-1 / _CORRIDOR**2)) + core
         corridor *= np.float32((1 - _BESIDE) / 2)
         corridor += np.float32(_BESIDE)
+        core *= self.near
         corridor *= self.near
-        return _slope_weights(self.slopes, self.slope_noise, planes), corridor
+        return _slope_weights(self.slopes, self.slope_noise, planes), core, corridor
+
+
+def _explained(excess: Singles, slope: Singles, place: Singles, least: float) -> Singles:
+    """Return (K,): the share of the road-like pixels of a place that lie on each plane, less those below."""
+    reached = place * slope
+    lost = np.einsum("kn,kn->k", np.where(excess < 0, reached, place), excess)
+    shares: Singles = -lost / (reached.sum(1) + np.float32(least * place.shape[1]))
+    return shares
 
 
 def _noise_share(sample: Sample, plane: NDArray[np.float64]) -> float:
