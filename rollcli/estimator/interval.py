@@ -72,7 +72,7 @@ def _by_group(rows: Floats, weights: Floats, position: Floats, share: Floats) ->
     Of the five rows four are the design's; with the fifth, the residuals, a product is a group's normal
     equations, right-hand side included.
     """
-    order = np.argsort(position, kind="stable")
+    order = np.argsort(position)
     heights = np.cumsum(share[order])
     cuts = np.searchsorted(heights, heights[-1] * np.arange(1, _GROUPS) / _GROUPS)
     bounds = [0, *cuts.tolist(), len(order)]

@@ -14,7 +14,8 @@ from rollcli.estimator.profile import Edges, sides
 from rollcli.estimator.road import Road, road_weights
 from rollcli.estimator.sample import Sample
 
-_ROUNDS = 6
+_ROUNDS = 5
+_ROUNDS_MORE = 3  # that start from an earlier fit
 _START = 2.0  # tolerances within which a pixel counts at first;
 _PLAIN = 3.0  # in the end this many standard deviations,
 _WIDE = 5.0  # or this many of an uneven road, since its rises and dips are no noise,
@@ -25,8 +26,9 @@ _OF_BIWEIGHT = 1.25  # times the weighted root mean square it is a normal distri
 _AHEAD = 0.8  # half-width of the lane ahead, in camera heights
 _EDGE = 0.65  # half-width of the part of the image that counts; it ends as exp(-(x / _EDGE)^8)
 _DROP = 3.0  # farther than this many tolerances from the plane, a pixel is not looked at again
-_PIXELS = 4000  # looked at; more of them would repeat each other
+_PIXELS = 3500  # looked at; more of them would repeat each other
 MIN_PIXELS = 30
+_RIDGE, _TINY = 1 + 1e-10 * np.eye(4), 1e-300 * np.eye(4)  # a line has no a2, and no equation for it
 
 
 class Fit(NamedTuple):
@@ -85,25 +87,28 @@ class Near:
         pixels = {name: getattr(self, name)[kept] for name in ("x", "y", "d", "tolerance", "place", "ahead")}
         return replace(self, **pixels)
 
-    def fit(self, road: Road, *, parabolic: bool, ahead: bool = False) -> Fit:
-        """Fit (a0, a1, a2, theta), starting from the road's plane.
+    def fit(self, start: Road | Fit, *, parabolic: bool, ahead: bool = False) -> Fit:
+        """Fit (a0, a1, a2, theta), starting from the road's plane or from an earlier fit.
 
         Gauss-Newton with Tukey's biweight, whose width shrinks from two tolerances as far as the pixels' own
         spread allows; with `ahead`, the spread of those in the lane ahead.
         """
-        c0, c1, c2 = road.plane
-        fit = Fit(road.theta, (float(c0), math.hypot(c1, c2), 0.0), _START)
+        if isinstance(start, Fit):
+            fit, rounds = start._replace(limit=_START), _ROUNDS_MORE
+        else:
+            c0, c1, c2 = start.plane
+            fit, rounds = Fit(start.theta, (float(c0), math.hypot(c1, c2), 0.0), _START), _ROUNDS
         design = np.empty((5, len(self.x)))
         design[0], design[4] = 1, self.d
         off = self._off(fit)
-        for _ in range(_ROUNDS):
+        for _ in range(rounds):
             weights = self._weights(off, fit.limit)
             cosine, sine = math.cos(fit.theta), math.sin(fit.theta)
             design[1] = self.y * cosine - self.x * sine
             design[2] = design[1] * design[1] if parabolic else 0
             design[3] = -(self.x * cosine + self.y * sine) * (fit.alpha[1] + 2 * fit.alpha[2] * design[1])
             products = (design * weights) @ design.T
-            normal = products[:4, :4] + np.diag(1e-10 * np.diag(products)[:4] + 1e-300)
+            normal = products[:4, :4] * _RIDGE + _TINY
             a0, a1, a2, turned = np.linalg.solve(normal, products[:4, 4])
             theta = fit.theta + max(-0.2, min(0.2, float(turned)))
             fit = Fit(theta, (float(a0), float(a1), float(a2)), fit.limit)

@@ -99,11 +99,12 @@ def _road(x: Floats, y: Floats, theta: float, alpha: tuple[float, float, float])
 
 def _medians(places: Floats, heights: Floats) -> list[float]:
     """Return the median height of each bin, left to right; NaN where hardly a pixel is."""
-    order = np.lexsort((heights, places))
-    bounds = np.searchsorted(places[order], np.arange(2 * _BINS + 1))
+    # one sort for all bins: heights, far below 1, are the fractions
+    keys = np.sort(places + 0.5 + np.clip(heights, -0.4, 0.4))
+    bounds = np.searchsorted(keys, np.arange(2 * _BINS + 1))
     counts = np.diff(bounds)
-    middles = np.minimum(bounds[:-1] + counts // 2, len(order) - 1)
-    medians: list[float] = np.where(counts >= _MIN_PIXELS, heights[order[middles]], math.nan).tolist()
+    middles = keys[np.minimum(bounds[:-1] + counts // 2, len(keys) - 1)] - np.arange(2 * _BINS) - 0.5
+    medians: list[float] = np.where(counts >= _MIN_PIXELS, middles, math.nan).tolist()
     return medians
 
 

@@ -19,24 +19,25 @@ from numpy.typing import NDArray
 from rollcli.errors import EstimationError
 from rollcli.estimator.sample import NO_SLOPE, Sample, Singles
 
+_POOL_PIXELS = 4000  # triples are drawn of these
 _DRAWS = 1024  # triples drawn; about half are planes that could be a road
-_HYPOTHESES = 384
-_FIRST_PIXELS = 450  # all hypotheses are judged on these,
+_HYPOTHESES = 320
+_FIRST_PIXELS = 320  # all hypotheses are judged on these,
 _FIRST_BESIDE = 0.2
 _OF_EACH_ROLL = 4
-_SECOND = 32  # this many on the next,
+_SECOND = 24  # this many on the next,
 _SECOND_PIXELS = 640
-_REFINED = 5  # and these are fitted and judged on
-_THIRD_PIXELS = 2400
+_REFINED = 4  # and these are fitted and judged on
+_THIRD_PIXELS = 2000
 _FITS = 4
 _RADIUS = 0.35  # of a triple, in half image lengths
 _MIN_AREA = 0.004  # twice the area of its triangle, to be well conditioned
 _LEAST_RISE = 4.0  # tolerances that a road rises by within the radius
-_BELOW = 0.7  # what a coherent pixel under the road costs beyond one that is merely not on it
+_BELOW = 0.85  # what a coherent pixel under the road costs beyond one that is merely not on it
 _OFF_SLOPE = 0.2  # weight of a pixel around which the map does not rise as the road does
 _SLOPE_SHARE = 0.4  # of the road's own slope: how far the map's may be off
-_CORE, _CORRIDOR = 0.4, 1.0  # half-widths of the corridor, in camera heights
-_BESIDE = 0.04  # weight of a pixel far beside it
+_CORRIDOR = 1.0  # half-width, in camera heights; that of its core is 1 / sqrt(8) of it
+_BESIDE = 0.03  # weight of a pixel far beside it
 _NEAR = 1.5  # typical disparities: weights grow up to here, for what is near ahead is the road driven on
 _HORIZON = 3.0  # half image lengths from the centre; a plane whose horizon is farther away is rather a wall
 _LEAST, _LEAST_CORE = 0.05, 0.02  # shares of the pixels that the corridor and its core should weigh
@@ -124,16 +125,21 @@ def road_weights(sample: Sample, plane: NDArray[np.float64], near: NDArray[np.in
 
 def _planes(sample: Sample, max_roll: float, seed: int) -> Singles:
     """Return planes (K, 3) through triples of neighbouring coherent pixels, disparity growing downward."""
-    pool = np.flatnonzero((sample.coherence >= 0.5) & _rising(sample.slopes))
+    few = slice(None, None, max(1, round(len(sample.d) / _POOL_PIXELS)))
+    pool = np.flatnonzero((sample.coherence[few] >= 0.5) & _rising(sample.slopes[:, few])) * few.step
     if len(pool) < 3:
         return np.empty((0, 3), np.float32)
-    pool = pool[np.argsort(sample.column[pool], kind="stable")]
+    column = sample.column[pool]
+    pool = pool[np.argsort(column, kind="stable")]
+    before = np.concatenate([[0], np.cumsum(np.bincount(column))])  # how many lie left of each column
     x, y, d = sample.x, sample.y, sample.d
     first, second, third = _draws(seed)
     central = pool[np.abs(x[pool]) < _RADIUS]  # the road is more likely there
     both = np.concatenate([pool, central])
     a = both[(first * len(both)).astype(np.intp)]
-    from_, to = np.searchsorted(x[pool], np.stack([x[a] - _RADIUS, x[a] + _RADIUS]))
+    at, reach = sample.column[a].astype(np.intp), int(_RADIUS / sample.pitch)
+    from_ = before[np.maximum(at - reach, 0)]
+    to = before[np.minimum(at + reach + 1, len(before) - 1)]
     b = pool[from_ + (second * (to - from_)).astype(np.intp)]
     c = pool[from_ + (third * (to - from_)).astype(np.intp)]
     x1, y1, d1 = x[b] - x[a], y[b] - y[a], d[b] - d[a]
@@ -246,8 +252,9 @@ class _Judge:
         c1, c2 = planes[:, 1:2], planes[:, 2:3]
         # x' / d in units of the plane's slope is the way to the side in camera heights, whatever the rig
         side = np.square((self.x * c2 - self.y * c1) / self.d)
-        core = np.exp(side * np.float32(-1 / _CORE**2))
-        corridor = np.exp(side * np.float32(-1 / _CORRIDOR**2)) + core
+        corridor = np.exp(side * np.float32(-1 / _CORRIDOR**2))
+        core = np.square(np.square(np.square(corridor)))
+        corridor += core
         corridor *= np.float32((1 - _BESIDE) / 2)
         corridor += np.float32(_BESIDE)
         core *= self.near

@@ -19,7 +19,7 @@ _NOISE_SHARE = 0.012  # of the median disparity: what matching gets wrong on rea
 UNEVEN_SHARE = 0.02  # of a pixel's own disparity: 2 % of the camera's height, 3 cm on a car
 _QUANTUM_SHARE = 0.35  # of the smallest step: rounding is off by 0.29 steps, root mean square
 _COHERENT_SHARE = 0.03
-NO_SLOPE = np.float32(1e9)  # agrees with no road
+NO_SLOPE = np.float32(1e9)  # this steep or steeper agrees with no road
 
 
 @dataclass(frozen=True)
@@ -43,12 +43,14 @@ class Sample:
     coherence : ndarray of float32
         The share of the valid ones among four neighbours whose disparity is within tolerance.
     slopes : ndarray of float32, shape (4, N)
-        One-sided derivatives of d to the left, right, up and down, px per unit of x or y; 1e9 where the
-        neighbour is no data.
+        One-sided derivatives of d to the left, right, up and down, px per unit of x or y; 1e9 or steeper
+        where the neighbour is no data.
     slope_noise : float
         What the noise makes of a slope, px per unit.
     column : ndarray of uint16
         Column of each pixel among the sampled ones.
+    pitch : float
+        From one of these to the next, units of x.
     """
 
     grid: Grid
@@ -62,6 +64,7 @@ class Sample:
     slopes: Singles
     slope_noise: float
     column: NDArray[np.uint16]
+    pitch: float
 
 
 def take_sample(disparity: NDArray[Any], usable: NDArray[np.bool_] | None = None) -> Sample:
@@ -118,7 +121,6 @@ def take_sample(disparity: NDArray[Any], usable: NDArray[np.bool_] | None = None
     coherence /= np.maximum(known.sum(0, dtype=np.float32), 1)
     per_unit = grid.scale / reach
     slopes = steps * np.array([-per_unit, per_unit, -per_unit, per_unit], np.float32)[:, None]
-    slopes[~known] = NO_SLOPE
     return Sample(
         grid=grid,
         x=((columns * step + first - grid.centre_u) / grid.scale).astype(np.float32),
@@ -131,6 +133,7 @@ def take_sample(disparity: NDArray[Any], usable: NDArray[np.bool_] | None = None
         slopes=slopes,
         slope_noise=noise * per_unit,
         column=columns.astype(np.uint16),
+        pitch=step / grid.scale,
     )
 
 

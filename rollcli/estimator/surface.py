@@ -18,7 +18,6 @@ from rollcli.estimator.sample import UNEVEN_SHARE, Sample, reach_of
 
 _EVEN = 1.4  # a fit that ends within so many tolerances has nothing beside the road in it
 _WORN = 1.2  # where the lane ahead alone is as uneven as this, no edge can be told from it
-_LOOKS = 2  # at the edges: each fit shows them better
 _STEADY = 0.5  # of the road's own rise: how far that of the map may be off
 
 
@@ -132,14 +131,13 @@ def fit_surface(sample: Sample, road: Road, *, parabolic: bool) -> Surface:
 def _between_edges(near: Near, fit: Fit, road: Road, *, parabolic: bool) -> tuple[Near, Fit, Edges]:
     """Return the pixels between the edges of verges, and their fit; all as they were where none is seen."""
     lane = near.fit(road, parabolic=parabolic, ahead=True)
-    inside, edges = near, NO_EDGES
-    for _ in range(_LOOKS if lane.limit < _WORN else 0):
-        found = find_edges(near.x, near.y, near.d, near.place > 0.1, lane.theta, lane.alpha)
-        if found == NO_EDGES:
-            break
-        inside, edges = near.within(found, lane), found
-        lane = inside.fit(road, parabolic=parabolic, ahead=True)
-    return (near, fit, edges) if edges == NO_EDGES else (inside, lane, edges)
+    if lane.limit > _WORN:
+        return near, fit, NO_EDGES
+    edges = find_edges(near.x, near.y, near.d, near.place > 0.1, lane.theta, lane.alpha)
+    if edges == NO_EDGES:
+        return near, fit, edges
+    inside = near.within(edges, lane)
+    return inside, inside.fit(lane, parabolic=parabolic, ahead=True), edges
 
 
 def _surface(near: Near, fit: Fit, edges: Edges, sample: Sample, road: Road, *, parabolic: bool) -> Surface:
@@ -156,7 +154,7 @@ def _surface(near: Near, fit: Fit, edges: Edges, sample: Sample, road: Road, *, 
         grid=sample.grid,
         noise=sample.noise,
         limit=fit.limit,
-        share=float(np.count_nonzero(used)) * near.stride / len(sample.d),
+        share=min(1.0, float(np.count_nonzero(used)) * near.stride / len(sample.d)),
         moved=abs(fit.theta - road.theta),
         parabolic=parabolic,
         edges=edges,

@@ -11,8 +11,8 @@ from rollcli.estimator.solution import Solution, apart
 from rollcli.estimator.surface import Surface
 
 WIDEST_INTERVAL = math.radians(0.25)
-LEAST_SCORE = 0.16
-RIVAL_SHARE = 0.75
+LEAST_SCORE = 0.18
+RIVAL_SHARE = 0.7
 MOST_NOISE = 0.25
 LONGEST_MOVE = math.radians(1)
 NEAR_MINIMUM = 1.1
