@@ -59,7 +59,7 @@ class Road:
         in its corridor and of that in the core of it, of which a wide verge has nothing. Less for a plane
         that looks like a wall, since its horizon is far outside of the image.
     rival : float
-        The best score of a plane whose roll differs by more than 2 degrees.
+        The best score of another plane: one whose roll differs by more than 2 degrees.
     noise : float
         The share of its corridor that is noise: pixels that differ from those around them.
     """
@@ -107,11 +107,11 @@ def find_road(sample: Sample, max_roll: float, seed: int) -> Road:
     fitted = fitted[kept] if kept.any() else planes[_best(-scores, 1)]
     final = third.scores(fitted)
     winner = int(np.argmax(final))
-    rolls, others = _rolls(fitted), _rolls(planes)
+    rolls = _rolls(fitted)
     far = np.abs(rolls - rolls[winner]) > RIVAL_ANGLE
-    rival = max(
-        final[far].max(initial=-1), scores[np.abs(others - rolls[winner]) > RIVAL_ANGLE].max(initial=-1)
-    )
+    # a plane that was not fitted may be the same road, badly drawn
+    others = np.abs(_rolls(planes) - rolls[winner]) > 2 * RIVAL_ANGLE
+    rival = max(final[far].max(initial=-1), scores[others].max(initial=-1))
     plane = fitted[winner].astype(np.float64)
     return Road(plane, float(final[winner]), float(rival), _noise_share(sample, plane))
 

@@ -12,7 +12,7 @@ from rollcli.estimator.surface import Surface
 
 WIDEST_INTERVAL = math.radians(0.25)
 LEAST_SCORE = 0.18
-RIVAL_SHARE = 0.7
+RIVAL_SHARE = 0.75
 MOST_NOISE = 0.25
 LONGEST_MOVE = math.radians(1)
 NEAR_MINIMUM = 1.1
