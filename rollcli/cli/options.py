@@ -145,7 +145,11 @@ encoding_options = record(
         help="px: pixels as they are; kitti: p/256; cityscapes: (p-1)/256; sgbm: p/16, negative is no data; "
         "auto: float and uint8 are px, uint16 is kitti, int16 is sgbm.",
     ),
-    option("--scale", type=Number("F", above=0), help="Pixels = stored number * F, instead of an encoding."),
+    option(
+        "--scale",
+        type=Number("F", above=0),
+        help="Pixels = stored number * F; with an encoding, F replaces its factor.",
+    ),
     option(
         "--invalid",
         type=NumberOrNan(),
