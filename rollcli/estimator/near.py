@@ -24,7 +24,10 @@ _LEAST = 0.2  # but at least this many tolerances
 _SMOOTH, _UNEVEN = 0.35, 0.55  # standard deviations of even and of uneven roads, in tolerances
 _OF_BIWEIGHT = 1.25  # times the weighted root mean square it is a normal distribution's standard deviation
 _AHEAD = 0.8  # half-width of the lane ahead, in camera heights
-_EDGE = 0.65  # half-width of the part of the image that counts; it ends as exp(-(x / _EDGE)^8)
+_EDGE = 0.7  # half-width of the part of the image that counts; it ends as exp(-(x / _EDGE)^8)
+_OTHER_ROLL = 0.06  # radians: what a rig rolled by this much more or less would not see does not count
+_LARGE_ROLL = 0.2  # its tangent: from here on less and less is left out
+_FADE = 0.01  # how softly
 _DROP = 3.0  # farther than this many tolerances from the plane, a pixel is not looked at again
 _PIXELS = 3500  # looked at; more of them would repeat each other
 MIN_PIXELS = 30
@@ -70,14 +73,14 @@ class Near:
         off = (c0 + c1 * sample.x + c2 * sample.y - sample.d) / sample.tolerance
         near = np.flatnonzero(np.abs(off) < _DROP)
         stride = -(-len(near) // _PIXELS) or 1
-        near = near[
-            near % stride == 0
-        ]  # by place in the sample: one pixel more leaves the others as they are
+        near = near[near % stride == 0]  # by place in the sample, so that one pixel more moves no other
         kept = (sample.x, sample.y, sample.d, sample.tolerance)
         x, y, d, tolerance = (pixels[near].astype(np.float64) for pixels in kept)
-        across = x * math.cos(road.theta) + y * math.sin(road.theta)
-        edge = np.square(np.square(np.square(across / _EDGE)))
-        place = np.square(road_weights(sample, road.plane, near)) * np.exp(-edge)
+        across, along = _rolled(x, y, road.theta)
+        half_height = sample.grid.centre_v / sample.grid.scale
+        place = np.square(road_weights(sample, road.plane, near)) * _seen(
+            across, along, half_height, road.theta
+        )
         ahead = (np.abs(across) * math.hypot(c1, c2) < _AHEAD * d).astype(np.float64)
         return cls(x, y, d, tolerance, place, ahead, stride)
 
@@ -103,10 +106,9 @@ class Near:
         off = self._off(fit)
         for _ in range(rounds):
             weights = self._weights(off, fit.limit)
-            cosine, sine = math.cos(fit.theta), math.sin(fit.theta)
-            design[1] = self.y * cosine - self.x * sine
+            across, design[1] = _rolled(self.x, self.y, fit.theta)
             design[2] = design[1] * design[1] if parabolic else 0
-            design[3] = -(self.x * cosine + self.y * sine) * (fit.alpha[1] + 2 * fit.alpha[2] * design[1])
+            design[3] = -across * (fit.alpha[1] + 2 * fit.alpha[2] * design[1])
             products = (design * weights) @ design.T
             normal = products[:4, :4] * _RIDGE + _TINY
             a0, a1, a2, turned = np.linalg.solve(normal, products[:4, 4])
@@ -146,3 +148,21 @@ class Near:
         uneven = max(0.0, min(1.0, (deviation - _SMOOTH) / (_UNEVEN - _SMOOTH)))
         times = _PLAIN + uneven * ((_LANE if ahead else _WIDE) - _PLAIN)
         return max(_LEAST, times * deviation)
+
+
+def _rolled(x: Floats, y: Floats, theta: float) -> tuple[Floats, Floats]:
+    """Return the coordinates across and along the road."""
+    cosine, sine = math.cos(theta), math.sin(theta)
+    return x * cosine + y * sine, y * cosine - x * sine
+
+
+def _seen(across: Floats, along: Floats, half_height: float, theta: float) -> Floats:
+    """Return 1 for what a rig sees of the road at any roll near its own, less towards sides and near corners.
+
+    On a road that is not even across, the corner that only one of two rolls sees would turn the angle.
+    """
+    edge = np.square(np.square(np.square(across / _EDGE)))
+    bottom = half_height / math.cos(theta) + max(0.0, abs(math.tan(theta)) - _LARGE_ROLL)
+    beyond = along + _OTHER_ROLL * np.abs(across) - bottom
+    seen: Floats = np.exp(-edge) / (1 + np.exp(np.minimum(beyond / _FADE, 50)))
+    return seen
