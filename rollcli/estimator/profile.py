@@ -17,7 +17,7 @@ from rollcli.estimator.moments import Floats
 _BIN = 0.25  # camera heights
 _BINS = 10  # to each side
 _MIN_PIXELS = 12  # of a bin
-_LEVEL = 0.006  # a bin within this height belongs to the road
+_LEVEL = 0.008  # a bin within this height belongs to the road
 _SLOPE = 0.032  # a verge rises or falls at least this much
 _STEP = 1.6  # a first bin that differs by this many times the rise of the next ones is a kerb
 _CORE, _LANE = 2, 4  # bins from the middle: not looked at; a lane has no edge before these
