@@ -164,7 +164,8 @@ def _first_costs(sample: Sample, planes: Singles) -> Singles:
     """Return a cheap cost for each plane, with one guess of the road's slope for the corridor of all."""
     few = slice(None, None, max(1, round(len(sample.d) / _FIRST_PIXELS)))
     x, d = sample.x[few], sample.d[few]
-    side = np.square(x * np.median(planes[:, 2]) / d)
+    middle = len(planes) // 2
+    side = np.square(x * np.partition(planes[:, 2], middle)[middle] / d)
     corridor = _FIRST_BESIDE + (1 - _FIRST_BESIDE) * np.exp(side * np.float32(-1 / _CORRIDOR**2))
     weight = np.where(_rising(sample.slopes[:, few]), corridor, corridor * np.float32(_OFF_SLOPE))
     scaled = np.stack([np.ones_like(x), x, sample.y[few], d]) / sample.tolerance[few]
