@@ -66,6 +66,10 @@ class Sample:
     column: NDArray[np.uint16]
     pitch: float
 
+    def about(self, pixels: int) -> slice:
+        """Return what takes about so many of the pixels, evenly."""
+        return slice(None, None, max(1, round(len(self.d) / pixels)))
+
 
 def take_sample(disparity: NDArray[Any], usable: NDArray[np.bool_] | None = None) -> Sample:
     """Sample a map.
@@ -135,6 +139,13 @@ def take_sample(disparity: NDArray[Any], usable: NDArray[np.bool_] | None = None
         column=columns.astype(np.uint16),
         pitch=step / grid.scale,
     )
+
+
+def rising(slopes: Singles) -> NDArray[np.bool_]:
+    """Return where the disparity grows downward, above the pixel or below it."""
+    up, down = slopes[2:]
+    grows: NDArray[np.bool_] = ((up > 0) & (up < NO_SLOPE)) | ((down > 0) & (down < NO_SLOPE))
+    return grows
 
 
 def reach_of(height: int, width: int) -> int:
