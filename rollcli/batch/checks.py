@@ -32,6 +32,19 @@ def check_one_owner(writes: Iterable[tuple[Frame, Iterable[str]]]) -> None:
                 )
 
 
+def check_writes(reads: Sequence[str], writes: Sequence[str], *, overwrite: bool) -> None:
+    """Nothing that is read is written and, unless `overwrite`, no output exists.
+
+    Raises
+    ------
+    UsageError
+        Names the file.
+    """
+    check_inputs_are_kept(reads, writes)
+    if not overwrite:
+        check_nothing_is_there(writes)
+
+
 def check_inputs_are_kept(reads: Sequence[str], writes: Iterable[str]) -> None:
     """Nothing that is read is written.
 

@@ -4,7 +4,7 @@ import contextlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from rollcli.batch.checks import check_inputs_are_kept, check_nothing_is_there, check_one_owner
+from rollcli.batch.checks import check_one_owner, check_writes
 from rollcli.batch.dry_run import list_files
 from rollcli.batch.job import Frame, Outcome, failed
 from rollcli.batch.local import done_locally
@@ -89,9 +89,8 @@ def convert(
 def _check(conversions: Sequence[Conversion], *, overwrite: bool) -> None:
     writes = [path for each in conversions for path in each.writes]
     check_one_owner((each.frame, each.writes) for each in conversions)
-    check_inputs_are_kept([path for each in conversions for path in each.frame.reads()], writes)
-    if not overwrite:
-        check_nothing_is_there(writes)
+    reads = [path for each in conversions for path in each.frame.reads()]
+    check_writes(reads, writes, overwrite=overwrite)
 
 
 def _lost(conversion: Conversion, reason: str) -> Outcome:

@@ -35,6 +35,10 @@ def charts(tables: Mapping[str, Table]) -> dict[str, Chart]:
     return {chart.name: chart for chart in made}
 
 
+def _error_axis(title: str) -> dict[str, Any]:
+    return {"title": {"text": title}, "type": "log", "ticksuffix": "°", "exponentformat": "none", "dtick": 1}
+
+
 def _line(name: str, x: Any, y: Any, colour: str, **more: Any) -> dict[str, Any]:
     return {
         "type": "scatter",
@@ -144,14 +148,7 @@ def _solvers(table: Table) -> Chart:
         marker = {"symbol": "circle-open", "size": 15, "color": _COLOURS[solver]} if solver == "exact" else {}
         more = {"hovertemplate": "%{y:.5f}°"} | ({"marker": marker} if marker else {})
         data.append(_line(name, _DEGREES, rows.column("mean_deg"), _COLOURS[solver], **more))
-    error = {
-        "title": {"text": "mean |Δθ|"},
-        "type": "log",
-        "ticksuffix": "°",
-        "exponentformat": "none",
-        "dtick": 1,
-    }
-    layout = {"xaxis": _DELTA_AXIS, "yaxis": error}
+    layout = {"xaxis": _DELTA_AXIS, "yaxis": _error_axis("mean |Δθ|")}
     return Chart(
         "accuracy", "Mean error of three solvers after known rotations, against the tolerance", data, layout
     )
@@ -176,16 +173,9 @@ def _methods(table: Table) -> Chart:
         }
         for column, (name, symbol, colour) in figures.items()
     ]
-    error = {
-        "title": {"text": "|Δθ|"},
-        "type": "log",
-        "ticksuffix": "°",
-        "exponentformat": "none",
-        "dtick": 1,
-    }
     return Chart(
         "methods",
         "Median, 95th percentile and worst error of five methods after known rotations",
         data,
-        {"xaxis": error, "yaxis": {"autorange": "reversed"}},
+        {"xaxis": _error_axis("|Δθ|"), "yaxis": {"autorange": "reversed"}},
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 
-from rollcli.batch.checks import check_inputs_are_kept, check_nothing_is_there
+from rollcli.batch.checks import check_writes
 from rollcli.batch.dry_run import list_files
 from rollcli.batch.options import RunningOptions
 from rollcli.batch.report import FRAMES_FAILED
@@ -40,9 +40,7 @@ def run_accuracy(result: str, truth: str, form: str, output: str, running: Runni
         Exit status 1.
     """
     writes = [] if is_stream(output) else [output]
-    check_inputs_are_kept([result, truth], writes)
-    if not running.overwrite:
-        check_nothing_is_there(writes)
+    check_writes([result, truth], writes, overwrite=running.overwrite)
     if running.dry_run:
         list_files([((result, truth), writes)])
         return 0

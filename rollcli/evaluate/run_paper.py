@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rollcli.batch.checks import check_inputs_are_kept, check_nothing_is_there
+from rollcli.batch.checks import check_writes
 from rollcli.batch.dry_run import list_files
 from rollcli.batch.frames import map_frames
 from rollcli.batch.job import Frame
@@ -57,9 +57,7 @@ def run_paper(options: PaperOptions) -> int:
     truth = _known_angles(frames, options)
     writes = [str(Path(folder, name)) for name in (*(f"{name}.csv" for name in TABLES), PAGE)]
     reads = [path for frame in frames for path in frame.reads()]
-    check_inputs_are_kept(reads, writes)
-    if not running.overwrite:
-        check_nothing_is_there(writes)
+    check_writes(reads, writes, overwrite=running.overwrite)
     if running.dry_run:
         list_files([(reads, writes)])
         return 0

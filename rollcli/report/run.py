@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
-from rollcli.batch.checks import check_inputs_are_kept, check_nothing_is_there
+from rollcli.batch.checks import check_writes
 from rollcli.batch.dry_run import list_files
 from rollcli.batch.local import done_locally
 from rollcli.batch.options import EncodingOptions, FrameOptions
@@ -60,9 +60,7 @@ def make_report(options: ReportOptions) -> int:
         *(path for each in found for path in (*each.frame.reads(), *each.images.values())),
     ]
     writes = [] if is_stream(options.output) else [options.output]
-    check_inputs_are_kept(reads, writes)
-    if not options.running.overwrite:
-        check_nothing_is_there(writes)
+    check_writes(reads, writes, overwrite=options.running.overwrite)
     if options.running.dry_run:
         list_files([(reads, writes)])
         return 0
