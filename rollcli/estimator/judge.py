@@ -17,6 +17,7 @@ _SLOPE_SHARE = 0.4  # of the road's own slope: how far the map's may be off
 _BESIDE = 0.03  # weight of a pixel far beside it
 _NEAR = 1.5  # typical disparities: weights grow up to here, for what is near ahead is the road driven on
 _HORIZON = 3.0  # half image lengths from the centre; a plane whose horizon is farther away is rather a wall
+_RIDGE, _TINY = 1 + 1e-8 * np.eye(3), 1e-30 * np.eye(3)
 _LEAST, _LEAST_CORE = 0.05, 0.02  # shares of the pixels that the corridor and its core should weigh
 
 
@@ -76,8 +77,7 @@ class Judge:
             off = np.square(_residuals(planes, self.scaled))
             weight = fixed * np.maximum(0, 1 - off * np.float32(0.25 if fit == 0 else 1))
             sums = (weight @ products.T).astype(np.float64).reshape(-1, 3, 4)
-            ridge = 1e-9 * np.trace(sums, axis1=1, axis2=2)[:, None, None] * np.eye(3) + 1e-30 * np.eye(3)
-            planes = np.linalg.solve(sums[..., :3] + ridge, sums[..., 3:])[..., 0].astype(np.float32)
+            planes = np.linalg.solve(sums[..., :3] * _RIDGE + _TINY, sums[..., 3:])[..., 0].astype(np.float32)
         return planes
 
     def _weights(self, planes: Singles) -> tuple[Singles, Singles, Singles]:

@@ -9,13 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from rollcli.errors import EstimationError
-from rollcli.estimator.moments import Floats
 from rollcli.estimator.profile import Edges, sides
 from rollcli.estimator.road import Road, road_weights
-from rollcli.estimator.sample import Sample
+from rollcli.estimator.sample import Sample, Singles
 
-_ROUNDS = 5
-_ROUNDS_MORE = 3  # that start from an earlier fit
 _START = 2.0  # tolerances within which a pixel counts at first;
 _PLAIN = 3.0  # in the end this many standard deviations,
 _WIDE = 5.0  # or this many of an uneven road, since its rises and dips are no noise,
@@ -29,7 +26,7 @@ _OTHER_ROLL = 0.06  # radians: what a rig rolled by this much more or less would
 _LARGE_ROLL = 0.2  # its tangent: from here on less and less is left out
 _FADE = 0.01  # how softly
 _DROP = 3.0  # farther than this many tolerances from the plane, a pixel is not looked at again
-_PIXELS = 3500  # looked at; more of them would repeat each other
+_PIXELS = 2500  # looked at; more of them would repeat each other
 MIN_PIXELS = 30
 _RIDGE, _TINY = 1 + 1e-10 * np.eye(4), 1e-300 * np.eye(4)  # a line has no a2, and no equation for it
 
@@ -40,6 +37,12 @@ class Fit(NamedTuple):
     theta: float
     alpha: tuple[float, float, float]
     limit: float
+
+    @classmethod
+    def of(cls, road: Road) -> Fit:
+        """Return the road's plane as a fit."""
+        c0, c1, c2 = road.plane
+        return cls(road.theta, (float(c0), math.hypot(c1, c2), 0.0), _START)
 
 
 @dataclass(frozen=True)
@@ -58,12 +61,12 @@ class Near:
         How many near pixels of the sample each of them stands for.
     """
 
-    x: Floats
-    y: Floats
-    d: Floats
-    tolerance: Floats
-    place: Floats
-    ahead: Floats
+    x: Singles
+    y: Singles
+    d: Singles
+    tolerance: Singles
+    place: Singles
+    ahead: Singles
     stride: int
 
     @classmethod
@@ -75,13 +78,13 @@ class Near:
         stride = -(-len(near) // _PIXELS) or 1
         near = near[near % stride == 0]  # by place in the sample, so that one pixel more moves no other
         kept = (sample.x, sample.y, sample.d, sample.tolerance)
-        x, y, d, tolerance = (pixels[near].astype(np.float64) for pixels in kept)
+        x, y, d, tolerance = (pixels[near] for pixels in kept)
         across, along = _rolled(x, y, road.theta)
         half_height = sample.grid.centre_v / sample.grid.scale
         place = np.square(road_weights(sample, road.plane, near)) * _seen(
             across, along, half_height, road.theta
         )
-        ahead = (np.abs(across) * math.hypot(c1, c2) < _AHEAD * d).astype(np.float64)
+        ahead = (np.abs(across) * math.hypot(c1, c2) < _AHEAD * d).astype(np.float32)
         return cls(x, y, d, tolerance, place, ahead, stride)
 
     def within(self, edges: Edges, fit: Fit) -> Near:
@@ -90,54 +93,56 @@ class Near:
         pixels = {name: getattr(self, name)[kept] for name in ("x", "y", "d", "tolerance", "place", "ahead")}
         return replace(self, **pixels)
 
-    def fit(self, start: Road | Fit, *, parabolic: bool, ahead: bool = False) -> Fit:
+    def fit(self, start: Fit, rounds: int, *, parabolic: bool, ahead: bool = False) -> Fit:
         """Fit (a0, a1, a2, theta), starting from the road's plane or from an earlier fit.
 
         Gauss-Newton with Tukey's biweight, whose width shrinks from two tolerances as far as the pixels' own
         spread allows; with `ahead`, the spread of those in the lane ahead.
         """
-        if isinstance(start, Fit):
-            fit, rounds = start._replace(limit=_START), _ROUNDS_MORE
-        else:
-            c0, c1, c2 = start.plane
-            fit, rounds = Fit(start.theta, (float(c0), math.hypot(c1, c2), 0.0), _START), _ROUNDS
-        design = np.empty((5, len(self.x)))
+        fit = start._replace(limit=_START)
+        design = np.empty((5, len(self.d)), np.float32)
         design[0], design[4] = 1, self.d
-        off = self._off(fit)
+        across, off = self._lay_out(design, fit)
         for _ in range(rounds):
             weights = self._weights(off, fit.limit)
-            across, design[1] = _rolled(self.x, self.y, fit.theta)
-            design[2] = design[1] * design[1] if parabolic else 0
-            design[3] = -across * (fit.alpha[1] + 2 * fit.alpha[2] * design[1])
-            products = (design * weights) @ design.T
+            if not parabolic:
+                design[2] = 0
+            design[3] = across * (design[1] * (-2 * fit.alpha[2]) - fit.alpha[1])
+            products = ((design * weights) @ design.T).astype(np.float64)
             normal = products[:4, :4] * _RIDGE + _TINY
-            a0, a1, a2, turned = np.linalg.solve(normal, products[:4, 4])
-            theta = fit.theta + max(-0.2, min(0.2, float(turned)))
-            fit = Fit(theta, (float(a0), float(a1), float(a2)), fit.limit)
-            off = self._off(fit)
+            a0, a1, a2, turned = np.linalg.solve(normal, products[:4, 4]).tolist()
+            fit = Fit(fit.theta + max(-0.2, min(0.2, turned)), (a0, a1, a2), fit.limit)
+            across, off = self._lay_out(design, fit)
             fit = fit._replace(limit=min(fit.limit, self._width(off, weights, ahead=ahead)))
         return fit
 
-    def weights(self, fit: Fit) -> Floats:
+    def weights(self, fit: Fit) -> Singles:
         """Return the weights that a fit leaves, 0 to 1."""
-        return self._weights(self._off(fit), fit.limit)
+        design = np.empty((3, len(self.d)), np.float32)
+        design[0] = 1
+        return self._weights(self._lay_out(design, fit)[1], fit.limit)
 
-    def _off(self, fit: Fit) -> Floats:
-        """Return road minus disparity in tolerances."""
-        level = self.y * math.cos(fit.theta) - self.x * math.sin(fit.theta)
-        a0, a1, a2 = fit.alpha
-        off: Floats = (a0 + level * (a1 + level * a2) - self.d) / self.tolerance
-        return off
+    def _lay_out(self, design: Singles, fit: Fit) -> tuple[Singles, Singles]:
+        """Set a design's rows 1 and 2, the way along the road and its square.
 
-    def _weights(self, off: Floats, limit: float) -> Floats:
+        Returns the way across it, and road minus disparity in tolerances.
+        """
+        across, design[1] = _rolled(self.x, self.y, fit.theta)
+        np.square(design[1], out=design[2])
+        off: Singles = np.array(fit.alpha, np.float32) @ design[:3]
+        off -= self.d
+        off /= self.tolerance
+        return across, off
+
+    def _weights(self, off: Singles, limit: float) -> Singles:
         """Return the weights; refuse a surface with hardly a pixel on it."""
         inside = np.maximum(0, 1 - np.square(off / limit))
-        weights: Floats = inside * inside * self.place
+        weights: Singles = inside * inside * self.place
         if np.count_nonzero(weights) < MIN_PIXELS:
             raise EstimationError("no road: hardly a pixel lies on the best plane that was found")
         return weights
 
-    def _width(self, off: Floats, weights: Floats, *, ahead: bool) -> float:
+    def _width(self, off: Singles, weights: Singles, *, ahead: bool) -> float:
         """Return how wide the weights should be, from the spread of the pixels that have some.
 
         Every step is smooth: a pixel more or less must not turn the road.
@@ -150,13 +155,13 @@ class Near:
         return max(_LEAST, times * deviation)
 
 
-def _rolled(x: Floats, y: Floats, theta: float) -> tuple[Floats, Floats]:
+def _rolled(x: Singles, y: Singles, theta: float) -> tuple[Singles, Singles]:
     """Return the coordinates across and along the road."""
     cosine, sine = math.cos(theta), math.sin(theta)
     return x * cosine + y * sine, y * cosine - x * sine
 
 
-def _seen(across: Floats, along: Floats, half_height: float, theta: float) -> Floats:
+def _seen(across: Singles, along: Singles, half_height: float, theta: float) -> Singles:
     """Return 1 for what a rig sees of the road at any roll near its own, less towards sides and near corners.
 
     On a road that is not even across, the corner that only one of two rolls sees would turn the angle.
@@ -164,5 +169,5 @@ def _seen(across: Floats, along: Floats, half_height: float, theta: float) -> Fl
     edge = np.square(np.square(np.square(across / _EDGE)))
     bottom = half_height / math.cos(theta) + max(0.0, abs(math.tan(theta)) - _LARGE_ROLL)
     beyond = along + _OTHER_ROLL * np.abs(across) - bottom
-    seen: Floats = np.exp(-edge) / (1 + np.exp(np.minimum(beyond / _FADE, 50)))
+    seen: Singles = np.exp(-edge) / (1 + np.exp(np.minimum(beyond / _FADE, 50)))
     return seen

@@ -1,25 +1,28 @@
 """The profile across a road: what the ground beside it does.
 
 Heights above the road, in camera heights, are relative differences of disparity: h = d / road - 1. A kerb is
-a step; a verge starts at the road's height and rises or falls from there.
+a step; a verge starts at the road's height and rises or falls from there, until it is lost, for only pixels
+near the road are looked at.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.estimator.moments import Floats
+Reals = NDArray[np.floating[Any]]
 
 _BIN = 0.25  # camera heights
 _BINS = 10  # to each side
 _MIN_PIXELS = 12  # of a bin
 _LEVEL = 0.008  # a bin within this height belongs to the road
-_SLOPE = 0.032  # a verge rises or falls at least this much
-_STEP = 1.6  # a first bin that differs by this many times the rise of the next ones is a kerb
+_SLOPE = 0.026  # a verge rises or falls at least this much
+_STEP = 1.3  # a first bin that differs by this many times the rise of the next ones is a kerb
+_LOST = 0.03  # ground that was as far off as this may leave the pixels near the road altogether
 _CORE, _LANE = 2, 4  # bins from the middle: not looked at; a lane has no edge before these
 _MARGIN = 0.5  # bins: how far before the first bin of a verge the road ends
 
@@ -30,7 +33,7 @@ class Edges(NamedTuple):
     left: float
     right: float
 
-    def hold(self, side: Floats) -> NDArray[np.bool_]:
+    def hold(self, side: Reals) -> NDArray[np.bool_]:
         """Return which pixels, this far to the right, lie between the edges."""
         held: NDArray[np.bool_] = (side > -self.left) & (side < self.right)
         return held
@@ -39,7 +42,7 @@ class Edges(NamedTuple):
 NO_EDGES = Edges(math.inf, math.inf)
 
 
-def sides(x: Floats, y: Floats, theta: float, alpha: tuple[float, float, float]) -> Floats:
+def sides(x: Reals, y: Reals, theta: float, alpha: tuple[float, float, float]) -> Reals:
     """Return how far to the right of the middle each pixel of a road lies, in camera heights.
 
     Parameters
@@ -56,15 +59,15 @@ def sides(x: Floats, y: Floats, theta: float, alpha: tuple[float, float, float])
     ndarray
     """
     road = _road(x, y, theta, alpha)
-    across: Floats = (x * math.cos(theta) + y * math.sin(theta)) * abs(alpha[1])
+    across: Reals = (x * math.cos(theta) + y * math.sin(theta)) * abs(alpha[1])
     with np.errstate(divide="ignore", invalid="ignore"):
         return across / np.maximum(road, 0)
 
 
 def find_edges(
-    x: Floats,
-    y: Floats,
-    d: Floats,
+    x: Reals,
+    y: Reals,
+    d: Reals,
     used: NDArray[np.bool_],
     theta: float,
     alpha: tuple[float, float, float],
@@ -88,16 +91,18 @@ def find_edges(
     used = used & (road > 0.1 * d)
     height = d[used] / road[used] - 1
     side = sides(x[used], y[used], theta, alpha)
+    if len(height) == 0:
+        return NO_EDGES
     medians = _medians(np.floor(side / _BIN) + _BINS, height)
     return Edges(_edge(medians[_BINS - 1 :: -1]), _edge(medians[_BINS:]))
 
 
-def _road(x: Floats, y: Floats, theta: float, alpha: tuple[float, float, float]) -> Floats:
+def _road(x: Reals, y: Reals, theta: float, alpha: tuple[float, float, float]) -> Reals:
     level = y * math.cos(theta) - x * math.sin(theta)
     return alpha[0] + level * (alpha[1] + level * alpha[2])
 
 
-def _medians(places: Floats, heights: Floats) -> list[float]:
+def _medians(places: Reals, heights: Reals) -> list[float]:
     """Return the median height of each bin, left to right; NaN where hardly a pixel is."""
     # one sort for all bins: heights, far below 1, are the fractions
     keys = np.sort(places + 0.5 + np.clip(heights, -0.4, 0.4))
@@ -109,16 +114,22 @@ def _medians(places: Floats, heights: Floats) -> list[float]:
 
 
 def _edge(heights: list[float]) -> float:
-    """Return where a verge begins, by the first three bins that are off the road, from the middle outward."""
+    """Return where a verge begins, by the first bins that are off the road, from the middle outward."""
     for first in range(_CORE, len(heights) - 2):
-        beside = heights[first : first + 3]
-        if not abs(beside[0]) > _LEVEL or any(map(math.isnan, beside)):
+        beside = list(itertools.takewhile(math.isfinite, heights[first : first + 3]))
+        if not beside or abs(beside[0]) < _LEVEL or (len(beside) < 3 and abs(beside[-1]) < _LOST):
             continue
         if first < _LANE:
             break
-        rise = (beside[2] - beside[0]) / 2
         before = heights[first - 1]
-        jump = beside[0] - (0.0 if math.isnan(before) else before)
-        verge = abs(rise) > _SLOPE * _BIN and jump * rise > 0 and abs(jump) < _STEP * abs(rise)
-        return (first - _MARGIN) * _BIN if verge else math.inf
+        jump = beside[0] - (before if math.isfinite(before) else 0)
+        return (first - _MARGIN) * _BIN if _slopes(beside, jump) else math.inf
     return math.inf
+
+
+def _slopes(beside: list[float], jump: float) -> bool:
+    """Return whether ground that begins with a jump is a verge, not a kerb and what is level behind it."""
+    if len(beside) == 1:  # it is lost at once
+        return True
+    rise = max(((height - beside[0]) / bins for bins, height in enumerate(beside[1:], 1)), key=abs)
+    return abs(rise) > _SLOPE * _BIN and jump * rise > 0 and abs(jump) < _STEP * abs(rise)

@@ -17,7 +17,7 @@ Singles = NDArray[np.float32]
 _PIXELS = 16000  # aimed at
 _NOISE_SHARE = 0.012  # of the median disparity: what matching gets wrong on real roads, whatever the scale
 UNEVEN_SHARE = 0.02  # of a pixel's own disparity: 2 % of the camera's height, 3 cm on a car
-_QUANTUM_SHARE = 0.35  # of the smallest step: rounding is off by 0.29 steps, root mean square
+_QUANTUM_SHARE = 0.29  # of the smallest step: rounding is off by 0.29 steps, root mean square
 _COHERENT_SHARE = 0.03
 NO_SLOPE = np.float32(1e9)  # this steep or steeper agrees with no road
 
@@ -106,29 +106,35 @@ def take_sample(disparity: NDArray[Any], usable: NDArray[np.bool_] | None = None
         )
     first = reach + (step // 2) % step
 
-    def at(dv: int, du: int) -> Singles:
-        return _strided(disparity, reach, step, dv, du).ravel()[chosen].astype(np.float32)
+    def at(dv: int, du: int) -> NDArray[Any]:
+        return _strided(disparity, reach, step, dv, du).ravel()[chosen]
 
-    rows, columns = np.divmod(chosen, taken.shape[1])
-    d = at(0, 0)
-    around = np.stack([at(0, -reach), at(0, reach), at(-reach, 0), at(reach, 0)])
+    rows = chosen // taken.shape[1]  # divmod would take longer
+    columns = chosen - rows * taken.shape[1]
+    d = at(0, 0).astype(np.float32, copy=False)
+    steps = np.empty((4, len(d)), np.float32)
+    for row, (dv, du) in zip(steps, ((0, -reach), (0, reach), (-reach, 0), (reach, 0)), strict=True):
+        row[:] = at(dv, du)
     with np.errstate(invalid="ignore"):
-        known = around > 0
-    steps = np.where(known, around - d, NO_SLOPE)
+        known = steps > 0
+    steps -= d
+    np.copyto(steps, NO_SLOPE, where=~known)
     jumps = np.abs(steps)
-    middle = len(d) // 2
-    typical = float(np.partition(d, middle)[middle])
-    noise = max(_NOISE_SHARE * typical, _QUANTUM_SHARE * _quantum(jumps))
-    tolerance = np.sqrt(np.float32(noise) ** 2 + np.square(np.float32(UNEVEN_SHARE) * d))
+    quantum = _quantum(jumps)
+    noise, tolerance = _tolerance(d, typical := _median(d), quantum)
     near = jumps <= np.maximum(tolerance, np.float32(_COHERENT_SHARE * typical))
     coherence = near.sum(0, dtype=np.float32)
     coherence /= np.maximum(known.sum(0, dtype=np.float32), 1)
+    # anew, for noise spread over all disparities has another median than what is seen
+    noise, tolerance = _tolerance(d, typical := _median(d[coherence >= 0.5]), quantum)
     per_unit = grid.scale / reach
     slopes = steps * np.array([-per_unit, per_unit, -per_unit, per_unit], np.float32)[:, None]
+    xs = (np.arange(first, width, step) - grid.centre_u) / grid.scale
+    ys = (np.arange(first, height, step) - grid.centre_v) / grid.scale
     return Sample(
         grid=grid,
-        x=((columns * step + first - grid.centre_u) / grid.scale).astype(np.float32),
-        y=((rows * step + first - grid.centre_v) / grid.scale).astype(np.float32),
+        x=xs.astype(np.float32)[columns],
+        y=ys.astype(np.float32)[rows],
         d=d,
         tolerance=tolerance,
         typical=typical,
@@ -166,6 +172,18 @@ def _taken(
     with np.errstate(invalid="ignore"):
         taken: NDArray[np.bool_] = _strided(disparity, reach, step) > 0
     return taken if usable is None else taken & _strided(usable, reach, step)
+
+
+def _median(values: Singles) -> float:
+    middle = len(values) // 2
+    return float(np.partition(values, middle)[middle])
+
+
+def _tolerance(d: Singles, typical: float, quantum: float) -> tuple[float, Singles]:
+    """Return the noise, px, and the tolerance of each pixel."""
+    noise = max(_NOISE_SHARE * typical, _QUANTUM_SHARE * quantum)
+    tolerance: Singles = np.sqrt(np.float32(noise) ** 2 + np.square(np.float32(UNEVEN_SHARE) * d))
+    return noise, tolerance
 
 
 def _quantum(jumps: Singles) -> float:

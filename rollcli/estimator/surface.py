@@ -16,8 +16,9 @@ from rollcli.estimator.profile import NO_EDGES, Edges, find_edges, sides
 from rollcli.estimator.road import Road
 from rollcli.estimator.sample import UNEVEN_SHARE, Sample, reach_of
 
-_EVEN = 1.4  # a fit that ends within so many tolerances has nothing beside the road in it
-_WORN = 1.2  # where the lane ahead alone is as uneven as this, no edge can be told from it
+_ROUNDS = 5  # of the fit,
+_LANE_ROUNDS = 3  # of that of the lane ahead, which only has to show the edges,
+_EDGE_ROUNDS = 3  # of that between the edges, which starts from there
 _STEADY = 0.5  # of the road's own rise: how far that of the map may be off
 
 
@@ -122,22 +123,15 @@ def fit_surface(sample: Sample, road: Road, *, parabolic: bool) -> Surface:
         When hardly any pixel lies on the road.
     """
     near = Near.of(sample, road)
-    fit, edges = near.fit(road, parabolic=parabolic), NO_EDGES
-    if fit.limit > _EVEN:
-        near, fit, edges = _between_edges(near, fit, road, parabolic=parabolic)
-    return _surface(near, fit, edges, sample, road, parabolic=parabolic)
-
-
-def _between_edges(near: Near, fit: Fit, road: Road, *, parabolic: bool) -> tuple[Near, Fit, Edges]:
-    """Return the pixels between the edges of verges, and their fit; all as they were where none is seen."""
-    lane = near.fit(road, parabolic=parabolic, ahead=True)
-    if lane.limit > _WORN:
-        return near, fit, NO_EDGES
+    plane = Fit.of(road)
+    lane = near.fit(plane, _LANE_ROUNDS, parabolic=parabolic, ahead=True)
     edges = find_edges(near.x, near.y, near.d, near.place > 0.1, lane.theta, lane.alpha)
     if edges == NO_EDGES:
-        return near, fit, edges
-    inside = near.within(edges, lane)
-    return inside, inside.fit(lane, parabolic=parabolic, ahead=True), edges
+        fit = near.fit(plane, _ROUNDS, parabolic=parabolic)
+    else:
+        near = near.within(edges, lane)
+        fit = near.fit(lane, _EDGE_ROUNDS, parabolic=parabolic, ahead=True)
+    return _surface(near, fit, edges, sample, road, parabolic=parabolic)
 
 
 def _surface(near: Near, fit: Fit, edges: Edges, sample: Sample, road: Road, *, parabolic: bool) -> Surface:
@@ -145,10 +139,10 @@ def _surface(near: Near, fit: Fit, edges: Edges, sample: Sample, road: Road, *, 
     weights = near.weights(fit)
     used = weights > 0
     return Surface(
-        x=near.x[used],
-        y=near.y[used],
-        d=near.d[used],
-        weights=weights[used],
+        x=near.x[used].astype(np.float64),
+        y=near.y[used].astype(np.float64),
+        d=near.d[used].astype(np.float64),
+        weights=weights[used].astype(np.float64),
         theta=fit.theta,
         alpha=fit.alpha,
         grid=sample.grid,

@@ -20,7 +20,7 @@ def edges(height_at, half_width=1.0):
     return find_edges(x[near], y[near], d[near], np.ones(near.sum(), bool), 0.0, (0.0, SLOPE, 0.0))
 
 
-@pytest.mark.parametrize("slope", [-0.1, -0.05, 0.05, 0.1])
+@pytest.mark.parametrize("slope", [-0.2, -0.1, -0.05, 0.05, 0.1, 0.2])
 @pytest.mark.parametrize("half_width", [1.0, 1.3])
 def test_the_road_ends_where_the_ground_begins_to_slope(slope, half_width):
     found = edges(lambda beyond: slope * beyond, half_width)
@@ -50,6 +50,27 @@ def test_a_kerb_and_level_ground_behind_it_is_no_edge(height):
 
 def test_a_kerb_and_a_slight_slope_behind_it_is_no_edge():
     assert edges(lambda beyond: 0.025 + 0.02 * beyond) == NO_EDGES
+
+
+def test_ground_that_is_lost_within_a_bin_is_an_edge():
+    found = edges(lambda beyond: 0.04 + 0.3 * beyond, half_width=1.2)
+
+    assert found.left == pytest.approx(1.2, abs=0.3)
+    assert found.right == pytest.approx(1.2, abs=0.3)
+
+
+def test_a_road_that_is_lost_from_view_has_no_edge():
+    rng = np.random.default_rng(8)
+    x, y = rng.uniform(-0.15, 0.15, 20000), rng.uniform(0.05, 0.4, 20000)
+    d = SLOPE * y + rng.normal(0, 0.1, x.shape)
+
+    assert find_edges(x, y, d, np.ones(len(x), bool), 0.0, (0.0, SLOPE, 0.0)) == NO_EDGES
+
+
+def test_no_pixel_has_no_edge():
+    none = np.empty(0)
+
+    assert find_edges(none, none, none, none > 0, 0.0, (0.0, SLOPE, 0.0)) == NO_EDGES
 
 
 def test_a_road_as_wide_as_the_picture_has_no_edge():
