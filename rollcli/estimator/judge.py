@@ -16,7 +16,7 @@ _OFF_SLOPE = 0.2  # weight of a pixel around which the map does not rise as the 
 _SLOPE_SHARE = 0.4  # of the road's own slope: how far the map's may be off
 _BESIDE = 0.03  # weight of a pixel far beside it
 _NEAR = 1.5  # typical disparities: weights grow up to here, for what is near ahead is the road driven on
-_HORIZON = 3.0  # half image lengths from the centre; a plane whose horizon is farther away is rather a wall
+_HORIZON = 2.0  # half image lengths from the centre; a plane whose horizon is farther away is rather a wall
 _RIDGE, _TINY = 1 + 1e-8 * np.eye(3), 1e-30 * np.eye(3)
 _LEAST, _LEAST_CORE = 0.05, 0.02  # shares of the pixels that the corridor and its core should weigh
 
