@@ -24,7 +24,7 @@ _SLOPE = 0.026  # a verge rises or falls at least this much
 _STEP = 1.3  # a first bin that differs by this many times the rise of the next ones is a kerb
 _LOST = 0.03  # ground that was as far off as this may leave the pixels near the road altogether
 _CORE, _LANE = 2, 4  # bins from the middle: not looked at; a lane has no edge before these
-_MARGIN = 0.5  # bins: how far before the first bin of a verge the road ends
+_MARGIN = 0.5  # bins: how far before it leaves the road's level the road ends
 
 
 class Edges(NamedTuple):
@@ -117,13 +117,16 @@ def _edge(heights: list[float]) -> float:
     """Return where a verge begins, by the first bins that are off the road, from the middle outward."""
     for first in range(_CORE, len(heights) - 2):
         beside = list(itertools.takewhile(math.isfinite, heights[first : first + 3]))
-        if not beside or abs(beside[0]) < _LEVEL or (len(beside) < 3 and abs(beside[-1]) < _LOST):
+        if not beside or abs(beside[0]) <= _LEVEL or (len(beside) < 3 and abs(beside[-1]) < _LOST):
             continue
         if first < _LANE:
             break
-        before = heights[first - 1]
-        jump = beside[0] - (before if math.isfinite(before) else 0)
-        return (first - _MARGIN) * _BIN if _slopes(beside, jump) else math.inf
+        before = heights[first - 1] if math.isfinite(heights[first - 1]) else 0.0
+        if not _slopes(beside, beside[0] - before):
+            break
+        level = min(abs(before), _LEVEL)
+        crossing = (_LEVEL - level) / (abs(beside[0]) - level)  # bins on from the middle of the one before
+        return (first - 0.5 + crossing - _MARGIN) * _BIN
     return math.inf
 
 
