@@ -51,15 +51,12 @@ def minima(energy: Energy) -> list[Minimum]:
     """
     if not energy.parabolic:
         return [_line_minimum(energy)]
-    starts = _stationary_angles(energy)
-    polished = [_polished(energy, start) for start in starts]
-    settled = [theta for theta, step in polished if step < 1e-6] or [theta for theta, _ in polished]
-    found: list[Minimum] = []
-    for theta in map(principal, settled):
-        if all(abs(math.remainder(theta - other.theta, math.pi)) > 1e-7 for other in found):
-            found.append(Minimum(theta, float(energy.at(theta).value)))
-    lowest = min(found, key=lambda m: m.energy)
+    starts, low = _stationary_angles(energy)
     same = 1e-12 * (energy.rest + energy.slope_energy)
+    found = _settled(energy, starts)
+    if min((minimum.energy for minimum in found), default=math.inf) > low.energy + same:  # no root told of it
+        found += _settled(energy, [low.theta]) or [low]
+    lowest = min(found, key=lambda m: m.energy)
     return sorted(found, key=lambda m: (m.energy if m.energy > lowest.energy + same else -1.0, abs(m.theta)))
 
 
@@ -70,25 +67,23 @@ def _line_minimum(energy: Energy) -> Minimum:
     return Minimum(theta, float(energy.at(theta).value))
 
 
-def _stationary_angles(energy: Energy) -> Floats:
-    """Return angles near every local minimum, at least one, radians."""
+def _stationary_angles(energy: Energy) -> tuple[list[float], Minimum]:
+    """Return angles near every local minimum, radians, and the lowest of a few angles."""
     angles, stretch = _unwhitened(energy, _ANGLES)
     terms = energy.at(angles)
+    lowest = int(np.argmin(terms.value))
+    low = Minimum(float(angles[lowest]), float(terms.value[lowest]))
     spectrum = np.fft.fft(terms.gradient * energy.denominator(angles) ** 2 * stretch**10)
     # z^5 times the series is a polynomial in z; numpy wants the highest power first
     coefficients = np.concatenate([spectrum[_DEGREE::-1], spectrum[: -_DEGREE - 1 : -1]])
     largest = np.abs(coefficients).max()
     if not largest > 0:
-        return np.zeros(1)
+        return [0.0], low
     roots = np.roots(np.where(np.abs(coefficients) > 1e-15 * largest, coefficients, 0))
     # A double root may leave the circle by the square root of rounding; the angle of any other root is
     # harmless, for only those that the polish confirms as minima are compared.
     near = roots[np.abs(np.log(np.maximum(np.abs(roots), 1e-300))) < 0.1]
-    critical, _ = _unwhitened(energy, np.angle(near) / 2)
-    candidates = np.concatenate([critical, angles[[int(np.argmin(terms.value))]]])
-    curvature = energy.at(candidates).curvature
-    upward = candidates[curvature > 0]
-    return upward if len(upward) else candidates
+    return _unwhitened(energy, np.angle(near) / 2)[0].tolist(), low
 
 
 def _unwhitened(energy: Energy, angles: Floats) -> tuple[Floats, Floats]:
@@ -105,6 +100,17 @@ def _unwhitened(energy: Energy, angles: Floats) -> tuple[Floats, Floats]:
     u, v = a * u + b * v, b * u + c * v
     length = np.hypot(u, v) / math.sqrt(a * c - b * b)
     return np.arctan2(-u, v), length
+
+
+def _settled(energy: Energy, starts: list[float]) -> list[Minimum]:
+    """Return the minima near some angles."""
+    found: list[Minimum] = []
+    for start in starts:
+        theta, step = _polished(energy, start)
+        theta = principal(theta)
+        if step < 1e-6 and all(abs(math.remainder(theta - other.theta, math.pi)) > 1e-7 for other in found):
+            found.append(Minimum(theta, float(energy.at(theta).value)))
+    return found
 
 
 def _polished(energy: Energy, theta: float) -> tuple[float, float]:

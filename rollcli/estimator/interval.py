@@ -51,7 +51,7 @@ def moves(surface: Surface, theta: float) -> tuple[float, float, float]:
     x, y, d, weights = (pixels[::stride] for pixels in (surface.x, surface.y, surface.d, surface.weights))
     cosine, sine = math.cos(theta), math.sin(theta)
     across, along = x * cosine + y * sine, y * cosine - x * sine
-    a0, a1, a2 = surface.parabola(theta)
+    a0, a1, a2 = surface.alpha
     rows = np.empty((5, len(d)))
     rows[0], rows[1], rows[2] = 1, along, along * along * surface.parabolic
     rows[3] = -across * (a1 + 2 * a2 * along)
@@ -61,9 +61,10 @@ def moves(surface: Surface, theta: float) -> tuple[float, float, float]:
     total = bands.sum(0)
     normal = total[:4, :4]
     inverse = np.linalg.inv(normal + np.diag(1e-12 * np.diag(normal) + 1e-300))
-    step = inverse @ total[:4, 4]
+    step = inverse @ total[:4, 4]  # from the surface's parabola to the best one
     independent = max(1.0, stride * total[0, 0] / _EFFECTIVE_PIXELS)
-    white = 1.96 * math.sqrt(total[4, 4] / total[0, 0] * inverse[3, 3] * independent / stride)
+    rest = max(0.0, total[4, 4] - step @ total[:4, 4])
+    white = 1.96 * math.sqrt(rest / total[0, 0] * inverse[3, 3] * independent / stride)
     return _spread(bands, normal, step), _spread(columns, normal, step), white
 
 

@@ -89,16 +89,6 @@ class Surface:
         rises[:-reach] |= steady
         return on_it & rises
 
-    def parabola(self, theta: float) -> tuple[float, float, float]:
-        """Return the best (a0, a1, a2) at a given roll, on the normalised y."""
-        level = self.y * math.cos(theta) - self.x * math.sin(theta)
-        design = np.stack([np.ones_like(level), level, level * level * self.parabolic])
-        weighted = design * self.weights
-        normal = weighted @ design.T
-        ridge = np.diag(1e-12 * np.diag(normal) + 1e-300)
-        a0, a1, a2 = np.linalg.solve(normal + ridge, weighted @ self.d)
-        return float(a0), float(a1), float(a2)
-
 
 def fit_surface(sample: Sample, road: Road, *, parabolic: bool) -> Surface:
     """Fit the road's parabola and its roll to the pixels near the road's plane.
@@ -157,15 +147,19 @@ def _surface(near: Near, fit: Fit, edges: Edges, sample: Sample, road: Road, *, 
 
 def whole_surface(sample: Sample, energy: Energy) -> Surface:
     """Return the surface that every sampled pixel is taken to lie on."""
-    pixels = len(sample.d)
+    x, y, d = (values.astype(np.float64) for values in (sample.x, sample.y, sample.d))
     _, c1, c2 = energy.plane
+    theta = math.atan2(-c1, c2)
+    level = y * math.cos(theta) - x * math.sin(theta)
+    powers = np.vander(level, 3 if energy.parabolic else 2, increasing=True)
+    a0, a1, *a2 = np.linalg.lstsq(powers.T @ powers, powers.T @ d, rcond=None)[0].tolist()
     return Surface(
-        x=sample.x.astype(np.float64),
-        y=sample.y.astype(np.float64),
-        d=sample.d.astype(np.float64),
-        weights=np.ones(pixels),
-        theta=math.atan2(-c1, c2),
-        alpha=(0.0, 0.0, 0.0),
+        x=x,
+        y=y,
+        d=d,
+        weights=np.ones(len(d)),
+        theta=theta,
+        alpha=(a0, a1, a2[0] if a2 else 0.0),
         grid=sample.grid,
         noise=sample.noise,
         limit=math.inf,
