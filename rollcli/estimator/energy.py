@@ -204,7 +204,8 @@ class Energy:
 
     def _rotated(self, theta: Any) -> list[Any]:
         """Return the moments in the frame rotated by theta, then the plane's slopes along x and y."""
-        c, s = np.cos(theta), np.sin(theta)
+        library: Any = math if isinstance(theta, float) else np  # which is slow on single numbers
+        c, s = library.cos(theta), library.sin(theta)
         cc, cs, ss = c * c, c * s, s * s
         basis = np.array(
             [cc, cs, ss, cc * c, cc * s, c * ss, ss * s, cc * cc, cc * cs, cc * ss, cs * ss, ss * ss]

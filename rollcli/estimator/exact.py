@@ -16,7 +16,7 @@ import numpy as np
 
 from rollcli.estimator.energy import Energy
 from rollcli.estimator.moments import Floats
-from rollcli.estimator.solution import Solution, principal
+from rollcli.estimator.solution import Solution, apart, principal
 
 _DEGREE = 5
 _SAMPLES = 16  # more than 2 * _DEGREE + 1
@@ -106,24 +106,24 @@ def _settled(energy: Energy, starts: list[float]) -> list[Minimum]:
     """Return the minima near some angles."""
     found: list[Minimum] = []
     for start in starts:
-        theta, step = _polished(energy, start)
-        theta = principal(theta)
-        if step < 1e-6 and all(abs(math.remainder(theta - other.theta, math.pi)) > 1e-7 for other in found):
-            found.append(Minimum(theta, float(energy.at(theta).value)))
+        minimum, step = _polished(energy, start)
+        if step < 1e-6 and all(apart(minimum.theta, other.theta) > 1e-7 for other in found):
+            found.append(minimum)
     return found
 
 
-def _polished(energy: Energy, theta: float) -> tuple[float, float]:
+def _polished(energy: Energy, theta: float) -> tuple[Minimum, float]:
     """Newton's method on the gradient, as long as the energy does not rise; then abs(the next step)."""
     noise = 1e-14 * (energy.rest + energy.slope_energy)
-    now = energy.at(theta)
+    now, step = energy.at(theta), math.inf
     for _ in range(_POLISH):
         if not now.curvature > 0:
-            return theta, math.inf
+            step = math.inf
+            break
         step = -now.gradient / now.curvature
         then = energy.at(theta + step)
         # within rounding of the energy, the gradient still tells better from worse
         if then.value > now.value + noise or not abs(then.gradient) < abs(now.gradient):
-            return theta, abs(step)
+            break
         theta, now = theta + step, then
-    return theta, abs(step)
+    return Minimum(principal(theta), now.value), abs(step)
