@@ -23,7 +23,8 @@ _LEVEL = 0.008  # a bin within this height belongs to the road
 _SLOPE = 0.026  # a verge rises or falls at least this much
 _STEP = 1.3  # a first bin that differs by this many times the rise of the next ones is a kerb
 _LOST = 0.03  # ground that was as far off as this may leave the pixels near the road altogether
-_CORE, _LANE = 2, 4  # bins from the middle: not looked at; a lane has no edge before these
+_CORE, _LANE = 2, 3  # bins from the middle: not looked at; a lane has no edge before these
+_CAMBER = 0.5  # of the jump beside it: what slopes as much within the road is its camber
 _MARGIN = 0.5  # bins: how far before it leaves the road's level the road ends
 
 
@@ -119,10 +120,8 @@ def _edge(heights: list[float]) -> float:
         beside = list(itertools.takewhile(math.isfinite, heights[first : first + 3]))
         if not beside or abs(beside[0]) <= _LEVEL or (len(beside) < 3 and abs(beside[-1]) < _LOST):
             continue
-        if first < _LANE:
-            break
         before = heights[first - 1] if math.isfinite(heights[first - 1]) else 0.0
-        if not _slopes(beside, beside[0] - before):
+        if first < _LANE or not _verge(heights[first - 2] - heights[first - 3], beside[0] - before, beside):
             break
         level = min(abs(before), _LEVEL)
         crossing = (_LEVEL - level) / (abs(beside[0]) - level)  # bins on from the middle of the one before
@@ -130,8 +129,14 @@ def _edge(heights: list[float]) -> float:
     return math.inf
 
 
-def _slopes(beside: list[float], jump: float) -> bool:
-    """Return whether ground that begins with a jump is a verge, not a kerb and what is level behind it."""
+def _verge(inner: float, jump: float, beside: list[float]) -> bool:
+    """Return whether ground beside a road, which begins with a jump, is a verge.
+
+    It is none where the road itself slopes from the middle on, by `inner` from bin to bin: that is camber.
+    Nor is a kerb with level ground behind it.
+    """
+    if inner * jump > 0 and abs(inner) > _CAMBER * abs(jump):
+        return False
     if len(beside) == 1:  # it is lost at once
         return True
     rise = max(((height - beside[0]) / bins for bins, height in enumerate(beside[1:], 1)), key=abs)

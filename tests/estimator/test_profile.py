@@ -78,4 +78,17 @@ def test_a_road_as_wide_as_the_picture_has_no_edge():
 
 
 def test_a_strip_that_is_narrower_than_a_lane_is_no_road_of_its_own():
-    assert edges(lambda beyond: 0.08 * beyond, half_width=0.55) == NO_EDGES
+    assert edges(lambda beyond: 0.08 * beyond, half_width=0.4) == NO_EDGES
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_camber_is_no_verge(sign):
+    assert edges(lambda aside: sign * (0.028 * aside - 0.01), half_width=0) == NO_EDGES
+
+
+@pytest.mark.parametrize("slope", [-0.08, 0.08])
+def test_a_lane_may_be_narrow_for_a_tall_rig(slope):
+    found = edges(lambda beyond: slope * beyond, half_width=0.75)
+
+    assert found.left == pytest.approx(0.75, abs=0.3)
+    assert found.right == pytest.approx(0.75, abs=0.3)
