@@ -1,8 +1,8 @@
 """The profile across a road: what the ground beside it does.
 
 Heights above the road, in camera heights, are relative differences of disparity: h = d / road - 1. A kerb is
-a step; a verge starts at the road's height and rises or falls from there, until it is lost, for only pixels
-near the road are looked at.
+a step; a verge starts at the road's height and rises or falls from there, until it is lost: only pixels near
+the road are looked at.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ _STEP = 1.3  # a first bin that differs by this many times the rise of the next 
 _LOST = 0.03  # ground that was as far off as this may leave the pixels near the road altogether
 _CORE, _LANE = 2, 3  # bins from the middle: not looked at; a lane has no edge before these
 _CAMBER = 0.5  # of the jump beside it: what slopes as much within the road is its camber
+_KERB = 0.04  # a step this high ends the road, whatever is behind it
 _MARGIN = 0.5  # bins: how far before it leaves the road's level the road ends
 
 
@@ -73,7 +74,7 @@ def find_edges(
     theta: float,
     alpha: tuple[float, float, float],
 ) -> Edges:
-    """Find where the ground falls away or rises from the edges of the road, without a kerb.
+    """Find where the road ends: at a verge, which falls away or rises from there, or at a kerb, unless low.
 
     Parameters
     ----------
@@ -115,13 +116,13 @@ def _medians(places: Reals, heights: Reals) -> list[float]:
 
 
 def _edge(heights: list[float]) -> float:
-    """Return where a verge begins, by the first bins that are off the road, from the middle outward."""
+    """Return where the road ends, by the first bins that are off its level, from the middle outward."""
     for first in range(_CORE, len(heights) - 2):
         beside = list(itertools.takewhile(math.isfinite, heights[first : first + 3]))
         if not beside or abs(beside[0]) <= _LEVEL or (len(beside) < 3 and abs(beside[-1]) < _LOST):
             continue
         before = heights[first - 1] if math.isfinite(heights[first - 1]) else 0.0
-        if first < _LANE or not _verge(heights[first - 2] - heights[first - 3], beside[0] - before, beside):
+        if first < _LANE or not _ends(heights[first - 2] - heights[first - 3], beside[0] - before, beside):
             break
         level = min(abs(before), _LEVEL)
         crossing = (_LEVEL - level) / (abs(beside[0]) - level)  # bins on from the middle of the one before
@@ -129,15 +130,15 @@ def _edge(heights: list[float]) -> float:
     return math.inf
 
 
-def _verge(inner: float, jump: float, beside: list[float]) -> bool:
-    """Return whether ground beside a road, which begins with a jump, is a verge.
+def _ends(inner: float, jump: float, beside: list[float]) -> bool:
+    """Return whether the road ends where its profile jumps, by the heights beside it.
 
-    It is none where the road itself slopes from the middle on, by `inner` from bin to bin: that is camber.
-    Nor is a kerb with level ground behind it.
+    It does not where it slopes from its middle on, by `inner` from bin to bin: that is camber. Nor at a low
+    kerb with ground behind it that is nearly level.
     """
     if inner * jump > 0 and abs(inner) > _CAMBER * abs(jump):
         return False
-    if len(beside) == 1:  # it is lost at once
+    if len(beside) == 1 or abs(jump) > _KERB:
         return True
     rise = max(((height - beside[0]) / bins for bins, height in enumerate(beside[1:], 1)), key=abs)
     return abs(rise) > _SLOPE * _BIN and jump * rise > 0 and abs(jump) < _STEP * abs(rise)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rollcli.errors import EstimationError
 from rollcli.estimator.energy import Energy
 from rollcli.estimator.moments import Floats, Grid
 from rollcli.estimator.near import Fit, Near
@@ -49,7 +51,7 @@ class Surface:
     parabolic : bool
         The road model: parabola or line.
     edges : Edges
-        Where a verge ends it.
+        Where a verge or a kerb ends it.
     """
 
     x: Floats
@@ -116,12 +118,13 @@ def fit_surface(sample: Sample, road: Road, *, parabolic: bool) -> Surface:
     plane = Fit.of(road)
     lane = near.fit(plane, _LANE_ROUNDS, parabolic=parabolic, ahead=True)
     edges = find_edges(near.x, near.y, near.d, near.place > 0.1, lane.theta, lane.alpha)
-    if edges == NO_EDGES:
-        fit = near.fit(plane, _ROUNDS, parabolic=parabolic)
-    else:
-        near = near.within(edges, lane)
-        fit = near.fit(lane, _EDGE_ROUNDS, parabolic=parabolic, ahead=True)
-    return _surface(near, fit, edges, sample, road, parabolic=parabolic)
+    if edges != NO_EDGES:
+        inside = near.within(edges, lane)
+        with suppress(EstimationError):  # hardly a pixel between them: then they are not the road's
+            fit = inside.fit(lane, _EDGE_ROUNDS, parabolic=parabolic, ahead=True)
+            return _surface(inside, fit, edges, sample, road, parabolic=parabolic)
+    fit = near.fit(plane, _ROUNDS, parabolic=parabolic)
+    return _surface(near, fit, NO_EDGES, sample, road, parabolic=parabolic)
 
 
 def _surface(near: Near, fit: Fit, edges: Edges, sample: Sample, road: Road, *, parabolic: bool) -> Surface:

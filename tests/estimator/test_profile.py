@@ -44,11 +44,19 @@ def test_each_side_has_an_edge_of_its_own():
 
 
 @pytest.mark.parametrize("height", [0.015, 0.03, -0.03])
-def test_a_kerb_and_level_ground_behind_it_is_no_edge(height):
+def test_a_low_kerb_and_level_ground_behind_it_is_no_edge(height):
     assert edges(lambda beyond: height + 0 * beyond) == NO_EDGES
 
 
-def test_a_kerb_and_a_slight_slope_behind_it_is_no_edge():
+@pytest.mark.parametrize("height", [0.055, -0.055])
+def test_a_kerb_is_an_edge(height):
+    found = edges(lambda beyond: height + 0 * beyond, half_width=1.2)
+
+    assert found.left == pytest.approx(1.2, abs=0.3)
+    assert found.right == pytest.approx(1.2, abs=0.3)
+
+
+def test_a_low_kerb_and_a_slight_slope_behind_it_is_no_edge():
     assert edges(lambda beyond: 0.025 + 0.02 * beyond) == NO_EDGES
 
 
