@@ -9,7 +9,6 @@ import numpy as np
 from rollcli.estimator.sample import Sample, Singles, rising
 
 CORRIDOR = 1.0  # half-width, in camera heights; that of its core is 1 / sqrt(8) of it
-_FIRST_BESIDE = 0.2
 _FITS = 4
 _BELOW = 0.85  # what a coherent pixel under the road costs beyond one that is merely not on it
 _OFF_SLOPE = 0.2  # weight of a pixel around which the map does not rise as the road does
@@ -27,7 +26,7 @@ def first_costs(sample: Sample, planes: Singles, pixels: int) -> Singles:
     x, d = sample.x[few], sample.d[few]
     middle = len(planes) // 2
     side = np.square(x * np.partition(planes[:, 2], middle)[middle] / d)
-    corridor = _FIRST_BESIDE + (1 - _FIRST_BESIDE) * np.exp(side * np.float32(-1 / CORRIDOR**2))
+    corridor = _BESIDE + (1 - _BESIDE) * np.exp(side * np.float32(-1 / CORRIDOR**2))
     weight = np.where(rising(sample.slopes[:, few]), corridor, corridor * np.float32(_OFF_SLOPE))
     scaled = np.stack([np.ones_like(x), x, sample.y[few], d]) / sample.tolerance[few]
     costs: Singles = _excess(planes, scaled, _caps(sample.coherence[few])) @ weight
