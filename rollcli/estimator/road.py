@@ -22,7 +22,7 @@ from rollcli.estimator.sample import Sample, Singles
 
 _FIRST_PIXELS = 320  # all hypotheses are judged on these,
 _OF_EACH_ROLL = 4
-_SECOND = 16  # this many on the next,
+_SECOND = 12  # this many on the next,
 _SECOND_PIXELS = 640
 _REFINED = 4  # and these are fitted and judged on
 _THIRD_PIXELS = 2000
