@@ -23,7 +23,7 @@ COUNTS = (50, 100, 200, 400, 1000, 2000)
 
 
 def terms(frames: int, seeds: tuple[int, int]) -> tuple[np.ndarray, list[str]]:
-    """Rows of (error, bands, columns, white for one pixel, effective pixels), degrees; and the scenes."""
+    """Rows of (error, bands, columns, white for one pixel, pixels, slant), degrees; and the scenes."""
     rows, scenes = [], []
     for seed, span in zip(seeds, (10, 35), strict=True):
         for disparity, roll_deg, scene in matched(frames // 2, seed, span):
@@ -38,15 +38,16 @@ def terms(frames: int, seeds: tuple[int, int]) -> tuple[np.ndarray, list[str]]:
             pixels = max(1.0, surface.weights.sum() / interval._EFFECTIVE_PIXELS)
             error = abs(math.degrees(theta) - roll_deg)
             weight = surface.weights.sum()
-            rows.append((error, bands, columns, white / math.sqrt(pixels), weight))
+            slant = interval.slant(theta)
+            rows.append((error, bands, columns, white / math.sqrt(pixels), weight, slant))
             scenes.append(scene)
     return np.array(rows), scenes
 
 
 def widths(rows: np.ndarray, count: float) -> np.ndarray:
     """Half-widths before the factor, degrees."""
-    _, bands, columns, white, pixels = rows.T
-    return np.sqrt(bands**2 + columns**2 + white**2 * np.maximum(1, pixels / count))
+    _, bands, columns, white, pixels, slant = rows.T
+    return slant * np.sqrt(bands**2 + columns**2 + white**2 * np.maximum(1, pixels / count))
 
 
 def main() -> None:
