@@ -17,9 +17,9 @@ from rollcli.estimator.moments import Floats
 from rollcli.estimator.surface import Surface
 
 _GROUPS = 6
-_PIXELS = 1000  # looked at; the misfit shows in them as well
 _EFFECTIVE_PIXELS = 200  # neighbouring pixels repeat each other: more do not tell more
-_KAPPA = 0.46  # fitted by tests/benchmarks/fit_interval.py
+_KAPPA = 0.5  # fitted by tests/benchmarks/fit_interval.py
+_RIDGE, _TINY = 1 + 1e-10 * np.eye(4), 1e-300 * np.eye(4)  # a line has no a2, and no equation for it
 # 97.5 % quantiles of Student's t for 1, 2, ... degrees of freedom
 _T975 = (12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228, 2.201, 2.179)
 
@@ -56,24 +56,23 @@ def moves(surface: Surface, theta: float) -> tuple[float, float, float]:
     white : float
         By the textbook formula, for as many pixels as could be independent, radians.
     """
-    stride = -(-len(surface.d) // _PIXELS)
-    x, y, d, weights = (pixels[::stride] for pixels in (surface.x, surface.y, surface.d, surface.weights))
     cosine, sine = math.cos(theta), math.sin(theta)
-    across, along = x * cosine + y * sine, y * cosine - x * sine
+    across = surface.x * cosine + surface.y * sine
+    along = surface.y * cosine - surface.x * sine
     a0, a1, a2 = surface.alpha
-    rows = np.empty((5, len(d)))
+    rows = np.empty((5, len(along)))
     rows[0], rows[1], rows[2] = 1, along, along * along * surface.parabolic
     rows[3] = -across * (a1 + 2 * a2 * along)
-    rows[4] = d - (a0 + along * (a1 + along * a2))
-    bands = _by_group(rows, weights, along, np.ones_like(along))
-    columns = _by_group(rows, weights, across, weights * np.square(rows[3]))
+    rows[4] = surface.d - (a0 + along * (a1 + along * a2))
+    bands = _by_group(rows, surface.weights, along, np.ones_like(along))
+    columns = _by_group(rows, surface.weights, across, surface.weights * np.square(rows[3]))
     total = bands.sum(0)
     normal = total[:4, :4]
-    inverse = np.linalg.inv(normal + np.diag(1e-12 * np.diag(normal) + 1e-300))
+    inverse = np.linalg.inv(normal * _RIDGE + _TINY)
     step = inverse @ total[:4, 4]  # from the surface's parabola to the best one
-    independent = max(1.0, stride * total[0, 0] / _EFFECTIVE_PIXELS)
+    independent = max(1.0, total[0, 0] / _EFFECTIVE_PIXELS)
     rest = max(0.0, total[4, 4] - step @ total[:4, 4])
-    white = 1.96 * math.sqrt(rest / total[0, 0] * inverse[3, 3] * independent / stride)
+    white = 1.96 * math.sqrt(rest / total[0, 0] * inverse[3, 3] * independent)
     return _spread(bands, normal, step), _spread(columns, normal, step), white
 
 
@@ -95,8 +94,7 @@ def _by_group(rows: Floats, weights: Floats, position: Floats, share: Floats) ->
 def _spread(groups: Floats, normal: Floats, step: Floats) -> float:
     """Return t * sqrt(sum of squared moves of theta) as one group after the other is left out."""
     parts, pulls = groups[:, :4, :4], groups[:, :4, 4]
-    ridge = 1e-9 * np.trace(normal) / 4 * np.eye(4)
-    moved = np.linalg.solve(normal - parts + ridge, (pulls - parts @ step)[..., None])[:, 3, 0]
+    moved = np.linalg.solve((normal - parts) * _RIDGE + _TINY, (pulls - parts @ step)[..., None])[:, 3, 0]
     leverage = parts[:, 3, 3] / normal[3, 3]
     freedom = max(1.0, 1 / float(np.square(leverage).sum()) - 1)
     return _student(freedom) * math.sqrt(float(np.square(moved).sum()))

@@ -19,7 +19,7 @@ _NOISE_SHARE = 0.012  # of the median disparity: what matching gets wrong on rea
 UNEVEN_SHARE = 0.02  # of a pixel's own disparity: 2 % of the camera's height, 3 cm on a car
 _QUANTUM_SHARE = 0.29  # of the smallest step: rounding is off by 0.29 steps, root mean square
 _COHERENT_SHARE = 0.03
-NO_SLOPE = np.float32(1e9)  # this steep or steeper agrees with no road
+NO_SLOPE = np.float32(np.inf)  # agrees with no road
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Sample:
     coherence : ndarray of float32
         The share of the valid ones among four neighbours whose disparity is within tolerance.
     slopes : ndarray of float32, shape (4, N)
-        One-sided derivatives of d to the left, right, up and down, px per unit of x or y; 1e9 or steeper
+        One-sided derivatives of d to the left, right, up and down, px per unit of x or y; infinite
         where the neighbour is no data.
     slope_noise : float
         What the noise makes of a slope, px per unit.
