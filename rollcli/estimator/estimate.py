@@ -16,7 +16,7 @@ from rollcli.estimator.exact import Minimum, exact, minima
 from rollcli.estimator.golden_section import golden_section
 from rollcli.estimator.gradient_descent import LAMBDA0, TOLERANCE, gradient_descent
 from rollcli.estimator.interval import half_width
-from rollcli.estimator.pixels import require_pixels
+from rollcli.estimator.pixels import LARGEST, require_pixels
 from rollcli.estimator.selection import Pixels, take_all, take_area, take_road
 from rollcli.estimator.solution import Solution, apart
 from rollcli.estimator.surface import Surface
@@ -87,8 +87,7 @@ class RollEstimate:
         -------
         ndarray of bool, shape (H, W)
         """
-        values = np.asarray(disparity)
-        used = _valid(values, self._usable)
+        values, used = _cleaned(np.asarray(disparity), self._usable)
         return used if self._surface is None else used & self._surface.covers(values)
 
 
@@ -109,7 +108,8 @@ def estimate_roll(
     Parameters
     ----------
     disparity : array_like, shape (H, W)
-        Real numbers, px (any constant factor gives the same angle); <= 0, NaN and inf are no data.
+        Real numbers, px (any constant factor gives the same angle); <= 0, NaN and what is beyond
+        1e15 are no data.
     mask : array_like, shape (H, W), optional
         Non-zero where a pixel may be used.
     method : {"gd", "gss", "exact", "plane", "areas"}
@@ -149,7 +149,7 @@ def estimate_roll(
     values = _checked_map(disparity)
     _check_arguments(method, model, road, lambda0, tolerance, max_roll)
     usable = None if mask is None else _checked_mask(mask, values)
-    valid = _valid(values, usable)
+    values, valid = _cleaned(values, usable)
     count = require_pixels(valid)
     if road == "auto":
         pixels = take_road(values, usable, max_roll, seed, parabolic=model == "parabola")
@@ -252,13 +252,19 @@ def _checked_mask(mask: ArrayLike, values: NDArray[Any]) -> NDArray[np.bool_]:
     return usable
 
 
-def _valid(values: NDArray[Any], usable: NDArray[np.bool_] | None) -> NDArray[np.bool_]:
+def _cleaned(
+    values: NDArray[Any], usable: NDArray[np.bool_] | None
+) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+    """Return a map without what is too large, and where it has a disparity that may be used."""
     valid: NDArray[np.bool_] = values > 0
     if values.dtype.kind == "f":
-        valid &= values < np.inf
+        positive = np.count_nonzero(valid)
+        valid &= values < LARGEST
+        if np.count_nonzero(valid) < positive:
+            values = np.where(valid, values, 0)
     if usable is not None:
         valid &= usable
-    return valid
+    return values, valid
 
 
 def _size(array: NDArray[Any]) -> str:

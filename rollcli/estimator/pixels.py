@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from rollcli.errors import EstimationError
 
+LARGEST = np.float32(1e15)  # beyond this it is no disparity, and single precision could not square it
 MIN_PIXELS = 100
 
 
@@ -28,7 +29,9 @@ def require_pixels(valid: NDArray[np.bool_]) -> int:
     """
     count = int(np.count_nonzero(valid))
     if count == 0:
-        raise EstimationError("no valid pixel: all are zero, negative, not finite or masked out")
+        raise EstimationError(
+            f"no valid pixel: all are zero, negative, beyond {LARGEST:g}, not finite or masked out"
+        )
     if count < MIN_PIXELS:
         raise EstimationError(f"only {count} valid pixels: at least {MIN_PIXELS} are needed")
     if count <= 2 * max(valid.shape):  # more cannot lie in two rows or columns

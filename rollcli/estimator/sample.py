@@ -19,6 +19,7 @@ _NOISE_SHARE = 0.012  # of the median disparity: what matching gets wrong on rea
 UNEVEN_SHARE = 0.02  # of a pixel's own disparity: 2 % of the camera's height, 3 cm on a car
 _QUANTUM_SHARE = 0.29  # of the smallest step: rounding is off by 0.29 steps, root mean square
 _COHERENT_SHARE = 0.03
+_SMALLEST, _LARGEST = 1e-12, 1e12  # typical disparities whose squares single precision can add up
 NO_SLOPE = np.float32(np.inf)  # agrees with no road
 
 
@@ -88,7 +89,7 @@ def take_sample(disparity: NDArray[Any], usable: NDArray[np.bool_] | None = None
     Raises
     ------
     EstimationError
-        When too few pixels are valid to look for a road among them.
+        When too few pixels are valid to look for a road among them, or their disparities cannot be squared.
     """
     height, width = disparity.shape
     grid = Grid.of_shape(height, width)
@@ -111,22 +112,22 @@ def take_sample(disparity: NDArray[Any], usable: NDArray[np.bool_] | None = None
 
     rows = chosen // taken.shape[1]  # divmod would take longer
     columns = chosen - rows * taken.shape[1]
-    d = at(0, 0).astype(np.float32, copy=False)
-    steps = np.empty((4, len(d)), np.float32)
-    for row, (dv, du) in zip(steps, ((0, -reach), (0, reach), (-reach, 0), (reach, 0)), strict=True):
-        row[:] = at(dv, du)
-    with np.errstate(invalid="ignore"):
-        known = steps > 0
-    steps -= d
-    np.copyto(steps, NO_SLOPE, where=~known)
+    with np.errstate(over="ignore"):
+        d = at(0, 0).astype(np.float32, copy=False)
+    typical = _median(d)
+    if not _SMALLEST < typical < _LARGEST:
+        raise EstimationError(f"disparities of about {typical:g}: they have to be in pixels, or nearly so")
+    steps = _steps(d, at(0, -reach), at(0, reach), at(-reach, 0), at(reach, 0))
     jumps = np.abs(steps)
+    known = jumps < NO_SLOPE
     quantum = _quantum(jumps)
-    noise, tolerance = _tolerance(d, typical := _median(d), quantum)
+    noise, tolerance = _tolerance(d, typical, quantum)
     near = jumps <= np.maximum(tolerance, np.float32(_COHERENT_SHARE * typical))
     coherence = near.sum(0, dtype=np.float32)
     coherence /= np.maximum(known.sum(0, dtype=np.float32), 1)
-    # anew, for noise spread over all disparities has another median than what is seen
-    noise, tolerance = _tolerance(d, typical := _median(d[coherence >= 0.5]), quantum)
+    coherent = d[coherence >= 0.5]
+    if len(coherent):  # anew, for noise spread over all disparities has another median than what is seen
+        noise, tolerance = _tolerance(d, typical := _median(coherent), quantum)
     per_unit = grid.scale / reach
     slopes = steps * np.array([-per_unit, per_unit, -per_unit, per_unit], np.float32)[:, None]
     xs = (np.arange(first, width, step) - grid.centre_u) / grid.scale
@@ -172,6 +173,18 @@ def _taken(
     with np.errstate(invalid="ignore"):
         taken: NDArray[np.bool_] = _strided(disparity, reach, step) > 0
     return taken if usable is None else taken & _strided(usable, reach, step)
+
+
+def _steps(d: Singles, *around: NDArray[Any]) -> Singles:
+    """Return the differences to the neighbours, NO_SLOPE where there is none: shape (neighbours, N)."""
+    steps = np.empty((len(around), len(d)), np.float32)
+    for row, neighbour in zip(steps, around, strict=True):
+        row[:] = neighbour
+    with np.errstate(invalid="ignore"):
+        unknown = ~(steps > 0)
+    steps -= d
+    np.copyto(steps, NO_SLOPE, where=unknown)
+    return steps
 
 
 def _median(values: Singles) -> float:

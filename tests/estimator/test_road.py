@@ -234,3 +234,21 @@ def test_the_road_is_at_most_all_of_the_map():
     disparity, _ = true_disparity(FrameSpec(scene="bare", roll=0.2, pitch=0.05, seed=5))
 
     assert 0.9 < estimate_roll(disparity).road_fraction <= 1
+
+
+@pytest.mark.parametrize("sentinel", [np.inf, np.finfo(np.float32).max, 1e20])
+def test_what_is_too_large_is_no_data(matched, sentinel):
+    _, _, disparity = matched[0]
+    marked = np.where(disparity > 0, disparity, np.float32(sentinel))
+
+    estimate = estimate_roll(marked)
+
+    assert estimate.theta == estimate_roll(disparity).theta
+    assert estimate.valid_fraction == pytest.approx(np.mean(disparity > 0))
+    np.testing.assert_array_equal(estimate.road_mask(marked), estimate.road_mask(disparity))
+
+
+@pytest.mark.parametrize("factor", [1e-20, 1e13])
+def test_what_cannot_be_squared_is_refused(matched, factor):
+    with pytest.raises(EstimationError, match="in pixels"):
+        estimate_roll(matched[0][2] * np.float32(factor))

@@ -38,3 +38,13 @@ def test_a_factor_changes_the_unit_alone(street):
 
     np.testing.assert_allclose(hundred.tolerance, 100 * one.tolerance, rtol=1e-5)
     np.testing.assert_array_equal(hundred.coherence, one.coherence)
+
+
+def test_pixels_without_neighbours_are_a_sample_too(street):
+    alone = np.zeros_like(street)
+    alone[5::20, 5::20] = street[5::20, 5::20]
+
+    sample = take_sample(alone)
+
+    assert not sample.coherence.any()
+    assert sample.typical == pytest.approx(take_sample(street).typical, rel=0.1)
