@@ -26,6 +26,7 @@ _LOST = 0.03  # ground that was as far off as this may leave the pixels near the
 _CORE, _LANE = 2, 3  # bins from the middle: not looked at; a lane has no edge before these
 _CAMBER = 0.5  # of the jump beside it: what slopes as much within the road is its camber
 _KERB = 0.04  # a step this high ends the road, whatever is behind it
+_GONE = 0.06  # ground that goes on to more than this is not level behind a kerb, but lost
 _MARGIN = 0.5  # bins: how far before it leaves the road's level the road ends
 
 
@@ -141,4 +142,7 @@ def _ends(inner: float, jump: float, beside: list[float]) -> bool:
     if len(beside) == 1 or abs(jump) > _KERB:
         return True
     rise = max(((height - beside[0]) / bins for bins, height in enumerate(beside[1:], 1)), key=abs)
-    return abs(rise) > _SLOPE * _BIN and jump * rise > 0 and abs(jump) < _STEP * abs(rise)
+    if jump * rise <= 0 or abs(rise) < _SLOPE * _BIN:
+        return False
+    gone = len(beside) == 2 and abs(beside[1] + rise) > _GONE
+    return gone or abs(jump) < _STEP * abs(rise)

@@ -8,7 +8,7 @@ from rollcli.estimator.profile import NO_EDGES, find_edges
 SLOPE = 200.0  # px of disparity per unit of y
 
 
-def edges(height_at, half_width=1.0):
+def edges(height_at, half_width=1.0, nearest=0.08):
     """Of a level road, with ground beside it whose height `height_at` says, all in camera heights."""
     rng = np.random.default_rng(6)
     x, y = rng.uniform(-1, 1, 20000), rng.uniform(0.05, 0.4, 20000)
@@ -16,7 +16,7 @@ def edges(height_at, half_width=1.0):
     side = x * SLOPE / road
     beyond = np.abs(side) - half_width
     d = road * (1 + np.where(beyond < 0, 0, height_at(beyond))) + rng.normal(0, 0.1, x.shape)
-    near = np.abs(d / road - 1) < 0.08
+    near = np.abs(d / road - 1) < nearest
     return find_edges(x[near], y[near], d[near], np.ones(near.sum(), bool), 0.0, (0.0, SLOPE, 0.0))
 
 
@@ -73,6 +73,13 @@ def test_a_road_that_is_lost_from_view_has_no_edge():
     d = SLOPE * y + rng.normal(0, 0.1, x.shape)
 
     assert find_edges(x, y, d, np.ones(len(x), bool), 0.0, (0.0, SLOPE, 0.0)) == NO_EDGES
+
+
+def test_a_kerb_and_a_steep_verge_behind_it_is_an_edge():
+    found = edges(lambda beyond: -0.025 - 0.1 * beyond, half_width=1.25, nearest=0.06)
+
+    assert found.left == pytest.approx(1.25, abs=0.3)
+    assert found.right == pytest.approx(1.25, abs=0.3)
 
 
 def test_no_pixel_has_no_edge():
