@@ -18,7 +18,7 @@ from rollcli.estimator.surface import Surface
 
 _GROUPS = 6
 _EFFECTIVE_PIXELS = 200  # neighbouring pixels repeat each other: more do not tell more
-_KAPPA = 0.53  # fitted by tests/benchmarks/fit_interval.py
+_KAPPA = 0.53  # tests/benchmarks/fit_interval.py finds 0.42; maps of other matchers ask for more
 _RIDGE, _TINY = 1 + 1e-10 * np.eye(4), 1e-300 * np.eye(4)  # a line has no a2, and no equation for it
 # 97.5 % quantiles of Student's t for 1, 2, ... degrees of freedom
 _T975 = (12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228, 2.201, 2.179)
