@@ -256,12 +256,9 @@ def _cleaned(
     values: NDArray[Any], usable: NDArray[np.bool_] | None
 ) -> tuple[NDArray[Any], NDArray[np.bool_]]:
     """Return a map without what is too large, and where it has a disparity that may be used."""
+    if values.dtype.kind == "f" and (large := values >= LARGEST).any():
+        values = np.where(large, 0, values)
     valid: NDArray[np.bool_] = values > 0
-    if values.dtype.kind == "f":
-        positive = np.count_nonzero(valid)
-        valid &= values < LARGEST
-        if np.count_nonzero(valid) < positive:
-            values = np.where(valid, values, 0)
     if usable is not None:
         valid &= usable
     return values, valid

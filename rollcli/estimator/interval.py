@@ -14,12 +14,12 @@ import math
 import numpy as np
 
 from rollcli.estimator.moments import Floats
+from rollcli.estimator.near import solvable
 from rollcli.estimator.surface import Surface
 
 _GROUPS = 6
 _EFFECTIVE_PIXELS = 200  # neighbouring pixels repeat each other: more do not tell more
 _KAPPA = 0.53  # tests/benchmarks/fit_interval.py finds 0.42; maps of other matchers ask for more
-_RIDGE, _TINY = 1 + 1e-10 * np.eye(4), 1e-300 * np.eye(4)  # a line has no a2, and no equation for it
 # 97.5 % quantiles of Student's t for 1, 2, ... degrees of freedom
 _T975 = (12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228, 2.201, 2.179)
 
@@ -68,7 +68,7 @@ def moves(surface: Surface, theta: float) -> tuple[float, float, float]:
     columns = _by_group(rows, surface.weights, across, surface.weights * np.square(rows[3]))
     total = bands.sum(0)
     normal = total[:4, :4]
-    inverse = np.linalg.inv(normal * _RIDGE + _TINY)
+    inverse = np.linalg.inv(solvable(normal))
     step = inverse @ total[:4, 4]  # from the surface's parabola to the best one
     independent = max(1.0, total[0, 0] / _EFFECTIVE_PIXELS)
     rest = max(0.0, total[4, 4] - step @ total[:4, 4])
@@ -94,7 +94,7 @@ def _by_group(rows: Floats, weights: Floats, position: Floats, share: Floats) ->
 def _spread(groups: Floats, normal: Floats, step: Floats) -> float:
     """Return t * sqrt(sum of squared moves of theta) as one group after the other is left out."""
     parts, pulls = groups[:, :4, :4], groups[:, :4, 4]
-    moved = np.linalg.solve((normal - parts) * _RIDGE + _TINY, (pulls - parts @ step)[..., None])[:, 3, 0]
+    moved = np.linalg.solve(solvable(normal - parts), (pulls - parts @ step)[..., None])[:, 3, 0]
     leverage = parts[:, 3, 3] / normal[3, 3]
     freedom = max(1.0, 1 / float(np.square(leverage).sum()) - 1)
     return _student(freedom) * math.sqrt(float(np.square(moved).sum()))

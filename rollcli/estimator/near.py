@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rollcli.errors import EstimationError
+from rollcli.estimator.moments import Floats
 from rollcli.estimator.profile import Edges, sides
 from rollcli.estimator.road import Road, road_weights
 from rollcli.estimator.sample import Sample, Singles
@@ -28,7 +29,7 @@ _FADE = 0.01  # how softly
 _DROP = 3.0  # farther than this many tolerances from the plane, a pixel is not looked at again
 _PIXELS = 2500  # looked at; more of them would repeat each other
 MIN_PIXELS = 30
-_RIDGE, _TINY = 1 + 1e-10 * np.eye(4), 1e-300 * np.eye(4)  # a line has no a2, and no equation for it
+_RIDGE, _TINY = 1 + 1e-10 * np.eye(4), 1e-300 * np.eye(4)
 
 
 class Fit(NamedTuple):
@@ -109,8 +110,7 @@ class Near:
                 design[2] = 0
             design[3] = across * (design[1] * (-2 * fit.alpha[2]) - fit.alpha[1])
             products = ((design * weights) @ design.T).astype(np.float64)
-            normal = products[:4, :4] * _RIDGE + _TINY
-            a0, a1, a2, turned = np.linalg.solve(normal, products[:4, 4]).tolist()
+            a0, a1, a2, turned = np.linalg.solve(solvable(products[:4, :4]), products[:4, 4]).tolist()
             fit = Fit(fit.theta + max(-0.2, min(0.2, turned)), (a0, a1, a2), fit.limit)
             across, off = self._lay_out(design, fit)
             fit = fit._replace(limit=min(fit.limit, self._width(off, weights, ahead=ahead)))
@@ -153,6 +153,11 @@ class Near:
         uneven = max(0.0, min(1.0, (deviation - _SMOOTH) / (_UNEVEN - _SMOOTH)))
         times = _PLAIN + uneven * ((_LANE if ahead else _WIDE) - _PLAIN)
         return max(_LEAST, times * deviation)
+
+
+def solvable(normal: Floats) -> Floats:
+    """Return normal matrices (..., 4, 4) of a0, a1, a2 and theta that can be inverted, also without an a2."""
+    return normal * _RIDGE + _TINY
 
 
 def _rolled(x: Singles, y: Singles, theta: float) -> tuple[Singles, Singles]:

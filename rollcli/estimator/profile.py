@@ -61,10 +61,7 @@ def sides(x: Reals, y: Reals, theta: float, alpha: tuple[float, float, float]) -
     -------
     ndarray
     """
-    road = _road(x, y, theta, alpha)
-    across: Reals = (x * math.cos(theta) + y * math.sin(theta)) * abs(alpha[1])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return across / np.maximum(road, 0)
+    return _aside(x, y, _road(x, y, theta, alpha), theta, alpha[1])
 
 
 def find_edges(
@@ -92,17 +89,24 @@ def find_edges(
     """
     road = _road(x, y, theta, alpha)
     used = used & (road > 0.1 * d)
-    height = d[used] / road[used] - 1
-    side = sides(x[used], y[used], theta, alpha)
-    if len(height) == 0:
+    if not used.any():
         return NO_EDGES
-    medians = _medians(np.floor(side / _BIN) + _BINS, height)
+    x, y, d, road = x[used], y[used], d[used], road[used]
+    side = _aside(x, y, road, theta, alpha[1])
+    medians = _medians(np.floor(side / _BIN) + _BINS, d / road - 1)
     return Edges(_edge(medians[_BINS - 1 :: -1]), _edge(medians[_BINS:]))
 
 
 def _road(x: Reals, y: Reals, theta: float, alpha: tuple[float, float, float]) -> Reals:
     level = y * math.cos(theta) - x * math.sin(theta)
     return alpha[0] + level * (alpha[1] + level * alpha[2])
+
+
+def _aside(x: Reals, y: Reals, road: Reals, theta: float, slope: float) -> Reals:
+    """Return `sides`, where the road's disparity is known already."""
+    across: Reals = (x * math.cos(theta) + y * math.sin(theta)) * abs(slope)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return across / np.maximum(road, 0)
 
 
 def _medians(places: Reals, heights: Reals) -> list[float]:

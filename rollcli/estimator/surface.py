@@ -96,7 +96,7 @@ def fit_surface(sample: Sample, road: Road, *, parabolic: bool) -> Surface:
     """Fit the road's parabola and its roll to the pixels near the road's plane.
 
     The fit stays wide where the ground beside the road is nearly as high. Where that ground falls away or
-    rises from the road's edge, like a verge, the road is fitted anew between the edges.
+    rises from the road's edge, like a verge, or lies behind a kerb, the road is fitted between the edges.
 
     Parameters
     ----------
