@@ -11,7 +11,7 @@ import rollcli
 from rollcli.files.atomic import write_atomic
 from rollcli.imaging.overlay import draw_disparity
 from rollcli.imaging.vdisparity import draw_v_disparity, row_offset
-from tests.program import ROOT
+from tests.run_cli import ROOT
 
 MAP, PICTURE = ROOT / "sample_data" / "maps" / "frame_0001.png", ROOT / ".github" / "readme.png"
 _BINS, _GAP, _WIDE_GAP = 256, 6, 24

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import rollcli
-from tests.program import ROOT
+from tests.run_cli import ROOT
 
 FUNCTIONS = [name for name in rollcli.__all__ if isinstance(getattr(rollcli, name), types.FunctionType)]
 README = (ROOT / "README.md").read_text("utf-8")

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from rollcli import estimate_roll, read_disparity
-from tests.program import ROOT, environment, rollcli
 from tests.readme_picture import MAP, PICTURE, picture
 from tests.readme_tables import with_tables
+from tests.run_cli import ROOT, environment, rollcli
 
 README = (ROOT / "README.md").read_text("utf-8")
 needs_make = pytest.mark.skipif(shutil.which("make") is None, reason="make is not installed")

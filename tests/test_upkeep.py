@@ -2,7 +2,7 @@
 
 import re
 
-from tests.program import ROOT
+from tests.run_cli import ROOT
 
 
 def found(pattern, *parts):

@@ -5,14 +5,14 @@ from dataclasses import dataclass
 from itertools import chain
 from typing import Literal
 
-from rollcli.batch.checks import check_inputs_are_kept, check_nothing_is_there, check_one_owner
-from rollcli.batch.frames import map_frames, pair_frames
-from rollcli.batch.job import Frame
 from rollcli.batch.options import EstimateOptions
-from rollcli.batch.outputs import image_paths
 from rollcli.errors import UsageError
 from rollcli.files.results import run_path
 from rollcli.files.stream import STDOUT
+from rollcli.frames.checks import check_inputs_are_kept, check_nothing_is_there, check_one_owner
+from rollcli.frames.find import map_frames, pair_frames
+from rollcli.frames.frame import Frame
+from rollcli.frames.outputs import image_paths
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from rollcli.batch.options import EncodingOptions, FrameOptions, ImageOptions
-from rollcli.batch.record import OPTION_NAMES
+from rollcli.batch.run_record import OPTION_NAMES
 from rollcli.errors import InputError
+from rollcli.frames.options import EncodingOptions, FrameOptions, ImageOptions
 from rollcli.imaging.stereo_options import StereoOptions
 
 if TYPE_CHECKING:

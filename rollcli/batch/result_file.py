@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Protocol
 
-from rollcli.batch.lock import lock
 from rollcli.errors import OutputError, UsageError
 from rollcli.files.atomic import output_error
+from rollcli.files.locking import lock
 from rollcli.files.results import Format, Row, format_header, format_row
 from rollcli.files.stream import (
     STDOUT,

@@ -5,21 +5,21 @@ from collections.abc import Generator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
-from rollcli.batch.dry_run import list_files
-from rollcli.batch.job import Frame, Outcome, do, lost
-from rollcli.batch.local import done_locally
 from rollcli.batch.options import EstimateOptions
-from rollcli.batch.outputs import image_paths, remove_image_leftovers
 from rollcli.batch.plan import Plan, make_plan
-from rollcli.batch.record import RunRecord, check_resumable, not_resumable
-from rollcli.batch.report import INTERRUPTED, Report
 from rollcli.batch.result_file import ResultFile, RowSink, check_result, kept_rows, open_sink
-from rollcli.batch.setup import limit_blas_threads
-from rollcli.batch.signals import Stop, stop_on_signals
-from rollcli.batch.workers import Work
+from rollcli.batch.run_record import RunRecord, check_resumable, not_resumable
 from rollcli.errors import ClusterError, InputError, OutputError, WorkerError
 from rollcli.files.results import Row, parse_rows, read_run, run_path
 from rollcli.files.stream import STDOUT
+from rollcli.frames.dry_run import list_files
+from rollcli.frames.frame import Frame, Outcome, do, lost
+from rollcli.frames.outputs import image_paths, remove_image_leftovers
+from rollcli.frames.progress import INTERRUPTED, Report
+from rollcli.parallel.in_order import Work
+from rollcli.parallel.interrupt import Stop, stop_on_signals
+from rollcli.parallel.local import done_locally
+from rollcli.parallel.process_setup import limit_blas_threads
 
 
 def run(options: EstimateOptions, resume_command: str = "") -> int:
@@ -47,7 +47,7 @@ def run(options: EstimateOptions, resume_command: str = "") -> int:
         return 0
     limit_blas_threads()
     if options.result.scheduler is not None:
-        from rollcli.batch.cluster import check_scheduler
+        from rollcli.parallel.cluster import check_scheduler
 
         check_scheduler(options.result.scheduler)
     given, report = options.result, Report(len(plan.frames), options.running, options.encoding)
@@ -134,7 +134,7 @@ def _outcomes(
 ) -> Generator[Outcome, None, None]:
     """Outcomes in order, from this process, from a pool of processes, or from a cluster."""
     if options.result.scheduler is not None:
-        from rollcli.batch.cluster import cluster_outcomes
+        from rollcli.parallel.cluster import cluster_outcomes
 
         return cluster_outcomes(frames, options.frame, options.result.scheduler, stop)
     work = Work(partial(do, options=options.frame), partial(lost, images=options.images))

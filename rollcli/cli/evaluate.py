@@ -4,12 +4,12 @@ from typing import Any
 
 import click
 
-from rollcli.batch.options import RunningOptions
 from rollcli.cli.command import Command, option, record
 from rollcli.cli.config import config_option
 from rollcli.cli.options import PATH, encoding_options, input_options, region_options, running_options
 from rollcli.cli.types import Number, Turns
 from rollcli.evaluate.options import TIMED, TURNS_DEG, ExperimentOptions, PaperOptions
+from rollcli.frames.options import RunningOptions
 
 experiment_options = record(
     "experiments",

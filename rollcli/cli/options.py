@@ -4,7 +4,9 @@ from typing import Any
 
 import click
 
-from rollcli.batch.options import (
+from rollcli.cli.command import option, record
+from rollcli.cli.types import FilePath, Number, NumberOrNan, Polygon, Roi
+from rollcli.frames.options import (
     EncodingOptions,
     ImageOptions,
     InputOptions,
@@ -13,8 +15,6 @@ from rollcli.batch.options import (
     RegionOptions,
     RunningOptions,
 )
-from rollcli.cli.command import option, record
-from rollcli.cli.types import FilePath, Number, NumberOrNan, Polygon, Roi
 from rollcli.imaging.stereo_options import MODES, StereoOptions
 
 PATH = FilePath()  # whether it exists is said by who reads it, in the same words for every way to name it

@@ -4,11 +4,11 @@ from typing import Any
 
 import click
 
-from rollcli.batch.options import RunningOptions
 from rollcli.cli.command import command, option, record
 from rollcli.cli.config import config_option
 from rollcli.cli.options import PATH, running_options
 from rollcli.cli.types import Number, Size, Span
+from rollcli.frames.options import RunningOptions
 from rollcli.simulate.options import (
     BASELINE,
     FOCAL_PER_WIDTH,

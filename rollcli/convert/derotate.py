@@ -4,16 +4,16 @@ import math
 from collections.abc import Iterator, Sequence
 from functools import partial
 
-from rollcli.batch.frames import map_frames
-from rollcli.batch.job import Frame, Outcome
-from rollcli.batch.options import EncodingOptions
-from rollcli.batch.outputs import output_path
 from rollcli.convert.options import DerotateOptions, TurnOptions
 from rollcli.convert.run import Conversion, convert
 from rollcli.errors import UsageError
 from rollcli.files.matching import match_paths
 from rollcli.files.naming import listed
 from rollcli.files.results import Row, read_result
+from rollcli.frames.find import map_frames
+from rollcli.frames.frame import Frame, Outcome
+from rollcli.frames.options import EncodingOptions
+from rollcli.frames.outputs import output_path
 
 
 def derotate_maps(options: DerotateOptions) -> int:

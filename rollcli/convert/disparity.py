@@ -2,12 +2,12 @@
 
 from functools import partial
 
-from rollcli.batch.frames import pair_frames
-from rollcli.batch.job import Outcome
-from rollcli.batch.options import EncodingOptions
-from rollcli.batch.outputs import MAP_ENDINGS, output_path
 from rollcli.convert.options import DisparityOptions
 from rollcli.convert.run import Conversion, convert
+from rollcli.frames.find import pair_frames
+from rollcli.frames.frame import Outcome
+from rollcli.frames.options import EncodingOptions
+from rollcli.frames.outputs import MAP_ENDINGS, output_path
 from rollcli.imaging.stereo_options import StereoOptions
 
 

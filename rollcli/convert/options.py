@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from rollcli.batch.options import EncodingOptions, InputOptions, PairOptions, RunningOptions
+from rollcli.frames.options import EncodingOptions, InputOptions, PairOptions, RunningOptions
 from rollcli.imaging.stereo_options import StereoOptions
 
 

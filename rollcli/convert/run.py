@@ -4,16 +4,16 @@ import contextlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from rollcli.batch.checks import check_one_owner, check_writes
-from rollcli.batch.dry_run import list_files
-from rollcli.batch.job import Frame, Outcome, failed
-from rollcli.batch.local import done_locally
-from rollcli.batch.options import EncodingOptions, RunningOptions
-from rollcli.batch.outputs import remove_leftovers, remove_outputs
-from rollcli.batch.report import INTERRUPTED, Report
-from rollcli.batch.setup import limit_blas_threads
-from rollcli.batch.signals import stop_on_signals
-from rollcli.batch.workers import Work
+from rollcli.frames.checks import check_one_owner, check_writes
+from rollcli.frames.dry_run import list_files
+from rollcli.frames.frame import Frame, Outcome, failed
+from rollcli.frames.options import EncodingOptions, RunningOptions
+from rollcli.frames.outputs import remove_leftovers, remove_outputs
+from rollcli.frames.progress import INTERRUPTED, Report
+from rollcli.parallel.in_order import Work
+from rollcli.parallel.interrupt import stop_on_signals
+from rollcli.parallel.local import done_locally
+from rollcli.parallel.process_setup import limit_blas_threads
 
 
 @dataclass(frozen=True, slots=True)

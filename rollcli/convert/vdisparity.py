@@ -2,12 +2,12 @@
 
 from functools import partial
 
-from rollcli.batch.frames import map_frames
-from rollcli.batch.job import Frame, Outcome
-from rollcli.batch.options import EncodingOptions
-from rollcli.batch.outputs import output_path
 from rollcli.convert.options import CountOptions, VDisparityOptions
 from rollcli.convert.run import Conversion, convert
+from rollcli.frames.find import map_frames
+from rollcli.frames.frame import Frame, Outcome
+from rollcli.frames.options import EncodingOptions
+from rollcli.frames.outputs import output_path
 
 
 def count_maps(options: VDisparityOptions) -> int:

@@ -4,12 +4,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rollcli.batch.faults import guarded
-from rollcli.batch.images import encode_computed, encode_turned
-from rollcli.batch.job import Outcome
-from rollcli.batch.options import EncodingOptions, FrameOptions
-from rollcli.batch.outputs import remove_outputs
-from rollcli.batch.source import Source, read_source
 from rollcli.convert.options import CountOptions
 from rollcli.convert.run import Conversion
 from rollcli.errors import EstimationError, InputError
@@ -18,6 +12,12 @@ from rollcli.files.atomic import write_atomic
 from rollcli.files.formats import encode_stored
 from rollcli.files.png import encode_png
 from rollcli.files.results import Row
+from rollcli.frames.encode import encode_computed, encode_turned
+from rollcli.frames.frame import Outcome
+from rollcli.frames.guard import guarded
+from rollcli.frames.options import EncodingOptions, FrameOptions
+from rollcli.frames.outputs import remove_outputs
+from rollcli.frames.read import Source, read_source
 from rollcli.imaging.stereo_options import StereoOptions
 from rollcli.imaging.vdisparity import draw_v_disparity, profile, v_disparity
 

@@ -10,16 +10,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rollcli.errors import UsageError
-from rollcli.estimator import verdict
+from rollcli.estimator.doubts import doubts_of_interval, doubts_of_road, doubts_of_solution
 from rollcli.estimator.energy import Energy
-from rollcli.estimator.exact import Minimum, exact, minima
-from rollcli.estimator.golden_section import golden_section
-from rollcli.estimator.gradient_descent import LAMBDA0, TOLERANCE, gradient_descent
 from rollcli.estimator.interval import half_width
-from rollcli.estimator.pixels import LARGEST, require_pixels
+from rollcli.estimator.road.surface import Surface
 from rollcli.estimator.selection import Pixels, take_all, take_area, take_road
-from rollcli.estimator.solution import Solution, apart
-from rollcli.estimator.surface import Surface
+from rollcli.estimator.solvers.exact import Minimum, exact, minima
+from rollcli.estimator.solvers.golden_section import golden_section
+from rollcli.estimator.solvers.gradient_descent import LAMBDA0, TOLERANCE, gradient_descent
+from rollcli.estimator.solvers.solution import Solution, apart
+from rollcli.estimator.validity import LARGEST, require_pixels
 
 AREA_METHODS = ("plane", "areas")
 METHODS = ("gd", "gss", "exact", *AREA_METHODS)
@@ -173,10 +173,10 @@ def estimate_roll(
     slack = 1e-9 * (energy.rest + energy.slope_energy)
     is_global = float(energy.at(solution.theta).value) <= basins[0].energy + slack
     ci95 = None if surface is None else half_width(surface, solution.theta)
-    doubts = verdict.of_solution(solution, energy, basins, is_global=is_global)
+    doubts = doubts_of_solution(solution, energy, basins, is_global=is_global)
     if pixels.road is not None and surface is not None:
-        doubts += verdict.of_road(pixels.road, surface, max_roll)
-    doubts += verdict.of_interval(ci95)
+        doubts += doubts_of_road(pixels.road, surface, max_roll)
+    doubts += doubts_of_interval(ci95)
     height, width = values.shape
     return RollEstimate(
         theta=solution.theta,

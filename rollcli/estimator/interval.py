@@ -14,8 +14,8 @@ import math
 import numpy as np
 
 from rollcli.estimator.moments import Floats
-from rollcli.estimator.near import solvable
-from rollcli.estimator.surface import Surface
+from rollcli.estimator.road.robust_fit import solvable
+from rollcli.estimator.road.surface import Surface
 
 _GROUPS = 6
 _EFFECTIVE_PIXELS = 200  # neighbouring pixels repeat each other: more do not tell more

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import EstimationError
-from rollcli.estimator.areas import areas
+from rollcli.estimator.areas.iterative import areas
+from rollcli.estimator.areas.lower_centre import AreaSolution, plane_fit
 from rollcli.estimator.energy import Energy
 from rollcli.estimator.moments import map_moments, point_moments
-from rollcli.estimator.plane_fit import AreaSolution, plane_fit
-from rollcli.estimator.road import Road, find_road
-from rollcli.estimator.sample import take_sample
-from rollcli.estimator.surface import Surface, fit_surface, whole_surface
+from rollcli.estimator.road.find import Road, find_road
+from rollcli.estimator.road.subsample import take_sample
+from rollcli.estimator.road.surface import Surface, fit_surface, whole_surface
 
 
 @dataclass(frozen=True)

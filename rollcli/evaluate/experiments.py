@@ -10,14 +10,14 @@ from typing import Any
 from numpy.typing import NDArray
 
 from rollcli.errors import EstimationError
-from rollcli.estimator.areas import areas
+from rollcli.estimator.areas.iterative import areas
+from rollcli.estimator.areas.lower_centre import plane_fit
 from rollcli.estimator.energy import Energy
 from rollcli.estimator.estimate import estimate_roll
-from rollcli.estimator.exact import exact, minima
-from rollcli.estimator.golden_section import golden_section
-from rollcli.estimator.gradient_descent import LAMBDA0, gradient_descent
 from rollcli.estimator.moments import map_moments
-from rollcli.estimator.plane_fit import plane_fit
+from rollcli.estimator.solvers.exact import exact, minima
+from rollcli.estimator.solvers.golden_section import golden_section
+from rollcli.estimator.solvers.gradient_descent import LAMBDA0, gradient_descent
 from rollcli.evaluate.rotate import rotate_nearest
 
 DELTAS = tuple(math.pi / k for k in (1.8e3, 1.8e4, 1.8e5, 1.8e6))

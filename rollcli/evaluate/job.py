@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.batch.faults import FAULTS
-from rollcli.batch.job import Frame, Outcome, failed
-from rollcli.batch.region import region_mask
-from rollcli.batch.source import Source, read_source
 from rollcli.evaluate.experiments import Findings, examine
 from rollcli.evaluate.options import PaperOptions
 from rollcli.files.matching import stem_of
 from rollcli.files.results import Row
+from rollcli.frames.frame import Frame, Outcome, failed
+from rollcli.frames.guard import FAULTS
+from rollcli.frames.read import Source, read_source
+from rollcli.frames.region import region_mask
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rollcli.batch.options import (
+from rollcli.frames.options import (
     EncodingOptions,
     FrameOptions,
     ImageOptions,

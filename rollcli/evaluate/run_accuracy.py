@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import sys
 
-from rollcli.batch.checks import check_writes
-from rollcli.batch.dry_run import list_files
-from rollcli.batch.options import RunningOptions
-from rollcli.batch.report import FRAMES_FAILED
 from rollcli.evaluate.accuracy import Accuracy, assess
 from rollcli.evaluate.accuracy_text import FORMATS
 from rollcli.evaluate.truth import read_truth
 from rollcli.files.results import read_result
 from rollcli.files.stream import is_stream, write_output
+from rollcli.frames.checks import check_writes
+from rollcli.frames.dry_run import list_files
+from rollcli.frames.options import RunningOptions
+from rollcli.frames.progress import FRAMES_FAILED
 
 
 def run_accuracy(result: str, truth: str, form: str, output: str, running: RunningOptions) -> int:

@@ -8,20 +8,20 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rollcli.batch.checks import check_writes
-from rollcli.batch.dry_run import list_files
-from rollcli.batch.frames import map_frames
-from rollcli.batch.job import Frame
-from rollcli.batch.local import done_locally
-from rollcli.batch.report import INTERRUPTED, Report
-from rollcli.batch.setup import limit_blas_threads
-from rollcli.batch.signals import stop_on_signals
-from rollcli.batch.workers import Work
 from rollcli.errors import UsageError
 from rollcli.evaluate.options import PaperOptions
 from rollcli.evaluate.truth import read_truth
 from rollcli.files.atomic import write_atomic
 from rollcli.files.matching import stem_of
+from rollcli.frames.checks import check_writes
+from rollcli.frames.dry_run import list_files
+from rollcli.frames.find import map_frames
+from rollcli.frames.frame import Frame
+from rollcli.frames.progress import INTERRUPTED, Report
+from rollcli.parallel.in_order import Work
+from rollcli.parallel.interrupt import stop_on_signals
+from rollcli.parallel.local import done_locally
+from rollcli.parallel.process_setup import limit_blas_threads
 from rollcli.report.page import require_extra
 
 if TYPE_CHECKING:

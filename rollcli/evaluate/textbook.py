@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.estimator.moments import Floats, Grid
-from rollcli.estimator.solution import Outcome, Solution, principal
+from rollcli.estimator.solvers.solution import Outcome, Solution, principal
 
 _RATIO = (math.sqrt(5) - 1) / 2
 _MAX_ITERATIONS = 100

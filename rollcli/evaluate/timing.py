@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.estimator.energy import Energy
-from rollcli.estimator.golden_section import golden_section
-from rollcli.estimator.gradient_descent import LAMBDA0, gradient_descent
 from rollcli.estimator.moments import map_moments
-from rollcli.estimator.solution import Solution
+from rollcli.estimator.solvers.golden_section import golden_section
+from rollcli.estimator.solvers.gradient_descent import LAMBDA0, gradient_descent
+from rollcli.estimator.solvers.solution import Solution
 from rollcli.evaluate.experiments import DELTAS
 from rollcli.evaluate.textbook import Textbook
 

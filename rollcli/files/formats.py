@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from rollcli.errors import InputError, UsageError
 from rollcli.files import npy, pfm, pictures, png, tiff
-from rollcli.files.stored import Stored as Stored
-from rollcli.files.stored import native
+from rollcli.files.raw_map import Stored as Stored
+from rollcli.files.raw_map import native
 
 _MAX_BYTES = 2**32
 _KNOWN = {

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rollcli.errors import InputError
 from rollcli.files.lzw import LzwError, decode_lzw
-from rollcli.files.stored import Stored, native, require_decoded_fits
+from rollcli.files.raw_map import Stored, native, require_decoded_fits
 
 SIGNATURES = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 _NONE, _LZW, _DEFLATE, _OLD_DEFLATE, _PACKBITS = 1, 5, 8, 32946, 32773

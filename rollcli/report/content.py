@@ -6,14 +6,14 @@ from typing import Any
 
 from rollcli import __version__
 from rollcli.files.results import Result, Row
-from rollcli.report.choice import SPREAD, SUSPECT, WIDEST, Choice
+from rollcli.report.axis_range import outside
+from rollcli.report.gallery import SPREAD, SUSPECT, WIDEST, Choice
 from rollcli.report.histogram import histogram
 from rollcli.report.options import ReportOptions
 from rollcli.report.page import render_page
 from rollcli.report.pictures import Pictures
 from rollcli.report.roll_chart import roll_chart
 from rollcli.report.summary import degrees, frame_count, option_lines, summarize
-from rollcli.report.view import outside
 
 _LISTED = 100  # doubtful frames on the page; the result has all
 

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.files.results import Row
+from rollcli.report.axis_range import view
 from rollcli.report.page import Chart
 from rollcli.report.summary import degrees
-from rollcli.report.view import view
 
 _MOST_BINS = 40
 _NARROWEST = 0.01  # degrees

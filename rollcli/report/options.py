@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from rollcli.batch.options import RunningOptions
+from rollcli.frames.options import RunningOptions
 
 GALLERY = 12
 

@@ -8,12 +8,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.batch.faults import FAULTS
-from rollcli.batch.options import FrameOptions
-from rollcli.batch.source import read_source
 from rollcli.errors import InputError
 from rollcli.files.encodings import read_disparity, to_disparity
 from rollcli.files.formats import read_image, read_stored
+from rollcli.frames.guard import FAULTS
+from rollcli.frames.options import FrameOptions
+from rollcli.frames.read import read_source
 from rollcli.imaging.derotate import derotate
 from rollcli.imaging.overlay import draw_disparity
 from rollcli.imaging.vdisparity import draw_v_disparity, row_offset, v_disparity

@@ -6,9 +6,9 @@ from itertools import pairwise
 from typing import Any
 
 from rollcli.files.results import Row
+from rollcli.report.axis_range import view
 from rollcli.report.page import Chart
 from rollcli.report.summary import degrees
-from rollcli.report.view import view
 
 _MANY = 400  # up to so many frames each has a dot, and marks are large
 _FEW = 10

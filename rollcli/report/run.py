@@ -5,18 +5,18 @@ from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
-from rollcli.batch.checks import check_writes
-from rollcli.batch.dry_run import list_files
-from rollcli.batch.local import done_locally
-from rollcli.batch.options import EncodingOptions, FrameOptions
 from rollcli.batch.recorded import recorded_options
-from rollcli.batch.report import FRAMES_FAILED, INTERRUPTED, Report
-from rollcli.batch.signals import stop_on_signals
-from rollcli.batch.workers import Work
 from rollcli.errors import InputError
 from rollcli.files.results import Result, read_result, run_path
 from rollcli.files.stream import is_stream, write_output
-from rollcli.report.choice import Choice, choose
+from rollcli.frames.checks import check_writes
+from rollcli.frames.dry_run import list_files
+from rollcli.frames.options import EncodingOptions, FrameOptions
+from rollcli.frames.progress import FRAMES_FAILED, INTERRUPTED, Report
+from rollcli.parallel.in_order import Work
+from rollcli.parallel.interrupt import stop_on_signals
+from rollcli.parallel.local import done_locally
+from rollcli.report.gallery import Choice, choose
 from rollcli.report.options import ReportOptions
 from rollcli.report.page import require_extra
 from rollcli.report.sources import Subject, subjects

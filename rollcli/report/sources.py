@@ -5,12 +5,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-from rollcli.batch.job import Frame
-from rollcli.batch.options import ImageOptions
 from rollcli.errors import UsageError
 from rollcli.files.inputs import MAP_ENDINGS
 from rollcli.files.naming import listed
 from rollcli.files.results import Row
+from rollcli.frames.frame import Frame
+from rollcli.frames.options import ImageOptions
 
 KINDS = ("derotated", "vdisparity", "disparity")
 

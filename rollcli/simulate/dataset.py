@@ -12,13 +12,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.batch.local import done_locally
-from rollcli.batch.signals import Stop
-from rollcli.batch.workers import Work
 from rollcli.errors import OutputError, UsageError
 from rollcli.files.atomic import output_error, write_atomic
 from rollcli.files.encodings import from_disparity
 from rollcli.files.formats import encode_stored
+from rollcli.parallel.in_order import Work
+from rollcli.parallel.interrupt import Stop
+from rollcli.parallel.local import done_locally
 from rollcli.simulate.options import SimulateOptions
 from rollcli.simulate.render import render_frame
 from rollcli.simulate.spec import FrameSpec, draw_specs

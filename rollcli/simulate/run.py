@@ -3,8 +3,8 @@
 import sys
 import time
 
-from rollcli.batch.options import RunningOptions
-from rollcli.batch.signals import stop_on_signals
+from rollcli.frames.options import RunningOptions
+from rollcli.parallel.interrupt import stop_on_signals
 from rollcli.simulate.dataset import KITTI_TOP, Dataset, plan_dataset, write_dataset
 from rollcli.simulate.options import SimulateOptions
 

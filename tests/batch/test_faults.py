@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.program import ROOT, command, contents, environment, rollcli, write_maps
+from tests.run_cli import ROOT, command, contents, environment, rollcli, write_maps
 
 FRAMES = 12
 

@@ -11,7 +11,7 @@ import pytest
 
 from rollcli.batch.result_file import whole_rows
 from rollcli.files.results import parse_rows
-from tests.program import command, contents, environment, road_map, rollcli, write_kitti, write_maps
+from tests.run_cli import command, contents, environment, road_map, rollcli, write_kitti, write_maps
 
 FRAMES = 40
 IMAGES = ("--derotated", "upright", "--vdisparity", "v")

@@ -15,7 +15,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
-from tests.program import command, environment, road_map, write_kitti
+from tests.run_cli import command, environment, road_map, write_kitti
 
 BARE = """
 import sys, time, cv2, numpy as np
@@ -34,12 +34,12 @@ start = time.perf_counter()
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
-from rollcli.batch.setup import limit_blas_threads, prepare_worker
+from rollcli.parallel.process_setup import limit_blas_threads, prepare_worker
 limit_blas_threads()
 prepare_worker()
-from rollcli.batch.frame import run_frame
-from rollcli.batch.job import Frame
-from rollcli.batch.options import *
+from rollcli.batch.frame_task import run_frame
+from rollcli.frames.frame import Frame
+from rollcli.frames.options import *
 options = FrameOptions(EncodingOptions(), StereoOptions(), RegionOptions(), MethodOptions(), ImageOptions())
 paths = map(str, sorted(Path(sys.argv[1]).iterdir()))
 frames = [Frame(path, "", path, "", Path(path).name, None) for path in paths]

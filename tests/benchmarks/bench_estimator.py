@@ -18,12 +18,12 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from rollcli.estimator.areas import areas
+from rollcli.estimator.areas.iterative import areas
 from rollcli.estimator.energy import Energy
-from rollcli.estimator.exact import exact
-from rollcli.estimator.golden_section import golden_section
-from rollcli.estimator.gradient_descent import gradient_descent
 from rollcli.estimator.moments import map_moments
+from rollcli.estimator.solvers.exact import exact
+from rollcli.estimator.solvers.golden_section import golden_section
+from rollcli.estimator.solvers.gradient_descent import gradient_descent
 from rollcli.evaluate.textbook import Textbook
 
 SIZES = ((640, 480), (1242, 375), (1920, 1080), (1730, 1028))

@@ -23,7 +23,7 @@ from rollcli.imaging.stereo import StereoOptions, match_pair
 from rollcli.imaging.vdisparity import draw_v_disparity, v_disparity
 from rollcli.simulate.render import render_frame
 from rollcli.simulate.spec import FrameSpec
-from tests.making import disparity_map, make_tiff
+from tests.binary_files import disparity_map, make_tiff
 
 SIZE = (1242, 375)
 

@@ -13,7 +13,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
-from tests.program import command, contents, environment, write_maps
+from tests.run_cli import command, contents, environment, write_maps
 
 KILLS = 5
 

@@ -12,7 +12,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
-from tests.program import command, environment, road_map, write_kitti
+from tests.run_cli import command, environment, road_map, write_kitti
 
 # in a process of its own, since the peak is that of the largest child so far
 RUN = "import resource, subprocess, sys; subprocess.run(sys.argv[1:], check=True); print({})"

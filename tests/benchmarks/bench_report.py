@@ -16,7 +16,7 @@ sys.path.insert(0, str(ROOT))
 
 from rollcli.files.results import Row, format_header, format_row
 from tests.conftest import BROWSERS, FLAGS
-from tests.program import command, environment, road_map, write_kitti
+from tests.run_cli import command, environment, road_map, write_kitti
 
 MAPS = 12
 LARGEST_MB, LONGEST_S = 30, 3

@@ -12,7 +12,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
-from tests.program import command, environment
+from tests.run_cli import command, environment
 
 AT_MOST = 2.2
 LINES = {

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from tests.program import rollcli, write_maps
+from tests.run_cli import rollcli, write_maps
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ import math
 
 import pytest
 
-from tests.program import contents, rollcli, write_maps
+from tests.run_cli import contents, rollcli, write_maps
 
 COLUMNS = (
     "file,right_file,status,roll_deg,roll_ci95_deg,method,iterations,converged,global_minimum,rmse_px,"

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from tests.program import rollcli
+from tests.run_cli import rollcli
 
 RESULT = """file,status,roll_deg,roll_ci95_deg
 maps/a.png,ok,1.100000,0.200000

@@ -11,8 +11,8 @@ import pytest
 
 from rollcli.cli.main import main
 from rollcli.evaluate.run_paper import PAGE, TABLES
-from tests.estimator.maps import bent_road
-from tests.program import contents, rollcli
+from tests.estimator.synthetic_maps import bent_road
+from tests.run_cli import contents, rollcli
 
 FAST = ("--turns", "-8:8:8", "--timed", "1")
 FILES = {PAGE, *(f"{name}.csv" for name in TABLES)}

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.program import command, environment, road_map, rollcli, write_kitti, write_maps, write_pair
+from tests.run_cli import command, environment, road_map, rollcli, write_kitti, write_maps, write_pair
 
 
 def column(text, name):

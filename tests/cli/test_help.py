@@ -7,8 +7,8 @@ import sys
 import click
 import pytest
 
-from tests.program import environment
 from tests.readme_tables import commands
+from tests.run_cli import environment
 
 COMMANDS = dict(commands())
 HELP = """

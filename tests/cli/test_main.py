@@ -6,7 +6,7 @@ import sys
 import pytest
 
 import rollcli as package
-from tests.program import environment, rollcli
+from tests.run_cli import environment, rollcli
 
 
 def test_version_is_the_packages(tmp_path):

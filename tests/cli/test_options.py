@@ -6,12 +6,12 @@ import math
 import click
 import pytest
 
-from rollcli.batch.options import MethodOptions
 from rollcli.cli.main import COMMANDS, main
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.files.results import columns
-from tests.program import ROOT
+from rollcli.frames.options import MethodOptions
 from tests.readme_tables import commands
+from tests.run_cli import ROOT
 
 ESTIMATE = main.get_command(click.Context(main), "estimate")
 

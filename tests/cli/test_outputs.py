@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.program import contents, road_map, rollcli, write_kitti, write_maps, write_pair
+from tests.run_cli import contents, road_map, rollcli, write_kitti, write_maps, write_pair
 
 
 @pytest.fixture

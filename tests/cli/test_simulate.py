@@ -8,7 +8,7 @@ import time
 import pytest
 
 from rollcli.cli.main import main
-from tests.program import command, contents, environment, rollcli
+from tests.run_cli import command, contents, environment, rollcli
 
 TINY = ("--frames", "2", "--size", "64x48")
 

@@ -7,7 +7,7 @@ import subprocess
 import numpy as np
 import pytest
 
-from tests.program import command, environment, road_map, rollcli, write_kitti, write_maps
+from tests.run_cli import command, environment, road_map, rollcli, write_kitti, write_maps
 
 
 @pytest.fixture

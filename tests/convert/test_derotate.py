@@ -7,13 +7,13 @@ from itertools import product
 import numpy as np
 import pytest
 
-from rollcli.batch.options import EncodingOptions, InputOptions, RunningOptions
 from rollcli.convert.derotate import derotate_maps
 from rollcli.convert.options import DerotateOptions, TurnOptions
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.files.encodings import from_disparity, read_disparity
 from rollcli.files.formats import encode_stored, read_stored
-from tests.program import contents, road_map, rollcli, write_kitti, write_maps
+from rollcli.frames.options import EncodingOptions, InputOptions, RunningOptions
+from tests.run_cli import contents, road_map, rollcli, write_kitti, write_maps
 
 TYPES = {
     "png": ["u1", "u2"],

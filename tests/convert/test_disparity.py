@@ -9,7 +9,7 @@ import pytest
 from rollcli.files.encodings import read_disparity
 from rollcli.files.formats import read_image, read_stored
 from rollcli.imaging.stereo import compute_disparity
-from tests.program import ROOT, contents, road_map, rollcli, write_pair
+from tests.run_cli import ROOT, contents, road_map, rollcli, write_pair
 
 ROADS = ROOT.parent / "shared" / "roads"
 

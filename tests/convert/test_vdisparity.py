@@ -8,7 +8,7 @@ import pytest
 
 from rollcli.files.encodings import read_disparity
 from rollcli.files.formats import read_stored
-from tests.program import contents, road_map, rollcli, write_kitti
+from tests.run_cli import contents, road_map, rollcli, write_kitti
 
 
 def road_pixels(picture):

@@ -9,10 +9,17 @@ from hypothesis import strategies as st
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.energy import Energy
-from rollcli.estimator.exact import exact
 from rollcli.estimator.moments import map_moments
+from rollcli.estimator.solvers.exact import exact
 from rollcli.evaluate.textbook import Textbook
-from tests.estimator.maps import bent_road, degrees_apart, energy_of, flat_road, random_maps, repeatable
+from tests.estimator.synthetic_maps import (
+    bent_road,
+    degrees_apart,
+    energy_of,
+    flat_road,
+    random_maps,
+    repeatable,
+)
 
 ANGLES = np.linspace(-math.pi / 2, math.pi / 2, 181)
 angles = st.floats(-math.pi / 2, math.pi / 2)

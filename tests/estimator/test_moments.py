@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rollcli.estimator.moments import Grid, map_moments, point_moments
-from tests.estimator.maps import bent_road, random_maps, repeatable
+from tests.estimator.synthetic_maps import bent_road, random_maps, repeatable
 
 DEGREES_4 = [(i, j) for i in range(5) for j in range(5 - i)]
 DEGREES_2 = [(i, j) for i in range(3) for j in range(3 - i)]

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from rollcli.errors import EstimationError
-from rollcli.estimator.exact import exact
+from rollcli.estimator.solvers.exact import exact
 from rollcli.evaluate.experiments import DELTAS, LAMBDAS, METHODS, SOLVERS, examine
 from rollcli.evaluate.rotate import rotate_nearest
 from rollcli.evaluate.tables import DELTAS_DEG, all_tables
 from rollcli.evaluate.timing import FORMS, Times, time_solvers
-from tests.estimator.maps import bent_road, degrees_apart, energy_of
+from tests.estimator.synthetic_maps import bent_road, degrees_apart, energy_of
 
 TURNS = [math.radians(turn) for turn in (-10, 0, 15)]
 

@@ -7,7 +7,7 @@ import pytest
 from rollcli.errors import InputError, UsageError
 from rollcli.files.encodings import Encoding, from_disparity, read_disparity, read_mask, to_disparity
 from rollcli.files.formats import Stored, encode_stored
-from tests.making import disparity_map, make_png, make_tiff
+from tests.binary_files import disparity_map, make_png, make_tiff
 
 
 def stored(values, dtype, **more):

@@ -10,7 +10,7 @@ import pytest
 
 from rollcli.errors import InputError, OutputError, UsageError
 from rollcli.files.formats import decode_stored, encode_stored, read_bytes, read_image, read_stored
-from tests.making import disparity_map, make_npy, make_png, make_tiff
+from tests.binary_files import disparity_map, make_npy, make_png, make_tiff
 
 WRITTEN = [
     *[("png", kind) for kind in ("u1", "u2")],

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rollcli.files.lzw import LzwError, decode_lzw
-from tests.making import lzw_encode
+from tests.binary_files import lzw_encode
 
 
 @given(st.binary(min_size=1, max_size=3000), st.integers(1, 40))

@@ -5,7 +5,7 @@ import pytest
 
 from rollcli.errors import InputError
 from rollcli.files.formats import decode_mask, decode_stored
-from tests.making import disparity_map, make_npy, npy_header
+from tests.binary_files import disparity_map, make_npy, npy_header
 
 REAL = ("u1", "u2", "u4", "u8", "i1", "i2", "i4", "i8", "f2", "f4", "f8", "g")
 

@@ -5,7 +5,7 @@ import pytest
 
 from rollcli.errors import InputError
 from rollcli.files.formats import decode_stored, encode_stored
-from tests.making import disparity_map, make_pfm
+from tests.binary_files import disparity_map, make_pfm
 
 MAP = disparity_map().astype(np.float32)
 

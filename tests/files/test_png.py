@@ -12,7 +12,7 @@ import pytest
 from rollcli.errors import InputError, OutputError
 from rollcli.files.formats import decode_mask, decode_stored, encode_stored
 from rollcli.files.png import picture
-from tests.making import disparity_map, make_png, png_file, png_header, png_rows
+from tests.binary_files import disparity_map, make_png, png_file, png_header, png_rows
 
 GREYS = bytes(np.repeat(np.arange(256, dtype=np.uint8), 3))
 

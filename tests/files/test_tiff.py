@@ -9,7 +9,7 @@ import pytest
 from rollcli.errors import InputError
 from rollcli.files.formats import decode_stored, encode_stored
 from rollcli.files.tiff import picture
-from tests.making import disparity_map, make_tiff
+from tests.binary_files import disparity_map, make_tiff
 
 KINDS = ("u1", "u2", "i2", "f2", "f4", "f8")
 

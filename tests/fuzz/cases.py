@@ -4,7 +4,7 @@ import struct
 
 import numpy as np
 
-from tests.making import make_tiff, npy_header
+from tests.binary_files import make_tiff, npy_header
 
 
 def _one_bit_tiff() -> bytes:

@@ -7,10 +7,10 @@ import traceback
 from pathlib import Path
 from typing import BinaryIO
 
-from rollcli.batch.setup import prepare_worker
 from rollcli.errors import InputError
 from rollcli.files.encodings import to_disparity
 from rollcli.files.formats import decode_image, decode_mask, decode_stored
+from rollcli.parallel.process_setup import prepare_worker
 from tests.fuzz.corpus import corpus
 
 MEMORY = 2**30

@@ -5,7 +5,7 @@ import zlib
 import cv2
 import numpy as np
 
-from tests.making import disparity_map, make_npy, make_pfm, make_png, make_tiff
+from tests.binary_files import disparity_map, make_npy, make_pfm, make_png, make_tiff
 
 MAP = disparity_map(11, 17)
 GREYS = bytes(np.repeat(np.arange(256, dtype=np.uint8), 3))

@@ -5,8 +5,8 @@ import re
 
 import pytest
 
-from tests.program import road_map, rollcli, write_kitti, write_maps
 from tests.report.results import row, write_result
+from tests.run_cli import road_map, rollcli, write_kitti, write_maps
 
 pytest.importorskip("plotly", reason="plotly, of the extra report, is not here")
 pytest.importorskip("jinja2", reason="jinja2, of the extra report, is not here")

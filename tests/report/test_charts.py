@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from rollcli.report.axis_range import outside, view
 from rollcli.report.histogram import histogram
 from rollcli.report.roll_chart import roll_chart
 from rollcli.report.summary import degrees, option_lines, summarize
-from rollcli.report.view import outside, view
 from tests.report.results import row
 
 ROWS = [

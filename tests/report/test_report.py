@@ -12,8 +12,8 @@ import pytest
 
 from rollcli.errors import UsageError
 from rollcli.report import page
-from tests.program import contents, road_map, rollcli, write_kitti, write_maps
 from tests.report.results import row, write_result
+from tests.run_cli import contents, road_map, rollcli, write_kitti, write_maps
 
 pytest.importorskip("plotly", reason="plotly, of the extra report, is not here")
 pytest.importorskip("jinja2", reason="jinja2, of the extra report, is not here")

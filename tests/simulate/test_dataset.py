@@ -13,7 +13,7 @@ from rollcli.simulate import dataset as module
 from rollcli.simulate.dataset import plan_dataset, write_dataset
 from rollcli.simulate.options import SimulateOptions
 from rollcli.simulate.render import render_frame
-from tests.program import contents
+from tests.run_cli import contents
 
 TINY = SimulateOptions(frames=3, size=(64, 48), seed=9)
 

@@ -1,0 +1,83 @@
+"""One frame in, one row out."""
+
+import math
+import time
+from dataclasses import replace
+from typing import Any
+
+from rollcli.estimator.estimate import RollEstimate, estimate_roll
+from rollcli.files.results import Row
+from rollcli.frames.encode import write_images
+from rollcli.frames.frame import Frame, Outcome
+from rollcli.frames.guard import guarded
+from rollcli.frames.options import FrameOptions, MethodOptions
+from rollcli.frames.outputs import remove_images
+from rollcli.frames.read import Source, read_source
+from rollcli.frames.region import region_mask
+
+
+def run_frame(frame: Frame, options: FrameOptions) -> Outcome:
+    """Do one frame; whatever is wrong with it becomes an `error` row.
+
+    Raises
+    ------
+    OutputError
+        An image cannot be written: that ends the run.
+    """
+    start = time.perf_counter()
+    outcome = guarded(frame, lambda: _measured(frame, options))
+    if outcome.row.status == "error":
+        remove_images(frame, options.images, options.root)
+    elapsed = 1000 * (time.perf_counter() - start)
+    return replace(outcome, row=replace(outcome.row, elapsed_ms=elapsed))
+
+
+def _measured(frame: Frame, options: FrameOptions) -> Outcome:
+    source = read_source(frame, options)
+    mask = region_mask(frame.mask, options, source.disparity.shape)
+    estimate = estimate_roll(source.disparity, mask=mask, **_arguments(options.method))
+    write_images(frame, source, estimate, options)
+    return Outcome(_row(frame, source, estimate), source.encoding, source.warning, source.searched)
+
+
+def _arguments(options: MethodOptions) -> dict[str, Any]:
+    return {
+        "method": options.method,
+        "model": options.model,
+        "road": options.road,
+        "lambda0": options.lambda0,
+        "tolerance": math.radians(options.tolerance_deg),
+        "max_roll": math.radians(options.max_roll_deg),
+        "seed": options.seed,
+    }
+
+
+def _row(frame: Frame, source: Source, estimate: RollEstimate) -> Row:
+    reasons = [estimate.message] if estimate.message else []
+    status = estimate.status
+    if source.doubt:
+        status = "suspect"
+        reasons.append(source.doubt)
+    if source.note:
+        reasons.append(source.note)
+    alpha0, alpha1, alpha2 = estimate.alpha
+    return Row(
+        file=frame.file,
+        right_file=frame.right_file,
+        status=status,
+        roll_deg=math.degrees(estimate.theta),
+        roll_ci95_deg=None if estimate.ci95 is None else math.degrees(estimate.ci95),
+        method=estimate.method,
+        iterations=estimate.iterations,
+        converged=estimate.converged,
+        global_minimum=estimate.global_minimum,
+        rmse_px=estimate.rmse,
+        alpha0=alpha0,
+        alpha1=alpha1,
+        alpha2=alpha2,
+        valid_fraction=estimate.valid_fraction,
+        road_fraction=estimate.road_fraction,
+        width=estimate.width,
+        height=estimate.height,
+        message="; ".join(reasons),
+    )

@@ -1,0 +1,149 @@
+"""The roll angle from planes in many small areas, and the iterative choice of the best of them [Areas].
+
+[Areas]: Evans, Fan, Dahnoun, "Iterative roll angle estimation from dense disparity map", MECO 2018. One
+chosen area may hold an obstacle; among many, the road's are those whose planes agree. The steps here:
+
+1. Sum the map in tiles, 100 along its longer side; an area is 4 x 4 tiles, half of it overlapping the next.
+2. Fit a plane to each area that is at least half valid. Keep those whose disparity grows downward and whose
+   roll is within bounds: no walls beside the road, no sky.
+3. A plane explains an area if it passes its pixels with a root mean square residual within a tolerance. The
+   best area is the one whose plane explains the most pixels.
+4. Fit a plane to all areas explained, and look again which areas it explains, until they stay the same.
+5. The angle is that of the best plane of all pixels of these areas.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollcli.errors import EstimationError
+from rollcli.estimator.areas.lower_centre import AreaSolution, plane_of
+from rollcli.estimator.areas.tiles import tile_sums
+from rollcli.estimator.moments import Floats
+from rollcli.estimator.solvers.solution import Outcome
+from rollcli.estimator.validity import require_pixels
+
+_TILES = 100  # along the longer side of the map
+_SIZE, _STEP = 4, 2  # of an area, in tiles
+_FILLED = 0.5
+_TOLERANCE = 0.01  # of the mean disparity
+_NOISE, _SMOOTH = 1.5, 0.1  # or 1.5 times the residual of the smoothest tenth: noise, whole pixels
+_TRIED = 200  # about as many planes compete to be the best
+_ROUNDS = 20
+_SINGULAR = 1e-10
+MAX_ROLL = math.radians(45)
+
+
+def areas(
+    disparity: NDArray[Any], weights: NDArray[Any] | None = None, max_roll: float = MAX_ROLL
+) -> AreaSolution:
+    """Fit planes to many small areas, and one plane to those that agree.
+
+    Parameters
+    ----------
+    disparity : ndarray, shape (H, W)
+        Real numbers, px; values <= 0, NaN and inf are no data.
+    weights : ndarray, shape (H, W), optional
+        Finite and not negative (or bool); all ones by default.
+    max_roll : float
+        The largest abs(roll) of an area's plane, radians.
+
+    Returns
+    -------
+    AreaSolution
+        `iterations` counts the rounds of step 4.
+
+    Raises
+    ------
+    EstimationError
+        When no area has enough valid pixels, or none looks like a road.
+    """
+    valid = (disparity > 0) & (disparity < np.inf)
+    if weights is not None:
+        valid &= weights > 0
+    require_pixels(valid)
+    side = max(2, round(max(disparity.shape) / _TILES))
+    grams = tile_sums(disparity, weights, side).areas(_SIZE, _STEP)
+    across, grams = grams.shape[1], grams.reshape(-1, 4, 4)
+    extent = _SIZE * side
+    full = 1.0 if weights is None else float(np.max(weights))
+    filled = np.flatnonzero(grams[:, 0, 0] >= _FILLED * full * extent**2)
+    if len(filled) == 0:
+        raise EstimationError(f"no area of {extent}x{extent} pixels is at least half valid")
+    grams = grams[filled]
+    planes = _fitted(grams)
+    roads = _look_like_road(planes, max_roll)
+    if not roads.any():
+        raise EstimationError("no area looks like a road: disparity grows downward in none")
+    tried = np.flatnonzero(roads)[:: max(1, np.count_nonzero(roads) // _TRIED)]
+    misfit = _misfit(grams, planes[tried])
+    own = misfit[tried, np.arange(len(tried))]
+    level = grams[roads, 0, 3].sum() / grams[roads, 0, 0].sum()
+    tolerance = max(_TOLERANCE * float(level), _NOISE * float(np.quantile(own, _SMOOTH)))
+    agreeing, rounds, outcome = _agreeing(grams, misfit <= tolerance, tolerance, max_roll)
+    used = valid & _covered(filled[agreeing], across, _STEP * side, extent, disparity.shape)
+    return plane_of(disparity, weights, used, rounds, outcome)
+
+
+def _fitted(grams: Floats) -> Floats:
+    """Return the least-squares planes (c0, c1, c2) of areas (N, 4, 4), level where it is undetermined."""
+    n = grams[:, 0, 0]
+    p, q, d = (grams[:, 0, k] / n for k in (1, 2, 3))
+    pp, qq = grams[:, 1, 1] - n * p * p, grams[:, 2, 2] - n * q * q
+    pq = grams[:, 1, 2] - n * p * q
+    pd, qd = grams[:, 1, 3] - n * p * d, grams[:, 2, 3] - n * q * d
+    spread = pp * qq - pq * pq
+    rounding = _SINGULAR * d * np.sqrt(n * (pp + qq))  # a constant area must not rise by rounding alone
+    flat = (spread <= _SINGULAR * (pp + qq) ** 2) | (np.hypot(pd, qd) <= rounding)
+    spread = np.where(flat, np.inf, spread)
+    c1, c2 = (qq * pd - pq * qd) / spread, (pp * qd - pq * pd) / spread
+    return np.stack([d - c1 * p - c2 * q, c1, c2], axis=-1)
+
+
+def _misfit(grams: Floats, planes: Floats) -> Floats:
+    """Return the root mean squared residual of each plane (P, 3) in each area (A, 4, 4), shape (A, P), px."""
+    x = np.concatenate([-planes, np.ones((len(planes), 1))], axis=1)
+    forms = (x[:, :, None] * x[:, None, :]).reshape(-1, 16)
+    squares = grams.reshape(-1, 16) @ forms.T / grams[:, :1, 0]
+    misfit: Floats = np.sqrt(np.maximum(squares, 0))
+    return misfit
+
+
+def _look_like_road(planes: Floats, max_roll: float) -> NDArray[np.bool_]:
+    """Return which planes (N, 3) have a disparity that grows downward, and a roll within bounds."""
+    _, c1, c2 = planes.T
+    roads: NDArray[np.bool_] = (c2 > 0) & (np.abs(c1) <= math.tan(max_roll) * c2)
+    return roads
+
+
+def _agreeing(
+    grams: Floats, explained: NDArray[np.bool_], tolerance: float, max_roll: float
+) -> tuple[NDArray[np.bool_], int, Outcome]:
+    """Return which areas (A,) share one plane, after how many rounds, and whether these settled.
+
+    `explained`, shape (A, P), says which areas each competing plane explains.
+    """
+    chosen = explained[:, int(np.argmax(grams[:, 0, 0] @ explained))]
+    for rounds in range(1, _ROUNDS + 1):
+        plane = _fitted(grams[chosen].sum(axis=0, keepdims=True))
+        again = _misfit(grams, plane)[:, 0] <= tolerance
+        if not again.any() or not _look_like_road(plane, max_roll).all():
+            return chosen, rounds, Outcome.DRIFTED
+        if (again == chosen).all():
+            return chosen, rounds, Outcome.CONVERGED
+        chosen = again
+    return chosen, _ROUNDS, Outcome.STEP_LIMIT
+
+
+def _covered(
+    areas: NDArray[np.intp], across: int, step: int, extent: int, shape: tuple[int, ...]
+) -> NDArray[np.bool_]:
+    """Return the pixels (H, W) of areas given by their number, `across` in a row."""
+    covered = np.zeros(shape, np.bool_)
+    for row, column in zip(*np.divmod(areas, across), strict=True):
+        covered[row * step : row * step + extent, column * step : column * step + extent] = True
+    return covered

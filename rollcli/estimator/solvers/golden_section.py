@@ -1,0 +1,55 @@
+"""Golden section search for the roll angle [GSS].
+
+[GSS]: Fan, Bocus, Dahnoun, "A novel disparity transformation algorithm for road segmentation", Inf. Process.
+Lett. 140 (2018).
+"""
+
+from __future__ import annotations
+
+import math
+
+from rollcli.estimator.energy import Energy
+from rollcli.estimator.solvers.gradient_descent import TOLERANCE
+from rollcli.estimator.solvers.solution import Solution, principal
+
+_RATIO = (math.sqrt(5) - 1) / 2
+_FINEST = 1e-15  # radians; a narrower bracket holds no two different numbers
+
+
+def golden_section(energy: Energy, tolerance: float = TOLERANCE) -> Solution:
+    """Shrink a bracket of one whole period until it is narrower than `tolerance`.
+
+    Parameters
+    ----------
+    energy : Energy
+        E_min as a function of theta; has period pi.
+    tolerance : float
+        delta_theta of the paper: the width of the final bracket, radians; more than 0.
+
+    Returns
+    -------
+    Solution
+        The middle of the final bracket; `iterations` counts how often the bracket shrank, as the paper does:
+        16, 21, 26 and 30 for 0.1, 0.01, 0.001 and 0.0001 degrees, on any map.
+
+    Notes
+    -----
+    Assumes one minimum in the bracket. Whole frames can have two: `exact` tells which is lower.
+    """
+    low, width = -math.pi / 2, math.pi
+    left, right = low + (1 - _RATIO) * width, low + _RATIO * width
+    at_left, at_right = energy.at(left).value, energy.at(right).value
+    iterations = 0
+    while width >= max(tolerance, _FINEST):
+        iterations += 1
+        width *= _RATIO
+        if at_left <= at_right:
+            right, at_right = left, at_left
+            left = low + (1 - _RATIO) * width
+            at_left = energy.at(left).value
+        else:
+            low = left
+            left, at_left = right, at_right
+            right = low + _RATIO * width
+            at_right = energy.at(right).value
+    return Solution(principal(low + width / 2), iterations)

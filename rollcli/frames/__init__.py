@@ -1,0 +1,1 @@
+"""One frame: found, read, checked, named, encoded."""

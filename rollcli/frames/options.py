@@ -1,0 +1,111 @@
+"""What decides a frame: frozen records, filled by the command line and read where they are used.
+
+Import-light: the command line imports this module to show its help.
+"""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from rollcli.imaging.stereo_options import StereoOptions
+
+Method = Literal["gd", "gss", "exact", "plane", "areas"]
+Model = Literal["parabola", "line"]
+Road = Literal["auto", "all"]
+
+
+@dataclass(frozen=True)
+class InputOptions:
+    """Which maps to read."""
+
+    inputs: tuple[str, ...] = ()
+    files_from: str | None = None
+    recursive: bool = False
+    include: tuple[str, ...] = ()
+    exclude: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class PairOptions:
+    """Which stereo pairs to read, instead of maps."""
+
+    left: str | None = None
+    right: str | None = None
+    match: Literal["name", "order"] = "name"
+
+
+@dataclass(frozen=True)
+class EncodingOptions:
+    """How stored numbers become pixels of disparity."""
+
+    encoding: str = "auto"
+    scale: float | None = None
+    invalid: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class RegionOptions:
+    """Which pixels may be used. `roi` is (x0, y0, x1, y1) in pixels, x1 and y1 excluded."""
+
+    mask: str | None = None
+    roi: tuple[int, int, int, int] | None = None
+    polygon: tuple[tuple[float, float], ...] | None = None
+
+
+@dataclass(frozen=True)
+class MethodOptions:
+    """How the angle is found."""
+
+    method: Method = "gd"
+    model: Model = "parabola"
+    road: Road = "auto"
+    lambda0: float | Literal["auto"] = 26.0
+    tolerance_deg: float = 1e-4
+    max_roll_deg: float = 45.0
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class ImageOptions:
+    """Which images to write, each into a folder of its own."""
+
+    derotated: str | None = None
+    vdisparity: str | None = None
+    disparity: str | None = None
+    road_mask: str | None = None
+    save_as: Literal["png", "tiff", "npy"] = "png"
+
+    def folders(self) -> list[tuple[str, str]]:
+        """(kind, folder) of what was asked for."""
+        kinds = ("derotated", "vdisparity", "disparity", "road_mask")
+        return [(kind, folder) for kind in kinds if (folder := getattr(self, kind)) is not None]
+
+
+@dataclass(frozen=True)
+class RunningOptions:
+    """How the program runs and how much it says. `jobs` None: the usable processors."""
+
+    jobs: int | None = None
+    overwrite: bool = False
+    dry_run: bool = False
+    quiet: bool = False
+    verbose: bool = False
+
+
+@dataclass(frozen=True)
+class FrameOptions:
+    """What decides the row and the images of a frame: all that a worker is told.
+
+    `root` is where relative paths start, for workers elsewhere.
+    """
+
+    encoding: EncodingOptions = EncodingOptions()
+    stereo: StereoOptions = field(default_factory=StereoOptions)
+    region: RegionOptions = RegionOptions()
+    method: MethodOptions = MethodOptions()
+    images: ImageOptions = ImageOptions()
+    root: str = ""
+
+    def at(self, path: str) -> str:
+        """Where a path is for this worker."""
+        return str(Path(self.root, path)) if self.root else path

@@ -1,0 +1,89 @@
+"""The disparity of a frame: read from a map, or matched from a pair."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from numpy.typing import NDArray
+
+from rollcli.files.encodings import to_disparity
+from rollcli.files.formats import Stored, read_image, read_stored
+from rollcli.frames.options import FrameOptions
+from rollcli.imaging.stereo_options import StereoOptions
+
+if TYPE_CHECKING:
+    from rollcli.frames.frame import Frame
+    from rollcli.imaging.stereo import StereoMatch
+
+# more of the map than this at the end of the searched range: the range was too short for the scene
+_MUCH_AT_END = 0.05
+
+
+@dataclass(frozen=True)
+class Source:
+    """The disparity of a frame, and where it comes from.
+
+    Attributes
+    ----------
+    disparity : ndarray, shape (H, W)
+        Pixels; 0 is no data.
+    stored : Stored or None
+        What the map file holds; None for a pair.
+    encoding, warning : str
+        How the stored numbers were read, and why that may be wrong.
+    searched : tuple of int, or None
+        First and last disparity searched, px; pairs only.
+    doubt : str
+        Why the map itself may be wrong; empty when there is no reason.
+    note : str
+        What was done about the pair; empty when nothing.
+    """
+
+    disparity: NDArray[Any]
+    stored: Stored | None = None
+    encoding: str = ""
+    warning: str = ""
+    searched: tuple[int, int] | None = None
+    doubt: str = ""
+    note: str = ""
+
+
+def read_source(frame: "Frame", options: FrameOptions) -> Source:
+    """Read the frame's map, or match its pair.
+
+    Raises
+    ------
+    InputError
+        A file cannot be read as what it should be.
+    """
+    return _match(frame, options) if frame.right_file else _read(frame, options)
+
+
+def _read(frame: "Frame", options: FrameOptions) -> Source:
+    stored = read_stored(options.at(frame.path), frame.file)
+    given = options.encoding
+    found = to_disparity(stored, encoding=given.encoding, scale=given.scale, invalid=given.invalid)
+    return Source(found.disparity, stored, found.encoding.value, found.warning or "")
+
+
+def _match(frame: "Frame", options: FrameOptions) -> Source:
+    from rollcli.imaging.stereo import match_pair
+
+    left = read_image(options.at(frame.path), frame.file)
+    right = read_image(options.at(frame.right_path), frame.right_file)
+    match = match_pair(left, right, options.stereo)
+    searched = (match.min_disparity, match.min_disparity + match.num_disparities - 1)
+    return Source(match.disparity, searched=searched, doubt=_doubt(match), note=_note(match, options.stereo))
+
+
+def _doubt(match: "StereoMatch") -> str:
+    if match.end_fraction <= _MUCH_AT_END:
+        return ""
+    share = f"{match.end_fraction:.0%} of the map lies at the end of the searched range"
+    return f"{share}; use a larger --num-disparities"
+
+
+def _note(match: "StereoMatch", given: StereoOptions) -> str:
+    if given.vertical_offset is not None or match.vertical_offset == 0:
+        return ""
+    side = "lower" if match.vertical_offset > 0 else "higher"
+    return f"corrected: the right image lay {abs(match.vertical_offset):.2f} px {side} than the left one"

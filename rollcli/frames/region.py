@@ -1,0 +1,55 @@
+"""The pixels that a user allows: mask file, rectangle and polygon together."""
+
+from functools import lru_cache
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from rollcli.errors import InputError
+from rollcli.files.encodings import read_mask
+from rollcli.frames.options import FrameOptions, RegionOptions
+
+
+def region_mask(mask: str | None, options: FrameOptions, shape: tuple[int, ...]) -> NDArray[np.bool_] | None:
+    """Pixels inside all that is given, shape (H, W); None when nothing is given.
+
+    Raises
+    ------
+    InputError
+        The mask cannot be read or has another size, or no pixel is left.
+    """
+    region = options.region
+    if mask is None and region.roi is None and region.polygon is None:
+        return None
+    allowed = _drawn(region, shape)
+    if mask is not None:
+        usable = _mask_file(options.at(mask), mask)
+        if usable.shape != shape:
+            raise InputError(f"the mask {mask} is {_size(usable.shape)}, the map {_size(shape)}")
+        allowed = allowed & usable
+    if not allowed.any():
+        raise InputError(f"no pixel of this {_size(shape)} map lies inside the mask, --roi and --polygon")
+    return allowed
+
+
+@lru_cache(maxsize=4)  # a batch has one size of map, or a few
+def _drawn(options: RegionOptions, shape: tuple[int, ...]) -> NDArray[np.bool_]:
+    inside = np.zeros(shape, np.uint8)
+    x0, y0, x1, y1 = options.roi or (0, 0, shape[1], shape[0])
+    inside[y0:y1, x0:x1] = 1
+    if options.polygon is not None:
+        area: NDArray[Any] = np.zeros(shape, np.uint8)
+        cv2.fillPoly(area, [np.rint(options.polygon).astype(np.int32)], 1)
+        inside &= area
+    return inside.astype(np.bool_)
+
+
+@lru_cache(maxsize=1)  # one mask for all frames is read once
+def _mask_file(path: str, name: str) -> NDArray[np.bool_]:
+    return read_mask(path, name)
+
+
+def _size(shape: tuple[int, ...]) -> str:
+    return "x".join(map(str, reversed(shape)))

@@ -1,0 +1,254 @@
+"""The road is found on whole frames: rendered ones with known roll, degraded ones, real ones."""
+
+import itertools
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rollcli.errors import EstimationError, UsageError
+from rollcli.estimator.estimate import estimate_roll
+from rollcli.files.formats import read_image
+from rollcli.imaging.derotate import derotate
+from rollcli.imaging.stereo import StereoOptions, match_pair
+from rollcli.simulate.render import render_frame, true_disparity
+from rollcli.simulate.spec import FrameSpec, draw_specs
+
+STREETS = Path(__file__).parents[3].parent / "shared" / "streets"
+LIDAR_DEG = {"000151_10": (-1.02, 0.2), "000174_10": (-1.46, 0.2), "000074_10": (-0.47, 0.3)}
+
+
+def error_deg(disparity, roll, **options):
+    return abs(math.degrees(estimate_roll(disparity, **options).theta - roll))
+
+
+def status_of(disparity, **options):
+    try:
+        return estimate_roll(disparity, **options).status
+    except EstimationError:
+        return "error"
+
+
+@pytest.fixture(scope="module")
+def matched():
+    """(scene, roll, disparity by SGBM) of two rendered pairs of each kind."""
+    specs = [
+        spec
+        for kind in ("bare", "open", "street", "verge")
+        for spec in draw_specs(
+            2, scene=kind, roll=(-math.radians(15), math.radians(15)), seed=71, colour=False
+        )
+    ]
+    frames = [render_frame(spec) for spec in specs]
+    maps = [match_pair(frame.left, frame.right, StereoOptions()).disparity for frame in frames]
+    return [(spec.scene, spec.roll, disparity) for spec, disparity in zip(specs, maps, strict=True)]
+
+
+def test_whole_frames_need_no_region(matched):
+    errors = [error_deg(disparity, roll) for _, roll, disparity in matched]
+
+    assert max(errors) < 0.15
+    assert np.median(errors) < 0.03
+
+
+def test_intervals_hold_the_truth_and_are_narrow(matched):
+    estimates = [(estimate_roll(disparity), roll) for _, roll, disparity in matched]
+
+    assert all(abs(estimate.theta - roll) < 2 * estimate.ci95 for estimate, roll in estimates)
+    assert np.median([estimate.ci95 for estimate, _ in estimates]) < math.radians(0.08)
+    assert all(estimate.status == "ok" for estimate, _ in estimates)
+
+
+def test_the_answer_hardly_depends_on_the_seed(matched):
+    for _, roll, disparity in matched:
+        assert max(error_deg(disparity, roll, seed=seed) for seed in range(1, 9)) < 0.2
+
+
+def test_the_same_seed_gives_the_same_bits(matched):
+    *_, disparity = matched[0]
+
+    assert estimate_roll(disparity, seed=5) == estimate_roll(disparity.copy(), seed=5)
+
+
+@pytest.mark.parametrize("factor", [100, 1 / 256, 3.7, 1e6])
+def test_the_scale_of_the_map_does_not_matter(matched, factor):
+    for _, _, disparity in matched:
+        once, scaled = estimate_roll(disparity), estimate_roll(disparity * np.float32(factor))
+
+        assert scaled.theta == pytest.approx(once.theta, abs=math.radians(1e-3))
+        assert scaled.ci95 == pytest.approx(once.ci95, rel=0.05)
+        assert scaled.status == once.status
+
+
+def test_whole_pixels_are_enough(matched):
+    assert max(error_deg(np.rint(disparity), roll) for _, roll, disparity in matched) < 0.3
+
+
+@pytest.mark.parametrize("share", [0.3, 0.6])
+def test_noise_on_many_pixels_does_little(matched, share):
+    rng = np.random.default_rng(0)
+    for _, roll, disparity in matched:
+        noise = rng.uniform(0, disparity.max(), disparity.shape).astype(np.float32)
+        noisy = np.where(rng.random(disparity.shape) < share, noise, disparity)
+
+        assert error_deg(noisy, roll) < 0.3
+
+
+def test_a_truck_that_hides_the_lower_image_is_not_the_road(matched):
+    for _, roll, disparity in matched:
+        height, width = disparity.shape
+        hidden = disparity.copy()
+        box = (slice(height // 6, int(0.85 * height)), slice(int(0.37 * width), int(0.68 * width)))
+        foot = disparity[int(0.85 * height), box[1]]
+        hidden[box] = np.median(foot[foot > 0])
+
+        assert error_deg(hidden, roll) < 0.3
+
+
+def test_an_own_bonnet_in_the_picture_is_not_the_road(matched):
+    for _, roll, disparity in matched:
+        height, width = disparity.shape
+        hidden = disparity.copy()
+        rows, columns = np.mgrid[:height, :width]
+        bonnet = rows > height * (0.85 + 0.5 * (columns / width - 0.5) ** 2)
+        hidden[bonnet] = 1.2 * disparity.max() + 0.02 * (rows - height)[bonnet]
+
+        assert error_deg(hidden, roll) < 0.5 or status_of(hidden) != "ok"
+
+
+@pytest.mark.parametrize("roll_deg", [-80, -60, 35, 45, 75])
+def test_any_roll_within_the_bound_is_found(roll_deg):
+    spec = FrameSpec(scene="bare", roll=math.radians(roll_deg), pitch=0.05, seed=3)
+    disparity, _ = true_disparity(spec)
+
+    assert error_deg(disparity, spec.roll, max_roll=math.radians(89)) < 0.005
+
+
+def test_a_roll_beyond_the_bound_is_not_called_ok():
+    spec = FrameSpec(scene="bare", roll=math.radians(30), pitch=0.05, seed=3)
+    disparity, _ = true_disparity(spec)
+
+    assert status_of(disparity, max_roll=math.radians(20)) != "ok"
+
+
+def no_road():
+    rng = np.random.default_rng(4)
+    rows, columns = np.mgrid[:480, :640].astype(np.float32)
+    spec = FrameSpec(scene="street", roll=0.1, pitch=0.05, seed=3)
+    street = true_disparity(spec)[0].astype(np.float32)
+    patches = rng.random((30, 40)).repeat(16, 0).repeat(16, 1)
+    return {
+        "a wall": 30 + rng.normal(0, 0.2, rows.shape),
+        "a wall seen at an angle": 30 + 0.05 * (columns - 320) + rng.normal(0, 0.2, rows.shape),
+        "a ceiling": np.maximum(30 - 0.1 * rows + rng.normal(0, 0.2, rows.shape), 0),
+        "noise": rng.uniform(0, 80, rows.shape),
+        "sky": np.where(patches > 0.85, rng.uniform(0.5, 4, rows.shape), 0),
+        "blocks": 80 * patches,
+        "a depth map": np.divide(300, street, out=np.zeros_like(street), where=street > 0),
+        "a map upside down": street[::-1],
+    }
+
+
+@pytest.mark.parametrize("name", no_road())
+def test_a_frame_without_a_road_is_never_ok(name):
+    assert status_of(no_road()[name]) in ("suspect", "error")
+
+
+def test_the_mask_shows_the_road_and_little_else():
+    spec = FrameSpec(scene="street", roll=0.08, pitch=0.06, seed=8)
+    disparity, road = true_disparity(spec)
+
+    found = estimate_roll(disparity).road_mask(disparity)
+
+    assert (found & road).sum() > 0.85 * road.sum()
+    assert (found & ~road).sum() < 0.1 * road.sum()
+
+
+def test_only_pixels_of_the_mask_are_used():
+    disparity, road = true_disparity(FrameSpec(scene="verge", roll=0.1, pitch=0.05, seed=8))
+
+    estimate = estimate_roll(disparity, mask=road)
+
+    assert math.degrees(estimate.theta) == pytest.approx(math.degrees(0.1), abs=0.02)
+    assert not (estimate.road_mask(disparity) & ~road).any()
+
+
+@pytest.mark.parametrize("max_roll_deg", [0, -5, 89.5, float("nan")])
+def test_a_bound_that_cannot_be_is_refused(max_roll_deg):
+    with pytest.raises(UsageError, match="largest roll"):
+        estimate_roll(np.ones((50, 50)), max_roll=math.radians(max_roll_deg))
+
+
+def test_a_mask_of_another_size_is_refused():
+    with pytest.raises(UsageError, match="the mask is 5x4, the map 50x40"):
+        estimate_roll(np.ones((40, 50)), mask=np.ones((4, 5)))
+
+
+def test_a_mask_that_leaves_hardly_a_pixel_is_refused():
+    mask = np.zeros((60, 80))
+    mask[20:30, 20:29] = 1
+    disparity = 10 + np.arange(60.0)[:, None] + np.zeros(80)
+
+    with pytest.raises(EstimationError, match="only 90 valid pixels: at least 100 are needed"):
+        estimate_roll(disparity, mask=mask)
+
+
+@pytest.fixture(scope="module")
+def streets():
+    if not STREETS.is_dir():
+        pytest.skip("the real street pairs (../shared/streets) are not here")
+    maps = {}
+    for left in sorted((STREETS / "left").glob("*.png")):
+        pair = read_image(left), read_image(STREETS / "right" / left.name)
+        maps[left.stem] = match_pair(*pair, StereoOptions()).disparity
+    return maps
+
+
+def test_real_streets_agree_with_lidar(streets):
+    for name, (roll_deg, off) in LIDAR_DEG.items():
+        assert math.degrees(estimate_roll(streets[name]).theta) == pytest.approx(roll_deg, abs=off)
+    for name, roll_deg in (("000027_10", -2.90), ("000138_10", -0.82)):  # a road of two planes; a skewed rig
+        estimate = estimate_roll(streets[name])
+        assert estimate.status == "suspect" or abs(math.degrees(estimate.theta) - roll_deg) < 0.5
+
+
+def test_real_streets_do_not_jump_from_frame_to_frame(streets):
+    rolls = {name: math.degrees(estimate_roll(disparity).theta) for name, disparity in streets.items()}
+
+    for (name, roll), (following, another) in itertools.pairwise(rolls.items()):
+        if name[:6] == following[:6]:
+            assert abs(roll - another) < 0.5
+
+
+def test_a_real_street_that_is_rotated_moves_the_angle_as_much(streets):
+    disparity = streets["000174_10"]
+    start = estimate_roll(disparity).theta
+
+    for turn_deg in (-6, -2, 3, 8):
+        turned = derotate(disparity, -math.radians(turn_deg))
+        assert math.degrees(estimate_roll(turned).theta - start) == pytest.approx(turn_deg, abs=0.15)
+
+
+def test_the_road_is_at_most_all_of_the_map():
+    disparity, _ = true_disparity(FrameSpec(scene="bare", roll=0.2, pitch=0.05, seed=5))
+
+    assert 0.9 < estimate_roll(disparity).road_fraction <= 1
+
+
+@pytest.mark.parametrize("sentinel", [np.inf, np.finfo(np.float32).max, 1e20])
+def test_what_is_too_large_is_no_data(matched, sentinel):
+    _, _, disparity = matched[0]
+    marked = np.where(disparity > 0, disparity, np.float32(sentinel))
+
+    estimate = estimate_roll(marked)
+
+    assert estimate.theta == estimate_roll(disparity).theta
+    assert estimate.valid_fraction == pytest.approx(np.mean(disparity > 0))
+    np.testing.assert_array_equal(estimate.road_mask(marked), estimate.road_mask(disparity))
+
+
+@pytest.mark.parametrize("factor", [1e-20, 1e13])
+def test_what_cannot_be_squared_is_refused(matched, factor):
+    with pytest.raises(EstimationError, match="in pixels"):
+        estimate_roll(matched[0][2] * np.float32(factor))

@@ -1,0 +1,155 @@
+"""The exact solver: no other angle has a lower energy."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rollcli.errors import EstimationError
+from rollcli.estimator.solvers.exact import exact, minima
+from rollcli.estimator.solvers.golden_section import golden_section
+from rollcli.estimator.solvers.gradient_descent import gradient_descent
+from tests.estimator.synthetic_maps import bent_road, degrees_apart, energy_of, random_maps, repeatable
+
+STEP = math.pi / 2048
+DENSE = np.arange(2048) * STEP - math.pi / 2 + STEP
+
+
+def dense_minima(energy):
+    """All local minima of a dense scan, each refined by scans of its neighbourhood: (theta, value)."""
+    values = energy.at(DENSE).value
+    low = np.flatnonzero((values < np.roll(values, 1)) & (values <= np.roll(values, -1)))
+    found = []
+    for theta in DENSE[low]:
+        width = STEP
+        for _ in range(8):
+            near = np.linspace(theta - width, theta + width, 41)
+            theta, width = near[np.argmin(energy.at(near).value)], width / 15
+        found.append((theta, energy.at(theta).value))
+    return sorted(found, key=lambda each: each[1])
+
+
+def noise_map(seed, shape=(40, 60)):
+    return np.random.default_rng(seed).uniform(1, 9, shape)
+
+
+@repeatable
+@given(random_maps())
+def test_no_angle_of_a_dense_scan_is_lower(disparity):
+    energy = energy_of(disparity)
+    scale = energy.rest + energy.slope_energy
+    assert minima(energy)[0].energy <= energy.at(DENSE).value.min() + 1e-12 * scale
+
+
+@repeatable
+@given(st.integers(0, 9999))
+def test_on_noise_it_finds_every_minimum_of_a_dense_scan(seed):
+    energy = energy_of(noise_map(seed))
+    found, expected = minima(energy), dense_minima(energy)
+    assert len(found) == len(expected)
+    for one, (theta, value) in zip(found, expected, strict=True):
+        assert degrees_apart(one.theta, theta) < 1e-4
+        assert one.energy == pytest.approx(value, rel=1e-10)
+
+
+@repeatable
+@given(st.integers(0, 9999))
+def test_it_is_polished_to_machine_precision(seed):
+    energy = energy_of(noise_map(seed))
+    best = exact(energy).theta
+    terms = energy.at(best)
+    assert abs(terms.gradient / terms.curvature) < 1e-12
+
+
+@repeatable
+@given(st.integers(0, 9999))
+def test_of_two_equal_minima_both_are_found_and_the_lower_angle_comes_first(seed):
+    noise = noise_map(seed)
+    mirrored = noise + noise[:, ::-1]  # E(theta) = E(-theta)
+    found = minima(energy_of(mirrored))
+    best = found[0]
+    twins = [m for m in found if abs(m.theta) > 1e-6 and m.energy == pytest.approx(best.energy, rel=1e-12)]
+    if abs(best.theta) > 1e-6 and abs(abs(best.theta) - math.pi / 2) > 1e-6:
+        assert len(twins) == 2
+        assert degrees_apart(twins[0].theta, -twins[1].theta) < 1e-6
+    assert abs(best.theta) <= min([abs(m.theta) for m in twins], default=math.pi) + 1e-9
+
+
+def test_a_saddle_has_two_equal_minima():
+    v, u = np.mgrid[:60, :100] - np.array([29.5, 49.5])[:, None, None]
+    found = minima(energy_of(100 + 0.02 * u * v))
+    assert len(found) == 2
+    assert degrees_apart(found[0].theta, -found[1].theta) < 1e-9
+    assert found[0].energy == pytest.approx(found[1].energy, rel=1e-12)
+
+
+@pytest.mark.parametrize("off_deg", [0, 1e-9, -1e-9, 1e-4, -1e-4, 0.3, -0.3])
+def test_angles_about_90_degrees_are_found(off_deg):
+    disparity = bent_road(90 + off_deg, noise=0)
+    theta = exact(energy_of(disparity)).theta
+    assert -math.pi / 2 < theta <= math.pi / 2
+    assert degrees_apart(theta, math.radians(90 + off_deg)) < 1e-6
+
+
+@repeatable
+@given(st.floats(-89.9, 90), st.sampled_from([0, 0.001, 0.1]))
+def test_a_road_at_any_roll_is_found(roll_deg, noise):
+    disparity = bent_road(roll_deg, width=80, height=60, noise=noise)
+    assert degrees_apart(exact(energy_of(disparity)).theta, math.radians(roll_deg)) < 1e-6 + 2 * noise
+
+
+@repeatable
+@given(random_maps())
+def test_the_line_model_gives_the_angle_of_the_best_plane(disparity):
+    energy = energy_of(disparity, parabolic=False)
+    v, u = np.nonzero(disparity > 0)
+    design = np.stack([np.ones(len(u)), u, v], axis=1)
+    (_, c1, c2), *_ = np.linalg.lstsq(design, disparity[v, u], rcond=None)
+    theta = exact(energy).theta
+    assert degrees_apart(theta, math.atan2(-c1, c2)) < 1e-6
+    assert energy.at(theta).value <= energy.at(DENSE).value.min() * (1 + 1e-12)
+
+
+@repeatable
+@given(random_maps())
+def test_it_is_never_above_another_solver(disparity):
+    energy = energy_of(disparity)
+    best = energy.at(exact(energy).theta).value
+    slack = 1e-12 * (energy.rest + energy.slope_energy)
+    assert best <= energy.at(gradient_descent(energy).theta).value + slack
+    assert best <= energy.at(golden_section(energy).theta).value + slack
+
+
+@repeatable
+@given(random_maps())
+def test_it_agrees_with_gradient_descent_where_that_is_global(disparity):
+    energy = energy_of(disparity)
+    best, *others = minima(energy)
+    descent = gradient_descent(energy, math.radians(1e-6))
+    nearest = min([best, *others], key=lambda m: degrees_apart(m.theta, descent.theta))
+    if descent.outcome.converged and nearest is best and energy.at(descent.theta).curvature > 0:
+        assert degrees_apart(descent.theta, best.theta) < 1e-6
+
+
+@pytest.mark.parametrize("columns", [(3, 40), (3, 4), (0, 59)])
+def test_two_columns_of_pixels_give_the_angle_of_their_plane_not_the_singular_direction(columns):
+    road = bent_road(8, width=60, height=60, bend=0, noise=0.01)
+    mask = np.zeros(road.shape, bool)
+    mask[:, list(columns)] = True
+    theta = exact(energy_of(road * mask)).theta
+    assert math.degrees(theta) == pytest.approx(8, abs=2 if columns == (3, 4) else 0.1)
+
+
+@repeatable
+@given(st.integers(0, 9999), st.floats(0.3, 3), st.integers(0, 20))
+def test_pixels_in_a_narrow_strip_are_no_harder(seed, slope, offset):
+    v, u = np.mgrid[:60, :60]
+    strip = np.abs(u - slope * v - offset) < 1.5
+    try:
+        energy = energy_of(noise_map(seed, (60, 60)) * strip)
+    except EstimationError:
+        return  # too short to hold more than a line
+    scale = energy.rest + energy.slope_energy
+    assert minima(energy)[0].energy <= energy.at(DENSE).value.min() + 1e-7 * scale

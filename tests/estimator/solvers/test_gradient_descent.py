@@ -1,0 +1,80 @@
+"""Gradient descent with the paper's learning rate."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rollcli.estimator.solvers.exact import exact, minima
+from rollcli.estimator.solvers.gradient_descent import gradient_descent
+from rollcli.estimator.solvers.solution import Outcome
+from rollcli.evaluate.textbook import Textbook
+from tests.estimator.synthetic_maps import bent_road, degrees_apart, energy_of, random_maps, repeatable
+
+
+@repeatable
+@given(st.floats(-45, 45), st.sampled_from([0.01, 0.3, 1]))
+def test_it_converges_to_the_global_minimum_on_roads(roll_deg, noise):
+    energy = energy_of(bent_road(roll_deg, noise=noise))
+    found = gradient_descent(energy)
+    assert found.outcome is Outcome.CONVERGED
+    assert degrees_apart(found.theta, exact(energy).theta) < 1e-6
+
+
+@repeatable
+@given(random_maps(), st.sampled_from([1e-6, 1.0, 26.0, 1e6, "auto"]))
+def test_it_never_climbs_whatever_the_first_rate(disparity, lambda0):
+    energy = energy_of(disparity)
+    slack = 1e-12 * (energy.rest + energy.slope_energy)
+    assert energy.at(gradient_descent(energy, lambda0=lambda0).theta).value <= energy.at(0.0).value + slack
+
+
+@repeatable
+@given(random_maps())
+def test_what_has_converged_is_flat(disparity):
+    energy = energy_of(disparity)
+    found = gradient_descent(energy, math.radians(1e-6))
+    if found.outcome.converged:
+        steepest = np.abs(energy.at(np.linspace(0, math.pi, 181)).gradient).max()
+        assert abs(energy.at(found.theta).gradient) < 1e-4 * steepest
+
+
+def test_newtons_rate_reaches_a_near_minimum_in_few_steps():
+    energy = energy_of(bent_road(2, noise=0.3))
+    assert gradient_descent(energy, lambda0="auto").iterations <= 5
+
+
+def test_a_smaller_tolerance_takes_no_fewer_iterations():
+    energy = energy_of(bent_road(6, noise=0.3))
+    counts = [gradient_descent(energy, math.pi / k).iterations for k in (1.8e3, 1.8e4, 1.8e5, 1.8e6)]
+    assert counts == sorted(counts)
+
+
+def test_equal_gradients_end_it():
+    v, u = np.mgrid[:60, :60] - 29.5
+    flat_in_theta = 100 + 0.01 * (u * u + v * v)  # a bowl: every angle fits alike
+    found = gradient_descent(energy_of(flat_in_theta))
+    assert math.isfinite(found.theta)
+
+
+@pytest.mark.parametrize("roll_deg", [-6, -2, 1, 4])
+def test_it_takes_the_path_of_the_papers_equations(roll_deg):
+    disparity = bent_road(roll_deg, width=150, height=100, noise=0.5)
+    ours = gradient_descent(energy_of(disparity), 1.7e-6)
+    papers = Textbook.of(disparity).gradient_descent(1.7e-6, 26.0)
+    assert ours.iterations == papers.iterations
+    assert degrees_apart(ours.theta, papers.theta) < 1e-6
+
+
+@pytest.mark.parametrize("turn_deg", [-20, -7, 3, 12])
+def test_a_rotated_road_moves_the_estimate_by_the_rotation(turn_deg):
+    before, after = (gradient_descent(energy_of(bent_road(r, noise=0.1))) for r in (1.5, 1.5 + turn_deg))
+    assert math.degrees(after.theta - before.theta) == pytest.approx(turn_deg, abs=0.02)
+
+
+def test_started_on_a_maximum_it_stays_there():
+    energy = energy_of(bent_road(90, noise=0))
+    assert gradient_descent(energy).theta == pytest.approx(0, abs=1e-12)
+    assert degrees_apart(minima(energy)[0].theta, math.pi / 2) < 1e-6

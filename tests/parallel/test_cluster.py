@@ -1,0 +1,196 @@
+"""A real Dask scheduler and two real workers, on this machine."""
+
+import json
+import socket
+import subprocess
+import sys
+import threading
+import time
+from concurrent.futures import CancelledError, Future
+from types import SimpleNamespace
+
+import pytest
+
+from tests.run_cli import command, contents, environment, rollcli, write_maps
+
+pytest.importorskip("distributed", reason="the extra cluster is not installed")
+
+from rollcli import __version__
+from rollcli.parallel.cluster import ClusterTicket, probe
+
+FRAMES = 60
+IMAGES = ("--derotated", "upright", "--vdisparity", "v")
+
+
+LOCAL = ("--host", "127.0.0.1", "--no-dashboard")
+ONE_PROCESS = ("--nthreads", "1", "--no-nanny")
+
+
+@pytest.fixture
+def scheduler_process(tmp_path):
+    """A scheduler that has no workers yet, and its address."""
+    state = tmp_path / "scheduler.json"
+    process = dask("scheduler", tmp_path, *LOCAL, "--port", "0", "--scheduler-file", state)
+    try:
+        wait_for(lambda: state.exists() and state.read_text().endswith("}"))
+        yield process, json.loads(state.read_text())["address"]
+    finally:
+        end(process)
+
+
+@pytest.fixture
+def scheduler(scheduler_process):
+    """The address of the scheduler."""
+    return scheduler_process[1]
+
+
+@pytest.fixture
+def workers(tmp_path, scheduler):
+    """Two worker processes, each in a folder of its own."""
+    processes = []
+    try:
+        for name in ("one", "two"):
+            (tmp_path / name).mkdir()
+            processes.append(
+                dask("worker", tmp_path / name, scheduler, *LOCAL, "--nthreads", "1", "--no-nanny")
+            )
+        yield processes
+    finally:
+        for process in processes:
+            end(process)
+
+
+def end(process):
+    process.kill()
+    process.wait()
+
+
+def dask(kind, folder, *arguments):
+    """A Dask process that works in a folder of its own, as on another machine."""
+    with (folder / f"{kind}.log").open("wb") as log:
+        return subprocess.Popen(
+            [sys.executable, "-m", f"distributed.cli.dask_{kind}", *map(str, arguments)],
+            cwd=folder,
+            env=environment(),
+            stdout=log,
+            stderr=subprocess.STDOUT,
+        )
+
+
+def wait_for(condition):
+    give_up = time.monotonic() + 60
+    while not (found := condition()):
+        assert time.monotonic() < give_up
+        time.sleep(0.02)
+    return found
+
+
+def test_a_cluster_that_loses_a_worker_gives_the_bytes_of_a_local_run(tmp_path, scheduler, workers):
+    local, far = tmp_path / "local", tmp_path / "far"
+    for folder in (local, far):
+        write_maps(folder / "maps", FRAMES, width=300, height=200)
+        (folder / "maps" / "frame5.png").write_bytes(b"")
+    assert rollcli("estimate", "maps", "-o", "rolls.csv", *IMAGES, cwd=local).status == 3
+    line = command("estimate", "maps", "-o", "rolls.csv", *IMAGES, "--scheduler", scheduler)
+    run = subprocess.Popen(line, cwd=far, env=environment(), stderr=subprocess.PIPE, text=True)
+    result = far / "rolls.csv"
+    wait_for(lambda: run.poll() is not None or (result.exists() and result.read_bytes().count(b"\n") > 8))
+    workers[0].kill()
+    _, err = run.communicate(timeout=120)
+    assert run.returncode == 3, err
+    assert result.read_bytes().count(b"\n") == FRAMES + 1
+    record = "rolls.csv.run.json"  # holds the times of the inputs, which differ
+    assert differing(contents(local), contents(far)) <= {record}
+    counts = [json.loads((folder / record).read_text())["counts"] for folder in (local, far)]
+    assert counts[0] == counts[1]
+
+
+def differing(one, other):
+    return {name for name in one.keys() | other.keys() if one.get(name) != other.get(name)}
+
+
+def test_a_scheduler_that_is_lost_ends_the_run_which_goes_on_without_it(tmp_path, scheduler_process, workers):
+    process, scheduler = scheduler_process
+    write_maps(tmp_path / "maps", 100, width=300, height=200)
+    arguments = ("estimate", "maps", "-q", "-o", "rolls.csv", *IMAGES)
+    line = command(*arguments, "--scheduler", scheduler)
+    run = subprocess.Popen(line, cwd=tmp_path, env=environment(), stderr=subprocess.PIPE, text=True)
+    result = tmp_path / "rolls.csv"
+    wait_for(lambda: run.poll() is not None or (result.exists() and result.read_bytes().count(b"\n") > 8))
+    process.kill()
+    _, err = run.communicate(timeout=60)
+    assert run.returncode == 1
+    assert err.startswith(f"rollcli: {scheduler}: the connection to the scheduler is lost; ")
+    assert err.endswith(" rows are kept, continue with --resume\n")
+    assert rollcli(*arguments, "--resume", cwd=tmp_path).status == 0
+    assert result.read_bytes().count(b"\n") == 101
+    assert not list(tmp_path.rglob("*.part"))
+
+
+def test_nobody_waits_for_what_was_sent_while_the_connection_broke():
+    client = SimpleNamespace(status="closed")
+    with pytest.raises(CancelledError):
+        ClusterTicket(Future(), client).result()
+
+
+def test_a_worker_that_has_no_such_program_or_files_is_named(tmp_path):
+    there = tmp_path / "a.png"
+    there.write_bytes(b"123")
+    assert probe(__version__, {str(there): 3}, [str(tmp_path / "a.png")]) == ""
+    assert "this is 0.0" in probe("0.0", {}, [])
+    assert f"does not see {tmp_path / 'b.png'}" in probe(__version__, {str(tmp_path / "b.png"): 3}, [])
+    assert "does not see" in probe(__version__, {str(there): 4}, [])
+    assert "image folders must lie on storage" in probe(__version__, {}, [str(tmp_path / "v" / "mark")])
+
+
+def test_a_scheduler_that_does_not_answer_ends_the_run_within_15_seconds(tmp_path):
+    write_maps(tmp_path / "maps", 2)
+    start = time.monotonic()
+    done = rollcli("estimate", "maps", "-o", "rolls.csv", "--scheduler", "tcp://127.0.0.1:9", cwd=tmp_path)
+    assert time.monotonic() - start < 15
+    assert done.status == 1
+    assert "tcp://127.0.0.1:9: no Dask scheduler answers there" in done.err
+    assert done.err.count("\n") == 1
+
+
+@pytest.mark.parametrize("greeting", [b"", b"HTTP/1.1 400 Bad Request\r\nServer: x\r\n\r\n"])
+def test_a_server_that_is_no_scheduler_ends_the_run_within_15_seconds(tmp_path, greeting):
+    write_maps(tmp_path / "maps", 1)
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        answering = threading.Thread(target=greet, args=(server, greeting), daemon=True)
+        answering.start()
+        address = f"127.0.0.1:{server.getsockname()[1]}"
+        start = time.monotonic()
+        done = rollcli("estimate", "maps", "-o", "rolls.csv", "--scheduler", address, cwd=tmp_path)
+        assert time.monotonic() - start < 15
+    assert (done.status, done.err) == (1, f"rollcli: {address}: no Dask scheduler answers there\n")
+
+
+def greet(server, greeting):
+    """Say something to whoever comes, and wait until he goes."""
+    caller, _ = server.accept()
+    with caller:
+        caller.sendall(greeting)
+        while caller.recv(1000):
+            pass
+
+
+@pytest.mark.parametrize("address", ["", "node0", "http://node0:8786", "tcp://node0:x", "tls://node0:8786"])
+def test_what_is_no_address_is_refused_and_the_result_that_is_there_is_kept(tmp_path, address):
+    write_maps(tmp_path / "maps", 1)
+    rollcli("estimate", "maps", "-o", "rolls.csv", cwd=tmp_path)
+    before = contents(tmp_path)
+    arguments = ("-o", "rolls.csv", "--overwrite", "--scheduler", address)
+    done = rollcli("estimate", "maps", *arguments, cwd=tmp_path)
+    assert done.status == 2
+    assert done.err.startswith(f"rollcli: --scheduler {address!r}: ")
+    assert done.err.endswith("; an address looks like tcp://host:8786\n")
+    assert contents(tmp_path) == before
+
+
+def test_a_scheduler_without_workers_ends_the_run(tmp_path, scheduler):
+    write_maps(tmp_path / "maps", 2)
+    done = rollcli("estimate", "maps", "-o", "rolls.csv", "--scheduler", scheduler, cwd=tmp_path)
+    assert done.status == 1
+    assert f"{scheduler}: has no workers" in done.err
+    assert rollcli("estimate", "maps", "-o", "rolls.csv", cwd=tmp_path).status == 0
