@@ -15,7 +15,7 @@ help:
 	@echo "make lint    ruff: style and format"
 	@echo "make types   mypy, strict"
 	@echo "make format  let ruff rewrite the code"
-	@echo "make readme  list the commands' options in the README"
+	@echo "make readme  write the tables of options in rollcli/cli/README.md"
 	@echo "make bench   run every benchmark of tests/benchmarks"
 	@echo "make fuzz    throw broken files at the readers for a while"
 	@echo "make clean   remove all that make made"

@@ -1,4 +1,4 @@
-"""Make the README's tables of commands and options anew, from the commands: python -m tests.readme_tables"""
+"""Write the tables of commands and options in rollcli/cli/README.md: python -m tests.readme_tables"""
 
 import re
 from collections.abc import Iterator
@@ -10,14 +10,14 @@ from rollcli.cli.command import OTHER
 from rollcli.cli.main import COMMANDS, main
 from rollcli.files.atomic import write_atomic
 
-README = Path(__file__).resolve().parent.parent / "README.md"
+OPTIONS_PAGE = Path(__file__).resolve().parent.parent / "rollcli" / "cli" / "README.md"
 BEGIN, END = "<!-- made by make readme -->\n", "<!-- end of what make readme makes -->"
 _DEFAULT = re.compile(r"\s*\[(?:default: )?([^\]]*(?:\[[^\]]*\])?[^\]]*)\]$")
 
 
-def with_tables(readme: str) -> str:
-    """The README with its tables as the commands have them."""
-    before, _, rest = readme.partition(BEGIN)
+def with_tables(page: str) -> str:
+    """Return the page with its tables as the commands have them."""
+    before, _, rest = page.partition(BEGIN)
     _, end, after = rest.partition(END)
     return f"{before}{BEGIN}\n{tables()}\n{end}{after}"
 
@@ -82,4 +82,4 @@ def _first_sentence(command: click.Command) -> str:
 
 
 if __name__ == "__main__":
-    write_atomic(README, with_tables(README.read_text("utf-8")).encode())
+    write_atomic(OPTIONS_PAGE, with_tables(OPTIONS_PAGE.read_text("utf-8")).encode())

@@ -1,4 +1,4 @@
-"""What the README says is so."""
+"""What the README and the pages it leads to say is so."""
 
 import math
 import re
@@ -12,29 +12,38 @@ import pytest
 
 from rollcli import estimate_roll, read_disparity
 from tests.readme_picture import MAP, PICTURE, picture
-from tests.readme_tables import with_tables
+from tests.readme_tables import OPTIONS_PAGE, with_tables
 from tests.run_cli import ROOT, environment, rollcli
 
 README = (ROOT / "README.md").read_text("utf-8")
+PAGES = [
+    ROOT / "README.md",
+    *sorted((ROOT / ".github").glob("*.md")),
+    *sorted((ROOT / "rollcli").rglob("README.md")),
+]
 needs_make = pytest.mark.skipif(shutil.which("make") is None, reason="make is not installed")
 
 
-def test_its_tables_of_options_are_those_of_the_commands():
-    assert with_tables(README) == README, "run: make readme"
+def test_the_tables_of_options_are_those_of_the_commands():
+    page = OPTIONS_PAGE.read_text("utf-8")
+    assert with_tables(page) == page, "run: make readme"
 
 
-def test_its_links_and_pictures_lead_somewhere():
+def test_it_is_short_enough_to_read():
+    assert len(README.split()) <= 2500
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_links_and_pictures_lead_somewhere(page):
+    text = page.read_text("utf-8")
     headings = {
-        re.sub(r"[^\w -]", "", each.lower()).replace(" ", "-")
-        for each in re.findall(r"^#+ (.*)", README, re.M)
+        re.sub(r"[^\w -]", "", each.lower()).replace(" ", "-") for each in re.findall(r"^#+ (.*)", text, re.M)
     }
-    targets = re.findall(r"\]\(([^)]+)\)", README)
-    assert targets
-    for target in targets:
+    for target in re.findall(r"\]\(([^)]+)\)", text):
         if target.startswith("#"):
             assert target[1:] in headings, target
         elif not target.startswith("https://"):
-            assert (ROOT / target).is_file(), target
+            assert (page.parent / target).is_file(), target
 
 
 def test_its_picture_and_the_angle_below_it_are_those_of_a_run():
@@ -49,7 +58,8 @@ def test_its_picture_and_the_angle_below_it_are_those_of_a_run():
 
 
 def test_every_command_it_shows_exists():
-    shown = set(re.findall(r"^\s*rollcli ([a-z]+)", README, flags=re.M))
+    blocks = "".join(re.findall(r"```(?:sh|make)\n(.*?)```", README, flags=re.S))
+    shown = set(re.findall(r"^\s*rollcli ([a-z]+)", blocks, flags=re.M))
     assert shown >= {"estimate", "report", "derotate", "vdisparity", "disparity", "simulate", "evaluate"}
     listed = rollcli("--help", cwd=ROOT).out
     assert [name for name in shown if f"\n  {name} " not in listed] == []
@@ -144,7 +154,7 @@ def test_its_makefile_leaves_out_the_map_of_a_pair_that_is_gone(pairs):
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_completion_is_there_for_each_shell_it_names(tmp_path, shell):
-    assert f"_ROLLCLI_COMPLETE={shell}_source rollcli" in README
+    assert f"_ROLLCLI_COMPLETE={shell}_source rollcli" in OPTIONS_PAGE.read_text("utf-8")
     if shell == "bash" and shutil.which("bash") is None:
         pytest.skip("bash, which is asked for its version, is not installed")
     script = rollcli(cwd=tmp_path, _ROLLCLI_COMPLETE=f"{shell}_source")
