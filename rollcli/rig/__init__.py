@@ -1,0 +1,1 @@
+"""What frames say about the rig: its calibration, and its pose over the road."""

@@ -1,0 +1,119 @@
+"""The calibration of a rectified stereo pair, as the pose needs it.
+
+Nothing heavy is imported here, since every frame carries a calibration to its worker.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+from rollcli.errors import UsageError
+
+_ROUNDED = 1.0  # px: the size of a scaled image is rounded to whole pixels
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """The intrinsics of the rectified left view, and what relates it to the right one.
+
+    Attributes
+    ----------
+    fx, fy : float
+        Focal lengths, px; more than 0.
+    cx, cy : float
+        Principal point, px from the centre of the top-left pixel.
+    baseline : float or None
+        Distance between the cameras, metres; None: the pose has a pitch and no height.
+    doffs : float
+        Column of the right view's principal point less that of the left one's, px:
+        depth = fx baseline / (disparity + doffs).
+    width, height : int or None
+        Size of the image that the numbers are for, px; None where it is not stated.
+    source : str
+        Where the numbers are from, for messages.
+    notes : tuple of str
+        What a user should know about how the file was read.
+
+    Raises
+    ------
+    UsageError
+        When the numbers cannot be those of a rig.
+    """
+
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    baseline: float | None = None
+    doffs: float = 0.0
+    width: int | None = None
+    height: int | None = None
+    source: str = "calibration"
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name, value in (("fx", self.fx), ("fy", self.fy)):
+            if not 0 < value < math.inf:
+                raise UsageError(f"{self.source}: a focal length {name} of {value:g} px: give a positive one")
+        for name, value in (("cx", self.cx), ("cy", self.cy), ("doffs", self.doffs)):
+            if not math.isfinite(value):
+                raise UsageError(f"{self.source}: {name} is {value:g} px: give a finite number")
+        if self.baseline is not None and not 0 < self.baseline < math.inf:
+            raise UsageError(f"{self.source}: a baseline of {self.baseline:g} m: give a positive one")
+        if self.width is not None and self.height is not None:
+            if not (self.width > 0 and self.height > 0):
+                raise UsageError(f"{self.source}: an image of {self.width}x{self.height} px has no pixels")
+            self.require_inside(self.width, self.height)
+
+    def require_inside(self, width: int, height: int) -> None:
+        """Refuse an image of this size that does not hold the principal point.
+
+        Raises
+        ------
+        UsageError
+        """
+        if not (0 < self.cx < width and 0 < self.cy < height):
+            raise UsageError(
+                f"{self.source}: the principal point {self.cx:g},{self.cy:g} lies outside of the "
+                f"{width}x{height} image: give the calibration of this size"
+            )
+
+    def for_size(self, width: int, height: int) -> "Calibration":
+        """Return the calibration of the same view at another size.
+
+        Parameters
+        ----------
+        width, height : int
+            Size of the image, px: that of the calibration times one factor, rounded to whole pixels.
+
+        Returns
+        -------
+        Calibration
+            For a calibration without a size, the same numbers with this size.
+
+        Raises
+        ------
+        UsageError
+            The sizes differ by more than one factor, as after a crop, or the principal point lies outside.
+        """
+        if self.width is None or self.height is None:
+            self.require_inside(width, height)
+            return replace(self, width=width, height=height)
+        if (width, height) == (self.width, self.height):
+            return self
+        across, down = width / self.width, height / self.height
+        # each side may be rounded: then the factors differ, by less than one pixel of the image
+        if abs(across - down) * min(self.width, self.height) > _ROUNDED:
+            raise UsageError(
+                f"{self.source}: the calibration is for {self.width}x{self.height} px, the map has "
+                f"{width}x{height}: give the calibration of this size; only a scaled image is allowed for"
+            )
+        return replace(
+            self,
+            fx=self.fx * across,
+            fy=self.fy * down,
+            cx=(self.cx + 0.5) * across - 0.5,
+            cy=(self.cy + 0.5) * down - 0.5,
+            doffs=self.doffs * across,
+            width=width,
+            height=height,
+        )

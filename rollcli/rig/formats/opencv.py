@@ -1,0 +1,139 @@
+"""OpenCV's FileStorage (YAML, XML, JSON): what stereoRectify gives, R1 R2 P1 P2 Q in one file.
+
+https://docs.opencv.org/4.x/d9/d0c/group__calib3d.html: P1 and P2 are the rectified projections,
+Q = [1 0 0 -cx; 0 1 0 -cy; 0 0 0 f; 0 0 -1/Tx (cx - cx')/Tx]. Their length is in squares of the chessboard as
+the user measured them, which the file does not say. The files are read here instead of by cv2.FileStorage,
+whose parser is not made for files of strangers and prints what it dislikes.
+"""
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from xml.etree.ElementTree import ParseError, XMLParser
+
+from rollcli.errors import InputError
+from rollcli.rig.formats.fields import Fields, File, Projection, numbers, pair_of, swapped
+from rollcli.rig.plain_yaml import Value, parse_yaml
+
+_KEYS = re.compile(r"""(?:^|[\s<{,"])(?:P1|P2|Q|M1)(?:"?\s*:|[\s>])""")
+_MARKS = ("%YAML:1.0", "%YAML 1.0", "<opencv_storage>", "opencv-matrix")
+_METRES = (0.005, 5.0)  # no rig on a vehicle is smaller or larger: another number has another unit
+_SAME = 1e-3  # relative: P2 and Q are of one rig
+_MAX_DEPTH = 16
+
+
+def is_opencv(text: str) -> bool:
+    """Tell whether a text is a FileStorage with the matrices of a stereo rig."""
+    return any(mark in text for mark in _MARKS) and _KEYS.search(text) is not None
+
+
+def read_opencv(file: File) -> Fields:
+    """Read P1 and P2, or Q."""
+    matrices = _matrices(file)
+    if "P1" in matrices and "P2" in matrices:
+        found = _of_projections(file, matrices)
+    elif "Q" in matrices:
+        found = _of_q(file, matrices["Q"])
+    else:
+        raise InputError(
+            f"{file.name}: has no P1 and P2, and no Q: give the file with stereoRectify's results "
+            "(often extrinsics.yml); camera matrices alone are those of the raw images"
+        )
+    if "P1" in matrices and "Q" in matrices:
+        other = _of_q(file, matrices["Q"])
+        for name, one, two in (("focal length", found[0], other[0]), ("baseline", found[4], other[4])):
+            if abs(one - two) > _SAME * abs(one):
+                raise InputError(
+                    f"{file.name}: is contradictory: the {name} is {one:g} in P2 and {two:g} in Q"
+                )
+    return _with_unit(file, found)
+
+
+def _with_unit(file: File, found: tuple[float, float, float, float, float, float]) -> Fields:
+    """Take the length for metres where it can be metres."""
+    fx, fy, cx, cy, length, doffs = found
+    if length < 0:
+        raise swapped(file.name)
+    low, high = _METRES
+    if not low <= length <= high:
+        lacks = (
+            f"has a baseline of {length:g} in the unit of its chessboard's squares, which cannot be metres"
+        )
+        return Fields("OpenCV", fx, fy, cx, cy, None, doffs, lacks=lacks)
+    note = f"{file.name}: its baseline, {length:g}, is taken for metres; OpenCV's files do not say the unit"
+    return Fields("OpenCV", fx, fy, cx, cy, length, doffs, notes=(note,))
+
+
+def _of_projections(
+    file: File, matrices: Mapping[str, list[float]]
+) -> tuple[float, float, float, float, float, float]:
+    left, right = (Projection.of(matrices[key], f"{file.name}: {key}") for key in ("P1", "P2"))
+    baseline, doffs = pair_of(left, right, file.name)
+    return left.fx, left.fy, left.cx, left.cy, baseline, doffs
+
+
+def _of_q(file: File, q: Sequence[float]) -> tuple[float, float, float, float, float, float]:
+    if len(q) != 16 or q[14] == 0:
+        raise InputError(f"{file.name}: its Q is no matrix of a horizontal rig")
+    return q[11], q[11], -q[3], -q[7], 1 / abs(q[14]), q[15] / q[14]
+
+
+def _matrices(file: File) -> dict[str, list[float]]:
+    start = file.text.lstrip()[:1]
+    if start == "<":
+        values = _xml_values(file)
+    elif start == "{":
+        values = json_values(file)
+    else:
+        values = parse_yaml(file.text, file.name)
+    found = {}
+    for key in ("P1", "P2", "Q"):
+        value = values.get(key)
+        if isinstance(value, dict) and "data" in value:
+            found[key] = numbers(value["data"], f"{file.name}: {key}")
+    return found
+
+
+def json_values(file: File) -> dict[str, Value]:
+    """Return the values of a JSON object, numbers as text."""
+    try:
+        # as text: Python reads numbers of thousands of digits slowly, or refuses them
+        values = json.loads(file.text, parse_int=str, parse_float=str, parse_constant=str)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{file.name}: is not whole JSON: {error}") from error
+    if not isinstance(values, dict):
+        raise InputError(f"{file.name}: is no JSON object")
+    return values
+
+
+class _Target:
+    """Collects the <data> of the matrices directly below <opencv_storage>."""
+
+    def __init__(self) -> None:
+        self.path: list[str] = []
+        self.parts: dict[str, list[str]] = {}
+
+    def start(self, tag: str, attributes: Mapping[str, str]) -> None:
+        self.path.append(tag)
+        if len(self.path) > _MAX_DEPTH:
+            raise ParseError("nests deeper than a calibration does")
+
+    def end(self, tag: str) -> None:
+        self.path.pop()
+
+    def data(self, text: str) -> None:
+        if len(self.path) == 3 and self.path[2] == "data":
+            self.parts.setdefault(self.path[1], []).append(text)
+
+
+def _xml_values(file: File) -> dict[str, Value]:
+    if "<!DOCTYPE" in file.text or "<!ENTITY" in file.text:
+        raise InputError(f"{file.name}: declares XML entities, which calibration files have no use for")
+    target = _Target()
+    parser = XMLParser(target=target)
+    try:
+        parser.feed(file.text)
+        parser.close()
+    except ParseError as error:
+        raise InputError(f"{file.name}: is not whole XML: {error}") from error
+    return {key: {"data": list("".join(parts).split())} for key, parts in target.parts.items()}

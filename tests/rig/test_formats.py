@@ -1,0 +1,293 @@
+"""Calibration files of every format, real and hostile."""
+
+import json
+import math
+import tracemalloc
+
+import cv2
+import numpy as np
+import pytest
+
+from rollcli.errors import InputError, RollcliError, UsageError
+from rollcli.rig.calibration import Calibration
+from rollcli.rig.options import CalibrationOptions
+from rollcli.rig.parse import parse_calibration
+from rollcli.rig.plain_yaml import parse_yaml
+from tests.rig import calibration_files as samples
+from tests.rig.calibration_files import Rig
+
+RIG = Rig()
+SKEWED = Rig(
+    fx=2262.52, fy=2265.3017905988554, cx=1096.98, cy=513.137, baseline=0.209313, width=2048, height=1024
+)
+OFFSET = Rig(doffs=31.25)
+
+
+def parse(*texts, **options):
+    files = [(f"calib{number}", text.encode()) for number, text in enumerate(texts)]
+    return parse_calibration(files, CalibrationOptions(**options))
+
+
+def numbers(calibration):
+    return [getattr(calibration, name) for name in ("fx", "fy", "cx", "cy", "baseline", "doffs")]
+
+
+def truth(rig):
+    return [rig.fx, rig.fy, rig.cx, rig.cy, rig.baseline, rig.doffs]
+
+
+def refusal(*texts, **options):
+    with pytest.raises(RollcliError) as caught:
+        parse(*texts, **options)
+    message = str(caught.value)
+    assert "\n" not in message
+    return message
+
+
+@pytest.mark.parametrize("form", samples.WHOLE)
+@pytest.mark.parametrize("rig", [RIG, SKEWED, OFFSET], ids=["square", "not-square", "doffs"])
+def test_one_rig_written_in_every_format_is_one_calibration(form, rig):
+    if rig.fx != rig.fy and form == "opencv-yaml":
+        pytest.skip("Q has one focal length: a FileStorage of stereoRectify cannot hold two")
+    found = parse(samples.WHOLE[form](rig))
+    doffs = 0.0 if form in samples.WITHOUT_DOFFS else rig.doffs
+    assert numbers(found) == pytest.approx([*truth(rig)[:5], doffs], rel=1e-12, abs=1e-9)
+    size = (rig.width, rig.height) if form in samples.WITH_SIZE else (None, None)
+    assert (found.width, found.height) == size
+
+
+@pytest.mark.parametrize("positive", [False, True])
+def test_a_pair_of_ros_files_is_the_same_rig_whatever_the_sign_of_tx(positive):
+    found = parse(samples.ros(OFFSET, right=False), samples.ros(OFFSET, right=True, positive=positive))
+    assert numbers(found) == pytest.approx(truth(OFFSET), rel=1e-12)
+    assert (found.width, found.height) == (RIG.width, RIG.height)
+    assert len(found.notes) == positive
+
+
+@pytest.mark.parametrize("ending", ["yml", "xml", "json"])
+def test_what_opencv_itself_writes_is_read(tmp_path, ending):
+    path = tmp_path / f"extrinsics.{ending}"
+    turn = np.eye(3)
+    shift = np.array([[-RIG.baseline], [0.001], [-0.002]])
+    camera = np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]])
+    none = np.zeros(5)
+    *_, p1, p2, q, _, _ = cv2.stereoRectify(camera, none, camera, none, (640, 480), turn, shift)
+    storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
+    for name, matrix in (("R", turn), ("T", shift), ("P1", p1), ("P2", p2), ("Q", q)):
+        storage.write(name, matrix)
+    storage.release()
+    found = parse(path.read_text())
+    # the rectified rows run along the baseline, whose length rectification keeps
+    expected = [p1[0, 0], p1[1, 1], p1[0, 2], p1[1, 2], np.linalg.norm(shift), p2[0, 2] - p1[0, 2]]
+    assert numbers(found) == pytest.approx(expected, rel=1e-9, abs=1e-9)
+    assert "taken for metres" in found.notes[0]
+
+
+def test_kittis_baseline_is_that_of_the_inverse_of_k():
+    found = parse(samples.KITTI_OBJECT)
+    projections = [
+        np.array(line.split()[1:], float).reshape(3, 4) for line in samples.KITTI_OBJECT.splitlines()
+    ]
+    left, right = (np.linalg.solve(p[:, :3], p[:, 3]) for p in projections)
+    assert found.baseline == pytest.approx(left[0] - right[0], rel=1e-12)
+    assert found.baseline == pytest.approx(0.53574, abs=1e-5)
+    assert parse(samples.KITTI_RAW).baseline == pytest.approx(0.53715, abs=1e-5)
+
+
+def test_a_file_of_four_kitti_cameras_gives_the_grey_pair_and_names_the_colour_pair():
+    found = parse(samples.kitti_benchmark(RIG) + samples.KITTI_OBJECT)
+    assert found.baseline == pytest.approx(RIG.baseline)
+    assert "--baseline 0.53574" in found.notes[0]
+
+
+def test_real_samples_give_their_documented_numbers():
+    middlebury = parse(samples.MIDDLEBURY)
+    assert numbers(middlebury) == pytest.approx([3997.684, 3997.684, 1176.728, 1011.728, 0.193001, 131.111])
+    ros = parse(samples.ROS_LEFT, samples.ROS_RIGHT)
+    assert ros.baseline == pytest.approx(0.11983, abs=1e-5)
+    assert "positive" in ros.notes[0]
+
+
+def test_a_length_that_cannot_be_metres_is_refused_until_a_baseline_is_given():
+    message = refusal(samples.OPENCV)
+    assert "7.875" in message
+    assert "--baseline" in message
+    assert parse(samples.OPENCV, baseline=0.5).baseline == 0.5
+
+
+@pytest.mark.parametrize("text", [samples.KALIBR, samples.zed(RIG)], ids=["kalibr", "zed"])
+def test_files_of_raw_images_give_the_baseline_alone_and_say_what_to_add(text):
+    message = refusal(text)
+    assert "--focal" in message
+    assert "--principal-point" in message
+    assert "--baseline" not in message
+    found = parse(text, focal=700.0, principal_point=(600.0, 180.0))
+    expected = RIG.baseline if text.startswith("[") else math.hypot(0.1125119, 0.0017042, 0.0005072)
+    assert found.baseline == pytest.approx(expected, rel=1e-9)
+
+
+def test_numbers_of_the_user_win_over_the_file():
+    found = parse(
+        samples.kitti_raw(RIG), focal=700.0, principal_point=(600.0, 180.0), baseline=0.5, doffs=2.0
+    )
+    assert numbers(found) == [700.0, 700.0, 600.0, 180.0, 0.5, 2.0]
+    assert found.source == "calib0, --focal, --principal-point, --baseline, --doffs"
+
+
+def test_focal_length_and_principal_point_alone_are_a_calibration_without_a_baseline():
+    found = parse(focal=700.0, principal_point=(600.0, 180.0))
+    assert found.baseline is None
+    assert "--principal-point" in refusal(focal=700.0)
+    assert "--focal" in refusal(baseline=0.5)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "no calibration of a known format"),
+        ("just text\n", "no calibration of a known format"),
+        (samples.KITTI_RAW[:-60], "12"),
+        (samples.KITTI_RAW.replace("-3.875744e+02", "nan"), "finite"),
+        (samples.KITTI_RAW.replace("-3.875744e+02", "9" * 5000), "finite"),
+        (samples.KITTI_RAW.replace("-3.875744e+02", "3.875744e+02"), "swapped"),
+        (samples.KITTI_RAW.replace("-3.875744e+02", "0"), "no distance"),
+        (samples.KITTI_RAW.replace("P_rect_01: 7.215377e+02", "P_rect_01: 8.215377e+02"), "contradictory"),
+        (samples.KITTI_RAW.replace("P_rect_01", "P_rect_00"), "contradictory"),
+        (samples.KITTI_RAW.replace("6.095593e+02", "1.300000e+03"), "principal point"),
+        (samples.KITTI_RAW.splitlines()[1], "only P_rect_00"),
+        (samples.MIDDLEBURY.replace("baseline=193.001", ""), "--baseline"),
+        (samples.MIDDLEBURY.replace("baseline=193.001", "baseline=-193"), "positive"),
+        (samples.MIDDLEBURY.replace("doffs=131.111", "doffs=12"), "contradictory"),
+        (samples.MIDDLEBURY[:30], "cut off"),
+        (samples.MIDDLEBURY.replace("cam0=[3997.684", "cam0=[-3997.684").replace("cam1", "cam2"), "positive"),
+        (samples.OPENCV[:-30], "cut off"),
+        (samples.OPENCV.replace("0.12697712", "0.5"), "contradictory"),
+        (samples.OPENCV.replace("P1", "M1").replace("P2", "M2").replace("Q", "D"), "stereoRectify"),
+        (samples.ROS_RIGHT, "one view of a pair"),
+        (samples.ROS_LEFT, "--calib RIGHT"),
+        (samples.cityscapes(RIG)[:-5], "not whole JSON"),
+        (samples.cityscapes(RIG).replace("fx", "gx"), "has no fx"),
+        (samples.cityscapes(RIG).replace("0.5372", "NaN"), "finite"),
+        (samples.orb_slam(RIG).replace("Camera.cx", "Camera.xx"), "has no Camera.cx"),
+        (samples.orb_slam(RIG).replace("707.0912\nCamera.fy", "-707.0912\nCamera.fy"), "positive"),
+        (samples.KALIBR[:-60], "cut off"),
+    ],
+)
+def test_a_bad_file_is_refused_in_one_line_that_names_it(text, words):
+    message = refusal(text)
+    assert words in message
+    assert "calib0" in message
+
+
+def test_a_vertical_rig_is_refused():
+    lower = "P0: 500 0 320 0 0 500 240 0 0 0 1 0\nP1: 500 0 320 0 0 500 240 -100 0 0 1 0\n"
+    assert "vertical" in refusal(lower)
+
+
+def test_two_files_are_one_calibration_for_ros_only():
+    assert "only a pair of ROS" in refusal(samples.KITTI_RAW, samples.KITTI_RAW)
+    assert "wrong order" in refusal(samples.ROS_RIGHT, samples.ROS_LEFT)
+
+
+def test_bytes_that_are_no_text_and_large_files_are_refused():
+    with pytest.raises(InputError, match="not text"):
+        parse_calibration([("c", b"P0: \xff\xfe\x00")])
+    with pytest.raises(InputError, match="larger"):
+        parse_calibration([("c", b" " * (1 << 20 | 1))])
+
+
+ROS_HEAD = "projection_matrix:\n"
+HOSTILE = {
+    "anchors without end": ROS_HEAD
+    + "  a: &a [x, x]\n"
+    + "".join(f"  b{n}: &b{n} [*a, *a]\n" for n in range(99)),
+    "an object": ROS_HEAD + "  data: !!python/object/apply:os.system ['echo ran > ran']\n",
+    "an object in brackets": ROS_HEAD + "  data: [!!python/object/apply:os.system ['echo ran > ran']]\n",
+    "brackets": ROS_HEAD + "  data: " + "[" * 100_000 + "]" * 100_000 + "\n",
+    "braces": ROS_HEAD + "  data: " + "{a: " * 100_000 + "}" * 100_000 + "\n",
+    "dashes": ROS_HEAD + "- " * 100_000 + "1\n",
+    "indents": ROS_HEAD + "".join(" " * n + "a:\n" for n in range(1, 1400)),
+    "an open bracket": ROS_HEAD + "  data: [1, 2\n" * 20_000,
+    "spaces": ROS_HEAD + "  data" + " " * 900_000 + "x\n",
+    "spaces in brackets": ROS_HEAD + "  data: [1" + " " * 900_000 + ", 2]\n",
+    "digits": ROS_HEAD + "  data: [" + "7" * 5000 + "]\n",
+    "quotes": ROS_HEAD + "  data: ['" + '"' * 100_000 + "\n",
+    "deep JSON": '{"intrinsic": {"u0": ' + "[" * 100_000 + "]" * 100_000 + "}}",
+    "JSON digits": '{"intrinsic": {"fx": ' + "7" * 5000 + ', "u0": 1}}',
+    "deep XML": "<opencv_storage><P1 >" + "<a>" * 100_000,
+    "XML entities": '<!DOCTYPE a [<!ENTITY b "bbbb"><!ENTITY c "&b;&b;">]>'
+    "<opencv_storage><P1 >&c;</P1></opencv_storage>",
+}
+
+
+@pytest.mark.parametrize("what", HOSTILE)
+def test_a_hostile_file_is_refused_without_running_code_or_filling_memory(what, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    tracemalloc.start()
+    refusal(HOSTILE[what])
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 64 << 20
+    assert not list(tmp_path.iterdir())
+
+
+def test_plain_yaml_is_read_as_a_library_reads_it():
+    yaml = pytest.importorskip("yaml", reason="PyYAML, the oracle here, is not installed")
+
+    def as_text(value):
+        if isinstance(value, dict):
+            return {str(key): as_text(each) for key, each in value.items()}
+        return [as_text(each) for each in value] if isinstance(value, list) else str(value)
+
+    nested = "a:\n- - x\n  - y\n- b: {c: [u, v], d: w}\n  e: f\n"
+    nested += "'q': \"r\"\nlong: [one,\n  two,  # and so on\n  three]\n"
+    for text in (samples.ros(RIG, right=True), samples.KALIBR, nested):
+        oracle = yaml.load(text, Loader=yaml.BaseLoader)
+        assert parse_yaml(text, "f") == as_text(oracle)
+    assert parse_yaml(json.dumps({"a": ["b", {"c": "d"}]}).replace("{", "", 1)[:-1], "f") == {
+        "a": ["b", {"c": "d"}]
+    }
+
+
+def test_a_calibration_cannot_be_made_of_impossible_numbers():
+    good = {"fx": 700.0, "fy": 700.0, "cx": 320.0, "cy": 240.0, "baseline": 0.5, "width": 640, "height": 480}
+    for name, value in (
+        ("fx", 0.0),
+        ("fy", -1.0),
+        ("fx", math.nan),
+        ("cx", math.inf),
+        ("cy", 480.0),
+        ("baseline", -0.5),
+        ("baseline", 0.0),
+        ("doffs", math.nan),
+        ("width", 0),
+    ):
+        with pytest.raises(UsageError):
+            Calibration(**{**good, name: value})
+
+
+SIZED = Calibration(700.0, 705.0, 320.0, 200.0, 0.5, 12.0, 640, 480, "calib.txt")
+
+
+@pytest.mark.parametrize(("width", "height"), [(320, 240), (1280, 960), (213, 160), (641, 481)])
+def test_a_scaled_image_has_the_calibration_of_rays_through_its_own_pixels(width, height):
+    scaled = SIZED.for_size(width, height)
+    across, down = width / 640, height / 480
+    for x, y in ((0.3, -0.2), (-0.1, 0.25)):
+        # a pixel's centre lies half a pixel from its corner, and corners scale about the image's corner
+        u, v = (SIZED.fx * x + SIZED.cx + 0.5) * across - 0.5, (SIZED.fy * y + SIZED.cy + 0.5) * down - 0.5
+        assert (scaled.fx * x + scaled.cx, scaled.fy * y + scaled.cy) == pytest.approx((u, v), rel=1e-12)
+    assert scaled.doffs == pytest.approx(12.0 * across)
+    assert scaled.baseline == 0.5
+
+
+def test_a_cropped_image_is_refused_by_naming_both_sizes():
+    with pytest.raises(UsageError, match=r"640x480.*600x480"):
+        SIZED.for_size(600, 480)
+
+
+def test_a_calibration_without_a_size_is_refused_where_its_centre_lies_outside_of_the_image():
+    unsized = Calibration(700.0, 700.0, 320.0, 200.0, source="calib.txt")
+    assert unsized.for_size(640, 480).width == 640
+    with pytest.raises(UsageError, match="320,200 lies outside of the 300x480"):
+        unsized.for_size(300, 480)
