@@ -10,6 +10,7 @@ from rollcli.batch.plan import Plan, make_plan
 from rollcli.batch.result_file import ResultFile, RowSink, check_result, kept_rows, open_sink
 from rollcli.batch.run_record import RunRecord, check_resumable, not_resumable
 from rollcli.errors import ClusterError, InputError, OutputError, WorkerError
+from rollcli.files.atomic import remove_leftovers
 from rollcli.files.results import Row, parse_rows, read_run, run_path
 from rollcli.files.stream import STDOUT
 from rollcli.frames.dry_run import list_files
@@ -83,6 +84,7 @@ def _take_up(
         report.keep(rows)
     if options.result.resume or options.running.overwrite:
         remove_image_leftovers(plan.frames[len(rows) :], options.images)
+    remove_leftovers([run_path(plan.output)])
     # in this order a run that is killed in between can be resumed: an empty file is taken for a new one
     sink.empty(keep=bool(rows))
     record.write({})

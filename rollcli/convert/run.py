@@ -4,11 +4,12 @@ import contextlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from rollcli.files.atomic import remove_leftovers
 from rollcli.frames.checks import check_one_owner, check_writes
 from rollcli.frames.dry_run import list_files
 from rollcli.frames.frame import Frame, Outcome, failed
 from rollcli.frames.options import EncodingOptions, RunningOptions
-from rollcli.frames.outputs import remove_leftovers, remove_outputs
+from rollcli.frames.outputs import remove_outputs
 from rollcli.frames.progress import INTERRUPTED, Report
 from rollcli.parallel.in_order import Work
 from rollcli.parallel.interrupt import stop_on_signals
@@ -95,4 +96,5 @@ def _check(conversions: Sequence[Conversion], *, overwrite: bool) -> None:
 
 def _lost(conversion: Conversion, reason: str) -> Outcome:
     remove_outputs(conversion.writes)
+    remove_leftovers(conversion.writes)
     return failed(conversion.frame, reason)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from rollcli.errors import UsageError
 from rollcli.evaluate.options import PaperOptions
 from rollcli.evaluate.truth import read_truth
-from rollcli.files.atomic import write_atomic
+from rollcli.files.atomic import remove_leftovers, write_atomic
 from rollcli.files.matching import stem_of
 from rollcli.frames.checks import check_writes
 from rollcli.frames.dry_run import list_files
@@ -126,6 +126,7 @@ def _write(
     tables = all_tables(found, failed, times)
     folder = Path(options.experiments.output)
     page = paper_page(tables, found, failed, times, options)
-    for name in TABLES:
-        write_atomic(folder / f"{name}.csv", tables[name].csv())
-    write_atomic(folder / PAGE, page)
+    written = {folder / f"{name}.csv": tables[name].csv() for name in TABLES} | {folder / PAGE: page}
+    remove_leftovers(written)
+    for path, data in written.items():
+        write_atomic(path, data)

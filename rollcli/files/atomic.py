@@ -1,16 +1,25 @@
-"""Files that appear whole or not at all: written beside their target, then renamed onto it."""
+"""Files that appear whole or not at all: written beside their target, then renamed onto it.
+
+The temporary file is `.NAME.RANDOM.part`. Its name begins with the target's, so that the next run of the same
+outputs finds what a killed one left, and nobody can guess the rest: a link, pipe or file put in its way
+beforehand is never opened. A link in the target's own place is replaced; what it points to stays as it is.
+"""
 
 import contextlib
 import os
-import sys
+import re
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import BinaryIO
 
 from rollcli.errors import OutputError
+from rollcli.files.durable import sync_file, sync_names
+from rollcli.files.locking import being_written, nobody_writes
 
-_LONGEST_NAME = 240  # bytes; file systems allow 255 with what is added
+_LONGEST_NAME = 225  # bytes; file systems allow 255 with what is added
+_RANDOM_BYTES = 8
+_PART = re.compile(rf"\.(.+)\.[0-9a-f]{{{2 * _RANDOM_BYTES}}}\.part", re.DOTALL)
 
 
 def output_error(path: str | Path, error: OSError) -> OutputError:
@@ -19,13 +28,15 @@ def output_error(path: str | Path, error: OSError) -> OutputError:
 
 
 @contextlib.contextmanager
-def atomic_file(path: str | Path) -> Iterator[BinaryIO]:
+def atomic_file(path: str | Path, *, durable: bool = False) -> Iterator[BinaryIO]:
     """Open a binary file that takes its name when the block ends, and vanishes when the block fails.
 
     Parameters
     ----------
     path : str or Path
-        The target; parent folders are made. An existing file is replaced in one step.
+        The target; parent folders are made. An existing file or link is replaced in one step.
+    durable : bool
+        Survives a power cut once the block has ended. For many files `durable.sync_files` is cheaper.
 
     Yields
     ------
@@ -38,72 +49,84 @@ def atomic_file(path: str | Path) -> Iterator[BinaryIO]:
         The target cannot be written (full disk, no permission, a folder of that name, ...).
     """
     target = Path(path)
-    temporary = part_of(target)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         if target.is_dir():
             raise OutputError(f"{path}: cannot be written: is a folder")
-        with _alone(temporary) as file:
+        with _new_part(target) as (temporary, file):
             try:
                 yield file
+                if durable:
+                    sync_file(file)
                 file.close()
                 temporary.replace(target)
             except BaseException:
                 with contextlib.suppress(OSError):
                     temporary.unlink()
                 raise
+        if durable:
+            sync_names([target])
     except OSError as error:
         raise output_error(path, error) from error
 
 
-@contextlib.contextmanager
-def _alone(temporary: Path) -> Iterator[BinaryIO]:
-    """The temporary file, empty; who writes the same target at this moment is waited for.
+def write_atomic(path: str | Path, data: bytes, *, durable: bool = False) -> None:
+    """Write `data` to `path`, whole or not at all; see `atomic_file`."""
+    with atomic_file(path, durable=durable) as file:
+        file.write(data)
 
-    A cluster may give a frame to a second worker while the first, given up as lost, is still writing.
+
+def remove_leftovers(paths: Iterable[str | Path]) -> None:
+    """Remove the temporary files that killed processes left beside these targets, and no others.
+
+    Each folder is listed once. A file that a live process is still writing is left alone, and so is whatever
+    is no regular file.
     """
-    flags = os.O_WRONLY | os.O_CREAT | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
+    listed: dict[str, dict[str, list[str]]] = {}
+    for path in paths:
+        folder, name = os.path.split(path)
+        if folder not in listed:
+            listed[folder] = _parts_in(folder)
+        if listed[folder]:
+            for part in listed[folder].pop(_marker(name), ()):
+                _remove_abandoned(part)
+
+
+@contextlib.contextmanager
+def _new_part(target: Path) -> Iterator[tuple[Path, BinaryIO]]:
+    """A temporary file that did not exist before, held until the block ends; permissions of any new file."""
+    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL  # which follows no link either
+    flags |= getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
     while True:
-        with os.fdopen(os.open(temporary, flags, 0o666), "wb") as file, _locked(file):
-            if _is_still(temporary, file):
-                file.truncate()
-                yield file
+        path = target.with_name(f".{_marker(target.name)}.{os.urandom(_RANDOM_BYTES).hex()}.part")
+        try:
+            descriptor = os.open(path, flags, 0o666)
+        except FileExistsError:
+            continue
+        with os.fdopen(descriptor, "wb") as file, being_written(file):
+            if os.fstat(descriptor).st_nlink:  # not removed as a leftover in the moment before it was held
+                yield path, file
                 return
 
 
-@contextlib.contextmanager
-def _locked(file: BinaryIO) -> Iterator[None]:
-    """Keep others from the file until the block ends, also when the file is closed before."""
-    if sys.platform == "win32":  # which keeps others from replacing an open file anyway
-        yield
-        return
-    import fcntl
-
-    held = os.dup(file.fileno())
-    try:
-        with contextlib.suppress(OSError):  # a file system without locks
-            fcntl.flock(held, fcntl.LOCK_EX)
-        yield
-    finally:
-        os.close(held)
+def _marker(name: str) -> str:
+    """The part of a temporary file's name that tells its target."""
+    data = os.fsencode(name)
+    return name if len(data) <= _LONGEST_NAME else f"{zlib.crc32(data):08x}"
 
 
-def _is_still(path: Path, file: BinaryIO) -> bool:
-    """Whether the file has this name, and not its target's by now."""
-    try:
-        return os.path.samestat(path.stat(), os.fstat(file.fileno()))
-    except FileNotFoundError:
-        return False
+def _parts_in(folder: str) -> dict[str, list[str]]:
+    """The temporary files in a folder, by what tells their targets."""
+    found: dict[str, list[str]] = {}
+    with contextlib.suppress(OSError), os.scandir(folder or ".") as entries:
+        for entry in entries:
+            if match := _PART.fullmatch(entry.name):
+                found.setdefault(match[1], []).append(entry.path)
+    return found
 
 
-def part_of(target: Path) -> Path:
-    """The temporary file of a target; not a random name: what a killed run leaves, the next takes over."""
-    name = os.fsencode(target.name)
-    short = target.name if len(name) <= _LONGEST_NAME else f"{zlib.crc32(name):08x}"
-    return target.with_name(f".{short}.part")
-
-
-def write_atomic(path: str | Path, data: bytes) -> None:
-    """Write `data` to `path`, whole or not at all; see `atomic_file`."""
-    with atomic_file(path) as file:
-        file.write(data)
+def _remove_abandoned(path: str) -> None:
+    """Remove a temporary file, unless a process is writing it or it is no regular file."""
+    with contextlib.suppress(OSError), nobody_writes(path) as abandoned:
+        if abandoned:
+            Path(path).unlink()

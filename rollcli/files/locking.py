@@ -1,8 +1,13 @@
 """One run at a time on one result: a lock that the system lets go when its holders end, however they end."""
 
+import contextlib
 import errno
+import os
+import stat
 import sys
 import time
+from collections.abc import Iterator
+from typing import BinaryIO
 
 from rollcli.errors import UsageError
 
@@ -16,14 +21,22 @@ if sys.platform == "win32":
     _FAR_BYTE = 2**62  # locked bytes cannot be read by others: take one that no result reaches
 
     def _try_lock(descriptor: int) -> bool:
-        import os
-
         os.lseek(descriptor, _FAR_BYTE, os.SEEK_SET)
         try:
             msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
         except OSError:
             return False
         return True
+
+    @contextlib.contextmanager
+    def being_written(file: BinaryIO) -> Iterator[None]:
+        """Nothing to do: Windows keeps others from removing an open file."""
+        yield
+
+    @contextlib.contextmanager
+    def nobody_writes(path: str) -> Iterator[bool]:
+        """Whether the path is a regular file."""
+        yield stat.S_ISREG(os.lstat(path).st_mode)
 
 else:
     import fcntl
@@ -37,6 +50,26 @@ else:
             # a file system without locks: better to run unguarded than not at all
             return error.errno in (errno.ENOLCK, errno.ENOTSUP, errno.EINVAL, errno.ENOSYS)
         return True
+
+    @contextlib.contextmanager
+    def being_written(file: BinaryIO) -> Iterator[None]:
+        """Let `nobody_writes` be false for a file until the block ends, also when it is closed before."""
+        held = os.dup(file.fileno())
+        try:
+            with contextlib.suppress(OSError):  # a file system without locks
+                fcntl.flock(held, fcntl.LOCK_EX)
+            yield
+        finally:
+            os.close(held)
+
+    @contextlib.contextmanager
+    def nobody_writes(path: str) -> Iterator[bool]:
+        """Whether the path is a regular file that no live process is writing; a link is none."""
+        descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
+        try:
+            yield stat.S_ISREG(os.fstat(descriptor).st_mode) and _try_lock(descriptor)
+        finally:
+            os.close(descriptor)
 
 
 def lock(descriptor: int, name: str) -> None:

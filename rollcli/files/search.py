@@ -104,7 +104,7 @@ class Search:
             relative = Path(os.path.relpath(path, base))
             inside = {os.path.realpath(base / parent) for parent in relative.parents[:-1]}
             if self._skip.isdisjoint(inside) and (at_its_word or self._reads(match)) and _is_file(path):
-                yield path, relative.as_posix()
+                yield path, _below(relative).as_posix()
 
     def _reads(self, name: str) -> bool:
         return name.lower().endswith(self._endings)
@@ -121,6 +121,11 @@ def _fail(error: OSError) -> None:
 def _is_file(path: Path) -> bool:
     """A file, or a link to nothing: that gets a row that says so."""
     return path.is_file() or (path.is_symlink() and not path.exists())
+
+
+def _below(relative: Path) -> Path:
+    """The path without its steps upwards: outputs keep it, and stay below their folder."""
+    return Path(*(part for part in relative.parts if part != ".."))
 
 
 def _fixed_part(pattern: str) -> Path:

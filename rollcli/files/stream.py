@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 from rollcli.errors import OutputError
-from rollcli.files.atomic import output_error, write_atomic
+from rollcli.files.atomic import output_error, remove_leftovers, write_atomic
 
 STDOUT = "-"  # how the command line names it
 STDOUT_NAME = "standard output"
@@ -42,6 +42,7 @@ def write_output(name: str, data: bytes) -> None:
         finally:
             os.close(descriptor)
     else:
+        remove_leftovers([name])
         write_atomic(name, data)
 
 

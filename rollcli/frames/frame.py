@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from rollcli.files.results import Row
 from rollcli.frames.options import FrameOptions, ImageOptions
-from rollcli.frames.outputs import remove_images
+from rollcli.frames.outputs import remove_image_leftovers, remove_images
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,4 +78,5 @@ def failed(frame: Frame, reason: str) -> Outcome:
 def lost(frame: Frame, reason: str, images: ImageOptions) -> Outcome:
     """The row of a frame whose worker died; what it wrote is removed, since an error row has no images."""
     remove_images(frame, images)
+    remove_image_leftovers([frame], images)
     return failed(frame, reason)

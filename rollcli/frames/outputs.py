@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rollcli.files.atomic import part_of
+from rollcli.files.atomic import remove_leftovers
 from rollcli.frames.options import ImageOptions
 
 if TYPE_CHECKING:
@@ -40,23 +40,12 @@ def remove_images(frame: "Frame", images: ImageOptions, root: str = "") -> None:
 
 
 def remove_outputs(paths: Iterable[str]) -> None:
-    """Remove files that a frame which has failed left or had before, temporary ones too."""
-    for path in map(Path, paths):
-        _remove(path)
-        _remove(part_of(path))
-
-
-def remove_leftovers(paths: Iterable[str]) -> None:
-    """Remove the temporary files that killed workers left beside what they were writing; no others."""
+    """Remove files that a frame which has failed has written, or an earlier run for it."""
     for path in paths:
-        _remove(part_of(Path(path)))
+        with contextlib.suppress(OSError):  # that there is no such file, or no such folder
+            Path(path).unlink()
 
 
 def remove_image_leftovers(frames: Iterable["Frame"], images: ImageOptions) -> None:
-    """Remove them for every image of these frames."""
+    """Remove the temporary files that killed workers left beside the images of these frames."""
     remove_leftovers(path for frame in frames for _, path in image_paths(frame, images))
-
-
-def _remove(path: Path) -> None:
-    with contextlib.suppress(OSError):  # that there is no such file, or no such folder
-        path.unlink()

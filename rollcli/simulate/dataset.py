@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import OutputError, UsageError
-from rollcli.files.atomic import output_error, write_atomic
+from rollcli.files.atomic import output_error, remove_leftovers, write_atomic
 from rollcli.files.encodings import from_disparity
 from rollcli.files.formats import encode_stored
 from rollcli.parallel.in_order import Work
@@ -134,6 +134,7 @@ def write_dataset(dataset: Dataset, jobs: int | None = 1, stop: Stop | None = No
         A file cannot be written, or a worker died.
     """
     _clear(dataset)
+    remove_leftovers(task.image(part) for part in _PARTS for task in dataset.tasks)
     written = 0
     for stem in done_locally(dataset.tasks, Work(_write_frame, _lost), jobs, stop or Stop()):
         written += 1

@@ -1,5 +1,7 @@
 """The images that `estimate` writes: their names, and what they never replace."""
 
+import os
+
 import cv2
 import numpy as np
 import pytest
@@ -124,3 +126,34 @@ def test_a_frame_that_fails_leaves_no_image_of_an_earlier_run(maps):
     (maps / "maps" / "frame0.png").write_bytes(b"")
     assert rollcli(*arguments, cwd=maps).status == 3
     assert names(maps / "up") == ["frame1.png"]
+
+
+@pytest.mark.parametrize("command", ["estimate", "derotate"])
+def test_links_and_pipes_in_the_output_folder_are_neither_followed_nor_waited_for(maps, command):
+    (maps / "victim").write_bytes(b"precious")
+    (maps / "up").mkdir()
+    (maps / "up" / ".frame0.png.part").symlink_to(maps / "victim")
+    os.mkfifo(maps / "up" / ".frame1.png.part")
+    (maps / "up" / "frame1.png").symlink_to(maps / "victim")
+    (maps / "up" / ".frame0.png.0123456789abcdef.part").write_bytes(b"of a killed run")
+    images = {"estimate": ("-o", "rolls.csv", "--derotated", "up"), "derotate": ("--roll", "1", "-o", "up")}
+
+    done = rollcli(command, "maps", *images[command], "--overwrite", cwd=maps)
+
+    assert done.status == 0, done.err
+    assert (maps / "victim").read_bytes() == b"precious"
+    left = sorted(path.name for path in (maps / "up").iterdir())
+    assert left == [".frame0.png.part", ".frame1.png.part", "frame0.png", "frame1.png"]
+    assert not (maps / "up" / "frame1.png").is_symlink()
+
+
+def test_a_pattern_that_steps_upwards_writes_nothing_outside_of_the_output_folder(tmp_path):
+    write_maps(tmp_path / "data" / "maps", 1)
+    write_maps(tmp_path / "more", 1)
+    pattern = "data/*/../../more/*.png"
+
+    done = rollcli("derotate", pattern, "--roll", "1", "-o", "out/up", cwd=tmp_path)
+
+    assert done.status == 0, done.err
+    assert names(tmp_path / "out") == ["up/more/frame0.png"]
+    assert names(tmp_path) == ["data/maps/frame0.png", "more/frame0.png", "out/up/more/frame0.png"]

@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from rollcli.errors import OutputError
-from rollcli.files.atomic import atomic_file, write_atomic
+from rollcli.files.atomic import atomic_file, remove_leftovers, write_atomic
 
 
 def names_in(folder):
@@ -37,21 +37,102 @@ def test_nothing_is_there_before_the_block_ends(tmp_path):
     assert names_in(tmp_path) == ["map.png"]
 
 
-def test_what_a_killed_process_left_is_taken_over(tmp_path):
-    script = (
-        "import os, sys\n"
-        "from rollcli.files.atomic import atomic_file\n"
-        "with atomic_file(sys.argv[1]) as file:\n"
-        "    file.write(b'half of a longer file')\n"
-        "    file.flush()\n"
-        "    os._exit(9)\n"
-    )
-    subprocess.run([sys.executable, "-c", script, tmp_path / "map.png"], check=False)
-    assert len(names_in(tmp_path)) == 1
+KILLED = (
+    "import os, sys\n"
+    "from rollcli.files.atomic import atomic_file\n"
+    "with atomic_file(sys.argv[1]) as file:\n"
+    "    file.write(b'half of a file')\n"
+    "    file.flush()\n"
+    "    os._exit(9)\n"
+)
+
+
+@pytest.mark.parametrize("name", ["map.png", "é" * 120 + ".png", "a\nb.png"])
+def test_what_a_killed_process_left_is_removed_before_the_next_run(tmp_path, name):
+    for _ in range(2):
+        subprocess.run([sys.executable, "-c", KILLED, tmp_path / name], check=False)
+    assert len(names_in(tmp_path)) == 2
+
+    remove_leftovers([tmp_path / "other.png", tmp_path / name])
+
+    assert names_in(tmp_path) == []
+
+
+def test_what_others_have_named_alike_is_left_alone(tmp_path):
+    strangers = [
+        ".map.png.part",
+        ".map.png.0123456789ABCDEF.part",
+        ".map.png.0123456789abcde.part",
+        "map.png.0123456789abcdef.part",
+        ".other.png.0123456789abcdef.part",
+        ".map.png.0123456789abcdef.part.txt",
+    ]
+    for name in strangers:
+        (tmp_path / name).write_bytes(b"mine")
+    (tmp_path / ".map.png.aaaaaaaaaaaaaaaa.part").mkdir()
+    (tmp_path / ".map.png.bbbbbbbbbbbbbbbb.part").symlink_to(tmp_path / strangers[0])
+    os.mkfifo(tmp_path / ".map.png.cccccccccccccccc.part")
+    before = names_in(tmp_path)
+
+    remove_leftovers([tmp_path / "map.png", tmp_path / "no such folder" / "map.png"])
+
+    assert names_in(tmp_path) == before
+
+
+def test_a_file_that_is_being_written_is_no_leftover(tmp_path):
+    with atomic_file(tmp_path / "map.png") as file:
+        file.write(b"data")
+        remove_leftovers([tmp_path / "map.png"])
+
+    assert (tmp_path / "map.png").read_bytes() == b"data"
+
+
+def test_leftovers_are_looked_for_once_a_folder(tmp_path, monkeypatch):
+    listed = []
+    scandir = os.scandir
+    monkeypatch.setattr(os, "scandir", lambda folder: listed.append(folder) or scandir(folder))
+
+    remove_leftovers(tmp_path / f"{number}.png" for number in range(1000))
+
+    assert listed == [str(tmp_path)]
+
+
+def planted(folder, name, kind):
+    """A link or a pipe where an attacker expects a temporary file."""
+    victim = folder.parent / "victim"
+    victim.write_bytes(b"precious")
+    if kind == "link":
+        (folder / name).symlink_to(victim)
+    else:
+        os.mkfifo(folder / name)
+    return victim
+
+
+@pytest.mark.parametrize("kind", ["link", "pipe"])
+@pytest.mark.parametrize("guess", [".map.png.part", f".map.png.{'00' * 8}.part"])
+def test_what_lies_at_a_guessed_temporary_name_is_neither_followed_nor_waited_for(
+    tmp_path, monkeypatch, kind, guess
+):
+    (tmp_path / "out").mkdir()
+    victim = planted(tmp_path / "out", guess, kind)
+    guesses = iter([bytes(8), b"somewhat"])  # even when it is guessed right
+    monkeypatch.setattr(os, "urandom", lambda size: next(guesses))
+
+    write_atomic(tmp_path / "out" / "map.png", b"data")
+
+    assert victim.read_bytes() == b"precious"
+    assert (tmp_path / "out" / "map.png").read_bytes() == b"data"
+    assert names_in(tmp_path / "out") == [guess, "map.png"]
+
+
+def test_a_link_in_the_place_of_the_target_is_replaced_and_not_followed(tmp_path):
+    (tmp_path / "victim").write_bytes(b"precious")
+    (tmp_path / "map.png").symlink_to(tmp_path / "victim")
 
     write_atomic(tmp_path / "map.png", b"data")
 
-    assert names_in(tmp_path) == ["map.png"]
+    assert (tmp_path / "victim").read_bytes() == b"precious"
+    assert not (tmp_path / "map.png").is_symlink()
     assert (tmp_path / "map.png").read_bytes() == b"data"
 
 
@@ -67,6 +148,7 @@ def test_two_processes_may_write_one_file_at_the_same_time(tmp_path):
     writers = [subprocess.Popen(line, stderr=subprocess.PIPE) for _ in range(2)]
     sizes = set()
     while any(writer.poll() is None for writer in writers):
+        remove_leftovers([target])  # as a third process does that begins with the same outputs
         if target.exists():
             sizes.add(len(target.read_bytes()))
 

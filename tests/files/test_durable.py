@@ -1,0 +1,82 @@
+"""What must survive a power cut is forced to the disk: bytes first, then names, each folder once."""
+
+import errno
+import os
+from pathlib import Path
+
+import pytest
+
+from rollcli.errors import OutputError
+from rollcli.files.atomic import write_atomic
+from rollcli.files.durable import sync_files
+
+pytestmark = pytest.mark.skipif(os.name == "nt", reason="Windows forces no folders")
+
+
+@pytest.fixture
+def synced(monkeypatch):
+    """What was forced to the disk, in order: (inode, size at that time)."""
+    calls = []
+    fsync = os.fsync
+
+    def watch(descriptor):
+        status = os.fstat(descriptor)
+        calls.append((status.st_ino, status.st_size))
+        fsync(descriptor)
+
+    monkeypatch.setattr(os, "fsync", watch)
+    return calls
+
+
+def inode(path):
+    return path.stat().st_ino
+
+
+def test_files_are_forced_before_the_folders_that_name_them(tmp_path, synced):
+    paths = [tmp_path / "a" / "b" / f"{number}.png" for number in range(5)] + [tmp_path / "a" / "c.png"]
+    for path in paths:
+        write_atomic(path, b"data")
+    assert synced == []
+
+    sync_files(paths)
+
+    order = [each for each, _ in synced]
+    assert set(order[:6]) == {inode(path) for path in paths}
+    assert order[6:9] == [inode(tmp_path / "a" / "b"), inode(tmp_path / "a"), inode(tmp_path)]
+    assert len(order) == len(set(order))
+
+
+def test_a_durable_file_has_its_bytes_on_the_disk_before_it_has_its_name(tmp_path, synced, monkeypatch):
+    replace = Path.replace
+
+    def watched(path, target):
+        assert synced == [(inode(path), 4)]
+        return replace(path, target)
+
+    monkeypatch.setattr(Path, "replace", watched)
+
+    write_atomic(tmp_path / "run.json", b"data", durable=True)
+
+    assert synced[1][0] == inode(tmp_path)
+
+
+def test_a_file_that_is_gone_by_now_is_left_out(tmp_path, synced):
+    sync_files([tmp_path / "gone.png"])
+
+    assert inode(tmp_path) in [each for each, _ in synced]
+
+
+def test_a_disk_that_fails_is_said_in_one_line(tmp_path, monkeypatch):
+    write_atomic(tmp_path / "map.png", b"data")
+
+    def fail(descriptor):
+        raise OSError(errno.EIO, os.strerror(errno.EIO))
+
+    monkeypatch.setattr(os, "fsync", fail)
+
+    with pytest.raises(OutputError, match=r"map\.png: cannot be forced to the disk: input/output error$"):
+        sync_files([tmp_path / "map.png"])
+    with pytest.raises(OutputError, match=r"new\.png: cannot be written: input/output error$"):
+        write_atomic(tmp_path / "new.png", b"data", durable=True)
+
+    assert not (tmp_path / "new.png").exists()
