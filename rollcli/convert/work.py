@@ -9,8 +9,8 @@ from rollcli.convert.run import Conversion
 from rollcli.errors import EstimationError, InputError
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.files.atomic import write_atomic
+from rollcli.files.codecs.png import encode_png
 from rollcli.files.formats import encode_stored
-from rollcli.files.png import encode_png
 from rollcli.files.results import Row
 from rollcli.frames.encode import encode_computed, encode_turned
 from rollcli.frames.frame import Outcome

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError, UsageError
-from rollcli.files import npy, pfm, pictures, png, tiff
-from rollcli.files.raw_map import Stored as Stored
-from rollcli.files.raw_map import native
+from rollcli.files.codecs import npy, pfm, pictures, png, tiff
+from rollcli.files.codecs.raw_map import Stored as Stored
+from rollcli.files.codecs.raw_map import native
 
 _MAX_BYTES = 2**32
 _KNOWN = {

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.files.atomic import write_atomic
+from rollcli.files.codecs.png import encode_png
 from rollcli.files.encodings import Encoding, from_disparity
 from rollcli.files.formats import Stored, encode_stored
-from rollcli.files.png import encode_png
 from rollcli.frames.options import FrameOptions
 from rollcli.frames.outputs import image_paths
 from rollcli.imaging.derotate import derotate

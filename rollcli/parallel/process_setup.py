@@ -18,7 +18,7 @@ def prepare_worker() -> None:
     """Set up this process: the frames are what runs in parallel, and each needs the same memory again."""
     import cv2
 
-    from rollcli.files.mute_stderr import silence_decoders
+    from rollcli.files.codecs.mute_stderr import silence_decoders
 
     cv2.setNumThreads(1)
     silence_decoders()

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from rollcli.errors import InputError, OutputError
+from rollcli.files.codecs.png import picture
 from rollcli.files.formats import decode_mask, decode_stored, encode_stored
-from rollcli.files.png import picture
 from tests.binary_files import disparity_map, make_png, png_file, png_header, png_rows
 
 GREYS = bytes(np.repeat(np.arange(256, dtype=np.uint8), 3))

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError
-from rollcli.files.mute_stderr import decoding
-from rollcli.files.raw_map import PICTURE_FLAGS, native, require_decoded_fits
+from rollcli.files.codecs.mute_stderr import decoding
+from rollcli.files.codecs.raw_map import PICTURE_FLAGS, native, require_decoded_fits
 
 LOSSLESS = (b"BM", b"P5", b"P6")
 SIGNATURES = (b"\xff\xd8\xff", *LOSSLESS)

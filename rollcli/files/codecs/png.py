@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError, OutputError
-from rollcli.files.mute_stderr import decoding
-from rollcli.files.raw_map import PICTURE_FLAGS, require_decoded_fits
+from rollcli.files.codecs.mute_stderr import decoding
+from rollcli.files.codecs.raw_map import PICTURE_FLAGS, require_decoded_fits
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _GREY, _COLOUR, _PALETTE, _GREY_ALPHA, _COLOUR_ALPHA = 0, 2, 3, 4, 6

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError
-from rollcli.files.raw_map import require_map_shape
+from rollcli.files.codecs.raw_map import require_map_shape
 
 MAGIC = b"\x93NUMPY"
 _MAX_HEADER = 10_000

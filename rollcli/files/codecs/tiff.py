@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError
-from rollcli.files.lzw import LzwError, decode_lzw
-from rollcli.files.raw_map import Stored, native, require_decoded_fits
+from rollcli.files.codecs.lzw import LzwError, decode_lzw
+from rollcli.files.codecs.raw_map import Stored, native, require_decoded_fits
 
 SIGNATURES = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 _NONE, _LZW, _DEFLATE, _OLD_DEFLATE, _PACKBITS = 1, 5, 8, 32946, 32773

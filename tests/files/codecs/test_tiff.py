@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from rollcli.errors import InputError
+from rollcli.files.codecs.tiff import picture
 from rollcli.files.formats import decode_stored, encode_stored
-from rollcli.files.tiff import picture
 from tests.binary_files import disparity_map, make_tiff
 
 KINDS = ("u1", "u2", "i2", "f2", "f4", "f8")
