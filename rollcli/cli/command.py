@@ -8,7 +8,7 @@ import click
 
 OTHER = "Other options"
 EXIT_STATUS = (
-    ("0", "every frame is done"),
+    ("0", "every frame is done, suspect ones included"),
     ("1", "the program could not do its job: an output cannot be written, the disk is full"),
     ("2", "wrong usage, or no input found"),
     ("3", "finished, and at least one frame failed; each says why"),

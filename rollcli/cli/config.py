@@ -1,6 +1,11 @@
-"""`--config FILE`: a TOML file of option values, below flags and the environment."""
+"""`--config FILE`: a TOML file of option values, below flags and the environment.
+
+Keys at the top are for every command that has such an option. Keys in a table, such as ``[estimate]`` or
+``[evaluate.accuracy]``, are for that command alone.
+"""
 
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,16 +19,50 @@ def _use(ctx: click.Context, param: click.Parameter, path: str | None) -> None:
     """Make the file's values the defaults of this command."""
     if path is None:
         return
-    options = {
-        str(p.name): p for p in ctx.command.params if isinstance(p, click.Option) and p.name != param.name
-    }
+    commands = _commands(ctx)
+    options = _options(ctx.command)
     defaults = {}
-    for key, value in _load(path).items():
-        name = key.replace("-", "_")
-        if name not in options:
-            raise click.UsageError(f"{path}: there is no option {key!r}{_nearest(name, options)}", ctx)
-        defaults[name] = _checked(ctx, options[name], value, path)
+    for words, values in _tables(_load(path)):
+        if words and values and " ".join(words) not in commands:
+            raise click.UsageError(f"{path}: there is no command for the table [{'.'.join(words)}]", ctx)
+        if words not in ((), tuple(ctx.command_path.split(" ")[1:])):
+            continue
+        for key, value in values.items():
+            name = key.replace("-", "_")
+            if name in options:
+                defaults[name] = _checked(ctx, options[name], value, path)
+            elif words or not any(name in _options(each) for each in commands.values()):
+                raise click.UsageError(f"{path}: there is no option {key!r}{_nearest(name, options)}", ctx)
     ctx.default_map = {**(ctx.default_map or {}), **defaults}
+
+
+def _tables(values: dict[str, Any], words: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
+    """Yield the words of each table, from the top down, and its keys; no command has more than two words."""
+    inner = {key: value for key, value in values.items() if isinstance(value, dict)} if len(words) < 2 else {}
+    yield words, {key: value for key, value in values.items() if key not in inner}
+    for key, value in inner.items():
+        yield from _tables(value, (*words, key))
+
+
+def _options(command: click.Command) -> dict[str, click.Option]:
+    """Return what a file may set, by the names of parameters."""
+    found = {str(each.name): each for each in command.params if isinstance(each, click.Option)}
+    found.pop("config", None)
+    return found
+
+
+def _commands(ctx: click.Context) -> dict[str, click.Command]:
+    """Return every command of the program by its words; loads their modules."""
+    root = ctx.find_root()
+    assert isinstance(root.command, click.Group)
+    found: dict[str, click.Command] = {}
+    for name in root.command.list_commands(root):
+        command = root.command.get_command(root, name)
+        if isinstance(command, click.Group):
+            found.update({f"{name} {each}": inner for each, inner in command.commands.items()})
+        elif command is not None:
+            found[name] = command
+    return found
 
 
 def _load(path: str) -> dict[str, Any]:

@@ -8,7 +8,6 @@ from rollcli.batch.options import EstimateOptions, ResultOptions
 from rollcli.cli.command import command, option, record
 from rollcli.cli.config import config_option
 from rollcli.cli.options import (
-    PATH,
     encoding_options,
     image_options,
     input_options,
@@ -19,16 +18,23 @@ from rollcli.cli.options import (
     stereo_options,
 )
 from rollcli.cli.resume import one_start, resume_command
-from rollcli.cli.types import Shard
+from rollcli.cli.types import Choice, OutputFile, Shard
 
 result_options = record(
     "result",
     "Result",
     ResultOptions,
-    option("-o", "--output", type=PATH, metavar="FILE", default="-", help="Where the rows go (-: stdout)."),
+    option(
+        "-o",
+        "--output",
+        type=OutputFile((".csv", ".jsonl", ".ndjson"), "CSV (.csv) or JSON Lines (.jsonl)"),
+        metavar="FILE",
+        default="-",
+        help="Where the rows go (-: stdout).",
+    ),
     option(
         "--format",
-        type=click.Choice(["csv", "jsonl"]),
+        type=Choice("csv", "jsonl"),
         help="CSV or JSON Lines.  [default: by FILE's ending, else csv]",
     ),
     option("--resume", is_flag=True, help="Keep the rows of an interrupted run and do the rest."),

@@ -7,7 +7,7 @@ import click
 from rollcli.cli.command import Command, option, record
 from rollcli.cli.config import config_option
 from rollcli.cli.options import PATH, encoding_options, input_options, region_options, running_options
-from rollcli.cli.types import Number, Turns
+from rollcli.cli.types import Choice, Number, Turns
 from rollcli.evaluate.options import TIMED, TURNS_DEG, ExperimentOptions, PaperOptions
 from rollcli.frames.options import RunningOptions
 
@@ -78,7 +78,7 @@ def evaluate(ctx: click.Context) -> None:
 )
 @option(
     "--format",
-    type=click.Choice(["table", "csv", "json"]),
+    type=Choice("table", "csv", "json"),
     default="table",
     section="Figures",
     help="To read, or for programs: degrees, and shares from 0 to 1.",

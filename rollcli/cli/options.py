@@ -5,7 +5,7 @@ from typing import Any
 import click
 
 from rollcli.cli.command import option, record
-from rollcli.cli.types import FilePath, Number, NumberOrNan, Polygon, Roi
+from rollcli.cli.types import Choice, FilePath, Number, NumberOrNan, Polygon, Roi
 from rollcli.frames.options import (
     EncodingOptions,
     ImageOptions,
@@ -68,7 +68,7 @@ pair_options = record(
     ),
     option(
         "--match",
-        type=click.Choice(["name", "order"]),
+        type=Choice("name", "order"),
         default="name",
         help="By name (the same but for left/right, l/r, L1/R1, image_2/image_3, im0/im1 …), or by order.",
     ),
@@ -98,7 +98,7 @@ stereo_options = record(
     ),
     option(
         "--sgbm-mode",
-        type=click.Choice(list(MODES)),
+        type=Choice(*MODES),
         default=StereoOptions.mode,
         help="OpenCV's variants: 3way (fast), sgbm (5 directions), hh (8: slow, much memory).",
     ),
@@ -140,7 +140,7 @@ encoding_options = record(
     EncodingOptions,
     option(
         "--encoding",
-        type=click.Choice(["auto", "px", "kitti", "cityscapes", "sgbm"]),
+        type=Choice("auto", "px", "kitti", "cityscapes", "sgbm"),
         default="auto",
         help="px: pixels as they are; kitti: p/256; cityscapes: (p-1)/256; sgbm: p/16, negative is no data; "
         "auto: float and uint8 are px, uint16 is kitti, int16 is sgbm.",
@@ -178,20 +178,20 @@ method_options = record(
     _method,
     option(
         "--method",
-        type=click.Choice(["gd", "gss", "exact", "plane", "areas"]),
+        type=Choice("gd", "gss", "exact", "plane", "areas"),
         default=MethodOptions.method,
         help="gd: gradient descent; gss: golden section search; exact: the global minimum, from polynomial "
         "roots; plane: one least-squares plane; areas: planes of many small areas.",
     ),
     option(
         "--model",
-        type=click.Choice(["parabola", "line"]),
+        type=Choice("parabola", "line"),
         default=MethodOptions.model,
         help="Disparity of the road as a function of the row.",
     ),
     option(
         "--road",
-        type=click.Choice(["auto", "all"]),
+        type=Choice("auto", "all"),
         default=MethodOptions.road,
         help="auto: find the road first; all: use every valid pixel, as the paper does.",
     ),
@@ -224,7 +224,7 @@ method_options = record(
 save_as_option = option(
     "--save-as",
     section="Output",
-    type=click.Choice(["png", "tiff", "npy"]),
+    type=Choice("png", "tiff", "npy"),
     default="png",
     help="Format of maps computed from pairs: 16-bit KITTI PNG (to 256 px), float32 TIFF or float32 NPY.",
 )

@@ -7,7 +7,7 @@ import click
 from rollcli.cli.command import command, option
 from rollcli.cli.config import config_option
 from rollcli.cli.options import PATH, running_options
-from rollcli.cli.types import Number
+from rollcli.cli.types import Number, OutputFile
 from rollcli.report.options import GALLERY, ReportOptions
 
 
@@ -28,7 +28,7 @@ from rollcli.report.options import GALLERY, ReportOptions
 @option(
     "-o",
     "--output",
-    type=PATH,
+    type=OutputFile((".html", ".htm"), "a page (.html)"),
     metavar="FILE.html",
     required=True,
     section="Page",

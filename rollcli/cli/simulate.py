@@ -7,7 +7,7 @@ import click
 from rollcli.cli.command import command, option, record
 from rollcli.cli.config import config_option
 from rollcli.cli.options import PATH, running_options
-from rollcli.cli.types import Number, Size, Span
+from rollcli.cli.types import Choice, Number, Size, Span
 from rollcli.frames.options import RunningOptions
 from rollcli.simulate.options import (
     BASELINE,
@@ -35,7 +35,7 @@ simulate_options = record(
     option("--frames", type=Number("N", at_least=1, whole=True), default=FRAMES, help="How many pairs."),
     option(
         "--scene",
-        type=click.Choice([*SCENES, MIXED]),
+        type=Choice(*SCENES, MIXED),
         default=MIXED,
         help="bare: only a road; open: kerbs and cars; street: house fronts too; verge: sloping grass; "
         "mixed: each frame one of these.",

@@ -2,14 +2,31 @@
 
 import math
 import re
+from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
 import click
 
-if TYPE_CHECKING:
-    _ParamType = click.ParamType[Any]  # generic to type checkers only, before click 8.4
+if TYPE_CHECKING:  # generic to type checkers only, before click 8.4
+    _ParamType = click.ParamType[Any]
+    _Choice = click.Choice[str]
 else:
     _ParamType = click.ParamType
+    _Choice = click.Choice
+
+
+# endings that promise a format; a name with any other ending is a name like "rolls.txt" or "rolls"
+_OTHER_FORMATS = {
+    *(".csv", ".tsv", ".json", ".jsonl", ".ndjson", ".parquet", ".feather"),
+    *(".xlsx", ".xls", ".ods", ".xml", ".yaml", ".toml", ".html", ".htm", ".pdf"),
+}
+
+
+class Choice(_Choice):
+    """One of some words; upper and lower case are the same."""
+
+    def __init__(self, *words: str) -> None:
+        super().__init__(words, case_sensitive=False)
 
 
 class FilePath(click.Path):
@@ -18,6 +35,28 @@ class FilePath(click.Path):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         if value == "":
             self.fail("the name is empty: is a variable unset?", param, ctx)
+        return super().convert(value, param, ctx)
+
+
+class OutputFile(FilePath):
+    """The name of a file to write; the ending of a format that is not written there is refused.
+
+    Parameters
+    ----------
+    endings : tuple of str
+        Endings of what is written, lower case, the usual one first.
+    what : str
+        What is written, in words.
+    """
+
+    def __init__(self, endings: tuple[str, ...], what: str) -> None:
+        super().__init__()
+        self.endings, self.what = endings, what
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        ending = PurePath(str(value)).suffix.lower()
+        if ending in _OTHER_FORMATS.difference(self.endings):
+            self.fail(f"{value!r}: {ending} is not written here; write {self.what}", param, ctx)
         return super().convert(value, param, ctx)
 
 

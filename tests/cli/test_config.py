@@ -2,6 +2,7 @@
 
 import json
 
+import cv2
 import pytest
 
 from tests.run_cli import rollcli, write_maps
@@ -40,6 +41,18 @@ def test_flags_win_over_the_environment_and_the_environment_over_the_config(maps
     environment = {"ROLLCLI_ESTIMATE_MAX_ROLL": "22", "ROLLCLI_ESTIMATE_TOLERANCE": "0.2"}
     options = options_of(maps, "--config", "rollcli.toml", "--tolerance", "0.3", **environment)
     assert (options["seed"], options["max-roll"], options["tolerance"]) == (1, 22, 0.3)
+
+
+def test_one_file_serves_all_commands(maps):
+    (maps / "rig.toml").write_text(
+        "quiet = true\nexpand = true\n[estimate]\nmethod = 'exact'\n[derotate]\nroll = 2.5\n"
+        "[evaluate.accuracy]\nformat = 'csv'\n"
+    )
+    assert options_of(maps, "--config", "rig.toml")["method"] == "exact"
+    turned = rollcli("derotate", "maps", "-o", "level", "--config", "rig.toml", cwd=maps)
+    assert (turned.status, turned.err) == (0, "")
+    width = cv2.imread(str(maps / "maps" / "frame0.png"), cv2.IMREAD_UNCHANGED).shape[1]
+    assert cv2.imread(str(maps / "level" / "frame0.png"), cv2.IMREAD_UNCHANGED).shape[1] > width
 
 
 def test_the_config_file_itself_may_come_from_the_environment(maps):
@@ -95,7 +108,9 @@ def test_resume_and_overwrite_exclude_each_other_unless_one_is_said_nearer(maps)
     ("text", "reason"),
     [
         ("lamda0 = 1", "there is no option 'lamda0'; the nearest is 'lambda0'"),
-        ("[estimate]\nseed = 1", "there is no option 'estimate'"),
+        ("[estimates]\nseed = 1", "there is no command for the table [estimates]"),
+        ("[estimate]\nroll = 1", "there is no option 'roll'"),
+        ("[derotate]\n[derotate.more]\nroll = 1", "there is no command for the table [derotate.more]"),
         ("seed = 1.5", "'seed': 1.5 is not a whole number"),
         ("seed = -1", "'seed': -1 is not a whole number of at least 0"),
         ("seed = true", "'seed': True is not a whole number"),
