@@ -11,9 +11,13 @@ from rollcli.cli.types import Choice, Number, Size, Span
 from rollcli.frames.options import RunningOptions
 from rollcli.simulate.options import (
     BASELINE,
+    CROSS_SECTIONS,
+    CROSSFALL,
     FOCAL_PER_WIDTH,
     FRAMES,
+    GUTTER_WIDTH,
     HEIGHT,
+    KERB,
     MIXED,
     NOISE,
     PITCH_DEG,
@@ -61,6 +65,38 @@ simulate_options = record(
         type=Span(),
         help="Of the road's height, 1/m, drawn evenly from A to B; positive: a sag; negative: a crest.  "
         "[default: half of the frames flat, half within +-0.001; bare is flat]",
+    ),
+    option(
+        "--cross-section",
+        type=click.Choice([*CROSS_SECTIONS, MIXED]),
+        default=CROSS_SECTIONS[0],
+        help="Shape of the road across. crown, dish: a parabola, highest or lowest in the middle; roof: two "
+        "planes that meet in the middle; superelevated: one plane, its outer side up in a bend; mixed: each "
+        "frame one of these. --roll is against the plane that touches the road below the left camera.",
+    ),
+    option(
+        "--crossfall",
+        type=Span(),
+        default=CROSSFALL,
+        show_default=False,
+        help="Slope of a cross section that is not flat, per cent, drawn evenly from A to B; of a crown or "
+        f"dish at its edges.  [default: {CROSSFALL[0]:g}:{CROSSFALL[1]:g}]",
+    ),
+    option(
+        "--gutter",
+        type=Span(),
+        default=(0.0, 0.0),
+        show_default=False,
+        help=f"How much more the outer {100 * GUTTER_WIDTH:g} cm on each side fall outward, per cent, drawn "
+        "evenly from A to B.  [default: 0]",
+    ),
+    option(
+        "--kerb",
+        type=Span(),
+        default=KERB,
+        show_default=False,
+        help="Height of kerbs and pavements (open, street) above the road's edge, metres, drawn evenly from "
+        f"A to B.  [default: {KERB[0]:g}:{KERB[1]:g}]",
     ),
     option(
         "--size",

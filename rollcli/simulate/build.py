@@ -1,8 +1,13 @@
 """The kinds of scenes, each drawn from a frame's seeds."""
 
+from collections.abc import Iterator
+from itertools import groupby
+
 import numpy as np
 
-from rollcli.simulate.light import draw_light
+from rollcli.simulate.carriageway import Carriageway, draw_asphalt, draw_carriageway
+from rollcli.simulate.cross_section import Piece
+from rollcli.simulate.light import Light, draw_light
 from rollcli.simulate.materials import Plain
 from rollcli.simulate.roadside import (
     add_backdrop,
@@ -18,76 +23,107 @@ from rollcli.simulate.roadside import (
 from rollcli.simulate.scene import FAR, Scene, draw, draw_offset
 from rollcli.simulate.spec import FrameSpec
 from rollcli.simulate.surfaces import Ground
-from rollcli.simulate.way import Way, draw_asphalt, draw_way
 
 _HORIZON = 2000.0  # metres: the end of a bare world
 
 
 def build_scene(spec: FrameSpec) -> Scene:
     """The scene of a frame: the same for the same scene name, curvature and seeds."""
-    rng = spec.scene_rng()
-    scene, way = Scene(draw_light(rng)), draw_way(rng, spec)
-    scene.road = scene.material(draw_asphalt(rng, way))
-    _KINDS[spec.scene](scene, rng, way)
+    rng, light, carriageway = _begin(spec)
+    scene = Scene(light, normal=carriageway.normal)
+    scene.road = scene.material(draw_asphalt(rng, carriageway))
+    _KINDS[spec.scene](scene, rng, carriageway)
     return scene
 
 
-def _bare(scene: Scene, rng: np.random.Generator, way: Way) -> None:
-    """The road, and grass level with it, to the horizon."""
+def road_camber(spec: FrameSpec) -> float:
+    """Curvature across the road below the rig, 1/(camera height): positive where both sides rise."""
+    _, _, carriageway = _begin(spec)
+    return carriageway.section.piece(0.0).curvature_at(0.0) * spec.height
+
+
+def _begin(spec: FrameSpec) -> tuple[np.random.Generator, Light, Carriageway]:
+    """What is drawn first, and the random numbers for the rest."""
+    rng = spec.scene_rng()
+    return rng, draw_light(rng), draw_carriageway(rng, spec)
+
+
+def _bare(scene: Scene, rng: np.random.Generator, carriageway: Carriageway) -> None:
+    """The road, and level grass from its edges to the horizon."""
     grass = add_grass(scene, rng)
-    edges = (-np.inf, way.left, way.right, np.inf)
-    scene.surfaces.append(Ground(way.course, edges, (grass, scene.road, grass), _HORIZON))
+    left, right = (
+        Piece(*ends, offset=carriageway.section.elevation(edge))
+        for ends, edge in (
+            ((-np.inf, carriageway.left), carriageway.left),
+            ((carriageway.right, np.inf), carriageway.right),
+        )
+    )
+    strips = [(left, grass), *_road_strips(scene, carriageway), (right, grass)]
+    scene.surfaces += _grounds(carriageway, strips, _HORIZON)
 
 
-def _open(scene: Scene, rng: np.random.Generator, way: Way) -> None:
+def _open(scene: Scene, rng: np.random.Generator, carriageway: Carriageway) -> None:
     """Kerbs, sidewalks, lawns, trees, cars."""
-    _lay_road(scene, way)
+    _lay_road(scene, carriageway)
     grass = add_grass(scene, rng)
-    for side, edge in way.sides:
-        height, outer = add_sidewalk(scene, rng, way, side, edge)
-        add_slope(scene, way, side, outer, side * np.inf, height, draw(rng, -0.04, 0.06), grass)
+    for side, edge in carriageway.sides:
+        level, outer = add_sidewalk(scene, rng, carriageway, side, edge)
+        add_slope(scene, carriageway, side, outer, side * np.inf, level, draw(rng, -0.04, 0.06), grass)
         if rng.random() < 0.3:
-            add_hedge(scene, rng, way, outer + side * draw(rng, 0.2, 1.0), height - 0.1)
-        add_posts(scene, rng, way, outer - side * 0.3, height)
-        add_trees(scene, rng, way, outer, outer + side * 25, height - 0.4)
-    add_cars(scene, rng, way)
-    add_backdrop(scene, rng, way)
+            add_hedge(scene, rng, carriageway, outer + side * draw(rng, 0.2, 1.0), level - 0.1)
+        add_posts(scene, rng, carriageway, outer - side * 0.3, level)
+        add_trees(scene, rng, carriageway, outer, outer + side * 25, level - 0.4)
+    add_cars(scene, rng, carriageway)
+    add_backdrop(scene, rng, carriageway)
 
 
-def _street(scene: Scene, rng: np.random.Generator, way: Way) -> None:
+def _street(scene: Scene, rng: np.random.Generator, carriageway: Carriageway) -> None:
     """A street between house fronts."""
-    _lay_road(scene, way)
+    _lay_road(scene, carriageway)
     yard = scene.material(Plain(0.3, tint=(0.9, 0.97, 1.0), offset=draw_offset(rng)))
-    for side, edge in way.sides:
-        height, outer = add_sidewalk(scene, rng, way, side, edge, beyond=yard)
+    for side, edge in carriageway.sides:
+        level, outer = add_sidewalk(scene, rng, carriageway, side, edge, beyond=yard)
         garden = float(rng.choice([0.0, 1.0])) * draw(rng, 1, 6)
-        add_houses(scene, rng, way.course, side, outer + side * garden, height)
-        add_posts(scene, rng, way, edge + side * 0.5, height)
+        add_houses(scene, rng, carriageway.course, side, outer + side * garden, level)
+        add_posts(scene, rng, carriageway, edge + side * 0.5, level)
         if rng.random() < 0.35:
-            add_trees(scene, rng, way, edge + side * 0.8, edge + side * 0.9, height)
-    add_cars(scene, rng, way)
-    add_backdrop(scene, rng, way)
+            add_trees(scene, rng, carriageway, edge + side * 0.8, edge + side * 0.9, level)
+    add_cars(scene, rng, carriageway)
+    add_backdrop(scene, rng, carriageway)
 
 
-def _verge(scene: Scene, rng: np.random.Generator, way: Way) -> None:
+def _verge(scene: Scene, rng: np.random.Generator, carriageway: Carriageway) -> None:
     """A country road between grass slopes that are wider than it is."""
-    _lay_road(scene, way)
+    _lay_road(scene, carriageway)
     grass = add_grass(scene, rng)
-    for side, edge in way.sides:
+    for side, edge in carriageway.sides:
+        level = carriageway.section.elevation(edge)
         slope = float(rng.choice([-1.0, 1.0])) * draw(rng, 0.03, 0.3)
-        width = (way.right - way.left) * draw(rng, 1.2, 3)
+        width = (carriageway.right - carriageway.left) * draw(rng, 1.2, 3)
         foot = edge + side * width
-        add_slope(scene, way, side, edge, foot, 0.0, slope, grass)
-        add_slope(scene, way, side, foot, side * np.inf, slope * width, 0.0, grass)
-        add_posts(scene, rng, way, edge + side * 0.6, 0.6 * slope, radius=0.05, height=1.0)
+        add_slope(scene, carriageway, side, edge, foot, level, slope, grass)
+        add_slope(scene, carriageway, side, foot, side * np.inf, level + slope * width, 0.0, grass)
+        add_posts(scene, rng, carriageway, edge + side * 0.6, level + 0.6 * slope, radius=0.05, height=1.0)
         if slope < 0.1:
-            add_trees(scene, rng, way, foot, foot + side * 30, slope * width)
-    add_cars(scene, rng, way)
-    add_backdrop(scene, rng, way)
+            add_trees(scene, rng, carriageway, foot, foot + side * 30, level + slope * width)
+    add_cars(scene, rng, carriageway)
+    add_backdrop(scene, rng, carriageway)
 
 
-def _lay_road(scene: Scene, way: Way) -> None:
-    scene.surfaces.append(Ground(way.course, (way.left, way.right), (scene.road,), FAR))
+def _lay_road(scene: Scene, carriageway: Carriageway) -> None:
+    scene.surfaces += _grounds(carriageway, _road_strips(scene, carriageway), FAR)
+
+
+def _road_strips(scene: Scene, carriageway: Carriageway) -> list[tuple[Piece, int]]:
+    return [(piece, scene.road) for piece in carriageway.section.pieces]
+
+
+def _grounds(carriageway: Carriageway, strips: list[tuple[Piece, int]], far: float) -> Iterator[Ground]:
+    """Pieces of ground and their materials, side by side; what continues a sheet is part of it."""
+    for (slope, camber, offset), group in groupby(strips, key=lambda strip: strip[0][2:]):
+        pieces, materials = zip(*group, strict=True)
+        edges = (*(piece.start for piece in pieces), pieces[-1].end)
+        yield Ground(carriageway.course, edges, materials, far, slope, offset, camber)
 
 
 _KINDS = {"bare": _bare, "open": _open, "street": _street, "verge": _verge}

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rollcli.simulate.cross_section import Piece
 from rollcli.simulate.materials import GREY, CarPaint, Glass, Material, Plain, Tint
 from rollcli.simulate.solids import Part, Solid
 from rollcli.simulate.surfaces import Course
@@ -62,9 +63,15 @@ def car_materials(offset: float) -> list[Material]:
 
 
 def vehicle(
-    rng: np.random.Generator, course: Course, lateral: float, z: float, first_material: int, oncoming: bool
+    rng: np.random.Generator,
+    course: Course,
+    ground: Piece,
+    lateral: float,
+    z: float,
+    first_material: int,
+    oncoming: bool,
 ) -> Solid:
-    """A car, or one time in six a truck, at (lateral, z) on the road, its nose ahead or toward us.
+    """A car, or one time in six a truck, at (lateral, z) on the ground, its nose ahead or toward us.
 
     Its materials are those of `car_materials`, from `first_material` on.
     """
@@ -83,7 +90,8 @@ def vehicle(
         ]
     )
     about = np.array([[-1.0], [1.0], [-1.0]]) if oncoming else 1.0
-    return Solid(about * course.frame(z), course.point(lateral, z), parts, extent)
+    frame = about * course.frame(z, ground.slope_at(lateral))
+    return Solid(frame, course.point(lateral, z, ground.elevation(lateral)), parts, extent)
 
 
 def _car(paint: int) -> tuple[_Shape, ...]:

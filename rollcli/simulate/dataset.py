@@ -19,6 +19,7 @@ from rollcli.files.formats import encode_stored
 from rollcli.parallel.in_order import Work
 from rollcli.parallel.interrupt import Stop
 from rollcli.parallel.local import done_locally
+from rollcli.simulate.build import road_camber
 from rollcli.simulate.options import SimulateOptions
 from rollcli.simulate.render import render_frame
 from rollcli.simulate.spec import FrameSpec, draw_specs
@@ -33,6 +34,10 @@ COLUMNS = (
     "height_m",
     "curvature_per_m",
     "seed",
+    "cross_section",
+    "crossfall_percent",
+    "gutter_percent",
+    "camber",
 )
 _PARTS = ("left", "right", "disparity")
 _TRUTH = "truth.csv"
@@ -101,6 +106,10 @@ def plan_dataset(folder: str | Path, options: SimulateOptions, *, overwrite: boo
         roll=_radians(options.roll_deg),
         pitch=_radians(options.pitch_deg),
         curvature=options.curvature,
+        cross_section=options.cross_section,
+        crossfall=_shares(options.crossfall),
+        gutter=_shares(options.gutter),
+        kerb=options.kerb,
         size=options.size,
         focal=options.focal,
         baseline=options.baseline,
@@ -178,7 +187,11 @@ def _truth(dataset: Dataset) -> bytes:
         # + 0.0 turns -0.0 into 0
         angles = (f"{math.degrees(angle) + 0.0:.9f}" for angle in (spec.roll, spec.pitch))
         rig = (f"{number + 0.0:.10g}" for number in (spec.focal, spec.baseline, spec.height, spec.curvature))
-        rows.writerow((task.stem, *angles, spec.scene, *rig, spec.seed))
+        slopes = (f"{100 * slope:.10g}" for slope in (spec.crossfall, spec.gutter))
+        # a roof has a ridge instead of a curvature
+        camber = "" if spec.cross_section == "roof" else f"{road_camber(spec) + 0.0:.10g}"
+        road = (spec.cross_section, *slopes, camber)
+        rows.writerow((task.stem, *angles, spec.scene, *rig, spec.seed, *road))
     return text.getvalue().encode()
 
 
@@ -193,7 +206,7 @@ def _require_free(folder: Path, overwrite: bool) -> None:
 
 
 def _clear(dataset: Dataset) -> None:
-    """Remove the frames that an earlier simulation left: a pair without a row would be in the way."""
+    """Remove the frames that an earlier simulation left: a pair without a row would be in the carriageway."""
     try:
         for path in (dataset.folder / _TRUTH, *_earlier_frames(dataset.folder)):
             path.unlink(missing_ok=True)
@@ -208,6 +221,10 @@ def _earlier_frames(folder: Path) -> list[Path]:
         return []
     names = set.intersection(*({path.name for path in each.iterdir()} for each in folders))
     return [each / name for name in names if _OURS.fullmatch(name) for each in folders]
+
+
+def _shares(percent: Sequence[float]) -> tuple[float, float]:
+    return percent[0] / 100, percent[1] / 100
 
 
 def _radians(span: Sequence[float]) -> tuple[float, float]:

@@ -6,7 +6,8 @@ Nothing heavy is imported here, since the command line imports this module to sh
 from dataclasses import dataclass
 
 SCENES = ("bare", "open", "street", "verge")
-MIXED = "mixed"  # each frame draws one of the scenes
+CROSS_SECTIONS = ("flat", "crown", "roof", "dish", "superelevated")
+MIXED = "mixed"  # each frame draws one of the scenes, or of the cross sections
 
 FRAMES = 10
 SIZE = (640, 480)
@@ -16,6 +17,9 @@ HEIGHT = 1.65
 NOISE = 1.5
 ROLL_DEG = (-10.0, 10.0)
 PITCH_DEG = (-2.0, 6.0)
+CROSSFALL = (1.0, 4.0)  # per cent, of roads that are not flat: what road design manuals allow without a bend
+GUTTER_WIDTH = 0.35  # metres, at each edge of the carriageway
+KERB = (0.10, 0.20)
 
 
 @dataclass(frozen=True)
@@ -23,7 +27,8 @@ class SimulateOptions:
     """What to render, as `rollcli simulate` is asked.
 
     `roll_deg` and `pitch_deg` are (lowest, highest), `curvature` the same in 1/m, or None: by scene;
-    `size` is (width, height) in pixels; `focal` in pixels or None: `FOCAL_PER_WIDTH` times the width.
+    `crossfall` and `gutter` the same in per cent, `kerb` in metres; `size` is (width, height) in pixels;
+    `focal` in pixels or None: `FOCAL_PER_WIDTH` times the width.
     """
 
     frames: int = FRAMES
@@ -31,6 +36,10 @@ class SimulateOptions:
     roll_deg: tuple[float, float] = ROLL_DEG
     pitch_deg: tuple[float, float] = PITCH_DEG
     curvature: tuple[float, float] | None = None
+    cross_section: str = "flat"
+    crossfall: tuple[float, float] = CROSSFALL
+    gutter: tuple[float, float] = (0.0, 0.0)
+    kerb: tuple[float, float] = KERB
     size: tuple[int, int] = SIZE
     focal: float | None = None
     baseline: float = BASELINE

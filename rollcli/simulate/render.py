@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.simulate.build import build_scene
+from rollcli.simulate.render_view import depths, render_view
 from rollcli.simulate.sensor import expose
 from rollcli.simulate.spec import FrameSpec
-from rollcli.simulate.view import depths, look
 
 
 @dataclass(frozen=True)
@@ -47,8 +47,7 @@ class Frame:
 def render_frame(spec: FrameSpec) -> Frame:
     """Render both views, the true disparity of the left one, and which of its pixels are road."""
     scene, rng = build_scene(spec), spec.sensor_rng()
-    cameras = spec.cameras
-    views = [look(scene, camera) for camera in cameras]
+    views = [render_view(scene, camera) for camera in spec.cameras(scene.normal)]
     left, right = (
         expose(view.light, spec.noise, gain, spec.colour, rng)
         for view, gain in zip(views, (1.0, spec.gain), strict=True)
@@ -60,5 +59,5 @@ def render_frame(spec: FrameSpec) -> Frame:
 def true_disparity(spec: FrameSpec) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """The left view's disparity in full precision (H, W), 0 in the sky, and its road pixels; no pictures."""
     scene = build_scene(spec)
-    depth, material = depths(scene, spec.cameras[0])
+    depth, material = depths(scene, spec.cameras(scene.normal)[0])
     return spec.focal * spec.baseline / depth, material == scene.road

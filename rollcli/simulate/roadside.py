@@ -5,13 +5,13 @@
 
 import numpy as np
 
+from rollcli.simulate.carriageway import Carriageway
 from rollcli.simulate.cars import box, car_materials, vehicle
 from rollcli.simulate.facade import Facade
 from rollcli.simulate.materials import WARM, Leaves, Paving, Plain, Tint
 from rollcli.simulate.scene import FAR, Scene, draw, draw_offset
 from rollcli.simulate.solids import Crown, Post, Solid
 from rollcli.simulate.surfaces import Backdrop, Course, Ground, Wall
-from rollcli.simulate.way import Way
 
 _GRASS: Tint = (0.45, 1.0, 0.72)
 _FOREST: Tint = (0.55, 1.0, 0.75)
@@ -24,19 +24,33 @@ def add_grass(scene: Scene, rng: np.random.Generator) -> int:
 
 
 def add_slope(
-    scene: Scene, way: Way, side: int, start: float, end: float, level: float, slope: float, material: int
+    scene: Scene,
+    carriageway: Carriageway,
+    side: int,
+    start: float,
+    end: float,
+    level: float,
+    slope: float,
+    material: int,
 ) -> None:
     """Ground from `start` outward to `end`, at `level` where it starts; a `slope` > 0 rises outward."""
     signed = side * slope
     edges = (start, end) if side > 0 else (end, start)
-    scene.surfaces.append(Ground(way.course, edges, (material,), FAR, signed, level - signed * start))
+    scene.surfaces.append(Ground(carriageway.course, edges, (material,), FAR, signed, level - signed * start))
 
 
 def add_sidewalk(
-    scene: Scene, rng: np.random.Generator, way: Way, side: int, edge: float, beyond: int | None = None
+    scene: Scene,
+    rng: np.random.Generator,
+    carriageway: Carriageway,
+    side: int,
+    edge: float,
+    beyond: int | None = None,
 ) -> tuple[float, float]:
-    """A kerb and a sidewalk, and what lies level `beyond` them; their height and where they end."""
-    height, width = draw(rng, 0.10, 0.20), draw(rng, 1.5, 3.5)
+    """A kerb and a sidewalk, and what lies level `beyond` them; their elevation and where they end."""
+    height, width = draw(rng, *carriageway.kerb), draw(rng, 1.5, 3.5)
+    base = carriageway.section.elevation(edge)
+    level = base + height
     stone = scene.material(Plain(draw(rng, 0.35, 0.5), joint=1.0, offset=draw_offset(rng)))
     look = Paving(draw(rng, 0.28, 0.42), draw(rng, 0.3, 0.6), tint=WARM, offset=draw_offset(rng))
     ends = [edge, edge + side * 0.15, edge + side * width]
@@ -44,10 +58,10 @@ def add_sidewalk(
     if beyond is not None:
         ends.append(side * np.inf)
         materials.append(beyond)
-    kerb = Wall(way.course, edge, 0.0, np.array([-50.0, FAR]), np.array([height]), stone)
-    strips = Ground(way.course, tuple(ends[::side]), tuple(materials[::side]), FAR, offset=height)
+    kerb = Wall(carriageway.course, edge, base, np.array([-50.0, FAR]), np.array([level]), stone)
+    strips = Ground(carriageway.course, tuple(ends[::side]), tuple(materials[::side]), FAR, offset=level)
     scene.surfaces += [kerb, strips]
-    return height, edge + side * width
+    return level, edge + side * width
 
 
 def add_houses(
@@ -78,19 +92,21 @@ def add_houses(
         scene.surfaces.append(Solid(course.frame(middle), place, (body,), extent))
 
 
-def add_hedge(scene: Scene, rng: np.random.Generator, way: Way, lateral: float, base: float) -> None:
+def add_hedge(
+    scene: Scene, rng: np.random.Generator, carriageway: Carriageway, lateral: float, base: float
+) -> None:
     """A clipped hedge along the road."""
     tint = (0.42, 1.0, 0.62)
     material = scene.material(Leaves(draw(rng, 0.08, 0.16), 0.4, tint=tint, offset=draw_offset(rng)))
     edges = np.arange(-20.0, 120.0, 1.0, dtype=np.float64)
     tops = base + draw(rng, 0.9, 1.8) + rng.uniform(-0.08, 0.08, len(edges) - 1)
-    scene.surfaces.append(Wall(way.course, lateral, base, edges, tops, material))
+    scene.surfaces.append(Wall(carriageway.course, lateral, base, edges, tops, material))
 
 
 def add_posts(
     scene: Scene,
     rng: np.random.Generator,
-    way: Way,
+    carriageway: Carriageway,
     lateral: float,
     level: float,
     radius: float = 0.07,
@@ -100,11 +116,11 @@ def add_posts(
     metal = scene.material(Plain(draw(rng, 0.2, 0.6), 0.05, 0.05))
     gap = draw(rng, 18, 35)
     for z in np.arange(draw(rng, 6, gap), 90, gap):
-        scene.surfaces.append(Post(way.course.point(lateral, float(z), level), radius, height, metal))
+        scene.surfaces.append(Post(carriageway.course.point(lateral, float(z), level), radius, height, metal))
 
 
 def add_trees(
-    scene: Scene, rng: np.random.Generator, way: Way, near: float, outer: float, level: float
+    scene: Scene, rng: np.random.Generator, carriageway: Carriageway, near: float, outer: float, level: float
 ) -> None:
     """Trees between two lateral positions, each a trunk and two crowns grown into each other."""
     bark = scene.material(Plain(0.12, 0.3, 0.2, tint=(0.75, 0.9, 1.0)))
@@ -115,7 +131,7 @@ def add_trees(
         lateral = near + (outer - near) * float(rng.random())
         stem, radius = draw(rng, 2.2, 3.2), draw(rng, 1.2, 2.2)
         half = radius * draw(rng, 0.9, 1.4)
-        foot, top = (way.course.point(lateral, z, level + rise) for rise in (0.0, stem + half))
+        foot, top = (carriageway.course.point(lateral, z, level + rise) for rise in (0.0, stem + half))
         lower = top + np.array([draw(rng, -0.8, 0.8), -0.3 * half, draw(rng, -0.8, 0.8)])
         scene.surfaces += [
             Post(foot, draw(rng, 0.1, 0.2), stem + half, bark),
@@ -125,29 +141,32 @@ def add_trees(
         z += draw(rng, 7, 25)
 
 
-def add_cars(scene: Scene, rng: np.random.Generator, way: Way) -> None:
+def add_cars(scene: Scene, rng: np.random.Generator, carriageway: Carriageway) -> None:
     """One ahead, one oncoming, and parked ones, each there or not."""
     places: list[tuple[float, float]] = []
     if rng.random() < 0.5:
-        places.append((way.shift + rng.normal(0, 0.2), rng.uniform(9, 40)))
-    if rng.random() < 0.5 and not way.single:
-        places.append((way.shift - way.lane + rng.normal(0, 0.2), rng.uniform(9, 60)))
-    if way.parking:
-        for edge in (way.left + 1.15, way.right - 1.15):
+        places.append((carriageway.shift + rng.normal(0, 0.2), rng.uniform(9, 40)))
+    if rng.random() < 0.5 and not carriageway.single:
+        places.append((carriageway.shift - carriageway.lane + rng.normal(0, 0.2), rng.uniform(9, 60)))
+    if carriageway.parking:
+        for edge in (carriageway.left + 1.15, carriageway.right - 1.15):
             z = rng.uniform(6, 12)
             while z < 70:
                 if rng.random() < 0.6:
                     places.append((edge + rng.normal(0, 0.05), z))
                 z += rng.uniform(8.2, 10)
-    first, middle = len(scene.materials), way.shift - way.lane / 2
+    first, middle = len(scene.materials), carriageway.shift - carriageway.lane / 2
     scene.materials += car_materials(draw_offset(rng))
-    scene.cars += [vehicle(rng, way.course, float(x), float(z), first, x < middle) for x, z in places]
+    course, section = carriageway.course, carriageway.section
+    scene.cars += [
+        vehicle(rng, course, section.piece(x), float(x), float(z), first, x < middle) for x, z in places
+    ]
     scene.surfaces += scene.cars
 
 
-def add_backdrop(scene: Scene, rng: np.random.Generator, way: Way) -> None:
+def add_backdrop(scene: Scene, rng: np.random.Generator, carriageway: Carriageway) -> None:
     """A line of trees where the ground ends."""
     look = Leaves(draw(rng, 0.10, 0.2), scale=0.15, tint=_FOREST, offset=draw_offset(rng))
     steps = rng.normal(0, 1.2, 400)
     skyline = 9 + np.convolve(steps, np.ones(9) / 3, mode="same") + rng.uniform(-1, 1, 400)
-    scene.surfaces.append(Backdrop(way.course, FAR, -30.0, skyline, scene.material(look)))
+    scene.surfaces.append(Backdrop(carriageway.course, FAR, -30.0, skyline, scene.material(look)))

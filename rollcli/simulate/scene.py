@@ -8,15 +8,21 @@ from rollcli.simulate.light import Light
 from rollcli.simulate.materials import Material
 from rollcli.simulate.solids import Solid
 from rollcli.simulate.surfaces import Surface
+from rollcli.simulate.vectors import Array
 
 FAR = 180.0  # metres: where the ground ends before a backdrop of trees
 
 
 @dataclass
 class Scene:
-    """What there is to see; `cars` are the solids that dim the road below, `road` is the road's material."""
+    """What there is to see.
+
+    `cars` are the solids that dim the road below them, `road` is the road's material, and `normal` (3,)
+    points upward from the plane that touches the road below the rig.
+    """
 
     light: Light
+    normal: Array
     surfaces: list[Surface] = field(default_factory=list)
     materials: list[Material] = field(default_factory=list)
     cars: list[Solid] = field(default_factory=list)

@@ -6,8 +6,8 @@ from numpy.typing import NDArray
 from rollcli.simulate.light import sky
 from rollcli.simulate.materials import Material
 from rollcli.simulate.scene import Scene
-from rollcli.simulate.see import AIR, LONG, NONE, SHORT, SUN, P, Q
 from rollcli.simulate.texture import Values
+from rollcli.simulate.trace import AIR, LONG, NONE, SHORT, SUN, P, Q
 from rollcli.simulate.vectors import Array, groups
 
 _MAX_TAPS = 8

@@ -7,11 +7,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rollcli.errors import UsageError
-from rollcli.simulate.camera import Camera, stereo_rig
+from rollcli.simulate.camera import Camera, rig_axes
 from rollcli.simulate.options import (
     BASELINE,
+    CROSS_SECTIONS,
+    CROSSFALL,
     FOCAL_PER_WIDTH,
     HEIGHT,
+    KERB,
     MIXED,
     NOISE,
     PITCH_DEG,
@@ -19,16 +22,21 @@ from rollcli.simulate.options import (
     SCENES,
     SIZE,
 )
+from rollcli.simulate.vectors import Array
 
 Span = tuple[float, float]
 
 _ROLL = (math.radians(ROLL_DEG[0]), math.radians(ROLL_DEG[1]))
+_CROSSFALL = (CROSSFALL[0] / 100, CROSSFALL[1] / 100)
 _PITCH = (math.radians(PITCH_DEG[0]), math.radians(PITCH_DEG[1]))
 MAX_PITCH = math.radians(60)
 MAX_CURVATURE = 0.01
+MAX_CROSSFALL, MAX_GUTTER = 0.15, 0.5
+MAX_KERB = 0.5  # metres
+_LEVEL = np.array([0.0, 1.0, 0.0])
 
 # streams of random numbers of a frame: each part draws from its own, so that one cannot shift another
-_POSE, _SCENE, _SENSOR = range(3)
+_POSE, _SCENE, _SENSOR, _ROAD = range(4)
 
 
 @dataclass(frozen=True)
@@ -40,16 +48,25 @@ class FrameSpec:
     scene : str
         One of `SCENES`.
     roll, pitch : float
-        Radians. Positive roll: the rig's right end is up. Positive pitch: it looks down at the road.
+        Radians, against the plane that touches the road below the left camera. Positive roll: the rig's
+        right end is up. Positive pitch: it looks down at the road.
     curvature : float
         Second derivative of the road's height along the driving direction, 1/m; a sag is positive, a
         crest negative.
+    cross_section : str
+        One of `CROSS_SECTIONS`.
+    crossfall : float
+        The steepest slope across the carriageway, metres per metre; 0 when it is flat.
+    gutter : float
+        How much more steeply the carriageway falls outward in its gutters, metres per metre.
+    kerb : tuple of float
+        The lowest and the highest kerb, metres above the edge of the carriageway.
     size : tuple of int
         Width and height, pixels.
     focal : float
         Focal length, pixels.
     baseline, height : float
-        Metres; the height is that of the left camera over the road.
+        Metres; the height is that of the left camera over the plane that touches the road below it.
     noise : float
         Standard deviation of the sensor's noise, grey levels of 255.
     gain : float
@@ -64,6 +81,10 @@ class FrameSpec:
     roll: float = 0.0
     pitch: float = 0.0
     curvature: float = 0.0
+    cross_section: str = "flat"
+    crossfall: float = 0.0
+    gutter: float = 0.0
+    kerb: Span = KERB
     size: tuple[int, int] = SIZE
     focal: float = FOCAL_PER_WIDTH * SIZE[0]
     baseline: float = BASELINE
@@ -78,10 +99,14 @@ class FrameSpec:
         for problem in _problems(self):
             raise UsageError(problem)
 
-    @property
-    def cameras(self) -> tuple[Camera, Camera]:
-        """The left and the right camera."""
-        return stereo_rig(self.size, self.focal, self.roll, self.pitch, self.height, self.baseline)
+    def cameras(self, normal: Array = _LEVEL) -> tuple[Camera, Camera]:
+        """The left and the right camera of a rig on a plane through the origin, whose `normal` points up."""
+        axes = rig_axes(self.roll, self.pitch, normal)
+        left = self.height * normal
+        centre = (self.size[0] - 1) / 2, (self.size[1] - 1) / 2
+        places = left, left + self.baseline * axes[0]
+        first, second = (Camera(*self.size, self.focal, centre, axes, place) for place in places)
+        return first, second
 
     def scene_rng(self) -> np.random.Generator:
         """Random numbers for what stands where and what it looks like."""
@@ -99,6 +124,10 @@ def draw_specs(
     roll: Span = _ROLL,
     pitch: Span = _PITCH,
     curvature: Span | None = None,
+    cross_section: str = "flat",
+    crossfall: Span = _CROSSFALL,
+    gutter: Span = (0.0, 0.0),
+    kerb: Span = KERB,
     size: tuple[int, int] = SIZE,
     focal: float | None = None,
     baseline: float = BASELINE,
@@ -121,6 +150,10 @@ def draw_specs(
     curvature : tuple of float or None
         Lowest and highest vertical curvature, 1/m, drawn evenly. None: ``bare`` is flat, in the
         other scenes every second frame is flat and the others lie within +-0.001 (a radius of 1 km).
+    cross_section : str
+        One of `CROSS_SECTIONS`, or ``mixed``: each frame draws one of them.
+    crossfall, gutter : tuple of float
+        Lowest and highest slope, metres per metre, drawn evenly; flat roads have no crossfall.
     focal : float or None
         Pixels; None: 0.58 times the width.
 
@@ -135,9 +168,12 @@ def draw_specs(
         raise UsageError(f"at least one frame must be asked for, not {n}")
     if scene not in (*SCENES, MIXED):
         raise UsageError(f"no such scene: {scene}; choose one of {', '.join((*SCENES, MIXED))}")
+    if cross_section not in (*CROSS_SECTIONS, MIXED):
+        raise UsageError(_no_such_section(cross_section, (*CROSS_SECTIONS, MIXED)))
     if seed < 0:
         raise UsageError(f"the seed must be 0 or more, not {seed}")
-    for name, span in (("roll", roll), ("pitch", pitch), ("curvature", curvature or (0.0, 0.0))):
+    spans = {"roll": roll, "pitch": pitch, "curvature": curvature or (0.0, 0.0)}
+    for name, span in (spans | {"crossfall": crossfall, "gutter": gutter}).items():
         if not span[0] <= span[1]:
             raise UsageError(f"the range of the {name} is empty: its lower end comes first")
     rig = FrameSpec(
@@ -148,11 +184,15 @@ def draw_specs(
         noise=noise,
         gain=gain,
         colour=colour,
+        kerb=kerb,
         seed=seed,
     )
-    for lowest_or_highest in zip(roll, pitch, curvature or (0.0, 0.0), strict=True):
-        _posed(rig, *lowest_or_highest)  # what cannot be is refused whatever is drawn
-    return [_draw(rig, index, scene, roll, pitch, curvature) for index in range(n)]
+    for angles in zip(*spans.values(), strict=True):
+        _posed(rig, *angles)  # what cannot be is refused whatever is drawn
+    for slopes in zip(crossfall, gutter, strict=True):
+        replace(rig, crossfall=slopes[0], gutter=slopes[1])
+    frames = (_draw(rig, index, scene, roll, pitch, curvature) for index in range(n))
+    return [_draw_section(spec, cross_section, crossfall, gutter) for spec in frames]
 
 
 def _draw(
@@ -169,8 +209,20 @@ def _draw(
     return replace(_posed(rig, float(theta), float(phi), float(bend)), scene=kind, index=index)
 
 
+def _draw_section(spec: FrameSpec, kind: str, crossfall: Span, gutter: Span) -> FrameSpec:
+    rng = _stream(spec.seed, spec.index, _ROAD)
+    steepest, beside = rng.uniform(*crossfall), rng.uniform(*gutter)
+    shape = CROSS_SECTIONS[rng.integers(len(CROSS_SECTIONS))] if kind == MIXED else kind
+    fall = 0.0 if shape == "flat" else float(steepest)
+    return replace(spec, cross_section=shape, crossfall=fall, gutter=float(beside))
+
+
 def _posed(rig: FrameSpec, roll: float, pitch: float, curvature: float) -> FrameSpec:
     return replace(rig, roll=roll, pitch=pitch, curvature=curvature)
+
+
+def _no_such_section(name: str, names: tuple[str, ...]) -> str:
+    return f"no such cross section: {name}; choose one of {', '.join(names)}"
 
 
 def _stream(seed: int, index: int, part: int) -> np.random.Generator:
@@ -189,11 +241,23 @@ def _problems(spec: FrameSpec) -> Iterator[str]:
         spec.height,
         spec.noise,
         spec.gain,
+        spec.crossfall,
+        spec.gutter,
+        *spec.kerb,
     )
     if not all(map(math.isfinite, numbers)):
         yield "every number of a simulated rig must be finite"
     if spec.scene not in SCENES:
         yield f"no such scene: {spec.scene}; choose one of {', '.join(SCENES)}"
+    if spec.cross_section not in CROSS_SECTIONS:
+        yield _no_such_section(spec.cross_section, CROSS_SECTIONS)
+    if not 0 <= spec.crossfall <= MAX_CROSSFALL:
+        yield f"a crossfall of {100 * spec.crossfall:g} % is not within 0 and {100 * MAX_CROSSFALL:g} %"
+    if not 0 <= spec.gutter <= MAX_GUTTER:
+        yield f"a gutter of {100 * spec.gutter:g} % is not within 0 and {100 * MAX_GUTTER:g} %"
+    if not 0 <= spec.kerb[0] <= spec.kerb[1] <= MAX_KERB:
+        low, high = spec.kerb
+        yield f"kerbs of {low:g} to {high:g} m do not lie within 0 and {MAX_KERB:g} m, the lower one first"
     if not (16 <= width <= 16384 and 16 <= height <= 16384):
         yield f"a size of {width}x{height} is not one of 16 to 16384 pixels each way"
     if spec.focal <= 0:

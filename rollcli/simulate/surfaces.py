@@ -2,7 +2,7 @@
 
 A surface says how far along each ray it is met (`intersect`) and, at the points met, which way it faces
 and where its texture is to be read (`chart`). The road rises and bends as parabolas, so that each
-intersection is a quadratic: exact, and without a step size.
+intersection is the root of a polynomial: exact, and without a step size.
 """
 
 from dataclasses import dataclass
@@ -11,9 +11,12 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from rollcli.simulate.polynomials import first_crossing
 from rollcli.simulate.vectors import Array, Vectors
 
 NEAR = 0.05  # metres: nothing nearer is met
+_SEAM = 1e-9  # metres: neighbouring grounds overlap by it, so that no ray slips between them
+_FARTHEST = 1e6  # metres
 
 Indices = NDArray[np.intp]
 
@@ -73,11 +76,11 @@ class Course:
         x = lateral + z * (self.heading + self.bend / 2 * z)
         return np.array([x, elevation + self.curvature / 2 * z * z, z])
 
-    def frame(self, z: float) -> Array:
-        """Rows: right, up and ahead of something that stands on the course at `z`, (3, 3)."""
+    def frame(self, z: float, slope: float = 0.0) -> Array:
+        """Rows: right, up and ahead of something that stands at `z` where the road has this slope, (3, 3)."""
         ahead = np.array([self.heading + self.bend * z, self.curvature * z, 1.0])
         ahead /= np.linalg.norm(ahead)
-        up = np.array([0.0, 1.0, 0.0]) - ahead[1] * ahead
+        up = np.array([-slope, 1.0, 0.0]) - (ahead[1] - slope * ahead[0]) * ahead
         up /= np.linalg.norm(up)
         return np.array([np.cross(up, ahead), up, ahead])
 
@@ -88,7 +91,7 @@ class Course:
 
 @dataclass(frozen=True)
 class Ground:
-    """The sheet elevation = offset + slope * lateral, in strips side by side.
+    """The sheet elevation = offset + slope * lateral + camber / 2 * lateral^2, in strips side by side.
 
     Strip i lies between edges[i] and edges[i + 1] (lateral, metres) and is of materials[i].
     """
@@ -99,23 +102,43 @@ class Ground:
     far: float
     slope: float = 0.0
     offset: float = 0.0
+    camber: float = 0.0
 
     def intersect(self, origin: Array, direction: Array) -> Array:
+        (ox, _, oz), (rx, _, rz) = origin, direction
+        t = self._first_hit(origin, direction)
+        z = oz + t * rz
+        lateral = ox + t * rx - z * (self.course.heading + self.course.bend / 2 * z)
+        inside = (lateral >= self.edges[0] - _SEAM) & (lateral < self.edges[-1] + _SEAM) & (z < self.far)
+        return np.where(inside, t, np.inf)
+
+    def _first_hit(self, origin: Array, direction: Array) -> Array:
+        """Where rays first meet the sheet, without its edges; nan where they do not."""
         (ox, oy, oz), (rx, ry, rz) = origin, direction
         lean = self.slope * self.course.bend - self.course.curvature
         a = lean / 2 * rz * rz
         b = ry - self.slope * (rx - self.course.heading * rz) + lean * oz * rz
         c = oy - self.slope * (ox - self.course.heading * oz) + lean / 2 * oz * oz - self.offset
-        t = first_root(a, b, c)
-        z = oz + t * rz
-        lateral = ox + t * rx - z * (self.course.heading + self.course.bend / 2 * z)
-        inside = (lateral >= self.edges[0]) & (lateral < self.edges[-1]) & (z < self.far)
-        return np.where(inside, t, np.inf)
+        if not self.camber:
+            return first_root(a, b, c)
+        # along a ray, lateral = l0 + l1 t + l2 t^2, and the camber adds its square
+        l0 = ox - oz * (self.course.heading + self.course.bend / 2 * oz)
+        l1 = rx - rz * (self.course.heading + self.course.bend * oz)
+        l2 = -self.course.bend / 2 * rz * rz
+        half = self.camber / 2
+        a, b, c = a - half * (l1 * l1 + 2 * l0 * l2), b - self.camber * l0 * l1, c - half * l0 * l0
+        if not self.course.bend:
+            return first_root(a, b, c)
+        terms = np.broadcast_arrays(c, b, a, -self.camber * l1 * l2, -half * l2 * l2)
+        with np.errstate(divide="ignore"):
+            end = np.where(rz > 0, (self.far - oz) / rz, _FARTHEST)
+        t = first_crossing(np.array(terms), np.minimum(end, _FARTHEST))
+        return np.where(t > NEAR, t, np.nan)
 
     def chart(self, points: Array) -> Chart:
         z = points[2]
         across, lateral = self.course.across(z), self.course.lateral(points)
-        normal = -self.slope * across
+        normal = -(self.slope + self.camber * lateral) * across
         normal[1] += 1.0
         normal[2] -= self.course.curvature * z
         strip = np.clip(np.searchsorted(self.edges, lateral, side="right") - 1, 0, len(self.materials) - 1)
@@ -194,7 +217,7 @@ def first_root(a: Array, b: Array, c: Array) -> Array:
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         t = 2 * c / (np.sqrt(b * b - 4 * a * c) - b)
-        return np.where((c > 0) & (t > NEAR) & (t < 1e6), t, np.nan)
+        return np.where((c > 0) & (t > NEAR) & (t < _FARTHEST), t, np.nan)
 
 
 # single precision: in double they would double the cost of shading

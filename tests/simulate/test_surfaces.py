@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from rollcli.simulate.cars import vehicle
+from rollcli.simulate.cross_section import Piece
 from rollcli.simulate.solids import Crown, Post
 from rollcli.simulate.surfaces import Backdrop, Course, Ground, Wall
 
@@ -12,7 +13,7 @@ ORIGIN = np.array([[0.3], [1.6], [0.1]])
 GROUND = Ground(COURSE, (-4.0, 1.0, 9.0), (0, 1), far=80.0, slope=0.1, offset=-0.2)
 WALL = Wall(COURSE, -6.0, 0.0, np.array([-5.0, 20.0, 50.0]), np.array([9.0, 4.0]), 0)
 BACKDROP = Backdrop(COURSE, 60.0, -5.0, np.full(200, 7.0), 0)
-CAR = vehicle(np.random.default_rng(3), COURSE, 1.0, 9.0, 0, oncoming=True)
+CAR = vehicle(np.random.default_rng(3), COURSE, Piece(-5, 5), 1.0, 9.0, 0, oncoming=True)
 POST = Post(COURSE.point(2.0, 8.0), 0.3, 4.0, 0)
 CROWN = Crown(COURSE.point(-1.0, 12.0, 2.5), 1.8, 2.2, 0)
 

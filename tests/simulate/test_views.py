@@ -10,8 +10,8 @@ import pytest
 from rollcli.imaging.stereo import compute_disparity
 from rollcli.simulate.build import build_scene
 from rollcli.simulate.render import render_frame
+from rollcli.simulate.render_view import render_view
 from rollcli.simulate.spec import FrameSpec
-from rollcli.simulate.view import look
 
 CLEAN = {"noise": 0.0, "colour": False}
 STREET = FrameSpec("street", math.radians(6), math.radians(2), seed=12, size=(320, 240), focal=186.0, **CLEAN)
@@ -27,7 +27,7 @@ def warped(image, disparity):
 def test_the_right_view_moved_by_the_true_disparity_is_the_left_view(scene):
     spec = replace(STREET, scene=scene)
     frame = render_frame(spec)
-    right_depth = look(build_scene(spec), spec.cameras[1]).depth
+    right_depth = render_view(build_scene(spec), spec.cameras()[1]).depth
     expected = spec.focal * spec.baseline / np.maximum(frame.disparity, 1e-6)
     seen_by_both = np.abs(warped(1 / right_depth, frame.disparity) * expected - 1) < 0.01
     seen_by_both &= np.indices(frame.disparity.shape)[1] - frame.disparity > 1
@@ -95,7 +95,7 @@ def test_a_stereo_matcher_finds_the_road_as_well_as_on_real_pairs(scene):
 
 def test_a_picture_is_the_same_rendered_in_one_band_of_rows_or_in_many(monkeypatch):
     whole = render_frame(STREET)
-    monkeypatch.setattr("rollcli.simulate.view._BAND", 17 * 320)
+    monkeypatch.setattr("rollcli.simulate.render_view._BAND", 17 * 320)
     banded = render_frame(STREET)
     assert np.array_equal(whole.left, banded.left)
     assert np.array_equal(whole.right, banded.right)

@@ -33,9 +33,9 @@ class Seen:
     reads: Values
 
 
-def see(scene: Scene, pixels: Pixels) -> Seen:
+def trace(scene: Scene, pixels: Pixels) -> Seen:
     """Trace the rays and read what they meet."""
-    depth, owner = trace(scene, pixels)
+    depth, owner = first_hits(scene, pixels)
     seen = Seen(depth, owner, np.full(len(depth), NONE, np.int16), np.ones((8, len(depth)), np.float32))
     direction = pixels.rays.direction.astype(np.float32)
     for k, at in groups(owner, len(scene.surfaces)):
@@ -44,7 +44,7 @@ def see(scene: Scene, pixels: Pixels) -> Seen:
     return seen
 
 
-def trace(scene: Scene, pixels: Pixels) -> tuple[Array, NDArray[np.int16]]:
+def first_hits(scene: Scene, pixels: Pixels) -> tuple[Array, NDArray[np.int16]]:
     """Depth (inf for sky) and index of the surface (-1 for sky) that each ray meets first."""
     rays = pixels.rays
     depth = np.full(len(pixels.u), np.inf)

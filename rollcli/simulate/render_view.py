@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from rollcli.simulate.camera import Camera
 from rollcli.simulate.pixels import Pixels
 from rollcli.simulate.scene import Scene
-from rollcli.simulate.see import SUN, Seen, see
 from rollcli.simulate.shade import shade
 from rollcli.simulate.texture import Values
+from rollcli.simulate.trace import SUN, Seen, trace
 from rollcli.simulate.vectors import Array
 
 _BAND = 350_000  # pixels: a picture of 640x480 is one band
@@ -27,9 +27,9 @@ class View:
     light: Values
 
 
-def look(scene: Scene, camera: Camera) -> View:
+def render_view(scene: Scene, camera: Camera) -> View:
     """Render a camera's image; pixels at the edges of things are averaged from four rays."""
-    bands = [_look(scene, camera, rows) for rows in _bands(camera)]
+    bands = [_render_band(scene, camera, rows) for rows in _bands(camera)]
     return View(
         np.concatenate([band.depth for band in bands]),
         np.concatenate([band.material for band in bands]),
@@ -40,7 +40,7 @@ def look(scene: Scene, camera: Camera) -> View:
 def depths(scene: Scene, camera: Camera) -> tuple[Array, NDArray[np.int16]]:
     """Depth and material (H, W) of a camera's image, as in `View`, without its light."""
     shape = (camera.height, camera.width)
-    bands = [see(scene, Pixels.of_rows(camera, rows)) for rows in _bands(camera)]
+    bands = [trace(scene, Pixels.of_rows(camera, rows)) for rows in _bands(camera)]
     depth = np.concatenate([band.depth for band in bands])
     return depth.reshape(shape), np.concatenate([band.material for band in bands]).reshape(shape)
 
@@ -50,17 +50,17 @@ def _bands(camera: Camera) -> list[range]:
     return [range(top, min(top + step, camera.height)) for top in range(0, camera.height, step)]
 
 
-def _look(scene: Scene, camera: Camera, rows: range) -> View:
+def _render_band(scene: Scene, camera: Camera, rows: range) -> View:
     """The part of a camera's image in these rows."""
     # with a row more above and below: edges are where neighbours differ
     around = range(max(rows.start - 1, 0), min(rows.stop + 1, camera.height))
     pixels = Pixels.of_rows(camera, around)
-    seen = see(scene, pixels)
+    seen = trace(scene, pixels)
     edge = np.flatnonzero(_edges(seen, camera.width))
     u = (pixels.u[edge] + _SUBPIXELS[:, :1]).ravel()
     v = (pixels.v[edge] + _SUBPIXELS[:, 1:]).ravel()
     between = Pixels.at(camera, u, v)
-    finer = see(scene, between)
+    finer = trace(scene, between)
     light = shade(
         scene,
         np.concatenate([pixels.rays.direction, between.rays.direction], axis=1),

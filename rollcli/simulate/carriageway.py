@@ -4,15 +4,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rollcli.simulate.cross_section import CrossSection, cross_section
 from rollcli.simulate.materials import Asphalt, Mark, Patch
+from rollcli.simulate.options import GUTTER_WIDTH
 from rollcli.simulate.scene import FAR, draw, draw_offset
 from rollcli.simulate.spec import FrameSpec
 from rollcli.simulate.surfaces import Course
+from rollcli.simulate.vectors import Array
 
 
 @dataclass(frozen=True)
-class Way:
-    """One or two lanes between two edges (lateral, metres); the middle of ours, the right one, is `shift`."""
+class Carriageway:
+    """One or two lanes between two edges (lateral, metres); the middle of ours, the right one, is `shift`.
+
+    `kerb` is the lowest and the highest kerb, metres.
+    """
 
     course: Course
     left: float
@@ -21,47 +27,62 @@ class Way:
     shift: float
     single: bool
     parking: bool
+    section: CrossSection
+    kerb: tuple[float, float]
 
     @property
     def sides(self) -> tuple[tuple[int, float], tuple[int, float]]:
         """-1 and the left edge, 1 and the right edge."""
         return (-1, self.left), (1, self.right)
 
+    @property
+    def normal(self) -> Array:
+        """The upward unit normal (3,) of the plane that touches the road where the rig stands."""
+        slope = self.section.piece(0.0).slope_at(0.0)
+        normal = np.array([-slope, 1.0, slope * self.course.heading])
+        return np.asarray(normal / np.linalg.norm(normal))
 
-def draw_way(rng: np.random.Generator, spec: FrameSpec) -> Way:
+
+def draw_carriageway(rng: np.random.Generator, spec: FrameSpec) -> Carriageway:
     """Half of the roads bend; country roads can have a single lane, others room to park."""
     bend = float(rng.choice([0.0, 1.0])) * draw(rng, -1 / 250, 1 / 250)
     heading = float(rng.normal(0, 0.015))
     course = Course(heading, 0.0 if spec.scene == "bare" else bend, spec.curvature)
     lane, shift = draw(rng, 2.8, 3.7), float(rng.normal(0, 0.25))
     country = spec.scene in ("bare", "verge")
-    single = bool(rng.random() < 0.3) and country
+    # the ridge of a roof runs between two lanes
+    single = bool(rng.random() < 0.3) and country and spec.cross_section != "roof"
     parking = bool(rng.random() < 0.4) and not country
     shoulder = 2.2 if parking else draw(rng, 0.1, 0.6)
     left = shift - (0.5 if single else 1.5) * lane - shoulder
-    return Way(course, left, shift + 0.5 * lane + shoulder, lane, shift, single, parking)
+    right = shift + 0.5 * lane + shoulder
+    section = cross_section(spec.cross_section, spec.crossfall, spec.gutter, left, right, course.bend)
+    return Carriageway(course, left, right, lane, shift, single, parking, section, spec.kerb)
 
 
-def draw_asphalt(rng: np.random.Generator, way: Way) -> Asphalt:
+def draw_asphalt(rng: np.random.Generator, carriageway: Carriageway) -> Asphalt:
     """Its marks, gutters, mended patches and seams."""
-    middle, left, right = (way.shift + x * way.lane for x in (-0.5, -1.5, 0.5))
+    middle, left, right = (carriageway.shift + x * carriageway.lane for x in (-0.5, -1.5, 0.5))
     marks = []
-    if not way.single:
+    if not carriageway.single:
         marks.append(Mark(middle, 0.13, 12.0, 6.0) if rng.random() < 0.8 else Mark(middle, 0.13))
         if rng.random() < 0.6:
             marks += [Mark(left, 0.12), Mark(right, 0.12)]
-    gutters = ((way.left, way.left + 0.35), (way.right - 0.35, way.right))
+    gutters = (
+        (carriageway.left, carriageway.left + GUTTER_WIDTH),
+        (carriageway.right - GUTTER_WIDTH, carriageway.right),
+    )
     patches = [Patch(start, end, -50, FAR, -0.2) for start, end in gutters]
     for _ in range(rng.integers(1, 6)):
-        x, z = draw(rng, way.left, way.right), draw(rng, 3, 40)
+        x, z = draw(rng, carriageway.left, carriageway.right), draw(rng, 3, 40)
         wide, long = draw(rng, 0.5, 2.0), draw(rng, 0.8, 6.0)
         patches.append(Patch(x, x + wide, z, z + long, draw(rng, -0.35, 0.2)))
     return Asphalt(
         draw(rng, 0.16, 0.30),
         draw(rng, 0.04, 0.2),
-        wheels=(way.shift + 0.25 * way.lane, way.lane / 2),
+        wheels=(carriageway.shift + 0.25 * carriageway.lane, carriageway.lane / 2),
         marks=tuple(marks),
         patches=tuple(patches),
-        seams=tuple(draw(rng, way.left, way.right) for _ in range(rng.integers(1, 4))),
+        seams=tuple(draw(rng, carriageway.left, carriageway.right) for _ in range(rng.integers(1, 4))),
         offset=draw_offset(rng),
     )
