@@ -77,8 +77,6 @@ simulate_options = record(
     option(
         "--crossfall",
         type=Span(),
-        default=CROSSFALL,
-        show_default=False,
         help="Slope of a cross section that is not flat, per cent, drawn evenly from A to B; of a crown or "
         f"dish at its edges.  [default: {CROSSFALL[0]:g}:{CROSSFALL[1]:g}]",
     ),
@@ -93,8 +91,6 @@ simulate_options = record(
     option(
         "--kerb",
         type=Span(),
-        default=KERB,
-        show_default=False,
         help="Height of kerbs and pavements (open, street) above the road's edge, metres, drawn evenly from "
         f"A to B.  [default: {KERB[0]:g}:{KERB[1]:g}]",
     ),

@@ -20,7 +20,7 @@ from rollcli.parallel.in_order import Work
 from rollcli.parallel.interrupt import Stop
 from rollcli.parallel.local import done_locally
 from rollcli.simulate.build import road_camber
-from rollcli.simulate.options import SimulateOptions
+from rollcli.simulate.options import CROSSFALL, KERB, KERBED, MIXED, SimulateOptions
 from rollcli.simulate.render import render_frame
 from rollcli.simulate.spec import FrameSpec, draw_specs
 
@@ -100,6 +100,7 @@ def plan_dataset(folder: str | Path, options: SimulateOptions, *, overwrite: boo
     UsageError
         Options that contradict each other, or a folder with files in it.
     """
+    _refuse_idle(options)
     specs = draw_specs(
         options.frames,
         scene=options.scene,
@@ -107,9 +108,9 @@ def plan_dataset(folder: str | Path, options: SimulateOptions, *, overwrite: boo
         pitch=_radians(options.pitch_deg),
         curvature=options.curvature,
         cross_section=options.cross_section,
-        crossfall=_shares(options.crossfall),
+        crossfall=_shares(options.crossfall or CROSSFALL),
         gutter=_shares(options.gutter),
-        kerb=options.kerb,
+        kerb=options.kerb or KERB,
         size=options.size,
         focal=options.focal,
         baseline=options.baseline,
@@ -121,6 +122,14 @@ def plan_dataset(folder: str | Path, options: SimulateOptions, *, overwrite: boo
     )
     _require_free(Path(folder), overwrite)
     return Dataset(Path(folder), tuple(specs))
+
+
+def _refuse_idle(options: SimulateOptions) -> None:
+    """Refuse options that change nothing in the frames that are asked for."""
+    if options.crossfall is not None and options.cross_section == "flat":
+        raise UsageError("--crossfall: a flat road has none; choose another --cross-section")
+    if options.kerb is not None and options.scene not in (*KERBED, MIXED):
+        raise UsageError(f"--kerb: the scene {options.scene} has no kerbs; {' and '.join(KERBED)} have")
 
 
 def write_dataset(dataset: Dataset, jobs: int | None = 1, stop: Stop | None = None) -> Iterator[str]:

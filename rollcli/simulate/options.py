@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 SCENES = ("bare", "open", "street", "verge")
 CROSS_SECTIONS = ("flat", "crown", "roof", "dish", "superelevated")
+KERBED = ("open", "street")  # the scenes with kerbs
 MIXED = "mixed"  # each frame draws one of the scenes, or of the cross sections
 
 FRAMES = 10
@@ -26,9 +27,9 @@ KERB = (0.10, 0.20)
 class SimulateOptions:
     """What to render, as `rollcli simulate` is asked.
 
-    `roll_deg` and `pitch_deg` are (lowest, highest), `curvature` the same in 1/m, or None: by scene;
-    `crossfall` and `gutter` the same in per cent, `kerb` in metres; `size` is (width, height) in pixels;
-    `focal` in pixels or None: `FOCAL_PER_WIDTH` times the width.
+    Ranges are (lowest, highest): `roll_deg` and `pitch_deg`, `curvature` in 1/m or None: by scene, `crossfall`
+    and `gutter` in per cent, `kerb` in metres; None stands for `CROSSFALL` and `KERB`. `size` is (width,
+    height) in pixels, `focal` in pixels or None: `FOCAL_PER_WIDTH` times the width.
     """
 
     frames: int = FRAMES
@@ -37,9 +38,9 @@ class SimulateOptions:
     pitch_deg: tuple[float, float] = PITCH_DEG
     curvature: tuple[float, float] | None = None
     cross_section: str = "flat"
-    crossfall: tuple[float, float] = CROSSFALL
+    crossfall: tuple[float, float] | None = None
     gutter: tuple[float, float] = (0.0, 0.0)
-    kerb: tuple[float, float] = KERB
+    kerb: tuple[float, float] | None = None
     size: tuple[int, int] = SIZE
     focal: float | None = None
     baseline: float = BASELINE

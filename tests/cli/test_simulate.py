@@ -60,6 +60,13 @@ def test_a_dry_run_lists_the_files_and_writes_none(tmp_path):
         (["--scene", "beach"], "beach"),
         (["--seed", "-1"], "--seed"),
         (["--curvature", "1"], "curvature of 1 per metre"),
+        (["--cross-section", "ridge"], "'ridge' is not one of"),
+        (["--cross-section", "crown", "--crossfall", "1:16"], "crossfall of 16 % is not within 0 and 15 %"),
+        (["--cross-section", "roof", "--crossfall", "-1"], "crossfall of -1 %"),
+        (["--crossfall", "2"], "a flat road has none"),
+        (["--gutter", "60"], "gutter of 60 % is not within 0 and 50 %"),
+        (["--kerb", "0.1:0.6"], "kerbs of 0.1 to 0.6 m"),
+        (["--kerb", "0.1", "--scene", "verge"], "the scene verge has no kerbs"),
     ],
 )
 def test_what_cannot_be_is_one_line_and_status_2_and_nothing_is_written(

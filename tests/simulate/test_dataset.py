@@ -10,6 +10,7 @@ import pytest
 from rollcli.errors import OutputError, UsageError
 from rollcli.files.encodings import read_disparity
 from rollcli.simulate import dataset as module
+from rollcli.simulate.build import road_camber
 from rollcli.simulate.dataset import plan_dataset, write_dataset
 from rollcli.simulate.options import SimulateOptions
 from rollcli.simulate.render import render_frame
@@ -37,7 +38,10 @@ def test_the_folder_holds_left_right_disparity_and_truth(tmp_path):
 def test_truth_has_the_documented_columns_and_each_frames_values(tmp_path):
     simulate(tmp_path)
     first = (tmp_path / "truth.csv").read_text().splitlines()[0]
-    assert first == "file,roll_deg,pitch_deg,scene,focal_px,baseline_m,height_m,curvature_per_m,seed"
+    assert first == (
+        "file,roll_deg,pitch_deg,scene,focal_px,baseline_m,height_m,curvature_per_m,seed,"
+        "cross_section,crossfall_percent,gutter_percent,camber"
+    )
     specs = plan_dataset(tmp_path, TINY, overwrite=True).specs
     for number, (row, spec) in enumerate(zip(rows(tmp_path), specs, strict=True), 1):
         assert row["file"] == f"frame_{number:04d}"
@@ -46,6 +50,24 @@ def test_truth_has_the_documented_columns_and_each_frames_values(tmp_path):
         assert float(row["curvature_per_m"]) == pytest.approx(spec.curvature)
         assert (row["scene"], float(row["focal_px"]), row["seed"]) == (spec.scene, 37.12, "9")
         assert (float(row["baseline_m"]), float(row["height_m"])) == (0.54, 1.65)
+        assert [row[name] for name in first.split(",")[-4:]] == ["flat", "0", "0", "0"]
+
+
+def test_truth_says_what_the_road_is_like_across(tmp_path):
+    asked = SimulateOptions(
+        frames=24, size=(32, 24), cross_section="mixed", crossfall=(2, 3), gutter=(5, 5), kerb=(0.02, 0.05)
+    )
+    specs = plan_dataset(tmp_path, asked).specs
+    simulate(tmp_path, asked)
+    assert {spec.cross_section for spec in specs} == {"flat", "crown", "roof", "dish", "superelevated"}
+    for row, spec in zip(rows(tmp_path), specs, strict=True):
+        assert spec.kerb == (0.02, 0.05)
+        assert row["cross_section"] == spec.cross_section
+        assert float(row["gutter_percent"]) == 5
+        assert float(row["crossfall_percent"]) == pytest.approx(100 * spec.crossfall)
+        assert spec.crossfall == 0 if spec.cross_section == "flat" else 0.02 <= spec.crossfall <= 0.03
+        expected = "" if spec.cross_section == "roof" else f"{road_camber(spec) + 0.0:.10g}"
+        assert row["camber"] == expected
 
 
 def test_images_are_the_rendered_frame(tmp_path):

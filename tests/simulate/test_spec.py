@@ -31,6 +31,10 @@ TINY = {"size": (64, 48), "focal": 37.0}
         ({"curvature": 0.02}, "curvature of 0.02"),
         ({"scene": "beach"}, "no such scene: beach"),
         ({"focal": math.nan}, "finite"),
+        ({"crossfall": 0.2}, "crossfall of 20 %"),
+        ({"gutter": -0.1}, "gutter of -10 %"),
+        ({"kerb": (0.2, 0.1)}, "kerbs of 0.2 to 0.1 m"),
+        ({"cross_section": "ridge"}, "no such cross section: ridge"),
     ],
 )
 def test_a_rig_that_cannot_be_is_refused_and_the_reason_named(wrong, named):
