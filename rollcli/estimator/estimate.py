@@ -12,13 +12,15 @@ from numpy.typing import ArrayLike, NDArray
 from rollcli.errors import UsageError
 from rollcli.estimator.doubts import doubts_of_interval, doubts_of_road, doubts_of_solution
 from rollcli.estimator.energy import Energy
-from rollcli.estimator.interval import half_width
+from rollcli.estimator.interval import half_width, jackknife
+from rollcli.estimator.moments import Grid
 from rollcli.estimator.road.surface import Surface
 from rollcli.estimator.selection import Pixels, take_all, take_area, take_road
 from rollcli.estimator.solvers.exact import Minimum, exact, minima
 from rollcli.estimator.solvers.golden_section import golden_section
 from rollcli.estimator.solvers.gradient_descent import LAMBDA0, TOLERANCE, gradient_descent
 from rollcli.estimator.solvers.solution import Solution, apart
+from rollcli.estimator.tangent import Tangent, touch
 from rollcli.estimator.validity import LARGEST, require_pixels
 
 AREA_METHODS = ("plane", "areas")
@@ -56,6 +58,13 @@ class RollEstimate:
         The share of all pixels that is valid, and the share of the valid ones that was used as road.
     width, height : int
         Of the map, px.
+    tangent : Tangent
+        The line that touches the road's parabola amid the pixels used.
+    pitch, pitch_ci95 : float or None
+        Angle of the optical axis to the road near ahead, radians, positive: looks down; and the half-width
+        of its 95 % interval, given the calibration. None without one.
+    height_m, height_ci95_m : float or None
+        Height of the left camera over the road near ahead, metres; None without a baseline.
     """
 
     theta: float
@@ -72,6 +81,11 @@ class RollEstimate:
     road_fraction: float
     width: int
     height: int
+    tangent: Tangent
+    pitch: float | None = None
+    pitch_ci95: float | None = None
+    height_m: float | None = None
+    height_ci95_m: float | None = None
     _usable: NDArray[np.bool_] | None = field(default=None, repr=False, compare=False)
     _surface: Surface | None = field(default=None, repr=False, compare=False)
 
@@ -172,7 +186,9 @@ def estimate_roll(
     energy, surface = pixels.energy, pixels.surface
     slack = 1e-9 * (energy.rest + energy.slope_energy)
     is_global = float(energy.at(solution.theta).value) <= basins[0].energy + slack
-    ci95 = None if surface is None else half_width(surface, solution.theta)
+    knife = None if surface is None else jackknife(surface, solution.theta)
+    ci95 = None if knife is None else half_width(knife, solution.theta)
+    alpha = energy.parabola(solution.theta)
     doubts = doubts_of_solution(solution, energy, basins, is_global=is_global)
     if pixels.road is not None and surface is not None:
         doubts += doubts_of_road(pixels.road, surface, max_roll)
@@ -188,11 +204,12 @@ def estimate_roll(
         converged=solution.outcome.converged,
         global_minimum=None if method in AREA_METHODS else is_global,
         rmse=energy.rmse(solution.theta),
-        alpha=energy.parabola(solution.theta),
+        alpha=alpha,
         valid_fraction=count / values.size,
         road_fraction=pixels.share,
         width=width,
         height=height,
+        tangent=touch(alpha, solution.theta, Grid.of_shape(height, width), surface, knife),
         _usable=usable if pixels.area is None else pixels.area,
         _surface=surface if pixels.road is not None and pixels.area is None else None,
     )

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -24,9 +25,37 @@ _KAPPA = 0.53  # tests/benchmarks/fit_interval.py finds 0.42; maps of other matc
 _T975 = (12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228, 2.201, 2.179)
 
 
-def half_width(surface: Surface, theta: float) -> float:
-    """Return the half-width of the 95 % interval of the roll angle, radians; see `moves`."""
-    bands, columns, white = moves(surface, theta)
+@dataclass(frozen=True)
+class Jackknife:
+    """How (a0, a1, a2, theta) change as a group of pixels is left out; normalised coordinates, radians.
+
+    Attributes
+    ----------
+    bands, columns : ndarray, shape (6, 4)
+        The change for each band along the road, and for each column across it.
+    white : ndarray, shape (4, 4)
+        The textbook covariance, for as many pixels as could be independent.
+    freedom : tuple of float
+        Degrees of freedom of theta's change over bands and over columns.
+    """
+
+    bands: Floats
+    columns: Floats
+    white: Floats
+    freedom: tuple[float, float]
+
+    def moves(self) -> tuple[float, float, float]:
+        """Return the half-widths of theta's interval, radians: by bands, by columns, and the textbook's."""
+        bands, columns = (
+            _student(freedom) * math.sqrt(float(np.square(changes[:, 3]).sum()))
+            for changes, freedom in zip((self.bands, self.columns), self.freedom, strict=True)
+        )
+        return bands, columns, 1.96 * math.sqrt(self.white[3, 3])
+
+
+def half_width(jackknife: Jackknife, theta: float) -> float:
+    """Return the half-width of the 95 % interval of the roll angle, radians."""
+    bands, columns, white = jackknife.moves()
     return _KAPPA * slant(theta) * math.sqrt(bands**2 + columns**2 + white**2)
 
 
@@ -39,8 +68,8 @@ def slant(theta: float) -> float:
     return 1 + abs(math.sin(theta))
 
 
-def moves(surface: Surface, theta: float) -> tuple[float, float, float]:
-    """Return what the interval is made of.
+def jackknife(surface: Surface, theta: float) -> Jackknife:
+    """Leave out one group of the road's pixels after the other.
 
     Parameters
     ----------
@@ -51,10 +80,7 @@ def moves(surface: Surface, theta: float) -> tuple[float, float, float]:
 
     Returns
     -------
-    bands, columns : float
-        By the jackknife over bands along the road and over columns across it, radians.
-    white : float
-        By the textbook formula, for as many pixels as could be independent, radians.
+    Jackknife
     """
     cosine, sine = math.cos(theta), math.sin(theta)
     across = surface.x * cosine + surface.y * sine
@@ -72,8 +98,15 @@ def moves(surface: Surface, theta: float) -> tuple[float, float, float]:
     step = inverse @ total[:4, 4]  # from the surface's parabola to the best one
     independent = max(1.0, total[0, 0] / _EFFECTIVE_PIXELS)
     rest = max(0.0, total[4, 4] - step @ total[:4, 4])
-    white = 1.96 * math.sqrt(rest / total[0, 0] * inverse[3, 3] * independent)
-    return _spread(bands, normal, step), _spread(columns, normal, step), white
+    white: Floats = inverse * (rest / total[0, 0] * independent)
+    if not surface.parabolic:  # there is no a2 to err
+        white[2] = white[:, 2] = 0
+    return Jackknife(
+        bands=_changes(bands, normal, step),
+        columns=_changes(columns, normal, step),
+        white=white,
+        freedom=(_freedom(bands, normal), _freedom(columns, normal)),
+    )
 
 
 def _by_group(rows: Floats, weights: Floats, position: Floats, share: Floats) -> Floats:
@@ -91,13 +124,17 @@ def _by_group(rows: Floats, weights: Floats, position: Floats, share: Floats) ->
     return np.stack([weighted[:, a:b] @ sorted_rows[:, a:b].T for a, b in itertools.pairwise(bounds)])
 
 
-def _spread(groups: Floats, normal: Floats, step: Floats) -> float:
-    """Return t * sqrt(sum of squared moves of theta) as one group after the other is left out."""
+def _changes(groups: Floats, normal: Floats, step: Floats) -> Floats:
+    """Return how the four parameters change as one group after the other is left out, shape (6, 4)."""
     parts, pulls = groups[:, :4, :4], groups[:, :4, 4]
-    moved = np.linalg.solve(solvable(normal - parts), (pulls - parts @ step)[..., None])[:, 3, 0]
-    leverage = parts[:, 3, 3] / normal[3, 3]
-    freedom = max(1.0, 1 / float(np.square(leverage).sum()) - 1)
-    return _student(freedom) * math.sqrt(float(np.square(moved).sum()))
+    changes = np.linalg.solve(solvable(normal - parts), (pulls - parts @ step)[..., None])
+    return np.asarray(changes[..., 0], np.float64)
+
+
+def _freedom(groups: Floats, normal: Floats) -> float:
+    """Return the degrees of freedom that the groups' shares of theta leave."""
+    leverage = groups[:, 3, 3] / normal[3, 3]
+    return max(1.0, 1 / float(np.square(leverage).sum()) - 1)
 
 
 def _student(freedom: float) -> float:

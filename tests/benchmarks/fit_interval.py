@@ -34,7 +34,7 @@ def terms(frames: int, seeds: tuple[int, int]) -> tuple[np.ndarray, list[str]]:
                 print(f"{scene} {roll_deg:.2f}: {error}")
                 continue
             assert surface is not None
-            bands, columns, white = np.degrees(interval.moves(surface, theta))
+            bands, columns, white = np.degrees(interval.jackknife(surface, theta).moves())
             pixels = max(1.0, surface.weights.sum() / interval._EFFECTIVE_PIXELS)
             error = abs(math.degrees(theta) - roll_deg)
             weight = surface.weights.sum()

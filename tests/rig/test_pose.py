@@ -1,0 +1,180 @@
+"""Pitch and height against rigs whose planes are made by ray casting, and against central differences."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rollcli.errors import UsageError
+from rollcli.estimator.estimate import estimate_roll
+from rollcli.estimator.tangent import Tangent
+from rollcli.rig.calibration import Calibration
+from rollcli.rig.pose import horizon_row, pose_jacobian, pose_of, taken_as_exact, with_pose
+
+WIDTH, HEIGHT = 320, 200
+
+
+def turned(roll, pitch):
+    """Axes of the camera (rows: right, down, forward) in a world of X right, Y down, Z forward."""
+    level = np.array(
+        [[1, 0, 0], [0, math.cos(pitch), -math.sin(pitch)], [0, math.sin(pitch), math.cos(pitch)]]
+    )
+    # a rig turned counter-clockwise seen from behind: its right axis goes up
+    own = np.array([[math.cos(roll), -math.sin(roll), 0], [math.sin(roll), math.cos(roll), 0], [0, 0, 1]])
+    return own @ level
+
+
+def cast(calibration, roll, pitch, height, shape=(HEIGHT, WIDTH)):
+    """Disparity of a level road by casting the ray of each pixel; 0 above the horizon."""
+    v, u = np.mgrid[: shape[0], : shape[1]].astype(float)
+    rays = np.stack(
+        [(u - calibration.cx) / calibration.fx, (v - calibration.cy) / calibration.fy, np.ones_like(u)], -1
+    )
+    down = (rays @ turned(roll, pitch))[..., 1]
+    with np.errstate(divide="ignore"):
+        depth = np.where(down > 1e-9, height / down, np.inf)
+    disparity = calibration.fx * calibration.baseline / depth - calibration.doffs
+    return np.where((disparity > 0) & np.isfinite(depth), disparity, 0)
+
+
+def random_rig(rng, *, square=True):
+    fx = rng.uniform(150, 400)
+    fy = fx if square else fx * rng.uniform(0.97, 1.03)
+    centre = rng.uniform(-30, 30, 2) + np.array([WIDTH, HEIGHT]) / 2
+    calibration = Calibration(
+        fx, fy, *map(float, centre), float(rng.uniform(0.1, 0.8)), float(rng.uniform(-5, 5))
+    )
+    roll, pitch, height = rng.uniform(-0.4, 0.4), rng.uniform(-0.1, 0.3), rng.uniform(0.5, 3)
+    return calibration, float(roll), float(pitch), float(height)
+
+
+def plane_tangent(disparity, row=None):
+    """The tangent of a map that is a plane, from three of its pixels."""
+    v, u = np.nonzero(disparity)
+    d0, c1, c2 = np.linalg.lstsq(np.column_stack([np.ones_like(u), u, v]), disparity[v, u], rcond=None)[0]
+    slope = math.hypot(c1, c2)
+    row = HEIGHT / 2 if row is None else row
+    return Tangent(math.atan2(-c1, c2), row, float(d0 + slope * row), slope, None)
+
+
+@pytest.mark.parametrize("seed", range(60))
+@pytest.mark.parametrize("square", [True, False])
+def test_the_pose_of_a_ray_cast_plane_is_the_rigs(seed, square):
+    calibration, roll, pitch, height = random_rig(np.random.default_rng(seed), square=square)
+    pose = pose_of(plane_tangent(cast(calibration, roll, pitch, height)), calibration)
+    assert (pose.roll, pose.pitch, pose.height) == pytest.approx((roll, pitch, height), abs=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_jacobian_is_what_central_differences_give(seed):
+    rng = np.random.default_rng(seed)
+    calibration, roll, pitch, height = random_rig(rng, square=False)
+    tangent = plane_tangent(cast(calibration, roll, pitch, height), row=rng.uniform(0, 200))
+    columns = []
+    for name, step in (("disparity", 1e-5), ("slope", 1e-7), ("theta", 1e-6)):
+        ends = [
+            pose_of(replace(tangent, **{name: getattr(tangent, name) + side * step}), calibration)
+            for side in (1, -1)
+        ]
+        upper, lower = (np.array([pose.roll, pose.pitch, pose.height]) for pose in ends)
+        columns.append((upper - lower) / (2 * step))
+    np.testing.assert_allclose(
+        pose_jacobian(tangent, calibration), np.column_stack(columns), rtol=1e-6, atol=1e-9
+    )
+
+
+@pytest.mark.parametrize("method", ["gd", "gss", "exact", "plane", "areas"])
+@pytest.mark.parametrize("road", ["auto", "all"])
+def test_every_method_gives_the_pose_of_a_road_that_fills_the_map(method, road):
+    calibration = Calibration(250.0, 250.0, 170.0, 80.0, 0.5, 1.5)
+    roll, pitch, height = math.radians(3), math.radians(25), 1.6
+    estimate = estimate_roll(cast(calibration, roll, pitch, height), method=method, road=road)
+    posed = with_pose(estimate, calibration)
+    assert (posed.theta, posed.pitch, posed.height_m) == pytest.approx((roll, pitch, height), abs=2e-4)
+    assert posed.pitch_ci95 is not None
+    assert posed.height_ci95_m is not None
+
+
+def test_pixels_that_are_not_square_correct_the_roll():
+    calibration = Calibration(250.0, 262.0, 170.0, 80.0, 0.5)
+    roll = math.radians(10)
+    estimate = estimate_roll(cast(calibration, roll, 0.4, 1.6), road="all")
+    assert abs(estimate.theta - roll) > math.radians(0.3)
+    assert with_pose(estimate, calibration).theta == pytest.approx(roll, abs=1e-6)
+
+
+def test_a_map_at_half_the_size_gives_the_same_pose():
+    calibration = Calibration(250.0, 250.0, 170.3, 80.7, 0.5, 2.0, WIDTH, HEIGHT)
+    half = calibration.for_size(WIDTH // 2, HEIGHT // 2)
+    assert half.doffs == 1.0
+    disparity = cast(half, 0.05, 0.3, 1.5, (HEIGHT // 2, WIDTH // 2))
+    # a pixel of the half-size image looks where the four pixels that it replaces look on average
+    four = cast(calibration, 0.05, 0.3, 1.5).reshape(HEIGHT // 2, 2, WIDTH // 2, 2).mean((1, 3)) / 2
+    inside = (disparity > 0) & (four > disparity.max() / 10)
+    np.testing.assert_allclose(disparity[inside], four[inside], atol=1e-9)
+    posed = with_pose(estimate_roll(disparity, road="all"), calibration)
+    assert (posed.pitch, posed.height_m) == pytest.approx((0.3, 1.5), abs=1e-5)
+
+
+def test_the_intervals_hold_the_truth_on_noisy_maps():
+    calibration = Calibration(250.0, 250.0, 160.0, 90.0, 0.5)
+    held = np.zeros(2)
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        pitch, height = rng.uniform(0.1, 0.3), rng.uniform(1.2, 2)
+        disparity = cast(calibration, rng.uniform(-0.1, 0.1), pitch, height)
+        noisy = np.where(disparity > 0, disparity + rng.normal(0, 0.3, disparity.shape), 0)
+        posed = with_pose(estimate_roll(noisy), calibration)
+        held += (
+            abs(posed.pitch - pitch) <= posed.pitch_ci95,
+            abs(posed.height_m - height) <= posed.height_ci95_m,
+        )
+    assert (held >= 36).all()
+
+
+def test_the_horizon_is_where_the_road_is_infinitely_far_away():
+    calibration, roll, pitch, height = random_rig(np.random.default_rng(5))
+    tangent = plane_tangent(cast(calibration, roll, pitch, height))
+    # the level direction straight ahead, projected
+    x, y, z = turned(roll, pitch) @ (0, 0, 1)
+    u, v = calibration.fx * x / z + calibration.cx, calibration.fy * y / z + calibration.cy
+    row = v * math.cos(roll) - u * math.sin(roll)
+    assert horizon_row(tangent, calibration) == pytest.approx(row, abs=1e-7)
+
+
+def test_without_a_baseline_there_is_a_pitch_and_no_height():
+    calibration = Calibration(250.0, 250.0, 160.0, 90.0)
+    disparity = cast(replace(calibration, baseline=0.5), 0.02, 0.2, 1.5)
+    posed = with_pose(estimate_roll(disparity), calibration)
+    assert posed.pitch == pytest.approx(0.2, abs=1e-4)
+    assert (posed.height_m, posed.height_ci95_m) == (None, None)
+    assert "baseline" not in posed.message
+
+
+def test_the_message_says_what_the_calibrations_errors_do():
+    calibration = Calibration(721.5377, 721.5377, 609.5593, 172.854, 0.53715)
+    tangent = Tangent(0.0, 280.0, 35.0, 0.53715 / 1.65, None)
+    one_lower = replace(calibration, cy=calibration.cy + 1)
+    vergence = replace(calibration, doffs=0.1)
+    message = taken_as_exact(tangent, calibration)
+    pitch = math.degrees(pose_of(tangent, calibration).pitch)
+    for other, unit in ((one_lower, "px of cy"), (vergence, "per 0.1 px of disparity")):
+        moved = math.degrees(pose_of(tangent, other).pitch) - pitch
+        said = float(message.split(unit)[0].replace(" degrees per", "").split()[-1])
+        assert said == pytest.approx(abs(moved), abs=5e-4)
+
+
+def test_a_map_of_another_size_is_refused():
+    sized = Calibration(250.0, 250.0, 160.0, 90.0, 0.5, 0.0, 300, 200)
+    estimate = estimate_roll(cast(sized, 0.02, 0.2, 1.5))
+    with pytest.raises(UsageError, match="300x200"):
+        with_pose(estimate, sized)
+
+
+def test_a_surface_whose_disparity_shrinks_downward_has_no_pose():
+    calibration = Calibration(250.0, 250.0, 160.0, 90.0, 0.5)
+    ceiling = cast(calibration, 0.0, 0.4, 1.5)[::-1]
+    posed = with_pose(estimate_roll(ceiling, road="all"), calibration)
+    assert posed.pitch is None
+    assert "no pose" in posed.message
