@@ -7,7 +7,7 @@ import click
 from rollcli.cli.command import command, option, record
 from rollcli.cli.config import config_option
 from rollcli.cli.options import PATH, running_options
-from rollcli.cli.types import Choice, Number, Size, Span
+from rollcli.cli.types import Choice, Number, Point, Size, Span
 from rollcli.frames.options import RunningOptions
 from rollcli.simulate.options import (
     BASELINE,
@@ -107,9 +107,28 @@ simulate_options = record(
         help=f"Focal length, pixels.  [default: {FOCAL_PER_WIDTH:g} times the width]",
     ),
     option(
+        "--principal-point",
+        type=Point(),
+        help="Column and row of the principal point, pixels from the centre of the top-left pixel.  "
+        "[default: the image's centre]",
+    ),
+    option(
+        "--principal-offset",
+        type=Span(),
+        default=(0.0, 0.0),
+        show_default=False,
+        help="Of the principal point, pixels, drawn evenly from A to B in each direction.  [default: 0]",
+    ),
+    option(
         "--baseline", type=Number("M", above=0), default=BASELINE, help="Between the two cameras, metres."
     ),
-    option("--height", type=Number("M"), default=HEIGHT, help="Of the left camera above the road, metres."),
+    option(
+        "--height",
+        type=Span(),
+        default=(HEIGHT, HEIGHT),
+        show_default=False,
+        help=f"Of the left camera above the road, metres, drawn evenly from A to B.  [default: {HEIGHT:g}]",
+    ),
     option(
         "--noise",
         type=Number("SIGMA", at_least=0),

@@ -134,6 +134,24 @@ class Roi(_ParamType):
         return x0, y0, x1, y1
 
 
+class Point(_ParamType):
+    """A column and a row, which need not be whole."""
+
+    name = "CX,CY"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[float, float]:
+        text = ",".join(map(str, value)) if isinstance(value, (list, tuple)) else str(value)
+        try:
+            numbers = [float(part) for part in text.split(",")]
+        except ValueError:
+            numbers = []
+        if len(numbers) != 2 or not all(map(math.isfinite, numbers)):
+            self.fail(f"{text!r} is not CX,CY in pixels, such as 609.6,172.9", param, ctx)
+        return numbers[0], numbers[1]
+
+
 class Polygon(_ParamType):
     """Three or more corners."""
 

@@ -1,7 +1,5 @@
-"""A folder of rendered frames: left, right, disparity and truth.csv, the same bytes whatever the workers."""
+"""A folder of rendered frames with their truth and calibration, the same bytes whatever the workers."""
 
-import csv
-import io
 import math
 import re
 from collections.abc import Iterator, Sequence
@@ -19,28 +17,16 @@ from rollcli.files.formats import encode_stored
 from rollcli.parallel.in_order import Work
 from rollcli.parallel.interrupt import Stop
 from rollcli.parallel.local import done_locally
-from rollcli.simulate.build import road_camber
+from rollcli.simulate.camera import rig_axes
+from rollcli.simulate.draw import draw_specs
 from rollcli.simulate.options import CROSSFALL, KERB, KERBED, MIXED, SimulateOptions
 from rollcli.simulate.render import render_frame
-from rollcli.simulate.spec import FrameSpec, draw_specs
+from rollcli.simulate.spec import LEVEL, FrameSpec
+from rollcli.simulate.truth import calibration, truth_csv
 
-COLUMNS = (
-    "file",
-    "roll_deg",
-    "pitch_deg",
-    "scene",
-    "focal_px",
-    "baseline_m",
-    "height_m",
-    "curvature_per_m",
-    "seed",
-    "cross_section",
-    "crossfall_percent",
-    "gutter_percent",
-    "camber",
-)
 _PARTS = ("left", "right", "disparity")
 _TRUTH = "truth.csv"
+_CALIBRATION = "calib"
 _OURS = re.compile(r"frame_\d{4,}\.png")
 KITTI_TOP = 65534 / 256  # pixels: larger disparities are written as no data
 
@@ -78,9 +64,17 @@ class Dataset:
         """The largest disparity of a flat road in any frame, pixels."""
         return max(_nearest_disparity(spec) for spec in self.specs)
 
+    def calibrations(self) -> dict[Path, bytes]:
+        """Files and contents: calib.txt where all frames share a rig, else one in calib/ for each frame."""
+        contents = {task.stem: calibration(task.spec) for task in self.tasks}
+        if len(set(contents.values())) == 1:
+            return {self.folder / f"{_CALIBRATION}.txt": next(iter(contents.values()))}
+        return {self.folder / _CALIBRATION / f"{stem}.txt": text for stem, text in contents.items()}
+
     def files(self) -> list[Path]:
         """Everything that is written, truth.csv last."""
-        return [*(task.image(part) for task in self.tasks for part in _PARTS), self.folder / _TRUTH]
+        images = (task.image(part) for task in self.tasks for part in _PARTS)
+        return [*images, *self.calibrations(), self.folder / _TRUTH]
 
 
 def plan_dataset(folder: str | Path, options: SimulateOptions, *, overwrite: bool = False) -> Dataset:
@@ -115,6 +109,8 @@ def plan_dataset(folder: str | Path, options: SimulateOptions, *, overwrite: boo
         focal=options.focal,
         baseline=options.baseline,
         height=options.height,
+        principal_point=options.principal_point,
+        principal_offset=options.principal_offset,
         noise=options.noise,
         gain=options.gain,
         colour=not options.grey,
@@ -158,7 +154,9 @@ def write_dataset(dataset: Dataset, jobs: int | None = 1, stop: Stop | None = No
         written += 1
         yield stem
     if written == len(dataset.specs):
-        write_atomic(dataset.folder / _TRUTH, _truth(dataset))
+        for path, text in dataset.calibrations().items():
+            write_atomic(path, text)
+        write_atomic(dataset.folder / _TRUTH, truth_csv((task.stem, task.spec) for task in dataset.tasks))
 
 
 def _write_frame(task: Task) -> str:
@@ -176,32 +174,20 @@ def _lost(task: Task, reason: str) -> str:
 
 
 def _nearest_disparity(spec: FrameSpec) -> float:
-    width, height = spec.size
-    y = (height - 1) / 2 * math.cos(spec.roll) + (width - 1) / 2 * abs(math.sin(spec.roll))
-    return spec.baseline / spec.height * (y * math.cos(spec.pitch) + spec.focal * math.sin(spec.pitch))
+    """The largest disparity of a flat road: at a corner of the image, as it changes evenly along each row."""
+    right, down, ahead = rig_axes(spec.roll, spec.pitch, LEVEL) @ -LEVEL
+    scale = spec.baseline / spec.height
+    return max(
+        scale * float(right * (u - spec.centre[0]) + down * (v - spec.centre[1]) + ahead * spec.focal)
+        for u in (0, spec.size[0] - 1)
+        for v in (0, spec.size[1] - 1)
+    )
 
 
 def _png(image: NDArray[np.uint8]) -> bytes:
     # noise hardly compresses: more effort than 1 only takes time
     _, data = cv2.imencode(".png", image, [cv2.IMWRITE_PNG_COMPRESSION, 1])
     return data.tobytes()
-
-
-def _truth(dataset: Dataset) -> bytes:
-    text = io.StringIO()
-    rows = csv.writer(text, lineterminator="\n")
-    rows.writerow(COLUMNS)
-    for task in dataset.tasks:
-        spec = task.spec
-        # + 0.0 turns -0.0 into 0
-        angles = (f"{math.degrees(angle) + 0.0:.9f}" for angle in (spec.roll, spec.pitch))
-        rig = (f"{number + 0.0:.10g}" for number in (spec.focal, spec.baseline, spec.height, spec.curvature))
-        slopes = (f"{100 * slope:.10g}" for slope in (spec.crossfall, spec.gutter))
-        # a roof has a ridge instead of a curvature
-        camber = "" if spec.cross_section == "roof" else f"{road_camber(spec) + 0.0:.10g}"
-        road = (spec.cross_section, *slopes, camber)
-        rows.writerow((task.stem, *angles, spec.scene, *rig, spec.seed, *road))
-    return text.getvalue().encode()
 
 
 def _require_free(folder: Path, overwrite: bool) -> None:
@@ -215,21 +201,25 @@ def _require_free(folder: Path, overwrite: bool) -> None:
 
 
 def _clear(dataset: Dataset) -> None:
-    """Remove the frames that an earlier simulation left: a pair without a row would be in the carriageway."""
+    """Remove what an earlier simulation left: pairs without a row, and the calibration of another rig."""
+    single = [dataset.folder / name for name in (_TRUTH, f"{_CALIBRATION}.txt")]
     try:
-        for path in (dataset.folder / _TRUTH, *_earlier_frames(dataset.folder)):
+        for path in (*single, *_earlier_frames(dataset.folder)):
             path.unlink(missing_ok=True)
     except OSError as error:
         raise output_error(dataset.folder, error) from error
 
 
 def _earlier_frames(folder: Path) -> list[Path]:
-    """What looks like ours: frame_0001.png and so on, where left, right and disparity all have it."""
+    """What looks like ours: frame_0001.png and so on, where left, right and disparity all have it, and its
+    calibration."""
     folders = [folder / part for part in _PARTS]
     if not all(each.is_dir() for each in folders):
         return []
     names = set.intersection(*({path.name for path in each.iterdir()} for each in folders))
-    return [each / name for name in names if _OURS.fullmatch(name) for each in folders]
+    ours = [name for name in names if _OURS.fullmatch(name)]
+    calibrations = [(folder / _CALIBRATION / name).with_suffix(".txt") for name in ours]
+    return [each / name for name in ours for each in folders] + calibrations
 
 
 def _shares(percent: Sequence[float]) -> tuple[float, float]:

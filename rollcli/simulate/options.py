@@ -27,9 +27,10 @@ KERB = (0.10, 0.20)
 class SimulateOptions:
     """What to render, as `rollcli simulate` is asked.
 
-    Ranges are (lowest, highest): `roll_deg` and `pitch_deg`, `curvature` in 1/m or None: by scene, `crossfall`
-    and `gutter` in per cent, `kerb` in metres; None stands for `CROSSFALL` and `KERB`. `size` is (width,
-    height) in pixels, `focal` in pixels or None: `FOCAL_PER_WIDTH` times the width.
+    Ranges are (lowest, highest): `roll_deg` and `pitch_deg`, `curvature` in 1/m or None: by scene,
+    `crossfall` and `gutter` in per cent, `kerb` and `height` in metres, `principal_offset` in pixels. None
+    stands for `CROSSFALL` and `KERB`. `size` is (width, height) in pixels, `focal` in pixels or None:
+    `FOCAL_PER_WIDTH` times the width, `principal_point` (column, row) in pixels or None: the image's centre.
     """
 
     frames: int = FRAMES
@@ -43,8 +44,10 @@ class SimulateOptions:
     kerb: tuple[float, float] | None = None
     size: tuple[int, int] = SIZE
     focal: float | None = None
+    principal_point: tuple[float, float] | None = None
+    principal_offset: tuple[float, float] = (0.0, 0.0)
     baseline: float = BASELINE
-    height: float = HEIGHT
+    height: tuple[float, float] = (HEIGHT, HEIGHT)
     noise: float = NOISE
     gain: float = 1.0
     grey: bool = False

@@ -20,9 +20,9 @@ from rollcli.files.encodings import read_disparity
 from rollcli.files.formats import read_image
 from rollcli.imaging.stereo import compute_disparity
 from rollcli.simulate.dataset import plan_dataset, write_dataset
+from rollcli.simulate.draw import draw_specs
 from rollcli.simulate.options import SCENES, SimulateOptions
 from rollcli.simulate.render import render_frame
-from rollcli.simulate.spec import draw_specs
 
 MODES = ("3way", "sgbm", "hh")
 STREETS = ROOT.parent / "shared" / "streets"

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from rollcli.imaging.stereo import StereoOptions, match_pair
+from rollcli.simulate.draw import draw_specs
 from rollcli.simulate.render import render_frame
-from rollcli.simulate.spec import FrameSpec, draw_specs
+from rollcli.simulate.spec import FrameSpec
 
 
 class Matched(NamedTuple):

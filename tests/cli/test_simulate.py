@@ -19,7 +19,7 @@ def test_it_writes_pairs_maps_and_truth_and_says_so(tmp_path):
     assert (done.status, done.out) == (0, "")
     assert "2 frames in rig" in done.err
     files = contents(tmp_path / "rig")
-    assert sorted(files)[:2] == ["disparity/frame_0001.png", "disparity/frame_0002.png"]
+    assert sorted(files)[:3] == ["calib.txt", "disparity/frame_0001.png", "disparity/frame_0002.png"]
     assert files["truth.csv"].count(b"\n") == 3
 
 
@@ -35,7 +35,8 @@ def test_a_dry_run_lists_the_files_and_writes_none(tmp_path):
     lines = [line.replace("\\", "/") for line in done.out.splitlines()]
     assert lines[0] == "write rig/left/frame_0001.png"
     assert lines[-1] == "write rig/truth.csv"
-    assert len(lines) == 7
+    assert lines[-2] == "write rig/calib.txt"
+    assert len(lines) == 8
     assert not (tmp_path / "rig").exists()
 
 
@@ -63,6 +64,10 @@ def test_a_dry_run_lists_the_files_and_writes_none(tmp_path):
         (["--cross-section", "ridge"], "'ridge' is not one of"),
         (["--cross-section", "crown", "--crossfall", "1:16"], "crossfall of 16 % is not within 0 and 15 %"),
         (["--cross-section", "roof", "--crossfall", "-1"], "crossfall of -1 %"),
+        (["--principal-point", "300"], "'300' is not CX,CY in pixels"),
+        (["--principal-point", "640,200"], "principal point 640,200 lies outside"),
+        (["--principal-offset", "0:400"], "lies outside of the image"),
+        (["--height", "2:1"], "A <= B"),
         (["--crossfall", "2"], "a flat road has none"),
         (["--gutter", "60"], "gutter of 60 % is not within 0 and 50 %"),
         (["--kerb", "0.1:0.6"], "kerbs of 0.1 to 0.6 m"),

@@ -13,7 +13,7 @@ from rollcli.simulate import dataset as module
 from rollcli.simulate.build import road_camber
 from rollcli.simulate.dataset import plan_dataset, write_dataset
 from rollcli.simulate.options import SimulateOptions
-from rollcli.simulate.render import render_frame
+from rollcli.simulate.render import render_frame, true_disparity
 from tests.run_cli import contents
 
 TINY = SimulateOptions(frames=3, size=(64, 48), seed=9)
@@ -32,14 +32,14 @@ def test_the_folder_holds_left_right_disparity_and_truth(tmp_path):
     stems = ["frame_0001", "frame_0002", "frame_0003"]
     assert done == stems
     expected = {f"{part}/{stem}.png" for part in ("left", "right", "disparity") for stem in stems}
-    assert set(contents(tmp_path / "rig")) == {*expected, "truth.csv"}
+    assert set(contents(tmp_path / "rig")) == {*expected, "calib.txt", "truth.csv"}
 
 
 def test_truth_has_the_documented_columns_and_each_frames_values(tmp_path):
     simulate(tmp_path)
     first = (tmp_path / "truth.csv").read_text().splitlines()[0]
     assert first == (
-        "file,roll_deg,pitch_deg,scene,focal_px,baseline_m,height_m,curvature_per_m,seed,"
+        "file,roll_deg,pitch_deg,scene,focal_px,cx_px,cy_px,baseline_m,height_m,curvature_per_m,seed,"
         "cross_section,crossfall_percent,gutter_percent,camber"
     )
     specs = plan_dataset(tmp_path, TINY, overwrite=True).specs
@@ -50,6 +50,7 @@ def test_truth_has_the_documented_columns_and_each_frames_values(tmp_path):
         assert float(row["curvature_per_m"]) == pytest.approx(spec.curvature)
         assert (row["scene"], float(row["focal_px"]), row["seed"]) == (spec.scene, 37.12, "9")
         assert (float(row["baseline_m"]), float(row["height_m"])) == (0.54, 1.65)
+        assert (row["cx_px"], row["cy_px"]) == ("31.5", "23.5")
         assert [row[name] for name in first.split(",")[-4:]] == ["flat", "0", "0", "0"]
 
 
@@ -68,6 +69,50 @@ def test_truth_says_what_the_road_is_like_across(tmp_path):
         assert spec.crossfall == 0 if spec.cross_section == "flat" else 0.02 <= spec.crossfall <= 0.03
         expected = "" if spec.cross_section == "roof" else f"{road_camber(spec) + 0.0:.10g}"
         assert row["camber"] == expected
+
+
+def projections(path):
+    lines = dict(line.split(": ") for line in path.read_text().splitlines())
+    return [[float(number) for number in lines[name].split()] for name in ("P0", "P1")]
+
+
+def test_frames_of_one_rig_share_a_calibration(tmp_path):
+    simulate(tmp_path, SimulateOptions(frames=2, size=(64, 48), principal_point=(30.0, 25.5), baseline=0.25))
+    left, right = projections(tmp_path / "calib.txt")
+    assert left == [37.12, 0, 30, 0, 0, 37.12, 25.5, 0, 0, 0, 1, 0]
+    assert right == [37.12, 0, 30, -9.28, 0, 37.12, 25.5, 0, 0, 0, 1, 0]
+    assert not (tmp_path / "calib").exists()
+
+
+def test_frames_of_different_rigs_have_a_calibration_each(tmp_path):
+    asked = SimulateOptions(frames=3, size=(64, 48), principal_offset=(-6, 6), height=(1.3, 1.8))
+    simulate(tmp_path, asked)
+    assert not (tmp_path / "calib.txt").exists()
+    assert len({row["cx_px"] for row in rows(tmp_path)} | {row["cy_px"] for row in rows(tmp_path)}) == 6
+    assert len({row["height_m"] for row in rows(tmp_path)}) == 3
+    for row in rows(tmp_path):
+        left, _ = projections(tmp_path / "calib" / f"{row['file']}.txt")
+        assert (left[2], left[6]) == pytest.approx((float(row["cx_px"]), float(row["cy_px"])), abs=1e-7)
+        assert 25.5 <= left[2] <= 37.5
+        assert 17.5 <= left[6] <= 29.5
+        assert 1.3 <= float(row["height_m"]) <= 1.8
+
+
+def test_overwriting_leaves_no_calibration_of_an_earlier_rig(tmp_path):
+    simulate(tmp_path, SimulateOptions(frames=2, size=(64, 48), principal_offset=(-6, 6)))
+    simulate(tmp_path, SimulateOptions(frames=1, size=(64, 48)), overwrite=True)
+    assert not list((tmp_path / "calib").iterdir())
+    simulate(tmp_path, SimulateOptions(frames=2, size=(64, 48), principal_offset=(-6, 6)), overwrite=True)
+    assert not (tmp_path / "calib.txt").exists()
+
+
+@pytest.mark.parametrize("roll_deg", [-30, 0, 12])
+def test_the_nearest_disparity_is_that_of_the_corner_of_the_image_nearest_to_the_road(tmp_path, roll_deg):
+    asked = SimulateOptions(
+        frames=1, scene="bare", size=(64, 48), roll_deg=(roll_deg, roll_deg), principal_point=(25.0, 20.0)
+    )
+    dataset = plan_dataset(tmp_path, asked)
+    assert dataset.nearest_disparity == pytest.approx(true_disparity(dataset.specs[0])[0].max(), abs=1e-9)
 
 
 def test_images_are_the_rendered_frame(tmp_path):
@@ -123,7 +168,7 @@ def test_a_file_in_place_of_the_folder_is_refused(tmp_path):
 
 def test_disparities_beyond_what_the_file_can_hold_are_no_data(tmp_path):
     options = SimulateOptions(
-        frames=1, size=(64, 48), baseline=2, height=0.2, roll_deg=(0, 0), pitch_deg=(5, 5)
+        frames=1, size=(64, 48), baseline=2, height=(0.2, 0.2), roll_deg=(0, 0), pitch_deg=(5, 5)
     )
     simulate(tmp_path, options)
     (spec,) = plan_dataset(tmp_path, options, overwrite=True).specs

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from rollcli.errors import UsageError
+from rollcli.simulate.draw import draw_specs
 from rollcli.simulate.options import SCENES
 from rollcli.simulate.render import render_frame
-from rollcli.simulate.spec import FrameSpec, draw_specs
+from rollcli.simulate.spec import FrameSpec
 
 TINY = {"size": (64, 48), "focal": 37.0}
 
@@ -34,6 +35,8 @@ TINY = {"size": (64, 48), "focal": 37.0}
         ({"crossfall": 0.2}, "crossfall of 20 %"),
         ({"gutter": -0.1}, "gutter of -10 %"),
         ({"kerb": (0.2, 0.1)}, "kerbs of 0.2 to 0.1 m"),
+        ({"principal_point": (640.0, 100.0)}, "principal point 640,100 lies outside"),
+        ({"principal_point": (100.0, -1.0)}, "principal point 100,-1 lies outside"),
         ({"cross_section": "ridge"}, "no such cross section: ridge"),
     ],
 )
@@ -51,7 +54,14 @@ def test_a_rig_that_cannot_be_is_refused_and_the_reason_named(wrong, named):
         {"roll": (0.2, 0.1)},
         {"roll": (-2.0, 0.1)},
         {"pitch": (0.0, 2.0)},
-        {"height": 0.3, "roll": (-1.0, 1.0)},
+        {"height": (0.3, 0.3), "roll": (-1.0, 1.0)},
+        {"height": (0.0, 1.6)},
+        {"height": (1.7, 1.6)},
+        {"principal_offset": (-400.0, 0.0)},
+        {"principal_offset": (0.0, 400.0)},
+        {"crossfall": (0.02, 0.2)},
+        {"gutter": (0.1, 0.0)},
+        {"cross_section": "ridge"},
     ],
 )
 def test_draws_that_cannot_be_are_refused_before_anything_is_drawn(wrong):
@@ -91,6 +101,25 @@ def test_mixed_draws_every_scene_and_only_a_bare_road_is_always_flat():
     flat = {kind: np.mean([s.curvature == 0 for s in specs if s.scene == kind]) for kind in SCENES}
     assert flat.pop("bare") == 1
     assert all(0.3 < share < 0.7 for share in flat.values())
+
+
+def test_heights_and_principal_points_are_drawn_evenly_and_change_nothing_else():
+    specs = draw_specs(1000, seed=1, size=(640, 480), height=(1.3, 1.8), principal_offset=(-30.0, 10.0))
+    plain = draw_specs(1000, seed=1, size=(640, 480))
+    assert [replace(spec, height=1.65, principal_point=None) for spec in specs] == plain
+    for values, low, high in (
+        ([spec.height for spec in specs], 1.3, 1.8),
+        ([spec.centre[0] for spec in specs], 289.5, 329.5),
+        ([spec.centre[1] for spec in specs], 209.5, 249.5),
+    ):
+        counts, _ = np.histogram(values, 5, (low, high))
+        assert counts.sum() == 1000
+        assert counts.min() > 150
+
+
+def test_offsets_are_from_the_principal_point_that_is_given():
+    (spec,) = draw_specs(1, principal_point=(300.0, 200.0), principal_offset=(5.0, 5.0))
+    assert spec.principal_point == (305.0, 205.0)
 
 
 def test_a_curvature_that_is_asked_for_holds_for_every_scene():

@@ -7,6 +7,7 @@ import pytest
 
 from rollcli.simulate.render import render_frame, true_disparity
 from rollcli.simulate.spec import FrameSpec
+from rollcli.simulate.truth import calibration
 
 SMALL = {"size": (320, 240), "focal": 186.0}
 
@@ -71,20 +72,57 @@ def rotation(roll, pitch):
 
 @pytest.mark.parametrize("curvature", [0.0, 0.002, -0.002])
 @pytest.mark.parametrize(("roll_deg", "pitch_deg"), [(0, 0), (25, 4), (-60, -2)])
-def test_points_from_the_disparity_lie_on_the_road(curvature, roll_deg, pitch_deg):
-    spec = FrameSpec("verge", math.radians(roll_deg), math.radians(pitch_deg), curvature, seed=2, **SMALL)
-    disparity, road = true_disparity(spec)
+@pytest.mark.parametrize("centre", [(159.5, 119.5), (130.25, 141.0)])
+def test_points_from_the_disparity_lie_on_the_road(curvature, roll_deg, pitch_deg, centre):
+    spec = FrameSpec(
+        "verge",
+        math.radians(roll_deg),
+        math.radians(pitch_deg),
+        curvature,
+        principal_point=centre,
+        seed=2,
+        **SMALL,
+    )
+    (cx, cy), (disparity, road) = centre, true_disparity(spec)
     v, u = np.nonzero(road)
     depth = spec.focal * spec.baseline / disparity[road]
-    rays = np.stack([(u - 159.5) / spec.focal, (v - 119.5) / spec.focal, np.ones(len(u))])
+    rays = np.stack([(u - cx) / spec.focal, (v - cy) / spec.focal, np.ones(len(u))])
     turned = rotation(spec.roll, spec.pitch)
     x, y, z = turned @ (depth * rays) + np.array([[0.0], [spec.height], [0.0]])
     assert np.abs(y - curvature / 2 * z**2).max() < 1e-9
     # the right camera is a baseline along the rig's own x axis, and sees the point that much to the left
     right = np.array([0.0, spec.height, 0.0]) + turned @ [spec.baseline, 0.0, 0.0]
     seen = turned.T @ (np.stack([x, y, z]) - right[:, None])
-    assert np.allclose(spec.focal * seen[0] / seen[2] + 159.5, u - disparity[road], atol=1e-9)
-    assert np.allclose(spec.focal * seen[1] / seen[2] + 119.5, v, atol=1e-9)
+    assert np.allclose(spec.focal * seen[0] / seen[2] + cx, u - disparity[road], atol=1e-9)
+    assert np.allclose(spec.focal * seen[1] / seen[2] + cy, v, atol=1e-9)
+
+
+@pytest.mark.parametrize("roll_deg", [-35, -2, 0, 11])
+@pytest.mark.parametrize("pitch_deg", [-2, 0, 6])
+def test_the_plane_of_a_flat_road_and_the_written_calibration_give_pitch_and_height(roll_deg, pitch_deg):
+    spec = FrameSpec(
+        "open",
+        math.radians(roll_deg),
+        math.radians(pitch_deg),
+        height=1.37,
+        baseline=0.31,
+        principal_point=(141.5, 132.0),
+        seed=4,
+        **SMALL,
+    )
+    lines = dict(line.split(": ") for line in calibration(spec).decode().splitlines())
+    left, right = (np.array(lines[name].split(), float).reshape(3, 4) for name in ("P0", "P1"))
+    camera = left[:, :3]
+    baseline = (np.linalg.solve(camera, left[:, 3]) - np.linalg.solve(camera, right[:, 3]))[0]
+    disparity, road = true_disparity(spec)
+    v, u = np.nonzero(road)
+    design = np.stack([np.ones(len(u)), u, v], axis=1)
+    c0, c1, c2 = np.linalg.lstsq(design, disparity[road], rcond=None)[0]
+    # the plane of the road is q . P = 1 in camera coordinates, with its normal q pointing down
+    q = camera.T @ [c1, c2, c0] / (camera[0, 0] * baseline)
+    assert 1 / np.linalg.norm(q) == pytest.approx(1.37, abs=1e-6)
+    assert math.degrees(math.asin(q[2] / np.linalg.norm(q))) == pytest.approx(pitch_deg, abs=1e-6)
+    assert math.degrees(math.atan2(-q[0], q[1])) == pytest.approx(roll_deg, abs=1e-6)
 
 
 def test_the_sky_has_no_disparity_and_everything_else_has():

@@ -12,8 +12,9 @@ from rollcli.estimator.estimate import estimate_roll
 from rollcli.files.formats import read_image
 from rollcli.imaging.derotate import derotate
 from rollcli.imaging.stereo import StereoOptions, match_pair
+from rollcli.simulate.draw import draw_specs
 from rollcli.simulate.render import render_frame, true_disparity
-from rollcli.simulate.spec import FrameSpec, draw_specs
+from rollcli.simulate.spec import FrameSpec
 
 STREETS = Path(__file__).parents[3].parent / "shared" / "streets"
 LIDAR_DEG = {"000151_10": (-1.02, 0.2), "000174_10": (-1.46, 0.2), "000074_10": (-0.47, 0.3)}
