@@ -10,7 +10,8 @@ import numpy as np
 import rollcli
 from rollcli.files.atomic import write_atomic
 from rollcli.imaging.overlay import draw_disparity
-from rollcli.imaging.vdisparity import draw_v_disparity, row_offset
+from rollcli.imaging.vdisparity import row_offset
+from rollcli.imaging.vdisparity_picture import draw_v_disparity
 from tests.run_cli import ROOT
 
 MAP, PICTURE = ROOT / "sample_data" / "maps" / "frame_0001.png", ROOT / ".github" / "readme.png"
@@ -34,7 +35,12 @@ def picture() -> np.ndarray:
         _gap(_GAP, roll.height),
         draw_v_disparity(after, *curve),
     ]
-    return np.hstack([part if part.shape[2] == 4 else _opaque(part) for part in parts])
+    height = max(len(part) for part in parts)
+    return np.hstack([_padded(part if part.shape[2] == 4 else _opaque(part), height) for part in parts])
+
+
+def _padded(part: np.ndarray, height: int) -> np.ndarray:
+    return np.vstack([part, np.zeros((height - len(part), *part.shape[1:]), np.uint8)])
 
 
 def _gap(width: int, height: int) -> np.ndarray:

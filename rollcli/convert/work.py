@@ -19,7 +19,8 @@ from rollcli.frames.options import EncodingOptions, FrameOptions
 from rollcli.frames.outputs import remove_outputs
 from rollcli.frames.read import Source, read_source
 from rollcli.imaging.stereo_options import StereoOptions
-from rollcli.imaging.vdisparity import draw_v_disparity, profile, v_disparity
+from rollcli.imaging.vdisparity import profile, v_disparity
+from rollcli.imaging.vdisparity_picture import draw_v_disparity
 
 
 def derotate_map(conversion: Conversion, encoding: EncodingOptions, expand: bool) -> Outcome:

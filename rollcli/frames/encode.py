@@ -14,7 +14,8 @@ from rollcli.frames.options import FrameOptions
 from rollcli.frames.outputs import image_paths
 from rollcli.imaging.derotate import derotate
 from rollcli.imaging.overlay import draw_road
-from rollcli.imaging.vdisparity import draw_v_disparity, row_offset, v_disparity
+from rollcli.imaging.vdisparity import row_offset, v_disparity
+from rollcli.imaging.vdisparity_picture import draw_v_disparity
 
 if TYPE_CHECKING:
     from rollcli.estimator.estimate import RollEstimate

@@ -4,18 +4,12 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import UsageError
 
 _MAX_BINS = 1024
-_MIN_WIDTH = 256  # of a picture, pixels
-_LABEL_WIDTH = 48
-_DASH = 8
-_ROAD = (255, 255, 0)  # BGR: cyan, which the colours of the counts do not have
-_TICK = (190, 190, 190)
 
 
 @dataclass(frozen=True)
@@ -81,41 +75,8 @@ def v_disparity(
     return VDisparity(np.ascontiguousarray(counts[:, :-1], dtype=np.int32), max_disparity)
 
 
-def draw_v_disparity(
-    histogram: VDisparity, alpha: tuple[float, float, float] | None = None, offset: float = 0.0
-) -> NDArray[np.uint8]:
-    """A picture of the counts to look at: log scale, bright where many; the road's parabola over it.
-
-    Parameters
-    ----------
-    histogram : VDisparity
-        Of a de-rotated map, where the road is a thin line.
-    alpha : tuple of float, optional
-        The road: d = a0 + a1 y + a2 y^2, pixels, with y = row + offset.
-    offset : float
-        See `row_offset`.
-
-    Returns
-    -------
-    ndarray of uint8, shape (H, width, 3)
-        BGR; a row of the picture is a row of the map.
-    """
-    counts = histogram.counts
-    if counts.shape[1] < _MIN_WIDTH:
-        counts = np.repeat(counts, -(-_MIN_WIDTH // counts.shape[1]), axis=1)
-    light = np.log1p(counts)
-    # a column of saturated disparities would leave the rest dark
-    top = float(np.percentile(light[counts > 0], 99.9)) if counts.any() else 1.0
-    grey = np.minimum(light * (255 / top), 255).astype(np.uint8)
-    picture = cv2.applyColorMap(grey, cv2.COLORMAP_INFERNO).astype(np.uint8, copy=False)
-    _draw_scale(picture, histogram.max_disparity)
-    if alpha is not None:
-        _draw_road(picture, np.polynomial.Polynomial(alpha), offset, histogram.max_disparity)
-    return picture
-
-
 def row_offset(theta: float, width: int, height: int) -> float:
-    """What to add to a row of the map de-rotated about its centre to get y of the method, pixels.
+    """Return what to add to a row of the map de-rotated about its centre to get y of the method, pixels.
 
     y = v cos - u sin is measured from the top-left pixel of the map as it was; `derotate` keeps the centre.
     """
@@ -124,7 +85,7 @@ def row_offset(theta: float, width: int, height: int) -> float:
 
 
 def profile(alpha: tuple[float, float, float], theta: float, width: int) -> tuple[float, float, float]:
-    """The road's disparity along the middle column of a map, as a parabola of the row.
+    """Return the road's disparity along the middle column of a map, as a parabola of the row.
 
     Parameters
     ----------
@@ -138,25 +99,3 @@ def profile(alpha: tuple[float, float, float], theta: float, width: int) -> tupl
     a0, a1, a2 = alpha
     start, step = -(width - 1) / 2 * math.sin(theta), math.cos(theta)  # y = start + step * row
     return a0 + a1 * start + a2 * start**2, (a1 + 2 * a2 * start) * step, a2 * step**2
-
-
-def _draw_road(picture: NDArray[np.uint8], road: Any, offset: float, max_disparity: float) -> None:
-    """The road's curve, dashed so that what it lies on can be seen."""
-    height, width = picture.shape[:2]
-    for top in range(0, height, 2 * _DASH):
-        rows = np.arange(top, min(top + _DASH, height))
-        columns = road(rows + offset) * (width / max_disparity)
-        points = np.column_stack([columns, rows])[(columns >= 0) & (columns < width)]
-        cv2.polylines(picture, [np.rint(points).astype(np.int32)], False, _ROAD, 1, cv2.LINE_AA)
-
-
-def _draw_scale(picture: NDArray[np.uint8], max_disparity: float) -> None:
-    """Disparities along the upper edge, in pixels; steps of a power of two, wide enough for their numbers."""
-    per_pixel = picture.shape[1] / max_disparity
-    step = 2.0 ** math.ceil(math.log2(_LABEL_WIDTH / per_pixel))
-    for disparity in np.arange(step, max_disparity, step):
-        column = round(disparity * per_pixel)
-        cv2.line(picture, (column, 0), (column, 4), _TICK, 1)
-        for colour, thickness in (((0, 0, 0), 3), (_TICK, 1)):  # readable on the brightest counts too
-            text, place, font = f"{disparity:g}", (column + 3, 10), cv2.FONT_HERSHEY_SIMPLEX
-            cv2.putText(picture, text, place, font, 0.3, colour, thickness, cv2.LINE_AA)

@@ -8,6 +8,7 @@ import pytest
 
 from rollcli.files.encodings import read_disparity
 from rollcli.files.formats import read_stored
+from rollcli.imaging.vdisparity_picture import BOTTOM_MARGIN, LEFT_MARGIN
 from tests.run_cli import contents, road_map, rollcli, write_kitti
 
 
@@ -48,7 +49,8 @@ def test_bins_and_max_disparity_are_the_histograms(maps):
 def test_the_picture_has_a_row_for_each_row_of_the_map_and_shows_the_road(maps):
     assert rollcli("vdisparity", "maps", "-o", "v", "-j2", cwd=maps).status == 0
     assert sorted(contents(maps / "v")) == [f"frame{i}.png" for i in range(3)]
-    picture = cv2.imread(str(maps / "v" / "frame1.png"), cv2.IMREAD_UNCHANGED)
+    whole = cv2.imread(str(maps / "v" / "frame1.png"), cv2.IMREAD_UNCHANGED)
+    picture = whole[:-BOTTOM_MARGIN, LEFT_MARGIN:]
     assert (picture.dtype, picture.shape[0], picture.shape[2]) == (np.uint8, 120, 3)
     rows, columns = np.nonzero(road_pixels(picture))
     assert len(rows) > 20

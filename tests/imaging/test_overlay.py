@@ -1,8 +1,9 @@
 """Pictures of maps: what is no data stays black, and the road stands out."""
 
 import numpy as np
+import pytest
 
-from rollcli.imaging.overlay import draw_disparity, draw_road
+from rollcli.imaging.overlay import BAR_WIDTH, draw_disparity, draw_preview, draw_road, draw_road_on_photo
 
 
 def test_no_data_is_black_and_data_never_is():
@@ -36,3 +37,22 @@ def test_the_road_is_tinted_and_nothing_else():
 def test_empty_maps_and_empty_masks_are_drawn():
     assert not draw_disparity(np.zeros((3, 4))).any()
     assert draw_road(np.ones((3, 4)), np.zeros((3, 4))).shape == (3, 4, 3)
+
+
+@pytest.mark.parametrize("photo", [np.full((20, 30), 90, np.uint8), np.full((40, 60, 3), 90 << 8, np.uint16)])
+def test_the_road_is_tinted_on_a_photo_of_any_kind(photo):
+    mask = np.zeros((20, 30))
+    mask[10:] = 1
+    picture = draw_road_on_photo(photo, mask)
+    assert picture.shape == (20, 30, 3)
+    assert (picture[:9] == 90).all()
+    assert (picture[12:18, 5:25] != 90).all()
+
+
+def test_a_preview_is_the_map_in_colour_beside_a_bar_from_the_brightest_to_the_darkest():
+    values = np.linspace(1, 100, 20000).reshape(100, 200)
+    preview = draw_preview(values)
+    np.testing.assert_array_equal(preview[:, :200], draw_disparity(values))
+    assert preview.shape == (100, 200 + BAR_WIDTH, 3)
+    bar = preview[:, 210].astype(int).sum(axis=1)
+    assert bar[0] > bar[50] > bar[-1]

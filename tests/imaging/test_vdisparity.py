@@ -11,7 +11,8 @@ from hypothesis.extra import numpy as arrays
 from rollcli.errors import UsageError
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.imaging.derotate import derotate
-from rollcli.imaging.vdisparity import draw_v_disparity, row_offset, v_disparity
+from rollcli.imaging.vdisparity import row_offset, v_disparity
+from rollcli.imaging.vdisparity_picture import BOTTOM_MARGIN, draw_v_disparity
 
 MAPS = arrays.arrays(
     st.sampled_from([np.uint8, np.uint16, np.int16, np.float32, np.float64]),
@@ -40,7 +41,7 @@ def test_defaults_count_every_valid_pixel_too(values):
     np.testing.assert_array_equal(
         histogram.counts.sum(axis=1), (np.isfinite(values) & (values > 0)).sum(axis=1)
     )
-    assert draw_v_disparity(histogram).shape[0] == len(values)
+    assert draw_v_disparity(histogram).shape[0] == len(values) + BOTTOM_MARGIN
 
 
 def test_a_disparity_lies_in_its_bin():
@@ -60,7 +61,7 @@ def test_an_empty_map_has_an_empty_histogram():
     histogram = v_disparity(np.zeros((3, 4)))
 
     assert histogram.counts.sum() == 0
-    assert draw_v_disparity(histogram).shape[0] == 3
+    assert draw_v_disparity(histogram).shape[0] == 3 + BOTTOM_MARGIN
 
 
 @pytest.mark.parametrize("options", [{"bins": 0}, {"max_disparity": 0}, {"max_disparity": math.inf}])
@@ -87,24 +88,3 @@ def test_the_parabola_lies_on_the_road_of_the_derotated_map(roll_deg):
     road = estimate.alpha[0] + estimate.alpha[1] * y + estimate.alpha[2] * y**2
 
     np.testing.assert_allclose(level[:, 150], road, atol=0.01)
-
-
-def test_the_road_is_drawn_in_a_colour_that_counts_do_not_have():
-    disparity = np.repeat(np.linspace(10, 60, 100)[:, None], 80, axis=1)
-    histogram = v_disparity(disparity)
-
-    plain = draw_v_disparity(histogram)
-    drawn = draw_v_disparity(histogram, (10, 50 / 99, 0))
-
-    assert plain.dtype == drawn.dtype == np.uint8
-    assert plain.shape == drawn.shape == (100, 256, 3)
-    changed = (plain != drawn).any(axis=2)
-    assert 30 < changed.any(axis=1).sum() < 70  # every other piece of eight rows
-    rows, columns = np.nonzero(changed)
-    np.testing.assert_allclose(columns, np.linspace(10, 60, 100)[rows] * 256 / 61, atol=4)
-
-
-def test_the_same_counts_give_the_same_picture():
-    histogram = v_disparity(np.random.default_rng(0).uniform(0, 50, (40, 50)))
-
-    np.testing.assert_array_equal(draw_v_disparity(histogram), draw_v_disparity(histogram))

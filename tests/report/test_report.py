@@ -217,8 +217,9 @@ def test_a_page_that_is_there_is_kept_and_inputs_are_never_replaced(folder):
     assert report(folder, "out/rolls.csv").status == 2
     assert page_of(folder) == "mine"
     before = contents(folder / "maps")
-    for target in ("out/rolls.csv", "maps/frame0.png"):
-        done = rollcli("report", "out/rolls.csv", "-o", target, "--overwrite", cwd=folder)
+    shutil.copy(folder / "out" / "rolls.csv", folder / "rolls")
+    for target in ("rolls", "maps/frame0.png"):
+        done = rollcli("report", "rolls", "-o", target, "--overwrite", cwd=folder)
         assert done.status == 2
         assert "would be replaced" in done.err
     assert contents(folder / "maps") == before

@@ -1,0 +1,116 @@
+"""Pictures of v-disparity: counts in colour, the road's curve, the horizon, and labelled margins."""
+
+import math
+from collections.abc import Iterator
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from rollcli.imaging.vdisparity import VDisparity
+
+LEFT_MARGIN, BOTTOM_MARGIN = 40, 32  # pixels; the first rows of a picture are the rows of the map
+_SHOWN = 0.998  # share of the pixels within the shown range: a few outliers must not squeeze the road
+_ROUND_PX = 16.0  # the range ends at a multiple of this, so that frames of one drive share their scale
+_MIN_WIDTH = 320
+_LABEL_EVERY = (60, 40)  # pixels between labels, along the disparities and along the rows
+_DASH = 8
+_ROAD = (255, 255, 0)  # BGR: cyan, which the colours of the counts do not have
+_HORIZON = (120, 220, 120)
+_PAPER, _INK = (255, 255, 255), (60, 60, 60)
+_FONT, _SIZE = cv2.FONT_HERSHEY_SIMPLEX, 0.36
+
+
+def draw_v_disparity(
+    histogram: VDisparity,
+    alpha: tuple[float, float, float] | None = None,
+    offset: float = 0.0,
+    horizon: float | None = None,
+) -> NDArray[np.uint8]:
+    """Draw counts: log scale, bright where many, with the road's parabola and the horizon over them.
+
+    Parameters
+    ----------
+    histogram : VDisparity
+        Of a de-rotated map, where the road is a thin line.
+    alpha : tuple of float, optional
+        The road: d = a0 + a1 y + a2 y^2, pixels, with y = row + offset.
+    offset : float
+        See `row_offset`.
+    horizon : float, optional
+        The row of the road's horizon, pixels.
+
+    Returns
+    -------
+    ndarray of uint8, shape (H + BOTTOM_MARGIN, LEFT_MARGIN + width, 3)
+        BGR. Its first H rows are the rows of the map; the margins name rows and disparities, in pixels.
+    """
+    counts, top = _shown(histogram)
+    light = np.log1p(counts)
+    brightest = float(np.percentile(light[counts > 0], 99.9)) if counts.any() else 1.0
+    grey = np.minimum(light * (255 / brightest), 255).astype(np.uint8)
+    chart = cv2.applyColorMap(grey, cv2.COLORMAP_INFERNO).astype(np.uint8, copy=False)
+    if horizon is not None and 0 <= horizon <= len(chart) - 1:
+        _draw_horizon(chart, round(horizon))
+    if alpha is not None:
+        _draw_road(chart, np.polynomial.Polynomial(alpha), offset, top)
+    return _with_margins(chart, top)
+
+
+def _shown(histogram: VDisparity) -> tuple[NDArray[np.int32], float]:
+    """Return the counts of the range that is shown, at least `_MIN_WIDTH` columns wide, and its end, px."""
+    counts, end = histogram.counts, histogram.max_disparity
+    reached = np.cumsum(counts.sum(axis=0))
+    total = int(reached[-1])
+    last = int(np.searchsorted(reached, _SHOWN * total)) + 1 if total else counts.shape[1]
+    per_bin = end / counts.shape[1]
+    bins = min(counts.shape[1], math.ceil(math.ceil(last * per_bin / _ROUND_PX) * _ROUND_PX / per_bin))
+    shown = counts[:, :bins]
+    return np.repeat(shown, -(-_MIN_WIDTH // bins), axis=1), bins * per_bin
+
+
+def _draw_road(chart: NDArray[np.uint8], road: "np.polynomial.Polynomial", offset: float, top: float) -> None:
+    """Draw the road's curve, dashed so that what it lies on can be seen."""
+    height, width = chart.shape[:2]
+    for start in range(0, height, 2 * _DASH):
+        rows = np.arange(start, min(start + _DASH, height))
+        columns = road(rows + offset) * (width / top)
+        points = np.column_stack([columns, rows])[(columns >= 0) & (columns < width)]
+        cv2.polylines(chart, [np.rint(points).astype(np.int32)], False, _ROAD, 1, cv2.LINE_AA)
+
+
+def _draw_horizon(chart: NDArray[np.uint8], row: int) -> None:
+    for start in range(0, chart.shape[1], 2 * _DASH):
+        cv2.line(chart, (start, row), (start + _DASH - 1, row), _HORIZON, 1)
+    cv2.putText(chart, "horizon", (4, max(row - 4, 10)), _FONT, _SIZE, _HORIZON, 1, cv2.LINE_AA)
+
+
+def _with_margins(chart: NDArray[np.uint8], top: float) -> NDArray[np.uint8]:
+    """Return the chart with rows named on its left and disparities below it."""
+    height, width = chart.shape[:2]
+    picture = np.full((height + BOTTOM_MARGIN, LEFT_MARGIN + width, 3), _PAPER, np.uint8)
+    picture[:height, LEFT_MARGIN:] = chart
+    for row in _ticks(float(height), float(_LABEL_EVERY[1])):
+        cv2.line(picture, (LEFT_MARGIN - 4, int(row)), (LEFT_MARGIN - 1, int(row)), _INK, 1)
+        _write(picture, f"{row:g}", LEFT_MARGIN - 7, max(int(row) + 4, 9), align=1.0)
+    for disparity in _ticks(top, _LABEL_EVERY[0] * top / width):
+        column = LEFT_MARGIN + round(disparity * width / top)
+        cv2.line(picture, (column, height), (column, height + 3), _INK, 1)
+        _write(picture, f"{disparity:g}", column, height + 14, align=0.5)
+    _write(picture, "disparity, px", LEFT_MARGIN + width // 2, height + 27, align=0.5)
+    _write(picture, "row", LEFT_MARGIN - 7, height + 27, align=1.0)
+    return picture
+
+
+def _ticks(end: float, least_step: float) -> Iterator[float]:
+    """Yield round numbers from 0 up to `end`, at least `least_step` apart: steps of 1, 2 or 5 times 10^n."""
+    power = 10.0 ** math.floor(math.log10(least_step))
+    step = next(each * power for each in (1, 2, 5, 10) if each * power >= least_step)
+    yield from (number * step for number in range(int(end / step) + 1) if number * step < end)
+
+
+def _write(picture: NDArray[np.uint8], text: str, column: int, row: int, *, align: float) -> None:
+    """Write a line; `align` 0 starts at the column, 0.5 is centred there, 1 ends there."""
+    (width, _), _ = cv2.getTextSize(text, _FONT, _SIZE, 1)
+    left = min(max(column - round(align * width), 0), picture.shape[1] - width)
+    cv2.putText(picture, text, (left, row), _FONT, _SIZE, _INK, 1, cv2.LINE_AA)

@@ -1,0 +1,80 @@
+"""The picture of a v-disparity shows the road, the horizon, rows and disparities."""
+
+import numpy as np
+import pytest
+
+from rollcli.imaging.vdisparity import v_disparity
+from rollcli.imaging.vdisparity_picture import BOTTOM_MARGIN, LEFT_MARGIN, draw_v_disparity
+
+CYAN = (255, 255, 0)
+
+
+def road_map(height=100, width=80, near=60.0):
+    return np.repeat(np.linspace(10, near, height)[:, None], width, axis=1)
+
+
+def chart(picture):
+    """The part of a picture whose rows are those of the map."""
+    return picture[:-BOTTOM_MARGIN, LEFT_MARGIN:]
+
+
+def test_the_road_is_drawn_in_a_colour_that_counts_do_not_have():
+    histogram = v_disparity(road_map())
+
+    plain = chart(draw_v_disparity(histogram))
+    drawn = chart(draw_v_disparity(histogram, (10, 50 / 99, 0)))
+
+    assert plain.shape == drawn.shape
+    changed = (plain != drawn).any(axis=2)
+    assert 30 < changed.any(axis=1).sum() < 70  # every other piece of eight rows
+    per_pixel = drawn.shape[1] / 61  # the histogram ends there, below the next multiple of 16
+    drawn_rows = changed.any(axis=1)
+    rows = np.flatnonzero(drawn_rows[1:-1] & drawn_rows[:-2] & drawn_rows[2:]) + 1  # not the ends of dashes
+    middles = [np.flatnonzero(changed[row]).mean() for row in rows]
+    road = np.linspace(10, 60, 100)[rows] * per_pixel
+    np.testing.assert_allclose(middles, road, atol=per_pixel * 50 / 99)  # within a row
+
+
+def test_a_few_outliers_do_not_change_the_range():
+    values = road_map(100, 400)
+    with_outliers = values.copy()
+    with_outliers[0, :20] = 900.0
+
+    kept = chart(draw_v_disparity(v_disparity(with_outliers, bins=1000, max_disparity=1000)))
+    plain = chart(draw_v_disparity(v_disparity(values, bins=1000, max_disparity=1000)))
+
+    assert kept.shape == plain.shape
+    np.testing.assert_array_equal(kept[1:], plain[1:])
+
+
+def test_frames_of_one_drive_share_their_range():
+    near = [
+        chart(draw_v_disparity(v_disparity(road_map(near=n), bins=400, max_disparity=100))) for n in (58, 63)
+    ]
+    assert near[0].shape == near[1].shape
+
+
+def test_the_horizon_is_a_line_across_at_its_row():
+    histogram = v_disparity(road_map())
+    changed = chart(draw_v_disparity(histogram)) != chart(draw_v_disparity(histogram, horizon=40.2))
+    rows = np.flatnonzero(changed.any(axis=2).sum(axis=1) > 100)
+    assert rows.tolist() == [40]
+
+
+@pytest.mark.parametrize("horizon", [-5.0, 99.5, 1e9])
+def test_a_horizon_outside_of_the_map_is_not_drawn(horizon):
+    histogram = v_disparity(road_map())
+    np.testing.assert_array_equal(draw_v_disparity(histogram), draw_v_disparity(histogram, horizon=horizon))
+
+
+def test_the_margins_are_written_on():
+    picture = draw_v_disparity(v_disparity(road_map()))
+    left, below = picture[:-BOTTOM_MARGIN, :LEFT_MARGIN], picture[-BOTTOM_MARGIN:, LEFT_MARGIN:]
+    assert (left < 128).any()
+    assert (below < 128).any()
+
+
+def test_the_same_counts_give_the_same_picture():
+    histogram = v_disparity(np.random.default_rng(0).uniform(0, 50, (40, 50)))
+
+    np.testing.assert_array_equal(draw_v_disparity(histogram), draw_v_disparity(histogram))
