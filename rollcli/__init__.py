@@ -11,15 +11,15 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from rollcli.errors import RollcliError as RollcliError
-    from rollcli.estimator.estimate import RollEstimate as RollEstimate
     from rollcli.estimator.estimate import estimate_roll as estimate_roll
+    from rollcli.estimator.result import RollEstimate as RollEstimate
     from rollcli.files.encodings import read_disparity as read_disparity
     from rollcli.imaging.derotate import derotate as derotate
     from rollcli.imaging.stereo import compute_disparity as compute_disparity
     from rollcli.imaging.vdisparity import v_disparity as v_disparity
 
 _HOMES = {
-    "RollEstimate": "rollcli.estimator.estimate",
+    "RollEstimate": "rollcli.estimator.result",
     "RollcliError": "rollcli.errors",
     "compute_disparity": "rollcli.imaging.stereo",
     "derotate": "rollcli.imaging.derotate",

@@ -5,7 +5,8 @@ import time
 from dataclasses import replace
 from typing import Any
 
-from rollcli.estimator.estimate import RollEstimate, estimate_roll
+from rollcli.estimator.estimate import estimate_roll
+from rollcli.estimator.result import RollEstimate
 from rollcli.files.results import Row
 from rollcli.frames.encode import write_images
 from rollcli.frames.frame import Frame, Outcome
@@ -35,7 +36,8 @@ def run_frame(frame: Frame, options: FrameOptions) -> Outcome:
 def _measured(frame: Frame, options: FrameOptions) -> Outcome:
     source = read_source(frame, options)
     mask = region_mask(frame.mask, options, source.disparity.shape)
-    estimate = estimate_roll(source.disparity, mask=mask, **_arguments(options.method))
+    wanted = options.images.road_mask is not None
+    estimate = estimate_roll(source.disparity, mask=mask, road_mask=wanted, **_arguments(options.method))
     write_images(frame, source, estimate, options)
     return Outcome(_row(frame, source, estimate), source.encoding, source.warning, source.searched)
 

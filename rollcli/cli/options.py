@@ -6,6 +6,7 @@ import click
 
 from rollcli.cli.command import option, record
 from rollcli.cli.types import Choice, FilePath, Number, NumberOrNan, Polygon, Roi
+from rollcli.estimator.methods import MAX_ROLL_LIMIT_DEG, METHODS, MODELS, ROADS
 from rollcli.frames.options import (
     EncodingOptions,
     ImageOptions,
@@ -178,20 +179,19 @@ method_options = record(
     _method,
     option(
         "--method",
-        type=Choice("gd", "gss", "exact", "plane", "areas"),
+        type=Choice(*METHODS),
         default=MethodOptions.method,
-        help="gd: gradient descent; gss: golden section search; exact: the global minimum, from polynomial "
-        "roots; plane: one least-squares plane; areas: planes of many small areas.",
+        help="; ".join(f"{name}: {method.summary}" for name, method in METHODS.items()) + ".",
     ),
     option(
         "--model",
-        type=Choice("parabola", "line"),
+        type=Choice(*MODELS),
         default=MethodOptions.model,
         help="Disparity of the road as a function of the row.",
     ),
     option(
         "--road",
-        type=Choice("auto", "all"),
+        type=Choice(*ROADS),
         default=MethodOptions.road,
         help="auto: find the road first; all: use every valid pixel, as the paper does.",
     ),
@@ -209,7 +209,7 @@ method_options = record(
     ),
     option(
         "--max-roll",
-        type=Number("DEG", above=0, at_most=89),
+        type=Number("DEG", above=0, at_most=MAX_ROLL_LIMIT_DEG),
         default=MethodOptions.max_roll_deg,
         help="Largest |roll| that road finding considers, degrees.",
     ),

@@ -18,7 +18,7 @@ from rollcli.imaging.vdisparity import row_offset, v_disparity
 from rollcli.imaging.vdisparity_picture import draw_v_disparity
 
 if TYPE_CHECKING:
-    from rollcli.estimator.estimate import RollEstimate
+    from rollcli.estimator.result import RollEstimate
     from rollcli.frames.frame import Frame
     from rollcli.frames.read import Source
 
@@ -70,7 +70,8 @@ def _disparity(source: "Source", estimate: "RollEstimate", options: FrameOptions
 
 
 def _road_mask(source: "Source", estimate: "RollEstimate", options: FrameOptions) -> bytes:
-    return encode_png(draw_road(source.disparity, estimate.road_mask(source.disparity)))
+    assert estimate.road_mask is not None  # the frame's task asks for it
+    return encode_png(draw_road(source.disparity, estimate.road_mask))
 
 
 _ENCODERS = {

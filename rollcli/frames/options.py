@@ -7,11 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
+from rollcli.estimator.methods import LAMBDA0, MAX_ROLL_DEG, TOLERANCE_DEG, LearningRate
 from rollcli.imaging.stereo_options import StereoOptions
-
-Method = Literal["gd", "gss", "exact", "plane", "areas"]
-Model = Literal["parabola", "line"]
-Road = Literal["auto", "all"]
 
 
 @dataclass(frozen=True)
@@ -54,14 +51,14 @@ class RegionOptions:
 
 @dataclass(frozen=True)
 class MethodOptions:
-    """How the angle is found."""
+    """How the angle is found; `rollcli.estimator.methods` has the names."""
 
-    method: Method = "gd"
-    model: Model = "parabola"
-    road: Road = "auto"
-    lambda0: float | Literal["auto"] = 26.0
-    tolerance_deg: float = 1e-4
-    max_roll_deg: float = 45.0
+    method: str = "gd"
+    model: str = "parabola"
+    road: str = "auto"
+    lambda0: LearningRate = LAMBDA0
+    tolerance_deg: float = TOLERANCE_DEG
+    max_roll_deg: float = MAX_ROLL_DEG
     seed: int = 0
 
 
