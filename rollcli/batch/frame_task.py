@@ -9,37 +9,36 @@ from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.result import RollEstimate
 from rollcli.files.results import Row
 from rollcli.frames.encode import write_images
-from rollcli.frames.frame import Frame, Outcome
+from rollcli.frames.frame import Frame, FrameResult
 from rollcli.frames.guard import guarded
 from rollcli.frames.options import FrameOptions, MethodOptions
 from rollcli.frames.outputs import remove_images
 from rollcli.frames.read import Source, read_source
-from rollcli.frames.region import region_mask
 
 
-def run_frame(frame: Frame, options: FrameOptions) -> Outcome:
-    """Do one frame; whatever is wrong with it becomes an `error` row.
+def run_frame(frame: Frame, options: FrameOptions) -> FrameResult:
+    """Estimate the roll of one frame and write its images; what is wrong with it becomes an `error` row.
 
     Raises
     ------
     OutputError
-        An image cannot be written: that ends the run.
+        An image cannot be written, which ends the run.
     """
     start = time.perf_counter()
-    outcome = guarded(frame, lambda: _measured(frame, options))
-    if outcome.row.status == "error":
+    result = guarded(frame, lambda: _estimate(frame, options))
+    if result.row.status == "error":
         remove_images(frame, options.images, options.root)
     elapsed = 1000 * (time.perf_counter() - start)
-    return replace(outcome, row=replace(outcome.row, elapsed_ms=elapsed))
+    return replace(result, row=replace(result.row, elapsed_ms=elapsed))
 
 
-def _measured(frame: Frame, options: FrameOptions) -> Outcome:
+def _estimate(frame: Frame, options: FrameOptions) -> FrameResult:
     source = read_source(frame, options)
-    mask = region_mask(frame.mask, options, source.disparity.shape)
     wanted = options.images.road_mask is not None
-    estimate = estimate_roll(source.disparity, mask=mask, road_mask=wanted, **_arguments(options.method))
+    arguments = _arguments(options.method)
+    estimate = estimate_roll(source.disparity, mask=source.allowed, road_mask=wanted, **arguments)
     write_images(frame, source, estimate, options)
-    return Outcome(_row(frame, source, estimate), source.encoding, source.warning, source.searched)
+    return FrameResult(_row(frame, source, estimate), source.encoding, source.warning, source.searched)
 
 
 def _arguments(options: MethodOptions) -> dict[str, Any]:

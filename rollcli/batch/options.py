@@ -1,4 +1,4 @@
-"""What a run of `estimate` was asked to do; import-light, since the command line shows its help."""
+"""The options of a run of `estimate`. Import-light: the command line loads this to show its help."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -26,12 +26,11 @@ class ResultOptions:
     shard: tuple[int, int] = (1, 1)
     fail_fast: bool = False
     timing: bool = False
-    scheduler: str | None = None
 
 
 @dataclass(frozen=True)
 class EstimateOptions:
-    """Everything that `rollcli estimate` was asked."""
+    """Every option of `rollcli estimate`."""
 
     inputs: InputOptions
     pairs: PairOptions
@@ -45,5 +44,7 @@ class EstimateOptions:
 
     @property
     def frame(self) -> FrameOptions:
-        """The part that decides what a frame gives."""
-        return FrameOptions(self.encoding, self.stereo, self.region, self.method, self.images)
+        """The part that decides the row and the images of a frame."""
+        return FrameOptions(
+            self.encoding, self.stereo, self.region, self.method, self.images, self.running.root
+        )

@@ -1,4 +1,4 @@
-"""What a run will read and write, decided and checked before anything runs."""
+"""Decide and check what a run will read and write, before anything runs."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -17,11 +17,12 @@ from rollcli.frames.outputs import image_paths
 
 @dataclass(frozen=True)
 class Plan:
-    """The frames of a run, in the order of their rows, and where the rows go."""
+    """The frames of a run, in the order of their rows; where the rows go, and in which form."""
 
     frames: list[Frame]
     output: str
     format: Literal["csv", "jsonl"]
+    timing: bool = False
 
 
 def make_plan(options: EstimateOptions) -> Plan:
@@ -43,11 +44,11 @@ def make_plan(options: EstimateOptions) -> Plan:
     frames = frames[part - 1 :: parts]
     if not (options.running.overwrite or options.result.resume):
         check_nothing_is_there(_images(frames, options))
-    return Plan(frames, output, options.result.format or _format(output))
+    return Plan(frames, output, options.result.format or _format(output), options.result.timing)
 
 
 def _images(frames: Iterable[Frame], options: EstimateOptions) -> Iterator[str]:
-    """Every image that is written; one by one, since a list of them would be most of our memory."""
+    """Yield every image that is written; a list of them would take most of our memory."""
     return (path for frame in frames for _, path in image_paths(frame, options.images))
 
 

@@ -1,10 +1,8 @@
-"""The options that commands share, each declared once; a decorator hands its group over as one record."""
+"""The options that commands share, each declared once; a command receives a group of them as one record."""
 
 from typing import Any
 
-import click
-
-from rollcli.cli.command import option, record
+from rollcli.cli.command import argument, option, record
 from rollcli.cli.types import Choice, FilePath, Number, NumberOrNan, Polygon, Roi
 from rollcli.estimator.methods import MAX_ROLL_LIMIT_DEG, METHODS, MODELS, ROADS
 from rollcli.frames.options import (
@@ -18,7 +16,7 @@ from rollcli.frames.options import (
 )
 from rollcli.imaging.stereo_options import MODES, StereoOptions
 
-PATH = FilePath()  # whether it exists is said by who reads it, in the same words for every way to name it
+PATH = FilePath()  # whether it exists, its reader says: in the same words wherever the name came from
 
 
 def _stereo(
@@ -34,7 +32,7 @@ def _method(*, tolerance: float, max_roll: float, **values: Any) -> MethodOption
 
 
 _folders = (
-    option("--recursive", is_flag=True, help="Look into the folders of folders too."),
+    option("--recursive", is_flag=True, help="Search folders recursively."),
     option(
         "--include", multiple=True, metavar="GLOB", help="Of folders, take only files that match. Repeatable."
     ),
@@ -45,7 +43,7 @@ input_options = record(
     "inputs",
     "Input",
     InputOptions,
-    click.argument("inputs", nargs=-1, type=PATH),
+    argument("inputs", nargs=-1, type=PATH),
     option(
         "--files-from",
         type=PATH,
@@ -254,10 +252,7 @@ image_options = record(
     save_as_option,
 )
 
-running_options = record(
-    "running",
-    "Running",
-    RunningOptions,
+_running = (
     option(
         "-j",
         "--jobs",
@@ -268,4 +263,14 @@ running_options = record(
     option("--dry-run", is_flag=True, help="List what would be read and written, and do nothing."),
     option("-q", "--quiet", is_flag=True, help="Say nothing but errors on stderr."),
     option("-v", "--verbose", is_flag=True, help="Say more on stderr."),
+)
+
+running_options = record("running", "Running", RunningOptions, *_running)
+
+cluster_options = record(
+    "running",
+    "Running",
+    RunningOptions,
+    *_running,
+    option("--scheduler", metavar="ADDRESS", help="Run on this Dask cluster, such as tcp://host:8786."),
 )

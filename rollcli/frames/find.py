@@ -1,4 +1,4 @@
-"""The frames behind what a user named: maps, or stereo pairs, each with its mask."""
+"""Find the frames that a user named: maps or stereo pairs, each with its mask."""
 
 from collections.abc import Sequence
 from pathlib import Path, PurePath
@@ -12,7 +12,7 @@ from rollcli.frames.options import InputOptions, PairOptions, RegionOptions
 def map_frames(
     given: InputOptions, *, region: RegionOptions | None = None, skip: Sequence[str] = ()
 ) -> list[Frame]:
-    """A frame for each map; `skip` are folders that results go to.
+    """Make a frame of each map; `skip` holds the output folders, which are not searched.
 
     Raises
     ------
@@ -36,7 +36,7 @@ def map_frames(
 def pair_frames(
     given: InputOptions, pairs: PairOptions, *, region: RegionOptions | None = None, skip: Sequence[str] = ()
 ) -> list[Frame]:
-    """A frame for each stereo pair; `skip` are folders that results go to.
+    """Make a frame of each stereo pair; `skip` holds the output folders, which are not searched.
 
     Raises
     ------
@@ -81,7 +81,7 @@ class _Masks:
             raise UsageError(f"{self.one}: no such mask file or folder")
 
     def of(self, left: Input) -> str | None:
-        """The mask for a frame."""
+        """Find the mask of a frame."""
         if self.by_stem is None:
             return self.one
         try:
