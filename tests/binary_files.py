@@ -138,10 +138,12 @@ def make_tiff(
     nodata=None,
     pages=1,
     page_kind=0,
+    sparse=(),
 ):
     """A TIFF file of (H, W) or (H, W, channels) numbers.
 
-    tile is (rows, columns); page_kind the NewSubfileType of the second and later pages (1: a reduced copy).
+    tile is (rows, columns); page_kind the NewSubfileType of the second and later pages (1: a reduced copy);
+    sparse the numbers of strips or tiles that are left out, as GDAL does.
     """
     image = pixels if pixels.ndim == 3 else pixels[..., None]
     height, width, channels = image.shape
@@ -156,6 +158,7 @@ def make_tiff(
                 padding = ((0, down - block.shape[0]), (0, across - block.shape[1]), (0, 0))
                 block = np.pad(block, padding)
             segments.append(pack(_predicted(block, predictor, order)))
+    segments = [b"" if number in sparse else segment for number, segment in enumerate(segments)]
     tags = {
         256: ("I", [width]),
         257: ("I", [height]),
@@ -185,7 +188,7 @@ def _tiff_file(tags, segments, order, big, tiled, pages, page_kind):
     for page in range(pages):
         starts = []
         for segment in segments:
-            starts.append(file.tell())
+            starts.append(file.tell() if segment else 0)
             file.write(segment)
         own = dict(tags)
         own[254] = ("I", [page_kind if page else 0])

@@ -150,8 +150,12 @@ def decode_image(data: bytes, name: str) -> NDArray[Any]:
 
 def decode_mask(data: bytes, name: str) -> NDArray[np.bool_]:
     """A mask from a map, or a picture that is no JPEG: True where any colour is non-zero; shape (H, W)."""
-    drawn = data.startswith((png.SIGNATURE, *pictures.LOSSLESS))
-    pixels = decode_image(data, name) if drawn else _decoded(data, name).values
+    if data.startswith(png.SIGNATURE):
+        pixels = png.picture(data, name, mask=True)
+    elif data.startswith(pictures.LOSSLESS):
+        pixels = pictures.decode_picture(data, name)
+    else:
+        pixels = _decoded(data, name).values
     mask: NDArray[np.bool_] = (pixels if pixels.ndim == 2 else pixels.max(axis=2)) != 0
     return mask
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from rollcli.errors import UsageError
 
 _MAX_BINS = 1024
+_BLOCK = 1 << 22  # pixels counted at a time: a large map would take 40 bytes a pixel
 
 
 @dataclass(frozen=True)
@@ -57,22 +58,32 @@ def v_disparity(
     values = np.asarray(disparity)
     if values.ndim != 2:
         raise UsageError(f"a disparity map is 2-D, not of shape {values.shape}")
-    valid = np.isfinite(values) & (values > 0)
-    pixels = np.where(valid, values, 0).astype(np.float64)
+    step = max(1, _BLOCK // max(1, values.shape[1]))
+    blocks = [values[top : top + step] for top in range(0, len(values), step)]
     if max_disparity is None:
-        max_disparity = math.floor(pixels.max(initial=0)) + 1.0
+        max_disparity = math.floor(max((_pixels(each).max(initial=0) for each in blocks), default=0)) + 1.0
     if not 0 < max_disparity < math.inf or (bins is not None and bins < 1):
         raise UsageError(f"bins {bins} and max-disparity {max_disparity}: both must be positive")
     if bins is None:
-        whole = bool((pixels == np.rint(pixels)).all())
+        whole = all(bool((pixels == np.rint(pixels)).all()) for pixels in map(_pixels, blocks))
         bins = min(math.ceil(max_disparity) if whole else max(256, math.ceil(4 * max_disparity)), _MAX_BINS)
-    height = len(values)
+    counts = [_counts(_pixels(each), bins, max_disparity) for each in blocks]
+    return VDisparity(np.concatenate([np.zeros((0, bins), np.int32), *counts]), max_disparity)
+
+
+def _pixels(values: NDArray[Any]) -> NDArray[np.float64]:
+    """Disparities; what is no data is 0."""
+    return np.where(np.isfinite(values) & (values > 0), values, 0).astype(np.float64)
+
+
+def _counts(pixels: NDArray[np.float64], bins: int, max_disparity: float) -> NDArray[np.int32]:
+    """The histogram of each row; the last bin also holds what lies beyond."""
     shares = np.minimum(pixels, max_disparity) / max_disparity
     cells = np.minimum(shares * bins, bins - 1).astype(np.int64)
-    cells[~valid] = bins  # one bin more, for what is no data
-    cells += np.arange(height)[:, None] * (bins + 1)
-    counts = np.bincount(cells.ravel(), minlength=height * (bins + 1)).reshape(height, bins + 1)
-    return VDisparity(np.ascontiguousarray(counts[:, :-1], dtype=np.int32), max_disparity)
+    cells[pixels == 0] = bins  # one bin more, for what is no data
+    cells += np.arange(len(pixels))[:, None] * (bins + 1)
+    counts = np.bincount(cells.ravel(), minlength=len(pixels) * (bins + 1)).reshape(len(pixels), bins + 1)
+    return np.ascontiguousarray(counts[:, :-1], dtype=np.int32)
 
 
 def row_offset(theta: float, width: int, height: int) -> float:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError
-from rollcli.files.codecs.raw_map import require_map_shape
+from rollcli.files.codecs.raw_map import require_decoded_fits, require_map_shape
 
 MAGIC = b"\x93NUMPY"
 _MAX_HEADER = 10_000
@@ -41,6 +41,7 @@ def decode_npy(data: bytes, name: str) -> NDArray[Any]:
         raise InputError(
             f"{name}: is truncated: shape {shape} of {dtype} needs {needed} bytes, {there} are there"
         )
+    require_decoded_fits(shape[1], shape[0], dtype.itemsize, len(data), name)
     values = np.frombuffer(data, dtype, count=count, offset=start)
     return values.reshape(shape, order="F" if fortran else "C")
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError, OutputError
+from rollcli.files.codecs.raw_map import require_decoded_fits
 
 MAGICS = (b"Pf", b"PF")
 _GAP = rb"(?:\s|#[^\n]*\n)+"
@@ -33,6 +34,7 @@ def decode_pfm(data: bytes, name: str) -> NDArray[Any]:
         raise InputError(
             f"{name}: is truncated: {width} x {height} pixels need {needed} bytes, {there} are there"
         )
+    require_decoded_fits(width, height, 4, len(data), name)
     order = "<f4" if header[4].startswith(b"-") else ">f4"
     rows = np.frombuffer(data, order, count=width * height, offset=header.end()).reshape(height, width)
     return rows[::-1]  # PFM stores the bottom row first

@@ -13,6 +13,10 @@ from rollcli.files.codecs.raw_map import PICTURE_FLAGS, native, require_decoded_
 
 LOSSLESS = (b"BM", b"P5", b"P6")
 SIGNATURES = (b"\xff\xd8\xff", *LOSSLESS)
+_FRAME_HEADERS = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
+_WITHOUT_LENGTH = frozenset((0x00, 0x01, *range(0xD0, 0xDA)))
+# many webcams write a few bytes more between the last row and the end of the image
+_HARMLESS = re.compile("extraneous bytes before marker 0xd9")
 _GAP = rb"(?:\s|#[^\n]*\n)+"
 _PNM = re.compile(rb"P([56])" + 2 * (_GAP + rb"(\d{1,9})") + _GAP + rb"(\d{1,5})\s")
 
@@ -23,16 +27,44 @@ def decode_picture(data: bytes, name: str) -> NDArray[Any]:
         return _pnm(data, name)
     if data.startswith(b"BM"):
         _require_whole_bmp(data, name)
-    elif data.rfind(b"\xff\xd9") < data.rfind(b"\xff\xda"):  # no end of image after the last start of scan
-        raise InputError(f"{name}: is a truncated JPEG")
+    else:
+        _require_whole_jpeg(data, name)
     try:
-        with decoding():
+        with decoding() as printed:
             pixels = cv2.imdecode(np.frombuffer(data, np.uint8), PICTURE_FLAGS)
     except cv2.error:  # a size beyond OpenCV's limits
         pixels = None
     if pixels is None:
         raise InputError(f"{name}: is a damaged image")
+    if complaint := _complaint(printed.text):
+        raise InputError(f"{name}: is a damaged JPEG: {complaint}")
     return pixels
+
+
+def _require_whole_jpeg(data: bytes, name: str) -> None:
+    """Refuse a JPEG without a frame header or an end, and one that is too large [ITU-T T.81, annex B]."""
+    if data.rfind(b"\xff\xd9") < data.rfind(b"\xff\xda"):  # no end of image after the last start of scan
+        raise InputError(f"{name}: is a truncated JPEG")
+    position = 2
+    while 0 <= (position := data.find(b"\xff", position)) < len(data) - 9:
+        if data[position + 1] == 0xFF:  # fill bytes may stand before a marker
+            position += 1
+            continue
+        marker, length = data[position + 1], int.from_bytes(data[position + 2 : position + 4], "big")
+        if marker in _FRAME_HEADERS:
+            height, width = (int.from_bytes(data[at : at + 2], "big") for at in (position + 5, position + 7))
+            require_decoded_fits(width, height, data[position + 9], len(data), name)
+            return
+        position += 2 + (length if marker not in _WITHOUT_LENGTH else 0)
+    raise InputError(f"{name}: is a damaged JPEG: it has no frame header")
+
+
+def _complaint(printed: str) -> str:
+    """What libjpeg says is wrong; empty for lines of OpenCV's own, and for what harms no pixel."""
+    for line in printed.splitlines():
+        if line.strip() and not line.startswith("[") and not _HARMLESS.search(line):
+            return " ".join(line.removeprefix("Corrupt JPEG data:").split())
+    return ""
 
 
 def _pnm(data: bytes, name: str) -> NDArray[Any]:
@@ -49,6 +81,7 @@ def _pnm(data: bytes, name: str) -> NDArray[Any]:
         raise InputError(
             f"{name}: is truncated: {width} x {height} pixels need {needed} bytes, {there} are there"
         )
+    require_decoded_fits(width, height, channels * dtype.itemsize, len(data), name)
     pixels = np.frombuffer(data, dtype, width * height * channels, header.end()).reshape(
         height, width, channels
     )
@@ -73,6 +106,6 @@ def _require_whole_bmp(data: bytes, name: str) -> None:
             f"{name}: is a damaged or an unusual BMP; 8, 24 and 32 bits without compression are read"
         )
     needed = (width * bits + 31) // 32 * 4 * abs(height)
-    require_decoded_fits(needed, f"its header claims {width} x {abs(height)} pixels", name)
+    require_decoded_fits(width, abs(height), bits // 8, len(data), name)
     if start + needed > len(data):
         raise InputError(f"{name}: is truncated: {width} x {abs(height)} pixels end at byte {start + needed}")

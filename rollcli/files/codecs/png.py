@@ -45,9 +45,32 @@ class _Header(NamedTuple):
     filtering: int
     interlace: int
 
+    @property
+    def pixel_bytes(self) -> int:
+        """What OpenCV takes for a pixel; a palette's colours are spelled out, with their opacity."""
+        return 4 if self.colour == _PALETTE else _CHANNELS[self.colour] * (2 if self.depth == 16 else 1)
+
     def row_bytes(self, width: int) -> int:
         """Bytes of a row of `width` pixels, after its filter byte."""
         return (width * self.depth * _CHANNELS[self.colour] + 7) // 8
+
+
+class _Whole(NamedTuple):
+    """What decides the pixels: the header, the bodies of palette and transparency, the chunks of the data."""
+
+    header: _Header
+    palette: bytes
+    transparent: bytes
+    image: list[bytes]
+
+    def chunks(self, name: str) -> list[bytes]:
+        """A file of nothing else."""
+        start = [SIGNATURE, _chunk(b"IHDR", struct.pack(">IIBBBBB", *self.header))]
+        if self.header.colour == _PALETTE:
+            start.append(_chunk(b"PLTE", _full_palette(self.header, self.palette, name)))
+            if self.transparent:
+                start.append(_chunk(b"tRNS", self.transparent[: 2**self.header.depth]))
+        return [*start, *self.image, _chunk(b"IEND", b"")]
 
 
 def grey_values(data: bytes, name: str) -> NDArray[Any]:
@@ -55,23 +78,29 @@ def grey_values(data: bytes, name: str) -> NDArray[Any]:
 
     A palette of greys stands for its greys; fully transparent pixels hold no data and become 0.
     """
-    header, pixels = _decoded(data, name, cv2.IMREAD_UNCHANGED)
+    whole = _checked(data, name)
+    header, transparent = whole.header, whole.transparent
+    pixels = _decoded(whole, name, cv2.IMREAD_UNCHANGED)
     if header.colour == _GREY:
-        # OpenCV spreads 1, 2 and 4 bits over 0..255
-        return pixels if header.depth >= 8 else pixels // (255 // (2**header.depth - 1))
+        if header.depth < 8:  # which OpenCV spreads over 0..255
+            pixels //= 255 // (2**header.depth - 1)
+        if transparent:
+            pixels[pixels == int.from_bytes(transparent, "big")] = 0
+        return pixels
     grey: NDArray[Any] = np.ascontiguousarray(pixels[..., 0])
-    if header.colour == _GREY_ALPHA:
-        grey[pixels[..., -1] == 0] = 0
+    if header.colour == _PALETTE and not bool((pixels[..., :3] == grey[..., None]).all()):
+        raise InputError(f"{name}: is a colour image (a palette); a disparity map has one channel")
+    if header.colour in (_GREY_ALPHA, _PALETTE):
+        if header.colour == _GREY_ALPHA or transparent:
+            grey[pixels[..., -1] == 0] = 0
         return grey
-    if header.colour == _PALETTE and bool((pixels == grey[..., None]).all()):
-        return grey
-    what = "a palette" if header.colour == _PALETTE else f"{_CHANNELS[header.colour]} channels"
+    what = f"{_CHANNELS[header.colour]} channels"
     raise InputError(f"{name}: is a colour image ({what}); a disparity map has one channel")
 
 
-def picture(data: bytes, name: str) -> NDArray[Any]:
-    """The pixels of a camera image: grey (H, W) or BGR (H, W, 3), uint8 or uint16."""
-    return _decoded(data, name, PICTURE_FLAGS)[1]
+def picture(data: bytes, name: str, *, mask: bool = False) -> NDArray[Any]:
+    """The pixels of a camera image or mask: grey (H, W) or BGR (H, W, 3), uint8 or uint16."""
+    return _decoded(_checked(data, name, mask), name, PICTURE_FLAGS)
 
 
 def encode_png(values: NDArray[Any]) -> bytes:
@@ -81,19 +110,18 @@ def encode_png(values: NDArray[Any]) -> bytes:
     return bytes(cv2.imencode(".png", values)[1])
 
 
-def _decoded(data: bytes, name: str, flags: int) -> tuple[_Header, NDArray[Any]]:
-    header, chunks = _checked(data, name)
-    with decoding():
-        pixels = cv2.imdecode(np.frombuffer(b"".join(chunks), np.uint8), flags)
-    if pixels is None:
+def _decoded(whole: _Whole, name: str, flags: int) -> NDArray[Any]:
+    with decoding() as printed:
+        pixels = cv2.imdecode(np.frombuffer(b"".join(whole.chunks(name)), np.uint8), flags)
+    if pixels is None or "libpng" in printed.text:
         raise InputError(f"{name}: is a damaged PNG: its pixel data are wrong")
-    return header, pixels
+    return pixels
 
 
-def _checked(data: bytes, name: str) -> tuple[_Header, list[bytes]]:
-    """The header, and the chunks that decide the pixels; InputError if the file is not whole."""
+def _checked(data: bytes, name: str, mask: bool = False) -> _Whole:
+    """What decides the pixels; InputError if the file is not whole."""
     view, position = memoryview(data), len(SIGNATURE)
-    header, palette, image, kind = None, b"", [], b""
+    header, palette, transparent, image, kind = None, b"", b"", [], b""
     while kind != b"IEND":
         end = position + 12 + int.from_bytes(view[position : position + 4], "big")
         if end > len(data) or position + 12 > len(data):
@@ -109,15 +137,16 @@ def _checked(data: bytes, name: str) -> tuple[_Header, list[bytes]]:
             header = _header(data[position + 8 : end - 4], name)
         elif kind == b"PLTE":
             palette = data[position + 8 : end - 4]
+        elif kind == b"tRNS":
+            transparent = data[position + 8 : end - 4]
         elif kind != b"IEND" and kind[:1].isupper():
             raise InputError(f"{name}: is no standard PNG: chunk {kind.decode('latin-1')!r} is unknown")
         position = end
     assert header is not None
+    compressed = sum(len(chunk) - 12 for chunk in image)
+    require_decoded_fits(*header[:2], header.pixel_bytes, compressed, name, mask=mask)
     _require_data(header, image, name)
-    chunks = [SIGNATURE, _chunk(b"IHDR", struct.pack(">IIBBBBB", *header)), *image, _chunk(b"IEND", b"")]
-    if header.colour == _PALETTE:
-        chunks.insert(2, _chunk(b"PLTE", _full_palette(header, palette, name)))
-    return header, chunks
+    return _Whole(header, palette, transparent, image)
 
 
 def _header(body: bytes, name: str) -> _Header:
@@ -136,7 +165,6 @@ def _require_data(header: _Header, image: list[bytes], name: str) -> None:
     """Refuse a header that claims more than the compressed data hold."""
     compressed = sum(len(chunk) - 12 for chunk in image)
     claim = f"its header claims {header.width} x {header.height} pixels"
-    require_decoded_fits(header.height * header.row_bytes(header.width), claim, name)
     if header.height * header.row_bytes(header.width) > _MAX_EXPANSION * compressed:
         raise InputError(f"{name}: {claim}, more than {compressed} bytes can hold")
     if compressed <= _SMALL and not _begins_well(header, b"".join(chunk[8:-4] for chunk in image)):

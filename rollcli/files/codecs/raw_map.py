@@ -9,8 +9,13 @@ from numpy.typing import NDArray
 
 from rollcli.errors import InputError
 
-# a compressed file may claim any size in a few bytes: more than this is refused before memory is taken
-_MAX_DECODED = 2**28
+# A compressed file may claim any size in a few bytes. What it would take is counted before memory is taken:
+# as disparities in float32, or in the file's own numbers where these are larger. What is computed from a map
+# takes up to fifteen times as much (with every image), so that a file of 1 MB never takes 1 GB
+_FLOAT32 = 4
+_MOST = 2**29  # bytes: 134 million pixels
+_ALWAYS = 2**25  # bytes that a small file may stand for, 8 million pixels: an empty map compresses well
+_EXPANSION = 48  # bytes that each byte of a larger file may stand for; real maps reach 20
 
 # a camera image as it lies in the file, grey or BGR: turning it by its EXIF tag would break rectification
 PICTURE_FLAGS = cv2.IMREAD_ANYDEPTH | cv2.IMREAD_ANYCOLOR | cv2.IMREAD_IGNORE_ORIENTATION
@@ -46,11 +51,31 @@ def require_map_shape(shape: tuple[int, ...], name: str) -> None:
         raise InputError(f"{name}: has no pixels (shape {shape})")
 
 
-def require_decoded_fits(size: int, claim: str, name: str) -> None:
-    """Refuse a compressed image of more bytes than any map has."""
-    if size > _MAX_DECODED:
+def require_decoded_fits(
+    width: int, height: int, pixel_bytes: int, stored: int, name: str, *, mask: bool = False
+) -> None:
+    """Refuse an image that would take more memory than any map, or more than its file can be worth.
+
+    Parameters
+    ----------
+    width, height : int
+        As the header claims, pixels.
+    pixel_bytes : int
+        That the decoder takes for each.
+    stored : int
+        The size of the file, bytes.
+    name : str
+        What errors call it.
+    mask : bool
+        Nothing is computed from it: it may stand for as much as any file, and masks compress best of all.
+    """
+    needed = width * height * (pixel_bytes if mask else max(pixel_bytes, _FLOAT32))
+    limit = _MOST if mask else min(_MOST, max(_ALWAYS, _EXPANSION * stored))
+    hint = "; save it uncompressed" if needed <= _MOST else ""
+    if needed > limit:
         raise InputError(
-            f"{name}: {claim}; compressed images of up to {_MAX_DECODED >> 20} MB of pixels are read"
+            f"{name}: its header claims {width} x {height} pixels, {-(-needed // 2**20)} MB once decoded; "
+            f"from {stored} bytes up to {limit >> 20} MB are read{hint}"
         )
 
 

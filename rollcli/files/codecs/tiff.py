@@ -1,8 +1,6 @@
-"""TIFF: tifffile reads the tags, the pixels are decoded here [TIFF 6.0; Adobe's technical notes 1 and 3].
+"""TIFF: tifffile reads the tags, the pixels are decoded by `tiff_parts` [TIFF 6.0].
 
-Without imagecodecs tifffile decodes neither LZW nor PackBits nor the floating-point predictor, and OpenCV
-reads no float16 and returns damaged data as if they were whole. The four usual compressions are little work,
-and done here every file is checked before memory is taken and comes out the same whatever is installed.
+Every file is checked before memory is taken, and comes out the same whatever is installed.
 """
 
 import io
@@ -15,14 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError
-from rollcli.files.codecs.lzw import LzwError, decode_lzw
+from rollcli.files.codecs.mute_stderr import decoding
 from rollcli.files.codecs.raw_map import Stored, native, require_decoded_fits
+from rollcli.files.codecs.tiff_parts import MAX_EXPANSION, DamagedPartError, check_parts, decode_parts
 
 SIGNATURES = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
-_NONE, _LZW, _DEFLATE, _OLD_DEFLATE, _PACKBITS = 1, 5, 8, 32946, 32773
-# how many bytes one byte can stand for
-_MAX_EXPANSION = {_NONE: 1, _LZW: 2732, _DEFLATE: 1032, _OLD_DEFLATE: 1032, _PACKBITS: 64}
-_NO_PREDICTOR, _HORIZONTAL, _FLOATING_POINT = 1, 2, 3
 _WHITE_IS_ZERO, _RGB, _PALETTE = 0, 2, 3
 _CHUNKY = 1
 _LARGE_TILE = 2**22  # pixels; a small image may lie in one large tile
@@ -120,9 +115,15 @@ def _pixels(page: Any, data: bytes, name: str) -> NDArray[Any]:
     parts = -(-width // across) * -(-height // down) * (1 if chunky else samples)
     if len(page.dataoffsets) != parts:
         raise InputError(f"{name}: is a damaged TIFF: {len(page.dataoffsets)} parts, not {parts}")
-    usual = int(page.compression) in _MAX_EXPANSION and int(page.bitspersample) in (8, 16, 32, 64)
-    if usual and chunky and int(page.fillorder) == 1:
-        return _from_parts(page, (height, width, samples), (down, across), data, name)
+    known = int(page.compression) in MAX_EXPANSION and int(page.fillorder) == 1
+    try:
+        if known and chunky and int(page.bitspersample) in (8, 16, 32, 64):
+            empty = next(iter(_nodata(page)), 0.0)
+            return decode_parts(page, (height, width, samples), (down, across), data, empty)
+        if known:
+            check_parts(page, (down, across, samples if chunky else 1), data)
+    except DamagedPartError as error:
+        raise InputError(f"{name}: is a damaged TIFF: its compressed data are wrong ({error})") from None
     return _decoded_by_tifffile(page, name).reshape(height, width, samples)
 
 
@@ -131,7 +132,7 @@ def _part_size(page: Any, name: str) -> tuple[int, int]:
     if not page.is_tiled:
         return int(page.imagewidth), min(int(page.rowsperstrip), int(page.imagelength))
     across, down = int(page.tilewidth), int(page.tilelength)
-    if across * down > 4 * page.imagewidth * page.imagelength + _LARGE_TILE:
+    if across * down > 2 * page.imagewidth * page.imagelength + _LARGE_TILE:
         size = f"{page.imagewidth} x {page.imagelength}"
         raise InputError(f"{name}: is a damaged TIFF: tiles of {across} x {down} for {size} pixels")
     return across, down
@@ -143,98 +144,29 @@ def _require_size(page: Any, numbers: int, data: bytes, name: str) -> None:
     for offset, count in zip(page.dataoffsets, page.databytecounts, strict=True):
         if offset + count > len(data):
             raise InputError(f"{name}: is truncated: its pixels end at byte {offset + count} of {len(data)}")
+    width, height = int(page.imagewidth), int(page.imagelength)
+    pixel_bytes = numbers // (width * height) * page.dtype.itemsize
+    require_decoded_fits(width, height, pixel_bytes, len(data), name)
+    if not all(page.databytecounts):
+        return  # a sparse file: parts without a place hold no data [GDAL]
     needed = numbers * int(page.bitspersample) // 8
-    claim = f"its header claims {page.imagewidth} x {page.imagelength} pixels"
-    if int(page.compression) != _NONE:
-        require_decoded_fits(needed, claim, name)
-    if needed > _MAX_EXPANSION.get(int(page.compression), needed) * stored:
-        raise InputError(f"{name}: {claim}, more than {stored} bytes can hold")
+    if needed > MAX_EXPANSION.get(int(page.compression), needed) * stored:
+        raise InputError(
+            f"{name}: its header claims {width} x {height} pixels, more than {stored} bytes can hold"
+        )
 
 
 def _decoded_by_tifffile(page: Any, name: str) -> NDArray[Any]:
     """Rare compressions, bit depths and layouts, which may need imagecodecs."""
     try:
-        values: NDArray[Any] = page.asarray()
+        with decoding():
+            values: NDArray[Any] = page.asarray()
     except _DAMAGE as error:
         how = f"compression {int(page.compression)}, {page.bitspersample} bits a number"
         missing = isinstance(error, ImportError) or "imagecodecs" in str(error)
         hint = ": pip install imagecodecs" if missing else ""
         raise InputError(f"{name}: its pixels cannot be decoded ({how}){hint}") from None
     return values
-
-
-def _from_parts(
-    page: Any, shape: tuple[int, int, int], part: tuple[int, int], data: bytes, name: str
-) -> NDArray[Any]:
-    """Decode strips or tiles of `part` (rows, columns) into their places; shape is (H, W, channels)."""
-    height, width, samples = shape
-    down, across = part
-    columns = -(-width // across)
-    values = np.empty(shape, page.dtype.newbyteorder("="))
-    for index, (offset, count) in enumerate(zip(page.dataoffsets, page.databytecounts, strict=True)):
-        top, left = index // columns * down, index % columns * across
-        rows = down if page.is_tiled else min(down, height - top)  # the last strip is short
-        try:
-            numbers = _part(page, data[offset : offset + count], (rows, across, samples))
-        except (zlib.error, LzwError, EOFError) as error:
-            raise InputError(f"{name}: is a damaged TIFF: its compressed data are wrong ({error})") from None
-        values[top : top + rows, left : left + across] = numbers[: height - top, : width - left]
-    return values
-
-
-def _part(page: Any, packed: bytes, shape: tuple[int, int, int]) -> NDArray[Any]:
-    """One strip or tile, shape (rows, columns, channels): compression, byte order and predictor undone."""
-    rows, columns, samples = shape
-    dtype = page.dtype.newbyteorder(page.parent.byteorder)
-    size = rows * columns * samples * dtype.itemsize
-    plain = _decompressed(int(page.compression), packed, size)
-    if len(plain) < size:
-        raise EOFError(f"{len(plain)} of {size} bytes")
-    if page.predictor == _FLOATING_POINT and dtype.kind == "f":
-        return _unpredicted_floats(plain, shape, dtype)
-    values: NDArray[Any] = np.frombuffer(plain, dtype, rows * columns * samples).reshape(shape)
-    if page.predictor == _HORIZONTAL:
-        bits = native(values).view(f"u{dtype.itemsize}")  # differences are taken of the bits, modulo 2^n
-        values = np.cumsum(bits, axis=1, dtype=bits.dtype).view(dtype.newbyteorder("="))
-    elif page.predictor != _NO_PREDICTOR:
-        raise ValueError(f"predictor {page.predictor} of {dtype}")
-    return values
-
-
-def _unpredicted_floats(plain: bytes, shape: tuple[int, int, int], dtype: Any) -> NDArray[Any]:
-    """Undo predictor 3: the bytes of a row lie sorted by significance, highest first, as differences."""
-    rows, columns, samples = shape
-    planes = np.frombuffer(plain, np.uint8, rows * columns * samples * dtype.itemsize).reshape(
-        rows, -1, samples
-    )
-    split = np.cumsum(planes, axis=1, dtype=np.uint8).reshape(rows, dtype.itemsize, columns * samples)
-    joined: NDArray[Any] = np.ascontiguousarray(split.transpose(0, 2, 1)).view(dtype.newbyteorder(">"))
-    return joined.reshape(shape)
-
-
-def _decompressed(compression: int, packed: bytes, size: int) -> bytes:
-    """The first `size` bytes, or fewer where the data end early."""
-    if compression == _LZW:
-        return decode_lzw(packed, size)
-    if compression == _PACKBITS:
-        return _unpacked_bits(packed, size)
-    if compression == _NONE:
-        return packed
-    return zlib.decompressobj().decompress(packed, size)
-
-
-def _unpacked_bits(packed: bytes, size: int) -> bytes:
-    """Undo PackBits: runs of copies and runs of repeats."""
-    plain, position = bytearray(), 0
-    while position < len(packed) and len(plain) < size:
-        head = packed[position]
-        if head < 128:
-            plain += packed[position + 1 : position + 2 + head]
-            position += 2 + head
-        else:
-            plain += packed[position + 1 : position + 2] * (257 - head if head > 128 else 0)
-            position += 2 if head > 128 else 1
-    return bytes(plain)
 
 
 def _nodata(page: Any) -> tuple[float, ...]:

@@ -215,3 +215,43 @@ def test_a_large_frame_is_what_opencv_decodes():
 
     assert struct.unpack(">II", file[16:24]) == (1242, 375)
     np.testing.assert_array_equal(decode_stored(file, "x").values, values)
+
+
+@pytest.mark.parametrize("depth", [1, 2, 4, 8, 16])
+def test_the_grey_that_stands_for_transparent_is_no_data(depth):
+    values = np.arange(40).reshape(5, 8) % 2**depth
+    hole = 3 % 2**depth
+    file = make_png(values, depth, extra=[(b"tRNS", struct.pack(">H", hole))])
+
+    expected = np.where(values == hole, 0, values)
+    np.testing.assert_array_equal(decode_stored(file, "x").values, expected)
+
+
+def test_a_transparent_colour_of_a_palette_is_no_data():
+    values = np.arange(40).reshape(5, 8) % 4
+    greys = np.repeat(np.array([10, 20, 30, 40], np.uint8), 3).tobytes()
+    raw = zlib.compress(png_rows(values, 2))
+    header = png_header(8, 5, 2, colour=3)
+    parts = [header, (b"PLTE", greys), (b"tRNS", bytes([255, 0, 128])), (b"IDAT", raw), (b"IEND", b"")]
+
+    found = decode_stored(png_file(*parts), "x").values
+
+    np.testing.assert_array_equal(found, np.array([10, 0, 30, 40])[values])
+    assert picture(png_file(*parts), "x").shape[:2] == (5, 8)
+
+
+@pytest.mark.parametrize("layout", [{}, {"interlace": True}])
+def test_every_flipped_bit_is_refused_or_changes_nothing(layout):
+    whole = make_png((disparity_map(11, 17) * 256).astype(np.uint16), **layout)
+    expected = decode_stored(whole, "x").values.tobytes()
+    refused = 0
+
+    for bit in range(8 * len(whole)):
+        broken = bytearray(whole)
+        broken[bit // 8] ^= 1 << bit % 8
+        try:
+            assert decode_stored(bytes(broken), "x").values.tobytes() == expected
+        except InputError:
+            refused += 1
+
+    assert refused > 7 * len(whole)

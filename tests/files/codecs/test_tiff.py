@@ -8,7 +8,7 @@ import pytest
 
 from rollcli.errors import InputError
 from rollcli.files.codecs.tiff import picture
-from rollcli.files.formats import decode_stored, encode_stored
+from rollcli.files.formats import decode_mask, decode_stored, encode_stored
 from tests.binary_files import disparity_map, make_tiff
 
 KINDS = ("u1", "u2", "i2", "f2", "f4", "f8")
@@ -181,3 +181,94 @@ def test_whole_numbers_of_any_size_are_read(kind):
     values = disparity_map().astype(kind)
 
     np.testing.assert_array_equal(decode_stored(make_tiff(values, "lzw", ">", 2), "map.tif").values, values)
+
+
+@pytest.mark.parametrize("compression", ["none", "lzw", "deflate", "packbits"])
+@pytest.mark.parametrize(("nodata", "expected"), [(None, 0), ("-1", -1), ("1e300", 0), ("nan", 0)])
+def test_parts_that_a_sparse_file_leaves_out_hold_no_data(compression, nodata, expected):
+    values = values_of("i2")
+    stored = decode_stored(make_tiff(values, compression, tile=(16, 32), nodata=nodata, sparse=(1, 2)), "x")
+
+    values[:16, 32:] = expected
+    values[16:32, :32] = expected
+    np.testing.assert_array_equal(stored.values, values)
+
+
+def test_the_last_strip_may_be_filled_up():
+    values = values_of("u2")
+    filled = make_tiff(np.vstack([values, values[:3]]), "deflate", rows_per_strip=10)
+    shorter = filled.replace(struct.pack("<HHII", 257, 4, 1, 40), struct.pack("<HHII", 257, 4, 1, 37))
+    assert shorter != filled
+
+    np.testing.assert_array_equal(decode_stored(shorter, "x").values, values)
+
+
+@pytest.mark.parametrize("compression", ["lzw", "deflate", "packbits"])
+def test_a_part_that_holds_more_than_its_pixels_is_refused(compression):
+    values = values_of("u2")
+    whole = make_tiff(values, compression)
+    fewer = whole.replace(struct.pack("<HHII", 257, 4, 1, 37), struct.pack("<HHII", 257, 4, 1, 30))
+    fewer = fewer.replace(struct.pack("<HHII", 278, 4, 1, 37), struct.pack("<HHII", 278, 4, 1, 30))
+
+    with pytest.raises(InputError, match="its compressed data are wrong"):
+        decode_stored(fewer, "map.tif")
+
+
+def test_data_after_the_end_of_a_part_are_refused():
+    whole = make_tiff(np.zeros((37, 53), np.uint16), "deflate")
+    count = whole.index(struct.pack("<HHI", 279, 4, 1)) + 8
+    longer = bytearray(whole)
+    longer[count : count + 4] = struct.pack("<I", int.from_bytes(whole[count : count + 4], "little") + 9)
+
+    with pytest.raises(InputError, match="its compressed data are wrong"):
+        decode_stored(bytes(longer), "map.tif")
+
+
+def test_deflated_bits_are_held_against_their_checksum_too():
+    bits = np.packbits(np.random.default_rng(0).integers(0, 2, (37, 56), dtype=np.uint8), axis=1)
+    field = struct.pack("<HHII", 256, 4, 1, 7)
+    whole = make_tiff(bits, "deflate").replace(field, struct.pack("<HHII", 256, 4, 1, 56))
+    whole = whole.replace(struct.pack("<HHIHH", 258, 3, 1, 8, 0), struct.pack("<HHIHH", 258, 3, 1, 1, 0))
+    expected = picture_or_mask(whole)
+
+    start, end = data_of(whole)
+    for bit in range(8 * start, 8 * end, 5):
+        assert picture_or_mask(flipped(whole, bit)) in (None, expected)
+
+
+def picture_or_mask(data):
+    """The bytes of a mask; None if it is refused."""
+    try:
+        return decode_mask(data, "x").tobytes()
+    except InputError:
+        return None
+
+
+def data_of(tiff):
+    """Where the only strip of a little-endian TIFF lies."""
+    start = tiff.index(struct.pack("<HHI", 273, 4, 1)) + 8
+    count = tiff.index(struct.pack("<HHI", 279, 4, 1)) + 8
+    first = int.from_bytes(tiff[start : start + 4], "little")
+    return first, first + int.from_bytes(tiff[count : count + 4], "little")
+
+
+def flipped(data, bit):
+    broken = bytearray(data)
+    broken[bit // 8] ^= 1 << bit % 8
+    return bytes(broken)
+
+
+@pytest.mark.parametrize(("kind", "predictor"), [("u2", 1), ("u2", 2), ("f4", 3)])
+def test_every_flipped_bit_of_deflated_pixels_is_refused_or_changes_nothing(kind, predictor):
+    whole = make_tiff(values_of(kind)[:11, :17], "deflate", predictor=predictor)
+    expected = decode_stored(whole, "x").values.tobytes()
+    start, end = data_of(whole)
+    refused = 0
+
+    for bit in range(8 * start, 8 * end):
+        try:
+            assert decode_stored(flipped(whole, bit), "x").values.tobytes() == expected
+        except InputError:
+            refused += 1
+
+    assert refused > (end - start) * 7

@@ -1,0 +1,170 @@
+"""Strips and tiles of a TIFF: compressions and predictors undone [TIFF 6.0; Adobe's technical notes 1 and 3].
+
+Without imagecodecs tifffile decodes neither LZW nor PackBits nor the floating-point predictor, and OpenCV
+reads no float16 and returns damaged data as if they were whole. The four usual compressions are little work,
+and done here each part must hold exactly its pixels: what has a checksum is held against it.
+"""
+
+import zlib
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollcli.files.codecs.lzw import LzwError, decode_lzw
+from rollcli.files.codecs.raw_map import native
+
+_NONE, _LZW, _DEFLATE, _OLD_DEFLATE, _PACKBITS = 1, 5, 8, 32946, 32773
+# how many bytes one byte can stand for
+MAX_EXPANSION = {_NONE: 1, _LZW: 2732, _DEFLATE: 1032, _OLD_DEFLATE: 1032, _PACKBITS: 64}
+_NO_PREDICTOR, _HORIZONTAL, _FLOATING_POINT = 1, 2, 3
+_PADDING = 1  # bytes after the data of a part: parts begin at even places
+
+
+class DamagedPartError(ValueError):
+    """The bytes of a strip or tile are not its pixels."""
+
+
+def decode_parts(
+    page: Any, shape: tuple[int, int, int], part: tuple[int, int], data: bytes, empty: float
+) -> NDArray[Any]:
+    """Decode strips or tiles into their places.
+
+    Parameters
+    ----------
+    page : tifffile.TiffPage
+        Its tags have been checked; 8, 16, 32 or 64 bits a number, channels side by side.
+    shape : tuple of int
+        (H, W, channels) of the image.
+    part : tuple of int
+        Rows and columns of a strip or tile.
+    data : bytes
+        The file.
+    empty : float
+        What the pixels of a part that is not in the file hold, as GDAL leaves them out.
+
+    Raises
+    ------
+    DamagedPartError
+    """
+    height, width, samples = shape
+    down, across = part
+    columns = -(-width // across)
+    values = np.empty(shape, page.dtype.newbyteorder("="))
+    for index, (offset, count) in enumerate(zip(page.dataoffsets, page.databytecounts, strict=True)):
+        top, left = index // columns * down, index % columns * across
+        rows = down if page.is_tiled else min(down, height - top)  # the last strip is short
+        place = values[top : top + rows, left : left + across]
+        if count == 0:
+            place[:] = _as(empty, values.dtype)
+        else:
+            numbers = _part(page, data[offset : offset + count], (rows, across, samples), down)
+            place[:] = numbers[: height - top, : width - left]
+    return values
+
+
+def check_parts(page: Any, part: tuple[int, int, int], data: bytes) -> None:
+    """Raise DamagedPartError where one does not hold its pixels; part is (rows, columns, channels)."""
+    down, across, samples = part
+    row = -(-across * samples * int(page.bitspersample) // 8)
+    strips = -(-int(page.imagelength) // down)
+    for index, (offset, count) in enumerate(zip(page.dataoffsets, page.databytecounts, strict=True)):
+        last = not page.is_tiled and index % strips == strips - 1
+        rows = int(page.imagelength) - (strips - 1) * down if last else down
+        if count:
+            _decompressed(int(page.compression), data[offset : offset + count], rows * row, down * row)
+
+
+def _as(number: float, dtype: np.dtype[Any]) -> Any:
+    """The number in this dtype, or 0 where that cannot hold it."""
+    if dtype.kind in "iu" and not np.iinfo(dtype).min <= number <= np.iinfo(dtype).max:
+        return dtype.type(0)  # NaN, too
+    with np.errstate(over="ignore"):
+        return dtype.type(number)
+
+
+def _part(page: Any, packed: bytes, shape: tuple[int, int, int], most_rows: int) -> NDArray[Any]:
+    """One strip or tile, shape (rows, columns, channels): compression, byte order and predictor undone."""
+    rows, columns, samples = shape
+    dtype = page.dtype.newbyteorder(page.parent.byteorder)
+    row = columns * samples * dtype.itemsize
+    plain = _decompressed(int(page.compression), packed, rows * row, most_rows * row)
+    if page.predictor == _FLOATING_POINT and dtype.kind == "f":
+        return _unpredicted_floats(plain, shape, dtype)
+    values: NDArray[Any] = np.frombuffer(plain, dtype, rows * columns * samples).reshape(shape)
+    if page.predictor == _HORIZONTAL:
+        bits = native(values).view(f"u{dtype.itemsize}")  # differences are taken of the bits, modulo 2^n
+        values = np.cumsum(bits, axis=1, dtype=bits.dtype).view(dtype.newbyteorder("="))
+    elif page.predictor != _NO_PREDICTOR:
+        raise ValueError(f"predictor {page.predictor} of {dtype}")
+    return values
+
+
+def _unpredicted_floats(plain: bytes, shape: tuple[int, int, int], dtype: Any) -> NDArray[Any]:
+    """Undo predictor 3: the bytes of a row lie sorted by significance, highest first, as differences."""
+    rows, columns, samples = shape
+    planes = np.frombuffer(plain, np.uint8, rows * columns * samples * dtype.itemsize).reshape(
+        rows, -1, samples
+    )
+    split = np.cumsum(planes, axis=1, dtype=np.uint8).reshape(rows, dtype.itemsize, columns * samples)
+    joined: NDArray[Any] = np.ascontiguousarray(split.transpose(0, 2, 1)).view(dtype.newbyteorder(">"))
+    return joined.reshape(shape)
+
+
+def _decompressed(compression: int, packed: bytes, size: int, most: int) -> bytes:
+    """What the bytes stand for: `size` bytes, or up to `most` where a short last strip was filled up.
+
+    Raises
+    ------
+    DamagedPartError
+        Fewer or more bytes, something after their end, or a wrong checksum.
+    """
+    try:
+        plain, rest = _UNPACK[compression](packed, most + _PADDING)
+    except (zlib.error, LzwError) as error:
+        raise DamagedPartError(str(error)) from None
+    if len(plain) < size:
+        raise DamagedPartError(f"{len(plain)} of {size} bytes")
+    if len(plain) > most + (_PADDING if compression == _NONE else 0) or rest > _PADDING:
+        raise DamagedPartError(f"more than {size} bytes")
+    return plain
+
+
+def _stored(packed: bytes, most: int) -> tuple[bytes, int]:
+    return packed, 0
+
+
+def _inflated(packed: bytes, most: int) -> tuple[bytes, int]:
+    """Undo Deflate; the checksum at its end is right."""
+    inflater = zlib.decompressobj()
+    plain = inflater.decompress(packed, most)
+    if not inflater.eof and len(plain) < most:
+        raise DamagedPartError(f"they end after {len(plain)} bytes")
+    return plain, len(inflater.unused_data)
+
+
+def _unpacked_lzw(packed: bytes, most: int) -> tuple[bytes, int]:
+    return decode_lzw(packed, most)
+
+
+def _unpacked_bits(packed: bytes, most: int) -> tuple[bytes, int]:
+    """Undo PackBits: runs of copies and runs of repeats."""
+    plain, position = bytearray(), 0
+    while position < len(packed) and len(plain) < most:
+        head = packed[position]
+        if head < 128:
+            plain += packed[position + 1 : position + 2 + head]
+            position += 2 + head
+        else:
+            plain += packed[position + 1 : position + 2] * (257 - head if head > 128 else 0)
+            position += 2 if head > 128 else 1
+    return bytes(plain), max(0, len(packed) - position)
+
+
+_UNPACK = {
+    _NONE: _stored,
+    _LZW: _unpacked_lzw,
+    _DEFLATE: _inflated,
+    _OLD_DEFLATE: _inflated,
+    _PACKBITS: _unpacked_bits,
+}

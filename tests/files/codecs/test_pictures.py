@@ -1,0 +1,85 @@
+"""JPEG images that are cut, damaged or too large are refused; whole ones are read."""
+
+import struct
+import subprocess
+import sys
+
+import cv2
+import numpy as np
+import pytest
+
+from rollcli.errors import InputError
+from rollcli.files.codecs.pictures import decode_picture
+from tests.run_cli import road_map, rollcli, write_pair
+
+IMAGE = cv2.GaussianBlur(np.random.default_rng(0).integers(0, 256, (120, 160), dtype=np.uint8), (0, 0), 2)
+WHOLE = cv2.imencode(".jpg", IMAGE)[1].tobytes()
+END = b"\xff\xd9"
+READ = (
+    "import sys\n"
+    "from rollcli.errors import InputError\n"
+    "from rollcli.files.codecs.mute_stderr import silence_decoders\n"
+    "from rollcli.files.codecs.pictures import decode_picture\n"
+    "silence_decoders()\n"
+    "try:\n"
+    "    print(decode_picture(sys.stdin.buffer.read(), 'x.jpg').shape)\n"
+    "except InputError as error:\n"
+    "    print(error)\n"
+)
+
+
+def in_a_worker(data):
+    """What a process says that works on frames, where what libjpeg prints is heard."""
+    done = subprocess.run([sys.executable, "-c", READ], input=data, capture_output=True, check=True)
+    assert done.stderr == b""
+    return done.stdout.decode().strip()
+
+
+@pytest.mark.parametrize("share", [0.3, 0.6, 0.95])
+def test_a_jpeg_that_was_cut_and_closed_is_refused(share):
+    start = WHOLE.index(b"\xff\xda") + 14
+    cut = WHOLE[: start + int(share * (len(WHOLE) - start))] + END
+
+    assert in_a_worker(cut) == "x.jpg: is a damaged JPEG: premature end of data segment"
+
+
+def test_bytes_before_the_end_that_webcams_write_harm_nothing():
+    assert in_a_worker(WHOLE[:-2] + bytes(3) + END) == "(120, 160)"
+
+
+def test_the_row_of_a_pair_with_a_cut_image_says_so(tmp_path):
+    write_pair(tmp_path, "a.png", road_map(0.05, width=320, height=160) / 2)
+    left = cv2.imread(str(tmp_path / "left" / "a.png"), cv2.IMREAD_UNCHANGED)
+    whole = cv2.imencode(".jpg", left)[1].tobytes()
+    (tmp_path / "a.jpg").write_bytes(whole[: 2 * len(whole) // 3] + END)
+
+    done = rollcli("estimate", "--left", "a.jpg", "--right", "right/a.png", "-q", cwd=tmp_path)
+
+    assert done.status == 3
+    assert "a.jpg: is a damaged JPEG: premature end of data segment" in done.out
+
+
+@pytest.mark.parametrize("progressive", [False, True])
+def test_a_jpeg_that_claims_more_than_it_can_be_worth_is_refused_undecoded(progressive):
+    options = [cv2.IMWRITE_JPEG_PROGRESSIVE, int(progressive)]
+    whole = cv2.imencode(".jpg", np.dstack([IMAGE] * 3), options)[1].tobytes()
+    place = whole.index(b"\xff\xc2" if progressive else b"\xff\xc0") + 5
+    lying = whole[:place] + struct.pack(">HH", 65500, 65500) + whole[place + 4 :]
+
+    with pytest.raises(InputError, match="claims 65500 x 65500 pixels"):
+        decode_picture(lying, "x.jpg")
+
+
+def test_fill_bytes_before_a_marker_are_read_over():
+    place = WHOLE.index(b"\xff\xc0")
+
+    np.testing.assert_array_equal(
+        decode_picture(WHOLE[:place] + b"\xff\xff" + WHOLE[place:], "x.jpg"), decode_picture(WHOLE, "x.jpg")
+    )
+
+
+def test_a_jpeg_without_a_frame_header_is_refused():
+    place = WHOLE.index(b"\xff\xc0")
+
+    with pytest.raises(InputError, match="no frame header"):
+        decode_picture(WHOLE[:place] + b"\xff\xda" + bytes(20) + END, "x.jpg")

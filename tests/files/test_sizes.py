@@ -1,0 +1,122 @@
+"""A small file never takes much memory, whatever it claims, and large maps are read up to a stated size."""
+
+import os
+import struct
+import subprocess
+import sys
+import zlib
+
+import numpy as np
+import pytest
+
+from rollcli.errors import InputError
+from rollcli.files.formats import decode_image, decode_mask, decode_stored
+from tests.binary_files import make_npy, make_pfm, make_tiff, png_chunk, png_header
+from tests.run_cli import command, environment
+
+GIB = 2**30
+
+
+def png_of(width, height, depth, colour=0, palette=b""):
+    """A PNG whose rows are all alike, made without the memory that reading it would take."""
+    packer, channels = zlib.compressobj(9), {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}[colour]
+    row = b"\0" + b"\x55" * ((width * depth * channels + 7) // 8)
+    data = b"".join(packer.compress(row) for _ in range(height)) + packer.flush()
+    kind, body = png_header(width, height, depth, colour)
+    chunks = [png_chunk(kind, body), png_chunk(b"IDAT", data), png_chunk(b"IEND", b"")]
+    return (
+        b"\x89PNG\r\n\x1a\n"
+        + chunks[0]
+        + (png_chunk(b"PLTE", palette) if palette else b"")
+        + b"".join(chunks[1:])
+    )
+
+
+def tiff_of(width, height, bits, rows=64):
+    """A Deflate TIFF of few bits a pixel, by the same trick."""
+    strip = zlib.compress(bytes((width * bits + 7) // 8 * rows), 9)
+    file = make_tiff(np.zeros((1, 8), np.uint8), "deflate")
+    strips = height // rows
+    starts, data = [], b""
+    for _ in range(strips):
+        starts.append(len(file) + len(data))
+        data += strip
+    places = len(file) + len(data)
+    fields = {
+        (256, 4, 8): struct.pack("<HHII", 256, 4, 1, width),
+        (257, 4, 1): struct.pack("<HHII", 257, 4, 1, rows * strips),
+        (278, 4, 1): struct.pack("<HHII", 278, 4, 1, rows),
+    }
+    for (tag, kind, value), new in fields.items():
+        file = file.replace(struct.pack("<HHII", tag, kind, 1, value), new)
+    file = file.replace(struct.pack("<HHIHH", 258, 3, 1, 8, 0), struct.pack("<HHIHH", 258, 3, 1, bits, 0))
+    for tag, place in ((273, places), (279, places + 4 * strips)):
+        at = file.index(struct.pack("<HHI", tag, 4, 1))
+        file = file[:at] + struct.pack("<HHII", tag, 4, strips, place) + file[at + 12 :]
+    return (
+        file + data + struct.pack(f"<{strips}I", *starts) + struct.pack(f"<{strips}I", *[len(strip)] * strips)
+    )
+
+
+BOMBS = {
+    "grey1.png": lambda: png_of(12_000, 12_000, 1),
+    "grey8.png": lambda: png_of(6_000, 6_000, 8),
+    "palette.png": lambda: png_of(9_000, 9_000, 1, 3, bytes([9, 9, 9, 20, 20, 20])),
+    "colour.png": lambda: png_of(3_000, 3_000, 16, 6),
+    "bits1.tif": lambda: tiff_of(12_000, 12_800, 1),
+    "bits4.tif": lambda: tiff_of(12_000, 6_400, 4),
+    "bits8.tif": lambda: tiff_of(6_000, 6_400, 8),
+}
+
+
+@pytest.mark.parametrize("name", BOMBS)
+def test_what_a_small_file_claims_to_hold_is_counted_before_memory_is_taken(name):
+    data = BOMBS[name]()
+    assert len(data) < 2**20
+
+    for decode in (decode_stored, decode_image):
+        with pytest.raises(InputError, match=r"^x: (its header claims .* MB once decoded|is neither)"):
+            decode(data, "x")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="peak memory is counted in other units elsewhere")
+def test_small_files_at_the_limit_take_less_than_a_gigabyte(tmp_path):
+    maps = tmp_path / "maps"
+    maps.mkdir()
+    for name, data in {
+        "1.png": png_of(3800, 2200, 1),
+        "16.png": png_of(3800, 2200, 16),
+        "palette.png": png_of(3800, 2200, 8, 3, bytes([9, 9, 9]) * 256),
+        "8.tif": tiff_of(3800, 2176, 8),
+        "f8.tif": make_tiff(np.zeros((2000, 2000)), "deflate"),
+    }.items():
+        (maps / name).write_bytes(data)
+        assert len(data) < 2**20
+    line = command("estimate", "maps", "-q", "-o", "rolls.csv", "-j", "1")
+
+    process = subprocess.Popen(line, cwd=tmp_path, env=environment(), stderr=subprocess.DEVNULL)
+    _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+
+    assert process.returncode == 3
+    assert len((tmp_path / "rolls.csv").read_text().splitlines()) == 6
+    assert "once decoded" not in (tmp_path / "rolls.csv").read_text()
+    assert usage.ru_maxrss * 1024 < GIB
+
+
+def test_maps_that_are_stored_plainly_are_read_whatever_they_hold():
+    values = np.zeros((3000, 4000), np.float32)
+
+    for data in (make_npy(values), make_pfm(values), make_tiff(values)):
+        assert decode_stored(data, "x").values.shape == values.shape
+
+
+def test_a_map_larger_than_any_is_refused_however_it_is_stored():
+    header = make_npy(np.zeros((1, 1), np.uint8)).replace(b"(1, 1)", b"(14000, 10000)")
+
+    with pytest.raises(InputError, match=r"claims 10000 x 14000 pixels, 535 MB once decoded"):
+        decode_stored(header + bytes(14_000 * 10_000), "x")
+
+
+def test_a_mask_of_a_large_map_may_compress_as_well_as_it_can():
+    assert decode_mask(png_of(12_000, 8_000, 1), "x").shape == (8_000, 12_000)
