@@ -1,1 +1,1 @@
-"""The run of `estimate`: the plan, one task a frame, the result and its record, resuming."""
+"""Many frames: one job a frame, workers, order, resume, counts."""

@@ -1,1 +1,1 @@
-"""Convert maps and pairs to other files: de-rotated maps, v-disparity images, disparity maps."""
+"""Maps and pairs to other files, one for one: de-rotated maps, v-disparity images, disparity maps."""

@@ -1,1 +1,1 @@
-"""One frame, a map or a stereo pair: found, checked, read, its outputs named and encoded."""
+"""One frame: found, read, checked, named, encoded."""

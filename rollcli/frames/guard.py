@@ -1,27 +1,19 @@
-"""The errors that cost a frame, not the batch."""
+"""What may be wrong with a frame without being wrong with the batch."""
 
 from collections.abc import Callable
 
 import cv2
 
 from rollcli.errors import EstimationError, InputError, UsageError
-from rollcli.frames.frame import Frame, FrameResult, failed_frame
+from rollcli.frames.frame import Frame, Outcome, failed
 
-_NUMERIC_ERRORS = (ArithmeticError, ValueError)  # from numbers that some step cannot deal with
-FRAME_ERRORS = (
-    InputError,
-    EstimationError,
-    UsageError,
-    OSError,
-    MemoryError,
-    cv2.error,
-    *_NUMERIC_ERRORS,
-)
+_NUMBERS = (ArithmeticError, ValueError)  # that some step cannot deal with
+FAULTS = (InputError, EstimationError, UsageError, OSError, MemoryError, cv2.error, *_NUMBERS)
 
 
-def guarded(frame: Frame, work: Callable[[], FrameResult]) -> FrameResult:
-    """Do the work; turn an error that costs only this frame into its `error` row."""
+def guarded(frame: Frame, work: Callable[[], Outcome]) -> Outcome:
+    """What the work gives, or the row that says what is wrong with this frame."""
     try:
         return work()
-    except FRAME_ERRORS as error:
-        return failed_frame(frame, str(error) or type(error).__name__)
+    except FAULTS as error:
+        return failed(frame, str(error) or type(error).__name__)

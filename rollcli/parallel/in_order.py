@@ -1,4 +1,4 @@
-"""Give tasks to an executor and yield their results in the tasks' order, with few tasks in flight."""
+"""Tasks to workers and what they give back in order, with a bounded number of tasks in flight."""
 
 from collections import deque
 from collections.abc import Callable, Generator, Iterable
@@ -8,83 +8,73 @@ from typing import Generic, Protocol, TypeVar
 
 from rollcli.parallel.interrupt import Stop
 
-Task = TypeVar("Task")
-Result = TypeVar("Result")
-_Task = TypeVar("_Task", contravariant=True)
-_Result = TypeVar("_Result", covariant=True)
+Task = TypeVar("Task", contravariant=True)
+Done = TypeVar("Done")
+Result = TypeVar("Result", covariant=True)
 
 
 @dataclass(frozen=True)
-class Work(Generic[Task, Result]):
-    """What to do with each task. Both functions are pickled and sent to workers: name them in a module.
+class Work(Generic[Task, Done]):
+    """What is done with each task. Both functions go to the workers: small, and of a module.
 
     Attributes
     ----------
     do : callable
-        Turns a task into its result. A task that cannot be done gets a result that says so.
+        Takes a task; what is wrong with the task is said by what it gives.
     lost : callable
-        Makes the result of a task whose worker died, from the task and the reason.
+        What a task gives whose worker died, from the task and the reason.
     """
 
-    do: Callable[[Task], Result]
-    lost: Callable[[Task, str], Result]
+    do: Callable[[Task], Done]
+    lost: Callable[[Task, str], Done]
 
 
-class Future(Protocol[_Result]):
-    """A task that was submitted: a `concurrent.futures.Future`, or an object with these two methods."""
+class Ticket(Protocol[Result]):
+    """A task that is under way: a `concurrent.futures.Future`, or what does for one."""
 
-    def result(self) -> _Result:
-        """Wait for the result; raise what the task raised, or an error that says that its worker died."""
+    def result(self) -> Result:
+        """Wait for what the task gives."""
 
     def cancel(self) -> bool:
-        """Withdraw the task; return False when a worker has started it."""
+        """Give the task back, unless a worker has it already."""
 
 
-class Executor(Protocol[_Task, _Result]):
-    """Workers, wherever they run.
+class Crew(Protocol[Task, Result]):
+    """Workers, wherever they are.
 
     Attributes
     ----------
     window : int
-        The number of tasks in flight: large enough to keep every worker busy, and bounded to bound memory.
-    worker_died : tuple of exception types
-        What `Future.result` raises when the task's worker has died.
+        How many tasks may be in flight: enough that nobody waits, few enough that memory stays bounded.
+    deaths : tuple of exception types
+        What `result` of a task raises whose worker has died.
     """
 
     window: int
-    worker_died: tuple[type[BaseException], ...]
+    deaths: tuple[type[BaseException], ...]
 
-    def submit(self, task: _Task) -> Future[_Result]:
-        """Queue a task."""
+    def submit(self, task: Task) -> Ticket[Result]:
+        """Start a task."""
 
-    def retry(self, task: _Task) -> _Result:
-        """Run a task again whose worker died; if this worker dies too, return the result of a lost task."""
-
-    def close(self, *, at_once: bool) -> None:
-        """End the workers: after their current task, or at once."""
+    def again(self, task: Task) -> Result:
+        """Do a task once more whose worker has died; if that dies too, what a lost task gives."""
 
 
-def in_order(
-    tasks: Iterable[Task], executor: Executor[Task, Result], stop: Stop
-) -> Generator[Result, None, None]:
-    """Yield the result of each task, in the tasks' order.
-
-    Once `stop` is requested, no task is submitted, queued tasks are cancelled, and the results of those that
-    were started are still yielded.
-    """
-    remaining, in_flight = iter(tasks), deque[tuple[Task, Future[Result]]]()
+def in_order(tasks: Iterable[Task], crew: Crew[Task, Done], stop: Stop) -> Generator[Done, None, None]:
+    """What each task gives, in the tasks' order; when asked to stop, of those that are worked on already."""
+    source, flying = iter(tasks), deque[tuple[Task, Ticket[Done]]]()
     while True:
-        for task in islice(remaining, 0 if stop.asked else executor.window - len(in_flight)):
-            in_flight.append((task, executor.submit(task)))
-        while stop.asked and in_flight and in_flight[-1][1].cancel():
-            in_flight.pop()
-        if not in_flight:
+        for task in islice(source, 0 if stop.asked else crew.window - len(flying)):
+            flying.append((task, crew.submit(task)))
+        while stop.asked and flying and flying[-1][1].cancel():
+            flying.pop()
+        if not flying:
             return
-        task, future = in_flight.popleft()
+        task, ticket = flying.popleft()
         try:
-            result = future.result()
-        except executor.worker_died:
+            done = ticket.result()
+        except crew.deaths:
             if stop.asked:
                 return  # whoever asked has ended the workers too
-            result = executor.retry(task)
-        yield result
+            done = crew.again(task)
+        yield done

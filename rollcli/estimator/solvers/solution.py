@@ -1,15 +1,13 @@
-"""What every solver is given and returns."""
+"""What every solver returns."""
+
+from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
-from rollcli.estimator.energy import Energy
-from rollcli.estimator.methods import SolverSettings
 
-
-class SolverStatus(Enum):
+class Outcome(Enum):
     """How a solver ended; the value is what a user reads."""
 
     CONVERGED = "converged"
@@ -20,7 +18,7 @@ class SolverStatus(Enum):
     @property
     def converged(self) -> bool:
         """Whether the angle is a solution."""
-        return self is SolverStatus.CONVERGED
+        return self is Outcome.CONVERGED
 
 
 @dataclass(frozen=True)
@@ -33,15 +31,12 @@ class Solution:
         Radians, in (-pi/2, pi/2].
     iterations : int
         As the method's paper counts them; 0 for closed forms.
-    status : SolverStatus
+    outcome : Outcome
     """
 
     theta: float
     iterations: int
-    status: SolverStatus = SolverStatus.CONVERGED
-
-
-Solver = Callable[[Energy, SolverSettings], Solution]
+    outcome: Outcome = Outcome.CONVERGED
 
 
 def principal(theta: float) -> float:
@@ -50,6 +45,6 @@ def principal(theta: float) -> float:
     return wrapped if wrapped > -math.pi / 2 + 1e-12 else math.pi / 2
 
 
-def angle_between(theta: float, other: float) -> float:
+def apart(theta: float, other: float) -> float:
     """Return the angle between two rolls, at most pi / 2."""
     return abs(math.remainder(theta - other, math.pi))
