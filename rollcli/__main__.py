@@ -1,29 +1,28 @@
 """``python -m rollcli``: the same program as ``rollcli``."""
 
-import os
 import sys
-from pathlib import Path
 from types import TracebackType
+
+from rollcli.messages import let_stderr_fail, say
 
 
 def main() -> None:
-    """Run the program; should it fail for a reason that nobody thought of, that is one line too."""
-    sys.excepthook = _one_line
-    if sys.stderr is None:  # closed: what we say goes nowhere
-        sys.stderr = Path(os.devnull).open("w")  # noqa: SIM115 (open as long as the program runs)
-    from rollcli.cli.main import main as program  # here: each worker process imports this module anew
+    """Run the program; an error that nobody expected is one line too."""
+    let_stderr_fail()
+    sys.excepthook = _say_in_one_line
+    from rollcli.cli.main import main as program  # a door: each worker process imports this module anew
 
     program(prog_name="rollcli")
 
 
-def _one_line(kind: type[BaseException], error: BaseException, at: TracebackType | None) -> None:
+def _say_in_one_line(kind: type[BaseException], error: BaseException, at: TracebackType | None) -> None:
     if issubclass(kind, KeyboardInterrupt):  # before there was anything to resume
-        sys.stderr.write("rollcli: interrupted\n")
+        say("interrupted")
         return
     while at is not None and at.tb_next is not None:
         at = at.tb_next
     where = f"{at.tb_frame.f_code.co_filename}:{at.tb_lineno}" if at else "nowhere"
-    sys.stderr.write(f"rollcli: internal error, please report it: {kind.__name__}: {error} ({where})\n")
+    say(f"internal error, please report it: {kind.__name__}: {error} ({where})")
 
 
 if __name__ == "__main__":

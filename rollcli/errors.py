@@ -1,4 +1,28 @@
-"""What can go wrong, as a user would name it. Every message is one line and says what to do."""
+"""What can go wrong, as a user would name it, and the exit status that says so.
+
+Every message is one line and says what to do.
+"""
+
+from enum import IntEnum
+
+
+class ExitStatus(IntEnum):
+    """How the program ends; the help of every command lists these."""
+
+    meaning: str
+
+    def __new__(cls, value: int, meaning: str) -> "ExitStatus":
+        """Make a number that carries its meaning."""
+        member = int.__new__(cls, value)
+        member._value_ = value
+        member.meaning = meaning
+        return member
+
+    DONE = 0, "every frame is done, suspect ones included"
+    FAILED = 1, "the program could not do its job: an output cannot be written, the disk is full"
+    USAGE = 2, "wrong usage, or no input found"
+    FRAMES_FAILED = 3, "finished, and at least one frame failed; each says why"
+    INTERRUPTED = 130, "interrupted"
 
 
 class RollcliError(Exception):

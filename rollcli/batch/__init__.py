@@ -1,1 +1,1 @@
-"""Many frames: one job a frame, workers, order, resume, counts."""
+"""The run of `estimate`: the plan, one task a frame, the result and its record, resuming."""

@@ -5,60 +5,40 @@ import time
 from dataclasses import replace
 from typing import Any
 
-from rollcli.estimator.estimate import RollEstimate, estimate_roll
+from rollcli.estimator.estimate import estimate_roll
+from rollcli.estimator.result import RollEstimate
 from rollcli.files.results import Row
 from rollcli.frames.encode import write_images
-from rollcli.frames.frame import Frame, Outcome
+from rollcli.frames.frame import Frame, FrameResult
 from rollcli.frames.guard import guarded
 from rollcli.frames.options import FrameOptions, MethodOptions
 from rollcli.frames.outputs import remove_images
 from rollcli.frames.read import Source, read_source
-from rollcli.frames.region import region_mask
-from rollcli.imaging.sgbm_offset import sgbm_offset
-from rollcli.rig.calibration import Calibration
-from rollcli.rig.pose import horizon_row, with_pose
 
 
-def run_frame(frame: Frame, options: FrameOptions) -> Outcome:
-    """Do one frame; whatever is wrong with it becomes an `error` row.
+def run_frame(frame: Frame, options: FrameOptions) -> FrameResult:
+    """Estimate the roll of one frame and write its images; what is wrong with it becomes an `error` row.
 
     Raises
     ------
     OutputError
-        An image cannot be written: that ends the run.
+        An image cannot be written, which ends the run.
     """
     start = time.perf_counter()
-    outcome = guarded(frame, lambda: _measured(frame, options))
-    if outcome.row.status == "error":
+    result = guarded(frame, lambda: _estimate(frame, options))
+    if result.row.status == "error":
         remove_images(frame, options.images, options.root)
     elapsed = 1000 * (time.perf_counter() - start)
-    return replace(outcome, row=replace(outcome.row, elapsed_ms=elapsed))
+    return replace(result, row=replace(result.row, elapsed_ms=elapsed))
 
 
-def _measured(frame: Frame, options: FrameOptions) -> Outcome:
+def _estimate(frame: Frame, options: FrameOptions) -> FrameResult:
     source = read_source(frame, options)
-    mask = region_mask(frame.mask, options, source.disparity.shape)
-    estimate = estimate_roll(source.disparity, mask=mask, **_arguments(options.method))
-    calibration = _calibration(frame, source, estimate)
-    horizon = None if calibration is None else horizon_row(estimate.tangent, calibration)
-    write_images(frame, source, estimate, options, horizon)
-    if calibration is not None:
-        estimate = with_pose(estimate, calibration)
-    return Outcome(_row(frame, source, estimate), source.encoding, source.warning, source.searched)
-
-
-def _calibration(frame: Frame, source: Source, estimate: RollEstimate) -> Calibration | None:
-    """The frame's calibration at the size of its map; doffs allows for what the matcher errs by."""
-    if frame.calibration is None:
-        return None
-    calibration = frame.calibration
-    if source.size is not None:
-        calibration = calibration.for_size(*source.size)
-    calibration = calibration.for_size(estimate.width, estimate.height)
-    if not source.mode:
-        return calibration
-    rise = estimate.tangent.slope * math.cos(estimate.tangent.theta)
-    return replace(calibration, doffs=calibration.doffs - sgbm_offset(source.mode, rise))
+    wanted = options.images.road_mask is not None
+    arguments = _arguments(options.method)
+    estimate = estimate_roll(source.disparity, mask=source.allowed, road_mask=wanted, **arguments)
+    write_images(frame, source, estimate, options)
+    return FrameResult(_row(frame, source, estimate), source.encoding, source.warning, source.searched)
 
 
 def _arguments(options: MethodOptions) -> dict[str, Any]:
@@ -87,11 +67,7 @@ def _row(frame: Frame, source: Source, estimate: RollEstimate) -> Row:
         right_file=frame.right_file,
         status=status,
         roll_deg=math.degrees(estimate.theta),
-        roll_ci95_deg=_degrees(estimate.ci95),
-        pitch_deg=_degrees(estimate.pitch),
-        pitch_ci95_deg=_degrees(estimate.pitch_ci95),
-        height_m=estimate.height_m,
-        height_ci95_m=estimate.height_ci95_m,
+        roll_ci95_deg=None if estimate.ci95 is None else math.degrees(estimate.ci95),
         method=estimate.method,
         iterations=estimate.iterations,
         converged=estimate.converged,
@@ -106,7 +82,3 @@ def _row(frame: Frame, source: Source, estimate: RollEstimate) -> Row:
         height=estimate.height,
         message="; ".join(reasons),
     )
-
-
-def _degrees(angle: float | None) -> float | None:
-    return None if angle is None else math.degrees(angle)

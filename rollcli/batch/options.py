@@ -1,6 +1,6 @@
-"""What a run of `estimate` was asked to do; import-light, since the command line shows its help."""
+"""The options of a run of `estimate`. Import-light: the command line loads this to show its help."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal
 
 from rollcli.frames.options import (
@@ -14,7 +14,6 @@ from rollcli.frames.options import (
     RunningOptions,
 )
 from rollcli.imaging.stereo_options import StereoOptions
-from rollcli.rig.options import CalibrationOptions
 
 
 @dataclass(frozen=True)
@@ -27,12 +26,11 @@ class ResultOptions:
     shard: tuple[int, int] = (1, 1)
     fail_fast: bool = False
     timing: bool = False
-    scheduler: str | None = None
 
 
 @dataclass(frozen=True)
 class EstimateOptions:
-    """Everything that `rollcli estimate` was asked."""
+    """Every option of `rollcli estimate`."""
 
     inputs: InputOptions
     pairs: PairOptions
@@ -43,9 +41,10 @@ class EstimateOptions:
     images: ImageOptions
     result: ResultOptions
     running: RunningOptions
-    calibration: CalibrationOptions = field(default_factory=CalibrationOptions)
 
     @property
     def frame(self) -> FrameOptions:
-        """The part that decides what a frame gives."""
-        return FrameOptions(self.encoding, self.stereo, self.region, self.method, self.images)
+        """The part that decides the row and the images of a frame."""
+        return FrameOptions(
+            self.encoding, self.stereo, self.region, self.method, self.images, self.running.root
+        )

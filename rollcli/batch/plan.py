@@ -1,4 +1,4 @@
-"""What a run will read and write, decided and checked before anything runs."""
+"""Decide and check what a run will read and write, before anything runs."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -9,7 +9,6 @@ from rollcli.batch.options import EstimateOptions
 from rollcli.errors import UsageError
 from rollcli.files.results import run_path
 from rollcli.files.stream import STDOUT
-from rollcli.frames.calibration import check_first_size
 from rollcli.frames.checks import check_inputs_are_kept, check_nothing_is_there, check_one_owner
 from rollcli.frames.find import map_frames, pair_frames
 from rollcli.frames.frame import Frame
@@ -18,21 +17,22 @@ from rollcli.frames.outputs import image_paths
 
 @dataclass(frozen=True)
 class Plan:
-    """The frames of a run, in the order of their rows, and where the rows go."""
+    """The frames of a run, in the order of their rows; where the rows go, and in which form."""
 
     frames: list[Frame]
     output: str
     format: Literal["csv", "jsonl"]
+    timing: bool = False
 
 
 def make_plan(options: EstimateOptions) -> Plan:
-    """Find the frames and check what can be checked before they run.
+    """Find the frames and check what can be checked without reading them.
 
     Raises
     ------
     UsageError
-        No input; pairs, masks or calibrations without partner; a calibration that is not for the images; two
-        frames with the same image; an image or a result that would replace an input, or that exists already.
+        No input; pairs or masks without partner; two frames with the same image; an image or a result that
+        would replace an input, or that exists already.
     """
     part, parts = options.result.shard
     frames = _find_frames(options)
@@ -42,14 +42,13 @@ def make_plan(options: EstimateOptions) -> Plan:
     reads = [path for frame in frames for path in frame.reads()]
     check_inputs_are_kept(reads, chain(results, _images(frames, options)))
     frames = frames[part - 1 :: parts]
-    check_first_size(frames, options.frame)
     if not (options.running.overwrite or options.result.resume):
         check_nothing_is_there(_images(frames, options))
-    return Plan(frames, output, options.result.format or _format(output))
+    return Plan(frames, output, options.result.format or _format(output), options.result.timing)
 
 
 def _images(frames: Iterable[Frame], options: EstimateOptions) -> Iterator[str]:
-    """Every image that is written; one by one, since a list of them would be most of our memory."""
+    """Yield every image that is written; a list of them would take most of our memory."""
     return (path for frame in frames for _, path in image_paths(frame, options.images))
 
 
@@ -68,7 +67,7 @@ def _find_frames(options: EstimateOptions) -> list[Frame]:
             "no input: name maps (files, folders, patterns, or - for a list on stdin) or --left and --right"
         )
     if paired:
-        return pair_frames(given, pairs, region=options.region, calibration=options.calibration, skip=skip)
+        return pair_frames(given, pairs, region=options.region, skip=skip)
     if options.images.disparity is not None:
         raise UsageError("--disparity writes maps computed from --left and --right; here maps are the input")
-    return map_frames(given, region=options.region, calibration=options.calibration, skip=skip)
+    return map_frames(given, region=options.region, skip=skip)

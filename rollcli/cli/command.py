@@ -1,21 +1,15 @@
-"""Commands whose help is in sections, and options that know theirs."""
+"""Commands whose help is in sections, and how their options are declared."""
 
 from collections.abc import Callable, Sequence
-from functools import partial, wraps
-from typing import Any, TypeVar
+from dataclasses import dataclass
+from typing import Any
 
 import click
 
-OTHER = "Other options"
-EXIT_STATUS = (
-    ("0", "every frame is done, suspect ones included"),
-    ("1", "the program could not do its job: an output cannot be written, the disk is full"),
-    ("2", "wrong usage, or no input found"),
-    ("3", "finished, and at least one frame failed; each says why"),
-    ("130", "interrupted"),
-)
+from rollcli.errors import ExitStatus
 
-Function = TypeVar("Function", bound=Callable[..., Any])
+OTHER = "Other options"
+Values = dict[str, Any]
 
 
 class Option(click.Option):
@@ -32,7 +26,7 @@ class Command(click.Command):
     Parameters
     ----------
     examples : sequence of (str, str)
-        What for, and the command line; several lines are steps.
+        A purpose, and the command line for it; several lines are steps.
     """
 
     def __init__(self, *args: Any, examples: Sequence[tuple[str, str]] = (), **attributes: Any) -> None:
@@ -40,6 +34,7 @@ class Command(click.Command):
         self.examples = tuple(examples)
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the options, by section."""
         sections: dict[str, list[tuple[str, str]]] = {}
         for param in self.get_params(ctx):
             record = param.get_help_record(ctx)
@@ -50,6 +45,7 @@ class Command(click.Command):
                 formatter.write_dl(sections[title])
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the examples, the environment variables and the exit statuses."""
         if self.examples:
             with formatter.section("Examples"):
                 for purpose, steps in self.examples:
@@ -60,17 +56,58 @@ class Command(click.Command):
                 f"Each option also reads {ctx.auto_envvar_prefix}_<OPTION>; flags win over it."
             )
         with formatter.section("Exit status"):
-            formatter.write_dl(EXIT_STATUS)
+            formatter.write_dl([(str(int(status)), status.meaning) for status in ExitStatus])
 
 
-command = partial(click.command, cls=Command)
-option = partial(click.option, cls=Option)
+@dataclass(frozen=True)
+class Declared:
+    """A function on its way to be a command: its parameters, and how their values are gathered for it."""
+
+    function: Callable[..., Any]
+    params: tuple[click.Parameter, ...] = ()
+    gather: tuple[Callable[[Values], None], ...] = ()
+
+    def __call__(self, **values: Any) -> Any:
+        """Call the function with the values that click has parsed."""
+        for gather in self.gather:
+            gather(values)
+        return self.function(**values)
 
 
-def record(
-    name: str, title: str, make: Callable[..., Any], *declarations: Callable[[Function], Function]
-) -> Callable[[Function], Function]:
-    """A decorator that declares options and hands the command one record of them.
+@dataclass(frozen=True)
+class Declaration:
+    """A decorator that declares parameters of a command.
+
+    Attributes
+    ----------
+    make : callable
+        Makes the parameters: each command has its own.
+    gather : callable or None
+        Replaces their values by one record.
+    """
+
+    make: Callable[[], list[click.Parameter]]
+    gather: Callable[[Values], None] | None = None
+
+    def __call__(self, function: Callable[..., Any]) -> Declared:
+        """Declare the parameters before those that are declared below."""
+        inner = function if isinstance(function, Declared) else Declared(function)
+        gather = (self.gather,) if self.gather is not None else ()
+        return Declared(inner.function, (*self.make(), *inner.params), (*gather, *inner.gather))
+
+
+def option(*names: str, **attributes: Any) -> Declaration:
+    """Declare an option; takes what `click.Option` takes, and the `section` of the help."""
+    return Declaration(lambda: [Option(names, **attributes)])
+
+
+def argument(*names: str, **attributes: Any) -> Declaration:
+    """Declare an argument; takes what `click.Argument` takes."""
+    return Declaration(lambda: [click.Argument(names, **attributes)])
+
+
+def record(name: str, title: str, make: Callable[..., Any], *declarations: Declaration) -> Declaration:
+    """Declare options that the command receives as one record.
 
     Parameters
     ----------
@@ -79,27 +116,40 @@ def record(
     title : str
         The heading in the help.
     make : callable
-        Takes the values by the options' names, gives the record.
+        Makes the record of the values, which it takes by the options' names.
     *declarations
-        What `option` and `click.argument` return.
+        What `option` and `argument` return.
     """
 
-    def decorate(function: Function) -> Function:
-        def blank() -> None: ...
+    def params() -> list[click.Parameter]:
+        made = [param for declaration in declarations for param in declaration.make()]
+        for param in made:
+            if isinstance(param, Option):
+                param.section = title
+        return made
 
-        for declare in reversed(declarations):
-            declare(blank)
-        declared: list[click.Parameter] = blank.__click_params__  # type: ignore[attr-defined]
-        for param in declared:
-            param.section = title  # type: ignore[attr-defined]
+    names = [str(param.name) for param in params()]
 
-        @wraps(function)
-        def collecting(*args: Any, **values: Any) -> Any:
-            values[name] = make(**{str(p.name): values.pop(str(p.name)) for p in declared})
-            return function(*args, **values)
+    def gather(values: Values) -> None:
+        values[name] = make(**{each: values.pop(each) for each in names})
 
-        # click lists the last decorator first and turns the list round
-        collecting.__click_params__ = [*getattr(function, "__click_params__", []), *declared]  # type: ignore[attr-defined]
-        return collecting  # type: ignore[return-value]
+    return Declaration(params, gather)
 
-    return decorate
+
+def command(
+    examples: Sequence[tuple[str, str]] = (), short_help: str | None = None
+) -> Callable[[Declared], Command]:
+    """Make a command of a function, named after it; its docstring is the help."""
+
+    def make(declared: Declared) -> Command:
+        function = declared.function
+        return Command(
+            function.__name__,
+            callback=declared,
+            params=list(declared.params),
+            help=function.__doc__,
+            short_help=short_help,
+            examples=examples,
+        )
+
+    return make

@@ -1,4 +1,4 @@
-"""`rollcli derotate`: maps turned upright."""
+"""`rollcli derotate`: rotate maps."""
 
 from typing import Any
 
@@ -6,19 +6,19 @@ import click
 
 from rollcli.cli.command import command, option, record
 from rollcli.cli.config import config_option
-from rollcli.cli.options import PATH, encoding_options, input_options, output_folder_option, running_options
+from rollcli.cli.options import PATH, cluster_options, encoding_options, input_options, output_folder_option
 from rollcli.cli.types import Number
-from rollcli.convert.options import DerotateOptions, TurnOptions
+from rollcli.convert.options import DerotateOptions, RotationOptions
 
 
-def _turn(*, roll: float | None, **values: Any) -> TurnOptions:
-    return TurnOptions(roll_deg=roll, result=values.pop("from"), **values)
+def _rotation(*, roll: float | None, **values: Any) -> RotationOptions:
+    return RotationOptions(roll_deg=roll, result=values.pop("from"), **values)
 
 
-turn_options = record(
-    "turn",
+rotation_options = record(
+    "rotation",
     "Angle",
-    _turn,
+    _rotation,
     option(
         "--roll",
         type=Number("DEG", at_least=-180, at_most=180),
@@ -41,10 +41,10 @@ turn_options = record(
     ]
 )
 @input_options
-@turn_options
+@rotation_options
 @output_folder_option
 @encoding_options
-@running_options
+@cluster_options
 @config_option
 @click.pass_context
 def derotate(ctx: click.Context, /, **records: Any) -> None:
@@ -57,6 +57,6 @@ def derotate(ctx: click.Context, /, **records: Any) -> None:
     With --from, every map needs its row and every row with an angle its map: what has no partner is an error
     that names it, before anything is written.
     """
-    from rollcli.convert.derotate import derotate_maps
+    from rollcli.convert.derotate import run_derotate
 
-    ctx.exit(derotate_maps(DerotateOptions(**records)))
+    ctx.exit(run_derotate(DerotateOptions(**records)))

@@ -1,4 +1,4 @@
-"""`rollcli disparity`: maps from stereo pairs."""
+"""`rollcli disparity`: compute maps from stereo pairs."""
 
 from typing import Any
 
@@ -7,10 +7,10 @@ import click
 from rollcli.cli.command import command
 from rollcli.cli.config import config_option
 from rollcli.cli.options import (
+    cluster_options,
     folder_options,
     output_folder_option,
     pair_options,
-    running_options,
     save_as_option,
     stereo_options,
 )
@@ -31,7 +31,7 @@ from rollcli.convert.options import DisparityOptions
 @output_folder_option
 @save_as_option
 @stereo_options
-@running_options
+@cluster_options
 @config_option
 @click.pass_context
 def disparity(ctx: click.Context, /, **records: Any) -> None:
@@ -40,6 +40,6 @@ def disparity(ctx: click.Context, /, **records: Any) -> None:
     Images are PNG, JPEG, TIFF, BMP, PGM or PPM, of 8 or 16 bits, grey or colour. An image without a partner
     is an error that names it, before anything runs.
     """
-    from rollcli.convert.disparity import match_pairs
+    from rollcli.convert.disparity import run_disparity
 
-    ctx.exit(match_pairs(DisparityOptions(**records)))
+    ctx.exit(run_disparity(DisparityOptions(**records)))

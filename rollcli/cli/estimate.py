@@ -8,14 +8,13 @@ from rollcli.batch.options import EstimateOptions, ResultOptions
 from rollcli.cli.command import command, option, record
 from rollcli.cli.config import config_option
 from rollcli.cli.options import (
-    calibration_options,
+    cluster_options,
     encoding_options,
     image_options,
     input_options,
     method_options,
     pair_options,
     region_options,
-    running_options,
     stereo_options,
 )
 from rollcli.cli.resume import one_start, resume_command
@@ -48,7 +47,6 @@ result_options = record(
     ),
     option("--fail-fast", is_flag=True, help="Stop at the first frame that fails."),
     option("--timing", is_flag=True, help="Add the column elapsed_ms: milliseconds spent on the frame."),
-    option("--scheduler", metavar="ADDRESS", help="Run on this Dask cluster, such as tcp://host:8786."),
 )
 
 
@@ -66,10 +64,6 @@ result_options = record(
             "find . -name '*_disp.png' | rollcli estimate - | sort -t, -gk4",
         ),
         (
-            "Pitch and camera height too, with a calibration file of each frame",
-            "rollcli estimate --left image_0 --right image_1 --calib calib/ -o pose.csv",
-        ),
-        (
             "The paper's setting: every pixel is road",
             "rollcli estimate crops/ --road all --method gd -o rolls.csv",
         ),
@@ -81,10 +75,9 @@ result_options = record(
 @image_options
 @encoding_options
 @region_options
-@calibration_options
 @method_options
 @stereo_options
-@running_options
+@cluster_options
 @config_option
 @click.pass_context
 def estimate(ctx: click.Context, /, **records: Any) -> None:
@@ -96,6 +89,6 @@ def estimate(ctx: click.Context, /, **records: Any) -> None:
     """
     options = one_start(ctx, EstimateOptions(**records))
 
-    from rollcli.batch.run import run  # what a run needs is loaded when there is one
+    from rollcli.batch.run import run_estimate
 
-    ctx.exit(run(options, resume_command=resume_command(ctx)))
+    ctx.exit(run_estimate(options, resume_command=resume_command(ctx)))

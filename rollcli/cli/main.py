@@ -1,4 +1,4 @@
-"""The `rollcli` group: commands are imported when they are called, and every error ends as one line."""
+"""The `rollcli` group: it imports a command when it is called, and ends every error as one line."""
 
 import os
 import sys
@@ -10,7 +10,8 @@ from typing import Any
 import click
 
 from rollcli import __version__
-from rollcli.errors import InputError, RollcliError, UsageError
+from rollcli.errors import ExitStatus, InputError, RollcliError, UsageError
+from rollcli.messages import say
 
 # name -> (module, one-line help): `rollcli --help` needs no command's module
 COMMANDS = {
@@ -22,19 +23,20 @@ COMMANDS = {
     "derotate": ("rollcli.cli.derotate", "Rotate maps by one angle, or by the angles of a result."),
     "vdisparity": ("rollcli.cli.vdisparity", "v-disparity images of maps."),
     "simulate": ("rollcli.cli.simulate", "Render road stereo pairs and true disparity with known roll."),
-    "evaluate": ("rollcli.cli.evaluate", "The paper's experiments; accuracy against known angles."),
+    "evaluate": ("rollcli.cli.evaluate.group", "The paper's experiments; accuracy against known angles."),
     "report": ("rollcli.cli.report", "An HTML report of a result."),
 }
-FAILED, USAGE, INTERRUPTED = 1, 2, 130
 
 
 class LazyGroup(click.Group):
     """A group that imports a command's module when the command is asked for."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
+        """List the names of the commands."""
         return list(COMMANDS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Import a command."""
         if cmd_name not in COMMANDS:
             return None
         command: click.Command = getattr(import_module(COMMANDS[cmd_name][0]), cmd_name)
@@ -52,37 +54,43 @@ class LazyGroup(click.Group):
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the commands without importing them."""
         with formatter.section("Commands"):
             formatter.write_dl([(name, text) for name, (_, text) in COMMANDS.items()])
 
     def invoke(self, ctx: click.Context) -> Any:
+        """Call the command; a closed stdout ends it quietly."""
         try:
             return super().invoke(ctx)
-        except BrokenPipeError:  # here, since click would call it a failure
-            _leave_closed_pipe()
-            return ctx.exit(0)
+        except BrokenPipeError:  # caught here, since click would call it a failure
+            _discard_stdout()
+            return ctx.exit(ExitStatus.DONE)
 
     def main(self, *args: Any, standalone_mode: bool = True, **extra: Any) -> Any:
+        """Run the program; outside of tests, exit with its status."""
         program = partial(super().main, *args, standalone_mode=False, **extra)
-
         if not standalone_mode:
             return program()
         sys.exit(exit_status(program))
 
 
 def exit_status(program: Callable[[], Any]) -> int:
-    """Run the program; what goes wrong is one line on stderr and the documented status."""
+    """Run the program; turn an error into one line on stderr and the documented status."""
     try:
         status = program()
     except click.ClickException as error:
-        return _say(_with_hint(error), error.exit_code)
+        say(" ".join(_with_hint(error).split()))
+        return error.exit_code
     except (click.Abort, KeyboardInterrupt):
-        return _say("interrupted", INTERRUPTED)
+        say("interrupted")
+        return ExitStatus.INTERRUPTED
     except RollcliError as error:
-        return _say(str(error), USAGE if isinstance(error, UsageError | InputError) else FAILED)
+        say(" ".join(str(error).split()))
+        return ExitStatus.USAGE if isinstance(error, UsageError | InputError) else ExitStatus.FAILED
     except MemoryError:
-        return _say("out of memory", FAILED)
-    return status if isinstance(status, int) else 0
+        say("out of memory")
+        return ExitStatus.FAILED
+    return status if isinstance(status, int) else ExitStatus.DONE
 
 
 def _with_hint(error: click.ClickException) -> str:
@@ -92,7 +100,7 @@ def _with_hint(error: click.ClickException) -> str:
 
 
 def _from_environment(error: click.ClickException) -> str:
-    """What is wrong with a variable, which the user does not see on the command line; else nothing."""
+    """Name the environment variable whose value is wrong; empty when it is not a variable's."""
     if not isinstance(error, click.BadParameter) or error.ctx is None or error.param is None:
         return ""
     name = str(error.param.name)
@@ -101,13 +109,8 @@ def _from_environment(error: click.ClickException) -> str:
     return f"{error.ctx.auto_envvar_prefix}_{name.upper()}: {error.message}"
 
 
-def _say(message: str, status: int) -> int:
-    click.echo("rollcli: " + " ".join(message.split()), err=True)
-    return status
-
-
-def _leave_closed_pipe() -> None:
-    """The reader has had enough: let the interpreter flush what is left to nowhere."""
+def _discard_stdout() -> None:
+    """Let the interpreter flush the rest to nowhere: the reader of stdout has left."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, 1)
     os.close(nowhere)

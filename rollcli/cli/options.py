@@ -1,11 +1,10 @@
-"""The options that commands share, each declared once; a decorator hands its group over as one record."""
+"""The options that commands share, each declared once; a command receives a group of them as one record."""
 
 from typing import Any
 
-import click
-
-from rollcli.cli.command import option, record
-from rollcli.cli.types import Choice, FilePath, Number, NumberOrNan, Point, Polygon, Roi
+from rollcli.cli.command import argument, option, record
+from rollcli.cli.types import Choice, FilePath, Number, NumberOrNan, Polygon, Roi
+from rollcli.estimator.methods import MAX_ROLL_LIMIT_DEG, METHODS, MODELS, ROADS
 from rollcli.frames.options import (
     EncodingOptions,
     ImageOptions,
@@ -16,9 +15,8 @@ from rollcli.frames.options import (
     RunningOptions,
 )
 from rollcli.imaging.stereo_options import MODES, StereoOptions
-from rollcli.rig.options import CalibrationOptions
 
-PATH = FilePath()  # whether it exists is said by who reads it, in the same words for every way to name it
+PATH = FilePath()  # whether it exists, its reader says: in the same words wherever the name came from
 
 
 def _stereo(
@@ -34,7 +32,7 @@ def _method(*, tolerance: float, max_roll: float, **values: Any) -> MethodOption
 
 
 _folders = (
-    option("--recursive", is_flag=True, help="Look into the folders of folders too."),
+    option("--recursive", is_flag=True, help="Search folders recursively."),
     option(
         "--include", multiple=True, metavar="GLOB", help="Of folders, take only files that match. Repeatable."
     ),
@@ -45,7 +43,7 @@ input_options = record(
     "inputs",
     "Input",
     InputOptions,
-    click.argument("inputs", nargs=-1, type=PATH),
+    argument("inputs", nargs=-1, type=PATH),
     option(
         "--files-from",
         type=PATH,
@@ -179,20 +177,19 @@ method_options = record(
     _method,
     option(
         "--method",
-        type=Choice("gd", "gss", "exact", "plane", "areas"),
+        type=Choice(*METHODS),
         default=MethodOptions.method,
-        help="gd: gradient descent; gss: golden section search; exact: the global minimum, from polynomial "
-        "roots; plane: one least-squares plane; areas: planes of many small areas.",
+        help="; ".join(f"{name}: {method.summary}" for name, method in METHODS.items()) + ".",
     ),
     option(
         "--model",
-        type=Choice("parabola", "line"),
+        type=Choice(*MODELS),
         default=MethodOptions.model,
         help="Disparity of the road as a function of the row.",
     ),
     option(
         "--road",
-        type=Choice("auto", "all"),
+        type=Choice(*ROADS),
         default=MethodOptions.road,
         help="auto: find the road first; all: use every valid pixel, as the paper does.",
     ),
@@ -210,7 +207,7 @@ method_options = record(
     ),
     option(
         "--max-roll",
-        type=Number("DEG", above=0, at_most=89),
+        type=Number("DEG", above=0, at_most=MAX_ROLL_LIMIT_DEG),
         default=MethodOptions.max_roll_deg,
         help="Largest |roll| that road finding considers, degrees.",
     ),
@@ -219,41 +216,6 @@ method_options = record(
         type=Number("INT", at_least=0, whole=True),
         default=MethodOptions.seed,
         help="Seed of road finding's samples.",
-    ),
-)
-
-calibration_options = record(
-    "calibration",
-    "Calibration of the rectified pair, for pitch and height",
-    CalibrationOptions,
-    option(
-        "--calib",
-        type=PATH,
-        multiple=True,
-        metavar="PATH",
-        help="A file, or a folder with one of the same stem each: KITTI, Middlebury, ETH3D, OpenCV, ROS "
-        "(twice: left, right), Cityscapes, ORB-SLAM, DrivingStereo; recognised by content.",
-    ),
-    option(
-        "--focal",
-        type=Number("PX", above=0),
-        help="Focal length, pixels.  [default: the file's]",
-    ),
-    option(
-        "--principal-point",
-        type=Point(),
-        help="Principal point of the left view, pixels from the centre of the top-left pixel.  "
-        "[default: the file's]",
-    ),
-    option(
-        "--baseline",
-        type=Number("M", above=0),
-        help="Distance between the cameras, metres; without it there is no height.  [default: the file's]",
-    ),
-    option(
-        "--doffs",
-        type=Number("PX"),
-        help="Column of the right principal point less the left one, pixels.  [default: the file's, else 0]",
     ),
 )
 
@@ -290,10 +252,7 @@ image_options = record(
     save_as_option,
 )
 
-running_options = record(
-    "running",
-    "Running",
-    RunningOptions,
+_running = (
     option(
         "-j",
         "--jobs",
@@ -304,4 +263,14 @@ running_options = record(
     option("--dry-run", is_flag=True, help="List what would be read and written, and do nothing."),
     option("-q", "--quiet", is_flag=True, help="Say nothing but errors on stderr."),
     option("-v", "--verbose", is_flag=True, help="Say more on stderr."),
+)
+
+running_options = record("running", "Running", RunningOptions, *_running)
+
+cluster_options = record(
+    "running",
+    "Running",
+    RunningOptions,
+    *_running,
+    option("--scheduler", metavar="ADDRESS", help="Run on this Dask cluster, such as tcp://host:8786."),
 )

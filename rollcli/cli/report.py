@@ -1,10 +1,10 @@
-"""`rollcli report`: a result to look at."""
+"""`rollcli report`: make an HTML page of a result."""
 
 from typing import Any
 
 import click
 
-from rollcli.cli.command import command, option
+from rollcli.cli.command import argument, command, option
 from rollcli.cli.config import config_option
 from rollcli.cli.options import PATH, running_options
 from rollcli.cli.types import Number, OutputFile
@@ -24,7 +24,7 @@ from rollcli.report.options import GALLERY, ReportOptions
         ),
     ]
 )
-@click.argument("result", type=PATH)
+@argument("result", type=PATH)
 @option(
     "-o",
     "--output",
@@ -63,6 +63,6 @@ def report(ctx: click.Context, /, **options: Any) -> None:
     Inputs are looked for under the names that RESULT gives them, from here or from its folder. The page needs
     the extra: pip install "rollcli[report]".
     """
-    from rollcli.report.run import make_report
+    from rollcli.report.run import run_report
 
-    ctx.exit(make_report(ReportOptions(**options)))
+    ctx.exit(run_report(ReportOptions(**options)))

@@ -1,10 +1,10 @@
-"""`rollcli simulate`: stereo pairs whose roll is known."""
+"""`rollcli simulate`: render stereo pairs whose roll is known."""
 
 from typing import Any
 
 import click
 
-from rollcli.cli.command import command, option, record
+from rollcli.cli.command import argument, command, option, record
 from rollcli.cli.config import config_option
 from rollcli.cli.options import PATH, running_options
 from rollcli.cli.types import Choice, Number, Point, Size, Span
@@ -161,7 +161,7 @@ simulate_options = record(
         ),
     ]
 )
-@click.argument("folder", metavar="DIR", type=PATH)
+@argument("folder", metavar="DIR", type=PATH)
 @simulate_options
 @running_options
 @config_option
@@ -172,6 +172,6 @@ def simulate(ctx: click.Context, /, folder: str, options: SimulateOptions, runni
     Writes DIR/left and DIR/right (8-bit PNG), DIR/disparity (the true disparity of the left view, 16-bit
     KITTI PNG) and DIR/truth.csv.
     """
-    from rollcli.simulate.run import run
+    from rollcli.simulate.run import run_simulate
 
-    ctx.exit(run(folder, options, running))
+    ctx.exit(run_simulate(folder, options, running))

@@ -1,4 +1,4 @@
-"""`rollcli vdisparity`: row by row, how often each disparity occurs."""
+"""`rollcli vdisparity`: draw the histogram of each row's disparities."""
 
 from typing import Any
 
@@ -6,7 +6,7 @@ import click
 
 from rollcli.cli.command import command, option, record
 from rollcli.cli.config import config_option
-from rollcli.cli.options import encoding_options, input_options, output_folder_option, running_options
+from rollcli.cli.options import cluster_options, encoding_options, input_options, output_folder_option
 from rollcli.cli.types import Number
 from rollcli.convert.options import CountOptions, VDisparityOptions
 
@@ -44,7 +44,7 @@ count_options = record(
 @count_options
 @output_folder_option
 @encoding_options
-@running_options
+@cluster_options
 @config_option
 @click.pass_context
 def vdisparity(ctx: click.Context, /, **records: Any) -> None:
@@ -55,6 +55,6 @@ def vdisparity(ctx: click.Context, /, **records: Any) -> None:
     its disparity along the middle column is drawn as a dashed curve: on a de-rotated map the road's pixels
     lie on it.
     """
-    from rollcli.convert.vdisparity import count_maps
+    from rollcli.convert.vdisparity import run_vdisparity
 
-    ctx.exit(count_maps(VDisparityOptions(**records)))
+    ctx.exit(run_vdisparity(VDisparityOptions(**records)))

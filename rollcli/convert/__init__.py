@@ -1,1 +1,1 @@
-"""Maps and pairs to other files, one for one: de-rotated maps, v-disparity images, disparity maps."""
+"""Convert maps and pairs to other files: de-rotated maps, v-disparity images, disparity maps."""

@@ -1,48 +1,49 @@
-"""`rollcli derotate`: maps rotated by one angle, or each by the angle that a result has for it."""
+"""Rotate maps by one angle, or each by the angle that a result has for it."""
 
 import math
 from collections.abc import Iterator, Sequence
 from functools import partial
 
-from rollcli.convert.options import DerotateOptions, TurnOptions
+from rollcli.convert.options import DerotateOptions, RotationOptions
 from rollcli.convert.run import Conversion, convert
-from rollcli.errors import UsageError
+from rollcli.errors import ExitStatus, UsageError
 from rollcli.files.matching import match_paths
 from rollcli.files.naming import listed
 from rollcli.files.results import Row, read_result
 from rollcli.frames.find import map_frames
-from rollcli.frames.frame import Frame, Outcome
-from rollcli.frames.options import EncodingOptions
+from rollcli.frames.frame import Frame, FrameResult
+from rollcli.frames.options import FrameOptions
 from rollcli.frames.outputs import output_path
 
 
-def derotate_maps(options: DerotateOptions) -> int:
-    """Rotate every map; the exit status."""
-    turn = options.turn
-    if (turn.roll_deg is None) == (turn.result is None):
+def run_derotate(options: DerotateOptions) -> ExitStatus:
+    """Rotate every map."""
+    rotation, running = options.rotation, options.running
+    if (rotation.roll_deg is None) == (rotation.result is None):
         raise UsageError("give either --roll, one angle for all maps, or --from, a result with one for each")
     frames = map_frames(options.inputs, skip=[options.output])
-    conversions = list(_conversions(frames, turn, options.output))
-    do = partial(_derotate, encoding=options.encoding, expand=turn.expand)
-    return convert(conversions, do, options.running, options.encoding)
+    conversions = list(_conversions(frames, rotation, options.output))
+    read = FrameOptions(encoding=options.encoding, root=running.root)
+    do = partial(_derotate, options=read, expand=rotation.expand)
+    return convert(conversions, do, options.output, running, options.encoding)
 
 
-def _conversions(frames: Sequence[Frame], turn: TurnOptions, folder: str) -> Iterator[Conversion]:
-    rows = _rows_of(frames, turn.result) if turn.result is not None else [None] * len(frames)
+def _conversions(frames: Sequence[Frame], rotation: RotationOptions, folder: str) -> Iterator[Conversion]:
+    rows = _rows_of(frames, rotation.result) if rotation.result is not None else [None] * len(frames)
     for frame, row in zip(frames, rows, strict=True):
-        roll_deg = turn.roll_deg if row is None else row.roll_deg
-        refused = "" if roll_deg is not None else f"has no angle in {turn.result}"
+        roll_deg = rotation.roll_deg if row is None else row.roll_deg
+        refused = "" if roll_deg is not None else f"has no angle in {rotation.result}"
         writes = (output_path(frame, folder),)
         yield Conversion(frame, writes, math.radians(roll_deg or 0.0), refused)
 
 
 def _rows_of(frames: Sequence[Frame], result: str) -> list[Row]:
-    """The row of each frame.
+    """Find the row of each frame.
 
     Raises
     ------
     UsageError
-        Names maps without a row, rows that have an angle but no map, and what fits more than one.
+        Names maps without a row, rows that have an angle but no map, and what matches more than one.
     """
     rows = read_result(result).rows
     found = match_paths([frame.file for frame in frames], [row.file for row in rows], result)
@@ -57,7 +58,7 @@ def _rows_of(frames: Sequence[Frame], result: str) -> list[Row]:
     return [rows[at] for at in used]
 
 
-def _derotate(conversion: Conversion, encoding: EncodingOptions, expand: bool) -> Outcome:
-    from rollcli.convert.work import derotate_map  # where the work is done
+def _derotate(conversion: Conversion, options: FrameOptions, expand: bool) -> FrameResult:
+    from rollcli.convert.work import derotate_map  # loads NumPy: only on a worker
 
-    return derotate_map(conversion, encoding, expand)
+    return derotate_map(conversion, options, expand)

@@ -1,26 +1,27 @@
-"""`rollcli disparity`: the disparity map of each stereo pair."""
+"""Compute the disparity map of each stereo pair."""
 
 from functools import partial
 
 from rollcli.convert.options import DisparityOptions
 from rollcli.convert.run import Conversion, convert
+from rollcli.errors import ExitStatus
 from rollcli.frames.find import pair_frames
-from rollcli.frames.frame import Outcome
-from rollcli.frames.options import EncodingOptions
-from rollcli.frames.outputs import MAP_ENDINGS, output_path
-from rollcli.imaging.stereo_options import StereoOptions
+from rollcli.frames.frame import FrameResult
+from rollcli.frames.options import EncodingOptions, FrameOptions
+from rollcli.frames.outputs import ENDING_OF_FORMAT, output_path
 
 
-def match_pairs(options: DisparityOptions) -> int:
-    """Match every pair; the exit status."""
+def run_disparity(options: DisparityOptions) -> ExitStatus:
+    """Match every pair."""
     frames = pair_frames(options.inputs, options.pairs, skip=[options.output])
-    ending = MAP_ENDINGS[options.save_as]
+    ending = ENDING_OF_FORMAT[options.save_as]
     conversions = [Conversion(frame, (output_path(frame, options.output, ending),)) for frame in frames]
-    do = partial(_match, stereo=options.stereo, save_as=options.save_as)
-    return convert(conversions, do, options.running, EncodingOptions())
+    read = FrameOptions(stereo=options.stereo, root=options.running.root)
+    do = partial(_match, options=read, save_as=options.save_as)
+    return convert(conversions, do, options.output, options.running, EncodingOptions())
 
 
-def _match(conversion: Conversion, stereo: StereoOptions, save_as: str) -> Outcome:
-    from rollcli.convert.work import match_frame  # where the work is done
+def _match(conversion: Conversion, options: FrameOptions, save_as: str) -> FrameResult:
+    from rollcli.convert.work import match_frame  # loads NumPy: only on a worker
 
-    return match_frame(conversion, stereo, save_as)
+    return match_frame(conversion, options, save_as)

@@ -1,4 +1,4 @@
-"""What a conversion was asked to do; light, since the command line imports this to show its help."""
+"""The options of the conversions. Import-light: the command line loads this to show its help."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -8,8 +8,8 @@ from rollcli.imaging.stereo_options import StereoOptions
 
 
 @dataclass(frozen=True)
-class TurnOptions:
-    """Where the angles come from: one for all, or a result with one for each map."""
+class RotationOptions:
+    """Where the angles come from: one for all maps, or a result with one for each."""
 
     roll_deg: float | None = None
     result: str | None = None
@@ -18,7 +18,7 @@ class TurnOptions:
 
 @dataclass(frozen=True)
 class CountOptions:
-    """How disparities are counted. None: as the map asks for."""
+    """How disparities are counted. None: chosen for each map."""
 
     bins: int | None = None
     max_disparity: float | None = None
@@ -27,10 +27,10 @@ class CountOptions:
 
 @dataclass(frozen=True)
 class DerotateOptions:
-    """Everything that `rollcli derotate` was asked."""
+    """Every option of `rollcli derotate`."""
 
     inputs: InputOptions
-    turn: TurnOptions
+    rotation: RotationOptions
     output: str
     encoding: EncodingOptions
     running: RunningOptions
@@ -38,7 +38,7 @@ class DerotateOptions:
 
 @dataclass(frozen=True)
 class VDisparityOptions:
-    """Everything that `rollcli vdisparity` was asked."""
+    """Every option of `rollcli vdisparity`."""
 
     inputs: InputOptions
     count: CountOptions
@@ -49,7 +49,7 @@ class VDisparityOptions:
 
 @dataclass(frozen=True)
 class DisparityOptions:
-    """Everything that `rollcli disparity` was asked."""
+    """Every option of `rollcli disparity`."""
 
     inputs: InputOptions
     pairs: PairOptions

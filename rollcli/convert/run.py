@@ -1,36 +1,36 @@
-"""A run that turns each frame into files of its own: checks, workers, exit status."""
+"""Convert each frame into files of its own: checks, workers, exit status."""
 
 import contextlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 
+from rollcli.errors import ExitStatus
 from rollcli.files.atomic import remove_leftovers
-from rollcli.frames.checks import check_one_owner, check_writes
-from rollcli.frames.dry_run import list_files
-from rollcli.frames.frame import Frame, Outcome, failed
+from rollcli.frames.checks import check_one_owner, check_writes, list_files
+from rollcli.frames.frame import Frame, FrameResult, failed_frame
 from rollcli.frames.options import EncodingOptions, RunningOptions
 from rollcli.frames.outputs import remove_outputs
-from rollcli.frames.progress import INTERRUPTED, Report
+from rollcli.frames.progress import Progress
 from rollcli.parallel.in_order import Work
-from rollcli.parallel.interrupt import stop_on_signals
-from rollcli.parallel.local import done_locally
+from rollcli.parallel.interrupt import Stop, stop_on_signals
 from rollcli.parallel.process_setup import limit_blas_threads
+from rollcli.parallel.run_tasks import SharedPaths, Workers, require_scheduler, run_tasks
 
 
 @dataclass(frozen=True, slots=True)
 class Conversion:
-    """What becomes of one frame.
+    """The task of converting one frame.
 
     Attributes
     ----------
     frame : Frame
         What is read.
     writes : tuple of str
-        The files that come of it.
+        The files that are written.
     roll : float
-        To rotate by, radians.
+        Angle to rotate by, radians.
     refused : str
-        Why this frame cannot be done; empty if it can.
+        Why this frame cannot be converted; empty when it can.
     """
 
     frame: Frame
@@ -41,50 +41,69 @@ class Conversion:
 
 def convert(
     conversions: Sequence[Conversion],
-    do: Callable[[Conversion], Outcome],
+    do: Callable[[Conversion], FrameResult],
+    folder: str,
     running: RunningOptions,
     encoding: EncodingOptions,
-) -> int:
-    """Do every conversion.
+) -> ExitStatus:
+    """Run every conversion.
 
     Parameters
     ----------
     conversions : sequence of Conversion
-        In the order to do them.
+        In the order to run them.
     do : callable
-        Does one; goes to the workers.
+        Runs one; it is pickled and sent to the workers.
+    folder : str
+        What they write lies below it.
     running : RunningOptions
         How to run.
     encoding : EncodingOptions
-        How maps are read: what "auto" has found is said.
-
-    Returns
-    -------
-    int
-        The exit status: 0 all are written, 3 some are not, 130 interrupted.
+        How maps are read: an encoding that "auto" found is named once.
 
     Raises
     ------
-    UsageError, OutputError
-        Exit statuses 2 and 1.
+    UsageError, OutputError, ClusterError, WorkerError
+        The run cannot start or cannot go on.
     """
     _check(conversions, overwrite=running.overwrite)
     if running.dry_run:
         list_files((each.frame.reads(), each.writes) for each in conversions)
-        return 0
+        return ExitStatus.DONE
+    require_scheduler(running.scheduler)
     remove_leftovers(path for each in conversions for path in each.writes)
     limit_blas_threads()
-    report = Report(len(conversions), running, encoding, statuses=("ok",))
-    with stop_on_signals() as stop, report:
-        done = done_locally(conversions, Work(do, _lost), running.jobs, stop)
-        with contextlib.closing(done) as outcomes:
-            for outcome in outcomes:
-                report.add(outcome)
-    report.note(report.summary())
-    if stop.asked and report.done < report.total:
-        report.say("interrupted; what is written is whole, and --overwrite starts anew")
-        return INTERRUPTED
-    return report.status
+    progress = Progress(len(conversions), running, encoding, statuses=("ok",))
+    with (
+        stop_on_signals() as stop,
+        progress,
+        contextlib.closing(_results(conversions, do, folder, running, stop)) as results,
+    ):
+        for result in results:
+            progress.add(result)
+    progress.note(progress.summary())
+    if stop.asked and progress.done < progress.total:
+        progress.say("interrupted; what is written is whole, and --overwrite starts anew")
+        return ExitStatus.INTERRUPTED
+    return progress.status
+
+
+def _results(
+    conversions: Sequence[Conversion],
+    do: Callable[[Conversion], FrameResult],
+    folder: str,
+    running: RunningOptions,
+    stop: Stop,
+) -> Generator[FrameResult, None, None]:
+    """Yield the result of each conversion from whichever workers were asked for."""
+    sample = (*conversions[:1], *conversions[-1:])
+    files = tuple(path for each in sample for path in each.frame.reads())
+    workers = Workers(running.jobs, running.scheduler, SharedPaths(files, (folder,)))
+    try:
+        yield from run_tasks(conversions, Work(do, _lost), stop, workers)
+    finally:
+        if workers.scheduler is not None:  # a worker that died elsewhere cannot be waited for
+            remove_leftovers(path for each in conversions for path in each.writes)
 
 
 def _check(conversions: Sequence[Conversion], *, overwrite: bool) -> None:
@@ -94,7 +113,7 @@ def _check(conversions: Sequence[Conversion], *, overwrite: bool) -> None:
     check_writes(reads, writes, overwrite=overwrite)
 
 
-def _lost(conversion: Conversion, reason: str) -> Outcome:
+def _lost(conversion: Conversion, reason: str) -> FrameResult:
     remove_outputs(conversion.writes)
     remove_leftovers(conversion.writes)
-    return failed(conversion.frame, reason)
+    return failed_frame(conversion.frame, reason)

@@ -1,21 +1,23 @@
-"""`rollcli vdisparity`: the v-disparity image of each map."""
+"""Draw the v-disparity image of each map."""
 
 from functools import partial
 
 from rollcli.convert.options import CountOptions, VDisparityOptions
 from rollcli.convert.run import Conversion, convert
+from rollcli.errors import ExitStatus
 from rollcli.frames.find import map_frames
-from rollcli.frames.frame import Frame, Outcome
-from rollcli.frames.options import EncodingOptions
+from rollcli.frames.frame import Frame, FrameResult
+from rollcli.frames.options import FrameOptions
 from rollcli.frames.outputs import output_path
 
 
-def count_maps(options: VDisparityOptions) -> int:
-    """Count the disparities of every map; the exit status."""
+def run_vdisparity(options: VDisparityOptions) -> ExitStatus:
+    """Count the disparities of every map, row by row, and draw them."""
     frames = map_frames(options.inputs, skip=[options.output])
     conversions = [Conversion(frame, _writes(frame, options)) for frame in frames]
-    do = partial(_count, encoding=options.encoding, count=options.count)
-    return convert(conversions, do, options.running, options.encoding)
+    read = FrameOptions(encoding=options.encoding, root=options.running.root)
+    do = partial(_count, options=read, count=options.count)
+    return convert(conversions, do, options.output, options.running, options.encoding)
 
 
 def _writes(frame: Frame, options: VDisparityOptions) -> tuple[str, ...]:
@@ -23,7 +25,7 @@ def _writes(frame: Frame, options: VDisparityOptions) -> tuple[str, ...]:
     return (picture, output_path(frame, options.output, ".tif")) if options.count.counts else (picture,)
 
 
-def _count(conversion: Conversion, encoding: EncodingOptions, count: CountOptions) -> Outcome:
-    from rollcli.convert.work import count_map  # where the work is done
+def _count(conversion: Conversion, options: FrameOptions, count: CountOptions) -> FrameResult:
+    from rollcli.convert.work import count_map  # loads NumPy: only on a worker
 
-    return count_map(conversion, encoding, count)
+    return count_map(conversion, options, count)

@@ -1,62 +1,128 @@
-"""Why an angle may be doubtful, in words."""
+"""Why an angle may be doubtful, in words.
 
-from __future__ import annotations
+Add a reason: a function that yields it, and its name in `REASONS`.
+"""
 
 import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 from rollcli.estimator.energy import Energy
-from rollcli.estimator.road.find import RIVAL_ANGLE, Road
+from rollcli.estimator.road.find import Road
 from rollcli.estimator.road.surface import Surface
-from rollcli.estimator.solvers.exact import Minimum
-from rollcli.estimator.solvers.solution import Solution, apart
-
-WIDEST_INTERVAL = math.radians(0.25)
-LEAST_SCORE = 0.18
-RIVAL_SHARE = 0.75
-MOST_NOISE = 0.25
-LONGEST_MOVE = math.radians(1)
-NEAR_MINIMUM = 1.1
-BOUND_SHARE = 0.99
+from rollcli.estimator.solvers.certificate import CertifiedSolution
+from rollcli.estimator.solvers.solution import angle_between
+from rollcli.estimator.tuning import DoubtTuning
 
 
-def doubts_of_solution(
-    solution: Solution, energy: Energy, basins: list[Minimum], *, is_global: bool
-) -> list[str]:
-    """Doubts that the energy raises; `basins` are its minima, the lowest first."""
-    doubts = []
-    if not solution.outcome.converged:
-        doubts.append(solution.outcome.value)
-    lowest = basins[0]
-    if not is_global:
-        doubts.append(f"a lower minimum of the energy lies at {math.degrees(lowest.theta):.4f} degrees")
-    for other in basins[1:]:
-        near = other.energy < NEAR_MINIMUM * lowest.energy
-        if is_global and near and apart(other.theta, solution.theta) > RIVAL_ANGLE:
-            doubts.append(f"the energy is nearly as low at {math.degrees(other.theta):.2f} degrees")
-    _, c1, c2 = energy.plane
-    if c2 * math.cos(solution.theta) - c1 * math.sin(solution.theta) < 0:
-        doubts.append("the disparity grows upward, as it does in a depth map")
-    return doubts
+@dataclass(frozen=True)
+class Evidence:
+    """What speaks for an angle and against it.
+
+    Attributes
+    ----------
+    energy : Energy
+        Of the pixels used.
+    certified : CertifiedSolution
+    road : Road or None
+        None where every valid pixel is taken for road.
+    surface : Surface or None
+        The road's pixels, or a sample of those used; None where the map is too small for one.
+    max_roll : float
+        The largest abs(roll) considered, radians.
+    ci95 : float or None
+        Half-width of the interval, radians.
+    """
+
+    energy: Energy
+    certified: CertifiedSolution
+    road: Road | None
+    surface: Surface | None
+    max_roll: float
+    ci95: float | None
 
 
-def doubts_of_road(road: Road, surface: Surface, max_roll: float) -> list[str]:
-    """Doubts about which surface was found."""
-    doubts = []
-    if road.score < LEAST_SCORE:
-        doubts.append("little of what lies ahead looks like a road")
-    elif road.rival > RIVAL_SHARE * road.score:
-        doubts.append("another plane, with another roll, explains the map nearly as well")
-    if road.noise > MOST_NOISE:
-        doubts.append(f"noise fills {road.noise:.0%} of what lies ahead")
-    if surface.moved > LONGEST_MOVE:
-        doubts.append(f"the road's pixels moved the roll by {math.degrees(surface.moved):.1f} degrees")
-    if abs(surface.theta) > BOUND_SHARE * max_roll:
-        doubts.append("the roll is at its bound, --max-roll")
-    return doubts
+def doubts_of(evidence: Evidence, tuning: DoubtTuning) -> list[str]:
+    """Return every reason to doubt an angle, the solver's first."""
+    return [doubt for reason in REASONS for doubt in reason(evidence, tuning)]
 
 
-def doubts_of_interval(ci95: float | None) -> list[str]:
-    """Doubts about the precision."""
-    if ci95 is None or ci95 <= WIDEST_INTERVAL:
-        return []
-    return [f"the interval is wide: +-{math.degrees(ci95):.2f} degrees"]
+def _not_converged(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
+    status = evidence.certified.solution.status
+    if not status.converged:
+        yield status.value
+
+
+def _not_global(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
+    if not evidence.certified.is_global:
+        lowest = math.degrees(evidence.certified.minima[0].theta)
+        yield f"a lower minimum of the energy lies at {lowest:.4f} degrees"
+
+
+def _near_minimum(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
+    certified = evidence.certified
+    lowest, *others = certified.minima
+    for other in others if certified.is_global else ():
+        far = angle_between(other.theta, certified.solution.theta) > tuning.other_angle
+        if far and other.energy < tuning.near_minimum * lowest.energy:
+            yield f"the energy is nearly as low at {math.degrees(other.theta):.2f} degrees"
+
+
+def _grows_upward(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
+    _, c1, c2 = evidence.energy.plane
+    theta = evidence.certified.solution.theta
+    if c2 * math.cos(theta) - c1 * math.sin(theta) < 0:
+        yield "the disparity grows upward, as it does in a depth map"
+
+
+def _little_road(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
+    road = evidence.road
+    if road and road.score < tuning.least_score:
+        yield "little of what lies ahead looks like a road"
+
+
+def _rival_plane(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
+    road = evidence.road
+    if not road or road.score < tuning.least_score:
+        return  # of a poor road any plane is a rival
+    if road.rival > tuning.rival_share * road.score:
+        yield "another plane, with another roll, explains the map nearly as well"
+
+
+def _noise(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
+    road = evidence.road
+    if road and road.noise > tuning.most_noise:
+        yield f"noise fills {road.noise:.0%} of what lies ahead"
+
+
+def _fit_moved(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
+    moved = evidence.surface.moved if evidence.surface else 0.0
+    if moved > tuning.longest_move:
+        yield f"the road's pixels moved the roll by {math.degrees(moved):.1f} degrees"
+
+
+def _at_bound(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
+    road, surface = evidence.road, evidence.surface
+    if road and surface and abs(surface.model.theta) > tuning.bound_share * evidence.max_roll:
+        yield "the roll is at its bound, --max-roll"
+
+
+def _wide_interval(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
+    ci95 = evidence.ci95
+    if ci95 is not None and ci95 > tuning.widest_interval:
+        yield f"the interval is wide: +-{math.degrees(ci95):.2f} degrees"
+
+
+Reason = Callable[[Evidence, DoubtTuning], Iterator[str]]
+REASONS: tuple[Reason, ...] = (
+    _not_converged,
+    _not_global,
+    _near_minimum,
+    _grows_upward,
+    _little_road,
+    _rival_plane,
+    _noise,
+    _fit_moved,
+    _at_bound,
+    _wide_interval,
+)

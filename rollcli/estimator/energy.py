@@ -9,8 +9,6 @@ constant belong to the road, so the road has to explain ``e = r + cx x`` by a pa
 `e` is small near the minimum: nothing large cancels, unlike in ``d'd - d'YJd``.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import cache
@@ -75,7 +73,7 @@ class Energy:
     forms: Floats
 
     @classmethod
-    def of(cls, moments: Moments, peak: float, *, parabolic: bool = True) -> Energy:
+    def of(cls, moments: Moments, peak: float, *, parabolic: bool = True) -> "Energy":
         """Reduce the moments of a map.
 
         Parameters

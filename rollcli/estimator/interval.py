@@ -6,8 +6,6 @@ how far noise AND misfit move the angle. The interval is conditional on the pixe
 road being even across: camber and the wrong surface are not in the residuals.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from dataclasses import dataclass
@@ -15,12 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from rollcli.estimator.moments import Floats
+from rollcli.estimator.road.model import Reals
 from rollcli.estimator.road.robust_fit import solvable
 from rollcli.estimator.road.surface import Surface
+from rollcli.estimator.tuning import IntervalTuning
 
-_GROUPS = 6
-_EFFECTIVE_PIXELS = 200  # neighbouring pixels repeat each other: more do not tell more
-_KAPPA = 0.53  # tests/benchmarks/fit_interval.py finds 0.42; maps of other matchers ask for more
 # 97.5 % quantiles of Student's t for 1, 2, ... degrees of freedom
 _T975 = (12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228, 2.201, 2.179)
 
@@ -31,7 +28,7 @@ class Jackknife:
 
     Attributes
     ----------
-    bands, columns : ndarray, shape (6, 4)
+    bands, columns : ndarray, shape (groups, 4)
         The change for each band along the road, and for each column across it.
     white : ndarray, shape (4, 4)
         The textbook covariance, for as many pixels as could be independent.
@@ -44,7 +41,7 @@ class Jackknife:
     white: Floats
     freedom: tuple[float, float]
 
-    def moves(self) -> tuple[float, float, float]:
+    def spreads(self) -> tuple[float, float, float]:
         """Return the half-widths of theta's interval, radians: by bands, by columns, and the textbook's."""
         bands, columns = (
             _student(freedom) * math.sqrt(float(np.square(changes[:, 3]).sum()))
@@ -53,22 +50,22 @@ class Jackknife:
         return bands, columns, 1.96 * math.sqrt(self.white[3, 3])
 
 
-def half_width(jackknife: Jackknife, theta: float) -> float:
+def half_width(jackknife: Jackknife, theta: float, tuning: IntervalTuning) -> float:
     """Return the half-width of the 95 % interval of the roll angle, radians."""
-    bands, columns, white = jackknife.moves()
-    return _KAPPA * slant(theta) * math.sqrt(bands**2 + columns**2 + white**2)
+    bands, columns, white = jackknife.spreads()
+    return tuning.factor * slant(theta, tuning) * math.sqrt(bands**2 + columns**2 + white**2)
 
 
-def slant(theta: float) -> float:
+def slant(theta: float, tuning: IntervalTuning) -> float:
     """Return how much wider the interval is at a roll, radians: 1 at none, 2 at a right angle.
 
     The more a road's disparity changes along the rows, the more a matcher errs that takes it for constant
     there; these errors are smooth, so that the residuals do not tell of them.
     """
-    return 1 + abs(math.sin(theta))
+    return 1 + tuning.slant * abs(math.sin(theta))
 
 
-def jackknife(surface: Surface, theta: float) -> Jackknife:
+def jackknife(surface: Surface, theta: float, tuning: IntervalTuning) -> Jackknife:
     """Leave out one group of the road's pixels after the other.
 
     Parameters
@@ -77,26 +74,26 @@ def jackknife(surface: Surface, theta: float) -> Jackknife:
         The road's pixels and their weights.
     theta : float
         The roll that was estimated from them, radians.
+    tuning : IntervalTuning
 
     Returns
     -------
     Jackknife
     """
-    cosine, sine = math.cos(theta), math.sin(theta)
-    across = surface.x * cosine + surface.y * sine
-    along = surface.y * cosine - surface.x * sine
-    a0, a1, a2 = surface.alpha
+    model = surface.model._replace(theta=theta)
+    across, along = model.across(surface.x, surface.y), model.along(surface.x, surface.y)
     rows = np.empty((5, len(along)))
     rows[0], rows[1], rows[2] = 1, along, along * along * surface.parabolic
-    rows[3] = -across * (a1 + 2 * a2 * along)
-    rows[4] = surface.d - (a0 + along * (a1 + along * a2))
-    bands = _by_group(rows, surface.weights, along, np.ones_like(along))
-    columns = _by_group(rows, surface.weights, across, surface.weights * np.square(rows[3]))
+    rows[3] = model.turning(across, along)
+    rows[4] = surface.d - model.disparity_along(along)
+    bands = _by_group(rows, surface.weights, along, np.ones_like(along), tuning.groups)
+    leverage = surface.weights * np.square(rows[3])
+    columns = _by_group(rows, surface.weights, across, leverage, tuning.groups)
     total = bands.sum(0)
     normal = total[:4, :4]
     inverse = np.linalg.inv(solvable(normal))
     step = inverse @ total[:4, 4]  # from the surface's parabola to the best one
-    independent = max(1.0, total[0, 0] / _EFFECTIVE_PIXELS)
+    independent = max(1.0, total[0, 0] / tuning.independent_pixels)
     rest = max(0.0, total[4, 4] - step @ total[:4, 4])
     white: Floats = inverse * (rest / total[0, 0] * independent)
     if not surface.parabolic:  # there is no a2 to err
@@ -109,15 +106,15 @@ def jackknife(surface: Surface, theta: float) -> Jackknife:
     )
 
 
-def _by_group(rows: Floats, weights: Floats, position: Floats, share: Floats) -> Floats:
-    """Return the weighted products (6, 5, 5) of six groups of equal total `share`, cut along `position`.
+def _by_group(rows: Floats, weights: Floats, position: Reals, share: Floats, groups: int) -> Floats:
+    """Return the weighted products (groups, 5, 5) of groups of equal total `share`, cut along `position`.
 
     Of the five rows four are the design's; with the fifth, the residuals, a product is a group's normal
     equations, right-hand side included.
     """
     order = np.argsort(position)
     heights = np.cumsum(share[order])
-    cuts = np.searchsorted(heights, heights[-1] * np.arange(1, _GROUPS) / _GROUPS)
+    cuts = np.searchsorted(heights, heights[-1] * np.arange(1, groups) / groups)
     bounds = [0, *cuts.tolist(), len(order)]
     sorted_rows = rows[:, order]
     weighted = sorted_rows * weights[order]
@@ -125,7 +122,7 @@ def _by_group(rows: Floats, weights: Floats, position: Floats, share: Floats) ->
 
 
 def _changes(groups: Floats, normal: Floats, step: Floats) -> Floats:
-    """Return how the four parameters change as one group after the other is left out, shape (6, 4)."""
+    """Return how the four parameters change as one group after the other is left out, shape (groups, 4)."""
     parts, pulls = groups[:, :4, :4], groups[:, :4, 4]
     changes = np.linalg.solve(solvable(normal - parts), (pulls - parts @ step)[..., None])
     return np.asarray(changes[..., 0], np.float64)

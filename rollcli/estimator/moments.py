@@ -4,8 +4,6 @@
 combination of ``sum w u^i v^j`` (i + j <= 4), ``sum w d u^i v^j`` (i + j <= 2) and ``sum w d^2``.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from typing import Any
@@ -43,7 +41,7 @@ class Grid:
     scale: float
 
     @classmethod
-    def of_shape(cls, height: int, width: int) -> Grid:
+    def of_shape(cls, height: int, width: int) -> "Grid":
         """Return the grid of a map of this shape."""
         return cls((width - 1) / 2, (height - 1) / 2, max(width, height, 2) / 2)
 
@@ -78,7 +76,7 @@ class Moments:
         """The sum of the weights: with weights 0 and 1, the number of pixels."""
         return float(self.s[0, 0])
 
-    def __add__(self, other: Moments) -> Moments:
+    def __add__(self, other: "Moments") -> "Moments":
         if (self.grid, self.plane) != (other.grid, other.plane):
             raise ValueError("moments add on one grid and one plane only")
         return replace(self, s=self.s + other.s, t=self.t + other.t, rr=self.rr + other.rr)

@@ -4,8 +4,6 @@ The parabola's own (a0, a1) are its tangent at y = 0, far above the road. Where 
 slope are known best, and hardly depend on how the road bends.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from rollcli.estimator.solvers.gradient_descent import LAMBDA0
+from rollcli.estimator.methods import LAMBDA0
 from rollcli.evaluate.tables import DELTAS_DEG, Table
 from rollcli.report.page import Chart
 

@@ -5,26 +5,36 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import EstimationError
-from rollcli.estimator.areas.iterative import areas
-from rollcli.estimator.areas.lower_centre import plane_fit
+from rollcli.estimator.areas.plane import fit_plane
 from rollcli.estimator.energy import Energy
 from rollcli.estimator.estimate import estimate_roll
+from rollcli.estimator.methods import (
+    MAX_ROLL_DEG,
+    MAX_ROLL_LIMIT_DEG,
+    AreaSettings,
+    SolverSettings,
+    load_area_method,
+    load_solver,
+)
 from rollcli.estimator.moments import map_moments
 from rollcli.estimator.solvers.exact import exact, minima
 from rollcli.estimator.solvers.golden_section import golden_section
-from rollcli.estimator.solvers.gradient_descent import LAMBDA0, gradient_descent
+from rollcli.estimator.solvers.gradient_descent import gradient_descent
+from rollcli.estimator.solvers.solution import angle_between
 from rollcli.evaluate.rotate import rotate_nearest
 
 DELTAS = tuple(math.pi / k for k in (1.8e3, 1.8e4, 1.8e5, 1.8e6))
 LAMBDAS = tuple(float(rate) for rate in range(1, 101))
 SOLVERS = ("gd", "gss", "exact")
 METHODS = ("gd", "line", "plane", "areas", "auto")
-_LARGEST_ROLL = math.radians(89)
+_LARGEST_ROLL = math.radians(MAX_ROLL_LIMIT_DEG)
 
 
 @dataclass(frozen=True)
@@ -105,8 +115,8 @@ def examine(
         height=height,
         pixels=round(energy.weight),
         theta=theta,
-        gss=tuple(golden_section(energy, delta).iterations for delta in DELTAS),
-        gd=tuple(gradient_descent(energy, delta).iterations for delta in DELTAS),
+        gss=tuple(golden_section(energy, SolverSettings(delta)).iterations for delta in DELTAS),
+        gd=tuple(gradient_descent(energy, SolverSettings(delta)).iterations for delta in DELTAS),
         sweep=_sweep(energy),
         solver_errors=_solver_errors(rotated, turns, theta if truth is None else truth),
         method_errors={
@@ -123,8 +133,8 @@ def _sweep(energy: Energy) -> tuple[tuple[int | None, ...], ...]:
     ends = [minimum.theta for minimum in minima(energy)]
 
     def iterations(delta: float, rate: float) -> int | None:
-        found = gradient_descent(energy, delta, rate)
-        return found.iterations if min(_apart(found.theta, end) for end in ends) <= delta else None
+        found = gradient_descent(energy, SolverSettings(delta, rate))
+        return found.iterations if min(angle_between(found.theta, end) for end in ends) <= delta else None
 
     return tuple(tuple(iterations(delta, rate) for rate in LAMBDAS) for delta in DELTAS)
 
@@ -133,14 +143,10 @@ def _solver_errors(
     rotated: Sequence[NDArray[Any]], turns: Sequence[float], base: float
 ) -> dict[str, tuple[tuple[float, ...], ...]]:
     energies = [_energy(each) for each in rotated]
-    solvers: dict[str, Callable[[Energy, float], float]] = {
-        "gd": lambda energy, delta: gradient_descent(energy, delta, LAMBDA0).theta,
-        "gss": lambda energy, delta: golden_section(energy, delta).theta,
-        "exact": lambda energy, delta: exact(energy).theta,
-    }
+    solvers = {name: load_solver(name) for name in SOLVERS}
     return {
         name: tuple(
-            tuple(_apart(solve(energy, delta), base + turn) for delta in DELTAS)
+            tuple(angle_between(solve(energy, SolverSettings(delta)).theta, base + turn) for delta in DELTAS)
             for energy, turn in zip(energies, turns, strict=True)
         )
         for name, solve in solvers.items()
@@ -149,13 +155,18 @@ def _solver_errors(
 
 def _methods(largest_turn: float, chosen: bool) -> dict[str, Callable[[NDArray[Any]], float]]:
     """Return each method as a function from a map to its angle."""
-    max_roll = min(_LARGEST_ROLL, math.radians(45) + max(0.0, largest_turn - math.radians(20)))
-    area = (slice(None), slice(None)) if chosen else None
+    max_roll = min(_LARGEST_ROLL, math.radians(MAX_ROLL_DEG) + max(0.0, largest_turn - math.radians(20)))
+    settings = AreaSettings(max_roll, chosen=chosen)
+
+    def by_areas(name: str, disparity: NDArray[Any]) -> float:
+        valid = (disparity > 0) & (disparity < np.inf)
+        return fit_plane(disparity, load_area_method(name)(disparity, valid, settings)).solution.theta
+
     return {
-        "gd": lambda disparity: gradient_descent(_energy(disparity), DELTAS[-1]).theta,
+        "gd": lambda disparity: gradient_descent(_energy(disparity), SolverSettings(DELTAS[-1])).theta,
         "line": lambda disparity: exact(_energy(disparity, parabolic=False)).theta,
-        "plane": lambda disparity: plane_fit(disparity, area=area).theta,
-        "areas": lambda disparity: areas(disparity, max_roll=max_roll).theta,
+        "plane": partial(by_areas, "plane"),
+        "areas": partial(by_areas, "areas"),
         "auto": lambda disparity: estimate_roll(disparity, road="auto", max_roll=max_roll).theta,
     }
 
@@ -170,7 +181,7 @@ def _method_errors(
     base = _angle(method, disparity) if truth is None else truth
     found = [_angle(method, each) for each in rotated]
     return tuple(
-        None if base is None or theta is None else _apart(theta, base + turn)
+        None if base is None or theta is None else angle_between(theta, base + turn)
         for theta, turn in zip(found, turns, strict=True)
     )
 
@@ -180,8 +191,3 @@ def _angle(method: Callable[[NDArray[Any]], float], disparity: NDArray[Any]) -> 
         return method(disparity)
     except EstimationError:
         return None
-
-
-def _apart(one: float, other: float) -> float:
-    """Return how far two angles are apart, as rotations of rows."""
-    return abs(math.remainder(one - other, math.pi))

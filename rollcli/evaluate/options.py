@@ -1,7 +1,5 @@
 """What the paper's experiments were asked to do; light, since the command line imports it for its help."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from rollcli.frames.options import (

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from rollcli import __version__
-from rollcli.estimator.solvers.gradient_descent import LAMBDA0
+from rollcli.estimator.methods import LAMBDA0
 from rollcli.evaluate.charts import METHOD_NAMES, SOLVER_NAMES, charts
 from rollcli.evaluate.experiments import Findings
 from rollcli.evaluate.options import PaperOptions

@@ -1,21 +1,17 @@
 """`evaluate accuracy` from the command line: what is read and written, and what is said meanwhile."""
 
-from __future__ import annotations
-
-import sys
-
+from rollcli.errors import ExitStatus
 from rollcli.evaluate.accuracy import Accuracy, assess
 from rollcli.evaluate.accuracy_text import FORMATS
 from rollcli.evaluate.truth import read_truth
 from rollcli.files.results import read_result
 from rollcli.files.stream import is_stream, write_output
-from rollcli.frames.checks import check_writes
-from rollcli.frames.dry_run import list_files
+from rollcli.frames.checks import check_writes, list_files
 from rollcli.frames.options import RunningOptions
-from rollcli.frames.progress import FRAMES_FAILED
+from rollcli.messages import say
 
 
-def run_accuracy(result: str, truth: str, form: str, output: str, running: RunningOptions) -> int:
+def run_accuracy(result: str, truth: str, form: str, output: str, running: RunningOptions) -> ExitStatus:
     """Compare a result with known angles.
 
     Parameters
@@ -29,8 +25,8 @@ def run_accuracy(result: str, truth: str, form: str, output: str, running: Runni
 
     Returns
     -------
-    int
-        The exit status: 3 when a frame of the truth has no angle.
+    ExitStatus
+        FRAMES_FAILED when a frame of the truth has no angle.
 
     Raises
     ------
@@ -43,12 +39,12 @@ def run_accuracy(result: str, truth: str, form: str, output: str, running: Runni
     check_writes([result, truth], writes, overwrite=running.overwrite)
     if running.dry_run:
         list_files([((result, truth), writes)])
-        return 0
+        return ExitStatus.DONE
     accuracy = assess(read_result(result).rows, read_truth(truth), result)
     _name_unmatched(accuracy, result, truth, running)
     data = FORMATS[form](accuracy).encode("utf-8", "surrogateescape")
     write_output(output, data)
-    return FRAMES_FAILED if accuracy.no_angle else 0
+    return ExitStatus.FRAMES_FAILED if accuracy.no_angle else ExitStatus.DONE
 
 
 def _name_unmatched(accuracy: Accuracy, result: str, truth: str, running: RunningOptions) -> None:
@@ -56,11 +52,6 @@ def _name_unmatched(accuracy: Accuracy, result: str, truth: str, running: Runnin
     if running.quiet:
         return
     for stem in accuracy.no_angle:
-        _say(f"{stem}: in {truth}, without an angle in {result}")
+        say(f"{stem}: in {truth}, without an angle in {result}")
     for name in accuracy.no_truth:
-        _say(f"{name}: in {result}, without a known angle in {truth}")
-
-
-def _say(message: str) -> None:
-    """One line on stderr."""
-    sys.stderr.write(f"rollcli: {message}\n")
+        say(f"{name}: in {result}, without a known angle in {truth}")

@@ -1,27 +1,24 @@
 """`evaluate paper` from the command line: maps to workers, their findings to tables and one page."""
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rollcli.errors import UsageError
+from rollcli.errors import ExitStatus, UsageError
 from rollcli.evaluate.options import PaperOptions
 from rollcli.evaluate.truth import read_truth
 from rollcli.files.atomic import remove_leftovers, write_atomic
 from rollcli.files.matching import stem_of
-from rollcli.frames.checks import check_writes
-from rollcli.frames.dry_run import list_files
+from rollcli.frames.checks import check_writes, list_files
 from rollcli.frames.find import map_frames
 from rollcli.frames.frame import Frame
-from rollcli.frames.progress import INTERRUPTED, Report
+from rollcli.frames.progress import Progress
 from rollcli.parallel.in_order import Work
 from rollcli.parallel.interrupt import stop_on_signals
-from rollcli.parallel.local import done_locally
 from rollcli.parallel.process_setup import limit_blas_threads
+from rollcli.parallel.run_tasks import Workers, run_tasks
 from rollcli.report.page import require_extra
 
 if TYPE_CHECKING:
@@ -32,7 +29,7 @@ PAGE = "paper.html"
 TABLES = ("maps", "table1_iterations", "table2_runtime", "fig3_lambda0", "fig6_accuracy", "methods_accuracy")
 
 
-def run_paper(options: PaperOptions) -> int:
+def run_paper(options: PaperOptions) -> ExitStatus:
     """Repeat the paper's experiments on maps.
 
     Parameters
@@ -41,8 +38,8 @@ def run_paper(options: PaperOptions) -> int:
 
     Returns
     -------
-    int
-        The exit status: 3 when a map gave no angle, 130 when interrupted.
+    ExitStatus
+        FRAMES_FAILED when a map gave no angle, INTERRUPTED when interrupted.
 
     Raises
     ------
@@ -60,7 +57,7 @@ def run_paper(options: PaperOptions) -> int:
     check_writes(reads, writes, overwrite=running.overwrite)
     if running.dry_run:
         list_files([(reads, writes)])
-        return 0
+        return ExitStatus.DONE
     limit_blas_threads()  # the paper's run times are those of one thread
     return _run(frames, truth, options)
 
@@ -75,50 +72,53 @@ def _known_angles(frames: list[Frame], options: PaperOptions) -> Mapping[str, fl
     return truth
 
 
-def _run(frames: list[Frame], truth: Mapping[str, float], options: PaperOptions) -> int:
+def _run(frames: list[Frame], truth: Mapping[str, float], options: PaperOptions) -> ExitStatus:
     from rollcli.evaluate.job import examine_file, lost
 
     work = Work(partial(examine_file, options=options, truth=truth), lost)
-    report = Report(len(frames), options.running, options.encoding, statuses=("ok",))
+    progress = Progress(len(frames), options.running, options.encoding, statuses=("ok",))
     found: list[Findings] = []
     failed: list[tuple[str, str]] = []
     with (
         stop_on_signals() as stop,
-        report,
-        contextlib.closing(done_locally(frames, work, options.running.jobs, stop)) as all_examined,
+        progress,
+        contextlib.closing(run_tasks(frames, work, stop, Workers(options.running.jobs))) as all_examined,
     ):
         for examined in all_examined:
-            report.add(examined.outcome)
+            progress.add(examined.result)
             if examined.findings is None:
-                failed.append((examined.outcome.row.file, examined.outcome.row.message))
+                failed.append((examined.result.row.file, examined.result.row.message))
             else:
                 found.append(examined.findings)
     if stop.asked:
-        report.say(f"interrupted after {report.done} of {report.total} maps; nothing is written")
-        return INTERRUPTED
-    report.note(report.summary())
+        progress.say(f"interrupted after {progress.done} of {progress.total} maps; nothing is written")
+        return ExitStatus.INTERRUPTED
+    progress.note(progress.summary())
     if not found:
-        report.say("no map gave an angle: there is nothing to tabulate")
-        return report.status
-    times = _time(frames, found, options, report)
+        progress.say("no map gave an angle: there is nothing to tabulate")
+        return progress.status
+    times = _time(frames, found, options, progress)
     _write(found, failed, times, options)
-    report.note(f"{Path(options.experiments.output, PAGE)} and {len(TABLES)} tables are written")
-    return report.status
+    progress.note(f"{Path(options.experiments.output, PAGE)} and {len(TABLES)} tables are written")
+    return progress.status
 
 
-def _time(frames: list[Frame], found: list[Findings], options: PaperOptions, report: Report) -> list[Times]:
+def _time(
+    frames: list[Frame], found: "list[Findings]", options: PaperOptions, progress: Progress
+) -> "list[Times]":
     """Take the run times on the first maps, in this process alone."""
-    from rollcli.evaluate.job import read_pixels
+    from rollcli.evaluate.job import usable_pixels
     from rollcli.evaluate.timing import time_solvers
+    from rollcli.frames.read import read_source
 
     good = {findings.file for findings in found}
     chosen = [frame for frame in frames if frame.file in good][: options.experiments.timed]
-    report.note(f"run times, on {len(chosen)} of the maps")
-    return [time_solvers(read_pixels(frame, options)[1]) for frame in chosen]
+    progress.note(f"run times, on {len(chosen)} of the maps")
+    return [time_solvers(usable_pixels(read_source(frame, options.frame))) for frame in chosen]
 
 
 def _write(
-    found: list[Findings], failed: list[tuple[str, str]], times: list[Times], options: PaperOptions
+    found: "list[Findings]", failed: list[tuple[str, str]], times: "list[Times]", options: PaperOptions
 ) -> None:
     from rollcli.evaluate.paper_page import paper_page
     from rollcli.evaluate.tables import all_tables

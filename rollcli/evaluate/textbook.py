@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.estimator.moments import Floats, Grid
-from rollcli.estimator.solvers.solution import Outcome, Solution, principal
+from rollcli.estimator.solvers.golden_section import shrink_bracket
+from rollcli.estimator.solvers.solution import Solution, SolverStatus, principal
 
-_RATIO = (math.sqrt(5) - 1) / 2
 _MAX_ITERATIONS = 100
 
 
@@ -65,23 +65,7 @@ class Textbook:
 
     def golden_section(self, tolerance: float) -> Solution:
         """Shrink a bracket of one period until it is narrower than `tolerance`, radians."""
-        low, width = -math.pi / 2, math.pi
-        left, right = low + (1 - _RATIO) * width, low + _RATIO * width
-        at_left, at_right = self.energy(left), self.energy(right)
-        iterations = 0
-        while width >= tolerance:
-            iterations += 1
-            width *= _RATIO
-            if at_left <= at_right:
-                right, at_right = left, at_left
-                left = low + (1 - _RATIO) * width
-                at_left = self.energy(left)
-            else:
-                low = left
-                left, at_left = right, at_right
-                right = low + _RATIO * width
-                at_right = self.energy(right)
-        return Solution(principal(low + width / 2), iterations)
+        return shrink_bracket(self.energy, tolerance)
 
     def gradient_descent(self, tolerance: float, lambda0: float) -> Solution:
         """Descend from 0 by [GD eq. 11 and 14], unguarded, until a step is shorter than `tolerance`."""
@@ -94,7 +78,7 @@ class Textbook:
                 return Solution(principal(theta), iteration)
             before, slope = slope, unit * self.gradient(theta)
             rate = rate * before / (before - slope)
-        return Solution(principal(theta), _MAX_ITERATIONS, Outcome.STEP_LIMIT)
+        return Solution(principal(theta), _MAX_ITERATIONS, SolverStatus.STEP_LIMIT)
 
     def _design(self, theta: float) -> Floats:
         """Return Y(theta), shape (n, 3) [GD eq. 6]."""

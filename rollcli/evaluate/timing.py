@@ -13,15 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.estimator.energy import Energy
+from rollcli.estimator.methods import LAMBDA0, SolverSettings
 from rollcli.estimator.moments import map_moments
 from rollcli.estimator.solvers.golden_section import golden_section
-from rollcli.estimator.solvers.gradient_descent import LAMBDA0, gradient_descent
-from rollcli.estimator.solvers.solution import Solution
+from rollcli.estimator.solvers.gradient_descent import gradient_descent
+from rollcli.estimator.solvers.solution import Solution, Solver
 from rollcli.evaluate.experiments import DELTAS
 from rollcli.evaluate.textbook import Textbook
 
 FORMS = ("moments", "with_pass", "textbook")
-Solver = Callable[[Energy, float], Solution]
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ def time_solvers(disparity: NDArray[Any]) -> Times:
     energy, textbook = Energy.of(map_moments(disparity), peak), Textbook.of(disparity)
 
     def with_pass(solve: Solver, delta: float) -> None:
-        solve(Energy.of(map_moments(disparity), peak), delta)
+        solve(Energy.of(map_moments(disparity), peak), SolverSettings(delta))
 
     seconds: dict[tuple[str, str], tuple[float, ...]] = {}
     solvers: dict[str, Solver] = {"gss": golden_section, "gd": gradient_descent}
@@ -51,7 +51,9 @@ def time_solvers(disparity: NDArray[Any]) -> Times:
         "gd": partial(textbook.gradient_descent, lambda0=LAMBDA0),
     }
     for name, solve in solvers.items():
-        seconds[name, "moments"] = tuple(_best(partial(solve, energy, delta), 50) for delta in DELTAS)
+        seconds[name, "moments"] = tuple(
+            _best(partial(solve, energy, SolverSettings(delta)), 50) for delta in DELTAS
+        )
         seconds[name, "with_pass"] = tuple(_best(partial(with_pass, solve, delta), 10) for delta in DELTAS)
         with np.errstate(all="ignore"):  # unguarded, it may run away
             seconds[name, "textbook"] = tuple(_best(partial(written_out[name], delta), 2) for delta in DELTAS)

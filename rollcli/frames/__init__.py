@@ -1,1 +1,1 @@
-"""One frame: found, read, checked, named, encoded."""
+"""One frame, a map or a stereo pair: found, checked, read, its outputs named and encoded."""

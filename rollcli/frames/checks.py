@@ -1,20 +1,21 @@
-"""What a run would write, held against what it reads and what is there already."""
+"""Compare what a run would write with what it reads and what exists; list both for --dry-run."""
 
 import os
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
 
 from rollcli.errors import UsageError
+from rollcli.files.stream import write_stdout
 from rollcli.frames.frame import Frame
 
 
 def check_one_owner(writes: Iterable[tuple[Frame, Iterable[str]]]) -> None:
-    """Every file is written for one frame.
+    """Check that every file is written for one frame only.
 
     Parameters
     ----------
     writes : iterable of (Frame, paths)
-        Each frame, and what is written for it.
+        Each frame, and the files that are written for it.
 
     Raises
     ------
@@ -33,7 +34,7 @@ def check_one_owner(writes: Iterable[tuple[Frame, Iterable[str]]]) -> None:
 
 
 def check_writes(reads: Sequence[str], writes: Sequence[str], *, overwrite: bool) -> None:
-    """Nothing that is read is written and, unless `overwrite`, no output exists.
+    """Check that no input is written and, unless `overwrite`, that no output exists.
 
     Raises
     ------
@@ -46,12 +47,12 @@ def check_writes(reads: Sequence[str], writes: Sequence[str], *, overwrite: bool
 
 
 def check_inputs_are_kept(reads: Sequence[str], writes: Iterable[str]) -> None:
-    """Nothing that is read is written.
+    """Check that no input is written, however differently its path is spelled.
 
     Raises
     ------
     UsageError
-        Names the file, however differently it was spelled.
+        Names the file.
     """
     folders = {_real_folder(os.path.split(path)[0]) for path in reads}
     # only what is written beside an input can replace one
@@ -62,7 +63,7 @@ def check_inputs_are_kept(reads: Sequence[str], writes: Iterable[str]) -> None:
 
 
 def check_nothing_is_there(writes: Iterable[str]) -> None:
-    """No output exists.
+    """Check that no output exists.
 
     Raises
     ------
@@ -74,13 +75,22 @@ def check_nothing_is_there(writes: Iterable[str]) -> None:
             raise UsageError(f"{path}: exists already; give --overwrite to replace it")
 
 
+def list_files(frames: Iterable[tuple[Iterable[str], Iterable[str]]]) -> None:
+    """Print what would be read and written, a line each; `frames` holds (reads, writes)."""
+    lines: list[str] = []
+    for reads, writes in frames:
+        lines += [f"read  {path}\n" for path in reads]
+        lines += [f"write {path}\n" for path in writes]
+    write_stdout("".join(lines).encode("utf-8", "surrogateescape"))
+
+
 def _place(path: str) -> str:
-    """The same for every spelling of a path."""
+    """Make one text of every spelling of a path."""
     folder, name = os.path.split(path)
     return f"{_real_folder(folder)}/{os.path.normcase(name)}"
 
 
-# resolving links costs a system call for each part of a path, and files share folders
+# cached: resolving links costs a system call for each part of a path, and files share folders
 @lru_cache(maxsize=1024)
 def _real_folder(folder: str) -> str:
     return os.path.realpath(folder)

@@ -1,30 +1,25 @@
-"""What goes to a worker and what comes back: light, so that who only hands out work stays small."""
+"""The records of a frame: what a worker is told and what it returns. Import-light: never loads NumPy."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 from rollcli.files.results import Row
-from rollcli.frames.options import FrameOptions, ImageOptions
-from rollcli.frames.outputs import remove_image_leftovers, remove_images
-from rollcli.rig.calibration import Calibration
 
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """A map or a pair: what a worker is told about it. `file` and `right_file` are as the user named them.
+    """A map or a stereo pair, as a worker is told of it.
 
     Attributes
     ----------
     file, right_file : str
-        What the row says; `right_file` is empty for a map.
+        As the user named them, for the row; `right_file` is empty for a map.
     path, right_path : str
         Where they are.
     relative : str
-        Below the folder it was found in; names its images.
+        Path below the folder it was found in; names its images.
     mask : str or None
-        The mask file for this frame.
-    calibration : Calibration or None
-        Of the images as they are in the files; None: without pitch and height.
+        The mask file of this frame.
     """
 
     file: str
@@ -33,10 +28,9 @@ class Frame:
     right_path: str
     relative: str
     mask: str | None
-    calibration: Calibration | None = None
 
     def reads(self) -> Iterator[str]:
-        """Every file that this frame needs."""
+        """Yield every file that this frame needs."""
         yield self.path
         if self.right_path:
             yield self.right_path
@@ -45,8 +39,8 @@ class Frame:
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """The row of a frame, and what the run wants to say once about its input.
+class FrameResult:
+    """The row of a frame, and what the user is told once about its input.
 
     Attributes
     ----------
@@ -65,22 +59,8 @@ class Outcome:
     searched: tuple[int, int] | None = None
 
 
-def do(frame: Frame, options: FrameOptions) -> Outcome:
-    """Do one frame where the work is done: in a worker, NumPy and OpenCV are there."""
-    from rollcli.batch.frame_task import run_frame
-
-    return run_frame(frame, options)
-
-
-def failed(frame: Frame, reason: str) -> Outcome:
-    """The row of a frame without an angle; one line that names the file."""
+def failed_frame(frame: Frame, reason: str) -> FrameResult:
+    """Make the `error` row of a frame, with a message of one line that names the file."""
     line, *names = (" ".join(text.split()) for text in (reason, frame.file, frame.right_file or frame.file))
-    named = line if line.startswith(tuple(names)) else f"{names[0]}: {line}"
-    return Outcome(Row(frame.file, frame.right_file, "error", message=named))
-
-
-def lost(frame: Frame, reason: str, images: ImageOptions) -> Outcome:
-    """The row of a frame whose worker died; what it wrote is removed, since an error row has no images."""
-    remove_images(frame, images)
-    remove_image_leftovers([frame], images)
-    return failed(frame, reason)
+    message = line if line.startswith(tuple(names)) else f"{names[0]}: {line}"
+    return FrameResult(Row(frame.file, frame.right_file, "error", message=message))

@@ -1,19 +1,27 @@
-"""What may be wrong with a frame without being wrong with the batch."""
+"""The errors that cost a frame, not the batch."""
 
 from collections.abc import Callable
 
 import cv2
 
 from rollcli.errors import EstimationError, InputError, UsageError
-from rollcli.frames.frame import Frame, Outcome, failed
+from rollcli.frames.frame import Frame, FrameResult, failed_frame
 
-_NUMBERS = (ArithmeticError, ValueError)  # that some step cannot deal with
-FAULTS = (InputError, EstimationError, UsageError, OSError, MemoryError, cv2.error, *_NUMBERS)
+_NUMERIC_ERRORS = (ArithmeticError, ValueError)  # from numbers that some step cannot deal with
+FRAME_ERRORS = (
+    InputError,
+    EstimationError,
+    UsageError,
+    OSError,
+    MemoryError,
+    cv2.error,
+    *_NUMERIC_ERRORS,
+)
 
 
-def guarded(frame: Frame, work: Callable[[], Outcome]) -> Outcome:
-    """What the work gives, or the row that says what is wrong with this frame."""
+def guarded(frame: Frame, work: Callable[[], FrameResult]) -> FrameResult:
+    """Do the work; turn an error that costs only this frame into its `error` row."""
     try:
         return work()
-    except FAULTS as error:
-        return failed(frame, str(error) or type(error).__name__)
+    except FRAME_ERRORS as error:
+        return failed_frame(frame, str(error) or type(error).__name__)

@@ -1,17 +1,14 @@
-"""What decides a frame: frozen records, filled by the command line and read where they are used.
+"""Frozen records of options, filled by the command line and read where they are used.
 
-Import-light: the command line imports this module to show its help.
+Import-light: the command line loads this module to show its help.
 """
 
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
+from rollcli.estimator.methods import LAMBDA0, MAX_ROLL_DEG, TOLERANCE_DEG, LearningRate
 from rollcli.imaging.stereo_options import StereoOptions
-
-Method = Literal["gd", "gss", "exact", "plane", "areas"]
-Model = Literal["parabola", "line"]
-Road = Literal["auto", "all"]
 
 
 @dataclass(frozen=True)
@@ -54,20 +51,20 @@ class RegionOptions:
 
 @dataclass(frozen=True)
 class MethodOptions:
-    """How the angle is found."""
+    """How the angle is found; `rollcli.estimator.methods` has the names."""
 
-    method: Method = "gd"
-    model: Model = "parabola"
-    road: Road = "auto"
-    lambda0: float | Literal["auto"] = 26.0
-    tolerance_deg: float = 1e-4
-    max_roll_deg: float = 45.0
+    method: str = "gd"
+    model: str = "parabola"
+    road: str = "auto"
+    lambda0: LearningRate = LAMBDA0
+    tolerance_deg: float = TOLERANCE_DEG
+    max_roll_deg: float = MAX_ROLL_DEG
     seed: int = 0
 
 
 @dataclass(frozen=True)
 class ImageOptions:
-    """Which images to write, each into a folder of its own."""
+    """Which images to write, each kind into a folder of its own."""
 
     derotated: str | None = None
     vdisparity: str | None = None
@@ -76,27 +73,36 @@ class ImageOptions:
     save_as: Literal["png", "tiff", "npy"] = "png"
 
     def folders(self) -> list[tuple[str, str]]:
-        """(kind, folder) of what was asked for."""
+        """List (kind, folder) of the images that were requested."""
         kinds = ("derotated", "vdisparity", "disparity", "road_mask")
         return [(kind, folder) for kind in kinds if (folder := getattr(self, kind)) is not None]
 
 
 @dataclass(frozen=True)
 class RunningOptions:
-    """How the program runs and how much it says. `jobs` None: the usable processors."""
+    """How the program runs and how much it says.
+
+    `jobs` None: the usable processors. `scheduler`: the address of a Dask cluster to run on instead.
+    """
 
     jobs: int | None = None
+    scheduler: str | None = None
     overwrite: bool = False
     dry_run: bool = False
     quiet: bool = False
     verbose: bool = False
 
+    @property
+    def root(self) -> str:
+        """The folder where relative paths start, for workers on other machines; empty for this one."""
+        return str(Path.cwd()) if self.scheduler is not None else ""
+
 
 @dataclass(frozen=True)
 class FrameOptions:
-    """What decides the row and the images of a frame: all that a worker is told.
+    """What decides the row and the images of a frame: everything that a worker is told beside the frame.
 
-    `root` is where relative paths start, for workers elsewhere.
+    `root` is the folder where relative paths start, for workers on other machines; empty for this one.
     """
 
     encoding: EncodingOptions = EncodingOptions()
@@ -107,5 +113,5 @@ class FrameOptions:
     root: str = ""
 
     def at(self, path: str) -> str:
-        """Where a path is for this worker."""
+        """Locate a path on this worker."""
         return str(Path(self.root, path)) if self.root else path

@@ -1,31 +1,35 @@
-"""The disparity of a frame: read from a map, or matched from a pair."""
+"""Read a frame: its disparity, from a map or matched from a pair, and the pixels that may be used."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.files.encodings import to_disparity
 from rollcli.files.formats import Stored, read_image, read_stored
+from rollcli.frames.frame import Frame
 from rollcli.frames.options import FrameOptions
+from rollcli.frames.region import region_mask
 from rollcli.imaging.stereo_options import StereoOptions
 
 if TYPE_CHECKING:
-    from rollcli.frames.frame import Frame
     from rollcli.imaging.stereo import StereoMatch
 
-# more of the map than this at the end of the searched range: the range was too short for the scene
+# when more of the map than this lies at the end of the searched range, the range was too short
 _MUCH_AT_END = 0.05
 
 
 @dataclass(frozen=True)
 class Source:
-    """The disparity of a frame, and where it comes from.
+    """The disparity of a frame, where it comes from, and which pixels of it may be used.
 
     Attributes
     ----------
     disparity : ndarray, shape (H, W)
         Pixels; 0 is no data.
+    allowed : ndarray of bool, shape (H, W), or None
+        Pixels inside the mask, --roi and --polygon; None when none of them is given.
     stored : Stored or None
         What the map file holds; None for a pair.
     encoding, warning : str
@@ -36,57 +40,46 @@ class Source:
         Why the map itself may be wrong; empty when there is no reason.
     note : str
         What was done about the pair; empty when nothing.
-    size : tuple of int, or None
-        Width and height of the images in the files, px, where the map was matched from them.
-    mode : str
-        How the pair was matched (`StereoOptions.mode`); empty for a map.
     """
 
     disparity: NDArray[Any]
+    allowed: NDArray[np.bool_] | None = None
     stored: Stored | None = None
     encoding: str = ""
     warning: str = ""
     searched: tuple[int, int] | None = None
     doubt: str = ""
     note: str = ""
-    size: tuple[int, int] | None = None
-    mode: str = ""
 
 
-def read_source(frame: "Frame", options: FrameOptions) -> Source:
-    """Read the frame's map, or match its pair.
+def read_source(frame: Frame, options: FrameOptions) -> Source:
+    """Read the frame's map, or match its pair, and draw its region.
 
     Raises
     ------
     InputError
-        A file cannot be read as what it should be.
+        A file cannot be read as what it should be, or no pixel may be used.
     """
-    return _match(frame, options) if frame.right_file else _read(frame, options)
+    source = _match(frame, options) if frame.right_file else _read(frame, options)
+    allowed = region_mask(frame.mask, options, source.disparity.shape)
+    return source if allowed is None else replace(source, allowed=allowed)
 
 
-def _read(frame: "Frame", options: FrameOptions) -> Source:
+def _read(frame: Frame, options: FrameOptions) -> Source:
     stored = read_stored(options.at(frame.path), frame.file)
     given = options.encoding
     found = to_disparity(stored, encoding=given.encoding, scale=given.scale, invalid=given.invalid)
-    return Source(found.disparity, stored, found.encoding.value, found.warning or "")
+    return Source(found.disparity, stored=stored, encoding=found.encoding.value, warning=found.warning or "")
 
 
-def _match(frame: "Frame", options: FrameOptions) -> Source:
+def _match(frame: Frame, options: FrameOptions) -> Source:
     from rollcli.imaging.stereo import match_pair
 
     left = read_image(options.at(frame.path), frame.file)
     right = read_image(options.at(frame.right_path), frame.right_file)
     match = match_pair(left, right, options.stereo)
     searched = (match.min_disparity, match.min_disparity + match.num_disparities - 1)
-    height, width = left.shape[:2]
-    return Source(
-        match.disparity,
-        searched=searched,
-        doubt=_doubt(match),
-        note=_note(match, options.stereo),
-        size=(width, height),
-        mode=options.stereo.mode,
-    )
+    return Source(match.disparity, searched=searched, doubt=_doubt(match), note=_note(match, options.stereo))
 
 
 def _doubt(match: "StereoMatch") -> str:

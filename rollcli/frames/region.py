@@ -1,4 +1,4 @@
-"""The pixels that a user allows: mask file, rectangle and polygon together."""
+"""Draw the pixels that a user allows: those inside the mask file, the rectangle and the polygon."""
 
 from functools import lru_cache
 from typing import Any
@@ -13,7 +13,7 @@ from rollcli.frames.options import FrameOptions, RegionOptions
 
 
 def region_mask(mask: str | None, options: FrameOptions, shape: tuple[int, ...]) -> NDArray[np.bool_] | None:
-    """Pixels inside all that is given, shape (H, W); None when nothing is given.
+    """Find the pixels inside all that is given, shape (H, W); None when nothing is given.
 
     Raises
     ------
@@ -34,7 +34,7 @@ def region_mask(mask: str | None, options: FrameOptions, shape: tuple[int, ...])
     return allowed
 
 
-@lru_cache(maxsize=4)  # a batch has one size of map, or a few
+@lru_cache(maxsize=4)  # the maps of a batch have one size, or a few
 def _drawn(options: RegionOptions, shape: tuple[int, ...]) -> NDArray[np.bool_]:
     inside = np.zeros(shape, np.uint8)
     x0, y0, x1, y1 = options.roi or (0, 0, shape[1], shape[0])
@@ -46,7 +46,7 @@ def _drawn(options: RegionOptions, shape: tuple[int, ...]) -> NDArray[np.bool_]:
     return inside.astype(np.bool_)
 
 
-@lru_cache(maxsize=1)  # one mask for all frames is read once
+@lru_cache(maxsize=1)  # a mask for all frames is read once
 def _mask_file(path: str, name: str) -> NDArray[np.bool_]:
     return read_mask(path, name)
 

@@ -1,51 +1,50 @@
-"""Workers on a Dask cluster: the same frames, sent to an executor elsewhere (extra `cluster`)."""
+"""The executor for workers elsewhere: a Dask cluster (extra `cluster`)."""
 
 import asyncio
+import contextlib
 import logging
 import os
-from collections.abc import Generator, Sequence
-from concurrent.futures import CancelledError, Future, wait
-from dataclasses import replace
+from collections.abc import Iterator
+from concurrent.futures import CancelledError, wait
+from concurrent.futures import Future as ConcurrentFuture
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic
 
 from rollcli import __version__
 from rollcli.errors import ClusterError, UsageError
 from rollcli.files.atomic import write_atomic
-from rollcli.frames.frame import Frame, Outcome, do, lost
-from rollcli.frames.options import FrameOptions
-from rollcli.frames.outputs import remove_image_leftovers
-from rollcli.parallel.in_order import in_order
-from rollcli.parallel.interrupt import Stop
+from rollcli.parallel.in_order import Result, Task, Work
 from rollcli.parallel.process_setup import prepare_worker
+from rollcli.parallel.run_tasks import SharedPaths
 
-_CONNECT_S, _FIRST_WORKER_S, _LOOK_EVERY_S = 6, 5, 2
+_CONNECT_S, _FIRST_WORKER_S, _POLL_S = 6, 5, 2
 _IN_FLIGHT_PER_THREAD = 4
-_LOST = "every worker that tried it died: killed for memory, perhaps, or crashed"
+_DIED = "every worker that tried it died: killed for memory, perhaps, or crashed"
 
 
 def check_scheduler(address: str) -> None:
-    """See that a scheduler answers, before anything is touched.
+    """Check that a scheduler answers, before anything is written.
 
-    Not left to Dask's client: one that cannot connect takes its time, and ends with a traceback.
+    Dask's own client would take longer to give up, and end with a traceback.
 
     Raises
     ------
     UsageError
         That is no address, or the extra `cluster` is not installed.
     ClusterError
-        Nobody answers there, or nobody who speaks as a scheduler does.
+        No scheduler answers there.
     """
-    _silence_dask()
+    _require_extra()
     try:
-        asyncio.run(asyncio.wait_for(_open_and_close(address), _CONNECT_S + 2))
+        with _silenced_logging():
+            asyncio.run(asyncio.wait_for(_open_and_close(address), _CONNECT_S + 2))
     except (ValueError, TypeError) as error:  # the latter for TLS that is not set up
         raise UsageError(
             f"--scheduler {address!r}: {error}; an address looks like tcp://host:8786"
         ) from error
-    # the last for servers of another kind: their first bytes are taken for a size
+    # MemoryError comes from servers of another kind: their first bytes are taken for a size
     except (OSError, asyncio.TimeoutError, MemoryError) as error:
-        raise ClusterError(f"{address}: no Dask scheduler answers there") from error
+        raise _no_scheduler(address) from error
 
 
 async def _open_and_close(address: str) -> None:
@@ -56,77 +55,109 @@ async def _open_and_close(address: str) -> None:
     await comm.close()
 
 
-def cluster_outcomes(
-    frames: Sequence[Frame], options: FrameOptions, address: str, stop: Stop
-) -> Generator[Outcome, None, None]:
-    """The outcome of each frame, in order, from the workers of the scheduler at `address`.
+class ClusterExecutor(Generic[Task, Result]):
+    """Runs tasks on the workers of a scheduler; Dask itself gives the task of a dead worker to another.
+
+    Parameters
+    ----------
+    address : str
+        Of the scheduler.
+    work : Work
+        What the workers do.
+    shared : SharedPaths
+        What each of them must see.
 
     Raises
     ------
     ClusterError
-        No scheduler or no worker answers, a worker has not this rollcli or does not see the files, or the
-        scheduler is lost.
+        No scheduler or no worker answers, a worker has another rollcli, or does not see the files.
     """
-    options = replace(options, root=str(Path.cwd()))
-    client = _connect(address)
-    try:
-        _check_workers(client, frames, options)
-        client.register_plugin(_worker_plugin())
-        yield from in_order(frames, ClusterCrew(client, options), stop)
-    except CancelledError as error:
-        raise ClusterError(f"{address}: the connection to the scheduler is lost") from error
-    finally:
-        client.close(timeout=2)
-        remove_image_leftovers(frames, options.images)  # of workers that died
 
-
-class ClusterCrew:
-    """The cluster's own executor; Dask itself gives a lost frame to another worker."""
-
-    def __init__(self, client: Any, options: FrameOptions) -> None:
+    def __init__(self, address: str, work: Work[Task, Result], shared: SharedPaths) -> None:
+        _require_extra()
         from distributed import KilledWorker
 
-        self.deaths: tuple[type[BaseException], ...] = (KilledWorker,)
-        self.window = _IN_FLIGHT_PER_THREAD * sum(client.nthreads().values())
-        self._client, self._options = client, options
-        self._executor = client.get_executor(pure=False)
+        self.worker_died: tuple[type[BaseException], ...] = (KilledWorker,)
+        self._address, self._work = address, work
+        self._resources = contextlib.ExitStack()
+        self._resources.enter_context(_silenced_logging())
+        try:
+            self._client = _connect(address)
+            self._resources.callback(self._client.close, timeout=2)
+            _check_workers(self._client, shared)
+            self._client.register_plugin(_worker_plugin())
+        except BaseException:
+            self._resources.close()
+            raise
+        self.window = _IN_FLIGHT_PER_THREAD * sum(self._client.nthreads().values())
+        self._executor = self._client.get_executor(pure=False)
 
-    def submit(self, frame: Frame) -> "ClusterTicket":
-        """Start a frame on whichever worker is free."""
+    def submit(self, task: Task) -> "ClusterFuture[Result]":
+        """Queue a task for whichever worker is free."""
         if self._client.status == "closed":
-            raise CancelledError
-        return ClusterTicket(self._executor.submit(do, frame, self._options), self._client)
+            raise _connection_lost(self._address)
+        return ClusterFuture(self._executor.submit(self._work.do, task), self._client, self._address)
 
-    def again(self, frame: Frame) -> Outcome:
-        """Several workers have tried it already."""
-        return lost(frame, _LOST, self._options.images)
+    def retry(self, task: Task) -> Result:
+        """Return the result of a lost task: several workers have tried it already."""
+        return self._work.lost(task, _DIED)
+
+    def close(self, *, at_once: bool) -> None:
+        """Disconnect; the workers belong to the cluster and go on."""
+        self._resources.close()
 
 
-def _silence_dask() -> None:
-    """No lines of Dask's own: what goes wrong ends as one of ours."""
+class ClusterFuture(Generic[Result]):
+    """A future that does not outlive its client: a task that is sent while a connection breaks has no end.
+
+    Raises
+    ------
+    ClusterError
+        When its result is asked for and the scheduler is lost.
+    """
+
+    def __init__(self, future: "ConcurrentFuture[Result]", client: Any, address: str) -> None:
+        self._future, self._client, self._address = future, client, address
+
+    def result(self) -> Result:
+        """Wait for the result."""
+        while not wait([self._future], timeout=_POLL_S).done:
+            if self._client.status == "closed":
+                raise _connection_lost(self._address)
+        try:
+            return self._future.result()
+        except CancelledError as error:
+            raise _connection_lost(self._address) from error
+
+    def cancel(self) -> bool:
+        """Withdraw the task, unless it is done."""
+        return self._future.cancel()
+
+
+def _connection_lost(address: str) -> ClusterError:
+    return ClusterError(f"{address}: the connection to the scheduler is lost")
+
+
+def _no_scheduler(address: str) -> ClusterError:
+    return ClusterError(f"{address}: no Dask scheduler answers there")
+
+
+def _require_extra() -> None:
     try:
         import distributed  # noqa: F401 (it sets up its logging when it is loaded)
     except ImportError as error:
         raise UsageError("--scheduler needs the extra cluster: pip install 'rollcli[cluster]'") from error
+
+
+@contextlib.contextmanager
+def _silenced_logging() -> Iterator[None]:
+    """Silence Dask, which logs every lost connection: a failure ends as one line of ours."""
+    before = logging.root.manager.disable
     logging.disable()
-
-
-class ClusterTicket:
-    """A future that does not outlive its client: what is sent while a connection breaks is never answered."""
-
-    def __init__(self, future: "Future[Outcome]", client: Any) -> None:
-        self._future, self._client = future, client
-
-    def result(self) -> Outcome:
-        """Wait for the outcome; CancelledError when the scheduler is lost."""
-        while not wait([self._future], timeout=_LOOK_EVERY_S).done:
-            if self._client.status == "closed":
-                raise CancelledError
-        return self._future.result()
-
-    def cancel(self) -> bool:
-        """Give the frame back, unless it is done."""
-        return self._future.cancel()
+    try:
+        yield
+    finally:
+        logging.disable(before)
 
 
 def _connect(address: str) -> Any:
@@ -136,7 +167,7 @@ def _connect(address: str) -> Any:
     try:
         client = Client(address, timeout=_CONNECT_S, set_as_default=False)
     except OSError as error:
-        raise ClusterError(f"{address}: no Dask scheduler answers there") from error
+        raise _no_scheduler(address) from error
     try:
         client.wait_for_workers(1, timeout=_FIRST_WORKER_S)
     except DaskTimeoutError as error:
@@ -149,21 +180,22 @@ def _worker_plugin() -> Any:
     from distributed import WorkerPlugin
 
     class PrepareWorker(WorkerPlugin):
-        """Sets up every worker process, also of workers that come later."""
+        """Sets up every worker process, also those that join later."""
 
         name = "rollcli"
 
         def setup(self, worker: Any) -> None:
+            """Set up the process that this worker runs in."""
             prepare_worker()
 
     return PrepareWorker()
 
 
-def _check_workers(client: Any, frames: Sequence[Frame], options: FrameOptions) -> None:
-    """Ask every worker whether it is this rollcli and sees the files and folders that this process sees."""
-    sample = {path for frame in (*frames[:1], *frames[-1:]) for path in frame.reads() if Path(path).exists()}
-    sizes = {options.at(path): Path(path).stat().st_size for path in sample}
-    marks = [Path(options.at(folder), ".rollcli-check") for _, folder in options.images.folders()]
+def _check_workers(client: Any, shared: SharedPaths) -> None:
+    """Ask every worker whether it has this rollcli and sees the files and folders that this process sees."""
+    files = {path.absolute() for path in map(Path, shared.files) if path.exists()}
+    sizes = {str(path): path.stat().st_size for path in files}
+    marks = [Path(folder).absolute() / ".rollcli-check" for folder in shared.folders]
     try:
         for mark in marks:
             write_atomic(mark, b"")
@@ -178,7 +210,7 @@ def _check_workers(client: Any, frames: Sequence[Frame], options: FrameOptions) 
 
 
 def probe(version: str, sizes: dict[str, int], marks: list[str]) -> str:
-    """What keeps this worker from doing frames; empty if nothing does. Runs on the worker."""
+    """Say what keeps this worker from running tasks; empty when nothing does. Runs on the worker."""
     if version != __version__:
         return f"has rollcli {__version__}, this is {version}"
     for path, size in sizes.items():

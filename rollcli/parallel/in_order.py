@@ -1,4 +1,4 @@
-"""Tasks to workers and what they give back in order, with a bounded number of tasks in flight."""
+"""Give tasks to an executor and yield their results in the tasks' order, with few tasks in flight."""
 
 from collections import deque
 from collections.abc import Callable, Generator, Iterable
@@ -8,73 +8,83 @@ from typing import Generic, Protocol, TypeVar
 
 from rollcli.parallel.interrupt import Stop
 
-Task = TypeVar("Task", contravariant=True)
-Done = TypeVar("Done")
-Result = TypeVar("Result", covariant=True)
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+_Task = TypeVar("_Task", contravariant=True)
+_Result = TypeVar("_Result", covariant=True)
 
 
 @dataclass(frozen=True)
-class Work(Generic[Task, Done]):
-    """What is done with each task. Both functions go to the workers: small, and of a module.
+class Work(Generic[Task, Result]):
+    """What to do with each task. Both functions are pickled and sent to workers: name them in a module.
 
     Attributes
     ----------
     do : callable
-        Takes a task; what is wrong with the task is said by what it gives.
+        Turns a task into its result. A task that cannot be done gets a result that says so.
     lost : callable
-        What a task gives whose worker died, from the task and the reason.
+        Makes the result of a task whose worker died, from the task and the reason.
     """
 
-    do: Callable[[Task], Done]
-    lost: Callable[[Task, str], Done]
+    do: Callable[[Task], Result]
+    lost: Callable[[Task, str], Result]
 
 
-class Ticket(Protocol[Result]):
-    """A task that is under way: a `concurrent.futures.Future`, or what does for one."""
+class Future(Protocol[_Result]):
+    """A task that was submitted: a `concurrent.futures.Future`, or an object with these two methods."""
 
-    def result(self) -> Result:
-        """Wait for what the task gives."""
+    def result(self) -> _Result:
+        """Wait for the result; raise what the task raised, or an error that says that its worker died."""
 
     def cancel(self) -> bool:
-        """Give the task back, unless a worker has it already."""
+        """Withdraw the task; return False when a worker has started it."""
 
 
-class Crew(Protocol[Task, Result]):
-    """Workers, wherever they are.
+class Executor(Protocol[_Task, _Result]):
+    """Workers, wherever they run.
 
     Attributes
     ----------
     window : int
-        How many tasks may be in flight: enough that nobody waits, few enough that memory stays bounded.
-    deaths : tuple of exception types
-        What `result` of a task raises whose worker has died.
+        The number of tasks in flight: large enough to keep every worker busy, and bounded to bound memory.
+    worker_died : tuple of exception types
+        What `Future.result` raises when the task's worker has died.
     """
 
     window: int
-    deaths: tuple[type[BaseException], ...]
+    worker_died: tuple[type[BaseException], ...]
 
-    def submit(self, task: Task) -> Ticket[Result]:
-        """Start a task."""
+    def submit(self, task: _Task) -> Future[_Result]:
+        """Queue a task."""
 
-    def again(self, task: Task) -> Result:
-        """Do a task once more whose worker has died; if that dies too, what a lost task gives."""
+    def retry(self, task: _Task) -> _Result:
+        """Run a task again whose worker died; if this worker dies too, return the result of a lost task."""
+
+    def close(self, *, at_once: bool) -> None:
+        """End the workers: after their current task, or at once."""
 
 
-def in_order(tasks: Iterable[Task], crew: Crew[Task, Done], stop: Stop) -> Generator[Done, None, None]:
-    """What each task gives, in the tasks' order; when asked to stop, of those that are worked on already."""
-    source, flying = iter(tasks), deque[tuple[Task, Ticket[Done]]]()
+def in_order(
+    tasks: Iterable[Task], executor: Executor[Task, Result], stop: Stop
+) -> Generator[Result, None, None]:
+    """Yield the result of each task, in the tasks' order.
+
+    Once `stop` is requested, no task is submitted, queued tasks are cancelled, and the results of those that
+    were started are still yielded.
+    """
+    remaining, in_flight = iter(tasks), deque[tuple[Task, Future[Result]]]()
     while True:
-        for task in islice(source, 0 if stop.asked else crew.window - len(flying)):
-            flying.append((task, crew.submit(task)))
-        while stop.asked and flying and flying[-1][1].cancel():
-            flying.pop()
-        if not flying:
+        for task in islice(remaining, 0 if stop.asked else executor.window - len(in_flight)):
+            in_flight.append((task, executor.submit(task)))
+        while stop.asked and in_flight and in_flight[-1][1].cancel():
+            in_flight.pop()
+        if not in_flight:
             return
-        task, ticket = flying.popleft()
+        task, future = in_flight.popleft()
         try:
-            done = ticket.result()
-        except crew.deaths:
+            result = future.result()
+        except executor.worker_died:
             if stop.asked:
                 return  # whoever asked has ended the workers too
-            done = crew.again(task)
-        yield done
+            result = executor.retry(task)
+        yield result

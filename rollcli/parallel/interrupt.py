@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM ask a run to stop after the frames in flight; asked twice, it stops at once."""
+"""Let Ctrl-C and SIGTERM stop a run after the tasks that have begun; the second one stops it at once."""
 
 import contextlib
 import signal
@@ -8,7 +8,7 @@ from types import FrameType
 
 
 class Stop:
-    """Whether the run was asked to stop, and whether that was at once."""
+    """Whether the run was asked to stop, and whether at once."""
 
     asked = False
     at_once = False
@@ -16,9 +16,10 @@ class Stop:
 
 @contextlib.contextmanager
 def stop_on_signals() -> Iterator[Stop]:
-    """Turn the signals into a request for as long as the block lasts.
+    """Set `Stop` instead of ending the process, as long as the block lasts.
 
-    A run that was asked is about to end: from then on, and after the block, a third Ctrl-C changes nothing.
+    The second signal raises KeyboardInterrupt. Later ones are ignored, also after the block: the run is
+    about to end, and must not be disturbed while it says how to continue.
     """
     stop = Stop()
 
@@ -31,7 +32,7 @@ def stop_on_signals() -> Iterator[Stop]:
         stop.asked = True
 
     if threading.current_thread() is not threading.main_thread():
-        yield stop  # only the main thread may handle signals; it does then
+        yield stop  # Python lets only the main thread handle signals
         return
     before = {number: signal.signal(number, ask) for number in (signal.SIGINT, signal.SIGTERM)}
     try:

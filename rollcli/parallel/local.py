@@ -1,47 +1,46 @@
-"""Tasks done on this machine: in this process, or in a pool of others."""
+"""The executor for one worker: this process."""
 
-import os
-from collections.abc import Generator, Iterable, Sequence
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Generic
 
-from rollcli.parallel.in_order import Done, Task, Work
-from rollcli.parallel.interrupt import Stop
+from rollcli.parallel.in_order import Result, Task, Work
 from rollcli.parallel.process_setup import prepare_worker
 
 
-def done_locally(
-    tasks: Sequence[Task], work: Work[Task, Done], jobs: int | None, stop: Stop, held: int | None = None
-) -> Generator[Done, None, None]:
-    """What each task gives, in order.
+class LocalExecutor(Generic[Task, Result]):
+    """Runs each task in this process, when its result is asked for."""
 
-    Parameters
-    ----------
-    tasks, work
-        What to do.
-    jobs : int or None
-        Worker processes; None: the usable processors.
-    stop : Stop
-        No task is begun once this is asked for.
-    held : int, optional
-        An open file that the workers keep open.
-    """
-    jobs = min(jobs or _usable_processors(), len(tasks))
-    if jobs <= 1:
-        return _here(tasks, work, stop)
-    from rollcli.parallel.pool import done_by_pool  # one worker needs no pool
+    window = 1
+    worker_died: tuple[type[BaseException], ...] = ()
 
-    return done_by_pool(tasks, work, jobs, held, stop)
+    def __init__(self, work: Work[Task, Result]) -> None:
+        prepare_worker()
+        self._work = work
+
+    def submit(self, task: Task) -> "LocalFuture[Task, Result]":
+        """Remember the task."""
+        return LocalFuture(self._work.do, task)
+
+    def retry(self, task: Task) -> Result:
+        """Run the task; nothing calls this, since this process cannot outlive its worker."""
+        return self._work.do(task)
+
+    def close(self, *, at_once: bool) -> None:
+        """Do nothing: there are no workers to end."""
 
 
-def _here(tasks: Iterable[Task], work: Work[Task, Done], stop: Stop) -> Generator[Done, None, None]:
-    prepare_worker()
-    for task in tasks:
-        if stop.asked:
-            return
-        yield work.do(task)
+@dataclass(frozen=True)
+class LocalFuture(Generic[Task, Result]):
+    """A task that waits for someone to need its result."""
 
+    do: Callable[[Task], Result]
+    task: Task
 
-def _usable_processors() -> int:
-    try:
-        return len(os.sched_getaffinity(0))
-    except AttributeError:  # not on macOS and Windows
-        return os.cpu_count() or 1
+    def result(self) -> Result:
+        """Run the task."""
+        return self.do(self.task)
+
+    def cancel(self) -> bool:
+        """Withdraw the task: it has not started."""
+        return True

@@ -1,147 +1,151 @@
-"""Worker processes on this machine.
+"""The executor for several workers: processes on this machine.
 
-Processes, not threads: decoding leaves the interpreter alone, but the estimator's many small NumPy calls do
-not, and a worker that dies takes no other with it. And not those of concurrent.futures: they break as a whole
-when one dies, without a word on which task did it, and hand out with threads that take time from the workers.
+Processes rather than threads: decoding releases the interpreter's lock, but the estimator's many small NumPy
+calls do not, and a process that dies takes no other with it. Not those of `concurrent.futures` either: its
+pool breaks as a whole when one process dies and does not say which task killed it, and its threads, which
+hand out the tasks, take time from the workers.
 """
 
 from collections import deque
-from collections.abc import Generator, Iterable
 from multiprocessing import connection
 from typing import Generic
 
-from rollcli.parallel.in_order import Done, Task, Work, in_order
-from rollcli.parallel.interrupt import Stop
+from rollcli.parallel.in_order import Result, Task, Work
 from rollcli.parallel.worker import Worker
 
-_TASKS_PER_WORKER = 2  # one that it works on, and one that it finds when that is done
-_IN_FLIGHT_PER_WORKER = 4  # more, since a slow task holds back those after it
+_TASKS_PER_WORKER = 2  # the one that it runs, and the next one
+_IN_FLIGHT_PER_WORKER = 4  # more than that, since a slow task holds back the results of those after it
 _DIED = "its worker died twice: killed for memory, perhaps, or crashed"
 
 
-def done_by_pool(
-    tasks: Iterable[Task], work: Work[Task, Done], jobs: int, held: int | None, stop: Stop
-) -> Generator[Done, None, None]:
-    """What each task gives, in order, from `jobs` processes; `held` is a file that they keep open."""
-    crew = PoolCrew(jobs, work, held)
-    try:
-        yield from in_order(tasks, crew, stop)
-    finally:
-        if stop.at_once:
-            crew.kill()
-        crew.close()
-
-
 class WorkerDiedError(Exception):
-    """The process that worked on a task has ended."""
+    """The process that ran a task has ended."""
 
 
-class PoolCrew(Generic[Task, Done]):
-    """Processes that take tasks in turn; they make progress while someone waits for a result."""
+class PoolExecutor(Generic[Task, Result]):
+    """A fixed number of processes; tasks are sent and results received while someone waits for a result.
 
-    deaths: tuple[type[BaseException], ...] = (WorkerDiedError,)
+    Parameters
+    ----------
+    jobs : int
+        The number of processes.
+    work : Work
+        What they do.
+    keep_open : int or None
+        A file descriptor that they inherit and keep open until they end.
 
-    def __init__(self, jobs: int, work: Work[Task, Done], held: int | None) -> None:
+    Raises
+    ------
+    WorkerError
+        The system starts no further process.
+    """
+
+    worker_died: tuple[type[BaseException], ...] = (WorkerDiedError,)
+
+    def __init__(self, jobs: int, work: Work[Task, Result], keep_open: int | None = None) -> None:
         self.window = _IN_FLIGHT_PER_WORKER * jobs
-        self._work, self._held = work, held
-        self._team = [Worker(work.do, held) for _ in range(jobs)]
-        self._backlog: deque[Ticket[Task, Done]] = deque()
+        self._work, self._keep_open = work, keep_open
+        self._workers: list[Worker] = []
+        self._queue: deque[PoolFuture[Task, Result]] = deque()
+        try:
+            for _ in range(jobs):
+                self._workers.append(Worker(work.do, keep_open))
+        except BaseException:
+            self.close(at_once=True)
+            raise
 
-    def submit(self, task: Task) -> "Ticket[Task, Done]":
-        """Take a task; its result is waited for with the ticket."""
-        ticket = Ticket(self, task)
-        self._backlog.append(ticket)
-        self._hand_out()
-        return ticket
+    def submit(self, task: Task) -> "PoolFuture[Task, Result]":
+        """Queue a task, and send it when a worker is free."""
+        future = PoolFuture(self, task)
+        self._queue.append(future)
+        self._send_tasks()
+        return future
 
-    def again(self, task: Task) -> Done:
-        """Do a task once more whose worker has died, with all memory to itself."""
-        held_back, self._backlog = self._backlog, deque()
-        while any(worker.asked for worker in self._team):
+    def retry(self, task: Task) -> Result:
+        """Run a task again whose worker died, alone, so that it has all the memory."""
+        waiting, self._queue = self._queue, deque()
+        while any(worker.pending for worker in self._workers):
             self.make_progress()
         try:
             return self.submit(task).result()
         except WorkerDiedError:
             return self._work.lost(task, _DIED)
         finally:
-            self._backlog.extend(held_back)
+            self._queue.extend(waiting)
 
-    def cancel(self, ticket: "Ticket[Task, Done]") -> bool:
-        """Give a task back that no worker has."""
-        if ticket not in self._backlog:
+    def cancel(self, future: "PoolFuture[Task, Result]") -> bool:
+        """Remove a task from the queue, if it still is there."""
+        if future not in self._queue:
             return False
-        self._backlog.remove(ticket)
+        self._queue.remove(future)
         return True
 
     def make_progress(self) -> None:
-        """Wait until a worker has something to say, and keep all of them busy."""
-        speaking = connection.wait([worker.pipe for worker in self._team if worker.asked])
-        for place, worker in enumerate(self._team):
-            if worker.pipe in speaking:
-                self._listen(place, worker)
-        self._hand_out()
+        """Wait until a worker answers or dies, and send further tasks."""
+        ready = connection.wait([worker.pipe for worker in self._workers if worker.pending])
+        for index, worker in enumerate(self._workers):
+            if worker.pipe in ready:
+                self._receive(index, worker)
+        self._send_tasks()
 
-    def kill(self) -> None:
-        """End the workers at once."""
-        for worker in self._team:
+    def close(self, *, at_once: bool) -> None:
+        """End the workers: after their current task, or at once."""
+        for worker in self._workers if at_once else ():
             worker.kill()
-
-    def close(self) -> None:
-        """End the workers, after what they are at."""
-        for worker in self._team:
+        for worker in self._workers:
             worker.close()
 
-    def _hand_out(self) -> None:
+    def _send_tasks(self) -> None:
         for _ in range(_TASKS_PER_WORKER):
-            for place, worker in enumerate(self._team):
-                if self._backlog and len(worker.asked) < _TASKS_PER_WORKER:
-                    self._ask(place, worker, self._backlog.popleft())
+            for index, worker in enumerate(self._workers):
+                if self._queue and len(worker.pending) < _TASKS_PER_WORKER:
+                    self._send(index, worker, self._queue.popleft())
 
-    def _ask(self, place: int, worker: Worker, ticket: "Ticket[Task, Done]") -> None:
-        worker.asked.append(ticket)
+    def _send(self, index: int, worker: Worker, future: "PoolFuture[Task, Result]") -> None:
+        worker.pending.append(future)
         try:
-            worker.pipe.send(ticket.task)
-        except OSError:  # it has died meanwhile, with nothing to do: that is no task's fault
-            if len(worker.asked) == 1:
-                self._replace(place, worker)
+            worker.pipe.send(future.task)
+        except OSError:  # it died while it was idle: no task is to blame
+            if len(worker.pending) == 1:
+                self._replace(index, worker)
 
-    def _listen(self, place: int, worker: Worker) -> None:
+    def _receive(self, index: int, worker: Worker) -> None:
         try:
             answer = worker.pipe.recv()
         except (EOFError, OSError):
-            worker.asked.popleft().settle(None, WorkerDiedError())
-            self._replace(place, worker)
+            worker.pending.popleft().settle(None, WorkerDiedError())
+            self._replace(index, worker)
         else:
-            worker.asked.popleft().settle(*answer)
+            worker.pending.popleft().settle(*answer)
 
-    def _replace(self, place: int, worker: Worker) -> None:
-        """A new worker in place of a dead one; what that was asked for after its last task goes to others."""
-        self._backlog.extendleft(reversed(worker.asked))
+    def _replace(self, index: int, worker: Worker) -> None:
+        """Start a new worker in place of a dead one, and requeue the tasks that it had not begun."""
+        self._queue.extendleft(reversed(worker.pending))
         worker.close()
-        self._team[place] = Worker(self._work.do, self._held)
+        self._workers[index] = Worker(self._work.do, self._keep_open)
 
 
-class Ticket(Generic[Task, Done]):
-    """A task that is under way; what `concurrent.futures.Future` is elsewhere."""
+class PoolFuture(Generic[Task, Result]):
+    """A task that was submitted to a pool."""
 
-    def __init__(self, crew: PoolCrew[Task, Done], task: Task) -> None:
+    def __init__(self, executor: PoolExecutor[Task, Result], task: Task) -> None:
         self.task = task
-        self._crew = crew
-        self._answer: tuple[Done, Exception | None] | None = None
+        self._executor = executor
+        self._answer: tuple[Result, Exception | None] | None = None
 
-    def settle(self, value: Done, error: Exception | None) -> None:
-        """Say how the task ended."""
+    def settle(self, value: Result, error: Exception | None) -> None:
+        """Store the result of the task, or the error that it raised."""
         self._answer = value, error
 
-    def result(self) -> Done:
-        """Wait for what the task gives; raises what it raised, or WorkerDiedError."""
+    def result(self) -> Result:
+        """Wait for the result; raise what the task raised, or WorkerDiedError."""
         while self._answer is None:
-            self._crew.make_progress()
+            self._executor.make_progress()
         value, error = self._answer
         if error is not None:
             raise error
         return value
 
     def cancel(self) -> bool:
-        """Give the task back, unless a worker has it."""
-        return self._crew.cancel(self)
+        """Withdraw the task; return False when a worker has it."""
+        return self._executor.cancel(self)

@@ -1,4 +1,4 @@
-"""How a process is set up that works on frames, and on nothing else."""
+"""Set up a process that runs tasks and does nothing else."""
 
 import ctypes
 import os
@@ -9,27 +9,27 @@ _MIB = 2**20
 
 
 def limit_blas_threads() -> None:
-    """Keep NumPy's linear algebra to one thread, here and in processes to come; before NumPy is loaded."""
+    """Limit NumPy's linear algebra to one thread, here and in child processes; call it before NumPy loads."""
     for name in _BLAS_THREADS:
         os.environ.setdefault(name, "1")
 
 
 def prepare_worker() -> None:
-    """Set up this process: the frames are what runs in parallel, and each needs the same memory again."""
+    """Set up this process to run tasks: one thread, silent decoders, memory that is kept between tasks."""
     import cv2
 
     from rollcli.files.codecs.mute_stderr import silence_decoders
 
-    cv2.setNumThreads(1)
+    cv2.setNumThreads(1)  # tasks run in parallel, not the loops inside of one
     silence_decoders()
     _keep_freed_memory()
 
 
 def _keep_freed_memory() -> None:
-    """Have glibc keep the arrays of a frame for the next: giving it back costs a fifth of the time."""
+    """Let glibc keep the arrays of a task for the next one: returning them costs a fifth of the time."""
     try:
         mallopt = ctypes.CDLL(None).mallopt
     except (AttributeError, OSError, TypeError):
-        return  # another C library: it has its own ways
+        return  # another C library, which has no such function
     mallopt(_M_MMAP_THRESHOLD, 32 * _MIB)
     mallopt(_M_TRIM_THRESHOLD, 256 * _MIB)

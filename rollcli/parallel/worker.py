@@ -1,4 +1,4 @@
-"""One worker process: tasks go in through a pipe, and what they give comes out."""
+"""One worker process: it receives tasks through a pipe, and sends their results back."""
 
 import contextlib
 import multiprocessing
@@ -18,16 +18,16 @@ from rollcli.parallel.process_setup import prepare_worker
 
 
 class Worker:
-    """This side of a worker process.
+    """The parent's end of a worker process.
 
-    Spawned, never forked: a fork copies locks that other threads hold.
+    The process is spawned, not forked: a fork copies locks that other threads hold.
 
     Parameters
     ----------
     do : callable
-        What is done with each task.
-    held : int or None
-        An open file that the process holds as long as it lives.
+        Turns a task into its result.
+    keep_open : int or None
+        A file descriptor that the process inherits and keeps open until it ends.
 
     Raises
     ------
@@ -36,76 +36,79 @@ class Worker:
 
     Attributes
     ----------
-    asked : deque
-        What it was asked for and has not answered, oldest first: that one it is working on.
+    pipe : Connection
+        Tasks go in, (result, error) comes out.
+    pending : deque
+        The futures of the tasks that were sent and not answered, oldest first: the first one is running.
     """
 
-    def __init__(self, do: Callable[[Any], Any], held: int | None) -> None:
+    def __init__(self, do: Callable[[Any], Any], keep_open: int | None) -> None:
         spawn = multiprocessing.get_context("spawn")
-        self.asked: deque[Any] = deque()
+        self.pending: deque[Any] = deque()
         try:
-            self.pipe, far = spawn.Pipe()
-            self._process = spawn.Process(target=_serve, args=(far, do, _Held(held)), daemon=True)
-            with _no_ctrl_c():  # a child inherits what is blocked: only the run decides when work ends
+            self.pipe, far_end = spawn.Pipe()
+            inherited = _InheritedFile(keep_open)
+            self._process = spawn.Process(target=_serve, args=(far_end, do, inherited), daemon=True)
+            with _ctrl_c_blocked():  # the child inherits this: only the parent decides when work ends
                 self._process.start()
         except OSError as error:
-            raise _unable(error) from error
-        far.close()
+            raise _cannot_start(error) from error
+        far_end.close()
 
     def kill(self) -> None:
-        """End it at once."""
+        """End the process at once."""
         self._process.kill()
 
     def close(self) -> None:
-        """End it after what it is working on."""
+        """End the process after its current task, and wait for that."""
         self.pipe.close()
         self._process.join()
 
 
-def _serve(pipe: "Connection[Any, Any]", do: Callable[[Any], Any], held: "_Held") -> None:
-    """What the process does; `held` is open as long as it lives."""
+def _serve(pipe: "Connection[Any, Any]", do: Callable[[Any], Any], inherited: "_InheritedFile") -> None:
+    """Run tasks until the pipe is closed; `inherited` is an argument so that its file stays open."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    unable = _prepare()
-    with contextlib.suppress(EOFError, OSError):  # the other side is closed: all is done
+    start_error = _prepare()
+    with contextlib.suppress(EOFError, OSError):  # the parent has closed its end: all is done
         while True:
             task = pipe.recv()
-            with _Outcome() as outcome:
-                if unable is not None:
-                    raise unable
-                outcome.value = do(task)
-            pipe.send((outcome.value, outcome.error))
-    os._exit(0)  # there is nothing to tidy up, and taking NumPy and OpenCV down takes longer than two frames
+            with _Answer() as answer:
+                if start_error is not None:
+                    raise start_error
+                answer.value = do(task)
+            pipe.send((answer.value, answer.error))
+    os._exit(0)  # there is nothing to clean up, and unloading NumPy and OpenCV takes longer than two frames
 
 
 def _prepare() -> WorkerError | None:
-    """What keeps this process from working: not the fault of any task."""
+    """Set up this process; return the error that keeps it from working, since no task is to blame for it."""
     try:
         prepare_worker()
     except (ImportError, OSError, MemoryError) as error:  # no memory left for NumPy or OpenCV
-        return _unable(error)
+        return _cannot_start(error)
     return None
 
 
-def _unable(error: Exception) -> WorkerError:
+def _cannot_start(error: Exception) -> WorkerError:
     return WorkerError(f"a worker process cannot start: {error}; try fewer of them, with --jobs")
 
 
 def _end_with_parent() -> None:
-    """A killed run leaves no workers that go on writing."""
+    """Exit when the parent has died: a killed run must leave no workers that go on writing."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         connection.wait([parent.sentinel])
         os._exit(1)
 
 
-class _Outcome:
-    """What a task gives, or the error that it ends with, which is raised where the answer is wanted."""
+class _Answer:
+    """The result of a task, or the error that it raised, which the parent raises again."""
 
     value: Any = None
     error: Exception | None = None
 
-    def __enter__(self) -> "_Outcome":
+    def __enter__(self) -> "_Answer":
         return self
 
     def __exit__(
@@ -121,30 +124,30 @@ class _Outcome:
         return self.error is not None
 
 
-class _Held:
-    """An open file that a spawned process receives, open."""
+class _InheritedFile:
+    """A file descriptor that is still open after this object was sent to a spawned process."""
 
     def __init__(self, descriptor: int | None) -> None:
         self.descriptor = descriptor
 
     def __reduce__(self) -> tuple[Any, ...]:
         if self.descriptor is None or sys.platform == "win32":
-            return _Held, (None,)
+            return _InheritedFile, (None,)
         return _received, (reduction.DupFd(self.descriptor),)
 
 
-def _received(duplicate: Any) -> _Held:
-    return _Held(duplicate.detach())
+def _received(duplicate: Any) -> _InheritedFile:
+    return _InheritedFile(duplicate.detach())
 
 
 @contextlib.contextmanager
-def _no_ctrl_c() -> Iterator[None]:
+def _ctrl_c_blocked() -> Iterator[None]:
     if sys.platform == "win32":
         yield
         return
     from multiprocessing import resource_tracker  # not on Windows
 
-    resource_tracker.ensure_running()  # it would be started in between, and unblocks what it finds blocked
+    resource_tracker.ensure_running()  # it would start inside the block, and unblocks Ctrl-C when it does
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield

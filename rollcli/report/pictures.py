@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rollcli.errors import InputError
 from rollcli.files.encodings import read_disparity, to_disparity
 from rollcli.files.formats import read_image, read_stored
-from rollcli.frames.guard import FAULTS
+from rollcli.frames.guard import FRAME_ERRORS
 from rollcli.frames.options import FrameOptions
 from rollcli.frames.read import read_source
 from rollcli.imaging.derotate import derotate
@@ -67,7 +67,7 @@ def no_pictures(_: Subject, reason: str) -> Pictures:
 def _attempt(make: Callable[[], Made]) -> tuple[Made | None, str]:
     try:
         return make(), ""
-    except FAULTS as error:
+    except FRAME_ERRORS as error:
         return None, str(error) or type(error).__name__
 
 

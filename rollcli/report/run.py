@@ -5,17 +5,16 @@ from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
-from rollcli.batch.recorded import recorded_options
-from rollcli.errors import InputError
+from rollcli.batch.run_record import recorded_options
+from rollcli.errors import ExitStatus, InputError
 from rollcli.files.results import Result, read_result, run_path
 from rollcli.files.stream import is_stream, write_output
-from rollcli.frames.checks import check_writes
-from rollcli.frames.dry_run import list_files
+from rollcli.frames.checks import check_writes, list_files
 from rollcli.frames.options import EncodingOptions, FrameOptions
-from rollcli.frames.progress import FRAMES_FAILED, INTERRUPTED, Report
+from rollcli.frames.progress import Progress
 from rollcli.parallel.in_order import Work
 from rollcli.parallel.interrupt import stop_on_signals
-from rollcli.parallel.local import done_locally
+from rollcli.parallel.run_tasks import Workers, run_tasks
 from rollcli.report.gallery import Choice, choose
 from rollcli.report.options import ReportOptions
 from rollcli.report.page import require_extra
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
 _REASONS = 3  # how many are told
 
 
-def make_report(options: ReportOptions) -> int:
+def run_report(options: ReportOptions) -> ExitStatus:
     """Write the page.
 
     Parameters
@@ -37,8 +36,8 @@ def make_report(options: ReportOptions) -> int:
 
     Returns
     -------
-    int
-        The exit status: 0, 3 when pictures are missing, 130 when interrupted.
+    ExitStatus
+        FRAMES_FAILED when pictures are missing, INTERRUPTED when interrupted.
 
     Raises
     ------
@@ -63,7 +62,7 @@ def make_report(options: ReportOptions) -> int:
     check_writes(reads, writes, overwrite=options.running.overwrite)
     if options.running.dry_run:
         list_files([(reads, writes)])
-        return 0
+        return ExitStatus.DONE
     return _write(options, result, chosen, found, recorded)
 
 
@@ -73,27 +72,27 @@ def _write(
     chosen: Sequence[Choice],
     found: Sequence[Subject],
     recorded: FrameOptions,
-) -> int:
+) -> ExitStatus:
     from rollcli.report.content import report_page
 
-    report = Report(len(found), options.running, EncodingOptions())
+    progress = Progress(len(found), options.running, EncodingOptions())
     pictures = _take(found, recorded, options.running.jobs)
     if len(pictures) < len(found):
-        report.say("interrupted; nothing is written")
-        return INTERRUPTED
+        progress.say("interrupted; nothing is written")
+        return ExitStatus.INTERRUPTED
     page = report_page(result, options, list(zip(chosen, pictures, strict=True)))
     write_output(options.output, page)
     missing = [each.missing for each in pictures if each.empty]
     for reason in missing[:_REASONS]:
-        report.say(f"no picture of {reason}")
+        progress.say(f"no picture of {reason}")
     if missing:
-        report.say(
+        progress.say(
             f"{len(missing)} of {frame_count(len(pictures))} without pictures: run where estimate ran, name "
             "what it wrote with --images, or leave pictures out with --gallery 0"
         )
     shown = len(pictures) - len(missing)
-    report.note(f"{options.output}: pictures of {frame_count(shown)}, {len(page) / 1e6:.1f} MB")
-    return FRAMES_FAILED if missing else 0
+    progress.note(f"{options.output}: pictures of {frame_count(shown)}, {len(page) / 1e6:.1f} MB")
+    return ExitStatus.FRAMES_FAILED if missing else ExitStatus.DONE
 
 
 def _take(found: Sequence[Subject], recorded: FrameOptions, jobs: int | None) -> "list[Pictures]":
@@ -101,5 +100,5 @@ def _take(found: Sequence[Subject], recorded: FrameOptions, jobs: int | None) ->
     from rollcli.report.pictures import no_pictures, take_pictures
 
     work = Work(partial(take_pictures, options=recorded), no_pictures)
-    with stop_on_signals() as stop, contextlib.closing(done_locally(found, work, jobs, stop)) as taken:
+    with stop_on_signals() as stop, contextlib.closing(run_tasks(found, work, stop, Workers(jobs))) as taken:
         return list(taken)

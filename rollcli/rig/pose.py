@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.estimator.estimate import RollEstimate
+from rollcli.estimator.result import RollEstimate
 from rollcli.estimator.tangent import Tangent
 from rollcli.rig.calibration import Calibration
 

@@ -16,7 +16,7 @@ from rollcli.files.encodings import from_disparity
 from rollcli.files.formats import encode_stored
 from rollcli.parallel.in_order import Work
 from rollcli.parallel.interrupt import Stop
-from rollcli.parallel.local import done_locally
+from rollcli.parallel.run_tasks import Workers, run_tasks
 from rollcli.simulate.camera import rig_axes
 from rollcli.simulate.draw import draw_specs
 from rollcli.simulate.options import CROSSFALL, KERB, KERBED, MIXED, SimulateOptions
@@ -150,7 +150,7 @@ def write_dataset(dataset: Dataset, jobs: int | None = 1, stop: Stop | None = No
     _clear(dataset)
     remove_leftovers(task.image(part) for part in _PARTS for task in dataset.tasks)
     written = 0
-    for stem in done_locally(dataset.tasks, Work(_write_frame, _lost), jobs, stop or Stop()):
+    for stem in run_tasks(dataset.tasks, Work(_write_frame, _lost), stop or Stop(), Workers(jobs)):
         written += 1
         yield stem
     if written == len(dataset.specs):

@@ -3,16 +3,16 @@
 import sys
 import time
 
+from rollcli.errors import ExitStatus
 from rollcli.frames.options import RunningOptions
+from rollcli.messages import say
 from rollcli.parallel.interrupt import stop_on_signals
 from rollcli.simulate.dataset import KITTI_TOP, Dataset, plan_dataset, write_dataset
 from rollcli.simulate.options import SimulateOptions
 
-INTERRUPTED = 130
 
-
-def run(folder: str, options: SimulateOptions, running: RunningOptions) -> int:
-    """Do what was asked; the exit status.
+def run_simulate(folder: str, options: SimulateOptions, running: RunningOptions) -> ExitStatus:
+    """Write the simulated frames.
 
     Raises
     ------
@@ -22,20 +22,20 @@ def run(folder: str, options: SimulateOptions, running: RunningOptions) -> int:
     dataset = plan_dataset(folder, options, overwrite=running.overwrite)
     if running.dry_run:
         sys.stdout.writelines(f"write {path}\n" for path in dataset.files())
-        return 0
+        return ExitStatus.DONE
     if dataset.nearest_disparity > KITTI_TOP and not running.quiet:
-        _say(
+        say(
             f"the road reaches {dataset.nearest_disparity:.0f} px of disparity: what exceeds "
             f"{KITTI_TOP:.0f} px does not fit a KITTI PNG and has no data in {dataset.folder}/disparity"
         )
     start, total = time.monotonic(), len(dataset.specs)
     done = _write(dataset, running)
     if done < total:
-        _say(f"interrupted after {done} of {total} frames; start again with --overwrite")
-        return INTERRUPTED
+        say(f"interrupted after {done} of {total} frames; start again with --overwrite")
+        return ExitStatus.INTERRUPTED
     if not running.quiet:
-        _say(f"{total} frames in {dataset.folder}; {time.monotonic() - start:.1f} s")
-    return 0
+        say(f"{total} frames in {dataset.folder}; {time.monotonic() - start:.1f} s")
+    return ExitStatus.DONE
 
 
 def _write(dataset: Dataset, running: RunningOptions) -> int:
@@ -48,9 +48,7 @@ def _write(dataset: Dataset, running: RunningOptions) -> int:
             done += 1
             bar.update()
             if running.verbose and not running.quiet:
-                bar.write(f"rollcli: {stem} written", file=sys.stderr)
+                bar.clear()
+                say(f"{stem} written")
+                bar.refresh()
     return done
-
-
-def _say(message: str) -> None:
-    sys.stderr.write(f"rollcli: {message}\n")

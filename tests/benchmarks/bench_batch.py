@@ -44,8 +44,8 @@ options = FrameOptions(EncodingOptions(), StereoOptions(), RegionOptions(), Meth
 paths = map(str, sorted(Path(sys.argv[1]).iterdir()))
 frames = [Frame(path, "", path, "", Path(path).name, None) for path in paths]
 with ThreadPoolExecutor(2) as pool:
-    for outcome in pool.map(partial(run_frame, options=options), frames):
-        assert outcome.row.status != "error"
+    for result in pool.map(partial(run_frame, options=options), frames):
+        assert result.row.status != "error"
 print(time.perf_counter() - start)
 """
 

@@ -7,7 +7,6 @@ same float32 map at 1242x375; energy, gradient and curvature together within 100
 exact within 1 ms; the n x 3 form more than 100 times slower.
 """
 
-import math
 import sys
 import timeit
 from collections.abc import Callable
@@ -18,8 +17,9 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from rollcli.estimator.areas.iterative import areas
+from rollcli.estimator.areas.iterative import iterative
 from rollcli.estimator.energy import Energy
+from rollcli.estimator.methods import LAMBDA0, SolverSettings
 from rollcli.estimator.moments import map_moments
 from rollcli.estimator.solvers.exact import exact
 from rollcli.estimator.solvers.golden_section import golden_section
@@ -27,7 +27,7 @@ from rollcli.estimator.solvers.gradient_descent import gradient_descent
 from rollcli.evaluate.textbook import Textbook
 
 SIZES = ((640, 480), (1242, 375), (1920, 1080), (1730, 1028))
-TOLERANCE = math.radians(1e-4)
+SETTINGS = SolverSettings()
 
 
 def road(width: int, height: int) -> np.ndarray:
@@ -56,13 +56,13 @@ def measure(width: int, height: int) -> dict[str, float]:
         "moments of the map": best(lambda: map_moments(disparity)),
         "E, gradient and curvature": best(lambda: energy.at(0.1)),
         "exact": best(lambda: exact(energy)),
-        "gd": best(lambda: gradient_descent(energy, TOLERANCE)),
-        "gss": best(lambda: golden_section(energy, TOLERANCE)),
-        "areas, with its pass": best(lambda: areas(disparity)),
+        "gd": best(lambda: gradient_descent(energy, SETTINGS)),
+        "gss": best(lambda: golden_section(energy, SETTINGS)),
+        "areas, with its pass": best(lambda: iterative(disparity, disparity > 0)),
         "n x 3: E": best(lambda: textbook.energy(0.1)),
         "n x 3: gradient": best(lambda: textbook.gradient(0.1)),
-        "n x 3: gd": best(lambda: textbook.gradient_descent(TOLERANCE, 26.0)),
-        "n x 3: gss": best(lambda: textbook.golden_section(TOLERANCE)),
+        "n x 3: gd": best(lambda: textbook.gradient_descent(SETTINGS.tolerance, LAMBDA0)),
+        "n x 3: gss": best(lambda: textbook.golden_section(SETTINGS.tolerance)),
     }
     figures["moments / np.sum"] = figures["moments of the map"] / figures["np.sum of the map"]
     figures["n x 3 gradient / E, gradient and curvature"] = (

@@ -14,11 +14,16 @@ import numpy as np
 from matched import matched
 
 from rollcli.errors import EstimationError
-from rollcli.estimator import interval
 from rollcli.estimator.estimate import estimate_roll
-from rollcli.estimator.selection import take_road
+from rollcli.estimator.interval import jackknife, slant
+from rollcli.estimator.methods import DEFAULT_SOLVER, MAX_ROLL_DEG
+from rollcli.estimator.request import Request
+from rollcli.estimator.selection import select_pixels
+from rollcli.estimator.tuning import TUNING
+from rollcli.estimator.validity import CheckedMap
 
 FIT_SEEDS, JUDGE_SEEDS = (81, 82), (83, 84)
+REQUEST = Request("gd", "parabola", "auto", DEFAULT_SOLVER, math.radians(MAX_ROLL_DEG), 0, TUNING)
 COUNTS = (50, 100, 200, 400, 1000, 2000)
 
 
@@ -29,25 +34,25 @@ def terms(frames: int, seeds: tuple[int, int]) -> tuple[np.ndarray, list[str]]:
         for disparity, roll_deg, scene in matched(frames // 2, seed, span):
             try:
                 theta = estimate_roll(disparity).theta
-                surface = take_road(disparity, None, math.radians(45), 0, parabolic=True).surface
+                surface = select_pixels(CheckedMap.of(disparity, None), REQUEST).surface
             except EstimationError as error:
                 print(f"{scene} {roll_deg:.2f}: {error}")
                 continue
             assert surface is not None
-            bands, columns, white = np.degrees(interval.jackknife(surface, theta).moves())
-            pixels = max(1.0, surface.weights.sum() / interval._EFFECTIVE_PIXELS)
+            bands, columns, white = np.degrees(jackknife(surface, theta, TUNING.interval).spreads())
+            pixels = max(1.0, surface.weights.sum() / TUNING.interval.independent_pixels)
             error = abs(math.degrees(theta) - roll_deg)
             weight = surface.weights.sum()
-            slant = interval.slant(theta)
-            rows.append((error, bands, columns, white / math.sqrt(pixels), weight, slant))
+            wider = slant(theta, TUNING.interval)
+            rows.append((error, bands, columns, white / math.sqrt(pixels), weight, wider))
             scenes.append(scene)
     return np.array(rows), scenes
 
 
 def widths(rows: np.ndarray, count: float) -> np.ndarray:
     """Half-widths before the factor, degrees."""
-    _, bands, columns, white, pixels, slant = rows.T
-    return slant * np.sqrt(bands**2 + columns**2 + white**2 * np.maximum(1, pixels / count))
+    _, bands, columns, white, pixels, wider = rows.T
+    return wider * np.sqrt(bands**2 + columns**2 + white**2 * np.maximum(1, pixels / count))
 
 
 def main() -> None:
@@ -56,7 +61,7 @@ def main() -> None:
     fit, _ = terms(frames, FIT_SEEDS)
     judge, scenes = terms(frames, JUDGE_SEEDS)
     print(f"{len(fit)} scenes to fit on, {len(judge)} to judge on")
-    print(f"in use: kappa {interval._KAPPA} and {interval._EFFECTIVE_PIXELS} pixels")
+    print(f"in use: kappa {TUNING.interval.factor} and {TUNING.interval.independent_pixels} pixels")
     for count in COUNTS:
         kappa = float(np.percentile(fit[:, 0] / widths(fit, count), 95))
         half = kappa * widths(judge, count)

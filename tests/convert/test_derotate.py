@@ -7,8 +7,8 @@ from itertools import product
 import numpy as np
 import pytest
 
-from rollcli.convert.derotate import derotate_maps
-from rollcli.convert.options import DerotateOptions, TurnOptions
+from rollcli.convert.derotate import run_derotate
+from rollcli.convert.options import DerotateOptions, RotationOptions
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.files.encodings import from_disparity, read_disparity
 from rollcli.files.formats import encode_stored, read_stored
@@ -32,10 +32,10 @@ COMBINATIONS = [
 
 def derotated(folder, roll_deg, *, encoding="auto", expand=False, invalid=()):
     """Every map of folder/maps rotated into folder/out, in this process; the exit status."""
-    return derotate_maps(
+    return run_derotate(
         DerotateOptions(
             InputOptions((str(folder / "maps"),)),
-            TurnOptions(roll_deg, None, expand),
+            RotationOptions(roll_deg, None, expand),
             str(folder / "out"),
             EncodingOptions(encoding, invalid=invalid),
             RunningOptions(jobs=1, quiet=True, overwrite=True),

@@ -7,6 +7,7 @@ import pytest
 
 from rollcli.estimator.energy import Energy
 from rollcli.estimator.estimate import estimate_roll
+from rollcli.estimator.methods import SolverSettings
 from rollcli.estimator.moments import map_moments
 from rollcli.estimator.solvers.exact import minima
 from rollcli.estimator.solvers.golden_section import golden_section
@@ -49,12 +50,13 @@ def test_gradient_descent_converges_within_6_iterations_to_the_known_angle(stem)
 
 
 def test_gradient_descents_iterations_are_within_one_of_the_papers(stem):
-    counts = [gradient_descent(energy_of(stem), delta).iterations for delta in DELTAS]
+    counts = [gradient_descent(energy_of(stem), SolverSettings(delta)).iterations for delta in DELTAS]
     assert all(abs(count - paper) <= 1 for count, paper in zip(counts, PAPER, strict=True)), counts
 
 
 def test_golden_sections_iterations_are_the_papers(stem):
-    assert [golden_section(energy_of(stem), delta).iterations for delta in DELTAS] == [16, 21, 26, 30]
+    counts = [golden_section(energy_of(stem), SolverSettings(delta)).iterations for delta in DELTAS]
+    assert counts == [16, 21, 26, 30]
 
 
 def test_exact_agrees_with_gradient_descent(stem):

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from rollcli.errors import EstimationError
-from rollcli.estimator.estimate import METHODS, estimate_roll
+from rollcli.estimator.estimate import estimate_roll
+from rollcli.estimator.methods import AREAS, METHODS
 from rollcli.estimator.validity import require_pixels
 from tests.estimator.synthetic_maps import bent_road
 
@@ -23,7 +24,7 @@ DEGENERATE = {
 @pytest.mark.parametrize("kind", DEGENERATE)
 def test_degenerate_pixels_are_refused_with_the_reason_by_every_method(kind, method):
     kept, reason = DEGENERATE[kind]
-    if method in ("plane", "areas") and kind == "a diagonal":
+    if method in AREAS and kind == "a diagonal":
         reason = "lie on one line|half valid|only"
     with pytest.raises(EstimationError, match=reason):
         estimate_roll(bent_road(5, noise=0.1), mask=kept, method=method, road="all")

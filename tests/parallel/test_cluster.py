@@ -6,7 +6,7 @@ import subprocess
 import sys
 import threading
 import time
-from concurrent.futures import CancelledError, Future
+from concurrent.futures import Future
 from types import SimpleNamespace
 
 import pytest
@@ -16,7 +16,8 @@ from tests.run_cli import command, contents, environment, rollcli, write_maps
 pytest.importorskip("distributed", reason="the extra cluster is not installed")
 
 from rollcli import __version__
-from rollcli.parallel.cluster import ClusterTicket, probe
+from rollcli.errors import ClusterError
+from rollcli.parallel.cluster import ClusterFuture, probe
 
 FRAMES = 60
 IMAGES = ("--derotated", "upright", "--vdisparity", "v")
@@ -129,8 +130,8 @@ def test_a_scheduler_that_is_lost_ends_the_run_which_goes_on_without_it(tmp_path
 
 def test_nobody_waits_for_what_was_sent_while_the_connection_broke():
     client = SimpleNamespace(status="closed")
-    with pytest.raises(CancelledError):
-        ClusterTicket(Future(), client).result()
+    with pytest.raises(ClusterError, match="the connection to the scheduler is lost"):
+        ClusterFuture(Future(), client, "tcp://far:8786").result()
 
 
 def test_a_worker_that_has_no_such_program_or_files_is_named(tmp_path):

@@ -1,4 +1,4 @@
-"""The roll angle from planes in many small areas, and the iterative choice of the best of them [Areas].
+"""Planes in many small areas, and the iterative choice of the best of them [Areas].
 
 [Areas]: Evans, Fan, Dahnoun, "Iterative roll angle estimation from dense disparity map", MECO 2018. One
 chosen area may hold an obstacle; among many, the road's are those whose planes agree. The steps here:
@@ -12,8 +12,6 @@ chosen area may hold an obstacle; among many, the road's are those whose planes 
 5. The angle is that of the best plane of all pixels of these areas.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
@@ -21,10 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import EstimationError
-from rollcli.estimator.areas.lower_centre import AreaSolution, plane_of
+from rollcli.estimator.areas.plane import AreaPixels
 from rollcli.estimator.areas.tiles import tile_sums
+from rollcli.estimator.methods import DEFAULT_AREA, AreaSettings
 from rollcli.estimator.moments import Floats
-from rollcli.estimator.solvers.solution import Outcome
+from rollcli.estimator.solvers.solution import SolverStatus
 from rollcli.estimator.validity import require_pixels
 
 _TILES = 100  # along the longer side of the map
@@ -35,26 +34,25 @@ _NOISE, _SMOOTH = 1.5, 0.1  # or 1.5 times the residual of the smoothest tenth: 
 _TRIED = 200  # about as many planes compete to be the best
 _ROUNDS = 20
 _SINGULAR = 1e-10
-MAX_ROLL = math.radians(45)
 
 
-def areas(
-    disparity: NDArray[Any], weights: NDArray[Any] | None = None, max_roll: float = MAX_ROLL
-) -> AreaSolution:
-    """Fit planes to many small areas, and one plane to those that agree.
+def iterative(
+    disparity: NDArray[Any], usable: NDArray[np.bool_], settings: AreaSettings = DEFAULT_AREA
+) -> AreaPixels:
+    """Fit planes to many small areas, and choose those that agree on one.
 
     Parameters
     ----------
     disparity : ndarray, shape (H, W)
-        Real numbers, px; values <= 0, NaN and inf are no data.
-    weights : ndarray, shape (H, W), optional
-        Finite and not negative (or bool); all ones by default.
-    max_roll : float
-        The largest abs(roll) of an area's plane, radians.
+        Real numbers, px.
+    usable : ndarray of bool, shape (H, W)
+        The pixels that are valid and may be used.
+    settings : AreaSettings
+        The largest roll of an area's plane.
 
     Returns
     -------
-    AreaSolution
+    AreaPixels
         `iterations` counts the rounds of step 4.
 
     Raises
@@ -62,19 +60,22 @@ def areas(
     EstimationError
         When no area has enough valid pixels, or none looks like a road.
     """
-    valid = (disparity > 0) & (disparity < np.inf)
-    if weights is not None:
-        valid &= weights > 0
-    require_pixels(valid)
+    require_pixels(usable)
     side = max(2, round(max(disparity.shape) / _TILES))
-    grams = tile_sums(disparity, weights, side).areas(_SIZE, _STEP)
+    grams = tile_sums(disparity, usable, side).areas(_SIZE, _STEP)
     across, grams = grams.shape[1], grams.reshape(-1, 4, 4)
     extent = _SIZE * side
-    full = 1.0 if weights is None else float(np.max(weights))
-    filled = np.flatnonzero(grams[:, 0, 0] >= _FILLED * full * extent**2)
+    filled = np.flatnonzero(grams[:, 0, 0] >= _FILLED * extent**2)
     if len(filled) == 0:
         raise EstimationError(f"no area of {extent}x{extent} pixels is at least half valid")
     grams = grams[filled]
+    agreeing, rounds, status = _road_areas(grams, settings.max_roll)
+    covered = _covered(filled[agreeing], across, _STEP * side, extent, disparity.shape)
+    return AreaPixels(usable & covered, rounds, status)
+
+
+def _road_areas(grams: Floats, max_roll: float) -> tuple[NDArray[np.bool_], int, SolverStatus]:
+    """Return which areas (A,), given by their sums (A, 4, 4), agree on a road; see `_agreeing`."""
     planes = _fitted(grams)
     roads = _look_like_road(planes, max_roll)
     if not roads.any():
@@ -84,9 +85,7 @@ def areas(
     own = misfit[tried, np.arange(len(tried))]
     level = grams[roads, 0, 3].sum() / grams[roads, 0, 0].sum()
     tolerance = max(_TOLERANCE * float(level), _NOISE * float(np.quantile(own, _SMOOTH)))
-    agreeing, rounds, outcome = _agreeing(grams, misfit <= tolerance, tolerance, max_roll)
-    used = valid & _covered(filled[agreeing], across, _STEP * side, extent, disparity.shape)
-    return plane_of(disparity, weights, used, rounds, outcome)
+    return _agreeing(grams, misfit <= tolerance, tolerance, max_roll)
 
 
 def _fitted(grams: Floats) -> Floats:
@@ -122,7 +121,7 @@ def _look_like_road(planes: Floats, max_roll: float) -> NDArray[np.bool_]:
 
 def _agreeing(
     grams: Floats, explained: NDArray[np.bool_], tolerance: float, max_roll: float
-) -> tuple[NDArray[np.bool_], int, Outcome]:
+) -> tuple[NDArray[np.bool_], int, SolverStatus]:
     """Return which areas (A,) share one plane, after how many rounds, and whether these settled.
 
     `explained`, shape (A, P), says which areas each competing plane explains.
@@ -132,11 +131,11 @@ def _agreeing(
         plane = _fitted(grams[chosen].sum(axis=0, keepdims=True))
         again = _misfit(grams, plane)[:, 0] <= tolerance
         if not again.any() or not _look_like_road(plane, max_roll).all():
-            return chosen, rounds, Outcome.DRIFTED
+            return chosen, rounds, SolverStatus.DRIFTED
         if (again == chosen).all():
-            return chosen, rounds, Outcome.CONVERGED
+            return chosen, rounds, SolverStatus.CONVERGED
         chosen = again
-    return chosen, _ROUNDS, Outcome.STEP_LIMIT
+    return chosen, _ROUNDS, SolverStatus.STEP_LIMIT
 
 
 def _covered(

@@ -1,7 +1,5 @@
 """Sums of a map tile by tile, in one pass: enough for the best plane of any area made of tiles."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

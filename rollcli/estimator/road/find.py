@@ -7,8 +7,6 @@ ahead, a few camera heights wide. All three are measured in units of the hypothe
 the focal length nor the scale of the disparities.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
@@ -17,18 +15,10 @@ from numpy.typing import NDArray
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.road.hypotheses import draw_planes
-from rollcli.estimator.road.scoring import CORRIDOR, Judge, first_costs, slope_weights
+from rollcli.estimator.road.model import RoadModel
+from rollcli.estimator.road.scoring import PlaneScorer, first_costs, slope_weights
 from rollcli.estimator.road.subsample import Sample, Singles
-
-_FIRST_PIXELS = 320  # all hypotheses are judged on these,
-_OF_EACH_ROLL = 4
-_SECOND = 12  # this many on the next,
-_SECOND_PIXELS = 640
-_REFINED = 4  # and these are fitted and judged on
-_THIRD_PIXELS = 2000
-_INCOHERENT = 0.3  # a pixel with less coherence is noise,
-_AT_LEAST = 0.3  # where the road's disparity is at least this, in typical ones: farther away edges are close
-RIVAL_ANGLE = math.radians(2)
+from rollcli.estimator.road.tuning import SearchTuning
 
 
 @dataclass(frozen=True)
@@ -44,7 +34,7 @@ class Road:
         in its corridor and of that in the core of it, of which a wide verge has nothing. Less for a plane
         that looks like a wall, since its horizon is far outside of the image.
     rival : float
-        The best score of another plane: one whose roll differs by more than 2 degrees.
+        The best score of another plane, one whose roll differs by `SearchTuning.rival_angle` or more.
     noise : float
         The share of its corridor that is noise: pixels that differ from those around them.
     """
@@ -55,9 +45,10 @@ class Road:
     noise: float
 
     @property
-    def theta(self) -> float:
-        """The plane's roll, radians."""
-        return math.atan2(-self.plane[1], self.plane[2])
+    def model(self) -> RoadModel:
+        """The plane as a road without curvature."""
+        c0, c1, c2 = self.plane
+        return RoadModel.of_plane(c0, c1, c2)
 
 
 def find_road(sample: Sample, max_roll: float, seed: int) -> Road:
@@ -83,19 +74,20 @@ def find_road(sample: Sample, max_roll: float, seed: int) -> Road:
     planes = draw_planes(sample, max_roll, seed)
     if len(planes) == 0:
         raise EstimationError("no road: nowhere does the disparity grow downward, as it does on a road")
-    planes = planes[_varied(first_costs(sample, planes, _FIRST_PIXELS), _rolls(planes))]
-    second = Judge.of(sample, _SECOND_PIXELS)
+    tuning = sample.tuning.search
+    planes = planes[_varied(first_costs(sample, planes, tuning.first_pixels), _rolls(planes), tuning)]
+    second = PlaneScorer.of(sample, tuning.second_pixels)
     scores = second.scores(planes)
-    third = Judge.of(sample, _THIRD_PIXELS)
-    fitted = third.fitted(planes[_shortlist(planes, scores)])
+    third = PlaneScorer.of(sample, tuning.third_pixels)
+    fitted = third.fitted(planes[_shortlist(planes, scores, tuning)])
     kept = np.abs(fitted[:, 1]) <= math.tan(max_roll) * fitted[:, 2]
     fitted = fitted[kept] if kept.any() else planes[_best(-scores, 1)]
     final = third.scores(fitted)
     winner = int(np.argmax(final))
     rolls = _rolls(fitted)
-    far = np.abs(rolls - rolls[winner]) > RIVAL_ANGLE
+    far = np.abs(rolls - rolls[winner]) > tuning.rival_angle
     # a plane that was not fitted may be the same road, badly drawn
-    others = np.abs(_rolls(planes) - rolls[winner]) > 2 * RIVAL_ANGLE
+    others = np.abs(_rolls(planes) - rolls[winner]) > 2 * tuning.rival_angle
     rival = max(final[far].max(initial=-1), scores[others].max(initial=-1))
     plane = fitted[winner].astype(np.float64)
     return Road(plane, float(final[winner]), float(rival), _noise_share(sample, plane))
@@ -104,40 +96,41 @@ def find_road(sample: Sample, max_roll: float, seed: int) -> Road:
 def road_weights(sample: Sample, plane: NDArray[np.float64], near: NDArray[np.intp]) -> Singles:
     """Return 0.2 to 1 for each of some pixels: how well the map's slopes around it agree with the plane's."""
     one = plane[None].astype(np.float32)
-    weights: Singles = slope_weights(sample.slopes[:, near], sample.slope_noise, one)[0]
+    weights: Singles = slope_weights(sample.slopes[:, near], sample.slope_noise, one, sample.tuning.score)[0]
     return weights
 
 
 def _noise_share(sample: Sample, plane: NDArray[np.float64]) -> float:
     """Return the share of the plane's corridor in which neighbouring pixels disagree."""
-    few = slice(None, None, max(1, len(sample.d) // _THIRD_PIXELS))
+    tuning = sample.tuning.search
+    few = slice(None, None, max(1, len(sample.d) // tuning.third_pixels))
     c0, c1, c2 = plane
     x, y = sample.x[few], sample.y[few]
     road = c0 + c1 * x + c2 * y
-    seen = road > _AT_LEAST * sample.typical
+    seen = road > tuning.noise_from * sample.typical
     side = (x * c2 - y * c1)[seen] / road[seen]  # by the road's disparity, for that of noise says nothing
-    weight = np.exp(-np.square(side / CORRIDOR))
-    noisy = weight @ (sample.coherence[few][seen] < _INCOHERENT)
+    weight = np.exp(-np.square(side / sample.tuning.score.corridor))
+    noisy = weight @ (sample.coherence[few][seen] < tuning.incoherent)
     return float(noisy / weight.sum()) if weight.sum() > 0 else 1.0
 
 
-def _varied(costs: Singles, rolls: Singles) -> NDArray[np.intp]:
+def _varied(costs: Singles, rolls: Singles, tuning: SearchTuning) -> NDArray[np.intp]:
     """Return the cheapest planes, few of each roll: a wide verge must not crowd out the road."""
     order = _best(costs, len(costs))
-    bins = np.floor(rolls[order] / RIVAL_ANGLE).astype(np.int64)
+    bins = np.floor(rolls[order] / tuning.rival_angle).astype(np.int64)
     by_bin = np.argsort(bins, kind="stable")
     starts = np.searchsorted(bins[by_bin], bins[by_bin])
     rank = np.empty_like(by_bin)
     rank[by_bin] = np.arange(len(order)) - starts
-    return order[rank < _OF_EACH_ROLL][:_SECOND]
+    return order[rank < tuning.of_each_roll][: tuning.second_planes]
 
 
-def _shortlist(planes: Singles, scores: Singles) -> NDArray[np.intp]:
+def _shortlist(planes: Singles, scores: Singles, tuning: SearchTuning) -> NDArray[np.intp]:
     """Return the best few, one of them a rival of the best: it may win once fitted."""
     order = _best(-scores, len(scores))
     rolls = _rolls(planes)
-    rivals = order[np.abs(rolls[order] - rolls[order[0]]) > RIVAL_ANGLE]
-    return np.concatenate([order[: _REFINED - 1], rivals[:1]])
+    rivals = order[np.abs(rolls[order] - rolls[order[0]]) > tuning.rival_angle]
+    return np.concatenate([order[: tuning.refined - 1], rivals[:1]])
 
 
 def _rolls(planes: Singles) -> Singles:

@@ -1,7 +1,5 @@
 """A few thousand pixels of a map, and what the map says about each from its neighbours."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any
@@ -11,14 +9,10 @@ from numpy.typing import NDArray
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.moments import Grid
+from rollcli.estimator.road.tuning import ROAD_TUNING, RoadTuning, SampleTuning
 
 Singles = NDArray[np.float32]
 
-_PIXELS = 16000  # aimed at
-_NOISE_SHARE = 0.012  # of the median disparity: what matching gets wrong on real roads, whatever the scale
-UNEVEN_SHARE = 0.02  # of a pixel's own disparity: 2 % of the camera's height, 3 cm on a car
-_QUANTUM_SHARE = 0.29  # of the smallest step: rounding is off by 0.29 steps, root mean square
-_COHERENT_SHARE = 0.03
 _SMALLEST, _LARGEST = 1e-12, 1e12  # typical disparities whose squares single precision can add up
 NO_SLOPE = np.float32(np.inf)  # agrees with no road
 
@@ -52,6 +46,8 @@ class Sample:
         Column of each pixel among the sampled ones.
     pitch : float
         From one of these to the next, units of x.
+    tuning : RoadTuning
+        The numbers by which the map was sampled, and by which its road is to be found.
     """
 
     grid: Grid
@@ -66,13 +62,16 @@ class Sample:
     slope_noise: float
     column: NDArray[np.uint16]
     pitch: float
+    tuning: RoadTuning
 
     def about(self, pixels: int) -> slice:
         """Return what takes about so many of the pixels, evenly."""
         return slice(None, None, max(1, round(len(self.d) / pixels)))
 
 
-def take_sample(disparity: NDArray[Any], usable: NDArray[np.bool_] | None = None) -> Sample:
+def take_sample(
+    disparity: NDArray[Any], usable: NDArray[np.bool_] | None = None, tuning: RoadTuning = ROAD_TUNING
+) -> Sample:
     """Sample a map.
 
     Parameters
@@ -81,6 +80,7 @@ def take_sample(disparity: NDArray[Any], usable: NDArray[np.bool_] | None = None
         Finite or NaN; <= 0 and NaN are no data.
     usable : ndarray of bool, shape (H, W), optional
         Pixels that may be taken; neighbours outside still count as neighbours.
+    tuning : RoadTuning
 
     Returns
     -------
@@ -93,15 +93,17 @@ def take_sample(disparity: NDArray[Any], usable: NDArray[np.bool_] | None = None
     """
     height, width = disparity.shape
     grid = Grid.of_shape(height, width)
-    reach = reach_of(height, width)
-    step = max(1, int(math.sqrt(height * width / _PIXELS)))
+    numbers = tuning.sample
+    reach = reach_of(height, width, numbers)
+    step = max(1, int(math.sqrt(height * width / numbers.pixels)))
     taken = _taken(disparity, usable, reach, step)
     count = int(np.count_nonzero(taken))
-    if count < 0.45 * _PIXELS and step > 1:
-        step = max(1, int(step * math.sqrt(max(count, 50) / (0.6 * _PIXELS))))
+    if count < numbers.sparse_share * numbers.pixels and step > 1:
+        aimed = numbers.finer_share * numbers.pixels
+        step = max(1, int(step * math.sqrt(max(count, numbers.least_pixels) / aimed)))
         taken = _taken(disparity, usable, reach, step)
     chosen = np.flatnonzero(taken)
-    if len(chosen) < 50:
+    if len(chosen) < numbers.least_pixels:
         raise EstimationError(
             f"only {len(chosen)} valid pixels away from the border: too few to find a road in"
         )
@@ -120,14 +122,14 @@ def take_sample(disparity: NDArray[Any], usable: NDArray[np.bool_] | None = None
     steps = _steps(d, at(0, -reach), at(0, reach), at(-reach, 0), at(reach, 0))
     jumps = np.abs(steps)
     known = jumps < NO_SLOPE
-    quantum = _quantum(jumps)
-    noise, tolerance = _tolerance(d, typical, quantum)
-    near = jumps <= np.maximum(tolerance, np.float32(_COHERENT_SHARE * typical))
+    quantum = _quantum(jumps, numbers)
+    noise, tolerance = _tolerance(d, typical, quantum, numbers)
+    near = jumps <= np.maximum(tolerance, np.float32(numbers.coherent_share * typical))
     coherence = near.sum(0, dtype=np.float32)
     coherence /= np.maximum(known.sum(0, dtype=np.float32), 1)
-    coherent = d[coherence >= 0.5]
+    coherent = d[coherence >= numbers.coherent_from]
     if len(coherent):  # anew, for noise spread over all disparities has another median than what is seen
-        noise, tolerance = _tolerance(d, typical := _median(coherent), quantum)
+        noise, tolerance = _tolerance(d, typical := _median(coherent), quantum, numbers)
     per_unit = grid.scale / reach
     slopes = steps * np.array([-per_unit, per_unit, -per_unit, per_unit], np.float32)[:, None]
     xs = (np.arange(first, width, step) - grid.centre_u) / grid.scale
@@ -145,6 +147,7 @@ def take_sample(disparity: NDArray[Any], usable: NDArray[np.bool_] | None = None
         slope_noise=noise * per_unit,
         column=columns.astype(np.uint16),
         pitch=step / grid.scale,
+        tuning=tuning,
     )
 
 
@@ -155,9 +158,10 @@ def rising(slopes: Singles) -> NDArray[np.bool_]:
     return grows
 
 
-def reach_of(height: int, width: int) -> int:
+def reach_of(height: int, width: int, numbers: SampleTuning) -> int:
     """Return how far away a pixel's neighbours are looked for, px."""
-    return min(16, max(3, round(max(height, width) / 310)), max(1, min(height, width) // 8))
+    wanted = max(numbers.neighbour_least, round(max(height, width) / numbers.neighbour_part))
+    return min(numbers.neighbour_most, wanted, max(1, min(height, width) // numbers.border_part))
 
 
 def _strided(array: NDArray[Any], reach: int, step: int, dv: int = 0, du: int = 0) -> NDArray[Any]:
@@ -192,16 +196,16 @@ def _median(values: Singles) -> float:
     return float(np.partition(values, middle)[middle])
 
 
-def _tolerance(d: Singles, typical: float, quantum: float) -> tuple[float, Singles]:
+def _tolerance(d: Singles, typical: float, quantum: float, numbers: SampleTuning) -> tuple[float, Singles]:
     """Return the noise, px, and the tolerance of each pixel."""
-    noise = max(_NOISE_SHARE * typical, _QUANTUM_SHARE * quantum)
-    tolerance: Singles = np.sqrt(np.float32(noise) ** 2 + np.square(np.float32(UNEVEN_SHARE) * d))
+    noise = max(numbers.noise_share * typical, numbers.quantum_share * quantum)
+    tolerance: Singles = np.sqrt(np.float32(noise) ** 2 + np.square(np.float32(numbers.uneven_share) * d))
     return noise, tolerance
 
 
-def _quantum(jumps: Singles) -> float:
+def _quantum(jumps: Singles, numbers: SampleTuning) -> float:
     """Return the smallest step between neighbours (5th percentile): 1 in a map of whole pixels, 0 if none."""
     some: Singles = jumps[1::2, ::4].ravel()
     some = some[(some > 0) & (some < NO_SLOPE)]
-    place = len(some) // 20
+    place = len(some) // numbers.quantum_part
     return float(np.partition(some, place)[place]) if len(some) else 0.0

@@ -1,7 +1,5 @@
 """From the road's plane to its pixels: a parabola fitted ever more strictly."""
 
-from __future__ import annotations
-
 import math
 from contextlib import suppress
 from dataclasses import dataclass
@@ -13,15 +11,12 @@ from numpy.typing import NDArray
 from rollcli.errors import EstimationError
 from rollcli.estimator.energy import Energy
 from rollcli.estimator.moments import Floats, Grid
-from rollcli.estimator.road.edges import NO_EDGES, Edges, find_edges, sides
+from rollcli.estimator.road.edges import NO_EDGES, Edges, find_edges
 from rollcli.estimator.road.find import Road
-from rollcli.estimator.road.robust_fit import Fit, Near
-from rollcli.estimator.road.subsample import UNEVEN_SHARE, Sample, reach_of
-
-_ROUNDS = 5  # of the fit,
-_LANE_ROUNDS = 3  # of that of the lane ahead, which only has to show the edges,
-_EDGE_ROUNDS = 3  # of that between the edges, which starts from there
-_STEADY = 0.5  # of the road's own rise: how far that of the map may be off
+from rollcli.estimator.road.model import RoadModel
+from rollcli.estimator.road.robust_fit import Fit, NearPixels
+from rollcli.estimator.road.subsample import Sample, reach_of
+from rollcli.estimator.road.tuning import RoadTuning
 
 
 @dataclass(frozen=True)
@@ -34,10 +29,8 @@ class Surface:
         Normalised coordinates and disparity, px.
     weights : ndarray
         More than 0, at most 1.
-    theta : float
-        Roll of the fit, radians.
-    alpha : tuple of float
-        The parabola in the rolled, normalised y.
+    model : RoadModel
+        The fit, on x and y.
     grid : Grid
         Of x and y.
     noise : float
@@ -52,39 +45,39 @@ class Surface:
         The road model: parabola or line.
     edges : Edges
         Where a verge or a kerb ends it.
+    tuning : RoadTuning
+        The numbers by which it was found.
     """
 
     x: Floats
     y: Floats
     d: Floats
     weights: Floats
-    theta: float
-    alpha: tuple[float, float, float]
+    model: RoadModel
     grid: Grid
     noise: float
     limit: float
     share: float
     moved: float
     parabolic: bool
-    edges: Edges = NO_EDGES
+    edges: Edges
+    tuning: RoadTuning
 
     def covers(self, disparity: NDArray[Any]) -> NDArray[np.bool_]:
         """Return which pixels of a map (H, W) lie on the surface and rise as it does."""
         height, width = disparity.shape
         x: Floats = (np.arange(width, dtype=np.float64) - self.grid.centre_u) / self.grid.scale
         y: Floats = ((np.arange(height, dtype=np.float64) - self.grid.centre_v) / self.grid.scale)[:, None]
-        level = y * math.cos(self.theta) - x * math.sin(self.theta)
-        a0, a1, a2 = self.alpha
-        road = a0 + level * (a1 + level * a2)
-        tolerance = np.hypot(self.noise, UNEVEN_SHARE * disparity)
+        road = self.model.disparity(x, y)
+        tolerance = np.hypot(self.noise, self.tuning.sample.uneven_share * disparity)
         on_it: NDArray[np.bool_] = np.abs(road - disparity) < self.limit * tolerance
         if self.edges != NO_EDGES:
-            on_it &= self.edges.hold(sides(x, y, self.theta, self.alpha))
+            on_it &= self.edges.hold(self.model.side(x, y, road))
         # where a wall passes through the surface it is as near as the road, but it does not rise
-        reach = min(reach_of(height, width), height - 1)
+        reach = min(reach_of(height, width, self.tuning.sample), height - 1)
         off = disparity - road
         steady = np.abs(off[reach:] - off[:-reach]) < np.maximum(
-            tolerance[reach:], _STEADY * np.abs(road[reach:] - road[:-reach])
+            tolerance[reach:], self.tuning.surface.steady * np.abs(road[reach:] - road[:-reach])
         )
         rises = np.zeros_like(on_it)
         rises[reach:] |= steady
@@ -114,20 +107,22 @@ def fit_surface(sample: Sample, road: Road, *, parabolic: bool) -> Surface:
     EstimationError
         When hardly any pixel lies on the road.
     """
-    near = Near.of(sample, road)
-    plane = Fit.of(road)
-    lane = near.fit(plane, _LANE_ROUNDS, parabolic=parabolic, ahead=True)
-    edges = find_edges(near.x, near.y, near.d, near.place > 0.1, lane.theta, lane.alpha)
+    near, tuning = NearPixels.of(sample, road), sample.tuning
+    lane = near.fit(road.model, tuning.fit.lane_rounds, parabolic=parabolic, ahead=True).model
+    looked_at = near.place > tuning.edges.least_place
+    edges = find_edges(near.x, near.y, near.d, looked_at, lane, tuning.edges)
     if edges != NO_EDGES:
         inside = near.within(edges, lane)
         with suppress(EstimationError):  # hardly a pixel between them: then they are not the road's
-            fit = inside.fit(lane, _EDGE_ROUNDS, parabolic=parabolic, ahead=True)
+            fit = inside.fit(lane, tuning.fit.edge_rounds, parabolic=parabolic, ahead=True)
             return _surface(inside, fit, edges, sample, road, parabolic=parabolic)
-    fit = near.fit(plane, _ROUNDS, parabolic=parabolic)
+    fit = near.fit(road.model, tuning.fit.rounds, parabolic=parabolic)
     return _surface(near, fit, NO_EDGES, sample, road, parabolic=parabolic)
 
 
-def _surface(near: Near, fit: Fit, edges: Edges, sample: Sample, road: Road, *, parabolic: bool) -> Surface:
+def _surface(
+    near: NearPixels, fit: Fit, edges: Edges, sample: Sample, road: Road, *, parabolic: bool
+) -> Surface:
     """Return the pixels that a fit leaves, and the fit."""
     weights = near.weights(fit)
     used = weights > 0
@@ -136,15 +131,15 @@ def _surface(near: Near, fit: Fit, edges: Edges, sample: Sample, road: Road, *, 
         y=near.y[used].astype(np.float64),
         d=near.d[used].astype(np.float64),
         weights=weights[used].astype(np.float64),
-        theta=fit.theta,
-        alpha=fit.alpha,
+        model=fit.model,
         grid=sample.grid,
         noise=sample.noise,
         limit=fit.limit,
         share=min(1.0, float(np.count_nonzero(used)) * near.stride / len(sample.d)),
-        moved=abs(fit.theta - road.theta),
+        moved=abs(fit.model.theta - road.model.theta),
         parabolic=parabolic,
         edges=edges,
+        tuning=sample.tuning,
     )
 
 
@@ -152,21 +147,21 @@ def whole_surface(sample: Sample, energy: Energy) -> Surface:
     """Return the surface that every sampled pixel is taken to lie on."""
     x, y, d = (values.astype(np.float64) for values in (sample.x, sample.y, sample.d))
     _, c1, c2 = energy.plane
-    theta = math.atan2(-c1, c2)
-    level = y * math.cos(theta) - x * math.sin(theta)
-    powers = np.vander(level, 3 if energy.parabolic else 2, increasing=True)
+    plane = RoadModel.of_plane(0.0, c1, c2)
+    powers = np.vander(plane.along(x, y), 3 if energy.parabolic else 2, increasing=True)
     a0, a1, *a2 = np.linalg.lstsq(powers.T @ powers, powers.T @ d, rcond=None)[0].tolist()
     return Surface(
         x=x,
         y=y,
         d=d,
         weights=np.ones(len(d)),
-        theta=theta,
-        alpha=(a0, a1, a2[0] if a2 else 0.0),
+        model=plane._replace(alpha=(a0, a1, a2[0] if a2 else 0.0)),
         grid=sample.grid,
         noise=sample.noise,
         limit=math.inf,
         share=1.0,
         moved=0.0,
         parabolic=energy.parabolic,
+        edges=NO_EDGES,
+        tuning=sample.tuning,
     )

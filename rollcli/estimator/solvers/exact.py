@@ -7,16 +7,15 @@ Fourier coefficients follow from samples of E' D^2 without error; the roots of t
 z = exp(2 i theta) near the unit circle are all the angles at which E_min can have a minimum.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from rollcli.estimator.energy import Energy
+from rollcli.estimator.methods import DEFAULT_SOLVER, SolverSettings
 from rollcli.estimator.moments import Floats
-from rollcli.estimator.solvers.solution import Solution, apart, principal
+from rollcli.estimator.solvers.solution import Solution, angle_between, principal
 
 _DEGREE = 5
 _SAMPLES = 16  # more than 2 * _DEGREE + 1
@@ -32,8 +31,11 @@ class Minimum:
     energy: float
 
 
-def exact(energy: Energy) -> Solution:
-    """Return the global minimum; of equal ones, the angle nearest to 0."""
+def exact(energy: Energy, settings: SolverSettings = DEFAULT_SOLVER) -> Solution:
+    """Return the global minimum; of equal ones, the angle nearest to 0.
+
+    It is polished to machine precision, whatever the tolerance in the settings.
+    """
     return Solution(minima(energy)[0].theta, 0)
 
 
@@ -107,13 +109,13 @@ def _settled(energy: Energy, starts: list[float]) -> list[Minimum]:
     found: list[Minimum] = []
     for start in starts:
         minimum, step = _polished(energy, start)
-        if step < 1e-6 and all(apart(minimum.theta, other.theta) > 1e-7 for other in found):
+        if step < 1e-6 and all(angle_between(minimum.theta, other.theta) > 1e-7 for other in found):
             found.append(minimum)
     return found
 
 
 def _polished(energy: Energy, theta: float) -> tuple[Minimum, float]:
-    """Newton's method on the gradient, as long as the energy does not rise; then abs(the next step)."""
+    """Take Newton steps on the gradient while the energy does not rise; return abs(the next step) too."""
     noise = 1e-14 * (energy.rest + energy.slope_energy)
     now, step = energy.at(theta), math.inf
     for _ in range(_POLISH):

@@ -4,27 +4,25 @@
 Lett. 140 (2018).
 """
 
-from __future__ import annotations
-
 import math
+from collections.abc import Callable
 
 from rollcli.estimator.energy import Energy
-from rollcli.estimator.solvers.gradient_descent import TOLERANCE
+from rollcli.estimator.methods import DEFAULT_SOLVER, SolverSettings
 from rollcli.estimator.solvers.solution import Solution, principal
 
 _RATIO = (math.sqrt(5) - 1) / 2
 _FINEST = 1e-15  # radians; a narrower bracket holds no two different numbers
 
 
-def golden_section(energy: Energy, tolerance: float = TOLERANCE) -> Solution:
-    """Shrink a bracket of one whole period until it is narrower than `tolerance`.
+def golden_section(energy: Energy, settings: SolverSettings = DEFAULT_SOLVER) -> Solution:
+    """Shrink a bracket of one whole period until it is narrower than the tolerance.
 
     Parameters
     ----------
     energy : Energy
         E_min as a function of theta; has period pi.
-    tolerance : float
-        delta_theta of the paper: the width of the final bracket, radians; more than 0.
+    settings : SolverSettings
 
     Returns
     -------
@@ -36,9 +34,14 @@ def golden_section(energy: Energy, tolerance: float = TOLERANCE) -> Solution:
     -----
     Assumes one minimum in the bracket. Whole frames can have two: `exact` tells which is lower.
     """
+    return shrink_bracket(lambda theta: energy.at(theta).value, settings.tolerance)
+
+
+def shrink_bracket(energy_at: Callable[[float], float], tolerance: float) -> Solution:
+    """Search one period of a function of theta, radians, evaluating it once an iteration."""
     low, width = -math.pi / 2, math.pi
     left, right = low + (1 - _RATIO) * width, low + _RATIO * width
-    at_left, at_right = energy.at(left).value, energy.at(right).value
+    at_left, at_right = energy_at(left), energy_at(right)
     iterations = 0
     while width >= max(tolerance, _FINEST):
         iterations += 1
@@ -46,10 +49,10 @@ def golden_section(energy: Energy, tolerance: float = TOLERANCE) -> Solution:
         if at_left <= at_right:
             right, at_right = left, at_left
             left = low + (1 - _RATIO) * width
-            at_left = energy.at(left).value
+            at_left = energy_at(left)
         else:
             low = left
             left, at_left = right, at_right
             right = low + _RATIO * width
-            at_right = energy.at(right).value
+            at_right = energy_at(right)
     return Solution(principal(low + width / 2), iterations)

@@ -1,33 +1,25 @@
 """Gradient descent with the paper's adaptive learning rate [GD eq. 11, 14], guarded."""
 
-from __future__ import annotations
-
 import math
-from typing import Literal
 
 from rollcli.estimator.energy import Energy
-from rollcli.estimator.solvers.solution import Outcome, Solution, principal
+from rollcli.estimator.methods import DEFAULT_SOLVER, LAMBDA0, SolverSettings
+from rollcli.estimator.solvers.solution import Solution, SolverStatus, principal
 
-LAMBDA0 = 26.0
-TOLERANCE = math.radians(1e-4)
 _MAX_ITERATIONS = 100
 _MAX_STEP = math.radians(20)
 
 
-def gradient_descent(
-    energy: Energy, tolerance: float = TOLERANCE, lambda0: float | Literal["auto"] = LAMBDA0
-) -> Solution:
-    """Descend from theta = 0 until a step is shorter than `tolerance`.
+def gradient_descent(energy: Energy, settings: SolverSettings = DEFAULT_SOLVER) -> Solution:
+    """Descend from theta = 0 until a step is shorter than the tolerance.
 
     Parameters
     ----------
     energy : Energy
         E_min as a function of theta.
-    tolerance : float
-        delta_theta of the paper, radians; more than 0.
-    lambda0 : float or "auto"
-        The first learning rate, rad^2 per unit of the normalised energy; "auto" is 1 / curvature at the
-        start (Newton's step) where the energy curves upward there, else 26.
+    settings : SolverSettings
+        A first learning rate "auto" is 1 / curvature at the start (Newton's step) where the energy curves
+        upward there, else the default.
 
     Returns
     -------
@@ -40,11 +32,9 @@ def gradient_descent(
     energy curves downward. So E must fall (else the step is halved), lambda stays positive (else it is
     doubled), and a step is at most 20 degrees.
     """
-    unit = energy.normaliser
+    unit, tolerance = energy.normaliser, settings.tolerance
     theta, now = 0.0, energy.at(0.0)
-    rate = float(lambda0) if lambda0 != "auto" else LAMBDA0
-    if lambda0 == "auto" and now.curvature > 0:
-        rate = 1 / (unit * now.curvature)
+    rate = _first_rate(settings, unit * now.curvature)
     noise = 1e-14 * (energy.rest + energy.slope_energy)
     for iteration in range(1, _MAX_ITERATIONS + 1):
         step = -rate * unit * now.gradient
@@ -54,7 +44,7 @@ def gradient_descent(
         then = energy.at(theta + step)
         if then.value > now.value + noise:
             if abs(step) < tolerance * 1e-3:
-                return Solution(principal(theta), iteration, Outcome.STUCK)
+                return Solution(principal(theta), iteration, SolverStatus.STUCK)
             rate /= 2
             continue
         change = unit * (now.gradient - then.gradient)
@@ -65,4 +55,11 @@ def gradient_descent(
             secant = rate * unit * now.gradient / change
             rate = secant if secant > 0 else 2 * rate
         now = then
-    return Solution(principal(theta), _MAX_ITERATIONS, Outcome.STEP_LIMIT)
+    return Solution(principal(theta), _MAX_ITERATIONS, SolverStatus.STEP_LIMIT)
+
+
+def _first_rate(settings: SolverSettings, curvature: float) -> float:
+    """Return lambda(0), given the curvature of the normalised energy at the start."""
+    if settings.lambda0 != "auto":
+        return float(settings.lambda0)
+    return 1 / curvature if curvature > 0 else LAMBDA0

@@ -1,13 +1,15 @@
-"""What every solver returns."""
-
-from __future__ import annotations
+"""What every solver is given and returns."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
+from rollcli.estimator.energy import Energy
+from rollcli.estimator.methods import SolverSettings
 
-class Outcome(Enum):
+
+class SolverStatus(Enum):
     """How a solver ended; the value is what a user reads."""
 
     CONVERGED = "converged"
@@ -18,7 +20,7 @@ class Outcome(Enum):
     @property
     def converged(self) -> bool:
         """Whether the angle is a solution."""
-        return self is Outcome.CONVERGED
+        return self is SolverStatus.CONVERGED
 
 
 @dataclass(frozen=True)
@@ -31,12 +33,15 @@ class Solution:
         Radians, in (-pi/2, pi/2].
     iterations : int
         As the method's paper counts them; 0 for closed forms.
-    outcome : Outcome
+    status : SolverStatus
     """
 
     theta: float
     iterations: int
-    outcome: Outcome = Outcome.CONVERGED
+    status: SolverStatus = SolverStatus.CONVERGED
+
+
+Solver = Callable[[Energy, SolverSettings], Solution]
 
 
 def principal(theta: float) -> float:
@@ -45,6 +50,6 @@ def principal(theta: float) -> float:
     return wrapped if wrapped > -math.pi / 2 + 1e-12 else math.pi / 2
 
 
-def apart(theta: float, other: float) -> float:
+def angle_between(theta: float, other: float) -> float:
     """Return the angle between two rolls, at most pi / 2."""
     return abs(math.remainder(theta - other, math.pi))

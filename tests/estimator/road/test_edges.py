@@ -4,8 +4,11 @@ import numpy as np
 import pytest
 
 from rollcli.estimator.road.edges import NO_EDGES, find_edges
+from rollcli.estimator.road.model import RoadModel
+from rollcli.estimator.road.tuning import EdgeTuning
 
 SLOPE = 200.0  # px of disparity per unit of y
+ROAD = RoadModel(0.0, (0.0, SLOPE, 0.0))
 
 
 def edges(height_at, half_width=1.0, nearest=0.08):
@@ -17,7 +20,7 @@ def edges(height_at, half_width=1.0, nearest=0.08):
     beyond = np.abs(side) - half_width
     d = road * (1 + np.where(beyond < 0, 0, height_at(beyond))) + rng.normal(0, 0.1, x.shape)
     near = np.abs(d / road - 1) < nearest
-    return find_edges(x[near], y[near], d[near], np.ones(near.sum(), bool), 0.0, (0.0, SLOPE, 0.0))
+    return find_edges(x[near], y[near], d[near], np.ones(near.sum(), bool), ROAD, EdgeTuning())
 
 
 @pytest.mark.parametrize("slope", [-0.2, -0.1, -0.05, 0.05, 0.1, 0.2])
@@ -37,7 +40,7 @@ def test_each_side_has_an_edge_of_its_own():
     d = road * (1 + np.maximum(0, 0.08 * (side - 1.2)))
     near = np.abs(d / road - 1) < 0.08
 
-    found = find_edges(x[near], y[near], d[near], np.ones(near.sum(), bool), 0.0, (0.0, SLOPE, 0.0))
+    found = find_edges(x[near], y[near], d[near], np.ones(near.sum(), bool), ROAD, EdgeTuning())
 
     assert found.left == np.inf
     assert found.right == pytest.approx(1.2, abs=0.3)
@@ -72,7 +75,7 @@ def test_a_road_that_is_lost_from_view_has_no_edge():
     x, y = rng.uniform(-0.15, 0.15, 20000), rng.uniform(0.05, 0.4, 20000)
     d = SLOPE * y + rng.normal(0, 0.1, x.shape)
 
-    assert find_edges(x, y, d, np.ones(len(x), bool), 0.0, (0.0, SLOPE, 0.0)) == NO_EDGES
+    assert find_edges(x, y, d, np.ones(len(x), bool), ROAD, EdgeTuning()) == NO_EDGES
 
 
 def test_a_kerb_and_a_steep_verge_behind_it_is_an_edge():
@@ -85,7 +88,7 @@ def test_a_kerb_and_a_steep_verge_behind_it_is_an_edge():
 def test_no_pixel_has_no_edge():
     none = np.empty(0)
 
-    assert find_edges(none, none, none, none > 0, 0.0, (0.0, SLOPE, 0.0)) == NO_EDGES
+    assert find_edges(none, none, none, none > 0, ROAD, EdgeTuning()) == NO_EDGES
 
 
 def test_a_road_as_wide_as_the_picture_has_no_edge():

@@ -160,7 +160,7 @@ def test_the_mask_shows_the_road_and_little_else():
     spec = FrameSpec(scene="street", roll=0.08, pitch=0.06, seed=8)
     disparity, road = true_disparity(spec)
 
-    found = estimate_roll(disparity).road_mask(disparity)
+    found = estimate_roll(disparity, road_mask=True).road_mask
 
     assert (found & road).sum() > 0.85 * road.sum()
     assert (found & ~road).sum() < 0.1 * road.sum()
@@ -169,10 +169,10 @@ def test_the_mask_shows_the_road_and_little_else():
 def test_only_pixels_of_the_mask_are_used():
     disparity, road = true_disparity(FrameSpec(scene="verge", roll=0.1, pitch=0.05, seed=8))
 
-    estimate = estimate_roll(disparity, mask=road)
+    estimate = estimate_roll(disparity, mask=road, road_mask=True)
 
     assert math.degrees(estimate.theta) == pytest.approx(math.degrees(0.1), abs=0.02)
-    assert not (estimate.road_mask(disparity) & ~road).any()
+    assert not (estimate.road_mask & ~road).any()
 
 
 @pytest.mark.parametrize("max_roll_deg", [0, -5, 89.5, float("nan")])
@@ -242,11 +242,11 @@ def test_what_is_too_large_is_no_data(matched, sentinel):
     _, _, disparity = matched[0]
     marked = np.where(disparity > 0, disparity, np.float32(sentinel))
 
-    estimate = estimate_roll(marked)
+    estimate, unmarked = (estimate_roll(each, road_mask=True) for each in (marked, disparity))
 
-    assert estimate.theta == estimate_roll(disparity).theta
+    assert estimate.theta == unmarked.theta
     assert estimate.valid_fraction == pytest.approx(np.mean(disparity > 0))
-    np.testing.assert_array_equal(estimate.road_mask(marked), estimate.road_mask(disparity))
+    np.testing.assert_array_equal(estimate.road_mask, unmarked.road_mask)
 
 
 @pytest.mark.parametrize("factor", [1e-20, 1e13])

@@ -30,7 +30,7 @@ def test_pixels_beyond_an_edge_are_no_road(found, monkeypatch):
     half = fitted(found, monkeypatch, Edges(math.inf, 0.5))
 
     assert half.share < 0.9 * whole.share
-    assert math.degrees(half.theta) == pytest.approx(-3, abs=0.05)
+    assert math.degrees(half.model.theta) == pytest.approx(-3, abs=0.05)
 
 
 def test_edges_with_hardly_a_pixel_between_them_are_none(found, monkeypatch):

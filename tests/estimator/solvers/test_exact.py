@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rollcli.errors import EstimationError
+from rollcli.estimator.methods import SolverSettings
 from rollcli.estimator.solvers.exact import exact, minima
 from rollcli.estimator.solvers.golden_section import golden_section
 from rollcli.estimator.solvers.gradient_descent import gradient_descent
@@ -127,9 +128,9 @@ def test_it_is_never_above_another_solver(disparity):
 def test_it_agrees_with_gradient_descent_where_that_is_global(disparity):
     energy = energy_of(disparity)
     best, *others = minima(energy)
-    descent = gradient_descent(energy, math.radians(1e-6))
+    descent = gradient_descent(energy, SolverSettings(math.radians(1e-6)))
     nearest = min([best, *others], key=lambda m: degrees_apart(m.theta, descent.theta))
-    if descent.outcome.converged and nearest is best and energy.at(descent.theta).curvature > 0:
+    if descent.status.converged and nearest is best and energy.at(descent.theta).curvature > 0:
         assert degrees_apart(descent.theta, best.theta) < 1e-6
 
 

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rollcli.estimator.methods import SolverSettings
 from rollcli.estimator.solvers.exact import exact, minima
 from rollcli.estimator.solvers.golden_section import golden_section
 from rollcli.evaluate.textbook import Textbook
@@ -18,16 +19,17 @@ TABLE_1 = {1.8e3: 16, 1.8e4: 21, 1.8e5: 26, 1.8e6: 30}  # [GD] Table I: pi / del
 @given(random_maps())
 def test_iterations_are_those_of_the_papers_table_on_any_map(disparity):
     energy = energy_of(disparity)
-    assert [golden_section(energy, math.pi / k).iterations for k in TABLE_1] == list(TABLE_1.values())
+    counts = [golden_section(energy, SolverSettings(math.pi / k)).iterations for k in TABLE_1]
+    assert counts == list(TABLE_1.values())
 
 
 @pytest.mark.parametrize("delta_deg", [0.1, 0.01, 0.001, 0.0001])
 @pytest.mark.parametrize("roll_deg", [-44, -3, 0, 17, 45])
 def test_the_angle_is_within_half_the_tolerance(roll_deg, delta_deg):
     energy = energy_of(bent_road(roll_deg, noise=0.3))
-    found = golden_section(energy, math.radians(delta_deg))
+    found = golden_section(energy, SolverSettings(math.radians(delta_deg)))
     assert degrees_apart(found.theta, exact(energy).theta) <= delta_deg / 2
-    assert found.outcome.converged
+    assert found.status.converged
 
 
 @repeatable
@@ -41,14 +43,14 @@ def test_the_angle_stays_in_its_range(roll_deg):
 @given(random_maps())
 def test_it_ends_near_a_minimum_or_at_the_end_of_its_bracket(disparity):
     energy = energy_of(disparity)
-    theta = golden_section(energy, math.radians(0.01)).theta
+    theta = golden_section(energy, SolverSettings(math.radians(0.01))).theta
     ends = [*(m.theta for m in minima(energy)), math.pi / 2]
     assert min(degrees_apart(theta, end) for end in ends) < 0.01
 
 
 def test_a_tolerance_below_rounding_ends_too():
     energy = energy_of(bent_road(5, noise=0.1))
-    assert golden_section(energy, 1e-300).iterations < 100
+    assert golden_section(energy, SolverSettings(1e-300)).iterations < 100
 
 
 def test_it_takes_the_path_of_the_textbook_form():

@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rollcli.estimator.methods import SolverSettings
 from rollcli.estimator.solvers.exact import exact, minima
 from rollcli.estimator.solvers.gradient_descent import gradient_descent
-from rollcli.estimator.solvers.solution import Outcome
+from rollcli.estimator.solvers.solution import SolverStatus
 from rollcli.evaluate.textbook import Textbook
 from tests.estimator.synthetic_maps import bent_road, degrees_apart, energy_of, random_maps, repeatable
 
@@ -18,8 +19,8 @@ from tests.estimator.synthetic_maps import bent_road, degrees_apart, energy_of, 
 @given(st.floats(-45, 45), st.sampled_from([0.01, 0.3, 1]))
 def test_it_converges_to_the_global_minimum_on_roads(roll_deg, noise):
     energy = energy_of(bent_road(roll_deg, noise=noise))
-    found = gradient_descent(energy)
-    assert found.outcome is Outcome.CONVERGED
+    found = gradient_descent(energy, SolverSettings(math.radians(1e-6)))
+    assert found.status is SolverStatus.CONVERGED
     assert degrees_apart(found.theta, exact(energy).theta) < 1e-6
 
 
@@ -28,27 +29,29 @@ def test_it_converges_to_the_global_minimum_on_roads(roll_deg, noise):
 def test_it_never_climbs_whatever_the_first_rate(disparity, lambda0):
     energy = energy_of(disparity)
     slack = 1e-12 * (energy.rest + energy.slope_energy)
-    assert energy.at(gradient_descent(energy, lambda0=lambda0).theta).value <= energy.at(0.0).value + slack
+    found = gradient_descent(energy, SolverSettings(lambda0=lambda0))
+    assert energy.at(found.theta).value <= energy.at(0.0).value + slack
 
 
 @repeatable
 @given(random_maps())
 def test_what_has_converged_is_flat(disparity):
     energy = energy_of(disparity)
-    found = gradient_descent(energy, math.radians(1e-6))
-    if found.outcome.converged:
+    found = gradient_descent(energy, SolverSettings(math.radians(1e-6)))
+    if found.status.converged:
         steepest = np.abs(energy.at(np.linspace(0, math.pi, 181)).gradient).max()
         assert abs(energy.at(found.theta).gradient) < 1e-4 * steepest
 
 
 def test_newtons_rate_reaches_a_near_minimum_in_few_steps():
     energy = energy_of(bent_road(2, noise=0.3))
-    assert gradient_descent(energy, lambda0="auto").iterations <= 5
+    assert gradient_descent(energy, SolverSettings(lambda0="auto")).iterations <= 5
 
 
 def test_a_smaller_tolerance_takes_no_fewer_iterations():
     energy = energy_of(bent_road(6, noise=0.3))
-    counts = [gradient_descent(energy, math.pi / k).iterations for k in (1.8e3, 1.8e4, 1.8e5, 1.8e6)]
+    deltas = [math.pi / k for k in (1.8e3, 1.8e4, 1.8e5, 1.8e6)]
+    counts = [gradient_descent(energy, SolverSettings(delta)).iterations for delta in deltas]
     assert counts == sorted(counts)
 
 
@@ -62,7 +65,7 @@ def test_equal_gradients_end_it():
 @pytest.mark.parametrize("roll_deg", [-6, -2, 1, 4])
 def test_it_takes_the_path_of_the_papers_equations(roll_deg):
     disparity = bent_road(roll_deg, width=150, height=100, noise=0.5)
-    ours = gradient_descent(energy_of(disparity), 1.7e-6)
+    ours = gradient_descent(energy_of(disparity), SolverSettings(1.7e-6))
     papers = Textbook.of(disparity).gradient_descent(1.7e-6, 26.0)
     assert ours.iterations == papers.iterations
     assert degrees_apart(ours.theta, papers.theta) < 1e-6

@@ -1,15 +1,14 @@
-"""`rollcli evaluate`: accuracy against known angles, and the paper's experiments."""
+"""`rollcli evaluate paper`: the paper's experiments on your maps."""
 
 from typing import Any
 
 import click
 
-from rollcli.cli.command import Command, option, record
+from rollcli.cli.command import command, option, record
 from rollcli.cli.config import config_option
 from rollcli.cli.options import PATH, encoding_options, input_options, region_options, running_options
-from rollcli.cli.types import Choice, Number, Turns
+from rollcli.cli.types import Number, Turns
 from rollcli.evaluate.options import TIMED, TURNS_DEG, ExperimentOptions, PaperOptions
-from rollcli.frames.options import RunningOptions
 
 experiment_options = record(
     "experiments",
@@ -40,67 +39,7 @@ experiment_options = record(
 )
 
 
-@click.group(invoke_without_command=True)
-@click.pass_context
-def evaluate(ctx: click.Context) -> None:
-    """The paper's experiments on your maps; accuracy against known angles."""
-    if ctx.invoked_subcommand is None:
-        click.echo(ctx.get_help())
-
-
-@evaluate.command(
-    cls=Command,
-    short_help="Errors of a result against known angles.",
-    examples=[
-        (
-            "Angles against those of `simulate`",
-            "rollcli evaluate accuracy rig/rolls.csv --truth rig/truth.csv",
-        )
-    ],
-)
-@click.argument("result", type=PATH)
-@option(
-    "--truth",
-    type=PATH,
-    metavar="FILE",
-    required=True,
-    section="Figures",
-    help="The known angles: CSV with the columns file and roll_deg, degrees.",
-)
-@option(
-    "-o",
-    "--output",
-    type=PATH,
-    metavar="FILE",
-    default="-",
-    section="Figures",
-    help="Where the figures go (-: stdout).",
-)
-@option(
-    "--format",
-    type=Choice("table", "csv", "json"),
-    default="table",
-    section="Figures",
-    help="To read, or for programs: degrees, and shares from 0 to 1.",
-)
-@running_options
-@config_option
-@click.pass_context
-def accuracy(
-    ctx: click.Context, /, result: str, truth: str, output: str, running: RunningOptions, **options: Any
-) -> None:
-    """How far the angles of RESULT, which estimate wrote, are from known ones.
-
-    Frames are matched by the stem of their file. Those without a partner are named on stderr; exit status 3
-    when a frame of the truth has no angle.
-    """
-    from rollcli.evaluate.run_accuracy import run_accuracy
-
-    ctx.exit(run_accuracy(result, truth, options["format"], output, running))
-
-
-@evaluate.command(
-    cls=Command,
+@command(
     short_help="The paper's tables and figures on your maps.",
     examples=[("The page, and its CSVs", "rollcli evaluate paper maps/ -o paper/")],
 )

@@ -1,0 +1,91 @@
+"""Compare an interrupted run with the run that would continue it."""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from rollcli.batch.plan import Plan
+from rollcli.batch.run_record import RunRecord
+from rollcli.errors import UsageError
+from rollcli.files.results import Row, run_path
+
+
+def check_resumable(
+    rows: Sequence[Row], run: Mapping[str, Any] | None, record: RunRecord, plan: Plan
+) -> Mapping[str, Any]:
+    """Refuse to continue a result of another version, other options or other inputs.
+
+    Returns
+    -------
+    mapping
+        The record of the interrupted run.
+
+    Raises
+    ------
+    UsageError
+        Says what differs.
+    """
+    record_name = run_path(plan.output).name
+    if run is None:
+        raise not_resumable(plan.output, f"there is no {record_name}")
+    if not _is_whole(run):
+        raise not_resumable(plan.output, f"{record_name} is damaged")
+    for difference in _differences(rows, run, record.fixed, plan):
+        raise not_resumable(plan.output, difference)
+    return run
+
+
+def not_resumable(name: str, reason: str) -> UsageError:
+    """Make the error that refuses to continue a result; its one line says what to do."""
+    return UsageError(f"{name}: cannot be resumed: {reason}; --overwrite starts anew")
+
+
+def _differences(
+    rows: Sequence[Row], was: Mapping[str, Any], now: Mapping[str, Any], plan: Plan
+) -> Iterator[str]:
+    if was["rollcli"] != now["rollcli"]:
+        yield f"it was begun by rollcli {was['rollcli']}, this is {now['rollcli']}"
+    options_was, options_now = was["options"], json.loads(json.dumps(now["options"]))
+    for key in (*options_now, *(key for key in options_was if key not in options_now)):
+        if options_was.get(key) != options_now.get(key):
+            yield f"--{key} was {_shown(options_was.get(key))}, is now {_shown(options_now.get(key))}"
+    for row, frame in zip(rows, plan.frames, strict=False):
+        if (row.file, row.right_file) != (frame.file, frame.right_file):
+            yield f"the inputs differ: its row is of {row.file}, where now {frame.file} is"
+    if len(rows) > len(plan.frames):
+        yield f"it has {len(rows)} rows, and there are {len(plan.frames)} frames"
+    inputs_was, inputs_now = was["inputs"], now["inputs"]
+    if inputs_was.get("frames") != inputs_now["frames"]:
+        yield f"it was begun with {inputs_was.get('frames')} frames, now there are {inputs_now['frames']}"
+    if inputs_was.get("names") != inputs_now["names"]:
+        yield "the names of the inputs differ"
+    if inputs_was != inputs_now:
+        yield f"{_changed(plan) or 'an input'} has changed since"
+
+
+def _is_whole(run: Mapping[str, Any]) -> bool:
+    """Tell whether a record holds all that a run writes, each of its type."""
+    encodings, searched = run.get("encoding"), run.get("disparities_searched_px")
+    return (
+        isinstance(run.get("rollcli"), str)
+        and isinstance(run.get("options"), dict)
+        and isinstance(run.get("inputs"), dict)
+        and isinstance(encodings, list)
+        and all(isinstance(each, str) for each in encodings)
+        and isinstance(searched, list)
+        and all(isinstance(each, int) for each in searched)
+    )
+
+
+def _changed(plan: Plan) -> str | None:
+    """Find the first input that is newer than the record of the run, or missing."""
+    begun = run_path(plan.output).stat().st_mtime_ns
+    for path in (path for frame in plan.frames for path in frame.reads()):
+        if not Path(path).exists() or Path(path).stat().st_mtime_ns > begun:
+            return path
+    return None
+
+
+def _shown(value: Any) -> str:
+    return "not given" if value in (None, []) else str(value)

@@ -1,0 +1,1 @@
+"""The commands of `rollcli evaluate`, one file each."""

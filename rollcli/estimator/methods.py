@@ -1,0 +1,96 @@
+"""What may be asked of the estimator, by name: methods, models, roads and their defaults.
+
+Import-light: the command line reads this module and loads neither NumPy nor a solver.
+
+Add a solver: a file in `solvers` with a `Solver` of the same name, and one line in `SOLVERS`.
+Add a method that chooses pixels: a file in `areas` with an `AreaMethod`, and one line in `AREAS`.
+"""
+
+import math
+from dataclasses import dataclass
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+if TYPE_CHECKING:
+    from rollcli.estimator.areas.plane import AreaMethod
+    from rollcli.estimator.solvers.solution import Solver
+
+LAMBDA0 = 26.0  # [GD] section IV, the best of 1 to 100 on its maps
+TOLERANCE_DEG = 1e-4  # the finest of the paper's four
+MAX_ROLL_DEG = 45.0
+MAX_ROLL_LIMIT_DEG = 89.0  # a plane of 90 degrees has no finite slope across
+
+LearningRate = float | Literal["auto"]
+
+
+class Method(NamedTuple):
+    """The file that holds a method's function, and what the help says of it."""
+
+    file: str
+    summary: str
+
+
+SOLVERS = {
+    "gd": Method("gradient_descent", "gradient descent"),
+    "gss": Method("golden_section", "golden section search"),
+    "exact": Method("exact", "the global minimum, from polynomial roots"),
+}
+AREAS = {
+    "plane": Method("lower_centre", "one least-squares plane"),
+    "areas": Method("iterative", "planes of many small areas"),
+}
+METHODS = {**SOLVERS, **AREAS}
+MODELS = ("parabola", "line")
+ROADS = ("auto", "all")
+
+
+@dataclass(frozen=True)
+class SolverSettings:
+    """What a solver may be told.
+
+    Attributes
+    ----------
+    tolerance : float
+        delta_theta of the paper, radians; more than 0.
+    lambda0 : float or "auto"
+        First learning rate of gradient descent, rad^2 per unit of the normalised energy.
+    """
+
+    tolerance: float = math.radians(TOLERANCE_DEG)
+    lambda0: LearningRate = LAMBDA0
+
+
+@dataclass(frozen=True)
+class AreaSettings:
+    """What a method that chooses pixels may be told.
+
+    Attributes
+    ----------
+    max_roll : float
+        The largest abs(roll) of a plane that may be road, radians.
+    chosen : bool
+        Whether the usable pixels are the chosen area already.
+    """
+
+    max_roll: float = math.radians(MAX_ROLL_DEG)
+    chosen: bool = False
+
+
+DEFAULT_SOLVER = SolverSettings()
+DEFAULT_AREA = AreaSettings()
+
+
+def load_solver(name: str) -> "Solver":
+    """Return the function of a solver."""
+    solver: Solver = _load("solvers", SOLVERS[name])
+    return solver
+
+
+def load_area_method(name: str) -> "AreaMethod":
+    """Return the function of a method that chooses pixels."""
+    method: AreaMethod = _load("areas", AREAS[name])
+    return method
+
+
+def _load(folder: str, method: Method) -> Any:
+    return getattr(import_module(f"rollcli.estimator.{folder}.{method.file}"), method.file)

@@ -1,0 +1,83 @@
+"""The road's disparity: a parabola in the rolled coordinate along the road [GD eq. 1-5].
+
+[GD]: Fan, Wang, Liu, Pitas, "A Robust Roll Angle Estimation Algorithm Based on Gradient Descent",
+arXiv:1906.01894.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Reals = NDArray[np.floating[Any]]
+
+
+class RoadModel(NamedTuple):
+    """A road d = a0 + a1 along + a2 along^2, rolled by theta.
+
+    Every method keeps the dtype of its arrays: single precision in, single precision out.
+
+    Attributes
+    ----------
+    theta : float
+        Roll, radians.
+    alpha : tuple of float
+        (a0, a1, a2), px per unit, unit squared of the coordinates x and y.
+    """
+
+    theta: float
+    alpha: tuple[float, float, float]
+
+    @classmethod
+    def of_plane(cls, c0: float, c1: float, c2: float) -> "RoadModel":
+        """Return the road that is the plane d = c0 + c1 x + c2 y."""
+        return cls(math.atan2(-c1, c2), (float(c0), math.hypot(c1, c2), 0.0))
+
+    @property
+    def plane(self) -> tuple[float, float, float]:
+        """The road without its curvature, as the plane d = c0 + c1 x + c2 y."""
+        level, slope, _ = self.alpha
+        return level, -slope * math.sin(self.theta), slope * math.cos(self.theta)
+
+    def across(self, x: Reals, y: Reals) -> Reals:
+        """Return the coordinate across the road, x cos(theta) + y sin(theta)."""
+        return x * math.cos(self.theta) + y * math.sin(self.theta)
+
+    def along(self, x: Reals, y: Reals) -> Reals:
+        """Return the coordinate along the road, y cos(theta) - x sin(theta)."""
+        return y * math.cos(self.theta) - x * math.sin(self.theta)
+
+    def disparity(self, x: Reals, y: Reals) -> Reals:
+        """Return the road's disparity, px."""
+        return self.disparity_along(self.along(x, y))
+
+    def disparity_along(self, along: Reals) -> Reals:
+        """Return the road's disparity, px, where the coordinate along it is known."""
+        a0, a1, a2 = self.alpha
+        return a0 + along * (a1 + along * a2)
+
+    def turning(self, across: Reals, along: Reals) -> Reals:
+        """Return the derivative of the road's disparity with respect to theta, px/rad [GD eq. 13]."""
+        _, a1, a2 = self.alpha
+        return across * (along * (-2 * a2) - a1)
+
+    def side(self, x: Reals, y: Reals, disparity: Reals) -> Reals:
+        """Return how far to the right of the middle the road's pixels lie, in camera heights.
+
+        Parameters
+        ----------
+        x, y : ndarray
+            Normalised coordinates, to be broadcast.
+        disparity : ndarray
+            Of the road there, px; above the horizon, where it is not positive, the result is infinite.
+
+        Notes
+        -----
+        A point X to the right at depth Z is seen at across = f X / Z with disparity d = f B / Z, and a flat
+        road's slope is a1 = B / H, for baseline B and camera height H. So across a1 / d = X / H, whatever the
+        focal length and the unit of the disparities.
+        """
+        with np.errstate(divide="ignore", invalid="ignore"):
+            side: Reals = self.across(x, y) * abs(self.alpha[1]) / np.maximum(disparity, 0)
+        return side

@@ -1,0 +1,219 @@
+"""Every tuned number of road finding: its unit, its reason, and what it does.
+
+One frozen record a stage, all of them in `RoadTuning`. ``tests/benchmarks/bench_ablation.py`` changes one
+number at a time; its table is in ``rollcli/estimator/README.md``. Lengths are in camera heights where it says
+so, else in units of half the map's longer side; a tolerance is `Sample.tolerance`, a pixel's own.
+"""
+
+import math
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class SampleTuning:
+    """Numbers of `take_sample`: which pixels are looked at, and how far they may be off."""
+
+    pixels: int = 16000
+    """Pixels aimed at. Fewer give a rougher road, more only take longer."""
+    sparse_share: float = 0.45
+    """Share of `pixels` below which a sparse map is sampled anew on a finer grid."""
+    finer_share: float = 0.6
+    """Share of `pixels` that the finer grid aims at."""
+    least_pixels: int = 50
+    """Pixels without which no road is looked for."""
+    noise_share: float = 0.012
+    """Share of the median disparity that matching gets wrong on real roads, whatever the scale."""
+    uneven_share: float = 0.02
+    """Share of a pixel's own disparity: 2 % of the camera's height, 3 cm on a car."""
+    quantum_share: float = 0.29
+    """Of the smallest step in the map: rounding is off by 1 / sqrt(12) steps, root mean square."""
+    quantum_part: int = 20
+    """The smallest step is the 1/20 quantile of all steps: smaller ones are rounding of floats."""
+    coherent_share: float = 0.03
+    """Share of the median disparity by which neighbours may differ and still agree."""
+    coherent_from: float = 0.5
+    """Share of agreeing neighbours from which a pixel is coherent, that is no noise."""
+    neighbour_part: int = 310
+    """Neighbours are 1/310 of the longer side away: 4 px at 1242. Nearer ones share a matcher's errors."""
+    neighbour_least: int = 3
+    """Neighbours are at least this far away, px: matchers blur over less."""
+    neighbour_most: int = 16
+    """Neighbours are at most this far away, px."""
+    border_part: int = 8
+    """Neighbours are at most 1/8 of the shorter side away: a small map needs its pixels."""
+
+
+@dataclass(frozen=True)
+class HypothesisTuning:
+    """Numbers of `draw_planes`."""
+
+    pool_pixels: int = 4000
+    """Triples are drawn of this many pixels."""
+    draws: int = 1024
+    """Triples drawn; about half are planes that could be a road."""
+    kept: int = 320
+    """Planes kept of these, the first ones. Fewer: gross misses."""
+    radius: float = 0.35
+    """Of a triple, units. Smaller: planes are noise; larger: triples leave the road."""
+    least_area: float = 0.004
+    """Twice the area of a triangle, square units: below, its plane is ill conditioned."""
+    least_rise: float = 4.0
+    """Tolerances by which a road rises within the radius: less is a wall's noise."""
+
+
+@dataclass(frozen=True)
+class ScoreTuning:
+    """Numbers of `PlaneScorer`: what makes a plane a road."""
+
+    corridor: float = 1.0
+    """Half-width of the corridor ahead, camera heights; that of its core is 1 / sqrt(8) of it."""
+    fits: int = 4
+    """Weighted fits of each plane that is short-listed."""
+    first_fit_width: float = 2.0
+    """Tolerances within which a pixel counts in the first of these fits, 1 in the others."""
+    below_penalty: float = 0.85
+    """Added cost of a coherent pixel below the plane (off it: 1); nothing lies below a road."""
+    off_slope_weight: float = 0.2
+    """Weight of a pixel around which the map does not rise as the road does."""
+    slope_share: float = 0.4
+    """Of the road's own slope: how far the map's may be off."""
+    beside_weight: float = 0.03
+    """Weight of a pixel far beside the corridor. Higher: wide verges and walls win."""
+    nearness: float = 1.5
+    """Typical disparities up to which weights grow: what is near ahead is the road driven on."""
+    horizon: float = 2.0
+    """Units from the centre: a plane whose horizon is farther away is rather a wall, or an own bonnet."""
+    least_corridor: float = 0.05
+    """Share of the pixels that the corridor should weigh: an emptier one scores less."""
+    least_core: float = 0.02
+    """The same for its core."""
+
+
+@dataclass(frozen=True)
+class SearchTuning:
+    """Numbers of `find_road`: how many planes are judged on how many pixels."""
+
+    first_pixels: int = 320
+    """Pixels on which all planes are judged cheaply."""
+    of_each_roll: int = 4
+    """Planes of one roll that go on: a wide verge must not crowd out the road."""
+    second_planes: int = 12
+    """Planes that go on to the second round."""
+    second_pixels: int = 640
+    """Pixels of the second round."""
+    refined: int = 4
+    """Planes that are fitted and judged last, one of them another roll."""
+    third_pixels: int = 2000
+    """Pixels of the last round."""
+    incoherent: float = 0.3
+    """Coherence below which a pixel is noise, for `Road.noise`."""
+    noise_from: float = 0.3
+    """Typical disparities from which a pixel counts for `Road.noise`: farther away, edges are dense."""
+    rival_angle: float = math.radians(2)
+    """Radians by which another plane's roll differs, to be a rival."""
+
+
+@dataclass(frozen=True)
+class FitTuning:
+    """Numbers of `NearPixels`: the robust fit of parabola and roll."""
+
+    pixels: int = 2500
+    """Pixels fitted; more of them would repeat each other."""
+    least_pixels: int = 30
+    """Pixels with some weight, without which there is no road."""
+    reach: float = 3.0
+    """Tolerances from the plane beyond which a pixel is not looked at again."""
+    rounds: int = 5
+    """Rounds of the fit to all pixels near the plane."""
+    lane_rounds: int = 3
+    """Rounds of the fit of the lane ahead, which only has to show the edges."""
+    edge_rounds: int = 3
+    """Rounds of the fit between the edges, which starts from the lane's."""
+    most_turn: float = 0.2
+    """Radians that a round may turn the road by."""
+    start_width: float = 2.0
+    """Tolerances within which a pixel counts at first."""
+    even_width: float = 3.0
+    """Standard deviations within which a pixel of an even road counts in the end."""
+    uneven_width: float = 5.0
+    """The same for an uneven road: its rises and dips are no noise."""
+    lane_width: float = 3.5
+    """The same for an uneven lane ahead."""
+    least_width: float = 0.2
+    """Tolerances within which a pixel counts in any case."""
+    even_spread: float = 0.35
+    """Standard deviation up to which a road is even, tolerances."""
+    uneven_spread: float = 0.55
+    """Standard deviation from which a road is uneven, tolerances; between the two the widths are mixed."""
+    biweight_spread: float = 1.25
+    """Standard deviation of a normal distribution over its root mean square under biweights."""
+    lane: float = 0.8
+    """Half-width of the lane ahead, camera heights."""
+    image_edge: float = 0.7
+    """Units across at which weights end, as exp(-(x / edge)^8): the image's sides see one roll only."""
+    other_roll: float = 0.06
+    """Radians: what a rig rolled by this much more or less would not see does not count."""
+    large_roll: float = 0.2
+    """Tangent of the roll from which on less and less of the corners is left out."""
+    corner_fade: float = 0.01
+    """Units over which the weight fades out there."""
+
+
+@dataclass(frozen=True)
+class EdgeTuning:
+    """Numbers of `find_edges`: the profile across the road, in bins of height over the road."""
+
+    bin_width: float = 0.25
+    """Camera heights."""
+    bins: int = 10
+    """To each side."""
+    bin_pixels: int = 12
+    """Pixels without which a bin has no height."""
+    least_place: float = 0.1
+    """Weight by place and slope (`NearPixels.place`) from which a pixel is looked at."""
+    least_road: float = 0.1
+    """Share of a pixel's disparity that the road's must have: above the horizon there is no profile."""
+    level: float = 0.008
+    """Camera heights within which a bin belongs to the road."""
+    verge_slope: float = 0.026
+    """A verge rises or falls at least this much; less is level ground behind a kerb."""
+    kerb_ratio: float = 1.3
+    """A first bin that differs by this many times the rise of the next ones is a kerb."""
+    lost: float = 0.03
+    """Camera heights: ground as far off as this may leave the pixels near the road altogether."""
+    core_bins: int = 2
+    """Bins from the middle that are not looked at."""
+    lane_bins: int = 3
+    """Bins from the middle before which a lane has no edge."""
+    camber: float = 0.5
+    """Of the jump beside it: what slopes as much within the road is its camber."""
+    kerb_height: float = 0.04
+    """Camera heights: a step this high ends the road, whatever is behind it."""
+    gone: float = 0.06
+    """Camera heights: ground that goes on to more than this is not level behind a kerb, but lost."""
+    margin: float = 0.5
+    """Bins by which the road ends before it leaves its level."""
+
+
+@dataclass(frozen=True)
+class SurfaceTuning:
+    """Numbers of `Surface.covers`."""
+
+    steady: float = 0.5
+    """Of the road's own rise: how far that of the map may be off. Higher: feet of walls are road."""
+
+
+@dataclass(frozen=True)
+class RoadTuning:
+    """Every tuned number of road finding, by stage."""
+
+    sample: SampleTuning = field(default_factory=SampleTuning)
+    hypotheses: HypothesisTuning = field(default_factory=HypothesisTuning)
+    score: ScoreTuning = field(default_factory=ScoreTuning)
+    search: SearchTuning = field(default_factory=SearchTuning)
+    fit: FitTuning = field(default_factory=FitTuning)
+    edges: EdgeTuning = field(default_factory=EdgeTuning)
+    surface: SurfaceTuning = field(default_factory=SurfaceTuning)
+
+
+ROAD_TUNING = RoadTuning()
