@@ -1,0 +1,128 @@
+"""The arrows between packages, and the size of modules and folders."""
+
+import ast
+from collections import defaultdict
+from graphlib import CycleError, TopologicalSorter
+
+from tests.run_cli import ROOT
+
+PACKAGE = ROOT / "rollcli"
+# a package may import those of its own layer, without a circle, and those of the layers below it
+LAYERS = (
+    {"cli"},
+    {"batch", "convert", "simulate", "evaluate", "report"},
+    {"frames"},
+    {"parallel", "imaging", "files", "rig"},
+    {"estimator"},
+    {"errors", "messages"},
+)
+# modules that import something of rollcli inside a function, and why
+DOORS = {
+    "rollcli": "names load when they are first used, so that `import rollcli` costs nothing",
+    "rollcli.__main__": "a worker process imports this module anew",
+    "rollcli.batch.door": "a worker's door",
+    "rollcli.convert.derotate": "a worker's door",
+    "rollcli.convert.disparity": "a worker's door",
+    "rollcli.convert.vdisparity": "a worker's door",
+    "rollcli.evaluate.run_paper": "loads the experiments, NumPy and the charts once the request is checked",
+    "rollcli.frames.read": "loads OpenCV's matcher only for pairs",
+    "rollcli.parallel.process_setup": "a worker's door",
+    "rollcli.parallel.run_tasks": "loads the executor that is used; the cluster is an extra",
+    "rollcli.report.run": "loads NumPy and the charts once the request is checked",
+}
+DOOR_PACKAGES = {
+    "rollcli.cli": "the command line's doors: help and version load no command",
+}
+_MOST_LINES, _MOST_MODULES = 300, 16
+
+
+def modules():
+    """Every module by its dotted name."""
+    for path in sorted(PACKAGE.rglob("*.py")):
+        parts = path.relative_to(ROOT).with_suffix("").parts
+        yield ".".join(parts[:-1] if parts[-1] == "__init__" else parts), path
+
+
+MODULES = dict(modules())
+
+
+def imports(name, *, in_functions):
+    """The modules of rollcli that a module imports: when it is loaded, or inside its functions."""
+    tree = ast.parse(MODULES[name].read_text("utf-8"))
+    inside = {
+        node
+        for function in ast.walk(tree)
+        if isinstance(function, ast.FunctionDef | ast.AsyncFunctionDef)
+        for node in ast.walk(function)
+    }
+    for node in (tree, *ast.walk(tree)):
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
+            inside.update(ast.walk(node))  # not loaded either
+            typing_only = set(ast.walk(node))
+            if in_functions:
+                inside -= typing_only
+    for node in ast.walk(tree):
+        if (node in inside) is not in_functions:
+            continue
+        if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "rollcli":
+            for alias in node.names:
+                full = f"{node.module}.{alias.name}"
+                yield full if full in MODULES else node.module
+        elif isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names if alias.name.split(".")[0] == "rollcli")
+
+
+def layer(name):
+    """The position of a module's package, from the command line down; None for the package itself."""
+    parts = name.split(".")
+    if len(parts) < 2 or parts[1] == "__main__":
+        return None
+    (found,) = (index for index, packages in enumerate(LAYERS) if parts[1] in packages)
+    return found
+
+
+def test_no_module_imports_upwards():
+    upwards = [
+        f"{name} -> {each}"
+        for name in MODULES
+        for each in (*imports(name, in_functions=False), *imports(name, in_functions=True))
+        if None not in (layer(name), layer(each)) and layer(each) < layer(name)
+    ]
+    assert upwards == []
+
+
+def sorted_or_circle(graph):
+    """Nothing, or the circle that a graph holds."""
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        return error.args[1]
+    return None
+
+
+def test_no_modules_import_each_other_in_a_circle():
+    assert sorted_or_circle({name: set(imports(name, in_functions=False)) for name in MODULES}) is None
+
+
+def test_no_packages_import_each_other_in_a_circle():
+    graph = defaultdict(set)
+    for name in MODULES:
+        for each in (*imports(name, in_functions=False), *imports(name, in_functions=True)):
+            if None not in (layer(name), layer(each)) and name.split(".")[1] != each.split(".")[1]:
+                graph[name.split(".")[1]].add(each.split(".")[1])
+    assert sorted_or_circle(graph) is None
+
+
+def test_imports_inside_functions_are_at_doors_alone():
+    found = {name for name in MODULES if any(imports(name, in_functions=True))}
+    unexplained = found - DOORS.keys()
+    unexplained -= {name for name in found if ".".join(name.split(".")[:2]) in DOOR_PACKAGES}
+    assert unexplained == set()
+    assert DOORS.keys() - found - {"rollcli"} == set()
+
+
+def test_no_module_is_too_long_to_read_and_no_folder_too_full():
+    long = {name for name, path in MODULES.items() if len(path.read_text("utf-8").splitlines()) > _MOST_LINES}
+    assert long == set()
+    folders = {path.parent for path in MODULES.values()}
+    assert {each.name for each in folders if len(list(each.glob("*.py"))) > _MOST_MODULES} == set()
