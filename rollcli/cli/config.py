@@ -87,7 +87,7 @@ def _nearest(name: str, options: dict[str, click.Option]) -> str:
 
 
 def _checked(ctx: click.Context, declared: click.Option, value: Any, path: str) -> Any:
-    """The value as this option takes it, or an error that names file and key."""
+    """Convert the value as this option does; an error names the file and the key."""
     if declared.multiple and not isinstance(value, list):
         value = [value]
     if declared.is_flag and not isinstance(value, bool):

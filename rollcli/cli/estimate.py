@@ -81,7 +81,7 @@ result_options = record(
 @config_option
 @click.pass_context
 def estimate(ctx: click.Context, /, **records: Any) -> None:
-    """The roll angle of each disparity map or stereo pair, one row a frame.
+    """Estimate the roll angle of each disparity map or stereo pair, one row a frame.
 
     INPUTS are maps (PNG, TIFF, NPY, PFM), folders of them, quoted patterns, or - for paths on stdin.
 

@@ -1,4 +1,4 @@
-"""The command that continues an interrupted run, and which of --resume and --overwrite is meant."""
+"""Make the command that continues an interrupted run, and choose between --resume and --overwrite."""
 
 import shlex
 import shutil
@@ -17,7 +17,7 @@ _NEAREST_FIRST = [ParameterSource.COMMANDLINE, ParameterSource.ENVIRONMENT, Para
 
 
 def one_start(ctx: click.Context, options: EstimateOptions) -> EstimateOptions:
-    """The options with --resume or --overwrite: flags win over the environment, and that over --config."""
+    """Keep one of --resume and --overwrite: flags win over the environment, and that over --config."""
     if not (options.result.resume and options.running.overwrite):
         return options
     resume, overwrite = (_distance(ctx, name) for name in ("resume", "overwrite"))
@@ -34,7 +34,7 @@ def _distance(ctx: click.Context, name: str) -> int:
 
 
 def resume_command(ctx: click.Context) -> str:
-    """This command, to be pasted into any shell: what the environment says is spelled out."""
+    """Make a command that can be pasted into any shell: settings from the environment become options."""
     words = sys.argv[1:]
     end = words.index("--") if "--" in words else len(words)
     options = [word for word in words[:end] if word not in _STARTS]
@@ -43,7 +43,7 @@ def resume_command(ctx: click.Context) -> str:
 
 
 def _program() -> str:
-    """The name of the program, or where it is when the shell would not find it."""
+    """Name the program, or its path when the shell would not find it."""
     called = sys.argv[0]
     return called if Path(called).name == "rollcli" and not shutil.which("rollcli") else "rollcli"
 

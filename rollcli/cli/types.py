@@ -93,7 +93,7 @@ class Number(_ParamType):
         return int(number) if self.whole else number
 
     def describe(self) -> str:
-        """What would be accepted, in words."""
+        """Describe in words what is accepted."""
         words = "a whole number" if self.whole else "a number"
         bounds = [
             f"above {self.above:g}" if self.above > -math.inf else "",

@@ -1,4 +1,4 @@
-"""The versions a bug report needs, without importing what they are of."""
+"""The versions that a bug report needs, found without importing the packages."""
 
 import platform
 from collections.abc import Iterator
@@ -17,7 +17,7 @@ OPTIONAL = ("imagecodecs", "dask", "distributed", "plotly", "jinja2")
 
 
 def versions() -> Iterator[tuple[str, str]]:
-    """(name, version) of rollcli, Python and each package it uses; of extras, those that are installed."""
+    """Yield (name, version) of rollcli, Python and each package it uses; of extras, those installed."""
     yield "rollcli", __version__
     yield "Python", f"{platform.python_version()} ({platform.python_implementation()}, {platform.platform()})"
     for names in REQUIRED:
@@ -26,7 +26,7 @@ def versions() -> Iterator[tuple[str, str]]:
 
 
 def _installed(names: str | tuple[str, ...]) -> tuple[str, str] | None:
-    """The first of several packages that bring the same module."""
+    """Find the first installed one of several packages that contain the same module."""
     for name in (names,) if isinstance(names, str) else names:
         try:
             return name, version(name)

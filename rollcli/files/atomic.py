@@ -23,7 +23,7 @@ _PART = re.compile(rf"\.(.+)\.[0-9a-f]{{{2 * _RANDOM_BYTES}}}\.part", re.DOTALL)
 
 
 def output_error(path: str | Path, error: OSError) -> OutputError:
-    """One line for a write that failed, naming the target rather than the temporary file."""
+    """Make the error of a failed write: one line that names the target, not the temporary file."""
     return OutputError(f"{path}: cannot be written: {(error.strerror or str(error)).lower()}")
 
 
@@ -94,7 +94,7 @@ def remove_leftovers(paths: Iterable[str | Path]) -> None:
 
 @contextlib.contextmanager
 def _new_part(target: Path) -> Iterator[tuple[Path, BinaryIO]]:
-    """A temporary file that did not exist before, held until the block ends; permissions of any new file."""
+    """Make a temporary file that did not exist, and hold it until the block ends."""
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL  # which follows no link either
     flags |= getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
     while True:
@@ -110,13 +110,13 @@ def _new_part(target: Path) -> Iterator[tuple[Path, BinaryIO]]:
 
 
 def _marker(name: str) -> str:
-    """The part of a temporary file's name that tells its target."""
+    """Make the part of a temporary file's name that identifies its target."""
     data = os.fsencode(name)
     return name if len(data) <= _LONGEST_NAME else f"{zlib.crc32(data):08x}"
 
 
 def _parts_in(folder: str) -> dict[str, list[str]]:
-    """The temporary files in a folder, by what tells their targets."""
+    """List the temporary files in a folder, by what identifies their targets."""
     found: dict[str, list[str]] = {}
     with contextlib.suppress(OSError), os.scandir(folder or ".") as entries:
         for entry in entries:

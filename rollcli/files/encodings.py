@@ -149,7 +149,7 @@ def read_mask(path: str | Path, name: str | None = None) -> NDArray[np.bool_]:
 
 
 def resolve_encoding(encoding: str, dtype: np.dtype[Any], scale: float | None) -> Encoding:
-    """The encoding that a name stands for, "auto" included."""
+    """Find the encoding that a name stands for, "auto" included."""
     if encoding == "auto":
         return Encoding.PX if scale is not None else _AUTO.get(dtype, Encoding.PX)
     try:
@@ -182,14 +182,14 @@ def _blank(disparity: NDArray[Any], values: NDArray[Any], invalid: tuple[float, 
 
 
 def _saturated(values: NDArray[Any]) -> tuple[float, ...]:
-    """The last number of 16 bits, where a map holds it: what was too large, or unknown."""
+    """Find the largest number of 16 bits, if the map holds it: it marks what was too large or unknown."""
     if values.dtype not in (np.uint16, np.int16) or (top := values.max()) < np.iinfo(values.dtype).max:
         return ()
     return (float(top),)
 
 
 def _doubt(values: NDArray[Any], encoding: Encoding) -> str:
-    """Why the encoding that "auto" took cannot be right, or nothing."""
+    """Say why the encoding that "auto" took cannot be right; empty when it can."""
     if encoding is Encoding.KITTI and 0 < (top := int(values.max())) < _WHOLE_PIXELS_BELOW:
         return (
             f"uint16 numbers up to {top}, read as kitti (/256), are disparities up to {top / 256:.2f} px: "
@@ -201,7 +201,7 @@ def _doubt(values: NDArray[Any], encoding: Encoding) -> str:
 def _without_overflow(
     numbers: NDArray[Any], valid: NDArray[np.bool_], top: int, top_px: float
 ) -> NDArray[np.bool_]:
-    """The valid pixels that can be stored."""
+    """Drop the valid pixels that cannot be stored."""
     fits: NDArray[np.bool_] = valid & (numbers <= top)
     lost = np.count_nonzero(valid) - np.count_nonzero(fits)
     if lost > 0.01 * np.count_nonzero(valid):

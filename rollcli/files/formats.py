@@ -33,7 +33,7 @@ _TEXT = re.compile(rb"[\t\n\r\f\x20-\x7e]{8}")  # no format begins with eight pr
 
 
 def read_bytes(path: str | Path, name: str | None = None) -> bytes:
-    """The bytes of a regular file; `name` is what errors call it, by default its path.
+    """Read the bytes of a regular file; errors call it `name`, by default its path.
 
     Raises
     ------
@@ -149,7 +149,7 @@ def decode_image(data: bytes, name: str) -> NDArray[Any]:
 
 
 def decode_mask(data: bytes, name: str) -> NDArray[np.bool_]:
-    """A mask from a map, or a picture that is no JPEG: True where any colour is non-zero; shape (H, W)."""
+    """Decode a mask, from a map or a lossless picture: True where any colour is non-zero; shape (H, W)."""
     if data.startswith(png.SIGNATURE):
         pixels = png.picture(data, name, mask=True)
     elif data.startswith(pictures.LOSSLESS):
@@ -173,7 +173,7 @@ def _decoded(data: bytes, name: str) -> Stored:
 
 
 def _what(data: bytes) -> str:
-    """What a file that cannot be read seems to be."""
+    """Say what a file that cannot be read seems to be."""
     for signature, what in _KNOWN.items():
         if data.startswith(signature):
             return what

@@ -58,7 +58,7 @@ def find_inputs(
     skip: Sequence[str | Path] = (),
     endings: Sequence[str] = MAP_ENDINGS,
 ) -> list[Input]:
-    """Every file that the arguments name, sorted naturally, each once.
+    """Find every file that the arguments name, sorted naturally, each once.
 
     Parameters
     ----------
@@ -69,11 +69,11 @@ def find_inputs(
     stdin : iterable of str, optional
         The lines behind "-"; sys.stdin by default.
     recursive : bool
-        Look into the folders of folders.
+        Search folders recursively.
     include, exclude : sequence of str
         Globs on the names or relative paths of what folders and patterns hold.
     skip : sequence of path
-        Folders never looked into: where this run's own results go.
+        Folders that are never searched: this run's results go there.
     endings : sequence of str
         What counts as readable in a folder.
 
@@ -182,7 +182,7 @@ def _place(each: Input) -> Path:
 def _arguments(
     inputs: Iterable[str], files_from: str | None, stdin: Iterable[str] | None
 ) -> Iterator[tuple[str, bool]]:
-    """Each argument, and whether it is meant literally: lists are, the command line may hold patterns."""
+    """Yield each argument, and whether it is literal: lists are, the command line may hold patterns."""
     for argument in inputs:
         if argument == "-":
             yield from ((line, True) for line in _stdin_lines(stdin))
@@ -208,6 +208,6 @@ def _stdin_lines(stdin: Iterable[str] | None) -> Iterator[str]:
 
 
 def _lines(data: bytes) -> Iterator[str]:
-    """Paths one a line, or as `find -print0` writes them; bytes, for file names need not be text."""
+    """Split paths, one a line or as `find -print0` writes them; bytes, for file names need not be text."""
     lines = data.split(b"\0") if b"\0" in data else data.replace(b"\r\n", b"\n").split(b"\n")
     return (os.fsdecode(line) for line in lines if line)

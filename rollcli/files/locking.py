@@ -1,4 +1,4 @@
-"""One run at a time on one result: a lock that the system lets go when its holders end, however they end."""
+"""Lock a result for one run; the system releases the lock when its holders end, however they end."""
 
 import contextlib
 import errno
@@ -30,12 +30,12 @@ if sys.platform == "win32":
 
     @contextlib.contextmanager
     def being_written(file: BinaryIO) -> Iterator[None]:
-        """Nothing to do: Windows keeps others from removing an open file."""
+        """Do nothing: Windows keeps others from removing an open file."""
         yield
 
     @contextlib.contextmanager
     def nobody_writes(path: str) -> Iterator[bool]:
-        """Whether the path is a regular file."""
+        """Yield whether the path is a regular file."""
         yield stat.S_ISREG(os.lstat(path).st_mode)
 
 else:
@@ -53,7 +53,7 @@ else:
 
     @contextlib.contextmanager
     def being_written(file: BinaryIO) -> Iterator[None]:
-        """Let `nobody_writes` be false for a file until the block ends, also when it is closed before."""
+        """Mark a file as being written until the block ends, also when it is closed before."""
         held = os.dup(file.fileno())
         try:
             with contextlib.suppress(OSError):  # a file system without locks
@@ -64,7 +64,7 @@ else:
 
     @contextlib.contextmanager
     def nobody_writes(path: str) -> Iterator[bool]:
-        """Whether the path is a regular file that no live process is writing; a link is none."""
+        """Yield whether the path is a regular file that no live process is writing; a link is none."""
         descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
         try:
             yield stat.S_ISREG(os.fstat(descriptor).st_mode) and _try_lock(descriptor)

@@ -1,4 +1,4 @@
-"""Which row of a table is about which file: by name, wherever the table was made."""
+"""Match the rows of a table with files by name, wherever the table was made."""
 
 from collections import defaultdict
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ _ENDINGS = {*MAP_ENDINGS, *IMAGE_ENDINGS}
 
 
 def stem_of(name: str) -> str:
-    """A frame's name without its folders and its ending; a table may leave out both."""
+    """Cut folders and ending off a frame's name; a table may leave out both."""
     path = PurePosixPath(name.replace("\\", "/"))
     return path.stem if path.suffix.lower() in _ENDINGS else path.name
 
@@ -58,13 +58,13 @@ def match_paths(names: Sequence[str], rows: Sequence[str], table: str) -> list[i
 
 
 def _parts(path: str) -> list[str]:
-    """From the stem up to the root."""
+    """Split a path from its stem up to the root."""
     folders = PurePosixPath(path.replace("\\", "/")).parent.parts
     return [stem_of(path), *reversed(folders)]
 
 
 def _closest(wanted: Sequence[str], candidates: dict[int, list[str]]) -> list[int]:
-    """Those that share the most folders with what is wanted."""
+    """Find the candidates that share the most folders with the wanted path."""
     shared = {at: _common(wanted, each) for at, each in candidates.items()}
     most = max(shared.values(), default=0)
     return [at for at, count in shared.items() if count == most]

@@ -1,4 +1,4 @@
-"""What file names say: their natural order, and which left image goes with which right one."""
+"""Read file names: their natural order, and which left image belongs to which right one."""
 
 import re
 from collections.abc import Iterable, Sequence
@@ -19,14 +19,14 @@ _LISTED = 3  # how many files a message names
 
 
 def listed(names: Iterable[str]) -> str:
-    """The first few names, and how many more there are."""
+    """Join the first few names, and say how many more there are."""
     every = list(names)
     more = f" and {len(every) - _LISTED} more" if len(every) > _LISTED else ""
     return ", ".join(every[:_LISTED]) + more
 
 
 def natural_key(name: str) -> str:
-    """A sort key that puts frame2 before frame10, folder by folder.
+    """Make a sort key that puts frame2 before frame10, folder by folder.
 
     A string, since a batch has a hundred thousand of them: a folder ends with the lowest character, numbers
     come before text, and a number is told by its length first.
@@ -47,7 +47,7 @@ def _run_key(run: str) -> str:
 
 @dataclass(frozen=True)
 class Matching:
-    """Which names go together; all numbers are positions in the lists given.
+    """The names that belong together; all numbers are positions in the given lists.
 
     Attributes
     ----------
@@ -115,7 +115,7 @@ def _stem(relative: str) -> str:
 
 
 def _unmarked(relative: str, number: str, side: int, marked: bool) -> str | None:
-    """The path without its ending and its marks; None when `marked` and there are none."""
+    """Cut ending and marks off a path; None when `marked` and it has none."""
     parts = []
     for part in _stem(relative).split("/"):
         without = re.sub(_WORDS[side], "*", part)

@@ -19,7 +19,7 @@ TEXT = {"encoding": "utf-8", "errors": "surrogateescape"}
 
 @dataclass(frozen=True)
 class Row:
-    """What is known of one frame; None where there is nothing to say. The columns of a result, in order."""
+    """What is known of one frame; None where a value is missing. The fields are the columns, in order."""
 
     file: str
     right_file: str = ""
@@ -70,17 +70,17 @@ class Result:
 
 
 def columns(timing: bool = False) -> tuple[str, ...]:
-    """The names of the columns, in order."""
+    """List the names of the columns, in order."""
     return (*COLUMNS, TIMING) if timing else COLUMNS
 
 
 def format_header(form: Format, timing: bool = False) -> bytes:
-    """What stands before the first row."""
+    """Format what stands before the first row."""
     return ",".join(columns(timing)).encode() + b"\n" if form == "csv" else b""
 
 
 def format_row(row: Row, form: Format, timing: bool = False) -> bytes:
-    """One line; the same row gives the same bytes."""
+    """Format one line; the same row gives the same bytes."""
     texts = {name: _text(name, getattr(row, name)) for name in columns(timing)}
     if form == "csv":
         return (",".join(map(_quoted, texts.values())) + "\n").encode(**TEXT)
@@ -89,7 +89,7 @@ def format_row(row: Row, form: Format, timing: bool = False) -> bytes:
 
 
 def _quoted(text: str) -> str:
-    """A field of CSV; the csv module quotes a carriage return only from Python 3.13 on."""
+    """Quote a field of CSV; the csv module quotes a carriage return only from Python 3.13 on."""
     if not any(special in text for special in ',"\r\n'):
         return text
     return '"' + text.replace('"', '""') + '"'
@@ -108,7 +108,7 @@ def _text(name: str, value: Any) -> str:
 
 
 def _json_value(name: str, value: Any, text: str) -> Any:
-    """The number that the CSV shows, so that both forms say the same."""
+    """Give the number that the CSV shows, so that both forms say the same."""
     if name in _DIGITS:
         return float(text) if text else None
     return value
@@ -137,19 +137,19 @@ def read_result(path: str | Path) -> Result:
 
 
 def parse_rows(data: bytes, name: str | Path) -> tuple[Row, ...]:
-    """The rows of a result's bytes; `name` is what errors call it."""
+    """Parse the bytes of a result; errors call it `name`."""
     text = data.removeprefix(b"\xef\xbb\xbf").decode(**TEXT)
     lines = _json_lines(text, name) if text.lstrip().startswith("{") else _csv_lines(text, name)
     return tuple(_row(values, f"{name}: line {number}") for number, values in lines)
 
 
 def run_path(path: str | Path) -> Path:
-    """Where the record of the run lies: FILE.run.json."""
+    """Name the record of the run: FILE.run.json."""
     return Path(f"{path}.run.json")
 
 
 def read_run(path: str | Path) -> Mapping[str, Any] | None:
-    """The record of the run that wrote the result `path`, or None where there is none."""
+    """Read the record of the run that wrote the result `path`; None when there is none."""
     record = run_path(path)
     if not record.exists():
         return None
@@ -215,7 +215,7 @@ _BOUNDS = {"roll_deg": (-90.0, 90.0), "roll_ci95_deg": (0.0, math.inf)}
 
 
 def _value(name: str, value: Any, where: str) -> Any:
-    """The value of a column from its text (CSV) or JSON value."""
+    """Convert the text (CSV) or JSON value of a column."""
     if name == "status" and value not in STATUSES:
         raise InputError(f"{where}: {value!r} is no status: {', '.join(STATUSES)}")
     if name not in _DIGITS and name not in _FLAGS and name not in _COUNTS:

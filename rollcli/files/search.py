@@ -1,4 +1,4 @@
-"""Which files lie behind one argument: a file, a folder or a pattern."""
+"""Find the files of one argument: a file, a folder or a pattern."""
 
 import fnmatch
 import glob
@@ -10,18 +10,18 @@ from rollcli.errors import UsageError
 
 
 class Search:
-    """What is taken from folders and patterns.
+    """Finds files, and knows which ones are taken from folders and patterns.
 
     Parameters
     ----------
     endings : sequence of str
         What counts as readable, lower case.
     recursive : bool
-        Look into the folders of folders.
+        Search folders recursively.
     include, exclude : sequence of str
         Globs on names and relative paths.
     skip : sequence of path
-        Folders never looked into: where results go.
+        Folders that are never searched: results go there.
     """
 
     def __init__(
@@ -38,7 +38,7 @@ class Search:
         self._skip = {os.path.realpath(folder) for folder in skip}
 
     def files(self, argument: str, *, literal: bool = False) -> Iterator[tuple[Path, str]]:
-        """Each file behind `argument`, and its path below the folder or pattern.
+        """Yield each file of `argument`, and its path below the folder or pattern.
 
         Parameters
         ----------
@@ -64,7 +64,7 @@ class Search:
     def _wanted(
         self, argument: str, files: Iterator[tuple[Path, str]], kind: str
     ) -> Iterator[tuple[Path, str]]:
-        """Those among the files that --include and --exclude let through; none at all is an error."""
+        """Yield the files that --include and --exclude allow; finding none is an error."""
         none = True
         for path, relative in files:
             names = (relative, path.name)
@@ -72,11 +72,11 @@ class Search:
                 none = False
                 yield path, relative
         if none:
-            hint = "; --recursive looks into its folders" if kind == "folder" and not self._recursive else ""
+            hint = "; --recursive searches its folders" if kind == "folder" and not self._recursive else ""
             raise UsageError(f"{argument}: no input found in this {kind} ({' '.join(self._endings)}){hint}")
 
     def _in_folder(self, folder: Path) -> Iterator[tuple[Path, str]]:
-        """Readable files, hidden ones aside."""
+        """Yield readable files, except hidden ones."""
         if os.path.realpath(folder) in self._skip:
             raise UsageError(f"{folder}: is an input and an output folder; write the results elsewhere")
         seen: set[str] = set()
@@ -95,7 +95,7 @@ class Search:
         return real not in self._skip and real not in seen  # links may make a circle
 
     def _in_pattern(self, pattern: str) -> Iterator[tuple[Path, str]]:
-        """Files that match; a pattern that names an ending gets what it asks for, others readable files."""
+        """Yield the files that match; unless the pattern names an ending, only readable ones."""
         ending = Path(pattern).suffix
         at_its_word = ending != "" and not glob.has_magic(ending)
         base = _fixed_part(pattern)
@@ -119,17 +119,17 @@ def _fail(error: OSError) -> None:
 
 
 def _is_file(path: Path) -> bool:
-    """A file, or a link to nothing: that gets a row that says so."""
+    """Tell whether this is a file, or a link to nothing: that one gets an error row."""
     return path.is_file() or (path.is_symlink() and not path.exists())
 
 
 def _below(relative: Path) -> Path:
-    """The path without its steps upwards: outputs keep it, and stay below their folder."""
+    """Cut the steps upwards off a path: outputs keep the rest, and stay below their folder."""
     return Path(*(part for part in relative.parts if part != ".."))
 
 
 def _fixed_part(pattern: str) -> Path:
-    """The folder before the first wildcard."""
+    """Find the folder before the first wildcard."""
     parts = Path(pattern).parts
     fixed = next((i for i, part in enumerate(parts) if glob.has_magic(part)), len(parts))
     return Path(*parts[:fixed])

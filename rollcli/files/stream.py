@@ -1,4 +1,4 @@
-"""Bytes to standard output, pipes and devices."""
+"""Write bytes to standard output, pipes and devices."""
 
 import os
 import stat
@@ -13,7 +13,7 @@ STDOUT_NAME = "standard output"
 
 
 def is_stream(name: str) -> bool:
-    """Standard output, or a device or pipe that exists: nothing that could be replaced by a file."""
+    """Tell whether a name is standard output, a device or a pipe, which no file can replace."""
     if name == STDOUT:
         return True
     try:
@@ -31,7 +31,7 @@ def write_output(name: str, data: bytes) -> None:
     OutputError
         It cannot be written.
     BrokenPipeError
-        The reader has had enough.
+        The reader has closed its end.
     """
     if name == STDOUT:
         write_stdout(data)
@@ -66,7 +66,7 @@ def write_stdout(data: bytes) -> None:
 
 
 def stdout_descriptor() -> int:
-    """The open file that is standard output.
+    """Find the descriptor of standard output.
 
     Raises
     ------
@@ -86,7 +86,7 @@ def write_stream(descriptor: int, data: bytes, name: str = STDOUT_NAME) -> None:
     OutputError
         It cannot be written.
     BrokenPipeError
-        The reader has had enough.
+        The reader has closed its end.
     """
     try:
         while data:

@@ -203,7 +203,7 @@ def test_pipes_and_folders_with_readable_endings_are_no_files(here):
 @pytest.mark.parametrize(
     ("inputs", "reason"),
     [
-        (["empty"], "empty: no input found in this folder .*; --recursive looks into its folders"),
+        (["empty"], "empty: no input found in this folder .*; --recursive searches its folders"),
         (["empty/*.png"], r"empty/\*.png: no input found in this pattern"),
         (["f1.png", "none/**"], r"none/\*\*: no input found in this pattern"),
         (["-"], "no input found: the list is empty"),

@@ -11,9 +11,14 @@ from rollcli.errors import InputError
 def run(task):
     """Do what the task's first word says; the others are paths or values."""
     kind, *arguments = task
-    return {"give": _give, "wait": _wait, "touch": _touch, "die": _die, "die_once": _die_once, "raise": _raise}[
-        kind
-    ](*arguments)
+    return {
+        "give": _give,
+        "wait": _wait,
+        "touch": _touch,
+        "die": _die,
+        "die_once": _die_once,
+        "raise": _raise,
+    }[kind](*arguments)
 
 
 def lost(task, reason):

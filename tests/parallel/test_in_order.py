@@ -1,4 +1,4 @@
-"""The order of results, the bound on tasks in flight, retries and stops, with an executor made for the test."""
+"""The order of results, the bound on tasks in flight, retries and stops, with a fake executor."""
 
 import pytest
 

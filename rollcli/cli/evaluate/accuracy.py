@@ -51,7 +51,7 @@ from rollcli.frames.options import RunningOptions
 def accuracy(
     ctx: click.Context, /, result: str, truth: str, output: str, running: RunningOptions, **options: Any
 ) -> None:
-    """How far the angles of RESULT, which estimate wrote, are from known ones.
+    """Compare the angles of RESULT, which estimate wrote, with known ones.
 
     Frames are matched by the stem of their file. Those without a partner are named on stderr; exit status 3
     when a frame of the truth has no angle.

@@ -9,7 +9,7 @@ from rollcli.cli.evaluate.paper import paper
 @click.group(invoke_without_command=True)
 @click.pass_context
 def evaluate(ctx: click.Context) -> None:
-    """The paper's experiments on your maps; accuracy against known angles."""
+    """Repeat the paper's experiments on your maps; compare results with known angles."""
     if ctx.invoked_subcommand is None:
         click.echo(ctx.get_help())
 
