@@ -17,8 +17,8 @@ from rollcli.files.formats import encode_stored
 from rollcli.parallel.in_order import Work
 from rollcli.parallel.interrupt import Stop
 from rollcli.parallel.run_tasks import Workers, run_tasks
-from rollcli.simulate.camera import rig_axes
 from rollcli.simulate.draw import draw_specs
+from rollcli.simulate.geometry.camera import rig_axes
 from rollcli.simulate.options import CROSSFALL, KERB, KERBED, MIXED, SimulateOptions
 from rollcli.simulate.render import render_frame
 from rollcli.simulate.spec import LEVEL, FrameSpec
@@ -32,7 +32,7 @@ KITTI_TOP = 65534 / 256  # pixels: larger disparities are written as no data
 
 
 @dataclass(frozen=True)
-class Task:
+class RenderTask:
     """A frame to render and the names of its files."""
 
     spec: FrameSpec
@@ -52,11 +52,12 @@ class Dataset:
     specs: tuple[FrameSpec, ...]
 
     @property
-    def tasks(self) -> list[Task]:
+    def tasks(self) -> list[RenderTask]:
         """The frames with their names: frame_0001, frame_0002, ..."""
         digits = max(4, len(str(len(self.specs))))
         return [
-            Task(spec, self.folder, f"frame_{number:0{digits}d}") for number, spec in enumerate(self.specs, 1)
+            RenderTask(spec, self.folder, f"frame_{number:0{digits}d}")
+            for number, spec in enumerate(self.specs, 1)
         ]
 
     @property
@@ -159,7 +160,7 @@ def write_dataset(dataset: Dataset, jobs: int | None = 1, stop: Stop | None = No
         write_atomic(dataset.folder / _TRUTH, truth_csv((task.stem, task.spec) for task in dataset.tasks))
 
 
-def _write_frame(task: Task) -> str:
+def _write_frame(task: RenderTask) -> str:
     frame = render_frame(task.spec)
     write_atomic(task.image("left"), _png(frame.left))
     write_atomic(task.image("right"), _png(frame.right))
@@ -169,7 +170,7 @@ def _write_frame(task: Task) -> str:
     return task.stem
 
 
-def _lost(task: Task, reason: str) -> str:
+def _lost(task: RenderTask, reason: str) -> str:
     raise OutputError(f"{task.image('left')}: cannot be rendered: {reason}; try fewer --jobs")
 
 

@@ -49,12 +49,12 @@ def draw_specs(
     colour: bool = True,
     seed: int = 0,
 ) -> list[FrameSpec]:
-    """The specs of `n` frames; the i-th is the same whatever `n` is.
+    """Draw the specs of `n` frames; the i-th does not depend on `n`.
 
     Parameters
     ----------
     n : int
-        How many.
+        Number of frames.
     scene : str
         One of `SCENES`, or ``mixed``: each frame draws one of them.
     roll, pitch : tuple of float
@@ -67,7 +67,7 @@ def draw_specs(
     crossfall, gutter : tuple of float
         Lowest and highest slope, metres per metre, drawn evenly; flat roads have no crossfall.
     focal : float or None
-        Pixels; None: 0.58 times the width.
+        PixelRays; None: 0.58 times the width.
     principal_point : tuple of float or None
         Column and row, pixels; None: the image's centre.
     principal_offset : tuple of float
@@ -80,7 +80,7 @@ def draw_specs(
     Raises
     ------
     UsageError
-        A number that cannot be, or numbers that contradict each other.
+        A value is not possible, or values contradict each other.
     """
     if n < 1:
         raise UsageError(f"at least one frame must be asked for, not {n}")
@@ -118,7 +118,7 @@ def draw_specs(
 
 
 def _check_ends(rig: FrameSpec, spans: dict[str, Span], principal_offset: Span) -> None:
-    """Refuse ranges with an end that cannot be, whatever is drawn."""
+    """Refuse ranges with an end that is not possible, whatever would be drawn."""
     for name, (low, high) in {**spans, "principal offset": principal_offset}.items():
         if not low <= high:
             raise UsageError(f"the range of the {name} is empty: its lower end comes first")

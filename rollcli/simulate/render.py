@@ -1,28 +1,28 @@
-"""From a frame's spec to its two views and its true disparity."""
+"""Render the two views of a frame and its true disparity."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.simulate.build import build_scene
-from rollcli.simulate.render_view import depths, render_view
-from rollcli.simulate.sensor import expose
+from rollcli.simulate.scenes.build import build_scene
 from rollcli.simulate.spec import FrameSpec
+from rollcli.simulate.views.render_view import depths, render_view
+from rollcli.simulate.views.sensor import expose
 
 
 @dataclass(frozen=True)
-class Frame:
+class RenderedFrame:
     """A rendered stereo pair with its truth.
 
     Attributes
     ----------
     left, right : numpy.ndarray
-        uint8, (H, W, 3) in BGR order, or (H, W) for a grey spec.
+        uint8, (H, W, 3) in BGR order, or (H, W) where the spec asks for grey images.
     disparity : numpy.ndarray
         float32 (H, W), pixels, of the left view; 0 where there is only sky.
     road : numpy.ndarray
-        bool (H, W): the left view's pixels that show the road surface.
+        bool (H, W): True where the left view shows the carriageway.
     spec : FrameSpec
         What was rendered.
     """
@@ -44,7 +44,7 @@ class Frame:
         return self.spec.pitch
 
 
-def render_frame(spec: FrameSpec) -> Frame:
+def render_frame(spec: FrameSpec) -> RenderedFrame:
     """Render both views, the true disparity of the left one, and which of its pixels are road."""
     scene, rng = build_scene(spec), spec.sensor_rng()
     views = [render_view(scene, camera) for camera in spec.cameras(scene.normal)]
@@ -53,11 +53,11 @@ def render_frame(spec: FrameSpec) -> Frame:
         for view, gain in zip(views, (1.0, spec.gain), strict=True)
     )
     disparity = (spec.focal * spec.baseline / views[0].depth).astype(np.float32)
-    return Frame(left, right, disparity, views[0].material == scene.road, spec)
+    return RenderedFrame(left, right, disparity, views[0].material == scene.road, spec)
 
 
 def true_disparity(spec: FrameSpec) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """The left view's disparity in full precision (H, W), 0 in the sky, and its road pixels; no pictures."""
+    """Return the disparity (H, W) of the left view in double precision, 0 in the sky, and its road pixels."""
     scene = build_scene(spec)
     depth, material = depths(scene, spec.cameras(scene.normal)[0])
     return spec.focal * spec.baseline / depth, material == scene.road

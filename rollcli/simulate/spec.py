@@ -8,7 +8,8 @@ from enum import IntEnum
 import numpy as np
 
 from rollcli.errors import UsageError
-from rollcli.simulate.camera import Camera, rig_axes
+from rollcli.simulate.geometry.camera import Camera, rig_axes
+from rollcli.simulate.geometry.vectors import Array
 from rollcli.simulate.options import (
     BASELINE,
     CROSS_SECTIONS,
@@ -19,7 +20,6 @@ from rollcli.simulate.options import (
     SCENES,
     SIZE,
 )
-from rollcli.simulate.vectors import Array
 
 Span = tuple[float, float]
 
@@ -31,7 +31,7 @@ LEVEL = np.array([0.0, 1.0, 0.0])  # the normal of a level road
 
 
 class Stream(IntEnum):
-    """The random numbers of a frame: each part draws from its own, so that none shifts another's."""
+    """The streams of random numbers of a frame: one for each part, so that no part changes another."""
 
     POSE = 0
     SCENE = 1
@@ -42,7 +42,7 @@ class Stream(IntEnum):
 
 @dataclass(frozen=True)
 class FrameSpec:
-    """One frame to render; equal specs give equal bytes.
+    """The parameters of one frame; equal specs give equal bytes.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ class FrameSpec:
         return self.principal_point or image_centre(self.size)
 
     def cameras(self, normal: Array = LEVEL) -> tuple[Camera, Camera]:
-        """The left and the right camera of a rig on a plane through the origin, whose `normal` points up."""
+        """Return the left and the right camera of a rig on the plane through the origin with this normal."""
         axes = rig_axes(self.roll, self.pitch, normal)
         left = self.height * normal
         places = left, left + self.baseline * axes[0]
@@ -117,20 +117,20 @@ class FrameSpec:
         return first, second
 
     def rng(self, stream: Stream) -> np.random.Generator:
-        """The random numbers of one part of the frame."""
+        """Return the generator of one part of the frame."""
         return np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(self.index, stream)))
 
     def scene_rng(self) -> np.random.Generator:
-        """Random numbers for what stands where and what it looks like."""
+        """Return the generator of the scene's objects and materials."""
         return self.rng(Stream.SCENE)
 
     def sensor_rng(self) -> np.random.Generator:
-        """Random numbers for the noise of both views."""
+        """Return the generator of the noise of both views."""
         return self.rng(Stream.SENSOR)
 
 
 def image_centre(size: tuple[int, int]) -> tuple[float, float]:
-    """The middle of an image of this width and height, pixels."""
+    """Return the centre of an image of this width and height, pixels."""
     return (size[0] - 1) / 2, (size[1] - 1) / 2
 
 
@@ -140,7 +140,7 @@ def not_one_of(kind: str, name: str, names: Sequence[str]) -> str:
 
 
 def _problems(spec: FrameSpec) -> Iterator[str]:
-    """What cannot be, in words; nothing when the spec is sound."""
+    """Yield a message for each value that is not possible."""
     width, height = spec.size
     numbers = (
         spec.roll,

@@ -1,4 +1,4 @@
-"""What is known of rendered frames: truth.csv, and the calibration of the rig in KITTI's form."""
+"""The known values of rendered frames: truth.csv, and the calibration of the rig in KITTI's form."""
 
 import csv
 import io
@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from rollcli.simulate.build import road_camber
+from rollcli.simulate.scenes.build import road_camber
 from rollcli.simulate.spec import FrameSpec
 
 COLUMNS = (
@@ -30,7 +30,7 @@ COLUMNS = (
 
 
 def truth_csv(frames: Iterable[tuple[str, FrameSpec]]) -> bytes:
-    """The table of known values, a row for each stem and its frame."""
+    """Write the table of known values, one row for each stem and its frame."""
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
     rows.writerow(COLUMNS)
@@ -45,7 +45,7 @@ def truth_csv(frames: Iterable[tuple[str, FrameSpec]]) -> bytes:
 
 
 def calibration(spec: FrameSpec) -> bytes:
-    """The rectified projections of the left and the right view, P0 and P1 of KITTI's benchmarks.
+    """Write the rectified projections of the left and the right view, P0 and P1 of KITTI's benchmarks.
 
     Both are 3x4, row by row, in pixels and metres; the fourth number of P1 is -focal * baseline. See Geiger,
     Lenz, Urtasun, "Are we ready for autonomous driving?", CVPR 2012.

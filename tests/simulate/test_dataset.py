@@ -10,10 +10,10 @@ import pytest
 from rollcli.errors import OutputError, UsageError
 from rollcli.files.encodings import read_disparity
 from rollcli.simulate import dataset as module
-from rollcli.simulate.build import road_camber
 from rollcli.simulate.dataset import plan_dataset, write_dataset
 from rollcli.simulate.options import SimulateOptions
 from rollcli.simulate.render import render_frame, true_disparity
+from rollcli.simulate.scenes.build import road_camber
 from tests.run_cli import contents
 
 TINY = SimulateOptions(frames=3, size=(64, 48), seed=9)

@@ -1,17 +1,17 @@
-"""Image positions of a camera and the rays through them."""
+"""Positions in a camera's image, and the rays through them."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from rollcli.simulate.camera import Camera, Rays
-from rollcli.simulate.surfaces import Indices
-from rollcli.simulate.vectors import Array
+from rollcli.simulate.geometry.camera import Camera, Rays
+from rollcli.simulate.geometry.surfaces import Indices
+from rollcli.simulate.geometry.vectors import Array
 
 
 @dataclass(frozen=True)
-class Pixels:
-    """Positions u, v (N,), pixels, and their rays; `rows`: they are these whole rows of the image."""
+class PixelRays:
+    """Positions u, v (N,), pixels, and their rays; `rows` if they are whole rows of the image, else None."""
 
     camera: Camera
     u: Array
@@ -20,19 +20,19 @@ class Pixels:
     rows: range | None
 
     @staticmethod
-    def of_rows(camera: Camera, rows: range) -> "Pixels":
-        """The centres of all pixels of these rows, row by row."""
+    def of_rows(camera: Camera, rows: range) -> "PixelRays":
+        """Take the centres of all pixels of these rows, row by row."""
         v, u = np.indices((len(rows), camera.width), float).reshape(2, -1)
         v += rows.start
-        return Pixels(camera, u, v, camera.rays(u, v), rows)
+        return PixelRays(camera, u, v, camera.rays(u, v), rows)
 
     @staticmethod
-    def at(camera: Camera, u: Array, v: Array) -> "Pixels":
-        """Any positions."""
-        return Pixels(camera, u, v, camera.rays(u, v), None)
+    def at(camera: Camera, u: Array, v: Array) -> "PixelRays":
+        """Take any positions."""
+        return PixelRays(camera, u, v, camera.rays(u, v), None)
 
     def window(self, corners: Array | None) -> Indices | None:
-        """Which of them can meet what lies between a box's corners (3, 8); None: any."""
+        """Return the indices of rays that can hit a box with these corners (3, 8); None: all of them can."""
         if corners is None:
             return None
         u, v, depth = self.camera.project(corners)

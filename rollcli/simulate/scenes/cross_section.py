@@ -21,15 +21,15 @@ class Piece(NamedTuple):
     offset: float = 0.0
 
     def elevation(self, lateral: float) -> float:
-        """The height at a lateral position, metres."""
+        """Return the height at a lateral position, metres."""
         return self.offset + (self.slope + self.camber / 2 * lateral) * lateral
 
     def slope_at(self, lateral: float) -> float:
-        """The slope at a lateral position; positive where the road rises to the right."""
+        """Return the slope at a lateral position; positive where the road rises to the right."""
         return self.slope + self.camber * lateral
 
     def curvature_at(self, lateral: float) -> float:
-        """Second derivative of the height over the plane that touches at a lateral position, 1/m."""
+        """Return the second derivative of the height over the plane tangent at a lateral position, 1/m."""
         return float(self.camber / math.hypot(1.0, self.slope_at(lateral)) ** 3)
 
 
@@ -40,11 +40,11 @@ class CrossSection:
     pieces: tuple[Piece, ...]
 
     def piece(self, lateral: float) -> Piece:
-        """The piece at a lateral position; beyond the edges the outermost one."""
+        """Return the piece at a lateral position; beyond the edges the outermost one."""
         return next((piece for piece in self.pieces if lateral < piece.end), self.pieces[-1])
 
     def elevation(self, lateral: float) -> float:
-        """Metres above the point below the rig; level beyond the edges."""
+        """Return the height above the point below the rig, metres; beyond an edge that of the edge."""
         inside = min(max(lateral, self.pieces[0].start), self.pieces[-1].end)
         return self.piece(inside).elevation(inside)
 
@@ -52,7 +52,7 @@ class CrossSection:
 def cross_section(
     shape: str, crossfall: float, gutter: float, left: float, right: float, bend: float
 ) -> CrossSection:
-    """The cross section of a carriageway.
+    """Make the cross section of a carriageway.
 
     Parameters
     ----------

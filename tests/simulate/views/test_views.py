@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from rollcli.imaging.stereo import compute_disparity
-from rollcli.simulate.build import build_scene
 from rollcli.simulate.render import render_frame
-from rollcli.simulate.render_view import render_view
+from rollcli.simulate.scenes.build import build_scene
 from rollcli.simulate.spec import FrameSpec
+from rollcli.simulate.views.render_view import render_view
 
 CLEAN = {"noise": 0.0, "colour": False}
 STREET = FrameSpec("street", math.radians(6), math.radians(2), seed=12, size=(320, 240), focal=186.0, **CLEAN)
@@ -95,7 +95,7 @@ def test_a_stereo_matcher_finds_the_road_as_well_as_on_real_pairs(scene):
 
 def test_a_picture_is_the_same_rendered_in_one_band_of_rows_or_in_many(monkeypatch):
     whole = render_frame(STREET)
-    monkeypatch.setattr("rollcli.simulate.render_view._BAND", 17 * 320)
+    monkeypatch.setattr("rollcli.simulate.views.render_view._BAND", 17 * 320)
     banded = render_frame(STREET)
     assert np.array_equal(whole.left, banded.left)
     assert np.array_equal(whole.right, banded.right)

@@ -1,4 +1,4 @@
-"""Rigid things on the road: unions of convex solids, cylinders, tree crowns."""
+"""Solid objects: unions of convex parts, cylinders, crowns of trees."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -6,15 +6,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.simulate.surfaces import NEAR, Chart
-from rollcli.simulate.texture import coarse, fine
-from rollcli.simulate.vectors import Array, dots
+from rollcli.simulate.geometry.surfaces import NEAR, SurfaceSample
+from rollcli.simulate.geometry.vectors import Array, dots
+from rollcli.simulate.looks.texture import coarse, fine
 
 _UP = np.eye(3, dtype=np.float32)[:, 1:2]
 
 
-class Part(NamedTuple):
-    """The convex solid normals . x <= offsets, (k, 3) unit vectors and (k,) metres."""
+class ConvexPart(NamedTuple):
+    """The convex solid normals . x <= offsets; normals are (k, 3) unit vectors, offsets (k,) metres."""
 
     normals: Array
     offsets: Array
@@ -23,14 +23,14 @@ class Part(NamedTuple):
 
 @dataclass(frozen=True)
 class Solid:
-    """Convex parts in a frame of their own: its axes (right, up, ahead) are the rows of `frame`.
+    """Convex parts in a frame of their own, whose axes (right, up, ahead) are the rows of `frame`.
 
-    `place` (3,) is the frame's origin, `extent` (3, 2) the box of all parts in the frame.
+    `place` (3,) is the origin of the frame, `extent` (3, 2) the bounding box of all parts in it.
     """
 
     frame: Array
     place: Array
-    parts: tuple[Part, ...]
+    parts: tuple[ConvexPart, ...]
     extent: Array
 
     def intersect(self, origin: Array, direction: Array) -> Array:
@@ -38,7 +38,7 @@ class Solid:
         r = dots(self.frame, direction)
         first = np.full(r.shape[1], np.inf)
         for normals, offsets, _ in self.parts:
-            # + 0.0 makes -0.0 positive: a ray along a face and outside of it then leaves at -inf
+            # + 0.0 makes -0.0 positive: a ray parallel to a face and outside of it then leaves at -inf
             toward, room = dots(normals, r) + 0.0, offsets[:, None] - dots(normals, o)
             with np.errstate(divide="ignore", invalid="ignore"):
                 t = room / toward
@@ -48,20 +48,20 @@ class Solid:
             np.minimum(first, enter, out=first, where=(enter < leave) & (enter > NEAR))
         return first
 
-    def chart(self, points: Array) -> Chart:
+    def sample(self, points: Array) -> SurfaceSample:
         local = dots(self.frame, points - self.place[:, None])
-        # a point on a part's surface is level with one of its faces and behind the others
+        # a point on the surface of a part lies on one of its faces and behind the others
         heights = [dots(normals, local) - offsets[:, None] for normals, offsets, _ in self.parts]
         owner = np.argmin([np.abs(h.max(axis=0)) for h in heights], axis=0)
         normal = np.empty((points.shape[1], 3))
         for k, part in enumerate(self.parts):
             at = owner == k
             normal[at] = part.normals[np.argmax(heights[k][:, at], axis=0)]
-        # read the texture on the two axes that the face lies along: side (ahead, up), top (right, ahead), end
+        # the texture's axes span the face: side (ahead, up), top (right, ahead), end (right, up)
         flat = np.argmax(np.abs(normal), axis=1)
         first, second = np.array([2, 0, 0])[flat], np.array([1, 2, 1])[flat]
         each = np.arange(points.shape[1])
-        return Chart(
+        return SurfaceSample(
             dots(self.frame.T, normal.T),
             local[first, each],
             local[second, each],
@@ -71,7 +71,7 @@ class Solid:
         )
 
     def bounds(self, margin: float = 0.0) -> Array | None:
-        """As `Surface.bounds`, and `margin` metres on each side."""
+        """Return the corners as `Surface.bounds` does, with `margin` metres more on each side."""
         extent = self.extent + np.array([-margin, margin])
         grid = np.stack(np.meshgrid(*extent, indexing="ij")).reshape(3, -1)
         return np.asarray(self.frame.T @ grid + self.place[:, None])
@@ -92,11 +92,11 @@ class Post:
         y = oy + enter * ry
         return np.where((enter > NEAR) & (y >= 0) & (y < self.height), enter, np.inf)
 
-    def chart(self, points: Array) -> Chart:
+    def sample(self, points: Array) -> SurfaceSample:
         x, y, z = points - self.foot[:, None]
         normal = np.array([x, np.zeros_like(x), z]) / self.radius
         around = np.array([-z, np.zeros_like(x), x]) / self.radius
-        return Chart(normal, self.radius * np.arctan2(x, -z), y, around, _UP, self.material)
+        return SurfaceSample(normal, self.radius * np.arctan2(x, -z), y, around, _UP, self.material)
 
     def bounds(self) -> Array | None:
         r = self.radius
@@ -105,8 +105,8 @@ class Post:
 
 
 @dataclass(frozen=True)
-class Crown:
-    """The crown of a tree: an ellipsoid shell of leaves with gaps, seen through them to its far side."""
+class TreeCrown:
+    """The crown of a tree: an ellipsoid shell of leaves; through its gaps the far side is visible."""
 
     centre: Array
     radius: float
@@ -128,18 +128,18 @@ class Crown:
         return first
 
     def _leaves(self, offset: Array) -> NDArray[np.bool_]:
-        """Where, relative to the centre, there are leaves."""
+        """Tell at which offsets from the centre there are leaves."""
         x, y, z = offset.astype(np.float32)
         p, q = x + np.float32(0.73) * z + 50, y + np.float32(0.51) * (z - x)
         w = np.full_like(x, 0.03)
         thin = np.abs(y) / np.float32(self.half_height)
         return np.asarray(coarse(p, q, w) + np.float32(0.5) * fine(p, q, w) > thin - np.float32(1.1))
 
-    def chart(self, points: Array) -> Chart:
+    def sample(self, points: Array) -> SurfaceSample:
         x, y, z = points - self.centre[:, None]
         normal = np.array([x, y * (self.radius / self.half_height) ** 2, z])
         around = np.array([-z, np.zeros_like(x), x]) * (self.radius / np.maximum(x * x + z * z, 0.01))
-        return Chart(normal, self.radius * np.arctan2(x, -z), y, around, _UP, self.material)
+        return SurfaceSample(normal, self.radius * np.arctan2(x, -z), y, around, _UP, self.material)
 
     def bounds(self) -> Array | None:
         size = np.array([self.radius, self.half_height, self.radius])
@@ -148,7 +148,7 @@ class Crown:
 
 
 def _sphere_roots(a: Array, half_b: Array, c: Array) -> tuple[Array, Array]:
-    """Both roots of a t^2 + 2 half_b t + c = 0, nan where there are none."""
+    """Return both roots of a t^2 + 2 half_b t + c = 0; nan where there are none."""
     with np.errstate(divide="ignore", invalid="ignore"):
         root = np.sqrt(half_b * half_b - a * c)
         return (-half_b - root) / a, (-half_b + root) / a

@@ -1,7 +1,7 @@
-"""Noise and edges that know how large a pixel is: what textures are made of.
+"""Noise and edges averaged over a pixel: the components of textures.
 
-A pixel on a distant road covers metres of it along the driving direction. Whatever is finer than a pixel
-must be averaged, not sampled: aliased detail would differ between the two views and fool a stereo matcher.
+A pixel on a distant road covers metres of it along the driving direction. Detail finer than a pixel must be
+averaged, not sampled: aliased detail would differ between the two views and mislead a stereo matcher.
 """
 
 from functools import lru_cache
@@ -16,10 +16,10 @@ _SIDE = 512  # texels of a tile, a power of two: wrapping is a bit mask
 
 
 class NoiseTile:
-    """Periodic noise of unit variance as a pyramid of averages: level k has texels 2^k times as large."""
+    """Periodic noise of unit variance as a pyramid of averages: texels of level k are 2^k times as large."""
 
     def __init__(self, seed: int, slope: float, longest: float) -> None:
-        """Amplitudes fall as frequency^-slope; waves longer than `longest` texels are left out."""
+        """Make noise with amplitudes of frequency^-slope, without waves longer than `longest` texels."""
         rng = np.random.default_rng(seed)
         fy, fx = np.fft.fftfreq(_SIDE)[:, None], np.fft.rfftfreq(_SIDE)[None]
         frequency = np.hypot(fy, fx)
@@ -41,7 +41,7 @@ class NoiseTile:
         self._masks = (sides - 1).astype(np.int32)
 
     def sample(self, x: Values, y: Values, level: NDArray[np.int32]) -> Values:
-        """The noise at (x, y), texels of level 0, averaged over 2^level texels; bilinear between texels."""
+        """Return the noise at (x, y), texels of level 0, averaged over 2^level texels; bilinear."""
         level = np.minimum(np.maximum(level, 0), len(self._starts) - 1)
         start, bits, mask = (table[level] for table in (self._starts, self._bits, self._masks))
         scale = self._scales[level]
@@ -62,7 +62,7 @@ class NoiseTile:
 
 @lru_cache(maxsize=1)
 def _tiles() -> tuple[NoiseTile, NoiseTile]:
-    # the fine tile leaves long waves to the coarse one: they would show its period
+    # no long waves in the fine tile: its period would be visible; the coarse tile has them
     return NoiseTile(1, 0.75, 80.0), NoiseTile(2, 1.1, float(_SIDE))
 
 
@@ -70,36 +70,36 @@ FINE_TEXEL, COARSE_TEXEL = 0.006, 0.1  # metres
 
 
 def fine(p: Values, q: Values, w: Values, offset: float = 0.0) -> Values:
-    """Grain from 1 cm to half a metre, unit variance, at (p, q) metres averaged over `w` metres."""
-    # turned against the road so that no row of texels runs along it
+    """Return grain from 1 cm to half a metre, of unit variance, at (p, q) metres averaged over `w` metres."""
+    # rotated against the road, so that no row of texels runs along it
     x, y = 0.946 * p + 0.324 * q, 0.946 * q - 0.324 * p
     return _sample(_tiles()[0], x + np.float32(offset), y, w, FINE_TEXEL)
 
 
 def coarse(p: Values, q: Values, w: Values, offset: float = 0.0) -> Values:
-    """Patches from 20 cm to 50 m, unit variance, at (p, q) metres averaged over `w` metres."""
+    """Return patches from 20 cm to 50 m, of unit variance, at (p, q) metres averaged over `w` metres."""
     x, y = 0.79 * p - 0.613 * q, 0.79 * q + 0.613 * p
     return _sample(_tiles()[1], x + np.float32(offset), y, w, COARSE_TEXEL)
 
 
 def _sample(tile: NoiseTile, x: Values, y: Values, w: Values, texel: float) -> Values:
-    # the exponent's bits of a float32 are floor(log2): this is rint(log2(w / texel)), several times faster
+    # rint(log2(w / texel)) from the exponent bits of a float32, which is several times faster
     level = ((w * np.float32(np.sqrt(2) / texel)).view(np.int32) >> 23) - np.int32(127)
     scale = np.float32(1 / texel)
     return tile.sample(x * scale, y * scale, level)
 
 
 def band(x: Values, low: float | Values, high: float | Values, w: Values) -> Values:
-    """The share of a pixel of width `w` at `x` that lies between `low` and `high`."""
+    """Return the share of a pixel of width `w` at `x` that lies between `low` and `high`."""
     half = w / 2
     covered = np.minimum(x + half, high) - np.maximum(x - half, low)
     return np.asarray(np.maximum(covered, np.float32(0)) / w, np.float32)
 
 
 def bars(x: Values, period: float, width: float, w: Values) -> Values:
-    """The share of a pixel of width `w` at `x` that bars of `width`, one each `period`, cover."""
+    """Return the share of a pixel of width `w` at `x` that bars of `width`, one every `period`, cover."""
 
-    # the integral of the pattern: exact for a pixel of any width
+    # the difference of integrals of the pattern is exact for a pixel of any width
     def integral(t: NDArray[np.floating[Any]]) -> Values:
         whole = np.floor(t / np.float32(period))
         rest = np.minimum(t - whole * np.float32(period), np.float32(width))
@@ -110,7 +110,7 @@ def bars(x: Values, period: float, width: float, w: Values) -> Values:
 
 
 def cell(column: Values, row: Values) -> Values:
-    """A number in [0, 1) that belongs to a cell of a grid."""
-    # the classic shader hash, in float64: in float32 its sine would differ between platforms
+    """Return a pseudo-random number in [0, 1) for each cell of a grid."""
+    # the usual hash of shaders, in float64: in float32 its sine would differ between platforms
     mixed = np.sin(column * 12.9898 + row * 78.233) * 43758.5453
     return np.asarray(mixed - np.floor(mixed), np.float32)

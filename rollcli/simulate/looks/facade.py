@@ -1,4 +1,4 @@
-"""House fronts: plaster, plinths, windows and doors, one look a house."""
+"""House fronts: plaster, plinths, windows and doors."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.simulate.texture import Values, band, bars, cell, coarse, fine
+from rollcli.simulate.looks.texture import Values, band, bars, cell, coarse, fine
 
 _RIM = np.float32(0.1)  # the width of window frames, metres
 
@@ -15,8 +15,8 @@ _RIM = np.float32(0.1)  # the width of window frames, metres
 class Facade:
     """A row of houses; p runs along the street, q up from the sidewalk.
 
-    House i stands between edges[i] and edges[i + 1]; it has its own albedo, tint (N, 3), height of a storey
-    and width of a bay, one window each, metres.
+    House i stands between edges[i] and edges[i + 1]. It has an albedo, a tint (N, 3), a height of its storeys
+    and a width of its bays, both in metres; each bay of a storey has one window.
     """
 
     offset: float
@@ -40,7 +40,7 @@ class Facade:
         along, up = (p - self.edges[house]) / bay, q / storey
         column, row = np.floor(along), np.floor(up)
         x, y, own = (along - column) * bay, (up - row) * storey, cell(column + 31 * house, row)
-        # a bay in six of the ground floor has a door, which starts at the sidewalk
+        # one bay in six of the ground floor has a door instead of a window
         door = (row == 0) & (own < 0.17)
         low = np.where(door, np.float32(-1), np.float32(0.31) * storey)
         left, right, high = 0.30 * bay, 0.70 * bay, 0.79 * storey

@@ -1,15 +1,16 @@
-"""The kinds of scenes, each drawn from a frame's seeds."""
+"""Build the scenes, each drawn from the seeds of a frame."""
 
 from collections.abc import Iterator
 from itertools import groupby
 
 import numpy as np
 
-from rollcli.simulate.carriageway import Carriageway, draw_asphalt, draw_carriageway
-from rollcli.simulate.cross_section import Piece
-from rollcli.simulate.light import Light, draw_light
-from rollcli.simulate.materials import Plain
-from rollcli.simulate.roadside import (
+from rollcli.simulate.geometry.surfaces import Ground
+from rollcli.simulate.looks.materials import Plain
+from rollcli.simulate.scenes.carriageway import Carriageway, draw_asphalt, draw_carriageway
+from rollcli.simulate.scenes.cross_section import Piece
+from rollcli.simulate.scenes.light import Light, draw_light
+from rollcli.simulate.scenes.roadside import (
     add_backdrop,
     add_cars,
     add_grass,
@@ -20,15 +21,14 @@ from rollcli.simulate.roadside import (
     add_slope,
     add_trees,
 )
-from rollcli.simulate.scene import FAR, Scene, draw, draw_offset
+from rollcli.simulate.scenes.scene import FAR, Scene, draw, draw_offset
 from rollcli.simulate.spec import FrameSpec
-from rollcli.simulate.surfaces import Ground
 
 _HORIZON = 2000.0  # metres: the end of a bare world
 
 
 def build_scene(spec: FrameSpec) -> Scene:
-    """The scene of a frame: the same for the same scene name, curvature and seeds."""
+    """Build the scene of a frame: the same for the same kind of scene, road and seeds."""
     rng, light, carriageway = _begin(spec)
     scene = Scene(light, normal=carriageway.normal)
     scene.road = scene.material(draw_asphalt(rng, carriageway))
@@ -37,19 +37,19 @@ def build_scene(spec: FrameSpec) -> Scene:
 
 
 def road_camber(spec: FrameSpec) -> float:
-    """Curvature across the road below the rig, 1/(camera height): positive where both sides rise."""
+    """Return the curvature across the road below the rig, 1/(camera height); a crown is negative."""
     _, _, carriageway = _begin(spec)
     return carriageway.section.piece(0.0).curvature_at(0.0) * spec.height
 
 
 def _begin(spec: FrameSpec) -> tuple[np.random.Generator, Light, Carriageway]:
-    """What is drawn first, and the random numbers for the rest."""
+    """Draw the light and the carriageway; return them with the generator for the rest of the scene."""
     rng = spec.scene_rng()
     return rng, draw_light(rng), draw_carriageway(rng, spec)
 
 
 def _bare(scene: Scene, rng: np.random.Generator, carriageway: Carriageway) -> None:
-    """The road, and level grass from its edges to the horizon."""
+    """Add the road, and level grass from its edges to the horizon."""
     grass = add_grass(scene, rng)
     left, right = (
         Piece(*ends, offset=carriageway.section.elevation(edge))
@@ -63,7 +63,7 @@ def _bare(scene: Scene, rng: np.random.Generator, carriageway: Carriageway) -> N
 
 
 def _open(scene: Scene, rng: np.random.Generator, carriageway: Carriageway) -> None:
-    """Kerbs, sidewalks, lawns, trees, cars."""
+    """Add a road with kerbs, sidewalks, lawns, trees and cars."""
     _lay_road(scene, carriageway)
     grass = add_grass(scene, rng)
     for side, edge in carriageway.sides:
@@ -78,7 +78,7 @@ def _open(scene: Scene, rng: np.random.Generator, carriageway: Carriageway) -> N
 
 
 def _street(scene: Scene, rng: np.random.Generator, carriageway: Carriageway) -> None:
-    """A street between house fronts."""
+    """Add a street between house fronts."""
     _lay_road(scene, carriageway)
     yard = scene.material(Plain(0.3, tint=(0.9, 0.97, 1.0), offset=draw_offset(rng)))
     for side, edge in carriageway.sides:
@@ -93,7 +93,7 @@ def _street(scene: Scene, rng: np.random.Generator, carriageway: Carriageway) ->
 
 
 def _verge(scene: Scene, rng: np.random.Generator, carriageway: Carriageway) -> None:
-    """A country road between grass slopes that are wider than it is."""
+    """Add a country road between grass slopes that are wider than the road."""
     _lay_road(scene, carriageway)
     grass = add_grass(scene, rng)
     for side, edge in carriageway.sides:
@@ -119,7 +119,7 @@ def _road_strips(scene: Scene, carriageway: Carriageway) -> list[tuple[Piece, in
 
 
 def _grounds(carriageway: Carriageway, strips: list[tuple[Piece, int]], far: float) -> Iterator[Ground]:
-    """Pieces of ground and their materials, side by side; what continues a sheet is part of it."""
+    """Make the ground of pieces side by side with their materials; join pieces of one parabola."""
     for (slope, camber, offset), group in groupby(strips, key=lambda strip: strip[0][2:]):
         pieces, materials = zip(*group, strict=True)
         edges = (*(piece.start for piece in pieces), pieces[-1].end)

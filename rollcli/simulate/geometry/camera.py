@@ -1,4 +1,4 @@
-"""A pinhole camera on a rolled, pitched rig, and the pair of them.
+"""A pinhole camera, and the orientation of the rig that carries two of them.
 
 World axes: X right, Y up, Z along the driving direction; the origin lies on the road below the left camera.
 """
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.simulate.vectors import Array
+from rollcli.simulate.geometry.vectors import Array
 
 
 @dataclass(frozen=True)
@@ -52,14 +52,14 @@ class Camera:
     position: Array
 
     def rays(self, u: NDArray[Any], v: NDArray[Any]) -> Rays:
-        """The rays through pixel positions `u`, `v` (N,); (0, 0) is the centre of the top-left pixel."""
+        """Return the rays through positions `u`, `v` (N,), pixels from the centre of the top-left pixel."""
         right, down, forward = self.axes / np.array([[self.focal], [self.focal], [1.0]])
         x, y = u - self.centre[0], v - self.centre[1]
         direction = forward[:, None] + right[:, None] * x + down[:, None] * y
         return Rays(self.position[:, None], direction, right, down)
 
     def project(self, points: Array) -> tuple[Array, Array, Array]:
-        """Columns, rows (pixels) and depths (metres) of world points (3, N); depth may be negative."""
+        """Return columns, rows (pixels) and depths (metres) of world points (3, N); depths have a sign."""
         x, y, depth = self.axes @ (points - self.position[:, None])
         u = self.focal * x / depth + self.centre[0]
         v = self.focal * y / depth + self.centre[1]
@@ -67,7 +67,7 @@ class Camera:
 
 
 def rig_axes(roll: float, pitch: float, normal: Array) -> Array:
-    """Rows: the right, down and forward axes of a rig in the world, (3, 3).
+    """Return the right, down and forward axes of a rig in the world, as the rows of a (3, 3) array.
 
     The pitch acts on the levelled rig and the roll turns it about its own optical axis: only in this
     order is a row of the image, turned back by the roll, parallel to the road.
@@ -79,7 +79,7 @@ def rig_axes(roll: float, pitch: float, normal: Array) -> Array:
     pitch : float
         Radians; positive looks down at the road.
     normal : numpy.ndarray
-        (3,), of length one: upward from the plane that both angles are against.
+        (3,), of length one: the upward normal of the plane from which both angles are measured.
     """
     cos_r, sin_r = np.cos(roll), np.sin(roll)
     cos_p, sin_p = np.cos(pitch), np.sin(pitch)

@@ -1,21 +1,21 @@
-"""A scene: light, surfaces and what they look like."""
+"""A scene: its light, surfaces and materials."""
 
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from rollcli.simulate.light import Light
-from rollcli.simulate.materials import Material
-from rollcli.simulate.solids import Solid
-from rollcli.simulate.surfaces import Surface
-from rollcli.simulate.vectors import Array
+from rollcli.simulate.geometry.solids import Solid
+from rollcli.simulate.geometry.surfaces import Surface
+from rollcli.simulate.geometry.vectors import Array
+from rollcli.simulate.looks.materials import Material
+from rollcli.simulate.scenes.light import Light
 
-FAR = 180.0  # metres: where the ground ends before a backdrop of trees
+FAR = 180.0  # metres: the ground ends here, at a backdrop of trees
 
 
 @dataclass
 class Scene:
-    """What there is to see.
+    """The light, surfaces and materials of a scene.
 
     `cars` are the solids that dim the road below them, `road` is the road's material, and `normal` (3,)
     points upward from the plane that touches the road below the rig.
@@ -29,16 +29,16 @@ class Scene:
     road: int = 0
 
     def material(self, look: Material) -> int:
-        """Add a material; its index."""
+        """Add a material; return its index."""
         self.materials.append(look)
         return len(self.materials) - 1
 
 
 def draw(rng: np.random.Generator, low: float, high: float) -> float:
-    """A number between two."""
+    """Draw a number evenly from `low` to `high`."""
     return float(rng.uniform(low, high))
 
 
 def draw_offset(rng: np.random.Generator) -> float:
-    """Where a material reads the noise, metres: no two materials look alike."""
+    """Draw the offset at which a material reads its noise, metres, so that no two materials look alike."""
     return draw(rng, 0, 1000)

@@ -1,8 +1,8 @@
-"""What every surface of a scene answers, and the ground and walls that follow the course of the road.
+"""The interface of surfaces, and the ground and walls that follow the course of the road.
 
-A surface says how far along each ray it is met (`intersect`) and, at the points met, which way it faces
-and where its texture is to be read (`chart`). The road rises and bends as parabolas, so that each
-intersection is the root of a polynomial: exact, and without a step size.
+A surface computes where rays hit it (`intersect`) and, at these points, its normal and its texture
+coordinates (`sample`). The road rises, bends and is cambered as parabolas, so that each intersection is the
+root of a polynomial: exact, and without a step size.
 """
 
 from dataclasses import dataclass
@@ -11,17 +11,17 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.simulate.polynomials import first_crossing
-from rollcli.simulate.vectors import Array, Vectors
+from rollcli.simulate.geometry.polynomials import first_crossing
+from rollcli.simulate.geometry.vectors import Array, Vectors
 
-NEAR = 0.05  # metres: nothing nearer is met
-_SEAM = 1e-9  # metres: neighbouring grounds overlap by it, so that no ray slips between them
+NEAR = 0.05  # metres: nearer surfaces are not hit
+_SEAM = 1e-9  # metres: adjacent grounds overlap by it, so that rounding lets no ray pass between them
 _FARTHEST = 1e6  # metres
 
 Indices = NDArray[np.intp]
 
 
-class Chart(NamedTuple):
+class SurfaceSample(NamedTuple):
     """The surface at N points; vectors are (3, N), or (3, 1) where they are the same everywhere.
 
     `p` and `q` (N,) are texture coordinates in metres, `grad_p` and `grad_q` their gradients in the world;
@@ -37,16 +37,16 @@ class Chart(NamedTuple):
 
 
 class Surface(Protocol):
-    """What a ray can meet."""
+    """What a ray can hit."""
 
     def intersect(self, origin: Array, direction: Array) -> Array:
-        """Ray parameters (N,) of the first hits, inf where a ray misses; `origin` is (3, N or 1)."""
+        """Return the ray parameters (N,) of the first hits, inf for a miss; `origin` is (3, N) or (3, 1)."""
 
-    def chart(self, points: Array) -> Chart:
-        """Normals, texture coordinates and materials at points (3, N) on the surface."""
+    def sample(self, points: Array) -> SurfaceSample:
+        """Return normals, texture coordinates and materials at points (3, N) on the surface."""
 
     def bounds(self) -> Array | None:
-        """The corners of a box that holds the surface, (3, 8), or None for one without end."""
+        """Return the corners (3, 8) of a box around the surface; None for one without end."""
 
 
 @dataclass(frozen=True)
@@ -62,22 +62,22 @@ class Course:
     curvature: float = 0.0
 
     def lateral(self, points: Array) -> Array:
-        """Metres to the right of the course's line."""
+        """Return the distance to the right of the course, metres."""
         x, _, z = points
         return np.asarray(x - z * (self.heading + self.bend / 2 * z))
 
     def elevation(self, points: Array) -> Array:
-        """Metres above the course's line."""
+        """Return the height above the course, metres."""
         _, y, z = points
         return np.asarray(y - self.curvature / 2 * z * z)
 
     def point(self, lateral: float, z: float, elevation: float = 0.0) -> Array:
-        """The world point (3,) of road coordinates."""
+        """Return the world point (3,) of road coordinates."""
         x = lateral + z * (self.heading + self.bend / 2 * z)
         return np.array([x, elevation + self.curvature / 2 * z * z, z])
 
     def frame(self, z: float, slope: float = 0.0) -> Array:
-        """Rows: right, up and ahead of something that stands at `z` where the road has this slope, (3, 3)."""
+        """Return the right, up and ahead axes, rows of (3, 3), at `z` where the slope across is this."""
         ahead = np.array([self.heading + self.bend * z, self.curvature * z, 1.0])
         ahead /= np.linalg.norm(ahead)
         up = np.array([-slope, 1.0, 0.0]) - (ahead[1] - slope * ahead[0]) * ahead
@@ -85,7 +85,7 @@ class Course:
         return np.array([np.cross(up, ahead), up, ahead])
 
     def across(self, z: Array) -> Array:
-        """The gradient of `lateral` at points with these z, (3, N)."""
+        """Return the gradient (3, N) of `lateral` at points with these z."""
         return np.array([np.ones_like(z), np.zeros_like(z), -self.heading - self.bend * z])
 
 
@@ -113,7 +113,7 @@ class Ground:
         return np.where(inside, t, np.inf)
 
     def _first_hit(self, origin: Array, direction: Array) -> Array:
-        """Where rays first meet the sheet, without its edges; nan where they do not."""
+        """Return the ray parameters where rays first hit the sheet, edges ignored; nan where they miss."""
         (ox, oy, oz), (rx, ry, rz) = origin, direction
         lean = self.slope * self.course.bend - self.course.curvature
         a = lean / 2 * rz * rz
@@ -135,14 +135,14 @@ class Ground:
         t = first_crossing(np.array(terms), np.minimum(end, _FARTHEST))
         return np.where(t > NEAR, t, np.nan)
 
-    def chart(self, points: Array) -> Chart:
+    def sample(self, points: Array) -> SurfaceSample:
         z = points[2]
         across, lateral = self.course.across(z), self.course.lateral(points)
         normal = -(self.slope + self.camber * lateral) * across
         normal[1] += 1.0
         normal[2] -= self.course.curvature * z
         strip = np.clip(np.searchsorted(self.edges, lateral, side="right") - 1, 0, len(self.materials) - 1)
-        return Chart(normal, lateral, z, across, _AHEAD, np.array(self.materials)[strip])
+        return SurfaceSample(normal, lateral, z, across, _AHEAD, np.array(self.materials)[strip])
 
     def bounds(self) -> Array | None:
         return None
@@ -163,7 +163,7 @@ class Wall:
         (ox, oy, oz), (rx, ry, rz) = origin, direction
         heading, bend = self.course.heading, self.course.bend
         c = ox - oz * (heading + bend / 2 * oz) - self.lateral
-        side = np.where(c < 0, -1.0, 1.0)  # the solver wants the origin on the positive side
+        side = np.where(c < 0, -1.0, 1.0)  # first_root needs the origin on the positive side
         b = rx - rz * (heading + bend * oz)
         t = first_root(-side * bend / 2 * rz * rz, side * b, side * c)
         z = oz + t * rz
@@ -173,11 +173,11 @@ class Wall:
         top = self.tops[np.where(inside, section, 0)]
         return np.where(inside & (elevation >= self.base) & (elevation < top), t, np.inf)
 
-    def chart(self, points: Array) -> Chart:
+    def sample(self, points: Array) -> SurfaceSample:
         z = points[2]
         up = np.array([np.zeros_like(z), np.ones_like(z), -self.course.curvature * z])
         elevation = self.course.elevation(points)
-        return Chart(self.course.across(z), z, elevation, _AHEAD, up, self.material)
+        return SurfaceSample(self.course.across(z), z, elevation, _AHEAD, up, self.material)
 
     def bounds(self) -> Array | None:
         return None
@@ -202,23 +202,23 @@ class Backdrop:
         top = np.interp(place, np.arange(len(self.skyline)), self.skyline)
         return np.where((t > NEAR) & (elevation >= self.base) & (elevation < top), t, np.inf)
 
-    def chart(self, points: Array) -> Chart:
+    def sample(self, points: Array) -> SurfaceSample:
         elevation = self.course.elevation(points)
-        return Chart(-_AHEAD, points[0], elevation, _RIGHT, _UP, self.material)
+        return SurfaceSample(-_AHEAD, points[0], elevation, _RIGHT, _UP, self.material)
 
     def bounds(self) -> Array | None:
         return None
 
 
 def first_root(a: Array, b: Array, c: Array) -> Array:
-    """The first t > NEAR with a t^2 + b t + c = 0 where the ray starts at c > 0; nan where there is none.
+    """Return the first t > NEAR with a t^2 + b t + c = 0, where c > 0; nan where there is none.
 
-    Written as 2c / (-b + sqrt(disc)), which stays exact as `a` vanishes.
+    The form 2c / (-b + sqrt(discriminant)) stays exact as `a` vanishes.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         t = 2 * c / (np.sqrt(b * b - 4 * a * c) - b)
         return np.where((c > 0) & (t > NEAR) & (t < _FARTHEST), t, np.nan)
 
 
-# single precision: in double they would double the cost of shading
+# single precision: double precision would double the cost of shading
 _RIGHT, _UP, _AHEAD = np.eye(3, dtype=np.float32)[:, :, None]

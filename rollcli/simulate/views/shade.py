@@ -1,20 +1,20 @@
-"""The light that rays carry, from what they meet."""
+"""Shade the points that rays hit."""
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.simulate.light import sky
-from rollcli.simulate.materials import Material
-from rollcli.simulate.scene import Scene
-from rollcli.simulate.texture import Values
-from rollcli.simulate.trace import AIR, LONG, NONE, SHORT, SUN, P, Q
-from rollcli.simulate.vectors import Array, groups
+from rollcli.simulate.geometry.vectors import Array, groups
+from rollcli.simulate.looks.materials import Material
+from rollcli.simulate.looks.texture import Values
+from rollcli.simulate.scenes.light import sky
+from rollcli.simulate.scenes.scene import Scene
+from rollcli.simulate.views.trace import AIR, LONG, NONE, SHORT, SUN, P, Q
 
 _MAX_TAPS = 8
 
 
 def shade(scene: Scene, direction: Array, kinds: NDArray[np.int16], reads: Values) -> Values:
-    """The light (N, 3) that rays carry which go in `direction` (3, N); `kinds` and `reads` as in `Seen`."""
+    """Return the light (N, 3) of rays in `direction` (3, N); `kinds` are materials, `reads` as in `Hits`."""
     light = np.empty((len(kinds), 3), np.float32)
     nothing = kinds == NONE
     light[nothing] = sky(scene.light, direction[:, nothing])
@@ -28,7 +28,7 @@ def shade(scene: Scene, direction: Array, kinds: NDArray[np.int16], reads: Value
 
 
 def _albedo(material: Material, reads: Values) -> Values:
-    """Albedo over each pixel's footprint: taps along its long axis, each as wide as its short one."""
+    """Average the albedo over each pixel's footprint: taps along its long axis, as wide as its short one."""
     albedo = np.empty(reads.shape[1], np.float32)
     power = np.ceil(np.log2(np.clip(reads[LONG] / reads[SHORT], 1, _MAX_TAPS)) - 0.5).astype(np.int16)
     for k, at in groups(power, power.max() + 1):

@@ -1,11 +1,11 @@
-"""What surfaces look like: albedo at texture coordinates in metres, averaged over the pixel."""
+"""Materials: albedo at texture coordinates in metres, averaged over the pixel."""
 
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
-from rollcli.simulate.texture import Values, band, bars, cell, coarse, fine
+from rollcli.simulate.looks.texture import Values, band, bars, cell, coarse, fine
 
 Tint = tuple[float, float, float]  # blue, green, red; multiplies the albedo
 
@@ -14,18 +14,18 @@ WARM: Tint = (0.95, 0.98, 1.0)
 
 
 class Material(Protocol):
-    """The look of a surface."""
+    """The appearance of a surface."""
 
     def albedo(self, p: Values, q: Values, w: Values) -> Values:
-        """Reflectance, 0 to 1, at (p, q) metres averaged over `w` metres."""
+        """Return the reflectance, 0 to 1, at (p, q) metres, averaged over `w` metres."""
 
     def colour(self, p: Values, q: Values) -> Values:
-        """What to multiply the albedo with in blue, green and red: (3,) or (N, 3)."""
+        """Return the factors of the albedo in blue, green and red: (3,) or (N, 3)."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Tinted:
-    """A material of one colour; `offset` moves its noise, so that no two are alike."""
+    """A material of one colour; `offset` shifts its noise, so that no two look alike."""
 
     tint: Tint = GREY
     offset: float = 0.0
@@ -36,7 +36,7 @@ class _Tinted:
 
 @dataclass(frozen=True)
 class Plain(_Tinted):
-    """One albedo with grain and blotches, and joints each `joint` metres when that is not 0."""
+    """One albedo with grain and blotches, and with joints every `joint` metres where that is not 0."""
 
     level: float
     grain: float = 0.1
@@ -67,7 +67,7 @@ class Leaves(_Tinted):
 
 @dataclass(frozen=True)
 class Mark:
-    """A painted line at `lateral`; dashes of `dash` metres each `period`, or solid when that is 0."""
+    """A painted line at `lateral`, with a dash of `dash` metres every `period` metres; 0: a solid line."""
 
     lateral: float
     width: float
@@ -77,7 +77,7 @@ class Mark:
 
 @dataclass(frozen=True)
 class Patch:
-    """A rectangle of the road, mended or worn: its albedo changes by the share `change`."""
+    """A rectangle of the road, mended or worn, whose albedo changes by the share `change`."""
 
     left: float
     right: float
@@ -112,7 +112,7 @@ class Asphalt(_Tinted):
             inside = band(p[at], patch.left, patch.right, w[at]) * band(q[at], patch.start, patch.end, w[at])
             base[at] += np.float32(patch.change) * inside
         for seam in self.seams:
-            # a line of tar that wanders with the blotches of the surface
+            # the line of tar follows the blotches of the surface to the left and right
             at = np.flatnonzero(np.abs(p - np.float32(seam)) < 0.6)
             place = p[at] + np.float32(0.12) * blotch[at]
             base[at] *= 1 - np.float32(0.45) * band(place, seam - 0.02, seam + 0.02, w[at])
@@ -129,7 +129,7 @@ class Asphalt(_Tinted):
 
 @dataclass(frozen=True)
 class Paving(_Tinted):
-    """Sidewalk slabs with joints, each slab of its own brightness."""
+    """Slabs of a sidewalk with joints between them; each slab has a brightness of its own."""
 
     level: float
     slab: float
@@ -138,7 +138,7 @@ class Paving(_Tinted):
         noise = 0.1 * fine(p, q, w, self.offset) + 0.1 * coarse(p, q, w, self.offset)
         own = cell(np.floor(p / self.slab), np.floor(q / self.slab)) - 0.5
         joints = np.maximum(bars(p, self.slab, 0.015, w), bars(q, self.slab, 0.015, w))
-        # slabs smaller than the pixel average out
+        # slabs smaller than a pixel average out
         base = 1 + noise + 0.25 * own * np.clip(1.5 - w / self.slab, 0, 1)
         return np.asarray(self.level * np.maximum(base * (1 - 0.6 * joints), 0.1), np.float32)
 

@@ -1,4 +1,4 @@
-"""The light of a scene: sun, sky, the shadows that things cast and the dimness below cars."""
+"""The light of a scene: sun, sky, shadows, and the lack of sky light below cars."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,15 +6,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.simulate.solids import Solid
-from rollcli.simulate.surfaces import Surface
-from rollcli.simulate.texture import Values, coarse
-from rollcli.simulate.vectors import Array, dots
+from rollcli.simulate.geometry.solids import Solid
+from rollcli.simulate.geometry.surfaces import Surface
+from rollcli.simulate.geometry.vectors import Array, dots
+from rollcli.simulate.looks.texture import Values, coarse
 
 
 @dataclass(frozen=True)
 class Light:
-    """The sun's direction (3,), the share of light that comes from everywhere, and the exposure.
+    """The direction to the sun (3,), the share of ambient light, the exposure, and an offset of the clouds.
 
     Under an overcast sky (`ambient` above 0.6) nothing casts a shadow.
     """
@@ -26,12 +26,12 @@ class Light:
 
     @property
     def sunny(self) -> bool:
-        """Whether things cast shadows."""
+        """Whether objects cast shadows."""
         return self.ambient < 0.6
 
 
 def draw_light(rng: np.random.Generator) -> Light:
-    """Every second scene has sun."""
+    """Draw the light; on average every second scene has sun."""
     height, azimuth = rng.uniform(0.45, 1.2), rng.uniform(-np.pi, np.pi)
     sun = np.array([np.cos(height) * np.sin(azimuth), np.sin(height), np.cos(height) * np.cos(azimuth)])
     ambient = rng.uniform(0.28, 0.45) if rng.random() < 0.5 else rng.uniform(0.7, 0.9)
@@ -39,18 +39,18 @@ def draw_light(rng: np.random.Generator) -> Light:
 
 
 def in_shadow(points: Array, sun: Array, casters: Sequence[Surface]) -> NDArray[np.bool_]:
-    """Which of the points (3, N) have a caster between them and the sun."""
+    """Tell which of the points (3, N) have a caster between them and the sun."""
     shadow = np.zeros(points.shape[1], bool)
-    # seen along the sun's rays, a caster covers what lies within its outline
+    # projected along the sun's rays, a caster covers the points within its outline
     across = np.cross(sun, [0.0, 1.0, 0.0])
     axes = np.array([across / np.linalg.norm(across), np.cross(across, sun) / np.linalg.norm(across)])
-    seen = dots(axes, points)
+    projected = dots(axes, points)
     for caster in casters:
         corners = caster.bounds()
         inside = ~shadow
         if corners is not None:
             outline = dots(axes, corners)
-            for place, low, high in zip(seen, outline.min(axis=1), outline.max(axis=1), strict=True):
+            for place, low, high in zip(projected, outline.min(axis=1), outline.max(axis=1), strict=True):
                 inside &= (place > low) & (place < high)
         at = np.flatnonzero(inside)
         if len(at):
@@ -60,7 +60,7 @@ def in_shadow(points: Array, sun: Array, casters: Sequence[Surface]) -> NDArray[
 
 
 def air_below(points: Array, car: Solid) -> Values:
-    """The share of the sky's light that reaches ground points (3, N) near and below a car."""
+    """Return the share of the sky's light that reaches ground points (3, N) near and below a car."""
     right, _, ahead = dots(car.frame, points - car.place[:, None])
     across, _, along = car.extent
     beside = np.maximum(np.maximum(across[0] - right, right - across[1]) + 0.2, 0)
@@ -69,7 +69,7 @@ def air_below(points: Array, car: Solid) -> Values:
 
 
 def sky(light: Light, direction: Array) -> Values:
-    """The sky's colour (N, 3) along directions (3, N): pale at the horizon, with clouds."""
+    """Return the sky's colour (N, 3) in directions (3, N): pale at the horizon, with clouds."""
     x, y, z = (direction / np.linalg.norm(direction, axis=0)).astype(np.float32)
     rise = np.clip(y, 0, 1)
     flat = np.float32(60) / (rise + np.float32(0.15))

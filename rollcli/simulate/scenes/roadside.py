@@ -1,24 +1,24 @@
-"""What stands beside a road and on it. Each function draws its things and adds them to the scene.
+"""Objects beside a road and on it. Each function draws its objects and adds them to the scene.
 
-`side` is -1 on the left and 1 on the right; lateral positions and heights are metres in road coordinates.
+`side` is -1 on the left and 1 on the right; lateral positions and elevations are metres in road coordinates.
 """
 
 import numpy as np
 
-from rollcli.simulate.carriageway import Carriageway
-from rollcli.simulate.cars import box, car_materials, vehicle
-from rollcli.simulate.facade import Facade
-from rollcli.simulate.materials import WARM, Leaves, Paving, Plain, Tint
-from rollcli.simulate.scene import FAR, Scene, draw, draw_offset
-from rollcli.simulate.solids import Crown, Post, Solid
-from rollcli.simulate.surfaces import Backdrop, Course, Ground, Wall
+from rollcli.simulate.geometry.solids import Post, Solid, TreeCrown
+from rollcli.simulate.geometry.surfaces import Backdrop, Course, Ground, Wall
+from rollcli.simulate.looks.facade import Facade
+from rollcli.simulate.looks.materials import WARM, Leaves, Paving, Plain, Tint
+from rollcli.simulate.scenes.carriageway import Carriageway
+from rollcli.simulate.scenes.cars import box, car_materials, vehicle
+from rollcli.simulate.scenes.scene import FAR, Scene, draw, draw_offset
 
 _GRASS: Tint = (0.45, 1.0, 0.72)
 _FOREST: Tint = (0.55, 1.0, 0.75)
 
 
 def add_grass(scene: Scene, rng: np.random.Generator) -> int:
-    """The material of lawns and verges."""
+    """Add the material of lawns and verges; return its index."""
     look = Leaves(draw(rng, 0.14, 0.24), draw(rng, 0.15, 0.3), tint=_GRASS, offset=draw_offset(rng))
     return scene.material(look)
 
@@ -33,7 +33,7 @@ def add_slope(
     slope: float,
     material: int,
 ) -> None:
-    """Ground from `start` outward to `end`, at `level` where it starts; a `slope` > 0 rises outward."""
+    """Add ground from `start` outward to `end`, which starts at elevation `level` with an outward `slope`."""
     signed = side * slope
     edges = (start, end) if side > 0 else (end, start)
     scene.surfaces.append(Ground(carriageway.course, edges, (material,), FAR, signed, level - signed * start))
@@ -47,7 +47,10 @@ def add_sidewalk(
     edge: float,
     beyond: int | None = None,
 ) -> tuple[float, float]:
-    """A kerb and a sidewalk, and what lies level `beyond` them; their elevation and where they end."""
+    """Add a kerb, a sidewalk and, of the material `beyond`, level ground behind it.
+
+    Returns the sidewalk's elevation and the lateral position of its outer edge.
+    """
     height, width = draw(rng, *carriageway.kerb), draw(rng, 1.5, 3.5)
     base = carriageway.section.elevation(edge)
     level = base + height
@@ -67,7 +70,7 @@ def add_sidewalk(
 def add_houses(
     scene: Scene, rng: np.random.Generator, course: Course, side: int, front: float, base: float
 ) -> None:
-    """A row of house fronts with gaps, and the bodies of the houses behind them."""
+    """Add a row of house fronts with gaps, and the bodies of the houses behind them."""
     n = 24
     widths, storeys = rng.uniform(7, 16, n), rng.uniform(2.8, 3.4, n)
     edges = -20 + np.concatenate([[0.0], np.cumsum(widths)])
@@ -79,14 +82,14 @@ def add_houses(
     look = Facade(draw_offset(rng), *looks)
     scene.surfaces.append(Wall(course, front, base, edges, base + heights, scene.material(look)))
     before = np.concatenate([[0.0], heights[:-1]])
-    # of a house's body only the gable above the house before it can be seen from the street
+    # the only part of a body that is visible from the street is the gable above the house before it
     for i in np.flatnonzero((heights > before + 0.3) & (edges[:-1] > 3) & (edges[:-1] < 120)):
         tint = tuple(float(x) for x in tints[i])
         plaster = scene.material(Plain(float(0.9 * levels[i]), tint=(tint[0], tint[1], tint[2])))
         height, half, depth = float(heights[i]), float(widths[i] / 2), 5.0
         extent = np.array([[-depth, depth], [0.0, height], [-half, half]])
         middle = float(edges[i] + half)
-        # set back, so that the straight body stays behind the bent front
+        # set back: the body is straight, and must stay behind a front that follows the bend
         place = course.point(front + side * (depth + 0.25), middle, base)
         body = box(depth, height, half, plaster)
         scene.surfaces.append(Solid(course.frame(middle), place, (body,), extent))
@@ -95,7 +98,7 @@ def add_houses(
 def add_hedge(
     scene: Scene, rng: np.random.Generator, carriageway: Carriageway, lateral: float, base: float
 ) -> None:
-    """A clipped hedge along the road."""
+    """Add a clipped hedge along the road."""
     tint = (0.42, 1.0, 0.62)
     material = scene.material(Leaves(draw(rng, 0.08, 0.16), 0.4, tint=tint, offset=draw_offset(rng)))
     edges = np.arange(-20.0, 120.0, 1.0, dtype=np.float64)
@@ -112,7 +115,7 @@ def add_posts(
     radius: float = 0.07,
     height: float = 6.0,
 ) -> None:
-    """Lamp posts or delineators, evenly spaced."""
+    """Add lamp posts or delineators, evenly spaced."""
     metal = scene.material(Plain(draw(rng, 0.2, 0.6), 0.05, 0.05))
     gap = draw(rng, 18, 35)
     for z in np.arange(draw(rng, 6, gap), 90, gap):
@@ -122,7 +125,7 @@ def add_posts(
 def add_trees(
     scene: Scene, rng: np.random.Generator, carriageway: Carriageway, near: float, outer: float, level: float
 ) -> None:
-    """Trees between two lateral positions, each a trunk and two crowns grown into each other."""
+    """Add trees between two lateral positions, each a trunk and two crowns that overlap."""
     bark = scene.material(Plain(0.12, 0.3, 0.2, tint=(0.75, 0.9, 1.0)))
     tint = (0.42, 1.0, draw(rng, 0.55, 0.8))
     leaves = scene.material(Leaves(draw(rng, 0.10, 0.2), 0.4, tint=tint, offset=draw_offset(rng)))
@@ -135,14 +138,14 @@ def add_trees(
         lower = top + np.array([draw(rng, -0.8, 0.8), -0.3 * half, draw(rng, -0.8, 0.8)])
         scene.surfaces += [
             Post(foot, draw(rng, 0.1, 0.2), stem + half, bark),
-            Crown(top, radius, half, leaves),
-            Crown(lower, 1.1 * radius, 0.6 * half, leaves),
+            TreeCrown(top, radius, half, leaves),
+            TreeCrown(lower, 1.1 * radius, 0.6 * half, leaves),
         ]
         z += draw(rng, 7, 25)
 
 
 def add_cars(scene: Scene, rng: np.random.Generator, carriageway: Carriageway) -> None:
-    """One ahead, one oncoming, and parked ones, each there or not."""
+    """Add vehicles: one ahead, one oncoming and parked ones, each with a probability."""
     places: list[tuple[float, float]] = []
     if rng.random() < 0.5:
         places.append((carriageway.shift + rng.normal(0, 0.2), rng.uniform(9, 40)))
@@ -165,7 +168,7 @@ def add_cars(scene: Scene, rng: np.random.Generator, carriageway: Carriageway) -
 
 
 def add_backdrop(scene: Scene, rng: np.random.Generator, carriageway: Carriageway) -> None:
-    """A line of trees where the ground ends."""
+    """Add a line of trees where the ground ends."""
     look = Leaves(draw(rng, 0.10, 0.2), scale=0.15, tint=_FOREST, offset=draw_offset(rng))
     steps = rng.normal(0, 1.2, 400)
     skyline = 9 + np.convolve(steps, np.ones(9) / 3, mode="same") + rng.uniform(-1, 1, 400)

@@ -1,20 +1,20 @@
-"""What one camera sees of a scene, in bands of rows so that memory does not grow with the image."""
+"""Render the image of one camera, in bands of rows so that memory does not grow with the image."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.simulate.camera import Camera
-from rollcli.simulate.pixels import Pixels
-from rollcli.simulate.scene import Scene
-from rollcli.simulate.shade import shade
-from rollcli.simulate.texture import Values
-from rollcli.simulate.trace import SUN, Seen, trace
-from rollcli.simulate.vectors import Array
+from rollcli.simulate.geometry.camera import Camera
+from rollcli.simulate.geometry.pixels import PixelRays
+from rollcli.simulate.geometry.vectors import Array
+from rollcli.simulate.looks.texture import Values
+from rollcli.simulate.scenes.scene import Scene
+from rollcli.simulate.views.shade import shade
+from rollcli.simulate.views.trace import SUN, Hits, trace
 
-_BAND = 350_000  # pixels: a picture of 640x480 is one band
-# four positions inside a pixel, no two in a row or a column
+_BAND = 350_000  # pixels; an image of 640x480 is one band
+# four positions inside a pixel, no two in the same row or column
 _SUBPIXELS = np.array([[-0.375, -0.125], [0.125, -0.375], [0.375, 0.125], [-0.125, 0.375]])
 
 
@@ -28,7 +28,7 @@ class View:
 
 
 def render_view(scene: Scene, camera: Camera) -> View:
-    """Render a camera's image; pixels at the edges of things are averaged from four rays."""
+    """Render the image of a camera; pixels at edges are the mean of four rays."""
     bands = [_render_band(scene, camera, rows) for rows in _bands(camera)]
     return View(
         np.concatenate([band.depth for band in bands]),
@@ -38,9 +38,9 @@ def render_view(scene: Scene, camera: Camera) -> View:
 
 
 def depths(scene: Scene, camera: Camera) -> tuple[Array, NDArray[np.int16]]:
-    """Depth and material (H, W) of a camera's image, as in `View`, without its light."""
+    """Return depth and material (H, W) of a camera's image, as in `View`, without rendering its light."""
     shape = (camera.height, camera.width)
-    bands = [trace(scene, Pixels.of_rows(camera, rows)) for rows in _bands(camera)]
+    bands = [trace(scene, PixelRays.of_rows(camera, rows)) for rows in _bands(camera)]
     depth = np.concatenate([band.depth for band in bands])
     return depth.reshape(shape), np.concatenate([band.material for band in bands]).reshape(shape)
 
@@ -51,35 +51,35 @@ def _bands(camera: Camera) -> list[range]:
 
 
 def _render_band(scene: Scene, camera: Camera, rows: range) -> View:
-    """The part of a camera's image in these rows."""
-    # with a row more above and below: edges are where neighbours differ
+    """Render these rows of a camera's image."""
+    # one more row above and below: an edge is where a pixel differs from its neighbour
     around = range(max(rows.start - 1, 0), min(rows.stop + 1, camera.height))
-    pixels = Pixels.of_rows(camera, around)
-    seen = trace(scene, pixels)
-    edge = np.flatnonzero(_edges(seen, camera.width))
+    pixels = PixelRays.of_rows(camera, around)
+    hits = trace(scene, pixels)
+    edge = np.flatnonzero(_edges(hits, camera.width))
     u = (pixels.u[edge] + _SUBPIXELS[:, :1]).ravel()
     v = (pixels.v[edge] + _SUBPIXELS[:, 1:]).ravel()
-    between = Pixels.at(camera, u, v)
+    between = PixelRays.at(camera, u, v)
     finer = trace(scene, between)
     light = shade(
         scene,
         np.concatenate([pixels.rays.direction, between.rays.direction], axis=1),
-        np.concatenate([seen.material, finer.material]),
-        np.concatenate([seen.reads, finer.reads], axis=1),
+        np.concatenate([hits.material, finer.material]),
+        np.concatenate([hits.reads, finer.reads], axis=1),
     )
     light[edge] = light[len(pixels.u) :].reshape(4, -1, 3).mean(axis=0)
     shape, inner = (len(around), camera.width), slice(rows.start - around.start, rows.stop - around.start)
     return View(
-        seen.depth.reshape(shape)[inner],
-        seen.material.reshape(shape)[inner],
+        hits.depth.reshape(shape)[inner],
+        hits.material.reshape(shape)[inner],
         light[: len(pixels.u)].reshape(*shape, 3)[inner],
     )
 
 
-def _edges(seen: Seen, width: int) -> NDArray[np.bool_]:
-    """Pixels of which a neighbour shows something else, or lies in shadow where they do not."""
-    shadow = seen.reads[SUN] == 0
-    kind = (seen.surface.astype(np.int32) << 17) + (seen.material.astype(np.int32) << 1) + shadow
+def _edges(hits: Hits, width: int) -> NDArray[np.bool_]:
+    """Find pixels that differ from a neighbour in surface, material or shadow."""
+    shadow = hits.reads[SUN] == 0
+    kind = (hits.surface.astype(np.int32) << 17) + (hits.material.astype(np.int32) << 1) + shadow
     kind = kind.reshape(-1, width)
     edge = np.zeros(kind.shape, bool)
     beside, below = np.diff(kind, axis=1) != 0, np.diff(kind, axis=0) != 0

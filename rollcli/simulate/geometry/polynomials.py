@@ -4,17 +4,17 @@ from itertools import pairwise
 
 import numpy as np
 
-from rollcli.simulate.vectors import Array
+from rollcli.simulate.geometry.vectors import Array
 
 _MOST_STEPS = 80  # bisection alone reaches the precision of a double in 60
 _PRECISION = 1e-12  # of a step of Newton's; the next one would be its square
 
 
 def first_crossing(coefficients: Array, end: Array) -> Array:
-    """The first place from 0 to `end` (N,) where polynomials that are positive at 0 reach 0.
+    """Find the first root in (0, `end`] of polynomials that are positive at 0.
 
-    Between its turning points, the roots of its derivative, a polynomial is monotone: it has one root
-    there or none, and the signs at both ends tell which.
+    Between the roots of its derivative a polynomial is monotone: it has one root there or none, and the signs
+    at both ends tell which.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ def first_crossing(coefficients: Array, end: Array) -> Array:
     Returns
     -------
     numpy.ndarray
-        (N,); nan where there is no such place, or the polynomial is not positive at 0.
+        (N,); nan where there is no such root, or the polynomial is not positive at 0.
     """
     found = np.full(end.shape, np.nan)
     searched = coefficients[0] > 0
@@ -39,7 +39,7 @@ def first_crossing(coefficients: Array, end: Array) -> Array:
 
 
 def _turning_points(coefficients: Array, end: Array) -> list[Array]:
-    """0, `end` and places between in ascending order: from one to the next the polynomials are monotone."""
+    """Return ascending points from 0 to `end`, from one to the next of which the polynomials are monotone."""
     if len(coefficients) == 2:
         return [np.zeros_like(end), end]
     derivative = coefficients[1:] * np.arange(1.0, len(coefficients))[:, None]
@@ -54,9 +54,9 @@ def _turning_points(coefficients: Array, end: Array) -> list[Array]:
 
 
 def _roots(coefficients: Array, low: Array, high: Array) -> Array:
-    """The root of each polynomial between `low` and `high`, where its signs differ.
+    """Find the root of each polynomial between `low` and `high`, at which its signs differ.
 
-    Newton's steps; a step that would leave the bracket is replaced by bisection.
+    Takes Newton's steps, and bisects where a step would leave the bracket.
     """
     root, moving = (low + high) / 2, np.arange(len(low))
     derivative = coefficients[1:] * np.arange(1.0, len(coefficients))[:, None]
@@ -78,7 +78,7 @@ def _roots(coefficients: Array, low: Array, high: Array) -> Array:
 
 
 def _values(coefficients: Array, at: Array) -> Array:
-    """The polynomials at `at`, by Horner's rule."""
+    """Evaluate the polynomials at `at` by Horner's rule."""
     value = coefficients[-1].copy()
     for coefficient in coefficients[-2::-1]:
         value = value * at + coefficient

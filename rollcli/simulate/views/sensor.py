@@ -1,10 +1,10 @@
-"""What a sensor makes of the light that falls on it."""
+"""Turn light into the grey levels of a sensor."""
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.simulate.texture import Values
-from rollcli.simulate.vectors import dot
+from rollcli.simulate.geometry.vectors import dot
+from rollcli.simulate.looks.texture import Values
 
 _GREY = np.array([0.114, 0.587, 0.299], np.float32)  # BT.601, as OpenCV's grey
 
@@ -12,7 +12,7 @@ _GREY = np.array([0.114, 0.587, 0.299], np.float32)  # BT.601, as OpenCV's grey
 def expose(
     light: Values, noise: float, gain: float, colour: bool, rng: np.random.Generator
 ) -> NDArray[np.uint8]:
-    """Vignetting, gamma, noise and eight bits: (H, W, 3), or (H, W) when not in colour.
+    """Apply vignetting, gamma and noise, and quantise to eight bits: (H, W, 3), or (H, W) when not in colour.
 
     `light` is (H, W, 3), 1 at saturation; `noise` in grey levels; `gain` multiplies the brightness.
     """

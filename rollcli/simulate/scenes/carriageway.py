@@ -4,20 +4,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rollcli.simulate.cross_section import CrossSection, cross_section
-from rollcli.simulate.materials import Asphalt, Mark, Patch
+from rollcli.simulate.geometry.surfaces import Course
+from rollcli.simulate.geometry.vectors import Array
+from rollcli.simulate.looks.materials import Asphalt, Mark, Patch
 from rollcli.simulate.options import GUTTER_WIDTH
-from rollcli.simulate.scene import FAR, draw, draw_offset
+from rollcli.simulate.scenes.cross_section import CrossSection, cross_section
+from rollcli.simulate.scenes.scene import FAR, draw, draw_offset
 from rollcli.simulate.spec import FrameSpec
-from rollcli.simulate.surfaces import Course
-from rollcli.simulate.vectors import Array
 
 
 @dataclass(frozen=True)
 class Carriageway:
-    """One or two lanes between two edges (lateral, metres); the middle of ours, the right one, is `shift`.
+    """One or two lanes between two edges (lateral, metres).
 
-    `kerb` is the lowest and the highest kerb, metres.
+    The rig drives in the right lane, whose middle is at `shift`. `kerb` is the lowest and the highest kerb,
+    metres.
     """
 
     course: Course
@@ -32,7 +33,7 @@ class Carriageway:
 
     @property
     def sides(self) -> tuple[tuple[int, float], tuple[int, float]]:
-        """-1 and the left edge, 1 and the right edge."""
+        """The two sides: -1 with the left edge, 1 with the right edge."""
         return (-1, self.left), (1, self.right)
 
     @property
@@ -44,7 +45,7 @@ class Carriageway:
 
 
 def draw_carriageway(rng: np.random.Generator, spec: FrameSpec) -> Carriageway:
-    """Half of the roads bend; country roads can have a single lane, others room to park."""
+    """Draw a carriageway: half of them bend; country roads can have a single lane, others room to park."""
     bend = float(rng.choice([0.0, 1.0])) * draw(rng, -1 / 250, 1 / 250)
     heading = float(rng.normal(0, 0.015))
     course = Course(heading, 0.0 if spec.scene == "bare" else bend, spec.curvature)
@@ -61,7 +62,7 @@ def draw_carriageway(rng: np.random.Generator, spec: FrameSpec) -> Carriageway:
 
 
 def draw_asphalt(rng: np.random.Generator, carriageway: Carriageway) -> Asphalt:
-    """Its marks, gutters, mended patches and seams."""
+    """Draw the carriageway's surface: its marks, gutters, mended patches and seams."""
     middle, left, right = (carriageway.shift + x * carriageway.lane for x in (-0.5, -1.5, 0.5))
     marks = []
     if not carriageway.single:

@@ -1,22 +1,22 @@
-"""Cars and trucks, put together from convex solids."""
+"""Cars and trucks, built from convex solids."""
 
 from typing import NamedTuple
 
 import numpy as np
 
-from rollcli.simulate.cross_section import Piece
-from rollcli.simulate.materials import GREY, CarPaint, Glass, Material, Plain, Tint
-from rollcli.simulate.solids import Part, Solid
-from rollcli.simulate.surfaces import Course
-from rollcli.simulate.vectors import Array
+from rollcli.simulate.geometry.solids import ConvexPart, Solid
+from rollcli.simulate.geometry.surfaces import Course
+from rollcli.simulate.geometry.vectors import Array
+from rollcli.simulate.looks.materials import GREY, CarPaint, Glass, Material, Plain, Tint
+from rollcli.simulate.scenes.cross_section import Piece
 
 Outline = tuple[tuple[float, float], ...]
 
 
 class _Shape(NamedTuple):
-    """A convex outline seen from the right, (ahead, up) in metres, clockwise, drawn out to both sides.
+    """A convex outline seen from the right, (ahead, up) in metres, clockwise, extruded to both sides.
 
-    `taper` leans the sides inward; `centre` is to the right of the middle.
+    `taper` is the inward slope of the sides, `centre` the offset to the right of the middle, metres.
     """
 
     outline: Outline
@@ -35,7 +35,7 @@ def _wheel(ahead: float, radius: float) -> Outline:
     return tuple((ahead + radius * float(np.cos(a)), radius + radius * float(np.sin(a))) for a in angles)
 
 
-_FAR = 40.0  # metres: beyond, a vehicle is drawn without its small parts
+_FAR = 40.0  # metres: vehicles farther away are drawn without their small parts
 _SILHOUETTE = 5
 
 _PAINTS: tuple[tuple[float, Tint], ...] = (
@@ -50,7 +50,7 @@ _GLASS, _BLACK, _RED, _WHITE, _CARGO = range(len(_PAINTS), len(_PAINTS) + 5)
 
 
 def car_materials(offset: float) -> list[Material]:
-    """What `vehicle` counts on, in this order: paints, glass, tyres, red and white lights, cargo boxes."""
+    """Return the materials of `vehicle` in order: paints, glass, tyres, red and white lights, cargo box."""
     paints: list[Material] = [CarPaint(level, tint=tint, offset=offset) for level, tint in _PAINTS]
     return [
         *paints,
@@ -71,9 +71,9 @@ def vehicle(
     first_material: int,
     oncoming: bool,
 ) -> Solid:
-    """A car, or one time in six a truck, at (lateral, z) on the ground, its nose ahead or toward us.
+    """Draw a car, or with a probability of 1/6 a truck, at (lateral, z) on the ground.
 
-    Its materials are those of `car_materials`, from `first_material` on.
+    An oncoming one faces the camera. `first_material` is the index of the first of `car_materials`.
     """
     paint, tall = int(rng.integers(len(_PAINTS))), float(rng.uniform(0.95, 1.25))
     shapes = _truck(paint) if rng.random() < 1 / 6 else _car(paint)
@@ -132,8 +132,8 @@ def _truck(paint: int) -> tuple[_Shape, ...]:
     )
 
 
-def _extrude(shape: _Shape, tall: float, material: int) -> Part:
-    """The solid of a shape made `tall` times as high."""
+def _extrude(shape: _Shape, tall: float, material: int) -> ConvexPart:
+    """Return the solid of a shape whose heights are multiplied by `tall`."""
     outline: Array = np.array(shape.outline) * [1.0, tall]
     edges = np.roll(outline, -1, axis=0) - outline
     out = np.stack([np.zeros(len(edges)), edges[:, 0], -edges[:, 1]], axis=1)
@@ -142,10 +142,12 @@ def _extrude(shape: _Shape, tall: float, material: int) -> Part:
     heights = out[:, 2] * outline[:, 0] + out[:, 1] * outline[:, 1]
     offsets = np.concatenate([heights, [reach + shape.centre, reach - shape.centre]])
     length = np.linalg.norm(normals, axis=1)
-    return Part(normals / length[:, None], offsets / length, material)
+    return ConvexPart(normals / length[:, None], offsets / length, material)
 
 
-def box(half_width: float, height: float, half_length: float, material: int) -> Part:
-    """A box that stands on its frame's origin."""
+def box(half_width: float, height: float, half_length: float, material: int) -> ConvexPart:
+    """Return a box that stands on the origin of its frame."""
     normals = np.concatenate([np.eye(3), -np.eye(3)])
-    return Part(normals, np.array([half_width, height, half_length, half_width, 0.0, half_length]), material)
+    return ConvexPart(
+        normals, np.array([half_width, height, half_length, half_width, 0.0, half_length]), material
+    )

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from rollcli.simulate.cars import vehicle
-from rollcli.simulate.cross_section import Piece
-from rollcli.simulate.solids import Crown, Post
-from rollcli.simulate.surfaces import Backdrop, Course, Ground, Wall
+from rollcli.simulate.geometry.solids import Post, TreeCrown
+from rollcli.simulate.geometry.surfaces import Backdrop, Course, Ground, Wall
+from rollcli.simulate.scenes.cars import vehicle
+from rollcli.simulate.scenes.cross_section import Piece
 
 COURSE = Course(heading=0.03, bend=1 / 300, curvature=0.001)
 ORIGIN = np.array([[0.3], [1.6], [0.1]])
@@ -15,7 +15,7 @@ WALL = Wall(COURSE, -6.0, 0.0, np.array([-5.0, 20.0, 50.0]), np.array([9.0, 4.0]
 BACKDROP = Backdrop(COURSE, 60.0, -5.0, np.full(200, 7.0), 0)
 CAR = vehicle(np.random.default_rng(3), COURSE, Piece(-5, 5), 1.0, 9.0, 0, oncoming=True)
 POST = Post(COURSE.point(2.0, 8.0), 0.3, 4.0, 0)
-CROWN = Crown(COURSE.point(-1.0, 12.0, 2.5), 1.8, 2.2, 0)
+TREE_CROWN = TreeCrown(COURSE.point(-1.0, 12.0, 2.5), 1.8, 2.2, 0)
 
 
 def inside_car(points):
@@ -76,10 +76,10 @@ def test_a_ray_meets_a_surface_where_marching_along_it_first_comes_inside(surfac
 
 
 def test_a_crown_is_met_on_its_ellipsoid_and_seen_through():
-    direction = rays(2000, CROWN.centre, 1.5)
-    met = CROWN.intersect(ORIGIN, direction)
+    direction = rays(2000, TREE_CROWN.centre, 1.5)
+    met = TREE_CROWN.intersect(ORIGIN, direction)
     hits = np.isfinite(met)
-    x, y, z = (ORIGIN + met[hits] * direction[:, hits]) - CROWN.centre[:, None]
+    x, y, z = (ORIGIN + met[hits] * direction[:, hits]) - TREE_CROWN.centre[:, None]
     assert np.allclose((x / 1.8) ** 2 + (y / 2.2) ** 2 + (z / 1.8) ** 2, 1)
     assert np.any(z < 0)
     assert np.any(z > 0)
@@ -93,7 +93,7 @@ def test_a_crown_is_met_on_its_ellipsoid_and_seen_through():
         (BACKDROP, (0, 5, 60)),
         (CAR, (1.3, 0.7, 9)),
         (POST, (2.4, 2, 8)),
-        (CROWN, (-0.4, 2.5, 12)),
+        (TREE_CROWN, (-0.4, 2.5, 12)),
     ],
 )
 def test_normals_and_gradients_are_those_of_the_surface(surface, toward):
@@ -102,7 +102,7 @@ def test_normals_and_gradients_are_those_of_the_surface(surface, toward):
     first, second = surface.intersect(ORIGIN, direction), surface.intersect(ORIGIN, neighbour)
     both = np.isfinite(first) & np.isfinite(second)
     here, there = ORIGIN + first[both] * direction[:, both], ORIGIN + second[both] * neighbour[:, both]
-    at, beside = surface.chart(here), surface.chart(there)
+    at, beside = surface.sample(here), surface.sample(there)
     moved = there - here
     same_face = np.linalg.norm(moved, axis=0) < 1e-2
     along_normal = (at.normal * moved).sum(axis=0) / np.linalg.norm(moved, axis=0)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rollcli.simulate.texture import NoiseTile, band, bars, coarse, fine
+from rollcli.simulate.looks.texture import NoiseTile, band, bars, coarse, fine
 
 
 def averaged(pattern, centre, width):

@@ -6,14 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rollcli.simulate.build import build_scene, road_camber
-from rollcli.simulate.carriageway import draw_carriageway
 from rollcli.simulate.draw import draw_specs
-from rollcli.simulate.light import draw_light
-from rollcli.simulate.polynomials import first_crossing
+from rollcli.simulate.geometry.polynomials import first_crossing
+from rollcli.simulate.geometry.surfaces import Ground
 from rollcli.simulate.render import render_frame, true_disparity
+from rollcli.simulate.scenes.build import build_scene, road_camber
+from rollcli.simulate.scenes.carriageway import draw_carriageway
+from rollcli.simulate.scenes.light import draw_light
 from rollcli.simulate.spec import FrameSpec
-from rollcli.simulate.surfaces import Ground
 
 SMALL = {"size": (320, 240), "focal": 186.0, "crossfall": 0.04}
 SHAPES = ("crown", "roof", "dish", "superelevated")

@@ -1,0 +1,1 @@
+"""Cameras, rays, and the surfaces and solids that rays hit."""

@@ -1,0 +1,1 @@
+"""The appearance of surfaces: textures and materials."""

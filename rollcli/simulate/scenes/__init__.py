@@ -1,0 +1,1 @@
+"""Scenes: the road, what stands beside it and on it, and the light."""

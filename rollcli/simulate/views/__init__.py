@@ -1,0 +1,1 @@
+"""The view of a camera: trace rays, shade what they hit, and expose the image."""
