@@ -11,29 +11,35 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from rollcli.errors import RollcliError as RollcliError
-    from rollcli.estimator.estimate import estimate_roll as estimate_roll
     from rollcli.estimator.result import RollEstimate as RollEstimate
     from rollcli.files.encodings import read_disparity as read_disparity
+    from rollcli.frames.calibration import read_calibration as read_calibration
     from rollcli.imaging.derotate import derotate as derotate
     from rollcli.imaging.stereo import compute_disparity as compute_disparity
     from rollcli.imaging.vdisparity import v_disparity as v_disparity
+    from rollcli.rig.calibration import Calibration as Calibration
+    from rollcli.rig.estimate import estimate_roll as estimate_roll
 
 _HOMES = {
+    "Calibration": "rollcli.rig.calibration",
     "RollEstimate": "rollcli.estimator.result",
     "RollcliError": "rollcli.errors",
     "compute_disparity": "rollcli.imaging.stereo",
     "derotate": "rollcli.imaging.derotate",
-    "estimate_roll": "rollcli.estimator.estimate",
+    "estimate_roll": "rollcli.rig.estimate",
+    "read_calibration": "rollcli.frames.calibration",
     "read_disparity": "rollcli.files.encodings",
     "v_disparity": "rollcli.imaging.vdisparity",
 }
 __all__ = [
+    "Calibration",
     "RollEstimate",
     "RollcliError",
     "__version__",
     "compute_disparity",
     "derotate",
     "estimate_roll",
+    "read_calibration",
     "read_disparity",
     "v_disparity",
 ]

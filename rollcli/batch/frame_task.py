@@ -14,6 +14,9 @@ from rollcli.frames.guard import guarded
 from rollcli.frames.options import FrameOptions, MethodOptions
 from rollcli.frames.outputs import remove_images
 from rollcli.frames.read import Source, read_source
+from rollcli.imaging.sgbm_offset import sgbm_offset
+from rollcli.rig.calibration import Calibration
+from rollcli.rig.pose import horizon_row, with_pose
 
 
 def run_frame(frame: Frame, options: FrameOptions) -> FrameResult:
@@ -37,8 +40,26 @@ def _estimate(frame: Frame, options: FrameOptions) -> FrameResult:
     wanted = options.images.road_mask is not None
     arguments = _arguments(options.method)
     estimate = estimate_roll(source.disparity, mask=source.allowed, road_mask=wanted, **arguments)
-    write_images(frame, source, estimate, options)
+    calibration = _calibration(frame, source, estimate)
+    horizon = None if calibration is None else horizon_row(estimate.tangent, calibration)
+    write_images(frame, source, estimate, options, horizon)
+    if calibration is not None:
+        estimate = with_pose(estimate, calibration)
     return FrameResult(_row(frame, source, estimate), source.encoding, source.warning, source.searched)
+
+
+def _calibration(frame: Frame, source: Source, estimate: RollEstimate) -> Calibration | None:
+    """The frame's calibration at the size of its map; doffs allows for what the matcher errs by."""
+    if frame.calibration is None:
+        return None
+    calibration = frame.calibration
+    if source.size is not None:
+        calibration = calibration.for_size(*source.size)
+    calibration = calibration.for_size(estimate.width, estimate.height)
+    if not source.mode:
+        return calibration
+    rise = estimate.tangent.slope * math.cos(estimate.tangent.theta)
+    return replace(calibration, doffs=calibration.doffs - sgbm_offset(source.mode, rise))
 
 
 def _arguments(options: MethodOptions) -> dict[str, Any]:
@@ -67,7 +88,11 @@ def _row(frame: Frame, source: Source, estimate: RollEstimate) -> Row:
         right_file=frame.right_file,
         status=status,
         roll_deg=math.degrees(estimate.theta),
-        roll_ci95_deg=None if estimate.ci95 is None else math.degrees(estimate.ci95),
+        roll_ci95_deg=_degrees(estimate.ci95),
+        pitch_deg=_degrees(estimate.pitch),
+        pitch_ci95_deg=_degrees(estimate.pitch_ci95),
+        height_m=estimate.height_m,
+        height_ci95_m=estimate.height_ci95_m,
         method=estimate.method,
         iterations=estimate.iterations,
         converged=estimate.converged,
@@ -82,3 +107,7 @@ def _row(frame: Frame, source: Source, estimate: RollEstimate) -> Row:
         height=estimate.height,
         message="; ".join(reasons),
     )
+
+
+def _degrees(angle: float | None) -> float | None:
+    return None if angle is None else math.degrees(angle)

@@ -1,6 +1,6 @@
 """The options of a run of `estimate`. Import-light: the command line loads this to show its help."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 from rollcli.frames.options import (
@@ -14,6 +14,7 @@ from rollcli.frames.options import (
     RunningOptions,
 )
 from rollcli.imaging.stereo_options import StereoOptions
+from rollcli.rig.options import CalibrationOptions
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,7 @@ class EstimateOptions:
     images: ImageOptions
     result: ResultOptions
     running: RunningOptions
+    calibration: CalibrationOptions = field(default_factory=CalibrationOptions)
 
     @property
     def frame(self) -> FrameOptions:

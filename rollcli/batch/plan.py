@@ -9,6 +9,7 @@ from rollcli.batch.options import EstimateOptions
 from rollcli.errors import UsageError
 from rollcli.files.results import run_path
 from rollcli.files.stream import STDOUT
+from rollcli.frames.calibration import check_first_size
 from rollcli.frames.checks import check_inputs_are_kept, check_nothing_is_there, check_one_owner
 from rollcli.frames.find import map_frames, pair_frames
 from rollcli.frames.frame import Frame
@@ -26,13 +27,13 @@ class Plan:
 
 
 def make_plan(options: EstimateOptions) -> Plan:
-    """Find the frames and check what can be checked without reading them.
+    """Find the frames and check what can be checked before they run.
 
     Raises
     ------
     UsageError
-        No input; pairs or masks without partner; two frames with the same image; an image or a result that
-        would replace an input, or that exists already.
+        No input; pairs, masks or calibrations without partner; a calibration that is not for the images; two
+        frames with the same image; an image or a result that would replace an input, or that exists already.
     """
     part, parts = options.result.shard
     frames = _find_frames(options)
@@ -42,6 +43,7 @@ def make_plan(options: EstimateOptions) -> Plan:
     reads = [path for frame in frames for path in frame.reads()]
     check_inputs_are_kept(reads, chain(results, _images(frames, options)))
     frames = frames[part - 1 :: parts]
+    check_first_size(frames, options.frame)
     if not (options.running.overwrite or options.result.resume):
         check_nothing_is_there(_images(frames, options))
     return Plan(frames, output, options.result.format or _format(output), options.result.timing)
@@ -67,7 +69,7 @@ def _find_frames(options: EstimateOptions) -> list[Frame]:
             "no input: name maps (files, folders, patterns, or - for a list on stdin) or --left and --right"
         )
     if paired:
-        return pair_frames(given, pairs, region=options.region, skip=skip)
+        return pair_frames(given, pairs, region=options.region, calibration=options.calibration, skip=skip)
     if options.images.disparity is not None:
         raise UsageError("--disparity writes maps computed from --left and --right; here maps are the input")
-    return map_frames(given, region=options.region, skip=skip)
+    return map_frames(given, region=options.region, calibration=options.calibration, skip=skip)

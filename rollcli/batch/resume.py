@@ -50,6 +50,8 @@ def _differences(
     for key in (*options_now, *(key for key in options_was if key not in options_now)):
         if options_was.get(key) != options_now.get(key):
             yield f"--{key} was {_shown(options_was.get(key))}, is now {_shown(options_now.get(key))}"
+    if was.get("calibration") != json.loads(json.dumps(now.get("calibration"))):
+        yield "the calibration differs"
     for row, frame in zip(rows, plan.frames, strict=False):
         if (row.file, row.right_file) != (frame.file, frame.right_file):
             yield f"the inputs differ: its row is of {row.file}, where now {frame.file} is"

@@ -3,8 +3,9 @@
 import hashlib
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 CONVENTIONS = {
     "roll_deg": "theta, degrees, (-90, 90]; positive: the rig is rolled counter-clockwise seen from behind",
     "roll_ci95_deg": "half-width of the 95 % interval, degrees",
+    "pitch_deg": "angle of the optical axis to the road near ahead, degrees; positive: looks down",
+    "height_m": "of the left camera over the road near ahead, metres",
     "alpha0, alpha1, alpha2": "road disparity in px = alpha0 + alpha1 y + alpha2 y^2",
     "y": "v cos(theta) - u sin(theta), px; u right, v down, from the centre of the top-left pixel",
 }
@@ -46,6 +49,8 @@ class RunRecord:
             "options": _effective(plan, options),
             "inputs": _fingerprint(plan.frames),
         }
+        if options.calibration.given:
+            self.fixed["calibration"] = _calibrations(plan.frames)
 
     def continue_from(self, earlier: Mapping[str, Any]) -> None:
         """Take over what the interrupted run has recorded about its inputs."""
@@ -86,6 +91,20 @@ def _effective(plan: Plan, options: EstimateOptions) -> dict[str, Any]:
         "shard": "/".join(map(str, options.result.shard)),
     }
     return {_OPTION_NAMES.get(key, key).replace("_", "-"): value for key, value in values.items()}
+
+
+def _calibrations(frames: Sequence[Frame]) -> dict[str, Any]:
+    """The calibrations used and where they are from: the first few, and how many differ."""
+    used = dict.fromkeys(frame.calibration for frame in frames if frame.calibration is not None)
+    digest = hashlib.sha256("\n".join(map(repr, used)).encode("utf-8", "surrogateescape"))
+    return {
+        "different": len(used),
+        "sha256": digest.hexdigest(),
+        "first": [asdict(calibration) for calibration in islice(used, _CALIBRATIONS_LISTED)],
+    }
+
+
+_CALIBRATIONS_LISTED = 3
 
 
 def _fingerprint(frames: list[Frame]) -> dict[str, Any]:

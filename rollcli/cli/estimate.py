@@ -8,6 +8,7 @@ from rollcli.batch.options import EstimateOptions, ResultOptions
 from rollcli.cli.command import command, option, record
 from rollcli.cli.config import config_option
 from rollcli.cli.options import (
+    calibration_options,
     cluster_options,
     encoding_options,
     image_options,
@@ -64,6 +65,10 @@ result_options = record(
             "find . -name '*_disp.png' | rollcli estimate - | sort -t, -gk4",
         ),
         (
+            "Pitch and camera height too, with a calibration file of each frame",
+            "rollcli estimate --left image_0 --right image_1 --calib calib/ -o pose.csv",
+        ),
+        (
             "The paper's setting: every pixel is road",
             "rollcli estimate crops/ --road all --method gd -o rolls.csv",
         ),
@@ -75,6 +80,7 @@ result_options = record(
 @image_options
 @encoding_options
 @region_options
+@calibration_options
 @method_options
 @stereo_options
 @cluster_options

@@ -26,6 +26,10 @@ class Row:
     status: str = "error"
     roll_deg: float | None = None
     roll_ci95_deg: float | None = None
+    pitch_deg: float | None = None
+    pitch_ci95_deg: float | None = None
+    height_m: float | None = None
+    height_ci95_m: float | None = None
     method: str = ""
     iterations: int | None = None
     converged: bool | None = None
@@ -51,6 +55,10 @@ _REQUIRED = ("file", "status", "roll_deg")
 _DIGITS = {
     "roll_deg": ".6f",
     "roll_ci95_deg": ".6f",
+    "pitch_deg": ".6f",
+    "pitch_ci95_deg": ".6f",
+    "height_m": ".6f",
+    "height_ci95_m": ".6f",
     "rmse_px": ".6g",
     "alpha0": ".9g",
     "alpha1": ".9g",
@@ -211,7 +219,12 @@ _FLAGS = {"converged", "global_minimum"}
 _COUNTS = {"iterations", "width", "height"}
 # what lies outside is another program's idea of a roll
 _ANY = (-math.inf, math.inf)
-_BOUNDS = {"roll_deg": (-90.0, 90.0), "roll_ci95_deg": (0.0, math.inf)}
+_BOUNDS = {
+    "roll_deg": (-90.0, 90.0),
+    "roll_ci95_deg": (0.0, math.inf),
+    "pitch_deg": (-90.0, 90.0),
+    "height_m": (0.0, math.inf),
+}
 
 
 def _value(name: str, value: Any, where: str) -> Any:

@@ -21,8 +21,16 @@ from rollcli.imaging.vdisparity import row_offset, v_disparity
 from rollcli.imaging.vdisparity_picture import draw_v_disparity
 
 
-def write_images(frame: Frame, source: Source, estimate: RollEstimate, options: FrameOptions) -> None:
+def write_images(
+    frame: Frame,
+    source: Source,
+    estimate: RollEstimate,
+    options: FrameOptions,
+    horizon: float | None = None,
+) -> None:
     """Write the images that were requested, each whole or not at all.
+
+    `horizon` is the y of the road's horizon, px, where a calibration tells it.
 
     Raises
     ------
@@ -30,7 +38,7 @@ def write_images(frame: Frame, source: Source, estimate: RollEstimate, options: 
         An image cannot be written.
     """
     for kind, path in image_paths(frame, options.images):
-        write_atomic(options.at(path), _ENCODERS[kind](source, estimate, options))
+        write_atomic(options.at(path), _ENCODERS[kind](source, estimate, options, horizon))
 
 
 def encode_turned(
@@ -51,23 +59,26 @@ def encode_computed(disparity: NDArray[Any], save_as: str) -> bytes:
     return encode_stored(disparity.astype(np.float32, copy=False), save_as)
 
 
-def _derotated(source: Source, estimate: RollEstimate, options: FrameOptions) -> bytes:
+def _derotated(source: Source, estimate: RollEstimate, options: FrameOptions, horizon: float | None) -> bytes:
     if source.stored is None:
         return encode_computed(derotate(source.disparity, estimate.theta), options.images.save_as)
     return encode_turned(source.stored, estimate.theta, source.encoding, options.encoding.invalid)
 
 
-def _v_disparity(source: Source, estimate: RollEstimate, options: FrameOptions) -> bytes:
+def _v_disparity(
+    source: Source, estimate: RollEstimate, options: FrameOptions, horizon: float | None
+) -> bytes:
     histogram = v_disparity(derotate(source.disparity, estimate.theta))
     offset = row_offset(estimate.theta, estimate.width, estimate.height)
-    return encode_png(draw_v_disparity(histogram, estimate.alpha, offset))
+    row = None if horizon is None else horizon - offset
+    return encode_png(draw_v_disparity(histogram, estimate.alpha, offset, row))
 
 
-def _disparity(source: Source, estimate: RollEstimate, options: FrameOptions) -> bytes:
+def _disparity(source: Source, estimate: RollEstimate, options: FrameOptions, horizon: float | None) -> bytes:
     return encode_computed(source.disparity, options.images.save_as)
 
 
-def _road_mask(source: Source, estimate: RollEstimate, options: FrameOptions) -> bytes:
+def _road_mask(source: Source, estimate: RollEstimate, options: FrameOptions, horizon: float | None) -> bytes:
     assert estimate.road_mask is not None  # the frame's task asks for it
     return encode_png(draw_road(source.disparity, estimate.road_mask))
 

@@ -1,27 +1,33 @@
-"""Find the frames that a user named: maps or stereo pairs, each with its mask."""
+"""Find the frames that a user named: maps or stereo pairs, each with its mask and its calibration."""
 
 from collections.abc import Sequence
 from pathlib import Path, PurePath
 
 from rollcli.errors import UsageError
 from rollcli.files.inputs import Input, find_inputs, pair_inputs
+from rollcli.frames.calibration import Calibrations
 from rollcli.frames.frame import Frame
 from rollcli.frames.options import InputOptions, PairOptions, RegionOptions
+from rollcli.rig.options import CalibrationOptions
 
 
 def map_frames(
-    given: InputOptions, *, region: RegionOptions | None = None, skip: Sequence[str] = ()
+    given: InputOptions,
+    *,
+    region: RegionOptions | None = None,
+    calibration: CalibrationOptions | None = None,
+    skip: Sequence[str] = (),
 ) -> list[Frame]:
     """Make a frame of each map; `skip` holds the output folders, which are not searched.
 
     Raises
     ------
     UsageError
-        Nothing is named or found, or a mask is missing.
+        Nothing is named or found, or a mask or a calibration is missing.
     """
     if not (given.inputs or given.files_from):
         raise UsageError("no input: name maps (files, folders, patterns, or - for a list on stdin)")
-    masks = _Masks(region)
+    masks, calibrations = _Masks(region), Calibrations(calibration or CalibrationOptions())
     found = find_inputs(
         given.inputs,
         files_from=given.files_from,
@@ -30,22 +36,27 @@ def map_frames(
         exclude=given.exclude,
         skip=skip,
     )
-    return [_frame(each, None, masks) for each in found]
+    return [_frame(each, None, masks, calibrations) for each in found]
 
 
 def pair_frames(
-    given: InputOptions, pairs: PairOptions, *, region: RegionOptions | None = None, skip: Sequence[str] = ()
+    given: InputOptions,
+    pairs: PairOptions,
+    *,
+    region: RegionOptions | None = None,
+    calibration: CalibrationOptions | None = None,
+    skip: Sequence[str] = (),
 ) -> list[Frame]:
     """Make a frame of each stereo pair; `skip` holds the output folders, which are not searched.
 
     Raises
     ------
     UsageError
-        A side is not named, an image has no partner, or a mask is missing.
+        A side is not named, an image has no partner, or a mask or a calibration is missing.
     """
     if pairs.left is None or pairs.right is None:
         raise UsageError("--left and --right are given together")
-    masks = _Masks(region)
+    masks, calibrations = _Masks(region), Calibrations(calibration or CalibrationOptions())
     found = pair_inputs(
         pairs.left,
         pairs.right,
@@ -55,10 +66,10 @@ def pair_frames(
         exclude=given.exclude,
         skip=skip,
     )
-    return [_frame(pair.left, pair.right, masks) for pair in found]
+    return [_frame(pair.left, pair.right, masks, calibrations) for pair in found]
 
 
-def _frame(left: Input, right: Input | None, masks: "_Masks") -> Frame:
+def _frame(left: Input, right: Input | None, masks: "_Masks", calibrations: Calibrations) -> Frame:
     return Frame(
         file=left.name,
         right_file=right.name if right else "",
@@ -66,6 +77,7 @@ def _frame(left: Input, right: Input | None, masks: "_Masks") -> Frame:
         right_path=right.location if right else "",
         relative=left.relative,
         mask=masks.of(left),
+        calibration=calibrations.of(left.name),
     )
 
 

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from rollcli.files.results import Row
+from rollcli.rig.calibration import Calibration
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,6 +21,8 @@ class Frame:
         Path below the folder it was found in; names its images.
     mask : str or None
         The mask file of this frame.
+    calibration : Calibration or None
+        Of the images as they are in the files; None: without pitch and height.
     """
 
     file: str
@@ -28,6 +31,7 @@ class Frame:
     right_path: str
     relative: str
     mask: str | None
+    calibration: Calibration | None = None
 
     def reads(self) -> Iterator[str]:
         """Yield every file that this frame needs."""

@@ -40,6 +40,10 @@ class Source:
         Why the map itself may be wrong; empty when there is no reason.
     note : str
         What was done about the pair; empty when nothing.
+    size : tuple of int, or None
+        Width and height of the images in the files, px, where the map was matched from them.
+    mode : str
+        How the pair was matched (`StereoOptions.mode`); empty for a map.
     """
 
     disparity: NDArray[Any]
@@ -50,6 +54,8 @@ class Source:
     searched: tuple[int, int] | None = None
     doubt: str = ""
     note: str = ""
+    size: tuple[int, int] | None = None
+    mode: str = ""
 
 
 def read_source(frame: Frame, options: FrameOptions) -> Source:
@@ -79,7 +85,15 @@ def _match(frame: Frame, options: FrameOptions) -> Source:
     right = read_image(options.at(frame.right_path), frame.right_file)
     match = match_pair(left, right, options.stereo)
     searched = (match.min_disparity, match.min_disparity + match.num_disparities - 1)
-    return Source(match.disparity, searched=searched, doubt=_doubt(match), note=_note(match, options.stereo))
+    height, width = left.shape[:2]
+    return Source(
+        match.disparity,
+        searched=searched,
+        doubt=_doubt(match),
+        note=_note(match, options.stereo),
+        size=(width, height),
+        mode=options.stereo.mode,
+    )
 
 
 def _doubt(match: "StereoMatch") -> str:

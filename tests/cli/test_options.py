@@ -58,7 +58,7 @@ PATHS = [
 @pytest.mark.parametrize(("ctx", "param"), PATHS, ids=lambda each: getattr(each, "name", None) or "of")
 def test_an_empty_name_is_never_taken_for_the_current_folder(ctx, param):
     with pytest.raises(click.BadParameter, match="the name is empty: is a variable unset"):
-        param.type_cast_value(ctx, ("",) if param.nargs == -1 else "")
+        param.type_cast_value(ctx, ("",) if param.nargs == -1 or param.multiple else "")
 
 
 OPTIONS = [

@@ -1,0 +1,127 @@
+"""The calibration of each frame: one for all, or one of the same stem each."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING
+
+from rollcli.errors import InputError, UsageError
+from rollcli.rig.calibration import Calibration
+from rollcli.rig.options import CalibrationOptions
+from rollcli.rig.parse import MAX_BYTES, parse_calibration
+
+if TYPE_CHECKING:
+    from rollcli.frames.frame import Frame
+    from rollcli.frames.options import FrameOptions
+
+_MARK = "_camera"  # Cityscapes: aachen_000000_000019_camera.json
+
+
+def read_calibration(path: str | os.PathLike[str], *right: str | os.PathLike[str]) -> Calibration:
+    """Read the calibration of a rectified stereo pair.
+
+    Parameters
+    ----------
+    path : str or path
+        A file of KITTI, Middlebury, ETH3D, OpenCV, ROS, Cityscapes, ORB-SLAM or DrivingStereo, recognised by
+        its content.
+    *right : str or path
+        The file of the right view, where each view has one (ROS).
+
+    Returns
+    -------
+    Calibration
+        Lengths in metres, the rest in pixels.
+
+    Raises
+    ------
+    InputError
+        A file cannot be read, is of no known format, or contradicts itself.
+    UsageError
+        What it says is not enough for a pose, or cannot be a rig.
+    """
+    return _read([os.fspath(each) for each in (path, *right)], CalibrationOptions())
+
+
+class Calibrations:
+    """What a user said of the calibration, found and read.
+
+    Raises
+    ------
+    UsageError, InputError
+        See `parse_calibration`; or there is no such file.
+    """
+
+    def __init__(self, given: CalibrationOptions) -> None:
+        self._given = given
+        self._by_stem: dict[str, list[Path]] | None = None
+        self._one: Calibration | None = None
+        if len(given.calib) == 1 and Path(given.calib[0]).is_dir():
+            self._by_stem = _stems(Path(given.calib[0]))
+        elif given.given:
+            self._one = _read(given.calib, given)
+
+    def of(self, name: str) -> Calibration | None:
+        """Return the calibration of a frame: of its stem, or of the stem up to one of its underscores."""
+        if self._by_stem is None:
+            return self._one
+        folder, stem = self._given.calib[0], PurePosixPath(name).stem
+        shorter = stem  # KITTI's 000010.txt is for 000010_10.png
+        while shorter not in self._by_stem:
+            shorter = shorter.rpartition("_")[0]
+            if not shorter:
+                raise UsageError(f"{name}: has no calibration of its name in {folder}")
+        paths = self._by_stem[shorter]
+        if len(paths) > 1:
+            raise UsageError(f"{name}: has more than one calibration of its name: {paths[0]}, {paths[1]}")
+        return _read([str(paths[0])], self._given)
+
+
+def check_first_size(frames: Sequence[Frame], options: FrameOptions) -> None:
+    """Refuse a calibration that is not for the size of the first frame, before anything runs.
+
+    Raises
+    ------
+    UsageError
+    """
+    from rollcli.files.formats import read_image, read_stored  # where calibrations are, images are decoded
+
+    first = next((frame for frame in frames if frame.calibration is not None), None)
+    if first is None or first.calibration is None:
+        return
+    try:
+        if first.right_file:
+            height, width = read_image(options.at(first.path), first.file).shape[:2]
+        else:
+            height, width = read_stored(options.at(first.path), first.file).values.shape
+    except InputError:
+        return  # its row will say so
+    first.calibration.for_size(width, height)
+
+
+def _stems(folder: Path) -> dict[str, list[Path]]:
+    found: dict[str, list[Path]] = {}
+    for path in sorted(folder.rglob("*")):
+        if path.is_file() and not path.name.startswith("."):
+            found.setdefault(path.stem.removesuffix(_MARK), []).append(path)
+    return found
+
+
+def _read(paths: Sequence[str], given: CalibrationOptions) -> Calibration:
+    if len(paths) > 2:
+        raise UsageError("--calib is given at most twice: for the left and the right view of ROS")
+    return parse_calibration([(path, _bytes(path)) for path in paths], given)
+
+
+def _bytes(path: str) -> bytes:
+    from rollcli.files.formats import read_bytes  # NumPy comes with it
+
+    try:
+        size = Path(path).stat().st_size
+    except (OSError, ValueError):
+        size = 0  # what is wrong is said by who reads it
+    if size > MAX_BYTES:
+        raise InputError(f"{path}: has {size} bytes; no calibration is larger than {MAX_BYTES >> 20} MB")
+    return read_bytes(path)

@@ -1,0 +1,206 @@
+"""`rollcli estimate --calib`: pitch and height in the rows, and what is refused before anything runs."""
+
+import csv
+import io
+import json
+import math
+
+import cv2
+import numpy as np
+import pytest
+
+from rollcli.rig.calibration import Calibration
+from tests.rig import calibration_files as samples
+from tests.rig.calibration_files import Rig
+from tests.rig.test_pose import cast
+from tests.run_cli import rollcli
+
+RIG = Rig(fx=250.0, fy=250.0, cx=150.0, cy=90.0, baseline=0.5, width=320, height=200)
+CALIBRATION = Calibration(RIG.fx, RIG.fy, RIG.cx, RIG.cy, RIG.baseline)
+ROLL, PITCH, HEIGHT = math.radians(2), math.radians(6), 1.5
+POSE = ("pitch_deg", "pitch_ci95_deg", "height_m", "height_ci95_m")
+
+
+def write_map(path, disparity):
+    path.parent.mkdir(exist_ok=True)
+    cv2.imwrite(str(path), np.rint(disparity * 256).astype(np.uint16))
+
+
+@pytest.fixture
+def maps(tmp_path):
+    for stem in ("000000_10", "000001_10"):
+        write_map(tmp_path / "maps" / f"{stem}.png", cast(CALIBRATION, ROLL, PITCH, HEIGHT))
+    (tmp_path / "calib.txt").write_text(samples.kitti_raw(RIG))
+    return tmp_path
+
+
+def rows_of(text):
+    return list(csv.DictReader(io.StringIO(text)))
+
+
+def assert_posed(rows):
+    assert rows
+    for row in rows:
+        assert float(row["pitch_deg"]) == pytest.approx(math.degrees(PITCH), abs=0.01)
+        assert float(row["height_m"]) == pytest.approx(HEIGHT, rel=1e-3)
+        assert 0 < float(row["pitch_ci95_deg"]) < 0.1
+        assert 0 < float(row["height_ci95_m"]) < 0.02
+
+
+@pytest.mark.parametrize("method", ["gd", "gss", "exact", "plane", "areas"])
+@pytest.mark.parametrize("road", ["auto", "all"])
+def test_every_method_fills_the_columns(maps, method, road):
+    done = rollcli("estimate", "maps", "--calib", "calib.txt", "--method", method, "--road", road, cwd=maps)
+    assert done.status == 0
+    assert_posed(rows_of(done.out))
+    assert all("px of cy" in row["message"] for row in rows_of(done.out))
+
+
+def test_json_lines_hold_the_same_numbers(maps):
+    text = rollcli("estimate", "maps", "--calib", "calib.txt", cwd=maps).out
+    lines = rollcli(
+        "estimate", "maps", "--calib", "calib.txt", "--format", "jsonl", cwd=maps
+    ).out.splitlines()
+    for row, line in zip(rows_of(text), map(json.loads, lines), strict=True):
+        assert [line[name] for name in POSE] == [float(row[name]) for name in POSE]
+
+
+def test_without_a_calibration_the_columns_are_empty_and_the_roll_is_the_same(maps):
+    plain, posed = (
+        rows_of(rollcli("estimate", "maps", *options, cwd=maps).out)
+        for options in ((), ("--calib", "calib.txt"))
+    )
+    assert [[row[name] for name in POSE] for row in plain] == [[""] * 4] * 2
+    assert [row["roll_deg"] for row in plain] == [row["roll_deg"] for row in posed]
+
+
+def test_numbers_on_the_command_line_are_a_calibration(maps):
+    numbers = ("--focal", "250", "--principal-point", "150,90")
+    assert_posed(rows_of(rollcli("estimate", "maps", *numbers, "--baseline", "0.5", cwd=maps).out))
+    without = rows_of(rollcli("estimate", "maps", *numbers, cwd=maps).out)
+    assert all(row["pitch_deg"] and not row["height_m"] for row in without)
+
+
+def test_a_folder_has_a_calibration_for_each_stem(maps):
+    (maps / "calib").mkdir()
+    (maps / "calib" / "000000.txt").write_text(samples.kitti_benchmark(RIG))
+    (maps / "calib" / "000001_10.json").write_text(samples.cityscapes(RIG))
+    done = rollcli("estimate", "maps", "--calib", "calib", "-o", "pose.csv", cwd=maps)
+    assert done.status == 0
+    assert_posed(rows_of((maps / "pose.csv").read_text()))
+    record = json.loads((maps / "pose.csv.run.json").read_text())["calibration"]
+    assert record["different"] == 2
+    assert [each["source"] for each in record["first"]] == ["calib/000000.txt", "calib/000001_10.json"]
+    (maps / "calib" / "000001_10.json").unlink()
+    refused = rollcli("estimate", "maps", "--calib", "calib", cwd=maps)
+    assert (refused.status, refused.out) == (2, "")
+    assert "maps/000001_10.png: has no calibration of its name" in refused.err
+
+
+def test_a_pair_of_ros_files_is_given_left_and_right(maps):
+    (maps / "left.yaml").write_text(samples.ros(RIG, right=False))
+    (maps / "right.yaml").write_text(samples.ros(RIG, right=True))
+    done = rollcli("estimate", "maps", "--calib", "left.yaml", "--calib", "right.yaml", cwd=maps)
+    assert_posed(rows_of(done.out))
+
+
+def test_a_map_at_half_the_size_uses_the_scaled_calibration(maps):
+    half = CALIBRATION.for_size(320, 200).for_size(160, 100)
+    write_map(maps / "half" / "a.png", cast(half, ROLL, PITCH, HEIGHT, (100, 160)))
+    assert_posed(rows_of(rollcli("estimate", "half", "--calib", "calib.txt", cwd=maps).out))
+
+
+def textured_pair(folder):
+    """A level road with a texture that both cameras see, matched by nothing but OpenCV."""
+    rng = np.random.default_rng(4)
+    texture = cv2.GaussianBlur(rng.integers(0, 256, (2000, 2000)).astype(np.float32), (0, 0), 2)
+    texture = cv2.normalize(texture, None, 0, 255, cv2.NORM_MINMAX)
+    v, u = np.mgrid[:200, :320].astype(np.float64)
+    for side, shift in (("left", 0.0), ("right", RIG.baseline)):
+        rays = np.stack([(u - RIG.cx) / RIG.fx, (v - RIG.cy) / RIG.fy, np.ones_like(u)])
+        down = rays[1] * math.cos(PITCH) + rays[2] * math.sin(PITCH)
+        far = np.where(down > 0.01, HEIGHT / np.maximum(down, 0.01), 0)
+        x, z = far * rays[0] + shift, far * (rays[2] * math.cos(PITCH) - rays[1] * math.sin(PITCH))
+        image = cv2.remap(
+            texture, (100 * x + 1000).astype(np.float32), (60 * z).astype(np.float32), cv2.INTER_LINEAR
+        )
+        (folder / side).mkdir()
+        cv2.imwrite(str(folder / side / "a.png"), np.where(far > 0, image, 128).astype(np.uint8))
+
+
+def test_downscaled_pairs_have_the_pose_of_the_full_size(tmp_path):
+    textured_pair(tmp_path)
+    (tmp_path / "calib.txt").write_text(samples.kitti_benchmark(RIG))
+    poses = []
+    for factor in ("1", "2"):
+        pair = ("--left", "left", "--right", "right", "--calib", "calib.txt", "--downscale", factor)
+        (row,) = rows_of(rollcli("estimate", *pair, cwd=tmp_path).out)
+        poses.append([float(row[name]) for name in POSE])
+    (pitch, pitch_ci, height, height_ci), (half_pitch, half_pitch_ci, half_height, half_height_ci) = poses
+    assert abs(pitch - half_pitch) <= math.hypot(pitch_ci, half_pitch_ci)
+    assert abs(height - half_height) <= math.hypot(height_ci, half_height_ci)
+
+
+BAD = {
+    "missing": ((), "no such file"),
+    "empty.txt": ("", "empty"),
+    "unknown.txt": ("hello\n", "known format"),
+    "cut.txt": (samples.kitti_raw(RIG)[:-30], "12"),
+    "crop.txt": (samples.kitti_raw(RIG._replace(width=320, height=240)), "320x240"),
+    "centre.txt": (samples.kitti_benchmark(RIG._replace(cx=400.0)), "320x200"),
+    "kalibr.yaml": (samples.kalibr(RIG), "--focal"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_a_bad_calibration_ends_it_in_one_line_before_anything_runs(maps, name):
+    text, words = BAD[name]
+    if text != ():
+        (maps / name).write_text(text)
+    done = rollcli("estimate", "maps", "--calib", name, "-o", "pose.csv", cwd=maps)
+    assert done.status == 2
+    assert words in done.err
+    assert name in done.err
+    assert done.err.count("\n") == 1
+    assert not (maps / "pose.csv").exists()
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ("--focal", "250"),
+        ("--baseline", "0.5"),
+        ("--focal", "-1", "--principal-point", "1,1"),
+        ("--focal", "nan", "--principal-point", "1,1"),
+        ("--focal", "250", "--principal-point", "nan,1"),
+        ("--focal", "250", "--principal-point", "900,90"),
+        ("--calib", "calib.txt", "--baseline", "-0.5"),
+        ("--calib", "calib.txt", "--calib", "calib.txt"),
+        ("--calib", "calib.txt", "--calib", "calib.txt", "--calib", "calib.txt"),
+    ],
+)
+def test_numbers_that_cannot_be_are_refused_before_anything_runs(maps, options):
+    done = rollcli("estimate", "maps", *options, cwd=maps)
+    assert (done.status, done.out) == (2, "")
+    assert done.err.count("\n") == 1
+
+
+def test_a_changed_calibration_is_no_resume(maps):
+    rollcli("estimate", "maps", "--calib", "calib.txt", "-o", "pose.csv", cwd=maps)
+    again = rollcli("estimate", "maps", "--calib", "calib.txt", "-o", "pose.csv", "--resume", cwd=maps)
+    assert again.status == 0
+    (maps / "calib.txt").write_text(samples.kitti_raw(RIG._replace(cy=91.0)))
+    other = rollcli("estimate", "maps", "--calib", "calib.txt", "-o", "pose.csv", "--resume", cwd=maps)
+    assert other.status == 2
+    assert "the calibration differs" in other.err
+
+
+def test_python_reads_a_calibration_and_gives_radians_and_metres(maps):
+    import rollcli as library
+
+    calibration = library.read_calibration(maps / "calib.txt")
+    disparity = cast(calibration, ROLL, PITCH, HEIGHT)
+    found = library.estimate_roll(disparity, calibration=calibration, road="all")
+    assert (found.theta, found.pitch, found.height_m) == pytest.approx((ROLL, PITCH, HEIGHT), abs=1e-4)
+    plain = library.estimate_roll(disparity)
+    assert (plain.pitch, plain.pitch_ci95, plain.height_m, plain.height_ci95_m) == (None,) * 4
