@@ -49,7 +49,7 @@ def _estimate(frame: Frame, options: FrameOptions) -> FrameResult:
 
 
 def _calibration(frame: Frame, source: Source, estimate: RollEstimate) -> Calibration | None:
-    """The frame's calibration at the size of its map; doffs allows for what the matcher errs by."""
+    """Scale the frame's calibration to its map; doffs allows for what the matcher errs by."""
     if frame.calibration is None:
         return None
     calibration = frame.calibration

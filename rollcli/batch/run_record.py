@@ -94,7 +94,7 @@ def _effective(plan: Plan, options: EstimateOptions) -> dict[str, Any]:
 
 
 def _calibrations(frames: Sequence[Frame]) -> dict[str, Any]:
-    """The calibrations used and where they are from: the first few, and how many differ."""
+    """List the first few calibrations used, and where they are from; count how many differ."""
     used = dict.fromkeys(frame.calibration for frame in frames if frame.calibration is not None)
     digest = hashlib.sha256("\n".join(map(repr, used)).encode("utf-8", "surrogateescape"))
     return {

@@ -5,10 +5,10 @@ from typing import Any
 import click
 
 from rollcli.batch.options import EstimateOptions, ResultOptions
+from rollcli.cli.calibration_options import calibration_options
 from rollcli.cli.command import command, option, record
 from rollcli.cli.config import config_option
 from rollcli.cli.options import (
-    calibration_options,
     cluster_options,
     encoding_options,
     image_options,

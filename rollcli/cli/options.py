@@ -3,7 +3,7 @@
 from typing import Any
 
 from rollcli.cli.command import argument, option, record
-from rollcli.cli.types import Choice, FilePath, Number, NumberOrNan, Point, Polygon, Roi
+from rollcli.cli.types import Choice, FilePath, Number, NumberOrNan, Polygon, Roi
 from rollcli.estimator.methods import MAX_ROLL_LIMIT_DEG, METHODS, MODELS, ROADS
 from rollcli.frames.options import (
     EncodingOptions,
@@ -15,7 +15,6 @@ from rollcli.frames.options import (
     RunningOptions,
 )
 from rollcli.imaging.stereo_options import MODES, StereoOptions
-from rollcli.rig.options import CalibrationOptions
 
 PATH = FilePath()  # whether it exists, its reader says: in the same words wherever the name came from
 
@@ -217,41 +216,6 @@ method_options = record(
         type=Number("INT", at_least=0, whole=True),
         default=MethodOptions.seed,
         help="Seed of road finding's samples.",
-    ),
-)
-
-calibration_options = record(
-    "calibration",
-    "Calibration of the rectified pair, for pitch and height",
-    CalibrationOptions,
-    option(
-        "--calib",
-        type=PATH,
-        multiple=True,
-        metavar="PATH",
-        help="A file, or a folder with one of the same stem each: KITTI, Middlebury, ETH3D, OpenCV, ROS "
-        "(twice: left, right), Cityscapes, ORB-SLAM, DrivingStereo; recognised by content.",
-    ),
-    option(
-        "--focal",
-        type=Number("PX", above=0),
-        help="Focal length, pixels.  [default: the file's]",
-    ),
-    option(
-        "--principal-point",
-        type=Point(),
-        help="Principal point of the left view, pixels from the centre of the top-left pixel.  "
-        "[default: the file's]",
-    ),
-    option(
-        "--baseline",
-        type=Number("M", above=0),
-        help="Distance between the cameras, metres; without it there is no height.  [default: the file's]",
-    ),
-    option(
-        "--doffs",
-        type=Number("PX"),
-        help="Column of the right principal point less the left one, pixels.  [default: the file's, else 0]",
     ),
 )
 
