@@ -65,6 +65,9 @@ class LazyGroup(click.Group):
         except BrokenPipeError:  # caught here, since click would call it a failure
             _discard_stdout()
             return ctx.exit(ExitStatus.DONE)
+        except KeyboardInterrupt:  # click would write a line of its own
+            say("interrupted")
+            return ctx.exit(ExitStatus.INTERRUPTED)
 
     def main(self, *args: Any, standalone_mode: bool = True, **extra: Any) -> Any:
         """Run the program; outside of tests, exit with its status."""

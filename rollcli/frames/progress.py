@@ -66,9 +66,9 @@ class Progress:
         if not self._running.quiet and sys.stderr.isatty():
             from tqdm import tqdm  # loaded only where a person reads it
 
-            known = os.get_terminal_size(sys.stderr.fileno()).columns > 0
-            size = {"dynamic_ncols": True} if known else _UNKNOWN_SIZE
-            self._bar = tqdm(total=self.total, initial=self._kept, unit=" frames", leave=False, **size)
+            self._bar = tqdm(
+                total=self.total, initial=self._kept, unit=" frames", leave=False, **_terminal_size()
+            )
         return self
 
     def __exit__(
@@ -171,3 +171,12 @@ class Progress:
     def status(self) -> ExitStatus:
         """The exit status of a run that came to its end."""
         return ExitStatus.FRAMES_FAILED if self.counts["error"] else ExitStatus.DONE
+
+
+def _terminal_size() -> dict[str, Any]:
+    """Choose the size of the bar: the terminal's, if that tells one."""
+    try:
+        known = os.get_terminal_size(sys.stderr.fileno()).columns > 0
+    except OSError:  # the terminal is gone
+        known = False
+    return {"dynamic_ncols": True} if known else _UNKNOWN_SIZE

@@ -1,4 +1,4 @@
-"""Let Ctrl-C and SIGTERM stop a run after the tasks that have begun; the second one stops it at once."""
+"""Let Ctrl-C, SIGTERM and SIGHUP stop a run after the tasks that have begun; a second one, at once."""
 
 import contextlib
 import signal
@@ -12,6 +12,34 @@ class Stop:
 
     asked = False
     at_once = False
+
+
+def stop_signals() -> list[signal.Signals]:
+    """List the signals that stop a run.
+
+    SIGHUP, which says that the terminal is gone, is one of them unless it is ignored, as `nohup` does.
+    """
+    signals = [signal.SIGINT, signal.SIGTERM]
+    hangup: signal.Signals | None = getattr(signal, "SIGHUP", None)  # not on Windows
+    if hangup is not None and signal.getsignal(hangup) is not signal.SIG_IGN:
+        signals.append(hangup)
+    return signals
+
+
+def raise_on_signals() -> None:
+    """Let each of the signals raise KeyboardInterrupt: for the time before a run and after it."""
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        raise KeyboardInterrupt
+
+    for number in stop_signals():
+        signal.signal(number, interrupt)
+
+
+def ignore_signals() -> None:
+    """Ignore the signals: the process is ending, or another one decides when it does."""
+    for number in stop_signals():
+        signal.signal(number, signal.SIG_IGN)
 
 
 @contextlib.contextmanager
@@ -34,7 +62,7 @@ def stop_on_signals() -> Iterator[Stop]:
     if threading.current_thread() is not threading.main_thread():
         yield stop  # Python lets only the main thread handle signals
         return
-    before = {number: signal.signal(number, ask) for number in (signal.SIGINT, signal.SIGTERM)}
+    before = {number: signal.signal(number, ask) for number in stop_signals()}
     try:
         yield stop
     finally:

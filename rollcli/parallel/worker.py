@@ -14,6 +14,7 @@ from types import TracebackType
 from typing import Any
 
 from rollcli.errors import RollcliError, WorkerError
+from rollcli.parallel.interrupt import ignore_signals, stop_signals
 from rollcli.parallel.process_setup import prepare_worker
 
 
@@ -49,7 +50,7 @@ class Worker:
             self.pipe, far_end = spawn.Pipe()
             inherited = _InheritedFile(keep_open)
             self._process = spawn.Process(target=_serve, args=(far_end, do, inherited), daemon=True)
-            with _ctrl_c_blocked():  # the child inherits this: only the parent decides when work ends
+            with _stop_signals_blocked():  # the child inherits this: only the parent decides when work ends
                 self._process.start()
         except OSError as error:
             raise _cannot_start(error) from error
@@ -67,7 +68,7 @@ class Worker:
 
 def _serve(pipe: "Connection[Any, Any]", do: Callable[[Any], Any], inherited: "_InheritedFile") -> None:
     """Run tasks until the pipe is closed; `inherited` is an argument so that its file stays open."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    ignore_signals()
     threading.Thread(target=_end_with_parent, daemon=True).start()
     start_error = _prepare()
     with contextlib.suppress(EOFError, OSError):  # the parent has closed its end: all is done
@@ -141,14 +142,14 @@ def _received(duplicate: Any) -> _InheritedFile:
 
 
 @contextlib.contextmanager
-def _ctrl_c_blocked() -> Iterator[None]:
+def _stop_signals_blocked() -> Iterator[None]:
     if sys.platform == "win32":
         yield
         return
     from multiprocessing import resource_tracker  # not on Windows
 
-    resource_tracker.ensure_running()  # it would start inside the block, and unblocks Ctrl-C when it does
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    resource_tracker.ensure_running()  # it would start inside the block, and unblock Ctrl-C when it does
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, set(stop_signals()))
     try:
         yield
     finally:

@@ -1,0 +1,128 @@
+"""What happens when nobody reads: only a closed stdout that takes results may end a run, and quietly."""
+
+import os
+import pty
+import signal
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from tests.run_cli import command, environment, write_maps
+
+FRAMES = 8
+
+
+@pytest.fixture
+def maps(tmp_path):
+    write_maps(tmp_path / "maps", FRAMES)
+    return tmp_path
+
+
+WORK = {
+    "estimate": (["estimate", "maps", "-v", "-o", "rolls.csv", "--derotated", "out"], "out/*.png"),
+    "derotate": (["derotate", "maps", "-v", "--roll", "1", "-o", "out"], "out/*.png"),
+    "simulate": (
+        ["simulate", "out", "-v", "--frames", str(FRAMES), "--size", "64x48", "-j1"],
+        "out/disparity/*.png",
+    ),
+}
+
+
+def start(folder, arguments, **streams):
+    return subprocess.Popen(command(*arguments), cwd=folder, env=environment(), **streams)
+
+
+@pytest.mark.parametrize("name", WORK)
+def test_a_reader_of_messages_who_leaves_neither_ends_nor_hides_the_work(maps, name):
+    arguments, written = WORK[name]
+    run = start(maps, arguments, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    run.stdout.readline()
+    run.stdout.close()
+    assert run.wait(60) == 0
+    assert len(list(maps.glob(written))) == FRAMES
+    if name == "estimate":
+        assert (maps / "rolls.csv").read_bytes().count(b"\n") == FRAMES + 1
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
+@pytest.mark.parametrize("name", WORK)
+def test_messages_that_do_not_fit_on_their_disk_do_not_end_the_work(maps, name):
+    arguments, written = WORK[name]
+    with Path("/dev/full").open("wb") as full:
+        assert start(maps, arguments, stderr=full).wait(60) == 0
+    assert len(list(maps.glob(written))) == FRAMES
+
+
+@pytest.mark.parametrize("name", WORK)
+def test_a_terminal_that_is_gone_does_not_end_the_work(maps, name):
+    arguments, written = WORK[name]
+    main, other = pty.openpty()
+    run = start(maps, arguments, stderr=other)
+    os.close(other)
+    os.read(main, 1)
+    os.close(main)
+    assert run.wait(60) == 0
+    assert len(list(maps.glob(written))) == FRAMES
+
+
+def test_an_error_keeps_its_status_when_nobody_reads_its_message(maps):
+    read, write = os.pipe()
+    os.close(read)
+    run = start(maps, ["estimate", "nothing"], stderr=write)
+    os.close(write)
+    assert run.wait(60) == 2
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="this system has no SIGHUP")
+def test_a_hangup_stops_a_run_as_sigterm_does_unless_it_is_ignored(maps):
+    write_maps(maps / "maps", 60)
+    line = ["estimate", "maps", "-o", "rolls.csv", "-v"]
+    run = start(maps, line, stderr=subprocess.PIPE)
+    run.stderr.readline()
+    run.send_signal(signal.SIGHUP)
+    _, err = run.communicate(timeout=60)
+    assert run.returncode == 130
+    assert b"interrupted; continue with: rollcli estimate maps" in err
+    ignored = subprocess.Popen(
+        command(*line, "--resume"),
+        cwd=maps,
+        env=environment(),
+        stderr=subprocess.PIPE,
+        preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN),
+    )
+    ignored.send_signal(signal.SIGHUP)
+    ignored.communicate(timeout=60)
+    assert ignored.returncode == 0
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_before_the_run_is_one_line_and_status_130(maps, number):
+    run = start(maps, ["estimate", "-"], stdin=subprocess.PIPE, stderr=subprocess.PIPE)
+    wait_until_it_reads(run)
+    run.send_signal(number)
+    _, err = run.communicate(timeout=60)
+    assert (run.returncode, err) == (130, b"rollcli: interrupted\n")
+
+
+def wait_until_it_reads(run):
+    """Until the program sleeps in its read of stdin: by then it has set up its signals."""
+    wchan = Path(f"/proc/{run.pid}/wchan")
+    if not wchan.exists():
+        pytest.skip("this system does not tell what a process waits for")
+    while "pipe" not in wchan.read_text():
+        assert run.poll() is None
+
+
+def test_file_names_neither_forge_lines_nor_command_the_terminal(tmp_path):
+    name = "a\x1b[2J\x07\nrollcli: all is well\r.png"
+    (tmp_path / name).write_bytes(b"no map at all")
+    run = start(tmp_path, ["estimate", ".", "-v"], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+    _, err = run.communicate(timeout=60)
+    assert run.returncode == 3
+    assert not any(byte in err for byte in b"\x1b\x07\r")
+    assert b"\nrollcli: all is well" not in err
+    refused = start(tmp_path, ["estimate", f"no{name}"], stderr=subprocess.PIPE)
+    _, err = refused.communicate(timeout=60)
+    assert err.count(b"\n") == 1
+    assert b"\x1b" not in err
