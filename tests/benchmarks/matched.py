@@ -7,7 +7,7 @@ import sys
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -22,19 +22,25 @@ from rollcli.simulate.spec import FrameSpec
 
 
 class Matched(NamedTuple):
-    """A disparity map from a rendered pair, its true roll and its kind of scene."""
+    """A disparity map from a rendered pair, its true roll, its kind of scene, and what was rendered."""
 
     disparity: NDArray[np.float32]
     roll_deg: float
     scene: str
+    spec: FrameSpec
 
 
 def matched(
-    frames: int, seed: int, roll_deg: float, size: tuple[int, int] = (640, 480), mode: str = "3way"
+    frames: int,
+    seed: int,
+    roll_deg: float,
+    size: tuple[int, int] = (640, 480),
+    mode: str = "3way",
+    **rig: Any,
 ) -> Iterator[Matched]:
-    """Render and match mixed scenes with rolls within +-roll_deg, on all processors."""
+    """Render and match mixed scenes, rolled within +-roll_deg, in parallel; `rig` is for `draw_specs`."""
     span = math.radians(roll_deg)
-    specs = draw_specs(frames, roll=(-span, span), size=size, seed=seed, colour=False)
+    specs = draw_specs(frames, roll=(-span, span), size=size, seed=seed, colour=False, **rig)
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(os.cpu_count(), context) as pool:
         yield from pool.map(_matched, specs, [mode] * frames)
@@ -44,4 +50,4 @@ def _matched(spec: FrameSpec, mode: str) -> Matched:
     cv2.setNumThreads(1)
     frame = render_frame(spec)
     match = match_pair(frame.left, frame.right, StereoOptions(mode=mode))
-    return Matched(match.disparity, math.degrees(spec.roll), spec.scene)
+    return Matched(match.disparity, math.degrees(spec.roll), spec.scene, spec)
