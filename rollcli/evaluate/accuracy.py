@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rollcli.errors import UsageError
+from rollcli.evaluate.pose_accuracy import PoseAccuracy
 from rollcli.evaluate.truth import by_stem
 from rollcli.files.results import Row
 
@@ -41,6 +42,8 @@ class Accuracy:
         Frames of the truth for which the result has no angle, as an error row or not at all.
     no_truth : tuple of str
         Rows of the result whose angle is not known.
+    pitch, height : PoseAccuracy or None
+        Of pitch, degrees, and height, metres; None where the truth or the result has none.
     """
 
     count: int
@@ -56,6 +59,8 @@ class Accuracy:
     suspect: int
     no_angle: tuple[str, ...]
     no_truth: tuple[str, ...]
+    pitch: PoseAccuracy | None = None
+    height: PoseAccuracy | None = None
 
 
 def assess(rows: Sequence[Row], truth: Mapping[str, float], result_name: str = "the result") -> Accuracy:

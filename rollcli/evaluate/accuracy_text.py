@@ -9,9 +9,11 @@ from dataclasses import fields
 from typing import Any
 
 from rollcli.evaluate.accuracy import LARGE_ERROR_DEG, Accuracy
+from rollcli.evaluate.pose_accuracy import PoseAccuracy
 
 _NAMES = {"no_angle", "no_truth"}
 _DIGITS = 6
+_LENGTHS = {"median", "p95", "worst", "bias"}  # what has the unit of the quantity
 
 
 def as_table(accuracy: Accuracy) -> str:
@@ -28,6 +30,16 @@ def as_table(accuracy: Accuracy) -> str:
         (f"above {LARGE_ERROR_DEG:g} degrees", _percent(accuracy.share_above_0_5_deg, of)),
         ("inside the 95 % interval", _percent(accuracy.coverage_95, accuracy.intervals)),
     ]
+    for name, part, unit in (("pitch", accuracy.pitch, "degrees"), ("height", accuracy.height, "m")):
+        if part is not None:
+            lines += [
+                (f"{name}, frames compared", str(part.count)),
+                (f"{name}, median error", f"{part.median:.4f} {unit}"),
+                (f"{name}, 95th percentile", f"{part.p95:.4f} {unit}"),
+                (f"{name}, worst", f"{part.worst:.4f} {unit}"),
+                (f"{name}, mean, signed", f"{part.bias:.4f} {unit}"),
+                (f"{name}, inside its interval", _percent(part.coverage_95, part.count)),
+            ]
     return "".join(f"{name:26}{value}\n" for name, value in lines)
 
 
@@ -51,6 +63,11 @@ FORMATS = {"table": as_table, "csv": as_csv, "json": as_json}
 
 def _values(accuracy: Accuracy) -> dict[str, Any]:
     values = {field.name: getattr(accuracy, field.name) for field in fields(accuracy)}
+    for name, unit in (("pitch", "deg"), ("height", "m")):
+        part = values.pop(name)
+        for field in fields(PoseAccuracy):
+            suffix = f"_{unit}" if field.name in _LENGTHS else ""
+            values[f"{name}_{field.name}{suffix}"] = getattr(part, field.name, None)
     return {name: round(v, _DIGITS) if isinstance(v, float) else v for name, v in values.items()}
 
 

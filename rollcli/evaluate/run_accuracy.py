@@ -1,9 +1,12 @@
 """`evaluate accuracy` from the command line: what is read and written, and what is said meanwhile."""
 
+from dataclasses import replace
+
 from rollcli.errors import ExitStatus
 from rollcli.evaluate.accuracy import Accuracy, assess
 from rollcli.evaluate.accuracy_text import FORMATS
-from rollcli.evaluate.truth import read_truth
+from rollcli.evaluate.pose_accuracy import assess_height, assess_pitch
+from rollcli.evaluate.truth import read_known_poses
 from rollcli.files.results import read_result
 from rollcli.files.stream import is_stream, write_output
 from rollcli.frames.checks import check_writes, list_files
@@ -17,7 +20,8 @@ def run_accuracy(result: str, truth: str, form: str, output: str, running: Runni
     Parameters
     ----------
     result, truth : str
-        Files: what `rollcli estimate` wrote, and a CSV with `file` and `roll_deg`.
+        Files: what `rollcli estimate` wrote, and a CSV with `file`, `roll_deg` and, where known, `pitch_deg`
+        and `height_m`.
     form : {"table", "csv", "json"}
     output : str
         A file, or "-" for stdout.
@@ -40,7 +44,9 @@ def run_accuracy(result: str, truth: str, form: str, output: str, running: Runni
     if running.dry_run:
         list_files([((result, truth), writes)])
         return ExitStatus.DONE
-    accuracy = assess(read_result(result).rows, read_truth(truth), result)
+    rows, known = read_result(result).rows, read_known_poses(truth)
+    accuracy = assess(rows, {stem: pose.theta for stem, pose in known.items()}, result)
+    accuracy = replace(accuracy, pitch=assess_pitch(rows, known), height=assess_height(rows, known))
     _name_unmatched(accuracy, result, truth, running)
     data = FORMATS[form](accuracy).encode("utf-8", "surrogateescape")
     write_output(output, data)

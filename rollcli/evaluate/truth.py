@@ -5,7 +5,8 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 from rollcli.errors import InputError, UsageError
@@ -13,6 +14,15 @@ from rollcli.files.matching import stem_of
 from rollcli.files.results import TEXT
 
 _NEEDED = ("file", "roll_deg")
+
+
+@dataclass(frozen=True)
+class KnownPose:
+    """What is known of a rig: its roll, radians; pitch, degrees, and height, metres, or None."""
+
+    theta: float
+    pitch_deg: float | None = None
+    height_m: float | None = None
 
 
 def by_stem(names: Iterable[str], where: str) -> dict[str, int]:
@@ -55,6 +65,15 @@ def read_truth(path: str | Path) -> dict[str, float]:
     UsageError
         Two frames have the same stem.
     """
+    return {stem: known.theta for stem, known in read_known_poses(path).items()}
+
+
+def read_known_poses(path: str | Path) -> dict[str, KnownPose]:
+    """Read known angles with what else is known of the rig; see `read_truth`.
+
+    Pitch and height are the optional columns `pitch_deg` and `height_m`. They hold for the road below the
+    camera, and are left out where `curvature_per_m` says that the road ahead bends away from it.
+    """
     try:
         data = Path(path).read_bytes()
     except OSError as error:
@@ -66,24 +85,35 @@ def read_truth(path: str | Path) -> dict[str, float]:
     return {stem: rows[place][1] for stem, place in places.items()}
 
 
-def _rows(text: str, path: str | Path) -> Iterator[tuple[str, float]]:
-    """Yield each line's name, and its angle in radians."""
+def _rows(text: str, path: str | Path) -> Iterator[tuple[str, KnownPose]]:
+    """Yield each line's name, and what it says of the rig."""
     lines = csv.DictReader(io.StringIO(text, newline=""), strict=True)
     try:
         missing = [name for name in _NEEDED if name not in (lines.fieldnames or ())]
         if missing:
             raise InputError(f"{path}: has no column {', '.join(missing)}: known angles are a CSV with both")
         for line in lines:
-            yield line["file"] or "", _angle(line["roll_deg"], f"{path}: line {lines.line_num}")
+            yield line["file"] or "", _known(line, f"{path}: line {lines.line_num}")
     except csv.Error as error:
         raise InputError(f"{path}: line {lines.line_num}: is not CSV: {error}") from error
 
 
-def _angle(text: str | None, where: str) -> float:
+def _known(line: Mapping[str, str | None], where: str) -> KnownPose:
+    bends = _number(line, "curvature_per_m", where) if line.get("curvature_per_m") else 0.0
+    pitch, height = (
+        _number(line, name, where) if line.get(name) and bends == 0 else None
+        for name in ("pitch_deg", "height_m")
+    )
+    return KnownPose(math.radians(_number(line, "roll_deg", where)), pitch, height)
+
+
+def _number(line: Mapping[str, str | None], name: str, where: str) -> float:
+    text = line[name]
     try:
-        degrees = float(text or "")
+        number = float(text or "")
     except ValueError:
-        degrees = math.nan
-    if not math.isfinite(degrees):
-        raise InputError(f"{where}: roll_deg is {text!r}, not an angle in degrees")
-    return math.radians(degrees)
+        number = math.nan
+    if not math.isfinite(number):
+        kind = "an angle in degrees" if name.endswith("_deg") else "a number"
+        raise InputError(f"{where}: {name} is {text!r}, not {kind}")
+    return number

@@ -1,6 +1,7 @@
 """Errors of a result against known angles."""
 
 import csv
+import dataclasses
 import io
 import json
 import math
@@ -10,7 +11,8 @@ import pytest
 from rollcli.errors import InputError, UsageError
 from rollcli.evaluate.accuracy import assess
 from rollcli.evaluate.accuracy_text import as_csv, as_json, as_table
-from rollcli.evaluate.truth import read_truth
+from rollcli.evaluate.pose_accuracy import assess_height, assess_pitch
+from rollcli.evaluate.truth import read_known_poses, read_truth
 from rollcli.files.matching import stem_of
 from rollcli.files.results import Row
 
@@ -161,3 +163,52 @@ def test_a_truth_that_is_not_there_is_refused(tmp_path):
 def test_a_truth_with_two_frames_of_one_stem_is_refused(tmp_path):
     with pytest.raises(UsageError, match=r"a\.png and b/a have the same stem"):
         read_truth(write_truth(tmp_path / "t.csv", "file,roll_deg\na.png,1\nb/a,2\n"))
+
+
+TRUTH_WITH_POSE = (
+    "file,roll_deg,pitch_deg,height_m,curvature_per_m\n"
+    "frame1,1,3.0,1.5,0\nframe2,2,4.0,1.6,0\nframe3,3,5.0,1.7,0.001\nframe4,4,,,\n"
+)
+
+
+def posed_rows():
+    poses = [(3.1, 0.2, 1.49, 0.02), (3.7, 0.2, 1.6, 0.02), (5.0, 0.2, 1.7, 0.02), (6.0, 0.2, 1.8, 0.02)]
+    return [
+        dataclasses.replace(row, pitch_deg=p, pitch_ci95_deg=pc, height_m=h, height_ci95_m=hc)
+        for row, (p, pc, h, hc) in zip(rows(1.0, 2.0, 3.0, 4.0), poses, strict=True)
+    ]
+
+
+def test_pitch_and_height_are_compared_where_they_are_known_and_the_road_does_not_bend(tmp_path):
+    known = read_known_poses(write_truth(tmp_path / "t.csv", TRUTH_WITH_POSE))
+    pitch, height = assess_pitch(posed_rows(), known), assess_height(posed_rows(), known)
+    # errors of the first two frames: 0.1 and -0.3 degrees, -0.01 and 0 m
+    assert (pitch.count, pitch.median, pitch.worst) == (2, pytest.approx(0.2), pytest.approx(0.3))
+    assert (pitch.bias, pitch.coverage_95) == (pytest.approx(-0.1), 0.5)
+    assert (height.count, height.worst, height.coverage_95) == (2, pytest.approx(0.01), 1.0)
+
+
+def test_pitch_and_height_stand_in_every_format(tmp_path):
+    known = read_known_poses(write_truth(tmp_path / "t.csv", TRUTH_WITH_POSE))
+    found = dataclasses.replace(
+        assess(posed_rows(), truth(1, 2, 3, 4)),
+        pitch=assess_pitch(posed_rows(), known),
+        height=assess_height(posed_rows(), known),
+    )
+    assert "pitch, median error       0.2000 degrees\n" in as_table(found)
+    assert "height, worst             0.0100 m\n" in as_table(found)
+    assert json.loads(as_json(found))["pitch_worst_deg"] == 0.3
+    (line,) = csv.DictReader(io.StringIO(as_csv(found)))
+    assert (line["height_count"], line["height_median_m"]) == ("2", "0.005")
+
+
+def test_without_known_poses_nothing_is_said_of_them(tmp_path):
+    known = read_known_poses(write_truth(tmp_path / "t.csv", "file,roll_deg\nframe1,1\n"))
+    assert assess_pitch(posed_rows(), known) is None
+    assert "pitch" not in as_table(assess(posed_rows(), truth(1, 2, 3, 4)))
+
+
+def test_a_pitch_that_is_no_number_is_named(tmp_path):
+    path = write_truth(tmp_path / "t.csv", "file,roll_deg,pitch_deg\nframe1,1,steep\n")
+    with pytest.raises(InputError, match="line 2: pitch_deg is 'steep'"):
+        read_known_poses(path)
