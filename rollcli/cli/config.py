@@ -4,6 +4,7 @@ Keys at the top are for every command that has such an option. Keys in a table, 
 ``[evaluate.accuracy]``, are for that command alone.
 """
 
+import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,6 +14,11 @@ import click
 
 from rollcli.cli.command import option
 from rollcli.cli.types import FilePath
+
+_PARTS = 8  # of a dotted key; no command has more than two words, and no option more than one
+_MANY_PARTS = re.compile(
+    rf"""(?:^|[\[{{,])[ \t]*(?:(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){{{_PARTS}}}""", re.MULTILINE
+)
 
 
 def _use(ctx: click.Context, param: click.Parameter, path: str | None) -> None:
@@ -72,10 +78,13 @@ def _load(path: str) -> dict[str, Any]:
         import tomli as tomllib
 
     try:
-        return tomllib.loads(Path(path).read_text("utf-8"))
+        text = Path(path).read_text("utf-8")
+        if _MANY_PARTS.search(text):  # which takes time that grows with the square of their number
+            raise click.UsageError(f"{path}: is no file of options: it has a key of more than {_PARTS} parts")
+        return tomllib.loads(text)
     except OSError as error:
         raise click.UsageError(f"{path}: cannot be read: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:  # TOML, UTF-8, numbers of thousands of digits
         raise click.UsageError(f"{path}: is not TOML: {error}") from error
 
 
@@ -94,7 +103,7 @@ def _checked(ctx: click.Context, declared: click.Option, value: Any, path: str) 
         raise click.UsageError(f"{path}: {_key(declared)} is true or false, not {value!r}", ctx)
     if isinstance(declared.type, click.types.StringParamType | click.Path | click.Choice):
         for text in value if declared.multiple else [value]:
-            if not isinstance(text, str):
+            if not isinstance(text, str) or "\0" in text:
                 raise click.UsageError(f"{path}: {_key(declared)} is a text in quotes, not {text!r}", ctx)
     try:
         declared.type_cast_value(ctx, value)

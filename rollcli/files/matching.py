@@ -1,6 +1,6 @@
 """Match the rows of a table with files by name, wherever the table was made."""
 
-from collections import defaultdict
+from bisect import bisect_left
 from collections.abc import Sequence
 from pathlib import PurePosixPath
 
@@ -40,15 +40,11 @@ def match_paths(names: Sequence[str], rows: Sequence[str], table: str) -> list[i
     UsageError
         Several rows fit one name equally well, or one row fits several names.
     """
-    by_stem: dict[str, list[int]] = defaultdict(list)
-    parts = [_parts(row) for row in rows]
-    for position, (stem, *_) in enumerate(parts):
-        by_stem[stem].append(position)
+    by_end = sorted((_parts(row), position) for position, row in enumerate(rows))
     found: list[int | None] = []
     owner: dict[int, str] = {}
     for name in names:
-        wanted = _parts(name)
-        best = _closest(wanted, {at: parts[at] for at in by_stem.get(wanted[0], ())})
+        best = _closest(_parts(name), by_end)
         if len(best) > 1:
             raise UsageError(f"{table}: more than one row fits {name}: {listed(rows[at] for at in best)}")
         found.append(best[0] if best else None)
@@ -63,11 +59,20 @@ def _parts(path: str) -> list[str]:
     return [stem_of(path), *reversed(folders)]
 
 
-def _closest(wanted: Sequence[str], candidates: dict[int, list[str]]) -> list[int]:
-    """Find the candidates that share the most folders with the wanted path."""
-    shared = {at: _common(wanted, each) for at, each in candidates.items()}
-    most = max(shared.values(), default=0)
-    return [at for at, count in shared.items() if count == most]
+def _closest(wanted: list[str], by_end: Sequence[tuple[list[str], int]]) -> list[int]:
+    """Find those that share the stem and the most folders before it with what is wanted.
+
+    In a list sorted from the stem up to the root they lie next to each other, where `wanted` would stand.
+    """
+    place = bisect_left(by_end, (wanted, -1))
+    beside = by_end[max(0, place - 1) : place + 1]
+    most = max((_common(wanted, parts) for parts, _ in beside), default=0)
+    if most == 0:
+        return []
+    first = end = bisect_left(by_end, (wanted[:most], -1))
+    while end < len(by_end) and by_end[end][0][:most] == wanted[:most]:
+        end += 1
+    return sorted(at for _, at in by_end[first:end])
 
 
 def _common(one: Sequence[str], other: Sequence[str]) -> int:

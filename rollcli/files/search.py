@@ -8,6 +8,8 @@ from pathlib import Path
 
 from rollcli.errors import UsageError
 
+_NOWHERE = (0, 0)
+
 
 class Search:
     """Finds files, and knows which ones are taken from folders and patterns.
@@ -77,33 +79,39 @@ class Search:
 
     def _in_folder(self, folder: Path) -> Iterator[tuple[Path, str]]:
         """Yield readable files, except hidden ones."""
-        if os.path.realpath(folder) in self._skip:
+        skipped = {_identity(each) for each in self._skip} - {_NOWHERE}
+        if _identity(folder) in skipped:
             raise UsageError(f"{folder}: is an input and an output folder; write the results elsewhere")
-        seen: set[str] = set()
-        for root, folders, files in os.walk(folder, onerror=_fail, followlinks=True):
-            seen.add(os.path.realpath(root))
-            folders[:] = sorted(name for name in folders if self._enters(Path(root, name), seen))
-            for name in files:
-                path = Path(root, name)
-                if not name.startswith(".") and self._reads(name) and _is_file(path):
+        closed = skipped | {_identity(folder)}  # links may make a circle
+        waiting = [str(folder)]
+        while waiting:  # no recursion: folders may lie a thousand deep
+            root = waiting.pop()
+            inner = []
+            for entry in _entries(root):
+                if entry.name.startswith("."):
+                    continue
+                if os.path.isdir(entry.path):  # noqa: PTH112 (many paths; false where it cannot be told)
+                    inner.append(entry.path)
+                elif self._reads(entry.name) and _is_file(entry.path):
+                    path = Path(entry.path)
                     yield path, path.relative_to(folder).as_posix()
-
-    def _enters(self, folder: Path, seen: set[str]) -> bool:
-        if not self._recursive or folder.name.startswith("."):
-            return False
-        real = os.path.realpath(folder)
-        return real not in self._skip and real not in seen  # links may make a circle
+            opened = []
+            for each in sorted(inner) if self._recursive else ():
+                if (identity := _identity(each)) not in closed:
+                    closed.add(identity)
+                    opened.append(each)
+            waiting += reversed(opened)
 
     def _in_pattern(self, pattern: str) -> Iterator[tuple[Path, str]]:
         """Yield the files that match; unless the pattern names an ending, only readable ones."""
         ending = Path(pattern).suffix
         at_its_word = ending != "" and not glob.has_magic(ending)
         base = _fixed_part(pattern)
-        for match in glob.iglob(pattern, recursive=True):  # noqa: PTH207 (Path.glob takes no absolute pattern)
+        for match in _matches(pattern):
             path = Path(match)
             relative = Path(os.path.relpath(path, base))
             inside = {os.path.realpath(base / parent) for parent in relative.parents[:-1]}
-            if self._skip.isdisjoint(inside) and (at_its_word or self._reads(match)) and _is_file(path):
+            if self._skip.isdisjoint(inside) and (at_its_word or self._reads(match)) and _is_file(match):
                 yield path, _below(relative).as_posix()
 
     def _reads(self, name: str) -> bool:
@@ -114,13 +122,34 @@ def _match(names: tuple[str, str], patterns: tuple[str, ...]) -> bool:
     return any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns for name in names)
 
 
-def _fail(error: OSError) -> None:
-    raise UsageError(f"{error.filename}: this folder cannot be read: {(error.strerror or '').lower()}")
+def _matches(pattern: str) -> Iterator[str]:
+    try:
+        yield from glob.iglob(pattern, recursive=True)  # noqa: PTH207 (Path.glob takes no absolute pattern)
+    except RecursionError:
+        hint = "name the folder, with --recursive"
+        raise UsageError(f"{pattern}: the folders lie too deep for a pattern; {hint}") from None
 
 
-def _is_file(path: Path) -> bool:
-    """Tell whether this is a file, or a link to nothing: that one gets an error row."""
-    return path.is_file() or (path.is_symlink() and not path.exists())
+def _entries(folder: str) -> list[os.DirEntry[str]]:
+    try:
+        with os.scandir(folder) as entries:
+            return list(entries)
+    except OSError as error:
+        raise UsageError(f"{folder}: this folder cannot be read: {(error.strerror or '').lower()}") from None
+
+
+def _identity(folder: str | Path) -> tuple[int, int]:
+    """Return the same for every path of a folder, and _NOWHERE where there is none."""
+    try:
+        found = os.stat(folder)  # noqa: PTH116
+    except OSError:
+        return _NOWHERE
+    return found.st_dev, found.st_ino
+
+
+def _is_file(path: str) -> bool:
+    """Tell whether this is a file, or a name behind which none can be seen: that one gets an error row."""
+    return os.path.isfile(path) or not os.path.exists(path)  # noqa: PTH110, PTH113 (Path's raise)
 
 
 def _below(relative: Path) -> Path:

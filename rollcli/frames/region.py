@@ -1,5 +1,6 @@
 """Draw the pixels that a user allows: those inside the mask file, the rectangle and the polygon."""
 
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -10,6 +11,9 @@ from numpy.typing import NDArray
 from rollcli.errors import InputError
 from rollcli.files.encodings import read_mask
 from rollcli.frames.options import FrameOptions, RegionOptions
+
+Corner = tuple[float, float]
+_FAR = 2.0**17  # pixels; a side that leaves the map there is still straight to a hundredth of a pixel
 
 
 def region_mask(mask: str | None, options: FrameOptions, shape: tuple[int, ...]) -> NDArray[np.bool_] | None:
@@ -41,9 +45,28 @@ def _drawn(options: RegionOptions, shape: tuple[int, ...]) -> NDArray[np.bool_]:
     inside[y0:y1, x0:x1] = 1
     if options.polygon is not None:
         area: NDArray[Any] = np.zeros(shape, np.uint8)
-        cv2.fillPoly(area, [np.rint(options.polygon).astype(np.int32)], 1)
+        if corners := _near(options.polygon):
+            cv2.fillPoly(area, [np.rint(corners).astype(np.int32)], 1)
         inside &= area
     return inside.astype(np.bool_)
+
+
+def _near(corners: Sequence[Corner]) -> Sequence[Corner]:
+    """Cut off what lies far outside of any map [Sutherland, Hodgman 1974]: OpenCV would fill that, too."""
+    for axis in (0, 1):
+        for bound, side in ((-_FAR, 1), (_FAR, -1)):
+            kept: list[Corner] = []
+            for one, other in zip(corners, (*corners[1:], *corners[:1]), strict=True):
+                first, second = side * (one[axis] - bound), side * (other[axis] - bound)
+                if first >= 0:
+                    kept.append(one)
+                if (first >= 0) != (second >= 0):
+                    share = first / (first - second)
+                    cut = [a + share * (b - a) for a, b in zip(one, other, strict=True)]
+                    cut[axis] = bound
+                    kept.append((cut[0], cut[1]))
+            corners = kept
+    return corners
 
 
 @lru_cache(maxsize=1)  # a mask for all frames is read once

@@ -1,6 +1,7 @@
 """Where the pictures of a row come from: images that `estimate` wrote, or its inputs."""
 
 import math
+import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -83,8 +84,9 @@ def _subject(row: Row, folder: Path, images: dict[str, str]) -> Subject:
 
 def _located(name: str, folder: Path) -> str:
     """A file named from where `estimate` ran: here, or else from the result's folder."""
-    beside = folder / name
-    return str(beside) if name and not Path(name).exists() and beside.exists() else name
+    beside = str(folder / name)
+    # a result may name anything, and Path.exists fails for names that are too long
+    return beside if name and not os.path.exists(name) and os.path.exists(beside) else name  # noqa: PTH110
 
 
 def _images(row: Row, images: str, recorded: ImageOptions) -> dict[str, str]:
@@ -95,14 +97,14 @@ def _image(kind: str, row: Row, images: Path, recorded: ImageOptions) -> str | N
     for folder in _folders(kind, images, getattr(recorded, kind)):
         for name in _tails(row.file):
             for ending in (".png",) if kind == "vdisparity" else MAP_ENDINGS:
-                if (path := folder / f"{name}{ending}").is_file():
-                    return str(path)
+                if os.path.isfile(path := str(folder / f"{name}{ending}")):  # noqa: PTH113 (see _located)
+                    return path
     return None
 
 
 def _folders(kind: str, images: Path, recorded: str | None) -> Iterator[Path]:
     """Where images of a kind may be: in the folder named, under the name it had or the option's."""
-    names = {Path(recorded).name, kind} if recorded is not None else {kind}
+    names = {Path(recorded).name, kind} - {".."} if recorded is not None else {kind}
     for name in sorted(names):
         yield images / name
     if images.resolve().name in names or (
@@ -116,4 +118,5 @@ def _tails(file: str) -> Iterator[str]:
     path = PurePosixPath(file)
     parts = path.with_suffix("").parts
     for first in range(1 if path.is_absolute() else 0, len(parts)):
-        yield "/".join(parts[first:])
+        if ".." not in parts[first:]:  # which would lead out of the folder of images
+            yield "/".join(parts[first:])

@@ -57,7 +57,7 @@ def option_lines(run: Mapping[str, Any] | None) -> list[tuple[str, str]]:
 
 def _shown(value: Any) -> str:
     if isinstance(value, list):
-        between = " " if isinstance(value[0], list) else ","
+        between = " " if value and isinstance(value[0], list) else ","
         return between.join(map(_shown, value))
     return f"{value:g}" if isinstance(value, float) else str(value)
 

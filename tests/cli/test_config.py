@@ -135,3 +135,34 @@ def test_what_is_wrong_with_a_config_file_is_said_with_its_name(maps, text, reas
 def test_a_missing_config_file_is_an_error(maps):
     done = rollcli("estimate", "maps", "--config", "none.toml", cwd=maps)
     assert (done.status, "none.toml: cannot be read" in done.err) == (2, True)
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("a = " + "[" * 100_000, "is not TOML: maximum recursion depth exceeded"),
+        ("seed = " + "1" * 5000, "is not TOML: Exceeds the limit"),
+        (".".join(["a"] * 50_000) + " = 1", "is no file of options: it has a key of more than 8 parts"),
+        ("[" + ".".join(['"a"'] * 50_000) + "]", "is no file of options: it has a key of more than 8 parts"),
+        ('output = "a\\u0000b"', "'output' is a text in quotes"),
+    ],
+)
+def test_a_config_file_made_to_harm_is_refused_in_one_line(maps, text, reason):
+    (maps / "rollcli.toml").write_text(text)
+
+    done = rollcli("estimate", "maps", "--config", "rollcli.toml", cwd=maps)
+
+    assert done.status == 2
+    assert done.err.startswith("rollcli: rollcli.toml: ")
+    assert reason in done.err
+    assert done.err.count("\n") == 1
+
+
+def test_lists_of_numbers_and_names_with_dots_are_no_long_keys(maps):
+    (maps / "rollcli.toml").write_text(
+        'polygon = [[0.5, 0.5],\n[1.5e2, 0.5], [1.5e2,\n 1.1e2]]\nmask = "a.b.c.d.e.f.g.h.i.png"\n'
+    )
+
+    done = rollcli("estimate", "maps", "--config", "rollcli.toml", cwd=maps)
+
+    assert "a.b.c.d.e.f.g.h.i.png: no such mask" in done.err

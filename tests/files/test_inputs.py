@@ -2,6 +2,7 @@
 
 import io
 import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -376,3 +377,35 @@ def test_a_list_may_be_separated_as_find_print0_does(tmp_path, monkeypatch):
         Path(name).touch()
     Path("list").write_bytes(b"a\nb.png\0c.png\0")
     assert [each.name for each in find_inputs((), files_from="list")] == ["a\nb.png", "c.png"]
+
+
+@pytest.fixture
+def deep(here):
+    """A folder in a folder, a thousand times, with a map in the last."""
+    root = here("deep/map.png")
+    folder = os.open(root / "deep", os.O_RDONLY)
+    for _ in range(1000):
+        os.mkdir("d", dir_fd=folder)
+        inner = os.open("d", os.O_RDONLY, dir_fd=folder)
+        os.close(folder)
+        folder = inner
+    os.close(os.open("map.png", os.O_CREAT, dir_fd=folder))
+    os.close(folder)
+    yield "deep"
+    subprocess.run(["rm", "-rf", root / "deep"], check=True)  # shutil fails at this depth
+
+
+@pytest.mark.skipif(os.name == "nt", reason="folders are made from open folders")
+def test_a_thousand_nested_folders_are_searched(deep):
+    found = find_inputs([deep], recursive=True)
+
+    assert [each.relative for each in found] == ["d/" * 1000 + "map.png", "map.png"]
+    with pytest.raises(UsageError, match="too deep for a pattern; name the folder, with --recursive"):
+        find_inputs([f"{deep}/**/*.png"])
+
+
+def test_a_link_to_itself_is_an_input_that_its_row_will_explain(here):
+    root = here("maps/a.png")
+    (root / "maps" / "loop.png").symlink_to("loop.png")
+
+    assert names(find_inputs(["maps"])) == ["maps/a.png", "maps/loop.png"]

@@ -132,3 +132,51 @@ def test_what_is_no_result_is_refused_with_its_line(tmp_path, data, reason):
 def test_a_missing_result_is_an_input_error(tmp_path):
     with pytest.raises(InputError, match="no such file"):
         read_result(tmp_path / "none.csv")
+
+
+HOSTILE = {
+    "nested 100,000 deep": b'{"file": ' + b"[" * 100_000,
+    "a number of 5,000 digits": b'{"file": "a", "status": "ok", "roll_deg": ' + b"1" * 5000 + b"}",
+    "such a number in CSV": b"file,status,roll_deg,iterations\na,ok,1," + b"1" * 5000 + b"\n",
+    "a long status": b"file,status,roll_deg\na," + b"x" * 5000 + b",1\n",
+}
+
+
+@pytest.mark.parametrize("what", HOSTILE)
+def test_results_made_to_harm_are_refused_in_one_short_line(tmp_path, what):
+    path = tmp_path / "rolls"
+    path.write_bytes(HOSTILE[what])
+
+    with pytest.raises(InputError, match=r"rolls: line [12]: ") as caught:
+        read_result(path)
+
+    assert "\n" not in str(caught.value)
+    assert len(str(caught.value)) < 400
+
+
+@pytest.mark.parametrize("record", [b"[" * 100_000, b'{"options": {"derotated": "a\\u0000b"}}', b"1" * 5000])
+def test_a_record_made_to_harm_is_refused_in_one_line(tmp_path, record):
+    path = tmp_path / "rolls.csv"
+    path.write_bytes(format_header("csv") + format_row(ROW, "csv"))
+    (tmp_path / "rolls.csv.run.json").write_bytes(record)
+
+    with pytest.raises(InputError, match=r"^[^\n]*run.json: is not JSON[^\n]*$"):
+        read_result(path)
+
+
+def test_a_name_that_leaves_no_room_for_its_record_has_none(tmp_path):
+    path = tmp_path / ("n" * 249 + ".csv")
+    path.write_bytes(format_header("csv") + format_row(ROW, "csv"))
+
+    assert read_result(path).run is None
+
+
+@pytest.mark.parametrize("name", ["=1+1.png", "+a.png", "-a.png", "@a.png"])
+@pytest.mark.parametrize("form", ["csv", "jsonl"])
+def test_names_that_a_spreadsheet_would_compute_are_written_as_they_are(name, form):
+    row = Row(file=name, status="error", message=f"{name}: is empty")
+
+    line = format_row(row, form)
+
+    assert parse_rows(format_header(form) + line, "x")[0].file == name
+    assert name.encode() in line

@@ -94,6 +94,18 @@ def test_pictures_come_from_the_images_that_estimate_wrote(folder, images):
     assert page_of(folder).count("maps/frame0.png: no such file") == 1
 
 
+@pytest.mark.parametrize("name", ["../secret.png", "maps/../../secret.png", "derotated/../../secret.png"])
+def test_no_picture_comes_from_outside_of_the_folder_of_images(tmp_path, name):
+    write_kitti(tmp_path / "secret.png", road_map(0.1))
+    (tmp_path / "images" / "derotated").mkdir(parents=True)
+    write_result(tmp_path / "rolls.csv", [row(name)])
+
+    done = rollcli("report", "rolls.csv", "--images", "images", "-o", "page.html", cwd=tmp_path)
+
+    assert done.status == 2
+    assert "images: has no image of" in done.err
+
+
 def test_pairs_are_shown_from_their_computed_maps_or_matched_anew(tmp_path):
     rollcli("simulate", "rig", "--frames", "2", "--size", "200x120", "-q", cwd=tmp_path)
     line = [
