@@ -9,11 +9,12 @@ from typing import Protocol
 from rollcli.batch.options import EstimateOptions
 from rollcli.batch.plan import Plan
 from rollcli.batch.result_file import ResultFile, has_rows, kept_rows, open_result
-from rollcli.batch.resume import check_resumable, not_resumable
+from rollcli.batch.resume import check_resumable
 from rollcli.batch.run_record import RunRecord
 from rollcli.errors import InputError, UsageError
 from rollcli.files.atomic import remove_leftovers
 from rollcli.files.results import Row, format_header, format_row, parse_rows, read_run, run_path
+from rollcli.files.resumable import not_resumable
 from rollcli.files.stream import (
     STDOUT,
     STDOUT_NAME,

@@ -7,8 +7,8 @@ from typing import Any
 
 from rollcli.batch.plan import Plan
 from rollcli.batch.run_record import RunRecord
-from rollcli.errors import UsageError
 from rollcli.files.results import Row, run_path
+from rollcli.files.resumable import differences, not_resumable
 
 
 def check_resumable(
@@ -36,20 +36,10 @@ def check_resumable(
     return run
 
 
-def not_resumable(name: str, reason: str) -> UsageError:
-    """Make the error that refuses to continue a result; its one line says what to do."""
-    return UsageError(f"{name}: cannot be resumed: {reason}; --overwrite starts anew")
-
-
 def _differences(
     rows: Sequence[Row], was: Mapping[str, Any], now: Mapping[str, Any], plan: Plan
 ) -> Iterator[str]:
-    if was["rollcli"] != now["rollcli"]:
-        yield f"it was begun by rollcli {was['rollcli']}, this is {now['rollcli']}"
-    options_was, options_now = was["options"], json.loads(json.dumps(now["options"]))
-    for key in (*options_now, *(key for key in options_was if key not in options_now)):
-        if options_was.get(key) != options_now.get(key):
-            yield f"--{key} was {_shown(options_was.get(key))}, is now {_shown(options_now.get(key))}"
+    yield from differences(was, now)
     if was.get("calibration") != json.loads(json.dumps(now.get("calibration"))):
         yield "the calibration differs"
     for row, frame in zip(rows, plan.frames, strict=False):
@@ -87,7 +77,3 @@ def _changed(plan: Plan) -> str | None:
         if not Path(path).exists() or Path(path).stat().st_mtime_ns > begun:
             return path
     return None
-
-
-def _shown(value: Any) -> str:
-    return "not given" if value in (None, []) else str(value)

@@ -1,5 +1,6 @@
 """`rollcli estimate`: the main job."""
 
+from dataclasses import replace
 from typing import Any
 
 import click
@@ -93,7 +94,13 @@ def estimate(ctx: click.Context, /, **records: Any) -> None:
 
     A positive roll means that the rig is rolled counter-clockwise seen from behind: its right end is up.
     """
-    options = one_start(ctx, EstimateOptions(**records))
+    options = EstimateOptions(**records)
+    resume, overwrite = one_start(ctx, resume=options.result.resume, overwrite=options.running.overwrite)
+    options = replace(
+        options,
+        result=replace(options.result, resume=resume),
+        running=replace(options.running, overwrite=overwrite),
+    )
 
     from rollcli.batch.run import run_estimate
 

@@ -4,28 +4,27 @@ import shlex
 import shutil
 import sys
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import click
 from click.core import ParameterSource
 
-from rollcli.batch.options import EstimateOptions
-
 _STARTS = ("--overwrite", "--resume")
 _NEAREST_FIRST = [ParameterSource.COMMANDLINE, ParameterSource.ENVIRONMENT, ParameterSource.DEFAULT_MAP]
 
 
-def one_start(ctx: click.Context, options: EstimateOptions) -> EstimateOptions:
-    """Keep one of --resume and --overwrite: flags win over the environment, and that over --config."""
-    if not (options.result.resume and options.running.overwrite):
-        return options
-    resume, overwrite = (_distance(ctx, name) for name in ("resume", "overwrite"))
-    if resume < overwrite:
-        return replace(options, running=replace(options.running, overwrite=False))
-    if overwrite < resume:
-        return replace(options, result=replace(options.result, resume=False))
-    return options
+def one_start(ctx: click.Context, *, resume: bool, overwrite: bool) -> tuple[bool, bool]:
+    """Decide between --resume and --overwrite: flags win over the environment, and that over --config.
+
+    Returns
+    -------
+    tuple of bool
+        (resume, overwrite); both where both are given in the same place, which is an error later.
+    """
+    if not (resume and overwrite):
+        return resume, overwrite
+    to_resume, to_overwrite = (_distance(ctx, name) for name in ("resume", "overwrite"))
+    return to_resume <= to_overwrite, to_overwrite <= to_resume
 
 
 def _distance(ctx: click.Context, name: str) -> int:

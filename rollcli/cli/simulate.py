@@ -1,5 +1,6 @@
 """`rollcli simulate`: render stereo pairs whose roll is known."""
 
+from dataclasses import replace
 from typing import Any
 
 import click
@@ -7,6 +8,7 @@ import click
 from rollcli.cli.command import argument, command, option, record
 from rollcli.cli.config import config_option
 from rollcli.cli.options import PATH, running_options
+from rollcli.cli.resume import one_start, resume_command
 from rollcli.cli.types import Choice, Number, Point, Size, Span
 from rollcli.frames.options import RunningOptions
 from rollcli.simulate.options import (
@@ -148,6 +150,7 @@ simulate_options = record(
         default=0,
         help="Of all that is drawn; the same seed gives the same files.",
     ),
+    option("--resume", is_flag=True, help="Keep the frames of an interrupted simulation and do the rest."),
 )
 
 
@@ -170,8 +173,10 @@ def simulate(ctx: click.Context, /, folder: str, options: SimulateOptions, runni
     """Render road stereo pairs with known roll into DIR.
 
     Writes DIR/left and DIR/right (8-bit PNG), DIR/disparity (the true disparity of the left view, 16-bit
-    KITTI PNG) and DIR/truth.csv.
+    KITTI PNG), DIR/calib.txt (the calibration in KITTI's form) and DIR/truth.csv.
     """
     from rollcli.simulate.run import run_simulate
 
-    ctx.exit(run_simulate(folder, options, running))
+    resume, overwrite = one_start(ctx, resume=options.resume, overwrite=running.overwrite)
+    options, running = replace(options, resume=resume), replace(running, overwrite=overwrite)
+    ctx.exit(run_simulate(folder, options, running, resume_command(ctx)))

@@ -1,31 +1,31 @@
 """A folder of rendered frames with their truth and calibration, the same bytes whatever the workers."""
 
-import math
+import json
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.errors import OutputError, UsageError
+from rollcli.errors import OutputError
 from rollcli.files.atomic import output_error, remove_leftovers, write_atomic
 from rollcli.files.encodings import from_disparity
 from rollcli.files.formats import encode_stored
+from rollcli.files.results import run_path
 from rollcli.parallel.in_order import Work
 from rollcli.parallel.interrupt import Stop
 from rollcli.parallel.run_tasks import Workers, run_tasks
-from rollcli.simulate.draw import draw_specs
 from rollcli.simulate.geometry.camera import rig_axes
-from rollcli.simulate.options import CROSSFALL, KERB, KERBED, MIXED, SimulateOptions
 from rollcli.simulate.render import render_frame
 from rollcli.simulate.spec import LEVEL, FrameSpec
 from rollcli.simulate.truth import calibration, truth_csv
 
 _PARTS = ("left", "right", "disparity")
-_TRUTH = "truth.csv"
+TRUTH = "truth.csv"
 _CALIBRATION = "calib"
 _OURS = re.compile(r"frame_\d{4,}\.png")
 KITTI_TOP = 65534 / 256  # pixels: larger disparities are written as no data
@@ -40,16 +40,26 @@ class RenderTask:
     stem: str
 
     def image(self, part: str) -> Path:
-        """The file of "left", "right" or "disparity"."""
+        """Name the file of "left", "right" or "disparity"."""
         return self.folder / part / f"{self.stem}.png"
+
+    def images(self) -> list[Path]:
+        """Name the three files of the frame."""
+        return [self.image(part) for part in _PARTS]
 
 
 @dataclass(frozen=True)
 class Dataset:
-    """Which frames are written, and where."""
+    """Which frames are written, and where.
+
+    `record` holds the version and the options for a later --resume; `kept` the stems that an interrupted
+    simulation has left whole, or None where the folder is begun anew.
+    """
 
     folder: Path
     specs: tuple[FrameSpec, ...]
+    record: Mapping[str, Any] | None = None
+    kept: frozenset[str] | None = None
 
     @property
     def tasks(self) -> list[RenderTask]:
@@ -61,79 +71,34 @@ class Dataset:
         ]
 
     @property
+    def missing(self) -> list[RenderTask]:
+        """The frames that are not there yet."""
+        return [task for task in self.tasks if task.stem not in (self.kept or ())]
+
+    @property
     def nearest_disparity(self) -> float:
         """The largest disparity of a flat road in any frame, pixels."""
         return max(_nearest_disparity(spec) for spec in self.specs)
 
     def calibrations(self) -> dict[Path, bytes]:
-        """Files and contents: calib.txt where all frames share a rig, else one in calib/ for each frame."""
+        """Make names and contents: calib.txt where all frames share a rig, else one a frame in calib/."""
         contents = {task.stem: calibration(task.spec) for task in self.tasks}
         if len(set(contents.values())) == 1:
             return {self.folder / f"{_CALIBRATION}.txt": next(iter(contents.values()))}
         return {self.folder / _CALIBRATION / f"{stem}.txt": text for stem, text in contents.items()}
 
     def files(self) -> list[Path]:
-        """Everything that is written, truth.csv last."""
-        images = (task.image(part) for task in self.tasks for part in _PARTS)
-        return [*images, *self.calibrations(), self.folder / _TRUTH]
-
-
-def plan_dataset(folder: str | Path, options: SimulateOptions, *, overwrite: bool = False) -> Dataset:
-    """Draw the frames and see that they can be written.
-
-    Parameters
-    ----------
-    folder : str or Path
-        Where to write; made if it is not there.
-    options : SimulateOptions
-        What to render.
-    overwrite : bool
-        Whether a folder with files in it may be written to.
-
-    Raises
-    ------
-    UsageError
-        Options that contradict each other, or a folder with files in it.
-    """
-    _refuse_idle(options)
-    specs = draw_specs(
-        options.frames,
-        scene=options.scene,
-        roll=_radians(options.roll_deg),
-        pitch=_radians(options.pitch_deg),
-        curvature=options.curvature,
-        cross_section=options.cross_section,
-        crossfall=_shares(options.crossfall or CROSSFALL),
-        gutter=_shares(options.gutter),
-        kerb=options.kerb or KERB,
-        size=options.size,
-        focal=options.focal,
-        baseline=options.baseline,
-        height=options.height,
-        principal_point=options.principal_point,
-        principal_offset=options.principal_offset,
-        noise=options.noise,
-        gain=options.gain,
-        colour=not options.grey,
-        seed=options.seed,
-    )
-    _require_free(Path(folder), overwrite)
-    return Dataset(Path(folder), tuple(specs))
-
-
-def _refuse_idle(options: SimulateOptions) -> None:
-    """Refuse options that change nothing in the frames that are asked for."""
-    if options.crossfall is not None and options.cross_section == "flat":
-        raise UsageError("--crossfall: a flat road has none; choose another --cross-section")
-    if options.kerb is not None and options.scene not in (*KERBED, MIXED):
-        raise UsageError(f"--kerb: the scene {options.scene} has no kerbs; {' and '.join(KERBED)} have")
+        """List all files that are written, truth.csv last."""
+        record = [] if self.record is None else [run_path(self.folder / TRUTH)]
+        images = (path for task in self.missing for path in task.images())
+        return [*record, *images, *self.calibrations(), self.folder / TRUTH]
 
 
 def write_dataset(dataset: Dataset, jobs: int | None = 1, stop: Stop | None = None) -> Iterator[str]:
-    """Render and write the frames; yields each one's stem once it is on disk, in order.
+    """Render and write the frames that are missing; yield the stem of each once it is on disk, in order.
 
-    Frames of an earlier simulation in the same folder are removed first. truth.csv comes last: until it is
-    there, the folder is not complete.
+    Unless frames are kept, those of an earlier simulation in the folder are removed first. truth.csv is
+    written last: until it is there, the folder is not complete.
 
     Parameters
     ----------
@@ -148,16 +113,20 @@ def write_dataset(dataset: Dataset, jobs: int | None = 1, stop: Stop | None = No
     OutputError
         A file cannot be written, or a worker died.
     """
-    _clear(dataset)
-    remove_leftovers(task.image(part) for part in _PARTS for task in dataset.tasks)
-    written = 0
-    for stem in run_tasks(dataset.tasks, Work(_write_frame, _lost), stop or Stop(), Workers(jobs)):
+    if dataset.kept is None:
+        _clear(dataset)
+    if dataset.record is not None:
+        text = json.dumps(dataset.record, indent=2).encode() + b"\n"
+        write_atomic(run_path(dataset.folder / TRUTH), text)
+    tasks, written = dataset.missing, 0
+    remove_leftovers(path for task in tasks for path in task.images())
+    for stem in run_tasks(tasks, Work(_write_frame, _lost), stop or Stop(), Workers(jobs)):
         written += 1
         yield stem
-    if written == len(dataset.specs):
+    if written == len(tasks):
         for path, text in dataset.calibrations().items():
             write_atomic(path, text)
-        write_atomic(dataset.folder / _TRUTH, truth_csv((task.stem, task.spec) for task in dataset.tasks))
+        write_atomic(dataset.folder / TRUTH, truth_csv((task.stem, task.spec) for task in dataset.tasks))
 
 
 def _write_frame(task: RenderTask) -> str:
@@ -175,7 +144,7 @@ def _lost(task: RenderTask, reason: str) -> str:
 
 
 def _nearest_disparity(spec: FrameSpec) -> float:
-    """The largest disparity of a flat road: at a corner of the image, as it changes evenly along each row."""
+    """Return the largest disparity of a flat road, which is linear in the image: largest in one corner."""
     right, down, ahead = rig_axes(spec.roll, spec.pitch, LEVEL) @ -LEVEL
     scale = spec.baseline / spec.height
     return max(
@@ -191,19 +160,9 @@ def _png(image: NDArray[np.uint8]) -> bytes:
     return data.tobytes()
 
 
-def _require_free(folder: Path, overwrite: bool) -> None:
-    try:
-        if folder.exists() and not folder.is_dir():
-            raise UsageError(f"{folder}: is a file, not a folder to write to")
-        if not overwrite and folder.is_dir() and any(folder.iterdir()):
-            raise UsageError(f"{folder}: there are files in it; --overwrite writes there all the same")
-    except OSError as error:
-        raise output_error(folder, error) from error
-
-
 def _clear(dataset: Dataset) -> None:
     """Remove what an earlier simulation left: pairs without a row, and the calibration of another rig."""
-    single = [dataset.folder / name for name in (_TRUTH, f"{_CALIBRATION}.txt")]
+    single = [dataset.folder / name for name in (TRUTH, f"{_CALIBRATION}.txt")]
     try:
         for path in (*single, *_earlier_frames(dataset.folder)):
             path.unlink(missing_ok=True)
@@ -212,8 +171,7 @@ def _clear(dataset: Dataset) -> None:
 
 
 def _earlier_frames(folder: Path) -> list[Path]:
-    """What looks like ours: frame_0001.png and so on, where left, right and disparity all have it, and its
-    calibration."""
+    """List the files of frame_0001 and so on, where left, right and disparity all have it."""
     folders = [folder / part for part in _PARTS]
     if not all(each.is_dir() for each in folders):
         return []
@@ -221,11 +179,3 @@ def _earlier_frames(folder: Path) -> list[Path]:
     ours = [name for name in names if _OURS.fullmatch(name)]
     calibrations = [(folder / _CALIBRATION / name).with_suffix(".txt") for name in ours]
     return [each / name for name in ours for each in folders] + calibrations
-
-
-def _shares(percent: Sequence[float]) -> tuple[float, float]:
-    return percent[0] / 100, percent[1] / 100
-
-
-def _radians(span: Sequence[float]) -> tuple[float, float]:
-    return math.radians(span[0]), math.radians(span[1])

@@ -52,3 +52,4 @@ class SimulateOptions:
     gain: float = 1.0
     grey: bool = False
     seed: int = 0
+    resume: bool = False

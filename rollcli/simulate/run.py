@@ -1,18 +1,32 @@
-"""A simulation from the command line: what it writes, and what it says meanwhile."""
+"""Run `rollcli simulate`: plan, write, and say how far it is."""
 
 import sys
-import time
 
 from rollcli.errors import ExitStatus
 from rollcli.frames.options import RunningOptions
 from rollcli.messages import say
 from rollcli.parallel.interrupt import stop_on_signals
-from rollcli.simulate.dataset import KITTI_TOP, Dataset, plan_dataset, write_dataset
+from rollcli.parallel.progress import TaskProgress
+from rollcli.simulate.dataset import KITTI_TOP, Dataset, write_dataset
 from rollcli.simulate.options import SimulateOptions
+from rollcli.simulate.plan import plan_dataset
 
 
-def run_simulate(folder: str, options: SimulateOptions, running: RunningOptions) -> ExitStatus:
+def run_simulate(
+    folder: str, options: SimulateOptions, running: RunningOptions, resume_command: str = ""
+) -> ExitStatus:
     """Write the simulated frames.
+
+    Parameters
+    ----------
+    folder : str
+        Where to write.
+    options : SimulateOptions
+        What to render.
+    running : RunningOptions
+        How to run, and how much to say.
+    resume_command : str
+        The command that continues this simulation when it is interrupted.
 
     Raises
     ------
@@ -28,27 +42,22 @@ def run_simulate(folder: str, options: SimulateOptions, running: RunningOptions)
             f"the road reaches {dataset.nearest_disparity:.0f} px of disparity: what exceeds "
             f"{KITTI_TOP:.0f} px does not fit a KITTI PNG and has no data in {dataset.folder}/disparity"
         )
-    start, total = time.monotonic(), len(dataset.specs)
-    done = _write(dataset, running)
-    if done < total:
-        say(f"interrupted after {done} of {total} frames; start again with --overwrite")
+    progress = TaskProgress(len(dataset.specs), quiet=running.quiet, verbose=running.verbose)
+    progress.kept = len(dataset.kept or ())
+    with stop_on_signals() as stop, progress:
+        for stem in write_dataset(dataset, running.jobs, stop):
+            progress.advance()
+            progress.detail(f"{stem} written")
+    if progress.done < progress.total:
+        say(f"interrupted after {progress.done} of {progress.total} frames; continue with: {resume_command}")
         return ExitStatus.INTERRUPTED
-    if not running.quiet:
-        say(f"{total} frames in {dataset.folder}; {time.monotonic() - start:.1f} s")
+    progress.note(_summary(dataset, progress))
     return ExitStatus.DONE
 
 
-def _write(dataset: Dataset, running: RunningOptions) -> int:
-    """Write the frames, and truth.csv if that is all of them; how many there are."""
-    from tqdm import tqdm
-
-    done, hidden = 0, running.quiet or not sys.stderr.isatty()
-    with stop_on_signals() as stop, tqdm(total=len(dataset.specs), unit=" frames", disable=hidden) as bar:
-        for stem in write_dataset(dataset, running.jobs, stop):
-            done += 1
-            bar.update()
-            if running.verbose and not running.quiet:
-                bar.clear()
-                say(f"{stem} written")
-                bar.refresh()
-    return done
+def _summary(dataset: Dataset, progress: TaskProgress) -> str:
+    """Make the last line: how many frames, and what one cost."""
+    kept = f" ({progress.kept} kept)" if progress.kept else ""
+    rendered = progress.done - progress.kept
+    cost = f", {progress.seconds / rendered:.2f} s a frame" if rendered else ""
+    return f"{progress.done} frames{kept} in {dataset.folder}; {progress.seconds:.1f} s{cost}"

@@ -1,5 +1,6 @@
 """`rollcli simulate` as a user runs it."""
 
+import re
 import signal
 import subprocess
 import sys
@@ -17,7 +18,7 @@ def test_it_writes_pairs_maps_and_truth_and_says_so(tmp_path):
     asked = ("--scene", "street", "--roll", "-5:5", "--jobs", "1")
     done = rollcli("simulate", "rig", *TINY, *asked, cwd=tmp_path)
     assert (done.status, done.out) == (0, "")
-    assert "2 frames in rig" in done.err
+    assert re.search(r"2 frames in rig; [0-9.]+ s, [0-9.]+ s a frame\n$", done.err)
     files = contents(tmp_path / "rig")
     assert sorted(files)[:3] == ["calib.txt", "disparity/frame_0001.png", "disparity/frame_0002.png"]
     assert files["truth.csv"].count(b"\n") == 3
@@ -33,10 +34,10 @@ def test_a_dry_run_lists_the_files_and_writes_none(tmp_path):
     done = rollcli("simulate", "rig", *TINY, "--dry-run", cwd=tmp_path)
     assert done.status == 0
     lines = [line.replace("\\", "/") for line in done.out.splitlines()]
-    assert lines[0] == "write rig/left/frame_0001.png"
+    assert lines[:2] == ["write rig/truth.csv.run.json", "write rig/left/frame_0001.png"]
     assert lines[-1] == "write rig/truth.csv"
     assert lines[-2] == "write rig/calib.txt"
-    assert len(lines) == 8
+    assert len(lines) == 9
     assert not (tmp_path / "rig").exists()
 
 
@@ -130,5 +131,26 @@ def test_ctrl_c_ends_it_with_status_130_and_without_truth(tmp_path, jobs):
         _, err = run.communicate(timeout=30)
     assert run.returncode == 130
     assert err.count("\n") == 1
-    assert "of 5000 frames; start again with --overwrite" in err
+    assert "of 5000 frames; continue with: rollcli simulate rig --frames 5000" in err.replace(
+        command()[0], "rollcli"
+    )
+    assert err.rstrip().endswith("--resume")
     assert not (tmp_path / "rig/truth.csv").exists()
+
+
+def test_resume_continues_an_interrupted_simulation_and_says_what_it_kept(tmp_path):
+    assert rollcli("simulate", "rig", *TINY, "-j1", cwd=tmp_path).status == 0
+    (tmp_path / "rig/right/frame_0002.png").unlink()
+    done = rollcli("simulate", "rig", *TINY, "-j1", "--resume", cwd=tmp_path)
+    assert (done.status, done.out) == (0, "")
+    assert "2 frames (1 kept) in rig" in done.err
+    assert (tmp_path / "rig/right/frame_0002.png").exists()
+    again = rollcli("simulate", "rig", *TINY, "--resume", "--dry-run", cwd=tmp_path)
+    assert "frame_0001" not in again.out
+
+
+def test_other_options_are_not_resumed(tmp_path):
+    assert rollcli("simulate", "rig", *TINY, "-j1", cwd=tmp_path).status == 0
+    refused = rollcli("simulate", "rig", *TINY, "--seed", "8", "--resume", cwd=tmp_path)
+    assert (refused.status, refused.err.count("\n")) == (2, 1)
+    assert "rig: cannot be resumed: --seed was 0, is now 8" in refused.err

@@ -2,16 +2,19 @@
 
 import csv
 import math
+from dataclasses import replace
 
 import cv2
 import numpy as np
 import pytest
 
+from rollcli import __version__
 from rollcli.errors import OutputError, UsageError
 from rollcli.files.encodings import read_disparity
 from rollcli.simulate import dataset as module
-from rollcli.simulate.dataset import plan_dataset, write_dataset
+from rollcli.simulate.dataset import write_dataset
 from rollcli.simulate.options import SimulateOptions
+from rollcli.simulate.plan import plan_dataset
 from rollcli.simulate.render import render_frame, true_disparity
 from rollcli.simulate.scenes.build import road_camber
 from tests.run_cli import contents
@@ -32,7 +35,7 @@ def test_the_folder_holds_left_right_disparity_and_truth(tmp_path):
     stems = ["frame_0001", "frame_0002", "frame_0003"]
     assert done == stems
     expected = {f"{part}/{stem}.png" for part in ("left", "right", "disparity") for stem in stems}
-    assert set(contents(tmp_path / "rig")) == {*expected, "calib.txt", "truth.csv"}
+    assert set(contents(tmp_path / "rig")) == {*expected, "calib.txt", "truth.csv", "truth.csv.run.json"}
 
 
 def test_truth_has_the_documented_columns_and_each_frames_values(tmp_path):
@@ -186,4 +189,71 @@ def test_truth_appears_only_when_every_frame_is_there(tmp_path, monkeypatch):
     monkeypatch.setattr(module, "render_frame", fail_at_second)
     with pytest.raises(OutputError):
         simulate(tmp_path)
-    assert set(contents(tmp_path)) == {f"{part}/frame_0001.png" for part in ("left", "right", "disparity")}
+    images = {f"{part}/frame_0001.png" for part in ("left", "right", "disparity")}
+    assert set(contents(tmp_path)) == {*images, "truth.csv.run.json"}
+
+
+def test_a_resumed_simulation_keeps_whole_frames_and_ends_with_the_same_bytes(tmp_path):
+    simulate(tmp_path / "whole")
+    simulate(tmp_path / "rig")
+    kept, half, missing = (f"frame_000{number}.png" for number in (1, 2, 3))
+    (tmp_path / "rig/disparity" / half).unlink()
+    for part in ("left", "right", "disparity"):
+        (tmp_path / "rig" / part / missing).unlink()
+    for name in ("truth.csv", "calib.txt"):
+        (tmp_path / "rig" / name).unlink()
+    before = (tmp_path / "rig/left" / kept).stat().st_mtime_ns
+    assert simulate(tmp_path / "rig", replace(TINY, resume=True)) == ["frame_0002", "frame_0003"]
+    assert (tmp_path / "rig/left" / kept).stat().st_mtime_ns == before
+    assert contents(tmp_path / "rig") == contents(tmp_path / "whole")
+
+
+def test_resuming_a_complete_folder_renders_nothing(tmp_path):
+    simulate(tmp_path)
+    assert simulate(tmp_path, replace(TINY, resume=True)) == []
+
+
+def test_resuming_what_was_never_begun_begins_it(tmp_path):
+    assert len(simulate(tmp_path / "rig", replace(TINY, resume=True))) == 3
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"seed": 10}, "--seed was 9, is now 10"),
+        ({"roll_deg": (-5.0, 5.0)}, r"--roll was \[-10.0, 10.0\], is now \[-5.0, 5.0\]"),
+        ({"frames": 4}, "--frames was 3, is now 4"),
+        ({"focal": 50.0}, "--focal was not given, is now 50"),
+    ],
+)
+def test_a_simulation_with_other_options_is_not_resumed(tmp_path, changed, said):
+    simulate(tmp_path)
+    with pytest.raises(UsageError, match=said):
+        plan_dataset(tmp_path, replace(TINY, resume=True, **changed))
+
+
+def test_a_simulation_of_another_version_is_not_resumed(tmp_path):
+    simulate(tmp_path)
+    record = tmp_path / "truth.csv.run.json"
+    record.write_text(record.read_text().replace(f'"rollcli": "{__version__}"', '"rollcli": "0.0.1"'))
+    with pytest.raises(UsageError, match=r"begun by rollcli 0\.0\.1"):
+        plan_dataset(tmp_path, replace(TINY, resume=True))
+
+
+@pytest.mark.parametrize("record", ["not json", "[]", "{}", '{"rollcli": "1", "options": []}'])
+def test_a_damaged_record_is_not_resumed(tmp_path, record):
+    simulate(tmp_path)
+    (tmp_path / "truth.csv.run.json").write_text(record)
+    with pytest.raises(UsageError, match=r"truth\.csv\.run\.json is damaged"):
+        plan_dataset(tmp_path, replace(TINY, resume=True))
+
+
+def test_a_folder_without_a_record_is_not_resumed(tmp_path):
+    (tmp_path / "notes.txt").write_text("mine")
+    with pytest.raises(UsageError, match=r"there is no truth\.csv\.run\.json"):
+        plan_dataset(tmp_path, replace(TINY, resume=True))
+
+
+def test_resume_and_overwrite_together_are_refused(tmp_path):
+    with pytest.raises(UsageError, match="either --resume or --overwrite"):
+        plan_dataset(tmp_path, replace(TINY, resume=True), overwrite=True)
