@@ -17,13 +17,17 @@ if TYPE_CHECKING:
     from rollcli.imaging.derotate import derotate as derotate
     from rollcli.imaging.stereo import compute_disparity as compute_disparity
     from rollcli.imaging.vdisparity import v_disparity as v_disparity
+    from rollcli.rig.assess import RigAssessment as RigAssessment
+    from rollcli.rig.assess import assess_rig as assess_rig
     from rollcli.rig.calibration import Calibration as Calibration
     from rollcli.rig.estimate import estimate_roll as estimate_roll
 
 _HOMES = {
     "Calibration": "rollcli.rig.calibration",
+    "RigAssessment": "rollcli.rig.assess",
     "RollEstimate": "rollcli.estimator.result",
     "RollcliError": "rollcli.errors",
+    "assess_rig": "rollcli.rig.assess",
     "compute_disparity": "rollcli.imaging.stereo",
     "derotate": "rollcli.imaging.derotate",
     "estimate_roll": "rollcli.rig.estimate",
@@ -33,9 +37,11 @@ _HOMES = {
 }
 __all__ = [
     "Calibration",
+    "RigAssessment",
     "RollEstimate",
     "RollcliError",
     "__version__",
+    "assess_rig",
     "compute_disparity",
     "derotate",
     "estimate_roll",

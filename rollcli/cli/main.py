@@ -24,6 +24,7 @@ COMMANDS = {
     "vdisparity": ("rollcli.cli.vdisparity", "v-disparity images of maps."),
     "simulate": ("rollcli.cli.simulate", "Render road stereo pairs and true disparity with known roll."),
     "evaluate": ("rollcli.cli.evaluate.group", "The paper's experiments; accuracy against known angles."),
+    "rig": ("rollcli.cli.rig", "What a result says about the rig: mounting, drift, jumps; a gate for CI."),
     "report": ("rollcli.cli.report", "An HTML report of a result."),
 }
 

@@ -6,7 +6,7 @@ import json
 import math
 import os
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Literal
@@ -51,7 +51,7 @@ STATUSES = ("ok", "suspect", "error")
 TIMING = "elapsed_ms"
 COLUMNS = tuple(field.name for field in fields(Row) if field.name != TIMING)
 STDIN = "-"
-_REQUIRED = ("file", "status", "roll_deg")
+REQUIRED = ("file", "status", "roll_deg")
 # a millionth of a degree is far below any map's noise; nine digits keep alpha2, which is small, whole
 _DIGITS = {
     "roll_deg": ".6f",
@@ -148,8 +148,15 @@ def read_result(path: str | Path) -> Result:
 def parse_rows(data: bytes, name: str | Path) -> tuple[Row, ...]:
     """Parse the bytes of a result; errors call it `name`."""
     text = data.removeprefix(b"\xef\xbb\xbf").decode(**TEXT)
-    lines = _json_lines(text, name) if text.lstrip().startswith("{") else _csv_lines(text, name)
-    return tuple(_row(values, f"{name}: line {number}") for number, values in lines)
+    if text.lstrip().startswith("{"):
+        return tuple(
+            _row(values, f"{name}: line {number}") for number, values in json_rows(text.split("\n"), name)
+        )
+    lines = csv_rows(io.StringIO(text, newline=""), name)
+    _, header = next(lines)
+    return tuple(
+        _row(dict(zip(header, line, strict=True)), f"{name}: line {number}") for number, line in lines
+    )
 
 
 def run_path(path: str | Path) -> Path:
@@ -181,49 +188,64 @@ def _read(path: str | Path) -> bytes:
         raise InputError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from error
 
 
-def _csv_lines(text: str, path: str | Path) -> Iterable[tuple[int, dict[str, str]]]:
-    lines = csv.reader(io.StringIO(text, newline=""), strict=True)
+def csv_rows(stream: Iterable[str], path: str | Path) -> Iterator[tuple[int, list[str]]]:
+    """Yield the header and then each line of a result, with its number; all have the header's length.
+
+    Raises
+    ------
+    InputError
+        It is not CSV, or not a result of `rollcli estimate`.
+    """
+    lines = csv.reader(stream, strict=True)
     try:
         header = next(lines, [])
-        missing = [name for name in _REQUIRED if name not in header]
+        missing = [name for name in REQUIRED if name not in header]
         if missing:
             raise InputError(
                 f"{path}: is not a result of rollcli estimate: it has no column {', '.join(missing)}"
             )
+        yield lines.line_num, header
         for line in lines:
             if line and len(line) != len(header):
                 raise InputError(
                     f"{path}: line {lines.line_num}: {len(line)} values for {len(header)} columns"
                 )
             if line:
-                yield lines.line_num, dict(zip(header, line, strict=True))
+                yield lines.line_num, line
     except csv.Error as error:
         raise InputError(f"{path}: line {lines.line_num}: is not CSV: {error}") from error
 
 
-def _json_lines(text: str, path: str | Path) -> Iterable[tuple[int, dict[str, Any]]]:
-    for number, line in enumerate(text.split("\n"), 1):
+def json_rows(lines: Iterable[str], path: str | Path) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Yield the values of each line of a result in JSON Lines, with its number.
+
+    Raises
+    ------
+    InputError
+        A line is not JSON, or no row of `rollcli estimate`.
+    """
+    for number, line in enumerate(lines, 1):
         if not line.strip():
             continue
         try:
             values = json.loads(line)
         except (ValueError, RecursionError) as error:
             raise InputError(f"{path}: line {number}: is not JSON: {error}") from error
-        missing = [name for name in _REQUIRED if not isinstance(values, dict) or name not in values]
+        missing = [name for name in REQUIRED if not isinstance(values, dict) or name not in values]
         if missing:
             raise InputError(f"{path}: line {number}: is no row of rollcli estimate: no {', '.join(missing)}")
         yield number, values
 
 
 def _row(values: Mapping[str, Any], where: str) -> Row:
-    return Row(**{field.name: _value(field.name, values.get(field.name), where) for field in fields(Row)})
+    return Row(**{field.name: value_of(field.name, values.get(field.name), where) for field in fields(Row)})
 
 
 _FLAGS = {"converged", "global_minimum"}
 _COUNTS = {"iterations", "width", "height"}
 # what lies outside is another program's idea of a roll
 _ANY = (-math.inf, math.inf)
-_BOUNDS = {
+BOUNDS = {
     "roll_deg": (-90.0, 90.0),
     "roll_ci95_deg": (0.0, math.inf),
     "pitch_deg": (-90.0, 90.0),
@@ -231,7 +253,7 @@ _BOUNDS = {
 }
 
 
-def _value(name: str, value: Any, where: str) -> Any:
+def value_of(name: str, value: Any, where: str) -> Any:
     """Convert the text (CSV) or JSON value of a column."""
     if name == "status" and value not in STATUSES:
         raise InputError(f"{where}: {value!r:.80} is no status: {', '.join(STATUSES)}")
@@ -245,7 +267,7 @@ def _value(name: str, value: Any, where: str) -> Any:
     try:
         if name in _FLAGS:
             return {"true": True, "false": False}[str(value).lower()]
-        return int(value) if name in _COUNTS else _within(float(value), *_BOUNDS.get(name, _ANY))
+        return int(value) if name in _COUNTS else _within(float(value), *BOUNDS.get(name, _ANY))
     except (KeyError, ValueError, TypeError, OverflowError) as error:
         raise InputError(f"{where}: {value!r:.80} is no value for {name}") from error
 

@@ -1,0 +1,101 @@
+"""`rollcli rig`: what the frames of a result say about the rig."""
+
+from typing import Any
+
+import click
+
+from rollcli.cli.command import argument, command, option, record
+from rollcli.cli.config import config_option
+from rollcli.cli.options import PATH, running_options
+from rollcli.cli.types import Number
+from rollcli.rig_check.options import GateOptions, RigOptions
+
+gate_options = record(
+    "gates",
+    "Checks: exit status 4 when one fails",
+    GateOptions,
+    option("--expect-roll", type=Number("DEG"), help="The roll must be this, degrees; with --within."),
+    option("--expect-pitch", type=Number("DEG"), help="The pitch must be this, degrees; with --within."),
+    option("--expect-height", type=Number("M"), help="The height must be this, metres."),
+    option(
+        "--within",
+        type=Number("DEG", at_least=0),
+        help="How far from what is expected it may be, degrees; of a height metres.",
+    ),
+    option(
+        "--within-height",
+        type=Number("M", at_least=0),
+        help="How far the height may be from what is expected, metres; else as --within.",
+    ),
+    option(
+        "--max-drift", type=Number("DEG", at_least=0), help="Largest drift of the roll over a drive, degrees."
+    ),
+    option("--max-jump", type=Number("DEG", at_least=0), help="Largest jump of the roll, degrees."),
+    option(
+        "--min-ok",
+        type=Number("SHARE", at_least=0, at_most=1),
+        help="Least share of the frames that are ok, 0 to 1.",
+    ),
+)
+
+
+@command(
+    examples=[
+        ("How the rig is mounted, and whether it has moved", "rollcli rig rolls.csv"),
+        (
+            "A gate for CI: status 4 when the rig has come loose, or when a map has no angle",
+            "rollcli rig rolls.csv --expect-roll 0 --within 0.5 --max-jump 0.3 --min-ok 0.9",
+        ),
+        ("The shards of one run, in any order", "rollcli rig part1.csv part2.csv part3.csv"),
+        ("Has it moved since?", "rollcli rig before.csv --against after.csv"),
+    ]
+)
+@argument("results", nargs=-1, required=True, type=PATH)
+@option(
+    "--against",
+    type=PATH,
+    metavar="FILE",
+    section="Assessment",
+    help="A later result: say how far the rig has moved until then.",
+)
+@option("--include-suspect", is_flag=True, section="Assessment", help="Let suspect frames count too.")
+@option(
+    "--groups",
+    metavar="GLOB|none",
+    default="auto",
+    section="Assessment",
+    help="Folders that are one drive each, such as 'data/run*'; none: all frames are one drive; auto: each "
+    "folder is a drive, unless folders hold hardly a frame.",
+)
+@option(
+    "-o",
+    "--output",
+    type=PATH,
+    metavar="FILE",
+    default="-",
+    section="Assessment",
+    help="Where it goes (-: stdout).",
+)
+@option(
+    "--format",
+    type=click.Choice(["table", "csv", "json"]),
+    default="table",
+    section="Assessment",
+    help="To read, or for programs: csv has a line for each segment.",
+)
+@gate_options
+@running_options
+@config_option
+@click.pass_context
+def rig(ctx: click.Context, /, **options: Any) -> None:
+    """Say how the rig is mounted, whether it has drifted, and when it has jumped.
+
+    RESULTS is one result of `rollcli estimate`, or the shards of one run. Each value has a 95 % interval that
+    allows for frames being alike: it is of blocks of frames, and takes at least eight of them. Suspect frames
+    are counted and left out. Roll after a jump is that of the last segment: the rig as it is now.
+
+    Exit status 4: a check has failed, or there are too few frames to tell.
+    """
+    from rollcli.rig_check.run import run_rig
+
+    ctx.exit(run_rig(RigOptions(**options)))

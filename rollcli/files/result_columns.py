@@ -1,0 +1,156 @@
+"""Some columns of a result as arrays: a million rows without an object for each."""
+
+from __future__ import annotations
+
+import io
+import sys
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from itertools import chain, islice
+from operator import itemgetter
+from pathlib import Path
+from typing import Any, TextIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollcli.errors import InputError
+from rollcli.files.results import BOUNDS, STATUSES, STDIN, TEXT, csv_rows, json_rows, read_run, value_of
+
+_CHUNK = 20_000  # rows that are held as text
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ResultColumns:
+    """Columns of a result file, and the run that made it.
+
+    Attributes
+    ----------
+    path : str
+    files : list of str
+        The column `file`.
+    status : ndarray of uint8, shape (N,)
+        Positions in `STATUSES`.
+    numbers : mapping of str to ndarray of float, shape (N,)
+        By column; NaN where a cell is empty. Columns that the file does not have are not in it.
+    methods : frozenset of str
+        The solvers of the rows that name one.
+    run : mapping or None
+        The content of FILE.run.json.
+    """
+
+    path: str
+    files: list[str]
+    status: NDArray[np.uint8]
+    numbers: Mapping[str, NDArray[np.float64]]
+    methods: frozenset[str]
+    run: Mapping[str, Any] | None
+
+
+def read_columns(path: str, wanted: Sequence[str]) -> ResultColumns:
+    """Read columns of a result that `rollcli estimate` wrote, CSV or JSON Lines.
+
+    Parameters
+    ----------
+    path : str
+        "-" is stdin.
+    wanted : sequence of str
+        Names of number columns.
+
+    Returns
+    -------
+    ResultColumns
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, or is not a result of `rollcli estimate`; the line is named.
+    """
+    files: list[str] = []
+    statuses: list[NDArray[np.uint8]] = []
+    parts: dict[str, list[NDArray[np.float64]]] = {}
+    methods: set[str] = set()
+    with _opened(path) as stream:
+        names, rows = _cells(stream, path, wanted)
+        while chunk := list(islice(rows, _CHUNK)):
+            lines, *columns = zip(*chunk, strict=True)
+            found = dict(zip(names, columns, strict=True))
+            files += map(str, found["file"])
+            statuses.append(_statuses(found["status"], lines, path))
+            methods.update(map(str, filter(None, found.get("method", ()))))
+            for name in wanted:
+                if name in found:
+                    parts.setdefault(name, []).append(_numbers(name, found[name], lines, path))
+    return ResultColumns(
+        path,
+        files,
+        np.concatenate(statuses) if statuses else np.empty(0, np.uint8),
+        {name: np.concatenate(part) for name, part in parts.items()},
+        frozenset(methods),
+        None if path == STDIN else read_run(path),
+    )
+
+
+@contextmanager
+def _opened(path: str) -> Iterator[TextIO]:
+    """Open the file as text, line ends as they are."""
+    try:
+        if path == STDIN:
+            yield io.TextIOWrapper(sys.stdin.buffer, TEXT["encoding"], TEXT["errors"], newline="")
+            return
+        with Path(path).open("r", -1, TEXT["encoding"], TEXT["errors"], newline="") as stream:
+            yield stream
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from error
+
+
+def _cells(stream: TextIO, path: str, wanted: Sequence[str]) -> tuple[list[str], Iterator[tuple[Any, ...]]]:
+    """Return the names of the columns that are there, and for each row its line and their cells."""
+    first = stream.readline().removeprefix("\ufeff")
+    lines = chain([first], stream)
+    names = ["file", "status", "method", *wanted]
+    if first.lstrip().startswith("{"):
+        return names, (
+            (number, *map(values.get, names)) for number, values in json_rows(_by_newline(lines), path)
+        )
+    rows = csv_rows(lines, path)
+    _, header = next(rows)
+    names = [name for name in names if name in header]
+    pick = itemgetter(*map(header.index, names))
+    return names, ((number, *pick(row)) for number, row in rows)
+
+
+def _by_newline(lines: Iterable[str]) -> Iterator[str]:
+    """Lines of JSON end at a newline alone: a carriage return is white space there."""
+    for line in lines:
+        yield from line.split("\n") if line.count("\n") > 1 else (line,)
+
+
+def _statuses(cells: Sequence[Any], lines: Sequence[int], path: str) -> NDArray[np.uint8]:
+    places = {status: place for place, status in enumerate(STATUSES)}
+    try:
+        return np.fromiter(map(places.__getitem__, cells), np.uint8, len(cells))
+    except (KeyError, TypeError):
+        _name_fault("status", cells, lines, path)
+        raise
+
+
+def _numbers(name: str, cells: Sequence[Any], lines: Sequence[int], path: str) -> NDArray[np.float64]:
+    low, high = BOUNDS.get(name, (-np.inf, np.inf))
+    try:
+        empty = np.fromiter((cell is None or cell == "" for cell in cells), bool, len(cells))
+        numbers = np.array([np.nan if none else float(cell) for none, cell in zip(empty, cells, strict=True)])
+    except (ValueError, TypeError):
+        _name_fault(name, cells, lines, path)
+        raise
+    fits = np.isfinite(numbers) & (numbers >= low) & (numbers <= high)
+    if not (fits | empty).all():
+        _name_fault(name, cells, lines, path)
+    return numbers
+
+
+def _name_fault(name: str, cells: Sequence[Any], lines: Sequence[int], path: str) -> None:
+    """Raise the error of the first cell that is no value."""
+    for cell, line in zip(cells, lines, strict=True):
+        value_of(name, cell, f"{path}: line {line}")

@@ -1,0 +1,343 @@
+"""`rollcli rig` as a user runs it."""
+
+import csv
+import io
+import json
+
+import numpy as np
+import pytest
+
+from rollcli.files.results import Row, format_header, format_row
+from tests.rig.sequence.series import drive
+from tests.run_cli import rollcli
+
+JUMP = {"seed": 1, "frames": 3000, "sd": 0.1, "jump": 0.8, "at": 1500}
+STABLE = {"seed": 2, "frames": 1000, "sd": 0.1}
+
+
+def rows(values, errors, *, folder="maps/", suspect=(), failed=(), method="gd"):
+    made = []
+    for place, (value, error) in enumerate(zip(values, errors, strict=True)):
+        name = f"{folder}frame_{place}.png"
+        if place in failed:
+            made.append(Row(name, message=f"{name}: is empty"))
+        else:
+            status = "suspect" if place in suspect else "ok"
+            made.append(Row(name, "", status, float(value), 1.96 * float(error), method=method))
+    return made
+
+
+def write(path, given, form="csv", run=None):
+    path.write_bytes(b"".join([format_header(form), *(format_row(row, form) for row in given)]))
+    if run is not None:
+        path.with_name(f"{path.name}.run.json").write_text(json.dumps(run))
+
+
+def record(shard="1/1", frames=None, encoding=("kitti",), **options):
+    run = {"rollcli": "0", "options": {"method": "gd", "shard": shard, **options}, "encoding": list(encoding)}
+    return run | ({} if frames is None else {"inputs": {"frames": frames}})
+
+
+@pytest.fixture
+def folder(tmp_path):
+    write(tmp_path / "jump.csv", rows(*drive(**JUMP), suspect={3, 4}, failed={10}))
+    write(tmp_path / "stable.csv", rows(*drive(**STABLE)))
+    return tmp_path
+
+
+def rig(folder, *arguments):
+    return rollcli("rig", *arguments, cwd=folder)
+
+
+def test_the_table_begins_with_the_answer_and_names_the_frame_of_a_jump(folder):
+    done = rig(folder, "jump.csv")
+    assert done.status == 0
+    first, *rest = done.out.splitlines()
+    assert first.startswith("roll    +0.")
+    assert "±" in first
+    assert " of 3,000 frames, 2 suspect, 1 failed" in first
+    (sentence,) = (line for line in rest if line.startswith("roll jumped by +0."))
+    assert "° at maps/frame_" in sentence
+    assert abs(int(sentence.partition("frame_")[2].removesuffix(".png")) - 1500) <= 15
+    assert done.err == ""
+
+
+def test_json_has_the_names_of_the_interface(folder):
+    values = json.loads(rig(folder, "jump.csv", "--format", "json", "-q").out)
+    assert (values["frames"], values["suspect"], values["failed"]) == (3000, 2, 1)
+    assert values["used"] + values["outliers"] == 2997
+    (jump,) = values["jumps"]
+    assert set(jump) == {"frame", "file", "change_deg", "change_ci95_deg"}
+    assert jump["file"] == f"maps/frame_{jump['frame']}.png"
+    before, after = values["segments"]
+    assert (before["first"], before["last"] + 1, after["last"]) == (0, jump["frame"], 2999)
+    assert (values["roll_deg"], values["roll_ci95_deg"]) == (after["roll_deg"], after["roll_ci95_deg"])
+    assert abs(before["roll_deg"] + 0.44) < 0.15
+    for name in ("pitch_deg", "pitch_ci95_deg", "height_m", "height_ci95_m"):
+        assert values[name] is before[name] is None
+    assert values["between_frames_sd_deg"] == pytest.approx(0.1, rel=0.4)
+    assert abs(values["drift_deg"]) < 2 * values["drift_ci95_deg"]
+    assert values["checks"] == []
+
+
+def test_csv_has_a_line_for_each_segment(folder):
+    done = rig(folder, "jump.csv", "--format", "csv", "-o", "rig.csv", "-q")
+    assert (done.status, done.out, done.err) == (0, "", "")
+    before, after = csv.DictReader(io.StringIO((folder / "rig.csv").read_text()))
+    assert (before["first_file"], after["last_file"]) == ("maps/frame_0.png", "maps/frame_2999.png")
+    assert float(after["change_deg"]) == pytest.approx(0.8, abs=0.2)
+    assert after["status"] == "jump"
+
+
+def test_a_result_is_not_replaced_unless_asked(folder):
+    assert rig(folder, "stable.csv", "-o", "out.txt").status == 0
+    again = rig(folder, "stable.csv", "-o", "out.txt")
+    assert again.status == 2
+    assert "exists already; give --overwrite" in again.err
+    assert rig(folder, "stable.csv", "-o", "stable.csv", "--overwrite").status == 2
+    assert rig(folder, "stable.csv", "-o", "out.txt", "--overwrite").status == 0
+
+
+def test_dry_run_lists_files_and_does_nothing(folder):
+    done = rig(folder, "stable.csv", "--against", "jump.csv", "--dry-run", "-o", "out.txt")
+    assert done.out.splitlines() == ["read  stable.csv", "read  jump.csv", "write out.txt"]
+    assert not (folder / "out.txt").exists()
+
+
+def test_json_lines_and_standard_input_are_read_as_csv_is(folder):
+    write(folder / "stable.jsonl", rows(*drive(**STABLE)), "jsonl")
+    expected = rig(folder, "stable.csv").out
+    assert rig(folder, "stable.jsonl").out == expected
+    assert rollcli("rig", "-", cwd=folder, stdin=(folder / "stable.csv").read_text()).out == expected
+
+
+def test_a_gate_that_is_kept_ends_with_0_and_one_that_is_not_with_4(folder):
+    kept = [
+        "--expect-roll",
+        "-0.4",
+        "--within",
+        "0.5",
+        "--max-drift",
+        "1",
+        "--max-jump",
+        "0.2",
+        "--min-ok",
+        "1",
+    ]
+    assert rig(folder, "stable.csv", *kept).status == 0
+    done = rig(folder, "jump.csv", *kept)
+    assert done.status == 4
+    said = done.err.splitlines()
+    assert len(said) == 3
+    assert "the roll of maps/frame_" in said[0]
+    assert "more than 0.5° from -0.4°" in said[0]
+    assert "the jump at maps/frame_" in said[1]
+    assert "2,997 of 3,000 frames are ok" in said[2]
+    assert "not: maps/frame_3.png, maps/frame_4.png, maps/frame_10.png" in said[2]
+    checks = json.loads(rig(folder, "jump.csv", *kept, "--format", "json").out)["checks"]
+    assert [(each["name"], each["ok"]) for each in checks] == [
+        ("expect-roll", False),
+        ("max-drift", True),
+        ("max-jump", False),
+        ("min-ok", False),
+    ]
+
+
+def test_an_interval_across_the_limit_is_said_though_the_gate_is_kept(folder):
+    value = json.loads(rig(folder, "stable.csv", "--format", "json").out)["roll_deg"]
+    done = rig(folder, "stable.csv", "--expect-roll", f"{value + 0.5}", "--within", "0.501")
+    assert done.status == 0
+    assert "its interval reaches across the limit" in done.err
+
+
+def test_a_drift_fails_its_gate(tmp_path):
+    write(tmp_path / "drift.csv", rows(*drive(4, 3000, sd=0.1, drift=1.0)))
+    done = rig(tmp_path, "drift.csv", "--max-drift", "0.3", "--max-jump", "0.3")
+    assert done.status == 4
+    assert done.err.count("\n") == 1
+    assert "the drift over maps/frame_0.png to maps/frame_2999.png is +" in done.err
+    assert "roll drifted by +" in done.out
+
+
+GATES = [
+    ["--expect-roll", "0", "--within", "90"],
+    ["--expect-pitch", "0", "--within", "90"],
+    ["--expect-height", "1", "--within-height", "9"],
+    ["--max-drift", "90"],
+    ["--max-jump", "90"],
+]
+
+
+@pytest.mark.parametrize("gate", GATES, ids=lambda gate: gate[0])
+@pytest.mark.parametrize("kind", ["one row", "a few rows", "all suspect", "all failed"])
+def test_a_gate_never_passes_for_want_of_data(tmp_path, gate, kind):
+    count = {"one row": 1, "a few rows": 6}.get(kind, 40)
+    every = set(range(count))
+    given = rows(
+        np.full(count, 0.1),
+        np.full(count, 0.05),
+        suspect=every if kind == "all suspect" else (),
+        failed=every if kind == "all failed" else (),
+    )
+    write(tmp_path / "few.csv", given)
+    done = rig(tmp_path, "few.csv", *gate)
+    assert done.status == 4
+    assert done.err.count("\n") == 1
+    assert rig(tmp_path, "few.csv").status == 0
+
+
+def test_all_suspect_frames_say_so_and_can_be_counted(tmp_path):
+    values = np.random.default_rng(0).normal(0.3, 0.1, 60)
+    write(tmp_path / "s.csv", rows(values, np.full(60, 0.05), suspect=set(range(60))))
+    done = rig(tmp_path, "s.csv")
+    assert done.out.startswith("roll    unknown  (0 of 60 frames, 60 suspect)")
+    assert "no interval for the roll: no frame counts" in done.out
+    assert rig(tmp_path, "s.csv", "--include-suspect").out.startswith("roll    +0.3")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        (["--expect-roll", "0"], "need --within"),
+        (["--within", "1"], "--within needs"),
+        (["--expect-height", "1"], "--expect-height needs --within-height"),
+        (["--within-height", "1"], "needs --expect-height"),
+        (["stable.csv"], "stable.csv: is named twice"),
+        (["--groups", "nothing*"], "matches no folder"),
+        (["--against", "none.csv"], "none.csv: cannot be read"),
+    ],
+)
+def test_a_question_that_makes_no_sense_is_refused(folder, arguments, reason):
+    done = rig(folder, "stable.csv", *arguments)
+    assert (done.status, done.out) == (2, "")
+    assert reason in done.err
+    assert done.err.count("\n") == 1
+
+
+HEADER = format_header("csv").decode()
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        ("", "is not a result of rollcli estimate"),
+        ("time,angle\n1,2\n", "is not a result of rollcli estimate: it has no column file, status, roll_deg"),
+        (HEADER, "has no rows"),
+        ("file,status,roll_deg\na.png,ok,far\n", "line 2: 'far' is no value for roll_deg"),
+        ("file,status,roll_deg\na.png,ok,nan\n", "line 2: 'nan' is no value for roll_deg"),
+        ("file,status,roll_deg\na.png,ok,91\n", "line 2: '91' is no value for roll_deg"),
+        ("file,status,roll_deg\na.png,fine,1\n", "line 2: 'fine' is no status"),
+        ("file,status,roll_deg\na.png,ok\n", "line 2: 2 values for 3 columns"),
+        ('{"file": "a", "status": "ok", "roll_deg": [1]}\n', "line 1: [1] is no value for roll_deg"),
+        ('{"file": "a", "status": "ok"}\n', "line 1: is no row of rollcli estimate: no roll_deg"),
+        ("file,status,roll_deg,method\na,ok,1,gd\nb,ok,1,plane\n", "rows of the methods gd, plane"),
+    ],
+)
+def test_what_is_no_result_is_one_line_and_status_2(tmp_path, content, reason):
+    (tmp_path / "r.csv").write_text(content)
+    done = rig(tmp_path, "r.csv")
+    assert (done.status, done.out) == (2, "")
+    assert reason in done.err
+    assert done.err.count("\n") == 1
+
+
+def shards(folder, given, count, **options):
+    for index in range(1, count + 1):
+        part = given[index - 1 :: count]
+        write(folder / f"part{index}.csv", part, run=record(f"{index}/{count}", len(part), **options))
+    return [f"part{index}.csv" for index in range(1, count + 1)]
+
+
+def test_shards_in_any_order_are_the_whole_run(folder):
+    names = shards(folder, rows(*drive(**JUMP), suspect={3, 4}, failed={10}), 3)
+    expected = rig(folder, "jump.csv").out
+    assert rig(folder, *names).out == expected
+    assert rig(folder, *reversed(names)).out == expected
+
+
+def test_shards_without_records_are_put_together_by_name(folder):
+    names = shards(folder, rows(*drive(**JUMP), suspect={3, 4}, failed={10}), 3)
+    for name in names:
+        (folder / f"{name}.run.json").unlink()
+    assert rig(folder, *reversed(names)).out == rig(folder, "jump.csv").out
+
+
+@pytest.mark.parametrize(
+    ("chosen", "reason"),
+    [
+        ([0, 2], "is one of 3 shards; missing: 2/3"),
+        ([1], "is one of 3 shards; missing: 1/3, 3/3"),
+        ([0, 1, 2, "copy.csv"], "are both shard 1/3"),
+        ([0, "stable.csv"], "there is no stable.csv.run.json to say which shard it is"),
+        ([0, "whole.csv"], "are not shards of one run"),
+        ([0, 1, "other.csv"], "are not shards of one run: --method was gd and plane"),
+    ],
+)
+def test_results_that_are_not_all_shards_of_one_run_are_refused(folder, chosen, reason):
+    given = rows(*drive(**STABLE))
+    names = shards(folder, given, 3)
+    write(folder / "copy.csv", given[::3], run=record("1/3"))
+    write(folder / "whole.csv", given, run=record("1/1"))
+    write(folder / "other.csv", given[2::3], run=record("3/3", method="plane"))
+    done = rig(folder, *(names[each] if isinstance(each, int) else each for each in chosen))
+    assert (done.status, done.out) == (2, "")
+    assert reason in done.err
+    assert done.err.count("\n") == 1
+
+
+def test_a_run_that_has_not_ended_is_said_and_passes_no_gate(folder):
+    write(folder / "half.csv", rows(*drive(**STABLE)), run=record(frames=2000))
+    done = rig(folder, "half.csv")
+    assert done.status == 0
+    assert done.err == "rollcli: half.csv: holds 1,000 of 2,000 frames: its run has not ended\n"
+    assert rig(folder, "half.csv", "--min-ok", "0.5").status == 4
+
+
+def test_maps_of_several_encodings_are_said(folder):
+    write(folder / "mixed.csv", rows(*drive(**STABLE)), run=record(encoding=["kitti", "px"]))
+    done = rig(folder, "mixed.csv")
+    assert done.status == 0
+    assert done.err == "rollcli: mixed.csv: maps were read as kitti, px: are they one rig's?\n"
+
+
+def test_drives_are_told_apart_and_the_one_that_differs_is_named(tmp_path):
+    first = rows(*drive(1, 1500, sd=0.1), folder="monday/")
+    second = rows(*drive(2, 1500, sd=0.1, level=0.4), folder="tuesday/")
+    write(tmp_path / "two.csv", first + second)
+    out = rig(tmp_path, "two.csv").out
+    assert "tuesday differs from monday by +0." in out
+    assert "monday/frame_0.png, monday/frame_1499.png" in out
+    values = json.loads(rig(tmp_path, "two.csv", "--format", "json").out)
+    assert [(each["drive"], each["first"], each["last"]) for each in values["segments"]] == [
+        ("monday", 0, 1499),
+        ("tuesday", 1500, 2999),
+    ]
+    assert rig(tmp_path, "two.csv", "--expect-roll", "0.4", "--within", "0.2").status == 4
+
+
+def test_against_says_how_far_the_rig_has_moved(tmp_path):
+    for name, seed, level in (("before", 1, -0.44), ("same", 2, -0.44), ("after", 3, 0.4)):
+        write(tmp_path / f"{name}.csv", rows(*drive(seed, 1500, sd=0.1, level=level)))
+    still = rig(tmp_path, "before.csv", "--against", "same.csv", "--max-jump", "0.3")
+    assert still.status == 0
+    assert "no move is seen" in still.out
+    moved = rig(tmp_path, "before.csv", "--against", "after.csv", "--max-jump", "0.3", "--format", "json")
+    assert moved.status == 4
+    values = json.loads(moved.out)["against"]
+    assert values["roll_moved"] is True
+    assert values["roll_change_deg"] == pytest.approx(0.84, abs=0.15)
+    assert 0 < values["roll_change_ci95_deg"] < 0.2
+
+
+def test_pitch_and_height_are_shown_where_the_result_has_them(tmp_path):
+    values, errors = drive(**STABLE)
+    lines = ["file,status,roll_deg,roll_ci95_deg,pitch_deg,pitch_ci95_deg,height_m,height_ci95_m"]
+    for place, (value, error) in enumerate(zip(values, errors, strict=True)):
+        lines.append(f"f{place}.png,ok,{value},{error},{value + 3},{error},{1.65 + 0.01 * value},0.01")
+    (tmp_path / "r.csv").write_text("\n".join(lines) + "\n")
+    out = rig(tmp_path, "r.csv", "--expect-height", "1.65", "--within-height", "0.05").out
+    assert "\npitch   +2." in out
+    assert "\nheight  1.64" in out
+    wrong = rig(tmp_path, "r.csv", "--expect-pitch", "0", "--within", "1", "--expect-height", "1.65")
+    assert wrong.status == 4
+    assert "the pitch of f0.png to f999.png is +2." in wrong.err

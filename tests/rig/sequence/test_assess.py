@@ -1,0 +1,115 @@
+"""One quantity over one drive, on simulated series whose truth is known; bench_rig.py counts many more."""
+
+import numpy as np
+import pytest
+
+from rollcli.rig.sequence.assess import assess_sequence
+from tests.rig.sequence.series import drive
+
+SEEDS = range(4)
+
+
+def test_a_stable_drive_has_an_interval_that_holds_and_neither_jumps_nor_drift():
+    inside, jumps = 0, 0
+    for seed in range(20):
+        found = assess_sequence(*drive(seed))
+        inside += found.now.ci95 is not None and abs(found.now.value + 0.44) <= found.now.ci95
+        jumps += len(found.jumps) > 0
+    assert inside >= 16  # 99.7 % of all twenties where 95 % are inside
+    assert jumps <= 2
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_jump_is_found_with_its_size_and_the_rig_is_as_it_is_after_it(seed):
+    found = assess_sequence(*drive(seed, jump=0.8, at=1200, sd=0.1))
+    (jump,) = found.jumps
+    assert found.status == "jump"
+    assert abs(jump.frame - 1200) <= 20
+    assert abs(jump.change.value - 0.8) < 0.2
+    assert abs(found.now.value - 0.36) < 0.15
+    assert [(each.first, each.last) for each in found.segments] == [(0, jump.frame - 1), (jump.frame, 1999)]
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_drift_is_found_and_is_no_jump(seed):
+    found = assess_sequence(*drive(seed, 4000, drift=1.0, sd=0.1))
+    assert (found.status, found.jumps) == ("drift", ())
+    assert abs(found.drift.value - 1.0) < 2 * found.drift.ci95
+
+
+def test_up_and_down_again_are_two_jumps():
+    values, errors = drive(3, 3000, sd=0.1)
+    values[1000:2000] += 0.8
+    found = assess_sequence(values, errors)
+    assert len(found.jumps) == 2
+    assert np.abs(np.subtract([each.frame for each in found.jumps], [1000, 2000])).max() <= 20
+    assert found.jumps[0].change.value > 0.5 > -0.5 > found.jumps[1].change.value
+
+
+def test_gross_outliers_called_ok_hardly_move_the_mean():
+    clean, soiled = [], []
+    for seed in range(6):
+        clean.append(assess_sequence(*drive(seed)).now.value + 0.44)
+        soiled.append(assess_sequence(*drive(seed, gross=0.05)).now.value + 0.44)
+    assert np.std(soiled) <= 1.5 * np.std(clean)
+    assert abs(np.mean(soiled)) <= 1.5 * max(abs(np.mean(clean)), np.std(clean) / 3)
+
+
+def test_a_kick_that_fades_is_no_jump():
+    values, errors = drive(8, sd=0.1, errors=(0.02, 0.05))
+    values[1000:] += 1.0 * 0.94 ** np.arange(1000)
+    assert assess_sequence(values, errors).jumps == ()
+
+
+def test_frames_without_an_order_need_no_long_blocks():
+    rng = np.random.default_rng(2)
+    found = assess_sequence(rng.normal(0.2, 0.1, 60), np.full(60, 0.05))
+    assert found.now.ci95 == pytest.approx(2.1 * 0.1 / np.sqrt(60), rel=0.35)
+
+
+def test_a_few_frames_of_a_drive_have_no_interval():
+    values, errors = drive(4, 60, phi=0.95, sd=0.3, errors=(0.02, 0.05))
+    found = assess_sequence(values, errors)
+    assert (found.status, found.now.ci95) == ("few", None)
+    assert found.now.needed > 60
+
+
+def test_frames_that_are_left_out_keep_their_time():
+    values, errors = drive(5, 3000, jump=0.8, at=1800, sd=0.1)
+    values[np.random.default_rng(0).random(3000) < 0.3] = np.nan
+    found = assess_sequence(values, errors)
+    assert [abs(jump.frame - 1800) <= 25 for jump in found.jumps] == [True]
+    assert found.used == np.isfinite(values).sum() - found.outliers
+
+
+def test_many_frames_are_averaged_and_the_jump_is_still_found_to_the_frame():
+    values, errors = drive(6, 120_000, phi=0.9, sd=0.1, jump=0.5, at=70_001)
+    found = assess_sequence(values, errors)
+    (jump,) = found.jumps
+    assert abs(jump.frame - 70_001) <= 10
+
+
+@pytest.mark.parametrize(
+    ("values", "errors"),
+    [
+        ([], []),
+        ([np.nan] * 20, [0.1] * 20),
+        ([1.0], [0.1]),
+        ([1.0, 1.2], [np.nan, np.nan]),
+        ([0.5] * 300, [0.0] * 300),
+        ([0.5] * 300, [np.nan] * 300),
+        ([0.0, 1.0] * 100, [0.1] * 200),
+        ([1.0] + [np.nan] * 500 + [2.0], [0.1] * 502),
+    ],
+)
+def test_few_equal_or_missing_values_are_assessed_without_complaint(values, errors):
+    found = assess_sequence(values, errors)
+    assert found.frames == len(values)
+    assert found.used == np.isfinite(values).sum()
+    assert found.now.value is None or min(np.array(values)[np.isfinite(values)]) <= found.now.value <= 2
+
+
+def test_a_wider_interval_counts_less():
+    values = np.tile([1.0, 0.0], 200) + np.random.default_rng(0).normal(0, 0.01, 400)
+    found = assess_sequence(values, np.tile([0.01, 0.5], 200))
+    assert found.now.value > 0.5
