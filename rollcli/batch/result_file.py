@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rollcli.errors import OutputError, UsageError
 from rollcli.files.atomic import output_error
-from rollcli.files.locking import lock
+from rollcli.files.locking import locked
 from rollcli.files.results import Format, format_header
 
 _HEADERS = (format_header("csv"), format_header("csv", timing=True))
@@ -90,8 +90,8 @@ def open_result(name: str) -> Iterator[ResultFile]:
     except OSError as error:
         raise output_error(name, error) from error
     try:
-        lock(descriptor, name)
-        yield ResultFile(descriptor, name)
+        with locked(descriptor, name):
+            yield ResultFile(descriptor, name)
     finally:
         os.close(descriptor)
 

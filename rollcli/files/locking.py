@@ -3,17 +3,27 @@
 import contextlib
 import errno
 import os
+import platform
 import stat
 import sys
 import time
 from collections.abc import Iterator
+from pathlib import Path
 from typing import BinaryIO
 
-from rollcli.errors import UsageError
+from rollcli.errors import OutputError, UsageError
+from rollcli.messages import say
 
 # a killed run's workers end a moment after it; a lock held longer than this belongs to a run that lives
 _PATIENCE_S = 2.0
 _POLL_S = 0.05
+
+_LOCK = ".lock"
+
+
+class _NoLocksError(Exception):
+    """The file system has no locks."""
+
 
 if sys.platform == "win32":
     import msvcrt
@@ -26,6 +36,8 @@ if sys.platform == "win32":
             msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
         except OSError:
             return False
+        finally:
+            os.lseek(descriptor, 0, os.SEEK_SET)  # what is there is read from its start
         return True
 
     @contextlib.contextmanager
@@ -47,8 +59,9 @@ else:
         except BlockingIOError:
             return False
         except OSError as error:
-            # a file system without locks: better to run unguarded than not at all
-            return error.errno in (errno.ENOLCK, errno.ENOTSUP, errno.EINVAL, errno.ENOSYS)
+            if error.errno in (errno.ENOLCK, errno.ENOTSUP, errno.EINVAL, errno.ENOSYS):
+                raise _NoLocksError from error
+            return False
         return True
 
     @contextlib.contextmanager
@@ -67,19 +80,78 @@ else:
         """Yield whether the path is a regular file that no live process is writing; a link is none."""
         descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
         try:
-            yield stat.S_ISREG(os.fstat(descriptor).st_mode) and _try_lock(descriptor)
+            yield stat.S_ISREG(os.fstat(descriptor).st_mode) and _is_free(descriptor)
         finally:
             os.close(descriptor)
 
+    def _is_free(descriptor: int) -> bool:
+        try:
+            return _try_lock(descriptor)
+        except _NoLocksError:  # nobody can hold it
+            return True
 
-def lock(descriptor: int, name: str) -> None:
-    """Take the lock on an open file.
+
+@contextlib.contextmanager
+def locked(descriptor: int, name: str) -> Iterator[None]:
+    """Hold the lock on an open file, or a lock file where the file system has no locks.
+
+    A process that shares the descriptor holds the lock as well; the lock file is held by this one alone.
 
     Raises
     ------
     UsageError
         Another run holds it.
+    OutputError
+        The lock file cannot be made.
     """
+    try:
+        _wait_for(descriptor, name)
+    except _NoLocksError:
+        say(f"{name}: its file system has no locks; {name}{_LOCK} keeps other runs away")
+        with _lock_file(name):
+            yield
+    else:
+        yield
+
+
+@contextlib.contextmanager
+def _lock_file(name: str) -> Iterator[None]:
+    """Make a file that says who writes a result; that of a run on this machine that has ended is replaced."""
+    path = Path(f"{name}{_LOCK}")
+    owner = f"{os.getpid()} {platform.node()}\n"
+    if _has_ended(path):
+        path.unlink(missing_ok=True)
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(owner)
+    except FileExistsError:
+        raise UsageError(
+            f"{name}: another run is writing this result; if none is, one was killed: remove {path}"
+        ) from None
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise OutputError(f"{path}: cannot be written: {reason}") from error
+    try:
+        yield
+    finally:
+        path.unlink(missing_ok=True)
+
+
+def _has_ended(path: Path) -> bool:
+    """Tell whether the run that made a lock file was on this machine and has ended."""
+    try:
+        process, _, machine = path.read_text("utf-8").strip().partition(" ")
+        if machine != platform.node() or sys.platform == "win32":
+            return False
+        os.kill(int(process), 0)
+    except ProcessLookupError:
+        return True
+    except (OSError, ValueError):
+        return False
+    return False
+
+
+def _wait_for(descriptor: int, name: str) -> None:
     give_up = time.monotonic() + _PATIENCE_S
     while not _try_lock(descriptor):
         if time.monotonic() > give_up:
