@@ -12,6 +12,7 @@ from rollcli.report.histogram import histogram
 from rollcli.report.options import ReportOptions
 from rollcli.report.page import render_page
 from rollcli.report.pictures import Pictures
+from rollcli.report.pose_charts import pose_charts
 from rollcli.report.roll_chart import roll_chart
 from rollcli.report.summary import degrees, frame_count, option_lines, summarize
 
@@ -37,6 +38,7 @@ def report_page(result: Result, options: ReportOptions, shown: Sequence[tuple[Ch
         options=option_lines(result.run),
         encodings=", ".join(map(str, run["encoding"])) if isinstance(run.get("encoding"), list) else "",
         roll_chart=roll_chart(rows),
+        pose_charts=pose_charts(rows),
         histogram=histogram(rows) if summary.median is not None else None,
         outside=outside(rows),
         doubtful=doubtful[:_LISTED],
