@@ -8,7 +8,7 @@ from typing import Literal
 from rollcli.batch.options import EstimateOptions
 from rollcli.errors import UsageError
 from rollcli.files.results import run_path
-from rollcli.files.stream import STDOUT
+from rollcli.files.stream import is_stream
 from rollcli.frames.calibration import check_first_size
 from rollcli.frames.checks import check_inputs_are_kept, check_nothing_is_there, check_one_owner
 from rollcli.frames.find import map_frames, pair_frames
@@ -38,8 +38,8 @@ def make_plan(options: EstimateOptions) -> Plan:
     part, parts = options.result.shard
     frames = _find_frames(options)
     output = options.result.output
-    results = [] if output == STDOUT else [output, str(run_path(output))]
-    check_one_owner((frame, _images([frame], options)) for frame in frames)
+    results = [] if is_stream(output) else [output, str(run_path(output))]
+    check_one_owner(((frame, _images([frame], options)) for frame in frames), results)
     reads = [path for frame in frames for path in frame.reads()]
     check_inputs_are_kept(reads, chain(results, _images(frames, options)))
     frames = frames[part - 1 :: parts]

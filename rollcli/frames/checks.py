@@ -1,36 +1,50 @@
 """Compare what a run would write with what it reads and what exists; list both for --dry-run."""
 
+import contextlib
 import os
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
+from pathlib import Path
+from unicodedata import normalize
 
 from rollcli.errors import UsageError
 from rollcli.files.stream import write_stdout
 from rollcli.frames.frame import Frame
 
 
-def check_one_owner(writes: Iterable[tuple[Frame, Iterable[str]]]) -> None:
-    """Check that every file is written for one frame only.
+def check_one_owner(writes: Iterable[tuple[Frame, Iterable[str]]], results: Iterable[str] = ()) -> None:
+    """Check that no file is written twice, however differently its path is spelled.
 
     Parameters
     ----------
     writes : iterable of (Frame, paths)
         Each frame, and the files that are written for it.
+    results : iterable of str
+        The files that are written for the run.
 
     Raises
     ------
     UsageError
-        Names both frames and the file.
+        Names the file and what it would be written for.
     """
-    owner: dict[str, str] = {}
+    owner = {_place(path): "" for path in results}
     for frame, paths in writes:
         for path in paths:
-            first = owner.setdefault(os.path.normcase(path), frame.file)
-            if first is not frame.file:
-                raise UsageError(
-                    f"{first} and {frame.file} would both write {path}; run them apart, or name their common "
-                    "folder with --recursive"
-                )
+            place = _place(path)
+            if place in owner:
+                raise UsageError(_written_twice(path, owner[place], frame.file))
+            owner[place] = frame.file
+
+
+def _written_twice(path: str, first: str, second: str) -> str:
+    if not first:
+        return f"{path}: would be a result of this run and an image of {second}; write them apart"
+    if first == second:
+        return f"{path}: two images of {first} would be written there; give each kind a folder of its own"
+    return (
+        f"{first} and {second} would both write {path}; run them apart, or name their common folder with "
+        "--recursive"
+    )
 
 
 def check_writes(reads: Sequence[str], writes: Sequence[str], *, overwrite: bool) -> None:
@@ -87,10 +101,31 @@ def list_files(frames: Iterable[tuple[Iterable[str], Iterable[str]]]) -> None:
 def _place(path: str) -> str:
     """Make one text of every spelling of a path."""
     folder, name = os.path.split(path)
-    return f"{_real_folder(folder)}/{os.path.normcase(name)}"
+    place = f"{_real_folder(folder)}/{os.path.normcase(name)}"
+    return normalize("NFC", place).casefold() if _ignores_case(folder) else place
 
 
 # cached: resolving links costs a system call for each part of a path, and files share folders
 @lru_cache(maxsize=1024)
 def _real_folder(folder: str) -> str:
     return os.path.realpath(folder)
+
+
+@lru_cache(maxsize=1024)
+def _ignores_case(folder: str) -> bool:
+    """Tell whether a.png and A.png are one file in a folder, by the names that it or its parents hold."""
+    here = Path(folder).resolve()
+    while not os.path.isdir(here) and here != here.parent:  # noqa: PTH112 (which never raises)
+        here = here.parent
+    with contextlib.suppress(OSError), os.scandir(here) as entries:
+        for entry in entries:
+            if entry.name != entry.name.swapcase():
+                return _same(here / entry.name, here / entry.name.swapcase())
+    return here != here.parent and not os.path.ismount(here) and _ignores_case(str(here.parent))
+
+
+def _same(path: Path, other: Path) -> bool:
+    try:
+        return os.path.samestat(path.lstat(), other.lstat())
+    except OSError:
+        return False

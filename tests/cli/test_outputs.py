@@ -157,3 +157,37 @@ def test_a_pattern_that_steps_upwards_writes_nothing_outside_of_the_output_folde
     assert done.status == 0, done.err
     assert names(tmp_path / "out") == ["up/more/frame0.png"]
     assert names(tmp_path) == ["data/maps/frame0.png", "more/frame0.png", "out/up/more/frame0.png"]
+
+
+@pytest.mark.parametrize("second", ["out", "./out", "out/../out", "link"])
+def test_two_kinds_of_images_in_one_folder_are_refused_before_anything_runs(maps, second):
+    (maps / "link").symlink_to("out")
+    line = refused(maps, "maps", "--derotated", "out", "--vdisparity", second, "--overwrite")
+    assert "two images of maps/frame0.png would be written there; give each kind a folder of its own" in line
+
+
+@pytest.mark.parametrize("result", ["out/frame1.png", "out/../out/frame1.png"])
+def test_a_result_and_an_image_of_one_path_are_refused(maps, result):
+    line = refused(maps, "maps", "-o", result, "--derotated", "out")
+    assert "would be a result of this run and an image of maps/frame1.png" in line
+
+
+def test_the_record_of_the_run_and_an_image_of_one_path_are_refused(tmp_path):
+    np.save(tmp_path / "rolls.csv.run.npy", road_map())
+    (tmp_path / "rolls.csv.run.npy").rename(tmp_path / "rolls.csv.run.json")
+    line = refused(tmp_path, "rolls.csv.run.json", "-o", "out/rolls.csv", "--derotated", "out", "--overwrite")
+    assert "would be a result of this run and an image" in line
+
+
+def test_names_that_differ_in_case_are_one_where_the_folder_ignores_case(tmp_path):
+    write_kitti(tmp_path / "one" / "a.png", road_map())
+    write_kitti(tmp_path / "two" / "A.png", road_map())
+    arguments = ("one/a.png", "two/A.png", "--derotated", "out", "--overwrite")
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "Name").touch()
+    assert rollcli("estimate", *arguments, cwd=tmp_path).status == 0
+    # two names of one file: that is how a folder that ignores case looks
+    (tmp_path / "out" / "nAME").hardlink_to(tmp_path / "out" / "Name")
+    for path in (tmp_path / "out").glob("?.png"):
+        path.unlink()
+    assert "one/a.png and two/A.png would both write" in refused(tmp_path, *arguments)
