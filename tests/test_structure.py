@@ -1,6 +1,7 @@
 """The arrows between packages, and the size of modules and folders."""
 
 import ast
+import functools
 from collections import defaultdict
 from graphlib import CycleError, TopologicalSorter
 
@@ -10,7 +11,7 @@ PACKAGE = ROOT / "rollcli"
 # a package may import those of its own layer, without a circle, and those of the layers below it
 LAYERS = (
     {"cli"},
-    {"batch", "convert", "simulate", "evaluate", "report"},
+    {"batch", "convert", "simulate", "evaluate", "report", "rig_check"},
     {"frames"},
     {"parallel", "imaging", "files", "rig"},
     {"estimator"},
@@ -47,30 +48,29 @@ def modules():
 MODULES = dict(modules())
 
 
+@functools.cache
 def imports(name, *, in_functions):
     """The modules of rollcli that a module imports: when it is loaded, or inside its functions."""
-    tree = ast.parse(MODULES[name].read_text("utf-8"))
-    inside = {
-        node
-        for function in ast.walk(tree)
-        if isinstance(function, ast.FunctionDef | ast.AsyncFunctionDef)
-        for node in ast.walk(function)
-    }
-    for node in (tree, *ast.walk(tree)):
-        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
-            inside.update(ast.walk(node))  # not loaded either
-            typing_only = set(ast.walk(node))
-            if in_functions:
-                inside -= typing_only
-    for node in ast.walk(tree):
-        if (node in inside) is not in_functions:
-            continue
-        if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "rollcli":
-            for alias in node.names:
-                full = f"{node.module}.{alias.name}"
-                yield full if full in MODULES else node.module
-        elif isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names if alias.name.split(".")[0] == "rollcli")
+    return tuple(
+        _imports(ast.parse(MODULES[name].read_text("utf-8")), in_function=False, wanted=in_functions)
+    )
+
+
+def _imports(node, *, in_function, wanted):
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.If) and ast.unparse(child.test) == "TYPE_CHECKING":
+            continue  # never loaded
+        if in_function is wanted and isinstance(child, ast.ImportFrom):
+            full = [f"{child.module}.{alias.name}" for alias in child.names]
+            yield from (each if each in MODULES else child.module for each in full if ours(each))
+        elif in_function is wanted and isinstance(child, ast.Import):
+            yield from (alias.name for alias in child.names if ours(alias.name))
+        is_function = isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef)
+        yield from _imports(child, in_function=in_function or is_function, wanted=wanted)
+
+
+def ours(name):
+    return name.split(".")[0] == "rollcli"
 
 
 def layer(name):

@@ -9,7 +9,7 @@ from typing import Protocol
 from rollcli.batch.options import EstimateOptions
 from rollcli.batch.plan import Plan
 from rollcli.batch.result_file import ResultFile, has_rows, kept_rows, open_result
-from rollcli.batch.resume import check_resumable
+from rollcli.batch.resume import check_resumable, unknown_inputs
 from rollcli.batch.run_record import RunRecord
 from rollcli.errors import InputError, UsageError
 from rollcli.files.atomic import remove_leftovers
@@ -152,8 +152,8 @@ def count_kept_rows(plan: Plan, options: EstimateOptions) -> int:
 
 def _begin(file: ResultFile, plan: Plan, options: EstimateOptions) -> FileOutput:
     kept = kept_rows(file.read(), plan.output, plan.format) if options.result.resume else b""
-    record = RunRecord(plan, options)
     rows, earlier = _parse_kept(kept, plan)
+    record = RunRecord(plan, options, unknown_inputs(earlier))
     if rows:
         record.continue_from(check_resumable(rows, earlier, record, plan))
     if options.result.resume or options.running.overwrite:

@@ -2,9 +2,9 @@
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
+from rollcli.batch.fingerprint import changed_input
 from rollcli.batch.plan import Plan
 from rollcli.batch.run_record import RunRecord
 from rollcli.files.results import Row, run_path
@@ -36,6 +36,13 @@ def check_resumable(
     return run
 
 
+def unknown_inputs(run: Mapping[str, Any] | None) -> list[str]:
+    """List the inputs that the interrupted run could not look at, by its record."""
+    inputs = (run or {}).get("inputs")
+    listed = inputs.get("unknown", []) if isinstance(inputs, dict) else []
+    return [each for each in listed if isinstance(each, str)] if isinstance(listed, list) else []
+
+
 def _differences(
     rows: Sequence[Row], was: Mapping[str, Any], now: Mapping[str, Any], plan: Plan
 ) -> Iterator[str]:
@@ -53,7 +60,8 @@ def _differences(
     if inputs_was.get("names") != inputs_now["names"]:
         yield "the names of the inputs differ"
     if inputs_was != inputs_now:
-        yield f"{_changed(plan) or 'an input'} has changed since"
+        begun = run_path(plan.output).stat().st_mtime_ns
+        yield f"{changed_input(plan.frames, begun) or 'an input'} has changed since"
 
 
 def _is_whole(run: Mapping[str, Any]) -> bool:
@@ -68,12 +76,3 @@ def _is_whole(run: Mapping[str, Any]) -> bool:
         and isinstance(searched, list)
         and all(isinstance(each, int) for each in searched)
     )
-
-
-def _changed(plan: Plan) -> str | None:
-    """Find the first input that is newer than the record of the run, or missing."""
-    begun = run_path(plan.output).stat().st_mtime_ns
-    for path in (path for frame in plan.frames for path in frame.reads()):
-        if not Path(path).exists() or Path(path).stat().st_mtime_ns > begun:
-            return path
-    return None

@@ -2,14 +2,13 @@
 
 import hashlib
 import json
-import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, fields
 from itertools import islice
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rollcli import __version__
+from rollcli.batch.fingerprint import fingerprint
 from rollcli.batch.options import EstimateOptions
 from rollcli.batch.plan import Plan
 from rollcli.errors import InputError
@@ -38,16 +37,19 @@ Options = TypeVar("Options", bound="DataclassInstance")
 
 
 class RunRecord:
-    """The record of one run; the same run gives the same bytes, whether it was interrupted or not."""
+    """The record of one run; the same run gives the same bytes, whether it was interrupted or not.
 
-    def __init__(self, plan: Plan, options: EstimateOptions) -> None:
+    `unknown` are the inputs that an interrupted run could not look at.
+    """
+
+    def __init__(self, plan: Plan, options: EstimateOptions, unknown: Collection[str] = ()) -> None:
         self._output = plan.output
         self._encodings: set[str] = set()
         self._searched: list[int] = []
         self.fixed = {
             "rollcli": __version__,
             "options": _effective(plan, options),
-            "inputs": _fingerprint(plan.frames),
+            "inputs": fingerprint(plan.frames, unknown),
         }
         if options.calibration.given:
             self.fixed["calibration"] = _calibrations(plan.frames)
@@ -105,28 +107,6 @@ def _calibrations(frames: Sequence[Frame]) -> dict[str, Any]:
 
 
 _CALIBRATIONS_LISTED = 3
-
-
-def _fingerprint(frames: list[Frame]) -> dict[str, Any]:
-    """Summarise the frames: how many, their names, and size and time of every file that they need."""
-    names, files = hashlib.sha256(), hashlib.sha256()
-    shared: dict[str, bytes] = {}  # a mask for all frames is looked at once
-    for frame in frames:
-        names.update(os.fsencode(f"{frame.file}\0{frame.right_file}\0"))
-        for path in frame.reads():
-            state = shared.get(path) or _state(path)
-            if path == frame.mask:
-                shared[path] = state
-            files.update(state)
-    return {"frames": len(frames), "names": names.hexdigest(), "files": files.hexdigest()}
-
-
-def _state(path: str) -> bytes:
-    try:
-        found = Path(path).stat()
-    except (OSError, ValueError):  # the latter for a name that no file can have
-        return b"missing\0"
-    return b"%d %d\0" % (found.st_size, found.st_mtime_ns)
 
 
 def recorded_options(run: Mapping[str, Any] | None, name: str) -> FrameOptions:

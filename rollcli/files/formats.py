@@ -54,7 +54,7 @@ def read_bytes(path: str | Path, name: str | None = None) -> bytes:
     except IsADirectoryError:
         raise InputError(f"{name}: is a folder, not a file") from None
     except FileNotFoundError:
-        dangling = Path(path).is_symlink()
+        dangling = os.path.lexists(path)
         raise InputError(f"{name}: {'is a link to nothing' if dangling else 'no such file'}") from None
     except (OSError, ValueError) as error:
         reason = str(getattr(error, "strerror", None) or error).lower()

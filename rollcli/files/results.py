@@ -4,7 +4,6 @@ import csv
 import io
 import json
 import math
-import os
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields
@@ -12,6 +11,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from rollcli.errors import InputError
+from rollcli.files.existence import is_there
 
 Format = Literal["csv", "jsonl"]
 # file names are bytes: those that are not UTF-8 come back as the bytes they were
@@ -167,7 +167,7 @@ def run_path(path: str | Path) -> Path:
 def read_run(path: str | Path) -> Mapping[str, Any] | None:
     """Read the record of the run that wrote the result `path`; None when there is none."""
     record = run_path(path)
-    if not os.path.exists(record):  # false, too, for a name that is too long for one  # noqa: PTH110
+    if not is_there(record):
         return None
     try:
         data = _read(record)

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from rollcli.errors import UsageError
+from rollcli.files.existence import is_file, is_folder, is_there
 
 _NOWHERE = (0, 0)
 
@@ -57,7 +58,7 @@ class Search:
         if not argument:
             raise UsageError("an input has an empty name: is a variable unset?")
         path = Path(argument)
-        if path.is_dir():
+        if is_folder(path):
             return self._wanted(argument, self._in_folder(path), "folder")
         if literal or not glob.has_magic(argument) or os.path.lexists(path):
             return iter([(path, path.name)])
@@ -149,7 +150,7 @@ def _identity(folder: str | Path) -> tuple[int, int]:
 
 def _is_file(path: str) -> bool:
     """Tell whether this is a file, or a name behind which none can be seen: that one gets an error row."""
-    return os.path.isfile(path) or not os.path.exists(path)  # noqa: PTH110, PTH113 (Path's raise)
+    return is_file(path) or not is_there(path)
 
 
 def _below(relative: Path) -> Path:

@@ -8,6 +8,7 @@ from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
 from rollcli.errors import InputError, UsageError
+from rollcli.files.existence import is_file, is_folder
 from rollcli.rig.calibration import Calibration
 from rollcli.rig.options import CalibrationOptions
 from rollcli.rig.parse import MAX_BYTES, parse_calibration
@@ -58,7 +59,7 @@ class Calibrations:
         self._given = given
         self._by_stem: dict[str, list[Path]] | None = None
         self._one: Calibration | None = None
-        if len(given.calib) == 1 and Path(given.calib[0]).is_dir():
+        if len(given.calib) == 1 and is_folder(given.calib[0]):
             self._by_stem = _stems(Path(given.calib[0]))
         elif given.given:
             self._one = _read(given.calib, given)
@@ -104,7 +105,7 @@ def check_first_size(frames: Sequence[Frame], options: FrameOptions) -> None:
 def _stems(folder: Path) -> dict[str, list[Path]]:
     found: dict[str, list[Path]] = {}
     for path in sorted(folder.rglob("*")):
-        if path.is_file() and not path.name.startswith("."):
+        if is_file(path) and not path.name.startswith("."):
             found.setdefault(path.stem.removesuffix(_MARK), []).append(path)
     return found
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from unicodedata import normalize
 
 from rollcli.errors import UsageError
+from rollcli.files.existence import is_folder
 from rollcli.files.stream import write_stdout
 from rollcli.frames.frame import Frame
 
@@ -115,7 +116,7 @@ def _real_folder(folder: str) -> str:
 def _ignores_case(folder: str) -> bool:
     """Tell whether a.png and A.png are one file in a folder, by the names that it or its parents hold."""
     here = Path(folder).resolve()
-    while not os.path.isdir(here) and here != here.parent:  # noqa: PTH112 (which never raises)
+    while not is_folder(here) and here != here.parent:
         here = here.parent
     with contextlib.suppress(OSError), os.scandir(here) as entries:
         for entry in entries:

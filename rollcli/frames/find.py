@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path, PurePath
 
 from rollcli.errors import UsageError
+from rollcli.files.existence import is_file, is_folder
 from rollcli.files.inputs import Input, find_inputs, pair_inputs
 from rollcli.frames.calibration import Calibrations
 from rollcli.frames.frame import Frame
@@ -86,10 +87,10 @@ class _Masks:
 
     def __init__(self, region: RegionOptions | None) -> None:
         self.one, self.by_stem = region.mask if region else None, None
-        if self.one is not None and Path(self.one).is_dir():
+        if self.one is not None and is_folder(self.one):
             found = find_inputs([self.one], recursive=True)
             self.by_stem = {Path(each.name).stem: each.location for each in found}
-        elif self.one is not None and not Path(self.one).is_file():
+        elif self.one is not None and not is_file(self.one):
             raise UsageError(f"{self.one}: no such mask file or folder")
 
     def of(self, left: Input) -> str | None:

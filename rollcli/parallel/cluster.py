@@ -13,6 +13,7 @@ from typing import Any, Generic
 from rollcli import __version__
 from rollcli.errors import ClusterError, UsageError
 from rollcli.files.atomic import write_atomic
+from rollcli.files.existence import is_file, is_there
 from rollcli.parallel.in_order import Result, Task, Work
 from rollcli.parallel.process_setup import prepare_worker
 from rollcli.parallel.run_tasks import SharedPaths
@@ -193,7 +194,7 @@ def _worker_plugin() -> Any:
 
 def _check_workers(client: Any, shared: SharedPaths) -> None:
     """Ask every worker whether it has this rollcli and sees the files and folders that this process sees."""
-    files = {path.absolute() for path in map(Path, shared.files) if path.exists()}
+    files = {path.absolute() for path in map(Path, shared.files) if is_file(path)}
     sizes = {str(path): path.stat().st_size for path in files}
     marks = [Path(folder).absolute() / ".rollcli-check" for folder in shared.folders]
     try:
@@ -214,11 +215,11 @@ def probe(version: str, sizes: dict[str, int], marks: list[str]) -> str:
     if version != __version__:
         return f"has rollcli {__version__}, this is {version}"
     for path, size in sizes.items():
-        if not Path(path).is_file() or Path(path).stat().st_size != size:
+        if not is_file(path) or Path(path).stat().st_size != size:
             return f"does not see {path}; inputs must lie on storage that the workers share"
     for mark in marks:
         folder = Path(mark).parent
-        if not Path(mark).exists():
+        if not is_there(mark):
             return f"does not see {folder}; image folders must lie on storage that the workers share"
         if not os.access(folder, os.W_OK):
             return f"cannot write to {folder}"

@@ -1,12 +1,12 @@
 """Where the pictures of a row come from: images that `estimate` wrote, or its inputs."""
 
 import math
-import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from rollcli.errors import UsageError
+from rollcli.files.existence import is_file, is_folder, is_there
 from rollcli.files.inputs import MAP_ENDINGS
 from rollcli.files.naming import listed
 from rollcli.files.results import Row
@@ -56,7 +56,7 @@ def subjects(rows: Sequence[Row], result: str, images: str | None, recorded: Ima
     UsageError
         There is no such folder, or there are no images of some rows in it.
     """
-    if images is not None and not Path(images).is_dir():
+    if images is not None and not is_folder(images):
         raise UsageError(f"{images}: no such folder of images")
     found = [_images(row, images, recorded) if images is not None else {} for row in rows]
     without = [row.file for row, files in zip(rows, found, strict=True) if images is not None and not files]
@@ -84,9 +84,8 @@ def _subject(row: Row, folder: Path, images: dict[str, str]) -> Subject:
 
 def _located(name: str, folder: Path) -> str:
     """A file named from where `estimate` ran: here, or else from the result's folder."""
-    beside = str(folder / name)
-    # a result may name anything, and Path.exists fails for names that are too long
-    return beside if name and not os.path.exists(name) and os.path.exists(beside) else name  # noqa: PTH110
+    beside = folder / name
+    return str(beside) if name and not is_there(name) and is_there(beside) else name
 
 
 def _images(row: Row, images: str, recorded: ImageOptions) -> dict[str, str]:
@@ -97,8 +96,8 @@ def _image(kind: str, row: Row, images: Path, recorded: ImageOptions) -> str | N
     for folder in _folders(kind, images, getattr(recorded, kind)):
         for name in _tails(row.file):
             for ending in (".png",) if kind == "vdisparity" else MAP_ENDINGS:
-                if os.path.isfile(path := str(folder / f"{name}{ending}")):  # noqa: PTH113 (see _located)
-                    return path
+                if is_file(path := folder / f"{name}{ending}"):
+                    return str(path)
     return None
 
 

@@ -1,0 +1,130 @@
+"""Inputs that the system refuses to look at: each costs its row, never the batch."""
+
+import csv
+import os
+import shutil
+import subprocess
+import sys
+
+import pytest
+
+from tests.run_cli import command, environment, rollcli, write_maps
+
+LONG = "x" * 300 + ".png"
+# calls that name this file fail, as those of a dying disk or a lost server do
+FAILING = """
+import errno, os, sys
+def failing(call):
+    def wrapper(path, *args, **options):
+        if not isinstance(path, int) and os.fspath(path).endswith("frame1.png"):
+            raise OSError(errno.EIO, os.strerror(errno.EIO), path)
+        return call(path, *args, **options)
+    return wrapper
+for name in {calls}:
+    setattr(os, name, failing(getattr(os, name)))
+sys.argv = ["rollcli", *{arguments}]
+from rollcli.__main__ import main
+main()
+"""
+
+
+@pytest.fixture
+def maps(tmp_path):
+    write_maps(tmp_path / "maps", 3)
+    return tmp_path
+
+
+def statuses(folder, name="rolls.csv"):
+    with (folder / name).open(newline="") as file:
+        return [row["status"] for row in csv.DictReader(file)]
+
+
+def run_failing(folder, calls, *arguments):
+    """Run the program where some system calls fail for one of the maps."""
+    code = FAILING.format(calls=calls, arguments=list(arguments))
+    line = [sys.executable, "-c", code]
+    done = subprocess.run(line, cwd=folder, env=environment(), capture_output=True, text=True, check=False)
+    assert "internal error" not in done.stderr
+    return done
+
+
+@pytest.mark.parametrize("name", [LONG, f"{LONG}/{LONG}", f"maps/{LONG}"])
+def test_a_name_that_no_file_system_takes_costs_its_row(maps, name):
+    done = rollcli("estimate", "maps", name, "-o", "rolls.csv", "--derotated", "up", cwd=maps)
+    assert done.status == 3
+    assert sorted(statuses(maps)) == ["error", "ok", "ok", "ok"]
+    assert "file name too long" in done.err
+    assert rollcli("derotate", "maps", name, "--roll", "1", "-o", "turned", cwd=maps).status == 3
+    assert len(list((maps / "turned").iterdir())) == 3
+
+
+@pytest.mark.parametrize("option", ["--mask", "--left", "--calib"])
+def test_a_name_that_no_file_system_takes_is_refused_as_an_option(maps, option):
+    other = ["--right", "maps/frame0.png"] if option == "--left" else ["maps"]
+    done = rollcli("estimate", *other, option, LONG, cwd=maps)
+    assert done.status == 2
+    assert done.err.count("\n") == 1
+
+
+def without_privilege():
+    """What stands before a command so that permissions count, for root too."""
+    if not hasattr(os, "geteuid") or os.geteuid() != 0:
+        return []
+    if shutil.which("setpriv") is None:
+        pytest.skip("root may read everything, and there is no setpriv to give that up")
+    return ["setpriv", "--bounding-set=-dac_override,-dac_read_search"]
+
+
+def test_a_file_in_a_folder_that_may_not_be_entered_costs_its_row(maps):
+    write_maps(maps / "locked", 1)
+    (maps / "locked").chmod(0)
+    line = command("estimate", "maps/frame0.png", "locked/frame0.png", "-o", "rolls.csv")
+    done = subprocess.run(
+        [*without_privilege(), *line],
+        cwd=maps,
+        env=environment(),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    (maps / "locked").chmod(0o700)
+    assert done.returncode == 3, done.stderr
+    assert statuses(maps) == ["error", "ok"]
+    assert "locked/frame0.png: cannot be read: permission denied" in done.stderr
+
+
+def test_a_file_that_cannot_be_read_for_a_dying_disk_costs_its_row(maps):
+    arguments = ("estimate", "maps", "-o", "rolls.csv", "-j1")
+    done = run_failing(maps, ["stat", "lstat", "open"], *arguments)
+    assert done.returncode == 3, done.stderr
+    assert statuses(maps) == ["ok", "error", "ok"]
+    assert "frame1.png: cannot be read: input/output error" in done.stderr
+
+
+def test_a_passing_fault_while_inputs_are_looked_at_does_not_hinder_a_resume(maps):
+    arguments = ("estimate", "maps", "-o", "rolls.csv", "-j1")
+    assert run_failing(maps, ["stat"], *arguments).returncode == 0
+    whole = (maps / "rolls.csv").read_bytes()
+    (maps / "rolls.csv").write_bytes(whole[: whole.index(b"maps/frame1")])
+    done = rollcli(*arguments, "--resume", cwd=maps)
+    assert (done.status, (maps / "rolls.csv").read_bytes()) == (0, whole), done.err
+    (maps / "rolls.csv").write_bytes(whole[: whole.index(b"maps/frame1")])
+    write_maps(maps / "maps", 1)  # the other inputs are still compared
+    os.utime(maps / "maps" / "frame0.png", (1, 1))
+    assert rollcli(*arguments, "--resume", cwd=maps).status == 2
+
+
+@pytest.mark.parametrize("length", [248, 253, 255])
+def test_a_result_whose_name_is_too_long_for_its_record_is_one_line(maps, length):
+    name = "r" * (length - 4) + ".csv"
+    done = subprocess.run(
+        command("estimate", "maps", "-o", name),
+        cwd=maps,
+        env=environment(),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1
+    assert done.stderr.count("\n") == 1
+    assert "file name too long" in done.stderr
