@@ -4,7 +4,7 @@ import contextlib
 import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 from rollcli.batch.options import EstimateOptions
 from rollcli.batch.plan import Plan
@@ -47,8 +47,8 @@ class Output(Protocol):
     def append(self, result: FrameResult) -> None:
         """Write the row; it has left this process when this returns."""
 
-    def finish(self, totals: Mapping[str, int]) -> None:
-        """Say that all rows are written, and how many of each status."""
+    def finish(self, totals: Mapping[str, int], alignment: Mapping[str, Any] | None) -> None:
+        """Say that all rows are written, how many of each status, and how the views of pairs lay."""
 
     def hint(self, rows: int) -> str:
         """Say how to continue after an error; empty when nothing can be continued."""
@@ -69,7 +69,7 @@ class StreamOutput:
         """Write the row."""
         self._write(format_row(result.row, self._plan.format, self._plan.timing))
 
-    def finish(self, totals: Mapping[str, int]) -> None:
+    def finish(self, totals: Mapping[str, int], alignment: Mapping[str, Any] | None) -> None:
         """Do nothing: a stream has no record."""
 
     def hint(self, rows: int) -> str:
@@ -95,9 +95,9 @@ class FileOutput:
         self._record.saw(result.encoding, result.searched)
         self._file.append(format_row(result.row, self._plan.format, self._plan.timing))
 
-    def finish(self, totals: Mapping[str, int]) -> None:
-        """Write the counts into the record."""
-        self._record.write(totals)
+    def finish(self, totals: Mapping[str, int], alignment: Mapping[str, Any] | None) -> None:
+        """Write both into the record."""
+        self._record.write(totals, alignment)
 
     def hint(self, rows: int) -> str:
         """Say that --resume continues, if rows were written and their file still is there."""

@@ -88,8 +88,10 @@ def _results(
 
 def _end(output: Output, progress: Progress, stop: Stop, resume_command: str) -> ExitStatus:
     if not progress.stopped_early:
-        output.finish(progress.totals)
+        output.finish(progress.totals, progress.alignment.summary())
     progress.note(progress.summary())
+    if progress.alignment.advice:
+        progress.note(f"median over the pairs: {progress.alignment.advice}")
     if stop.asked and progress.stopped_early:
         how = f"; continue with: {resume_command}" if output.resumable else ""
         progress.say(f"interrupted{how}")

@@ -26,6 +26,8 @@ CONVENTIONS = {
     "roll_ci95_deg": "half-width of the 95 % interval, degrees",
     "pitch_deg": "angle of the optical axis to the road near ahead, degrees; positive: looks down",
     "height_m": "of the left camera over the road near ahead, metres",
+    "alignment": "median over the pairs of what was corrected, the right image or camera against the left; "
+    "px of the size matched at; right_camera_roll_deg is positive counter-clockwise, seen from behind",
     "alpha0, alpha1, alpha2": "road disparity in px = alpha0 + alpha1 y + alpha2 y^2",
     "y": "v cos(theta) - u sin(theta), px; u right, v down, from the centre of the top-left pixel",
 }
@@ -70,12 +72,13 @@ class RunRecord:
         if (self._encodings, self._searched) != before:
             self.write({})
 
-    def write(self, counts: Mapping[str, int]) -> None:
-        """Write the file, whole or not at all; `counts` is empty until the run is over."""
+    def write(self, counts: Mapping[str, int], alignment: Mapping[str, Any] | None = None) -> None:
+        """Write the file, whole or not at all; `counts` is empty until the run is over, `alignment` None."""
         record = {
             **self.fixed,
             "encoding": sorted(self._encodings),
             "disparities_searched_px": self._searched,
+            "alignment": alignment,
             "conventions": CONVENTIONS,
             "counts": counts,
         }

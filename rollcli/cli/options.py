@@ -14,7 +14,7 @@ from rollcli.frames.options import (
     RegionOptions,
     RunningOptions,
 )
-from rollcli.imaging.stereo_options import MODES, StereoOptions
+from rollcli.imaging.stereo_options import ALIGN, MODES, StereoOptions
 
 PATH = FilePath()  # whether it exists, its reader says: in the same words wherever the name came from
 
@@ -126,10 +126,18 @@ stereo_options = record(
         help="Match at 1/F of the size; maps and pixel columns then refer to that size.",
     ),
     option(
+        "--align",
+        type=Choice(*ALIGN),
+        default=StereoOptions.align,
+        help="auto: measure how much lower, larger and how far turned the right image is against the left, "
+        "correct that before matching, and say so in the row; off: match the images as they are.",
+    ),
+    option(
         "--vertical-offset",
         type=Number("PX", auto=True),
         default="auto",
-        help="How much lower the right image lies, pixels; auto: measured, and corrected from 0.15 on.",
+        help="How much lower the right image lies, pixels: corrected as given, and nothing is measured; "
+        "auto: as --align says.",
     ),
 )
 

@@ -10,6 +10,7 @@ from rollcli.errors import ExitStatus
 from rollcli.files.results import Row
 from rollcli.frames.frame import FrameResult
 from rollcli.frames.options import EncodingOptions, RunningOptions
+from rollcli.frames.rig_alignment import RigAlignment
 from rollcli.parallel.progress import TaskProgress
 
 _FAILURES_SHOWN = 5
@@ -48,6 +49,7 @@ class Progress(TaskProgress):
         self.stopped_early = False
         self._statuses = statuses
         self._auto = encoding.encoding == "auto" and encoding.scale is None
+        self.alignment = RigAlignment()
         self._failures = 0
 
     def __enter__(self) -> "Progress":
@@ -56,7 +58,9 @@ class Progress(TaskProgress):
 
     def keep(self, rows: tuple[Row, ...]) -> None:
         """Count the rows that an interrupted run has left."""
-        self.counts.update(row.status for row in rows)
+        for row in rows:
+            self.counts[row.status] += 1
+            self.alignment.add(row)
         self.kept = len(rows)
 
     def counted(self) -> dict[str, int]:
@@ -72,6 +76,7 @@ class Progress(TaskProgress):
         """Count a row that is written, and say what the user should know about it."""
         row = result.row
         self.counts[row.status] += 1
+        self.alignment.add(row)
         self._tell_input(result)
         if row.status == "error":
             self._tell_failure(row)

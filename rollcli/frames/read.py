@@ -1,5 +1,6 @@
 """Read a frame: its disparity, from a map or matched from a pair, and the pixels that may be used."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +12,7 @@ from rollcli.files.formats import Stored, read_image, read_stored
 from rollcli.frames.frame import Frame
 from rollcli.frames.options import FrameOptions
 from rollcli.frames.region import region_mask
-from rollcli.imaging.stereo_options import StereoOptions
+from rollcli.imaging.misalignment_words import note_of
 
 if TYPE_CHECKING:
     from rollcli.imaging.stereo import StereoMatch
@@ -89,22 +90,16 @@ def _match(frame: Frame, options: FrameOptions) -> Source:
     return Source(
         match.disparity,
         searched=searched,
-        doubt=_doubt(match),
-        note=_note(match, options.stereo),
+        doubt="; ".join(_doubts(match)),
+        note=note_of(match.corrected, *match.disparity.shape) if options.stereo.measures_alignment else "",
         size=(width, height),
         mode=options.stereo.mode,
     )
 
 
-def _doubt(match: "StereoMatch") -> str:
-    if match.end_fraction <= _MUCH_AT_END:
-        return ""
-    share = f"{match.end_fraction:.0%} of the map lies at the end of the searched range"
-    return f"{share}; use a larger --num-disparities"
-
-
-def _note(match: "StereoMatch", given: StereoOptions) -> str:
-    if given.vertical_offset is not None or match.vertical_offset == 0:
-        return ""
-    side = "lower" if match.vertical_offset > 0 else "higher"
-    return f"corrected: the right image lay {abs(match.vertical_offset):.2f} px {side} than the left one"
+def _doubts(match: "StereoMatch") -> Iterator[str]:
+    if match.end_fraction > _MUCH_AT_END:
+        share = f"{match.end_fraction:.0%} of the map lies at the end of the searched range"
+        yield f"{share}; use a larger --num-disparities"
+    if match.doubt:
+        yield match.doubt

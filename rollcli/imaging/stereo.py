@@ -1,39 +1,29 @@
-"""Disparity maps from stereo pairs with OpenCV's semi-global matching [Hirschmüller 2008]."""
+"""Disparity maps from stereo pairs: views levelled, range found, then one semi-global match."""
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError
-from rollcli.imaging.alignment import moved_up, vertical_offset
-from rollcli.imaging.disparity_range import largest_disparity
+from rollcli.imaging.alignment import LEFT_OVER, TOLERANCE, is_level, level, measure_at_size
+from rollcli.imaging.first_look import FirstLook, find_range, first_look
+from rollcli.imaging.misalignment import LEVEL, Misalignment
+from rollcli.imaging.same_scene import check_same_scene
+from rollcli.imaging.sgbm import NARROWEST, match_views, usable_range
 from rollcli.imaging.stereo_options import StereoOptions as StereoOptions
+from rollcli.imaging.vertical_disparity import Measured
+from rollcli.imaging.views import Views, prepare_views
 
-MODES = {
-    "sgbm": cv2.STEREO_SGBM_MODE_SGBM,
-    "hh": cv2.STEREO_SGBM_MODE_HH,
-    "3way": cv2.STEREO_SGBM_MODE_SGBM_3WAY,
-}
-Views = tuple[NDArray[np.uint8], NDArray[np.uint8]]
-"""Left and right."""
-
-# Half of what OpenCV's own samples take: on a slanted road less smoothing is less bias (tests/benchmarks)
-_SMALL_STEP_COST, _LARGE_STEP_COST = 4, 16
-_SUBPIXELS = 16  # OpenCV stores sixteenths of a pixel
-_SMALL_WIDTH = 320  # px, to find the range at
-_SMALL = StereoOptions(mode="3way", speckle_size=50, speckle_range=1)
-_ALIGNED = 0.15  # px: a smaller vertical offset is not worth another match
-_ALIGNMENTS = 3
-_HIDDEN = 1.3  # a map that was matched with the offset hides a part of it: this many times what it shows
+_MATCHES = 4  # until a pair counts as one that cannot be levelled
+_ROUNDS = 4  # of measuring where the first look has told nothing
+_FURTHEST = Misalignment(12.0, 0.03, 0.02, 0.0)  # what no rig in use has: px, radians, share
 
 
 @dataclass(frozen=True)
 class StereoMatch:
-    """A disparity map and the range it was searched in.
+    """A disparity map, the range it was searched in, and how the right view lay.
 
     Attributes
     ----------
@@ -43,15 +33,18 @@ class StereoMatch:
         The range searched.
     end_fraction : float
         Share of the valid pixels within a pixel of the range's end: if large, the range was too short.
-    vertical_offset : float
-        By how much the right image was moved up before it was matched, px.
+    corrected : Misalignment
+        What the right view was levelled by, pixels of the size matched at; `LEVEL` if it was left as it is.
+    doubt : str
+        Why the views may not be level now; empty if there is no reason.
     """
 
     disparity: NDArray[np.float32]
     min_disparity: int
     num_disparities: int
     end_fraction: float
-    vertical_offset: float
+    corrected: Misalignment
+    doubt: str
 
 
 def compute_disparity(left: NDArray[Any], right: NDArray[Any], **options: Any) -> NDArray[np.float32]:
@@ -72,7 +65,7 @@ def compute_disparity(left: NDArray[Any], right: NDArray[Any], **options: Any) -
     Raises
     ------
     InputError
-        The images differ in size, or are too small to match.
+        The images differ in size, are too small to match, are swapped, or do not show the same scene.
     UsageError
         An option makes no sense.
 
@@ -88,108 +81,83 @@ def compute_disparity(left: NDArray[Any], right: NDArray[Any], **options: Any) -
 
 
 def match_pair(left: NDArray[Any], right: NDArray[Any], options: StereoOptions) -> StereoMatch:
-    """The disparity map of a rectified pair, with the range that was searched; see `compute_disparity`."""
-    if left.shape[:2] != right.shape[:2]:
-        sizes = " and ".join(f"{each.shape[1]}x{each.shape[0]}" for each in (left, right))
-        raise InputError(f"left and right image differ in size: {sizes}")
-    views = _prepared(left, right, options.downscale)
-    first, count = options.min_disparity, options.num_disparities
-    if count is None:
-        count = _find_range(views) - first
+    """The disparity map of a rectified pair, with all that was found on the way; see `compute_disparity`."""
+    views = prepare_views(left, right, options.downscale)
     width = views[0].shape[1]
-    count = _usable_range(count, first, width, options.block_size)
-    if count < 16:
-        raise InputError(f"images {width} px wide are too narrow to match from disparity {first} on")
-    disparity, offset = _aligned_match(views, first, count, options)
-    valid = np.count_nonzero(disparity)
+    if usable_range(1, options.min_disparity, width, options.block_size) < NARROWEST:
+        raise InputError(
+            f"images {width} px wide are too narrow to match from disparity {options.min_disparity} on"
+        )
+    look = _look(views, options)
+    count = options.num_disparities
+    if count is None:
+        count = (width // 8 if look.range is None else look.range) - options.min_disparity
+    count = usable_range(count, options.min_disparity, width, options.block_size)
+    disparity, corrected, doubt = _levelled_match(views, look, count, options)
+    valid, end = np.count_nonzero(disparity), options.min_disparity + count
     return StereoMatch(
         disparity=disparity,
-        min_disparity=first,
+        min_disparity=options.min_disparity,
         num_disparities=count,
-        end_fraction=np.count_nonzero(disparity >= first + count - 2) / valid if valid else 0.0,
-        vertical_offset=offset,
+        end_fraction=np.count_nonzero(disparity >= end - 2) / valid if valid else 0.0,
+        corrected=corrected,
+        doubt=doubt,
     )
 
 
-def _aligned_match(
-    views: Views, first: int, count: int, options: StereoOptions
-) -> tuple[NDArray[np.float32], float]:
-    """The disparity of views brought to equal height, and how much lower the right one was."""
-    left, right = views
-    offset = options.vertical_offset or 0.0
-    level = moved_up(right, offset)
-    disparity = _match((left, level), first, count, options)
-    for _ in range(_ALIGNMENTS if options.vertical_offset is None else 0):
-        more = vertical_offset(left, level, disparity)
-        if abs(more) < _ALIGNED:
-            break
-        offset += _HIDDEN * more
-        level = moved_up(right, offset)
-        disparity = _match((left, level), first, count, options)
-    return disparity, offset
+def _look(views: Views, options: StereoOptions) -> FirstLook:
+    """What is to be known before the pair is matched."""
+    if options.measures_alignment:
+        look = first_look(views)
+        if options.min_disparity >= 0:  # who searches below 0 knows what the views are
+            check_same_scene(views, look)
+        return look
+    given = Misalignment(options.vertical_offset or 0.0)
+    levelled = views[0], level(views[1], given)
+    return FirstLook(find_range(levelled) if options.num_disparities is None else None, None)
 
 
-def _prepared(left: NDArray[Any], right: NDArray[Any], downscale: float) -> Views:
-    """Grey, 8 bits, at the size to match at."""
-    # cameras leave some of 16 bits unused: a fixed shift would make their images black
-    brightest = max(int(left.max(initial=1)), int(right.max(initial=1)))
-    return _plain(left, brightest, downscale), _plain(right, brightest, downscale)
+def _levelled_match(
+    views: Views, look: FirstLook, count: int, options: StereoOptions
+) -> tuple[NDArray[np.float32], Misalignment, str]:
+    """The disparity of the views once they are level, what was corrected, and why that may be wrong."""
+
+    def match(misalignment: Misalignment) -> NDArray[np.float32]:
+        levelled = views[0], level(views[1], misalignment)
+        return match_views(levelled, options.min_disparity, count, options)
+
+    if not options.measures_alignment:
+        given = Misalignment(options.vertical_offset or 0.0)
+        return match(given), given, ""
+    shape = views[0].shape
+    at = _worth_correcting(look.measured, shape)
+    for _ in range(_MATCHES):
+        disparity = match(at)
+        measured = measure_at_size(views, disparity, at, 2 if look.measured else _ROUNDS)
+        if measured is None:
+            return disparity, at, "too little can be compared to tell whether the views are level"
+        wanted = _worth_correcting(measured, shape)
+        if wanted == LEVEL != at:  # small views were taken for uneven
+            at = LEVEL
+        elif is_level(
+            measured.misalignment - at, measured.errors, shape, LEFT_OVER if at != LEVEL else TOLERANCE
+        ):
+            return disparity, at, _doubt(at)
+        else:
+            at = wanted
+    return disparity, at, "the views are not level, and could not be levelled"
 
 
-def _plain(image: NDArray[Any], brightest: int, downscale: float) -> NDArray[np.uint8]:
-    if image.dtype not in (np.uint8, np.uint16) or not (image.ndim == 2 or image.shape[2:] == (3,)):
-        raise InputError(
-            f"an image of {image.dtype} and shape {image.shape} cannot be matched: "
-            "grey and BGR images of 8 and 16 bits can"
-        )
-    if image.dtype == np.uint16:
-        image = cv2.convertScaleAbs(image, alpha=255 / brightest)
-    grey = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) if image.ndim == 3 else image
-    return _shrunk(grey.astype(np.uint8, copy=False), downscale)
+def _worth_correcting(measured: Measured | None, shape: tuple[int, ...]) -> Misalignment:
+    if measured is None or is_level(measured.misalignment, measured.errors, shape):
+        return LEVEL
+    return measured.misalignment
 
 
-def _shrunk(image: NDArray[Any], factor: float) -> NDArray[np.uint8]:
-    if factor == 1:
-        return image
-    height, width = (max(1, round(side / factor)) for side in image.shape)
-    return cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
-
-
-def _find_range(views: Views) -> int:
-    """Disparities from 0 to this are worth a search, pixels."""
-    width = views[0].shape[1]
-    factor = max(1.0, width / _SMALL_WIDTH)
-    small = _shrunk(views[0], factor), _shrunk(views[1], factor)
-
-    def match(count: float) -> NDArray[np.float32]:
-        usable = _usable_range(math.ceil(count), 0, small[0].shape[1], _SMALL.block_size)
-        return _match(small, 0, usable, _SMALL) if usable >= 16 else np.zeros(small[0].shape, np.float32)
-
-    top = largest_disparity(match, small[0].shape[1])
-    return int(width // 8 if top is None else math.ceil(1.1 * top * factor) + 8)
-
-
-def _usable_range(count: int, first: int, width: int, block_size: int) -> int:
-    """A multiple of 16, as OpenCV wants it, that leaves columns to match; 0 where there is none."""
-    furthest = (width - block_size - max(0, first, -first)) // 16 * 16
-    return min(-(-max(1, count) // 16) * 16, furthest)
-
-
-def _match(views: Views, first: int, count: int, options: StereoOptions) -> NDArray[np.float32]:
-    """OpenCV SGBM over `count` disparities from `first` on; pixels, no data is 0."""
-    area = options.block_size**2
-    matcher = cv2.StereoSGBM.create(
-        minDisparity=first,
-        numDisparities=count,
-        blockSize=options.block_size,
-        P1=_SMALL_STEP_COST * area,
-        P2=_LARGE_STEP_COST * area,
-        disp12MaxDiff=1,
-        uniquenessRatio=options.uniqueness,
-        speckleWindowSize=options.speckle_size,
-        speckleRange=options.speckle_range,
-        mode=MODES[options.mode],
+def _doubt(corrected: Misalignment) -> str:
+    far = (
+        abs(corrected.offset) > _FURTHEST.offset
+        or abs(corrected.rotation) > _FURTHEST.rotation
+        or abs(corrected.scale) > _FURTHEST.scale
     )
-    sixteenths = matcher.compute(*views)
-    disparity: NDArray[np.float32] = np.divide(np.maximum(sixteenths, 0), _SUBPIXELS, dtype=np.float32)
-    return disparity
+    return "the views lie too far from level to be sure of the correction" if far else ""

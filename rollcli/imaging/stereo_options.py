@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from rollcli.errors import UsageError
 
 MODES = ("sgbm", "hh", "3way")
+ALIGN = ("auto", "off")
 _LARGEST = 2000  # px: OpenCV stores sixteenths in 16 bits
 _LIMITS = {
     "num_disparities": (1, _LARGEST),
@@ -41,8 +42,11 @@ class StereoOptions:
         Disparity step that ends an island, pixels.
     downscale : float
         Match at 1/downscale of the size.
+    align : {"auto", "off"}
+        Whether to measure how the right view lies against the left one, and to level it.
     vertical_offset : float or None
-        How much lower the right image lies, pixels of the size matched at; None: measured from the pair.
+        How much lower the right image lies, pixels of the size matched at: corrected as given, and nothing is
+        measured; None: as `align` says.
     """
 
     num_disparities: int | None = None
@@ -53,6 +57,7 @@ class StereoOptions:
     speckle_size: int = 100
     speckle_range: int = 2
     downscale: float = 1.0
+    align: str = "auto"
     vertical_offset: float | None = None
 
     def __post_init__(self) -> None:
@@ -64,3 +69,10 @@ class StereoOptions:
             raise UsageError(f"block-size {self.block_size}: must be odd")
         if self.mode not in MODES:
             raise UsageError(f"sgbm-mode {self.mode!r}: choose one of {', '.join(MODES)}")
+        if self.align not in ALIGN:
+            raise UsageError(f"align {self.align!r}: choose one of {', '.join(ALIGN)}")
+
+    @property
+    def measures_alignment(self) -> bool:
+        """Whether the views are levelled by what they show."""
+        return self.align == "auto" and self.vertical_offset is None

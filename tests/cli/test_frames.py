@@ -2,6 +2,7 @@
 
 import csv
 import io
+import json
 import re
 import subprocess
 
@@ -135,7 +136,38 @@ def test_a_pair_whose_views_are_not_level_is_corrected_and_says_so(tmp_path):
     done = rollcli("estimate", *pair, cwd=tmp_path)
     assert re.search(r"corrected: the right image lay (0\.[89]|1\.[01])\d px lower", done.out)
     assert float(column(done.out, "roll_deg")[0]) == pytest.approx(np.degrees(0.05), abs=0.3)
-    assert "corrected" not in rollcli("estimate", *pair, "--vertical-offset", "1", cwd=tmp_path).out
+    assert re.search(r"median over the pairs: the right image lies \d\.\d\d px lower: recalibrate", done.err)
+    for untouched in (("--vertical-offset", "1"), ("--align", "off")):
+        assert "corrected" not in rollcli("estimate", *pair, *untouched, cwd=tmp_path).out
+
+
+def test_the_record_of_a_run_says_how_the_cameras_lie(tmp_path):
+    for name, clockwise_deg in (("a.png", 0.30), ("b.png", 0.31), ("c.png", 0.32)):
+        write_pair(tmp_path, name, road_map(0.05, width=480, height=240) / 2)
+        right = cv2.imread(str(tmp_path / "right" / name), cv2.IMREAD_UNCHANGED)
+        turn = cv2.getRotationMatrix2D((239.5, 119.5), -clockwise_deg, 1.0)
+        turned = cv2.warpAffine(right, turn, (480, 240), flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REFLECT)
+        cv2.imwrite(str(tmp_path / "right" / name), turned)
+
+    done = rollcli("estimate", "--left", "left", "--right", "right", "-o", "r.csv", cwd=tmp_path)
+
+    alignment = json.loads((tmp_path / "r.csv.run.json").read_text())["alignment"]
+    assert (alignment["frames"], alignment["corrected"]) == (3, 3)
+    assert alignment["right_camera_roll_deg"] == pytest.approx(0.31, abs=0.03)
+    assert re.match(r"the right camera is rolled by 0\.3\d degrees against the left", alignment["advice"])
+    assert alignment["advice"] in done.err
+
+
+def test_swapped_views_and_images_of_two_places_get_a_row_that_says_so(tmp_path):
+    write_pair(tmp_path, "a.png", road_map(0.05, width=320, height=160) / 2)
+    swapped = rollcli("estimate", "--left", "right", "--right", "left", cwd=tmp_path)
+    assert (swapped.status, column(swapped.out, "status")) == (3, ["error"])
+    assert "the views seem swapped" in swapped.out
+
+    grain = np.random.default_rng(5).integers(0, 256, (160, 320), dtype=np.uint8)
+    cv2.imwrite(str(tmp_path / "right" / "a.png"), grain)
+    two_places = rollcli("estimate", "--left", "left", "--right", "right", cwd=tmp_path)
+    assert "the two images do not show the same scene" in two_places.out
 
 
 def test_maps_and_pairs_are_not_mixed(maps):

@@ -1,19 +1,34 @@
-"""A vertical offset between the views is measured and taken away, so that it does not pass for a roll."""
+"""A right view that is shifted, turned or enlarged is levelled, so that it does not pass for a roll."""
 
 import math
+from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
-from rollcli.errors import UsageError
+from rollcli.errors import InputError, UsageError
 from rollcli.estimator.estimate import estimate_roll
-from rollcli.imaging.alignment import moved_up, vertical_offset
+from rollcli.files.formats import read_image
+from rollcli.files.inputs import pair_inputs
+from rollcli.imaging.alignment import Approach, level
+from rollcli.imaging.misalignment import LEVEL, Misalignment
 from rollcli.imaging.stereo import StereoOptions, match_pair
 from rollcli.simulate.render import render_frame
 from rollcli.simulate.spec import FrameSpec
 
+SHARED = Path(__file__).parents[2].parent / "shared"
 ROLL = math.radians(-3)
+ODD_RIGS = [  # degrees clockwise, percent larger, pixels lower
+    (0.3, 0.0, 0.0),
+    (-0.8, 0.0, 0.0),
+    (0.0, 0.4, 0.0),
+    (0.0, -0.8, 0.0),
+    (0.0, 0.0, -0.6),
+    (0.0, 0.0, 4.0),
+    (0.6, 0.8, -4.0),
+    (-0.8, -0.4, 2.0),
+]
 
 
 @pytest.fixture(scope="module", params=["open", "street"])
@@ -21,72 +36,175 @@ def frame(request):
     return render_frame(FrameSpec(scene=request.param, roll=ROLL, seed=31, colour=False))
 
 
-def lowered(view, offset):
-    """The view as a camera sees it that looks up by a few pixels; by another way than the program's."""
-    rows = np.arange(view.shape[0], dtype=np.float32)[:, None] - np.float32(offset)
-    columns = np.arange(view.shape[1], dtype=np.float32)[None, :]
-    maps = map(np.ascontiguousarray, np.broadcast_arrays(columns, rows))
-    return cv2.remap(view, *maps, cv2.INTER_LANCZOS4, borderMode=cv2.BORDER_REFLECT)
+def seen_by(view, *, clockwise_deg=0.0, larger_percent=0.0, lower=0.0):
+    """The view as an odd camera sees it; OpenCV's own matrix, not the program's formulas."""
+    height, width = view.shape[:2]
+    centre = (width - 1) / 2, (height - 1) / 2
+    matrix = cv2.getRotationMatrix2D(centre, -clockwise_deg, 1 + larger_percent / 100)
+    matrix[1, 2] += lower
+    return cv2.warpAffine(
+        view, matrix, (width, height), flags=cv2.INTER_LANCZOS4, borderMode=cv2.BORDER_REFLECT
+    )
 
 
-@pytest.mark.parametrize("offset", [-1.2, -0.6, 0.3, 0.6, 1.2])
-def test_an_offset_is_found_and_taken_away(frame, offset):
-    level = match_pair(frame.left, frame.right, StereoOptions())
-    match = match_pair(frame.left, lowered(frame.right, offset), StereoOptions())
-
-    # it ends when less than 0.15 px shows, and a map hides up to a quarter
-    assert match.vertical_offset == pytest.approx(offset, abs=0.2)
-    both = (match.disparity > 0) & (level.disparity > 0)
-    assert both.mean() > 0.95 * (level.disparity > 0).mean()
-    assert np.median(np.abs(match.disparity - level.disparity)[both]) < 0.1
+def roll_deg(left, right, **options):
+    return math.degrees(estimate_roll(match_pair(left, right, StereoOptions(**options)).disparity).theta)
 
 
-def test_a_level_pair_is_left_as_it_is(frame):
-    match = match_pair(frame.left, frame.right, StereoOptions())
+@pytest.mark.parametrize(("clockwise_deg", "larger_percent", "lower"), ODD_RIGS)
+def test_what_a_camera_was_moved_by_is_found_and_taken_away(frame, clockwise_deg, larger_percent, lower):
+    odd = {"clockwise_deg": clockwise_deg, "larger_percent": larger_percent, "lower": lower}
 
-    assert match.vertical_offset == 0
-    given = match_pair(frame.left, frame.right, StereoOptions(vertical_offset=0.0))
-    np.testing.assert_array_equal(match.disparity, given.disparity)
+    match = match_pair(frame.left, seen_by(frame.right, **odd), StereoOptions())
+
+    assert match.doubt == ""
+    assert match.corrected.rotation_deg == pytest.approx(clockwise_deg, abs=0.03)
+    assert 100 * match.corrected.scale == pytest.approx(larger_percent, abs=0.05)
+    assert match.corrected.offset == pytest.approx(lower, abs=0.15)
+    found = math.degrees(estimate_roll(match.disparity).theta)
+    assert found == pytest.approx(roll_deg(frame.left, frame.right), abs=0.1)
 
 
-def test_the_roll_no_longer_depends_on_the_offset(frame):
-    def roll_deg(offset, **options):
-        match = match_pair(frame.left, lowered(frame.right, offset), StereoOptions(**options))
-        return math.degrees(estimate_roll(match.disparity).theta)
+def test_uncorrected_they_would_turn_the_road(frame):
+    right = seen_by(frame.right, clockwise_deg=0.3)
 
-    turned = abs(roll_deg(0.8, vertical_offset=0.0) - roll_deg(-0.8, vertical_offset=0.0))
-    assert abs(roll_deg(0.8) - roll_deg(-0.8)) < turned / 4
-    assert abs(roll_deg(0.8) - math.degrees(ROLL)) < 0.1
+    assert abs(roll_deg(frame.left, right, align="off") - roll_deg(frame.left, right)) > 0.2
+
+
+def test_rows_that_a_lens_has_skewed_are_straightened(frame):
+    height, width = frame.right.shape
+    columns, rows = np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32))
+    x, y = columns - (width - 1) / 2, rows - (height - 1) / 2
+    skew = 1.4 / (width * height / 4)  # 1.4 px in the corners, as on KITTI
+    right = cv2.remap(frame.right, columns, rows - np.float32(skew) * x * y, cv2.INTER_LANCZOS4)
+
+    match = match_pair(frame.left, right, StereoOptions())
+
+    assert match.corrected.shifts(height, width)[3] == pytest.approx(1.4, abs=0.2)
+    found = math.degrees(estimate_roll(match.disparity).theta)
+    assert found == pytest.approx(roll_deg(frame.left, frame.right), abs=0.05)
+
+
+@pytest.mark.parametrize("downscale", [1.0, 2.0])
+def test_a_level_pair_is_left_as_it_is(frame, downscale):
+    match = match_pair(frame.left, frame.right, StereoOptions(downscale=downscale))
+
+    assert match.corrected == LEVEL
+    assert match.doubt == ""
+    count = match.num_disparities
+    off = match_pair(
+        frame.left, frame.right, StereoOptions(align="off", num_disparities=count, downscale=downscale)
+    )
+    np.testing.assert_array_equal(match.disparity, off.disparity)
+
+
+def test_brightness_is_no_misalignment(frame):
+    brighter = np.clip(frame.right.astype(np.float32) * 1.1 + 12, 0, 255).astype(np.uint8)
+
+    assert match_pair(frame.left, brighter, StereoOptions()).corrected == LEVEL
+
+
+def test_what_is_measured_at_half_size_is_in_pixels_of_that(frame):
+    match = match_pair(frame.left, seen_by(frame.right, lower=3), StereoOptions(downscale=2))
+
+    assert match.corrected.offset == pytest.approx(1.5, abs=0.1)
 
 
 def test_an_offset_that_is_given_is_not_measured(frame):
-    match = match_pair(frame.left, lowered(frame.right, 0.6), StereoOptions(vertical_offset=0.5))
+    match = match_pair(frame.left, seen_by(frame.right, lower=0.6), StereoOptions(vertical_offset=0.5))
 
-    assert match.vertical_offset == 0.5
-
-
-def test_brightness_is_no_offset(frame):
-    level = match_pair(frame.left, frame.right, StereoOptions()).disparity
-    brighter = np.clip(frame.right.astype(np.float32) * 1.1 + 12, 0, 255).astype(np.uint8)
-
-    assert abs(vertical_offset(frame.left, brighter, level)) < 0.1
+    assert match.corrected == Misalignment(offset=0.5)
 
 
-def test_views_without_edges_tell_nothing():
-    plain = np.full((80, 200), 90, np.uint8)
+def test_align_off_measures_nothing(frame):
+    match = match_pair(frame.left, seen_by(frame.right, lower=3), StereoOptions(align="off"))
 
-    assert vertical_offset(plain, plain, np.full((80, 200), 5, np.float32)) == 0
-    assert vertical_offset(plain, plain, np.zeros((80, 200), np.float32)) == 0
+    assert match.corrected == LEVEL
+    assert match.doubt == ""
 
 
-def test_moving_by_whole_pixels_moves_rows():
+def test_where_nothing_tells_whether_the_views_are_level_that_is_said():
+    plain = np.full((120, 400), 90, np.uint8)
+
+    assert "to tell whether the views are level" in match_pair(plain, plain, StereoOptions()).doubt
+
+
+def test_a_camera_that_is_too_far_off_is_never_corrected_without_a_word(frame):
+    right = seen_by(frame.right, clockwise_deg=3)
+
+    assert match_pair(frame.left, right, StereoOptions()).doubt
+
+
+def test_swapped_views_are_told(frame):
+    with pytest.raises(InputError, match="the views seem swapped"):
+        match_pair(frame.right, frame.left, StereoOptions())
+
+
+def test_swapped_and_turned_views_are_told(frame):
+    with pytest.raises(InputError, match="the views seem swapped"):
+        match_pair(seen_by(frame.right, clockwise_deg=0.4, lower=1), frame.left, StereoOptions())
+
+
+def test_images_of_two_places_are_told(frame):
+    elsewhere = render_frame(FrameSpec(scene="street", roll=0.05, seed=77, colour=False))
+
+    with pytest.raises(InputError, match="do not show the same scene"):
+        match_pair(frame.left, elsewhere.right, StereoOptions())
+
+
+def test_who_searches_below_zero_may_swap_the_views(frame):
+    match = match_pair(frame.right, frame.left, StereoOptions(min_disparity=-96, num_disparities=96))
+
+    assert not (match.disparity > 2).mean() > 0.1  # what is below 0 is no data
+
+
+def test_whole_pixels_move_rows():
     view = np.random.default_rng(0).integers(0, 256, (20, 30), dtype=np.uint8)
 
-    np.testing.assert_array_equal(moved_up(view, 2)[:-2], view[2:])
-    np.testing.assert_array_equal(moved_up(view, -1)[1:], view[:-1])
+    np.testing.assert_array_equal(level(view, Misalignment(offset=2))[:-2], view[2:])
+    np.testing.assert_array_equal(level(view, Misalignment(offset=-1))[1:], view[:-1])
+
+
+def test_levelling_is_the_inverse_of_what_the_camera_did():
+    rng = np.random.default_rng(1)
+    view = cv2.GaussianBlur(rng.integers(0, 256, (240, 320), dtype=np.uint8), (0, 0), 3)
+    odd = seen_by(view, clockwise_deg=0.8, larger_percent=0.8, lower=3)
+
+    again = level(odd, Misalignment(offset=3, rotation=math.radians(0.8), scale=0.008))
+
+    inside = np.s_[12:-12, 12:-12]
+    assert np.abs(again[inside].astype(int) - view[inside]).max() <= 2
+
+
+def test_what_a_map_hides_is_found_from_two_measurements():
+    """A rig 2 px low, of which each map hides two thirds."""
+    approach, at = Approach((200, 300)), LEVEL
+    for _ in range(3):
+        at = approach.next(at, at + (Misalignment(offset=2) - at).times(1 / 3))
+
+    assert at.offset == pytest.approx(2)
 
 
 @pytest.mark.parametrize("offset", [-101, 100.5, math.nan])
 def test_an_offset_that_cannot_be_is_refused(offset):
     with pytest.raises(UsageError, match="vertical-offset"):
         StereoOptions(vertical_offset=offset)
+
+
+def test_a_way_to_align_that_is_not_there_is_refused():
+    with pytest.raises(UsageError, match="align"):
+        StereoOptions(align="on")
+
+
+@pytest.mark.skipif(not (SHARED / "streets").is_dir(), reason="no real street pairs at ../shared/streets")
+@pytest.mark.parametrize(("clockwise_deg", "larger_percent", "lower"), [(0.5, 0.0, -2.0), (-0.8, 0.8, 4.0)])
+def test_real_street_pairs_are_levelled_by_what_was_added(clockwise_deg, larger_percent, lower):
+    odd = {"clockwise_deg": clockwise_deg, "larger_percent": larger_percent, "lower": lower}
+    for pair in pair_inputs(str(SHARED / "streets" / "left"), str(SHARED / "streets" / "right"))[::6]:
+        left, right = read_image(pair.left.path), read_image(pair.right.path)
+        as_it_is = match_pair(left, right, StereoOptions())
+        added = match_pair(left, seen_by(right, **odd), StereoOptions()).corrected - as_it_is.corrected
+
+        assert added.rotation_deg == pytest.approx(clockwise_deg, abs=0.03)
+        assert 100 * added.scale == pytest.approx(larger_percent, abs=0.05)
+        assert added.offset == pytest.approx(lower, abs=0.1)

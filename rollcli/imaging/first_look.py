@@ -1,0 +1,141 @@
+"""A first look at a pair, on small views: how far to search, and how the right view lies."""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollcli.imaging.alignment import Approach, level, measure_at_size, size_factor
+from rollcli.imaging.disparity_range import largest_disparity
+from rollcli.imaging.misalignment import LEVEL, Misalignment
+from rollcli.imaging.sgbm import NARROWEST, match_views, usable_range
+from rollcli.imaging.stereo_options import StereoOptions
+from rollcli.imaging.vertical_disparity import Measured, measure_misalignment
+from rollcli.imaging.views import Views, shrink_both
+
+_SMALLEST, _SMALL = 16_000, 40_000  # px of the views that are looked at, one after the other
+_OPTIONS = StereoOptions(mode="3way", speckle_size=50, speckle_range=1)
+_ROUNDS = 6
+_STEP = 0.1  # px of the small view, anywhere: the end
+_FAR = 0.5  # the same: what was matched so far off does not show the range
+_MARGIN = 1.1  # beyond the largest disparity seen, to search
+# From a start 3 px off, a view of little texture can end at an offset and a scale that deny each other. It is
+# told by what it leaves (wrong: 0.22 px and more, right: up to 0.22), or by a scale that no rig has
+_UNSURE_SPREAD = 0.2  # px of the smallest view
+_UNSURE_SCALE = 0.012
+_STARTS = (-4.0, 4.0)  # px of the whole view; offset of the further attempts
+
+
+@dataclass(frozen=True)
+class FirstLook:
+    """What small views say about a pair, in pixels of the whole ones.
+
+    Attributes
+    ----------
+    range : int or None
+        Disparities from 0 to this are worth a search; None where nothing was matched.
+    measured : Measured or None
+        How the right view lies; None where that cannot be told, or was not asked.
+    """
+
+    range: int | None
+    measured: Measured | None
+
+
+@dataclass(frozen=True)
+class _Small:
+    """A small match: largest disparity, map, and how the right view lies; pixels of the small views."""
+
+    top: float
+    disparity: NDArray[np.float32]
+    measured: Measured | None
+
+
+def find_range(views: Views) -> int | None:
+    """Disparities from 0 to this are worth a search, pixels; None where nothing can be matched."""
+    factor = size_factor(views[0].shape, _SMALLEST)
+    found = _match_small(shrink_both(views, factor), None)
+    return None if found is None else _with_margin(found, factor)
+
+
+def first_look(views: Views) -> FirstLook:
+    """Find the range of a pair, and how its right view lies, coarse to fine.
+
+    Parameters
+    ----------
+    views : pair of ndarray of uint8, shape (H, W)
+    """
+    shape = views[0].shape
+    factor = size_factor(shape, _SMALLEST)
+    found = _coarsest(shrink_both(views, factor), factor)
+    if found is None:
+        return FirstLook(None, None)
+    before, factor = factor, size_factor(shape, _SMALL)
+    start = found.measured.misalignment.resized(before / factor) if found.measured else LEVEL
+    found = _climb(shrink_both(views, factor), start, top=found.top * before / factor) or found
+    measured = None
+    if found.measured is not None:
+        start = found.measured.misalignment.resized(factor)
+        measured = measure_at_size(views, found.disparity, start)
+    return FirstLook(_with_margin(found, factor), measured)
+
+
+def _coarsest(small: Views, factor: float) -> _Small | None:
+    """The best of several attempts, where the first is not plainly right."""
+    found = _climb(small, LEVEL)
+    if found is not None and found.measured is not None and not _unsure(found.measured):
+        return found
+    starts = (Misalignment(offset / factor) for offset in _STARTS)
+    return _clearest([found, *(_climb(small, start) for start in starts)])
+
+
+def _unsure(measured: Measured) -> bool:
+    return measured.spread > _UNSURE_SPREAD or abs(measured.misalignment.scale) > _UNSURE_SCALE
+
+
+def _clearest(attempts: Iterable[_Small | None]) -> _Small | None:
+    """The attempt that leaves the least unexplained, of those that tell anything."""
+    some = [each for each in attempts if each is not None]
+    return min(some, key=lambda each: each.measured.spread if each.measured else math.inf, default=None)
+
+
+def _climb(small: Views, start: Misalignment, top: float | None = None) -> _Small | None:
+    """Level, match and measure in turn, until the right view lies still."""
+    shape = small[0].shape
+    found, at, approach = None, start, Approach(shape)
+    for _ in range(_ROUNDS):
+        matched = _match_small((small[0], level(small[1], at)), top)
+        if matched is None:
+            return found
+        measured = measure_misalignment(small, matched.disparity, at)
+        found = _Small(matched.top, matched.disparity, measured)
+        if measured is None:
+            return found
+        step = (measured.misalignment - at).reach(*shape)
+        if step < _STEP:
+            return found
+        at = approach.next(at, measured.misalignment)
+        top = matched.top if step < _FAR else top
+    return found
+
+
+def _match_small(pair: Views, top: float | None) -> _Small | None:
+    """Match over the range that is known, or find it."""
+    if top is None:
+        top = largest_disparity(lambda count: _match(pair, count), pair[0].shape[1])
+    if top is None:
+        return None
+    return _Small(top, _match(pair, _MARGIN * top + 2), None)
+
+
+def _with_margin(found: _Small, factor: float) -> int:
+    return math.ceil(_MARGIN * found.top * factor) + 8
+
+
+def _match(pair: Views, count: float) -> NDArray[np.float32]:
+    usable = usable_range(math.ceil(count), 0, pair[0].shape[1], _OPTIONS.block_size)
+    if usable < NARROWEST:
+        return np.zeros(pair[0].shape, np.float32)
+    return match_views(pair, 0, usable, _OPTIONS)

@@ -1,0 +1,51 @@
+"""Do the two images of a pair show the same scene, and is the left one left?
+
+What has texture and is seen by both cameras finds its match. In level pairs, and in pairs 0.8 degrees,
+0.8 % and 4 px off, 46 to 84 % of the textured blocks tell how the right view lies; in swapped and unrelated
+images 0 to 22 % do (26 rendered, 24 real pairs).
+"""
+
+from rollcli.errors import InputError
+from rollcli.imaging.alignment import at_measuring_size
+from rollcli.imaging.first_look import FirstLook, first_look
+from rollcli.imaging.vertical_disparity import textured_blocks
+from rollcli.imaging.views import Views
+
+# Shares of the textured blocks that tell
+_SURE = 0.3  # from here on the images are what they should be
+_FEW = 0.2  # below it, they show two scenes
+_PLAIN = 0.4  # from here on swapped images are swapped
+_FEWEST = 100  # textured blocks; images with fewer may show the same scene
+
+
+def check_same_scene(views: Views, look: FirstLook) -> None:
+    """See that the images show one scene from the left and from the right.
+
+    Parameters
+    ----------
+    views : pair of ndarray of uint8, shape (H, W)
+    look : FirstLook
+        What the first look at them has found.
+
+    Raises
+    ------
+    InputError
+        They are swapped, or show two scenes.
+    """
+    left, right = at_measuring_size(views)
+    textured = min(textured_blocks(left), textured_blocks(right))
+    matched = _matched(look)
+    if textured < _FEWEST or matched >= _SURE * textured:
+        return
+    if _matched(first_look((views[1], views[0]))) >= _PLAIN * textured:
+        raise InputError(
+            "the views seem swapped: the scene is matched when the right image is taken for the left one"
+        )
+    if matched < _FEW * textured:
+        raise InputError(
+            "the two images do not show the same scene: hardly anything in one is found in the other"
+        )
+
+
+def _matched(look: FirstLook) -> int:
+    return look.measured.blocks if look.measured is not None else 0

@@ -1,0 +1,211 @@
+"""Vertical disparities of a pair, and the misalignment of the views that explains them.
+
+Matching looks for a pixel in the same row. Where the right view lies lower, is rotated or is larger, slanted
+edges find their match at a wrong disparity: on a road, whose edges converge, that turns the disparities as a
+roll does, by half a degree a pixel or so, and nothing in the map tells.
+"""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from rollcli.imaging.misalignment import LEVEL, Misalignment
+from rollcli.imaging.views import View, Views
+
+Floats = NDArray[np.float32]
+_SMOOTHING = 0.7  # px: more takes away the grain that tells on an empty road, less leaves the noise
+_BLOCK = 8  # px: the side of what gets one vertical disparity
+_KNOWN = 0.7  # share of a block that has to have a disparity
+_RIDGE = 0.2  # squared grey levels per pixel: gradients along the rows below this are noise
+_LEAST = 2.0  # the same, across the rows: a block with less says nothing
+_MOST = 50.0  # and one with more counts no more than with this
+_FEWEST = 40  # blocks
+_FIT_ROUNDS = 10
+_TUNING = 1.5  # standard deviations at which a block counts a quarter
+_LONGEST_STEP = 1.5  # px, anywhere
+_SMALL_STEP = 0.02  # px: the end
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What the vertical disparities of a pair say.
+
+    Attributes
+    ----------
+    misalignment : Misalignment
+        Of the right view, pixels of the size measured at.
+    blocks : int
+        How many small blocks of the image told.
+    errors : Misalignment
+        Standard error of each part.
+    spread : float
+        Standard deviation of their vertical disparities from what is explained, outliers aside, pixels.
+    """
+
+    misalignment: Misalignment
+    errors: Misalignment
+    blocks: int
+    spread: float
+
+    def resized(self, factor: float) -> "Measured":
+        """The same, of views `factor` times as large."""
+        there, errors = self.misalignment.resized(factor), self.errors.resized(factor)
+        return Measured(there, errors, self.blocks, factor * self.spread)
+
+
+def measure_misalignment(
+    views: Views, disparity: Floats, start: Misalignment = LEVEL, rounds: int = 3
+) -> Measured | None:
+    """Measure how the right view lies against the left one.
+
+    Least squares on the grey levels at matched pixels [Lucas and Kanade 1981], in small blocks: each gives a
+    horizontal shift, which takes up what is wrong in its disparity, and a vertical one. A robust fit of
+    offset, rotation, scale and twist to the vertical ones is the answer.
+
+    Parameters
+    ----------
+    views : pair of ndarray of uint8, shape (H, W)
+        Left and right, as they were given.
+    disparity : ndarray of float32, shape (H, W)
+        From the left view to the right one that is levelled by `start`, pixels; no data is 0.
+    start : Misalignment
+        Where to begin.
+    rounds : int
+        Steps at most.
+
+    Returns
+    -------
+    Measured or None
+        None where too few blocks tell.
+    """
+    blocks = _Blocks(views, disparity)
+    found, errors, spread, count = start, LEVEL, 0.0, 0
+    for _ in range(rounds):
+        seen = blocks.vertical(found)
+        count = len(seen.shift)
+        if count < _FEWEST:
+            return None
+        step, errors, spread = _fit(seen)
+        reach = step.reach(*disparity.shape)
+        found = found + step.times(_LONGEST_STEP / max(reach, _LONGEST_STEP))
+        if reach < _SMALL_STEP:
+            break
+    return Measured(found, errors, count, spread)
+
+
+def textured_blocks(view: View) -> int:
+    """How many blocks of a view could tell a vertical disparity, were they matched."""
+    across, down = _gradients(_smooth(view))
+    along = _block_means(across * across) + np.float32(_RIDGE)
+    weight = _block_means(down * down) - np.square(_block_means(across * down)) / along
+    return int(np.count_nonzero(weight > _LEAST))
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """Vertical disparities (px) of blocks at (x, y) from the centre of the right view, and their weights."""
+
+    x: Floats
+    y: Floats
+    shift: Floats
+    weight: Floats
+
+
+class _Blocks:
+    """The pair in blocks; what does not change from round to round is computed once."""
+
+    def __init__(self, views: Views, disparity: Floats) -> None:
+        height, width = (side // _BLOCK * _BLOCK for side in disparity.shape)
+        whole = np.s_[:height, :width]
+        left, self._right = (_smooth(view) for view in views)
+        self._left = left[whole]
+        self._across, self._down = (gradient[whole] for gradient in _gradients(left))
+        self._known = disparity[whole] > 0
+        centre_x, centre_y = ((side - 1) / 2 for side in reversed(disparity.shape))
+        self._u = np.arange(width, dtype=np.float32) - disparity[whole]
+        self._x = self._u - np.float32(centre_x)
+        self._v = np.arange(height, dtype=np.float32)[:, None]
+        self._y = self._v - np.float32(centre_y)
+
+    def vertical(self, at: Misalignment) -> _Seen:
+        """Return the vertical disparities that are left when the right view is levelled by `at`."""
+        x, y = self._x, self._y
+        u = self._u + np.float32(at.stretch) * x - np.float32(at.rotation) * y
+        v = (np.float32(at.rotation) + np.float32(at.twist) * y) * x
+        v += self._v + np.float32(at.offset) + np.float32(at.scale) * y
+        height, width = self._right.shape
+        inside = (self._known & (u > 1) & (u < width - 2) & (v > 1) & (v < height - 2)).astype(np.float32)
+        off = self._left - cv2.remap(self._right, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        off *= inside
+        across, down = self._across * inside, self._down * inside
+        part = _block_means(inside)
+        share = np.maximum(part, np.float32(1e-3))
+
+        def mean(pixels: Floats) -> Floats:
+            return (_block_means(pixels) / share).astype(np.float32, copy=False)
+
+        # covariances within a block: the views' brightness may differ from place to place
+        mean_off, mean_across, mean_down = mean(off), mean(across), mean(down)
+        along = mean(across * across) - np.square(mean_across) + np.float32(_RIDGE)
+        mixed = (mean(across * down) - mean_across * mean_down) / along
+        weight = mean(down * down) - np.square(mean_down) - np.square(mixed) * along
+        shift = (
+            mean(down * off) - mean_down * mean_off - mixed * (mean(across * off) - mean_across * mean_off)
+        )
+        telling = (part > _KNOWN) & (weight > _LEAST)
+        weight = weight[telling]
+        return _Seen(
+            mean(x * inside)[telling],
+            mean(y * inside)[telling],
+            shift[telling] / weight,
+            np.minimum(weight, np.float32(_MOST)),
+        )
+
+
+def _fit(seen: _Seen) -> tuple[Misalignment, Misalignment, float]:
+    """Return the misalignment that explains most blocks, its standard errors, and the spread of the rest."""
+    size = max(1.0, float(np.abs(seen.x).max()), float(np.abs(seen.y).max()))
+    x, y = seen.x.astype(np.float64) / size, seen.y.astype(np.float64) / size
+    columns = np.stack([np.ones_like(x), x, y, x * y], axis=1)
+    shift: NDArray[np.float64] = seen.shift.astype(np.float64)
+    fixed: NDArray[np.float64] = seen.weight.astype(np.float64)
+    used: NDArray[np.float64] = fixed
+    weight: NDArray[np.float64] = fixed
+    values, inverse, off, spread = np.zeros(4), np.eye(4), shift, 0.0
+    for _ in range(_FIT_ROUNDS):
+        weighted = columns * weight[:, None]
+        normal = weighted.T @ columns
+        normal += 1e-6 * np.trace(normal) * np.eye(4)
+        inverse = np.linalg.inv(normal)
+        values = inverse @ (weighted.T @ shift)
+        off = shift - columns @ values
+        spread = 1.4826 * float(np.median(np.abs(off))) + 1e-3
+        doubted: NDArray[np.float64] = 1 + np.square(off / (_TUNING * spread))
+        used, weight = weight, np.divide(fixed, np.square(doubted), dtype=np.float64)
+    scores = columns * (used * off)[:, None] @ inverse
+    errors = np.sqrt(np.square(scores).sum(axis=0))
+    units = np.array([1, size, size, size**2])
+    return Misalignment(*(values / units).tolist()), Misalignment(*(errors / units).tolist()), spread
+
+
+def _smooth(view: View) -> Floats:
+    smooth = cv2.GaussianBlur(view.astype(np.float32), (0, 0), _SMOOTHING)
+    return smooth.astype(np.float32, copy=False)
+
+
+def _gradients(view: Floats) -> tuple[Floats, Floats]:
+    """Grey levels per pixel along the rows and down the columns."""
+    across, down = (
+        cv2.Sobel(view, cv2.CV_32F, *order, ksize=3, scale=0.125).astype(np.float32, copy=False)
+        for order in ((1, 0), (0, 1))
+    )
+    return across, down
+
+
+def _block_means(pixels: Floats) -> Floats:
+    height, width = (side // _BLOCK for side in pixels.shape)
+    whole = pixels[: height * _BLOCK, : width * _BLOCK]
+    means = cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA)
+    return means.astype(np.float32, copy=False)

@@ -1,0 +1,56 @@
+"""The two views of a pair as they are matched: grey, 8 bits, at one size."""
+
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from rollcli.errors import InputError
+
+View = NDArray[np.uint8]
+"""Shape (H, W)."""
+
+Views = tuple[View, View]
+"""Left and right."""
+
+
+def prepare_views(left: NDArray[Any], right: NDArray[Any], downscale: float) -> Views:
+    """Make both views grey, 8 bits deep and `downscale` times smaller.
+
+    Raises
+    ------
+    InputError
+        The images differ in size, or are of a kind that cannot be matched.
+    """
+    if left.shape[:2] != right.shape[:2]:
+        sizes = " and ".join(f"{each.shape[1]}x{each.shape[0]}" for each in (left, right))
+        raise InputError(f"left and right image differ in size: {sizes}")
+    # cameras leave some of 16 bits unused: a fixed shift would make their images black
+    brightest = max(int(left.max(initial=1)), int(right.max(initial=1)))
+    return _plain(left, brightest, downscale), _plain(right, brightest, downscale)
+
+
+def shrink(view: NDArray[Any], factor: float) -> View:
+    """The view, `factor` times smaller; as it is for a factor of 1."""
+    if factor == 1:
+        return view
+    height, width = (max(1, round(side / factor)) for side in view.shape)
+    return cv2.resize(view, (width, height), interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
+
+
+def shrink_both(views: Views, factor: float) -> Views:
+    """Both views, `factor` times smaller."""
+    return shrink(views[0], factor), shrink(views[1], factor)
+
+
+def _plain(image: NDArray[Any], brightest: int, downscale: float) -> View:
+    if image.dtype not in (np.uint8, np.uint16) or not (image.ndim == 2 or image.shape[2:] == (3,)):
+        raise InputError(
+            f"an image of {image.dtype} and shape {image.shape} cannot be matched: "
+            "grey and BGR images of 8 and 16 bits can"
+        )
+    if image.dtype == np.uint16:
+        image = cv2.convertScaleAbs(image, alpha=255 / brightest)
+    grey = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) if image.ndim == 3 else image
+    return shrink(grey.astype(np.uint8, copy=False), downscale)
