@@ -38,7 +38,7 @@ class RigAlignment:
         return advice_of(self.median, *self._size)
 
     def summary(self) -> dict[str, float | int | str] | None:
-        """The entry of the run's record; None where no pair was corrected."""
+        """Return the entry of the run's record; None where no pair was corrected."""
         if not self._corrected:
             return None
         found = self.median

@@ -8,7 +8,7 @@ images 0 to 22 % do (26 rendered, 24 real pairs).
 from rollcli.errors import InputError
 from rollcli.imaging.alignment import at_measuring_size
 from rollcli.imaging.first_look import FirstLook, first_look
-from rollcli.imaging.vertical_disparity import textured_blocks
+from rollcli.imaging.vertical_disparity import Measured, textured_blocks
 from rollcli.imaging.views import Views
 
 # Shares of the textured blocks that tell
@@ -18,34 +18,44 @@ _PLAIN = 0.4  # from here on swapped images are swapped
 _FEWEST = 100  # textured blocks; images with fewer may show the same scene
 
 
-def check_same_scene(views: Views, look: FirstLook) -> None:
+def check_same_scene(views: Views, look: FirstLook, measured: Measured | None) -> None:
     """See that the images show one scene from the left and from the right.
 
     Parameters
     ----------
     views : pair of ndarray of uint8, shape (H, W)
     look : FirstLook
-        What the first look at them has found.
+        What was seen before the match.
+    measured : Measured or None
+        How the right view lies, as far as the match tells.
 
     Raises
     ------
     InputError
         They are swapped, or show two scenes.
     """
-    left, right = at_measuring_size(views)
-    textured = min(textured_blocks(left), textured_blocks(right))
-    matched = _matched(look)
+    left, right = views
+    textured = min(map(textured_blocks, at_measuring_size(views)))
+    matched = max(_blocks(look.measured), _blocks(measured))
     if textured < _FEWEST or matched >= _SURE * textured:
         return
-    if _matched(first_look((views[1], views[0]))) >= _PLAIN * textured:
+    if _blocks(first_look((right, left)).measured) >= _PLAIN * textured:
         raise InputError(
             "the views seem swapped: the scene is matched when the right image is taken for the left one"
         )
-    if matched < _FEW * textured:
+    if matched < _FEW * textured and not _is_near(look, left.shape[1]):
         raise InputError(
             "the two images do not show the same scene: hardly anything in one is found in the other"
         )
 
 
-def _matched(look: FirstLook) -> int:
-    return look.measured.blocks if look.measured is not None else 0
+def _is_near(look: FirstLook, width: int) -> bool:
+    """Whether the scene may be so near that each view hides a third of it from the other.
+
+    At half the width ends what is searched: there, the largest disparity means nothing.
+    """
+    return look.range is not None and width / 3 < look.range < width / 2
+
+
+def _blocks(measured: Measured | None) -> int:
+    return 0 if measured is None else measured.blocks

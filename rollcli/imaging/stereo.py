@@ -108,10 +108,7 @@ def match_pair(left: NDArray[Any], right: NDArray[Any], options: StereoOptions) 
 def _look(views: Views, options: StereoOptions) -> FirstLook:
     """What is to be known before the pair is matched."""
     if options.measures_alignment:
-        look = first_look(views)
-        if options.min_disparity >= 0:  # who searches below 0 knows what the views are
-            check_same_scene(views, look)
-        return look
+        return first_look(views)
     given = Misalignment(options.vertical_offset or 0.0)
     levelled = views[0], level(views[1], given)
     return FirstLook(find_range(levelled) if options.num_disparities is None else None, None)
@@ -134,6 +131,8 @@ def _levelled_match(
     for _ in range(_MATCHES):
         disparity = match(at)
         measured = measure_at_size(views, disparity, at, 2 if look.measured else _ROUNDS)
+        if options.min_disparity >= 0:  # who searches below 0 knows what the views are
+            check_same_scene(views, look, measured)
         if measured is None:
             return disparity, at, "too little can be compared to tell whether the views are level"
         wanted = _worth_correcting(measured, shape)

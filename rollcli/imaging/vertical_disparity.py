@@ -15,6 +15,7 @@ from rollcli.imaging.misalignment import LEVEL, Misalignment
 from rollcli.imaging.views import View, Views
 
 Floats = NDArray[np.float32]
+Doubles = NDArray[np.float64]
 _SMOOTHING = 0.7  # px: more takes away the grain that tells on an empty road, less leaves the noise
 _BLOCK = 8  # px: the side of what gets one vertical disparity
 _KNOWN = 0.7  # share of a block that has to have a disparity
@@ -23,7 +24,7 @@ _LEAST = 2.0  # the same, across the rows: a block with less says nothing
 _MOST = 50.0  # and one with more counts no more than with this
 _FEWEST = 40  # blocks
 _FIT_ROUNDS = 10
-_TUNING = 1.5  # standard deviations at which a block counts a quarter
+_TUNING = 1.5  # standard deviations off, a block counts a quarter
 _LONGEST_STEP = 1.5  # px, anywhere
 _SMALL_STEP = 0.02  # px: the end
 
@@ -169,25 +170,25 @@ def _fit(seen: _Seen) -> tuple[Misalignment, Misalignment, float]:
     size = max(1.0, float(np.abs(seen.x).max()), float(np.abs(seen.y).max()))
     x, y = seen.x.astype(np.float64) / size, seen.y.astype(np.float64) / size
     columns = np.stack([np.ones_like(x), x, y, x * y], axis=1)
-    shift: NDArray[np.float64] = seen.shift.astype(np.float64)
-    fixed: NDArray[np.float64] = seen.weight.astype(np.float64)
-    used: NDArray[np.float64] = fixed
-    weight: NDArray[np.float64] = fixed
-    values, inverse, off, spread = np.zeros(4), np.eye(4), shift, 0.0
+    shift, fixed = seen.shift.astype(np.float64), seen.weight.astype(np.float64)
+    weight, off, spread = fixed, np.zeros_like(fixed), 1.0
     for _ in range(_FIT_ROUNDS):
-        weighted = columns * weight[:, None]
-        normal = weighted.T @ columns
-        normal += 1e-6 * np.trace(normal) * np.eye(4)
-        inverse = np.linalg.inv(normal)
-        values = inverse @ (weighted.T @ shift)
+        weight = fixed * _believed(off, spread)
+        normal = columns.T @ (columns * weight[:, None])
+        inverse = np.linalg.inv(normal + 1e-6 * np.trace(normal) * np.eye(4))
+        values = inverse @ (columns.T @ (weight * shift))
         off = shift - columns @ values
         spread = 1.4826 * float(np.median(np.abs(off))) + 1e-3
-        doubted: NDArray[np.float64] = 1 + np.square(off / (_TUNING * spread))
-        used, weight = weight, np.divide(fixed, np.square(doubted), dtype=np.float64)
-    scores = columns * (used * off)[:, None] @ inverse
+    scores = columns * (weight * off)[:, None] @ inverse
     errors = np.sqrt(np.square(scores).sum(axis=0))
     units = np.array([1, size, size, size**2])
     return Misalignment(*(values / units).tolist()), Misalignment(*(errors / units).tolist()), spread
+
+
+def _believed(off: Doubles, spread: float) -> Doubles:
+    """How much blocks count that are so far off; none is thrown away, far ones hardly count."""
+    doubt: Doubles = 1 + np.square(off / (_TUNING * spread))
+    return 1 / np.square(doubt)
 
 
 def _smooth(view: View) -> Floats:
