@@ -43,18 +43,10 @@ def check_same_scene(views: Views, look: FirstLook, measured: Measured | None) -
         raise InputError(
             "the views seem swapped: the scene is matched when the right image is taken for the left one"
         )
-    if matched < _FEW * textured and not _is_near(look, left.shape[1]):
+    if matched < _FEW * textured:
         raise InputError(
             "the two images do not show the same scene: hardly anything in one is found in the other"
         )
-
-
-def _is_near(look: FirstLook, width: int) -> bool:
-    """Whether the scene may be so near that each view hides a third of it from the other.
-
-    At half the width ends what is searched: there, the largest disparity means nothing.
-    """
-    return look.range is not None and width / 3 < look.range < width / 2
 
 
 def _blocks(measured: Measured | None) -> int:
