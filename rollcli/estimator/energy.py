@@ -23,6 +23,7 @@ from rollcli.estimator.moments import Floats, Grid, Moments
 # x^i y^j of the rotated frame that the energy and its two derivatives need, as (i, j)
 _OF_WEIGHTS = ((2, 0), (1, 1), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3), (2, 2), (1, 3), (0, 4))
 _OF_RESIDUAL = ((2, 0), (1, 1), (0, 2))
+SAME_EVERYWHERE = "the disparity is the same everywhere: every roll angle fits it equally well"
 _SINGULAR = 1e-10  # a variance below this share of its square scale is rounding error
 
 
@@ -115,9 +116,7 @@ class Energy:
             n, peak, parabolic, centred, plane, rest, _rotations() @ np.array(sources + residual + higher)
         )
         if energy.slope_energy + abs(np.array(residual)).max() ** 2 / n <= 1e-18 * n * max(peak, 1e-300) ** 2:
-            raise EstimationError(
-                "the disparity is the same everywhere: every roll angle fits it equally well"
-            )
+            raise EstimationError(SAME_EVERYWHERE)
         return energy
 
     @property

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from rollcli.errors import EstimationError
 from rollcli.estimator.areas.plane import AreaPixels
 from rollcli.estimator.areas.tiles import tile_sums
+from rollcli.estimator.energy import SAME_EVERYWHERE
 from rollcli.estimator.methods import DEFAULT_AREA, AreaSettings
 from rollcli.estimator.moments import Floats
 from rollcli.estimator.solvers.solution import SolverStatus
@@ -33,7 +34,7 @@ _TOLERANCE = 0.01  # of the mean disparity
 _NOISE, _SMOOTH = 1.5, 0.1  # or 1.5 times the residual of the smoothest tenth: noise, whole pixels
 _TRIED = 200  # about as many planes compete to be the best
 _ROUNDS = 20
-_SINGULAR = 1e-10
+_ROUNDING = 1e-10
 
 
 def iterative(
@@ -69,36 +70,30 @@ def iterative(
     if len(filled) == 0:
         raise EstimationError(f"no area of {extent}x{extent} pixels is at least half valid")
     grams = grams[filled]
-    agreeing, rounds, status = _road_areas(grams, settings.max_roll)
+    planes = _fitted(grams)
+    roads = _look_like_road(planes, settings.max_roll)
+    if not roads.any():
+        if np.ptp(disparity[usable]) == 0:
+            raise EstimationError(SAME_EVERYWHERE)
+        raise EstimationError("no area looks like a road: disparity grows downward in none")
+    agreeing, rounds, status = _agreeing(grams, planes, roads, settings.max_roll)
     covered = _covered(filled[agreeing], across, _STEP * side, extent, disparity.shape)
     return AreaPixels(usable & covered, rounds, status)
 
 
-def _road_areas(grams: Floats, max_roll: float) -> tuple[NDArray[np.bool_], int, SolverStatus]:
-    """Return which areas (A,), given by their sums (A, 4, 4), agree on a road; see `_agreeing`."""
-    planes = _fitted(grams)
-    roads = _look_like_road(planes, max_roll)
-    if not roads.any():
-        raise EstimationError("no area looks like a road: disparity grows downward in none")
-    tried = np.flatnonzero(roads)[:: max(1, np.count_nonzero(roads) // _TRIED)]
-    misfit = _misfit(grams, planes[tried])
-    own = misfit[tried, np.arange(len(tried))]
-    level = grams[roads, 0, 3].sum() / grams[roads, 0, 0].sum()
-    tolerance = max(_TOLERANCE * float(level), _NOISE * float(np.quantile(own, _SMOOTH)))
-    return _agreeing(grams, misfit <= tolerance, tolerance, max_roll)
-
-
 def _fitted(grams: Floats) -> Floats:
-    """Return the least-squares planes (c0, c1, c2) of areas (N, 4, 4), level where it is undetermined."""
+    """Return the least-squares planes (c0, c1, c2) of areas (N, 4, 4).
+
+    An area is at least half valid, so that its pixels do determine a plane.
+    """
     n = grams[:, 0, 0]
     p, q, d = (grams[:, 0, k] / n for k in (1, 2, 3))
     pp, qq = grams[:, 1, 1] - n * p * p, grams[:, 2, 2] - n * q * q
     pq = grams[:, 1, 2] - n * p * q
     pd, qd = grams[:, 1, 3] - n * p * d, grams[:, 2, 3] - n * q * d
     spread = pp * qq - pq * pq
-    rounding = _SINGULAR * d * np.sqrt(n * (pp + qq))  # a constant area must not rise by rounding alone
-    flat = (spread <= _SINGULAR * (pp + qq) ** 2) | (np.hypot(pd, qd) <= rounding)
-    spread = np.where(flat, np.inf, spread)
+    rounding = _ROUNDING * d * np.sqrt(n * (pp + qq))  # lest a constant area rise by rounding alone
+    spread = np.where(np.hypot(pd, qd) <= rounding, np.inf, spread)
     c1, c2 = (qq * pd - pq * qd) / spread, (pp * qd - pq * pd) / spread
     return np.stack([d - c1 * p - c2 * q, c1, c2], axis=-1)
 
@@ -120,12 +115,27 @@ def _look_like_road(planes: Floats, max_roll: float) -> NDArray[np.bool_]:
 
 
 def _agreeing(
-    grams: Floats, explained: NDArray[np.bool_], tolerance: float, max_roll: float
+    grams: Floats, planes: Floats, roads: NDArray[np.bool_], max_roll: float
 ) -> tuple[NDArray[np.bool_], int, SolverStatus]:
     """Return which areas (A,) share one plane, after how many rounds, and whether these settled.
 
-    `explained`, shape (A, P), says which areas each competing plane explains.
+    Parameters
+    ----------
+    grams : ndarray, shape (A, 4, 4)
+        Sums of the areas.
+    planes : ndarray, shape (A, 3)
+        Their own planes.
+    roads : ndarray of bool, shape (A,)
+        Which of these look like a road and compete to be the best.
+    max_roll : float
+        Radians.
     """
+    competing = np.flatnonzero(roads)[:: max(1, np.count_nonzero(roads) // _TRIED)]
+    misfit = _misfit(grams, planes[competing])
+    own = misfit[competing, np.arange(len(competing))]
+    mean = grams[roads, 0, 3].sum() / grams[roads, 0, 0].sum()
+    tolerance = max(_TOLERANCE * float(mean), _NOISE * float(np.quantile(own, _SMOOTH)))
+    explained = misfit <= tolerance
     chosen = explained[:, int(np.argmax(grams[:, 0, 0] @ explained))]
     for rounds in range(1, _ROUNDS + 1):
         plane = _fitted(grams[chosen].sum(axis=0, keepdims=True))

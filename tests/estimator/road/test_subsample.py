@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from rollcli.estimator.road.subsample import take_sample
+from rollcli.estimator.road.subsample import NO_SLOPE, rising, take_sample
 from rollcli.simulate.render import true_disparity
 from rollcli.simulate.spec import FrameSpec
 
@@ -48,3 +48,33 @@ def test_pixels_without_neighbours_are_a_sample_too(street):
 
     assert not sample.coherence.any()
     assert sample.typical == pytest.approx(take_sample(street).typical, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("up", "down", "grows"),
+    [
+        (2, 2, True),
+        (2, -2, True),
+        (-2, 2, True),
+        (-2, -2, False),
+        (0, 0, False),
+        (-2, NO_SLOPE, False),
+        (NO_SLOPE, -2, False),
+        (NO_SLOPE, 2, True),
+        (2, NO_SLOPE, True),
+        (NO_SLOPE, NO_SLOPE, False),
+    ],
+)
+def test_the_map_rises_where_a_known_slope_above_or_below_does(up, down, grows):
+    slopes = np.array([[-1], [1], [up], [down]], np.float32)
+
+    assert rising(slopes) == [grows]
+
+
+def test_slopes_are_those_of_the_map_per_unit_to_all_four_sides():
+    v, u = np.mgrid[:480, :640]
+    sample = take_sample((50 + 0.02 * u + 0.1 * v).astype(np.float32))
+    left, right, up, down = sample.slopes
+
+    for slope, expected in ((left, 0.02), (right, 0.02), (up, 0.1), (down, 0.1)):
+        np.testing.assert_allclose(slope, expected * sample.grid.scale, rtol=1e-3)

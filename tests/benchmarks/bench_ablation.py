@@ -1,0 +1,269 @@
+"""What each tuned number of the estimator does: change one at a time, and look at error and coverage.
+
+    python tests/benchmarks/bench_ablation.py [FRAMES] [--only NAME] [--markdown]
+
+Render FRAMES stereo pairs (40 by default), half with rolls within +-10 degrees, half within +-35, and match
+each once by SGBM. A second map of each is made worse: noise on 40 % of the pixels, whole pixels, an own
+bonnet, a truck ahead, or one pixel in 20 left. Where real maps with known rolls lie in ../shared/realmaps,
+estimate every second of them too. Then estimate all maps with each number of `Tuning` times 0.67, times 1.5,
+and switched off where that means something.
+
+Columns: 95 % and worst error of the rendered maps, degrees; gross errors (above 0.5 degrees) of the rendered,
+degraded and real maps, and how many of these are called ok; needless doubts, of the maps within 0.25 degrees;
+coverage of the 95 % interval, rendered and real, and its median half-width. A map without an angle counts as
+a gross error that is not called ok. Read differences of one or two as noise.
+"""
+
+import argparse
+import csv
+import math
+import os
+import pickle
+import tempfile
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import fields, is_dataclass, replace
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any, NamedTuple
+
+for threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ[threads] = "1"
+
+import numpy as np
+from matched import matched
+from numpy.typing import NDArray
+
+from rollcli.errors import EstimationError
+from rollcli.estimator.estimate import estimate_roll
+from rollcli.estimator.tuning import TUNING, Tuning
+from rollcli.files.encodings import read_disparity
+
+REAL = Path(__file__).parents[3] / "shared" / "realmaps"
+SEEDS = {81: 10, 82: 35}  # seed, and the largest roll, degrees
+OFF = {
+    "sample.uneven_share": 0.0,
+    "sample.quantum_share": 0.0,
+    "sample.coherent_from": 0.0,
+    "hypotheses.least_rise": 0.0,
+    "score.below_penalty": 0.0,
+    "score.off_slope_weight": 1.0,
+    "score.beside_weight": 1.0,
+    "score.nearness": 1e-6,
+    "score.horizon": 1e6,
+    "score.least_corridor": 0.0,
+    "score.least_core": 0.0,
+    "search.of_each_roll": 10**6,
+    "fit.image_edge": 1e6,
+    "fit.other_roll": -1e6,
+    "fit.large_roll": 1e6,
+    "edges.level": 1e6,
+    "edges.camber": 1e6,
+    "edges.kerb_height": 1e6,
+    "edges.gone": 1e6,
+    "edges.margin": 0.0,
+    "surface.steady": 1e6,
+    "interval.slant": 0.0,
+    "doubts.near_minimum": 0.0,
+    "doubts.least_score": 0.0,
+    "doubts.rival_share": 1e6,
+    "doubts.most_noise": 1.0,
+    "doubts.longest_move": 1e6,
+    "doubts.bound_share": 1e6,
+    "doubts.widest_interval": 1e6,
+}
+_maps: "list[Case]" = []
+
+
+class Case(NamedTuple):
+    """A map, the range of rolls that are right, degrees, and how it came about."""
+
+    disparity: NDArray[Any]
+    low_deg: float
+    high_deg: float
+    kind: str
+
+
+class Change(NamedTuple):
+    """A number of the tuning, by its path, and another value for it."""
+
+    name: str
+    how: str
+    value: float
+
+
+class Outcomes(NamedTuple):
+    """Error, half-width (degrees) and whether the angle is called ok, for each map."""
+
+    error: NDArray[np.float64]
+    half_width: NDArray[np.float64]
+    ok: NDArray[np.bool_]
+
+
+def numbers(record: Any, path: str = "") -> Iterator[tuple[str, float]]:
+    """Yield the path and the value of every number in a record of records."""
+    for field in fields(record):
+        value, name = getattr(record, field.name), f"{path}{field.name}"
+        if is_dataclass(value):
+            yield from numbers(value, "" if name == "road" else f"{name}.")
+        elif isinstance(value, int | float) and not isinstance(value, bool):
+            yield name, value
+
+
+def changed(tuning: Tuning, change: Change) -> Tuning:
+    """Return a tuning with one number changed."""
+    group, name = change.name.split(".")
+    if hasattr(tuning, group):
+        record = replace(getattr(tuning, group), **{name: change.value})
+        return replace(tuning, **{group: record})
+    record = replace(getattr(tuning.road, group), **{name: change.value})
+    return replace(tuning, road=replace(tuning.road, **{group: record}))
+
+
+def changes(only: str) -> list[Change]:
+    """Return every change to try."""
+    found = []
+    for name, value in numbers(TUNING):
+        if only not in name:
+            continue
+        for factor in (0.67, 1.5):
+            other = value * factor
+            if isinstance(value, int):
+                other = max(1, round(other))
+            if other != value:
+                found.append(Change(name, f"x {factor}", other))
+        if name in OFF:
+            found.append(Change(name, "off", OFF[name]))
+    return found
+
+
+def degraded(disparity: NDArray[np.float32], kind: str, rng: np.random.Generator) -> NDArray[np.float32]:
+    """Return the map made worse in one of five ways."""
+    height, width = disparity.shape
+    rows, columns = np.mgrid[:height, :width]
+    if kind == "noise":
+        noise = rng.uniform(0, disparity.max(), disparity.shape).astype(np.float32)
+        return np.where(rng.random(disparity.shape) < 0.4, noise, disparity)
+    if kind == "whole pixels":
+        return np.rint(disparity)
+    if kind == "sparse":
+        return np.where(rng.random(disparity.shape) < 0.05, disparity, 0)
+    if kind == "bonnet":
+        hidden = rows > height * (0.85 + 0.5 * (columns / width - 0.5) ** 2)
+        return np.where(hidden, 1.2 * disparity.max() + 0.02 * (rows - height), disparity).astype(np.float32)
+    box = (slice(height // 6, int(0.8 * height)), slice(int(0.37 * width), int(0.65 * width)))
+    foot = disparity[int(0.8 * height), box[1]]
+    truck = disparity.copy()
+    truck[box] = np.median(foot[foot > 0]) if (foot > 0).any() else 0
+    return truck
+
+
+def cases(frames: int) -> list[Case]:
+    """Return rendered, degraded and, where they are, real maps."""
+    found, rng = [], np.random.default_rng(9)
+    kinds = ("noise", "whole pixels", "sparse", "bonnet", "truck")
+    for seed, span in SEEDS.items():
+        for index, frame in enumerate(matched(frames // 2, seed, span)):
+            roll = frame.roll_deg
+            found.append(Case(frame.disparity, roll, roll, "rendered"))
+            worse = degraded(frame.disparity, kinds[index % len(kinds)], rng)
+            found.append(Case(worse, roll, roll, "degraded"))
+    if REAL.is_dir():
+        with (REAL / "reference.csv").open() as file:
+            rows = [row for row in csv.DictReader(file) if row["lo_deg"] and "sequence" not in row["file"]]
+        found += [
+            Case(read_disparity(REAL / row["file"]), float(row["lo_deg"]), float(row["hi_deg"]), "real")
+            for row in rows[::2]
+        ]
+    return found
+
+
+def load(path: str) -> None:
+    """Load the maps into a worker."""
+    _maps[:] = pickle.loads(Path(path).read_bytes())  # noqa: S301 written by this program
+
+
+def estimate_all(tuning: Tuning) -> Outcomes:
+    """Estimate every map."""
+    rows = [estimate_one(case, tuning) for case in _maps]
+    error, half_width, ok = zip(*rows, strict=True)
+    return Outcomes(np.array(error), np.array(half_width), np.array(ok))
+
+
+def estimate_one(case: Case, tuning: Tuning) -> tuple[float, float, bool]:
+    """Return error and half-width, degrees, and whether the angle is called ok."""
+    try:
+        with np.errstate(all="ignore"):
+            found = estimate_roll(case.disparity, tuning=tuning)
+    except (EstimationError, np.linalg.LinAlgError, ValueError, IndexError):
+        return 90.0, 0.0, False  # a number may be changed beyond what the code can bear
+    middle, half = (case.low_deg + case.high_deg) / 2, (case.high_deg - case.low_deg) / 2
+    off = abs(math.remainder(math.degrees(found.theta) - middle, 180))
+    return max(0.0, off - half), math.degrees(found.ci95 or 0.0), found.status == "ok"
+
+
+HEADINGS = ("95 %", "worst", "gross", "gross, ok", "needless", "coverage", "half-width")
+
+
+def figures(outcomes: Outcomes, kinds: NDArray[np.str_]) -> tuple[str, ...]:
+    """Return one cell for each of `HEADINGS`."""
+    present = [kind for kind in ("rendered", "degraded", "real") if (kinds == kind).any()]
+    rendered = kinds == "rendered"
+    gross, good = outcomes.error > 0.5, outcomes.error <= 0.25
+    held = outcomes.error <= outcomes.half_width
+
+    def counts(what: NDArray[np.bool_]) -> str:
+        return " + ".join(str(np.count_nonzero(what & (kinds == kind))) for kind in present)
+
+    covered = [f"{held[kinds == kind].mean():.2f}" for kind in present if kind != "degraded"]
+    return (
+        f"{np.percentile(outcomes.error[rendered], 95):.3f}",
+        f"{outcomes.error[rendered].max():.2f}",
+        counts(gross),
+        counts(gross & outcomes.ok),
+        counts(good & ~outcomes.ok),
+        " / ".join(covered),
+        f"{np.median(outcomes.half_width[rendered]):.3f}",
+    )
+
+
+def table(rows: list[tuple[str, ...]], markdown: bool) -> Iterator[str]:
+    """Yield the lines of a table."""
+    if markdown:
+        yield "| " + " | ".join(rows[0]) + " |"
+        yield "|" + "---|" * len(rows[0])
+        yield from ("| " + " | ".join(row) + " |" for row in rows[1:])
+        return
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        yield "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+
+
+def main() -> None:
+    """Print one row for each change."""
+    parser = argparse.ArgumentParser(description="Change one tuned number of the estimator at a time.")
+    parser.add_argument("frames", nargs="?", type=int, default=40)
+    parser.add_argument("--only", default="", help="numbers whose path contains this")
+    parser.add_argument("--markdown", action="store_true")
+    arguments = parser.parse_args()
+    found = cases(arguments.frames)
+    kinds = np.array([case.kind for case in found])
+    tried = changes(arguments.only)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "maps")
+        path.write_bytes(pickle.dumps(found))
+        tunings = [TUNING, *(changed(TUNING, change) for change in tried)]
+        context = get_context("spawn")
+        with ProcessPoolExecutor(os.cpu_count(), context, load, (str(path),)) as pool:
+            outcomes = list(pool.map(estimate_all, tunings))
+    print(", ".join(f"{np.count_nonzero(kinds == kind)} {kind}" for kind in dict.fromkeys(kinds.tolist())))
+    values = dict(numbers(TUNING))
+    rows = [("number", "value", "changed", *HEADINGS), ("as it is", "", "", *figures(outcomes[0], kinds))]
+    for change, outcome in zip(tried, outcomes[1:], strict=True):
+        rows.append((change.name, f"{values[change.name]:.4g}", change.how, *figures(outcome, kinds)))
+    for line in table(rows, arguments.markdown):
+        print(line)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,79 @@
+"""Each reason to doubt an angle, on a map that gives it; a map that gives none."""
+
+import math
+
+import numpy as np
+import pytest
+
+from rollcli.estimator.doubts import REASONS
+from rollcli.estimator.estimate import estimate_roll
+from tests.estimator.synthetic_maps import bent_road, flat_road
+
+V, U = np.mgrid[:480, :640].astype(float)
+
+
+def road(roll_deg):
+    """A flat road that fills the map below its horizon, 480 x 640, px."""
+    return flat_road(roll_deg, width=640, height=480, focal=560.0)
+
+
+def with_noise(disparity, sigma=0.15):
+    """The map with white noise on its valid pixels."""
+    noise = np.random.default_rng(0).normal(0, sigma, disparity.shape)
+    return np.where(disparity > 0, np.maximum(disparity + noise, 0.01), 0)
+
+
+def twisted_road():
+    """A road whose roll changes from near to far."""
+    y = (V - 300) * math.cos(0.05) - (U - 320) * math.sin(0.05)
+    return with_noise(np.where(y > -150, 40 + 0.25 * y + 0.001 * (U - 320) * y, 0))
+
+
+def noise_alone():
+    return np.random.default_rng(0).uniform(1, 9, (40, 60))
+
+
+def saddle():
+    """A surface that every second angle explains as well as its mirror image."""
+    v, u = np.mgrid[:60, :100] - np.array([29.5, 49.5])[:, None, None]
+    return 100 + 0.02 * u * v
+
+
+def half_noise():
+    rng = np.random.default_rng(1)
+    return np.where(rng.random(V.shape) < 0.5, rng.uniform(0, 60, V.shape), with_noise(road(4)))
+
+
+MAPS = {
+    "no convergence within the iterations allowed": (noise_alone, {"road": "all", "tolerance": 1e-300}),
+    "a lower minimum of the energy lies at 90.0000 degrees": (lambda: bent_road(90), {"road": "all"}),
+    "the energy is nearly as low at -30.96 degrees": (saddle, {"road": "all", "method": "exact"}),
+    "the disparity grows upward": (lambda: road(4)[::-1], {"road": "all"}),
+    "little of what lies ahead looks like a road": (lambda: np.minimum(road(-10), road(10)), {}),
+    "another plane, with another roll": (lambda: np.maximum(road(-10), road(10)), {}),
+    "noise fills": (half_noise, {}),
+    "the road's pixels moved the roll": (twisted_road, {}),
+    "the roll is at its bound": (lambda: road(20.2), {"max_roll": math.radians(20.25)}),
+    "the interval is wide": (lambda: with_noise(np.where(np.abs(U - 320) < 40, road(4), 0), 0.8), {}),
+}
+
+
+@pytest.mark.parametrize("reason", MAPS)
+def test_a_map_made_for_a_reason_is_suspect_and_says_so(reason):
+    make, options = MAPS[reason]
+
+    estimate = estimate_roll(make(), **options)
+
+    assert estimate.status == "suspect"
+    assert reason in estimate.message
+
+
+def test_there_is_a_map_for_every_reason():
+    assert len(MAPS) == len(REASONS)
+
+
+@pytest.mark.parametrize("roll_deg", [-15, 0, 4])
+def test_a_road_that_fills_the_map_is_beyond_doubt(roll_deg):
+    estimate = estimate_roll(with_noise(road(roll_deg)))
+
+    assert (estimate.status, estimate.message) == ("ok", "")

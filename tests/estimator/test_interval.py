@@ -1,0 +1,80 @@
+"""The interval holds the truth as often as it says, and the jackknife is that of refitting."""
+
+import math
+
+import numpy as np
+import pytest
+
+from rollcli.estimator.energy import Energy
+from rollcli.estimator.estimate import estimate_roll
+from rollcli.estimator.interval import jackknife
+from rollcli.estimator.methods import DEFAULT_SOLVER
+from rollcli.estimator.moments import point_moments
+from rollcli.estimator.request import Request
+from rollcli.estimator.selection import select_pixels
+from rollcli.estimator.solvers.exact import exact
+from rollcli.estimator.tuning import TUNING
+from rollcli.estimator.validity import CheckedMap
+from tests.estimator.synthetic_maps import flat_road
+
+SIZE = {"width": 320, "height": 240, "focal": 280.0}
+MAPS = 100
+
+
+def smooth_noise(rng, shape, cell):
+    """Noise of deviation 1 at nodes `cell` pixels apart, interpolated between them."""
+    v, u = (np.arange(n) / cell for n in shape)
+    rows, columns = v.astype(int), u.astype(int)
+    nodes = rng.normal(0, 1, (rows[-1] + 2, columns[-1] + 2))
+    down, right = (v - rows)[:, None], u - columns
+    upper, lower = (
+        (1 - right) * nodes[np.ix_(at, columns)] + right * nodes[np.ix_(at, columns + 1)]
+        for at in (rows, rows + 1)
+    )
+    return (1 - down) * upper + down * lower
+
+
+def noisy_road(rng, roll_deg):
+    """A flat road with noise like a matcher's, that neighbouring pixels share."""
+    road = flat_road(roll_deg, **SIZE)
+    noise = rng.normal(0, 0.1, road.shape) + 0.3 * smooth_noise(rng, road.shape, 7)
+    return np.where(road > 0, np.maximum(road + noise, 0.01), 0)
+
+
+def test_95_percent_of_the_intervals_hold_the_true_roll():
+    rng = np.random.default_rng(2)
+    rolls = rng.uniform(-60, 60, MAPS)
+    found = [estimate_roll(noisy_road(rng, roll), max_roll=math.radians(70)) for roll in rolls]
+    error = np.abs(np.degrees([each.theta for each in found]) - rolls)
+    half_width = np.degrees([each.ci95 for each in found])
+
+    # three standard deviations of a binomial of 100 draws at 0.95
+    assert np.mean(error <= half_width) >= 0.95 - 3 * math.sqrt(0.95 * 0.05 / MAPS)
+    assert np.median(half_width) < 6 * np.median(error)
+
+
+@pytest.mark.parametrize("roll_deg", [-50, 0, 30])
+def test_the_jackknife_is_what_refitting_without_each_band_gives(roll_deg):
+    request = Request("exact", "parabola", "all", DEFAULT_SOLVER, math.radians(70), 0, TUNING)
+    disparity = noisy_road(np.random.default_rng(3), roll_deg)
+    pixels = select_pixels(CheckedMap.of(disparity, None), request)
+    surface, theta = pixels.surface, exact(pixels.energy).theta
+
+    def refitted(kept):
+        x, y, d, weights = (each[kept] for each in (surface.x, surface.y, surface.d, surface.weights))
+        moments = point_moments(x, y, d, weights, surface.grid, (0.0, 0.0, 0.0))
+        return exact(Energy.of(moments, float(d.max()))).theta
+
+    along = surface.y * math.cos(theta) - surface.x * math.sin(theta)
+    bands = np.array_split(np.argsort(along), TUNING.interval.groups)
+    everything = np.ones(len(along), bool)
+    whole = refitted(everything)
+    changes = []
+    for band in bands:
+        kept = everything.copy()
+        kept[band] = False
+        changes.append(refitted(kept) - whole)
+
+    found = -jackknife(surface, theta, TUNING.interval).bands[:, 3]
+
+    np.testing.assert_allclose(found, changes, rtol=0.1, atol=0.05 * np.abs(changes).max())
