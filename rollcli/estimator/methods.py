@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from rollcli.estimator.areas.plane import AreaMethod
     from rollcli.estimator.solvers.solution import Solver
 
-LAMBDA0 = 26.0  # [GD] section IV, the best of 1 to 100 on its maps
+LAMBDA0 = 26.0  # the fewest iterations in [GD] Fig. 3
 TOLERANCE_DEG = 1e-4  # the finest of the paper's four
 MAX_ROLL_DEG = 45.0
 MAX_ROLL_LIMIT_DEG = 89.0  # a plane of 90 degrees has no finite slope across

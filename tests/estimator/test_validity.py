@@ -18,6 +18,8 @@ DEGENERATE = {
     "one column": (U == 7, "120 rows and 1 columns"),
     "a diagonal": (U == V, "lie on one line"),
 }
+
+
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("kind", DEGENERATE)
 def test_degenerate_pixels_are_refused_with_the_reason_by_every_method(kind, method):
