@@ -3,15 +3,16 @@
     python tests/benchmarks/bench_ablation.py [FRAMES] [--only NAME] [--markdown]
 
 Render FRAMES stereo pairs (40 by default), half with rolls within +-10 degrees, half within +-35, and match
-each once by SGBM. A second map of each is made worse: noise on 40 % of the pixels, whole pixels, an own
-bonnet, a truck ahead, or one pixel in 20 left. Where real maps with known rolls lie in ../shared/realmaps,
-estimate every second of them too. Then estimate all maps with each number of `Tuning` times 0.67, times 1.5,
-and switched off where that means something.
+each once by SGBM. Make two worse maps of each: noise on two thirds of the pixels, disparities rounded to four
+pixels, one pixel in 50 left, an own bonnet, a truck ahead, or a wall over nearly half of the image; and one
+without a road: upside down, a depth map, a wall, or patches of sky. Where real maps with known rolls lie in
+../shared/realmaps, take every second of them too. Then estimate all maps with each number of `Tuning` times
+0.67, times 1.5, and switched off where that means something.
 
-Columns: 95 % and worst error of the rendered maps, degrees; gross errors (above 0.5 degrees) of the rendered,
-degraded and real maps, and how many of these are called ok; needless doubts, of the maps within 0.25 degrees;
-coverage of the 95 % interval, rendered and real, and its median half-width. A map without an angle counts as
-a gross error that is not called ok. Read differences of one or two as noise.
+Columns: 95 % and worst error of the rendered maps, degrees; gross errors (above 0.5 degrees, or no angle) of
+rendered + degraded + real maps; wrong angles that are called ok, of rendered + degraded + real + roadless;
+needless doubts, of rendered + degraded + real maps within 0.25 degrees; coverage of the 95 % interval,
+rendered and real, and its median half-width, rendered. Read differences of one or two as noise.
 """
 
 import argparse
@@ -72,11 +73,15 @@ OFF = {
     "doubts.bound_share": 1e6,
     "doubts.widest_interval": 1e6,
 }
+WORSE = ("noise", "rounded", "sparse", "bonnet", "truck", "wall")
+ROADLESS = ("upside down", "depth", "wall", "sky")
+NAN = math.nan
+Map = NDArray[np.float32]
 _maps: "list[Case]" = []
 
 
 class Case(NamedTuple):
-    """A map, the range of rolls that are right, degrees, and how it came about."""
+    """A map, the range of rolls that are right, degrees (NaN: none is), and how it came about."""
 
     disparity: NDArray[Any]
     low_deg: float
@@ -137,37 +142,55 @@ def changes(only: str) -> list[Change]:
     return found
 
 
-def degraded(disparity: NDArray[np.float32], kind: str, rng: np.random.Generator) -> NDArray[np.float32]:
-    """Return the map made worse in one of five ways."""
+def degraded(disparity: Map, kind: str, rng: np.random.Generator) -> Map:
+    """Return the map made worse in one of `WORSE` ways."""
     height, width = disparity.shape
-    rows, columns = np.mgrid[:height, :width]
+    rows, columns = np.mgrid[:height, :width].astype(np.float32)
     if kind == "noise":
         noise = rng.uniform(0, disparity.max(), disparity.shape).astype(np.float32)
-        return np.where(rng.random(disparity.shape) < 0.4, noise, disparity)
-    if kind == "whole pixels":
-        return np.rint(disparity)
+        return np.where(rng.random(disparity.shape) < 0.67, noise, disparity)
+    if kind == "rounded":
+        return 4 * np.rint(disparity / 4)
     if kind == "sparse":
-        return np.where(rng.random(disparity.shape) < 0.05, disparity, 0)
+        return np.where(rng.random(disparity.shape) < 0.02, disparity, 0)
     if kind == "bonnet":
-        hidden = rows > height * (0.85 + 0.5 * (columns / width - 0.5) ** 2)
-        return np.where(hidden, 1.2 * disparity.max() + 0.02 * (rows - height), disparity).astype(np.float32)
-    box = (slice(height // 6, int(0.8 * height)), slice(int(0.37 * width), int(0.65 * width)))
-    foot = disparity[int(0.8 * height), box[1]]
+        hidden = rows > height * (0.78 + 0.5 * (columns / width - 0.5) ** 2)
+        return np.where(hidden, 1.1 * disparity.max() + 0.05 * (rows - height), disparity)
+    if kind == "wall":
+        noise = rng.normal(0, 0.3, disparity.shape).astype(np.float32)
+        return np.where(columns < 0.45 * width, 40 - 0.08 * columns + 0.01 * rows + noise, disparity)
     truck = disparity.copy()
-    truck[box] = np.median(foot[foot > 0]) if (foot > 0).any() else 0
+    foot = disparity[int(0.87 * height), int(0.32 * width) : int(0.7 * width)]
+    near = np.median(foot[foot > 0]) if (foot > 0).any() else 0
+    truck[height // 8 : int(0.87 * height), int(0.32 * width) : int(0.7 * width)] = near
     return truck
 
 
+def without_road(disparity: Map, kind: str, rng: np.random.Generator) -> Map:
+    """Return a map without a road, in one of `ROADLESS` ways."""
+    if kind == "upside down":
+        return disparity[::-1]
+    if kind == "depth":
+        return np.divide(300, disparity, out=np.zeros_like(disparity), where=disparity > 0)
+    rows, columns = np.mgrid[: disparity.shape[0], : disparity.shape[1]].astype(np.float32)
+    noise = rng.normal(0, 0.3, disparity.shape).astype(np.float32)
+    if kind == "wall":
+        return 30 + rng.uniform(-0.05, 0.05) * columns + rng.uniform(-0.01, 0.01) * rows + noise
+    patches = rng.random((disparity.shape[0] // 16 + 1, disparity.shape[1] // 16 + 1))
+    patches = patches.repeat(16, 0).repeat(16, 1)[: disparity.shape[0], : disparity.shape[1]]
+    return np.where(patches > 0.85, 2 + np.abs(noise), 0).astype(np.float32)
+
+
 def cases(frames: int) -> list[Case]:
-    """Return rendered, degraded and, where they are, real maps."""
+    """Return rendered, degraded, roadless and, where they are, real maps."""
     found, rng = [], np.random.default_rng(9)
-    kinds = ("noise", "whole pixels", "sparse", "bonnet", "truck")
     for seed, span in SEEDS.items():
         for index, frame in enumerate(matched(frames // 2, seed, span)):
-            roll = frame.roll_deg
-            found.append(Case(frame.disparity, roll, roll, "rendered"))
-            worse = degraded(frame.disparity, kinds[index % len(kinds)], rng)
-            found.append(Case(worse, roll, roll, "degraded"))
+            disparity, roll = frame.disparity, frame.roll_deg
+            found.append(Case(disparity, roll, roll, "rendered"))
+            for way in (WORSE[index % 6], WORSE[(index + 1 + index // 6) % 6]):
+                found.append(Case(degraded(disparity, way, rng), roll, roll, "degraded"))
+            found.append(Case(without_road(disparity, ROADLESS[index % 4], rng), NAN, NAN, "roadless"))
     if REAL.is_dir():
         with (REAL / "reference.csv").open() as file:
             rows = [row for row in csv.DictReader(file) if row["lo_deg"] and "sequence" not in row["file"]]
@@ -197,31 +220,34 @@ def estimate_one(case: Case, tuning: Tuning) -> tuple[float, float, bool]:
             found = estimate_roll(case.disparity, tuning=tuning)
     except (EstimationError, np.linalg.LinAlgError, ValueError, IndexError):
         return 90.0, 0.0, False  # a number may be changed beyond what the code can bear
+    ok = found.status == "ok"
+    if case.kind == "roadless":
+        return 90.0, 0.0, ok
     middle, half = (case.low_deg + case.high_deg) / 2, (case.high_deg - case.low_deg) / 2
     off = abs(math.remainder(math.degrees(found.theta) - middle, 180))
-    return max(0.0, off - half), math.degrees(found.ci95 or 0.0), found.status == "ok"
+    return max(0.0, off - half), math.degrees(found.ci95 or 0.0), ok
 
 
-HEADINGS = ("95 %", "worst", "gross", "gross, ok", "needless", "coverage", "half-width")
+HEADINGS = ("95 %", "worst", "gross", "wrong, ok", "needless", "coverage", "half-width")
 
 
 def figures(outcomes: Outcomes, kinds: NDArray[np.str_]) -> tuple[str, ...]:
     """Return one cell for each of `HEADINGS`."""
-    present = [kind for kind in ("rendered", "degraded", "real") if (kinds == kind).any()]
+    roads = [kind for kind in ("rendered", "degraded", "real") if (kinds == kind).any()]
     rendered = kinds == "rendered"
     gross, good = outcomes.error > 0.5, outcomes.error <= 0.25
     held = outcomes.error <= outcomes.half_width
 
-    def counts(what: NDArray[np.bool_]) -> str:
-        return " + ".join(str(np.count_nonzero(what & (kinds == kind))) for kind in present)
+    def counts(what: NDArray[np.bool_], of: list[str]) -> str:
+        return " + ".join(str(np.count_nonzero(what & (kinds == kind))) for kind in of)
 
-    covered = [f"{held[kinds == kind].mean():.2f}" for kind in present if kind != "degraded"]
+    covered = [f"{held[kinds == kind].mean():.2f}" for kind in roads if kind != "degraded"]
     return (
         f"{np.percentile(outcomes.error[rendered], 95):.3f}",
         f"{outcomes.error[rendered].max():.2f}",
-        counts(gross),
-        counts(gross & outcomes.ok),
-        counts(good & ~outcomes.ok),
+        counts(gross, roads),
+        counts(gross & outcomes.ok, [*roads, "roadless"]),
+        counts(good & ~outcomes.ok, roads),
         " / ".join(covered),
         f"{np.median(outcomes.half_width[rendered]):.3f}",
     )
