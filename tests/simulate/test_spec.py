@@ -46,6 +46,64 @@ def test_a_rig_that_cannot_be_is_refused_and_the_reason_named(wrong, named):
 
 
 @pytest.mark.parametrize(
+    ("name", "last", "beyond"),
+    [
+        ("roll", math.pi / 2, 1.571),
+        ("roll", -math.pi / 2, -1.571),
+        ("pitch", math.radians(60), 1.048),
+        ("pitch", -math.radians(60), -1.048),
+        ("curvature", 0.01, 0.0101),
+        ("curvature", -0.01, -0.0101),
+        ("crossfall", 0.15, 0.151),
+        ("crossfall", 0.0, -0.001),
+        ("gutter", 0.5, 0.501),
+        ("gutter", 0.0, -0.001),
+        ("kerb", (0.0, 0.5), (0.0, 0.501)),
+        ("kerb", (0.0, 0.0), (-0.001, 0.0)),
+        ("size", (16, 480), (15, 480)),
+        ("size", (640, 16), (640, 15)),
+        ("size", (16384, 16), (16385, 16)),
+        ("size", (16, 16384), (16, 16385)),
+        ("principal_point", (0.0, 479.0), (-0.1, 479.0)),
+        ("principal_point", (639.0, 0.0), (639.1, 0.0)),
+        ("principal_point", (0.0, 0.0), (0.0, -0.1)),
+        ("principal_point", (639.0, 479.0), (639.0, 479.1)),
+        ("noise", 0.0, -0.001),
+    ],
+)
+def test_a_value_at_its_limit_is_taken_and_one_beyond_it_is_refused(name, last, beyond):
+    others = {"principal_point": (1.0, 1.0)} if name == "size" else {"height": 3.0}
+    assert getattr(FrameSpec(**{**others, name: last}), name) == last
+    with pytest.raises(UsageError):
+        FrameSpec(**{**others, name: beyond})
+
+
+@pytest.mark.parametrize("pitch_deg", [0, 30])
+def test_the_right_camera_is_above_the_road_just_when_the_baseline_leaves_room(pitch_deg):
+    pitch = math.radians(pitch_deg)
+    lowest = 0.54 * math.sin(math.radians(40)) * math.cos(pitch)
+    FrameSpec(roll=-math.radians(40), pitch=pitch, height=lowest + 1e-6)
+    FrameSpec(roll=math.radians(40), pitch=pitch, height=1e-6)
+    with pytest.raises(UsageError, match="right camera is under the road"):
+        FrameSpec(roll=-math.radians(40), pitch=pitch, height=lowest - 1e-6)
+
+
+def test_without_ranges_the_documented_ones_are_drawn():
+    specs = draw_specs(3000, seed=8, cross_section="crown")
+    for values, low, high in (
+        (np.degrees([spec.roll for spec in specs]), -10, 10),
+        (np.degrees([spec.pitch for spec in specs]), -2, 6),
+        ([100 * spec.crossfall for spec in specs], 1, 4),
+        ([spec.curvature for spec in specs if spec.curvature], -0.001, 0.001),
+    ):
+        span = high - low
+        assert low <= min(values) < low + 0.01 * span
+        assert high - 0.01 * span < max(values) <= high
+    rigs = {(s.height, s.baseline, s.focal, s.noise, s.size, s.kerb, s.gutter, s.centre) for s in specs}
+    assert rigs == {(1.65, 0.54, 371.2, 1.5, (640, 480), (0.1, 0.2), 0.0, (319.5, 239.5))}
+
+
+@pytest.mark.parametrize(
     "wrong",
     [
         {"n": 0},

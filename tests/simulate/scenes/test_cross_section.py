@@ -8,10 +8,12 @@ import pytest
 
 from rollcli.simulate.draw import draw_specs
 from rollcli.simulate.geometry.polynomials import first_crossing
-from rollcli.simulate.geometry.surfaces import Ground
+from rollcli.simulate.geometry.surfaces import Course, Ground
 from rollcli.simulate.render import render_frame, true_disparity
 from rollcli.simulate.scenes.build import build_scene, road_camber
 from rollcli.simulate.scenes.carriageway import draw_carriageway
+from rollcli.simulate.scenes.cars import vehicle
+from rollcli.simulate.scenes.cross_section import Piece
 from rollcli.simulate.scenes.light import draw_light
 from rollcli.simulate.spec import FrameSpec
 
@@ -226,3 +228,49 @@ def test_the_first_of_several_roots_is_found():
     found = first_crossing(coefficients, np.ones(400))
     assert np.array_equal(np.isnan(found), np.isnan(expected))
     assert np.nanmax(np.abs(found - expected)) < 1e-6
+
+
+@pytest.mark.parametrize("scene", ["bare", "open", "street", "verge"])
+def test_lanes_are_as_wide_as_real_ones_and_only_country_roads_have_a_single_lane(scene):
+    roads = [drawn_road(FrameSpec(scene, seed=seed)) for seed in range(120)]
+    assert all(2.8 <= road.lane <= 3.7 for road in roads)
+    country = scene in ("bare", "verge")
+    assert any(road.single for road in roads) == country
+    assert any(road.parking for road in roads) == (not country)
+    assert any(road.course.bend > 0 for road in roads) == (scene != "bare")
+    assert any(road.course.bend < 0 for road in roads) == (scene != "bare")
+    for road in roads:
+        # beyond the edge of the right lane, in which the rig drives, lies a shoulder
+        shoulder = road.right - road.shift - 0.5 * road.lane
+        assert shoulder == pytest.approx(2.2) if road.parking else 0.1 <= shoulder <= 0.6
+        lanes = 1 if road.single else 2
+        assert road.right - road.left == pytest.approx(lanes * road.lane + 2 * shoulder)
+
+
+def test_a_roof_has_two_lanes_and_its_ridge_between_them():
+    for seed in range(40):
+        road = drawn_road(FrameSpec("verge", cross_section="roof", crossfall=0.03, seed=seed))
+        assert not road.single
+        left, right = road.section.pieces
+        assert left.end == right.start == pytest.approx(road.shift - road.lane / 2)
+        assert (left.slope, right.slope) == (0.03, -0.03)
+
+
+def test_kerbs_are_drawn_from_their_range():
+    heights = []
+    for seed in range(30):
+        spec = FrameSpec("open", seed=seed)
+        road, scene = drawn_road(spec), build_scene(spec)
+        sidewalks = [s for s in scene.surfaces if isinstance(s, Ground) and s.offset and not s.slope]
+        heights += [s.offset for s in sidewalks if {road.left, road.right} & set(s.edges)]
+    assert 0.1 <= min(heights) < 0.11
+    assert 0.19 < max(heights) <= 0.2
+
+
+@pytest.mark.parametrize("oncoming", [False, True])
+def test_a_vehicle_ahead_shows_its_rear_and_an_oncoming_one_its_front(oncoming):
+    course = Course(heading=0.02, bend=0.003)
+    car = vehicle(np.random.default_rng(3), course, Piece(-5, 5), 1.0, 12.0, 0, oncoming)
+    assert (car.frame[2, 2] > 0) == (not oncoming)
+    assert car.frame[1] @ [0, 1, 0] > 0.99
+    assert np.linalg.det(car.frame) == pytest.approx(1)
