@@ -38,12 +38,13 @@ simulate_options = record(
     "options",
     "What to render",
     _options,
-    option("--frames", type=Number("N", at_least=1, whole=True), default=FRAMES, help="How many pairs."),
+    option("--frames", type=Number("N", at_least=1, whole=True), default=FRAMES, help="Number of pairs."),
     option(
         "--scene",
         type=Choice(*SCENES, MIXED),
         default=MIXED,
-        help="bare: only a road; open: kerbs and cars; street: house fronts too; verge: sloping grass; "
+        help="bare: a road alone; open: with kerbs and cars; street: with house fronts too; verge: between "
+        "grass slopes; "
         "mixed: each frame one of these.",
     ),
     option(
@@ -51,7 +52,8 @@ simulate_options = record(
         type=Span(),
         default=ROLL_DEG,
         show_default=False,
-        help="Degrees, drawn evenly from A to B; positive: the right end of the rig is up.  "
+        help="Roll of the rig against the road, degrees, drawn evenly from A to B; positive: its right "
+        "end is up.  "
         f"[default: {ROLL_DEG[0]:g}:{ROLL_DEG[1]:g}]",
     ),
     option(
@@ -59,22 +61,23 @@ simulate_options = record(
         type=Span(),
         default=PITCH_DEG,
         show_default=False,
-        help="Degrees, drawn evenly from A to B; positive: the rig looks down.  "
+        help="Pitch of the rig against the road, degrees, drawn evenly from A to B; positive: it looks "
+        "down.  "
         f"[default: {PITCH_DEG[0]:g}:{PITCH_DEG[1]:g}]",
     ),
     option(
         "--curvature",
         type=Span(),
-        help="Of the road's height, 1/m, drawn evenly from A to B; positive: a sag; negative: a crest.  "
+        help="Curvature along the road, 1/m, drawn evenly from A to B; positive: a sag; negative: a crest.  "
         "[default: half of the frames flat, half within +-0.001; bare is flat]",
     ),
     option(
         "--cross-section",
-        type=click.Choice([*CROSS_SECTIONS, MIXED]),
+        type=Choice(*CROSS_SECTIONS, MIXED),
         default=CROSS_SECTIONS[0],
         help="Shape of the road across. crown, dish: a parabola, highest or lowest in the middle; roof: two "
         "planes that meet in the middle; superelevated: one plane, its outer side up in a bend; mixed: each "
-        "frame one of these. --roll is against the plane that touches the road below the left camera.",
+        "frame one of these. Roll and pitch are against the plane tangent to the road below the left camera.",
     ),
     option(
         "--crossfall",
@@ -101,7 +104,7 @@ simulate_options = record(
         type=Size(),
         default=SIZE,
         show_default=False,
-        help=f"Of the images, pixels.  [default: {SIZE[0]}x{SIZE[1]}]",
+        help=f"Size of the images, pixels.  [default: {SIZE[0]}x{SIZE[1]}]",
     ),
     option(
         "--focal",
@@ -119,23 +122,28 @@ simulate_options = record(
         type=Span(),
         default=(0.0, 0.0),
         show_default=False,
-        help="Of the principal point, pixels, drawn evenly from A to B in each direction.  [default: 0]",
+        help="Offset of the principal point in each direction, pixels, drawn evenly from A to B.  "
+        "[default: 0]",
     ),
     option(
-        "--baseline", type=Number("M", above=0), default=BASELINE, help="Between the two cameras, metres."
+        "--baseline",
+        type=Number("M", above=0),
+        default=BASELINE,
+        help="Distance of the cameras, metres.",
     ),
     option(
         "--height",
         type=Span(),
         default=(HEIGHT, HEIGHT),
         show_default=False,
-        help=f"Of the left camera above the road, metres, drawn evenly from A to B.  [default: {HEIGHT:g}]",
+        help="Height of the left camera above the road, metres, drawn evenly from A to B.  "
+        f"[default: {HEIGHT:g}]",
     ),
     option(
         "--noise",
         type=Number("SIGMA", at_least=0),
         default=NOISE,
-        help="Of the sensor, standard deviation in grey levels of 255.",
+        help="Noise of the sensor: standard deviation in grey levels of 255.",
     ),
     option(
         "--gain",
@@ -143,12 +151,12 @@ simulate_options = record(
         default=1.0,
         help="Brightness of the right view relative to the left one.",
     ),
-    option("--grey", is_flag=True, help="Grey images.  [default: colour]"),
+    option("--grey", is_flag=True, help="Write grey images.  [default: colour]"),
     option(
         "--seed",
         type=Number("INT", at_least=0, whole=True),
         default=0,
-        help="Of all that is drawn; the same seed gives the same files.",
+        help="Seed of the random numbers; the same seed gives the same files.",
     ),
     option("--resume", is_flag=True, help="Keep the frames of an interrupted simulation and do the rest."),
 )
