@@ -42,6 +42,18 @@ def read_calibration(path: str | os.PathLike[str], *right: str | os.PathLike[str
         A file cannot be read, is of no known format, or contradicts itself.
     UsageError
         What it says is not enough for a pose, or cannot be a rig.
+
+    Examples
+    --------
+    A calibration in KITTI's form, of cameras half a metre apart:
+
+    >>> import tempfile
+    >>> file = Path(tempfile.mkdtemp(), "calib.txt")
+    >>> left, right = "700 0 600 0 0 700 180 0 0 0 1 0", "700 0 600 -350 0 700 180 0 0 0 1 0"
+    >>> characters = file.write_text(f"P0: {left}\\nP1: {right}\\n")
+    >>> found = read_calibration(file)
+    >>> found.fx, found.cy, found.baseline
+    (700.0, 180.0, 0.5)
     """
     return _read([os.fspath(each) for each in (path, *right)], CalibrationOptions())
 
