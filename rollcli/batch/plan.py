@@ -9,7 +9,7 @@ from rollcli.batch.options import EstimateOptions
 from rollcli.errors import UsageError
 from rollcli.files.results import run_path
 from rollcli.files.stream import is_stream
-from rollcli.frames.calibration import check_first_size
+from rollcli.frames.calibration import calibration_files, check_first_size
 from rollcli.frames.checks import check_inputs_are_kept, check_nothing_is_there, check_one_owner
 from rollcli.frames.find import map_frames, pair_frames
 from rollcli.frames.frame import Frame
@@ -41,6 +41,7 @@ def make_plan(options: EstimateOptions) -> Plan:
     results = [] if is_stream(output) else [output, str(run_path(output))]
     check_one_owner(((frame, _images([frame], options)) for frame in frames), results)
     reads = [path for frame in frames for path in frame.reads()]
+    reads += calibration_files(options.calibration)
     check_inputs_are_kept(reads, chain(results, _images(frames, options)))
     frames = frames[part - 1 :: parts]
     check_first_size(frames, options.frame)

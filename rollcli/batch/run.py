@@ -3,6 +3,7 @@
 import contextlib
 from collections.abc import Generator, Sequence
 from functools import partial
+from itertools import islice
 
 from rollcli.batch.door import estimate_frame, lost_frame
 from rollcli.batch.options import EstimateOptions
@@ -11,6 +12,7 @@ from rollcli.batch.plan import Plan, make_plan
 from rollcli.errors import ClusterError, ExitStatus, OutputError, WorkerError
 from rollcli.files.results import run_path
 from rollcli.files.stream import STDOUT
+from rollcli.frames.calibration import calibration_files, calibration_notes
 from rollcli.frames.checks import list_files
 from rollcli.frames.frame import Frame, FrameResult
 from rollcli.frames.outputs import image_paths, remove_image_leftovers
@@ -19,6 +21,8 @@ from rollcli.parallel.in_order import Work
 from rollcli.parallel.interrupt import Stop, stop_on_signals
 from rollcli.parallel.process_setup import limit_blas_threads
 from rollcli.parallel.run_tasks import SharedPaths, Workers, require_scheduler, run_tasks
+
+_NOTES = 3  # on how calibrations were read; the record of the run has those of more files
 
 
 def run_estimate(options: EstimateOptions, resume_command: str = "") -> ExitStatus:
@@ -44,6 +48,8 @@ def run_estimate(options: EstimateOptions, resume_command: str = "") -> ExitStat
     progress = Progress(len(plan.frames), options.running, options.encoding)
     with open_output(plan, options) as output:
         progress.keep(output.kept)
+        for note in islice(calibration_notes(plan.frames), _NOTES):
+            progress.note(note)
         try:
             with stop_on_signals() as stop, progress:
                 _run_frames(plan.frames[progress.done :], options, output, progress, stop)
@@ -102,6 +108,7 @@ def _end(output: Output, progress: Progress, stop: Stop, resume_command: str) ->
 def _list(plan: Plan, options: EstimateOptions) -> None:
     """Print what would be read and written, a line each."""
     frames = plan.frames[count_kept_rows(plan, options) :]
+    list_files([(calibration_files(options.calibration), ())])
     list_files((frame.reads(), (path for _, path in image_paths(frame, options.images))) for frame in frames)
     if plan.output != STDOUT:
         list_files([((), (plan.output, str(run_path(plan.output))))])

@@ -92,6 +92,21 @@ class Calibrations:
         return _read([str(paths[0])], self._given)
 
 
+def calibration_files(given: CalibrationOptions) -> list[str]:
+    """List the files that a user named, those of a folder one by one."""
+    return [
+        str(path)
+        for name in given.calib
+        for path in (_files(Path(name)) if is_folder(name) else [Path(name)])
+    ]
+
+
+def calibration_notes(frames: Sequence[Frame]) -> list[str]:
+    """List what the user should know about how the calibrations were read, each once."""
+    used = dict.fromkeys(frame.calibration for frame in frames if frame.calibration is not None)
+    return list(dict.fromkeys(note for calibration in used for note in calibration.notes))
+
+
 def check_first_size(frames: Sequence[Frame], options: FrameOptions) -> None:
     """Refuse a calibration that is not for the size of the first frame, before anything runs.
 
@@ -116,10 +131,13 @@ def check_first_size(frames: Sequence[Frame], options: FrameOptions) -> None:
 
 def _stems(folder: Path) -> dict[str, list[Path]]:
     found: dict[str, list[Path]] = {}
-    for path in sorted(folder.rglob("*")):
-        if is_file(path) and not path.name.startswith("."):
-            found.setdefault(path.stem.removesuffix(_MARK), []).append(path)
+    for path in _files(folder):
+        found.setdefault(path.stem.removesuffix(_MARK), []).append(path)
     return found
+
+
+def _files(folder: Path) -> list[Path]:
+    return sorted(path for path in folder.rglob("*") if is_file(path) and not path.name.startswith("."))
 
 
 def _read(paths: Sequence[str], given: CalibrationOptions) -> Calibration:

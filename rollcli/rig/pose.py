@@ -141,7 +141,7 @@ def with_pose(estimate: RollEstimate, calibration: Calibration) -> RollEstimate:
         pitch_ci95=pitch_ci95,
         height_m=pose.height,
         height_ci95_m=None if pose.height is None else height_ci95,
-        message=_joined(estimate.message, taken_as_exact(tangent, calibration)),
+        message=_joined(estimate.message, taken_as_exact(tangent, calibration, pose.pitch)),
     )
 
 
@@ -150,9 +150,8 @@ def horizon_row(tangent: Tangent, calibration: Calibration) -> float:
     return tangent.row - (tangent.disparity + calibration.doffs) / tangent.slope
 
 
-def taken_as_exact(tangent: Tangent, calibration: Calibration) -> str:
+def taken_as_exact(tangent: Tangent, calibration: Calibration, pitch: float) -> str:
     """Say in one line what the intervals cannot know: errors of the calibration, and what they would do."""
-    pitch = pose_of(tangent, calibration).pitch
     turn = math.degrees(math.cos(pitch) ** 2)
     text = (
         "pitch is given the calibration: "

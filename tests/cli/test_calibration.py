@@ -204,3 +204,23 @@ def test_python_reads_a_calibration_and_gives_radians_and_metres(maps):
     assert (found.theta, found.pitch, found.height_m) == pytest.approx((ROLL, PITCH, HEIGHT), abs=1e-4)
     plain = library.estimate_roll(disparity)
     assert (plain.pitch, plain.pitch_ci95, plain.height_m, plain.height_ci95_m) == (None,) * 4
+
+
+def test_what_was_read_against_a_convention_is_said_once(maps):
+    (maps / "left.yaml").write_text(samples.ros(RIG, right=False))
+    (maps / "right.yaml").write_text(samples.ros(RIG, right=True, positive=True))
+    pair = ("--calib", "left.yaml", "--calib", "right.yaml")
+    assert rollcli("estimate", "maps", *pair, cwd=maps).err.count("Tx is positive") == 1
+    assert "Tx" not in rollcli("estimate", "maps", *pair, "-q", cwd=maps).err
+
+
+def test_a_result_never_replaces_the_calibration(maps):
+    before = (maps / "calib.txt").read_text()
+    done = rollcli("estimate", "maps", "--calib", "calib.txt", "-o", "calib.txt", "--overwrite", cwd=maps)
+    assert done.status == 2
+    assert (maps / "calib.txt").read_text() == before
+
+
+def test_a_dry_run_lists_the_calibration(maps):
+    done = rollcli("estimate", "maps", "--calib", "calib.txt", "--dry-run", cwd=maps)
+    assert "read  calib.txt\n" in done.out

@@ -157,10 +157,10 @@ def test_the_message_says_what_the_calibrations_errors_do():
     tangent = Tangent(0.0, 280.0, 35.0, 0.53715 / 1.65, None)
     one_lower = replace(calibration, cy=calibration.cy + 1)
     vergence = replace(calibration, doffs=0.1)
-    message = taken_as_exact(tangent, calibration)
-    pitch = math.degrees(pose_of(tangent, calibration).pitch)
+    pitch = pose_of(tangent, calibration).pitch
+    message = taken_as_exact(tangent, calibration, pitch)
     for other, unit in ((one_lower, "px of cy"), (vergence, "per 0.1 px of disparity")):
-        moved = math.degrees(pose_of(tangent, other).pitch) - pitch
+        moved = math.degrees(pose_of(tangent, other).pitch - pitch)
         said = float(message.split(unit)[0].replace(" degrees per", "").split()[-1])
         assert said == pytest.approx(abs(moved), abs=5e-4)
 
