@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from rollcli import __version__
+from rollcli import __version__, read_calibration
 from rollcli.errors import OutputError, UsageError
 from rollcli.files.encodings import read_disparity
 from rollcli.simulate import dataset as module
@@ -85,6 +85,10 @@ def test_frames_of_one_rig_share_a_calibration(tmp_path):
     assert left == [37.12, 0, 30, 0, 0, 37.12, 25.5, 0, 0, 0, 1, 0]
     assert right == [37.12, 0, 30, -9.28, 0, 37.12, 25.5, 0, 0, 0, 1, 0]
     assert not (tmp_path / "calib").exists()
+    read = read_calibration(tmp_path / "calib.txt")
+    assert (read.fx, read.fy, read.cx, read.cy) == (37.12, 37.12, 30.0, 25.5)
+    assert (read.baseline, read.doffs) == (pytest.approx(0.25), 0.0)
+    assert read.notes == ()
 
 
 def test_frames_of_different_rigs_have_a_calibration_each(tmp_path):

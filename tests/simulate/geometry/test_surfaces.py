@@ -57,6 +57,7 @@ SURFACES = [
     pytest.param(BACKDROP, beyond_backdrop, (0, 5, 60), 12, id="backdrop"),
     pytest.param(CAR, inside_car, COURSE.point(1.0, 9.0, 0.7), 1.6, id="car"),
     pytest.param(POST, inside_post, COURSE.point(2.0, 8.0, 2.0), 1.2, id="post"),
+    pytest.param(POST, inside_post, COURSE.point(2.0, 8.0, 0.1), 0.8, id="foot of a post"),
 ]
 
 
@@ -75,7 +76,22 @@ def test_a_ray_meets_a_surface_where_marching_along_it_first_comes_inside(surfac
     assert agree.mean() > 0.97
 
 
-def test_a_crown_is_met_on_its_ellipsoid_and_seen_through():
+def test_a_point_on_the_line_between_two_strips_belongs_to_the_right_one():
+    x = np.array([-4.0, np.nextafter(1.0, 0), 1.0, 9.0])
+    ground = Ground(Course(), (-4.0, 1.0, 9.0), (5, 6), far=80.0)
+    points = np.array([x, np.zeros(4), np.full(4, 10.0)])
+    assert list(ground.sample(points).material) == [5, 5, 6, 6]
+
+
+@pytest.mark.parametrize(("distance", "met"), [(0.049, False), (0.051, True), (99.0, True), (101.0, False)])
+def test_a_surface_is_met_from_five_centimetres_to_its_far_end(distance, met):
+    ground = Ground(Course(), (-np.inf, np.inf), (0,), far=100.0)
+    origin = np.array([[0.0], [distance / 10], [0.0]])
+    t = ground.intersect(origin, np.array([[0.0], [-0.1], [1.0]]))
+    assert np.isfinite(t[0]) == met
+
+
+def test_a_crown_of_a_tree_is_met_on_its_ellipsoid_and_seen_through():
     direction = rays(2000, TREE_CROWN.centre, 1.5)
     met = TREE_CROWN.intersect(ORIGIN, direction)
     hits = np.isfinite(met)

@@ -67,3 +67,18 @@ def test_a_footprint_is_the_area_that_neighbouring_rays_enclose_on_the_road():
     assert near.sum() > 2000
     assert np.allclose(long, longest[:, 0], rtol=0.01)
     assert np.allclose(long * short, area, rtol=0.01)
+
+
+def box(low, high):
+    """The corners of a box in the world, (3, 8)."""
+    return np.stack(np.meshgrid(*np.stack([low, high], axis=1), indexing="ij")).reshape(3, -1)
+
+
+def test_a_box_around_the_camera_may_be_met_by_any_ray_and_one_behind_it_by_none():
+    _, pixels = every_pixel(SPEC)
+    assert pixels.window(None) is None
+    assert pixels.window(box((-1, 0, -2), (1, 3, 2))) is None
+    assert pixels.window(box((-1, 0, 0.05), (1, 3, 9))) is None
+    assert len(pixels.window(box((-1, 0, -9), (1, 3, -4)))) == 0
+    ahead = pixels.window(box((-1, 0, 4), (1, 2, 9)))
+    assert 0 < len(ahead) < len(pixels.u)
