@@ -2,16 +2,17 @@
 
 import contextlib
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
+from rollcli.batch.durable_rows import DurableRows
 from rollcli.batch.options import EstimateOptions
 from rollcli.batch.plan import Plan
 from rollcli.batch.result_file import ResultFile, has_rows, kept_rows, open_result
 from rollcli.batch.resume import check_resumable, unknown_inputs
 from rollcli.batch.run_record import RunRecord
-from rollcli.errors import InputError, UsageError
+from rollcli.errors import InputError, OutputError, UsageError
 from rollcli.files.atomic import remove_leftovers
 from rollcli.files.results import Row, format_header, format_row, parse_rows, read_run, run_path
 from rollcli.files.resumable import not_resumable
@@ -23,8 +24,9 @@ from rollcli.files.stream import (
     stdout_descriptor,
     write_stream,
 )
-from rollcli.frames.frame import FrameResult
-from rollcli.frames.outputs import remove_image_leftovers
+from rollcli.frames.frame import Frame, FrameResult
+from rollcli.frames.options import ImageOptions
+from rollcli.frames.outputs import has_images, image_paths, remove_image_leftovers
 
 
 class Output(Protocol):
@@ -36,21 +38,30 @@ class Output(Protocol):
         The rows of an interrupted run, which is resumed.
     keep_open : int or None
         A descriptor for workers to inherit.
+    incomplete : list of Frame
+        Frames of kept rows whose images are missing or empty, whatever the cause.
     resumable : bool
         Whether an interrupted run can be resumed.
     """
 
     kept: tuple[Row, ...]
+    incomplete: list[Frame]
     keep_open: int | None
     resumable: bool
 
-    def append(self, result: FrameResult) -> None:
-        """Write the row; it has left this process when this returns."""
+    def append(self, frame: Frame, result: FrameResult) -> None:
+        """Write the row, at once or with others after it."""
+
+    def restore(self, frame: Frame, result: FrameResult) -> None:
+        """Take the images of an incomplete frame, which were made again."""
+
+    def commit(self) -> None:
+        """Write every row that was appended."""
 
     def finish(self, totals: Mapping[str, int], alignment: Mapping[str, Any] | None) -> None:
         """Say that all rows are written, how many of each status, and how the views of pairs lay."""
 
-    def hint(self, rows: int) -> str:
+    def hint(self) -> str:
         """Say how to continue after an error; empty when nothing can be continued."""
 
 
@@ -62,17 +73,24 @@ class StreamOutput:
     resumable = False
 
     def __init__(self, descriptor: int, name: str, plan: Plan) -> None:
+        self.incomplete: list[Frame] = []
         self._descriptor, self._name, self._plan = descriptor, name, plan
         self._write(format_header(plan.format, plan.timing))
 
-    def append(self, result: FrameResult) -> None:
-        """Write the row."""
+    def append(self, frame: Frame, result: FrameResult) -> None:
+        """Write the row; it has left this process when this returns."""
         self._write(format_row(result.row, self._plan.format, self._plan.timing))
 
     def finish(self, totals: Mapping[str, int], alignment: Mapping[str, Any] | None) -> None:
         """Do nothing: a stream has no record."""
 
-    def hint(self, rows: int) -> str:
+    def restore(self, frame: Frame, result: FrameResult) -> None:
+        """Do nothing: a stream keeps no rows."""
+
+    def commit(self) -> None:
+        """Do nothing: no row waits."""
+
+    def hint(self) -> str:
         """Return nothing: a stream cannot be resumed."""
         return ""
 
@@ -81,27 +99,58 @@ class StreamOutput:
 
 
 class FileOutput:
-    """Rows to a locked file, and FILE.run.json beside it."""
+    """Rows to a locked file, and FILE.run.json beside it; a row is written once its images are durable."""
 
     resumable = True
 
-    def __init__(self, file: ResultFile, record: RunRecord, plan: Plan, kept: tuple[Row, ...]) -> None:
+    def __init__(
+        self,
+        file: ResultFile,
+        record: RunRecord,
+        plan: Plan,
+        kept: tuple[Row, ...],
+        images: ImageOptions,
+    ) -> None:
         self.kept = kept
+        self.incomplete = _incomplete_frames(plan, kept, images)
         self.keep_open: int | None = file.descriptor
-        self._file, self._record, self._plan = file, record, plan
+        self._file, self._record, self._plan, self._images = file, record, plan, images
+        self._rows = DurableRows(file)
 
-    def append(self, result: FrameResult) -> None:
-        """Write the row, whole or not at all, after the record knows how its frame was read."""
+    def append(self, frame: Frame, result: FrameResult) -> None:
+        """Add the row, after the record knows how its frame was read."""
         self._record.saw(result.encoding, result.searched)
-        self._file.append(format_row(result.row, self._plan.format, self._plan.timing))
+        row = format_row(result.row, self._plan.format, self._plan.timing)
+        self._rows.append(row, self._paths(frame, result))
+
+    def restore(self, frame: Frame, result: FrameResult) -> None:
+        """Take the images of an incomplete frame, which were made again.
+
+        Raises
+        ------
+        OutputError
+            They could not be made: its row no longer holds.
+        """
+        if result.row.status == "error":
+            raise OutputError(f"the images of {frame.file} cannot be made again: {result.row.message}")
+        self._rows.restore(self._paths(frame, result))
+
+    def commit(self) -> None:
+        """Force the images and rows that were added to the disk."""
+        self._rows.commit()
 
     def finish(self, totals: Mapping[str, int], alignment: Mapping[str, Any] | None) -> None:
         """Write both into the record."""
         self._record.write(totals, alignment)
 
-    def hint(self, rows: int) -> str:
+    def hint(self) -> str:
         """Say that --resume continues, if rows were written and their file still is there."""
+        rows = len(self.kept) + self._rows.written
         return f"; {rows} rows are kept, continue with --resume" if rows and self._file.is_there() else ""
+
+    def _paths(self, frame: Frame, result: FrameResult) -> Iterator[str]:
+        if result.row.status != "error":
+            yield from (path for _, path in image_paths(frame, self._images))
 
 
 @contextlib.contextmanager
@@ -131,8 +180,8 @@ def open_output(plan: Plan, options: EstimateOptions) -> Iterator[Output]:
             yield _begin(file, plan, options)
 
 
-def count_kept_rows(plan: Plan, options: EstimateOptions) -> int:
-    """Count the rows that a resume would keep, without opening the result for writing.
+def frames_to_do(plan: Plan, options: EstimateOptions) -> list[Frame]:
+    """List the frames that a run would work on, without opening the result for writing.
 
     Raises
     ------
@@ -141,13 +190,22 @@ def count_kept_rows(plan: Plan, options: EstimateOptions) -> int:
     """
     _check_permitted(plan.output, options)
     if not options.result.resume:
-        return 0
+        return plan.frames
     try:
         data = Path(plan.output).read_bytes()
     except OSError:
-        return 0
+        return plan.frames
     kept = kept_rows(data, plan.output, plan.format)
-    return len(parse_rows(kept, plan.output)) if kept else 0
+    rows = parse_rows(kept, plan.output) if kept else ()
+    return [*_incomplete_frames(plan, rows, options.images), *plan.frames[len(rows) :]]
+
+
+def _incomplete_frames(plan: Plan, kept: Sequence[Row], images: ImageOptions) -> list[Frame]:
+    """List the frames of kept rows whose images are missing or empty."""
+    if not images.folders():
+        return []
+    pairs = zip(plan.frames, kept, strict=False)
+    return [frame for frame, row in pairs if row.status != "error" and not has_images(frame, images)]
 
 
 def _begin(file: ResultFile, plan: Plan, options: EstimateOptions) -> FileOutput:
@@ -164,7 +222,7 @@ def _begin(file: ResultFile, plan: Plan, options: EstimateOptions) -> FileOutput
     record.write({})
     if not rows:
         file.append(format_header(plan.format, plan.timing))
-    return FileOutput(file, record, plan, rows)
+    return FileOutput(file, record, plan, rows, options.images)
 
 
 def _parse_kept(kept: bytes, plan: Plan) -> tuple[tuple[Row, ...], Mapping[str, object] | None]:

@@ -1,6 +1,7 @@
 """The file of a result: whole rows, locked against a second run."""
 
 import contextlib
+import errno
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -64,6 +65,20 @@ class ResultFile:
                 os.ftruncate(self.descriptor, before)
             raise output_error(self._name, error) from error
 
+    def sync(self) -> None:
+        """Force the rows to the disk, where its file system can.
+
+        Raises
+        ------
+        OutputError
+            The disk fails to take them.
+        """
+        try:
+            os.fsync(self.descriptor)
+        except OSError as error:
+            if error.errno not in (errno.EINVAL, errno.ENOTSUP):
+                raise output_error(self._name, error) from error
+
     def is_there(self) -> bool:
         """Tell whether the open file still has its name."""
         try:
@@ -93,7 +108,8 @@ def open_result(name: str) -> Iterator[ResultFile]:
         with locked(descriptor, name):
             yield ResultFile(descriptor, name)
     finally:
-        os.close(descriptor)
+        with contextlib.suppress(OSError):  # what it would report, `sync` has reported
+            os.close(descriptor)
 
 
 def has_rows(name: str) -> bool:

@@ -1,13 +1,13 @@
 """A run of `estimate`: the plan, the workers, the rows in order, and the exit status."""
 
 import contextlib
-from collections.abc import Generator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from itertools import islice
 
 from rollcli.batch.door import estimate_frame, lost_frame
 from rollcli.batch.options import EstimateOptions
-from rollcli.batch.output import Output, count_kept_rows, open_output
+from rollcli.batch.output import Output, frames_to_do, open_output
 from rollcli.batch.plan import Plan, make_plan
 from rollcli.errors import ClusterError, ExitStatus, OutputError, WorkerError
 from rollcli.files.results import run_path
@@ -52,11 +52,12 @@ def run_estimate(options: EstimateOptions, resume_command: str = "") -> ExitStat
             progress.note(note)
         try:
             with stop_on_signals() as stop, progress:
-                _run_frames(plan.frames[progress.done :], options, output, progress, stop)
+                _restore_images(options, output, progress, stop)
+                _run_frames(plan.frames[len(output.kept) :], options, output, progress, stop)
         except KeyboardInterrupt:  # the second Ctrl-C: without waiting for the frames that have begun
             progress.stopped_early = True
         except (OutputError, ClusterError, WorkerError) as error:
-            raise type(error)(f"{error}{output.hint(progress.done)}") from error
+            raise type(error)(f"{error}{output.hint()}") from error
         return _end(output, progress, stop, resume_command)
 
 
@@ -64,20 +65,37 @@ def _run_frames(
     frames: Sequence[Frame], options: EstimateOptions, output: Output, progress: Progress, stop: Stop
 ) -> None:
     """Write the row of each frame, in order; its images are written by then."""
-    with contextlib.closing(_results(frames, options, output, stop)) as results:
-        for result in results:
-            output.append(result)
+    with _results(frames, options, output, stop) as results:
+        for frame, result in zip(frames, results, strict=False):
+            output.append(frame, result)
             progress.add(result)
             if options.result.fail_fast and result.row.status == "error":
                 progress.stopped_early = True
                 return
-    progress.stopped_early = stop.asked and progress.done < progress.total
+    if stop.asked and progress.done < progress.total:
+        progress.stopped_early = True
 
 
+def _restore_images(options: EstimateOptions, output: Output, progress: Progress, stop: Stop) -> None:
+    """Make the images again that kept rows should have."""
+    frames = output.incomplete
+    if not frames:
+        return
+    progress.note(f"images are missing or empty for {len(frames)} of the kept rows: they are made again")
+    progress.stopped_early = True  # unless every one is made
+    with _results(frames, options, output, stop) as results:
+        restored = 0
+        for frame, result in zip(frames, results, strict=False):
+            output.restore(frame, result)
+            restored += 1
+    progress.stopped_early = restored < len(frames)
+
+
+@contextlib.contextmanager
 def _results(
     frames: Sequence[Frame], options: EstimateOptions, output: Output, stop: Stop
-) -> Generator[FrameResult, None, None]:
-    """Yield the result of each frame from whichever workers were asked for."""
+) -> Iterator[Iterator[FrameResult]]:
+    """Open the results of frames from whichever workers were asked for; the output is complete afterwards."""
     work = Work(partial(estimate_frame, options=options.frame), partial(lost_frame, images=options.images))
     sample = (*frames[:1], *frames[-1:])
     shared = SharedPaths(
@@ -86,8 +104,10 @@ def _results(
     )
     workers = Workers(options.running.jobs, options.running.scheduler, shared, output.keep_open)
     try:
-        yield from run_tasks(frames, work, stop, workers)
+        with contextlib.closing(run_tasks(frames, work, stop, workers)) as results:
+            yield results
     finally:
+        output.commit()
         if workers.scheduler is not None:  # a worker that died elsewhere cannot be waited for
             remove_image_leftovers(frames, options.images)
 
@@ -107,7 +127,7 @@ def _end(output: Output, progress: Progress, stop: Stop, resume_command: str) ->
 
 def _list(plan: Plan, options: EstimateOptions) -> None:
     """Print what would be read and written, a line each."""
-    frames = plan.frames[count_kept_rows(plan, options) :]
+    frames = frames_to_do(plan, options)
     list_files([(calibration_files(options.calibration), ())])
     list_files((frame.reads(), (path for _, path in image_paths(frame, options.images))) for frame in frames)
     if plan.output != STDOUT:

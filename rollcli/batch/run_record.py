@@ -82,7 +82,7 @@ class RunRecord:
             "conventions": CONVENTIONS,
             "counts": counts,
         }
-        write_atomic(run_path(self._output), json.dumps(record, indent=2).encode() + b"\n")
+        write_atomic(run_path(self._output), json.dumps(record, indent=2).encode() + b"\n", durable=True)
 
 
 def _effective(plan: Plan, options: EstimateOptions) -> dict[str, Any]:

@@ -25,6 +25,17 @@ def image_paths(frame: Frame, images: ImageOptions) -> Iterator[tuple[str, str]]
         yield kind, output_path(frame, folder, endings[kind])
 
 
+def has_images(frame: Frame, images: ImageOptions) -> bool:
+    """Tell whether every image of a frame exists and is not empty."""
+    for _, path in image_paths(frame, images):
+        try:
+            if Path(path).stat().st_size == 0:
+                return False
+        except OSError:
+            return False
+    return True
+
+
 def output_path(frame: Frame, folder: str, ending: str | None = None) -> str:
     """Name the file of a frame below `folder`; it keeps the frame's own ending unless one is given."""
     stem, own = posixpath.splitext(frame.relative)
