@@ -4,6 +4,8 @@ import shutil
 
 import pytest
 
+from tests.object_store import object_store
+
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 FLAGS = (
     "--headless",
@@ -15,6 +17,13 @@ FLAGS = (
     "--disable-component-update",
     "--disable-sync",
 )
+
+
+@pytest.fixture(scope="session")
+def store():
+    """The environment that leads to an object store on this machine, which has the bucket `maps`."""
+    with object_store() as environment:
+        yield environment
 
 
 @pytest.fixture(scope="module")

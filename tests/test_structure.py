@@ -26,6 +26,7 @@ DOORS = {
     "rollcli.convert.disparity": "a worker's door",
     "rollcli.convert.vdisparity": "a worker's door",
     "rollcli.evaluate.run_paper": "loads the experiments, NumPy and the charts once the request is checked",
+    "rollcli.files.storage": "urllib loads only for URLs of web servers",
     "rollcli.frames.calibration": "decodes an image, which loads NumPy, only for its size",
     "rollcli.frames.read": "loads OpenCV's matcher only for pairs",
     "rollcli.parallel.process_setup": "a worker's door",

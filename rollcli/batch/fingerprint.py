@@ -7,6 +7,7 @@ from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
 
+from rollcli.files.stores.locations import is_url
 from rollcli.frames.frame import Frame
 
 # what these errors say of a path, they say again the next time; others may pass, such as EIO
@@ -50,6 +51,8 @@ def fingerprint(frames: Sequence[Frame], unknown: Collection[str] = ()) -> dict[
 def changed_input(frames: Sequence[Frame], since_ns: int) -> str | None:
     """Find the first file that is missing, or newer than a time in nanoseconds."""
     for path in (path for frame in frames for path in frame.reads()):
+        if is_url(path):
+            continue
         try:
             if Path(path).stat().st_mtime_ns > since_ns:
                 return path
@@ -60,6 +63,8 @@ def changed_input(frames: Sequence[Frame], since_ns: int) -> str | None:
 
 def _state(path: str) -> bytes | None:
     """Summarise a file; None when the system fails to look at it."""
+    if is_url(path):  # asking for the state of each object would take as long as reading it
+        return b"url\0"
     try:
         found = Path(path).stat()
     except ValueError:  # no file can have this name

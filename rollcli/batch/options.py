@@ -22,11 +22,12 @@ class ResultOptions:
     """Where the rows go, and which frames they are of. `shard` is (I, N), I from 1."""
 
     output: str = "-"
-    format: Literal["csv", "jsonl"] | None = None
+    format: Literal["csv", "jsonl", "parquet"] | None = None
     resume: bool = False
     shard: tuple[int, int] = (1, 1)
     fail_fast: bool = False
     timing: bool = False
+    part_rows: int = 1000
 
 
 @dataclass(frozen=True)

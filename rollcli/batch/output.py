@@ -10,6 +10,7 @@ from rollcli.batch.durable_rows import DurableRows
 from rollcli.batch.options import EstimateOptions
 from rollcli.batch.plan import Plan
 from rollcli.batch.result_file import ResultFile, has_rows, kept_rows, open_result
+from rollcli.batch.result_parts import count_kept_parts, open_parts
 from rollcli.batch.resume import check_resumable, unknown_inputs
 from rollcli.batch.run_record import RunRecord
 from rollcli.errors import InputError, OutputError, UsageError
@@ -165,6 +166,9 @@ def open_output(plan: Plan, options: EstimateOptions) -> Iterator[Output]:
     OutputError
         It cannot be written.
     """
+    if plan.in_parts and plan.output != STDOUT:
+        yield open_parts(plan, options)
+        return
     _check_permitted(plan.output, options)
     if plan.output == STDOUT:
         yield StreamOutput(stdout_descriptor(), STDOUT_NAME, plan)
@@ -188,6 +192,8 @@ def frames_to_do(plan: Plan, options: EstimateOptions) -> list[Frame]:
     UsageError
         As `open_output`.
     """
+    if plan.in_parts:
+        return count_kept_parts(plan, options)
     _check_permitted(plan.output, options)
     if not options.result.resume:
         return plan.frames

@@ -3,11 +3,11 @@
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import chain
-from typing import Literal
 
 from rollcli.batch.options import EstimateOptions
 from rollcli.errors import UsageError
-from rollcli.files.results import run_path
+from rollcli.files.results import Format, run_path
+from rollcli.files.stores.locations import is_url
 from rollcli.files.stream import is_stream
 from rollcli.frames.calibration import calibration_files, check_first_size
 from rollcli.frames.checks import check_inputs_are_kept, check_nothing_is_there, check_one_owner
@@ -22,8 +22,13 @@ class Plan:
 
     frames: list[Frame]
     output: str
-    format: Literal["csv", "jsonl"]
+    format: Format
     timing: bool = False
+
+    @property
+    def in_parts(self) -> bool:
+        """Whether the result is a folder of parts."""
+        return self.format == "parquet" or is_url(self.output)
 
 
 def make_plan(options: EstimateOptions) -> Plan:
@@ -38,7 +43,7 @@ def make_plan(options: EstimateOptions) -> Plan:
     part, parts = options.result.shard
     frames = _find_frames(options)
     output = options.result.output
-    results = [] if is_stream(output) else [output, str(run_path(output))]
+    results = [] if is_stream(output) else [output, run_path(output)]
     check_one_owner(((frame, _images([frame], options)) for frame in frames), results)
     reads = [path for frame in frames for path in frame.reads()]
     reads += calibration_files(options.calibration)
@@ -47,7 +52,10 @@ def make_plan(options: EstimateOptions) -> Plan:
     check_first_size(frames, options.frame)
     if not (options.running.overwrite or options.result.resume):
         check_nothing_is_there(_images(frames, options))
-    return Plan(frames, output, options.result.format or _format(output), options.result.timing)
+    form = options.result.format or _format(output)
+    if form == "parquet" and is_stream(output):
+        raise UsageError("Parquet is a folder of parts: name it with --output")
+    return Plan(frames, output, form, options.result.timing)
 
 
 def _images(frames: Iterable[Frame], options: EstimateOptions) -> Iterator[str]:
@@ -55,8 +63,11 @@ def _images(frames: Iterable[Frame], options: EstimateOptions) -> Iterator[str]:
     return (path for frame in frames for _, path in image_paths(frame, options.images))
 
 
-def _format(output: str) -> Literal["csv", "jsonl"]:
-    return "jsonl" if output.lower().endswith((".jsonl", ".ndjson")) else "csv"
+def _format(output: str) -> Format:
+    lower = output.lower().rstrip("/")
+    if lower.endswith((".jsonl", ".ndjson")):
+        return "jsonl"
+    return "parquet" if lower.endswith(".parquet") else "csv"
 
 
 def _find_frames(options: EstimateOptions) -> list[Frame]:

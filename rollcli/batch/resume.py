@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from rollcli.batch.fingerprint import changed_input
@@ -9,6 +10,7 @@ from rollcli.batch.plan import Plan
 from rollcli.batch.run_record import RunRecord
 from rollcli.files.results import Row, run_path
 from rollcli.files.resumable import differences, not_resumable
+from rollcli.files.stores.locations import base_name, is_url
 
 
 def check_resumable(
@@ -26,7 +28,7 @@ def check_resumable(
     UsageError
         Says what differs.
     """
-    record_name = run_path(plan.output).name
+    record_name = base_name(run_path(plan.output))
     if run is None:
         raise not_resumable(plan.output, f"there is no {record_name}")
     if not _is_whole(run):
@@ -60,8 +62,13 @@ def _differences(
     if inputs_was.get("names") != inputs_now["names"]:
         yield "the names of the inputs differ"
     if inputs_was != inputs_now:
-        begun = run_path(plan.output).stat().st_mtime_ns
-        yield f"{changed_input(plan.frames, begun) or 'an input'} has changed since"
+        yield f"{_changed_input(plan) or 'an input'} has changed since"
+
+
+def _changed_input(plan: Plan) -> str | None:
+    if is_url(plan.output):
+        return None  # the clock of a store is not the clock of this machine
+    return changed_input(plan.frames, Path(run_path(plan.output)).stat().st_mtime_ns)
 
 
 def _is_whole(run: Mapping[str, Any]) -> bool:

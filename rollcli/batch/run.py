@@ -131,4 +131,4 @@ def _list(plan: Plan, options: EstimateOptions) -> None:
     list_files([(calibration_files(options.calibration), ())])
     list_files((frame.reads(), (path for _, path in image_paths(frame, options.images))) for frame in frames)
     if plan.output != STDOUT:
-        list_files([((), (plan.output, str(run_path(plan.output))))])
+        list_files([((), (plan.output, run_path(plan.output)))])

@@ -12,8 +12,8 @@ from rollcli.batch.fingerprint import fingerprint
 from rollcli.batch.options import EstimateOptions
 from rollcli.batch.plan import Plan
 from rollcli.errors import InputError
-from rollcli.files.atomic import write_atomic
 from rollcli.files.results import run_path
+from rollcli.files.storage import write_bytes
 from rollcli.frames.frame import Frame
 from rollcli.frames.options import EncodingOptions, FrameOptions, ImageOptions
 from rollcli.imaging.stereo_options import StereoOptions
@@ -82,7 +82,7 @@ class RunRecord:
             "conventions": CONVENTIONS,
             "counts": counts,
         }
-        write_atomic(run_path(self._output), json.dumps(record, indent=2).encode() + b"\n", durable=True)
+        write_bytes(run_path(self._output), json.dumps(record, indent=2).encode() + b"\n", durable=True)
 
 
 def _effective(plan: Plan, options: EstimateOptions) -> dict[str, Any]:
@@ -93,6 +93,7 @@ def _effective(plan: Plan, options: EstimateOptions) -> dict[str, Any]:
     values |= {
         "format": plan.format,
         "timing": options.result.timing,
+        **({"part-rows": options.result.part_rows} if plan.in_parts else {}),
         "shard": "/".join(map(str, options.result.shard)),
     }
     return {_OPTION_NAMES.get(key, key).replace("_", "-"): value for key, value in values.items()}

@@ -20,7 +20,7 @@ from rollcli.cli.options import (
     stereo_options,
 )
 from rollcli.cli.resume import one_start, resume_command
-from rollcli.cli.types import Choice, OutputFile, Shard
+from rollcli.cli.types import Choice, Number, OutputFile, Shard
 
 result_options = record(
     "result",
@@ -29,15 +29,24 @@ result_options = record(
     option(
         "-o",
         "--output",
-        type=OutputFile((".csv", ".jsonl", ".ndjson"), "CSV (.csv) or JSON Lines (.jsonl)"),
+        type=OutputFile(
+            (".csv", ".jsonl", ".ndjson", ".parquet"),
+            "CSV (.csv), JSON Lines (.jsonl) or Parquet (.parquet)",
+        ),
         metavar="FILE",
         default="-",
         help="Where the rows go (-: stdout).",
     ),
     option(
         "--format",
-        type=Choice("csv", "jsonl"),
-        help="CSV or JSON Lines.  [default: by FILE's ending, else csv]",
+        type=Choice("csv", "jsonl", "parquet"),
+        help="CSV, JSON Lines, or Parquet (a folder of parts).  [default: by FILE's ending, else csv]",
+    ),
+    option(
+        "--part-rows",
+        type=Number("N", at_least=1, whole=True),
+        default=ResultOptions.part_rows,
+        help="Rows of each part, of Parquet and of results in an object store.",
     ),
     option("--resume", is_flag=True, help="Keep the rows of an interrupted run and do the rest."),
     option(

@@ -8,10 +8,10 @@ from rollcli.convert.options import CountOptions
 from rollcli.convert.run import Conversion
 from rollcli.errors import EstimationError, InputError
 from rollcli.estimator.estimate import estimate_roll
-from rollcli.files.atomic import write_atomic
 from rollcli.files.codecs.png import encode_png
 from rollcli.files.formats import encode_stored
 from rollcli.files.results import Row
+from rollcli.files.storage import write_bytes
 from rollcli.frames.encode import encode_computed, encode_turned
 from rollcli.frames.frame import FrameResult
 from rollcli.frames.guard import guarded
@@ -67,7 +67,7 @@ def _convert(
             raise InputError(f"{frame.file}: {conversion.refused}")
         source = read_source(frame, options)
         for path, data in zip(paths, make(source), strict=True):
-            write_atomic(path, data)
+            write_bytes(path, data)
         row = Row(frame.file, frame.right_file, "ok")
         warning = source.warning or source.doubt or source.note
         return FrameResult(row, source.encoding, warning, source.searched)

@@ -16,6 +16,7 @@ from typing import BinaryIO
 from rollcli.errors import OutputError
 from rollcli.files.durable import sync_file, sync_names
 from rollcli.files.locking import being_written, nobody_writes
+from rollcli.files.stores.locations import is_url
 
 _LONGEST_NAME = 225  # bytes; file systems allow 255 with what is added
 _RANDOM_BYTES = 8
@@ -84,6 +85,8 @@ def remove_leftovers(paths: Iterable[str | Path]) -> None:
     """
     listed: dict[str, dict[str, list[str]]] = {}
     for path in paths:
+        if is_url(str(path)):  # objects are whole or not there
+            continue
         folder, name = os.path.split(path)
         if folder not in listed:
             listed[folder] = _parts_in(folder)

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError, UsageError
-from rollcli.files.formats import Stored, decode_mask, read_bytes, read_stored
+from rollcli.files.formats import Stored, decode_mask, read_stored
+from rollcli.files.storage import read_bytes
 
 
 class Encoding(str, Enum):

@@ -4,9 +4,7 @@ Bytes, because OpenCV's own file functions fail on non-ASCII names on Windows an
 What a file is, its first bytes say; its name's ending decides nothing.
 """
 
-import os
 import re
-import stat
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +15,8 @@ from rollcli.errors import InputError, UsageError
 from rollcli.files.codecs import npy, pfm, pictures, png, tiff
 from rollcli.files.codecs.raw_map import Stored as Stored
 from rollcli.files.codecs.raw_map import native
+from rollcli.files.storage import read_bytes
 
-_MAX_BYTES = 2**32
 _KNOWN = {
     b"\xff\xd8\xff": "a JPEG image",
     b"PK\x03\x04": "a ZIP or NPZ archive",
@@ -30,38 +28,6 @@ _KNOWN = {
     **dict.fromkeys((b"\x80\x02", b"\x80\x03", b"\x80\x04", b"\x80\x05"), "a pickle, which is never loaded"),
 }
 _TEXT = re.compile(rb"[\t\n\r\f\x20-\x7e]{8}")  # no format begins with eight printable characters
-
-
-def read_bytes(path: str | Path, name: str | None = None) -> bytes:
-    """Read the bytes of a regular file; errors call it `name`, by default its path.
-
-    Raises
-    ------
-    InputError
-        It does not exist, may not be read, is empty, or is no regular file.
-    """
-    name = name or str(path)
-    try:
-        # not blocking: a named pipe would otherwise wait for its writer for ever
-        descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
-        with os.fdopen(descriptor, "rb") as file:
-            status = os.fstat(file.fileno())
-            if not stat.S_ISREG(status.st_mode):
-                raise InputError(f"{name}: is not a regular file")
-            if status.st_size > _MAX_BYTES:
-                raise InputError(f"{name}: has {status.st_size} bytes; no disparity map is that large")
-            data = file.read()
-    except IsADirectoryError:
-        raise InputError(f"{name}: is a folder, not a file") from None
-    except FileNotFoundError:
-        dangling = os.path.lexists(path)
-        raise InputError(f"{name}: {'is a link to nothing' if dangling else 'no such file'}") from None
-    except (OSError, ValueError) as error:
-        reason = str(getattr(error, "strerror", None) or error).lower()
-        raise InputError(f"{name}: cannot be read: {reason}") from None
-    if not data:
-        raise InputError(f"{name}: is empty")
-    return data
 
 
 def read_stored(path: str | Path, name: str | None = None) -> Stored:

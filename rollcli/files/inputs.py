@@ -7,9 +7,11 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from rollcli.errors import UsageError
+from rollcli.errors import InputError, UsageError
 from rollcli.files.naming import listed, match_names, natural_key
 from rollcli.files.search import Search
+from rollcli.files.storage import read_bytes
+from rollcli.files.stores.locations import is_url, public_name
 
 MAP_ENDINGS = (".png", ".tif", ".tiff", ".npy", ".pfm")
 IMAGE_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm")
@@ -95,18 +97,22 @@ def find_inputs(
     for argument, literal in _arguments(inputs, files_from, stdin):
         for path, relative in search.files(argument, literal=literal):
             # links to files stay themselves: each may be a frame
-            identity = f"{real(path.parent)}/{path.name}"
+            folder, base = os.path.split(path)
+            identity = path if is_url(path) else f"{real(folder)}/{base}"
             if identity not in seen:
                 seen.add(identity)
-                location = str(path)
-                name = location if os.sep == "/" else path.as_posix()  # one text, not two
-                found.append(Input(location, name, relative))
+                found.append(Input(path, _shown(path), relative))
     del seen  # before the keys of the sort take its place
-    if not any(os.path.lexists(each.location) for each in found):
+    if not any(is_url(each.location) or os.path.lexists(each.location) for each in found):
         named = listed(each.name for each in found)
         raise UsageError(f"no input found: {named + ': no such file' if named else 'the list is empty'}")
     found.sort(key=lambda each: natural_key(each.name))
     return found
+
+
+def _shown(location: str) -> str:
+    """Return a location as rows show it; on Linux that is the same text, which takes no further memory."""
+    return public_name(location) if is_url(location) else location.replace(os.sep, "/")
 
 
 def pair_inputs(
@@ -192,7 +198,9 @@ def _arguments(
         yield from ((line, True) for line in _stdin_lines(stdin))
     elif files_from is not None:
         try:
-            data = Path(files_from).read_bytes()
+            data = read_bytes(files_from) if is_url(files_from) else Path(files_from).read_bytes()
+        except InputError as error:
+            raise UsageError(str(error)) from None
         except OSError as error:
             reason = (error.strerror or str(error)).lower()
             raise UsageError(f"{files_from}: the list of files cannot be read: {reason}") from None

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError
-from rollcli.files.results import BOUNDS, STATUSES, STDIN, TEXT, csv_rows, json_rows, read_run, value_of
+from rollcli.files.codecs.row_text import csv_rows, json_rows
+from rollcli.files.results import BOUNDS, STATUSES, STDIN, TEXT, read_run, value_of
 
 _CHUNK = 20_000  # rows that are held as text
 

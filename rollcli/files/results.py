@@ -1,19 +1,22 @@
 """Results, one row a frame: CSV (RFC 4180 quoting, lines end in \\n) or JSON Lines, written and read back."""
 
-import csv
 import io
 import json
 import math
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args, get_type_hints
 
 from rollcli.errors import InputError
-from rollcli.files.existence import is_there
+from rollcli.files.codecs.parquet import MAGIC, decode_parquet
+from rollcli.files.codecs.row_text import csv_rows, json_rows
+from rollcli.files.storage import exists, list_names, read_bytes
+from rollcli.files.stores.locations import is_url
+from rollcli.files.stores.parts import part_names, read_parts
 
-Format = Literal["csv", "jsonl"]
+Format = Literal["csv", "jsonl", "parquet"]
 # file names are bytes: those that are not UTF-8 come back as the bytes they were
 TEXT = {"encoding": "utf-8", "errors": "surrogateescape"}
 
@@ -51,7 +54,6 @@ STATUSES = ("ok", "suspect", "error")
 TIMING = "elapsed_ms"
 COLUMNS = tuple(field.name for field in fields(Row) if field.name != TIMING)
 STDIN = "-"
-REQUIRED = ("file", "status", "roll_deg")
 # a millionth of a degree is far below any map's noise; nine digits keep alpha2, which is small, whole
 _DIGITS = {
     "roll_deg": ".6f",
@@ -83,6 +85,12 @@ def columns(timing: bool = False) -> tuple[str, ...]:
     return (*COLUMNS, TIMING) if timing else COLUMNS
 
 
+def column_types(timing: bool = False) -> dict[str, type]:
+    """Return the type of each column's values, in the columns' order."""
+    hints = get_type_hints(Row)
+    return {name: next(kind for kind in (*get_args(hints[name]), hints[name])) for name in columns(timing)}
+
+
 def format_header(form: Format, timing: bool = False) -> bytes:
     """Format what stands before the first row."""
     return ",".join(columns(timing)).encode() + b"\n" if form == "csv" else b""
@@ -90,11 +98,15 @@ def format_header(form: Format, timing: bool = False) -> bytes:
 
 def format_row(row: Row, form: Format, timing: bool = False) -> bytes:
     """Format one line; the same row gives the same bytes."""
-    texts = {name: _text(name, getattr(row, name)) for name in columns(timing)}
     if form == "csv":
-        return (",".join(map(_quoted, texts.values())) + "\n").encode(**TEXT)
-    values = {name: _json_value(name, getattr(row, name), text) for name, text in texts.items()}
-    return json.dumps(values).encode() + b"\n"
+        texts = (_text(name, getattr(row, name)) for name in columns(timing))
+        return (",".join(map(_quoted, texts)) + "\n").encode(**TEXT)
+    return json.dumps(plain_values(row, timing)).encode() + b"\n"
+
+
+def plain_values(row: Row, timing: bool = False) -> dict[str, Any]:
+    """Return the values as the CSV shows them, so that every form says the same; None for an empty one."""
+    return {name: _plain(name, getattr(row, name)) for name in columns(timing)}
 
 
 def _quoted(text: str) -> str:
@@ -116,11 +128,11 @@ def _text(name: str, value: Any) -> str:
     return "90.000000" if name == "roll_deg" and text == "-90.000000" else text
 
 
-def _json_value(name: str, value: Any, text: str) -> Any:
-    """Give the number that the CSV shows, so that both forms say the same."""
-    if name in _DIGITS:
-        return float(text) if text else None
-    return value
+def _plain(name: str, value: Any) -> Any:
+    if name not in _DIGITS:
+        return value
+    text = _text(name, value)
+    return float(text) if text else None
 
 
 def read_result(path: str | Path) -> Result:
@@ -129,7 +141,7 @@ def read_result(path: str | Path) -> Result:
     Parameters
     ----------
     path : str or Path
-        CSV or JSON Lines; which of them is seen from the first character.
+        CSV, JSON Lines or Parquet, which the first bytes tell; a folder of parts; or a URL of these.
 
     Returns
     -------
@@ -142,11 +154,27 @@ def read_result(path: str | Path) -> Result:
     InputError
         The file cannot be read, or is not a result of `rollcli estimate`; the line is named.
     """
-    return Result(parse_rows(_read(path), path), read_run(path))
+    path = str(path)
+    parts = () if path == STDIN else part_names(list_names(path))
+    return Result(parse_parts(path, parts) if parts else parse_rows(_read(path), path), read_run(path))
+
+
+def parse_parts(folder: str, names: Iterable[str]) -> tuple[Row, ...]:
+    """Parse the parts of a result, put together in their order.
+
+    Raises
+    ------
+    InputError
+        A part cannot be read, or its rows are no result.
+    """
+    return tuple(row for name, data in read_parts(folder, names) for row in parse_rows(data, name))
 
 
 def parse_rows(data: bytes, name: str | Path) -> tuple[Row, ...]:
     """Parse the bytes of a result; errors call it `name`."""
+    if data.startswith(MAGIC):
+        table = decode_parquet(data, str(name))
+        return tuple(_row(values, f"{name}: row {number}") for number, values in table)
     text = data.removeprefix(b"\xef\xbb\xbf").decode(**TEXT)
     if text.lstrip().startswith("{"):
         return tuple(
@@ -159,15 +187,15 @@ def parse_rows(data: bytes, name: str | Path) -> tuple[Row, ...]:
     )
 
 
-def run_path(path: str | Path) -> Path:
-    """Name the record of the run: FILE.run.json."""
-    return Path(f"{path}.run.json")
+def run_path(path: str | Path) -> str:
+    """Return where the record of the run lies: FILE.run.json."""
+    return f"{str(path).rstrip('/')}.run.json"
 
 
 def read_run(path: str | Path) -> Mapping[str, Any] | None:
     """Read the record of the run that wrote the result `path`; None when there is none."""
     record = run_path(path)
-    if not is_there(record):
+    if not exists(record):
         return None
     try:
         data = _read(record)
@@ -182,59 +210,12 @@ def read_run(path: str | Path) -> Mapping[str, Any] | None:
 
 
 def _read(path: str | Path) -> bytes:
+    if is_url(str(path)):
+        return read_bytes(path)
     try:
         return sys.stdin.buffer.read() if str(path) == STDIN else Path(path).read_bytes()
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from error
-
-
-def csv_rows(stream: Iterable[str], path: str | Path) -> Iterator[tuple[int, list[str]]]:
-    """Yield the header and then each line of a result, with its number; all have the header's length.
-
-    Raises
-    ------
-    InputError
-        It is not CSV, or not a result of `rollcli estimate`.
-    """
-    lines = csv.reader(stream, strict=True)
-    try:
-        header = next(lines, [])
-        missing = [name for name in REQUIRED if name not in header]
-        if missing:
-            raise InputError(
-                f"{path}: is not a result of rollcli estimate: it has no column {', '.join(missing)}"
-            )
-        yield lines.line_num, header
-        for line in lines:
-            if line and len(line) != len(header):
-                raise InputError(
-                    f"{path}: line {lines.line_num}: {len(line)} values for {len(header)} columns"
-                )
-            if line:
-                yield lines.line_num, line
-    except csv.Error as error:
-        raise InputError(f"{path}: line {lines.line_num}: is not CSV: {error}") from error
-
-
-def json_rows(lines: Iterable[str], path: str | Path) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Yield the values of each line of a result in JSON Lines, with its number.
-
-    Raises
-    ------
-    InputError
-        A line is not JSON, or no row of `rollcli estimate`.
-    """
-    for number, line in enumerate(lines, 1):
-        if not line.strip():
-            continue
-        try:
-            values = json.loads(line)
-        except (ValueError, RecursionError) as error:
-            raise InputError(f"{path}: line {number}: is not JSON: {error}") from error
-        missing = [name for name in REQUIRED if not isinstance(values, dict) or name not in values]
-        if missing:
-            raise InputError(f"{path}: line {number}: is no row of rollcli estimate: no {', '.join(missing)}")
-        yield number, values
 
 
 def _row(values: Mapping[str, Any], where: str) -> Row:

@@ -8,6 +8,8 @@ from pathlib import Path
 
 from rollcli.errors import UsageError
 from rollcli.files.existence import is_file, is_folder, is_there
+from rollcli.files.stores.locations import base_name, is_object_url, is_url
+from rollcli.files.stores.search import is_folder_url, objects_behind
 
 _NOWHERE = (0, 0)
 
@@ -38,9 +40,10 @@ class Search:
         self._endings = tuple(endings)
         self._recursive = recursive
         self._include, self._exclude = tuple(include), tuple(exclude)
-        self._skip = {os.path.realpath(folder) for folder in skip}
+        self._skip = {os.path.realpath(folder) for folder in skip if not is_url(str(folder))}
+        self._skipped_urls = [str(folder).rstrip("/") for folder in skip if is_url(str(folder))]
 
-    def files(self, argument: str, *, literal: bool = False) -> Iterator[tuple[Path, str]]:
+    def files(self, argument: str, *, literal: bool = False) -> Iterator[tuple[str, str]]:
         """Yield each file of `argument`, and its path below the folder or pattern.
 
         Parameters
@@ -57,20 +60,22 @@ class Search:
         """
         if not argument:
             raise UsageError("an input has an empty name: is a variable unset?")
+        if is_url(argument):
+            return self._behind_url(argument, literal=literal)
         path = Path(argument)
         if is_folder(path):
             return self._wanted(argument, self._in_folder(path), "folder")
         if literal or not glob.has_magic(argument) or os.path.lexists(path):
-            return iter([(path, path.name)])
+            return iter([(argument, path.name)])
         return self._wanted(argument, self._in_pattern(argument), "pattern")
 
     def _wanted(
-        self, argument: str, files: Iterator[tuple[Path, str]], kind: str
-    ) -> Iterator[tuple[Path, str]]:
+        self, argument: str, files: Iterator[tuple[str, str]], kind: str
+    ) -> Iterator[tuple[str, str]]:
         """Yield the files that --include and --exclude allow; finding none is an error."""
         none = True
         for path, relative in files:
-            names = (relative, path.name)
+            names = (relative, os.path.basename(path))  # noqa: PTH119 (URLs are no paths)
             if (not self._include or _match(names, self._include)) and not _match(names, self._exclude):
                 none = False
                 yield path, relative
@@ -78,7 +83,7 @@ class Search:
             hint = "; --recursive searches its folders" if kind == "folder" and not self._recursive else ""
             raise UsageError(f"{argument}: no input found in this {kind} ({' '.join(self._endings)}){hint}")
 
-    def _in_folder(self, folder: Path) -> Iterator[tuple[Path, str]]:
+    def _in_folder(self, folder: Path) -> Iterator[tuple[str, str]]:
         """Yield readable files, except hidden ones."""
         skipped = {_identity(each) for each in self._skip} - {_NOWHERE}
         if _identity(folder) in skipped:
@@ -95,7 +100,7 @@ class Search:
                     inner.append(entry.path)
                 elif self._reads(entry.name) and _is_file(entry.path):
                     path = Path(entry.path)
-                    yield path, path.relative_to(folder).as_posix()
+                    yield str(path), path.relative_to(folder).as_posix()
             opened = []
             for each in sorted(inner) if self._recursive else ():
                 if (identity := _identity(each)) not in closed:
@@ -103,7 +108,7 @@ class Search:
                     opened.append(each)
             waiting += reversed(opened)
 
-    def _in_pattern(self, pattern: str) -> Iterator[tuple[Path, str]]:
+    def _in_pattern(self, pattern: str) -> Iterator[tuple[str, str]]:
         """Yield the files that match; unless the pattern names an ending, only readable ones."""
         ending = Path(pattern).suffix
         at_its_word = ending != "" and not glob.has_magic(ending)
@@ -113,7 +118,19 @@ class Search:
             relative = Path(os.path.relpath(path, base))
             inside = {os.path.realpath(base / parent) for parent in relative.parents[:-1]}
             if self._skip.isdisjoint(inside) and (at_its_word or self._reads(match)) and _is_file(match):
-                yield path, _below(relative).as_posix()
+                yield str(path), _below(relative).as_posix()
+
+    def _behind_url(self, url: str, *, literal: bool) -> Iterator[tuple[str, str]]:
+        """Yield the objects behind a URL: one, or those of a prefix or pattern that are readable."""
+        pattern = not literal and is_object_url(url) and glob.has_magic(url)
+        if not pattern and (literal or not is_folder_url(url)):
+            return iter([(url, base_name(url))])
+        found = objects_behind(url, recursive=self._recursive)
+        readable = ((each, below) for each, below in found if self._reads(each) and not self._skips(each))
+        return self._wanted(url, readable, "pattern" if pattern else "folder")
+
+    def _skips(self, url: str) -> bool:
+        return any(url.startswith(f"{folder}/") for folder in self._skipped_urls)
 
     def _reads(self, name: str) -> bool:
         return name.lower().endswith(self._endings)

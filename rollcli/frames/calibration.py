@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from rollcli.errors import InputError, UsageError
 from rollcli.files.existence import is_file, is_folder
+from rollcli.files.storage import read_bytes
 from rollcli.rig.calibration import Calibration
 from rollcli.rig.options import CalibrationOptions
 from rollcli.rig.parse import MAX_BYTES, parse_calibration
@@ -147,8 +148,6 @@ def _read(paths: Sequence[str], given: CalibrationOptions) -> Calibration:
 
 
 def _bytes(path: str) -> bytes:
-    from rollcli.files.formats import read_bytes  # NumPy comes with it
-
     try:
         size = Path(path).stat().st_size
     except (OSError, ValueError):

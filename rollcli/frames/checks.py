@@ -9,6 +9,8 @@ from unicodedata import normalize
 
 from rollcli.errors import UsageError
 from rollcli.files.existence import is_folder
+from rollcli.files.stores.locations import is_object_url, split_url
+from rollcli.files.stores.objects import list_objects
 from rollcli.files.stream import write_stdout
 from rollcli.frames.frame import Frame
 
@@ -85,9 +87,27 @@ def check_nothing_is_there(writes: Iterable[str]) -> None:
     UsageError
         Names the first that does.
     """
+    there = _Existing()
     for path in writes:
-        if os.path.lexists(path):
+        if path in there:
             raise UsageError(f"{path}: exists already; give --overwrite to replace it")
+
+
+class _Existing:
+    """What exists; a folder of an object store is listed once, since each question to it takes a while."""
+
+    def __init__(self) -> None:
+        self._listed: dict[str, set[str]] = {}
+
+    def __contains__(self, path: str) -> bool:
+        if not is_object_url(path):
+            return os.path.lexists(path)
+        root = split_url(path)[0]
+        folder = next((each for each in self._listed if path.startswith(each)), None)
+        if folder is None:
+            folder = path[: path.rindex("/") + 1] if path.count("/") > root.count("/") + 1 else f"{root}/"
+            self._listed[folder] = {found for found, _ in list_objects(folder)}
+        return path in self._listed[folder]
 
 
 def list_files(frames: Iterable[tuple[Iterable[str], Iterable[str]]]) -> None:

@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.estimator.result import RollEstimate
-from rollcli.files.atomic import write_atomic
 from rollcli.files.codecs.png import encode_png
 from rollcli.files.encodings import Encoding, from_disparity
 from rollcli.files.formats import Stored, encode_stored
+from rollcli.files.storage import write_bytes
 from rollcli.frames.frame import Frame
 from rollcli.frames.options import FrameOptions
 from rollcli.frames.outputs import image_paths
@@ -38,7 +38,7 @@ def write_images(
         An image cannot be written.
     """
     for kind, path in image_paths(frame, options.images):
-        write_atomic(options.at(path), _ENCODERS[kind](source, estimate, options, horizon))
+        write_bytes(options.at(path), _ENCODERS[kind](source, estimate, options, horizon))
 
 
 def encode_turned(

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from rollcli.estimator.methods import LAMBDA0, MAX_ROLL_DEG, TOLERANCE_DEG, LearningRate
+from rollcli.files.stores.locations import located
 from rollcli.imaging.stereo_options import StereoOptions
 
 
@@ -114,4 +115,4 @@ class FrameOptions:
 
     def at(self, path: str) -> str:
         """Locate a path on this worker."""
-        return str(Path(self.root, path)) if self.root else path
+        return located(self.root, path)

@@ -3,9 +3,11 @@
 import contextlib
 import posixpath
 from collections.abc import Iterable, Iterator
-from pathlib import Path
 
+from rollcli.errors import OutputError
 from rollcli.files.atomic import remove_leftovers
+from rollcli.files.storage import remove
+from rollcli.files.stores.locations import located
 from rollcli.frames.frame import Frame
 from rollcli.frames.options import ImageOptions
 
@@ -44,14 +46,14 @@ def output_path(frame: Frame, folder: str, ending: str | None = None) -> str:
 
 def remove_images(frame: Frame, images: ImageOptions, root: str = "") -> None:
     """Remove the images of a frame: a frame without an angle has none."""
-    remove_outputs(str(Path(root, path)) for _, path in image_paths(frame, images))
+    remove_outputs(located(root, path) for _, path in image_paths(frame, images))
 
 
 def remove_outputs(paths: Iterable[str]) -> None:
     """Remove the files of a failed frame, which an earlier run may have written."""
     for path in paths:
-        with contextlib.suppress(OSError):  # there is no such file or no such folder
-            Path(path).unlink()
+        with contextlib.suppress(OutputError):  # the row says what is wrong with the frame
+            remove(path)
 
 
 def remove_image_leftovers(frames: Iterable[Frame], images: ImageOptions) -> None:

@@ -50,7 +50,7 @@ def run_report(options: ReportOptions) -> ExitStatus:
     result = read_result(options.result)
     if not result.rows:
         raise InputError(f"{options.result}: has no rows: there is nothing to report")
-    recorded = recorded_options(result.run, str(run_path(options.result)))
+    recorded = recorded_options(result.run, run_path(options.result))
     chosen = choose(result.rows, options.gallery)
     rows = [result.rows[each.place] for each in chosen]
     found = subjects(rows, options.result, options.images, recorded.images)

@@ -14,6 +14,7 @@ from rollcli.errors import InputError, UsageError
 from rollcli.files.naming import listed, natural_key
 from rollcli.files.result_columns import ResultColumns, read_columns
 from rollcli.files.results import STATUSES, run_path
+from rollcli.files.stores.locations import base_name
 from rollcli.rig.assess import RigFrames
 from rollcli.rig.quantities import COLUMNS
 
@@ -95,7 +96,9 @@ def _order(parts: Sequence[ResultColumns]) -> NDArray[np.intp]:
         return _by_name(parts)
     for part, shard in zip(parts, shards, strict=True):
         if shard is None:
-            raise UsageError(f"{part.path}: there is no {run_path(part.path).name} to say which shard it is")
+            raise UsageError(
+                f"{part.path}: there is no {base_name(run_path(part.path))} to say which shard it is"
+            )
     known = [shard for shard in shards if shard is not None]
     _check_shards(parts, known)
     places = [

@@ -89,7 +89,7 @@ class Dataset:
 
     def files(self) -> list[Path]:
         """List all files that are written, truth.csv last."""
-        record = [] if self.record is None else [run_path(self.folder / TRUTH)]
+        record = [] if self.record is None else [Path(run_path(self.folder / TRUTH))]
         images = (path for task in self.missing for path in task.images())
         return [*record, *images, *self.calibrations(), self.folder / TRUTH]
 

@@ -103,7 +103,7 @@ def _check_resumable(dataset: Dataset) -> None:
     UsageError
         Says what differs.
     """
-    name, record = str(dataset.folder), run_path(TRUTH).name
+    name, record = str(dataset.folder), run_path(TRUTH)
     try:
         was = read_run(dataset.folder / TRUTH)
     except InputError as error:

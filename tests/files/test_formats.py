@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from rollcli.errors import InputError, OutputError, UsageError
-from rollcli.files.formats import decode_stored, encode_stored, read_bytes, read_image, read_stored
+from rollcli.files.formats import decode_stored, encode_stored, read_image, read_stored
+from rollcli.files.storage import read_bytes
 from tests.binary_files import disparity_map, make_npy, make_png, make_tiff
 
 WRITTEN = [

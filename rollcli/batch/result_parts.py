@@ -1,0 +1,163 @@
+"""A result as a folder of immutable parts: for Parquet, and for object stores, which cannot append.
+
+A part holds a fixed number of rows, and only the last part holds fewer. It is written whole, and its rows
+count as done when it exists. Parts of CSV and JSON Lines, put together in their order, are the very file that
+a run on a local disk writes.
+"""
+
+import uuid
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from rollcli.batch.options import EstimateOptions
+from rollcli.batch.plan import Plan
+from rollcli.batch.resume import check_resumable
+from rollcli.batch.run_record import RunRecord
+from rollcli.errors import InputError, OutputError, UsageError
+from rollcli.files.codecs.parquet import encode_parquet, require_parquet
+from rollcli.files.results import (
+    Row,
+    column_types,
+    format_header,
+    format_row,
+    parse_parts,
+    plain_values,
+    read_run,
+)
+from rollcli.files.resumable import not_resumable
+from rollcli.files.storage import create, list_names, remove
+from rollcli.files.stores.locations import base_name, is_url
+from rollcli.files.stores.parts import part_names
+from rollcli.frames.frame import FrameResult
+
+
+class PartsOutput:
+    """Rows to a folder of parts, and FILE.run.json beside it."""
+
+    resumable = True
+    keep_open: int | None = None
+
+    def __init__(self, plan: Plan, record: RunRecord, kept: tuple[Row, ...], part_rows: int) -> None:
+        self.kept = kept
+        self._plan, self._record, self._part_rows = plan, record, part_rows
+        self._next = len(kept) // part_rows
+        self._waiting: list[Row] = []
+        self._run = uuid.uuid4().hex  # tells our parts from those of another run
+        self._written = len(kept)
+
+    def append(self, result: FrameResult) -> None:
+        """Take the row; every full part is written."""
+        self._record.saw(result.encoding, result.searched)
+        self._waiting.append(result.row)
+        if len(self._waiting) == self._part_rows:
+            self._write()
+
+    def finish(self, totals: Mapping[str, int], alignment: Mapping[str, Any] | None) -> None:
+        """Write the last part, and both into the record."""
+        if self._waiting or not self._written:
+            self._write()
+        self._record.write(totals, alignment)
+
+    def hint(self, rows: int) -> str:
+        """Say that --resume continues after the last part."""
+        return f"; {self._written} rows are kept, continue with --resume" if self._written else ""
+
+    def _write(self) -> None:
+        data = self._encoded()
+        location = _part_location(self._plan, self._next)
+        if not create(location, data, self._run):
+            raise OutputError(f"{location}: another run is writing this result; give another --output")
+        self._written += len(self._waiting)
+        self._next += 1
+        self._waiting = []
+
+    def _encoded(self) -> bytes:
+        plan = self._plan
+        if plan.format == "parquet":
+            values = [plain_values(row, plan.timing) for row in self._waiting]
+            return encode_parquet(column_types(plan.timing), values, self._record.fixed)
+        header = format_header(plan.format, plan.timing) if self._next == 0 else b""
+        return header + b"".join(format_row(row, plan.format, plan.timing) for row in self._waiting)
+
+
+def open_parts(plan: Plan, options: EstimateOptions) -> PartsOutput:
+    """Begin a folder of parts, or continue that of an interrupted run.
+
+    Raises
+    ------
+    UsageError
+        Parts exist and neither --resume nor --overwrite is given, or they cannot be continued.
+    OutputError
+        The folder cannot be written.
+    """
+    if plan.format == "parquet":
+        require_parquet()
+    parts = check_parts(plan, resume=options.result.resume, overwrite=options.running.overwrite)
+    record = RunRecord(plan, options)
+    rows: tuple[Row, ...] = ()
+    if options.result.resume and parts:
+        rows = _kept_rows(plan, parts, options.result.part_rows)
+        if rows:
+            record.continue_from(check_resumable(rows, _earlier(plan), record, plan))
+    for name in parts[_whole_parts(len(rows), options.result.part_rows) :]:
+        remove(f"{plan.output}/{name}")
+    record.write({})
+    return PartsOutput(plan, record, rows, options.result.part_rows)
+
+
+def check_parts(plan: Plan, *, resume: bool, overwrite: bool) -> list[str]:
+    """Return the names of the parts that exist, in order; refuse to touch them unless told how.
+
+    Raises
+    ------
+    UsageError
+        Parts exist and neither --resume nor --overwrite is given; or a file is in the folder's place.
+    """
+    if not is_url(plan.output) and Path(plan.output).exists() and not Path(plan.output).is_dir():
+        raise UsageError(f"{plan.output}: is a file; a result of parts is a folder, give another --output")
+    parts = part_names(list_names(plan.output))
+    if parts and not (resume or overwrite):
+        raise UsageError(
+            f"{plan.output}: exists already; give --resume to continue it or --overwrite to replace it"
+        )
+    endings = {name.rpartition(".")[2] for name in parts}
+    if resume and parts and endings != {plan.format}:
+        raise not_resumable(plan.output, f"its parts are {', '.join(sorted(endings))}, not {plan.format}")
+    return parts
+
+
+def count_kept_parts(plan: Plan, options: EstimateOptions) -> int:
+    """Count the rows that a resume would keep."""
+    parts = check_parts(plan, resume=options.result.resume, overwrite=options.running.overwrite)
+    return len(_kept_rows(plan, parts, options.result.part_rows)) if options.result.resume and parts else 0
+
+
+def _kept_rows(plan: Plan, parts: list[str], part_rows: int) -> tuple[Row, ...]:
+    """Return the rows of the parts from the first one on, as far as none is missing or short.
+
+    The names are sorted: after a missing part, no name has the number of its place.
+    """
+    numbered = enumerate(parts)
+    present = [name for number, name in numbered if name == base_name(_part_location(plan, number))]
+    try:
+        rows = parse_parts(plan.output, present)
+    except InputError as error:
+        raise not_resumable(plan.output, str(error)) from error
+    whole = len(rows) if len(rows) == len(plan.frames) else len(rows) // part_rows * part_rows
+    return rows[:whole]
+
+
+def _whole_parts(rows: int, part_rows: int) -> int:
+    return -(-rows // part_rows)
+
+
+def _earlier(plan: Plan) -> Mapping[str, Any] | None:
+    try:
+        return read_run(plan.output)
+    except InputError as error:
+        raise not_resumable(plan.output, str(error)) from error
+
+
+def _part_location(plan: Plan, number: int) -> str:
+    return f"{plan.output}/part-{number:05d}.{plan.format}"

@@ -1,0 +1,81 @@
+"""Tables as Parquet (extra `parquet`): typed columns, nulls, and a record in the schema's metadata."""
+
+import io
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from rollcli.errors import InputError, UsageError
+
+MAGIC = b"PAR1"
+_RECORD = b"rollcli"
+_ARROW_TYPES = {str: "string", float: "float64", int: "int64", bool: "bool"}
+
+
+def require_parquet() -> None:
+    """Refuse, before any work, what cannot be done without pyarrow.
+
+    Raises
+    ------
+    UsageError
+        The extra `parquet` is not installed.
+    """
+    try:
+        import pyarrow.parquet  # noqa: F401 (this is the question)
+    except ImportError as error:
+        raise UsageError("Parquet needs the extra parquet: pip install 'rollcli[parquet]'") from error
+
+
+def encode_parquet(
+    types: Mapping[str, type], rows: Sequence[Mapping[str, Any]], record: Mapping[str, Any]
+) -> bytes:
+    """Encode a table.
+
+    Parameters
+    ----------
+    types : mapping of str to type
+        The columns in their order: str, float, int or bool. Any of them may hold None.
+    rows : sequence of mapping
+        The values by the names of their columns.
+    record : mapping
+        It stands as JSON under the key `rollcli` of the schema's metadata.
+
+    Raises
+    ------
+    UsageError
+        A text is not UTF-8, as a file name need not be; Parquet cannot hold it.
+    """
+    import pyarrow
+    import pyarrow.parquet
+
+    columns = [(name, _ARROW_TYPES[kind]) for name, kind in types.items()]
+    schema = pyarrow.schema(columns, metadata={_RECORD: json.dumps(record).encode()})
+    try:
+        table = pyarrow.Table.from_pylist(list(rows), schema=schema)
+    except UnicodeEncodeError as error:
+        name = error.object.encode("utf-8", "backslashreplace").decode()
+        raise UsageError(f"{name}: this name is not UTF-8, which Parquet cannot hold; use CSV") from error
+    target = io.BytesIO()
+    pyarrow.parquet.write_table(table, target, compression="zstd", version="2.6")
+    return target.getvalue()
+
+
+def decode_parquet(data: bytes, name: str) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Yield the number (from 1) and the values of each row.
+
+    Raises
+    ------
+    InputError
+        It is damaged.
+    UsageError
+        The extra `parquet` is not installed.
+    """
+    require_parquet()
+    import pyarrow
+    import pyarrow.parquet
+
+    try:
+        table = pyarrow.parquet.ParquetFile(io.BytesIO(data)).read()
+    except (pyarrow.ArrowException, OSError, ValueError) as error:
+        raise InputError(f"{name}: is damaged: {' '.join(str(error).split())[:200]}") from error
+    yield from enumerate(table.to_pylist(), 1)

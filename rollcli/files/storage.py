@@ -1,0 +1,186 @@
+"""Bytes wherever they lie: on local disk, in an object store, or on a web server.
+
+Import-light: obstore is loaded when the first URL of an object store is read or written.
+"""
+
+import contextlib
+import os
+import stat
+from pathlib import Path
+
+from rollcli.errors import InputError, OutputError
+from rollcli.files.atomic import output_error, write_atomic
+from rollcli.files.stores.locations import WEB_SERVERS, is_url, public_name, scheme_of
+from rollcli.files.stores.objects import (
+    create_object,
+    list_objects,
+    object_exists,
+    read_object,
+    remove_object,
+    write_object,
+)
+
+_MAX_BYTES = 2**32
+
+
+def read_bytes(location: str | Path, name: str | None = None) -> bytes:
+    """Return the bytes of a file or an object.
+
+    Parameters
+    ----------
+    location : str or Path
+        A path, or a URL of s3, gs, az, http or https.
+    name : str, optional
+        What errors call it; by default the location, without secrets.
+
+    Raises
+    ------
+    InputError
+        It does not exist, may not be read, is empty, is no regular file, or its store does not answer.
+    """
+    location = str(location)
+    name = name or public_name(location)
+    data = _read_url(location) if is_url(location) else _read_file(location, name)
+    if not data:
+        raise InputError(f"{name}: is empty")
+    return data
+
+
+def _read_url(location: str) -> bytes:
+    if scheme_of(location) in WEB_SERVERS:
+        from rollcli.files.stores.web import read_web_file  # urllib takes longer to load than all of this
+
+        return read_web_file(location)
+    return read_object(location)
+
+
+def write_bytes(location: str, data: bytes, *, durable: bool = False) -> None:
+    """Write a file or an object, whole or not at all; what is there is replaced.
+
+    Parameters
+    ----------
+    location : str
+        A path, or a URL of an object store.
+    data : bytes
+    durable : bool
+        Whether a file survives a power cut once this returns, as an object always does.
+
+    Raises
+    ------
+    OutputError
+        It cannot be written.
+    """
+    if not is_url(location):
+        write_atomic(location, data, durable=durable)
+        return
+    _require_writable(location)
+    write_object(location, data)
+
+
+def create(location: str, data: bytes, owner: str) -> bool:
+    """Write a file or an object unless there is one of this name; return whether this owner wrote it.
+
+    Parameters
+    ----------
+    location : str
+        A path, or a URL of an object store.
+    data : bytes
+    owner : str
+        Names who writes. A store may have taken a request whose answer was lost; when the request is
+        repeated, this name tells our own object from another's.
+
+    Raises
+    ------
+    OutputError
+        It cannot be written.
+    """
+    if not is_url(location):
+        return _create_file(Path(location), data)
+    _require_writable(location)
+    return create_object(location, data, owner)
+
+
+def list_names(folder: str) -> list[str]:
+    """Return the names of the files in a folder, or of the objects below a prefix; none if it is absent."""
+    if is_url(folder):
+        if scheme_of(folder) in WEB_SERVERS:
+            return []  # a web server cannot be asked
+        base = folder.rstrip("/") + "/"
+        return [url.removeprefix(base) for url, _ in list_objects(base)]
+    try:
+        return [path.name for path in Path(folder).iterdir()]
+    except (FileNotFoundError, NotADirectoryError):
+        return []
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be read: {(error.strerror or str(error)).lower()}") from error
+
+
+def exists(location: str) -> bool:
+    """Return whether there is a file or an object of this name."""
+    if not is_url(location):
+        return os.path.lexists(location)
+    if scheme_of(location) in WEB_SERVERS:
+        return True  # asking costs as much as reading; reading says what is wrong
+    return object_exists(location)
+
+
+def remove(location: str) -> None:
+    """Remove a file or an object; none of this name is no error.
+
+    Raises
+    ------
+    OutputError
+        It cannot be removed.
+    """
+    if is_url(location):
+        _require_writable(location)
+        remove_object(location)
+        return
+    try:
+        Path(location).unlink(missing_ok=True)
+    except OSError as error:
+        raise output_error(location, error) from error
+
+
+def _read_file(path: str, name: str) -> bytes:
+    """Return the bytes of a regular file; pipes and devices could be read for ever."""
+    try:
+        # not blocking: a named pipe would otherwise wait for its writer for ever
+        descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+        with os.fdopen(descriptor, "rb") as file:
+            status = os.fstat(file.fileno())
+            if not stat.S_ISREG(status.st_mode):
+                raise InputError(f"{name}: is not a regular file")
+            if status.st_size > _MAX_BYTES:
+                raise InputError(f"{name}: has {status.st_size} bytes; no disparity map is that large")
+            data = file.read()
+    except IsADirectoryError:
+        raise InputError(f"{name}: is a folder, not a file") from None
+    except FileNotFoundError:
+        dangling = os.path.lexists(path)
+        raise InputError(f"{name}: {'is a link to nothing' if dangling else 'no such file'}") from None
+    except (OSError, ValueError) as error:
+        reason = str(getattr(error, "strerror", None) or error).lower()
+        raise InputError(f"{name}: cannot be read: {reason}") from None
+    return data
+
+
+def _create_file(target: Path, data: bytes) -> bool:
+    """Create a local file whole: write it under another name, and link it to its own if that is free."""
+    own = target.with_name(f".{target.name}.{os.getpid()}")
+    write_atomic(own, data)
+    try:
+        os.link(own, target)
+    except FileExistsError:
+        return False
+    except OSError as error:
+        raise output_error(target, error) from error
+    finally:
+        with contextlib.suppress(OSError):
+            own.unlink()
+    return True
+
+
+def _require_writable(url: str) -> None:
+    if scheme_of(url) in WEB_SERVERS:
+        raise OutputError(f"{public_name(url)}: web servers are read from, not written to")

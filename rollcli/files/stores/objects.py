@@ -1,0 +1,245 @@
+"""Objects of s3, gs and az through obstore, and files of web servers (extra `storage`).
+
+obstore hangs in a child process when it was used before a fork. Workers are spawned, and each opens its own
+stores here when it first needs them.
+"""
+
+import os
+import re
+import time
+from collections.abc import Callable, Iterator
+from datetime import timedelta
+from functools import lru_cache
+from typing import Any, TypeVar
+
+from rollcli.errors import InputError, OutputError, UsageError
+from rollcli.files.stores.locations import public_name, split_url
+
+Value = TypeVar("Value")
+
+_CONNECT_S = 5
+_REQUEST_S = 60  # a map of 10 MB at 1.4 Mbit/s takes as long
+_RETRIES = 6  # by obstore: answers 5xx and refused connections
+_RETRY_S = 60
+_BODY_TRIES = 4  # by this module: a body that is cut in the middle
+_FIRST_PAUSE_S = 0.2
+_OWNER = "rollcli-run"  # attribute of an object that was created rather than replaced
+TIMEOUT_VARIABLE = "ROLLCLI_STORE_TIMEOUT"  # seconds a request may take
+
+
+def read_object(url: str) -> bytes:
+    """Return the bytes of an object.
+
+    Raises
+    ------
+    InputError
+        There is no such object, it may not be read, or the store does not answer.
+    """
+    store, key = _open(url)
+
+    def fetch() -> bytes:
+        return bytes(store.get(key).bytes())
+
+    try:
+        return _repeated(fetch)
+    except FileNotFoundError as error:
+        raise InputError(f"{public_name(url)}: {_missing(error)}") from None
+    except _store_errors() as error:
+        raise InputError(f"{public_name(url)}: cannot be read: {_reason(error)}") from None
+
+
+def write_object(url: str, data: bytes) -> None:
+    """Write an object, whole or not at all; an existing one is replaced.
+
+    Raises
+    ------
+    OutputError
+        The store does not take it.
+    """
+    _put(url, data, "overwrite")
+
+
+def create_object(url: str, data: bytes, owner: str) -> bool:
+    """Write an object unless there is one of this name; return whether this owner wrote it."""
+    from obstore.exceptions import AlreadyExistsError
+
+    try:
+        _put(url, data, "create", {_OWNER: owner})
+    except AlreadyExistsError:
+        store, key = _open(url)
+        return _repeated(lambda: bool(store.get(key).attributes.get(_OWNER) == owner))
+    return True
+
+
+def object_exists(url: str) -> bool:
+    """Return whether there is an object of this name."""
+    return object_state(url) is not None
+
+
+def object_state(url: str) -> tuple[int, str] | None:
+    """Return the size and the version mark of an object, or None where there is none.
+
+    Raises
+    ------
+    InputError
+        The store does not answer, or does not let us look.
+    """
+    store, key = _open(url)
+    try:
+        found = store.head(key)
+    except FileNotFoundError:
+        return None
+    except _store_errors() as error:
+        raise InputError(f"{public_name(url)}: cannot be read: {_reason(error)}") from None
+    return found["size"], str(found["e_tag"] or found["last_modified"])
+
+
+def remove_object(url: str) -> None:
+    """Remove an object; none of this name is no error.
+
+    Raises
+    ------
+    OutputError
+        The store does not let us.
+    """
+    store, key = _open(url)
+    try:
+        store.delete(key)
+    except FileNotFoundError:
+        return
+    except _store_errors() as error:
+        raise OutputError(f"{public_name(url)}: cannot be removed: {_reason(error)}") from None
+
+
+def list_objects(url: str) -> Iterator[tuple[str, int]]:
+    """Yield the URL and size of each object below a prefix, in the store's order.
+
+    Parameters
+    ----------
+    url : str
+        ``s3://bucket/folder/``; the prefix ends at a slash, as a folder's name does.
+
+    Raises
+    ------
+    UsageError
+        There is no such bucket, or it may not be listed.
+    """
+    store, prefix = _open(url)
+    root = split_url(url)[0]
+    try:
+        for chunk in store.list(prefix.rstrip("/") or None, chunk_size=1000):
+            for found in chunk:
+                yield f"{root}/{found['path']}", found["size"]
+    except FileNotFoundError as error:
+        raise UsageError(f"{public_name(url)}: {_missing(error)}") from None
+    except _store_errors() as error:
+        raise UsageError(f"{public_name(url)}: cannot be listed: {_reason(error)}") from None
+
+
+def _put(url: str, data: bytes, mode: str, attributes: dict[str, str] | None = None) -> None:
+    from obstore.exceptions import AlreadyExistsError
+
+    store, key = _open(url)
+    try:
+        store.put(key, data, mode=mode, attributes=attributes)
+    except AlreadyExistsError:
+        raise
+    except FileNotFoundError as error:
+        raise OutputError(f"{public_name(url)}: {_missing(error)}") from None
+    except _store_errors() as error:
+        raise OutputError(f"{public_name(url)}: cannot be written: {_reason(error)}") from None
+
+
+def _repeated(fetch: Callable[[], Value]) -> Value:
+    """Call `fetch` again, after growing pauses, when the network cuts an answer short."""
+    from obstore.exceptions import GenericError
+
+    for attempt in range(_BODY_TRIES - 1):
+        try:
+            return fetch()
+        except GenericError:
+            time.sleep(_FIRST_PAUSE_S * 4**attempt)
+    return fetch()
+
+
+def _open(url: str) -> tuple[Any, str]:
+    root, key = split_url(url)
+    return _store(root, os.getpid()), key
+
+
+@lru_cache(maxsize=64)
+def _store(root: str, process: int) -> Any:
+    """Open a bucket; its endpoint and keys come from the environment. `process` keeps forks apart."""
+    try:
+        from obstore.store import from_url
+    except ImportError as error:
+        raise UsageError(f"{root}: needs the extra storage: pip install 'rollcli[storage]'") from error
+    from obstore.exceptions import BaseError
+
+    seconds = _request_seconds()
+    client = {"connect_timeout": f"{_CONNECT_S}s", "timeout": f"{seconds:g}s"}
+    if os.environ.get("AWS_ENDPOINT_URL", os.environ.get("AWS_ENDPOINT", "")).startswith("http://"):
+        client["allow_http"] = "true"
+    retry: Any = {"max_retries": _RETRIES, "retry_timeout": timedelta(seconds=max(_RETRY_S, 2 * seconds))}
+    try:
+        return from_url(root, client_options=client, retry_config=retry)  # type: ignore[call-overload]
+    except (BaseError, ValueError) as error:
+        raise UsageError(f"{root}: cannot be opened: {_reason(error)}") from None
+
+
+def _request_seconds() -> float:
+    text = os.environ.get(TIMEOUT_VARIABLE, "")
+    try:
+        seconds = float(text) if text else float(_REQUEST_S)
+    except ValueError:
+        seconds = 0.0
+    if not 0 < seconds < 1e6:
+        raise UsageError(f"{TIMEOUT_VARIABLE}={text}: give seconds, such as 60")
+    return seconds
+
+
+def _store_errors() -> tuple[type[Exception], ...]:
+    from obstore.exceptions import BaseError
+
+    return (BaseError, OSError, RuntimeError)
+
+
+_CODES = {
+    "NoSuchBucket": "there is no such bucket",
+    "AccessDenied": "access is denied; check the rights of these keys",
+    "InvalidAccessKeyId": "the access key is unknown; check AWS_ACCESS_KEY_ID",
+    "SignatureDoesNotMatch": "the secret key is wrong; check AWS_SECRET_ACCESS_KEY",
+    "ExpiredToken": "the keys have expired; fetch new ones",
+    "RequestTimeTooSkewed": "this machine's clock differs from the store's; set it",
+    "PermanentRedirect": "the bucket is in another region; set AWS_REGION",
+    "AuthorizationHeaderMalformed": "the bucket is in another region; set AWS_REGION",
+    "IllegalLocationConstraintException": "the bucket is in another region; set AWS_REGION",
+}
+_STATUS = re.compile(r"non-2xx status code: (\d+)")
+
+
+def _reason(error: Exception) -> str:
+    """Say in one line what a store objects to, without addresses, keys or signatures."""
+    text = str(error)
+    for code, meaning in _CODES.items():
+        if f"<Code>{code}</Code>" in text:
+            return meaning
+    if "169.254.169.254" in text or "metadata" in text.lower():
+        return "no keys are given; set AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, or the store's own"
+    if "301 Moved Permanently" in text or "redirect" in text.lower():
+        return "the bucket is in another region; set AWS_REGION"
+    if "MissingAccount" in text:
+        return "no account is given; set AZURE_STORAGE_ACCOUNT_NAME"
+    status = _STATUS.search(text)
+    if status:
+        meanings = {"401": "the keys are not accepted", "403": "access is denied; check the keys and rights"}
+        return meanings.get(status[1], f"the store answered {status[1]}")
+    if "error sending request" in text or "onnect" in text:
+        return "the store does not answer; check the network and the endpoint"
+    if "timed out" in text or "timeout" in text.lower():
+        return f"the store takes too long; {TIMEOUT_VARIABLE} sets the seconds it may take"
+    return "the answer of the store was cut short" if "body" in text else "the store refused the request"
+
+
+def _missing(error: Exception) -> str:
+    return _CODES["NoSuchBucket"] if "NoSuchBucket" in str(error) else "there is no such object"

@@ -1,0 +1,55 @@
+"""Single files of web servers; signed addresses work, and are never shown."""
+
+import http.client
+import time
+import urllib.error
+import urllib.request
+
+from rollcli.errors import InputError
+from rollcli.files.stores.locations import public_name
+
+_TIMEOUT_S = 60.0
+_TRIES = 4
+_FIRST_PAUSE_S = 0.2
+_LARGEST = 2**32
+
+
+def read_web_file(url: str) -> bytes:
+    """Return the bytes behind an http or https URL.
+
+    Raises
+    ------
+    InputError
+        There is no such file, it may not be read, or the server does not answer.
+    """
+    for attempt in range(_TRIES):
+        try:
+            return _fetched(url)
+        except urllib.error.HTTPError as error:
+            reason, final = f"the server answered {error.code} {error.reason}", error.code < 500
+        except (OSError, http.client.HTTPException, ValueError) as error:
+            reason, final = _reason(error), isinstance(error, ValueError)
+        if final:
+            break
+        time.sleep(_FIRST_PAUSE_S * 4**attempt)
+    raise InputError(f"{public_name(url)}: cannot be read: {reason}")
+
+
+def _fetched(url: str) -> bytes:
+    with urllib.request.urlopen(url, timeout=_TIMEOUT_S) as answer:
+        data: bytes = answer.read(_LARGEST + 1)
+    if len(data) > _LARGEST:
+        raise ValueError("it has more bytes than any disparity map")
+    return data
+
+
+def _reason(error: Exception) -> str:
+    if isinstance(error, TimeoutError) or "timed out" in str(error):
+        return "the server takes too long"
+    if isinstance(error, http.client.IncompleteRead):
+        return "the answer of the server was cut short"
+    if isinstance(error, urllib.error.URLError):
+        return "the server does not answer"
+    return (
+        str(error) if isinstance(error, ValueError) else "the server does not answer as one of the web does"
+    )

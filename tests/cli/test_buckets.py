@@ -1,0 +1,108 @@
+"""Buckets in and out: what works on a disk works in an object store."""
+
+import pytest
+
+from tests.run_cli import contents, rollcli, write_maps
+
+
+@pytest.fixture
+def bucket(store, tmp_path, monkeypatch):
+    """Five maps on disk and in a bucket, below a prefix of this test's own."""
+    for name, value in store.items():
+        monkeypatch.setenv(name, value)
+    from rollcli.files.storage import write_bytes
+
+    write_maps(tmp_path / "maps", 5)
+    for name, data in contents(tmp_path / "maps").items():
+        write_bytes(f"s3://maps/{tmp_path.name}/maps/{name}", data)
+    return f"s3://maps/{tmp_path.name}"
+
+
+def joined(folder, ending="csv"):
+    """The parts of a result below a URL, put together."""
+    from rollcli.files.storage import list_names, read_bytes
+
+    names = sorted(name for name in list_names(folder) if name.endswith(ending))
+    return b"".join(read_bytes(f"{folder}/{name}") for name in names)
+
+
+def test_maps_and_images_and_rows_in_a_bucket_are_those_on_disk(bucket, tmp_path):
+    local = rollcli("estimate", "maps", "-o", "rolls.csv", "--derotated", "level", cwd=tmp_path)
+    assert local.status == 0
+    there = rollcli(
+        *("estimate", f"{bucket}/maps", "-o", f"{bucket}/rolls.csv", "--derotated", f"{bucket}/level"),
+        *("--part-rows", "2", "-j", "2"),
+        cwd=tmp_path,
+    )
+    assert (there.status, contents(tmp_path).keys()) == (0, contents(tmp_path).keys())
+    expected = (tmp_path / "rolls.csv").read_bytes().replace(b"maps/", f"{bucket}/maps/".encode())
+    assert joined(f"{bucket}/rolls.csv") == expected
+    from rollcli.files.storage import read_bytes
+
+    for name, data in contents(tmp_path / "level").items():
+        assert read_bytes(f"{bucket}/level/{name}") == data
+
+
+def test_a_result_in_a_bucket_is_kept_resumed_and_replaced_as_asked(bucket, tmp_path):
+    line = ("estimate", f"{bucket}/maps", "-o", f"{bucket}/rolls.csv", "--part-rows", "2", "-q")
+    assert rollcli(*line, cwd=tmp_path).status == 0
+    whole = joined(f"{bucket}/rolls.csv")
+    refused = rollcli(*line, cwd=tmp_path)
+    assert refused.status == 2
+    assert "exists already; give --resume" in refused.err
+    from rollcli.files.storage import remove
+
+    remove(f"{bucket}/rolls.csv/part-00001.csv")
+    assert rollcli(*line, "--resume", cwd=tmp_path).status == 0
+    assert joined(f"{bucket}/rolls.csv") == whole
+    assert rollcli(*line, "--overwrite", cwd=tmp_path).status == 0
+    assert joined(f"{bucket}/rolls.csv") == whole
+
+
+def test_parquet_parts_are_one_typed_table(tmp_path):
+    parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow, of the extra parquet, is not here")
+    write_maps(tmp_path / "maps", 5)
+    (tmp_path / "maps" / "frame9.png").write_bytes(b"no map")
+    assert rollcli("estimate", "maps", "-o", "rolls.csv", cwd=tmp_path).status == 3
+    assert rollcli("estimate", "maps", "-o", "rolls.parquet", "--part-rows", "4", cwd=tmp_path).status == 3
+    assert sorted(contents(tmp_path / "rolls.parquet")) == ["part-00000.parquet", "part-00001.parquet"]
+    table = parquet.read_table(tmp_path / "rolls.parquet")
+    assert table.num_rows == 6
+    types = {name: str(table.schema.field(name).type) for name in ("file", "roll_deg", "iterations")}
+    assert types == {"file": "string", "roll_deg": "double", "iterations": "int64"}
+    assert table.column("roll_deg")[5].as_py() is None
+    assert b"rollcli" in table.schema.metadata
+    from rollcli.files.results import read_result
+
+    assert read_result(tmp_path / "rolls.parquet").rows == read_result(tmp_path / "rolls.csv").rows
+
+
+def test_other_commands_read_a_result_of_parts(bucket, tmp_path):
+    assert (
+        rollcli("estimate", "maps", "-o", f"{bucket}/rolls.csv", "--part-rows", "2", cwd=tmp_path).status == 0
+    )
+    turned = rollcli(
+        "derotate", "maps", "--from", f"{bucket}/rolls.csv", "-o", f"{bucket}/level", cwd=tmp_path
+    )
+    assert (turned.status, len(joined(f"{bucket}/level", "png")) > 1000) == (0, True)
+    (tmp_path / "truth.csv").write_text("file,roll_deg\n" + "".join(f"frame{i},0\n" for i in range(5)))
+    figures = rollcli("evaluate", "accuracy", f"{bucket}/rolls.csv", "--truth", "truth.csv", cwd=tmp_path)
+    assert figures.status == 0, figures.err
+    assert "frames compared           5" in figures.out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["estimate", "s3://nowhere/maps/"], "s3://nowhere/maps/: cannot be listed: there is no such bucket"),
+        (["estimate", "s3://maps/empty/"], "no input found in this folder"),
+        (["estimate", "ftp://host/maps/"], "ftp:// is not supported"),
+        (["estimate", "maps", "--format", "parquet"], "Parquet is a folder of parts: name it with --output"),
+        (["estimate", "maps", "-o", "s3://nowhere/rolls.csv"], "there is no such bucket"),
+    ],
+)
+def test_what_is_wrong_with_a_bucket_is_one_line(bucket, tmp_path, arguments, said):
+    done = rollcli(*arguments, cwd=tmp_path)
+    assert done.status == 2
+    assert said in done.err
+    assert done.err.count("\n") == 1

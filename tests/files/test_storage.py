@@ -1,0 +1,95 @@
+"""Bytes in an object store are read and written as those of local files are."""
+
+import pytest
+
+from rollcli.errors import InputError, OutputError, UsageError
+from rollcli.files import storage
+from rollcli.files.stores.locations import public_name
+from rollcli.files.stores.objects import list_objects
+
+
+@pytest.fixture(params=["local", "s3"])
+def folder(request, tmp_path, monkeypatch):
+    """A folder on disk, and a prefix of a bucket."""
+    if request.param == "local":
+        return str(tmp_path)
+    for name, value in request.getfixturevalue("store").items():
+        monkeypatch.setenv(name, value)
+    return f"s3://maps/{tmp_path.name}"
+
+
+@pytest.mark.parametrize("name", ["map.png", "a b/ü%20#?.png", "=x/..y"])
+def test_what_was_written_is_read(folder, name):
+    assert not storage.exists(f"{folder}/{name}")
+    storage.write_bytes(f"{folder}/{name}", b"first")
+    storage.write_bytes(f"{folder}/{name}", b"second")
+    assert storage.exists(f"{folder}/{name}")
+    assert storage.read_bytes(f"{folder}/{name}") == b"second"
+
+
+def test_only_the_first_creates(folder):
+    assert storage.create(f"{folder}/part", b"mine", "me")
+    assert not storage.create(f"{folder}/part", b"mine", "you")
+    assert not storage.create(f"{folder}/part", b"yours", "you")
+    assert storage.read_bytes(f"{folder}/part") == b"mine"
+
+
+def test_what_is_not_there_is_an_input_error(folder):
+    with pytest.raises(InputError, match="no such"):
+        storage.read_bytes(f"{folder}/none.png")
+
+
+def test_what_was_removed_is_gone_and_may_be_removed_again(folder):
+    storage.write_bytes(f"{folder}/x", b"x")
+    storage.remove(f"{folder}/x")
+    storage.remove(f"{folder}/x")
+    assert not storage.exists(f"{folder}/x")
+
+
+def test_objects_are_listed_with_their_sizes_below_their_folder_only(store, monkeypatch):
+    for name, value in store.items():
+        monkeypatch.setenv(name, value)
+    for name in ("listed/a.png", "listed/b/c.png", "listed2/d.png"):
+        storage.write_bytes(f"s3://maps/{name}", b"12345")
+    found = sorted(list_objects("s3://maps/listed/"))
+    assert found == [("s3://maps/listed/a.png", 5), ("s3://maps/listed/b/c.png", 5)]
+
+
+@pytest.mark.parametrize(
+    ("url", "said"),
+    [
+        ("s3://no-such-bucket/x", "there is no such bucket"),
+        ("s3:///x", "names no bucket"),
+        ("ftp://host/x.png", "ftp:// is not supported; use s3://"),
+    ],
+)
+def test_a_wrong_address_is_one_line(store, monkeypatch, url, said):
+    for name, value in store.items():
+        monkeypatch.setenv(name, value)
+    with pytest.raises((InputError, UsageError), match=said) as raised:
+        storage.read_bytes(url)
+    assert "\n" not in str(raised.value)
+
+
+def test_a_store_that_does_not_answer_is_one_line_without_keys(monkeypatch):
+    pytest.importorskip("obstore", reason="obstore, of the extra storage, is not here")
+    monkeypatch.setenv("AWS_ENDPOINT_URL", "http://127.0.0.1:9")
+    monkeypatch.setenv("AWS_ACCESS_KEY_ID", "PUBLIC")
+    monkeypatch.setenv("AWS_SECRET_ACCESS_KEY", "SECRET")
+    monkeypatch.setattr("rollcli.files.stores.objects._RETRIES", 0)
+    monkeypatch.setattr("rollcli.files.stores.objects._BODY_TRIES", 1)
+    with pytest.raises(InputError, match="does not answer") as raised:
+        storage.read_bytes("s3://closed/x.png")
+    assert "SECRET" not in str(raised.value)
+    assert "PUBLIC" not in str(raised.value)
+
+
+def test_web_servers_are_read_only():
+    with pytest.raises(OutputError, match="not written to"):
+        storage.write_bytes("https://host/x.png", b"")
+
+
+def test_signatures_and_passwords_are_not_shown():
+    assert public_name("https://me:pw@host:8/a b.png?X-Amz-Signature=1#2") == "https://host:8/a b.png"
+    assert public_name("s3://bucket/what?.png") == "s3://bucket/what?.png"
+    assert public_name("C:/maps/x.png") == "C:/maps/x.png"
