@@ -27,7 +27,7 @@ from rollcli.files.stream import (
 )
 from rollcli.frames.frame import Frame, FrameResult
 from rollcli.frames.options import ImageOptions
-from rollcli.frames.outputs import has_images, image_paths, remove_image_leftovers
+from rollcli.frames.outputs import has_images, local_images, remove_image_leftovers
 
 
 class Output(Protocol):
@@ -151,7 +151,7 @@ class FileOutput:
 
     def _paths(self, frame: Frame, result: FrameResult) -> Iterator[str]:
         if result.row.status != "error":
-            yield from (path for _, path in image_paths(frame, self._images))
+            yield from local_images(frame, self._images)
 
 
 @contextlib.contextmanager
@@ -193,7 +193,7 @@ def frames_to_do(plan: Plan, options: EstimateOptions) -> list[Frame]:
         As `open_output`.
     """
     if plan.in_parts:
-        return count_kept_parts(plan, options)
+        return plan.frames[count_kept_parts(plan, options) :]
     _check_permitted(plan.output, options)
     if not options.result.resume:
         return plan.frames

@@ -16,6 +16,7 @@ from rollcli.batch.resume import check_resumable
 from rollcli.batch.run_record import RunRecord
 from rollcli.errors import InputError, OutputError, UsageError
 from rollcli.files.codecs.parquet import encode_parquet, require_parquet
+from rollcli.files.durable import sync_files
 from rollcli.files.results import (
     Row,
     column_types,
@@ -29,7 +30,9 @@ from rollcli.files.resumable import not_resumable
 from rollcli.files.storage import create, list_names, remove
 from rollcli.files.stores.locations import base_name, is_url
 from rollcli.files.stores.parts import part_names
-from rollcli.frames.frame import FrameResult
+from rollcli.frames.frame import Frame, FrameResult
+from rollcli.frames.options import ImageOptions
+from rollcli.frames.outputs import local_images
 
 
 class PartsOutput:
@@ -38,18 +41,29 @@ class PartsOutput:
     resumable = True
     keep_open: int | None = None
 
-    def __init__(self, plan: Plan, record: RunRecord, kept: tuple[Row, ...], part_rows: int) -> None:
+    def __init__(
+        self,
+        plan: Plan,
+        record: RunRecord,
+        kept: tuple[Row, ...],
+        part_rows: int,
+        images: ImageOptions,
+    ) -> None:
         self.kept = kept
         self._plan, self._record, self._part_rows = plan, record, part_rows
         self._next = len(kept) // part_rows
         self._waiting: list[Row] = []
+        self.incomplete: list[Frame] = []
+        self._image_options, self._images = images, list[str]()  # those of the part that is being filled
         self._run = uuid.uuid4().hex  # tells our parts from those of another run
         self._written = len(kept)
 
-    def append(self, result: FrameResult) -> None:
+    def append(self, frame: Frame, result: FrameResult) -> None:
         """Take the row; every full part is written."""
         self._record.saw(result.encoding, result.searched)
         self._waiting.append(result.row)
+        if result.row.status != "error":
+            self._images.extend(local_images(frame, self._image_options))
         if len(self._waiting) == self._part_rows:
             self._write()
 
@@ -59,11 +73,19 @@ class PartsOutput:
             self._write()
         self._record.write(totals, alignment)
 
-    def hint(self, rows: int) -> str:
+    def restore(self, frame: Frame, result: FrameResult) -> None:
+        """Do nothing: no frame is incomplete, since parts enter the result after their images."""
+
+    def commit(self) -> None:
+        """Do nothing: a part enters the result when it is full, or when all rows are there."""
+
+    def hint(self) -> str:
         """Say that --resume continues after the last part."""
         return f"; {self._written} rows are kept, continue with --resume" if self._written else ""
 
     def _write(self) -> None:
+        sync_files(self._images)
+        self._images.clear()
         data = self._encoded()
         location = _part_location(self._plan, self._next)
         if not create(location, data, self._run):
@@ -103,7 +125,7 @@ def open_parts(plan: Plan, options: EstimateOptions) -> PartsOutput:
     for name in parts[_whole_parts(len(rows), options.result.part_rows) :]:
         remove(f"{plan.output}/{name}")
     record.write({})
-    return PartsOutput(plan, record, rows, options.result.part_rows)
+    return PartsOutput(plan, record, rows, options.result.part_rows, options.images)
 
 
 def check_parts(plan: Plan, *, resume: bool, overwrite: bool) -> list[str]:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from rollcli.errors import InputError, OutputError
 from rollcli.files.atomic import output_error, write_atomic
+from rollcli.files.durable import sync_names
 from rollcli.files.stores.locations import WEB_SERVERS, is_url, public_name, scheme_of
 from rollcli.files.stores.objects import (
     create_object,
@@ -168,9 +169,10 @@ def _read_file(path: str, name: str) -> bytes:
 def _create_file(target: Path, data: bytes) -> bool:
     """Create a local file whole: write it under another name, and link it to its own if that is free."""
     own = target.with_name(f".{target.name}.{os.getpid()}")
-    write_atomic(own, data)
+    write_atomic(own, data, durable=True)
     try:
         os.link(own, target)
+        sync_names([target])
     except FileExistsError:
         return False
     except OSError as error:

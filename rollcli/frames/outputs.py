@@ -3,11 +3,12 @@
 import contextlib
 import posixpath
 from collections.abc import Iterable, Iterator
+from pathlib import Path
 
 from rollcli.errors import OutputError
 from rollcli.files.atomic import remove_leftovers
 from rollcli.files.storage import remove
-from rollcli.files.stores.locations import located
+from rollcli.files.stores.locations import is_url, located
 from rollcli.frames.frame import Frame
 from rollcli.frames.options import ImageOptions
 
@@ -27,9 +28,16 @@ def image_paths(frame: Frame, images: ImageOptions) -> Iterator[tuple[str, str]]
         yield kind, output_path(frame, folder, endings[kind])
 
 
+def local_images(frame: Frame, images: ImageOptions) -> Iterator[str]:
+    """Yield the images of a frame that lie on local disk, where a power cut may take them."""
+    return (path for _, path in image_paths(frame, images) if not is_url(path))
+
+
 def has_images(frame: Frame, images: ImageOptions) -> bool:
-    """Tell whether every image of a frame exists and is not empty."""
+    """Tell whether every image of a frame exists and is not empty; those in an object store are believed."""
     for _, path in image_paths(frame, images):
+        if is_url(path):  # asking for each would take as long as making it again, and objects are whole
+            continue
         try:
             if Path(path).stat().st_size == 0:
                 return False
