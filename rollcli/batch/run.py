@@ -11,6 +11,7 @@ from rollcli.batch.output import Output, frames_to_do, open_output
 from rollcli.batch.plan import Plan, make_plan
 from rollcli.errors import ClusterError, ExitStatus, OutputError, WorkerError
 from rollcli.files.results import run_path
+from rollcli.files.stores.turns import tasks_in_hand
 from rollcli.files.stream import STDOUT
 from rollcli.frames.calibration import calibration_files, calibration_notes
 from rollcli.frames.checks import list_files
@@ -102,7 +103,8 @@ def _results(
         files=tuple(path for frame in sample for path in frame.reads()),
         folders=tuple(folder for _, folder in options.images.folders()),
     )
-    workers = Workers(options.running.jobs, options.running.scheduler, shared, output.keep_open)
+    threads = tasks_in_hand((*shared.files, *shared.folders))
+    workers = Workers(options.running.jobs, options.running.scheduler, shared, output.keep_open, threads)
     try:
         with contextlib.closing(run_tasks(frames, work, stop, workers)) as results:
             yield results

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from rollcli.errors import ExitStatus
 from rollcli.files.atomic import remove_leftovers
+from rollcli.files.stores.turns import tasks_in_hand
 from rollcli.frames.checks import check_one_owner, check_writes, list_files
 from rollcli.frames.frame import Frame, FrameResult, failed_frame
 from rollcli.frames.options import EncodingOptions, RunningOptions
@@ -98,7 +99,8 @@ def _results(
     """Yield the result of each conversion from whichever workers were asked for."""
     sample = (*conversions[:1], *conversions[-1:])
     files = tuple(path for each in sample for path in each.frame.reads())
-    workers = Workers(running.jobs, running.scheduler, SharedPaths(files, (folder,)))
+    shared = SharedPaths(files, (folder,))
+    workers = Workers(running.jobs, running.scheduler, shared, threads=tasks_in_hand((*files, folder)))
     try:
         yield from run_tasks(conversions, Work(do, _lost), stop, workers)
     finally:

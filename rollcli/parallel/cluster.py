@@ -4,9 +4,10 @@ import asyncio
 import contextlib
 import logging
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError, wait
 from concurrent.futures import Future as ConcurrentFuture
+from functools import partial
 from pathlib import Path
 from typing import Any, Generic
 
@@ -14,6 +15,8 @@ from rollcli import __version__
 from rollcli.errors import ClusterError, UsageError
 from rollcli.files.atomic import write_atomic
 from rollcli.files.existence import is_file, is_there
+from rollcli.files.stores.locations import is_url
+from rollcli.files.stores.turns import computing
 from rollcli.parallel.in_order import Result, Task, Work
 from rollcli.parallel.process_setup import prepare_worker
 from rollcli.parallel.run_tasks import SharedPaths
@@ -67,6 +70,8 @@ class ClusterExecutor(Generic[Task, Result]):
         What the workers do.
     shared : SharedPaths
         What each of them must see.
+    threads : int
+        Tasks that each thread of a worker has in hand at once; see `files.stores.turns`.
 
     Raises
     ------
@@ -74,7 +79,7 @@ class ClusterExecutor(Generic[Task, Result]):
         No scheduler or no worker answers, a worker has another rollcli, or does not see the files.
     """
 
-    def __init__(self, address: str, work: Work[Task, Result], shared: SharedPaths) -> None:
+    def __init__(self, address: str, work: Work[Task, Result], shared: SharedPaths, threads: int = 1) -> None:
         _require_extra()
         from distributed import KilledWorker
 
@@ -90,14 +95,15 @@ class ClusterExecutor(Generic[Task, Result]):
         except BaseException:
             self._resources.close()
             raise
-        self.window = _IN_FLIGHT_PER_THREAD * sum(self._client.nthreads().values())
+        self._do = partial(_in_turn, work.do) if threads > 1 else work.do
+        self.window = max(_IN_FLIGHT_PER_THREAD, threads) * sum(self._client.nthreads().values())
         self._executor = self._client.get_executor(pure=False)
 
     def submit(self, task: Task) -> "ClusterFuture[Result]":
         """Queue a task for whichever worker is free."""
         if self._client.status == "closed":
             raise _connection_lost(self._address)
-        return ClusterFuture(self._executor.submit(self._work.do, task), self._client, self._address)
+        return ClusterFuture(self._executor.submit(self._do, task), self._client, self._address)
 
     def retry(self, task: Task) -> Result:
         """Return the result of a lost task: several workers have tried it already."""
@@ -133,6 +139,15 @@ class ClusterFuture(Generic[Result]):
     def cancel(self) -> bool:
         """Withdraw the task, unless it is done."""
         return self._future.cancel()
+
+
+def _in_turn(do: Callable[[Task], Result], task: Task) -> Result:
+    """Run a task that waits for the network; the worker takes others meanwhile, and one computes."""
+    from distributed import secede
+
+    secede()
+    with computing():
+        return do(task)
 
 
 def _connection_lost(address: str) -> ClusterError:
@@ -196,7 +211,7 @@ def _check_workers(client: Any, shared: SharedPaths) -> None:
     """Ask every worker whether it has this rollcli and sees the files and folders that this process sees."""
     files = {path.absolute() for path in map(Path, shared.files) if is_file(path)}
     sizes = {str(path): path.stat().st_size for path in files}
-    marks = [Path(folder).absolute() / ".rollcli-check" for folder in shared.folders]
+    marks = [Path(folder).absolute() / ".rollcli-check" for folder in shared.folders if not is_url(folder)]
     try:
         for mark in marks:
             write_atomic(mark, b"")

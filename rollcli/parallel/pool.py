@@ -13,8 +13,8 @@ from typing import Generic
 from rollcli.parallel.in_order import Result, Task, Work
 from rollcli.parallel.worker import Worker
 
-_TASKS_PER_WORKER = 2  # the one that it runs, and the next one
-_IN_FLIGHT_PER_WORKER = 4  # more than that, since a slow task holds back the results of those after it
+_SPARE_TASKS = 1  # of a worker, beside those that it runs
+_IN_FLIGHT = 2  # times the tasks that workers have: a slow one holds back the results after it
 _DIED = "its worker died twice: killed for memory, perhaps, or crashed"
 
 
@@ -33,6 +33,8 @@ class PoolExecutor(Generic[Task, Result]):
         What they do.
     keep_open : int or None
         A file descriptor that they inherit and keep open until they end.
+    threads : int
+        Tasks that each runs at once; see `files.stores.turns`.
 
     Raises
     ------
@@ -42,14 +44,17 @@ class PoolExecutor(Generic[Task, Result]):
 
     worker_died: tuple[type[BaseException], ...] = (WorkerDiedError,)
 
-    def __init__(self, jobs: int, work: Work[Task, Result], keep_open: int | None = None) -> None:
-        self.window = _IN_FLIGHT_PER_WORKER * jobs
-        self._work, self._keep_open = work, keep_open
+    def __init__(
+        self, jobs: int, work: Work[Task, Result], keep_open: int | None = None, threads: int = 1
+    ) -> None:
+        self._tasks_per_worker = threads + _SPARE_TASKS
+        self.window = _IN_FLIGHT * self._tasks_per_worker * jobs
+        self._work, self._keep_open, self._threads = work, keep_open, threads
         self._workers: list[Worker] = []
         self._queue: deque[PoolFuture[Task, Result]] = deque()
         try:
             for _ in range(jobs):
-                self._workers.append(Worker(work.do, keep_open))
+                self._workers.append(Worker(work.do, keep_open, threads))
         except BaseException:
             self.close(at_once=True)
             raise
@@ -96,9 +101,9 @@ class PoolExecutor(Generic[Task, Result]):
             worker.close()
 
     def _send_tasks(self) -> None:
-        for _ in range(_TASKS_PER_WORKER):
+        for _ in range(self._tasks_per_worker):
             for index, worker in enumerate(self._workers):
-                if self._queue and len(worker.pending) < _TASKS_PER_WORKER:
+                if self._queue and len(worker.pending) < self._tasks_per_worker:
                     self._send(index, worker, self._queue.popleft())
 
     def _send(self, index: int, worker: Worker, future: "PoolFuture[Task, Result]") -> None:
@@ -122,7 +127,7 @@ class PoolExecutor(Generic[Task, Result]):
         """Start a new worker in place of a dead one, and requeue the tasks that it had not begun."""
         self._queue.extendleft(reversed(worker.pending))
         worker.close()
-        self._workers[index] = Worker(self._work.do, self._keep_open)
+        self._workers[index] = Worker(self._work.do, self._keep_open, self._threads)
 
 
 class PoolFuture(Generic[Task, Result]):

@@ -39,12 +39,16 @@ class Workers:
         What the workers of a cluster must see.
     keep_open : int or None
         A file descriptor that processes on this machine inherit and keep open until they end.
+    threads : int
+        Tasks that each worker has in hand at once: more than one where they wait for the network. One of
+        them computes at a time.
     """
 
     jobs: int | None = None
     scheduler: str | None = None
     shared: SharedPaths = SharedPaths()
     keep_open: int | None = None
+    threads: int = 1
 
 
 def run_tasks(
@@ -87,12 +91,12 @@ def _executor(count: int, work: Work[Any, Any], workers: Workers) -> Any:
     if workers.scheduler is not None:
         from rollcli.parallel.cluster import ClusterExecutor
 
-        return ClusterExecutor(workers.scheduler, work, workers.shared)
+        return ClusterExecutor(workers.scheduler, work, workers.shared, workers.threads)
     jobs = min(workers.jobs or _usable_processors(), count)
-    if jobs > 1:
+    if jobs > 1 or (count and workers.threads > 1):
         from rollcli.parallel.pool import PoolExecutor
 
-        return PoolExecutor(jobs, work, workers.keep_open)
+        return PoolExecutor(jobs, work, workers.keep_open, workers.threads)
     from rollcli.parallel.local import LocalExecutor
 
     return LocalExecutor(work)

@@ -14,8 +14,11 @@ from types import TracebackType
 from typing import Any
 
 from rollcli.errors import RollcliError, WorkerError
+from rollcli.files.stores.turns import computing
 from rollcli.parallel.interrupt import ignore_signals, stop_signals
 from rollcli.parallel.process_setup import prepare_worker
+
+_POLL_S = 0.002  # a task that waits for the network takes ten times as long
 
 
 class Worker:
@@ -29,6 +32,8 @@ class Worker:
         Turns a task into its result.
     keep_open : int or None
         A file descriptor that the process inherits and keeps open until it ends.
+    threads : int
+        Tasks that it runs at once; their answers come in the order of the tasks.
 
     Raises
     ------
@@ -43,13 +48,14 @@ class Worker:
         The futures of the tasks that were sent and not answered, oldest first: the first one is running.
     """
 
-    def __init__(self, do: Callable[[Any], Any], keep_open: int | None) -> None:
+    def __init__(self, do: Callable[[Any], Any], keep_open: int | None, threads: int = 1) -> None:
         spawn = multiprocessing.get_context("spawn")
         self.pending: deque[Any] = deque()
         try:
             self.pipe, far_end = spawn.Pipe()
             inherited = _InheritedFile(keep_open)
-            self._process = spawn.Process(target=_serve, args=(far_end, do, inherited), daemon=True)
+            arguments = (far_end, do, inherited, threads)
+            self._process = spawn.Process(target=_serve, args=arguments, daemon=True)
             with _stop_signals_blocked():  # the child inherits this: only the parent decides when work ends
                 self._process.start()
         except OSError as error:
@@ -66,20 +72,45 @@ class Worker:
         self._process.join()
 
 
-def _serve(pipe: "Connection[Any, Any]", do: Callable[[Any], Any], inherited: "_InheritedFile") -> None:
+def _serve(
+    pipe: "Connection[Any, Any]", do: Callable[[Any], Any], inherited: "_InheritedFile", threads: int
+) -> None:
     """Run tasks until the pipe is closed; `inherited` is an argument so that its file stays open."""
     ignore_signals()
     threading.Thread(target=_end_with_parent, daemon=True).start()
     start_error = _prepare()
+
+    def answer(task: Any) -> tuple[Any, Exception | None]:
+        with _Answer() as answer:
+            if start_error is not None:
+                raise start_error
+            answer.value = do(task)
+        return answer.value, answer.error
+
     with contextlib.suppress(EOFError, OSError):  # the parent has closed its end: all is done
-        while True:
-            task = pipe.recv()
-            with _Answer() as answer:
-                if start_error is not None:
-                    raise start_error
-                answer.value = do(task)
-            pipe.send((answer.value, answer.error))
+        if threads == 1:
+            while True:
+                pipe.send(answer(pipe.recv()))
+        _serve_in_threads(pipe, answer, threads)
     os._exit(0)  # there is nothing to clean up, and unloading NumPy and OpenCV takes longer than two frames
+
+
+def _serve_in_threads(pipe: "Connection[Any, Any]", answer: Callable[[Any], Any], threads: int) -> None:
+    """Answer tasks in their order, while those after them run, too; one computes at a time."""
+    from concurrent.futures import ThreadPoolExecutor  # only where tasks wait for the network
+
+    def in_turn(task: Any) -> Any:
+        with computing():
+            return answer(task)
+
+    pool, running = ThreadPoolExecutor(threads), deque[Any]()
+    while True:
+        if not running or pipe.poll():
+            running.append(pool.submit(in_turn, pipe.recv()))
+        elif running[0].done():
+            pipe.send(running.popleft().result())
+        else:
+            connection.wait([pipe], timeout=_POLL_S)
 
 
 def _prepare() -> WorkerError | None:

@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 
 from rollcli.errors import InputError, OutputError, UsageError
 from rollcli.files.stores.locations import public_name, split_url
+from rollcli.files.stores.turns import waiting_for_network
 
 Value = TypeVar("Value")
 
@@ -41,7 +42,8 @@ def read_object(url: str) -> bytes:
         return bytes(store.get(key).bytes())
 
     try:
-        return _repeated(fetch)
+        with waiting_for_network():
+            return _repeated(fetch)
     except FileNotFoundError as error:
         raise InputError(f"{public_name(url)}: {_missing(error)}") from None
     except _store_errors() as error:
@@ -104,7 +106,8 @@ def remove_object(url: str) -> None:
     """
     store, key = _open(url)
     try:
-        store.delete(key)
+        with waiting_for_network():
+            store.delete(key)
     except FileNotFoundError:
         return
     except _store_errors() as error:
@@ -141,7 +144,8 @@ def _put(url: str, data: bytes, mode: str, attributes: dict[str, str] | None = N
 
     store, key = _open(url)
     try:
-        store.put(key, data, mode=mode, attributes=attributes)
+        with waiting_for_network():
+            store.put(key, data, mode=mode, attributes=attributes)
     except AlreadyExistsError:
         raise
     except FileNotFoundError as error:

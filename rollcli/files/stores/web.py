@@ -7,6 +7,7 @@ import urllib.request
 
 from rollcli.errors import InputError
 from rollcli.files.stores.locations import public_name
+from rollcli.files.stores.turns import waiting_for_network
 
 _TIMEOUT_S = 60.0
 _TRIES = 4
@@ -24,7 +25,8 @@ def read_web_file(url: str) -> bytes:
     """
     for attempt in range(_TRIES):
         try:
-            return _fetched(url)
+            with waiting_for_network():
+                return _fetched(url)
         except urllib.error.HTTPError as error:
             reason, final = f"the server answered {error.code} {error.reason}", error.code < 500
         except (OSError, http.client.HTTPException, ValueError) as error:
