@@ -12,7 +12,7 @@ from rollcli.batch.plan import Plan
 from rollcli.batch.result_file import ResultFile, has_rows, kept_rows, open_result
 from rollcli.batch.result_parts import count_kept_parts, open_parts
 from rollcli.batch.resume import check_resumable, unknown_inputs
-from rollcli.batch.run_record import RunRecord
+from rollcli.batch.run_record import RunRecord, is_replaceable_record
 from rollcli.errors import InputError, OutputError, UsageError
 from rollcli.files.atomic import remove_leftovers
 from rollcli.files.results import Row, format_header, format_row, parse_rows, read_run, run_path
@@ -251,5 +251,15 @@ def _check_permitted(name: str, options: EstimateOptions) -> None:
         if resume:
             raise UsageError("--resume needs a result file: name it with --output")
         return
-    if not (resume or overwrite) and has_rows(name):
-        raise UsageError(f"{name}: exists already; give --resume to continue it or --overwrite to replace it")
+    if overwrite:
+        return
+    if has_rows(name):
+        if not resume:
+            raise UsageError(
+                f"{name}: exists already; give --resume to continue it or --overwrite to replace it"
+            )
+    elif not is_replaceable_record(run_path(name)):
+        raise UsageError(
+            f"{run_path(name)}: exists already and is not the record of a run; give another --output, or "
+            "--overwrite to replace it"
+        )

@@ -30,6 +30,7 @@ class ResultFile:
 
     def read(self) -> bytes:
         """Read the whole file."""
+        os.lseek(self.descriptor, 0, os.SEEK_SET)  # locking moves the position on Windows
         with open(self.descriptor, "rb", closefd=False) as file:
             return file.read()
 
@@ -146,8 +147,11 @@ def whole_rows(data: bytes, form: Format) -> bytes:
     end = data.rfind(b"\n") + 1
     if form == "jsonl":
         return data[:end]
-    while end and data.count(b'"', 0, end) % 2:
-        end = data.rfind(b"\n", 0, end - 1) + 1
+    quotes = data.count(b'"', 0, end)
+    while end and quotes % 2:
+        before = data.rfind(b"\n", 0, end - 1) + 1
+        quotes -= data.count(b'"', before, end)
+        end = before
     return data[:end]
 
 

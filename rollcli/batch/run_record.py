@@ -5,6 +5,7 @@ import json
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, fields
 from itertools import islice
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rollcli import __version__
@@ -111,6 +112,17 @@ def _calibrations(frames: Sequence[Frame]) -> dict[str, Any]:
 
 
 _CALIBRATIONS_LISTED = 3
+
+
+def is_replaceable_record(path: str) -> bool:
+    """Tell whether a new run may write its record here: there is none, or one of an earlier run."""
+    try:
+        data = Path(path).read_bytes()
+        return not data or isinstance(json.loads(data)["rollcli"], str)
+    except OSError:
+        return True  # it does not exist, or writing it will say what is wrong
+    except (ValueError, RecursionError, KeyError, TypeError):
+        return False
 
 
 def recorded_options(run: Mapping[str, Any] | None, name: str) -> FrameOptions:

@@ -6,6 +6,7 @@ import shlex
 import signal
 import subprocess
 import time
+from pathlib import Path
 
 import pytest
 
@@ -226,6 +227,8 @@ def test_a_second_run_on_the_same_result_is_refused(folder):
         done = rollcli("estimate", "maps", "-o", "rolls.csv", *IMAGES, flag, cwd=folder)
         assert done.status == 2
         assert "another run" in done.err
+        if Path("/proc/self/fd").exists():
+            assert f"(process {first.pid})" in done.err
     first.send_signal(signal.SIGCONT)
     first.communicate(timeout=60)
     assert first.returncode == 3
@@ -371,3 +374,35 @@ def test_an_empty_file_is_no_result(tmp_path, flag):
     write_maps(tmp_path / "maps", 2)
     (tmp_path / "rolls.csv").touch()
     assert rollcli("estimate", "maps", "-o", "rolls.csv", *flag, cwd=tmp_path).status == 0
+
+
+def test_a_record_of_another_program_is_replaced_only_when_told_so(tmp_path):
+    write_maps(tmp_path / "maps", 1)
+    record = tmp_path / "rolls.csv.run.json"
+    for foreign in ("my notes", "[1]", '{"rollcli": 1}', "{}"):
+        record.write_text(foreign)
+        done = rollcli("estimate", "maps", "-o", "rolls.csv", cwd=tmp_path)
+        assert (done.status, record.read_text()) == (2, foreign)
+        assert "rolls.csv.run.json: exists already and is not the record of a run" in done.err
+        assert not (tmp_path / "rolls.csv").exists()
+    assert rollcli("estimate", "maps", "-o", "rolls.csv", "--overwrite", cwd=tmp_path).status == 0
+    (tmp_path / "rolls.csv").unlink()  # a record of an earlier run is ours
+    assert rollcli("estimate", "maps", "-o", "rolls.csv", cwd=tmp_path).status == 0
+
+
+def test_whole_rows_are_found_in_one_pass_behind_a_stray_quote():
+    row = b"maps/frame.png,,ok\n"
+
+    class Counted(bytes):
+        """Bytes that add up how many of them are searched for quotes."""
+
+        searched = 0
+
+        def count(self, sub, start=0, end=None):
+            end = len(self) if end is None else end
+            Counted.searched += end - start
+            return super().count(sub, start, end)
+
+    data = Counted(row * 50 + b'stray",' + row * 20_000)
+    assert whole_rows(data, "csv") == row * 50
+    assert Counted.searched < 3 * len(data)
