@@ -72,6 +72,12 @@ simulate_options = record(
         "[default: half of the frames flat, half within +-0.001; bare is flat]",
     ),
     option(
+        "--bend",
+        type=Span(),
+        help="Horizontal curvature of the road, 1/m, drawn evenly from A to B; positive: to the right; 0: a "
+        "straight road.  [default: half of the roads straight, half within +-0.004; bare is straight]",
+    ),
+    option(
         "--cross-section",
         type=Choice(*CROSS_SECTIONS, MIXED),
         default=CROSS_SECTIONS[0],

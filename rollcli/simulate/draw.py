@@ -34,6 +34,7 @@ def draw_specs(
     roll: Span = _ROLL,
     pitch: Span = _PITCH,
     curvature: Span | None = None,
+    bend: Span | None = None,
     cross_section: str = "flat",
     crossfall: Span = _CROSSFALL,
     gutter: Span = _NONE,
@@ -62,6 +63,9 @@ def draw_specs(
     curvature : tuple of float or None
         Lowest and highest vertical curvature, 1/m, drawn evenly. None: ``bare`` is flat, in the
         other scenes every second frame is flat and the others lie within +-0.001 (a radius of 1 km).
+    bend : tuple of float or None
+        Lowest and highest horizontal curvature, 1/m, drawn evenly. None: ``bare`` is straight, in the other
+        scenes on average every second road is straight and the others lie within +-0.004 (a radius of 250 m).
     cross_section : str
         One of `CROSS_SECTIONS`, or ``mixed``: each frame draws one of them.
     crossfall, gutter : tuple of float
@@ -104,6 +108,7 @@ def draw_specs(
         "roll": roll,
         "pitch": pitch,
         "curvature": curvature or _NONE,
+        "bend": bend or _NONE,
         "crossfall": crossfall,
         "gutter": gutter,
         "height": height,
@@ -112,7 +117,7 @@ def draw_specs(
     frames = []
     for index in range(n):
         spec = _draw_pose(replace(rig, index=index), scene, roll, pitch, curvature)
-        spec = _draw_cross_section(spec, cross_section, crossfall, gutter)
+        spec = _draw_cross_section(spec, cross_section, crossfall, gutter, bend)
         frames.append(_draw_rig(spec, height, principal_offset))
     return frames
 
@@ -140,12 +145,15 @@ def _draw_pose(spec: FrameSpec, scene: str, roll: Span, pitch: Span, curvature: 
     return replace(spec, scene=kind, roll=float(theta), pitch=float(phi), curvature=float(drawn))
 
 
-def _draw_cross_section(spec: FrameSpec, kind: str, crossfall: Span, gutter: Span) -> FrameSpec:
+def _draw_cross_section(
+    spec: FrameSpec, kind: str, crossfall: Span, gutter: Span, bend: Span | None
+) -> FrameSpec:
     rng = spec.rng(Stream.CROSS_SECTION)
     steepest, beside = rng.uniform(*crossfall), rng.uniform(*gutter)
     shape = CROSS_SECTIONS[rng.integers(len(CROSS_SECTIONS))] if kind == MIXED else kind
     fall = 0.0 if shape == "flat" else float(steepest)
-    return replace(spec, cross_section=shape, crossfall=fall, gutter=float(beside))
+    drawn = None if bend is None else float(rng.uniform(*bend))
+    return replace(spec, cross_section=shape, crossfall=fall, gutter=float(beside), bend=drawn)
 
 
 def _draw_rig(spec: FrameSpec, height: Span, principal_offset: Span) -> FrameSpec:

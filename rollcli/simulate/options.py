@@ -27,7 +27,7 @@ KERB = (0.10, 0.20)
 class SimulateOptions:
     """What to render, as `rollcli simulate` is asked.
 
-    Ranges are (lowest, highest): `roll_deg` and `pitch_deg`, `curvature` in 1/m or None: by scene,
+    Ranges are (lowest, highest): `roll_deg` and `pitch_deg`, `curvature` and `bend` in 1/m or None: by scene,
     `crossfall` and `gutter` in per cent, `kerb` and `height` in metres, `principal_offset` in pixels. None
     stands for `CROSSFALL` and `KERB`. `size` is (width, height) in pixels, `focal` in pixels or None:
     `FOCAL_PER_WIDTH` times the width, `principal_point` (column, row) in pixels or None: the image's centre.
@@ -38,6 +38,7 @@ class SimulateOptions:
     roll_deg: tuple[float, float] = ROLL_DEG
     pitch_deg: tuple[float, float] = PITCH_DEG
     curvature: tuple[float, float] | None = None
+    bend: tuple[float, float] | None = None
     cross_section: str = "flat"
     crossfall: tuple[float, float] | None = None
     gutter: tuple[float, float] = (0.0, 0.0)

@@ -42,6 +42,7 @@ def plan_dataset(folder: str | Path, options: SimulateOptions, *, overwrite: boo
         roll=_radians(options.roll_deg),
         pitch=_radians(options.pitch_deg),
         curvature=options.curvature,
+        bend=options.bend,
         cross_section=options.cross_section,
         crossfall=_shares(options.crossfall or CROSSFALL),
         gutter=_shares(options.gutter),

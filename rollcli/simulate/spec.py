@@ -25,6 +25,7 @@ Span = tuple[float, float]
 
 MAX_PITCH = math.radians(60)
 MAX_CURVATURE = 0.01
+MAX_BEND = 0.02
 MAX_CROSSFALL, MAX_GUTTER = 0.15, 0.5
 MAX_KERB = 0.5  # metres
 LEVEL = np.array([0.0, 1.0, 0.0])  # the normal of a level road
@@ -62,6 +63,8 @@ class FrameSpec:
         How much more steeply the carriageway falls outward in its gutters, metres per metre.
     kerb : tuple of float
         The lowest and the highest kerb, metres above the edge of the carriageway.
+    bend : float or None
+        Horizontal curvature of the road, 1/m; positive bends to the right. None: drawn with the scene.
     size : tuple of int
         Width and height, pixels.
     focal : float
@@ -88,6 +91,7 @@ class FrameSpec:
     crossfall: float = 0.0
     gutter: float = 0.0
     kerb: Span = KERB
+    bend: float | None = None
     size: tuple[int, int] = SIZE
     focal: float = FOCAL_PER_WIDTH * SIZE[0]
     principal_point: tuple[float, float] | None = None
@@ -153,6 +157,7 @@ def _problems(spec: FrameSpec) -> Iterator[str]:
         spec.gain,
         spec.crossfall,
         spec.gutter,
+        spec.bend or 0.0,
         *spec.kerb,
         *spec.centre,
     )
@@ -183,6 +188,8 @@ def _problems(spec: FrameSpec) -> Iterator[str]:
         yield f"a pitch of {math.degrees(spec.pitch):g} degrees is beyond +-60"
     if abs(spec.curvature) > MAX_CURVATURE:
         yield f"a curvature of {spec.curvature:g} per metre is beyond +-{MAX_CURVATURE:g} (a radius of 100 m)"
+    if abs(spec.bend or 0.0) > MAX_BEND:
+        yield f"a bend of {spec.bend:g} per metre is beyond +-{MAX_BEND:g} (a radius of 50 m)"
     if spec.noise < 0:
         yield f"the noise must be 0 or more grey levels, not {spec.noise:g}"
     if spec.gain <= 0:

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from rollcli.simulate.scenes.build import road_camber
+from rollcli.simulate.scenes.build import carriageway_of, road_camber
 from rollcli.simulate.spec import FrameSpec
 
 COLUMNS = (
@@ -26,6 +26,7 @@ COLUMNS = (
     "crossfall_percent",
     "gutter_percent",
     "camber",
+    "bend_per_m",
 )
 
 
@@ -40,7 +41,8 @@ def truth_csv(frames: Iterable[tuple[str, FrameSpec]]) -> bytes:
         slopes = (_number(100 * slope) for slope in (spec.crossfall, spec.gutter))
         # a roof has a ridge instead of a curvature
         camber = "" if spec.cross_section == "roof" else _number(road_camber(spec))
-        rows.writerow((stem, *angles, spec.scene, *rig, spec.seed, spec.cross_section, *slopes, camber))
+        road = (spec.cross_section, *slopes, camber, _number(carriageway_of(spec).course.bend))
+        rows.writerow((stem, *angles, spec.scene, *rig, spec.seed, *road))
     return text.getvalue().encode()
 
 

@@ -62,6 +62,7 @@ def test_a_dry_run_lists_the_files_and_writes_none(tmp_path):
         (["--scene", "beach"], "beach"),
         (["--seed", "-1"], "--seed"),
         (["--curvature", "1"], "curvature of 1 per metre"),
+        (["--bend", "0:0.1"], "bend of 0.1 per metre"),
         (["--cross-section", "ridge"], "'ridge' is not one of"),
         (["--cross-section", "crown", "--crossfall", "1:16"], "crossfall of 16 % is not within 0 and 15 %"),
         (["--cross-section", "roof", "--crossfall", "-1"], "crossfall of -1 %"),

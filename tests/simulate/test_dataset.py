@@ -43,7 +43,7 @@ def test_truth_has_the_documented_columns_and_each_frames_values(tmp_path):
     first = (tmp_path / "truth.csv").read_text().splitlines()[0]
     assert first == (
         "file,roll_deg,pitch_deg,scene,focal_px,cx_px,cy_px,baseline_m,height_m,curvature_per_m,seed,"
-        "cross_section,crossfall_percent,gutter_percent,camber"
+        "cross_section,crossfall_percent,gutter_percent,camber,bend_per_m"
     )
     specs = plan_dataset(tmp_path, TINY, overwrite=True).specs
     for number, (row, spec) in enumerate(zip(rows(tmp_path), specs, strict=True), 1):
@@ -54,7 +54,7 @@ def test_truth_has_the_documented_columns_and_each_frames_values(tmp_path):
         assert (row["scene"], float(row["focal_px"]), row["seed"]) == (spec.scene, 37.12, "9")
         assert (float(row["baseline_m"]), float(row["height_m"])) == (0.54, 1.65)
         assert (row["cx_px"], row["cy_px"]) == ("31.5", "23.5")
-        assert [row[name] for name in first.split(",")[-4:]] == ["flat", "0", "0", "0"]
+        assert [row[name] for name in first.split(",")[-5:-1]] == ["flat", "0", "0", "0"]
 
 
 def test_truth_says_what_the_road_is_like_across(tmp_path):
@@ -72,6 +72,14 @@ def test_truth_says_what_the_road_is_like_across(tmp_path):
         assert spec.crossfall == 0 if spec.cross_section == "flat" else 0.02 <= spec.crossfall <= 0.03
         expected = "" if spec.cross_section == "roof" else f"{road_camber(spec) + 0.0:.10g}"
         assert row["camber"] == expected
+
+
+def test_bends_are_as_asked_for_in_every_scene_and_stand_in_the_truth(tmp_path):
+    simulate(tmp_path, SimulateOptions(frames=12, size=(32, 24), bend=(0.002, 0.005), seed=4))
+    assert {row["scene"] for row in rows(tmp_path)} == {"bare", "open", "street", "verge"}
+    bends = [float(row["bend_per_m"]) for row in rows(tmp_path)]
+    assert len(set(bends)) == 12
+    assert all(0.002 <= bend <= 0.005 for bend in bends)
 
 
 def projections(path):

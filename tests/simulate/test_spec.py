@@ -53,6 +53,8 @@ def test_a_rig_that_cannot_be_is_refused_and_the_reason_named(wrong, named):
         ("pitch", math.radians(60), 1.048),
         ("pitch", -math.radians(60), -1.048),
         ("curvature", 0.01, 0.0101),
+        ("bend", 0.02, 0.0201),
+        ("bend", -0.02, -0.0201),
         ("curvature", -0.01, -0.0101),
         ("crossfall", 0.15, 0.151),
         ("crossfall", 0.0, -0.001),

@@ -38,8 +38,12 @@ def build_scene(spec: FrameSpec) -> Scene:
 
 def road_camber(spec: FrameSpec) -> float:
     """Return the curvature across the road below the rig, 1/(camera height); a crown is negative."""
-    _, _, carriageway = _begin(spec)
-    return carriageway.section.piece(0.0).curvature_at(0.0) * spec.height
+    return carriageway_of(spec).section.piece(0.0).curvature_at(0.0) * spec.height
+
+
+def carriageway_of(spec: FrameSpec) -> Carriageway:
+    """Draw the carriageway of a frame, without the rest of its scene."""
+    return _begin(spec)[2]
 
 
 def _begin(spec: FrameSpec) -> tuple[np.random.Generator, Light, Carriageway]:

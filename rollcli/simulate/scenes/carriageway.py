@@ -48,7 +48,11 @@ def draw_carriageway(rng: np.random.Generator, spec: FrameSpec) -> Carriageway:
     """Draw a carriageway: half of them bend; country roads can have a single lane, others room to park."""
     bend = float(rng.choice([0.0, 1.0])) * draw(rng, -1 / 250, 1 / 250)
     heading = float(rng.normal(0, 0.015))
-    course = Course(heading, 0.0 if spec.scene == "bare" else bend, spec.curvature)
+    if spec.bend is not None:
+        bend = spec.bend
+    elif spec.scene == "bare":
+        bend = 0.0
+    course = Course(heading, bend, spec.curvature)
     lane, shift = draw(rng, 2.8, 3.7), float(rng.normal(0, 0.25))
     country = spec.scene in ("bare", "verge")
     # the ridge of a roof runs between two lanes

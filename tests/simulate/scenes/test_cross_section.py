@@ -274,3 +274,9 @@ def test_a_vehicle_ahead_shows_its_rear_and_an_oncoming_one_its_front(oncoming):
     assert (car.frame[2, 2] > 0) == (not oncoming)
     assert car.frame[1] @ [0, 1, 0] > 0.99
     assert np.linalg.det(car.frame) == pytest.approx(1)
+
+
+def test_a_positive_bend_turns_to_the_right_and_zero_is_straight():
+    right, straight = (drawn_road(FrameSpec("bare", bend=bend, seed=4)).course for bend in (0.01, 0.0))
+    assert right.point(0.0, 20.0)[0] - straight.point(0.0, 20.0)[0] == pytest.approx(0.01 / 2 * 20**2)
+    assert straight.bend == 0

@@ -83,6 +83,17 @@ def test_no_pixel_shows_detail_finer_than_itself(scene):
     assert shown < 0.6 * sampled, "hardly better than one point of each pixel"
 
 
+@pytest.mark.parametrize(("horizon", "ground"), [(119.25, 0.25), (118.75, 0.75)])
+def test_a_pixel_on_the_horizon_shows_sky_and_ground_in_the_share_of_its_rays(horizon, ground):
+    # the ground ends 2 km away, a little below the row of the principal point
+    centre = (159.5, horizon - 186.0 * 1.65 / 2000)
+    spec = FrameSpec("bare", principal_point=centre, seed=5, size=(320, 240), focal=186.0, **CLEAN)
+    scene = build_scene(spec)
+    light = render_view(scene, spec.cameras(scene.normal)[0]).light[..., 0]
+    share = (light[119] - light[118]) / (light[120] - light[118])
+    assert np.median(share) == pytest.approx(ground, abs=0.05)
+
+
 @pytest.mark.parametrize("scene", ["open", "street"])
 def test_a_stereo_matcher_finds_the_road_as_well_as_on_real_pairs(scene):
     frame = render_frame(FrameSpec(scene, math.radians(-5), math.radians(2), seed=31))
