@@ -14,7 +14,6 @@ from rollcli.frames.guard import guarded
 from rollcli.frames.options import FrameOptions, MethodOptions
 from rollcli.frames.outputs import remove_images
 from rollcli.frames.read import Source, read_source
-from rollcli.imaging.sgbm_offset import sgbm_offset
 from rollcli.rig.calibration import Calibration
 from rollcli.rig.pose import horizon_row, with_pose
 
@@ -49,17 +48,13 @@ def _estimate(frame: Frame, options: FrameOptions) -> FrameResult:
 
 
 def _calibration(frame: Frame, source: Source, estimate: RollEstimate) -> Calibration | None:
-    """Scale the frame's calibration to its map; doffs allows for what the matcher errs by."""
+    """Scale the frame's calibration from its images to its map."""
     if frame.calibration is None:
         return None
     calibration = frame.calibration
     if source.size is not None:
         calibration = calibration.for_size(*source.size)
-    calibration = calibration.for_size(estimate.width, estimate.height)
-    if not source.mode:
-        return calibration
-    rise = estimate.tangent.slope * math.cos(estimate.tangent.theta)
-    return replace(calibration, doffs=calibration.doffs - sgbm_offset(source.mode, rise))
+    return calibration.for_size(estimate.width, estimate.height)
 
 
 def _arguments(options: MethodOptions) -> dict[str, Any]:

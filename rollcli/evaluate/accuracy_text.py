@@ -38,7 +38,7 @@ def as_table(accuracy: Accuracy) -> str:
                 (f"{name}, 95th percentile", f"{part.p95:.4f} {unit}"),
                 (f"{name}, worst", f"{part.worst:.4f} {unit}"),
                 (f"{name}, mean, signed", f"{part.bias:.4f} {unit}"),
-                (f"{name}, inside its interval", _percent(part.coverage_95, part.count)),
+                (f"{name}, in its interval", _percent(part.coverage_95, part.count)),
             ]
     return "".join(f"{name:26}{value}\n" for name, value in lines)
 

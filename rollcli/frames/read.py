@@ -43,8 +43,6 @@ class Source:
         What was done about the pair; empty when nothing.
     size : tuple of int, or None
         Width and height of the images in the files, px, where the map was matched from them.
-    mode : str
-        How the pair was matched (`StereoOptions.mode`); empty for a map.
     """
 
     disparity: NDArray[Any]
@@ -56,7 +54,6 @@ class Source:
     doubt: str = ""
     note: str = ""
     size: tuple[int, int] | None = None
-    mode: str = ""
 
 
 def read_source(frame: Frame, options: FrameOptions) -> Source:
@@ -93,7 +90,6 @@ def _match(frame: Frame, options: FrameOptions) -> Source:
         doubt="; ".join(_doubts(match)),
         note=note_of(match.corrected, *match.disparity.shape) if options.stereo.measures_alignment else "",
         size=(width, height),
-        mode=options.stereo.mode,
     )
 
 

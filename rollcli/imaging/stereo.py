@@ -12,6 +12,7 @@ from rollcli.imaging.first_look import FirstLook, find_range, first_look
 from rollcli.imaging.misalignment import LEVEL, Misalignment
 from rollcli.imaging.same_scene import check_same_scene
 from rollcli.imaging.sgbm import NARROWEST, match_views, usable_range
+from rollcli.imaging.sgbm_lag import without_lag
 from rollcli.imaging.stereo_options import StereoOptions as StereoOptions
 from rollcli.imaging.vertical_disparity import Measured
 from rollcli.imaging.views import Views, prepare_views
@@ -96,7 +97,7 @@ def match_pair(left: NDArray[Any], right: NDArray[Any], options: StereoOptions) 
     disparity, corrected, doubt = _levelled_match(views, look, count, options)
     valid, end = np.count_nonzero(disparity), options.min_disparity + count
     return StereoMatch(
-        disparity=disparity,
+        disparity=without_lag(disparity, options.mode),
         min_disparity=options.min_disparity,
         num_disparities=count,
         end_fraction=np.count_nonzero(disparity >= end - 2) / valid if valid else 0.0,

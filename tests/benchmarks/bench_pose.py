@@ -10,14 +10,14 @@ than 3 % of a frame's time.
 
 Pitch and height are those of the road near ahead, where the tangent touches it. A road of curvature k bends
 away by k z at the distance z: "at the tangent" compares with the road there, "below the camera" with the road
-under the camera, where that of a flat road is the same. "offset" is what SGBM errs by beyond `sgbm_offset`.
+under the camera, where that of a flat road is the same. "offset" is the mean error of the pitch as px of
+disparity: what the matcher errs by.
 """
 
 import math
 import sys
 import time
 from collections import defaultdict
-from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -26,7 +26,6 @@ from matched import Matched, matched
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.estimate import estimate_roll
-from rollcli.imaging.sgbm_offset import sgbm_offset
 from rollcli.imaging.stereo import StereoOptions, match_pair
 from rollcli.rig.calibration import Calibration
 from rollcli.rig.pose import with_pose
@@ -36,22 +35,14 @@ STREETS = Path(__file__).parents[3] / "shared" / "streets"
 KITTI_2012 = Calibration(707.0912, 707.0912, 601.8873, 183.1104, 0.5372)
 
 
-def corrected(estimate, calibration, mode="3way"):
-    """The calibration with what the matcher errs by in doffs, as `rollcli estimate` does it."""
-    rise = estimate.tangent.slope * math.cos(estimate.tangent.theta)
-    return replace(calibration, doffs=calibration.doffs - sgbm_offset(mode, rise))
-
-
 def judged(frame: Matched):
     """Errors of one frame: pitch (degrees) and height (per cent) at the tangent and below the camera, ..."""
     spec = frame.spec
     width, height = spec.size
     nominal = Calibration(spec.focal, spec.focal, *spec.centre, spec.baseline, 0.0, width, height)
-    estimate = estimate_roll(frame.disparity)
-    calibration = corrected(estimate, nominal)
-    posed = with_pose(estimate, calibration)
-    tangent = estimate.tangent
-    distance = spec.focal * spec.baseline / (tangent.disparity + calibration.doffs)
+    posed = with_pose(estimate_roll(frame.disparity), nominal)
+    tangent = posed.tangent
+    distance = spec.focal * spec.baseline / tangent.disparity
     bend = math.atan(spec.curvature * distance)
     pitch = spec.pitch + bend
     above = (spec.height + spec.curvature * distance**2 / 2) * math.cos(bend)
@@ -116,7 +107,7 @@ def streets() -> None:
             found = match_pair(left, right, StereoOptions(downscale=factor)).disparity
             estimate = estimate_roll(found)
             calibration = KITTI_2012.for_size(*left.shape[::-1]).for_size(*found.shape[::-1])
-            poses.append(with_pose(estimate, corrected(estimate, calibration)))
+            poses.append(with_pose(estimate, calibration))
         full, half = poses
         runs[path.stem.split("_")[0]].append(full)
         if all(each.status == "ok" for each in poses):
