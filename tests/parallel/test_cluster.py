@@ -195,3 +195,36 @@ def test_a_scheduler_without_workers_ends_the_run(tmp_path, scheduler):
     assert done.status == 1
     assert f"{scheduler}: has no workers" in done.err
     assert rollcli("estimate", "maps", "-o", "rolls.csv", cwd=tmp_path).status == 0
+
+
+def test_workers_that_share_only_a_bucket_give_the_bytes_of_a_local_run(
+    store, tmp_path, monkeypatch, request
+):
+    for name, value in store.items():
+        monkeypatch.setenv(name, value)
+    scheduler, workers = (request.getfixturevalue(name) for name in ("scheduler", "workers"))
+    from rollcli.files.storage import list_names, read_bytes, write_bytes
+
+    bucket = f"s3://maps/{tmp_path.name}"
+    write_maps(tmp_path / "maps", FRAMES, width=300, height=200)
+    for name, data in contents(tmp_path / "maps").items():
+        write_bytes(f"{bucket}/maps/{name}", data)
+    assert rollcli("estimate", "maps", "-o", "rolls.csv", "--derotated", "up", cwd=tmp_path).status == 0
+
+    line = ("estimate", f"{bucket}/maps/", "-o", f"{bucket}/rolls.csv", "--derotated", f"{bucket}/up")
+    line = (*line, "--part-rows", "8", "--scheduler", scheduler)
+    (tmp_path / "driver").mkdir()
+    run = subprocess.Popen(command(*line), cwd=tmp_path / "driver", env=environment())
+    wait_for(lambda: run.poll() is not None or len(list_names(f"{bucket}/rolls.csv")) > 1)
+    run.kill()
+    assert run.wait() != 0
+    resumed = subprocess.Popen(command(*line, "--resume", "-q"), cwd=tmp_path / "driver", env=environment())
+    wait_for(lambda: resumed.poll() is not None or len(list_names(f"{bucket}/rolls.csv")) > 3)
+    workers[0].kill()
+    assert resumed.wait(timeout=120) == 0
+
+    parts = sorted(list_names(f"{bucket}/rolls.csv"))
+    expected = (tmp_path / "rolls.csv").read_bytes().replace(b"maps/", f"{bucket}/maps/".encode())
+    assert b"".join(read_bytes(f"{bucket}/rolls.csv/{part}") for part in parts) == expected
+    images = {name: read_bytes(f"{bucket}/up/{name}") for name in list_names(f"{bucket}/up")}
+    assert images == contents(tmp_path / "up")
