@@ -16,8 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError
+from rollcli.files.codecs.parquet import MAGIC, decode_parquet
 from rollcli.files.codecs.row_text import csv_rows, json_rows
+from rollcli.files.existence import is_file
 from rollcli.files.results import BOUNDS, STATUSES, STDIN, TEXT, read_run, value_of
+from rollcli.files.storage import list_names, read_bytes
+from rollcli.files.stores.locations import is_url
+from rollcli.files.stores.parts import part_names, read_parts
 
 _CHUNK = 20_000  # rows that are held as text
 
@@ -72,17 +77,16 @@ def read_columns(path: str, wanted: Sequence[str]) -> ResultColumns:
     statuses: list[NDArray[np.uint8]] = []
     parts: dict[str, list[NDArray[np.float64]]] = {}
     methods: set[str] = set()
-    with _opened(path) as stream:
-        names, rows = _cells(stream, path, wanted)
+    for name_of_part, names, rows in _tables(path, wanted):
         while chunk := list(islice(rows, _CHUNK)):
             lines, *columns = zip(*chunk, strict=True)
             found = dict(zip(names, columns, strict=True))
             files += map(str, found["file"])
-            statuses.append(_statuses(found["status"], lines, path))
+            statuses.append(_statuses(found["status"], lines, name_of_part))
             methods.update(map(str, filter(None, found.get("method", ()))))
             for name in wanted:
                 if name in found:
-                    parts.setdefault(name, []).append(_numbers(name, found[name], lines, path))
+                    parts.setdefault(name, []).append(_numbers(name, found[name], lines, name_of_part))
     return ResultColumns(
         path,
         files,
@@ -91,6 +95,39 @@ def read_columns(path: str, wanted: Sequence[str]) -> ResultColumns:
         frozenset(methods),
         None if path == STDIN else read_run(path),
     )
+
+
+def _tables(path: str, wanted: Sequence[str]) -> Iterator[tuple[str, list[str], Iterator[tuple[Any, ...]]]]:
+    """Yield the file, or each part of a folder of parts: its name, its columns, its rows with their lines."""
+    parts = () if path == STDIN else part_names(list_names(path))
+    if parts:
+        for location, data in read_parts(path, parts):
+            yield location, *_table(data, location, wanted)
+    elif is_url(path) or _is_parquet(path):
+        yield path, *_table(read_bytes(path), path, wanted)
+    else:
+        with _opened(path) as stream:
+            yield path, *_cells(stream, path, wanted)
+
+
+def _table(data: bytes, path: str, wanted: Sequence[str]) -> tuple[list[str], Iterator[tuple[Any, ...]]]:
+    if not data.startswith(MAGIC):
+        return _cells(
+            io.TextIOWrapper(io.BytesIO(data), TEXT["encoding"], TEXT["errors"], newline=""), path, wanted
+        )
+    names = ["file", "status", "method", *wanted]
+    rows = ((number, *map(values.get, names)) for number, values in decode_parquet(data, path))
+    return names, rows
+
+
+def _is_parquet(path: str) -> bool:
+    if path == STDIN or not is_file(path):  # the bytes of a pipe can be read once
+        return False
+    try:
+        with Path(path).open("rb") as file:
+            return file.read(len(MAGIC)) == MAGIC
+    except OSError:
+        return False  # opening it as text says what is wrong
 
 
 @contextmanager

@@ -75,6 +75,8 @@ def test_parquet_parts_are_one_typed_table(tmp_path):
     from rollcli.files.results import read_result
 
     assert read_result(tmp_path / "rolls.parquet").rows == read_result(tmp_path / "rolls.csv").rows
+    outs = [rollcli("rig", name, cwd=tmp_path).out for name in ("rolls.parquet", "rolls.csv")]
+    assert outs[0] == outs[1] != ""
 
 
 def test_other_commands_read_a_result_of_parts(bucket, tmp_path):
@@ -89,6 +91,8 @@ def test_other_commands_read_a_result_of_parts(bucket, tmp_path):
     figures = rollcli("evaluate", "accuracy", f"{bucket}/rolls.csv", "--truth", "truth.csv", cwd=tmp_path)
     assert figures.status == 0, figures.err
     assert "frames compared           5" in figures.out
+    seen = rollcli("rig", f"{bucket}/rolls.csv", cwd=tmp_path)
+    assert "(5 of 5 frames)" in seen.out
 
 
 @pytest.mark.parametrize(
