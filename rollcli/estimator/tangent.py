@@ -13,6 +13,8 @@ from rollcli.estimator.interval import Jackknife
 from rollcli.estimator.moments import Floats, Grid
 from rollcli.estimator.road.surface import Surface
 
+_MOST_MOVED = 0.05  # of the slope: no road bends more, so what does is no bend of the road
+
 
 @dataclass(frozen=True)
 class Tangent:
@@ -65,19 +67,44 @@ def touch(
     Tangent
     """
     cosine, sine = math.cos(theta), math.sin(theta)
-    centre = 0.0
+    centre, cubic = 0.0, (0.0, 0.0)
     if surface is not None:
         grid = surface.grid
-        x, y = (float(surface.weights @ values) for values in (surface.x, surface.y))
-        centre = (y * cosine - x * sine) / float(surface.weights.sum())
+        along = surface.y * cosine - surface.x * sine
+        centre = float(surface.weights @ along) / float(surface.weights.sum())
+        cubic = _parabola_of_cubic((along - centre) * grid.scale, surface.weights)
     row = centre * grid.scale + grid.centre_v * cosine - grid.centre_u * sine
     a0, a1, a2 = alpha
-    slope = a1 + 2 * a2 * row
+    disparity, slope = a0 + row * (a1 + row * a2), a1 + 2 * a2 * row
+    third = _third_power(disparity, slope, a2, cubic[1])
+    disparity, slope = disparity - third * cubic[0], slope - third * cubic[1]
     changes = None
     if jackknife is not None:
         across = grid.centre_u * cosine + grid.centre_v * sine
         changes = _in_pixels(_errors(jackknife), centre, grid.scale, slope * across)
-    return Tangent(theta, row, a0 + row * (a1 + row * a2), slope, changes)
+    return Tangent(theta, row, disparity, slope, changes)
+
+
+def _parabola_of_cubic(along: Floats, weights: Floats) -> tuple[float, float]:
+    """Return value and slope at 0 of the parabola that fits the cubes of some positions, px^3 and px^2."""
+    powers = np.vander(along, 4, increasing=True)
+    products = (powers * weights[:, None]).T @ powers
+    value, slope, _ = np.linalg.lstsq(products[:3, :3], products[:3, 3], rcond=None)[0].tolist()
+    return value, slope
+
+
+def _third_power(disparity: float, slope: float, bend: float, moved: float) -> float:
+    """Return the coefficient of the cube that a road of constant curvature adds to its parabola, 1/px^2.
+
+    A road of constant vertical curvature is y = h' d + s + c / d: the third derivative of d is 6 c d'^4 / d^4
+    where the second one is -2 c d'^3 / d^3. A fitted parabola takes a part of the cube for slope, `moved` for
+    a coefficient of 1: up to 0.6 % of the height on a road with a radius of 1 km.
+    """
+    if disparity <= 0 or slope <= 0:
+        return 0.0
+    third = -bend * slope / disparity
+    most = _MOST_MOVED * slope / max(abs(moved), 1e-300)
+    return max(-most, min(most, third))
 
 
 def _errors(jackknife: Jackknife) -> Floats:

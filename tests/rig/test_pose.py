@@ -165,6 +165,29 @@ def test_the_message_says_what_the_calibrations_errors_do():
         assert said == pytest.approx(abs(moved), abs=5e-4)
 
 
+@pytest.mark.parametrize("curvature", [-0.001, 0.001])
+def test_on_a_bent_road_the_pose_is_that_over_the_road_where_the_tangent_touches_it(curvature):
+    calibration = Calibration(720.0, 720.0, 620.0, 170.0, 0.54)
+    pitch, height = 0.03, 1.6
+    v = np.arange(375.0)
+    down = np.tan(np.arctan((v - calibration.cy) / calibration.fy) + pitch)
+    # the ray meets height - curvature z^2 / 2 below the camera's level
+    with np.errstate(invalid="ignore", divide="ignore"):
+        root = np.sqrt(down**2 + 2 * curvature * height)
+        z = np.where(down > 0.02, (root - down) / curvature, np.inf)
+    seen = np.isfinite(z)
+    z = z[seen]
+    along_axis = z * math.cos(pitch) + (height - curvature * z**2 / 2) * math.sin(pitch)
+    disparity = np.zeros((375, 1242))
+    disparity[seen] = (calibration.fx * calibration.baseline / along_axis)[:, None]
+    posed = with_pose(estimate_roll(disparity), calibration)
+    far = calibration.fx * calibration.baseline / posed.tangent.disparity
+    bend = math.atan(curvature * far)
+    assert posed.pitch == pytest.approx(pitch + bend, abs=math.radians(0.03))
+    over = (height + curvature * far**2 / 2) * math.cos(bend)
+    assert posed.height_m == pytest.approx(over, rel=3e-3)
+
+
 def test_a_map_of_another_size_is_refused():
     sized = Calibration(250.0, 250.0, 160.0, 90.0, 0.5, 0.0, 300, 200)
     estimate = estimate_roll(cast(sized, 0.02, 0.2, 1.5))
