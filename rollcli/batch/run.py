@@ -21,7 +21,8 @@ from rollcli.frames.progress import Progress
 from rollcli.parallel.in_order import Work
 from rollcli.parallel.interrupt import Stop, stop_on_signals
 from rollcli.parallel.process_setup import limit_blas_threads
-from rollcli.parallel.run_tasks import SharedPaths, Workers, require_scheduler, run_tasks
+from rollcli.parallel.run_tasks import require_scheduler, run_tasks
+from rollcli.parallel.workers import SharedPaths, Workers
 
 _NOTES = 3  # on how calibrations were read; the record of the run has those of more files
 

@@ -6,14 +6,8 @@ from numpy.typing import ArrayLike
 
 from rollcli.estimator.doubts import Evidence, doubts_of
 from rollcli.estimator.interval import half_width, jackknife
-from rollcli.estimator.methods import (
-    AREAS,
-    DEFAULT_SOLVER,
-    MAX_ROLL_DEG,
-    LearningRate,
-    SolverSettings,
-    load_solver,
-)
+from rollcli.estimator.load_method import load_solver
+from rollcli.estimator.methods import AREAS, DEFAULT_SOLVER, MAX_ROLL_DEG, LearningRate, SolverSettings
 from rollcli.estimator.moments import Grid
 from rollcli.estimator.request import Request
 from rollcli.estimator.result import RollEstimate

@@ -8,12 +8,7 @@ Add a method that chooses pixels: a file in `areas` with an `AreaMethod`, and on
 
 import math
 from dataclasses import dataclass
-from importlib import import_module
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
-
-if TYPE_CHECKING:
-    from rollcli.estimator.areas.plane import AreaMethod
-    from rollcli.estimator.solvers.solution import Solver
+from typing import Literal, NamedTuple
 
 LAMBDA0 = 26.0  # the fewest iterations in [GD] Fig. 3
 TOLERANCE_DEG = 1e-4  # the finest of the paper's four
@@ -78,19 +73,3 @@ class AreaSettings:
 
 DEFAULT_SOLVER = SolverSettings()
 DEFAULT_AREA = AreaSettings()
-
-
-def load_solver(name: str) -> "Solver":
-    """Return the function of a solver."""
-    solver: Solver = _load("solvers", SOLVERS[name])
-    return solver
-
-
-def load_area_method(name: str) -> "AreaMethod":
-    """Return the function of a method that chooses pixels."""
-    method: AreaMethod = _load("areas", AREAS[name])
-    return method
-
-
-def _load(folder: str, method: Method) -> Any:
-    return getattr(import_module(f"rollcli.estimator.{folder}.{method.file}"), method.file)

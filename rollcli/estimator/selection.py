@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from rollcli.errors import EstimationError
 from rollcli.estimator.areas.plane import fit_plane
 from rollcli.estimator.energy import Energy
-from rollcli.estimator.methods import AREAS, AreaSettings, load_area_method
+from rollcli.estimator.load_method import load_area_method
+from rollcli.estimator.methods import AREAS, AreaSettings
 from rollcli.estimator.moments import map_moments, point_moments
 from rollcli.estimator.request import Request
 from rollcli.estimator.road.find import Road, find_road

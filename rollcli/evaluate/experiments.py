@@ -15,14 +15,8 @@ from rollcli.errors import EstimationError
 from rollcli.estimator.areas.plane import fit_plane
 from rollcli.estimator.energy import Energy
 from rollcli.estimator.estimate import estimate_roll
-from rollcli.estimator.methods import (
-    MAX_ROLL_DEG,
-    MAX_ROLL_LIMIT_DEG,
-    AreaSettings,
-    SolverSettings,
-    load_area_method,
-    load_solver,
-)
+from rollcli.estimator.load_method import load_area_method, load_solver
+from rollcli.estimator.methods import MAX_ROLL_DEG, MAX_ROLL_LIMIT_DEG, AreaSettings, SolverSettings
 from rollcli.estimator.moments import map_moments
 from rollcli.estimator.solvers.exact import exact, minima
 from rollcli.estimator.solvers.golden_section import golden_section

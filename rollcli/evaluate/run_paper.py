@@ -18,7 +18,8 @@ from rollcli.frames.progress import Progress
 from rollcli.parallel.in_order import Work
 from rollcli.parallel.interrupt import stop_on_signals
 from rollcli.parallel.process_setup import limit_blas_threads
-from rollcli.parallel.run_tasks import Workers, run_tasks
+from rollcli.parallel.run_tasks import run_tasks
+from rollcli.parallel.workers import Workers
 from rollcli.report.page import require_extra
 
 if TYPE_CHECKING:

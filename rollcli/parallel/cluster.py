@@ -19,7 +19,7 @@ from rollcli.files.stores.locations import is_url
 from rollcli.files.stores.turns import computing
 from rollcli.parallel.in_order import Result, Task, Work
 from rollcli.parallel.process_setup import prepare_worker
-from rollcli.parallel.run_tasks import SharedPaths
+from rollcli.parallel.workers import SharedPaths
 
 _CONNECT_S, _FIRST_WORKER_S, _POLL_S = 6, 5, 2
 _IN_FLIGHT_PER_THREAD = 4

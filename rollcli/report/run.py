@@ -14,7 +14,8 @@ from rollcli.frames.options import EncodingOptions, FrameOptions
 from rollcli.frames.progress import Progress
 from rollcli.parallel.in_order import Work
 from rollcli.parallel.interrupt import stop_on_signals
-from rollcli.parallel.run_tasks import Workers, run_tasks
+from rollcli.parallel.run_tasks import run_tasks
+from rollcli.parallel.workers import Workers
 from rollcli.report.gallery import Choice, choose
 from rollcli.report.options import ReportOptions
 from rollcli.report.page import require_extra

@@ -18,7 +18,8 @@ from rollcli.files.formats import encode_stored
 from rollcli.files.results import run_path
 from rollcli.parallel.in_order import Work
 from rollcli.parallel.interrupt import Stop
-from rollcli.parallel.run_tasks import Workers, run_tasks
+from rollcli.parallel.run_tasks import run_tasks
+from rollcli.parallel.workers import Workers
 from rollcli.simulate.geometry.camera import rig_axes
 from rollcli.simulate.render import render_frame
 from rollcli.simulate.spec import LEVEL, FrameSpec

@@ -9,7 +9,8 @@ from rollcli.errors import InputError
 from rollcli.parallel.in_order import Work
 from rollcli.parallel.interrupt import Stop
 from rollcli.parallel.pool import PoolExecutor
-from rollcli.parallel.run_tasks import Workers, run_tasks
+from rollcli.parallel.run_tasks import run_tasks
+from rollcli.parallel.workers import Workers
 from tests.parallel.tasks import lost, run
 
 WORK = Work(run, lost)

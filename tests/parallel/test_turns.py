@@ -5,7 +5,8 @@ import threading
 from rollcli.files.stores.turns import computing, tasks_in_hand, waiting_for_network
 from rollcli.parallel.in_order import Work
 from rollcli.parallel.interrupt import Stop
-from rollcli.parallel.run_tasks import Workers, run_tasks
+from rollcli.parallel.run_tasks import run_tasks
+from rollcli.parallel.workers import Workers
 
 _COUNT = 4
 _together = threading.Barrier(_COUNT)
