@@ -104,7 +104,11 @@ def sorted_or_circle(graph):
 
 
 def test_no_modules_import_each_other_in_a_circle():
-    assert sorted_or_circle({name: set(imports(name, in_functions=False)) for name in MODULES}) is None
+    graph = {
+        name: {*imports(name, in_functions=False), *imports(name, in_functions=True)} - {name, "rollcli"}
+        for name in MODULES
+    }
+    assert sorted_or_circle(graph) is None
 
 
 def test_no_packages_import_each_other_in_a_circle():
