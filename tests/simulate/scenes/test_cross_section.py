@@ -280,3 +280,21 @@ def test_a_positive_bend_turns_to_the_right_and_zero_is_straight():
     right, straight = (drawn_road(FrameSpec("bare", bend=bend, seed=4)).course for bend in (0.01, 0.0))
     assert right.point(0.0, 20.0)[0] - straight.point(0.0, 20.0)[0] == pytest.approx(0.01 / 2 * 20**2)
     assert straight.bend == 0
+
+
+@pytest.mark.parametrize("shape", ["flat", *SHAPES])
+@pytest.mark.parametrize("scene", ["bare", "verge"])
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_the_ground_of_a_country_road_has_no_steps(shape, scene, seed):
+    crossfall = 0.0 if shape == "flat" else 0.04
+    spec = FrameSpec(scene, cross_section=shape, crossfall=crossfall, gutter=0.1, seed=seed)
+    road, grounds = drawn_road(spec), [s for s in build_scene(spec).surfaces if isinstance(s, Ground)]
+    edges = {edge for ground in grounds for edge in ground.edges if math.isfinite(edge)}
+    assert len(edges) >= 2
+    down = np.array([[0.0], [-1.0], [0.0]])
+    for edge in edges:
+        heights = []
+        for lateral in (edge - 1e-7, edge + 1e-7):
+            above = road.course.point(lateral, 6.0, 50.0)[:, None]
+            heights.append(50.0 - min(float(ground.intersect(above, down)[0]) for ground in grounds))
+        assert abs(heights[0] - heights[1]) < 1e-6
