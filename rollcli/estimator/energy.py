@@ -1,12 +1,13 @@
 """The energy of [GD] eq. 9, its gradient (eq. 12-13), its curvature and its parabola, from moments alone.
 
 [GD]: Fan, Wang, Liu, Pitas, "A Robust Roll Angle Estimation Algorithm Based on Gradient Descent",
-arXiv:1906.01894.
+arXiv:1906.01894. [VarPro]: Golub, Pereyra, "The differentiation of pseudo-inverses and nonlinear least
+squares problems whose variables separate", SIAM J. Numer. Anal. 10(2), 1973. README.md has the derivation.
 
-Moved to the centroid of the pixels and freed of its best plane, a map is a plane (c1, c2) and a residual r
-that is orthogonal to 1, p and q. In the frame rotated by theta the plane is ``cx x + cy y``; `cy y` and the
-constant belong to the road, so the road has to explain ``e = r + cx x`` by a parabola in y. What is left of
-`e` is small near the minimum: nothing large cancels, unlike in ``d'd - d'YJd``.
+With the origin at the centroid of the pixels, a map is the sum of its best plane and a residual r that is
+orthogonal to 1, p and q. In the frame rotated by theta the plane is ``cx x + cy y``. `cy y` and the constant
+belong to the road, so the parabola in y has to explain ``e = r + cx x``. What it leaves of `e` is small near
+the minimum: no large numbers cancel, as they do in ``d'd - d'YJd``.
 """
 
 import math
@@ -157,7 +158,7 @@ class Energy:
         res_xy = rxy + cx * xxy - b0 * xy - b1 * xyy - b2 * xyyy
         res_xx = rxx + cx * xxx - b0 * xx - b1 * xxy - b2 * xxyy
         gradient = 2 * (slope * res_x + bend * res_xy)
-        # the coefficients turn with theta too: what their turning saves
+        # the coefficients follow theta: subtract what that saves [VarPro]
         z0 = bend * xy
         z1 = slope * xy + bend * xyy - res_x
         z2 = slope * xyy + bend * xyyy - 2 * res_xy

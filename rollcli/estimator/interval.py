@@ -2,8 +2,12 @@
 
 Neighbouring disparities are not independent, and what a road's parabola misses is smooth: the textbook
 standard error is far too small. Leaving out whole bands (along the road) and whole columns (across it) shows
-how far noise AND misfit move the angle. The interval is conditional on the pixels used being road, and on the
-road being even across: camber and the wrong surface are not in the residuals.
+how far both noise and misfit move the angle. The interval assumes that the pixels are road and that the road
+is not cambered: neither shows in the residuals.
+
+[Jackknife]: Kott, "The delete-a-group jackknife", Journal of Official Statistics 17(4), 2001. [Freedom]:
+Satterthwaite, "An approximate distribution of estimates of variance components", Biometrics Bulletin 2(6),
+1946.
 """
 
 import itertools
@@ -59,14 +63,14 @@ def half_width(jackknife: Jackknife, theta: float, tuning: IntervalTuning) -> fl
 def slant(theta: float, tuning: IntervalTuning) -> float:
     """Return how much wider the interval is at a roll, radians: 1 at none, 2 at a right angle.
 
-    The more a road's disparity changes along the rows, the more a matcher errs that takes it for constant
-    there; these errors are smooth, so that the residuals do not tell of them.
+    A matcher takes the disparity for constant within its block. The more a rolled road's disparity changes
+    along the rows, the more that errs; these errors are smooth and do not show in the residuals.
     """
     return 1 + tuning.slant * abs(math.sin(theta))
 
 
 def jackknife(surface: Surface, theta: float, tuning: IntervalTuning) -> Jackknife:
-    """Leave out one group of the road's pixels after the other.
+    """Leave out one group of the road's pixels after the other [Jackknife].
 
     Parameters
     ----------
@@ -129,7 +133,10 @@ def _changes(groups: Floats, normal: Floats, step: Floats) -> Floats:
 
 
 def _freedom(groups: Floats, normal: Floats) -> float:
-    """Return the degrees of freedom that the groups' shares of theta leave."""
+    """Return the degrees of freedom of theta's change, by the groups' shares of its leverage [Freedom].
+
+    1 / sum share^2 is the number of equal groups that would tell as much; one goes to the mean.
+    """
     leverage = groups[:, 3, 3] / normal[3, 3]
     return max(1.0, 1 / float(np.square(leverage).sum()) - 1)
 

@@ -41,7 +41,7 @@ ROADS = ("auto", "all")
 
 @dataclass(frozen=True)
 class SolverSettings:
-    """What a solver may be told.
+    """The settings of solvers.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class SolverSettings:
 
 @dataclass(frozen=True)
 class AreaSettings:
-    """What a method that chooses pixels may be told.
+    """The settings of methods that choose pixels.
 
     Attributes
     ----------

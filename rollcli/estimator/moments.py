@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-_ROWS = 64  # rows of a block at most: it stays in the cache, and its sums of integer powers exact in float32
+_ROWS = 64  # rows of a block at most, so that it stays in the cache and sums of powers are exact in float32
 _ONE_THREAD = 1 << 19  # multiplications; above, OpenBLAS wakes threads, which costs more than it saves here
-_SMALL = 1 << 17  # pixels; up to here double precision takes no time that anyone would notice
+_SMALL = 1 << 17  # pixels; double precision costs smaller maps little
 _PLANE_BITS = 20  # of the 24 that a float32 has, for the plane's value at any pixel
 _CHOOSE = np.array([[float(math.comb(j, k)) for k in range(5)] for j in range(5)])
 _REST = np.maximum(np.subtract.outer(np.arange(5), np.arange(5)), 0)  # j - k
@@ -119,7 +119,7 @@ def map_moments(
         if plane is None:
             plane = _exact_steps(_first_fit(disparity, weights, p, q), grid.scale)
         sums = _block_sums(disparity, weights, p, q, grid.scale, plane)
-        if not np.isfinite(sums[2]):  # NaN or inf among the pixels: rare enough to look only now
+        if not np.isfinite(sums[2]):  # NaN or inf among the pixels is rare: look for it only now
             known = np.where(np.isfinite(disparity), disparity, 0)
             sums = _block_sums(known, weights, p, q, grid.scale, plane)
     return Moments(grid, plane, *sums)

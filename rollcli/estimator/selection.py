@@ -96,7 +96,7 @@ def _road_pixels(found: FoundRoad) -> PixelSet:
 
 
 def _all_pixels(checked: CheckedMap, request: Request) -> PixelSet:
-    """Sum every valid pixel, as the paper does; a sample of them tells how sure that is."""
+    """Sum every valid pixel, as the paper does; a sample of them serves the interval."""
     values, usable = checked.values, checked.usable
     used = values if usable is None else np.where(usable, values, 0)
     peak = float(used.max())

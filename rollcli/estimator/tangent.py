@@ -1,16 +1,16 @@
-"""The road's tangent amid the pixels used: what the pose of the rig is read from.
+"""The tangent of the road's parabola amid the pixels used, for the pose of the rig.
 
 The parabola's own (a0, a1) are its tangent at y = 0, far above the road. Where the pixels are, disparity and
 slope are known best, and hardly depend on how the road bends.
 """
 
-import math
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from rollcli.estimator.interval import Jackknife
 from rollcli.estimator.moments import Floats, Grid
+from rollcli.estimator.road.model import RoadModel
 from rollcli.estimator.road.surface import Surface
 
 _MOST_MOVED = 0.05  # of the slope: no road bends more, so what does is no bend of the road
@@ -66,21 +66,20 @@ def touch(
     -------
     Tangent
     """
-    cosine, sine = math.cos(theta), math.sin(theta)
-    centre, cubic = 0.0, (0.0, 0.0)
+    road, centre, cubic = RoadModel(theta, alpha), 0.0, (0.0, 0.0)
     if surface is not None:
         grid = surface.grid
-        along = surface.y * cosine - surface.x * sine
+        along = road.along(surface.x, surface.y)
         centre = float(surface.weights @ along) / float(surface.weights.sum())
         cubic = _parabola_of_cubic((along - centre) * grid.scale, surface.weights)
-    row = centre * grid.scale + grid.centre_v * cosine - grid.centre_u * sine
-    a0, a1, a2 = alpha
-    disparity, slope = a0 + row * (a1 + row * a2), a1 + 2 * a2 * row
+    row = centre * grid.scale + road.along(grid.centre_u, grid.centre_v)
+    _, a1, a2 = alpha
+    disparity, slope = road.disparity_along(row), a1 + 2 * a2 * row
     third = _third_power(disparity, slope, a2, cubic[1])
     disparity, slope = disparity - third * cubic[0], slope - third * cubic[1]
     changes = None
     if jackknife is not None:
-        across = grid.centre_u * cosine + grid.centre_v * sine
+        across = road.across(grid.centre_u, grid.centre_v)
         changes = _in_pixels(_errors(jackknife), centre, grid.scale, slope * across)
     return Tangent(theta, row, disparity, slope, changes)
 

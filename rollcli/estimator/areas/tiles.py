@@ -11,7 +11,7 @@ from rollcli.estimator.moments import Floats, Grid
 
 @dataclass(frozen=True)
 class Tiles:
-    """What the tiles of a map add up to.
+    """The sums of a map's tiles.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""The profile across a road: what the ground beside it does.
+"""The profile across a road: where a verge or a kerb ends it.
 
 Heights above the road, in camera heights, are relative differences of disparity: h = d / road - 1. A kerb is
 a step; a verge starts at the road's height and rises or falls from there, until it is lost: only pixels near
@@ -23,7 +23,7 @@ class Edges(NamedTuple):
     right: float
 
     def hold(self, side: Reals) -> NDArray[np.bool_]:
-        """Return which pixels, this far to the right, lie between the edges."""
+        """Return which pixels lie between the edges; `side` is how far to the right each is."""
         held: NDArray[np.bool_] = (side > -self.left) & (side < self.right)
         return held
 
@@ -34,7 +34,7 @@ NO_EDGES = Edges(math.inf, math.inf)
 def find_edges(
     x: Reals, y: Reals, d: Reals, used: NDArray[np.bool_], road: RoadModel, tuning: EdgeTuning
 ) -> Edges:
-    """Find where the road ends: at a verge, which falls away or rises from there, or at a kerb, unless low.
+    """Find where the road ends: at a verge, which falls or rises from its edge, or at a kerb that is not low.
 
     Parameters
     ----------
@@ -93,8 +93,8 @@ def _edge(heights: list[float], tuning: EdgeTuning) -> float:
 def _ends(inner: float, jump: float, beside: list[float], tuning: EdgeTuning) -> bool:
     """Return whether the road ends where its profile jumps, by the heights beside it.
 
-    It does not where it slopes from its middle on, by `inner` from bin to bin: that is camber. Nor at a low
-    kerb with ground behind it that is nearly level.
+    It goes on where it slopes within by nearly as much, `inner` from bin to bin: that is camber. It also goes
+    on at a low kerb with nearly level ground behind it.
     """
     if inner * jump > 0 and abs(inner) > tuning.camber * abs(jump):
         return False

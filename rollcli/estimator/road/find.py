@@ -30,13 +30,13 @@ class Road:
     plane : ndarray, shape (3,)
         d = c0 + c1 x + c2 y on the sample's grid.
     score : float
-        The share of the road-like pixels ahead that lie on it, less those below it, up to 1: the mean of that
-        in its corridor and of that in the core of it, of which a wide verge has nothing. Less for a plane
-        that looks like a wall, since its horizon is far outside of the image.
+        The share of the road-like pixels ahead that lie on the plane, less those below it; at most 1. It is
+        the mean of two shares, in the corridor and in its core, where a wide verge has no pixel. A plane
+        whose horizon is far outside of the image, as that of a wall, scores less.
     rival : float
         The best score of another plane, one whose roll differs by `SearchTuning.rival_angle` or more.
     noise : float
-        The share of its corridor that is noise: pixels that differ from those around them.
+        The share of the corridor that is noise: pixels that differ from their neighbours.
     """
 
     plane: NDArray[np.float64]

@@ -5,12 +5,13 @@ arXiv:1906.01894.
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 Reals = NDArray[np.floating[Any]]
+Coordinate = TypeVar("Coordinate", float, Reals)
 
 
 class RoadModel(NamedTuple):
@@ -40,11 +41,11 @@ class RoadModel(NamedTuple):
         level, slope, _ = self.alpha
         return level, -slope * math.sin(self.theta), slope * math.cos(self.theta)
 
-    def across(self, x: Reals, y: Reals) -> Reals:
+    def across(self, x: Coordinate, y: Coordinate) -> Coordinate:
         """Return the coordinate across the road, x cos(theta) + y sin(theta)."""
         return x * math.cos(self.theta) + y * math.sin(self.theta)
 
-    def along(self, x: Reals, y: Reals) -> Reals:
+    def along(self, x: Coordinate, y: Coordinate) -> Coordinate:
         """Return the coordinate along the road, y cos(theta) - x sin(theta)."""
         return y * math.cos(self.theta) - x * math.sin(self.theta)
 
@@ -52,7 +53,7 @@ class RoadModel(NamedTuple):
         """Return the road's disparity, px."""
         return self.disparity_along(self.along(x, y))
 
-    def disparity_along(self, along: Reals) -> Reals:
+    def disparity_along(self, along: Coordinate) -> Coordinate:
         """Return the road's disparity, px, where the coordinate along it is known."""
         a0, a1, a2 = self.alpha
         return a0 + along * (a1 + along * a2)

@@ -52,7 +52,7 @@ class NearPixels:
 
     @classmethod
     def of(cls, sample: Sample, road: Road) -> "NearPixels":
-        """Take them from a sample."""
+        """Take the pixels near a road's plane from a sample."""
         tuning, model = sample.tuning.fit, road.model
         c0, c1, c2 = road.plane
         off = (c0 + c1 * sample.x + c2 * sample.y - sample.d) / sample.tolerance
@@ -69,7 +69,7 @@ class NearPixels:
         return cls(x, y, d, tolerance, place, ahead, stride, tuning)
 
     def within(self, edges: Edges, model: RoadModel) -> "NearPixels":
-        """Return those between the edges of a road."""
+        """Return the pixels between the edges of a road."""
         kept = edges.hold(model.side(self.x, self.y, model.disparity(self.x, self.y)))
         pixels = {name: getattr(self, name)[kept] for name in ("x", "y", "d", "tolerance", "place", "ahead")}
         return replace(self, **pixels)
@@ -144,9 +144,9 @@ def solvable(normal: Floats) -> Floats:
 
 
 def _seen(across: Singles, along: Singles, half_height: float, theta: float, tuning: FitTuning) -> Singles:
-    """Return 1 for what a rig sees of the road at any roll near its own, less towards sides and near corners.
+    """Return weights: 1 where a rig sees the road at any roll near its own, less at sides and lower corners.
 
-    On a road that is not even across, the corner that only one of two rolls sees would turn the angle.
+    A corner that is seen at one roll and not at another would turn the angle of a cambered road.
     """
     edge = np.square(np.square(np.square(across / tuning.image_edge)))
     bottom = half_height / math.cos(theta) + max(0.0, abs(math.tan(theta)) - tuning.large_roll)

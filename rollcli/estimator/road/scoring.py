@@ -94,7 +94,7 @@ class PlaneScorer:
     def _weights(self, planes: Singles) -> tuple[Singles, Singles, Singles]:
         """Return, for each plane and pixel, the agreement of slopes and the places in core and corridor."""
         c1, c2 = planes[:, 1:2], planes[:, 2:3]
-        # x' / d in units of the plane's slope is the way to the side in camera heights, whatever the rig
+        # how far to the side each pixel lies, in camera heights, as `RoadModel.side` says
         side = np.square((self.x * c2 - self.y * c1) / self.d)
         corridor = np.exp(side * np.float32(-1 / self.tuning.corridor**2))
         core = np.square(np.square(np.square(corridor)))

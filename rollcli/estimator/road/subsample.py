@@ -1,4 +1,4 @@
-"""A few thousand pixels of a map, and what the map says about each from its neighbours."""
+"""A sample of a map's pixels, each with its tolerance, its agreement with its neighbours, and slopes."""
 
 import math
 from dataclasses import dataclass
@@ -45,7 +45,7 @@ class Sample:
     column : ndarray of uint16
         Column of each pixel among the sampled ones.
     pitch : float
-        From one of these to the next, units of x.
+        Distance between neighbouring columns of the sample, units of x.
     tuning : RoadTuning
         The numbers by which the map was sampled, and by which its road is to be found.
     """
@@ -65,7 +65,7 @@ class Sample:
     tuning: RoadTuning
 
     def about(self, pixels: int) -> slice:
-        """Return what takes about so many of the pixels, evenly."""
+        """Return a slice that takes about so many of the pixels, evenly."""
         return slice(None, None, max(1, round(len(self.d) / pixels)))
 
 
@@ -128,7 +128,7 @@ def take_sample(
     coherence = near.sum(0, dtype=np.float32)
     coherence /= np.maximum(known.sum(0, dtype=np.float32), 1)
     coherent = d[coherence >= numbers.coherent_from]
-    if len(coherent):  # anew, for noise spread over all disparities has another median than what is seen
+    if len(coherent):  # again, without the noise, which has another median
         noise, tolerance = _tolerance(d, typical := _median(coherent), quantum, numbers)
     per_unit = grid.scale / reach
     slopes = steps * np.array([-per_unit, per_unit, -per_unit, per_unit], np.float32)[:, None]

@@ -1,4 +1,4 @@
-"""From the road's plane to its pixels: a parabola fitted ever more strictly."""
+"""The surface of a road: its parabola, its edges and its pixels."""
 
 import math
 from contextlib import suppress
@@ -73,7 +73,7 @@ class Surface:
         on_it: NDArray[np.bool_] = np.abs(road - disparity) < self.limit * tolerance
         if self.edges != NO_EDGES:
             on_it &= self.edges.hold(self.model.side(x, y, road))
-        # where a wall passes through the surface it is as near as the road, but it does not rise
+        # where a wall crosses the surface it is as near as the road, but it does not rise as the road does
         reach = min(reach_of(height, width, self.tuning.sample), height - 1)
         off = disparity - road
         steady = np.abs(off[reach:] - off[:-reach]) < np.maximum(
@@ -144,7 +144,7 @@ def _surface(
 
 
 def whole_surface(sample: Sample, energy: Energy) -> Surface:
-    """Return the surface that every sampled pixel is taken to lie on."""
+    """Return a surface that takes every sampled pixel for road."""
     x, y, d = (values.astype(np.float64) for values in (sample.x, sample.y, sample.d))
     _, c1, c2 = energy.plane
     plane = RoadModel.of_plane(0.0, c1, c2)

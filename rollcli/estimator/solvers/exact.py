@@ -5,6 +5,8 @@ derivative is (N D' - N' D) / D^2, and this numerator is a trigonometric polynom
 a polynomial of degree 10 in tan(theta), but well conditioned at every angle, 90 degrees included. Its 11
 Fourier coefficients follow from samples of E' D^2 without error; the roots of the polynomial in
 z = exp(2 i theta) near the unit circle are all the angles at which E_min can have a minimum.
+
+[TITS]: Fan, Liu, "Road Damage Detection Based on Unsupervised Disparity Map Segmentation", IEEE T-ITS (2019).
 """
 
 import math
@@ -56,7 +58,7 @@ def minima(energy: Energy) -> list[Minimum]:
     starts, low = _stationary_angles(energy)
     same = 1e-12 * (energy.rest + energy.slope_energy)
     found = _settled(energy, starts)
-    if min((minimum.energy for minimum in found), default=math.inf) > low.energy + same:  # no root told of it
+    if min((minimum.energy for minimum in found), default=math.inf) > low.energy + same:  # no root led to it
         found += _settled(energy, [low.theta]) or [low]
     lowest = min(found, key=lambda m: m.energy)
     return sorted(found, key=lambda m: (m.energy if m.energy > lowest.energy + same else -1.0, abs(m.theta)))
@@ -82,8 +84,8 @@ def _stationary_angles(energy: Energy) -> tuple[list[float], Minimum]:
     if not largest > 0:
         return [0.0], low
     roots = np.roots(np.where(np.abs(coefficients) > 1e-15 * largest, coefficients, 0))
-    # A double root may leave the circle by the square root of rounding; the angle of any other root is
-    # harmless, for only those that the polish confirms as minima are compared.
+    # Rounding moves a double root off the circle by its square root. Other roots that are near do no harm:
+    # only minima that Newton's method confirms are compared.
     near = roots[np.abs(np.log(np.maximum(np.abs(roots), 1e-300))) < 0.1]
     return _unwhitened(energy, np.angle(near) / 2)[0].tolist(), low
 
@@ -92,7 +94,7 @@ def _unwhitened(energy: Energy, angles: Floats) -> tuple[Floats, Floats]:
     """Return the theta of angles in the frame where the pixels spread alike in all directions.
 
     There the polynomial is well conditioned even if all pixels lie in a narrow strip. The second result is
-    the length of y's unit vector on its way back: E' D^2 goes with its 10th power.
+    the length of the unit vector along y once it is back in the map's frame: E' D^2 grows with its 10th power.
     """
     xx, xy, yy = energy.forms[:3, 0]
     root = math.sqrt(xx * yy - xy * xy)
@@ -124,7 +126,7 @@ def _polished(energy: Energy, theta: float) -> tuple[Minimum, float]:
             break
         step = -now.gradient / now.curvature
         then = energy.at(theta + step)
-        # within rounding of the energy, the gradient still tells better from worse
+        # where energies differ by rounding alone, the gradient still decides
         if then.value > now.value + noise or not abs(then.gradient) < abs(now.gradient):
             break
         theta, now = theta + step, then

@@ -32,7 +32,7 @@ def golden_section(energy: Energy, settings: SolverSettings = DEFAULT_SOLVER) ->
 
     Notes
     -----
-    Assumes one minimum in the bracket. Whole frames can have two: `exact` tells which is lower.
+    Assumes one minimum in the bracket. Whole frames can have two: `exact` finds the lower one.
     """
     return shrink_bracket(lambda theta: energy.at(theta).value, settings.tolerance)
 

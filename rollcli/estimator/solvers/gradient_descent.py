@@ -1,4 +1,8 @@
-"""Gradient descent with the paper's adaptive learning rate [GD eq. 11, 14], guarded."""
+"""Gradient descent with the paper's adaptive learning rate [GD eq. 11, 14], guarded.
+
+[GD]: Fan, Wang, Liu, Pitas, "A Robust Roll Angle Estimation Algorithm Based on Gradient Descent",
+arXiv:1906.01894.
+"""
 
 import math
 
@@ -28,8 +32,8 @@ def gradient_descent(energy: Energy, settings: SolverSettings = DEFAULT_SOLVER) 
 
     Notes
     -----
-    Eq. 14 is the secant rule on the gradient: superlinear near a minimum, and bound for a maximum where the
-    energy curves downward. So E must fall (else the step is halved), lambda stays positive (else it is
+    Eq. 14 is the secant rule on the gradient: it is superlinear near a minimum, and runs to a maximum where
+    the energy curves downward. So E must fall (else the step is halved), lambda stays positive (else it is
     doubled), and a step is at most 20 degrees.
     """
     unit, tolerance = energy.normaliser, settings.tolerance
