@@ -94,7 +94,7 @@ def _unwhitened(energy: Energy, angles: Floats) -> tuple[Floats, Floats]:
     """Return the theta of angles in the frame where the pixels spread alike in all directions.
 
     There the polynomial is well conditioned even if all pixels lie in a narrow strip. The second result is
-    the length of the unit vector along y once it is back in the map's frame: E' D^2 grows with its 10th power.
+    the length of the unit vector along y, back in the map's frame: E' D^2 grows with its 10th power.
     """
     xx, xy, yy = energy.forms[:3, 0]
     root = math.sqrt(xx * yy - xy * xy)
