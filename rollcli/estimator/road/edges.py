@@ -50,7 +50,7 @@ def find_edges(
     Edges
     """
     expected = road.disparity(x, y)
-    used = used & (expected > tuning.least_road * d)
+    used = used & (expected > 0)  # above the horizon there is no profile
     if not used.any():
         return NO_EDGES
     x, y, d, expected = x[used], y[used], d[used], expected[used]

@@ -171,8 +171,6 @@ class EdgeTuning:
     """Pixels without which a bin has no height."""
     least_place: float = 0.1
     """Weight by place and slope (`NearPixels.place`) from which a pixel is looked at."""
-    least_road: float = 0.1
-    """Share of a pixel's disparity that the road's must have: above the horizon there is no profile."""
     level: float = 0.008
     """Camera heights within which a bin belongs to the road."""
     verge_slope: float = 0.026
