@@ -10,7 +10,7 @@ import numpy as np
 
 from rollcli.estimator.interval import Jackknife
 from rollcli.estimator.moments import Floats, Grid
-from rollcli.estimator.road.model import RoadModel
+from rollcli.estimator.road.model import Reals, RoadModel
 from rollcli.estimator.road.surface import Surface
 
 _MOST_MOVED = 0.05  # of the slope: no road bends more, so what does is no bend of the road
@@ -84,7 +84,7 @@ def touch(
     return Tangent(theta, row, disparity, slope, changes)
 
 
-def _parabola_of_cubic(along: Floats, weights: Floats) -> tuple[float, float]:
+def _parabola_of_cubic(along: Reals, weights: Floats) -> tuple[float, float]:
     """Return value and slope at 0 of the parabola that fits the cubes of some positions, px^3 and px^2."""
     powers = np.vander(along, 4, increasing=True)
     products = (powers * weights[:, None]).T @ powers
