@@ -17,7 +17,7 @@ help:
 	@echo "make format  let ruff rewrite the code"
 	@echo "make readme  write the tables of options in rollcli/cli/README.md"
 	@echo "make bench   run every benchmark of tests/benchmarks"
-	@echo "make fuzz    throw broken files at the readers for a while"
+	@echo "make fuzz    throw broken files at the readers, and let every system call of a run fail"
 	@echo "make clean   remove all that make made"
 
 $(BIN)/.run: pyproject.toml
@@ -29,7 +29,7 @@ $(BIN)/.run: pyproject.toml
 
 $(BIN)/.dev: $(BIN)/.run
 	@echo "installing what the tests need into $(VENV) ..."
-	@$(PIP) --editable '.[dev,report,cluster]'
+	@$(PIP) --editable '.[dev,all]'
 	@$(TOUCH) $@
 
 run: $(BIN)/.run
@@ -57,6 +57,7 @@ bench: $(BIN)/.dev
 
 fuzz: $(BIN)/.dev
 	$(BIN)/python -m tests.fuzz
+	$(BIN)/python -m tests.fuzz.faults
 
 clean:
 	@$(REMOVE) $(VENV) out build "*.egg-info" .pytest_cache .mypy_cache .ruff_cache .hypothesis

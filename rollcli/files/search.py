@@ -3,11 +3,12 @@
 import fnmatch
 import glob
 import os
+import stat
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from rollcli.errors import UsageError
-from rollcli.files.existence import is_file, is_folder, is_there
+from rollcli.files.existence import is_folder
 from rollcli.files.stores.locations import base_name, is_object_url, is_url
 from rollcli.files.stores.search import is_folder_url, objects_behind
 
@@ -96,9 +97,10 @@ class Search:
             for entry in _entries(root):
                 if entry.name.startswith("."):
                     continue
-                if os.path.isdir(entry.path):  # noqa: PTH112 (many paths; false where it cannot be told)
+                mode = _mode(entry.path)
+                if stat.S_ISDIR(mode):
                     inner.append(entry.path)
-                elif self._reads(entry.name) and _is_file(entry.path):
+                elif self._reads(entry.name) and stat.S_ISREG(mode):
                     path = Path(entry.path)
                     yield str(path), path.relative_to(folder).as_posix()
             opened = []
@@ -117,7 +119,8 @@ class Search:
             path = Path(match)
             relative = Path(os.path.relpath(path, base))
             inside = {os.path.realpath(base / parent) for parent in relative.parents[:-1]}
-            if self._skip.isdisjoint(inside) and (at_its_word or self._reads(match)) and _is_file(match):
+            wanted = at_its_word or self._reads(match)
+            if wanted and self._skip.isdisjoint(inside) and stat.S_ISREG(_mode(match)):
                 yield str(path), _below(relative).as_posix()
 
     def _behind_url(self, url: str, *, literal: bool) -> Iterator[tuple[str, str]]:
@@ -165,9 +168,12 @@ def _identity(folder: str | Path) -> tuple[int, int]:
     return found.st_dev, found.st_ino
 
 
-def _is_file(path: str) -> bool:
-    """Tell whether this is a file, or a name behind which none can be seen: that one gets an error row."""
-    return is_file(path) or not is_there(path)
+def _mode(path: str) -> int:
+    """Ask once what a path is; what cannot be looked at counts as a file, and gets an error row."""
+    try:
+        return os.stat(path).st_mode  # noqa: PTH116 (many paths)
+    except OSError:
+        return stat.S_IFREG
 
 
 def _below(relative: Path) -> Path:

@@ -15,6 +15,7 @@ sys.path.insert(0, str(ROOT))
 import cv2
 import numpy as np
 
+from rollcli.files.codecs import png, tiff_parts, unpack
 from rollcli.files.encodings import to_disparity
 from rollcli.files.formats import decode_stored, encode_stored
 from rollcli.imaging.derotate import derotate
@@ -47,6 +48,18 @@ def show(title: str, times: Mapping[str, float], beside: str) -> None:
         print(f"  {name:42} {value:7.2f}   {value / times[beside]:5.2f}")
 
 
+def without_extras(file: bytes) -> object:
+    """Read a file as where neither `fast` nor `tiff` is installed."""
+    found = png.decode_grey16, unpack.imagecodecs
+    png.decode_grey16 = lambda *_: None
+    unpack.imagecodecs = tiff_parts.imagecodecs = lambda: None
+    try:
+        return decode_stored(file, "map")
+    finally:
+        png.decode_grey16, unpack.imagecodecs = found
+        tiff_parts.imagecodecs = found[1]
+
+
 def main() -> None:
     """Print the tables."""
     rounds = int(sys.argv[1]) if len(sys.argv) > 1 else 60
@@ -61,9 +74,28 @@ def main() -> None:
         jobs = {
             "cv2.imdecode": lambda data=data: cv2.imdecode(data, cv2.IMREAD_UNCHANGED),
             "decode_stored": lambda file=file: decode_stored(file, "map.png"),
+            "decode_stored, without extras": lambda file=file: without_extras(file),
             "to_disparity": lambda stored=stored: to_disparity(stored),
         }
         show(f"{title} ({len(file) // 1024} KiB)", best(jobs, rounds), "cv2.imdecode")
+
+    for title, kind, compression, predictor in (
+        ("TIFF, uint16, Deflate", kitti, "deflate", 1),
+        ("TIFF, uint16, Deflate, predictor 2", kitti, "deflate", 2),
+        ("TIFF, float32, Deflate", real, "deflate", 1),
+        ("TIFF, float32, Deflate, predictor 3", real, "deflate", 3),
+        ("TIFF, uint16, LZW", kitti, "lzw", 1),
+        ("TIFF, float32, PackBits", real, "packbits", 1),
+    ):
+        file = make_tiff(kind, compression, predictor=predictor, rows_per_strip=8)
+        jobs = {
+            "cv2.imdecode": lambda file=file: cv2.imdecode(
+                np.frombuffer(file, np.uint8), cv2.IMREAD_UNCHANGED
+            ),
+            "decode_stored": lambda file=file: decode_stored(file, "map.tif"),
+            "decode_stored, without extras": lambda file=file: without_extras(file),
+        }
+        show(title, best(jobs, rounds // 4 + 1), "cv2.imdecode")
 
     files = {
         "PNG, uint16": noisy,

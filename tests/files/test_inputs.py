@@ -1,5 +1,6 @@
 """Inputs are found once each, in natural order, and paired or named."""
 
+import errno
 import io
 import os
 import subprocess
@@ -409,3 +410,17 @@ def test_a_link_to_itself_is_an_input_that_its_row_will_explain(here):
     (root / "maps" / "loop.png").symlink_to("loop.png")
 
     assert names(find_inputs(["maps"])) == ["maps/a.png", "maps/loop.png"]
+
+
+def test_a_file_that_the_system_refuses_to_look_at_is_an_input_that_its_row_will_explain(here, monkeypatch):
+    here("maps/a.png", "maps/b.png")
+    stat = os.stat
+
+    def refuse(path, **options):
+        if str(path).endswith("a.png"):
+            raise OSError(errno.EIO, os.strerror(errno.EIO))
+        return stat(path, **options)
+
+    monkeypatch.setattr(os, "stat", refuse)
+
+    assert names(find_inputs(["maps"])) == ["maps/a.png", "maps/b.png"]

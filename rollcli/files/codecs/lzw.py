@@ -21,26 +21,26 @@ class LzwError(ValueError):
     """The bytes are no LZW data."""
 
 
-def decode_lzw(packed: bytes, most: int) -> tuple[bytes, int]:
-    """What `packed` stands for, but no more than `most` bytes; and how many bytes follow its end code.
+def decode_lzw(packed: bytes, most: int) -> bytes:
+    """Unpack what the bytes stand for, but no more than `most` bytes.
 
     Raises
     ------
     LzwError
         A code that cannot occur.
     """
-    codes, parents, rest = _codes(packed)
+    codes, parents = _codes(packed)
     literal = codes < _CLEAR
     lengths, roots = _chains(np.where(literal, np.arange(len(codes), dtype=np.int32), parents), ~literal)
     used = int(np.searchsorted(np.cumsum(lengths, dtype=np.int64), most)) + 1
     # a string is its parent's plus the first letter of what followed the parent
     followers = np.where(literal, 0, parents + 1)
     letters = np.where(literal, codes, codes[roots[followers]]).astype(np.uint8)
-    return _spelled(letters, parents, lengths[:used])[:most].tobytes(), rest
+    return _spelled(letters, parents, lengths[:used])[:most].tobytes()
 
 
-def _codes(packed: bytes) -> tuple[NDArray[Any], NDArray[Any], int]:
-    """All codes but clear and end, for each the position of the code that its string extends; bytes after."""
+def _codes(packed: bytes) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Find all codes but clear and end, and for each the position of the code that its string extends."""
     bits = 8 * len(packed)
     padded = np.frombuffer(packed + bytes(3), np.uint8).astype(np.int32)
     window = padded[:-2] << 16 | padded[1:-1] << 8 | padded[2:]
@@ -60,17 +60,14 @@ def _codes(packed: bytes) -> tuple[NDArray[Any], NDArray[Any], int]:
         blocks.append(block)
         parents.append(block - _FIRST + done)
         done += count
-        if not len(stops):
-            position = bits
+        if not len(stops) or codes[count] == _END:
             break
         position = int(starts[count]) + int(widths[count])
-        if codes[count] == _END:
-            break
         if len(blocks) > 64 + len(packed) // 128:
             raise LzwError("too many tables")  # each costs the same time, however short it is
     if done == 0:
         raise LzwError("no data")
-    return np.concatenate(blocks), np.concatenate(parents), (bits - position) // 8
+    return np.concatenate(blocks), np.concatenate(parents)
 
 
 def _chains(parents: NDArray[Any], depth: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:

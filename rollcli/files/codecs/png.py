@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError, OutputError
+from rollcli.files.codecs.fast_png import decode_grey16
 from rollcli.files.codecs.mute_stderr import decoding
 from rollcli.files.codecs.raw_map import PICTURE_FLAGS, require_decoded_fits
 
@@ -111,8 +112,13 @@ def encode_png(values: NDArray[Any]) -> bytes:
 
 
 def _decoded(whole: _Whole, name: str, flags: int) -> NDArray[Any]:
+    file, header = b"".join(whole.chunks(name)), whole.header
+    if (header.colour, header.depth, header.interlace) == (_GREY, 16, 0):
+        fast = decode_grey16(file, header.width, header.height)
+        if fast is not None:
+            return fast
     with decoding() as printed:
-        pixels = cv2.imdecode(np.frombuffer(b"".join(whole.chunks(name)), np.uint8), flags)
+        pixels = cv2.imdecode(np.frombuffer(file, np.uint8), flags)
     if pixels is None or "libpng" in printed.text:
         raise InputError(f"{name}: is a damaged PNG: its pixel data are wrong")
     return pixels

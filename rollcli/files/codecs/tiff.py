@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from rollcli.errors import InputError
 from rollcli.files.codecs.mute_stderr import decoding
 from rollcli.files.codecs.raw_map import Stored, native, require_decoded_fits
-from rollcli.files.codecs.tiff_parts import MAX_EXPANSION, DamagedPartError, check_parts, decode_parts
+from rollcli.files.codecs.tiff_parts import check_parts, decode_parts
+from rollcli.files.codecs.unpack import MAX_EXPANSION, DamagedPartError
 
 SIGNATURES = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 _WHITE_IS_ZERO, _RGB, _PALETTE = 0, 2, 3

@@ -1,28 +1,18 @@
-"""Strips and tiles of a TIFF: compressions and predictors undone [TIFF 6.0; Adobe's technical notes 1 and 3].
+"""Strips and tiles of a TIFF: predictors undone, put in their places [Adobe's technical notes 1 and 3].
 
 Without imagecodecs tifffile decodes neither LZW nor PackBits nor the floating-point predictor, and OpenCV
-reads no float16 and returns damaged data as if they were whole. The four usual compressions are little work,
-and done here each part must hold exactly its pixels: what has a checksum is held against it.
+reads no float16 and returns damaged data as if they were whole.
 """
 
-import zlib
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.files.codecs.lzw import LzwError, decode_lzw
 from rollcli.files.codecs.raw_map import native
+from rollcli.files.codecs.unpack import imagecodecs, unpacked
 
-_NONE, _LZW, _DEFLATE, _OLD_DEFLATE, _PACKBITS = 1, 5, 8, 32946, 32773
-# how many bytes one byte can stand for
-MAX_EXPANSION = {_NONE: 1, _LZW: 2732, _DEFLATE: 1032, _OLD_DEFLATE: 1032, _PACKBITS: 64}
 _NO_PREDICTOR, _HORIZONTAL, _FLOATING_POINT = 1, 2, 3
-_PADDING = 1  # bytes after the data of a part: parts begin at even places
-
-
-class DamagedPartError(ValueError):
-    """The bytes of a strip or tile are not its pixels."""
 
 
 def decode_parts(
@@ -72,7 +62,7 @@ def check_parts(page: Any, part: tuple[int, int, int], data: bytes) -> None:
         last = not page.is_tiled and index % strips == strips - 1
         rows = int(page.imagelength) - (strips - 1) * down if last else down
         if count:
-            _decompressed(int(page.compression), data[offset : offset + count], rows * row, down * row)
+            unpacked(int(page.compression), data[offset : offset + count], rows * row, down * row)
 
 
 def _as(number: float, dtype: np.dtype[Any]) -> Any:
@@ -88,10 +78,10 @@ def _part(page: Any, packed: bytes, shape: tuple[int, int, int], most_rows: int)
     rows, columns, samples = shape
     dtype = page.dtype.newbyteorder(page.parent.byteorder)
     row = columns * samples * dtype.itemsize
-    plain = _decompressed(int(page.compression), packed, rows * row, most_rows * row)
+    plain = unpacked(int(page.compression), packed, rows * row, most_rows * row)
     if page.predictor == _FLOATING_POINT and dtype.kind == "f":
         return _unpredicted_floats(plain, shape, dtype)
-    values: NDArray[Any] = np.frombuffer(plain, dtype, rows * columns * samples).reshape(shape)
+    values = _shaped(plain, shape, dtype)
     if page.predictor == _HORIZONTAL:
         bits = native(values).view(f"u{dtype.itemsize}")  # differences are taken of the bits, modulo 2^n
         values = np.cumsum(bits, axis=1, dtype=bits.dtype).view(dtype.newbyteorder("="))
@@ -100,8 +90,16 @@ def _part(page: Any, packed: bytes, shape: tuple[int, int, int], most_rows: int)
     return values
 
 
+def _shaped(plain: bytes, shape: tuple[int, int, int], dtype: Any) -> NDArray[Any]:
+    rows, columns, samples = shape
+    return np.frombuffer(plain, dtype, rows * columns * samples).reshape(shape)
+
+
 def _unpredicted_floats(plain: bytes, shape: tuple[int, int, int], dtype: Any) -> NDArray[Any]:
     """Undo predictor 3: the bytes of a row lie sorted by significance, highest first, as differences."""
+    if (codecs := imagecodecs()) is not None:
+        decoded: NDArray[Any] = codecs.floatpred_decode(_shaped(plain, shape, dtype), axis=-2)
+        return decoded
     rows, columns, samples = shape
     planes = np.frombuffer(plain, np.uint8, rows * columns * samples * dtype.itemsize).reshape(
         rows, -1, samples
@@ -109,62 +107,3 @@ def _unpredicted_floats(plain: bytes, shape: tuple[int, int, int], dtype: Any) -
     split = np.cumsum(planes, axis=1, dtype=np.uint8).reshape(rows, dtype.itemsize, columns * samples)
     joined: NDArray[Any] = np.ascontiguousarray(split.transpose(0, 2, 1)).view(dtype.newbyteorder(">"))
     return joined.reshape(shape)
-
-
-def _decompressed(compression: int, packed: bytes, size: int, most: int) -> bytes:
-    """What the bytes stand for: `size` bytes, or up to `most` where a short last strip was filled up.
-
-    Raises
-    ------
-    DamagedPartError
-        Fewer or more bytes, something after their end, or a wrong checksum.
-    """
-    try:
-        plain, rest = _UNPACK[compression](packed, most + _PADDING)
-    except (zlib.error, LzwError) as error:
-        raise DamagedPartError(str(error)) from None
-    if len(plain) < size:
-        raise DamagedPartError(f"{len(plain)} of {size} bytes")
-    if len(plain) > most + (_PADDING if compression == _NONE else 0) or rest > _PADDING:
-        raise DamagedPartError(f"more than {size} bytes")
-    return plain
-
-
-def _stored(packed: bytes, most: int) -> tuple[bytes, int]:
-    return packed, 0
-
-
-def _inflated(packed: bytes, most: int) -> tuple[bytes, int]:
-    """Undo Deflate; the checksum at its end is right."""
-    inflater = zlib.decompressobj()
-    plain = inflater.decompress(packed, most)
-    if not inflater.eof and len(plain) < most:
-        raise DamagedPartError(f"they end after {len(plain)} bytes")
-    return plain, len(inflater.unused_data)
-
-
-def _unpacked_lzw(packed: bytes, most: int) -> tuple[bytes, int]:
-    return decode_lzw(packed, most)
-
-
-def _unpacked_bits(packed: bytes, most: int) -> tuple[bytes, int]:
-    """Undo PackBits: runs of copies and runs of repeats."""
-    plain, position = bytearray(), 0
-    while position < len(packed) and len(plain) < most:
-        head = packed[position]
-        if head < 128:
-            plain += packed[position + 1 : position + 2 + head]
-            position += 2 + head
-        else:
-            plain += packed[position + 1 : position + 2] * (257 - head if head > 128 else 0)
-            position += 2 if head > 128 else 1
-    return bytes(plain), max(0, len(packed) - position)
-
-
-_UNPACK = {
-    _NONE: _stored,
-    _LZW: _unpacked_lzw,
-    _DEFLATE: _inflated,
-    _OLD_DEFLATE: _inflated,
-    _PACKBITS: _unpacked_bits,
-}
