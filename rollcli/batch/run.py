@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 from itertools import islice
 
+from rollcli.batch.answer import RigAnswer
 from rollcli.batch.door import estimate_frame, lost_frame
 from rollcli.batch.options import EstimateOptions
 from rollcli.batch.output import Output, frames_to_do, open_output
@@ -48,29 +49,41 @@ def run_estimate(options: EstimateOptions, resume_command: str = "") -> ExitStat
     limit_blas_threads()
     require_scheduler(options.running.scheduler)
     progress = Progress(len(plan.frames), options.running, options.encoding)
+    answer = RigAnswer()
     with open_output(plan, options) as output:
         progress.keep(output.kept)
+        for row in output.kept:
+            answer.add(row)
         for note in islice(calibration_notes(plan.frames), _NOTES):
             progress.note(note)
         try:
             with stop_on_signals() as stop, progress:
                 _restore_images(options, output, progress, stop)
-                _run_frames(plan.frames[len(output.kept) :], options, output, progress, stop)
+                _run_frames(plan.frames[len(output.kept) :], options, output, progress, answer, stop)
         except KeyboardInterrupt:  # the second Ctrl-C: without waiting for the frames that have begun
             progress.stopped_early = True
         except (OutputError, ClusterError, WorkerError) as error:
             raise type(error)(f"{error}{output.hint()}") from error
-        return _end(output, progress, stop, resume_command)
+        status = _end(output, progress, stop, resume_command)
+        if not (progress.stopped_early or options.running.quiet):
+            progress.say(answer.line())
+        return status
 
 
 def _run_frames(
-    frames: Sequence[Frame], options: EstimateOptions, output: Output, progress: Progress, stop: Stop
+    frames: Sequence[Frame],
+    options: EstimateOptions,
+    output: Output,
+    progress: Progress,
+    answer: RigAnswer,
+    stop: Stop,
 ) -> None:
     """Write the row of each frame, in order; its images are written by then."""
     with _results(frames, options, output, stop) as results:
         for frame, result in zip(frames, results, strict=False):
             output.append(frame, result)
             progress.add(result)
+            answer.add(result.row)
             if options.result.fail_fast and result.row.status == "error":
                 progress.stopped_early = True
                 return

@@ -46,7 +46,11 @@ def _digits(half: float | None) -> int:
 def one_line(rig: RigAssessment) -> str:
     """Return the answer in one line: `roll -0.44 ± 0.06°, 5 ok, 0 suspect, 0 failed`."""
     ok = int(rig.frames.ok.sum())
-    return f"roll {answer(rig.now())}, {ok:,} ok, {rig.suspect:,} suspect, {rig.failed:,} failed"
+    now = rig.now()
+    where = f" in {rig.drives[-1].name}" if len(rig.drives) > 1 else ""
+    if now.value is not None and now.ci95 is None:
+        where += " (too few frames for an interval)"
+    return f"roll {answer(now)}{where}, {ok:,} ok, {rig.suspect:,} suspect, {rig.failed:,} failed"
 
 
 def counts(rig: RigAssessment) -> str:

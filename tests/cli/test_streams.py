@@ -19,7 +19,10 @@ def maps(tmp_path):
 def test_results_alone_go_to_standard_output(maps):
     done = rollcli("estimate", "maps", cwd=maps)
     assert done.out.count("\n") == 4
-    assert done.err.splitlines()[-1].startswith("rollcli: 3 frames: 3 ok, 0 suspect, 0 failed; ")
+    counts, answer = done.err.splitlines()[-2:]
+    assert counts.startswith("rollcli: 3 frames: 3 ok, 0 suspect, 0 failed; ")
+    assert answer.startswith("rollcli: roll +0.5")
+    assert answer.endswith("° (too few frames for an interval), 3 ok, 0 suspect, 0 failed")
 
 
 def test_quiet_says_nothing_when_all_is_well(maps):
