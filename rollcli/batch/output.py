@@ -11,7 +11,7 @@ from rollcli.batch.options import EstimateOptions
 from rollcli.batch.plan import Plan
 from rollcli.batch.result_file import ResultFile, has_rows, kept_rows, open_result
 from rollcli.batch.result_parts import count_kept_parts, open_parts
-from rollcli.batch.resume import check_resumable, unknown_inputs
+from rollcli.batch.resume import begun_plan, check_resumable, unknown_inputs
 from rollcli.batch.run_record import RunRecord, is_replaceable_record
 from rollcli.errors import InputError, OutputError, UsageError
 from rollcli.files.atomic import remove_leftovers
@@ -217,9 +217,12 @@ def _incomplete_frames(plan: Plan, kept: Sequence[Row], images: ImageOptions) ->
 def _begin(file: ResultFile, plan: Plan, options: EstimateOptions) -> FileOutput:
     kept = kept_rows(file.read(), plan.output, plan.format) if options.result.resume else b""
     rows, earlier = _parse_kept(kept, plan)
-    record = RunRecord(plan, options, unknown_inputs(earlier))
+    unknown = unknown_inputs(earlier)
+    record, begun = RunRecord(plan, options, unknown), begun_plan(plan, earlier)
     if rows:
-        record.continue_from(check_resumable(rows, earlier, record, plan))
+        same = record if begun is plan else RunRecord(begun, options, unknown)
+        added = len(plan.frames) - len(begun.frames)
+        record.continue_from(check_resumable(rows, earlier, same, begun, added))
     if options.result.resume or options.running.overwrite:
         remove_image_leftovers(plan.frames[len(rows) :], options.images)
     remove_leftovers([run_path(plan.output)])

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +13,35 @@ from rollcli.files.results import Row, run_path
 from rollcli.files.resumable import differences, not_resumable
 from rollcli.files.stores.locations import base_name, is_url
 
+_SORT_LAST = "new frames must sort last: estimate these into a result of their own"
+
+
+def begun_plan(plan: Plan, run: Mapping[str, Any] | None) -> Plan:
+    """Return the plan without the frames that have been added since a run began, if these sort last."""
+    inputs = (run or {}).get("inputs")
+    count = inputs.get("frames") if isinstance(inputs, dict) else None
+    if not isinstance(count, int) or not 0 < count < len(plan.frames):
+        return plan
+    return replace(plan, frames=plan.frames[:count])
+
 
 def check_resumable(
-    rows: Sequence[Row], run: Mapping[str, Any] | None, record: RunRecord, plan: Plan
+    rows: Sequence[Row], run: Mapping[str, Any] | None, record: RunRecord, plan: Plan, added: int = 0
 ) -> Mapping[str, Any]:
     """Refuse to continue a result of another version, other options or other inputs.
+
+    Parameters
+    ----------
+    rows : sequence of Row
+        Of the interrupted run.
+    run : mapping or None
+        Its record.
+    record : RunRecord
+        Of the plan.
+    plan : Plan
+        As many frames as the interrupted run had, if there are as many; see `begun_plan`.
+    added : int
+        How many frames there are beyond them.
 
     Returns
     -------
@@ -33,7 +58,7 @@ def check_resumable(
         raise not_resumable(plan.output, f"there is no {record_name}")
     if not _is_whole(run):
         raise not_resumable(plan.output, f"{record_name} is damaged")
-    for difference in _differences(rows, run, record.fixed, plan):
+    for difference in _differences(rows, run, record.fixed, plan, added):
         raise not_resumable(plan.output, difference)
     return run
 
@@ -46,19 +71,23 @@ def unknown_inputs(run: Mapping[str, Any] | None) -> list[str]:
 
 
 def _differences(
-    rows: Sequence[Row], was: Mapping[str, Any], now: Mapping[str, Any], plan: Plan
+    rows: Sequence[Row], was: Mapping[str, Any], now: Mapping[str, Any], plan: Plan, added: int
 ) -> Iterator[str]:
     yield from differences(was, now)
     if was.get("calibration") != json.loads(json.dumps(now.get("calibration"))):
         yield "the calibration differs"
     for row, frame in zip(rows, plan.frames, strict=False):
         if (row.file, row.right_file) != (frame.file, frame.right_file):
+            if added and frame.file not in {each.file for each in rows}:
+                yield f"{frame.file} has been added and sorts before {row.file}; {_SORT_LAST}"
             yield f"the inputs differ: its row is of {row.file}, where now {frame.file} is"
     if len(rows) > len(plan.frames):
         yield f"it has {len(rows)} rows, and there are {len(plan.frames)} frames"
     inputs_was, inputs_now = was["inputs"], now["inputs"]
     if inputs_was.get("frames") != inputs_now["frames"]:
         yield f"it was begun with {inputs_was.get('frames')} frames, now there are {inputs_now['frames']}"
+    if added and inputs_was.get("names") != inputs_now["names"]:
+        yield f"frames have been added that sort before others of its frames; {_SORT_LAST}"
     if inputs_was.get("names") != inputs_now["names"]:
         yield "the names of the inputs differ"
     if inputs_was != inputs_now:

@@ -270,11 +270,44 @@ def test_a_resume_with_changed_inputs_is_refused(interrupted):
     assert "maps/frame2.png has changed since" in refused(interrupted)
 
 
-def test_a_resume_with_more_or_other_inputs_is_refused(interrupted):
+def test_a_resume_with_fewer_or_other_inputs_is_refused(interrupted):
+    (interrupted / "maps" / "frame9.png").unlink()
+    assert "10 frames, now there are 9" in refused(interrupted)
     write_kitti(interrupted / "maps" / "frame10.png", road_map())
-    assert "10 frames, now there are 11" in refused(interrupted)
+    assert "the names of the inputs differ" in refused(interrupted)
     (interrupted / "maps" / "frame3.png").unlink()
     assert "maps/frame3.png, where now maps/frame4.png" in refused(interrupted)
+
+
+@pytest.mark.parametrize("shard", [[], ["--shard", "2/2"]])
+def test_a_folder_that_has_grown_at_its_end_is_resumed_to_the_bytes_of_one_run(tmp_path, shard):
+    write_maps(tmp_path / "maps", 7)
+    rollcli("estimate", "maps", "-o", "rolls.csv", *shard, cwd=tmp_path)
+    before = (tmp_path / "rolls.csv").read_bytes()
+    for index in (7, 8, 10):
+        write_kitti(tmp_path / "maps" / f"frame{index}.png", road_map(0.1, seed=index))
+    done = rollcli("estimate", "maps", "-o", "rolls.csv", "--resume", *shard, cwd=tmp_path)
+    assert done.status == 0
+    assert f"({len(before.splitlines()) - 1} kept)" in done.err
+    rollcli("estimate", "maps", "-o", "anew.csv", *shard, cwd=tmp_path)
+    assert (tmp_path / "rolls.csv").read_bytes() == (tmp_path / "anew.csv").read_bytes()
+    record = "rolls.csv.run.json"
+    assert (tmp_path / record).read_bytes() == (tmp_path / "anew.csv.run.json").read_bytes()
+
+
+def test_a_folder_that_has_grown_elsewhere_is_refused_and_says_what_to_do(interrupted):
+    write_kitti(interrupted / "maps" / "frame7a.png", road_map())
+    said = refused(interrupted)
+    assert "frames have been added that sort before others" in said
+    assert "estimate these into a result of their own" in said
+    write_kitti(interrupted / "maps" / "frame1a.png", road_map())
+    assert "maps/frame1a.png has been added and sorts before maps/frame2.png" in refused(interrupted)
+
+
+def test_a_folder_that_has_grown_and_changed_is_refused(interrupted):
+    write_kitti(interrupted / "maps" / "frame10.png", road_map())
+    write_kitti(interrupted / "maps" / "frame2.png", road_map(0.3))
+    assert "has changed since" in refused(interrupted)
 
 
 def test_a_resume_without_the_record_of_the_run_is_refused(interrupted):
