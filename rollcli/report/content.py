@@ -15,6 +15,8 @@ from rollcli.report.pictures import Pictures
 from rollcli.report.pose_charts import pose_charts
 from rollcli.report.roll_chart import roll_chart
 from rollcli.report.summary import degrees, frame_count, option_lines, summarize
+from rollcli.rig.assess import assess_rig
+from rollcli.rig.words import answer, counts, findings, now_in_words
 
 _LISTED = 100  # doubtful frames on the page; the result has all
 
@@ -22,6 +24,7 @@ _LISTED = 100  # doubtful frames on the page; the result has all
 def report_page(result: Result, options: ReportOptions, shown: Sequence[tuple[Choice, Pictures]]) -> bytes:
     """The page, HTML, UTF-8."""
     rows, run, summary = result.rows, result.run or {}, summarize(result.rows)
+    rig = assess_rig(rows)
     doubtful = sorted(
         ((number, row) for number, row in enumerate(rows, 1) if row.status != "ok"),
         key=lambda each: each[1].status,  # errors before suspects
@@ -37,7 +40,11 @@ def report_page(result: Result, options: ReportOptions, shown: Sequence[tuple[Ch
         degrees=degrees,
         options=option_lines(result.run),
         encodings=", ".join(map(str, run["encoding"])) if isinstance(run.get("encoding"), list) else "",
-        roll_chart=roll_chart(rows),
+        roll_chart=roll_chart(rows, rig),
+        answer=answer(rig.now()),
+        now=now_in_words(rig),
+        counts=counts(rig),
+        findings=findings(rig) or ["Neither a jump nor a drift is seen."],
         pose_charts=pose_charts(rows),
         histogram=histogram(rows) if summary.median is not None else None,
         outside=outside(rows),

@@ -8,32 +8,39 @@ from typing import Any
 from rollcli.files.results import Row
 from rollcli.report.axis_range import view
 from rollcli.report.page import Chart
+from rollcli.report.rig_traces import drive_starts, rig_traces
 from rollcli.report.summary import degrees
+from rollcli.rig.assess import RigAssessment
 
 _MANY = 400  # up to so many frames each has a dot, and marks are large
 _FEW = 10
 _LONGEST_NAME = 44  # in a hover label, so that it fits a narrow screen
 _FAILED_AT = 0.035  # of the chart's height
-_BRIDGED = 3  # so many suspect frames in a row do not break the line
 
 _VALUES = ("x", "y", "customdata")
 
 Numbered = Sequence[tuple[int, Row]]
 
 
-def roll_chart(rows: Sequence[Row]) -> Chart:
-    """The roll of each frame: a line, its interval as a band, suspect and failed frames marked."""
+def roll_chart(rows: Sequence[Row], rig: RigAssessment | None = None) -> Chart:
+    """The roll of each frame: a line, its interval as a band, suspect and failed frames marked.
+
+    With `rig`, its segments, jumps and smoothed mounting roll too. A line neither bridges a suspect frame nor
+    leads from one drive to another.
+    """
     numbered = list(enumerate(rows, 1))
+    ends = view(rows)
     suspect = [each for each in numbered if each[1].status == "suspect"]
     failed = [each for each in numbered if each[1].status == "error"]
     sure = [each for each in numbered if each[1].status == "ok" and each[1].roll_deg is not None]
-    failures = {number for number, row in numbered if row.roll_deg is None}
+    starts = set() if rig is None else drive_starts(rig)
     many = len(rows) > _MANY
     # what is sure lies on top: suspect marks of a long run would hide it
-    data = [_band(sure, failures), _suspect(suspect, bars=not many), _line(sure, failures), _failed(failed)]
+    data = [_band(sure, starts), _suspect(suspect, bars=not many), _line(sure, starts), _failed(failed)]
     data = [trace for trace in data if trace["x"]]  # plotly's legend stumbles over what is empty
     for trace in data:
         trace["marker"] = {"size": 5 if many else 8, **trace.get("marker", {})}
+    data += [] if rig is None else rig_traces(rig, ends)
     margin = max(0.5, 0.01 * len(rows))
     layout = {
         "hovermode": "closest",
@@ -46,7 +53,7 @@ def roll_chart(rows: Sequence[Row]) -> Chart:
             "tickformat": ",d",
             **({"dtick": 1} if len(rows) <= _FEW else {}),  # there are no half frames
         },
-        "yaxis": {"title": {"text": "roll, degrees"}, "range": list(view(rows)), "zeroline": True},
+        "yaxis": {"title": {"text": "roll, degrees"}, "range": list(ends), "zeroline": True},
         "yaxis2": {"overlaying": "y", "range": [0, 1], "visible": False, "fixedrange": True},
     }
     what = (
@@ -55,14 +62,14 @@ def roll_chart(rows: Sequence[Row]) -> Chart:
     return Chart("roll", what, data, layout)
 
 
-def _line(numbered: Numbered, failures: Set[int]) -> dict[str, Any]:
-    parts = [_points(stretch) for stretch in _stretches(numbered, failures)]
+def _line(numbered: Numbered, starts: Set[int]) -> dict[str, Any]:
+    parts = [_points(stretch) for stretch in _stretches(numbered, starts)]
     joined = {name: [each for part in parts for each in (*part[name], None)] for name in _VALUES}
     return {
-        "mode": "lines+markers" if len(numbered) <= _MANY else "lines",
+        "mode": "lines+markers",  # a frame between two suspect ones is a dot
         "name": "roll",
         "line": {"color": "@c1", "width": 1.5},
-        "marker": {"color": "@c1", "size": 5},
+        "marker": {"color": "@c1", "size": 5 if len(numbered) <= _MANY else 1.5},
         **_points(()),
         **joined,
     }
@@ -98,12 +105,11 @@ def _points(numbered: Numbered) -> dict[str, Any]:
     }
 
 
-def _band(numbered: Numbered, failures: Set[int]) -> dict[str, Any]:
+def _band(numbered: Numbered, starts: Set[int]) -> dict[str, Any]:
     """One polygon for each stretch of frames that have an interval; None parts them."""
     x: list[int | None] = []
     y: list[float | None] = []
-    bare = {number for number, row in numbered if row.roll_ci95_deg is None}
-    for stretch in _stretches([each for each in numbered if each[0] not in bare], failures | bare):
+    for stretch in _stretches([each for each in numbered if each[1].roll_ci95_deg is not None], starts):
         along = [number for number, _ in stretch]
         ends = [((row.roll_deg or 0.0), (row.roll_ci95_deg or 0.0)) for _, row in stretch]
         x += [*along, *reversed(along), None]
@@ -122,12 +128,12 @@ def _band(numbered: Numbered, failures: Set[int]) -> dict[str, Any]:
     }
 
 
-def _stretches(numbered: Numbered, breaks: Set[int]) -> list[Numbered]:
-    """Runs of frames with no break and no more than a few suspect frames between two of them."""
+def _stretches(numbered: Numbered, starts: Set[int]) -> list[Numbered]:
+    """Runs of frames that follow each other, each within one drive."""
     ends = [
         place
         for place, ((before, _), (after, _)) in enumerate(pairwise(numbered), 1)
-        if after - before > _BRIDGED + 1 or not breaks.isdisjoint(range(before + 1, after))
+        if after - before > 1 or after in starts
     ]
     return [numbered[start:end] for start, end in pairwise([0, *ends, len(numbered)]) if end > start]
 

@@ -47,7 +47,7 @@ def one_line(rig: RigAssessment) -> str:
     """Return the answer in one line: `roll -0.44 ± 0.06°, 5 ok, 0 suspect, 0 failed`."""
     ok = int(rig.frames.ok.sum())
     now = rig.now()
-    where = f" in {rig.drives[-1].name}" if len(rig.drives) > 1 else ""
+    where = f" {now_in_words(rig)}".rstrip()
     if now.value is not None and now.ci95 is None:
         where += " (too few frames for an interval)"
     return f"roll {answer(now)}{where}, {ok:,} ok, {rig.suspect:,} suspect, {rig.failed:,} failed"
@@ -65,6 +65,17 @@ def counts(rig: RigAssessment) -> str:
         if count
     ]
     return ", ".join([f"{rig.used:,} of {rig.count:,} frames", *left_out])
+
+
+def now_in_words(rig: RigAssessment) -> str:
+    """Return of which frames the answer is, where it is not of all: after a jump, or of the last drive."""
+    found = rig.latest()
+    if found is None:
+        return ""
+    drive = next(each for each in reversed(rig.drives) if each.quantities[ROLL.name] is found)
+    if found.jumps:
+        return f"since {rig.frames.files[drive.frames[found.jumps[-1].frame]]}"
+    return f"in {drive.name}" if len(rig.drives) > 1 else ""
 
 
 def findings(rig: RigAssessment) -> list[str]:

@@ -7,6 +7,7 @@ from rollcli.report.axis_range import outside, view
 from rollcli.report.histogram import histogram
 from rollcli.report.roll_chart import roll_chart
 from rollcli.report.summary import degrees, option_lines, summarize
+from rollcli.rig.assess import assess_rig
 from tests.report.results import row
 
 ROWS = [
@@ -38,8 +39,8 @@ def test_the_band_is_the_interval_and_breaks_where_there_is_none():
     assert band["y"] == [1.1, 2.2, 1.8, 0.9, None, -0.9, -1.1, None, 0.3, -0.3, None]
 
 
-@pytest.mark.parametrize(("suspects", "broken"), [(1, False), (3, False), (4, True)])
-def test_a_few_suspect_frames_in_a_row_do_not_break_the_line_many_do(suspects, broken):
+@pytest.mark.parametrize(("suspects", "broken"), [(0, False), (1, True), (4, True)])
+def test_no_line_is_drawn_across_a_suspect_frame(suspects, broken):
     between = [row(f"s{i}.png", 9.0, 1.0, "suspect") for i in range(suspects)]
     shown = traces([row("a.png"), row("b.png"), *between, row("c.png"), row("d.png")])
     for name in ("roll", "95 % interval"):
@@ -140,3 +141,30 @@ def test_options_are_listed_as_they_are_typed():
     shown = option_lines({"options": {**options, "timing": False, "invalid": [], "seed": 0}})
     assert shown == [("--lambda0", "26"), ("--roi", "0,1,2,3"), ("--polygon", "0,1.5 2,3"), ("--seed", "0")]
     assert option_lines(None) == []
+
+
+def drive_rows(folder, level, frames=400, jump=0.0):
+    rng = np.random.default_rng(3)
+    rolls = level + rng.normal(0, 0.05, frames)
+    rolls[frames // 2 :] += jump
+    return [row(f"{folder}/{place}.png", float(roll), 0.05) for place, roll in enumerate(rolls)]
+
+
+def test_the_chart_shows_segments_jumps_and_the_smoothed_roll():
+    rows = drive_rows("run", 0.2, jump=0.8)
+    shown = {trace["name"]: trace for trace in roll_chart(rows, assess_rig(rows)).data}
+    assert shown["jump"]["x"] == [200.5, 200.5, None]
+    assert shown["jump"]["text"][0].startswith("jump by +0.")
+    assert shown["jump"]["text"][0].endswith(" at run/200.png")
+    assert shown["mounting"]["x"] == [1, 200, None, 201, 400, None]
+    assert shown["mounting"]["y"][0] == pytest.approx(0.2, abs=0.03)
+    assert shown["mounting"]["y"][3] == pytest.approx(1.0, abs=0.03)
+    smoothed = np.array([value for value in shown["smoothed"]["y"] if value is not None])
+    assert np.abs(smoothed - np.repeat([0.2, 1.0], 200)).max() < 0.1
+
+
+def test_no_line_leads_from_one_drive_to_another():
+    rows = [*drive_rows("monday", 0.2, 30), *drive_rows("tuesday", 0.2, 30)]
+    shown = {trace["name"]: trace for trace in roll_chart(rows, assess_rig(rows)).data}
+    assert shown["roll"]["x"] == [*range(1, 31), None, *range(31, 61), None]
+    assert shown["mounting"]["x"] == [1, 30, None, 31, 60, None]
