@@ -12,7 +12,7 @@ from typing import Any
 
 from rollcli.batch.options import EstimateOptions
 from rollcli.batch.plan import Plan
-from rollcli.batch.resume import check_resumable
+from rollcli.batch.resume import begun_plan, check_resumable
 from rollcli.batch.run_record import RunRecord
 from rollcli.errors import InputError, OutputError, UsageError
 from rollcli.files.codecs.parquet import encode_parquet, require_parquet
@@ -121,7 +121,11 @@ def open_parts(plan: Plan, options: EstimateOptions) -> PartsOutput:
     if options.result.resume and parts:
         rows = _kept_rows(plan, parts, options.result.part_rows)
         if rows:
-            record.continue_from(check_resumable(rows, _earlier(plan), record, plan))
+            earlier = _earlier(plan)
+            begun = begun_plan(plan, earlier)
+            same = record if begun is plan else RunRecord(begun, options)
+            added = len(plan.frames) - len(begun.frames)
+            record.continue_from(check_resumable(rows, earlier, same, begun, added))
     for name in parts[_whole_parts(len(rows), options.result.part_rows) :]:
         remove(f"{plan.output}/{name}")
     record.write({})

@@ -341,3 +341,11 @@ def test_pitch_and_height_are_shown_where_the_result_has_them(tmp_path):
     wrong = rig(tmp_path, "r.csv", "--expect-pitch", "0", "--within", "1", "--expect-height", "1.65")
     assert wrong.status == 4
     assert "the pitch of f0.png to f999.png is +2." in wrong.err
+
+
+def test_a_result_in_parts_is_read_as_one_file_is(folder):
+    given = rows(*drive(**STABLE))
+    (folder / "parts").mkdir()
+    write(folder / "parts" / "part-00000.jsonl", given[:600], "jsonl")
+    write(folder / "parts" / "part-00001.jsonl", given[600:], "jsonl")
+    assert rig(folder, "parts").out == rig(folder, "stable.csv").out

@@ -15,7 +15,7 @@ class _Constant(MLEModel):
     """A constant level, AR(1) and white noise, as statsmodels has them."""
 
     def __init__(self, series):
-        super().__init__(series, k_states=2, initialization="known")
+        super().__init__(series, k_states=2)
         slow, white = NOISE.variance * NOISE.share, NOISE.variance * (1 - NOISE.share)
         self["design"] = np.array([[1.0, 1.0]])
         self["transition"] = np.diag([1.0, NOISE.phi])
