@@ -182,13 +182,22 @@ def test_a_file_in_place_of_the_folder_is_refused(tmp_path):
 
 
 def test_disparities_beyond_what_the_file_can_hold_are_no_data(tmp_path):
+    # the road gains half a pixel of disparity a row, and passes the largest that fits
     options = SimulateOptions(
-        frames=1, size=(64, 48), baseline=2, height=(0.2, 0.2), roll_deg=(0, 0), pitch_deg=(5, 5)
+        frames=1,
+        scene="bare",
+        size=(16, 1200),
+        focal=100,
+        baseline=0.5,
+        height=(1, 1),
+        roll_deg=(0, 0),
+        pitch_deg=(5, 5),
     )
     simulate(tmp_path, options)
     (spec,) = plan_dataset(tmp_path, options, overwrite=True).specs
     stored, disparity = read_disparity(tmp_path / "disparity/frame_0001.png"), render_frame(spec).disparity
     assert disparity.max() > 256
+    assert stored.max() > 255
     assert np.array_equal(stored == 0, (disparity > 65534 / 256) | (disparity == 0))
 
 
