@@ -1,7 +1,5 @@
 """The angles of a result against known ones."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

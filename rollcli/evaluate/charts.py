@@ -1,7 +1,5 @@
 """The paper's tables and figures as charts."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

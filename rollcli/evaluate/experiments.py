@@ -1,7 +1,5 @@
 """The paper's experiments on one map: iterations, the first learning rate, and rotations by known angles."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

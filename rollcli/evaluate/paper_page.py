@@ -1,7 +1,5 @@
 """The page that shows the paper's tables and figures beside those of these maps."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """The pitch and the height of a result against known ones."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Rotate a map by a known angle, as the paper's accuracy experiment does."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The paper's tables and figures as tables of numbers, over all maps; each is one CSV."""
 
-from __future__ import annotations
-
 import csv
 import io
 import math
@@ -50,7 +48,7 @@ class Table:
         place = self.columns.index(name)
         return [row[place] for row in self.rows]
 
-    def where(self, **values: Value) -> Table:
+    def where(self, **values: Value) -> "Table":
         """The rows that have these values."""
         places = {self.columns.index(name): value for name, value in values.items()}
         rows = tuple(row for row in self.rows if all(row[at] == value for at, value in places.items()))

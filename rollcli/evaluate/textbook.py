@@ -5,8 +5,6 @@ This is what the solvers on moments are timed and checked against; nothing else 
 arXiv:1906.01894.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any
@@ -38,7 +36,7 @@ class Textbook:
     d: Floats
 
     @classmethod
-    def of(cls, disparity: NDArray[Any]) -> Textbook:
+    def of(cls, disparity: NDArray[Any]) -> "Textbook":
         """Take every valid pixel of a map (H, W)."""
         grid = Grid.of_shape(*disparity.shape)
         rows, columns = np.nonzero((disparity > 0) & (disparity < np.inf))

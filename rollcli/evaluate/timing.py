@@ -1,7 +1,5 @@
 """Run times of golden section and gradient descent in three forms (Table II), on one thread."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Known angles, read from a CSV with the columns `file` and `roll_deg`, and the stems that match frames."""
 
-from __future__ import annotations
-
 import csv
 import io
 import math

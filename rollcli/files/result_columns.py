@@ -1,7 +1,5 @@
 """Some columns of a result as arrays: a million rows without an object for each."""
 
-from __future__ import annotations
-
 import io
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence

@@ -1,22 +1,17 @@
 """The calibration of each frame: one for all, or one of the same stem each."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING
 
 from rollcli.errors import InputError, UsageError
 from rollcli.files.existence import is_file, is_folder
 from rollcli.files.storage import read_bytes
+from rollcli.frames.frame import Frame
+from rollcli.frames.options import FrameOptions
 from rollcli.rig.calibration import Calibration
 from rollcli.rig.options import CalibrationOptions
 from rollcli.rig.parse import MAX_BYTES, parse_calibration
-
-if TYPE_CHECKING:
-    from rollcli.frames.frame import Frame
-    from rollcli.frames.options import FrameOptions
 
 _MARK = "_camera"  # Cityscapes: aachen_000000_000019_camera.json
 

@@ -4,8 +4,6 @@ A page extends `page.html` and puts `Chart` objects where it wants them. plotly 
 are the extra `report` and imported here only, when a page is made.
 """
 
-from __future__ import annotations
-
 import html
 import importlib.util
 import json
