@@ -11,7 +11,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from tests.run_cli import command, contents, environment, rollcli, write_maps
+from tests.run_cli import command, contents, environment, road_map, rollcli, write_maps, write_pair
 
 pytest.importorskip("distributed", reason="the extra cluster is not installed")
 
@@ -104,6 +104,23 @@ def test_a_cluster_that_loses_a_worker_gives_the_bytes_of_a_local_run(tmp_path, 
     assert differing(contents(local), contents(far)) <= {record}
     counts = [json.loads((folder / record).read_text())["counts"] for folder in (local, far)]
     assert counts[0] == counts[1]
+
+
+def test_conversions_on_a_cluster_give_the_bytes_of_a_local_run(tmp_path, scheduler, workers):
+    write_maps(tmp_path / "maps", 3)
+    write_pair(tmp_path, "a.png", road_map(width=160, height=80) / 2)
+    (tmp_path / "maps" / "frame1.png").write_bytes(b"no map")
+    lines = {
+        "derotate": ("maps", "--roll", "2"),
+        "vdisparity": ("maps", "--counts"),
+        "disparity": ("--left", "left", "--right", "right", "--num-disparities", "32"),
+    }
+    for name, arguments in lines.items():
+        status = 0 if name == "disparity" else 3
+        assert rollcli(name, *arguments, "-o", f"here/{name}", cwd=tmp_path).status == status
+        far = rollcli(name, *arguments, "-o", f"far/{name}", "--scheduler", scheduler, cwd=tmp_path)
+        assert far.status == status, far.err
+    assert contents(tmp_path / "far") == contents(tmp_path / "here")
 
 
 def differing(one, other):
