@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Iterable
+from pathlib import Path
 
 from rollcli.batch.result_file import ResultFile
 from rollcli.files.durable import sync_files
@@ -27,6 +28,7 @@ class DurableRows:
         self._file = file
         self._rows: list[bytes] = []
         self._images: list[str] = []
+        self._folders: set[Path] = set()  # whose names are on the disk
         self._unsynced = False
         self._last, self._wait_s = time.monotonic(), 0.0
 
@@ -67,7 +69,7 @@ class DurableRows:
         """
         start = time.monotonic()
         if self._images:
-            sync_files(self._images)
+            sync_files(self._images, self._folders)
             self._images.clear()
         while self._rows:
             self._write(self._rows[0])

@@ -21,13 +21,15 @@ _THREADS = 16  # 64 files of 300 kB: 0.3 ms each on ext4, where one thread takes
 _NOT_FOR_FOLDERS = (errno.EINVAL, errno.ENOTSUP, errno.EBADF, errno.EACCES, errno.EPERM)
 
 
-def sync_files(paths: Iterable[str | Path]) -> None:
+def sync_files(paths: Iterable[str | Path], named: set[Path] | None = None) -> None:
     """Force files that have been written, by this process or another, and their names to the disk.
 
     Parameters
     ----------
     paths : iterable of str or Path
         Whole files, under their final names. One that is gone by now is left out.
+    named : set of Path, optional
+        Folders whose own names are on the disk, from earlier calls; those of this call are added.
 
     Raises
     ------
@@ -36,20 +38,22 @@ def sync_files(paths: Iterable[str | Path]) -> None:
     """
     every = [Path(path) for path in paths]
     _in_threads(_sync_path, every)
-    sync_names(every)
+    sync_names(every, named)
 
 
-def sync_names(paths: Iterable[Path]) -> None:
-    """Force the names of files to the disk, and those of the folders above them; each folder once."""
+def sync_names(paths: Iterable[Path], named: set[Path] | None = None) -> None:
+    """Force the names of files to the disk, and those of the folders above them, unless they are `named`."""
+    named = set() if named is None else named
     folders: dict[Path, None] = {}
     for path in paths:
         for folder in path.absolute().parents:  # those above may be new as well
             if folder in folders:
                 break
             folders[folder] = None
-            if folder.is_mount():
+            if folder in named or folder.is_mount():
                 break
     _in_threads(_sync_folder, list(folders))
+    named.update(folders)
 
 
 def _in_threads(sync: Callable[[Path], None], paths: Sequence[Path]) -> None:

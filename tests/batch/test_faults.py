@@ -49,6 +49,7 @@ def test_a_full_standard_output_ends_the_run_with_status_1(maps):
 
 @pytest.mark.parametrize("jobs", ["1", "2"])
 def test_a_result_that_may_not_grow_keeps_its_whole_rows_and_is_resumed_later(maps, jobs):
+    write_maps(maps / "maps", 40)
     arguments = ("estimate", "maps", "-o", "rolls.csv", "-q", "-j", jobs)
     rollcli("estimate", "maps", "-o", "whole.csv", "-q", cwd=maps)
     whole = (maps / "whole.csv").read_bytes()
@@ -59,7 +60,7 @@ def test_a_result_that_may_not_grow_keeps_its_whole_rows_and_is_resumed_later(ma
         capture_output=True,
         text=True,
         check=False,
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (1500, 1500)),
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (4000, 4000)),
     )
     assert limited.returncode == 1
     assert "rolls.csv" in limited.stderr

@@ -80,3 +80,13 @@ def test_a_disk_that_fails_is_said_in_one_line(tmp_path, monkeypatch):
         write_atomic(tmp_path / "new.png", b"data", durable=True)
 
     assert not (tmp_path / "new.png").exists()
+
+
+def test_folders_whose_names_are_on_the_disk_are_not_named_again(tmp_path, synced):
+    first, second = tmp_path / "a" / "b" / "1.png", tmp_path / "a" / "b" / "2.png"
+    named = set()
+    for path in (first, second):
+        write_atomic(path, b"data")
+        synced.clear()
+        sync_files([path], named)
+    assert {each for each, _ in synced} == {inode(second), inode(second.parent)}
