@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from rollcli.files.results import parse_rows
 from tests.run_cli import ROOT, command, contents, environment, rollcli, write_maps
 
 FRAMES = 12
@@ -220,11 +221,13 @@ def test_a_frame_that_kills_its_worker_twice_is_an_error_row_and_the_batch_goes_
     done = run_with_deaths(maps, ["frame3"], 99)
     assert done.status == 3
     assert len(list(maps.glob("died-of-*"))) == 2
-    rows = (maps / "rolls.csv").read_text().splitlines()[1:]
+    rows = parse_rows((maps / "rolls.csv").read_bytes(), "rolls.csv")
     assert len(rows) == FRAMES
-    assert [row for row in rows if ",error," in row] == [
-        "maps/frame3.png,,error,,,,,,,,,,,,,,,"
-        '"maps/frame3.png: its worker died twice: killed for memory, perhaps, or crashed"'
+    assert [(row.file, row.message) for row in rows if row.status == "error"] == [
+        (
+            "maps/frame3.png",
+            "maps/frame3.png: its worker died twice: killed for memory, perhaps, or crashed",
+        )
     ]
 
 
