@@ -21,6 +21,7 @@ LAYERS = (
 DOORS = {
     "rollcli": "names load when they are first used, so that `import rollcli` costs nothing",
     "rollcli.__main__": "a worker process imports this module anew",
+    "rollcli.batch.answer": "loads NumPy only at the end of a run, to tell the rig's roll",
     "rollcli.batch.door": "a worker's door",
     "rollcli.convert.derotate": "a worker's door",
     "rollcli.convert.disparity": "a worker's door",
