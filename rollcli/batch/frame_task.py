@@ -41,10 +41,11 @@ def _estimate(frame: Frame, options: FrameOptions) -> FrameResult:
     estimate = estimate_roll(source.disparity, mask=source.allowed, road_mask=wanted, **arguments)
     calibration = _calibration(frame, source, estimate)
     horizon = None if calibration is None else horizon_row(estimate.tangent, calibration)
-    write_images(frame, source, estimate, options, horizon)
+    note = write_images(frame, source, estimate, options, horizon)
     if calibration is not None:
         estimate = with_pose(estimate, calibration)
-    return FrameResult(_row(frame, source, estimate), source.encoding, source.warning, source.searched)
+    row = _row(frame, source, estimate, note)
+    return FrameResult(row, source.encoding, source.warning, source.searched)
 
 
 def _calibration(frame: Frame, source: Source, estimate: RollEstimate) -> Calibration | None:
@@ -69,14 +70,13 @@ def _arguments(options: MethodOptions) -> dict[str, Any]:
     }
 
 
-def _row(frame: Frame, source: Source, estimate: RollEstimate) -> Row:
+def _row(frame: Frame, source: Source, estimate: RollEstimate, note: str) -> Row:
     reasons = [estimate.message] if estimate.message else []
     status = estimate.status
     if source.doubt:
         status = "suspect"
         reasons.append(source.doubt)
-    if source.note:
-        reasons.append(source.note)
+    reasons += filter(None, [source.note, note])
     alpha0, alpha1, alpha2 = estimate.alpha
     return Row(
         file=frame.file,

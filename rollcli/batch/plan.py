@@ -13,7 +13,7 @@ from rollcli.frames.calibration import calibration_files, check_first_size
 from rollcli.frames.checks import check_inputs_are_kept, check_nothing_is_there, check_one_owner
 from rollcli.frames.find import map_frames, pair_frames
 from rollcli.frames.frame import Frame
-from rollcli.frames.outputs import image_paths
+from rollcli.frames.outputs import possible_paths
 
 
 @dataclass(frozen=True)
@@ -59,8 +59,8 @@ def make_plan(options: EstimateOptions) -> Plan:
 
 
 def _images(frames: Iterable[Frame], options: EstimateOptions) -> Iterator[str]:
-    """Yield every image that is written; a list of them would take most of our memory."""
-    return (path for frame in frames for _, path in image_paths(frame, options.images))
+    """Yield every image that may be written; a list of them would take most of our memory."""
+    return (path for frame in frames for paths in possible_paths(frame, options.images) for path in paths)
 
 
 def _format(output: str) -> Format:

@@ -4,9 +4,10 @@ from typing import Any
 
 import click
 
-from rollcli.cli.command import command
+from rollcli.cli.command import command, option
 from rollcli.cli.config import config_option
 from rollcli.cli.options import (
+    PATH,
     cluster_options,
     folder_options,
     output_folder_option,
@@ -30,6 +31,13 @@ from rollcli.convert.options import DisparityOptions
 @folder_options
 @output_folder_option
 @save_as_option
+@option(
+    "--preview",
+    type=PATH,
+    metavar="DIR",
+    section="Output",
+    help="Also write each map as a picture to look at, in colour with a scale in pixels, PNG.",
+)
 @stereo_options
 @cluster_options
 @config_option

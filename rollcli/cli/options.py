@@ -232,7 +232,8 @@ save_as_option = option(
     section="Output",
     type=Choice("png", "tiff", "npy"),
     default="png",
-    help="Format of maps computed from pairs: 16-bit KITTI PNG (to 256 px), float32 TIFF or float32 NPY.",
+    help="Format of maps computed from pairs: 16-bit KITTI PNG (TIFF for a map beyond its 256 px), float32 "
+    "TIFF or float32 NPY.",
 )
 
 output_folder_option = option(
@@ -256,7 +257,12 @@ image_options = record(
         "--vdisparity", type=PATH, metavar="DIR", help="The v-disparity image with the road's parabola, PNG."
     ),
     option("--disparity", type=PATH, metavar="DIR", help="The disparity map that was computed from a pair."),
-    option("--road-mask", type=PATH, metavar="DIR", help="The found road, drawn over the map, PNG."),
+    option(
+        "--road-mask",
+        type=PATH,
+        metavar="DIR",
+        help="The found road, drawn on the left image of a pair or on the map, PNG.",
+    ),
     save_as_option,
 )
 

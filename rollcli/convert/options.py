@@ -57,3 +57,4 @@ class DisparityOptions:
     save_as: Literal["png", "tiff", "npy"]
     stereo: StereoOptions
     running: RunningOptions
+    preview: str | None = None

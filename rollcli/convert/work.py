@@ -12,12 +12,13 @@ from rollcli.files.codecs.png import encode_png
 from rollcli.files.formats import encode_stored
 from rollcli.files.results import Row
 from rollcli.files.storage import write_bytes
-from rollcli.frames.encode import encode_computed, encode_turned
+from rollcli.frames.encode import TOO_LARGE_FOR_PNG, encode_computed, encode_turned
 from rollcli.frames.frame import FrameResult
 from rollcli.frames.guard import guarded
 from rollcli.frames.options import FrameOptions
 from rollcli.frames.outputs import remove_outputs
 from rollcli.frames.read import Source, read_source
+from rollcli.imaging.overlay import draw_preview
 from rollcli.imaging.vdisparity import profile, v_disparity
 from rollcli.imaging.vdisparity_picture import draw_v_disparity
 
@@ -25,10 +26,11 @@ from rollcli.imaging.vdisparity_picture import draw_v_disparity
 def derotate_map(conversion: Conversion, options: FrameOptions, expand: bool) -> FrameResult:
     """Write the rotated map."""
 
-    def make(source: Source) -> list[bytes]:
+    def make(source: Source) -> dict[str, bytes]:
         assert source.stored is not None  # a map, not a pair
         invalid = options.encoding.invalid
-        return [encode_turned(source.stored, conversion.roll, source.encoding, invalid, expand=expand)]
+        data = encode_turned(source.stored, conversion.roll, source.encoding, invalid, expand=expand)
+        return {options.at(conversion.writes[0]): data}
 
     return _convert(conversion, options, make)
 
@@ -36,27 +38,33 @@ def derotate_map(conversion: Conversion, options: FrameOptions, expand: bool) ->
 def count_map(conversion: Conversion, options: FrameOptions, count: CountOptions) -> FrameResult:
     """Write the v-disparity image of the map, and the counts if they were requested."""
 
-    def make(source: Source) -> list[bytes]:
+    def make(source: Source) -> dict[str, bytes]:
         histogram = v_disparity(source.disparity, bins=count.bins, max_disparity=count.max_disparity)
         picture = encode_png(draw_v_disparity(histogram, _road(source)))
-        return [picture, encode_stored(histogram.counts, "tiff")] if count.counts else [picture]
+        images = [picture, encode_stored(histogram.counts, "tiff")] if count.counts else [picture]
+        return dict(zip(map(options.at, conversion.writes), images, strict=True))
 
     return _convert(conversion, options, make)
 
 
-def match_frame(conversion: Conversion, options: FrameOptions, save_as: str) -> FrameResult:
-    """Write the disparity map of the pair."""
+def match_frame(
+    conversion: Conversion, options: FrameOptions, save_as: str, *, preview: bool = False
+) -> FrameResult:
+    """Write the disparity map of the pair, and a picture of it if that was requested."""
 
-    def make(source: Source) -> list[bytes]:
+    def make(source: Source) -> dict[str, bytes]:
         if not np.any(source.disparity):
             raise InputError(f"{conversion.frame.file}: no pixel could be matched with the right image")
-        return [encode_computed(source.disparity, save_as)]
+        path, data = encode_computed(options.at(conversion.writes[0]), source.disparity, save_as)
+        if not preview:
+            return {path: data}
+        return {path: data, options.at(conversion.writes[-1]): encode_png(draw_preview(source.disparity))}
 
     return _convert(conversion, options, make)
 
 
 def _convert(
-    conversion: Conversion, options: FrameOptions, make: Callable[[Source], list[bytes]]
+    conversion: Conversion, options: FrameOptions, make: Callable[[Source], dict[str, bytes]]
 ) -> FrameResult:
     """Read the frame and write the files that `make` makes of it, each whole or not at all."""
     frame = conversion.frame
@@ -66,10 +74,13 @@ def _convert(
         if conversion.refused:
             raise InputError(f"{frame.file}: {conversion.refused}")
         source = read_source(frame, options)
-        for path, data in zip(paths, make(source), strict=True):
+        written = make(source)
+        for path, data in written.items():
             write_bytes(path, data)
+        remove_outputs(path for path in paths if path not in written)
         row = Row(frame.file, frame.right_file, "ok")
-        warning = source.warning or source.doubt or source.note
+        too_large = "" if paths[0] in written else TOO_LARGE_FOR_PNG
+        warning = source.warning or source.doubt or source.note or too_large
         return FrameResult(row, source.encoding, warning, source.searched)
 
     result = guarded(frame, work)

@@ -24,6 +24,7 @@ class Encoding(str, Enum):
     SGBM = "sgbm"  # p / 16; negative is no data
 
 
+KITTI_TOP = 65534 / 256  # px: the largest disparity of a KITTI PNG; 65535 is never one
 _SCALE = {Encoding.PX: 1.0, Encoding.KITTI: 1 / 256, Encoding.CITYSCAPES: 1 / 256, Encoding.SGBM: 1 / 16}
 _AUTO = {np.dtype(np.uint16): Encoding.KITTI, np.dtype(np.int16): Encoding.SGBM}
 _WHOLE_PIXELS_BELOW = 512

@@ -8,17 +8,19 @@ from numpy.typing import NDArray
 
 from rollcli.estimator.result import RollEstimate
 from rollcli.files.codecs.png import encode_png
-from rollcli.files.encodings import Encoding, from_disparity
+from rollcli.files.encodings import KITTI_TOP, Encoding, from_disparity
 from rollcli.files.formats import Stored, encode_stored
 from rollcli.files.storage import write_bytes
 from rollcli.frames.frame import Frame
 from rollcli.frames.options import FrameOptions
-from rollcli.frames.outputs import image_paths
+from rollcli.frames.outputs import image_paths, remove_outputs, roomy_path
 from rollcli.frames.read import Source
 from rollcli.imaging.derotate import derotate
-from rollcli.imaging.overlay import draw_road
+from rollcli.imaging.overlay import draw_road, draw_road_on_photo
 from rollcli.imaging.vdisparity import row_offset, v_disparity
 from rollcli.imaging.vdisparity_picture import draw_v_disparity
+
+TOO_LARGE_FOR_PNG = f"written as TIFF: a disparity is above the {KITTI_TOP:.0f} px of a KITTI PNG"
 
 
 def write_images(
@@ -27,8 +29,8 @@ def write_images(
     estimate: RollEstimate,
     options: FrameOptions,
     horizon: float | None = None,
-) -> None:
-    """Write the images that were requested, each whole or not at all.
+) -> str:
+    """Write the images that were requested, each whole or not at all; return what the row should say of them.
 
     `horizon` is the y of the road's horizon, px, where a calibration tells it.
 
@@ -37,8 +39,15 @@ def write_images(
     OutputError
         An image cannot be written.
     """
+    note = ""
     for kind, path in image_paths(frame, options.images):
-        write_bytes(options.at(path), _ENCODERS[kind](source, estimate, options, horizon))
+        planned = options.at(path)
+        target, data = _ENCODERS[kind](planned, source, estimate, options, horizon)
+        write_bytes(target, data)
+        if target != planned:
+            note = TOO_LARGE_FOR_PNG
+            remove_outputs([planned])  # of an earlier run
+    return note
 
 
 def encode_turned(
@@ -52,35 +61,51 @@ def encode_turned(
     return encode_stored(turned, stored.format, stored.nodata)
 
 
-def encode_computed(disparity: NDArray[Any], save_as: str) -> bytes:
-    """Encode a map computed from a pair: a PNG in KITTI's 16 bits, other formats in pixels."""
-    if save_as == "png":
-        return encode_stored(from_disparity(disparity, "kitti", np.uint16), "png")
-    return encode_stored(disparity.astype(np.float32, copy=False), save_as)
+def encode_computed(path: str, disparity: NDArray[Any], save_as: str) -> tuple[str, bytes]:
+    """Name and encode a map computed from a pair: a PNG in KITTI's 16 bits, other formats in pixels.
+
+    A map that reaches further than such a PNG holds becomes a TIFF of the same stem.
+    """
+    if save_as == "png" and np.max(disparity, initial=0) <= KITTI_TOP:
+        return path, encode_stored(from_disparity(disparity, "kitti", np.uint16), "png")
+    form = "tiff" if save_as == "png" else save_as
+    data = encode_stored(disparity.astype(np.float32, copy=False), form)
+    return (roomy_path(path) if save_as == "png" else path), data
 
 
-def _derotated(source: Source, estimate: RollEstimate, options: FrameOptions, horizon: float | None) -> bytes:
+_Named = tuple[str, bytes]
+
+
+def _derotated(
+    path: str, source: Source, estimate: RollEstimate, options: FrameOptions, horizon: float | None
+) -> _Named:
     if source.stored is None:
-        return encode_computed(derotate(source.disparity, estimate.theta), options.images.save_as)
-    return encode_turned(source.stored, estimate.theta, source.encoding, options.encoding.invalid)
+        return encode_computed(path, derotate(source.disparity, estimate.theta), options.images.save_as)
+    return path, encode_turned(source.stored, estimate.theta, source.encoding, options.encoding.invalid)
 
 
 def _v_disparity(
-    source: Source, estimate: RollEstimate, options: FrameOptions, horizon: float | None
-) -> bytes:
+    path: str, source: Source, estimate: RollEstimate, options: FrameOptions, horizon: float | None
+) -> _Named:
     histogram = v_disparity(derotate(source.disparity, estimate.theta))
     offset = row_offset(estimate.theta, estimate.width, estimate.height)
     row = None if horizon is None else horizon - offset
-    return encode_png(draw_v_disparity(histogram, estimate.alpha, offset, row))
+    return path, encode_png(draw_v_disparity(histogram, estimate.alpha, offset, row))
 
 
-def _disparity(source: Source, estimate: RollEstimate, options: FrameOptions, horizon: float | None) -> bytes:
-    return encode_computed(source.disparity, options.images.save_as)
+def _disparity(
+    path: str, source: Source, estimate: RollEstimate, options: FrameOptions, horizon: float | None
+) -> _Named:
+    return encode_computed(path, source.disparity, options.images.save_as)
 
 
-def _road_mask(source: Source, estimate: RollEstimate, options: FrameOptions, horizon: float | None) -> bytes:
+def _road_mask(
+    path: str, source: Source, estimate: RollEstimate, options: FrameOptions, horizon: float | None
+) -> _Named:
     assert estimate.road_mask is not None  # the frame's task asks for it
-    return encode_png(draw_road(source.disparity, estimate.road_mask))
+    if source.photo is not None:
+        return path, encode_png(draw_road_on_photo(source.photo, estimate.road_mask))
+    return path, encode_png(draw_road(source.disparity, estimate.road_mask))
 
 
 _ENCODERS = {

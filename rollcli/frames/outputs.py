@@ -28,22 +28,34 @@ def image_paths(frame: Frame, images: ImageOptions) -> Iterator[tuple[str, str]]
         yield kind, output_path(frame, folder, endings[kind])
 
 
+def roomy_path(path: str) -> str:
+    """Name the TIFF that is written in place of a KITTI PNG which cannot hold the map."""
+    return posixpath.splitext(path)[0] + ENDING_OF_FORMAT["tiff"]
+
+
+def possible_paths(frame: Frame, images: ImageOptions) -> Iterator[tuple[str, ...]]:
+    """Yield, for each image of a frame, the paths of which one is written."""
+    for kind, path in image_paths(frame, images):
+        computed = frame.right_file and kind in ("derotated", "disparity") and images.save_as == "png"
+        yield (path, roomy_path(path)) if computed else (path,)
+
+
 def local_images(frame: Frame, images: ImageOptions) -> Iterator[str]:
-    """Yield the images of a frame that lie on local disk, where a power cut may take them."""
-    return (path for _, path in image_paths(frame, images) if not is_url(path))
+    """Yield the images of a frame that may lie on local disk, where a power cut may take them."""
+    return (path for paths in possible_paths(frame, images) for path in paths if not is_url(path))
 
 
 def has_images(frame: Frame, images: ImageOptions) -> bool:
     """Tell whether every image of a frame exists and is not empty; those in an object store are believed."""
-    for _, path in image_paths(frame, images):
-        if is_url(path):  # asking for each would take as long as making it again, and objects are whole
-            continue
-        try:
-            if Path(path).stat().st_size == 0:
-                return False
-        except OSError:
-            return False
-    return True
+    # asking a store for each object would take as long as making it again, and objects are whole
+    return all(is_url(paths[0]) or any(map(_has_bytes, paths)) for paths in possible_paths(frame, images))
+
+
+def _has_bytes(path: str) -> bool:
+    try:
+        return Path(path).stat().st_size > 0
+    except OSError:
+        return False
 
 
 def output_path(frame: Frame, folder: str, ending: str | None = None) -> str:
@@ -54,7 +66,7 @@ def output_path(frame: Frame, folder: str, ending: str | None = None) -> str:
 
 def remove_images(frame: Frame, images: ImageOptions, root: str = "") -> None:
     """Remove the images of a frame: a frame without an angle has none."""
-    remove_outputs(located(root, path) for _, path in image_paths(frame, images))
+    remove_outputs(located(root, path) for paths in possible_paths(frame, images) for path in paths)
 
 
 def remove_outputs(paths: Iterable[str]) -> None:
@@ -66,4 +78,4 @@ def remove_outputs(paths: Iterable[str]) -> None:
 
 def remove_image_leftovers(frames: Iterable[Frame], images: ImageOptions) -> None:
     """Remove the temporary files that killed workers left beside the images of these frames."""
-    remove_leftovers(path for frame in frames for _, path in image_paths(frame, images))
+    remove_leftovers(path for frame in frames for paths in possible_paths(frame, images) for path in paths)

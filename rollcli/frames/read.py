@@ -43,6 +43,8 @@ class Source:
         What was done about the pair; empty when nothing.
     size : tuple of int, or None
         Width and height of the images in the files, px, where the map was matched from them.
+    photo : ndarray or None
+        The left image of a pair, grey or BGR, where the road is to be drawn on it.
     """
 
     disparity: NDArray[Any]
@@ -54,6 +56,7 @@ class Source:
     doubt: str = ""
     note: str = ""
     size: tuple[int, int] | None = None
+    photo: NDArray[Any] | None = None
 
 
 def read_source(frame: Frame, options: FrameOptions) -> Source:
@@ -90,6 +93,7 @@ def _match(frame: Frame, options: FrameOptions) -> Source:
         doubt="; ".join(_doubts(match)),
         note=note_of(match.corrected, *match.disparity.shape) if options.stereo.measures_alignment else "",
         size=(width, height),
+        photo=left if options.images.road_mask is not None else None,
     )
 
 

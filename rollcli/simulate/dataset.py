@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rollcli.errors import OutputError
 from rollcli.files.atomic import output_error, remove_leftovers, write_atomic
-from rollcli.files.encodings import from_disparity
+from rollcli.files.encodings import KITTI_TOP, from_disparity
 from rollcli.files.formats import encode_stored
 from rollcli.files.results import run_path
 from rollcli.parallel.in_order import Work
@@ -29,7 +29,6 @@ _PARTS = ("left", "right", "disparity")
 TRUTH = "truth.csv"
 _CALIBRATION = "calib"
 _OURS = re.compile(r"frame_\d{4,}\.png")
-KITTI_TOP = 65534 / 256  # pixels: larger disparities are written as no data
 
 
 @dataclass(frozen=True)

@@ -3,11 +3,12 @@
 import sys
 
 from rollcli.errors import ExitStatus
+from rollcli.files.encodings import KITTI_TOP
 from rollcli.frames.options import RunningOptions
 from rollcli.messages import say
 from rollcli.parallel.interrupt import stop_on_signals
 from rollcli.parallel.progress import TaskProgress
-from rollcli.simulate.dataset import KITTI_TOP, Dataset, write_dataset
+from rollcli.simulate.dataset import Dataset, write_dataset
 from rollcli.simulate.options import SimulateOptions
 from rollcli.simulate.plan import plan_dataset
 

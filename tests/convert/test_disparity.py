@@ -1,8 +1,8 @@
 """`rollcli disparity`: one map a pair, as stereo matching has it."""
 
-import re
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
@@ -75,16 +75,52 @@ def test_a_pair_that_cannot_be_matched_costs_itself_alone(pairs, tmp_path):
 
 
 @pytest.mark.parametrize("program", [["disparity", "-o"], ["estimate", "-o", "rolls.csv", "--disparity"]])
-def test_a_pair_too_near_for_16_bits_costs_itself_alone_and_says_what_to_do(tmp_path, program):
+def test_a_map_that_a_16_bit_png_cannot_hold_is_written_as_tiff_and_that_is_said(tmp_path, program):
     for name, near in (("a.png", 0), ("b.png", 280), ("c.png", 0)):
         write_pair(tmp_path, name, road_map(0.02, width=900) / 2 + near)
     line = [*program, "maps", "--left", "left", "--right", "right", "--num-disparities", "352"]
     done = rollcli(*line, cwd=tmp_path)
-    assert done.status == 3
-    assert re.search("left/b.png: disparities up to 3.. px do not fit .* 256 px: give --save-as", done.err)
-    assert sorted(contents(tmp_path / "maps")) == ["a.png", "c.png"]
-    assert rollcli(*line, "--save-as", "tiff", "--overwrite", cwd=tmp_path).status == 0
+    assert done.status == 0
+    said = done.err + (tmp_path / "rolls.csv").read_text() if program[0] == "estimate" else done.err
+    assert "written as TIFF: a disparity is above the 256 px of a KITTI PNG" in said
+    assert sorted(contents(tmp_path / "maps")) == ["a.png", "b.tif", "c.png"]
     assert read_disparity(tmp_path / "maps" / "b.tif").max() > 300
+    (tmp_path / "maps" / "b.png").write_bytes(b"of an earlier run")
+    assert rollcli(*line, "--overwrite", cwd=tmp_path).status == 0
+    assert sorted(contents(tmp_path / "maps")) == ["a.png", "b.tif", "c.png"]
+
+
+def test_a_resume_finds_the_tiff_that_stands_for_a_png(tmp_path):
+    for name, near in (("a.png", 0), ("b.png", 280)):
+        write_pair(tmp_path, name, road_map(0.02, width=900) / 2 + near)
+    line = ["estimate", "--left", "left", "--right", "right", "--num-disparities", "352", "-o", "rolls.csv"]
+    line += ["--disparity", "maps"]
+    assert rollcli(*line, cwd=tmp_path).status == 0
+    assert "made again" not in rollcli(*line, "--resume", cwd=tmp_path).err
+    (tmp_path / "maps" / "b.tif").unlink()
+    assert "made again" in rollcli(*line, "--resume", cwd=tmp_path).err
+    assert sorted(contents(tmp_path / "maps")) == ["a.png", "b.tif"]
+
+
+def test_the_road_of_a_pair_is_drawn_on_its_photo(tmp_path):
+    write_pair(tmp_path, "a.png", road_map(0.02, width=900) / 2)
+    line = [
+        "estimate",
+        "--left",
+        "left",
+        "--right",
+        "right",
+        "--num-disparities",
+        "64",
+        "--road-mask",
+        "road",
+    ]
+    assert rollcli(*line, cwd=tmp_path).status == 0
+    drawn = cv2.imread(str(tmp_path / "road" / "a.png")).astype(int)
+    photo = cv2.imread(str(tmp_path / "left" / "a.png")).astype(int)
+    assert drawn.shape == photo.shape
+    unchanged = (drawn == photo).all(axis=2)
+    assert 0.02 < unchanged.mean() < 0.98
 
 
 @pytest.mark.parametrize(
