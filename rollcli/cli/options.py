@@ -254,7 +254,10 @@ image_options = record(
         "--derotated", type=PATH, metavar="DIR", help="The map rotated upright; type and format of the input."
     ),
     option(
-        "--vdisparity", type=PATH, metavar="DIR", help="The v-disparity image with the road's parabola, PNG."
+        "--vdisparity",
+        type=PATH,
+        metavar="DIR",
+        help="The v-disparity image of the map rotated upright, with the road's parabola, PNG.",
     ),
     option("--disparity", type=PATH, metavar="DIR", help="The disparity map that was computed from a pair."),
     option(

@@ -51,9 +51,9 @@ def vdisparity(ctx: click.Context, /, **records: Any) -> None:
     """Draw the v-disparity image of each map: the histogram of each row's disparities.
 
     INPUTS are maps (PNG, TIFF, NPY, PFM), folders of them, quoted patterns, or - for paths on stdin. The
-    picture is an 8-bit PNG, on a log scale, rows of the picture being rows of the map. Where a road is found,
-    its disparity along the middle column is drawn as a dashed curve: on a de-rotated map the road's pixels
-    lie on it.
+    picture is an 8-bit PNG on a log scale; its first rows are those of the map. The map is taken as it is,
+    whereas `estimate --vdisparity` rotates it upright first. Where a road is found, its disparity along the
+    middle column is drawn as a dashed curve: on a de-rotated map the road's pixels lie on it.
     """
     from rollcli.convert.vdisparity import run_vdisparity
 

@@ -102,6 +102,16 @@ def test_a_resume_finds_the_tiff_that_stands_for_a_png(tmp_path):
     assert sorted(contents(tmp_path / "maps")) == ["a.png", "b.tif"]
 
 
+def test_a_preview_is_a_colour_picture_beside_the_map(tmp_path):
+    write_pair(tmp_path, "a.png", road_map(0.02, width=900) / 2)
+    line = ["disparity", "--left", "left", "--right", "right", "-o", "maps", "--preview", "look"]
+    done = rollcli(*line, cwd=tmp_path)
+    assert (done.status, sorted(contents(tmp_path / "maps"))) == (0, ["a.png"])
+    picture = cv2.imread(str(tmp_path / "look" / "a.png"), cv2.IMREAD_UNCHANGED)
+    assert (picture.dtype, picture.shape[2]) == (np.uint8, 3)
+    assert rollcli(*line, cwd=tmp_path).status == 2  # both are there already
+
+
 def test_the_road_of_a_pair_is_drawn_on_its_photo(tmp_path):
     write_pair(tmp_path, "a.png", road_map(0.02, width=900) / 2)
     line = [
