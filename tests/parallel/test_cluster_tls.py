@@ -1,0 +1,97 @@
+"""A cluster whose connections are encrypted, by Dask's own settings."""
+
+import json
+import shutil
+import subprocess
+import sys
+import time
+
+import pytest
+
+from tests.run_cli import environment, rollcli, write_maps
+
+pytest.importorskip("distributed", reason="the extra cluster is not installed")
+pytestmark = pytest.mark.skipif(
+    shutil.which("openssl") is None, reason="no openssl to make certificates with"
+)
+
+LOCAL = ("--host", "127.0.0.1", "--no-dashboard", "--protocol", "tls")
+
+
+def certificate(folder, name):
+    """A certificate that vouches for itself, and its key."""
+    cert, key = folder / f"{name}.pem", folder / f"{name}.key"
+    line = [
+        "openssl",
+        "req",
+        "-x509",
+        "-newkey",
+        "rsa:2048",
+        "-nodes",
+        "-days",
+        "1",
+        "-subj",
+        "/CN=localhost",
+    ]
+    subprocess.run([*line, "-out", cert, "-keyout", key], check=True, capture_output=True)
+    return cert, key
+
+
+def settings(cert, key, trusted):
+    """Dask's settings as variables: everyone has this certificate, and trusts one."""
+    tls = {
+        f"{role}__{what}": path
+        for role in ("SCHEDULER", "WORKER", "CLIENT")
+        for what, path in (("CERT", cert), ("KEY", key))
+    }
+    tls["CA_FILE"] = trusted
+    named = {f"DASK_DISTRIBUTED__COMM__TLS__{name}": str(path) for name, path in tls.items()}
+    return {**named, "DASK_DISTRIBUTED__COMM__REQUIRE_ENCRYPTION": "True"}
+
+
+@pytest.fixture
+def cluster(tmp_path):
+    """The address of a scheduler with one worker, and the settings of who may take part."""
+    variables = settings(*certificate(tmp_path, "node"), tmp_path / "node.pem")
+    state = tmp_path / "scheduler.json"
+    processes = []
+
+    def start(*words):
+        line = [sys.executable, "-m", "distributed.cli.dask_" + words[0], *map(str, words[1:])]
+        quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+        processes.append(subprocess.Popen(line, cwd=tmp_path, env=environment(**variables), **quiet))
+
+    try:
+        start("scheduler", *LOCAL, "--port", "0", "--scheduler-file", state)
+        end = time.monotonic() + 60
+        while not (state.exists() and state.read_text().endswith("}")):
+            assert time.monotonic() < end, "the scheduler does not start"
+            time.sleep(0.1)
+        address = json.loads(state.read_text())["address"]
+        start("worker", address, *LOCAL, "--nthreads", "1", "--no-nanny")
+        yield address, variables
+    finally:
+        for process in reversed(processes):
+            process.kill()
+            process.wait()
+
+
+def test_a_run_on_an_encrypted_cluster_gives_the_same_rows_and_a_stranger_is_refused(tmp_path, cluster):
+    address, variables = cluster
+    assert address.startswith("tls://")
+    write_maps(tmp_path / "maps", 3)
+    rollcli("estimate", "maps", "-q", "-o", "local.csv", cwd=tmp_path)
+
+    done = rollcli(
+        "estimate", "maps", "-q", "-o", "far.csv", "--scheduler", address, cwd=tmp_path, **variables
+    )
+
+    assert (done.status, done.err) == (0, "")
+    assert (tmp_path / "far.csv").read_bytes() == (tmp_path / "local.csv").read_bytes()
+    stranger = settings(*certificate(tmp_path, "stranger"), tmp_path / "node.pem")
+    for others in (stranger, {}):
+        refused = rollcli("estimate", "maps", "-o", "no.csv", "--scheduler", address, cwd=tmp_path, **others)
+        assert refused.status in (1, 2)
+        assert address in refused.err
+        assert refused.err.count("\n") == 1
+        assert not (tmp_path / "no.csv").exists()
