@@ -127,7 +127,7 @@ class Roi(_ParamType):
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> tuple[int, int, int, int]:
         text = ",".join(map(str, value)) if isinstance(value, (list, tuple)) else str(value)
-        found = re.fullmatch(r"\s*(\d+)\s*,\s*(\d+)\s*,\s*(\d+)\s*,\s*(\d+)\s*", text)
+        found = re.fullmatch(r"\s*(\d{1,9})\s*,\s*(\d{1,9})\s*,\s*(\d{1,9})\s*,\s*(\d{1,9})\s*", text)
         x0, y0, x1, y1 = (int(number) for number in found.groups()) if found else (0, 0, 0, 0)
         if not (x0 < x1 and y0 < y1):
             self.fail(f"{text!r} is not X0,Y0,X1,Y1 in whole pixels with X0 < X1 and Y0 < Y1", param, ctx)
