@@ -134,3 +134,8 @@ def test_no_module_is_too_long_to_read_and_no_folder_too_full():
     assert long == set()
     folders = {path.parent for path in MODULES.values()}
     assert {each.name for each in folders if len(list(each.glob("*.py"))) > _MOST_MODULES} <= TOO_FULL
+
+
+def test_no_module_defers_its_annotations():
+    deferring = {name for name, path in MODULES.items() if "from __future__" in path.read_text("utf-8")}
+    assert deferring == set()

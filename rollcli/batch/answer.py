@@ -1,7 +1,5 @@
 """The last line of a run: what its frames say about the rig."""
 
-from __future__ import annotations
-
 from array import array
 
 from rollcli.files.results import Row

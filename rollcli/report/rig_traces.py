@@ -1,7 +1,5 @@
 """What the roll chart shows of the rig: segments with intervals, jumps, and the smoothed mounting roll."""
 
-from __future__ import annotations
-
 import html
 from collections.abc import Sequence
 from typing import Any

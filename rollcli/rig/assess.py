@@ -1,7 +1,5 @@
 """The rig: every drive and every quantity of its frames, and what changed from drive to drive."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

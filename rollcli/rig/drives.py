@@ -1,7 +1,5 @@
 """Which frames are one drive: those of one folder, unless the user says otherwise."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from pathlib import PurePosixPath

@@ -1,7 +1,5 @@
 """The estimator with a calibration: roll, pitch and height of one map."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from numpy.typing import ArrayLike

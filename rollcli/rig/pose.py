@@ -13,8 +13,6 @@ and n = (-sin(roll) cos(pitch), cos(roll) cos(pitch), sin(pitch)): first the pit
 axis, then the roll about the optical axis.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """An assessment in words: what people read in the table, on stderr and on the page."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 

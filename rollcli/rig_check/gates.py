@@ -1,7 +1,5 @@
 """Whether the rig is what it should be: one check for each thing that was asked."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

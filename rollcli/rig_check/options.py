@@ -1,7 +1,5 @@
 """What `rollcli rig` was asked. Import-light: the command line imports this module to show its help."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 from rollcli.frames.options import RunningOptions

@@ -1,7 +1,5 @@
 """`rollcli rig` from the command line: what is read and written, and the exit status."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 from rollcli.errors import ExitStatus, UsageError

@@ -1,7 +1,5 @@
 """The frames of one run, from its result or from its shards in any order."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

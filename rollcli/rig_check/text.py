@@ -1,7 +1,5 @@
 """An assessment as a table to read, as CSV and as JSON."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

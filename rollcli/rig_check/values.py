@@ -1,7 +1,5 @@
 """An assessment as the values that programs read: JSON objects and the rows of a CSV."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -4,8 +4,6 @@ Frames of a drive repeat each other: the car rolls and the road turns for many f
 independent frames covers 5 to 30 % instead of 95. Blocks of several correlation lengths are independent.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Literal

@@ -1,7 +1,5 @@
 """Means of blocks of frames, and the intervals that follow from how much they differ."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from statistics import NormalDist

@@ -5,8 +5,6 @@ to the next says much: a step of the mount is seen in both. Generalised least sq
 deserve [Aitken 1936]; its scan for a step at every place costs one pass.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -5,8 +5,6 @@ one more; a set is taken when it lowers -2 log likelihood by more than its penal
 for each: noise that was fitted about a jump calls it noise.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise

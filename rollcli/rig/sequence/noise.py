@@ -4,8 +4,6 @@ The spectrum of both is fitted to the periodogram by Whittle's likelihood, which
 and is blind to the mean [Whittle 1953].
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The frame of a jump: what was found in cells of several frames is looked at more and more closely."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from rollcli.rig.sequence.cells import make_cells

@@ -1,7 +1,5 @@
 """The best way to cut a series into stretches of constant mean, by dynamic programming: exact."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from rollcli.rig.sequence.weights import Floats

@@ -4,8 +4,6 @@ Two states and a scalar measurement: the Kalman filter forward [Kalman 1960], th
 Striebel 1965]. Frames are averaged in cells first: a chart cannot show more of a long drive.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

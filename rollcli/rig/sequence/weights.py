@@ -1,7 +1,5 @@
 """What each frame counts: its own error, the variance between frames, and how far off it is."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,0 +1,68 @@
+"""Lines on standard error: one a message, whatever it holds, and never an error of their own."""
+
+import io
+import os
+import subprocess
+import sys
+
+import pytest
+
+from rollcli.messages import printable, say
+from tests.run_cli import environment
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("maps/frame1.png: is empty", "maps/frame1.png: is empty"),
+        ("Straße ü 日本.png", "Straße ü 日本.png"),
+        ("a\x1b[2J\x07b", r"a\x1b[2J\x07b"),
+        ("a\nrollcli: all is well\r", r"a\nrollcli: all is well\r"),
+        ("a\u202egnp.b", r"a\u202egnp.b"),
+        ("not text \udcff", r"not text \udcff"),
+    ],
+)
+def test_what_a_terminal_would_obey_or_hide_is_escaped(text, shown):
+    assert printable(text) == shown
+
+
+def test_a_message_is_one_line_with_the_programs_name(capsys):
+    say("a\nb")
+    assert capsys.readouterr().err == "rollcli: a\\nb\n"
+
+
+LOST = """
+import os, sys
+from rollcli.messages import let_stderr_fail, say
+let_stderr_fail()
+for number in range(3):
+    say(str(number))
+print("done", sys.stderr.fileno(), sys.stderr.isatty())
+"""
+
+
+@pytest.mark.parametrize("broken", ["closed pipe", "closed", "read only"])
+def test_messages_that_cannot_be_written_raise_nothing_and_leave_the_status(broken):
+    read, write = os.pipe()
+    os.close(read)
+    before = {"closed pipe": None, "closed": lambda: os.close(2), "read only": lambda: reopen_read_only()}[
+        broken
+    ]
+    line = [sys.executable, "-c", LOST]
+    done = subprocess.run(
+        line, env=environment(), stdout=subprocess.PIPE, stderr=write, preexec_fn=before, check=False
+    )
+    os.close(write)
+    assert done.returncode == 0
+    assert done.stdout.startswith(b"done")
+
+
+def reopen_read_only():
+    os.dup2(os.open(os.devnull, os.O_RDONLY), 2)
+
+
+def test_text_of_any_encoding_can_be_said():
+    line = [sys.executable, "-c", LOST.replace("str(number)", "'ü \\udcff 日'")]
+    done = subprocess.run(line, env=environment(PYTHONIOENCODING="ascii"), capture_output=True, check=True)
+    assert done.stderr.count(b"\n") == 3
+    assert io.BytesIO(done.stderr).readline().startswith(b"rollcli: \\xfc ")
