@@ -38,7 +38,7 @@ class Tolerance:
 TOLERANCE = Tolerance()
 LEFT_OVER = Tolerance(0.075, 0.00025, 0.0002, 0.3)
 """What a correction may leave: less, since a map that was matched with it hides a part of it."""
-_MEASURED_AT = 120_000  # px: larger views are measured at this size, which keeps a fifth of the tolerance
+_MEASURED_AT = 90_000  # px: larger views are measured at this size, which keeps a fifth of the tolerance
 
 _SURE = 2.0  # standard errors
 _FURTHEST = 2.0  # times the last change; further away, two measurements do not tell
@@ -101,33 +101,48 @@ def size_factor(shape: tuple[int, ...], pixels: int) -> float:
     return max(1.0, math.sqrt(shape[0] * shape[1] / pixels))
 
 
-def at_measuring_size(views: Views) -> Views:
-    """Both views at the size that they are measured at."""
-    return shrink_both(views, size_factor(views[0].shape, _MEASURED_AT))
+class SmallViews:
+    """The views of a pair at the size that they are measured at; large ones are shrunk once.
 
-
-def measure_at_size(views: Views, disparity: Map, start: Misalignment, rounds: int = 2) -> Measured | None:
-    """Measure the misalignment of views of any size at a size that costs little.
-
-    Parameters
+    Attributes
     ----------
-    views : pair of ndarray of uint8, shape (H, W)
-        Left and right, as they were given.
-    disparity : ndarray of float32, shape (h, w)
-        Of the same pair at this or another size, in its own pixels; no data is 0.
-    start, rounds
-        See `measure_misalignment`.
-
-    Returns
-    -------
-    Measured or None
-        Pixels of the whole views.
+    shape : tuple of int
+        Of the whole views.
+    views : pair of ndarray of uint8, shape (h, w)
+        Left and right.
+    factor : float
+        How many times smaller they are than the whole ones.
     """
-    small = at_measuring_size(views)
-    factor = size_factor(views[0].shape, _MEASURED_AT)
-    seen = resampled(disparity, small[0].shape)
-    found = measure_misalignment(small, seen, start.resized(1 / factor), rounds)
-    return None if found is None else found.resized(factor)
+
+    def __init__(self, whole: Views) -> None:
+        self.shape = whole[0].shape
+        self.factor = size_factor(self.shape, _MEASURED_AT)
+        self.views = shrink_both(whole, self.factor)
+
+    def swapped(self) -> "SmallViews":
+        """The same, the right view taken for the left one."""
+        return SmallViews((self.views[1], self.views[0]))
+
+    def measure(self, disparity: Map, start: Misalignment, rounds: int = 2) -> Measured | None:
+        """Measure how the right view lies.
+
+        Parameters
+        ----------
+        disparity : ndarray of float32
+            Of the pair at any size, in its own pixels; no data is 0.
+        start : Misalignment
+            Where to begin; pixels of the whole views.
+        rounds : int
+            See `measure_misalignment`.
+
+        Returns
+        -------
+        Measured or None
+            Pixels of the whole views.
+        """
+        seen = resampled(disparity, self.views[0].shape)
+        found = measure_misalignment(self.views, seen, start.resized(1 / self.factor), rounds)
+        return None if found is None else found.resized(self.factor)
 
 
 def resampled(disparity: Map, shape: tuple[int, ...]) -> Map:

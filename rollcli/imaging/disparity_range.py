@@ -1,7 +1,7 @@
 """How far to search: the disparity range of a pair, found by matching it small."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +13,15 @@ _ROUNDS = 4
 _MIN_SHARE = 0.01  # of the pixels, to say anything
 
 
-def largest_disparity(match: Matcher, width: int) -> float | None:
-    """The largest disparity of a pair, outliers aside.
+class Range(NamedTuple):
+    """The largest disparity of a pair, outliers aside, and the map that shows it."""
+
+    top: float
+    disparity: NDArray[Any]
+
+
+def largest_disparity(match: Matcher, width: int) -> Range | None:
+    """Find the largest disparity of a pair, and a map of what may be believed.
 
     Parameters
     ----------
@@ -25,7 +32,7 @@ def largest_disparity(match: Matcher, width: int) -> float | None:
 
     Returns
     -------
-    float or None
+    Range or None
         Pixels; None where nothing can be matched.
 
     Notes
@@ -36,15 +43,18 @@ def largest_disparity(match: Matcher, width: int) -> float | None:
     wide finds too is believed.
     """
     top = _top(match(width / 2), 98)
+    found = None
     for _ in range(_ROUNDS):
         if top is None:
             return None
         searched = 1.4 * top + 4
         narrow, wide = match(searched), match(min(2 * searched, width / 2))
-        top = _top(np.where(np.abs(narrow - wide) < 1, narrow, 0), 99)
+        believed = np.where(np.abs(narrow - wide) < 1, narrow, 0)
+        top = _top(believed, 99)
+        found = None if top is None else Range(top, np.where(wide > 0, believed, narrow))
         if top is not None and top < 0.85 * searched:
-            return top
-    return top
+            break
+    return found
 
 
 def _top(disparity: NDArray[Any], percentile: float) -> float | None:

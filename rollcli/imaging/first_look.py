@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.imaging.alignment import Approach, level, measure_at_size, size_factor
+from rollcli.imaging.alignment import Approach, SmallViews, is_level, level, size_factor
 from rollcli.imaging.disparity_range import largest_disparity
 from rollcli.imaging.misalignment import LEVEL, Misalignment
 from rollcli.imaging.sgbm import NARROWEST, match_views, usable_range
@@ -15,15 +15,15 @@ from rollcli.imaging.stereo_options import StereoOptions
 from rollcli.imaging.vertical_disparity import Measured, measure_misalignment
 from rollcli.imaging.views import Views, shrink_both
 
-_SMALLEST, _SMALL = 16_000, 40_000  # px of the views that are looked at, one after the other
+_SMALLEST, _SMALL = 16_000, 30_000  # px of the views that are looked at, one after the other
 _OPTIONS = StereoOptions(mode="3way", speckle_size=50, speckle_range=1)
 _ROUNDS = 6
-_STEP = 0.1  # px of the small view, anywhere: the end
+_STEP = 0.3  # px of the small view, anywhere: the end; the match at full size shows what is left
 _FAR = 0.5  # the same: what was matched so far off does not show the range
 _MARGIN = 1.1  # beyond the largest disparity seen, to search
 # From a start 3 px off, a view of little texture can end at an offset and a scale that deny each other. It is
 # told by what it leaves (wrong: 0.22 px and more, right: up to 0.22), or by a scale that no rig has
-_UNSURE_SPREAD = 0.2  # px of the smallest view
+_UNSURE_SPREAD = 0.4  # px of the smallest view
 _UNSURE_SCALE = 0.012
 _STARTS = (-4.0, 4.0)  # px of the whole view; offset of the further attempts
 
@@ -60,25 +60,20 @@ def find_range(views: Views) -> int | None:
     return None if found is None else _with_margin(found, factor)
 
 
-def first_look(views: Views) -> FirstLook:
-    """Find the range of a pair, and how its right view lies, coarse to fine.
-
-    Parameters
-    ----------
-    views : pair of ndarray of uint8, shape (H, W)
-    """
-    shape = views[0].shape
+def first_look(small: SmallViews) -> FirstLook:
+    """Find the range of a pair, and how its right view lies, coarse to fine."""
+    shape = small.views[0].shape
     factor = size_factor(shape, _SMALLEST)
-    found = _coarsest(shrink_both(views, factor), factor)
+    found = _coarsest(shrink_both(small.views, factor), factor * small.factor)
     if found is None:
         return FirstLook(None, None)
     before, factor = factor, size_factor(shape, _SMALL)
     start = found.measured.misalignment.resized(before / factor) if found.measured else LEVEL
-    found = _climb(shrink_both(views, factor), start, top=found.top * before / factor) or found
-    measured = None
-    if found.measured is not None:
-        start = found.measured.misalignment.resized(factor)
-        measured = measure_at_size(views, found.disparity, start)
+    found = _climb(shrink_both(small.views, factor), start, top=found.top * before / factor) or found
+    factor *= small.factor
+    measured = None if found.measured is None else found.measured.resized(factor)
+    if measured is not None and not is_level(measured.misalignment, measured.errors, small.shape):
+        measured = small.measure(found.disparity, measured.misalignment)
     return FirstLook(_with_margin(found, factor), measured)
 
 
@@ -117,17 +112,17 @@ def _climb(small: Views, start: Misalignment, top: float | None = None) -> _Smal
         if step < _STEP:
             return found
         at = approach.next(at, measured.misalignment)
-        top = matched.top if step < _FAR else top
+        if top is None and step < _FAR:
+            top = matched.top
     return found
 
 
 def _match_small(pair: Views, top: float | None) -> _Small | None:
     """Match over the range that is known, or find it."""
-    if top is None:
-        top = largest_disparity(lambda count: _match(pair, count), pair[0].shape[1])
-    if top is None:
-        return None
-    return _Small(top, _match(pair, _MARGIN * top + 2), None)
+    if top is not None:
+        return _Small(top, _match(pair, _MARGIN * top + 2), None)
+    found = largest_disparity(lambda count: _match(pair, count), pair[0].shape[1])
+    return None if found is None else _Small(found.top, found.disparity.astype(np.float32, copy=False), None)
 
 
 def _with_margin(found: _Small, factor: float) -> int:

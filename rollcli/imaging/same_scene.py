@@ -6,10 +6,9 @@ images 0 to 22 % do (26 rendered, 24 real pairs).
 """
 
 from rollcli.errors import InputError
-from rollcli.imaging.alignment import at_measuring_size
+from rollcli.imaging.alignment import SmallViews
 from rollcli.imaging.first_look import FirstLook, first_look
-from rollcli.imaging.vertical_disparity import Measured, textured_blocks
-from rollcli.imaging.views import Views
+from rollcli.imaging.vertical_disparity import Measured, all_blocks, textured_blocks
 
 # Shares of the textured blocks that tell
 _SURE = 0.3  # from here on the images are what they should be
@@ -18,12 +17,12 @@ _PLAIN = 0.4  # from here on swapped images are swapped
 _FEWEST = 100  # textured blocks; images with fewer may show the same scene
 
 
-def check_same_scene(views: Views, look: FirstLook, measured: Measured | None) -> None:
+def check_same_scene(small: SmallViews, look: FirstLook, measured: Measured | None) -> None:
     """See that the images show one scene from the left and from the right.
 
     Parameters
     ----------
-    views : pair of ndarray of uint8, shape (H, W)
+    small : SmallViews
     look : FirstLook
         What was seen before the match.
     measured : Measured or None
@@ -34,12 +33,13 @@ def check_same_scene(views: Views, look: FirstLook, measured: Measured | None) -
     InputError
         They are swapped, or show two scenes.
     """
-    left, right = views
-    textured = min(map(textured_blocks, at_measuring_size(views)))
     matched = max(_blocks(look.measured), _blocks(measured))
+    if matched >= _SURE * all_blocks(small.views[0]):
+        return  # most pairs: their texture need not be looked at
+    textured = min(map(textured_blocks, small.views))
     if textured < _FEWEST or matched >= _SURE * textured:
         return
-    if _blocks(first_look((right, left)).measured) >= _PLAIN * textured:
+    if _blocks(first_look(small.swapped()).measured) >= _PLAIN * textured:
         raise InputError(
             "the views seem swapped: the scene is matched when the right image is taken for the left one"
         )

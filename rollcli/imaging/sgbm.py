@@ -17,6 +17,8 @@ _SMALL_STEP_COST, _LARGE_STEP_COST = 4, 16
 _SUBPIXELS = 16  # OpenCV stores sixteenths of a pixel
 _STEP = 16  # px: widths that OpenCV takes
 NARROWEST = _STEP
+ALL_ROWS = slice(None)
+_MARGIN = 32  # rows beside those that are needed: what lies there smooths what is needed
 
 
 def usable_range(count: int, first: int, width: int, block_size: int) -> int:
@@ -48,4 +50,19 @@ def match_views(views: Views, first: int, count: int, options: StereoOptions) ->
     )
     sixteenths = matcher.compute(*views)
     disparity: NDArray[np.float32] = np.divide(np.maximum(sixteenths, 0), _SUBPIXELS, dtype=np.float32)
+    return disparity
+
+
+def match_rows(
+    views: Views, first: int, count: int, options: StereoOptions, rows: slice = ALL_ROWS
+) -> NDArray[np.float32]:
+    """Match only what some rows need; the rest of the map is no data. See `match_views`."""
+    height = views[0].shape[0]
+    start, stop, _ = rows.indices(height)
+    top, bottom = max(0, start - _MARGIN), min(height, stop + _MARGIN)
+    if (top, bottom) == (0, height):
+        return match_views(views, first, count, options)
+    disparity = np.zeros(views[0].shape, np.float32)
+    left, right = (view[top:bottom] for view in views)
+    disparity[top:bottom] = match_views((left, right), first, count, options)
     return disparity

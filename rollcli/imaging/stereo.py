@@ -1,5 +1,6 @@
 """Disparity maps from stereo pairs: views levelled, range found, then one semi-global match."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -7,12 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError
-from rollcli.imaging.alignment import LEFT_OVER, TOLERANCE, is_level, level, measure_at_size
+from rollcli.imaging.alignment import LEFT_OVER, TOLERANCE, SmallViews, is_level, level
 from rollcli.imaging.first_look import FirstLook, find_range, first_look
 from rollcli.imaging.misalignment import LEVEL, Misalignment
 from rollcli.imaging.same_scene import check_same_scene
-from rollcli.imaging.sgbm import NARROWEST, match_views, usable_range
-from rollcli.imaging.sgbm_lag import without_lag
+from rollcli.imaging.sgbm import ALL_ROWS, NARROWEST, match_rows, usable_range
 from rollcli.imaging.stereo_options import StereoOptions as StereoOptions
 from rollcli.imaging.vertical_disparity import Measured
 from rollcli.imaging.views import Views, prepare_views
@@ -81,67 +81,81 @@ def compute_disparity(left: NDArray[Any], right: NDArray[Any], **options: Any) -
     return match_pair(left, right, StereoOptions(**options)).disparity
 
 
-def match_pair(left: NDArray[Any], right: NDArray[Any], options: StereoOptions) -> StereoMatch:
-    """The disparity map of a rectified pair, with all that was found on the way; see `compute_disparity`."""
+def match_pair(
+    left: NDArray[Any], right: NDArray[Any], options: StereoOptions, rows: slice = ALL_ROWS
+) -> StereoMatch:
+    """Match a rectified pair, and keep all that was found on the way.
+
+    Parameters
+    ----------
+    left, right, options
+        See `compute_disparity`.
+    rows : slice
+        Rows of the map that are needed, of the size matched at; the others may hold no data.
+
+    Raises
+    ------
+    InputError, UsageError
+        See `compute_disparity`.
+    """
     views = prepare_views(left, right, options.downscale)
-    width = views[0].shape[1]
-    if usable_range(1, options.min_disparity, width, options.block_size) < NARROWEST:
-        raise InputError(
-            f"images {width} px wide are too narrow to match from disparity {options.min_disparity} on"
-        )
-    look = _look(views, options)
+    width, first = views[0].shape[1], options.min_disparity
+    if usable_range(1, first, width, options.block_size) < NARROWEST:
+        raise InputError(f"images {width} px wide are too narrow to match from disparity {first} on")
+    small = SmallViews(views) if options.measures_alignment else None
+    look = FirstLook(_range_as_given(views, options), None) if small is None else first_look(small)
     count = options.num_disparities
     if count is None:
-        count = (width // 8 if look.range is None else look.range) - options.min_disparity
-    count = usable_range(count, options.min_disparity, width, options.block_size)
-    disparity, corrected, doubt = _levelled_match(views, look, count, options)
-    valid, end = np.count_nonzero(disparity), options.min_disparity + count
+        count = (width // 8 if look.range is None else look.range) - first
+    count = usable_range(count, first, width, options.block_size)
+
+    def match(lies: Misalignment) -> NDArray[np.float32]:
+        return match_rows((views[0], level(views[1], lies)), first, count, options, rows)
+
+    if small is None:
+        corrected, doubt = Misalignment(options.vertical_offset or 0.0), ""
+        disparity = match(corrected)
+    else:
+        disparity, corrected, doubt = _match_levelled(match, small, look, first < 0)
+    valid = np.count_nonzero(disparity)
     return StereoMatch(
-        disparity=without_lag(disparity, options.mode),
-        min_disparity=options.min_disparity,
+        disparity=disparity,
+        min_disparity=first,
         num_disparities=count,
-        end_fraction=np.count_nonzero(disparity >= end - 2) / valid if valid else 0.0,
+        end_fraction=np.count_nonzero(disparity >= first + count - 2) / valid if valid else 0.0,
         corrected=corrected,
         doubt=doubt,
     )
 
 
-def _look(views: Views, options: StereoOptions) -> FirstLook:
-    """What is to be known before the pair is matched."""
-    if options.measures_alignment:
-        return first_look(views)
-    given = Misalignment(options.vertical_offset or 0.0)
-    levelled = views[0], level(views[1], given)
-    return FirstLook(find_range(levelled) if options.num_disparities is None else None, None)
+def _range_as_given(views: Views, options: StereoOptions) -> int | None:
+    """The range of views that lie as the user says."""
+    if options.num_disparities is not None:
+        return None
+    return find_range((views[0], level(views[1], Misalignment(options.vertical_offset or 0.0))))
 
 
-def _levelled_match(
-    views: Views, look: FirstLook, count: int, options: StereoOptions
+def _match_levelled(
+    match: Callable[[Misalignment], NDArray[np.float32]],
+    small: SmallViews,
+    look: FirstLook,
+    any_scene: bool,
 ) -> tuple[NDArray[np.float32], Misalignment, str]:
-    """The disparity of the views once they are level, what was corrected, and why that may be wrong."""
-
-    def match(misalignment: Misalignment) -> NDArray[np.float32]:
-        levelled = views[0], level(views[1], misalignment)
-        return match_views(levelled, options.min_disparity, count, options)
-
-    if not options.measures_alignment:
-        given = Misalignment(options.vertical_offset or 0.0)
-        return match(given), given, ""
-    shape = views[0].shape
+    """Match once the views are level; the map, what was corrected, and why that may be wrong."""
+    shape = small.shape
     at = _worth_correcting(look.measured, shape)
     for _ in range(_MATCHES):
         disparity = match(at)
-        measured = measure_at_size(views, disparity, at, 2 if look.measured else _ROUNDS)
-        if options.min_disparity >= 0:  # who searches below 0 knows what the views are
-            check_same_scene(views, look, measured)
+        measured = small.measure(disparity, at, 2 if look.measured else _ROUNDS)
+        if not any_scene:
+            check_same_scene(small, look, measured)
         if measured is None:
             return disparity, at, "too little can be compared to tell whether the views are level"
         wanted = _worth_correcting(measured, shape)
+        tolerance = TOLERANCE if at == LEVEL else LEFT_OVER
         if wanted == LEVEL != at:  # small views were taken for uneven
             at = LEVEL
-        elif is_level(
-            measured.misalignment - at, measured.errors, shape, LEFT_OVER if at != LEVEL else TOLERANCE
-        ):
+        elif is_level(measured.misalignment - at, measured.errors, shape, tolerance):
             return disparity, at, _doubt(at)
         else:
             at = wanted

@@ -24,9 +24,10 @@ _LEAST = 2.0  # the same, across the rows: a block with less says nothing
 _MOST = 50.0  # and one with more counts no more than with this
 _FEWEST = 40  # blocks
 _FIT_ROUNDS = 10
+_SAME = 0.02  # of the spread: a fit that changes it by less has settled
 _TUNING = 1.5  # standard deviations off, a block counts a quarter
 _LONGEST_STEP = 1.5  # px, anywhere
-_SMALL_STEP = 0.02  # px: the end
+_SMALL_STEP = 0.1  # px: after one this small, another changes a hundredth
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,7 @@ class Measured:
 
 
 def measure_misalignment(
-    views: Views, disparity: Floats, start: Misalignment = LEVEL, rounds: int = 3
+    views: Views, disparity: Floats, start: Misalignment = LEVEL, rounds: int = 2
 ) -> Measured | None:
     """Measure how the right view lies against the left one.
 
@@ -94,6 +95,12 @@ def measure_misalignment(
         if reach < _SMALL_STEP:
             break
     return Measured(found, errors, count, spread)
+
+
+def all_blocks(view: View) -> int:
+    """Count the blocks that a view is cut into."""
+    height, width = view.shape
+    return int(height // _BLOCK * (width // _BLOCK))
 
 
 def textured_blocks(view: View) -> int:
@@ -178,7 +185,9 @@ def _fit(seen: _Seen) -> tuple[Misalignment, Misalignment, float]:
         inverse = np.linalg.inv(normal + 1e-6 * np.trace(normal) * np.eye(4))
         values = inverse @ (columns.T @ (weight * shift))
         off = shift - columns @ values
-        spread = 1.4826 * float(np.median(np.abs(off))) + 1e-3
+        before, spread = spread, 1.4826 * float(np.median(np.abs(off))) + 1e-3
+        if abs(spread - before) < _SAME * spread:
+            break
     scores = columns * (weight * off)[:, None] @ inverse
     errors = np.sqrt(np.square(scores).sum(axis=0))
     units = np.array([1, size, size, size**2])
