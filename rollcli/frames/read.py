@@ -67,7 +67,9 @@ def read_source(frame: Frame, options: FrameOptions) -> Source:
     InputError
         A file cannot be read as what it should be, or no pixel may be used.
     """
-    source = _match(frame, options) if frame.right_file else _read(frame, options)
+    if frame.right_file:
+        return _match(frame, options)
+    source = _read(frame, options)
     allowed = region_mask(frame.mask, options, source.disparity.shape)
     return source if allowed is None else replace(source, allowed=allowed)
 
@@ -81,10 +83,14 @@ def _read(frame: Frame, options: FrameOptions) -> Source:
 
 def _match(frame: Frame, options: FrameOptions) -> Source:
     from rollcli.imaging.stereo import match_pair
+    from rollcli.imaging.views import matched_shape
 
     left = read_image(options.at(frame.path), frame.file)
     right = read_image(options.at(frame.right_path), frame.right_file)
-    match = match_pair(left, right, options.stereo)
+    allowed = region_mask(frame.mask, options, matched_shape(left.shape, options.stereo.downscale))
+    # images show the whole map: one that is asked for needs all of it
+    rows = slice(None) if allowed is None or options.images.folders() else _used_rows(allowed)
+    match = match_pair(left, right, options.stereo, rows)
     searched = (match.min_disparity, match.min_disparity + match.num_disparities - 1)
     height, width = left.shape[:2]
     return Source(
@@ -94,7 +100,14 @@ def _match(frame: Frame, options: FrameOptions) -> Source:
         note=note_of(match.corrected, *match.disparity.shape) if options.stereo.measures_alignment else "",
         size=(width, height),
         photo=left if options.images.road_mask is not None else None,
+        allowed=allowed,
     )
+
+
+def _used_rows(allowed: NDArray[np.bool_]) -> slice:
+    """Return the rows from the first to the last that has an allowed pixel."""
+    (used,) = np.nonzero(allowed.any(axis=1))
+    return slice(int(used[0]), int(used[-1]) + 1)
 
 
 def _doubts(match: "StereoMatch") -> Iterator[str]:

@@ -38,7 +38,7 @@ class Tolerance:
 TOLERANCE = Tolerance()
 LEFT_OVER = Tolerance(0.075, 0.00025, 0.0002, 0.3)
 """What a correction may leave: less, since a map that was matched with it hides a part of it."""
-_MEASURED_AT = 90_000  # px: larger views are measured at this size, which keeps a fifth of the tolerance
+_MEASURED_AT = 120_000  # px: larger views are measured at this size, which keeps a fifth of the tolerance
 
 _SURE = 2.0  # standard errors
 _FURTHEST = 2.0  # times the last change; further away, two measurements do not tell

@@ -20,7 +20,7 @@ class Range(NamedTuple):
     disparity: NDArray[Any]
 
 
-def largest_disparity(match: Matcher, width: int) -> Range | None:
+def largest_disparity(match: Matcher, width: int, start: float | None = None) -> Range | None:
     """Find the largest disparity of a pair, and a map of what may be believed.
 
     Parameters
@@ -29,6 +29,8 @@ def largest_disparity(match: Matcher, width: int) -> Range | None:
         Matches the pair within a range.
     width : int
         Of the images, pixels.
+    start : float, optional
+        About how large it is; None: find that, too.
 
     Returns
     -------
@@ -42,7 +44,7 @@ def largest_disparity(match: Matcher, width: int) -> Range | None:
     is nothing to match, any candidate wins, and with more of them another one: so only what a search twice as
     wide finds too is believed.
     """
-    top = _top(match(width / 2), 98)
+    top = rough_largest(match, width) if start is None else start
     found = None
     for _ in range(_ROUNDS):
         if top is None:
@@ -55,6 +57,11 @@ def largest_disparity(match: Matcher, width: int) -> Range | None:
         if top is not None and top < 0.85 * searched:
             break
     return found
+
+
+def rough_largest(match: Matcher, width: int) -> float | None:
+    """Find about how large disparities get, by one search over half the width; None where none is found."""
+    return _top(match(width / 2), 98)
 
 
 def _top(disparity: NDArray[Any], percentile: float) -> float | None:

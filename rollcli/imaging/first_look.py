@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.imaging.alignment import Approach, SmallViews, is_level, level, size_factor
-from rollcli.imaging.disparity_range import largest_disparity
+from rollcli.imaging.disparity_range import largest_disparity, rough_largest
 from rollcli.imaging.misalignment import LEVEL, Misalignment
 from rollcli.imaging.sgbm import NARROWEST, match_views, usable_range
 from rollcli.imaging.stereo_options import StereoOptions
@@ -121,7 +121,10 @@ def _match_small(pair: Views, top: float | None) -> _Small | None:
     """Match over the range that is known, or find it."""
     if top is not None:
         return _Small(top, _match(pair, _MARGIN * top + 2), None)
-    found = largest_disparity(lambda count: _match(pair, count), pair[0].shape[1])
+    half = shrink_both(pair, 2)
+    rough = rough_largest(lambda count: _match(half, count), half[0].shape[1])
+    start = None if rough is None else 2 * rough
+    found = largest_disparity(lambda count: _match(pair, count), pair[0].shape[1], start)
     return None if found is None else _Small(found.top, found.disparity.astype(np.float32, copy=False), None)
 
 

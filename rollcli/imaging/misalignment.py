@@ -60,6 +60,14 @@ class Misalignment:
         corners = ((1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1))
         return max(abs(offset + u * rotation + v * scale + uv * twist) for u, v, uv in corners)
 
+    def reach_in_rows(self, height: int, width: int, start: int, stop: int) -> float:
+        """The largest vertical shift in the middle half of some rows of a view of this size, pixels."""
+        x, rows = width / 4, (start - height / 2, stop - height / 2)
+        corners = ((u, v) for u in (-x, x) for v in rows)
+        return max(
+            abs(self.offset + self.rotation * u + self.scale * v + self.twist * u * v) for u, v in corners
+        )
+
     @property
     def stretch(self) -> float:
         """The part of the scale that is believed to be in the columns, too."""

@@ -8,13 +8,13 @@ images 0 to 22 % do (26 rendered, 24 real pairs).
 from rollcli.errors import InputError
 from rollcli.imaging.alignment import SmallViews
 from rollcli.imaging.first_look import FirstLook, first_look
-from rollcli.imaging.vertical_disparity import Measured, all_blocks, textured_blocks
+from rollcli.imaging.vertical_disparity import Measured, textured_share
 
 # Shares of the textured blocks that tell
 _SURE = 0.3  # from here on the images are what they should be
 _FEW = 0.2  # below it, they show two scenes
 _PLAIN = 0.4  # from here on swapped images are swapped
-_FEWEST = 100  # textured blocks; images with fewer may show the same scene
+_LEAST_TEXTURE = 0.07  # share of the blocks; images with less may show the same scene
 
 
 def check_same_scene(small: SmallViews, look: FirstLook, measured: Measured | None) -> None:
@@ -33,13 +33,13 @@ def check_same_scene(small: SmallViews, look: FirstLook, measured: Measured | No
     InputError
         They are swapped, or show two scenes.
     """
-    matched = max(_blocks(look.measured), _blocks(measured))
-    if matched >= _SURE * all_blocks(small.views[0]):
+    matched = max(_share(look.measured), _share(measured))
+    if matched >= _SURE:
         return  # most pairs: their texture need not be looked at
-    textured = min(map(textured_blocks, small.views))
-    if textured < _FEWEST or matched >= _SURE * textured:
+    textured = min(map(textured_share, small.views))
+    if textured < _LEAST_TEXTURE or matched >= _SURE * textured:
         return
-    if _blocks(first_look(small.swapped()).measured) >= _PLAIN * textured:
+    if _share(first_look(small.swapped()).measured) >= _PLAIN * textured:
         raise InputError(
             "the views seem swapped: the scene is matched when the right image is taken for the left one"
         )
@@ -49,5 +49,5 @@ def check_same_scene(small: SmallViews, look: FirstLook, measured: Measured | No
         )
 
 
-def _blocks(measured: Measured | None) -> int:
-    return 0 if measured is None else measured.blocks
+def _share(measured: Measured | None) -> float:
+    return 0.0 if measured is None else measured.share

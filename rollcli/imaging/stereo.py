@@ -13,12 +13,14 @@ from rollcli.imaging.first_look import FirstLook, find_range, first_look
 from rollcli.imaging.misalignment import LEVEL, Misalignment
 from rollcli.imaging.same_scene import check_same_scene
 from rollcli.imaging.sgbm import ALL_ROWS, NARROWEST, match_rows, usable_range
+from rollcli.imaging.sgbm_lag import without_lag
 from rollcli.imaging.stereo_options import StereoOptions as StereoOptions
 from rollcli.imaging.vertical_disparity import Measured
 from rollcli.imaging.views import Views, prepare_views
 
 _MATCHES = 4  # until a pair counts as one that cannot be levelled
 _ROUNDS = 4  # of measuring where the first look has told nothing
+_LEFT_IN_ROWS = 0.3  # px, where not all rows are matched
 _FURTHEST = Misalignment(12.0, 0.03, 0.02, 0.0)  # what no rig in use has: px, radians, share
 
 
@@ -109,17 +111,17 @@ def match_pair(
         count = (width // 8 if look.range is None else look.range) - first
     count = usable_range(count, first, width, options.block_size)
 
-    def match(lies: Misalignment) -> NDArray[np.float32]:
-        return match_rows((views[0], level(views[1], lies)), first, count, options, rows)
+    def match(lies: Misalignment, needed: slice) -> NDArray[np.float32]:
+        return match_rows((views[0], level(views[1], lies)), first, count, options, needed)
 
     if small is None:
         corrected, doubt = Misalignment(options.vertical_offset or 0.0), ""
-        disparity = match(corrected)
+        disparity = match(corrected, rows)
     else:
-        disparity, corrected, doubt = _match_levelled(match, small, look, first < 0)
+        disparity, corrected, doubt = _match_levelled(match, rows, small, look, first < 0)
     valid = np.count_nonzero(disparity)
     return StereoMatch(
-        disparity=disparity,
+        disparity=without_lag(disparity, options.mode),
         min_disparity=first,
         num_disparities=count,
         end_fraction=np.count_nonzero(disparity >= first + count - 2) / valid if valid else 0.0,
@@ -136,30 +138,49 @@ def _range_as_given(views: Views, options: StereoOptions) -> int | None:
 
 
 def _match_levelled(
-    match: Callable[[Misalignment], NDArray[np.float32]],
+    match: Callable[[Misalignment, slice], NDArray[np.float32]],
+    rows: slice,
     small: SmallViews,
     look: FirstLook,
     any_scene: bool,
 ) -> tuple[NDArray[np.float32], Misalignment, str]:
     """Match once the views are level; the map, what was corrected, and why that may be wrong."""
-    shape = small.shape
-    at = _worth_correcting(look.measured, shape)
+    at = _worth_correcting(look.measured, small.shape)
     for _ in range(_MATCHES):
-        disparity = match(at)
+        disparity = match(at, rows)
         measured = small.measure(disparity, at, 2 if look.measured else _ROUNDS)
         if not any_scene:
             check_same_scene(small, look, measured)
+        if rows != ALL_ROWS:
+            if look.measured is not None and _is_confirmed(measured, at, small.shape, rows):
+                return disparity, at, _doubt(at)
+            rows = ALL_ROWS  # a few rows say that something is wrong, but not what
+            continue
         if measured is None:
             return disparity, at, "too little can be compared to tell whether the views are level"
-        wanted = _worth_correcting(measured, shape)
-        tolerance = TOLERANCE if at == LEVEL else LEFT_OVER
-        if wanted == LEVEL != at:  # small views were taken for uneven
-            at = LEVEL
-        elif is_level(measured.misalignment - at, measured.errors, shape, tolerance):
+        wanted = _wanted(measured, at, small.shape)
+        if wanted == at:
             return disparity, at, _doubt(at)
-        else:
-            at = wanted
+        at = wanted
     return disparity, at, "the views are not level, and could not be levelled"
+
+
+def _is_confirmed(measured: Measured | None, at: Misalignment, shape: tuple[int, ...], rows: slice) -> bool:
+    """Whether what is left in the rows that were matched is small, as far as they tell."""
+    if measured is None:
+        return True
+    height, width = shape
+    start, stop, _ = rows.indices(height)
+    return (measured.misalignment - at).reach_in_rows(height, width, start, stop) < _LEFT_IN_ROWS
+
+
+def _wanted(measured: Measured, at: Misalignment, shape: tuple[int, ...]) -> Misalignment:
+    """What to correct now that `measured` was found in a map matched at `at`; that, if it was right."""
+    wanted = _worth_correcting(measured, shape)
+    if wanted == LEVEL:
+        return LEVEL  # also where the small views were taken for uneven
+    tolerance = TOLERANCE if at == LEVEL else LEFT_OVER
+    return at if is_level(measured.misalignment - at, measured.errors, shape, tolerance) else wanted
 
 
 def _worth_correcting(measured: Measured | None, shape: tuple[int, ...]) -> Misalignment:

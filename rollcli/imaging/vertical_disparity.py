@@ -23,8 +23,8 @@ _RIDGE = 0.2  # squared grey levels per pixel: gradients along the rows below th
 _LEAST = 2.0  # the same, across the rows: a block with less says nothing
 _MOST = 50.0  # and one with more counts no more than with this
 _FEWEST = 40  # blocks
-_FIT_ROUNDS = 10
-_SAME = 0.02  # of the spread: a fit that changes it by less has settled
+_FIT_ROUNDS = 12
+_SAME = 0.005  # of the spread: a fit that changes it by less has settled
 _TUNING = 1.5  # standard deviations off, a block counts a quarter
 _LONGEST_STEP = 1.5  # px, anywhere
 _SMALL_STEP = 0.1  # px: after one this small, another changes a hundredth
@@ -38,8 +38,8 @@ class Measured:
     ----------
     misalignment : Misalignment
         Of the right view, pixels of the size measured at.
-    blocks : int
-        How many small blocks of the image told.
+    share : float
+        Of the blocks that the view is cut into, those that told.
     errors : Misalignment
         Standard error of each part.
     spread : float
@@ -48,13 +48,13 @@ class Measured:
 
     misalignment: Misalignment
     errors: Misalignment
-    blocks: int
+    share: float
     spread: float
 
     def resized(self, factor: float) -> "Measured":
         """The same, of views `factor` times as large."""
         there, errors = self.misalignment.resized(factor), self.errors.resized(factor)
-        return Measured(there, errors, self.blocks, factor * self.spread)
+        return Measured(there, errors, self.share, factor * self.spread)
 
 
 def measure_misalignment(
@@ -94,21 +94,17 @@ def measure_misalignment(
         found = found + step.times(_LONGEST_STEP / max(reach, _LONGEST_STEP))
         if reach < _SMALL_STEP:
             break
-    return Measured(found, errors, count, spread)
+    return Measured(
+        found, errors, count / (disparity.shape[0] // _BLOCK * (disparity.shape[1] // _BLOCK)), spread
+    )
 
 
-def all_blocks(view: View) -> int:
-    """Count the blocks that a view is cut into."""
-    height, width = view.shape
-    return int(height // _BLOCK * (width // _BLOCK))
-
-
-def textured_blocks(view: View) -> int:
-    """How many blocks of a view could tell a vertical disparity, were they matched."""
+def textured_share(view: View) -> float:
+    """Return the share of a view's blocks that could tell a vertical disparity, were they matched."""
     across, down = _gradients(_smooth(view))
     along = _block_means(across * across) + np.float32(_RIDGE)
     weight = _block_means(down * down) - np.square(_block_means(across * down)) / along
-    return int(np.count_nonzero(weight > _LEAST))
+    return float(np.mean(weight > _LEAST))
 
 
 @dataclass(frozen=True)

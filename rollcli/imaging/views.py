@@ -31,11 +31,17 @@ def prepare_views(left: NDArray[Any], right: NDArray[Any], downscale: float) -> 
     return _plain(left, brightest, downscale), _plain(right, brightest, downscale)
 
 
+def matched_shape(shape: tuple[int, ...], downscale: float) -> tuple[int, int]:
+    """Return the shape that an image of this shape is matched at."""
+    height, width = (max(1, round(side / downscale)) for side in shape[:2])
+    return height, width
+
+
 def shrink(view: NDArray[Any], factor: float) -> View:
     """The view, `factor` times smaller; as it is for a factor of 1."""
     if factor == 1:
         return view
-    height, width = (max(1, round(side / factor)) for side in view.shape)
+    height, width = matched_shape(view.shape, factor)
     return cv2.resize(view, (width, height), interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
 
 

@@ -170,6 +170,20 @@ def test_swapped_views_and_images_of_two_places_get_a_row_that_says_so(tmp_path)
     assert "the two images do not show the same scene" in two_places.out
 
 
+def test_a_region_of_a_pair_gives_the_same_angle_whether_the_whole_map_is_written_or_not(tmp_path):
+    write_pair(tmp_path, "a.png", road_map(0.05, width=480, height=240) / 2)
+    region = ("--left", "left", "--right", "right", "--roi", "0,150,480,230", "--road", "all")
+
+    alone = rollcli("estimate", *region, cwd=tmp_path).out
+    beside_a_map = rollcli("estimate", *region, "--disparity", "maps", cwd=tmp_path).out
+
+    rolls = [float(column(out, "roll_deg")[0]) for out in (alone, beside_a_map)]
+    assert rolls[0] == pytest.approx(rolls[1], abs=0.05)
+    assert column(alone, "status") == column(beside_a_map, "status")
+    written = cv2.imread(str(tmp_path / "maps" / "a.png"), cv2.IMREAD_UNCHANGED)
+    assert (written[:100] > 0).mean() > 0.3
+
+
 def test_maps_and_pairs_are_not_mixed(maps):
     assert "--left and --right" in rollcli("estimate", "maps", "--left", "a", "--right", "b", cwd=maps).err
     assert "together" in rollcli("estimate", "--left", "maps", cwd=maps).err

@@ -116,6 +116,22 @@ def test_colour_grey_and_16_bits_give_much_the_same(street):
     assert np.median(np.abs(compute_disparity(*twelve_bits) - from_colour)[both]) < 0.1
 
 
+@pytest.mark.parametrize("lower", [0, 3])
+def test_rows_that_are_needed_are_matched_as_in_the_whole(street, lower):
+    right = np.roll(street.right, lower, axis=0)
+    whole = match_pair(street.left, right, StereoOptions())
+    part = match_pair(street.left, right, StereoOptions(), slice(140, 200))
+
+    needed = np.s_[140:200]
+    both = (whole.disparity[needed] > 0) & (part.disparity[needed] > 0)
+    assert both.sum() > 0.97 * (whole.disparity[needed] > 0).sum()
+    assert (np.abs(whole.disparity - part.disparity)[needed][both] < 0.1).mean() > 0.97
+    assert not part.disparity[:100].any()
+    assert part.disparity.shape == whole.disparity.shape
+    assert part.corrected.offset == pytest.approx(lower, abs=0.15)
+    assert part.doubt == ""
+
+
 def test_a_rendered_street_is_matched_as_it_is(street):
     disparity = compute_disparity(street.left, street.right)
 

@@ -1,0 +1,122 @@
+"""What a stereo pair costs beside the one bare match that it cannot do without.
+
+    python tests/benchmarks/bench_pairs.py [PAIRS]
+
+CPU time of reading, levelling, matching and estimating a pair (ours), and of cv2 decoding of both views with
+one OpenCV SGBM over the same range (bare), on one thread, in turns. The pairs: PAIRS rendered ones (12) of
+640x480 and of 1242x375, level, and with the right view turned by 0.3 degrees, 0.2 % larger and 1.5 px lower;
+and real streets, where ../shared/streets is. Errors are against the rendered roll, degrees. To reach: 1.25
+for level pairs, 1.45 for real ones.
+"""
+
+import math
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+from rollcli.estimator.estimate import estimate_roll
+from rollcli.files.formats import read_image
+from rollcli.imaging.misalignment import LEVEL
+from rollcli.imaging.stereo import StereoOptions, match_pair
+from rollcli.simulate.draw import draw_specs
+from rollcli.simulate.render import render_frame
+
+STREETS = Path(__file__).parents[3] / "shared" / "streets"
+ROUNDS = 3
+SEED = 4711
+
+
+class Pair(NamedTuple):
+    """Two files, and the true roll where it is known."""
+
+    left: Path
+    right: Path
+    roll_deg: float | None = None
+
+
+def main() -> None:
+    """Print a line for each kind of pairs."""
+    cv2.setNumThreads(1)
+    pairs = int(sys.argv[1]) if len(sys.argv) > 1 else 12
+    with TemporaryDirectory() as folder:
+        for size in ((640, 480), (1242, 375)):
+            for odd in (False, True):
+                kind = f"rendered {size[0]}x{size[1]}, {'turned' if odd else 'level'}"
+                report(kind, list(rendered(Path(folder), pairs, size, odd=odd)))
+    if STREETS.is_dir():
+        named = sorted((STREETS / "left").iterdir())
+        report("real streets, as they are", [Pair(left, STREETS / "right" / left.name) for left in named])
+
+
+def rendered(folder: Path, pairs: int, size: tuple[int, int], *, odd: bool) -> Iterator[Pair]:
+    """Render pairs; odd: with a right camera that is out of place."""
+    span = math.radians(10)
+    for number, spec in enumerate(draw_specs(pairs, roll=(-span, span), size=size, seed=SEED, colour=False)):
+        frame = render_frame(spec)
+        left, right = (folder / f"{side}{number}.png" for side in ("left", "right"))
+        cv2.imwrite(str(left), frame.left)
+        cv2.imwrite(str(right), out_of_place(frame.right) if odd else frame.right)
+        yield Pair(left, right, math.degrees(spec.roll))
+
+
+def out_of_place(view: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """What a camera sees that is turned, nearer and lower."""
+    height, width = view.shape
+    matrix = cv2.getRotationMatrix2D(((width - 1) / 2, (height - 1) / 2), -0.3, 1.002)
+    matrix[1, 2] += 1.5
+    seen = cv2.warpAffine(view, matrix, (width, height), flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REFLECT)
+    return seen.astype(np.uint8, copy=False)
+
+
+def report(kind: str, pairs: list[Pair]) -> None:
+    """Time both ways on each pair, in turns."""
+    ours, bare, errors, corrected = [], [], [], 0
+    for pair in pairs:
+        best = [math.inf, math.inf]
+        for _ in range(ROUNDS):
+            start = time.process_time()
+            match = match_pair(read_image(str(pair.left)), read_image(str(pair.right)), StereoOptions())
+            estimate = estimate_roll(match.disparity)
+            between = time.process_time()
+            bare_match(pair, match.num_disparities)
+            end = time.process_time()
+            best = [min(best[0], between - start), min(best[1], end - between)]
+        ours.append(best[0])
+        bare.append(best[1])
+        corrected += match.corrected != LEVEL
+        if pair.roll_deg is not None:
+            errors.append(abs(math.degrees(estimate.theta) - pair.roll_deg))
+    ratio = sum(ours) / sum(bare)
+    print(f"{kind}: {len(pairs)} pairs, {corrected} corrected; CPU a pair: ", end="")
+    print(f"ours {1e3 * np.mean(ours):.0f} ms, bare {1e3 * np.mean(bare):.0f} ms, ratio {ratio:.2f}", end="")
+    print(f"; error median {np.median(errors):.3f}, worst {max(errors):.3f}" if errors else "")
+
+
+def bare_match(pair: Pair, count: int) -> None:
+    """What one would write with OpenCV alone, the range being known."""
+    left, right = (cv2.imread(str(path), cv2.IMREAD_GRAYSCALE) for path in (pair.left, pair.right))
+    matcher = cv2.StereoSGBM.create(
+        numDisparities=count,
+        blockSize=5,
+        P1=100,
+        P2=400,
+        disp12MaxDiff=1,
+        uniquenessRatio=10,
+        speckleWindowSize=100,
+        speckleRange=2,
+        mode=cv2.STEREO_SGBM_MODE_SGBM_3WAY,
+    )
+    matcher.compute(left, right)
+
+
+if __name__ == "__main__":
+    main()
