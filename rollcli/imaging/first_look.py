@@ -18,6 +18,7 @@ from rollcli.imaging.views import Views, shrink_both
 _SMALLEST, _SMALL = 16_000, 30_000  # px of the views that are looked at, one after the other
 _OPTIONS = StereoOptions(mode="3way", speckle_size=50, speckle_range=1)
 _ROUNDS = 6
+_NEAR = 0.25  # of the width: beyond it, so much of a view is hidden that half its size shows too little
 _STEP = 0.3  # px of the small view, anywhere: the end; the match at full size shows what is left
 _FAR = 0.5  # the same: what was matched so far off does not show the range
 _MARGIN = 1.1  # beyond the largest disparity seen, to search
@@ -123,8 +124,16 @@ def _match_small(pair: Views, top: float | None) -> _Small | None:
         return _Small(top, _match(pair, _MARGIN * top + 2), None)
     half = shrink_both(pair, 2)
     rough = rough_largest(lambda count: _match(half, count), half[0].shape[1])
-    start = None if rough is None else 2 * rough
-    found = largest_disparity(lambda count: _match(pair, count), pair[0].shape[1], start)
+    width = pair[0].shape[1]
+
+    def match(count: float) -> NDArray[np.float32]:
+        return _match(pair, count)
+
+    found = None
+    if rough is not None and rough < _NEAR * half[0].shape[1]:
+        found = largest_disparity(match, width, 2 * rough)
+    if found is None:  # a near scene, or grain that is gone at half the size
+        found = largest_disparity(match, width)
     return None if found is None else _Small(found.top, found.disparity.astype(np.float32, copy=False), None)
 
 
