@@ -34,24 +34,25 @@ def let_stderr_fail() -> None:
     if sys.stderr is None:  # it was closed before the program started
         sys.stderr = Path(os.devnull).open("w")  # noqa: SIM115 (open as long as the program runs)
         return
-    descriptor, encoding = sys.stderr.fileno(), sys.stderr.encoding
+    buffer = sys.stderr.buffer
+    raw = getattr(buffer, "raw", buffer)  # Python's option -u leaves out the buffer between
     sys.stderr = io.TextIOWrapper(
-        _LossyWriter(descriptor), encoding, errors="backslashreplace", write_through=True
+        _LossyWriter(raw), sys.stderr.encoding, errors="backslashreplace", write_through=True
     )
 
 
 class _LossyWriter(io.RawIOBase):
-    """Bytes to a descriptor; those that it does not take are dropped."""
+    """Bytes to another raw stream; those that it does not take are dropped."""
 
-    def __init__(self, descriptor: int) -> None:
-        self._descriptor = descriptor
+    def __init__(self, raw: Any) -> None:
+        self._raw = raw
 
     def write(self, data: Any) -> int:
         """Write what can be written; all of it counts as written."""
         rest = bytes(data)
-        with contextlib.suppress(OSError):
-            while rest:
-                rest = rest[os.write(self._descriptor, rest) :]
+        with contextlib.suppress(OSError, ValueError):  # the latter when it is closed
+            while rest and (count := self._raw.write(rest)):
+                rest = rest[count:]
         return len(data)
 
     def writable(self) -> bool:
@@ -60,8 +61,8 @@ class _LossyWriter(io.RawIOBase):
 
     def fileno(self) -> int:
         """Give the descriptor: a terminal is asked for its size by it."""
-        return self._descriptor
+        return int(self._raw.fileno())
 
     def isatty(self) -> bool:
         """Tell whether a person reads this."""
-        return os.isatty(self._descriptor)
+        return bool(self._raw.isatty())
