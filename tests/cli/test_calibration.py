@@ -10,6 +10,9 @@ import numpy as np
 import pytest
 
 from rollcli.rig.calibration import Calibration
+from rollcli.simulate.draw import draw_specs
+from rollcli.simulate.render import render_frame
+from rollcli.simulate.truth import calibration
 from tests.rig import calibration_files as samples
 from tests.rig.calibration_files import Rig
 from tests.rig.test_pose import cast
@@ -110,27 +113,14 @@ def test_a_map_at_half_the_size_uses_the_scaled_calibration(maps):
     assert_posed(rows_of(rollcli("estimate", "half", "--calib", "calib.txt", cwd=maps).out))
 
 
-def textured_pair(folder):
-    """A level road with a texture that both cameras see, matched by nothing but OpenCV."""
-    rng = np.random.default_rng(4)
-    texture = cv2.GaussianBlur(rng.integers(0, 256, (2000, 2000)).astype(np.float32), (0, 0), 2)
-    texture = cv2.normalize(texture, None, 0, 255, cv2.NORM_MINMAX)
-    v, u = np.mgrid[:200, :320].astype(np.float64)
-    for side, shift in (("left", 0.0), ("right", RIG.baseline)):
-        rays = np.stack([(u - RIG.cx) / RIG.fx, (v - RIG.cy) / RIG.fy, np.ones_like(u)])
-        down = rays[1] * math.cos(PITCH) + rays[2] * math.sin(PITCH)
-        far = np.where(down > 0.01, HEIGHT / np.maximum(down, 0.01), 0)
-        x, z = far * rays[0] + shift, far * (rays[2] * math.cos(PITCH) - rays[1] * math.sin(PITCH))
-        image = cv2.remap(
-            texture, (100 * x + 1000).astype(np.float32), (60 * z).astype(np.float32), cv2.INTER_LINEAR
-        )
-        (folder / side).mkdir()
-        cv2.imwrite(str(folder / side / "a.png"), np.where(far > 0, image, 128).astype(np.uint8))
-
-
 def test_downscaled_pairs_have_the_pose_of_the_full_size(tmp_path):
-    textured_pair(tmp_path)
-    (tmp_path / "calib.txt").write_text(samples.kitti_benchmark(RIG))
+    rig = {"pitch": (0.08, 0.08), "height": (1.4, 1.4), "principal_offset": (-30.0, 30.0)}
+    (spec,) = draw_specs(1, scene="open", curvature=(0, 0), seed=6, colour=False, **rig)
+    frame = render_frame(spec)
+    for side, image in (("left", frame.left), ("right", frame.right)):
+        (tmp_path / side).mkdir()
+        cv2.imwrite(str(tmp_path / side / "a.png"), image)
+    (tmp_path / "calib.txt").write_bytes(calibration(spec))
     poses = []
     for factor in ("1", "2"):
         pair = ("--left", "left", "--right", "right", "--calib", "calib.txt", "--downscale", factor)
@@ -139,6 +129,7 @@ def test_downscaled_pairs_have_the_pose_of_the_full_size(tmp_path):
     (pitch, pitch_ci, height, height_ci), (half_pitch, half_pitch_ci, half_height, half_height_ci) = poses
     assert abs(pitch - half_pitch) <= math.hypot(pitch_ci, half_pitch_ci)
     assert abs(height - half_height) <= math.hypot(height_ci, half_height_ci)
+    assert (pitch, height) == pytest.approx((math.degrees(0.08), 1.4), rel=0.02)
 
 
 BAD = {
