@@ -1,5 +1,6 @@
 """16-bit grey PNG by wuffs, in 0.6 of OpenCV's time, where the extra `fast` is installed."""
 
+from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 
@@ -15,9 +16,9 @@ def decode_grey16(data: bytes, width: int, height: int) -> NDArray[Any] | None:
     ndarray of uint16, shape (H, W), or None
         None where wuffs is not installed or finds something wrong: then OpenCV's verdict counts.
     """
-    if (decoder := _decoder()) is None:
+    if (make_decoder := _decoders()) is None:
         return None
-    result = decoder.decode(data)
+    result = make_decoder().decode(data)  # one decoder in two threads crashes
     # what it has not reached is 0, and it says so here alone
     if result.error_message or result.pixbuf.shape != (height, width, 2):
         return None
@@ -26,15 +27,19 @@ def decode_grey16(data: bytes, width: int, height: int) -> NDArray[Any] | None:
 
 
 @lru_cache(maxsize=1)
-def _decoder() -> Any:
-    """Return a decoder of PNG alone that verifies checksums; None where wuffs is not installed."""
+def _decoders() -> Callable[[], Any] | None:
+    """Return what makes decoders of PNG alone that verify checksums; None where wuffs is not installed."""
     try:
         from pywuffs import ImageDecoderQuirks, ImageDecoderType, PixelFormat
         from pywuffs.aux import ImageDecoder, ImageDecoderConfig
     except ImportError:
         return None
-    config = ImageDecoderConfig()
-    config.enabled_decoders = [ImageDecoderType.PNG]
-    config.pixel_format = PixelFormat.Y_16LE
-    config.quirks = {ImageDecoderQuirks.IGNORE_CHECKSUM: 0}
-    return ImageDecoder(config)
+
+    def make() -> Any:
+        config = ImageDecoderConfig()
+        config.enabled_decoders = [ImageDecoderType.PNG]
+        config.pixel_format = PixelFormat.Y_16LE
+        config.quirks = {ImageDecoderQuirks.IGNORE_CHECKSUM: 0}
+        return ImageDecoder(config)
+
+    return make

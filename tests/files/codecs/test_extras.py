@@ -1,5 +1,7 @@
 """With the extras `fast` and `tiff` files read the same, number for number and word for word, only faster."""
 
+import subprocess
+import sys
 import zlib
 from random import Random
 
@@ -13,6 +15,7 @@ from rollcli.files.formats import decode_image, decode_mask, decode_stored
 from tests.binary_files import disparity_map, make_png, make_tiff, png_file, png_header, png_rows
 from tests.fuzz.corpus import corpus
 from tests.fuzz.mutations import at_random, every_region, with_repairs
+from tests.run_cli import environment
 
 FILES = {name: data for name, data in corpus().items() if name != "large.png"}
 DEEP = (disparity_map(37, 53) * 256).astype(np.uint16)
@@ -75,6 +78,25 @@ def test_only_16_bits_of_grey_go_to_wuffs(wuffs, monkeypatch):
         decode_stored(file, "x")
 
     assert len(asked) == 1
+
+
+def test_wuffs_reads_in_several_threads_at_once():
+    pytest.importorskip("pywuffs", reason="the extra fast is not installed")
+    script = (
+        "from concurrent.futures import ThreadPoolExecutor\n"
+        "import numpy as np\n"
+        "from rollcli.files.formats import decode_stored\n"
+        "from tests.binary_files import make_png\n"
+        "values = np.random.default_rng(0).integers(0, 60000, (200, 300), dtype=np.uint16)\n"
+        "file = make_png(values)\n"
+        "with ThreadPoolExecutor(4) as pool:\n"
+        "    read = pool.map(lambda _: decode_stored(file, 'x').values, range(400))\n"
+        "    assert all(np.array_equal(each, values) for each in read)\n"
+    )
+
+    done = subprocess.run([sys.executable, "-c", script], env=environment(), check=False)
+
+    assert done.returncode == 0
 
 
 @pytest.mark.parametrize("damage", ["cut", "checksum"])
