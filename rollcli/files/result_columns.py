@@ -175,8 +175,14 @@ def _statuses(cells: Sequence[Any], lines: Sequence[int], path: str) -> NDArray[
 def _numbers(name: str, cells: Sequence[Any], lines: Sequence[int], path: str) -> NDArray[np.float64]:
     low, high = BOUNDS.get(name, (-np.inf, np.inf))
     try:
-        empty = np.fromiter((cell is None or cell == "" for cell in cells), bool, len(cells))
-        numbers = np.array([np.nan if none else float(cell) for none, cell in zip(empty, cells, strict=True)])
+        if all(cells):
+            empty, numbers = np.zeros(len(cells), bool), np.array(list(map(float, cells)))
+        elif not any(cells) and 0 not in cells:  # a million empty cells are told at once
+            return np.full(len(cells), np.nan)
+        else:
+            empty = np.array([cell is None or cell == "" for cell in cells])
+            pairs = zip(empty.tolist(), cells, strict=True)
+            numbers = np.array([np.nan if none else float(cell) for none, cell in pairs])
     except (ValueError, TypeError):
         _name_fault(name, cells, lines, path)
         raise

@@ -37,19 +37,18 @@ def split_drives(files: Sequence[str], groups: str = AUTO) -> list[tuple[str, ND
     if groups == NONE or not files:
         return [("", np.arange(len(files)))] if files else []
     pattern = "" if groups == AUTO else groups
-    folders: dict[str, str] = {}
-    members: dict[str, list[int]] = {}
-    for place, file in enumerate(files):
-        folder = file.replace("\\", "/").rpartition("/")[0]
-        name = folders.get(folder)
-        if name is None:
-            name = folders[folder] = _matching(folder, pattern) if pattern else folder
-        members.setdefault(name, []).append(place)
-    if pattern and set(members) <= set(folders) and not any(_matches(folder, pattern) for folder in folders):
-        raise UsageError(f"--groups {groups}: matches no folder of the frames, such as {next(iter(folders))}")
-    if groups == AUTO and len(files) < _FRAMES_OF_A_DRIVE * len(members):
+    folders = [file.rpartition("/")[0] for file in files]
+    names = {folder: _matching(folder, pattern) if pattern else folder for folder in dict.fromkeys(folders)}
+    if pattern and not any(_matches(folder, pattern) for folder in names):
+        raise UsageError(f"--groups {groups}: matches no folder of the frames, such as {next(iter(names))}")
+    drives = {name: number for number, name in enumerate(dict.fromkeys(names.values()))}
+    if groups == AUTO and len(files) < _FRAMES_OF_A_DRIVE * len(drives):
         return [("", np.arange(len(files)))]
-    return [(name, np.array(places)) for name, places in members.items()]
+    of_folder = {folder: drives[name] for folder, name in names.items()}
+    numbers = np.fromiter(map(of_folder.__getitem__, folders), np.intp, len(files))
+    order = np.argsort(numbers, kind="stable")
+    ends = np.searchsorted(numbers[order], np.arange(1, len(drives)))
+    return list(zip(drives, np.split(order, ends), strict=True))
 
 
 def _matching(folder: str, pattern: str) -> str:
