@@ -110,7 +110,7 @@ def _at_bound(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
 def _wide_interval(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
     ci95 = evidence.ci95
     if ci95 is not None and ci95 > tuning.widest_interval:
-        yield f"the interval is wide: +-{math.degrees(ci95):.2f} degrees"
+        yield f"the interval is wide: ±{math.degrees(ci95):.2f} degrees"
 
 
 Reason = Callable[[Evidence, DoubtTuning], Iterator[str]]

@@ -14,17 +14,26 @@ from rollcli.report.page import render_page
 from rollcli.report.pictures import Pictures
 from rollcli.report.pose_charts import pose_charts
 from rollcli.report.roll_chart import roll_chart
-from rollcli.report.summary import degrees, frame_count, option_lines, summarize
+from rollcli.report.summary import (
+    degrees,
+    frame_count,
+    input_folders,
+    option_lines,
+    summarize,
+    with_interval,
+    written_at,
+)
 from rollcli.rig.assess import assess_rig
-from rollcli.rig.words import answer, counts, findings, now_in_words
+from rollcli.rig.words import answer, counts, decimals, findings, now_in_words
 
+_FOLDERS = 6  # of inputs that the summary names
 _LISTED = 100  # doubtful frames on the page; the result has all
 
 
 def report_page(result: Result, options: ReportOptions, shown: Sequence[tuple[Choice, Pictures]]) -> bytes:
     """The page, HTML, UTF-8."""
     rows, run, summary = result.rows, result.run or {}, summarize(result.rows)
-    rig = assess_rig(rows)
+    rig, folders = assess_rig(rows), input_folders(rows)
     doubtful = sorted(
         ((number, row) for number, row in enumerate(rows, 1) if row.status != "ok"),
         key=lambda each: each[1].status,  # errors before suspects
@@ -38,6 +47,11 @@ def report_page(result: Result, options: ReportOptions, shown: Sequence[tuple[Ch
         page_version=__version__,
         summary=summary,
         degrees=degrees,
+        with_interval=with_interval,
+        decimals=decimals,
+        folders=folders[:_FOLDERS],
+        more_folders=len(folders) - _FOLDERS,
+        written=written_at(options.result),
         options=option_lines(result.run),
         encodings=", ".join(map(str, run["encoding"])) if isinstance(run.get("encoding"), list) else "",
         roll_chart=roll_chart(rows, rig),
@@ -73,7 +87,7 @@ def _chosen_text(rows: Sequence[Row], choices: Sequence[Choice]) -> str:
 
 def _card(rows: Sequence[Row], choice: Choice, pictures: Pictures) -> dict[str, Any]:
     row, aspect = rows[choice.place], pictures.aspect
-    roll = degrees(row.roll_deg, 3)
+    roll = degrees(row.roll_deg, decimals(row.roll_ci95_deg))
     beside = min(max(0.28 * aspect, 0.5), 1.2)  # of a v-disparity: room for its numbers, and no more
     return {
         "number": choice.place + 1,

@@ -1,11 +1,12 @@
 """Pitch and height over the frames, where a calibration has given them."""
 
-import html
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from rollcli.files.results import Row
+from rollcli.report.labels import label
 from rollcli.report.page import Chart
+from rollcli.rig.words import decimals
 
 _DOTS = 400  # up to so many frames each has a dot
 
@@ -115,7 +116,6 @@ def _band(values: Sequence[_Value]) -> dict[str, Any]:
 
 
 def _described(each: _Value, unit: str) -> str:
-    """Make a hover label; plotly takes tags and entities in it for its own."""
-    interval = "" if each.half_width is None else f" ± {each.half_width:.3f}"
-    doubt = "" if each.row.status == "ok" else "<br>suspect"
-    return f"{html.escape(each.row.file)}<br>{each.value:.3f}{interval} {unit}{doubt}"
+    digits = decimals(each.half_width)
+    interval = "" if each.half_width is None else f" ± {each.half_width:.{digits}f}"
+    return label(each.row, f"{each.value:.{digits}f}{interval} {unit}")

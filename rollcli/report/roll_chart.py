@@ -1,20 +1,19 @@
 """The roll over the frames."""
 
-import html
 from collections.abc import Sequence, Set
 from itertools import pairwise
 from typing import Any
 
 from rollcli.files.results import Row
 from rollcli.report.axis_range import view
+from rollcli.report.labels import label
 from rollcli.report.page import Chart
 from rollcli.report.rig_traces import drive_starts, rig_traces
-from rollcli.report.summary import degrees
+from rollcli.report.summary import with_interval
 from rollcli.rig.assess import RigAssessment
 
 _MANY = 400  # up to so many frames each has a dot, and marks are large
 _FEW = 10
-_LONGEST_NAME = 44  # in a hover label, so that it fits a narrow screen
 _FAILED_AT = 0.035  # of the chart's height
 
 _VALUES = ("x", "y", "customdata")
@@ -100,7 +99,10 @@ def _points(numbered: Numbered) -> dict[str, Any]:
         "type": "scatter",
         "x": [number for number, _ in numbered],
         "y": [row.roll_deg for _, row in numbered],
-        "customdata": [_described(row) for _, row in numbered],
+        "customdata": [
+            label(row, "" if row.roll_deg is None else with_interval(row.roll_deg, row.roll_ci95_deg))
+            for _, row in numbered
+        ],
         "hovertemplate": "%{customdata}<extra></extra>",
     }
 
@@ -136,13 +138,3 @@ def _stretches(numbered: Numbered, starts: Set[int]) -> list[Numbered]:
         if after - before > 1 or after in starts
     ]
     return [numbered[start:end] for start, end in pairwise([0, *ends, len(numbered)]) if end > start]
-
-
-def _described(row: Row) -> str:
-    """What a hover label says; plotly takes tags and entities in it for its own."""
-    name = row.file if len(row.file) <= _LONGEST_NAME else f"…{row.file[1 - _LONGEST_NAME :]}"
-    if row.roll_deg is None:
-        return f"{html.escape(name)}<br>failed"
-    interval = "" if row.roll_ci95_deg is None else f" ± {degrees(row.roll_ci95_deg, 3, sign=False)}"
-    doubt = "<br>suspect" if row.status == "suspect" else ""
-    return f"{html.escape(name)}<br>{degrees(row.roll_deg, 3)}{interval}{doubt}"

@@ -1,13 +1,17 @@
 """What a result says as a whole, in numbers and in words."""
 
+import posixpath
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from datetime import datetime, timezone
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from rollcli.files.results import STATUSES, Row
+from rollcli.rig.words import decimals
 
 
 @dataclass(frozen=True)
@@ -46,6 +50,31 @@ def degrees(angle: float | None, digits: int = 2, *, sign: bool = True) -> str:
         return "–"
     text = f"{angle:+.{digits}f}" if sign and round(angle, digits) else f"{abs(angle):.{digits}f}"
     return text.replace("-", "−") + "°"
+
+
+def with_interval(angle: float | None, half_width: float | None) -> str:
+    """Return an angle with the half-width of its interval, degrees, and as many decimals as that is worth."""
+    digits = decimals(half_width)
+    half = "" if half_width is None else f" ± {degrees(half_width, digits, sign=False)}"
+    return degrees(angle, digits) + half
+
+
+def input_folders(rows: Sequence[Row]) -> list[str]:
+    """List the folders that the frames lie in, in order of appearance; "." is where `estimate` ran."""
+    names = [name for row in rows for name in (row.file, row.right_file) if name]
+    return list(dict.fromkeys(posixpath.dirname(name) or "." for name in names))
+
+
+def written_at(result: str) -> str:
+    """Return when the result was written, UTC, in words; "" for a stream or an object store.
+
+    The page holds no date of its own: the same result gives the same page.
+    """
+    try:
+        seconds = Path(result).stat().st_mtime
+    except (OSError, ValueError):
+        return ""
+    return datetime.fromtimestamp(seconds, timezone.utc).strftime("%Y-%m-%d %H:%M UTC")
 
 
 def option_lines(run: Mapping[str, Any] | None) -> list[tuple[str, str]]:

@@ -25,7 +25,7 @@ def answer(estimate: Estimate, quantity: Quantity = ROLL, *, change: bool = Fals
     """
     if estimate.value is None:
         return "unknown"
-    digits = _digits(estimate.ci95)
+    digits = decimals(estimate.ci95)
     sign = "" if quantity is HEIGHT and not change else "+"
     text = f"{estimate.value:{sign}.{digits}f}"
     if float(text) == 0:
@@ -34,8 +34,8 @@ def answer(estimate: Estimate, quantity: Quantity = ROLL, *, change: bool = Fals
     return f"{text}{half}{quantity.unit}"
 
 
-def _digits(half: float | None) -> int:
-    """As many decimals as the interval is worth."""
+def decimals(half: float | None) -> int:
+    """Return as many decimals as the half-width of an interval is worth: two where there is none."""
     if half is None or not half > 0:
         return _FEWEST_DIGITS
     return min(_MOST_DIGITS, max(_FEWEST_DIGITS, -math.floor(math.log10(half))))

@@ -114,7 +114,7 @@ def test_hovering_shows_the_name_of_the_frame_as_text(opened):
         page.mouse.move(x + 1, y + 1)
         label = page.locator("#roll .hovertext", has_text=name)
         label.wait_for()
-        status = "failed" if name == "maps/frame5.png" else "°"
+        status = "failedmaps/frame5.png: is empty" if name == "maps/frame5.png" else "°"
         assert label.text_content().replace(name, "", 1).endswith(status)
 
 

@@ -1,12 +1,14 @@
 """What the charts hold."""
 
+import html
+
 import numpy as np
 import pytest
 
 from rollcli.report.axis_range import outside, view
 from rollcli.report.histogram import histogram
 from rollcli.report.roll_chart import roll_chart
-from rollcli.report.summary import degrees, option_lines, summarize
+from rollcli.report.summary import degrees, option_lines, summarize, with_interval
 from rollcli.rig.assess import assess_rig
 from tests.report.results import row
 
@@ -49,11 +51,31 @@ def test_no_line_is_drawn_across_a_suspect_frame(suspects, broken):
 
 def test_hover_labels_show_names_as_they_are():
     labels = traces(ROWS)["roll"]["customdata"]
-    assert labels[0] == "a.png<br>+1.000° ± 0.100°"
-    assert labels[-2].startswith("&lt;b&gt;g&lt;/b&gt;&amp;amp;.png<br>0.000°")
+    assert labels[0] == "a.png<br>+1.00° ± 0.10°"
+    assert labels[-2].startswith("&lt;b&gt;g&lt;/b&gt;&amp;amp;.png<br>0.00°")
     long = traces([row("folder/" * 20 + "frame.png")])["roll"]["customdata"][0].partition("<br>")[0]
     assert len(long) == 44
     assert long.endswith("folder/frame.png")
+
+
+def test_hover_labels_say_why_a_frame_is_suspect_or_has_failed_in_lines_that_fit():
+    reason = "the interval is wide: ± 3.10 degrees; <b>few</b> pixels; " * 9
+    doubtful = [row("a.png", 1.0, 0.004, "suspect", reason), row("b.png", None, message="b.png: is empty")]
+    suspect = traces(doubtful)["suspect"]["customdata"][0].split("<br>")
+    assert suspect[:3] == ["a.png", "+1.000° ± 0.004°", "suspect"]
+    assert suspect[3] == "the interval is wide: ± 3.10 degrees;"
+    assert "&lt;b&gt;few&lt;/b&gt;" in " ".join(suspect)
+    assert max(len(html.unescape(line)) for line in suspect) <= 44
+    assert len(suspect) == 8
+    assert traces(doubtful)["failed"]["customdata"] == ["b.png<br>failed<br>b.png: is empty"]
+
+
+@pytest.mark.parametrize(
+    ("half", "words"),
+    [(None, "+2.35°"), (0.5, "+2.35° ± 0.50°"), (0.012, "+2.35° ± 0.01°"), (0.0042, "+2.346° ± 0.004°")],
+)
+def test_an_angle_has_as_many_decimals_as_its_interval_is_worth(half, words):
+    assert with_interval(2.3456, half) == words
 
 
 def test_every_angle_within_the_view_is_in_the_histogram():

@@ -50,4 +50,4 @@ def test_the_band_is_the_interval_and_breaks_where_there_is_none():
 
 def test_file_names_are_no_tags():
     label = traces(pose_charts(ROWS)[0])["pitch"]["customdata"][3]
-    assert label == "&lt;b&gt;.png<br>3.400 degrees"
+    assert label == "&lt;b&gt;.png<br>3.40 degrees"

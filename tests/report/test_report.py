@@ -6,6 +6,7 @@ import os
 import re
 import shutil
 from concurrent.futures import ThreadPoolExecutor
+from datetime import datetime, timezone
 
 import numpy as np
 import pytest
@@ -68,6 +69,24 @@ def test_the_summary_says_options_version_counts_and_the_sign(folder):
     assert "median roll" in text
     assert "its right end is up" in text
     assert "Every frame that has an angle." in text
+    assert "inputs from maps" in text
+    written = datetime.fromtimestamp((folder / "out" / "rolls.csv").stat().st_mtime, timezone.utc)
+    assert f"result written {written:%Y-%m-%d %H:%M} UTC" in text
+
+
+def test_a_suspect_frame_says_why_beside_its_pictures(folder):
+    rows = [row("maps/frame0.png", status="suspect", message="the <interval> is wide: ± 0.05 degrees")]
+    write_result(folder / "rolls.csv", rows)
+    assert report(folder, "rolls.csv").status == 0
+    figure = page_of(folder).partition("<figure>")[2].partition("</figure>")[0]
+    assert "the &lt;interval&gt; is wide: ± 0.05 degrees" in figure
+
+
+def test_the_summary_names_the_folders_of_the_inputs_and_counts_what_is_left_out(folder):
+    write_result(folder / "rolls.csv", [row(f"drive{i}/a.png") for i in range(8)])
+    assert report(folder, "rolls.csv", "--gallery", "0").status == 0
+    text = page_of(folder)
+    assert "<code>drive5</code> and 2 more folders" in text
 
 
 def test_any_number_of_workers_gives_the_same_page(folder):
