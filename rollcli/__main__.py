@@ -1,7 +1,10 @@
 """``python -m rollcli``: the same program as ``rollcli``."""
 
+import contextlib
+import os
 import sys
 from types import TracebackType
+from typing import NoReturn
 
 from rollcli.errors import ExitStatus
 from rollcli.messages import let_stderr_fail, say
@@ -19,9 +22,25 @@ def main() -> None:
         program(prog_name="rollcli")
     except KeyboardInterrupt:  # before there was anything to resume
         say("interrupted")
-        sys.exit(ExitStatus.INTERRUPTED)
+        _end_interrupted()
+    except SystemExit as end:
+        if end.code == ExitStatus.INTERRUPTED:
+            _end_interrupted()
+        raise
     finally:
         ignore_signals()
+
+
+def _end_interrupted() -> NoReturn:
+    """Exit with the status of an interrupted run, at once.
+
+    Python itself would end by SIGINT when the interrupt has passed through `exec`, which every dataclass
+    calls while it is made, although it was handled.
+    """
+    if sys.stdout is not None:
+        with contextlib.suppress(OSError):
+            sys.stdout.flush()
+    os._exit(ExitStatus.INTERRUPTED)
 
 
 def _say_in_one_line(kind: type[BaseException], error: BaseException, at: TracebackType | None) -> None:

@@ -106,3 +106,15 @@ def test_choices_ignore_case(tmp_path):
     upper = rollcli("estimate", "maps", "--method", "EXACT", "--road", "All", cwd=tmp_path)
     assert upper.out == rollcli("estimate", "maps", "--method", "exact", "--road", "all", cwd=tmp_path).out
     assert ",exact," in upper.out
+
+
+def test_an_interrupt_while_a_module_loads_is_status_130(tmp_path):
+    code = """
+import rollcli.cli.main
+rollcli.cli.main.main = lambda **_: exec("raise KeyboardInterrupt")
+from rollcli.__main__ import main
+main()
+"""
+    line = [sys.executable, "-c", code]
+    done = subprocess.run(line, cwd=tmp_path, env=environment(), capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (130, "rollcli: interrupted\n")
