@@ -150,14 +150,13 @@ def horizon_row(tangent: Tangent, calibration: Calibration) -> float:
 def taken_as_exact(tangent: Tangent, calibration: Calibration, pitch: float) -> str:
     """Say in one line what the intervals cannot know: errors of the calibration, and what they would do."""
     turn = math.degrees(math.cos(pitch) ** 2)
-    text = (
-        "pitch is given the calibration: "
-        f"{turn / calibration.fy:.3f} degrees per px of cy, "
+    height = calibration.baseline is not None
+    return (
+        f"{'pitch and height take' if height else 'pitch takes'} the calibration as exact: "
+        f"{turn / calibration.fy:.3f} degrees of pitch per px of cy, "
         f"{0.1 * turn / (calibration.fx * tangent.slope):.3f} per 0.1 px of disparity (vergence)"
+        f"{', 1 % of height per 1 % of baseline' if height else ''}"
     )
-    if calibration.baseline is None:
-        return text
-    return text.replace("pitch is", "pitch and height are", 1) + "; height 1 % per 1 % of baseline"
 
 
 def _joined(message: str, more: str) -> str:
