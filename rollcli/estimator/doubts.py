@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from rollcli.estimator.energy import Energy
+from rollcli.estimator.interval import Interval
 from rollcli.estimator.road.find import Road
 from rollcli.estimator.road.surface import Surface
 from rollcli.estimator.solvers.certificate import CertifiedSolution
@@ -30,8 +31,9 @@ class Evidence:
         The road's pixels, or a sample of those used; None where the map is too small for one.
     max_roll : float
         The largest abs(roll) considered, radians.
-    ci95 : float or None
-        Half-width of the interval, radians.
+    max_interval : float
+        The half-width from which an interval is too wide to be ok, radians.
+    interval : Interval or None
     """
 
     energy: Energy
@@ -39,7 +41,8 @@ class Evidence:
     road: Road | None
     surface: Surface | None
     max_roll: float
-    ci95: float | None
+    max_interval: float
+    interval: Interval | None
 
 
 def doubts_of(evidence: Evidence, tuning: DoubtTuning) -> list[str]:
@@ -89,12 +92,6 @@ def _rival_plane(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
         yield "another plane, with another roll, explains the map nearly as well"
 
 
-def _noise(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
-    road = evidence.road
-    if road and road.noise > tuning.most_noise:
-        yield f"noise fills {road.noise:.0%} of what lies ahead"
-
-
 def _fit_moved(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
     moved = evidence.surface.moved if evidence.surface else 0.0
     if moved > tuning.longest_move:
@@ -107,10 +104,16 @@ def _at_bound(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
         yield "the roll is at its bound, --max-roll"
 
 
+def _uncertain(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
+    interval = evidence.interval
+    if interval and interval.noise > tuning.noise_share * evidence.max_interval:
+        yield f"noise and unevenness leave the angle open: ±{math.degrees(interval.noise):.2f} degrees"
+
+
 def _wide_interval(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
-    ci95 = evidence.ci95
-    if ci95 is not None and ci95 > tuning.widest_interval:
-        yield f"the interval is wide: ±{math.degrees(ci95):.2f} degrees"
+    interval = evidence.interval
+    if interval and interval.half_width > evidence.max_interval:
+        yield f"the interval is wide: ±{math.degrees(interval.half_width):.2f} degrees"
 
 
 Reason = Callable[[Evidence, DoubtTuning], Iterator[str]]
@@ -121,8 +124,8 @@ REASONS: tuple[Reason, ...] = (
     _grows_upward,
     _little_road,
     _rival_plane,
-    _noise,
     _fit_moved,
     _at_bound,
+    _uncertain,
     _wide_interval,
 )

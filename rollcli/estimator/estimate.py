@@ -5,9 +5,16 @@ import math
 from numpy.typing import ArrayLike
 
 from rollcli.estimator.doubts import Evidence, doubts_of
-from rollcli.estimator.interval import half_width, jackknife
+from rollcli.estimator.interval import interval_of, jackknife
 from rollcli.estimator.load_method import load_solver
-from rollcli.estimator.methods import AREAS, DEFAULT_SOLVER, MAX_ROLL_DEG, LearningRate, SolverSettings
+from rollcli.estimator.methods import (
+    AREAS,
+    DEFAULT_SOLVER,
+    MAX_INTERVAL_DEG,
+    MAX_ROLL_DEG,
+    LearningRate,
+    SolverSettings,
+)
 from rollcli.estimator.moments import Grid
 from rollcli.estimator.request import Request
 from rollcli.estimator.result import RollEstimate
@@ -28,6 +35,7 @@ def estimate_roll(
     lambda0: LearningRate = DEFAULT_SOLVER.lambda0,
     tolerance: float = DEFAULT_SOLVER.tolerance,
     max_roll: float = math.radians(MAX_ROLL_DEG),
+    max_interval: float = math.radians(MAX_INTERVAL_DEG),
     seed: int = 0,
     road_mask: bool = False,
     tuning: Tuning = TUNING,
@@ -51,6 +59,9 @@ def estimate_roll(
         delta_theta of the paper, radians.
     max_roll : float
         The largest abs(roll) that road finding considers, radians.
+    max_interval : float
+        Half-width of the 95 % interval above which an angle is doubted, radians; so is one of which noise
+        alone makes a third of that.
     seed : int
         Of road finding.
     road_mask : bool
@@ -79,20 +90,21 @@ def estimate_roll(
     >>> estimate.status, round(math.degrees(estimate.theta), 3)
     ('ok', 3.0)
     """
-    request = Request(method, model, road, SolverSettings(tolerance, lambda0), max_roll, seed, tuning)
+    settings = SolverSettings(tolerance, lambda0)
+    request = Request(method, model, road, settings, max_roll, max_interval, seed, tuning)
     checked = CheckedMap.of(disparity, mask)
     pixels = select_pixels(checked, request)
     certified = _solve(pixels, request)
     theta, surface = certified.solution.theta, pixels.surface
     knife = None if surface is None else jackknife(surface, theta, tuning.interval)
-    ci95 = None if knife is None else half_width(knife, theta, tuning.interval)
-    evidence = Evidence(pixels.energy, certified, pixels.road, surface, max_roll, ci95)
+    interval = None if knife is None else interval_of(knife, theta, tuning.interval)
+    evidence = Evidence(pixels.energy, certified, pixels.road, surface, max_roll, max_interval, interval)
     doubts = doubts_of(evidence, tuning.doubts)
     alpha = pixels.energy.parabola(theta)
     height, width = checked.values.shape
     return RollEstimate(
         theta=theta,
-        ci95=ci95,
+        ci95=None if interval is None else interval.half_width,
         status="suspect" if doubts else "ok",
         message="; ".join(doubts + _notes(certified, request)),
         method=method,
@@ -105,6 +117,7 @@ def estimate_roll(
         road_fraction=pixels.share,
         width=width,
         height=height,
+        camber=None if knife is None else knife.camber,
         tangent=touch(alpha, theta, Grid.of_shape(height, width), surface, knife),
         road_mask=pixels.mask(checked) if road_mask else None,
     )

@@ -1,9 +1,10 @@
-"""How sure the angle is: a delete-a-group jackknife over bands and columns of the road.
+"""How sure the angle is: a jackknife over the road's pixels, and how much its parts disagree.
 
 Neighbouring disparities are not independent, and what a road's parabola misses is smooth: the textbook
 standard error is far too small. Leaving out whole bands (along the road) and whole columns (across it) shows
-how far both noise and misfit move the angle. The interval assumes that the pixels are road and that the road
-is not cambered: neither shows in the residuals.
+how far both noise and misfit move the angle. On real roads most of the error is neither: the lane, the whole
+road, its near and its far part have angles of their own, and how far these are apart tells how far the choice
+matters. The interval assumes that the pixels used are road, and that the rig is calibrated.
 
 [Jackknife]: Kott, "The delete-a-group jackknife", Journal of Official Statistics 17(4), 2001. [Freedom]:
 Satterthwaite, "An approximate distribution of estimates of variance components", Biometrics Bulletin 2(6),
@@ -17,18 +18,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from rollcli.estimator.moments import Floats
-from rollcli.estimator.road.model import Reals
-from rollcli.estimator.road.robust_fit import solvable
+from rollcli.estimator.road.model import Reals, RoadModel
+from rollcli.estimator.road.robust_fit import solve_normal
 from rollcli.estimator.road.surface import Surface
 from rollcli.estimator.tuning import IntervalTuning
 
 # 97.5 % quantiles of Student's t for 1, 2, ... degrees of freedom
 _T975 = (12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228, 2.201, 2.179)
+_THETA, _CAMBER = 3, 4  # columns of the design
 
 
 @dataclass(frozen=True)
 class Jackknife:
     """How (a0, a1, a2, theta) change as a group of pixels is left out; normalised coordinates, radians.
+
+    The camber is free: where the pixels do not determine it, the angle changes the more.
 
     Attributes
     ----------
@@ -38,26 +42,58 @@ class Jackknife:
         The textbook covariance, for as many pixels as could be independent.
     freedom : tuple of float
         Degrees of freedom of theta's change over bands and over columns.
+    lateral : float
+        By how much the theta of the lane ahead differs from that of all pixels.
+    depth : float
+        By how much the theta of the near half differs from that of the far half.
+    bend : float
+        By how much the camber that was fitted moves theta.
+    camber : float or None
+        Curvature across the road, 1/(camera height); None where the pixels tell less of it than what is known
+        of roads.
     """
 
     bands: Floats
     columns: Floats
     white: Floats
     freedom: tuple[float, float]
+    lateral: float
+    depth: float
+    bend: float
+    camber: float | None
 
     def spreads(self) -> tuple[float, float, float]:
         """Return the half-widths of theta's interval, radians: by bands, by columns, and the textbook's."""
         bands, columns = (
-            _student(freedom) * math.sqrt(float(np.square(changes[:, 3]).sum()))
+            _student(freedom) * math.sqrt(float(np.square(changes[:, _THETA]).sum()))
             for changes, freedom in zip((self.bands, self.columns), self.freedom, strict=True)
         )
-        return bands, columns, 1.96 * math.sqrt(self.white[3, 3])
+        return bands, columns, 1.96 * math.sqrt(self.white[_THETA, _THETA])
 
 
-def half_width(jackknife: Jackknife, theta: float, tuning: IntervalTuning) -> float:
-    """Return the half-width of the 95 % interval of the roll angle, radians."""
+@dataclass(frozen=True)
+class Interval:
+    """The 95 % interval of the roll, radians.
+
+    Attributes
+    ----------
+    noise : float
+        The part of the half-width that noise and misfit make.
+    half_width : float
+        All of it: with the part that the choice of surface makes.
+    """
+
+    noise: float
+    half_width: float
+
+
+def interval_of(jackknife: Jackknife, theta: float, tuning: IntervalTuning) -> Interval:
+    """Return the 95 % interval of the roll angle."""
     bands, columns, white = jackknife.spreads()
-    return tuning.factor * slant(theta, tuning) * math.sqrt(bands**2 + columns**2 + white**2)
+    noise = tuning.factor * slant(theta, tuning) * math.sqrt(bands**2 + columns**2 + white**2)
+    lateral, depth = tuning.lateral * jackknife.lateral, tuning.depth * jackknife.depth
+    bend = tuning.bend * jackknife.bend
+    return Interval(noise, math.sqrt(noise**2 + lateral**2 + depth**2 + bend**2))
 
 
 def slant(theta: float, tuning: IntervalTuning) -> float:
@@ -70,7 +106,7 @@ def slant(theta: float, tuning: IntervalTuning) -> float:
 
 
 def jackknife(surface: Surface, theta: float, tuning: IntervalTuning) -> Jackknife:
-    """Leave out one group of the road's pixels after the other [Jackknife].
+    """Leave out one group of the road's pixels after the other [Jackknife], and compare its parts.
 
     Parameters
     ----------
@@ -84,36 +120,82 @@ def jackknife(surface: Surface, theta: float, tuning: IntervalTuning) -> Jackkni
     -------
     Jackknife
     """
-    model = surface.model._replace(theta=theta)
+    model, weights = surface.model._replace(theta=theta), surface.weights
     across, along = model.across(surface.x, surface.y), model.along(surface.x, surface.y)
-    rows = np.empty((5, len(along)))
+    cambered = math.isfinite(surface.camber_precision)
+    plain = model.disparity_along(along)
+    rows = np.empty((6, len(along)))
     rows[0], rows[1], rows[2] = 1, along, along * along * surface.parabolic
     rows[3] = model.turning(across, along)
-    rows[4] = surface.d - model.disparity_along(along)
-    bands = _by_group(rows, surface.weights, along, np.ones_like(along), tuning.groups)
-    leverage = surface.weights * np.square(rows[3])
-    columns = _by_group(rows, surface.weights, across, leverage, tuning.groups)
+    rows[4] = model.bulge(across, plain) if cambered else 0
+    rows[5] = surface.d - plain
+    bands = _by_group(rows, weights, along, np.ones_like(along), tuning.groups)
+    columns = _by_group(rows, weights, across, weights * np.square(rows[3]), tuning.groups)
     total = bands.sum(0)
-    normal = total[:4, :4]
-    inverse = np.linalg.inv(solvable(normal))
-    step = inverse @ total[:4, 4]  # from the surface's parabola to the best one
+    normal = total[:5, :5].copy()
+    prior = surface.camber_precision if cambered else 0.0
+    normal[_CAMBER, _CAMBER] += prior
+    inverse = solve_normal(normal, np.eye(5))
+    step = inverse @ total[:5, 5]  # from the surface's parabola to the best one
     independent = max(1.0, total[0, 0] / tuning.independent_pixels)
-    rest = max(0.0, total[4, 4] - step @ total[:4, 4])
+    rest = max(0.0, total[5, 5] - step @ total[:5, 5])
     white: Floats = inverse * (rest / total[0, 0] * independent)
     if not surface.parabolic:  # there is no a2 to err
         white[2] = white[:, 2] = 0
     return Jackknife(
         bands=_changes(bands, normal, step),
         columns=_changes(columns, normal, step),
-        white=white,
+        white=white[:4, :4],
         freedom=(_freedom(bands, normal), _freedom(columns, normal)),
+        lateral=_lateral(rows, weights, total, model.side(surface.x, surface.y, plain), tuning),
+        depth=_depth(rows, weights, total, along, tuning),
+        bend=_bend(total, model.camber),
+        camber=_camber(model, prior * float(inverse[_CAMBER, _CAMBER])) if cambered else None,
     )
 
 
-def _by_group(rows: Floats, weights: Floats, position: Reals, share: Floats, groups: int) -> Floats:
-    """Return the weighted products (groups, 5, 5) of groups of equal total `share`, cut along `position`.
+def _lateral(rows: Floats, weights: Floats, total: Floats, side: Reals, tuning: IntervalTuning) -> float:
+    """Return by how much the theta of the lane ahead differs from that of all pixels."""
+    lane = weights * np.exp(-np.minimum(np.square(np.square(side)), 80))
+    return abs(_theta_of((rows * lane) @ rows.T, total, tuning) - _theta_of(total, total, tuning))
 
-    Of the five rows four are the design's; with the fifth, the residuals, a product is a group's normal
+
+def _depth(rows: Floats, weights: Floats, total: Floats, along: Reals, tuning: IntervalTuning) -> float:
+    """Return by how much the theta of the near half differs from that of the far half."""
+    middle = float(weights @ along) / float(weights.sum())
+    near = weights / (1 + np.exp(np.clip((middle - along) / tuning.depth_fade, -50, 50)))
+    products = (rows * near) @ rows.T
+    return abs(_theta_of(products, total, tuning) - _theta_of(total - products, total, tuning))
+
+
+def _theta_of(part: Floats, total: Floats, tuning: IntervalTuning) -> float:
+    """Return how far the theta of a part lies from the fit, at its camber, from the part's products.
+
+    A little of the whole is added: where a part is nearly empty, it says what the whole says.
+    """
+    products = part + tuning.whole_share * total
+    products[_CAMBER, :5] = products[:5, _CAMBER] = 0
+    return float(solve_normal(products[:5, :5], products[:5, 5:])[_THETA, 0])
+
+
+def _bend(total: Floats, camber: float) -> float:
+    """Return by how much theta would differ without the camber."""
+    products = total[:5, :5].copy()
+    products[_CAMBER] = products[:, _CAMBER] = 0
+    pull = total[:5, _CAMBER : _CAMBER + 1].copy()
+    pull[_CAMBER] = 0
+    return abs(camber * float(solve_normal(products, pull)[_THETA, 0]))
+
+
+def _camber(model: RoadModel, prior_share: float) -> float | None:
+    """Return the camber that the pixels alone ask for; None where the prior knows more than they."""
+    return model.camber / (1 - prior_share) if prior_share < 0.5 else None
+
+
+def _by_group(rows: Floats, weights: Floats, position: Reals, share: Floats, groups: int) -> Floats:
+    """Return the weighted products (groups, 6, 6) of groups of equal total `share`, cut along `position`.
+
+    Of the six rows five are the design's; with the sixth, the residuals, a product is a group's normal
     equations, right-hand side included.
     """
     order = np.argsort(position)
@@ -127,9 +209,9 @@ def _by_group(rows: Floats, weights: Floats, position: Reals, share: Floats, gro
 
 def _changes(groups: Floats, normal: Floats, step: Floats) -> Floats:
     """Return how the four parameters change as one group after the other is left out, shape (groups, 4)."""
-    parts, pulls = groups[:, :4, :4], groups[:, :4, 4]
-    changes = np.linalg.solve(solvable(normal - parts), (pulls - parts @ step)[..., None])
-    return np.asarray(changes[..., 0], np.float64)
+    parts, pulls = groups[:, :5, :5], groups[:, :5, 5]
+    changes = solve_normal(normal - parts, (pulls - parts @ step)[..., None], normal)
+    return np.asarray(changes[:, :4, 0], np.float64)
 
 
 def _freedom(groups: Floats, normal: Floats) -> float:
@@ -137,7 +219,7 @@ def _freedom(groups: Floats, normal: Floats) -> float:
 
     1 / sum share^2 is the number of equal groups that would tell as much; one goes to the mean.
     """
-    leverage = groups[:, 3, 3] / normal[3, 3]
+    leverage = groups[:, _THETA, _THETA] / normal[_THETA, _THETA]
     return max(1.0, 1 / float(np.square(leverage).sum()) - 1)
 
 

@@ -13,6 +13,7 @@ from typing import Literal, NamedTuple
 LAMBDA0 = 26.0  # the fewest iterations in [GD] Fig. 3
 TOLERANCE_DEG = 1e-4  # the finest of the paper's four
 MAX_ROLL_DEG = 45.0
+MAX_INTERVAL_DEG = 0.75
 MAX_ROLL_LIMIT_DEG = 89.0  # a plane of 90 degrees has no finite slope across
 
 LearningRate = float | Literal["auto"]

@@ -24,6 +24,7 @@ class Request:
     road: str
     solver: SolverSettings
     max_roll: float
+    max_interval: float
     seed: int
     tuning: Tuning
 
@@ -40,6 +41,11 @@ class Request:
             raise UsageError(
                 f"a largest roll of {math.degrees(self.max_roll):g} degrees: "
                 f"give more than 0, at most {MAX_ROLL_LIMIT_DEG:g}"
+            )
+
+        if not self.max_interval > 0:
+            raise UsageError(
+                f"a widest interval of {math.degrees(self.max_interval):g} degrees: give a positive angle"
             )
 
     @property

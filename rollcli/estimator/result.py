@@ -17,8 +17,8 @@ class RollEstimate:
     theta : float
         Roll, radians, in (-pi/2, pi/2]; positive: the rig is turned counter-clockwise seen from behind.
     ci95 : float or None
-        Half-width of the 95 % interval, radians, assuming the pixels used are road and the road is not
-        cambered; None where the map is too small to tell.
+        Half-width of the 95 % interval, radians, assuming the pixels used are road; None where the map is
+        too small to tell.
     status : str
         "ok", or "suspect": `message` says why the angle is doubtful.
     message : str
@@ -36,6 +36,9 @@ class RollEstimate:
         The share of all pixels that is valid, and the share of the valid ones that was used as road.
     width, height : int
         Of the map, px.
+    camber : float or None
+        Curvature across the road, 1/(camera height): x camera heights to the side, the surface is higher by
+        camber/2 x^2 camera heights. Negative: crowned. None where the map does not determine it.
     tangent : Tangent
         The line that touches the road's parabola amid the pixels used.
     pitch, pitch_ci95 : float or None
@@ -61,6 +64,7 @@ class RollEstimate:
     road_fraction: float
     width: int
     height: int
+    camber: float | None
     tangent: Tangent
     pitch: float | None = None
     pitch_ci95: float | None = None

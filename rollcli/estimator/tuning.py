@@ -8,14 +8,24 @@ from rollcli.estimator.road.tuning import RoadTuning
 
 @dataclass(frozen=True)
 class IntervalTuning:
-    """Numbers of `half_width`."""
+    """Numbers of `jackknife` and `interval_of`."""
 
     groups: int = 6
     """Bands and columns of the jackknife. More are less independent, fewer have fewer degrees of freedom."""
     independent_pixels: int = 200
     """Pixels that could be independent: neighbouring ones repeat each other, more do not tell more."""
-    factor: float = 0.53
-    """Kappa. tests/benchmarks/fit_interval.py finds 0.42; maps of other matchers ask for more."""
+    factor: float = 0.5
+    """Of the jackknife's half-width."""
+    lateral: float = 3.0
+    """Of the difference between the lane's angle and that of all pixels."""
+    depth: float = 0.5
+    """Of the difference between the near half's angle and the far half's."""
+    bend: float = 2.0
+    """Of the angle by which the camber moves theta: a crown is no exact parabola."""
+    depth_fade: float = 0.02
+    """Units over which near turns into far."""
+    whole_share: float = 0.02
+    """Share of the whole that is added to a part, which may be nearly empty."""
     slant: float = 1.0
     """Growth of the interval from no roll to a right angle, by the sine of the roll."""
 
@@ -32,14 +42,12 @@ class DoubtTuning:
     """`Road.score` below which little of what lies ahead looks like a road."""
     rival_share: float = 0.75
     """Share of the road's score from which another plane explains the map nearly as well."""
-    most_noise: float = 0.25
-    """Share of the corridor that noise may fill."""
     longest_move: float = math.radians(1)
     """Radians by which the fit to the road's pixels may move the roll of its plane."""
     bound_share: float = 0.99
     """Share of the largest roll from which a roll is at its bound."""
-    widest_interval: float = math.radians(0.25)
-    """Half-width of an interval that is still narrow, radians."""
+    noise_share: float = 1 / 3
+    """Share of the widest interval that noise alone may make."""
 
 
 @dataclass(frozen=True)

@@ -2,11 +2,13 @@
 
     python tests/benchmarks/fit_interval.py [FRAMES]
 
-Prints, for several counts of independent pixels, the factor kappa with which 95 % of the intervals hold the
-true roll on the first half of the scenes, and the coverage it gives on the second half, by kind of scene.
-Half of the frames have rolls within +-10, half within +-35 degrees.
+Prints the factor of the noise with which 95 % of the intervals hold the true roll on the first half of the
+scenes, and the coverage that it and the factor in use give on the second half, by kind of scene. Half of the
+frames have rolls within +-10, half within +-35 degrees; half of the roads are flat, the others have all cross
+sections.
 """
 
+import itertools
 import math
 import sys
 
@@ -16,22 +18,30 @@ from matched import matched
 from rollcli.errors import EstimationError
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.interval import jackknife, slant
-from rollcli.estimator.methods import DEFAULT_SOLVER, MAX_ROLL_DEG
+from rollcli.estimator.methods import DEFAULT_SOLVER, MAX_INTERVAL_DEG, MAX_ROLL_DEG
 from rollcli.estimator.request import Request
 from rollcli.estimator.selection import select_pixels
 from rollcli.estimator.tuning import TUNING
 from rollcli.estimator.validity import CheckedMap
 
 FIT_SEEDS, JUDGE_SEEDS = (81, 82), (83, 84)
-REQUEST = Request("gd", "parabola", "auto", DEFAULT_SOLVER, math.radians(MAX_ROLL_DEG), 0, TUNING)
-COUNTS = (50, 100, 200, 400, 1000, 2000)
+REQUEST = Request(
+    "gd",
+    "parabola",
+    "auto",
+    DEFAULT_SOLVER,
+    max_roll=math.radians(MAX_ROLL_DEG),
+    max_interval=math.radians(MAX_INTERVAL_DEG),
+    seed=0,
+    tuning=TUNING,
+)
 
 
 def terms(frames: int, seeds: tuple[int, int]) -> tuple[np.ndarray, list[str]]:
-    """Rows of (error, bands, columns, white for one pixel, pixels, slant), degrees; and the scenes."""
-    rows, scenes = [], []
-    for seed, span in zip(seeds, (10, 35), strict=True):
-        for disparity, roll_deg, scene in matched(frames // 2, seed, span):
+    """Rows of (error, noise before the factor, choice of surface), degrees; and the kinds of scene."""
+    tuning, rows, kinds = TUNING.interval, [], []
+    for (seed, span), section in itertools.product(zip(seeds, (10, 35), strict=True), ("flat", "mixed")):
+        for disparity, roll_deg, scene in matched(frames // 4, seed, span, cross_section=section):
             try:
                 theta = estimate_roll(disparity).theta
                 surface = select_pixels(CheckedMap.of(disparity, None), REQUEST).surface
@@ -39,37 +49,30 @@ def terms(frames: int, seeds: tuple[int, int]) -> tuple[np.ndarray, list[str]]:
                 print(f"{scene} {roll_deg:.2f}: {error}")
                 continue
             assert surface is not None
-            bands, columns, white = np.degrees(jackknife(surface, theta, TUNING.interval).spreads())
-            pixels = max(1.0, surface.weights.sum() / TUNING.interval.independent_pixels)
+            knife = jackknife(surface, theta, tuning)
+            noise = slant(theta, tuning) * math.hypot(*knife.spreads())
+            choice = math.hypot(tuning.lateral * knife.lateral, tuning.depth * knife.depth)
             error = abs(math.degrees(theta) - roll_deg)
-            weight = surface.weights.sum()
-            wider = slant(theta, TUNING.interval)
-            rows.append((error, bands, columns, white / math.sqrt(pixels), weight, wider))
-            scenes.append(scene)
-    return np.array(rows), scenes
-
-
-def widths(rows: np.ndarray, count: float) -> np.ndarray:
-    """Half-widths before the factor, degrees."""
-    _, bands, columns, white, pixels, wider = rows.T
-    return wider * np.sqrt(bands**2 + columns**2 + white**2 * np.maximum(1, pixels / count))
+            rows.append((error, math.degrees(noise), math.degrees(choice)))
+            kinds.append(f"{scene} {section}")
+    return np.array(rows), kinds
 
 
 def main() -> None:
-    """Print one line for each count."""
+    """Print the factor found, and the coverage of that and of the one in use."""
     frames = int(sys.argv[1]) if len(sys.argv) > 1 else 400
-    fit, _ = terms(frames, FIT_SEEDS)
-    judge, scenes = terms(frames, JUDGE_SEEDS)
-    print(f"{len(fit)} scenes to fit on, {len(judge)} to judge on")
-    print(f"in use: kappa {TUNING.interval.factor} and {TUNING.interval.independent_pixels} pixels")
-    for count in COUNTS:
-        kappa = float(np.percentile(fit[:, 0] / widths(fit, count), 95))
-        half = kappa * widths(judge, count)
-        held = judge[:, 0] <= half
-        by_scene = {kind: held[[scene == kind for scene in scenes]].mean() for kind in sorted(set(scenes))}
-        kinds = "  ".join(f"{kind} {share:.2f}" for kind, share in by_scene.items())
-        print(f"{count:5d} pixels: kappa {kappa:.2f}, coverage {held.mean():.3f}", end="")
-        print(f", median half-width {np.median(half):.4f}; {kinds}")
+    error, noise, choice = terms(frames, FIT_SEEDS)[0].T
+    found = float(np.percentile(np.sqrt(np.maximum(0, error**2 - choice**2)) / noise, 95))
+    judged, kinds = terms(frames, JUDGE_SEEDS)
+    error, noise, choice = judged.T
+    print(f"{frames} scenes to fit on, {len(judged)} to judge on")
+    for name, factor in (("found", found), ("in use", TUNING.interval.factor)):
+        half = np.hypot(factor * noise, choice)
+        held = error <= half
+        by_kind = {kind: held[[each == kind for each in kinds]].mean() for kind in sorted(set(kinds))}
+        shares = "  ".join(f"{kind} {share:.2f}" for kind, share in by_kind.items())
+        print(f"{name:6}: factor {factor:.2f}, coverage {held.mean():.3f}", end="")
+        print(f", median half-width {np.median(half):.4f}; {shares}")
 
 
 if __name__ == "__main__":

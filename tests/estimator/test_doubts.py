@@ -39,9 +39,9 @@ def saddle():
     return 100 + 0.02 * u * v
 
 
-def half_noise():
-    rng = np.random.default_rng(1)
-    return np.where(rng.random(V.shape) < 0.5, rng.uniform(0, 60, V.shape), with_noise(road(4)))
+def two_halves():
+    """A road whose near half has another roll than its far half."""
+    return with_noise(np.where(V > 330, road(4), road(5.8)))
 
 
 MAPS = {
@@ -51,10 +51,13 @@ MAPS = {
     "the disparity grows upward": (lambda: road(4)[::-1], {"road": "all"}),
     "little of what lies ahead looks like a road": (lambda: np.minimum(road(-10), road(10)), {}),
     "another plane, with another roll": (lambda: np.maximum(road(-10), road(10)), {}),
-    "noise fills": (half_noise, {}),
     "the road's pixels moved the roll": (twisted_road, {}),
     "the roll is at its bound": (lambda: road(20.2), {"max_roll": math.radians(20.25)}),
-    "the interval is wide": (lambda: with_noise(np.where(np.abs(U - 320) < 40, road(4), 0), 0.8), {}),
+    "noise and unevenness leave the angle open": (
+        lambda: with_noise(np.where(np.abs(U - 320) < 40, road(4), 0), 0.8),
+        {},
+    ),
+    "the interval is wide": (two_halves, {"max_interval": math.radians(0.04)}),
 }
 
 

@@ -55,7 +55,7 @@ def test_95_percent_of_the_intervals_hold_the_true_roll():
 
 @pytest.mark.parametrize("roll_deg", [-50, 0, 30])
 def test_the_jackknife_is_what_refitting_without_each_band_gives(roll_deg):
-    request = Request("exact", "parabola", "all", DEFAULT_SOLVER, math.radians(70), 0, TUNING)
+    request = Request("exact", "parabola", "all", DEFAULT_SOLVER, math.radians(70), 0.01, 0, TUNING)
     disparity = noisy_road(np.random.default_rng(3), roll_deg)
     pixels = select_pixels(CheckedMap.of(disparity, None), request)
     surface, theta = pixels.surface, exact(pixels.energy).theta

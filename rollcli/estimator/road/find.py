@@ -35,14 +35,11 @@ class Road:
         whose horizon is far outside of the image, as that of a wall, scores less.
     rival : float
         The best score of another plane, one whose roll differs by `SearchTuning.rival_angle` or more.
-    noise : float
-        The share of the corridor that is noise: pixels that differ from their neighbours.
     """
 
     plane: NDArray[np.float64]
     score: float
     rival: float
-    noise: float
 
     @property
     def model(self) -> RoadModel:
@@ -90,7 +87,7 @@ def find_road(sample: Sample, max_roll: float, seed: int) -> Road:
     others = np.abs(_rolls(planes) - rolls[winner]) > 2 * tuning.rival_angle
     rival = max(final[far].max(initial=-1), scores[others].max(initial=-1))
     plane = fitted[winner].astype(np.float64)
-    return Road(plane, float(final[winner]), float(rival), _noise_share(sample, plane))
+    return Road(plane, float(final[winner]), float(rival))
 
 
 def road_weights(sample: Sample, plane: NDArray[np.float64], near: NDArray[np.intp]) -> Singles:
@@ -98,20 +95,6 @@ def road_weights(sample: Sample, plane: NDArray[np.float64], near: NDArray[np.in
     one = plane[None].astype(np.float32)
     weights: Singles = slope_weights(sample.slopes[:, near], sample.slope_noise, one, sample.tuning.score)[0]
     return weights
-
-
-def _noise_share(sample: Sample, plane: NDArray[np.float64]) -> float:
-    """Return the share of the plane's corridor in which neighbouring pixels disagree."""
-    tuning = sample.tuning.search
-    few = slice(None, None, max(1, len(sample.d) // tuning.third_pixels))
-    c0, c1, c2 = plane
-    x, y = sample.x[few], sample.y[few]
-    road = c0 + c1 * x + c2 * y
-    seen = road > tuning.noise_from * sample.typical
-    side = (x * c2 - y * c1)[seen] / road[seen]  # by the road's disparity, for that of noise says nothing
-    weight = np.exp(-np.square(side / sample.tuning.score.corridor))
-    noisy = weight @ (sample.coherence[few][seen] < tuning.incoherent)
-    return float(noisy / weight.sum()) if weight.sum() > 0 else 1.0
 
 
 def _varied(costs: Singles, rolls: Singles, tuning: SearchTuning) -> NDArray[np.intp]:

@@ -1,4 +1,4 @@
-"""The road's disparity: a parabola in the rolled coordinate along the road [GD eq. 1-5].
+"""The road's disparity: a parabola in the rolled coordinate along the road [GD eq. 1-5], and camber.
 
 [GD]: Fan, Wang, Liu, Pitas, "A Robust Roll Angle Estimation Algorithm Based on Gradient Descent",
 arXiv:1906.01894.
@@ -14,8 +14,11 @@ Reals = NDArray[np.floating[Any]]
 Coordinate = TypeVar("Coordinate", float, Reals)
 
 
+_FARTHEST = 4.0  # camera heights to the side; camber is not extrapolated beyond
+
+
 class RoadModel(NamedTuple):
-    """A road d = a0 + a1 along + a2 along^2, rolled by theta.
+    """A road d = a0 + a1 along + a2 along^2, rolled by theta, and what camber adds to it.
 
     Every method keeps the dtype of its arrays: single precision in, single precision out.
 
@@ -25,10 +28,13 @@ class RoadModel(NamedTuple):
         Roll, radians.
     alpha : tuple of float
         (a0, a1, a2), px per unit, unit squared of the coordinates x and y.
+    camber : float
+        Curvature across the road, 1/(camera height): it rises by camber/2 side^2. Negative: crowned.
     """
 
     theta: float
     alpha: tuple[float, float, float]
+    camber: float = 0.0
 
     @classmethod
     def of_plane(cls, c0: float, c1: float, c2: float) -> "RoadModel":
@@ -37,7 +43,7 @@ class RoadModel(NamedTuple):
 
     @property
     def plane(self) -> tuple[float, float, float]:
-        """The road without its curvature, as the plane d = c0 + c1 x + c2 y."""
+        """The road without its curvatures, as the plane d = c0 + c1 x + c2 y."""
         level, slope, _ = self.alpha
         return level, -slope * math.sin(self.theta), slope * math.cos(self.theta)
 
@@ -50,11 +56,12 @@ class RoadModel(NamedTuple):
         return y * math.cos(self.theta) - x * math.sin(self.theta)
 
     def disparity(self, x: Reals, y: Reals) -> Reals:
-        """Return the road's disparity, px."""
-        return self.disparity_along(self.along(x, y))
+        """Return the road's disparity, px, camber included."""
+        road = self.disparity_along(self.along(x, y))
+        return road if self.camber == 0 else road + self.camber * self.bulge(self.across(x, y), road)
 
     def disparity_along(self, along: Coordinate) -> Coordinate:
-        """Return the road's disparity, px, where the coordinate along it is known."""
+        """Return the disparity, px, of the road without camber, where the coordinate along it is known."""
         a0, a1, a2 = self.alpha
         return a0 + along * (a1 + along * a2)
 
@@ -62,6 +69,27 @@ class RoadModel(NamedTuple):
         """Return the derivative of the road's disparity with respect to theta, px/rad [GD eq. 13]."""
         _, a1, a2 = self.alpha
         return across * (along * (-2 * a2) - a1)
+
+    def bulge(self, across: Reals, road: Reals) -> Reals:
+        """Return what a camber of 1 adds to the disparity, px: half the disparity times the side squared.
+
+        Parameters
+        ----------
+        across : ndarray
+            Coordinate across the road.
+        road : ndarray
+            Disparity there without camber, px; 0 is returned where it is not positive.
+
+        Notes
+        -----
+        A surface that is higher by h camera heights is nearer, and its disparity larger by the factor
+        1 / (1 - h), in first order 1 + h.
+        """
+        positive = np.maximum(road, 0)
+        lateral = across * abs(self.alpha[1])
+        lateral = np.minimum(np.square(lateral), np.square(_FARTHEST * positive))
+        bulge: Reals = 0.5 * lateral / np.maximum(positive, 1e-30)
+        return bulge
 
     def side(self, x: Reals, y: Reals, disparity: Reals) -> Reals:
         """Return how far to the right of the middle the road's pixels lie, in camera heights.

@@ -1,27 +1,33 @@
-"""A robust fit of the road's parabola and roll to the pixels near its plane."""
+"""A robust fit of the road's parabola, roll and camber to the pixels near its plane."""
 
 import math
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.moments import Floats
-from rollcli.estimator.road.edges import Edges
 from rollcli.estimator.road.find import Road, road_weights
 from rollcli.estimator.road.model import RoadModel
+from rollcli.estimator.road.profile import Profile, read_profile
 from rollcli.estimator.road.subsample import Sample, Singles
-from rollcli.estimator.road.tuning import FitTuning
+from rollcli.estimator.road.tuning import FitTuning, ProfileTuning
 
-_RIDGE, _TINY = 1 + 1e-10 * np.eye(4), 1e-300 * np.eye(4)
+_RIDGE = 1e-10 * np.eye(5)  # of normal matrices with a diagonal of ones
 
 
 class Fit(NamedTuple):
-    """A road on normalised coordinates, and where the weights end, in tolerances."""
+    """A road on normalised coordinates, and where the weights end, in tolerances.
+
+    `camber_precision` is what the prior adds to the normal equations of the camber; infinite where none is
+    fitted.
+    """
 
     model: RoadModel
     limit: float
+    camber_precision: float = math.inf
 
 
 @dataclass(frozen=True)
@@ -35,9 +41,13 @@ class NearPixels:
     place : ndarray
         Weights from 0 to 1 by place in the image and by slopes.
     ahead : ndarray
-        1 for those in the lane ahead, else 0.
+        1 in the middle of the lane ahead, fading towards its sides.
+    shown : ndarray of bool
+        Those that the lane is fitted to.
     stride : int
         How many near pixels of the sample each of them stands for.
+    least_width : float
+        Tolerances within which a pixel counts in any case.
     tuning : FitTuning
     """
 
@@ -47,7 +57,9 @@ class NearPixels:
     tolerance: Singles
     place: Singles
     ahead: Singles
+    shown: NDArray[np.bool_]
     stride: int
+    least_width: float
     tuning: FitTuning
 
     @classmethod
@@ -59,58 +71,80 @@ class NearPixels:
         near = np.flatnonzero(np.abs(off) < tuning.reach)
         stride = -(-len(near) // tuning.pixels) or 1
         near = near[near % stride == 0]  # by place in the sample, so that one pixel more moves no other
+        every = max(1, round(len(near) / tuning.lane_pixels))
+        shown = (near // stride) % every == 0
         kept = (sample.x, sample.y, sample.d, sample.tolerance)
         x, y, d, tolerance = (pixels[near] for pixels in kept)
         across, along = model.across(x, y), model.along(x, y)
         half_height = sample.grid.centre_v / sample.grid.scale
         place = np.square(road_weights(sample, road.plane, near))
         place *= _seen(across, along, half_height, model.theta, tuning)
-        ahead = (np.abs(across) * model.alpha[1] < tuning.lane * d).astype(np.float32)
-        return cls(x, y, d, tolerance, place, ahead, stride, tuning)
+        side = np.square(across * (model.alpha[1] / tuning.lane) / d)
+        ahead: Singles = np.exp(-np.minimum(np.square(side), 80))
+        # the steps of a map of whole pixels are no spread: within less, only stripes of one value are left
+        usual = math.hypot(sample.noise, sample.tuning.sample.uneven_share * sample.typical)
+        least = max(tuning.least_width, sample.quantum / usual)
+        return cls(x, y, d, tolerance, place, ahead, shown, stride, least, tuning)
 
-    def within(self, edges: Edges, model: RoadModel) -> "NearPixels":
-        """Return the pixels between the edges of a road."""
-        kept = edges.hold(model.side(self.x, self.y, model.disparity(self.x, self.y)))
-        pixels = {name: getattr(self, name)[kept] for name in ("x", "y", "d", "tolerance", "place", "ahead")}
-        return replace(self, **pixels)
+    def lane(self) -> "NearPixels":
+        """Return some of them, weighted so that the lane ahead counts."""
+        few = np.flatnonzero(self.shown)
+        arrays = {name: getattr(self, name)[few] for name in ("x", "y", "d", "tolerance", "ahead", "shown")}
+        return replace(self, **arrays, place=self.place[few] * arrays["ahead"])
 
-    def fit(self, start: RoadModel, rounds: int, *, parabolic: bool, ahead: bool = False) -> Fit:
-        """Fit (a0, a1, a2, theta), starting from the road's plane or from an earlier fit.
+    def profile(self, lane: RoadModel, tuning: ProfileTuning) -> tuple[Profile, "NearPixels"]:
+        """Read the profile across the lane; return it, and the pixels weighted by it."""
+        road = lane.disparity_along(lane.along(self.x, self.y))
+        side = lane.side(self.x, self.y, np.maximum(road, tuning.least_road * self.d))
+        used = (self.place > tuning.least_place) & (road > tuning.least_road * self.d)
+        profile = read_profile(side[used], self.d[used] / road[used] - 1, tuning)
+        return profile, replace(self, place=self.place * profile.at(side).astype(np.float32))
 
-        Gauss-Newton with Tukey's biweight, whose width shrinks from two tolerances as far as the pixels' own
-        spread allows; with `ahead`, the spread of those in the lane ahead.
+    def fit(self, start: RoadModel, rounds: int, *, parabolic: bool, cambered: bool = False) -> Fit:
+        """Fit (a0, a1, a2, theta) and the camber, starting from the road's plane or from an earlier fit.
+
+        Gauss-Newton with Tukey's biweight, whose width shrinks from two tolerances as far as the spread of
+        the pixels ahead allows. The camber has a prior: where the pixels do not determine it, it stays small.
         """
-        model, limit, most = start, self.tuning.start_width, self.tuning.most_turn
-        design = np.empty((5, len(self.d)), np.float32)
-        design[0], design[4] = 1, self.d
-        across, off = self._lay_out(design, model)
+        most = self.tuning.most_turn
+        fit = Fit(start, self.tuning.start_width)
+        design = np.empty((6, len(self.d)), np.float32)
+        design[0], design[4], design[5] = 1, 0, self.d
+        across, off = self._lay_out(design, start, cambered=cambered)
         for _ in range(rounds):
-            weights = self._weights(off, limit)
+            model, weights = fit.model, self._weights(off, fit.limit)
             if not parabolic:
                 design[2] = 0
             design[3] = model.turning(across, design[1])
+            precision = self._camber_precision(weights, off) if cambered else math.inf
             products = ((design * weights) @ design.T).astype(np.float64)
-            a0, a1, a2, turned = np.linalg.solve(solvable(products[:4, :4]), products[:4, 4]).tolist()
-            model = RoadModel(model.theta + max(-most, min(most, turned)), (a0, a1, a2))
-            across, off = self._lay_out(design, model)
-            limit = min(limit, self._width(off, weights, ahead=ahead))
-        return Fit(model, limit)
+            if cambered:
+                products[4, 4] += precision
+            a0, a1, a2, turned, camber = solve_normal(products[:5, :5], products[:5, 5:])[:, 0].tolist()
+            turned = max(-most, min(most, turned))
+            model = RoadModel(model.theta + turned, (a0, a1, a2), camber)
+            across, off = self._lay_out(design, model, cambered=cambered)
+            fit = Fit(model, min(fit.limit, self._width(off, weights)), precision)
+        return fit
 
     def weights(self, fit: Fit) -> Singles:
         """Return the weights that a fit leaves, 0 to 1."""
-        design = np.empty((3, len(self.d)), np.float32)
+        design = np.empty((5, len(self.d)), np.float32)
         design[0] = 1
-        return self._weights(self._lay_out(design, fit.model)[1], fit.limit)
+        return self._weights(self._lay_out(design, fit.model, cambered=True)[1], fit.limit)
 
-    def _lay_out(self, design: Singles, model: RoadModel) -> tuple[Singles, Singles]:
-        """Set a design's rows 1 and 2, the coordinate along the road and its square.
+    def _lay_out(self, design: Singles, model: RoadModel, *, cambered: bool) -> tuple[Singles, Singles]:
+        """Set a design's rows 1 and 2, the coordinate along the road and its square, and 4, the bulge.
 
-        Return the coordinate across it, and road minus disparity in tolerances.
+        Return the coordinate across the road, and road minus disparity in tolerances.
         """
         across: Singles = model.across(self.x, self.y)
         design[1] = model.along(self.x, self.y)
         np.square(design[1], out=design[2])
         off: Singles = np.array(model.alpha, np.float32) @ design[:3]  # RoadModel.disparity takes longer
+        if cambered:
+            design[4] = model.bulge(across, off)
+            off += np.float32(model.camber) * design[4]
         off -= self.d
         off /= self.tolerance
         return across, off
@@ -123,24 +157,52 @@ class NearPixels:
             raise EstimationError("no road: hardly a pixel lies on the best plane that was found")
         return weights
 
-    def _width(self, off: Singles, weights: Singles, *, ahead: bool) -> float:
-        """Return how wide the weights should be, from the spread of the pixels that have some.
+    def _camber_precision(self, weights: Singles, off: Singles) -> float:
+        """Return what the camber's prior adds to its normal equation.
+
+        The variance of the pixels over that of the prior, times how often neighbouring pixels repeat each
+        other.
+        """
+        total = float(weights.sum())
+        variance = float(weights @ np.square(off * self.tolerance)) / total
+        repeated = max(1.0, total / self.tuning.independent_pixels)
+        return variance * repeated / self.tuning.camber**2
+
+    def _width(self, off: Singles, weights: Singles) -> float:
+        """Return how wide the weights should be, from the spread of the pixels ahead that have some.
 
         Every step is smooth: a pixel more or less must not turn the road.
         """
         tuning = self.tuning
-        if ahead and np.count_nonzero(weights * self.ahead) >= tuning.least_pixels:
-            weights = weights * self.ahead
+        weights = weights * (self.ahead + np.float32(tuning.beside))
         spread = tuning.biweight_spread * math.sqrt(float(weights @ np.square(off)) / float(weights.sum()))
         mix = (spread - tuning.even_spread) / (tuning.uneven_spread - tuning.even_spread)
-        widest = tuning.lane_width if ahead else tuning.uneven_width
-        times = tuning.even_width + max(0.0, min(1.0, mix)) * (widest - tuning.even_width)
-        return max(tuning.least_width, times * spread)
+        times = tuning.even_width + max(0.0, min(1.0, mix)) * (tuning.uneven_width - tuning.even_width)
+        return max(self.least_width, times * spread)
 
 
-def solvable(normal: Floats) -> Floats:
-    """Return normal matrices (..., 4, 4) of a0, a1, a2 and theta that can be inverted, also without an a2."""
-    return normal * _RIDGE + _TINY
+def solve_normal(normal: Floats, right: Floats, like: Floats | None = None) -> Floats:
+    """Solve normal equations in parameters of different units, some of which may be missing.
+
+    Parameters
+    ----------
+    normal : ndarray, shape (..., N, N)
+        Normal matrix; where a parameter is missing, its row and column are 0.
+    right : ndarray, shape (..., N, M)
+        Right-hand sides, 0 for what is missing.
+    like : ndarray, shape (N, N), optional
+        A normal matrix whose units are taken; `normal` itself by default.
+
+    Returns
+    -------
+    ndarray, shape (..., N, M)
+        0 for what is missing.
+    """
+    diagonal = np.diagonal(normal if like is None else like, axis1=-2, axis2=-1)
+    scale = np.where(diagonal > 0, np.sqrt(np.maximum(diagonal, 0)), 1)
+    even = normal / (scale[..., :, None] * scale[..., None, :]) + _RIDGE
+    solved: Floats = np.linalg.solve(even, right / scale[..., :, None]) / scale[..., :, None]
+    return solved
 
 
 def _seen(across: Singles, along: Singles, half_height: float, theta: float, tuning: FitTuning) -> Singles:

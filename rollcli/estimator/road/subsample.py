@@ -46,6 +46,8 @@ class Sample:
         Column of each pixel among the sampled ones.
     pitch : float
         Distance between neighbouring columns of the sample, units of x.
+    quantum : float
+        The smallest step between neighbours, px: 1 in a map of whole pixels.
     tuning : RoadTuning
         The numbers by which the map was sampled, and by which its road is to be found.
     """
@@ -62,6 +64,7 @@ class Sample:
     slope_noise: float
     column: NDArray[np.uint16]
     pitch: float
+    quantum: float
     tuning: RoadTuning
 
     def about(self, pixels: int) -> slice:
@@ -147,6 +150,7 @@ def take_sample(
         slope_noise=noise * per_unit,
         column=columns.astype(np.uint16),
         pitch=step / grid.scale,
+        quantum=quantum,
         tuning=tuning,
     )
 

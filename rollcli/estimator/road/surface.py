@@ -1,19 +1,17 @@
 """The surface of a road: its parabola, its edges and its pixels."""
 
 import math
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.errors import EstimationError
 from rollcli.estimator.energy import Energy
 from rollcli.estimator.moments import Floats, Grid
-from rollcli.estimator.road.edges import NO_EDGES, Edges, find_edges
 from rollcli.estimator.road.find import Road
 from rollcli.estimator.road.model import RoadModel
+from rollcli.estimator.road.profile import Profile
 from rollcli.estimator.road.robust_fit import Fit, NearPixels
 from rollcli.estimator.road.subsample import Sample, reach_of
 from rollcli.estimator.road.tuning import RoadTuning
@@ -25,8 +23,10 @@ class Surface:
 
     Attributes
     ----------
-    x, y, d : ndarray
-        Normalised coordinates and disparity, px.
+    x, y : ndarray
+        Normalised coordinates.
+    d : ndarray
+        Disparity less what the road's camber adds, px.
     weights : ndarray
         More than 0, at most 1.
     model : RoadModel
@@ -43,8 +43,10 @@ class Surface:
         How far the roll moved from the plane's, radians.
     parabolic : bool
         The road model: parabola or line.
-    edges : Edges
-        Where a verge or a kerb ends it.
+    profile : Profile or None
+        How much the ground counts by how far to the side it lies; None where all of it does.
+    camber_precision : float
+        What the prior of the camber adds to its normal equation; infinite where none was fitted.
     tuning : RoadTuning
         The numbers by which it was found.
     """
@@ -60,7 +62,8 @@ class Surface:
     share: float
     moved: float
     parabolic: bool
-    edges: Edges
+    profile: Profile | None
+    camber_precision: float
     tuning: RoadTuning
 
     def covers(self, disparity: NDArray[Any]) -> NDArray[np.bool_]:
@@ -71,8 +74,8 @@ class Surface:
         road = self.model.disparity(x, y)
         tolerance = np.hypot(self.noise, self.tuning.sample.uneven_share * disparity)
         on_it: NDArray[np.bool_] = np.abs(road - disparity) < self.limit * tolerance
-        if self.edges != NO_EDGES:
-            on_it &= self.edges.hold(self.model.side(x, y, road))
+        if self.profile is not None:
+            on_it &= self.profile.level(self.model.side(x, y, road)) > self.tuning.surface.least_level
         # where a wall crosses the surface it is as near as the road, but it does not rise as the road does
         reach = min(reach_of(height, width, self.tuning.sample), height - 1)
         off = disparity - road
@@ -86,10 +89,10 @@ class Surface:
 
 
 def fit_surface(sample: Sample, road: Road, *, parabolic: bool) -> Surface:
-    """Fit the road's parabola and its roll to the pixels near the road's plane.
+    """Fit the road's parabola, roll and camber to the pixels near the road's plane.
 
-    The fit stays wide where the ground beside the road is nearly as high. Where that ground falls away or
-    rises from the road's edge, like a verge, or lies behind a kerb, the road is fitted between the edges.
+    The lane ahead of the rig is fitted first. The profile across it says how much of the ground beside it is
+    still the same road, and the fit to all that is left starts from the lane's.
 
     Parameters
     ----------
@@ -108,37 +111,34 @@ def fit_surface(sample: Sample, road: Road, *, parabolic: bool) -> Surface:
         When hardly any pixel lies on the road.
     """
     near, tuning = NearPixels.of(sample, road), sample.tuning
-    lane = near.fit(road.model, tuning.fit.lane_rounds, parabolic=parabolic, ahead=True).model
-    looked_at = near.place > tuning.edges.least_place
-    edges = find_edges(near.x, near.y, near.d, looked_at, lane, tuning.edges)
-    if edges != NO_EDGES:
-        inside = near.within(edges, lane)
-        with suppress(EstimationError):  # hardly a pixel between them: then they are not the road's
-            fit = inside.fit(lane, tuning.fit.edge_rounds, parabolic=parabolic, ahead=True)
-            return _surface(inside, fit, edges, sample, road, parabolic=parabolic)
-    fit = near.fit(road.model, tuning.fit.rounds, parabolic=parabolic)
-    return _surface(near, fit, NO_EDGES, sample, road, parabolic=parabolic)
+    lane = near.lane().fit(road.model, tuning.fit.lane_rounds, parabolic=parabolic).model
+    profile, weighted = near.profile(lane, tuning.profile)
+    fit = weighted.fit(lane, tuning.fit.rounds, parabolic=parabolic, cambered=True)
+    return _surface(weighted, fit, profile, sample, road, parabolic=parabolic)
 
 
 def _surface(
-    near: NearPixels, fit: Fit, edges: Edges, sample: Sample, road: Road, *, parabolic: bool
+    near: NearPixels, fit: Fit, profile: Profile, sample: Sample, road: Road, *, parabolic: bool
 ) -> Surface:
     """Return the pixels that a fit leaves, and the fit."""
-    weights = near.weights(fit)
+    weights, model = near.weights(fit), fit.model
     used = weights > 0
+    x, y, d = (values[used].astype(np.float64) for values in (near.x, near.y, near.d))
+    plain = model.disparity_along(model.along(x, y))
     return Surface(
-        x=near.x[used].astype(np.float64),
-        y=near.y[used].astype(np.float64),
-        d=near.d[used].astype(np.float64),
+        x=x,
+        y=y,
+        d=d - model.camber * model.bulge(model.across(x, y), plain),
         weights=weights[used].astype(np.float64),
-        model=fit.model,
+        model=model,
         grid=sample.grid,
         noise=sample.noise,
         limit=fit.limit,
         share=min(1.0, float(np.count_nonzero(used)) * near.stride / len(sample.d)),
-        moved=abs(fit.model.theta - road.model.theta),
+        moved=abs(model.theta - road.model.theta),
         parabolic=parabolic,
-        edges=edges,
+        profile=profile,
+        camber_precision=fit.camber_precision,
         tuning=sample.tuning,
     )
 
@@ -162,6 +162,7 @@ def whole_surface(sample: Sample, energy: Energy) -> Surface:
         share=1.0,
         moved=0.0,
         parabolic=energy.parabolic,
-        edges=NO_EDGES,
+        profile=None,
+        camber_precision=math.inf,
         tuning=sample.tuning,
     )

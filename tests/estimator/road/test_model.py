@@ -67,3 +67,24 @@ def test_above_the_horizon_everything_is_infinitely_far_to_the_side():
     side = model.side(np.array([-1.0, 1.0]), np.array([-1.0, -1.0]), np.array([-1.0, -1.0]))
 
     np.testing.assert_array_equal(side, [-np.inf, np.inf])
+
+
+def test_camber_lifts_the_road_by_half_the_side_squared():
+    """Against the geometry: ground that is higher by h camera heights is nearer by the factor 1 - h."""
+    camber, side = 0.02, np.linspace(-2, 2, 9)
+    model = RoadModel(0.0, (0.0, 200.0, 0.0), camber)
+    y = np.full(9, 0.3)
+    x = side * y  # across * slope / disparity = x / y
+
+    lifted = model.disparity(x, y)
+
+    height = camber / 2 * side**2
+    np.testing.assert_allclose(lifted, 200 * y / (1 - height), rtol=2 * np.square(height.max()))
+
+
+def test_camber_is_not_extrapolated_far_to_the_side_or_above_the_horizon():
+    model = RoadModel(0.0, (0.0, 200.0, 0.0), 0.02)
+    far, above = model.disparity(np.array([0.9, 0.0]), np.array([0.1, -0.1]))
+
+    assert far == pytest.approx(20 * (1 + 0.01 * 16))
+    assert above == -20

@@ -1,25 +1,116 @@
-"""The road's pixels: between its edges, as long as there are any."""
+"""The surface is that of the lane ahead, with its camber, whatever lies beside it."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from rollcli.estimator.road.edges import NO_EDGES
+from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.road.find import find_road
 from rollcli.estimator.road.subsample import take_sample
 from rollcli.estimator.road.surface import fit_surface
-from rollcli.estimator.road.tuning import ROAD_TUNING
 from tests.estimator.synthetic_maps import flat_road
 
-WIDTH, HEIGHT, FOCAL = 640, 480, 560.0
+WIDTH, HEIGHT, FOCAL = 640, 480, 400.0
+BASELINE, CAMERA_HEIGHT = 0.5, 1.6
 ROLL = math.radians(-3)
+
+
+def disparity_of(height_at, roll_deg=0.0, pitch_deg=6.0):
+    """Exact disparity of ground whose height in metres, X metres to the right of the rig, `height_at` says.
+
+    The depth along each ray is found by bisection: below it the ray is above the ground.
+    """
+    roll, pitch = math.radians(roll_deg), math.radians(pitch_deg)
+    v, u = np.mgrid[:HEIGHT, :WIDTH]
+    x, y = (u - (WIDTH - 1) / 2) / FOCAL, (v - (HEIGHT - 1) / 2) / FOCAL
+    across = x * math.cos(roll) + y * math.sin(roll)
+    down = (y * math.cos(roll) - x * math.sin(roll)) * math.cos(pitch) + math.sin(pitch)
+    near, far = np.full(u.shape, 0.5), np.full(u.shape, 60.0)
+    for _ in range(40):
+        middle = (near + far) / 2
+        under = middle * down > CAMERA_HEIGHT - height_at(middle * across)
+        near, far = np.where(under, near, middle), np.where(under, middle, far)
+    noise = np.random.default_rng(2).normal(0, 0.1, u.shape)
+    return np.where(far < 59, FOCAL * BASELINE / far + noise, 0)
+
+
+def found_in(height_at, roll_deg=0.0):
+    sample = take_sample(disparity_of(height_at, roll_deg))
+    return fit_surface(sample, find_road(sample, math.radians(45), 0), parabolic=True)
+
+
+@pytest.mark.parametrize("roll_deg", [-8, 0, 3])
+def test_a_flat_road_has_its_roll_and_no_camber(roll_deg):
+    found = found_in(lambda x: 0 * x, roll_deg)
+
+    assert math.degrees(found.model.theta) == pytest.approx(roll_deg, abs=0.02)
+    assert found.model.camber == pytest.approx(0, abs=5e-4)
+
+
+@pytest.mark.parametrize("kerb", [0.03, 0.06, 0.08, 0.1, 0.15])
+def test_a_platform_on_one_side_does_not_turn_the_angle(kerb):
+    # the distance over which stereo matching smears a step
+    found = found_in(lambda x: kerb * np.clip((x - 1.8) / 0.3, 0, 1))
+
+    assert math.degrees(found.model.theta) == pytest.approx(0, abs=0.1)
+
+
+@pytest.mark.parametrize("slope", [-0.15, -0.06, 0.06, 0.15])
+def test_a_verge_on_one_side_does_not_turn_the_angle(slope):
+    found = found_in(lambda x: slope * np.maximum(0, x - 1.7))
+
+    assert math.degrees(found.model.theta) == pytest.approx(0, abs=0.1)
+
+
+@pytest.mark.parametrize("fall", [0.01, 0.02, 0.03, 0.04])
+@pytest.mark.parametrize("left_edge", [-6.0, -1.9])
+def test_on_a_crowned_road_the_angle_is_that_under_the_rig(fall, left_edge):
+    curvature = fall / 3.5  # falls by `fall` per metre 3.5 m to the side
+    found = found_in(lambda x: -curvature / 2 * np.square(np.maximum(x, left_edge)))
+
+    assert math.degrees(found.model.theta) == pytest.approx(0, abs=0.1)
+
+
+@pytest.mark.parametrize("fall", [0.02, 0.04])
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_camber_is_reported_in_camera_heights(fall, sign):
+    curvature = sign * fall / 3.5
+    disparity = disparity_of(lambda x: curvature / 2 * np.square(x), roll_deg=2)
+
+    estimate = estimate_roll(disparity)
+
+    assert estimate.camber == pytest.approx(curvature * CAMERA_HEIGHT, rel=0.15)
+    assert math.degrees(estimate.theta) == pytest.approx(2, abs=0.02)
+
+
+def test_where_only_the_middle_is_seen_camber_is_left_open():
+    disparity = disparity_of(lambda x: 0 * x)
+    columns = np.arange(WIDTH)
+    narrow = np.where(np.abs(columns - WIDTH / 2) < 25, disparity, 0)
+
+    assert estimate_roll(narrow).camber is None
+
+
+@pytest.mark.parametrize("fall", [0.01, 0.03])
+def test_on_a_roof_the_angle_is_that_of_the_side_the_rig_drives_on(fall):
+    found = found_in(lambda x: -2 * fall * np.maximum(0, -1.6 - x))
+
+    assert math.degrees(found.model.theta) == pytest.approx(0, abs=0.15)
+
+
+def test_whole_pixels_leave_no_stripes():
+    disparity = disparity_of(lambda x: 0 * x, roll_deg=0.2)
+
+    estimate = estimate_roll(np.rint(disparity))
+
+    assert abs(math.degrees(estimate.theta) - 0.2) < 0.05
+    assert estimate.road_fraction > 0.3
 
 
 def road_and_sides():
     """A road of -3 degrees with noise, px, and how far to the right each pixel lies, in camera heights."""
-    road = flat_road(-3, width=WIDTH, height=HEIGHT, focal=FOCAL, pitch_deg=0)
+    road = flat_road(-3, width=WIDTH, height=HEIGHT, focal=560.0, pitch_deg=0)
     v, u = np.mgrid[:HEIGHT, :WIDTH]
     x, y = u - (WIDTH - 1) / 2, v - (HEIGHT - 1) / 2
     below = y * math.cos(ROLL) - x * math.sin(ROLL)  # the horizon; a road's pixel is one height under it
@@ -28,44 +119,20 @@ def road_and_sides():
     return np.where(road > 1, road + noise, 0), side
 
 
-def surface_of(disparity, tuning=ROAD_TUNING):
-    sample = take_sample(disparity, None, tuning)
+def surface_of(disparity):
+    sample = take_sample(disparity)
     return fit_surface(sample, find_road(sample, math.radians(45), 0), parabolic=True)
 
 
 @pytest.mark.parametrize("slope", [-0.15, 0.15])
 def test_a_verge_beyond_the_edge_of_the_road_is_no_road(slope):
     road, side = road_and_sides()
-    verge = np.maximum(0, side - 1.4)
+    disparity = road * (1 + slope * np.maximum(0, side - 1.4))
 
-    found = surface_of(road * (1 + slope * verge))
+    covered = surface_of(disparity).covers(disparity)
 
-    assert found.edges.left == math.inf
-    assert found.edges.right == pytest.approx(1.4, abs=0.3)
-    assert math.degrees(found.model.theta) == pytest.approx(-3, abs=0.05)
-    covered = found.covers(road * (1 + slope * verge))
-    assert not covered[side > 1.7].any()
+    assert not covered[side > 2].any()
     assert covered[(np.abs(side) < 1) & (road > 0)].mean() > 0.95
-
-
-def test_a_road_without_edges_is_road_up_to_the_sides_of_the_map():
-    road, side = road_and_sides()
-
-    found = surface_of(road)
-
-    assert found.edges == NO_EDGES
-    assert found.covers(road)[(side > 1.7) & (road > 5)].mean() > 0.9
-
-
-def test_edges_with_hardly_a_pixel_between_them_are_none():
-    road, side = road_and_sides()
-    disparity = road * (1 + 0.15 * np.maximum(0, side - 1.4))
-    crossed = replace(ROAD_TUNING, edges=replace(ROAD_TUNING.edges, margin=400))  # the left edge right of all
-
-    found = surface_of(disparity, crossed)
-
-    assert found.edges == NO_EDGES
-    assert found.share > surface_of(disparity).share
 
 
 def test_a_surface_that_crosses_the_road_without_rising_as_it_does_is_no_road():

@@ -1,0 +1,90 @@
+"""The profile across a road: where the ground beside the lane stops to count."""
+
+import math
+
+import numpy as np
+import pytest
+
+from rollcli.estimator.road.profile import read_profile
+from rollcli.estimator.road.tuning import ProfileTuning
+
+SIDES = np.array([0.125, 0.375, 0.625, 0.875, 1.125, 1.375, 1.625, 1.875, 2.125, 2.375])  # middles of bins
+
+
+def weights(height_at, spread=0.002):
+    """The weights at `SIDES` to the right of ground whose height at a side `height_at` says."""
+    rng = np.random.default_rng(6)
+    side = rng.uniform(-2.5, 2.5, 20000)
+    height = np.where(side > 0, height_at(side), 0) + rng.normal(0, spread, side.shape)
+    return read_profile(side, height, ProfileTuning()).at(SIDES)
+
+
+def beyond(start, height_at):
+    """Level ground up to `start` camera heights to the side, then as `height_at` says."""
+    return lambda side: np.where(side < start, 0, height_at(side - start))
+
+
+def test_level_ground_counts_until_it_is_far_to_the_side():
+    found = weights(lambda side: 0 * side)
+
+    assert found[:4].min() > 0.95
+    assert found[-1] < 0.01
+    assert np.all(np.diff(found) <= 0)
+
+
+@pytest.mark.parametrize("height", [0.04, 0.055, 0.1, -0.055])
+def test_ground_behind_a_kerb_does_not_count(height):
+    found = weights(beyond(1.25, lambda _: height))
+
+    assert found[:4].min() > 0.9
+    assert found[5:].max() < 0.05
+
+
+@pytest.mark.parametrize("slope", [-0.2, -0.08, -0.04, 0.04, 0.08, 0.2])
+def test_a_verge_fades_out_from_its_edge(slope):
+    found = weights(beyond(1.0, lambda beside: slope * beside))
+
+    assert found[:4].min() > 0.9
+    assert np.all(np.diff(found[4:]) <= 0)
+    assert found[-1] < 0.05
+
+
+def test_ground_that_is_lost_from_view_counts_less_behind_the_gap():
+    rng = np.random.default_rng(8)
+    side = rng.uniform(-2.5, 2.5, 20000)
+    seen = (side < 1) | (side > 2)
+    found = read_profile(side[seen], 0 * side[seen], ProfileTuning()).at(SIDES)
+
+    assert found[:4].min() > 0.95
+    assert found[8] < 0.05
+
+
+def test_each_side_is_read_by_itself():
+    rng = np.random.default_rng(7)
+    side = rng.uniform(-2.5, 2.5, 20000)
+    profile = read_profile(side, np.where(side > 1.25, 0.1, 0.0), ProfileTuning())
+
+    assert profile.at(SIDES)[5] < 0.01
+    assert profile.at(-SIDES)[5] > 0.5
+
+
+def test_the_middle_of_the_lane_counts_whatever_its_height():
+    assert weights(lambda side: np.where(side < 0.5, 0.03, 0))[:2].min() > 0.95
+
+
+def test_a_kerb_that_grows_takes_the_weight_away_little_by_little():
+    behind = [
+        weights(beyond(0.75, lambda _, height=height: height))[3] for height in np.linspace(0, 0.05, 51)
+    ]
+
+    assert behind[0] > 0.95
+    assert behind[-1] < 0.02
+    assert np.abs(np.diff(behind)).max() < 0.15  # a millimetre and a half of a car's camera height at a time
+
+
+def test_no_pixel_leaves_the_lane_to_itself():
+    none = np.empty(0)
+    found = read_profile(none, none, ProfileTuning()).at(SIDES)
+
+    assert found[0] == pytest.approx(1)
+    assert math.isfinite(found.sum())
