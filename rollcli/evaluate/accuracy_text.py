@@ -15,7 +15,7 @@ _LENGTHS = {"median", "p95", "worst", "bias"}  # what has the unit of the quanti
 
 
 def as_table(accuracy: Accuracy) -> str:
-    """One figure a line, for people."""
+    """Return one figure a line, for people."""
     of = accuracy.count
     lines = [
         ("frames compared", f"{of}" + (f" ({accuracy.suspect} suspect)" if accuracy.suspect else "")),
@@ -42,7 +42,7 @@ def as_table(accuracy: Accuracy) -> str:
 
 
 def as_csv(accuracy: Accuracy) -> str:
-    """A header and one line."""
+    """Return a header and one line."""
     buffer = io.StringIO()
     values = _values(accuracy)
     lines = csv.writer(buffer, lineterminator="\n")
@@ -52,7 +52,7 @@ def as_csv(accuracy: Accuracy) -> str:
 
 
 def as_json(accuracy: Accuracy) -> str:
-    """One object; the frames without an angle or a known one by name."""
+    """Return one object; the frames without an angle or a known one by name."""
     return json.dumps(_values(accuracy), indent=2) + "\n"
 
 

@@ -22,7 +22,7 @@ _DELTA_AXIS = {"title": {"text": "δ<sub>θ</sub>"}, "type": "category"}
 
 
 def charts(tables: Mapping[str, Table]) -> dict[str, Chart]:
-    """Every chart of the page, by its name."""
+    """Return every chart of the page, by its name."""
     made = (
         _iterations(tables["table1_iterations"]),
         _runtime(tables["table2_runtime"]),

@@ -45,5 +45,5 @@ def usable_pixels(source: Source) -> NDArray[Any]:
 
 
 def lost(frame: Frame, reason: str) -> Examined:
-    """What is known of a map that could not be examined."""
+    """Return what is known of a map that could not be examined."""
     return Examined(failed_frame(frame, reason), None)

@@ -69,7 +69,7 @@ def _numbers(table: Table, column: str) -> list[float]:
 
 
 def _iterations(table: Table) -> list[tuple[str, list[str], list[str]]]:
-    """Name, the paper's column and ours, for each solver."""
+    """Return name, the paper's column and ours, for each solver."""
     lines = []
     for solver in ("gss", "gd"):
         rows = table.where(solver=solver)
@@ -84,7 +84,7 @@ def _iterations(table: Table) -> list[tuple[str, list[str], list[str]]]:
 
 
 def _runtimes(table: Table) -> list[tuple[str, str, list[str]]]:
-    """Solver, form, and a time for each delta."""
+    """Return solver, form, and a time for each delta."""
     forms = {
         "paper_s": "paper, Matlab 2019a on an i7-8700K",
         "textbook_s": "here, the paper's n × 3 form",
@@ -103,7 +103,7 @@ def _runtimes(table: Table) -> list[tuple[str, str, list[str]]]:
 
 
 def _methods(table: Table) -> list[tuple[str, ...]]:
-    """Name, mean, median, 95th percentile, worst, and how many rotated maps had no angle."""
+    """Return name, mean, median, 95th percentile, worst, and how many rotated maps had no angle."""
     return [
         (
             METHOD_NAMES[str(method)],
@@ -115,7 +115,7 @@ def _methods(table: Table) -> list[tuple[str, ...]]:
 
 
 def _lowest(table: Table) -> list[tuple[str, str, str]]:
-    """Delta, the fewest mean iterations and the rates with which every map takes them, those at 26."""
+    """Return delta, the fewest mean iterations and the rates with which every map takes them, those at 26."""
     lines = []
     for delta in DELTAS_DEG:
         on_all = table.where(delta_deg=delta, short=0)
@@ -128,7 +128,7 @@ def _lowest(table: Table) -> list[tuple[str, str, str]]:
 
 
 def _spans(rates: Sequence[float]) -> str:
-    """Runs of whole numbers, such as "8–26, 30"."""
+    """Return runs of whole numbers, such as "8–26, 30"."""
     runs: list[list[int]] = []
     for rate in map(int, rates):
         if runs and rate == runs[-1][1] + 1:
@@ -150,7 +150,7 @@ def _map(found: Findings) -> dict[str, Any]:
 
 
 def _duration(seconds: float) -> str:
-    """Three digits, in the unit that suits."""
+    """Return three digits, in the unit that suits."""
     for unit, size in (("s", 1.0), ("ms", 1e-3)):
         if seconds >= size:
             return f"{seconds / size:.3g} {unit}"

@@ -36,7 +36,7 @@ class Table:
     rows: tuple[tuple[Value, ...], ...]
 
     def csv(self) -> bytes:
-        """The table as CSV; floats with seven digits, nothing where there is no value."""
+        """Return the table as CSV; floats with seven digits, nothing where there is no value."""
         buffer = io.StringIO()
         lines = csv.writer(buffer, lineterminator="\n")
         lines.writerow(self.columns)
@@ -44,19 +44,19 @@ class Table:
         return buffer.getvalue().encode("utf-8", "surrogateescape")
 
     def column(self, name: str) -> list[Value]:
-        """One column, from top to bottom."""
+        """Return one column, from top to bottom."""
         place = self.columns.index(name)
         return [row[place] for row in self.rows]
 
     def where(self, **values: Value) -> "Table":
-        """The rows that have these values."""
+        """Return the rows that have these values."""
         places = {self.columns.index(name): value for name, value in values.items()}
         rows = tuple(row for row in self.rows if all(row[at] == value for at, value in places.items()))
         return Table(self.name, self.columns, rows)
 
 
 def maps_table(found: Sequence[Findings], failed: Sequence[tuple[str, str]]) -> Table:
-    """Each map: its angle, and the iterations on it."""
+    """Return each map: its angle, and the iterations on it."""
     counts = [f"{solver}_{delta:g}" for solver in ("gss", "gd") for delta in DELTAS_DEG]
     columns = ("file", "width", "height", "pixels", "theta_deg", *counts, "message")
     rows: list[tuple[Value, ...]] = [
@@ -69,7 +69,7 @@ def maps_table(found: Sequence[Findings], failed: Sequence[tuple[str, str]]) -> 
 
 
 def iterations_table(found: Sequence[Findings]) -> Table:
-    """Table I: iterations of both solvers for each delta."""
+    """Return Table I: iterations of both solvers for each delta."""
     columns = ("solver", "delta_deg", "delta_rad", "paper", "mean", "min", "max", "maps")
     rows = []
     for solver in ("gss", "gd"):
@@ -82,7 +82,7 @@ def iterations_table(found: Sequence[Findings]) -> Table:
 
 
 def runtime_table(times: Sequence[Times]) -> Table:
-    """Table II: mean run time of both solvers in three forms, seconds."""
+    """Return Table II: mean run time of both solvers in three forms, seconds."""
     columns = (
         "solver",
         "delta_deg",
@@ -101,7 +101,7 @@ def runtime_table(times: Sequence[Times]) -> Table:
 
 
 def sweep_table(found: Sequence[Findings]) -> Table:
-    """Fig. 3: iterations of gd against the first learning rate, for each delta.
+    """Return Fig. 3: iterations of gd against the first learning rate, for each delta.
 
     Over the maps on which it ended within delta of a minimum; `short` counts the others.
     """
@@ -119,7 +119,7 @@ _ERRORS = ("mean_deg", "median_deg", "p95_deg", "worst_deg", "estimates")
 
 
 def solvers_table(found: Sequence[Findings]) -> Table:
-    """Fig. 6: errors of the three solvers after known rotations, for each delta."""
+    """Return Fig. 6: errors of the three solvers after known rotations, for each delta."""
     rows = tuple(
         (solver, DELTAS_DEG[k], *_errors(turn[k] for each in found for turn in each.solver_errors[solver]))
         for solver in SOLVERS
@@ -129,7 +129,7 @@ def solvers_table(found: Sequence[Findings]) -> Table:
 
 
 def methods_table(found: Sequence[Findings]) -> Table:
-    """Ours: errors of the other methods after the same rotations."""
+    """Return the errors of our other methods after the same rotations."""
     rows = []
     for method in METHODS:
         errors = [error for each in found for error in each.method_errors[method]]
@@ -139,7 +139,7 @@ def methods_table(found: Sequence[Findings]) -> Table:
 
 
 def _errors(errors: Iterable[float]) -> tuple[float | int | None, ...]:
-    """Mean, median, 95th percentile and largest, degrees; then how many there are."""
+    """Return mean, median, 95th percentile and largest, degrees; then how many there are."""
     sizes = np.degrees(np.array(list(errors)))
     if not len(sizes):
         return None, None, None, None, 0
@@ -156,7 +156,7 @@ def _text(value: Value) -> str:
 def all_tables(
     found: Sequence[Findings], failed: Sequence[tuple[str, str]], times: Sequence[Times]
 ) -> dict[str, Table]:
-    """Every table by its name."""
+    """Return every table by its name."""
     tables = (
         maps_table(found, failed),
         iterations_table(found),

@@ -48,13 +48,13 @@ class Textbook:
         )
 
     def energy(self, theta: float) -> float:
-        """E_min at `theta` [GD eq. 9], px^2."""
+        """Return E_min at `theta` [GD eq. 9], px^2."""
         Y = self._design(theta)
         residual = self.d - Y @ self._alpha(Y)
         return float(residual @ residual)
 
     def gradient(self, theta: float) -> float:
-        """dE_min / dtheta [GD eq. 12-13], px^2/rad."""
+        """Return dE_min / dtheta [GD eq. 12-13], px^2/rad."""
         Y = self._design(theta)
         x, y = self.u * math.cos(theta) + self.v * math.sin(theta), Y[:, 1]
         turned = np.stack([np.zeros_like(x), -x, -2 * x * y], axis=1)

@@ -71,7 +71,7 @@ def _codes(packed: bytes) -> tuple[NDArray[Any], NDArray[Any]]:
 
 
 def _chains(parents: NDArray[Any], depth: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Length of each chain of parents, and its root: each round doubles how far it sees."""
+    """Return the length of each chain of parents, and its root: each round doubles how far it sees."""
     depth = depth.astype(np.int32)
     while np.any(further := depth[parents]):
         depth = depth + further
@@ -80,7 +80,7 @@ def _chains(parents: NDArray[Any], depth: NDArray[Any]) -> tuple[NDArray[Any], N
 
 
 def _spelled(letters: NDArray[np.uint8], parents: NDArray[Any], lengths: NDArray[Any]) -> NDArray[np.uint8]:
-    """The strings one after the other, each written from its last letter to its first."""
+    """Return the strings one after the other, each written from its last letter to its first."""
     ends = np.cumsum(lengths, dtype=np.int64)
     text = np.empty(int(ends[-1]), np.uint8)
     current: NDArray[Any] = np.arange(len(lengths), dtype=np.int32)

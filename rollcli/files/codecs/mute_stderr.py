@@ -60,7 +60,7 @@ def decoding() -> Iterator[Printed]:
 
 
 def _taken(sink: int) -> str:
-    """What was printed into the file, which is empty again after that."""
+    """Return what was printed into the file, which is empty again after that."""
     if not os.lseek(sink, 0, os.SEEK_CUR):
         return ""
     os.lseek(sink, 0, os.SEEK_SET)

@@ -32,7 +32,7 @@ _UNREAL = {
 
 
 def decode_npy(data: bytes, name: str) -> NDArray[Any]:
-    """The array of an .npy file: real numbers or booleans, shape (H, W), any byte and axis order."""
+    """Return the array of an .npy file: real numbers or booleans, shape (H, W), any byte and axis order."""
     dtype, fortran, shape, start = _header(data, name)
     require_map_shape(shape, name)
     count = math.prod(shape)
@@ -47,14 +47,14 @@ def decode_npy(data: bytes, name: str) -> NDArray[Any]:
 
 
 def encode_npy(values: NDArray[Any]) -> bytes:
-    """An .npy file of the array."""
+    """Return an .npy file of the array."""
     buffer = io.BytesIO()
     np.lib.format.write_array(buffer, np.ascontiguousarray(values), allow_pickle=False)
     return buffer.getvalue()
 
 
 def _header(data: bytes, name: str) -> tuple[np.dtype[Any], bool, tuple[int, ...], int]:
-    """dtype, Fortran order, shape, and where the numbers start."""
+    """Return dtype, Fortran order, shape, and where the numbers start."""
     width = 2 if data[6:7] == b"\x01" else 4
     start = 8 + width + int.from_bytes(data[8 : 8 + width], "little")
     if len(data) < 8 + width or start > len(data):
@@ -69,7 +69,7 @@ def _header(data: bytes, name: str) -> tuple[np.dtype[Any], bool, tuple[int, ...
 
 
 def _real_dtype(descr: str, name: str) -> np.dtype[Any]:
-    """The dtype when it holds real numbers; objects, records, complex numbers, text are refused."""
+    """Return the dtype when it holds real numbers; objects, records, complex numbers, text are refused."""
     if _REAL.fullmatch(descr[1:-1]):
         try:
             return np.dtype(descr[1:-1])

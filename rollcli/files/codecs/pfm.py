@@ -20,7 +20,7 @@ _HEADER = re.compile(rb"P([fF])" + 2 * (_GAP + rb"(\d{1,9})") + _GAP + _FLOAT + 
 
 
 def decode_pfm(data: bytes, name: str) -> NDArray[Any]:
-    """The float32 values of a single-channel PFM file, top row first."""
+    """Return the float32 values of a single-channel PFM file, top row first."""
     header = _HEADER.match(data, 0, min(len(data), 1000))
     if header is None or float(header[4]) == 0:
         raise InputError(f"{name}: its PFM header cannot be read (expected: Pf, width height, scale)")
@@ -41,7 +41,7 @@ def decode_pfm(data: bytes, name: str) -> NDArray[Any]:
 
 
 def encode_pfm(values: NDArray[Any]) -> bytes:
-    """A little-endian single-channel PFM file of float32 values."""
+    """Return a little-endian single-channel PFM file of float32 values."""
     if values.dtype != np.float32:
         raise OutputError(f"a PFM holds float32, not {values.dtype}: write TIFF or NPY instead")
     height, width = values.shape

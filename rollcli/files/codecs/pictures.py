@@ -22,7 +22,7 @@ _PNM = re.compile(rb"P([56])" + 2 * (_GAP + rb"(\d{1,9})") + _GAP + rb"(\d{1,5})
 
 
 def decode_picture(data: bytes, name: str) -> NDArray[Any]:
-    """The pixels of a camera image: grey (H, W) or BGR (H, W, 3), uint8 or uint16."""
+    """Return the pixels of a camera image: grey (H, W) or BGR (H, W, 3), uint8 or uint16."""
     if data.startswith((b"P5", b"P6")):
         return _pnm(data, name)
     if data.startswith(b"BM"):
@@ -60,7 +60,7 @@ def _require_whole_jpeg(data: bytes, name: str) -> None:
 
 
 def _complaint(printed: str) -> str:
-    """What libjpeg says is wrong; empty for lines of OpenCV's own, and for what harms no pixel."""
+    """Return what libjpeg says is wrong; empty for lines of OpenCV's own, and for what harms no pixel."""
     for line in printed.splitlines():
         if line.strip() and not line.startswith("[") and not _HARMLESS.search(line):
             return " ".join(line.removeprefix("Corrupt JPEG data:").split())
@@ -89,7 +89,7 @@ def _pnm(data: bytes, name: str) -> NDArray[Any]:
 
 
 def _require_whole_bmp(data: bytes, name: str) -> None:
-    """OpenCV would print what is wrong with one."""
+    """Refuse a bitmap that is not whole, before OpenCV prints what is wrong with it."""
     start, size, width, height, bits, packing = (
         int.from_bytes(data[first : first + count], "little", signed=first in (18, 22))
         for first, count in ((10, 4), (14, 4), (18, 4), (22, 4), (28, 2), (30, 4))

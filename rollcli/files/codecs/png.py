@@ -52,7 +52,7 @@ class _Header(NamedTuple):
         return 4 if self.colour == _PALETTE else _CHANNELS[self.colour] * (2 if self.depth == 16 else 1)
 
     def row_bytes(self, width: int) -> int:
-        """Bytes of a row of `width` pixels, after its filter byte."""
+        """Return the bytes of a row of `width` pixels, after its filter byte."""
         return (width * self.depth * _CHANNELS[self.colour] + 7) // 8
 
 
@@ -65,7 +65,7 @@ class _Whole(NamedTuple):
     image: list[bytes]
 
     def chunks(self, name: str) -> list[bytes]:
-        """A file of nothing else."""
+        """Return a file of nothing else."""
         start = [SIGNATURE, _chunk(b"IHDR", struct.pack(">IIBBBBB", *self.header))]
         if self.header.colour == _PALETTE:
             start.append(_chunk(b"PLTE", _full_palette(self.header, self.palette, name)))
@@ -75,7 +75,7 @@ class _Whole(NamedTuple):
 
 
 def grey_values(data: bytes, name: str) -> NDArray[Any]:
-    """The values of a single-channel PNG as they are stored; shape (H, W), uint8 or uint16.
+    """Return the values of a single-channel PNG as they are stored; shape (H, W), uint8 or uint16.
 
     A palette of greys stands for its greys; fully transparent pixels hold no data and become 0.
     """
@@ -100,12 +100,12 @@ def grey_values(data: bytes, name: str) -> NDArray[Any]:
 
 
 def picture(data: bytes, name: str, *, mask: bool = False) -> NDArray[Any]:
-    """The pixels of a camera image or mask: grey (H, W) or BGR (H, W, 3), uint8 or uint16."""
+    """Return the pixels of a camera image or mask: grey (H, W) or BGR (H, W, 3), uint8 or uint16."""
     return _decoded(_checked(data, name, mask), name, PICTURE_FLAGS)
 
 
 def encode_png(values: NDArray[Any]) -> bytes:
-    """A PNG file of (H, W) or BGR (H, W, 3) values, uint8 or uint16."""
+    """Return a PNG file of (H, W) or BGR (H, W, 3) values, uint8 or uint16."""
     if values.dtype not in (np.uint8, np.uint16):
         raise OutputError(f"a PNG holds uint8 or uint16, not {values.dtype}: write TIFF or NPY instead")
     return bytes(cv2.imencode(".png", values)[1])
@@ -125,7 +125,7 @@ def _decoded(whole: _Whole, name: str, flags: int) -> NDArray[Any]:
 
 
 def _checked(data: bytes, name: str, mask: bool = False) -> _Whole:
-    """What decides the pixels; InputError if the file is not whole."""
+    """Return what decides the pixels; InputError if the file is not whole."""
     view, position = memoryview(data), len(SIGNATURE)
     header, palette, transparent, image, kind = None, b"", b"", [], b""
     while kind != b"IEND":
@@ -178,7 +178,7 @@ def _require_data(header: _Header, image: list[bytes], name: str) -> None:
 
 
 def _begins_well(header: _Header, compressed: bytes) -> bool:
-    """Whether the data hold what the header says, in rows with filters that exist; see _FOREHAND."""
+    """Tell whether the data hold what the header says, in rows with filters that exist; see _FOREHAND."""
     starts, size = _row_starts(header)
     inflater = zlib.decompressobj()
     try:
@@ -193,7 +193,7 @@ def _begins_well(header: _Header, compressed: bytes) -> bool:
 
 
 def _row_starts(header: _Header) -> tuple[list[range], int]:
-    """Where the rows of each pass start in the inflated data, and how many bytes these are."""
+    """Return where the rows of each pass start in the inflated data, and how many bytes these are."""
     starts, size = [], 0
     for column, row, across, down in _ADAM7 if header.interlace else ((0, 0, 1, 1),):
         width, height = -(-(header.width - column) // across), -(-(header.height - row) // down)
@@ -205,7 +205,7 @@ def _row_starts(header: _Header) -> tuple[list[range], int]:
 
 
 def _full_palette(header: _Header, palette: bytes, name: str) -> bytes:
-    """The palette with an entry for every number that a pixel can hold."""
+    """Return the palette with an entry for every number that a pixel can hold."""
     if not palette or len(palette) % 3 or len(palette) > 3 * 2**header.depth:
         raise InputError(f"{name}: is a damaged PNG: its palette is missing or wrong")
     return palette.ljust(3 * 2**header.depth, b"\0")

@@ -80,5 +80,5 @@ def require_decoded_fits(
 
 
 def native(values: NDArray[Any]) -> NDArray[Any]:
-    """C-contiguous, in this machine's byte order."""
+    """Make C-contiguous, in this machine's byte order."""
     return np.ascontiguousarray(values, dtype=values.dtype.newbyteorder("="))

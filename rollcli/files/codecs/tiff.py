@@ -42,7 +42,7 @@ logging.getLogger("tifffile").addHandler(logging.NullHandler())
 
 
 def decode_tiff(data: bytes, name: str) -> Stored:
-    """The numbers of a single-channel TIFF file, as they are stored; of several pages the first."""
+    """Return the numbers of a single-channel TIFF file, as they are stored; of several pages the first."""
 
     def decode(file: Any, page: Any) -> Stored:
         if page.samplesperpixel != 1 or page.photometric == _PALETTE:
@@ -56,7 +56,7 @@ def decode_tiff(data: bytes, name: str) -> Stored:
 
 
 def picture(data: bytes, name: str) -> NDArray[Any]:
-    """The pixels of a camera image: grey (H, W) or BGR (H, W, 3), uint8 or uint16."""
+    """Return the pixels of a camera image: grey (H, W) or BGR (H, W, 3), uint8 or uint16."""
 
     def decode(_: Any, page: Any) -> NDArray[Any]:
         colour = page.photometric == _RGB and page.samplesperpixel >= 3
@@ -74,7 +74,7 @@ def picture(data: bytes, name: str) -> NDArray[Any]:
 
 
 def encode_tiff(values: NDArray[Any], nodata: tuple[float, ...] = ()) -> bytes:
-    """A single-page TIFF file of any real dtype; not compressed, so that its bytes depend on no library."""
+    """Return a single-page TIFF file; not compressed, so that its bytes depend on no library."""
     import tifffile
 
     tags = [(_GDAL_NODATA, "s", 0, f"{nodata[0]:.17g}", True)] if nodata else []
@@ -102,7 +102,7 @@ def _with_first_page(data: bytes, name: str, decode: Any) -> Any:
 
 
 def _pixels(page: Any, data: bytes, name: str) -> NDArray[Any]:
-    """The numbers of one page; shape (H, W, channels)."""
+    """Return the numbers of one page; shape (H, W, channels)."""
     width, height, samples = int(page.imagewidth), int(page.imagelength), int(page.samplesperpixel)
     if width == 0 or height == 0:
         raise InputError(f"{name}: has no pixels ({width} x {height})")
@@ -180,7 +180,7 @@ def _nodata(page: Any) -> tuple[float, ...]:
 
 
 def _note(file: Any, name: str) -> str:
-    """What to tell a user who gave several pages."""
+    """Return what to tell a user who gave several pages."""
     try:
         second = file.pages[1]
     except IndexError:

@@ -66,7 +66,7 @@ def check_parts(page: Any, part: tuple[int, int, int], data: bytes) -> None:
 
 
 def _as(number: float, dtype: np.dtype[Any]) -> Any:
-    """The number in this dtype, or 0 where that cannot hold it."""
+    """Return the number in this dtype, or 0 where that cannot hold it."""
     if dtype.kind in "iu" and not np.iinfo(dtype).min <= number <= np.iinfo(dtype).max:
         return dtype.type(0)  # NaN, too
     with np.errstate(over="ignore"):
@@ -74,7 +74,7 @@ def _as(number: float, dtype: np.dtype[Any]) -> Any:
 
 
 def _part(page: Any, packed: bytes, shape: tuple[int, int, int], most_rows: int) -> NDArray[Any]:
-    """One strip or tile, shape (rows, columns, channels): compression, byte order and predictor undone."""
+    """Decode one strip or tile, shape (rows, columns, channels)."""
     rows, columns, samples = shape
     dtype = page.dtype.newbyteorder(page.parent.byteorder)
     row = columns * samples * dtype.itemsize
