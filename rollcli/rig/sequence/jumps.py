@@ -20,6 +20,7 @@ from rollcli.rig.sequence.weights import Floats, frame_weights
 
 _PROPOSAL_BLOCKS = 200
 _MOVES = 2
+_ROUNDING = 1e-9  # degrees or metres: what equal frames differ by is arithmetic, and would look correlated
 _REACH = 1.0  # shortest stretches that a proposed jump may move
 
 
@@ -123,6 +124,7 @@ def fit_residuals(series: Series, level: Floats) -> tuple[Floats, float, Noise, 
         See `Fit`.
     """
     used, residuals = series.used, series.values - level
+    residuals = np.where(np.abs(residuals) > _ROUNDING, residuals, 0.0)
     weights = np.zeros(len(used))
     weights[used], tau2 = frame_weights(residuals[used], series.variances[used])
     relative = weights / weights.mean()

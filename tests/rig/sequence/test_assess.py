@@ -109,6 +109,12 @@ def test_few_equal_or_missing_values_are_assessed_without_complaint(values, erro
     assert found.now.value is None or min(np.array(values)[np.isfinite(values)]) <= found.now.value <= 2
 
 
+def test_equal_frames_have_an_interval_of_nothing():
+    found = assess_sequence([2.00012] * 24, [0.00014] * 24)
+    assert found.now.ci95 == pytest.approx(0, abs=1e-9)
+    assert (found.status, found.jumps) == ("stable", ())
+
+
 def test_a_wider_interval_counts_less():
     values = np.tile([1.0, 0.0], 200) + np.random.default_rng(0).normal(0, 0.01, 400)
     found = assess_sequence(values, np.tile([0.01, 0.5], 200))
