@@ -1,25 +1,26 @@
 """A call that fails costs a run no more than it says; `make fuzz` lets every call fail with every error."""
 
 import os
+import re
+import subprocess
+import sys
 
 import pytest
+
+from tests.run_cli import ROOT, environment
 
 if not hasattr(os, "fork"):
     pytest.skip("faults are injected into forked processes", allow_module_level=True)
 
-from tests.fuzz.faults import Bench
 
-
-@pytest.fixture(scope="module")
-def bench(tmp_path_factory):
-    return Bench(tmp_path_factory.mktemp("faults"))
-
-
-def test_a_run_makes_calls_of_every_kind_that_can_fail(bench):
-    assert {"open", "write", "close", "replace", "stat", "mkdir", "flock"} <= set(bench.whole.counts)
-
-
-def test_a_run_with_a_call_that_fails_is_resumed_to_the_same_bytes(bench):
-    sample = list(bench.faults(step=40))
-
-    assert [(fault, problem) for fault in sample if (problem := bench.problem(fault))] == []
+def test_a_run_with_a_call_that_fails_is_resumed_to_the_same_bytes():
+    # in a process of its own: a fork of this one would lack the threads that OpenCV may have started here
+    line = [sys.executable, "-m", "tests.fuzz.faults", "40"]
+    done = subprocess.run(
+        line, cwd=ROOT, env=environment(), capture_output=True, text=True, timeout=600, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    (tried,) = re.findall(r"^(\d+) faults, 0 finds$", done.stdout, flags=re.M)
+    assert int(tried) >= 5
+    (calls,) = re.findall(r"^calls: (.*)$", done.stdout, flags=re.M)
+    assert {"open", "write", "close", "replace", "stat", "mkdir", "flock"} <= set(calls.split())
