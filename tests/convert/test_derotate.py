@@ -204,7 +204,7 @@ def test_what_does_not_fit_is_refused_and_named_before_anything_is_written(folde
 
 def test_a_map_whose_row_has_no_angle_fails_and_the_others_are_done(folder):
     lines = (folder / "rolls.csv").read_text().splitlines()
-    lines[2] = "maps/frame1.png,,error" + "," * 15
+    lines[2] = "maps/frame1.png,,error" + "," * (lines[0].count(",") - 2)
     (folder / "rolls.csv").write_text("\n".join(lines) + "\n")
 
     done = rollcli("derotate", "maps", "--from", "rolls.csv", "-o", "out", cwd=folder)
