@@ -2,9 +2,7 @@
 
 from array import array
 
-from rollcli.files.results import Row
-
-_STATUSES = ("ok", "suspect", "error")
+from rollcli.files.results import STATUSES, Row
 
 
 class RigAnswer:
@@ -21,7 +19,7 @@ class RigAnswer:
     def add(self, row: Row) -> None:
         """Take a row that is written."""
         self._files.append(row.file)
-        self._status.append(_STATUSES.index(row.status))
+        self._status.append(STATUSES.index(row.status))
         self._rolls.append(float("nan") if row.roll_deg is None else row.roll_deg)
         self._halves.append(float("nan") if row.roll_ci95_deg is None else row.roll_ci95_deg)
 
@@ -32,7 +30,7 @@ class RigAnswer:
 
         columns = {
             "file": self._files,
-            "status": [_STATUSES[each] for each in self._status],
+            "status": [STATUSES[each] for each in self._status],
             "roll_deg": self._rolls,
             "roll_ci95_deg": self._halves,
         }
