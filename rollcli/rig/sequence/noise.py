@@ -16,7 +16,7 @@ _BINS = 90
 _LEAST_DECAY = 1e-4
 _ONE_SIGMA = 1.0  # of the deviance
 _SEEN = 8.0  # gain in deviance below which no correlation is seen: a single slow ordinate brings as much
-_UNSEEN = 1.5  # frames: the longest correlation time where none is seen, so that 24 single frames suffice
+_UNSEEN = 2.0  # frames: the longest correlation time where none is seen, so that 32 single frames suffice
 _SLOW_MATTERS = 3.0  # a slow share of a third governs the means of blocks
 
 
