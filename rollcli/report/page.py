@@ -1,12 +1,17 @@
 """HTML pages with charts that open from disk without a network: what every page shares.
 
-A page extends `page.html` and puts `Chart` objects where it wants them. plotly (its script alone) and jinja2
-are the extra `report` and imported here only, when a page is made.
+A page extends `page.html` and puts `Chart` objects where it wants them. The styles and scripts of `x.html`
+are in `x.css` and `x.js` beside it. plotly (its script alone) and jinja2 are the extra `report` and
+are imported here only, when a page is made.
 """
 
+import base64
+import hashlib
 import html
+import importlib.resources
 import importlib.util
 import json
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -14,6 +19,9 @@ from typing import Any
 from rollcli.errors import UsageError
 
 _NEEDED = ("plotly", "jinja2")
+# plotly adds a style sheet for geographic maps unless an element has its id; the policy would refuse it aloud
+_STYLE_OF_MAPS = re.compile(r'document\.getElementById\("([0-9a-f]{64})"\)')
+_PLOTLY_STYLES = ("",)  # plotly makes an empty style element, which it fills by rules
 
 
 @dataclass(frozen=True)
@@ -91,6 +99,35 @@ def render_page(package: str, template: str, **values: Any) -> bytes:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    script = Markup(get_plotlyjs())
-    page = environment.get_template(template).render(plotly_script=script, **values)
+    stem = template.removesuffix(".html")
+    styles = [*_texts("rollcli.report", "page.css"), *_texts(package, f"{stem}.css")]
+    plotly = get_plotlyjs()
+    scripts = [plotly, *_texts("rollcli.report", "page.js"), *_texts(package, f"{stem}.js")]
+    page = environment.get_template(template).render(
+        styles=map(Markup, styles),
+        scripts=map(Markup, scripts),
+        policy=_policy(styles, scripts),
+        unused_styles=_STYLE_OF_MAPS.findall(plotly),
+        **values,
+    )
     return page.encode("utf-8", "replace")
+
+
+def _texts(package: str, name: str) -> list[str]:
+    """Return the text of a style or script beside the templates; nothing where a page has none."""
+    file = importlib.resources.files(package) / "templates" / name
+    return [file.read_text("utf-8")] if file.is_file() else []
+
+
+def _policy(styles: Sequence[str], scripts: Sequence[str]) -> str:
+    """Return the Content-Security-Policy: only these styles and scripts are active; nothing is requested."""
+    allowed = {"script-src": scripts, "style-src": [*styles, *_PLOTLY_STYLES]}
+    sources = [f"{kind} {' '.join(map(_source, texts))}" for kind, texts in allowed.items()]
+    return "; ".join(
+        ["default-src 'none'", *sources, "img-src data: blob:", "base-uri 'none'", "form-action 'none'"]
+    )
+
+
+def _source(text: str) -> str:
+    digest = hashlib.sha256(text.encode("utf-8", "replace")).digest()
+    return f"'sha256-{base64.b64encode(digest).decode()}'"

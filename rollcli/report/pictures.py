@@ -74,6 +74,10 @@ def _attempt(make: Callable[[], Made]) -> tuple[Made | None, str]:
 def _map(subject: Subject, options: FrameOptions) -> NDArray[Any]:
     if "disparity" in subject.images:
         return read_disparity(subject.images["disparity"])
+    if subject.images_only:
+        raise InputError(
+            f"{subject.frame.file}: there is no map of it among the images (estimate --disparity)"
+        )
     return read_source(subject.frame, options).disparity
 
 

@@ -30,12 +30,15 @@ class Subject:
         The road's parabola, px.
     images : dict of str to str
         The files that `estimate` wrote for it, by kind.
+    images_only : bool
+        Whether pictures come from these alone: a result from elsewhere may name any file.
     """
 
     frame: Frame
     theta: float
     alpha: tuple[float, float, float] | None
     images: dict[str, str]
+    images_only: bool = False
 
 
 def subjects(rows: Sequence[Row], result: str, images: str | None, recorded: ImageOptions) -> list[Subject]:
@@ -65,10 +68,11 @@ def subjects(rows: Sequence[Row], result: str, images: str | None, recorded: Ima
             f"{images}: has no image of {listed(without)}: name the folder where estimate has put what it "
             "wrote, or leave --images out to have the pictures made from the inputs"
         )
-    return [_subject(row, Path(result).parent, files) for row, files in zip(rows, found, strict=True)]
+    only = images is not None
+    return [_subject(row, Path(result).parent, files, only) for row, files in zip(rows, found, strict=True)]
 
 
-def _subject(row: Row, folder: Path, images: dict[str, str]) -> Subject:
+def _subject(row: Row, folder: Path, images: dict[str, str], images_only: bool) -> Subject:
     frame = Frame(
         file=row.file,
         right_file=row.right_file,
@@ -79,7 +83,7 @@ def _subject(row: Row, folder: Path, images: dict[str, str]) -> Subject:
     )
     alpha = (row.alpha0, row.alpha1, row.alpha2)
     whole = None if None in alpha else alpha
-    return Subject(frame, math.radians(row.roll_deg or 0.0), whole, images)  # type: ignore[arg-type]
+    return Subject(frame, math.radians(row.roll_deg or 0.0), whole, images, images_only)  # type: ignore[arg-type]
 
 
 def _located(name: str, folder: Path) -> str:
@@ -93,10 +97,12 @@ def _images(row: Row, images: str, recorded: ImageOptions) -> dict[str, str]:
 
 
 def _image(kind: str, row: Row, images: Path, recorded: ImageOptions) -> str | None:
+    inside = images.resolve()  # neither a name nor a link leads out of it
     for folder in _folders(kind, images, getattr(recorded, kind)):
         for name in _tails(row.file):
             for ending in (".png",) if kind == "vdisparity" else MAP_ENDINGS:
-                if is_file(path := folder / f"{name}{ending}"):
+                path = folder / f"{name}{ending}"
+                if is_file(path) and path.resolve().is_relative_to(inside):
                     return str(path)
     return None
 

@@ -2,6 +2,7 @@
 
 import contextlib
 import re
+from pathlib import Path
 
 import pytest
 
@@ -43,13 +44,13 @@ def opened(browser, url):
     complaints = []
     with contextlib.ExitStack() as stack:
 
-        def open_page(width=1280, scheme="light", url=url):
+        def open_page(width=1280, scheme="light", url=url, expected=complaints):
             context = browser.new_context(
                 viewport={"width": width, "height": 900}, color_scheme=scheme, offline=True
             )
             stack.callback(context.close)
             page = context.new_page()
-            page.on("console", lambda message: complaints.append(message.text))
+            page.on("console", lambda message: expected.append(message.text))
             page.on("pageerror", lambda error: complaints.append(str(error)))
             page.on("dialog", lambda dialog: complaints.append(dialog.message))
             page.on("request", lambda request: complaints.extend(outside(request.url, url)))
@@ -203,6 +204,17 @@ def test_text_stands_out_in_light_and_dark_mode(opened, scheme):
         assert contrast(style(page, selector, "color"), card) > 4.5, selector
     for selector in ("#roll .xtick text", "#roll .legendtext", "#histogram .ytick text"):
         assert contrast(style(page, selector, "fill"), card) > 7, selector
+
+
+def test_a_script_that_is_not_the_pages_own_does_not_run(opened, tmp_path, url):
+    text = Path(url.removeprefix("file://")).read_text("utf-8")
+    (tmp_path / "page.html").write_text(
+        text.replace("</main>", "<script>window.ran = 1</script></main>"), "utf-8"
+    )
+    refused = []
+    page = opened(url=(tmp_path / "page.html").as_uri(), expected=refused)
+    assert page.evaluate("window.ran") is None
+    assert ["script-src" in message for message in refused] == [True]
 
 
 def test_charts_follow_when_the_mode_changes(opened):

@@ -1,5 +1,7 @@
 """`rollcli report` from the outside."""
 
+import base64
+import hashlib
 import html
 import json
 import os
@@ -110,7 +112,7 @@ def test_pictures_come_from_the_images_that_estimate_wrote(folder, images):
     assert done.status == 0, done.err
     # of the map itself nothing is left; the level map gives its v-disparity too
     assert len(PICTURES.findall(page_of(folder))) == (3 if images == "out/v" else 6)
-    assert page_of(folder).count("maps/frame0.png: no such file") == 1
+    assert page_of(folder).count("maps/frame0.png: there is no map of it among the images") == 1
 
 
 @pytest.mark.parametrize("name", ["../secret.png", "maps/../../secret.png", "derotated/../../secret.png"])
@@ -123,6 +125,35 @@ def test_no_picture_comes_from_outside_of_the_folder_of_images(tmp_path, name):
 
     assert done.status == 2
     assert "images: has no image of" in done.err
+
+
+def test_with_a_folder_of_images_neither_a_link_nor_an_input_is_shown(folder):
+    write_kitti(folder / "secret.png", road_map(0.1, width=300, height=200))
+    (folder / "out" / "upright" / "secret.png").symlink_to(folder / "secret.png")
+    write_kitti(folder / "out" / "v" / "secret.png", road_map(0.1))
+    write_result(folder / "rolls.csv", [row("secret.png")])
+
+    done = report(folder, "rolls.csv", "--images", "out/upright")
+    assert (done.status, "has no image of secret.png" in done.err) == (2, True)
+
+    (folder / "out" / "vdisparity").mkdir()
+    write_kitti(folder / "out" / "vdisparity" / "secret.png", road_map(0.1))
+    assert report(folder, "rolls.csv", "--images", "out").status == 0
+    assert len(PICTURES.findall(page_of(folder))) == 1
+
+
+def test_only_the_pages_own_scripts_and_styles_are_active_and_nothing_is_requested(folder):
+    assert report(folder, "out/rolls.csv", "--gallery", "1").status == 0
+    text = page_of(folder)
+    policy = html.unescape(re.search(r'Content-Security-Policy" content="([^"]+)"', text)[1])
+    rules = {name: sources for name, *sources in map(str.split, policy.split(";"))}
+    assert rules["default-src"] == ["'none'"]
+    assert rules["img-src"] == ["data:", "blob:"]
+    for kind in ("script", "style"):
+        inline = re.findall(rf"<{kind}(?: id=\S+)?>(.*?)</{kind}>", text, re.S)
+        digests = [base64.b64encode(hashlib.sha256(each.encode()).digest()).decode() for each in inline]
+        assert set(rules[f"{kind}-src"]) == {f"'sha256-{digest}'" for digest in digests}
+    assert not re.search(r"<[^>]+ (style|on\w+)=", re.sub(r"<script.*?</script>", "", text, flags=re.S))
 
 
 def test_pairs_are_shown_from_their_computed_maps_or_matched_anew(tmp_path):

@@ -1,0 +1,40 @@
+(() => {
+  const colour = name => getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
+  // "@name" in a colour's place is one of the page's colours
+  const coloured = (value, key) => {
+    if (typeof value === "string") return /color$/.test(key) && value[0] === "@" ? colour(value.slice(1)) : value;
+    if (Array.isArray(value)) return value.map(each => coloured(each, key));
+    if (value === null || typeof value !== "object") return value;
+    return Object.fromEntries(Object.entries(value).map(([name, each]) => [name, coloured(each, name)]));
+  };
+  const narrow = window.innerWidth < 576;
+  const styled = layout => {
+    const page = {
+      font: { family: getComputedStyle(document.body).fontFamily, size: narrow ? 11 : 13, color: colour("text") },
+      colorway: ["c1", "c2", "c3", "c4", "c5", "c6"].map(colour),
+      paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
+      margin: { l: narrow ? 48 : 64, r: 12, t: 34, b: 50 },
+      legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom", traceorder: "normal", bgcolor: "rgba(0,0,0,0)" },
+      modebar: { bgcolor: "rgba(0,0,0,0)", color: colour("muted"), activecolor: colour("c1") },
+      hoverlabel: { bgcolor: colour("card"), bordercolor: colour("line"), font: { color: colour("text") } },
+      ...layout,
+    };
+    for (const name of new Set([...Object.keys(layout).filter(key => /^[xy]axis/.test(key)), "xaxis", "yaxis"]))
+      page[name] = {
+        gridcolor: colour("grid"), linecolor: colour("line"), zerolinecolor: colour("line"),
+        automargin: true, ...layout[name], title: { standoff: 10, ...layout[name]?.title },
+      };
+    return page;
+  };
+  const draw = () => document.querySelectorAll("[data-chart]").forEach(script => {
+    const name = script.dataset.chart, chart = coloured(JSON.parse(script.textContent));
+    Plotly.react(name, chart.data, styled(chart.layout), {
+      responsive: true, displaylogo: false, displayModeBar: narrow ? false : "hover",
+      // named one by one: of its own accord plotly offers to upload the chart
+      modeBarButtons: [["toImage"], ["zoom2d", "pan2d"], ["zoomIn2d", "zoomOut2d", "resetScale2d"]], plotlyServerURL: "",
+      toImageButtonOptions: { filename: name, scale: 2 },
+    });
+  });
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
+  draw();
+})();
