@@ -1,0 +1,113 @@
+"""How well a right view is levelled that is turned, enlarged or shifted by a known amount.
+
+    python tests/benchmarks/bench_level.py [PAIRS]
+
+PAIRS rendered pairs (12) of 640x480, half as many of 1242x375, and every third real street where
+../shared/streets is. OpenCV warps the right view in twelve ways; each angle is compared with that of the
+untouched pair. To reach: within 0.1 degrees, or suspect; no level rendered pair corrected.
+"""
+
+import math
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+from rollcli.errors import RollcliError
+from rollcli.estimator.estimate import estimate_roll
+from rollcli.files.formats import read_image
+from rollcli.imaging.misalignment import LEVEL
+from rollcli.imaging.stereo import StereoMatch, StereoOptions, match_pair
+from rollcli.simulate.draw import draw_specs
+from rollcli.simulate.render import render_frame
+
+STREETS = Path(__file__).parents[3] / "shared" / "streets"
+SEED = 812
+WAYS = [  # degrees clockwise, share larger, pixels lower
+    (0.3, 0.0, 0.0),
+    (-0.8, 0.0, 0.0),
+    (0.0, 0.002, 0.0),
+    (0.0, -0.004, 0.0),
+    (0.0, 0.008, 0.0),
+    (0.0, 0.0005, 0.0),
+    (0.0, 0.0, 0.4),
+    (0.0, 0.0, -4.0),
+    (0.1, -0.001, 0.5),
+    (-0.8, 0.008, 4.0),
+    (0.8, 0.008, -4.0),
+    (0.5, -0.006, -2.0),
+]
+GOOD_DEG = 0.1
+
+
+class Views(NamedTuple):
+    """A left and a right view."""
+
+    left: NDArray[Any]
+    right: NDArray[Any]
+
+
+def main() -> None:
+    """Print a line for rendered and for real pairs."""
+    cv2.setNumThreads(1)
+    pairs = int(sys.argv[1]) if len(sys.argv) > 1 else 12
+    report("rendered", [*rendered(pairs, (640, 480)), *rendered(pairs // 2, (1242, 375))])
+    if STREETS.is_dir():
+        named = sorted((STREETS / "left").iterdir())[::3]
+        sides = [(path, STREETS / "right" / path.name) for path in named]
+        report("real streets", [Views(*(read_image(str(path)) for path in pair)) for pair in sides])
+
+
+def rendered(pairs: int, size: tuple[int, int]) -> Iterator[Views]:
+    """Render level pairs."""
+    span = math.radians(10)
+    for spec in draw_specs(pairs, roll=(-span, span), size=size, seed=SEED, colour=False):
+        frame = render_frame(spec)
+        yield Views(frame.left, frame.right)
+
+
+def report(kind: str, pairs: list[Views]) -> None:
+    """Compare each pair with itself, untouched and warped."""
+    off, doubted, corrected = [], 0, 0
+    for pair in pairs:
+        level = match_pair(*pair, StereoOptions())
+        corrected += level.corrected != LEVEL
+        for way in WAYS:
+            try:
+                match = match_pair(pair.left, warped(pair.right, *way), StereoOptions())
+            except RollcliError:
+                doubted += 1
+                continue
+            doubted += bool(match.doubt)
+            if not match.doubt:
+                off.append(abs(roll_deg(match) - roll_deg(level)))
+    print(f"{kind}: {len(pairs)} pairs, {corrected} corrected untouched; {len(WAYS)} ways each: ", end="")
+    print(
+        f"median {np.median(off):.3f}, 95 % {np.percentile(off, 95):.3f}, worst {max(off):.3f} degrees; ",
+        end="",
+    )
+    print(f"{np.sum(np.array(off) > GOOD_DEG)} of {len(off)} above {GOOD_DEG}; {doubted} doubted or refused")
+
+
+def warped(view: NDArray[Any], clockwise_deg: float, larger: float, lower: float) -> NDArray[Any]:
+    """What a camera sees that is turned, nearer and lower."""
+    height, width = view.shape[:2]
+    matrix = cv2.getRotationMatrix2D(((width - 1) / 2, (height - 1) / 2), -clockwise_deg, 1 + larger)
+    matrix[1, 2] += lower
+    size = width, height
+    return cv2.warpAffine(view, matrix, size, flags=cv2.INTER_LANCZOS4, borderMode=cv2.BORDER_REFLECT)
+
+
+def roll_deg(match: StereoMatch) -> float:
+    """The angle of a matched pair, degrees."""
+    return math.degrees(estimate_roll(match.disparity).theta)
+
+
+if __name__ == "__main__":
+    main()
