@@ -66,6 +66,7 @@ def _arguments(options: MethodOptions) -> dict[str, Any]:
         "lambda0": options.lambda0,
         "tolerance": math.radians(options.tolerance_deg),
         "max_roll": math.radians(options.max_roll_deg),
+        "max_interval": math.radians(options.max_interval_deg),
         "seed": options.seed,
     }
 
@@ -88,6 +89,7 @@ def _row(frame: Frame, source: Source, estimate: RollEstimate, note: str) -> Row
         pitch_ci95_deg=_degrees(estimate.pitch_ci95),
         height_m=estimate.height_m,
         height_ci95_m=estimate.height_ci95_m,
+        camber=estimate.camber,
         method=estimate.method,
         iterations=estimate.iterations,
         converged=estimate.converged,

@@ -27,6 +27,8 @@ CONVENTIONS = {
     "roll_ci95_deg": "half-width of the 95 % interval, degrees",
     "pitch_deg": "angle of the optical axis to the road near ahead, degrees; positive: looks down",
     "height_m": "of the left camera over the road near ahead, metres",
+    "camber": "curvature across the road, 1/(camera height): x camera heights to the side, the surface is "
+    "higher by camber/2 x^2 camera heights; negative: crowned",
     "alignment": "median over the pairs of what was corrected, the right image or camera against the left; "
     "px of the size matched at; right_camera_roll_deg is positive counter-clockwise, seen from behind",
     "alpha0, alpha1, alpha2": "road disparity in px = alpha0 + alpha1 y + alpha2 y^2",
@@ -34,7 +36,12 @@ CONVENTIONS = {
 }
 
 # fields whose option has another name
-_OPTION_NAMES = {"tolerance_deg": "tolerance", "max_roll_deg": "max-roll", "mode": "sgbm-mode"}
+_OPTION_NAMES = {
+    "tolerance_deg": "tolerance",
+    "max_roll_deg": "max-roll",
+    "max_interval_deg": "max-interval",
+    "mode": "sgbm-mode",
+}
 _NUMBERS = ("scale", "num_disparities", "vertical_offset")  # options that are None by default
 Options = TypeVar("Options", bound="DataclassInstance")
 

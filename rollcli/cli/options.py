@@ -27,8 +27,10 @@ def _stereo(
     return StereoOptions(num_disparities=searched, mode=sgbm_mode, vertical_offset=offset, **values)
 
 
-def _method(*, tolerance: float, max_roll: float, **values: Any) -> MethodOptions:
-    return MethodOptions(tolerance_deg=tolerance, max_roll_deg=max_roll, **values)
+def _method(*, tolerance: float, max_roll: float, max_interval: float, **values: Any) -> MethodOptions:
+    return MethodOptions(
+        tolerance_deg=tolerance, max_roll_deg=max_roll, max_interval_deg=max_interval, **values
+    )
 
 
 _folders = (
@@ -218,6 +220,13 @@ method_options = record(
         type=Number("DEG", above=0, at_most=MAX_ROLL_LIMIT_DEG),
         default=MethodOptions.max_roll_deg,
         help="Largest |roll| that road finding considers, degrees.",
+    ),
+    option(
+        "--max-interval",
+        type=Number("DEG", above=0, at_most=90),
+        default=MethodOptions.max_interval_deg,
+        help="Doubt an angle whose 95 % half-width is above this, or of which noise alone makes a third of "
+        "this, degrees.",
     ),
     option(
         "--seed",

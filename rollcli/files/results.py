@@ -34,6 +34,7 @@ class Row:
     pitch_ci95_deg: float | None = None
     height_m: float | None = None
     height_ci95_m: float | None = None
+    camber: float | None = None
     method: str = ""
     iterations: int | None = None
     converged: bool | None = None
@@ -62,6 +63,7 @@ _DIGITS = {
     "pitch_ci95_deg": ".6f",
     "height_m": ".6f",
     "height_ci95_m": ".6f",
+    "camber": ".6f",
     "rmse_px": ".6g",
     "alpha0": ".9g",
     "alpha1": ".9g",

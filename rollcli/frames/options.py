@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from rollcli.estimator.methods import LAMBDA0, MAX_ROLL_DEG, TOLERANCE_DEG, LearningRate
+from rollcli.estimator.methods import LAMBDA0, MAX_INTERVAL_DEG, MAX_ROLL_DEG, TOLERANCE_DEG, LearningRate
 from rollcli.files.stores.locations import located
 from rollcli.imaging.stereo_options import StereoOptions
 
@@ -60,6 +60,7 @@ class MethodOptions:
     lambda0: LearningRate = LAMBDA0
     tolerance_deg: float = TOLERANCE_DEG
     max_roll_deg: float = MAX_ROLL_DEG
+    max_interval_deg: float = MAX_INTERVAL_DEG
     seed: int = 0
 
 

@@ -22,7 +22,7 @@ def estimate_roll(
     calibration : Calibration, optional
         Of the rectified left view, at the map's size or at another one; see `read_calibration`.
     **settings
-        mask, method, model, road, lambda0, tolerance, max_roll, seed and road_mask: see
+        mask, method, model, road, lambda0, tolerance, max_roll, max_interval, seed and road_mask: see
         `rollcli.estimator.estimate.estimate_roll`.
 
     Returns

@@ -10,8 +10,8 @@ import pytest
 from tests.run_cli import contents, rollcli, write_maps
 
 COLUMNS = (
-    "file,right_file,status,roll_deg,roll_ci95_deg,pitch_deg,pitch_ci95_deg,height_m,height_ci95_m,method,"
-    "iterations,converged,global_minimum,rmse_px,"
+    "file,right_file,status,roll_deg,roll_ci95_deg,pitch_deg,pitch_ci95_deg,height_m,height_ci95_m,camber,"
+    "method,iterations,converged,global_minimum,rmse_px,"
     "alpha0,alpha1,alpha2,valid_fraction,road_fraction,width,height,message"
 )
 
@@ -83,3 +83,9 @@ def test_an_existing_result_is_refused(maps):
     assert "--overwrite" in done.err
     assert (maps / "rolls.csv").read_bytes() == before
     assert rollcli("estimate", "maps", "-o", "rolls.csv", "--overwrite", cwd=maps).status == 0
+
+
+@pytest.mark.parametrize(("most", "doubted"), [("0.000001", True), ("90", False)])
+def test_max_interval_says_which_angles_are_doubted(maps, most, doubted):
+    rows = rows_of(rollcli("estimate", "maps/frame1.png", "--max-interval", most, cwd=maps).out)
+    assert ["the interval is wide" in row["message"] for row in rows] == [doubted]

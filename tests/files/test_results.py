@@ -17,6 +17,7 @@ ROW = Row(
     pitch_ci95_deg=0.0323456789,
     height_m=1.65123456,
     height_ci95_m=0.004,
+    camber=-0.0123456789,
     method="gd",
     iterations=4,
     converged=True,
@@ -36,7 +37,7 @@ FAILED = Row(file="maps/b.png", status="error", message="maps/b.png: is empty")
 
 def test_a_row_of_csv_has_fixed_digits_and_rfc_4180_quotes():
     assert format_row(ROW, "csv") == (
-        b"maps/a.png,,suspect,-1.250000,0.012346,2.500000,0.032346,1.651235,0.004000,"
+        b"maps/a.png,,suspect,-1.250000,0.012346,2.500000,0.032346,1.651235,0.004000,-0.012346,"
         b"gd,4,true,false,0.123457,-45.0018767,0.300002217,"
         b'-3.83765039e-09,0.597333,0.500000,1242,375,"one, ""two"""\n'
     )
@@ -50,7 +51,7 @@ def test_what_csv_gives_a_meaning_is_quoted(text):
 
 
 def test_an_error_row_holds_no_numbers():
-    assert format_row(FAILED, "csv") == b"maps/b.png,,error" + b"," * 19 + b"maps/b.png: is empty\n"
+    assert format_row(FAILED, "csv") == b"maps/b.png,,error" + b"," * 20 + b"maps/b.png: is empty\n"
 
 
 def test_timing_is_a_column_of_its_own_at_the_end():
@@ -88,7 +89,7 @@ def test_rounding_makes_no_negative_zero_and_stays_within_the_half_open_range(th
 
 
 def test_numbers_that_are_not_finite_are_left_empty():
-    assert format_row(Row("a", rmse_px=math.nan, alpha0=math.inf), "csv") == b"a,,error" + b"," * 19 + b"\n"
+    assert format_row(Row("a", rmse_px=math.nan, alpha0=math.inf), "csv") == b"a,,error" + b"," * 20 + b"\n"
 
 
 def test_a_result_is_read_with_the_record_of_its_run(tmp_path):
