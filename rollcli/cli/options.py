@@ -61,12 +61,8 @@ pair_options = record(
     "pairs",
     "Stereo pairs",
     PairOptions,
-    option(
-        "--left", type=PATH, metavar="PATH", help="The left images: a file, a folder or a quoted pattern."
-    ),
-    option(
-        "--right", type=PATH, metavar="PATH", help="The right images: a file, a folder or a quoted pattern."
-    ),
+    option("--left", type=PATH, metavar="PATH", help="Left images: a file, a folder or a quoted pattern."),
+    option("--right", type=PATH, metavar="PATH", help="Right images: a file, a folder or a quoted pattern."),
     option(
         "--match",
         type=Choice("name", "order"),
