@@ -23,9 +23,8 @@ _STEP = 0.3  # px of the small view, anywhere: the end; the match at full size s
 _FAR = 0.5  # the same: what was matched so far off does not show the range
 _MARGIN = 1.1  # beyond the largest disparity seen, to search
 # From a start 3 px off, a view of little texture can end at an offset and a scale that deny each other. It is
-# told by what it leaves (wrong: 0.22 px and more, right: up to 0.22), with a scale that few rigs have
-_UNSURE_SPREAD = 0.2  # px of the smallest view
-_UNSURE_SCALE = 0.012
+# told by its scale; other starts then show which leaves less
+_UNSURE_SCALE = 0.003
 _STARTS = (-4.0, 4.0)  # px of the whole view; offset of the further attempts
 
 
@@ -88,8 +87,7 @@ def _coarsest(small: Views, factor: float) -> _Small | None:
 
 
 def _unsure(measured: Measured) -> bool:
-    scale = abs(measured.misalignment.scale)
-    return scale > _UNSURE_SCALE or (measured.spread > _UNSURE_SPREAD and scale > _UNSURE_SCALE / 2)
+    return abs(measured.misalignment.scale) > _UNSURE_SCALE
 
 
 def _clearest(attempts: Iterable[_Small | None]) -> _Small | None:
