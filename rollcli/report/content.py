@@ -10,7 +10,7 @@ from rollcli.report.axis_range import outside
 from rollcli.report.gallery import SPREAD, SUSPECT, WIDEST, Choice
 from rollcli.report.histogram import histogram
 from rollcli.report.options import ReportOptions
-from rollcli.report.page import render_page
+from rollcli.report.page import Rows, render_page
 from rollcli.report.pictures import Pictures
 from rollcli.report.pose_charts import pose_charts
 from rollcli.report.roll_chart import roll_chart
@@ -41,6 +41,7 @@ def report_page(result: Result, options: ReportOptions, shown: Sequence[tuple[Ch
     return render_page(
         "rollcli.report",
         "report.html",
+        "frames",
         title=options.title or f"Roll of {frame_count(len(rows))}",
         result=options.result,
         version=run.get("rollcli"),
@@ -64,8 +65,26 @@ def report_page(result: Result, options: ReportOptions, shown: Sequence[tuple[Ch
         outside=outside(rows),
         doubtful=doubtful[:_LISTED],
         more_doubtful=max(0, len(doubtful) - _LISTED),
+        rows=_table(rows),
         gallery=[_card(rows, choice, pictures) for choice, pictures in shown],
         chosen=_chosen_text(rows, [choice for choice, _ in shown]),
+    )
+
+
+def _table(rows: Sequence[Row]) -> Rows:
+    """Return what the table shows of each frame: number, file, status, roll, roll in words, reason."""
+    return Rows(
+        [
+            (
+                number,
+                row.file.encode("utf-8", "replace").decode(),
+                "failed" if row.status == "error" else row.status,
+                None if row.roll_deg is None else round(row.roll_deg, 6),
+                with_interval(row.roll_deg, row.roll_ci95_deg),
+                row.message,
+            )
+            for number, row in enumerate(rows, 1)
+        ]
     )
 
 

@@ -47,15 +47,32 @@ class Chart:
     layout: Mapping[str, Any] = field(default_factory=dict)
 
     def __html__(self) -> str:
-        """The chart's place and its content; file names in it cannot end the script."""
-        content = json.dumps({"data": self.data, "layout": self.layout}, allow_nan=False)
-        for mark in "<>&\u2028\u2029":
-            content = content.replace(mark, f"\\u{ord(mark):04x}")
+        """Return the chart's place and its content."""
+        content = _json({"data": self.data, "layout": self.layout})
         name = html.escape(self.name)
         return (
             f'<div class="chart" id="{name}" role="img" aria-label="{html.escape(self.label)}"></div>'
             f'<script type="application/json" data-chart="{name}">{content}</script>'
         )
+
+
+@dataclass(frozen=True)
+class Rows:
+    """What a script of the page reads as the element `rows`; prints itself in a template."""
+
+    rows: Sequence[Sequence[Any]]
+
+    def __html__(self) -> str:
+        """Return the rows as JSON."""
+        return f'<script type="application/json" id="rows">{_json({"rows": self.rows})}</script>'
+
+
+def _json(value: Any) -> str:
+    """Return JSON for a script element, which file names in it cannot end."""
+    content = json.dumps(value, allow_nan=False)
+    for mark in "<>&\u2028\u2029":
+        content = content.replace(mark, f"\\u{ord(mark):04x}")
+    return content
 
 
 def require_extra(what: str) -> None:
@@ -71,7 +88,7 @@ def require_extra(what: str) -> None:
         raise UsageError(f'{what} needs {" and ".join(missing)}: pip install "rollcli[report]"')
 
 
-def render_page(package: str, template: str, **values: Any) -> bytes:
+def render_page(package: str, template: str, *more: str, **values: Any) -> bytes:
     """Fill a template that extends `page.html`; whatever it prints is escaped.
 
     Parameters
@@ -80,6 +97,8 @@ def render_page(package: str, template: str, **values: Any) -> bytes:
         Whose folder `templates` holds the template.
     template : str
         Its name.
+    *more : str
+        Further scripts beside it, without their ending.
     **values
         What it prints; `title` is required by `page.html`.
 
@@ -102,7 +121,11 @@ def render_page(package: str, template: str, **values: Any) -> bytes:
     stem = template.removesuffix(".html")
     styles = [*_texts("rollcli.report", "page.css"), *_texts(package, f"{stem}.css")]
     plotly = get_plotlyjs()
-    scripts = [plotly, *_texts("rollcli.report", "page.js"), *_texts(package, f"{stem}.js")]
+    scripts = [
+        plotly,
+        *_texts("rollcli.report", "page.js"),
+        *(text for name in (stem, *more) for text in _texts(package, f"{name}.js")),
+    ]
     page = environment.get_template(template).render(
         styles=map(Markup, styles),
         scripts=map(Markup, scripts),

@@ -63,7 +63,11 @@ def opened(browser, url):
 
 
 def outside(requested, url):
-    return [] if requested == url or requested.startswith(("data:", "blob:")) else [requested]
+    return (
+        []
+        if requested.partition("#")[0] == url.partition("#")[0] or requested.startswith(("data:", "blob:"))
+        else [requested]
+    )
 
 
 def luminance(colour):
@@ -215,6 +219,89 @@ def test_a_script_that_is_not_the_pages_own_does_not_run(opened, tmp_path, url):
     page = opened(url=(tmp_path / "page.html").as_uri(), expected=refused)
     assert page.evaluate("window.ran") is None
     assert ["script-src" in message for message in refused] == [True]
+
+
+@pytest.fixture(scope="module")
+def long_url(tmp_path_factory):
+    """The page of 10,000 frames, of which every fiftieth is suspect."""
+    folder = tmp_path_factory.mktemp("long")
+    rows = [
+        row(
+            f"maps/f{i:05}.png",
+            (i * 7919 % 10_000) / 1000,
+            0.05,
+            "ok" if i % 50 else "suspect",
+            "" if i % 50 else "<b>wide</b>",
+        )
+        for i in range(10_000)
+    ]
+    write_result(folder / "rolls.csv", rows)
+    assert rollcli("report", "rolls.csv", "-o", "page.html", "--gallery", "0", cwd=folder).status == 0
+    return (folder / "page.html").as_uri()
+
+
+def shown_rows(page):
+    """Number, name, status and roll of each row in the document, from above."""
+    return [
+        [cell.strip() for cell in cells][:4]
+        for cells in page.locator(".rows .row").evaluate_all(
+            "all => all.map(each => [...each.children].map(cell => cell.textContent))"
+        )
+    ]
+
+
+def test_a_table_of_ten_thousand_frames_holds_the_rows_in_view_alone_and_is_sorted_and_searched(
+    opened, long_url
+):
+    page = opened(url=long_url)
+    assert shown_rows(page)[0][:2] == ["1", "maps/f00000.png"]
+    assert len(shown_rows(page)) < 50
+
+    page.get_by_role("button", name="roll", exact=True).click()
+    rolls = [float(line[3].split("°")[0]) for line in shown_rows(page)]
+    assert rolls == sorted(rolls)
+    assert rolls[0] == 0
+    page.get_by_role("button", name="roll", exact=True).click()
+    assert shown_rows(page)[0][3] == "+10.00° ± 0.05°"
+
+    page.get_by_role("searchbox").fill("WIDE f001")
+    assert page.locator(".count").inner_text() == "2 of 10,000"
+    assert {line[1] for line in shown_rows(page)} == {"maps/f00100.png", "maps/f00150.png"}
+
+    page.get_by_role("searchbox").fill("")
+    page.get_by_role("button", name="#", exact=True).click()
+    page.locator(".rows").evaluate("box => { box.scrollTop = box.scrollHeight; }")
+    page.get_by_text("maps/f09999.png").wait_for()
+    assert len(shown_rows(page)) < 50
+
+
+def test_an_address_leads_to_a_frame_whatever_it_is_called(opened, url, long_url):
+    page = opened(url=long_url + "#frame=maps/f07750.png")
+    assert page.locator(".detail h3").inner_text() == "maps/f07750.png"
+    assert "<b>wide</b>" in page.locator(".detail").inner_text()
+    assert page.locator(".rows [aria-current]").is_visible()
+
+    page = opened(url=url)
+    page.locator(".rows .row", has_text="alert").click()
+    assert page.locator(".detail h3").inner_text() == NAME
+    assert page.locator(".detail img").count() == 4
+    again = opened(url=page.url)
+    assert again.locator(".detail h3").inner_text() == NAME
+    assert opened(url=url + "#frame=%E0%A4%A").locator(".detail").is_hidden()
+
+
+def test_a_click_on_a_point_of_the_chart_leads_to_its_row_and_pictures(opened):
+    page = opened()
+    for name in ("maps/frame3.png", "maps/frame5.png"):
+        page.locator("#roll").scroll_into_view_if_needed()
+        x, y = page.evaluate(PLACE, name)
+        page.mouse.move(x + 1, y + 1)
+        page.locator("#roll .hovertext", has_text=name).wait_for()
+        page.mouse.click(x + 1, y + 1)
+        page.locator(".detail h3", has_text=name).wait_for()
+        assert (page.locator(".detail img").count() == 4) == (name == "maps/frame3.png")
+        assert page.locator(".rows [aria-current]").is_visible()
+    assert "maps/frame5.png: is empty" in page.locator(".detail").inner_text()
 
 
 def test_charts_follow_when_the_mode_changes(opened):

@@ -13,7 +13,11 @@
     const seen = dialog.querySelector("div");
     seen.scrollLeft = (seen.scrollWidth - seen.clientWidth) / 2;
   };
-  pictures.forEach((button, place) => button.addEventListener("click", () => show(place)));
+  // also from a copy of the pictures, which the table shows
+  document.addEventListener("click", event => {
+    const caption = event.target.closest(".pictures button")?.dataset.caption;
+    if (caption !== undefined) show(pictures.findIndex(each => each.dataset.caption === caption));
+  });
   dialog.querySelectorAll("[data-step]").forEach(
     button => button.addEventListener("click", () => show(current + Number(button.dataset.step))));
   dialog.querySelector("[data-close]").addEventListener("click", () => dialog.close());
