@@ -157,7 +157,7 @@ def jackknife(surface: Surface, theta: float, tuning: IntervalTuning) -> Jackkni
 def _lateral(rows: Floats, weights: Floats, total: Floats, side: Reals, tuning: IntervalTuning) -> float:
     """Return by how much the theta of the lane ahead differs from that of all pixels."""
     lane = weights * np.exp(-np.minimum(np.square(np.square(side)), 80))
-    return abs(_theta_of((rows * lane) @ rows.T, total, tuning) - _theta_of(total, total, tuning))
+    return _apart((rows * lane) @ rows.T, total, total, tuning)
 
 
 def _depth(rows: Floats, weights: Floats, total: Floats, along: Reals, tuning: IntervalTuning) -> float:
@@ -165,17 +165,18 @@ def _depth(rows: Floats, weights: Floats, total: Floats, along: Reals, tuning: I
     middle = float(weights @ along) / float(weights.sum())
     near = weights / (1 + np.exp(np.clip((middle - along) / tuning.depth_fade, -50, 50)))
     products = (rows * near) @ rows.T
-    return abs(_theta_of(products, total, tuning) - _theta_of(total - products, total, tuning))
+    return _apart(products, total - products, total, tuning)
 
 
-def _theta_of(part: Floats, total: Floats, tuning: IntervalTuning) -> float:
-    """Return how far the theta of a part lies from the fit, at its camber, from the part's products.
+def _apart(one: Floats, other: Floats, total: Floats, tuning: IntervalTuning) -> float:
+    """Return how far the thetas of two parts lie apart, at the fitted camber, from the parts' products.
 
     A little of the whole is added: where a part is nearly empty, it says what the whole says.
     """
-    products = part + tuning.whole_share * total
-    products[_CAMBER, :5] = products[:5, _CAMBER] = 0
-    return float(solve_normal(products[:5, :5], products[:5, 5:])[_THETA, 0])
+    products = np.stack([one, other]) + tuning.whole_share * total
+    products[:, _CAMBER, :5] = products[:, :5, _CAMBER] = 0
+    theta = solve_normal(products[:, :5, :5], products[:, :5, 5:])[:, _THETA, 0]
+    return abs(float(theta[0] - theta[1]))
 
 
 def _bend(total: Floats, camber: float) -> float:

@@ -98,7 +98,11 @@ class NearPixels:
         side = lane.side(self.x, self.y, np.maximum(road, tuning.least_road * self.d))
         used = (self.place > tuning.least_place) & (road > tuning.least_road * self.d)
         profile = read_profile(side[used], self.d[used] / road[used] - 1, tuning)
-        return profile, replace(self, place=self.place * profile.at(side).astype(np.float32))
+        weights = profile.at(side)
+        kept = np.flatnonzero(weights > self.tuning.least_weight)
+        names = ("x", "y", "d", "tolerance", "ahead", "shown")
+        arrays = {name: getattr(self, name)[kept] for name in names}
+        return profile, replace(self, **arrays, place=self.place[kept] * weights[kept].astype(np.float32))
 
     def fit(self, start: RoadModel, rounds: int, *, parabolic: bool, cambered: bool = False) -> Fit:
         """Fit (a0, a1, a2, theta) and the camber, starting from the road's plane or from an earlier fit.
