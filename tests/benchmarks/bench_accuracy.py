@@ -28,7 +28,7 @@ def main() -> None:
     mode = sys.argv[3] if len(sys.argv) > 3 else "3way"
     for span, seed in SEEDS.items():
         rows, failed = [], 0
-        for disparity, roll_deg, scene in matched(frames, seed, span, (width, height), mode):
+        for disparity, roll_deg, scene, _ in matched(frames, seed, span, (width, height), mode):
             try:
                 estimate = estimate_roll(disparity)
             except EstimationError:

@@ -41,7 +41,7 @@ def terms(frames: int, seeds: tuple[int, int]) -> tuple[np.ndarray, list[str]]:
     """Rows of (error, noise before the factor, choice of surface), degrees; and the kinds of scene."""
     tuning, rows, kinds = TUNING.interval, [], []
     for (seed, span), section in itertools.product(zip(seeds, (10, 35), strict=True), ("flat", "mixed")):
-        for disparity, roll_deg, scene in matched(frames // 4, seed, span, cross_section=section):
+        for disparity, roll_deg, scene, _ in matched(frames // 4, seed, span, cross_section=section):
             try:
                 theta = estimate_roll(disparity).theta
                 surface = select_pixels(CheckedMap.of(disparity, None), REQUEST).surface
