@@ -3,7 +3,6 @@
 import math
 import time
 from dataclasses import replace
-from typing import Any
 
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.result import RollEstimate
@@ -11,7 +10,7 @@ from rollcli.files.results import Row
 from rollcli.frames.encode import write_images
 from rollcli.frames.frame import Frame, FrameResult
 from rollcli.frames.guard import guarded
-from rollcli.frames.options import FrameOptions, MethodOptions
+from rollcli.frames.options import FrameOptions
 from rollcli.frames.outputs import remove_images
 from rollcli.frames.read import Source, read_source
 from rollcli.rig.calibration import Calibration
@@ -37,7 +36,7 @@ def run_frame(frame: Frame, options: FrameOptions) -> FrameResult:
 def _estimate(frame: Frame, options: FrameOptions) -> FrameResult:
     source = read_source(frame, options)
     wanted = options.images.road_mask is not None
-    arguments = _arguments(options.method)
+    arguments = options.method.arguments()
     estimate = estimate_roll(source.disparity, mask=source.allowed, road_mask=wanted, **arguments)
     calibration = _calibration(frame, source, estimate)
     horizon = None if calibration is None else horizon_row(estimate.tangent, calibration)
@@ -56,19 +55,6 @@ def _calibration(frame: Frame, source: Source, estimate: RollEstimate) -> Calibr
     if source.size is not None:
         calibration = calibration.for_size(*source.size)
     return calibration.for_size(estimate.width, estimate.height)
-
-
-def _arguments(options: MethodOptions) -> dict[str, Any]:
-    return {
-        "method": options.method,
-        "model": options.model,
-        "road": options.road,
-        "lambda0": options.lambda0,
-        "tolerance": math.radians(options.tolerance_deg),
-        "max_roll": math.radians(options.max_roll_deg),
-        "max_interval": math.radians(options.max_interval_deg),
-        "seed": options.seed,
-    }
 
 
 def _row(frame: Frame, source: Source, estimate: RollEstimate, note: str) -> Row:

@@ -16,7 +16,7 @@ from rollcli.errors import InputError
 from rollcli.files.results import run_path
 from rollcli.files.storage import write_bytes
 from rollcli.frames.frame import Frame
-from rollcli.frames.options import EncodingOptions, FrameOptions, ImageOptions
+from rollcli.frames.options import EncodingOptions, FrameOptions, ImageOptions, MethodOptions
 from rollcli.imaging.stereo_options import StereoOptions
 
 if TYPE_CHECKING:
@@ -153,6 +153,7 @@ def recorded_options(run: Mapping[str, Any] | None, name: str) -> FrameOptions:
     try:
         return FrameOptions(
             encoding=_filled(EncodingOptions(), given),
+            method=_filled(MethodOptions(), given),
             stereo=_filled(StereoOptions(), given),
             images=_filled(ImageOptions(), given),
         )
@@ -177,6 +178,8 @@ def _filled(defaults: Options, given: Mapping[str, Any]) -> Options:
 
 def _kinds(name: str, default: Any) -> tuple[type, ...]:
     """List the types that JSON may hold for an option."""
+    if name == "lambda0":
+        return (str, int, float)
     if default is None:
         return (type(None), int, float) if name in _NUMBERS else (type(None), str)
     return {int: (int,), float: (int, float), tuple: (tuple,)}.get(type(default), (str,))

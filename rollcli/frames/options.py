@@ -3,9 +3,10 @@
 Import-light: the command line loads this module to show its help.
 """
 
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from rollcli.estimator.methods import LAMBDA0, MAX_INTERVAL_DEG, MAX_ROLL_DEG, TOLERANCE_DEG, LearningRate
 from rollcli.files.stores.locations import located
@@ -62,6 +63,19 @@ class MethodOptions:
     max_roll_deg: float = MAX_ROLL_DEG
     max_interval_deg: float = MAX_INTERVAL_DEG
     seed: int = 0
+
+    def arguments(self) -> dict[str, Any]:
+        """Return the arguments that `estimate_roll` takes."""
+        return {
+            "method": self.method,
+            "model": self.model,
+            "road": self.road,
+            "lambda0": self.lambda0,
+            "tolerance": math.radians(self.tolerance_deg),
+            "max_roll": math.radians(self.max_roll_deg),
+            "max_interval": math.radians(self.max_interval_deg),
+            "seed": self.seed,
+        }
 
 
 @dataclass(frozen=True)

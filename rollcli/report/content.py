@@ -1,6 +1,5 @@
 """What the page of a report shows, ready to be printed by its template."""
 
-import base64
 from collections.abc import Sequence
 from typing import Any
 
@@ -105,27 +104,37 @@ def _chosen_text(rows: Sequence[Row], choices: Sequence[Choice]) -> str:
 
 
 def _card(rows: Sequence[Row], choice: Choice, pictures: Pictures) -> dict[str, Any]:
-    row, aspect = rows[choice.place], pictures.aspect
+    row = rows[choice.place]
     roll = degrees(row.roll_deg, decimals(row.roll_ci95_deg))
-    beside = min(max(0.28 * aspect, 0.5), 1.2)  # of a v-disparity: room for its numbers, and no more
     return {
         "number": choice.place + 1,
         "row": row,
+        "roll": roll,
         "reason": choice.reason,
         "missing": pictures.missing,
         "empty": pictures.empty,
-        "pairs": [
+        "show": "before" if pictures.map else "after",
+        "columns": [
             [
-                ("Map", "map", _data_uri(pictures.map), aspect),
-                ("v-disparity", "v-disparity of the map", _data_uri(pictures.map_counts), beside),
+                ("", "Left image, the found road tinted", "road on the left image", pictures.road, ""),
+                ("before", "Map", "map", pictures.map, pictures.missing),
+                (
+                    "after",
+                    f"Map, de-rotated by {roll}",
+                    f"map de-rotated by {roll}",
+                    pictures.level,
+                    "Map, de-rotated: not there",
+                ),
             ],
             [
-                (f"De-rotated by {roll}", f"map de-rotated by {roll}", _data_uri(pictures.level), aspect),
-                ("v-disparity", "v-disparity once de-rotated", _data_uri(pictures.level_counts), beside),
+                ("before", "v-disparity", "v-disparity of the map", pictures.map_counts, ""),
+                (
+                    "after",
+                    "v-disparity, de-rotated",
+                    "v-disparity once de-rotated",
+                    pictures.level_counts,
+                    "v-disparity: not there",
+                ),
             ],
         ],
     }
-
-
-def _data_uri(data: bytes | None) -> str | None:
-    return None if data is None else "data:image/webp;base64," + base64.b64encode(data).decode()

@@ -1,7 +1,9 @@
-"""The pictures of a frame: its map and the map de-rotated, each with its v-disparity image."""
+"""The pictures of a frame: the road on its photo, its map before and after de-rotation, and v-disparity."""
 
+import base64
+import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 import cv2
@@ -9,52 +11,69 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError
+from rollcli.estimator.estimate import estimate_roll
 from rollcli.files.encodings import read_disparity, to_disparity
 from rollcli.files.formats import read_image, read_stored
 from rollcli.frames.guard import FRAME_ERRORS
 from rollcli.frames.options import FrameOptions
-from rollcli.frames.read import read_source
+from rollcli.frames.read import Source, read_source
 from rollcli.imaging.derotate import derotate
-from rollcli.imaging.overlay import draw_disparity
+from rollcli.imaging.overlay import draw_disparity, draw_road_on_photo
 from rollcli.imaging.vdisparity import row_offset, v_disparity
 from rollcli.imaging.vdisparity_picture import draw_v_disparity
 from rollcli.report.sources import Subject
 
 # small enough that a page with a dozen frames opens at once, large enough to see a stripe of noise
 _WIDEST, _MOST_BINS, _QUALITY = 1280, 320, 82
+_SAME = math.radians(1e-4)  # a result holds angles to a millionth of a degree
 
 Made = TypeVar("Made")
 
 
 @dataclass(frozen=True)
-class Pictures:
-    """WebP files of a frame; where there is no map to show, `missing` says why."""
+class Picture:
+    """A WebP file and its size, pixels."""
 
-    map: bytes | None = None
-    map_counts: bytes | None = None
-    level: bytes | None = None
-    level_counts: bytes | None = None
-    aspect: float = 2.0  # width by height of the map
+    data: bytes
+    width: int
+    height: int
+
+    @property
+    def uri(self) -> str:
+        """Return the picture as an address that holds it."""
+        return "data:image/webp;base64," + base64.b64encode(self.data).decode()
+
+
+@dataclass(frozen=True)
+class Pictures:
+    """The pictures of a frame; where there is no map to show, `missing` says why."""
+
+    road: Picture | None = None
+    map: Picture | None = None
+    map_counts: Picture | None = None
+    level: Picture | None = None
+    level_counts: Picture | None = None
     missing: str = ""
 
     @property
     def empty(self) -> bool:
         """There is nothing to show at all."""
-        return self.map is self.level is self.level_counts is None
+        return self.road is self.map is self.level is self.level_counts is None
 
 
 def take_pictures(subject: Subject, options: FrameOptions) -> Pictures:
     """Take what can be taken: from the images of the subject, else from its map or pair."""
-    disparity, missing = _attempt(lambda: _map(subject, options))
+    source, missing = _attempt(lambda: _source(subject, options))
+    disparity = None if source is None else source.disparity
+    road, _ = _attempt(lambda: _road(subject, source, options))
     level, _ = _attempt(lambda: _level(subject, disparity, options))
     counts, _ = _attempt(lambda: _level_counts(subject, disparity, level))
-    shown = disparity if disparity is not None else level
     return Pictures(
+        road=None if road is None else _encoded(road),
         map=None if disparity is None else _encoded(draw_disparity(disparity)),
         map_counts=None if disparity is None else _encoded(_counts(disparity, disparity)),
         level=None if level is None else _encoded(draw_disparity(level)),
         level_counts=None if counts is None else _encoded(counts),
-        aspect=2.0 if shown is None else round(shown.shape[1] / shown.shape[0], 4),
         missing=missing,
     )
 
@@ -71,14 +90,27 @@ def _attempt(make: Callable[[], Made]) -> tuple[Made | None, str]:
         return None, str(error) or type(error).__name__
 
 
-def _map(subject: Subject, options: FrameOptions) -> NDArray[Any]:
+def _source(subject: Subject, options: FrameOptions) -> Source:
     if "disparity" in subject.images:
-        return read_disparity(subject.images["disparity"])
+        return Source(read_disparity(subject.images["disparity"]))
     if subject.images_only:
-        raise InputError(
-            f"{subject.frame.file}: there is no map of it among the images (estimate --disparity)"
-        )
-    return read_source(subject.frame, options).disparity
+        raise InputError(f"{subject.frame.file}: there is no map of it among the images")
+    # a pair's left image is kept where the road is to be drawn on it
+    return read_source(subject.frame, replace(options, images=replace(options.images, road_mask="")))
+
+
+def _road(subject: Subject, source: Source | None, options: FrameOptions) -> NDArray[Any] | None:
+    """Draw the road on the left image of a pair: as `estimate` wrote it, else found again."""
+    if "road_mask" in subject.images:
+        return read_image(subject.images["road_mask"])
+    if source is None or source.photo is None:
+        return None
+    arguments = options.method.arguments()
+    found = estimate_roll(source.disparity, mask=source.allowed, road_mask=True, **arguments)
+    # where options that the record does not give back led to another angle, this is not its road
+    if found.road_mask is None or abs(found.theta - subject.theta) > _SAME:
+        return None
+    return draw_road_on_photo(source.photo, found.road_mask)
 
 
 def _level(subject: Subject, disparity: NDArray[Any] | None, options: FrameOptions) -> NDArray[Any]:
@@ -120,10 +152,10 @@ def _required(made: NDArray[Any] | None) -> NDArray[Any]:
     return made
 
 
-def _encoded(picture: NDArray[Any]) -> bytes:
+def _encoded(picture: NDArray[Any]) -> Picture:
     height, width = picture.shape[:2]
     if width > _WIDEST:
         size = (_WIDEST, max(1, round(height * _WIDEST / width)))
         picture = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
     _, data = cv2.imencode(".webp", np.ascontiguousarray(picture), [cv2.IMWRITE_WEBP_QUALITY, _QUALITY])
-    return data.tobytes()
+    return Picture(data.tobytes(), picture.shape[1], picture.shape[0])

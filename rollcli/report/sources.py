@@ -13,7 +13,7 @@ from rollcli.files.results import Row
 from rollcli.frames.frame import Frame
 from rollcli.frames.options import ImageOptions
 
-KINDS = ("derotated", "vdisparity", "disparity")
+KINDS = ("derotated", "vdisparity", "disparity", "road_mask")
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +100,7 @@ def _image(kind: str, row: Row, images: Path, recorded: ImageOptions) -> str | N
     inside = images.resolve()  # neither a name nor a link leads out of it
     for folder in _folders(kind, images, getattr(recorded, kind)):
         for name in _tails(row.file):
-            for ending in (".png",) if kind == "vdisparity" else MAP_ENDINGS:
+            for ending in (".png",) if kind in ("vdisparity", "road_mask") else MAP_ENDINGS:
                 path = folder / f"{name}{ending}"
                 if is_file(path) and path.resolve().is_relative_to(inside):
                     return str(path)
