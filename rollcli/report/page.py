@@ -143,11 +143,21 @@ def _texts(package: str, name: str) -> list[str]:
 
 
 def _policy(styles: Sequence[str], scripts: Sequence[str]) -> str:
-    """Return the Content-Security-Policy: only these styles and scripts are active; nothing is requested."""
+    """Return the Content-Security-Policy: only these styles and scripts are active; nothing is requested.
+
+    plotly writes labels with subscripts as elements with a style attribute, which cannot run anything.
+    """
     allowed = {"script-src": scripts, "style-src": [*styles, *_PLOTLY_STYLES]}
     sources = [f"{kind} {' '.join(map(_source, texts))}" for kind, texts in allowed.items()]
     return "; ".join(
-        ["default-src 'none'", *sources, "img-src data: blob:", "base-uri 'none'", "form-action 'none'"]
+        [
+            "default-src 'none'",
+            *sources,
+            "style-src-attr 'unsafe-inline'",
+            "img-src data: blob:",
+            "base-uri 'none'",
+            "form-action 'none'",
+        ]
     )
 
 
