@@ -211,6 +211,26 @@ def test_nothing_is_cut_off_or_too_small_to_read(opened, width):
     assert min(sizes)[0] >= 11, min(sizes)
 
 
+def test_on_a_narrow_screen_no_value_is_hidden(opened):
+    page = opened(width=400)
+    assert page.locator(".reasons td").count() >= 5
+    hidden = page.locator(".reasons td, .rows .row > span, .figures td, .options span").evaluate_all(
+        "all => all.filter(e => e.textContent && !e.getClientRects().length).map(e => e.className)"
+    )
+    assert hidden == []
+
+
+def test_a_printed_page_shows_both_sides_of_the_switch_and_keeps_headings_with_what_follows(opened):
+    page = opened()
+    page.emulate_media(media="print")
+    assert style(page, "h2", "breakAfter") == "avoid"
+    shown = page.locator("figure .picture").evaluate_all(
+        "all => all.every(each => each.getClientRects().length)"
+    )
+    assert shown
+    assert page.locator(".switch").first.is_hidden()
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_text_stands_out_in_light_and_dark_mode(opened, scheme):
     page = opened(scheme=scheme)
