@@ -5,8 +5,9 @@ What a file is, its first bytes say; its name's ending decides nothing.
 """
 
 import re
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,44 @@ from rollcli.files.codecs.raw_map import Stored as Stored
 from rollcli.files.codecs.raw_map import native
 from rollcli.files.storage import read_bytes
 
+
+class MapFormat(NamedTuple):
+    """A kind of map file.
+
+    Attributes
+    ----------
+    signatures : tuple of bytes
+        What its files begin with.
+    decode : callable
+        From bytes, and the name for errors, to `Stored`.
+    encode : callable
+        From an array (H, W), and the values that mean no data, to bytes.
+    """
+
+    signatures: tuple[bytes, ...]
+    decode: Callable[[bytes, str], Stored]
+    encode: Callable[[NDArray[Any], tuple[float, ...]], bytes]
+
+
+# a new format: a file in `codecs`, a line here, and its ending in `inputs`, which loads no decoder
+MAP_FORMATS = {
+    "png": MapFormat(
+        (png.SIGNATURE,),
+        lambda data, name: Stored(png.grey_values(data, name), "png"),
+        lambda values, _: png.encode_png(values),
+    ),
+    "tiff": MapFormat(tiff.SIGNATURES, tiff.decode_tiff, tiff.encode_tiff),
+    "npy": MapFormat(
+        (npy.MAGIC,),
+        lambda data, name: Stored(native(npy.decode_npy(data, name)), "npy"),
+        lambda values, _: npy.encode_npy(values),
+    ),
+    "pfm": MapFormat(
+        pfm.MAGICS,
+        lambda data, name: Stored(native(pfm.decode_pfm(data, name)), "pfm"),
+        lambda values, _: pfm.encode_pfm(values),
+    ),
+}
 _KNOWN = {
     b"\xff\xd8\xff": "a JPEG image",
     b"PK\x03\x04": "a ZIP or NPZ archive",
@@ -80,15 +119,9 @@ def encode_stored(values: NDArray[Any], format: str, nodata: tuple[float, ...] =
     UsageError
         There is no such format.
     """
-    if format == "png":
-        return png.encode_png(values)
-    if format == "tiff":
-        return tiff.encode_tiff(values, nodata)
-    if format == "npy":
-        return npy.encode_npy(values)
-    if format == "pfm":
-        return pfm.encode_pfm(values)
-    raise UsageError(f"{format}: unknown map format; png, tiff, npy and pfm are written")
+    if format not in MAP_FORMATS:
+        raise UsageError(f"{format}: unknown map format; {', '.join(MAP_FORMATS)} are written")
+    return MAP_FORMATS[format].encode(values, nodata)
 
 
 def read_image(path: str | Path, name: str | None = None) -> NDArray[Any]:
@@ -127,14 +160,9 @@ def decode_mask(data: bytes, name: str) -> NDArray[np.bool_]:
 
 
 def _decoded(data: bytes, name: str) -> Stored:
-    if data.startswith(png.SIGNATURE):
-        return Stored(png.grey_values(data, name), "png")
-    if data.startswith(tiff.SIGNATURES):
-        return tiff.decode_tiff(data, name)
-    if data.startswith(npy.MAGIC):
-        return Stored(native(npy.decode_npy(data, name)), "npy")
-    if data.startswith(pfm.MAGICS):
-        return Stored(native(pfm.decode_pfm(data, name)), "pfm")
+    for each in MAP_FORMATS.values():
+        if data.startswith(each.signatures):
+            return each.decode(data, name)
     raise InputError(f"{name}: is {_what(data)}; a disparity map is a PNG, TIFF, NPY or PFM file")
 
 
