@@ -99,6 +99,12 @@ result_options = record(
 def estimate(ctx: click.Context, /, **records: Any) -> None:
     """Estimate the roll angle of each disparity map or stereo pair, one row a frame.
 
+    \b
+    To start with:
+      rollcli estimate maps/ -o rolls.csv
+      rollcli estimate --left left/ --right right/ -o rolls.csv
+      rollcli report rolls.csv -o rolls.html
+
     INPUTS are maps (PNG, TIFF, NPY, PFM), folders of them, quoted patterns, or - for paths on stdin.
 
     A positive roll means that the rig is rolled counter-clockwise seen from behind: its right end is up.
