@@ -48,7 +48,7 @@ _NO_CHANGE = 1e-6  # px^2
 def is_level(
     lies: Misalignment, errors: Misalignment, shape: tuple[int, ...], tolerance: Tolerance = TOLERANCE
 ) -> bool:
-    """Whether views of this shape that lie so, with these standard errors, need no correction."""
+    """Tell whether views of this shape that lie so, with these standard errors, need no correction."""
     corner = shape[0] * shape[1] / 4
     limits = (tolerance.offset, tolerance.rotation, tolerance.scale, tolerance.twist / corner)
     parts = zip(astuple(lies), astuple(errors), limits, strict=True)
@@ -56,7 +56,7 @@ def is_level(
 
 
 def level(right: View, misalignment: Misalignment) -> View:
-    """The right view as a level camera would have seen it, in one resampling; rows at the border repeat."""
+    """Resample the right view once, as a level camera would have seen it; rows at the border repeat."""
     if misalignment == LEVEL:
         return right
     height, width = right.shape
@@ -97,7 +97,7 @@ class Approach:
 
 
 def size_factor(shape: tuple[int, ...], pixels: int) -> float:
-    """How many times smaller a view of this shape is made to have that many pixels; 1 if it has no more."""
+    """Return the factor that shrinks a view of this shape to that many pixels; 1 if it has no more."""
     return max(1.0, math.sqrt(shape[0] * shape[1] / pixels))
 
 
@@ -120,7 +120,7 @@ class SmallViews:
         self.views = shrink_both(whole, self.factor)
 
     def swapped(self) -> "SmallViews":
-        """The same, the right view taken for the left one."""
+        """Return the views with left and right exchanged."""
         return SmallViews((self.views[1], self.views[0]))
 
     def measure(self, disparity: Map, start: Misalignment, rounds: int = 2) -> Measured | None:
@@ -146,7 +146,7 @@ class SmallViews:
 
 
 def resampled(disparity: Map, shape: tuple[int, ...]) -> Map:
-    """A map at another size, in pixels of that; 0 where not all that a value is made of is known."""
+    """Return a map at another size, in pixels of that; 0 where not all that a value is made of is known."""
     if disparity.shape == shape:
         return disparity
     size = shape[1], shape[0]

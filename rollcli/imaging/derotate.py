@@ -99,14 +99,14 @@ class _Turn:
         return cls((height, width), size, cosine, sine)
 
     def sources(self, rows: slice) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Where in the map (v, u) the pixels of some rows of the result come from."""
+        """Return where in the map (v, u) the pixels of some rows of the result come from."""
         y, x = _centred(self.size)
         u: NDArray[np.float64] = self.cosine * x - self.sine * y[rows, None] + (self.shape[1] - 1) / 2
         v: NDArray[np.float64] = self.sine * x + self.cosine * y[rows, None] + (self.shape[0] - 1) / 2
         return v, u
 
     def targets(self, pixels: NDArray[np.bool_]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Where in the result (y, x) some pixels of the map go."""
+        """Return where in the result (y, x) some pixels of the map go."""
         rows, columns = np.nonzero(pixels)
         v, u = _centred(self.shape)
         x: NDArray[np.float64] = self.cosine * u[columns] + self.sine * v[rows] + (self.size[1] - 1) / 2
@@ -130,7 +130,7 @@ def _validity(values: NDArray[Any], invalid: Iterable[float]) -> NDArray[np.bool
 
 
 def _not_nearest_to_invalid(valid: NDArray[np.bool_], turn: _Turn) -> NDArray[np.bool_]:
-    """The pixels of the result that no invalid pixel of the map falls on."""
+    """Return the pixels of the result that no invalid pixel of the map falls on."""
     kept = np.ones(turn.size, bool)
     y, x = (np.floor(each + 0.5).astype(np.intp) for each in turn.targets(~valid))
     inside = (y >= 0) & (y < turn.size[0]) & (x >= 0) & (x < turn.size[1])
@@ -164,12 +164,12 @@ def _interpolated(
 
 
 def _as_stored(values: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:
-    """Rounded where the dtype holds whole numbers."""
+    """Round where the dtype holds whole numbers."""
     return np.rint(values) if dtype.kind in "iu" else values
 
 
 def _no_data(values: NDArray[Any], valid: NDArray[np.bool_]) -> float:
-    """How this map writes "no data"."""
+    """Return how this map writes "no data"."""
     if values.dtype.kind == "u" or valid.all():
         return 0
     unused = values[~valid]

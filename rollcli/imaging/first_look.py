@@ -78,7 +78,7 @@ def first_look(small: SmallViews) -> FirstLook:
 
 
 def _coarsest(small: Views, factor: float) -> _Small | None:
-    """The best of several attempts, where the first is not plainly right."""
+    """Return the best of several attempts, where the first is not plainly right."""
     found = _climb(small, LEVEL)
     if found is not None and found.measured is not None and not _unsure(found.measured):
         return found
@@ -91,7 +91,7 @@ def _unsure(measured: Measured) -> bool:
 
 
 def _clearest(attempts: Iterable[_Small | None]) -> _Small | None:
-    """The attempt that leaves the least unexplained, of those that tell anything."""
+    """Return the attempt that leaves the least unexplained, of those that tell anything."""
     some = [each for each in attempts if each is not None]
     return min(some, key=lambda each: each.measured.spread if each.measured else math.inf, default=None)
 

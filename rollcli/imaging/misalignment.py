@@ -38,30 +38,30 @@ class Misalignment:
         return Misalignment(*(a + b for a, b in zip(astuple(self), astuple(other), strict=True)))
 
     def __sub__(self, other: "Misalignment") -> "Misalignment":
-        """What is left of this after the other is taken away, to first order."""
+        """Return what is left of this after the other is taken away, to first order."""
         return self + other.times(-1)
 
     def times(self, factor: float) -> "Misalignment":
-        """The same, `factor` times as much."""
+        """Return this misalignment, `factor` times as much."""
         return Misalignment(*(factor * each for each in astuple(self)))
 
     def resized(self, factor: float) -> "Misalignment":
-        """The same, of views `factor` times as large."""
+        """Return this misalignment, of views `factor` times as large."""
         return Misalignment(self.offset * factor, self.rotation, self.scale, self.twist / factor)
 
     def shifts(self, height: int, width: int) -> tuple[float, float, float, float]:
-        """The largest vertical shift of each part in a view of this size, pixels; signed."""
+        """Return the largest vertical shift of each part in a view of this size, pixels; signed."""
         x, y = width / 2, height / 2
         return self.offset, self.rotation * x, self.scale * y, self.twist * x * y
 
     def reach(self, height: int, width: int) -> float:
-        """The largest vertical shift in a view of this size, pixels."""
+        """Return the largest vertical shift in a view of this size, pixels."""
         offset, rotation, scale, twist = self.shifts(height, width)
         corners = ((1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1))
         return max(abs(offset + u * rotation + v * scale + uv * twist) for u, v, uv in corners)
 
     def reach_in_rows(self, height: int, width: int, start: int, stop: int) -> float:
-        """The largest vertical shift in the middle half of some rows of a view of this size, pixels."""
+        """Return the largest vertical shift in the middle half of some rows of such a view, pixels."""
         x, rows = width / 4, (start - height / 2, stop - height / 2)
         corners = ((u, v) for u in (-x, x) for v in rows)
         return max(

@@ -18,7 +18,7 @@ _PARTS = {
 
 
 def note_of(corrected: Misalignment, height: int, width: int) -> str:
-    """What was corrected, in words; empty if nothing was.
+    """Return what was corrected, in words; empty if nothing was.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def note_of(corrected: Misalignment, height: int, width: int) -> str:
 
 
 def advice_of(median: Misalignment, height: int, width: int) -> str:
-    """What a run says of its rig, in a sentence; empty where nothing is far enough from level.
+    """Return what a run says of its rig, in a sentence; empty where nothing is far enough from level.
 
     Notes
     -----
@@ -65,7 +65,7 @@ def advice_of(median: Misalignment, height: int, width: int) -> str:
 
 
 def read_note(message: str, height: int, width: int) -> Misalignment:
-    """What the message of a row says was corrected; nothing, if it says nothing."""
+    """Return what the message of a row says was corrected; nothing, if it says nothing."""
     _, lead, rest = message.partition(_LEAD)
     note = rest.partition(";")[0] if lead else ""
     found = {name: pattern.search(note) for name, pattern in _PARTS.items()}

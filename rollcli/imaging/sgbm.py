@@ -22,7 +22,7 @@ _MARGIN = 32  # rows beside those that are needed: what lies there smooths what 
 
 
 def usable_range(count: int, first: int, width: int, block_size: int) -> int:
-    """The range `count` as OpenCV wants it, with columns left to match; below `NARROWEST` there are none."""
+    """Return the range `count` as OpenCV takes it; below `NARROWEST` there are no columns left to match."""
     furthest = (width - block_size - max(0, first, -first)) // _STEP * _STEP
     return min(-(-max(1, count) // _STEP) * _STEP, furthest)
 

@@ -51,7 +51,7 @@ class StereoMatch:
 
 
 def compute_disparity(left: NDArray[Any], right: NDArray[Any], **options: Any) -> NDArray[np.float32]:
-    """The disparity map of a rectified pair.
+    """Return the disparity map of a rectified pair.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ def match_pair(
 
 
 def _range_as_given(views: Views, options: StereoOptions) -> int | None:
-    """The range of views that lie as the user says."""
+    """Return the range of views that lie as the user says."""
     if options.num_disparities is not None:
         return None
     return find_range((views[0], level(views[1], Misalignment(options.vertical_offset or 0.0))))
@@ -166,7 +166,7 @@ def _match_levelled(
 
 
 def _is_confirmed(measured: Measured | None, at: Misalignment, shape: tuple[int, ...], rows: slice) -> bool:
-    """Whether what is left in the rows that were matched is small, as far as they tell."""
+    """Tell whether what is left in the rows that were matched is small, as far as they tell."""
     if measured is None:
         return True
     height, width = shape
@@ -175,7 +175,7 @@ def _is_confirmed(measured: Measured | None, at: Misalignment, shape: tuple[int,
 
 
 def _wanted(measured: Measured, at: Misalignment, shape: tuple[int, ...]) -> Misalignment:
-    """What to correct now that `measured` was found in a map matched at `at`; that, if it was right."""
+    """Return what to correct after `measured` was found in a map matched at `at`; `at` if that was right."""
     wanted = _worth_correcting(measured, shape)
     if wanted == LEVEL:
         return LEVEL  # also where the small views were taken for uneven

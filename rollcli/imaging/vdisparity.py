@@ -77,7 +77,7 @@ def _pixels(values: NDArray[Any]) -> NDArray[np.float64]:
 
 
 def _counts(pixels: NDArray[np.float64], bins: int, max_disparity: float) -> NDArray[np.int32]:
-    """The histogram of each row; the last bin also holds what lies beyond."""
+    """Return the histogram of each row; the last bin also holds what lies beyond."""
     shares = np.minimum(pixels, max_disparity) / max_disparity
     cells = np.minimum(shares * bins, bins - 1).astype(np.int64)
     cells[pixels == 0] = bins  # one bin more, for what is no data

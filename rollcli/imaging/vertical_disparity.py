@@ -52,7 +52,7 @@ class Measured:
     spread: float
 
     def resized(self, factor: float) -> "Measured":
-        """The same, of views `factor` times as large."""
+        """Return this measurement, of views `factor` times as large."""
         there, errors = self.misalignment.resized(factor), self.errors.resized(factor)
         return Measured(there, errors, self.share, factor * self.spread)
 
@@ -191,7 +191,7 @@ def _fit(seen: _Seen) -> tuple[Misalignment, Misalignment, float]:
 
 
 def _believed(off: Doubles, spread: float) -> Doubles:
-    """How much blocks count that are so far off; none is thrown away, far ones hardly count."""
+    """Return the weights of blocks by their residuals: far ones hardly count, and none is thrown away."""
     doubt: Doubles = 1 + np.square(off / (_TUNING * spread))
     return 1 / np.square(doubt)
 

@@ -38,7 +38,7 @@ def matched_shape(shape: tuple[int, ...], downscale: float) -> tuple[int, int]:
 
 
 def shrink(view: NDArray[Any], factor: float) -> View:
-    """The view, `factor` times smaller; as it is for a factor of 1."""
+    """Shrink the view by `factor`; 1 leaves it as it is."""
     if factor == 1:
         return view
     height, width = matched_shape(view.shape, factor)

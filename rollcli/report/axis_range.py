@@ -9,7 +9,7 @@ _WIDEST = 1.0  # degrees: a wider interval is seen to leave the view
 
 
 def view(rows: Sequence[Row]) -> tuple[float, float]:
-    """The ends of the view, degrees: all angles that are ok, and suspect ones unless they lie far off."""
+    """Return the ends of the axis, degrees: all angles that are ok, and suspect ones that are not far off."""
     angled = [row for row in rows if row.roll_deg is not None]
     if not angled:
         return -1.0, 1.0
@@ -21,7 +21,7 @@ def view(rows: Sequence[Row]) -> tuple[float, float]:
 
 
 def outside(rows: Sequence[Row]) -> int:
-    """How many angles lie outside of the view."""
+    """Return how many angles lie outside of the view."""
     low, high = view(rows)
     return sum(row.roll_deg is not None and not low <= row.roll_deg <= high for row in rows)
 

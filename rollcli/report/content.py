@@ -30,7 +30,7 @@ _LISTED = 100  # doubtful frames on the page; the result has all
 
 
 def report_page(result: Result, options: ReportOptions, shown: Sequence[tuple[Choice, Pictures]]) -> bytes:
-    """The page, HTML, UTF-8."""
+    """Return the page, HTML, UTF-8."""
     rows, run, summary = result.rows, result.run or {}, summarize(result.rows)
     rig, folders = assess_rig(rows), input_folders(rows)
     doubtful = sorted(

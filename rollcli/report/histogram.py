@@ -20,7 +20,7 @@ _ROUND = (1, 2, 2.5, 5, 10)
 
 
 def histogram(rows: Sequence[Row]) -> Chart:
-    """How many frames have which roll, suspect ones on top of the others."""
+    """Return how many frames have which roll, suspect ones on top of the others."""
     low, high = view(rows)
     shown = [row.roll_deg for row in rows if row.roll_deg is not None and low <= row.roll_deg <= high]
     low, high = min(shown, default=low), max(shown, default=high)
@@ -52,7 +52,7 @@ def histogram(rows: Sequence[Row]) -> Chart:
 
 
 def _bins(count: int) -> int:
-    """A few for few frames, so that bars are higher than one."""
+    """Return fewer bins for fewer frames, so that bars are higher than one."""
     return min(_MOST_BINS, max(5, math.ceil(2 * math.sqrt(count))))
 
 
@@ -63,13 +63,13 @@ def _whole_ticks(rolls: Sequence[float], edges: NDArray[Any]) -> dict[str, Any]:
 
 
 def _padded(edges: NDArray[Any], step: float) -> list[float]:
-    """A single bar is no wall."""
+    """Widen the axis around a single bar, which would fill the chart."""
     width = float(np.ptp(edges))
     margin = max(0.02 * width, (_FEW * step - width) / 2)
     return [float(edges[0]) - margin, float(edges[-1]) + margin]
 
 
 def _step(least: float) -> float:
-    """The next round number: 1, 2, 2.5 or 5 times a power of ten."""
+    """Return the next round number: 1, 2, 2.5 or 5 times a power of ten."""
     power = 10.0 ** math.floor(math.log10(least))
     return next(each * power for each in _ROUND if each * power >= least * (1 - 1e-9))

@@ -114,7 +114,7 @@ def _road(subject: Subject, source: Source | None, options: FrameOptions) -> NDA
 
 
 def _level(subject: Subject, disparity: NDArray[Any] | None, options: FrameOptions) -> NDArray[Any]:
-    """The map de-rotated: as `estimate` wrote it, else made."""
+    """Return the map de-rotated: as `estimate` wrote it, else made."""
     if "derotated" in subject.images:
         stored, given = read_stored(subject.images["derotated"]), options.encoding
         encoding = "auto" if subject.frame.right_file else given.encoding
@@ -139,7 +139,7 @@ def _counts(
     alpha: tuple[float, float, float] | None = None,
     offset: float = 0.0,
 ) -> NDArray[Any]:
-    """The picture of the v-disparity, from 0 to the largest disparity of `scale`: two are comparable."""
+    """Draw the v-disparity from 0 to the largest disparity of `scale`, so that two can be compared."""
     histogram = v_disparity(scale)
     bins = min(histogram.counts.shape[1], _MOST_BINS)
     counted = v_disparity(disparity, bins=bins, max_disparity=histogram.max_disparity)

@@ -90,7 +90,7 @@ def _points(values: Sequence[_Value | None], unit: str) -> dict[str, Any]:
 
 
 def _band(values: Sequence[_Value]) -> dict[str, Any]:
-    """One polygon for each run of frames that have an interval; None parts them."""
+    """Return one polygon for each run of frames that have an interval; None parts them."""
     x: list[int | None] = []
     y: list[float | None] = []
     run: list[_Value] = []

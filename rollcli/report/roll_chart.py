@@ -22,7 +22,7 @@ Numbered = Sequence[tuple[int, Row]]
 
 
 def roll_chart(rows: Sequence[Row], rig: RigAssessment | None = None) -> Chart:
-    """The roll of each frame: a line, its interval as a band, suspect and failed frames marked.
+    """Return the roll of each frame: a line, its interval as a band, suspect and failed frames marked.
 
     With `rig`, its segments, jumps and smoothed mounting roll too. A line neither bridges a suspect frame nor
     leads from one drive to another.
@@ -108,7 +108,7 @@ def _points(numbered: Numbered) -> dict[str, Any]:
 
 
 def _band(numbered: Numbered, starts: Set[int]) -> dict[str, Any]:
-    """One polygon for each stretch of frames that have an interval; None parts them."""
+    """Return one polygon for each stretch of frames that have an interval; None parts them."""
     x: list[int | None] = []
     y: list[float | None] = []
     for stretch in _stretches([each for each in numbered if each[1].roll_ci95_deg is not None], starts):
@@ -131,7 +131,7 @@ def _band(numbered: Numbered, starts: Set[int]) -> dict[str, Any]:
 
 
 def _stretches(numbered: Numbered, starts: Set[int]) -> list[Numbered]:
-    """Runs of frames that follow each other, each within one drive."""
+    """Return runs of frames that follow each other, each within one drive."""
     ends = [
         place
         for place, ((before, _), (after, _)) in enumerate(pairwise(numbered), 1)

@@ -97,7 +97,7 @@ def _write(
 
 
 def _take(found: Sequence[Subject], recorded: FrameOptions, jobs: int | None) -> "list[Pictures]":
-    """The pictures of each subject, fewer when interrupted."""
+    """Return the pictures of each subject, fewer when interrupted."""
     from rollcli.report.pictures import no_pictures, take_pictures
 
     work = Work(partial(take_pictures, options=recorded), no_pictures)

@@ -87,7 +87,7 @@ def _subject(row: Row, folder: Path, images: dict[str, str], images_only: bool) 
 
 
 def _located(name: str, folder: Path) -> str:
-    """A file named from where `estimate` ran: here, or else from the result's folder."""
+    """Return a file named from where `estimate` ran: here, or else from the result's folder."""
     beside = folder / name
     return str(beside) if name and not is_there(name) and is_there(beside) else name
 
@@ -108,7 +108,7 @@ def _image(kind: str, row: Row, images: Path, recorded: ImageOptions) -> str | N
 
 
 def _folders(kind: str, images: Path, recorded: str | None) -> Iterator[Path]:
-    """Where images of a kind may be: in the folder named, under the name it had or the option's."""
+    """Yield where images of a kind may be: in the folder named, under the name it had or the option's."""
     names = {Path(recorded).name, kind} - {".."} if recorded is not None else {kind}
     for name in sorted(names):
         yield images / name
@@ -119,7 +119,7 @@ def _folders(kind: str, images: Path, recorded: str | None) -> Iterator[Path]:
 
 
 def _tails(file: str) -> Iterator[str]:
-    """The path without its ending, then without its first folder, and so on: what was named is unknown."""
+    """Yield the path without its ending, then without its first folder, and so on."""
     path = PurePosixPath(file)
     parts = path.with_suffix("").parts
     for first in range(1 if path.is_absolute() else 0, len(parts)):

@@ -45,7 +45,7 @@ def summarize(rows: Sequence[Row]) -> Summary:
 
 
 def degrees(angle: float | None, digits: int = 2, *, sign: bool = True) -> str:
-    """An angle to read: with its sign, a true minus, and its unit."""
+    """Return an angle to read: with its sign, a true minus, and its unit."""
     if angle is None:
         return "–"
     text = f"{angle:+.{digits}f}" if sign and round(angle, digits) else f"{abs(angle):.{digits}f}"
@@ -78,7 +78,7 @@ def written_at(result: str) -> str:
 
 
 def option_lines(run: Mapping[str, Any] | None) -> list[tuple[str, str]]:
-    """The options of the run by their names on the command line, those that were not given left out."""
+    """Return the options that the run was given, by their names on the command line."""
     options = (run or {}).get("options", {})
     given = {name: value for name, value in options.items() if value is not False and value not in (None, [])}
     return [(f"--{name}", _shown(value)) for name, value in given.items()]
@@ -92,5 +92,5 @@ def _shown(value: Any) -> str:
 
 
 def frame_count(count: int) -> str:
-    """How many frames, in words."""
+    """Return how many frames, in words."""
     return f"{count:,} frame" + ("" if count == 1 else "s")
