@@ -57,6 +57,22 @@ def test_its_picture_and_the_angle_below_it_are_those_of_a_run():
     assert f"{angle:.2f}° ± {half:.2f}°".replace("-", "−") in README
 
 
+def test_the_first_run_prints_what_it_shows(tmp_path):
+    shutil.copytree(ROOT / "sample_data" / "maps", tmp_path / "sample_data" / "maps")
+    section = README.partition("\n## Run\n")[2].partition("\n## ")[0]
+    line, said, rows = re.findall(r"```(?:sh)?\n(.*?)```", section, flags=re.S)
+    done = rollcli(*line.split()[1:], cwd=tmp_path)
+    timing = r"; [\d.]+ s, [\d.]+ frames/s"
+    assert re.sub(timing, "", done.err) == re.sub(timing, "", said)
+    shown = [row.split(",") for row in rows.splitlines()]
+    written = [row.split(",")[:5] for row in (tmp_path / "rolls.csv").read_text().splitlines()]
+    assert [row[:3] for row in shown] == [row[:3] for row in written]
+    for one, other in zip(shown[1:], written[1:], strict=True):
+        assert [float(each) for each in one[3:]] == pytest.approx(
+            [float(each) for each in other[3:]], abs=1e-4
+        )
+
+
 def test_every_command_it_shows_exists():
     blocks = "".join(re.findall(r"```(?:sh|make)\n(.*?)```", README, flags=re.S))
     shown = set(re.findall(r"^\s*rollcli ([a-z]+)", blocks, flags=re.M))

@@ -57,7 +57,7 @@ def _bins(count: int) -> int:
 
 
 def _whole_ticks(rolls: Sequence[float], edges: NDArray[Any]) -> dict[str, Any]:
-    """There are no half frames."""
+    """Put ticks at whole frames where bars are low: there are no half frames."""
     highest = int(np.histogram(rolls, edges)[0].max())
     return {"dtick": 1} if highest <= _FEW else {}
 
