@@ -60,6 +60,14 @@ def wait_for_rows(folder, count, run, name="rolls.csv"):
         time.sleep(0.002)
 
 
+def wait_for_images(folder, count, run):
+    """Until so many frames are done: rows with images follow theirs in groups, up to a second later."""
+    images, give_up = folder / "upright", time.monotonic() + 60
+    while run.poll() is None and not (images.exists() and len(list(images.glob("*.png"))) >= count):
+        assert time.monotonic() < give_up
+        time.sleep(0.002)
+
+
 def kill(run):
     run.kill()
     run.wait()
@@ -104,7 +112,7 @@ def test_resume_does_not_do_again_what_is_done(undisturbed, folder):
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_ctrl_c_keeps_what_is_done_and_prints_the_command_that_resumes(undisturbed, folder, jobs):
     run = start(folder, "-j", str(jobs))
-    wait_for_rows(folder, 4, run)
+    wait_for_images(folder, 4, run)
     os.killpg(run.pid, signal.SIGINT)  # a terminal sends it to the workers as well
     _, err = run.communicate(timeout=60)
     assert run.returncode == 130
@@ -172,7 +180,7 @@ def test_the_command_that_resumes_a_list_says_that_it_is_needed_again(undisturbe
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_ctrl_c_again_and_again_ends_at_once_in_one_piece(undisturbed, folder, jobs):
     run = start(folder, "-j", str(jobs))
-    wait_for_rows(folder, 4, run)
+    wait_for_images(folder, 4, run)
     err = interrupt_until_it_ends(run)
     assert "Traceback" not in err
     assert "interrupted; continue with: rollcli estimate maps" in err
@@ -182,7 +190,7 @@ def test_ctrl_c_again_and_again_ends_at_once_in_one_piece(undisturbed, folder, j
 
 def test_ctrl_c_twice_ends_a_run_whose_worker_has_been_stopped(folder):
     run = start(folder, "-j2")
-    wait_for_rows(folder, 4, run)
+    wait_for_images(folder, 4, run)
     stopped = workers_of(run)[0]
     os.kill(stopped, signal.SIGSTOP)
     interrupt_until_it_ends(run)
@@ -212,7 +220,7 @@ def workers_of(run):
 
 def test_sigterm_stops_a_run_as_ctrl_c_does(undisturbed, folder):
     run = start(folder, "-j2")
-    wait_for_rows(folder, 4, run)
+    wait_for_images(folder, 4, run)
     run.terminate()
     assert (run.communicate(timeout=60), run.returncode)[1] == 130
     assert rollcli("estimate", "maps", "-o", "rolls.csv", *IMAGES, "--resume", cwd=folder).status == 3
@@ -221,7 +229,7 @@ def test_sigterm_stops_a_run_as_ctrl_c_does(undisturbed, folder):
 
 def test_a_second_run_on_the_same_result_is_refused(folder):
     first = start(folder, "-j1")
-    wait_for_rows(folder, 1, first)
+    wait_for_images(folder, 1, first)
     first.send_signal(signal.SIGSTOP)
     for flag in ("--resume", "--overwrite"):
         done = rollcli("estimate", "maps", "-o", "rolls.csv", *IMAGES, flag, cwd=folder)
