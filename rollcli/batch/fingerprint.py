@@ -4,9 +4,9 @@ import errno
 import hashlib
 import os
 from collections.abc import Collection, Sequence
-from pathlib import Path
 from typing import Any
 
+from rollcli.files.existence import look_at
 from rollcli.files.stores.locations import is_url
 from rollcli.frames.frame import Frame
 
@@ -54,7 +54,7 @@ def changed_input(frames: Sequence[Frame], since_ns: int) -> str | None:
         if is_url(path):
             continue
         try:
-            if Path(path).stat().st_mtime_ns > since_ns:
+            if look_at(path).st_mtime_ns > since_ns:
                 return path
         except (OSError, ValueError):
             return path
@@ -66,7 +66,7 @@ def _state(path: str) -> bytes | None:
     if is_url(path):  # asking for the state of each object would take as long as reading it
         return b"url\0"
     try:
-        found = Path(path).stat()
+        found = look_at(path)
     except ValueError:  # no file can have this name
         return b"missing\0"
     except OSError as error:

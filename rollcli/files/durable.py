@@ -15,6 +15,7 @@ from threading import Thread
 from typing import BinaryIO
 
 from rollcli.errors import OutputError
+from rollcli.files.existence import is_mount
 
 _THREADS = 16  # 64 files of 300 kB: 0.3 ms each on ext4, where one thread takes 4 ms each
 # a file system that cannot force a folder, or that Windows opens none
@@ -50,7 +51,7 @@ def sync_names(paths: Iterable[Path], named: set[Path] | None = None) -> None:
             if folder in folders:
                 break
             folders[folder] = None
-            if folder in named or folder.is_mount():
+            if folder in named or is_mount(folder):
                 break
     _in_threads(_sync_folder, list(folders))
     named.update(folders)
