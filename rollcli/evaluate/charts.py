@@ -5,7 +5,7 @@ from typing import Any
 
 from rollcli.estimator.methods import LAMBDA0
 from rollcli.evaluate.tables import DELTAS_DEG, Table
-from rollcli.report.page import Chart
+from rollcli.report.charts.chart import Chart
 
 SOLVER_NAMES = {"gd": "gradient descent", "gss": "golden section", "exact": "exact"}
 METHOD_NAMES = {

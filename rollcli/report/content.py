@@ -5,14 +5,13 @@ from typing import Any
 
 from rollcli import __version__
 from rollcli.files.results import Result, Row
-from rollcli.report.axis_range import outside
+from rollcli.report.charts.axis_range import outside
+from rollcli.report.charts.histogram import histogram
+from rollcli.report.charts.over_frames import charts_over_frames
 from rollcli.report.gallery import SPREAD, SUSPECT, WIDEST, Choice
-from rollcli.report.histogram import histogram
 from rollcli.report.options import ReportOptions
 from rollcli.report.page import Rows, render_page
 from rollcli.report.pictures import Pictures
-from rollcli.report.pose_charts import pose_charts
-from rollcli.report.roll_chart import roll_chart
 from rollcli.report.summary import (
     degrees,
     frame_count,
@@ -33,6 +32,7 @@ def report_page(result: Result, options: ReportOptions, shown: Sequence[tuple[Ch
     """Return the page, HTML, UTF-8."""
     rows, run, summary = result.rows, result.run or {}, summarize(result.rows)
     rig, folders = assess_rig(rows), input_folders(rows)
+    roll_chart, *pose_charts = charts_over_frames(rows, rig)
     doubtful = sorted(
         ((number, row) for number, row in enumerate(rows, 1) if row.status != "ok"),
         key=lambda each: each[1].status,  # errors before suspects
@@ -54,12 +54,12 @@ def report_page(result: Result, options: ReportOptions, shown: Sequence[tuple[Ch
         written=written_at(options.result),
         options=option_lines(result.run),
         encodings=", ".join(map(str, run["encoding"])) if isinstance(run.get("encoding"), list) else "",
-        roll_chart=roll_chart(rows, rig),
+        roll_chart=roll_chart,
         answer=answer(rig.now()),
         now=now_in_words(rig),
         counts=counts(rig),
         findings=findings(rig) or ["Neither a jump nor a drift is seen."],
-        pose_charts=pose_charts(rows),
+        pose_charts=pose_charts,
         histogram=histogram(rows) if summary.median is not None else None,
         outside=outside(rows),
         doubtful=doubtful[:_LISTED],

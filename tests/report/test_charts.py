@@ -5,9 +5,9 @@ import html
 import numpy as np
 import pytest
 
-from rollcli.report.axis_range import outside, view
-from rollcli.report.histogram import histogram
-from rollcli.report.roll_chart import roll_chart
+from rollcli.report.charts.axis_range import outside, view
+from rollcli.report.charts.histogram import histogram
+from rollcli.report.charts.over_frames import chart_over_frames
 from rollcli.report.summary import degrees, option_lines, summarize, with_interval
 from rollcli.rig.assess import assess_rig
 from tests.report.results import row
@@ -24,7 +24,7 @@ ROWS = [
 
 
 def traces(rows):
-    return {trace["name"]: trace for trace in roll_chart(rows).data}
+    return {trace["name"]: trace for trace in chart_over_frames(rows).data}
 
 
 def test_the_line_breaks_where_frames_have_failed_and_leaves_suspect_ones_to_their_marks():
@@ -113,13 +113,13 @@ def test_an_angle_far_off_does_not_flatten_the_others():
 def test_a_single_row_of_any_kind_has_a_chart(rows):
     low, high = view(rows)
     assert low < high
-    assert sum(len(trace["x"]) for trace in roll_chart(rows).data) >= 1
+    assert sum(len(trace["x"]) for trace in chart_over_frames(rows).data) >= 1
 
 
 @pytest.mark.parametrize(("frames", "bars"), [(400, True), (402, False)])
 def test_suspect_marks_lie_below_the_line_and_have_no_bars_in_long_runs(frames, bars):
     shown = traces([row("a.png"), row("b.png", 9.0, 1.0, "suspect")] * (frames // 2))
-    assert list(shown) == ["95 % interval", "suspect", "roll"]
+    assert list(shown) == ["95 % interval", "suspect", "roll", *([] if bars else ["roll, alone"])]
     assert ("error_y" in shown["suspect"]) == bars
 
 
@@ -132,11 +132,11 @@ def test_suspect_marks_lie_below_the_line_and_have_no_bars_in_long_runs(frames, 
     ],
 )
 def test_the_legend_names_what_is_there_even_if_it_is_one_thing(rows, named):
-    chart = roll_chart(rows)
+    chart = chart_over_frames(rows)
     assert chart.layout["showlegend"]
     assert [trace["name"] for trace in chart.data] == named
     assert chart.layout["xaxis"]["dtick"] == 1
-    assert "dtick" not in roll_chart(rows * 100).layout["xaxis"]
+    assert "dtick" not in chart_over_frames(rows * 100).layout["xaxis"]
 
 
 def test_the_summary_counts_and_takes_the_median():
@@ -174,7 +174,7 @@ def drive_rows(folder, level, frames=400, jump=0.0):
 
 def test_the_chart_shows_segments_jumps_and_the_smoothed_roll():
     rows = drive_rows("run", 0.2, jump=0.8)
-    shown = {trace["name"]: trace for trace in roll_chart(rows, assess_rig(rows)).data}
+    shown = {trace["name"]: trace for trace in chart_over_frames(rows, rig=assess_rig(rows)).data}
     assert shown["jump"]["x"] == [200.5, 200.5, None]
     assert shown["jump"]["text"][0].startswith("jump by +0.")
     assert shown["jump"]["text"][0].endswith(" at run/200.png")
@@ -185,8 +185,25 @@ def test_the_chart_shows_segments_jumps_and_the_smoothed_roll():
     assert np.abs(smoothed - np.repeat([0.2, 1.0], 200)).max() < 0.1
 
 
+def test_the_smoothed_roll_is_not_drawn_across_suspect_frames():
+    rows = drive_rows("run", 0.2, frames=80)
+    rows[20:24] = [row(f"run/{place}.png", 9.0, 1.0, "suspect") for place in range(20, 24)]
+    shown = {trace["name"]: trace for trace in chart_over_frames(rows, rig=assess_rig(rows)).data}
+    assert shown["smoothed"]["x"] == [*range(1, 21), None, *range(25, 81), None]
+
+
+def test_a_long_run_has_a_line_without_dots_and_a_dot_for_each_frame_that_stands_alone():
+    rows = [row(f"{place}.png") for place in range(500)]
+    for place in (20, 22, 24):
+        rows[place] = row(f"{place}.png", 9.0, 1.0, "suspect")
+    shown = traces(rows)
+    assert shown["roll"]["mode"] == "lines"
+    assert shown["roll, alone"]["x"] == [22, 24]
+    assert traces(rows[:400])["roll"]["mode"] == "lines+markers"
+
+
 def test_no_line_leads_from_one_drive_to_another():
     rows = [*drive_rows("monday", 0.2, 30), *drive_rows("tuesday", 0.2, 30)]
-    shown = {trace["name"]: trace for trace in roll_chart(rows, assess_rig(rows)).data}
+    shown = {trace["name"]: trace for trace in chart_over_frames(rows, rig=assess_rig(rows)).data}
     assert shown["roll"]["x"] == [*range(1, 31), None, *range(31, 61), None]
     assert shown["mounting"]["x"] == [1, 30, None, 31, 60, None]

@@ -2,7 +2,11 @@
 
 from dataclasses import replace
 
-from rollcli.report.pose_charts import pose_charts
+import numpy as np
+import pytest
+
+from rollcli.report.charts.over_frames import charts_over_frames
+from rollcli.rig.assess import assess_rig
 from tests.report.results import row
 
 
@@ -17,6 +21,10 @@ ROWS = [
     posed("<b>.png", 3.4, None),
     posed("e.png", 3.1, 0.1),
 ]
+
+
+def pose_charts(rows, rig=None):
+    return charts_over_frames(rows, rig)[1:]
 
 
 def traces(chart):
@@ -37,8 +45,8 @@ def test_a_pitch_without_a_height_is_one_chart():
 def test_the_line_breaks_at_suspect_frames_which_have_marks():
     (chart,) = pose_charts(ROWS)
     shown = traces(chart)
-    assert shown["pitch"]["x"] == [1, 2, None, 4, 5]
-    assert shown["pitch"]["y"] == [3.0, 3.2, None, 3.4, 3.1]
+    assert shown["pitch"]["x"] == [1, 2, None, 4, 5, None]
+    assert shown["pitch"]["y"] == [3.0, 3.2, None, 3.4, 3.1, None]
     assert (shown["suspect"]["x"], shown["suspect"]["y"]) == ([3], [9.0])
 
 
@@ -50,4 +58,29 @@ def test_the_band_is_the_interval_and_breaks_where_there_is_none():
 
 def test_file_names_are_no_tags():
     label = traces(pose_charts(ROWS)[0])["pitch"]["customdata"][3]
-    assert label == "&lt;b&gt;.png<br>3.40 degrees"
+    assert label == "&lt;b&gt;.png<br>+3.40°"
+
+
+def test_a_height_is_told_in_metres_with_as_many_decimals_as_its_interval_is_worth():
+    each = replace(row("a.png"), height_m=1.6543, height_ci95_m=0.004)
+    assert traces(pose_charts([each])[0])["height"]["customdata"][0] == "a.png<br>1.654 ± 0.004 m"
+
+
+def test_jumps_segments_and_the_smoothed_value_are_shown_and_no_line_leads_to_another_drive():
+    rng = np.random.default_rng(4)
+    rows = [
+        replace(posed(f"{folder}/{place}.png", 3.0, 0.05), height_m=1.5 + jump + noise, height_ci95_m=0.01)
+        for folder, jump in (("monday", 0.0), ("tuesday", 0.2))
+        for place, noise in enumerate(rng.normal(0, 0.01, 200))
+    ]
+    for place in range(300, 400):
+        rows[place] = replace(rows[place], height_m=rows[place].height_m + 0.1)
+    pitch, height = pose_charts(rows, assess_rig(rows))
+    shown = traces(height)
+    assert shown["mounting"]["x"] == [1, 200, None, 201, 300, None, 301, 400, None]
+    assert shown["mounting"]["y"][::3] == pytest.approx([1.5, 1.7, 1.8], abs=0.01)
+    assert shown["mounting"]["text"][0].startswith("mounting height 1.50")
+    assert shown["jump"]["x"] == [300.5, 300.5, None]
+    assert shown["height"]["x"][199:202] == [200, None, 201]
+    assert shown["smoothed"]["x"][199:202] == [200, None, 201]
+    assert "jump" not in traces(pitch)

@@ -29,11 +29,14 @@ class Smoothed:
     level : ndarray of float, shape (C,)
     error : ndarray of float, shape (C,)
         Standard error of the level.
+    cell : int
+        Frames of a cell; cells without a frame are left out.
     """
 
     frames: NDArray[np.float64]
     level: Floats
     error: Floats
+    cell: int
 
 
 def smooth(values: Floats, weights: Floats, noise: Noise, steps: Sequence[float] = _STEPS) -> Smoothed:
@@ -67,7 +70,7 @@ def smooth(values: Floats, weights: Floats, noise: Noise, steps: Sequence[float]
     best = min(runs, key=lambda run: run.deviance)
     level, variance = _back(best)
     frames = np.minimum(starts + (width - 1) / 2, len(values) - 1)[there]
-    return Smoothed(frames, level + centre, np.sqrt(np.maximum(variance, 0.0)))
+    return Smoothed(frames, level + centre, np.sqrt(np.maximum(variance, 0.0)), width)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.files.results import Row
-from rollcli.report.axis_range import view
-from rollcli.report.page import Chart
+from rollcli.report.charts.axis_range import view
+from rollcli.report.charts.chart import Chart
 from rollcli.report.summary import degrees
 
 _MOST_BINS = 40

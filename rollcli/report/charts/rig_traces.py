@@ -1,11 +1,14 @@
-"""What the roll chart shows of the rig: segments with intervals, jumps, and the smoothed mounting roll."""
+"""What a chart over the frames shows of the rig: segments with intervals, jumps, the smoothed value."""
 
 import html
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from rollcli.rig.assess import DriveAssessment, RigAssessment
-from rollcli.rig.quantities import ROLL
+from rollcli.rig.quantities import Quantity
+from rollcli.rig.sequence.assess import SequenceAssessment
 from rollcli.rig.sequence.smoothing import smooth
 from rollcli.rig.words import answer
 
@@ -23,14 +26,15 @@ def drive_starts(rig: RigAssessment) -> set[int]:
     return {place + 1 for place in range(1, rig.count) if drives[place] != drives[place - 1]}
 
 
-def rig_traces(rig: RigAssessment, ends: tuple[float, float]) -> list[Trace]:
+def rig_traces(rig: RigAssessment, quantity: Quantity, ends: tuple[float, float]) -> list[Trace]:
     """Return the traces of all drives.
 
     Parameters
     ----------
     rig : RigAssessment
+    quantity : Quantity
     ends : (float, float)
-        The lower and upper end of the chart, degrees, from which to which a jump is marked.
+        The lower and upper end of the chart, degrees or metres, from which to which a jump is marked.
 
     Returns
     -------
@@ -48,9 +52,11 @@ def rig_traces(rig: RigAssessment, ends: tuple[float, float]) -> list[Trace]:
     smoothed["line"] = {"color": "@c4", "width": 1.5, "dash": "dot"}
     jumps["line"] = {"color": "@error", "width": 1.5, "dash": "dash"}
     for drive in rig.drives:
-        _add_segments(drive, band, means)
-        _add_smoothed(drive, smoothed)
-        _add_jumps(rig, drive, jumps, ends)
+        found = drive.quantities.get(quantity.name)
+        if found is not None:
+            _add_segments(drive, quantity, found, band, means)
+            _add_smoothed(drive, quantity, found, smoothed)
+            _add_jumps(rig, drive, quantity, found, jumps, ends)
     return [trace for trace in (band, means, smoothed, jumps) if trace["x"]]
 
 
@@ -66,33 +72,46 @@ def _add(trace: Trace, x: Sequence[float], y: Sequence[float], text: str) -> Non
     trace["text"] += [*([html.escape(text)] * len(x)), None]
 
 
-def _add_segments(drive: DriveAssessment, band: Trace, means: Trace) -> None:
-    for segment in drive.quantities[ROLL.name].segments:
+def _add_segments(
+    drive: DriveAssessment, quantity: Quantity, found: SequenceAssessment, band: Trace, means: Trace
+) -> None:
+    for segment in found.segments:
         value, half = segment.mean.value, segment.mean.ci95
         if value is None:
             continue
         first, last = (int(drive.frames[place]) + 1 for place in (segment.first, segment.last))
-        count = f"{segment.used:,} frames"
-        _add(means, [first, last], [value, value], f"mounting roll {answer(segment.mean)}, of {count}")
+        said = f"mounting {quantity.name} {answer(segment.mean, quantity)}, of {segment.used:,} frames"
+        _add(means, [first, last], [value, value], said)
         if half is not None:
             low, high = value - half, value + half
             _add(band, [first, last, last, first], [high, high, low, low], "")
 
 
-def _add_smoothed(drive: DriveAssessment, smoothed: Trace) -> None:
-    found = drive.quantities[ROLL.name]
+def _add_smoothed(
+    drive: DriveAssessment, quantity: Quantity, found: SequenceAssessment, smoothed: Trace
+) -> None:
     for segment in found.segments:
         if found.noise is None or segment.used < _FEWEST_TO_SMOOTH:
             continue
         part = slice(segment.first, segment.last + 1)
         curve = smooth(found.values[part], found.weights[part], found.noise)
-        places = (curve.frames + segment.first).astype(int)
-        numbers = [int(each) + 1 for each in drive.frames[places]]
-        _add(smoothed, numbers, curve.level.tolist(), "mounting roll, smoothed")
+        numbers = drive.frames[(curve.frames + segment.first).astype(int)] + 1
+        # neither across cells whose frames are all suspect, nor across frames of another drive
+        ends = np.flatnonzero(np.diff(numbers) > 1.5 * curve.cell) + 1
+        said = f"mounting {quantity.name}, smoothed"
+        for along, level in zip(np.split(numbers, ends), np.split(curve.level, ends), strict=True):
+            _add(smoothed, along.tolist(), level.tolist(), said)
 
 
-def _add_jumps(rig: RigAssessment, drive: DriveAssessment, jumps: Trace, ends: tuple[float, float]) -> None:
-    for jump in drive.quantities[ROLL.name].jumps:
+def _add_jumps(
+    rig: RigAssessment,
+    drive: DriveAssessment,
+    quantity: Quantity,
+    found: SequenceAssessment,
+    jumps: Trace,
+    ends: tuple[float, float],
+) -> None:
+    for jump in found.jumps:
         frame = int(drive.frames[jump.frame])
-        said = f"jump by {answer(jump.change, change=True)} at {rig.frames.files[frame]}"
+        said = f"jump by {answer(jump.change, quantity, change=True)} at {rig.frames.files[frame]}"
         _add(jumps, [frame + 0.5, frame + 0.5], ends, said)

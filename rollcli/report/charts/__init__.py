@@ -1,0 +1,1 @@
+"""The charts of a report: what they hold, as plotly takes it."""

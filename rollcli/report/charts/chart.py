@@ -1,0 +1,47 @@
+"""A chart, and how a page holds it."""
+
+import html
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Chart:
+    """A chart as plotly's script takes it; prints itself in a template.
+
+    Attributes
+    ----------
+    name : str
+        Its id on the page, and the name of the picture that a reader saves.
+    label : str
+        What it shows, for those who cannot see it.
+    data : sequence of mapping
+        The traces. No NaN: None where there is no value. A colour may be "@" and a name of the page's own
+        colours, such as "@c1", "@ok" or "@muted": these follow light and dark mode.
+    layout : mapping
+        Titles, ranges, kinds of axes; fonts, margins and colours are the page's.
+    """
+
+    name: str
+    label: str
+    data: Sequence[Mapping[str, Any]]
+    layout: Mapping[str, Any] = field(default_factory=dict)
+
+    def __html__(self) -> str:
+        """Return the chart's place and its content."""
+        content = script_json({"data": self.data, "layout": self.layout})
+        name = html.escape(self.name)
+        return (
+            f'<div class="chart" id="{name}" role="img" aria-label="{html.escape(self.label)}"></div>'
+            f'<script type="application/json" data-chart="{name}">{content}</script>'
+        )
+
+
+def script_json(value: Any) -> str:
+    """Return JSON for a script element, which file names in it cannot end."""
+    content = json.dumps(value, allow_nan=False)
+    for mark in "<>&\u2028\u2029":
+        content = content.replace(mark, f"\\u{ord(mark):04x}")
+    return content
