@@ -4,9 +4,11 @@ import math
 import time
 from dataclasses import replace
 
+from rollcli.errors import EstimationError
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.result import RollEstimate
 from rollcli.files.results import Row
+from rollcli.frames.diagnosis import looks_like
 from rollcli.frames.encode import write_images
 from rollcli.frames.frame import Frame, FrameResult
 from rollcli.frames.guard import guarded
@@ -35,16 +37,27 @@ def run_frame(frame: Frame, options: FrameOptions) -> FrameResult:
 
 def _estimate(frame: Frame, options: FrameOptions) -> FrameResult:
     source = read_source(frame, options)
-    wanted = options.images.road_mask is not None
-    arguments = options.method.arguments()
-    estimate = estimate_roll(source.disparity, mask=source.allowed, road_mask=wanted, **arguments)
+    estimate, likeness = _estimate_roll(source, options)
     calibration = _calibration(frame, source, estimate)
     horizon = None if calibration is None else horizon_row(estimate.tangent, calibration)
     note = write_images(frame, source, estimate, options, horizon)
     if calibration is not None:
         estimate = with_pose(estimate, calibration)
-    row = _row(frame, source, estimate, note)
+    row = _row(frame, source, estimate, note, likeness)
     return FrameResult(row, source.encoding, source.warning, source.searched)
+
+
+def _estimate_roll(source: Source, options: FrameOptions) -> tuple[RollEstimate, str]:
+    """Estimate the roll; where there is no sure angle, say what the map looks like instead."""
+    wanted = options.images.road_mask is not None
+    arguments = options.method.arguments()
+    try:
+        estimate = estimate_roll(source.disparity, mask=source.allowed, road_mask=wanted, **arguments)
+    except EstimationError as error:
+        likeness = looks_like(source.disparity, source.stored, options)
+        raise EstimationError(f"{likeness}; {error}" if likeness else str(error)) from error
+    doubtful = estimate.status != "ok"
+    return estimate, looks_like(source.disparity, source.stored, options) if doubtful else ""
 
 
 def _calibration(frame: Frame, source: Source, estimate: RollEstimate) -> Calibration | None:
@@ -57,8 +70,8 @@ def _calibration(frame: Frame, source: Source, estimate: RollEstimate) -> Calibr
     return calibration.for_size(estimate.width, estimate.height)
 
 
-def _row(frame: Frame, source: Source, estimate: RollEstimate, note: str) -> Row:
-    reasons = [estimate.message] if estimate.message else []
+def _row(frame: Frame, source: Source, estimate: RollEstimate, note: str, likeness: str) -> Row:
+    reasons = [reason for reason in (likeness, estimate.message) if reason]
     status = estimate.status
     if source.doubt:
         status = "suspect"

@@ -9,7 +9,7 @@ from rollcli.errors import UsageError
 from rollcli.files.results import Format, run_path
 from rollcli.files.stores.locations import is_url
 from rollcli.files.stream import is_stream
-from rollcli.frames.calibration import calibration_files, check_first_size
+from rollcli.frames.calibration import calibration_files, check_depth, check_first_size
 from rollcli.frames.checks import check_inputs_are_kept, check_nothing_is_there, check_one_owner
 from rollcli.frames.find import map_frames, pair_frames
 from rollcli.frames.frame import Frame
@@ -42,6 +42,8 @@ def make_plan(options: EstimateOptions) -> Plan:
     """
     part, parts = options.result.shard
     frames = _find_frames(options)
+    if options.pairs.left is None:
+        check_depth(frames, options.encoding)
     output = options.result.output
     results = [] if is_stream(output) else [output, run_path(output)]
     check_one_owner(((frame, _images([frame], options)) for frame in frames), results)

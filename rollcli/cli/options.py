@@ -145,15 +145,17 @@ encoding_options = record(
     EncodingOptions,
     option(
         "--encoding",
-        type=Choice("auto", "px", "kitti", "cityscapes", "sgbm"),
+        type=Choice("auto", "px", "kitti", "cityscapes", "sgbm", "depth"),
         default="auto",
         help="px: pixels as they are; kitti: p/256; cityscapes: (p-1)/256; sgbm: p/16, negative is no data; "
+        "depth: metres (whole numbers: millimetres), which a calibration turns into disparities; "
         "auto: float and uint8 are px, uint16 is kitti, int16 is sgbm.",
     ),
     option(
         "--scale",
         type=Number("F", above=0),
-        help="Pixels = stored number * F; with an encoding, F replaces its factor.",
+        help="Pixels = stored number * F (depth: metres = stored number * F); F replaces the factor of an "
+        "encoding.",
     ),
     option(
         "--invalid",

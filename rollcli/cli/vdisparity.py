@@ -4,6 +4,7 @@ from typing import Any
 
 import click
 
+from rollcli.cli.calibration_options import calibration_options
 from rollcli.cli.command import command, option, record
 from rollcli.cli.config import config_option
 from rollcli.cli.options import cluster_options, encoding_options, input_options, output_folder_option
@@ -44,6 +45,7 @@ count_options = record(
 @count_options
 @output_folder_option
 @encoding_options
+@calibration_options
 @cluster_options
 @config_option
 @click.pass_context

@@ -1,10 +1,11 @@
 """The options of the conversions. Import-light: the command line loads this to show its help."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 from rollcli.frames.options import EncodingOptions, InputOptions, PairOptions, RunningOptions
 from rollcli.imaging.stereo_options import StereoOptions
+from rollcli.rig.options import CalibrationOptions
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,7 @@ class VDisparityOptions:
     output: str
     encoding: EncodingOptions
     running: RunningOptions
+    calibration: CalibrationOptions = field(default_factory=CalibrationOptions)
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from functools import partial
 from rollcli.convert.options import CountOptions, VDisparityOptions
 from rollcli.convert.run import Conversion, convert
 from rollcli.errors import ExitStatus
+from rollcli.frames.calibration import check_depth
 from rollcli.frames.find import map_frames
 from rollcli.frames.frame import Frame, FrameResult
 from rollcli.frames.options import FrameOptions
@@ -13,7 +14,8 @@ from rollcli.frames.outputs import output_path
 
 def run_vdisparity(options: VDisparityOptions) -> ExitStatus:
     """Count the disparities of every map, row by row, and draw them."""
-    frames = map_frames(options.inputs, skip=[options.output])
+    frames = map_frames(options.inputs, calibration=options.calibration, skip=[options.output])
+    check_depth(frames, options.encoding)
     conversions = [Conversion(frame, _writes(frame, options)) for frame in frames]
     read = FrameOptions(encoding=options.encoding, root=options.running.root)
     do = partial(_count, options=read, count=options.count)

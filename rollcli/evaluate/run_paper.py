@@ -50,6 +50,8 @@ def run_paper(options: PaperOptions) -> ExitStatus:
         Exit status 1.
     """
     require_extra("the page of charts")
+    if options.encoding.encoding == "depth":
+        raise UsageError("--encoding depth: the experiments are made on disparity maps, not on depth maps")
     folder, running = options.experiments.output, options.running
     frames = map_frames(options.inputs, region=options.region, skip=[folder])
     truth = _known_angles(frames, options)

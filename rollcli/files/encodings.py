@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from rollcli.errors import InputError, UsageError
 from rollcli.files.formats import Stored, decode_mask, read_stored
 from rollcli.files.storage import read_bytes
+from rollcli.rig.calibration import Calibration
 
 
 class Encoding(str, Enum):
@@ -22,10 +23,12 @@ class Encoding(str, Enum):
     KITTI = "kitti"  # p / 256; 0 is no data
     CITYSCAPES = "cityscapes"  # (p - 1) / 256; 0 is no data
     SGBM = "sgbm"  # p / 16; negative is no data
+    DEPTH = "depth"  # a distance z: focal length * baseline / z - doffs
 
 
 KITTI_TOP = 65534 / 256  # px: the largest disparity of a KITTI PNG; 65535 is never one
 _SCALE = {Encoding.PX: 1.0, Encoding.KITTI: 1 / 256, Encoding.CITYSCAPES: 1 / 256, Encoding.SGBM: 1 / 16}
+_METRES = {"f": 1.0, "i": 1e-3, "u": 1e-3}  # a stored depth, by its kind: metres, or whole millimetres
 _AUTO = {np.dtype(np.uint16): Encoding.KITTI, np.dtype(np.int16): Encoding.SGBM}
 _WHOLE_PIXELS_BELOW = 512
 
@@ -41,7 +44,7 @@ class DisparityMap:
     encoding : Encoding
         The one used.
     scale : float
-        Pixels per stored unit.
+        Pixels per stored unit; of a depth map, metres per stored unit.
     stored : Stored
         What the file holds.
     warning : str or None
@@ -56,7 +59,12 @@ class DisparityMap:
 
 
 def to_disparity(
-    stored: Stored, *, encoding: str = "auto", scale: float | None = None, invalid: Iterable[float] = ()
+    stored: Stored,
+    *,
+    encoding: str = "auto",
+    scale: float | None = None,
+    invalid: Iterable[float] = (),
+    calibration: Calibration | None = None,
 ) -> DisparityMap:
     """Turn stored numbers into pixels of disparity.
 
@@ -64,24 +72,30 @@ def to_disparity(
     ----------
     stored : Stored
         What a file holds.
-    encoding : {"auto", "px", "kitti", "cityscapes", "sgbm"}
-        auto: uint16 is kitti, int16 is sgbm, everything else px.
+    encoding : {"auto", "px", "kitti", "cityscapes", "sgbm", "depth"}
+        auto: uint16 is kitti, int16 is sgbm, everything else px. depth: metres, in whole numbers millimetres.
     scale : float, optional
-        Pixels per stored unit, in place of the encoding's own; makes "auto" take px.
+        Pixels (of a depth: metres) per stored unit, in place of the encoding's own; makes "auto" take px.
     invalid : iterable of float
         Stored values that mean no data, besides NaN, inf, <= 0, the file's own tag, and 65535 in uint16.
+    calibration : Calibration, optional
+        What turns a depth into a disparity; without it, the disparity of a depth z is 1/z.
 
     Raises
     ------
     UsageError
-        Unknown encoding, or a scale that is not positive.
+        Unknown encoding, a scale that is not positive, or a calibration of another view.
     """
     used = resolve_encoding(encoding, stored.values.dtype, scale)
-    factor = _SCALE[used] if scale is None else scale
+    factor = _factor(used, stored.values.dtype) if scale is None else scale
     if not (math.isfinite(factor) and factor > 0):
         raise UsageError(f"scale {factor}: must be a positive number, pixels per stored unit")
     with np.errstate(all="ignore"):  # numbers too large for float32 become inf, and inf no data
-        disparity = _scaled(stored.values, used, factor)
+        disparity = (
+            _from_depth(stored.values, factor, calibration)
+            if used is Encoding.DEPTH
+            else _scaled(stored.values, used, factor)
+        )
         _blank(disparity, stored.values, (*invalid, *stored.nodata, *_saturated(stored.values)))
     doubt = _doubt(stored.values, used) if encoding == "auto" and scale is None else ""
     warning = "; ".join(each for each in (stored.note, doubt) if each)
@@ -89,7 +103,12 @@ def to_disparity(
 
 
 def read_disparity(
-    path: str | Path, *, encoding: str = "auto", scale: float | None = None, invalid: float | None = None
+    path: str | Path,
+    *,
+    encoding: str = "auto",
+    scale: float | None = None,
+    invalid: float | None = None,
+    calibration: Calibration | None = None,
 ) -> NDArray[Any]:
     """Read a disparity map: pixels, shape (H, W), float32 (float64 if the file holds that); no data is 0.
 
@@ -104,7 +123,10 @@ def read_disparity(
     array([[0. , 1. , 2.5]], dtype=float32)
     """
     values = () if invalid is None else (invalid,)
-    return to_disparity(read_stored(path), encoding=encoding, scale=scale, invalid=values).disparity
+    found = to_disparity(
+        read_stored(path), encoding=encoding, scale=scale, invalid=values, calibration=calibration
+    )
+    return found.disparity
 
 
 def from_disparity(
@@ -126,12 +148,14 @@ def from_disparity(
     Raises
     ------
     UsageError
-        Unknown encoding.
+        Unknown encoding, or depth, which is only read.
     InputError
         More than one in a hundred disparities is too large for the dtype. Fewer become no data.
     """
     kind = np.dtype(dtype)
     used = resolve_encoding(encoding, kind, scale)
+    if used is Encoding.DEPTH:
+        raise UsageError("a disparity is not written as a depth")
     factor = _SCALE[used] if scale is None else scale
     valid = np.isfinite(disparity) & (disparity > 0)
     first = int(used is Encoding.CITYSCAPES)
@@ -174,6 +198,25 @@ def _scaled(values: NDArray[Any], encoding: Encoding, scale: float) -> NDArray[A
     if not np.isfinite(pixels.max()):
         pixels[np.isinf(pixels)] = 0
     return pixels
+
+
+def _factor(encoding: Encoding, dtype: np.dtype[Any]) -> float:
+    """Return the pixels, or of a depth the metres, that a stored unit stands for."""
+    return _METRES[dtype.kind] if encoding is Encoding.DEPTH else _SCALE[encoding]
+
+
+def _from_depth(values: NDArray[Any], metres: float, calibration: Calibration | None) -> NDArray[Any]:
+    """Turn stored depths into pixels of disparity; whatever is no depth becomes 0."""
+    real = np.float64 if values.dtype.kind == "f" and values.dtype.itemsize >= 8 else np.float32
+    depth: NDArray[Any] = np.multiply(values, real(metres), dtype=real)
+    focal_baseline, doffs = 1.0, 0.0
+    if calibration is not None and calibration.baseline is not None:
+        rig = calibration.for_size(*reversed(values.shape))
+        focal_baseline, doffs = rig.fx * calibration.baseline, rig.doffs
+    pixels = real(focal_baseline) / depth - real(doffs)
+    found: NDArray[Any] = np.where(np.isfinite(depth) & (depth > 0) & (pixels > 0), pixels, real(0))
+    found[np.isinf(found)] = 0
+    return found
 
 
 def _blank(disparity: NDArray[Any], values: NDArray[Any], invalid: tuple[float, ...]) -> None:

@@ -163,7 +163,8 @@ def _decoded(data: bytes, name: str) -> Stored:
     for each in MAP_FORMATS.values():
         if data.startswith(each.signatures):
             return each.decode(data, name)
-    raise InputError(f"{name}: is {_what(data)}; a disparity map is a PNG, TIFF, NPY or PFM file")
+    hint = "; photographs are given by --left and --right" if data.startswith(pictures.SIGNATURES) else ""
+    raise InputError(f"{name}: is {_what(data)}; a disparity map is a PNG, TIFF, NPY or PFM file{hint}")
 
 
 def _what(data: bytes) -> str:

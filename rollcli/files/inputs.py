@@ -15,6 +15,7 @@ from rollcli.files.stores.locations import is_url, public_name
 
 MAP_ENDINGS = (".png", ".tif", ".tiff", ".npy", ".pfm")
 IMAGE_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm")
+_OTHER_SIDE = "name the images of the other camera"
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,7 +147,7 @@ def pair_inputs(
     Raises
     ------
     UsageError
-        An image without a partner, or with more than one; it is named.
+        An image without a partner, or with more than one, or that is given as both; it is named.
     """
     lefts, rights = (
         find_inputs(
@@ -157,10 +158,13 @@ def pair_inputs(
     if match == "order":
         if len(lefts) != len(rights):
             raise UsageError(f"{len(lefts)} left and {len(rights)} right images cannot be matched by order")
-        return [Pair(*both) for both in zip(lefts, rights, strict=True)]
-    if len(lefts) == len(rights) == 1:
-        return [Pair(lefts[0], rights[0])]
-    return _by_name(lefts, rights)
+    elif not len(lefts) == len(rights) == 1:
+        return _by_name(lefts, rights)
+    pairs = [Pair(*both) for both in zip(lefts, rights, strict=True)]
+    for pair in pairs:
+        if pair.left.path.name == pair.right.path.name and _place(pair.left) == _place(pair.right):
+            raise UsageError(f"{pair.left.name}: is given by --left and by --right; {_OTHER_SIDE}")
+    return pairs
 
 
 def _by_name(lefts: list[Input], rights: list[Input]) -> list[Pair]:
@@ -176,8 +180,15 @@ def _by_name(lefts: list[Input], rights: list[Input]) -> list[Pair]:
     pairs = [Pair(lefts[i], rights[j]) for i, j in matching.pairs]
     paired = {_place(each) for pair in pairs for each in (pair.left, pair.right)}
     alone = list(dict.fromkeys(each.name for each in (*lefts, *rights) if _place(each) not in paired))
+    if not pairs and set(map(_place, lefts)) == same_files:
+        raise UsageError(
+            f"--left and --right name the same images, and no name has a mark of its side (such as left and "
+            f"right, L1 and R1): {listed(each.name for each in lefts)}; {_OTHER_SIDE}"
+        )
     if alone:
-        raise UsageError(f"no partner found for {listed(alone)}")
+        by_order = len(lefts) == len(rights) and not pairs
+        hint = "; --match order pairs the first with the first, and so on" if by_order else ""
+        raise UsageError(f"no partner found for {listed(alone)}{hint}")
     return pairs
 
 

@@ -8,7 +8,7 @@ from rollcli.errors import InputError, UsageError
 from rollcli.files.existence import is_file, is_folder
 from rollcli.files.storage import read_bytes
 from rollcli.frames.frame import Frame
-from rollcli.frames.options import FrameOptions
+from rollcli.frames.options import EncodingOptions, FrameOptions
 from rollcli.rig.calibration import Calibration
 from rollcli.rig.options import CalibrationOptions
 from rollcli.rig.parse import MAX_BYTES, parse_calibration
@@ -123,6 +123,23 @@ def check_first_size(frames: Sequence[Frame], options: FrameOptions) -> None:
     except InputError:
         return  # its row will say so
     first.calibration.for_size(width, height)
+
+
+def check_depth(frames: Sequence[Frame], encoding: EncodingOptions) -> None:
+    """Refuse depth maps without the calibration that turns their numbers into disparities.
+
+    Raises
+    ------
+    UsageError
+    """
+    if encoding.encoding != "depth":
+        return
+    for frame in frames:
+        if frame.calibration is None or frame.calibration.baseline is None:
+            raise UsageError(
+                "--encoding depth needs a focal length and a baseline, which turn a depth into a disparity: "
+                "give --calib, or --focal, --principal-point and --baseline"
+            )
 
 
 def _stems(folder: Path) -> dict[str, list[Path]]:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from rollcli.files.encodings import to_disparity
 from rollcli.files.formats import Stored, read_image, read_stored
+from rollcli.frames.diagnosis import require_positive, too_large
 from rollcli.frames.frame import Frame
 from rollcli.frames.options import FrameOptions
 from rollcli.frames.region import region_mask
@@ -76,9 +77,25 @@ def read_source(frame: Frame, options: FrameOptions) -> Source:
 
 def _read(frame: Frame, options: FrameOptions) -> Source:
     stored = read_stored(options.at(frame.path), frame.file)
+    require_positive(stored, frame.file)
     given = options.encoding
-    found = to_disparity(stored, encoding=given.encoding, scale=given.scale, invalid=given.invalid)
-    return Source(found.disparity, stored=stored, encoding=found.encoding.value, warning=found.warning or "")
+    found = to_disparity(
+        stored,
+        encoding=given.encoding,
+        scale=given.scale,
+        invalid=given.invalid,
+        calibration=frame.calibration,
+    )
+    encoding = found.encoding.value
+    beyond = too_large(found.disparity, stored, encoding)
+    return Source(
+        found.disparity,
+        stored=stored,
+        encoding=encoding,
+        warning="; ".join(filter(None, [found.warning, beyond])),
+        # the roll is the same at any scale, pitch and height are not
+        doubt=beyond if frame.calibration is not None else "",
+    )
 
 
 def _match(frame: Frame, options: FrameOptions) -> Source:

@@ -215,3 +215,31 @@ def test_a_result_never_replaces_the_calibration(maps):
 def test_a_dry_run_lists_the_calibration(maps):
     done = rollcli("estimate", "maps", "--calib", "calib.txt", "--dry-run", cwd=maps)
     assert "read  calib.txt\n" in done.out
+
+
+def test_depth_maps_become_the_disparities_of_their_calibration(maps):
+    disparity = cast(CALIBRATION, ROLL, PITCH, HEIGHT)
+    depth = np.where(disparity > 0, RIG.fx * RIG.baseline / np.where(disparity > 0, disparity, 1), np.nan)
+    (maps / "depth").mkdir()
+    np.save(maps / "depth" / "metres.npy", depth.astype(np.float32))
+    millimetres = np.rint(1000 * np.clip(np.nan_to_num(depth), 0, 65)).astype(np.uint16)
+    cv2.imwrite(str(maps / "depth" / "millimetres.png"), millimetres)
+
+    depths = ("depth", "--encoding", "depth", "--calib", "calib.txt")
+    done = rollcli("estimate", *depths, "--derotated", "level", cwd=maps)
+    assert done.status == 0
+    assert_posed(rows_of(done.out))
+    assert [float(row["roll_deg"]) for row in rows_of(done.out)] == pytest.approx([2.0, 2.0], abs=0.01)
+    level = rollcli("estimate", "level", *depths[1:], cwd=maps)
+    assert [float(row["roll_deg"]) for row in rows_of(level.out)] == pytest.approx([0.0, 0.0], abs=0.05)
+    assert rollcli("vdisparity", *depths, "-o", "v", cwd=maps).status == 0
+    assert rollcli("derotate", *depths[:3], "--roll", "2", "-o", "turned", cwd=maps).status == 0
+
+
+@pytest.mark.parametrize("command", [("estimate",), ("vdisparity", "-o", "v")])
+@pytest.mark.parametrize("rig", [(), ("--focal", "250", "--principal-point", "150,90")])
+def test_depth_maps_without_a_baseline_are_refused_before_anything_runs(maps, command, rig):
+    done = rollcli(*command, "maps", "--encoding", "depth", *rig, cwd=maps)
+    assert (done.status, done.out) == (2, "")
+    assert "needs a focal length and a baseline" in done.err
+    assert done.err.count("\n") == 1

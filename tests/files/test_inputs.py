@@ -348,8 +348,24 @@ def test_more_than_one_partner_is_an_error_that_names_them(here):
 def test_one_folder_without_marks_has_no_pairs(here):
     here("one/a.png", "one/b.png")
 
-    with pytest.raises(UsageError, match=r"no partner found for one/a.png, one/b.png"):
+    with pytest.raises(UsageError, match=r"the same images.*: one/a.png, one/b.png; name the images of the"):
         pair_inputs("one", "one/../one")
+
+
+@pytest.mark.parametrize("match", ["name", "order"])
+def test_an_image_is_no_pair_with_itself(here, match):
+    here("one/a.png", "two/a.png")
+
+    with pytest.raises(UsageError, match=r"one/a.png: is given by --left and by --right"):
+        pair_inputs("one/a.png", "two/../one", match=match)
+
+
+def test_names_that_pair_by_order_alone_are_told_so(here):
+    here("l/0001.png", "l/0003.png", "r/0002.png", "r/0004.png")
+
+    with pytest.raises(UsageError, match=r"and 1 more; --match order pairs the first with the first"):
+        pair_inputs("l", "r")
+    assert pairs(pair_inputs("l", "r", match="order"))[1] == ("l/0003.png", "r/0004.png")
 
 
 def test_pairs_by_order_need_as_many_of_each(here):

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from rollcli.errors import InputError, OutputError
 from rollcli.files.codecs.fast_png import decode_grey16
 from rollcli.files.codecs.mute_stderr import decoding
-from rollcli.files.codecs.raw_map import PICTURE_FLAGS, require_decoded_fits
+from rollcli.files.codecs.raw_map import COLOUR_REMEDY, PICTURE_FLAGS, require_decoded_fits
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _GREY, _COLOUR, _PALETTE, _GREY_ALPHA, _COLOUR_ALPHA = 0, 2, 3, 4, 6
@@ -90,13 +90,13 @@ def grey_values(data: bytes, name: str) -> NDArray[Any]:
         return pixels
     grey: NDArray[Any] = np.ascontiguousarray(pixels[..., 0])
     if header.colour == _PALETTE and not bool((pixels[..., :3] == grey[..., None]).all()):
-        raise InputError(f"{name}: is a colour image (a palette); a disparity map has one channel")
+        raise InputError(f"{name}: is a colour image (a palette); {COLOUR_REMEDY}")
     if header.colour in (_GREY_ALPHA, _PALETTE):
         if header.colour == _GREY_ALPHA or transparent:
             grey[pixels[..., -1] == 0] = 0
         return grey
     what = f"{_CHANNELS[header.colour]} channels"
-    raise InputError(f"{name}: is a colour image ({what}); a disparity map has one channel")
+    raise InputError(f"{name}: is a colour image ({what}); {COLOUR_REMEDY}")
 
 
 def picture(data: bytes, name: str, *, mask: bool = False) -> NDArray[Any]:

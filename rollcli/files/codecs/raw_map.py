@@ -17,6 +17,8 @@ _MOST = 2**29  # bytes: 134 million pixels
 _ALWAYS = 2**25  # bytes that a small file may stand for, 8 million pixels: an empty map compresses well
 _EXPANSION = 48  # bytes that each byte of a larger file may stand for; real maps reach 20
 
+COLOUR_REMEDY = "a disparity map has one channel; photographs are given by --left and --right"
+
 # a camera image as it lies in the file, grey or BGR: turning it by its EXIF tag would break rectification
 PICTURE_FLAGS = cv2.IMREAD_ANYDEPTH | cv2.IMREAD_ANYCOLOR | cv2.IMREAD_IGNORE_ORIENTATION
 
@@ -46,7 +48,11 @@ class Stored:
 def require_map_shape(shape: tuple[int, ...], name: str) -> None:
     """Refuse anything that is not (H, W) with at least one pixel."""
     if len(shape) != 2:
-        raise InputError(f"{name}: is a {len(shape)}-D array of shape {shape}; a disparity map is 2-D (H, W)")
+        colours = len(shape) == 3 and shape[2] in (3, 4)
+        hint = "; photographs are given as image files, by --left and --right" if colours else ""
+        raise InputError(
+            f"{name}: is a {len(shape)}-D array of shape {shape}; a disparity map is 2-D (H, W){hint}"
+        )
     if 0 in shape:
         raise InputError(f"{name}: has no pixels (shape {shape})")
 

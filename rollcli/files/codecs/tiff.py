@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rollcli.errors import InputError
 from rollcli.files.codecs.mute_stderr import decoding
-from rollcli.files.codecs.raw_map import Stored, native, require_decoded_fits
+from rollcli.files.codecs.raw_map import COLOUR_REMEDY, Stored, native, require_decoded_fits
 from rollcli.files.codecs.tiff_parts import check_parts, decode_parts
 from rollcli.files.codecs.unpack import MAX_EXPANSION, DamagedPartError
 
@@ -47,7 +47,7 @@ def decode_tiff(data: bytes, name: str) -> Stored:
     def decode(file: Any, page: Any) -> Stored:
         if page.samplesperpixel != 1 or page.photometric == _PALETTE:
             what = "a palette" if page.photometric == _PALETTE else f"{page.samplesperpixel} channels"
-            raise InputError(f"{name}: is a colour image ({what}); a disparity map has one channel")
+            raise InputError(f"{name}: is a colour image ({what}); {COLOUR_REMEDY}")
         values = _pixels(page, data, name)[..., 0]
         return Stored(native(values), "tiff", nodata=_nodata(page), note=_note(file, name))
 
