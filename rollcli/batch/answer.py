@@ -23,6 +23,12 @@ class RigAnswer:
         self._rolls.append(float("nan") if row.roll_deg is None else row.roll_deg)
         self._halves.append(float("nan") if row.roll_ci95_deg is None else row.roll_ci95_deg)
 
+    def replace(self, position: int, row: Row) -> None:
+        """Take a row that is written in the place of the one at a position, from 0."""
+        self._status[position] = STATUSES.index(row.status)
+        self._rolls[position] = float("nan") if row.roll_deg is None else row.roll_deg
+        self._halves[position] = float("nan") if row.roll_ci95_deg is None else row.roll_ci95_deg
+
     def line(self) -> str:
         """Return the answer in one line, such as `roll -0.44 ± 0.06°, 5 ok, 0 suspect, 0 failed`."""
         from rollcli.rig.assess import assess_rig

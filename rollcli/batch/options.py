@@ -24,6 +24,7 @@ class ResultOptions:
     output: str = "-"
     format: Literal["csv", "jsonl", "parquet"] | None = None
     resume: bool = False
+    retry_failed: bool = False
     shard: tuple[int, int] = (1, 1)
     fail_fast: bool = False
     timing: bool = False

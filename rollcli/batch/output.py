@@ -10,8 +10,8 @@ from rollcli.batch.durable_rows import DurableRows
 from rollcli.batch.options import EstimateOptions
 from rollcli.batch.plan import Plan
 from rollcli.batch.result_file import ResultFile, has_rows, kept_rows, open_result
-from rollcli.batch.result_parts import count_kept_parts, open_parts
-from rollcli.batch.resume import begun_plan, check_resumable, unknown_inputs
+from rollcli.batch.result_parts import kept_part_rows, open_parts
+from rollcli.batch.resume import failed_positions, new_record
 from rollcli.batch.run_record import RunRecord, is_replaceable_record
 from rollcli.errors import InputError, OutputError, UsageError
 from rollcli.files.atomic import remove_leftovers
@@ -41,12 +41,15 @@ class Output(Protocol):
         A descriptor for workers to inherit.
     incomplete : list of Frame
         Frames of kept rows whose images are missing or empty, whatever the cause.
+    failed : list of int
+        Positions of the kept rows, from 0, whose frames are done again.
     resumable : bool
         Whether an interrupted run can be resumed.
     """
 
     kept: tuple[Row, ...]
     incomplete: list[Frame]
+    failed: list[int]
     keep_open: int | None
     resumable: bool
 
@@ -56,8 +59,11 @@ class Output(Protocol):
     def restore(self, frame: Frame, result: FrameResult) -> None:
         """Take the images of an incomplete frame, which were made again."""
 
+    def replace(self, position: int, frame: Frame, result: FrameResult) -> None:
+        """Write the row in the place of a kept one, at once or with others after it; positions increase."""
+
     def commit(self) -> None:
-        """Write every row that was appended."""
+        """Write every row that was appended or replaces another."""
 
     def finish(self, totals: Mapping[str, int], alignment: Mapping[str, Any] | None) -> None:
         """Say that all rows are written, how many of each status, and how the views of pairs lay."""
@@ -75,6 +81,7 @@ class StreamOutput:
 
     def __init__(self, descriptor: int, name: str, plan: Plan) -> None:
         self.incomplete: list[Frame] = []
+        self.failed: list[int] = []
         self._descriptor, self._name, self._plan = descriptor, name, plan
         self._write(format_header(plan.format, plan.timing))
 
@@ -86,6 +93,9 @@ class StreamOutput:
         """Do nothing: a stream has no record."""
 
     def restore(self, frame: Frame, result: FrameResult) -> None:
+        """Do nothing: a stream keeps no rows."""
+
+    def replace(self, position: int, frame: Frame, result: FrameResult) -> None:
         """Do nothing: a stream keeps no rows."""
 
     def commit(self) -> None:
@@ -110,13 +120,16 @@ class FileOutput:
         record: RunRecord,
         plan: Plan,
         kept: tuple[Row, ...],
-        images: ImageOptions,
+        options: EstimateOptions,
     ) -> None:
+        images = options.images
         self.kept = kept
         self.incomplete = _incomplete_frames(plan, kept, images)
+        self.failed = failed_positions(kept, options)
         self.keep_open: int | None = file.descriptor
         self._file, self._record, self._plan, self._images = file, record, plan, images
         self._rows = DurableRows(file)
+        self._replacing: dict[int, bytes] = {}
 
     def append(self, frame: Frame, result: FrameResult) -> None:
         """Add the row, after the record knows how its frame was read."""
@@ -136,9 +149,18 @@ class FileOutput:
             raise OutputError(f"the images of {frame.file} cannot be made again: {result.row.message}")
         self._rows.restore(self._paths(frame, result))
 
+    def replace(self, position: int, frame: Frame, result: FrameResult) -> None:
+        """Take the row and its images; the file gets them all at once, in `commit`."""
+        self._record.saw(result.encoding, result.searched)
+        self._replacing[position] = format_row(result.row, self._plan.format, self._plan.timing)
+        self._rows.restore(self._paths(frame, result))
+
     def commit(self) -> None:
         """Force the images and rows that were added to the disk."""
         self._rows.commit()
+        if self._replacing:
+            self._file.replace(self._replacing, self._plan.format)
+            self._replacing.clear()
 
     def finish(self, totals: Mapping[str, int], alignment: Mapping[str, Any] | None) -> None:
         """Write both into the record."""
@@ -193,17 +215,23 @@ def frames_to_do(plan: Plan, options: EstimateOptions) -> list[Frame]:
         As `open_output`.
     """
     if plan.in_parts:
-        return plan.frames[count_kept_parts(plan, options) :]
-    _check_permitted(plan.output, options)
-    if not options.result.resume:
-        return plan.frames
+        rows = kept_part_rows(plan, options)
+        incomplete = []
+    else:
+        _check_permitted(plan.output, options)
+        rows = _kept_in_file(plan) if options.result.resume else ()
+        incomplete = _incomplete_frames(plan, rows, options.images)
+    failed = [plan.frames[position] for position in failed_positions(rows, options)]
+    return [*incomplete, *failed, *plan.frames[len(rows) :]]
+
+
+def _kept_in_file(plan: Plan) -> tuple[Row, ...]:
     try:
         data = Path(plan.output).read_bytes()
     except OSError:
-        return plan.frames
+        return ()
     kept = kept_rows(data, plan.output, plan.format)
-    rows = parse_rows(kept, plan.output) if kept else ()
-    return [*_incomplete_frames(plan, rows, options.images), *plan.frames[len(rows) :]]
+    return parse_rows(kept, plan.output) if kept else ()
 
 
 def _incomplete_frames(plan: Plan, kept: Sequence[Row], images: ImageOptions) -> list[Frame]:
@@ -217,21 +245,17 @@ def _incomplete_frames(plan: Plan, kept: Sequence[Row], images: ImageOptions) ->
 def _begin(file: ResultFile, plan: Plan, options: EstimateOptions) -> FileOutput:
     kept = kept_rows(file.read(), plan.output, plan.format) if options.result.resume else b""
     rows, earlier = _parse_kept(kept, plan)
-    unknown = unknown_inputs(earlier)
-    record, begun = RunRecord(plan, options, unknown), begun_plan(plan, earlier)
-    if rows:
-        same = record if begun is plan else RunRecord(begun, options, unknown)
-        added = len(plan.frames) - len(begun.frames)
-        record.continue_from(check_resumable(rows, earlier, same, begun, added))
+    record = new_record(plan, options, rows, earlier)
     if options.result.resume or options.running.overwrite:
-        remove_image_leftovers(plan.frames[len(rows) :], options.images)
-    remove_leftovers([run_path(plan.output)])
+        retried = (frame for frame, row in zip(plan.frames, rows, strict=False) if row.status == "error")
+        remove_image_leftovers((*retried, *plan.frames[len(rows) :]), options.images)
+    remove_leftovers([run_path(plan.output), os.path.realpath(plan.output)])
     # in this order, a run that is killed in between can be resumed: an empty file counts as a new one
     file.truncate(len(kept) if rows else 0)
     record.write({})
     if not rows:
         file.append(format_header(plan.format, plan.timing))
-    return FileOutput(file, record, plan, rows, options.images)
+    return FileOutput(file, record, plan, rows, options)
 
 
 def _parse_kept(kept: bytes, plan: Plan) -> tuple[tuple[Row, ...], Mapping[str, object] | None]:

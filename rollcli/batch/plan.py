@@ -40,6 +40,8 @@ def make_plan(options: EstimateOptions) -> Plan:
         No input; pairs, masks or calibrations without partner; a calibration that is not for the images; two
         frames with the same image; an image or a result that would replace an input, or that exists already.
     """
+    if options.result.retry_failed and not options.result.resume:
+        raise UsageError("--retry-failed does again what failed in an earlier run: give --resume with it")
     part, parts = options.result.shard
     frames = _find_frames(options)
     if options.pairs.left is None:

@@ -3,11 +3,12 @@
 import contextlib
 import errno
 import os
-from collections.abc import Iterator
+import stat
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from rollcli.errors import OutputError, UsageError
-from rollcli.files.atomic import output_error
+from rollcli.files.atomic import atomic_file, output_error
 from rollcli.files.locking import locked
 from rollcli.files.results import Format, format_header
 
@@ -66,6 +67,31 @@ class ResultFile:
                 os.ftruncate(self.descriptor, before)
             raise output_error(self._name, error) from error
 
+    def replace(self, rows: Mapping[int, bytes], form: Format) -> None:
+        """Write rows in the place of those at these positions, from 0, all in one step.
+
+        The new file is locked before it takes the name. A run that is killed leaves the old one or the new.
+
+        Raises
+        ------
+        OutputError
+            The disk does not take the new file; the old one is as it was.
+        """
+        target = os.path.realpath(self._name)  # a link stays one
+        first = -1 if form == "csv" else 0  # the header
+        with contextlib.ExitStack() as held:
+            try:
+                with Path(target).open("rb") as old, atomic_file(target, durable=True) as new:
+                    if hasattr(os, "fchmod"):
+                        os.fchmod(new.fileno(), stat.S_IMODE(os.fstat(self.descriptor).st_mode))
+                    for position, line in enumerate(_lines(old, form), first):
+                        new.write(rows.get(position, line))
+                    locked_file = os.dup(new.fileno())  # the lock is the open file's, and stays with it
+                    held.callback(os.close, locked_file)
+                os.dup2(locked_file, self.descriptor, inheritable=False)
+            except OSError as error:
+                raise output_error(self._name, error) from error
+
     def sync(self) -> None:
         """Force the rows to the disk, where its file system can.
 
@@ -100,17 +126,21 @@ def open_result(name: str) -> Iterator[ResultFile]:
         It cannot be written.
     """
     flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
-    try:
-        Path(name).parent.mkdir(parents=True, exist_ok=True)
-        descriptor = os.open(name, flags, 0o666)
-    except OSError as error:
-        raise output_error(name, error) from error
-    try:
-        with locked(descriptor, name):
-            yield ResultFile(descriptor, name)
-    finally:
-        with contextlib.suppress(OSError):  # what it would report, `sync` has reported
-            os.close(descriptor)
+    while True:
+        try:
+            Path(name).parent.mkdir(parents=True, exist_ok=True)
+            descriptor = os.open(name, flags, 0o666)
+        except OSError as error:
+            raise output_error(name, error) from error
+        try:
+            with locked(descriptor, name):
+                file = ResultFile(descriptor, name)
+                if file.is_there():  # the run that held it may have replaced it
+                    yield file
+                    return
+        finally:
+            with contextlib.suppress(OSError):  # what it would report, `sync` has reported
+                os.close(descriptor)
 
 
 def has_rows(name: str) -> bool:
@@ -153,6 +183,16 @@ def whole_rows(data: bytes, form: Format) -> bytes:
         quotes -= data.count(b'"', before, end)
         end = before
     return data[:end]
+
+
+def _lines(file: Iterable[bytes], form: Format) -> Iterator[bytes]:
+    """Yield the header and the rows of a whole result; a row of CSV may hold newlines in quotes."""
+    line = b""
+    for piece in file:
+        line += piece
+        if form == "jsonl" or line.count(b'"') % 2 == 0:
+            yield line
+            line = b""
 
 
 def _write_all(descriptor: int, data: bytes) -> None:

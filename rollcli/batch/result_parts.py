@@ -6,15 +6,16 @@ a run on a local disk writes.
 """
 
 import uuid
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from rollcli.batch.options import EstimateOptions
 from rollcli.batch.plan import Plan
-from rollcli.batch.resume import begun_plan, check_resumable
+from rollcli.batch.resume import failed_positions, new_record
 from rollcli.batch.run_record import RunRecord
 from rollcli.errors import InputError, OutputError, UsageError
+from rollcli.files.atomic import remove_leftovers
 from rollcli.files.codecs.parquet import encode_parquet, require_parquet
 from rollcli.files.durable import sync_files
 from rollcli.files.results import (
@@ -25,14 +26,14 @@ from rollcli.files.results import (
     parse_parts,
     plain_values,
     read_run,
+    run_path,
 )
 from rollcli.files.resumable import not_resumable
-from rollcli.files.storage import create, list_names, remove
+from rollcli.files.storage import create, list_names, remove, write_bytes
 from rollcli.files.stores.locations import base_name, is_url
 from rollcli.files.stores.parts import part_names
 from rollcli.frames.frame import Frame, FrameResult
-from rollcli.frames.options import ImageOptions
-from rollcli.frames.outputs import local_images
+from rollcli.frames.outputs import local_images, remove_image_leftovers
 
 
 class PartsOutput:
@@ -46,15 +47,19 @@ class PartsOutput:
         plan: Plan,
         record: RunRecord,
         kept: tuple[Row, ...],
-        part_rows: int,
-        images: ImageOptions,
+        options: EstimateOptions,
     ) -> None:
         self.kept = kept
-        self._plan, self._record, self._part_rows = plan, record, part_rows
-        self._next = len(kept) // part_rows
+        self.failed = failed_positions(kept, options)
+        self._plan, self._record, self._part_rows = plan, record, options.result.part_rows
+        self._next = len(kept) // self._part_rows
+        self._replaced_part, self._replacing = 0, dict[int, Row]()  # rows by their positions in the result
         self._waiting: list[Row] = []
         self.incomplete: list[Frame] = []
-        self._image_options, self._images = images, list[str]()  # those of the part that is being filled
+        self._image_options, self._images = (
+            options.images,
+            list[str](),
+        )  # those of the part that is being filled
         self._run = uuid.uuid4().hex  # tells our parts from those of another run
         self._written = len(kept)
 
@@ -76,8 +81,30 @@ class PartsOutput:
     def restore(self, frame: Frame, result: FrameResult) -> None:
         """Do nothing: no frame is incomplete, since parts enter the result after their images."""
 
+    def replace(self, position: int, frame: Frame, result: FrameResult) -> None:
+        """Take the row; a part is written anew once its last such row is known."""
+        number = position // self._part_rows
+        if number != self._replaced_part:
+            self.commit()
+            self._replacing.clear()
+        self._replaced_part = number
+        self._record.saw(result.encoding, result.searched)
+        self._replacing[position] = result.row
+        if result.row.status != "error":
+            self._images.extend(local_images(frame, self._image_options))
+
     def commit(self) -> None:
-        """Do nothing: a part enters the result when it is full, or when all rows are there."""
+        """Write the part anew whose rows are replaced, if they differ; a new part waits until it is full."""
+        if not self._replacing:
+            return
+        sync_files(self._images)
+        self._images.clear()
+        number, first = self._replaced_part, self._replaced_part * self._part_rows
+        old = self.kept[first : first + self._part_rows]
+        rows = [self._replacing.get(position, row) for position, row in enumerate(old, first)]
+        data = self._encoded(number, rows)
+        if data != self._encoded(number, old):
+            write_bytes(_part_location(self._plan, number), data, durable=True)
 
     def hint(self) -> str:
         """Say that --resume continues after the last part."""
@@ -86,7 +113,7 @@ class PartsOutput:
     def _write(self) -> None:
         sync_files(self._images)
         self._images.clear()
-        data = self._encoded()
+        data = self._encoded(self._next, self._waiting)
         location = _part_location(self._plan, self._next)
         if not create(location, data, self._run):
             raise OutputError(f"{location}: another run is writing this result; give another --output")
@@ -94,13 +121,13 @@ class PartsOutput:
         self._next += 1
         self._waiting = []
 
-    def _encoded(self) -> bytes:
+    def _encoded(self, number: int, rows: Sequence[Row]) -> bytes:
         plan = self._plan
         if plan.format == "parquet":
-            values = [plain_values(row, plan.timing) for row in self._waiting]
-            return encode_parquet(column_types(plan.timing), values, self._record.fixed)
-        header = format_header(plan.format, plan.timing) if self._next == 0 else b""
-        return header + b"".join(format_row(row, plan.format, plan.timing) for row in self._waiting)
+            values = [plain_values(row, plan.timing) for row in rows]
+            return encode_parquet(column_types(plan.timing), values, self._record.of_rows)
+        header = format_header(plan.format, plan.timing) if number == 0 else b""
+        return header + b"".join(format_row(row, plan.format, plan.timing) for row in rows)
 
 
 def open_parts(plan: Plan, options: EstimateOptions) -> PartsOutput:
@@ -116,20 +143,18 @@ def open_parts(plan: Plan, options: EstimateOptions) -> PartsOutput:
     if plan.format == "parquet":
         require_parquet()
     parts = check_parts(plan, resume=options.result.resume, overwrite=options.running.overwrite)
-    record = RunRecord(plan, options)
     rows: tuple[Row, ...] = ()
     if options.result.resume and parts:
         rows = _kept_rows(plan, parts, options.result.part_rows)
-        if rows:
-            earlier = _earlier(plan)
-            begun = begun_plan(plan, earlier)
-            same = record if begun is plan else RunRecord(begun, options)
-            added = len(plan.frames) - len(begun.frames)
-            record.continue_from(check_resumable(rows, earlier, same, begun, added))
+    record = new_record(plan, options, rows, _earlier(plan) if rows else None)
+    if not is_url(plan.output):
+        remove_leftovers([run_path(plan.output), *(f"{plan.output}/{name}" for name in parts)])
+    if options.result.resume or options.running.overwrite:
+        remove_image_leftovers(plan.frames, options.images)
     for name in parts[_whole_parts(len(rows), options.result.part_rows) :]:
         remove(f"{plan.output}/{name}")
     record.write({})
-    return PartsOutput(plan, record, rows, options.result.part_rows, options.images)
+    return PartsOutput(plan, record, rows, options)
 
 
 def check_parts(plan: Plan, *, resume: bool, overwrite: bool) -> list[str]:
@@ -153,10 +178,10 @@ def check_parts(plan: Plan, *, resume: bool, overwrite: bool) -> list[str]:
     return parts
 
 
-def count_kept_parts(plan: Plan, options: EstimateOptions) -> int:
-    """Count the rows that a resume would keep."""
+def kept_part_rows(plan: Plan, options: EstimateOptions) -> tuple[Row, ...]:
+    """Return the rows that a resume would keep."""
     parts = check_parts(plan, resume=options.result.resume, overwrite=options.running.overwrite)
-    return len(_kept_rows(plan, parts, options.result.part_rows)) if options.result.resume and parts else 0
+    return _kept_rows(plan, parts, options.result.part_rows) if options.result.resume and parts else ()
 
 
 def _kept_rows(plan: Plan, parts: list[str], part_rows: int) -> tuple[Row, ...]:

@@ -1,19 +1,57 @@
 """Compare an interrupted run with the run that would continue it."""
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 from rollcli.batch.fingerprint import changed_input
+from rollcli.batch.options import EstimateOptions
 from rollcli.batch.plan import Plan
 from rollcli.batch.run_record import RunRecord
 from rollcli.files.results import Row, run_path
 from rollcli.files.resumable import differences, not_resumable
-from rollcli.files.stores.locations import base_name, is_url
+from rollcli.files.storage import modified_ns
+from rollcli.files.stores.locations import base_name
 
 _SORT_LAST = "new frames must sort last: estimate these into a result of their own"
+
+
+def failed_positions(rows: Sequence[Row], options: EstimateOptions) -> list[int]:
+    """List the positions, from 0, of the kept rows whose frames are to be done again."""
+    if not options.result.retry_failed:
+        return []
+    return [position for position, row in enumerate(rows) if row.status == "error"]
+
+
+def new_record(
+    plan: Plan, options: EstimateOptions, rows: Sequence[Row], earlier: Mapping[str, Any] | None
+) -> RunRecord:
+    """Make the record of a run, which continues that of an interrupted run where rows are kept.
+
+    Parameters
+    ----------
+    plan : Plan
+    options : EstimateOptions
+    rows : sequence of Row
+        Those of the interrupted run.
+    earlier : mapping or None
+        Its record.
+
+    Raises
+    ------
+    UsageError
+        It cannot be continued; says what differs.
+    """
+    unknown = unknown_inputs(earlier)
+    retried = failed_positions(rows, options)
+    begun = begun_plan(plan, earlier)
+    record = RunRecord(plan, options, () if retried else unknown)
+    if rows:
+        same = record if begun is plan and not (retried and unknown) else RunRecord(begun, options, unknown)
+        added = len(plan.frames) - len(begun.frames)
+        record.continue_from(check_resumable(rows, earlier, same, begun, added, retried))
+    return record
 
 
 def begun_plan(plan: Plan, run: Mapping[str, Any] | None) -> Plan:
@@ -26,7 +64,12 @@ def begun_plan(plan: Plan, run: Mapping[str, Any] | None) -> Plan:
 
 
 def check_resumable(
-    rows: Sequence[Row], run: Mapping[str, Any] | None, record: RunRecord, plan: Plan, added: int = 0
+    rows: Sequence[Row],
+    run: Mapping[str, Any] | None,
+    record: RunRecord,
+    plan: Plan,
+    added: int = 0,
+    retried: Collection[int] = (),
 ) -> Mapping[str, Any]:
     """Refuse to continue a result of another version, other options or other inputs.
 
@@ -42,6 +85,8 @@ def check_resumable(
         As many frames as the interrupted run had, if there are as many; see `begun_plan`.
     added : int
         How many frames there are beyond them.
+    retried : collection of int
+        Positions of the frames that are done again: their files may have changed.
 
     Returns
     -------
@@ -58,7 +103,7 @@ def check_resumable(
         raise not_resumable(plan.output, f"there is no {record_name}")
     if not _is_whole(run):
         raise not_resumable(plan.output, f"{record_name} is damaged")
-    for difference in _differences(rows, run, record.fixed, plan, added):
+    for difference in _differences(rows, run, record.fixed, plan, added, retried):
         raise not_resumable(plan.output, difference)
     return run
 
@@ -71,7 +116,12 @@ def unknown_inputs(run: Mapping[str, Any] | None) -> list[str]:
 
 
 def _differences(
-    rows: Sequence[Row], was: Mapping[str, Any], now: Mapping[str, Any], plan: Plan, added: int
+    rows: Sequence[Row],
+    was: Mapping[str, Any],
+    now: Mapping[str, Any],
+    plan: Plan,
+    added: int,
+    retried: Collection[int],
 ) -> Iterator[str]:
     yield from differences(was, now)
     if was.get("calibration") != json.loads(json.dumps(now.get("calibration"))):
@@ -91,13 +141,15 @@ def _differences(
     if inputs_was.get("names") != inputs_now["names"]:
         yield "the names of the inputs differ"
     if inputs_was != inputs_now:
-        yield f"{_changed_input(plan) or 'an input'} has changed since"
+        changed = _changed_input(plan, set(retried))
+        if changed or not retried:
+            yield f"{changed or 'an input'} has changed since"
 
 
-def _changed_input(plan: Plan) -> str | None:
-    if is_url(plan.output):
-        return None  # the clock of a store is not the clock of this machine
-    return changed_input(plan.frames, Path(run_path(plan.output)).stat().st_mtime_ns)
+def _changed_input(plan: Plan, retried: Collection[int]) -> str | None:
+    """Find an input that is newer than the record, or missing, apart from those of frames done again."""
+    frames = [frame for position, frame in enumerate(plan.frames) if position not in retried]
+    return changed_input(frames, modified_ns(run_path(plan.output)))
 
 
 def _is_whole(run: Mapping[str, Any]) -> bool:

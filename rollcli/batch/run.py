@@ -25,6 +25,7 @@ from rollcli.parallel.process_setup import limit_blas_threads
 from rollcli.parallel.run_tasks import require_scheduler, run_tasks
 from rollcli.parallel.workers import SharedPaths, Workers
 
+_RETRIED_AT_ONCE = 1000  # frames whose work a kill costs; starting the workers anew adds 3 % of their time
 _NOTES = 3  # on how calibrations were read; the record of the run has those of more files
 
 
@@ -51,7 +52,8 @@ def run_estimate(options: EstimateOptions, resume_command: str = "") -> ExitStat
     progress = Progress(len(plan.frames), options.running, options.encoding)
     answer = RigAnswer()
     with open_output(plan, options) as output:
-        progress.keep(output.kept)
+        failed = set(output.failed)
+        progress.keep(row for position, row in enumerate(output.kept) if position not in failed)
         for row in output.kept:
             answer.add(row)
         for note in islice(calibration_notes(plan.frames), _NOTES):
@@ -59,7 +61,8 @@ def run_estimate(options: EstimateOptions, resume_command: str = "") -> ExitStat
         try:
             with stop_on_signals() as stop, progress:
                 _restore_images(options, output, progress, stop)
-                _run_frames(plan.frames[len(output.kept) :], options, output, progress, answer, stop)
+                if not _retry_failed(plan, options, output, progress, answer, stop):
+                    _run_frames(plan.frames[len(output.kept) :], options, output, progress, answer, stop)
         except KeyboardInterrupt:  # the second Ctrl-C: without waiting for the frames that have begun
             progress.stopped_early = True
         except (OutputError, ClusterError, WorkerError) as error:
@@ -104,6 +107,30 @@ def _restore_images(options: EstimateOptions, output: Output, progress: Progress
             output.restore(frame, result)
             restored += 1
     progress.stopped_early = restored < len(frames)
+
+
+def _retry_failed(
+    plan: Plan, options: EstimateOptions, output: Output, progress: Progress, answer: RigAnswer, stop: Stop
+) -> bool:
+    """Do the failed frames of kept rows again; return whether the run ends here.
+
+    A result takes the new rows once the workers have ended, which hold the lock of the file that it was.
+    """
+    for first in range(0, len(output.failed), _RETRIED_AT_ONCE):
+        positions = output.failed[first : first + _RETRIED_AT_ONCE]
+        frames = [plan.frames[position] for position in positions]
+        with _results(frames, options, output, stop) as results:
+            for position, frame, result in zip(positions, frames, results, strict=False):
+                output.replace(position, frame, result)
+                progress.add(result)
+                answer.replace(position, result.row)
+                if options.result.fail_fast and result.row.status == "error":
+                    progress.stopped_early = True
+                    return True
+        if stop.asked:
+            progress.stopped_early = progress.done < progress.total
+            return True
+    return False
 
 
 @contextlib.contextmanager

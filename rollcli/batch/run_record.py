@@ -64,6 +64,11 @@ class RunRecord:
         if options.calibration.given:
             self.fixed["calibration"] = _calibrations(plan.frames)
 
+    @property
+    def of_rows(self) -> dict[str, Any]:
+        """What holds for rows whichever they are: all that was fixed before the run but its inputs."""
+        return {key: value for key, value in self.fixed.items() if key != "inputs"}
+
     def continue_from(self, earlier: Mapping[str, Any]) -> None:
         """Take over what the interrupted run has recorded about its inputs."""
         self._encodings.update(earlier["encoding"])

@@ -50,6 +50,11 @@ result_options = record(
     ),
     option("--resume", is_flag=True, help="Keep the rows of an interrupted run and do the rest."),
     option(
+        "--retry-failed",
+        is_flag=True,
+        help="With --resume: do the frames again whose rows are error, such as those of files mended since.",
+    ),
+    option(
         "--shard",
         type=Shard(),
         default=(1, 1),

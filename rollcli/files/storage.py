@@ -16,6 +16,7 @@ from rollcli.files.stores.objects import (
     create_object,
     list_objects,
     object_exists,
+    object_time_ns,
     read_object,
     remove_object,
     write_object,
@@ -123,6 +124,11 @@ def exists(location: str) -> bool:
     if scheme_of(location) in WEB_SERVERS:
         return True  # asking costs as much as reading; reading says what is wrong
     return object_exists(location)
+
+
+def modified_ns(location: str) -> int:
+    """Return when a file or an object that exists was written, ns since 1970, by the clock of its store."""
+    return object_time_ns(location) if is_url(location) else Path(location).stat().st_mtime_ns
 
 
 def remove(location: str) -> None:

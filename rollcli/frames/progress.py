@@ -4,7 +4,7 @@ It belongs to `frames`, since every command that works through frames reports on
 """
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from rollcli.errors import ExitStatus
 from rollcli.files.results import Row
@@ -56,12 +56,12 @@ class Progress(TaskProgress):
         super().__enter__()
         return self
 
-    def keep(self, rows: tuple[Row, ...]) -> None:
+    def keep(self, rows: Iterable[Row]) -> None:
         """Count the rows that an interrupted run has left."""
         for row in rows:
             self.counts[row.status] += 1
             self.alignment.add(row)
-        self.kept = len(rows)
+            self.kept += 1
 
     def counted(self) -> dict[str, int]:
         """Name the failures."""

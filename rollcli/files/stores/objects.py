@@ -75,11 +75,13 @@ def create_object(url: str, data: bytes, owner: str) -> bool:
 
 def object_exists(url: str) -> bool:
     """Return whether there is an object of this name."""
-    return object_state(url) is not None
+    return object_time_ns(url) > 0
 
 
-def object_state(url: str) -> tuple[int, str] | None:
-    """Return the size and the version mark of an object, or None where there is none.
+def object_time_ns(url: str) -> int:
+    """Return the end of the second when an object was written, ns since 1970, by the store's clock.
+
+    0 where there is none.
 
     Raises
     ------
@@ -90,10 +92,10 @@ def object_state(url: str) -> tuple[int, str] | None:
     try:
         found = store.head(key)
     except FileNotFoundError:
-        return None
+        return 0
     except _store_errors() as error:
         raise InputError(f"{public_name(url)}: cannot be read: {_reason(error)}") from None
-    return found["size"], str(found["e_tag"] or found["last_modified"])
+    return (int(found["last_modified"].timestamp()) + 1) * 1_000_000_000 - 1
 
 
 def remove_object(url: str) -> None:
