@@ -80,13 +80,18 @@ def _grows_upward(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
 
 def _little_road(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
     road = evidence.road
-    if road and road.score < tuning.least_score:
+    if road and road.score < _least_score(road, tuning):
         yield "little of what lies ahead looks like a road"
+
+
+def _least_score(road: Road, tuning: DoubtTuning) -> float:
+    """Return the least score of a road: more where the horizon is not in the image, as with tables."""
+    return tuning.least_score if road.horizon < tuning.steep else tuning.least_steep_score
 
 
 def _rival_plane(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
     road = evidence.road
-    if not road or road.score < tuning.least_score:
+    if not road or road.score < _least_score(road, tuning):
         return  # of a poor road any plane is a rival
     if road.rival > tuning.rival_share * road.score:
         yield "another plane, with another roll, explains the map nearly as well"

@@ -38,8 +38,13 @@ class DoubtTuning:
     """Times the lowest energy up to which another minimum is nearly as low."""
     other_angle: float = math.radians(2)
     """Radians by which another minimum is another answer."""
-    least_score: float = 0.18
-    """`Road.score` below which little of what lies ahead looks like a road."""
+    least_score: float = 0.03
+    """`Road.score` below which little of what lies ahead looks like a road. Behind a car, and with noise on
+    four fifths of the pixels, right angles have 0.04 and more; wrong ones, with more noise still, 0.02."""
+    least_steep_score: float = 0.18
+    """The same for a plane whose horizon is far away: tables and stairs have up to 0.17."""
+    steep: float = 0.5
+    """Units from the centre beyond which a horizon is far away: of roads it is within 0.2, of tables 1.5."""
     rival_share: float = 0.75
     """Share of the road's score from which another plane explains the map nearly as well."""
     longest_move: float = math.radians(1)

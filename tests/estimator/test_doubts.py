@@ -44,6 +44,21 @@ def two_halves():
     return with_noise(np.where(V > 330, road(4), road(5.8)))
 
 
+def behind_a_car():
+    """A road of which a car hides most of the lane, a few metres ahead."""
+    hidden = (np.abs(U - 320) < 150) & (V > 200) & (V < 470)
+    return with_noise(np.where(hidden, road(4)[470, 320], road(4)))
+
+
+def table(roll_deg):
+    """A table seen from above, with things on it, and the floor behind it."""
+    y = (V - 240) * math.cos(math.radians(roll_deg)) - (U - 320) * math.sin(math.radians(roll_deg))
+    top = np.where(y > -100, 50 + 0.03 * y, 20)
+    for left, above, disparity in ((100, 60, 58), (250, 220, 63), (420, 120, 55)):
+        top[above : above + 150, left : left + 110] = disparity
+    return with_noise(top, 0.2)
+
+
 MAPS = {
     "no convergence within the iterations allowed": (noise_alone, {"road": "all", "tolerance": 1e-300}),
     "a lower minimum of the energy lies at 90.0000 degrees": (lambda: bent_road(90), {"road": "all"}),
@@ -80,3 +95,18 @@ def test_a_road_that_fills_the_map_is_beyond_doubt(roll_deg):
     estimate = estimate_roll(with_noise(road(roll_deg)))
 
     assert (estimate.status, estimate.message) == ("ok", "")
+
+
+def test_what_a_car_leaves_of_the_road_gives_an_angle_beyond_doubt():
+    estimate = estimate_roll(behind_a_car())
+
+    assert abs(math.degrees(estimate.theta) - 4) < 0.1
+    assert (estimate.status, estimate.message) == ("ok", "")
+
+
+@pytest.mark.parametrize("roll_deg", [-20, 0, 12])
+def test_a_table_is_no_road(roll_deg):
+    estimate = estimate_roll(table(roll_deg))
+
+    assert estimate.status == "suspect"
+    assert "little of what lies ahead looks like a road" in estimate.message

@@ -47,6 +47,12 @@ class Road:
         c0, c1, c2 = self.plane
         return RoadModel.of_plane(c0, c1, c2)
 
+    @property
+    def horizon(self) -> float:
+        """How far the plane's horizon is from the centre of the image, units: large for a wall or a table."""
+        c0, c1, c2 = self.plane
+        return abs(float(c0)) / math.hypot(c1, c2)
+
 
 def find_road(sample: Sample, max_roll: float, seed: int) -> Road:
     """Find the plane of the road.
