@@ -77,7 +77,7 @@ def test_a_store_that_does_not_answer_is_one_line_without_keys(monkeypatch):
     monkeypatch.setenv("AWS_ACCESS_KEY_ID", "PUBLIC")
     monkeypatch.setenv("AWS_SECRET_ACCESS_KEY", "SECRET")
     monkeypatch.setattr("rollcli.files.stores.objects._RETRIES", 0)
-    monkeypatch.setattr("rollcli.files.stores.objects._BODY_TRIES", 1)
+    monkeypatch.setattr("rollcli.files.stores.objects._TRIES", 1)
     with pytest.raises(InputError, match="does not answer") as raised:
         storage.read_bytes("s3://closed/x.png")
     assert "SECRET" not in str(raised.value)

@@ -22,7 +22,8 @@ _CONNECT_S = 5
 _REQUEST_S = 60  # a map of 10 MB at 1.4 Mbit/s takes as long
 _RETRIES = 6  # by obstore: answers 5xx and refused connections
 _RETRY_S = 60
-_BODY_TRIES = 4  # by this module: a body that is cut in the middle
+_PAGE = 1000
+_TRIES = 4  # by this module: a body that is cut in the middle, and a creation whose answer is lost
 _FIRST_PAUSE_S = 0.2
 _OWNER = "rollcli-run"  # attribute of an object that was created rather than replaced
 TIMEOUT_VARIABLE = "ROLLCLI_STORE_TIMEOUT"  # seconds a request may take
@@ -90,7 +91,7 @@ def object_time_ns(url: str) -> int:
     """
     store, key = _open(url)
     try:
-        found = store.head(key)
+        found = _repeated(lambda: store.head(key))
     except FileNotFoundError:
         return 0
     except _store_errors() as error:
@@ -109,7 +110,7 @@ def remove_object(url: str) -> None:
     store, key = _open(url)
     try:
         with waiting_for_network():
-            store.delete(key)
+            _repeated(lambda: store.delete(key))
     except FileNotFoundError:
         return
     except _store_errors() as error:
@@ -132,13 +133,32 @@ def list_objects(url: str) -> Iterator[tuple[str, int]]:
     store, prefix = _open(url)
     root = split_url(url)[0]
     try:
-        for chunk in store.list(prefix.rstrip("/") or None, chunk_size=1000):
-            for found in chunk:
-                yield f"{root}/{found['path']}", found["size"]
+        for found in _listed(store, prefix.rstrip("/") or None):
+            yield f"{root}/{found['path']}", found["size"]
     except FileNotFoundError as error:
         raise UsageError(f"{public_name(url)}: {_missing(error)}") from None
     except _store_errors() as error:
         raise UsageError(f"{public_name(url)}: cannot be listed: {_reason(error)}") from None
+
+
+def _listed(store: Any, prefix: str | None) -> Iterator[Any]:
+    """Yield what a store says of each object; a listing that is cut continues after the last name."""
+    last: str | None = None
+    pages: Iterator[Any] | None = None
+
+    def page() -> Any:
+        nonlocal pages
+        if pages is None:
+            pages = iter(store.list(prefix, offset=last, chunk_size=_PAGE))
+        try:
+            return next(pages, ())
+        except Exception:
+            pages = None
+            raise
+
+    while found := _repeated(page):
+        yield from found
+        last = found[-1]["path"]
 
 
 def _put(url: str, data: bytes, mode: str, attributes: dict[str, str] | None = None) -> None:
@@ -147,7 +167,7 @@ def _put(url: str, data: bytes, mode: str, attributes: dict[str, str] | None = N
     store, key = _open(url)
     try:
         with waiting_for_network():
-            store.put(key, data, mode=mode, attributes=attributes)
+            _repeated(lambda: store.put(key, data, mode=mode, attributes=attributes))
     except AlreadyExistsError:
         raise
     except FileNotFoundError as error:
@@ -157,13 +177,16 @@ def _put(url: str, data: bytes, mode: str, attributes: dict[str, str] | None = N
 
 
 def _repeated(fetch: Callable[[], Value]) -> Value:
-    """Call `fetch` again, after growing pauses, when the network cuts an answer short."""
+    """Call `fetch` again, after growing pauses, when an answer is lost or cut short on its way."""
     from obstore.exceptions import GenericError
 
-    for attempt in range(_BODY_TRIES - 1):
+    give_up = time.monotonic() + _RETRY_S
+    for attempt in range(_TRIES - 1):
         try:
             return fetch()
         except GenericError:
+            if time.monotonic() > give_up:
+                raise
             time.sleep(_FIRST_PAUSE_S * 4**attempt)
     return fetch()
 
@@ -240,10 +263,10 @@ def _reason(error: Exception) -> str:
     if status:
         meanings = {"401": "the keys are not accepted", "403": "access is denied; check the keys and rights"}
         return meanings.get(status[1], f"the store answered {status[1]}")
+    if "kind: Timeout" in text:
+        return f"the store takes too long; {TIMEOUT_VARIABLE} sets the seconds it may take"
     if "error sending request" in text or "onnect" in text:
         return "the store does not answer; check the network and the endpoint"
-    if "timed out" in text or "timeout" in text.lower():
-        return f"the store takes too long; {TIMEOUT_VARIABLE} sets the seconds it may take"
     return "the answer of the store was cut short" if "body" in text else "the store refused the request"
 
 

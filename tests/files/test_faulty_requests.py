@@ -1,0 +1,105 @@
+"""Each kind of request to a store is repeated when it fails for the network's sake."""
+
+import socket
+
+import pytest
+
+from rollcli.errors import InputError
+from rollcli.files import storage
+from rollcli.files.stores.objects import _listed, _store, list_objects
+from tests.store_proxy import CUT, NEVER, PASS, Faults, proxied
+
+DOINGS = {
+    "read": lambda url: storage.read_bytes(url),
+    "list": lambda url: list(list_objects(url.rpartition("/")[0])),
+    "exists": lambda url: storage.exists(url),
+    "modified": lambda url: storage.modified_ns(url),
+    "write": lambda url: storage.write_bytes(url, b"other"),
+    "create": lambda url: storage.create(f"{url}2", b"new", "me"),
+    "create what another has": lambda url: storage.create(url, b"new", "me"),
+    "remove": lambda url: storage.remove(url),
+}
+
+
+@pytest.mark.parametrize("kind", [*Faults.KINDS, NEVER], ids=["500", "503", CUT, NEVER])
+def test_every_request_gives_the_same_when_it_fails_first(store, tmp_path, monkeypatch, kind):
+    for name, value in store.items():
+        monkeypatch.setenv(name, value)
+    monkeypatch.setenv("ROLLCLI_STORE_TIMEOUT", "0.5")
+    wanted, found = {}, {}
+    for made, treat in ((wanted, None), (found, FirstFails(kind))):
+        with proxied(store["AWS_ENDPOINT_URL"], treat or (lambda *_: PASS)) as address:
+            for doing, do in DOINGS.items():
+                url = f"s3://maps/{tmp_path.name}-{kind[:12]!r}/{doing}/map.png"
+                for each in (url, f"{url}2"):
+                    monkeypatch.setenv("AWS_ENDPOINT_URL", store["AWS_ENDPOINT_URL"])
+                    opened_anew()
+                    storage.remove(each)
+                storage.write_bytes(url, b"12345" * 1000)
+                monkeypatch.setenv("AWS_ENDPOINT_URL", address)
+                opened_anew()
+                said = do(url)
+                made[doing] = said > 0 if doing == "modified" else said
+                monkeypatch.setenv("AWS_ENDPOINT_URL", store["AWS_ENDPOINT_URL"])
+                opened_anew()
+                there = [each for each in (url, f"{url}2") if storage.exists(each)]
+                made[f"after {doing}"] = [storage.read_bytes(each) for each in there]
+    assert found == wanted
+
+
+def test_a_listing_that_is_cut_continues_after_the_last_name(monkeypatch):
+    exceptions = pytest.importorskip(
+        "obstore.exceptions", reason="obstore, of the extra storage, is not here"
+    )
+    monkeypatch.setattr("rollcli.files.stores.objects._FIRST_PAUSE_S", 0.0)
+
+    names = [f"p/{number}" for number in range(7)]
+
+    class Store:
+        """Seven objects, two a page; the third page is cut the first time."""
+
+        cut = False
+
+        def list(self, prefix, *, offset, chunk_size):
+            """Yield the pages after a name."""
+            rest = [name for name in names if offset is None or name > offset]
+            for first in range(0, len(rest), 2):
+                if first == 4 and not self.cut:
+                    self.cut = True
+                    raise exceptions.GenericError("cut")
+                yield [{"path": name} for name in rest[first : first + 2]]
+
+    assert [found["path"] for found in _listed(Store(), "p")] == names
+
+
+def test_a_store_that_takes_too_long_is_told_from_one_that_is_not_there(monkeypatch):
+    pytest.importorskip("obstore", reason="obstore, of the extra storage, is not here")
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        monkeypatch.setenv("AWS_ENDPOINT_URL", f"http://127.0.0.1:{silent.getsockname()[1]}")
+        monkeypatch.setenv("AWS_ACCESS_KEY_ID", "test")
+        monkeypatch.setenv("AWS_SECRET_ACCESS_KEY", "test")
+        monkeypatch.setenv("ROLLCLI_STORE_TIMEOUT", "0.1")
+        monkeypatch.setattr("rollcli.files.stores.objects._RETRIES", 0)
+        monkeypatch.setattr("rollcli.files.stores.objects._TRIES", 1)
+        opened_anew()
+        with pytest.raises(InputError, match="takes too long; ROLLCLI_STORE_TIMEOUT sets the seconds"):
+            storage.read_bytes("s3://silent/x.png")
+    opened_anew()
+
+
+def opened_anew():
+    """Forget the stores that were opened with another address."""
+    _store.cache_clear()
+
+
+class FirstFails:
+    """The first request of each name fails."""
+
+    def __init__(self, kind):
+        self._kind, self._seen = kind, set()
+
+    def __call__(self, method, target):
+        """Decide about a request."""
+        first = (method, target) not in self._seen
+        self._seen.add((method, target))
+        return self._kind if first else PASS
