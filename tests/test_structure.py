@@ -29,6 +29,7 @@ DOORS = {
     "rollcli.evaluate.run_paper": "loads the experiments, NumPy and the charts once the request is checked",
     "rollcli.files.storage": "urllib loads only for URLs of web servers",
     "rollcli.frames.calibration": "decodes an image, which loads NumPy, only for its size",
+    "rollcli.frames.options": "the command line's help needs no URLs",
     "rollcli.frames.read": "loads OpenCV's matcher only for pairs",
     "rollcli.parallel.process_setup": "a worker's door",
     "rollcli.parallel.run_tasks": "loads the executor that is used; the cluster is an extra",

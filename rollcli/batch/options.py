@@ -1,7 +1,6 @@
 """The options of a run of `estimate`. Import-light: the command line loads this to show its help."""
 
-from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from rollcli.frames.options import (
     EncodingOptions,
@@ -17,8 +16,7 @@ from rollcli.imaging.stereo_options import StereoOptions
 from rollcli.rig.options import CalibrationOptions
 
 
-@dataclass(frozen=True)
-class ResultOptions:
+class ResultOptions(NamedTuple):
     """Where the rows go, and which frames they are of. `shard` is (I, N), I from 1."""
 
     output: str = "-"
@@ -31,8 +29,7 @@ class ResultOptions:
     part_rows: int = 1000
 
 
-@dataclass(frozen=True)
-class EstimateOptions:
+class EstimateOptions(NamedTuple):
     """Every option of `rollcli estimate`."""
 
     inputs: InputOptions
@@ -44,7 +41,7 @@ class EstimateOptions:
     images: ImageOptions
     result: ResultOptions
     running: RunningOptions
-    calibration: CalibrationOptions = field(default_factory=CalibrationOptions)
+    calibration: CalibrationOptions = CalibrationOptions()
 
     @property
     def frame(self) -> FrameOptions:

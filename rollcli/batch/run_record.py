@@ -3,10 +3,10 @@
 import hashlib
 import json
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 from rollcli import __version__
 from rollcli.batch.fingerprint import fingerprint
@@ -16,11 +16,8 @@ from rollcli.errors import InputError
 from rollcli.files.results import run_path
 from rollcli.files.storage import write_bytes
 from rollcli.frames.frame import Frame
-from rollcli.frames.options import EncodingOptions, FrameOptions, ImageOptions, MethodOptions
+from rollcli.frames.options import EncodingOptions, FrameOptions, ImageOptions, MethodOptions, RegionOptions
 from rollcli.imaging.stereo_options import StereoOptions
-
-if TYPE_CHECKING:
-    from _typeshed import DataclassInstance
 
 CONVENTIONS = {
     "roll_deg": "theta, degrees, (-90, 90]; positive: the rig is rolled counter-clockwise seen from behind",
@@ -43,7 +40,7 @@ _OPTION_NAMES = {
     "mode": "sgbm-mode",
 }
 _NUMBERS = ("scale", "num_disparities", "vertical_offset")  # options that are None by default
-Options = TypeVar("Options", bound="DataclassInstance")
+Options = TypeVar("Options", EncodingOptions, ImageOptions, MethodOptions, RegionOptions, StereoOptions)
 
 
 class RunRecord:
@@ -100,9 +97,8 @@ class RunRecord:
 
 def _effective(plan: Plan, options: EstimateOptions) -> dict[str, Any]:
     """Collect the options that decide the bytes of rows and images, by their names on the command line."""
-    records: list[DataclassInstance] = [options.method, options.region, options.images]
-    records.append(options.encoding if options.pairs.left is None else options.stereo)
-    values = {key: value for record in records for key, value in asdict(record).items()}
+    read = _by_name(options.encoding) if options.pairs.left is None else _by_name(options.stereo)
+    values = {**_by_name(options.method), **_by_name(options.region), **_by_name(options.images), **read}
     values |= {
         "format": plan.format,
         "timing": options.result.timing,
@@ -110,6 +106,10 @@ def _effective(plan: Plan, options: EstimateOptions) -> dict[str, Any]:
         "shard": "/".join(map(str, options.result.shard)),
     }
     return {_OPTION_NAMES.get(key, key).replace("_", "-"): value for key, value in values.items()}
+
+
+def _by_name(options: Options) -> dict[str, Any]:
+    return asdict(options) if isinstance(options, StereoOptions) else options._asdict()
 
 
 def _calibrations(frames: Sequence[Frame]) -> dict[str, Any]:
@@ -168,16 +168,15 @@ def recorded_options(run: Mapping[str, Any] | None, name: str) -> FrameOptions:
 
 def _filled(defaults: Options, given: Mapping[str, Any]) -> Options:
     """Replace the defaults by what is given."""
-    values = {}
-    for field in fields(defaults):
-        key = _OPTION_NAMES.get(field.name, field.name).replace("_", "-")
-        before = getattr(defaults, field.name)
+    values: dict[str, Any] = {}
+    for name, before in _by_name(defaults).items():
+        key = _OPTION_NAMES.get(name, name).replace("_", "-")
         value: Any = given.get(key, before)
         if isinstance(before, tuple) and isinstance(value, list):
             value = tuple(map(float, value))
-        if not isinstance(value, _kinds(field.name, before)) or isinstance(value, bool):
+        if not isinstance(value, _kinds(name, before)) or isinstance(value, bool):
             raise TypeError(f"{key} is {value!r}")
-        values[field.name] = value
+        values[name] = value
     return type(defaults)(**values)
 
 

@@ -1,7 +1,6 @@
 """Commands whose help is in sections, and how their options are declared."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import click
@@ -59,13 +58,16 @@ class Command(click.Command):
             formatter.write_dl([(str(int(status)), status.meaning) for status in ExitStatus])
 
 
-@dataclass(frozen=True)
 class Declared:
     """A function on its way to be a command: its parameters, and how their values are gathered for it."""
 
-    function: Callable[..., Any]
-    params: tuple[click.Parameter, ...] = ()
-    gather: tuple[Callable[[Values], None], ...] = ()
+    def __init__(
+        self,
+        function: Callable[..., Any],
+        params: tuple[click.Parameter, ...] = (),
+        gather: tuple[Callable[[Values], None], ...] = (),
+    ) -> None:
+        self.function, self.params, self.gather = function, params, gather
 
     def __call__(self, **values: Any) -> Any:
         """Call the function with the values that click has parsed."""
@@ -74,11 +76,10 @@ class Declared:
         return self.function(**values)
 
 
-@dataclass(frozen=True)
 class Declaration:
     """A decorator that declares parameters of a command.
 
-    Attributes
+    Parameters
     ----------
     make : callable
         Makes the parameters: each command has its own.
@@ -86,8 +87,10 @@ class Declaration:
         Replaces their values by one record.
     """
 
-    make: Callable[[], list[click.Parameter]]
-    gather: Callable[[Values], None] | None = None
+    def __init__(
+        self, make: Callable[[], list[click.Parameter]], gather: Callable[[Values], None] | None = None
+    ) -> None:
+        self.make, self.gather = make, gather
 
     def __call__(self, function: Callable[..., Any]) -> Declared:
         """Declare the parameters before those that are declared below."""
@@ -128,9 +131,8 @@ def record(name: str, title: str, make: Callable[..., Any], *declarations: Decla
                 param.section = title
         return made
 
-    names = [str(param.name) for param in params()]
-
     def gather(values: Values) -> None:
+        names = [str(param.name) for param in params()]  # here: --help needs none
         values[name] = make(**{each: values.pop(each) for each in names})
 
     return Declaration(params, gather)

@@ -1,6 +1,5 @@
 """`rollcli estimate`: the main job."""
 
-from dataclasses import replace
 from typing import Any
 
 import click
@@ -45,7 +44,7 @@ result_options = record(
     option(
         "--part-rows",
         type=Number("N", at_least=1, whole=True),
-        default=ResultOptions.part_rows,
+        default=ResultOptions().part_rows,
         help="Rows of each part, of Parquet and of results in an object store.",
     ),
     option("--resume", is_flag=True, help="Keep the rows of an interrupted run and do the rest."),
@@ -116,10 +115,9 @@ def estimate(ctx: click.Context, /, **records: Any) -> None:
     """
     options = EstimateOptions(**records)
     resume, overwrite = one_start(ctx, resume=options.result.resume, overwrite=options.running.overwrite)
-    options = replace(
-        options,
-        result=replace(options.result, resume=resume),
-        running=replace(options.running, overwrite=overwrite),
+    options = options._replace(
+        result=options.result._replace(resume=resume),
+        running=options.running._replace(overwrite=overwrite),
     )
 
     from rollcli.batch.run import run_estimate

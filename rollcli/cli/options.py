@@ -16,6 +16,7 @@ from rollcli.frames.options import (
 )
 from rollcli.imaging.stereo_options import ALIGN, MODES, StereoOptions
 
+_METHOD = MethodOptions()
 PATH = FilePath()  # whether it exists, its reader says: in the same words wherever the name came from
 
 
@@ -27,10 +28,9 @@ def _stereo(
     return StereoOptions(num_disparities=searched, mode=sgbm_mode, vertical_offset=offset, **values)
 
 
-def _method(*, tolerance: float, max_roll: float, max_interval: float, **values: Any) -> MethodOptions:
-    return MethodOptions(
-        tolerance_deg=tolerance, max_roll_deg=max_roll, max_interval_deg=max_interval, **values
-    )
+def _method(**values: Any) -> MethodOptions:
+    angles = {f"{name}_deg": values.pop(name) for name in ("tolerance", "max_roll", "max_interval")}
+    return MethodOptions(**angles, **values)
 
 
 _folders = (
@@ -186,50 +186,50 @@ method_options = record(
     option(
         "--method",
         type=Choice(*METHODS),
-        default=MethodOptions.method,
+        default=_METHOD.method,
         help="; ".join(f"{name}: {method.summary}" for name, method in METHODS.items()) + ".",
     ),
     option(
         "--model",
         type=Choice(*MODELS),
-        default=MethodOptions.model,
+        default=_METHOD.model,
         help="Disparity of the road as a function of the row.",
     ),
     option(
         "--road",
         type=Choice(*ROADS),
-        default=MethodOptions.road,
+        default=_METHOD.road,
         help="auto: find the road first; all: use every valid pixel, as the paper does.",
     ),
     option(
         "--lambda0",
         type=Number("FLOAT", above=0, auto=True),
-        default=MethodOptions.lambda0,
+        default=_METHOD.lambda0,
         help="First learning rate of gd, rad^2 per unit of energy; auto: 1 / curvature.",
     ),
     option(
         "--tolerance",
         type=Number("DEG", above=0, at_most=90),
-        default=MethodOptions.tolerance_deg,
+        default=_METHOD.tolerance_deg,
         help="Stop when the angle moves by less than this, degrees.",
     ),
     option(
         "--max-roll",
         type=Number("DEG", above=0, at_most=MAX_ROLL_LIMIT_DEG),
-        default=MethodOptions.max_roll_deg,
+        default=_METHOD.max_roll_deg,
         help="Largest |roll| that road finding considers, degrees.",
     ),
     option(
         "--max-interval",
         type=Number("DEG", above=0, at_most=90),
-        default=MethodOptions.max_interval_deg,
+        default=_METHOD.max_interval_deg,
         help="Doubt an angle whose 95 % half-width is above this, or of which noise alone makes a third of "
         "this, degrees.",
     ),
     option(
         "--seed",
         type=Number("INT", at_least=0, whole=True),
-        default=MethodOptions.seed,
+        default=_METHOD.seed,
         help="Seed of road finding's samples.",
     ),
 )

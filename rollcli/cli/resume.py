@@ -1,6 +1,5 @@
 """Make the command that continues an interrupted run, and choose between --resume and --overwrite."""
 
-import shlex
 import shutil
 import sys
 from collections.abc import Iterator
@@ -34,6 +33,8 @@ def _distance(ctx: click.Context, name: str) -> int:
 
 def resume_command(ctx: click.Context) -> str:
     """Make a command that can be pasted into any shell: settings from the environment become options."""
+    import shlex  # here: every --help imports this module
+
     words = sys.argv[1:]
     end = words.index("--") if "--" in words else len(words)
     options = [word for word in words[:end] if word not in _STARTS]

@@ -1,5 +1,7 @@
 """`rollcli simulate`: render stereo pairs whose roll is known."""
 
+import math
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -9,7 +11,7 @@ from rollcli.cli.command import argument, command, option, record
 from rollcli.cli.config import config_option
 from rollcli.cli.options import PATH, running_options
 from rollcli.cli.resume import one_start, resume_command
-from rollcli.cli.types import Choice, Number, Point, Size, Span
+from rollcli.cli.types import Choice, Number, ParamType, Point
 from rollcli.frames.options import RunningOptions
 from rollcli.simulate.options import (
     BASELINE,
@@ -28,6 +30,44 @@ from rollcli.simulate.options import (
     SIZE,
     SimulateOptions,
 )
+
+
+class Span(ParamType):
+    """A:B, from the lowest to the highest; one number stands for both."""
+
+    name = "A:B"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[float, float]:
+        if isinstance(value, tuple):
+            return value  # the default
+        try:
+            ends = [float(end) for end in str(value).split(":")]
+        except ValueError:
+            ends = []
+        if len(ends) not in (1, 2) or not all(map(math.isfinite, ends)) or ends[0] > ends[-1]:
+            self.fail(f"{value!r} is not A:B with A <= B, such as -5:5, nor a single number", param, ctx)
+        return ends[0], ends[-1]
+
+
+class Size(ParamType):
+    """WxH in whole pixels."""
+
+    name = "WxH"
+
+    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
+        return self.name  # click would turn it into capitals
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[int, int]:
+        if isinstance(value, tuple):
+            return value  # the default
+        found = re.fullmatch(r"(\d{1,6})[xX×](\d{1,6})", str(value))
+        if found is None:
+            self.fail(f"{value!r} is not WxH in whole pixels, such as 640x480", param, ctx)
+        return int(found[1]), int(found[2])
 
 
 def _options(*, roll: tuple[float, float], pitch: tuple[float, float], **values: Any) -> SimulateOptions:
@@ -192,5 +232,5 @@ def simulate(ctx: click.Context, /, folder: str, options: SimulateOptions, runni
     from rollcli.simulate.run import run_simulate
 
     resume, overwrite = one_start(ctx, resume=options.resume, overwrite=running.overwrite)
-    options, running = replace(options, resume=resume), replace(running, overwrite=overwrite)
+    options, running = replace(options, resume=resume), running._replace(overwrite=overwrite)
     ctx.exit(run_simulate(folder, options, running, resume_command(ctx)))

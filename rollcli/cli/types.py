@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 if TYPE_CHECKING:  # generic to type checkers only, before click 8.4
-    _ParamType = click.ParamType[Any]
+    ParamType = click.ParamType[Any]
     _Choice = click.Choice[str]
 else:
-    _ParamType = click.ParamType
+    ParamType = click.ParamType
     _Choice = click.Choice
 
 
@@ -60,7 +60,7 @@ class OutputFile(FilePath):
         return super().convert(value, param, ctx)
 
 
-class Number(_ParamType):
+class Number(ParamType):
     """A finite number within bounds, with its unit as the placeholder; "auto" where that is allowed."""
 
     def __init__(
@@ -105,7 +105,7 @@ class Number(_ParamType):
         )
 
 
-class NumberOrNan(_ParamType):
+class NumberOrNan(ParamType):
     """Any number that a pixel may hold: also nan and inf."""
 
     name = "VALUE"
@@ -118,7 +118,7 @@ class NumberOrNan(_ParamType):
         return self.fail(f"{value!r} is not a number", param, ctx) if number is None else number
 
 
-class Roi(_ParamType):
+class Roi(ParamType):
     """Four whole numbers with X0 < X1 and Y0 < Y1."""
 
     name = "X0,Y0,X1,Y1"
@@ -134,7 +134,7 @@ class Roi(_ParamType):
         return x0, y0, x1, y1
 
 
-class Point(_ParamType):
+class Point(ParamType):
     """A column and a row, which need not be whole."""
 
     name = "CX,CY"
@@ -152,7 +152,7 @@ class Point(_ParamType):
         return numbers[0], numbers[1]
 
 
-class Polygon(_ParamType):
+class Polygon(ParamType):
     """Three or more corners."""
 
     name = "'x,y x,y x,y …'"
@@ -170,7 +170,7 @@ class Polygon(_ParamType):
         return tuple((p[0], p[1]) for p in points)
 
 
-class Shard(_ParamType):
+class Shard(ParamType):
     """I/N with 1 <= I <= N."""
 
     name = "I/N"
@@ -185,62 +185,3 @@ class Shard(_ParamType):
         if not 1 <= part <= parts:
             self.fail(f"{value!r} is not I/N with I from 1 to N, such as 2/8", param, ctx)
         return part, parts
-
-
-class Span(_ParamType):
-    """A:B, from the lowest to the highest; one number stands for both."""
-
-    name = "A:B"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[float, float]:
-        if isinstance(value, tuple):
-            return value  # the default
-        try:
-            ends = [float(end) for end in str(value).split(":")]
-        except ValueError:
-            ends = []
-        if len(ends) not in (1, 2) or not all(map(math.isfinite, ends)) or ends[0] > ends[-1]:
-            self.fail(f"{value!r} is not A:B with A <= B, such as -5:5, nor a single number", param, ctx)
-        return ends[0], ends[-1]
-
-
-class Size(_ParamType):
-    """WxH in whole pixels."""
-
-    name = "WxH"
-
-    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
-        return self.name  # click would turn it into capitals
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[int, int]:
-        if isinstance(value, tuple):
-            return value  # the default
-        found = re.fullmatch(r"(\d{1,6})[xX×](\d{1,6})", str(value))
-        if found is None:
-            self.fail(f"{value!r} is not WxH in whole pixels, such as 640x480", param, ctx)
-        return int(found[1]), int(found[2])
-
-
-class Turns(_ParamType):
-    """A:B:STEP with A <= B and a step above 0, all within a quarter turn; at most 1000 angles."""
-
-    name = "A:B:STEP"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[float, float, float]:
-        if isinstance(value, tuple):
-            return value  # the default
-        try:
-            first, last, step = map(float, str(value).split(":"))
-        except ValueError:
-            first, last, step = 0.0, -1.0, 1.0
-        if not (-90 <= first <= last <= 90 and step > 0 and last - first <= 1000 * step):
-            self.fail(
-                f"{value!r} is not A:B:STEP in degrees with -90 <= A <= B <= 90, such as -20:20:2", param, ctx
-            )
-        return first, last, step

@@ -7,7 +7,6 @@ Add a method that chooses pixels: a file in `areas` with an `AreaMethod`, and on
 """
 
 import math
-from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 LAMBDA0 = 26.0  # the fewest iterations in [GD] Fig. 3
@@ -40,8 +39,7 @@ MODELS = ("parabola", "line")
 ROADS = ("auto", "all")
 
 
-@dataclass(frozen=True)
-class SolverSettings:
+class SolverSettings(NamedTuple):
     """The settings of solvers.
 
     Attributes
@@ -56,8 +54,7 @@ class SolverSettings:
     lambda0: LearningRate = LAMBDA0
 
 
-@dataclass(frozen=True)
-class AreaSettings:
+class AreaSettings(NamedTuple):
     """The settings of methods that choose pixels.
 
     Attributes

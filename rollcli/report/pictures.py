@@ -3,7 +3,7 @@
 import base64
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import cv2
@@ -96,7 +96,7 @@ def _source(subject: Subject, options: FrameOptions) -> Source:
     if subject.images_only:
         raise InputError(f"{subject.frame.file}: there is no map of it among the images")
     # a pair's left image is kept where the road is to be drawn on it
-    return read_source(subject.frame, replace(options, images=replace(options.images, road_mask="")))
+    return read_source(subject.frame, options._replace(images=options.images._replace(road_mask="")))
 
 
 def _road(subject: Subject, source: Source | None, options: FrameOptions) -> NDArray[Any] | None:

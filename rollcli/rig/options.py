@@ -1,10 +1,9 @@
 """What a user says of the calibration: a frozen record, filled by the command line."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 
-@dataclass(frozen=True)
-class CalibrationOptions:
+class CalibrationOptions(NamedTuple):
     """Files and numbers of the calibration; each number wins over the files.
 
     `calib` names a file, a folder, or the left and the right file of ROS; `focal` and `doffs` are in px,

@@ -7,8 +7,30 @@ import click
 from rollcli.cli.command import command, option, record
 from rollcli.cli.config import config_option
 from rollcli.cli.options import PATH, encoding_options, input_options, region_options, running_options
-from rollcli.cli.types import Number, Turns
+from rollcli.cli.types import Number, ParamType
 from rollcli.evaluate.options import TIMED, TURNS_DEG, ExperimentOptions, PaperOptions
+
+
+class Turns(ParamType):
+    """A:B:STEP with A <= B and a step above 0, all within a quarter turn; at most 1000 angles."""
+
+    name = "A:B:STEP"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[float, float, float]:
+        if isinstance(value, tuple):
+            return value  # the default
+        try:
+            first, last, step = map(float, str(value).split(":"))
+        except ValueError:
+            first, last, step = 0.0, -1.0, 1.0
+        if not (-90 <= first <= last <= 90 and step > 0 and last - first <= 1000 * step):
+            self.fail(
+                f"{value!r} is not A:B:STEP in degrees with -90 <= A <= B <= 90, such as -20:20:2", param, ctx
+            )
+        return first, last, step
+
 
 experiment_options = record(
     "experiments",
