@@ -158,7 +158,7 @@ def _results(
 def _end(output: Output, progress: Progress, stop: Stop, resume_command: str) -> ExitStatus:
     if not progress.stopped_early:
         output.finish(progress.totals, progress.alignment.summary())
-    progress.note(progress.summary())
+    progress.tell_end()
     if progress.alignment.advice:
         progress.note(f"median over the pairs: {progress.alignment.advice}")
     if stop.asked and progress.stopped_early:

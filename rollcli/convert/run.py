@@ -83,7 +83,7 @@ def convert(
     ):
         for result in results:
             progress.add(result)
-    progress.note(progress.summary())
+    progress.tell_end()
     if stop.asked and progress.done < progress.total:
         progress.say("interrupted; what is written is whole, and --overwrite starts anew")
         return ExitStatus.INTERRUPTED

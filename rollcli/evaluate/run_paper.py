@@ -96,7 +96,7 @@ def _run(frames: list[Frame], truth: Mapping[str, float], options: PaperOptions)
     if stop.asked:
         progress.say(f"interrupted after {progress.done} of {progress.total} maps; nothing is written")
         return ExitStatus.INTERRUPTED
-    progress.note(progress.summary())
+    progress.tell_end()
     if not found:
         progress.say("no map gave an angle: there is nothing to tabulate")
         return progress.status

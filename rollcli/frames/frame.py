@@ -63,8 +63,21 @@ class FrameResult:
     searched: tuple[int, int] | None = None
 
 
+_LEFT, _RIGHT = "left image: ", "right image: "  # what a message calls the files of a pair
+
+
 def failed_frame(frame: Frame, reason: str) -> FrameResult:
-    """Make the `error` row of a frame, with a message of one line that names the file."""
-    line, *names = (" ".join(text.split()) for text in (reason, frame.file, frame.right_file or frame.file))
-    message = line if line.startswith(tuple(names)) else f"{names[0]}: {line}"
+    """Make the `error` row of a frame; its message is one line that does not repeat the names of the row."""
+    message, left, right = (" ".join(text.split()) for text in (reason, frame.file, frame.right_file))
+    if right and message.startswith(f"{right}: "):
+        message = _RIGHT + message.removeprefix(f"{right}: ")
+    elif message.startswith(f"{left}: "):
+        message = (_LEFT if right else "") + message.removeprefix(f"{left}: ")
     return FrameResult(Row(frame.file, frame.right_file, "error", message=message))
+
+
+def named_message(row: Row) -> str:
+    """Return the message of a row behind the name of the file that it is about."""
+    if row.right_file and row.message.startswith(_RIGHT):
+        return f"{row.right_file}: {row.message.removeprefix(_RIGHT)}"
+    return f"{row.file}: {row.message.removeprefix(_LEFT) if row.right_file else row.message}"

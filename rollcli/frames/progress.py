@@ -8,12 +8,12 @@ from collections.abc import Iterable, Sequence
 
 from rollcli.errors import ExitStatus
 from rollcli.files.results import Row
-from rollcli.frames.frame import FrameResult
+from rollcli.frames.failures import Failures, cause_of
+from rollcli.frames.frame import FrameResult, named_message
 from rollcli.frames.options import EncodingOptions, RunningOptions
 from rollcli.frames.rig_alignment import RigAlignment
 from rollcli.parallel.progress import TaskProgress
 
-_FAILURES_SHOWN = 5
 _MEANING = {
     "px": "pixels as stored",
     "kitti": "stored / 256",
@@ -50,7 +50,7 @@ class Progress(TaskProgress):
         self._statuses = statuses
         self._auto = encoding.encoding == "auto" and encoding.scale is None
         self.alignment = RigAlignment()
-        self._failures = 0
+        self._failures = Failures()
 
     def __enter__(self) -> "Progress":
         super().__enter__()
@@ -91,7 +91,7 @@ class Progress(TaskProgress):
             how = f"{name}: read as {result.encoding} ({_MEANING[result.encoding]})"
             self.note(how, topic=result.encoding)
         if result.warning:
-            self.note(f"{name}: warning: {result.warning}", topic="warning")
+            self.note(f"{name}: warning: {result.warning}", topic=f"warning: {cause_of(result.warning)}")
         if searched is not None:
             how = f"{name}: searched disparities from {searched[0]} to {searched[1]} px"
             if self._verbose:
@@ -100,11 +100,18 @@ class Progress(TaskProgress):
                 self.note(how, topic="searched")
 
     def _tell_failure(self, row: Row) -> None:
-        self._failures += 1
-        if self._failures <= _FAILURES_SHOWN or self._verbose:
-            self.say(row.message)
-        elif self._failures == _FAILURES_SHOWN + 1:
-            self.say("further failures are not named here; -v names all")
+        line = self._failures.add(row)
+        if self._verbose:
+            self.say(named_message(row))
+        elif line:
+            self.say(line)
+
+    def tell_end(self) -> None:
+        """Say which causes of failure were met more than once, and the summary."""
+        if not self._verbose:
+            for line in self._failures.repeated():
+                self.say(line)
+        self.note(self.summary())
 
     def summary(self) -> str:
         """Make the last line of a run: how many frames came to what, and how fast."""

@@ -55,14 +55,14 @@ def test_a_frame_that_fails_has_a_row_that_says_why_and_the_others_still_come(ma
     rows = rows_of(done.out)
     assert done.status == 3
     assert [row["file"] for row in rows if row["status"] == "error"] == ["maps/frame3.png"]
-    assert (rows[3]["roll_deg"], rows[3]["message"]) == ("", "maps/frame3.png: is empty")
+    assert (rows[3]["roll_deg"], rows[3]["message"]) == ("", "is empty")
 
 
 def test_the_row_of_a_frame_that_fails_names_it_once_whatever_its_name_is(tmp_path):
     (tmp_path / "two  blanks.png").write_bytes(b"x")
     done = rollcli("estimate", "two  blanks.png", "-q", cwd=tmp_path)
     assert done.out.splitlines()[1].startswith("two  blanks.png,,error,")
-    assert done.err.startswith("rollcli: two blanks.png: is only 1 bytes long")
+    assert done.err.startswith("rollcli: two  blanks.png: is only 1 bytes long")
 
 
 def test_json_lines_say_the_same_as_csv(maps):

@@ -92,7 +92,7 @@ def test_a_region_outside_of_the_map_costs_the_frame(two_roads):
     done = rollcli("estimate", "map.png", "--roi", "500,500,600,600", cwd=two_roads)
     assert done.status == 3
     assert column(done.out, "message") == [
-        "map.png: no pixel of this 160x120 map lies inside the mask, --roi and --polygon"
+        "no pixel of this 160x120 map lies inside the mask, --roi and --polygon"
     ]
 
 
@@ -100,7 +100,7 @@ def test_a_mask_of_another_size_costs_the_frame(two_roads):
     write_kitti(two_roads / "small.png", np.ones((10, 10)))
     done = rollcli("estimate", "map.png", "--mask", "small.png", cwd=two_roads)
     assert done.status == 3
-    assert column(done.out, "message") == ["map.png: the mask small.png is 10x10, the map 160x120"]
+    assert column(done.out, "message") == ["the mask small.png is 10x10, the map 160x120"]
 
 
 def test_a_frame_without_its_mask_is_named_before_anything_runs(two_roads):

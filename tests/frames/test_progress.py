@@ -4,7 +4,7 @@ import pytest
 
 from rollcli.errors import ExitStatus
 from rollcli.files.results import Row
-from rollcli.frames.frame import FrameResult
+from rollcli.frames.frame import Frame, FrameResult, failed_frame, named_message
 from rollcli.frames.options import EncodingOptions, RunningOptions
 from rollcli.frames.progress import Progress
 
@@ -39,22 +39,64 @@ def test_the_exit_status_says_whether_a_frame_failed(lines):
     counted = progress()
     counted.add(result("suspect"))
     assert counted.status is ExitStatus.DONE
-    counted.add(result("error", "a.png: is no map"))
+    counted.add(result("error", "is no map"))
     assert counted.status is ExitStatus.FRAMES_FAILED
     assert lines() == ["rollcli: a.png: is no map"]
 
 
-def test_failures_after_the_fifth_are_named_only_when_verbose(lines):
-    quiet, verbose = progress(quiet=True), progress(verbose=True)
-    for number in range(8):
-        quiet.add(result("error", f"{number}"))
-    assert [line.removeprefix("rollcli: ") for line in lines()] == [
-        *"01234",
-        "further failures are not named here; -v names all",
+def test_a_cause_is_said_once_and_at_the_end_for_how_many_frames(lines):
+    counted = progress(quiet=True)
+    for name, message in [
+        ("a", "is empty"),
+        ("b", "only 37 valid pixels"),
+        ("c", "is empty"),
+        ("d", "only 5 valid pixels"),
+        ("e", "is text"),
+        ("f", "is empty"),
+    ]:
+        counted.add(FrameResult(Row(name, message=message)))
+    assert lines() == ["rollcli: a: is empty", "rollcli: b: only 37 valid pixels", "rollcli: e: is text"]
+    counted.tell_end()
+    assert lines() == ["rollcli: 3 frames: is empty", "rollcli: 2 frames: as b: only 37 valid pixels"]
+
+
+def test_of_many_causes_the_first_five_are_said(lines):
+    counted = progress(quiet=True)
+    for cause in "abcdefg":
+        counted.add(FrameResult(Row("x", message=cause)))
+    counted.tell_end()
+    assert lines() == [
+        *(f"rollcli: x: {cause}" for cause in "abcde"),
+        "rollcli: 2 further frames: other causes, which -v names",
     ]
+
+
+def test_a_verbose_run_names_every_failure(lines):
+    counted = progress(verbose=True)
     for number in range(8):
-        verbose.add(result("error", f"{number}"))
-    assert len(lines()) == 8
+        counted.add(result("error", f"{number}"))
+    counted.tell_end()
+    assert [line for line in lines() if "a.png" in line] == [f"rollcli: a.png: {n}" for n in range(8)]
+
+
+PAIR = Frame("left/a.png", "right/a.png", "left/a.png", "right/a.png", "a.png", None)
+MAP = Frame("a.png", "", "a.png", "", "a.png", None)
+
+
+@pytest.mark.parametrize(
+    ("frame", "reason", "message", "said"),
+    [
+        (MAP, "a.png: is empty", "is empty", "a.png: is empty"),
+        (MAP, "no road", "no road", "a.png: no road"),
+        (MAP, "a.png.tif: is empty", "a.png.tif: is empty", "a.png: a.png.tif: is empty"),
+        (PAIR, "left/a.png: is empty", "left image: is empty", "left/a.png: is empty"),
+        (PAIR, "right/a.png: is empty", "right image: is empty", "right/a.png: is empty"),
+        (PAIR, "no road", "no road", "left/a.png: no road"),
+    ],
+)
+def test_a_row_does_not_repeat_its_file_and_stderr_names_it(frame, reason, message, said):
+    row = failed_frame(frame, reason).row
+    assert (row.message, named_message(row)) == (message, said)
 
 
 def test_how_numbers_were_read_is_said_once_unless_it_was_given(lines):
