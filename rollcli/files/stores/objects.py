@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 
 from rollcli.errors import InputError, OutputError, UsageError
 from rollcli.files.stores.locations import public_name, split_url
-from rollcli.files.stores.turns import waiting_for_network
+from rollcli.files.stores.turns import wait_for_room, waiting_for_network
 
 Value = TypeVar("Value")
 
@@ -39,8 +39,15 @@ def read_object(url: str) -> bytes:
     """
     store, key = _open(url)
 
+    counted = False
+
     def fetch() -> bytes:
-        return bytes(store.get(key).bytes())
+        nonlocal counted
+        answer = store.get(key)
+        if not counted:
+            wait_for_room(answer.meta["size"])
+            counted = True
+        return bytes(answer.bytes())
 
     try:
         with waiting_for_network():

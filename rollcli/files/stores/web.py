@@ -7,7 +7,7 @@ import urllib.request
 
 from rollcli.errors import InputError
 from rollcli.files.stores.locations import public_name
-from rollcli.files.stores.turns import waiting_for_network
+from rollcli.files.stores.turns import wait_for_room, waiting_for_network
 
 _TIMEOUT_S = 60.0
 _TRIES = 4
@@ -39,6 +39,7 @@ def read_web_file(url: str) -> bytes:
 
 def _fetched(url: str) -> bytes:
     with urllib.request.urlopen(url, timeout=_TIMEOUT_S) as answer:
+        wait_for_room(answer.length or 0)
         data: bytes = answer.read(_LARGEST + 1)
     if len(data) > _LARGEST:
         raise ValueError("it has more bytes than any disparity map")
