@@ -1,8 +1,8 @@
 """What workers are told to do with a frame. Import-light: the dispatcher never loads NumPy, workers do."""
 
 from rollcli.frames.frame import Frame, FrameResult, failed_frame
-from rollcli.frames.options import FrameOptions, ImageOptions
-from rollcli.frames.outputs import remove_image_leftovers, remove_images
+from rollcli.frames.options import FrameOptions
+from rollcli.frames.outputs import every_path, remove_image_leftovers, write_outputs
 
 
 def estimate_frame(frame: Frame, options: FrameOptions) -> FrameResult:
@@ -12,8 +12,8 @@ def estimate_frame(frame: Frame, options: FrameOptions) -> FrameResult:
     return run_frame(frame, options)
 
 
-def lost_frame(frame: Frame, reason: str, images: ImageOptions) -> FrameResult:
-    """Make the row of a frame whose worker died, and remove its images, which an error row never has."""
-    remove_images(frame, images)
-    remove_image_leftovers([frame], images)
+def lost_frame(frame: Frame, reason: str, options: FrameOptions) -> FrameResult:
+    """Make the row of a frame whose worker died, and remove its images of an earlier run."""
+    write_outputs({}, every_path(frame, options.images), replaces=options.replaces)
+    remove_image_leftovers([frame], options.images)
     return failed_frame(frame, reason)

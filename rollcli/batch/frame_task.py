@@ -9,11 +9,11 @@ from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.result import RollEstimate
 from rollcli.files.results import Row
 from rollcli.frames.diagnosis import looks_like
-from rollcli.frames.encode import write_images
+from rollcli.frames.encode import encode_images
 from rollcli.frames.frame import Frame, FrameResult
 from rollcli.frames.guard import guarded
 from rollcli.frames.options import FrameOptions
-from rollcli.frames.outputs import remove_images
+from rollcli.frames.outputs import every_path, write_outputs
 from rollcli.frames.read import Source, read_source
 from rollcli.rig.calibration import Calibration
 from rollcli.rig.pose import horizon_row, with_pose
@@ -28,22 +28,24 @@ def run_frame(frame: Frame, options: FrameOptions) -> FrameResult:
         An image cannot be written, which ends the run.
     """
     start = time.perf_counter()
-    result = guarded(frame, lambda: _estimate(frame, options))
-    if result.row.status == "error":
-        remove_images(frame, options.images, options.root)
+    images: dict[str, bytes] = {}
+    result = guarded(frame, lambda: _estimate(frame, options, images))
+    write_outputs(images, every_path(frame, options.images, options.root), replaces=options.replaces)
     elapsed = 1000 * (time.perf_counter() - start)
     return replace(result, row=replace(result.row, elapsed_ms=elapsed))
 
 
-def _estimate(frame: Frame, options: FrameOptions) -> FrameResult:
+def _estimate(frame: Frame, options: FrameOptions, images: dict[str, bytes]) -> FrameResult:
+    """Make the row, and last the images: a frame that fails has none."""
     source = read_source(frame, options)
     estimate, likeness = _estimate_roll(source, options)
     calibration = _calibration(frame, source, estimate)
     horizon = None if calibration is None else horizon_row(estimate.tangent, calibration)
-    note = write_images(frame, source, estimate, options, horizon)
     if calibration is not None:
         estimate = with_pose(estimate, calibration)
+    made, note = encode_images(frame, source, estimate, options, horizon)
     row = _row(frame, source, estimate, note, likeness)
+    images.update(made)
     return FrameResult(row, source.encoding, source.warning, source.searched)
 
 

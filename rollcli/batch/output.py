@@ -45,6 +45,8 @@ class Output(Protocol):
         Positions of the kept rows, from 0, whose frames are done again.
     resumable : bool
         Whether an interrupted run can be resumed.
+    replaces : bool
+        Whether images are replaced that were there before the run: it was begun with --overwrite.
     """
 
     kept: tuple[Row, ...]
@@ -52,6 +54,7 @@ class Output(Protocol):
     failed: list[int]
     keep_open: int | None
     resumable: bool
+    replaces: bool
 
     def append(self, frame: Frame, result: FrameResult) -> None:
         """Write the row, at once or with others after it."""
@@ -79,9 +82,10 @@ class StreamOutput:
     keep_open: int | None = None
     resumable = False
 
-    def __init__(self, descriptor: int, name: str, plan: Plan) -> None:
+    def __init__(self, descriptor: int, name: str, plan: Plan, *, replaces: bool) -> None:
         self.incomplete: list[Frame] = []
         self.failed: list[int] = []
+        self.replaces = replaces
         self._descriptor, self._name, self._plan = descriptor, name, plan
         self._write(format_header(plan.format, plan.timing))
 
@@ -127,6 +131,7 @@ class FileOutput:
         self.incomplete = _incomplete_frames(plan, kept, images)
         self.failed = failed_positions(kept, options)
         self.keep_open: int | None = file.descriptor
+        self.replaces = record.replaces
         self._file, self._record, self._plan, self._images = file, record, plan, images
         self._rows = DurableRows(file)
         self._replacing: dict[int, bytes] = {}
@@ -193,11 +198,11 @@ def open_output(plan: Plan, options: EstimateOptions) -> Iterator[Output]:
         return
     _check_permitted(plan.output, options)
     if plan.output == STDOUT:
-        yield StreamOutput(stdout_descriptor(), STDOUT_NAME, plan)
+        yield StreamOutput(stdout_descriptor(), STDOUT_NAME, plan, replaces=options.running.overwrite)
     elif is_stream(plan.output):
         descriptor = open_stream(plan.output)
         try:
-            yield StreamOutput(descriptor, plan.output, plan)
+            yield StreamOutput(descriptor, plan.output, plan, replaces=options.running.overwrite)
         finally:
             os.close(descriptor)
     else:

@@ -13,7 +13,7 @@ from rollcli.frames.calibration import calibration_files, check_depth, check_fir
 from rollcli.frames.checks import check_inputs_are_kept, check_nothing_is_there, check_one_owner
 from rollcli.frames.find import map_frames, pair_frames
 from rollcli.frames.frame import Frame
-from rollcli.frames.outputs import possible_paths
+from rollcli.frames.outputs import every_path
 
 
 @dataclass(frozen=True)
@@ -55,16 +55,27 @@ def make_plan(options: EstimateOptions) -> Plan:
     frames = frames[part - 1 :: parts]
     check_first_size(frames, options.frame)
     if not (options.running.overwrite or options.result.resume):
-        check_nothing_is_there(_images(frames, options))
+        check_images_are_new(frames, options)
     form = options.result.format or _format(output)
     if form == "parquet" and is_stream(output):
         raise UsageError("Parquet is a folder of parts: name it with --output")
     return Plan(frames, output, form, options.result.timing)
 
 
+def check_images_are_new(frames: Iterable[Frame], options: EstimateOptions) -> None:
+    """Check that no image of these frames exists.
+
+    Raises
+    ------
+    UsageError
+        Names the first that does.
+    """
+    check_nothing_is_there(_images(frames, options))
+
+
 def _images(frames: Iterable[Frame], options: EstimateOptions) -> Iterator[str]:
     """Yield every image that may be written; a list of them would take most of our memory."""
-    return (path for frame in frames for paths in possible_paths(frame, options.images) for path in paths)
+    return (path for frame in frames for path in every_path(frame, options.images))
 
 
 def _format(output: str) -> Format:

@@ -56,10 +56,9 @@ class PartsOutput:
         self._replaced_part, self._replacing = 0, dict[int, Row]()  # rows by their positions in the result
         self._waiting: list[Row] = []
         self.incomplete: list[Frame] = []
-        self._image_options, self._images = (
-            options.images,
-            list[str](),
-        )  # those of the part that is being filled
+        self.replaces = record.replaces
+        self._image_options = options.images
+        self._images: list[str] = []  # those of the part that is being filled
         self._run = uuid.uuid4().hex  # tells our parts from those of another run
         self._written = len(kept)
 
@@ -144,7 +143,7 @@ def open_parts(plan: Plan, options: EstimateOptions) -> PartsOutput:
         require_parquet()
     parts = check_parts(plan, resume=options.result.resume, overwrite=options.running.overwrite)
     rows: tuple[Row, ...] = ()
-    if options.result.resume and parts:
+    if options.result.resume:
         rows = _kept_rows(plan, parts, options.result.part_rows)
     record = new_record(plan, options, rows, _earlier(plan) if rows else None)
     if not is_url(plan.output):

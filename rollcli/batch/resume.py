@@ -7,9 +7,10 @@ from typing import Any
 
 from rollcli.batch.fingerprint import changed_input
 from rollcli.batch.options import EstimateOptions
-from rollcli.batch.plan import Plan
+from rollcli.batch.plan import Plan, check_images_are_new
 from rollcli.batch.run_record import RunRecord
-from rollcli.files.results import Row, run_path
+from rollcli.errors import InputError
+from rollcli.files.results import Row, read_run, run_path
 from rollcli.files.resumable import differences, not_resumable
 from rollcli.files.storage import modified_ns
 from rollcli.files.stores.locations import base_name
@@ -41,7 +42,7 @@ def new_record(
     Raises
     ------
     UsageError
-        It cannot be continued; says what differs.
+        It cannot be continued; says what differs. Or it is a first start, and there are images already.
     """
     unknown = unknown_inputs(earlier)
     retried = failed_positions(rows, options)
@@ -51,6 +52,8 @@ def new_record(
         same = record if begun is plan and not (retried and unknown) else RunRecord(begun, options, unknown)
         added = len(plan.frames) - len(begun.frames)
         record.continue_from(check_resumable(rows, earlier, same, begun, added, retried))
+    elif options.result.resume:
+        _start_or_continue(record, plan, options)
     return record
 
 
@@ -106,6 +109,24 @@ def check_resumable(
     for difference in _differences(rows, run, record.fixed, plan, added, retried):
         raise not_resumable(plan.output, difference)
     return run
+
+
+def _start_or_continue(record: RunRecord, plan: Plan, options: EstimateOptions) -> None:
+    """Find out what a resume without rows is: a first start, or the same run, which had got no further.
+
+    Raises
+    ------
+    UsageError
+        A first start, and there are images: they belong to another run.
+    """
+    try:
+        run = read_run(plan.output)
+    except InputError:
+        run = None
+    if run is not None and _is_whole(run) and not any(_differences((), run, record.fixed, plan, 0, ())):
+        record.continue_from(run)
+    else:
+        check_images_are_new(plan.frames, options)
 
 
 def unknown_inputs(run: Mapping[str, Any] | None) -> list[str]:

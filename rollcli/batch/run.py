@@ -138,7 +138,8 @@ def _results(
     frames: Sequence[Frame], options: EstimateOptions, output: Output, stop: Stop
 ) -> Iterator[Iterator[FrameResult]]:
     """Open the results of frames from whichever workers were asked for; the output is complete afterwards."""
-    work = Work(partial(estimate_frame, options=options.frame), partial(lost_frame, images=options.images))
+    told = options.frame._replace(replaces=output.replaces)
+    work = Work(partial(estimate_frame, options=told), partial(lost_frame, options=told))
     sample = (*frames[:1], *frames[-1:])
     shared = SharedPaths(
         files=tuple(path for frame in sample for path in frame.reads()),

@@ -39,6 +39,7 @@ _OPTION_NAMES = {
     "max_interval_deg": "max-interval",
     "mode": "sgbm-mode",
 }
+_REPLACES = "replaces_images"  # while a run with --overwrite is not over
 _NUMBERS = ("scale", "num_disparities", "vertical_offset")  # options that are None by default
 Options = TypeVar("Options", EncodingOptions, ImageOptions, MethodOptions, RegionOptions, StereoOptions)
 
@@ -53,6 +54,7 @@ class RunRecord:
         self._output = plan.output
         self._encodings: set[str] = set()
         self._searched: list[int] = []
+        self.replaces = options.running.overwrite  # older images, now and after a resume
         self.fixed = {
             "rollcli": __version__,
             "options": _effective(plan, options),
@@ -70,6 +72,7 @@ class RunRecord:
         """Take over what the interrupted run has recorded about its inputs."""
         self._encodings.update(earlier["encoding"])
         self._searched = list(earlier["disparities_searched_px"])
+        self.replaces |= earlier.get(_REPLACES) is True
 
     def saw(self, encoding: str, searched: tuple[int, int] | None) -> None:
         """Record how a frame was read; the file says so before its row is written."""
@@ -91,6 +94,7 @@ class RunRecord:
             "alignment": alignment,
             "conventions": CONVENTIONS,
             "counts": counts,
+            **({_REPLACES: True} if self.replaces and not counts else {}),
         }
         write_bytes(run_path(self._output), json.dumps(record, indent=2).encode() + b"\n", durable=True)
 

@@ -23,7 +23,7 @@ def run_derotate(options: DerotateOptions) -> ExitStatus:
         raise UsageError("give either --roll, one angle for all maps, or --from, a result with one for each")
     frames = map_frames(options.inputs, skip=[options.output])
     conversions = list(_conversions(frames, rotation, options.output))
-    read = FrameOptions(encoding=options.encoding, root=running.root)
+    read = FrameOptions(encoding=options.encoding, root=running.root, replaces=running.overwrite)
     do = partial(_derotate, options=read, expand=rotation.expand)
     return convert(conversions, do, options.output, running, options.encoding)
 

@@ -17,7 +17,7 @@ def run_disparity(options: DisparityOptions) -> ExitStatus:
         options.inputs, options.pairs, skip=[*filter(None, [options.output, options.preview])]
     )
     conversions = [Conversion(frame, _writes(frame, options)) for frame in frames]
-    read = FrameOptions(stereo=options.stereo, root=options.running.root)
+    read = FrameOptions(stereo=options.stereo, root=options.running.root, replaces=options.running.overwrite)
     do = partial(_match, options=read, save_as=options.save_as, preview=options.preview is not None)
     return convert(conversions, do, options.output, options.running, EncodingOptions())
 

@@ -3,6 +3,7 @@
 import contextlib
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from rollcli.errors import ExitStatus
 from rollcli.files.atomic import remove_leftovers
@@ -10,7 +11,7 @@ from rollcli.files.stores.turns import tasks_in_hand
 from rollcli.frames.checks import check_one_owner, check_writes, list_files
 from rollcli.frames.frame import Frame, FrameResult, failed_frame
 from rollcli.frames.options import EncodingOptions, RunningOptions
-from rollcli.frames.outputs import remove_outputs
+from rollcli.frames.outputs import write_outputs
 from rollcli.frames.progress import Progress
 from rollcli.parallel.in_order import Work
 from rollcli.parallel.interrupt import Stop, stop_on_signals
@@ -102,8 +103,9 @@ def _results(
     files = tuple(path for each in sample for path in each.frame.reads())
     shared = SharedPaths(files, (folder,))
     workers = Workers(running.jobs, running.scheduler, shared, threads=tasks_in_hand((*files, folder)))
+    work = Work(do, partial(_lost, replaces=running.overwrite))
     try:
-        yield from run_tasks(conversions, Work(do, _lost), stop, workers)
+        yield from run_tasks(conversions, work, stop, workers)
     finally:
         if workers.scheduler is not None:  # a worker that died elsewhere cannot be waited for
             remove_leftovers(path for each in conversions for path in each.writes)
@@ -116,7 +118,7 @@ def _check(conversions: Sequence[Conversion], *, overwrite: bool) -> None:
     check_writes(reads, writes, overwrite=overwrite)
 
 
-def _lost(conversion: Conversion, reason: str) -> FrameResult:
-    remove_outputs(conversion.writes)
+def _lost(conversion: Conversion, reason: str, replaces: bool) -> FrameResult:
+    write_outputs({}, conversion.writes, replaces=replaces)
     remove_leftovers(conversion.writes)
     return failed_frame(conversion.frame, reason)

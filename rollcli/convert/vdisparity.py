@@ -14,12 +14,13 @@ from rollcli.frames.outputs import output_path
 
 def run_vdisparity(options: VDisparityOptions) -> ExitStatus:
     """Count the disparities of every map, row by row, and draw them."""
+    running = options.running
     frames = map_frames(options.inputs, calibration=options.calibration, skip=[options.output])
     check_depth(frames, options.encoding)
     conversions = [Conversion(frame, _writes(frame, options)) for frame in frames]
-    read = FrameOptions(encoding=options.encoding, root=options.running.root)
+    read = FrameOptions(encoding=options.encoding, root=running.root, replaces=running.overwrite)
     do = partial(_count, options=read, count=options.count)
-    return convert(conversions, do, options.output, options.running, options.encoding)
+    return convert(conversions, do, options.output, running, options.encoding)
 
 
 def _writes(frame: Frame, options: VDisparityOptions) -> tuple[str, ...]:

@@ -11,12 +11,11 @@ from rollcli.estimator.estimate import estimate_roll
 from rollcli.files.codecs.png import encode_png
 from rollcli.files.formats import encode_stored
 from rollcli.files.results import Row
-from rollcli.files.storage import write_bytes
 from rollcli.frames.encode import TOO_LARGE_FOR_PNG, encode_computed, encode_turned
 from rollcli.frames.frame import FrameResult
 from rollcli.frames.guard import guarded
 from rollcli.frames.options import FrameOptions
-from rollcli.frames.outputs import remove_outputs
+from rollcli.frames.outputs import write_outputs
 from rollcli.frames.read import Source, read_source
 from rollcli.imaging.overlay import draw_preview
 from rollcli.imaging.vdisparity import profile, v_disparity
@@ -69,23 +68,20 @@ def _convert(
     """Read the frame and write the files that `make` makes of it, each whole or not at all."""
     frame = conversion.frame
     paths = [options.at(path) for path in conversion.writes]
+    made: dict[str, bytes] = {}
 
     def work() -> FrameResult:
         if conversion.refused:
             raise InputError(f"{frame.file}: {conversion.refused}")
         source = read_source(frame, options)
-        written = make(source)
-        for path, data in written.items():
-            write_bytes(path, data)
-        remove_outputs(path for path in paths if path not in written)
+        made.update(make(source))
         row = Row(frame.file, frame.right_file, "ok")
-        too_large = "" if paths[0] in written else TOO_LARGE_FOR_PNG
+        too_large = "" if paths[0] in made else TOO_LARGE_FOR_PNG
         warning = source.warning or source.doubt or source.note or too_large
         return FrameResult(row, source.encoding, warning, source.searched)
 
     result = guarded(frame, work)
-    if result.row.status == "error":
-        remove_outputs(paths)  # a file of an earlier run would pass for this one's
+    write_outputs(made, paths, replaces=options.replaces)
     return result
 
 

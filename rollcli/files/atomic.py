@@ -6,6 +6,7 @@ beforehand is never opened. A link in the target's own place is replaced; what i
 """
 
 import contextlib
+import errno
 import os
 import re
 import zlib
@@ -20,7 +21,12 @@ from rollcli.files.stores.locations import is_url
 
 _LONGEST_NAME = 225  # bytes; file systems allow 255 with what is added
 _RANDOM_BYTES = 8
+_NO_LINKS = (errno.EPERM, errno.EINVAL, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP)  # of FAT, say
 _PART = re.compile(rf"\.(.+)\.[0-9a-f]{{{2 * _RANDOM_BYTES}}}\.part", re.DOTALL)
+
+
+class NameTakenError(OutputError):
+    """There is something of this name already, which must not be replaced."""
 
 
 def output_error(path: str | Path, error: OSError) -> OutputError:
@@ -29,7 +35,7 @@ def output_error(path: str | Path, error: OSError) -> OutputError:
 
 
 @contextlib.contextmanager
-def atomic_file(path: str | Path, *, durable: bool = False) -> Iterator[BinaryIO]:
+def atomic_file(path: str | Path, *, durable: bool = False, replaces: bool = True) -> Iterator[BinaryIO]:
     """Open a binary file that takes its name when the block ends, and vanishes when the block fails.
 
     Parameters
@@ -38,6 +44,8 @@ def atomic_file(path: str | Path, *, durable: bool = False) -> Iterator[BinaryIO
         The target; parent folders are made. An existing file or link is replaced in one step.
     durable : bool
         Survives a power cut once the block has ended. For many files `durable.sync_files` is cheaper.
+    replaces : bool
+        Whether an existing file or link is replaced; otherwise it stays as it is.
 
     Yields
     ------
@@ -48,6 +56,8 @@ def atomic_file(path: str | Path, *, durable: bool = False) -> Iterator[BinaryIO
     ------
     OutputError
         The target cannot be written (full disk, no permission, a folder of that name, ...).
+    NameTakenError
+        There is something of this name, at the moment when the block ends, and `replaces` is false.
     """
     target = Path(path)
     try:
@@ -60,7 +70,10 @@ def atomic_file(path: str | Path, *, durable: bool = False) -> Iterator[BinaryIO
                 if durable:
                     sync_file(file)
                 file.close()
-                temporary.replace(target)
+                if replaces:
+                    temporary.replace(target)
+                else:
+                    _take_free_name(temporary, target)
             except BaseException:
                 with contextlib.suppress(OSError):
                     temporary.unlink()
@@ -71,10 +84,32 @@ def atomic_file(path: str | Path, *, durable: bool = False) -> Iterator[BinaryIO
         raise output_error(path, error) from error
 
 
-def write_atomic(path: str | Path, data: bytes, *, durable: bool = False) -> None:
+def write_atomic(path: str | Path, data: bytes, *, durable: bool = False, replaces: bool = True) -> None:
     """Write `data` to `path`, whole or not at all; see `atomic_file`."""
-    with atomic_file(path, durable=durable) as file:
+    with atomic_file(path, durable=durable, replaces=replaces) as file:
         file.write(data)
+
+
+def _take_free_name(temporary: Path, target: Path) -> None:
+    """Give a file its name unless there is something of that name, be it a link to nothing.
+
+    Raises
+    ------
+    NameTakenError
+        There is.
+    """
+    try:
+        os.link(temporary, target)
+    except FileExistsError:
+        raise NameTakenError(f"{target}: exists already") from None
+    except OSError as error:
+        if error.errno not in _NO_LINKS:
+            raise
+        if os.path.lexists(target):  # not in one step with the next line: the best that such a disk can do
+            raise NameTakenError(f"{target}: exists already") from None
+        temporary.replace(target)
+    else:
+        temporary.unlink()
 
 
 def remove_leftovers(paths: Iterable[str | Path]) -> None:

@@ -3,14 +3,13 @@
 Import-light: obstore is loaded when the first URL of an object store is read or written.
 """
 
-import contextlib
+import hashlib
 import os
 import stat
 from pathlib import Path
 
 from rollcli.errors import InputError, OutputError
-from rollcli.files.atomic import output_error, write_atomic
-from rollcli.files.durable import sync_names
+from rollcli.files.atomic import NameTakenError, output_error, write_atomic
 from rollcli.files.stores.locations import WEB_SERVERS, is_url, public_name, scheme_of
 from rollcli.files.stores.objects import (
     create_object,
@@ -79,6 +78,55 @@ def write_bytes(location: str, data: bytes, *, durable: bool = False) -> None:
     write_object(location, data)
 
 
+def write_new(location: str, data: bytes) -> None:
+    """Write a file or an object, whole or not at all; what another program wrote is not replaced.
+
+    Nothing is in the way if it holds these very bytes, or, on local disk, as many of them as a power cut left
+    of an earlier write: the first ones, and zeros where the rest should be.
+
+    Parameters
+    ----------
+    location : str
+        A path, or a URL of an object store.
+    data : bytes
+
+    Raises
+    ------
+    OutputError
+        It cannot be written, or something else has its name.
+    """
+    if is_url(location):
+        _require_writable(location)
+        if not create_object(location, data, hashlib.sha256(data).hexdigest()):
+            raise _taken(location)
+        return
+    try:
+        write_atomic(location, data, replaces=False)
+    except NameTakenError:
+        there = _beginning_of(location, len(data))
+        if there is None or not data.startswith(there.rstrip(b"\0")):
+            raise _taken(location) from None
+        if there != data:
+            write_atomic(location, data)
+
+
+def _taken(location: str) -> OutputError:
+    return OutputError(
+        f"{public_name(location)}: exists already and is not of this run; move it away, or give --overwrite "
+        "to replace it"
+    )
+
+
+def _beginning_of(path: str, size: int) -> bytes | None:
+    """Read a regular file of at most so many bytes; None for all else."""
+    try:
+        if Path(path).lstat().st_size > size:
+            return None
+        return _read_file(path, path)
+    except (OSError, InputError):
+        return None
+
+
 def create(location: str, data: bytes, owner: str) -> bool:
     """Write a file or an object unless there is one of this name; return whether this owner wrote it.
 
@@ -97,7 +145,11 @@ def create(location: str, data: bytes, owner: str) -> bool:
         It cannot be written.
     """
     if not is_url(location):
-        return _create_file(Path(location), data)
+        try:
+            write_atomic(location, data, durable=True, replaces=False)
+        except NameTakenError:
+            return False
+        return True
     _require_writable(location)
     return create_object(location, data, owner)
 
@@ -170,23 +222,6 @@ def _read_file(path: str, name: str) -> bytes:
         reason = str(getattr(error, "strerror", None) or error).lower()
         raise InputError(f"{name}: cannot be read: {reason}") from None
     return data
-
-
-def _create_file(target: Path, data: bytes) -> bool:
-    """Create a local file whole: write it under another name, and link it to its own if that is free."""
-    own = target.with_name(f".{target.name}.{os.getpid()}")
-    write_atomic(own, data, durable=True)
-    try:
-        os.link(own, target)
-        sync_names([target])
-    except FileExistsError:
-        return False
-    except OSError as error:
-        raise output_error(target, error) from error
-    finally:
-        with contextlib.suppress(OSError):
-            own.unlink()
-    return True
 
 
 def _require_writable(url: str) -> None:

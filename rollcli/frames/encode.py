@@ -10,10 +10,9 @@ from rollcli.estimator.result import RollEstimate
 from rollcli.files.codecs.png import encode_png
 from rollcli.files.encodings import KITTI_TOP, Encoding, from_disparity
 from rollcli.files.formats import Stored, encode_stored
-from rollcli.files.storage import write_bytes
 from rollcli.frames.frame import Frame
 from rollcli.frames.options import FrameOptions
-from rollcli.frames.outputs import image_paths, remove_outputs, roomy_path
+from rollcli.frames.outputs import image_paths, roomy_path
 from rollcli.frames.read import Source
 from rollcli.imaging.derotate import derotate
 from rollcli.imaging.overlay import draw_road, draw_road_on_photo
@@ -23,31 +22,25 @@ from rollcli.imaging.vdisparity_picture import draw_v_disparity
 TOO_LARGE_FOR_PNG = f"written as TIFF: a disparity is above the {KITTI_TOP:.0f} px of a KITTI PNG"
 
 
-def write_images(
+def encode_images(
     frame: Frame,
     source: Source,
     estimate: RollEstimate,
     options: FrameOptions,
     horizon: float | None = None,
-) -> str:
-    """Write the images that were requested, each whole or not at all; return what the row should say of them.
+) -> tuple[dict[str, bytes], str]:
+    """Make the images that were requested, by their paths, and what the row should say of them.
 
     `horizon` is the y of the road's horizon, px, where a calibration tells it.
-
-    Raises
-    ------
-    OutputError
-        An image cannot be written.
     """
-    note = ""
+    images, note = {}, ""
     for kind, path in image_paths(frame, options.images):
         planned = options.at(path)
         target, data = _ENCODERS[kind](planned, source, estimate, options, horizon)
-        write_bytes(target, data)
+        images[target] = data
         if target != planned:
             note = TOO_LARGE_FOR_PNG
-            remove_outputs([planned])  # of an earlier run
-    return note
+    return images, note
 
 
 def encode_turned(

@@ -110,6 +110,7 @@ class FrameOptions(NamedTuple):
     """What decides the row and the images of a frame: everything that a worker is told beside the frame.
 
     `root` is the folder where relative paths start, for workers on other machines; empty for this one.
+    `replaces` tells whether files that are in the place of an image are replaced.
     """
 
     encoding: EncodingOptions = EncodingOptions()
@@ -118,6 +119,7 @@ class FrameOptions(NamedTuple):
     method: MethodOptions = MethodOptions()
     images: ImageOptions = ImageOptions()
     root: str = ""
+    replaces: bool = False
 
     def at(self, path: str) -> str:
         """Locate a path on this worker."""

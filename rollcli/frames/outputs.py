@@ -2,12 +2,12 @@
 
 import contextlib
 import posixpath
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 
 from rollcli.errors import OutputError
 from rollcli.files.atomic import remove_leftovers
-from rollcli.files.storage import remove
+from rollcli.files.storage import remove, write_bytes, write_new
 from rollcli.files.stores.locations import is_url, located
 from rollcli.frames.frame import Frame
 from rollcli.frames.options import ImageOptions
@@ -64,18 +64,39 @@ def output_path(frame: Frame, folder: str, ending: str | None = None) -> str:
     return posixpath.join(folder, stem + (own if ending is None else ending))
 
 
-def remove_images(frame: Frame, images: ImageOptions, root: str = "") -> None:
-    """Remove the images of a frame: a frame without an angle has none."""
-    remove_outputs(located(root, path) for paths in possible_paths(frame, images) for path in paths)
+def every_path(frame: Frame, images: ImageOptions, root: str = "") -> list[str]:
+    """List every image that may be written for a frame, from a folder where relative paths start."""
+    return [located(root, path) for paths in possible_paths(frame, images) for path in paths]
 
 
-def remove_outputs(paths: Iterable[str]) -> None:
-    """Remove the files of a failed frame, which an earlier run may have written."""
-    for path in paths:
-        with contextlib.suppress(OutputError):  # the row says what is wrong with the frame
-            remove(path)
+def write_outputs(files: Mapping[str, bytes], paths: Collection[str], *, replaces: bool) -> None:
+    """Write the files of a frame, each whole or not at all; a failed frame has none.
+
+    Parameters
+    ----------
+    files : mapping from str to bytes
+        What is written, by its path.
+    paths : collection of str
+        All that may be written for the frame.
+    replaces : bool
+        Whether files of an earlier run are replaced, and those that are not written now removed: they would
+        pass for this run's. Otherwise nothing that another run or program wrote is touched.
+
+    Raises
+    ------
+    OutputError
+        One cannot be written, or must not be replaced.
+    """
+    write = write_bytes if replaces else write_new
+    for path, data in files.items():
+        write(path, data)
+    if replaces:
+        for path in paths:
+            if path not in files:
+                with contextlib.suppress(OutputError):  # the row says what is wrong with the frame
+                    remove(path)
 
 
 def remove_image_leftovers(frames: Iterable[Frame], images: ImageOptions) -> None:
     """Remove the temporary files that killed workers left beside the images of these frames."""
-    remove_leftovers(path for frame in frames for paths in possible_paths(frame, images) for path in paths)
+    remove_leftovers(path for frame in frames for path in every_path(frame, images))

@@ -1,5 +1,6 @@
 """A file is there whole or not at all."""
 
+import errno
 import os
 import stat
 import subprocess
@@ -8,7 +9,7 @@ import sys
 import pytest
 
 from rollcli.errors import OutputError
-from rollcli.files.atomic import atomic_file, remove_leftovers, write_atomic
+from rollcli.files.atomic import NameTakenError, atomic_file, remove_leftovers, write_atomic
 
 
 def names_in(folder):
@@ -27,6 +28,47 @@ def test_an_existing_file_is_replaced(tmp_path):
     write_atomic(tmp_path / "map.png", b"new")
 
     assert (tmp_path / "map.png").read_bytes() == b"new"
+
+
+def refuses_links(error):
+    """`os.link` on a disk that has none, as FAT's says it."""
+
+    def link(source, target):
+        raise OSError(error, os.strerror(error), str(source), None, str(target))
+
+    return link
+
+
+@pytest.mark.parametrize("error", [None, errno.EPERM, errno.EOPNOTSUPP])
+def test_a_name_that_is_taken_is_left_alone_when_told_so(tmp_path, monkeypatch, error):
+    if error is not None:
+        monkeypatch.setattr(os, "link", refuses_links(error))
+    write_atomic(tmp_path / "map.png", b"first", replaces=False)
+    (tmp_path / "link.png").symlink_to("nothing")
+    for name in ("map.png", "link.png"):
+        with pytest.raises(NameTakenError):
+            write_atomic(tmp_path / name, b"second", replaces=False)
+
+    assert (tmp_path / "map.png").read_bytes() == b"first"
+    assert (tmp_path / "link.png").is_symlink()
+    assert names_in(tmp_path) == ["link.png", "map.png"]
+
+
+def test_a_name_that_is_taken_while_the_file_is_written_is_left_alone(tmp_path):
+    with pytest.raises(NameTakenError), atomic_file(tmp_path / "map.png", replaces=False) as file:
+        file.write(b"second")
+        (tmp_path / "map.png").write_bytes(b"first")
+
+    assert (tmp_path / "map.png").read_bytes() == b"first"
+    assert names_in(tmp_path) == ["map.png"]
+
+
+def test_a_disk_that_fails_to_link_is_named(tmp_path, monkeypatch):
+    monkeypatch.setattr(os, "link", refuses_links(errno.EIO))
+    with pytest.raises(OutputError, match=r"map\.png: cannot be written: input/output error"):
+        write_atomic(tmp_path / "map.png", b"data", replaces=False)
+
+    assert names_in(tmp_path) == []
 
 
 def test_nothing_is_there_before_the_block_ends(tmp_path):

@@ -1,5 +1,7 @@
 """Bytes in an object store are read and written as those of local files are."""
 
+import os
+
 import pytest
 
 from rollcli.errors import InputError, OutputError, UsageError
@@ -32,6 +34,42 @@ def test_only_the_first_creates(folder):
     assert not storage.create(f"{folder}/part", b"mine", "you")
     assert not storage.create(f"{folder}/part", b"yours", "you")
     assert storage.read_bytes(f"{folder}/part") == b"mine"
+
+
+def test_what_is_there_already_is_replaced_by_its_own_bytes_only(folder):
+    storage.write_new(f"{folder}/map.png", b"mine")
+    storage.write_new(f"{folder}/map.png", b"mine")
+    with pytest.raises(OutputError, match="exists already and is not of this run"):
+        storage.write_new(f"{folder}/map.png", b"yours")
+    assert storage.read_bytes(f"{folder}/map.png") == b"mine"
+
+
+@pytest.mark.parametrize("left", [b"", b"\x89PNG", b"\x89PNG\0\0\0\0\0\0", bytes(10)])
+def test_what_a_power_cut_left_is_replaced(tmp_path, left):
+    (tmp_path / "map.png").write_bytes(left)
+    storage.write_new(str(tmp_path / "map.png"), b"\x89PNG\r\n\0abc")
+    assert (tmp_path / "map.png").read_bytes() == b"\x89PNG\r\n\0abc"
+
+
+@pytest.mark.parametrize("there", [b"\x89PNX", b"\x89PNG\0\n", b"\x89PNG\r\n\0abcd", bytes(11)])
+def test_what_no_power_cut_leaves_is_not_replaced(tmp_path, there):
+    (tmp_path / "map.png").write_bytes(there)
+    with pytest.raises(OutputError, match="exists already"):
+        storage.write_new(str(tmp_path / "map.png"), b"\x89PNG\r\n\0abc")
+    assert (tmp_path / "map.png").read_bytes() == there
+
+
+@pytest.mark.parametrize("kind", ["folder", "link to nothing", "pipe"])
+def test_what_is_no_file_is_not_replaced_and_not_waited_for(tmp_path, kind):
+    path = tmp_path / "map.png"
+    {"folder": path.mkdir, "link to nothing": lambda: path.symlink_to("x"), "pipe": lambda: os.mkfifo(path)}[
+        kind
+    ]()
+    before = path.lstat()
+    with pytest.raises(OutputError, match="is a folder|exists already"):
+        storage.write_new(str(path), b"data")
+    assert path.lstat() == before
+    assert [each.name for each in tmp_path.iterdir()] == ["map.png"]
 
 
 def test_what_is_not_there_is_an_input_error(folder):

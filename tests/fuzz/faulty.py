@@ -21,6 +21,7 @@ FAULTS = {
     "read": ("EIO",),
     "close": ("EIO", "ENOSPC"),
     "replace": ("EIO", "ENOSPC", "EROFS"),
+    "link": ("EIO", "ENOSPC", "EPERM"),
     "ftruncate": ("EIO",),
     "unlink": ("EIO", "EROFS"),
     "mkdir": ("EIO", "ENOSPC", "EDQUOT"),
