@@ -55,9 +55,13 @@ def test_a_name_that_is_taken_is_left_alone_when_told_so(tmp_path, monkeypatch, 
 
 
 def test_a_name_that_is_taken_while_the_file_is_written_is_left_alone(tmp_path):
-    with pytest.raises(NameTakenError), atomic_file(tmp_path / "map.png", replaces=False) as file:
-        file.write(b"second")
-        (tmp_path / "map.png").write_bytes(b"first")
+    def write():
+        with atomic_file(tmp_path / "map.png", replaces=False) as file:
+            file.write(b"second")
+            (tmp_path / "map.png").write_bytes(b"first")
+
+    with pytest.raises(NameTakenError):
+        write()
 
     assert (tmp_path / "map.png").read_bytes() == b"first"
     assert names_in(tmp_path) == ["map.png"]
