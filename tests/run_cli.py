@@ -4,20 +4,16 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from typing import NamedTuple
 
 import cv2
 import numpy as np
 
+from tests.in_process import Finished, run_here
+
 ROOT = Path(__file__).resolve().parent.parent
-
-
-class Finished(NamedTuple):
-    """What a run of the program left."""
-
-    status: int
-    out: str
-    err: str
+_WITH_WORKERS = ("estimate", "disparity", "derotate", "vdisparity", "simulate", "report", "evaluate_accuracy")
+_ONE_WORKER = {f"ROLLCLI_{name.upper()}_JOBS": "1" for name in _WITH_WORKERS}
+_PROCESSES = ("-j", "--jobs", "--scheduler")  # options that start some
 
 
 def command(*arguments: str | Path) -> list[str]:
@@ -29,11 +25,19 @@ def environment(**variables: str) -> dict[str, str]:
     """This environment without settings of rollcli's, with these; one process where no more are asked for."""
     kept = {name: value for name, value in os.environ.items() if not name.startswith("ROLLCLI")}
     path = os.pathsep.join(filter(None, [str(ROOT), kept.get("PYTHONPATH")]))
-    return {**kept, "PYTHONPATH": path, "ROLLCLI_ESTIMATE_JOBS": "1", **variables}
+    return {**kept, "PYTHONPATH": path, **_ONE_WORKER, **variables}
 
 
 def rollcli(*arguments: str | Path, cwd: Path, stdin: str = "", **variables: str) -> Finished:
-    """Run the program to its end; a traceback is always a failure."""
+    """Run the program to its end: in this process, unless it starts others or is told how Python starts."""
+    words = [*map(str, arguments)]
+    if "PYTHONPATH" in variables or any(each.startswith(_PROCESSES) or "://" in each for each in words):
+        return rollcli_process(*words, cwd=cwd, stdin=stdin, **variables)
+    return run_here(words, cwd, stdin, environment(**variables))
+
+
+def rollcli_process(*arguments: str | Path, cwd: Path, stdin: str = "", **variables: str) -> Finished:
+    """Run the program to its end in a process of its own; a traceback is always a failure."""
     done = subprocess.run(
         command(*arguments),
         cwd=cwd,

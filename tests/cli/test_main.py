@@ -6,11 +6,11 @@ import sys
 import pytest
 
 import rollcli as package
-from tests.run_cli import environment, rollcli, write_maps
+from tests.run_cli import environment, rollcli, rollcli_process, write_maps
 
 
 def test_version_is_the_packages(tmp_path):
-    assert rollcli("--version", cwd=tmp_path).out == f"rollcli {package.__version__}\n"
+    assert rollcli_process("--version", cwd=tmp_path).out == f"rollcli {package.__version__}\n"
 
 
 def test_versions_names_python_and_every_dependency(tmp_path):
@@ -61,7 +61,7 @@ def test_the_program_alone_shows_its_commands(tmp_path):
 
 
 def test_help_calls_the_program_rollcli(tmp_path):
-    assert rollcli("--help", cwd=tmp_path).out.startswith("Usage: rollcli ")
+    assert rollcli_process("--help", cwd=tmp_path).out.startswith("Usage: rollcli ")
 
 
 def test_what_nobody_thought_of_is_one_line_too(tmp_path):
