@@ -6,6 +6,7 @@ Import-light: obstore is loaded when the first URL of an object store is read or
 import hashlib
 import os
 import stat
+from collections.abc import Iterable
 from pathlib import Path
 
 from rollcli.errors import InputError, OutputError
@@ -22,6 +23,7 @@ from rollcli.files.stores.objects import (
 )
 
 _MAX_BYTES = 2**32
+_AT_ONCE = 16  # requests, of 50 ms each: 10,000 small objects take half a minute
 
 
 def read_bytes(location: str | Path, name: str | None = None) -> bytes:
@@ -45,6 +47,23 @@ def read_bytes(location: str | Path, name: str | None = None) -> bytes:
     if not data:
         raise InputError(f"{name}: is empty")
     return data
+
+
+def fetch_all(locations: Iterable[str]) -> dict[str, bytes]:
+    """Read many small objects at once.
+
+    Raises
+    ------
+    InputError
+        One of them cannot be read.
+    """
+    from concurrent.futures import ThreadPoolExecutor  # takes a while to load
+
+    every = list(locations)
+    if not every:
+        return {}
+    with ThreadPoolExecutor(_AT_ONCE) as pool:
+        return dict(zip(every, pool.map(read_bytes, every), strict=True))
 
 
 def _read_url(location: str) -> bytes:

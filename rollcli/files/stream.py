@@ -6,7 +6,8 @@ import sys
 from pathlib import Path
 
 from rollcli.errors import OutputError
-from rollcli.files.atomic import output_error, remove_leftovers, write_atomic
+from rollcli.files.atomic import output_error, remove_leftovers
+from rollcli.files.storage import write_bytes
 
 STDOUT = "-"  # how the command line names it
 STDOUT_NAME = "standard output"
@@ -24,7 +25,7 @@ def is_stream(name: str) -> bool:
 
 
 def write_output(name: str, data: bytes) -> None:
-    """Write to standard output, into a device or pipe, or as a file that is whole or not there.
+    """Write to standard output, into a device or pipe, or as a file or object that is whole or not there.
 
     Raises
     ------
@@ -43,7 +44,7 @@ def write_output(name: str, data: bytes) -> None:
             os.close(descriptor)
     else:
         remove_leftovers([name])
-        write_atomic(name, data)
+        write_bytes(name, data)
 
 
 def open_stream(name: str) -> int:

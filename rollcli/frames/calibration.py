@@ -1,12 +1,14 @@
 """The calibration of each frame: one for all, or one of the same stem each."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path, PurePosixPath
 
 from rollcli.errors import InputError, UsageError
-from rollcli.files.existence import is_file, is_folder
-from rollcli.files.storage import read_bytes
+from rollcli.files.existence import is_file
+from rollcli.files.storage import fetch_all, read_bytes
+from rollcli.files.stores.locations import is_url, public_name
+from rollcli.files.stores.search import is_place, objects_behind
 from rollcli.frames.frame import Frame
 from rollcli.frames.options import EncodingOptions, FrameOptions
 from rollcli.rig.calibration import Calibration
@@ -65,10 +67,13 @@ class Calibrations:
 
     def __init__(self, given: CalibrationOptions) -> None:
         self._given = given
-        self._by_stem: dict[str, list[Path]] | None = None
+        self._by_stem: dict[str, list[str]] | None = None
+        self._fetched: dict[str, bytes] = {}  # of an object store, where one after the other takes long
         self._one: Calibration | None = None
-        if len(given.calib) == 1 and is_folder(given.calib[0]):
-            self._by_stem = _stems(Path(given.calib[0]))
+        if len(given.calib) == 1 and is_place(given.calib[0]):
+            files = _files(given.calib[0])
+            self._by_stem = _stems(files)
+            self._fetched = fetch_all(filter(is_url, files))
         elif given.given:
             self._one = _read(given.calib, given)
 
@@ -85,16 +90,12 @@ class Calibrations:
         paths = self._by_stem[shorter]
         if len(paths) > 1:
             raise UsageError(f"{name}: has more than one calibration of its name: {paths[0]}, {paths[1]}")
-        return _read([str(paths[0])], self._given)
+        return _read([paths[0]], self._given, self._fetched)
 
 
 def calibration_files(given: CalibrationOptions) -> list[str]:
     """List the files that a user named, those of a folder one by one."""
-    return [
-        str(path)
-        for name in given.calib
-        for path in (_files(Path(name)) if is_folder(name) else [Path(name)])
-    ]
+    return [path for name in given.calib for path in (_files(name) if is_place(name) else [name])]
 
 
 def calibration_notes(frames: Sequence[Frame]) -> list[str]:
@@ -142,24 +143,33 @@ def check_depth(frames: Sequence[Frame], encoding: EncodingOptions) -> None:
             )
 
 
-def _stems(folder: Path) -> dict[str, list[Path]]:
-    found: dict[str, list[Path]] = {}
-    for path in _files(folder):
-        found.setdefault(path.stem.removesuffix(_MARK), []).append(path)
+def _stems(files: Sequence[str]) -> dict[str, list[str]]:
+    found: dict[str, list[str]] = {}
+    for path in files:
+        found.setdefault(PurePosixPath(path).stem.removesuffix(_MARK), []).append(path)
     return found
 
 
-def _files(folder: Path) -> list[Path]:
-    return sorted(path for path in folder.rglob("*") if is_file(path) and not path.name.startswith("."))
+def _files(folder: str) -> list[str]:
+    if is_url(folder):
+        return sorted(path for path, _ in objects_behind(folder, recursive=True))
+    found = (path for path in Path(folder).rglob("*") if is_file(path) and not path.name.startswith("."))
+    return [str(path) for path in sorted(found)]
 
 
-def _read(paths: Sequence[str], given: CalibrationOptions) -> Calibration:
+def _read(
+    paths: Sequence[str], given: CalibrationOptions, fetched: Mapping[str, bytes] | None = None
+) -> Calibration:
     if len(paths) > 2:
         raise UsageError("--calib is given at most twice: for the left and the right view of ROS")
-    return parse_calibration([(path, _bytes(path)) for path in paths], given)
+    fetched = fetched or {}
+    files = [(public_name(path), fetched[path] if path in fetched else _bytes(path)) for path in paths]
+    return parse_calibration(files, given)
 
 
 def _bytes(path: str) -> bytes:
+    if is_url(path):
+        return read_bytes(path)
     try:
         size = Path(path).stat().st_size
     except (OSError, ValueError):

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from pathlib import Path, PurePath
 
 from rollcli.errors import UsageError
-from rollcli.files.existence import is_file, is_folder
+from rollcli.files.existence import is_file
 from rollcli.files.inputs import Input, find_inputs, pair_inputs
-from rollcli.files.stores.locations import is_object_url, is_url
-from rollcli.files.stores.search import is_folder_url
+from rollcli.files.stores.locations import is_url
+from rollcli.files.stores.search import is_place
 from rollcli.frames.calibration import Calibrations
 from rollcli.frames.frame import Frame
 from rollcli.frames.options import InputOptions, PairOptions, RegionOptions
@@ -89,7 +89,7 @@ class _Masks:
 
     def __init__(self, region: RegionOptions | None) -> None:
         self.one, self.by_stem = region.mask if region else None, None
-        if self.one is not None and _is_folder(self.one):
+        if self.one is not None and is_place(self.one):
             found = find_inputs([self.one], recursive=True)
             self.by_stem = {Path(each.name).stem: each.location for each in found}
         elif self.one is not None and not (is_url(self.one) or is_file(self.one)):
@@ -103,9 +103,3 @@ class _Masks:
             return self.by_stem[PurePath(left.name).stem]
         except KeyError:
             raise UsageError(f"{left.name}: has no mask of its name in {self.one}") from None
-
-
-def _is_folder(location: str) -> bool:
-    if is_object_url(location):
-        return is_folder_url(location)
-    return is_folder(location)

@@ -1,7 +1,7 @@
 """Where the pictures of a row come from: images that `estimate` wrote, or its inputs."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
@@ -10,6 +10,8 @@ from rollcli.files.existence import is_file, is_folder, is_there
 from rollcli.files.inputs import MAP_ENDINGS
 from rollcli.files.naming import listed
 from rollcli.files.results import Row
+from rollcli.files.stores.locations import base_name, is_url
+from rollcli.files.stores.search import objects_behind
 from rollcli.frames.frame import Frame
 from rollcli.frames.options import ImageOptions
 
@@ -59,9 +61,8 @@ def subjects(rows: Sequence[Row], result: str, images: str | None, recorded: Ima
     UsageError
         There is no such folder, or there are no images of some rows in it.
     """
-    if images is not None and not is_folder(images):
-        raise UsageError(f"{images}: no such folder of images")
-    found = [_images(row, images, recorded) if images is not None else {} for row in rows]
+    there = None if images is None else _ImageFolder(images)
+    found = [_images(row, there, recorded) if there is not None else {} for row in rows]
     without = [row.file for row, files in zip(rows, found, strict=True) if images is not None and not files]
     if without:
         raise UsageError(
@@ -69,7 +70,8 @@ def subjects(rows: Sequence[Row], result: str, images: str | None, recorded: Ima
             "wrote, or leave --images out to have the pictures made from the inputs"
         )
     only = images is not None
-    return [_subject(row, Path(result).parent, files, only) for row, files in zip(rows, found, strict=True)]
+    folder = Path() if is_url(result) else Path(result).parent  # names in a bucket are whole URLs
+    return [_subject(row, folder, files, only) for row, files in zip(rows, found, strict=True)]
 
 
 def _subject(row: Row, folder: Path, images: dict[str, str], images_only: bool) -> Subject:
@@ -92,30 +94,60 @@ def _located(name: str, folder: Path) -> str:
     return str(beside) if name and not is_there(name) and is_there(beside) else name
 
 
-def _images(row: Row, images: str, recorded: ImageOptions) -> dict[str, str]:
-    return {kind: path for kind in KINDS if (path := _image(kind, row, Path(images), recorded))}
+class _ImageFolder:
+    """A folder of images, or of folders of images, on disk or in an object store.
+
+    Raises
+    ------
+    UsageError
+        There is none.
+    """
+
+    def __init__(self, location: str) -> None:
+        self._location = location.rstrip("/")
+        self._objects: frozenset[str] | None = None
+        if is_url(location):
+            self._objects = frozenset(url for url, _ in objects_behind(location, recursive=True))
+        if not (is_folder(location) if self._objects is None else self._objects):
+            raise UsageError(f"{location}: no such folder of images")
+
+    def find(self, relative: str) -> str | None:
+        """Return where a file below it lies; neither a name nor a link leads out of it."""
+        location = f"{self._location}/{relative}"
+        if self._objects is not None:
+            return location if location in self._objects else None
+        path, inside = Path(location), Path(self._location).resolve()
+        return location if is_file(path) and path.resolve().is_relative_to(inside) else None
+
+    def is_one_of(self, names: Collection[str], recorded: str | None) -> bool:
+        """Tell whether it holds images itself: by its name, or since the run wrote them there."""
+        if self._objects is not None:
+            same = recorded is not None and recorded.rstrip("/") == self._location
+            return same or base_name(self._location) in names
+        place = Path(self._location).resolve()
+        return place.name in names or (recorded is not None and place == Path(recorded).resolve())
 
 
-def _image(kind: str, row: Row, images: Path, recorded: ImageOptions) -> str | None:
-    inside = images.resolve()  # neither a name nor a link leads out of it
+def _images(row: Row, images: _ImageFolder, recorded: ImageOptions) -> dict[str, str]:
+    return {kind: path for kind in KINDS if (path := _image(kind, row, images, recorded))}
+
+
+def _image(kind: str, row: Row, images: _ImageFolder, recorded: ImageOptions) -> str | None:
     for folder in _folders(kind, images, getattr(recorded, kind)):
         for name in _tails(row.file):
             for ending in (".png",) if kind in ("vdisparity", "road_mask") else MAP_ENDINGS:
-                path = folder / f"{name}{ending}"
-                if is_file(path) and path.resolve().is_relative_to(inside):
-                    return str(path)
+                if found := images.find(f"{folder}{name}{ending}"):
+                    return found
     return None
 
 
-def _folders(kind: str, images: Path, recorded: str | None) -> Iterator[Path]:
+def _folders(kind: str, images: _ImageFolder, recorded: str | None) -> Iterator[str]:
     """Yield where images of a kind may be: in the folder named, under the name it had or the option's."""
-    names = {Path(recorded).name, kind} - {".."} if recorded is not None else {kind}
+    names = {base_name(recorded.rstrip("/")), kind} - {".."} if recorded is not None else {kind}
     for name in sorted(names):
-        yield images / name
-    if images.resolve().name in names or (
-        recorded is not None and images.resolve() == Path(recorded).resolve()
-    ):
-        yield images
+        yield f"{name}/"
+    if images.is_one_of(names, recorded):
+        yield ""
 
 
 def _tails(file: str) -> Iterator[str]:

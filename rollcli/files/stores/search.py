@@ -6,7 +6,8 @@ import posixpath
 import re
 from collections.abc import Iterator, Sequence
 
-from rollcli.files.stores.locations import OBJECT_STORES, scheme_of, split_url
+from rollcli.files.existence import is_folder
+from rollcli.files.stores.locations import OBJECT_STORES, is_url, scheme_of, split_url
 from rollcli.files.stores.objects import list_objects
 
 _MAGIC = re.compile(r"[*?[]")
@@ -18,6 +19,11 @@ def is_folder_url(url: str) -> bool:
         return False
     key = split_url(url)[1]
     return key in ("", "/") or key.endswith("/") or posixpath.splitext(key)[1] == ""
+
+
+def is_place(location: str) -> bool:
+    """Tell whether a location holds files: a local folder, or what `is_folder_url` takes for one."""
+    return is_folder_url(location) if is_url(location) else is_folder(location)
 
 
 def objects_behind(url: str, *, recursive: bool) -> Iterator[tuple[str, str]]:
