@@ -46,7 +46,8 @@ def _estimate(frame: Frame, options: FrameOptions, images: dict[str, bytes]) -> 
     made, note = encode_images(frame, source, estimate, options, horizon)
     row = _row(frame, source, estimate, note, likeness)
     images.update(made)
-    return FrameResult(row, source.encoding, source.warning, source.searched)
+    warning = "; ".join(filter(None, [source.warning, likeness]))
+    return FrameResult(row, source.encoding, warning, source.searched)
 
 
 def _estimate_roll(source: Source, options: FrameOptions) -> tuple[RollEstimate, str]:

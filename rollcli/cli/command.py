@@ -1,11 +1,13 @@
 """Commands whose help is in sections, and how their options are declared."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
 from rollcli.errors import ExitStatus
+from rollcli.messages import say
 
 OTHER = "Other options"
 Values = dict[str, Any]
@@ -26,11 +28,31 @@ class Command(click.Command):
     ----------
     examples : sequence of (str, str)
         A purpose, and the command line for it; several lines are steps.
+    instead : str
+        What to give in place of arguments, to those who give some to a command that takes none.
     """
 
-    def __init__(self, *args: Any, examples: Sequence[tuple[str, str]] = (), **attributes: Any) -> None:
+    def __init__(
+        self,
+        *args: Any,
+        examples: Sequence[tuple[str, str]] = (),
+        instead: str = "",
+        **attributes: Any,
+    ) -> None:
         super().__init__(*args, **attributes)
         self.examples = tuple(examples)
+        self.instead = instead
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Parse the words; where there should be none, say what should be there instead."""
+        takes_any = any(isinstance(param, click.Argument) for param in self.get_params(ctx))
+        if takes_any or not self.instead or ctx.resilient_parsing:
+            return super().parse_args(ctx, args)
+        ctx.allow_extra_args = True
+        rest = super().parse_args(ctx, args)
+        if rest:
+            raise click.UsageError(f"{' '.join(rest)}: {self.instead}", ctx)
+        return rest
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the options, by section."""
@@ -139,7 +161,7 @@ def record(name: str, title: str, make: Callable[..., Any], *declarations: Decla
 
 
 def command(
-    examples: Sequence[tuple[str, str]] = (), short_help: str | None = None
+    examples: Sequence[tuple[str, str]] = (), short_help: str | None = None, instead: str = ""
 ) -> Callable[[Declared], Command]:
     """Make a command of a function, named after it; its docstring is the help."""
 
@@ -152,6 +174,39 @@ def command(
             help=function.__doc__,
             short_help=short_help,
             examples=examples,
+            instead=instead,
         )
 
     return make
+
+
+def tell_idle(
+    ctx: click.Context,
+    idle: Iterable[tuple[Sequence[str], str]],
+    repeated: Sequence[str] = (),
+    *,
+    quiet: bool,
+) -> None:
+    """Say which options of the command line have no effect on this run.
+
+    Those of the environment and of --config are not told: they are there for many commands and runs.
+
+    Parameters
+    ----------
+    ctx : click.Context
+    idle : iterable of (names, reason)
+        Parameters that have no effect, and why.
+    repeated : sequence of str
+        Inputs that are named more than once.
+    quiet : bool
+        Whether nothing is said.
+    """
+    if quiet:
+        return
+    for name in repeated:
+        say(f"{name}: is named more than once; each of its files is taken once")
+    for names, reason in idle:
+        typed = [name for name in names if ctx.get_parameter_source(name) is ParameterSource.COMMANDLINE]
+        if typed:
+            flags = ", ".join(f"--{name.replace('_', '-')}" for name in typed)
+            say(f"{flags}: no effect here: {reason}")

@@ -4,7 +4,7 @@ from typing import Any
 
 import click
 
-from rollcli.cli.command import command, option, record
+from rollcli.cli.command import command, option, record, tell_idle
 from rollcli.cli.config import config_option
 from rollcli.cli.options import PATH, cluster_options, encoding_options, input_options, output_folder_option
 from rollcli.cli.types import Number
@@ -30,6 +30,7 @@ rotation_options = record(
         metavar="RESULT",
         help="The angle of each map, from what `rollcli estimate` wrote; matched by stem.",
     ),
+    option("--skip-suspect", is_flag=True, help="With --from, leave out the maps whose angle is suspect."),
     option("--expand", is_flag=True, help="Enlarge the maps so that their corners are kept."),
 )
 
@@ -55,8 +56,13 @@ def derotate(ctx: click.Context, /, **records: Any) -> None:
     data stays no data.
 
     With --from, every map needs its row and every row with an angle its map: what has no partner is an error
-    that names it, before anything is written.
+    that names it, before anything is written. Suspect angles are used, and a line says how many there are;
+    --skip-suspect leaves their maps out.
     """
     from rollcli.convert.derotate import run_derotate
+    from rollcli.convert.idle import idle_in_derotate
+    from rollcli.frames.idle import repeated_inputs
 
-    ctx.exit(run_derotate(DerotateOptions(**records)))
+    options = DerotateOptions(**records)
+    tell_idle(ctx, idle_in_derotate(options), repeated_inputs(options.inputs), quiet=options.running.quiet)
+    ctx.exit(run_derotate(options))

@@ -4,7 +4,7 @@ from typing import Any
 
 import click
 
-from rollcli.cli.command import command, option
+from rollcli.cli.command import command, option, tell_idle
 from rollcli.cli.config import config_option
 from rollcli.cli.options import (
     PATH,
@@ -25,7 +25,8 @@ from rollcli.convert.options import DisparityOptions
             "At half the size, as floating-point TIFF",
             "rollcli disparity --left 'im0*.png' --right 'im1*.png' --downscale 2 --save-as tiff -o maps/",
         ),
-    ]
+    ],
+    instead="images are given by --left and --right",
 )
 @pair_options
 @folder_options
@@ -49,5 +50,8 @@ def disparity(ctx: click.Context, /, **records: Any) -> None:
     is an error that names it, before anything runs.
     """
     from rollcli.convert.disparity import run_disparity
+    from rollcli.convert.idle import idle_in_disparity
 
-    ctx.exit(run_disparity(DisparityOptions(**records)))
+    options = DisparityOptions(**records)
+    tell_idle(ctx, idle_in_disparity(options), quiet=options.running.quiet)
+    ctx.exit(run_disparity(options))

@@ -6,7 +6,7 @@ import click
 
 from rollcli.batch.options import EstimateOptions, ResultOptions
 from rollcli.cli.calibration_options import calibration_options
-from rollcli.cli.command import command, option, record
+from rollcli.cli.command import command, option, record, tell_idle
 from rollcli.cli.config import config_option
 from rollcli.cli.options import (
     cluster_options,
@@ -120,6 +120,9 @@ def estimate(ctx: click.Context, /, **records: Any) -> None:
         running=options.running._replace(overwrite=overwrite),
     )
 
+    from rollcli.batch.idle import idle_in_estimate
     from rollcli.batch.run import run_estimate
+    from rollcli.frames.idle import repeated_inputs
 
+    tell_idle(ctx, idle_in_estimate(options), repeated_inputs(options.inputs), quiet=options.running.quiet)
     ctx.exit(run_estimate(options, resume_command=resume_command(ctx)))

@@ -5,7 +5,7 @@ from typing import Any
 import click
 
 from rollcli.cli.calibration_options import calibration_options
-from rollcli.cli.command import command, option, record
+from rollcli.cli.command import command, option, record, tell_idle
 from rollcli.cli.config import config_option
 from rollcli.cli.options import cluster_options, encoding_options, input_options, output_folder_option
 from rollcli.cli.types import Number
@@ -57,6 +57,10 @@ def vdisparity(ctx: click.Context, /, **records: Any) -> None:
     whereas `estimate --vdisparity` rotates it upright first. Where a road is found, its disparity along the
     middle column is drawn as a dashed curve: on a de-rotated map the road's pixels lie on it.
     """
+    from rollcli.convert.idle import idle_in_vdisparity
     from rollcli.convert.vdisparity import run_vdisparity
+    from rollcli.frames.idle import repeated_inputs
 
-    ctx.exit(run_vdisparity(VDisparityOptions(**records)))
+    options = VDisparityOptions(**records)
+    tell_idle(ctx, idle_in_vdisparity(options), repeated_inputs(options.inputs), quiet=options.running.quiet)
+    ctx.exit(run_vdisparity(options))

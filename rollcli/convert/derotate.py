@@ -12,8 +12,9 @@ from rollcli.files.naming import listed
 from rollcli.files.results import Row, read_result
 from rollcli.frames.find import map_frames
 from rollcli.frames.frame import Frame, FrameResult
-from rollcli.frames.options import FrameOptions
+from rollcli.frames.options import FrameOptions, RunningOptions
 from rollcli.frames.outputs import output_path
+from rollcli.messages import say
 
 
 def run_derotate(options: DerotateOptions) -> ExitStatus:
@@ -21,20 +22,48 @@ def run_derotate(options: DerotateOptions) -> ExitStatus:
     rotation, running = options.rotation, options.running
     if (rotation.roll_deg is None) == (rotation.result is None):
         raise UsageError("give either --roll, one angle for all maps, or --from, a result with one for each")
+    if rotation.skip_suspect and rotation.result is None:
+        raise UsageError("--skip-suspect needs --from: one angle for all maps is not doubted")
     frames = map_frames(options.inputs, skip=[options.output])
-    conversions = list(_conversions(frames, rotation, options.output))
+    conversions = list(_conversions(frames, options))
     read = FrameOptions(encoding=options.encoding, root=running.root, replaces=running.overwrite)
     do = partial(_derotate, options=read, expand=rotation.expand)
     return convert(conversions, do, options.output, running, options.encoding)
 
 
-def _conversions(frames: Sequence[Frame], rotation: RotationOptions, folder: str) -> Iterator[Conversion]:
-    rows = _rows_of(frames, rotation.result) if rotation.result is not None else [None] * len(frames)
+def _conversions(frames: Sequence[Frame], options: DerotateOptions) -> Iterator[Conversion]:
+    rotation = options.rotation
+    rows: Sequence[Row | None] = [None] * len(frames)
+    if rotation.result is not None:
+        rows = found = _rows_of(frames, rotation.result)
+        _tell_suspects(found, rotation, options.running)
     for frame, row in zip(frames, rows, strict=True):
+        if row is not None and row.status == "suspect" and rotation.skip_suspect:
+            continue
         roll_deg = rotation.roll_deg if row is None else row.roll_deg
         refused = "" if roll_deg is not None else f"has no angle in {rotation.result}"
-        writes = (output_path(frame, folder),)
+        writes = (output_path(frame, options.output),)
         yield Conversion(frame, writes, math.radians(roll_deg or 0.0), refused)
+
+
+def _tell_suspects(rows: Sequence[Row], rotation: RotationOptions, running: RunningOptions) -> None:
+    """Say how many angles are suspect, and whether they are used.
+
+    Raises
+    ------
+    UsageError
+        They are left out, and there are no others.
+    """
+    suspects = sum(row.status == "suspect" for row in rows)
+    if rotation.skip_suspect and suspects == len(rows):
+        raise UsageError(f"{rotation.result}: every angle is suspect: --skip-suspect leaves out all maps")
+    if not suspects or running.quiet:
+        return
+    of = f"{rotation.result}: {suspects} of {len(rows)} angles {'is' if suspects == 1 else 'are'} suspect"
+    if rotation.skip_suspect:
+        say(f"{of}; such maps are left out")
+    else:
+        say(f"{of} and used; --skip-suspect leaves such maps out")
 
 
 def _rows_of(frames: Sequence[Frame], result: str) -> list[Row]:

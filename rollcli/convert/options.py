@@ -15,6 +15,7 @@ class RotationOptions:
     roll_deg: float | None = None
     result: str | None = None
     expand: bool = False
+    skip_suspect: bool = False
 
 
 @dataclass(frozen=True)

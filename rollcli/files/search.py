@@ -13,6 +13,7 @@ from rollcli.files.stores.locations import base_name, is_object_url, is_url
 from rollcli.files.stores.search import is_folder_url, objects_behind
 
 _NOWHERE = (0, 0)
+_LOOKED_AT = 1000  # names of a folder without inputs, to say what it holds
 
 
 class Search:
@@ -81,8 +82,18 @@ class Search:
                 none = False
                 yield path, relative
         if none:
-            hint = "; --recursive searches its folders" if kind == "folder" and not self._recursive else ""
+            hint = "" if kind == "pattern" else self._in_place_of_inputs(argument)
             raise UsageError(f"{argument}: no input found in this {kind} ({' '.join(self._endings)}){hint}")
+
+    def _in_place_of_inputs(self, folder: str) -> str:
+        """Say what a folder without inputs holds instead."""
+        if is_url(folder):
+            return "" if self._recursive else "; --recursive searches its folders"
+        names = [entry.name for entry in _entries(folder) if not entry.name.startswith(".")]
+        endings = {Path(name).suffix.lower() for name in names[:_LOOKED_AT]} - {"", *self._endings}
+        hint = f"; it holds {' '.join(sorted(endings)[:3])} files" if endings else ""
+        inner = any(is_folder(Path(folder, name)) for name in names[:_LOOKED_AT])
+        return hint + ("; --recursive searches its folders" if inner and not self._recursive else "")
 
     def _in_folder(self, folder: Path) -> Iterator[tuple[str, str]]:
         """Yield readable files, except hidden ones."""

@@ -30,6 +30,8 @@ _TEXTURED, _EQUAL, _NOISE_STEP, _NOISE = 0.45, 0.3, 64, 0.1
 _DOWNWARD = 0.2
 _EVERY = 4  # rows and columns; enough for a median
 _WIDE = math.radians(5.0)  # how wide an interval may be where only the road counts
+_DEPTH_MAP = "like a depth map: give --encoding depth and its calibration, such as --calib FILE"
+_UPSIDE_DOWN = "upside down: reverse the order of its rows"
 
 
 def require_positive(stored: Stored, name: str) -> None:
@@ -105,10 +107,14 @@ def _likenesses(disparity: NDArray[Any], stored: Stored, options: FrameOptions) 
         yield "looks like a photograph, not a disparity map: give photographs by --left and --right"
     if _grows_downward(disparity):
         return
-    if options.encoding.encoding != Encoding.DEPTH and _has_road(_inverse(disparity), options):
-        yield "looks like a depth map: give --encoding depth, with --calib or --focal and --baseline"
-    if _has_road(disparity[::-1], options):
-        yield "looks upside down: reverse the order of its rows"
+    depth = options.encoding.encoding != Encoding.DEPTH and _has_road(_inverse(disparity), options)
+    reversed_rows = _has_road(disparity[::-1], options)
+    if depth and reversed_rows:  # roads of few bends and no noise
+        yield f"looks {_DEPTH_MAP}; or it is {_UPSIDE_DOWN}"
+    elif depth:
+        yield f"looks {_DEPTH_MAP}"
+    elif reversed_rows:
+        yield f"looks {_UPSIDE_DOWN}"
 
 
 def _is_photograph(values: NDArray[Any]) -> bool:

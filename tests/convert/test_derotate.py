@@ -254,3 +254,34 @@ def test_a_broken_map_costs_itself_alone(folder):
     assert done.status == 3
     assert "maps/frame2.png: is empty" in done.err
     assert len(contents(folder / "out")) == 3
+
+
+def make_suspect(folder, *names):
+    lines = (folder / "rolls.csv").read_text().splitlines(keepends=True)
+    doubted = [line.replace(",ok,", ",suspect,") if line.startswith(names) else line for line in lines]
+    (folder / "rolls.csv").write_text("".join(doubted))
+
+
+def test_suspect_angles_are_used_and_counted_or_their_maps_are_left_out(folder):
+    make_suspect(folder, "maps/frame1", "maps/frame3")
+    line = ("derotate", "maps", "--from", "rolls.csv")
+
+    used = rollcli(*line, "-o", "all", cwd=folder)
+    assert "rolls.csv: 2 of 4 angles are suspect and used; --skip-suspect leaves such maps out" in used.err
+    assert len(contents(folder / "all")) == 4
+
+    left_out = rollcli(*line, "-o", "sure", "--skip-suspect", cwd=folder)
+    assert "rolls.csv: 2 of 4 angles are suspect; such maps are left out" in left_out.err
+    assert (left_out.status, sorted(contents(folder / "sure"))) == (0, ["frame0.png", "frame2.png"])
+
+    quiet = rollcli(*line, "-o", "quiet", "-q", cwd=folder)
+    assert (quiet.status, quiet.err) == (0, "")
+
+
+def test_leaving_out_every_map_or_none_that_is_doubted_is_refused(folder):
+    one = rollcli("derotate", "maps", "--roll", "2", "--skip-suspect", "-o", "out", cwd=folder)
+    assert (one.status, "--skip-suspect needs --from" in one.err) == (2, True)
+    make_suspect(folder, "maps/")
+    every = rollcli("derotate", "maps", "--from", "rolls.csv", "--skip-suspect", "-o", "out", cwd=folder)
+    assert (every.status, "every angle is suspect" in every.err) == (2, True)
+    assert not (folder / "out").exists()

@@ -205,7 +205,7 @@ def test_pipes_and_folders_with_readable_endings_are_no_files(here):
 @pytest.mark.parametrize(
     ("inputs", "reason"),
     [
-        (["empty"], "empty: no input found in this folder .*; --recursive searches its folders"),
+        (["empty"], r"empty: no input found in this folder \(.*\)$"),
         (["empty/*.png"], r"empty/\*.png: no input found in this pattern"),
         (["f1.png", "none/**"], r"none/\*\*: no input found in this pattern"),
         (["-"], "no input found: the list is empty"),
@@ -440,3 +440,12 @@ def test_a_file_that_the_system_refuses_to_look_at_is_an_input_that_its_row_will
     monkeypatch.setattr(os, "stat", refuse)
 
     assert names(find_inputs(["maps"])) == ["maps/a.png", "maps/b.png"]
+
+
+def test_a_folder_without_inputs_says_what_it_holds_instead(here):
+    here("photos/1.jpg", "photos/2.JPG", "nested/inner/1.png")
+
+    with pytest.raises(UsageError, match=r"photos: no input found .*\); it holds \.jpg files$"):
+        find_inputs(["photos"])
+    with pytest.raises(UsageError, match=r"nested: no input found .*\); --recursive searches its folders$"):
+        find_inputs(["nested"])
