@@ -5,8 +5,7 @@ import shlex
 import numpy as np
 import pytest
 
-from rollcli.cli.main import main
-from tests.run_cli import road_map, write_kitti, write_pair
+from tests.run_cli import road_map, rollcli, write_kitti, write_pair
 
 
 @pytest.fixture(scope="module")
@@ -21,16 +20,12 @@ def folder(tmp_path_factory):
 
 
 @pytest.fixture
-def run(folder, monkeypatch, capsys):
-    """Run a command line in this process; return its status, its rows and what it tells of them."""
+def run(folder):
+    """Run a command line; return its status, its rows and what it tells of idle options."""
 
-    def run(*words):
-        monkeypatch.chdir(folder)
-        with pytest.raises(SystemExit) as ended:
-            main([*words, "-j1"], prog_name="rollcli")
-        captured = capsys.readouterr()
-        told = [line for line in captured.err.splitlines() if "no effect here" in line]
-        return ended.value.code, captured.out, told
+    def run(*words, **variables):
+        done = rollcli(*words, cwd=folder, **variables)
+        return done.status, done.out, [line for line in done.err.splitlines() if "no effect here" in line]
 
     return run
 
@@ -108,10 +103,8 @@ def test_options_of_one_reason_are_told_in_a_line(run):
     ]
 
 
-def test_the_environment_and_quiet_runs_are_told_nothing(run, monkeypatch):
-    monkeypatch.setenv("ROLLCLI_ESTIMATE_SGBM_MODE", "hh")
-    assert run("estimate", "maps")[2] == []
-    monkeypatch.delenv("ROLLCLI_ESTIMATE_SGBM_MODE")
+def test_the_environment_and_quiet_runs_are_told_nothing(run):
+    assert run("estimate", "maps", ROLLCLI_ESTIMATE_SGBM_MODE="hh")[2] == []
     assert run("estimate", "maps", "--sgbm-mode", "hh", "-q")[2] == []
 
 

@@ -1,0 +1,71 @@
+"""Typical mistakes of a new user, and the program's answer to each: the exact line, and the exit status."""
+
+import re
+import shlex
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from rollcli.files.encodings import read_disparity
+from rollcli.files.results import Row, format_header, format_row
+from tests.run_cli import ROOT, road_map, rollcli, write_kitti, write_pair
+
+SAMPLES = ROOT / "sample_data"
+TABLE = Path(__file__).with_name("mistakes.txt").read_text("utf-8")
+ANSWERS = re.findall(r"^\$ (.+)\n(\d+): (.+)$", TABLE, flags=re.MULTILINE)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """What a new user may have at hand."""
+    folder = tmp_path_factory.mktemp("mistakes")
+    for name in ("a", "b"):
+        write_kitti(folder / "maps" / f"{name}.png", road_map(0.02))
+    road = road_map(0.02)
+    photo = cv2.imread(str(SAMPLES / "left" / "frame_0001.png"))
+    cv2.imwrite(str(folder / "photo.png"), photo[..., 0])
+    cv2.imwrite(str(folder / "colour.png"), cv2.merge([photo[..., 0]] * 3))
+    cv2.imwrite(str(folder / "photo.jpg"), photo)
+    np.save(folder / "colour.npy", cv2.merge([photo[..., 0]] * 3))
+    street = read_disparity(SAMPLES / "maps" / "frame_0001.png")
+    depth = np.where(street > 0, 150 / np.where(street > 0, street, 1), 0)
+    np.save(folder / "depth.npy", depth.astype(np.float32))
+    cv2.imwrite(str(folder / "depth.png"), np.clip(np.rint(1000 * depth), 0, 65535).astype(np.uint16))
+    np.save(folder / "x16.npy", road * 16)
+    np.save(folder / "x256.npy", road * 256)
+    np.save(folder / "negative.npy", -road)
+    np.save(folder / "reversed.npy", street[::-1])
+    np.save(folder / "mask.npy", road > 0)
+    np.save(folder / "empty.npy", np.zeros((120, 160), np.float32))
+    cv2.imwrite(str(folder / "whole.png"), np.rint(road).astype(np.uint16))
+    (folder / "notes.txt").write_text("bring the camera\n")
+    (folder / "cut.png").write_bytes((folder / "maps" / "a.png").read_bytes()[:999])
+    (folder / "nothing").mkdir()
+    (folder / "photos").mkdir()
+    cv2.imwrite(str(folder / "photos" / "1.jpg"), photo)
+    for name in ("1.png", "2.png"):
+        write_pair(folder, name, road_map(0.05, width=320, height=160) / 2)
+    for side, names in (("cam_a", ("0001", "0003")), ("cam_b", ("0002", "0004"))):
+        (folder / side).mkdir()
+        for name, original in zip(names, ("1.png", "2.png"), strict=True):
+            source = folder / ("left" if side == "cam_a" else "right") / original
+            (folder / side / f"{name}.png").write_bytes(source.read_bytes())
+    cv2.imwrite(str(folder / "small.png"), np.zeros((60, 80), np.uint8))
+    rows = [Row("maps/a.png", status="ok", roll_deg=1.0), Row("maps/b.png", status="suspect", roll_deg=2.0)]
+    text = format_header("csv") + b"".join(format_row(row, "csv") for row in rows)
+    (folder / "rolls.csv").write_bytes(text)
+    (folder / "truth.csv").write_text("file,roll_deg\nz,1\n")
+    return folder
+
+
+@pytest.mark.parametrize(("line", "status", "answer"), ANSWERS, ids=[line for line, *_ in ANSWERS])
+def test_a_typical_mistake_gets_its_answer(folder, line, status, answer):
+    done = rollcli(*shlex.split(line)[1:], cwd=folder)
+    assert done.status == int(status)
+    assert f"rollcli: {answer}" in done.err.splitlines()
+
+
+def test_the_table_is_read_whole():
+    assert len(ANSWERS) == TABLE.count("\n$ ") >= 25
