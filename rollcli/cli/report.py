@@ -22,6 +22,7 @@ from rollcli.report.options import GALLERY, ReportOptions
             "rollcli estimate maps/ -o out/rolls.csv --derotated out/upright --vdisparity out/vdisparity\n"
             "rollcli report out/rolls.csv --images out -o out/rolls.html",
         ),
+        ("Its charts for slides, without a page", "rollcli report rolls.csv --svg slides --png slides"),
     ]
 )
 @argument("result", type=PATH)
@@ -30,7 +31,6 @@ from rollcli.report.options import GALLERY, ReportOptions
     "--output",
     type=OutputFile((".html", ".htm"), "a page (.html)"),
     metavar="FILE.html",
-    required=True,
     section="Page",
     help="Where the page goes (-: stdout).",
 )
@@ -50,6 +50,16 @@ from rollcli.report.options import GALLERY, ReportOptions
     section="Page",
     help="How many frames to show in pictures: the widest intervals, suspect ones, and some evenly spread.",
 )
+@option(
+    "--svg",
+    type=PATH,
+    metavar="DIR",
+    section="Charts for slides",
+    help="Write each chart of the page as an SVG: roll, histogram, and pitch and height where there are any.",
+)
+@option(
+    "--png", type=PATH, metavar="DIR", section="Charts for slides", help="The same as PNGs, 1920 pixels wide."
+)
 @running_options
 @config_option
 @click.pass_context
@@ -61,7 +71,7 @@ def report(ctx: click.Context, /, **options: Any) -> None:
     images. One file that opens from disk without a network.
 
     Inputs are looked for under the names that RESULT gives them, from here or from its folder. The page needs
-    the extra: pip install "rollcli[report]".
+    the extra: pip install "rollcli[report]". Charts alone (--svg, --png) do not.
     """
     from rollcli.report.run import run_report
 

@@ -57,6 +57,12 @@ def draw_v_disparity(
     return _with_margins(chart, top)
 
 
+def round_step(least: float) -> float:
+    """Return the next round number: 1, 2 or 5 times a power of ten."""
+    power = 10.0 ** math.floor(math.log10(least))
+    return next(each * power for each in (1, 2, 5, 10) if each * power >= least * (1 - 1e-9))
+
+
 def _shown(histogram: VDisparity) -> tuple[NDArray[np.int32], float]:
     """Return the counts of the range that is shown, at least `_MIN_WIDTH` columns wide, and its end, px."""
     counts, end = histogram.counts, histogram.max_disparity
@@ -104,8 +110,7 @@ def _with_margins(chart: NDArray[np.uint8], top: float) -> NDArray[np.uint8]:
 
 def _ticks(end: float, least_step: float) -> Iterator[float]:
     """Yield round numbers from 0 up to `end`, at least `least_step` apart: steps of 1, 2 or 5 times 10^n."""
-    power = 10.0 ** math.floor(math.log10(least_step))
-    step = next(each * power for each in (1, 2, 5, 10) if each * power >= least_step)
+    step = round_step(least_step)
     yield from (number * step for number in range(int(end / step) + 1) if number * step < end)
 
 

@@ -1,13 +1,13 @@
 """What the page of a report shows, ready to be printed by its template."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rollcli import __version__
 from rollcli.files.results import Result, Row
 from rollcli.report.charts.axis_range import outside
-from rollcli.report.charts.histogram import histogram
-from rollcli.report.charts.over_frames import charts_over_frames
+from rollcli.report.charts.chart import Chart
+from rollcli.report.drawing.still import with_still
 from rollcli.report.gallery import SPREAD, SUSPECT, WIDEST, Choice
 from rollcli.report.options import ReportOptions
 from rollcli.report.page import Rows, render_page
@@ -21,18 +21,23 @@ from rollcli.report.summary import (
     with_interval,
     written_at,
 )
-from rollcli.rig.assess import assess_rig
+from rollcli.rig.assess import RigAssessment
 from rollcli.rig.words import answer, counts, decimals, findings, now_in_words
 
 _FOLDERS = 6  # of inputs that the summary names
 _LISTED = 100  # doubtful frames on the page; the result has all
 
 
-def report_page(result: Result, options: ReportOptions, shown: Sequence[tuple[Choice, Pictures]]) -> bytes:
+def report_page(
+    result: Result,
+    options: ReportOptions,
+    shown: Sequence[tuple[Choice, Pictures]],
+    rig: RigAssessment,
+    charts: Mapping[str, Chart],
+) -> bytes:
     """Return the page, HTML, UTF-8."""
     rows, run, summary = result.rows, result.run or {}, summarize(result.rows)
-    rig, folders = assess_rig(rows), input_folders(rows)
-    roll_chart, *pose_charts = charts_over_frames(rows, rig)
+    folders = input_folders(rows)
     doubtful = sorted(
         ((number, row) for number, row in enumerate(rows, 1) if row.status != "ok"),
         key=lambda each: each[1].status,  # errors before suspects
@@ -54,13 +59,11 @@ def report_page(result: Result, options: ReportOptions, shown: Sequence[tuple[Ch
         written=written_at(options.result),
         options=option_lines(result.run),
         encodings=", ".join(map(str, run["encoding"])) if isinstance(run.get("encoding"), list) else "",
-        roll_chart=roll_chart,
+        charts={name: with_still(chart) for name, chart in charts.items()},
         answer=answer(rig.now()),
         now=now_in_words(rig),
         counts=counts(rig),
         findings=findings(rig) or ["Neither a jump nor a drift is seen."],
-        pose_charts=pose_charts,
-        histogram=histogram(rows) if summary.median is not None else None,
         outside=outside(rows),
         doubtful=doubtful[:_LISTED],
         more_doubtful=max(0, len(doubtful) - _LISTED),

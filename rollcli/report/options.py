@@ -1,6 +1,7 @@
 """What a report was asked to be; light, since the command line imports this to show its help."""
 
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from rollcli.frames.options import RunningOptions
 
@@ -9,11 +10,22 @@ GALLERY = 12
 
 @dataclass(frozen=True)
 class ReportOptions:
-    """Everything that `rollcli report` was asked; `gallery` is how many frames the gallery shows."""
+    """Everything that `rollcli report` was asked.
+
+    `output` is the page, `png` and `svg` are folders for its charts; `gallery` is how many frames the page
+    shows in pictures.
+    """
 
     result: str
-    output: str
+    output: str | None = None
+    png: str | None = None
+    svg: str | None = None
     images: str | None = None
     title: str | None = None
     gallery: int = GALLERY
     running: RunningOptions = field(default_factory=RunningOptions)
+
+    def chart_paths(self, name: str) -> dict[str, str]:
+        """Return where a chart is written, by format."""
+        folders = {"svg": self.svg, "png": self.png}
+        return {kind: str(Path(folder, f"{name}.{kind}")) for kind, folder in folders.items() if folder}

@@ -1,8 +1,9 @@
 """HTML pages with charts that open from disk without a network: what every page shares.
 
 A page extends `page.html` and puts `Chart` objects where it wants them. The styles and scripts of `x.html`
-are in `x.css` and `x.js` beside it. plotly (its script alone) and jinja2 are the extra `report` and
-are imported here only, when a page is made.
+are in `x.css` and `x.js` beside it. A page is shown before `page.js` runs plotly, which takes longer than all
+the rest. plotly (its script alone) and jinja2 are the extra `report` and are imported here only, when a page
+is made.
 """
 
 import base64
@@ -16,6 +17,7 @@ from typing import Any
 
 from rollcli.errors import UsageError
 from rollcli.report.charts.chart import script_json
+from rollcli.report.drawing.colours import style_sheet
 
 _NEEDED = ("plotly", "jinja2")
 # plotly adds a style sheet for geographic maps unless an element has its id; the policy would refuse it aloud
@@ -78,17 +80,17 @@ def render_page(package: str, template: str, *more: str, **values: Any) -> bytes
         lstrip_blocks=True,
     )
     stem = template.removesuffix(".html")
-    styles = [*_texts("rollcli.report", "page.css"), *_texts(package, f"{stem}.css")]
+    styles = [style_sheet(), *_texts("rollcli.report", "page.css"), *_texts(package, f"{stem}.css")]
     plotly = get_plotlyjs()
     scripts = [
-        plotly,
         *_texts("rollcli.report", "page.js"),
         *(text for name in (stem, *more) for text in _texts(package, f"{name}.js")),
     ]
     page = environment.get_template(template).render(
         styles=map(Markup, styles),
         scripts=map(Markup, scripts),
-        policy=_policy(styles, scripts),
+        plotly=Markup(plotly),
+        policy=_policy(styles, [*scripts, plotly]),
         unused_styles=_STYLE_OF_MAPS.findall(plotly),
         **values,
     )

@@ -1,4 +1,4 @@
-"""`rollcli report`: a result to one HTML page."""
+"""`rollcli report`: a result to one HTML page, and its charts to files for slides."""
 
 import contextlib
 from collections.abc import Sequence
@@ -6,7 +6,8 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from rollcli.batch.run_record import recorded_options
-from rollcli.errors import ExitStatus, InputError
+from rollcli.errors import ExitStatus, InputError, UsageError
+from rollcli.files.naming import listed
 from rollcli.files.results import Result, read_result, run_path
 from rollcli.files.stream import is_stream, write_output
 from rollcli.frames.checks import check_writes, list_files
@@ -16,6 +17,7 @@ from rollcli.parallel.in_order import Work
 from rollcli.parallel.interrupt import stop_on_signals
 from rollcli.parallel.run_tasks import run_tasks
 from rollcli.parallel.workers import Workers
+from rollcli.report.charts.names import chart_names
 from rollcli.report.gallery import Choice, choose
 from rollcli.report.options import ReportOptions
 from rollcli.report.page import require_extra
@@ -29,7 +31,7 @@ _REASONS = 3  # how many are told
 
 
 def run_report(options: ReportOptions) -> ExitStatus:
-    """Write the page.
+    """Write the page and the charts that are asked for.
 
     Parameters
     ----------
@@ -47,24 +49,38 @@ def run_report(options: ReportOptions) -> ExitStatus:
     OutputError
         Exit status 1.
     """
-    require_extra("report")
+    if options.output is None:
+        _require_charts_alone(options)
+    else:
+        require_extra("report")
     result = read_result(options.result)
     if not result.rows:
         raise InputError(f"{options.result}: has no rows: there is nothing to report")
     recorded = recorded_options(result.run, run_path(options.result))
-    chosen = choose(result.rows, options.gallery)
+    chosen = choose(result.rows, options.gallery if options.output is not None else 0)
     rows = [result.rows[each.place] for each in chosen]
     found = subjects(rows, options.result, options.images, recorded.images)
     reads = [
         options.result,
         *(path for each in found for path in (*each.frame.reads(), *each.images.values())),
     ]
-    writes = [] if is_stream(options.output) else [options.output]
+    page = [] if options.output is None or is_stream(options.output) else [options.output]
+    charts = [path for name in chart_names(result.rows) for path in options.chart_paths(name).values()]
+    writes = [*charts, *page]
     check_writes(reads, writes, overwrite=options.running.overwrite)
     if options.running.dry_run:
         list_files([(reads, writes)])
         return ExitStatus.DONE
     return _write(options, result, chosen, found, recorded)
+
+
+def _require_charts_alone(options: ReportOptions) -> None:
+    """Refuse to write nothing, and what is for a page alone."""
+    if options.png is None and options.svg is None:
+        raise UsageError("nothing to write: name a page with -o, or a folder for charts with --svg or --png")
+    if options.images is not None or options.title is not None:
+        name = "--title" if options.images is None else "--images"
+        raise UsageError(f"{name} is for a page: name one with -o")
 
 
 def _write(
@@ -74,14 +90,26 @@ def _write(
     found: Sequence[Subject],
     recorded: FrameOptions,
 ) -> ExitStatus:
+    from rollcli.report.chart_files import chart_files
+    from rollcli.report.charts.all_charts import all_charts
     from rollcli.report.content import report_page
+    from rollcli.rig.assess import assess_rig
 
     progress = Progress(len(found), options.running, EncodingOptions())
     pictures = _take(found, recorded, options.running.jobs)
     if len(pictures) < len(found):
         progress.say("interrupted; nothing is written")
         return ExitStatus.INTERRUPTED
-    page = report_page(result, options, list(zip(chosen, pictures, strict=True)))
+    rig = assess_rig(result.rows)
+    charts = all_charts(result.rows, rig)
+    files = chart_files(charts, options)
+    for path, data in files.items():
+        write_output(path, data)
+    if files:
+        progress.note(f"{listed(list(files))}: written")
+    if options.output is None:
+        return ExitStatus.DONE
+    page = report_page(result, options, list(zip(chosen, pictures, strict=True)), rig, charts)
     write_output(options.output, page)
     missing = [each.missing for each in pictures if each.empty]
     for reason in missing[:_REASONS]:

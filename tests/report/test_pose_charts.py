@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rollcli.report.charts.over_frames import charts_over_frames
+from rollcli.report.charts.all_charts import all_charts
 from rollcli.rig.assess import assess_rig
 from tests.report.results import row
 
@@ -24,7 +24,8 @@ ROWS = [
 
 
 def pose_charts(rows, rig=None):
-    return charts_over_frames(rows, rig)[1:]
+    """The charts between the first, of the roll, and the last, the histogram."""
+    return list(all_charts(rows, rig).values())[1:-1]
 
 
 def traces(chart):
@@ -32,7 +33,8 @@ def traces(chart):
 
 
 def test_without_a_calibration_there_are_no_charts():
-    assert pose_charts([row("a.png", 1.0, 0.1), row("b.png", None)]) == []
+    assert list(all_charts([row("a.png", 1.0, 0.1), row("b.png", None)])) == ["roll", "histogram"]
+    assert list(all_charts([row("b.png", None)])) == ["roll"]
 
 
 def test_a_pitch_without_a_height_is_one_chart():

@@ -153,7 +153,7 @@ def test_only_the_pages_own_scripts_and_styles_are_active_and_nothing_is_request
     assert rules["default-src"] == ["'none'"]
     assert rules["img-src"] == ["data:", "blob:"]
     for kind in ("script", "style"):
-        inline = re.findall(rf"<{kind}(?: id=\S+)?>(.*?)</{kind}>", text, re.S)
+        inline = re.findall(rf'<{kind}(?: type="text/plain")?(?: id=\S+)?>(.*?)</{kind}>', text, re.S)
         digests = [base64.b64encode(hashlib.sha256(each.encode()).digest()).decode() for each in inline]
         assert set(rules[f"{kind}-src"]) == {f"'sha256-{digest}'" for digest in digests}
     assert not re.search(r"<[^>]+ (style|on\w+)=", re.sub(r"<script.*?</script>", "", text, flags=re.S))
@@ -324,6 +324,41 @@ def test_without_the_extra_it_says_what_to_install(monkeypatch):
     monkeypatch.setattr(page, "_NEEDED", ("jinja2", "no_such_package"))
     with pytest.raises(UsageError, match=r'report needs no_such_package: pip install "rollcli\[report\]"'):
         page.require_extra("report")
+
+
+def test_charts_are_written_for_slides_with_or_without_a_page(folder):
+    alone = rollcli("report", "out/rolls.csv", "--svg", "slides", "--png", "slides", cwd=folder)
+    assert (alone.status, alone.out) == (0, "")
+    written = contents(folder / "slides")
+    assert sorted(written) == ["histogram.png", "histogram.svg", "roll.png", "roll.svg"]
+
+    again = rollcli("report", "out/rolls.csv", "--svg", "slides", cwd=folder)
+    assert (again.status, "slides/roll.svg: exists already" in again.err) == (2, True)
+    assert report(folder, "out/rolls.csv", "--svg", "slides", "--overwrite").status == 0
+    assert contents(folder / "slides") == written
+    assert (folder / "page.html").exists()
+
+    (folder / "nothing").write_text("")
+    assert rollcli("report", "out/rolls.csv", "--png", "nothing", cwd=folder).status == 1
+
+
+def test_a_dry_run_names_the_charts(folder):
+    done = rollcli("report", "out/rolls.csv", "--png", "slides", "--dry-run", cwd=folder)
+    assert done.out.splitlines()[1:] == ["write slides/roll.png", "write slides/histogram.png"]
+    assert not (folder / "slides").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ([], "nothing to write: name a page with -o"),
+        (["--png", "slides", "--title", "x"], "--title is for a page"),
+        (["--svg", "slides", "--images", "out"], "--images is for a page"),
+    ],
+)
+def test_what_would_do_nothing_is_refused(folder, arguments, words):
+    done = rollcli("report", "out/rolls.csv", *arguments, cwd=folder)
+    assert (done.status, words in done.err) == (2, True)
 
 
 def test_a_result_from_a_pipe_and_a_page_to_one(folder):

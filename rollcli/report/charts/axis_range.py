@@ -6,7 +6,7 @@ from rollcli.files.results import Row
 from rollcli.report.charts.values import Value, values_of
 from rollcli.rig.quantities import HEIGHT, ROLL, Quantity
 
-_BEYOND = 0.75  # a suspect value may widen the view by this share of the others' range
+_BEYOND = 0.35  # a suspect value may widen the view by this share of the others' range, and by half a degree
 _WIDEST = 1.0  # degrees: a wider interval is seen to leave the view
 _DEGREE_IN_METRES = 0.1  # what of a height is as much as a degree of an angle
 
@@ -30,7 +30,8 @@ def view(rows: Sequence[Row], quantity: Quantity = ROLL) -> tuple[float, float]:
         return -unit, unit
     low, high = _span([each for each in there if each.row.status == "ok"] or there, unit)
     beyond = _BEYOND * (high - low) + 0.5 * unit
-    low, high = _span((each for each in there if low - beyond <= (each.value or 0.0) <= high + beyond), unit)
+    near = [value for each in there if low - beyond <= (value := each.value or 0.0) <= high + beyond]
+    low, high = min(low, *near), max(high, *near)  # without their intervals, which are wide
     margin = 0.06 * (high - low) + 0.05 * unit
     return round(low - margin, 3), round(high + margin, 3)
 

@@ -22,19 +22,23 @@ class Chart:
         colours, such as "@c1", "@ok" or "@muted": these follow light and dark mode.
     layout : mapping
         Titles, ranges, kinds of axes; fonts, margins and colours are the page's.
+    still : str
+        HTML that shows it until plotly has drawn it, or where no script runs.
     """
 
     name: str
     label: str
     data: Sequence[Mapping[str, Any]]
     layout: Mapping[str, Any] = field(default_factory=dict)
+    still: str = ""
 
     def __html__(self) -> str:
         """Return the chart's place and its content."""
         content = script_json({"data": self.data, "layout": self.layout})
         name = html.escape(self.name)
+        label = html.escape(self.label)
         return (
-            f'<div class="chart" id="{name}" role="img" aria-label="{html.escape(self.label)}"></div>'
+            f'<div class="chart" id="{name}" role="img" aria-label="{label}">{self.still}</div>'
             f'<script type="application/json" data-chart="{name}">{content}</script>'
         )
 

@@ -9,14 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.files.results import Row
+from rollcli.imaging.vdisparity_picture import round_step
 from rollcli.report.charts.axis_range import view
 from rollcli.report.charts.chart import Chart
+from rollcli.report.charts.names import HISTOGRAM
 from rollcli.report.summary import degrees
 
 _MOST_BINS = 40
 _NARROWEST = 0.01  # degrees
 _FEW = 6
-_ROUND = (1, 2, 2.5, 5, 10)
 
 
 def histogram(rows: Sequence[Row]) -> Chart:
@@ -24,7 +25,7 @@ def histogram(rows: Sequence[Row]) -> Chart:
     low, high = view(rows)
     shown = [row.roll_deg for row in rows if row.roll_deg is not None and low <= row.roll_deg <= high]
     low, high = min(shown, default=low), max(shown, default=high)
-    step = _step(max((high - low) / _bins(len(shown)), _NARROWEST))
+    step = round_step(max((high - low) / _bins(len(shown)), _NARROWEST))
     edges = np.arange(math.floor(low / step), math.floor(high / step) + 2) * step
     spans = [f"{degrees(start, 3)} to {degrees(end, 3)}" for start, end in pairwise(edges.tolist())]
     data = []
@@ -46,9 +47,9 @@ def histogram(rows: Sequence[Row]) -> Chart:
         "barmode": "stack",
         "showlegend": [trace["name"] for trace in data] != ["ok"],
         "xaxis": {"title": {"text": "roll, degrees"}, "range": _padded(edges, step), "zeroline": False},
-        "yaxis": {"title": {"text": "frames"}, "rangemode": "tozero", **_whole_ticks(shown, edges)},
+        "yaxis": {"title": {"text": "frames"}, **_counted(int(np.histogram(shown, edges)[0].max()))},
     }
-    return Chart("histogram", "How many frames have which roll", data, layout)
+    return Chart(HISTOGRAM, "How many frames have which roll", data, layout)
 
 
 def _bins(count: int) -> int:
@@ -56,10 +57,9 @@ def _bins(count: int) -> int:
     return min(_MOST_BINS, max(5, math.ceil(2 * math.sqrt(count))))
 
 
-def _whole_ticks(rolls: Sequence[float], edges: NDArray[Any]) -> dict[str, Any]:
-    """Put ticks at whole frames where bars are low: there are no half frames."""
-    highest = int(np.histogram(rolls, edges)[0].max())
-    return {"dtick": 1} if highest <= _FEW else {}
+def _counted(highest: int) -> dict[str, Any]:
+    """Let the axis begin at nothing, with ticks at whole frames where bars are low."""
+    return {"range": [0, 1.05 * max(highest, 1)], **({"dtick": 1} if highest <= _FEW else {})}
 
 
 def _padded(edges: NDArray[Any], step: float) -> list[float]:
@@ -67,9 +67,3 @@ def _padded(edges: NDArray[Any], step: float) -> list[float]:
     width = float(np.ptp(edges))
     margin = max(0.02 * width, (_FEW * step - width) / 2)
     return [float(edges[0]) - margin, float(edges[-1]) + margin]
-
-
-def _step(least: float) -> float:
-    """Return the next round number: 1, 2, 2.5 or 5 times a power of ten."""
-    power = 10.0 ** math.floor(math.log10(least))
-    return next(each * power for each in _ROUND if each * power >= least * (1 - 1e-9))

@@ -11,7 +11,7 @@ from rollcli.report.charts.labels import label
 from rollcli.report.charts.rig_traces import drive_starts, rig_traces
 from rollcli.report.charts.values import Value, in_words, values_of
 from rollcli.rig.assess import RigAssessment
-from rollcli.rig.quantities import QUANTITIES, ROLL, Quantity
+from rollcli.rig.quantities import ROLL, Quantity
 
 _MANY = 400  # up to so many frames each has a dot, and marks are large
 _FEW = 10
@@ -22,15 +22,6 @@ _VALUES = ("x", "y", "customdata")
 
 Values = Sequence[Value]
 Trace = dict[str, Any]
-
-
-def charts_over_frames(rows: Sequence[Row], rig: RigAssessment | None = None) -> list[Chart]:
-    """Return the chart of the roll, and those of pitch and height where a calibration has given them."""
-    return [
-        chart_over_frames(rows, quantity, rig)
-        for quantity in QUANTITIES
-        if quantity is ROLL or any(getattr(row, quantity.column) is not None for row in rows)
-    ]
 
 
 def chart_over_frames(

@@ -91,9 +91,9 @@
   box.addEventListener("scroll", () => requestAnimationFrame(draw));
   window.addEventListener("resize", draw);
   window.addEventListener("hashchange", follow);
-  document.querySelectorAll(".chart").forEach(chart => chart.on?.("plotly_click", event => {
+  document.addEventListener("drawn", ({ target }) => target.on("plotly_click", event => {
     const point = event.points.find(each => each.customdata && rows[each.x - 1]);
-    if (point && chart.id !== "histogram") open(point.x - 1);
+    if (point && target.id !== "histogram") open(point.x - 1);
   }));
   arrange();
   follow();

@@ -26,15 +26,32 @@
       };
     return page;
   };
-  const draw = () => document.querySelectorAll("[data-chart]").forEach(script => {
-    const name = script.dataset.chart, chart = coloured(JSON.parse(script.textContent));
+  const draw = script => {
+    const name = script.dataset.chart, chart = coloured(JSON.parse(script.textContent)), place = document.getElementById(name);
     Plotly.react(name, chart.data, styled(chart.layout), {
       responsive: true, displaylogo: false, displayModeBar: narrow ? false : "hover",
       // named one by one: of its own accord plotly offers to upload the chart
       modeBarButtons: [["toImage"], ["zoom2d", "pan2d"], ["zoomIn2d", "zoomOut2d", "resetScale2d"]], plotlyServerURL: "",
       toImageButtonOptions: { filename: name, scale: 2 },
     });
-  });
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
-  draw();
+    place.querySelectorAll(":scope > .still").forEach(each => each.remove());
+  };
+  const charts = [...document.querySelectorAll("[data-chart]")];
+  // one thing at a time, so that the page answers in between
+  const later = work => (window.requestIdleCallback ?? setTimeout)(work, { timeout: 200 });
+  const next = () => {
+    const script = charts.find(each => !each.drawn);
+    if (!script) return;
+    script.drawn = true;
+    draw(script);
+    document.getElementById(script.dataset.chart).dispatchEvent(new Event("drawn", { bubbles: true }));
+    later(next);
+  };
+  const start = () => {
+    const text = document.getElementById("plotly").textContent;
+    document.head.append(Object.assign(document.createElement("script"), { textContent: text }));
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => charts.forEach(draw));
+    later(next);
+  };
+  addEventListener("load", () => requestAnimationFrame(() => later(start)));
 })();
