@@ -1,7 +1,6 @@
 """What a report was asked to be; light, since the command line imports this to show its help."""
 
 from dataclasses import dataclass, field
-from pathlib import Path
 
 from rollcli.frames.options import RunningOptions
 
@@ -28,4 +27,4 @@ class ReportOptions:
     def chart_paths(self, name: str) -> dict[str, str]:
         """Return where a chart is written, by format."""
         folders = {"svg": self.svg, "png": self.png}
-        return {kind: str(Path(folder, f"{name}.{kind}")) for kind, folder in folders.items() if folder}
+        return {kind: f"{folder.rstrip('/')}/{name}.{kind}" for kind, folder in folders.items() if folder}
