@@ -105,12 +105,12 @@ def pairs(tmp_path, made):
     return shutil.copytree(made, tmp_path, dirs_exist_ok=True)  # keeps the times of files
 
 
-def make(folder):
+def make(folder, target="rolls.html"):
     variables = environment()
     for inherited in ("MAKEFLAGS", "MAKELEVEL", "MFLAGS"):  # of the make that runs the tests
         variables.pop(inherited, None)
     variables["PATH"] = f"{folder / 'bin'}:{variables['PATH']}"
-    line = ["make", "-j", "2", "rolls.html"]
+    line = ["make", "-j", "2", target]
     return subprocess.run(
         line, cwd=folder, env=variables, capture_output=True, text=True, timeout=120, check=False
     )

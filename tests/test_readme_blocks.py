@@ -1,0 +1,204 @@
+"""Every block of the README does what it says: here, or in the test that is named beside it."""
+
+import re
+import shlex
+import shutil
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from tests.run_cli import ROOT, contents, road_map, rollcli, rollcli_process, write_kitti
+from tests.test_readme import README, made, make, needs_make  # noqa: F401 (a fixture)
+
+BLOCKS = [text for _, text in re.findall(r"^```(\w*)\n(.*?)^```", README, flags=re.M | re.S)]
+SAMPLES = ROOT / "sample_data"
+ELSEWHERE = {
+    "rollcli estimate sample_data/maps": "test_readme: the first run prints what it shows",
+    "rollcli: sample_data/maps/frame_0001.png": "test_readme: the first run prints what it shows",
+    "file,right_file,status": "test_readme: the first run prints what it shows",
+    "LEFT := $(wildcard left/*.png)": "test_readme: its makefile makes a page from pairs",
+    ">>> import math": "test_examples: the README's session in Python holds",
+}
+NOT_RUN = {
+    "pipx install": "needs the package index; CI's build installs the program, and `make run` is run by hand",
+    "@": "a citation",
+}
+
+
+def block(start):
+    """The one block that starts like this."""
+    (found,) = (each for each in BLOCKS if each.lstrip("#! ").startswith(start))
+    return found
+
+
+def run_block(start, cwd, **replaced):
+    """Run each line of a block; text is replaced where the block is too large for a test."""
+    text = block(start)
+    for old, new in replaced.items():
+        assert old in text, old
+        text = text.replace(old, new)
+    done = []
+    for line in text.splitlines():
+        program, *words = shlex.split(line, comments=True)
+        assert program == "rollcli"
+        done.append(rollcli(*words, cwd=cwd))
+        assert done[-1].status == 0, (line, done[-1].err)
+    return done
+
+
+def maps(folder, *names):
+    """Copy maps of the samples, all by default."""
+    shutil.copytree(
+        SAMPLES / "maps", folder, ignore=lambda _, found: set(found) - set(names) if names else set()
+    )
+
+
+def views(folder, left, right):
+    """Copy two pairs of the samples."""
+    for side, name in (("left", left), ("right", right)):
+        (folder / name).mkdir()
+        for number in (1, 2):
+            shutil.copy(SAMPLES / side / f"frame_000{number}.png", folder / name)
+    shutil.copy(SAMPLES / "calib.txt", folder)
+
+
+def estimated(folder, name="rolls.csv"):
+    """Estimate `maps`, copied if it is not there."""
+    if not (folder / "maps").is_dir():
+        maps(folder / "maps")
+    assert rollcli("estimate", "maps", "-o", name, "-q", cwd=folder).status == 0
+
+
+def test_the_page_is_made_from_a_result_and_from_what_make_run_wrote(tmp_path):
+    pytest.importorskip("plotly", reason="plotly, of the extra report, is not here")
+    maps(tmp_path / "sample_data" / "maps")
+    assert rollcli("estimate", "sample_data/maps", "-o", "rolls.csv", cwd=tmp_path).status == 0
+    (line,) = re.findall(r"^\t\$\(BIN\)/rollcli (.*)", (ROOT / "Makefile").read_text(), flags=re.M)
+    assert rollcli(*shlex.split(line), cwd=tmp_path).status == 0
+    run_block("rollcli report rolls.csv", tmp_path)
+    for page in ("rolls.html", "out.html"):
+        assert "frame_0004.npy" in (tmp_path / page).read_text("utf-8")
+
+
+def test_a_folder_of_kitti_pngs(tmp_path):
+    maps(tmp_path / "training" / "disp_occ_0", "frame_0001.png", "frame_0002.png")
+    run_block("rollcli estimate training/disp_occ_0", tmp_path)
+    assert sorted(contents(tmp_path / "upright")) == ["frame_0001.png", "frame_0002.png"]
+    assert (tmp_path / "rolls.csv").read_text().count(",ok,") == 2
+
+
+def test_two_folders_of_images(tmp_path):
+    views(tmp_path, "image_2", "image_3")
+    run_block("rollcli estimate --left image_2", tmp_path)
+    assert sorted(contents(tmp_path / "maps")) == ["frame_0001.png", "frame_0002.png"]
+    assert (tmp_path / "rolls.csv").read_text().count("image_3/frame_000") == 2
+
+
+def test_npy_maps_with_a_mask(tmp_path):
+    maps(tmp_path / "run7" / "morning", "frame_0004.npy")
+    bonnet = np.full((360, 480), 255, np.uint8)
+    bonnet[330:] = 0
+    cv2.imwrite(str(tmp_path / "bonnet.png"), bonnet)
+    run_block("rollcli estimate 'run7/**/*.npy'", tmp_path)
+    assert (tmp_path / "rolls.csv").read_text().count("run7/morning/frame_0004.npy,,ok,-3.9") == 1
+
+
+def test_derotation_by_a_result_and_by_one_angle_and_then_v_disparity(tmp_path):
+    estimated(tmp_path)
+    run_block("rollcli derotate maps --from", tmp_path)
+    assert contents(tmp_path / "level").keys() == contents(tmp_path / "maps").keys()
+    assert contents(tmp_path / "whole").keys() == contents(tmp_path / "maps").keys()
+    run_block("rollcli vdisparity level", tmp_path)
+    stems = [f"frame_000{number}" for number in range(1, 6)]
+    assert sorted(contents(tmp_path / "vdisparity")) == [
+        f"{stem}{ending}" for stem in stems for ending in (".png", ".tif")
+    ]
+
+
+def test_pitch_and_height(tmp_path):
+    views(tmp_path, "image_0", "image_1")
+    run_block("rollcli estimate --left image_0", tmp_path)
+    header, *rows = (line.split(",") for line in (tmp_path / "pose.csv").read_text().splitlines())
+    assert all(row[header.index(name)] for row in rows for name in ("pitch_deg", "height_m"))
+
+
+def test_the_check_in_ci_passes_a_rig_that_holds_and_fails_one_that_does_not(tmp_path):
+    for index in range(40):
+        write_kitti(tmp_path / "calibration" / "maps" / f"{index}.png", road_map(0.001, seed=index))
+    *_, passed = run_block("rollcli estimate calibration/maps", tmp_path)
+    assert "ok" in passed.out
+    gate = shlex.split(block("rollcli estimate calibration/maps").splitlines()[1])[1:]
+    loose = rollcli(*("2" if word == "0" else word for word in gate), cwd=tmp_path)
+    assert loose.status == 4
+
+
+def test_what_the_result_says_of_the_rig(tmp_path):
+    for name in ("rolls.csv", "before.csv", "after.csv"):
+        estimated(tmp_path, name)
+    alone, against = run_block("rollcli rig rolls.csv", tmp_path)
+    assert "roll" in alone.out
+    assert "roll" in against.out
+
+
+@needs_make
+def test_the_rule_of_a_makefile_accepts_frames_without_an_angle(tmp_path, made):  # noqa: F811
+    maps(tmp_path / "maps", "frame_0001.png", "frame_0002.png")
+    (tmp_path / "maps" / "frame_0003.png").write_bytes(b"no map")
+    shutil.copytree(made / "bin", tmp_path / "bin")
+    (tmp_path / "Makefile").write_text(block("rolls.csv: $(wildcard maps/*.png)"))
+    done = make(tmp_path, "rolls.csv")
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "rolls.csv").read_text().count(",ok,") == 2
+
+
+def test_a_long_run_continues_to_the_same_bytes(tmp_path):
+    maps(tmp_path / "maps")
+    line = block("rollcli estimate maps -o rolls.csv --derotated").replace(" --resume", "")
+    assert rollcli(*shlex.split(line)[1:], cwd=tmp_path).status == 0
+    whole = contents(tmp_path)
+    rows = (tmp_path / "rolls.csv").read_bytes().splitlines(keepends=True)
+    (tmp_path / "rolls.csv").write_bytes(b"".join(rows[:-2]) + rows[-2][:20])
+    run_block("rollcli estimate maps -o rolls.csv --derotated", tmp_path)
+    assert contents(tmp_path) == whole
+
+
+def test_a_bucket(tmp_path, store, monkeypatch):
+    for name, value in store.items():
+        monkeypatch.setenv(name, value)
+    from rollcli.files.storage import list_names, write_bytes
+
+    pytest.importorskip("pyarrow", reason="pyarrow, of the extra parquet, is not here")
+    there = f"s3://maps/{tmp_path.name}"
+    write_bytes(f"{there}/run7/frame_0001.png", (SAMPLES / "maps" / "frame_0001.png").read_bytes())
+    words = shlex.split(block("rollcli estimate s3://").replace("s3://drives", there))[1:]
+    done = rollcli_process(*words, cwd=tmp_path)
+    assert done.status == 0, done.err
+    assert list(list_names(f"{there}/run7-level")) == ["frame_0001.png"]
+    assert [name for name in list_names(f"{there}/run7.parquet") if name.endswith(".parquet")]
+
+
+def test_a_simulation_of_the_rig_of_fewer_and_smaller_frames(tmp_path):
+    smaller = {
+        "--frames 200": "--frames 2",
+        "--size 1280x720": "--size 320x180",
+        "--focal 700": "--focal 175",
+    }
+    *_, accuracy = run_block("rollcli simulate rig", tmp_path, **smaller)
+    assert re.search(r"frames compared +2\n", accuracy.out)
+
+
+def test_every_block_is_run_or_says_why_not():
+    here = set(re.findall(r'block\(\s*"([^"]+)"', Path(__file__).read_text("utf-8")))
+    for starts in BLOCKS:
+        known = [each for each in (*here, *ELSEWHERE, *NOT_RUN) if starts.startswith(each)]
+        assert len(known) == 1, starts
+
+
+def test_the_programs_of_the_project_that_it_names_are_there():
+    for module in re.findall(r"`python -m (tests[.\w]+)", README):
+        assert (ROOT / f"{module.replace('.', '/')}.py").is_file()
+    scripts = re.findall(r"`python (tests/[\w/]+\.py)", README)
+    assert scripts
+    assert [each for each in scripts if not (ROOT / each).is_file()] == []
