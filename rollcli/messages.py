@@ -3,9 +3,14 @@
 import contextlib
 import io
 import os
+import re
 import sys
 from pathlib import Path
 from typing import Any
+
+_ADDRESS = re.compile(r"(https?://)(?:[^\s/?#@]*@)?([^\s?#'\"]*)(?:[?#][^\s'\"]*)?", re.IGNORECASE)
+_NAMES = "x-amz-[a-z-]+|x-goog-[a-z-]+|sig|signature|awsaccesskeyid|googleaccessid|key-pair-id|policy|token"
+_SIGNATURE = re.compile(rf"[?&](?:{_NAMES})=[^\s&'\"]*()", re.IGNORECASE)  # of a URL with a space before it
 
 
 def say(message: str) -> None:
@@ -13,7 +18,12 @@ def say(message: str) -> None:
 
     Control characters are escaped: a file name must neither forge a line nor command the terminal.
     """
-    sys.stderr.write(f"rollcli: {printable(message)}\n")
+    sys.stderr.write(f"rollcli: {printable(without_secrets(message))}\n")
+
+
+def without_secrets(text: str) -> str:
+    """Leave out the passwords and the queries of web addresses, and signatures wherever they are."""
+    return _SIGNATURE.sub(r"\1", _ADDRESS.sub(r"\1\2", text))
 
 
 def printable(text: str) -> str:

@@ -10,7 +10,12 @@ from rollcli.files.results import Format, run_path
 from rollcli.files.stores.locations import is_url
 from rollcli.files.stream import is_stream
 from rollcli.frames.calibration import calibration_files, check_depth, check_first_size
-from rollcli.frames.checks import check_inputs_are_kept, check_nothing_is_there, check_one_owner
+from rollcli.frames.checks import (
+    check_inputs_are_kept,
+    check_nothing_is_there,
+    check_one_owner,
+    check_places,
+)
 from rollcli.frames.find import map_frames, pair_frames
 from rollcli.frames.frame import Frame
 from rollcli.frames.outputs import every_path
@@ -53,6 +58,7 @@ def make_plan(options: EstimateOptions) -> Plan:
     reads += calibration_files(options.calibration)
     check_inputs_are_kept(reads, chain(results, _images(frames, options)))
     frames = frames[part - 1 :: parts]
+    check_places(frames, [folder for _, folder in options.images.folders()])
     check_first_size(frames, options.frame)
     if not (options.running.overwrite or options.result.resume):
         check_images_are_new(frames, options)

@@ -15,6 +15,7 @@ from rollcli.batch.plan import Plan
 from rollcli.errors import InputError
 from rollcli.files.results import run_path
 from rollcli.files.storage import write_bytes
+from rollcli.files.stores.locations import public_name
 from rollcli.frames.frame import Frame
 from rollcli.frames.options import EncodingOptions, FrameOptions, ImageOptions, MethodOptions, RegionOptions
 from rollcli.imaging.stereo_options import StereoOptions
@@ -109,7 +110,12 @@ def _effective(plan: Plan, options: EstimateOptions) -> dict[str, Any]:
         **({"part-rows": options.result.part_rows} if plan.in_parts else {}),
         "shard": "/".join(map(str, options.result.shard)),
     }
-    return {_OPTION_NAMES.get(key, key).replace("_", "-"): value for key, value in values.items()}
+    return {_OPTION_NAMES.get(key, key).replace("_", "-"): _public(value) for key, value in values.items()}
+
+
+def _public(value: Any) -> Any:
+    """Return the value of an option without the signature of a URL."""
+    return public_name(value) if isinstance(value, str) else value
 
 
 def _by_name(options: Options) -> dict[str, Any]:

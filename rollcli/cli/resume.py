@@ -8,6 +8,8 @@ from pathlib import Path
 import click
 from click.core import ParameterSource
 
+from rollcli.messages import without_secrets
+
 _STARTS = ("--overwrite", "--resume")
 _NEAREST_FIRST = [ParameterSource.COMMANDLINE, ParameterSource.ENVIRONMENT, ParameterSource.DEFAULT_MAP]
 
@@ -39,7 +41,10 @@ def resume_command(ctx: click.Context) -> str:
     end = words.index("--") if "--" in words else len(words)
     options = [word for word in words[:end] if word not in _STARTS]
     line = [_program(), *options, *_from_environment(ctx), "--resume", *words[end:]]
-    return shlex.join(line) + ("  # with the same list on stdin" if _reads_stdin(ctx) else "")
+    shown = [without_secrets(word) for word in line]
+    hints = ["with the same list on stdin"] if _reads_stdin(ctx) else []
+    hints += ["with the signed addresses"] if shown != line else []
+    return shlex.join(shown) + ("  # " + " and ".join(hints) if hints else "")
 
 
 def _program() -> str:

@@ -8,7 +8,7 @@ from functools import partial
 from rollcli.errors import ExitStatus
 from rollcli.files.atomic import remove_leftovers
 from rollcli.files.stores.turns import tasks_in_hand
-from rollcli.frames.checks import check_one_owner, check_writes, list_files
+from rollcli.frames.checks import check_one_owner, check_places, check_writes, list_files
 from rollcli.frames.frame import Frame, FrameResult, failed_frame
 from rollcli.frames.options import EncodingOptions, RunningOptions
 from rollcli.frames.outputs import write_outputs
@@ -69,7 +69,7 @@ def convert(
     UsageError, OutputError, ClusterError, WorkerError
         The run cannot start or cannot go on.
     """
-    _check(conversions, overwrite=running.overwrite)
+    _check(conversions, folder, overwrite=running.overwrite)
     if running.dry_run:
         list_files((each.frame.reads(), each.writes) for each in conversions)
         return ExitStatus.DONE
@@ -111,10 +111,11 @@ def _results(
             remove_leftovers(path for each in conversions for path in each.writes)
 
 
-def _check(conversions: Sequence[Conversion], *, overwrite: bool) -> None:
+def _check(conversions: Sequence[Conversion], folder: str, *, overwrite: bool) -> None:
     writes = [path for each in conversions for path in each.writes]
     check_one_owner((each.frame, each.writes) for each in conversions)
     reads = [path for each in conversions for path in each.frame.reads()]
+    check_places([each.frame for each in conversions], [folder])
     check_writes(reads, writes, overwrite=overwrite)
 
 

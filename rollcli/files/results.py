@@ -13,7 +13,7 @@ from rollcli.errors import InputError
 from rollcli.files.codecs.parquet import MAGIC, decode_parquet
 from rollcli.files.codecs.row_text import csv_rows, json_rows
 from rollcli.files.storage import exists, list_names, read_bytes
-from rollcli.files.stores.locations import is_url
+from rollcli.files.stores.locations import is_url, is_web_url
 from rollcli.files.stores.parts import part_names, read_parts
 
 Format = Literal["csv", "jsonl", "parquet"]
@@ -195,9 +195,9 @@ def run_path(path: str | Path) -> str:
 
 
 def read_run(path: str | Path) -> Mapping[str, Any] | None:
-    """Read the record of the run that wrote the result `path`; None when there is none."""
+    """Read the record of the run that wrote the result `path`; None when there is none, as on the web."""
     record = run_path(path)
-    if not exists(record):
+    if is_web_url(record) or not exists(record):
         return None
     try:
         data = _read(record)

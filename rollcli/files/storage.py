@@ -14,8 +14,10 @@ from rollcli.files.atomic import NameTakenError, output_error, write_atomic
 from rollcli.files.stores.locations import WEB_SERVERS, is_url, public_name, scheme_of
 from rollcli.files.stores.objects import (
     create_object,
+    folder_problem,
     list_objects,
     object_exists,
+    object_problem,
     object_time_ns,
     read_object,
     remove_object,
@@ -23,6 +25,7 @@ from rollcli.files.stores.objects import (
 )
 
 _MAX_BYTES = 2**32
+_READ_ONLY = "web servers are read from, not written to"
 _AT_ONCE = 16  # requests, of 50 ms each: 10,000 small objects take half a minute
 
 
@@ -72,6 +75,32 @@ def _read_url(location: str) -> bytes:
 
         return read_web_file(location)
     return read_object(location)
+
+
+def read_problem(url: str) -> str:
+    """Say what keeps an object or a web file from being read, and probably others; empty where nothing does.
+
+    Raises
+    ------
+    UsageError
+        The scheme is not supported, or an extra is missing.
+    """
+    if scheme_of(url) in WEB_SERVERS:
+        from rollcli.files.stores.web import web_problem
+
+        return web_problem(url)
+    return object_problem(url)
+
+
+def write_problem(folder: str) -> str:
+    """Say what keeps everything below a URL from being written; empty where nothing is known to.
+
+    Raises
+    ------
+    UsageError
+        The scheme is not supported, or an extra is missing.
+    """
+    return _READ_ONLY if scheme_of(folder) in WEB_SERVERS else folder_problem(folder)
 
 
 def write_bytes(location: str, data: bytes, *, durable: bool = False) -> None:
@@ -245,4 +274,4 @@ def _read_file(path: str, name: str) -> bytes:
 
 def _require_writable(url: str) -> None:
     if scheme_of(url) in WEB_SERVERS:
-        raise OutputError(f"{public_name(url)}: web servers are read from, not written to")
+        raise OutputError(f"{public_name(url)}: {_READ_ONLY}")

@@ -8,8 +8,9 @@ from pathlib import Path
 from unicodedata import normalize
 
 from rollcli.errors import UsageError
+from rollcli.files import storage
 from rollcli.files.existence import is_folder
-from rollcli.files.stores.locations import is_object_url, split_url
+from rollcli.files.stores.locations import is_object_url, is_url, public_name, split_url
 from rollcli.files.stores.objects import list_objects
 from rollcli.files.stream import write_stdout
 from rollcli.frames.frame import Frame
@@ -48,6 +49,27 @@ def _written_twice(path: str, first: str, second: str) -> str:
         f"{first} and {second} would both write {path}; run them apart, or name their common folder with "
         "--recursive"
     )
+
+
+def check_places(frames: Sequence[Frame], folders: Iterable[str] = ()) -> None:
+    """Ask each store about a file or two, and about each folder that is written to, before any work.
+
+    Raises
+    ------
+    UsageError
+        The bucket does not exist or is elsewhere, the keys are wrong or have expired, or the like.
+    """
+    asked: dict[str, list[str]] = {}
+    for path in dict.fromkeys(path for frame in (*frames[:1], *frames[-1:]) for path in frame.reads()):
+        if is_url(path):
+            asked.setdefault("/".join(path.split("/", 3)[:3]), []).append(path)
+    for paths in asked.values():
+        problems = [storage.read_problem(path) for path in paths]
+        if all(problems):
+            raise UsageError(f"{public_name(paths[0])}: cannot be read: {problems[0]}")
+    for folder in filter(is_url, folders):
+        if problem := storage.write_problem(folder):
+            raise UsageError(f"{public_name(folder)}: cannot be written to: {problem}")
 
 
 def check_writes(reads: Sequence[str], writes: Sequence[str], *, overwrite: bool) -> None:
@@ -114,8 +136,8 @@ def list_files(frames: Iterable[tuple[Iterable[str], Iterable[str]]]) -> None:
     """Print what would be read and written, a line each; `frames` holds (reads, writes)."""
     lines: list[str] = []
     for reads, writes in frames:
-        lines += [f"read  {path}\n" for path in reads]
-        lines += [f"write {path}\n" for path in writes]
+        lines += [f"read  {public_name(path)}\n" for path in reads]
+        lines += [f"write {public_name(path)}\n" for path in writes]
     write_stdout("".join(lines).encode("utf-8", "surrogateescape"))
 
 

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from rollcli.files.results import Row
+from rollcli.messages import without_secrets
 from rollcli.rig.calibration import Calibration
 
 
@@ -68,7 +69,9 @@ _LEFT, _RIGHT = "left image: ", "right image: "  # what a message calls the file
 
 def failed_frame(frame: Frame, reason: str) -> FrameResult:
     """Make the `error` row of a frame; its message is one line that does not repeat the names of the row."""
-    message, left, right = (" ".join(text.split()) for text in (reason, frame.file, frame.right_file))
+    message, left, right = (
+        " ".join(text.split()) for text in (without_secrets(reason), frame.file, frame.right_file)
+    )
     if right and message.startswith(f"{right}: "):
         message = _RIGHT + message.removeprefix(f"{right}: ")
     elif message.startswith(f"{left}: "):

@@ -5,6 +5,7 @@ from typing import Any
 
 from rollcli import __version__
 from rollcli.files.results import Result, Row
+from rollcli.files.stores.locations import public_name
 from rollcli.report.charts.axis_range import outside
 from rollcli.report.charts.chart import Chart
 from rollcli.report.drawing.still import with_still
@@ -47,7 +48,7 @@ def report_page(
         "report.html",
         "frames",
         title=options.title or f"Roll of {frame_count(len(rows))}",
-        result=options.result,
+        result=public_name(options.result),
         version=run.get("rollcli"),
         page_version=__version__,
         summary=summary,

@@ -8,6 +8,7 @@ from rollcli.errors import InputError, OutputError, UsageError
 from rollcli.files import storage
 from rollcli.files.stores.locations import public_name
 from rollcli.files.stores.objects import list_objects
+from rollcli.messages import without_secrets
 
 
 @pytest.fixture(params=["local", "s3"])
@@ -132,5 +133,10 @@ def test_web_servers_are_read_only():
 
 def test_signatures_and_passwords_are_not_shown():
     assert public_name("https://me:pw@host:8/a b.png?X-Amz-Signature=1#2") == "https://host:8/a b.png"
+    assert public_name("https://host?a=1/b") == "https://host"
+    assert public_name("https://[x?sig=1") == "https://[x"
     assert public_name("s3://bucket/what?.png") == "s3://bucket/what?.png"
+    assert public_name("s3://key:secret@bucket/a@b.png") == "s3://bucket/a@b.png"
+    line = "--mask='https://me:pw@h/a b.png?X-Amz-Signature=1&x=2' https://h/c.png?sig=3: is no image"
+    assert without_secrets(line) == "--mask='https://h/a b.png&x=2' https://h/c.png is no image"
     assert public_name("C:/maps/x.png") == "C:/maps/x.png"

@@ -3,12 +3,13 @@
 import posixpath
 import re
 from pathlib import Path
-from urllib.parse import unquote, urlsplit, urlunsplit
+from urllib.parse import unquote, urlsplit
 
 from rollcli.errors import UsageError
 
 OBJECT_STORES = ("s3", "gs", "az")
 WEB_SERVERS = ("http", "https")
+_QUERY = re.compile("[?#]")
 _SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]+)://")  # two letters or more: "c:/" is a drive of Windows
 
 
@@ -20,6 +21,11 @@ def is_url(location: str) -> bool:
 def is_object_url(location: str) -> bool:
     """Return whether a location is a URL of an object store, whose objects can be listed and written."""
     return is_url(location) and scheme_of(location) in OBJECT_STORES
+
+
+def is_web_url(location: str) -> bool:
+    """Return whether a location is a URL of a web server, which has single files to read."""
+    return is_url(location) and scheme_of(location) in WEB_SERVERS
 
 
 def scheme_of(url: str) -> str:
@@ -49,6 +55,8 @@ def split_url(url: str) -> tuple[str, str]:
     scheme = scheme_of(url)
     rest = url[len(scheme) + 3 :]
     bucket, _, key = rest.partition("/")
+    if "@" in bucket:
+        raise UsageError(f"{public_name(url)}: keys go into the environment, not into a URL")
     if not bucket:
         raise UsageError(f"{public_name(url)}: names no bucket; write {scheme}://bucket/prefix")
     return f"{scheme}://{bucket}", key
@@ -58,11 +66,11 @@ def public_name(location: str) -> str:
     """Return a location as messages, rows and records show it: without passwords and signatures."""
     if not is_url(location):
         return location
-    if location.lower().startswith(tuple(f"{each}://" for each in OBJECT_STORES)):
-        return location  # their keys may hold "?" and "@", and their URLs hold no secrets
-    parts = urlsplit(location)
-    host = parts.netloc.rpartition("@")[2]
-    return urlunsplit((parts.scheme, host, parts.path, "", ""))
+    scheme, _, rest = location.partition("://")
+    if scheme.lower() not in OBJECT_STORES:  # whose keys may hold "?" and "#"
+        rest = _QUERY.split(rest, maxsplit=1)[0]
+    host, slash, path = rest.partition("/")
+    return f"{scheme}://{host.rpartition('@')[2]}{slash}{path}"
 
 
 def located(root: str, location: str) -> str:

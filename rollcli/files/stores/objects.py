@@ -5,7 +5,6 @@ stores here when it first needs them.
 """
 
 import os
-import re
 import time
 from collections.abc import Callable, Iterator
 from datetime import timedelta
@@ -14,6 +13,7 @@ from typing import Any, TypeVar
 
 from rollcli.errors import InputError, OutputError, UsageError
 from rollcli.files.stores.locations import public_name, split_url
+from rollcli.files.stores.reasons import DENIED, TIMEOUT_VARIABLE, holds_for_all, reason_of, what_is_missing
 from rollcli.files.stores.turns import wait_for_room, waiting_for_network
 
 Value = TypeVar("Value")
@@ -26,7 +26,6 @@ _PAGE = 1000
 _TRIES = 4  # by this module: a body that is cut in the middle, and a creation whose answer is lost
 _FIRST_PAUSE_S = 0.2
 _OWNER = "rollcli-run"  # attribute of an object that was created rather than replaced
-TIMEOUT_VARIABLE = "ROLLCLI_STORE_TIMEOUT"  # seconds a request may take
 
 
 def read_object(url: str) -> bytes:
@@ -53,9 +52,9 @@ def read_object(url: str) -> bytes:
         with waiting_for_network():
             return _repeated(fetch)
     except FileNotFoundError as error:
-        raise InputError(f"{public_name(url)}: {_missing(error)}") from None
+        raise InputError(f"{public_name(url)}: {what_is_missing(error)}") from None
     except _store_errors() as error:
-        raise InputError(f"{public_name(url)}: cannot be read: {_reason(error)}") from None
+        raise InputError(f"{public_name(url)}: cannot be read: {reason_of(error)}") from None
 
 
 def write_object(url: str, data: bytes) -> None:
@@ -102,8 +101,48 @@ def object_time_ns(url: str) -> int:
     except FileNotFoundError:
         return 0
     except _store_errors() as error:
-        raise InputError(f"{public_name(url)}: cannot be read: {_reason(error)}") from None
+        raise InputError(f"{public_name(url)}: cannot be read: {reason_of(error)}") from None
     return (int(found["last_modified"].timestamp()) + 1) * 1_000_000_000 - 1
+
+
+def object_problem(url: str) -> str:
+    """Say what keeps an object from being read, and probably others; empty where nothing does.
+
+    Raises
+    ------
+    UsageError
+        The extra `storage` is not installed, or the store's settings are wrong.
+    """
+    store, key = _open(url)
+    try:
+        store.get_range(key, start=0, length=1)
+    except FileNotFoundError as error:
+        reason = what_is_missing(error)
+    except _store_errors() as error:
+        reason = reason_of(error)
+    else:
+        return ""
+    return reason if holds_for_all(reason) or reason == DENIED else ""
+
+
+def folder_problem(url: str) -> str:
+    """Say what keeps everything below a prefix from being written; empty where nothing is known to.
+
+    Raises
+    ------
+    UsageError
+        The extra `storage` is not installed, or the store's settings are wrong.
+    """
+    store, prefix = _open(url)
+    try:
+        next(iter(store.list(prefix.rstrip("/") or None, chunk_size=1)), None)
+    except FileNotFoundError as error:
+        reason = what_is_missing(error)
+    except _store_errors() as error:
+        reason = reason_of(error)
+    else:
+        return ""
+    return reason if holds_for_all(reason) else ""
 
 
 def remove_object(url: str) -> None:
@@ -121,7 +160,7 @@ def remove_object(url: str) -> None:
     except FileNotFoundError:
         return
     except _store_errors() as error:
-        raise OutputError(f"{public_name(url)}: cannot be removed: {_reason(error)}") from None
+        raise OutputError(f"{public_name(url)}: cannot be removed: {reason_of(error)}") from None
 
 
 def list_objects(url: str) -> Iterator[tuple[str, int]]:
@@ -143,9 +182,9 @@ def list_objects(url: str) -> Iterator[tuple[str, int]]:
         for found in _listed(store, prefix.rstrip("/") or None):
             yield f"{root}/{found['path']}", found["size"]
     except FileNotFoundError as error:
-        raise UsageError(f"{public_name(url)}: {_missing(error)}") from None
+        raise UsageError(f"{public_name(url)}: {what_is_missing(error)}") from None
     except _store_errors() as error:
-        raise UsageError(f"{public_name(url)}: cannot be listed: {_reason(error)}") from None
+        raise UsageError(f"{public_name(url)}: cannot be listed: {reason_of(error)}") from None
 
 
 def _listed(store: Any, prefix: str | None) -> Iterator[Any]:
@@ -178,9 +217,9 @@ def _put(url: str, data: bytes, mode: str, attributes: dict[str, str] | None = N
     except AlreadyExistsError:
         raise
     except FileNotFoundError as error:
-        raise OutputError(f"{public_name(url)}: {_missing(error)}") from None
+        raise OutputError(f"{public_name(url)}: {what_is_missing(error)}") from None
     except _store_errors() as error:
-        raise OutputError(f"{public_name(url)}: cannot be written: {_reason(error)}") from None
+        raise OutputError(f"{public_name(url)}: cannot be written: {reason_of(error)}") from None
 
 
 def _repeated(fetch: Callable[[], Value]) -> Value:
@@ -220,7 +259,7 @@ def _store(root: str, process: int) -> Any:
     try:
         return from_url(root, client_options=client, retry_config=retry)  # type: ignore[call-overload]
     except (BaseError, ValueError) as error:
-        raise UsageError(f"{root}: cannot be opened: {_reason(error)}") from None
+        raise UsageError(f"{root}: cannot be opened: {reason_of(error)}") from None
 
 
 def _request_seconds() -> float:
@@ -238,44 +277,3 @@ def _store_errors() -> tuple[type[Exception], ...]:
     from obstore.exceptions import BaseError
 
     return (BaseError, OSError, RuntimeError)
-
-
-_CODES = {
-    "NoSuchBucket": "there is no such bucket",
-    "AccessDenied": "access is denied; check the rights of these keys",
-    "InvalidAccessKeyId": "the access key is unknown; check AWS_ACCESS_KEY_ID",
-    "SignatureDoesNotMatch": "the secret key is wrong; check AWS_SECRET_ACCESS_KEY",
-    "ExpiredToken": "the keys have expired; fetch new ones",
-    "RequestTimeTooSkewed": "this machine's clock differs from the store's; set it",
-    "PermanentRedirect": "the bucket is in another region; set AWS_REGION",
-    "AuthorizationHeaderMalformed": "the bucket is in another region; set AWS_REGION",
-    "IllegalLocationConstraintException": "the bucket is in another region; set AWS_REGION",
-}
-_STATUS = re.compile(r"non-2xx status code: (\d+)")
-
-
-def _reason(error: Exception) -> str:
-    """Say in one line what a store objects to, without addresses, keys or signatures."""
-    text = str(error)
-    for code, meaning in _CODES.items():
-        if f"<Code>{code}</Code>" in text:
-            return meaning
-    if "169.254.169.254" in text or "metadata" in text.lower():
-        return "no keys are given; set AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, or the store's own"
-    if "301 Moved Permanently" in text or "redirect" in text.lower():
-        return "the bucket is in another region; set AWS_REGION"
-    if "MissingAccount" in text:
-        return "no account is given; set AZURE_STORAGE_ACCOUNT_NAME"
-    status = _STATUS.search(text)
-    if status:
-        meanings = {"401": "the keys are not accepted", "403": "access is denied; check the keys and rights"}
-        return meanings.get(status[1], f"the store answered {status[1]}")
-    if "kind: Timeout" in text:
-        return f"the store takes too long; {TIMEOUT_VARIABLE} sets the seconds it may take"
-    if "error sending request" in text or "onnect" in text:
-        return "the store does not answer; check the network and the endpoint"
-    return "the answer of the store was cut short" if "body" in text else "the store refused the request"
-
-
-def _missing(error: Exception) -> str:
-    return _CODES["NoSuchBucket"] if "NoSuchBucket" in str(error) else "there is no such object"

@@ -15,6 +15,10 @@ _FIRST_PAUSE_S = 0.2
 _LARGEST = 2**32
 
 
+class _TooLargeError(OSError):
+    """A file of more bytes than are read."""
+
+
 def read_web_file(url: str) -> bytes:
     """Return the bytes behind an http or https URL.
 
@@ -30,11 +34,25 @@ def read_web_file(url: str) -> bytes:
         except urllib.error.HTTPError as error:
             reason, final = f"the server answered {error.code} {error.reason}", error.code < 500
         except (OSError, http.client.HTTPException, ValueError) as error:
-            reason, final = _reason(error), isinstance(error, ValueError)
+            reason, final = _reason(error), isinstance(error, (_TooLargeError, ValueError))
         if final:
             break
         time.sleep(_FIRST_PAUSE_S * 4**attempt)
     raise InputError(f"{public_name(url)}: cannot be read: {reason}")
+
+
+def web_problem(url: str) -> str:
+    """Say why a server refuses a file that it may have; empty where it does not refuse it."""
+    request = urllib.request.Request(url, headers={"Range": "bytes=0-0"})
+    try:
+        urllib.request.urlopen(request, timeout=_TIMEOUT_S).close()
+    except urllib.error.HTTPError as error:
+        if error.code in (400, 401, 403):  # Amazon answers 400 when temporary keys have expired
+            answer = f"the server answered {error.code} {error.reason}"
+            return f"{answer}; the signature of the URL may have expired"
+    except (OSError, http.client.HTTPException, ValueError):
+        pass  # reading it says what is wrong
+    return ""
 
 
 def _fetched(url: str) -> bytes:
@@ -42,7 +60,7 @@ def _fetched(url: str) -> bytes:
         wait_for_room(answer.length or 0)
         data: bytes = answer.read(_LARGEST + 1)
     if len(data) > _LARGEST:
-        raise ValueError("it has more bytes than any disparity map")
+        raise _TooLargeError
     return data
 
 
@@ -53,6 +71,8 @@ def _reason(error: Exception) -> str:
         return "the answer of the server was cut short"
     if isinstance(error, urllib.error.URLError):
         return "the server does not answer"
-    return (
-        str(error) if isinstance(error, ValueError) else "the server does not answer as one of the web does"
-    )
+    if isinstance(error, _TooLargeError):
+        return "it has more bytes than any disparity map"
+    if isinstance(error, ValueError):
+        return "this is no address"  # what Python says of it would show its password or its signature
+    return "the server does not answer as one of the web does"

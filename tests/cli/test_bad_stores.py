@@ -1,0 +1,179 @@
+"""What is wrong with a store, its keys or an address is one line before any work, and shows no secret."""
+
+import functools
+import http.server
+import json
+import threading
+
+import pytest
+
+from tests.run_cli import contents, road_map, rollcli, write_kitti, write_maps
+from tests.store_proxy import PASS, answer, proxied
+
+SECRET = "c0ffee5ec2e7"
+SIGNED = f"?X-Amz-Credential={SECRET}&X-Amz-Signature={SECRET}"
+
+
+@pytest.fixture
+def bucket(store, tmp_path, monkeypatch):
+    """Two maps in a bucket and on disk, below a prefix of this test's own."""
+    for name, value in store.items():
+        monkeypatch.setenv(name, value)
+    from rollcli.files.storage import write_bytes
+
+    write_maps(tmp_path / "maps", 2)
+    for name, data in contents(tmp_path / "maps").items():
+        write_bytes(f"s3://maps/{tmp_path.name}/maps/{name}", data)
+    return f"s3://maps/{tmp_path.name}"
+
+
+ANSWERS = {
+    "no rights": (answer("403 Forbidden", "AccessDenied"), "access is denied; check the rights"),
+    "another region": (answer("301 Moved Permanently", "PermanentRedirect"), "set AWS_REGION"),
+    "a malformed region": (answer("400 Bad Request", "AuthorizationHeaderMalformed"), "set AWS_REGION"),
+    "expired keys": (answer("400 Bad Request", "ExpiredToken"), "the keys have expired; fetch new ones"),
+    "an unknown key": (answer("403 Forbidden", "InvalidAccessKeyId"), "check AWS_ACCESS_KEY_ID"),
+    "a wrong key": (answer("403 Forbidden", "SignatureDoesNotMatch"), "check AWS_SECRET_ACCESS_KEY"),
+}
+PLACES = {
+    "a folder in": ["estimate", "@/maps/"],
+    "a file in": ["estimate", "@/maps/frame0.png", "-o", "rolls.csv"],
+    "a result out": ["estimate", "maps", "-o", "@/rolls.csv"],
+}
+
+
+@pytest.mark.parametrize(
+    ("what", "place"),
+    [
+        *((what, "a file in") for what in ANSWERS),
+        ("another region", "a folder in"),
+        ("no rights", "a folder in"),
+        ("expired keys", "a result out"),
+    ],
+)
+def test_what_a_store_objects_to_is_said_before_any_work(bucket, store, tmp_path, what, place):
+    reply, said = ANSWERS[what]
+    before = contents(tmp_path)
+    with proxied(store["AWS_ENDPOINT_URL"], lambda *_: reply) as address:
+        variables = {"AWS_ENDPOINT_URL": address, "AWS_SECRET_ACCESS_KEY": SECRET}
+        done = rollcli(*(word.replace("@", bucket) for word in PLACES[place]), cwd=tmp_path, **variables)
+    assert (done.status, done.err.count("\n")) == (2, 1), done.err
+    assert said in done.err
+    assert SECRET not in done.err
+    assert contents(tmp_path) == before
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "said"),
+    [
+        (["estimate", "s3://nowhere/a.png"], 2, "there is no such bucket"),
+        (["estimate", "maps", "--derotated", "s3://nowhere/up", "--overwrite"], 2, "there is no such bucket"),
+        (["derotate", "maps", "--roll", "1", "-o", "s3://nowhere/up"], 2, "there is no such bucket"),
+        (["estimate", "maps", "--derotated", "https://host/up"], 2, "web servers are read from"),
+        (["estimate", "maps", "-o", "https://host/rolls.csv"], 1, "web servers are read from"),
+        (["estimate", "maps", "-o", "ftp://host/rolls.csv"], 2, "ftp:// is not supported; use s3://"),
+        (["estimate", "maps", "--mask", "gopher://host/mask.png"], 2, "gopher:// is not supported"),
+        (["estimate", "maps", "--calib", "hdfs://host/calib.txt"], 2, "hdfs:// is not supported"),
+        (["estimate", f"s3://me:{SECRET}@maps/a.png"], 2, "keys go into the environment"),
+        (["rig", "s3://maps/none.csv"], 2, "there is no such object"),
+    ],
+)
+def test_a_wrong_address_is_one_line_before_any_work(bucket, tmp_path, words, status, said):
+    before = contents(tmp_path)
+    done = rollcli(*words, cwd=tmp_path)
+    assert (done.status, done.err.count("\n")) == (status, 1), done.err
+    assert said in done.err
+    assert SECRET not in done.err
+    assert contents(tmp_path) == before
+
+
+@pytest.mark.parametrize("place", ["s3://maps/a.png", "s3://maps/"])
+def test_a_missing_extra_is_named_with_the_line_that_installs_it(tmp_path, place):
+    (tmp_path / "without").mkdir()
+    (tmp_path / "without" / "obstore.py").write_text("raise ImportError('not here')\n")
+    from tests.run_cli import ROOT
+
+    path = f"{tmp_path / 'without'}:{ROOT}"
+    done = rollcli("estimate", place, cwd=tmp_path, PYTHONPATH=path)
+    assert (done.status, done.err.count("\n")) == (2, 1)
+    assert "pip install 'rollcli[storage]'" in done.err
+
+
+def test_an_object_that_may_not_be_read_costs_its_row_alone(bucket, store, tmp_path):
+    def treat(method, target):
+        denied = "frame1.png" in target and method == "GET"
+        return answer("403 Forbidden", "AccessDenied") if denied else PASS
+
+    with proxied(store["AWS_ENDPOINT_URL"], treat) as address:
+        done = rollcli("estimate", f"{bucket}/maps/", cwd=tmp_path, AWS_ENDPOINT_URL=address)
+    assert done.status == 3
+    assert [line.split(",")[2] for line in done.out.splitlines()[1:]] == ["ok", "error"]
+    assert "access is denied" in done.out
+
+
+@pytest.fixture
+def web(tmp_path):
+    """The address of a web server over a folder; what is called `expired` it refuses, as a store does."""
+    (tmp_path / "web").mkdir()
+
+    class Handler(http.server.SimpleHTTPRequestHandler):
+        """Takes signed addresses, and says nothing of them."""
+
+        def do_GET(self):
+            """Answer."""
+            if "expired" in self.path:
+                self.send_error(403)
+            else:
+                super().do_GET()
+
+        def log_message(self, *_):
+            """Keep quiet."""
+
+    handler = functools.partial(Handler, directory=str(tmp_path / "web"))
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        yield f"http://127.0.0.1:{server.server_port}"
+        server.shutdown()
+        thread.join()
+
+
+def test_a_signed_address_works_and_is_shown_nowhere(web, tmp_path):
+    write_kitti(tmp_path / "web" / "map 1.png", road_map(0.1))
+    write_kitti(tmp_path / "web" / "mask.png", road_map())
+    (tmp_path / "web" / "broken.png").write_bytes(b"no map")
+    maps = [f"{web}/{name}.png{SIGNED}" for name in ("map%201", "broken", "none")]
+    line = (
+        "estimate",
+        *maps,
+        "--mask",
+        f"{web}/mask.png{SIGNED}",
+        "-o",
+        "rolls.csv",
+        "--derotated",
+        "up",
+        "-v",
+    )
+    listed = rollcli(*line, "--dry-run", cwd=tmp_path)
+    done = rollcli(*line, cwd=tmp_path)
+    assert done.status == 3
+    assert (tmp_path / "rolls.csv").read_text().count(",error,") == 2
+    (tmp_path / "web" / "rolls.csv").write_bytes((tmp_path / "rolls.csv").read_bytes())
+    shown = rollcli("rig", f"{web}/rolls.csv{SIGNED}", cwd=tmp_path)
+    assert shown.status == 0, shown.err
+    nothing = rollcli("rig", f"{web}/none.csv{SIGNED}", cwd=tmp_path)
+    assert "the server answered 404" in nothing.err
+    said = [each for ended in (listed, done, shown, nothing) for each in (ended.out, ended.err)]
+    written = [name + data.decode("latin-1") for name, data in contents(tmp_path).items()]
+    assert SECRET not in "".join([*said, *written])
+    assert f"read  {web}/broken.png\n" in listed.out
+    assert json.loads((tmp_path / "rolls.csv.run.json").read_bytes())["options"]["mask"] == f"{web}/mask.png"
+
+
+def test_a_signature_that_has_expired_is_said_before_any_work(web, tmp_path):
+    done = rollcli("estimate", f"{web}/expired.png{SIGNED}", "-o", "rolls.csv", cwd=tmp_path)
+    assert (done.status, done.err.count("\n")) == (2, 1)
+    assert "the server answered 403" in done.err
+    assert "may have expired" in done.err
+    assert SECRET not in done.err
+    assert not (tmp_path / "rolls.csv").exists()
