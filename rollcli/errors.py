@@ -22,7 +22,7 @@ class ExitStatus(IntEnum):
     FAILED = 1, "the program could not do its job: an output cannot be written, the disk is full"
     USAGE = 2, "wrong usage, or no input found"
     FRAMES_FAILED = 3, "finished, and at least one frame failed; each says why"
-    CHECK_FAILED = 4, "rig: the rig is not what was asked for, or there are too few frames to tell"
+    CHECK_FAILED = 4, "a check has failed, or there are too few frames to tell"
     INTERRUPTED = 130, "interrupted"
 
 

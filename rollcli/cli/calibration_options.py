@@ -28,5 +28,9 @@ calibration_options = record(
         type=Number("M", above=0),
         help="Distance between the cameras, metres; gives the height.  [default: the file's]",
     ),
-    option("--doffs", type=Number("PX"), help="Right less left CX, pixels.  [default: the file's, else 0]"),
+    option(
+        "--doffs",
+        type=Number("PX"),
+        help="CX of the right view less that of the left one, pixels.  [default: the file's, else 0]",
+    ),
 )

@@ -30,6 +30,8 @@ class Command(click.Command):
         A purpose, and the command line for it; several lines are steps.
     instead : str
         What to give in place of arguments, to those who give some to a command that takes none.
+    checks : bool
+        Whether its exit status can tell that a check has failed.
     """
 
     def __init__(
@@ -37,11 +39,13 @@ class Command(click.Command):
         *args: Any,
         examples: Sequence[tuple[str, str]] = (),
         instead: str = "",
+        checks: bool = False,
         **attributes: Any,
     ) -> None:
         super().__init__(*args, **attributes)
         self.examples = tuple(examples)
         self.instead = instead
+        self.statuses = [each for each in ExitStatus if checks or each is not ExitStatus.CHECK_FAILED]
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Parse the words; where there should be none, say what should be there instead."""
@@ -74,10 +78,11 @@ class Command(click.Command):
                         formatter.write(f"{'':>{formatter.current_indent}}{line}\n")
         with formatter.section("Environment"):
             formatter.write_text(
-                f"Each option also reads {ctx.auto_envvar_prefix}_<OPTION>; flags win over it."
+                f"Each option is also read from {ctx.auto_envvar_prefix}_<OPTION>, such as "
+                f"{ctx.auto_envvar_prefix}_QUIET=1; flags win over it."
             )
         with formatter.section("Exit status"):
-            formatter.write_dl([(str(int(status)), status.meaning) for status in ExitStatus])
+            formatter.write_dl([(str(int(status)), status.meaning) for status in self.statuses])
 
 
 class Declared:
@@ -161,7 +166,10 @@ def record(name: str, title: str, make: Callable[..., Any], *declarations: Decla
 
 
 def command(
-    examples: Sequence[tuple[str, str]] = (), short_help: str | None = None, instead: str = ""
+    examples: Sequence[tuple[str, str]] = (),
+    short_help: str | None = None,
+    instead: str = "",
+    checks: bool = False,
 ) -> Callable[[Declared], Command]:
     """Make a command of a function, named after it; its docstring is the help."""
 
@@ -175,6 +183,7 @@ def command(
             short_help=short_help,
             examples=examples,
             instead=instead,
+            checks=checks,
         )
 
     return make

@@ -95,9 +95,9 @@ result_options = record(
 @encoding_options
 @region_options
 @calibration_options
+@cluster_options
 @method_options
 @stereo_options
-@cluster_options
 @config_option
 @click.pass_context
 def estimate(ctx: click.Context, /, **records: Any) -> None:

@@ -150,6 +150,12 @@ def _print_versions(ctx: click.Context, param: click.Parameter, asked: bool) -> 
 )
 @click.pass_context
 def main(ctx: click.Context) -> None:
-    """Estimate the roll angle of a stereo rig from disparity maps or stereo pairs."""
+    """Estimate the roll angle of a stereo rig from disparity maps or stereo pairs.
+
+    \b
+    To start with:
+      rollcli estimate maps/ -o rolls.csv
+      rollcli estimate --help
+    """
     if ctx.invoked_subcommand is None:
         click.echo(ctx.get_help())

@@ -205,7 +205,7 @@ method_options = record(
         "--lambda0",
         type=Number("FLOAT", above=0, auto=True),
         default=_METHOD.lambda0,
-        help="First learning rate of gd, rad^2 per unit of energy; auto: 1 / curvature.",
+        help="First learning rate of gd, rad^2 per unit of energy; auto: 1 / curvature of the energy.",
     ),
     option(
         "--tolerance",
@@ -223,8 +223,8 @@ method_options = record(
         "--max-interval",
         type=Number("DEG", above=0, at_most=90),
         default=_METHOD.max_interval_deg,
-        help="Doubt an angle whose 95 % half-width is above this, or of which noise alone makes a third of "
-        "this, degrees.",
+        help="An angle is suspect when the half-width of its 95 % interval is above this, or when noise and "
+        "unevenness alone make a third of this, degrees.",
     ),
     option(
         "--seed",

@@ -7,7 +7,7 @@ import click
 from rollcli.cli.command import argument, command, option, record
 from rollcli.cli.config import config_option
 from rollcli.cli.options import PATH, running_options
-from rollcli.cli.types import Number
+from rollcli.cli.types import TABLE_FILE, TABLE_FORMATS, Choice, Number, table_format
 from rollcli.rig_check.options import GateOptions, RigOptions
 
 gate_options = record(
@@ -48,7 +48,8 @@ gate_options = record(
         ),
         ("The shards of one run, in any order", "rollcli rig part1.csv part2.csv part3.csv"),
         ("Has it moved since?", "rollcli rig before.csv --against after.csv"),
-    ]
+    ],
+    checks=True,
 )
 @argument("results", nargs=-1, required=True, type=PATH)
 @option(
@@ -70,7 +71,7 @@ gate_options = record(
 @option(
     "-o",
     "--output",
-    type=PATH,
+    type=TABLE_FILE,
     metavar="FILE",
     default="-",
     section="Assessment",
@@ -78,10 +79,10 @@ gate_options = record(
 )
 @option(
     "--format",
-    type=click.Choice(["table", "csv", "json"]),
-    default="table",
+    type=Choice(*TABLE_FORMATS),
     section="Assessment",
-    help="To read, or for programs: csv has a line for each segment.",
+    help="A table to read, or for programs; csv has a line for each segment, from one jump to the next.  "
+    "[default: by FILE's ending, else table]",
 )
 @gate_options
 @running_options
@@ -90,12 +91,12 @@ gate_options = record(
 def rig(ctx: click.Context, /, **options: Any) -> None:
     """Say how the rig is mounted, whether it has drifted, and when it has jumped.
 
-    RESULTS is one result of `rollcli estimate`, or the shards of one run. Each value has a 95 % interval that
-    allows for frames being alike: it is of blocks of frames, and takes at least eight of them. Suspect frames
-    are counted and left out. Roll after a jump is that of the last segment: the rig as it is now.
-
-    Exit status 4: a check has failed, or there are too few frames to tell.
+    RESULTS is one result of `rollcli estimate`, or the shards of one run. Neighbouring frames are alike, so
+    the 95 % intervals rest on blocks of frames instead of single ones. They need eight blocks: a message says
+    about how many frames that takes. Suspect frames are counted and not used. After a jump, the roll is that
+    of the frames since: of the rig as it is now.
     """
     from rollcli.rig_check.run import run_rig
 
-    ctx.exit(run_rig(RigOptions(**options)))
+    form = table_format(options.pop("format"), options["output"])
+    ctx.exit(run_rig(RigOptions(**options, format=form)))

@@ -60,6 +60,16 @@ class OutputFile(FilePath):
         return super().convert(value, param, ctx)
 
 
+TABLE_FILE = OutputFile((".csv", ".json"), "CSV (.csv), JSON (.json), or a table to read (any other name)")
+TABLE_FORMATS = ("table", "csv", "json")
+
+
+def table_format(given: str | None, output: str) -> str:
+    """Choose one of `TABLE_FORMATS`: the one given, else by the ending of the output."""
+    ending = PurePath(output).suffix.lower().removeprefix(".")
+    return given or (ending if ending in TABLE_FORMATS[1:] else TABLE_FORMATS[0])
+
+
 class Number(ParamType):
     """A finite number within bounds, with its unit as the placeholder; "auto" where that is allowed."""
 

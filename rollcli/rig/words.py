@@ -113,6 +113,6 @@ def too_few(found: SequenceAssessment) -> str:
     since = " since the last jump" if found.jumps else ""
     holds = "frame" if frames == 1 else "frames"
     return (
-        f"{frames:,} {holds}{since}, fewer than {TUNING.fewest_blocks} independent blocks; "
-        f"it takes about {last.mean.needed:,} frames"
+        f"{frames:,} {holds}{since}, and about {last.mean.needed:,} are needed for "
+        f"{TUNING.fewest_blocks} independent blocks of frames"
     )

@@ -52,8 +52,22 @@ def test_accuracy_writes_a_file_and_refuses_to_replace_it(folder):
     again = accuracy(folder, "-o", "figures.csv")
     assert again.status == 2
     assert "figures.csv: exists already; give --overwrite" in again.err
-    assert accuracy(folder, "-o", "figures.csv", "--overwrite").status == 0
+    assert accuracy(folder, "-o", "figures.csv", "--overwrite", "--format", "Table").status == 0
     assert (folder / "figures.csv").read_text().startswith("frames compared")
+
+
+@pytest.mark.parametrize(
+    "command", [("evaluate", "accuracy", "rolls.csv", "--truth", "truth.csv"), ("rig", "rolls.csv")]
+)
+def test_the_ending_of_the_output_says_its_format(folder, command):
+    for name in ("found.json", "found.csv", "found.txt"):
+        assert rollcli(*command, "-o", name, cwd=folder).status == 0
+    assert isinstance(json.loads((folder / "found.json").read_text()), dict)
+    assert (folder / "found.csv").read_text().splitlines()[0].count(",") > 5
+    assert "  " in (folder / "found.txt").read_text().splitlines()[0]
+    refused = rollcli(*command, "-o", "found.xlsx", cwd=folder)
+    assert refused.status == 2
+    assert ".xlsx is not written here; write CSV (.csv), JSON (.json)" in refused.err
 
 
 def test_accuracy_never_replaces_what_it_reads(folder):

@@ -108,7 +108,8 @@ def test_too_few_frames_have_a_value_without_an_interval_and_say_what_it_takes()
     rig = rollcli.assess_rig(columns([0.1, 0.2, 0.3], [0.05] * 3))
     assert answer(rig.now()) == "+0.20°"
     (sentence,) = findings(rig)
-    assert sentence.startswith("no interval for the roll: 3 frames, fewer than 8 independent blocks")
+    assert sentence.startswith("no interval for the roll: 3 frames, and about ")
+    assert sentence.endswith(" are needed for 8 independent blocks of frames")
 
 
 @pytest.mark.parametrize(

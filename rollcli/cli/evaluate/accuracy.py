@@ -7,7 +7,7 @@ import click
 from rollcli.cli.command import argument, command, option
 from rollcli.cli.config import config_option
 from rollcli.cli.options import PATH, running_options
-from rollcli.cli.types import Choice
+from rollcli.cli.types import TABLE_FILE, TABLE_FORMATS, Choice, table_format
 from rollcli.frames.options import RunningOptions
 
 
@@ -32,7 +32,7 @@ from rollcli.frames.options import RunningOptions
 @option(
     "-o",
     "--output",
-    type=PATH,
+    type=TABLE_FILE,
     metavar="FILE",
     default="-",
     section="Figures",
@@ -40,10 +40,10 @@ from rollcli.frames.options import RunningOptions
 )
 @option(
     "--format",
-    type=Choice("table", "csv", "json"),
-    default="table",
+    type=Choice(*TABLE_FORMATS),
     section="Figures",
-    help="To read, or for programs: degrees, and shares from 0 to 1.",
+    help="A table to read, or degrees and shares from 0 to 1 for programs.  "
+    "[default: by FILE's ending, else table]",
 )
 @running_options
 @config_option
@@ -53,9 +53,9 @@ def accuracy(
 ) -> None:
     """Compare the angles of RESULT, which estimate wrote, with known ones.
 
-    Frames are matched by the stem of their file. Those without a partner are named on stderr; exit status 3
-    when a frame of the truth has no angle.
+    Frames are matched by the names of their files, without folder and ending. Those without a partner are
+    named on stderr; exit status 3 when a frame of the truth has no angle.
     """
     from rollcli.evaluate.run_accuracy import run_accuracy
 
-    ctx.exit(run_accuracy(result, truth, options["format"], output, running))
+    ctx.exit(run_accuracy(result, truth, table_format(options["format"], output), output, running))
