@@ -85,7 +85,7 @@ class TaskProgress:
             self._last_line = time.monotonic()
             if not self._quiet:
                 counted = "".join(f", {number} {what}" for what, number in self.counted().items())
-                self.say(f"{self.done} of {self.total} frames{counted}, {self.speed()}")
+                self.say(f"{self.done} of {self.total} frames{counted}, {self.speed()}{self._left()}")
 
     def counted(self) -> dict[str, int]:
         """Name what else is shown beside the number of frames."""
@@ -94,6 +94,19 @@ class TaskProgress:
     def speed(self) -> str:
         """Say how many frames were done in a second, those of an interrupted run left out."""
         return f"{self._finished / max(self.seconds, 1e-9):.1f} frames/s"
+
+    def _left(self) -> str:
+        """Say how long the rest takes at this speed."""
+        seconds = self.seconds / self._finished * (self.total - self.done) if self._finished else 0.0
+        return f", about {_rough(seconds)} left" if seconds else ""
+
+
+def _rough(seconds: float) -> str:
+    """Say how long something takes, in the unit of which there are a few."""
+    for name, size in (("h", 3600), ("min", 60)):
+        if seconds >= 1.5 * size:
+            return f"{seconds / size:.0f} {name}"
+    return f"{seconds:.0f} s"
 
 
 def _terminal_size() -> dict[str, Any]:

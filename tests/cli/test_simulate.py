@@ -24,6 +24,15 @@ def test_it_writes_pairs_maps_and_truth_and_says_so(tmp_path):
     assert files["truth.csv"].count(b"\n") == 3
 
 
+def test_off_a_terminal_lines_tell_how_far_it_is_and_how_long_it_takes(tmp_path, monkeypatch):
+    monkeypatch.setattr("rollcli.parallel.progress._LINE_EVERY_S", 0.0)
+    done = rollcli("simulate", "rig", *TINY, cwd=tmp_path)
+    first, second, summary = done.err.splitlines()
+    assert re.fullmatch(r"rollcli: 1 of 2 frames, [\d.]+ frames/s, about \d+ s left", first)
+    assert re.fullmatch(r"rollcli: 2 of 2 frames, [\d.]+ frames/s", second)
+    assert re.fullmatch(r"rollcli: 2 frames in rig; [\d.]+ s, [\d.]+ s a frame", summary)
+
+
 def test_one_number_is_a_range_of_its_own(tmp_path):
     done = rollcli("simulate", "rig", *TINY, "--roll", "-12.5", "--pitch", "3", "-q", "-j1", cwd=tmp_path)
     assert (done.status, done.err) == (0, "")

@@ -31,9 +31,23 @@ def test_a_line_is_written_every_half_minute_off_a_terminal(clock, capsys):
             clock.now += 10
             progress.advance()
     assert capsys.readouterr().err == (
-        "rollcli: 13 of 100 frames, 0.1 frames/s\nrollcli: 16 of 100 frames, 0.1 frames/s\n"
+        "rollcli: 13 of 100 frames, 0.1 frames/s, about 14 min left\n"
+        "rollcli: 16 of 100 frames, 0.1 frames/s, about 14 min left\n"
     )
     assert (progress.done, progress.seconds) == (18, 80)
+
+
+@pytest.mark.parametrize(
+    ("total", "left"),
+    [(31, ""), (32, ", about 2 s left"), (91, ", about 2 min left"), (30_031, ", about 12 h left")],
+)
+def test_the_time_that_is_left_is_told_in_a_unit_that_fits(clock, capsys, total, left):
+    with TaskProgress(total) as progress:
+        progress.kept = 11
+        for _ in range(20):
+            clock.now += 1.5
+            progress.advance()
+    assert capsys.readouterr().err == f"rollcli: 31 of {total} frames, 0.7 frames/s{left}\n"
 
 
 def test_quiet_progress_writes_no_lines(clock, capsys):
