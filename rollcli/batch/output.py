@@ -2,7 +2,7 @@
 
 import contextlib
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -11,9 +11,9 @@ from rollcli.batch.options import EstimateOptions
 from rollcli.batch.plan import Plan
 from rollcli.batch.result_file import ResultFile, has_rows, kept_rows, open_result
 from rollcli.batch.result_parts import kept_part_rows, open_parts
-from rollcli.batch.resume import failed_positions, new_record
+from rollcli.batch.resume import check_restored, failed_positions, incomplete_frames, new_record
 from rollcli.batch.run_record import RunRecord, is_replaceable_record
-from rollcli.errors import InputError, OutputError, UsageError
+from rollcli.errors import InputError, UsageError
 from rollcli.files.atomic import remove_leftovers
 from rollcli.files.results import Row, format_header, format_row, parse_rows, read_run, run_path
 from rollcli.files.resumable import not_resumable
@@ -26,8 +26,7 @@ from rollcli.files.stream import (
     write_stream,
 )
 from rollcli.frames.frame import Frame, FrameResult
-from rollcli.frames.options import ImageOptions
-from rollcli.frames.outputs import has_images, local_images, remove_image_leftovers
+from rollcli.frames.outputs import local_images, remove_image_leftovers
 
 
 class Output(Protocol):
@@ -128,7 +127,7 @@ class FileOutput:
     ) -> None:
         images = options.images
         self.kept = kept
-        self.incomplete = _incomplete_frames(plan, kept, images)
+        self.incomplete = incomplete_frames(plan, kept, images)
         self.failed = failed_positions(kept, options)
         self.keep_open: int | None = file.descriptor
         self.replaces = record.replaces
@@ -150,8 +149,7 @@ class FileOutput:
         OutputError
             They could not be made: its row no longer holds.
         """
-        if result.row.status == "error":
-            raise OutputError(f"the images of {frame.file} cannot be made again: {result.row.message}")
+        check_restored(frame, result)
         self._rows.restore(self._paths(frame, result))
 
     def replace(self, position: int, frame: Frame, result: FrameResult) -> None:
@@ -221,11 +219,10 @@ def frames_to_do(plan: Plan, options: EstimateOptions) -> list[Frame]:
     """
     if plan.in_parts:
         rows = kept_part_rows(plan, options)
-        incomplete = []
     else:
         _check_permitted(plan.output, options)
         rows = _kept_in_file(plan) if options.result.resume else ()
-        incomplete = _incomplete_frames(plan, rows, options.images)
+    incomplete = incomplete_frames(plan, rows, options.images)
     failed = [plan.frames[position] for position in failed_positions(rows, options)]
     return [*incomplete, *failed, *plan.frames[len(rows) :]]
 
@@ -237,14 +234,6 @@ def _kept_in_file(plan: Plan) -> tuple[Row, ...]:
         return ()
     kept = kept_rows(data, plan.output, plan.format)
     return parse_rows(kept, plan.output) if kept else ()
-
-
-def _incomplete_frames(plan: Plan, kept: Sequence[Row], images: ImageOptions) -> list[Frame]:
-    """List the frames of kept rows whose images are missing or empty."""
-    if not images.folders():
-        return []
-    pairs = zip(plan.frames, kept, strict=False)
-    return [frame for frame, row in pairs if row.status != "error" and not has_images(frame, images)]
 
 
 def _begin(file: ResultFile, plan: Plan, options: EstimateOptions) -> FileOutput:

@@ -12,7 +12,7 @@ from typing import Any
 
 from rollcli.batch.options import EstimateOptions
 from rollcli.batch.plan import Plan
-from rollcli.batch.resume import failed_positions, new_record
+from rollcli.batch.resume import check_restored, failed_positions, incomplete_frames, new_record
 from rollcli.batch.run_record import RunRecord
 from rollcli.errors import InputError, OutputError, UsageError
 from rollcli.files.atomic import remove_leftovers
@@ -55,7 +55,7 @@ class PartsOutput:
         self._next = len(kept) // self._part_rows
         self._replaced_part, self._replacing = 0, dict[int, Row]()  # rows by their positions in the result
         self._waiting: list[Row] = []
-        self.incomplete: list[Frame] = []
+        self.incomplete = incomplete_frames(plan, kept, options.images)
         self.replaces = record.replaces
         self._image_options = options.images
         self._images: list[str] = []  # those of the part that is being filled
@@ -78,7 +78,15 @@ class PartsOutput:
         self._record.write(totals, alignment)
 
     def restore(self, frame: Frame, result: FrameResult) -> None:
-        """Do nothing: no frame is incomplete, since parts enter the result after their images."""
+        """Take the images of an incomplete frame, which were made again.
+
+        Raises
+        ------
+        OutputError
+            They could not be made: its row no longer holds.
+        """
+        check_restored(frame, result)
+        self._images.extend(local_images(frame, self._image_options))
 
     def replace(self, position: int, frame: Frame, result: FrameResult) -> None:
         """Take the row; a part is written anew once its last such row is known."""
@@ -94,10 +102,10 @@ class PartsOutput:
 
     def commit(self) -> None:
         """Write the part anew whose rows are replaced, if they differ; a new part waits until it is full."""
-        if not self._replacing:
-            return
         sync_files(self._images)
         self._images.clear()
+        if not self._replacing:
+            return
         number, first = self._replaced_part, self._replaced_part * self._part_rows
         old = self.kept[first : first + self._part_rows]
         rows = [self._replacing.get(position, row) for position, row in enumerate(old, first)]

@@ -9,11 +9,14 @@ from rollcli.batch.fingerprint import changed_input
 from rollcli.batch.options import EstimateOptions
 from rollcli.batch.plan import Plan, check_images_are_new
 from rollcli.batch.run_record import RunRecord
-from rollcli.errors import InputError
+from rollcli.errors import InputError, OutputError
 from rollcli.files.results import Row, read_run, run_path
 from rollcli.files.resumable import differences, not_resumable
 from rollcli.files.storage import modified_ns
 from rollcli.files.stores.locations import base_name
+from rollcli.frames.frame import Frame, FrameResult
+from rollcli.frames.options import ImageOptions
+from rollcli.frames.outputs import MadeImages
 
 _SORT_LAST = "new frames must sort last: estimate these into a result of their own"
 
@@ -23,6 +26,27 @@ def failed_positions(rows: Sequence[Row], options: EstimateOptions) -> list[int]
     if not options.result.retry_failed:
         return []
     return [position for position, row in enumerate(rows) if row.status == "error"]
+
+
+def incomplete_frames(plan: Plan, kept: Sequence[Row], images: ImageOptions) -> list[Frame]:
+    """List the frames of kept rows whose images are missing or empty."""
+    if not (kept and images.folders()):
+        return []
+    made = MadeImages(images)
+    pairs = zip(plan.frames, kept, strict=False)
+    return [frame for frame, row in pairs if row.status != "error" and not made.has_all(frame)]
+
+
+def check_restored(frame: Frame, result: FrameResult) -> None:
+    """Check that the images of a kept row were made again.
+
+    Raises
+    ------
+    OutputError
+        They could not be: the row no longer holds.
+    """
+    if result.row.status == "error":
+        raise OutputError(f"the images of {frame.file} cannot be made again: {result.row.message}")
 
 
 def new_record(

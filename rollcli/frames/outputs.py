@@ -8,7 +8,8 @@ from pathlib import Path
 from rollcli.errors import OutputError
 from rollcli.files.atomic import remove_leftovers
 from rollcli.files.storage import remove, write_bytes, write_new
-from rollcli.files.stores.locations import is_url, located
+from rollcli.files.stores.locations import is_object_url, is_url, located
+from rollcli.files.stores.objects import list_objects
 from rollcli.frames.frame import Frame
 from rollcli.frames.options import ImageOptions
 
@@ -45,17 +46,28 @@ def local_images(frame: Frame, images: ImageOptions) -> Iterator[str]:
     return (path for paths in possible_paths(frame, images) for path in paths if not is_url(path))
 
 
-def has_images(frame: Frame, images: ImageOptions) -> bool:
-    """Tell whether every image of a frame exists and is not empty; those in an object store are believed."""
-    # asking a store for each object would take as long as making it again, and objects are whole
-    return all(is_url(paths[0]) or any(map(_has_bytes, paths)) for paths in possible_paths(frame, images))
+class MadeImages:
+    """Which images of a run exist and are not empty.
 
+    A folder of an object store is listed once: asking for each object would take as long as making it again.
+    """
 
-def _has_bytes(path: str) -> bool:
-    try:
-        return Path(path).stat().st_size > 0
-    except OSError:
-        return False
+    def __init__(self, images: ImageOptions) -> None:
+        self._images = images
+        folders = [f"{folder.rstrip('/')}/" for _, folder in images.folders() if is_object_url(folder)]
+        self._objects = {url for folder in folders for url, size in list_objects(folder) if size}
+
+    def has_all(self, frame: Frame) -> bool:
+        """Tell whether every image of a frame is there."""
+        return all(any(map(self._is_there, paths)) for paths in possible_paths(frame, self._images))
+
+    def _is_there(self, path: str) -> bool:
+        if is_url(path):
+            return path in self._objects
+        try:
+            return Path(path).stat().st_size > 0
+        except OSError:
+            return False
 
 
 def output_path(frame: Frame, folder: str, ending: str | None = None) -> str:

@@ -59,6 +59,32 @@ def test_a_result_in_a_bucket_is_kept_resumed_and_replaced_as_asked(bucket, tmp_
     assert joined(f"{bucket}/rolls.csv") == whole
 
 
+@pytest.mark.parametrize("place", ["bucket", "disk"])
+def test_images_of_kept_rows_that_are_missing_are_made_again(bucket, tmp_path, place):
+    from rollcli.files.storage import list_names, read_bytes, remove
+
+    level = f"{bucket}/level" if place == "bucket" else str(tmp_path / "level")
+    line = ("estimate", f"{bucket}/maps", "-o", f"{bucket}/rolls.csv", "--derotated", level)
+    line = (*line, "--part-rows", "2")
+    assert rollcli(*line, cwd=tmp_path).status == 0
+    rows, images = (
+        joined(f"{bucket}/rolls.csv"),
+        {name: read_bytes(f"{level}/{name}") for name in list_names(level)},
+    )
+    for name in ("frame1.png", "frame4.png"):
+        remove(f"{level}/{name}")
+    listed = rollcli(*line, "--resume", "--dry-run", cwd=tmp_path).out
+    assert [each for each in listed.splitlines() if each.startswith("read")] == [
+        f"read  {bucket}/maps/frame{index}.png" for index in (1, 4)
+    ]
+    done = rollcli(*line, "--resume", cwd=tmp_path)
+    assert (done.status, "images are missing or empty for 2 of the kept rows" in done.err) == (0, True), (
+        done.err
+    )
+    assert joined(f"{bucket}/rolls.csv") == rows
+    assert {name: read_bytes(f"{level}/{name}") for name in list_names(level)} == images
+
+
 def test_parquet_parts_are_one_typed_table(tmp_path):
     parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow, of the extra parquet, is not here")
     write_maps(tmp_path / "maps", 5)
