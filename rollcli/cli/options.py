@@ -264,7 +264,8 @@ image_options = record(
         "--vdisparity",
         type=PATH,
         metavar="DIR",
-        help="The v-disparity image of the map rotated upright, with the road's parabola, PNG.",
+        help="The v-disparity image of the map rotated upright, with the road's parabola, PNG; the command "
+        "vdisparity draws a map as it is.",
     ),
     option("--disparity", type=PATH, metavar="DIR", help="The disparity map that was computed from a pair."),
     option(

@@ -6,9 +6,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from rollcli.imaging.vdisparity_picture import round_step
+
 _ROAD = (220, 230, 40)  # BGR
 _TINT = 0.5
 BAR_WIDTH = 64  # of the colour bar, pixels
+_LABEL_EVERY = 50  # pixels along the bar
 _INK = (60, 60, 60)
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
 
@@ -96,9 +99,12 @@ def draw_preview(disparity: NDArray[Any]) -> NDArray[np.uint8]:
     levels = np.linspace(255, 1, height).astype(np.uint8)[:, None]
     bar[:, 8:24] = _coloured(levels, _colours())
     top = _top(np.asarray(disparity))
-    for share in np.linspace(0, 1, max(2, height // 60)):
-        row = min(max(round((1 - share) * (height - 1)) + 4, 9), height - 3)
-        cv2.putText(bar, f"{share * top:.0f}", (28, row), _FONT, 0.36, _INK, 1, cv2.LINE_AA)
+    step = round_step(top * _LABEL_EVERY / height) if height > _LABEL_EVERY else top
+    for number in range(int(top / step * (1 + 1e-9)) + 1):
+        label = number * step
+        row = min(max(round((1 - label / top) * (height - 1)) + 4, 9), height - 3)
+        text = f"{label:g}" if label else "0 px"
+        cv2.putText(bar, text, (28, row), _FONT, 0.36, _INK, 1, cv2.LINE_AA)
     return np.hstack([picture, bar])
 
 

@@ -12,9 +12,10 @@ from rollcli.imaging.vdisparity import VDisparity
 LEFT_MARGIN, BOTTOM_MARGIN = 40, 32  # pixels; the first rows of a picture are the rows of the map
 _SHOWN = 0.998  # share of the pixels within the shown range: a few outliers must not squeeze the road
 _ROUND_PX = 16.0  # the range ends at a multiple of this, so that frames of one drive share their scale
-_MIN_WIDTH = 320
+_WIDTH = 320  # of the chart: all pictures of one size of map have the same size
 _LABEL_EVERY = (60, 40)  # pixels between labels, along the disparities and along the rows
 _DASH = 8
+_SHIFT = 4  # bits of a coordinate after the point
 _ROAD = (255, 255, 0)  # BGR: cyan, which the colours of the counts do not have
 _HORIZON = (120, 220, 120)
 _PAPER, _INK = (255, 255, 255), (60, 60, 60)
@@ -63,26 +64,29 @@ def round_step(least: float) -> float:
     return next(each * power for each in (1, 2, 5, 10) if each * power >= least * (1 - 1e-9))
 
 
-def _shown(histogram: VDisparity) -> tuple[NDArray[np.int32], float]:
-    """Return the counts of the range that is shown, at least `_MIN_WIDTH` columns wide, and its end, px."""
+def _shown(histogram: VDisparity) -> tuple[NDArray[np.float32], float]:
+    """Return the counts of the range that is shown, `_WIDTH` columns wide, and its end, px."""
     counts, end = histogram.counts, histogram.max_disparity
     reached = np.cumsum(counts.sum(axis=0))
     total = int(reached[-1])
     last = int(np.searchsorted(reached, _SHOWN * total)) + 1 if total else counts.shape[1]
     per_bin = end / counts.shape[1]
     bins = min(counts.shape[1], math.ceil(math.ceil(last * per_bin / _ROUND_PX) * _ROUND_PX / per_bin))
-    shown = counts[:, :bins]
-    return np.repeat(shown, -(-_MIN_WIDTH // bins), axis=1), bins * per_bin
+    kind = cv2.INTER_AREA if bins > _WIDTH else cv2.INTER_NEAREST
+    shown = cv2.resize(counts[:, :bins].astype(np.float32), (_WIDTH, len(counts)), interpolation=kind)
+    return shown.astype(np.float32, copy=False), bins * per_bin
 
 
 def _draw_road(chart: NDArray[np.uint8], road: "np.polynomial.Polynomial", offset: float, top: float) -> None:
-    """Draw the road's curve, dashed so that what it lies on can be seen."""
+    """Draw the road's curve two pixels wide, dashed so that what it lies on can be seen."""
     height, width = chart.shape[:2]
     for start in range(0, height, 2 * _DASH):
         rows = np.arange(start, min(start + _DASH, height))
         columns = road(rows + offset) * (width / top)
         points = np.column_stack([columns, rows])[(columns >= 0) & (columns < width)]
-        cv2.polylines(chart, [np.rint(points).astype(np.int32)], False, _ROAD, 1, cv2.LINE_AA)
+        sides = [points + np.array([side, 0.0]) for side in (-0.5, 0.5)]
+        fixed = [np.rint(each * 2**_SHIFT).astype(np.int32) for each in sides]
+        cv2.polylines(chart, fixed, False, _ROAD, 1, cv2.LINE_AA, _SHIFT)
 
 
 def _draw_horizon(chart: NDArray[np.uint8], row: int) -> None:

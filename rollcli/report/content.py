@@ -26,7 +26,7 @@ from rollcli.rig.assess import RigAssessment
 from rollcli.rig.words import answer, counts, decimals, findings, now_in_words
 
 _FOLDERS = 6  # of inputs that the summary names
-_LISTED = 100  # doubtful frames on the page; the result has all
+_LISTED = 20  # doubtful frames in a list of their own; the table has all
 
 
 def report_page(
@@ -61,7 +61,8 @@ def report_page(
         options=option_lines(result.run),
         encodings=", ".join(map(str, run["encoding"])) if isinstance(run.get("encoding"), list) else "",
         charts={name: with_still(chart) for name, chart in charts.items()},
-        answer=answer(rig.now()),
+        answer=answer(rig.now()).replace("-", "−"),
+        drawn={trace["name"] for trace in charts["roll"].data},
         now=now_in_words(rig),
         counts=counts(rig),
         findings=findings(rig) or ["Neither a jump nor a drift is seen."],

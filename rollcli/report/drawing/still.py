@@ -7,7 +7,7 @@ from rollcli.report.drawing.lay_out import lay_out
 from rollcli.report.drawing.svg import svg_for_page
 
 # width, height and font of the chart's place on the page, pixels; the page's styles show one of them
-_WIDE, _NARROW = (1000, 368, 13.0), (350, 304, 11.0)
+_WIDE, _NARROW = (1000, 368, 13.0), (350, 352, 11.0)
 
 
 def with_still(chart: Chart) -> Chart:

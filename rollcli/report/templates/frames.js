@@ -20,6 +20,7 @@
     const each = height(), start = Math.max(0, Math.floor(box.scrollTop / each) - 5);
     const end = Math.min(order.length, Math.ceil((box.scrollTop + box.clientHeight) / each) + 5);
     space.style.height = order.length * each + "px";
+    box.style.maxHeight = rows.length * each + 2 + "px";
     space.replaceChildren(...order.slice(start, end).map((place, i) => {
       const row = rows[place], line = element("a", "row", "");
       line.href = link(place);
