@@ -54,6 +54,12 @@ def test_frames_of_one_drive_share_their_range():
     assert near[0].shape == near[1].shape
 
 
+@pytest.mark.parametrize(("bins", "near"), [(61, 60.0), (256, 60.0), (319, 90.0), (330, 90.0), (1024, 200.0)])
+def test_maps_of_one_size_have_pictures_of_one_size(bins, near):
+    histogram = v_disparity(road_map(near=near), bins=bins, max_disparity=near + 1)
+    assert draw_v_disparity(histogram).shape == (100 + BOTTOM_MARGIN, LEFT_MARGIN + 320, 3)
+
+
 def test_the_horizon_is_a_line_across_at_its_row():
     histogram = v_disparity(road_map())
     changed = chart(draw_v_disparity(histogram)) != chart(draw_v_disparity(histogram, horizon=40.2))

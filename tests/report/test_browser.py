@@ -309,6 +309,28 @@ def test_a_table_of_ten_thousand_frames_holds_the_rows_in_view_alone_and_is_sort
     assert len(shown_rows(page)) < 50
 
 
+def test_a_table_of_few_frames_has_no_empty_space_and_the_chart_a_picture_until_it_is_drawn(
+    opened, browser, tmp_path
+):
+    write_result(tmp_path / "rolls.csv", [row("a.png"), row("b.png", 2.0)])
+    assert rollcli("report", "rolls.csv", "-o", "page.html", "--gallery", "0", cwd=tmp_path).status == 0
+    page = opened(url=(tmp_path / "page.html").as_uri())
+    box, last = (page.locator(each).bounding_box() for each in (".rows", ".rows .row:last-child"))
+    assert last["y"] + last["height"] == pytest.approx(box["y"] + box["height"], abs=3)
+    page.wait_for_selector("#histogram .main-svg")
+    assert page.locator(".still").count() == 0
+
+    for width, shown in ((1280, ".wide-screen"), (400, ".narrow-screen")):
+        still = browser.new_page(viewport={"width": width, "height": 900}, java_script_enabled=False)
+        still.goto((tmp_path / "page.html").as_uri())
+        place = still.locator("#roll").bounding_box()
+        picture = still.locator(f"#roll {shown}").bounding_box()
+        assert picture == place
+        assert still.locator("#roll .still:visible").count() == 1
+        assert still.locator(f"#roll {shown}").get_by_text("roll, degrees").is_visible()
+        still.close()
+
+
 def test_an_address_leads_to_a_frame_whatever_it_is_called(opened, url, long_url):
     page = opened(url=long_url + "#frame=maps/f07750.png")
     assert page.locator(".detail h3").inner_text() == "maps/f07750.png"

@@ -326,6 +326,23 @@ def test_without_the_extra_it_says_what_to_install(monkeypatch):
         page.require_extra("report")
 
 
+def test_the_page_of_one_frame_describes_what_it_shows_and_no_more(folder):
+    write_result(folder / "rolls.csv", [row("maps/frame0.png")])
+    assert report(folder, "rolls.csv").status == 0
+    shown = re.sub(r"<(script|style).*?</\1>", "", page_of(folder), flags=re.S)
+    assert "Dot: the roll of the frame." in shown
+    for word in ("Level line", "a jump", "Dotted", "How often each roll occurs", "nine in ten"):
+        assert word not in shown
+
+
+def test_a_long_list_of_doubtful_frames_is_cut_short_and_says_where_the_others_are(folder):
+    write_result(folder / "rolls.csv", [row(f"{i}.png", status="suspect", message="wide") for i in range(50)])
+    assert report(folder, "rolls.csv", "--gallery", "0").status == 0
+    listed = page_of(folder).partition('<table class="reasons">')[2].partition("</section>")[0]
+    assert listed.count("<tr><td>") == 20
+    assert "And 30 more: search for “suspect” or “failed” below." in listed
+
+
 def test_charts_are_written_for_slides_with_or_without_a_page(folder):
     alone = rollcli("report", "out/rolls.csv", "--svg", "slides", "--png", "slides", cwd=folder)
     assert (alone.status, alone.out) == (0, "")
