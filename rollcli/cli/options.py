@@ -264,8 +264,7 @@ image_options = record(
         "--vdisparity",
         type=PATH,
         metavar="DIR",
-        help="The v-disparity image of the map rotated upright, with the road's parabola, PNG; the command "
-        "vdisparity draws a map as it is.",
+        help="v-disparity of the map rotated upright, with the road, PNG; vdisparity draws maps as they are.",
     ),
     option("--disparity", type=PATH, metavar="DIR", help="The disparity map that was computed from a pair."),
     option(
