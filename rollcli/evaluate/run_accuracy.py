@@ -7,6 +7,7 @@ from rollcli.evaluate.accuracy import Accuracy, assess
 from rollcli.evaluate.accuracy_text import FORMATS
 from rollcli.evaluate.pose_accuracy import assess_height, assess_pitch
 from rollcli.evaluate.truth import read_known_poses
+from rollcli.files.naming import listed
 from rollcli.files.results import read_result
 from rollcli.files.stream import is_stream, write_output
 from rollcli.frames.checks import check_writes, list_files
@@ -54,10 +55,13 @@ def run_accuracy(result: str, truth: str, form: str, output: str, running: Runni
 
 
 def _name_unmatched(accuracy: Accuracy, result: str, truth: str, running: RunningOptions) -> None:
-    """Say which frames could not be compared, a line each."""
+    """Say which frames could not be compared: the first few by name."""
     if running.quiet:
         return
-    for stem in accuracy.no_angle:
-        say(f"{stem}: in {truth}, without an angle in {result}")
-    for name in accuracy.no_truth:
-        say(f"{name}: in {result}, without a known angle in {truth}")
+    for names, where, what in (
+        (accuracy.no_angle, truth, f"no angle in {result}"),
+        (accuracy.no_truth, result, f"no known angle in {truth}"),
+    ):
+        if names:
+            frames = "1 frame has" if len(names) == 1 else f"{len(names)} frames have"
+            say(f"{where}: {frames} {what}: {listed(names)}")

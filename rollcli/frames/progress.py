@@ -5,10 +5,11 @@ It belongs to `frames`, since every command that works through frames reports on
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 from rollcli.errors import ExitStatus
 from rollcli.files.results import Row
-from rollcli.frames.failures import Failures, cause_of
+from rollcli.frames.causes import Causes
 from rollcli.frames.frame import FrameResult, named_message
 from rollcli.frames.options import EncodingOptions, RunningOptions
 from rollcli.frames.rig_alignment import RigAlignment
@@ -50,7 +51,7 @@ class Progress(TaskProgress):
         self._statuses = statuses
         self._auto = encoding.encoding == "auto" and encoding.scale is None
         self.alignment = RigAlignment()
-        self._failures = Failures()
+        self._failures, self._warnings = Causes(), Causes()
 
     def __enter__(self) -> "Progress":
         super().__enter__()
@@ -91,13 +92,20 @@ class Progress(TaskProgress):
             how = f"{name}: read as {result.encoding} ({_MEANING[result.encoding]})"
             self.note(how, topic=result.encoding)
         if result.warning:
-            self.note(f"{name}: warning: {result.warning}", topic=f"warning: {cause_of(result.warning)}")
+            self._tell_warning(replace(result.row, message=f"warning: {result.warning}"))
         if searched is not None:
             how = f"{name}: searched disparities from {searched[0]} to {searched[1]} px"
             if self._verbose:
                 self.detail(how)
             else:
                 self.note(how, topic="searched")
+
+    def _tell_warning(self, row: Row) -> None:
+        line = self._warnings.add(row)
+        if self._verbose:
+            self.detail(named_message(row))
+        elif line:
+            self.note(line)
 
     def _tell_failure(self, row: Row) -> None:
         line = self._failures.add(row)
@@ -107,8 +115,10 @@ class Progress(TaskProgress):
             self.say(line)
 
     def tell_end(self) -> None:
-        """Say which causes of failure were met more than once, and the summary."""
+        """Say which causes of warnings and failures were met more than once, and the summary."""
         if not self._verbose:
+            for line in self._warnings.repeated():
+                self.note(line)
             for line in self._failures.repeated():
                 self.say(line)
         self.note(self.summary())

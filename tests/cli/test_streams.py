@@ -39,7 +39,9 @@ def test_whole_pixels_in_16_bits_are_warned_of_once(tmp_path):
     for name in ("a.png", "b.png"):
         write_kitti(tmp_path / name, np.rint(road_map()) / 256)
     err = rollcli("estimate", "a.png", "b.png", cwd=tmp_path).err
-    assert err.count("--encoding px") == 1
+    assert err.count("a.png: warning: ") == 1
+    assert err.count("--encoding px") == 2
+    assert "rollcli: 2 frames: warning: uint16 numbers up to" in err
 
 
 def test_failures_of_one_cause_are_said_once_with_their_number(tmp_path):

@@ -54,7 +54,7 @@ def accuracy(
     """Compare the angles of RESULT, which estimate wrote, with known ones.
 
     Frames are matched by the names of their files, without folder and ending. Those without a partner are
-    named on stderr; exit status 3 when a frame of the truth has no angle.
+    counted on stderr; exit status 3 when a frame of the truth has no angle.
     """
     from rollcli.evaluate.run_accuracy import run_accuracy
 

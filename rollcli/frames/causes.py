@@ -1,4 +1,4 @@
-"""The failures of a run by their cause: a cause is said once, and how many frames it cost at the end."""
+"""What goes wrong in a run, by its cause: each is said once, and at the end how many frames it was met in."""
 
 import re
 from dataclasses import dataclass
@@ -22,15 +22,15 @@ class _Cause:
     alike: bool = True  # whether all messages are the same, to the number
 
 
-class Failures:
-    """Groups the messages of failed frames; those that differ in numbers alone have one cause."""
+class Causes:
+    """Groups the messages of frames; those that differ in numbers alone have one cause."""
 
     def __init__(self) -> None:
         self._causes: dict[str, _Cause] = {}
         self._others = 0
 
     def add(self, row: Row) -> str:
-        """Take the row of a failed frame; return what is to be said of it now, or nothing."""
+        """Take the row of a frame, with its message; return what is to be said of it now, or nothing."""
         key = cause_of(row.message)
         cause = self._causes.get(key)
         if cause is not None:
