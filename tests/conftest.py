@@ -4,7 +4,10 @@ import shutil
 
 import pytest
 
+from rollcli.parallel.process_setup import limit_blas_threads
 from tests.object_store import object_store
+
+limit_blas_threads()  # as every command does; NumPy is not loaded yet
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 FLAGS = (

@@ -21,7 +21,6 @@ from rollcli.frames.outputs import image_paths, remove_image_leftovers
 from rollcli.frames.progress import Progress
 from rollcli.parallel.in_order import Work
 from rollcli.parallel.interrupt import Stop, stop_on_signals
-from rollcli.parallel.process_setup import limit_blas_threads
 from rollcli.parallel.run_tasks import require_scheduler, run_tasks
 from rollcli.parallel.workers import SharedPaths, Workers
 
@@ -47,7 +46,6 @@ def run_estimate(options: EstimateOptions, resume_command: str = "") -> ExitStat
     if options.running.dry_run:
         _list(plan, options)
         return ExitStatus.DONE
-    limit_blas_threads()
     require_scheduler(options.running.scheduler)
     progress = Progress(len(plan.frames), options.running, options.encoding)
     answer = RigAnswer()

@@ -58,6 +58,16 @@ class Command(click.Command):
             raise click.UsageError(f"{' '.join(rest)}: {self.instead}", ctx)
         return rest
 
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command with one thread of linear algebra.
+
+        Its matrices are small: threads spend ten times as long waiting for each other as working.
+        """
+        from rollcli.parallel.process_setup import limit_blas_threads
+
+        limit_blas_threads()
+        return super().invoke(ctx)
+
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the options, by section."""
         sections: dict[str, list[tuple[str, str]]] = {}

@@ -15,7 +15,6 @@ from rollcli.frames.outputs import write_outputs
 from rollcli.frames.progress import Progress
 from rollcli.parallel.in_order import Work
 from rollcli.parallel.interrupt import Stop, stop_on_signals
-from rollcli.parallel.process_setup import limit_blas_threads
 from rollcli.parallel.run_tasks import require_scheduler, run_tasks
 from rollcli.parallel.workers import SharedPaths, Workers
 
@@ -75,7 +74,6 @@ def convert(
         return ExitStatus.DONE
     require_scheduler(running.scheduler)
     remove_leftovers(path for each in conversions for path in each.writes)
-    limit_blas_threads()
     progress = Progress(len(conversions), running, encoding, statuses=("ok",))
     with (
         stop_on_signals() as stop,

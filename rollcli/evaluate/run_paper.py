@@ -17,7 +17,6 @@ from rollcli.frames.frame import Frame
 from rollcli.frames.progress import Progress
 from rollcli.parallel.in_order import Work
 from rollcli.parallel.interrupt import stop_on_signals
-from rollcli.parallel.process_setup import limit_blas_threads
 from rollcli.parallel.run_tasks import run_tasks
 from rollcli.parallel.workers import Workers
 from rollcli.report.page import require_extra
@@ -61,7 +60,6 @@ def run_paper(options: PaperOptions) -> ExitStatus:
     if running.dry_run:
         list_files([(reads, writes)])
         return ExitStatus.DONE
-    limit_blas_threads()  # the paper's run times are those of one thread
     return _run(frames, truth, options)
 
 

@@ -135,7 +135,7 @@ def _is_photograph(values: NDArray[Any]) -> bool:
 
 def _grows_downward(disparity: NDArray[Any]) -> bool:
     """Tell whether the lower a row lies, the larger its disparities are, as in a map with a road."""
-    rows = [(v, row[row > 0]) for v, row in enumerate(disparity[::_EVERY, ::_EVERY])]
+    rows = [(v, row[(row > 0) & np.isfinite(row)]) for v, row in enumerate(disparity[::_EVERY, ::_EVERY])]
     medians = np.array([(v, np.median(valid)) for v, valid in rows if valid.size])
     if len(medians) < 3 or not np.ptp(medians[:, 1]) > 0:
         return False

@@ -10,6 +10,7 @@ from rollcli.imaging.vdisparity_picture import round_step
 
 _ROAD = (220, 230, 40)  # BGR
 _TINT = 0.5
+_BLOCK = 2**20  # pixels
 BAR_WIDTH = 64  # of the colour bar, pixels
 _LABEL_EVERY = 50  # pixels along the bar
 _INK = (60, 60, 60)
@@ -122,9 +123,15 @@ def _top(values: NDArray[Any]) -> float:
 def _levels(disparity: NDArray[Any]) -> NDArray[np.uint8]:
     """Return 0 for no data, 1..255 for small to large disparities."""
     values = np.asarray(disparity)
-    valid = np.isfinite(values) & (values > 0)
-    top = _top(values)
-    return np.where(valid, np.clip(np.where(valid, values, 0) * (255 / top), 1, 255), 0).astype(np.uint8)
+    top, levels = _top(values), np.empty(values.shape, np.uint8)
+    step = max(1, _BLOCK // max(1, values.shape[1]))  # a few rows at a time, for the memory of large maps
+    for first in range(0, len(values), step):
+        some = values[first : first + step]
+        valid = np.isfinite(some) & (some > 0)
+        levels[first : first + step] = np.where(
+            valid, np.clip(np.where(valid, some, 0) * (255 / top), 1, 255), 0
+        )
+    return levels
 
 
 def _coloured(levels: NDArray[np.uint8], colours: NDArray[np.uint8]) -> NDArray[np.uint8]:

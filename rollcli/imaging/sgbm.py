@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from rollcli.errors import InputError
 from rollcli.imaging.stereo_options import StereoOptions
 from rollcli.imaging.views import Views
 
@@ -18,6 +19,8 @@ _SUBPIXELS = 16  # OpenCV stores sixteenths of a pixel
 _STEP = 16  # px: widths that OpenCV takes
 NARROWEST = _STEP
 ALL_ROWS = slice(None)
+_HH_BYTES = 4  # for each pixel and disparity: OpenCV keeps two costs of 16 bits
+_MOST_HH_BYTES = 2**32  # 1920x1080 pixels over 256 disparities take less than half
 _MARGIN = 32  # rows beside those that are needed: what lies there smooths what is needed
 
 
@@ -34,7 +37,20 @@ def match_views(views: Views, first: int, count: int, options: StereoOptions) ->
     -------
     ndarray of float32, shape (H, W)
         Pixels; no data is 0.
+
+    Raises
+    ------
+    InputError
+        The mode hh would take too much memory.
     """
+    height, width = views[0].shape
+    taken = _HH_BYTES * height * (width - count) * count if options.mode == "hh" else 0
+    if taken > _MOST_HH_BYTES:
+        raise InputError(
+            f"matching {width}x{height} pixels over {count} disparities in the mode hh would take "
+            f"{taken / 2**30:.1f} GiB, and {_MOST_HH_BYTES >> 30} are allowed; give --downscale 2, fewer "
+            "--num-disparities, or --sgbm-mode 3way"
+        )
     area = options.block_size**2
     matcher = cv2.StereoSGBM.create(
         minDisparity=first,

@@ -118,3 +118,37 @@ main()
     line = [sys.executable, "-c", code]
     done = subprocess.run(line, cwd=tmp_path, env=environment(), capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (130, "rollcli: interrupted\n")
+
+
+WATCH_NUMPY = """
+import os, sys
+
+class Watch:
+    def find_spec(name, path=None, target=None):
+        if name == "numpy":
+            print("threads:", os.environ.get("OPENBLAS_NUM_THREADS"))
+
+sys.meta_path.insert(0, Watch)
+from rollcli.cli.main import main
+main()
+"""
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("estimate", "maps", "-q", "-j1"),
+        ("derotate", "maps", "--roll", "1", "-o", "up", "-j1"),
+        ("rig", "none.csv"),
+        ("report", "none.csv"),
+        ("simulate", "out", "--frames", "1", "--size", "64x48", "-j1"),
+        ("evaluate", "accuracy", "none.csv", "--truth", "none.csv"),
+        ("evaluate", "paper", "maps", "-o", "out"),
+    ],
+)
+def test_linear_algebra_has_one_thread_when_numpy_is_loaded(tmp_path, arguments):
+    write_maps(tmp_path / "maps", 1)
+    variables = {name: text for name, text in environment().items() if not name.endswith("_NUM_THREADS")}
+    line = [sys.executable, "-c", WATCH_NUMPY, *arguments]
+    done = subprocess.run(line, cwd=tmp_path, env=variables, capture_output=True, text=True, check=False)
+    assert done.stdout.startswith("threads: 1\n"), done.stderr

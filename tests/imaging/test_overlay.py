@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from rollcli.imaging import overlay
 from rollcli.imaging.overlay import BAR_WIDTH, draw_disparity, draw_preview, draw_road, draw_road_on_photo
 
 
@@ -56,3 +57,10 @@ def test_a_preview_is_the_map_in_colour_beside_a_bar_from_the_brightest_to_the_d
     assert preview.shape == (100, 200 + BAR_WIDTH, 3)
     bar = preview[:, 210].astype(int).sum(axis=1)
     assert bar[0] > bar[50] > bar[-1]
+
+
+def test_a_map_is_drawn_the_same_a_few_rows_at_a_time(monkeypatch):
+    disparity = np.random.default_rng(0).uniform(-5, 60, (50, 40)).astype(np.float32)
+    whole = draw_disparity(disparity)
+    monkeypatch.setattr(overlay, "_BLOCK", 3 * 40)
+    assert np.array_equal(draw_disparity(disparity), whole)

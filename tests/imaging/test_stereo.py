@@ -11,6 +11,7 @@ from rollcli.errors import InputError, UsageError
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.files.formats import read_image
 from rollcli.files.inputs import pair_inputs
+from rollcli.imaging import sgbm
 from rollcli.imaging.stereo import StereoOptions, compute_disparity, match_pair
 from rollcli.simulate.render import render_frame
 from rollcli.simulate.spec import FrameSpec
@@ -236,3 +237,17 @@ def test_real_street_pairs_get_a_range_that_fits():
         assert 32 <= match.num_disparities <= 112
         assert match.end_fraction < 0.03
         assert (match.disparity[:, match.num_disparities :] > 0).mean() > 0.6
+
+
+def test_what_the_mode_hh_would_take_is_counted_before_it_is_taken(monkeypatch):
+    blank = np.zeros((2160, 4096), np.uint8)
+    options = StereoOptions(mode="hh", num_disparities=512, vertical_offset=0)
+    with pytest.raises(InputError, match=r"would take 14\.8 GiB, and 4 are allowed; give --downscale 2"):
+        match_pair(blank, blank, options)
+    pair = pair_at(20)
+    options = StereoOptions(mode="hh", num_disparities=64, vertical_offset=0)
+    monkeypatch.setattr(sgbm, "_MOST_HH_BYTES", 4 * 120 * (400 - 64) * 64)
+    assert match_pair(*pair, options).disparity.any()
+    monkeypatch.setattr(sgbm, "_MOST_HH_BYTES", 4 * 120 * (400 - 64) * 64 - 1)
+    with pytest.raises(InputError, match="in the mode hh"):
+        match_pair(*pair, options)

@@ -16,6 +16,8 @@ from rollcli.estimator.road.robust_fit import Fit, NearPixels
 from rollcli.estimator.road.subsample import Sample, reach_of
 from rollcli.estimator.road.tuning import RoadTuning
 
+_BLOCK = 2**20  # pixels
+
 
 @dataclass(frozen=True)
 class Surface:
@@ -69,15 +71,26 @@ class Surface:
     def covers(self, disparity: NDArray[Any]) -> NDArray[np.bool_]:
         """Return which pixels of a map (H, W) lie on the surface and rise as it does."""
         height, width = disparity.shape
-        x: Floats = (np.arange(width, dtype=np.float64) - self.grid.centre_u) / self.grid.scale
-        y: Floats = ((np.arange(height, dtype=np.float64) - self.grid.centre_v) / self.grid.scale)[:, None]
+        reach = min(reach_of(height, width, self.tuning.sample), height - 1)
+        covered = np.empty(disparity.shape, bool)
+        step = max(1, _BLOCK // width)  # a few rows at a time: a large map leaves no room for eight more
+        for top in range(0, height, step):
+            first, end = max(0, top - reach), min(height, top + step)
+            rows = slice(first, min(height, end + reach))
+            covered[top:end] = self._covers(disparity[rows], first, reach)[top - first : end - first]
+        return covered
+
+    def _covers(self, disparity: NDArray[Any], first: int, reach: int) -> NDArray[np.bool_]:
+        """Return the same of some rows, from `first` on: they are compared with those `reach` away."""
+        rows, columns = (np.arange(side, dtype=np.float64) for side in disparity.shape)
+        x: Floats = (columns - self.grid.centre_u) / self.grid.scale
+        y: Floats = ((rows + first - self.grid.centre_v) / self.grid.scale)[:, None]
         road = self.model.disparity(x, y)
         tolerance = np.hypot(self.noise, self.tuning.sample.uneven_share * disparity)
         on_it: NDArray[np.bool_] = np.abs(road - disparity) < self.limit * tolerance
         if self.profile is not None:
             on_it &= self.profile.level(self.model.side(x, y, road)) > self.tuning.surface.least_level
         # where a wall crosses the surface it is as near as the road, but it does not rise as the road does
-        reach = min(reach_of(height, width, self.tuning.sample), height - 1)
         off = disparity - road
         steady = np.abs(off[reach:] - off[:-reach]) < np.maximum(
             tolerance[reach:], self.tuning.surface.steady * np.abs(road[reach:] - road[:-reach])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from rollcli.estimator.estimate import estimate_roll
+from rollcli.estimator.road import surface
 from rollcli.estimator.road.find import find_road
 from rollcli.estimator.road.subsample import take_sample
 from rollcli.estimator.road.surface import fit_surface
@@ -145,3 +146,16 @@ def test_a_surface_that_crosses_the_road_without_rising_as_it_does_is_no_road():
     near = crossing & (np.abs(road - 15) < 0.6)
     assert near.sum() > 100
     assert covered[near].mean() < 0.1
+
+
+@pytest.mark.parametrize("rows", [1, 7, HEIGHT - 1])
+def test_a_few_rows_at_a_time_cover_the_same_pixels(monkeypatch, rows):
+    road, side = road_and_sides()
+    disparity = np.where(np.abs(side + 1.8) < 0.5, 15, road)
+    found = surface_of(disparity)
+    whole = found.covers(disparity)
+
+    monkeypatch.setattr(surface, "_BLOCK", rows * WIDTH)
+
+    assert np.array_equal(found.covers(disparity), whole)
+    assert 0.1 < whole.mean() < 0.9

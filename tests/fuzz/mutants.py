@@ -1,0 +1,210 @@
+"""Change the program in one place at a time, and see whether its tests notice.
+
+``python -m tests.fuzz.mutants [--count 15] [--seed 1] [PACKAGE ...]``: so many changes of each package, drawn
+at random and each tried with the tests that belong to the package, which end at the first failure. What lives
+is listed: either it changes nothing that anyone could see, or a test is missing.
+"""
+
+import argparse
+import ast
+import copy
+import os
+import random
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).resolve().parents[2]
+PROGRAM, TESTS = "rollcli", "tests"
+# the tests of a package beyond the folder of its name, the quickest first
+FURTHER = {
+    "batch": ("cli/test_outputs.py", "cli/test_estimate.py", "cli/test_frames.py"),
+    "cli": ("batch/test_resume.py",),
+    "convert": ("cli/test_outputs.py",),
+    "evaluate": ("cli/test_evaluate.py", "cli/test_evaluate_paper.py"),
+    "files": ("batch/test_resume.py", "cli/test_frames.py", "cli/test_outputs.py"),
+    "frames": ("cli/test_frames.py", "cli/test_outputs.py", "cli/test_streams.py", "convert"),
+    "parallel": ("batch/test_faults.py", "batch/test_resume.py"),
+    "rig_check": ("cli/test_rig.py",),
+    "rig": ("cli/test_calibration.py",),
+}
+_QUICKLY = ("-x", "-q", "-p", "no:cacheprovider")
+_SECONDS = 600  # a change may make an endless loop
+
+_COMPARISONS: dict[type[ast.cmpop], type[ast.cmpop]] = {
+    ast.Lt: ast.LtE,
+    ast.LtE: ast.Lt,
+    ast.Gt: ast.GtE,
+    ast.GtE: ast.Gt,
+    ast.Eq: ast.NotEq,
+    ast.NotEq: ast.Eq,
+    ast.Is: ast.IsNot,
+    ast.IsNot: ast.Is,
+    ast.In: ast.NotIn,
+    ast.NotIn: ast.In,
+}
+_OPERATORS: dict[type[ast.operator], type[ast.operator]] = {
+    ast.Add: ast.Sub,
+    ast.Sub: ast.Add,
+    ast.Mult: ast.Div,
+    ast.Div: ast.Mult,
+    ast.FloorDiv: ast.Div,
+    ast.Mod: ast.Mult,
+    ast.Pow: ast.Mult,
+    ast.BitOr: ast.BitAnd,
+    ast.BitAnd: ast.BitOr,
+}
+_NAMES = {"min": "max", "max": "min", "any": "all", "all": "any", "minimum": "maximum", "maximum": "minimum"}
+
+
+class Mutant(NamedTuple):
+    """One change: the file below the root, the line, what stood there, and the whole changed source."""
+
+    path: Path
+    line: int
+    change: str
+    source: str
+
+
+def mutants(path: Path) -> Iterator[Callable[[], Mutant]]:
+    """Yield every change of a file, each to be made when it is wanted."""
+    tree = ast.parse(path.read_text("utf-8"))
+    for place, node in enumerate(ast.walk(tree)):
+        for number in range(len(_changes(node))):
+            yield lambda place=place, number=number: _mutant(path, tree, place, number)
+
+
+def _mutant(path: Path, tree: ast.Module, place: int, number: int) -> Mutant:
+    changed = copy.deepcopy(tree)
+    node = list(ast.walk(changed))[place]
+    before = ast.unparse(node)
+    _changes(node)[number]()
+    line = getattr(node, "lineno", 0)
+    return Mutant(path.relative_to(ROOT), line, f"{before}  ->  {ast.unparse(node)}", ast.unparse(changed))
+
+
+def _changes(node: ast.AST) -> list[Callable[[], None]]:
+    """List what can be changed in a node; annotations and texts are left alone."""
+    if isinstance(node, ast.Compare):
+        swaps = [(place, _COMPARISONS.get(type(each))) for place, each in enumerate(node.ops)]
+        return [_setter(node.ops, place, other()) for place, other in swaps if other]
+    if isinstance(node, ast.BinOp | ast.AugAssign) and type(node.op) in _OPERATORS:
+        if isinstance(node.op, ast.BitOr) and isinstance(node, ast.BinOp) and _is_type(node):
+            return []
+        return [_attribute(node, "op", _OPERATORS[type(node.op)]())]
+    if isinstance(node, ast.BoolOp):
+        return [_attribute(node, "op", ast.Or() if isinstance(node.op, ast.And) else ast.And())]
+    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+        return [_attribute(node, "op", ast.UAdd())]
+    if isinstance(node, ast.If | ast.IfExp | ast.While):
+        return [_attribute(node, "test", ast.UnaryOp(ast.Not(), node.test))]
+    if isinstance(node, ast.Constant):
+        return _of_constant(node)
+    if isinstance(node, ast.Name) and node.id in _NAMES:
+        return [_attribute(node, "id", _NAMES[node.id])]
+    if isinstance(node, ast.Attribute) and node.attr in _NAMES:
+        return [_attribute(node, "attr", _NAMES[node.attr])]
+    if isinstance(node, ast.Expr) and isinstance(node.value, ast.Call | ast.YieldFrom):
+        return [_attribute(node, "value", ast.Constant(None))]
+    return []
+
+
+def _of_constant(node: ast.Constant) -> list[Callable[[], None]]:
+    value = node.value
+    if isinstance(value, bool):
+        return [_attribute(node, "value", not value)]
+    if isinstance(value, int):
+        return [_attribute(node, "value", value + 1)]
+    return [_attribute(node, "value", value * 1.5 + 0.1)] if isinstance(value, float) else []
+
+
+def _is_type(node: ast.expr) -> bool:
+    """Tell `int | None`, which Python only reads, from arithmetic."""
+    if isinstance(node, ast.BinOp):
+        return _is_type(node.left) or _is_type(node.right)
+    names = {"None", "NoneType", "str", "int", "float", "Path", "bytes", "Any"}
+    return ast.unparse(node) in names or ast.unparse(node).endswith(("]", "Error"))
+
+
+def _attribute(node: ast.AST, name: str, value: object) -> Callable[[], None]:
+    return lambda: setattr(node, name, value)
+
+
+def _setter(items: list[ast.cmpop], place: int, value: ast.cmpop) -> Callable[[], None]:
+    return lambda: items.__setitem__(place, value)
+
+
+def tests_of(path: Path) -> list[str]:
+    """List the test files to try, those first that are named after the module or import it."""
+    package, name = path.parts[1], path.with_suffix("").as_posix().replace("/", ".")
+    places = [ROOT / TESTS / each for each in (package, *FURTHER.get(package, ()))]
+    files = [
+        file for place in places for file in ([place] if place.suffix else sorted(place.rglob("test_*.py")))
+    ]
+
+    def distance(file: Path) -> int:
+        if file.stem == f"test_{path.stem}":
+            return 0
+        return 1 if name in file.read_text("utf-8") else 2
+
+    return [str(file.relative_to(ROOT)) for file in sorted(dict.fromkeys(files), key=distance)]
+
+
+def noticed(mutant: Mutant, tree: Path) -> bool:
+    """Tell whether a test fails on the changed program."""
+    target = tree / mutant.path
+    whole = target.read_bytes()
+    target.write_text(mutant.source, "utf-8")
+    try:
+        done = subprocess.run(
+            [sys.executable, "-m", "pytest", *_QUICKLY, *tests_of(mutant.path)],
+            cwd=tree,
+            env={**os.environ, "PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1"},
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            timeout=_SECONDS,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        return True
+    finally:
+        target.write_bytes(whole)
+    return done.returncode != 0
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Try the changes, and print a line for each that lives and one for each package."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("packages", nargs="*", help="of rollcli (all)")
+    parser.add_argument("--count", type=int, default=15)
+    parser.add_argument("--seed", type=int, default=1)
+    given = parser.parse_args(arguments)
+    every = sorted(path.parent.name for path in (ROOT / PROGRAM).glob("*/__init__.py"))
+    with tempfile.TemporaryDirectory() as folder:
+        tree = Path(folder) / "tree"
+        shutil.copytree(ROOT, tree, ignore=shutil.ignore_patterns(".*", "out", "*.egg-info", "__pycache__"))
+        if (ROOT.parent / "shared").exists():
+            (tree.parent / "shared").symlink_to((ROOT.parent / "shared").resolve())
+        for package in given.packages or every:
+            places = [
+                make for path in sorted((ROOT / PROGRAM / package).rglob("*.py")) for make in mutants(path)
+            ]
+            drawn = random.Random(f"{given.seed} {package}").sample(places, min(given.count, len(places)))
+            start, killed = time.monotonic(), 0
+            for make in drawn:
+                mutant = make()
+                if noticed(mutant, tree):
+                    killed += 1
+                else:
+                    print(f"  lives: {mutant.path}:{mutant.line}: {mutant.change}", flush=True)
+            seconds = time.monotonic() - start
+            print(f"{package}: {len(drawn)} tried, {killed} killed, {seconds:.0f} s", flush=True)
+
+
+if __name__ == "__main__":
+    main()
