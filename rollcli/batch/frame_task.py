@@ -46,7 +46,7 @@ def _estimate(frame: Frame, options: FrameOptions, images: dict[str, bytes]) -> 
     made, note = encode_images(frame, source, estimate, options, horizon)
     row = _row(frame, source, estimate, note, likeness)
     images.update(made)
-    warning = "; ".join(filter(None, [source.warning, likeness]))
+    warning = "; ".join(filter(None, [source.warning, source.beyond, likeness]))
     return FrameResult(row, source.encoding, warning, source.searched)
 
 

@@ -43,7 +43,7 @@ def _conversions(frames: Sequence[Frame], options: DerotateOptions) -> Iterator[
         roll_deg = rotation.roll_deg if row is None else row.roll_deg
         refused = "" if roll_deg is not None else f"has no angle in {rotation.result}"
         writes = (output_path(frame, options.output),)
-        yield Conversion(frame, writes, math.radians(roll_deg or 0.0), refused)
+        yield Conversion(frame, writes, math.radians(roll_deg or 0.0), refused, keeps_numbers=True)
 
 
 def _tell_suspects(rows: Sequence[Row], rotation: RotationOptions, running: RunningOptions) -> None:

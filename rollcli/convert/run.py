@@ -33,12 +33,15 @@ class Conversion:
         Angle to rotate by, radians.
     refused : str
         Why this frame cannot be converted; empty when it can.
+    keeps_numbers : bool
+        What is stored stays as it is: how it is read does not matter.
     """
 
     frame: Frame
     writes: tuple[str, ...]
     roll: float = 0.0
     refused: str = ""
+    keeps_numbers: bool = False
 
 
 def convert(

@@ -77,7 +77,8 @@ def _convert(
         made.update(make(source))
         row = Row(frame.file, frame.right_file, "ok")
         too_large = "" if paths[0] in made else TOO_LARGE_FOR_PNG
-        warning = source.warning or source.doubt or source.note or too_large
+        beyond = "" if conversion.keeps_numbers else source.beyond
+        warning = source.warning or beyond or source.doubt or source.note or too_large
         return FrameResult(row, source.encoding, warning, source.searched)
 
     result = guarded(frame, work)

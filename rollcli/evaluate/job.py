@@ -34,7 +34,8 @@ def examine_file(frame: Frame, options: PaperOptions, truth: Mapping[str, float]
         findings = examine(frame.file, usable_pixels(source), turns, known, chosen=options.has_region)
     except FRAME_ERRORS as error:
         return lost(frame, str(error) or type(error).__name__)
-    return Examined(FrameResult(Row(frame.file, status="ok"), source.encoding, source.warning), findings)
+    warning = source.warning or source.beyond
+    return Examined(FrameResult(Row(frame.file, status="ok"), source.encoding, warning), findings)
 
 
 def usable_pixels(source: Source) -> NDArray[Any]:

@@ -36,6 +36,8 @@ class Source:
         What the map file holds; None for a pair.
     encoding, warning : str
         How the stored numbers were read, and why that may be wrong.
+    beyond : str
+        Why the disparities are too large to be pixels, and what would divide them; empty when they are not.
     searched : tuple of int, or None
         First and last disparity searched, px; pairs only.
     doubt : str
@@ -53,6 +55,7 @@ class Source:
     stored: Stored | None = None
     encoding: str = ""
     warning: str = ""
+    beyond: str = ""
     searched: tuple[int, int] | None = None
     doubt: str = ""
     note: str = ""
@@ -92,7 +95,8 @@ def _read(frame: Frame, options: FrameOptions) -> Source:
         found.disparity,
         stored=stored,
         encoding=encoding,
-        warning="; ".join(filter(None, [found.warning, beyond])),
+        warning=found.warning or "",
+        beyond=beyond,
         # the roll is the same at any scale, pitch and height are not
         doubt=beyond if frame.calibration is not None else "",
     )

@@ -285,3 +285,10 @@ def test_leaving_out_every_map_or_none_that_is_doubted_is_refused(folder):
     every = rollcli("derotate", "maps", "--from", "rolls.csv", "--skip-suspect", "-o", "out", cwd=folder)
     assert (every.status, "every angle is suspect" in every.err) == (2, True)
     assert not (folder / "out").exists()
+
+
+def test_numbers_that_are_kept_are_not_warned_of(tmp_path):
+    np.save(tmp_path / "x256.npy", 256 * road_map())
+    assert "256 times too large" in rollcli("vdisparity", "x256.npy", "-o", "v", cwd=tmp_path).err
+    done = rollcli("derotate", "x256.npy", "--roll", "2", "-o", "out", cwd=tmp_path)
+    assert (done.status, "too large" in done.err) == (0, False)
