@@ -1,8 +1,8 @@
 """What a file that is no disparity map in pixels seems to be, and what to do about it.
 
 Of 108 real maps none is taken for anything else, stretched to 8 bits or not. Of the depth maps made of them
-105 are told, a third as depth or upside down; of the maps turned upside down 107, a tenth likewise. Each of 86
-real photographs is told; blurred and dark ones are not.
+105 are told, a third as depth or upside down; of the maps turned upside down 107, a tenth likewise. Each of
+86 real photographs is told; blurred and dark ones are not.
 """
 
 import math
