@@ -15,6 +15,7 @@ import cv2
 from rollcli.cli.main import main
 from rollcli.files.codecs import mute_stderr
 from rollcli.messages import let_stderr_fail
+from rollcli.parallel.interrupt import stop_signals
 
 
 class Finished(NamedTuple):
@@ -45,7 +46,7 @@ def _process_state(cwd: Path, environment: Mapping[str, str]) -> Iterator[None]:
     _forget()
     folder, variables, line = Path.cwd(), dict(os.environ), sys.argv
     threads, sink = cv2.getNumThreads(), mute_stderr._sink
-    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    handlers = {number: signal.getsignal(number) for number in stop_signals()}
     mute_stderr._sink = None
     os.chdir(cwd)
     _set_environment(environment)

@@ -20,6 +20,8 @@ from rollcli.files.locking import being_written, nobody_writes
 from rollcli.files.stores.locations import is_url
 
 _LONGEST_NAME = 225  # bytes; file systems allow 255 with what is added
+_ON_WINDOWS = os.name == "nt"
+_WINDOWS_PATH = 259 - 27  # characters of a whole path, less what the temporary file's name adds
 _RANDOM_BYTES = 8
 _NO_LINKS = (errno.EPERM, errno.EINVAL, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP)  # of FAT, say
 _PART = re.compile(rf"\.(.+)\.[0-9a-f]{{{2 * _RANDOM_BYTES}}}\.part", re.DOTALL)
@@ -31,7 +33,10 @@ class NameTakenError(OutputError):
 
 def output_error(path: str | Path, error: OSError) -> OutputError:
     """Make the error of a failed write: one line that names the target, not the temporary file."""
-    return OutputError(f"{path}: cannot be written: {(error.strerror or str(error)).lower()}")
+    reason = (error.strerror or str(error)).lower()
+    if _ON_WINDOWS and len(str(Path(path).absolute())) > _WINDOWS_PATH:
+        reason += f" (Windows takes {_WINDOWS_PATH} characters unless its long paths are switched on)"
+    return OutputError(f"{path}: cannot be written: {reason}")
 
 
 @contextlib.contextmanager
@@ -75,6 +80,8 @@ def atomic_file(path: str | Path, *, durable: bool = False, replaces: bool = Tru
                 else:
                     _take_free_name(temporary, target)
             except BaseException:
+                with contextlib.suppress(OSError):
+                    file.close()  # Windows removes no open file
                 with contextlib.suppress(OSError):
                     temporary.unlink()
                 raise

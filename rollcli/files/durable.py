@@ -87,7 +87,8 @@ def _in_threads(sync: Callable[[Path], None], paths: Sequence[Path]) -> None:
 
 
 def _sync_path(path: Path) -> None:
-    with contextlib.suppress(FileNotFoundError), path.open("rb") as file:
+    # Windows forces only what is open for writing
+    with contextlib.suppress(FileNotFoundError), path.open("r+b" if os.name == "nt" else "rb") as file:
         os.fsync(file.fileno())
 
 
