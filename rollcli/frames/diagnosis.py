@@ -43,7 +43,7 @@ def require_positive(stored: Stored, name: str) -> None:
     InputError
     """
     values = stored.values
-    if values.dtype.kind not in "if" or values.max() > 0:
+    if values.dtype.kind not in "if" or values.max() > 0 or np.any(values > 0):  # the maximum may be NaN
         return
     negative = values[values < 0]
     negative = negative[np.isfinite(negative)]

@@ -103,8 +103,15 @@ def test_a_map_of_negative_numbers_is_asked_for_its_sign(empty):
 
 @pytest.mark.parametrize(
     "values",
-    [np.full((9, 9), -16, np.int16), np.zeros((9, 9)), road_map() - 30, np.full((9, 9), np.nan)],
-    ids=["no data", "zero", "both signs", "nan"],
+    [
+        np.full((9, 9), -16, np.int16),
+        np.zeros((9, 9)),
+        road_map() - 30,
+        np.full((9, 9), np.nan),
+        np.array([[np.nan, -2.0, -1.0], [3.0, 4.0, 5.0]]),
+        np.array([[-np.inf, -np.inf]]),
+    ],
+    ids=["no data", "zero", "both signs", "nan", "nan and both signs", "infinite"],
 )
 def test_a_map_without_disparities_is_not_asked_for_its_sign(values):
     require_positive(Stored(values, "npy"), "a.npy")
