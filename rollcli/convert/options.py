@@ -12,10 +12,10 @@ from rollcli.rig.options import CalibrationOptions
 class RotationOptions:
     """Where the angles come from: one for all maps, or a result with one for each."""
 
-    roll_deg: float | None = None
-    result: str | None = None
-    expand: bool = False
-    skip_suspect: bool = False
+    roll_deg: float | None
+    result: str | None
+    expand: bool
+    skip_suspect: bool
 
 
 @dataclass(frozen=True)

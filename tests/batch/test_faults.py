@@ -224,10 +224,7 @@ def test_a_frame_that_kills_its_worker_twice_is_an_error_row_and_the_batch_goes_
     rows = parse_rows((maps / "rolls.csv").read_bytes(), "rolls.csv")
     assert len(rows) == FRAMES
     assert [(row.file, row.message) for row in rows if row.status == "error"] == [
-        (
-            "maps/frame3.png",
-            "maps/frame3.png: its worker died twice: killed for memory, perhaps, or crashed",
-        )
+        ("maps/frame3.png", "its worker died twice: killed for memory, perhaps, or crashed")
     ]
 
 

@@ -35,7 +35,7 @@ def derotated(folder, roll_deg, *, encoding="auto", expand=False, invalid=()):
     return run_derotate(
         DerotateOptions(
             InputOptions((str(folder / "maps"),)),
-            RotationOptions(roll_deg, None, expand),
+            RotationOptions(roll_deg, None, expand, False),
             str(folder / "out"),
             EncodingOptions(encoding, invalid=invalid),
             RunningOptions(jobs=1, quiet=True, overwrite=True),

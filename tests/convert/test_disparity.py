@@ -170,3 +170,13 @@ def matched_share(path: Path) -> float:
     disparity = read_disparity(path)
     seen_by_both = disparity[:, int(disparity.max()) + 1 :]
     return float((seen_by_both > 0).mean())
+
+
+def test_its_own_maps_and_previews_never_become_inputs(tmp_path):
+    write_pair(tmp_path, "a.png", road_map(width=160, height=80) / 2)
+    outputs = ("-o", "left/maps", "--preview", "right/previews", "--overwrite")
+    for _ in range(2):
+        done = match(tmp_path, "--recursive", *outputs, left="left", right="right")
+        assert done.status == 0, done.err
+    assert sorted(contents(tmp_path / "left")) == ["a.png", "maps/a.png"]
+    assert sorted(contents(tmp_path / "right")) == ["a.png", "previews/a.png"]

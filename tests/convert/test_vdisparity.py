@@ -77,3 +77,10 @@ def test_two_maps_of_one_name_are_refused(maps):
     done = rollcli("vdisparity", "maps", "-o", "v", cwd=maps)
     assert done.status == 2
     assert "would both write v/frame0.png" in done.err
+
+
+def test_its_own_pictures_never_become_inputs(maps):
+    for _ in range(2):
+        line = ("vdisparity", "maps", "--recursive", "-o", "maps/v", "--overwrite")
+        assert rollcli(*line, cwd=maps).status == 0
+    assert sorted(contents(maps / "maps" / "v")) == [f"frame{index}.png" for index in range(3)]

@@ -91,10 +91,9 @@ def test_frames_without_an_angle_or_a_truth_are_named():
 
 
 def test_suspect_frames_are_compared_and_counted():
-    found = assess(
-        rows(1.0, status="suspect") + rows(2.0, folder="x", ending="b.png"), {"frame1": 0, "xframe1b": 0}
-    )
-    assert (found.count, found.ok, found.suspect) == (2, 1, 1)
+    given = rows(1.0, 1.5, status="suspect") + rows(2.0, folder="x", ending="b.png")
+    found = assess(given, {"frame1": 0, "frame2": 0, "xframe1b": 0})
+    assert (found.count, found.ok, found.suspect) == (3, 1, 2)
 
 
 def test_when_nothing_matches_the_error_says_what_was_looked_for():

@@ -50,6 +50,15 @@ def test_a_second_run_is_refused(result, impatient):
         os.close(other)
 
 
+def test_where_locks_are_there_is_no_lock_file_and_nothing_is_said(result, capsys):
+    descriptor, name = result
+
+    with locking.locked(descriptor, name):
+        assert [path.name for path in Path(name).parent.iterdir()] == ["rolls.csv"]
+
+    assert capsys.readouterr().err == ""
+
+
 def test_without_locks_a_lock_file_keeps_a_second_run_away_and_that_is_said(result, without_locks, capsys):
     descriptor, name = result
 
