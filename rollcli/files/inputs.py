@@ -93,15 +93,19 @@ def find_inputs(
     """
     search = Search(endings, recursive, include, exclude, skip)
     found: list[Input] = []
-    seen: set[str] = set()
+    seen: dict[str, set[str]] = {}  # names by their folders, whose texts they share
     real = functools.cache(os.path.realpath)  # one folder holds thousands of files
     for argument, literal in _arguments(inputs, files_from, stdin):
         for path, relative in search.files(argument, literal=literal):
             # links to files stay themselves: each may be a frame
-            folder, base = os.path.split(path)
-            identity = path if is_url(path) else f"{real(folder)}/{base}"
-            if identity not in seen:
-                seen.add(identity)
+            if is_url(path):
+                folder, base = "", path
+            else:
+                folder, base = os.path.split(path)
+                folder = real(folder)
+            names = seen.setdefault(folder, set())
+            if base not in names:
+                names.add(base)
                 found.append(Input(path, _shown(path), relative))
     del seen  # before the keys of the sort take its place
     if not any(is_url(each.location) or os.path.lexists(each.location) for each in found):

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 # the marks of a left and of a right image: a word or letter of its own, leftImg8bit, m1_L1, 000123r
 _WORDS = (
@@ -31,7 +32,17 @@ def natural_key(name: str) -> str:
     A string, since a batch has a hundred thousand of them: a folder ends with the lowest character, numbers
     come before text, and a number is told by its length first.
     """
-    return "\0".join("".join(map(_run_key, _RUNS.findall(part))) for part in name.split("/"))
+    folder, slash, base = name.rpartition("/")
+    return f"{_folder_key(folder)}\0{_part_key(base)}" if slash else _part_key(base)
+
+
+@lru_cache(maxsize=1024)  # a folder holds many names
+def _folder_key(folder: str) -> str:
+    return "\0".join(map(_part_key, folder.split("/")))
+
+
+def _part_key(part: str) -> str:
+    return "".join(map(_run_key, _RUNS.findall(part)))
 
 
 _RUNS = re.compile(r"[0-9]+|[^0-9]+")

@@ -101,19 +101,22 @@ class Search:
         if _identity(folder) in skipped:
             raise UsageError(f"{folder}: is an input and an output folder; write the results elsewhere")
         closed = skipped | {_identity(folder)}  # links may make a circle
-        waiting = [str(folder)]
+        base = str(folder)
+        cut = 0 if base == os.curdir else len(base.rstrip(os.sep)) + 1  # what stands before a relative path
+        waiting = [base]
         while waiting:  # no recursion: folders may lie a thousand deep
             root = waiting.pop()
             inner = []
             for entry in _entries(root):
                 if entry.name.startswith("."):
                     continue
-                mode = _mode(entry.path)
+                # the folder tells what most entries are; asking for each takes as long as all the rest
+                mode = stat.S_IFREG if entry.is_file(follow_symlinks=False) else _mode(entry.path)
                 if stat.S_ISDIR(mode):
                     inner.append(entry.path)
                 elif self._reads(entry.name) and stat.S_ISREG(mode):
-                    path = Path(entry.path)
-                    yield str(path), path.relative_to(folder).as_posix()
+                    path = entry.path.removeprefix(f"{os.curdir}{os.sep}")
+                    yield path, path[cut:].replace(os.sep, "/")
             opened = []
             for each in sorted(inner) if self._recursive else ():
                 if (identity := _identity(each)) not in closed:

@@ -3,6 +3,7 @@
 import contextlib
 import posixpath
 from collections.abc import Collection, Iterable, Iterator, Mapping
+from functools import lru_cache
 from pathlib import Path
 
 from rollcli.errors import OutputError
@@ -18,15 +19,21 @@ ENDING_OF_FORMAT = {"png": ".png", "tiff": ".tif", "npy": ".npy"}  # of maps com
 
 def image_paths(frame: Frame, images: ImageOptions) -> Iterator[tuple[str, str]]:
     """Yield (kind, path) of each image that is written for a frame."""
-    computed = ENDING_OF_FORMAT[images.save_as]
+    for kind, folder, ending in _kinds(images, computed=bool(frame.right_file)):
+        yield kind, output_path(frame, folder, ending)
+
+
+@lru_cache(maxsize=16)  # the same for each of a million frames
+def _kinds(images: ImageOptions, *, computed: bool) -> tuple[tuple[str, str, str | None], ...]:
+    """List (kind, folder, ending) of the images; None is the ending of the frame's own file."""
+    of_maps = ENDING_OF_FORMAT[images.save_as]
     endings = {
-        "derotated": computed if frame.right_file else None,
+        "derotated": of_maps if computed else None,
         "vdisparity": ".png",
-        "disparity": computed,
+        "disparity": of_maps,
         "road_mask": ".png",
     }
-    for kind, folder in images.folders():
-        yield kind, output_path(frame, folder, endings[kind])
+    return tuple((kind, folder, endings[kind]) for kind, folder in images.folders())
 
 
 def roomy_path(path: str) -> str:
@@ -72,8 +79,8 @@ class MadeImages:
 
 def output_path(frame: Frame, folder: str, ending: str | None = None) -> str:
     """Name the file of a frame below `folder`; it keeps the frame's own ending unless one is given."""
-    stem, own = posixpath.splitext(frame.relative)
-    return posixpath.join(folder, stem + (own if ending is None else ending))
+    name = frame.relative if ending is None else posixpath.splitext(frame.relative)[0] + ending
+    return f"{folder}{name}" if folder.endswith("/") else f"{folder}/{name}"
 
 
 def every_path(frame: Frame, images: ImageOptions, root: str = "") -> list[str]:

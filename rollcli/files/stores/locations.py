@@ -15,7 +15,7 @@ _SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]+)://")  # two letters or more: "c
 
 def is_url(location: str) -> bool:
     """Return whether a location is a URL rather than a local path."""
-    return _SCHEME.match(location) is not None
+    return "://" in location and _SCHEME.match(location) is not None
 
 
 def is_object_url(location: str) -> bool:
