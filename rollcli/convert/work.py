@@ -1,6 +1,7 @@
 """Convert one frame, on a worker: read, compute, write."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from rollcli.estimator.estimate import estimate_roll
 from rollcli.files.codecs.png import encode_png
 from rollcli.files.formats import encode_stored
 from rollcli.files.results import Row
+from rollcli.frames.diagnosis import looks_like
 from rollcli.frames.encode import TOO_LARGE_FOR_PNG, encode_computed, encode_turned
 from rollcli.frames.frame import FrameResult
 from rollcli.frames.guard import guarded
@@ -36,14 +38,19 @@ def derotate_map(conversion: Conversion, options: FrameOptions, expand: bool) ->
 
 def count_map(conversion: Conversion, options: FrameOptions, count: CountOptions) -> FrameResult:
     """Write the v-disparity image of the map, and the counts if they were requested."""
+    likeness = ""
 
     def make(source: Source) -> dict[str, bytes]:
+        nonlocal likeness
         histogram = v_disparity(source.disparity, bins=count.bins, max_disparity=count.max_disparity)
-        picture = encode_png(draw_v_disparity(histogram, _road(source)))
+        road = _road(source)
+        likeness = "" if road is not None else looks_like(source.disparity, source.stored, options)
+        picture = encode_png(draw_v_disparity(histogram, road))
         images = [picture, encode_stored(histogram.counts, "tiff")] if count.counts else [picture]
         return dict(zip(map(options.at, conversion.writes), images, strict=True))
 
-    return _convert(conversion, options, make)
+    result = _convert(conversion, options, make)
+    return replace(result, warning="; ".join(filter(None, [result.warning, likeness])))
 
 
 def match_frame(

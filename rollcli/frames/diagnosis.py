@@ -1,12 +1,14 @@
 """What a file that is no disparity map in pixels seems to be, and what to do about it.
 
-Of 108 real maps none is taken for anything else, stretched to 8 bits or not. Of the depth maps made of them
-105 are told, a third as depth or upside down; of the maps turned upside down 107, a tenth likewise. Each of
-86 real photographs is told; blurred and dark ones are not.
+Of 105 real maps none is taken for anything else, stretched to 8 bits or not. Of the depth maps made of them
+104 are told, up to a third as depth or upside down; of the maps turned upside down 104, a tenth likewise.
+Each of 86 real photographs is told; blurred and dark ones are not. The numbers lie amid the gaps that these
+files leave (python tests/benchmarks/bench_diagnosis.py).
 """
 
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,21 +20,48 @@ from rollcli.files.encodings import Encoding
 from rollcli.files.formats import Stored
 from rollcli.frames.options import FrameOptions
 
-# share of the disparities beyond the map's width: from here on these are not outliers, but the whole map
-_BEYOND = 0.01
-# the nearest of a real map lie at up to a quarter of its width; one that is still larger is no better
-_PLAUSIBLE = 0.5
 _DIVISORS = (("sgbm", 16), ("kitti", 256))
-# Neighbours in a row, in 256 levels. Of photographs 57 to 83 % differ by more than a level, and 6 to 24 % are
-# equal; of maps at most 31 %, and at least 38 %. Noise differs by more than a quarter of the range
-_TEXTURED, _EQUAL, _NOISE_STEP, _NOISE = 0.45, 0.3, 64, 0.1
-# rows whose median grows downward are those of a disparity map: no need to try what else it may be. The
-# correlation of row and median is -0.95 to 0.0 in depth maps and in maps that are upside down
-_DOWNWARD = 0.2
-_EVERY = 4  # rows, and columns where these need not be neighbours: enough for shares and medians
-_WIDE = math.radians(5.0)  # how wide an interval may be where only the road counts
 _DEPTH_MAP = "like a depth map: give --encoding depth and its calibration, such as --calib FILE"
 _UPSIDE_DOWN = "upside down: reverse the order of its rows"
+
+
+@dataclass(frozen=True)
+class DiagnosisTuning:
+    """The numbers that tell what a file looks like; what they were found on stands above.
+
+    Attributes
+    ----------
+    beyond : float
+        Share of the disparities that are larger than the map is wide: from here on they are not outliers.
+    plausible : float
+        Share of the map's width up to which its nearest disparities may reach; in real maps a quarter. A
+        divisor that leaves them larger does not explain the map.
+    textured, equal : float
+        Shares of the neighbours in a row, in 256 levels. In photographs 57 to 83 % differ by more than a
+        level and 6 to 24 % are equal; in maps at most 31 %, and at least 38 %.
+    noise_step, noise : float
+        A step of levels, and the share of steps beyond it that noise has and no photograph.
+    downward : float
+        Correlation of a row and the median of its disparities from which a map has its near parts below:
+        no need to try what else it may be. In depth maps and in maps that are upside down -0.95 to 0.0.
+    every : int
+        Take each such row, and column where these need not be neighbours: enough for shares and medians.
+    wide : float
+        How wide an interval may be where only the road counts, radians.
+    """
+
+    beyond: float = 0.01
+    plausible: float = 0.5
+    textured: float = 0.45
+    equal: float = 0.3
+    noise_step: int = 64
+    noise: float = 0.1
+    downward: float = 0.2
+    every: int = 4
+    wide: float = math.radians(5.0)
+
+
+TUNING = DiagnosisTuning()
 
 
 def require_positive(stored: Stored, name: str) -> None:
@@ -71,7 +100,7 @@ def too_large(disparity: NDArray[Any], stored: Stored, encoding: str) -> str:
         return ""
     valid = disparity[disparity > 0]
     share = np.count_nonzero(valid > width) / valid.size
-    if share < _BEYOND:
+    if share < TUNING.beyond:
         return ""
     said = (
         f"{share:.0%} of the disparities are larger than the map is wide, {width} px "
@@ -80,8 +109,10 @@ def too_large(disparity: NDArray[Any], stored: Stored, encoding: str) -> str:
     if encoding == Encoding.DEPTH:
         return f"{said}: give --scale, the metres that a stored number of 1 stands for"
     numbers = stored.values[disparity > 0]
-    near = float(np.quantile(numbers.astype(np.float64), 1 - _BEYOND))
-    fitting = [(name, by) for name, by in _DIVISORS if name != encoding and near / by <= _PLAUSIBLE * width]
+    near = float(np.quantile(numbers.astype(np.float64), 1 - TUNING.beyond))
+    fitting = [
+        (name, by) for name, by in _DIVISORS if name != encoding and near / by <= TUNING.plausible * width
+    ]
     if not fitting:
         return f"{said}: give --scale, the pixels that a stored number of 1 stands for"
     times = " or ".join(str(by) for _, by in fitting)
@@ -119,28 +150,29 @@ def _likenesses(disparity: NDArray[Any], stored: Stored, options: FrameOptions) 
 
 
 def _is_photograph(values: NDArray[Any]) -> bool:
-    """Tell whether whole numbers have the texture of a photograph; `_TEXTURED` says how maps differ."""
+    """Tell whether whole numbers have the texture of a photograph; `DiagnosisTuning` says how maps differ."""
     if values.dtype.kind != "u" or values.shape[1] < 2:
         return False
-    levels = values[::_EVERY].astype(np.int64)
+    levels = values[:: TUNING.every].astype(np.int64)
     top = int(levels.max())
     if top > 255:
         levels = levels * 255 // top
     steps = np.abs(np.diff(levels, axis=1))
     return bool(
-        np.mean(steps > 1) > _TEXTURED
-        and np.mean(steps == 0) < _EQUAL
-        and np.mean(steps > _NOISE_STEP) < _NOISE
+        np.mean(steps > 1) > TUNING.textured
+        and np.mean(steps == 0) < TUNING.equal
+        and np.mean(steps > TUNING.noise_step) < TUNING.noise
     )
 
 
 def _grows_downward(disparity: NDArray[Any]) -> bool:
     """Tell whether the lower a row lies, the larger its disparities are, as in a map with a road."""
-    rows = [(v, row[(row > 0) & np.isfinite(row)]) for v, row in enumerate(disparity[::_EVERY, ::_EVERY])]
+    few = disparity[:: TUNING.every, :: TUNING.every]
+    rows = [(v, row[(row > 0) & np.isfinite(row)]) for v, row in enumerate(few)]
     medians = np.array([(v, np.median(valid)) for v, valid in rows if valid.size])
     if len(medians) < 3 or not np.ptp(medians[:, 1]) > 0:
         return False
-    return bool(np.corrcoef(medians.T)[0, 1] > _DOWNWARD)
+    return bool(np.corrcoef(medians.T)[0, 1] > TUNING.downward)
 
 
 def _inverse(values: NDArray[Any]) -> NDArray[Any]:
@@ -152,6 +184,6 @@ def _has_road(disparity: NDArray[Any], options: FrameOptions) -> bool:
     """Tell whether a road is found that gives no reason for doubt, however wide its interval."""
     seed = options.method.seed
     try:
-        return estimate_roll(disparity, max_interval=_WIDE, seed=seed).status == "ok"
+        return estimate_roll(disparity, max_interval=TUNING.wide, seed=seed).status == "ok"
     except EstimationError:
         return False
