@@ -5,13 +5,16 @@ import shlex
 import shutil
 from pathlib import Path
 
+import click
 import cv2
 import numpy as np
 import pytest
 
+from tests.readme_tables import commands
 from tests.run_cli import ROOT, contents, road_map, rollcli, rollcli_process, write_kitti
-from tests.test_readme import README, made, make, needs_make  # noqa: F401 (a fixture)
+from tests.test_readme import PAGES, README, made, make, needs_make  # noqa: F401 (a fixture)
 
+COMMANDS = dict(commands())
 BLOCKS = [text for _, text in re.findall(r"^```(\w*)\n(.*?)^```", README, flags=re.M | re.S)]
 SAMPLES = ROOT / "sample_data"
 ELSEWHERE = {
@@ -202,3 +205,30 @@ def test_the_programs_of_the_project_that_it_names_are_there():
     scripts = re.findall(r"`python (tests/[\w/]+\.py)", README)
     assert scripts
     assert [each for each in scripts if not (ROOT / each).is_file()] == []
+
+
+def lines_of(page):
+    """Yield the words of each command line of rollcli in the blocks of a page."""
+    for text in re.findall(r"^```(?:sh|make)?\n(.*?)^```", page.read_text("utf-8"), flags=re.M | re.S):
+        for line in text.replace("\\\n", " ").splitlines():
+            for part in re.split(r"\||&&|;", line.partition(" #")[0]):
+                words = (
+                    shlex.split(part, comments=True)
+                    if part.count('"') % 2 == part.count("'") % 2 == 0
+                    else []
+                )
+                if "rollcli" in words[:1]:
+                    yield words[1:]
+
+
+WITH_COMMANDS = [page for page in PAGES if any(lines_of(page))]
+
+
+@pytest.mark.parametrize("page", WITH_COMMANDS, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_every_command_line_of_every_page_is_one_that_the_program_takes(page):
+    for words in lines_of(page):
+        variable = any("$" in word for word in words)  # of a shell or a Makefile
+        if words and not (words[0].startswith("-") or variable or "--config" in words):
+            name = " ".join(words[:2]) if words[0] == "evaluate" else words[0]
+            context = COMMANDS[name].command.make_context(name, words[len(name.split()) :])
+            assert isinstance(context, click.Context)
