@@ -192,7 +192,8 @@ def open_output(plan: Plan, options: EstimateOptions) -> Iterator[Output]:
         It cannot be written.
     """
     if plan.in_parts and plan.output != STDOUT:
-        yield open_parts(plan, options)
+        with open_parts(plan, options) as parts:
+            yield parts
         return
     _check_permitted(plan.output, options)
     if plan.output == STDOUT:

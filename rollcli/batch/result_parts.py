@@ -5,8 +5,9 @@ count as done when it exists. Parts of CSV and JSON Lines, put together in their
 a run on a local disk writes.
 """
 
-import uuid
-from collections.abc import Mapping, Sequence
+import contextlib
+import time
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +15,11 @@ from rollcli.batch.options import EstimateOptions
 from rollcli.batch.plan import Plan
 from rollcli.batch.resume import check_restored, failed_positions, incomplete_frames, new_record
 from rollcli.batch.run_record import RunRecord
-from rollcli.errors import InputError, OutputError, UsageError
+from rollcli.errors import InputError, UsageError
 from rollcli.files.atomic import remove_leftovers
 from rollcli.files.codecs.parquet import encode_parquet, require_parquet
 from rollcli.files.durable import sync_files
+from rollcli.files.locking import locked_folder
 from rollcli.files.results import (
     Row,
     column_types,
@@ -35,12 +37,13 @@ from rollcli.files.stores.parts import part_names
 from rollcli.frames.frame import Frame, FrameResult
 from rollcli.frames.outputs import local_images, remove_image_leftovers
 
+_CHECK_S = 10.0  # a request of 50 ms now and then
+
 
 class PartsOutput:
     """Rows to a folder of parts, and FILE.run.json beside it."""
 
     resumable = True
-    keep_open: int | None = None
 
     def __init__(
         self,
@@ -48,8 +51,9 @@ class PartsOutput:
         record: RunRecord,
         kept: tuple[Row, ...],
         options: EstimateOptions,
+        keep_open: int | None = None,
     ) -> None:
-        self.kept = kept
+        self.kept, self.keep_open = kept, keep_open
         self.failed = failed_positions(kept, options)
         self._plan, self._record, self._part_rows = plan, record, options.result.part_rows
         self._next = len(kept) // self._part_rows
@@ -59,11 +63,13 @@ class PartsOutput:
         self.replaces = record.replaces
         self._image_options = options.images
         self._images: list[str] = []  # those of the part that is being filled
-        self._run = uuid.uuid4().hex  # tells our parts from those of another run
+        self._checked = time.monotonic()
         self._written = len(kept)
 
     def append(self, frame: Frame, result: FrameResult) -> None:
         """Take the row; every full part is written."""
+        if time.monotonic() - self._checked > _CHECK_S:
+            self._check_owned()
         self._record.saw(result.encoding, result.searched)
         self._waiting.append(result.row)
         if result.row.status != "error":
@@ -111,19 +117,27 @@ class PartsOutput:
         rows = [self._replacing.get(position, row) for position, row in enumerate(old, first)]
         data = self._encoded(number, rows)
         if data != self._encoded(number, old):
+            self._check_owned()
             write_bytes(_part_location(self._plan, number), data, durable=True)
 
     def hint(self) -> str:
         """Say that --resume continues after the last part."""
         return f"; {self._written} rows are kept, continue with --resume" if self._written else ""
 
+    def _check_owned(self) -> None:
+        self._record.check_owned()
+        self._checked = time.monotonic()
+
     def _write(self) -> None:
         sync_files(self._images)
         self._images.clear()
         data = self._encoded(self._next, self._waiting)
         location = _part_location(self._plan, self._next)
-        if not create(location, data, self._run):
-            raise OutputError(f"{location}: another run is writing this result; give another --output")
+        self._check_owned()
+        if not create(location, data, self._record.run):
+            raise UsageError(
+                f"{location}: another run has written this part; give each an --output of its own"
+            )
         self._written += len(self._waiting)
         self._next += 1
         self._waiting = []
@@ -137,7 +151,8 @@ class PartsOutput:
         return header + b"".join(format_row(row, plan.format, plan.timing) for row in rows)
 
 
-def open_parts(plan: Plan, options: EstimateOptions) -> PartsOutput:
+@contextlib.contextmanager
+def open_parts(plan: Plan, options: EstimateOptions) -> Iterator[PartsOutput]:
     """Begin a folder of parts, or continue that of an interrupted run.
 
     Raises
@@ -149,6 +164,16 @@ def open_parts(plan: Plan, options: EstimateOptions) -> PartsOutput:
     """
     if plan.format == "parquet":
         require_parquet()
+    check_parts(plan, resume=options.result.resume, overwrite=options.running.overwrite)
+    if is_url(plan.output):
+        yield _begin(plan, options, None)
+    else:
+        with locked_folder(plan.output) as descriptor:
+            yield _begin(plan, options, descriptor)
+
+
+def _begin(plan: Plan, options: EstimateOptions, keep_open: int | None) -> PartsOutput:
+    # again, now that no other run can write it
     parts = check_parts(plan, resume=options.result.resume, overwrite=options.running.overwrite)
     rows: tuple[Row, ...] = ()
     if options.result.resume:
@@ -161,7 +186,8 @@ def open_parts(plan: Plan, options: EstimateOptions) -> PartsOutput:
     for name in parts[_whole_parts(len(rows), options.result.part_rows) :]:
         remove(f"{plan.output}/{name}")
     record.write({})
-    return PartsOutput(plan, record, rows, options)
+    record.check_owned()  # another run may have begun in this very second
+    return PartsOutput(plan, record, rows, options, keep_open)
 
 
 def check_parts(plan: Plan, *, resume: bool, overwrite: bool) -> list[str]:

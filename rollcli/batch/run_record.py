@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import uuid
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict
 from itertools import islice
@@ -12,10 +13,10 @@ from rollcli import __version__
 from rollcli.batch.fingerprint import fingerprint
 from rollcli.batch.options import EstimateOptions
 from rollcli.batch.plan import Plan
-from rollcli.errors import InputError
+from rollcli.errors import InputError, UsageError
 from rollcli.files.results import run_path
-from rollcli.files.storage import write_bytes
-from rollcli.files.stores.locations import public_name
+from rollcli.files.storage import owner_of, write_bytes
+from rollcli.files.stores.locations import is_url, public_name
 from rollcli.frames.frame import Frame
 from rollcli.frames.options import EncodingOptions, FrameOptions, ImageOptions, MethodOptions, RegionOptions
 from rollcli.imaging.stereo_options import StereoOptions
@@ -55,6 +56,8 @@ class RunRecord:
         self._output = plan.output
         self._encodings: set[str] = set()
         self._searched: list[int] = []
+        self.run = uuid.uuid4().hex  # tells our objects from those of another run
+        self._begun = False
         self.replaces = options.running.overwrite  # older images, now and after a resume
         self.fixed = {
             "rollcli": __version__,
@@ -63,6 +66,24 @@ class RunRecord:
         }
         if options.calibration.given:
             self.fixed["calibration"] = _calibrations(plan.frames)
+
+    def check_owned(self) -> None:
+        """Check that no other run has begun since on a result in an object store, which has no locks.
+
+        The run that begins last goes on, and those before it end: they may hang, or have lost their network.
+
+        Raises
+        ------
+        UsageError
+            Another one has.
+        """
+        if not (self._begun and is_url(self._output)):
+            return
+        if owner_of(run_path(self._output)) not in (self.run, ""):
+            raise UsageError(
+                f"{public_name(self._output)}: another run has begun to write this result, so this one ends; "
+                "give each an --output of its own"
+            )
 
     @property
     def of_rows(self) -> dict[str, Any]:
@@ -87,7 +108,16 @@ class RunRecord:
             self.write({})
 
     def write(self, counts: Mapping[str, int], alignment: Mapping[str, Any] | None = None) -> None:
-        """Write the file, whole or not at all; `counts` is empty until the run is over, `alignment` None."""
+        """Write the file, whole or not at all; `counts` is empty until the run is over, `alignment` None.
+
+        Raises
+        ------
+        UsageError
+            See `check_owned`.
+        OutputError
+            It cannot be written.
+        """
+        self.check_owned()
         record = {
             **self.fixed,
             "encoding": sorted(self._encodings),
@@ -97,7 +127,9 @@ class RunRecord:
             "counts": counts,
             **({_REPLACES: True} if self.replaces and not counts else {}),
         }
-        write_bytes(run_path(self._output), json.dumps(record, indent=2).encode() + b"\n", durable=True)
+        data = json.dumps(record, indent=2).encode() + b"\n"
+        write_bytes(run_path(self._output), data, durable=True, owner=self.run)
+        self._begun = True
 
 
 def _effective(plan: Plan, options: EstimateOptions) -> dict[str, Any]:

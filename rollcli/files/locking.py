@@ -115,6 +115,34 @@ def locked(descriptor: int, name: str) -> Iterator[None]:
 
 
 @contextlib.contextmanager
+def locked_folder(name: str) -> Iterator[int | None]:
+    """Make a folder if there is none, and hold the lock on it; yield its descriptor, for workers to inherit.
+
+    None on Windows, where a folder cannot be opened.
+
+    Raises
+    ------
+    UsageError
+        Another run holds it.
+    OutputError
+        The folder cannot be made.
+    """
+    try:
+        Path(name).mkdir(parents=True, exist_ok=True)
+        descriptor = None if sys.platform == "win32" else os.open(name, os.O_RDONLY | os.O_CLOEXEC)
+    except OSError as error:
+        raise OutputError(f"{name}: cannot be written: {(error.strerror or str(error)).lower()}") from error
+    if descriptor is None:
+        yield None
+        return
+    try:
+        with locked(descriptor, name):
+            yield descriptor
+    finally:
+        os.close(descriptor)
+
+
+@contextlib.contextmanager
 def _lock_file(name: str) -> Iterator[None]:
     """Make a file that says who writes a result; that of a run on this machine that has ended is replaced."""
     path = Path(f"{name}{_LOCK}")

@@ -17,6 +17,7 @@ from rollcli.files.stores.objects import (
     folder_problem,
     list_objects,
     object_exists,
+    object_owner,
     object_problem,
     object_time_ns,
     read_object,
@@ -103,7 +104,7 @@ def write_problem(folder: str) -> str:
     return _READ_ONLY if scheme_of(folder) in WEB_SERVERS else folder_problem(folder)
 
 
-def write_bytes(location: str, data: bytes, *, durable: bool = False) -> None:
+def write_bytes(location: str, data: bytes, *, durable: bool = False, owner: str = "") -> None:
     """Write a file or an object, whole or not at all; what is there is replaced.
 
     Parameters
@@ -113,6 +114,8 @@ def write_bytes(location: str, data: bytes, *, durable: bool = False) -> None:
     data : bytes
     durable : bool
         Whether a file survives a power cut once this returns, as an object always does.
+    owner : str
+        Names who writes an object; `owner_of` returns it. A file has a lock instead.
 
     Raises
     ------
@@ -123,7 +126,12 @@ def write_bytes(location: str, data: bytes, *, durable: bool = False) -> None:
         write_atomic(location, data, durable=durable)
         return
     _require_writable(location)
-    write_object(location, data)
+    write_object(location, data, owner)
+
+
+def owner_of(url: str) -> str:
+    """Return who wrote an object; empty where it does not say, or where there is none."""
+    return object_owner(url)
 
 
 def write_new(location: str, data: bytes) -> None:

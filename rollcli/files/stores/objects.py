@@ -25,7 +25,7 @@ _RETRY_S = 60
 _PAGE = 1000
 _TRIES = 4  # by this module: a body that is cut in the middle, and a creation whose answer is lost
 _FIRST_PAUSE_S = 0.2
-_OWNER = "rollcli-run"  # attribute of an object that was created rather than replaced
+_OWNER = "rollcli-run"  # attribute of an object: who wrote it
 
 
 def read_object(url: str) -> bytes:
@@ -57,15 +57,15 @@ def read_object(url: str) -> bytes:
         raise InputError(f"{public_name(url)}: cannot be read: {reason_of(error)}") from None
 
 
-def write_object(url: str, data: bytes) -> None:
-    """Write an object, whole or not at all; an existing one is replaced.
+def write_object(url: str, data: bytes, owner: str = "") -> None:
+    """Write an object, whole or not at all; an existing one is replaced. `owner` names who writes.
 
     Raises
     ------
     OutputError
         The store does not take it.
     """
-    _put(url, data, "overwrite")
+    _put(url, data, "overwrite", {_OWNER: owner} if owner else None)
 
 
 def create_object(url: str, data: bytes, owner: str) -> bool:
@@ -75,9 +75,25 @@ def create_object(url: str, data: bytes, owner: str) -> bool:
     try:
         _put(url, data, "create", {_OWNER: owner})
     except AlreadyExistsError:
-        store, key = _open(url)
-        return _repeated(lambda: bool(store.get(key).attributes.get(_OWNER) == owner))
+        return object_owner(url) == owner
     return True
+
+
+def object_owner(url: str) -> str:
+    """Return who wrote an object; empty where it does not say, or where there is none.
+
+    Raises
+    ------
+    InputError
+        The store does not answer, or does not let us look.
+    """
+    store, key = _open(url)
+    try:
+        return str(_repeated(lambda: store.get(key).attributes.get(_OWNER, "")))
+    except FileNotFoundError:
+        return ""
+    except _store_errors() as error:
+        raise InputError(f"{public_name(url)}: cannot be read: {reason_of(error)}") from None
 
 
 def object_exists(url: str) -> bool:
