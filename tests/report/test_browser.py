@@ -4,8 +4,11 @@ import contextlib
 import re
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 
+from tests.page_picture import PICTURE, SHOWN, WIDTH, photograph
 from tests.report.results import row, write_result
 from tests.run_cli import road_map, rollcli, write_kitti, write_maps
 
@@ -358,6 +361,17 @@ def test_a_click_on_a_point_of_the_chart_leads_to_its_row_and_pictures(opened):
         assert (page.locator(".detail img").count() == 4) == (name == "maps/frame3.png")
         assert page.locator(".rows [aria-current]").is_visible()
     assert "is empty" in page.locator(".detail").inner_text()
+
+
+def test_the_readmes_picture_of_the_page_is_of_the_parts_it_names(browser, url):
+    page = Path(url.removeprefix("file://"))
+    assert [each for each in SHOWN if f"<h2>{each}</h2>" not in page.read_text("utf-8")] == []
+    pixels = cv2.imdecode(np.frombuffer(photograph(browser, page), np.uint8), cv2.IMREAD_COLOR)
+    assert pixels.shape[1] == WIDTH
+    assert 1200 < pixels.shape[0] < 2400  # without tables and lists, and of one frame
+    committed = cv2.imread(str(PICTURE))
+    assert committed.shape[1] == WIDTH
+    assert PICTURE.stat().st_size < 300_000
 
 
 def test_charts_follow_when_the_mode_changes(opened):
