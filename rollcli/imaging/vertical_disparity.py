@@ -6,6 +6,7 @@ roll does, by half a degree a pixel or so, and nothing in the map tells.
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -117,21 +118,61 @@ class _Seen:
     weight: Floats
 
 
+class _Shares(NamedTuple):
+    """What each pixel says of its block's shift down the rows, and where the blocks lie.
+
+    The least-squares shift is the sum of the grey differences, each times a share that the gradients decide.
+    Arrays of pixels have shape (blocks, pixels of a block).
+    """
+
+    share: Floats
+    weight: Floats
+    x: Floats
+    y: Floats
+
+    @staticmethod
+    def of(across: Floats, down: Floats, seen: Floats, x: Floats, y: Floats) -> "_Shares":
+        """Work them out from the gradients and places of the pixels that are `seen` (1; others 0)."""
+        count = np.maximum(seen.sum(axis=1), np.float32(1))
+        across, down = across * seen, down * seen
+
+        def mean(one: Floats, other: Floats) -> Floats:
+            found: Floats = np.einsum("ij,ij->i", one, other) / count
+            return found
+
+        # covariances within a block: the views' brightness may differ from place to place
+        mean_across, mean_down = mean(across, seen), mean(down, seen)
+        along = mean(across, across) - np.square(mean_across) + np.float32(_RIDGE)
+        mixed = (mean(across, down) - mean_across * mean_down) / along
+        weight = mean(down, down) - np.square(mean_down) - np.square(mixed) * along
+        weight[(weight <= _LEAST) | (count <= _KNOWN * _BLOCK**2)] = 0
+        share = down - mixed[:, None] * across - (mean_down - mixed * mean_across)[:, None] * seen
+        share /= (np.maximum(weight, np.float32(_LEAST)) * count)[:, None]
+        return _Shares(share, np.minimum(weight, np.float32(_MOST)), mean(x, seen), mean(y, seen))
+
+
 class _Blocks:
-    """The pair in blocks; what does not change from round to round is computed once."""
+    """The blocks of a pair; what does not change from round to round is computed once."""
 
     def __init__(self, views: Views, disparity: Floats) -> None:
-        height, width = (side // _BLOCK * _BLOCK for side in disparity.shape)
-        whole = np.s_[:height, :width]
         left, self._right = (_smooth(view) for view in views)
-        self._left = left[whole]
-        self._across, self._down = (gradient[whole] for gradient in _gradients(left))
-        self._known = disparity[whole] > 0
-        centre_x, centre_y = ((side - 1) / 2 for side in reversed(disparity.shape))
-        self._u = np.arange(width, dtype=np.float32) - disparity[whole]
-        self._x = self._u - np.float32(centre_x)
-        self._v = np.arange(height, dtype=np.float32)[:, None]
-        self._y = self._v - np.float32(centre_y)
+        known = (disparity > 0).astype(np.float32)
+        places = _block_means(known) > _KNOWN
+
+        def of_blocks(pixels: Floats) -> Floats:
+            height, width = (side // _BLOCK for side in pixels.shape)
+            blocks = pixels[: height * _BLOCK, : width * _BLOCK].reshape(height, _BLOCK, width, _BLOCK)
+            return blocks.swapaxes(1, 2)[places].reshape(-1, _BLOCK**2)
+
+        self._left, self._seen = of_blocks(left), of_blocks(known)
+        self._across, self._down = (of_blocks(gradient) for gradient in _gradients(left))
+        rows, columns = (_BLOCK * place[:, None].astype(np.float32) for place in np.nonzero(places))
+        within = np.arange(_BLOCK, dtype=np.float32)
+        self._v = rows + np.repeat(within, _BLOCK)
+        self._u = columns + np.tile(within, _BLOCK) - of_blocks(disparity)
+        centre_x, centre_y = (np.float32((side - 1) / 2) for side in reversed(disparity.shape))
+        self._x, self._y = self._u - centre_x, self._v - centre_y
+        self._shares = _Shares.of(self._across, self._down, self._seen, self._x, self._y)
 
     def vertical(self, at: Misalignment) -> _Seen:
         """Return the vertical disparities that are left when the right view is levelled by `at`."""
@@ -139,33 +180,19 @@ class _Blocks:
         u = self._u + np.float32(at.stretch) * x - np.float32(at.rotation) * y
         v = (np.float32(at.rotation) + np.float32(at.twist) * y) * x
         v += self._v + np.float32(at.offset) + np.float32(at.scale) * y
+        if not len(u):
+            return _Seen(x[:, 0], x[:, 0], x[:, 0], x[:, 0])
         height, width = self._right.shape
-        inside = (self._known & (u > 1) & (u < width - 2) & (v > 1) & (v < height - 2)).astype(np.float32)
         off = self._left - cv2.remap(self._right, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        off *= inside
-        across, down = self._across * inside, self._down * inside
-        part = _block_means(inside)
-        share = np.maximum(part, np.float32(1e-3))
-
-        def mean(pixels: Floats) -> Floats:
-            return (_block_means(pixels) / share).astype(np.float32, copy=False)
-
-        # covariances within a block: the views' brightness may differ from place to place
-        mean_off, mean_across, mean_down = mean(off), mean(across), mean(down)
-        along = mean(across * across) - np.square(mean_across) + np.float32(_RIDGE)
-        mixed = (mean(across * down) - mean_across * mean_down) / along
-        weight = mean(down * down) - np.square(mean_down) - np.square(mixed) * along
-        shift = (
-            mean(down * off) - mean_down * mean_off - mixed * (mean(across * off) - mean_across * mean_off)
-        )
-        telling = (part > _KNOWN) & (weight > _LEAST)
-        weight = weight[telling]
-        return _Seen(
-            mean(x * inside)[telling],
-            mean(y * inside)[telling],
-            shift[telling] / weight,
-            np.minimum(weight, np.float32(_MOST)),
-        )
+        shift = np.einsum("ij,ij->i", self._shares.share, off)
+        weight, mean_x, mean_y = (each.copy() for each in self._shares[1:])
+        inside = (u > 1) & (u < width - 2) & (v > 1) & (v < height - 2)
+        cut = np.flatnonzero(~inside.all(axis=1))  # few: those at the border
+        part = _Shares.of(self._across[cut], self._down[cut], self._seen[cut] * inside[cut], x[cut], y[cut])
+        shift[cut] = np.einsum("ij,ij->i", part.share, off[cut])
+        weight[cut], mean_x[cut], mean_y[cut] = part[1:]
+        telling = weight > 0
+        return _Seen(mean_x[telling], mean_y[telling], shift[telling], weight[telling])
 
 
 def _fit(seen: _Seen) -> tuple[Misalignment, Misalignment, float]:
@@ -181,13 +208,19 @@ def _fit(seen: _Seen) -> tuple[Misalignment, Misalignment, float]:
         inverse = np.linalg.inv(normal + 1e-6 * np.trace(normal) * np.eye(4))
         values = inverse @ (columns.T @ (weight * shift))
         off = shift - columns @ values
-        before, spread = spread, 1.4826 * float(np.median(np.abs(off))) + 1e-3
+        before, spread = spread, 1.4826 * _median(np.abs(off)) + 1e-3
         if abs(spread - before) < _SAME * spread:
             break
     scores = columns * (weight * off)[:, None] @ inverse
     errors = np.sqrt(np.square(scores).sum(axis=0))
     units = np.array([1, size, size, size**2])
     return Misalignment(*(values / units).tolist()), Misalignment(*(errors / units).tolist()), spread
+
+
+def _median(values: Doubles) -> float:
+    """Return the median, in a fifth of the time that `numpy.median` takes for a few hundred values."""
+    middle = (values.size - 1) // 2, values.size // 2
+    return float(np.partition(values, middle)[list(middle)].mean())
 
 
 def _believed(off: Doubles, spread: float) -> Doubles:
