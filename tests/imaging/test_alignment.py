@@ -200,6 +200,7 @@ def test_a_way_to_align_that_is_not_there_is_refused():
 @pytest.mark.parametrize(("clockwise_deg", "larger_percent", "lower"), [(0.5, 0.0, -2.0), (-0.8, 0.8, 4.0)])
 def test_real_street_pairs_are_levelled_by_what_was_added(clockwise_deg, larger_percent, lower):
     odd = {"clockwise_deg": clockwise_deg, "larger_percent": larger_percent, "lower": lower}
+    compared = 0
     for pair in pair_inputs(str(SHARED / "streets" / "left"), str(SHARED / "streets" / "right"))[::6]:
         left, right = read_image(pair.left.path), read_image(pair.right.path)
         as_it_is = match_pair(left, right, StereoOptions())
@@ -208,5 +209,8 @@ def test_real_street_pairs_are_levelled_by_what_was_added(clockwise_deg, larger_
         added = match.corrected - as_it_is.corrected
         assert added.rotation_deg == pytest.approx(clockwise_deg, abs=0.03)
         assert added.offset == pytest.approx(lower, abs=0.1)
-        moved = estimate_roll(match.disparity).theta - estimate_roll(as_it_is.disparity).theta
-        assert math.degrees(moved) == pytest.approx(0, abs=0.1)
+        found, before = estimate_roll(match.disparity), estimate_roll(as_it_is.disparity)
+        if before.status == "ok":  # a suspect angle may be either of two planes
+            assert math.degrees(found.theta - before.theta) == pytest.approx(0, abs=0.1)
+            compared += 1
+    assert compared >= 2
