@@ -84,3 +84,9 @@ def test_its_own_pictures_never_become_inputs(maps):
         line = ("vdisparity", "maps", "--recursive", "-o", "maps/v", "--overwrite")
         assert rollcli(*line, cwd=maps).status == 0
     assert sorted(contents(maps / "maps" / "v")) == [f"frame{index}.png" for index in range(3)]
+
+
+def test_the_last_line_counts_what_was_drawn(maps):
+    (maps / "maps" / "frame1.png").write_bytes(b"no map")
+    done = rollcli("vdisparity", "maps", "-o", "v", cwd=maps)
+    assert done.err.splitlines()[-1].startswith("rollcli: 3 frames: 2 ok, 1 failed; ")

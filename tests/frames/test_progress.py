@@ -121,3 +121,13 @@ def test_doubts_are_said_when_verbose(lines):
     counted = progress(verbose=True)
     counted.add(result("suspect", "is doubtful"))
     assert lines() == ["rollcli: a.png: suspect: is doubtful"]
+
+
+def test_the_last_line_is_the_summary_and_a_quiet_run_has_none(lines):
+    for quiet in (False, True):
+        counted = progress(2, quiet=quiet)
+        counted.add(result())
+        counted.tell_end()
+        assert [line.partition("; ")[0] for line in lines()] == [
+            "rollcli: 1 frame: 1 ok, 0 suspect, 0 failed"
+        ] * (not quiet)
