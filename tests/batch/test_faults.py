@@ -253,26 +253,43 @@ def test_a_worker_that_cannot_load_its_libraries_ends_the_run_in_one_line(maps):
     assert "cv2" in cannot_start(maps, env=environment(PYTHONPATH=path))
 
 
-def test_workers_end_with_a_run_that_is_killed(maps):
-    write_maps(maps / "more", 300, width=300, height=200)
+# a worker that reads a certain map never comes back from it
+ENDLESS = """
+import pathlib, sys, threading
+if "spawn_main" in " ".join(sys.orig_argv):
+    import rollcli.files.formats as formats
+    read = formats.read_stored
+    def read_stored(path, name=None):
+        if pathlib.Path(path).stem == "frame8":
+            pathlib.Path("has-begun").touch()
+            threading.Event().wait()
+        return read(path, name)
+    formats.read_stored = read_stored
+"""
+
+
+def test_workers_end_with_a_run_that_is_killed_also_in_the_middle_of_a_frame(maps):
+    (maps / "hook").mkdir()
+    (maps / "hook" / "sitecustomize.py").write_text(ENDLESS)
     run = subprocess.Popen(
-        command("estimate", "more", "-j2", "-o", "rolls.csv", "-q"),
+        command("estimate", "maps", "-j2", "-o", "rolls.csv", "-q"),
         cwd=maps,
-        env=environment(),
+        env=environment(PYTHONPATH=os.pathsep.join([str(maps / "hook"), str(ROOT)])),
         start_new_session=True,
     )
-    wait_for_bytes(maps / "rolls.csv", 2000)
+    wait_until((maps / "has-begun").exists)
     run.kill()
     run.wait()
-    give_up = time.monotonic() + 10
-    while alive_in_group(run.pid) and time.monotonic() < give_up:
-        time.sleep(0.02)
-    assert not alive_in_group(run.pid)
+    wait_until(lambda: not alive_in_group(run.pid))
 
 
 def wait_for_bytes(result, size):
+    wait_until(lambda: result.exists() and result.stat().st_size > size)
+
+
+def wait_until(condition):
     give_up = time.monotonic() + 60
-    while not (result.exists() and result.stat().st_size > size):
+    while not condition():
         assert time.monotonic() < give_up
         time.sleep(0.01)
 
