@@ -25,10 +25,16 @@ PROGRAM, TESTS = "rollcli", "tests"
 FURTHER = {
     "batch": ("cli/test_outputs.py", "cli/test_estimate.py", "cli/test_frames.py"),
     "cli": ("batch/test_resume.py",),
-    "convert": ("cli/test_outputs.py",),
+    "convert": ("cli/test_idle_options.py", "cli/test_outputs.py"),
     "evaluate": ("cli/test_evaluate.py", "cli/test_evaluate_paper.py"),
     "files": ("batch/test_resume.py", "cli/test_frames.py", "cli/test_outputs.py"),
-    "frames": ("cli/test_frames.py", "cli/test_outputs.py", "cli/test_streams.py", "convert"),
+    "frames": (
+        "cli/test_idle_options.py",
+        "cli/test_frames.py",
+        "cli/test_outputs.py",
+        "cli/test_streams.py",
+        "convert",
+    ),
     "parallel": ("batch/test_faults.py", "batch/test_resume.py"),
     "rig_check": ("cli/test_rig.py",),
     "rig": ("cli/test_calibration.py",),
