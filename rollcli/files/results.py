@@ -21,7 +21,7 @@ Format = Literal["csv", "jsonl", "parquet"]
 TEXT = {"encoding": "utf-8", "errors": "surrogateescape"}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Row:
     """What is known of one frame; None where a value is missing. The fields are the columns, in order."""
 
@@ -55,6 +55,7 @@ STATUSES = ("ok", "suspect", "error")
 TIMING = "elapsed_ms"
 COLUMNS = tuple(field.name for field in fields(Row) if field.name != TIMING)
 STDIN = "-"
+_MOST_SPACE = 1000  # bytes before what tells the format
 # a millionth of a degree is far below any map's noise; nine digits keep alpha2, which is small, whole
 _DIGITS = {
     "roll_deg": ".6f",
@@ -177,12 +178,13 @@ def parse_rows(data: bytes, name: str | Path) -> tuple[Row, ...]:
     if data.startswith(MAGIC):
         table = decode_parquet(data, str(name))
         return tuple(_row(values, f"{name}: row {number}") for number, values in table)
-    text = data.removeprefix(b"\xef\xbb\xbf").decode(**TEXT)
-    if text.lstrip().startswith("{"):
-        return tuple(
-            _row(values, f"{name}: line {number}") for number, values in json_rows(text.split("\n"), name)
-        )
-    lines = csv_rows(io.StringIO(text, newline=""), name)
+    stream = io.BytesIO(
+        data.removeprefix(b"\xef\xbb\xbf")
+    )  # decoded piece by piece: text takes 4 bytes a letter
+    if data[:_MOST_SPACE].removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"{"):
+        texts = (line.removesuffix(b"\n").decode(**TEXT) for line in stream)
+        return tuple(_row(values, f"{name}: line {number}") for number, values in json_rows(texts, name))
+    lines = csv_rows(io.TextIOWrapper(stream, TEXT["encoding"], TEXT["errors"], newline=""), name)
     _, header = next(lines)
     return tuple(
         _row(dict(zip(header, line, strict=True)), f"{name}: line {number}") for number, line in lines
