@@ -56,7 +56,7 @@ def test_the_row_of_a_pair_with_a_cut_image_says_so(tmp_path):
     done = rollcli("estimate", "--left", "a.jpg", "--right", "right/a.png", "-q", cwd=tmp_path)
 
     assert done.status == 3
-    assert "a.jpg: is a damaged JPEG: premature end of data segment" in done.out
+    assert "left image: is a damaged JPEG: premature end of data segment" in done.out
 
 
 @pytest.mark.parametrize("progressive", [False, True])
