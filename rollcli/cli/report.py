@@ -64,7 +64,7 @@ from rollcli.report.options import GALLERY, ReportOptions
 @config_option
 @click.pass_context
 def report(ctx: click.Context, /, **options: Any) -> None:
-    """Make an HTML page of RESULT, which `rollcli estimate` wrote as CSV or JSON Lines.
+    """Make an HTML page of RESULT, which `rollcli estimate` wrote.
 
     It shows the roll over the frames with its 95 % interval, suspect and failed frames marked; how often
     each roll occurs; a summary; and a gallery of maps before and after de-rotation with their v-disparity
