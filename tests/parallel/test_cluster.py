@@ -11,6 +11,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from tests.in_process import run_here
 from tests.run_cli import command, contents, environment, road_map, rollcli, write_maps, write_pair
 
 pytest.importorskip("distributed", reason="the extra cluster is not installed")
@@ -194,8 +195,8 @@ def test_what_is_no_address_is_refused_and_the_result_that_is_there_is_kept(tmp_
     write_maps(tmp_path / "maps", 1)
     rollcli("estimate", "maps", "-o", "rolls.csv", cwd=tmp_path)
     before = contents(tmp_path)
-    arguments = ("-o", "rolls.csv", "--overwrite", "--scheduler", address)
-    done = rollcli("estimate", "maps", *arguments, cwd=tmp_path)
+    line = ["estimate", "maps", "-o", "rolls.csv", "--overwrite", "--scheduler", address]
+    done = run_here(line, tmp_path, "", environment())
     assert done.status == 2
     assert done.err.startswith(f"rollcli: --scheduler {address!r}: ")
     assert done.err.endswith("; an address looks like tcp://host:8786\n")

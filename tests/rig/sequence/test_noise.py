@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from rollcli.rig.sequence import noise
 from rollcli.rig.sequence.noise import fit_noise
 from tests.rig.sequence.series import ar1
 
@@ -35,3 +36,15 @@ def test_the_variance_of_a_mean_is_the_sum_of_all_covariances(phi, white, frames
 @pytest.mark.parametrize("series", [[], [1.0], [0.0] * 100, [1.0, -1.0, 0.5]])
 def test_what_tells_nothing_has_no_correlation(series):
     assert fit_noise(np.array(series)).correlation_time == 1.0
+
+
+def test_the_longest_correlation_that_fits_is_that_of_the_best_where_no_other_fits():
+    decays, shares = np.array([0.05, 0.2, 0.6]), np.array([0.0, 0.3, 0.9])
+    deviance = np.full((3, 3), 50.0)
+    deviance[1, 1] = 0.0
+    best = noise._longest(deviance, decays, shares, np.unravel_index(4, (3, 3)))
+    assert best == pytest.approx(1 + 8.0 * min(1.0, 0.3 * noise._SLOW_MATTERS))
+    deviance[0, 1] = 0.9  # slower, and within one standard error
+    deviance[0, 0] = 0.9  # fits as well, but its slow share is smaller
+    longer = noise._longest(deviance, decays, shares, np.unravel_index(4, (3, 3)))
+    assert longer == pytest.approx(1 + 38.0 * min(1.0, 0.3 * noise._SLOW_MATTERS))
