@@ -1,18 +1,20 @@
 """What each tuned number of the estimator does: change one at a time, and look at error and coverage.
 
-    python tests/benchmarks/bench_ablation.py [FRAMES] [--only NAME] [--markdown]
+    python tests/benchmarks/bench_ablation.py [FRAMES] [--only NAME] [--off] [--markdown]
 
 Render FRAMES stereo pairs (40 by default), half with rolls within +-10 degrees, half within +-35, and match
 each once by SGBM. Make two worse maps of each: noise on two thirds of the pixels, disparities rounded to four
 pixels, one pixel in 50 left, an own bonnet, a truck ahead, or a wall over nearly half of the image; and one
 without a road: upside down, a depth map, a wall, or patches of sky. Where real maps with known rolls lie in
 ../shared/realmaps, take every third of them too. Then estimate all maps with each number of `Tuning` times
-0.67, times 1.5, and switched off where that means something.
+0.67, times 1.5, and switched off where that means something; with --off, only switched off, which many
+frames can then be had for.
 
 Columns: 95 % and worst error of the rendered maps, degrees; gross errors (above 0.5 degrees, or no angle) of
 rendered + degraded + real maps; wrong angles that are called ok, of rendered + degraded + real + roadless;
 needless doubts, of rendered + degraded + real maps within 0.25 degrees; coverage of the 95 % interval,
-rendered and real, and its median half-width, rendered. Read differences of one or two as noise.
+rendered and real, and its median half-width, rendered; maps whose angle moves by 0.02 degrees or whose status
+changes, of rendered + degraded + real + roadless. Read differences of one or two as noise.
 """
 
 import argparse
@@ -97,8 +99,9 @@ class Change(NamedTuple):
 
 
 class Outcomes(NamedTuple):
-    """Error, half-width (degrees) and whether the angle is called ok, for each map."""
+    """Angle, error, half-width (degrees) and whether the angle is called ok, for each map."""
 
+    angle: NDArray[np.float64]
     error: NDArray[np.float64]
     half_width: NDArray[np.float64]
     ok: NDArray[np.bool_]
@@ -124,13 +127,13 @@ def changed(tuning: Tuning, change: Change) -> Tuning:
     return replace(tuning, road=replace(tuning.road, **{group: record}))
 
 
-def changes(only: str) -> list[Change]:
+def changes(only: str, factors: tuple[float, ...]) -> list[Change]:
     """Return every change to try."""
     found = []
     for name, value in numbers(TUNING):
         if only not in name:
             continue
-        for factor in (0.67, 1.5):
+        for factor in factors:
             other = value * factor
             if isinstance(value, int):
                 other = max(1, round(other))
@@ -180,8 +183,8 @@ def without_road(disparity: Map, kind: str, rng: np.random.Generator) -> Map:
     return np.where(patches > 0.85, 2 + np.abs(noise), 0).astype(np.float32)
 
 
-def cases(frames: int) -> list[Case]:
-    """Return rendered, degraded, roadless and, where they are, real maps."""
+def cases(frames: int, every: int) -> list[Case]:
+    """Return rendered, degraded, roadless and, where they are, every third or so of the real maps."""
     found, rng = [], np.random.default_rng(9)
     for seed, span in SEEDS.items():
         for index, frame in enumerate(matched(frames // 2, seed, span)):
@@ -195,7 +198,7 @@ def cases(frames: int) -> list[Case]:
             rows = [row for row in csv.DictReader(file) if row["lo_deg"] and "sequence" not in row["file"]]
         found += [
             Case(read_disparity(REAL / row["file"]), float(row["lo_deg"]), float(row["hi_deg"]), "real")
-            for row in rows[::3]
+            for row in rows[::every]
         ]
     return found
 
@@ -208,34 +211,36 @@ def load(path: str) -> None:
 def estimate_all(tuning: Tuning) -> Outcomes:
     """Estimate every map."""
     rows = [estimate_one(case, tuning) for case in _maps]
-    error, half_width, ok = zip(*rows, strict=True)
-    return Outcomes(np.array(error), np.array(half_width), np.array(ok))
+    return Outcomes(*(np.array(column) for column in zip(*rows, strict=True)))
 
 
-def estimate_one(case: Case, tuning: Tuning) -> tuple[float, float, bool]:
-    """Return error and half-width, degrees, and whether the angle is called ok."""
+def estimate_one(case: Case, tuning: Tuning) -> tuple[float, float, float, bool]:
+    """Return angle, error and half-width, degrees, and whether the angle is called ok."""
     try:
         with np.errstate(all="ignore"):
             found = estimate_roll(case.disparity, tuning=tuning)
     except (EstimationError, np.linalg.LinAlgError, ValueError, IndexError):
-        return 90.0, 0.0, False  # a number may be changed beyond what the code can bear
+        return NAN, 90.0, 0.0, False  # a number may be changed beyond what the code can bear
     ok = found.status == "ok"
+    angle, half_width = math.degrees(found.theta), math.degrees(found.ci95 or 0.0)
     if case.kind == "roadless":
-        return 90.0, 0.0, ok
+        return angle, 90.0, half_width, ok
     middle, half = (case.low_deg + case.high_deg) / 2, (case.high_deg - case.low_deg) / 2
-    off = abs(math.remainder(math.degrees(found.theta) - middle, 180))
-    return max(0.0, off - half), math.degrees(found.ci95 or 0.0), ok
+    off = abs(math.remainder(angle - middle, 180))
+    return angle, max(0.0, off - half), half_width, ok
 
 
-HEADINGS = ("95 %", "worst", "gross", "wrong, ok", "needless", "coverage", "half-width")
+HEADINGS = ("95 %", "worst", "gross", "wrong, ok", "needless", "coverage", "half-width", "moved")
 
 
-def figures(outcomes: Outcomes, kinds: NDArray[np.str_]) -> tuple[str, ...]:
+def figures(outcomes: Outcomes, as_it_is: Outcomes, kinds: NDArray[np.str_]) -> tuple[str, ...]:
     """Return one cell for each of `HEADINGS`."""
     roads = [kind for kind in ("rendered", "degraded", "real") if (kinds == kind).any()]
     rendered = kinds == "rendered"
     gross, good = outcomes.error > 0.5, outcomes.error <= 0.25
     held = outcomes.error <= outcomes.half_width
+    turned = np.abs(np.remainder(outcomes.angle - as_it_is.angle + 90, 180) - 90)
+    moved = ~(turned <= 0.02) & ~(np.isnan(outcomes.angle) & np.isnan(as_it_is.angle))
 
     def counts(what: NDArray[np.bool_], of: list[str]) -> str:
         return " + ".join(str(np.count_nonzero(what & (kinds == kind))) for kind in of)
@@ -249,10 +254,11 @@ def figures(outcomes: Outcomes, kinds: NDArray[np.str_]) -> tuple[str, ...]:
         counts(good & ~outcomes.ok, roads),
         " / ".join(covered),
         f"{np.median(outcomes.half_width[rendered]):.3f}",
+        counts(moved | (outcomes.ok != as_it_is.ok), [*roads, "roadless"]),
     )
 
 
-WIDTHS = (28, 9, 7, 6, 6, 11, 14, 11, 12, 10)
+WIDTHS = (28, 9, 7, 6, 6, 11, 14, 11, 12, 10, 14)
 
 
 def line(cells: tuple[str, ...], markdown: bool) -> str:
@@ -267,12 +273,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Change one tuned number of the estimator at a time.")
     parser.add_argument("frames", nargs="?", type=int, default=40)
     parser.add_argument("--only", default="", help="numbers whose path contains this")
+    parser.add_argument("--off", action="store_true", help="only switch numbers off, on every real map")
     parser.add_argument("--markdown", action="store_true")
     arguments = parser.parse_args()
-    found = cases(arguments.frames)
+    found = cases(arguments.frames, 1 if arguments.off else 3)
     kinds = np.array([case.kind for case in found])
     print(", ".join(f"{np.count_nonzero(kinds == kind)} {kind}" for kind in dict.fromkeys(kinds.tolist())))
-    tried, values = changes(arguments.only), dict(numbers(TUNING))
+    tried, values = changes(arguments.only, () if arguments.off else (0.67, 1.5)), dict(numbers(TUNING))
     print(line(("number", "value", "changed", *HEADINGS), arguments.markdown))
     if arguments.markdown:
         print("|" + "---|" * len(WIDTHS))
@@ -283,8 +290,10 @@ def main() -> None:
         with ProcessPoolExecutor(os.cpu_count(), get_context("spawn"), load, (str(path),)) as pool:
             names = [("as it is", "", "")]
             names += [(each.name, f"{values[each.name]:.4g}", each.how) for each in tried]
+            as_it_is = None
             for name, outcomes in zip(names, pool.map(estimate_all, tunings), strict=True):
-                print(line((*name, *figures(outcomes, kinds)), arguments.markdown), flush=True)
+                as_it_is = as_it_is or outcomes
+                print(line((*name, *figures(outcomes, as_it_is, kinds)), arguments.markdown), flush=True)
 
 
 if __name__ == "__main__":

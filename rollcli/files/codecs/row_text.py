@@ -28,13 +28,12 @@ def csv_rows(stream: Iterable[str], path: str | Path) -> Iterator[tuple[int, lis
                 f"{path}: is not a result of rollcli estimate: it has no column {', '.join(missing)}"
             )
         yield lines.line_num, header
+        width = len(header)
         for line in lines:
-            if line and len(line) != len(header):
-                raise InputError(
-                    f"{path}: line {lines.line_num}: {len(line)} values for {len(header)} columns"
-                )
-            if line:
+            if len(line) == width:
                 yield lines.line_num, line
+            elif line:
+                raise InputError(f"{path}: line {lines.line_num}: {len(line)} values for {width} columns")
     except csv.Error as error:
         raise InputError(f"{path}: line {lines.line_num}: is not CSV: {error}") from error
 

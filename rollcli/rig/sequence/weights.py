@@ -13,6 +13,7 @@ Flags = NDArray[np.bool_]
 
 _MAD_TO_SD = 1.4826  # of a normal distribution
 _STEPS = 60
+_PRECISION = 1e-9  # of tau^2; the steps' errors square
 
 
 def between_variance(values: Floats, variances: Floats) -> float:
@@ -31,24 +32,18 @@ def between_variance(values: Floats, variances: Floats) -> float:
         tau^2 >= 0 for which the weighted squares about the weighted mean sum to N - 1; 0 where the own
         errors explain them all.
     """
-    wanted = len(values) - 1
-
-    def excess(tau2: float) -> float:
-        weights = 1 / (variances + tau2)
-        mean = weights @ values / weights.sum()
-        return float(weights @ (values - mean) ** 2) - wanted
-
-    if wanted < 1 or excess(0.0) <= 0:
-        return 0.0
-    low, high = 0.0, float(np.var(values, ddof=1))
-    while excess(high) > 0:
-        high *= 2
+    tau2 = 0.0
     for _ in range(_STEPS):
-        middle = (low + high) / 2
-        low, high = (middle, high) if excess(middle) > 0 else (low, middle)
-        if high - low <= 1e-6 * high:
+        weights = 1 / (variances + tau2)
+        squares = weights * (values - weights @ values / weights.sum()) ** 2
+        excess = float(squares.sum()) - (len(values) - 1)
+        if excess <= 0:  # the sum is convex and falls, so that Newton's steps come from below
             break
-    return (low + high) / 2
+        step = excess / float(weights @ squares)
+        tau2 += step
+        if step <= _PRECISION * tau2:
+            break
+    return tau2
 
 
 def frame_weights(residuals: Floats, variances: Floats) -> tuple[Floats, float]:
