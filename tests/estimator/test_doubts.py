@@ -72,7 +72,7 @@ MAPS = {
         lambda: with_noise(np.where(np.abs(U - 320) < 40, road(4), 0), 0.8),
         {},
     ),
-    "the interval is wide": (two_halves, {"max_interval": math.radians(0.04)}),
+    "the interval is wide": (two_halves, {"max_interval": math.radians(0.02)}),
 }
 
 

@@ -1,9 +1,8 @@
 """The profile across a road: how far to the sides the ground still belongs to the lane ahead.
 
-Heights above the road, in camera heights, are relative differences of disparity: h = d / road - 1. A kerb is
-a step; a verge or the far side of a crown starts at the lane's height and rises or falls from there.
-Nothing is cut off: weights fade, so that a kerb that is a little lower, or half a bin farther away, turns the
-angle a little and not at once.
+Heights above the road, in camera heights, are relative differences of disparity: h = d / road - 1. Pavements,
+verges and the far side of a crown lie higher or lower than the lane. Nothing is cut off: weights fade, so
+that a kerb that is a little lower, or half a bin farther away, turns the angle a little and not at once.
 """
 
 import math
@@ -46,7 +45,7 @@ class Profile:
 
 
 def read_profile(side: Reals, height: Reals, tuning: ProfileTuning) -> Profile:
-    """Read the profile across the lane ahead, outward from its middle.
+    """Read the profile across the lane ahead.
 
     Parameters
     ----------
@@ -61,44 +60,28 @@ def read_profile(side: Reals, height: Reals, tuning: ProfileTuning) -> Profile:
     Profile
     """
     heights = _medians(np.floor(side / tuning.bin_width) + tuning.bins, height, tuning)
-    left, right = _outward(heights[tuning.bins - 1 :: -1], tuning), _outward(heights[tuning.bins :], tuning)
-    return Profile(np.array([*reversed(left), *right]), tuning)
+    left, right = heights[tuning.bins - 1 :: -1], heights[tuning.bins :]
+    both = np.concatenate([_outward(left, tuning)[::-1], _outward(right, tuning)])
+    return Profile(1 / (1 + (both / tuning.off_level) ** 4), tuning)
 
 
-def _medians(places: Reals, heights: Reals, tuning: ProfileTuning) -> list[float]:
+def _medians(places: Reals, heights: Reals, tuning: ProfileTuning) -> Floats:
     """Return the median height of each bin, left to right; NaN where hardly a pixel is."""
     # one sort for all bins: heights, far below 1, are the fractions
     keys = np.sort(places + 0.5 + np.clip(heights, -0.4, 0.4))
     if len(keys) == 0:
-        return [math.nan] * (2 * tuning.bins)
+        return np.full(2 * tuning.bins, math.nan)
     bins = np.arange(2 * tuning.bins)
     bounds = np.searchsorted(keys, np.arange(2 * tuning.bins + 1))
     counts = np.diff(bounds)
     middles = keys[np.minimum(bounds[:-1] + counts // 2, len(keys) - 1)] - bins - 0.5
-    medians: list[float] = np.where(counts >= tuning.bin_pixels, middles, math.nan).tolist()
+    medians: Floats = np.where(counts >= tuning.bin_pixels, middles, math.nan)
     return medians
 
 
-def _outward(heights: list[float], tuning: ProfileTuning) -> list[float]:
-    """Return the weight of each bin of one side, from the middle outward."""
-    weights: list[float] = []
-    reached = 1.0  # what the steps on the way leave
-    seen: list[tuple[int, float]] = []
-    for place, height in enumerate(heights):
-        if place < tuning.core_bins or not math.isfinite(height):
-            reached *= tuning.gap if place >= tuning.core_bins else 1.0
-            weights.append(reached)
-        else:
-            if seen:
-                reached /= 1 + (abs(height - _continued(seen, place, tuning)) / tuning.step) ** 6
-            weights.append(reached / (1 + (height / tuning.off_level) ** 4))
-        if math.isfinite(height):
-            seen.append((place, height))
-    return weights
-
-
-def _continued(seen: list[tuple[int, float]], place: int, tuning: ProfileTuning) -> float:
-    """Return the height at a bin if the ground went on from those seen so far as it came, but not steeply."""
-    (first, start), (last, height) = seen[-3:][0], seen[-1]
-    slope = 0.0 if first == last else (height - start) / (last - first)
-    return height + max(-tuning.slope, min(tuning.slope, slope)) * (place - last)
+def _outward(heights: Floats, tuning: ProfileTuning) -> Floats:
+    """Return the heights outward from the middle: the lane is level, and where nothing is seen it goes on."""
+    seen = np.where(np.arange(len(heights)) < tuning.core_bins, 0, heights)
+    last = np.maximum.accumulate(np.where(np.isnan(seen), 0, np.arange(len(seen))))
+    filled: Floats = seen[last]
+    return filled

@@ -210,12 +210,11 @@ def solve_normal(normal: Floats, right: Floats, like: Floats | None = None) -> F
 
 
 def _seen(across: Singles, along: Singles, half_height: float, theta: float, tuning: FitTuning) -> Singles:
-    """Return weights: 1 where a rig sees the road at any roll near its own, less at sides and lower corners.
+    """Return weights: 1 where a rig sees the road at any roll near its own, less in the lower corners.
 
     A corner that is seen at one roll and not at another would turn the angle of a cambered road.
     """
-    edge = np.square(np.square(np.square(across / tuning.image_edge)))
     bottom = half_height / math.cos(theta) + max(0.0, abs(math.tan(theta)) - tuning.large_roll)
     beyond = along + tuning.other_roll * np.abs(across) - bottom
-    seen: Singles = np.exp(-edge) / (1 + np.exp(np.minimum(beyond / tuning.corner_fade, 50)))
+    seen: Singles = np.reciprocal(1 + np.exp(np.minimum(beyond / tuning.corner_fade, 50)))
     return seen

@@ -58,7 +58,7 @@ class HypothesisTuning:
     least_area: float = 0.004
     """Twice the area of a triangle, square units: below, its plane is ill conditioned."""
     least_rise: float = 4.0
-    """Tolerances by which a road rises within the radius: less is a wall's noise."""
+    """Tolerances by which a road rises within the radius: less is the noise of a wall, or of a car ahead."""
 
 
 @dataclass(frozen=True)
@@ -151,8 +151,6 @@ class FitTuning:
     """Weight by the profile below which a pixel is left out: it would only take time."""
     beside: float = 0.01
     """Weight of a pixel beside the lane when its spread is measured: a lane may be hidden."""
-    image_edge: float = 0.7
-    """Units across at which weights end, as exp(-(x / edge)^8): the image's sides see one roll only."""
     other_roll: float = 0.10
     """Radians: what a rig rolled by this much more or less would not see does not count."""
     large_roll: float = 0.2
@@ -177,15 +175,9 @@ class ProfileTuning:
     """Share of a pixel's disparity that the road's must have: above the horizon there is no profile."""
     core_bins: int = 2
     """Bins from the middle that are the lane's in any case."""
-    step: float = 0.022
-    """Camera heights of a step, off the straight continuation of what came before, that halves the weight."""
-    slope: float = 0.008
-    """Camera heights a bin by which what came before is continued at most: beyond, it is a verge."""
     off_level: float = 0.01
     """Camera heights over or under the lane at which the weight is halved: on gentle verges and the far side
     of a crown there is no step."""
-    gap: float = 0.7
-    """Factor of the weight for each bin without a height on the way."""
     width: float = 1.5
     """Camera heights to the side at which weights end, as exp(-(side / width)^8). With 3.0 the errors
     on crowned roads are a quarter larger (95 %)."""
