@@ -49,14 +49,15 @@ def test_a_verge_fades_out_from_its_edge(slope):
     assert found[-1] < 0.05
 
 
-def test_ground_that_is_lost_from_view_counts_less_behind_the_gap():
+def test_ground_that_is_not_seen_goes_on_at_the_height_that_was_seen_last():
     rng = np.random.default_rng(8)
     side = rng.uniform(-2.5, 2.5, 20000)
-    seen = (side < 1) | (side > 2)
-    found = read_profile(side[seen], 0 * side[seen], ProfileTuning()).at(SIDES)
+    side = side[(np.abs(side) < 1) | (np.abs(side) > 1.75)]
+    height = np.where(side < -0.75, 0.05, 0.0)
+    found = read_profile(side, height, ProfileTuning())
 
-    assert found[:4].min() > 0.95
-    assert found[8] < 0.05
+    assert found.level(np.array([-1.125, -1.375, -1.625])).max() < 0.05
+    assert found.level(np.array([1.125, 1.375, 1.625])).min() > 0.95
 
 
 def test_each_side_is_read_by_itself():
