@@ -71,7 +71,7 @@ class SequenceTuning:
     jump_penalty: float = 14.0
     scarce_penalty: float = 250.0
     drift_penalty: float = 6.6
-    told_apart: float = 4.0
+    told_apart: float = 2.5
     fewest_to_search: int = 24
     apart: float = 4.0
     persistence: float = 0.5
