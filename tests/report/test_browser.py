@@ -223,15 +223,50 @@ def test_on_a_narrow_screen_no_value_is_hidden(opened):
     assert hidden == []
 
 
-def test_a_printed_page_shows_both_sides_of_the_switch_and_keeps_headings_with_what_follows(opened):
+# puts pages beside each other as columns, which a browser fills by the rules of pages
+COLUMNS = """() => {
+    const size = "width: 720px; height: 1040px; max-width: none; margin: 0; padding: 0";
+    document.querySelector("main").style.cssText = `${size}; columns: 720px; column-fill: auto`;
+}"""
+# headings in another column than what follows them, and parts that reach beyond their column
+TORN = """() => {
+    const main = document.querySelector("main"), gap = parseFloat(getComputedStyle(main).columnGap) || 16;
+    const first = each => each.getClientRects()[0];
+    const column = each => Math.floor(first(each).left / (720 + gap));
+    const seen = each => each.getClientRects().length;
+    const headings = [...document.querySelectorAll("h2, h3")].filter(seen);
+    const torn = headings.filter(each => {
+        let next = each.nextElementSibling;
+        while (next && !seen(next)) next = next.nextElementSibling;
+        return next && column(next) !== column(each);
+    });
+    const reaches = (box, each) => box.right > (column(each) + 1) * (720 + gap) || box.bottom > 1041;
+    const cut = [...document.querySelectorAll("td, th, .picture, .chart")].filter(seen).filter(
+        each => [...each.getClientRects()].some(box => reaches(box, each)));
+    return [...torn, ...cut].map(each => each.outerHTML.slice(0, 80));
+}"""
+
+
+def test_a_printed_page_shows_both_sides_of_the_switch_and_keeps_headings_with_what_follows(opened, tmp_path):
     page = opened()
     page.emulate_media(media="print")
-    assert style(page, "h2", "breakAfter") == "avoid"
     shown = page.locator("figure .picture").evaluate_all(
         "all => all.every(each => each.getClientRects().length)"
     )
     assert shown
     assert page.locator(".switch").first.is_hidden()
+
+    reason = "the interval is wide, and few rows have the road's edge; " * 3
+    rows = [
+        row(f"drives/a_long_name_of_a_day/image_2/{i:06}.png", 1.0, 1.5, "suspect", reason) for i in range(40)
+    ]
+    write_result(tmp_path / "rolls.csv", rows)
+    assert rollcli("report", "rolls.csv", "-o", "page.html", "--gallery", "0", cwd=tmp_path).status == 0
+    for each in (page, opened(url=(tmp_path / "page.html").as_uri())):
+        each.emulate_media(media="print")
+        each.evaluate(COLUMNS)
+        assert each.evaluate("document.querySelector('main').scrollWidth") > 1500  # several pages
+        assert each.evaluate(TORN) == []
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

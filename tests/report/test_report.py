@@ -340,7 +340,7 @@ def test_a_long_list_of_doubtful_frames_is_cut_short_and_says_where_the_others_a
     assert report(folder, "rolls.csv", "--gallery", "0").status == 0
     listed = page_of(folder).partition('<table class="reasons">')[2].partition("</section>")[0]
     assert listed.count("<tr><td>") == 20
-    assert "And 30 more: search for “suspect” or “failed” below." in listed
+    assert "And 30 more, in <code>rolls.csv</code>; to list them, search for “suspect”" in listed
 
 
 def test_charts_are_written_for_slides_with_or_without_a_page(folder):

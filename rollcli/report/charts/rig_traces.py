@@ -77,7 +77,7 @@ def _add_segments(
 ) -> None:
     for segment in found.segments:
         value, half = segment.mean.value, segment.mean.ci95
-        if value is None:
+        if value is None or segment.first == segment.last:  # a frame alone is its own mean
             continue
         first, last = (int(drive.frames[place]) + 1 for place in (segment.first, segment.last))
         said = f"mounting {quantity.name} {answer(segment.mean, quantity)}, of {segment.used:,} frames"
