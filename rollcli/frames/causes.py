@@ -48,8 +48,10 @@ class Causes:
         lines = []
         for cause in self._causes.values():
             if cause.frames > 1:
-                what = cause.first.message if cause.alike else f"as {named_message(cause.first)}"
-                lines.append(f"{cause.frames} frames: {what}")
+                what = (
+                    f": {cause.first.message}" if cause.alike else f", such as {named_message(cause.first)}"
+                )
+                lines.append(f"{cause.frames} frames{what}")
         if self._others:
             frames = "frame" if self._others == 1 else "frames"
             lines.append(f"{self._others} further {frames}: other causes, which -v names")

@@ -57,7 +57,7 @@ def test_a_cause_is_said_once_and_at_the_end_for_how_many_frames(lines):
         counted.add(FrameResult(Row(name, message=message)))
     assert lines() == ["rollcli: a: is empty", "rollcli: b: only 37 valid pixels", "rollcli: e: is text"]
     counted.tell_end()
-    assert lines() == ["rollcli: 3 frames: is empty", "rollcli: 2 frames: as b: only 37 valid pixels"]
+    assert lines() == ["rollcli: 3 frames: is empty", "rollcli: 2 frames, such as b: only 37 valid pixels"]
 
 
 def test_of_many_causes_the_first_five_are_said(lines):
