@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from rollcli.imaging.vdisparity import VDisparity
 
-LEFT_MARGIN, BOTTOM_MARGIN = 40, 32  # pixels; the first rows of a picture are the rows of the map
+_UNIT_ROWS = 480  # sizes below are pixels; a map of so many times these rows has them so many times larger
+LEFT_MARGIN, BOTTOM_MARGIN = 40, 32  # the first rows of a picture are the rows of the map
 _SHOWN = 0.998  # share of the pixels within the shown range: a few outliers must not squeeze the road
 _ROUND_PX = 16.0  # the range ends at a multiple of this, so that frames of one drive share their scale
 _WIDTH = 320  # of the chart: all pictures of one size of map have the same size
@@ -45,17 +46,19 @@ def draw_v_disparity(
     -------
     ndarray of uint8, shape (H + BOTTOM_MARGIN, LEFT_MARGIN + width, 3)
         BGR. Its first H rows are the rows of the map; the margins name rows and disparities, in pixels.
+        Width, margins and letters are twice as large for 960 rows, three times for 1440, and so on.
     """
-    counts, top = _shown(histogram)
+    unit = max(1, len(histogram.counts) // _UNIT_ROWS)
+    counts, top = _shown(histogram, _WIDTH * unit)
     light = np.log1p(counts)
     brightest = float(np.percentile(light[counts > 0], 99.9)) if counts.any() else 1.0
     grey = np.minimum(light * (255 / brightest), 255).astype(np.uint8)
     chart = cv2.applyColorMap(grey, cv2.COLORMAP_INFERNO).astype(np.uint8, copy=False)
     if horizon is not None and 0 <= horizon <= len(chart) - 1:
-        _draw_horizon(chart, round(horizon))
+        _draw_horizon(chart, round(horizon), unit)
     if alpha is not None:
-        _draw_road(chart, np.polynomial.Polynomial(alpha), offset, top)
-    return _with_margins(chart, top)
+        _draw_road(chart, np.polynomial.Polynomial(alpha), offset, top, unit)
+    return _with_margins(chart, top, unit)
 
 
 def round_step(least: float) -> float:
@@ -64,51 +67,56 @@ def round_step(least: float) -> float:
     return next(each * power for each in (1, 2, 5, 10) if each * power >= least * (1 - 1e-9))
 
 
-def _shown(histogram: VDisparity) -> tuple[NDArray[np.float32], float]:
-    """Return the counts of the range that is shown, `_WIDTH` columns wide, and its end, px."""
+def _shown(histogram: VDisparity, width: int) -> tuple[NDArray[np.float32], float]:
+    """Return the counts of the range that is shown, `width` columns wide, and its end, px."""
     counts, end = histogram.counts, histogram.max_disparity
     reached = np.cumsum(counts.sum(axis=0))
     total = int(reached[-1])
     last = int(np.searchsorted(reached, _SHOWN * total)) + 1 if total else counts.shape[1]
     per_bin = end / counts.shape[1]
     bins = min(counts.shape[1], math.ceil(math.ceil(last * per_bin / _ROUND_PX) * _ROUND_PX / per_bin))
-    kind = cv2.INTER_AREA if bins > _WIDTH else cv2.INTER_NEAREST
-    shown = cv2.resize(counts[:, :bins].astype(np.float32), (_WIDTH, len(counts)), interpolation=kind)
+    kind = cv2.INTER_AREA if bins > width else cv2.INTER_NEAREST
+    shown = cv2.resize(counts[:, :bins].astype(np.float32), (width, len(counts)), interpolation=kind)
     return shown.astype(np.float32, copy=False), bins * per_bin
 
 
-def _draw_road(chart: NDArray[np.uint8], road: "np.polynomial.Polynomial", offset: float, top: float) -> None:
-    """Draw the road's curve two pixels wide, dashed so that what it lies on can be seen."""
+def _draw_road(
+    chart: NDArray[np.uint8], road: "np.polynomial.Polynomial", offset: float, top: float, unit: int
+) -> None:
+    """Draw the road's curve, dashed so that what it lies on can be seen."""
     height, width = chart.shape[:2]
-    for start in range(0, height, 2 * _DASH):
-        rows = np.arange(start, min(start + _DASH, height))
+    for start in range(0, height, 2 * _DASH * unit):
+        rows = np.arange(start, min(start + _DASH * unit, height))
         columns = road(rows + offset) * (width / top)
         points = np.column_stack([columns, rows])[(columns >= 0) & (columns < width)]
-        sides = [points + np.array([side, 0.0]) for side in (-0.5, 0.5)]
+        sides = [points + np.array([side, 0.0]) for side in (-0.5 * unit, 0.5 * unit)]
         fixed = [np.rint(each * 2**_SHIFT).astype(np.int32) for each in sides]
-        cv2.polylines(chart, fixed, False, _ROAD, 1, cv2.LINE_AA, _SHIFT)
+        cv2.polylines(chart, fixed, False, _ROAD, unit, cv2.LINE_AA, _SHIFT)
 
 
-def _draw_horizon(chart: NDArray[np.uint8], row: int) -> None:
-    for start in range(0, chart.shape[1], 2 * _DASH):
-        cv2.line(chart, (start, row), (start + _DASH - 1, row), _HORIZON, 1)
-    cv2.putText(chart, "horizon", (4, max(row - 4, 10)), _FONT, _SIZE, _HORIZON, 1, cv2.LINE_AA)
+def _draw_horizon(chart: NDArray[np.uint8], row: int, unit: int) -> None:
+    dash = _DASH * unit
+    for start in range(0, chart.shape[1], 2 * dash):
+        cv2.line(chart, (start, row), (start + dash - 1, row), _HORIZON, unit)
+    place = (4 * unit, max(row - 4 * unit, 10 * unit))
+    cv2.putText(chart, "horizon", place, _FONT, _SIZE * unit, _HORIZON, unit, cv2.LINE_AA)
 
 
-def _with_margins(chart: NDArray[np.uint8], top: float) -> NDArray[np.uint8]:
+def _with_margins(chart: NDArray[np.uint8], top: float, unit: int) -> NDArray[np.uint8]:
     """Return the chart with rows named on its left and disparities below it."""
     height, width = chart.shape[:2]
-    picture = np.full((height + BOTTOM_MARGIN, LEFT_MARGIN + width, 3), _PAPER, np.uint8)
-    picture[:height, LEFT_MARGIN:] = chart
-    for row in _ticks(float(height), float(_LABEL_EVERY[1])):
-        cv2.line(picture, (LEFT_MARGIN - 4, int(row)), (LEFT_MARGIN - 1, int(row)), _INK, 1)
-        _write(picture, f"{row:g}", LEFT_MARGIN - 7, max(int(row) + 4, 9), align=1.0)
-    for disparity in _ticks(top, _LABEL_EVERY[0] * top / width):
-        column = LEFT_MARGIN + round(disparity * width / top)
-        cv2.line(picture, (column, height), (column, height + 3), _INK, 1)
-        _write(picture, f"{disparity:g}", column, height + 14, align=0.5)
-    _write(picture, "disparity, px", LEFT_MARGIN + width // 2, height + 27, align=0.5)
-    _write(picture, "row", LEFT_MARGIN - 7, height + 27, align=1.0)
+    left, tick = LEFT_MARGIN * unit, 4 * unit
+    picture = np.full((height + BOTTOM_MARGIN * unit, left + width, 3), _PAPER, np.uint8)
+    picture[:height, left:] = chart
+    for row in _ticks(float(height), float(_LABEL_EVERY[1] * unit)):
+        cv2.line(picture, (left - tick, int(row)), (left - 1, int(row)), _INK, unit)
+        _write(picture, f"{row:g}", left - 7 * unit, max(int(row) + 4 * unit, 9 * unit), unit, align=1.0)
+    for disparity in _ticks(top, _LABEL_EVERY[0] * unit * top / width):
+        column = left + round(disparity * width / top)
+        cv2.line(picture, (column, height), (column, height + tick - 1), _INK, unit)
+        _write(picture, f"{disparity:g}", column, height + 14 * unit, unit, align=0.5)
+    _write(picture, "disparity, px", left + width // 2, height + 27 * unit, unit, align=0.5)
+    _write(picture, "row", left - 7 * unit, height + 27 * unit, unit, align=1.0)
     return picture
 
 
@@ -118,8 +126,8 @@ def _ticks(end: float, least_step: float) -> Iterator[float]:
     yield from (number * step for number in range(int(end / step) + 1) if number * step < end)
 
 
-def _write(picture: NDArray[np.uint8], text: str, column: int, row: int, *, align: float) -> None:
+def _write(picture: NDArray[np.uint8], text: str, column: int, row: int, unit: int, *, align: float) -> None:
     """Write a line; `align` 0 starts at the column, 0.5 is centred there, 1 ends there."""
-    (width, _), _ = cv2.getTextSize(text, _FONT, _SIZE, 1)
+    (width, _), _ = cv2.getTextSize(text, _FONT, _SIZE * unit, unit)
     left = min(max(column - round(align * width), 0), picture.shape[1] - width)
-    cv2.putText(picture, text, (left, row), _FONT, _SIZE, _INK, 1, cv2.LINE_AA)
+    cv2.putText(picture, text, (left, row), _FONT, _SIZE * unit, _INK, unit, cv2.LINE_AA)

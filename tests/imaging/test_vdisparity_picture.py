@@ -60,6 +60,14 @@ def test_maps_of_one_size_have_pictures_of_one_size(bins, near):
     assert draw_v_disparity(histogram).shape == (100 + BOTTOM_MARGIN, LEFT_MARGIN + 320, 3)
 
 
+def test_a_high_map_has_a_picture_as_wide_for_its_height_with_letters_that_can_be_read():
+    histogram = v_disparity(road_map(height=1080, width=100, near=90.0))
+    picture = draw_v_disparity(histogram, (10, 80 / 1079, 0), horizon=300.0)
+    assert picture.shape == (1080 + 2 * BOTTOM_MARGIN, 2 * (LEFT_MARGIN + 320), 3)
+    below = (picture[1080 + 20 : 1080 + 2 * 15, 2 * LEFT_MARGIN :] < 128).any(axis=(0, 2))
+    assert below.sum() > 50  # numbers, in the rows where they stand
+
+
 def test_the_horizon_is_a_line_across_at_its_row():
     histogram = v_disparity(road_map())
     changed = chart(draw_v_disparity(histogram)) != chart(draw_v_disparity(histogram, horizon=40.2))
