@@ -13,6 +13,7 @@ from tests.run_cli import command, contents, environment, road_map, rollcli, wri
 
 FRAMES = 12
 BROKEN = (2, 3, 9)
+COUNT = 30
 RETRY = ("--resume", "--retry-failed")
 
 
@@ -98,14 +99,14 @@ def test_rows_whose_names_hold_newlines_and_quotes_keep_their_places(maps, tmp_p
 
 
 def test_a_retry_killed_at_any_time_loses_no_row_and_is_taken_up_again(tmp_path):
-    for index in range(60):
+    for index in range(COUNT):
         (tmp_path / "maps").mkdir(exist_ok=True)
         (tmp_path / "maps" / f"frame{index:02}.png").write_bytes(b"no map")
     line = ("estimate", "maps", "-o", "rolls.csv", "--derotated", "up", "-j", "2")
     assert rollcli(*line, cwd=tmp_path).status == 3
-    for index in range(60):
+    for index in range(COUNT):
         write_kitti(tmp_path / "maps" / f"frame{index:02}.png", road_map(0.01 * index, width=300, height=200))
-    for count in (5, 55):
+    for count in (5, COUNT - 5):
         run = subprocess.Popen(command(*line, *RETRY), cwd=tmp_path, env=environment())
         give_up = time.monotonic() + 60
         while run.poll() is None and len(list(tmp_path.glob("up/*.png"))) < count:
@@ -114,7 +115,7 @@ def test_a_retry_killed_at_any_time_loses_no_row_and_is_taken_up_again(tmp_path)
         run.kill()
         run.wait()
         rows = (tmp_path / "rolls.csv").read_text().splitlines()[1:]
-        assert [row.split(",")[0] for row in rows] == [f"maps/frame{index:02}.png" for index in range(60)]
+        assert [row.split(",")[0] for row in rows] == [f"maps/frame{index:02}.png" for index in range(COUNT)]
     assert rollcli(*line, *RETRY, cwd=tmp_path).status == 0
     fresh, kept = anew(tmp_path, line)
     assert kept == fresh

@@ -13,7 +13,14 @@ from typing import Any, TypeVar
 
 from rollcli.errors import InputError, OutputError, UsageError
 from rollcli.files.stores.locations import public_name, split_url
-from rollcli.files.stores.reasons import DENIED, TIMEOUT_VARIABLE, holds_for_all, reason_of, what_is_missing
+from rollcli.files.stores.reasons import (
+    DENIED,
+    TIMEOUT_VARIABLE,
+    holds_for_all,
+    is_final,
+    reason_of,
+    what_is_missing,
+)
 from rollcli.files.stores.turns import wait_for_room, waiting_for_network
 
 Value = TypeVar("Value")
@@ -130,14 +137,7 @@ def object_problem(url: str) -> str:
         The extra `storage` is not installed, or the store's settings are wrong.
     """
     store, key = _open(url)
-    try:
-        store.get_range(key, start=0, length=1)
-    except FileNotFoundError as error:
-        reason = what_is_missing(error)
-    except _store_errors() as error:
-        reason = reason_of(error)
-    else:
-        return ""
+    reason = _objection(lambda: store.get_range(key, start=0, length=1))
     return reason if holds_for_all(reason) or reason == DENIED else ""
 
 
@@ -150,15 +150,19 @@ def folder_problem(url: str) -> str:
         The extra `storage` is not installed, or the store's settings are wrong.
     """
     store, prefix = _open(url)
-    try:
-        next(iter(store.list(prefix.rstrip("/") or None, chunk_size=1)), None)
-    except FileNotFoundError as error:
-        reason = what_is_missing(error)
-    except _store_errors() as error:
-        reason = reason_of(error)
-    else:
-        return ""
+    reason = _objection(lambda: next(iter(store.list(prefix.rstrip("/") or None, chunk_size=1)), None))
     return reason if holds_for_all(reason) else ""
+
+
+def _objection(ask: Callable[[], Any]) -> str:
+    """Return what a store objects to; empty where it does not."""
+    try:
+        ask()
+    except FileNotFoundError as error:
+        return what_is_missing(error)
+    except _store_errors() as error:
+        return reason_of(error)
+    return ""
 
 
 def remove_object(url: str) -> None:
@@ -246,8 +250,8 @@ def _repeated(fetch: Callable[[], Value]) -> Value:
     for attempt in range(_TRIES - 1):
         try:
             return fetch()
-        except GenericError:
-            if time.monotonic() > give_up:
+        except GenericError as error:
+            if is_final(error) or time.monotonic() > give_up:
                 raise
             time.sleep(_FIRST_PAUSE_S * 4**attempt)
     return fetch()
