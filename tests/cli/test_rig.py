@@ -271,6 +271,7 @@ def test_shards_without_records_are_put_together_by_name(folder):
         ([0, "stable.csv"], "there is no stable.csv.run.json to say which shard it is"),
         ([0, "whole.csv"], "are not shards of one run"),
         ([0, 1, "other.csv"], "are not shards of one run: --method was gd and plane"),
+        ([0, 1, "later.csv"], "are not shards of one run: the version of rollcli was 0 and 1"),
     ],
 )
 def test_results_that_are_not_all_shards_of_one_run_are_refused(folder, chosen, reason):
@@ -279,6 +280,7 @@ def test_results_that_are_not_all_shards_of_one_run_are_refused(folder, chosen, 
     write(folder / "copy.csv", given[::3], run=record("1/3"))
     write(folder / "whole.csv", given, run=record("1/1"))
     write(folder / "other.csv", given[2::3], run=record("3/3", method="plane"))
+    write(folder / "later.csv", given[2::3], run=record("3/3") | {"rollcli": "1"})
     done = rig(folder, *(names[each] if isinstance(each, int) else each for each in chosen))
     assert (done.status, done.out) == (2, "")
     assert reason in done.err
@@ -306,7 +308,10 @@ def test_drives_are_told_apart_and_the_one_that_differs_is_named(tmp_path):
     write(tmp_path / "two.csv", first + second)
     out = rig(tmp_path, "two.csv").out
     assert "tuesday differs from monday by +0." in out
-    assert "monday/frame_0.png, monday/frame_1499.png" in out
+    by_drive = {line.rpartition(", ")[0].split()[-1]: line for line in out.splitlines() if "_1499.png" in line}
+    assert by_drive.keys() == {"monday/frame_0.png", "tuesday/frame_0.png"}
+    assert by_drive["monday/frame_0.png"].endswith("monday/frame_1499.png")
+    assert by_drive["tuesday/frame_0.png"].endswith("tuesday/frame_1499.png  differs")
     values = json.loads(rig(tmp_path, "two.csv", "--format", "json").out)
     assert [(each["drive"], each["first"], each["last"]) for each in values["segments"]] == [
         ("monday", 0, 1499),
