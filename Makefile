@@ -4,6 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 TOUCH := $(BIN)/python -c "import pathlib, sys; pathlib.Path(sys.argv[1]).touch()"
+HALF := tests/batch tests/cli tests/parallel
 REMOVE := $(PYTHON) -c "import glob, os, shutil, sys; [shutil.rmtree(p) if os.path.isdir(p) else os.remove(p) for a in sys.argv[1:] for p in glob.glob(a)]"
 
 .DEFAULT_GOAL := help
@@ -35,8 +36,13 @@ $(BIN)/.dev: $(BIN)/.run
 run: $(BIN)/.run
 	$(BIN)/rollcli estimate sample_data/maps --overwrite -o out/rolls.csv --derotated out/derotated --vdisparity out/vdisparity
 
+# two processes for two processors; what the second one prints comes after the first one's. A shell lets
+# processes in its background ignore Ctrl-C: tests of signals are in the first half.
 test: $(BIN)/.dev
-	$(BIN)/python -m pytest
+	@printed=$$(mktemp); $(BIN)/python -m pytest $(addprefix --ignore=,$(HALF)) > $$printed 2>&1 & second=$$!; \
+	trap 'kill $$second' INT TERM; \
+	$(BIN)/python -m pytest $(HALF); first=$$?; \
+	wait $$second; second=$$?; cat $$printed; rm $$printed; exit $$((first + second))
 
 lint: $(BIN)/.dev
 	$(BIN)/ruff check .

@@ -308,7 +308,8 @@ def test_drives_are_told_apart_and_the_one_that_differs_is_named(tmp_path):
     write(tmp_path / "two.csv", first + second)
     out = rig(tmp_path, "two.csv").out
     assert "tuesday differs from monday by +0." in out
-    by_drive = {line.rpartition(", ")[0].split()[-1]: line for line in out.splitlines() if "_1499.png" in line}
+    segments = [line for line in out.splitlines() if "_1499.png" in line]
+    by_drive = {line.rpartition(", ")[0].split()[-1]: line for line in segments}
     assert by_drive.keys() == {"monday/frame_0.png", "tuesday/frame_0.png"}
     assert by_drive["monday/frame_0.png"].endswith("monday/frame_1499.png")
     assert by_drive["tuesday/frame_0.png"].endswith("tuesday/frame_1499.png  differs")
