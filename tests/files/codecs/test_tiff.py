@@ -164,6 +164,19 @@ def test_camera_images_are_read_in_grey_and_in_colour():
         picture(make_tiff(values_of("f4")), "x")
 
 
+@pytest.mark.parametrize("compression", ["lzw", "deflate", "packbits"])
+def test_a_colour_image_of_fewer_rows_than_its_header_says_is_refused(compression):
+    rgb = np.random.default_rng(0).integers(0, 255, (20, 30, 3), dtype=np.uint8)
+    file = make_tiff(rgb, compression, photometric=2)
+    for tag in (257, 278):
+        file = file.replace(struct.pack("<HHII", tag, 4, 1, 20), struct.pack("<HHII", tag, 4, 1, 37))
+
+    with pytest.raises(
+        InputError, match=r"x: is a damaged TIFF: its compressed data are wrong \(1800 of 3330 bytes"
+    ):
+        picture(file, "x")
+
+
 @pytest.mark.skipif(bool(find_spec("imagecodecs")), reason="imagecodecs is installed here")
 def test_compressions_of_another_package_name_it():
     field = struct.pack("<HHIHH", 259, 3, 1, 8, 0)
