@@ -191,3 +191,9 @@ def test_what_is_no_map_is_refused():
     ):
         with pytest.raises(UsageError, match="cannot rotate"):
             derotate(values, roll)
+
+
+def test_a_map_whose_only_invalid_numbers_are_too_large_gets_a_border_of_zeros():
+    stored = np.full((20, 30), 320, np.int16)
+    stored[4, 5] = np.iinfo(np.int16).max
+    assert derotate(stored, math.radians(30))[0, 0] == 0
