@@ -51,7 +51,9 @@ def terms(frames: int, seeds: tuple[int, int]) -> tuple[np.ndarray, list[str]]:
             assert surface is not None
             knife = jackknife(surface, theta, tuning)
             noise = slant(theta, tuning) * math.hypot(*knife.spreads())
-            choice = math.hypot(tuning.lateral * knife.lateral, tuning.depth * knife.depth)
+            choice = math.hypot(
+                tuning.lateral * knife.lateral, tuning.depth * knife.depth, tuning.bend * knife.bend
+            )
             error = abs(math.degrees(theta) - roll_deg)
             rows.append((error, math.degrees(noise), math.degrees(choice)))
             kinds.append(f"{scene} {section}")
