@@ -7,15 +7,16 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from rollcli.batch.durable_rows import DurableRows
+from rollcli.batch.kept_rows import KeptRows
 from rollcli.batch.options import EstimateOptions
 from rollcli.batch.plan import Plan
 from rollcli.batch.result_file import ResultFile, has_rows, kept_rows, open_result
-from rollcli.batch.result_parts import kept_part_rows, open_parts
-from rollcli.batch.resume import check_restored, failed_positions, incomplete_frames, new_record
+from rollcli.batch.result_parts import kept_in_parts, open_parts
+from rollcli.batch.resume import check_restored, new_record
 from rollcli.batch.run_record import RunRecord, is_replaceable_record
 from rollcli.errors import InputError, UsageError
 from rollcli.files.atomic import remove_leftovers
-from rollcli.files.results import Row, format_header, format_row, parse_rows, read_run, run_path
+from rollcli.files.results import format_header, format_row, parse_rows, read_run, run_path
 from rollcli.files.resumable import not_resumable
 from rollcli.files.stream import (
     STDOUT,
@@ -26,6 +27,7 @@ from rollcli.files.stream import (
     write_stream,
 )
 from rollcli.frames.frame import Frame, FrameResult
+from rollcli.frames.options import ImageOptions
 from rollcli.frames.outputs import local_images, remove_image_leftovers
 
 
@@ -34,23 +36,17 @@ class Output(Protocol):
 
     Attributes
     ----------
-    kept : tuple of Row
-        The rows of an interrupted run, which is resumed.
+    kept : KeptRows
+        What is known of the rows of an interrupted run, which is resumed.
     keep_open : int or None
         A descriptor for workers to inherit.
-    incomplete : list of Frame
-        Frames of kept rows whose images are missing or empty, whatever the cause.
-    failed : list of int
-        Positions of the kept rows, from 0, whose frames are done again.
     resumable : bool
         Whether an interrupted run can be resumed.
     replaces : bool
         Whether images are replaced that were there before the run: it was begun with --overwrite.
     """
 
-    kept: tuple[Row, ...]
-    incomplete: list[Frame]
-    failed: list[int]
+    kept: KeptRows
     keep_open: int | None
     resumable: bool
     replaces: bool
@@ -77,14 +73,12 @@ class Output(Protocol):
 class StreamOutput:
     """Rows to stdout, a pipe or a device."""
 
-    kept: tuple[Row, ...] = ()
     keep_open: int | None = None
     resumable = False
 
-    def __init__(self, descriptor: int, name: str, plan: Plan, *, replaces: bool) -> None:
-        self.incomplete: list[Frame] = []
-        self.failed: list[int] = []
-        self.replaces = replaces
+    def __init__(self, descriptor: int, name: str, plan: Plan, options: EstimateOptions) -> None:
+        self.kept = KeptRows(plan, options)
+        self.replaces = options.running.overwrite
         self._descriptor, self._name, self._plan = descriptor, name, plan
         self._write(format_header(plan.format, plan.timing))
 
@@ -122,13 +116,10 @@ class FileOutput:
         file: ResultFile,
         record: RunRecord,
         plan: Plan,
-        kept: tuple[Row, ...],
-        options: EstimateOptions,
+        kept: KeptRows,
+        images: ImageOptions,
     ) -> None:
-        images = options.images
         self.kept = kept
-        self.incomplete = incomplete_frames(plan, kept, images)
-        self.failed = failed_positions(kept, options)
         self.keep_open: int | None = file.descriptor
         self.replaces = record.replaces
         self._file, self._record, self._plan, self._images = file, record, plan, images
@@ -171,7 +162,7 @@ class FileOutput:
 
     def hint(self) -> str:
         """Say that --resume continues, if rows were written and their file still is there."""
-        rows = len(self.kept) + self._rows.written
+        rows = self.kept.count + self._rows.written
         return f"; {rows} rows are kept, continue with --resume" if rows and self._file.is_there() else ""
 
     def _paths(self, frame: Frame, result: FrameResult) -> Iterator[str]:
@@ -197,11 +188,11 @@ def open_output(plan: Plan, options: EstimateOptions) -> Iterator[Output]:
         return
     _check_permitted(plan.output, options)
     if plan.output == STDOUT:
-        yield StreamOutput(stdout_descriptor(), STDOUT_NAME, plan, replaces=options.running.overwrite)
+        yield StreamOutput(stdout_descriptor(), STDOUT_NAME, plan, options)
     elif is_stream(plan.output):
         descriptor = open_stream(plan.output)
         try:
-            yield StreamOutput(descriptor, plan.output, plan, replaces=options.running.overwrite)
+            yield StreamOutput(descriptor, plan.output, plan, options)
         finally:
             os.close(descriptor)
     else:
@@ -219,49 +210,43 @@ def frames_to_do(plan: Plan, options: EstimateOptions) -> list[Frame]:
         As `open_output`.
     """
     if plan.in_parts:
-        rows = kept_part_rows(plan, options)
+        kept = kept_in_parts(plan, options)
     else:
         _check_permitted(plan.output, options)
-        rows = _kept_in_file(plan) if options.result.resume else ()
-    incomplete = incomplete_frames(plan, rows, options.images)
-    failed = [plan.frames[position] for position in failed_positions(rows, options)]
-    return [*incomplete, *failed, *plan.frames[len(rows) :]]
+        kept = _kept_in_file(plan, options)
+    failed = [plan.frames[position] for position in kept.failed]
+    return [*kept.incomplete, *failed, *plan.frames[kept.count :]]
 
 
-def _kept_in_file(plan: Plan) -> tuple[Row, ...]:
+def _kept_in_file(plan: Plan, options: EstimateOptions) -> KeptRows:
+    if not options.result.resume:
+        return KeptRows(plan, options)
     try:
         data = Path(plan.output).read_bytes()
     except OSError:
-        return ()
+        return KeptRows(plan, options)
     kept = kept_rows(data, plan.output, plan.format)
-    return parse_rows(kept, plan.output) if kept else ()
+    return KeptRows(plan, options, parse_rows(kept, plan.output) if kept else ())
 
 
 def _begin(file: ResultFile, plan: Plan, options: EstimateOptions) -> FileOutput:
-    kept = kept_rows(file.read(), plan.output, plan.format) if options.result.resume else b""
-    rows, earlier = _parse_kept(kept, plan)
-    record = new_record(plan, options, rows, earlier)
-    if options.result.resume or options.running.overwrite:
-        retried = (frame for frame, row in zip(plan.frames, rows, strict=False) if row.status == "error")
-        remove_image_leftovers((*retried, *plan.frames[len(rows) :]), options.images)
-    remove_leftovers([run_path(plan.output), os.path.realpath(plan.output)])
-    # in this order, a run that is killed in between can be resumed: an empty file counts as a new one
-    file.truncate(len(kept) if rows else 0)
-    record.write({})
-    if not rows:
-        file.append(format_header(plan.format, plan.timing))
-    return FileOutput(file, record, plan, rows, options)
-
-
-def _parse_kept(kept: bytes, plan: Plan) -> tuple[tuple[Row, ...], Mapping[str, object] | None]:
-    """Parse the rows of an interrupted run, and read its record."""
-    if not kept:
-        return (), None
+    data = kept_rows(file.read(), plan.output, plan.format) if options.result.resume else b""
     try:
-        rows = parse_rows(kept, plan.output)
-        return rows, read_run(plan.output) if rows else None
+        kept = KeptRows(plan, options, parse_rows(data, plan.output) if data else ())
+        earlier = read_run(plan.output) if kept.count else None
     except InputError as error:
         raise not_resumable(plan.output, str(error)) from error
+    record = new_record(plan, options, kept, earlier)
+    if options.result.resume or options.running.overwrite:
+        failed = (plan.frames[position] for position in kept.errors)
+        remove_image_leftovers((*failed, *plan.frames[kept.count :]), options.images)
+    remove_leftovers([run_path(plan.output), os.path.realpath(plan.output)])
+    # in this order, a run that is killed in between can be resumed: an empty file counts as a new one
+    file.truncate(len(data) if kept.count else 0)
+    record.write({})
+    if not kept.count:
+        file.append(format_header(plan.format, plan.timing))
+    return FileOutput(file, record, plan, kept, options.images)
 
 
 def _check_permitted(name: str, options: EstimateOptions) -> None:

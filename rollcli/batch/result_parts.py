@@ -11,9 +11,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from rollcli.batch.kept_rows import KeptRows
 from rollcli.batch.options import EstimateOptions
 from rollcli.batch.plan import Plan
-from rollcli.batch.resume import check_restored, failed_positions, incomplete_frames, new_record
+from rollcli.batch.resume import check_restored, new_record
 from rollcli.batch.run_record import RunRecord
 from rollcli.errors import InputError, UsageError
 from rollcli.files.atomic import remove_leftovers
@@ -25,7 +26,7 @@ from rollcli.files.results import (
     column_types,
     format_header,
     format_row,
-    parse_parts,
+    parse_rows,
     plain_values,
     read_run,
     run_path,
@@ -33,7 +34,7 @@ from rollcli.files.results import (
 from rollcli.files.resumable import not_resumable
 from rollcli.files.storage import create, list_names, remove, write_bytes
 from rollcli.files.stores.locations import base_name, is_url
-from rollcli.files.stores.parts import part_names
+from rollcli.files.stores.parts import part_names, read_parts
 from rollcli.frames.frame import Frame, FrameResult
 from rollcli.frames.outputs import local_images, remove_image_leftovers
 
@@ -49,22 +50,20 @@ class PartsOutput:
         self,
         plan: Plan,
         record: RunRecord,
-        kept: tuple[Row, ...],
+        kept: KeptRows,
         options: EstimateOptions,
         keep_open: int | None = None,
     ) -> None:
         self.kept, self.keep_open = kept, keep_open
-        self.failed = failed_positions(kept, options)
         self._plan, self._record, self._part_rows = plan, record, options.result.part_rows
-        self._next = len(kept) // self._part_rows
+        self._next = kept.count // self._part_rows
         self._replaced_part, self._replacing = 0, dict[int, Row]()  # rows by their positions in the result
         self._waiting: list[Row] = []
-        self.incomplete = incomplete_frames(plan, kept, options.images)
         self.replaces = record.replaces
         self._image_options = options.images
         self._images: list[str] = []  # those of the part that is being filled
         self._checked = time.monotonic()
-        self._written = len(kept)
+        self._written = kept.count
 
     def append(self, frame: Frame, result: FrameResult) -> None:
         """Take the row; every full part is written."""
@@ -113,7 +112,7 @@ class PartsOutput:
         if not self._replacing:
             return
         number, first = self._replaced_part, self._replaced_part * self._part_rows
-        old = self.kept[first : first + self._part_rows]
+        old = _rows_of_part(self._plan, number)
         rows = [self._replacing.get(position, row) for position, row in enumerate(old, first)]
         data = self._encoded(number, rows)
         if data != self._encoded(number, old):
@@ -175,19 +174,17 @@ def open_parts(plan: Plan, options: EstimateOptions) -> Iterator[PartsOutput]:
 def _begin(plan: Plan, options: EstimateOptions, keep_open: int | None) -> PartsOutput:
     # again, now that no other run can write it
     parts = check_parts(plan, resume=options.result.resume, overwrite=options.running.overwrite)
-    rows: tuple[Row, ...] = ()
-    if options.result.resume:
-        rows = _kept_rows(plan, parts, options.result.part_rows)
-    record = new_record(plan, options, rows, _earlier(plan) if rows else None)
+    kept = _kept(plan, options, parts)
+    record = new_record(plan, options, kept, _earlier(plan) if kept.count else None)
     if not is_url(plan.output):
         remove_leftovers([run_path(plan.output), *(f"{plan.output}/{name}" for name in parts)])
     if options.result.resume or options.running.overwrite:
         remove_image_leftovers(plan.frames, options.images)
-    for name in parts[_whole_parts(len(rows), options.result.part_rows) :]:
+    for name in parts[_whole_parts(kept.count, options.result.part_rows) :]:
         remove(f"{plan.output}/{name}")
     record.write({})
     record.check_owned()  # another run may have begun in this very second
-    return PartsOutput(plan, record, rows, options, keep_open)
+    return PartsOutput(plan, record, kept, options, keep_open)
 
 
 def check_parts(plan: Plan, *, resume: bool, overwrite: bool) -> list[str]:
@@ -211,25 +208,39 @@ def check_parts(plan: Plan, *, resume: bool, overwrite: bool) -> list[str]:
     return parts
 
 
-def kept_part_rows(plan: Plan, options: EstimateOptions) -> tuple[Row, ...]:
-    """Return the rows that a resume would keep."""
+def kept_in_parts(plan: Plan, options: EstimateOptions) -> KeptRows:
+    """Take in the rows that a resume would keep."""
     parts = check_parts(plan, resume=options.result.resume, overwrite=options.running.overwrite)
-    return _kept_rows(plan, parts, options.result.part_rows) if options.result.resume and parts else ()
+    return _kept(plan, options, parts)
 
 
-def _kept_rows(plan: Plan, parts: list[str], part_rows: int) -> tuple[Row, ...]:
-    """Return the rows of the parts from the first one on, as far as none is missing or short.
+def _kept(plan: Plan, options: EstimateOptions, parts: list[str]) -> KeptRows:
+    """Take in the rows of the parts from the first one on, as far as none is missing or short.
 
     The names are sorted: after a missing part, no name has the number of its place.
     """
+    kept = KeptRows(plan, options)
+    if not options.result.resume:
+        return kept
     numbered = enumerate(parts)
     present = [name for number, name in numbered if name == base_name(_part_location(plan, number))]
     try:
-        rows = parse_parts(plan.output, present)
+        for name, data in read_parts(plan.output, present):
+            rows = tuple(parse_rows(data, name))
+            if len(rows) < options.result.part_rows and kept.count + len(rows) != len(plan.frames):
+                break
+            for row in rows:
+                kept.add(row)
     except InputError as error:
         raise not_resumable(plan.output, str(error)) from error
-    whole = len(rows) if len(rows) == len(plan.frames) else len(rows) // part_rows * part_rows
-    return rows[:whole]
+    return kept
+
+
+def _rows_of_part(plan: Plan, number: int) -> tuple[Row, ...]:
+    """Read a part again; the first one has the header of CSV."""
+    names = dict.fromkeys(base_name(_part_location(plan, each)) for each in (0, number))
+    *_, (name, data) = read_parts(plan.output, names)
+    return tuple(parse_rows(data, name))
 
 
 def _whole_parts(rows: int, part_rows: int) -> int:

@@ -1,40 +1,23 @@
 """Compare an interrupted run with the run that would continue it."""
 
 import json
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
 from rollcli.batch.fingerprint import changed_input
+from rollcli.batch.kept_rows import KeptRows
 from rollcli.batch.options import EstimateOptions
 from rollcli.batch.plan import Plan, check_images_are_new
 from rollcli.batch.run_record import RunRecord
 from rollcli.errors import InputError, OutputError
-from rollcli.files.results import Row, read_run, run_path
+from rollcli.files.results import read_run, run_path
 from rollcli.files.resumable import differences, not_resumable
 from rollcli.files.storage import modified_ns
 from rollcli.files.stores.locations import base_name
 from rollcli.frames.frame import Frame, FrameResult
-from rollcli.frames.options import ImageOptions
-from rollcli.frames.outputs import MadeImages
 
 _SORT_LAST = "new frames must sort last: estimate these into a result of their own"
-
-
-def failed_positions(rows: Sequence[Row], options: EstimateOptions) -> list[int]:
-    """List the positions, from 0, of the kept rows whose frames are to be done again."""
-    if not options.result.retry_failed:
-        return []
-    return [position for position, row in enumerate(rows) if row.status == "error"]
-
-
-def incomplete_frames(plan: Plan, kept: Sequence[Row], images: ImageOptions) -> list[Frame]:
-    """List the frames of kept rows whose images are missing or empty."""
-    if not (kept and images.folders()):
-        return []
-    made = MadeImages(images)
-    pairs = zip(plan.frames, kept, strict=False)
-    return [frame for frame, row in pairs if row.status != "error" and not made.has_all(frame)]
 
 
 def check_restored(frame: Frame, result: FrameResult) -> None:
@@ -50,7 +33,7 @@ def check_restored(frame: Frame, result: FrameResult) -> None:
 
 
 def new_record(
-    plan: Plan, options: EstimateOptions, rows: Sequence[Row], earlier: Mapping[str, Any] | None
+    plan: Plan, options: EstimateOptions, kept: KeptRows, earlier: Mapping[str, Any] | None
 ) -> RunRecord:
     """Make the record of a run, which continues that of an interrupted run where rows are kept.
 
@@ -58,8 +41,7 @@ def new_record(
     ----------
     plan : Plan
     options : EstimateOptions
-    rows : sequence of Row
-        Those of the interrupted run.
+    kept : KeptRows
     earlier : mapping or None
         Its record.
 
@@ -69,15 +51,15 @@ def new_record(
         It cannot be continued; says what differs. Or it is a first start, and there are images already.
     """
     unknown = unknown_inputs(earlier)
-    retried = failed_positions(rows, options)
+    retried = kept.failed
     begun = begun_plan(plan, earlier)
     record = RunRecord(plan, options, () if retried else unknown)
-    if rows:
+    if kept.count:
         same = record if begun is plan and not (retried and unknown) else RunRecord(begun, options, unknown)
         added = len(plan.frames) - len(begun.frames)
-        record.continue_from(check_resumable(rows, earlier, same, begun, added, retried))
+        record.continue_from(check_resumable(kept, earlier, same, begun, added))
     elif options.result.resume:
-        _start_or_continue(record, plan, options)
+        _start_or_continue(record, plan, options, kept)
     return record
 
 
@@ -91,19 +73,14 @@ def begun_plan(plan: Plan, run: Mapping[str, Any] | None) -> Plan:
 
 
 def check_resumable(
-    rows: Sequence[Row],
-    run: Mapping[str, Any] | None,
-    record: RunRecord,
-    plan: Plan,
-    added: int = 0,
-    retried: Collection[int] = (),
+    kept: KeptRows, run: Mapping[str, Any] | None, record: RunRecord, plan: Plan, added: int = 0
 ) -> Mapping[str, Any]:
     """Refuse to continue a result of another version, other options or other inputs.
 
     Parameters
     ----------
-    rows : sequence of Row
-        Of the interrupted run.
+    kept : KeptRows
+        Of the interrupted run; the files of frames that are done again may have changed.
     run : mapping or None
         Its record.
     record : RunRecord
@@ -112,8 +89,6 @@ def check_resumable(
         As many frames as the interrupted run had, if there are as many; see `begun_plan`.
     added : int
         How many frames there are beyond them.
-    retried : collection of int
-        Positions of the frames that are done again: their files may have changed.
 
     Returns
     -------
@@ -130,12 +105,12 @@ def check_resumable(
         raise not_resumable(plan.output, f"there is no {record_name}")
     if not _is_whole(run):
         raise not_resumable(plan.output, f"{record_name} is damaged")
-    for difference in _differences(rows, run, record.fixed, plan, added, retried):
+    for difference in _differences(kept, run, record.fixed, plan, added):
         raise not_resumable(plan.output, difference)
     return run
 
 
-def _start_or_continue(record: RunRecord, plan: Plan, options: EstimateOptions) -> None:
+def _start_or_continue(record: RunRecord, plan: Plan, options: EstimateOptions, kept: KeptRows) -> None:
     """Find out what a resume without rows is: a first start, or the same run, which had got no further.
 
     Raises
@@ -147,7 +122,7 @@ def _start_or_continue(record: RunRecord, plan: Plan, options: EstimateOptions) 
         run = read_run(plan.output)
     except InputError:
         run = None
-    if run is not None and _is_whole(run) and not any(_differences((), run, record.fixed, plan, 0, ())):
+    if run is not None and _is_whole(run) and not any(_differences(kept, run, record.fixed, plan, 0)):
         record.continue_from(run)
     else:
         check_images_are_new(plan.frames, options)
@@ -161,23 +136,17 @@ def unknown_inputs(run: Mapping[str, Any] | None) -> list[str]:
 
 
 def _differences(
-    rows: Sequence[Row],
-    was: Mapping[str, Any],
-    now: Mapping[str, Any],
-    plan: Plan,
-    added: int,
-    retried: Collection[int],
+    kept: KeptRows, was: Mapping[str, Any], now: Mapping[str, Any], plan: Plan, added: int
 ) -> Iterator[str]:
     yield from differences(was, now)
     if was.get("calibration") != json.loads(json.dumps(now.get("calibration"))):
         yield "the calibration differs"
-    for row, frame in zip(rows, plan.frames, strict=False):
-        if (row.file, row.right_file) != (frame.file, frame.right_file):
-            if added and frame.file not in {each.file for each in rows}:
-                yield f"{frame.file} has been added and sorts before {row.file}; {_SORT_LAST}"
-            yield f"the inputs differ: its row is of {row.file}, where now {frame.file} is"
-    if len(rows) > len(plan.frames):
-        yield f"it has {len(rows)} rows, and there are {len(plan.frames)} frames"
+    if found := kept.mismatch:
+        if added and found.frame_is_new:
+            yield f"{found.frame_file} has been added and sorts before {found.row_file}; {_SORT_LAST}"
+        yield f"the inputs differ: its row is of {found.row_file}, where now {found.frame_file} is"
+    if kept.count > len(plan.frames):
+        yield f"it has {kept.count} rows, and there are {len(plan.frames)} frames"
     inputs_was, inputs_now = was["inputs"], now["inputs"]
     if inputs_was.get("frames") != inputs_now["frames"]:
         yield f"it was begun with {inputs_was.get('frames')} frames, now there are {inputs_now['frames']}"
@@ -186,8 +155,8 @@ def _differences(
     if inputs_was.get("names") != inputs_now["names"]:
         yield "the names of the inputs differ"
     if inputs_was != inputs_now:
-        changed = _changed_input(plan, set(retried))
-        if changed or not retried:
+        changed = _changed_input(plan, set(kept.failed))
+        if changed or not kept.failed:
             yield f"{changed or 'an input'} has changed since"
 
 

@@ -48,19 +48,17 @@ def run_estimate(options: EstimateOptions, resume_command: str = "") -> ExitStat
         return ExitStatus.DONE
     require_scheduler(options.running.scheduler)
     progress = Progress(len(plan.frames), options.running, options.encoding)
-    answer = RigAnswer()
     with open_output(plan, options) as output:
-        failed = set(output.failed)
-        progress.keep(row for position, row in enumerate(output.kept) if position not in failed)
-        for row in output.kept:
-            answer.add(row)
+        kept = output.kept
+        progress.keep(kept.totals, kept.alignment)
+        answer = kept.answer
         for note in islice(calibration_notes(plan.frames), _NOTES):
             progress.note(note)
         try:
             with stop_on_signals() as stop, progress:
                 _restore_images(options, output, progress, stop)
                 if not _retry_failed(plan, options, output, progress, answer, stop):
-                    _run_frames(plan.frames[len(output.kept) :], options, output, progress, answer, stop)
+                    _run_frames(plan.frames[kept.count :], options, output, progress, answer, stop)
         except KeyboardInterrupt:  # the second Ctrl-C: without waiting for the frames that have begun
             progress.stopped_early = True
         except (OutputError, ClusterError, WorkerError) as error:
@@ -94,7 +92,7 @@ def _run_frames(
 
 def _restore_images(options: EstimateOptions, output: Output, progress: Progress, stop: Stop) -> None:
     """Make the images again that kept rows should have."""
-    frames = output.incomplete
+    frames = output.kept.incomplete
     if not frames:
         return
     progress.note(f"images are missing or empty for {len(frames)} of the kept rows: they are made again")
@@ -114,8 +112,8 @@ def _retry_failed(
 
     A result takes the new rows once the workers have ended, which hold the lock of the file that it was.
     """
-    for first in range(0, len(output.failed), _RETRIED_AT_ONCE):
-        positions = output.failed[first : first + _RETRIED_AT_ONCE]
+    for first in range(0, len(output.kept.failed), _RETRIED_AT_ONCE):
+        positions = output.kept.failed[first : first + _RETRIED_AT_ONCE]
         frames = [plan.frames[position] for position in positions]
         with _results(frames, options, output, stop) as results:
             for position, frame, result in zip(positions, frames, results, strict=False):

@@ -4,7 +4,7 @@ import io
 import json
 import math
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Literal, get_args, get_type_hints
@@ -159,35 +159,32 @@ def read_result(path: str | Path) -> Result:
     """
     path = str(path)
     parts = () if path == STDIN else part_names(list_names(path))
-    return Result(parse_parts(path, parts) if parts else parse_rows(_read(path), path), read_run(path))
+    pieces = read_parts(path, parts) if parts else [(path, _read(path))]
+    return Result(tuple(row for name, data in pieces for row in parse_rows(data, name)), read_run(path))
 
 
-def parse_parts(folder: str, names: Iterable[str]) -> tuple[Row, ...]:
-    """Parse the parts of a result, put together in their order.
+def parse_rows(data: bytes, name: str | Path) -> Iterator[Row]:
+    """Parse the bytes of a result, row by row; errors call it `name`.
 
     Raises
     ------
     InputError
-        A part cannot be read, or its rows are no result.
+        They are no result; the line is named.
     """
-    return tuple(row for name, data in read_parts(folder, names) for row in parse_rows(data, name))
-
-
-def parse_rows(data: bytes, name: str | Path) -> tuple[Row, ...]:
-    """Parse the bytes of a result; errors call it `name`."""
     if data.startswith(MAGIC):
         table = decode_parquet(data, str(name))
-        return tuple(_row(values, f"{name}: row {number}") for number, values in table)
+        yield from (_row(values, f"{name}: row {number}") for number, values in table)
+        return
     # decoded piece by piece: as one text, a million rows would take a gigabyte more
     stream = io.BytesIO(data.removeprefix(b"\xef\xbb\xbf"))
     if data[:_MOST_SPACE].removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"{"):
         texts = (line.removesuffix(b"\n").decode(**TEXT) for line in stream)
-        return tuple(_row(values, f"{name}: line {number}") for number, values in json_rows(texts, name))
+        yield from (_row(values, f"{name}: line {number}") for number, values in json_rows(texts, name))
+        return
     lines = csv_rows(io.TextIOWrapper(stream, TEXT["encoding"], TEXT["errors"], newline=""), name)
     _, header = next(lines)
-    return tuple(
-        _row(dict(zip(header, line, strict=True)), f"{name}: line {number}") for number, line in lines
-    )
+    for number, line in lines:
+        yield _row(dict(zip(header, line, strict=True)), f"{name}: line {number}")
 
 
 def run_path(path: str | Path) -> str:

@@ -4,7 +4,7 @@ It belongs to `frames`, since every command that works through frames reports on
 """
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from rollcli.errors import ExitStatus
@@ -57,12 +57,11 @@ class Progress(TaskProgress):
         super().__enter__()
         return self
 
-    def keep(self, rows: Iterable[Row]) -> None:
-        """Count the rows that an interrupted run has left."""
-        for row in rows:
-            self.counts[row.status] += 1
-            self.alignment.add(row)
-            self.kept += 1
+    def keep(self, totals: Mapping[str, int], alignment: RigAlignment) -> None:
+        """Count the rows that an interrupted run has left, by their status, and go on with its alignment."""
+        self.counts.update(totals)
+        self.kept += sum(totals.values())
+        self.alignment = alignment
 
     def counted(self) -> dict[str, int]:
         """Name the failures."""

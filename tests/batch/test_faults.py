@@ -221,7 +221,7 @@ def test_a_frame_that_kills_its_worker_twice_is_an_error_row_and_the_batch_goes_
     done = run_with_deaths(maps, ["frame3"], 99)
     assert done.status == 3
     assert len(list(maps.glob("died-of-*"))) == 2
-    rows = parse_rows((maps / "rolls.csv").read_bytes(), "rolls.csv")
+    rows = list(parse_rows((maps / "rolls.csv").read_bytes(), "rolls.csv"))
     assert len(rows) == FRAMES
     assert [(row.file, row.message) for row in rows if row.status == "error"] == [
         ("maps/frame3.png", "its worker died twice: killed for memory, perhaps, or crashed")

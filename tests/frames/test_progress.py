@@ -7,6 +7,7 @@ from rollcli.files.results import Row
 from rollcli.frames.frame import Frame, FrameResult, failed_frame, named_message
 from rollcli.frames.options import EncodingOptions, RunningOptions
 from rollcli.frames.progress import Progress
+from rollcli.frames.rig_alignment import RigAlignment
 
 GUESSED = EncodingOptions()
 
@@ -26,7 +27,7 @@ def lines(capsys):
 
 def test_it_counts_kept_and_new_rows_by_status(lines):
     counted = progress(4)
-    counted.keep((Row("a.png", status="ok"), Row("b.png", status="suspect")))
+    counted.keep({"ok": 1, "suspect": 1}, RigAlignment())
     counted.add(result())
     counted.add(result("suspect"))
     assert counted.done == 4
