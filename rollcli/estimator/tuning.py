@@ -16,7 +16,7 @@ class IntervalTuning:
     """Pixels that could be independent: neighbouring ones repeat each other, more do not tell more."""
     factor: float = 0.5
     """Of the jackknife's half-width. `fit_interval.py` finds 0.42 on rendered roads, which covers as many of
-    others, 0.96; but with 0.4 fewer of the real maps that nothing was tuned on, 0.82 instead of 0.85."""
+    others, 0.96; but with 0.4 fewer of half of the real maps, 0.82 instead of 0.85."""
     lateral: float = 3.0
     """Of the difference between the lane's angle and that of all pixels."""
     depth: float = 0.5

@@ -3,7 +3,7 @@
     python tests/benchmarks/bench_accuracy.py [FRAMES [SIZE [MODE]]]
 
 FRAMES mixed scenes (300) with rolls within +-10 degrees and as many within +-35, of SIZE (640x480) and
-matched in MODE (3way), of seeds that nothing was tuned on. To reach: median 0.01, 95 % 0.05, worst 0.3
+matched in MODE (3way), of seeds that no number was fitted to. To reach: median 0.01, 95 % 0.05, worst 0.3
 degrees within +-10; 95 % 0.07, worst 0.5 within +-35; coverage 0.92 to 0.98, at least 0.88 in each kind of
 scene; nothing above 0.5 degrees called ok, at most 8 % of the good frames called suspect.
 """

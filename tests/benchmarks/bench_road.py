@@ -3,9 +3,9 @@
     python tests/benchmarks/bench_road.py [FRAMES]
 
 First the errors on rendered scenes matched by SGBM, half of them with rolls within +-10 degrees, half within
-+-35; seeds that nothing was tuned on. Then the time on one thread beside the decoding of the same map from a
-16-bit PNG, on such maps of 1242x375 and one of 3840x2160. scikit-learn, scikit-image and Open3D (pip install
-scikit-learn scikit-image open3d) are left out with a word where they are not installed.
++-35; of seeds that no number was fitted to. Then the time on one thread beside the decoding of the same map
+from a 16-bit PNG, on such maps of 1242x375 and one of 3840x2160. scikit-learn, scikit-image and Open3D (pip
+install scikit-learn scikit-image open3d) are left out with a word where they are not installed.
 
 Bars: estimate within 0.8 times the decoding at 1242x375, 0.3 times at 3840x2160.
 """
