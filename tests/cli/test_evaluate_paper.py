@@ -101,7 +101,7 @@ def test_every_chart_is_drawn_in_a_browser_without_an_error(done, tmp_path):
     flags += ["--disable-sync", "--disable-component-update", "--enable-logging=stderr", "--v=0"]
     page = (done[0] / "out" / PAGE).as_uri()
     opened = subprocess.run(
-        [browser, *flags, f"--user-data-dir={tmp_path}", "--virtual-time-budget=5000", "--dump-dom", page],
+        [browser, *flags, f"--user-data-dir={tmp_path}", "--virtual-time-budget=30000", "--dump-dom", page],
         capture_output=True,
         text=True,
         timeout=60,
