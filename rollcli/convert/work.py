@@ -19,9 +19,9 @@ from rollcli.frames.guard import guarded
 from rollcli.frames.options import FrameOptions
 from rollcli.frames.outputs import write_outputs
 from rollcli.frames.read import Source, read_source
-from rollcli.imaging.overlay import draw_preview
+from rollcli.imaging.pictures.overlay import draw_preview
+from rollcli.imaging.pictures.vdisparity_picture import draw_v_disparity
 from rollcli.imaging.vdisparity import profile, v_disparity
-from rollcli.imaging.vdisparity_picture import draw_v_disparity
 
 
 def derotate_map(conversion: Conversion, options: FrameOptions, expand: bool) -> FrameResult:

@@ -15,9 +15,9 @@ from rollcli.frames.options import FrameOptions
 from rollcli.frames.outputs import image_paths, roomy_path
 from rollcli.frames.read import Source
 from rollcli.imaging.derotate import derotate
-from rollcli.imaging.overlay import draw_road, draw_road_on_photo
+from rollcli.imaging.pictures.overlay import draw_road, draw_road_on_photo
+from rollcli.imaging.pictures.vdisparity_picture import draw_v_disparity
 from rollcli.imaging.vdisparity import row_offset, v_disparity
-from rollcli.imaging.vdisparity_picture import draw_v_disparity
 
 TOO_LARGE_FOR_PNG = f"written as TIFF: a disparity is above the {KITTI_TOP:.0f} px of a KITTI PNG"
 

@@ -18,9 +18,9 @@ from rollcli.frames.guard import FRAME_ERRORS
 from rollcli.frames.options import FrameOptions
 from rollcli.frames.read import Source, read_source
 from rollcli.imaging.derotate import derotate
-from rollcli.imaging.overlay import draw_disparity, draw_road_on_photo
+from rollcli.imaging.pictures.overlay import draw_disparity, draw_road_on_photo
+from rollcli.imaging.pictures.vdisparity_picture import draw_v_disparity
 from rollcli.imaging.vdisparity import row_offset, v_disparity
-from rollcli.imaging.vdisparity_picture import draw_v_disparity
 from rollcli.report.sources import Subject
 
 # small enough that a page with a dozen frames opens at once, large enough to see a stripe of noise

@@ -19,10 +19,10 @@ from rollcli.files.codecs import png, tiff_parts, unpack
 from rollcli.files.encodings import to_disparity
 from rollcli.files.formats import decode_stored, encode_stored
 from rollcli.imaging.derotate import derotate
-from rollcli.imaging.overlay import draw_road
+from rollcli.imaging.pictures.overlay import draw_road
+from rollcli.imaging.pictures.vdisparity_picture import draw_v_disparity
 from rollcli.imaging.stereo import StereoOptions, match_pair
 from rollcli.imaging.vdisparity import v_disparity
-from rollcli.imaging.vdisparity_picture import draw_v_disparity
 from rollcli.simulate.render import render_frame
 from rollcli.simulate.spec import FrameSpec
 from tests.binary_files import disparity_map, make_tiff

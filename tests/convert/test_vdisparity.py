@@ -8,7 +8,7 @@ import pytest
 
 from rollcli.files.encodings import read_disparity
 from rollcli.files.formats import read_stored
-from rollcli.imaging.vdisparity_picture import BOTTOM_MARGIN, LEFT_MARGIN
+from rollcli.imaging.pictures.vdisparity_picture import BOTTOM_MARGIN, LEFT_MARGIN
 from tests.run_cli import contents, road_map, rollcli, write_kitti
 
 

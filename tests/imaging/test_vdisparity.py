@@ -11,8 +11,8 @@ from hypothesis.extra import numpy as arrays
 from rollcli.errors import UsageError
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.imaging.derotate import derotate
+from rollcli.imaging.pictures.vdisparity_picture import BOTTOM_MARGIN, draw_v_disparity
 from rollcli.imaging.vdisparity import row_offset, v_disparity
-from rollcli.imaging.vdisparity_picture import BOTTOM_MARGIN, draw_v_disparity
 
 MAPS = arrays.arrays(
     st.sampled_from([np.uint8, np.uint16, np.int16, np.float32, np.float64]),

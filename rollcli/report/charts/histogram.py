@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.files.results import Row
-from rollcli.imaging.vdisparity_picture import round_step
 from rollcli.report.charts.axis_range import view
 from rollcli.report.charts.chart import Chart
 from rollcli.report.charts.names import HISTOGRAM
 from rollcli.report.summary import degrees
+from rollcli.round_step import round_step
 
 _MOST_BINS = 40
 _NARROWEST = 0.01  # degrees

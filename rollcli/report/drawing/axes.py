@@ -6,10 +6,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rollcli.imaging.vdisparity_picture import round_step
 from rollcli.report.charts.chart import Chart
 from rollcli.report.drawing.sketch import Area, Item, Line, Marks, Words
 from rollcli.report.drawing.words import colour_of, dash_of, symbol_of
+from rollcli.round_step import round_step
 
 _LETTER = 0.56  # width of a letter, of the font's size: digits of the usual fonts have this width
 _SWATCH, _APART = 2.3, 1.1  # of the legend, of the font's size

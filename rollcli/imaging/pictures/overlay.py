@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.imaging.vdisparity_picture import round_step
+from rollcli.round_step import round_step
 
 _ROAD = (220, 230, 40)  # BGR
 _TINT = 0.5

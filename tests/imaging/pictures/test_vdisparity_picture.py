@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from rollcli.imaging.pictures.vdisparity_picture import BOTTOM_MARGIN, LEFT_MARGIN, draw_v_disparity
 from rollcli.imaging.vdisparity import v_disparity
-from rollcli.imaging.vdisparity_picture import BOTTOM_MARGIN, LEFT_MARGIN, draw_v_disparity
 
 CYAN = (255, 255, 0)
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.imaging.vdisparity import VDisparity
+from rollcli.round_step import round_step
 
 _UNIT_ROWS = 480  # sizes below are pixels; a map of so many times these rows has them so many times larger
 LEFT_MARGIN, BOTTOM_MARGIN = 40, 32  # the first rows of a picture are the rows of the map
@@ -59,12 +60,6 @@ def draw_v_disparity(
     if alpha is not None:
         _draw_road(chart, np.polynomial.Polynomial(alpha), offset, top, unit)
     return _with_margins(chart, top, unit)
-
-
-def round_step(least: float) -> float:
-    """Return the next round number: 1, 2 or 5 times a power of ten."""
-    power = 10.0 ** math.floor(math.log10(least))
-    return next(each * power for each in (1, 2, 5, 10) if each * power >= least * (1 - 1e-9))
 
 
 def _shown(histogram: VDisparity, width: int) -> tuple[NDArray[np.float32], float]:

@@ -3,8 +3,14 @@
 import numpy as np
 import pytest
 
-from rollcli.imaging import overlay
-from rollcli.imaging.overlay import BAR_WIDTH, draw_disparity, draw_preview, draw_road, draw_road_on_photo
+from rollcli.imaging.pictures import overlay
+from rollcli.imaging.pictures.overlay import (
+    BAR_WIDTH,
+    draw_disparity,
+    draw_preview,
+    draw_road,
+    draw_road_on_photo,
+)
 
 
 def test_no_data_is_black_and_data_never_is():
