@@ -35,6 +35,5 @@ def idle_in_estimate(options: EstimateOptions) -> Iterator[Idle]:
     yield from idle_method(options.method)
     yield from idle_folders(options.inputs, options.pairs)
     yield from idle_running(options.running)
-    in_parts = options.result.format == "parquet" or options.result.output.rstrip("/").endswith(".parquet")
-    if not in_parts and not is_url(options.result.output):
+    if options.result.form != "parquet" and not is_url(options.result.output):
         yield Idle(("part_rows",), "only Parquet and results in an object store have parts")

@@ -30,8 +30,6 @@ class KeptRows:
         How many they are.
     errors : list of int
         Positions, from 0, of those without an angle.
-    failed : list of int
-        Positions of those whose frames are done again.
     incomplete : list of Frame
         Frames whose images are missing or empty, whatever the cause.
     totals : Counter of str
@@ -56,6 +54,7 @@ class KeptRows:
 
     @property
     def failed(self) -> list[int]:
+        """Positions of the rows whose frames are done again."""
         return self.errors if self._retries else []
 
     def add(self, row: Row) -> None:

@@ -28,6 +28,16 @@ class ResultOptions(NamedTuple):
     timing: bool = False
     part_rows: int = 1000
 
+    @property
+    def form(self) -> Literal["csv", "jsonl", "parquet"]:
+        """The format of the rows: the one given, else by the ending of the output."""
+        if self.format is not None:
+            return self.format
+        lower = self.output.lower().rstrip("/")
+        if lower.endswith((".jsonl", ".ndjson")):
+            return "jsonl"
+        return "parquet" if lower.endswith(".parquet") else "csv"
+
 
 class EstimateOptions(NamedTuple):
     """Every option of `rollcli estimate`."""

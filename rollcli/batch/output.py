@@ -225,14 +225,18 @@ def _kept_in_file(plan: Plan, options: EstimateOptions) -> KeptRows:
         data = Path(plan.output).read_bytes()
     except OSError:
         return KeptRows(plan, options)
-    kept = kept_rows(data, plan.output, plan.format)
-    return KeptRows(plan, options, parse_rows(kept, plan.output) if kept else ())
+    return _parsed(kept_rows(data, plan.output, plan.format), plan, options)
+
+
+def _parsed(data: bytes, plan: Plan, options: EstimateOptions) -> KeptRows:
+    """Take in the rows of a file that is cut after its last whole row; it may have none, nor a header."""
+    return KeptRows(plan, options, parse_rows(data, plan.output) if data else ())
 
 
 def _begin(file: ResultFile, plan: Plan, options: EstimateOptions) -> FileOutput:
     data = kept_rows(file.read(), plan.output, plan.format) if options.result.resume else b""
     try:
-        kept = KeptRows(plan, options, parse_rows(data, plan.output) if data else ())
+        kept = _parsed(data, plan, options)
         earlier = read_run(plan.output) if kept.count else None
     except InputError as error:
         raise not_resumable(plan.output, str(error)) from error

@@ -62,7 +62,7 @@ def make_plan(options: EstimateOptions) -> Plan:
     check_first_size(frames, options.frame)
     if not (options.running.overwrite or options.result.resume):
         check_images_are_new(frames, options)
-    form = options.result.format or _format(output)
+    form = options.result.form
     if form == "parquet" and is_stream(output):
         raise UsageError("Parquet is a folder of parts: name it with --output")
     return Plan(frames, output, form, options.result.timing)
@@ -82,13 +82,6 @@ def check_images_are_new(frames: Iterable[Frame], options: EstimateOptions) -> N
 def _images(frames: Iterable[Frame], options: EstimateOptions) -> Iterator[str]:
     """Yield every image that may be written; a list of them would take most of our memory."""
     return (path for frame in frames for path in every_path(frame, options.images))
-
-
-def _format(output: str) -> Format:
-    lower = output.lower().rstrip("/")
-    if lower.endswith((".jsonl", ".ndjson")):
-        return "jsonl"
-    return "parquet" if lower.endswith(".parquet") else "csv"
 
 
 def _find_frames(options: EstimateOptions) -> list[Frame]:

@@ -71,8 +71,7 @@ class PartsOutput:
             self._check_owned()
         self._record.saw(result.encoding, result.searched)
         self._waiting.append(result.row)
-        if result.row.status != "error":
-            self._images.extend(local_images(frame, self._image_options))
+        self._take_images(frame, result)
         if len(self._waiting) == self._part_rows:
             self._write()
 
@@ -91,7 +90,7 @@ class PartsOutput:
             They could not be made: its row no longer holds.
         """
         check_restored(frame, result)
-        self._images.extend(local_images(frame, self._image_options))
+        self._take_images(frame, result)
 
     def replace(self, position: int, frame: Frame, result: FrameResult) -> None:
         """Take the row; a part is written anew once its last such row is known."""
@@ -102,8 +101,7 @@ class PartsOutput:
         self._replaced_part = number
         self._record.saw(result.encoding, result.searched)
         self._replacing[position] = result.row
-        if result.row.status != "error":
-            self._images.extend(local_images(frame, self._image_options))
+        self._take_images(frame, result)
 
     def commit(self) -> None:
         """Write the part anew whose rows are replaced, if they differ; a new part waits until it is full."""
@@ -122,6 +120,10 @@ class PartsOutput:
     def hint(self) -> str:
         """Say that --resume continues after the last part."""
         return f"; {self._written} rows are kept, continue with --resume" if self._written else ""
+
+    def _take_images(self, frame: Frame, result: FrameResult) -> None:
+        if result.row.status != "error":
+            self._images.extend(local_images(frame, self._image_options))
 
     def _check_owned(self) -> None:
         self._record.check_owned()
