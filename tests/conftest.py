@@ -1,5 +1,6 @@
 """What tests of several folders share."""
 
+import contextlib
 import shutil
 
 import pytest
@@ -42,3 +43,34 @@ def browser():
         chromium = driver.chromium.launch(executable_path=found, args=list(FLAGS))
         yield chromium
         chromium.close()
+
+
+@pytest.fixture
+def open_page(browser):
+    """Opens a page; a message on the console, a dialog or a request for anything outside of it fails."""
+    complaints = []
+    with contextlib.ExitStack() as stack:
+
+        def opened(url, width=1280, scheme="light", expected=complaints):
+            context = browser.new_context(
+                viewport={"width": width, "height": 900}, color_scheme=scheme, offline=True
+            )
+            stack.callback(context.close)
+            page = context.new_page()
+            page.on("console", lambda message: expected.append(message.text))
+            page.on("pageerror", lambda error: complaints.append(str(error)))
+            page.on("dialog", lambda dialog: complaints.append(dialog.message))
+            page.on("request", lambda request: complaints.extend(_outside(request.url, url)))
+            page.goto(url)
+            return page
+
+        yield opened
+    assert complaints == []
+
+
+def _outside(requested, url):
+    return (
+        []
+        if requested.partition("#")[0] == url.partition("#")[0] or requested.startswith(("data:", "blob:"))
+        else [requested]
+    )

@@ -1,6 +1,5 @@
 """The page as a browser shows it."""
 
-import contextlib
 import re
 from pathlib import Path
 
@@ -42,35 +41,15 @@ def url(tmp_path_factory):
 
 
 @pytest.fixture
-def opened(browser, url):
-    """Opens the page; a message on the console, a dialog or a request for anything outside of it fails."""
-    complaints = []
-    with contextlib.ExitStack() as stack:
+def opened(open_page, url):
+    """Opens the page, or another, and waits for its chart."""
 
-        def open_page(width=1280, scheme="light", url=url, expected=complaints):
-            context = browser.new_context(
-                viewport={"width": width, "height": 900}, color_scheme=scheme, offline=True
-            )
-            stack.callback(context.close)
-            page = context.new_page()
-            page.on("console", lambda message: expected.append(message.text))
-            page.on("pageerror", lambda error: complaints.append(str(error)))
-            page.on("dialog", lambda dialog: complaints.append(dialog.message))
-            page.on("request", lambda request: complaints.extend(outside(request.url, url)))
-            page.goto(url)
-            page.wait_for_selector("#roll .main-svg")
-            return page
+    def opened_page(url=url, **how):
+        page = open_page(url, **how)
+        page.wait_for_selector("#roll .main-svg")
+        return page
 
-        yield open_page
-    assert complaints == []
-
-
-def outside(requested, url):
-    return (
-        []
-        if requested.partition("#")[0] == url.partition("#")[0] or requested.startswith(("data:", "blob:"))
-        else [requested]
-    )
+    return opened_page
 
 
 def luminance(colour):
