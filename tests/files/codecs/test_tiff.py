@@ -227,11 +227,27 @@ def test_a_part_that_holds_more_than_its_pixels_is_refused(compression):
         decode_stored(fewer, "map.tif")
 
 
-def test_deflated_bits_are_held_against_their_checksum_too():
-    bits = np.packbits(np.random.default_rng(0).integers(0, 2, (37, 56), dtype=np.uint8), axis=1)
+def tiff_of_bits(rows, compression):
+    """A mask of 56 random bits a row, in one strip."""
+    bits = np.packbits(np.random.default_rng(0).integers(0, 2, (rows, 56), dtype=np.uint8), axis=1)
     field = struct.pack("<HHII", 256, 4, 1, 7)
-    whole = make_tiff(bits, "deflate").replace(field, struct.pack("<HHII", 256, 4, 1, 56))
-    whole = whole.replace(struct.pack("<HHIHH", 258, 3, 1, 8, 0), struct.pack("<HHIHH", 258, 3, 1, 1, 0))
+    whole = make_tiff(bits, compression).replace(field, struct.pack("<HHII", 256, 4, 1, 56))
+    return whole.replace(struct.pack("<HHIHH", 258, 3, 1, 8, 0), struct.pack("<HHIHH", 258, 3, 1, 1, 0))
+
+
+@pytest.mark.parametrize("compression", ["lzw", "deflate", "packbits"])
+def test_fewer_rows_of_bits_than_the_header_says_are_refused(compression):
+    file = tiff_of_bits(20, compression)
+    assert decode_mask(file, "x").shape == (20, 56)
+    for tag in (257, 278):
+        file = file.replace(struct.pack("<HHII", tag, 4, 1, 20), struct.pack("<HHII", tag, 4, 1, 37))
+
+    with pytest.raises(InputError, match=r"its compressed data are wrong \(140 of 259 bytes"):
+        decode_mask(file, "x")
+
+
+def test_deflated_bits_are_held_against_their_checksum_too():
+    whole = tiff_of_bits(37, "deflate")
     expected = picture_or_mask(whole)
 
     start, end = data_of(whole)
