@@ -142,41 +142,46 @@ def jackknife(surface: Surface, theta: float, tuning: IntervalTuning) -> Jackkni
     white: Floats = inverse * (rest / total[0, 0] * independent)
     if not surface.parabolic:  # there is no a2 to err
         white[2] = white[:, 2] = 0
+    changes = _changes(np.concatenate([bands, columns]), normal, step)
+    parts = _lane(weights, model.side(surface.x, surface.y, plain)), _near(weights, along, tuning)
+    lane, near = ((rows * part) @ rows.T for part in parts)
+    lateral, depth = _apart(np.array([[lane, total], [near, total - near]]), total, tuning)
     return Jackknife(
-        bands=_changes(bands, normal, step),
-        columns=_changes(columns, normal, step),
+        bands=changes[: len(bands)],
+        columns=changes[len(bands) :],
         white=white[:4, :4],
         freedom=(_freedom(bands, normal), _freedom(columns, normal)),
-        lateral=_lateral(rows, weights, total, model.side(surface.x, surface.y, plain), tuning),
-        depth=_depth(rows, weights, total, along, tuning),
+        lateral=lateral,
+        depth=depth,
         bend=_bend(total, model.camber),
         camber=_camber(model, prior * float(inverse[_CAMBER, _CAMBER])) if cambered else None,
     )
 
 
-def _lateral(rows: Floats, weights: Floats, total: Floats, side: Reals, tuning: IntervalTuning) -> float:
-    """Return by how much the theta of the lane ahead differs from that of all pixels."""
-    lane = weights * np.exp(-np.minimum(np.square(np.square(side)), 80))
-    return _apart((rows * lane) @ rows.T, total, total, tuning)
+def _lane(weights: Floats, side: Reals) -> Floats:
+    """Return the weights of the lane ahead."""
+    lane: Floats = weights * np.exp(-np.minimum(np.square(np.square(side)), 80))
+    return lane
 
 
-def _depth(rows: Floats, weights: Floats, total: Floats, along: Reals, tuning: IntervalTuning) -> float:
-    """Return by how much the theta of the near half differs from that of the far half."""
+def _near(weights: Floats, along: Reals, tuning: IntervalTuning) -> Floats:
+    """Return the weights of the near half."""
     middle = float(weights @ along) / float(weights.sum())
-    near = weights / (1 + np.exp(np.clip((middle - along) / tuning.depth_fade, -50, 50)))
-    products = (rows * near) @ rows.T
-    return _apart(products, total - products, total, tuning)
+    near: Floats = weights / (1 + np.exp(np.clip((middle - along) / tuning.depth_fade, -50, 50)))
+    return near
 
 
-def _apart(one: Floats, other: Floats, total: Floats, tuning: IntervalTuning) -> float:
-    """Return how far the thetas of two parts lie apart, at the fitted camber, from the parts' products.
+def _apart(pairs: Floats, total: Floats, tuning: IntervalTuning) -> list[float]:
+    """Return how far the thetas of two parts lie apart, at the fitted camber, for each pair of products.
 
+    `pairs` has shape (K, 2, 6, 6), `total` is of all pixels.
     A little of the whole is added: where a part is nearly empty, it says what the whole says.
     """
-    products = np.stack([one, other]) + tuning.whole_share * total
-    products[:, _CAMBER, :5] = products[:, :5, _CAMBER] = 0
-    theta = solve_normal(products[:, :5, :5], products[:, :5, 5:])[:, _THETA, 0]
-    return abs(float(theta[0] - theta[1]))
+    products = pairs + tuning.whole_share * total
+    products[..., _CAMBER, :5] = products[..., :5, _CAMBER] = 0
+    theta = solve_normal(products[..., :5, :5], products[..., :5, 5:])[..., _THETA, 0]
+    apart: list[float] = np.abs(theta[:, 0] - theta[:, 1]).tolist()
+    return apart
 
 
 def _bend(total: Floats, camber: float) -> float:
@@ -203,7 +208,7 @@ def _by_group(rows: Floats, weights: Floats, position: Reals, share: Floats, gro
     heights = np.cumsum(share[order])
     cuts = np.searchsorted(heights, heights[-1] * np.arange(1, groups) / groups)
     bounds = [0, *cuts.tolist(), len(order)]
-    sorted_rows = rows[:, order]
+    sorted_rows = rows.take(order, 1)
     weighted = sorted_rows * weights[order]
     return np.stack([weighted[:, a:b] @ sorted_rows[:, a:b].T for a, b in itertools.pairwise(bounds)])
 

@@ -129,12 +129,20 @@ def point_moments(
     p: Floats, q: Floats, disparity: Floats, weights: Floats, grid: Grid, plane: tuple[float, float, float]
 ) -> Moments:
     """Sum scattered pixels, given by their normalised coordinates; all arrays have shape (N,)."""
-    rows, columns = _powers(p).T, _powers(q).T
+    rows, columns = powers(p), powers(q)
     residual = disparity - (plane[0] + plane[1] * p + plane[2] * q)
     pull = weights * residual
-    s = (rows * weights[:, None]).T @ columns
-    t = (rows[:, :3] * pull[:, None]).T @ columns[:, :3]
+    s = (rows * weights) @ columns.T
+    t = (rows[:3] * pull) @ columns[:3].T
     return Moments(grid, plane, s, t, float(pull @ residual))
+
+
+def powers(x: NDArray[np.floating[Any]], degree: int = 4) -> Floats:
+    """Return x^0 to x^degree, shape (degree + 1, N); several times faster than `np.vander`."""
+    rows = np.ones((degree + 1, len(x)))
+    for k in range(1, degree + 1):
+        np.multiply(rows[k - 1], x, out=rows[k])
+    return rows
 
 
 def _block_sums(
@@ -150,7 +158,7 @@ def _block_sums(
     precision = np.float64 if disparity.size <= _SMALL else np.float32
     rows = min(_ROWS, max(8, _ONE_THREAD // (5 * width)))
     steps = np.arange(rows, dtype=np.float64) - rows // 2
-    powers = _powers(steps).astype(precision)
+    by_step = powers(steps).astype(precision)
     along = (plane[0] + plane[1] * p).astype(disparity.dtype)
     middles = q[::rows] + (rows // 2) / scale
     columns = np.empty((len(middles), 9, width), precision)  # 5 of w, then of w r 4: BLAS is faster than at 3
@@ -172,8 +180,8 @@ def _block_sums(
             raw = r * (m > 0)
             r *= m
             squares += float(np.vdot(r, raw))
-        np.matmul(powers[:, :n], m, out=columns[k, :5])
-        np.matmul(powers[:4, :n], r, out=columns[k, 5:])
+        np.matmul(by_step[:, :n], m, out=columns[k, :5])
+        np.matmul(by_step[:4, :n], r, out=columns[k, 5:])
     across = _along_rows(columns, p)
     s, t = across[:, :5], across[:, 5:8, :3]  # per block: powers of the step, powers of p
     slope = plane[2] / scale
@@ -186,26 +194,18 @@ def _block_sums(
 def _along_rows(columns: NDArray[Any], p: Floats) -> Floats:
     """Return the sums of columns (B, 9, W) times p^0 to p^4, shape (B, 9, 5)."""
     blocks, kinds, width = columns.shape
-    powers = np.zeros((width, 8))  # BLAS is faster at 8 than at 5
-    powers[:, :5] = _powers(p).T
+    padded = np.zeros((width, 8))  # BLAS is faster at 8 than at 5
+    padded[:, :5] = powers(p).T
     some = max(1, _ONE_THREAD // (kinds * 8 * width))
     parts = [
-        columns[k : k + some].reshape(-1, width).astype(np.float64) @ powers for k in range(0, blocks, some)
+        columns[k : k + some].reshape(-1, width).astype(np.float64) @ padded for k in range(0, blocks, some)
     ]
     return np.concatenate(parts).reshape(blocks, kinds, 8)[..., :5]
 
 
-def _powers(x: Floats) -> Floats:
-    """Return x^0 to x^4, shape (5, N); several times faster than `np.vander`."""
-    powers = np.ones((5, len(x)))
-    for k in range(1, 5):
-        np.multiply(powers[k - 1], x, out=powers[k])
-    return powers
-
-
 def _from_steps(middles: Floats, scale: float) -> Floats:
     """Return the matrices from powers of a step to powers of q = middle + step / scale, shape (B, 5, 5)."""
-    matrices: Floats = _CHOOSE * _powers(middles).T[:, _REST] / scale ** np.arange(5)
+    matrices: Floats = _CHOOSE * powers(middles).T[:, _REST] / scale ** np.arange(5)
     return matrices
 
 
@@ -231,7 +231,7 @@ def _first_fit(
     used = (sample > 0) & (sample < np.inf)
     if weights is not None:
         used &= weights[rows, columns] > 0
-    x, y = _powers(p[columns])[:3], _powers(q[rows])[:3]
+    x, y = powers(p[columns], 2), powers(q[rows], 2)
     s = y @ used @ x.T
     t = y[:2] @ np.where(used, sample, 0) @ x[:2].T
     n = float(s[0, 0])

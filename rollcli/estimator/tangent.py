@@ -9,8 +9,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rollcli.estimator.interval import Jackknife
-from rollcli.estimator.moments import Floats, Grid
+from rollcli.estimator.moments import Floats, Grid, powers
 from rollcli.estimator.road.model import Reals, RoadModel
+from rollcli.estimator.road.robust_fit import solve_normal
 from rollcli.estimator.road.surface import Surface
 
 _MOST_MOVED = 0.05  # of the slope: no road bends more, so what does is no bend of the road
@@ -86,9 +87,9 @@ def touch(
 
 def _parabola_of_cubic(along: Reals, weights: Floats) -> tuple[float, float]:
     """Return value and slope at 0 of the parabola that fits the cubes of some positions, px^3 and px^2."""
-    powers = np.vander(along, 4, increasing=True)
-    products = (powers * weights[:, None]).T @ powers
-    value, slope, _ = np.linalg.lstsq(products[:3, :3], products[:3, 3], rcond=None)[0].tolist()
+    rows = powers(along, 3)
+    products = (rows * weights) @ rows.T
+    value, slope, _ = solve_normal(products[:3, :3], products[:3, 3:])[:, 0].tolist()
     return value, slope
 
 

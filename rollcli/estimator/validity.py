@@ -57,8 +57,8 @@ class CheckedMap:
                 f"a disparity map is a 2-D array of real numbers, not {values.ndim}-D {values.dtype}"
             )
         usable = None if mask is None else _checked_mask(mask, values.shape)
-        if values.dtype.kind == "f" and (large := values >= LARGEST).any():
-            values = np.where(large, 0, values)
+        if values.dtype.kind == "f" and not values.max(initial=0) < LARGEST:  # or one is NaN
+            values = np.where(values >= LARGEST, 0, values)
         valid: NDArray[np.bool_] = values > 0
         if usable is not None:
             valid &= usable

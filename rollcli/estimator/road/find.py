@@ -99,7 +99,9 @@ def find_road(sample: Sample, max_roll: float, seed: int) -> Road:
 def road_weights(sample: Sample, plane: NDArray[np.float64], near: NDArray[np.intp]) -> Singles:
     """Return 0.2 to 1 for each of some pixels: how well the map's slopes around it agree with the plane's."""
     one = plane[None].astype(np.float32)
-    weights: Singles = slope_weights(sample.slopes[:, near], sample.slope_noise, one, sample.tuning.score)[0]
+    weights: Singles = slope_weights(
+        sample.slopes.take(near, 1), sample.slope_noise, one, sample.tuning.score
+    )[0]
     return weights
 
 

@@ -15,7 +15,7 @@ from rollcli.estimator.road.profile import Profile, read_profile
 from rollcli.estimator.road.subsample import Sample, Singles
 from rollcli.estimator.road.tuning import FitTuning, ProfileTuning
 
-_RIDGE = 1e-10 * np.eye(5)  # of normal matrices with a diagonal of ones
+_RIDGE = 1e-10 * np.eye(5)  # of normal matrices with a diagonal of ones, up to this size
 
 
 class Fit(NamedTuple):
@@ -67,12 +67,12 @@ class NearPixels:
         """Take the pixels near a road's plane from a sample."""
         tuning, model = sample.tuning.fit, road.model
         c0, c1, c2 = road.plane
-        off = (c0 + c1 * sample.x + c2 * sample.y - sample.d) / sample.tolerance
-        near = np.flatnonzero(np.abs(off) < tuning.reach)
-        stride = -(-len(near) // tuning.pixels) or 1
-        near = near[near % stride == 0]  # by place in the sample, so that one pixel more moves no other
-        every = max(1, round(len(near) / tuning.lane_pixels))
-        shown = (near // stride) % every == 0
+        off = c0 + c1 * sample.x + c2 * sample.y - sample.d
+        close = np.abs(off) < tuning.reach * sample.tolerance
+        stride = -(-int(np.count_nonzero(close)) // tuning.pixels) or 1
+        places = np.flatnonzero(close[::stride])  # so that one pixel more moves no other
+        near = places * stride
+        shown = places % max(1, round(len(places) / tuning.lane_pixels)) == 0
         kept = (sample.x, sample.y, sample.d, sample.tolerance)
         x, y, d, tolerance = (pixels[near] for pixels in kept)
         across, along = model.across(x, y), model.along(x, y)
@@ -203,9 +203,11 @@ def solve_normal(normal: Floats, right: Floats, like: Floats | None = None) -> F
         0 for what is missing.
     """
     diagonal = np.diagonal(normal if like is None else like, axis1=-2, axis2=-1)
-    scale = np.where(diagonal > 0, np.sqrt(np.maximum(diagonal, 0)), 1)
-    even = normal / (scale[..., :, None] * scale[..., None, :]) + _RIDGE
-    solved: Floats = np.linalg.solve(even, right / scale[..., :, None]) / scale[..., :, None]
+    unit = 1 / np.sqrt(np.where(diagonal > 0, diagonal, 1))
+    across = unit[..., :, None]
+    size = normal.shape[-1]
+    even = normal * (across * unit[..., None, :]) + _RIDGE[:size, :size]
+    solved: Floats = np.linalg.solve(even, right * across) * across
     return solved
 
 

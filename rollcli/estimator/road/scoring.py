@@ -18,7 +18,7 @@ def first_costs(sample: Sample, planes: Singles, pixels: int) -> Singles:
     side = np.square(x * np.partition(planes[:, 2], middle)[middle] / d)
     beside = tuning.beside_weight
     corridor = beside + (1 - beside) * np.exp(side * np.float32(-1 / tuning.corridor**2))
-    weight = np.where(rising(sample.slopes[:, few]), corridor, corridor * np.float32(tuning.off_slope_weight))
+    weight = np.where(rising(sample.slopes[:, few]), 1, np.float32(tuning.off_slope_weight)) * corridor
     scaled = np.stack([np.ones_like(x), x, sample.y[few], d]) / sample.tolerance[few]
     costs: Singles = _excess(planes, scaled, _caps(sample.coherence[few], tuning)) @ weight
     return costs
@@ -30,8 +30,8 @@ class PlaneScorer:
 
     Attributes
     ----------
-    x, y, d : ndarray
-        As in `Sample`.
+    bearings : ndarray, shape (2, N)
+        x and -y over the disparity.
     scaled : ndarray, shape (4, N)
         1, x, y and d over the tolerance.
     caps : ndarray
@@ -44,9 +44,7 @@ class PlaneScorer:
     tuning : ScoreTuning
     """
 
-    x: Singles
-    y: Singles
-    d: Singles
+    bearings: Singles
     scaled: Singles
     caps: Singles
     near: Singles
@@ -64,15 +62,21 @@ class PlaneScorer:
         near = np.minimum(d, np.float32(tuning.nearness * sample.typical))
         near /= near.mean()
         caps = _caps(sample.coherence[few], tuning)
-        return cls(x, y, d, scaled, caps, near, sample.slopes[:, few], sample.slope_noise, tuning)
+        return cls(
+            np.stack([x, -y]) / d, scaled, caps, near, sample.slopes[:, few], sample.slope_noise, tuning
+        )
 
     def scores(self, planes: Singles) -> Singles:
         """Return the score of each plane (K, 3); see `Road.score`."""
         excess = _excess(planes, self.scaled, self.caps)
         excess -= 1
         slope, core, corridor = self._weights(planes)
-        scores = _explained(excess, slope, core, self.tuning.least_core)
-        scores += _explained(excess, slope, corridor, self.tuning.least_corridor)
+        # what speaks for a plane counts as far as the slopes agree, what speaks against it in any case
+        lost = np.minimum(excess, 0)
+        lost *= slope
+        lost += np.maximum(excess, 0)
+        scores = _explained(lost, slope, core, self.tuning.least_core)
+        scores += _explained(lost, slope, corridor, self.tuning.least_corridor)
         scores /= 2
         rise = np.square(planes[:, 1]) + np.square(planes[:, 2])
         steep = np.square(planes[:, 0]) / np.maximum(rise, np.float32(1e-30))
@@ -93,11 +97,14 @@ class PlaneScorer:
 
     def _weights(self, planes: Singles) -> tuple[Singles, Singles, Singles]:
         """Return, for each plane and pixel, the agreement of slopes and the places in core and corridor."""
-        c1, c2 = planes[:, 1:2], planes[:, 2:3]
         # how far to the side each pixel lies, in camera heights, as `RoadModel.side` says
-        side = np.square((self.x * c2 - self.y * c1) / self.d)
-        corridor = np.exp(side * np.float32(-1 / self.tuning.corridor**2))
-        core = np.square(np.square(np.square(corridor)))
+        corridor = planes[:, :0:-1] @ self.bearings
+        np.square(corridor, out=corridor)
+        corridor *= np.float32(-1 / self.tuning.corridor**2)
+        np.exp(corridor, out=corridor)
+        core = np.square(corridor)
+        np.square(core, out=core)
+        np.square(core, out=core)
         corridor += core
         beside = self.tuning.beside_weight
         corridor *= np.float32((1 - beside) / 2)
@@ -111,8 +118,8 @@ def slope_weights(slopes: Singles, slope_noise: float, planes: Singles, tuning: 
     """Return (K, N) weights by how well the map's slopes, the better of each pair, agree with the planes'."""
     c1, c2 = planes[:, 1:2], planes[:, 2:3]
     left, right, up, down = slopes
-    weights: Singles = np.square(np.minimum(np.abs(left - c1), np.abs(right - c1)))
-    weights += np.square(np.minimum(np.abs(up - c2), np.abs(down - c2)))
+    weights = _off_slope(left, right, c1)
+    weights += _off_slope(up, down, c2)
     share = np.float32(tuning.slope_share**2)
     weights *= -0.5 / (share * (c1 * c1 + c2 * c2) + np.float32(slope_noise**2))
     np.exp(weights, out=weights)
@@ -121,11 +128,20 @@ def slope_weights(slopes: Singles, slope_noise: float, planes: Singles, tuning: 
     return weights
 
 
-def _explained(excess: Singles, slope: Singles, place: Singles, least: float) -> Singles:
+def _off_slope(one: Singles, other: Singles, slope: Singles) -> Singles:
+    """Return (K, N): the square of how far the better of two slopes is off that of each plane (K, 1)."""
+    off, off_other = one - slope, other - slope
+    np.abs(off, out=off)
+    np.abs(off_other, out=off_other)
+    np.minimum(off, off_other, out=off)
+    squares: Singles = np.square(off, out=off)
+    return squares
+
+
+def _explained(lost: Singles, slope: Singles, place: Singles, least: float) -> Singles:
     """Return (K,): the share of the road-like pixels of a place that lie on each plane, less those below."""
-    reached = place * slope
-    lost = np.einsum("kn,kn->k", np.where(excess < 0, reached, place), excess)
-    shares: Singles = -lost / (reached.sum(1) + np.float32(least * place.shape[1]))
+    reached = np.einsum("kn,kn->k", place, slope)
+    shares: Singles = -np.einsum("kn,kn->k", place, lost) / (reached + np.float32(least * place.shape[1]))
     return shares
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.estimator.energy import Energy
-from rollcli.estimator.moments import Floats, Grid
+from rollcli.estimator.moments import Floats, Grid, powers
 from rollcli.estimator.road.find import Road
 from rollcli.estimator.road.model import RoadModel
 from rollcli.estimator.road.profile import Profile
@@ -161,8 +161,8 @@ def whole_surface(sample: Sample, energy: Energy) -> Surface:
     x, y, d = (values.astype(np.float64) for values in (sample.x, sample.y, sample.d))
     _, c1, c2 = energy.plane
     plane = RoadModel.of_plane(0.0, c1, c2)
-    powers = np.vander(plane.along(x, y), 3 if energy.parabolic else 2, increasing=True)
-    a0, a1, *a2 = np.linalg.lstsq(powers.T @ powers, powers.T @ d, rcond=None)[0].tolist()
+    rows = powers(plane.along(x, y), 2 if energy.parabolic else 1)
+    a0, a1, *a2 = np.linalg.lstsq(rows @ rows.T, rows @ d, rcond=None)[0].tolist()
     return Surface(
         x=x,
         y=y,
