@@ -1,72 +1,269 @@
-"""500 frames, killed with SIGKILL at five random moments, resumed: the bytes of an undisturbed run?
+"""Runs disturbed at random moments and resumed until one ends by itself: the bytes of a run undisturbed?
 
-python tests/benchmarks/bench_kill.py [frames] [trials] [seed]
+python tests/benchmarks/bench_kill.py [--count 1000] [--frames 60] [--seed 0] [KIND ...]
+
+A disturbance counts when it has met a living run. A finding is another status than the documented ones, a
+traceback or an internal error, a process that outlives its run, a second run that is let in, or, at the end
+of a trial, another byte in the result, its record or the images. Linux alone: it looks into /proc.
 """
 
+import argparse
+import os
+import pty
 import random
+import shutil
+import signal
 import subprocess
 import sys
 import tempfile
+import termios
 import time
+from collections import Counter
+from collections.abc import Callable
+from fcntl import ioctl
 from pathlib import Path
+from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
 from tests.run_cli import command, contents, environment, write_maps
 
-KILLS = 5
+RESULTS = ("rolls.csv", "rolls.jsonl")
+IMAGES = ("--derotated", "up", "--vdisparity", "v", "--road-mask", "road")
+STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+LONGEST_S = 120  # a run that lasts longer hangs
 
 
-def start(folder: Path, jobs: int, *flags: str) -> subprocess.Popen[bytes]:
-    """A run that writes a result and three images a frame into the folder."""
-    images = ("--derotated", "up", "--vdisparity", "v", "--road-mask", "road")
-    line = command("estimate", "../maps", "-q", "-o", "rolls.csv", "-j", str(jobs), *images, *flags)
-    return subprocess.Popen(line, cwd=folder, env=environment())
+class Run:
+    """A run in a session of its own, which writes a result and three images a frame into the folder.
+
+    Parameters
+    ----------
+    folder : Path
+    result : str
+    jobs : int
+    messages : str
+        Where they go: `file`, `pipe` or `terminal`.
+    """
+
+    def __init__(self, folder: Path, result: str, jobs: int, messages: str = "file") -> None:
+        self.folder, self.result, self.jobs = folder, result, jobs
+        self.reader = -1
+        self._said = folder.with_suffix(".messages")
+        if messages == "file":
+            writer = os.open(self._said, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+        elif messages == "pipe":
+            self.reader, writer = os.pipe()
+        else:
+            self.reader, writer = pty.openpty()
+        self.process = subprocess.Popen(
+            command("estimate", "../maps", "-v", "-o", result, "-j", str(jobs), "--resume", *IMAGES),
+            cwd=folder,
+            env=environment(),
+            stdout=subprocess.DEVNULL,
+            stderr=writer,
+            start_new_session=True,
+            preexec_fn=(lambda: ioctl(2, termios.TIOCSCTTY, 0)) if messages == "terminal" else None,
+        )
+        os.close(writer)
+
+    def send(self, number: int) -> None:
+        """Send a signal to the process that was started."""
+        self.process.send_signal(number)
+
+    def send_all(self, number: int) -> None:
+        """Send a signal to it and its workers, as a terminal does."""
+        if self.process.poll() is None:
+            os.killpg(self.process.pid, number)
+
+    def workers(self) -> list[int]:
+        """Its worker processes."""
+        try:
+            children = Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children").read_text()
+            lines = {int(pid): Path(f"/proc/{pid}/cmdline").read_bytes() for pid in children.split()}
+        except OSError:
+            return []
+        return [pid for pid, line in lines.items() if b"spawn_main" in line]
+
+    def has_begun(self) -> bool:
+        """Whether it handles the signals by now: what comes before that, Python or the system answers."""
+        try:
+            status = Path(f"/proc/{self.process.pid}/status").read_text()
+        except OSError:
+            return True
+        caught = int(status.partition("SigCgt:")[2].split()[0], 16)
+        return bool(caught >> (signal.SIGHUP - 1) & 1)
+
+    def leave(self) -> None:
+        """Close the end where its messages are read."""
+        if self.reader >= 0:
+            os.close(self.reader)
+            self.reader = -1
+
+    def end(self) -> tuple[int, str]:
+        """Wait for its end; its status and what it said, as far as that is known."""
+        status = self.process.wait(LONGEST_S)
+        said = b""
+        if self.reader >= 0:
+            os.set_blocking(self.reader, False)
+            try:
+                while data := os.read(self.reader, 1 << 16):
+                    said += data
+            except OSError:  # nothing more, or the terminal is gone
+                pass
+            self.leave()
+        elif self._said.exists():
+            said = self._said.read_bytes()
+        return status, said.decode("utf-8", "replace")
+
+    def outlived(self) -> bool:
+        """Whether one of its processes is still there when it should long have gone."""
+        give_up = time.monotonic() + 30
+        while time.monotonic() < give_up:
+            try:
+                os.killpg(self.process.pid, 0)
+            except ProcessLookupError:
+                return False
+            time.sleep(0.01)
+        return True
 
 
-def seconds_undisturbed(folder: Path, jobs: int) -> float:
-    """How long the whole takes."""
-    folder.mkdir()
-    before = time.perf_counter()
-    start(folder, jobs).wait()
-    return time.perf_counter() - before
+def storm(run: Run, chance: random.Random) -> None:
+    """Signals that stop, halt and wake, one upon the other, to one process or to all."""
+    for _ in range(chance.randint(5, 60)):
+        send = chance.choice((run.send, run.send_all))
+        send(chance.choice((*STOPS, *STOPS, signal.SIGSTOP, signal.SIGCONT)))
+        time.sleep(chance.choice((0, 0, 0.001, 0.01)))
+    run.send_all(signal.SIGCONT)
 
 
-def disturbed(folder: Path, jobs: int, seconds: float, chance: random.Random) -> list[int]:
-    """Kill five runs, let the sixth finish; the rows that each of them left."""
-    folder.mkdir()
-    rows = []
-    for _ in range(KILLS):
-        run = start(folder, jobs, "--resume")
-        time.sleep(chance.uniform(0, 2 * seconds / KILLS))
-        run.kill()
-        run.wait()
-        result = folder / "rolls.csv"
-        rows.append(result.read_bytes().count(b"\n") if result.exists() else 0)
-    start(folder, jobs, "--resume").wait()
-    return rows
+def halt(run: Run, chance: random.Random) -> None:
+    """Stop all of it for a while, as Ctrl-Z and fg do."""
+    run.send_all(signal.SIGSTOP)
+    time.sleep(chance.uniform(0, 0.3))
+    run.send_all(signal.SIGCONT)
+
+
+def second_run(run: Run, chance: random.Random) -> str:
+    """Stop it, and start a second run on its result, which has to be refused."""
+    run.send_all(signal.SIGSTOP)
+    began = (run.folder / run.result).exists()
+    second = Run(run.folder, run.result, run.jobs, "pipe") if began else None
+    status, said = second.end() if second else (2, "another run")
+    run.send_all(signal.SIGCONT)
+    return "" if status == 2 and "another run" in said else f"a second run ended with {status}: {said[-300:]}"
+
+
+def a_worker(number: int) -> Callable[[Run, random.Random], None]:
+    """Send the signal to one of its workers; one that was stopped is woken after a while."""
+
+    def act(run: Run, chance: random.Random) -> None:
+        for worker in run.workers()[: chance.randint(1, 2)][-1:]:
+            os.kill(worker, number)
+            if number == signal.SIGSTOP:
+                time.sleep(chance.uniform(0, 0.3))
+                os.kill(worker, signal.SIGCONT)
+
+    return act
+
+
+class Kind(NamedTuple):
+    """A way to disturb a run; `ends`: the run is over then, with one of these statuses or with 0."""
+
+    act: Callable[[Run, random.Random], str | None]
+    ends: bool = True
+    statuses: tuple[int, ...] = (130,)
+    jobs: tuple[int, ...] = (1, 2)
+    messages: str = "file"
+
+
+KINDS = {
+    "kill": Kind(lambda run, _: run.send(signal.SIGKILL), statuses=(-9,)),
+    "kill-all": Kind(lambda run, _: run.send_all(signal.SIGKILL), statuses=(-9,)),
+    "kill-worker": Kind(a_worker(signal.SIGKILL), ends=False, jobs=(2,)),
+    "ctrl-c": Kind(lambda run, _: run.send_all(signal.SIGINT)),
+    "sigterm": Kind(lambda run, _: run.send(signal.SIGTERM)),
+    "sighup": Kind(lambda run, _: run.send_all(signal.SIGHUP)),
+    "storm": Kind(storm),
+    "stop": Kind(halt, ends=False),
+    "stop-worker": Kind(a_worker(signal.SIGSTOP), ends=False, jobs=(2,)),
+    "second-run": Kind(second_run, ends=False),
+    "closed-terminal": Kind(lambda run, _: run.leave(), messages="terminal"),
+    "closed-pipe": Kind(lambda run, _: run.leave(), ends=False, messages="pipe"),
+}
+
+
+def disturbed(folder: Path, result: str, jobs: int, name: str, seconds: float, chance: random.Random):
+    """Disturb one run; whether it met it alive, whether the run has ended the work, and what was found."""
+    kind = KINDS[name]
+    run = Run(folder, result, jobs, kind.messages)
+    time.sleep(chance.uniform(0, seconds))
+    early, met = not run.has_begun(), run.process.poll() is None
+    found = kind.act(run, chance) if met else None
+    try:
+        status, said = run.end()
+    except subprocess.TimeoutExpired:
+        run.send_all(signal.SIGKILL)
+        return met, early, False, f"hangs, {found}"
+    if "Traceback" in said or "internal error" in said:
+        found = said[-2000:]
+    allowed = kind.statuses if met and kind.ends else ()
+    if status not in (0, *allowed) and not (early and status in [-number for number in STOPS]):
+        found = f"status {status}: {said[-500:]}"
+    if run.outlived():
+        found = "a process outlives its run"
+    return met, early, status == 0, found
 
 
 def main() -> None:
-    """Print one line a trial."""
-    frames, trials, seed = [int(text) for text in sys.argv[1:4]] + [500, 3, 0][len(sys.argv) - 1 :]
-    chance, same = random.Random(seed), 0
+    """Print a line for each finding and each ten trials, and how often each kind met a run."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("kinds", nargs="*", metavar="KIND", help=", ".join(KINDS))
+    parser.add_argument("--count", type=int, default=1000)
+    parser.add_argument("--frames", type=int, default=60)
+    parser.add_argument("--seed", type=int, default=0)
+    given = parser.parse_args()
+    chance, kinds = random.Random(given.seed), given.kinds or list(KINDS)
+    counts: Counter[str] = Counter()
+    trials, same, findings, early_ones = 0, 0, 0, 0
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        write_maps(folder / "maps", frames, width=320, height=240)
-        seconds = seconds_undisturbed(folder / "undisturbed", 2)
-        expected = contents(folder / "undisturbed")
-        for trial in range(trials):
-            jobs = 1 + trial % 2
-            rows = disturbed(folder / f"trial{trial}", jobs, seconds, chance)
-            equal = contents(folder / f"trial{trial}") == expected
-            same += equal
-            print(
-                f"-j{jobs}, killed after {rows} lines: {'the same bytes' if equal else 'DIFFERENT'}",
-                flush=True,
-            )
-    print(f"{same} of {trials} trials ended in the bytes of an undisturbed run ({len(expected)} files)")
+        write_maps(folder / "maps", given.frames, width=320, height=240)
+        seconds, expected = {}, {}
+        for result in RESULTS:
+            (folder / f"undisturbed-{result}").mkdir()
+            start = time.monotonic()
+            Run(folder / f"undisturbed-{result}", result, 2).end()
+            seconds[result] = time.monotonic() - start
+            expected[result] = contents(folder / f"undisturbed-{result}")
+        while counts.total() < given.count:
+            result, jobs = RESULTS[trials // 2 % 2], 1 + trials % 2
+            trial = folder / f"trial{trials}"
+            trial.mkdir()
+            done = False
+            while not done:
+                kind = chance.choice([each for each in kinds if jobs in KINDS[each].jobs])
+                met, early, done, found = disturbed(trial, result, jobs, kind, seconds[result], chance)
+                counts[kind] += met
+                early_ones += met and early
+                if found:
+                    findings += 1
+                    print(f"FOUND by {kind}, -j{jobs}, {result}: {found}", flush=True)
+            trials += 1
+            if contents(trial) == expected[result]:
+                same += 1
+                shutil.rmtree(trial)
+            else:
+                print(f"DIFFERENT bytes, -j{jobs}, {result}, after {kind}", flush=True)
+            if trials % 10 == 0:
+                print(f"{counts.total()} disturbances, {same} of {trials} trials the same", flush=True)
+    for kind in kinds:
+        print(f"{kind:16} {counts[kind]}")
+    print(
+        f"{counts.total()} disturbances, {early_ones} before the program had begun; {findings} findings; "
+        f"{same} of {trials} trials ended in the bytes of an undisturbed run"
+    )
 
 
 if __name__ == "__main__":
