@@ -179,7 +179,9 @@ def _begin(plan: Plan, options: EstimateOptions, keep_open: int | None) -> Parts
     kept = _kept(plan, options, parts)
     record = new_record(plan, options, kept, _earlier(plan) if kept.count else None)
     if not is_url(plan.output):
-        remove_leftovers([run_path(plan.output), *(f"{plan.output}/{name}" for name in parts)])
+        all_parts = range(_whole_parts(len(plan.frames), options.result.part_rows))
+        to_write = [_part_location(plan, number) for number in all_parts]  # a kill may have met any of them
+        remove_leftovers([run_path(plan.output), *to_write, *(f"{plan.output}/{name}" for name in parts)])
     if options.result.resume or options.running.overwrite:
         remove_image_leftovers(plan.frames, options.images)
     for name in parts[_whole_parts(kept.count, options.result.part_rows) :]:
