@@ -8,6 +8,7 @@ of a trial, another byte in the result, its record or the images. Linux alone: i
 """
 
 import argparse
+import contextlib
 import os
 import pty
 import random
@@ -32,7 +33,9 @@ from tests.run_cli import command, contents, environment, write_maps
 RESULTS = ("rolls.csv", "rolls.jsonl")
 IMAGES = ("--derotated", "up", "--vdisparity", "v", "--road-mask", "road")
 STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-LONGEST_S = 120  # a run that lasts longer hangs
+LONGEST_S = 300  # a run that lasts longer hangs
+# the moment: while it starts, or so many images later and within the next frame
+STARTING, START_S, MOST_IMAGES, FRAME_S = 0.2, 0.8, 16, 0.03
 
 
 class Run:
@@ -95,6 +98,17 @@ class Run:
         caught = int(status.partition("SigCgt:")[2].split()[0], 16)
         return bool(caught >> (signal.SIGHUP - 1) & 1)
 
+    def goes_on(self, images: int) -> bool:
+        """Wait until it has made so many images more than were there; whether it still runs then."""
+        wanted = images + self._images()
+        while self.process.poll() is None and self._images() < wanted:
+            time.sleep(0.002)
+        return self.process.poll() is None
+
+    def _images(self) -> int:
+        folder = self.folder / IMAGES[1]
+        return sum(1 for _ in folder.iterdir()) if folder.exists() else 0
+
     def leave(self) -> None:
         """Close the end where its messages are read."""
         if self.reader >= 0:
@@ -117,16 +131,18 @@ class Run:
             said = self._said.read_bytes()
         return status, said.decode("utf-8", "replace")
 
-    def outlived(self) -> bool:
-        """Whether one of its processes is still there when it should long have gone."""
+    def left(self) -> list[str]:
+        """Its processes that are still there when they should long have gone."""
         give_up = time.monotonic() + 30
         while time.monotonic() < give_up:
             try:
                 os.killpg(self.process.pid, 0)
             except ProcessLookupError:
-                return False
+                return []
             time.sleep(0.01)
-        return True
+        return subprocess.run(
+            ["ps", "-o", "pid=,stat=,args=", "-g", str(self.process.pid)], capture_output=True, text=True
+        ).stdout.splitlines()
 
 
 def storm(run: Run, chance: random.Random) -> None:
@@ -135,7 +151,8 @@ def storm(run: Run, chance: random.Random) -> None:
         send = chance.choice((run.send, run.send_all))
         send(chance.choice((*STOPS, *STOPS, signal.SIGSTOP, signal.SIGCONT)))
         time.sleep(chance.choice((0, 0, 0.001, 0.01)))
-    run.send_all(signal.SIGCONT)
+    with contextlib.suppress(ProcessLookupError):  # whatever is left of it
+        os.killpg(run.process.pid, signal.SIGCONT)
 
 
 def halt(run: Run, chance: random.Random) -> None:
@@ -194,11 +211,14 @@ KINDS = {
 }
 
 
-def disturbed(folder: Path, result: str, jobs: int, name: str, seconds: float, chance: random.Random):
-    """Disturb one run; whether it met it alive, whether the run has ended the work, and what was found."""
+def disturbed(folder: Path, result: str, jobs: int, name: str, chance: random.Random):
+    """Disturb one run; whether it met it alive, and early, whether the work is done, and what was found."""
     kind = KINDS[name]
     run = Run(folder, result, jobs, kind.messages)
-    time.sleep(chance.uniform(0, seconds))
+    if chance.random() < STARTING:
+        time.sleep(chance.uniform(0, START_S))
+    elif run.goes_on(chance.randint(0, MOST_IMAGES)):
+        time.sleep(chance.uniform(0, FRAME_S))
     early, met = not run.has_begun(), run.process.poll() is None
     found = kind.act(run, chance) if met else None
     try:
@@ -211,8 +231,8 @@ def disturbed(folder: Path, result: str, jobs: int, name: str, seconds: float, c
     allowed = kind.statuses if met and kind.ends else ()
     if status not in (0, *allowed) and not (early and status in [-number for number in STOPS]):
         found = f"status {status}: {said[-500:]}"
-    if run.outlived():
-        found = "a process outlives its run"
+    if left := run.left():
+        found = f"outlive their run: {left}"
     return met, early, status == 0, found
 
 
@@ -230,12 +250,10 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         write_maps(folder / "maps", given.frames, width=320, height=240)
-        seconds, expected = {}, {}
+        expected = {}
         for result in RESULTS:
             (folder / f"undisturbed-{result}").mkdir()
-            start = time.monotonic()
             Run(folder / f"undisturbed-{result}", result, 2).end()
-            seconds[result] = time.monotonic() - start
             expected[result] = contents(folder / f"undisturbed-{result}")
         while counts.total() < given.count:
             result, jobs = RESULTS[trials // 2 % 2], 1 + trials % 2
@@ -244,7 +262,7 @@ def main() -> None:
             done = False
             while not done:
                 kind = chance.choice([each for each in kinds if jobs in KINDS[each].jobs])
-                met, early, done, found = disturbed(trial, result, jobs, kind, seconds[result], chance)
+                met, early, done, found = disturbed(trial, result, jobs, kind, chance)
                 counts[kind] += met
                 early_ones += met and early
                 if found:
