@@ -30,6 +30,14 @@ def store():
         yield environment
 
 
+@pytest.fixture
+def bucket(store, tmp_path, monkeypatch):
+    """A prefix of this test's own in the store's bucket, which this process and those it starts may use."""
+    for name, value in store.items():
+        monkeypatch.setenv(name, value)
+    return f"s3://maps/{tmp_path.name}"
+
+
 @pytest.fixture(scope="module")
 def browser():
     """A headless Chromium with a profile of its own."""

@@ -14,6 +14,7 @@ import cv2
 
 from rollcli.cli.main import main
 from rollcli.files.codecs import mute_stderr
+from rollcli.files.stores import turns
 from rollcli.messages import let_stderr_fail
 from rollcli.parallel.interrupt import stop_signals
 
@@ -45,9 +46,10 @@ def _process_state(cwd: Path, environment: Mapping[str, str]) -> Iterator[None]:
     """Give the program what a process of its own would have, and take back what it changes."""
     _forget()
     folder, variables, line = Path.cwd(), dict(os.environ), sys.argv
-    threads, sink = cv2.getNumThreads(), mute_stderr._sink
+    threads, sink, in_hand = cv2.getNumThreads(), mute_stderr._sink, turns._IN_HAND
     handlers = {number: signal.getsignal(number) for number in stop_signals()}
     mute_stderr._sink = None
+    turns._IN_HAND = 1  # more, which URLs ask for, are the matter of a worker
     os.chdir(cwd)
     _set_environment(environment)
     try:
@@ -60,7 +62,7 @@ def _process_state(cwd: Path, environment: Mapping[str, str]) -> Iterator[None]:
         cv2.setNumThreads(threads)
         if mute_stderr._sink is not None:
             os.close(mute_stderr._sink)
-        mute_stderr._sink = sink
+        mute_stderr._sink, turns._IN_HAND = sink, in_hand
         for number, handler in handlers.items():
             signal.signal(number, handler)
 

@@ -8,8 +8,12 @@ import sys
 import time
 import urllib.request
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
+
+from rollcli.files.storage import list_names, read_bytes, write_bytes
+from tests.run_cli import contents
 
 KEYS = {"AWS_ACCESS_KEY_ID": "test", "AWS_SECRET_ACCESS_KEY": "test", "AWS_REGION": "us-east-1"}
 
@@ -35,6 +39,18 @@ def object_store() -> Iterator[dict[str, str]]:
             yield {**KEYS, "AWS_ENDPOINT_URL": endpoint, "ROLLCLI_STORE_TIMEOUT": "5"}
         finally:
             server.kill()
+
+
+def upload(folder: Path, url: str) -> None:
+    """Copy every file below a folder to below a URL."""
+    for name, data in contents(folder).items():
+        write_bytes(f"{url}/{name}", data)
+
+
+def joined(url: str, ending: str = "csv") -> bytes:
+    """Put the parts of a result below a URL together; or other objects, whose names end with `ending`."""
+    names = sorted(name for name in list_names(url) if name.endswith(ending))
+    return b"".join(read_bytes(f"{url}/{name}") for name in names)
 
 
 def _wait_for(address: str) -> None:

@@ -13,6 +13,8 @@ from tests.in_process import Finished, run_here
 ROOT = Path(__file__).resolve().parent.parent
 _WITH_WORKERS = ("estimate", "disparity", "derotate", "vdisparity", "simulate", "report", "evaluate_accuracy")
 _ONE_WORKER = {f"ROLLCLI_{name.upper()}_JOBS": "1" for name in _WITH_WORKERS}
+# processes compile the program once, not each of them anew
+_NOT_KEPT = ("ROLLCLI", "PYTHONDONTWRITEBYTECODE")
 _PROCESSES = ("-j", "--jobs", "--scheduler")  # options that start some
 
 
@@ -23,15 +25,18 @@ def command(*arguments: str | Path) -> list[str]:
 
 def environment(**variables: str) -> dict[str, str]:
     """This environment without settings of rollcli's, with these; one process where no more are asked for."""
-    kept = {name: value for name, value in os.environ.items() if not name.startswith("ROLLCLI")}
+    kept = {name: value for name, value in os.environ.items() if not name.startswith(_NOT_KEPT)}
     path = os.pathsep.join(filter(None, [str(ROOT), kept.get("PYTHONPATH")]))
     return {**kept, "PYTHONPATH": path, **_ONE_WORKER, **variables}
 
 
 def rollcli(*arguments: str | Path, cwd: Path, stdin: str = "", **variables: str) -> Finished:
-    """Run the program to its end: in this process, unless it starts others or is told how Python starts."""
+    """Run the program to its end: in this process, unless it starts others or is told how Python starts.
+
+    With a URL it has one frame in hand here; in a process of its own, a worker has several.
+    """
     words = [*map(str, arguments)]
-    if "PYTHONPATH" in variables or any(each.startswith(_PROCESSES) or "://" in each for each in words):
+    if "PYTHONPATH" in variables or any(each.startswith(_PROCESSES) for each in words):
         return rollcli_process(*words, cwd=cwd, stdin=stdin, **variables)
     return run_here(words, cwd, stdin, environment(**variables))
 

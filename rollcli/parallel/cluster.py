@@ -21,7 +21,7 @@ from rollcli.parallel.in_order import Result, Task, Work
 from rollcli.parallel.process_setup import prepare_worker
 from rollcli.parallel.workers import SharedPaths
 
-_CONNECT_S, _FIRST_WORKER_S, _POLL_S = 6, 5, 2
+_CONNECT_S, _GREETING_S, _FIRST_WORKER_S, _POLL_S = 6, 2, 5, 2
 _IN_FLIGHT_PER_THREAD = 4
 _DIED = "every worker that tried it died: killed for memory, perhaps, or crashed"
 
@@ -41,7 +41,7 @@ def check_scheduler(address: str) -> None:
     _require_extra()
     try:
         with _silenced_logging():
-            asyncio.run(asyncio.wait_for(_open_and_close(address), _CONNECT_S + 2))
+            asyncio.run(asyncio.wait_for(_open_and_close(address), _CONNECT_S + _GREETING_S))
     except (ValueError, TypeError) as error:  # the latter for TLS that is not set up
         raise UsageError(
             f"--scheduler {address!r}: {error}; an address looks like tcp://host:8786"

@@ -9,6 +9,8 @@ import pytest
 
 from rollcli.batch.result_file import open_result
 from rollcli.errors import UsageError
+from rollcli.files.storage import list_names, modified_ns, read_bytes, write_bytes
+from tests.object_store import upload
 from tests.run_cli import command, contents, environment, road_map, rollcli, write_kitti, write_maps
 
 FRAMES = 12
@@ -102,12 +104,12 @@ def test_a_retry_killed_at_any_time_loses_no_row_and_is_taken_up_again(tmp_path)
     for index in range(COUNT):
         (tmp_path / "maps").mkdir(exist_ok=True)
         (tmp_path / "maps" / f"frame{index:02}.png").write_bytes(b"no map")
-    line = ("estimate", "maps", "-o", "rolls.csv", "--derotated", "up", "-j", "2")
+    line = ("estimate", "maps", "-o", "rolls.csv", "--derotated", "up")
     assert rollcli(*line, cwd=tmp_path).status == 3
     for index in range(COUNT):
         write_kitti(tmp_path / "maps" / f"frame{index:02}.png", road_map(0.01 * index, width=300, height=200))
     for count in (5, COUNT - 5):
-        run = subprocess.Popen(command(*line, *RETRY), cwd=tmp_path, env=environment())
+        run = subprocess.Popen(command(*line, *RETRY, "-j", "2"), cwd=tmp_path, env=environment())
         give_up = time.monotonic() + 60
         while run.poll() is None and len(list(tmp_path.glob("up/*.png"))) < count:
             assert time.monotonic() < give_up
@@ -186,21 +188,13 @@ def test_a_result_whose_rows_were_replaced_is_still_locked_and_grows(tmp_path, m
 
 
 @pytest.mark.parametrize("ending", ["csv", "parquet"])
-def test_failed_frames_of_a_bucket_are_done_again_and_other_parts_stay(
-    store, folder, maps, monkeypatch, ending
-):
+def test_failed_frames_of_a_bucket_are_done_again_and_other_parts_stay(bucket, folder, maps, ending):
     if ending == "parquet":
         pytest.importorskip("pyarrow", reason="pyarrow, of the extra parquet, is not here")
-    for name, value in store.items():
-        monkeypatch.setenv(name, value)
-    from rollcli.files.storage import list_names, modified_ns, read_bytes, write_bytes
-
-    bucket = f"s3://maps/{folder.name}"
-    for name, data in contents(folder / "maps").items():
-        write_bytes(f"{bucket}/maps/{name}", data)
+    upload(folder / "maps", f"{bucket}/maps")
 
     def line(result):
-        return ("estimate", f"{bucket}/maps", "-o", f"{bucket}/{result}.{ending}", "--part-rows", "4", "-j1")
+        return ("estimate", f"{bucket}/maps", "-o", f"{bucket}/{result}.{ending}", "--part-rows", "4")
 
     def parts(result):
         names = list_names(f"{bucket}/{result}.{ending}")

@@ -45,16 +45,14 @@ def append(output, frames):
 
 
 @pytest.fixture
-def bucket(store, tmp_path, monkeypatch):
-    """A prefix of this test's own, and four maps on disk."""
-    for name, value in store.items():
-        monkeypatch.setenv(name, value)
+def maps(tmp_path):
+    """Four maps on disk."""
     write_maps(tmp_path / "maps", 4)
-    return f"s3://maps/{tmp_path.name}"
+    return tmp_path / "maps"
 
 
-def test_of_two_runs_in_a_bucket_the_last_to_begin_goes_on_and_the_other_ends(bucket, tmp_path):
-    given = options(tmp_path / "maps", f"{bucket}/rolls.csv")
+def test_of_two_runs_in_a_bucket_the_last_to_begin_goes_on_and_the_other_ends(bucket, maps):
+    given = options(maps, f"{bucket}/rolls.csv")
     plan = make_plan(given)
     with open_output(plan, given) as first, open_output(plan, given) as last:
         append(first, plan.frames[:1])
@@ -73,9 +71,9 @@ def test_of_two_runs_in_a_bucket_the_last_to_begin_goes_on_and_the_other_ends(bu
         pass
 
 
-def test_a_run_whose_rows_come_slowly_looks_now_and_then(bucket, tmp_path, monkeypatch):
+def test_a_run_whose_rows_come_slowly_looks_now_and_then(bucket, maps, monkeypatch):
     monkeypatch.setattr("rollcli.batch.result_parts._CHECK_S", 0.0)
-    given = options(tmp_path / "maps", f"{bucket}/rolls.csv")
+    given = options(maps, f"{bucket}/rolls.csv")
     plan = make_plan(given)
     with open_output(plan, given) as first:
         append(first, plan.frames[:1])
@@ -86,8 +84,8 @@ def test_a_run_whose_rows_come_slowly_looks_now_and_then(bucket, tmp_path, monke
             append(first, plan.frames[1:2])  # the part is not full
 
 
-def test_two_runs_that_begin_in_the_same_second_are_told_apart_at_once(bucket, tmp_path, monkeypatch):
-    given = options(tmp_path / "maps", f"{bucket}/rolls.csv")
+def test_two_runs_that_begin_in_the_same_second_are_told_apart_at_once(bucket, maps, monkeypatch):
+    given = options(maps, f"{bucket}/rolls.csv")
     plan = make_plan(given)
     others = []
     written = RunRecord.write

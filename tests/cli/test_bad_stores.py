@@ -7,7 +7,8 @@ import threading
 
 import pytest
 
-from tests.run_cli import contents, road_map, rollcli, write_kitti, write_maps
+from tests.object_store import upload
+from tests.run_cli import ROOT, contents, road_map, rollcli, write_kitti, write_maps
 from tests.store_proxy import PASS, answer, proxied
 
 SECRET = "c0ffee5ec2e7"
@@ -15,16 +16,11 @@ SIGNED = f"?X-Amz-Credential={SECRET}&X-Amz-Signature={SECRET}"
 
 
 @pytest.fixture
-def bucket(store, tmp_path, monkeypatch):
-    """Two maps in a bucket and on disk, below a prefix of this test's own."""
-    for name, value in store.items():
-        monkeypatch.setenv(name, value)
-    from rollcli.files.storage import write_bytes
-
+def bucket(bucket, tmp_path):
+    """Two maps on disk and in the bucket."""
     write_maps(tmp_path / "maps", 2)
-    for name, data in contents(tmp_path / "maps").items():
-        write_bytes(f"s3://maps/{tmp_path.name}/maps/{name}", data)
-    return f"s3://maps/{tmp_path.name}"
+    upload(tmp_path / "maps", f"{bucket}/maps")
+    return bucket
 
 
 ANSWERS = {
@@ -91,8 +87,6 @@ def test_a_wrong_address_is_one_line_before_any_work(bucket, tmp_path, words, st
 def test_a_missing_extra_is_named_with_the_line_that_installs_it(tmp_path, place):
     (tmp_path / "without").mkdir()
     (tmp_path / "without" / "obstore.py").write_text("raise ImportError('not here')\n")
-    from tests.run_cli import ROOT
-
     path = f"{tmp_path / 'without'}:{ROOT}"
     done = rollcli("estimate", place, cwd=tmp_path, PYTHONPATH=path)
     assert (done.status, done.err.count("\n")) == (2, 1)
@@ -131,7 +125,7 @@ def web(tmp_path):
 
     handler = functools.partial(Handler, directory=str(tmp_path / "web"))
     with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
-        thread = threading.Thread(target=server.serve_forever)
+        thread = threading.Thread(target=server.serve_forever, args=(0.01,))  # s until it sees its end
         thread.start()
         yield f"http://127.0.0.1:{server.server_port}"
         server.shutdown()

@@ -2,28 +2,17 @@
 
 import pytest
 
+from rollcli.files.storage import list_names, read_bytes, remove
+from tests.object_store import joined, upload
 from tests.run_cli import contents, rollcli, write_maps
 
 
 @pytest.fixture
-def bucket(store, tmp_path, monkeypatch):
-    """Five maps on disk and in a bucket, below a prefix of this test's own."""
-    for name, value in store.items():
-        monkeypatch.setenv(name, value)
-    from rollcli.files.storage import write_bytes
-
+def bucket(bucket, tmp_path):
+    """Five maps on disk and in the bucket."""
     write_maps(tmp_path / "maps", 5)
-    for name, data in contents(tmp_path / "maps").items():
-        write_bytes(f"s3://maps/{tmp_path.name}/maps/{name}", data)
-    return f"s3://maps/{tmp_path.name}"
-
-
-def joined(folder, ending="csv"):
-    """The parts of a result below a URL, put together."""
-    from rollcli.files.storage import list_names, read_bytes
-
-    names = sorted(name for name in list_names(folder) if name.endswith(ending))
-    return b"".join(read_bytes(f"{folder}/{name}") for name in names)
+    upload(tmp_path / "maps", f"{bucket}/maps")
+    return bucket
 
 
 def test_maps_and_images_and_rows_in_a_bucket_are_those_on_disk(bucket, tmp_path):
@@ -37,8 +26,6 @@ def test_maps_and_images_and_rows_in_a_bucket_are_those_on_disk(bucket, tmp_path
     assert (there.status, contents(tmp_path).keys()) == (0, contents(tmp_path).keys())
     expected = (tmp_path / "rolls.csv").read_bytes().replace(b"maps/", f"{bucket}/maps/".encode())
     assert joined(f"{bucket}/rolls.csv") == expected
-    from rollcli.files.storage import read_bytes
-
     for name, data in contents(tmp_path / "level").items():
         assert read_bytes(f"{bucket}/level/{name}") == data
 
@@ -50,8 +37,6 @@ def test_a_result_in_a_bucket_is_kept_resumed_and_replaced_as_asked(bucket, tmp_
     refused = rollcli(*line, cwd=tmp_path)
     assert refused.status == 2
     assert "exists already; give --resume" in refused.err
-    from rollcli.files.storage import remove
-
     remove(f"{bucket}/rolls.csv/part-00001.csv")
     assert rollcli(*line, "--resume", cwd=tmp_path).status == 0
     assert joined(f"{bucket}/rolls.csv") == whole
@@ -61,8 +46,6 @@ def test_a_result_in_a_bucket_is_kept_resumed_and_replaced_as_asked(bucket, tmp_
 
 @pytest.mark.parametrize("place", ["bucket", "disk"])
 def test_images_of_kept_rows_that_are_missing_are_made_again(bucket, tmp_path, place):
-    from rollcli.files.storage import list_names, read_bytes, remove
-
     level = f"{bucket}/level" if place == "bucket" else str(tmp_path / "level")
     line = ("estimate", f"{bucket}/maps", "-o", f"{bucket}/rolls.csv", "--derotated", level)
     line = (*line, "--part-rows", "2")

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from tests.run_cli import contents, road_map, rollcli, write_maps, write_pair
+from tests.run_cli import contents, road_map, rollcli, rollcli_process, write_maps, write_pair
 
 CALIBRATION = "P0: 200 0 80 0 0 200 60 0 0 0 1 0\nP1: 200 0 80 -100 0 200 60 0 0 0 1 0\n"
 MAPS = 3
@@ -13,14 +13,18 @@ LINES = {
     "a list and a calibration": "estimate --files-from @/list.txt --calib @/calib.txt -o @/listed.jsonl",
     "folders": "estimate @/maps/ --calib @/calib/ --mask @/mask.png -o @/each.csv --derotated @/up",
     "pairs": "estimate --left @/left --right @/right --num-disparities 32 -o @/pairs.csv --road-mask @/road",
-    "derotate": "derotate @/maps/*.png --from @/rolls.csv -o @/level -j 1",
-    "vdisparity": "vdisparity @/maps --calib @/calib.txt -o @/counts --counts -j 1",
-    "disparity": "disparity --left @/left --right @/right --num-disparities 32 -o @/computed -j 1",
+    "derotate": "derotate @/maps/*.png --from @/rolls.csv -o @/level",
+    "vdisparity": "vdisparity @/maps --calib @/calib.txt -o @/counts --counts",
+    "disparity": "disparity --left @/left --right @/right --num-disparities 32 -o @/computed",
     "rig": "rig @/rolls.csv --format json -o @/rig.json",
     "evaluate accuracy": "evaluate accuracy @/rolls.csv --truth @/truth.csv --format csv -o @/accuracy.csv",
-    "report": "report @/rolls.csv -o @/page.html -j 1",
-    "report of images": "report @/rolls.csv --images @/level-images -o @/shown.html -j 1",
+    "report": "report @/rolls.csv -o @/page.html",
+    "report of images": "report @/rolls.csv --images @/level-images -o @/shown.html",
 }
+
+
+# these work on frames: with URLs, in worker processes, each of which opens its own stores
+WITH_WORKERS = ("estimate", "derotate", "vdisparity", "disparity")
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +73,8 @@ def test_a_url_works_as_a_path_does(places, store, what):
         pytest.importorskip("plotly", reason="plotly, of the extra report, is not here")
     before = contents(folder).keys()
     here = rollcli(*LINES[what].replace("@/", "").split(), cwd=folder)
-    there = rollcli(*LINES[what].replace("@/", f"{bucket}/").split(), cwd=folder, **store)
+    run = rollcli_process if LINES[what].startswith(WITH_WORKERS) else rollcli
+    there = run(*LINES[what].replace("@/", f"{bucket}/").split(), cwd=folder, **store)
     assert (here.status, there.status) == (0, 0), there.err
     found = below(bucket)
     written = contents(folder)

@@ -1,6 +1,7 @@
 """Each kind of request to a store is repeated when it fails for the network's sake."""
 
 import socket
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
@@ -21,30 +22,37 @@ DOINGS = {
 }
 
 
+@pytest.fixture(autouse=True)
+def _opened_anew():
+    """Forget the stores that were opened with another address, before and after."""
+    _store.cache_clear()
+    yield
+    _store.cache_clear()
+
+
 @pytest.mark.parametrize("kind", [*Faults.KINDS, NEVER], ids=["500", "503", CUT, NEVER])
-def test_every_request_gives_the_same_when_it_fails_first(store, tmp_path, monkeypatch, kind):
-    for name, value in store.items():
-        monkeypatch.setenv(name, value)
+def test_every_request_gives_the_same_when_it_fails_first(store, bucket, monkeypatch, kind):
     monkeypatch.setenv("ROLLCLI_STORE_TIMEOUT", "0.5")
-    wanted, found = {}, {}
-    for made, treat in ((wanted, None), (found, FirstFails(kind))):
-        with proxied(store["AWS_ENDPOINT_URL"], treat or (lambda *_: PASS)) as address:
-            for doing, do in DOINGS.items():
-                url = f"s3://maps/{tmp_path.name}-{kind[:12]!r}/{doing}/map.png"
-                for each in (url, f"{url}2"):
-                    monkeypatch.setenv("AWS_ENDPOINT_URL", store["AWS_ENDPOINT_URL"])
-                    opened_anew()
-                    storage.remove(each)
-                storage.write_bytes(url, b"12345" * 1000)
-                monkeypatch.setenv("AWS_ENDPOINT_URL", address)
-                opened_anew()
-                said = do(url)
-                made[doing] = said > 0 if doing == "modified" else said
-                monkeypatch.setenv("AWS_ENDPOINT_URL", store["AWS_ENDPOINT_URL"])
-                opened_anew()
-                there = [each for each in (url, f"{url}2") if storage.exists(each)]
-                made[f"after {doing}"] = [storage.read_bytes(each) for each in there]
+    with proxied(store["AWS_ENDPOINT_URL"], treat := FirstFails(kind)) as address:
+        monkeypatch.setenv("AWS_ENDPOINT_URL", address)
+        wanted, found = (done_at_once(bucket, treat, fails=fails) for fails in (False, True))
     assert found == wanted
+    assert treat.failed >= len(DOINGS)
+
+
+def done_at_once(bucket, treat, *, fails):
+    """What each doing says and leaves. All are done at once: their pauses and time-outs pass together."""
+    urls = {doing: f"{bucket}/{doing}/map.png" for doing in DOINGS}
+    for url in urls.values():
+        storage.remove(f"{url}2")
+        storage.write_bytes(url, b"12345" * 1000)
+    treat.fails = fails
+    with ThreadPoolExecutor(len(DOINGS)) as pool:
+        said = dict(zip(DOINGS, pool.map(lambda doing: DOINGS[doing](urls[doing]), DOINGS), strict=True))
+    treat.fails = False
+    said["modified"] = said["modified"] > 0
+    there = [each for url in urls.values() for each in (url, f"{url}2") if storage.exists(each)]
+    return said, {each: storage.read_bytes(each) for each in there}
 
 
 def test_a_listing_that_is_cut_continues_after_the_last_name(monkeypatch):
@@ -81,10 +89,8 @@ def test_a_store_that_takes_too_long_is_told_from_one_that_is_not_there(monkeypa
         monkeypatch.setenv("ROLLCLI_STORE_TIMEOUT", "0.1")
         monkeypatch.setattr("rollcli.files.stores.objects._RETRIES", 0)
         monkeypatch.setattr("rollcli.files.stores.objects._TRIES", 1)
-        opened_anew()
         with pytest.raises(InputError, match="takes too long; ROLLCLI_STORE_TIMEOUT sets the seconds"):
             storage.read_bytes("s3://silent/x.png")
-    opened_anew()
 
 
 @pytest.mark.parametrize(
@@ -116,19 +122,17 @@ def test_what_azure_objects_to_is_said_in_the_same_words_and_asked_once(monkeypa
     assert len(asked) == 1
 
 
-def opened_anew():
-    """Forget the stores that were opened with another address."""
-    _store.cache_clear()
-
-
 class FirstFails:
-    """The first request of each name fails."""
+    """The first request of each name fails, while `fails` is set."""
 
     def __init__(self, kind):
+        self.fails, self.failed = False, 0
         self._kind, self._seen = kind, set()
 
     def __call__(self, method, target):
         """Decide about a request."""
-        first = (method, target) not in self._seen
+        if not self.fails or (method, target) in self._seen:
+            return PASS
         self._seen.add((method, target))
-        return self._kind if first else PASS
+        self.failed += 1
+        return self._kind

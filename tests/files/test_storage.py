@@ -12,13 +12,9 @@ from rollcli.messages import without_secrets
 
 
 @pytest.fixture(params=["local", "s3"])
-def folder(request, tmp_path, monkeypatch):
+def folder(request, tmp_path):
     """A folder on disk, and a prefix of a bucket."""
-    if request.param == "local":
-        return str(tmp_path)
-    for name, value in request.getfixturevalue("store").items():
-        monkeypatch.setenv(name, value)
-    return f"s3://maps/{tmp_path.name}"
+    return str(tmp_path) if request.param == "local" else request.getfixturevalue("bucket")
 
 
 @pytest.mark.parametrize("name", ["map.png", "a b/ü%20#?.png", "=x/..y"])
@@ -88,13 +84,11 @@ def test_what_was_removed_is_gone_and_may_be_removed_again(folder):
     assert not storage.exists(f"{folder}/x")
 
 
-def test_objects_are_listed_with_their_sizes_below_their_folder_only(store, monkeypatch):
-    for name, value in store.items():
-        monkeypatch.setenv(name, value)
+def test_objects_are_listed_with_their_sizes_below_their_folder_only(bucket):
     for name in ("listed/a.png", "listed/b/c.png", "listed2/d.png"):
-        storage.write_bytes(f"s3://maps/{name}", b"12345")
-    found = sorted(list_objects("s3://maps/listed/"))
-    assert found == [("s3://maps/listed/a.png", 5), ("s3://maps/listed/b/c.png", 5)]
+        storage.write_bytes(f"{bucket}/{name}", b"12345")
+    found = sorted(list_objects(f"{bucket}/listed/"))
+    assert found == [(f"{bucket}/listed/a.png", 5), (f"{bucket}/listed/b/c.png", 5)]
 
 
 @pytest.mark.parametrize(
@@ -105,9 +99,7 @@ def test_objects_are_listed_with_their_sizes_below_their_folder_only(store, monk
         ("ftp://host/x.png", "ftp:// is not supported; use s3://"),
     ],
 )
-def test_a_wrong_address_is_one_line(store, monkeypatch, url, said):
-    for name, value in store.items():
-        monkeypatch.setenv(name, value)
+def test_a_wrong_address_is_one_line(bucket, url, said):
     with pytest.raises((InputError, UsageError), match=said) as raised:
         storage.read_bytes(url)
     assert "\n" not in str(raised.value)

@@ -12,12 +12,15 @@ from types import SimpleNamespace
 import pytest
 
 from tests.in_process import run_here
+from tests.object_store import joined, upload
 from tests.run_cli import command, contents, environment, road_map, rollcli, write_maps, write_pair
 
 pytest.importorskip("distributed", reason="the extra cluster is not installed")
 
 from rollcli import __version__
 from rollcli.errors import ClusterError
+from rollcli.files.storage import list_names, read_bytes
+from rollcli.parallel import cluster
 from rollcli.parallel.cluster import ClusterFuture, probe
 
 FRAMES = 60
@@ -146,7 +149,8 @@ def test_a_scheduler_that_is_lost_ends_the_run_which_goes_on_without_it(tmp_path
     assert not list(tmp_path.rglob("*.part"))
 
 
-def test_nobody_waits_for_what_was_sent_while_the_connection_broke():
+def test_nobody_waits_for_what_was_sent_while_the_connection_broke(monkeypatch):
+    monkeypatch.setattr(cluster, "_POLL_S", 0.01)
     client = SimpleNamespace(status="closed")
     with pytest.raises(ClusterError, match="the connection to the scheduler is lost"):
         ClusterFuture(Future(), client, "tcp://far:8786").result()
@@ -162,22 +166,31 @@ def test_a_worker_that_has_no_such_program_or_files_is_named(tmp_path):
     assert "image folders must lie on storage" in probe(__version__, {}, [str(tmp_path / "v" / "mark")])
 
 
-def test_a_scheduler_that_does_not_answer_ends_the_run(tmp_path):
+def estimate_here(address, cwd, *more):
+    """Run in this process, whose patience with clusters a test can set."""
+    line = ("estimate", "maps", "-o", "rolls.csv", "--scheduler", address, *more)
+    return run_here(line, cwd, "", environment())
+
+
+def test_a_scheduler_that_does_not_answer_ends_the_run(tmp_path, monkeypatch):
+    monkeypatch.setattr(cluster, "_CONNECT_S", 0.5)
     write_maps(tmp_path / "maps", 2)
-    done = rollcli("estimate", "maps", "-o", "rolls.csv", "--scheduler", "tcp://127.0.0.1:9", cwd=tmp_path)
+    done = estimate_here("tcp://127.0.0.1:9", tmp_path)
     assert done.status == 1
     assert "tcp://127.0.0.1:9: no Dask scheduler answers there" in done.err
     assert done.err.count("\n") == 1
 
 
 @pytest.mark.parametrize("greeting", [b"", b"HTTP/1.1 400 Bad Request\r\nServer: x\r\n\r\n"])
-def test_a_server_that_is_no_scheduler_ends_the_run(tmp_path, greeting):
+def test_a_server_that_is_no_scheduler_ends_the_run(tmp_path, monkeypatch, greeting):
+    monkeypatch.setattr(cluster, "_CONNECT_S", 0.5)
+    monkeypatch.setattr(cluster, "_GREETING_S", 0.0)
     write_maps(tmp_path / "maps", 1)
     with socket.create_server(("127.0.0.1", 0)) as server:
         answering = threading.Thread(target=greet, args=(server, greeting), daemon=True)
         answering.start()
         address = f"127.0.0.1:{server.getsockname()[1]}"
-        done = rollcli("estimate", "maps", "-o", "rolls.csv", "--scheduler", address, cwd=tmp_path)
+        done = estimate_here(address, tmp_path)
     assert (done.status, done.err) == (1, f"rollcli: {address}: no Dask scheduler answers there\n")
 
 
@@ -195,34 +208,26 @@ def test_what_is_no_address_is_refused_and_the_result_that_is_there_is_kept(tmp_
     write_maps(tmp_path / "maps", 1)
     rollcli("estimate", "maps", "-o", "rolls.csv", cwd=tmp_path)
     before = contents(tmp_path)
-    line = ["estimate", "maps", "-o", "rolls.csv", "--overwrite", "--scheduler", address]
-    done = run_here(line, tmp_path, "", environment())
+    done = estimate_here(address, tmp_path, "--overwrite")
     assert done.status == 2
     assert done.err.startswith(f"rollcli: --scheduler {address!r}: ")
     assert done.err.endswith("; an address looks like tcp://host:8786\n")
     assert contents(tmp_path) == before
 
 
-def test_a_scheduler_without_workers_ends_the_run(tmp_path, scheduler):
+def test_a_scheduler_without_workers_ends_the_run(tmp_path, monkeypatch, scheduler):
+    monkeypatch.setattr(cluster, "_FIRST_WORKER_S", 0.5)
     write_maps(tmp_path / "maps", 2)
-    done = rollcli("estimate", "maps", "-o", "rolls.csv", "--scheduler", scheduler, cwd=tmp_path)
+    done = estimate_here(scheduler, tmp_path)
     assert done.status == 1
     assert f"{scheduler}: has no workers" in done.err
     assert rollcli("estimate", "maps", "-o", "rolls.csv", cwd=tmp_path).status == 0
 
 
-def test_workers_that_share_only_a_bucket_give_the_bytes_of_a_local_run(
-    store, tmp_path, monkeypatch, request
-):
-    for name, value in store.items():
-        monkeypatch.setenv(name, value)
-    scheduler, workers = (request.getfixturevalue(name) for name in ("scheduler", "workers"))
-    from rollcli.files.storage import list_names, read_bytes, write_bytes
-
-    bucket = f"s3://maps/{tmp_path.name}"
+# the bucket comes first: workers take its settings over when they start
+def test_workers_that_share_only_a_bucket_give_the_bytes_of_a_local_run(bucket, tmp_path, scheduler, workers):
     write_maps(tmp_path / "maps", FRAMES, width=300, height=200)
-    for name, data in contents(tmp_path / "maps").items():
-        write_bytes(f"{bucket}/maps/{name}", data)
+    upload(tmp_path / "maps", f"{bucket}/maps")
     assert rollcli("estimate", "maps", "-o", "rolls.csv", "--derotated", "up", cwd=tmp_path).status == 0
 
     line = ("estimate", f"{bucket}/maps/", "-o", f"{bucket}/rolls.csv", "--derotated", f"{bucket}/up")
@@ -237,8 +242,7 @@ def test_workers_that_share_only_a_bucket_give_the_bytes_of_a_local_run(
     workers[0].kill()
     assert resumed.wait(timeout=120) == 0
 
-    parts = sorted(list_names(f"{bucket}/rolls.csv"))
     expected = (tmp_path / "rolls.csv").read_bytes().replace(b"maps/", f"{bucket}/maps/".encode())
-    assert b"".join(read_bytes(f"{bucket}/rolls.csv/{part}") for part in parts) == expected
+    assert joined(f"{bucket}/rolls.csv") == expected
     images = {name: read_bytes(f"{bucket}/up/{name}") for name in list_names(f"{bucket}/up")}
     assert images == contents(tmp_path / "up")
