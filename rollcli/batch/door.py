@@ -15,5 +15,9 @@ def estimate_frame(frame: Frame, options: FrameOptions) -> FrameResult:
 def lost_frame(frame: Frame, reason: str, options: FrameOptions) -> FrameResult:
     """Make the row of a frame whose worker died, and remove its images of an earlier run."""
     write_outputs({}, every_path(frame, options.images), replaces=options.replaces)
-    remove_image_leftovers([frame], options.images)
     return failed_frame(frame, reason)
+
+
+def clear_frame(frame: Frame, options: FrameOptions) -> None:
+    """Remove the halves of images that a worker left which died amid this frame."""
+    remove_image_leftovers([frame], options.images)

@@ -6,7 +6,7 @@ from functools import partial
 from itertools import islice
 
 from rollcli.batch.answer import RigAnswer
-from rollcli.batch.door import estimate_frame, lost_frame
+from rollcli.batch.door import clear_frame, estimate_frame, lost_frame
 from rollcli.batch.options import EstimateOptions
 from rollcli.batch.output import Output, frames_to_do, open_output
 from rollcli.batch.plan import Plan, make_plan
@@ -135,7 +135,11 @@ def _results(
 ) -> Iterator[Iterator[FrameResult]]:
     """Open the results of frames from whichever workers were asked for; the output is complete afterwards."""
     told = options.frame._replace(replaces=output.replaces)
-    work = Work(partial(estimate_frame, options=told), partial(lost_frame, options=told))
+    work = Work(
+        partial(estimate_frame, options=told),
+        partial(lost_frame, options=told),
+        partial(clear_frame, options=told),
+    )
     sample = (*frames[:1], *frames[-1:])
     shared = SharedPaths(
         files=tuple(path for frame in sample for path in frame.reads()),

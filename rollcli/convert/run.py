@@ -104,7 +104,7 @@ def _results(
     files = tuple(path for each in sample for path in each.frame.reads())
     shared = SharedPaths(files, (folder,))
     workers = Workers(running.jobs, running.scheduler, shared, threads=tasks_in_hand((*files, folder)))
-    work = Work(do, partial(_lost, replaces=running.overwrite))
+    work = Work(do, partial(_lost, replaces=running.overwrite), lambda each: remove_leftovers(each.writes))
     try:
         yield from run_tasks(conversions, work, stop, workers)
     finally:
@@ -122,5 +122,4 @@ def _check(conversions: Sequence[Conversion], folder: str, *, overwrite: bool) -
 
 def _lost(conversion: Conversion, reason: str, replaces: bool) -> FrameResult:
     write_outputs({}, conversion.writes, replaces=replaces)
-    remove_leftovers(conversion.writes)
     return failed_frame(conversion.frame, reason)

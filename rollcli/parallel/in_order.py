@@ -14,20 +14,28 @@ _Task = TypeVar("_Task", contravariant=True)
 _Result = TypeVar("_Result", covariant=True)
 
 
+def _nothing(task: object) -> None:
+    """Leave everything as it is: the tasks write no files."""
+
+
 @dataclass(frozen=True)
 class Work(Generic[Task, Result]):
-    """What to do with each task. Both functions are pickled and sent to workers: name them in a module.
+    """What to do with each task.
 
     Attributes
     ----------
     do : callable
-        Turns a task into its result. A task that cannot be done gets a result that says so.
+        Turns a task into its result. A task that cannot be done gets a result that says so. It is pickled
+        and sent to workers: name it in a module.
     lost : callable
         Makes the result of a task whose worker died, from the task and the reason.
+    clear : callable
+        Removes the half-written files that a worker left which died amid the task.
     """
 
     do: Callable[[Task], Result]
     lost: Callable[[Task, str], Result]
+    clear: Callable[[Task], None] = _nothing
 
 
 class Future(Protocol[_Result]):

@@ -123,8 +123,11 @@ class PoolExecutor(Generic[Task, Result]):
         try:
             answer = worker.pipe.recv()
         except (EOFError, OSError):
+            begun = [future.task for future in worker.pending]  # all of them, perhaps, in its threads
             worker.pending.popleft().settle(None, WorkerDiedError())
             self._replace(index, worker)
+            for task in begun:
+                self._work.clear(task)
         else:
             worker.pending.popleft().settle(*answer)
 

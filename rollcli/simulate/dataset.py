@@ -120,7 +120,8 @@ def write_dataset(dataset: Dataset, jobs: int | None = 1, stop: Stop | None = No
         write_atomic(run_path(dataset.folder / TRUTH), text)
     tasks, written = dataset.missing, 0
     remove_leftovers(path for task in tasks for path in task.images())
-    for stem in run_tasks(tasks, Work(_write_frame, _lost), stop or Stop(), Workers(jobs)):
+    work = Work(_write_frame, _lost, lambda task: remove_leftovers(task.images()))
+    for stem in run_tasks(tasks, work, stop or Stop(), Workers(jobs)):
         written += 1
         yield stem
     if written == len(tasks):

@@ -2,6 +2,7 @@
 
 import os
 import resource
+import shutil
 import signal
 import subprocess
 import sys
@@ -226,6 +227,48 @@ def test_a_frame_that_kills_its_worker_twice_is_an_error_row_and_the_batch_goes_
     assert [(row.file, row.message) for row in rows if row.status == "error"] == [
         ("maps/frame3.png", "its worker died twice: killed for memory, perhaps, or crashed")
     ]
+
+
+# the first worker that gives an image of a certain frame its name dies just before or after it
+DEADLY_NAMES = """
+import os, pathlib, signal, sys
+if "spawn_main" in " ".join(sys.orig_argv):
+    def deadly(give_name):
+        def give(source, target, **options):
+            first = FRAME in str(target) and not pathlib.Path("died").exists()
+            if first:
+                pathlib.Path("died").touch()
+            if not first or AFTER:
+                give_name(source, target, **options)
+            if first:
+                os.kill(os.getpid(), signal.SIGKILL)
+        return give
+    os.link, os.replace, os.rename = map(deadly, (os.link, os.replace, os.rename))
+"""
+WRITE_IMAGES = {
+    "estimate": ("frame3", "estimate maps -o out/rolls.csv --derotated out/up --vdisparity out/v"),
+    "derotate": ("frame3", "derotate maps --roll 2 -o out"),
+    "simulate": ("frame_0002", "simulate out --frames 3 --size 64x48"),
+}
+
+
+@pytest.mark.parametrize(("name", "after"), [*((each, False) for each in WRITE_IMAGES), ("estimate", True)])
+def test_a_worker_that_dies_while_it_writes_an_image_leaves_nothing_behind(maps, name, after):
+    frame, line = WRITE_IMAGES[name]
+    (maps / "out").mkdir()
+    assert rollcli(*line.split(), "-j1", cwd=maps).status == 0
+    expected = contents(maps / "out")
+    shutil.rmtree(maps / "out")
+    (maps / "out").mkdir()
+    (maps / "hook").mkdir()
+    (maps / "hook" / "sitecustomize.py").write_text(f"FRAME, AFTER = {frame!r}, {after}\n{DEADLY_NAMES}")
+    path = os.pathsep.join([str(maps / "hook"), str(ROOT)])
+
+    done = rollcli(*line.split(), "-j2", cwd=maps, PYTHONPATH=path)
+
+    assert (maps / "died").exists()
+    assert done.status == 0, done.err
+    assert contents(maps / "out") == expected
 
 
 def cannot_start(maps, **how):
