@@ -69,6 +69,8 @@ class LazyGroup(click.Group):
         except KeyboardInterrupt:  # click would write a line of its own
             say("interrupted")
             return ctx.exit(ExitStatus.INTERRUPTED)
+        except EOFError as error:  # click would take it for Ctrl-D at a prompt, and say "interrupted"
+            raise RuntimeError(f"EOFError: {error}").with_traceback(error.__traceback__) from None
 
     def main(self, *args: Any, standalone_mode: bool = True, **extra: Any) -> Any:
         """Run the program; outside of tests, exit with its status."""

@@ -64,11 +64,14 @@ def test_help_calls_the_program_rollcli(tmp_path):
     assert rollcli_process("--help", cwd=tmp_path).out.startswith("Usage: rollcli ")
 
 
-def test_what_nobody_thought_of_is_one_line_too(tmp_path):
-    code = """
+@pytest.mark.parametrize(
+    ("work", "said"), [('{}["key"]', "KeyError: 'key'"), ('__import__("marshal").loads(b"")', "EOFError: ")]
+)
+def test_what_nobody_thought_of_is_one_line_too(tmp_path, work, said):
+    code = f"""
 import sys
 import rollcli.batch.run
-rollcli.batch.run.make_plan = lambda options: {}["key"]
+rollcli.batch.run.make_plan = lambda options: {work}
 sys.argv = ["rollcli", "estimate", "."]
 from rollcli.__main__ import main
 main()
@@ -76,7 +79,9 @@ main()
     line = [sys.executable, "-c", code]
     done = subprocess.run(line, cwd=tmp_path, env=environment(), capture_output=True, text=True, check=False)
     assert done.returncode == 1
-    assert done.stderr.startswith("rollcli: internal error, please report it: KeyError: 'key' (")
+    assert done.stderr.startswith("rollcli: internal error, please report it: ")
+    assert said in done.stderr
+    assert "<string>:4)" in done.stderr
     assert done.stderr.count("\n") == 1
 
 
