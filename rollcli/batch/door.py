@@ -14,10 +14,12 @@ def estimate_frame(frame: Frame, options: FrameOptions) -> FrameResult:
 
 def lost_frame(frame: Frame, reason: str, options: FrameOptions) -> FrameResult:
     """Make the row of a frame whose worker died, and remove its images of an earlier run."""
-    write_outputs({}, every_path(frame, options.images), replaces=options.replaces)
+    paths = every_path(frame, options.images)
+    write_outputs({}, paths, replaces=options.replaces, retry_of=options.retry_of)
     return failed_frame(frame, reason)
 
 
 def clear_frame(frame: Frame, options: FrameOptions) -> None:
     """Remove the halves of images that a worker left which died amid this frame."""
-    remove_image_leftovers([frame], options.images)
+    if not options.retry_of:  # they go when the row is written, with marks that are needed until then
+        remove_image_leftovers([frame], options.images)

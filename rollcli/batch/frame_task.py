@@ -30,7 +30,8 @@ def run_frame(frame: Frame, options: FrameOptions) -> FrameResult:
     start = time.perf_counter()
     images: dict[str, bytes] = {}
     result = guarded(frame, lambda: _estimate(frame, options, images))
-    write_outputs(images, every_path(frame, options.images, options.root), replaces=options.replaces)
+    paths = every_path(frame, options.images, options.root)
+    write_outputs(images, paths, replaces=options.replaces, retry_of=options.retry_of)
     elapsed = 1000 * (time.perf_counter() - start)
     return replace(result, row=replace(result.row, elapsed_ms=elapsed))
 

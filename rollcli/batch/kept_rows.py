@@ -1,7 +1,7 @@
 """The rows of an interrupted run: what a resume has to know of them."""
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 from rollcli.batch.answer import RigAnswer
@@ -56,6 +56,16 @@ class KeptRows:
     def failed(self) -> list[int]:
         """Positions of the rows whose frames are done again."""
         return self.errors if self._retries else []
+
+    def not_failed(self, first: int = 0) -> Iterator[Frame]:
+        """Yield the frames from a position on whose row is not `error`, or not there yet.
+
+        Marks beside images of the others are needed until these are done again.
+        """
+        failed = set(self.errors)
+        return (
+            self._frames[position] for position in range(first, len(self._frames)) if position not in failed
+        )
 
     def add(self, row: Row) -> None:
         """Take in the next row."""

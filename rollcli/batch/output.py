@@ -28,7 +28,7 @@ from rollcli.files.stream import (
 )
 from rollcli.frames.frame import Frame, FrameResult
 from rollcli.frames.options import ImageOptions
-from rollcli.frames.outputs import local_images, remove_image_leftovers
+from rollcli.frames.outputs import local_images, remove_image_leftovers, remove_marks
 
 
 class Output(Protocol):
@@ -154,6 +154,7 @@ class FileOutput:
         self._rows.commit()
         if self._replacing:
             self._file.replace(self._replacing, self._plan.format)
+            remove_marks([self._plan.frames[position] for position in self._replacing], self._images)
             self._replacing.clear()
 
     def finish(self, totals: Mapping[str, int], alignment: Mapping[str, Any] | None) -> None:
@@ -242,8 +243,8 @@ def _begin(file: ResultFile, plan: Plan, options: EstimateOptions) -> FileOutput
         raise not_resumable(plan.output, str(error)) from error
     record = new_record(plan, options, kept, earlier)
     if options.result.resume or options.running.overwrite:
-        failed = (plan.frames[position] for position in kept.errors)
-        remove_image_leftovers((*failed, *plan.frames[kept.count :]), options.images)
+        first = 0 if options.result.retry_failed else kept.count
+        remove_image_leftovers(kept.not_failed(first), options.images)
     remove_leftovers([run_path(plan.output), os.path.realpath(plan.output)])
     # in this order, a run that is killed in between can be resumed: an empty file counts as a new one
     file.truncate(len(data) if kept.count else 0)

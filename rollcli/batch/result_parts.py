@@ -36,7 +36,7 @@ from rollcli.files.storage import create, list_names, remove, write_bytes
 from rollcli.files.stores.locations import base_name, is_url
 from rollcli.files.stores.parts import part_names, read_parts
 from rollcli.frames.frame import Frame, FrameResult
-from rollcli.frames.outputs import local_images, remove_image_leftovers
+from rollcli.frames.outputs import local_images, remove_image_leftovers, remove_marks
 
 _CHECK_S = 10.0  # a request of 50 ms now and then
 
@@ -97,7 +97,6 @@ class PartsOutput:
         number = position // self._part_rows
         if number != self._replaced_part:
             self.commit()
-            self._replacing.clear()
         self._replaced_part = number
         self._record.saw(result.encoding, result.searched)
         self._replacing[position] = result.row
@@ -116,6 +115,8 @@ class PartsOutput:
         if data != self._encoded(number, old):
             self._check_owned()
             write_bytes(_part_location(self._plan, number), data, durable=True)
+        remove_marks([self._plan.frames[position] for position in self._replacing], self._image_options)
+        self._replacing.clear()
 
     def hint(self) -> str:
         """Say that --resume continues after the last part."""
@@ -183,7 +184,7 @@ def _begin(plan: Plan, options: EstimateOptions, keep_open: int | None) -> Parts
         to_write = [_part_location(plan, number) for number in all_parts]  # a kill may have met any of them
         remove_leftovers([run_path(plan.output), *to_write, *(f"{plan.output}/{name}" for name in parts)])
     if options.result.resume or options.running.overwrite:
-        remove_image_leftovers(plan.frames, options.images)
+        remove_image_leftovers(kept.not_failed(), options.images)
     for name in parts[_whole_parts(kept.count, options.result.part_rows) :]:
         remove(f"{plan.output}/{name}")
     record.write({})

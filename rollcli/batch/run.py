@@ -1,6 +1,7 @@
 """A run of `estimate`: the plan, the workers, the rows in order, and the exit status."""
 
 import contextlib
+import os
 from collections.abc import Iterator, Sequence
 from functools import partial
 from itertools import islice
@@ -12,6 +13,7 @@ from rollcli.batch.output import Output, frames_to_do, open_output
 from rollcli.batch.plan import Plan, make_plan
 from rollcli.errors import ClusterError, ExitStatus, OutputError, WorkerError
 from rollcli.files.results import run_path
+from rollcli.files.stores.locations import is_url
 from rollcli.files.stores.turns import tasks_in_hand
 from rollcli.files.stream import STDOUT
 from rollcli.frames.calibration import calibration_files, calibration_notes
@@ -115,7 +117,7 @@ def _retry_failed(
     for first in range(0, len(output.kept.failed), _RETRIED_AT_ONCE):
         positions = output.kept.failed[first : first + _RETRIED_AT_ONCE]
         frames = [plan.frames[position] for position in positions]
-        with _results(frames, options, output, stop) as results:
+        with _results(frames, options, output, stop, _name_of(plan.output)) as results:
             for position, frame, result in zip(positions, frames, results, strict=False):
                 output.replace(position, frame, result)
                 progress.add(result)
@@ -129,12 +131,17 @@ def _retry_failed(
     return False
 
 
+def _name_of(result: str) -> str:
+    """Name a result in one way, from whichever folder it is resumed."""
+    return result if is_url(result) else os.path.realpath(result)
+
+
 @contextlib.contextmanager
 def _results(
-    frames: Sequence[Frame], options: EstimateOptions, output: Output, stop: Stop
+    frames: Sequence[Frame], options: EstimateOptions, output: Output, stop: Stop, retry_of: str = ""
 ) -> Iterator[Iterator[FrameResult]]:
     """Open the results of frames from whichever workers were asked for; the output is complete afterwards."""
-    told = options.frame._replace(replaces=output.replaces)
+    told = options.frame._replace(replaces=output.replaces, retry_of=retry_of)
     work = Work(
         partial(estimate_frame, options=told),
         partial(lost_frame, options=told),
@@ -152,7 +159,9 @@ def _results(
             yield results
     finally:
         output.commit()
-        if workers.scheduler is not None:  # a worker that died elsewhere cannot be waited for
+        if (
+            workers.scheduler is not None and not retry_of
+        ):  # a worker that died elsewhere cannot be waited for
             remove_image_leftovers(frames, options.images)
 
 

@@ -8,6 +8,7 @@ beforehand is never opened. A link in the target's own place is replaced; what i
 import contextlib
 import errno
 import os
+import posixpath
 import re
 import zlib
 from collections.abc import Iterable, Iterator
@@ -117,6 +118,12 @@ def _take_free_name(temporary: Path, target: Path) -> None:
         temporary.replace(target)
     else:
         temporary.unlink()
+
+
+def mark_path(path: str) -> str:
+    """Name a file that says something of another one for a while, and is removed with its leftovers."""
+    folder, name = posixpath.split(path)
+    return posixpath.join(folder, f".{_marker(name)}.{'0' * (2 * _RANDOM_BYTES)}.part")
 
 
 def remove_leftovers(paths: Iterable[str | Path]) -> None:

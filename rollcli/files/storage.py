@@ -257,6 +257,16 @@ def remove(location: str) -> None:
         raise output_error(location, error) from error
 
 
+def remove_all(locations: Iterable[str]) -> None:
+    """Remove many files or objects at once; see `remove`."""
+    from concurrent.futures import ThreadPoolExecutor
+
+    every = list(locations)
+    if every:
+        with ThreadPoolExecutor(_AT_ONCE) as pool:
+            list(pool.map(remove, every))  # asked for, so that an error is raised
+
+
 def _read_file(path: str, name: str) -> bytes:
     """Return the bytes of a regular file; pipes and devices could be read for ever."""
     try:

@@ -110,7 +110,8 @@ class FrameOptions(NamedTuple):
     """What decides the row and the images of a frame: everything that a worker is told beside the frame.
 
     `root` is the folder where relative paths start, for workers on other machines; empty for this one.
-    `replaces` tells whether files that are in the place of an image are replaced.
+    `replaces` tells whether files that are in the place of an image are replaced. `retry_of` names the result
+    whose failed frames are done again; empty otherwise.
     """
 
     encoding: EncodingOptions = EncodingOptions()
@@ -120,6 +121,7 @@ class FrameOptions(NamedTuple):
     images: ImageOptions = ImageOptions()
     root: str = ""
     replaces: bool = False
+    retry_of: str = ""
 
     def at(self, path: str) -> str:
         """Locate a path on this worker."""

@@ -1,14 +1,15 @@
 """Where the files that are written for a frame lie."""
 
 import contextlib
+import hashlib
 import posixpath
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
 
-from rollcli.errors import OutputError
-from rollcli.files.atomic import remove_leftovers
-from rollcli.files.storage import remove, write_bytes, write_new
+from rollcli.errors import InputError, OutputError
+from rollcli.files.atomic import mark_path, remove_leftovers
+from rollcli.files.storage import read_bytes, remove, remove_all, write_bytes, write_new
 from rollcli.files.stores.locations import is_object_url, is_url, located
 from rollcli.files.stores.objects import list_objects
 from rollcli.frames.frame import Frame
@@ -88,7 +89,9 @@ def every_path(frame: Frame, images: ImageOptions, root: str = "") -> list[str]:
     return [located(root, path) for paths in possible_paths(frame, images) for path in paths]
 
 
-def write_outputs(files: Mapping[str, bytes], paths: Collection[str], *, replaces: bool) -> None:
+def write_outputs(
+    files: Mapping[str, bytes], paths: Collection[str], *, replaces: bool, retry_of: str = ""
+) -> None:
     """Write the files of a frame, each whole or not at all; a failed frame has none.
 
     Parameters
@@ -100,12 +103,18 @@ def write_outputs(files: Mapping[str, bytes], paths: Collection[str], *, replace
     replaces : bool
         Whether files of an earlier run are replaced, and those that are not written now removed: they would
         pass for this run's. Otherwise nothing that another run or program wrote is touched.
+    retry_of : str
+        The result whose failed frame is done again. What an earlier retry of it made and did not live to
+        write a row of is taken back: a mark beside such a file says so until the row is in the result.
 
     Raises
     ------
     OutputError
         One cannot be written, or must not be replaced.
     """
+    if retry_of and not replaces:
+        _write_marked(files, paths, retry_of)
+        return
     write = write_bytes if replaces else write_new
     for path, data in files.items():
         write(path, data)
@@ -114,6 +123,37 @@ def write_outputs(files: Mapping[str, bytes], paths: Collection[str], *, replace
             if path not in files:
                 with contextlib.suppress(OutputError):  # the row says what is wrong with the frame
                     remove(path)
+
+
+def _write_marked(files: Mapping[str, bytes], paths: Collection[str], result: str) -> None:
+    for path in paths:
+        _take_back(path, result)
+    for path, data in files.items():
+        write_bytes(mark_path(path), _mark(data, result))
+        try:
+            write_new(path, data)
+        except OutputError:
+            remove(mark_path(path))
+            raise
+
+
+def _take_back(path: str, result: str) -> None:
+    """Remove a file that a retry of this result made, unless somebody has changed it since."""
+    with contextlib.suppress(InputError):  # it was not marked, or is gone
+        if read_bytes(mark_path(path)) == _mark(read_bytes(path), result):
+            remove(path)
+
+
+def _mark(data: bytes, result: str) -> bytes:
+    return hashlib.sha256(result.encode("utf-8", "surrogateescape") + b"\0" + data).hexdigest().encode()
+
+
+def remove_marks(frames: Collection[Frame], images: ImageOptions) -> None:
+    """Remove the marks beside the images of frames that were done again, and what killed workers left."""
+    paths = [path for frame in frames for path in every_path(frame, images)]
+    marks = [mark_path(path) for path in paths]
+    remove_leftovers([*paths, *marks])
+    remove_all(filter(is_url, marks))
 
 
 def remove_image_leftovers(frames: Iterable[Frame], images: ImageOptions) -> None:

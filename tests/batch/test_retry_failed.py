@@ -4,12 +4,13 @@ import json
 import shutil
 import subprocess
 import time
+from pathlib import Path
 
 import pytest
 
 from rollcli.batch.result_file import open_result
-from rollcli.errors import UsageError
-from rollcli.files.storage import list_names, modified_ns, read_bytes, write_bytes
+from rollcli.errors import OutputError, UsageError
+from rollcli.files.storage import list_names, modified_ns, read_bytes, remove, write_bytes
 from tests.object_store import upload
 from tests.run_cli import command, contents, environment, road_map, rollcli, write_kitti, write_maps
 
@@ -106,12 +107,13 @@ def test_a_retry_killed_at_any_time_loses_no_row_and_is_taken_up_again(tmp_path)
         (tmp_path / "maps" / f"frame{index:02}.png").write_bytes(b"no map")
     line = ("estimate", "maps", "-o", "rolls.csv", "--derotated", "up")
     assert rollcli(*line, cwd=tmp_path).status == 3
-    for index in range(COUNT):
-        write_kitti(tmp_path / "maps" / f"frame{index:02}.png", road_map(0.01 * index, width=300, height=200))
-    for count in (5, COUNT - 5):
+    for seed, count in ((0, 5), (1, COUNT - 5)):
+        for index in range(COUNT):
+            disparity = road_map(0.01 * index, width=300, height=200, seed=seed)
+            write_kitti(tmp_path / "maps" / f"frame{index:02}.png", disparity)
         run = subprocess.Popen(command(*line, *RETRY, "-j", "2"), cwd=tmp_path, env=environment())
         give_up = time.monotonic() + 60
-        while run.poll() is None and len(list(tmp_path.glob("up/*.png"))) < count:
+        while run.poll() is None and len(list(tmp_path.glob("up/[!.]*.png"))) < count:
             assert time.monotonic() < give_up
             time.sleep(0.002)
         run.kill()
@@ -211,3 +213,57 @@ def test_failed_frames_of_a_bucket_are_done_again_and_other_parts_stay(bucket, f
     assert parts("rolls") == parts("anew")
     records = [read_bytes(f"{bucket}/{name}.{ending}.run.json") for name in ("rolls", "anew")]
     assert records[0] == records[1]
+
+
+@pytest.fixture(params=["rolls.csv", "rolls.parquet", "bucket"])
+def stopped(request, folder, maps, monkeypatch):
+    """A folder, and the line of a run whose retry made images and could not write their rows."""
+    if request.param == "rolls.parquet":
+        pytest.importorskip("pyarrow", reason="pyarrow, of the extra parquet, is not here")
+    place = f"{request.getfixturevalue('bucket')}/" if request.param == "bucket" else ""
+    result = "rolls.csv" if place else request.param
+    line = ("estimate", "maps", "-o", place + result, "--derotated", f"{place}up", "--part-rows", "5")
+    assert rollcli(*line, cwd=folder).status == 3
+    mend(folder, maps, *BROKEN)
+
+    def full(*_, **__):
+        raise OutputError("the disk is full")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("rollcli.batch.result_file.ResultFile.replace", full)
+        patch.setattr("rollcli.batch.result_parts.write_bytes", full)
+        done = rollcli(*line, *RETRY, cwd=folder)
+    assert (done.status, "the disk is full" in done.err) == (1, True)
+    return folder, place or f"{folder}/", line
+
+
+def test_frames_that_are_mended_again_after_a_stopped_retry_get_the_images_of_their_last_files(stopped):
+    folder, place, line = stopped
+    for index in BROKEN[:2]:
+        write_kitti(folder / "maps" / f"frame{index}.png", road_map(0.2, seed=50 + index))
+    (folder / "maps" / f"frame{BROKEN[2]}.png").write_bytes(b"broken again")
+    assert rollcli(*line, *RETRY, cwd=folder).status == 3
+    retried = everything(place)
+    assert f"up/frame{BROKEN[2]}.png" not in retried
+    assert rollcli(*line, "--overwrite", cwd=folder).status == 3
+    assert everything(place) == retried
+
+
+def test_an_image_that_took_the_place_of_one_of_a_stopped_retry_is_kept(stopped):
+    folder, place, line = stopped
+    write_bytes(f"{place}up/frame2.png", b"precious")
+    done = rollcli(*line, *RETRY, cwd=folder)
+    assert (done.status, "up/frame2.png: exists already and is not of this run" in done.err) == (1, True)
+    assert read_bytes(f"{place}up/frame2.png") == b"precious"
+    remove(f"{place}up/frame2.png")
+    assert rollcli(*line, *RETRY, cwd=folder).status == 0
+    retried = everything(place)
+    assert rollcli(*line, "--overwrite", cwd=folder).status == 0
+    assert everything(place) == retried
+
+
+def everything(place):
+    """What lies in a folder or below a prefix, apart from maps, by its name."""
+    if place.startswith("s3://"):
+        return {name: read_bytes(f"{place}{name}") for name in list_names(place)}
+    return made(Path(place))
