@@ -159,9 +159,8 @@ def _results(
             yield results
     finally:
         output.commit()
-        if (
-            workers.scheduler is not None and not retry_of
-        ):  # a worker that died elsewhere cannot be waited for
+        # a worker that died elsewhere cannot be waited for; a retry has removed what is not needed any more
+        if workers.scheduler is not None and not retry_of:
             remove_image_leftovers(frames, options.images)
 
 

@@ -5,20 +5,12 @@ import sys
 import pytest
 
 from rollcli.batch.kept_rows import KeptRows, Mismatch
-from rollcli.batch.options import EstimateOptions, ResultOptions
+from rollcli.batch.options import ResultOptions
 from rollcli.batch.plan import Plan
 from rollcli.files.results import Row
 from rollcli.frames.frame import Frame
-from rollcli.frames.options import (
-    EncodingOptions,
-    ImageOptions,
-    InputOptions,
-    MethodOptions,
-    PairOptions,
-    RegionOptions,
-    RunningOptions,
-)
-from rollcli.imaging.stereo_options import StereoOptions
+from rollcli.frames.options import ImageOptions
+from tests.batch.estimate_options import estimate_options
 
 NAMES = ("a.png", "b.png", "c.png")
 
@@ -32,16 +24,9 @@ def take(tmp_path):
     """Take in rows of some files, each `name` or `name status`."""
 
     def kept(*rows, retry=False, images=False):
-        options = EstimateOptions(
-            inputs=InputOptions(),
-            pairs=PairOptions(),
-            encoding=EncodingOptions(),
-            stereo=StereoOptions(),
-            region=RegionOptions(),
-            method=MethodOptions(),
+        options = estimate_options(
             images=ImageOptions(derotated=str(tmp_path)) if images else ImageOptions(),
             result=ResultOptions(resume=True, retry_failed=retry),
-            running=RunningOptions(),
         )
         plan = Plan([frame(name) for name in NAMES], str(tmp_path / "rolls.csv"), "csv")
         parts = [(*each.split(), "ok")[:2] for each in rows]

@@ -6,7 +6,7 @@ import os
 import pytest
 
 from rollcli.batch.fingerprint import changed_input, fingerprint
-from rollcli.batch.options import EstimateOptions, ResultOptions
+from rollcli.batch.options import ResultOptions
 from rollcli.batch.plan import make_plan
 from rollcli.batch.run_record import RunRecord, recorded_options
 from rollcli.errors import InputError
@@ -17,27 +17,22 @@ from rollcli.frames.options import (
     ImageOptions,
     InputOptions,
     MethodOptions,
-    PairOptions,
     RegionOptions,
-    RunningOptions,
 )
-from rollcli.imaging.stereo_options import StereoOptions
+from tests.batch.estimate_options import estimate_options
 from tests.run_cli import write_maps
 
 
 @pytest.fixture
 def options(tmp_path):
     write_maps(tmp_path / "maps", 3)
-    return EstimateOptions(
+    return estimate_options(
         inputs=InputOptions((str(tmp_path / "maps"),)),
-        pairs=PairOptions(),
         encoding=EncodingOptions(scale=0.5, invalid=(1.0, 2.0)),
-        stereo=StereoOptions(),
         region=RegionOptions(roi=(0, 0, 9, 9)),
         method=MethodOptions(method="gss"),
         images=ImageOptions(derotated=str(tmp_path / "up")),
         result=ResultOptions(output=str(tmp_path / "rolls.csv")),
-        running=RunningOptions(),
     )
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from rollcli.batch.options import EstimateOptions, ResultOptions
+from rollcli.batch.options import ResultOptions
 from rollcli.batch.output import open_output
 from rollcli.batch.plan import make_plan
 from rollcli.batch.run_record import RunRecord
@@ -10,32 +10,15 @@ from rollcli.errors import UsageError
 from rollcli.files.locking import locked_folder
 from rollcli.files.results import Row
 from rollcli.frames.frame import FrameResult
-from rollcli.frames.options import (
-    EncodingOptions,
-    ImageOptions,
-    InputOptions,
-    MethodOptions,
-    PairOptions,
-    RegionOptions,
-    RunningOptions,
-)
-from rollcli.imaging.stereo_options import StereoOptions
+from rollcli.frames.options import InputOptions
+from tests.batch.estimate_options import estimate_options
 from tests.run_cli import contents, rollcli, write_maps
 
 
-def options(maps, output, *, resume=False):
+def options(maps, output):
     """Those of a run over a folder, in parts of two rows."""
-    return EstimateOptions(
-        InputOptions((str(maps),)),
-        PairOptions(),
-        EncodingOptions(),
-        StereoOptions(),
-        RegionOptions(),
-        MethodOptions(),
-        ImageOptions(),
-        ResultOptions(output=output, part_rows=2, resume=resume),
-        RunningOptions(),
-    )
+    result = ResultOptions(output=output, part_rows=2)
+    return estimate_options(inputs=InputOptions((str(maps),)), result=result)
 
 
 def append(output, frames):
