@@ -249,7 +249,7 @@ def main() -> None:
     trials, same, findings, early_ones = 0, 0, 0, 0
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        write_maps(folder / "maps", given.frames, width=320, height=240)
+        write_maps(folder / "maps", given.frames)
         expected = {}
         for result in RESULTS:
             (folder / f"undisturbed-{result}").mkdir()
@@ -275,7 +275,8 @@ def main() -> None:
             else:
                 print(f"DIFFERENT bytes, -j{jobs}, {result}, after {kind}", flush=True)
             if trials % 10 == 0:
-                print(f"{counts.total()} disturbances, {same} of {trials} trials the same", flush=True)
+                said = ", ".join(f"{kind} {counts[kind]}" for kind in kinds)
+                print(f"{counts.total()} ({said}); {same} of {trials} trials the same", flush=True)
     for kind in kinds:
         print(f"{kind:16} {counts[kind]}")
     print(
