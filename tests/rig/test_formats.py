@@ -171,12 +171,57 @@ def test_focal_length_and_principal_point_alone_are_a_calibration_without_a_base
         (samples.orb_slam(RIG).replace("Camera.cx", "Camera.xx"), "has no Camera.cx"),
         (samples.orb_slam(RIG).replace("707.0912\nCamera.fy", "-707.0912\nCamera.fy"), "positive"),
         (samples.KALIBR[:-60], "cut off"),
+        (samples.kalibr(RIG).replace("[0.0, 1.0, 0.0, 0.0]", "[0.0, 1.0, 0.0]"), "no 4x4 matrix"),
+        (samples.kalibr(RIG).replace("[0.0, 1.0, 0.0, 0.0]", "[0.0, 1.0, 0.0, 0.9]"), "vertical rig"),
+        (samples.zed(RIG).partition("Baseline")[0], "no Baseline below [STEREO]"),
+        (samples.zed(RIG).replace("Baseline=", "Baseline=about "), "finite"),
+        ("left:\n" + samples.ros(RIG, right=False).replace("\n", "\n  ").join(("  ", "")), "top level"),
+        (samples.ros(RIG, right=False).replace("[707.0912", "[0.0"), "no projection of a rectified view"),
+        (
+            samples.ros(RIG, right=False).replace("width: 1226", "width: 12.5"),
+            "12.5x370 px: that is no image",
+        ),
+        (samples.kitti_raw(RIG).replace("S_rect_00: 1226 370", "S_rect_00: 1226"), "S_rect_00 has 1 numbers"),
+        (samples.driving_stereo(RIG).replace("P_rect_103", "P_rect_104"), "has no P_rect_103"),
+        (samples.orb_slam(RIG).replace("fx: 707.0912", "fx: 0"), "focal length"),
+        ("projection_matrix:\n  data: 5\n", "not a list of numbers"),
+        ('{"intrinsic": ["fx", "u0"]}', "calib0"),
     ],
 )
 def test_a_bad_file_is_refused_in_one_line_that_names_it(text, words):
     message = refusal(text)
     assert words in message
     assert "calib0" in message
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("# nothing but a comment\n", "holds no value"),
+        ("- 1\n- 2\n", "line 2 is not plain YAML"),
+        ("a: 1\n b: 2\n", "line 2 is not plain YAML"),
+        ("a: 1\n\tb: 2\n", "line 2 is indented by a tab"),
+        ("a: 1]\n", "line 1 closes a bracket that is not open"),
+        ("a: 1\nb\n", "line 2 is not plain YAML"),
+        ("a: 1\nb: 2\na: 3\n", "line 3 gives a a second time"),
+        ("a:\n-\n", "line 2 is not plain YAML"),
+        ("a: [1] 2\n", "line 1 is not plain YAML"),
+        ("a: |\n", "line 1 begins with |"),
+        ("a: {b 1}\n", "line 1 is not plain YAML"),
+        ("a: {b: 1, b: 2}\n", "line 1 is not plain YAML"),
+        ("a: [1 {b: 2}]\n", "line 1 is not plain YAML"),
+        ("a: [1, {b: 2]}\n", "line 1 is not plain YAML"),
+        ("a: [,]\n", "line 1 is not plain YAML"),
+    ],
+)
+def test_what_is_no_plain_yaml_is_refused_by_its_line(text, words):
+    with pytest.raises(InputError, match="^f: ") as caught:
+        parse_yaml(text, "f")
+    assert words in str(caught.value)
+
+
+def test_what_follows_the_end_of_a_document_is_left_alone():
+    assert parse_yaml("%YAML:1.0\n---\na: 1\n...\n]\n", "f") == {"a": "1"}
 
 
 def test_a_vertical_rig_is_refused():

@@ -50,7 +50,9 @@ def read_ros(first: File, second: File | None = None) -> Fields:
 
 def _view(file: File) -> tuple[Projection, int | None, int | None]:
     values = parse_yaml(file.text, file.name)
-    matrix = values["projection_matrix"]
+    matrix = values.get("projection_matrix", "")
+    if not matrix:
+        raise InputError(f"{file.name}: has no projection_matrix, or not at its top level")
     data = matrix.get("data", []) if isinstance(matrix, dict) else matrix
     what = f"{file.name}: projection_matrix"
     view = Projection.of(numbers(data, what), what)
