@@ -215,7 +215,7 @@ def test_a_bad_file_is_refused_in_one_line_that_names_it(text, words):
     ],
 )
 def test_what_is_no_plain_yaml_is_refused_by_its_line(text, words):
-    with pytest.raises(InputError, match="^f: ") as caught:
+    with pytest.raises(InputError, match=r"^f: ") as caught:
         parse_yaml(text, "f")
     assert words in str(caught.value)
 
