@@ -2,14 +2,18 @@
 
 import json
 import shutil
+import signal
 import subprocess
 import time
 from pathlib import Path
 
 import pytest
 
+from rollcli.batch import run as batch_run
+from rollcli.batch.door import estimate_frame
 from rollcli.batch.result_file import open_result
 from rollcli.errors import OutputError, UsageError
+from rollcli.files.results import read_result
 from rollcli.files.storage import list_names, modified_ns, read_bytes, remove, write_bytes
 from tests.object_store import upload
 from tests.run_cli import command, contents, environment, road_map, rollcli, write_kitti, write_maps
@@ -85,6 +89,36 @@ def test_what_fails_again_stays_as_it_was(folder):
     before = made(folder)
     assert rollcli(*line, *RETRY, cwd=folder).status == 3
     assert made(folder) == before
+
+
+def test_a_retry_that_is_interrupted_keeps_what_it_has_done_and_is_taken_up_again(folder, maps, monkeypatch):
+    line = ("estimate", "maps", "-o", "rolls.csv", "--derotated", "up")
+    assert rollcli(*line, cwd=folder).status == 3
+    mend(folder, maps, *BROKEN)
+
+    def interrupted(frame, options):
+        signal.raise_signal(signal.SIGINT)
+        return estimate_frame(frame, options)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(batch_run, "estimate_frame", interrupted)
+        done = rollcli(*line, *RETRY, cwd=folder)
+    assert done.status == 130
+    assert "interrupted; continue with: rollcli estimate maps" in done.err
+    statuses = [row.status for row in read_result(folder / "rolls.csv").rows]
+    assert [statuses[index] for index in BROKEN] == ["ok", "error", "error"]
+    assert rollcli(*line, *RETRY, cwd=folder).status == 0
+    fresh, kept = anew(folder, line)
+    assert kept == fresh
+
+
+def test_a_retry_that_may_not_fail_stops_at_the_first_failure(folder, maps):
+    line = ("estimate", "maps", "-o", "rolls.csv")
+    assert rollcli(*line, cwd=folder).status == 3
+    mend(folder, maps, 2, 9)
+    assert rollcli(*line, *RETRY, "--fail-fast", cwd=folder).status == 3
+    statuses = [row.status for row in read_result(folder / "rolls.csv").rows]
+    assert [statuses[index] for index in BROKEN] == ["ok", "error", "error"]
 
 
 def test_rows_whose_names_hold_newlines_and_quotes_keep_their_places(maps, tmp_path):

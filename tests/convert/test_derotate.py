@@ -2,13 +2,16 @@
 
 import math
 import shutil
+import signal
 from itertools import product
 
 import numpy as np
 import pytest
 
+from rollcli.convert import work
 from rollcli.convert.derotate import run_derotate
 from rollcli.convert.options import DerotateOptions, RotationOptions
+from rollcli.convert.work import derotate_map
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.files.encodings import from_disparity, read_disparity
 from rollcli.files.formats import encode_stored, read_stored
@@ -254,6 +257,20 @@ def test_a_broken_map_costs_itself_alone(folder):
     assert done.status == 3
     assert "maps/frame2.png: is empty" in done.err
     assert len(contents(folder / "out")) == 3
+
+
+def test_an_interrupted_run_says_that_what_is_written_is_whole(folder, monkeypatch):
+    assert rollcli("derotate", "maps", "--roll", "2", "-o", "whole", cwd=folder).status == 0
+
+    def interrupted(*arguments):
+        signal.raise_signal(signal.SIGINT)
+        return derotate_map(*arguments)
+
+    monkeypatch.setattr(work, "derotate_map", interrupted)
+    done = rollcli("derotate", "maps", "--roll", "2", "-o", "out", cwd=folder)
+    assert done.status == 130
+    assert "interrupted; what is written is whole, and --overwrite starts anew" in done.err
+    assert contents(folder / "out") == {"frame0.png": contents(folder / "whole")["frame0.png"]}
 
 
 def make_suspect(folder, *names):
