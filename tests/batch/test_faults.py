@@ -200,13 +200,15 @@ if "spawn_main" in " ".join(sys.orig_argv):
 """
 
 
-def run_with_deaths(maps, deadly, times):
+ESTIMATE = ("estimate", "maps", "-j2", "-o", "rolls.csv", "-q")
+
+
+def run_with_deaths(maps, deadly, times, arguments=ESTIMATE):
     """A run in which reading certain frames kills the worker, so many times each."""
     (maps / "hook").mkdir()
     settings = f"DEADLY, TIMES = {deadly!r}, {times}\n"
     (maps / "hook" / "sitecustomize.py").write_text(settings + SITECUSTOMIZE)
     path = os.pathsep.join([str(maps / "hook"), str(ROOT)])
-    arguments = ("estimate", "maps", "-j2", "-o", "rolls.csv", "-q")
     return rollcli(*arguments, cwd=maps, PYTHONPATH=path)
 
 
@@ -227,6 +229,16 @@ def test_a_frame_that_kills_its_worker_twice_is_an_error_row_and_the_batch_goes_
     assert [(row.file, row.message) for row in rows if row.status == "error"] == [
         ("maps/frame3.png", "its worker died twice: killed for memory, perhaps, or crashed")
     ]
+
+
+def test_a_map_that_kills_its_worker_twice_is_not_derotated_and_the_others_are(maps):
+    (maps / "out").mkdir()
+    (maps / "out" / "frame3.png").write_text("of an earlier run")
+    line = ("derotate", "maps", "-j2", "--roll", "2", "-o", "out", "--overwrite")
+    done = run_with_deaths(maps, ["frame3"], 99, line)
+    assert done.status == 3
+    assert "maps/frame3.png: its worker died twice: killed for memory, perhaps, or crashed" in done.err
+    assert sorted(contents(maps / "out")) == sorted(f"frame{n}.png" for n in range(FRAMES) if n != 3)
 
 
 # the first worker that gives an image of a certain frame its name dies just before or after it
