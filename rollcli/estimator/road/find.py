@@ -83,7 +83,8 @@ def find_road(sample: Sample, max_roll: float, seed: int) -> Road:
     scores = second.scores(planes)
     third = PlaneScorer.of(sample, tuning.third_pixels)
     fitted = third.fitted(planes[_shortlist(planes, scores, tuning)])
-    kept = np.abs(fitted[:, 1]) <= math.tan(max_roll) * fitted[:, 2]
+    # a plane on which no pixel lies is fitted to nothing, and level
+    kept = (fitted[:, 2] > 0) & (np.abs(fitted[:, 1]) <= math.tan(max_roll) * fitted[:, 2])
     fitted = fitted[kept] if kept.any() else planes[_best(-scores, 1)]
     final = third.scores(fitted)
     winner = int(np.argmax(final))
