@@ -1,6 +1,7 @@
 """The program as a user runs it, and maps for it to read."""
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -15,7 +16,7 @@ _WITH_WORKERS = ("estimate", "disparity", "derotate", "vdisparity", "simulate", 
 _ONE_WORKER = {f"ROLLCLI_{name.upper()}_JOBS": "1" for name in _WITH_WORKERS}
 # processes compile the program once, not each of them anew
 _NOT_KEPT = ("ROLLCLI", "PYTHONDONTWRITEBYTECODE")
-_PROCESSES = ("-j", "--jobs", "--scheduler")  # options that start some
+_STARTS_PROCESSES = re.compile(r" (-j|--jobs)(?![ =]?1 )| --scheduler")
 
 
 def command(*arguments: str | Path) -> list[str]:
@@ -36,7 +37,7 @@ def rollcli(*arguments: str | Path, cwd: Path, stdin: str = "", **variables: str
     With a URL it has one frame in hand here; in a process of its own, a worker has several.
     """
     words = [*map(str, arguments)]
-    if "PYTHONPATH" in variables or any(each.startswith(_PROCESSES) for each in words):
+    if "PYTHONPATH" in variables or _STARTS_PROCESSES.search(f" {' '.join(words)} "):
         return rollcli_process(*words, cwd=cwd, stdin=stdin, **variables)
     return run_here(words, cwd, stdin, environment(**variables))
 
