@@ -100,6 +100,20 @@ def test_a_folder_has_a_calibration_for_each_stem(maps):
     assert "maps/000001_10.png: has no calibration of its name" in refused.err
 
 
+def test_two_calibrations_of_one_stem_and_a_large_one_are_refused(maps):
+    (maps / "calib").mkdir()
+    for name in ("000000.txt", "000000.json", "000001.txt"):
+        (maps / "calib" / name).write_text(samples.kitti_benchmark(RIG))
+    twice = rollcli("estimate", "maps", "--calib", "calib", cwd=maps)
+    assert (twice.status, twice.out) == (2, "")
+    assert "maps/000000_10.png: has more than one calibration of its name: " in twice.err
+    with (maps / "large.txt").open("wb") as file:
+        file.truncate((1 << 20) + 1)
+    large = rollcli("estimate", "maps", "--calib", "large.txt", cwd=maps)
+    assert (large.status, large.out) == (2, "")
+    assert large.err == "rollcli: large.txt: has 1048577 bytes; no calibration is larger than 1 MB\n"
+
+
 def test_a_pair_of_ros_files_is_given_left_and_right(maps):
     (maps / "left.yaml").write_text(samples.ros(RIG, right=False))
     (maps / "right.yaml").write_text(samples.ros(RIG, right=True))

@@ -4,12 +4,15 @@ import csv
 import importlib.util
 import re
 import shutil
+import signal
 
 import numpy as np
 import pytest
 
 from rollcli.cli.main import main
+from rollcli.evaluate import job
 from rollcli.evaluate.run_paper import PAGE, TABLES
+from rollcli.parallel import run_tasks
 from tests.estimator.synthetic_maps import bent_road
 from tests.run_cli import contents, rollcli
 
@@ -129,6 +132,44 @@ def test_maps_without_a_known_angle_are_refused_by_name(tmp_path):
     (tmp_path / "truth.csv").write_text("file,roll_deg\na,-2.5\n")
     run = paper(tmp_path, "--truth", "truth.csv")
     assert (run.status, run.err) == (2, "rollcli: maps/b.npy: has no known angle in truth.csv\n")
+
+
+@needs_extra
+def test_depth_maps_are_refused(tmp_path):
+    write_maps(tmp_path / "maps", "a.npy")
+    run = paper(tmp_path, "--encoding", "depth")
+    assert run.status == 2
+    assert "--encoding depth: the experiments are made on disparity maps, not on depth maps" in run.err
+
+
+@needs_extra
+def test_pixels_outside_of_the_region_count_for_nothing(tmp_path):
+    write_maps(tmp_path / "maps", "a.npy")
+    values = np.load(tmp_path / "maps/a.npy")
+    values[:, :40] = 7  # a car beside the road
+    np.save(tmp_path / "maps/a.npy", values)
+    (tmp_path / "truth.csv").write_text("file,roll_deg\na,-3\n")
+    corners = "45,0 159,0 159,119 45,119"
+    assert paper(tmp_path, "--truth", "truth.csv", "--polygon", corners, "-q").status == 0
+    exact = [row for row in read(tmp_path / "out/fig6_accuracy.csv") if row["solver"] == "exact"]
+    assert float(exact[0]["mean_deg"]) == pytest.approx(0, abs=0.05)
+
+
+@needs_extra
+def test_an_interrupted_evaluation_writes_nothing(tmp_path, monkeypatch):
+    write_maps(tmp_path / "maps", "a.npy", "b.npy")
+    examine_one = job.examine_file
+
+    def interrupted(*arguments, **options):
+        signal.raise_signal(signal.SIGINT)
+        return examine_one(*arguments, **options)
+
+    monkeypatch.setattr(job, "examine_file", interrupted)
+    monkeypatch.setattr(run_tasks, "_usable_processors", lambda: 1)
+    run = paper(tmp_path)
+    assert run.status == 130
+    assert "interrupted after 1 of 2 maps; nothing is written" in run.err
+    assert not (tmp_path / "out").exists()
 
 
 @needs_extra

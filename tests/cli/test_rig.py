@@ -287,6 +287,20 @@ def test_results_that_are_not_all_shards_of_one_run_are_refused(folder, chosen, 
     assert done.err.count("\n") == 1
 
 
+def test_what_cannot_be_put_together_is_refused(folder):
+    names = shards(folder, rows(*drive(**STABLE)), 2)
+    (folder / "odd.csv").write_bytes((folder / names[0]).read_bytes())
+    (folder / "odd.csv.run.json").write_text(json.dumps(record("3/2")))
+    odd = rig(folder, "odd.csv", names[1])
+    assert (odd.status, odd.out) == (2, "")
+    assert odd.err == "rollcli: odd.csv.run.json: is not the record of a run: its shard is no I/N\n"
+    for name in ("odd.csv", names[0]):
+        (folder / f"{name}.run.json").unlink()
+    twice = rig(folder, "odd.csv", names[0])
+    assert (twice.status, twice.out) == (2, "")
+    assert "odd.csv and part1.csv both have a row of maps/frame_0.png" in twice.err
+
+
 def test_a_run_that_has_not_ended_is_said_and_passes_no_gate(folder):
     write(folder / "half.csv", rows(*drive(**STABLE)), run=record(frames=2000))
     done = rig(folder, "half.csv")

@@ -7,6 +7,7 @@ import json
 import os
 import re
 import shutil
+import signal
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from datetime import datetime, timezone
@@ -17,7 +18,7 @@ import pytest
 
 from rollcli.errors import UsageError
 from rollcli.files.results import read_result
-from rollcli.report import page
+from rollcli.report import page, pictures
 from tests.report.results import row, write_result
 from tests.run_cli import contents, road_map, rollcli, write_kitti, write_maps
 
@@ -223,6 +224,19 @@ def test_maps_that_are_gone_leave_a_page_that_says_so_and_status_3(folder):
     assert "page.html: pictures of 2 frames, " in done.err
     assert report(folder, "out/rolls.csv", "--gallery", "0", "--overwrite").status == 0
     assert not PICTURES.search(page_of(folder))
+
+
+def test_an_interrupted_report_writes_nothing(folder, monkeypatch):
+    take_one = pictures.take_pictures
+
+    def interrupted(*arguments, **options):
+        signal.raise_signal(signal.SIGINT)
+        return take_one(*arguments, **options)
+
+    monkeypatch.setattr(pictures, "take_pictures", interrupted)
+    done = report(folder, "out/rolls.csv")
+    assert (done.status, done.err) == (130, "rollcli: interrupted; nothing is written\n")
+    assert not (folder / "page.html").exists()
 
 
 def test_names_of_frames_are_text_wherever_they_stand(tmp_path):

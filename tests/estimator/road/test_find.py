@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -203,6 +204,29 @@ def test_only_pixels_of_the_mask_are_used():
 def test_a_bound_that_cannot_be_is_refused(max_roll_deg):
     with pytest.raises(UsageError, match="largest roll"):
         estimate_roll(np.ones((50, 50)), max_roll=math.radians(max_roll_deg))
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        ({"method": "magic"}, "method 'magic': choose one of gd, gss, exact"),
+        ({"model": "cubic"}, "model 'cubic': choose one of parabola, line"),
+        ({"road": "none"}, "road 'none': choose one of auto, all"),
+        ({"lambda0": 0.0}, "lambda0 0.0: give a positive number, or auto"),
+        ({"lambda0": math.inf}, "lambda0 inf: give a positive number, or auto"),
+        ({"tolerance": 0.0}, "a tolerance of 0 degrees: give a positive angle"),
+        ({"max_interval": math.nan}, "a widest interval of nan degrees: give a positive angle"),
+    ],
+)
+def test_what_cannot_be_asked_is_refused(asked, words):
+    with pytest.raises(UsageError, match=f"^{re.escape(words)}"):
+        estimate_roll(np.ones((50, 50)), **asked)
+
+
+@pytest.mark.parametrize("disparity", [np.ones(50), np.ones((5, 5, 3)), np.full((50, 50), "1")])
+def test_what_is_no_map_is_refused(disparity):
+    with pytest.raises(UsageError):
+        estimate_roll(disparity)
 
 
 def test_a_mask_of_another_size_is_refused():
