@@ -163,10 +163,10 @@ def halt(run: Run, chance: random.Random) -> None:
 
 
 def second_run(run: Run, chance: random.Random) -> str:
-    """Stop it, and start a second run on its result, which has to be refused."""
+    """Stop it, and start a second run on its result, which has to be refused once the first one holds it."""
     run.send_all(signal.SIGSTOP)
-    began = (run.folder / run.result).exists()
-    second = Run(run.folder, run.result, run.jobs, "pipe") if began else None
+    held = f" {run.process.pid} " in Path("/proc/locks").read_text()
+    second = Run(run.folder, run.result, run.jobs, "pipe") if held else None
     status, said = second.end() if second else (2, "another run")
     run.send_all(signal.SIGCONT)
     return "" if status == 2 and "another run" in said else f"a second run ended with {status}: {said[-300:]}"

@@ -35,7 +35,7 @@ FURTHER = {
         "cli/test_streams.py",
         "convert",
     ),
-    "parallel": ("batch/test_faults.py", "batch/test_resume.py"),
+    "parallel": ("cli/test_lost_readers.py", "batch/test_faults.py", "batch/test_resume.py"),
     "rig_check": ("cli/test_rig.py",),
     "rig": ("cli/test_calibration.py",),
 }

@@ -5,6 +5,8 @@ import signal
 import time
 from pathlib import Path
 
+import cv2
+
 from rollcli.errors import InputError
 
 
@@ -18,6 +20,7 @@ def run(task):
         "die": _die,
         "die_once": _die_once,
         "raise": _raise,
+        "threads": cv2.getNumThreads,
     }[kind](*arguments)
 
 

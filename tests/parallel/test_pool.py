@@ -54,6 +54,10 @@ def test_errors_on_purpose_are_raised_as_they_are_and_others_say_where():
         results(("raise", "key"), ("give", 1))
 
 
+def test_a_worker_computes_in_one_thread():
+    assert results(("threads",), ("threads",)) == [1, 1]
+
+
 def test_a_queued_task_can_be_cancelled_and_a_running_one_cannot(tmp_path):
     event = tmp_path / "event"
     with pool() as executor:

@@ -362,6 +362,9 @@ def test_charts_are_written_for_slides_with_or_without_a_page(folder):
     assert (alone.status, alone.out) == (0, "")
     written = contents(folder / "slides")
     assert sorted(written) == ["histogram.png", "histogram.svg", "roll.png", "roll.svg"]
+    for name in ("histogram", "roll"):
+        head = written[f"{name}.svg"].partition(b">")[0]
+        assert all(each in head for each in (b' width="1280" height="560"', b' font-size="18"'))
 
     again = rollcli("report", "out/rolls.csv", "--svg", "slides", cwd=folder)
     assert (again.status, "slides/roll.svg: exists already" in again.err) == (2, True)
