@@ -59,8 +59,11 @@ def _fetched(url: str) -> bytes:
     with urllib.request.urlopen(url, timeout=_TIMEOUT_S) as answer:
         wait_for_room(answer.length or 0)
         data: bytes = answer.read(_LARGEST + 1)
+        missing = answer.length
     if len(data) > _LARGEST:
         raise _TooLargeError
+    if missing:  # a bounded read of a body that is cut ends as one that is whole
+        raise http.client.IncompleteRead(data, missing)
     return data
 
 
