@@ -62,6 +62,15 @@ def test_a_value_lies_where_the_axes_say():
     assert line.points[:, 1] == pytest.approx([(1 - margin) * height, margin * height], abs=0.2)
 
 
+def test_of_the_lines_behind_the_values_that_of_zero_stands_out():
+    laid = sketch([row("a.png", -1.0, None), row("b.png", 1.0, None)])
+    behind = [item for item in laid.inside if isinstance(item, Line) and item.colour in ("line", "grid")]
+    (zero,) = [item for item in behind if item.colour == "line"]
+    _, _, width, height = laid.frame
+    np.testing.assert_allclose(zero.points, [(0, height / 2), (width, height / 2)], atol=0.5)
+    assert {item.width < zero.width for item in behind if item is not zero} == {True}
+
+
 def test_axes_have_round_numbers_with_a_true_minus_and_thousands():
     rows = [row(f"{i}.png", -1 + 2 * i / 2500, 0.05) for i in range(2500)]
     texts = [item.text for item in sketch(rows).around if isinstance(item, Words)]
