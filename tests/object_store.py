@@ -13,7 +13,6 @@ from pathlib import Path
 import pytest
 
 from rollcli.files.storage import list_names, read_bytes, write_bytes
-from tests.run_cli import contents
 
 KEYS = {"AWS_ACCESS_KEY_ID": "test", "AWS_SECRET_ACCESS_KEY": "test", "AWS_REGION": "us-east-1"}
 
@@ -43,8 +42,9 @@ def object_store() -> Iterator[dict[str, str]]:
 
 def upload(folder: Path, url: str) -> None:
     """Copy every file below a folder to below a URL."""
-    for name, data in contents(folder).items():
-        write_bytes(f"{url}/{name}", data)
+    for path in folder.rglob("*"):
+        if path.is_file():
+            write_bytes(f"{url}/{path.relative_to(folder).as_posix()}", path.read_bytes())
 
 
 def joined(url: str, ending: str = "csv") -> bytes:

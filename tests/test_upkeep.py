@@ -1,6 +1,8 @@
 """What keeps the project in order agrees with what the project says of itself."""
 
 import re
+import subprocess
+import sys
 
 from tests.run_cli import ROOT
 
@@ -31,3 +33,8 @@ def test_ci_runs_on_windows_and_macos_with_tests_that_are_there():
     named = found(r"(?<=[ :])tests(?:/[\w./]+)?(?=\s)", ".github", "workflows", "ci.yml")
     assert "tests/test_other_systems.py" in named
     assert [each for each in named if not (ROOT / each).exists()] == []
+
+
+def test_what_all_tests_share_limits_the_threads_of_numpy_before_numpy_loads():
+    line = [sys.executable, "-c", "import sys, tests.conftest; sys.exit('numpy' in sys.modules)"]
+    assert subprocess.run(line, cwd=ROOT, check=False).returncode == 0
