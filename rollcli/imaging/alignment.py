@@ -6,13 +6,14 @@ little, and an offset of 8 pixels is one of 2 there. After the match it is measu
 
 import math
 from dataclasses import astuple, dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.imaging.misalignment import LEVEL, Misalignment
-from rollcli.imaging.vertical_disparity import Measured, measure_misalignment
+from rollcli.imaging.vertical_disparity import Measured, Texture, measure_misalignment
 from rollcli.imaging.views import View, Views, shrink_both
 
 Map = NDArray[np.float32]
@@ -119,6 +120,10 @@ class SmallViews:
         self.factor = size_factor(self.shape, _MEASURED_AT)
         self.views = shrink_both(whole, self.factor)
 
+    @cached_property
+    def _texture(self) -> Texture:
+        return Texture.of(self.views)
+
     def swapped(self) -> "SmallViews":
         """Return the views with left and right exchanged."""
         return SmallViews((self.views[1], self.views[0]))
@@ -141,7 +146,7 @@ class SmallViews:
             Pixels of the whole views.
         """
         seen = resampled(disparity, self.views[0].shape)
-        found = measure_misalignment(self.views, seen, start.resized(1 / self.factor), rounds)
+        found = measure_misalignment(self._texture, seen, start.resized(1 / self.factor), rounds)
         return None if found is None else found.resized(self.factor)
 
 

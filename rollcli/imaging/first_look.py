@@ -12,7 +12,7 @@ from rollcli.imaging.disparity_range import largest_disparity, rough_largest
 from rollcli.imaging.misalignment import LEVEL, Misalignment
 from rollcli.imaging.sgbm import NARROWEST, match_views, usable_range
 from rollcli.imaging.stereo_options import StereoOptions
-from rollcli.imaging.vertical_disparity import Measured, measure_misalignment
+from rollcli.imaging.vertical_disparity import Measured, Texture, measure_misalignment
 from rollcli.imaging.views import Views, shrink_both
 
 _SMALLEST, _SMALL = 16_000, 30_000  # px of the views that are looked at, one after the other
@@ -123,13 +123,13 @@ def _clearest(attempts: Iterable[_Small | None]) -> _Small | None:
 
 def _climb(small: Views, start: Misalignment, top: float | None = None) -> _Small | None:
     """Level, match and measure in turn, until the right view lies still."""
-    shape = small[0].shape
+    shape, texture = small[0].shape, Texture.of(small)
     found, at, approach = None, start, Approach(shape)
     for _ in range(_ROUNDS):
         matched = _match_small((small[0], level(small[1], at)), top)
         if matched is None:
             return found
-        measured = measure_misalignment(small, matched.disparity, at)
+        measured = measure_misalignment(texture, matched.disparity, at)
         found = _Small(matched.top, matched.disparity, measured)
         if measured is None:
             return found

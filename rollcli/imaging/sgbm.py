@@ -64,9 +64,9 @@ def match_views(views: Views, first: int, count: int, options: StereoOptions) ->
         speckleRange=options.speckle_range,
         mode=_MODES[options.mode],
     )
-    sixteenths = matcher.compute(*views)
-    disparity: NDArray[np.float32] = np.divide(np.maximum(sixteenths, 0), _SUBPIXELS, dtype=np.float32)
-    return disparity
+    sixteenths = np.maximum(matcher.compute(*views), 0)
+    disparity = cv2.addWeighted(sixteenths, 1 / _SUBPIXELS, sixteenths, 0, 0, dtype=cv2.CV_32F)
+    return disparity.astype(np.float32, copy=False)
 
 
 def match_rows(

@@ -72,5 +72,6 @@ def without_lag(disparity: NDArray[np.float32], mode: str) -> NDArray[np.float32
     around = cv2.blur(known, (_AROUND, _AROUND))
     filled = np.where(known > 0, lags, cv2.blur(lags, (_AROUND, _AROUND)) / np.maximum(around, 1e-3))
     added = cv2.resize(filled, (width, height), interpolation=cv2.INTER_LINEAR)
-    corrected: NDArray[np.float32] = disparity + added * (disparity > 0)
+    added *= disparity > 0
+    corrected: NDArray[np.float32] = np.add(disparity, added, out=added)
     return corrected

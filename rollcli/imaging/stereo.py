@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -123,7 +124,7 @@ def match_pair(
         disparity = match(corrected, rows)
     else:
         disparity, corrected, doubt = _match_levelled(match, rows, small, look, first < 0)
-    valid = np.count_nonzero(disparity)
+    valid = cv2.countNonZero(disparity)
     return StereoMatch(
         disparity=without_lag(disparity, options.mode),
         min_disparity=first,

@@ -58,8 +58,26 @@ class Measured:
         return Measured(there, errors, self.share, factor * self.spread)
 
 
+class Texture(NamedTuple):
+    """What is compared of two views: smoothed grey levels, and their gradients in the left one.
+
+    Arrays of shape (H, W): grey levels, and grey levels per pixel along the rows and down the columns.
+    """
+
+    left: Floats
+    right: Floats
+    across: Floats
+    down: Floats
+
+    @staticmethod
+    def of(views: Views) -> "Texture":
+        """Work it out; a pair that is measured again and again needs it once."""
+        left, right = (_smooth(view) for view in views)
+        return Texture(left, right, *_gradients(left))
+
+
 def measure_misalignment(
-    views: Views, disparity: Floats, start: Misalignment = LEVEL, rounds: int = 2
+    texture: Texture, disparity: Floats, start: Misalignment = LEVEL, rounds: int = 2
 ) -> Measured | None:
     """Measure how the right view lies against the left one.
 
@@ -69,8 +87,8 @@ def measure_misalignment(
 
     Parameters
     ----------
-    views : pair of ndarray of uint8, shape (H, W)
-        Left and right, as they were given.
+    texture : Texture
+        Of the views as they were given.
     disparity : ndarray of float32, shape (H, W)
         From the left view to the right one that is levelled by `start`, pixels; no data is 0.
     start : Misalignment
@@ -83,7 +101,7 @@ def measure_misalignment(
     Measured or None
         None where too few blocks tell.
     """
-    blocks = _Blocks(views, disparity)
+    blocks = _Blocks(texture, disparity)
     found, errors, spread, count = start, LEVEL, 0.0, 0
     for _ in range(rounds):
         seen = blocks.vertical(found)
@@ -154,8 +172,8 @@ class _Shares(NamedTuple):
 class _Blocks:
     """The blocks of a pair; what does not change from round to round is computed once."""
 
-    def __init__(self, views: Views, disparity: Floats) -> None:
-        left, self._right = (_smooth(view) for view in views)
+    def __init__(self, texture: Texture, disparity: Floats) -> None:
+        self._right = texture.right
         known = (disparity > 0).astype(np.float32)
         places = _block_means(known) > _KNOWN
 
@@ -164,8 +182,8 @@ class _Blocks:
             blocks = pixels[: height * _BLOCK, : width * _BLOCK].reshape(height, _BLOCK, width, _BLOCK)
             return blocks.swapaxes(1, 2)[places].reshape(-1, _BLOCK**2)
 
-        self._left, self._seen = of_blocks(left), of_blocks(known)
-        self._across, self._down = (of_blocks(gradient) for gradient in _gradients(left))
+        self._left, self._seen = of_blocks(texture.left), of_blocks(known)
+        self._across, self._down = of_blocks(texture.across), of_blocks(texture.down)
         rows, columns = (_BLOCK * place[:, None].astype(np.float32) for place in np.nonzero(places))
         within = np.arange(_BLOCK, dtype=np.float32)
         self._v = rows + np.repeat(within, _BLOCK)
@@ -199,20 +217,21 @@ def _fit(seen: _Seen) -> tuple[Misalignment, Misalignment, float]:
     """Return the misalignment that explains most blocks, its standard errors, and the spread of the rest."""
     size = max(1.0, float(np.abs(seen.x).max()), float(np.abs(seen.y).max()))
     x, y = seen.x.astype(np.float64) / size, seen.y.astype(np.float64) / size
-    columns = np.stack([np.ones_like(x), x, y, x * y], axis=1)
+    columns = np.stack([np.ones_like(x), x, y, x * y])
     shift, fixed = seen.shift.astype(np.float64), seen.weight.astype(np.float64)
     weight, off, spread = fixed, np.zeros_like(fixed), 1.0
     for _ in range(_FIT_ROUNDS):
         weight = fixed * _believed(off, spread)
-        normal = columns.T @ (columns * weight[:, None])
+        weighted = columns * weight
+        normal = weighted @ columns.T
         inverse = np.linalg.inv(normal + 1e-6 * np.trace(normal) * np.eye(4))
-        values = inverse @ (columns.T @ (weight * shift))
-        off = shift - columns @ values
+        values = inverse @ (weighted @ shift)
+        off = shift - values @ columns
         before, spread = spread, 1.4826 * _median(np.abs(off)) + 1e-3
         if abs(spread - before) < _SAME * spread:
             break
-    scores = columns * (weight * off)[:, None] @ inverse
-    errors = np.sqrt(np.square(scores).sum(axis=0))
+    scores = inverse @ (weighted * off)
+    errors = np.sqrt(np.square(scores).sum(axis=1))
     units = np.array([1, size, size, size**2])
     return Misalignment(*(values / units).tolist()), Misalignment(*(errors / units).tolist()), spread
 
