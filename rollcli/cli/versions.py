@@ -13,7 +13,7 @@ OPENCV = (
     "opencv-contrib-python",
 )
 REQUIRED = ("numpy", OPENCV, "click", "tqdm", "tifffile")
-OPTIONAL = ("imagecodecs", "dask", "distributed", "plotly", "jinja2")
+OPTIONAL = ("dask", "distributed", "imagecodecs", "jinja2", "obstore", "plotly", "pyarrow", "pywuffs")
 
 
 def versions() -> Iterator[tuple[str, str]]:

@@ -1,12 +1,15 @@
 """The group: what it says of itself, and how errors end."""
 
+import re
 import subprocess
 import sys
+from importlib.metadata import PackageNotFoundError
 
 import pytest
 
 import rollcli as package
-from tests.run_cli import environment, rollcli, rollcli_process, write_maps
+from rollcli.cli import versions
+from tests.run_cli import ROOT, environment, rollcli, rollcli_process, write_maps
 
 
 def test_version_is_the_packages(tmp_path):
@@ -18,6 +21,33 @@ def test_versions_names_python_and_every_dependency(tmp_path):
     names = [line.split()[0] for line in done.out.splitlines()]
     assert names[:7] == ["rollcli", "Python", "numpy", "opencv-python-headless", "click", "tqdm", "tifffile"]
     assert "not installed" not in done.out
+
+
+def test_every_extra_has_its_version():
+    extras = re.search(
+        r"\[project.optional-dependencies\]\n(.*?)\nall = ",
+        (ROOT / "pyproject.toml").read_text("utf-8"),
+        re.S,
+    )[1]
+    assert set(versions.OPTIONAL) == set(re.findall(r'"([a-z0-9]+)>=', extras))
+
+
+def test_a_package_that_is_missing_is_named_as_such(tmp_path, monkeypatch):
+    def version(name):
+        if name in ("tqdm", "opencv-python-headless", "plotly"):
+            raise PackageNotFoundError
+        return "1.0"
+
+    monkeypatch.setattr(versions, "version", version)
+    lines = rollcli("--versions", cwd=tmp_path).out.splitlines()
+    assert "tqdm not installed" in lines
+    assert "opencv-python 1.0" in lines
+    assert not any(line.startswith("plotly") for line in lines)
+
+
+def test_help_leaves_two_of_a_hundred_columns_free_on_a_wide_screen(tmp_path):
+    lines = rollcli("simulate", "--help", cwd=tmp_path, COLUMNS="200").out.splitlines()
+    assert 90 < max(map(len, lines)) <= 98
 
 
 @pytest.mark.parametrize("arguments", [["--version"], ["--help"], ["estimate", "--help"]])

@@ -11,7 +11,7 @@ from rollcli.report.charts.all_charts import all_charts
 from rollcli.report.drawing.colours import DARK, LIGHT, rgb
 from rollcli.report.drawing.lay_out import lay_out
 from rollcli.report.drawing.png import png_file
-from rollcli.report.drawing.sketch import Line, Words
+from rollcli.report.drawing.sketch import Line, Sketch, Words
 from rollcli.report.drawing.svg import svg_file
 from rollcli.rig.assess import assess_rig
 from tests.report.results import row
@@ -70,6 +70,16 @@ def test_of_the_lines_behind_the_values_that_of_zero_stands_out():
     _, _, width, height = laid.frame
     np.testing.assert_allclose(zero.points, [(0, height / 2), (width, height / 2)], atol=0.5)
     assert {item.width < zero.width for item in behind if item is not zero} == {True}
+
+
+@pytest.mark.parametrize("anchor", ["start", "end"])  # the middle may lie between two pixels
+def test_upright_words_are_those_of_a_line_turned(anchor):
+    lying = Sketch("", 200, 80, 18.0, (0, 0, 10, 10), (), (Words(100, 40, "roll, degrees", "text", anchor),))
+    words = Words(40, 200 - 100, "roll, degrees", "text", anchor, upright=True)
+    upright = Sketch("", 80, 200, 18.0, (0, 0, 10, 10), (), (words,))
+    shown = [decoded(png_file(each)).astype(int) for each in (lying, upright)]
+    assert of_colour(shown[0], "text").any()
+    assert np.abs(np.rot90(shown[0]) - shown[1]).max() <= 1
 
 
 def test_axes_have_round_numbers_with_a_true_minus_and_thousands():

@@ -185,6 +185,8 @@ def test_focal_length_and_principal_point_alone_are_a_calibration_without_a_base
         (samples.driving_stereo(RIG).replace("P_rect_103", "P_rect_104"), "has no P_rect_103"),
         (samples.orb_slam(RIG).replace("fx: 707.0912", "fx: 0"), "focal length"),
         ("projection_matrix:\n  data: 5\n", "not a list of numbers"),
+        (samples.opencv_yaml(RIG._replace(baseline=-0.5)).partition("Q:")[0], "swapped"),
+        ("%YAML:1.0\nQ: {data: [1, 2, 3]}\n", "its Q is no matrix of a horizontal rig"),
         ('{"intrinsic": ["fx", "u0"]}', "calib0"),
     ],
 )
@@ -232,6 +234,8 @@ def test_a_vertical_rig_is_refused():
 def test_two_files_are_one_calibration_for_ros_only():
     assert "only a pair of ROS" in refusal(samples.KITTI_RAW, samples.KITTI_RAW)
     assert "wrong order" in refusal(samples.ROS_RIGHT, samples.ROS_LEFT)
+    wider = samples.ros(RIG._replace(width=1280), right=True)
+    assert "different sizes, 1226x370 and 1280x370" in refusal(samples.ros(RIG, right=False), wider)
 
 
 def test_bytes_that_are_no_text_and_large_files_are_refused():
