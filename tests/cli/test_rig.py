@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -38,10 +39,20 @@ def record(shard="1/1", frames=None, encoding=("kitti",), **options):
     return run | ({} if frames is None else {"inputs": {"frames": frames}})
 
 
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """Two results that nobody changes."""
+    folder = tmp_path_factory.mktemp("written")
+    write(folder / "jump.csv", rows(*drive(**JUMP), suspect={3, 4}, failed={10}))
+    write(folder / "stable.csv", rows(*drive(**STABLE)))
+    return folder
+
+
 @pytest.fixture
-def folder(tmp_path):
-    write(tmp_path / "jump.csv", rows(*drive(**JUMP), suspect={3, 4}, failed={10}))
-    write(tmp_path / "stable.csv", rows(*drive(**STABLE)))
+def folder(written, tmp_path):
+    """The same results, and nothing else."""
+    for path in written.iterdir():
+        shutil.copyfile(path, tmp_path / path.name)
     return tmp_path
 
 
