@@ -2,7 +2,8 @@
 
 ``python -m tests.fuzz.mutants [--count 15] [--seed 1] [PACKAGE ...]``: so many changes of each package, drawn
 at random and each tried with the tests that belong to the package, which end at the first failure. What lives
-is listed: either it changes nothing that anyone could see, or a test is missing.
+either changes nothing that anyone could see, or a test is missing. What dies is listed with the test that
+failed: on a busy machine one that waits for a browser or a network may fail for another reason.
 """
 
 import argparse
@@ -161,8 +162,8 @@ def tests_of(path: Path) -> list[str]:
     return [str(file.relative_to(ROOT)) for file in sorted(dict.fromkeys(files), key=distance)]
 
 
-def noticed(mutant: Mutant, tree: Path) -> bool:
-    """Tell whether a test fails on the changed program."""
+def noticed(mutant: Mutant, tree: Path) -> str:
+    """Name the test that fails on the changed program; empty when none does."""
     target = tree / mutant.path
     whole = target.read_bytes()
     target.write_text(mutant.source, "utf-8")
@@ -171,20 +172,25 @@ def noticed(mutant: Mutant, tree: Path) -> bool:
             [sys.executable, "-m", "pytest", *_QUICKLY, *tests_of(mutant.path)],
             cwd=tree,
             env={**os.environ, "PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1"},
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            errors="replace",
             timeout=_SECONDS,
             check=False,
         )
     except subprocess.TimeoutExpired:
-        return True
+        return f"no end in {_SECONDS} s"
     finally:
         target.write_bytes(whole)
-    return done.returncode != 0
+    if done.returncode == 0:
+        return ""
+    failed = [line for line in done.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
+    return failed[0].partition(" - ")[0] if failed else f"pytest's status {done.returncode}"
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Try the changes, and print a line for each that lives and one for each package."""
+    """Try the changes, and print a line for each, and one for each package."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("packages", nargs="*", help="of rollcli (all)")
     parser.add_argument("--count", type=int, default=15)
@@ -204,10 +210,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
             start, killed = time.monotonic(), 0
             for make in drawn:
                 mutant = make()
-                if noticed(mutant, tree):
-                    killed += 1
-                else:
-                    print(f"  lives: {mutant.path}:{mutant.line}: {mutant.change}", flush=True)
+                said = noticed(mutant, tree)
+                killed += bool(said)
+                print(f"  {said or 'lives'}: {mutant.path}:{mutant.line}: {mutant.change}", flush=True)
             seconds = time.monotonic() - start
             print(f"{package}: {len(drawn)} tried, {killed} killed, {seconds:.0f} s", flush=True)
 
