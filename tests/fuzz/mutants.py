@@ -199,7 +199,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     every = sorted(path.parent.name for path in (ROOT / PROGRAM).glob("*/__init__.py"))
     with tempfile.TemporaryDirectory() as folder:
         tree = Path(folder) / "tree"
-        shutil.copytree(ROOT, tree, ignore=shutil.ignore_patterns(".*", "out", "*.egg-info", "__pycache__"))
+        shutil.copytree(
+            ROOT,
+            tree,
+            ignore=shutil.ignore_patterns(".git", ".venv", ".*cache*", "out", "*.egg-info", "__pycache__"),
+        )
         if (ROOT.parent / "shared").exists():
             (tree.parent / "shared").symlink_to((ROOT.parent / "shared").resolve())
         for package in given.packages or every:
