@@ -53,6 +53,8 @@ OFF = {
     "score.beside_weight": 1.0,
     "score.nearness": 1e-6,
     "score.horizon": 1e6,
+    "score.least_corridor": 0.0,
+    "score.least_core": 0.0,
     "search.of_each_roll": 10**6,
     "fit.other_roll": -1e6,
     "fit.large_roll": 1e6,

@@ -20,6 +20,8 @@ from rollcli.estimator.road.scoring import PlaneScorer, first_costs, slope_weigh
 from rollcli.estimator.road.subsample import Sample, Singles
 from rollcli.estimator.road.tuning import SearchTuning
 
+HARDLY_A_PIXEL = "no road: hardly a pixel lies on the best plane that was found"
+
 
 @dataclass(frozen=True)
 class Road:
@@ -72,7 +74,8 @@ def find_road(sample: Sample, max_roll: float, seed: int) -> Road:
     Raises
     ------
     EstimationError
-        When no plane through the pixels rises downward in the image, as a road's disparity does.
+        When no plane through the pixels rises downward in the image, as a road's disparity does, or none
+        has pixels on it.
     """
     planes = draw_planes(sample, max_roll, seed)
     if len(planes) == 0:
@@ -83,11 +86,12 @@ def find_road(sample: Sample, max_roll: float, seed: int) -> Road:
     scores = second.scores(planes)
     third = PlaneScorer.of(sample, tuning.third_pixels)
     fitted = third.fitted(planes[_shortlist(planes, scores, tuning)])
-    # a plane on which no pixel lies is fitted to nothing, and level
-    kept = (fitted[:, 2] > 0) & (np.abs(fitted[:, 1]) <= math.tan(max_roll) * fitted[:, 2])
+    kept = np.abs(fitted[:, 1]) <= math.tan(max_roll) * fitted[:, 2]
     fitted = fitted[kept] if kept.any() else planes[_best(-scores, 1)]
     final = third.scores(fitted)
     winner = int(np.argmax(final))
+    if not fitted[winner, 2] > 0:  # fitted to no pixel, it scores 0, and the others have more against them
+        raise EstimationError(HARDLY_A_PIXEL)
     rolls = _rolls(fitted)
     far = np.abs(rolls - rolls[winner]) > tuning.rival_angle
     # a plane that was not fitted may be the same road, badly drawn

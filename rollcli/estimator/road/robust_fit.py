@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.moments import Floats
-from rollcli.estimator.road.find import Road, road_weights
+from rollcli.estimator.road.find import HARDLY_A_PIXEL, Road, road_weights
 from rollcli.estimator.road.model import RoadModel
 from rollcli.estimator.road.profile import Profile, read_profile
 from rollcli.estimator.road.subsample import Sample, Singles
@@ -158,7 +158,7 @@ class NearPixels:
         inside = np.maximum(0, 1 - np.square(off / limit))
         weights: Singles = inside * inside * self.place
         if np.count_nonzero(weights) < self.tuning.least_pixels:
-            raise EstimationError("no road: hardly a pixel lies on the best plane that was found")
+            raise EstimationError(HARDLY_A_PIXEL)
         return weights
 
     def _camber_precision(self, weights: Singles, off: Singles) -> float:

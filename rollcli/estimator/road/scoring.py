@@ -75,8 +75,8 @@ class PlaneScorer:
         lost = np.minimum(excess, 0)
         lost *= slope
         lost += np.maximum(excess, 0)
-        scores = _explained(lost, slope, core)
-        scores += _explained(lost, slope, corridor)
+        scores = _explained(lost, slope, core, self.tuning.least_core)
+        scores += _explained(lost, slope, corridor, self.tuning.least_corridor)
         scores /= 2
         rise = np.square(planes[:, 1]) + np.square(planes[:, 2])
         steep = np.square(planes[:, 0]) / np.maximum(rise, np.float32(1e-30))
@@ -138,13 +138,10 @@ def _off_slope(one: Singles, other: Singles, slope: Singles) -> Singles:
     return squares
 
 
-def _explained(lost: Singles, slope: Singles, place: Singles) -> Singles:
-    """Return (K,): the share of the road-like pixels of a place that lie on each plane, less those below.
-
-    A place that weighs less than one pixel explains less: 0 where it is empty.
-    """
+def _explained(lost: Singles, slope: Singles, place: Singles, least: float) -> Singles:
+    """Return (K,): the share of the road-like pixels of a place that lie on each plane, less those below."""
     reached = np.einsum("kn,kn->k", place, slope)
-    shares: Singles = -np.einsum("kn,kn->k", place, lost) / np.maximum(reached, 1)
+    shares: Singles = -np.einsum("kn,kn->k", place, lost) / (reached + np.float32(least * place.shape[1]))
     return shares
 
 

@@ -83,6 +83,10 @@ class ScoreTuning:
     """Typical disparities up to which weights grow: what is near ahead is the road driven on."""
     horizon: float = 2.0
     """Units from the centre: a plane whose horizon is farther away is rather a wall, or an own bonnet."""
+    least_corridor: float = 0.05
+    """Share of the pixels that the corridor should weigh: an emptier one scores less."""
+    least_core: float = 0.02
+    """The same for its core."""
 
 
 @dataclass(frozen=True)
