@@ -59,6 +59,29 @@ def rollcli_process(*arguments: str | Path, cwd: Path, stdin: str = "", **variab
     return Finished(done.returncode, done.stdout, done.stderr)
 
 
+# a worker that reads a certain map never comes back from it
+_ENDLESS = """
+import pathlib, sys, threading
+if "spawn_main" in " ".join(sys.orig_argv):
+    import rollcli.files.formats as formats
+    read = formats.read_stored
+    def read_stored(path, name=None):
+        if pathlib.Path(path).stem == "STEM":
+            pathlib.Path("has-begun").touch()
+            threading.Event().wait()
+        return read(path, name)
+    formats.read_stored = read_stored
+"""
+
+
+def endless(folder: Path, stem: str) -> dict[str, str]:
+    """The environment in which workers never come back from the map of this stem; `has-begun` says when."""
+    hook = folder / "hook"
+    hook.mkdir()
+    (hook / "sitecustomize.py").write_text(_ENDLESS.replace("STEM", stem))
+    return environment(PYTHONPATH=os.pathsep.join([str(hook), str(ROOT)]))
+
+
 def contents(folder: Path) -> dict[str, bytes]:
     """Every file below a folder, by its relative path."""
     files = (path for path in folder.rglob("*") if path.is_file())

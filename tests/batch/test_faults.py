@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from rollcli.files.results import parse_rows
-from tests.run_cli import ROOT, command, contents, environment, rollcli, write_maps
+from tests.run_cli import ROOT, command, contents, endless, environment, rollcli, write_maps
 
 FRAMES = 12
 
@@ -308,28 +308,11 @@ def test_a_worker_that_cannot_load_its_libraries_ends_the_run_in_one_line(maps):
     assert "cv2" in cannot_start(maps, env=environment(PYTHONPATH=path))
 
 
-# a worker that reads a certain map never comes back from it
-ENDLESS = """
-import pathlib, sys, threading
-if "spawn_main" in " ".join(sys.orig_argv):
-    import rollcli.files.formats as formats
-    read = formats.read_stored
-    def read_stored(path, name=None):
-        if pathlib.Path(path).stem == "frame8":
-            pathlib.Path("has-begun").touch()
-            threading.Event().wait()
-        return read(path, name)
-    formats.read_stored = read_stored
-"""
-
-
 def test_workers_end_with_a_run_that_is_killed_also_in_the_middle_of_a_frame(maps):
-    (maps / "hook").mkdir()
-    (maps / "hook" / "sitecustomize.py").write_text(ENDLESS)
     run = subprocess.Popen(
         command("estimate", "maps", "-j2", "-o", "rolls.csv", "-q"),
         cwd=maps,
-        env=environment(PYTHONPATH=os.pathsep.join([str(maps / "hook"), str(ROOT)])),
+        env=endless(maps, "frame8"),
         start_new_session=True,
     )
     wait_until((maps / "has-begun").exists)
