@@ -4,6 +4,8 @@ import os
 import re
 import subprocess
 import sys
+import time
+from collections.abc import Callable
 from pathlib import Path
 
 import cv2
@@ -59,27 +61,35 @@ def rollcli_process(*arguments: str | Path, cwd: Path, stdin: str = "", **variab
     return Finished(done.returncode, done.stdout, done.stderr)
 
 
-# a worker that reads a certain map never comes back from it
-_ENDLESS = """
-import pathlib, sys, threading
+# a worker that reads a certain map says so, and comes back from it when it may
+_HELD = """
+import pathlib, sys, time
 if "spawn_main" in " ".join(sys.orig_argv):
     import rollcli.files.formats as formats
     read = formats.read_stored
     def read_stored(path, name=None):
         if pathlib.Path(path).stem == "STEM":
             pathlib.Path("has-begun").touch()
-            threading.Event().wait()
+            while not pathlib.Path("may-go-on").exists():
+                time.sleep(0.01)
         return read(path, name)
     formats.read_stored = read_stored
 """
 
 
-def endless(folder: Path, stem: str) -> dict[str, str]:
-    """The environment in which workers never come back from the map of this stem; `has-begun` says when."""
+def holding(folder: Path, stem: str) -> dict[str, str]:
+    """The environment in which workers hold the map of this stem, from `has-begun` to `may-go-on`."""
     hook = folder / "hook"
     hook.mkdir()
-    (hook / "sitecustomize.py").write_text(_ENDLESS.replace("STEM", stem))
+    (hook / "sitecustomize.py").write_text(_HELD.replace("STEM", stem))
     return environment(PYTHONPATH=os.pathsep.join([str(hook), str(ROOT)]))
+
+
+def wait_until(condition: Callable[[], bool]) -> None:
+    give_up = time.monotonic() + 60
+    while not condition():
+        assert time.monotonic() < give_up
+        time.sleep(0.01)
 
 
 def contents(folder: Path) -> dict[str, bytes]:

@@ -6,14 +6,13 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from functools import partial
 from pathlib import Path
 
 import pytest
 
 from rollcli.files.results import parse_rows
-from tests.run_cli import ROOT, command, contents, endless, environment, rollcli, write_maps
+from tests.run_cli import ROOT, command, contents, environment, holding, rollcli, wait_until, write_maps
 
 FRAMES = 12
 
@@ -312,7 +311,7 @@ def test_workers_end_with_a_run_that_is_killed_also_in_the_middle_of_a_frame(map
     run = subprocess.Popen(
         command("estimate", "maps", "-j2", "-o", "rolls.csv", "-q"),
         cwd=maps,
-        env=endless(maps, "frame8"),
+        env=holding(maps, "frame8"),
         start_new_session=True,
     )
     wait_until((maps / "has-begun").exists)
@@ -323,13 +322,6 @@ def test_workers_end_with_a_run_that_is_killed_also_in_the_middle_of_a_frame(map
 
 def wait_for_bytes(result, size):
     wait_until(lambda: result.exists() and result.stat().st_size > size)
-
-
-def wait_until(condition):
-    give_up = time.monotonic() + 60
-    while not condition():
-        assert time.monotonic() < give_up
-        time.sleep(0.01)
 
 
 def alive_in_group(group):

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.run_cli import command, endless, environment, write_maps
+from tests.run_cli import command, environment, holding, wait_until, write_maps
 
 FRAMES = 8
 
@@ -76,12 +76,12 @@ def test_an_error_keeps_its_status_when_nobody_reads_its_message(maps):
 
 @pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="this system has no SIGHUP")
 def test_a_hangup_stops_a_run_as_sigterm_does_unless_it_is_ignored(maps):
+    write_maps(maps / "maps", 60)
     line = ["estimate", "maps", "-o", "rolls.csv", "-v", "-j2"]
-    run = subprocess.Popen(
-        command(*line), cwd=maps, env=endless(maps, f"frame{FRAMES - 1}"), stderr=subprocess.PIPE
-    )
-    run.stderr.readline()
+    run = subprocess.Popen(command(*line), cwd=maps, env=holding(maps, "frame2"), stderr=subprocess.PIPE)
+    wait_until((maps / "has-begun").exists)
     run.send_signal(signal.SIGHUP)
+    (maps / "may-go-on").touch()
     _, err = run.communicate(timeout=60)
     assert run.returncode == 130
     assert b"interrupted; continue with: rollcli estimate maps" in err
