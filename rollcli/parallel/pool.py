@@ -97,7 +97,8 @@ class PoolExecutor(Generic[Task, Result]):
 
     def make_progress(self) -> None:
         """Wait until a worker answers or dies, and send further tasks."""
-        ready = connection.wait([worker.pipe for worker in self._workers if worker.pending])
+        asked = [worker.pipe for worker in self._workers if worker.pending]
+        ready = connection.wait(asked) if asked else []  # of nobody, it would wait for ever
         for index, worker in enumerate(self._workers):
             if worker.pipe in ready:
                 self._receive(index, worker)

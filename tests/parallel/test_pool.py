@@ -40,6 +40,18 @@ def test_a_task_that_kills_its_worker_once_is_done_by_another(tmp_path):
     assert results(*tasks) == [1, "survived", *range(2, 12)]
 
 
+def test_tasks_that_wait_while_one_is_tried_again_are_done_though_none_follows(tmp_path):
+    with pool(jobs=1) as executor:
+        dying, *others = [
+            executor.submit(task)
+            for task in [("die_once", tmp_path / "mark"), *(("give", number) for number in range(3))]
+        ]
+        with pytest.raises(executor.worker_died):
+            dying.result()
+        assert executor.retry(dying.task) == "survived"
+        assert [other.result() for other in others] == [0, 1, 2]
+
+
 def test_a_task_that_kills_two_workers_is_lost_and_costs_no_other_task():
     done = results(("give", 1), ("die",), *(("give", number) for number in range(2, 12)))
     assert done[1][:2] == ("lost", ("die",))
