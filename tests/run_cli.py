@@ -85,7 +85,23 @@ def holding(folder: Path, stem: str) -> dict[str, str]:
     return environment(PYTHONPATH=os.pathsep.join([str(hook), str(ROOT)]))
 
 
+_HALF = """
+import os, sys
+from rollcli.files.atomic import atomic_file
+with atomic_file(sys.argv[1]) as file:
+    file.write(b"half of a file")
+    file.flush()
+    os._exit(9)
+"""
+
+
+def leave_half(path: Path) -> None:
+    """Leave what a process leaves that is killed while it writes this file."""
+    subprocess.run([sys.executable, "-c", _HALF, path], check=False)
+
+
 def wait_until(condition: Callable[[], bool]) -> None:
+    """Wait for what another process brings about; fail after a minute."""
     give_up = time.monotonic() + 60
     while not condition():
         assert time.monotonic() < give_up

@@ -1,22 +1,10 @@
 """A result of parts in a folder: what is in the way, damaged, or left by a run that was killed."""
 
-import subprocess
-import sys
-
 import pytest
 
 from rollcli.batch import result_parts
 from rollcli.errors import OutputError
-from tests.run_cli import contents, rollcli, write_maps
-
-HALF_WRITTEN = (
-    "import os, sys\n"
-    "from rollcli.files.atomic import atomic_file\n"
-    "with atomic_file(sys.argv[1]) as file:\n"
-    "    file.write(b'half of a file')\n"
-    "    file.flush()\n"
-    "    os._exit(9)\n"
-)
+from tests.run_cli import contents, leave_half, rollcli, write_maps
 
 
 @pytest.fixture
@@ -35,7 +23,7 @@ def test_half_a_part_of_a_killed_run_is_removed(parts, half_written, flag):
     folder, line = parts
     whole = contents(folder)
     (folder / "rolls.parquet" / "part-00002.parquet").unlink()
-    subprocess.run([sys.executable, "-c", HALF_WRITTEN, folder / "rolls.parquet" / half_written], check=False)
+    leave_half(folder / "rolls.parquet" / half_written)
     assert len(contents(folder)) == len(whole)
 
     assert rollcli(*line, flag, cwd=folder).status == 0

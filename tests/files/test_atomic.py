@@ -10,6 +10,7 @@ import pytest
 
 from rollcli.errors import OutputError
 from rollcli.files.atomic import NameTakenError, atomic_file, remove_leftovers, write_atomic
+from tests.run_cli import leave_half
 
 
 def names_in(folder):
@@ -83,20 +84,10 @@ def test_nothing_is_there_before_the_block_ends(tmp_path):
     assert names_in(tmp_path) == ["map.png"]
 
 
-KILLED = (
-    "import os, sys\n"
-    "from rollcli.files.atomic import atomic_file\n"
-    "with atomic_file(sys.argv[1]) as file:\n"
-    "    file.write(b'half of a file')\n"
-    "    file.flush()\n"
-    "    os._exit(9)\n"
-)
-
-
 @pytest.mark.parametrize("name", ["map.png", "é" * 120 + ".png", "a\nb.png"])
 def test_what_a_killed_process_left_is_removed_before_the_next_run(tmp_path, name):
     for _ in range(2):
-        subprocess.run([sys.executable, "-c", KILLED, tmp_path / name], check=False)
+        leave_half(tmp_path / name)
     assert len(names_in(tmp_path)) == 2
 
     remove_leftovers([tmp_path / "other.png", tmp_path / name])
