@@ -6,9 +6,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rollcli.files.formats import MAP_FORMATS
 from tests.fuzz.cases import CASES
 from tests.fuzz.child import read_all_ways
-from tests.fuzz.corpus import corpus
+from tests.fuzz.corpus import READERS, corpus
 from tests.fuzz.mutations import at_random, every_region, with_repairs
 
 FILES = {name: data for name, data in corpus().items() if name != "large.png"}
@@ -24,6 +25,13 @@ def test_a_file_broken_anywhere_is_read_or_refused_in_one_line(name):
     answers = [read_all_ways(each) for broken in every_region(FILES[name]) for each in with_repairs(broken)]
 
     assert answers.count("refused") > len(answers) / 10
+
+
+def test_every_map_format_has_a_reader_to_fuzz_and_every_file_one_reader():
+    of_each = [name for reader in READERS for name in corpus([reader])]
+
+    assert MAP_FORMATS.keys() <= READERS.keys()
+    assert sorted(of_each) == sorted(corpus())
 
 
 @settings(deadline=None, max_examples=300)

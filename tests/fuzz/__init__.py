@@ -1,1 +1,1 @@
-"""Broken files for the readers: `python -m tests.fuzz --seconds 60`."""
+"""Broken files for the readers: `python -m tests.fuzz [--reader tiff] --seconds 60`."""

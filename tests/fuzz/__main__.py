@@ -14,12 +14,12 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from random import Random
 from typing import IO
 
-from tests.fuzz.corpus import corpus
+from tests.fuzz.corpus import READERS, corpus
 from tests.fuzz.mutations import at_random, every_region, with_repairs
 
 HANG = 2.0
@@ -66,9 +66,9 @@ class Reader:
         self._process.communicate()
 
 
-def broken_files(seed: int) -> Iterator[tuple[str, bytes]]:
+def broken_files(seed: int, readers: Iterable[str] = READERS) -> Iterator[tuple[str, bytes]]:
     """(name of the whole file, broken file): each region of each file, then places at random without end."""
-    files = corpus()
+    files = corpus(readers)
     for name, whole in files.items():
         for broken in every_region(whole):
             yield from ((name, each) for each in with_repairs(broken))
@@ -86,20 +86,24 @@ def main() -> int:
     parser.add_argument(
         "--seed", type=int, default=int(time.time()), help="for random places (default: the time)"
     )
+    parser.add_argument(
+        "--reader", action="append", choices=READERS, help="whose files, repeatable (default: every one's)"
+    )
     options = parser.parse_args()
-    print(f"seed {options.seed}, {options.seconds:g} s")
+    readers = options.reader or list(READERS)
+    print(f"{', '.join(readers)}, seed {options.seed}, {options.seconds:g} s", flush=True)
     end = time.monotonic() + options.seconds
     counts: Counter[str] = Counter()
     finds: dict[str, Path] = {}
     reader = Reader()
-    for name, data in broken_files(options.seed):
+    for name, data in broken_files(options.seed, readers):
         answer = reader.read(data)
         counts[answer if answer in ("read", "refused") else "finds"] += 1
         if answer not in ("read", "refused") and answer not in finds:
             KEPT.mkdir(parents=True, exist_ok=True)
             finds[answer] = KEPT / f"{hashlib.sha256(data).hexdigest()[:12]}-{name}"
             finds[answer].write_bytes(data)
-            print(f"{finds[answer]}: {answer}")
+            print(f"{finds[answer]}: {answer}", flush=True)
         if time.monotonic() > end:
             break
     reader.close()

@@ -1,6 +1,7 @@
 """Whole files of each readable format and kind, small enough to reach every byte of them."""
 
 import zlib
+from collections.abc import Iterable
 
 import cv2
 import numpy as np
@@ -8,11 +9,18 @@ import numpy as np
 from tests.binary_files import disparity_map, make_npy, make_pfm, make_png, make_tiff
 
 MAP = disparity_map(11, 17)
+READERS = {
+    "png": (".png",),
+    "tiff": (".tif",),
+    "npy": (".npy",),
+    "pfm": (".pfm",),
+    "pictures": (".jpg", ".bmp", ".ppm", ".pgm"),
+}
 GREYS = bytes(np.repeat(np.arange(256, dtype=np.uint8), 3))
 
 
-def corpus() -> dict[str, bytes]:
-    """Name and bytes of each file."""
+def corpus(readers: Iterable[str] = READERS) -> dict[str, bytes]:
+    """Name and bytes of each file that these readers read."""
     grey, deep, real = MAP.astype(np.uint8), (MAP * 256).astype(np.uint16), MAP.astype(np.float32)
     colour = np.dstack([grey, grey // 2, grey])
     text = (b"tEXt", b"Comment\0made by hand")
@@ -43,7 +51,8 @@ def corpus() -> dict[str, bytes]:
     files["big.tif"] = make_tiff(real, "deflate", big=True)
     files["pages.tif"] = make_tiff(grey, pages=3)
     files["colour.tif"] = make_tiff(colour, "lzw", photometric=2)
-    return files
+    endings = tuple(ending for reader in readers for ending in READERS[reader])
+    return {name: whole for name, whole in files.items() if name.endswith(endings)}
 
 
 def repaired_png(data: bytes) -> bytes:
