@@ -42,9 +42,10 @@ def _estimate(frame: Frame, options: FrameOptions, images: dict[str, bytes]) -> 
     estimate, likeness = _estimate_roll(source, options)
     calibration = _calibration(frame, source, estimate)
     horizon = None if calibration is None else horizon_row(estimate.tangent, calibration)
+    # the images are turned by the angle of the pixels, which is not the rig's where fx and fy differ
+    made, note = encode_images(frame, source, estimate, options, horizon)
     if calibration is not None:
         estimate = with_pose(estimate, calibration)
-    made, note = encode_images(frame, source, estimate, options, horizon)
     row = _row(frame, source, estimate, note, likeness)
     images.update(made)
     warning = "; ".join(filter(None, [source.warning, source.beyond, likeness]))

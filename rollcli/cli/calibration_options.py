@@ -7,7 +7,7 @@ from rollcli.rig.options import CalibrationOptions
 
 calibration_options = record(
     "calibration",
-    "Calibration of the rectified pair, for pitch, height and depth maps",
+    "Calibration of the rectified pair, for pitch, height, horizon and depth maps",
     CalibrationOptions,
     option(
         "--calib",

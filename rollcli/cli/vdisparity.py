@@ -55,7 +55,8 @@ def vdisparity(ctx: click.Context, /, **records: Any) -> None:
     INPUTS are maps (PNG, TIFF, NPY, PFM), folders of them, quoted patterns, or - for paths on stdin. The
     picture is an 8-bit PNG on a log scale; its first rows are those of the map. The map is taken as it is,
     whereas `estimate --vdisparity` rotates it upright first. Where a road is found, its disparity along the
-    middle column is drawn as a dashed curve: on a de-rotated map the road's pixels lie on it.
+    middle column is drawn as a dashed curve: on a de-rotated map the road's pixels lie on it. With a
+    calibration, the road's horizon on that column is drawn, too.
     """
     from rollcli.convert.idle import idle_in_vdisparity
     from rollcli.convert.vdisparity import run_vdisparity

@@ -6,8 +6,6 @@ from rollcli.convert.options import DerotateOptions, DisparityOptions, VDisparit
 from rollcli.frames.idle import Idle, idle_folders, idle_running, idle_stereo
 from rollcli.frames.options import PairOptions
 
-_CALIBRATION = ("calib", "focal", "principal_point", "baseline", "doffs")
-
 
 def idle_in_disparity(options: DisparityOptions) -> Iterator[Idle]:
     """Yield the options without effect on a run of `disparity`."""
@@ -28,6 +26,6 @@ def idle_in_derotate(options: DerotateOptions) -> Iterator[Idle]:
 def idle_in_vdisparity(options: VDisparityOptions) -> Iterator[Idle]:
     """Yield the options without effect on a run of `vdisparity`."""
     if options.encoding.encoding != "depth":
-        yield Idle(_CALIBRATION, "only --encoding depth needs a calibration")
+        yield Idle(("baseline",), "the horizon does not depend on it; only --encoding depth needs it")
     yield from idle_folders(options.inputs, PairOptions())
     yield from idle_running(options.running)

@@ -5,7 +5,7 @@ from functools import partial
 from rollcli.convert.options import CountOptions, VDisparityOptions
 from rollcli.convert.run import Conversion, convert
 from rollcli.errors import ExitStatus
-from rollcli.frames.calibration import check_depth
+from rollcli.frames.calibration import check_depth, check_first_size
 from rollcli.frames.find import map_frames
 from rollcli.frames.frame import Frame, FrameResult
 from rollcli.frames.options import FrameOptions
@@ -19,6 +19,7 @@ def run_vdisparity(options: VDisparityOptions) -> ExitStatus:
     check_depth(frames, options.encoding)
     conversions = [Conversion(frame, _writes(frame, options)) for frame in frames]
     read = FrameOptions(encoding=options.encoding, root=running.root, replaces=running.overwrite)
+    check_first_size(frames, read)
     do = partial(_count, options=read, count=options.count)
     return convert(conversions, do, options.output, running, options.encoding)
 

@@ -9,6 +9,7 @@ from rollcli.convert.options import CountOptions
 from rollcli.convert.run import Conversion
 from rollcli.errors import EstimationError, InputError
 from rollcli.estimator.estimate import estimate_roll
+from rollcli.estimator.result import RollEstimate
 from rollcli.files.codecs.png import encode_png
 from rollcli.files.formats import encode_stored
 from rollcli.files.results import Row
@@ -21,7 +22,9 @@ from rollcli.frames.outputs import write_outputs
 from rollcli.frames.read import Source, read_source
 from rollcli.imaging.pictures.overlay import draw_preview
 from rollcli.imaging.pictures.vdisparity_picture import draw_v_disparity
-from rollcli.imaging.vdisparity import profile, v_disparity
+from rollcli.imaging.vdisparity import middle_row, profile, v_disparity
+from rollcli.rig.calibration import Calibration
+from rollcli.rig.pose import horizon_row
 
 
 def derotate_map(conversion: Conversion, options: FrameOptions, expand: bool) -> FrameResult:
@@ -43,9 +46,14 @@ def count_map(conversion: Conversion, options: FrameOptions, count: CountOptions
     def make(source: Source) -> dict[str, bytes]:
         nonlocal likeness
         histogram = v_disparity(source.disparity, bins=count.bins, max_disparity=count.max_disparity)
-        road = _road(source)
-        likeness = "" if road is not None else looks_like(source.disparity, source.stored, options)
-        picture = encode_png(draw_v_disparity(histogram, road))
+        estimate = _sure_estimate(source)
+        road = horizon = None
+        if estimate is None:
+            likeness = looks_like(source.disparity, source.stored, options)
+        else:
+            road = profile(estimate.alpha, estimate.theta, estimate.width)
+            horizon = _horizon(estimate, conversion.frame.calibration)
+        picture = encode_png(draw_v_disparity(histogram, road, horizon=horizon))
         images = [picture, encode_stored(histogram.counts, "tiff")] if count.counts else [picture]
         return dict(zip(map(options.at, conversion.writes), images, strict=True))
 
@@ -93,10 +101,18 @@ def _convert(
     return result
 
 
-def _road(source: Source) -> tuple[float, float, float] | None:
-    """Find the road's disparity as a parabola of the row; None unless the estimate is `ok`."""
+def _sure_estimate(source: Source) -> RollEstimate | None:
+    """Find the road; None unless the estimate is `ok`."""
     try:
         estimate = estimate_roll(source.disparity)
     except EstimationError:
         return None
-    return profile(estimate.alpha, estimate.theta, estimate.width) if estimate.status == "ok" else None
+    return estimate if estimate.status == "ok" else None
+
+
+def _horizon(estimate: RollEstimate, calibration: Calibration | None) -> float | None:
+    """Return the row of the horizon on the middle column; None without a calibration."""
+    if calibration is None:
+        return None
+    y = horizon_row(estimate.tangent, calibration.for_size(estimate.width, estimate.height))
+    return None if y is None else middle_row(y, estimate.theta, estimate.width)

@@ -108,5 +108,16 @@ def profile(alpha: tuple[float, float, float], theta: float, width: int) -> tupl
         Of the map, pixels.
     """
     a0, a1, a2 = alpha
-    start, step = -(width - 1) / 2 * math.sin(theta), math.cos(theta)  # y = start + step * row
+    start, step = _middle_column(theta, width)
     return a0 + a1 * start + a2 * start**2, (a1 + 2 * a2 * start) * step, a2 * step**2
+
+
+def middle_row(y: float, theta: float, width: int) -> float:
+    """Return the row where the middle column of a map has a y of the method, pixels."""
+    start, step = _middle_column(theta, width)
+    return (y - start) / step
+
+
+def _middle_column(theta: float, width: int) -> tuple[float, float]:
+    """Return start and step of y = start + step * row along the middle column of a map."""
+    return -(width - 1) / 2 * math.sin(theta), math.cos(theta)

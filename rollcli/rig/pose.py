@@ -142,8 +142,13 @@ def with_pose(estimate: RollEstimate, calibration: Calibration) -> RollEstimate:
     )
 
 
-def horizon_row(tangent: Tangent, calibration: Calibration) -> float:
-    """Return the y of the road's horizon, px: where the tangent's points are infinitely far away."""
+def horizon_row(tangent: Tangent, calibration: Calibration) -> float | None:
+    """Return the y of the road's horizon, px: where the tangent's points are infinitely far away.
+
+    None where the disparity does not grow downward: such a plane is no road.
+    """
+    if tangent.slope <= 0:
+        return None
     return tangent.row - (tangent.disparity + calibration.doffs) / tangent.slope
 
 

@@ -82,7 +82,7 @@ def test_what_is_told_to_have_no_effect_has_none(run, line, idle, reason):
         ("derotate maps --roll 2", "--encoding px", "rotated maps keep their stored numbers"),
         ("derotate maps/a.png --roll 2", "--recursive", "no folder is named"),
         ("vdisparity maps/a.png", "--recursive", "no folder is named"),
-        ("vdisparity maps", "--baseline 0.5 --focal 100 --principal-point 80,60", "only --encoding depth"),
+        ("vdisparity maps --focal 100 --principal-point 80,60", "--baseline 0.5", "only --encoding depth"),
         ("disparity --left left --right right --vertical-offset 0", "--align off", "--vertical-offset says"),
     ],
 )

@@ -202,3 +202,9 @@ def test_a_surface_whose_disparity_shrinks_downward_has_no_pose():
     posed = with_pose(estimate_roll(ceiling, road="all"), calibration)
     assert posed.pitch is None
     assert "no pose" in posed.message
+
+
+@pytest.mark.parametrize("slope", [0.0, -0.3])
+def test_a_plane_whose_disparity_does_not_grow_downward_has_no_horizon(slope):
+    calibration = Calibration(250.0, 250.0, 160.0, 90.0, 0.5)
+    assert horizon_row(Tangent(0.0, 100.0, 20.0, slope, None), calibration) is None

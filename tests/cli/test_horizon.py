@@ -1,0 +1,75 @@
+"""With a calibration, v-disparity images mark the horizon; images are turned by the angle of the pixels."""
+
+import csv
+import io
+import math
+
+import cv2
+import numpy as np
+import pytest
+
+from rollcli.rig.calibration import Calibration
+from tests.rig.calibration_files import Rig, kitti_raw, middlebury
+from tests.rig.test_pose import cast
+from tests.run_cli import rollcli
+
+RIG = Rig(fx=250.0, fy=250.0, cx=150.0, cy=90.0, baseline=0.5, width=320, height=200)
+ROLL, PITCH, HEIGHT = math.radians(9), math.radians(6), 1.5
+GREEN = (120, 220, 120)
+
+
+def write_map(path, rig):
+    path.parent.mkdir(exist_ok=True)
+    disparity = cast(Calibration(rig.fx, rig.fy, rig.cx, rig.cy, rig.baseline), ROLL, PITCH, HEIGHT)
+    cv2.imwrite(str(path), np.rint(disparity * 256).astype(np.uint16))
+
+
+def horizon_on(column, rig):
+    """The row of a column whose ray is level: n K^-1 (u, v, 1) = 0, n the normal of the road."""
+    n = (
+        -math.sin(ROLL) * math.cos(PITCH),
+        math.cos(ROLL) * math.cos(PITCH),
+        math.sin(PITCH),
+    )
+    return rig.cy - rig.fy * (n[0] * (column - rig.cx) / rig.fx + n[2]) / n[1]
+
+
+def marked_row(path):
+    """The row with most pixels of the horizon's colour."""
+    picture = cv2.imread(str(path))
+    return int((picture == GREEN).all(axis=2).sum(axis=1).argmax())
+
+
+def test_the_horizon_is_marked_where_the_road_is_infinitely_far_away(tmp_path):
+    write_map(tmp_path / "maps" / "a.png", RIG)
+    (tmp_path / "calib.txt").write_text(kitti_raw(RIG))
+    calib = ("--calib", "calib.txt")
+    assert rollcli("estimate", "maps", *calib, "--vdisparity", "upright", cwd=tmp_path).status == 0
+    done = rollcli("vdisparity", "maps", *calib, "-o", "as_it_is", cwd=tmp_path)
+    assert (done.status, "no effect" in done.err) == (0, False)
+    middle = horizon_on(159.5, RIG)
+    assert marked_row(tmp_path / "as_it_is" / "a.png") == pytest.approx(middle, abs=0.6)
+    # the upright map is turned about its centre, and its horizon is level
+    above = (99.5 - middle) * math.cos(ROLL)
+    assert marked_row(tmp_path / "upright" / "a.png") == pytest.approx(99.5 - above, abs=0.6)
+
+
+def test_a_calibration_of_another_size_is_refused_before_pictures_are_drawn(tmp_path):
+    write_map(tmp_path / "maps" / "a.png", RIG)
+    (tmp_path / "calib.txt").write_text(kitti_raw(RIG._replace(height=240)))
+    done = rollcli("vdisparity", "maps", "--calib", "calib.txt", "-o", "v", cwd=tmp_path)
+    assert done.status == 2
+    assert "320x240" in done.err
+    assert done.err.count("\n") == 1
+    assert not (tmp_path / "v").exists()
+
+
+def test_images_are_turned_by_the_angle_of_the_pixels_where_these_are_not_square(tmp_path):
+    rig = RIG._replace(fy=200.0)
+    write_map(tmp_path / "maps" / "a.png", rig)
+    (tmp_path / "calib.txt").write_text(middlebury(rig))
+    posed = rollcli("estimate", "maps", "--calib", "calib.txt", "--derotated", "upright", cwd=tmp_path)
+    level = rollcli("estimate", "upright", cwd=tmp_path)
+    (before,), (after,) = (csv.DictReader(io.StringIO(done.out)) for done in (posed, level))
+    assert float(before["roll_deg"]) == pytest.approx(math.degrees(ROLL), abs=0.01)
+    assert float(after["roll_deg"]) == pytest.approx(0.0, abs=0.05)
