@@ -18,11 +18,15 @@ _NEEDED = ("file", "roll_deg")
 
 @dataclass(frozen=True)
 class KnownPose:
-    """What is known of a rig: its roll, radians; pitch, degrees, and height, metres, or None."""
+    """What is known of a rig: its roll, radians; pitch, degrees, and height, metres, or None.
+
+    `bends` says that the road does, so that pitch and height over the road ahead are others.
+    """
 
     theta: float
     pitch_deg: float | None = None
     height_m: float | None = None
+    bends: bool = False
 
 
 def by_stem(names: Iterable[str], where: str) -> dict[str, int]:
@@ -99,12 +103,12 @@ def _rows(text: str, path: str | Path) -> Iterator[tuple[str, KnownPose]]:
 
 
 def _known(line: Mapping[str, str | None], where: str) -> KnownPose:
-    bends = _number(line, "curvature_per_m", where) if line.get("curvature_per_m") else 0.0
+    bends = bool(line.get("curvature_per_m")) and _number(line, "curvature_per_m", where) != 0
     pitch, height = (
-        _number(line, name, where) if line.get(name) and bends == 0 else None
+        _number(line, name, where) if line.get(name) and not bends else None
         for name in ("pitch_deg", "height_m")
     )
-    return KnownPose(math.radians(_number(line, "roll_deg", where)), pitch, height)
+    return KnownPose(math.radians(_number(line, "roll_deg", where)), pitch, height, bends)
 
 
 def _number(line: Mapping[str, str | None], name: str, where: str) -> float:

@@ -1,6 +1,7 @@
 """`rollcli evaluate` as a user runs it."""
 
 import json
+import re
 
 import pytest
 
@@ -43,6 +44,21 @@ def test_accuracy_ends_with_3_when_a_known_frame_has_no_angle(folder):
     assert done.status == 3
     assert json.loads(done.out)["no_angle"] == ["c", "e"]
     assert "rollcli: truth.csv: 2 frames have no angle in rolls.csv: c, e\n" in done.err
+
+
+def test_poses_over_bent_roads_are_counted_because_they_are_not_compared(tmp_path):
+    pose = {"status": "ok", "roll_deg": 1.0, "pitch_deg": 3.0, "height_m": 1.5}
+    lines = [json.dumps({"file": f"{name}.png", **pose}) for name in "abc"]
+    (tmp_path / "rolls.jsonl").write_text("".join(f"{line}\n" for line in lines))
+    (tmp_path / "truth.csv").write_text(
+        "file,roll_deg,pitch_deg,height_m,curvature_per_m\na,1,3,1.5,0\nb,1,3,1.5,1e-3\nc,1,3,1.5,-1e-3\n"
+    )
+    line = ("evaluate", "accuracy", "rolls.jsonl", "--truth", "truth.csv")
+    done = rollcli(*line, cwd=tmp_path)
+    assert re.search(r"^pitch, frames compared +1$", done.out, re.MULTILINE)
+    said = "rollcli: truth.csv: pitch and height are not compared on 2 frames, whose roads bend"
+    assert done.err == f"{said} (curvature_per_m)\n"
+    assert rollcli(*line, "-q", cwd=tmp_path).err == ""
 
 
 def test_accuracy_writes_a_file_and_refuses_to_replace_it(folder):
