@@ -25,6 +25,7 @@ from rollcli.estimator.moments import Floats, Grid, Moments
 _OF_WEIGHTS = ((2, 0), (1, 1), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3), (2, 2), (1, 3), (0, 4))
 _OF_RESIDUAL = ((2, 0), (1, 1), (0, 2))
 SAME_EVERYWHERE = "the disparity is the same everywhere: every roll angle fits it equally well"
+_SMALLEST, _LARGEST = 1e-120, 1e120  # px: a solver multiplies squares of what it is given
 _SINGULAR = 1e-10  # a variance below this share of its square scale is rounding error
 
 
@@ -94,8 +95,8 @@ class Energy:
         n = moments.weight
         if n <= 0:
             raise EstimationError("no valid pixel: all are zero, negative, not finite or masked out")
-        if not math.isfinite(moments.rr):
-            raise EstimationError(f"disparities up to {peak:g}: the squares of such numbers overflow")
+        if not _SMALLEST < peak < _LARGEST:
+            raise EstimationError(f"disparities up to {peak:g}: their squares leave double precision")
         p, q = moments.s[1, 0] / n, moments.s[0, 1] / n
         s = _shift(5, p) @ moments.s @ _shift(5, q).T
         t = _shift(3, p) @ moments.t @ _shift(3, q).T
@@ -194,10 +195,8 @@ class Energy:
         return math.sqrt(max(0.0, self.at(theta).value) / self.weight)
 
     def denominator(self, theta: Any) -> Any:
-        """Return det(Y'Y) / weight: E_min is a quotient of trigonometric polynomials over it."""
+        """Return the parabola's det(Y'Y) / weight: E_min is a quotient of trigonometric polynomials over it."""
         _, _, yy, _, _, _, yyy, _, _, yyyy, *_ = self._rotated(theta)
-        if not self.parabolic:
-            return yy
         return yy * yyyy - yyy * yyy - yy**3 / self.weight
 
     def _rotated(self, theta: Any) -> list[Any]:

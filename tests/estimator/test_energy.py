@@ -153,7 +153,8 @@ V, U = np.mgrid[:60, :60]
         (kept(V == 9), LINE),
         (kept(U == V), LINE),
         (kept((U == 3) & (V == 4)), LINE),
-        (bent_road(5) * 1e200, "overflow"),
+        (bent_road(5) * 1e200, "double precision"),
+        (bent_road(5) * 1e-160, "double precision"),
     ],
 )
 def test_pixels_that_do_not_determine_a_roll_are_refused_with_the_reason(disparity, reason):

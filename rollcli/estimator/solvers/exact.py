@@ -81,8 +81,6 @@ def _stationary_angles(energy: Energy) -> tuple[list[float], Minimum]:
     # z^5 times the series is a polynomial in z; numpy wants the highest power first
     coefficients = np.concatenate([spectrum[_DEGREE::-1], spectrum[: -_DEGREE - 1 : -1]])
     largest = np.abs(coefficients).max()
-    if not largest > 0:
-        return [0.0], low
     roots = np.roots(np.where(np.abs(coefficients) > 1e-15 * largest, coefficients, 0))
     # Rounding moves a double root off the circle by its square root. Other roots that are near do no harm:
     # only minima that Newton's method confirms are compared.
