@@ -9,6 +9,7 @@ from rollcli.errors import EstimationError
 from rollcli.estimator.areas.iterative import iterative
 from rollcli.estimator.areas.plane import fit_plane
 from rollcli.estimator.estimate import estimate_roll
+from rollcli.estimator.solvers.solution import SolverStatus
 from tests.estimator.synthetic_maps import bent_road, flat_road
 
 SIZE = {"width": 320, "height": 240, "focal": 280.0}
@@ -95,3 +96,20 @@ def test_scattered_pixels_are_refused_with_the_reason():
     sparse = flat_road(5, **SIZE) * (np.random.default_rng(0).random((240, 320)) < 0.05)
     with pytest.raises(EstimationError, match="at least half valid"):
         areas(sparse)
+
+
+def test_areas_of_noise_whose_common_plane_is_no_road_have_not_converged():
+    noise = np.random.default_rng(5).uniform(1, 9, (60, 80))
+    pixels = iterative(noise, noise > 0)
+    assert pixels.status is SolverStatus.DRIFTED
+    v, u = np.nonzero(pixels.used)
+    (_, c1, c2), *_ = np.linalg.lstsq(np.stack([np.ones(len(u)), u, v], axis=1), noise[v, u], rcond=None)
+    assert c2 <= 0 or abs(c1) > math.tan(math.radians(45)) * c2
+
+
+def test_areas_that_still_change_after_the_last_round_have_not_converged():
+    v, u = np.mgrid[:60, :80] - np.array([29.5, 39.5])[:, None, None]
+    curved = 80 + 0.3 * v - 0.004409 * v * v - 0.003132 * u * u - 0.00561 * u * v
+    pixels = iterative(curved, curved > 0)
+    assert pixels.status is SolverStatus.STEP_LIMIT
+    assert pixels.iterations == 20

@@ -159,3 +159,12 @@ def test_a_few_rows_at_a_time_cover_the_same_pixels(monkeypatch, rows):
 
     assert np.array_equal(found.covers(disparity), whole)
     assert 0.1 < whole.mean() < 0.9
+
+
+@pytest.mark.parametrize("roll_deg", [-8, 3])
+def test_the_line_model_finds_the_roll_of_a_flat_road_and_has_no_bend(roll_deg):
+    sample = take_sample(disparity_of(lambda x: 0 * x, roll_deg))
+    found = fit_surface(sample, find_road(sample, math.radians(45), 0), parabolic=False)
+
+    assert math.degrees(found.model.theta) == pytest.approx(roll_deg, abs=0.02)
+    assert found.model.alpha[2] == 0

@@ -82,3 +82,14 @@ def test_started_on_a_maximum_it_stays_there():
     energy = energy_of(bent_road(90, noise=0))
     assert gradient_descent(energy).theta == pytest.approx(0, abs=1e-12)
     assert degrees_apart(minima(energy)[0].theta, math.pi / 2) < 1e-6
+
+
+def test_where_rounding_hides_the_fall_it_is_stuck_beside_the_minimum_and_says_so():
+    v, u = np.mgrid[:40, :60] - np.array([19.5, 29.5])[:, None, None]
+    symmetric = 100 + 0.01 * (u * u + v * v)  # about 0 but for the noise, so that the first step is long
+    energy = energy_of(symmetric + 1e-6 * np.random.default_rng(0).normal(size=u.shape))
+    found = gradient_descent(energy, SolverSettings(1e-3, lambda0=1e6))
+    there = energy.at(found.theta)
+    assert found.status is SolverStatus.STUCK
+    assert abs(there.gradient / there.curvature) < 1e-6
+    assert there.value <= energy.at(0.0).value + 1e-14 * (energy.rest + energy.slope_energy)
