@@ -197,3 +197,12 @@ def test_a_map_whose_only_invalid_numbers_are_too_large_gets_a_border_of_zeros()
     stored = np.full((20, 30), 320, np.int16)
     stored[4, 5] = np.iinfo(np.int16).max
     assert derotate(stored, math.radians(30))[0, 0] == 0
+
+
+@pytest.mark.parametrize("shape", [(20, 20), (8, 31), (31, 8)])
+@pytest.mark.parametrize("quarters", [-1, 0, 1, 2])
+def test_a_result_that_fits_exactly_is_not_enlarged(shape, quarters):
+    turned = shape[::-1] if quarters % 2 else shape
+    level = derotate(np.full(shape, 7.0), quarters * math.pi / 2, expand=True)
+    # as many more pixels on either side: one more where the sides differ by an odd number
+    assert level.shape == tuple(a + (b - a) + (b - a) % 2 for a, b in zip(shape, turned, strict=True))

@@ -57,6 +57,16 @@ def test_the_range_found_holds_the_disparities_and_not_much_more(largest):
     assert match.end_fraction < 0.01
 
 
+@pytest.mark.parametrize("first", [-16, 0, 24])
+def test_the_range_found_ends_where_it_does_whatever_it_begins_with(first):
+    left, right = pair_at(np.linspace(30, 60, 120))
+
+    match = match_pair(left, right, StereoOptions(align="off", min_disparity=first))
+
+    assert match.min_disparity == first
+    assert 62 <= first + match.num_disparities <= 1.3 * 60 + 48
+
+
 def test_the_range_does_not_follow_what_cannot_be_matched():
     left, right = pair_at(20)
     left[:, :250] = right[:, :200] = 255  # a low sun

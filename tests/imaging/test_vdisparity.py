@@ -12,7 +12,7 @@ from rollcli.errors import UsageError
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.imaging.derotate import derotate
 from rollcli.imaging.pictures.vdisparity_picture import BOTTOM_MARGIN, draw_v_disparity
-from rollcli.imaging.vdisparity import row_offset, v_disparity
+from rollcli.imaging.vdisparity import profile, row_offset, v_disparity
 
 MAPS = arrays.arrays(
     st.sampled_from([np.uint8, np.uint16, np.int16, np.float32, np.float64]),
@@ -88,3 +88,13 @@ def test_the_parabola_lies_on_the_road_of_the_derotated_map(roll_deg):
     road = estimate.alpha[0] + estimate.alpha[1] * y + estimate.alpha[2] * y**2
 
     np.testing.assert_allclose(level[:, 150], road, atol=0.01)
+
+
+@pytest.mark.parametrize("width", [1, 2, 141])
+@pytest.mark.parametrize("roll_deg", [-12, 0, 25])
+def test_the_profile_is_the_road_along_the_middle_column(width, roll_deg):
+    theta, alpha = math.radians(roll_deg), (20.0, 0.4, 0.003)
+    rows = np.arange(97)
+    y = rows * math.cos(theta) - (width - 1) / 2 * math.sin(theta)
+    road = np.polynomial.Polynomial(alpha)(y)
+    np.testing.assert_allclose(np.polynomial.Polynomial(profile(alpha, theta, width))(rows), road)

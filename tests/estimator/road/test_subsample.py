@@ -78,3 +78,20 @@ def test_slopes_are_those_of_the_map_per_unit_to_all_four_sides():
 
     for slope, expected in ((left, 0.02), (right, 0.02), (up, 0.1), (down, 0.1)):
         np.testing.assert_allclose(slope, expected * sample.grid.scale, rtol=1e-3)
+
+
+@pytest.mark.parametrize("sides", [(1, 0), (0, 1)])
+def test_whole_pixels_are_seen_across_and_down(sides):
+    v, u = np.mgrid[:480, :640]
+    sample = take_sample(np.round(2 + 0.01 * (sides[0] * u + sides[1] * v)).astype(np.float32))
+
+    assert sample.noise == pytest.approx(math.sqrt(1 / 12), rel=0.05)
+
+
+@pytest.mark.parametrize("size", [(240, 320), (480, 640)])
+def test_a_sparse_map_is_sampled_more_finely(size):
+    rng = np.random.default_rng(0)
+    sparse = np.where(rng.random(size) < 0.1, 50.0, 0).astype(np.float32)
+    whole = np.full(size, 50.0, np.float32)
+
+    assert len(take_sample(sparse).d) > 3 * 0.1 * len(take_sample(whole).d)

@@ -92,3 +92,20 @@ def test_the_same_counts_give_the_same_picture():
     histogram = v_disparity(np.random.default_rng(0).uniform(0, 50, (40, 50)))
 
     np.testing.assert_array_equal(draw_v_disparity(histogram), draw_v_disparity(histogram))
+
+
+def test_ticks_are_four_pixels_long_beside_the_rows_and_below_the_disparities():
+    picture = draw_v_disparity(v_disparity(road_map()))
+    ink = (picture < 128).all(axis=2)
+    assert ink[0, :LEFT_MARGIN][-6:].tolist() == [False] * 2 + [True] * 4
+    assert ink[-BOTTOM_MARGIN:, LEFT_MARGIN][:6].tolist() == [True] * 4 + [False] * 2
+
+
+def test_a_road_that_turns_back_within_a_dash_is_a_line_and_no_loop():
+    histogram = v_disparity(road_map())
+    there_and_back = (42.25, -7.0, 1.0)  # 30 px in the middle of the first eight rows, 42 px at their ends
+    plain, drawn = (chart(draw_v_disparity(histogram, road)) for road in (None, there_and_back))
+    changed = (plain != drawn).any(axis=2)
+    ends = 42.25 * changed.shape[1] / 61
+    assert np.flatnonzero(changed[0]).max() == pytest.approx(ends, abs=3)
+    assert np.flatnonzero(changed[3]).max() < ends - 20
