@@ -195,7 +195,7 @@ class Energy:
         return math.sqrt(max(0.0, self.at(theta).value) / self.weight)
 
     def denominator(self, theta: Any) -> Any:
-        """Return det(Y'Y) / weight of the parabola: E_min is a quotient of trigonometric polynomials over it."""
+        """Return det(Y'Y) / weight of the parabola: E_min is a quotient of trigonometric polynomials."""
         _, _, yy, _, _, _, yyy, _, _, yyyy, *_ = self._rotated(theta)
         return yy * yyyy - yyy * yyy - yy**3 / self.weight
 
