@@ -9,6 +9,10 @@ from dataclasses import dataclass, replace
 from rollcli.errors import UsageError
 
 _ROUNDED = 1.0  # px: the size of a scaled image is rounded to whole pixels
+# no rig reaches these; numbers that do are damage, and their squares can be beyond what a float holds
+_FOCAL = (1.0, 1e6)  # px
+_PLACE = 1e6  # px from the first pixel
+_BASELINE = (1e-4, 1e4)  # m
 
 
 @dataclass(frozen=True)
@@ -52,17 +56,21 @@ class Calibration:
 
     def __post_init__(self) -> None:
         for name, value in (("fx", self.fx), ("fy", self.fy)):
-            if not 0 < value < math.inf:
-                raise UsageError(f"{self.source}: a focal length {name} of {value:g} px: give a positive one")
-        for name, value in (("cx", self.cx), ("cy", self.cy), ("doffs", self.doffs)):
-            if not math.isfinite(value):
-                raise UsageError(f"{self.source}: {name} is {value:g} px: give a finite number")
-        if self.baseline is not None and not 0 < self.baseline < math.inf:
-            raise UsageError(f"{self.source}: a baseline of {self.baseline:g} m: give a positive one")
+            self._require(f"a focal length {name}", value, *_FOCAL, "px")
+        for name, value in (("a principal point cx", self.cx), ("a principal point cy", self.cy)):
+            self._require(name, value, -_PLACE, _PLACE, "px")
+        self._require("a doffs", self.doffs, -_PLACE, _PLACE, "px")
+        if self.baseline is not None:
+            self._require("a baseline", self.baseline, *_BASELINE, "m")
         if self.width is not None and self.height is not None:
             if not (self.width > 0 and self.height > 0):
                 raise UsageError(f"{self.source}: an image of {self.width}x{self.height} px has no pixels")
             self.require_inside(self.width, self.height)
+
+    def _require(self, what: str, value: float, least: float, most: float, unit: str) -> None:
+        if not least <= value <= most:
+            hint = "a positive one" if math.isfinite(value) and value <= 0 < least else "that of a camera"
+            raise UsageError(f"{self.source}: {what} of {value:g} {unit}: give {hint}")
 
     def require_inside(self, width: int, height: int) -> None:
         """Refuse an image of this size that does not hold the principal point.

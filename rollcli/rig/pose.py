@@ -116,7 +116,8 @@ def with_pose(estimate: RollEstimate, calibration: Calibration) -> RollEstimate:
     Returns
     -------
     RollEstimate
-        Without pitch and height where the road's disparity does not grow downward.
+        Without pitch and height where the road's disparity does not grow downward, or where `doffs` puts the
+        road behind the camera.
 
     Raises
     ------
@@ -129,6 +130,9 @@ def with_pose(estimate: RollEstimate, calibration: Calibration) -> RollEstimate:
         return replace(
             estimate, message=_joined(estimate.message, "no pose: the disparity does not grow down")
         )
+    if tangent.disparity + calibration.doffs <= 0:
+        behind = f"no pose: with doffs of {calibration.doffs:g} px the road lies behind the camera"
+        return replace(estimate, message=_joined(estimate.message, behind))
     pose = pose_of(tangent, calibration)
     pitch_ci95, height_ci95 = _half_widths(tangent, calibration)
     return replace(

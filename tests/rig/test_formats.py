@@ -309,6 +309,12 @@ def test_a_calibration_cannot_be_made_of_impossible_numbers():
         ("baseline", -0.5),
         ("baseline", 0.0),
         ("doffs", math.nan),
+        ("fx", 1e308),
+        ("fy", 1e-300),
+        ("cx", -1e300),
+        ("baseline", 1e-300),
+        ("baseline", 1e300),
+        ("doffs", 1e300),
         ("width", 0),
     ):
         with pytest.raises(UsageError):

@@ -204,6 +204,14 @@ def test_a_surface_whose_disparity_shrinks_downward_has_no_pose():
     assert "no pose" in posed.message
 
 
+def test_a_doffs_that_puts_the_road_behind_the_camera_gives_no_pose():
+    calibration = Calibration(250.0, 250.0, 160.0, 90.0, 0.5)
+    estimate = estimate_roll(cast(calibration, 0.02, 0.2, 1.5))
+    posed = with_pose(estimate, replace(calibration, doffs=-500.0))
+    assert (posed.pitch, posed.height_m, posed.theta) == (None, None, estimate.theta)
+    assert "no pose: with doffs of -500 px the road lies behind the camera" in posed.message
+
+
 @pytest.mark.parametrize("slope", [0.0, -0.3])
 def test_a_plane_whose_disparity_does_not_grow_downward_has_no_horizon(slope):
     calibration = Calibration(250.0, 250.0, 160.0, 90.0, 0.5)
