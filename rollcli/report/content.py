@@ -23,6 +23,7 @@ from rollcli.report.summary import (
     written_at,
 )
 from rollcli.rig.assess import RigAssessment
+from rollcli.rig.quantities import QUANTITIES
 from rollcli.rig.words import answer, counts, decimals, findings, now_in_words
 
 _FOLDERS = 6  # of inputs that the summary names
@@ -64,6 +65,11 @@ def report_page(
         answer=answer(rig.now()).replace("-", "−"),
         drawn={trace["name"] for trace in charts["roll"].data},
         now=now_in_words(rig),
+        others=[
+            f"{quantity.name} {answer(rig.now(quantity), quantity)}".replace("-", "−")
+            for quantity in QUANTITIES[1:]
+            if rig.latest(quantity) is not None
+        ],
         counts=counts(rig),
         findings=findings(rig) or ["Neither a jump nor a drift is seen."],
         outside=outside(rows),

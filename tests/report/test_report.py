@@ -51,6 +51,29 @@ def page_of(folder):
     return (folder / "page.html").read_text("utf-8")
 
 
+def test_the_page_begins_with_the_rig_as_it_is_mounted(tmp_path):
+    turns = np.random.default_rng(4).normal(0, 0.1, (400, 3))
+    rows = [
+        replace(
+            row(f"m/{number:04}.png", 1.0 + roll, 0.1),
+            pitch_deg=-3.0 + pitch,
+            pitch_ci95_deg=0.1,
+            height_m=1.5 + 0.1 * height,
+            height_ci95_m=0.01,
+        )
+        for number, (roll, pitch, height) in enumerate(turns)
+    ]
+    write_result(tmp_path / "rolls.csv", rows)
+    assert report(tmp_path, "rolls.csv", "--gallery", "0").status == 0
+    (answer,) = re.findall(r'<section class="answer">(.*?)</section>', page_of(tmp_path), re.DOTALL)
+    roll, others, counted, wrong = re.findall(r"<p[^>]*>(.*?)</p>", answer, re.DOTALL)
+    value = r"\d\.\d+ ± 0\.\d+"
+    assert re.fullmatch(rf"roll \+{value}°", roll)
+    assert re.fullmatch(rf"pitch −{value}°, height {value} m", others)
+    assert "400 of 400 frames" in counted
+    assert wrong == "Neither a jump nor a drift is seen."
+
+
 def test_a_page_holds_everything_it_shows(folder):
     done = report(folder, "out/rolls.csv")
     assert (done.status, done.out) == (0, "")
