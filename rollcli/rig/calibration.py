@@ -13,6 +13,7 @@ _ROUNDED = 1.0  # px: the size of a scaled image is rounded to whole pixels
 _FOCAL = (1.0, 1e6)  # px
 _PLACE = 1e6  # px from the first pixel
 _BASELINE = (1e-4, 1e4)  # m
+_EDGE = 0.1  # of a side: there lies the principal point of twice the size, but hardly that of a crop
 
 
 @dataclass(frozen=True)
@@ -84,6 +85,13 @@ class Calibration:
                 f"{self.source}: the principal point {self.cx:g},{self.cy:g} lies outside of the "
                 f"{width}x{height} image: give the calibration of this size"
             )
+
+    @property
+    def at_edge(self) -> bool:
+        """Whether the principal point lies so far out that the numbers seem to be of a larger image."""
+        if self.width is None or self.height is None:
+            return False
+        return max((self.cx + 0.5) / self.width, (self.cy + 0.5) / self.height) > 1 - _EDGE
 
     def for_size(self, width: int, height: int) -> "Calibration":
         """Return the calibration of the same view at another size.

@@ -25,6 +25,8 @@ from rollcli.rig.calibration import Calibration
 
 Floats = NDArray[np.float64]
 
+_AT_EDGE = "; its principal point lies near the edge: is it of images of this size?"
+
 
 @dataclass(frozen=True)
 class IntervalTuning:
@@ -165,6 +167,7 @@ def taken_as_exact(tangent: Tangent, calibration: Calibration, pitch: float) -> 
         f"{turn / calibration.fy:.3f} degrees of pitch per px of cy, "
         f"{0.1 * turn / (calibration.fx * tangent.slope):.3f} per 0.1 px of disparity (vergence)"
         f"{', 1 % of height per 1 % of baseline' if height else ''}"
+        f"{_AT_EDGE if calibration.at_edge else ''}"
     )
 
 

@@ -212,6 +212,14 @@ def test_a_doffs_that_puts_the_road_behind_the_camera_gives_no_pose():
     assert "no pose: with doffs of -500 px the road lies behind the camera" in posed.message
 
 
+def test_the_calibration_of_twice_the_size_is_doubted_where_the_file_states_no_size():
+    calibration = Calibration(250.0, 250.0, WIDTH / 2 + 4.0, HEIGHT / 2 - 3.0, 0.5)
+    estimate = estimate_roll(cast(calibration, 0.02, 0.2, 1.5))
+    assert "is it of images of this size?" not in with_pose(estimate, calibration).message
+    twice = Calibration(500.0, 500.0, WIDTH - 2.0, HEIGHT - 6.0, 0.5)
+    assert "lies near the edge: is it of images of this size?" in with_pose(estimate, twice).message
+
+
 @pytest.mark.parametrize("slope", [0.0, -0.3])
 def test_a_plane_whose_disparity_does_not_grow_downward_has_no_horizon(slope):
     calibration = Calibration(250.0, 250.0, 160.0, 90.0, 0.5)
