@@ -168,3 +168,15 @@ def test_the_line_model_finds_the_roll_of_a_flat_road_and_has_no_bend(roll_deg):
 
     assert math.degrees(found.model.theta) == pytest.approx(roll_deg, abs=0.02)
     assert found.model.alpha[2] == 0
+
+
+def test_pixels_that_do_not_lie_on_the_road_have_no_part_in_its_share():
+    shares = {}
+    for others in (0.0, 0.3):
+        disparity = disparity_of(lambda x: 0 * x)
+        above = (np.random.default_rng(4).random(disparity.shape) < others) & (disparity > 0)
+        sample = take_sample(disparity * (1 + 0.06 * above))  # three tolerances
+        road = find_road(sample, math.radians(45), 0)
+        shares[others] = fit_surface(sample, road, parabolic=True).share
+
+    assert shares[0.3] == pytest.approx(0.7 * shares[0.0], rel=0.05)
