@@ -309,3 +309,15 @@ def test_numbers_that_are_kept_are_not_warned_of(tmp_path):
     assert "256 times too large" in rollcli("vdisparity", "x256.npy", "-o", "v", cwd=tmp_path).err
     done = rollcli("derotate", "x256.npy", "--roll", "2", "-o", "out", cwd=tmp_path)
     assert (done.status, "too large" in done.err) == (0, False)
+
+
+def test_a_cityscapes_map_is_turned_with_its_ones_left_out(tmp_path):
+    stored = np.full((90, 120), 256 * 20 + 1, np.uint16)
+    stored[20:40, 30:60] = 1  # no disparity could be measured
+    (tmp_path / "maps").mkdir()
+    (tmp_path / "maps" / "a.png").write_bytes(encode_stored(stored, "png"))
+    line = ("derotate", "maps", "--roll", "3", "--encoding", "cityscapes", "-o", "up")
+    run = rollcli(*line, cwd=tmp_path)
+    assert (run.status, "no effect" in run.err) == (0, False)
+    turned = read_stored(tmp_path / "up" / "a.png").values
+    assert set(np.unique(turned)) == {0, 256 * 20 + 1}  # nothing between a road and what is not known

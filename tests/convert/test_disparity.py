@@ -180,3 +180,13 @@ def test_its_own_maps_and_previews_never_become_inputs(tmp_path):
         assert done.status == 0, done.err
     assert sorted(contents(tmp_path / "left")) == ["a.png", "maps/a.png"]
     assert sorted(contents(tmp_path / "right")) == ["a.png", "previews/a.png"]
+
+
+def test_views_without_a_pixel_that_matches_have_no_map(tmp_path):
+    for side in ("left", "right"):
+        (tmp_path / side).mkdir()
+        cv2.imwrite(str(tmp_path / side / "a.png"), np.full((120, 320), 128, np.uint8))
+    run = rollcli("disparity", "--left", "left", "--right", "right", "-o", "maps", cwd=tmp_path)
+    assert run.status == 3
+    assert "left/a.png: no pixel could be matched with the right image" in run.err
+    assert not list((tmp_path / "maps").glob("*"))

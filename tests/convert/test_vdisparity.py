@@ -90,3 +90,20 @@ def test_the_last_line_counts_what_was_drawn(maps):
     (maps / "maps" / "frame1.png").write_bytes(b"no map")
     done = rollcli("vdisparity", "maps", "-o", "v", cwd=maps)
     assert done.err.splitlines()[-1].startswith("rollcli: 3 frames: 2 ok, 1 failed; ")
+
+
+def test_depth_maps_are_counted_as_the_disparities_of_their_calibration(maps):
+    (maps / "depth").mkdir()
+    for path in (maps / "maps").glob("*.png"):
+        disparity = read_disparity(path)
+        depth = np.where(disparity > 0, 280 * 0.3 / np.where(disparity > 0, disparity, 1), 0)
+        np.save(maps / "depth" / f"{path.stem}.npy", depth)
+    rig = ("--encoding", "depth", "--focal", "280", "--principal-point", "80,60", "--baseline", "0.3")
+    run = rollcli("vdisparity", "depth", "--counts", *rig, "-o", "of-depth", cwd=maps)
+    assert (run.status, "no effect" in run.err) == (0, False)
+    assert rollcli("vdisparity", "maps", "--counts", "-o", "of-maps", cwd=maps).status == 0
+    for index in range(3):
+        one, other = (read_stored(maps / out / f"frame{index}.tif").values for out in ("of-depth", "of-maps"))
+        moved = np.abs(np.cumsum(one - other, axis=1)).sum()  # by rounding, into the next bin
+        assert one.sum() == other.sum() > 0
+        assert moved < 0.01 * one.sum()
