@@ -7,6 +7,7 @@ import pytest
 from rollcli.errors import InputError, UsageError
 from rollcli.files.encodings import Encoding, from_disparity, read_disparity, read_mask, to_disparity
 from rollcli.files.formats import Stored, encode_stored
+from rollcli.rig.calibration import Calibration
 from tests.binary_files import disparity_map, make_png, make_tiff
 
 
@@ -190,3 +191,16 @@ def test_masks_of_maps_and_images_are_read(tmp_path):
         assert read_mask(tmp_path / name).tolist() == mask.astype(bool).tolist()
     with pytest.raises(InputError, match="is a JPEG image"):  # its zeros are not all zero
         read_mask(tmp_path / "e.jpg")
+
+
+@pytest.mark.parametrize(
+    ("calibration", "expected"),
+    [
+        (None, [0.5, 0.25, 0]),
+        (Calibration(fx=100, fy=100, cx=1, cy=0.5), [0.5, 0.25, 0]),  # a disparity of no rig known
+        (Calibration(fx=100, fy=100, cx=1, cy=0.5, baseline=0.5), [25, 12.5, 0]),
+        (Calibration(fx=100, fy=100, cx=1, cy=0.5, baseline=0.5, doffs=12.5), [12.5, 0, 0]),
+    ],
+)
+def test_a_depth_becomes_the_disparity_of_the_rig_as_far_as_that_is_known(calibration, expected):
+    assert pixels([2, 4, 0], "f4", encoding="depth", calibration=calibration) == expected

@@ -8,6 +8,7 @@ from rollcli.errors import InputError, OutputError, UsageError
 from rollcli.files import storage
 from rollcli.files.stores.locations import public_name
 from rollcli.files.stores.objects import list_objects
+from rollcli.files.stores.search import objects_behind
 from rollcli.messages import without_secrets
 
 
@@ -132,3 +133,11 @@ def test_signatures_and_passwords_are_not_shown():
     line = "--mask='https://me:pw@h/a b.png?X-Amz-Signature=1&x=2' https://h/c.png?sig=3: is no image"
     assert without_secrets(line) == "--mask='https://h/a b.png&x=2' https://h/c.png is no image"
     assert public_name("C:/maps/x.png") == "C:/maps/x.png"
+
+
+@pytest.mark.parametrize("pattern", ["maps", "maps/**/*.png", "maps/*/*.png"])
+def test_hidden_objects_and_those_in_hidden_folders_are_left_out(bucket, pattern):
+    for name in ("day/a.png", "day/.b.png", ".day/c.png", "day/.e/d.png"):
+        storage.write_bytes(f"{bucket}/maps/{name}", b"map")
+    found = [relative for _, relative in objects_behind(f"{bucket}/{pattern}", recursive=True)]
+    assert found == ["day/a.png"]
