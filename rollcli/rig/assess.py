@@ -92,13 +92,18 @@ class RigAssessment:
         """How many frames there are."""
         return len(self.frames.files)
 
-    def latest(self, quantity: Quantity = ROLL) -> SequenceAssessment | None:
-        """Return the last drive's assessment of a quantity that has any value, or None."""
+    def latest_drive(self, quantity: Quantity = ROLL) -> DriveAssessment | None:
+        """Return the last drive in which a quantity has any value, or None."""
         for drive in reversed(self.drives):
             found = drive.quantities.get(quantity.name)
             if found is not None and found.used:
-                return found
+                return drive
         return None
+
+    def latest(self, quantity: Quantity = ROLL) -> SequenceAssessment | None:
+        """Return the assessment of a quantity in the last drive in which it has any value, or None."""
+        drive = self.latest_drive(quantity)
+        return None if drive is None else drive.quantities[quantity.name]
 
     def now(self, quantity: Quantity = ROLL) -> Estimate:
         """Return the rig as it is: the mean of the last segment of the last drive."""

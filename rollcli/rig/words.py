@@ -65,12 +65,12 @@ def counts(rig: RigAssessment) -> str:
     return ", ".join([f"{rig.used:,} of {rig.count:,} frames", *left_out])
 
 
-def now_in_words(rig: RigAssessment) -> str:
+def now_in_words(rig: RigAssessment, quantity: Quantity = ROLL) -> str:
     """Return of which frames the answer is, where it is not of all: after a jump, or of the last drive."""
-    found = rig.latest()
-    if found is None:
+    drive = rig.latest_drive(quantity)
+    if drive is None:
         return ""
-    drive = next(each for each in reversed(rig.drives) if each.quantities[ROLL.name] is found)
+    found = drive.quantities[quantity.name]
     if found.jumps:
         return f"since {rig.frames.files[drive.frames[found.jumps[-1].frame]]}"
     return f"in {drive.name}" if len(rig.drives) > 1 else ""

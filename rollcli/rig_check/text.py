@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from rollcli.rig.assess import RigAssessment
 from rollcli.rig.quantities import QUANTITIES, ROLL
 from rollcli.rig.sequence.blocks import Estimate
-from rollcli.rig.words import answer, counts, findings
+from rollcli.rig.words import answer, counts, findings, now_in_words
 from rollcli.rig_check.gates import Check
 from rollcli.rig_check.values import moved, rig_values, segment_rows
 
@@ -62,15 +62,16 @@ FORMATS = {"table": as_table, "csv": as_csv, "json": as_json}
 
 def _lines(found: Findings) -> Iterator[str]:
     rig = found.rig
-    yield f"roll    {answer(rig.now())}  ({counts(rig)})"
-    for quantity in QUANTITIES[1:]:
-        if rig.latest(quantity) is not None:
-            yield f"{quantity.name:8}{answer(rig.now(quantity), quantity)}"
-    latest = rig.latest()
-    if latest is not None:
-        if latest.drift.ci95 is not None:
-            yield f"drift   {answer(latest.drift, change=True)} over the drive"
-        yield f"jumps   {len(_roll_jumps(rig)) or 'none'}"
+    for quantity in QUANTITIES:
+        if quantity is ROLL or rig.latest(quantity) is not None:
+            now = f"{answer(rig.now(quantity), quantity)} {now_in_words(rig, quantity)}".rstrip()
+            yield f"{quantity.name:8}{now}" + (f"  ({counts(rig)})" if quantity is ROLL else "")
+    drive = rig.latest_drive()
+    if drive is not None:
+        drift, over = drive.quantities[ROLL.name].drift, drive.name if len(rig.drives) > 1 else ""
+        if drift.ci95 is not None:
+            yield f"drift   {answer(drift, change=True)} over {over or 'the drive'}"
+        yield f"jumps   {_jump_count(rig)}"
     yield from (f"        {line}" for line in _roll_jumps(rig))
     yield from _segments(rig)
     for name, change in found.changes.items():
@@ -81,6 +82,12 @@ def _lines(found: Findings) -> Iterator[str]:
     yield from sentences
     for check in found.checks:
         yield f"{'ok' if check.ok else 'FAILED'}: {check.message}"
+
+
+def _jump_count(rig: RigAssessment) -> str:
+    """How many jumps of the roll there are; none only where every drive has frames enough to tell."""
+    told = all(drive.quantities[ROLL.name].now.ci95 is not None for drive in rig.drives)
+    return str(len(_roll_jumps(rig)) or ("none" if told else "unknown"))
 
 
 def _roll_jumps(rig: RigAssessment) -> list[str]:

@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import re
 import shutil
 
 import numpy as np
@@ -65,7 +66,7 @@ def test_the_table_begins_with_the_answer_and_names_the_frame_of_a_jump(folder):
     assert done.status == 0
     first, *rest = done.out.splitlines()
     assert first.startswith("roll    +0.")
-    assert "±" in first
+    assert re.search(r"± 0\.\d+° since maps/frame_1[45]\d\d\.png  \(", first)
     assert " of 3,000 frames, 2 suspect, 1 failed" in first
     (sentence,) = (line for line in rest if line.startswith("roll jumped by +0."))
     assert "° at maps/frame_" in sentence
@@ -194,7 +195,10 @@ def test_a_gate_never_passes_for_want_of_data(tmp_path, gate, kind):
     done = rig(tmp_path, "few.csv", *gate)
     assert done.status == 4
     assert done.err.count("\n") == 1
-    assert rig(tmp_path, "few.csv").status == 0
+    alone = rig(tmp_path, "few.csv")
+    assert alone.status == 0
+    assert "jumps   none" not in alone.out
+    assert ("jumps   unknown" in alone.out) == (kind in ("one row", "a few rows"))
 
 
 def test_all_suspect_frames_say_so_and_can_be_counted(tmp_path):
@@ -332,6 +336,8 @@ def test_drives_are_told_apart_and_the_one_that_differs_is_named(tmp_path):
     second = rows(*drive(2, 1500, sd=0.1, level=0.4), folder="tuesday/")
     write(tmp_path / "two.csv", first + second)
     out = rig(tmp_path, "two.csv").out
+    assert re.match(r"roll +\+0\.\d+ ± 0\.\d+° in tuesday  \(3,000 of 3,000 frames\)\n", out)
+    assert re.search(r"\ndrift .*° over tuesday\njumps +none\n", out)
     assert "tuesday differs from monday by +0." in out
     segments = [line for line in out.splitlines() if "_1499.png" in line]
     by_drive = {line.rpartition(", ")[0].split()[-1]: line for line in segments}
