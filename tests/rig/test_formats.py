@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import tracemalloc
 
 import cv2
@@ -214,6 +215,8 @@ def test_a_bad_file_is_refused_in_one_line_that_names_it(text, words):
         ("a: [1 {b: 2}]\n", "line 1 is not plain YAML"),
         ("a: [1, {b: 2]}\n", "line 1 is not plain YAML"),
         ("a: [,]\n", "line 1 is not plain YAML"),
+        ("a: [&x, 2]\n", "line 1 is not plain YAML"),
+        ("a: {b: *x}\n", "line 1 is not plain YAML"),
     ],
 )
 def test_what_is_no_plain_yaml_is_refused_by_its_line(text, words):
@@ -346,3 +349,30 @@ def test_a_calibration_without_a_size_is_refused_where_its_centre_lies_outside_o
     assert unsized.for_size(640, 480).width == 640
     with pytest.raises(UsageError, match="320,200 lies outside of the 300x480"):
         unsized.for_size(300, 480)
+
+
+def without_size(text):
+    """The lines of a file that do not give the size of its images."""
+    return "".join(line for line in text.splitlines(True) if not re.match(r".*(width|height)", line))
+
+
+@pytest.mark.parametrize("form", ["middlebury", "orb-slam"])
+def test_a_rig_whose_images_have_no_size_is_one_of_any_size(form):
+    found = parse(without_size(samples.WHOLE[form](RIG)))
+    assert numbers(found) == pytest.approx(truth(RIG), rel=1e-12, abs=1e-9)
+    assert (found.width, found.height) == (None, None)
+
+
+def test_a_pair_of_ros_files_without_a_size_is_one_of_any_size():
+    left, right = (without_size(samples.ros(RIG, right=side)) for side in (False, True))
+    found = parse(left, right)
+    assert numbers(found) == pytest.approx(truth(RIG), rel=1e-12, abs=1e-9)
+    assert (found.width, found.height) == (None, None)
+
+
+def test_a_key_without_a_value_is_an_empty_one():
+    assert parse_yaml("a:\nb: 1\n", "f") == {"a": "", "b": "1"}
+
+
+def test_json_that_is_no_object_is_refused():
+    assert refusal('["intrinsic", "u0"]') == "calib0: is no JSON object"

@@ -291,3 +291,9 @@ def test_every_flipped_bit_of_deflated_pixels_is_refused_or_changes_nothing(kind
             refused += 1
 
     assert refused > (end - start) * 7
+
+
+def test_a_large_map_in_one_tile_that_is_a_little_larger_is_read():
+    values = np.arange(2100 * 2050, dtype=np.uint32).astype(np.uint8).reshape(2100, 2050)
+    file = make_tiff(values, "none", tile=(2112, 2064))
+    np.testing.assert_array_equal(decode_stored(file, "x").values, values)
