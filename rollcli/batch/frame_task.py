@@ -57,7 +57,13 @@ def _estimate_roll(source: Source, options: FrameOptions) -> tuple[RollEstimate,
     wanted = options.images.road_mask is not None
     arguments = options.method.arguments()
     try:
-        estimate = estimate_roll(source.disparity, mask=source.allowed, road_mask=wanted, **arguments)
+        estimate = estimate_roll(
+            source.disparity,
+            mask=source.allowed,
+            slope_error=source.slope_error,
+            road_mask=wanted,
+            **arguments,
+        )
     except EstimationError as error:
         likeness = looks_like(source.disparity, source.stored, options)
         raise EstimationError(f"{likeness}; {error}" if likeness else str(error)) from error

@@ -36,6 +36,7 @@ def estimate_roll(
     tolerance: float = DEFAULT_SOLVER.tolerance,
     max_roll: float = math.radians(MAX_ROLL_DEG),
     max_interval: float = math.radians(MAX_INTERVAL_DEG),
+    slope_error: float = 0.0,
     seed: int = 0,
     road_mask: bool = False,
     tuning: Tuning = TUNING,
@@ -62,6 +63,9 @@ def estimate_roll(
     max_interval : float
         Half-width of the 95 % interval above which an angle is doubted, radians; so is one of which noise
         alone makes a third of that.
+    slope_error : float
+        Standard deviation of a slope along the rows, px per px, that all disparities may have beside the
+        road's: what is left of it where the views of a pair were levelled (`StereoMatch.slope_error`).
     seed : int
         Of road finding.
     road_mask : bool
@@ -91,17 +95,19 @@ def estimate_roll(
     ('ok', 3.0)
     """
     settings = SolverSettings(tolerance, lambda0)
-    request = Request(method, model, road, settings, max_roll, max_interval, seed, tuning)
+    request = Request(method, model, road, settings, max_roll, max_interval, slope_error, seed, tuning)
     checked = CheckedMap.of(disparity, mask)
     pixels = select_pixels(checked, request)
     certified = _solve(pixels, request)
     theta, surface = certified.solution.theta, pixels.surface
     knife = None if surface is None else jackknife(surface, theta, tuning.interval)
-    interval = None if knife is None else interval_of(knife, theta, tuning.interval)
-    evidence = Evidence(pixels.energy, certified, pixels.road, surface, max_roll, max_interval, interval)
-    doubts = doubts_of(evidence, tuning.doubts)
     alpha = pixels.energy.parabola(theta)
     height, width = checked.values.shape
+    tangent = touch(alpha, theta, Grid.of_shape(height, width), surface, knife)
+    turned = tangent.turned_by(slope_error)
+    interval = None if knife is None else interval_of(knife, theta, turned, tuning.interval)
+    evidence = Evidence(pixels.energy, certified, pixels.road, surface, max_roll, max_interval, interval)
+    doubts = doubts_of(evidence, tuning.doubts)
     return RollEstimate(
         theta=theta,
         ci95=None if interval is None else interval.half_width,
@@ -118,7 +124,7 @@ def estimate_roll(
         width=width,
         height=height,
         camber=None if knife is None else knife.camber,
-        tangent=touch(alpha, theta, Grid.of_shape(height, width), surface, knife),
+        tangent=tangent,
         road_mask=pixels.mask(checked) if road_mask else None,
     )
 

@@ -25,6 +25,7 @@ from rollcli.estimator.tuning import IntervalTuning
 
 # 97.5 % quantiles of Student's t for 1, 2, ... degrees of freedom
 _T975 = (12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228, 2.201, 2.179)
+_NORMAL = 1.96  # 97.5 % quantile of the normal distribution
 _THETA, _CAMBER = 3, 4  # columns of the design
 
 
@@ -68,7 +69,7 @@ class Jackknife:
             _student(freedom) * math.sqrt(float(np.square(changes[:, _THETA]).sum()))
             for changes, freedom in zip((self.bands, self.columns), self.freedom, strict=True)
         )
-        return bands, columns, 1.96 * math.sqrt(self.white[_THETA, _THETA])
+        return bands, columns, _NORMAL * math.sqrt(self.white[_THETA, _THETA])
 
 
 @dataclass(frozen=True)
@@ -87,13 +88,23 @@ class Interval:
     half_width: float
 
 
-def interval_of(jackknife: Jackknife, theta: float, tuning: IntervalTuning) -> Interval:
-    """Return the 95 % interval of the roll angle."""
+def interval_of(jackknife: Jackknife, theta: float, turned: float, tuning: IntervalTuning) -> Interval:
+    """Return the 95 % interval of the roll angle.
+
+    Parameters
+    ----------
+    jackknife : Jackknife
+    theta : float
+        Radians.
+    turned : float
+        Standard deviation of an error that all pixels share, by which the map itself is turned, radians.
+    tuning : IntervalTuning
+    """
     bands, columns, white = jackknife.spreads()
     noise = tuning.factor * slant(theta, tuning) * math.sqrt(bands**2 + columns**2 + white**2)
     lateral, depth = tuning.lateral * jackknife.lateral, tuning.depth * jackknife.depth
     bend = tuning.bend * jackknife.bend
-    return Interval(noise, math.sqrt(noise**2 + lateral**2 + depth**2 + bend**2))
+    return Interval(noise, math.sqrt(noise**2 + lateral**2 + depth**2 + bend**2 + (_NORMAL * turned) ** 2))
 
 
 def slant(theta: float, tuning: IntervalTuning) -> float:

@@ -25,6 +25,7 @@ class Request:
     solver: SolverSettings
     max_roll: float
     max_interval: float
+    slope_error: float
     seed: int
     tuning: Tuning
 
@@ -43,6 +44,8 @@ class Request:
                 f"give more than 0, at most {MAX_ROLL_LIMIT_DEG:g}"
             )
 
+        if not 0 <= self.slope_error < math.inf:
+            raise UsageError(f"a slope error of {self.slope_error:g}: give 0 or more px per px")
         if not self.max_interval > 0:
             raise UsageError(
                 f"a widest interval of {math.degrees(self.max_interval):g} degrees: give a positive angle"

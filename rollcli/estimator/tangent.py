@@ -4,6 +4,7 @@ The parabola's own (a0, a1) are its tangent at y = 0, far above the road. Where 
 slope are known best, and hardly depend on how the road bends.
 """
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -39,6 +40,10 @@ class Tangent:
     disparity: float
     slope: float
     changes: Floats | None = field(repr=False, compare=False)
+
+    def turned_by(self, slope: float) -> float:
+        """Return by how much a slope along the rows, px per px, turns this road, radians."""
+        return abs(math.cos(self.theta) * slope / self.slope) if self.slope else 0.0
 
 
 def touch(

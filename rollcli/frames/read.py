@@ -40,6 +40,8 @@ class Source:
         Why the disparities are too large to be pixels, and what would divide them; empty when they are not.
     searched : tuple of int, or None
         First and last disparity searched, px; pairs only.
+    slope_error : float
+        Standard deviation of a slope that all disparities may have beside the road's, px per px.
     doubt : str
         Why the map itself may be wrong; empty when there is no reason.
     note : str
@@ -57,6 +59,7 @@ class Source:
     warning: str = ""
     beyond: str = ""
     searched: tuple[int, int] | None = None
+    slope_error: float = 0.0
     doubt: str = ""
     note: str = ""
     size: tuple[int, int] | None = None
@@ -117,6 +120,7 @@ def _match(frame: Frame, options: FrameOptions) -> Source:
     return Source(
         match.disparity,
         searched=searched,
+        slope_error=match.slope_error,
         doubt="; ".join(_doubts(match)),
         note=note_of(match.corrected, *match.disparity.shape) if options.stereo.measures_alignment else "",
         size=(width, height),

@@ -43,6 +43,9 @@ class StereoMatch:
         Share of the valid pixels within a pixel of the range's end: if large, the range was too short.
     corrected : Misalignment
         What the right view was levelled by, pixels of the size matched at; `LEVEL` if it was left as it is.
+    slope_error : float
+        Standard deviation of the slope along the rows that levelling left in the disparities, px per px; 0 if
+        nothing was measured and corrected.
     doubt : str
         Why the views may not be level now; empty if there is no reason.
     """
@@ -52,6 +55,7 @@ class StereoMatch:
     num_disparities: int
     end_fraction: float
     corrected: Misalignment
+    slope_error: float
     doubt: str
 
 
@@ -131,6 +135,7 @@ def match_pair(
         num_disparities=count,
         end_fraction=np.count_nonzero(disparity >= first + count - 2) / valid if valid else 0.0,
         corrected=corrected,
+        slope_error=0.0 if small is None else corrected.stretch_error,
         doubt=doubt,
     )
 

@@ -19,6 +19,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from rollcli.estimator.estimate import estimate_roll
+from rollcli.estimator.result import RollEstimate
 from rollcli.files.formats import read_image
 from rollcli.imaging.stereo import StereoOptions, match_pair
 
@@ -39,19 +40,20 @@ class Outcome(NamedTuple):
     ok: bool
 
 
-def disparity_of(file: str) -> np.ndarray:
-    """Read a map, or match the pair of a left image, px."""
+def estimate_of(file: str) -> RollEstimate:
+    """Estimate the roll of a map, or of the pair that a left image is of."""
     path = REALMAPS / file
     if path.parent.name == "left":
         right = path.parents[1] / "right" / path.name
-        return match_pair(read_image(path), read_image(right), StereoOptions()).disparity
+        match = match_pair(read_image(path), read_image(right), StereoOptions())
+        return estimate_roll(match.disparity, slope_error=match.slope_error)
     stored = read_image(path)
-    return stored.astype(np.float32) / (256 if stored.dtype == np.uint16 else 1)
+    return estimate_roll(stored.astype(np.float32) / (256 if stored.dtype == np.uint16 else 1))
 
 
 def outcome(row: dict[str, str]) -> Outcome:
     """Estimate one frame, and compare it with its reference."""
-    estimate = estimate_roll(disparity_of(row["file"]))
+    estimate = estimate_of(row["file"])
     low, high = float(row["lo_deg"]), float(row["hi_deg"])
     apart = math.remainder(math.degrees(estimate.theta) - (low + high) / 2, 180)
     off = max(0.0, abs(apart) - (high - low) / 2)

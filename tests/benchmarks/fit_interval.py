@@ -32,6 +32,7 @@ REQUEST = Request(
     DEFAULT_SOLVER,
     max_roll=math.radians(MAX_ROLL_DEG),
     max_interval=math.radians(MAX_INTERVAL_DEG),
+    slope_error=0.0,
     seed=0,
     tuning=TUNING,
 )

@@ -139,6 +139,9 @@ def test_a_pair_whose_views_are_not_level_is_corrected_and_says_so(tmp_path):
     assert re.search(r"median over the pairs: the right image lies \d\.\d\d px lower: recalibrate", done.err)
     for untouched in (("--vertical-offset", "1"), ("--align", "off")):
         assert "corrected" not in rollcli("estimate", *pair, *untouched, cwd=tmp_path).out
+    given = rollcli("estimate", *pair, "--vertical-offset", "1", cwd=tmp_path)
+    half_width, half_width_given = (float(column(each.out, "roll_ci95_deg")[0]) for each in (done, given))
+    assert half_width > half_width_given  # what was measured has an error of its own
 
 
 def test_the_record_of_a_run_says_how_the_cameras_lie(tmp_path):

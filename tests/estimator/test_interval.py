@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from rollcli.errors import UsageError
 from rollcli.estimator.energy import Energy
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.interval import jackknife
@@ -54,8 +55,33 @@ def test_95_percent_of_the_intervals_hold_the_true_roll():
 
 
 @pytest.mark.parametrize("roll_deg", [-50, 0, 30])
+def test_a_slope_that_all_disparities_may_have_widens_it_by_what_it_would_turn(roll_deg):
+    """Maps that have such a slope show what it turns: that is the standard deviation that is added."""
+    slope, columns = 1e-3, np.arange(SIZE["width"])
+    road = noisy_road(np.random.default_rng(4), roll_deg)
+    settings = {"road": "all", "method": "exact", "max_roll": math.radians(70)}
+    turned = [
+        estimate_roll(np.where(road > 0, road + sign * slope * columns, 0), **settings).theta
+        for sign in (1, -1)
+    ]
+
+    without = estimate_roll(road, **settings)
+    found = estimate_roll(road, slope_error=slope, **settings)
+
+    added = math.sqrt(found.ci95**2 - without.ci95**2)
+    assert found.theta == without.theta
+    assert added == pytest.approx(1.96 * abs(turned[0] - turned[1]) / 2, rel=0.05)
+
+
+@pytest.mark.parametrize("slope_error", [-1e-4, math.nan, math.inf])
+def test_a_slope_error_that_is_none_is_refused(slope_error):
+    with pytest.raises(UsageError, match=r"slope error of .*: give 0 or more px per px"):
+        estimate_roll(flat_road(3, **SIZE), slope_error=slope_error)
+
+
+@pytest.mark.parametrize("roll_deg", [-50, 0, 30])
 def test_the_jackknife_is_what_refitting_without_each_band_gives(roll_deg):
-    request = Request("exact", "parabola", "all", DEFAULT_SOLVER, math.radians(70), 0.01, 0, TUNING)
+    request = Request("exact", "parabola", "all", DEFAULT_SOLVER, math.radians(70), 0.01, 0.0, 0, TUNING)
     disparity = noisy_road(np.random.default_rng(3), roll_deg)
     pixels = select_pixels(CheckedMap.of(disparity, None), request)
     surface, theta = pixels.surface, exact(pixels.energy).theta

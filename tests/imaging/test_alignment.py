@@ -71,6 +71,28 @@ def test_uncorrected_they_would_turn_the_road(frame):
     assert abs(roll_deg(frame.left, right, align="off") - roll_deg(frame.left, right)) > 0.2
 
 
+def test_the_interval_knows_that_levelling_errs():
+    """Enlarged views of six empty roads: without what levelling leaves, it holds half of their rolls."""
+    rolls = np.radians(np.linspace(-8, 8, 6))
+    frames = [render_frame(FrameSpec(roll=roll, seed=seed, colour=False)) for seed, roll in enumerate(rolls)]
+    reached = []
+    for roll, frame in zip(rolls, frames, strict=True):
+        for larger_percent in (0.2, -0.4):
+            right = seen_by(frame.right, larger_percent=larger_percent)
+            match = match_pair(frame.left, right, StereoOptions())
+            found = estimate_roll(match.disparity, slope_error=match.slope_error)
+            reached.append(abs(found.theta - roll) <= found.ci95)
+
+    assert sum(reached) >= 0.9 * len(reached)
+
+
+def test_a_pair_that_was_not_levelled_has_no_error_of_levelling(frame):
+    assert match_pair(frame.left, frame.right, StereoOptions()).slope_error == 0
+    lower = seen_by(frame.right, lower=2.0)
+    assert match_pair(frame.left, lower, StereoOptions(vertical_offset=2.0)).slope_error == 0
+    assert match_pair(frame.left, lower, StereoOptions()).slope_error > 0
+
+
 def test_rows_that_a_lens_has_skewed_are_straightened(frame):
     height, width = frame.right.shape
     columns, rows = np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32))
