@@ -98,11 +98,9 @@ def report(kind: str, pairs: list[Views]) -> None:
         f"median {np.median(off):.3f}, 95 % {np.percentile(off, 95):.3f}, worst {max(off):.3f} degrees; ",
         end="",
     )
-    print(
-        f"{np.sum(np.array(off) > GOOD_DEG)} of {len(off)} above {GOOD_DEG}; {doubted} doubted or refused",
-        end="",
-    )
-    print("" if math.isnan(pairs[0].roll) else f"; the interval covers {np.mean(reached):.2f}")
+    above = np.sum(np.array(off) > GOOD_DEG)
+    covered = "" if math.isnan(pairs[0].roll) else f"; the interval covers {np.mean(reached):.2f}"
+    print(f"{above} of {len(off)} above {GOOD_DEG}; {doubted} doubted or refused{covered}")
 
 
 def warped(view: NDArray[Any], clockwise_deg: float, larger: float, lower: float) -> NDArray[Any]:
