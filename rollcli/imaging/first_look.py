@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,9 @@ _FAR = 0.5  # the same: what was matched so far off does not show the range
 _MARGIN = 1.1  # beyond the largest disparity seen, to search
 # Of the smallest views, which tell a scale to 0.2 %: level pairs need no larger look. Real rigs twist more
 _AS_GOOD_AS_LEVEL = Tolerance(offset=0.15, rotation=0.0005, scale=0.002, twist=0.4)
+# What the smallest views may say of a level pair with little texture. A map that was matched with it hides
+# half of what is wrong about it: larger views start from level again
+_MILD = Tolerance(offset=0.5, rotation=0.0015, scale=0.004, twist=0.8)
 # From a start 3 px off, a view of little texture can end at an offset and a scale that deny each other. Its
 # scale tells, with blocks that do not agree or a larger view that does not: other starts then show which
 # leaves less. Of 288 warped pairs, wrong ends had errors from 0.018 px or steps from 1.4 px on; of the right
@@ -59,6 +63,19 @@ class _Small:
     measured: Measured | None
 
 
+class _Pair(NamedTuple):
+    """Small views, and what is compared of them."""
+
+    views: Views
+    texture: Texture
+
+    @staticmethod
+    def of(views: Views, factor: float) -> "_Pair":
+        """Shrink the views by `factor`."""
+        small = shrink_both(views, factor)
+        return _Pair(small, Texture.of(small))
+
+
 def find_range(views: Views) -> int | None:
     """Disparities from 0 to this are worth a search, pixels; None where nothing can be matched."""
     factor = size_factor(views[0].shape, _SMALLEST)
@@ -69,11 +86,12 @@ def find_range(views: Views) -> int | None:
 def first_look(small: SmallViews) -> FirstLook:
     """Find the range of a pair, and how its right view lies, coarse to fine."""
     factor = size_factor(small.views[0].shape, _SMALLEST)
-    smallest = shrink_both(small.views, factor)
-    first = _climb(smallest, LEVEL)
+    smallest = _Pair.of(small.views, factor)
+    first = _look(smallest, LEVEL)
     plain = _plainly_level(first, factor * small.factor, small.shape)
     if plain is not None:
         return plain
+    first = _climb(smallest, LEVEL, first=first)
     look, sure = _closer(small, first, factor)
     if sure:
         return look
@@ -82,12 +100,14 @@ def first_look(small: SmallViews) -> FirstLook:
     return look if clearest is first else _closer(small, clearest, factor)[0]
 
 
-def _plainly_level(found: _Small | None, factor: float, shape: tuple[int, ...]) -> FirstLook | None:
-    """Return what was found where the smallest views say level, as far as they tell; the match decides."""
+def _plainly_level(
+    found: _Small | None, factor: float, shape: tuple[int, ...], tolerance: Tolerance = _AS_GOOD_AS_LEVEL
+) -> FirstLook | None:
+    """Return what was found where small views say level, as far as they tell; the match decides."""
     if found is None or found.measured is None:
         return None
     seen = found.measured.resized(factor)
-    if not is_level(seen.misalignment, seen.errors, shape, _AS_GOOD_AS_LEVEL):
+    if not is_level(seen.misalignment, seen.errors, shape, tolerance):
         return None
     return FirstLook(_with_margin(found, factor), replace(seen, misalignment=LEVEL))
 
@@ -97,8 +117,13 @@ def _closer(small: SmallViews, found: _Small | None, before: float) -> tuple[Fir
     if found is None:
         return FirstLook(None, None), False
     factor = size_factor(small.views[0].shape, _SMALL)
+    pair, top = _Pair.of(small.views, factor), found.top * before / factor
+    if _plainly_level(found, before * small.factor, small.shape, _MILD) is not None:
+        plain = _plainly_level(_look(pair, LEVEL, top), factor * small.factor, small.shape)
+        if plain is not None:
+            return plain, True
     start = found.measured.misalignment.resized(before / factor) if found.measured else LEVEL
-    found = _climb(shrink_both(small.views, factor), start, top=found.top * before / factor) or found
+    found = _climb(pair, start, top) or found
     factor *= small.factor
     measured = coarse = None if found.measured is None else found.measured.resized(factor)
     if coarse is not None and not is_level(coarse.misalignment, coarse.errors, small.shape):
@@ -121,25 +146,36 @@ def _clearest(attempts: Iterable[_Small | None]) -> _Small | None:
     return min(some, key=lambda each: each.measured.spread if each.measured else math.inf, default=None)
 
 
-def _climb(small: Views, start: Misalignment, top: float | None = None) -> _Small | None:
-    """Level, match and measure in turn, until the right view lies still."""
-    shape, texture = small[0].shape, Texture.of(small)
+def _climb(
+    pair: _Pair, start: Misalignment, top: float | None = None, first: _Small | None = None
+) -> _Small | None:
+    """Level, match and measure in turn, until the right view lies still; `first` is what `start` gave."""
+    shape = pair.views[0].shape
     found, at, approach = None, start, Approach(shape)
     for _ in range(_ROUNDS):
-        matched = _match_small((small[0], level(small[1], at)), top)
-        if matched is None:
+        seen, first = first or _look(pair, at, top), None
+        if seen is None:
             return found
-        measured = measure_misalignment(texture, matched.disparity, at)
-        found = _Small(matched.top, matched.disparity, measured)
-        if measured is None:
+        found = seen
+        if found.measured is None:
             return found
-        step = (measured.misalignment - at).reach(*shape)
+        step = (found.measured.misalignment - at).reach(*shape)
         if step < _STEP:
             return found
-        at = approach.next(at, measured.misalignment)
+        at = approach.next(at, found.measured.misalignment)
         if top is None and step < _FAR:
-            top = matched.top
+            top = found.top
     return found
+
+
+def _look(pair: _Pair, at: Misalignment, top: float | None = None) -> _Small | None:
+    """Level, match and measure once."""
+    left, right = pair.views
+    matched = _match_small((left, level(right, at)), top)
+    if matched is None:
+        return None
+    measured = measure_misalignment(pair.texture, matched.disparity, at)
+    return _Small(matched.top, matched.disparity, measured)
 
 
 def _match_small(pair: Views, top: float | None) -> _Small | None:

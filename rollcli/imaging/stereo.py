@@ -1,7 +1,7 @@
 """Disparity maps from stereo pairs: views levelled, range found, then one semi-global match."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import cv2
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError
-from rollcli.imaging.alignment import LEFT_OVER, TOLERANCE, SmallViews, is_level, level
+from rollcli.imaging.alignment import LEFT_OVER, TOLERANCE, Approach, SmallViews, is_level, level
 from rollcli.imaging.first_look import FirstLook, find_range, first_look
 from rollcli.imaging.misalignment import LEVEL, Misalignment
 from rollcli.imaging.same_scene import check_same_scene
@@ -155,10 +155,10 @@ def _match_levelled(
     any_scene: bool,
 ) -> tuple[NDArray[np.float32], Misalignment, str]:
     """Match once the views are level; the map, what was corrected, and why that may be wrong."""
-    at = _worth_correcting(look.measured, small.shape)
+    at, approach, views = _worth_correcting(look.measured, small.shape), Approach(small.shape), small
     for _ in range(_MATCHES):
         disparity = match(at, rows)
-        measured = small.measure(disparity, at, 2 if look.measured else _ROUNDS)
+        measured = views.measure(disparity, at, 2 if look.measured else _ROUNDS)
         if not any_scene:
             check_same_scene(small, look, measured)
         if rows != ALL_ROWS:
@@ -168,7 +168,11 @@ def _match_levelled(
             continue
         if measured is None:
             return disparity, at, "too little can be compared to tell whether the views are level"
-        wanted = _wanted(measured, at, small.shape)
+        wanted = _wanted(measured, measured.misalignment, at, small.shape)
+        if views is small and wanted not in (at, LEVEL):
+            views = small.closer  # another match costs more than to measure well
+            measured = views.measure(disparity, at, _ROUNDS) or measured
+        wanted = _wanted(measured, approach.next(at, measured.misalignment), at, small.shape)
         if wanted == at:
             return disparity, at, _doubt(at, measured)
         at = wanted
@@ -184,9 +188,15 @@ def _is_confirmed(measured: Measured | None, at: Misalignment, shape: tuple[int,
     return (measured.misalignment - at).reach_in_rows(height, width, start, stop) < _LEFT_IN_ROWS
 
 
-def _wanted(measured: Measured, at: Misalignment, shape: tuple[int, ...]) -> Misalignment:
-    """Return what to correct after `measured` was found in a map matched at `at`; `at` if that was right."""
-    wanted = _worth_correcting(measured, shape)
+def _wanted(
+    measured: Measured, reached: Misalignment, at: Misalignment, shape: tuple[int, ...]
+) -> Misalignment:
+    """Return what to correct after `measured` was found in a map matched at `at`; `at` if that was right.
+
+    `reached` is where this and the measurement before lead to. It is believed where it is level; else a map
+    in which little is left is enough, since what noise adds is several times larger there.
+    """
+    wanted = _worth_correcting(replace(measured, misalignment=reached), shape)
     if wanted == LEVEL:
         return LEVEL  # also where the small views were taken for uneven
     tolerance = TOLERANCE if at == LEVEL else LEFT_OVER

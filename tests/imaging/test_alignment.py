@@ -14,6 +14,7 @@ from rollcli.files.inputs import pair_inputs
 from rollcli.imaging.alignment import Approach, level
 from rollcli.imaging.misalignment import LEVEL, Misalignment
 from rollcli.imaging.stereo import StereoOptions, match_pair
+from rollcli.simulate.draw import draw_specs
 from rollcli.simulate.render import render_frame
 from rollcli.simulate.spec import FrameSpec
 
@@ -118,6 +119,32 @@ def test_a_level_pair_is_left_as_it_is(frame, downscale):
         frame.left, frame.right, StereoOptions(align="off", num_disparities=count, downscale=downscale)
     )
     np.testing.assert_array_equal(match.disparity, off.disparity)
+
+
+@pytest.fixture(scope="module", params=[1, 5, 14])
+def empty_road(request):
+    """Grain and noise: of two of these, small views say that the right one is turned and skewed."""
+    span = math.radians(10)
+    specs = draw_specs(
+        request.param + 1, scene="bare", roll=(-span, span), noise=4.0, seed=6101, colour=False
+    )
+    return render_frame(specs[-1])
+
+
+def test_a_level_pair_of_an_empty_road_is_left_as_it_is(empty_road):
+    match = match_pair(empty_road.left, empty_road.right, StereoOptions())
+
+    assert match.corrected == LEVEL
+    assert match.doubt == ""
+
+
+@pytest.mark.parametrize(("larger_percent", "lower"), [(0.2, 0.0), (0.0, 0.4), (0.0, -2.0)])
+def test_what_a_map_of_an_empty_road_hides_is_found(empty_road, larger_percent, lower):
+    right = seen_by(empty_road.right, larger_percent=larger_percent, lower=lower)
+
+    found = roll_deg(empty_road.left, right)
+
+    assert found == pytest.approx(roll_deg(empty_road.left, empty_road.right), abs=0.1)
 
 
 def test_brightness_is_no_misalignment(frame):
