@@ -119,9 +119,19 @@ def test_a_store_that_does_not_answer_is_one_line_without_keys(monkeypatch):
     assert "PUBLIC" not in str(raised.value)
 
 
-def test_web_servers_are_read_only():
-    with pytest.raises(OutputError, match="not written to"):
-        storage.write_bytes("https://host/x.png", b"")
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda url: storage.write_bytes(url, b""),
+        lambda url: storage.write_new(url, b""),
+        lambda url: storage.create(url, b"", "me"),
+        storage.remove,
+        lambda url: storage.remove_all([url]),
+    ],
+)
+def test_web_servers_are_read_only(change):
+    with pytest.raises(OutputError, match=r"^https://host/x\.png: .* not written to"):
+        change("https://host/x.png")
 
 
 def test_signatures_and_passwords_are_not_shown():
