@@ -13,6 +13,7 @@ from rollcli.files.formats import read_image
 from rollcli.files.inputs import pair_inputs
 from rollcli.imaging import sgbm
 from rollcli.imaging.stereo import StereoOptions, compute_disparity, match_pair
+from rollcli.imaging.views import matched_shape
 from rollcli.simulate.render import render_frame
 from rollcli.simulate.spec import FrameSpec
 
@@ -113,6 +114,12 @@ def test_matching_small_gives_a_small_map_in_its_own_pixels():
 
     assert disparity.shape == (60, 200)
     assert np.median(disparity[disparity > 0]) == pytest.approx(20, abs=0.1)
+
+
+@pytest.mark.parametrize("colours", [(), (3,), (4,)])
+@pytest.mark.parametrize(("downscale", "expected"), [(1, (241, 322)), (2, (120, 161)), (1000, (1, 1))])
+def test_the_shape_that_is_matched_does_not_depend_on_colours(downscale, expected, colours):
+    assert matched_shape((241, 322, *colours), downscale) == expected
 
 
 def test_colour_grey_and_16_bits_give_much_the_same(street):
