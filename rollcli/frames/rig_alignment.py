@@ -6,11 +6,14 @@ from statistics import median
 
 from rollcli.files.results import Row
 from rollcli.imaging.misalignment import Misalignment
-from rollcli.imaging.misalignment_words import advice_of, read_note
+from rollcli.imaging.misalignment_words import NOT_LEVELLED, TOO_LITTLE, advice_of, read_note
 
 
 class RigAlignment:
-    """Collects what rows say was corrected; a pair that was matched as it is counts as level."""
+    """Collects what rows say was corrected; a pair that was matched as it is counts as level.
+
+    One that could not be levelled, or not be checked, says nothing: what was tried is no measurement.
+    """
 
     def __init__(self) -> None:
         self._parts = [array("d") for _ in astuple(Misalignment())]
@@ -20,6 +23,8 @@ class RigAlignment:
     def add(self, row: Row) -> None:
         """Take in a row; those of maps and those without an angle say nothing."""
         if not row.right_file or row.height is None or row.width is None:
+            return
+        if NOT_LEVELLED in row.message or TOO_LITTLE in row.message:
             return
         self._size = row.height, row.width
         found = read_note(row.message, *self._size)

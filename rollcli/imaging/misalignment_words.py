@@ -8,6 +8,11 @@ import re
 
 from rollcli.imaging.misalignment import Misalignment
 
+NOT_LEVELLED = "the views are not level, and could not be levelled"
+"""The doubt of a pair whose correction was still changing when it was given up."""
+TOO_LITTLE = "too little can be compared to tell whether the views are level"
+"""The doubt of a pair whose correction could not be checked."""
+
 _LEAD = "corrected: the right image "
 _PARTS = {
     "offset": re.compile(r"lay ([\d.]+) px (lower|higher)"),

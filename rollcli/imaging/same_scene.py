@@ -5,6 +5,8 @@ What has texture and is seen by both cameras finds its match. In level pairs, an
 images 0 to 22 % do (26 rendered, 24 real pairs).
 """
 
+import numpy as np
+
 from rollcli.errors import InputError
 from rollcli.imaging.alignment import SmallViews
 from rollcli.imaging.first_look import FirstLook, first_look
@@ -31,7 +33,7 @@ def check_same_scene(small: SmallViews, look: FirstLook, measured: Measured | No
     Raises
     ------
     InputError
-        They are swapped, or show two scenes.
+        They are one image, are swapped, or show two scenes.
     """
     matched = max(_share(look.measured), _share(measured))
     if matched >= _SURE:
@@ -39,6 +41,8 @@ def check_same_scene(small: SmallViews, look: FirstLook, measured: Measured | No
     textured = min(map(textured_share, small.views))
     if textured < _LEAST_TEXTURE or matched >= _SURE * textured:
         return
+    if np.array_equal(*small.views):
+        raise InputError("the left and the right image are the same")
     if _share(first_look(small.swapped()).measured) >= _PLAIN * textured:
         raise InputError(
             "the views seem swapped: the scene is matched when the right image is taken for the left one"

@@ -12,6 +12,7 @@ from rollcli.errors import InputError
 from rollcli.imaging.alignment import LEFT_OVER, TOLERANCE, Approach, SmallViews, is_level, level
 from rollcli.imaging.first_look import FirstLook, find_range, first_look
 from rollcli.imaging.misalignment import LEVEL, Misalignment
+from rollcli.imaging.misalignment_words import NOT_LEVELLED, TOO_LITTLE
 from rollcli.imaging.same_scene import check_same_scene
 from rollcli.imaging.sgbm import ALL_ROWS, NARROWEST, match_rows, usable_range
 from rollcli.imaging.sgbm_lag import without_lag
@@ -167,7 +168,7 @@ def _match_levelled(
             rows = ALL_ROWS  # a few rows say that something is wrong, but not what
             continue
         if measured is None:
-            return disparity, at, "too little can be compared to tell whether the views are level"
+            return disparity, at, TOO_LITTLE
         wanted = _wanted(measured, measured.misalignment, at, small.shape)
         if views is small and wanted not in (at, LEVEL):
             views = small.closer  # another match costs more than to measure well
@@ -176,7 +177,7 @@ def _match_levelled(
         if wanted == at:
             return disparity, at, _doubt(at, measured)
         at = wanted
-    return disparity, at, "the views are not level, and could not be levelled"
+    return disparity, at, NOT_LEVELLED
 
 
 def _is_confirmed(measured: Measured | None, at: Misalignment, shape: tuple[int, ...], rows: slice) -> bool:

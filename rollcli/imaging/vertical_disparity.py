@@ -101,6 +101,8 @@ def measure_misalignment(
     Measured or None
         None where too few blocks tell.
     """
+    if min(disparity.shape) < _BLOCK:
+        return None
     blocks = _Blocks(texture, disparity)
     found, errors, spread, count = start, LEVEL, 0.0, 0
     for _ in range(rounds):
@@ -120,6 +122,8 @@ def measure_misalignment(
 
 def textured_share(view: View) -> float:
     """Return the share of a view's blocks that could tell a vertical disparity, were they matched."""
+    if min(view.shape) < _BLOCK:
+        return 0.0
     across, down = _gradients(_smooth(view))
     along = _block_means(across * across) + np.float32(_RIDGE)
     weight = _block_means(down * down) - np.square(_block_means(across * down)) / along

@@ -201,6 +201,19 @@ def test_images_of_two_places_are_told(frame):
         match_pair(frame.left, elsewhere.right, StereoOptions())
 
 
+def test_one_image_given_twice_is_told(frame):
+    with pytest.raises(InputError, match="the left and the right image are the same"):
+        match_pair(frame.left, frame.left.copy(), StereoOptions())
+
+
+@pytest.mark.parametrize("height", [1, 2, 7])
+def test_views_of_a_few_rows_tell_nothing(frame, height):
+    match = match_pair(frame.left[:height], frame.right[:height], StereoOptions())
+
+    assert match.disparity.shape == (height, frame.left.shape[1])
+    assert "to tell whether the views are level" in match.doubt
+
+
 def test_who_searches_below_zero_may_swap_the_views(frame):
     match = match_pair(frame.right, frame.left, StereoOptions(min_disparity=-96, num_disparities=96))
 

@@ -9,7 +9,7 @@ import pytest
 from rollcli.files.results import Row
 from rollcli.frames.rig_alignment import RigAlignment
 from rollcli.imaging.misalignment import LEVEL, Misalignment
-from rollcli.imaging.misalignment_words import advice_of, note_of, read_note
+from rollcli.imaging.misalignment_words import NOT_LEVELLED, TOO_LITTLE, advice_of, note_of, read_note
 
 ODD = Misalignment(offset=-0.52, rotation=math.radians(0.31), scale=-0.004, twist=2e-5)
 WORDS = (
@@ -70,6 +70,15 @@ def test_a_run_of_maps_or_of_level_pairs_has_nothing_to_say():
     rig.add(row("", right=""))
     rig.add(row(""))
     rig.add(Row("l.png", "r.png", "error", message="l.png: cannot be read"))
+
+    assert rig.summary() is None
+    assert rig.advice == ""
+
+
+@pytest.mark.parametrize("doubt", [NOT_LEVELLED, TOO_LITTLE])
+def test_what_was_tried_in_vain_is_no_advice(doubt):
+    rig = RigAlignment()
+    rig.add(row(f"{doubt}; corrected: the right image was 7.573 % smaller", status="suspect"))
 
     assert rig.summary() is None
     assert rig.advice == ""
