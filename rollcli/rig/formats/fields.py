@@ -117,17 +117,28 @@ def pair_of(left: Projection, right: Projection, where: str) -> tuple[float, flo
         )
     if across == 0:
         raise InputError(f"{where} has no distance between the cameras: its projections are the same")
+    require_one_pair((left.fx, left.fy, left.cy), (right.fx, right.fy, right.cy), where)
+    return across, right.cx - left.cx
+
+
+def require_one_pair(left: tuple[float, float, float], right: tuple[float, float, float], where: str) -> None:
+    """Refuse two views, each (fx, fy, cy), that are not those of one rectified pair.
+
+    Raises
+    ------
+    InputError
+    """
+    (fx, fy, cy), (other_fx, other_fy, other_cy) = left, right
     for name, one, other, tolerance in (
-        ("focal lengths", left.fx, right.fx, _SAME_FOCAL * abs(left.fx)),
-        ("vertical focal lengths", left.fy, right.fy, _SAME_FOCAL * abs(left.fy)),
-        ("rows of the principal point", left.cy, right.cy, _SAME_ROW),
+        ("focal lengths", fx, other_fx, _SAME_FOCAL * abs(fx)),
+        ("vertical focal lengths", fy, other_fy, _SAME_FOCAL * abs(fy)),
+        ("rows of the principal point", cy, other_cy, _SAME_ROW),
     ):
         if abs(one - other) > tolerance:
             raise InputError(
                 f"{where} is contradictory: the {name} of the two views are {one:g} and {other:g} px, "
                 "and those of a rectified pair are equal"
             )
-    return across, right.cx - left.cx
 
 
 def swapped(where: str) -> InputError:

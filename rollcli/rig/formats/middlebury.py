@@ -7,7 +7,7 @@ right view's principal point may lie elsewhere than the left one's: `doffs` is t
 import re
 
 from rollcli.errors import InputError
-from rollcli.rig.formats.fields import Fields, File, number, numbers, size
+from rollcli.rig.formats.fields import Fields, File, number, numbers, require_one_pair, size
 
 _LINE = re.compile(r"^[ \t]*(\w+)[ \t]*=[ \t]*(.*?)[ \t]*\r?$", re.MULTILINE)
 _CAMERA = re.compile(r"^[ \t]*cam0[ \t]*=", re.MULTILINE)
@@ -27,6 +27,7 @@ def read_middlebury(file: File) -> Fields:
     right = _camera(values["cam1"], f"{file.name}: cam1") if "cam1" in values else None
     doffs = number(values["doffs"], f"{file.name}: doffs") if "doffs" in values else None
     if right is not None:
+        require_one_pair((fx, fy, cy), (right[0], right[1], right[3]), file.name)
         between = right[2] - cx
         if doffs is not None and abs(doffs - between) > _SAME_DOFFS:
             raise InputError(

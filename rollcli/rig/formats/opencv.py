@@ -20,6 +20,12 @@ _MARKS = ("%YAML:1.0", "%YAML 1.0", "<opencv_storage>", "opencv-matrix")
 _METRES = (0.005, 5.0)  # no rig on a vehicle is smaller or larger: another number has another unit
 _SAME = 1e-3  # relative: P2 and Q are of one rig
 _MAX_DEPTH = 16
+_IN_BOTH = (
+    ("focal length", 0),
+    ("principal point's column", 2),
+    ("principal point's row", 3),
+    ("baseline", 4),
+)
 
 
 def is_opencv(text: str) -> bool:
@@ -41,10 +47,11 @@ def read_opencv(file: File) -> Fields:
         )
     if "P1" in matrices and "Q" in matrices:
         other = _of_q(file, matrices["Q"])
-        for name, one, two in (("focal length", found[0], other[0]), ("baseline", found[4], other[4])):
+        for name, place in _IN_BOTH:
+            one, two = found[place], other[place]
             if abs(one - two) > _SAME * abs(one):
                 raise InputError(
-                    f"{file.name}: is contradictory: the {name} is {one:g} in P2 and {two:g} in Q"
+                    f"{file.name}: is contradictory: the {name} is {one:g} in P1 and P2, and {two:g} in Q"
                 )
     return _with_unit(file, found)
 
