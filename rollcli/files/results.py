@@ -240,7 +240,7 @@ def value_of(name: str, value: Any, where: str) -> Any:
         raise InputError(f"{where}: {value!r:.80} is no status: {', '.join(STATUSES)}")
     if name not in _DIGITS and name not in _FLAGS and name not in _COUNTS:
         text = "" if value is None else str(value)
-        if "\0" in text:  # names no file anywhere
+        if "\0" in text or (name == "file" and not text):  # names no file anywhere
             raise InputError(f"{where}: {text!r:.80} is no value for {name}")
         return text
     if value is None or value == "":

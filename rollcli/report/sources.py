@@ -153,7 +153,7 @@ def _folders(kind: str, images: _ImageFolder, recorded: str | None) -> Iterator[
 def _tails(file: str) -> Iterator[str]:
     """Yield the path without its ending, then without its first folder, and so on."""
     path = PurePosixPath(file)
-    parts = path.with_suffix("").parts
+    parts = path.with_suffix("").parts if path.name else ()  # "/" and "." name no file
     for first in range(1 if path.is_absolute() else 0, len(parts)):
         if ".." not in parts[first:]:  # which would lead out of the folder of images
             yield "/".join(parts[first:])

@@ -142,7 +142,9 @@ def test_pictures_come_from_the_images_that_estimate_wrote(folder, images):
     assert page_of(folder).count("maps/frame0.png: there is no map of it among the images") == 1
 
 
-@pytest.mark.parametrize("name", ["../secret.png", "maps/../../secret.png", "derotated/../../secret.png"])
+@pytest.mark.parametrize(
+    "name", ["../secret.png", "maps/../../secret.png", "derotated/../../secret.png", "/", "//", ".", "a/.."]
+)
 def test_no_picture_comes_from_outside_of_the_folder_of_images(tmp_path, name):
     write_kitti(tmp_path / "secret.png", road_map(0.1))
     (tmp_path / "images" / "derotated").mkdir(parents=True)
@@ -287,6 +289,7 @@ def test_ten_thousand_frames_stay_under_30_mb(tmp_path):
         ("frame,angle\n1,2\n", "no column file, status, roll_deg"),
         ("file,status\na.png,ok\n", "no column roll_deg"),
         ("file,status,roll_deg\n", "has no rows"),
+        ("file,status,roll_deg\n,ok,1\n", "line 2: '' is no value for file"),
         ("file,status,roll_deg\na.png,ok,much\n", "line 2: 'much' is no value for roll_deg"),
         ("file,status,roll_deg\na.png,ok,nan\n", "line 2: 'nan' is no value for roll_deg"),
         ("file,status,roll_deg\na.png,ok,359.2\n", "line 2: '359.2' is no value for roll_deg"),

@@ -99,6 +99,7 @@ def test_ticks_are_four_pixels_long_beside_the_rows_and_below_the_disparities():
     ink = (picture < 128).all(axis=2)
     assert ink[0, :LEFT_MARGIN][-6:].tolist() == [False] * 2 + [True] * 4
     assert ink[-BOTTOM_MARGIN:, LEFT_MARGIN][:6].tolist() == [True] * 4 + [False] * 2
+    np.testing.assert_array_equal(chart(picture)[0, :4], chart(picture)[5, :4])  # none of it on the chart
 
 
 def test_a_road_that_turns_back_within_a_dash_is_a_line_and_no_loop():
