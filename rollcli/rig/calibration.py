@@ -8,7 +8,11 @@ from dataclasses import dataclass, replace
 
 from rollcli.errors import UsageError
 
-_ROUNDED = 1.0  # px: the size of a scaled image is rounded to whole pixels
+_ROUNDINGS = (
+    -0.5,
+    0.0,
+    -1.0,
+)  # px: both sides of a scaled image are rounded to the nearest pixel, down, or up
 # no rig reaches these; numbers that do are damage, and their squares can be beyond what a float holds
 _FOCAL = (1.0, 1e6)  # px
 _PLACE = 1e6  # px from the first pixel
@@ -116,13 +120,12 @@ class Calibration:
             return replace(self, width=width, height=height)
         if (width, height) == (self.width, self.height):
             return self
-        across, down = width / self.width, height / self.height
-        # each side may be rounded: then the factors differ, by less than one pixel of the image
-        if abs(across - down) * min(self.width, self.height) > _ROUNDED:
+        if not _one_factor(width, self.width, height, self.height):
             raise UsageError(
                 f"{self.source}: the calibration is for {self.width}x{self.height} px, the map has "
                 f"{width}x{height}: give the calibration of this size; only a scaled image is allowed for"
             )
+        across, down = width / self.width, height / self.height
         return replace(
             self,
             fx=self.fx * across,
@@ -133,3 +136,12 @@ class Calibration:
             width=width,
             height=height,
         )
+
+
+def _one_factor(width: int, of_width: int, height: int, of_height: int) -> bool:
+    """Whether one factor makes a size of another, rounded to whole pixels."""
+    sides = ((width, of_width), (height, of_height))
+    return any(
+        max((side + below) / of for side, of in sides) < min((side + below + 1) / of for side, of in sides)
+        for below in _ROUNDINGS
+    )

@@ -346,9 +346,16 @@ def test_a_scaled_image_has_the_calibration_of_rays_through_its_own_pixels(width
     assert scaled.baseline == 0.5
 
 
-def test_a_cropped_image_is_refused_by_naming_both_sizes():
-    with pytest.raises(UsageError, match=r"640x480.*600x480"):
-        SIZED.for_size(600, 480)
+@pytest.mark.parametrize("rounded", [round, math.floor, math.ceil])
+def test_an_image_scaled_by_any_factor_is_one_however_its_sides_are_rounded(rounded):
+    for factor in np.random.default_rng(3).uniform(0.1, 4, 200):
+        SIZED.for_size(rounded(640 * factor), rounded(480 * factor))
+
+
+@pytest.mark.parametrize("size", [(600, 480), (640, 479), (640, 481), (1280, 959), (320, 241)])
+def test_a_cropped_image_is_refused_by_naming_both_sizes(size):
+    with pytest.raises(UsageError, match=rf"640x480.*{size[0]}x{size[1]}"):
+        SIZED.for_size(*size)
 
 
 def test_a_calibration_without_a_size_is_refused_where_its_centre_lies_outside_of_the_image():
