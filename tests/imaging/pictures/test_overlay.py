@@ -72,3 +72,16 @@ def test_a_map_is_drawn_the_same_a_few_rows_at_a_time(monkeypatch):
     whole = draw_disparity(disparity)
     monkeypatch.setattr(overlay, "_BLOCK", 3 * 40)
     assert np.array_equal(draw_disparity(disparity), whole)
+
+
+def test_labels_of_a_preview_stand_beside_the_colours_they_name():
+    values = np.linspace(0.5, 100, 400)
+    preview = draw_preview(values[:, None] * np.ones((400, 50))).astype(int)
+    picture, bar, labels = preview[:, 25], preview[:, 50 + 16], preview[:, 50 + 24 :]
+    inked = (labels < 200).any(axis=(1, 2)).astype(int)
+    starts, ends = (np.flatnonzero(np.diff(inked, prepend=0, append=0) == way) for way in (1, -1))
+    assert len(starts) == 5  # 80, 60, 40, 20, and 0 px
+    for name, start, end in zip((80, 60, 40, 20), starts, ends, strict=False):
+        colour = picture[np.abs(values - name).argmin()]
+        same = np.abs(bar - colour).sum(axis=1).argmin()
+        assert (start + end - 1) / 2 == pytest.approx(same, abs=2)
