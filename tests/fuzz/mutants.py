@@ -27,6 +27,7 @@ FURTHER = {
     "batch": ("cli/test_outputs.py", "cli/test_estimate.py", "cli/test_frames.py"),
     "cli": ("batch/test_resume.py",),
     "convert": ("cli/test_idle_options.py", "cli/test_outputs.py"),
+    "estimator": ("rig/test_pose.py",),
     "evaluate": ("cli/test_evaluate.py", "cli/test_evaluate_paper.py"),
     "files": ("batch/test_resume.py", "cli/test_frames.py", "cli/test_outputs.py"),
     "frames": (
