@@ -143,13 +143,16 @@ def test_choices_ignore_case(tmp_path):
     assert ",exact," in upper.out
 
 
-def test_an_interrupt_while_a_module_loads_is_status_130(tmp_path):
+@pytest.mark.parametrize("stdout", ["open", "closed"])
+def test_an_interrupt_while_a_module_loads_is_status_130(tmp_path, stdout):
     code = """
 import rollcli.cli.main
 rollcli.cli.main.main = lambda **_: exec("raise KeyboardInterrupt")
 from rollcli.__main__ import main
 main()
 """
+    if stdout == "closed":  # Python has none then
+        code = f"import sys; sys.stdout = None{code}"
     line = [sys.executable, "-c", code]
     done = subprocess.run(line, cwd=tmp_path, env=environment(), capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (130, "rollcli: interrupted\n")

@@ -7,6 +7,7 @@ import sys
 import threading
 import time
 from concurrent.futures import Future
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -21,7 +22,8 @@ from rollcli import __version__
 from rollcli.errors import ClusterError
 from rollcli.files.storage import list_names, read_bytes
 from rollcli.parallel import cluster
-from rollcli.parallel.cluster import ClusterFuture, probe
+from rollcli.parallel.cluster import ClusterFuture, _check_workers, probe
+from rollcli.parallel.workers import SharedPaths
 
 FRAMES = 60
 IMAGES = ("--derotated", "upright", "--vdisparity", "v")
@@ -154,6 +156,23 @@ def test_nobody_waits_for_what_was_sent_while_the_connection_broke(monkeypatch):
     client = SimpleNamespace(status="closed")
     with pytest.raises(ClusterError, match="the connection to the scheduler is lost"):
         ClusterFuture(Future(), client, "tcp://far:8786").result()
+
+
+@pytest.mark.parametrize(
+    ("answer", "said"),
+    [
+        ("does not see a.png", "worker tcp://second:1: does not see a.png"),
+        (ImportError("no module"), "worker tcp://second:1: cannot run rollcli .*: no module"),
+    ],
+)
+def test_a_run_with_a_worker_that_cannot_take_part_is_refused_and_leaves_no_mark(tmp_path, answer, said):
+    def ask(function, version, sizes, marks, on_error):
+        assert [Path(mark).exists() for mark in marks] == [True]
+        return {"tcp://first:1": "", "tcp://second:1": answer}
+
+    with pytest.raises(ClusterError, match=said):
+        _check_workers(SimpleNamespace(run=ask), SharedPaths((), (str(tmp_path / "up"),)))
+    assert list((tmp_path / "up").iterdir()) == []
 
 
 def test_a_worker_that_has_no_such_program_or_files_is_named(tmp_path):
