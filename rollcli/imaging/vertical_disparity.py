@@ -22,6 +22,7 @@ _BLOCK = 8  # px: the side of what gets one vertical disparity
 _KNOWN = 0.7  # share of a block that has to have a disparity
 _RIDGE = 0.2  # squared grey levels per pixel: gradients along the rows below this are noise
 _LEAST = 2.0  # the same, across the rows: a block with less says nothing
+_ROUNDING = 0.99  # of a sum of 64 float32
 _MOST = 50.0  # and one with more counts no more than with this
 _FEWEST = 40  # blocks
 _FIT_ROUNDS = 12
@@ -179,7 +180,7 @@ class _Blocks:
     def __init__(self, texture: Texture, disparity: Floats) -> None:
         self._right = texture.right
         known = (disparity > 0).astype(np.float32)
-        places = _block_means(known) > _KNOWN
+        places = (_block_means(known) > _KNOWN) & _may_tell(texture.down)
 
         def of_blocks(pixels: Floats) -> Floats:
             height, width = (side // _BLOCK for side in pixels.shape)
@@ -215,6 +216,16 @@ class _Blocks:
         weight[cut], mean_x[cut], mean_y[cut] = part[1:]
         telling = weight > 0
         return _Seen(mean_x[telling], mean_y[telling], shift[telling], weight[telling])
+
+
+def _may_tell(down: Floats) -> NDArray[np.bool_]:
+    """Tell which blocks vary enough down the columns, whatever part of them has a disparity.
+
+    What is left of a block's squares is no more than all of them, over a count of `_KNOWN` of it or more.
+    """
+    varies = _block_means(down * down) - np.square(_block_means(down))
+    enough: NDArray[np.bool_] = varies > np.float32(_LEAST * _KNOWN * _ROUNDING)
+    return enough
 
 
 def _fit(seen: _Seen) -> tuple[Misalignment, Misalignment, float]:
