@@ -65,11 +65,7 @@ def report_page(
         answer=answer(rig.now()).replace("-", "−"),
         drawn={trace["name"] for trace in charts["roll"].data},
         now=now_in_words(rig),
-        others=[
-            f"{quantity.name} {answer(rig.now(quantity), quantity)}".replace("-", "−")
-            for quantity in QUANTITIES[1:]
-            if rig.latest(quantity) is not None
-        ],
+        others=_others(rig),
         counts=counts(rig),
         findings=findings(rig) or ["Neither a jump nor a drift is seen."],
         outside=outside(rows),
@@ -79,6 +75,17 @@ def report_page(
         gallery=[_card(rows, choice, pictures) for choice, pictures in shown],
         chosen=_chosen_text(rows, [choice for choice, _ in shown]),
     )
+
+
+def _others(rig: RigAssessment) -> list[str]:
+    """Return pitch and height, and since when they hold, where that is not what is said of the roll."""
+    others = []
+    for quantity in QUANTITIES[1:]:
+        if rig.latest(quantity) is not None:
+            since, value = now_in_words(rig, quantity), answer(rig.now(quantity), quantity)
+            words = f"{quantity.name} {value.replace('-', '−')}"
+            others.append(words if since == now_in_words(rig) else f"{words} {since}".rstrip())
+    return others
 
 
 def _table(rows: Sequence[Row]) -> Rows:

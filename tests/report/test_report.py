@@ -70,8 +70,22 @@ def test_the_page_begins_with_the_rig_as_it_is_mounted(tmp_path):
     value = r"\d\.\d+ ± 0\.\d+"
     assert re.fullmatch(rf"roll \+{value}°", roll)
     assert re.fullmatch(rf"pitch −{value}°, height {value} m", others)
-    assert "400 of 400 frames" in counted
+    assert counted.endswith("Counted: 400 of 400 frames.")
     assert wrong == "Neither a jump nor a drift is seen."
+
+
+def test_the_page_says_since_when_a_height_holds(tmp_path):
+    heights = 1.5 + np.random.default_rng(5).normal(0, 0.005, 800)
+    heights[500:] += 0.1
+    rolls = np.random.default_rng(6).normal(1, 0.1, 800)
+    pairs = enumerate(zip(rolls, heights, strict=True))
+    rows = [
+        replace(row(f"m/{number:04}.png", roll, 0.1), height_m=height, height_ci95_m=0.01)
+        for number, (roll, height) in pairs
+    ]
+    write_result(tmp_path / "rolls.csv", rows)
+    assert report(tmp_path, "rolls.csv", "--gallery", "0").status == 0
+    assert re.search(r">height 1\.(?:59|60)\d* ± 0\.\d+ m since m/0500\.png</p>", page_of(tmp_path))
 
 
 def test_a_page_holds_everything_it_shows(folder):
