@@ -15,6 +15,10 @@ import time
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+from rollcli.parallel.process_setup import limit_blas_threads
+
+limit_blas_threads()  # as the program does; with two, the series take twenty times as long on a busy machine
+
 import numpy as np
 
 from rollcli.files.results import Row, format_header, format_row
