@@ -4,12 +4,12 @@ The functions below are loaded when first used, so that ``import rollcli`` (and 
 ``rollcli --version``) costs nothing.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
-
 __version__ = "0.1.0"
 
+TYPE_CHECKING = False  # as type checkers know it, without loading typing
 if TYPE_CHECKING:
+    from typing import Any
+
     from rollcli.errors import RollcliError as RollcliError
     from rollcli.estimator.result import RollEstimate as RollEstimate
     from rollcli.files.encodings import read_disparity as read_disparity
@@ -51,8 +51,10 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> "Any":
     if name in _HOMES:
+        from importlib import import_module
+
         return getattr(import_module(_HOMES[name]), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 

@@ -1,49 +1,74 @@
-"""``python -m rollcli``: the same program as ``rollcli``."""
+"""``python -m rollcli``: the same program as ``rollcli``.
 
-import contextlib
+Functions import what they need, so that a signal during imports is met by `main` and ends in no traceback.
+"""
+
 import os
 import sys
-from types import TracebackType
-from typing import NoReturn
 
-from rollcli.errors import ExitStatus
-from rollcli.messages import let_stderr_fail, say
-from rollcli.parallel.interrupt import ignore_signals, raise_on_signals
+TYPE_CHECKING = False  # typing, which has it, is not loaded yet
+if TYPE_CHECKING:
+    from types import TracebackType
+    from typing import NoReturn
 
 
 def main() -> None:
     """Run the program; an error that nobody expected is one line too."""
-    let_stderr_fail()
     sys.excepthook = _say_in_one_line
     try:
+        from rollcli.parallel.interrupt import raise_on_signals
+
         raise_on_signals()
+        from rollcli.messages import let_stderr_fail
+
+        let_stderr_fail()
         from rollcli.cli.main import main as program  # a door: each worker process imports this module anew
 
         program(prog_name="rollcli")
     except KeyboardInterrupt:  # before there was anything to resume
-        say("interrupted")
-        _end_interrupted()
+        _say_interrupted()
     except SystemExit as end:
+        from rollcli.errors import ExitStatus
+
         if end.code == ExitStatus.INTERRUPTED:
             _end_interrupted()
         raise
     finally:
+        from rollcli.parallel.interrupt import ignore_signals
+
         ignore_signals()
 
 
-def _end_interrupted() -> NoReturn:
+def _say_interrupted() -> "NoReturn":
+    from rollcli.parallel.interrupt import ignore_signals
+
+    ignore_signals()
+    from rollcli.messages import let_stderr_fail, say
+
+    let_stderr_fail()  # the signal may have come before it
+    say("interrupted")
+    _end_interrupted()
+
+
+def _end_interrupted() -> "NoReturn":
     """Exit with the status of an interrupted run, at once.
 
     Python itself would end by SIGINT when the interrupt has passed through `exec`, which every dataclass
     calls while it is made, although it was handled.
     """
+    import contextlib
+
+    from rollcli.errors import ExitStatus
+
     if sys.stdout is not None:
         with contextlib.suppress(OSError):
             sys.stdout.flush()
     os._exit(ExitStatus.INTERRUPTED)
 
 
-def _say_in_one_line(kind: type[BaseException], error: BaseException, at: TracebackType | None) -> None:
+def _say_in_one_line(kind: type[BaseException], error: BaseException, at: "TracebackType | None") -> None:
+    from rollcli.messages import say
+
     while at is not None and at.tb_next is not None:
         at = at.tb_next
     where = f"{at.tb_frame.f_code.co_filename}:{at.tb_lineno}" if at else "nowhere"

@@ -20,7 +20,7 @@ LAYERS = (
 # modules that import something of rollcli inside a function, and why
 DOORS = {
     "rollcli": "names load when they are first used, so that `import rollcli` costs nothing",
-    "rollcli.__main__": "a worker process imports this module anew",
+    "rollcli.__main__": "a worker process imports it anew, and a signal during imports is one line",
     "rollcli.batch.answer": "loads NumPy only at the end of a run, to tell the rig's roll",
     "rollcli.batch.door": "a worker's door",
     "rollcli.convert.derotate": "a worker's door",

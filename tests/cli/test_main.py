@@ -1,5 +1,6 @@
 """The group: what it says of itself, and how errors end."""
 
+import itertools
 import re
 import subprocess
 import sys
@@ -156,6 +157,46 @@ main()
     line = [sys.executable, "-c", code]
     done = subprocess.run(line, cwd=tmp_path, env=environment(), capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (130, "rollcli: interrupted\n")
+
+
+def test_signals_are_met_before_anything_is_imported_that_python_has_not(tmp_path):
+    code = """
+import sys
+before = set(sys.modules)
+import rollcli.__main__
+print(sorted(set(sys.modules) - before))
+"""
+    line = [sys.executable, "-c", code]
+    done = subprocess.run(line, cwd=tmp_path, env=environment(), capture_output=True, text=True, check=True)
+    assert done.stdout == "['rollcli', 'rollcli.__main__']\n"
+
+
+@pytest.mark.parametrize(
+    ("number", "module"),
+    [
+        ("SIGINT", "rollcli.parallel.interrupt"),  # where Python's own handler is still in place
+        *itertools.product(("SIGINT", "SIGTERM"), ("rollcli.messages", "rollcli.cli.main", "click")),
+    ],
+)
+def test_a_signal_while_the_program_is_imported_is_one_line(tmp_path, number, module):
+    code = f"""
+import _signal
+import sys
+
+class Strike:
+    def find_spec(name, path=None, target=None):
+        if name == {module!r} and sys.meta_path[0] is Strike:
+            sys.meta_path.remove(Strike)
+            _signal.raise_signal(_signal.{number})
+
+sys.meta_path.insert(0, Strike)
+sys.argv = ["rollcli", "--version"]
+from rollcli.__main__ import main
+main()
+"""
+    line = [sys.executable, "-c", code]
+    done = subprocess.run(line, cwd=tmp_path, env=environment(), capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "rollcli: interrupted\n")
 
 
 WATCH_NUMPY = """
