@@ -78,7 +78,13 @@ def test_an_error_keeps_its_status_when_nobody_reads_its_message(maps):
 def test_a_hangup_stops_a_run_as_sigterm_does_unless_it_is_ignored(maps):
     write_maps(maps / "maps", 60)
     line = ["estimate", "maps", "-o", "rolls.csv", "-v", "-j2"]
-    run = subprocess.Popen(command(*line), cwd=maps, env=holding(maps, "frame2"), stderr=subprocess.PIPE)
+    run = subprocess.Popen(
+        command(*line),
+        cwd=maps,
+        env=holding(maps, "frame2"),
+        stderr=subprocess.PIPE,
+        preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_DFL),  # the tests may run under nohup
+    )
     wait_until((maps / "has-begun").exists)
     run.send_signal(signal.SIGHUP)
     (maps / "may-go-on").touch()
