@@ -129,6 +129,8 @@ def test_tables_hold_the_papers_numbers_beside_the_mean_of_ours(found):
 def test_runs_that_stopped_short_are_left_out_of_the_mean_and_counted(found):
     short = replace(found, sweep=tuple((None, *counts[1:]) for counts in found.sweep))
     table = all_tables([found, short], [], [made_times(1)])["fig3_lambda0"]
+    rates = table.where(delta_deg=DELTAS_DEG[0]).column("lambda0")
+    assert rates == list(range(1, 101))  # the whole numbers that the command's help names
     row = table.where(lambda0=1.0, delta_deg=0.0001)
     assert row.column("short") == [1 + (found.sweep[-1][0] is None)]
     assert row.column("mean") == [found.sweep[-1][0]]

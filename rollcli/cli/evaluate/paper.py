@@ -75,8 +75,8 @@ experiment_options = record(
 def paper(ctx: click.Context, /, **records: Any) -> None:
     """Repeat the paper's tables and figures on these maps, and write them as CSV and one HTML page of charts.
 
-    Iterations and run times of golden section and gradient descent (Tables I and II), the first learning
-    rate (Fig. 3), accuracy after known rotations (Fig. 6), and the same accuracy for the other methods. Every
+    Iterations and run times of golden section and gradient descent (Tables I and II), first learning rates
+    from 1 to 100 (Fig. 3), accuracy after known rotations (Fig. 6), and the same for the other methods. Every
     valid pixel is used, as in the paper. The page needs the extra: pip install "rollcli[report]".
     """
     from rollcli.evaluate.run_paper import run_paper
