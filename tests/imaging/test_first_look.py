@@ -1,0 +1,189 @@
+"""What is concluded from small views, with measurements that are known."""
+
+import math
+
+import numpy as np
+import pytest
+
+from rollcli.imaging import first_look as module
+from rollcli.imaging.alignment import SmallViews
+from rollcli.imaging.first_look import _Small, find_range, first_look
+from rollcli.imaging.misalignment import LEVEL, Misalignment
+from rollcli.imaging.vertical_disparity import Measured
+from tests.imaging.test_vertical_disparity import texture_of
+
+SHAPE = (120, 160)
+EMPTY = np.zeros(SHAPE, np.float32)
+
+
+def measured(offset=0.0, scale=0.0, error=0.01, spread=0.1, rotation=0.0):
+    return Measured(Misalignment(offset, rotation, scale), Misalignment(error), 0.5, spread)
+
+
+def small(seen, top=20.0):
+    return _Small(top, EMPTY, seen)
+
+
+def pair_of(disparity, lower=0, shape=(240, 640)):
+    texture = texture_of((shape[0] + 40, shape[1] + 400), seed=9)
+    rows = slice(20, 20 + shape[0])
+    left = texture[rows, 200 : 200 + shape[1]]
+    right = texture[20 - lower : 20 - lower + shape[0], 200 + disparity : 200 + disparity + shape[1]]
+    return np.ascontiguousarray(left), np.ascontiguousarray(right)
+
+
+@pytest.mark.parametrize("disparity", [8, 30, 60, 120, 200])
+def test_the_range_holds_what_is_there_and_a_tenth_more(disparity):
+    assert 1.1 * disparity + 5 <= find_range(pair_of(disparity)) <= 1.1 * disparity + 12
+
+
+def test_where_nothing_is_matched_no_range_is_found():
+    flat = np.full((240, 640), 90, np.uint8)
+    assert find_range((flat, flat)) is None
+    look = first_look(SmallViews((flat, flat)))
+    assert look.range is None
+    assert look.measured is None
+
+
+@pytest.mark.parametrize("lower", [-6, -3, 0, 3, 6])
+def test_a_look_finds_how_far_the_right_view_lies_off(lower):
+    look = first_look(SmallViews(pair_of(40, lower)))
+
+    assert look.measured.misalignment.offset == pytest.approx(lower, abs=0.12)
+    assert look.measured.misalignment.rotation == pytest.approx(0, abs=0.0006)
+    assert look.measured.misalignment.scale == pytest.approx(0, abs=0.002)
+    assert (look.measured.misalignment == LEVEL) == (lower == 0)
+    assert 49 <= look.range <= 56
+
+
+@pytest.mark.parametrize(("error", "level"), [(0.07, True), (0.08, False)])
+def test_small_views_with_large_errors_do_not_say_level(error, level):
+    """Of views twice as large, the error is twice as large; 0.15 px are too many."""
+    found = module._plainly_level(small(measured(0.01, error=error)), 2.0, (240, 320))
+
+    assert (found is not None) == level
+    if level:
+        assert found.measured.misalignment == LEVEL
+        assert found.measured.errors.offset == 2 * error
+        assert found.range == math.ceil(1.1 * 40) + 8
+
+
+def test_small_views_that_lie_off_or_tell_nothing_do_not_say_level():
+    assert module._plainly_level(None, 2.0, SHAPE) is None
+    assert module._plainly_level(small(None), 2.0, SHAPE) is None
+    assert module._plainly_level(small(measured(0.2)), 1.0, SHAPE) is None
+    assert module._plainly_level(small(measured(0.1, error=0.001)), 1.0, SHAPE) is not None
+    assert module._plainly_level(small(measured(0.1, error=0.001)), 2.0, SHAPE) is None
+
+
+@pytest.mark.parametrize(
+    ("coarse", "fine", "sure"),
+    [
+        (measured(), measured(), True),
+        (None, measured(), False),
+        (measured(), None, False),
+        (measured(), measured(scale=0.0029, error=1.0), True),
+        (measured(9), measured(scale=0.0029), True),
+        (measured(scale=0.0031), measured(scale=0.0031), True),
+        (measured(scale=-0.0031), measured(scale=-0.0031, error=0.015), False),
+        (measured(scale=0.0031), measured(scale=0.0031, error=0.0135), True),
+        (measured(1.1, scale=0.0031), measured(0.0, scale=0.0031), True),
+        (measured(1.3, scale=0.0031), measured(0.0, scale=0.0031), False),
+    ],
+)
+def test_an_unusual_scale_is_sure_where_blocks_and_views_agree(coarse, fine, sure):
+    assert module._is_sure(coarse, fine, SHAPE) == sure
+
+
+def test_the_clearest_attempt_leaves_the_least_unexplained():
+    one, two, blind = small(measured(spread=0.3)), small(measured(spread=0.2)), small(None)
+    assert module._clearest([one, None, two, blind]) is two
+    assert module._clearest([blind, one]) is one
+    assert module._clearest([None, blind]) is blind
+    assert module._clearest([None]) is None
+
+
+class Looks:
+    """A rig of which each map hides a share, as `_look` would see it; it notes where and how it is asked."""
+
+    def __init__(self, offset, hidden=0.0, blind_from=99, none_from=99):
+        self.offset, self.hidden = offset, hidden
+        self.blind_from, self.none_from, self.asked = blind_from, none_from, []
+
+    def __call__(self, _pair, at, top=None):
+        self.asked.append((at.offset, top))
+        if len(self.asked) >= self.none_from:
+            return None
+        seen = self.offset - self.hidden * (self.offset - at.offset)
+        return small(None if len(self.asked) >= self.blind_from else measured(seen), top=30 + len(self.asked))
+
+
+PAIR = module._Pair.of((np.zeros(SHAPE, np.uint8),) * 2, 1)
+
+
+def climb(monkeypatch, looks, **given):
+    monkeypatch.setattr(module, "_look", looks)
+    return module._climb(PAIR, LEVEL, **given)
+
+
+def test_a_climb_ends_where_a_step_says_little(monkeypatch):
+    looks = Looks(0.29)
+    assert climb(monkeypatch, looks).measured.misalignment.offset == 0.29
+    assert looks.asked == [(0, None)]
+    looks = Looks(0.31)
+    assert climb(monkeypatch, looks).measured.misalignment.offset == pytest.approx(0.31)
+    assert looks.asked == [(0, None), (0.31, 31)]  # so near that its range is known
+    looks = Looks(0.6)
+    climb(monkeypatch, looks)
+    assert looks.asked == [(0, None), (0.6, None)]
+    looks = Looks(0.6)
+    climb(monkeypatch, looks, top=25.0)
+    assert looks.asked == [(0, 25.0), (0.6, 25.0)]
+
+
+def test_a_climb_begins_with_what_is_known_and_gives_up_after_six_rounds(monkeypatch):
+    looks = Looks(5.0)
+    climb(monkeypatch, looks, first=small(measured(2.0)))
+    assert looks.asked[0] == (2.0, None)
+    rig = Looks(0)
+
+    def running(pair, at, top=None):
+        rig.offset = at.offset + 4.0 * (-1) ** len(rig.asked)
+        return rig(pair, at, top)
+
+    assert climb(monkeypatch, running) is not None
+    assert len(rig.asked) == 6
+
+
+def test_a_climb_that_loses_the_scene_keeps_what_it_had(monkeypatch):
+    assert climb(monkeypatch, Looks(3, none_from=1)) is None
+    assert climb(monkeypatch, Looks(3, none_from=2)).measured.misalignment.offset == 3
+    assert climb(monkeypatch, Looks(3, blind_from=2)).measured is None
+
+
+def test_a_known_range_is_matched_a_tenth_and_two_pixels_wider(monkeypatch):
+    searched = []
+    monkeypatch.setattr(module, "_match", lambda pair, count: searched.append(count) or EMPTY)
+    found = module._match_small(PAIR.views, 40.0)
+    assert (found.top, searched) == (40.0, [pytest.approx(46)])
+
+
+@pytest.mark.parametrize(
+    ("rough", "start"), [(None, None), (19.9, 39.8), (20.0, None), (35.0, None)]
+)  # views at half the size are 80 px wide: a quarter of them are 20
+def test_half_the_size_gives_the_range_of_what_is_not_near(monkeypatch, rough, start):
+    asked = []
+    monkeypatch.setattr(module, "rough_largest", lambda _match, width: asked.append(width) or rough)
+    monkeypatch.setattr(
+        module, "largest_disparity", lambda _, width, start=None: asked.append((width, start))
+    )
+    assert module._match_small(PAIR.views, None) is None
+    near = [(160, None)]
+    assert asked == [80, *([(160, start)] if start else []), *near]
+
+
+def test_views_too_narrow_to_search_have_no_disparities():
+    narrow = texture_of((40, 20))
+    assert not module._match((narrow, narrow), 8).any()
+    wide = pair_of(8, shape=(40, 120))
+    assert np.median(module._match(wide, 8.2)[:, 40:100]) == pytest.approx(8, abs=0.1)
