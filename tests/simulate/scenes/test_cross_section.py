@@ -12,7 +12,7 @@ from rollcli.simulate.geometry.surfaces import Course, Ground
 from rollcli.simulate.render import render_frame, true_disparity
 from rollcli.simulate.scenes.build import build_scene, road_camber
 from rollcli.simulate.scenes.carriageway import draw_carriageway
-from rollcli.simulate.scenes.cars import vehicle
+from rollcli.simulate.scenes.cars import car_materials, vehicle
 from rollcli.simulate.scenes.cross_section import Piece
 from rollcli.simulate.scenes.light import draw_light
 from rollcli.simulate.spec import FrameSpec
@@ -274,6 +274,30 @@ def test_a_vehicle_ahead_shows_its_rear_and_an_oncoming_one_its_front(oncoming):
     assert (car.frame[2, 2] > 0) == (not oncoming)
     assert car.frame[1] @ [0, 1, 0] > 0.99
     assert np.linalg.det(car.frame) == pytest.approx(1)
+
+
+@pytest.mark.parametrize("seed", range(9))  # cars and trucks
+def test_no_part_of_a_vehicle_covers_a_light_or_a_number_plate(seed):
+    *_, red, white, _ = range(len(car_materials(0.0)))  # in the order that its docstring gives
+    car = vehicle(np.random.default_rng(seed), Course(0.0, 0.0), Piece(-5, 5), 1.0, 12.0, 0, False)
+    lights = [part for part in car.parts if part.material in (red, white)]
+    assert len(lights) >= 4
+    for light in lights:
+        bounds = np.array(
+            [
+                [side * light.offsets[np.argmax(side * light.normals @ axis)] for side in (-1, 1)]
+                for axis in np.eye(3)
+            ]
+        )
+        outward = np.sign(bounds[2].mean())
+        shares = np.linspace(0.01, 0.99, 30)
+        right, up = (low + shares * (high - low) for low, high in bounds[:2])
+        face = np.stack(
+            [*map(np.ravel, np.meshgrid(right, up)), np.full(900, outward * np.abs(bounds[2]).max())]
+        )
+        face[2] += outward * 1e-3  # just before it
+        for part in car.parts:
+            assert not (part.normals @ face <= part.offsets[:, None]).all(axis=0).any()
 
 
 def test_a_positive_bend_turns_to_the_right_and_zero_is_straight():
