@@ -25,7 +25,9 @@ def main() -> None:
         from rollcli.cli.main import main as program  # a door: each worker process imports this module anew
 
         program(prog_name="rollcli")
-    except KeyboardInterrupt:  # before there was anything to resume
+    except (KeyboardInterrupt, RuntimeError) as error:  # before there was anything to resume
+        if isinstance(error, RuntimeError) and not isinstance(error.__cause__, KeyboardInterrupt):
+            raise  # Python before 3.12 makes one of an interrupt while an attribute learns its name
         _say_interrupted()
     except SystemExit as end:
         from rollcli.errors import ExitStatus

@@ -144,6 +144,23 @@ def test_choices_ignore_case(tmp_path):
     assert ",exact," in upper.out
 
 
+def test_an_interrupt_while_an_attribute_learns_its_name_is_status_130(tmp_path):
+    code = """
+import rollcli.cli.main
+
+class Interrupted:
+    def __set_name__(self, owner, name):
+        raise KeyboardInterrupt
+
+rollcli.cli.main.main = lambda **_: type("Owner", (), {"name": Interrupted()})
+from rollcli.__main__ import main
+main()
+"""
+    line = [sys.executable, "-c", code]
+    done = subprocess.run(line, cwd=tmp_path, env=environment(), capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (130, "rollcli: interrupted\n")
+
+
 @pytest.mark.parametrize("stdout", ["open", "closed"])
 def test_an_interrupt_while_a_module_loads_is_status_130(tmp_path, stdout):
     code = """
