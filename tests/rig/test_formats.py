@@ -377,6 +377,12 @@ def test_a_rig_whose_images_have_no_size_is_one_of_any_size(form):
     assert (found.width, found.height) == (None, None)
 
 
+@pytest.mark.parametrize("side", ["width", "height"])
+def test_half_of_a_size_is_none(side):
+    text = re.sub(rf"Camera.{side}: .*", "", samples.orb_slam(RIG))
+    assert (parse(text).width, parse(text).height) == (None, None)
+
+
 def test_a_pair_of_ros_files_without_a_size_is_one_of_any_size():
     left, right = (without_size(samples.ros(RIG, right=side)) for side in (False, True))
     found = parse(left, right)

@@ -37,7 +37,7 @@ class Estimate:
 
 
 def t_quantile(freedom: float, chance: float = 0.05) -> float:
-    """Return the two-sided quantile of Student's t, within 0.5 % from five degrees of freedom on.
+    """Return the two-sided quantile of Student's t, within 0.1 % from five degrees of freedom on.
 
     Notes
     -----

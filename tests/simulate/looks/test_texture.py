@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from rollcli.simulate.looks.facade import Facade
 from rollcli.simulate.looks.texture import NoiseTile, band, bars, coarse, fine
 
 
@@ -51,3 +52,19 @@ def test_noise_has_unit_variance_up_close_and_fades_with_distance(noise):
     assert 0.7 < spreads[0] < 1.05
     assert np.all(np.diff(spreads) < 0.02)
     assert spreads[-1] < 0.1
+
+
+def test_a_window_pane_shows_nothing_of_the_plaster_around_it():
+    def house(level):
+        one = np.ones(1, np.float32)
+        facade = Facade(0.0, np.array([0, 90], np.float32), level * one, np.ones((1, 3)), 3 * one, 2 * one)
+        return facade.albedo(p, q, np.full_like(p, 1e-3))
+
+    # 30 bays of the upper storeys; inside of one half of each window, and between windows
+    bay, storey = np.meshgrid(np.arange(30), np.arange(1, 5))
+    q = (3 * (storey.ravel() + 0.55)).astype(np.float32)
+    p = (2 * (bay.ravel() + 0.4)).astype(np.float32)
+    np.testing.assert_allclose(house(0.3), house(0.6), atol=1e-4)  # edges are a little soft
+    assert house(0.3).std() > 0.02
+    p = (2 * (bay.ravel() + 0.1)).astype(np.float32)
+    assert (house(0.6) > 1.5 * house(0.3)).all()
