@@ -115,22 +115,23 @@ def test_the_chart_has_the_colours_of_the_logarithm_of_the_counts():
         ).all()
 
 
+@pytest.mark.parametrize("per_px", [0.5, 1, 2, 4])
 @pytest.mark.parametrize(("last", "shown"), [(15.5, 16), (16.5, 32), (47.5, 48), (48.5, 64)])
-def test_the_range_shown_ends_at_the_next_multiple_of_16(last, shown):
-    counts = np.zeros((50, 100), np.int32)
-    counts[:, int(last)] = 100
-    counts[0, 90] = 9  # 0.18 % of the pixels lie beyond
-    picture = draw_v_disparity(VDisparity(counts, 100.0))[:50, LEFT_MARGIN:]
+def test_the_range_shown_ends_at_the_next_multiple_of_16(last, shown, per_px):
+    counts, bin_of_last = np.zeros((50, round(100 * per_px)), np.int32), int(last * per_px)
+    counts[:, bin_of_last] = 100
+    beyond = int(90 * per_px)
 
-    bright = np.flatnonzero(picture[25].astype(int).sum(axis=1) > 300)
-    per_pixel = 320 / shown
-    assert bright[0] == pytest.approx(int(last) * per_pixel, abs=1)
-    assert bright[-1] == pytest.approx((int(last) + 1) * per_pixel - 1, abs=1)
-    counts[0, 90] = 12  # 0.24 %
-    wider = draw_v_disparity(VDisparity(counts, 100.0))[:50, LEFT_MARGIN:]
-    assert np.flatnonzero(wider[25].astype(int).sum(axis=1) > 300)[0] == pytest.approx(
-        int(last) * 3.33, abs=6
-    )
+    def bright(few):
+        counts[0, beyond] = few
+        picture = draw_v_disparity(VDisparity(counts, 100.0))[:50, LEFT_MARGIN:]
+        return np.flatnonzero(picture[25].astype(int).sum(axis=1) > 300)
+
+    columns = bright(9)  # 0.18 % of the pixels lie beyond
+    per_bin = 320 / shown / per_px
+    assert columns[0] == pytest.approx(bin_of_last * per_bin, abs=1)
+    assert columns[-1] == pytest.approx((bin_of_last + 1) * per_bin - 1, abs=1)
+    assert bright(12)[0] == pytest.approx(bin_of_last / per_px * 320 / 96, abs=3)  # 0.24 %: all is shown
 
 
 @pytest.mark.parametrize(("height", "unit"), [(200, 1), (960, 2)])
