@@ -84,8 +84,8 @@ class ScoreTuning:
     horizon: float = 2.0
     """Units from the centre: a plane whose horizon is farther away is rather a wall, or an own bonnet."""
     least_corridor: float = 0.025
-    """Share of the pixels that the corridor should weigh: an emptier one scores less, and depth maps are told as
-    such. Twice as much, with twice `least_core`, gives a street with a narrow lane to the verge, 4.7 degrees off."""
+    """Share of the pixels that the corridor should weigh: an emptier one scores less, and depth maps are told
+    as such. Twice this, and twice `least_core`, give a narrow lane to the verge, 4.7 degrees off."""
     least_core: float = 0.01
     """The same for its core."""
 

@@ -269,7 +269,7 @@ def test_real_streets_do_not_jump_from_frame_to_frame_unless_they_are_doubted(st
     assert sum(estimate.status == "suspect" for estimate in found.values()) <= 6
 
 
-@pytest.mark.parametrize("name", ["000174_10", "000027_07"])  # the lane of the second is narrow, beside a verge
+@pytest.mark.parametrize("name", ["000174_10", "000027_07"])  # the second has a verge beside a narrow lane
 def test_a_real_street_that_is_rotated_moves_the_angle_as_much(streets, name):
     disparity = streets[name]
     start = estimate_roll(disparity).theta
