@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from rollcli.files.results import Row, format_header, format_row
+from rollcli.rig_check.values import rounded
 from tests.rig.sequence.series import drive
 from tests.run_cli import rollcli
 
@@ -144,7 +145,7 @@ def test_a_gate_that_is_kept_ends_with_0_and_one_that_is_not_with_4(folder):
     assert "the roll of maps/frame_" in said[0]
     assert "more than 0.5° from -0.4°" in said[0]
     assert "the jump at maps/frame_" in said[1]
-    assert "2,997 of 3,000 frames are ok" in said[2]
+    assert "2,997 of 3,000 frames are ok, 99.9 %, fewer than 100 %; " in said[2]
     assert "not: maps/frame_3.png, maps/frame_4.png, maps/frame_10.png" in said[2]
     checks = json.loads(rig(folder, "jump.csv", *kept, "--format", "json").out)["checks"]
     assert [(each["name"], each["ok"]) for each in checks] == [
@@ -153,6 +154,10 @@ def test_a_gate_that_is_kept_ends_with_0_and_one_that_is_not_with_4(folder):
         ("max-jump", False),
         ("min-ok", False),
     ]
+
+
+def test_what_rounds_to_nothing_has_no_sign():
+    assert [str(rounded(value)) for value in (-4e-7, 4e-7, -6e-7)] == ["0.0", "0.0", "-1e-06"]
 
 
 def test_an_interval_across_the_limit_is_said_though_the_gate_is_kept(folder):
@@ -282,7 +287,7 @@ def test_shards_without_records_are_put_together_by_name(folder):
     [
         ([0, 2], "is one of 3 shards; missing: 2/3"),
         ([1], "is one of 3 shards; missing: 1/3, 3/3"),
-        ([0, 1, 2, "copy.csv"], "are both shard 1/3"),
+        ([0, 1, 2, "copy.csv"], "rollcli: part1.csv, copy.csv: are both shard 1/3"),
         ([0, "stable.csv"], "there is no stable.csv.run.json to say which shard it is"),
         ([0, "whole.csv"], "are not shards of one run"),
         ([0, 1, "other.csv"], "are not shards of one run: --method was gd and plane"),

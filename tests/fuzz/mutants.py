@@ -63,6 +63,7 @@ FURTHER = {
         "cli/test_estimate.py",
         "cli/test_calibration.py",
         "cli/test_horizon.py",
+        "cli/test_bad_stores.py",
         "convert",
         "batch/test_kept_rows.py",
         "batch/test_images_of_others.py",
