@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from rollcli.imaging import first_look
 from rollcli.imaging.disparity_range import largest_disparity, rough_largest
 
 
@@ -102,3 +103,29 @@ def test_candidates_that_change_with_the_search_are_no_range():
     assert largest_disparity(lambda count: noise.uniform(1, count, (40, 40)) * 50, 4000, 10.0) is None
     assert largest_disparity(lambda _: np.zeros((40, 40)), 400) is None
     assert largest_disparity(lambda _: np.zeros((40, 40)), 400, 10.0) is None
+
+
+VIEWS = (np.zeros((120, 160), np.uint8),) * 2
+
+
+def test_a_known_range_is_matched_a_tenth_and_two_pixels_wider(monkeypatch):
+    searched = []
+    monkeypatch.setattr(
+        first_look, "_match", lambda pair, count: searched.append(count) or np.zeros((120, 160))
+    )
+    found = first_look._match_small(VIEWS, 40.0)
+    assert (found.top, searched) == (40.0, [pytest.approx(46)])
+
+
+@pytest.mark.parametrize(
+    ("rough", "start"), [(None, None), (19.9, 39.8), (20.0, None), (35.0, None)]
+)  # views at half the size are 80 px wide: a quarter of them are 20
+def test_half_the_size_gives_the_range_of_what_is_not_near(monkeypatch, rough, start):
+    asked = []
+    monkeypatch.setattr(first_look, "rough_largest", lambda _match, width: asked.append(width) or rough)
+    monkeypatch.setattr(
+        first_look, "largest_disparity", lambda _, width, start=None: asked.append((width, start))
+    )
+    assert first_look._match_small(VIEWS, None) is None
+    near = [(160, None)]
+    assert asked == [80, *([(160, start)] if start else []), *near]

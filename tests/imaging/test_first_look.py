@@ -161,29 +161,129 @@ def test_a_climb_that_loses_the_scene_keeps_what_it_had(monkeypatch):
     assert climb(monkeypatch, Looks(3, blind_from=2)).measured is None
 
 
-def test_a_known_range_is_matched_a_tenth_and_two_pixels_wider(monkeypatch):
-    searched = []
-    monkeypatch.setattr(module, "_match", lambda pair, count: searched.append(count) or EMPTY)
-    found = module._match_small(PAIR.views, 40.0)
-    assert (found.top, searched) == (40.0, [pytest.approx(46)])
-
-
-@pytest.mark.parametrize(
-    ("rough", "start"), [(None, None), (19.9, 39.8), (20.0, None), (35.0, None)]
-)  # views at half the size are 80 px wide: a quarter of them are 20
-def test_half_the_size_gives_the_range_of_what_is_not_near(monkeypatch, rough, start):
-    asked = []
-    monkeypatch.setattr(module, "rough_largest", lambda _match, width: asked.append(width) or rough)
-    monkeypatch.setattr(
-        module, "largest_disparity", lambda _, width, start=None: asked.append((width, start))
-    )
-    assert module._match_small(PAIR.views, None) is None
-    near = [(160, None)]
-    assert asked == [80, *([(160, start)] if start else []), *near]
-
-
 def test_views_too_narrow_to_search_have_no_disparities():
     narrow = texture_of((40, 20))
     assert not module._match((narrow, narrow), 8).any()
     wide = pair_of(8, shape=(40, 120))
     assert np.median(module._match(wide, 8.2)[:, 40:100]) == pytest.approx(8, abs=0.1)
+
+
+class Whole:
+    """The views of a pair of 480 x 640 px at half of that; what is measured in them lies 0.7 px off."""
+
+    shape, factor, views = (480, 640), 2.0, (np.zeros((240, 320), np.uint8),) * 2
+
+    def __init__(self):
+        self.asked = []
+
+    def measure(self, disparity, start):
+        self.asked.append((disparity, start))
+        return measured(0.7)
+
+
+BEFORE = 4.0  # the smallest views are so many times smaller than those of `Whole`
+AFTER = math.sqrt(240 * 320 / 30_000)  # and the larger ones, of 30,000 px
+
+
+def closer(monkeypatch, found, level_look=None, climbed=None):
+    asked = []
+    monkeypatch.setattr(module, "_look", lambda _, at, top: asked.append(("look", at, top)) or level_look)
+    monkeypatch.setattr(module, "_climb", lambda _, at, top: asked.append(("climb", at, top)) or climbed)
+    whole = Whole()
+    look, sure = module._closer(whole, found, BEFORE)
+    return look, sure, asked, whole.asked
+
+
+def test_without_a_small_match_larger_views_are_not_looked_at(monkeypatch):
+    assert closer(monkeypatch, None) == (module.FirstLook(None, None), False, [], [])
+
+
+def test_what_may_be_level_is_looked_at_from_level_again(monkeypatch):
+    """0.04 px of the smallest views are 0.32 of the whole ones: neither level nor far off."""
+    found = small(measured(0.04, error=0.001), top=8.0)
+    top = 8 * BEFORE / AFTER
+
+    look, sure, asked, again = closer(monkeypatch, found, small(measured(0.01), top=21.0))
+
+    assert (sure, asked, again) == (True, [("look", LEVEL, pytest.approx(top))], [])
+    assert look.measured.misalignment == LEVEL
+    assert look.measured.errors.offset == pytest.approx(0.01 * 2 * AFTER)
+    assert look.range == math.ceil(1.1 * 21 * 2 * AFTER) + 8
+
+    climbed = small(measured(0.2), top=22.0)
+    look, _, asked, _ = closer(monkeypatch, found, small(measured(0.2), top=21.0), climbed)
+    start = Misalignment(pytest.approx(0.04 * BEFORE / AFTER), 0.0, 0.0, 0.0)
+    assert asked == [("look", LEVEL, pytest.approx(top)), ("climb", start, pytest.approx(top))]
+    assert look.range == math.ceil(1.1 * 22 * 2 * AFTER) + 8
+
+
+def test_what_lies_off_is_climbed_from_where_the_smallest_views_ended(monkeypatch):
+    found, climbed = small(measured(0.4, error=0.001), top=8.0), small(measured(1.0), top=21.0)
+
+    look, sure, asked, again = closer(monkeypatch, found, climbed=climbed)
+
+    assert [step for step, _, _ in asked] == ["climb"]
+    assert asked[0][1].offset == pytest.approx(0.4 * BEFORE / AFTER)
+    # what is not level is measured once more, in the whole views' pixels
+    assert again == [(climbed.disparity, climbed.measured.misalignment.resized(2 * AFTER))]
+    assert look.measured == measured(0.7)
+    assert sure
+
+
+def test_what_a_climb_finds_level_is_not_measured_again(monkeypatch):
+    found, climbed = small(measured(0.4, error=0.001)), small(measured(0.01), top=21.0)
+
+    look, _, _, again = closer(monkeypatch, found, climbed=climbed)
+
+    assert not again
+    assert look.measured == climbed.measured.resized(2 * AFTER)
+
+
+def test_a_climb_that_finds_nothing_leaves_what_was_found(monkeypatch):
+    look, sure, asked, again = closer(monkeypatch, small(None, top=8.0))
+    assert [step for step, _, _ in asked] == ["climb"]
+    assert asked[0][1] == LEVEL
+    assert (look.measured, sure, again) == (None, False, [])
+
+
+class Attempts:
+    """What `first_look` asks for: climbs by where they begin, and larger views by where these ended."""
+
+    def __init__(self, monkeypatch, spreads, sure, seen=3.0):
+        self.climbed, self.closer, self.sure = [], [], sure
+        self.found = {key: small(measured(key, spread=value)) for key, value in spreads.items()}
+        monkeypatch.setattr(module, "_look", lambda *_: small(measured(seen, error=0.001)))
+        monkeypatch.setattr(module, "_climb", self.climb)
+        monkeypatch.setattr(module, "_closer", self.look)
+
+    def climb(self, _, start, first=None):
+        self.climbed.append((start.offset, first is not None))
+        return self.found[round(start.offset * 2 * math.sqrt(240 * 320 / 16_000), 6)]
+
+    def look(self, _, found, before):
+        assert before == pytest.approx(math.sqrt(240 * 320 / 16_000))
+        self.closer.append(found)
+        return module.FirstLook(len(self.closer), found.measured), self.sure
+
+
+def test_views_that_are_plainly_level_are_looked_at_once(monkeypatch):
+    attempts = Attempts(monkeypatch, {}, sure=True, seen=0.001)
+    assert first_look(Whole()).measured.misalignment == LEVEL
+    assert not attempts.climbed
+
+
+def test_a_sure_look_needs_no_other_start(monkeypatch):
+    attempts = Attempts(monkeypatch, {0.0: 0.2}, sure=True)
+    assert first_look(Whole()).measured is attempts.found[0.0].measured
+    assert attempts.climbed == [(0, True)]
+
+
+@pytest.mark.parametrize(
+    ("spreads", "best", "looks"),
+    [((0.2, 0.1, 0.3), -4.0, 2), ((0.2, 0.3, 0.1), 4.0, 2), ((0.1, 0.2, 0.3), 0.0, 1)],
+)
+def test_an_unsure_look_starts_4_px_higher_and_lower_too(monkeypatch, spreads, best, looks):
+    attempts = Attempts(monkeypatch, dict(zip((0.0, -4.0, 4.0), spreads, strict=True)), sure=False)
+    assert first_look(Whole()).measured is attempts.found[best].measured
+    assert len(attempts.climbed) == 3
+    assert len(attempts.closer) == looks

@@ -156,6 +156,16 @@ def test_the_road_is_dashed_and_lies_where_its_parabola_is(height, unit):
             assert not changed[row].any()
 
 
+def test_a_road_at_the_border_of_the_chart_is_drawn_to_it():
+    histogram = counts_of()
+    plain = draw_v_disparity(histogram)
+    for disparity, column in ((0.0, 0), (0.2, 0), (99.8, 319)):
+        changed = (draw_v_disparity(histogram, (disparity, 0, 0)) != plain).any(axis=2)[:200, LEFT_MARGIN:]
+        assert changed[4, column]
+    for disparity in (-0.2, 100.0, 140.0):
+        assert np.array_equal(draw_v_disparity(histogram, (disparity, 0, 0)), plain)
+
+
 @pytest.mark.parametrize(
     ("height", "unit", "row"), [(200, 1, 120), (960, 2, 500), (200, 1, 3), (200, 1, 0), (200, 1, 199)]
 )
