@@ -147,6 +147,8 @@ def test_a_gate_that_is_kept_ends_with_0_and_one_that_is_not_with_4(folder):
     assert "the jump at maps/frame_" in said[1]
     assert "2,997 of 3,000 frames are ok, 99.9 %, fewer than 100 %; " in said[2]
     assert "not: maps/frame_3.png, maps/frame_4.png, maps/frame_10.png" in said[2]
+    few = rig(folder, "jump.csv", "--min-ok", "0.9995")
+    assert (few.status, "99.9 %, fewer than 99.95 %; " in few.err) == (4, True)
     checks = json.loads(rig(folder, "jump.csv", *kept, "--format", "json").out)["checks"]
     assert [(each["name"], each["ok"]) for each in checks] == [
         ("expect-roll", False),
