@@ -227,6 +227,17 @@ def test_the_shift_of_a_block_is_that_of_least_squares():
         assert shares.y[block] == pytest.approx(y[block][known].mean(), abs=1e-3)
 
 
+@pytest.mark.parametrize("pixels", [45, 64])
+@pytest.mark.parametrize(("variance", "tells"), [(1.3, False), (2.02, True)])
+def test_no_block_that_could_tell_is_left_out_before_it_is_looked_at(pixels, variance, tells):
+    """Those of its pixels that have a disparity vary by so much, the others not at all."""
+    down = np.full((8, 8), 3, np.float32)
+    wave = np.resize([1.0, -1.0], pixels)
+    down.flat[:pixels] += wave * math.sqrt(variance) / wave.std() - wave.mean()
+    assert down.flat[:pixels].var() == pytest.approx(variance, rel=1e-4)
+    assert vertical._may_tell(down).item() == tells
+
+
 def seen_at(lies, noise=0.0, count=400, seed=0):
     rng = np.random.default_rng(seed)
     x, y = rng.uniform(-150, 150, count), rng.uniform(-80, 80, count)
