@@ -309,6 +309,14 @@ def test_results_that_are_not_all_shards_of_one_run_are_refused(folder, chosen, 
     assert done.err.count("\n") == 1
 
 
+def test_one_of_two_shards_is_no_whole_run(folder):
+    first, second = shards(folder, rows(*drive(**STABLE)), 2)
+    for name, other in ((first, "2/2"), (second, "1/2")):
+        alone = rig(folder, name)
+        assert (alone.status, alone.out) == (2, "")
+        assert f"{name}: is one of 2 shards; missing: {other}: " in alone.err
+
+
 def test_what_cannot_be_put_together_is_refused(folder):
     names = shards(folder, rows(*drive(**STABLE)), 2)
     (folder / "odd.csv").write_bytes((folder / names[0]).read_bytes())
