@@ -119,3 +119,14 @@ def test_a_wider_interval_counts_less():
     values = np.tile([1.0, 0.0], 200) + np.random.default_rng(0).normal(0, 0.01, 400)
     found = assess_sequence(values, np.tile([0.01, 0.5], 200))
     assert found.now.value > 0.5
+
+
+def test_a_frame_without_an_error_has_the_usual_one_of_the_frames_that_are_used():
+    values, _ = drive(3, 400, sd=0.1)
+    values[:40] = np.nan
+    whole = np.full(400, 0.05)
+    holed = whole.copy()
+    holed[40::2] = np.nan
+    holed[:40] = 5.0  # of frames without a value
+    assert assess_sequence(values, holed).now == assess_sequence(values, whole).now
+    assert assess_sequence(values, np.full(400, np.nan)).now == assess_sequence(values, np.zeros(400)).now
