@@ -15,6 +15,7 @@ pytest.importorskip("plotly", reason="plotly, of the extra report, is not here")
 pytest.importorskip("jinja2", reason="jinja2, of the extra report, is not here")
 
 NAME = "maps/<script>alert(1)</script>.png"
+DRAWN = "() => [...document.querySelectorAll('[data-chart]')].every(each => each.drawn)"
 # where on the screen the chart has the mark of a frame
 PLACE = """name => {
     const chart = document.getElementById("roll");
@@ -42,11 +43,12 @@ def url(tmp_path_factory):
 
 @pytest.fixture
 def opened(open_page, url):
-    """Opens the page, or another, and waits for its chart."""
+    """Opens the page, or another, and waits for its charts, which are drawn one after the other."""
 
     def opened_page(url=url, **how):
         page = open_page(url, **how)
         page.wait_for_selector("#roll .main-svg")
+        page.wait_for_function(DRAWN)
         return page
 
     return opened_page
@@ -71,8 +73,8 @@ def style(page, selector, name):
 def test_the_charts_are_there(opened):
     page = opened()
     assert page.title() == "Roll of 13 frames"
-    assert page.locator("#roll .scatterlayer .trace").count() >= 3
-    assert page.locator("#histogram .bars .point").count() >= 5
+    page.locator("#roll .scatterlayer .trace").nth(2).wait_for(state="attached")
+    page.locator("#histogram .bars .point").nth(4).wait_for(state="attached")
     legend = page.locator("#roll .legendtext").all_text_contents()
     assert [text for text in ("95 % interval", "roll", "failed") if text not in legend] == []
 
