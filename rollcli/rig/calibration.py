@@ -8,11 +8,8 @@ from dataclasses import dataclass, replace
 
 from rollcli.errors import UsageError
 
-_ROUNDINGS = (
-    -0.5,
-    0.0,
-    -1.0,
-)  # px: both sides of a scaled image are rounded to the nearest pixel, down, or up
+# px: both sides of a scaled image are rounded to the nearest pixel, down, or up
+_ROUNDINGS = (-0.5, 0.0, -1.0)
 # no rig reaches these; numbers that do are damage, and their squares can be beyond what a float holds
 _FOCAL = (1.0, 1e6)  # px
 _PLACE = 1e6  # px from the first pixel
