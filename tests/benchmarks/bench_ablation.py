@@ -30,8 +30,9 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, NamedTuple
 
-for threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ[threads] = "1"
+from rollcli.parallel.process_setup import limit_blas_threads
+
+limit_blas_threads()
 
 import numpy as np
 from matched import matched

@@ -8,12 +8,13 @@ one, and as told from a drift when it beats the line by more than in 95 % of the
 `bench_rig.py` shows what `rollcli rig` reaches, which knows none of this.
 """
 
-import os
 import sys
 from pathlib import Path
 
-os.environ["OPENBLAS_NUM_THREADS"] = "1"
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+from rollcli.parallel.process_setup import limit_blas_threads
+
+limit_blas_threads()
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular, toeplitz

@@ -11,14 +11,14 @@ Bars: estimate within 0.8 times the decoding at 1242x375, 0.3 times at 3840x2160
 """
 
 import math
-import os
 import sys
 import timeit
 from collections.abc import Callable
 from importlib.util import find_spec
 
-for threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ[threads] = "1"
+from rollcli.parallel.process_setup import limit_blas_threads
+
+limit_blas_threads()
 
 import cv2
 import numpy as np
