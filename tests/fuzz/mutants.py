@@ -4,6 +4,10 @@
 at random and each tried with the tests that belong to the package, which end at the first failure. What lives
 either changes nothing that anyone could see, or a test is missing. What dies is listed with the test that
 failed: on a busy machine one that waits for a browser or a network may fail for another reason.
+
+All is read from one copy of the sources, and the tests must pass there before anything is changed. So a
+change is noticed when a test fails, and also when the tests cannot even be collected: that worked before.
+Whatever else pytest ends with tells nothing about the change, and stops the whole.
 """
 
 import argparse
@@ -19,6 +23,8 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
+
+import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAM, TESTS = "rollcli", "tests"
@@ -86,6 +92,8 @@ FURTHER = {
     ),
 }
 _QUICKLY = ("-x", "-q", "-p", "no:cacheprovider")
+_NOTICED = (pytest.ExitCode.TESTS_FAILED, pytest.ExitCode.INTERRUPTED, pytest.ExitCode.USAGE_ERROR)
+_FAILURES = ("FAILED ", "ERROR ", "ImportError while loading conftest ")
 _SECONDS = 600  # a change may make an endless loop
 
 _COMPARISONS: dict[type[ast.cmpop], type[ast.cmpop]] = {
@@ -123,21 +131,21 @@ class Mutant(NamedTuple):
     source: str
 
 
-def mutants(path: Path) -> Iterator[Callable[[], Mutant]]:
-    """Yield every change of a file, each to be made when it is wanted."""
-    tree = ast.parse(path.read_text("utf-8"))
-    for place, node in enumerate(ast.walk(tree)):
+def mutants(tree: Path, path: Path) -> Iterator[Callable[[], Mutant]]:
+    """Yield every change of a file below the root, each to be made when it is wanted."""
+    module = ast.parse((tree / path).read_text("utf-8"))
+    for place, node in enumerate(ast.walk(module)):
         for number in range(len(_changes(node))):
-            yield lambda place=place, number=number: _mutant(path, tree, place, number)
+            yield lambda place=place, number=number: _mutant(path, module, place, number)
 
 
-def _mutant(path: Path, tree: ast.Module, place: int, number: int) -> Mutant:
-    changed = copy.deepcopy(tree)
+def _mutant(path: Path, module: ast.Module, place: int, number: int) -> Mutant:
+    changed = copy.deepcopy(module)
     node = list(ast.walk(changed))[place]
     before = ast.unparse(node)
     _changes(node)[number]()
     line = getattr(node, "lineno", 0)
-    return Mutant(path.relative_to(ROOT), line, f"{before}  ->  {ast.unparse(node)}", ast.unparse(changed))
+    return Mutant(path, line, f"{before}  ->  {ast.unparse(node)}", ast.unparse(changed))
 
 
 def _changes(node: ast.AST) -> list[Callable[[], None]]:
@@ -191,10 +199,10 @@ def _setter(items: list[ast.cmpop], place: int, value: ast.cmpop) -> Callable[[]
     return lambda: items.__setitem__(place, value)
 
 
-def tests_of(path: Path) -> list[str]:
+def tests_of(tree: Path, path: Path) -> list[str]:
     """List the test files to try, those first that are named after the module or import it."""
     package, name = path.parts[1], path.with_suffix("").as_posix().replace("/", ".")
-    places = [ROOT / TESTS / each for each in (package, *FURTHER.get(package, ()))]
+    places = [tree / TESTS / each for each in (package, *FURTHER.get(package, ()))]
     files = [
         file for place in places for file in ([place] if place.suffix else sorted(place.rglob("test_*.py")))
     ]
@@ -204,17 +212,14 @@ def tests_of(path: Path) -> list[str]:
             return 0
         return 1 if name in file.read_text("utf-8") else 2
 
-    return [str(file.relative_to(ROOT)) for file in sorted(dict.fromkeys(files), key=distance)]
+    return [str(file.relative_to(tree)) for file in sorted(dict.fromkeys(files), key=distance)]
 
 
-def noticed(mutant: Mutant, tree: Path) -> str:
-    """Name the test that fails on the changed program; empty when none does."""
-    target = tree / mutant.path
-    whole = target.read_bytes()
-    target.write_text(mutant.source, "utf-8")
+def failure(tree: Path, files: Sequence[str]) -> str:
+    """Run the tests of the copy; name the one that fails, or cannot be collected; empty when none does."""
     try:
         done = subprocess.run(
-            [sys.executable, "-m", "pytest", *_QUICKLY, *tests_of(mutant.path)],
+            [sys.executable, "-m", "pytest", *_QUICKLY, *files],
             cwd=tree,
             env={**os.environ, "PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1"},
             stdout=subprocess.PIPE,
@@ -226,12 +231,24 @@ def noticed(mutant: Mutant, tree: Path) -> str:
         )
     except subprocess.TimeoutExpired:
         return f"no end in {_SECONDS} s"
+    if done.returncode == pytest.ExitCode.OK:
+        return ""
+    # what cannot be imported has a line ERROR; with a conftest pytest calls it wrong usage
+    said = [line for line in done.stdout.splitlines() if line.startswith(_FAILURES)]
+    if said and done.returncode in _NOTICED:
+        return said[0].partition(" - ")[0]
+    sys.exit(f"{done.stdout}\npytest ended with {done.returncode}: the tests neither passed nor failed")
+
+
+def noticed(mutant: Mutant, tree: Path) -> str:
+    """Name the test that fails on the changed program; empty when none does."""
+    target = tree / mutant.path
+    whole = target.read_bytes()
+    target.write_text(mutant.source, "utf-8")
+    try:
+        return failure(tree, tests_of(tree, mutant.path))
     finally:
         target.write_bytes(whole)
-    if done.returncode == 0:
-        return ""
-    failed = [line for line in done.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
-    return failed[0].partition(" - ")[0] if failed else f"pytest's status {done.returncode}"
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -241,7 +258,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--count", type=int, default=15)
     parser.add_argument("--seed", type=int, default=1)
     given = parser.parse_args(arguments)
-    every = sorted(path.parent.name for path in (ROOT / PROGRAM).glob("*/__init__.py"))
     with tempfile.TemporaryDirectory() as folder:
         tree = Path(folder) / "tree"
         shutil.copytree(
@@ -251,10 +267,15 @@ def main(arguments: Sequence[str] | None = None) -> None:
         )
         if (ROOT.parent / "shared").exists():
             (tree.parent / "shared").symlink_to((ROOT.parent / "shared").resolve())
+        every = sorted(path.parent.name for path in (tree / PROGRAM).glob("*/__init__.py"))
+        for unknown in set(given.packages) - set(every):
+            parser.error(f"no package of {PROGRAM}: {unknown}")
         for package in given.packages or every:
-            places = [
-                make for path in sorted((ROOT / PROGRAM / package).rglob("*.py")) for make in mutants(path)
-            ]
+            modules = sorted(path.relative_to(tree) for path in (tree / PROGRAM / package).rglob("*.py"))
+            said = failure(tree, tests_of(tree, modules[0]))
+            if said:
+                sys.exit(f"{package}: its tests fail before anything is changed: {said}")
+            places = [make for path in modules for make in mutants(tree, path)]
             drawn = random.Random(f"{given.seed} {package}").sample(places, min(given.count, len(places)))
             start, killed = time.monotonic(), 0
             for make in drawn:
