@@ -172,7 +172,7 @@ def _thinned(series: Series) -> tuple[Series, int]:
     weights = np.where(series.used, 1 / (series.variances + spread), 0.0)
     starts = np.arange(0, len(series.values), width)
     total = np.add.reduceat(weights, starts)
-    safe = np.maximum(total, 1e-300)
+    safe = np.where(total > 0, total, 1.0)
     values = np.add.reduceat(weights * series.values, starts) / safe
     variances = np.add.reduceat(weights**2 * series.variances, starts) / safe**2
     used = total > 0

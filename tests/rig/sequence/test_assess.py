@@ -2,8 +2,13 @@
 
 import numpy as np
 import pytest
+import statsmodels.api as sm
+from scipy.stats import t as student
 
+from rollcli.rig.sequence import assess
 from rollcli.rig.sequence.assess import assess_sequence
+from rollcli.rig.sequence.blocks import block_count, frames_needed, hidden, make_blocks
+from rollcli.rig.sequence.jumps import Series, search
 from tests.rig.sequence.series import drive
 
 SEEDS = range(4)
@@ -130,3 +135,119 @@ def test_a_frame_without_an_error_has_the_usual_one_of_the_frames_that_are_used(
     holed[:40] = 5.0  # of frames without a value
     assert assess_sequence(values, holed).now == assess_sequence(values, whole).now
     assert assess_sequence(values, np.full(400, np.nan)).now == assess_sequence(values, np.zeros(400)).now
+
+
+def white(frames, sd=0.1, seed=0):
+    return np.random.default_rng(seed).normal(0, sd, frames)
+
+
+def test_the_drift_is_the_line_through_the_blocks_and_its_error_that_of_statsmodels():
+    values = white(600) + np.linspace(-0.2, 0.3, 600)
+    found = assess_sequence(values, np.full(600, 0.01))
+    assert found.noise.correlation_time <= 2
+    count = block_count(600, found.noise)
+    blocks = make_blocks(found.values, found.weights, count)
+    line = sm.WLS(blocks.means, sm.add_constant(blocks.centres / 599), weights=blocks.weights).fit()
+    assert found.drift.value == pytest.approx(line.params[1], rel=1e-9)
+    inflation = hidden(found.noise, 600, count)
+    assert found.drift.error == pytest.approx(line.bse[1] * np.sqrt(inflation), rel=1e-6)
+    assert found.drift.freedom == line.df_resid == count - 2
+    assert found.drift.ci95 == pytest.approx(student.ppf(0.975, count - 2) * found.drift.error, rel=1e-4)
+    assert found.drift.value == pytest.approx(0.5, abs=2 * found.drift.ci95)
+
+
+def test_a_drift_beside_a_jump_is_that_of_the_line_between_levels():
+    values = white(900, 0.05) + np.linspace(0, 1, 900)
+    values[450:] += 2.0
+    found = assess_sequence(values, np.full(900, 0.01))
+    (jump,) = found.jumps
+    assert (jump.frame, found.drifts, found.status) == (450, True, "jump")
+    frames = np.arange(900)
+    steps = np.column_stack([frames / 899, frames < 450, frames >= 450]).astype(float)
+    line = sm.OLS(values, steps).fit()
+    assert found.drift.value == pytest.approx(line.params[0], abs=0.1 * line.bse[0] + 0.01)
+    assert jump.change.value == pytest.approx(line.params[2] - line.params[1], abs=0.02)
+
+
+@pytest.mark.parametrize("drift", [0.0, 1.0])
+def test_the_size_of_a_jump_has_the_error_that_statsmodels_finds_with_the_same_noise(drift):
+    values, errors = drive(7, 1500, phi=0.5, sd=0.05, errors=(0.02, 0.05), drift=drift)
+    values[500:] += 1.0
+    values[1100:] -= 0.7
+    fit = search(Series(values, errors**2, np.ones(1500, dtype=bool)))
+    cells = fit.cells
+    oracle = sm.GLS(cells.values, cells.design(fit.starts, fit.drift), np.linalg.inv(cells.precision)).fit()
+    for place in (0, 1):
+        change = assess._change(fit, place, 1500, fit.noise)
+        assert change.value == pytest.approx(oracle.params[place - 2], rel=1e-6)
+        assert change.error == pytest.approx(oracle.bse[place - 2], rel=1e-6)
+        assert change.freedom == max(block_count(1500, fit.noise), 8) - 1
+        assert change.ci95 == pytest.approx(student.ppf(0.975, change.freedom) * change.error, rel=1e-3)
+
+
+def test_a_known_drift_is_no_spread_of_the_mean():
+    still, moving = (
+        assess_sequence(white(800) + drift, np.full(800, 0.01)).now for drift in (0, np.linspace(-2, 2, 800))
+    )
+    assert moving.value == pytest.approx(still.value, abs=1e-3)
+    # one degree of freedom less, and a block holds what the line does not explain
+    assert moving.ci95 == pytest.approx(still.ci95, rel=0.25)
+    assert moving.freedom == still.freedom - 1
+
+
+def test_few_blocks_have_no_drift_but_say_how_many_frames_it_takes():
+    values, errors = drive(4, 60, phi=0.95, sd=0.3, errors=(0.02, 0.05))
+    found = assess_sequence(values, errors)
+    assert (found.drift.value, found.drift.ci95) == (None, None)
+    assert found.drift.needed == frames_needed(found.noise) > 60
+
+
+def test_the_mean_over_some_frames_is_that_of_theirs():
+    values = white(300) + np.repeat([0.0, 1.0, 2.0], 100)
+    found = assess_sequence(values, np.full(300, 0.01))
+    for first, last in ((0, 99), (100, 199), (3, 3)):
+        part = slice(first, last + 1)
+        expected = np.average(values[part], weights=found.weights[part])
+        assert found.mean_over(first, last).value == pytest.approx(expected)
+    assert assess_sequence([np.nan], [0.1]).mean_over(0, 0).value is None
+
+
+def test_a_drive_of_too_many_frames_is_searched_in_averages_of_as_few_neighbours_as_possible():
+    for frames, width in ((40_000, 1), (40_001, 2), (80_000, 2), (80_001, 3)):
+        rng = np.random.default_rng(frames)
+        used = rng.random(frames) < 0.6
+        used[6:12] = False
+        given = Series(np.where(used, rng.normal(1, 0.2, frames), 0), rng.uniform(0.01, 0.1, frames), used)
+        short, by = assess._thinned(given)
+        assert (by, len(short.values)) == (width, -(-frames // width))
+        if width == 1:
+            continue
+        middle = np.median(given.values[used])
+        share = np.where(used, 1 / (given.variances + np.median((given.values[used] - middle) ** 2)), 0)
+        for place in (0, 1, 5, 6, 200, len(short.values) - 1):
+            part = slice(place * width, (place + 1) * width)
+            assert short.used[place] == used[part].any()
+            if used[part].any():
+                mean = np.average(given.values[part], weights=share[part])
+                variance = (share[part] ** 2 @ given.variances[part]) / share[part].sum() ** 2
+                assert (short.values[place], short.variances[place]) == pytest.approx((mean, variance))
+
+
+def test_of_what_is_assessed_only_what_is_used_has_a_value_and_weight():
+    values, errors = white(200), np.full(200, 0.05)
+    values[20:30], values[100] = np.nan, 40.0
+    errors[50:60], errors[60:70] = np.nan, -1.0  # neither is an error
+    found = assess_sequence(values, errors)
+    left_out = np.isin(np.arange(200), [*range(20, 30), 100])
+    assert (found.frames, found.used, found.outliers) == (200, 189, 1)
+    assert np.array_equal(found.weights == 0, left_out)
+    assert np.array_equal(found.values == 0, left_out)
+    errors[50:70] = 0.05
+    assert assess_sequence(values, errors).now == found.now
+
+
+def test_the_spread_between_frames_is_what_their_errors_do_not_explain():
+    rng = np.random.default_rng(3)
+    values = rng.normal(0, 0.3, 4000) + rng.normal(0, 0.1, 4000)
+    found = assess_sequence(values, np.full(4000, 0.1))
+    assert found.between_sd == pytest.approx(0.3, rel=0.05)
