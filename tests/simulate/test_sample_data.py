@@ -32,10 +32,10 @@ def test_the_script_makes_the_same_files_and_the_same_truth(made):
 
 
 def test_the_script_makes_the_same_pictures(made):
-    # not the same bytes: other versions of OpenCV compress and round in other ways
+    # other versions compress in other ways, and other processors may round a grey level to its neighbour
     for name in (f"{side}/{stem}.png" for side in ("left", "right") for stem in STEMS):
         difference = np.abs(read_image(SAMPLES / name).astype(float) - read_image(made / name))
-        assert difference.mean() < 0.5
+        assert np.mean(difference > 1) < 1e-4
 
 
 @pytest.mark.parametrize(("stem", "spec"), list(zip(STEMS, SPECS, strict=True)))

@@ -48,3 +48,62 @@ def test_the_longest_correlation_that_fits_is_that_of_the_best_where_no_other_fi
     deviance[0, 0] = 0.9  # fits as well, but its slow share is smaller
     longer = noise._longest(deviance, decays, shares, np.unravel_index(4, (3, 3)))
     assert longer == pytest.approx(1 + 38.0 * min(1.0, 0.3 * noise._SLOW_MATTERS))
+
+
+@pytest.mark.parametrize("frames", [4, 5, 40, 41, 3000, 3001])
+def test_the_periodogram_has_every_frequency_once_and_the_slow_ones_by_themselves(frames):
+    series = np.random.default_rng(3).normal(0, 1, frames)
+    power, omega, counts = noise._periodogram(series)
+    every = np.arange(1, (frames + 1) // 2)
+    raw = [np.abs(np.sum(series * np.exp(-2j * np.pi * k * np.arange(frames) / frames))) ** 2 for k in every]
+    ends = np.cumsum(counts).astype(int)
+    assert ends[-1] == len(every)
+    for start, end, mean, middle in zip(ends - counts.astype(int), ends, power, omega, strict=True):
+        assert mean == pytest.approx(np.mean(raw[start:end]) / frames)
+        assert middle == pytest.approx(2 * np.pi * every[start:end].mean() / frames)
+    assert (counts[: min(len(every), 24)] == 1).all()
+    assert len(counts) <= 24 + 90
+
+
+def test_the_deviance_is_whittles_likelihood_at_its_best_scale():
+    rng = np.random.default_rng(4)
+    power, omega, counts = (
+        rng.exponential(1, 12),
+        np.linspace(0.1, 3, 12),
+        rng.integers(1, 9, 12).astype(float),
+    )
+    decays, shares = np.array([0.02, 0.3, 1.0]), np.array([0.0, 0.4, 1.0])
+    deviance, scale = noise._deviance(power, omega, counts, decays, shares)
+    for row, decay in enumerate(decays):
+        for column, share in enumerate(shares):
+            # the spectrum of AR(1) as the sum of its correlations, which fade within 2,000 frames
+            lags = np.arange(1, 2000)
+            slow = 1 + 2 * np.cos(np.outer(omega, lags)) @ (1 - decay) ** lags
+            shape = share * slow + 1 - share
+
+            def whittle(factor, shape=shape):
+                return 2 * np.sum(counts * (np.log(factor * shape) + power / (factor * shape)))
+
+            best = scale[row, column]
+            assert whittle(best) < min(whittle(0.99 * best), whittle(1.01 * best))
+            assert deviance[row, column] == pytest.approx(whittle(best) - 2 * counts.sum())
+
+
+def test_few_frames_have_a_correlation_time_of_half_of_them_at_most():
+    for seed in range(20):
+        for frames in (4, 12, 40):
+            found = fit_noise(ar1(np.random.default_rng(seed), frames, 0.99, 1.0))
+            assert 1 <= found.correlation_time <= max(1 + 2 * found.phi / (1 - found.phi), frames / 2)
+
+
+def test_frames_that_are_hardly_correlated_are_taken_for_two_at_most():
+    times = [fit_noise(np.random.default_rng(seed).normal(0, 1, 300)).correlation_time for seed in range(100)]
+    # eight in deviance are brought by chance in a few of a hundred
+    assert np.mean(np.array(times) <= 2) > 0.9
+    assert min(times) >= 1
+
+
+def test_a_slow_share_of_less_than_a_third_counts_in_part():
+    assert noise._forgotten(0.1, 1.0) == noise._forgotten(0.1, 0.5) == pytest.approx(19)
+    assert noise._forgotten(0.1, 1 / 6) == pytest.approx(10)
+    assert noise._forgotten(1.0, 1.0) == noise._forgotten(0.1, 0.0) == 1

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from rollcli.simulate.geometry.solids import Post, TreeCrown
+from rollcli.simulate.geometry.solids import Post, Solid, TreeCrown
 from rollcli.simulate.geometry.surfaces import Backdrop, Course, Ground, Wall
-from rollcli.simulate.scenes.cars import vehicle
+from rollcli.simulate.scenes.cars import box, vehicle
 from rollcli.simulate.scenes.cross_section import Piece
 
 COURSE = Course(heading=0.03, bend=1 / 300, curvature=0.001)
@@ -64,7 +64,9 @@ SURFACES = [
 @pytest.mark.parametrize(("surface", "inside", "toward", "spread"), SURFACES)
 def test_a_ray_meets_a_surface_where_marching_along_it_first_comes_inside(surface, inside, toward, spread):
     direction = rays(300, toward, spread)
-    met = surface.intersect(ORIGIN, direction)
+    # along rays of any length
+    scale = np.random.default_rng(1).uniform(0.3, 3, 300)
+    met = surface.intersect(ORIGIN, direction * scale) * scale
     step = 0.02
     marched = np.full(300, np.inf)
     for t in np.arange(step, 75, step)[::-1]:
@@ -128,3 +130,13 @@ def test_normals_and_gradients_are_those_of_the_surface(surface, toward):
     for before, after, gradient in ((at.p, beside.p, at.grad_p), (at.q, beside.q, at.grad_q)):
         change = (gradient * moved).sum(axis=0)
         assert np.median(np.abs(after - before - change)[same_face]) < 0.01 * moves
+
+
+@pytest.mark.parametrize("mirror", [1.0, -1.0])
+def test_a_ray_along_the_faces_of_a_box_meets_its_front_where_it_does_not_pass_by(mirror):
+    extent = np.array([[-1.0, 1.0], [0.0, 2.0], [-3.0, 3.0]])
+    body = Solid(np.diag([mirror, 1, 1]), np.array([0.0, 0.0, 10.0]), (box(1.0, 2.0, 3.0, 0),), extent)
+    x, y = (each.ravel() for each in np.meshgrid([-1.5, -0.5, 0.5, 1.5], [-0.5, 0.5, 1.5, 2.5]))
+    origin = np.array([x, y, np.zeros(16)])
+    met = body.intersect(origin, np.tile([[0.0], [0.0], [1.0]], 16))
+    assert np.array_equal(met, np.where((np.abs(x) < 1) & (y > 0) & (y < 2), 7.0, np.inf))
