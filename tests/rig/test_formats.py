@@ -396,3 +396,16 @@ def test_a_key_without_a_value_is_an_empty_one():
 
 def test_json_that_is_no_object_is_refused():
     assert refusal('["intrinsic", "u0"]') == "calib0: is no JSON object"
+
+
+def test_a_calibration_without_a_size_has_no_edge_that_its_centre_could_be_near():
+    for width, height in ((None, None), (640, None), (None, 480)):
+        assert not Calibration(700.0, 700.0, 639.0, 479.0, width=width, height=height).at_edge
+    sized = {"fx": 700.0, "fy": 700.0, "width": 1000, "height": 500}
+    for cx, cy, near in (
+        (899.4, 449.4, False),
+        (899.6, 250.0, True),
+        (500.0, 449.6, True),
+        (1.0, 1.0, False),
+    ):
+        assert Calibration(cx=cx, cy=cy, **sized).at_edge == near
