@@ -409,3 +409,29 @@ def test_a_calibration_without_a_size_has_no_edge_that_its_centre_could_be_near(
         (1.0, 1.0, False),
     ):
         assert Calibration(cx=cx, cy=cy, **sized).at_edge == near
+
+
+def nested(levels):
+    """YAML of mappings, YAML of lists in brackets, and an XML of OpenCV with elements in each other."""
+    keys = "".join(" " * place + "a:\n" for place in range(levels)) + " " * levels + "a: x\n"
+    lists = f"a: {'[' * levels}x{']' * levels}\n"
+    q = "<Q><data>1 0 0 -600 0 1 0 -180 0 0 0 700 0 0 2 0</data></Q>"
+    inner = "<a>" * (levels - 1) + "</a>" * (levels - 1)
+    return keys, lists, f"<?xml version='1.0'?><opencv_storage>{q}{inner}</opencv_storage>"
+
+
+def test_a_calibration_nests_sixteen_levels_deep():
+    keys, lists, xml = nested(16)
+    found, listed = parse_yaml(keys, "f"), parse_yaml(lists, "f")["a"]
+    for _ in range(16):
+        found, (listed,) = found["a"], listed
+    assert (found, listed) == ({"a": "x"}, "x")
+    assert parse(xml).baseline == 0.5
+
+
+def test_a_calibration_that_nests_deeper_is_refused():
+    keys, lists, xml = nested(17)
+    for text in (keys, lists):
+        with pytest.raises(InputError, match="nests deeper than a calibration does"):
+            parse_yaml(text, "f")
+    assert "nests deeper than a calibration does" in refusal(xml)
