@@ -8,6 +8,10 @@ from typing import Any
 from rollcli.errors import InputError, UsageError
 
 MAGIC = b"PAR1"
+_ROWS_AT_ONCE = 1000
+_ROW_BYTES = 200  # of memory that a row takes, even an empty one
+# real results have up to 100 bytes of values for each of the file's, and most files are small
+_MOST_BYTES, _MOST_FOLD = 64 << 20, 200
 _RECORD = b"rollcli"
 _ARROW_TYPES = {str: "string", float: "float64", int: "int64", bool: "bool"}
 
@@ -56,7 +60,7 @@ def encode_parquet(
         name = error.object.encode("utf-8", "backslashreplace").decode()
         raise UsageError(f"{name}: this name is not UTF-8, which Parquet cannot hold; use CSV") from error
     target = io.BytesIO()
-    pyarrow.parquet.write_table(table, target, compression="zstd", version="2.6")
+    pyarrow.parquet.write_table(table, target, compression="zstd", version="2.6", write_page_checksum=True)
     return target.getvalue()
 
 
@@ -66,7 +70,7 @@ def decode_parquet(data: bytes, name: str) -> Iterator[tuple[int, dict[str, Any]
     Raises
     ------
     InputError
-        It is damaged.
+        It is damaged, or made to fill the memory.
     UsageError
         The extra `parquet` is not installed.
     """
@@ -74,8 +78,25 @@ def decode_parquet(data: bytes, name: str) -> Iterator[tuple[int, dict[str, Any]
     import pyarrow
     import pyarrow.parquet
 
+    number, allowed = 0, max(_MOST_BYTES, _MOST_FOLD * len(data))
     try:
-        table = pyarrow.parquet.ParquetFile(io.BytesIO(data)).read()
+        file = pyarrow.parquet.ParquetFile(io.BytesIO(data), page_checksum_verification=True)
+        claimed = sum(file.metadata.row_group(group).total_byte_size for group in range(file.num_row_groups))
+        if claimed > allowed:
+            raise InputError(
+                f"{name}: claims {claimed} bytes of values in {len(data)}; no result has so many"
+            )
+        for column in file.schema_arrow:
+            if pyarrow.types.is_dictionary(column.type):  # a few bytes of it can stand for gigabytes
+                raise InputError(f"{name}: its column {column.name} is a dictionary; write plain values")
+        for batch in file.iter_batches(_ROWS_AT_ONCE):
+            allowed -= max(batch.nbytes, _ROW_BYTES * batch.num_rows)
+            if allowed < 0:
+                raise InputError(f"{name}: its {len(data)} bytes hold more values than any result")
+            for values in batch.to_pylist():
+                number += 1
+                yield number, values
+        if number != file.metadata.num_rows:
+            raise InputError(f"{name}: is damaged: it has {number} of {file.metadata.num_rows} rows")
     except (pyarrow.ArrowException, OSError, ValueError) as error:
         raise InputError(f"{name}: is damaged: {' '.join(str(error).split())[:200]}") from error
-    yield from enumerate(table.to_pylist(), 1)

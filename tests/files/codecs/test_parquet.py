@@ -1,0 +1,79 @@
+"""Results as Parquet: damage is refused, and so is what was made to fill the memory."""
+
+import io
+
+import pytest
+
+from rollcli.errors import InputError
+from rollcli.files.codecs.parquet import decode_parquet, encode_parquet
+from rollcli.files.results import Row, column_types, plain_values
+from tests.fuzz.mutations import every_region
+
+pyarrow = pytest.importorskip("pyarrow", reason="pyarrow, of the extra parquet, is not here")
+parquet = pytest.importorskip("pyarrow.parquet")
+
+ROWS = [plain_values(Row(f"maps/frame{index}.png", status="ok", roll_deg=index / 7)) for index in range(2500)]
+
+
+def written(**columns):
+    target = io.BytesIO()
+    parquet.write_table(pyarrow.table(columns), target, compression="zstd")
+    return target.getvalue()
+
+
+def refusal(data):
+    with pytest.raises(InputError) as caught:
+        list(decode_parquet(data, "x"))
+    return str(caught.value)
+
+
+def test_rows_come_back_with_their_numbers():
+    data = encode_parquet(column_types(), ROWS, {"rollcli": "0"})
+
+    assert list(decode_parquet(data, "x")) == list(enumerate(ROWS, 1))
+
+
+def test_values_damaged_anywhere_are_refused_or_read_the_same():
+    whole = encode_parquet(column_types(), ROWS[:20], {})
+    footer = whole[-8 - int.from_bytes(whole[-8:-4], "little") :]  # has no checksum
+    for broken in every_region(whole.removesuffix(footer)):
+        try:
+            rows = list(decode_parquet(broken + footer, "x"))
+        except InputError:
+            continue
+        assert rows == list(enumerate(ROWS[:20], 1))
+
+
+def test_a_table_with_fewer_rows_than_it_says_is_damaged(monkeypatch):
+    data = encode_parquet(column_types(), ROWS, {})
+    whole = parquet.ParquetFile.iter_batches
+    monkeypatch.setattr(parquet.ParquetFile, "iter_batches", lambda *args: [next(whole(*args))])
+
+    assert refusal(data) == "x: is damaged: it has 1000 of 2500 rows"
+
+
+def test_text_that_is_not_utf8_is_refused():
+    latin = pyarrow.array([b"caf\xe9.png"]).view(pyarrow.string())
+
+    assert refusal(written(file=latin)).startswith("x: is damaged: ")
+
+
+@pytest.mark.parametrize(
+    "column",
+    [
+        lambda: pyarrow.array(["x" * 20_000] * 5_000),
+        lambda: pyarrow.nulls(500_000, pyarrow.float64()),
+    ],
+    ids=["long texts", "rows of nothing"],
+)
+def test_few_bytes_that_hold_many_values_are_refused(column):
+    data = written(file=column())
+
+    assert len(data) < 1_000_000
+    assert refusal(data).endswith(("no result has so many", "hold more values than any result"))
+
+
+def test_a_text_that_stands_for_many_is_refused():
+    repeated = pyarrow.array(["x" * 1000] * 10).dictionary_encode()
+
+    assert refusal(written(file=repeated)) == "x: its column file is a dictionary; write plain values"
