@@ -11,6 +11,7 @@ from tests.fuzz.cases import CASES
 from tests.fuzz.child import read_all_ways
 from tests.fuzz.corpus import READERS, corpus
 from tests.fuzz.mutations import at_random, every_region, with_repairs
+from tests.fuzz.texts import READ_BY, read_text, texts
 
 FILES = {name: data for name, data in corpus().items() if name != "large.png"}
 
@@ -49,3 +50,12 @@ def test_any_bytes_are_read_or_refused_in_one_line(data, start):
 @pytest.mark.parametrize("case", CASES)
 def test_what_was_found_before_stays_fixed(case):
     assert read_all_ways(CASES[case]) == "refused"
+
+
+@pytest.mark.parametrize("reader", READ_BY)
+def test_whole_texts_are_read_and_broken_ones_are_read_or_refused(reader):
+    random = Random(1)
+    for name, whole in texts([reader]).items():
+        assert read_text(whole, name) == ("refused" if "unrectified" in name else "read")
+        answers = [read_text(at_random(whole, random), name) for _ in range(10)]
+        assert set(answers) <= {"read", "refused"}

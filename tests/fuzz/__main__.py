@@ -1,7 +1,8 @@
 """Throw broken files at the readers for a while, and keep what they stumble over.
 
 Every file must be read or refused with one line: no other exception, no crash, no more than two seconds and a
-gigabyte, and nothing on the terminal.
+gigabyte, and nothing on the terminal. Texts (results, records of runs, settings, calibrations, known angles,
+lists of files) are read by a command, which must end with a status that its help names.
 """
 
 import argparse
@@ -21,7 +22,9 @@ from typing import IO
 
 from tests.fuzz.corpus import READERS, corpus
 from tests.fuzz.mutations import at_random, every_region, with_repairs
+from tests.fuzz.texts import READ_BY, texts
 
+ALL = (*READERS, *READ_BY)
 HANG = 2.0
 KEPT = Path("out/fuzz")
 
@@ -40,19 +43,20 @@ class Reader:
             stdout=subprocess.PIPE,
             stderr=self._printed,
         )
-        self.read(b"warm up", patience=60)
+        self.read(b"", "warm up", patience=60)
 
-    def read(self, data: bytes, patience: float = HANG) -> str:
+    def read(self, data: bytes, name: str, patience: float = HANG) -> str:
         """What became of a file: "read", "refused", or a find."""
         before = self._printed.seek(0, 2)
         assert self._process.stdin is not None
         assert self._process.stdout is not None
-        self._process.stdin.write(struct.pack("<I", len(data)) + data)
+        self._process.stdin.write(struct.pack("<II", len(name), len(data)) + name.encode() + data)
         self._process.stdin.flush()
         ready, _, _ = select.select([self._process.stdout], [], [], patience)
         answer = self._process.stdout.readline().decode().strip() if ready else ""
         if not answer:
             answer = f"ended with {self._process.wait()}" if ready else f"no answer within {patience} s"
+            self._process.kill()
             self.close()
             self._start()
         elif self._printed.seek(0, 2) > before:
@@ -61,14 +65,13 @@ class Reader:
         return answer
 
     def close(self) -> None:
-        """End the child."""
-        self._process.kill()
+        """End the child, which tidies up."""
         self._process.communicate()
 
 
-def broken_files(seed: int, readers: Iterable[str] = READERS) -> Iterator[tuple[str, bytes]]:
+def broken_files(seed: int, readers: Iterable[str] = ALL) -> Iterator[tuple[str, bytes]]:
     """(name of the whole file, broken file): each region of each file, then places at random without end."""
-    files = corpus(readers)
+    files = corpus(readers) | texts(readers)
     for name, whole in files.items():
         for broken in every_region(whole):
             yield from ((name, each) for each in with_repairs(broken))
@@ -87,21 +90,21 @@ def main() -> int:
         "--seed", type=int, default=int(time.time()), help="for random places (default: the time)"
     )
     parser.add_argument(
-        "--reader", action="append", choices=READERS, help="whose files, repeatable (default: every one's)"
+        "--reader", action="append", choices=ALL, help="whose files, repeatable (default: every one's)"
     )
     options = parser.parse_args()
-    readers = options.reader or list(READERS)
+    readers = options.reader or list(ALL)
     print(f"{', '.join(readers)}, seed {options.seed}, {options.seconds:g} s", flush=True)
     end = time.monotonic() + options.seconds
     counts: Counter[str] = Counter()
     finds: dict[str, Path] = {}
     reader = Reader()
     for name, data in broken_files(options.seed, readers):
-        answer = reader.read(data)
+        answer = reader.read(data, name)
         counts[answer if answer in ("read", "refused") else "finds"] += 1
         if answer not in ("read", "refused") and answer not in finds:
             KEPT.mkdir(parents=True, exist_ok=True)
-            finds[answer] = KEPT / f"{hashlib.sha256(data).hexdigest()[:12]}-{name}"
+            finds[answer] = KEPT / f"{hashlib.sha256(data).hexdigest()[:12]}-{name.replace('/', '-')}"
             finds[answer].write_bytes(data)
             print(f"{finds[answer]}: {answer}", flush=True)
         if time.monotonic() > end:

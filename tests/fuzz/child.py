@@ -12,6 +12,7 @@ from rollcli.files.encodings import to_disparity
 from rollcli.files.formats import decode_image, decode_mask, decode_stored
 from rollcli.parallel.process_setup import prepare_worker
 from tests.fuzz.corpus import corpus
+from tests.fuzz.texts import read_text, texts
 
 MEMORY = 2**30
 
@@ -34,6 +35,11 @@ def read_all_ways(data: bytes) -> str:
     return "read" if read else "refused"
 
 
+def read_whole(data: bytes, name: str) -> str:
+    """Read what bears the name of a text as one, and anything else as a picture."""
+    return read_text(data, name) if "/" in name else read_all_ways(data)
+
+
 def _limit_memory() -> None:
     pages = int(Path("/proc/self/statm").read_text().split()[0])
     limit = pages * resource.getpagesize() + MEMORY
@@ -41,11 +47,11 @@ def _limit_memory() -> None:
 
 
 def _serve(requests: BinaryIO, answers: BinaryIO) -> None:
-    """Answer each length-prefixed file with a line."""
-    while size := requests.read(4):
-        data = requests.read(struct.unpack("<I", size)[0])
+    """Answer each file with a line; the lengths of its name and of its bytes stand before them."""
+    while sizes := requests.read(8):
+        name, data = (requests.read(size) for size in struct.unpack("<II", sizes))
         try:
-            answer = read_all_ways(data)
+            answer = read_whole(data, name.decode())
         except Exception:  # noqa: BLE001 (whatever gets here is the find)
             answer = "failed: " + " | ".join(
                 traceback.format_exc(limit=-1, chain=False).strip().splitlines()[1:]
@@ -56,7 +62,7 @@ def _serve(requests: BinaryIO, answers: BinaryIO) -> None:
 
 if __name__ == "__main__":
     prepare_worker()
-    for whole in corpus().values():
-        read_all_ways(whole)  # what is imported late, and kept, does not count
+    for name, whole in (corpus() | texts()).items():
+        read_whole(whole, name)  # what is imported late, and kept, does not count
     _limit_memory()
     _serve(sys.stdin.buffer, sys.stdout.buffer)

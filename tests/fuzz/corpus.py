@@ -20,7 +20,7 @@ GREYS = bytes(np.repeat(np.arange(256, dtype=np.uint8), 3))
 
 
 def corpus(readers: Iterable[str] = READERS) -> dict[str, bytes]:
-    """Name and bytes of each file that these readers read."""
+    """Name and bytes of each file that the readers of pictures among these read."""
     grey, deep, real = MAP.astype(np.uint8), (MAP * 256).astype(np.uint16), MAP.astype(np.float32)
     colour = np.dstack([grey, grey // 2, grey])
     text = (b"tEXt", b"Comment\0made by hand")
@@ -51,7 +51,7 @@ def corpus(readers: Iterable[str] = READERS) -> dict[str, bytes]:
     files["big.tif"] = make_tiff(real, "deflate", big=True)
     files["pages.tif"] = make_tiff(grey, pages=3)
     files["colour.tif"] = make_tiff(colour, "lzw", photometric=2)
-    endings = tuple(ending for reader in readers for ending in READERS[reader])
+    endings = tuple(ending for reader in readers for ending in READERS.get(reader, ()))
     return {name: whole for name, whole in files.items() if name.endswith(endings)}
 
 

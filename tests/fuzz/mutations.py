@@ -6,7 +6,23 @@ from random import Random
 from tests.fuzz.corpus import repaired_png
 
 _NUMBERS = (0, 1, 127, 128, 255, 2**15 - 1, 2**16 - 1, 2**31 - 1, 2**31, 2**32 - 1, 2**63 - 1, 2**64 - 1)
-_TEXTS = (b"\n", b" ", b"#", b"-1", b"1e999", b"nan", b"999999999", b"(" * 50, b"'", b"\0")
+_SHORT = (
+    b"\n",
+    b"\r",
+    b" ",
+    b"#",
+    b"'",
+    b'"',
+    b"\0",
+    b"\xff",
+    b"-1",
+    b"1e999",
+    b"nan",
+    b"999999999",
+    b"\\ud800",
+    b"../",
+)
+_LONG = (b"(" * 50, b"0" * 300, b"9" * 5000, b"[" * 5000, b"{" * 5000)
 
 
 def every_region(data: bytes) -> Iterator[bytes]:
@@ -57,7 +73,7 @@ def _number(data: bytearray, random: Random) -> None:
 
 
 def _text(data: bytearray, random: Random) -> None:
-    place, text = _place(data, random), random.choice(_TEXTS)
+    place, text = _place(data, random), random.choice(_SHORT + _LONG)
     data[place : place + random.choice((0, len(text)))] = text
 
 

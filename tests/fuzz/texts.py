@@ -1,0 +1,104 @@
+"""Whole texts that the program reads, each with the command that reads it."""
+
+import atexit
+import os
+import shutil
+import tempfile
+from collections.abc import Iterable
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+
+from tests.rig.calibration_files import KALIBR, WHOLE, Rig, zed
+from tests.run_cli import rollcli, write_maps
+
+MAPS, RESULT, RECORD = "maps", "rolls.csv", "rolls.csv.run.json"
+READ_BY = {
+    "results": ("rig", "text"),
+    "records": ("estimate", MAPS, "-o", RESULT, "--resume"),
+    "settings": ("estimate", MAPS, "--config", "text", "--dry-run"),
+    "calibrations": ("estimate", MAPS, "--calib", "text", "--dry-run"),
+    "truths": ("evaluate", "accuracy", RESULT, "--truth", "text"),
+    "lists": ("estimate", "--files-from", "text", "--dry-run"),
+}
+_SETTINGS = """\
+quiet = true
+jobs = 1
+[estimate]
+encoding = "kitti"
+scale = 0.00390625
+invalid = [255.0, 1]
+roi = "0,0,160,120"
+polygon = "0,0 159,0 159,119 0,119"
+include = ["*.png", "**/frame?.png"]
+method = "gss"
+max-roll = 30.0
+timing = true
+[evaluate.accuracy]
+format = "json"
+"""
+_TRUTH = """\
+file,roll_deg,pitch_deg,height_m,curvature_per_m
+frame0.png,0.0,1.5,1.4,0
+frame1.png,0.57,,,0.001
+"""
+_RIG = Rig(fx=140.5, fy=140.5, cx=79.2, cy=58.9, width=160, height=120)
+# 3: `evaluate` has no angle for a name; 4: `rig` has too few rows to tell
+_ENDED = {0: "read", 3: "read", 4: "read", 2: "refused"}
+
+
+def texts(readers: Iterable[str] = READ_BY) -> dict[str, bytes]:
+    """Bytes of each text of these readers, by reader/name."""
+    asked = set(readers)
+    return {name: text for name, text in _whole().items() if name.partition("/")[0] in asked}
+
+
+@cache
+def _whole() -> dict[str, bytes]:
+    folder = _workplace()
+    rolls = (folder / RESULT).read_bytes()
+    assert rollcli("estimate", MAPS, "-o", "rolls.jsonl", cwd=folder).status == 0
+    parquet = {}
+    if find_spec("pyarrow"):  # the extra
+        assert rollcli("estimate", MAPS, "-o", "rolls.parquet", cwd=folder).status == 0
+        parquet["results/parquet"] = (folder / "rolls.parquet" / "part-00000.parquet").read_bytes()
+    return {
+        "results/csv": rolls,
+        "results/jsonl": (folder / "rolls.jsonl").read_bytes(),
+        **parquet,
+        "records/json": (folder / RECORD).read_bytes(),
+        "settings/toml": _SETTINGS.encode(),
+        "truths/csv": _TRUTH.encode(),
+        "lists/txt": b"".join(b"maps/frame%d.png\n" % index for index in range(3)),
+        "calibrations/unrectified-kalibr": KALIBR.encode(),
+        "calibrations/unrectified-zed": zed(_RIG).encode(),
+        **{f"calibrations/{form}": write(_RIG).encode() for form, write in WHOLE.items()},
+    }
+
+
+def read_text(data: bytes, name: str) -> str:
+    """ "read" or "refused" by the command that reads such texts; anything else is raised."""
+    reader = name.partition("/")[0]
+    folder = _workplace()
+    given = {RESULT: _whole()["results/csv"], RECORD: _whole()["records/json"]}
+    given[RECORD if reader == "records" else "text"] = data
+    for each, content in given.items():
+        (folder / each).write_bytes(content)
+    done = rollcli(*READ_BY[reader], cwd=folder)
+    answer = _ENDED.get(done.status, "")
+    said = done.err.startswith(("rollcli: ", "Usage: rollcli "))
+    if not answer or "internal error" in done.err or (answer == "refused" and not said):
+        raise ValueError(f"ended with {done.status}: {done.err!r:.300}")
+    return answer
+
+
+@cache
+def _workplace() -> Path:
+    """A folder with maps and a result of them."""
+    folder = Path(tempfile.mkdtemp())
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    write_maps(folder / MAPS, 12)
+    for each in (folder / MAPS).iterdir():  # a record holds the times: another process makes the same one
+        os.utime(each, (0, 0))
+    assert rollcli("estimate", MAPS, "-o", RESULT, cwd=folder).status == 0
+    return folder
