@@ -103,7 +103,7 @@ def draw_preview(disparity: NDArray[Any]) -> NDArray[np.uint8]:
     step = round_step(top * _LABEL_EVERY / height) if height > _LABEL_EVERY else top
     for number in range(int(top / step * (1 + 1e-9)) + 1):
         label = number * step
-        row = min(max(round((1 - label / top) * (height - 1)) + 4, 9), height - 3)
+        row = min(max(round((1 - label / top) * (height - 1)) + 4, 9), height - 4)
         text = f"{label:g}" if label else "0 px"
         cv2.putText(bar, text, (28, row), _FONT, 0.36, _INK, 1, cv2.LINE_AA)
     return np.hstack([picture, bar])

@@ -256,7 +256,7 @@ def test_a_bar_names_round_disparities_beside_their_colours(height, top, names):
     for name in [*names, "0 px"]:
         _, _, below = size_of(name)
         value = float(name.split()[0])
-        baseline = min(max(round((1 - value / top) * (height - 1)) + 4, 9), height - 3)
+        baseline = min(max(round((1 - value / top) * (height - 1)) + 4, 9), height - 4)
         assert any(abs(box[1] - baseline - below) <= 0 and box[2] <= 7 for box in find_text(labels, name)), (
             name
         )

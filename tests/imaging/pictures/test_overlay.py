@@ -63,7 +63,7 @@ def test_a_preview_is_the_map_in_colour_beside_a_bar_from_the_brightest_to_the_d
     assert preview.shape == (100, 200 + BAR_WIDTH, 3)
     bar = preview[:, 210].astype(int).sum(axis=1)
     assert bar[0] > bar[50] > bar[-1]
-    labels = np.flatnonzero((preview[:, 200 + 24 :] < 200).any(axis=(0, 2)))
+    labels = np.flatnonzero((preview[:, 200 + 24 :] < 250).any(axis=(0, 2)))
     assert labels[0] == 4  # pixels right of the bar
 
 
