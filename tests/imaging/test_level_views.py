@@ -36,7 +36,7 @@ def test_views_are_level_within_the_tolerance_and_twice_the_error(place, sign):
     "lies",
     [
         Misalignment(12.0),
-        Misalignment(-7.5),
+        Misalignment(-7.0),  # of half a pixel OpenCV 4 rounds every number up
         Misalignment(rotation=0.1),
         Misalignment(rotation=-0.05),
         Misalignment(scale=0.1),
