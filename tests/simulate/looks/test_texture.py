@@ -68,3 +68,15 @@ def test_a_window_pane_shows_nothing_of_the_plaster_around_it():
     assert house(0.3).std() > 0.02
     p = (2 * (bay.ravel() + 0.1)).astype(np.float32)
     assert (house(0.6) > 1.5 * house(0.3)).all()
+
+
+def test_each_house_has_its_own_colour_and_the_outermost_go_on():
+    edges, tints = np.array([0, 10, 25, 40], np.float32), np.eye(3, dtype=np.float32)
+    one = np.ones(3, np.float32)
+    row = Facade(0.0, edges, np.array([0.2, 0.4, 0.6], np.float32), tints, 3 * one, 2 * one)
+    p = np.array([-3, 0.01, 9.99, 10.01, 24.99, 25.01, 39.99, 50], np.float32)
+    assert row.colour(p, p).argmax(axis=1).tolist() == [0, 0, 0, 1, 1, 2, 2, 2]
+    # plaster between the windows of the first floor, far enough away to see no grain
+    middles = np.array([2.0, 12.0, 27.0], np.float32)
+    wall = row.albedo(middles, np.full(3, 5.8, np.float32), np.full(3, 0.05, np.float32))
+    assert (np.diff(wall) > 0.05).all()
