@@ -157,13 +157,13 @@ def test_the_drift_is_the_line_through_the_blocks_and_its_error_that_of_statsmod
 
 
 def test_a_drift_beside_a_jump_is_that_of_the_line_between_levels():
-    values = white(900, 0.05) + np.linspace(0, 1, 900)
-    values[450:] += 2.0
-    found = assess_sequence(values, np.full(900, 0.01))
+    values = white(200, 0.05) + np.linspace(0, 1, 200)
+    values[100:] += 2.0
+    found = assess_sequence(values, np.full(200, 0.01))
     (jump,) = found.jumps
-    assert (jump.frame, found.drifts, found.status) == (450, True, "jump")
-    frames = np.arange(900)
-    steps = np.column_stack([frames / 899, frames < 450, frames >= 450]).astype(float)
+    assert (jump.frame, found.drifts, found.status) == (100, True, "jump")
+    frames = np.arange(200)
+    steps = np.column_stack([frames / 199, frames < 100, frames >= 100]).astype(float)
     line = sm.OLS(values, steps).fit()
     assert found.drift.value == pytest.approx(line.params[0], abs=0.1 * line.bse[0] + 0.01)
     assert jump.change.value == pytest.approx(line.params[2] - line.params[1], abs=0.02)
@@ -171,17 +171,17 @@ def test_a_drift_beside_a_jump_is_that_of_the_line_between_levels():
 
 @pytest.mark.parametrize("drift", [0.0, 1.0])
 def test_the_size_of_a_jump_has_the_error_that_statsmodels_finds_with_the_same_noise(drift):
-    values, errors = drive(7, 1500, phi=0.5, sd=0.05, errors=(0.02, 0.05), drift=drift)
-    values[500:] += 1.0
-    values[1100:] -= 0.7
-    fit = search(Series(values, errors**2, np.ones(1500, dtype=bool)))
+    values, errors = drive(7, 150, phi=0.5, sd=0.02, errors=(0.01, 0.02), drift=drift)
+    values[50:] += 1.0
+    values[110:] -= 0.7
+    fit = search(Series(values, errors**2, np.ones(150, dtype=bool)))
     cells = fit.cells
     oracle = sm.GLS(cells.values, cells.design(fit.starts, fit.drift), np.linalg.inv(cells.precision)).fit()
     for place in (0, 1):
-        change = assess._change(fit, place, 1500, fit.noise)
+        change = assess._change(fit, place, 150, fit.noise)
         assert change.value == pytest.approx(oracle.params[place - 2], rel=1e-6)
         assert change.error == pytest.approx(oracle.bse[place - 2], rel=1e-6)
-        assert change.freedom == max(block_count(1500, fit.noise), 8) - 1
+        assert change.freedom == max(block_count(150, fit.noise), 8) - 1
         assert change.ci95 == pytest.approx(student.ppf(0.975, change.freedom) * change.error, rel=1e-3)
 
 
