@@ -12,7 +12,7 @@ from rollcli.errors import InputError, UsageError
 from rollcli.evaluate.accuracy import assess
 from rollcli.evaluate.accuracy_text import as_csv, as_json, as_table
 from rollcli.evaluate.pose_accuracy import assess_height, assess_pitch
-from rollcli.evaluate.truth import read_known_poses, read_truth
+from rollcli.evaluate.truth import KnownPose, read_known_poses, read_truth
 from rollcli.files.matching import stem_of
 from rollcli.files.results import Row
 
@@ -56,6 +56,16 @@ def test_angles_half_a_turn_apart_are_the_same():
 def test_coverage_counts_the_truths_inside_their_interval():
     found = assess(rows(1.0, 2.0, 3.0, 4.0, ci95=0.25), truth(1.2, 2.3, 3.0, 3.76))
     assert (found.coverage_95, found.intervals) == (0.75, 4)
+
+
+def test_an_error_of_just_the_limit_is_not_above_it_and_just_of_the_interval_is_inside():
+    found = assess(rows(0.5, -0.5, 0.25, ci95=0.5), truth(0, 0, 0))
+    assert (found.share_above_0_5_deg, found.coverage_95) == (0, 1)
+    assert (found.worst_deg, found.worst_file) == (0.5, "maps/frame1.png")
+    given = dataclasses.replace(rows(0.0)[0], pitch_deg=0.5, pitch_ci95_deg=0.5)
+    assert assess_pitch([given], {"frame1": KnownPose(0.0, 0.0)}).coverage_95 == 1
+    unsure = dataclasses.replace(given, pitch_ci95_deg=None)
+    assert assess_pitch([unsure], {"frame1": KnownPose(0.0, 0.0)}).coverage_95 is None
 
 
 def test_without_intervals_there_is_no_coverage():
