@@ -1,5 +1,6 @@
 """The search for jumps: its steps against least squares and likelihoods that are written out."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -148,3 +149,14 @@ def test_fewer_frames_than_two_dozen_neither_jump_nor_drift(shape):
 def test_stretches_begin_and_end_at_the_starts():
     assert bounds_of([], 9) == [(0, 9)]
     assert bounds_of([2, 5], 9) == [(0, 2), (2, 5), (5, 9)]
+
+
+@pytest.mark.parametrize(("off", "reached"), [(4, True), (5, False), (-4, True), (-5, False)])
+def test_where_stretches_are_short_a_proposed_jump_moves_twice_by_two_cells(off, reached):
+    given = series(9, 2500, phi=0.0, sd=0.02, errors=(0.01, 0.02))
+    fit = fit_steps(given, (), drift=False)
+    assert jumps._gap(fit) == 1
+    jumped = Series(given.values + (np.arange(2500) >= 1000), given.variances, given.used)
+    cells = jumps.make_cells(jumped.values, fit.weights, given.variances, 0.0, 0.0, 10)
+    moved = jumps._settled(jumped, (100 + off,), replace(fit, cells=cells))
+    assert (moved == (100,)) == reached
