@@ -224,6 +224,8 @@ def test_a_bad_file_is_refused_in_one_line_that_names_it(text, words):
         ("a: [,]\n", "line 1 is not plain YAML"),
         ("a: [&x, 2]\n", "line 1 is not plain YAML"),
         ("a: {b: *x}\n", "line 1 is not plain YAML"),
+        ('a: [1, "]"\n', "line 1 is not plain YAML"),
+        ('a: {b: "}"\n', "line 1 is not plain YAML"),
     ],
 )
 def test_what_is_no_plain_yaml_is_refused_by_its_line(text, words):
