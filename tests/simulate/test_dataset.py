@@ -2,6 +2,7 @@
 
 import csv
 import math
+import shutil
 from dataclasses import replace
 
 import cv2
@@ -26,6 +27,20 @@ def simulate(folder, options=TINY, jobs=1, overwrite=False):
     return list(write_dataset(plan_dataset(folder, options, overwrite=overwrite), jobs))
 
 
+@pytest.fixture(scope="module")
+def rendered(tmp_path_factory):
+    """A simulation that nobody changes."""
+    folder = tmp_path_factory.mktemp("rendered")
+    simulate(folder)
+    return folder
+
+
+@pytest.fixture
+def rig(tmp_path, rendered):
+    """A copy of it, which may be changed; nothing else is in its folder."""
+    return shutil.copytree(rendered, tmp_path / "rig")
+
+
 def rows(folder):
     return list(csv.DictReader((folder / "truth.csv").read_text().splitlines()))
 
@@ -38,15 +53,14 @@ def test_the_folder_holds_left_right_disparity_and_truth(tmp_path):
     assert set(contents(tmp_path / "rig")) == {*expected, "calib.txt", "truth.csv", "truth.csv.run.json"}
 
 
-def test_truth_has_the_documented_columns_and_each_frames_values(tmp_path):
-    simulate(tmp_path)
-    first = (tmp_path / "truth.csv").read_text().splitlines()[0]
+def test_truth_has_the_documented_columns_and_each_frames_values(rig):
+    first = (rig / "truth.csv").read_text().splitlines()[0]
     assert first == (
         "file,roll_deg,pitch_deg,scene,focal_px,cx_px,cy_px,baseline_m,height_m,curvature_per_m,seed,"
         "cross_section,crossfall_percent,gutter_percent,camber,bend_per_m"
     )
-    specs = plan_dataset(tmp_path, TINY, overwrite=True).specs
-    for number, (row, spec) in enumerate(zip(rows(tmp_path), specs, strict=True), 1):
+    specs = plan_dataset(rig, TINY, overwrite=True).specs
+    for number, (row, spec) in enumerate(zip(rows(rig), specs, strict=True), 1):
         assert row["file"] == f"frame_{number:04d}"
         assert float(row["roll_deg"]) == pytest.approx(math.degrees(spec.roll), abs=1e-9)
         assert float(row["pitch_deg"]) == pytest.approx(math.degrees(spec.pitch), abs=1e-9)
@@ -130,23 +144,21 @@ def test_the_nearest_disparity_is_that_of_the_corner_of_the_image_nearest_to_the
     assert dataset.nearest_disparity == pytest.approx(true_disparity(dataset.specs[0])[0].max(), abs=1e-9)
 
 
-def test_images_are_the_rendered_frame(tmp_path):
-    simulate(tmp_path)
-    specs = plan_dataset(tmp_path / "x", TINY).specs
+def test_images_are_the_rendered_frame(rig):
+    specs = plan_dataset(rig / "x", TINY).specs
     for stem, spec in (("frame_0001", specs[0]), ("frame_0003", specs[2])):
         frame = render_frame(spec)
         for part, image in (("left", frame.left), ("right", frame.right)):
-            data = np.frombuffer((tmp_path / part / f"{stem}.png").read_bytes(), np.uint8)
+            data = np.frombuffer((rig / part / f"{stem}.png").read_bytes(), np.uint8)
             assert np.array_equal(cv2.imdecode(data, cv2.IMREAD_UNCHANGED), image)
-        stored = read_disparity(tmp_path / "disparity" / f"{stem}.png")
+        stored = read_disparity(rig / "disparity" / f"{stem}.png")
         assert np.array_equal(stored > 0, frame.disparity > 0)
         assert np.abs(stored - frame.disparity).max() <= 1 / 512 + 1e-6 or stored.min() == 1 / 256
 
 
-def test_the_files_are_the_same_whatever_the_jobs_are(tmp_path):
-    simulate(tmp_path / "one", jobs=1)
+def test_the_files_are_the_same_whatever_the_jobs_are(tmp_path, rendered):
     simulate(tmp_path / "two", jobs=2)
-    assert contents(tmp_path / "one") == contents(tmp_path / "two")
+    assert contents(rendered) == contents(tmp_path / "two")
 
 
 def test_grey_images_have_one_channel(tmp_path):
@@ -155,14 +167,13 @@ def test_grey_images_have_one_channel(tmp_path):
     assert cv2.imdecode(data, cv2.IMREAD_UNCHANGED).shape == (48, 64)
 
 
-def test_overwriting_leaves_no_frame_of_an_earlier_simulation_and_no_other_file_is_touched(tmp_path):
-    simulate(tmp_path)
+def test_overwriting_leaves_no_frame_of_an_earlier_simulation_and_no_other_file_is_touched(rig):
     for name in ("mine.png", "frame_0099.png"):
-        (tmp_path / "left" / name).write_bytes(b"mine")
-    simulate(tmp_path, SimulateOptions(frames=1, size=(64, 48)), overwrite=True)
-    left = sorted(path.name for path in (tmp_path / "left").iterdir())
+        (rig / "left" / name).write_bytes(b"mine")
+    simulate(rig, SimulateOptions(frames=1, size=(64, 48)), overwrite=True)
+    left = sorted(path.name for path in (rig / "left").iterdir())
     assert left == ["frame_0001.png", "frame_0099.png", "mine.png"]
-    assert len(rows(tmp_path)) == 1
+    assert len(rows(rig)) == 1
 
 
 def test_a_folder_with_files_in_it_is_refused(tmp_path):
@@ -214,24 +225,21 @@ def test_truth_appears_only_when_every_frame_is_there(tmp_path, monkeypatch):
     assert set(contents(tmp_path)) == {*images, "truth.csv.run.json"}
 
 
-def test_a_resumed_simulation_keeps_whole_frames_and_ends_with_the_same_bytes(tmp_path):
-    simulate(tmp_path / "whole")
-    simulate(tmp_path / "rig")
+def test_a_resumed_simulation_keeps_whole_frames_and_ends_with_the_same_bytes(rig, rendered):
     kept, half, missing = (f"frame_000{number}.png" for number in (1, 2, 3))
-    (tmp_path / "rig/disparity" / half).unlink()
+    (rig / "disparity" / half).unlink()
     for part in ("left", "right", "disparity"):
-        (tmp_path / "rig" / part / missing).unlink()
+        (rig / part / missing).unlink()
     for name in ("truth.csv", "calib.txt"):
-        (tmp_path / "rig" / name).unlink()
-    before = (tmp_path / "rig/left" / kept).stat().st_mtime_ns
-    assert simulate(tmp_path / "rig", replace(TINY, resume=True)) == ["frame_0002", "frame_0003"]
-    assert (tmp_path / "rig/left" / kept).stat().st_mtime_ns == before
-    assert contents(tmp_path / "rig") == contents(tmp_path / "whole")
+        (rig / name).unlink()
+    before = (rig / "left" / kept).stat().st_mtime_ns
+    assert simulate(rig, replace(TINY, resume=True)) == ["frame_0002", "frame_0003"]
+    assert (rig / "left" / kept).stat().st_mtime_ns == before
+    assert contents(rig) == contents(rendered)
 
 
-def test_resuming_a_complete_folder_renders_nothing(tmp_path):
-    simulate(tmp_path)
-    assert simulate(tmp_path, replace(TINY, resume=True)) == []
+def test_resuming_a_complete_folder_renders_nothing(rig):
+    assert simulate(rig, replace(TINY, resume=True)) == []
 
 
 def test_resuming_what_was_never_begun_begins_it(tmp_path):
@@ -247,26 +255,23 @@ def test_resuming_what_was_never_begun_begins_it(tmp_path):
         ({"focal": 50.0}, "--focal was not given, is now 50"),
     ],
 )
-def test_a_simulation_with_other_options_is_not_resumed(tmp_path, changed, said):
-    simulate(tmp_path)
+def test_a_simulation_with_other_options_is_not_resumed(rig, changed, said):
     with pytest.raises(UsageError, match=said):
-        plan_dataset(tmp_path, replace(TINY, resume=True, **changed))
+        plan_dataset(rig, replace(TINY, resume=True, **changed))
 
 
-def test_a_simulation_of_another_version_is_not_resumed(tmp_path):
-    simulate(tmp_path)
-    record = tmp_path / "truth.csv.run.json"
+def test_a_simulation_of_another_version_is_not_resumed(rig):
+    record = rig / "truth.csv.run.json"
     record.write_text(record.read_text().replace(f'"rollcli": "{__version__}"', '"rollcli": "0.0.1"'))
     with pytest.raises(UsageError, match=r"begun by rollcli 0\.0\.1"):
-        plan_dataset(tmp_path, replace(TINY, resume=True))
+        plan_dataset(rig, replace(TINY, resume=True))
 
 
 @pytest.mark.parametrize("record", ["not json", "[]", "{}", '{"rollcli": "1", "options": []}'])
-def test_a_damaged_record_is_not_resumed(tmp_path, record):
-    simulate(tmp_path)
-    (tmp_path / "truth.csv.run.json").write_text(record)
+def test_a_damaged_record_is_not_resumed(rig, record):
+    (rig / "truth.csv.run.json").write_text(record)
     with pytest.raises(UsageError, match=r"truth\.csv\.run\.json is damaged"):
-        plan_dataset(tmp_path, replace(TINY, resume=True))
+        plan_dataset(rig, replace(TINY, resume=True))
 
 
 def test_a_folder_without_a_record_is_not_resumed(tmp_path):
