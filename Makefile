@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 TOUCH := $(BIN)/python -c "import pathlib, sys; pathlib.Path(sys.argv[1]).touch()"
-HALF := tests/batch tests/cli tests/files tests/parallel
+HALF := tests/batch tests/cli tests/convert tests/files tests/parallel
 REMOVE := $(PYTHON) -c "import glob, os, shutil, sys; [shutil.rmtree(p) if os.path.isdir(p) else os.remove(p) for a in sys.argv[1:] for p in glob.glob(a)]"
 
 .DEFAULT_GOAL := help
