@@ -49,8 +49,8 @@ _ENDED = {0: "read", 3: "read", 4: "read", 2: "refused"}
 
 def texts(readers: Iterable[str] = READ_BY) -> dict[str, bytes]:
     """Bytes of each text of these readers, by reader/name."""
-    asked = set(readers)
-    return {name: text for name, text in _whole().items() if name.partition("/")[0] in asked}
+    asked = set(readers).intersection(READ_BY)
+    return {name: text for name, text in _whole().items() if name.partition("/")[0] in asked} if asked else {}
 
 
 @cache
