@@ -41,7 +41,7 @@ def saddle():
 
 def two_halves():
     """A road whose near half has another roll than its far half."""
-    return with_noise(np.where(V > 330, road(4), road(5.8)))
+    return with_noise(np.where(V > 330, road(4), road(5.8)), 0.3)
 
 
 def behind_a_car():

@@ -9,12 +9,14 @@ from numpy.typing import NDArray
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.moments import Floats
+from rollcli.estimator.road.average import averaged
 from rollcli.estimator.road.find import HARDLY_A_PIXEL, Road, road_weights
 from rollcli.estimator.road.model import RoadModel
 from rollcli.estimator.road.profile import Profile, read_profile
 from rollcli.estimator.road.subsample import Sample, Singles
 from rollcli.estimator.road.tuning import FitTuning, ProfileTuning
 
+_KEPT = ("x", "y", "d", "alone", "tolerance", "ahead", "shown")  # as `NearPixels` are picked
 _RIDGE = 1e-10 * np.eye(5)  # of normal matrices with a diagonal of ones, up to this size
 
 
@@ -36,8 +38,12 @@ class NearPixels:
 
     Attributes
     ----------
-    x, y, d, tolerance : ndarray
+    x, y, tolerance : ndarray
         As in `Sample`.
+    d : ndarray
+        Disparity, averaged with pixels around, px.
+    alone : ndarray
+        That of the pixel alone.
     place : ndarray
         Weights from 0 to 1 by place in the image and by slopes.
     ahead : ndarray
@@ -54,6 +60,7 @@ class NearPixels:
     x: Singles
     y: Singles
     d: Singles
+    alone: Singles
     tolerance: Singles
     place: Singles
     ahead: Singles
@@ -74,7 +81,8 @@ class NearPixels:
         near = places * stride
         shown = places % max(1, round(len(places) / tuning.lane_pixels)) == 0
         kept = (sample.x, sample.y, sample.d, sample.tolerance)
-        x, y, d, tolerance = (pixels[near] for pixels in kept)
+        x, y, alone, tolerance = (pixels[near] for pixels in kept)
+        d = averaged(sample, road.plane, near)
         across, along = model.across(x, y), model.along(x, y)
         half_height = sample.grid.centre_v / sample.grid.scale
         place = np.square(road_weights(sample, road.plane, near))
@@ -84,12 +92,12 @@ class NearPixels:
         # the steps of a map of whole pixels are no spread: within less, only stripes of one value are left
         usual = math.hypot(sample.noise, sample.tuning.sample.uneven_share * sample.typical)
         least = max(tuning.least_width, sample.quantum / usual)
-        return cls(x, y, d, tolerance, place, ahead, shown, stride, least, tuning)
+        return cls(x, y, d, alone, tolerance, place, ahead, shown, stride, least, tuning)
 
     def lane(self) -> "NearPixels":
         """Return some of them, weighted so that the lane ahead counts."""
         few = np.flatnonzero(self.shown)
-        arrays = {name: getattr(self, name)[few] for name in ("x", "y", "d", "tolerance", "ahead", "shown")}
+        arrays = {name: getattr(self, name)[few] for name in _KEPT}
         return replace(self, **arrays, place=self.place[few] * arrays["ahead"])
 
     def profile(self, lane: RoadModel, tuning: ProfileTuning) -> tuple[Profile, "NearPixels"]:
@@ -100,8 +108,7 @@ class NearPixels:
         profile = read_profile(side[used], self.d[used] / road[used] - 1, tuning)
         weights = profile.at(side)
         kept = np.flatnonzero(weights > self.tuning.least_weight)
-        names = ("x", "y", "d", "tolerance", "ahead", "shown")
-        arrays = {name: getattr(self, name)[kept] for name in names}
+        arrays = {name: getattr(self, name)[kept] for name in _KEPT}
         return profile, replace(self, **arrays, place=self.place[kept] * weights[kept].astype(np.float32))
 
     def fit(self, start: RoadModel, rounds: int, *, parabolic: bool, cambered: bool = False) -> Fit:
@@ -136,6 +143,19 @@ class NearPixels:
         design = np.empty((5, len(self.d)), np.float32)
         design[0] = 1
         return self._weights(self._lay_out(design, fit.model, cambered=True)[1], fit.limit)
+
+    def limit_alone(self, model: RoadModel) -> float:
+        """Return where the weights of single pixels around a road would end, in tolerances.
+
+        Averaged ones lie closer together.
+        """
+        design = np.empty((5, len(self.d)), np.float32)
+        design[0] = 1
+        off = self._lay_out(design, model, cambered=True)[1] + (self.d - self.alone) / self.tolerance
+        limit = self.tuning.start_width
+        for _ in range(self.tuning.rounds):
+            limit = min(limit, self._width(off, self._weights(off, limit)))
+        return limit
 
     def _lay_out(self, design: Singles, model: RoadModel, *, cambered: bool) -> tuple[Singles, Singles]:
         """Set a design's rows 1 and 2, the coordinate along the road and its square, and 4, the bulge.

@@ -42,12 +42,20 @@ class Sample:
         where the neighbour is no data.
     slope_noise : float
         What the noise makes of a slope, px per unit.
+    row : ndarray of int
+        Row of each pixel among the sampled ones.
     column : ndarray of uint16
         Column of each pixel among the sampled ones.
     pitch : float
         Distance between neighbouring columns of the sample, units of x.
     quantum : float
         The smallest step between neighbours, px: 1 in a map of whole pixels.
+    disparity : ndarray, shape (H, W)
+        The map.
+    usable : ndarray of bool, shape (H, W), or None
+        Its pixels that may be taken, where not all may.
+    reach, step : int
+        How far every pixel is from the border at least, and how far apart they are, px.
     tuning : RoadTuning
         The numbers by which the map was sampled, and by which its road is to be found.
     """
@@ -62,14 +70,29 @@ class Sample:
     coherence: Singles
     slopes: Singles
     slope_noise: float
+    row: NDArray[np.intp]
     column: NDArray[np.uint16]
     pitch: float
     quantum: float
+    disparity: NDArray[Any]
+    usable: NDArray[np.bool_] | None
+    reach: int
+    step: int
     tuning: RoadTuning
 
     def about(self, pixels: int) -> slice:
         """Return a slice that takes about so many of the pixels, evenly."""
         return slice(None, None, max(1, round(len(self.d) / pixels)))
+
+    def places(self, some: NDArray[np.intp]) -> NDArray[np.intp]:
+        """Return where some of the pixels are in the map, counted row by row."""
+        width = self.disparity.shape[1]
+        first = _first(self.reach, self.step) * (width + 1)
+        places: NDArray[np.intp] = self.row[some] * width
+        places += self.column[some]
+        places *= self.step
+        places += first
+        return places
 
 
 def take_sample(
@@ -110,9 +133,9 @@ def take_sample(
         raise EstimationError(
             f"only {len(chosen)} valid pixels away from the border: too few to find a road in"
         )
-    first = reach + (step // 2) % step
+    first = _first(reach, step)
 
-    def at(dv: int, du: int) -> NDArray[Any]:
+    def at(dv: int, du: int) -> "NDArray[Any]":  # evaluated at each call, it would take time
         return _strided(disparity, reach, step, dv, du).ravel()[chosen]
 
     rows = chosen // taken.shape[1]  # divmod would take longer
@@ -128,8 +151,8 @@ def take_sample(
     quantum = _quantum(jumps, numbers)
     noise, tolerance = _tolerance(d, typical, quantum, numbers)
     near = jumps <= np.maximum(tolerance, np.float32(numbers.coherent_share * typical))
-    coherence = _count(near)
-    coherence /= np.maximum(_count(known), 1)
+    coherence = count_true(near)
+    coherence /= np.maximum(count_true(known), 1)
     coherent = d[coherence >= numbers.coherent_from]
     if len(coherent):  # again, without the noise, which has another median
         noise, tolerance = _tolerance(d, typical := _median(coherent), quantum, numbers)
@@ -148,9 +171,14 @@ def take_sample(
         coherence=coherence,
         slopes=steps,
         slope_noise=noise * per_unit,
+        row=rows,
         column=columns.astype(np.uint16),
         pitch=step / grid.scale,
         quantum=quantum,
+        disparity=disparity,
+        usable=usable,
+        reach=reach,
+        step=step,
         tuning=tuning,
     )
 
@@ -178,10 +206,15 @@ def _step(wanted: float) -> int:
     return step - (step % 3 == 0)
 
 
+def _first(reach: int, step: int) -> int:
+    """Return the first row and column that is sampled."""
+    return reach + (step // 2) % step
+
+
 def _strided(array: NDArray[Any], reach: int, step: int, dv: int = 0, du: int = 0) -> NDArray[Any]:
     """Return every step-th pixel, moved by (dv, du), that has neighbours at `reach` on all sides."""
     height, width = array.shape
-    first = reach + (step // 2) % step
+    first = _first(reach, step)
     return array[first + dv : height - reach + dv : step, first + du : width - reach + du : step]
 
 
@@ -205,7 +238,7 @@ def _steps(d: Singles, *around: NDArray[Any]) -> Singles:
     return steps
 
 
-def _count(agreeing: NDArray[np.bool_]) -> Singles:
+def count_true(agreeing: NDArray[np.bool_]) -> Singles:
     """Return how many of a pixel's neighbours agree, from bool (neighbours, N)."""
     counts: NDArray[np.uint8] = agreeing.view(np.uint8).sum(0, dtype=np.uint8)  # a sum of bool takes longer
     return counts.astype(np.float32)

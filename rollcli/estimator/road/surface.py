@@ -37,8 +37,6 @@ class Surface:
         Of x and y.
     noise : float
         `Sample.noise`, px.
-    limit : float
-        Where the weight ends, in tolerances.
     share : float
         The share of the sampled pixels that is road.
     moved : float
@@ -49,6 +47,8 @@ class Surface:
         How much the ground counts by how far to the side it lies; None where all of it does.
     camber_precision : float
         What the prior of the camber adds to its normal equation; infinite where none was fitted.
+    near : NearPixels or None
+        What the road was fitted to; None where every pixel is taken for road.
     tuning : RoadTuning
         The numbers by which it was found.
     """
@@ -60,34 +60,38 @@ class Surface:
     model: RoadModel
     grid: Grid
     noise: float
-    limit: float
     share: float
     moved: float
     parabolic: bool
     profile: Profile | None
     camber_precision: float
+    near: NearPixels | None
     tuning: RoadTuning
 
     def covers(self, disparity: NDArray[Any]) -> NDArray[np.bool_]:
         """Return which pixels of a map (H, W) lie on the surface and rise as it does."""
         height, width = disparity.shape
+        limit = math.inf if self.near is None else self.near.limit_alone(self.model)
         reach = min(reach_of(height, width, self.tuning.sample), height - 1)
         covered = np.empty(disparity.shape, bool)
         step = max(1, _BLOCK // width)  # a few rows at a time: a large map leaves no room for eight more
         for top in range(0, height, step):
             first, end = max(0, top - reach), min(height, top + step)
             rows = slice(first, min(height, end + reach))
-            covered[top:end] = self._covers(disparity[rows], first, reach)[top - first : end - first]
+            covered[top:end] = self._covers(disparity[rows], first, reach, limit)[top - first : end - first]
         return covered
 
-    def _covers(self, disparity: NDArray[Any], first: int, reach: int) -> NDArray[np.bool_]:
-        """Return the same of some rows, from `first` on: they are compared with those `reach` away."""
+    def _covers(self, disparity: NDArray[Any], first: int, reach: int, limit: float) -> NDArray[np.bool_]:
+        """Return the same of some rows, from `first` on: they are compared with those `reach` away.
+
+        Pixels on the surface are within `limit` tolerances of it.
+        """
         rows, columns = (np.arange(side, dtype=np.float64) for side in disparity.shape)
         x: Floats = (columns - self.grid.centre_u) / self.grid.scale
         y: Floats = ((rows + first - self.grid.centre_v) / self.grid.scale)[:, None]
         road = self.model.disparity(x, y)
         tolerance = np.hypot(self.noise, self.tuning.sample.uneven_share * disparity)
-        on_it: NDArray[np.bool_] = np.abs(road - disparity) < self.limit * tolerance
+        on_it: NDArray[np.bool_] = np.abs(road - disparity) < limit * tolerance
         if self.profile is not None:
             on_it &= self.profile.level(self.model.side(x, y, road)) > self.tuning.surface.least_level
         # where a wall crosses the surface it is as near as the road, but it does not rise as the road does
@@ -146,12 +150,12 @@ def _surface(
         model=model,
         grid=sample.grid,
         noise=sample.noise,
-        limit=fit.limit,
         share=min(1.0, float(np.count_nonzero(used)) * near.stride / len(sample.d)),
         moved=abs(model.theta - road.model.theta),
         parabolic=parabolic,
         profile=profile,
         camber_precision=fit.camber_precision,
+        near=near,
         tuning=sample.tuning,
     )
 
@@ -171,11 +175,11 @@ def whole_surface(sample: Sample, energy: Energy) -> Surface:
         model=plane._replace(alpha=(a0, a1, a2[0] if a2 else 0.0)),
         grid=sample.grid,
         noise=sample.noise,
-        limit=math.inf,
         share=1.0,
         moved=0.0,
         parabolic=energy.parabolic,
         profile=None,
         camber_precision=math.inf,
+        near=None,
         tuning=sample.tuning,
     )

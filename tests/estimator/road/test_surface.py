@@ -109,20 +109,28 @@ def test_whole_pixels_leave_no_stripes():
     assert estimate.road_fraction > 0.3
 
 
-def road_and_sides():
-    """A road of -3 degrees with noise, px, and how far to the right each pixel lies, in camera heights."""
+def road_and_sides(sigma=0.1):
+    """A road of -3 degrees with noise of sigma px, and how far to the right each pixel is, camera heights."""
     road = flat_road(-3, width=WIDTH, height=HEIGHT, focal=560.0, pitch_deg=0)
     v, u = np.mgrid[:HEIGHT, :WIDTH]
     x, y = u - (WIDTH - 1) / 2, v - (HEIGHT - 1) / 2
     below = y * math.cos(ROLL) - x * math.sin(ROLL)  # the horizon; a road's pixel is one height under it
     side = (x * math.cos(ROLL) + y * math.sin(ROLL)) / np.maximum(below, 1e-9)
-    noise = np.random.default_rng(0).normal(0, 0.1, road.shape)
+    noise = np.random.default_rng(0).normal(0, sigma, road.shape)
     return np.where(road > 1, road + noise, 0), side
 
 
 def surface_of(disparity):
     sample = take_sample(disparity)
     return fit_surface(sample, find_road(sample, math.radians(45), 0), parabolic=True)
+
+
+def test_pixels_with_noise_that_averages_out_are_road():
+    disparity, side = road_and_sides(sigma=0.2)
+
+    covered = surface_of(disparity).covers(disparity)
+
+    assert covered[(np.abs(side) < 1) & (disparity > 5)].mean() > 0.96
 
 
 @pytest.mark.parametrize("slope", [-0.15, 0.15])
