@@ -27,9 +27,13 @@ def stop_signals() -> list[signal.Signals]:
 
 
 def raise_on_signals() -> None:
-    """Let each of the signals raise KeyboardInterrupt: for the time before a run and after it."""
+    """Let the first of the signals raise KeyboardInterrupt: for the time before a run and after it.
+
+    Later ones are ignored: the program is about to end, and must not be disturbed while it says so.
+    """
 
     def interrupt(number: int, frame: FrameType | None) -> None:
+        ignore_signals()
         raise KeyboardInterrupt
 
     for number in stop_signals():

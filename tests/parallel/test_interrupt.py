@@ -3,7 +3,9 @@
 import signal
 from concurrent.futures import ThreadPoolExecutor
 
-from rollcli.parallel.interrupt import stop_on_signals, stop_signals
+import pytest
+
+from rollcli.parallel.interrupt import raise_on_signals, stop_on_signals, stop_signals
 
 
 def test_a_run_in_a_thread_leaves_the_signals_to_its_program():
@@ -17,3 +19,17 @@ def test_a_run_in_a_thread_leaves_the_signals_to_its_program():
     with stop_on_signals():
         assert all(signal.getsignal(each) not in before for each in stop_signals())
     assert [signal.getsignal(each) for each in stop_signals()] == before
+
+
+@pytest.mark.parametrize("first", stop_signals())
+def test_outside_of_a_run_the_first_signal_ends_the_program_and_no_other_disturbs_that(first):
+    before = {each: signal.getsignal(each) for each in stop_signals()}
+    try:
+        raise_on_signals()
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(first)
+        for each in before:
+            signal.raise_signal(each)
+    finally:
+        for each, handler in before.items():
+            signal.signal(each, handler)
