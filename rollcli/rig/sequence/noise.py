@@ -76,7 +76,7 @@ def fit_noise(series: Floats) -> Noise:
         at = (np.intp(len(decays) - 1), np.intp(0))
     longest = _longest(deviance, decays, shares, at)
     if decays[at[0]] == 1:
-        return Noise(variance, 0.0, 0.0, min(longest, _UNSEEN, max(1.0, n / 2)))
+        return Noise(variance, 0.0, 0.0, min(longest, _UNSEEN))
     decays = np.minimum(1.0, decays[at[0]] * np.geomspace(0.8, 1.25, 25))
     shares = np.clip(shares[at[1]] + np.linspace(-0.06, 0.06, 13), 0.0, 1.0)
     deviance, scale = _deviance(power, omega, counts, decays, shares)
