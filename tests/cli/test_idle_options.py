@@ -120,3 +120,19 @@ def test_what_has_an_effect_is_not_told(run):
 def test_one_folder_among_files_is_searched(run):
     told = run("estimate", "kitti.npy", "maps", "--recursive", "--exclude", "b*")[2]
     assert told == []
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "estimate maps",
+        "derotate maps --roll 2 -o out",
+        "vdisparity maps -o out",
+        "disparity --left left --right right -o out",
+    ],
+)
+def test_a_cluster_has_workers_of_its_own(run, line):
+    cluster = (*shlex.split(line), "--dry-run", "--scheduler", "tcp://127.0.0.1:1")
+    status, _, told = run(*cluster, "--jobs", "2")
+    assert (status, told) == (0, ["rollcli: --jobs: no effect here: --scheduler has workers of its own"])
+    assert run(*cluster)[2] == run(*shlex.split(line), "--dry-run", "--jobs", "2")[2] == []

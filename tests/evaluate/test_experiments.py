@@ -10,9 +10,11 @@ import pytest
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.solvers.exact import exact
+from rollcli.estimator.solvers.solution import SolverStatus
 from rollcli.evaluate.experiments import DELTAS, LAMBDAS, METHODS, SOLVERS, examine
 from rollcli.evaluate.rotate import rotate_nearest
 from rollcli.evaluate.tables import DELTAS_DEG, all_tables
+from rollcli.evaluate.textbook import Textbook
 from rollcli.evaluate.timing import FORMS, Times, time_solvers
 from tests.estimator.synthetic_maps import bent_road, degrees_apart, energy_of
 
@@ -82,6 +84,20 @@ def test_a_known_angle_takes_the_place_of_the_maps_own_estimate():
     off = examine("a", disparity, [0.0], truth=math.radians(2))
     assert math.degrees(off.solver_errors["exact"][0][0]) == pytest.approx(1, abs=1e-3)
     assert math.degrees(off.method_errors["line"][0]) == pytest.approx(1, abs=0.1)
+
+
+def test_the_papers_method_is_its_descent_with_the_smallest_tolerance():
+    truth = math.radians(2.9)
+    found = examine("a", bent_road(3, width=120, height=90, noise=0.1), TURNS, truth=truth)
+    assert found.method_errors["gd"] == tuple(errors[-1] for errors in found.solver_errors["gd"])
+
+
+def test_a_descent_that_never_ends_is_stopped_after_a_hundred_steps(monkeypatch):
+    written_out = Textbook.of(bent_road(3, width=60, height=40))
+    slopes = iter(0.5**k for k in range(200))  # the rate doubles as the slope halves: all steps are alike
+    monkeypatch.setattr(Textbook, "gradient", lambda self, theta: next(slopes))
+    found = written_out.gradient_descent(1e-15, 26.0)
+    assert (found.iterations, found.status) == (100, SolverStatus.STEP_LIMIT)
 
 
 def test_a_method_without_an_angle_is_counted_and_leaves_the_others_alone():
