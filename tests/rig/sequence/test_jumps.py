@@ -160,3 +160,17 @@ def test_where_stretches_are_short_a_proposed_jump_moves_twice_by_two_cells(off,
     cells = jumps.make_cells(jumped.values, fit.weights, given.variances, 0.0, 0.0, 10)
     moved = jumps._settled(jumped, (100 + off,), replace(fit, cells=cells))
     assert (moved == (100,)) == reached
+
+
+def test_one_more_jump_is_proposed_by_the_scan_and_one_or_two_by_the_partitions():
+    given = series(10, phi=0.5, sd=0.02, errors=(0.01, 0.02))
+    shape = np.where(np.arange(240) >= 100, 1.0, 0.0)
+    once = Series(given.values + shape, given.variances, given.used)
+    scan, one, two = jumps._proposals(once, fit_steps(once, (), drift=False))
+    assert scan == (100,)
+    assert (len(one), len(two)) == (1, 2)
+    # with what is there already, and beside it the next one
+    twice = Series(once.values - 2 * (np.arange(240) >= 170), given.variances, given.used)
+    scan, one, two = jumps._proposals(twice, fit_steps(twice, (100,), drift=False))
+    assert scan == (100, 170)
+    assert (len(one), len(two)) == (2, 3)

@@ -35,7 +35,8 @@ def test_the_variance_of_a_mean_is_the_sum_of_all_covariances(phi, white, frames
 
 @pytest.mark.parametrize("series", [[], [1.0], [0.0] * 100, [1.0, -1.0, 0.5]])
 def test_what_tells_nothing_has_no_correlation(series):
-    assert fit_noise(np.array(series)).correlation_time == 1.0
+    variance = np.mean(np.square(series)) if series else 0.0
+    assert fit_noise(np.array(series)) == noise.Noise(variance, 0.0, 0.0, 1.0)
 
 
 def test_the_longest_correlation_that_fits_is_that_of_the_best_where_no_other_fits():
@@ -48,6 +49,14 @@ def test_the_longest_correlation_that_fits_is_that_of_the_best_where_no_other_fi
     deviance[0, 0] = 0.9  # fits as well, but its slow share is smaller
     longer = noise._longest(deviance, decays, shares, np.unravel_index(4, (3, 3)))
     assert longer == pytest.approx(1 + 38.0 * min(1.0, 0.3 * noise._SLOW_MATTERS))
+
+
+def test_a_correlation_is_seen_by_its_decay_and_not_by_its_share():
+    decays, shares = np.array([0.05, 0.2, 1.0]), np.array([0.0, 0.3, 0.9])
+    deviance = np.full((3, 3), 50.0)
+    deviance[1, 2] = deviance[0, 1] = 0.0
+    longest = noise._longest(deviance, decays, shares, np.unravel_index(5, (3, 3)))
+    assert longest == pytest.approx(1 + 8.0)  # a slower one has a smaller share
 
 
 @pytest.mark.parametrize("frames", [4, 5, 40, 41, 3000, 3001])
