@@ -111,11 +111,11 @@ def check_first_size(frames: Sequence[Frame], options: FrameOptions) -> None:
     ------
     UsageError
     """
-    from rollcli.files.formats import read_image, read_stored  # where calibrations are, images are decoded
-
     first = next((frame for frame in frames if frame.calibration is not None), None)
     if first is None or first.calibration is None:
         return
+    from rollcli.files.formats import read_image, read_stored  # only here does a dispatcher decode an image
+
     try:
         if first.right_file:
             height, width = read_image(options.at(first.path), first.file).shape[:2]

@@ -68,6 +68,23 @@ print([name for name in ("numpy", "cv2", "tqdm", "tifffile", "multiprocessing") 
     assert done.stdout.splitlines()[-1] == "[]"
 
 
+@pytest.mark.parametrize("more", [["estimate"], ["vdisparity"], ["derotate", "--roll", "1"]])
+def test_a_process_that_only_hands_out_work_loads_neither_numpy_nor_opencv(tmp_path, more):
+    write_maps(tmp_path / "maps", 2)
+    code = f"""
+import sys
+sys.argv = ["rollcli", *{more}, "maps", "-q", "-j", "2", "-o", "out"]
+from rollcli.__main__ import main
+try:
+    main()
+except SystemExit as end:
+    print(end.code, [name for name in ("numpy", "cv2") if name in sys.modules])
+"""
+    line = [sys.executable, "-c", code]
+    done = subprocess.run(line, cwd=tmp_path, env=environment(), capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "0 []"
+
+
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -233,7 +250,7 @@ main()
 @pytest.mark.parametrize(
     "arguments",
     [
-        ("estimate", "maps", "-q", "-j1"),
+        ("estimate", "maps", "-q", "-j1", "-o", "rolls.csv"),
         ("derotate", "maps", "--roll", "1", "-o", "up", "-j1"),
         ("rig", "none.csv"),
         ("report", "none.csv"),
