@@ -20,9 +20,9 @@ def decode_grey16(data: bytes, width: int, height: int) -> NDArray[Any] | None:
         return None
     result = make_decoder().decode(data)  # one decoder in two threads crashes
     # what it has not reached is 0, and it says so here alone
-    if result.error_message or result.pixbuf.shape != (height, width, 2):
+    if result.error_message or (buffer := result.pixbuf).shape != (height, width, 2):
         return None
-    pixels: NDArray[Any] = result.pixbuf.view("<u2")[..., 0]
+    pixels: NDArray[Any] = buffer.view("<u2")[..., 0]
     return np.ascontiguousarray(pixels, np.uint16)
 
 

@@ -62,11 +62,11 @@ class _Whole(NamedTuple):
     header: _Header
     palette: bytes
     transparent: bytes
-    image: list[bytes]
+    image: list[memoryview]
 
-    def chunks(self, name: str) -> list[bytes]:
+    def chunks(self, name: str) -> list[bytes | memoryview]:
         """Return a file of nothing else."""
-        start = [SIGNATURE, _chunk(b"IHDR", struct.pack(">IIBBBBB", *self.header))]
+        start: list[bytes | memoryview] = [SIGNATURE, _chunk(b"IHDR", struct.pack(">IIBBBBB", *self.header))]
         if self.header.colour == _PALETTE:
             start.append(_chunk(b"PLTE", _full_palette(self.header, self.palette, name)))
             if self.transparent:
@@ -127,7 +127,8 @@ def _decoded(whole: _Whole, name: str, flags: int) -> NDArray[Any]:
 def _checked(data: bytes, name: str, mask: bool = False) -> _Whole:
     """Return what decides the pixels; InputError if the file is not whole."""
     view, position = memoryview(data), len(SIGNATURE)
-    header, palette, transparent, image, kind = None, b"", b"", [], b""
+    header, palette, transparent, kind = None, b"", b"", b""
+    image: list[memoryview] = []
     while kind != b"IEND":
         end = position + 12 + int.from_bytes(view[position : position + 4], "big")
         if end > len(data) or position + 12 > len(data):
@@ -138,7 +139,7 @@ def _checked(data: bytes, name: str, mask: bool = False) -> _Whole:
         if (header is None) != (kind == b"IHDR"):
             raise InputError(f"{name}: is a damaged PNG: its header is not first, or not alone")
         if kind == b"IDAT":
-            image.append(data[position:end])
+            image.append(view[position:end])
         elif kind == b"IHDR":
             header = _header(data[position + 8 : end - 4], name)
         elif kind == b"PLTE":
@@ -167,7 +168,7 @@ def _header(body: bytes, name: str) -> _Header:
     return header
 
 
-def _require_data(header: _Header, image: list[bytes], name: str) -> None:
+def _require_data(header: _Header, image: list[memoryview], name: str) -> None:
     """Refuse a header that claims more than the compressed data hold."""
     compressed = sum(len(chunk) - 12 for chunk in image)
     claim = f"its header claims {header.width} x {header.height} pixels"
