@@ -3,6 +3,7 @@
 import io
 import json
 import math
+import re
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
@@ -56,6 +57,7 @@ TIMING = "elapsed_ms"
 COLUMNS = tuple(field.name for field in fields(Row) if field.name != TIMING)
 STDIN = "-"
 _MOST_SPACE = 1000  # bytes before what tells the format
+_SPECIAL = re.compile(r'[,"\r\n]')  # what a field of CSV holds in quotes only
 # a millionth of a degree is far below any map's noise; nine digits keep alpha2, which is small, whole
 _DIGITS = {
     "roll_deg": ".6f",
@@ -114,7 +116,7 @@ def plain_values(row: Row, timing: bool = False) -> dict[str, Any]:
 
 def _quoted(text: str) -> str:
     """Quote a field of CSV; the csv module quotes a carriage return only from Python 3.13 on."""
-    if not any(special in text for special in ',"\r\n'):
+    if not _SPECIAL.search(text):
         return text
     return '"' + text.replace('"', '""') + '"'
 
