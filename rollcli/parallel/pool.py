@@ -5,15 +5,15 @@ calls do not, and a process that dies takes no other with it. Not those of `conc
 pool breaks as a whole when one process dies and does not say which task killed it, and its threads, which
 hand out the tasks, take time from the workers.
 
-Spawned, each worker loads NumPy and OpenCV by itself: 0.3 s. Tried: multiprocessing's fork server that has
-loaded them. Two workers then start in 0.36 s of CPU time in place of 0.65, eight in 0.35 in place of 2.1. It
-is not taken yet: the server is then the workers' parent, and what ends them when a run is killed, stopped or
-short of memory would have to be shown anew.
+Spawned, each worker loads NumPy and OpenCV by itself: 0.23 s of CPU time. Tried: multiprocessing's fork
+server that has loaded them. Two workers then start in 0.26 s of CPU time in place of 0.46, eight in 0.5 in
+place of 2.9. On two busy processors, two workers were ready after 0.7 s in place of 1.2. Free processors load
+at the same time, and gain less. It is not taken: the server would be the workers' parent, and what ends them
+when a run is killed, stopped or short of memory would have to be shown anew, for Linux alone.
 
-Over 1,000 maps of 640x480 on two busy processors, one process took 10.4 s of CPU time, and two workers took
-11.8 s with their parent: two free processors could be 1.75 times as fast. The parent took 0.7 s of that,
-0.5 ms a row beyond its start. Starting took 0.4 s more than one process does. The rest is probably that a
-frame costs more while two are computed at once. By that, the fork server would bring the 1.75 to 1.80.
+Over 1,000 maps of 1242x375 on two busy processors, one process took 14.0 and 14.6 s of CPU time, and two
+workers took 15.6 s with their parent, which worked alone for 0.2 s of that: two free processors could be 1.78
+to 1.84 times as fast. The parent took 0.6 ms a row.
 """
 
 from collections import deque
