@@ -64,6 +64,7 @@ class Run:
         self.folder, self.result, self.jobs = folder, result, jobs
         self.reader = -1
         self._said = folder.with_suffix(".messages")
+        self._said.unlink(missing_ok=True)  # those of another run
         if messages == "file":
             writer = os.open(self._said, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
         elif messages == "pipe":
