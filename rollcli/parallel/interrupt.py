@@ -33,11 +33,16 @@ def raise_on_signals() -> None:
     """
 
     def interrupt(number: int, frame: FrameType | None) -> None:
-        ignore_signals()
+        for each in stop_signals():  # not SIG_IGN: of one that came together with this, Python would complain
+            signal.signal(each, _leave_unheard)
         raise KeyboardInterrupt
 
     for number in stop_signals():
         signal.signal(number, interrupt)
+
+
+def _leave_unheard(number: int, frame: FrameType | None) -> None:
+    pass
 
 
 def ignore_signals() -> None:

@@ -1,6 +1,7 @@
 """Signals stop a run where Python lets it handle them."""
 
 import signal
+import sys
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
@@ -33,3 +34,22 @@ def test_outside_of_a_run_the_first_signal_ends_the_program_and_no_other_disturb
     finally:
         for each, handler in before.items():
             signal.signal(each, handler)
+
+
+@pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="signals cannot be held back here")
+def test_of_signals_that_come_together_one_ends_the_program_and_nothing_is_said_of_the_others(monkeypatch):
+    before = {each: signal.getsignal(each) for each in stop_signals()}
+    complaints = []
+    monkeypatch.setattr(sys, "unraisablehook", complaints.append)
+    try:
+        raise_on_signals()
+        signal.pthread_sigmask(signal.SIG_BLOCK, before)
+        for each in before:
+            signal.raise_signal(each)
+        with pytest.raises(KeyboardInterrupt):
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, before)
+    finally:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, before)
+        for each, handler in before.items():
+            signal.signal(each, handler)
+    assert complaints == []
