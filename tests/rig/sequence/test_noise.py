@@ -21,6 +21,7 @@ def test_the_correlation_of_ar1_with_white_noise_is_found(phi, white):
 def test_frames_without_an_order_have_no_correlation():
     found = fit_noise(np.random.default_rng(0).normal(0, 1, 5000))
     assert found.correlation_time < 1.2
+    assert (found.phi, found.share) == (0, 0)
 
 
 @pytest.mark.parametrize(("phi", "white"), [(0.9, 0.0), (0.97, 1.0)])

@@ -52,3 +52,11 @@ def test_frames_that_are_left_out_have_no_say():
     found = smooth(series, weights, NOISE)
     assert len(found.frames) == 190
     assert np.abs(found.level).max() < 1e-9
+
+
+def test_a_level_stands_in_the_middle_of_the_frames_that_it_is_of():
+    found = smooth(np.linspace(0, 1, 1195), np.ones(1195), NOISE)
+    middles = [np.mean(cell) for cell in np.array_split(np.arange(1197), 399)]
+    assert found.cell == 3
+    assert found.frames[:-1] == pytest.approx(middles[:-1])
+    assert found.frames[-1] == 1194  # the last cell holds one frame
