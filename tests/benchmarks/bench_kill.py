@@ -238,7 +238,9 @@ def disturbed(folder: Path, result: str, jobs: int, name: str, chance: random.Ra
         run.send_all(signal.SIGKILL)
         return met, early, False, f"hangs, {found}"
     allowed = kind.statuses if met and kind.ends else ()
-    by_python = early and (status in _BY_SIGNAL or ("KeyboardInterrupt" in said and "rollcli" not in said))
+    by_python = early and (
+        status in _BY_SIGNAL or ("KeyboardInterrupt" in said and str(ROOT / "rollcli") not in said)
+    )
     if not by_python and ("Traceback" in said or "internal error" in said):
         found = said[-2000:]
     if not by_python and status not in (0, *allowed):
