@@ -30,7 +30,12 @@ ROOT = Path(__file__).resolve().parents[2]
 PROGRAM, TESTS = "rollcli", "tests"
 # the tests of a package beyond the folder of its name, the quickest first
 FURTHER = {
-    "batch": ("cli/test_outputs.py", "cli/test_estimate.py", "cli/test_frames.py"),
+    "batch": (
+        "cli/test_outputs.py",
+        "cli/test_idle_options.py",
+        "cli/test_estimate.py",
+        "cli/test_frames.py",
+    ),
     "cli": ("batch/test_resume.py",),
     "convert": (
         "cli/test_idle_options.py",
