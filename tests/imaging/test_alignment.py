@@ -73,7 +73,7 @@ def test_uncorrected_they_would_turn_the_road(frame):
 
 
 def test_the_interval_knows_that_levelling_errs():
-    """Enlarged views of six empty roads: without what levelling leaves, it holds half of their rolls."""
+    """Enlarged views of six empty roads: without what levelling leaves, it misses two of the twelve rolls."""
     rolls = np.radians(np.linspace(-8, 8, 6))
     frames = [render_frame(FrameSpec(roll=roll, seed=seed, colour=False)) for seed, roll in enumerate(rolls)]
     reached = []
