@@ -1,6 +1,7 @@
 """What tests of several folders share."""
 
 import contextlib
+import functools
 import shutil
 
 import pytest
@@ -56,6 +57,19 @@ def browser():
 @pytest.fixture
 def open_page(browser):
     """Opens a page; a message on the console, a dialog or a request for anything outside of it fails."""
+    with _pages(browser) as opened:
+        yield opened
+
+
+@pytest.fixture(scope="module")
+def open_page_once(browser):
+    """The same for tests that only look: asked for the same again, it returns the page that is open."""
+    with _pages(browser) as opened:
+        yield functools.cache(opened)
+
+
+@contextlib.contextmanager
+def _pages(browser):
     complaints = []
     with contextlib.ExitStack() as stack:
 

@@ -40,16 +40,28 @@ def url(tmp_path_factory):
     return (folder / "page.html").as_uri()
 
 
-@pytest.fixture
-def opened(open_page, url):
+def waiting_for_a_chart(open_page, default):
     """Opens the page, or another, and waits for its first chart; the others are drawn after it."""
 
-    def opened_page(url=url, **how):
+    def opened_page(url=default, **how):
         page = open_page(url, **how)
         page.wait_for_selector("#roll .main-svg")
         return page
 
     return opened_page
+
+
+@pytest.fixture
+def opened(open_page, url):
+    """Opens a page of the test's own."""
+    return waiting_for_a_chart(open_page, url)
+
+
+@pytest.fixture
+def seen(open_page_once, url):
+    """Opens the page for several tests, which only look at it."""
+    opened_page = waiting_for_a_chart(open_page_once, url)
+    return lambda width=1280, scheme="light": opened_page(width=width, scheme=scheme)
 
 
 def luminance(colour):
@@ -68,8 +80,8 @@ def style(page, selector, name):
     return page.locator(selector).first.evaluate(f"element => getComputedStyle(element).{name}")
 
 
-def test_the_charts_are_there(opened):
-    page = opened()
+def test_the_charts_are_there(seen):
+    page = seen()
     assert page.title() == "Roll of 13 frames"
     page.locator("#roll .scatterlayer .trace").nth(2).wait_for(state="attached")
     page.locator("#histogram .bars .point").nth(4).wait_for(state="attached")
@@ -175,8 +187,8 @@ def test_on_a_narrow_screen_a_wide_map_is_enlarged_beyond_the_screen_and_is_move
 
 
 @pytest.mark.parametrize("width", [400, 1280])
-def test_nothing_is_cut_off_or_too_small_to_read(opened, width):
-    page = opened(width=width)
+def test_nothing_is_cut_off_or_too_small_to_read(seen, width):
+    page = seen(width=width)
     assert page.evaluate("document.documentElement.scrollWidth") == width
     too_wide = page.evaluate(
         """() => [...document.querySelectorAll("main *")].filter(
@@ -193,8 +205,8 @@ def test_nothing_is_cut_off_or_too_small_to_read(opened, width):
     assert min(sizes)[0] >= 11, min(sizes)
 
 
-def test_on_a_narrow_screen_no_value_is_hidden(opened):
-    page = opened(width=400)
+def test_on_a_narrow_screen_no_value_is_hidden(seen):
+    page = seen(width=400)
     assert page.locator(".reasons td").count() >= 5
     hidden = page.locator(".reasons td, .rows .row > span, .figures td, .options span").evaluate_all(
         "all => all.filter(e => e.textContent && !e.getClientRects().length).map(e => e.className)"
@@ -249,8 +261,8 @@ def test_a_printed_page_shows_both_sides_of_the_switch_and_keeps_headings_with_w
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_text_stands_out_in_light_and_dark_mode(opened, scheme):
-    page = opened(scheme=scheme)
+def test_text_stands_out_in_light_and_dark_mode(seen, scheme):
+    page = seen(scheme=scheme)
     ground, card = style(page, "body", "backgroundColor"), style(page, "section", "backgroundColor")
     assert (luminance(card) < 0.05) == (scheme == "dark")
     assert contrast(style(page, "h1", "color"), ground) > 7
@@ -398,7 +410,7 @@ def test_charts_follow_when_the_mode_changes(opened):
     assert contrast(style(page, "#roll .xtick text", "fill"), style(page, "section", "backgroundColor")) > 7
 
 
-def test_the_chart_offers_nothing_that_leaves_this_computer(opened):
-    titles = opened().locator(".modebar-btn").evaluate_all("all => all.map(each => each.dataset.title)")
+def test_the_chart_offers_nothing_that_leaves_this_computer(seen):
+    titles = seen().locator(".modebar-btn").evaluate_all("all => all.map(each => each.dataset.title)")
     assert titles
     assert not [title for title in titles if re.search("share|cloud|plotly|edit", title, re.I)]
