@@ -104,6 +104,13 @@ def test_the_answer_in_one_line_counts_every_frame():
     assert "±" in line
 
 
+def test_the_answer_in_one_line_says_why_it_has_no_interval():
+    few = one_line(rollcli.assess_rig(columns(np.full(5, 1.5), np.full(5, 0.1))))
+    assert few == "roll +1.50° (too few frames for an interval), 5 ok, 0 suspect, 0 failed"
+    failed = {**columns(np.full(5, 1.5), np.full(5, 0.1)), "status": ["error"] * 5}
+    assert "too few" not in one_line(rollcli.assess_rig(failed))
+
+
 def test_too_few_frames_have_a_value_without_an_interval_and_say_what_it_takes():
     rig = rollcli.assess_rig(columns([0.1, 0.2, 0.3], [0.05] * 3))
     assert answer(rig.now()) == "+0.20°"

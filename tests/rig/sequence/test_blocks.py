@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import t
 
-from rollcli.rig.sequence.blocks import make_blocks, mean_of_blocks, t_quantile
+from rollcli.rig.sequence.blocks import hidden, make_blocks, mean_of_blocks, t_quantile
 from rollcli.rig.sequence.noise import Noise
 
 WHITE = Noise(1.0, 0.0, 0.0, 1.0)
@@ -45,3 +45,14 @@ def test_below_eight_blocks_there_is_no_interval_but_how_many_frames_it_takes():
     found = mean_of_blocks(np.ones(200), np.ones(200), slow)
     assert (found.value, found.ci95, found.needed) == (1.0, None, 304)
     assert mean_of_blocks(np.ones(304), np.ones(304), slow).ci95 is not None
+
+
+def test_blocks_hide_what_their_alike_neighbours_share():
+    """Of AR(1): the variance of the mean over what the spread of block means tells, all covariances summed."""
+    phi, frames, count = 0.9, 120, 4
+    covariances = phi ** np.abs(np.subtract.outer(np.arange(frames), np.arange(frames)))
+    parts = covariances.reshape(count, frames // count, count, frames // count).mean(axis=(1, 3))
+    told = (np.trace(parts) / count - parts.mean()) / (count - 1)
+
+    assert hidden(Noise(1.0, phi, 1.0, 19.0), frames, count) == pytest.approx(parts.mean() / told, rel=0.02)
+    assert hidden(Noise(0.0, 0.0, 0.0, 1.0), frames, count) == 1  # without noise nothing is hidden
