@@ -4,8 +4,12 @@ from dataclasses import make_dataclass
 
 import numpy as np
 import pytest
+from scipy.stats import t as student
+from scipy.stats import ttest_ind_from_stats
 
 import rollcli
+from rollcli.rig.assess import difference
+from rollcli.rig.sequence.blocks import Estimate
 from rollcli.rig.words import answer, findings, one_line
 from tests.rig.sequence.series import drive
 
@@ -73,6 +77,18 @@ def test_groups_name_the_folders_that_are_drives():
     assert len(rollcli.assess_rig(joined(*parts), groups="none").drives) == 1
     with pytest.raises(rollcli.RollcliError, match="matches no folder"):
         rollcli.assess_rig(joined(*parts), groups="nothing*")
+
+
+def test_two_drives_differ_by_welchs_test():
+    before, after = Estimate(0.3, 0.1, 0.05, 9), Estimate(0.7, 0.2, 0.08, 14)
+    # standard deviations of 10 and 15 frames whose means have these errors
+    welch = ttest_ind_from_stats(0.7, 0.08 * 15**0.5, 15, 0.3, 0.05 * 10**0.5, 10, equal_var=False)
+
+    change = difference(before, after)
+
+    assert change.value == pytest.approx(0.4)
+    assert change.value / change.error == pytest.approx(welch.statistic)
+    assert 2 * student.sf(welch.statistic, change.freedom) == pytest.approx(welch.pvalue)
 
 
 def test_pitch_and_height_are_assessed_by_themselves_where_they_are_there():

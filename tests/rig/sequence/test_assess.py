@@ -156,6 +156,14 @@ def test_the_drift_is_the_line_through_the_blocks_and_its_error_that_of_statsmod
     assert found.drift.value == pytest.approx(0.5, abs=2 * found.drift.ci95)
 
 
+def test_the_error_of_a_drift_grows_with_what_the_blocks_hide(monkeypatch):
+    values = white(500), np.full(500, 0.01)
+    monkeypatch.setattr(assess, "hidden", lambda *_: 1.0)
+    told = assess_sequence(*values).drift
+    monkeypatch.setattr(assess, "hidden", lambda *_: 4.0)
+    assert assess_sequence(*values).drift.error == pytest.approx(2 * told.error)
+
+
 def test_a_drift_beside_a_jump_is_that_of_the_line_between_levels():
     values = white(200, 0.05) + np.linspace(0, 1, 200)
     values[100:] += 2.0

@@ -48,7 +48,7 @@ def test_below_eight_blocks_there_is_no_interval_but_how_many_frames_it_takes():
 
 
 def test_blocks_hide_what_their_alike_neighbours_share():
-    """Of AR(1): the variance of the mean over what the spread of block means tells, all covariances summed."""
+    """Of AR(1): the variance of the mean over what the blocks' spread tells, all covariances summed."""
     phi, frames, count = 0.9, 120, 4
     covariances = phi ** np.abs(np.subtract.outer(np.arange(frames), np.arange(frames)))
     parts = covariances.reshape(count, frames // count, count, frames // count).mean(axis=(1, 3))

@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 from statsmodels.stats.meta_analysis import combine_effects
 
+from rollcli.rig.sequence.tuning import TUNING
 from rollcli.rig.sequence.weights import between_variance, frame_weights, gross_outliers
 from tests.rig.sequence.series import drive
 
@@ -66,3 +68,16 @@ def test_a_jump_is_no_gross_outlier():
 @pytest.mark.parametrize("values", [[], [1.0], [1.0, 1.0, 1.0], [0.0] * 50])
 def test_few_or_equal_values_have_no_outliers(values):
     assert not gross_outliers(np.array(values), np.full(len(values), 0.01)).any()
+
+
+def test_the_variance_between_frames_is_cut_at_hubers_bound_of_the_median():
+    """Twice the mean square of a normal variable that is cut at the bound, first that of its median."""
+    residuals = np.random.default_rng(11).normal(0, 0.2, 40_000)
+    expected = 1.0
+    for _ in range(2):
+        bound = TUNING.huber * np.sqrt(expected)
+        expected = norm.expect(lambda x, cut=bound: min(x * x, cut * cut), lb=-12, ub=12)
+
+    _, tau2 = frame_weights(residuals, np.full(40_000, 1e-12))
+
+    assert tau2 == pytest.approx(0.2**2 * expected, rel=0.03)
