@@ -140,22 +140,24 @@ class NearPixels:
 
     def weights(self, fit: Fit) -> Singles:
         """Return the weights that a fit leaves, 0 to 1."""
-        design = np.empty((5, len(self.d)), np.float32)
-        design[0] = 1
-        return self._weights(self._lay_out(design, fit.model, cambered=True)[1], fit.limit)
+        return self._weights(self._off(fit.model), fit.limit)
 
     def limit_alone(self, model: RoadModel) -> float:
         """Return where the weights of single pixels around a road would end, in tolerances.
 
         Averaged ones lie closer together.
         """
-        design = np.empty((5, len(self.d)), np.float32)
-        design[0] = 1
-        off = self._lay_out(design, model, cambered=True)[1] + (self.d - self.alone) / self.tolerance
+        off = self._off(model) + (self.d - self.alone) / self.tolerance
         limit = self.tuning.start_width
         for _ in range(self.tuning.rounds):
             limit = min(limit, self._width(off, self._weights(off, limit)))
         return limit
+
+    def _off(self, model: RoadModel) -> Singles:
+        """Return road minus disparity in tolerances."""
+        design = np.empty((5, len(self.d)), np.float32)
+        design[0] = 1
+        return self._lay_out(design, model, cambered=True)[1]
 
     def _lay_out(self, design: Singles, model: RoadModel, *, cambered: bool) -> tuple[Singles, Singles]:
         """Set a design's rows 1 and 2, the coordinate along the road and its square, and 4, the bulge.
