@@ -9,7 +9,7 @@ from rollcli.rig.sequence import assess
 from rollcli.rig.sequence.assess import assess_sequence
 from rollcli.rig.sequence.blocks import block_count, frames_needed, hidden, make_blocks
 from rollcli.rig.sequence.jumps import Series, search
-from tests.rig.sequence.series import drive
+from tests.rig.sequence.series import drive, two_jumps
 
 SEEDS = range(4)
 
@@ -179,10 +179,7 @@ def test_a_drift_beside_a_jump_is_that_of_the_line_between_levels():
 
 @pytest.mark.parametrize("drift", [0.0, 1.0])
 def test_the_size_of_a_jump_has_the_error_that_statsmodels_finds_with_the_same_noise(drift):
-    values, errors = drive(7, 150, phi=0.5, sd=0.02, errors=(0.01, 0.02), drift=drift)
-    values[50:] += 1.0
-    values[110:] -= 0.7
-    fit = search(Series(values, errors**2, np.ones(150, dtype=bool)))
+    fit = search(two_jumps(drift))
     cells = fit.cells
     oracle = sm.GLS(cells.values, cells.design(fit.starts, fit.drift), np.linalg.inv(cells.precision)).fit()
     for place in (0, 1):

@@ -10,7 +10,7 @@ from scipy.stats import multivariate_normal
 from rollcli.rig.sequence import jumps
 from rollcli.rig.sequence.jumps import Series, bounds_of, fit_residuals, fit_steps, search
 from rollcli.rig.sequence.tuning import TUNING
-from tests.rig.sequence.series import ar1, drive
+from tests.rig.sequence.series import ar1, drive, two_jumps
 
 
 def series(seed, frames=240, missing=0.0, **options):
@@ -118,10 +118,7 @@ def test_without_correlation_a_step_is_no_kick():
 
 @pytest.mark.parametrize("drift", [0.0, 1.0])
 def test_jumps_are_found_beside_a_line_and_without_one(drift):
-    values, errors = drive(7, 150, phi=0.5, sd=0.02, errors=(0.01, 0.02), drift=drift)
-    values[50:] += 1.0
-    values[110:] -= 0.7
-    found = search(Series(values, errors**2, np.ones(150, dtype=bool)))
+    found = search(two_jumps(drift))
     assert found.drift == (drift != 0)
     assert found.starts == (50, 110)
 
