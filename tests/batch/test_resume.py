@@ -227,7 +227,8 @@ def test_sigterm_stops_a_run_as_ctrl_c_does(undisturbed, folder):
     assert results(folder) == results(undisturbed)
 
 
-def test_a_second_run_on_the_same_result_is_refused(folder):
+def test_a_second_run_on_the_same_result_is_refused(folder, monkeypatch):
+    monkeypatch.setattr("rollcli.files.locking._PATIENCE_S", 0.1)
     first = start(folder, "-j1")
     wait_for_images(folder, 1, first)
     first.send_signal(signal.SIGSTOP)
