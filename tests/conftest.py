@@ -73,12 +73,13 @@ def _pages(browser):
     complaints = []
     with contextlib.ExitStack() as stack:
 
-        def opened(url, width=1280, scheme="light", expected=complaints):
+        def opened(url, width=1280, scheme="light", expected=complaints, script=""):
             context = browser.new_context(
                 viewport={"width": width, "height": 900}, color_scheme=scheme, offline=True
             )
             stack.callback(context.close)
             page = context.new_page()
+            page.add_init_script(script)
             page.on("console", lambda message: expected.append(message.text))
             page.on("pageerror", lambda error: complaints.append(str(error)))
             page.on("dialog", lambda dialog: complaints.append(dialog.message))

@@ -29,6 +29,9 @@ PLACE = """name => {
 }"""
 
 
+NEVER_IDLE = "window.requestIdleCallback = () => {}"  # charts wait until the browser is idle
+
+
 @pytest.fixture(scope="module")
 def url(tmp_path_factory):
     folder = tmp_path_factory.mktemp("report")
@@ -41,11 +44,15 @@ def url(tmp_path_factory):
 
 
 def waiting_for_a_chart(open_page, default):
-    """Opens the page, or another, and waits for its first chart; the others are drawn after it."""
+    """Opens the page, or another, and waits for its first chart; the others are drawn after it.
 
-    def opened_page(url=default, **how):
-        page = open_page(url, **how)
-        page.wait_for_selector("#roll .main-svg")
+    Drawing takes most of the time: what has nothing to do with charts sees the page before any is drawn.
+    """
+
+    def opened_page(url=default, drawn=True, **how):
+        page = open_page(url, script="" if drawn else NEVER_IDLE, **how)
+        if drawn:
+            page.wait_for_selector("#roll .main-svg")
         return page
 
     return opened_page
@@ -106,8 +113,8 @@ def test_a_result_of_one_kind_of_frame_has_a_page_without_complaint(opened, tmp_
     assert page.locator("#roll .legendtext").count() >= 1
 
 
-def test_hovering_shows_the_name_of_the_frame_as_text(opened):
-    page = opened()
+def test_hovering_shows_the_name_of_the_frame_as_text(seen):
+    page = seen()
     for name in ("maps/frame3.png", "maps/frame5.png", NAME):
         x, y = page.evaluate(PLACE, name)
         page.mouse.move(x + 1, y + 1)
@@ -118,7 +125,7 @@ def test_hovering_shows_the_name_of_the_frame_as_text(opened):
 
 
 def test_a_click_enlarges_and_keys_move_on_and_close(opened):
-    page = opened()
+    page = opened(drawn=False)
     button = page.locator(".pictures .picture").nth(2)
     small = button.locator("img").bounding_box()
     button.click()
@@ -138,7 +145,7 @@ def test_a_click_enlarges_and_keys_move_on_and_close(opened):
 
 
 def test_the_keyboard_alone_opens_a_picture_and_its_buttons_are_named(opened):
-    page = opened()
+    page = opened(drawn=False)
     page.locator(".pictures .picture").first.focus()
     page.keyboard.press("Enter")
     page.get_by_role("button", name="Next picture").click()
@@ -150,7 +157,7 @@ def test_the_keyboard_alone_opens_a_picture_and_its_buttons_are_named(opened):
 
 
 def test_a_switch_shows_a_frame_before_and_after_and_the_table_shows_its_pictures_too(opened):
-    page = opened()
+    page = opened(drawn=False)
     page.locator(".rows .row", has_text="alert").click()
     for box in (page.locator("figure .pictures").first, page.locator(".detail .pictures")):
         before, after = box.locator(".picture.before"), box.locator(".picture.after")
@@ -164,7 +171,7 @@ def test_a_switch_shows_a_frame_before_and_after_and_the_table_shows_its_picture
 
 
 def test_an_enlarged_wide_map_leaves_no_empty_space_and_the_buttons_stay_where_they_are(opened):
-    page = opened()
+    page = opened(drawn=False)
     page.locator(f".pictures .picture[data-caption='{NAME}: map']").click()
     shown, next_one = page.locator("dialog img"), page.get_by_role("button", name="Next picture")
     image, place = shown.bounding_box(), next_one.bounding_box()
@@ -176,7 +183,7 @@ def test_an_enlarged_wide_map_leaves_no_empty_space_and_the_buttons_stay_where_t
 
 
 def test_on_a_narrow_screen_a_wide_map_is_enlarged_beyond_the_screen_and_is_moved_about(opened):
-    page = opened(width=400)
+    page = opened(width=400, drawn=False)
     button = page.locator(".pictures .picture").first
     small = button.locator("img").bounding_box()
     button.click()
@@ -279,7 +286,7 @@ def test_a_script_that_is_not_the_pages_own_does_not_run(opened, tmp_path, url):
         text.replace("</main>", "<script>window.ran = 1</script></main>"), "utf-8"
     )
     refused = []
-    page = opened(url=(tmp_path / "page.html").as_uri(), expected=refused)
+    page = opened(url=(tmp_path / "page.html").as_uri(), expected=refused, drawn=False)
     assert page.evaluate("window.ran") is None
     assert ["script-src" in message for message in refused] == [True]
 
@@ -316,7 +323,7 @@ def shown_rows(page):
 def test_a_table_of_ten_thousand_frames_holds_the_rows_in_view_alone_and_is_sorted_and_searched(
     opened, long_url
 ):
-    page = opened(url=long_url)
+    page = opened(url=long_url, drawn=False)
     assert shown_rows(page)[0][:2] == ["1", "maps/f00000.png"]
     assert len(shown_rows(page)) < 50
 
@@ -361,18 +368,18 @@ def test_a_table_of_few_frames_has_no_empty_space_and_the_chart_a_picture_until_
 
 
 def test_an_address_leads_to_a_frame_whatever_it_is_called(opened, url, long_url):
-    page = opened(url=long_url + "#frame=maps/f07750.png")
+    page = opened(url=long_url + "#frame=maps/f07750.png", drawn=False)
     assert page.locator(".detail h3").inner_text() == "maps/f07750.png"
     assert "<b>wide</b>" in page.locator(".detail").inner_text()
     assert page.locator(".rows [aria-current]").is_visible()
 
-    page = opened(url=url)
+    page = opened(drawn=False)
     page.locator(".rows .row", has_text="alert").click()
     assert page.locator(".detail h3").inner_text() == NAME
     assert page.locator(".detail img").count() == 4
-    again = opened(url=page.url)
+    again = opened(url=page.url, drawn=False)
     assert again.locator(".detail h3").inner_text() == NAME
-    assert opened(url=url + "#frame=%E0%A4%A").locator(".detail").is_hidden()
+    assert opened(url=url + "#frame=%E0%A4%A", drawn=False).locator(".detail").is_hidden()
 
 
 def test_a_click_on_a_point_of_the_chart_leads_to_its_row_and_pictures(opened):
