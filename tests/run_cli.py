@@ -39,7 +39,8 @@ def rollcli(*arguments: str | Path, cwd: Path, stdin: str = "", **variables: str
     With a URL it has one frame in hand here; in a process of its own, a worker has several.
     """
     words = [*map(str, arguments)]
-    if "PYTHONPATH" in variables or _STARTS_PROCESSES.search(f" {' '.join(words)} "):
+    starts_others = _STARTS_PROCESSES.search(f" {' '.join(words)} ") and "--dry-run" not in words
+    if starts_others or "PYTHONPATH" in variables:
         return rollcli_process(*words, cwd=cwd, stdin=stdin, **variables)
     return run_here(words, cwd, stdin, environment(**variables))
 

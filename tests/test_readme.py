@@ -91,10 +91,7 @@ def made(tmp_path_factory):
         each for each in re.findall(r"```make\n(.*?)```", README, flags=re.S) if "maps/%.png" in each
     )
     (folder / "Makefile").write_text(recipe)
-    (folder / "bin").mkdir()
-    program = folder / "bin" / "rollcli"
-    program.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m rollcli "$@"\n')
-    program.chmod(0o755)
+    write_program(folder)
     done = make(folder)
     assert done.returncode == 0, done.stderr
     return folder
@@ -103,6 +100,14 @@ def made(tmp_path_factory):
 @pytest.fixture
 def pairs(tmp_path, made):
     return shutil.copytree(made, tmp_path, dirs_exist_ok=True)  # keeps the times of files
+
+
+def write_program(folder):
+    """Put the program where `make` looks for it."""
+    (folder / "bin").mkdir()
+    program = folder / "bin" / "rollcli"
+    program.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m rollcli "$@"\n')
+    program.chmod(0o755)
 
 
 def make(folder, target="rolls.html"):

@@ -12,7 +12,7 @@ import pytest
 
 from tests.readme_tables import commands
 from tests.run_cli import ROOT, contents, road_map, rollcli, rollcli_process, write_kitti
-from tests.test_readme import PAGES, README, made, make, needs_make  # noqa: F401 (a fixture)
+from tests.test_readme import PAGES, README, make, needs_make, write_program
 
 COMMANDS = dict(commands())
 BLOCKS = [text for _, text in re.findall(r"^```(\w*)\n(.*?)^```", README, flags=re.M | re.S)]
@@ -146,10 +146,10 @@ def test_what_the_result_says_of_the_rig(tmp_path):
 
 
 @needs_make
-def test_the_rule_of_a_makefile_accepts_frames_without_an_angle(tmp_path, made):  # noqa: F811
+def test_the_rule_of_a_makefile_accepts_frames_without_an_angle(tmp_path):
     maps(tmp_path / "maps", "frame_0001.png", "frame_0002.png")
     (tmp_path / "maps" / "frame_0003.png").write_bytes(b"no map")
-    shutil.copytree(made / "bin", tmp_path / "bin")
+    write_program(tmp_path)
     (tmp_path / "Makefile").write_text(block("rolls.csv: $(wildcard maps/*.png)"))
     done = make(tmp_path, "rolls.csv")
     assert done.returncode == 0, done.stderr

@@ -54,9 +54,12 @@ MODULES = dict(modules())
 @functools.cache
 def imports(name, *, in_functions):
     """The modules of rollcli that a module imports: when it is loaded, or inside its functions."""
-    return tuple(
-        _imports(ast.parse(MODULES[name].read_text("utf-8")), in_function=False, wanted=in_functions)
-    )
+    return tuple(_imports(_tree(name), in_function=False, wanted=in_functions))
+
+
+@functools.cache
+def _tree(name):
+    return ast.parse(MODULES[name].read_text("utf-8"))
 
 
 def _imports(node, *, in_function, wanted):

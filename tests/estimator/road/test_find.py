@@ -1,5 +1,6 @@
 """The road is found on whole frames: rendered ones with known roll, degraded ones, real ones."""
 
+import functools
 import itertools
 import math
 import re
@@ -145,6 +146,7 @@ def test_a_road_rolled_beyond_the_bound_is_no_road():
         estimate_roll(disparity, max_roll=math.radians(20))
 
 
+@functools.cache
 def no_road():
     rng = np.random.default_rng(4)
     rows, columns = np.mgrid[:480, :640].astype(np.float32)
