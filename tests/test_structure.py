@@ -39,6 +39,8 @@ DOOR_PACKAGES = {
     "rollcli.cli": "the command line's doors: help and version load no command",
 }
 _MOST_LINES, _MOST_MODULES = 300, 16
+# what is filled in while it is made
+CHANGING = {"rollcli.frames.causes._Cause", "rollcli.simulate.scenes.scene.Scene"}
 
 
 def modules():
@@ -142,3 +144,15 @@ def test_no_module_is_too_long_to_read_and_no_folder_too_full():
 def test_no_module_defers_its_annotations():
     deferring = {name for name, path in MODULES.items() if "from __future__" in path.read_text("utf-8")}
     assert deferring == set()
+
+
+def test_a_record_does_not_change_once_it_is_made():
+    changing = {
+        f"{name}.{node.name}"
+        for name in MODULES
+        for node in ast.walk(_tree(name))
+        if isinstance(node, ast.ClassDef)
+        for each in map(ast.unparse, node.decorator_list)
+        if each.partition("(")[0] == "dataclass" and "frozen=True" not in each
+    }
+    assert changing == CHANGING

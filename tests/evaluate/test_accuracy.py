@@ -126,6 +126,16 @@ def test_all_frames_in_error_leave_no_figures():
     assert json.loads(as_json(found))["median_deg"] is None
 
 
+def test_figures_are_written_to_a_millionth_one_a_line():
+    found = assess(rows(1 / 3, status="suspect"), truth(0))
+    assert as_json(found).splitlines()[:3] == ["{", '  "count": 1,', '  "median_deg": 0.333333,']
+    assert as_csv(found).splitlines()[1].startswith("1,0.333333,0.333333,0.333333,maps/frame1.png,0.333333,")
+    assert "frames compared           1 (1 suspect)\n" in as_table(found)
+    assert "worst                     0.3333 degrees  maps/frame1.png\n" in as_table(found)
+    assert "frames compared           1\n" in as_table(assess(rows(1.0), truth(0)))
+    assert "worst                     -\n" in as_table(assess(rows(None), truth(0)))
+
+
 def test_the_three_forms_say_the_same():
     found = assess(rows(1.125, 2.0, None, ci95=0.2), {**truth(1, 2, 3)})
     line = next(csv.DictReader(io.StringIO(as_csv(found))))
@@ -165,7 +175,7 @@ def test_a_truth_that_holds_no_angles_is_refused_with_the_line(tmp_path, text, r
 
 
 def test_a_truth_that_is_not_there_is_refused(tmp_path):
-    with pytest.raises(InputError, match="no such file"):
+    with pytest.raises(InputError, match=r"t\.csv: cannot be read: no such file or directory$"):
         read_truth(tmp_path / "t.csv")
 
 
@@ -193,6 +203,7 @@ def test_pitch_and_height_are_compared_where_they_are_known_and_the_road_does_no
     pitch, height = assess_pitch(posed_rows(), known), assess_height(posed_rows(), known)
     # errors of the first two frames: 0.1 and -0.3 degrees, -0.01 and 0 m
     assert (pitch.count, pitch.median, pitch.worst) == (2, pytest.approx(0.2), pytest.approx(0.3))
+    assert pitch.p95 == pytest.approx(0.1 + 0.95 * 0.2)
     assert (pitch.bias, pitch.coverage_95) == (pytest.approx(-0.1), 0.5)
     assert (height.count, height.worst, height.coverage_95) == (2, pytest.approx(0.01), 1.0)
 
@@ -217,7 +228,11 @@ def test_without_known_poses_nothing_is_said_of_them(tmp_path):
     assert "pitch" not in as_table(assess(posed_rows(), truth(1, 2, 3, 4)))
 
 
-def test_a_pitch_that_is_no_number_is_named(tmp_path):
-    path = write_truth(tmp_path / "t.csv", "file,roll_deg,pitch_deg\nframe1,1,steep\n")
-    with pytest.raises(InputError, match="line 2: pitch_deg is 'steep'"):
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [("pitch_deg", "an angle in degrees"), ("height_m", "a number"), ("curvature_per_m", "a number")],
+)
+def test_a_pose_that_is_no_number_is_named(tmp_path, name, kind):
+    path = write_truth(tmp_path / "t.csv", f"file,roll_deg,{name}\nframe1,1,steep\n")
+    with pytest.raises(InputError, match=f"line 2: {name} is 'steep', not {kind}$"):
         read_known_poses(path)

@@ -42,6 +42,14 @@ def test_rotating_keeps_the_corners_and_invents_nothing():
         assert corner in rotated
 
 
+@pytest.mark.parametrize("turn_deg", range(-90, 91, 9))
+def test_a_rotated_map_is_just_large_enough_for_its_corners(turn_deg):
+    c, s = abs(math.cos(math.radians(turn_deg))), abs(math.sin(math.radians(turn_deg)))
+    rotated = rotate_nearest(np.ones((60, 101)), math.radians(turn_deg))
+    for size, needed in zip(rotated.shape, (60 * c + 101 * s, 101 * c + 60 * s), strict=True):
+        assert -1e-6 < size - needed < 1
+
+
 def test_rotating_by_nothing_gives_the_same_map():
     disparity = bent_road(7, width=61, height=40)
     np.testing.assert_array_equal(rotate_nearest(disparity, 0.0), disparity)

@@ -1,6 +1,8 @@
 """What the paper's page and its charts show is what stands in the tables."""
 
+import html
 import math
+import re
 from dataclasses import replace
 
 import pytest
@@ -8,8 +10,10 @@ import pytest
 from rollcli.evaluate import paper_page
 from rollcli.evaluate.charts import METHOD_NAMES, SOLVER_NAMES, charts
 from rollcli.evaluate.experiments import DELTAS, LAMBDAS, METHODS, SOLVERS, Findings
+from rollcli.evaluate.options import ExperimentOptions, PaperOptions
 from rollcli.evaluate.tables import DELTAS_DEG, all_tables
 from rollcli.evaluate.timing import FORMS, Times
+from rollcli.frames.options import EncodingOptions, InputOptions, RegionOptions, RunningOptions
 
 TOLERANCES = ["0.1°", "0.01°", "0.001°", "0.0001°"]
 
@@ -46,6 +50,68 @@ def times(seconds):
 @pytest.fixture(scope="module")
 def tables():
     return all_tables([findings(), findings("b.png", (4, 4, 5, 8), 9)], [], [times(2e-3)])
+
+
+def page_text(found, timed, region=None, **experiments):
+    """What the page of these maps says."""
+    pytest.importorskip("plotly", reason="plotly, of the extra report, is not here")
+    pytest.importorskip("jinja2", reason="jinja2, of the extra report, is not here")
+    options = PaperOptions(
+        InputOptions(("maps",)),
+        EncodingOptions(),
+        region or RegionOptions(),
+        ExperimentOptions("out", **experiments),
+        RunningOptions(),
+    )
+    page = paper_page.paper_page(all_tables(found, [], timed), found, [], timed, options).decode()
+    shown = re.sub(r"<(script|style|svg).*?</\1>", "", page, flags=re.S)
+    return " ".join(html.unescape(re.sub("<[^>]+>", "", shown)).split())
+
+
+def test_the_page_says_what_was_done():
+    seconds = {
+        (solver, form): tuple(1e-3 * (400 - 10 * k if form == "textbook" else 1) for k in range(4))
+        for solver in ("gss", "gd")
+        for form in FORMS
+    }
+    text = page_text([findings()], [Times(9, seconds), Times(12_345, seconds)])
+    assert "The paper's experiments on 1 map" in text
+    assert "the parabola’s energy over every valid pixel, λ(0) = 26." in text
+    assert "One thread, mean over 2 maps of 6,177 valid pixels." in text
+    assert "at least 370 times less here" in text
+    assert "Each map is rotated by −20° to 20° in steps of 2° (nearest pixel" in text
+    assert "the exact minimum of the map itself plus the rotation" in text
+    assert "0.001°, 0.0001°. maps.csv" in text
+
+
+def test_the_page_says_what_was_asked_for():
+    text = page_text(
+        [findings()], [times(1)], RegionOptions(roi=(0, 0, 9, 9)), turns=(5.0, 5.0, 1.0), truth="known.csv"
+    )
+    assert "over every pixel of the chosen region" in text
+    assert "Each map is rotated by 5° (nearest pixel" in text
+    assert "the known angle in known.csv plus the rotation" in text
+
+
+@pytest.mark.parametrize(("count", "words"), [(50, "maps.csv"), (52, "2 more in maps.csv")])
+def test_the_page_lists_fifty_maps_and_counts_the_others(count, words):
+    text = page_text([findings(f"map{k}.png") for k in range(count)], [times(1)])
+    assert f"experiments on {count} maps" in text
+    assert f"0.001°, 0.0001°. {words}" in text
+    assert [text.count(f"map{k}.png") for k in (0, 49, 50, 51)] == [1, 1, 0, 0]
+
+
+@pytest.mark.parametrize(
+    ("turns", "angles"),
+    [
+        (ExperimentOptions("out").turns, range(-20, 21, 2)),
+        ((0.0, 0.3, 0.1), (0, 0.1, 0.2, 0.3)),  # the last is reached, whatever is rounded
+        ((1.0, 2.95, 1.0), (1, 2)),
+        ((-8.0, -8.0, 3.0), (-8,)),
+    ],
+)
+def test_maps_are_turned_from_the_first_angle_in_steps_to_the_last(turns, angles):
+    assert ExperimentOptions("out", turns).turns_deg == pytest.approx(tuple(angles))
 
 
 def traces(chart):
@@ -91,7 +157,7 @@ def test_the_sweep_is_drawn_over_every_first_rate_with_the_papers_marked(tables)
     (mark,) = chart.layout["shapes"]
     assert (mark["x0"], mark["x1"], mark["y0"], mark["y1"]) == (26, 26, 0, 1)
     (text,) = chart.layout["annotations"]
-    assert (text["x"], text["y"], text["text"]) == (26, 1, "26")
+    assert (text["x"], text["y"], text["text"], text["showarrow"]) == (26, 1, "26", False)
 
 
 def test_mean_errors_of_the_solvers_are_drawn_in_degrees(tables):
@@ -101,6 +167,10 @@ def test_mean_errors_of_the_solvers_are_drawn_in_degrees(tables):
         mean = [math.degrees(0.002 * (1 + at) / (1 + k)) for k in range(4)]
         assert drawn[SOLVER_NAMES[solver]]["y"] == pytest.approx(mean)
         assert drawn[SOLVER_NAMES[solver]]["x"] == TOLERANCES
+        is_open = drawn[SOLVER_NAMES[solver]]["marker"].get("symbol") == "circle-open"
+        assert is_open == (solver == "exact")  # it lies around the others
+    axis = charts(tables)["accuracy"].layout["yaxis"]
+    assert (axis["type"], axis["dtick"], axis["ticksuffix"]) == ("log", 1, "°")  # a label at each decade
 
 
 def test_median_and_worst_of_each_method_are_drawn_in_degrees(tables):

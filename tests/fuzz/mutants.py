@@ -207,7 +207,7 @@ def _setter(items: list[ast.cmpop], place: int, value: ast.cmpop) -> Callable[[]
 def tests_of(tree: Path, path: Path) -> list[str]:
     """List the test files to try, those first that are named after the module or import it."""
     package, name = path.parts[1], path.with_suffix("").as_posix().replace("/", ".")
-    places = [tree / TESTS / each for each in (package, *FURTHER.get(package, ()))]
+    places = [tree / TESTS / each for each in (package, *FURTHER.get(package, ()), "test_structure.py")]
     files = [
         file for place in places for file in ([place] if place.suffix else sorted(place.rglob("test_*.py")))
     ]
