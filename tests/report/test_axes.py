@@ -45,7 +45,7 @@ def test_an_axis_takes_its_ends_name_step_and_zero_from_the_layout():
 
 
 def test_labels_stand_beside_the_lines_that_they_name():
-    left, top, width, height = 100, 50, 800, 400
+    left, top, width, height = 100, 50, 800, 640
     words = list(AXES.names(left, top, width, height, FONT))
     lines = list(axis_items(AXES, width, height, FONT))
     across = [each for each in lines if each.points[0, 1] == each.points[1, 1]]
@@ -67,22 +67,25 @@ def test_labels_stand_beside_the_lines_that_they_name():
 
 
 def test_the_line_of_zero_is_twice_as_wide_where_zero_is_marked():
-    widths = {each.colour: each.width for each in axis_items(AXES, 800, 400, 13.0)}
-    assert widths == {"grid": 1, "line": 2}
+    lines = list(axis_items(AXES, 800, 400, 39.0))
+    assert {(each.colour, each.width) for each in lines} == {("grid", 3), ("line", 6)}
+    (zero,) = (each for each in lines if each.colour == "line")
+    assert zero.points == pytest.approx(np.array([(0, 200), (800, 200)]))
     unmarked = AXES._replace(y=AXES.y._replace(zero=False))
     assert {each.colour for each in axis_items(unmarked, 800, 400, 13.0)} == {"grid"}
 
 
 def test_margins_hold_the_labels_the_names_and_the_legend():
-    left, top, right, bottom = margins(AXES, 400, FONT, rows=2)
-    widest = max(len(text) for _, text in AXES.y.ticks(400, 4.5 * FONT))
-    words = list(AXES.names(left, top, 800, 400, FONT))
+    axes = AXES._replace(y=Axis((-2.0, 2.0), "roll"))
+    left, top, right, bottom = margins(axes, 600, FONT, rows=2)
+    words = list(axes.names(left, top, 800, 600, FONT))
+    widest = max(len(each.text) for each in words if each.anchor == "end")
     upright = words[-1]
     # letters 0.56 of the font's size wide, half a font's size from the axis; the name's foot is beside them
     assert left - (0.5 + 0.56 * widest) * FONT - upright.x == pytest.approx(0.6 * FONT, abs=1)
     lowest = max(each.y for each in words if not each.upright)
-    assert 0.25 * FONT < top + 400 + bottom - lowest < FONT
-    assert margins(AXES, 400, FONT, rows=3)[1] - top == pytest.approx(1.55 * FONT, abs=1)
+    assert 0.25 * FONT < top + 600 + bottom - lowest < FONT
+    assert margins(axes, 600, FONT, rows=3)[1] - top == pytest.approx(1.55 * FONT, abs=1)
     baselines = [
         each.y
         for row in legend_items(Chart("x", "x", [trace("a" * 30), trace("b" * 30)]), 500, FONT)
@@ -91,7 +94,7 @@ def test_margins_hold_the_labels_the_names_and_the_legend():
     ]
     assert len(set(baselines)) == 2
     assert 0.25 * FONT < top - max(baselines) < 1.5 * FONT
-    assert 0.5 * FONT < right < 1.5 * FONT
+    assert 0.5 * FONT < right < 1.2 * FONT
 
 
 def test_a_legend_runs_on_in_the_next_row_where_a_name_does_not_fit():
@@ -144,6 +147,7 @@ def test_the_samples_of_a_legend_look_like_what_they_name():
         assert area.colour == colour
         low, high = area.points.min(axis=0), area.points.max(axis=0)
         assert high - low == pytest.approx([2.3 * FONT, 0.7 * FONT])  # as high as a capital
+        assert abs(polygon_area(area.points)) == pytest.approx(np.prod(high - low))
         assert (high[1], name.x - high[0]) == pytest.approx((name.y, 0.5 * FONT))
     assert isinstance(line, Line)
     assert (line.colour, line.width, line.dash) == (
@@ -154,10 +158,16 @@ def test_the_samples_of_a_legend_look_like_what_they_name():
     assert line.points[:, 1] == pytest.approx([words[2].y - 0.35 * FONT] * 2)
     assert words[2].x - line.points[1, 0] == pytest.approx(0.5 * FONT)
     assert isinstance(marks, Marks)
-    assert (marks.colour, marks.symbol) == ("suspect", "diamond")
+    assert (marks.colour, marks.symbol, marks.size) == ("suspect", "diamond", 0.6 * FONT)
     assert marks.points == pytest.approx(
         np.array([(words[3].x - (0.5 + 1.15) * FONT, words[3].y - 0.35 * FONT)])
     )
+
+
+def polygon_area(points):
+    """By the shoelace formula; 0 for corners in the order of a bow tie."""
+    x, y = points.T
+    return 0.5 * (x @ np.roll(y, -1) - y @ np.roll(x, -1))
 
 
 def layout(x, y):
@@ -176,9 +186,7 @@ def drawn(traces, x=(0, 10), y=(-1, 1), font=26.0):
 
 
 def test_a_line_has_gaps_where_values_are_missing_and_grows_with_the_font():
-    line = trace(
-        "a", x=[0, 5, None, 10], y=[-1, 0, None, 1], line={"color": "@c1", "width": 2, "dash": "dash"}
-    )
+    line = trace("a", x=[0, 5, 7, 10], y=[-1, 0, None, 1], line={"color": "@c1", "width": 2, "dash": "dash"})
     (width, height), (first, last) = drawn([line])
     assert first.points == pytest.approx(np.array([(0, height), (width / 2, height / 2)]))
     assert last.points == pytest.approx(np.array([(width, 0)]))
@@ -223,10 +231,10 @@ def test_bars_of_error_reach_as_far_as_the_interval_and_lie_below_their_marks():
 
 def test_bars_stand_on_each_other_a_pixel_apart_and_none_is_drawn_for_nothing():
     bars = [
-        {"type": "bar", "name": name, "x": [0, 2, 4], "y": y, "width": 2, "marker": {"color": colour}}
+        {"type": "bar", "name": name, "x": [2, 4, 6], "y": y, "width": 2, "marker": {"color": colour}}
         for name, y, colour in (("ok", [1, 0, 3], "@c1"), ("suspect", [2, 1, 0], "@suspect"))
     ]
-    (width, height), items = drawn(bars, y=(0, 4))
+    (width, height), items = drawn(bars, x=(2, 12), y=(0, 4))
     boxes = [(each.colour, *each.points.min(axis=0), *each.points.max(axis=0)) for each in items]
 
     def box(colour, first, last, foot, top):
@@ -247,12 +255,13 @@ def test_bars_stand_on_each_other_a_pixel_apart_and_none_is_drawn_for_nothing():
     assert [each[0] for each in boxes] == [each[0] for each in expected]
     for found, each in zip(boxes, expected, strict=True):
         assert found[1:] == pytest.approx(each[1:])
-        corners = items[boxes.index(found)].points
-        assert len(np.unique(corners.round(3), axis=0)) == 4
+        corners, (_, left, top, right, bottom) = items[boxes.index(found)].points, found
+        assert abs(polygon_area(corners)) == pytest.approx((right - left) * (bottom - top))
 
 
 def test_a_picture_has_the_size_asked_for_and_the_words_of_its_chart():
     laid = lay_out(Chart("x", "what", [trace("a", x=[1], y=[0])], layout((0, 1), (0, 1))), 900, 500, 15.0)
+    assert lay_out(Chart("x", "what", [], layout((0, 1), (0, 1))), 900, 500).font == 13
     assert (laid.label, laid.width, laid.height, laid.font) == ("what", 900, 500, 15.0)
     left, top, width, height = laid.frame
     axes = Axes.of(layout((0, 1), (0, 1)))
