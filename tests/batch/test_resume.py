@@ -288,9 +288,9 @@ def test_a_resume_with_fewer_or_other_inputs_is_refused(interrupted):
     assert "maps/frame3.png, where now maps/frame4.png" in refused(interrupted)
 
 
-@pytest.mark.parametrize("shard", [[], ["--shard", "2/2"]])
-def test_a_folder_that_has_grown_at_its_end_is_resumed_to_the_bytes_of_one_run(tmp_path, shard):
-    write_maps(tmp_path / "maps", 7)
+@pytest.mark.parametrize(("count", "shard"), [(7, []), (7, ["--shard", "2/2"]), (1, [])])
+def test_a_folder_that_has_grown_at_its_end_is_resumed_to_the_bytes_of_one_run(tmp_path, count, shard):
+    write_maps(tmp_path / "maps", count)
     rollcli("estimate", "maps", "-o", "rolls.csv", *shard, cwd=tmp_path)
     before = (tmp_path / "rolls.csv").read_bytes()
     for index in (7, 8, 10):

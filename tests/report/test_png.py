@@ -61,20 +61,24 @@ def test_a_light_colour_lets_shine_through_what_lies_below():
             ]
         )
         assert shown[60, column] == pytest.approx(expected, abs=2)
+    for left, top in ((-90, 10), (150, 10), (10, -90), (10, 90)):  # wholly outside of it
+        outside = picture([box(left, top, left + 20, top + 20, "band")])
+        assert outside.min() == 255
     edge = picture([box(-30, -30, 20, 20, "band")])  # reaches out of the frame
     assert extent(edge) == pytest.approx([40, 20, 60, 40], abs=1)
     assert edge[30, 50] == pytest.approx(shown[60, 130], abs=2)
 
 
 def test_a_line_is_as_wide_as_it_says_but_for_its_soft_edges():
-    def across(width):
-        return inked(picture([Line(np.array([(20.0, 40.0), (100.0, 40.0)]), "c1", width)]))[:, 100]
+    def across(width, colour="c1"):
+        return inked(picture([Line(np.array([(20.0, 40.0), (100.0, 40.0)]), colour, width)]))[:, 100]
 
     assert across(3.0).sum() == pytest.approx(3.5, abs=0.5)
     assert across(8.0).sum() - across(3.0).sum() == pytest.approx(5, abs=0.1)
     rows = np.flatnonzero(across(8.0) > 0.1)
     assert (rows[0] + rows[-1] + 1) / 2 == pytest.approx(60, abs=0.6)
     assert across(0.1).max() > 0  # no line vanishes
+    np.testing.assert_allclose(across(8.0, "band"), across(8.0), atol=0.1)
 
 
 def test_dashes_and_gaps_are_alike_and_turn_with_the_line():

@@ -38,6 +38,13 @@ def test_rows_of_any_kind_give_the_same_answer():
     assert rollcli.assess_rig(pandas.DataFrame(given)).now() == answers[0]
 
 
+def test_a_single_row_is_a_frame_whatever_its_kind():
+    only = {name: cells[0] for name, cells in columns([1.5], [0.1]).items()}
+    for rows in ([only], [SCHEMA(**only)], {name: [cell] for name, cell in only.items()}):
+        rig = rollcli.assess_rig(rows)
+        assert (rig.count, rig.frames.files, rig.now().value) == (1, ["run/0.png"], 1.5)
+
+
 def test_suspect_frames_are_counted_and_left_out_unless_asked_for():
     values, errors = drive(2, 800, sd=0.1)
     status = np.where(np.arange(800) % 5 == 0, "suspect", "ok")
