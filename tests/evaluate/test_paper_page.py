@@ -152,10 +152,11 @@ def test_the_sweep_is_drawn_over_every_first_rate_with_the_papers_marked(tables)
     for place, trace in enumerate(chart.data):
         assert trace["x"] == list(range(1, 101))
         assert trace["y"] == [8 + place + (rate > 26) for rate in LAMBDAS]
-    assert len({trace["line"]["color"] for trace in chart.data}) == 4
+    assert [trace["line"]["color"] for trace in chart.data] == ["@c1", "@c2", "@c3", "@c4"]
     assert chart.layout["xaxis"]["range"] == [0, 101]  # one more than the rates on each side
     (mark,) = chart.layout["shapes"]
     assert (mark["x0"], mark["x1"], mark["y0"], mark["y1"]) == (26, 26, 0, 1)
+    assert mark["line"]["width"] < min(trace["line"]["width"] for trace in chart.data)
     (text,) = chart.layout["annotations"]
     assert (text["x"], text["y"], text["text"], text["showarrow"]) == (26, 1, "26", False)
 

@@ -203,6 +203,33 @@ def test_a_long_run_has_a_line_without_dots_and_a_dot_for_each_frame_that_stands
     assert traces(rows[:400])["roll"]["mode"] == "lines+markers"
 
 
+def test_what_is_measured_stands_out_from_what_is_said_of_it():
+    rows = drive_rows("run", 0.2, jump=0.8)
+    rows[50] = row("run/50.png", 9.0, 1.0, "suspect")
+    rows[60] = row("run/60.png", None)
+    chart = chart_over_frames(rows, rig=assess_rig(rows))
+    shown = {trace["name"]: trace for trace in chart.data}
+    width = {name: trace["line"]["width"] for name, trace in shown.items() if "line" in trace}
+    assert width["mounting, 95 %"] == 0  # an area alone
+    assert width["95 % interval"] < width["roll"] == width["smoothed"] == width["jump"] < width["mounting"]
+    assert (
+        shown["suspect"]["error_y"]["thickness"] < width["roll"] < shown["failed"]["marker"]["line"]["width"]
+    )
+    alone = traces([row("a.png"), row("b.png", 9.0, 1.0, "suspect")] * 201)["roll, alone"]
+    assert width["roll"] < alone["marker"]["size"] < 2 * width["roll"]
+    assert not alone["showlegend"]
+    # the nearest frame is told, however far it is; failed frames have a scale of their own, which stays
+    assert (chart.layout["hovermode"], chart.layout["hoverdistance"]) == ("closest", -1)
+    scale = chart.layout["yaxis2"]
+    assert (scale["range"], scale["visible"], scale["fixedrange"]) == ([0, 1], False, True)
+    assert not chart.layout["xaxis"]["zeroline"]
+
+
+def test_the_band_is_told_to_a_ten_thousandth():
+    band = traces([row("a.png", 1.000051, 0.1)])["95 % interval"]
+    assert band["y"] == [1.1001, 0.9001, None]
+
+
 def test_no_line_leads_from_one_drive_to_another():
     rows = [*drive_rows("monday", 0.2, 30), *drive_rows("tuesday", 0.2, 30)]
     shown = {trace["name"]: trace for trace in chart_over_frames(rows, rig=assess_rig(rows)).data}
