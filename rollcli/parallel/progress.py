@@ -97,7 +97,7 @@ class TaskProgress:
 
     def _left(self) -> str:
         """Say how long the rest takes at this speed."""
-        seconds = self.seconds / self._finished * (self.total - self.done) if self._finished else 0.0
+        seconds = self.seconds / self._finished * (self.total - self.done)
         return f", about {_rough(seconds)} left" if seconds else ""
 
 

@@ -1,5 +1,8 @@
 """How far a run is, said where nobody looks at a bar."""
 
+import os
+import struct
+import sys
 import time
 
 import pytest
@@ -48,6 +51,82 @@ def test_the_time_that_is_left_is_told_in_a_unit_that_fits(clock, capsys, total,
             clock.now += 1.5
             progress.advance()
     assert capsys.readouterr().err == f"rollcli: 31 of {total} frames, 0.7 frames/s{left}\n"
+
+
+class Terminal:
+    """A terminal so many characters wide, which shows what this process says; 0 if it tells no size."""
+
+    def __init__(self, monkeypatch, columns):
+        fcntl = pytest.importorskip("fcntl", reason="this system has no terminals of POSIX")
+        import termios
+
+        self.reader, end = os.openpty()
+        fcntl.ioctl(end, termios.TIOCSWINSZ, struct.pack("HHHH", 24 if columns else 0, columns, 0, 0))
+        self.stream = os.fdopen(end, "w")
+        monkeypatch.setattr(sys, "stderr", self.stream)
+
+    def read(self):
+        """What was written since it was read."""
+        self.stream.flush()
+        os.set_blocking(self.reader, False)
+        try:
+            return os.read(self.reader, 100_000).decode()
+        except BlockingIOError:
+            return ""
+
+
+class WithFailures(TaskProgress):
+    def counted(self):
+        return {"failed": 2}
+
+
+@pytest.mark.parametrize(("columns", "longest"), [(60, 60), (0, 80)])
+def test_a_terminal_shows_a_bar_which_makes_room_for_messages_and_vanishes(monkeypatch, columns, longest):
+    terminal = Terminal(monkeypatch, columns)
+    progress = WithFailures(10)
+    progress.kept = 4
+    with progress:
+        shown = terminal.read().rpartition("\r")[2]
+        assert " 4/10 " in shown
+        assert longest - 2 <= len(shown) <= longest
+        for _ in range(3):
+            progress.advance()
+        terminal.read()
+        progress.say("a message")
+        cleared, said, after = terminal.read().partition("rollcli: a message\r\n")
+        assert (cleared.strip(), said != "") == ("", True)
+        assert len(cleared) > longest - 5
+        assert " 7/10 " in after
+        assert "failed=2" in after
+    assert terminal.read().rpartition("\r")[2] == ""
+    terminal.stream.close()
+    os.close(terminal.reader)
+
+
+def test_a_terminal_that_is_gone_has_a_bar_of_80_characters(monkeypatch):
+    def gone(descriptor):
+        raise OSError
+
+    terminal = Terminal(monkeypatch, 60)
+    monkeypatch.setattr(os, "get_terminal_size", gone)
+    with TaskProgress(10):
+        assert 78 <= len(terminal.read().rpartition("\r")[2]) <= 80
+    terminal.stream.close()
+    os.close(terminal.reader)
+
+
+def test_nothing_is_shown_on_a_terminal_when_quiet(monkeypatch):
+    terminal = Terminal(monkeypatch, 60)
+    with TaskProgress(10, quiet=True) as progress:
+        progress.advance()
+        assert (terminal.read(), progress.done) == ("", 1)
+    terminal.stream.close()
+    os.close(terminal.reader)
+
+
+def test_details_are_for_those_who_ask(capsys):
+    TaskProgress(3).detail("a detail")
+    assert capsys.readouterr().err == ""
 
 
 def test_quiet_progress_writes_no_lines(clock, capsys):
