@@ -132,7 +132,7 @@ def test_disparities_too_large_for_the_file_are_told(tmp_path):
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
 @pytest.mark.parametrize("jobs", ["1", "2"])
 def test_ctrl_c_ends_it_with_status_130_and_without_truth(tmp_path, jobs):
-    line = command("simulate", "rig", "--frames", "5000", "--size", "64x48", "-j", jobs)
+    line = command("simulate", "rig", "--frames", "700", "--size", "64x48", "-j", jobs)
     with subprocess.Popen(line, cwd=tmp_path, env=environment(), stderr=subprocess.PIPE, text=True) as run:
         while not (tmp_path / "rig/disparity/frame_0003.png").exists():
             time.sleep(0.02)
@@ -141,7 +141,7 @@ def test_ctrl_c_ends_it_with_status_130_and_without_truth(tmp_path, jobs):
         _, err = run.communicate(timeout=30)
     assert run.returncode == 130
     assert err.count("\n") == 1
-    assert "of 5000 frames; continue with: rollcli simulate rig --frames 5000" in err.replace(
+    assert "of 700 frames; continue with: rollcli simulate rig --frames 700" in err.replace(
         command()[0], "rollcli"
     )
     assert err.rstrip().endswith("--resume")

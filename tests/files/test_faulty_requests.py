@@ -33,6 +33,7 @@ def _opened_anew():
 @pytest.mark.parametrize("kind", [*Faults.KINDS, NEVER], ids=["500", "503", CUT, NEVER])
 def test_every_request_gives_the_same_when_it_fails_first(store, bucket, monkeypatch, kind):
     monkeypatch.setenv("ROLLCLI_STORE_TIMEOUT", "0.5")
+    monkeypatch.setattr("rollcli.files.stores.objects._FIRST_PAUSE_S", 0.02)
     with proxied(store["AWS_ENDPOINT_URL"], treat := FirstFails(kind)) as address:
         monkeypatch.setenv("AWS_ENDPOINT_URL", address)
         wanted, found = (done_at_once(bucket, treat, fails=fails) for fails in (False, True))
