@@ -67,12 +67,12 @@ class Terminal:
 
     def read(self):
         """What was written since it was read."""
+        self.stream.write("\0")  # what was written before it has arrived when this has
         self.stream.flush()
-        os.set_blocking(self.reader, False)
-        try:
-            return os.read(self.reader, 100_000).decode()
-        except BlockingIOError:
-            return ""
+        data = b""
+        while not data.endswith(b"\0"):
+            data += os.read(self.reader, 100_000)
+        return data[:-1].decode()
 
 
 class WithFailures(TaskProgress):
