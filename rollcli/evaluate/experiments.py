@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import EstimationError
@@ -20,6 +19,7 @@ from rollcli.estimator.solvers.exact import exact, minima
 from rollcli.estimator.solvers.golden_section import golden_section
 from rollcli.estimator.solvers.gradient_descent import gradient_descent
 from rollcli.estimator.solvers.solution import angle_between
+from rollcli.estimator.validity import CheckedMap
 from rollcli.evaluate.rotate import rotate_nearest
 
 DELTAS = tuple(math.pi / k for k in (1.8e3, 1.8e4, 1.8e5, 1.8e6))
@@ -151,8 +151,9 @@ def _methods(largest_turn: float, chosen: bool) -> dict[str, Callable[[NDArray[A
     settings = AreaSettings(max_roll, chosen=chosen)
 
     def by_areas(name: str, disparity: NDArray[Any]) -> float:
-        valid = (disparity > 0) & (disparity < np.inf)
-        return fit_plane(disparity, load_area_method(name)(disparity, valid, settings)).solution.theta
+        checked = CheckedMap.of(disparity, None)
+        pixels = load_area_method(name)(checked.values, checked.valid, settings)
+        return fit_plane(checked.values, pixels).solution.theta
 
     return {
         "gd": lambda disparity: gradient_descent(_energy(disparity), SolverSettings(DELTAS[-1])).theta,

@@ -97,6 +97,15 @@ def test_methods_follow_far_and_whatever_the_scale_of_the_map_is():
             assert math.degrees(error) < 0.5, name
 
 
+def test_pixels_without_data_count_for_no_method():
+    disparity = bent_road(3, width=120, height=90, noise=0.1)
+    disparity[:, :40] = 0
+    found = examine("a", disparity, TURNS[:1], truth=math.radians(3), chosen=True)
+    assert found.pixels == 80 * 90
+    for name in METHODS:
+        assert math.degrees(found.method_errors[name][0]) < 0.5, name
+
+
 def test_a_known_angle_takes_the_place_of_the_maps_own_estimate():
     disparity = bent_road(3, width=120, height=90)
     off = examine("a", disparity, [0.0], truth=math.radians(2))

@@ -180,6 +180,8 @@ def test_the_chart_shows_segments_jumps_and_the_smoothed_roll():
     assert shown["jump"]["text"][0].endswith(" at run/200.png")
     assert shown["mounting"]["x"] == [1, 200, None, 201, 400, None]
     assert shown["mounting"]["y"][0] == pytest.approx(0.2, abs=0.03)
+    told = [each for each in shown["smoothed"]["y"] if each is not None]
+    assert told == [round(each, 4) for each in told] != [round(each, 3) for each in told]
     assert shown["mounting"]["y"][3] == pytest.approx(1.0, abs=0.03)
     smoothed = np.array([value for value in shown["smoothed"]["y"] if value is not None])
     assert np.abs(smoothed - np.repeat([0.2, 1.0], 200)).max() < 0.1
