@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from rollcli.cli.evaluate.paper import Turns
+from rollcli.cli.simulate import Size, Span
 from rollcli.cli.types import (
     Choice,
     FilePath,
@@ -154,6 +155,20 @@ CORNERS = "'0,375 600,180 1242,375'"
         (OutputFile((".csv",), "CSV"), "a.CSV", "a.CSV"),
         (OutputFile((".csv",), "CSV"), "a.txt", "a.txt"),
         (Choice("gd", "gss"), "GSS", "gss"),
+        (Span(), "-5:5.5", (-5, 5.5)),
+        (Span(), "2", (2, 2)),
+        (Span(), "2:2", (2, 2)),
+        (Span(), (1.0, 2.0), (1, 2)),
+        (Span(), "2:1", "is not A:B with A <= B"),
+        (Span(), "1:2:3", "is not A:B with A <= B"),
+        (Span(), "1:nan", "is not A:B with A <= B"),
+        (Span(), "", "is not A:B with A <= B"),
+        (Size(), "640x480", (640, 480)),
+        (Size(), "1X2", (1, 2)),
+        (Size(), (3, 4), (3, 4)),
+        (Size(), "640", "is not WxH"),
+        (Size(), "640x480x3", "is not WxH"),
+        (Size(), "-640x480", "is not WxH"),
     ],
 )
 def test_what_is_given_is_read_or_refused_with_an_example(kind, given, expected):

@@ -36,7 +36,7 @@ FURTHER = {
         "cli/test_estimate.py",
         "cli/test_frames.py",
     ),
-    "cli": ("batch/test_resume.py",),
+    "cli": ("batch/test_resume.py", "test_messages.py", "test_readme.py"),
     "convert": (
         "cli/test_idle_options.py",
         "cli/test_outputs.py",
