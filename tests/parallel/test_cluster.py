@@ -1,6 +1,7 @@
 """A real Dask scheduler and two real workers, on this machine."""
 
 import json
+import os
 import shutil
 import socket
 import subprocess
@@ -244,6 +245,13 @@ def test_a_worker_that_has_no_such_program_or_files_is_named(tmp_path):
     assert f"does not see {tmp_path / 'b.png'}" in probe(__version__, {str(tmp_path / "b.png"): 3}, [])
     assert "does not see" in probe(__version__, {str(there): 4}, [])
     assert "image folders must lie on storage" in probe(__version__, {}, [str(tmp_path / "v" / "mark")])
+
+
+def test_a_worker_that_may_not_write_is_named(tmp_path, monkeypatch):
+    (tmp_path / "mark").touch()
+    assert probe(__version__, {}, [str(tmp_path / "mark")]) == ""
+    monkeypatch.setattr(os, "access", lambda path, mode: mode != os.W_OK)
+    assert probe(__version__, {}, [str(tmp_path / "mark")]) == f"cannot write to {tmp_path}"
 
 
 def estimate_here(address, cwd, *more):
