@@ -9,9 +9,10 @@ from pathlib import Path
 
 import pytest
 
+from rollcli.batch import durable_rows
 from rollcli.batch import run as batch_run
 from rollcli.batch.door import estimate_frame
-from rollcli.batch.result_file import open_result
+from rollcli.batch.result_file import ResultFile, open_result
 from rollcli.errors import OutputError, UsageError
 from rollcli.files.results import read_result
 from rollcli.files.storage import list_names, modified_ns, read_bytes, remove, write_bytes
@@ -110,6 +111,26 @@ def test_a_retry_that_is_interrupted_keeps_what_it_has_done_and_is_taken_up_agai
     assert rollcli(*line, *RETRY, cwd=folder).status == 0
     fresh, kept = anew(folder, line)
     assert kept == fresh
+
+
+def test_images_of_retried_frames_are_on_the_disk_before_their_rows(folder, maps, monkeypatch):
+    line = ("estimate", "maps", "-o", "rolls.csv", "--derotated", "up")
+    assert rollcli(*line, cwd=folder).status == 3
+    mend(folder, maps, *BROKEN)
+    events, sync_files, replace = [], durable_rows.sync_files, ResultFile.replace
+
+    def sync(images, folders):
+        events.extend(Path(each).name for each in images)
+        sync_files(images, folders)
+
+    def write(file, rows, form):
+        events.append(sorted(rows))
+        replace(file, rows, form)
+
+    monkeypatch.setattr(durable_rows, "sync_files", sync)
+    monkeypatch.setattr(ResultFile, "replace", write)
+    assert rollcli(*line, *RETRY, cwd=folder).status == 0
+    assert events == [*(f"frame{index}.png" for index in BROKEN), list(BROKEN)]
 
 
 def test_a_retry_that_may_not_fail_stops_at_the_first_failure(folder, maps):

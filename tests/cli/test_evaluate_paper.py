@@ -52,6 +52,8 @@ def test_it_writes_one_page_and_a_csv_for_each_table(done):
     assert set(contents(folder / "out")) == FILES
     assert run.out == ""
     assert "4 frames: 3 ok, 1 failed" in run.err
+    assert "rollcli: run times, on 1 of the maps\n" in run.err
+    assert f"rollcli: out/{PAGE} and 6 tables are written\n" in run.err
 
 
 @needs_extra
