@@ -105,6 +105,13 @@ def test_the_same_holds_in_an_object_store(monkeypatch, images, recorded, there)
             subjects([row("a.png")], "s3://maps/rolls.csv", images, options)
 
 
+def test_a_folder_is_known_by_its_real_name(folder, monkeypatch):
+    touch("derotated/a.png")
+    monkeypatch.chdir(folder / "derotated")
+    (found,) = subjects([row("a.png")], "rolls.csv", ".", NONE)
+    assert found.images == {"derotated": "./a.png"}
+
+
 def test_a_folder_that_is_not_there_or_empty_is_refused(folder, monkeypatch):
     with pytest.raises(UsageError, match="out: no such folder of images"):
         subjects([row("a.png")], "rolls.csv", "out", NONE)
