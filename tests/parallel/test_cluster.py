@@ -1,6 +1,7 @@
 """A real Dask scheduler and two real workers, on this machine."""
 
 import json
+import logging
 import os
 import shutil
 import socket
@@ -245,6 +246,13 @@ def test_a_worker_that_has_no_such_program_or_files_is_named(tmp_path):
     assert f"does not see {tmp_path / 'b.png'}" in probe(__version__, {str(tmp_path / "b.png"): 3}, [])
     assert "does not see" in probe(__version__, {str(there): 4}, [])
     assert "image folders must lie on storage" in probe(__version__, {}, [str(tmp_path / "v" / "mark")])
+
+
+def test_dask_may_log_again_once_the_cluster_is_left():
+    before = logging.root.manager.disable
+    with cluster._silenced_logging():
+        assert not logging.getLogger("distributed").isEnabledFor(logging.CRITICAL)
+    assert logging.root.manager.disable == before
 
 
 def test_a_worker_that_may_not_write_is_named(tmp_path, monkeypatch):

@@ -24,6 +24,11 @@ def test_the_widest_then_suspect_ones_then_evenly_spread_ones():
     assert rest[0] < 80 < rest[1] < 180 < rest[2]
 
 
+def test_a_frame_without_an_interval_is_not_one_of_the_widest():
+    chosen = choose([row(f"{i}.png", width=None) for i in range(20)], 9)
+    assert [each.reason for each in chosen] == [SPREAD] * 9
+
+
 def test_frames_without_an_angle_are_never_chosen():
     rows = [row(f"{i}.png", None if i % 2 else 1.0) for i in range(20)]
     assert sorted(each.place for each in choose(rows, 12)) == list(range(0, 20, 2))

@@ -66,6 +66,7 @@ def test_options_are_shown_but_those_that_were_not_given():
         ("--f", "0.5,2"),
         ("--g", "x"),
     ]
+    assert option_lines({"options": {"invalid": [7.0]}}) == [("--invalid", "7")]
     assert option_lines({}) == []
 
 
@@ -168,7 +169,7 @@ def test_a_histogram_is_of_two_angles_or_more():
     assert chart_names([row("a.png"), row("b.png")]) == ["roll", "histogram"]
     assert chart_names([row("a.png"), row("b.png", None)]) == ["roll"]
     posed = replace(row("a.png", None), pitch_deg=0.0, height_m=1.5)
-    assert chart_names([posed]) == ["roll", "pitch", "height"]
+    assert chart_names([row("b.png", None), posed]) == ["roll", "pitch", "height"]
 
 
 def test_a_label_is_cut_to_44_characters_a_line_and_five_lines():
