@@ -42,7 +42,7 @@ class Lag:
 # 0.1 px is 0.025 degrees of pitch at KITTI's size, and 0.045 at 640x480
 LAGS = {"3way": Lag(0.25, 0.22), "sgbm": Lag(0.50, 0.25)}
 _REACH = 6  # rows above and below: SGBM's steps of 1/16 px are then a hundredth of a road's rise
-_STEEPEST = 1.0  # px per row: more is an edge between two things
+STEEPEST = 1.0  # px per px: more is an edge between two things
 _STEP = 4  # of the grid on which the rise is taken: the lag is smooth
 _AROUND = 9  # cells of the grid: where the rise is not known, it is that around
 
@@ -67,7 +67,7 @@ def without_lag(disparity: NDArray[np.float32], mode: str) -> NDArray[np.float32
         return disparity
     upper, lower = disparity[: -2 * _REACH : _STEP, ::_STEP], disparity[2 * _REACH :: _STEP, ::_STEP]
     rise = (lower - upper) / (2 * _REACH)
-    known = ((upper > 0) & (lower > 0) & (np.abs(rise) < _STEEPEST)).astype(np.float32)
+    known = ((upper > 0) & (lower > 0) & (np.abs(rise) < STEEPEST)).astype(np.float32)
     lags = lag.of(rise).astype(np.float32) * known
     around = cv2.blur(known, (_AROUND, _AROUND))
     filled = np.where(known > 0, lags, cv2.blur(lags, (_AROUND, _AROUND)) / np.maximum(around, 1e-3))

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import cv2
@@ -13,6 +14,7 @@ from rollcli.imaging.alignment import LEFT_OVER, TOLERANCE, Approach, SmallViews
 from rollcli.imaging.first_look import FirstLook, find_range, first_look
 from rollcli.imaging.misalignment import LEVEL, Misalignment
 from rollcli.imaging.misalignment_words import NOT_LEVELLED, TOO_LITTLE
+from rollcli.imaging.refinement import refined
 from rollcli.imaging.same_scene import check_same_scene
 from rollcli.imaging.sgbm import ALL_ROWS, NARROWEST, match_rows, usable_range
 from rollcli.imaging.sgbm_lag import without_lag
@@ -121,8 +123,12 @@ def match_pair(
         count = (width // 8 if look.range is None else look.range) - first
     count = usable_range(count, first, width, options.block_size)
 
+    @lru_cache(maxsize=1)
+    def levelled(lies: Misalignment) -> Views:
+        return views[0], level(views[1], lies)
+
     def match(lies: Misalignment, needed: slice) -> NDArray[np.float32]:
-        return match_rows((views[0], level(views[1], lies)), first, count, options, needed)
+        return match_rows(levelled(lies), first, count, options, needed)
 
     if small is None:
         corrected, doubt = Misalignment(options.vertical_offset or 0.0), ""
@@ -131,7 +137,7 @@ def match_pair(
         disparity, corrected, doubt = _match_levelled(match, rows, small, look, first < 0)
     valid = cv2.countNonZero(disparity)
     return StereoMatch(
-        disparity=without_lag(disparity, options.mode),
+        disparity=refined(without_lag(disparity, options.mode), levelled(corrected)),
         min_disparity=first,
         num_disparities=count,
         end_fraction=np.count_nonzero(disparity >= first + count - 2) / valid if valid else 0.0,

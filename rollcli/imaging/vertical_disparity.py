@@ -13,12 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.imaging.misalignment import LEVEL, Misalignment
-from rollcli.imaging.views import View, Views
+from rollcli.imaging.views import BLOCK, View, Views, block_means, blocks_at
 
 Floats = NDArray[np.float32]
 Doubles = NDArray[np.float64]
 _SMOOTHING = 0.7  # px: more takes away the grain that tells on an empty road, less leaves the noise
-_BLOCK = 8  # px: the side of what gets one vertical disparity
 _KNOWN = 0.7  # share of a block that has to have a disparity
 _RIDGE = 0.2  # squared grey levels per pixel: gradients along the rows below this are noise
 _LEAST = 2.0  # the same, across the rows: a block with less says nothing
@@ -102,7 +101,7 @@ def measure_misalignment(
     Measured or None
         None where too few blocks tell.
     """
-    if min(disparity.shape) < _BLOCK:
+    if min(disparity.shape) < BLOCK:
         return None
     blocks = _Blocks(texture, disparity)
     found, errors, spread, count = start, LEVEL, 0.0, 0
@@ -117,17 +116,17 @@ def measure_misalignment(
         if reach < _SMALL_STEP:
             break
     return Measured(
-        found, errors, count / (disparity.shape[0] // _BLOCK * (disparity.shape[1] // _BLOCK)), spread
+        found, errors, count / (disparity.shape[0] // BLOCK * (disparity.shape[1] // BLOCK)), spread
     )
 
 
 def textured_share(view: View) -> float:
     """Return the share of a view's blocks that could tell a vertical disparity, were they matched."""
-    if min(view.shape) < _BLOCK:
+    if min(view.shape) < BLOCK:
         return 0.0
     across, down = _gradients(_smooth(view))
-    along = _block_means(across * across) + np.float32(_RIDGE)
-    weight = _block_means(down * down) - np.square(_block_means(across * down)) / along
+    along = block_means(across * across) + np.float32(_RIDGE)
+    weight = block_means(down * down) - np.square(block_means(across * down)) / along
     return float(np.mean(weight > _LEAST))
 
 
@@ -168,7 +167,7 @@ class _Shares(NamedTuple):
         along = mean(across, across) - np.square(mean_across) + np.float32(_RIDGE)
         mixed = (mean(across, down) - mean_across * mean_down) / along
         weight = mean(down, down) - np.square(mean_down) - np.square(mixed) * along
-        weight[(weight <= _LEAST) | (count <= _KNOWN * _BLOCK**2)] = 0
+        weight[(weight <= _LEAST) | (count <= _KNOWN * BLOCK**2)] = 0
         share = down - mixed[:, None] * across - (mean_down - mixed * mean_across)[:, None] * seen
         share /= (np.maximum(weight, np.float32(_LEAST)) * count)[:, None]
         return _Shares(share, np.minimum(weight, np.float32(_MOST)), mean(x, seen), mean(y, seen))
@@ -180,19 +179,14 @@ class _Blocks:
     def __init__(self, texture: Texture, disparity: Floats) -> None:
         self._right = texture.right
         known = (disparity > 0).astype(np.float32)
-        places = (_block_means(known) > _KNOWN) & _may_tell(texture.down)
+        places = (block_means(known) > _KNOWN) & _may_tell(texture.down)
 
-        def of_blocks(pixels: Floats) -> Floats:
-            height, width = (side // _BLOCK for side in pixels.shape)
-            blocks = pixels[: height * _BLOCK, : width * _BLOCK].reshape(height, _BLOCK, width, _BLOCK)
-            return blocks.swapaxes(1, 2)[places].reshape(-1, _BLOCK**2)
-
-        self._left, self._seen = of_blocks(texture.left), of_blocks(known)
-        self._across, self._down = of_blocks(texture.across), of_blocks(texture.down)
-        rows, columns = (_BLOCK * place[:, None].astype(np.float32) for place in np.nonzero(places))
-        within = np.arange(_BLOCK, dtype=np.float32)
-        self._v = rows + np.repeat(within, _BLOCK)
-        self._u = columns + np.tile(within, _BLOCK) - of_blocks(disparity)
+        self._left, self._seen = blocks_at(texture.left, places), blocks_at(known, places)
+        self._across, self._down = blocks_at(texture.across, places), blocks_at(texture.down, places)
+        rows, columns = (BLOCK * place[:, None].astype(np.float32) for place in np.nonzero(places))
+        within = np.arange(BLOCK, dtype=np.float32)
+        self._v = rows + np.repeat(within, BLOCK)
+        self._u = columns + np.tile(within, BLOCK) - blocks_at(disparity, places)
         centre_x, centre_y = (np.float32((side - 1) / 2) for side in reversed(disparity.shape))
         self._x, self._y = self._u - centre_x, self._v - centre_y
         self._shares = _Shares.of(self._across, self._down, self._seen, self._x, self._y)
@@ -223,7 +217,7 @@ def _may_tell(down: Floats) -> NDArray[np.bool_]:
 
     What is left of a block's squares is no more than all of them, over a count of `_KNOWN` of it or more.
     """
-    varies = _block_means(down * down) - np.square(_block_means(down))
+    varies = block_means(down * down) - np.square(block_means(down))
     enough: NDArray[np.bool_] = varies > np.float32(_LEAST * _KNOWN * _ROUNDING)
     return enough
 
@@ -275,10 +269,3 @@ def _gradients(view: Floats) -> tuple[Floats, Floats]:
         for order in ((1, 0), (0, 1))
     )
     return across, down
-
-
-def _block_means(pixels: Floats) -> Floats:
-    height, width = (side // _BLOCK for side in pixels.shape)
-    whole = pixels[: height * _BLOCK, : width * _BLOCK]
-    means = cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA)
-    return means.astype(np.float32, copy=False)

@@ -1,6 +1,6 @@
 """The two views of a pair as they are matched: grey, 8 bits, at one size."""
 
-from typing import Any
+from typing import Any, TypeVar
 
 import cv2
 import numpy as np
@@ -8,11 +8,15 @@ from numpy.typing import NDArray
 
 from rollcli.errors import InputError
 
+_Number = TypeVar("_Number", np.float32, np.uint8)
+
 View = NDArray[np.uint8]
 """Shape (H, W)."""
 
 Views = tuple[View, View]
 """Left and right."""
+
+BLOCK = 8  # px: the side of what gets one shift where the grey levels of both views are compared
 
 
 def prepare_views(left: NDArray[Any], right: NDArray[Any], downscale: float) -> Views:
@@ -48,6 +52,21 @@ def shrink(view: NDArray[Any], factor: float) -> View:
 def shrink_both(views: Views, factor: float) -> Views:
     """Both views, `factor` times smaller."""
     return shrink(views[0], factor), shrink(views[1], factor)
+
+
+def block_means(pixels: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return the means of the blocks that fit into an image, shape (H // BLOCK, W // BLOCK)."""
+    height, width = (side // BLOCK for side in pixels.shape)
+    whole = pixels[: height * BLOCK, : width * BLOCK]
+    means = cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA)
+    return means.astype(np.float32, copy=False)
+
+
+def blocks_at(pixels: NDArray[_Number], places: NDArray[np.bool_]) -> NDArray[_Number]:
+    """Return the pixels of some of the blocks of an image, shape (blocks, BLOCK ** 2)."""
+    height, width = (side // BLOCK for side in pixels.shape)
+    blocks = pixels[: height * BLOCK, : width * BLOCK].reshape(height, BLOCK, width, BLOCK)
+    return blocks.swapaxes(1, 2)[places].reshape(-1, BLOCK**2)
 
 
 def _plain(image: NDArray[Any], brightest: int, downscale: float) -> View:
