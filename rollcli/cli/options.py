@@ -224,7 +224,7 @@ method_options = record(
         type=Number("DEG", above=0, at_most=90),
         default=_METHOD.max_interval_deg,
         help="An angle is suspect when the half-width of its 95 % interval is above this, or when noise and "
-        "unevenness alone make a third of this, degrees.",
+        "unevenness alone make 0.45 of this, degrees.",
     ),
     option(
         "--seed",

@@ -62,7 +62,7 @@ def estimate_roll(
         The largest abs(roll) that road finding considers, radians.
     max_interval : float
         Half-width of the 95 % interval above which an angle is doubted, radians; so is one of which noise
-        alone makes a third of that.
+        alone makes 0.45 of that.
     slope_error : float
         Standard deviation of a slope along the rows, px per px, that all disparities may have beside the
         road's: what is left of it where the views of a pair were levelled (`StereoMatch.slope_error`).

@@ -100,11 +100,16 @@ def interval_of(jackknife: Jackknife, theta: float, turned: float, tuning: Inter
         Standard deviation of an error that all pixels share, by which the map itself is turned, radians.
     tuning : IntervalTuning
     """
-    bands, columns, white = jackknife.spreads()
-    noise = tuning.factor * slant(theta, tuning) * math.sqrt(bands**2 + columns**2 + white**2)
+    noise = tuning.factor * noise_of(jackknife, theta, tuning)
     lateral, depth = tuning.lateral * jackknife.lateral, tuning.depth * jackknife.depth
     bend = tuning.bend * jackknife.bend
     return Interval(noise, math.sqrt(noise**2 + lateral**2 + depth**2 + bend**2 + (_NORMAL * turned) ** 2))
+
+
+def noise_of(jackknife: Jackknife, theta: float, tuning: IntervalTuning) -> float:
+    """Return the half-width that noise and misfit make at a roll, radians, before `tuning.factor`."""
+    bands, columns, white = jackknife.spreads()
+    return slant(theta, tuning) * math.hypot(bands, columns, tuning.white * white)
 
 
 def slant(theta: float, tuning: IntervalTuning) -> float:

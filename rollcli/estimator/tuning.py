@@ -13,18 +13,19 @@ class IntervalTuning:
     groups: int = 6
     """Bands and columns of the jackknife. More are less independent, fewer have fewer degrees of freedom."""
     independent_pixels: int = 100
-    """Pixels that could be independent: neighbouring ones repeat each other, more do not tell more. With 200
-    the interval covers 0.95 of flat rendered roads instead of 0.97, and 0.91 of real ones instead of 0.92."""
-    factor: float = 0.5
-    """Of the jackknife's half-width. `fit_interval.py 80` finds 0.37 on rendered roads, which covers 0.98 of
-    80 others, but 0.93 of 1,020 more; and fewer of half of the real maps, 0.85 instead of 0.87."""
-    lateral: float = 2.5
+    """Pixels that could be independent: neighbouring ones repeat each other, more do not tell more."""
+    white: float = 0.2
+    """Of the textbook's half-width: what makes neighbours alike shows in bands and columns, too. With 1 the
+    interval covers every flat rendered road; tangents need all of it, since one shift of all disparities
+    turns no road, and shows nowhere else."""
+    factor: float = 0.65
+    """Of the jackknife's half-width."""
+    lateral: float = 0.75
     """Of the difference between the lane's angle and that of all pixels."""
-    depth: float = 0.5
+    depth: float = 0.55
     """Of the difference between the near half's angle and the far half's."""
-    bend: float = 2.5
-    """Of the angle by which the camber moves theta: a crown is no exact parabola. With 2 the interval covers
-    0.959 of cambered rendered roads instead of 0.966."""
+    bend: float = 2.75
+    """Of the angle by which the camber moves theta: a crown is no exact parabola."""
     depth_fade: float = 0.02
     """Units over which near turns into far."""
     whole_share: float = 0.02
@@ -54,7 +55,7 @@ class DoubtTuning:
     """Radians by which the fit to the road's pixels may move the roll of its plane."""
     bound_share: float = 0.99
     """Share of the largest roll from which a roll is at its bound."""
-    noise_share: float = 1 / 3
+    noise_share: float = 0.45
     """Share of the widest interval that noise alone may make."""
 
 

@@ -17,7 +17,7 @@ from matched import matched
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.estimate import estimate_roll
-from rollcli.estimator.interval import jackknife, slant
+from rollcli.estimator.interval import jackknife, noise_of
 from rollcli.estimator.methods import DEFAULT_SOLVER, MAX_INTERVAL_DEG, MAX_ROLL_DEG
 from rollcli.estimator.request import Request
 from rollcli.estimator.selection import select_pixels
@@ -51,7 +51,7 @@ def terms(frames: int, seeds: tuple[int, int]) -> tuple[np.ndarray, list[str]]:
                 continue
             assert surface is not None
             knife = jackknife(surface, theta, tuning)
-            noise = slant(theta, tuning) * math.hypot(*knife.spreads())
+            noise = noise_of(knife, theta, tuning)
             choice = math.hypot(
                 tuning.lateral * knife.lateral, tuning.depth * knife.depth, tuning.bend * knife.bend
             )
