@@ -114,9 +114,9 @@ class SearchTuning:
 class FitTuning:
     """Numbers of `NearPixels`: the robust fit of parabola and roll."""
 
-    pixels: int = 3000
-    """Pixels near the plane that are looked at, each averaged with those around it. With 4,500 errors on
-    rendered roads are 3 % smaller, and all takes 4 % more time."""
+    pixels: int = 4500
+    """Pixels near the plane that are looked at, each averaged with those around it. With 3,000 the median
+    error on rendered roads is a seventh larger, and all takes 4 % less time."""
     lane_pixels: int = 1500
     """Pixels of the fit of the lane ahead, which only has to show the profile."""
     least_pixels: int = 30
