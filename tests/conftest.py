@@ -4,12 +4,15 @@ import contextlib
 import functools
 import shutil
 
+import hypothesis
 import pytest
 
 from rollcli.parallel.process_setup import limit_blas_threads
 from tests.object_store import object_store
 
 limit_blas_threads()  # as every command does; NumPy is not loaded yet
+hypothesis.settings.register_profile("untimed", deadline=None)  # no test fails on a busy machine
+hypothesis.settings.load_profile("untimed")
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 FLAGS = (

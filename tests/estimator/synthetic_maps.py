@@ -13,7 +13,7 @@ from rollcli.estimator.moments import map_moments
 ROADS = Path(__file__).resolve().parents[3] / "shared" / "roads"
 
 # the same examples each time, however busy the machine
-repeatable = settings(derandomize=True, deadline=None, max_examples=60, database=None)
+repeatable = settings(derandomize=True, max_examples=60, database=None)
 
 
 def flat_road(roll_deg, *, width=160, height=120, focal=140.0, pitch_deg=8.0, dtype=np.float64):

@@ -35,7 +35,7 @@ def test_every_map_format_has_a_reader_to_fuzz_and_every_file_one_reader():
     assert sorted(of_each) == sorted(corpus())
 
 
-@settings(deadline=None, max_examples=300)
+@settings(max_examples=300)
 @given(st.sampled_from(sorted(FILES)), st.integers(0, 2**32))
 def test_a_file_broken_at_random_is_read_or_refused_in_one_line(name, seed):
     for each in with_repairs(at_random(FILES[name], Random(seed))):
