@@ -2,8 +2,9 @@
 
 import contextlib
 import signal
+import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from types import FrameType
 
 
@@ -37,12 +38,32 @@ def raise_on_signals() -> None:
             signal.signal(each, _leave_unheard)
         raise KeyboardInterrupt
 
-    for number in stop_signals():
-        signal.signal(number, interrupt)
+    def listen() -> None:
+        for number in stop_signals():
+            signal.signal(number, interrupt)
+
+    listen()
+    _where_swallowed(listen)
 
 
 def _leave_unheard(number: int, frame: FrameType | None) -> None:
     pass
+
+
+def _where_swallowed(listen: Callable[[], None]) -> None:
+    """Call `listen`, to hear the next signal, where Python swallows a KeyboardInterrupt.
+
+    It does so in callbacks of weak references and in finalizers, and would print a traceback.
+    """
+    usual = sys.unraisablehook
+
+    def hook(swallowed: "sys.UnraisableHookArgs") -> None:
+        if issubclass(swallowed.exc_type, KeyboardInterrupt):
+            listen()
+        else:
+            usual(swallowed)
+
+    sys.unraisablehook = hook
 
 
 def ignore_signals() -> None:
@@ -71,9 +92,16 @@ def stop_on_signals() -> Iterator[Stop]:
     if threading.current_thread() is not threading.main_thread():
         yield stop  # Python lets only the main thread handle signals
         return
+
+    def listen() -> None:
+        stop.at_once = False
+
+    usual = sys.unraisablehook
+    _where_swallowed(listen)
     before = {number: signal.signal(number, ask) for number in stop_signals()}
     try:
         yield stop
     finally:
+        sys.unraisablehook = usual
         for number, handler in before.items():
             signal.signal(number, signal.SIG_IGN if stop.asked else handler)
