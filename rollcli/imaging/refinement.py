@@ -21,6 +21,9 @@ _KNOWN = 0.7  # share of a block that has to have a disparity: else its mean is 
 # px: how far the mean of the four blocks around may lie off; further is an edge. At half of it the noisy
 # blocks of a road are left as they were, and its median error grows by a sixth; at twice it that is the same
 _EDGE = 0.5
+# px per row: the least that a road rises by, which is the baseline over the camera's height (0.07 and more)
+# times the cosine of the roll. Walls, trees and sky are left as they are: they only take time
+_LEAST_RISE = 0.01
 # Squared grey levels per pixel: what a noise of one grey level adds to a squared gradient. Blocks with less
 # texture keep most of what SGBM says. From 0.2 to 1 the errors of angles are the same
 _RIDGE = 0.5
@@ -47,7 +50,8 @@ def refined(disparity: Floats, views: Views) -> Floats:
     Returns
     -------
     ndarray of float32, shape (H, W)
-        Parts with little texture, edges and what lies alone are left as they are.
+        What does not rise down the image, as a road does, parts with little texture, edges and what lies
+        alone are left as they are.
     """
     height, width = (side // BLOCK for side in disparity.shape)
     if min(height, width) < 2:
@@ -97,7 +101,7 @@ class _Planes(NamedTuple):
         apart = np.float32(2 * BLOCK)
         across, down = (right - left) / apart, (below - above) / apart
         told = (share > _KNOWN) & (np.abs((left + right + above + below) / 4 - middle) < _EDGE)
-        told &= (np.abs(across) < STEEPEST) & (np.abs(down) < STEEPEST)
+        told &= (np.abs(across) < STEEPEST) & (down > _LEAST_RISE) & (down < STEEPEST)
         return _Planes(middle, across, down, told)
 
 

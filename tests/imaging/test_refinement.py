@@ -39,7 +39,7 @@ def error(found, true):
 
 
 @pytest.mark.parametrize("off", [-0.4, -0.1, 0.15, 0.4])
-@pytest.mark.parametrize("slopes", [(0.0, 0.0), (0.02, 0.3), (-0.2, 0.25), (0.3, 0.0)])
+@pytest.mark.parametrize("slopes", [(0.0, 0.05), (0.02, 0.3), (-0.2, 0.25), (0.3, 0.05)])
 def test_a_plane_is_shifted_to_where_it_is(off, slopes):
     true = plane(*slopes)
     left = error(refined(true + np.float32(off), seen(true)), true)
@@ -81,6 +81,14 @@ def test_no_data_stays_and_what_lies_beside_it_is_shifted_as_the_rest():
     assert not found[holes <= 0].any()
     beside = error(np.where(holes > 0, found, true), true)
     assert abs(beside[holes[:, -SHAPE[1] // 2 :] > 0].mean()) < 0.04
+
+
+@pytest.mark.parametrize("slopes", [(0.0, 0.0), (0.3, 0.0), (0.02, -0.1)], ids=["wall", "slanted", "ceiling"])
+def test_what_does_not_rise_down_the_image_stays_where_it_is(slopes):
+    true = plane(*slopes)
+    true -= min(0, true.min() - 5)
+    given = true + np.float32(0.3)
+    assert np.array_equal(refined(given, seen(true)), given)
 
 
 def test_an_edge_stays_where_it_is():
