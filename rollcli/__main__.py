@@ -25,9 +25,13 @@ def main() -> None:
         from rollcli.cli.main import main as program  # a door: each worker process imports this module anew
 
         program(prog_name="rollcli")
-    except (KeyboardInterrupt, RuntimeError) as error:  # before there was anything to resume
-        if isinstance(error, RuntimeError) and not isinstance(error.__cause__, KeyboardInterrupt):
-            raise  # Python before 3.12 makes one of an interrupt while an attribute learns its name
+    except KeyboardInterrupt:  # before there was anything to resume
+        _say_interrupted()
+    except RuntimeError as error:
+        from rollcli.parallel.interrupt import came_of_interrupt
+
+        if not came_of_interrupt(error):
+            raise
         _say_interrupted()
     except SystemExit as end:
         from rollcli.errors import ExitStatus

@@ -66,6 +66,17 @@ def _where_swallowed(listen: Callable[[], None]) -> None:
     sys.unraisablehook = hook
 
 
+def came_of_interrupt(error: RuntimeError) -> bool:
+    """Tell whether Python made this error of a KeyboardInterrupt.
+
+    It does so where one comes while a lock is released, and, before 3.12, while an attribute learns its name.
+    """
+    before: BaseException | None = error
+    while before is not None and not isinstance(before, KeyboardInterrupt):
+        before = before.__cause__ or before.__context__
+    return before is not None
+
+
 def ignore_signals() -> None:
     """Ignore the signals: the process is ending, or another one decides when it does."""
     for number in stop_signals():
@@ -101,6 +112,10 @@ def stop_on_signals() -> Iterator[Stop]:
     before = {number: signal.signal(number, ask) for number in stop_signals()}
     try:
         yield stop
+    except RuntimeError as error:
+        if came_of_interrupt(error):
+            raise KeyboardInterrupt from error
+        raise
     finally:
         sys.unraisablehook = usual
         for number, handler in before.items():
