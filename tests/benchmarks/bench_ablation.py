@@ -62,6 +62,7 @@ OFF = {
     "profile.off_level": 1e6,
     "profile.width": 1e6,
     "surface.steady": 1e6,
+    "interval.white": 0.0,
     "interval.slant": 0.0,
     "doubts.near_minimum": 0.0,
     "doubts.least_score": -1.0,
