@@ -239,7 +239,12 @@ def failure(tree: Path, files: Sequence[str]) -> str:
     if done.returncode == pytest.ExitCode.OK:
         return ""
     # what cannot be imported has a line ERROR; with a conftest pytest calls it wrong usage
-    said = [line for line in done.stdout.splitlines() if line.startswith(_FAILURES)]
+    # a change may raise what only a signal should; the user's own Ctrl-C ends this process too
+    said = [
+        line
+        for line in done.stdout.splitlines()
+        if line.startswith(_FAILURES) or line.endswith(": KeyboardInterrupt")
+    ]
     if said and done.returncode in _NOTICED:
         return said[0].partition(" - ")[0]
     sys.exit(f"{done.stdout}\npytest ended with {done.returncode}: the tests neither passed nor failed")
