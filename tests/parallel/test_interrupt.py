@@ -21,6 +21,14 @@ def handlers_of_before(monkeypatch):
         signal.signal(each, handler)
 
 
+@pytest.fixture
+def complaints(monkeypatch):
+    """What Python swallows and does not print."""
+    swallowed = []
+    monkeypatch.setattr(sys, "unraisablehook", swallowed.append)
+    return swallowed
+
+
 def test_a_run_in_a_thread_leaves_the_signals_to_its_program():
     def handlers():
         with stop_on_signals() as stop:
@@ -44,10 +52,8 @@ def test_outside_of_a_run_the_first_signal_ends_the_program_and_no_other_disturb
 
 
 @pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="signals cannot be held back here")
-def test_of_signals_that_come_together_one_ends_the_program_and_nothing_is_said_of_the_others(monkeypatch):
+def test_of_signals_that_come_together_one_ends_the_program_and_nothing_is_said_of_the_others(complaints):
     together = stop_signals()
-    complaints = []
-    monkeypatch.setattr(sys, "unraisablehook", complaints.append)
     try:
         raise_on_signals()
         signal.pthread_sigmask(signal.SIG_BLOCK, together)
@@ -76,9 +82,7 @@ def signal_where_python_swallows_it(number):
     assert reference() is None
 
 
-def test_a_second_signal_that_python_swallows_is_not_printed_and_the_next_one_ends_the_run(monkeypatch):
-    complaints = []
-    monkeypatch.setattr(sys, "unraisablehook", complaints.append)
+def test_a_second_signal_that_python_swallows_is_not_printed_and_the_next_one_ends_the_run(complaints):
     with stop_on_signals() as stop:
         signal.raise_signal(signal.SIGINT)
         signal_where_python_swallows_it(signal.SIGINT)
@@ -88,9 +92,7 @@ def test_a_second_signal_that_python_swallows_is_not_printed_and_the_next_one_en
     assert complaints == []
 
 
-def test_outside_of_a_run_one_that_python_swallows_is_not_printed_and_the_next_one_counts(monkeypatch):
-    complaints = []
-    monkeypatch.setattr(sys, "unraisablehook", complaints.append)
+def test_outside_of_a_run_one_that_python_swallows_is_not_printed_and_the_next_one_counts(complaints):
     raise_on_signals()
     signal_where_python_swallows_it(signal.SIGTERM)
     with pytest.raises(KeyboardInterrupt):
@@ -98,9 +100,7 @@ def test_outside_of_a_run_one_that_python_swallows_is_not_printed_and_the_next_o
     assert complaints == []
 
 
-def test_other_errors_that_python_swallows_are_told_as_ever(monkeypatch):
-    complaints = []
-    monkeypatch.setattr(sys, "unraisablehook", complaints.append)
+def test_other_errors_that_python_swallows_are_told_as_ever(complaints):
 
     def callback(reference):
         raise LookupError("as ever")

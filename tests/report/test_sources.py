@@ -61,6 +61,17 @@ def test_images_are_found_under_the_name_that_the_run_gave_their_folder(folder):
         subjects([row("a.png")], "rolls.csv", "out", NONE)
 
 
+def assert_found(result, images, recorded, image):
+    """The image is that of the frame, or none is found where it is None."""
+    options = NONE if recorded is None else NONE._replace(derotated=recorded)
+    if image is not None:
+        (found,) = subjects([row("a.png")], result, images, options)
+        assert found.images == {"derotated": image}
+    else:
+        with pytest.raises(UsageError, match="has no image of"):
+            subjects([row("a.png")], result, images, options)
+
+
 @pytest.mark.parametrize(
     ("images", "recorded", "there"),
     [
@@ -72,13 +83,7 @@ def test_images_are_found_under_the_name_that_the_run_gave_their_folder(folder):
 )
 def test_the_folder_of_one_kind_may_be_named_itself(folder, images, recorded, there):
     touch(f"{images}/a.png")
-    options = NONE if recorded is None else NONE._replace(derotated=recorded)
-    if there:
-        (found,) = subjects([row("a.png")], "rolls.csv", images, options)
-        assert found.images == {"derotated": f"{images}/a.png"}
-    else:
-        with pytest.raises(UsageError, match="has no image of"):
-            subjects([row("a.png")], "rolls.csv", images, options)
+    assert_found("rolls.csv", images, recorded, f"{images}/a.png" if there else None)
 
 
 @pytest.mark.parametrize(
@@ -96,13 +101,7 @@ def test_the_same_holds_in_an_object_store(monkeypatch, images, recorded, there)
     monkeypatch.setattr(
         sources, "objects_behind", lambda url, recursive: [(f"{place}/a.png", 9)] if recursive else []
     )
-    options = NONE if recorded is None else NONE._replace(derotated=recorded)
-    if there:
-        (found,) = subjects([row("a.png")], "s3://maps/rolls.csv", images, options)
-        assert found.images == {"derotated": f"{place}/a.png"}
-    else:
-        with pytest.raises(UsageError, match="has no image of"):
-            subjects([row("a.png")], "s3://maps/rolls.csv", images, options)
+    assert_found("s3://maps/rolls.csv", images, recorded, f"{place}/a.png" if there else None)
 
 
 def test_a_folder_is_known_by_its_real_name(folder, monkeypatch):
