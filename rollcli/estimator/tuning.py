@@ -19,7 +19,8 @@ class IntervalTuning:
     interval covers every flat rendered road; tangents need all of it, since one shift of all disparities
     turns no road, and shows nowhere else."""
     factor: float = 0.65
-    """Of the jackknife's half-width."""
+    """Of the jackknife's half-width. Two thirds of it cover 0.86 of 28 real maps instead of 0.93, and 0.92 of
+    24 rendered ones instead of 0.96."""
     lateral: float = 0.75
     """Of the difference between the lane's angle and that of all pixels."""
     depth: float = 0.55
@@ -56,7 +57,8 @@ class DoubtTuning:
     bound_share: float = 0.99
     """Share of the largest roll from which a roll is at its bound."""
     noise_share: float = 0.45
-    """Share of the widest interval that noise alone may make."""
+    """Share of the widest interval that noise alone may make. At two thirds of it six of 28 real maps that
+    are right are doubted, instead of two."""
 
 
 @dataclass(frozen=True)
