@@ -19,7 +19,7 @@ from rollcli.files.codecs.tiff_parts import check_parts, decode_parts
 from rollcli.files.codecs.unpack import MAX_EXPANSION, DamagedPartError
 
 SIGNATURES = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
-_WHITE_IS_ZERO, _RGB, _PALETTE = 0, 2, 3
+_RGB, _PALETTE = 2, 3
 _CHUNKY = 1
 _LARGE_TILE = 2**22  # pixels; a small image may lie in one large tile
 _NOT_A_PAGE_OF_ITS_OWN = 0b101  # a reduced copy, or a mask, of another page
@@ -125,7 +125,10 @@ def _pixels(page: Any, data: bytes, name: str) -> NDArray[Any]:
             check_parts(page, (down, across, samples if chunky else 1), data)
     except DamagedPartError as error:
         raise InputError(f"{name}: is a damaged TIFF: its compressed data are wrong ({error})") from None
-    return _decoded_by_tifffile(page, name).reshape(height, width, samples)
+    values = _decoded_by_tifffile(page, name)
+    if chunky:
+        return values.reshape(height, width, samples)
+    return np.moveaxis(values.reshape(samples, height, width), 0, -1)  # one plane a channel
 
 
 def _part_size(page: Any, name: str) -> tuple[int, int]:
