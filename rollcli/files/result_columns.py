@@ -157,10 +157,16 @@ def _cells(stream: TextIO, path: str, wanted: Sequence[str]) -> tuple[list[str],
     return names, ((number, *pick(row)) for number, row in rows)
 
 
-def _by_newline(lines: Iterable[str]) -> Iterator[str]:
-    """Lines of JSON end at a newline alone: a carriage return is white space there."""
-    for line in lines:
-        yield from line.split("\n") if line.count("\n") > 1 else (line,)
+def _by_newline(pieces: Iterable[str]) -> Iterator[str]:
+    """Join what a carriage return has cut: in JSON it is white space, and a newline alone ends a line."""
+    held: list[str] = []
+    for piece in pieces:
+        held.append(piece)
+        if piece.endswith("\n"):
+            yield "".join(held)
+            held.clear()
+    if held:
+        yield "".join(held)
 
 
 def _statuses(cells: Sequence[Any], lines: Sequence[int], path: str) -> NDArray[np.uint8]:
