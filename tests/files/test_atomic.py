@@ -5,12 +5,17 @@ import os
 import stat
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 from rollcli.errors import OutputError
-from rollcli.files.atomic import NameTakenError, atomic_file, remove_leftovers, write_atomic
+from rollcli.files.atomic import NameTakenError, atomic_file, mark_path, remove_leftovers, write_atomic
 from tests.run_cli import leave_half
+
+
+def open_descriptors():
+    return sum(1 for _ in Path("/dev/fd").iterdir())
 
 
 def names_in(folder):
@@ -269,4 +274,43 @@ def test_a_full_disk_leaves_nothing_behind(tmp_path):
 
     assert done.stdout == f"{target}: cannot be written: file too large\n"
     assert done.stderr == ""
+    assert names_in(tmp_path) == []
+
+
+def test_a_mark_of_a_file_is_removed_with_its_leftovers(tmp_path):
+    assert mark_path("out/rolls.csv") == "out/.rolls.csv.0000000000000000.part"
+    assert mark_path("s3://bucket/rolls.csv") == "s3://bucket/.rolls.csv.0000000000000000.part"
+    write_atomic(mark_path(str(tmp_path / "rolls.csv")), b"")
+    remove_leftovers([tmp_path / "other.csv", "s3://bucket/rolls.csv"])
+    assert names_in(tmp_path) == [".rolls.csv.0000000000000000.part"]
+    remove_leftovers([tmp_path / "rolls.csv"])
+    assert names_in(tmp_path) == []
+
+
+@pytest.mark.parametrize("length", [225, 226, 255])
+def test_a_name_of_any_length_that_the_system_takes_is_written_and_its_leftovers_are_found(tmp_path, length):
+    name = "x" * (length - 4) + ".png"
+    leave_half(tmp_path / name)
+    assert len(names_in(tmp_path)) == 1
+    write_atomic(tmp_path / name, b"data")
+    remove_leftovers([tmp_path / name])
+    assert names_in(tmp_path) == [name]
+
+
+def test_nothing_stays_open(tmp_path):
+    before = open_descriptors()
+    write_atomic(tmp_path / "a.png", b"data")
+    write_atomic(tmp_path / "b.png", b"data", replaces=False)
+    leave_half(tmp_path / "a.png")
+    remove_leftovers([tmp_path / "a.png"])
+    with pytest.raises(OutputError):
+        write_atomic(tmp_path, b"data")
+    assert open_descriptors() == before
+    assert names_in(tmp_path) == ["a.png", "b.png"]
+
+
+def test_leftovers_beside_relative_names_are_removed(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    leave_half(tmp_path / "map.png")
+    remove_leftovers(["map.png"])
     assert names_in(tmp_path) == []

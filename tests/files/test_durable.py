@@ -2,6 +2,7 @@
 
 import errno
 import os
+import stat
 from pathlib import Path
 
 import pytest
@@ -90,3 +91,45 @@ def test_folders_whose_names_are_on_the_disk_are_not_named_again(tmp_path, synce
         synced.clear()
         sync_files([path], named)
     assert {each for each, _ in synced} == {inode(second), inode(second.parent)}
+
+
+def open_descriptors():
+    return sum(1 for _ in Path("/dev/fd").iterdir())
+
+
+def test_nothing_that_was_forced_stays_open(tmp_path):
+    paths = [tmp_path / str(folder) / "map.png" for folder in range(40)]
+    for path in paths:
+        write_atomic(path, b"data")
+    before = open_descriptors()
+    sync_files(paths)
+    write_atomic(tmp_path / "map.png", b"data", durable=True)
+    assert open_descriptors() == before
+
+
+@pytest.mark.parametrize("number", [errno.EINVAL, errno.ENOTSUP, errno.EBADF, errno.EACCES, errno.EPERM])
+def test_a_file_system_that_forces_no_folders_is_no_error_and_a_disk_that_fails_is(
+    tmp_path, monkeypatch, number
+):
+    write_atomic(tmp_path / "map.png", b"data")
+    fsync = os.fsync
+
+    def fail(number):
+        def call(descriptor):
+            if stat.S_ISDIR(os.fstat(descriptor).st_mode):
+                raise OSError(number, os.strerror(number))
+            fsync(descriptor)
+
+        return call
+
+    monkeypatch.setattr(os, "fsync", fail(number))
+    sync_files([tmp_path / "map.png"])
+    monkeypatch.setattr(os, "fsync", fail(errno.EIO))
+    with pytest.raises(OutputError, match=r"cannot be forced to the disk: input/output error$"):
+        sync_files([tmp_path / "map.png"])
+
+
+def test_a_durable_file_that_replaces_nothing_is_forced_too(tmp_path, synced):
+    write_atomic(tmp_path / "part", b"data", durable=True, replaces=False)
+    assert synced[0] == (inode(tmp_path / "part"), 4)
+    assert inode(tmp_path) in {each for each, _ in synced[1:]}

@@ -204,3 +204,52 @@ def test_masks_of_maps_and_images_are_read(tmp_path):
 )
 def test_a_depth_becomes_the_disparity_of_the_rig_as_far_as_that_is_known(calibration, expected):
     assert pixels([2, 4, 0], "f4", encoding="depth", calibration=calibration) == expected
+
+
+def test_stored_distances_are_metres_or_whole_millimetres():
+    assert pixels([2, 4, 0, -4, np.inf, np.nan], "f8", encoding="depth") == [0.5, 0.25, 0, 0, 0, 0]
+    for kind in ("u2", "i2", "u4", "i4"):
+        assert pixels([2000, 4000, 0], kind, encoding="depth") == [0.5, 0.25, 0]
+    assert pixels([512, 0], "u2", encoding="depth", scale=1 / 256) == [0.5, 0]
+    assert pixels([1e-45, 2], "f4", encoding="depth") == [0, 0.5]  # 1/z is too large for a float32
+    assert to_disparity(stored([2], "f8"), encoding="depth").disparity.dtype == np.float64
+    assert to_disparity(stored([2], "f4"), encoding="depth").disparity.dtype == np.float32
+
+
+def test_a_further_value_below_a_pixel_is_no_data_either():
+    assert pixels([0.5, 1.5], "f4", invalid=(0.5,)) == [0, 1.5]
+
+
+def test_the_doubt_says_what_was_read_and_what_it_may_be():
+    assert to_disparity(stored([0, 511], "u2", note="two pages")).warning == (
+        "two pages; uint16 numbers up to 511, read as kitti (/256), are disparities up to 2.00 px: "
+        "they look like whole pixels (--encoding px)"
+    )
+    assert "--encoding px" in to_disparity(stored([0, 1], "u2")).warning
+
+
+def test_one_pixel_of_a_hundred_may_be_too_large_and_no_more():
+    disparity = np.full((10, 10), 100.0)
+    disparity[0, 0] = 65535 / 256
+    assert from_disparity(disparity, "kitti")[0].tolist() == [0, *[25600] * 9]
+    disparity[0, 1:3] = 0  # 98 are valid: one is more than a hundredth of them
+    with pytest.raises(
+        InputError, match=r"^disparities up to 256 px do not fit numbers that end at 256 px: give"
+    ):
+        from_disparity(disparity, "kitti")
+    assert from_disparity(np.array([[65534 / 256]]), "kitti").tolist() == [[65534]]
+
+
+def test_no_data_is_negative_in_signed_numbers_of_sgbm_alone():
+    empty = np.array([[0.0, 2.0]])
+    assert from_disparity(empty, "sgbm", "f4").tolist() == [[0, 32]]
+    assert from_disparity(empty, "sgbm", "u2").tolist() == [[0, 32]]
+    assert from_disparity(empty, "px", "i4").tolist() == [[0, 2]]
+    assert from_disparity(np.array([[2.0]]), "kitti", "f4", scale=0.5).tolist() == [[4]]
+    with pytest.raises(UsageError, match="a disparity is not written as a depth"):
+        from_disparity(empty, "depth", "f4")
+
+
+def test_disparities_are_rounded_to_the_nearest_number():
+    assert from_disparity(np.array([[2.0019, 2.002]]), "kitti").tolist() == [[512, 513]]
+    assert from_disparity(np.array([[2.5]]), "px", "f4").tolist() == [[2.5]]

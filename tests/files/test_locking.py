@@ -3,13 +3,14 @@
 import errno
 import importlib.util
 import os
+import subprocess
 import sys
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
-from rollcli.errors import UsageError
+from rollcli.errors import OutputError, UsageError
 from rollcli.files import locking
 
 fcntl = pytest.importorskip("fcntl", reason="this system has no flock")
@@ -119,3 +120,128 @@ def test_on_windows_a_result_is_read_from_its_start_once_it_is_locked(result, mo
         assert os.read(descriptor, 4) == b"file"
 
     assert places == [2**30]
+
+
+def holder(*descriptors):
+    """A process that holds open files until its stdin ends."""
+    return subprocess.Popen(
+        [sys.executable, "-c", "import sys; sys.stdin.read()"], stdin=subprocess.PIPE, pass_fds=descriptors
+    )
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="/proc is Linux's")
+def test_who_holds_the_lock_is_named(result, impatient):
+    descriptor, name = result
+    own = os.open(name, os.O_RDWR)
+    held = os.open(name, os.O_RDWR)
+    fcntl.flock(held, fcntl.LOCK_EX)
+    processes = [holder(held) for _ in range(2)]
+    os.close(held)
+    try:
+        for count in (2, 1):
+            numbers = sorted(process.pid for process in processes[:count])
+            who = f" (process{'es' if count > 1 else ''} {', '.join(map(str, numbers))})"
+            with pytest.raises(UsageError) as caught, locking.locked(descriptor, name):
+                pass
+            assert str(caught.value) == (
+                f"{name}: another run is writing this result{who}; wait for it, or give another --output"
+            )
+            processes[count - 1].communicate()
+    finally:
+        for process in processes:
+            process.communicate()
+        os.close(own)
+    with locking.locked(descriptor, name):
+        pass
+
+
+def test_a_lock_is_waited_for_as_long_as_the_workers_of_a_killed_run_take_to_end(result, monkeypatch):
+    descriptor, name = result
+    other = os.open(name, os.O_RDWR)
+    fcntl.flock(other, fcntl.LOCK_EX)
+    now, slept = [100.0], []
+
+    def sleep(seconds):
+        slept.append(seconds)
+        now[0] += seconds
+
+    monkeypatch.setattr(locking, "time", SimpleNamespace(monotonic=lambda: now[0], sleep=sleep))
+    try:
+        with pytest.raises(UsageError, match="another run"), locking.locked(descriptor, name):
+            pass
+        assert 2.0 <= sum(slept) <= 2.2
+        slept.clear()
+
+        def let_go(seconds):
+            slept.append(seconds)
+            fcntl.flock(other, fcntl.LOCK_UN)
+
+        monkeypatch.setattr(locking.time, "sleep", let_go)
+        with locking.locked(descriptor, name):
+            assert len(slept) == 1
+    finally:
+        os.close(other)
+
+
+def test_a_folder_is_made_and_locked_and_its_descriptor_is_closed_again(tmp_path, impatient):
+    name = str(tmp_path / "a" / "parts")
+    refused = pytest.raises(UsageError, match="another run is writing this result")
+    with locking.locked_folder(name) as descriptor:
+        assert os.path.samestat(os.fstat(descriptor), Path(name).stat())
+        with refused, locking.locked_folder(name):
+            pass
+    with pytest.raises(OSError, match="Bad file descriptor"):
+        os.fstat(descriptor)
+    with locking.locked_folder(name):
+        pass
+
+    (tmp_path / "file").write_bytes(b"")
+    with (
+        pytest.raises(OutputError, match=r"file: cannot be written: file exists$"),
+        locking.locked_folder(str(tmp_path / "file")),
+    ):
+        pass
+
+
+def test_a_lock_file_that_cannot_be_made_is_named(tmp_path, without_locks, result):
+    descriptor, _ = result
+    name = str(tmp_path / "none" / "rolls.csv")
+    with pytest.raises(OutputError) as caught, locking.locked(descriptor, name):
+        pass
+    assert str(caught.value) == f"{name}.lock: cannot be written: no such file or directory"
+
+
+def test_other_errors_of_the_lock_are_those_of_a_run_that_holds_it(result, impatient, monkeypatch):
+    descriptor, name = result
+
+    def fail(number, operation):
+        raise OSError(errno.EIO, os.strerror(errno.EIO))
+
+    monkeypatch.setattr(fcntl, "flock", fail)
+    with pytest.raises(UsageError, match="another run"), locking.locked(descriptor, name):
+        pass
+    for number in (errno.ENOLCK, errno.ENOTSUP, errno.EINVAL, errno.ENOSYS):
+        monkeypatch.setattr(
+            fcntl, "flock", lambda *_, number=number: (_ for _ in ()).throw(OSError(number, "x"))
+        )
+        with locking.locked(descriptor, name):
+            assert Path(f"{name}.lock").exists()
+
+
+def test_only_a_regular_file_that_nobody_writes_is_abandoned(tmp_path):
+    path = tmp_path / "part"
+    path.write_bytes(b"")
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "link").symlink_to(path)
+    with locking.nobody_writes(str(path)) as abandoned:
+        assert abandoned
+    with locking.nobody_writes(str(tmp_path / "pipe")) as abandoned:
+        assert not abandoned
+    with pytest.raises(OSError, match="symbolic links"), locking.nobody_writes(str(tmp_path / "link")):
+        pass
+    with path.open("wb") as file, locking.being_written(file):
+        file.close()  # it is held until the block ends
+        with locking.nobody_writes(str(path)) as abandoned:
+            assert not abandoned
+    with locking.nobody_writes(str(path)) as abandoned:
+        assert abandoned

@@ -6,7 +6,16 @@ import math
 import pytest
 
 from rollcli.errors import InputError
-from rollcli.files.results import COLUMNS, Row, columns, format_header, format_row, parse_rows, read_result
+from rollcli.files.results import (
+    COLUMNS,
+    Row,
+    column_types,
+    columns,
+    format_header,
+    format_row,
+    parse_rows,
+    read_result,
+)
 
 ROW = Row(
     file="maps/a.png",
@@ -181,3 +190,119 @@ def test_names_that_a_spreadsheet_would_compute_are_written_as_they_are(name, fo
 
     assert next(parse_rows(format_header(form) + line, "x")).file == name
     assert name.encode() in line
+
+
+def test_every_number_has_its_digits_in_every_form():
+    numbers = {name: 1.23456789012 for name, kind in column_types(timing=True).items() if kind is float}
+    digits = {"rmse_px": "1.23457", **dict.fromkeys(("alpha0", "alpha1", "alpha2"), "1.23456789")}
+    texts = {name: digits.get(name, "1.234568") for name in numbers} | {"elapsed_ms": "1.235"}
+
+    line = format_row(Row("a", **numbers), "csv", timing=True).decode().rstrip("\n").split(",")
+    values = json.loads(format_row(Row("a", **numbers), "jsonl", timing=True))
+
+    assert {name: line[columns(timing=True).index(name)] for name in numbers} == texts
+    assert {name: values[name] for name in numbers} == {name: float(text) for name, text in texts.items()}
+
+
+def test_columns_have_the_types_of_their_values():
+    types = column_types(timing=True)
+    assert tuple(types) == columns(timing=True)
+    assert types == {
+        "file": str,
+        "right_file": str,
+        "status": str,
+        **dict.fromkeys(("roll_deg", "roll_ci95_deg", "pitch_deg", "pitch_ci95_deg"), float),
+        **dict.fromkeys(("height_m", "height_ci95_m", "camber"), float),
+        "method": str,
+        "iterations": int,
+        **dict.fromkeys(("converged", "global_minimum"), bool),
+        **dict.fromkeys(("rmse_px", "alpha0", "alpha1", "alpha2", "valid_fraction", "road_fraction"), float),
+        **dict.fromkeys(("width", "height"), int),
+        "message": str,
+        "elapsed_ms": float,
+    }
+    assert "elapsed_ms" not in column_types()
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "value"),
+    [
+        ("converged", "true", True),
+        ("converged", "False", False),
+        ("global_minimum", "FALSE", False),
+        ("iterations", "12", 12),
+        ("width", "1242", 1242),
+        ("roll_deg", "-90", -90.0),
+        ("roll_deg", "90", 90.0),
+        ("roll_ci95_deg", "0", 0.0),
+        ("pitch_deg", "-90", -90.0),
+        ("height_m", "0", 0.0),
+        ("rmse_px", "-1e300", -1e300),
+        ("method", "gd", "gd"),
+    ],
+)
+def test_a_cell_is_read_as_its_column_has_it(name, text, value):
+    values = {"file": "a", "status": "ok", "roll_deg": "1", name: text}
+    data = f"{','.join(values)}\n{','.join(values.values())}\n".encode()
+    (row,) = parse_rows(data, "x")
+    assert getattr(row, name) == value
+    assert type(getattr(row, name)) is type(value)
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("converged", "yes"),
+        ("global_minimum", "1"),
+        ("iterations", "1.5"),
+        ("width", "wide"),
+        ("roll_deg", "-90.1"),
+        ("roll_deg", "90.1"),
+        ("roll_deg", "nan"),
+        ("roll_ci95_deg", "-0.1"),
+        ("pitch_deg", "inf"),
+        ("height_m", "-1"),
+        ("alpha0", "nan"),
+        ("alpha0", "-inf"),
+    ],
+)
+def test_a_cell_that_its_column_cannot_have_is_refused(name, text):
+    values = {"file": "a", "status": "ok", "roll_deg": "1", name: text}
+    data = f"{','.join(values)}\n{','.join(values.values())}\n".encode()
+    with pytest.raises(InputError, match=rf"^x: line 2: '{text}' is no value for {name}$"):
+        list(parse_rows(data, "x"))
+
+
+def test_a_row_names_a_file_and_no_text_holds_a_nul():
+    for line, said in (
+        (b",ok,1", "'' is no value for file"),
+        (b"a\0b,ok,1", r"'a\\x00b' is no value for file"),
+    ):
+        with pytest.raises(InputError, match=rf"^x: line 2: {said}$"):
+            list(parse_rows(b"file,status,roll_deg\n" + line + b"\n", "x"))
+
+
+@pytest.mark.parametrize("before", [b"", b"\xef\xbb\xbf", b" \n\n", b" " * 999, b"\xef\xbb\xbf  "])
+def test_white_space_may_stand_before_the_first_line_of_json(before):
+    line = b'{"file": "a", "status": "ok", "roll_deg": 1}\n'
+    (row,) = parse_rows(before + line, "x")
+    assert (row.file, row.roll_deg) == ("a", 1.0)
+
+
+def test_lines_are_numbered_in_every_form():
+    good, bad = (
+        '{"file": "a", "status": "ok", "roll_deg": 1}',
+        '{"file": "a", "status": "bad", "roll_deg": 1}',
+    )
+    with pytest.raises(InputError, match=r"^x: line 4: 'bad' is no status: ok, suspect, error$"):
+        list(parse_rows(f"{good}\n\n{good}\n{bad}\n".encode(), "x"))
+    with pytest.raises(InputError, match=r"^x: line 5: 'bad' is no status"):  # the quoted one takes two lines
+        list(parse_rows(b'file,status,roll_deg\n"a\nb",ok,1\na,ok,1\na,bad,1\n', "x"))
+
+
+def test_a_record_that_is_no_table_is_refused(tmp_path):
+    path = tmp_path / "rolls.csv"
+    path.write_bytes(format_header("csv"))
+    (tmp_path / "rolls.csv.run.json").write_text("[1]")
+    with pytest.raises(InputError, match=r"run.json: is not the record of a run$"):
+        read_result(path)

@@ -6,12 +6,14 @@ import subprocess
 import sys
 import zlib
 
+import cv2
 import numpy as np
 import pytest
 
 from rollcli.errors import InputError
+from rollcli.files.codecs import raw_map
 from rollcli.files.formats import decode_image, decode_mask, decode_stored
-from tests.binary_files import make_npy, make_pfm, make_tiff, png_chunk, png_header
+from tests.binary_files import make_npy, make_pfm, make_png, make_tiff, png_chunk, png_header
 from tests.run_cli import command, environment
 
 GIB = 2**30
@@ -120,3 +122,101 @@ def test_a_map_larger_than_any_is_refused_however_it_is_stored():
 
 def test_a_mask_of_a_large_map_may_compress_as_well_as_it_can():
     assert decode_mask(png_of(12_000, 8_000, 1), "x").shape == (8_000, 12_000)
+
+
+def _bmp(width, height, bits):
+    palette = bytes(4 * 256 if bits == 8 else 0)
+    start = 54 + len(palette)
+    header = struct.pack("<IiiHHIIiiII", 40, width, height, 1, bits, 0, 0, 0, 0, 0, 0)
+    body = bytes(-(-width * bits // 32) * 4 * abs(height))
+    return struct.pack("<2sIHHI", b"BM", 0, 0, 0, start) + header + palette + body
+
+
+def _jpeg(channels):
+    shape = (7, 13, 3) if channels == 3 else (7, 13)
+    return cv2.imencode(".jpg", np.zeros(shape, np.uint8))[1].tobytes()
+
+
+def _pixels(kind, *channels):
+    return np.zeros((7, 13, *channels), kind)
+
+
+GREYS = bytes(3 * 256)
+# 13 x 7 pixels, and the bytes that one of them takes once decoded: at least the four of a disparity
+COUNTED = {
+    "grey1.png": (decode_stored, lambda: make_png(_pixels("u1"), 1), 4),
+    "grey16.png": (decode_stored, lambda: make_png(_pixels("u2"), 16), 4),
+    "palette.png": (decode_stored, lambda: make_png(_pixels("u1"), 8, 3, palette=GREYS), 4),
+    "opacity16.png": (decode_stored, lambda: make_png(_pixels("u2", 2), 16, 4), 4),
+    "colour8.png": (decode_image, lambda: make_png(_pixels("u1", 3), 8, 2), 4),
+    "colour16.png": (decode_image, lambda: make_png(_pixels("u2", 3), 16, 2), 6),
+    "all16.png": (decode_image, lambda: make_png(_pixels("u2", 4), 16, 6), 8),
+    "u1.tif": (decode_stored, lambda: make_tiff(_pixels("u1")), 4),
+    "f4.tif": (decode_stored, lambda: make_tiff(_pixels("f4"), "lzw"), 4),
+    "f8.tif": (decode_stored, lambda: make_tiff(_pixels("f8"), "deflate"), 8),
+    "colour8.tif": (decode_image, lambda: make_tiff(_pixels("u1", 3), photometric=2), 4),
+    "colour16.tif": (decode_image, lambda: make_tiff(_pixels("u2", 3), photometric=2), 6),
+    "u1.npy": (decode_stored, lambda: make_npy(_pixels("u1")), 4),
+    "f8.npy": (decode_stored, lambda: make_npy(_pixels("f8")), 8),
+    "f4.pfm": (decode_stored, lambda: make_pfm(_pixels("f4")), 4),
+    "grey.jpg": (decode_image, lambda: _jpeg(1), 4),
+    "colour.jpg": (decode_image, lambda: _jpeg(3), 4),
+    "grey8.pgm": (decode_image, lambda: b"P5\n13 7\n255\n" + bytes(91), 4),
+    "colour8.ppm": (decode_image, lambda: b"P6\n13 7\n255\n" + bytes(91 * 3), 4),
+    "colour16.ppm": (decode_image, lambda: b"P6\n13 7\n65535\n" + bytes(91 * 6), 6),
+    "grey.bmp": (decode_image, lambda: _bmp(13, 7, 8), 4),
+    "colour.bmp": (decode_image, lambda: _bmp(13, -7, 24), 4),
+    "wide.bmp": (decode_image, lambda: _bmp(13, 7, 32), 4),
+}
+
+
+@pytest.mark.parametrize("name", COUNTED)
+def test_a_file_is_read_up_to_the_limit_and_no_further(monkeypatch, name):
+    decode, make, pixel_bytes = COUNTED[name]
+    data, needed = make(), 13 * 7 * pixel_bytes
+    monkeypatch.setattr(raw_map, "_ALWAYS", 0)
+
+    monkeypatch.setattr(raw_map, "_MOST", needed)
+    monkeypatch.setattr(raw_map, "_EXPANSION", 2 * needed)
+    found = decode(data, "x")
+    assert (found.values if decode is decode_stored else found).shape[:2] == (7, 13)
+    monkeypatch.setattr(raw_map, "_MOST", needed - 1)
+    with pytest.raises(
+        InputError, match=r"^x: its header claims 13 x 7 pixels, 1 MB once decoded; from \d+ bytes up"
+    ):
+        decode(data, "x")
+
+
+def claim(width, height, pixel_bytes, stored, *, mask=False):
+    """What is said of a claim; empty where it is believed."""
+    try:
+        raw_map.require_decoded_fits(width, height, pixel_bytes, stored, "x", mask=mask)
+    except InputError as error:
+        return str(error)
+    return ""
+
+
+# as the README of the package has it: 134 million pixels, 67 million of float64; of a file of few bytes 8
+# million, and then 48 bytes for each of its own
+@pytest.mark.parametrize(
+    ("pixel_bytes", "most", "always"), [(1, 2**27, 2**23), (4, 2**27, 2**23), (8, 2**26, 2**22)]
+)
+def test_the_limits_are_those_that_the_readme_states(pixel_bytes, most, always):
+    assert claim(most, 1, pixel_bytes, 2**40) == claim(always, 1, pixel_bytes, 1) == ""
+    assert claim(most + 1, 1, pixel_bytes, 2**40) == (
+        f"x: its header claims {most + 1} x 1 pixels, 513 MB once decoded; "
+        f"from {2**40} bytes up to 512 MB are read"
+    )
+    assert claim(1, always + 1, pixel_bytes, 1) == (
+        f"x: its header claims 1 x {always + 1} pixels, 33 MB once decoded; "
+        "from 1 bytes up to 32 MB are read; save it uncompressed"
+    )
+    pixels = 12 * 10**6 * 4 // max(pixel_bytes, 4)
+    assert claim(pixels, 1, pixel_bytes, 10**6) == ""
+    assert claim(pixels + 1, 1, pixel_bytes, 10**6).endswith("; save it uncompressed")
+    assert claim(most, 1, pixel_bytes, 2**29 // 48).endswith("; save it uncompressed")
+
+
+def test_a_mask_is_counted_in_its_own_bytes():
+    assert claim(2**29, 1, 1, 1, mask=True) == ""
+    assert claim(2**29 + 1, 1, 1, 1, mask=True).endswith("up to 512 MB are read")

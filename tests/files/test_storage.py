@@ -1,6 +1,7 @@
 """Bytes in an object store are read and written as those of local files are."""
 
 import os
+import time
 
 import pytest
 
@@ -151,3 +152,103 @@ def test_hidden_objects_and_those_in_hidden_folders_are_left_out(bucket, pattern
         storage.write_bytes(f"{bucket}/maps/{name}", b"map")
     found = [relative for _, relative in objects_behind(f"{bucket}/{pattern}", recursive=True)]
     assert found == ["day/a.png"]
+
+
+def test_prefixes_are_searched_below_when_asked_for(bucket):
+    for name in ("a.png", "day/b.png", "day/in/c.png"):
+        storage.write_bytes(f"{bucket}/maps/{name}", b"map")
+    for url in (f"{bucket}/maps", f"{bucket}/maps/"):
+        for recursive, expected in ((False, ["a.png"]), (True, ["a.png", "day/b.png", "day/in/c.png"])):
+            found = sorted(objects_behind(url, recursive=recursive))
+            assert found == [(f"{bucket}/maps/{name}", name) for name in expected]
+    assert list(objects_behind(f"{bucket}/map", recursive=True)) == []
+
+
+def test_names_are_those_of_a_folder_or_a_prefix(folder, tmp_path):
+    assert storage.list_names(f"{folder}/day") == []
+    for name in ("a.png", "b.png"):
+        storage.write_bytes(f"{folder}/day/{name}", b"map")
+    assert sorted(storage.list_names(f"{folder}/day")) == ["a.png", "b.png"]
+    assert storage.list_names("https://host/day") == []
+    (tmp_path / "file").write_bytes(b"")
+    assert storage.list_names(str(tmp_path / "file")) == []
+    with pytest.raises(InputError, match=r"cannot be read: file name too long$"):
+        storage.list_names("x" * 300)
+
+
+def test_many_are_fetched_and_removed_at_once(folder):
+    names = [f"{folder}/{place}.png" for place in range(40)]
+    for place, name in enumerate(names):
+        storage.write_bytes(name, b"%d" % place)
+    assert storage.fetch_all(names) == {name: b"%d" % place for place, name in enumerate(names)}
+    storage.remove_all(names)
+    assert not any(map(storage.exists, names))
+    assert storage.fetch_all([]) == {}
+    with pytest.raises(InputError, match="no such"):
+        storage.fetch_all(names)
+
+
+def test_a_file_that_cannot_be_removed_is_named(tmp_path):
+    (tmp_path / "folder" / "inner").mkdir(parents=True)
+    for remove in (storage.remove, lambda name: storage.remove_all([name])):
+        with pytest.raises(OutputError, match=r"folder: cannot be written: "):
+            remove(str(tmp_path / "folder"))
+
+
+def test_times_are_those_of_the_file_and_of_the_end_of_a_second_of_the_store(folder):
+    before = time.time_ns()
+    storage.write_bytes(f"{folder}/x", b"x")
+    found, after = storage.modified_ns(f"{folder}/x"), time.time_ns()
+    if "://" in folder:
+        assert found % 10**9 == 10**9 - 1
+    assert before - 10**8 <= found <= after + 10**9
+
+
+def test_an_owner_is_who_wrote_an_object(bucket):
+    storage.write_bytes(f"{bucket}/x", b"x", owner="me")
+    assert storage.owner_of(f"{bucket}/x") == "me"
+    storage.write_bytes(f"{bucket}/x", b"x")
+    assert storage.owner_of(f"{bucket}/x") == ""
+    assert storage.owner_of(f"{bucket}/none") == ""
+
+
+def test_what_keeps_a_place_from_being_written_or_read_is_said_beforehand(bucket, tmp_path):
+    storage.write_bytes(f"{bucket}/a.png", b"map")
+    assert storage.write_problem("https://host/out") == "web servers are read from, not written to"
+    assert storage.write_problem(bucket) == storage.write_problem("s3://maps") == ""
+    assert storage.write_problem("s3://no-such-bucket/out") == "there is no such bucket"
+    assert storage.read_problem(f"{bucket}/a.png") == ""
+    assert storage.read_problem(f"{bucket}/none.png") == ""  # a row says so
+    assert storage.read_problem("s3://no-such-bucket/a.png") == "there is no such bucket"
+
+
+def test_a_link_to_nothing_exists_and_of_a_web_server_nothing_is_known(tmp_path):
+    (tmp_path / "link").symlink_to("nothing")
+    assert storage.exists(str(tmp_path / "link"))
+    assert not storage.exists(str(tmp_path / "nothing"))
+    assert storage.exists("https://host/any.png")
+
+
+def test_a_file_of_more_than_4_gib_is_refused_unread(tmp_path):
+    with (tmp_path / "map.npy").open("wb") as file:
+        file.truncate(2**32 + 1)
+    with pytest.raises(InputError, match=r"map.npy: has 4294967297 bytes; no disparity map is that large$"):
+        storage.read_bytes(tmp_path / "map.npy")
+
+
+@pytest.mark.parametrize(
+    ("path", "reason"),
+    [("x" * 300, "cannot be read: file name too long"), ("a\0b.png", "cannot be read: embedded null byte")],
+)
+def test_what_the_system_objects_to_is_said_in_its_words(path, reason):
+    with pytest.raises(InputError) as caught:
+        storage.read_bytes(path, "map.png")
+    assert str(caught.value) == f"map.png: {reason}"
+
+
+@pytest.mark.parametrize("seconds", ["0", "-1", "nan", "1e6", "x"])
+def test_a_store_waits_for_a_number_of_seconds(monkeypatch, seconds):
+    pytest.importorskip("obstore", reason="obstore, of the extra storage, is not here")
+    monkeypatch.setenv("ROLLCLI_STORE_TIMEOUT", seconds)
+    with pytest.raises(UsageError, match=rf"^ROLLCLI_STORE_TIMEOUT={seconds}: give seconds, such as 60$"):
+        storage.read_bytes(f"s3://waits-{seconds}/x")

@@ -79,7 +79,12 @@ FURTHER = {
         "batch/test_kept_rows.py",
         "batch/test_images_of_others.py",
     ),
-    "parallel": ("cli/test_lost_readers.py", "batch/test_faults.py", "batch/test_resume.py"),
+    "parallel": (
+        "files/stores/test_turns.py",
+        "cli/test_lost_readers.py",
+        "batch/test_faults.py",
+        "batch/test_resume.py",
+    ),
     "rig_check": ("cli/test_rig.py", "cli/test_urls.py", "cli/test_buckets.py"),
     "rig": (
         "cli/test_calibration.py",

@@ -111,3 +111,61 @@ def test_a_type_that_does_not_exist_is_refused():
         decode_stored(
             npy_header("{'descr': '<f3', 'fortran_order': False, 'shape': (1, 1)}") + bytes(9), "map.npy"
         )
+
+
+def test_a_header_may_end_where_the_file_does():
+    header = npy_header("{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3), }\n")
+    for there in (0, 23):
+        with pytest.raises(InputError) as caught:
+            decode_stored(header + bytes(there), "x")
+        assert (
+            str(caught.value) == f"x: is truncated: shape (2, 3) of float32 needs 24 bytes, {there} are there"
+        )
+    assert decode_stored(header + bytes(24), "x").values.shape == (2, 3)
+    with pytest.raises(InputError, match=r"^x: is truncated within its NPY header$"):
+        decode_stored(header[:-1], "x")
+
+
+@pytest.mark.parametrize("version", [1, 2])
+def test_a_file_may_end_within_the_length_of_its_header(version):
+    header = npy_header("{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3), }\n", version)
+    for length in range(8, len(header)):
+        with pytest.raises(InputError, match=r"^x: is truncated within its NPY header$"):
+            decode_stored(header[:length], "x")
+
+
+@pytest.mark.parametrize(
+    ("shape", "said"),
+    [
+        ((2, 3, 3), "; photographs are given as image files, by --left and --right"),
+        ((2, 3, 4), "; photographs are given as image files, by --left and --right"),
+        ((2, 3, 2), ""),
+        ((2, 3, 5), ""),
+        ((2, 3, 4, 3), ""),
+        ((3,), ""),
+    ],
+)
+def test_an_array_of_colours_is_told_where_photographs_go(shape, said):
+    with pytest.raises(InputError) as caught:
+        decode_stored(make_npy(np.ones(shape)), "x")
+    assert str(caught.value) == (
+        f"x: is a {len(shape)}-D array of shape {shape}; a disparity map is 2-D (H, W){said}"
+    )
+
+
+@pytest.mark.parametrize(
+    ("descr", "what"),
+    [
+        ("'|O'", "Python objects (a pickle, which is never loaded)"),
+        ("'<c16'", "complex numbers"),
+        ("[('a', '<f4')]", "records"),
+        ("'<U3'", "data of type <U3"),
+        ('"|S5"', "data of type |S5"),
+        ("'" + "x" * 60 + "'", "data of type " + "x" * 40),
+    ],
+)
+def test_what_an_array_holds_instead_is_named(descr, what):
+    header = npy_header(f"{{'descr': {descr}, 'fortran_order': False, 'shape': (1, 1), }}\n")
+    with pytest.raises(InputError) as caught:
+        decode_stored(header + bytes(100), "x")
+    assert str(caught.value) == f"x: holds {what}; a disparity map is a 2-D array of real numbers"

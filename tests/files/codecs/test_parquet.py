@@ -4,7 +4,7 @@ import io
 
 import pytest
 
-from rollcli.errors import InputError
+from rollcli.errors import InputError, UsageError
 from rollcli.files.codecs.parquet import decode_parquet, encode_parquet
 from rollcli.files.results import Row, column_types, plain_values
 from tests.fuzz.mutations import every_region
@@ -77,3 +77,25 @@ def test_a_text_that_stands_for_many_is_refused():
     repeated = pyarrow.array(["x" * 1000] * 10).dictionary_encode()
 
     assert refusal(written(file=repeated)) == "x: its column file is a dictionary; write plain values"
+
+
+def test_many_equal_rows_take_few_bytes_and_are_read():
+    row = plain_values(Row("maps/frame.png", status="ok", roll_deg=1.0))
+    data = encode_parquet(column_types(), [row] * 100_000, {})
+
+    assert len(data) * 200 < 100_000 * 200  # less than the share that the bytes of a large file allow
+    assert sum(1 for _ in decode_parquet(data, "x")) == 100_000
+
+
+def test_the_record_stands_in_the_metadata():
+    data = encode_parquet(column_types(), ROWS[:1], {"rollcli": "1.0"})
+
+    assert parquet.read_schema(io.BytesIO(data)).metadata[b"rollcli"] == b'{"rollcli": "1.0"}'
+
+
+def test_a_name_that_is_not_utf8_is_refused_with_what_to_do():
+    rows = [plain_values(Row("caf\udce9.png", status="ok", roll_deg=1.0))]
+    with pytest.raises(
+        UsageError, match=r"^caf\\udce9.png: this name is not UTF-8, which Parquet cannot hold; use CSV"
+    ):
+        encode_parquet(column_types(), rows, {})

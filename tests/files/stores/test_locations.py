@@ -1,0 +1,142 @@
+"""Names of places: which are URLs, and what their parts are; names of parts, and their order."""
+
+import pytest
+
+from rollcli.errors import InputError, UsageError
+from rollcli.files.stores.locations import (
+    base_name,
+    is_object_url,
+    is_url,
+    is_web_url,
+    located,
+    scheme_of,
+    split_url,
+)
+from rollcli.files.stores.parts import part_names, read_parts
+from rollcli.files.stores.search import _fits, is_folder_url
+
+
+@pytest.mark.parametrize(
+    ("location", "is_one"),
+    [
+        ("s3://bucket/a.png", True),
+        ("S3://bucket/a.png", True),
+        ("ab+c.d-1://x", True),
+        ("c://maps/a.png", False),
+        ("maps/s3://x", False),
+        ("1s3://x", False),
+        ("s3:/bucket", False),
+        ("maps", False),
+    ],
+)
+def test_a_url_has_a_scheme_of_two_letters_or_more(location, is_one):
+    assert is_url(location) == is_one
+
+
+def test_stores_and_web_servers_are_told_apart_whatever_their_case():
+    for scheme in ("s3", "gs", "az", "S3"):
+        assert scheme_of(f"{scheme}://b/k") == scheme.lower()
+        assert is_object_url(f"{scheme}://b/k")
+        assert not is_web_url(f"{scheme}://b/k")
+    for scheme in ("http", "https", "HTTPS"):
+        assert is_web_url(f"{scheme}://b/k")
+        assert not is_object_url(f"{scheme}://b/k")
+    assert not is_object_url("maps")
+    assert not is_web_url("maps")
+
+
+def test_a_bucket_and_its_key_are_split_and_keys_of_access_are_refused():
+    assert split_url("s3://bucket") == ("s3://bucket", "")
+    assert split_url("S3://bucket/a/b?c.png") == ("s3://bucket", "a/b?c.png")
+    with pytest.raises(UsageError, match=r"^s3://bucket/x: keys go into the environment, not into a URL"):
+        split_url("s3://key:secret@bucket/x")
+    with pytest.raises(UsageError, match=r"^gs:///x: names no bucket; write gs://bucket/prefix"):
+        split_url("gs:///x")
+
+
+def test_the_last_part_of_a_web_address_is_that_of_its_path():
+    assert base_name("https://host/maps/a%20b.png?sig=c/d#e/f") == "a b.png"
+    assert base_name("s3://bucket/maps/a%20b?c.png") == "a%20b?c.png"
+    assert base_name("maps/a.png") == "a.png"
+
+
+def test_relative_paths_alone_start_at_the_root_of_the_run():
+    assert located("/run", "maps/a.png") == "/run/maps/a.png"
+    assert located("/run", "/maps/a.png") == "/maps/a.png"
+    assert located("", "maps/a.png") == "maps/a.png"
+    assert located("/run", "s3://bucket/a.png") == "s3://bucket/a.png"
+
+
+@pytest.mark.parametrize(
+    ("url", "is_folder"),
+    [
+        ("s3://bucket", True),
+        ("s3://bucket/", True),
+        ("s3://bucket//", True),
+        ("s3://bucket/maps", True),
+        ("s3://bucket/maps.d/", True),
+        ("s3://bucket/maps/a.png", False),
+        ("s3://bucket/maps.d/a", True),
+        ("https://host/maps/", False),
+    ],
+)
+def test_a_prefix_has_no_ending(url, is_folder):
+    assert is_folder_url(url) == is_folder
+
+
+@pytest.mark.parametrize(
+    ("path", "pattern", "fits"),
+    [
+        ("a.png", "*.png", True),
+        ("b/a.png", "*.png", False),
+        ("b/a.png", "*/*.png", True),
+        ("b/a.png", "**/*.png", True),
+        ("a.png", "**/*.png", True),
+        ("c/b/a.png", "**/*.png", True),
+        ("c/b/a.png", "c/**/a.png", True),
+        ("c/a.png", "c/**/a.png", True),
+        ("c/b/a.png", "c/**", True),
+        ("c/b/a.png", "**/c/a.png", False),
+        ("A.png", "a.png", False),
+        ("c", "c/*", False),
+    ],
+)
+def test_a_pattern_is_held_against_a_path_folder_by_folder(path, pattern, fits):
+    assert _fits(path.split("/"), pattern.split("/")) == fits
+
+
+def test_parts_have_numbers_and_come_in_their_order():
+    names = ["part-00010.csv", "part-00009.csv", "part-100000.csv", "part-00000.csv"]
+    others = ["part-0001.csv", "part-00001.txt", "xpart-00001.csv", "part-00001.csv.gz", "part-00001"]
+    assert part_names(names + others) == [
+        "part-00000.csv",
+        "part-00009.csv",
+        "part-00010.csv",
+        "part-100000.csv",
+    ]
+    for ending in ("jsonl", "parquet"):
+        assert part_names([f"part-00000.{ending}"]) == [f"part-00000.{ending}"]
+
+
+def test_later_parts_of_csv_get_the_header_of_the_first(tmp_path):
+    (tmp_path / "part-00000.csv").write_bytes(b"file,status\na,ok\n")
+    (tmp_path / "part-00001.csv").write_bytes(b"b,ok\n")
+    (tmp_path / "part-00002.csv").write_bytes(b"c,ok\n")
+    found = list(read_parts(str(tmp_path), ["part-00000.csv", "part-00001.csv", "part-00002.csv"]))
+    assert [name.removeprefix(f"{tmp_path}/") for name, _ in found] == [
+        f"part-0000{at}.csv" for at in range(3)
+    ]
+    assert [data for _, data in found] == [
+        b"file,status\na,ok\n",
+        b"file,status\nb,ok\n",
+        b"file,status\nc,ok\n",
+    ]
+
+
+def test_parts_of_json_have_no_header(tmp_path):
+    for at in range(2):
+        (tmp_path / f"part-0000{at}.jsonl").write_bytes(b'{"file": "a"}\n')
+    found = read_parts(str(tmp_path), ["part-00000.jsonl", "part-00001.jsonl"])
+    assert [data for _, data in found] == [b'{"file": "a"}\n'] * 2
+    with pytest.raises(InputError, match="no such file"):
+        list(read_parts(str(tmp_path), ["part-00002.jsonl"]))

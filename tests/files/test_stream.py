@@ -1,0 +1,84 @@
+"""Standard output, pipes and devices are written to; everything else becomes a whole file."""
+
+import contextlib
+import errno
+import os
+import sys
+import threading
+
+import pytest
+
+from rollcli.errors import OutputError
+from rollcli.files import stream
+
+pytestmark = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes on this system")
+
+
+@pytest.fixture
+def pipe():
+    """Both ends of a pipe: (reads, writes)."""
+    ends = os.pipe()
+    yield ends
+    for each in ends:
+        with contextlib.suppress(OSError):  # a test may have closed it
+            os.close(each)
+
+
+def test_streams_are_told_from_what_a_file_can_replace(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "file").write_bytes(b"")
+    for name in ("-", str(tmp_path / "pipe"), "/dev/null"):
+        assert stream.is_stream(name)
+    for name in ("file", "none", "."):
+        assert not stream.is_stream(str(tmp_path / name))
+
+
+def test_a_pipe_gets_all_of_the_bytes_and_stays_a_pipe(tmp_path):
+    path, data, found = tmp_path / "pipe", os.urandom(300_000), []  # more than a pipe holds
+    os.mkfifo(path)
+    reader = threading.Thread(target=lambda: found.append(path.read_bytes()))
+    reader.start()
+    stream.write_output(str(path), data)
+    reader.join(timeout=60)
+    assert found == [data]
+    assert path.is_fifo()
+
+
+def test_a_file_is_replaced_and_what_a_killed_run_left_of_it_is_removed(tmp_path):
+    path = tmp_path / "page.html"
+    path.write_bytes(b"old")
+    (tmp_path / ".page.html.0123456789abcdef.part").write_bytes(b"half")
+    stream.write_output(str(path), b"new")
+    assert path.read_bytes() == b"new"
+    assert [each.name for each in tmp_path.iterdir()] == ["page.html"]
+
+
+def test_standard_output_is_descriptor_1_unless_python_calls_it_closed(monkeypatch):
+    assert stream.stdout_descriptor() == 1
+    monkeypatch.setattr(sys, "stdout", None)
+    with pytest.raises(OutputError, match=r"^standard output: is closed$"):
+        stream.stdout_descriptor()
+
+
+def test_a_reader_that_has_gone_is_told_from_an_error(pipe, monkeypatch):
+    reads, writes = pipe
+    os.close(reads)
+    with pytest.raises(BrokenPipeError):
+        stream.write_stream(writes, b"data")
+
+    def fail(descriptor, data):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "write", fail)
+    with pytest.raises(OutputError, match=r"^/dev/x: cannot be written: no space left on device$"):
+        stream.write_stream(writes, b"data", "/dev/x")
+
+
+def test_what_cannot_be_opened_is_named(tmp_path):
+    with pytest.raises(OutputError, match=r"none: cannot be written: no such file or directory$"):
+        stream.open_stream(str(tmp_path / "none"))
+
+
+def test_a_device_that_takes_nothing_is_named():
+    with pytest.raises(OutputError, match=r"^/dev/full: cannot be written: no space left on device$"):
+        stream.write_output("/dev/full", b"data")
