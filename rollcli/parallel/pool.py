@@ -112,9 +112,9 @@ class PoolExecutor(Generic[Task, Result]):
             worker.close()
 
     def _send_tasks(self) -> None:
-        for _ in range(self._tasks_per_worker):
+        for most in range(self._tasks_per_worker):  # nobody gets a spare task while another has none
             for index, worker in enumerate(self._workers):
-                if self._queue and len(worker.pending) < self._tasks_per_worker:
+                if self._queue and len(worker.pending) <= most:
                     self._send(index, worker, self._queue.popleft())
 
     def _send(self, index: int, worker: Worker, future: "PoolFuture[Task, Result]") -> None:

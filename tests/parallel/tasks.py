@@ -19,6 +19,10 @@ def run(task):
         "touch": _touch,
         "die": _die,
         "die_once": _die_once,
+        "die_then_look": _die_then_look,
+        "hold": _hold,
+        "append": _append,
+        "signals": _signals,
         "raise": _raise,
         "threads": cv2.getNumThreads,
     }[kind](*arguments)
@@ -34,7 +38,10 @@ def _give(value):
 
 
 def _wait(path):
+    give_up = time.monotonic() + 60
     while not Path(path).exists():
+        if time.monotonic() > give_up:
+            raise TimeoutError(path)
         time.sleep(0.002)
     return "waited"
 
@@ -53,6 +60,33 @@ def _die_once(path):
         return "survived"
     Path(path).touch()
     return _die()
+
+
+def _hold(path, event):
+    """Have a file there until the event."""
+    Path(path).touch()
+    _wait(event)
+    Path(path).unlink()
+    return "held"
+
+
+def _die_then_look(mark, path):
+    """Die once the file is there; the second time tell whether it is."""
+    if Path(mark).exists():
+        return Path(path).exists()
+    Path(mark).touch()
+    _wait(path)
+    return _die()
+
+
+def _append(path, text):
+    with Path(path).open("a") as file:
+        file.write(text)
+
+
+def _signals():
+    """The process, and how it takes the signals that stop a run."""
+    return os.getpid(), [signal.getsignal(each) is signal.SIG_IGN for each in (signal.SIGINT, signal.SIGTERM)]
 
 
 def _raise(name):

@@ -2,10 +2,15 @@
 
 import contextlib
 import os
+import signal
+import sys
+from types import SimpleNamespace
 
 import pytest
 
-from rollcli.errors import InputError
+from rollcli.errors import InputError, WorkerError
+from rollcli.parallel import pool as pools
+from rollcli.parallel import worker as workers
 from rollcli.parallel.in_order import Work
 from rollcli.parallel.interrupt import Stop
 from rollcli.parallel.pool import PoolExecutor
@@ -113,3 +118,121 @@ def test_an_inherited_file_stays_open_in_the_workers(tmp_path):
             fcntl.flock(other, fcntl.LOCK_EX | fcntl.LOCK_NB)
     finally:
         executor.close(at_once=True)
+
+
+def test_a_task_is_tried_again_when_no_other_runs(tmp_path):
+    mark, busy, event = (tmp_path / name for name in ("mark", "busy", "event"))
+    with pool() as executor:
+        held = executor.submit(("hold", busy, event))
+        dying = executor.submit(("die_then_look", mark, busy))
+        with pytest.raises(executor.worker_died):
+            dying.result()
+        make_progress = executor.make_progress
+
+        def let_go():
+            event.touch()
+            make_progress()
+
+        executor.make_progress = let_go
+        assert executor.retry(dying.task) is False
+        assert held.result() == "held"
+
+
+def test_what_a_dead_worker_left_is_cleared_before_its_task_is_tried_again(tmp_path):
+    cleared = []
+    executor = PoolExecutor(1, Work(run, lost, cleared.append))
+    try:
+        tasks = [("give", 1), ("die_once", tmp_path / "mark"), ("give", 2), ("give", 3)]
+        futures = [executor.submit(task) for task in tasks]
+        assert futures[0].result() == 1
+        assert cleared == []
+        with pytest.raises(executor.worker_died):
+            futures[1].result()
+        assert cleared[0] == tasks[1]
+        assert [future.result() for future in futures[2:]] == [2, 3]
+    finally:
+        executor.close(at_once=True)
+
+
+def test_the_tasks_after_one_that_killed_its_worker_keep_their_order(tmp_path):
+    tasks = [
+        ("die_once", tmp_path / "mark"),
+        *(("append", tmp_path / "order", str(number)) for number in range(8)),
+    ]
+    with pool(jobs=1) as executor:
+        dying, *others = [executor.submit(task) for task in tasks]
+        with pytest.raises(executor.worker_died):
+            dying.result()
+        for other in others:
+            other.result()
+    assert (tmp_path / "order").read_text() == "01234567"
+
+
+def test_of_few_tasks_each_worker_gets_one(tmp_path):
+    event = tmp_path / "event"
+    with pool() as executor:  # the first one waits for what the second one does
+        futures = [executor.submit(("wait", event)), executor.submit(("touch", event))]
+        assert [future.result() for future in futures] == ["waited", "touched"]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+def test_workers_leave_the_signals_to_their_parent():
+    with pool(jobs=1) as executor:
+        process, ignored = executor.submit(("signals",)).result()
+        assert all(ignored)
+        for each in (signal.SIGINT, signal.SIGTERM):
+            os.kill(process, each)
+        assert executor.submit(("signals",)).result()[0] == process
+
+
+def test_workers_end_after_their_task_or_at_once(tmp_path):
+    for at_once, status in ((False, 0), (True, -signal.SIGKILL)):
+        executor = PoolExecutor(1, WORK)
+        executor.submit(("append", tmp_path / f"{at_once}", "done")).result()
+        executor.submit(("append", tmp_path / f"{at_once}", " done"))
+        (worker,) = executor._workers
+        executor.close(at_once=at_once)
+        assert worker._process.exitcode == status
+    assert (tmp_path / "False").read_text() == "done done"
+
+
+def test_when_a_further_worker_cannot_start_the_others_end(monkeypatch):
+    started = []
+
+    class Limited(workers.Worker):
+        def __init__(self, *arguments):
+            if len(started) == 2:
+                raise WorkerError("no more")
+            super().__init__(*arguments)
+            started.append(self)
+
+    monkeypatch.setattr(pools, "Worker", Limited)
+    with pytest.raises(WorkerError, match="no more"):
+        PoolExecutor(3, WORK)
+    assert [worker._process.is_alive() for worker in started] == [False, False]
+
+
+def test_a_system_that_starts_no_process_is_said_with_a_remedy(monkeypatch):
+    def fail():
+        raise OSError(24, "Too many open files")
+
+    spawn = SimpleNamespace(Pipe=fail)
+    monkeypatch.setattr(workers.multiprocessing, "get_context", lambda kind: {"spawn": spawn}[kind])
+    with pytest.raises(
+        WorkerError,
+        match=r"^a worker process cannot start: .*Too many open files; try fewer of them, with --jobs$",
+    ):
+        PoolExecutor(2, WORK)
+
+
+@pytest.mark.parametrize("error", [ImportError("no NumPy"), OSError("no library"), MemoryError("no memory")])
+def test_a_worker_that_cannot_be_set_up_answers_with_the_reason(monkeypatch, error):
+    def fail():
+        raise error
+
+    monkeypatch.setattr(workers, "prepare_worker", fail)
+    found = workers._prepare()
+    assert isinstance(found, WorkerError)
+    assert str(found) == f"a worker process cannot start: {error}; try fewer of them, with --jobs"
+    monkeypatch.setattr(workers, "prepare_worker", lambda: None)
+    assert workers._prepare() is None
