@@ -79,7 +79,7 @@ def read_columns(path: str, wanted: Sequence[str]) -> ResultColumns:
         while chunk := list(islice(rows, _CHUNK)):
             lines, *columns = zip(*chunk, strict=True)
             found = dict(zip(names, columns, strict=True))
-            files += map(str, found["file"])
+            files += _files(found["file"], lines, name_of_part)
             statuses.append(_statuses(found["status"], lines, name_of_part))
             methods.update(map(str, filter(None, found.get("method", ()))))
             for name in wanted:
@@ -167,6 +167,13 @@ def _by_newline(pieces: Iterable[str]) -> Iterator[str]:
             held.clear()
     if held:
         yield "".join(held)
+
+
+def _files(cells: Sequence[Any], lines: Sequence[int], path: str) -> list[str]:
+    names = list(map(str, cells))
+    if not all(cells) or "\0" in "".join(names):  # an empty name, or one that no file can have
+        _name_fault("file", cells, lines, path)
+    return names
 
 
 def _statuses(cells: Sequence[Any], lines: Sequence[int], path: str) -> NDArray[np.uint8]:

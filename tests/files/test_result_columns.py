@@ -174,3 +174,23 @@ def test_carriage_returns_end_no_line_of_json(tmp_path):
     assert len(read_result(path).rows) == 3
     path.write_bytes(2 * good + good.rstrip(b"\r\n"))
     assert read_columns(str(path), ["roll_deg"]).numbers["roll_deg"].tolist() == [1, 1, 1]
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        (",ok,1", "line 3: '' is no value for file"),
+        ("a\0b,ok,1", r"line 3: 'a\\x00b' is no value for file"),
+        ('{"file": null, "status": "ok", "roll_deg": 1}', "line 2: '' is no value for file"),
+        ('{"file": "", "status": "ok", "roll_deg": 1}', "line 2: '' is no value for file"),
+    ],
+)
+def test_a_row_names_a_file(tmp_path, line, said):
+    path = tmp_path / "rolls"
+    good = (
+        '{"file": "a", "status": "ok", "roll_deg": 1}' if line[0] == "{" else "file,status,roll_deg\na,ok,1"
+    )
+    path.write_text(f"{good}\n{line}\n")
+    for read in (lambda: read_columns(str(path), ["roll_deg"]), lambda: read_result(path)):
+        with pytest.raises(InputError, match=rf"rolls: {said}$"):
+            read()
