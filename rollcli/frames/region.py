@@ -1,6 +1,7 @@
 """Draw the pixels that a user allows: those inside the mask file, the rectangle and the polygon."""
 
 from collections.abc import Sequence
+from fractions import Fraction
 from functools import lru_cache
 from typing import Any
 
@@ -13,7 +14,7 @@ from rollcli.files.encodings import read_mask
 from rollcli.frames.options import FrameOptions, RegionOptions
 
 Corner = tuple[float, float]
-_FAR = 2.0**17  # pixels; a side that leaves the map there is still straight to a hundredth of a pixel
+_FAR = 2**17  # pixels; a side that leaves the map there is still straight to a hundredth of a pixel
 
 
 def region_mask(mask: str | None, options: FrameOptions, shape: tuple[int, ...]) -> NDArray[np.bool_] | None:
@@ -52,21 +53,24 @@ def _drawn(options: RegionOptions, shape: tuple[int, ...]) -> NDArray[np.bool_]:
 
 
 def _near(corners: Sequence[Corner]) -> Sequence[Corner]:
-    """Cut off what lies far outside of any map [Sutherland, Hodgman 1974]: OpenCV would fill that, too."""
+    """Cut off what lies far outside of any map [Sutherland, Hodgman 1974]: OpenCV would fill that, too.
+
+    In fractions, for of a step between 1e300 and a pixel a float keeps nothing.
+    """
+    exact = [(Fraction(u), Fraction(v)) for u, v in corners]
     for axis in (0, 1):
         for bound, side in ((-_FAR, 1), (_FAR, -1)):
-            kept: list[Corner] = []
-            for one, other in zip(corners, (*corners[1:], *corners[:1]), strict=True):
+            kept: list[tuple[Fraction, Fraction]] = []
+            for one, other in zip(exact, (*exact[1:], *exact[:1]), strict=True):
                 first, second = side * (one[axis] - bound), side * (other[axis] - bound)
                 if first >= 0:
                     kept.append(one)
                 if (first >= 0) != (second >= 0):
                     share = first / (first - second)
                     cut = [a + share * (b - a) for a, b in zip(one, other, strict=True)]
-                    cut[axis] = bound
                     kept.append((cut[0], cut[1]))
-            corners = kept
-    return corners
+            exact = kept
+    return [(float(u), float(v)) for u, v in exact]
 
 
 @lru_cache(maxsize=1)  # a mask for all frames is read once

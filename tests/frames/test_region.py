@@ -24,13 +24,14 @@ def test_a_polygon_may_reach_as_far_as_it_likes(far):
     np.testing.assert_array_equal(allowed((-far, 60), (far, 60), (far, far), (-far, far)), v >= 60)
 
 
-@pytest.mark.parametrize("far", [1e6, 1e9])
+@pytest.mark.parametrize("far", [1e6, 1e9, 1e300, 1.7e308])
 def test_a_slanted_side_that_reaches_far_keeps_its_place(far):
     v, u = np.mgrid[: SHAPE[0], : SHAPE[1]]
     found = allowed((-far, -far), (far, far), (-far, far))
 
     assert found[v > u].all()
     assert not found[v < u].any()
+    np.testing.assert_array_equal(allowed((0, 0), (far, 0), (far, far)), v <= u)
 
 
 def test_a_polygon_that_lies_elsewhere_is_said_to_leave_nothing():
