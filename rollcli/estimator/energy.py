@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import EstimationError
-from rollcli.estimator.moments import Floats, Grid, Moments
+from rollcli.estimator.moments import Floats, Grid, Moments, shift
 
 # x^i y^j of the rotated frame that the energy and its two derivatives need, as (i, j)
 _OF_WEIGHTS = ((2, 0), (1, 1), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3), (2, 2), (1, 3), (0, 4))
@@ -98,8 +98,9 @@ class Energy:
         if not _SMALLEST < peak < _LARGEST:
             raise EstimationError(f"disparities up to {peak:g}: their squares leave double precision")
         p, q = moments.s[1, 0] / n, moments.s[0, 1] / n
-        s = _shift(5, p) @ moments.s @ _shift(5, q).T
-        t = _shift(3, p) @ moments.t @ _shift(3, q).T
+        along_p, along_q = shift(p), shift(q)
+        s = along_p @ moments.s @ along_q.T
+        t = along_p[:3, :3] @ moments.t @ along_q[:3, :3].T
         spread = s[2, 0] * s[0, 2] - s[1, 1] ** 2
         if spread <= _SINGULAR * (s[2, 0] + s[0, 2]) ** 2:
             raise EstimationError("the valid pixels lie on one line: they do not determine a roll angle")
@@ -145,7 +146,20 @@ class Energy:
         -------
         Terms
         """
-        xx, xy, yy, xxx, xxy, xyy, yyy, xxyy, xyyy, yyyy, rxx, rxy, ryy, cx, cy = self._rotated(theta)
+        return self._terms(self._rotated(theta))
+
+    def at_with_numerator(self, theta: Any) -> tuple[Terms, Any]:
+        """Evaluate the same, and the numerator of the gradient over det(Y'Y)^2 / weight^2.
+
+        E_min is a quotient of trigonometric polynomials, and the numerator of its derivative is one.
+        """
+        rotated = self._rotated(theta)
+        _, _, yy, _, _, _, yyy, _, _, yyyy, *_ = rotated
+        terms = self._terms(rotated)
+        return terms, terms.gradient * (yy * yyyy - yyy * yyy - yy**3 / self.weight) ** 2
+
+    def _terms(self, rotated: list[Any]) -> Terms:
+        xx, xy, yy, xxx, xxy, xyy, yyy, xxyy, xyyy, yyyy, rxx, rxy, ryy, cx, cy = rotated
         n = self.weight
         skew, mean = yyy / yy, yy / n  # phi = y^2 - skew y - mean is orthogonal to 1 and y
         per_phi = self._inverse(yyyy - yyy * skew - yy * mean, yyyy)
@@ -194,11 +208,6 @@ class Energy:
         """Root of the mean squared residual at `theta`, px."""
         return math.sqrt(max(0.0, self.at(theta).value) / self.weight)
 
-    def denominator(self, theta: Any) -> Any:
-        """Return det(Y'Y) / weight of the parabola: E_min is a quotient of trigonometric polynomials."""
-        _, _, yy, _, _, _, yyy, _, _, yyyy, *_ = self._rotated(theta)
-        return yy * yyyy - yyy * yyy - yy**3 / self.weight
-
     def _rotated(self, theta: Any) -> list[Any]:
         """Return the moments in the frame rotated by theta, then the plane's slopes along x and y."""
         library: Any = math if isinstance(theta, float) else np  # which is slow on single numbers
@@ -219,13 +228,6 @@ class Energy:
             return 1 / norm if norm > _SINGULAR * scale else 0.0
         regular = norm > _SINGULAR * scale
         return np.where(regular, 1 / np.where(regular, norm, 1), 0.0)
-
-
-def _shift(size: int, by: float) -> Floats:
-    """Return the matrix that takes sums of p^k to sums of (p - by)^k."""
-    return np.array(
-        [[math.comb(i, k) * (-by) ** (i - k) if k <= i else 0.0 for k in range(size)] for i in range(size)]
-    )
 
 
 def _monomials(degree: int) -> list[tuple[int, int]]:

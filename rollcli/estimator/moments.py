@@ -145,6 +145,12 @@ def powers(x: NDArray[np.floating[Any]], degree: int = 4) -> Floats:
     return rows
 
 
+def shift(by: float) -> Floats:
+    """Return the matrix (5, 5) that takes sums of p^0 to p^4 to those of the powers of p - by."""
+    matrix: Floats = _CHOOSE * np.array([1.0, -by, by**2, -(by**3), by**4])[_REST]
+    return matrix
+
+
 def _block_sums(
     disparity: NDArray[Any],
     weights: NDArray[Any] | None,

@@ -1,9 +1,9 @@
 """What a file that is no disparity map in pixels seems to be, and what to do about it.
 
 Of 105 real maps none is taken for anything else, stretched to 8 bits or not. Of the depth maps made of them
-104 are told, up to a third as depth or upside down; of the maps turned upside down 104, a tenth likewise.
-Each of 86 real photographs is told; blurred and dark ones are not. The numbers lie amid the gaps that these
-files leave (python tests/benchmarks/bench_diagnosis.py).
+104 and more are told, up to a quarter as depth or upside down; of the maps turned upside down 104, a tenth
+likewise. Each of 86 real photographs is told; blurred and dark ones are not. The numbers lie amid the gaps
+that these files leave (python tests/benchmarks/bench_diagnosis.py).
 """
 
 import math

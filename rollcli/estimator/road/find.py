@@ -82,23 +82,17 @@ def find_road(sample: Sample, max_roll: float, seed: int) -> Road:
         raise EstimationError("no road: nowhere does the disparity grow downward, as it does on a road")
     tuning = sample.tuning.search
     planes = planes[_varied(first_costs(sample, planes, tuning.first_pixels), _rolls(planes), tuning)]
-    second = PlaneScorer.of(sample, tuning.second_pixels)
-    scores = second.scores(planes)
-    third = PlaneScorer.of(sample, tuning.third_pixels)
-    fitted = third.fitted(planes[_shortlist(planes, scores, tuning)])
+    scorer = PlaneScorer.of(sample, tuning.second_pixels)
+    fitted = scorer.fitted(planes)
     kept = np.abs(fitted[:, 1]) <= math.tan(max_roll) * fitted[:, 2]
-    fitted = fitted[kept] if kept.any() else planes[_best(-scores, 1)]
-    final = third.scores(fitted)
-    winner = int(np.argmax(final))
+    fitted = fitted[kept] if kept.any() else planes[:1]
+    scores = scorer.scores(fitted)
+    winner = int(np.argmax(scores))
     if not fitted[winner, 2] > 0:  # fitted to no pixel, it scores 0, and the others have more against them
         raise EstimationError(HARDLY_A_PIXEL)
     rolls = _rolls(fitted)
     far = np.abs(rolls - rolls[winner]) > tuning.rival_angle
-    # a plane that was not fitted may be the same road, badly drawn
-    others = np.abs(_rolls(planes) - rolls[winner]) > 2 * tuning.rival_angle
-    rival = max(final[far].max(initial=-1), scores[others].max(initial=-1))
-    plane = fitted[winner].astype(np.float64)
-    return Road(plane, float(final[winner]), float(rival))
+    return Road(fitted[winner].astype(np.float64), float(scores[winner]), float(scores[far].max(initial=-1)))
 
 
 def road_weights(sample: Sample, plane: NDArray[np.float64], near: NDArray[np.intp]) -> Singles:
@@ -112,26 +106,14 @@ def road_weights(sample: Sample, plane: NDArray[np.float64], near: NDArray[np.in
 
 def _varied(costs: Singles, rolls: Singles, tuning: SearchTuning) -> NDArray[np.intp]:
     """Return the cheapest planes, few of each roll: a wide verge must not crowd out the road."""
-    order = _best(costs, len(costs))
+    order = np.argsort(costs, kind="stable")
     bins = np.floor(rolls[order] / tuning.rival_angle).astype(np.int64)
     by_bin = np.argsort(bins, kind="stable")
     starts = np.searchsorted(bins[by_bin], bins[by_bin])
     rank = np.empty_like(by_bin)
     rank[by_bin] = np.arange(len(order)) - starts
-    return order[rank < tuning.of_each_roll][: tuning.second_planes]
-
-
-def _shortlist(planes: Singles, scores: Singles, tuning: SearchTuning) -> NDArray[np.intp]:
-    """Return the best few, one of them a rival of the best: it may win once fitted."""
-    order = _best(-scores, len(scores))
-    rolls = _rolls(planes)
-    rivals = order[np.abs(rolls[order] - rolls[order[0]]) > tuning.rival_angle]
-    return np.concatenate([order[: tuning.refined - 1], rivals[:1]])
+    return order[rank < tuning.of_each_roll][: tuning.refined]
 
 
 def _rolls(planes: Singles) -> Singles:
     return np.arctan2(-planes[:, 1], planes[:, 2])
-
-
-def _best(costs: Singles, count: int) -> NDArray[np.intp]:
-    return np.argsort(costs, kind="stable")[:count]

@@ -38,9 +38,11 @@ class Profile:
 
     def level(self, side: Reals) -> Floats:
         """Return how much of the lane's level the ground there has, 0 to 1, however far it is."""
-        bins = len(self.weights) // 2
-        middles = (np.arange(-bins, bins) + 0.5) * self.tuning.bin_width
-        level: Floats = np.interp(side, middles, self.weights)
+        # np.interp takes three times as long
+        last = len(self.weights) - 1
+        places = np.fmin(np.fmax(side / self.tuning.bin_width + last / 2, 0), last)
+        below = places.astype(np.intp)
+        level: Floats = self.weights[below] + (places - below) * np.diff(self.weights, append=0)[below]
         return level
 
 

@@ -21,13 +21,21 @@ _RIDGE = 1e-10 * np.eye(5)  # of normal matrices with a diagonal of ones, up to 
 
 
 class Fit(NamedTuple):
-    """A road on normalised coordinates, and where the weights end, in tolerances.
+    """A road on normalised coordinates, and how the pixels lie around it.
 
-    `camber_precision` is what the prior adds to the normal equations of the camber; infinite where none is
-    fitted.
+    Attributes
+    ----------
+    model : RoadModel
+    off : ndarray, shape (N,)
+        Road minus disparity in tolerances.
+    limit : float
+        Where the weights end, in tolerances.
+    camber_precision : float
+        What the prior adds to the normal equation of the camber; infinite where none is fitted.
     """
 
     model: RoadModel
+    off: Singles
     limit: float
     camber_precision: float = math.inf
 
@@ -73,7 +81,7 @@ class NearPixels:
     def of(cls, sample: Sample, road: Road) -> "NearPixels":
         """Take the pixels near a road's plane from a sample."""
         tuning, model = sample.tuning.fit, road.model
-        c0, c1, c2 = road.plane
+        c0, c1, c2 = road.plane.tolist()  # of NumPy's double precision they would make everything double
         off = c0 + c1 * sample.x + c2 * sample.y - sample.d
         close = np.abs(off) < tuning.reach * sample.tolerance
         stride = -(-int(np.count_nonzero(close)) // tuning.pixels) or 1
@@ -104,7 +112,7 @@ class NearPixels:
         """Read the profile across the lane; return it, and the pixels weighted by it."""
         road = lane.disparity_along(lane.along(self.x, self.y))
         side = lane.side(self.x, self.y, np.maximum(road, tuning.least_road * self.d))
-        used = (self.place > tuning.least_place) & (road > tuning.least_road * self.d)
+        used = np.flatnonzero((self.place > tuning.least_place) & (road > tuning.least_road * self.d))
         profile = read_profile(side[used], self.d[used] / road[used] - 1, tuning)
         weights = profile.at(side)
         kept = np.flatnonzero(weights > self.tuning.least_weight)
@@ -118,16 +126,16 @@ class NearPixels:
         the pixels ahead allows. The camber has a prior: where the pixels do not determine it, it stays small.
         """
         most = self.tuning.most_turn
-        fit = Fit(start, self.tuning.start_width)
         design = np.empty((6, len(self.d)), np.float32)
         design[0], design[4], design[5] = 1, 0, self.d
         across, off = self._lay_out(design, start, cambered=cambered)
+        fit = Fit(start, off, self.tuning.start_width)
         for _ in range(rounds):
-            model, weights = fit.model, self._weights(off, fit.limit)
+            model, weights = fit.model, self.weights(fit)
             if not parabolic:
                 design[2] = 0
             design[3] = model.turning(across, design[1])
-            precision = self._camber_precision(weights, off) if cambered else math.inf
+            precision = self._camber_precision(weights, fit.off) if cambered else math.inf
             products = ((design * weights) @ design.T).astype(np.float64)
             if cambered:
                 products[4, 4] += precision
@@ -135,29 +143,24 @@ class NearPixels:
             turned = max(-most, min(most, turned))
             model = RoadModel(model.theta + turned, (a0, a1, a2), camber)
             across, off = self._lay_out(design, model, cambered=cambered)
-            fit = Fit(model, min(fit.limit, self._width(off, weights)), precision)
+            fit = Fit(model, off, min(fit.limit, self._width(off, weights)), precision)
         return fit
 
     def weights(self, fit: Fit) -> Singles:
-        """Return the weights that a fit leaves, 0 to 1."""
-        return self._weights(self._off(fit.model), fit.limit)
+        """Return the weights that a fit leaves, 0 to 1; refuse a surface with hardly a pixel on it."""
+        return self._weights(fit.off, fit.limit)
 
     def limit_alone(self, model: RoadModel) -> float:
         """Return where the weights of single pixels around a road would end, in tolerances.
 
         Averaged ones lie closer together.
         """
-        off = self._off(model) + (self.d - self.alone) / self.tolerance
+        design = np.ones((5, len(self.d)), np.float32)
+        off = self._lay_out(design, model, cambered=True)[1] + (self.d - self.alone) / self.tolerance
         limit = self.tuning.start_width
         for _ in range(self.tuning.rounds):
             limit = min(limit, self._width(off, self._weights(off, limit)))
         return limit
-
-    def _off(self, model: RoadModel) -> Singles:
-        """Return road minus disparity in tolerances."""
-        design = np.empty((5, len(self.d)), np.float32)
-        design[0] = 1
-        return self._lay_out(design, model, cambered=True)[1]
 
     def _lay_out(self, design: Singles, model: RoadModel, *, cambered: bool) -> tuple[Singles, Singles]:
         """Set a design's rows 1 and 2, the coordinate along the road and its square, and 4, the bulge.

@@ -153,7 +153,7 @@ def take_sample(
     near = jumps <= np.maximum(tolerance, np.float32(numbers.coherent_share * typical))
     coherence = count_true(near)
     coherence /= np.maximum(count_true(known), 1)
-    coherent = d[coherence >= numbers.coherent_from]
+    coherent = d.compress(coherence >= numbers.coherent_from)
     if len(coherent):  # again, without the noise, which has another median
         noise, tolerance = _tolerance(d, typical := _median(coherent), quantum, numbers)
     per_unit = grid.scale / reach
@@ -245,8 +245,9 @@ def count_true(agreeing: NDArray[np.bool_]) -> Singles:
 
 
 def _median(values: Singles) -> float:
-    middle = len(values) // 2
-    return float(np.partition(values, middle)[middle])
+    few = values[::4]  # it is a scale: all would take time
+    middle = len(few) // 2
+    return float(np.partition(few, middle)[middle])
 
 
 def _tolerance(d: Singles, typical: float, quantum: float, numbers: SampleTuning) -> tuple[float, Singles]:
@@ -259,6 +260,6 @@ def _tolerance(d: Singles, typical: float, quantum: float, numbers: SampleTuning
 def _quantum(jumps: Singles, numbers: SampleTuning) -> float:
     """Return the smallest step between neighbours (5th percentile): 1 in a map of whole pixels, 0 if none."""
     some: Singles = jumps[1::2, ::4].ravel()
-    some = some[(some > 0) & (some < NO_SLOPE)]
+    some = some.compress((some > 0) & (some < NO_SLOPE))
     place = len(some) // numbers.quantum_part
     return float(np.partition(some, place)[place]) if len(some) else 0.0

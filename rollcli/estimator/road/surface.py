@@ -139,7 +139,7 @@ def _surface(
 ) -> Surface:
     """Return the pixels that a fit leaves, and the fit."""
     weights, model = near.weights(fit), fit.model
-    used = weights > 0
+    used = np.flatnonzero(weights)
     x, y, d = (values[used].astype(np.float64) for values in (near.x, near.y, near.d))
     plain = model.disparity_along(model.along(x, y))
     return Surface(
@@ -150,7 +150,7 @@ def _surface(
         model=model,
         grid=sample.grid,
         noise=sample.noise,
-        share=min(1.0, float(np.count_nonzero(used)) * near.stride / len(sample.d)),
+        share=min(1.0, len(used) * near.stride / len(sample.d)),
         moved=abs(model.theta - road.model.theta),
         parabolic=parabolic,
         profile=profile,

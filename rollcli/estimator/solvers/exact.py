@@ -74,10 +74,10 @@ def _line_minimum(energy: Energy) -> Minimum:
 def _stationary_angles(energy: Energy) -> tuple[list[float], Minimum]:
     """Return angles near every local minimum, radians, and the lowest of a few angles."""
     angles, stretch = _unwhitened(energy, _ANGLES)
-    terms = energy.at(angles)
+    terms, numerator = energy.at_with_numerator(angles)
     lowest = int(np.argmin(terms.value))
     low = Minimum(float(angles[lowest]), float(terms.value[lowest]))
-    spectrum = np.fft.fft(terms.gradient * energy.denominator(angles) ** 2 * stretch**10)
+    spectrum = np.fft.fft(numerator * stretch**10)
     # z^5 times the series is a polynomial in z; numpy wants the highest power first
     coefficients = np.concatenate([spectrum[_DEGREE::-1], spectrum[: -_DEGREE - 1 : -1]])
     largest = np.abs(coefficients).max()
