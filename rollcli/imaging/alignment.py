@@ -14,36 +14,36 @@ from numpy.typing import NDArray
 
 from rollcli.imaging.misalignment import LEVEL, Misalignment
 from rollcli.imaging.vertical_disparity import Measured, Texture, measure_misalignment
-from rollcli.imaging.views import View, Views, shrink_both
+from rollcli.imaging.views import View, Views, seen_at, shrink_both
 
 Map = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
 class Tolerance:
-    """What is level enough, beside twice the standard error of what was measured.
+    """What is level enough, beside some standard errors of what was measured.
 
-    Level rendered pairs measure up to 0.03 px, 0.01 degrees, 0.05 % and 0.23 px.
+    Level rendered pairs measure up to 0.03 px, 0.008 degrees, 0.04 % and 0.18 px; empty roads with much noise
+    up to 0.08 px, 0.024 degrees, 0.07 % and 0.24 px, with standard errors of a sixth of that.
     """
 
-    offset: float = 0.15
-    """Pixels; turns a road by 0.08 degrees."""
-    rotation: float = 0.0005
-    """Radians (0.03 degrees); turns a road by 0.06 degrees."""
-    scale: float = 0.0004
-    """Turns a road by 0.1 degrees."""
-    twist: float = 0.3
-    """Pixels in the corners; turns a road by 0.05 degrees."""
+    offset: float = 0.06
+    """Pixels; turns a road by 0.03 degrees."""
+    rotation: float = 0.00025
+    """Radians (0.014 degrees); turns a road by 0.03 degrees."""
+    scale: float = 0.0003
+    """Turns a road by 0.08 degrees."""
+    twist: float = 0.15
+    """Pixels in the corners; turns a road by 0.03 degrees."""
+    sure: float = 4.0
+    """Standard errors. Blocks beside each other err together: they are said to err less than they do."""
 
 
 TOLERANCE = Tolerance()
-LEFT_OVER = Tolerance(0.075, 0.00025, 0.0002, 0.3)
-"""What a correction may leave: less, since a map that was matched with it hides a part of it."""
 _MEASURED_AT = 120_000  # px: larger views are measured at this size, which keeps a fifth of the tolerance
 # px, before a pair is matched again: the whole of most views. A level road of fine grain seems 0.06 % larger
 # at 120,000 and 0.02 % at its 307,000. More would take 25 bytes for each pixel of a large photo
 _CLOSER = 480_000
-_SURE = 2.0  # standard errors
 _FURTHEST = 2.0  # times the last change; further away, two measurements do not tell
 _NO_CHANGE = 1e-6  # px^2
 
@@ -51,11 +51,11 @@ _NO_CHANGE = 1e-6  # px^2
 def is_level(
     lies: Misalignment, errors: Misalignment, shape: tuple[int, ...], tolerance: Tolerance = TOLERANCE
 ) -> bool:
-    """Tell whether views of this shape that lie so, with these standard errors, need no correction."""
+    """Tell whether views of this shape that lie so, with these standard errors, are within a tolerance."""
     corner = shape[0] * shape[1] / 4
     limits = (tolerance.offset, tolerance.rotation, tolerance.scale, tolerance.twist / corner)
     parts = zip(astuple(lies), astuple(errors), limits, strict=True)
-    return all(abs(value) < limit + _SURE * error for value, error, limit in parts)
+    return all(abs(value) < limit + tolerance.sure * error for value, error, limit in parts)
 
 
 def level(right: View, misalignment: Misalignment) -> View:
@@ -65,11 +65,7 @@ def level(right: View, misalignment: Misalignment) -> View:
     height, width = right.shape
     u = np.arange(width, dtype=np.float32)
     v = np.arange(height, dtype=np.float32)[:, None]
-    x, y = u - np.float32((width - 1) / 2), v - np.float32((height - 1) / 2)
-    rotation = np.float32(misalignment.rotation)
-    at_u = u + np.float32(misalignment.stretch) * x - rotation * y
-    at_v = (rotation + np.float32(misalignment.twist) * y) * x
-    at_v += v + np.float32(misalignment.offset) + np.float32(misalignment.scale) * y
+    at_u, at_v = seen_at(misalignment, u, v, right.shape)
     levelled = cv2.remap(right, at_u, at_v, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
     return levelled.astype(np.uint8, copy=False)
 
@@ -121,6 +117,7 @@ class SmallViews:
         self.shape = whole[0].shape
         self.factor = size_factor(self.shape, pixels)
         self.views = shrink_both(whole, self.factor)
+        self._every = max(1, round(self.views[0].size / _MEASURED_AT))
         self._whole = whole
 
     @cached_property
@@ -154,7 +151,7 @@ class SmallViews:
             Pixels of the whole views.
         """
         seen = resampled(disparity, self.views[0].shape)
-        found = measure_misalignment(self._texture, seen, start.resized(1 / self.factor), rounds)
+        found = measure_misalignment(self._texture, seen, start.resized(1 / self.factor), rounds, self._every)
         return None if found is None else found.resized(self.factor)
 
 

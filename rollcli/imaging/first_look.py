@@ -24,13 +24,13 @@ _STEP = 0.3  # px of the small view, anywhere: the end; the match at full size s
 _FAR = 0.5  # the same: what was matched so far off does not show the range
 _MARGIN = 1.1  # beyond the largest disparity seen, to search
 # Of the smallest views, which tell a scale to 0.2 %: level pairs need no larger look. Real rigs twist more
-_AS_GOOD_AS_LEVEL = Tolerance(offset=0.15, rotation=0.0005, scale=0.002, twist=0.4)
+_AS_GOOD_AS_LEVEL = Tolerance(offset=0.15, rotation=0.0005, scale=0.002, twist=0.4, sure=2.0)
 # px of the whole view; standard error of the offset. Above it small views cannot tell: 0.21 and more in dark
 # streets that are 0.3 px off, up to 0.11 on level roads of fine grain
 _TELLING_ERROR = 0.15
 # What the smallest views may say of a level pair with little texture. A map that was matched with it hides
 # half of what is wrong about it: larger views start from level again
-_MILD = Tolerance(offset=0.5, rotation=0.0015, scale=0.004, twist=0.8)
+_MILD = Tolerance(offset=0.5, rotation=0.0015, scale=0.004, twist=0.8, sure=2.0)
 # From a start 3 px off, a view of little texture can end at an offset and a scale that deny each other. Its
 # scale tells, with blocks that do not agree or a larger view that does not: other starts then show which
 # leaves less. Of 288 warped pairs, wrong ends had errors from 0.018 px or steps from 1.4 px on; of the right

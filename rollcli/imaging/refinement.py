@@ -12,8 +12,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from rollcli.imaging.misalignment import LEVEL, Misalignment
 from rollcli.imaging.sgbm_lag import STEEPEST
-from rollcli.imaging.views import BLOCK, View, Views, block_means, blocks_at
+from rollcli.imaging.views import BLOCK, View, Views, block_means, blocks_at, seen_at
 
 Floats = NDArray[np.float32]
 
@@ -28,6 +29,9 @@ _LEAST_RISE = 0.01
 # texture keep most of what SGBM says. From 0.2 to 1 the errors of angles are the same
 _RIDGE = 0.5
 _ROUNDS = 2  # a weak block goes about half of the way in one; a third changes no angle any more
+# Where the right view is not quite as it was levelled for the match: roads matched with 0.1 degrees left are
+# then 0.010 degrees wrong (95 %: 0.043), after two rounds 0.021 (0.063)
+_ROUNDS_LEVELLED = 4
 _LONGEST_STEP = 0.5  # px
 _TOGETHER = 1 << 17  # pixels shifted at a time: what they need stays in the processor's cache
 
@@ -37,7 +41,7 @@ _PLANE = np.stack(  # what a value in the middle, a slope across and a slope dow
 )
 
 
-def refined(disparity: Floats, views: Views) -> Floats:
+def refined(disparity: Floats, views: Views, lies: Misalignment = LEVEL) -> Floats:
     """Shift each part of a map to where the grey levels agree.
 
     Parameters
@@ -45,7 +49,9 @@ def refined(disparity: Floats, views: Views) -> Floats:
     disparity : ndarray of float32, shape (H, W)
         Pixels, right to about half a pixel; no data is <= 0 and stays.
     views : pair of ndarray of uint8, shape (H, W)
-        As they were matched.
+        As they were given.
+    lies : Misalignment
+        How the right one lies, pixels; it may have been levelled by a little less or more for the match.
 
     Returns
     -------
@@ -65,7 +71,7 @@ def refined(disparity: Floats, views: Views) -> Floats:
     for top in range(0, height, many):
         rows = slice(top, top + many)
         if planes.told[rows].any():
-            shifts[rows][planes.told[rows]] = _found(left, gradient, right, planes, rows)
+            shifts[rows][planes.told[rows]] = _found(left, gradient, right, planes, rows, lies)
     result = disparity.copy()
     whole = slice(0, height * BLOCK), slice(0, width * BLOCK)
     cv2.add(disparity[whole], _between(shifts), dst=result[whole], mask=known.view(np.uint8)[whole])
@@ -105,7 +111,9 @@ class _Planes(NamedTuple):
         return _Planes(middle, across, down, told)
 
 
-def _found(left: View, gradient: Floats, right: Floats, planes: _Planes, rows: slice) -> Floats:
+def _found(
+    left: View, gradient: Floats, right: Floats, planes: _Planes, rows: slice, lies: Misalignment
+) -> Floats:
     """Find the shifts of the planes that are told in some rows of blocks, px."""
     told, pixels = planes.told[rows], slice(rows.start * BLOCK, rows.stop * BLOCK)
     middle, across, down = (each[rows][told] for each in (planes.middle, planes.across, planes.down))
@@ -114,13 +122,14 @@ def _found(left: View, gradient: Floats, right: Floats, planes: _Planes, rows: s
     none = np.zeros_like(row)
     u = np.stack([column - middle, 1 - across, -down], axis=1) @ _PLANE
     v = np.stack([row, none, none + 1], axis=1) @ _PLANE
+    u, v = seen_at(lies, u, v, right.shape)
     grey = blocks_at(left[pixels], told).astype(np.float32)
     weight = blocks_at(gradient[pixels], told)
     weight -= weight.mean(axis=1, keepdims=True)  # one view may be brighter than the other
     weight /= (np.einsum("ij,ij->i", weight, weight) + np.float32(_RIDGE * BLOCK**2))[:, None]
     weight *= (1 - across)[:, None]  # the right view is that much less stretched than the left one
     shift: Floats = none
-    for _ in range(_ROUNDS):
+    for _ in range(_ROUNDS if lies == LEVEL else _ROUNDS_LEVELLED):
         off = cv2.remap(right, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE) - grey
         step = np.clip(np.einsum("ij,ij->i", weight, off), -_LONGEST_STEP, _LONGEST_STEP)
         u -= step[:, None]

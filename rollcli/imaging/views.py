@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError
+from rollcli.imaging.misalignment import LEVEL, Misalignment
 
 _Number = TypeVar("_Number", np.float32, np.uint8)
 
@@ -52,6 +53,20 @@ def shrink(view: NDArray[Any], factor: float) -> View:
 def shrink_both(views: Views, factor: float) -> Views:
     """Both views, `factor` times smaller."""
     return shrink(views[0], factor), shrink(views[1], factor)
+
+
+def seen_at(
+    lies: Misalignment, u: NDArray[np.float32], v: NDArray[np.float32], shape: tuple[int, ...]
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return where a right view of this shape that `lies` so shows the points (u, v) of a level one, px."""
+    if lies == LEVEL:
+        return u, v
+    height, width = shape
+    x, y = u - np.float32((width - 1) / 2), v - np.float32((height - 1) / 2)
+    rotation = np.float32(lies.rotation)
+    at_v = (rotation + np.float32(lies.twist) * y) * x
+    at_v += v + np.float32(lies.offset) + np.float32(lies.scale) * y
+    return u + np.float32(lies.stretch) * x - rotation * y, at_v
 
 
 def block_means(pixels: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -139,7 +139,7 @@ def test_a_level_pair_of_an_empty_road_is_left_as_it_is(empty_road):
     assert match.doubt == ""
 
 
-@pytest.mark.parametrize(("larger_percent", "lower"), [(0.2, 0.0), (0.0, 0.4), (0.0, -2.0)])
+@pytest.mark.parametrize(("larger_percent", "lower"), [(0.2, 0.0), (0.0, 0.3), (0.0, 0.4), (0.0, -2.0)])
 def test_what_a_map_of_an_empty_road_hides_is_found_or_doubted(empty_road, larger_percent, lower):
     right = seen_by(empty_road.right, larger_percent=larger_percent, lower=lower)
 

@@ -18,16 +18,17 @@ def parts(offset=0.0, rotation=0.0, scale=0.0, corners=0.0, shape=SHAPE):
 
 @pytest.mark.parametrize("sign", [-1, 1])
 @pytest.mark.parametrize("place", range(4))
-def test_views_are_level_within_the_tolerance_and_twice_the_error(place, sign):
+@pytest.mark.parametrize("sure", [0.0, 2.0, 4.0])
+def test_views_are_level_within_the_tolerance_and_some_standard_errors(place, sign, sure):
     limits, errors = (0.2, 0.003, 0.004, 0.5), (0.1, 0.001, 0.002, 0.05)
-    tolerance = Tolerance(*limits)
+    tolerance = Tolerance(*limits, sure=sure)
 
     def one(value):
         return parts(*(sign * value if each == place else 0.0 for each in range(4)))
 
     assert is_level(one(0.99 * limits[place]), LEVEL, SHAPE, tolerance)
     assert not is_level(one(1.01 * limits[place]), LEVEL, SHAPE, tolerance)
-    wider = limits[place] + 2 * errors[place]
+    wider = limits[place] + sure * errors[place]
     assert is_level(one(0.99 * wider), parts(*errors), SHAPE, tolerance)
     assert not is_level(one(1.01 * wider), parts(*errors), SHAPE, tolerance)
 
@@ -139,15 +140,17 @@ def test_small_views_measure_in_pixels_of_the_whole(monkeypatch):
     assert small.closer.views[0] is whole[0]
     asked = []
 
-    def measure(texture, disparity, start, rounds):
-        asked.append((float(disparity.max()), disparity.shape, start, rounds))
+    def measure(texture, disparity, start, rounds, every):
+        asked.append((float(disparity.max()), disparity.shape, start, rounds, every))
         seen = Misalignment(1, 0.01, 0.02, 0.0004)
         return alignment.Measured(seen, seen, 0.5, 0.1)
 
     monkeypatch.setattr(alignment, "measure_misalignment", measure)
     found = small.measure(np.full((600, 800), 12, np.float32), Misalignment(3, 0.01, 0.02, 0.0001), 4)
 
-    assert asked == [(6, (300, 400), Misalignment(1.5, 0.01, 0.02, 0.0002), 4)]
+    assert asked == [(6, (300, 400), Misalignment(1.5, 0.01, 0.02, 0.0002), 4, 1)]
+    small.closer.measure(np.full((600, 800), 12, np.float32), LEVEL, 4)
+    assert asked[1] == (12, (600, 800), LEVEL, 4, 4)  # as many pixels
     assert found.misalignment == found.errors == Misalignment(2, 0.01, 0.02, 0.0002)
     assert (found.share, found.spread) == (0.5, 0.2)
     monkeypatch.setattr(alignment, "measure_misalignment", lambda *_: None)

@@ -1,6 +1,6 @@
 """How often a pair is matched until its views are level, with matches and measurements that are known."""
 
-from types import SimpleNamespace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -57,18 +57,23 @@ def test_a_few_rows_confirm_what_leaves_little_in_them():
 
 def test_what_is_level_needs_no_correction():
     assert stereo._worth_correcting(None, SHAPE) == LEVEL
-    assert stereo._worth_correcting(lies(0.1), SHAPE) == LEVEL
+    assert stereo._worth_correcting(lies(0.05), SHAPE) == LEVEL
     assert stereo._worth_correcting(lies(0.4), SHAPE) == Misalignment(0.4)
-    assert stereo._worth_correcting(lies(0.4, error=0.2), SHAPE) == LEVEL
+    assert stereo._worth_correcting(lies(0.4, error=0.1), SHAPE) == LEVEL
 
 
-def test_a_correction_that_leaves_little_is_kept():
+def test_level_is_believed_of_the_measurement_and_of_where_two_lead_to():
+    assert stereo._wanted(lies(2.1), Misalignment(2.4), SHAPE) == Misalignment(2.4)
+    assert stereo._wanted(lies(2.1), Misalignment(0.01), SHAPE) == LEVEL
+    assert stereo._wanted(lies(0.01), Misalignment(0.4), SHAPE) == LEVEL
+
+
+@pytest.mark.parametrize(("left", "spread", "kept"), [(0.29, 0.15, True), (0.31, 0.15, False)])
+def test_a_map_that_refinement_makes_right_is_kept(left, spread, kept):
     at = Misalignment(2.0)
-    assert stereo._wanted(lies(2.05), Misalignment(2.4), at, SHAPE) == at
-    assert stereo._wanted(lies(2.1), Misalignment(2.4), at, SHAPE) == Misalignment(2.4)  # a part is hidden
-    assert stereo._wanted(lies(2.05), Misalignment(0.1), at, SHAPE) == LEVEL
-    assert stereo._wanted(lies(0.1), Misalignment(0.4), LEVEL, SHAPE) == LEVEL
-    assert stereo._wanted(lies(0.4), Misalignment(0.4), LEVEL, SHAPE) == Misalignment(0.4)
+    found = replace(lies(2 + left, error=9.0), spread=spread)
+    assert stereo._is_kept(found, at, SHAPE) == kept
+    assert stereo._is_kept(replace(found, spread=2 * spread), Misalignment(2 + left / 2), SHAPE) == kept
 
 
 class Rig:
@@ -80,14 +85,14 @@ class Rig:
 
     @property
     def closer(self):
-        return SimpleNamespace(measure=lambda *given: self.measure(*given, closer=True))
+        return self
 
     def match(self, at, rows):
         self.matched.append((round(at.offset, 3), rows))
         return np.full(SHAPE, len(self.matched), np.float32)
 
-    def measure(self, disparity, at, rounds, closer=False):
-        self.measured.append((int(disparity[0, 0]), rounds, closer))
+    def measure(self, disparity, at, rounds):
+        self.measured.append((int(disparity[0, 0]), rounds))
         seen = self.offset(at.offset) if callable(self.offset) else self.offset
         return lies(seen - self.hidden * (seen - at.offset)) if self.tells else None
 
@@ -110,7 +115,7 @@ def test_a_level_pair_is_matched_once(monkeypatch, any_scene):
     rig = Rig(0.05)
     assert rig.run(monkeypatch, lies(0.0), any_scene=any_scene) == (0, "")
     assert rig.matched == [(0, ALL_ROWS)]
-    assert rig.measured == [(1, 2, False)]
+    assert rig.measured == [(1, 8)]
     assert rig.checked == (not any_scene)
 
 
@@ -120,11 +125,23 @@ def test_a_look_that_was_right_needs_one_match(monkeypatch):
     assert rig.matched == [(3.0, ALL_ROWS)]
 
 
+def test_what_a_look_missed_by_little_is_left_to_refinement(monkeypatch):
+    rig = Rig(3.0)
+    assert rig.run(monkeypatch, lies(2.8)) == (3.0, "")
+    assert rig.matched == [(2.8, ALL_ROWS)]
+
+
+def test_a_level_pair_that_the_look_took_for_uneven_is_matched_as_it_is(monkeypatch):
+    rig = Rig(0.02)
+    assert rig.run(monkeypatch, lies(0.2)) == (0, "")
+    assert rig.matched == [(0.2, ALL_ROWS), (0, ALL_ROWS)]
+
+
 def test_where_the_look_told_nothing_the_match_does(monkeypatch):
     rig = Rig(3.0)
     assert rig.run(monkeypatch) == (3.0, "")
     assert rig.matched == [(0, ALL_ROWS), (3.0, ALL_ROWS)]
-    assert rig.measured == [(1, 4, False), (1, 4, True), (2, 4, True)]
+    assert rig.measured == [(1, 8), (2, 8)]
 
 
 def test_what_each_map_hides_is_found_in_three_matches(monkeypatch):

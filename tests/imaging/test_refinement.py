@@ -8,6 +8,8 @@ import pytest
 
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.imaging import refinement, stereo
+from rollcli.imaging.alignment import level
+from rollcli.imaging.misalignment import Misalignment
 from rollcli.imaging.refinement import refined
 from rollcli.imaging.stereo import StereoOptions, match_pair
 from rollcli.simulate.draw import draw_specs
@@ -53,6 +55,21 @@ def test_an_error_that_changes_slowly_is_taken_away_and_the_plane_is_no_longer_t
     left = error(refined(tilted, seen(true, noise=1.5)), true)
     slope = np.polyfit(np.arange(left.shape[1]), left.mean(axis=0), 1)[0]
     assert abs(slope) < 0.0002
+
+
+@pytest.mark.parametrize(
+    "lies",
+    [Misalignment(0.4), Misalignment(rotation=-0.004), Misalignment(scale=0.004), Misalignment(0.2, 0.003)],
+)
+def test_a_right_view_that_lies_off_is_read_where_it_shows_the_points(lies):
+    true = plane()
+    left, right = seen(true)
+    off = level(right, lies.times(-1))
+    shifted = true - np.float32(0.3)
+
+    error_then = error(refined(shifted, (left, off), lies), true)[8:-8]
+    assert abs(error_then.mean()) < 0.03
+    assert np.abs(error_then).mean() < 0.7 * np.abs(error(refined(shifted, (left, off)), true)[8:-8]).mean()
 
 
 @pytest.mark.parametrize(("gain", "offset"), [(1.1, 0.0), (0.9, 5.0), (1.0, -12.0)])
@@ -120,7 +137,7 @@ def test_matched_roads_lie_nearer_to_where_they_are_and_so_do_their_angles(monke
     specs = draw_specs(8, scene="bare", roll=(-0.5, 0.5), size=(640, 480), seed=71, colour=False)
     for spec in specs:
         frame = render_frame(spec)
-        for name, step in (("smoothed", lambda disparity, _: disparity), ("refined", refined)):
+        for name, step in (("smoothed", lambda disparity, *_: disparity), ("refined", refined)):
             monkeypatch.setattr(stereo, "refined", step)
             found = match_pair(frame.left, frame.right, StereoOptions()).disparity
             road = frame.road & (abs(found - frame.disparity) < 1)
