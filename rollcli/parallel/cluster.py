@@ -79,7 +79,7 @@ class ClusterExecutor(Generic[Task, Result]):
         No scheduler or no worker answers, a worker has another rollcli, or does not see the files.
     """
 
-    def __init__(self, address: str, work: Work[Task, Result], shared: SharedPaths, threads: int = 1) -> None:
+    def __init__(self, address: str, work: Work[Task, Result], shared: SharedPaths, threads: int) -> None:
         _require_extra()
         from distributed import KilledWorker
 

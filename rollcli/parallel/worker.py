@@ -48,7 +48,7 @@ class Worker:
         The futures of the tasks that were sent and not answered, oldest first: the first one is running.
     """
 
-    def __init__(self, do: Callable[[Any], Any], keep_open: int | None, threads: int = 1) -> None:
+    def __init__(self, do: Callable[[Any], Any], keep_open: int | None, threads: int) -> None:
         spawn = multiprocessing.get_context("spawn")
         self.pending: deque[Any] = deque()
         try:

@@ -85,8 +85,9 @@ def _append(path, text):
 
 
 def _signals():
-    """The process, and how it takes the signals that stop a run."""
-    return os.getpid(), [signal.getsignal(each) is signal.SIG_IGN for each in (signal.SIGINT, signal.SIGTERM)]
+    """The process, the signals that it ignores, and those that never reach it."""
+    ignored = {each for each in signal.valid_signals() if signal.getsignal(each) is signal.SIG_IGN}
+    return os.getpid(), ignored, signal.pthread_sigmask(signal.SIG_BLOCK, ())
 
 
 def _raise(name):
