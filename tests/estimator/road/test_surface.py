@@ -144,6 +144,19 @@ def test_a_verge_beyond_the_edge_of_the_road_is_no_road(slope):
     assert covered[(np.abs(side) < 1) & (road > 0)].mean() > 0.95
 
 
+# of the height of the camera: at a hundredth the ground counts half, as `ProfileTuning.off_level` says
+@pytest.mark.parametrize(("share", "is_road"), [(0.004, True), (0.008, True), (0.0125, False), (0.03, False)])
+def test_ground_that_counts_half_as_much_as_the_lane_is_shown_as_road(share, is_road):
+    disparity = disparity_of(lambda x: share * CAMERA_HEIGHT * np.clip((x - 1.2) / 0.1, 0, 1))
+    to_the_right = (np.mgrid[:HEIGHT, :WIDTH][1] - (WIDTH - 1) / 2) * BASELINE / np.maximum(disparity, 1e-9)
+    step = (disparity > 8) & (to_the_right > 1.4) & (to_the_right < 2.6)
+
+    covered = surface_of(disparity).covers(disparity)
+
+    assert step.sum() > 20_000
+    assert covered[step].mean() > 0.95 if is_road else covered[step].mean() < 0.05
+
+
 def test_a_surface_that_crosses_the_road_without_rising_as_it_does_is_no_road():
     road, side = road_and_sides()
     crossing = np.abs(side + 1.8) < 0.5
