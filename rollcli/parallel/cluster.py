@@ -15,6 +15,7 @@ from rollcli import __version__
 from rollcli.errors import ClusterError, UsageError
 from rollcli.files.atomic import write_atomic
 from rollcli.files.existence import is_file, is_there
+from rollcli.files.storage import remove
 from rollcli.files.stores.locations import is_url
 from rollcli.files.stores.turns import computing
 from rollcli.parallel.in_order import Result, Task, Work
@@ -212,13 +213,15 @@ def _check_workers(client: Any, shared: SharedPaths) -> None:
     files = {path.absolute() for path in map(Path, shared.files) if is_file(path)}
     sizes = {str(path): path.stat().st_size for path in files}
     marks = [Path(folder).absolute() / ".rollcli-check" for folder in shared.folders if not is_url(folder)]
+    made: list[Path] = []
     try:
         for mark in marks:
             write_atomic(mark, b"")
+            made.append(mark)
         answers = client.run(probe, __version__, sizes, [str(mark) for mark in marks], on_error="return")
     finally:
-        for mark in marks:
-            mark.unlink(missing_ok=True)
+        for mark in made:
+            remove(str(mark))
     for worker, answer in answers.items():
         problem = answer if isinstance(answer, str) else f"cannot run rollcli {__version__}: {answer}"
         if problem:

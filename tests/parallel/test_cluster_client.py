@@ -13,7 +13,7 @@ pytest.importorskip("distributed", reason="the extra cluster is not installed")
 from distributed import KilledWorker
 
 from rollcli import __version__
-from rollcli.errors import ClusterError, UsageError
+from rollcli.errors import ClusterError, OutputError, UsageError
 from rollcli.files.stores import turns
 from rollcli.parallel import cluster
 from rollcli.parallel.cluster import ClusterExecutor, ClusterFuture, check_scheduler
@@ -121,6 +121,16 @@ def test_workers_are_asked_for_files_that_are_there_and_folders_that_are_no_urls
         )
     ]
     assert list((tmp_path / "up").iterdir()) == []
+
+
+def test_a_folder_that_cannot_be_written_is_named_and_no_mark_is_left_in_the_others(client, tmp_path):
+    (tmp_path / "file").write_bytes(b"")
+    shared = SharedPaths((), (str(tmp_path / "up"), str(tmp_path / "file" / "v"), str(tmp_path / "road")))
+    with pytest.raises(OutputError, match=r"file/v/\.rollcli-check: cannot be written: not a directory$"):
+        ClusterExecutor("tcp://far:1", WORK, shared, 1)
+    assert client.asked == []
+    assert len(client.closed) == 1
+    assert sorted(path.name for path in tmp_path.rglob("*")) == ["file", "up"]
 
 
 def test_a_task_that_killed_its_workers_is_lost(client):
