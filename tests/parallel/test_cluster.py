@@ -314,7 +314,7 @@ def test_what_is_no_address_is_refused_and_the_result_that_is_there_is_kept(tmp_
 def test_a_scheduler_without_workers_ends_the_run(tmp_path, monkeypatch):
     monkeypatch.setattr(cluster, "_FIRST_WORKER_S", 0.5)
     write_maps(tmp_path / "maps", 2)
-    here = {"host": "127.0.0.1", "protocol": "tcp", "dashboard_address": None}
+    here = {"host": "127.0.0.1", "protocol": "tcp", "dashboard_address": ":0"}
     with LocalCluster(n_workers=0, processes=False, **here) as empty:
         done = estimate_here(empty.scheduler_address, tmp_path)
     assert done.status == 1
