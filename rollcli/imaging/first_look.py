@@ -16,28 +16,27 @@ from rollcli.imaging.stereo_options import StereoOptions
 from rollcli.imaging.vertical_disparity import Measured, Texture, measure_misalignment
 from rollcli.imaging.views import Views, shrink_both
 
-_SMALLEST, _SMALL = 16_000, 30_000  # px of the views that are looked at, one after the other
+_PIXELS = 16_000  # of the views that are looked at
 _OPTIONS = StereoOptions(mode="3way", speckle_size=50, speckle_range=1)
 _ROUNDS = 6
 _NEAR = 0.25  # of the width: beyond it, so much of a view is hidden that half its size shows too little
-_STEP = 0.3  # px of the small view, anywhere: the end; the match at full size shows what is left
-_FAR = 0.5  # the same: what was matched so far off does not show the range
+# px of the small view, anywhere: the end. Larger views show what is left; half of it takes a quarter longer
+# and makes no angle better
+_STEP = 0.6
+_CLOSER_ROUNDS = 4  # of measuring at larger views
 _MARGIN = 1.1  # beyond the largest disparity seen, to search
-# Of the smallest views, which tell a scale to 0.2 %: level pairs need no larger look. Real rigs twist more
+# Of small views, which tell a scale to 0.2 %: level pairs need no closer look. Real rigs twist more
 _AS_GOOD_AS_LEVEL = Tolerance(offset=0.15, rotation=0.0005, scale=0.002, twist=0.4, sure=2.0)
 # px of the whole view; standard error of the offset. Above it small views cannot tell: 0.21 and more in dark
 # streets that are 0.3 px off, up to 0.11 on level roads of fine grain
 _TELLING_ERROR = 0.15
-# What the smallest views may say of a level pair with little texture. A map that was matched with it hides
-# half of what is wrong about it: larger views start from level again
-_MILD = Tolerance(offset=0.5, rotation=0.0015, scale=0.004, twist=0.8, sure=2.0)
 # From a start 3 px off, a view of little texture can end at an offset and a scale that deny each other. Its
 # scale tells, with blocks that do not agree or a larger view that does not: other starts then show which
 # leaves less. Of 288 warped pairs, wrong ends had errors from 0.018 px or steps from 1.4 px on; of the right
 # ones of such a scale, nine in ten had less
 _UNSURE_SCALE = 0.003
 _UNSURE_ERROR = 0.014  # px of the whole view; standard error of the offset
-_UNSURE_STEP = 1.2  # px of the whole view, anywhere; from what smaller views said
+_UNSURE_STEP = 1.2  # px of the whole view, anywhere; from what small views said
 _STARTS = (-4.0, 4.0)  # px of the whole view; offset of the further attempts
 
 
@@ -81,56 +80,48 @@ class _Pair(NamedTuple):
 
 def find_range(views: Views) -> int | None:
     """Disparities from 0 to this are worth a search, pixels; None where nothing can be matched."""
-    factor = size_factor(views[0].shape, _SMALLEST)
-    found = _match_small(shrink_both(views, factor), None)
+    factor = size_factor(views[0].shape, _PIXELS)
+    found = _match_small(shrink_both(views, factor))
     return None if found is None else _with_margin(found, factor)
 
 
 def first_look(small: SmallViews) -> FirstLook:
     """Find the range of a pair, and how its right view lies, coarse to fine."""
-    factor = size_factor(small.views[0].shape, _SMALLEST)
-    smallest = _Pair.of(small.views, factor)
-    first = _look(smallest, LEVEL)
-    plain = _plainly_level(first, factor * small.factor, small.shape)
+    factor = size_factor(small.views[0].shape, _PIXELS)
+    pair = _Pair.of(small.views, factor)
+    factor *= small.factor
+    first = _look(pair, LEVEL)
+    plain = _plainly_level(first, factor, small.shape)
     if plain is not None:
         return plain
-    first = _climb(smallest, LEVEL, first=first)
+    first = _climb(pair, LEVEL, first)
     look, sure = _closer(small, first, factor)
     if sure:
         return look
-    starts = (Misalignment(offset / (factor * small.factor)) for offset in _STARTS)
-    clearest = _clearest([first, *(_climb(smallest, start) for start in starts)])
+    starts = (Misalignment(offset / factor) for offset in _STARTS)
+    clearest = _clearest([first, *(_climb(pair, start) for start in starts)])
     return look if clearest is first else _closer(small, clearest, factor)[0]
 
 
-def _plainly_level(
-    found: _Small | None, factor: float, shape: tuple[int, ...], tolerance: Tolerance = _AS_GOOD_AS_LEVEL
-) -> FirstLook | None:
+def _plainly_level(found: _Small | None, factor: float, shape: tuple[int, ...]) -> FirstLook | None:
     """Return what was found where small views say level, as far as they tell; the match decides."""
     if found is None or found.measured is None:
         return None
     seen = found.measured.resized(factor)
-    if seen.errors.offset > _TELLING_ERROR or not is_level(seen.misalignment, seen.errors, shape, tolerance):
+    if seen.errors.offset > _TELLING_ERROR or not is_level(
+        seen.misalignment, seen.errors, shape, _AS_GOOD_AS_LEVEL
+    ):
         return None
     return FirstLook(_with_margin(found, factor), replace(seen, misalignment=LEVEL))
 
 
-def _closer(small: SmallViews, found: _Small | None, before: float) -> tuple[FirstLook, bool]:
-    """Look at larger views, from where those that are `before` times smaller have ended; is it sure?"""
+def _closer(small: SmallViews, found: _Small | None, factor: float) -> tuple[FirstLook, bool]:
+    """Measure at larger views, from where those that are `factor` times smaller have ended; is it sure?"""
     if found is None:
         return FirstLook(None, None), False
-    factor = size_factor(small.views[0].shape, _SMALL)
-    pair, top = _Pair.of(small.views, factor), found.top * before / factor
-    if _plainly_level(found, before * small.factor, small.shape, _MILD) is not None:
-        plain = _plainly_level(_look(pair, LEVEL, top), factor * small.factor, small.shape)
-        if plain is not None:
-            return plain, True
-    start = found.measured.misalignment.resized(before / factor) if found.measured else LEVEL
-    found = _climb(pair, start, top) or found
-    factor *= small.factor
-    measured = coarse = None if found.measured is None else found.measured.resized(factor)
-    if coarse is not None and not is_level(coarse.misalignment, coarse.errors, small.shape):
-        measured = small.measure(found.disparity, coarse.misalignment)
+    coarse = measured = None if found.measured is None else found.measured.resized(factor)
+    if coarse is not None:
+        measured = small.measure(found.disparity, coarse.misalignment, _CLOSER_ROUNDS)
     return FirstLook(_with_margin(found, factor), measured), _is_sure(coarse, measured, small.shape)
 
 
@@ -149,14 +140,12 @@ def _clearest(attempts: Iterable[_Small | None]) -> _Small | None:
     return min(some, key=lambda each: each.measured.spread if each.measured else math.inf, default=None)
 
 
-def _climb(
-    pair: _Pair, start: Misalignment, top: float | None = None, first: _Small | None = None
-) -> _Small | None:
+def _climb(pair: _Pair, start: Misalignment, first: _Small | None = None) -> _Small | None:
     """Level, match and measure in turn, until the right view lies still; `first` is what `start` gave."""
     shape = pair.views[0].shape
     found, at, approach = None, start, Approach(shape)
     for _ in range(_ROUNDS):
-        seen, first = first or _look(pair, at, top), None
+        seen, first = first or _look(pair, at), None
         if seen is None:
             return found
         found = seen
@@ -166,25 +155,21 @@ def _climb(
         if step < _STEP:
             return found
         at = approach.next(at, found.measured.misalignment)
-        if top is None and step < _FAR:
-            top = found.top
     return found
 
 
-def _look(pair: _Pair, at: Misalignment, top: float | None = None) -> _Small | None:
+def _look(pair: _Pair, at: Misalignment) -> _Small | None:
     """Level, match and measure once."""
     left, right = pair.views
-    matched = _match_small((left, level(right, at)), top)
+    matched = _match_small((left, level(right, at)))
     if matched is None:
         return None
     measured = measure_misalignment(pair.texture, matched.disparity, at)
     return _Small(matched.top, matched.disparity, measured)
 
 
-def _match_small(pair: Views, top: float | None) -> _Small | None:
-    """Match over the range that is known, or find it."""
-    if top is not None:
-        return _Small(top, _match(pair, _MARGIN * top + 2), None)
+def _match_small(pair: Views) -> _Small | None:
+    """Match over the range that is found to be enough."""
     half = shrink_both(pair, 2)
     rough = rough_largest(lambda count: _match(half, count), half[0].shape[1])
     width = pair[0].shape[1]

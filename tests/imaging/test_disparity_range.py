@@ -108,15 +108,6 @@ def test_candidates_that_change_with_the_search_are_no_range():
 VIEWS = (np.zeros((120, 160), np.uint8),) * 2
 
 
-def test_a_known_range_is_matched_a_tenth_and_two_pixels_wider(monkeypatch):
-    searched = []
-    monkeypatch.setattr(
-        first_look, "_match", lambda pair, count: searched.append(count) or np.zeros((120, 160))
-    )
-    found = first_look._match_small(VIEWS, 40.0)
-    assert (found.top, searched) == (40.0, [pytest.approx(46)])
-
-
 @pytest.mark.parametrize(
     ("rough", "start"), [(None, None), (19.9, 39.8), (20.0, None), (35.0, None)]
 )  # views at half the size are 80 px wide: a quarter of them are 20
@@ -126,6 +117,6 @@ def test_half_the_size_gives_the_range_of_what_is_not_near(monkeypatch, rough, s
     monkeypatch.setattr(
         first_look, "largest_disparity", lambda _, width, start=None: asked.append((width, start))
     )
-    assert first_look._match_small(VIEWS, None) is None
+    assert first_look._match_small(VIEWS) is None
     near = [(160, None)]
     assert asked == [80, *([(160, start)] if start else []), *near]

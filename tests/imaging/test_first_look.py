@@ -110,8 +110,8 @@ class Looks:
         self.offset, self.hidden = offset, hidden
         self.blind_from, self.none_from, self.asked = blind_from, none_from, []
 
-    def __call__(self, _pair, at, top=None):
-        self.asked.append((at.offset, top))
+    def __call__(self, _pair, at):
+        self.asked.append(at.offset)
         if len(self.asked) >= self.none_from:
             return None
         seen = self.offset - self.hidden * (self.offset - at.offset)
@@ -127,29 +127,23 @@ def climb(monkeypatch, looks, **given):
 
 
 def test_a_climb_ends_where_a_step_says_little(monkeypatch):
-    looks = Looks(0.29)
-    assert climb(monkeypatch, looks).measured.misalignment.offset == 0.29
-    assert looks.asked == [(0, None)]
-    looks = Looks(0.31)
-    assert climb(monkeypatch, looks).measured.misalignment.offset == pytest.approx(0.31)
-    assert looks.asked == [(0, None), (0.31, 31)]  # so near that its range is known
-    looks = Looks(0.6)
-    climb(monkeypatch, looks)
-    assert looks.asked == [(0, None), (0.6, None)]
-    looks = Looks(0.6)
-    climb(monkeypatch, looks, top=25.0)
-    assert looks.asked == [(0, 25.0), (0.6, 25.0)]
+    looks = Looks(0.59)
+    assert climb(monkeypatch, looks).measured.misalignment.offset == 0.59
+    assert looks.asked == [0]
+    looks = Looks(0.61)
+    assert climb(monkeypatch, looks).measured.misalignment.offset == pytest.approx(0.61)
+    assert looks.asked == [0, 0.61]
 
 
 def test_a_climb_begins_with_what_is_known_and_gives_up_after_six_rounds(monkeypatch):
     looks = Looks(5.0)
     climb(monkeypatch, looks, first=small(measured(2.0)))
-    assert looks.asked[0] == (2.0, None)
+    assert looks.asked[0] == 2.0
     rig = Looks(0)
 
-    def running(pair, at, top=None):
+    def running(pair, at):
         rig.offset = at.offset + 4.0 * (-1) ** len(rig.asked)
-        return rig(pair, at, top)
+        return rig(pair, at)
 
     assert climb(monkeypatch, running) is not None
     assert len(rig.asked) == 6
@@ -176,74 +170,31 @@ class Whole:
     def __init__(self):
         self.asked = []
 
-    def measure(self, disparity, start):
-        self.asked.append((disparity, start))
+    def measure(self, disparity, start, rounds):
+        self.asked.append((disparity, start, rounds))
         return measured(0.7)
 
 
-BEFORE = 4.0  # the smallest views are so many times smaller than those of `Whole`
-AFTER = math.sqrt(240 * 320 / 30_000)  # and the larger ones, of 30,000 px
+BEFORE = 8.0  # the small views are so many times smaller than the whole ones
 
 
-def closer(monkeypatch, found, level_look=None, climbed=None):
-    asked = []
-    monkeypatch.setattr(module, "_look", lambda _, at, top: asked.append(("look", at, top)) or level_look)
-    monkeypatch.setattr(module, "_climb", lambda _, at, top: asked.append(("climb", at, top)) or climbed)
+def test_without_a_small_match_larger_views_are_not_measured():
     whole = Whole()
+    assert module._closer(whole, None, BEFORE) == (module.FirstLook(None, None), False)
+    look, sure = module._closer(whole, small(None, top=8.0), BEFORE)
+    assert (look.measured, sure) == (None, False)
+    assert look.range == math.ceil(1.1 * 8 * BEFORE) + 8
+    assert not whole.asked
+
+
+def test_what_small_views_see_is_measured_at_larger_ones():
+    whole, found = Whole(), small(measured(0.1, error=0.001), top=21.0)
+
     look, sure = module._closer(whole, found, BEFORE)
-    return look, sure, asked, whole.asked
 
-
-def test_without_a_small_match_larger_views_are_not_looked_at(monkeypatch):
-    assert closer(monkeypatch, None) == (module.FirstLook(None, None), False, [], [])
-
-
-def test_what_may_be_level_is_looked_at_from_level_again(monkeypatch):
-    """0.04 px of the smallest views are 0.32 of the whole ones: neither level nor far off."""
-    found = small(measured(0.04, error=0.001), top=8.0)
-    top = 8 * BEFORE / AFTER
-
-    look, sure, asked, again = closer(monkeypatch, found, small(measured(0.01), top=21.0))
-
-    assert (sure, asked, again) == (True, [("look", LEVEL, pytest.approx(top))], [])
-    assert look.measured.misalignment == LEVEL
-    assert look.measured.errors.offset == pytest.approx(0.01 * 2 * AFTER)
-    assert look.range == math.ceil(1.1 * 21 * 2 * AFTER) + 8
-
-    climbed = small(measured(0.2), top=22.0)
-    look, _, asked, _ = closer(monkeypatch, found, small(measured(0.2), top=21.0), climbed)
-    start = Misalignment(pytest.approx(0.04 * BEFORE / AFTER), 0.0, 0.0, 0.0)
-    assert asked == [("look", LEVEL, pytest.approx(top)), ("climb", start, pytest.approx(top))]
-    assert look.range == math.ceil(1.1 * 22 * 2 * AFTER) + 8
-
-
-def test_what_lies_off_is_climbed_from_where_the_smallest_views_ended(monkeypatch):
-    found, climbed = small(measured(0.4, error=0.001), top=8.0), small(measured(1.0), top=21.0)
-
-    look, sure, asked, again = closer(monkeypatch, found, climbed=climbed)
-
-    assert [step for step, _, _ in asked] == ["climb"]
-    assert asked[0][1].offset == pytest.approx(0.4 * BEFORE / AFTER)
-    # what is not level is measured once more, in the whole views' pixels
-    assert again == [(climbed.disparity, climbed.measured.misalignment.resized(2 * AFTER))]
-    assert look.measured == measured(0.7)
+    assert whole.asked == [(found.disparity, Misalignment(0.1 * BEFORE), 4)]  # pixels of the whole views
+    assert look == module.FirstLook(math.ceil(1.1 * 21 * BEFORE) + 8, measured(0.7))
     assert sure
-
-
-def test_what_a_climb_finds_level_is_not_measured_again(monkeypatch):
-    found, climbed = small(measured(0.4, error=0.001)), small(measured(0.01), top=21.0)
-
-    look, _, _, again = closer(monkeypatch, found, climbed=climbed)
-
-    assert not again
-    assert look.measured == climbed.measured.resized(2 * AFTER)
-
-
-def test_a_climb_that_finds_nothing_leaves_what_was_found(monkeypatch):
-    look, sure, asked, again = closer(monkeypatch, small(None, top=8.0))
-    assert [step for step, _, _ in asked] == ["climb"]
-    assert asked[0][1] == LEVEL
-    assert (look.measured, sure, again) == (None, False, [])
 
 
 class Attempts:
@@ -261,7 +212,7 @@ class Attempts:
         return self.found[round(start.offset * 2 * math.sqrt(240 * 320 / 16_000), 6)]
 
     def look(self, _, found, before):
-        assert before == pytest.approx(math.sqrt(240 * 320 / 16_000))
+        assert before == pytest.approx(2 * math.sqrt(240 * 320 / 16_000))
         self.closer.append(found)
         return module.FirstLook(len(self.closer), found.measured), self.sure
 
