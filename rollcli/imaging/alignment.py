@@ -5,7 +5,7 @@ little, and an offset of 8 pixels is one of 2 there. After the match it is measu
 """
 
 import math
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 from functools import cached_property
 
 import cv2
@@ -54,7 +54,7 @@ def is_level(
     """Tell whether views of this shape that lie so, with these standard errors, are within a tolerance."""
     corner = shape[0] * shape[1] / 4
     limits = (tolerance.offset, tolerance.rotation, tolerance.scale, tolerance.twist / corner)
-    parts = zip(astuple(lies), astuple(errors), limits, strict=True)
+    parts = zip(lies.parts, errors.parts, limits, strict=True)
     return all(abs(value) < limit + tolerance.sure * error for value, error, limit in parts)
 
 

@@ -1,7 +1,7 @@
 """How the right view of a pair lies against the left one; import-light, since run records read it too."""
 
 import math
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 
 # A scale this small is as likely a bend of the rows that a lens has left. On KITTI vertical disparities grow
 # by 0.03 to 0.1 % down the image; lidar says that nothing of it is in the horizontal ones.
@@ -36,9 +36,14 @@ class Misalignment:
     scale: float = 0.0
     twist: float = 0.0
 
+    @property
+    def parts(self) -> tuple[float, float, float, float]:
+        """The four numbers; `dataclasses.astuple` takes ten times and more."""
+        return self.offset, self.rotation, self.scale, self.twist
+
     def __add__(self, other: "Misalignment") -> "Misalignment":
         """Both, one after the other, to first order."""
-        return Misalignment(*(a + b for a, b in zip(astuple(self), astuple(other), strict=True)))
+        return Misalignment(*(a + b for a, b in zip(self.parts, other.parts, strict=True)))
 
     def __sub__(self, other: "Misalignment") -> "Misalignment":
         """Return what is left of this after the other is taken away, to first order."""
@@ -46,7 +51,7 @@ class Misalignment:
 
     def times(self, factor: float) -> "Misalignment":
         """Return this misalignment, `factor` times as much."""
-        return Misalignment(*(factor * each for each in astuple(self)))
+        return Misalignment(*(factor * each for each in self.parts))
 
     def resized(self, factor: float) -> "Misalignment":
         """Return this misalignment, of views `factor` times as large."""

@@ -190,8 +190,8 @@ class _Blocks:
     def __init__(self, texture: Texture, disparity: Floats, every: int = 1) -> None:
         self._right = texture.right
         known = (disparity > 0).astype(np.float32)
-        row, column = np.ogrid[: known.shape[0] // BLOCK, : known.shape[1] // BLOCK]
-        looked_at = (row + 2 * column) % every == 0
+        row, column = (np.arange(side // BLOCK) for side in known.shape)
+        looked_at = (row[:, None] + 2 * column) % every == 0
         self.count = int(np.count_nonzero(looked_at))
         places = looked_at & (block_means(known) > _KNOWN) & _may_tell(texture.down)
 
