@@ -23,6 +23,7 @@ from rollcli.files.stores.locations import is_url
 from rollcli.files.stores.parts import part_names, read_parts
 
 _CHUNK = 300  # rows that are held as text: twenty thousand do not fit into a cache, and take a third longer
+_MOST_SPACE = 1000  # empty lines before what tells the format
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -143,10 +144,12 @@ def _opened(path: str) -> Iterator[TextIO]:
 
 def _cells(stream: TextIO, path: str, wanted: Sequence[str]) -> tuple[list[str], Iterator[tuple[Any, ...]]]:
     """Return the names of the columns that are there, and for each row its line and their cells."""
-    first = stream.readline().removeprefix("\ufeff")
-    lines = chain([first], stream)
+    start = [stream.readline().removeprefix("\ufeff")]
+    while start[-1].isspace() and len(start) < _MOST_SPACE:
+        start.append(stream.readline())
+    lines = chain(start, stream)
     names = ["file", "status", "method", *wanted]
-    if first.lstrip().startswith("{"):
+    if start[-1].lstrip().startswith("{"):
         return names, (
             (number, *map(values.get, names)) for number, values in json_rows(_by_newline(lines), path)
         )

@@ -103,3 +103,11 @@ def test_the_grid_is_centred_and_reaches_one_along_the_longer_side():
     grid = Grid.of_shape(height=101, width=201)
     assert (grid.centre_u, grid.centre_v) == (100, 50)
     assert (0 - grid.centre_u) / grid.scale == pytest.approx(-1, abs=0.01)
+
+
+def test_what_is_subtracted_leaves_nothing_of_a_plane_wherever_its_pixels_lie():
+    v, u = np.mgrid[:90, :160]
+    plane = 40 + 0.11 * u + 0.23 * v
+    slanted = map_moments(np.where(np.abs(u - 1.5 * v) < 25, plane, 0))  # where p and q go together
+    assert slanted.rr < 0.01**2 * slanted.weight  # the plane is rounded
+    assert (slanted.plane[1], slanted.plane[2]) == pytest.approx((0.11 * 80, 0.23 * 80), abs=0.01)

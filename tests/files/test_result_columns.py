@@ -194,3 +194,11 @@ def test_a_row_names_a_file(tmp_path, line, said):
     for read in (lambda: read_columns(str(path), ["roll_deg"]), lambda: read_result(path)):
         with pytest.raises(InputError, match=rf"rolls: {said}$"):
             read()
+
+
+def test_empty_lines_before_json_are_no_other_format(tmp_path):
+    path = tmp_path / "rolls.jsonl"
+    rows = [Row(f"{place}.png", status="ok", roll_deg=float(place)) for place in range(3)]
+    path.write_bytes(b"\n \r\n\n" + b"".join(format_row(row, "jsonl") for row in rows))
+    assert read_columns(str(path), ["roll_deg"]).numbers["roll_deg"].tolist() == [0.0, 1.0, 2.0]
+    assert [row.file for row in read_result(path)] == ["0.png", "1.png", "2.png"]
