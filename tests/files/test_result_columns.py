@@ -201,4 +201,4 @@ def test_empty_lines_before_json_are_no_other_format(tmp_path):
     rows = [Row(f"{place}.png", status="ok", roll_deg=float(place)) for place in range(3)]
     path.write_bytes(b"\n \r\n\n" + b"".join(format_row(row, "jsonl") for row in rows))
     assert read_columns(str(path), ["roll_deg"]).numbers["roll_deg"].tolist() == [0.0, 1.0, 2.0]
-    assert [row.file for row in read_result(path)] == ["0.png", "1.png", "2.png"]
+    assert [row.file for row in read_result(path).rows] == ["0.png", "1.png", "2.png"]
