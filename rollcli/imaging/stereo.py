@@ -168,8 +168,9 @@ def _match_levelled(
     any_scene: bool,
 ) -> tuple[NDArray[np.float32], Misalignment, str]:
     """Match once the views are level; the map, what was corrected, and why that may be wrong."""
-    at, approach = _worth_correcting(look.measured, small.shape), Approach(small.shape)
-    for _ in range(_MATCHES):
+    looked_at = _worth_correcting(look.measured, small.shape)
+    at, approach = looked_at, Approach(small.shape)
+    for matched in range(_MATCHES):
         disparity = match(at, rows)
         measured = small.closer.measure(disparity, at, _ROUNDS)
         if not any_scene:
@@ -187,6 +188,8 @@ def _match_levelled(
         if wanted != LEVEL and _is_kept(measured, at, small.shape):
             return disparity, measured.misalignment, _doubt(measured.misalignment, measured)
         at = wanted
+        if matched == 1 and looked_at != LEVEL:  # which may have led astray
+            at, approach = LEVEL, Approach(small.shape)
     return disparity, at, NOT_LEVELLED
 
 

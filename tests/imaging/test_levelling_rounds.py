@@ -156,6 +156,12 @@ def test_a_pair_that_runs_away_is_given_up_after_four_matches(monkeypatch):
     assert len(rig.matched) == 4
 
 
+def test_a_pair_that_a_look_led_astray_is_matched_as_it_is_too(monkeypatch):
+    rig = Rig(lambda at: at + 1.0 if at else 0.0)
+    assert rig.run(monkeypatch, lies(3.0)) == (0, "")
+    assert [round(at) for at, _ in rig.matched] == [3, 4, 0]
+
+
 def test_where_nothing_can_be_compared_that_is_said(monkeypatch):
     assert Rig(1.0, tells=False).run(monkeypatch) == (0, TOO_LITTLE)
 
