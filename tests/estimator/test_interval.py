@@ -1,6 +1,7 @@
 """The interval holds the truth as often as it says, and the jackknife is that of refitting."""
 
 import math
+from statistics import NormalDist
 
 import numpy as np
 import pytest
@@ -8,13 +9,13 @@ import pytest
 from rollcli.errors import UsageError
 from rollcli.estimator.energy import Energy
 from rollcli.estimator.estimate import estimate_roll
-from rollcli.estimator.interval import jackknife
+from rollcli.estimator.interval import Jackknife, interval_of, jackknife
 from rollcli.estimator.methods import DEFAULT_SOLVER
 from rollcli.estimator.moments import point_moments
 from rollcli.estimator.request import Request
 from rollcli.estimator.selection import select_pixels
 from rollcli.estimator.solvers.exact import exact
-from rollcli.estimator.tuning import TUNING
+from rollcli.estimator.tuning import TUNING, IntervalTuning
 from rollcli.estimator.validity import CheckedMap
 from tests.estimator.synthetic_maps import flat_road
 
@@ -104,3 +105,44 @@ def test_the_jackknife_is_what_refitting_without_each_band_gives(roll_deg):
     found = -jackknife(surface, theta, TUNING.interval).bands[:, 3]
 
     np.testing.assert_allclose(found, changes, rtol=0.1, atol=0.05 * np.abs(changes).max())
+
+
+def knife(bands=(0.0,), columns=(0.0,), white=0.0, freedom=(5.0, 5.0), **parts):
+    """A jackknife whose groups change theta alone."""
+    changes = [np.array([[0, 0, 0, change] for change in group]) for group in (bands, columns)]
+    others = {"lateral": 0.0, "depth": 0.0, "bend": 0.0, "camber": None} | parts
+    return Jackknife(*changes, np.diag([0, 0, 0, white]), freedom, **others)
+
+
+@pytest.mark.parametrize("freedom", range(1, 13))
+def test_groups_widen_it_as_students_t_does(freedom):
+    bands, columns, _ = knife(bands=(0.003, -0.004), columns=(2,), freedom=(freedom, freedom)).spreads()
+    # the density of t, of which 2.5 % lie beyond the quantile
+    factor = math.gamma((freedom + 1) / 2) / (math.sqrt(freedom * math.pi) * math.gamma(freedom / 2))
+    t = np.linspace(0, bands / 0.005, 20001)
+    density = factor * (1 + t * t / freedom) ** (-(freedom + 1) / 2)
+    inside = np.sum(density[1:] + density[:-1]) / 2 * t[1]
+    assert inside == pytest.approx(0.475, abs=2e-5)
+    assert columns / 2 == pytest.approx(bands / 0.005)
+
+
+def test_between_whole_degrees_of_freedom_t_is_interpolated_and_many_are_the_most_that_are_known():
+    spread = {
+        freedom: knife(bands=(1,), freedom=(freedom, 5)).spreads()[0] for freedom in (3, 3.5, 4, 12, 40)
+    }
+    assert spread[3.5] == pytest.approx((spread[3] + spread[4]) / 2)
+    assert spread[40] == spread[12]
+
+
+def test_the_textbooks_part_is_that_of_a_normal_distribution():
+    *_, white = knife(white=0.25).spreads()
+    assert white == pytest.approx(NormalDist().inv_cdf(0.975) * 0.5, rel=1e-4)
+
+
+def test_its_parts_add_as_independent_errors_do():
+    tuning = IntervalTuning(white=0.5, factor=2.0, lateral=3.0, depth=5.0, bend=7.0, slant=0.4)
+    one = knife((0.3,), (0.4,), 0.09, (12.0, 12.0), lateral=0.01, depth=0.02, bend=0.03)
+    found = interval_of(one, math.radians(-30), 0.2, tuning)
+    noise = 2 * (1 + 0.4 * 0.5) * math.hypot(2.179 * 0.3, 2.179 * 0.4, 0.5 * 1.96 * 0.3)
+    assert found.noise == pytest.approx(noise)
+    assert found.half_width == pytest.approx(math.hypot(noise, 0.03, 0.1, 0.21, 1.96 * 0.2))
