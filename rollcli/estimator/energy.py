@@ -118,7 +118,7 @@ class Energy:
         energy = cls(
             n, peak, parabolic, centred, plane, rest, _rotations() @ np.array(sources + residual + higher)
         )
-        if energy.slope_energy + abs(np.array(residual)).max() ** 2 / n <= 1e-18 * n * max(peak, 1e-300) ** 2:
+        if energy.slope_energy + abs(np.array(residual)).max() ** 2 / n <= 1e-18 * n * peak**2:
             raise EstimationError(SAME_EVERYWHERE)
         return energy
 

@@ -178,3 +178,29 @@ def test_all_weight_masked_out_is_no_valid_pixel():
     disparity = bent_road(5)
     with pytest.raises(EstimationError, match="no valid pixel"):
         Energy.of(map_moments(disparity, np.zeros(disparity.shape, bool)), 90.0)
+
+
+@repeatable
+@given(random_maps(), angles)
+def test_the_numerator_of_the_gradient_is_that_over_the_determinant_of_the_normal_equations(disparity, theta):
+    energy = energy_of(disparity)
+    grid = energy.grid
+    v, u = np.nonzero(disparity > 0)
+    y = ((v - grid.centre_v) * math.cos(theta) - (u - grid.centre_u) * math.sin(theta)) / grid.scale
+    powers = np.vander(y, 3)
+    determinant = np.linalg.det(powers.T @ powers) / len(y)
+    terms, numerator = energy.at_with_numerator(theta)
+    scale = np.abs(energy.at(ANGLES).gradient).max() * np.sum(y**2) ** 2 * np.sum(y**4) ** 2
+    assert numerator == pytest.approx(terms.gradient * determinant**2, rel=1e-6, abs=1e-12 * scale)
+
+
+@pytest.mark.parametrize(("times", "enough"), [(0.9, False), (1.1, True)])
+def test_a_map_is_the_same_everywhere_when_it_bends_by_less_than_rounding(times, enough):
+    v, u = np.mgrid[:60, :60] - 29.5
+    bend = u * v / np.sum((u * v) ** 2) * 30**2  # of which sum p q d is 1 on normalised coordinates
+    least = 1e-9 * 3600 * 100  # a billionth of the disparity for each pixel
+    if enough:
+        assert energy_of(100 + times * least * bend).rest > 0
+    else:
+        with pytest.raises(EstimationError, match="the same everywhere"):
+            energy_of(100 + times * least * bend)

@@ -1,12 +1,14 @@
 """Which pixels can determine a roll at all."""
 
+import math
+
 import numpy as np
 import pytest
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.methods import METHODS
-from rollcli.estimator.validity import require_pixels
+from rollcli.estimator.validity import CheckedMap, require_pixels
 from tests.estimator.synthetic_maps import bent_road
 
 V, U = np.mgrid[:120, :160]
@@ -39,3 +41,11 @@ def test_a_constant_map_is_refused_by_every_method(value, method):
 
 def test_three_rows_and_columns_are_enough():
     assert require_pixels((U % 60 == 0) & (V < 100)) == 300
+
+
+def test_what_is_beyond_the_largest_disparity_is_no_data():
+    disparity = np.full((20, 20), 9.0)
+    disparity[0, :3] = 0.99e15, 1.01e15, math.nan
+    found = CheckedMap.of(disparity, None)
+    assert found.count == 398
+    assert found.valid[0, 0]

@@ -113,3 +113,13 @@ def test_areas_that_still_change_after_the_last_round_have_not_converged():
     pixels = iterative(curved, curved > 0)
     assert pixels.status is SolverStatus.STEP_LIMIT
     assert pixels.iterations == 20
+
+
+def test_an_area_of_which_half_is_valid_is_enough():
+    road = bent_road(4, bend=0, width=80, height=60)
+    half = np.where(np.arange(80) % 2 == 0, road, 0)
+    found, _ = areas(half)
+    assert math.degrees(found.theta) == pytest.approx(4, abs=1e-6)
+    half[::4, ::8] = 0
+    with pytest.raises(EstimationError, match="at least half valid"):
+        areas(half)

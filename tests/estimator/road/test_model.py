@@ -88,3 +88,10 @@ def test_camber_is_not_extrapolated_far_to_the_side_or_above_the_horizon():
 
     assert far == pytest.approx(20 * (1 + 0.01 * 16))
     assert above == -20
+
+
+def test_a_bulge_is_half_the_disparity_times_the_side_squared_however_small_they_are():
+    road = np.array([1e-3, 0.05, 0.5, 3.0])
+    side = np.array([0.5, -1.0, 2.0, 3.5])
+    model = RoadModel(0.0, (0.0, 0.02, 0.0))
+    np.testing.assert_allclose(model.bulge(side * road / 0.02, road), road / 2 * side**2)

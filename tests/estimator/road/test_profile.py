@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from rollcli.estimator.road.profile import read_profile
+from rollcli.estimator.road.profile import Profile, read_profile
 from rollcli.estimator.road.tuning import ProfileTuning
 
 SIDES = np.array([0.125, 0.375, 0.625, 0.875, 1.125, 1.375, 1.625, 1.875, 2.125, 2.375])  # middles of bins
@@ -89,3 +89,31 @@ def test_no_pixel_leaves_the_lane_to_itself():
 
     assert found[0] == pytest.approx(1)
     assert math.isfinite(found.sum())
+    assert len(read_profile(none, none, ProfileTuning()).weights) == 20
+
+
+def test_the_left_is_the_mirror_image_of_the_right():
+    rng = np.random.default_rng(9)
+    side = rng.uniform(-2.5, 2.5, 20000)
+    height = 0.03 * np.maximum(0, side - 0.6) - 0.02 * np.maximum(0, -side - 1.1)
+    one, other = (read_profile(sign * side, height, ProfileTuning()) for sign in (1, -1))
+    np.testing.assert_allclose(one.weights, other.weights[::-1])
+    np.testing.assert_allclose(one.at(SIDES), other.at(-SIDES))
+    assert len(set(one.weights.round(3))) > 8
+
+
+def test_between_the_middles_of_bins_the_level_is_interpolated_and_beyond_the_last_it_stays():
+    profile = Profile(np.linspace(0, 0.95, 20), ProfileTuning())
+    sides = np.linspace(-2.375, 2.375, 96)
+    np.testing.assert_allclose(profile.level(sides), np.linspace(0, 0.95, 96), atol=1e-12)
+    np.testing.assert_allclose(profile.level(np.array([-9.0, 9.0, -np.inf, np.inf])), [0, 0.95, 0, 0.95])
+
+
+def test_a_bin_with_too_few_pixels_has_no_height():
+    tuning = ProfileTuning()
+    middle = np.full(50, 0.125)
+    for pixels, level in ((tuning.bin_pixels - 1, 1), (tuning.bin_pixels, 0.5)):
+        side = np.concatenate([middle, np.full(pixels, 1.125)])
+        found = read_profile(side, np.where(side > 1, tuning.off_level, 0), tuning)
+        assert found.level(np.array([1.125])) == pytest.approx(level)
+        assert len(found.weights) == 20

@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from rollcli.estimator.road.subsample import NO_SLOPE, rising, take_sample
+from rollcli.errors import EstimationError
+from rollcli.estimator.road.subsample import NO_SLOPE, reach_of, rising, take_sample
 from rollcli.estimator.road.tuning import ROAD_TUNING
 from rollcli.simulate.render import true_disparity
 from rollcli.simulate.spec import FrameSpec
@@ -98,3 +99,47 @@ def test_a_sparse_map_is_sampled_more_finely(size):
     found = len(take_sample(sparse).d)
     assert found > 3 * 0.1 * len(take_sample(whole).d)
     assert found < 2 * ROAD_TUNING.sample.finer_share * ROAD_TUNING.sample.pixels  # not all there are
+
+
+def pixels_alone(count):
+    """A map of which so many pixels are valid."""
+    disparity = np.zeros((40, 40))
+    disparity[10:30, 10:30].flat[:count] = 20.0
+    return disparity
+
+
+def test_as_many_pixels_as_are_needed_are_enough_and_one_less_is_not():
+    least = ROAD_TUNING.sample.least_pixels
+    assert len(take_sample(pixels_alone(least)).d) == least
+    with pytest.raises(EstimationError, match=f"only {least - 1} valid pixels"):
+        take_sample(pixels_alone(least - 1))
+
+
+def test_a_pixel_half_of_whose_neighbours_agree_is_no_noise():
+    v, u = np.mgrid[:480, :640]
+    stripes = 50.0 + 10 * (u // 3 % 2)  # neighbours are 3 px away: those above and below are alike
+    noise = np.random.default_rng(1).uniform(1, 20, u.shape)
+    sample = take_sample(np.where(v < 180, stripes, noise))
+    assert sample.typical >= 50
+
+
+@pytest.mark.parametrize("size", [(480, 640), (375, 1242), (1080, 1920), (90, 100)])
+def test_places_are_where_the_sampled_disparities_are(size):
+    disparity = np.random.default_rng(2).uniform(10, 20, size).astype(np.float32)
+    sample = take_sample(disparity)
+    places = sample.places(np.arange(len(sample.d)))
+    np.testing.assert_array_equal(disparity.ravel()[places], sample.d)
+    v, u = np.divmod(places, size[1])
+    np.testing.assert_allclose(sample.x, (u - (size[1] - 1) / 2) / (size[1] / 2), atol=1e-6)
+    np.testing.assert_allclose(sample.y, (v - (size[0] - 1) / 2) / (size[1] / 2), atol=1e-6)
+    assert sample.pitch == pytest.approx(sample.step / (size[1] / 2))
+    assert sample.step == 1 or sample.step % 3 != 0
+    assert min(u.min(), v.min(), size[1] - 1 - u.max(), size[0] - 1 - v.max()) >= sample.reach
+
+
+@pytest.mark.parametrize(
+    ("size", "reach"),
+    [((480, 640), 3), ((600, 1240), 4), ((2000, 3100), 10), ((5000, 9000), 16), ((16, 700), 2), ((7, 9), 1)],
+)
+def test_neighbours_are_as_far_away_as_the_size_of_the_map_allows(size, reach):
+    assert reach_of(*size, ROAD_TUNING.sample) == reach

@@ -153,3 +153,9 @@ def test_pixels_in_a_narrow_strip_are_no_harder(seed, slope, offset):
         return  # too short to hold more than a line
     scale = energy.rest + energy.slope_energy
     assert minima(energy)[0].energy <= energy.at(DENSE).value.min() + 1e-7 * scale
+
+
+def test_minima_are_in_order_however_small_their_energies():
+    large, small = minima(energy_of(noise_map(3))), minima(energy_of(1e-4 * noise_map(3)))
+    assert len(large) > 1
+    np.testing.assert_allclose([m.theta for m in small], [m.theta for m in large], atol=1e-9)

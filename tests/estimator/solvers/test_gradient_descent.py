@@ -7,7 +7,8 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from rollcli.estimator.methods import SolverSettings
+from rollcli.estimator.energy import Terms
+from rollcli.estimator.methods import LAMBDA0, SolverSettings
 from rollcli.estimator.solvers.exact import exact, minima
 from rollcli.estimator.solvers.gradient_descent import gradient_descent
 from rollcli.estimator.solvers.solution import SolverStatus
@@ -93,3 +94,68 @@ def test_where_rounding_hides_the_fall_it_is_stuck_beside_the_minimum_and_says_s
     assert found.status is SolverStatus.STUCK
     assert abs(there.gradient / there.curvature) < 1e-6
     assert there.value <= energy.at(0.0).value + 1e-14 * (energy.rest + energy.slope_energy)
+
+
+class Curve:
+    """An energy whose derivatives are written out, and the angles at which it was asked for."""
+
+    normaliser, rest, slope_energy = 1.0, 0.0, 0.0
+
+    def __init__(self, value, gradient, curvature):
+        self.functions, self.asked = (value, gradient, curvature), []
+
+    def at(self, theta):
+        self.asked.append(theta)
+        return Terms(*(function(theta) for function in self.functions))
+
+
+def parabola(lowest=1.0, curvature=2.0):
+    return Curve(
+        lambda theta: curvature / 2 * (theta - lowest) ** 2,
+        lambda theta: curvature * (theta - lowest),
+        lambda theta: curvature,
+    )
+
+
+@pytest.mark.parametrize("lowest", [-1.0, 1.0])
+def test_no_step_is_longer_than_20_degrees(lowest):
+    curve = parabola(lowest)
+    assert gradient_descent(curve, SolverSettings(1e-9, lambda0=1e6)).theta == pytest.approx(lowest)
+    steps = np.diff(curve.asked)
+    assert np.abs(steps).max() == pytest.approx(math.radians(20))
+    assert steps[0] == pytest.approx(math.copysign(math.radians(20), lowest))
+
+
+def test_a_step_that_climbs_is_halved_until_it_does_not():
+    curve = parabola(lowest=0.04)
+    gradient_descent(curve, SolverSettings(1e-9, lambda0=1e6))
+    np.testing.assert_allclose(curve.asked[:5], np.radians([0, 20, 10, 5, 2.5]))
+    assert curve.asked[5] == pytest.approx(0.04)  # on a parabola the secant rule is exact
+
+
+def test_newtons_rate_reaches_the_lowest_point_of_a_parabola_at_once():
+    curve = parabola(lowest=0.2)
+    assert gradient_descent(curve, SolverSettings(1e-9, lambda0="auto")).iterations == 2
+    assert curve.asked[1] == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize("curvature", [0.0, -1.0])
+def test_where_it_does_not_curve_upward_newtons_rate_is_the_default(curvature):
+    curve = Curve(lambda theta: -theta, lambda theta: -1e-3, lambda theta: curvature)
+    gradient_descent(curve, SolverSettings(1e-9, lambda0="auto"))
+    assert curve.asked[1] == pytest.approx(1e-3 * LAMBDA0)
+
+
+def test_it_ends_after_100_angles():
+    curve = Curve(lambda theta: -theta, lambda theta: -1e-3, lambda theta: 0.0)
+    found = gradient_descent(curve, SolverSettings(1e-9))
+    assert (found.iterations, found.status) == (100, SolverStatus.STEP_LIMIT)
+    assert len(curve.asked) == 101
+
+
+def test_where_a_longer_step_falls_more_steeply_the_rate_is_doubled():
+    curve = Curve(lambda theta: -(theta**2) - theta, lambda theta: -2 * theta - 1, lambda theta: -2.0)
+    gradient_descent(curve, SolverSettings(1e-9, lambda0=0.01))
+    first, second = np.diff(curve.asked[:3])
+    assert first == pytest.approx(0.01)
+    assert second == pytest.approx(0.02 * (1 + 2 * 0.01))
