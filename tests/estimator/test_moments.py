@@ -111,3 +111,10 @@ def test_what_is_subtracted_leaves_nothing_of_a_plane_wherever_its_pixels_lie():
     slanted = map_moments(np.where(np.abs(u - 1.5 * v) < 25, plane, 0))  # where p and q go together
     assert slanted.rr < 0.01**2 * slanted.weight  # the plane is rounded
     assert (slanted.plane[1], slanted.plane[2]) == pytest.approx((0.11 * 80, 0.23 * 80), abs=0.01)
+
+
+@pytest.mark.parametrize("size", [(9, 14000), (50, 2500), (300, 40)])
+def test_wide_and_tall_maps_are_summed_in_other_blocks(size):
+    disparity = np.random.default_rng(4).uniform(-1, 9, size)
+    moments = map_moments(disparity)
+    assert_same(moments, pixel_by_pixel(disparity, moments), rtol=1e-8)

@@ -1,9 +1,12 @@
 import math
 
 import numpy as np
+import pytest
 
 from rollcli.estimator.estimate import estimate_roll
-from tests.estimator.synthetic_maps import bent_road, flat_road
+from rollcli.estimator.road.subsample import take_sample
+from rollcli.estimator.road.surface import whole_surface
+from tests.estimator.synthetic_maps import bent_road, energy_of, flat_road
 
 
 def test_without_road_finding_every_valid_pixel_is_road():
@@ -33,3 +36,22 @@ def test_a_map_with_pixels_at_its_border_alone_has_an_angle_and_no_interval():
 
     assert math.isclose(math.degrees(found.theta), 5, abs_tol=1e-6)
     assert found.ci95 is None
+
+
+@pytest.mark.parametrize("model", ["parabola", "line"])
+def test_a_road_without_road_finding_is_beyond_doubt(model):
+    found = estimate_roll(bent_road(4, bend=0, noise=0.1), road="all", model=model)
+
+    assert (found.status, found.message) == ("ok", "")
+    assert found.road_fraction == 1
+
+
+@pytest.mark.parametrize("parabolic", [True, False])
+def test_where_every_pixel_is_road_the_surface_is_their_least_squares_fit(parabolic):
+    disparity = bent_road(7, bend=0.002 * parabolic)
+    sample, energy = take_sample(disparity), energy_of(disparity, parabolic=parabolic)
+    found = whole_surface(sample, energy)
+
+    np.testing.assert_allclose(found.model.disparity(found.x, found.y), found.d, rtol=1e-5)
+    assert (found.weights == 1).all()
+    assert (found.moved, found.share) == (0, 1)

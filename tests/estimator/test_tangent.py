@@ -7,7 +7,10 @@ import pytest
 
 from rollcli.estimator.interval import Jackknife
 from rollcli.estimator.moments import Grid
+from rollcli.estimator.road.subsample import take_sample
+from rollcli.estimator.road.surface import whole_surface
 from rollcli.estimator.tangent import touch
+from tests.estimator.synthetic_maps import bent_road, energy_of
 
 GRID = Grid.of_shape(375, 1242)
 THETA = 0.2
@@ -40,12 +43,12 @@ def test_a_textbook_that_knows_some_parameter_exactly_adds_no_error_to_it():
 
 
 def test_without_pixels_it_touches_at_the_centre_of_the_map():
-    parabola = np.polynomial.Polynomial((30.0, 0.3, 1e-4))
+    parabola = np.polynomial.Polynomial((30.0, 3.0, 0.05))
     tangent = touch(tuple(parabola.coef), THETA, GRID, None, None)
     row = 187 * math.cos(THETA) - 620.5 * math.sin(THETA)
     assert tangent.row == pytest.approx(row)
-    assert tangent.disparity == pytest.approx(parabola(row))
-    assert tangent.slope == pytest.approx(parabola.deriv()(row))
+    assert tangent.disparity == pytest.approx(parabola(row), rel=1e-12)
+    assert tangent.slope == pytest.approx(parabola.deriv()(row), rel=1e-12)
     assert tangent.changes is None
 
 
@@ -60,3 +63,44 @@ def test_a_slope_along_the_rows_turns_a_road_by_its_part_across_and_a_constant_o
 
 def test_what_it_shows_has_no_array_in_it():
     assert "changes" not in repr(touch((30.0, 0.3, 0.0), THETA, GRID, None, None))
+
+
+def touched(disparity, alpha=None):
+    """The tangent of a map's parabola, or of another, amid all of its pixels, and the mean of their rows."""
+    surface = whole_surface(take_sample(disparity), energy := energy_of(disparity))
+    u, v = (each * surface.grid.scale for each in (surface.x, surface.y))
+    y = (v + 119.5) * math.cos(THETA) - (u + 159.5) * math.sin(THETA)
+    return touch(alpha or energy.parabola(THETA), THETA, GRID, surface, None), y.mean()
+
+
+@pytest.mark.parametrize("bend", [-300.0, 300.0])
+def test_on_a_road_of_constant_curvature_it_is_the_roads_own_tangent(bend):
+    v, u = np.mgrid[:240, :320]
+    y = v * math.cos(THETA) - u * math.sin(THETA) + 120
+
+    # y = 3 d + bend / d, solved for the disparity
+    def road(y):
+        return (y + np.sqrt(y**2 - 12 * bend)) / 6
+
+    tangent, row = touched(np.where(y > 100, road(np.maximum(y, 100)), 0))
+    there = road(tangent.row + 120)
+    assert tangent.row == pytest.approx(row, abs=1e-3)
+    assert tangent.disparity == pytest.approx(there, rel=1e-3)
+    assert tangent.slope == pytest.approx(1 / (3 - bend / there**2), rel=2e-3)
+
+
+def test_what_bends_more_than_a_road_moves_it_by_a_twentieth_at_most():
+    for bend in (-0.01, 0.01):
+        alpha = (30.0 + 100 * abs(bend) * 100, 0.3 - 2 * bend * 85, bend)  # a slope of 0.3 about the middle
+        tangent, _ = touched(bent_road(0, width=320, height=240, bend=0), alpha)
+        own = alpha[1] + 2 * bend * tangent.row
+        assert own > 0
+        assert abs(tangent.slope / own - 1) == pytest.approx(0.05)
+
+
+def test_of_a_surface_that_falls_it_is_the_parabolas():
+    alpha = (90.0, -0.3, 1e-4)
+    tangent, _ = touched(bent_road(0, width=320, height=240, bend=0), alpha)
+    parabola = np.polynomial.Polynomial(alpha)
+    assert tangent.disparity == pytest.approx(parabola(tangent.row), rel=1e-12)
+    assert tangent.slope == pytest.approx(parabola.deriv()(tangent.row), rel=1e-12)

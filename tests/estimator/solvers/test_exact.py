@@ -159,3 +159,13 @@ def test_minima_are_in_order_however_small_their_energies():
     large, small = minima(energy_of(noise_map(3))), minima(energy_of(1e-4 * noise_map(3)))
     assert len(large) > 1
     np.testing.assert_allclose([m.theta for m in small], [m.theta for m in large], atol=1e-9)
+
+
+@pytest.mark.parametrize("slope", [0.4, 1.0, 2.5])
+def test_in_a_narrow_strip_every_minimum_is_polished_too(slope):
+    v, u = np.mgrid[:60, :60]
+    energy = energy_of(noise_map(2, (60, 60)) * (np.abs(u - slope * v) < 1.5))
+    for minimum in minima(energy):
+        terms = energy.at(minimum.theta)
+        assert terms.curvature > 0
+        assert abs(terms.gradient / terms.curvature) < 1e-9
