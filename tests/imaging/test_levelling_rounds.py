@@ -68,7 +68,7 @@ def test_level_is_believed_of_the_measurement_and_of_where_two_lead_to():
     assert stereo._wanted(lies(0.01), Misalignment(0.4), SHAPE) == LEVEL
 
 
-@pytest.mark.parametrize(("left", "spread", "kept"), [(0.29, 0.2, True), (0.31, 0.2, False)])
+@pytest.mark.parametrize(("left", "spread", "kept"), [(0.29, 0.15, True), (0.31, 0.15, False)])
 def test_a_map_that_refinement_makes_right_is_kept(left, spread, kept):
     at = Misalignment(2.0)
     found = replace(lies(2 + left, error=9.0), spread=spread)
