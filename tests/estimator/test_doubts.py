@@ -189,3 +189,15 @@ def test_what_is_just_within_every_bound_is_ok():
 def test_what_is_just_beyond_a_bound_is_doubted_for_that_alone(beyond, says):
     (doubt,) = doubts_about(**just_within_every_bound() | beyond)
     assert says in doubt
+
+
+@pytest.mark.parametrize(("sign", "grows_upward"), [(1, False), (-1, True)])
+def test_which_way_is_down_is_told_along_the_rolled_road(sign, grows_upward):
+    roll = 1.2
+    plane = (9.0, -sign * 0.2 * math.sin(roll), sign * 0.2 * math.cos(roll))
+    certified = CertifiedSolution(Solution(roll, 1), [Minimum(roll, 64.0)], is_global=True)
+    evidence = Evidence(SimpleNamespace(plane=plane), certified, None, None, 1.5, 1.0, None)
+    assert (
+        doubts_of(evidence, BOUNDS)
+        == ["the disparity grows upward, as it does in a depth map"] * grows_upward
+    )

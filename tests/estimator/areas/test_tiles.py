@@ -46,6 +46,7 @@ def test_weights_and_no_data_are_those_of_the_moments():
 def test_an_area_is_the_sum_of_its_tiles(size, step):
     tiles = tile_sums(bent_road(5, noise=0.2), None, 10)  # 12 x 16 tiles
     areas = tiles.areas(size, step)
+    assert areas.shape[:2] == ((12 - size) // step + 1, (16 - size) // step + 1)
     for i, j in ((0, 0), (2, 3), (areas.shape[0] - 1, areas.shape[1] - 1)):
         inside = tiles.gram[i * step : i * step + size, j * step : j * step + size]
         np.testing.assert_allclose(areas[i, j], inside.sum(axis=(0, 1)), rtol=1e-9)

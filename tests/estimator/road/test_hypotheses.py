@@ -1,5 +1,6 @@
 """Planes drawn through triples of neighbouring pixels."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -53,3 +54,44 @@ def test_no_plane_is_rolled_beyond_the_bound():
 
 def test_a_surface_that_rises_upward_gives_no_plane():
     assert len(draw_planes(take_sample(two_roads()[::-1]), MAX_ROLL, 0)) == 0
+
+
+def rising_by(tolerances, scale=1.0):
+    """A surface that rises downward by so many tolerances of its middle within the radius of a triple."""
+    numbers, radius = ROAD_TUNING.sample, ROAD_TUNING.hypotheses.radius
+    tolerance = math.hypot(numbers.noise_share * 50, numbers.uneven_share * 50)
+    v, u = np.mgrid[:480, :640]
+    return scale * (50 + tolerances * tolerance / radius * (v - 239.5) / 320 + 0 * u)
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e3])
+def test_what_hardly_rises_within_the_radius_is_no_road(scale):
+    least = ROAD_TUNING.hypotheses.least_rise
+    assert len(draw_planes(take_sample(rising_by(0.7 * least, scale)), MAX_ROLL, 0)) == 0
+    assert len(draw_planes(take_sample(rising_by(1.3 * least, scale)), MAX_ROLL, 0)) > 50
+
+
+def test_of_many_planes_the_first_are_kept():
+    every = take_sample(rising_by(20))
+    fewer = dataclasses.replace(
+        every,
+        tuning=dataclasses.replace(
+            ROAD_TUNING, hypotheses=dataclasses.replace(ROAD_TUNING.hypotheses, kept=40)
+        ),
+    )
+    np.testing.assert_array_equal(draw_planes(fewer, MAX_ROLL, 0), draw_planes(every, MAX_ROLL, 0)[:40])
+
+
+def test_pixels_half_of_whose_neighbours_agree_are_coherent_enough():
+    u = np.arange(640)
+    striped = rising_by(8) * (1 + 0.3 * (u // 3 % 2))  # neighbours are 3 px away: those below are alike
+    sample = take_sample(striped)
+    assert (sample.coherence == 0.5).all()
+    assert len(draw_planes(sample, MAX_ROLL, 0)) > 0
+
+
+def test_two_pixels_are_no_plane():
+    disparity = np.zeros((60, 80))
+    disparity[::3, ::3] = np.random.default_rng(0).uniform(5, 90, (20, 27))
+    sample = take_sample(disparity)
+    assert draw_planes(sample, MAX_ROLL, 0).shape[1] == 3

@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 
+from rollcli.estimator.road.find import find_road
 from rollcli.estimator.road.model import RoadModel
 from rollcli.estimator.road.scoring import PlaneScorer, first_costs, slope_weights
 from rollcli.estimator.road.subsample import NO_SLOPE, rising, take_sample
@@ -137,3 +138,13 @@ def test_the_first_costs_are_those_of_pixels_ahead_of_a_usual_plane(sample, plan
     weights = ahead * np.where(rising(sample.slopes[:, few]), 1, 0.3)
     expected = [weights @ costs(plane, x, y, d, tolerance, sample.coherence[few]) for plane in planes]
     np.testing.assert_allclose(first_costs(sample, planes, PIXELS), expected, rtol=1e-4)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2, 3])
+def test_near_the_bound_those_fits_that_stay_within_it_compete(seed):
+    road = flat_road(5, width=640, height=480, focal=560.0)
+    noise = np.random.default_rng(seed).normal(0, 0.5, road.shape)
+    noisy = take_sample(np.where(road > 1, np.maximum(road + noise, 0.01), 0))
+    bounded, free = (find_road(noisy, math.radians(bound), 0) for bound in (5, 45))
+    assert abs(bounded.model.theta) <= math.radians(5)
+    assert bounded.score > 0.98 * free.score
