@@ -68,7 +68,7 @@ class ScoreTuning:
 
     corridor: float = 1.0
     """Half-width of the corridor ahead, camera heights; that of its core is 1 / sqrt(8) of it."""
-    fits: int = 3
+    fits: int = 2
     """Weighted fits of each plane that is judged again."""
     first_fit_width: float = 2.0
     """Tolerances within which a pixel counts in the first of these fits, 1 in the others."""
