@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import EstimationError
-from rollcli.estimator.moments import Floats, Grid, Moments, shift
+from rollcli.estimator.moments import Floats, Grid, Moments, to_powers_of_sum
 
 # x^i y^j of the rotated frame that the energy and its two derivatives need, as (i, j)
 _OF_WEIGHTS = ((2, 0), (1, 1), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3), (2, 2), (1, 3), (0, 4))
@@ -98,7 +98,7 @@ class Energy:
         if not _SMALLEST < peak < _LARGEST:
             raise EstimationError(f"disparities up to {peak:g}: their squares leave double precision")
         p, q = moments.s[1, 0] / n, moments.s[0, 1] / n
-        along_p, along_q = shift(p), shift(q)
+        along_p, along_q = to_powers_of_sum(np.array([-p, -q]))
         s = along_p @ moments.s @ along_q.T
         t = along_p[:3, :3] @ moments.t @ along_q[:3, :3].T
         spread = s[2, 0] * s[0, 2] - s[1, 1] ** 2

@@ -145,10 +145,10 @@ def powers(x: NDArray[np.floating[Any]], degree: int = 4) -> Floats:
     return rows
 
 
-def shift(by: float) -> Floats:
-    """Return the matrix (5, 5) that takes sums of p^0 to p^4 to those of the powers of p - by."""
-    matrix: Floats = _CHOOSE * np.array([1.0, -by, by**2, -(by**3), by**4])[_REST]
-    return matrix
+def to_powers_of_sum(offsets: Floats) -> Floats:
+    """Return the matrices from powers of x to powers of x + offset, for each offset: shape (B, 5, 5)."""
+    matrices: Floats = _CHOOSE * powers(offsets).T[:, _REST]
+    return matrices
 
 
 def _block_sums(
@@ -211,7 +211,7 @@ def _along_rows(columns: NDArray[Any], p: Floats) -> Floats:
 
 def _from_steps(middles: Floats, scale: float) -> Floats:
     """Return the matrices from powers of a step to powers of q = middle + step / scale, shape (B, 5, 5)."""
-    matrices: Floats = _CHOOSE * powers(middles).T[:, _REST] / scale ** np.arange(5)
+    matrices: Floats = to_powers_of_sum(middles) / scale ** np.arange(5)
     return matrices
 
 
