@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 # A scale this small is as likely a bend of the rows that a lens has left. On KITTI vertical disparities grow
 # by 0.03 to 0.1 % down the image; lidar says that nothing of it is in the horizontal ones.
@@ -57,6 +58,10 @@ class Misalignment:
         """Return this misalignment, of views `factor` times as large."""
         return Misalignment(self.offset * factor, self.rotation, self.scale, self.twist / factor)
 
+    def down(self, x: Any, y: Any) -> Any:
+        """Return how far down points (x, y) from the centre are seen, pixels; numbers, or arrays alike."""
+        return self.offset + self.rotation * x + (self.scale + self.twist * x) * y
+
     def shifts(self, height: int, width: int) -> tuple[float, float, float, float]:
         """Return the largest vertical shift of each part in a view of this size, pixels; signed."""
         x, y = width / 2, height / 2
@@ -71,10 +76,8 @@ class Misalignment:
     def reach_in_rows(self, height: int, width: int, start: int, stop: int) -> float:
         """Return the largest vertical shift in the middle half of some rows of such a view, pixels."""
         x, rows = width / 4, (start - height / 2, stop - height / 2)
-        corners = ((u, v) for u in (-x, x) for v in rows)
-        return max(
-            abs(self.offset + self.rotation * u + self.scale * v + self.twist * u * v) for u, v in corners
-        )
+        largest: float = max(abs(self.down(u, v)) for u in (-x, x) for v in rows)
+        return largest
 
     @property
     def stretch(self) -> float:

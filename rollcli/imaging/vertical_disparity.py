@@ -28,9 +28,8 @@ _FIT_ROUNDS = 12
 _SAME = 0.005  # of the spread: a fit that changes it by less has settled
 _TUNING = 1.5  # standard deviations off, a block counts a quarter
 _LONGEST_STEP = 1.5  # px, anywhere; along the rows, shorter ones take twice as many rounds
-_SMALL_STEP = (
-    0.05  # px: after one this small, another changes a hundredth, or a fortieth where noise is strong
-)
+# px: after one this small, another changes a hundredth, or a fortieth where noise is strong
+_SMALL_STEP = 0.05
 
 
 @dataclass(frozen=True)
@@ -231,9 +230,7 @@ class _Blocks:
         A disparity that was matched in the wrong row is wrong by what hides that. Noise in the gradients lets
         least squares take up a part of it only: without this, a fifth to a half stays hidden.
         """
-        x, y = self._shares.x, self._shares.y
-        down = np.float32(step.offset) + np.float32(step.rotation) * x
-        down += (np.float32(step.scale) + np.float32(step.twist) * x) * y
+        down = step.down(self._shares.x, self._shares.y)
         moved = np.clip(self._along - self._shares.mixed * down, -_LONGEST_STEP, _LONGEST_STEP)
         self._u += moved[:, None]
 

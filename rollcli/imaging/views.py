@@ -63,10 +63,7 @@ def seen_at(
         return u, v
     height, width = shape
     x, y = u - np.float32((width - 1) / 2), v - np.float32((height - 1) / 2)
-    rotation = np.float32(lies.rotation)
-    at_v = (rotation + np.float32(lies.twist) * y) * x
-    at_v += v + np.float32(lies.offset) + np.float32(lies.scale) * y
-    return u + np.float32(lies.stretch) * x - rotation * y, at_v
+    return u + lies.stretch * x - lies.rotation * y, v + lies.down(x, y)
 
 
 def block_means(pixels: NDArray[np.float32]) -> NDArray[np.float32]:
