@@ -17,6 +17,7 @@ from rollcli.estimator.road.subsample import Sample, Singles
 from rollcli.estimator.road.tuning import FitTuning, ProfileTuning
 
 _KEPT = ("x", "y", "d", "alone", "tolerance", "ahead", "shown")  # as `NearPixels` are picked
+_MOST_FADED = 30.0  # as exp(-30): products of such weights are no denormals, which take ten times as long
 _RIDGE = 1e-10 * np.eye(5)  # of normal matrices with a diagonal of ones, up to this size
 
 
@@ -96,7 +97,7 @@ class NearPixels:
         place = np.square(road_weights(sample, road.plane, near))
         place *= _seen(across, along, half_height, model.theta, tuning)
         side = np.square(across * (model.alpha[1] / tuning.lane) / d)
-        ahead: Singles = np.exp(-np.minimum(np.square(side), 80))
+        ahead: Singles = np.exp(-np.minimum(np.square(side), _MOST_FADED))
         # the steps of a map of whole pixels are no spread: within less, only stripes of one value are left
         usual = math.hypot(sample.noise, sample.tuning.sample.uneven_share * sample.typical)
         least = max(tuning.least_width, sample.quantum / usual)
@@ -243,5 +244,5 @@ def _seen(across: Singles, along: Singles, half_height: float, theta: float, tun
     """
     bottom = half_height / math.cos(theta) + max(0.0, abs(math.tan(theta)) - tuning.large_roll)
     beyond = along + tuning.other_roll * np.abs(across) - bottom
-    seen: Singles = np.reciprocal(1 + np.exp(np.minimum(beyond / tuning.corner_fade, 50)))
+    seen: Singles = np.reciprocal(1 + np.exp(np.minimum(beyond / tuning.corner_fade, _MOST_FADED)))
     return seen

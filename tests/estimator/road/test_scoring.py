@@ -148,3 +148,10 @@ def test_near_the_bound_those_fits_that_stay_within_it_compete(seed):
     bounded, free = (find_road(noisy, math.radians(bound), 0) for bound in (5, 45))
     assert abs(bounded.model.theta) <= math.radians(5)
     assert bounded.score > 0.98 * free.score
+
+
+def test_no_weight_is_denormal_since_these_take_ten_times_as_long(sample, planes):
+    scorer = PlaneScorer.of(sample, PIXELS)
+    far = dataclasses.replace(scorer, bearings=scorer.bearings * 40)
+    for weights in far._weights(planes):
+        assert weights.min() > np.finfo(np.float32).tiny
