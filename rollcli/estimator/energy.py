@@ -148,15 +148,18 @@ class Energy:
         """
         return self._terms(self._rotated(theta))
 
-    def at_with_numerator(self, theta: Any) -> tuple[Terms, Any]:
-        """Evaluate the same, and the numerator of the gradient over det(Y'Y)^2 / weight^2.
+    def as_quotient(self, c: Floats, s: Floats) -> tuple[Floats, Floats]:
+        """Return numerator and denominator of E_min less `rest`; the latter is det(Y'Y) / weight.
 
-        E_min is a quotient of trigonometric polynomials, and the numerator of its derivative is one.
+        Both are homogeneous polynomials of degree 6 in c and s, which are the cosine and the sine of theta
+        times a factor: coordinates that are longer by a factor leave E_min as it is.
         """
-        rotated = self._rotated(theta)
-        _, _, yy, _, _, _, yyy, _, _, yyyy, *_ = rotated
-        terms = self._terms(rotated)
-        return terms, terms.gradient * (yy * yyyy - yyy * yyy - yy**3 / self.weight) ** 2
+        *rotated, cx, _ = self._in_frame(c, s)
+        xx, xy, yy, _, _, xyy, yyy, _, _, yyyy, _, _, ryy = rotated
+        cx = cx / (c * c + s * s)
+        phi = ryy * yy + cx * (xyy * yy - yyy * xy)
+        determinant = yy * yyyy - yyy * yyy - yy * yy * yy / self.weight
+        return cx * cx * (xx - xy * xy / yy) * determinant - phi * phi / yy, determinant
 
     def _terms(self, rotated: list[Any]) -> Terms:
         xx, xy, yy, xxx, xxy, xyy, yyy, xxyy, xyyy, yyyy, rxx, rxy, ryy, cx, cy = rotated
@@ -210,8 +213,12 @@ class Energy:
 
     def _rotated(self, theta: Any) -> list[Any]:
         """Return the moments in the frame rotated by theta, then the plane's slopes along x and y."""
-        library: Any = math if isinstance(theta, float) else np  # which is slow on single numbers
-        c, s = library.cos(theta), library.sin(theta)
+        if isinstance(theta, float):
+            return self._in_frame(math.cos(theta), math.sin(theta))  # NumPy is slow on single numbers
+        return self._in_frame(np.cos(theta), np.sin(theta))
+
+    def _in_frame(self, c: Any, s: Any) -> list[Any]:
+        """Return the same for the frame x = c p + s q, y = c q - s p."""
         cc, cs, ss = c * c, c * s, s * s
         basis = np.array(
             [cc, cs, ss, cc * c, cc * s, c * ss, ss * s, cc * cc, cc * cs, cc * ss, cs * ss, ss * ss]

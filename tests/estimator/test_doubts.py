@@ -41,9 +41,9 @@ def noise_alone():
 
 
 def saddle():
-    """A surface that every second angle explains as well as its mirror image."""
+    """A surface that an angle explains hardly better than its mirror image."""
     v, u = np.mgrid[:60, :100] - np.array([29.5, 49.5])[:, None, None]
-    return 100 + 0.02 * u * v
+    return 100 + 0.02 * u * v + 0.001 * (u - v)
 
 
 def two_halves():

@@ -181,17 +181,21 @@ def test_all_weight_masked_out_is_no_valid_pixel():
 
 
 @repeatable
-@given(random_maps(), angles)
-def test_the_numerator_of_the_gradient_is_that_over_the_determinant_of_the_normal_equations(disparity, theta):
+@given(random_maps(), angles, st.floats(0.5, 2))
+def test_the_energy_is_a_quotient_over_the_determinant_of_the_normal_equations(disparity, theta, factor):
     energy = energy_of(disparity)
     grid = energy.grid
     v, u = np.nonzero(disparity > 0)
     y = ((v - grid.centre_v) * math.cos(theta) - (u - grid.centre_u) * math.sin(theta)) / grid.scale
     powers = np.vander(y, 3)
-    determinant = np.linalg.det(powers.T @ powers) / len(y)
-    terms, numerator = energy.at_with_numerator(theta)
-    scale = np.abs(energy.at(ANGLES).gradient).max() * np.sum(y**2) ** 2 * np.sum(y**4) ** 2
-    assert numerator == pytest.approx(terms.gradient * determinant**2, rel=1e-6, abs=1e-12 * scale)
+    expected = factor**6 * np.linalg.det(powers.T @ powers) / len(y)
+    c, s = np.array([[math.cos(theta)], [math.sin(theta)]]) * factor
+    (numerator,), (determinant,) = energy.as_quotient(c, s)
+    scale = factor**6 * np.sum(y**2) * np.sum(y**4)
+    assert determinant == pytest.approx(expected, rel=1e-6, abs=1e-12 * scale)
+    value = energy.at(theta).value - energy.rest
+    size = energy.rest + energy.slope_energy
+    assert numerator == pytest.approx(value * determinant, rel=1e-6, abs=1e-10 * size * scale)
 
 
 @pytest.mark.parametrize(("times", "enough"), [(0.9, False), (1.1, True)])

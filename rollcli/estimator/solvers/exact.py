@@ -2,9 +2,8 @@
 
 E_min = d'd - N/D, where N and D = det(Y'Y) are homogeneous of degree 6 in cos(theta) and sin(theta). Its
 derivative is (N D' - N' D) / D^2, and this numerator is a trigonometric polynomial of degree 5 in 2 theta:
-a polynomial of degree 10 in tan(theta), but well conditioned at every angle, 90 degrees included. Its 11
-Fourier coefficients follow from samples of E' D^2 without error; the roots of the polynomial in
-z = exp(2 i theta) near the unit circle are all the angles at which E_min can have a minimum.
+a polynomial of degree 10 in tan(theta), but well conditioned at every angle, 90 degrees included. Samples of
+N and D give it without error, and its zeros are all the angles at which E_min can have a minimum.
 
 [TITS]: Fan, Liu, "Road Damage Detection Based on Unsupervised Disparity Map Segmentation", IEEE T-ITS (2019).
 """
@@ -18,10 +17,11 @@ from rollcli.estimator.energy import Energy
 from rollcli.estimator.methods import DEFAULT_SOLVER, SolverSettings
 from rollcli.estimator.moments import Floats
 from rollcli.estimator.solvers.solution import Solution, angle_between, principal
+from rollcli.estimator.solvers.trigonometric import SAMPLES, derivative, rising_zeros, zeros
 
-_DEGREE = 5
-_SAMPLES = 16  # more than 2 * _DEGREE + 1
-_ANGLES: Floats = np.linspace(0, np.pi, _SAMPLES, endpoint=False, dtype=np.float64)
+# of the polynomial: twice those of a frame
+_ANGLES: Floats = np.linspace(0, 2 * np.pi, SAMPLES, endpoint=False, dtype=np.float64)
+_CIRCLE = np.stack([np.cos(_ANGLES / 2), np.sin(_ANGLES / 2)])
 _POLISH = 8
 
 
@@ -55,11 +55,13 @@ def minima(energy: Energy) -> list[Minimum]:
     """
     if not energy.parabolic:
         return [_line_minimum(energy)]
-    starts, low = _stationary_angles(energy)
+    frame = _even_frame(energy)
+    numerator = _numerator(energy, frame)
+    rising = rising_zeros(numerator)
+    found = _settled(energy, _thetas(frame, rising or []))
+    if not rising or len(found) < len(rising):
+        found = _searched(energy, frame, numerator)
     same = 1e-12 * (energy.rest + energy.slope_energy)
-    found = _settled(energy, starts)
-    if min((minimum.energy for minimum in found), default=math.inf) > low.energy + same:  # no root led to it
-        found += _settled(energy, [low.theta]) or [low]
     lowest = min(found, key=lambda m: m.energy)
     return sorted(found, key=lambda m: (m.energy if m.energy > lowest.energy + same else -1.0, abs(m.theta)))
 
@@ -71,37 +73,44 @@ def _line_minimum(energy: Energy) -> Minimum:
     return Minimum(theta, float(energy.at(theta).value))
 
 
-def _stationary_angles(energy: Energy) -> tuple[list[float], Minimum]:
-    """Return angles near every local minimum, radians, and the lowest of a few angles."""
-    angles, stretch = _unwhitened(energy, _ANGLES)
-    terms, numerator = energy.at_with_numerator(angles)
-    lowest = int(np.argmin(terms.value))
-    low = Minimum(float(angles[lowest]), float(terms.value[lowest]))
-    spectrum = np.fft.fft(numerator * stretch**10)
-    # z^5 times the series is a polynomial in z; numpy wants the highest power first
-    coefficients = np.concatenate([spectrum[_DEGREE::-1], spectrum[: -_DEGREE - 1 : -1]])
-    largest = np.abs(coefficients).max()
-    roots = np.roots(np.where(np.abs(coefficients) > 1e-15 * largest, coefficients, 0))
-    # Rounding moves a double root off the circle by its square root. Other roots that are near do no harm:
-    # only minima that Newton's method confirms are compared.
-    near = roots[np.abs(np.log(np.maximum(np.abs(roots), 1e-300))) < 0.1]
-    return _unwhitened(energy, np.angle(near) / 2)[0].tolist(), low
+def _numerator(energy: Energy, frame: Floats) -> Floats:
+    """Return the numerator of the derivative at even angles of a frame, shape (SAMPLES,)."""
+    over, under = energy.as_quotient(*(frame @ _CIRCLE))
+    numerator: Floats = derivative(over) * under - over * derivative(under)
+    return numerator
 
 
-def _unwhitened(energy: Energy, angles: Floats) -> tuple[Floats, Floats]:
-    """Return the theta of angles in the frame where the pixels spread alike in all directions.
+def _even_frame(energy: Energy) -> Floats:
+    """Return the matrix (2, 2) to cosine and sine from those in a frame where pixels spread alike everywhere.
 
-    There the polynomial is well conditioned even if all pixels lie in a narrow strip. The second result is
-    the length of the unit vector along y, back in the map's frame: E' D^2 grows with its 10th power.
+    There the polynomial is well conditioned even if all pixels lie in a narrow strip.
     """
-    xx, xy, yy = energy.forms[:3, 0]
+    xx, xy, yy = energy.forms[:3, 0].tolist()
     root = math.sqrt(xx * yy - xy * xy)
-    size = math.sqrt(xx + yy + 2 * root)  # (C + root I) / size is the square root of C = [[xx, xy], [xy, yy]]
-    a, b, c = (yy + root) / size, -xy / size, (xx + root) / size  # its inverse, up to a factor
-    u, v = -np.sin(angles), np.cos(angles)
-    u, v = a * u + b * v, b * u + c * v
-    length = np.hypot(u, v) / math.sqrt(a * c - b * b)
-    return np.arctan2(-u, v), length
+    # (C + root I) / size is the square root of C = [[xx, xy], [xy, yy]]; this is its inverse, up to a factor
+    size = math.sqrt(root * (xx + yy + 2 * root))
+    return np.array([[xx + root, xy], [xy, yy + root]]) / size
+
+
+def _thetas(frame: Floats, doubled: list[float]) -> list[float]:
+    """Return the thetas of some angles in a frame, given twice as large, as the polynomial has them."""
+    half = [angle / 2 for angle in doubled]
+    (a, b), (_, c) = frame.tolist()
+    return [
+        math.atan2(b * math.cos(each) + c * math.sin(each), a * math.cos(each) + b * math.sin(each))
+        for each in half
+    ]
+
+
+def _searched(energy: Energy, frame: Floats, numerator: Floats) -> list[Minimum]:
+    """Return the minima near all zeros of the derivative: a degenerate one may hide some."""
+    found = _settled(energy, _thetas(frame, zeros(numerator)))
+    coarse = [Minimum(theta, energy.at(theta).value) for theta in _thetas(frame, _ANGLES.tolist())]
+    low = min(coarse, key=lambda m: m.energy)
+    same = 1e-12 * (energy.rest + energy.slope_energy)
+    if min((minimum.energy for minimum in found), default=math.inf) > low.energy + same:  # no root led to it
+        found += _settled(energy, [low.theta]) or [low]
+    return found
 
 
 def _settled(energy: Energy, starts: list[float]) -> list[Minimum]:
