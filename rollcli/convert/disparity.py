@@ -7,7 +7,7 @@ from rollcli.convert.run import Conversion, convert
 from rollcli.errors import ExitStatus
 from rollcli.frames.find import pair_frames
 from rollcli.frames.frame import Frame, FrameResult
-from rollcli.frames.options import EncodingOptions, FrameOptions
+from rollcli.frames.options import EncodingOptions, FrameOptions, MethodOptions
 from rollcli.frames.outputs import ENDING_OF_FORMAT, output_path, roomy_path
 
 
@@ -17,7 +17,12 @@ def run_disparity(options: DisparityOptions) -> ExitStatus:
         options.inputs, options.pairs, skip=[*filter(None, [options.output, options.preview])]
     )
     conversions = [Conversion(frame, _writes(frame, options)) for frame in frames]
-    read = FrameOptions(stereo=options.stereo, root=options.running.root, replaces=options.running.overwrite)
+    read = FrameOptions(
+        stereo=options.stereo,
+        method=MethodOptions(road="all"),  # every row is wanted at full size
+        root=options.running.root,
+        replaces=options.running.overwrite,
+    )
     do = partial(_match, options=read, save_as=options.save_as, preview=options.preview is not None)
     return convert(conversions, do, options.output, options.running, EncodingOptions())
 

@@ -73,14 +73,14 @@ def _derotated(
     path: str, source: Source, estimate: RollEstimate, options: FrameOptions, horizon: float | None
 ) -> _Named:
     if source.stored is None:
-        return encode_computed(path, derotate(source.disparity, estimate.theta), options.images.save_as)
+        return encode_computed(path, derotate(source.shown, estimate.theta), options.images.save_as)
     return path, encode_turned(source.stored, estimate.theta, source.encoding, options.encoding.invalid)
 
 
 def _v_disparity(
     path: str, source: Source, estimate: RollEstimate, options: FrameOptions, horizon: float | None
 ) -> _Named:
-    histogram = v_disparity(derotate(source.disparity, estimate.theta))
+    histogram = v_disparity(derotate(source.shown, estimate.theta))
     offset = row_offset(estimate.theta, estimate.width, estimate.height)
     row = None if horizon is None else horizon - offset
     return path, encode_png(draw_v_disparity(histogram, estimate.alpha, offset, row))
@@ -89,7 +89,7 @@ def _v_disparity(
 def _disparity(
     path: str, source: Source, estimate: RollEstimate, options: FrameOptions, horizon: float | None
 ) -> _Named:
-    return encode_computed(path, source.disparity, options.images.save_as)
+    return encode_computed(path, source.shown, options.images.save_as)
 
 
 def _road_mask(
@@ -98,7 +98,7 @@ def _road_mask(
     assert estimate.road_mask is not None  # the frame's task asks for it
     if source.photo is not None:
         return path, encode_png(draw_road_on_photo(source.photo, estimate.road_mask))
-    return path, encode_png(draw_road(source.disparity, estimate.road_mask))
+    return path, encode_png(draw_road(source.shown, estimate.road_mask))
 
 
 _ENCODERS = {

@@ -1,22 +1,25 @@
 """Read a frame: its disparity, from a map or matched from a pair, and the pixels that may be used."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rollcli.estimator.road.first_row import first_row_of_road
 from rollcli.files.encodings import to_disparity
 from rollcli.files.formats import Stored, read_image, read_stored
 from rollcli.frames.diagnosis import require_positive, too_large
 from rollcli.frames.frame import Frame
-from rollcli.frames.options import FrameOptions
+from rollcli.frames.options import FrameOptions, MethodOptions
 from rollcli.frames.region import region_mask
 from rollcli.imaging.misalignment_words import note_of
 
 if TYPE_CHECKING:
-    from rollcli.imaging.stereo import StereoMatch
+    from rollcli.imaging.stereo import StereoMatch, Wanted
 
 # when more of the map than this lies at the end of the searched range, the range was too short
 _MUCH_AT_END = 0.05
@@ -29,7 +32,7 @@ class Source:
     Attributes
     ----------
     disparity : ndarray, shape (H, W)
-        Pixels; 0 is no data.
+        What the angle is estimated from; pixels, 0 is no data.
     allowed : ndarray of bool, shape (H, W), or None
         Pixels inside the mask, --roi and --polygon; None when none of them is given.
     stored : Stored or None
@@ -48,6 +51,8 @@ class Source:
         What was done about the pair; empty when nothing.
     size : tuple of int, or None
         Width and height of the images in the files, px, where the map was matched from them.
+    whole : ndarray, shape (H, W), or None
+        The map of a pair with all rows at full size, where images are to show it.
     photo : ndarray or None
         The left image of a pair, grey or BGR, where the road is to be drawn on it.
     """
@@ -63,7 +68,13 @@ class Source:
     doubt: str = ""
     note: str = ""
     size: tuple[int, int] | None = None
+    whole: NDArray[Any] | None = None
     photo: NDArray[Any] | None = None
+
+    @property
+    def shown(self) -> NDArray[Any]:
+        """The map that images show, px, shape (H, W)."""
+        return self.disparity if self.whole is None else self.whole
 
 
 def read_source(frame: Frame, options: FrameOptions) -> Source:
@@ -112,9 +123,7 @@ def _match(frame: Frame, options: FrameOptions) -> Source:
     left = read_image(options.at(frame.path), frame.file)
     right = read_image(options.at(frame.right_path), frame.right_file)
     allowed = region_mask(frame.mask, options, matched_shape(left.shape, options.stereo.downscale))
-    # images show the whole map: one that is asked for needs all of it
-    rows = slice(None) if allowed is None or options.images.folders() else _used_rows(allowed)
-    match = match_pair(left, right, options.stereo, rows)
+    match = match_pair(left, right, options.stereo, wanted_of(allowed, options))
     searched = (match.min_disparity, match.min_disparity + match.num_disparities - 1)
     height, width = left.shape[:2]
     return Source(
@@ -124,8 +133,20 @@ def _match(frame: Frame, options: FrameOptions) -> Source:
         doubt="; ".join(_doubts(match)),
         note=note_of(match.corrected, *match.disparity.shape) if options.stereo.measures_alignment else "",
         size=(width, height),
+        whole=match.whole,
         photo=left if options.images.road_mask is not None else None,
         allowed=allowed,
+    )
+
+
+def wanted_of(allowed: NDArray[np.bool_] | None, options: FrameOptions) -> "Wanted":
+    """Say what of the map the estimate needs, and whether images show more."""
+    from rollcli.imaging.stereo import Wanted
+
+    return Wanted(
+        rows=slice(None) if allowed is None else _used_rows(allowed),
+        first_row=partial(_first_row, allowed, options.method) if options.method.road == "auto" else None,
+        whole=bool(options.images.folders()),
     )
 
 
@@ -133,6 +154,14 @@ def _used_rows(allowed: NDArray[np.bool_]) -> slice:
     """Return the rows from the first to the last that has an allowed pixel."""
     (used,) = np.nonzero(allowed.any(axis=1))
     return slice(int(used[0]), int(used[-1]) + 1)
+
+
+def _first_row(allowed: NDArray[np.bool_] | None, method: MethodOptions, small: NDArray[Any]) -> float:
+    """Return the first row of a small map that the road in the region can reach."""
+    if allowed is not None:
+        v, u = (np.arange(few) * many // few for few, many in zip(small.shape, allowed.shape, strict=True))
+        allowed = allowed[v[:, None], u]
+    return first_row_of_road(small, allowed, math.radians(method.max_roll_deg), method.seed)
 
 
 def _doubts(match: "StereoMatch") -> Iterator[str]:

@@ -10,13 +10,10 @@ from functools import cached_property
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from rollcli.imaging.misalignment import LEVEL, Misalignment
 from rollcli.imaging.vertical_disparity import Measured, Texture, measure_misalignment
-from rollcli.imaging.views import View, Views, seen_at, shrink_both
-
-Map = NDArray[np.float32]
+from rollcli.imaging.views import Map, View, Views, resampled, seen_at, shrink_both
 
 
 @dataclass(frozen=True)
@@ -153,17 +150,3 @@ class SmallViews:
         seen = resampled(disparity, self.views[0].shape)
         found = measure_misalignment(self._texture, seen, start.resized(1 / self.factor), rounds, self._every)
         return None if found is None else found.resized(self.factor)
-
-
-def resampled(disparity: Map, shape: tuple[int, ...]) -> Map:
-    """Return a map at another size, in pixels of that; 0 where not all that a value is made of is known."""
-    if disparity.shape == shape:
-        return disparity
-    size = shape[1], shape[0]
-    scale = np.float32(shape[1] / disparity.shape[1])
-    if scale < 1:  # one pixel of a few says the same, and edges stay edges
-        fewer: Map = cv2.resize(disparity, size, interpolation=cv2.INTER_NEAREST) * scale
-        return fewer
-    known = cv2.resize((disparity > 0).astype(np.float32), size, interpolation=cv2.INTER_LINEAR)
-    larger = cv2.resize(disparity, size, interpolation=cv2.INTER_LINEAR) * scale
-    return np.where(known > np.float32(0.999), larger, np.float32(0))

@@ -50,10 +50,13 @@ class FirstLook:
         Disparities from 0 to this are worth a search; None where nothing was matched.
     measured : Measured or None
         How the right view lies; None where that cannot be told, or was not asked.
+    disparity : ndarray of float32, or None
+        The small map, in its own pixels; None where nothing was matched.
     """
 
     range: int | None
     measured: Measured | None
+    disparity: NDArray[np.float32] | None = None
 
 
 @dataclass(frozen=True)
@@ -78,11 +81,10 @@ class _Pair(NamedTuple):
         return _Pair(small, Texture.of(small))
 
 
-def find_range(views: Views) -> int | None:
-    """Disparities from 0 to this are worth a search, pixels; None where nothing can be matched."""
+def look_for_range(views: Views) -> FirstLook:
+    """Find the range of a pair alone: how its right view lies is not measured."""
     factor = size_factor(views[0].shape, _PIXELS)
-    found = _match_small(shrink_both(views, factor))
-    return None if found is None else _with_margin(found, factor)
+    return _seen(_match_small(shrink_both(views, factor)), factor, None)
 
 
 def first_look(small: SmallViews) -> FirstLook:
@@ -112,21 +114,20 @@ def _plainly_level(found: _Small | None, factor: float, shape: tuple[int, ...]) 
         seen.misalignment, seen.errors, shape, _AS_GOOD_AS_LEVEL
     ):
         return None
-    return FirstLook(_with_margin(found, factor), replace(seen, misalignment=LEVEL))
+    return _seen(found, factor, replace(seen, misalignment=LEVEL))
 
 
 def _closer(small: SmallViews, found: _Small | None, factor: float) -> tuple[FirstLook, bool]:
     """Measure at larger views, from where those that are `factor` times smaller have ended; is it sure?"""
-    if found is None:
-        return FirstLook(None, None), False
-    coarse = measured = None if found.measured is None else found.measured.resized(factor)
-    if coarse is not None:
-        measured = small.measure(found.disparity, coarse.misalignment, _CLOSER_ROUNDS)
-    return FirstLook(_with_margin(found, factor), measured), _is_sure(coarse, measured, small.shape)
+    if found is None or found.measured is None:
+        return _seen(found, factor, None), False
+    coarse = found.measured.resized(factor)
+    measured = small.measure(found.disparity, coarse.misalignment, _CLOSER_ROUNDS)
+    return _seen(found, factor, measured), _is_sure(coarse, measured, small.shape)
 
 
-def _is_sure(coarse: Measured | None, measured: Measured | None, shape: tuple[int, ...]) -> bool:
-    if coarse is None or measured is None:
+def _is_sure(coarse: Measured, measured: Measured | None, shape: tuple[int, ...]) -> bool:
+    if measured is None:
         return False
     if abs(measured.misalignment.scale) < _UNSURE_SCALE:
         return True
@@ -185,8 +186,11 @@ def _match_small(pair: Views) -> _Small | None:
     return None if found is None else _Small(found.top, found.disparity.astype(np.float32, copy=False), None)
 
 
-def _with_margin(found: _Small, factor: float) -> int:
-    return math.ceil(_MARGIN * found.top * factor) + 8
+def _seen(found: _Small | None, factor: float, measured: Measured | None) -> FirstLook:
+    """Say what was found at views that are `factor` times smaller, and how the right one lies."""
+    if found is None:
+        return FirstLook(None, None)
+    return FirstLook(math.ceil(_MARGIN * found.top * factor) + 8, measured, found.disparity)
 
 
 def _match(pair: Views, count: float) -> NDArray[np.float32]:

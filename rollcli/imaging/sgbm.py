@@ -1,12 +1,13 @@
 """OpenCV's semi-global block matching [Hirschmüller 2008], with one set of smoothness costs."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from rollcli.errors import InputError
 from rollcli.imaging.stereo_options import StereoOptions
-from rollcli.imaging.views import Views
+from rollcli.imaging.views import Map, Views, resampled, shrink_both
 
 _MODES = {
     "sgbm": cv2.STEREO_SGBM_MODE_SGBM,
@@ -21,7 +22,10 @@ NARROWEST = _STEP
 ALL_ROWS = slice(None)
 _HH_BYTES = 4  # for each pixel and disparity: OpenCV keeps two costs of 16 bits
 _MOST_HH_BYTES = 2**32  # 1920x1080 pixels over 256 disparities take less than half
-_MARGIN = 32  # rows beside those that are needed: what lies there smooths what is needed
+# Rows beside those that are needed: what lies there smooths what is needed. The first 16 rows then differ by
+# 0.001 px from a match of all rows, with 8 by 0.004, with none by 0.07
+_MARGIN = 16
+_SMALLER = 3  # times: what need not be matched at full size takes a 27th of the time
 
 
 def usable_range(count: int, first: int, width: int, block_size: int) -> int:
@@ -30,7 +34,7 @@ def usable_range(count: int, first: int, width: int, block_size: int) -> int:
     return min(-(-max(1, count) // _STEP) * _STEP, furthest)
 
 
-def match_views(views: Views, first: int, count: int, options: StereoOptions) -> NDArray[np.float32]:
+def match_views(views: Views, first: int, count: int, options: StereoOptions) -> Map:
     """Match over `count` disparities from `first` on.
 
     Returns
@@ -70,15 +74,39 @@ def match_views(views: Views, first: int, count: int, options: StereoOptions) ->
 
 
 def match_rows(
-    views: Views, first: int, count: int, options: StereoOptions, rows: slice = ALL_ROWS
-) -> NDArray[np.float32]:
-    """Match only what some rows need; the rest of the map is no data. See `match_views`."""
-    height = views[0].shape[0]
+    views: Views, first: int, count: int, options: StereoOptions, rows: slice = ALL_ROWS, above: int = 0
+) -> Map:
+    """Match only what some rows need, and of these the ones above a row at half the size.
+
+    Parameters
+    ----------
+    views, first, count, options
+        See `match_views`.
+    rows : slice
+        Rows that are needed; elsewhere the map may hold no data.
+    above : int
+        The first row at full size. Half the size takes an eighth of the time.
+    """
+    height, width = views[0].shape
     start, stop, _ = rows.indices(height)
-    top, bottom = max(0, start - _MARGIN), min(height, stop + _MARGIN)
+    top, bottom = max(0, min(max(start, above), stop) - _MARGIN), min(height, stop + _MARGIN)
     if (top, bottom) == (0, height):
         return match_views(views, first, count, options)
-    disparity = np.zeros(views[0].shape, np.float32)
+    disparity = np.zeros((height, width), np.float32)
     left, right = (view[top:bottom] for view in views)
     disparity[top:bottom] = match_views((left, right), first, count, options)
+    if start < top:
+        left, right = (view[start : top + _MARGIN] for view in views)
+        disparity[start:top] = _match_coarsely((left, right), first, count, options)[: top - start]
     return disparity
+
+
+def _match_coarsely(views: Views, first: int, count: int, options: StereoOptions) -> Map:
+    """Match at half the size; the map has the size of the views."""
+    small = shrink_both(views, _SMALLER)
+    first //= _SMALLER
+    count = usable_range(-(-count // _SMALLER), first, small[0].shape[1], options.block_size)
+    if count < NARROWEST:
+        return np.zeros(views[0].shape, np.float32)
+    patches = replace(options, speckle_size=options.speckle_size // _SMALLER**2)
+    return resampled(match_views(small, first, count, patches), views[0].shape)

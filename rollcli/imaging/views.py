@@ -17,6 +17,9 @@ View = NDArray[np.uint8]
 Views = tuple[View, View]
 """Left and right."""
 
+Map = NDArray[np.float32]
+"""Disparities in pixels, shape (H, W); no data is 0."""
+
 BLOCK = 8  # px: the side of what gets one shift where the grey levels of both views are compared
 
 
@@ -53,6 +56,20 @@ def shrink(view: NDArray[Any], factor: float) -> View:
 def shrink_both(views: Views, factor: float) -> Views:
     """Both views, `factor` times smaller."""
     return shrink(views[0], factor), shrink(views[1], factor)
+
+
+def resampled(disparity: Map, shape: tuple[int, ...]) -> Map:
+    """Return a map at another size, in pixels of that; 0 where not all that a value is made of is known."""
+    if disparity.shape == shape:
+        return disparity
+    size = shape[1], shape[0]
+    scale = np.float32(shape[1] / disparity.shape[1])
+    if scale < 1:  # one pixel of a few says the same, and edges stay edges
+        fewer: Map = cv2.resize(disparity, size, interpolation=cv2.INTER_NEAREST) * scale
+        return fewer
+    known = cv2.resize((disparity > 0).astype(np.float32), size, interpolation=cv2.INTER_LINEAR)
+    larger = cv2.resize(disparity, size, interpolation=cv2.INTER_LINEAR) * scale
+    return np.where(known > np.float32(0.999), larger, np.float32(0))
 
 
 def seen_at(

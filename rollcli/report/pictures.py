@@ -64,7 +64,7 @@ class Pictures:
 def take_pictures(subject: Subject, options: FrameOptions) -> Pictures:
     """Take what can be taken: from the images of the subject, else from its map or pair."""
     source, missing = _attempt(lambda: _source(subject, options))
-    disparity = None if source is None else source.disparity
+    disparity = None if source is None else source.shown
     road, _ = _attempt(lambda: _road(subject, source, options))
     level, _ = _attempt(lambda: _level(subject, disparity, options))
     counts, _ = _attempt(lambda: _level_counts(subject, disparity, level))

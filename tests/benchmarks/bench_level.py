@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
+from matched import match_as_estimated
 from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
@@ -26,7 +27,7 @@ from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.result import RollEstimate
 from rollcli.files.formats import read_image
 from rollcli.imaging.misalignment import LEVEL
-from rollcli.imaging.stereo import StereoMatch, StereoOptions, match_pair
+from rollcli.imaging.stereo import StereoMatch
 from rollcli.simulate.draw import draw_specs
 from rollcli.simulate.render import render_frame
 
@@ -91,7 +92,7 @@ def empty_roads(pairs: int, size: tuple[int, int]) -> Iterator[Views]:
 
 def report_level(kind: str, pairs: list[Views]) -> None:
     """Count the level pairs that are not left as they are."""
-    matches = [match_pair(pair.left, pair.right, StereoOptions()) for pair in pairs]
+    matches = [match_as_estimated(pair.left, pair.right) for pair in pairs]
     corrected = sum(match.corrected != LEVEL for match in matches)
     doubted = sum(bool(match.doubt) for match in matches)
     print(f"{kind}: {len(pairs)} level pairs, {corrected} corrected, {doubted} doubted")
@@ -101,12 +102,12 @@ def report(kind: str, pairs: list[Views]) -> None:
     """Compare each pair with itself, untouched and warped."""
     off, reached, doubted, corrected = [], [], 0, 0
     for pair in pairs:
-        level = match_pair(pair.left, pair.right, StereoOptions())
+        level = match_as_estimated(pair.left, pair.right)
         level_theta = estimate_of(level).theta
         corrected += level.corrected != LEVEL
         for way in WAYS:
             try:
-                match = match_pair(pair.left, warped(pair.right, *way), StereoOptions())
+                match = match_as_estimated(pair.left, warped(pair.right, *way))
             except RollcliError:
                 doubted += 1
                 continue

@@ -14,12 +14,13 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from matched import match_as_estimated
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.estimate import estimate_roll
-from rollcli.imaging.stereo import StereoOptions, match_pair
+from rollcli.imaging.stereo import StereoOptions
 from rollcli.simulate.draw import draw_specs
 from rollcli.simulate.render import RenderedFrame, render_frame
 
@@ -51,7 +52,7 @@ def measured(frames: list[RenderedFrame], rolls: list[float], options: StereoOpt
     start = time.process_time()
     for frame, roll_deg in zip(frames, rolls, strict=True):
         try:
-            estimate = estimate_roll(match_pair(frame.left, frame.right, options).disparity)
+            estimate = estimate_roll(match_as_estimated(frame.left, frame.right, options).disparity)
         except EstimationError:
             suspect += 1
             continue

@@ -19,6 +19,7 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
+from matched import match_as_estimated
 from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
@@ -26,7 +27,6 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.files.formats import read_image
 from rollcli.imaging.misalignment import LEVEL
-from rollcli.imaging.stereo import StereoOptions, match_pair
 from rollcli.simulate.draw import draw_specs
 from rollcli.simulate.render import render_frame
 
@@ -84,7 +84,7 @@ def report(kind: str, pairs: list[Pair]) -> None:
         best = [math.inf, math.inf]
         for _ in range(ROUNDS):
             start = time.process_time()
-            match = match_pair(read_image(str(pair.left)), read_image(str(pair.right)), StereoOptions())
+            match = match_as_estimated(read_image(str(pair.left)), read_image(str(pair.right)))
             estimate = estimate_roll(match.disparity)
             between = time.process_time()
             bare_match(pair, match.num_disparities)

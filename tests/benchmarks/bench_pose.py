@@ -22,11 +22,11 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from matched import Matched, matched
+from matched import Matched, match_as_estimated, matched
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.estimate import estimate_roll
-from rollcli.imaging.stereo import StereoOptions, match_pair
+from rollcli.imaging.stereo import StereoOptions
 from rollcli.rig.calibration import Calibration
 from rollcli.rig.pose import with_pose
 
@@ -104,7 +104,7 @@ def streets() -> None:
         left, right = (cv2.imread(str(STREETS / side / path.name), -1) for side in ("left", "right"))
         poses = []
         for factor in (1, 2):
-            found = match_pair(left, right, StereoOptions(downscale=factor)).disparity
+            found = match_as_estimated(left, right, StereoOptions(downscale=factor)).disparity
             estimate = estimate_roll(found)
             calibration = KITTI_2012.for_size(*left.shape[::-1]).for_size(*found.shape[::-1])
             poses.append(with_pose(estimate, calibration))

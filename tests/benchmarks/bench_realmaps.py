@@ -15,13 +15,13 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from matched import match_as_estimated
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.result import RollEstimate
 from rollcli.files.formats import read_image
-from rollcli.imaging.stereo import StereoOptions, match_pair
 
 REALMAPS = Path(__file__).resolve().parents[3] / "shared" / "realmaps"
 SOURCES = {
@@ -45,7 +45,7 @@ def estimate_of(file: str) -> RollEstimate:
     path = REALMAPS / file
     if path.parent.name == "left":
         right = path.parents[1] / "right" / path.name
-        match = match_pair(read_image(path), read_image(right), StereoOptions())
+        match = match_as_estimated(read_image(path), read_image(right))
         return estimate_roll(match.disparity, slope_error=match.slope_error)
     stored = read_image(path)
     return estimate_roll(stored.astype(np.float32) / (256 if stored.dtype == np.uint16 else 1))

@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from rollcli.imaging.stereo import StereoOptions, match_pair
+from rollcli.frames.options import FrameOptions
+from rollcli.frames.read import wanted_of
+from rollcli.imaging.stereo import StereoMatch, StereoOptions, match_pair
 from rollcli.simulate.draw import draw_specs
 from rollcli.simulate.render import render_frame
 from rollcli.simulate.spec import FrameSpec
@@ -46,8 +48,15 @@ def matched(
         yield from pool.map(_matched, specs, [mode] * frames)
 
 
+def match_as_estimated(
+    left: NDArray[Any], right: NDArray[Any], options: StereoOptions | None = None
+) -> StereoMatch:
+    """Match a pair as `rollcli estimate` does: rows above the road at a part of the size."""
+    return match_pair(left, right, options or StereoOptions(), wanted_of(None, FrameOptions()))
+
+
 def _matched(spec: FrameSpec, mode: str) -> Matched:
     cv2.setNumThreads(1)
     frame = render_frame(spec)
-    match = match_pair(frame.left, frame.right, StereoOptions(mode=mode))
+    match = match_as_estimated(frame.left, frame.right, StereoOptions(mode=mode))
     return Matched(match.disparity, math.degrees(spec.roll), spec.scene, spec)

@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import math
 import re
 import subprocess
 
@@ -10,6 +11,8 @@ import cv2
 import numpy as np
 import pytest
 
+from rollcli.simulate.render import render_frame
+from rollcli.simulate.spec import FrameSpec
 from tests.run_cli import command, environment, road_map, rollcli, write_kitti, write_maps, write_pair
 
 
@@ -173,18 +176,29 @@ def test_swapped_views_and_images_of_two_places_get_a_row_that_says_so(tmp_path)
     assert "the two images do not show the same scene" in two_places.out
 
 
-def test_a_region_of_a_pair_gives_the_same_angle_whether_the_whole_map_is_written_or_not(tmp_path):
-    write_pair(tmp_path, "a.png", road_map(0.05, width=480, height=240) / 2)
-    region = ("--left", "left", "--right", "right", "--roi", "0,150,480,230", "--road", "all")
+@pytest.mark.parametrize("options", [(), ("--roi", "0,120,320,200"), ("--road", "all")])
+def test_a_pair_gives_the_same_row_whether_its_whole_map_is_written_or_not(tmp_path, options):
+    spec = FrameSpec(scene="street", roll=math.radians(4), size=(320, 240), seed=3)
+    frame = render_frame(spec)
+    for side in ("left", "right"):
+        (tmp_path / side).mkdir()
+        cv2.imwrite(str(tmp_path / side / "a.png"), getattr(frame, side))
+    pairs = ("--left", "left", "--right", "right")
 
-    alone = rollcli("estimate", *region, cwd=tmp_path).out
-    beside_a_map = rollcli("estimate", *region, "--disparity", "maps", cwd=tmp_path).out
+    alone = rollcli("estimate", *pairs, *options, cwd=tmp_path).out
+    beside_a_map = rollcli("estimate", *pairs, *options, "--disparity", "maps", cwd=tmp_path).out
+    rollcli("disparity", *pairs, "-o", "whole", cwd=tmp_path)
 
-    rolls = [float(column(out, "roll_deg")[0]) for out in (alone, beside_a_map)]
-    assert rolls[0] == pytest.approx(rolls[1], abs=0.05)
-    assert column(alone, "status") == column(beside_a_map, "status")
-    written = cv2.imread(str(tmp_path / "maps" / "a.png"), cv2.IMREAD_UNCHANGED)
-    assert (written[:100] > 0).mean() > 0.3
+    if "all" not in options:
+        assert float(column(alone, "roll_deg")[0]) == pytest.approx(4, abs=0.2)
+    assert alone == beside_a_map
+    written, whole = (
+        cv2.imread(str(tmp_path / folder / "a.png"), cv2.IMREAD_UNCHANGED) / 256
+        for folder in ("maps", "whole")
+    )
+    both = (written > 0) & (whole > 0)
+    assert both.sum() > 0.97 * (whole > 0).sum()
+    assert (np.abs(written - whole)[both] < 0.1).mean() > 0.97
 
 
 def test_maps_and_pairs_are_not_mixed(maps):

@@ -7,7 +7,7 @@ import pytest
 
 from rollcli.imaging import first_look as module
 from rollcli.imaging.alignment import SmallViews
-from rollcli.imaging.first_look import _Small, find_range, first_look
+from rollcli.imaging.first_look import FirstLook, _Small, first_look, look_for_range
 from rollcli.imaging.misalignment import LEVEL, Misalignment
 from rollcli.imaging.vertical_disparity import Measured
 from tests.imaging.test_vertical_disparity import texture_of
@@ -34,12 +34,12 @@ def pair_of(disparity, lower=0, shape=(240, 640)):
 
 @pytest.mark.parametrize("disparity", [8, 30, 60, 120, 200])
 def test_the_range_holds_what_is_there_and_a_tenth_more(disparity):
-    assert 1.1 * disparity + 5 <= find_range(pair_of(disparity)) <= 1.1 * disparity + 12
+    assert 1.1 * disparity + 5 <= look_for_range(pair_of(disparity)).range <= 1.1 * disparity + 12
 
 
 def test_where_nothing_is_matched_no_range_is_found():
     flat = np.full((240, 640), 90, np.uint8)
-    assert find_range((flat, flat)) is None
+    assert look_for_range((flat, flat)) == FirstLook(None, None)
     look = first_look(SmallViews((flat, flat)))
     assert look.range is None
     assert look.measured is None
@@ -80,7 +80,6 @@ def test_small_views_that_lie_off_or_tell_nothing_do_not_say_level():
     ("coarse", "fine", "sure"),
     [
         (measured(), measured(), True),
-        (None, measured(), False),
         (measured(), None, False),
         (measured(), measured(scale=0.0029, error=1.0), True),
         (measured(9), measured(scale=0.0029), True),
@@ -193,7 +192,7 @@ def test_what_small_views_see_is_measured_at_larger_ones():
     look, sure = module._closer(whole, found, BEFORE)
 
     assert whole.asked == [(found.disparity, Misalignment(0.1 * BEFORE), 4)]  # pixels of the whole views
-    assert look == module.FirstLook(math.ceil(1.1 * 21 * BEFORE) + 8, measured(0.7))
+    assert look == module.FirstLook(math.ceil(1.1 * 21 * BEFORE) + 8, measured(0.7), found.disparity)
     assert sure
 
 
