@@ -17,6 +17,10 @@ TABLE = Path(__file__).with_name("mistakes.txt").read_text("utf-8")
 ANSWERS = re.findall(r"^\$ (.+)\n(\d+): (.+)$", TABLE, flags=re.MULTILINE)
 
 
+def depth_of(disparity):
+    return np.where(disparity > 0, 150 / np.where(disparity > 0, disparity, 1), 0).astype(np.float32)
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """What a new user may have at hand."""
@@ -29,10 +33,10 @@ def folder(tmp_path_factory):
     cv2.imwrite(str(folder / "colour.png"), cv2.merge([photo[..., 0]] * 3))
     cv2.imwrite(str(folder / "photo.jpg"), photo)
     np.save(folder / "colour.npy", cv2.merge([photo[..., 0]] * 3))
-    street = read_disparity(SAMPLES / "maps" / "frame_0001.png")
-    depth = np.where(street > 0, 150 / np.where(street > 0, street, 1), 0)
-    np.save(folder / "depth.npy", depth.astype(np.float32))
-    cv2.imwrite(str(folder / "depth.png"), np.clip(np.rint(1000 * depth), 0, 65535).astype(np.uint16))
+    street, rolled = (read_disparity(SAMPLES / "maps" / f"frame_{n}") for n in ("0001.png", "0003.tiff"))
+    np.save(folder / "depth.npy", depth_of(rolled))
+    millimetres = np.clip(np.rint(1000 * depth_of(street)), 0, 65535)
+    cv2.imwrite(str(folder / "depth.png"), millimetres.astype(np.uint16))
     np.save(folder / "x16.npy", road * 16)
     np.save(folder / "x256.npy", road * 256)
     np.save(folder / "negative.npy", -road)

@@ -7,7 +7,8 @@ it prefers whole pixels. A mean of five has less of it, at a few operations for 
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.estimator.road.subsample import Sample, Singles, count_true
+from rollcli.estimator.road.neighbours import Singles, count_true
+from rollcli.estimator.road.subsample import Sample
 
 # in fifths of the sample's step: with the pixel itself, each row and column of its 5 by 5 cell has one
 _AROUND = ((2, 1), (-2, -1), (1, -2), (-1, 2))
@@ -35,7 +36,7 @@ def averaged(sample: Sample, plane: NDArray[np.float64], near: NDArray[np.intp])
     if not moves:
         return d
     width = sample.disparity.shape[1]
-    there = sample.places(near) + np.array([[down * width + right] for down, right in moves])
+    there = sample.places[near] + np.array([[down * width + right] for down, right in moves])
     with np.errstate(over="ignore", invalid="ignore"):
         off = sample.disparity.reshape(-1).take(there).astype(np.float32, copy=False)
         agrees = off > 0

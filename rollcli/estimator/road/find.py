@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from rollcli.errors import EstimationError
 from rollcli.estimator.road.hypotheses import draw_planes
 from rollcli.estimator.road.model import RoadModel
+from rollcli.estimator.road.neighbours import Singles
 from rollcli.estimator.road.scoring import PlaneScorer, first_costs, slope_weights
-from rollcli.estimator.road.subsample import Sample, Singles
+from rollcli.estimator.road.subsample import Sample
 from rollcli.estimator.road.tuning import SearchTuning
 
 HARDLY_A_PIXEL = "no road: hardly a pixel lies on the best plane that was found"
@@ -82,7 +83,7 @@ def find_road(sample: Sample, max_roll: float, seed: int) -> Road:
         raise EstimationError("no road: nowhere does the disparity grow downward, as it does on a road")
     tuning = sample.tuning.search
     planes = planes[_varied(first_costs(sample, planes, tuning.first_pixels), _rolls(planes), tuning)]
-    scorer = PlaneScorer.of(sample, tuning.second_pixels)
+    scorer = PlaneScorer.of(sample)
     fitted = scorer.fitted(planes)
     kept = np.abs(fitted[:, 1]) <= math.tan(max_roll) * fitted[:, 2]
     fitted = fitted[kept] if kept.any() else planes[:1]
@@ -98,9 +99,7 @@ def find_road(sample: Sample, max_roll: float, seed: int) -> Road:
 def road_weights(sample: Sample, plane: NDArray[np.float64], near: NDArray[np.intp]) -> Singles:
     """Return 0.2 to 1 for each of some pixels: how well the map's slopes around it agree with the plane's."""
     one = plane[None].astype(np.float32)
-    weights: Singles = slope_weights(
-        sample.slopes.take(near, 1), sample.slope_noise, one, sample.tuning.score
-    )[0]
+    weights: Singles = slope_weights(sample.slopes(near), sample.slope_noise, one, sample.tuning.score)[0]
     return weights
 
 

@@ -6,26 +6,27 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.estimator.road.subsample import Sample, Singles, rising
+from rollcli.estimator.road.neighbours import Singles, rising
+from rollcli.estimator.road.subsample import Sample
 
 
 def draw_planes(sample: Sample, max_roll: float, seed: int) -> Singles:
     """Return planes (K, 3) through triples of neighbouring coherent pixels, disparity growing downward."""
     tuning, radius = sample.tuning.hypotheses, sample.tuning.hypotheses.radius
-    few = sample.about(tuning.pool_pixels)
-    coherent = sample.coherence[few] >= sample.tuning.sample.coherent_from
-    pool = np.flatnonzero(coherent & rising(sample.slopes[:, few])) * few.step
+    coarse = sample.coarse
+    coherent = coarse.coherence >= sample.tuning.sample.coherent_from
+    pool = np.flatnonzero(coherent & rising(coarse.slopes))
     if len(pool) < 3:
         return np.empty((0, 3), np.float32)
-    column = sample.column[pool]
+    column = coarse.column[pool]
     pool = pool[np.argsort(column, kind="stable")]
     before = np.concatenate([[0], np.cumsum(np.bincount(column))])  # how many lie left of each column
-    x, y, d = sample.x, sample.y, sample.d
+    x, y, d = coarse.x, coarse.y, coarse.d
     first, second, third = _draws(seed, tuning.draws)
     central = pool[np.abs(x[pool]) < radius]  # the road is more likely there
     both = np.concatenate([pool, central])
     a = both[(first * len(both)).astype(np.intp)]
-    at, reach = sample.column[a].astype(np.intp), int(radius / sample.pitch)
+    at, reach = coarse.column[a], int(radius / sample.pitch)
     from_ = before[np.maximum(at - reach, 0)]
     to = before[np.minimum(at + reach + 1, len(before) - 1)]
     b = pool[from_ + (second * (to - from_)).astype(np.intp)]
@@ -36,7 +37,7 @@ def draw_planes(sample: Sample, max_roll: float, seed: int) -> Singles:
     wide = (np.abs(area) > tuning.least_area) & (np.maximum(np.abs(y1), np.abs(y2)) < radius)
     area = np.where(wide, area, 1)
     c1, c2 = (d1 * y2 - d2 * y1) / area, (x1 * d2 - x2 * d1) / area
-    steep = c2 * radius > tuning.least_rise * sample.tolerance[a]  # a wall's noise is not a road
+    steep = c2 * radius > tuning.least_rise * coarse.tolerance[a]  # a wall's noise is not a road
     good = np.flatnonzero(wide & steep & (np.abs(c1) <= math.tan(max_roll) * c2))[: tuning.kept]
     c1, c2, a = c1[good], c2[good], a[good]
     return np.stack([d[a] - c1 * x[a] - c2 * y[a], c1, c2], 1)

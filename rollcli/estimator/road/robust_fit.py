@@ -12,8 +12,9 @@ from rollcli.estimator.moments import Floats
 from rollcli.estimator.road.average import averaged
 from rollcli.estimator.road.find import HARDLY_A_PIXEL, Road, road_weights
 from rollcli.estimator.road.model import RoadModel
+from rollcli.estimator.road.neighbours import Singles
 from rollcli.estimator.road.profile import Profile, read_profile
-from rollcli.estimator.road.subsample import Sample, Singles
+from rollcli.estimator.road.subsample import Sample
 from rollcli.estimator.road.tuning import FitTuning, ProfileTuning
 
 _KEPT = ("x", "y", "d", "alone", "tolerance", "ahead", "shown")  # as `NearPixels` are picked

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rollcli.estimator.road.subsample import Sample, Singles, rising
+from rollcli.estimator.road.neighbours import Singles, rising
+from rollcli.estimator.road.subsample import CoarseSample, Sample
 from rollcli.estimator.road.tuning import ScoreTuning
 
 _LEAST_ROOT = np.float32(1e-4)  # its 8th power is no denormal: these take ten times as long
@@ -13,21 +14,21 @@ _RIDGE, _TINY = 1 + 1e-8 * np.eye(3), 1e-30 * np.eye(3)  # let singular normal e
 
 def first_costs(sample: Sample, planes: Singles, pixels: int) -> Singles:
     """Return a cheap cost for each plane, with one guess of the road's slope for the corridor of all."""
-    few, tuning = sample.about(pixels), sample.tuning.score
-    x, d = sample.x[few], sample.d[few]
+    coarse, tuning = sample.coarse, sample.tuning.score
+    few = coarse.about(pixels)
+    x, d = coarse.x[few], coarse.d[few]
     middle = len(planes) // 2
     side = np.square(x * np.partition(planes[:, 2], middle)[middle] / d)
     beside = tuning.beside_weight
     corridor = beside + (1 - beside) * np.exp(side * np.float32(-1 / tuning.corridor**2))
-    weight = np.where(rising(sample.slopes[:, few]), 1, np.float32(tuning.off_slope_weight)) * corridor
-    scaled = np.stack([np.ones_like(x), x, sample.y[few], d]) / sample.tolerance[few]
-    costs: Singles = _excess(planes, scaled, _caps(sample.coherence[few], tuning)) @ weight
+    weight = np.where(rising(coarse.slopes[:, few]), 1, np.float32(tuning.off_slope_weight)) * corridor
+    costs: Singles = _excess(planes, *_scaled(coarse, few, tuning)) @ weight
     return costs
 
 
 @dataclass(frozen=True)
 class PlaneScorer:
-    """Some of a sample's pixels, laid out for scoring many planes at once; arrays of shape (N,).
+    """The coarse pixels of a sample, laid out for scoring many planes at once; arrays of shape (N,).
 
     Attributes
     ----------
@@ -54,18 +55,15 @@ class PlaneScorer:
     tuning: ScoreTuning
 
     @classmethod
-    def of(cls, sample: Sample, pixels: int) -> "PlaneScorer":
-        """Take about so many pixels of a sample."""
-        tuning = sample.tuning.score
-        few = sample.about(pixels)
-        x, y, d = sample.x[few], sample.y[few], sample.d[few]
-        scaled = np.stack([np.ones_like(x), x, y, d]) / sample.tolerance[few]
-        near = np.minimum(d, np.float32(tuning.nearness * sample.typical))
+    def of(cls, sample: Sample) -> "PlaneScorer":
+        """Take the coarse pixels of a sample."""
+        tuning, coarse = sample.tuning.score, sample.coarse
+        near = np.minimum(coarse.d, np.float32(tuning.nearness * sample.typical))
         near /= near.mean()
-        caps = _caps(sample.coherence[few], tuning)
-        return cls(
-            np.stack([x, -y]) / d, scaled, caps, near, sample.slopes[:, few], sample.slope_noise, tuning
-        )
+        scaled, caps = _scaled(coarse, slice(None), tuning)
+        bearings = scaled[1:3] / scaled[3]
+        np.negative(bearings[1], out=bearings[1])
+        return cls(bearings, scaled, caps, near, coarse.slopes, sample.slope_noise, tuning)
 
     def scores(self, planes: Singles) -> Singles:
         """Return the score of each plane (K, 3); see `Road.score`."""
@@ -162,7 +160,9 @@ def _residuals(planes: Singles, scaled: Singles) -> Singles:
     return residuals
 
 
-def _caps(coherence: Singles, tuning: ScoreTuning) -> Singles:
-    """Return how many tolerances below a plane a pixel costs at most."""
-    caps: Singles = np.sqrt(1 + np.float32(tuning.below_penalty) * coherence)
-    return caps
+def _scaled(coarse: CoarseSample, few: slice, tuning: ScoreTuning) -> tuple[Singles, Singles]:
+    """Return 1, x, y and d over the tolerance, (4, N), and how many of it below a plane cost the most."""
+    scaled = np.empty((4, len(coarse.d[few])), np.float32)
+    scaled[0], scaled[1], scaled[2], scaled[3] = 1, coarse.x[few], coarse.y[few], coarse.d[few]
+    scaled /= coarse.tolerance[few]
+    return scaled, np.sqrt(1 + np.float32(tuning.below_penalty) * coarse.coherence[few])

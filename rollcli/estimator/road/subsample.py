@@ -1,4 +1,4 @@
-"""A sample of a map's pixels, each with its tolerance, its agreement with its neighbours, and slopes."""
+"""A sample of a map's pixels: all for the fit, and fewer, with their neighbours, for finding the road."""
 
 import math
 from dataclasses import dataclass
@@ -9,12 +9,46 @@ from numpy.typing import NDArray
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.moments import Grid
+from rollcli.estimator.road.neighbours import (
+    NO_SLOPE,
+    Singles,
+    count_true,
+    smallest_step,
+    steps_around,
+    to_slopes,
+)
 from rollcli.estimator.road.tuning import ROAD_TUNING, RoadTuning, SampleTuning
 
-Singles = NDArray[np.float32]
-
 _SMALLEST, _LARGEST = 1e-12, 1e12  # typical disparities whose squares single precision can add up
-NO_SLOPE = np.float32(np.inf)  # agrees with no road
+
+
+@dataclass(frozen=True)
+class CoarseSample:
+    """The pixels of a sample that planes are drawn through and judged by; arrays of shape (M,) unless said.
+
+    Attributes
+    ----------
+    x, y, d, tolerance : ndarray of float32
+        As in `Sample`.
+    column : ndarray of int
+        Column of each pixel among all that are sampled.
+    coherence : ndarray of float32
+        The share of the valid ones among four neighbours whose disparity is within tolerance.
+    slopes : ndarray of float32, shape (4, M)
+        As `Sample.slopes` returns them.
+    """
+
+    x: Singles
+    y: Singles
+    d: Singles
+    tolerance: Singles
+    column: NDArray[np.intp]
+    coherence: Singles
+    slopes: Singles
+
+    def about(self, pixels: int) -> slice:
+        """Return a slice that takes about so many of the pixels, evenly."""
+        return every(len(self.d), pixels)
 
 
 @dataclass(frozen=True)
@@ -35,17 +69,10 @@ class Sample:
         The median disparity, px.
     noise : float
         The part of it that does not grow with the disparity, px.
-    coherence : ndarray of float32
-        The share of the valid ones among four neighbours whose disparity is within tolerance.
-    slopes : ndarray of float32, shape (4, N)
-        One-sided derivatives of d to the left, right, up and down, px per unit of x or y; infinite
-        where the neighbour is no data.
-    slope_noise : float
-        What the noise makes of a slope, px per unit.
-    row : ndarray of int
-        Row of each pixel among the sampled ones.
-    column : ndarray of uint16
-        Column of each pixel among the sampled ones.
+    places : ndarray of int
+        Where each pixel is in the map, counted row by row.
+    coarse : CoarseSample
+        Every so many of the pixels, with their neighbours.
     pitch : float
         Distance between neighbouring columns of the sample, units of x.
     quantum : float
@@ -67,11 +94,8 @@ class Sample:
     tolerance: Singles
     typical: float
     noise: float
-    coherence: Singles
-    slopes: Singles
-    slope_noise: float
-    row: NDArray[np.intp]
-    column: NDArray[np.uint16]
+    places: NDArray[np.intp]
+    coarse: CoarseSample
     pitch: float
     quantum: float
     disparity: NDArray[Any]
@@ -80,19 +104,19 @@ class Sample:
     step: int
     tuning: RoadTuning
 
-    def about(self, pixels: int) -> slice:
-        """Return a slice that takes about so many of the pixels, evenly."""
-        return slice(None, None, max(1, round(len(self.d) / pixels)))
+    @property
+    def slope_noise(self) -> float:
+        """What the noise makes of a slope, px per unit."""
+        return self.noise * self.grid.scale / self.reach
 
-    def places(self, some: NDArray[np.intp]) -> NDArray[np.intp]:
-        """Return where some of the pixels are in the map, counted row by row."""
-        width = self.disparity.shape[1]
-        first = _first(self.reach, self.step) * (width + 1)
-        places: NDArray[np.intp] = self.row[some] * width
-        places += self.column[some]
-        places *= self.step
-        places += first
-        return places
+    def slopes(self, some: NDArray[np.intp]) -> Singles:
+        """Return the slopes around some of the pixels, shape (4, M).
+
+        One-sided derivatives of d to the left, right, up and down, px per unit of x or y; infinite where the
+        neighbour is no data.
+        """
+        steps = steps_around(self.disparity, self.places[some], self.d[some], self.reach)
+        return to_slopes(steps, self.grid.scale / self.reach)
 
 
 def take_sample(
@@ -133,46 +157,53 @@ def take_sample(
         raise EstimationError(
             f"only {len(chosen)} valid pixels away from the border: too few to find a road in"
         )
+    disparity = np.ascontiguousarray(disparity)
     first = _first(reach, step)
-
-    def at(dv: int, du: int) -> "NDArray[Any]":  # evaluated at each call, it would take time
-        return _strided(disparity, reach, step, dv, du).ravel()[chosen]
-
     rows = chosen // taken.shape[1]  # divmod would take longer
     columns = chosen - rows * taken.shape[1]
+    places = (rows * width + columns) * step + first * (width + 1)
     with np.errstate(over="ignore"):
-        d = at(0, 0).astype(np.float32, copy=False)
-    typical = _median(d)
+        d: Singles = disparity.reshape(-1).take(places).astype(np.float32, copy=False)
+    few = every(len(d), numbers.coarse_pixels)
+    few_d = d[few].copy()
+    typical = _median(few_d)
     if not _SMALLEST < typical < _LARGEST:
         raise EstimationError(f"disparities of about {typical:g}: they have to be in pixels, or nearly so")
-    steps = _steps(d, at(0, -reach), at(0, reach), at(-reach, 0), at(reach, 0))
+    steps = steps_around(disparity, places[few], few_d, reach)
     jumps = np.abs(steps)
-    known = jumps < NO_SLOPE
-    quantum = _quantum(jumps, numbers)
-    noise, tolerance = _tolerance(d, typical, quantum, numbers)
-    near = jumps <= np.maximum(tolerance, np.float32(numbers.coherent_share * typical))
+    quantum = smallest_step(jumps, numbers.quantum_part)
+    noise = _noise(typical, quantum, numbers)
+    near = jumps <= np.maximum(
+        _tolerance(few_d, noise, numbers), np.float32(numbers.coherent_share * typical)
+    )
     coherence = count_true(near)
-    coherence /= np.maximum(count_true(known), 1)
-    coherent = d.compress(coherence >= numbers.coherent_from)
+    coherence /= np.maximum(count_true(jumps < NO_SLOPE), 1)
+    coherent = few_d.compress(coherence >= numbers.coherent_from)
     if len(coherent):  # again, without the noise, which has another median
-        noise, tolerance = _tolerance(d, typical := _median(coherent), quantum, numbers)
-    per_unit = grid.scale / reach
-    steps *= np.array([-per_unit, per_unit, -per_unit, per_unit], np.float32)[:, None]
-    xs = (np.arange(first, width, step) - grid.centre_u) / grid.scale
-    ys = (np.arange(first, height, step) - grid.centre_v) / grid.scale
+        typical = _median(coherent)
+        noise = _noise(typical, quantum, numbers)
+    tolerance = _tolerance(d, noise, numbers)
+    x = ((np.arange(first, width, step) - grid.centre_u) / grid.scale).astype(np.float32).take(columns)
+    y = ((np.arange(first, height, step) - grid.centre_v) / grid.scale).astype(np.float32).take(rows)
+    coarse = CoarseSample(
+        x=x[few],
+        y=y[few],
+        d=few_d,
+        tolerance=tolerance[few],
+        column=columns[few],
+        coherence=coherence,
+        slopes=to_slopes(steps, grid.scale / reach),
+    )
     return Sample(
         grid=grid,
-        x=xs.astype(np.float32)[columns],
-        y=ys.astype(np.float32)[rows],
+        x=x,
+        y=y,
         d=d,
         tolerance=tolerance,
         typical=typical,
         noise=noise,
-        coherence=coherence,
-        slopes=steps,
-        slope_noise=noise * per_unit,
-        row=rows,
-        column=columns.astype(np.uint16),
+        places=places,
+        coarse=coarse,
         pitch=step / grid.scale,
         quantum=quantum,
         disparity=disparity,
@@ -183,11 +214,9 @@ def take_sample(
     )
 
 
-def rising(slopes: Singles) -> NDArray[np.bool_]:
-    """Return where the disparity grows downward, above the pixel or below it."""
-    up, down = slopes[2:]
-    grows: NDArray[np.bool_] = ((up > 0) & (up < NO_SLOPE)) | ((down > 0) & (down < NO_SLOPE))
-    return grows
+def every(count: int, pixels: int) -> slice:
+    """Return a slice that takes about so many of a number of pixels, evenly."""
+    return slice(None, None, max(1, round(count / pixels)))
 
 
 def reach_of(height: int, width: int, numbers: SampleTuning) -> int:
@@ -226,40 +255,17 @@ def _taken(
     return taken if usable is None else taken & _strided(usable, reach, step)
 
 
-def _steps(d: Singles, *around: NDArray[Any]) -> Singles:
-    """Return the differences to the neighbours, NO_SLOPE where there is none: shape (neighbours, N)."""
-    steps = np.empty((len(around), len(d)), np.float32)
-    for row, neighbour in zip(steps, around, strict=True):
-        row[:] = neighbour
-    with np.errstate(invalid="ignore"):
-        unknown = ~(steps > 0)
-    steps -= d
-    np.copyto(steps, NO_SLOPE, where=unknown)
-    return steps
-
-
-def count_true(agreeing: NDArray[np.bool_]) -> Singles:
-    """Return how many of a pixel's neighbours agree, from bool (neighbours, N)."""
-    counts: NDArray[np.uint8] = agreeing.view(np.uint8).sum(0, dtype=np.uint8)  # a sum of bool takes longer
-    return counts.astype(np.float32)
-
-
 def _median(values: Singles) -> float:
-    few = values[::4]  # it is a scale: all would take time
-    middle = len(few) // 2
-    return float(np.partition(few, middle)[middle])
+    middle = len(values) // 2
+    return float(np.partition(values, middle)[middle])
 
 
-def _tolerance(d: Singles, typical: float, quantum: float, numbers: SampleTuning) -> tuple[float, Singles]:
-    """Return the noise, px, and the tolerance of each pixel."""
-    noise = max(numbers.noise_share * typical, numbers.quantum_share * quantum)
+def _noise(typical: float, quantum: float, numbers: SampleTuning) -> float:
+    """Return what matching and rounding get wrong at any disparity, px."""
+    return max(numbers.noise_share * typical, numbers.quantum_share * quantum)
+
+
+def _tolerance(d: Singles, noise: float, numbers: SampleTuning) -> Singles:
+    """Return how far each pixel of a road may be off, px."""
     tolerance: Singles = np.sqrt(np.float32(noise) ** 2 + np.square(np.float32(numbers.uneven_share) * d))
-    return noise, tolerance
-
-
-def _quantum(jumps: Singles, numbers: SampleTuning) -> float:
-    """Return the smallest step between neighbours (5th percentile): 1 in a map of whole pixels, 0 if none."""
-    some: Singles = jumps[1::2, ::4].ravel()
-    some = some.compress((some > 0) & (some < NO_SLOPE))
-    place = len(some) // numbers.quantum_part
-    return float(np.partition(some, place)[place]) if len(some) else 0.0
+    return tolerance

@@ -86,7 +86,7 @@ def test_pixels_half_of_whose_neighbours_agree_are_coherent_enough():
     u = np.arange(640)
     striped = rising_by(8) * (1 + 0.3 * (u // 3 % 2))  # neighbours are 3 px away: those below are alike
     sample = take_sample(striped)
-    assert (sample.coherence == 0.5).all()
+    assert (sample.coarse.coherence == 0.5).all()
     assert len(draw_planes(sample, MAX_ROLL, 0)) > 0
 
 

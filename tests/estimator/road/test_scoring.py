@@ -8,9 +8,10 @@ import pytest
 
 from rollcli.estimator.road.find import find_road
 from rollcli.estimator.road.model import RoadModel
+from rollcli.estimator.road.neighbours import NO_SLOPE, rising
 from rollcli.estimator.road.scoring import PlaneScorer, first_costs, slope_weights
-from rollcli.estimator.road.subsample import NO_SLOPE, rising, take_sample
-from rollcli.estimator.road.tuning import ROAD_TUNING, ScoreTuning
+from rollcli.estimator.road.subsample import take_sample
+from rollcli.estimator.road.tuning import ROAD_TUNING, SampleTuning, ScoreTuning
 from tests.estimator.synthetic_maps import flat_road
 
 TUNING = ScoreTuning(  # other numbers than the defaults, each of them felt
@@ -26,7 +27,7 @@ TUNING = ScoreTuning(  # other numbers than the defaults, each of them felt
     least_corridor=0.1,
     least_core=0.05,
 )
-PIXELS = 700
+FEWER = SampleTuning(coarse_pixels=700)
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +38,7 @@ def sample():
     disparity = np.where(road > 0, np.maximum(road + rng.normal(0, 0.2, road.shape), 0.01), 0)
     disparity[100:200, 230:300] = 25.0
     disparity[rng.random(road.shape) < 0.1] *= 0.4
-    return take_sample(disparity, tuning=dataclasses.replace(ROAD_TUNING, score=TUNING))
+    return take_sample(disparity, tuning=dataclasses.replace(ROAD_TUNING, sample=FEWER, score=TUNING))
 
 
 @pytest.fixture(scope="module")
@@ -53,8 +54,8 @@ def planes(sample):
 
 
 def laid_out(sample):
-    few = sample.about(PIXELS)
-    return (np.asarray(each[few], float) for each in (sample.x, sample.y, sample.d, sample.tolerance))
+    coarse = sample.coarse
+    return (np.asarray(each, float) for each in (coarse.x, coarse.y, coarse.d, coarse.tolerance))
 
 
 def places(plane, x, y, d, sample):
@@ -92,11 +93,10 @@ def test_a_pixel_without_neighbours_has_the_weight_of_one_off_the_slope():
 
 def test_the_score_is_the_mean_of_what_lies_on_the_plane_in_corridor_and_core(sample, planes):
     x, y, d, tolerance = laid_out(sample)
-    few = sample.about(PIXELS)
-    found = PlaneScorer.of(sample, PIXELS).scores(planes)
+    found = PlaneScorer.of(sample).scores(planes)
     for score, plane in zip(found, planes, strict=True):
-        agreeing = slope_weights(sample.slopes[:, few], sample.slope_noise, plane[None], TUNING)[0]
-        more = costs(plane, x, y, d, tolerance, sample.coherence[few]) - 1
+        agreeing = slope_weights(sample.coarse.slopes, sample.slope_noise, plane[None], TUNING)[0]
+        more = costs(plane, x, y, d, tolerance, sample.coarse.coherence) - 1
         gained = -np.where(more < 0, agreeing * more, more)
         corridor, core = places(plane, x, y, d, sample)
         shares = [
@@ -113,13 +113,10 @@ def test_the_score_is_the_mean_of_what_lies_on_the_plane_in_corridor_and_core(sa
 @pytest.mark.parametrize("fits", [1, 2])
 def test_a_plane_is_fitted_to_the_pixels_on_it_by_weighted_least_squares(sample, planes, fits):
     x, y, d, tolerance = laid_out(sample)
-    few = sample.about(PIXELS)
-    scorer = dataclasses.replace(
-        PlaneScorer.of(sample, PIXELS), tuning=dataclasses.replace(TUNING, fits=fits)
-    )
+    scorer = dataclasses.replace(PlaneScorer.of(sample), tuning=dataclasses.replace(TUNING, fits=fits))
     found = scorer.fitted(planes[:4])
     for fitted, plane in zip(found, planes[:4], strict=True):
-        agreeing = slope_weights(sample.slopes[:, few], sample.slope_noise, plane[None], TUNING)[0]
+        agreeing = slope_weights(sample.coarse.slopes, sample.slope_noise, plane[None], TUNING)[0]
         corridor, _ = places(plane, x, y, d, sample)
         expected = plane
         for width in (3.0, 1.0)[:fits]:
@@ -133,11 +130,10 @@ def test_a_plane_is_fitted_to_the_pixels_on_it_by_weighted_least_squares(sample,
 
 def test_the_first_costs_are_those_of_pixels_ahead_of_a_usual_plane(sample, planes):
     x, y, d, tolerance = laid_out(sample)
-    few = sample.about(PIXELS)
     ahead = 0.1 + 0.9 * np.exp(-((x * np.sort(planes[:, 2])[len(planes) // 2] / d / 0.8) ** 2))
-    weights = ahead * np.where(rising(sample.slopes[:, few]), 1, 0.3)
-    expected = [weights @ costs(plane, x, y, d, tolerance, sample.coherence[few]) for plane in planes]
-    np.testing.assert_allclose(first_costs(sample, planes, PIXELS), expected, rtol=1e-4)
+    weights = ahead * np.where(rising(sample.coarse.slopes), 1, 0.3)
+    expected = [weights @ costs(plane, x, y, d, tolerance, sample.coarse.coherence) for plane in planes]
+    np.testing.assert_allclose(first_costs(sample, planes, len(x)), expected, rtol=1e-4)
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2, 3])
@@ -151,7 +147,7 @@ def test_near_the_bound_those_fits_that_stay_within_it_compete(seed):
 
 
 def test_no_weight_is_denormal_since_these_take_ten_times_as_long(sample, planes):
-    scorer = PlaneScorer.of(sample, PIXELS)
+    scorer = PlaneScorer.of(sample)
     far = dataclasses.replace(scorer, bearings=scorer.bearings * 40)
     for weights in far._weights(planes):
         assert weights.min() > np.finfo(np.float32).tiny

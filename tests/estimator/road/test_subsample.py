@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from rollcli.errors import EstimationError
-from rollcli.estimator.road.subsample import NO_SLOPE, reach_of, rising, take_sample
+from rollcli.estimator.road.neighbours import NO_SLOPE, rising
+from rollcli.estimator.road.subsample import reach_of, take_sample
 from rollcli.estimator.road.tuning import ROAD_TUNING
 from rollcli.simulate.render import true_disparity
 from rollcli.simulate.spec import FrameSpec
@@ -39,7 +40,7 @@ def test_a_factor_changes_the_unit_alone(street):
     one, hundred = take_sample(street), take_sample(100 * street)
 
     np.testing.assert_allclose(hundred.tolerance, 100 * one.tolerance, rtol=1e-5)
-    np.testing.assert_array_equal(hundred.coherence, one.coherence)
+    np.testing.assert_array_equal(hundred.coarse.coherence, one.coarse.coherence)
 
 
 def test_pixels_without_neighbours_are_a_sample_too(street):
@@ -48,7 +49,7 @@ def test_pixels_without_neighbours_are_a_sample_too(street):
 
     sample = take_sample(alone)
 
-    assert not sample.coherence.any()
+    assert not sample.coarse.coherence.any()
     assert sample.typical == pytest.approx(take_sample(street).typical, rel=0.1)
 
 
@@ -76,7 +77,9 @@ def test_the_map_rises_where_a_known_slope_above_or_below_does(up, down, grows):
 def test_slopes_are_those_of_the_map_per_unit_to_all_four_sides():
     v, u = np.mgrid[:480, :640]
     sample = take_sample((50 + 0.02 * u + 0.1 * v).astype(np.float32))
-    left, right, up, down = sample.slopes
+    some = np.arange(3, len(sample.d), 7)
+    np.testing.assert_allclose(sample.slopes(some)[2:], 0.1 * sample.grid.scale, rtol=1e-3)
+    left, right, up, down = sample.coarse.slopes
 
     for slope, expected in ((left, 0.02), (right, 0.02), (up, 0.1), (down, 0.1)):
         np.testing.assert_allclose(slope, expected * sample.grid.scale, rtol=1e-3)
@@ -127,7 +130,7 @@ def test_a_pixel_half_of_whose_neighbours_agree_is_no_noise():
 def test_places_are_where_the_sampled_disparities_are(size):
     disparity = np.random.default_rng(2).uniform(10, 20, size).astype(np.float32)
     sample = take_sample(disparity)
-    places = sample.places(np.arange(len(sample.d)))
+    places = sample.places
     np.testing.assert_array_equal(disparity.ravel()[places], sample.d)
     v, u = np.divmod(places, size[1])
     np.testing.assert_allclose(sample.x, (u - (size[1] - 1) / 2) / (size[1] / 2), atol=1e-6)
@@ -143,3 +146,21 @@ def test_places_are_where_the_sampled_disparities_are(size):
 )
 def test_neighbours_are_as_far_away_as_the_size_of_the_map_allows(size, reach):
     assert reach_of(*size, ROAD_TUNING.sample) == reach
+
+
+def test_the_coarse_sample_is_every_so_many_of_the_pixels_with_their_slopes(street):
+    sample = take_sample(street)
+    coarse, step = sample.coarse, round(len(sample.d) / ROAD_TUNING.sample.coarse_pixels)
+    assert step > 1
+    for name in ("x", "y", "d", "tolerance"):
+        np.testing.assert_array_equal(getattr(coarse, name), getattr(sample, name)[::step])
+    np.testing.assert_array_equal(coarse.slopes, sample.slopes(np.arange(0, len(sample.d), step)))
+    np.testing.assert_allclose(coarse.column * sample.pitch, coarse.x - coarse.x.min(), atol=1e-5)
+    few = coarse.about(100)
+    assert len(coarse.d[few]) == pytest.approx(100, rel=0.1)
+
+
+def test_the_slopes_of_holes_agree_with_no_road(street):
+    holes = np.where(np.random.default_rng(0).random(street.shape) < 0.5, 0, street)
+    slopes = take_sample(holes).coarse.slopes
+    assert 0.4 < np.mean(np.abs(slopes) == NO_SLOPE) < 0.6

@@ -1,0 +1,67 @@
+"""How a map's disparity changes from a pixel to those around it."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Singles = NDArray[np.float32]
+
+NO_SLOPE = np.float32(np.inf)  # agrees with no road
+_TOWARDS = np.array([[-1], [1], [-1], [1]], np.float32)  # left, right, up and down along x or y
+
+
+def steps_around(disparity: NDArray[Any], places: NDArray[np.intp], d: Singles, reach: int) -> Singles:
+    """Return how the disparity changes from some pixels to their neighbours.
+
+    Parameters
+    ----------
+    disparity : ndarray, shape (H, W)
+        The map; contiguous, or this takes time.
+    places : ndarray of int, shape (N,)
+        Where the pixels are, counted row by row; at least `reach` from the border.
+    d : ndarray of float32, shape (N,)
+        Their disparities.
+    reach : int
+        How far away the neighbours are, px.
+
+    Returns
+    -------
+    ndarray of float32, shape (4, N)
+        To the left, right, up and down, px; `NO_SLOPE` where the neighbour is no data.
+    """
+    down = reach * disparity.shape[1]
+    there = places + np.array([[-reach], [reach], [-down], [down]])
+    with np.errstate(invalid="ignore", over="ignore"):
+        steps: Singles = disparity.reshape(-1).take(there).astype(np.float32, copy=False)
+        unknown = ~(steps > 0)
+    steps -= d
+    np.copyto(steps, NO_SLOPE, where=unknown)
+    return steps
+
+
+def to_slopes(steps: Singles, per_unit: float) -> Singles:
+    """Return the one-sided derivatives (4, N) along x and y, from steps over 1 / per_unit units."""
+    slopes: Singles = steps * (_TOWARDS * np.float32(per_unit))
+    return slopes
+
+
+def rising(slopes: Singles) -> NDArray[np.bool_]:
+    """Return where the disparity grows downward, above the pixel or below it."""
+    up, down = slopes[2:]
+    grows: NDArray[np.bool_] = ((up > 0) & (up < NO_SLOPE)) | ((down > 0) & (down < NO_SLOPE))
+    return grows
+
+
+def count_true(agreeing: NDArray[np.bool_]) -> Singles:
+    """Return how many of a pixel's neighbours agree, from bool (neighbours, N)."""
+    counts: NDArray[np.uint8] = agreeing.view(np.uint8).sum(0, dtype=np.uint8)  # a sum of bool takes longer
+    return counts.astype(np.float32)
+
+
+def smallest_step(jumps: Singles, part: int) -> float:
+    """Return the 1/part quantile of the steps to the right and down, px: 0 if there are none."""
+    some: Singles = jumps[1::2].ravel()
+    some = some.compress((some > 0) & (some < NO_SLOPE))
+    place = len(some) // part
+    return float(np.partition(some, place)[place]) if len(some) else 0.0
