@@ -14,6 +14,7 @@ Reals = NDArray[np.floating[Any]]
 Coordinate = TypeVar("Coordinate", float, Reals)
 
 
+_HARDLY = 1e-9  # of the slope: a disparity that is none, by which squares can be divided
 _FARTHEST = 4.0  # camera heights to the side; camber is not extrapolated beyond
 
 
@@ -65,10 +66,13 @@ class RoadModel(NamedTuple):
         a0, a1, a2 = self.alpha
         return a0 + along * (a1 + along * a2)
 
-    def turning(self, across: Reals, along: Reals) -> Reals:
+    def turning(self, across: Reals, along: Reals, out: Reals | None = None) -> Reals:
         """Return the derivative of the road's disparity with respect to theta, px/rad [GD eq. 13]."""
         _, a1, a2 = self.alpha
-        return across * (along * (-2 * a2) - a1)
+        slope = np.multiply(along, -2 * a2, out=out)
+        slope -= a1
+        slope *= across
+        return slope
 
     def bulge(self, across: Reals, road: Reals) -> Reals:
         """Return what a camber of 1 adds to the disparity, px: half the disparity times the side squared.
@@ -78,17 +82,20 @@ class RoadModel(NamedTuple):
         across : ndarray
             Coordinate across the road.
         road : ndarray
-            Disparity there without camber, px; 0 is returned where it is not positive.
+            Disparity there without camber, px; hardly anything is returned where it is not positive.
 
         Notes
         -----
         A surface that is higher by h camera heights is nearer, and its disparity larger by the factor
         1 / (1 - h), in first order 1 + h.
         """
-        positive = np.maximum(road, 0)
-        lateral = across * abs(self.alpha[1])
-        lateral = np.minimum(np.square(lateral), np.square(_FARTHEST * positive))
-        bulge: Reals = 0.5 * lateral / np.maximum(positive, 1e-30)
+        slope = abs(self.alpha[1])
+        positive = np.maximum(road, _HARDLY * slope + 1e-30)
+        bulge = across * slope
+        bulge *= bulge
+        bulge /= positive
+        np.minimum(bulge, positive * _FARTHEST**2, out=bulge)
+        bulge *= 0.5
         return bulge
 
     def side(self, x: Reals, y: Reals, disparity: Reals) -> Reals:

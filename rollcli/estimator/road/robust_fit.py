@@ -28,8 +28,8 @@ class Fit(NamedTuple):
     Attributes
     ----------
     model : RoadModel
-    off : ndarray, shape (N,)
-        Road minus disparity in tolerances.
+    squares : ndarray, shape (N,)
+        Squared distances from the road, in tolerances.
     limit : float
         Where the weights end, in tolerances.
     camber_precision : float
@@ -37,7 +37,7 @@ class Fit(NamedTuple):
     """
 
     model: RoadModel
-    off: Singles
+    squares: Singles
     limit: float
     camber_precision: float = math.inf
 
@@ -113,13 +113,14 @@ class NearPixels:
     def profile(self, lane: RoadModel, tuning: ProfileTuning) -> tuple[Profile, "NearPixels"]:
         """Read the profile across the lane; return it, and the pixels weighted by it."""
         road = lane.disparity_along(lane.along(self.x, self.y))
-        side = lane.side(self.x, self.y, np.maximum(road, tuning.least_road * self.d))
-        used = np.flatnonzero((self.place > tuning.least_place) & (road > tuning.least_road * self.d))
+        least = self.d * tuning.least_road
+        side = lane.side(self.x, self.y, np.maximum(road, least))
+        used = np.flatnonzero((self.place > tuning.least_place) & (road > least))
         profile = read_profile(side[used], self.d[used] / road[used] - 1, tuning)
-        weights = profile.at(side)
+        weights: Singles = profile.at(side).astype(np.float32, copy=False)
         kept = np.flatnonzero(weights > self.tuning.least_weight)
         arrays = {name: getattr(self, name)[kept] for name in _KEPT}
-        return profile, replace(self, **arrays, place=self.place[kept] * weights[kept].astype(np.float32))
+        return profile, replace(self, **arrays, place=self.place[kept] * weights[kept])
 
     def fit(self, start: RoadModel, rounds: int, *, parabolic: bool, cambered: bool = False) -> Fit:
         """Fit (a0, a1, a2, theta) and the camber, starting from the road's plane or from an earlier fit.
@@ -127,86 +128,101 @@ class NearPixels:
         Gauss-Newton with Tukey's biweight, whose width shrinks from two tolerances as far as the spread of
         the pixels ahead allows. The camber has a prior: where the pixels do not determine it, it stays small.
         """
-        most = self.tuning.most_turn
         design = np.empty((6, len(self.d)), np.float32)
-        design[0], design[4], design[5] = 1, 0, self.d
-        across, off = self._lay_out(design, start, cambered=cambered)
-        fit = Fit(start, off, self.tuning.start_width)
+        design[0], design[4] = 1, 0
+        ahead = self.ahead + np.float32(self.tuning.beside)
+        across, squares = self._lay_out(design, start, self.d, cambered=cambered)
+        fit = Fit(start, squares, self.tuning.start_width)
         for _ in range(rounds):
-            model, weights = fit.model, self.weights(fit)
+            weights = self.weights(fit)
             if not parabolic:
                 design[2] = 0
-            design[3] = model.turning(across, design[1])
-            precision = self._camber_precision(weights, fit.off) if cambered else math.inf
+            fit.model.turning(across, design[1], out=design[3])
             products = ((design * weights) @ design.T).astype(np.float64)
+            precision = math.inf
             if cambered:
+                precision = self._camber_precision(products)
                 products[4, 4] += precision
-            a0, a1, a2, turned, camber = solve_normal(products[:5, :5], products[:5, 5:])[:, 0].tolist()
-            turned = max(-most, min(most, turned))
-            model = RoadModel(model.theta + turned, (a0, a1, a2), camber)
-            across, off = self._lay_out(design, model, cambered=cambered)
-            fit = Fit(model, off, min(fit.limit, self._width(off, weights)), precision)
+                products[4, 5] -= precision * fit.model.camber
+            model = self._moved(fit.model, solve_normal(products[:5, :5], products[:5, 5:])[:, 0].tolist())
+            across, squares = self._lay_out(design, model, self.d, cambered=cambered)
+            weights *= ahead
+            fit = Fit(model, squares, min(fit.limit, self._width(squares, weights)), precision)
         return fit
 
     def weights(self, fit: Fit) -> Singles:
         """Return the weights that a fit leaves, 0 to 1; refuse a surface with hardly a pixel on it."""
-        return self._weights(fit.off, fit.limit)
+        return self._weights(fit.squares, fit.limit)
 
     def limit_alone(self, model: RoadModel) -> float:
         """Return where the weights of single pixels around a road would end, in tolerances.
 
         Averaged ones lie closer together.
         """
-        design = np.ones((5, len(self.d)), np.float32)
-        off = self._lay_out(design, model, cambered=True)[1] + (self.d - self.alone) / self.tolerance
+        design = np.ones((6, len(self.d)), np.float32)
+        _, squares = self._lay_out(design, model, self.alone, cambered=True)
+        ahead = self.ahead + np.float32(self.tuning.beside)
         limit = self.tuning.start_width
         for _ in range(self.tuning.rounds):
-            limit = min(limit, self._width(off, self._weights(off, limit)))
+            limit = min(limit, self._width(squares, self._weights(squares, limit) * ahead))
         return limit
 
-    def _lay_out(self, design: Singles, model: RoadModel, *, cambered: bool) -> tuple[Singles, Singles]:
-        """Set a design's rows 1 and 2, the coordinate along the road and its square, and 4, the bulge.
+    def _lay_out(
+        self, design: Singles, model: RoadModel, d: Singles, *, cambered: bool
+    ) -> tuple[Singles, Singles]:
+        """Set a design's rows 1 and 2, the coordinate along the road and its square, 4, the bulge, and 5.
 
-        Return the coordinate across the road, and road minus disparity in tolerances.
+        The last is what the road leaves of some disparities. Return the coordinate across the road, and the
+        squares of what is left, in tolerances.
         """
         across: Singles = model.across(self.x, self.y)
         design[1] = model.along(self.x, self.y)
         np.square(design[1], out=design[2])
-        off: Singles = np.array(model.alpha, np.float32) @ design[:3]  # RoadModel.disparity takes longer
+        road: Singles = np.array(model.alpha, np.float32) @ design[:3]  # RoadModel.disparity takes longer
         if cambered:
-            design[4] = model.bulge(across, off)
-            off += np.float32(model.camber) * design[4]
-        off -= self.d
-        off /= self.tolerance
-        return across, off
+            design[4] = model.bulge(across, road)
+            road += np.float32(model.camber) * design[4]
+        np.subtract(d, road, out=design[5])
+        squares = design[5] / self.tolerance
+        squares *= squares
+        return across, squares
 
-    def _weights(self, off: Singles, limit: float) -> Singles:
+    def _moved(self, model: RoadModel, steps: list[float]) -> RoadModel:
+        """Return a road whose parameters differ by some steps; no round turns it by more than it may."""
+        most, (a0, a1, a2) = self.tuning.most_turn, model.alpha
+        d0, d1, d2, turned, camber = steps
+        turned = max(-most, min(most, turned))
+        return RoadModel(model.theta + turned, (a0 + d0, a1 + d1, a2 + d2), model.camber + camber)
+
+    def _weights(self, squares: Singles, limit: float) -> Singles:
         """Return the weights; refuse a surface with hardly a pixel on it."""
-        inside = np.maximum(0, 1 - np.square(off / limit))
-        weights: Singles = inside * inside * self.place
+        weights = squares * (-1 / limit**2)
+        weights += 1
+        np.maximum(weights, 0, out=weights)
+        weights *= weights
+        weights *= self.place
         if np.count_nonzero(weights) < self.tuning.least_pixels:
             raise EstimationError(HARDLY_A_PIXEL)
         return weights
 
-    def _camber_precision(self, weights: Singles, off: Singles) -> float:
+    def _camber_precision(self, products: Floats) -> float:
         """Return what the camber's prior adds to its normal equation.
 
         The variance of the pixels over that of the prior, times how often neighbouring pixels repeat each
         other.
         """
-        total = float(weights.sum())
-        variance = float(weights @ np.square(off * self.tolerance)) / total
+        total = float(products[0, 0])
+        variance = float(products[5, 5]) / total
         repeated = max(1.0, total / self.tuning.independent_pixels)
         return variance * repeated / self.tuning.camber**2
 
-    def _width(self, off: Singles, weights: Singles) -> float:
+    def _width(self, squares: Singles, weights: Singles) -> float:
         """Return how wide the weights should be, from the spread of the pixels ahead that have some.
 
         Every step is smooth: a pixel more or less must not turn the road.
         """
         tuning = self.tuning
-        weights = weights * (self.ahead + np.float32(tuning.beside))
-        spread = tuning.biweight_spread * math.sqrt(float(weights @ np.square(off)) / float(weights.sum()))
+        spread = tuning.biweight_spread * math.sqrt(float(weights @ squares) / float(weights.sum()))
         mix = (spread - tuning.even_spread) / (tuning.uneven_spread - tuning.even_spread)
         times = tuning.even_width + max(0.0, min(1.0, mix)) * (tuning.uneven_width - tuning.even_width)
         return max(self.least_width, times * spread)
