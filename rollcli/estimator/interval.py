@@ -14,12 +14,13 @@ Satterthwaite, "An approximate distribution of estimates of variance components"
 import itertools
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from rollcli.estimator.moments import Floats
 from rollcli.estimator.road.model import Reals, RoadModel
-from rollcli.estimator.road.robust_fit import solve_normal
+from rollcli.estimator.road.robust_fit import inverse_of_normal
 from rollcli.estimator.road.surface import Surface
 from rollcli.estimator.tuning import IntervalTuning
 
@@ -139,74 +140,114 @@ def jackknife(surface: Surface, theta: float, tuning: IntervalTuning) -> Jackkni
     model, weights = surface.model._replace(theta=theta), surface.weights
     across, along = model.across(surface.x, surface.y), model.along(surface.x, surface.y)
     cambered = math.isfinite(surface.camber_precision)
+    prior = surface.camber_precision if cambered else 0.0
     plain = model.disparity_along(along)
     rows = np.empty((6, len(along)))
     rows[0], rows[1], rows[2] = 1, along, along * along * surface.parabolic
-    rows[3] = model.turning(across, along)
+    model.turning(across, along, out=rows[3])
     rows[4] = model.bulge(across, plain) if cambered else 0
-    rows[5] = surface.d - plain
-    bands = _by_group(rows, weights, along, np.ones_like(along), tuning.groups)
-    columns = _by_group(rows, weights, across, weights * np.square(rows[3]), tuning.groups)
+    np.subtract(surface.d, plain, out=rows[5])
+    rows *= np.sqrt(weights)  # from here on all products are weighted
+
+    bands = _by_group(rows, along, None, tuning.groups)
+    columns = _by_group(rows, across, np.square(rows[3]), tuning.groups)
     total = bands.sum(0)
-    normal = total[:5, :5].copy()
-    prior = surface.camber_precision if cambered else 0.0
-    normal[_CAMBER, _CAMBER] += prior
-    inverse = solve_normal(normal, np.eye(5))
-    step = inverse @ total[:5, 5]  # from the surface's parabola to the best one
-    independent = max(1.0, total[0, 0] / tuning.independent_pixels)
-    rest = max(0.0, total[5, 5] - step @ total[:5, 5])
-    white: Floats = inverse * (rest / total[0, 0] * independent)
+    parts = _lane(model.side(across, plain)), _near(weights, along, tuning)
+    lane, near = ((rows * part) @ rows.T for part in parts)
+    halves = np.stack([lane, total, near, total - near]) + tuning.whole_share * total
+    found, inverse = _solved(total, np.concatenate([bands, columns]), halves, prior)
+
+    white: Floats = inverse * _white(total, found.whole, tuning)
     if not surface.parabolic:  # there is no a2 to err
         white[2] = white[:, 2] = 0
-    changes = _changes(np.concatenate([bands, columns]), normal, step)
-    parts = _lane(weights, model.side(surface.x, surface.y, plain)), _near(weights, along, tuning)
-    lane, near = ((rows * part) @ rows.T for part in parts)
-    lateral, depth = _apart(np.array([[lane, total], [near, total - near]]), total, tuning)
+    of_lane, of_all, of_near, of_far = found.halves[:, _THETA].tolist()
     return Jackknife(
-        bands=changes[: len(bands)],
-        columns=changes[len(bands) :],
+        bands=found.changes[: tuning.groups],
+        columns=found.changes[tuning.groups :],
         white=white[:4, :4],
-        freedom=(_freedom(bands, normal), _freedom(columns, normal)),
-        lateral=lateral,
-        depth=depth,
-        bend=_bend(total, model.camber),
+        freedom=(_freedom(bands), _freedom(columns)),
+        lateral=abs(of_lane - of_all),
+        depth=abs(of_near - of_far),
+        bend=abs(model.camber * float(found.bulge[_THETA])),
         camber=_camber(model, prior * float(inverse[_CAMBER, _CAMBER])) if cambered else None,
     )
 
 
-def _lane(weights: Floats, side: Reals) -> Floats:
-    """Return the weights of the lane ahead."""
-    lane: Floats = weights * np.exp(-np.minimum(np.square(np.square(side)), 80))
+def _lane(side: Reals) -> Reals:
+    """Return how much each pixel belongs to the lane ahead, 0 to 1."""
+    lane: Reals = np.exp(-np.minimum(np.square(np.square(side)), 80))
     return lane
 
 
-def _near(weights: Floats, along: Reals, tuning: IntervalTuning) -> Floats:
-    """Return the weights of the near half."""
+def _near(weights: Floats, along: Reals, tuning: IntervalTuning) -> Reals:
+    """Return how much each pixel belongs to the near half, 0 to 1."""
     middle = float(weights @ along) / float(weights.sum())
-    near: Floats = weights / (1 + np.exp(np.clip((middle - along) / tuning.depth_fade, -50, 50)))
+    near: Reals = 1 / (1 + np.exp(np.minimum((middle - along) / tuning.depth_fade, 50)))
     return near
 
 
-def _apart(pairs: Floats, total: Floats, tuning: IntervalTuning) -> list[float]:
-    """Return how far the thetas of two parts lie apart, at the fitted camber, for each pair of products.
+def _by_group(rows: Floats, position: Reals, share: Reals | None, groups: int) -> Floats:
+    """Return the products (groups, 6, 6) of groups of equal total `share`, or number, cut along `position`.
 
-    `pairs` has shape (K, 2, 6, 6), `total` is of all pixels.
-    A little of the whole is added: where a part is nearly empty, it says what the whole says.
+    Of the six rows five are the design's; with the sixth, the residuals, a product is a group's normal
+    equations, right-hand side included.
     """
-    products = pairs + tuning.whole_share * total
-    products[..., _CAMBER, :5] = products[..., :5, _CAMBER] = 0
-    theta = solve_normal(products[..., :5, :5], products[..., :5, 5:])[..., _THETA, 0]
-    apart: list[float] = np.abs(theta[:, 0] - theta[:, 1]).tolist()
-    return apart
+    order = np.argsort(position)
+    if share is None:
+        cuts = [math.ceil(len(order) * group / groups) - 1 for group in range(1, groups)]
+    else:
+        heights = np.cumsum(share.take(order))
+        cuts = np.searchsorted(heights, heights[-1] * np.arange(1, groups) / groups).tolist()
+    ordered = rows.take(order, 1)
+    parts = [ordered[:, start:end] for start, end in itertools.pairwise([0, *cuts, len(order)])]
+    return np.stack([part @ part.T for part in parts])
 
 
-def _bend(total: Floats, camber: float) -> float:
-    """Return by how much theta would differ without the camber."""
-    products = total[:5, :5].copy()
-    products[_CAMBER] = products[:, _CAMBER] = 0
-    pull = total[:5, _CAMBER : _CAMBER + 1].copy()
-    pull[_CAMBER] = 0
-    return abs(camber * float(solve_normal(products, pull)[_THETA, 0]))
+class _Solutions(NamedTuple):
+    """Solutions (a0, a1, a2, theta, camber) of normal equations.
+
+    Attributes
+    ----------
+    whole : ndarray, shape (5,)
+        From the surface's parabola to the best one.
+    changes : ndarray, shape (groups, 4)
+        How the first four change as one group after the other is left out.
+    halves : ndarray, shape (4, 5)
+        Of parts, at the fitted camber.
+    bulge : ndarray, shape (5,)
+        What a camber of 1 adds to the others, where it is not known.
+    """
+
+    whole: Floats
+    changes: Floats
+    halves: Floats
+    bulge: Floats
+
+
+def _solved(total: Floats, groups: Floats, halves: Floats, prior: float) -> tuple[_Solutions, Floats]:
+    """Solve the normal equations of all pixels, of all but a group, and of parts. At once takes less time.
+
+    Return the inverse of the first normal matrix, too.
+    """
+    free = 1 + len(groups)  # of these the camber is free
+    products = np.concatenate([total[None], total - groups, halves, total[None]])
+    normal, pulls = products[:, :5, :5], products[:, :5, 5:]
+    pulls[-1] = normal[-1, :, _CAMBER:]
+    pulls[-1, _CAMBER] = 0
+    normal[:free, _CAMBER, _CAMBER] += prior
+    normal[free:, _CAMBER] = normal[free:, :, _CAMBER] = 0
+    inverses = inverse_of_normal(normal, normal[0])
+    solutions = (inverses @ pulls)[..., 0]
+    whole = solutions[0]
+    changes = (whole - solutions[1:free])[:, :4]
+    return _Solutions(whole, changes, solutions[free:-1], solutions[-1]), inverses[0]
+
+
+def _white(total: Floats, whole: Floats, tuning: IntervalTuning) -> float:
+    """Return the variance of a pixel, times how many repeat each other, px^2."""
+    independent = max(1.0, float(total[0, 0]) / tuning.independent_pixels)
+    rest = max(0.0, float(total[5, 5] - whole @ total[:5, 5]))
+    return rest / float(total[0, 0]) * independent
 
 
 def _camber(model: RoadModel, prior_share: float) -> float | None:
@@ -214,37 +255,17 @@ def _camber(model: RoadModel, prior_share: float) -> float | None:
     return model.camber / (1 - prior_share) if prior_share < 0.5 else None
 
 
-def _by_group(rows: Floats, weights: Floats, position: Reals, share: Floats, groups: int) -> Floats:
-    """Return the weighted products (groups, 6, 6) of groups of equal total `share`, cut along `position`.
-
-    Of the six rows five are the design's; with the sixth, the residuals, a product is a group's normal
-    equations, right-hand side included.
-    """
-    order = np.argsort(position)
-    heights = np.cumsum(share[order])
-    cuts = np.searchsorted(heights, heights[-1] * np.arange(1, groups) / groups)
-    bounds = [0, *cuts.tolist(), len(order)]
-    sorted_rows = rows.take(order, 1)
-    weighted = sorted_rows * weights[order]
-    return np.stack([weighted[:, a:b] @ sorted_rows[:, a:b].T for a, b in itertools.pairwise(bounds)])
-
-
-def _changes(groups: Floats, normal: Floats, step: Floats) -> Floats:
-    """Return how the four parameters change as one group after the other is left out, shape (groups, 4)."""
-    parts, pulls = groups[:, :5, :5], groups[:, :5, 5]
-    changes = solve_normal(normal - parts, (pulls - parts @ step)[..., None], normal)
-    return np.asarray(changes[:, :4, 0], np.float64)
-
-
-def _freedom(groups: Floats, normal: Floats) -> float:
+def _freedom(groups: Floats) -> float:
     """Return the degrees of freedom of theta's change, by the groups' shares of its leverage [Freedom].
 
     1 / sum share^2 is the number of equal groups that would tell as much; one goes to the mean.
     """
-    leverage = groups[:, _THETA, _THETA] / normal[_THETA, _THETA]
-    return max(1.0, 1 / float(np.square(leverage).sum()) - 1)
+    leverage = groups[:, _THETA, _THETA].tolist()
+    return max(1.0, float(sum(leverage) ** 2 / sum(each * each for each in leverage)) - 1)
 
 
 def _student(freedom: float) -> float:
     """Return the 97.5 % quantile of Student's t, between whole degrees of freedom by interpolation."""
-    return float(np.interp(freedom, np.arange(1, len(_T975) + 1), _T975))
+    below = min(int(freedom), len(_T975) - 1)
+    part = min(freedom, len(_T975)) - below
+    return _T975[below - 1] + part * (_T975[below] - _T975[below - 1])

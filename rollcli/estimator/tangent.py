@@ -10,11 +10,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rollcli.estimator.interval import Jackknife
-from rollcli.estimator.moments import Floats, Grid, powers
+from rollcli.estimator.moments import Floats, Grid
 from rollcli.estimator.road.model import Reals, RoadModel
-from rollcli.estimator.road.robust_fit import solve_normal
 from rollcli.estimator.road.surface import Surface
 
+_SINGULAR = 1e-10  # a variance below this share of its square scale is rounding error
 _MOST_MOVED = 0.05  # of the slope: no road bends more, so what does is no bend of the road
 
 
@@ -77,7 +77,8 @@ def touch(
         grid = surface.grid
         along = road.along(surface.x, surface.y)
         centre = float(surface.weights @ along) / float(surface.weights.sum())
-        cubic = _parabola_of_cubic((along - centre) * grid.scale, surface.weights)
+        value, moved = _parabola_of_cubic(along - centre, surface.weights)
+        cubic = value * grid.scale**3, moved * grid.scale**2  # px^3 and px^2
     row = centre * grid.scale + road.along(grid.centre_u, grid.centre_v)
     _, a1, a2 = alpha
     disparity, slope = road.disparity_along(row), a1 + 2 * a2 * row
@@ -91,11 +92,18 @@ def touch(
 
 
 def _parabola_of_cubic(along: Reals, weights: Floats) -> tuple[float, float]:
-    """Return value and slope at 0 of the parabola that fits the cubes of some positions, px^3 and px^2."""
-    rows = powers(along, 3)
-    products = (rows * weights) @ rows.T
-    value, slope, _ = solve_normal(products[:3, :3], products[:3, 3:])[:, 0].tolist()
-    return value, slope
+    """Return value and slope at 0 of the parabola that fits the cubes of some positions of mean 0."""
+    squares = along * along
+    weighted = weights * squares
+    cubes = squares * along
+    n, two, three = float(weights.sum()), float(weighted.sum()), float(weighted @ along)
+    four, five = float(weighted @ squares), float(weighted @ cubes)
+    if not two > 0:
+        return 0.0, 0.0
+    skew, mean = three / two, two / n  # y^2 - skew y - mean is orthogonal to 1 and y
+    norm = four - skew * three - mean * two
+    bend = (five - skew * four - mean * three) / norm if norm > _SINGULAR * four else 0.0
+    return three / n - mean * bend, four / two - skew * bend
 
 
 def _third_power(disparity: float, slope: float, bend: float, moved: float) -> float:
@@ -126,4 +134,4 @@ def _in_pixels(errors: Floats, centre: float, scale: float, turn: float) -> Floa
     """
     e0, e1, e2, turned = errors.T
     disparity = e0 + centre * (e1 + centre * e2) + turn * turned
-    return np.column_stack([disparity, (e1 + 2 * centre * e2) / scale, turned])
+    return np.stack([disparity, (e1 + 2 * centre * e2) / scale, turned], 1)

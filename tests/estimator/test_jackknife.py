@@ -125,7 +125,7 @@ def test_the_angles_of_lane_and_of_near_and_far_half_are_those_of_fits_to_them(c
     surface, weights = problem.surface, problem.surface.weights
     road = RoadModel(theta, surface.model.alpha)
     along = road.along(surface.x, surface.y)
-    side = road.side(surface.x, surface.y, road.disparity(surface.x, surface.y))
+    side = road.side(road.across(surface.x, surface.y), road.disparity(surface.x, surface.y))
     lane = weights * np.exp(-(side**4))
     middle = np.average(along, weights=weights)
     near = weights / (1 + np.exp((middle - along) / TUNING.interval.depth_fade))

@@ -98,13 +98,13 @@ class RoadModel(NamedTuple):
         bulge *= 0.5
         return bulge
 
-    def side(self, x: Reals, y: Reals, disparity: Reals) -> Reals:
+    def side(self, across: Reals, disparity: Reals) -> Reals:
         """Return how far to the right of the middle the road's pixels lie, in camera heights.
 
         Parameters
         ----------
-        x, y : ndarray
-            Normalised coordinates, to be broadcast.
+        across : ndarray
+            Coordinate across the road.
         disparity : ndarray
             Of the road there, px; above the horizon, where it is not positive, the result is infinite.
 
@@ -115,5 +115,5 @@ class RoadModel(NamedTuple):
         focal length and the unit of the disparities.
         """
         with np.errstate(divide="ignore", invalid="ignore"):
-            side: Reals = self.across(x, y) * abs(self.alpha[1]) / np.maximum(disparity, 0)
+            side: Reals = across * abs(self.alpha[1]) / np.maximum(disparity, 0)
         return side

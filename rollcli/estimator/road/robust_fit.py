@@ -114,7 +114,7 @@ class NearPixels:
         """Read the profile across the lane; return it, and the pixels weighted by it."""
         road = lane.disparity_along(lane.along(self.x, self.y))
         least = self.d * tuning.least_road
-        side = lane.side(self.x, self.y, np.maximum(road, least))
+        side = lane.side(lane.across(self.x, self.y), np.maximum(road, least))
         used = np.flatnonzero((self.place > tuning.least_place) & (road > least))
         profile = read_profile(side[used], self.d[used] / road[used] - 1, tuning)
         weights: Singles = profile.at(side).astype(np.float32, copy=False)
@@ -144,7 +144,8 @@ class NearPixels:
                 precision = self._camber_precision(products)
                 products[4, 4] += precision
                 products[4, 5] -= precision * fit.model.camber
-            model = self._moved(fit.model, solve_normal(products[:5, :5], products[:5, 5:])[:, 0].tolist())
+            steps = inverse_of_normal(products[:5, :5]) @ products[:5, 5]
+            model = self._moved(fit.model, steps.tolist())
             across, squares = self._lay_out(design, model, self.d, cambered=cambered)
             weights *= ahead
             fit = Fit(model, squares, min(fit.limit, self._width(squares, weights)), precision)
@@ -228,30 +229,27 @@ class NearPixels:
         return max(self.least_width, times * spread)
 
 
-def solve_normal(normal: Floats, right: Floats, like: Floats | None = None) -> Floats:
-    """Solve normal equations in parameters of different units, some of which may be missing.
+def inverse_of_normal(normal: Floats, like: Floats | None = None) -> Floats:
+    """Invert normal matrices of parameters in different units, some of which may be missing.
 
     Parameters
     ----------
     normal : ndarray, shape (..., N, N)
         Normal matrix; where a parameter is missing, its row and column are 0.
-    right : ndarray, shape (..., N, M)
-        Right-hand sides, 0 for what is missing.
     like : ndarray, shape (N, N), optional
         A normal matrix whose units are taken; `normal` itself by default.
 
     Returns
     -------
-    ndarray, shape (..., N, M)
-        0 for what is missing.
+    ndarray, shape (..., N, N)
+        Times right-hand sides that are 0 for what is missing, 0 for it, too.
     """
     diagonal = np.diagonal(normal if like is None else like, axis1=-2, axis2=-1)
     unit = 1 / np.sqrt(np.where(diagonal > 0, diagonal, 1))
-    across = unit[..., :, None]
+    units = unit[..., :, None] * unit[..., None, :]
     size = normal.shape[-1]
-    even = normal * (across * unit[..., None, :]) + _RIDGE[:size, :size]
-    solved: Floats = np.linalg.solve(even, right * across) * across
-    return solved
+    inverse: Floats = np.linalg.inv(normal * units + _RIDGE[:size, :size]) * units
+    return inverse
 
 
 def _seen(across: Singles, along: Singles, half_height: float, theta: float, tuning: FitTuning) -> Singles:

@@ -93,7 +93,10 @@ class Surface:
         tolerance = np.hypot(self.noise, self.tuning.sample.uneven_share * disparity)
         on_it: NDArray[np.bool_] = np.abs(road - disparity) < limit * tolerance
         if self.profile is not None:
-            on_it &= self.profile.level(self.model.side(x, y, road)) > self.tuning.surface.least_level
+            on_it &= (
+                self.profile.level(self.model.side(self.model.across(x, y), road))
+                > self.tuning.surface.least_level
+            )
         # where a wall crosses the surface it is as near as the road, but it does not rise as the road does
         off = disparity - road
         steady = np.abs(off[reach:] - off[:-reach]) < np.maximum(

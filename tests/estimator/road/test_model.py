@@ -59,12 +59,14 @@ def test_the_side_of_a_pixel_is_its_way_to_the_right_in_camera_heights(roll_deg)
     metres = (x * math.cos(roll) + y * math.sin(roll)) * depth / focal
     model = RoadModel(roll, (0.0, baseline / height, 0.0))
 
-    np.testing.assert_allclose(model.side(x, y, model.disparity(x, y)), metres / height, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(
+        model.side(model.across(x, y), model.disparity(x, y)), metres / height, rtol=1e-9, atol=1e-9
+    )
 
 
 def test_above_the_horizon_everything_is_infinitely_far_to_the_side():
     model = RoadModel(0.0, (0.0, 1.0, 0.0))
-    side = model.side(np.array([-1.0, 1.0]), np.array([-1.0, -1.0]), np.array([-1.0, -1.0]))
+    side = model.side(np.array([-1.0, 1.0]), np.array([-1.0, -1.0]))
 
     np.testing.assert_array_equal(side, [-np.inf, np.inf])
 

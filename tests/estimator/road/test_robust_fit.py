@@ -9,7 +9,7 @@ import pytest
 from rollcli.errors import EstimationError
 from rollcli.estimator.road.find import Road, road_weights
 from rollcli.estimator.road.model import RoadModel
-from rollcli.estimator.road.robust_fit import NearPixels, solve_normal
+from rollcli.estimator.road.robust_fit import NearPixels, inverse_of_normal
 from rollcli.estimator.road.subsample import take_sample
 from rollcli.estimator.road.tuning import ROAD_TUNING, FitTuning
 from tests.estimator.synthetic_maps import flat_road
@@ -189,7 +189,8 @@ def test_missing_parameters_are_0_and_units_do_not_matter():
     known = [0, 1, 2, 4]
     expected = np.zeros((5, 2))
     expected[known] = np.linalg.lstsq(design[:, known], d, rcond=None)[0]
-    np.testing.assert_allclose(solve_normal(normal, right), expected, rtol=1e-7)
-    np.testing.assert_allclose(solve_normal(normal[None], right[None], 3 * normal)[0], expected, rtol=1e-7)
-    fewer = solve_normal(normal[:3, :3], right[:3])
+    np.testing.assert_allclose(inverse_of_normal(normal) @ right, expected, rtol=1e-7)
+    stacked = inverse_of_normal(normal[None], 3 * normal)[0]
+    np.testing.assert_allclose(stacked @ right, expected, rtol=1e-7)
+    fewer = inverse_of_normal(normal[:3, :3]) @ right[:3]
     np.testing.assert_allclose(fewer, np.linalg.lstsq(design[:, :3], d, rcond=None)[0], rtol=1e-7)

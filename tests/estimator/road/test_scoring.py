@@ -60,7 +60,8 @@ def laid_out(sample):
 
 def places(plane, x, y, d, sample):
     """The weights of a plane's corridor and its core, more for what is near, without the slopes."""
-    side = RoadModel.of_plane(*plane.astype(float)).side(x, y, d)
+    model = RoadModel.of_plane(*plane.astype(float))
+    side = model.side(model.across(x, y), d)
     near = np.minimum(d, 1.2 * sample.typical)
     near /= near.mean()
     corridor = np.exp(-((side / 0.8) ** 2))
