@@ -7,7 +7,9 @@ import math
 import sys
 import time
 from collections.abc import Callable, Mapping
+from contextlib import ExitStack
 from pathlib import Path
+from unittest.mock import patch
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
@@ -15,7 +17,7 @@ sys.path.insert(0, str(ROOT))
 import cv2
 import numpy as np
 
-from rollcli.files.codecs import png, tiff_parts, unpack
+from rollcli.files.codecs import fast_png, tiff_parts, unpack
 from rollcli.files.encodings import to_disparity
 from rollcli.files.formats import decode_stored, encode_stored
 from rollcli.imaging.derotate import derotate
@@ -50,14 +52,10 @@ def show(title: str, times: Mapping[str, float], beside: str) -> None:
 
 def without_extras(file: bytes) -> object:
     """Read a file as where neither `fast` nor `tiff` is installed."""
-    found = png.decode_grey16, unpack.imagecodecs
-    png.decode_grey16 = lambda *_: None
-    unpack.imagecodecs = tiff_parts.imagecodecs = lambda: None
-    try:
+    with patch.object(fast_png, "_decoders", lambda: None), ExitStack() as stack:
+        for module in (fast_png, tiff_parts, unpack):
+            stack.enter_context(patch.object(module, "imagecodecs", lambda: None))
         return decode_stored(file, "map")
-    finally:
-        png.decode_grey16, unpack.imagecodecs = found
-        tiff_parts.imagecodecs = found[1]
 
 
 def main() -> None:

@@ -7,6 +7,7 @@ OpenCV gets a file of nothing but what decides the pixels.
 
 import struct
 import zlib
+from functools import partial
 from typing import Any, NamedTuple
 
 import cv2
@@ -17,6 +18,7 @@ from rollcli.errors import InputError, OutputError
 from rollcli.files.codecs.fast_png import decode_grey16
 from rollcli.files.codecs.mute_stderr import decoding
 from rollcli.files.codecs.raw_map import COLOUR_REMEDY, PICTURE_FLAGS, require_decoded_fits
+from rollcli.files.codecs.unpack import crc32
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _GREY, _COLOUR, _PALETTE, _GREY_ALPHA, _COLOUR_ALPHA = 0, 2, 3, 4, 6
@@ -64,14 +66,20 @@ class _Whole(NamedTuple):
     transparent: bytes
     image: list[memoryview]
 
-    def chunks(self, name: str) -> list[bytes | memoryview]:
-        """Return a file of nothing else."""
+    @property
+    def packed(self) -> bytes:
+        """The pixel data: a zlib stream."""
+        return b"".join(chunk[8:-4] for chunk in self.image)
+
+    def file(self, name: str, packed: bytes | None = None) -> bytes:
+        """Return a file of nothing else, of these pixel data where some are given."""
         start: list[bytes | memoryview] = [SIGNATURE, _chunk(b"IHDR", struct.pack(">IIBBBBB", *self.header))]
         if self.header.colour == _PALETTE:
             start.append(_chunk(b"PLTE", _full_palette(self.header, self.palette, name)))
             if self.transparent:
                 start.append(_chunk(b"tRNS", self.transparent[: 2**self.header.depth]))
-        return [*start, *self.image, _chunk(b"IEND", b"")]
+        image = self.image if packed is None else [_chunk(b"IDAT", packed)]
+        return b"".join([*start, *image, _chunk(b"IEND", b"")])
 
 
 def grey_values(data: bytes, name: str) -> NDArray[Any]:
@@ -112,13 +120,13 @@ def encode_png(values: NDArray[Any]) -> bytes:
 
 
 def _decoded(whole: _Whole, name: str, flags: int) -> NDArray[Any]:
-    file, header = b"".join(whole.chunks(name)), whole.header
+    header = whole.header
     if (header.colour, header.depth, header.interlace) == (_GREY, 16, 0):
-        fast = decode_grey16(file, header.width, header.height)
+        fast = decode_grey16(whole.packed, header.width, header.height, partial(whole.file, name))
         if fast is not None:
             return fast
     with decoding() as printed:
-        pixels = cv2.imdecode(np.frombuffer(file, np.uint8), flags)
+        pixels = cv2.imdecode(np.frombuffer(whole.file(name), np.uint8), flags)
     if pixels is None or "libpng" in printed.text:
         raise InputError(f"{name}: is a damaged PNG: its pixel data are wrong")
     return pixels
@@ -133,7 +141,7 @@ def _checked(data: bytes, name: str, mask: bool = False) -> _Whole:
         end = position + 12 + int.from_bytes(view[position : position + 4], "big")
         if end > len(data) or position + 12 > len(data):
             raise InputError(f"{name}: is a truncated PNG: it ends after {len(data)} bytes")
-        if zlib.crc32(view[position + 4 : end - 4]) != int.from_bytes(view[end - 4 : end], "big"):
+        if crc32(view[position + 4 : end - 4]) != int.from_bytes(view[end - 4 : end], "big"):
             raise InputError(f"{name}: is a damaged PNG: wrong checksum {position} bytes in")
         kind = data[position + 4 : position + 8]
         if (header is None) != (kind == b"IHDR"):
@@ -213,4 +221,4 @@ def _full_palette(header: _Header, palette: bytes, name: str) -> bytes:
 
 
 def _chunk(kind: bytes, body: bytes) -> bytes:
-    return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
+    return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", crc32(kind + body))

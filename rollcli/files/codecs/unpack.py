@@ -29,6 +29,13 @@ def imagecodecs() -> Any:
     return package
 
 
+def crc32(data: bytes | memoryview) -> int:
+    """Return the checksum of PNG and gzip, by libdeflate in a twentieth of the time where it is installed."""
+    codecs = imagecodecs()
+    found: int = zlib.crc32(data) if codecs is None else codecs.deflate_crc32(data)
+    return found
+
+
 def unpacked(compression: int, packed: bytes, size: int, most: int) -> bytes:
     """Unpack a strip or tile.
 

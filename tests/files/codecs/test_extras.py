@@ -3,6 +3,8 @@
 import subprocess
 import sys
 import zlib
+from functools import partial
+from itertools import cycle
 from random import Random
 
 import cv2
@@ -59,18 +61,100 @@ def imagecodecs():
     pytest.importorskip("imagecodecs", reason="the extra tiff is not installed")
 
 
-@pytest.mark.parametrize("filtering", range(5))
-@pytest.mark.parametrize("shape", [(37, 53), (1, 1), (1, 200), (200, 1)])
-def test_wuffs_reads_what_opencv_reads(wuffs, shape, filtering):
-    values = np.resize(DEEP, shape)
-    options = [cv2.IMWRITE_PNG_FILTER, (8, 16, 32, 64, 128)[filtering]]
-    file = cv2.imencode(".png", values, options)[1].tobytes()
+@pytest.fixture(params=["imagecodecs and pywuffs", "imagecodecs", "pywuffs", "nothing"])
+def installed(request, monkeypatch):
+    """What of the extra `fast` is there, one after the other."""
+    for package, where in (("imagecodecs", "imagecodecs"), ("pywuffs", "_decoders")):
+        if package in request.param:
+            pytest.importorskip(package, reason="the extra fast is not installed")
+        else:
+            monkeypatch.setattr(fast_png, where, lambda: None)
+    return request.param
 
-    np.testing.assert_array_equal(fast_png.decode_grey16(file, shape[1], shape[0]), values)
+
+def decoded(values, filters):
+    """Decode a file whose rows have these filters, one after the other; the options do not reach OpenCV."""
+    height, width = values.shape
+    plain = filtered(values, filters)
+    return fast_png.decode_grey16(zlib.compress(plain), width, height, partial(grey_file, width, height))
+
+
+def grey_file(width, height, packed):
+    return png_file(png_header(width, height), (b"IDAT", packed), (b"IEND", b""))
+
+
+def filtered(values, filters):
+    """Filter rows of 16 bits as PNG does [ISO/IEC 15948, 9.2], byte by byte."""
+    pixels = values.astype(">u2").view(np.uint8).astype(int)
+    before = np.zeros_like(pixels[0])
+    rows = []
+    for row, kind in zip(pixels, cycle(filters)):
+        left, corner = (np.concatenate([[0, 0], each[:-2]]) for each in (row, before))
+        nearest = [
+            min((a, b, c), key=lambda each, p=a + b - c: abs(p - each))
+            for a, b, c in zip(left, before, corner, strict=True)
+        ]
+        predicted = [0, left, before, (left + before) // 2, np.array(nearest)][kind]
+        rows.append(bytes([kind]) + ((row - predicted) % 256).astype(np.uint8).tobytes())
+        before = row
+    return b"".join(rows)
+
+
+@pytest.mark.parametrize("filters", [[0], [1], [2], [3], [4], [0, 1], [1, 4, 0, 3, 2], [1] * 30 + [4]])
+@pytest.mark.parametrize("shape", [(37, 53), (1, 1), (1, 200), (200, 1), (60, 700)])
+def test_rows_of_every_filter_read_as_opencv_reads_them(installed, shape, filters):
+    values = np.random.default_rng(1).integers(0, 2**16, shape, dtype=np.uint16)
+    file = grey_file(*shape[::-1], zlib.compress(filtered(values, filters)))
+    np.testing.assert_array_equal(cv2.imdecode(np.frombuffer(file, np.uint8), cv2.IMREAD_UNCHANGED), values)
+
+    found = decoded(values, filters)
+
+    if found is None:  # OpenCV is as fast
+        assert installed == "nothing"
+        assert {2, 3, 4} & set(filters)
+    else:
+        assert (found.dtype, found.flags.c_contiguous, found.flags.writeable) == (np.uint16, True, True)
+        np.testing.assert_array_equal(found, values)
     np.testing.assert_array_equal(decode_stored(file, "x").values, values)
 
 
-def test_only_16_bits_of_grey_go_to_wuffs(wuffs, monkeypatch):
+def test_what_opencv_writes_needs_no_opencv_to_be_read(installed, monkeypatch):
+    file = cv2.imencode(".png", DEEP)[1].tobytes()
+    monkeypatch.setattr(png.cv2, "imdecode", None)
+    np.testing.assert_array_equal(decode_stored(file, "x").values, DEEP)
+
+
+PLAIN = filtered(DEEP, [1])
+PACKED = zlib.compress(PLAIN)
+NO_SUCH_FILTER = zlib.compress(b"\5" + PLAIN[1:])
+
+
+@pytest.mark.parametrize(
+    "packed",
+    [
+        PACKED[: len(PACKED) // 2],
+        PACKED[:-1] + bytes([PACKED[-1] ^ 1]),
+        PACKED[:-4],
+        PACKED + b"more",
+        PACKED + PACKED[-4:],
+        PACKED + b"more" + PACKED[-4:],
+        zlib.compress(PLAIN + b"\0"),
+        zlib.compress(PLAIN[:-1]),
+        b"\x77" + PACKED[1:],
+        NO_SUCH_FILTER,
+        zlib.compress(PLAIN[:-107] + b"\5" + PLAIN[-106:]),
+        b"",
+    ],
+)
+def test_data_that_are_not_just_the_rows_are_left_to_opencv(installed, plain, packed):
+    height, width = DEEP.shape
+    if installed != "pywuffs":  # which does not mind what follows the rows
+        assert fast_png.decode_grey16(packed, width, height, partial(grey_file, width, height)) is None
+    file = grey_file(width, height, packed)
+    assert outcome(file) == plain(file)
+
+
+def test_only_16_bits_of_grey_are_read_so(monkeypatch):
     asked = []
     monkeypatch.setattr(png, "decode_grey16", lambda *_: asked.append(1))
 
@@ -100,23 +184,24 @@ def test_wuffs_reads_in_several_threads_at_once():
 
 
 @pytest.mark.parametrize("damage", ["cut", "checksum"])
-def test_half_an_image_of_wuffs_is_never_taken(wuffs, damage):
+def test_half_an_image_is_never_taken(installed, damage):
     packed = zlib.compress(png_rows(DEEP, 16))
     packed = packed[: len(packed) // 2] if damage == "cut" else packed[:-1] + bytes([packed[-1] ^ 1])
-    file = png_file(png_header(53, 37), (b"IDAT", packed), (b"IEND", b""))
 
-    assert fast_png.decode_grey16(file, 53, 37) is None
+    assert fast_png.decode_grey16(packed, 53, 37, partial(grey_file, 53, 37)) is None
     with pytest.raises(InputError, match="damaged PNG"):
-        decode_stored(file, "x")
+        decode_stored(grey_file(53, 37, packed), "x")
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_every_file_of_the_fuzzer_reads_the_same_without_extras(wuffs, imagecodecs, plain, name):
+def test_every_file_of_the_fuzzer_reads_the_same_without_extras(installed, plain, name):
     assert outcome(FILES[name]) == plain(FILES[name])
 
 
 @pytest.mark.parametrize("name", ["16.png", *(name for name in FILES if name.endswith(".tif"))])
-def test_broken_files_read_the_same_without_extras(wuffs, imagecodecs, plain, name):
+def test_broken_files_read_the_same_without_extras(installed, plain, name):
+    if name != "16.png" and installed != "imagecodecs":
+        return  # TIFFs know nothing of wuffs, and `plain` reads them without imagecodecs
     random = Random(0)
     broken = [*list(every_region(FILES[name]))[::7], *(at_random(FILES[name], random) for _ in range(40))]
 
