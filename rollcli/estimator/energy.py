@@ -97,28 +97,27 @@ class Energy:
             raise EstimationError("no valid pixel: all are zero, negative, not finite or masked out")
         if not _SMALLEST < peak < _LARGEST:
             raise EstimationError(f"disparities up to {peak:g}: their squares leave double precision")
-        p, q = moments.s[1, 0] / n, moments.s[0, 1] / n
+        p, q = float(moments.s[1, 0]) / n, float(moments.s[0, 1]) / n
         along_p, along_q = to_powers_of_sum(np.array([-p, -q]))
-        s = along_p @ moments.s @ along_q.T
-        t = along_p[:3, :3] @ moments.t @ along_q[:3, :3].T
-        spread = s[2, 0] * s[0, 2] - s[1, 1] ** 2
-        if spread <= _SINGULAR * (s[2, 0] + s[0, 2]) ** 2:
+        s = (along_p @ moments.s @ along_q.T).tolist()  # NumPy is slow on single numbers
+        t = (along_p[:3, :3] @ moments.t @ along_q[:3, :3].T).tolist()
+        spread = s[2][0] * s[0][2] - s[1][1] ** 2
+        if spread <= _SINGULAR * (s[2][0] + s[0][2]) ** 2:
             raise EstimationError("the valid pixels lie on one line: they do not determine a roll angle")
-        dc0 = t[0, 0] / n
-        dc1 = (s[0, 2] * t[1, 0] - s[1, 1] * t[0, 1]) / spread
-        dc2 = (s[2, 0] * t[0, 1] - s[1, 1] * t[1, 0]) / spread
+        dc0 = t[0][0] / n
+        dc1 = (s[0][2] * t[1][0] - s[1][1] * t[0][1]) / spread
+        dc2 = (s[2][0] * t[0][1] - s[1][1] * t[1][0]) / spread
         c0, c1, c2 = moments.plane
-        rest = max(0.0, float(moments.rr - dc0 * t[0, 0] - dc1 * t[1, 0] - dc2 * t[0, 1]))
-        sources = [s[i, j] for i, j in _monomials(2)]
-        residual = [t[i, j] - dc0 * s[i, j] - dc1 * s[i + 1, j] - dc2 * s[i, j + 1] for i, j in _monomials(2)]
-        higher = [s[i, j] for k in (3, 4) for i, j in _monomials(k)]
+        rest = max(0.0, float(moments.rr) - dc0 * t[0][0] - dc1 * t[1][0] - dc2 * t[0][1])
+        sources = [s[i][j] for i, j in _monomials(2)]
+        residual = [t[i][j] - dc0 * s[i][j] - dc1 * s[i + 1][j] - dc2 * s[i][j + 1] for i, j in _monomials(2)]
+        higher = [s[i][j] for k in (3, 4) for i, j in _monomials(k)]
         grid = moments.grid
         centred = Grid(grid.centre_u + p * grid.scale, grid.centre_v + q * grid.scale, grid.scale)
         plane = (float(c0 + c1 * p + c2 * q + dc0), float(c1 + dc1), float(c2 + dc2))
-        energy = cls(
-            n, peak, parabolic, centred, plane, rest, _rotations() @ np.array(sources + residual + higher)
-        )
-        if energy.slope_energy + abs(np.array(residual)).max() ** 2 / n <= 1e-18 * n * peak**2:
+        forms = _rotations() @ np.array(sources + residual + higher)
+        energy = cls(n, peak, parabolic, centred, plane, rest, forms)
+        if energy.slope_energy + max(map(abs, residual)) ** 2 / n <= 1e-18 * n * peak**2:
             raise EstimationError(SAME_EVERYWHERE)
         return energy
 

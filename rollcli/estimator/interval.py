@@ -66,9 +66,10 @@ class Jackknife:
 
     def spreads(self) -> tuple[float, float, float]:
         """Return the half-widths of theta's interval, radians: by bands, by columns, and the textbook's."""
+        turned = (self.bands[:, _THETA], self.columns[:, _THETA])
         bands, columns = (
-            _student(freedom) * math.sqrt(float(np.square(changes[:, _THETA]).sum()))
-            for changes, freedom in zip((self.bands, self.columns), self.freedom, strict=True)
+            _student(freedom) * math.sqrt(float(thetas @ thetas))
+            for thetas, freedom in zip(turned, self.freedom, strict=True)
         )
         return bands, columns, _NORMAL * math.sqrt(self.white[_THETA, _THETA])
 

@@ -122,9 +122,22 @@ def _third_power(disparity: float, slope: float, bend: float, moved: float) -> f
 
 def _errors(jackknife: Jackknife) -> Floats:
     """Return independent errors of (a0, a1, a2, theta): the groups', and the textbook's as half-widths."""
-    values, vectors = np.linalg.eigh(jackknife.white)
-    white = (vectors * np.sqrt(np.maximum(values, 0))).T
-    return np.concatenate([jackknife.bands, jackknife.columns, 1.96 * white])
+    return np.concatenate([jackknife.bands, jackknife.columns, 1.96 * _roots(jackknife.white)])
+
+
+def _roots(covariance: Floats) -> Floats:
+    """Return independent errors, shape (4, 4), whose squares add up to a covariance: its Cholesky factor.
+
+    Nothing for what is known exactly. NumPy's own refuses that.
+    """
+    wanted = covariance.tolist()
+    size = len(wanted)
+    roots: list[list[float]] = []
+    for k in range(size):
+        left = [wanted[k][j] - sum(root[k] * root[j] for root in roots) for j in range(size)]
+        known = left[k] <= _SINGULAR * wanted[k][k]
+        roots.append([0.0 if known or j < k else left[j] / math.sqrt(left[k]) for j in range(size)])
+    return np.array(roots)
 
 
 def _in_pixels(errors: Floats, centre: float, scale: float, turn: float) -> Floats:
@@ -134,4 +147,6 @@ def _in_pixels(errors: Floats, centre: float, scale: float, turn: float) -> Floa
     """
     e0, e1, e2, turned = errors.T
     disparity = e0 + centre * (e1 + centre * e2) + turn * turned
-    return np.stack([disparity, (e1 + 2 * centre * e2) / scale, turned], 1)
+    changes = np.empty((len(errors), 3))
+    changes[:, 0], changes[:, 1], changes[:, 2] = disparity, (e1 + 2 * centre * e2) / scale, turned
+    return changes

@@ -4,6 +4,8 @@ Most of what a matcher gets wrong differs from pixel to pixel and from row to ro
 it prefers whole pixels. A mean of five has less of it, at a few operations for each pixel of the fit.
 """
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -33,25 +35,27 @@ def averaged(sample: Sample, plane: NDArray[np.float64], near: NDArray[np.intp])
     """
     d = sample.d[near]
     moves = _moves(sample.step, sample.reach)
-    if not moves:
+    if not len(moves):
         return d
-    width = sample.disparity.shape[1]
-    there = sample.places[near] + np.array([[down * width + right] for down, right in moves])
+    there = sample.places[near] + moves @ np.array([[sample.disparity.shape[1]], [1]])
+    expected = (moves @ (plane[:0:-1, None] / sample.grid.scale)).astype(np.float32)
     with np.errstate(over="ignore", invalid="ignore"):
         off = sample.disparity.reshape(-1).take(there).astype(np.float32, copy=False)
         agrees = off > 0
-        if sample.usable is not None:
-            agrees &= sample.usable.reshape(-1).take(there)
-        _, c1, c2 = plane / sample.grid.scale
         off -= d
-        off -= np.array([[c1 * right + c2 * down] for down, right in moves], np.float32)
+        off -= expected
+    if sample.usable is not None:
+        agrees &= sample.usable.reshape(-1).take(there)
     agrees &= np.abs(off) <= np.maximum(sample.tolerance[near], np.float32(sample.quantum))
     np.copyto(off, 0, where=~agrees)
-    mean: Singles = d + off.sum(0) / (1 + count_true(agrees))
+    mean: Singles = off.sum(0)
+    mean /= 1 + count_true(agrees)
+    mean += d
     return mean
 
 
-def _moves(step: int, reach: int) -> list[tuple[int, int]]:
-    """Return how far down and right of a pixel others are averaged with it, px; nothing at step 1."""
-    moves = [tuple(max(-reach, min(reach, round(fifths * step / 5))) for fifths in move) for move in _AROUND]
-    return [(down, right) for down, right in moves if down or right]
+@lru_cache(maxsize=8)
+def _moves(step: int, reach: int) -> NDArray[np.intp]:
+    """Return how far down and right of a pixel others are averaged with it, px (M, 2); nothing at step 1."""
+    moves = [[max(-reach, min(reach, round(fifths * step / 5))) for fifths in move] for move in _AROUND]
+    return np.array([move for move in moves if any(move)], np.intp).reshape(-1, 2)

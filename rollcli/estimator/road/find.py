@@ -8,6 +8,7 @@ the focal length nor the scale of the disparities.
 """
 
 import math
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,13 +48,12 @@ class Road:
     @property
     def model(self) -> RoadModel:
         """The plane as a road without curvature."""
-        c0, c1, c2 = self.plane
-        return RoadModel.of_plane(c0, c1, c2)
+        return RoadModel.of_plane(*self.plane.tolist())
 
     @property
     def horizon(self) -> float:
         """How far the plane's horizon is from the centre of the image, units: large for a wall or a table."""
-        c0, c1, c2 = self.plane
+        c0, c1, c2 = self.plane.tolist()
         return abs(float(c0)) / math.hypot(c1, c2)
 
 
@@ -103,15 +103,18 @@ def road_weights(sample: Sample, plane: NDArray[np.float64], near: NDArray[np.in
     return weights
 
 
-def _varied(costs: Singles, rolls: Singles, tuning: SearchTuning) -> NDArray[np.intp]:
+def _varied(costs: Singles, rolls: Singles, tuning: SearchTuning) -> list[int]:
     """Return the cheapest planes, few of each roll: a wide verge must not crowd out the road."""
-    order = np.argsort(costs, kind="stable")
-    bins = np.floor(rolls[order] / tuning.rival_angle).astype(np.int64)
-    by_bin = np.argsort(bins, kind="stable")
-    starts = np.searchsorted(bins[by_bin], bins[by_bin])
-    rank = np.empty_like(by_bin)
-    rank[by_bin] = np.arange(len(order)) - starts
-    return order[rank < tuning.of_each_roll][: tuning.refined]
+    bins = np.floor(rolls / tuning.rival_angle).tolist()
+    taken: Counter[float] = Counter()
+    chosen: list[int] = []
+    for plane in np.argsort(costs, kind="stable").tolist():
+        taken[bins[plane]] += 1
+        if taken[bins[plane]] <= tuning.of_each_roll:
+            chosen.append(plane)
+            if len(chosen) == tuning.refined:
+                break
+    return chosen
 
 
 def _rolls(planes: Singles) -> Singles:

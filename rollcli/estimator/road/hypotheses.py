@@ -26,7 +26,7 @@ def draw_planes(sample: Sample, max_roll: float, seed: int) -> Singles:
     central = pool[np.abs(x[pool]) < radius]  # the road is more likely there
     both = np.concatenate([pool, central])
     a = both[(first * len(both)).astype(np.intp)]
-    at, reach = coarse.column[a], int(radius / sample.pitch)
+    at, reach = coarse.column[a].astype(np.intp), int(radius / sample.pitch)
     from_ = before[np.maximum(at - reach, 0)]
     to = before[np.minimum(at + reach + 1, len(before) - 1)]
     b = pool[from_ + (second * (to - from_)).astype(np.intp)]

@@ -40,7 +40,7 @@ class RoadModel(NamedTuple):
     @classmethod
     def of_plane(cls, c0: float, c1: float, c2: float) -> "RoadModel":
         """Return the road that is the plane d = c0 + c1 x + c2 y."""
-        return cls(math.atan2(-c1, c2), (float(c0), math.hypot(c1, c2), 0.0))
+        return cls(math.atan2(-c1, c2), (c0, math.hypot(c1, c2), 0.0))
 
     @property
     def plane(self) -> tuple[float, float, float]:

@@ -73,7 +73,7 @@ class PlaneScorer:
         # what speaks for a plane counts as far as the slopes agree, what speaks against it in any case
         lost = np.minimum(excess, 0)
         lost *= slope
-        lost += np.maximum(excess, 0)
+        lost += np.maximum(excess, 0, out=excess)
         scores = _explained(lost, slope, core, self.tuning.least_core)
         scores += _explained(lost, slope, corridor, self.tuning.least_corridor)
         scores /= 2
@@ -84,12 +84,16 @@ class PlaneScorer:
     def fitted(self, planes: Singles) -> Singles:
         """Fit each plane (K, 3) to the pixels on it, a few times over."""
         slope, _, corridor = self._weights(planes)
-        fixed = slope * corridor
+        fixed = np.multiply(slope, corridor, out=corridor)
         products = (self.scaled[:3, None] * self.scaled[None]).reshape(12, -1)
         for fit in range(self.tuning.fits):
-            off = np.square(_residuals(planes, self.scaled))
             width = self.tuning.first_fit_width if fit == 0 else 1.0
-            weight = fixed * np.maximum(0, 1 - off * np.float32(width**-2))
+            weight = _residuals(planes, self.scaled)
+            np.square(weight, out=weight)
+            weight *= np.float32(-(width**-2))
+            weight += 1
+            np.maximum(weight, 0, out=weight)
+            weight *= fixed
             sums = (weight @ products.T).astype(np.float64).reshape(-1, 3, 4)
             planes = np.linalg.solve(sums[..., :3] * _RIDGE + _TINY, sums[..., 3:])[..., 0].astype(np.float32)
         return planes

@@ -30,8 +30,8 @@ class CoarseSample:
     ----------
     x, y, d, tolerance : ndarray of float32
         As in `Sample`.
-    column : ndarray of int
-        Column of each pixel among all that are sampled.
+    column : ndarray of uint16
+        Column of each pixel among all that are sampled; of this type a sort takes a quarter of the time.
     coherence : ndarray of float32
         The share of the valid ones among four neighbours whose disparity is within tolerance.
     slopes : ndarray of float32, shape (4, M)
@@ -42,7 +42,7 @@ class CoarseSample:
     y: Singles
     d: Singles
     tolerance: Singles
-    column: NDArray[np.intp]
+    column: NDArray[np.uint16]
     coherence: Singles
     slopes: Singles
 
@@ -190,7 +190,7 @@ def take_sample(
         y=y[few],
         d=few_d,
         tolerance=tolerance[few],
-        column=columns[few],
+        column=columns[few].astype(np.uint16),
         coherence=coherence,
         slopes=to_slopes(steps, grid.scale / reach),
     )
