@@ -60,8 +60,9 @@ def _inflated(packed: bytes, width: int, height: int) -> Rows | None:
     except (RuntimeError, ValueError):  # its errors are RuntimeErrors
         return None
     checksum = imagecodecs().deflate_adler32(plain).to_bytes(4, "big")
-    # libdeflate does not tell where the stream ends; its checksum does
-    return rows if len(plain) == rows.size and packed.find(checksum) == len(packed) - 4 else None
+    # libdeflate does not tell where the stream ends; its checksum does, if it is found once, at the end
+    ends = packed.endswith(checksum) and packed.rfind(checksum, 0, -1) < 0
+    return rows if len(plain) == rows.size and ends else None
 
 
 def _inflated_sub(packed: bytes, width: int, height: int) -> Rows | None:
