@@ -56,6 +56,11 @@ class RoadModel(NamedTuple):
         """Return the coordinate along the road, y cos(theta) - x sin(theta)."""
         return y * math.cos(self.theta) - x * math.sin(self.theta)
 
+    def turned(self, places: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return across and along, shape (2, N), of x and y, shape (2, N): several times faster."""
+        c, s = math.cos(self.theta), math.sin(self.theta)
+        return np.array([[c, s], [-s, c]], np.float32) @ places
+
     def disparity(self, x: Reals, y: Reals) -> Reals:
         """Return the road's disparity, px, camber included."""
         road = self.disparity_along(self.along(x, y))

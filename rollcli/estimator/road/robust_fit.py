@@ -17,7 +17,7 @@ from rollcli.estimator.road.profile import Profile, read_profile
 from rollcli.estimator.road.subsample import Sample
 from rollcli.estimator.road.tuning import FitTuning, ProfileTuning
 
-_KEPT = ("x", "y", "d", "alone", "tolerance", "ahead", "shown")  # as `NearPixels` are picked
+X, Y, D, ALONE, TOLERANCE, PLACE, AHEAD, SHOWN = range(8)  # rows of `NearPixels.rows`
 _MOST_FADED = 30.0  # as exp(-30): products of such weights are no denormals, which take ten times as long
 _RIDGE = 1e-10 * np.eye(5)  # of normal matrices with a diagonal of ones, up to this size
 
@@ -44,22 +44,15 @@ class Fit(NamedTuple):
 
 @dataclass(frozen=True)
 class NearPixels:
-    """The pixels near a road's plane, with what stays the same through all fits; arrays of shape (N,).
+    """The pixels near a road's plane, with what stays the same through all fits.
 
     Attributes
     ----------
-    x, y, tolerance : ndarray
-        As in `Sample`.
-    d : ndarray
-        Disparity, averaged with pixels around, px.
-    alone : ndarray
-        That of the pixel alone.
-    place : ndarray
-        Weights from 0 to 1 by place in the image and by slopes.
-    ahead : ndarray
-        1 in the middle of the lane ahead, fading towards its sides.
-    shown : ndarray of bool
-        Those that the lane is fitted to.
+    rows : ndarray of float32, shape (8, N)
+        x, y and tolerance as in `Sample`; disparity, averaged with pixels around, and that of the pixel
+        alone, px; `place`, weights from 0 to 1 by place in the image and by slopes; `ahead`, 1 in the middle
+        of the lane ahead, fading towards its sides; and `shown`, 1 for those that the lane is fitted to,
+        else 0. One array: pixels are picked at once.
     stride : int
         How many near pixels of the sample each of them stands for.
     least_width : float
@@ -67,14 +60,7 @@ class NearPixels:
     tuning : FitTuning
     """
 
-    x: Singles
-    y: Singles
-    d: Singles
-    alone: Singles
-    tolerance: Singles
-    place: Singles
-    ahead: Singles
-    shown: NDArray[np.bool_]
+    rows: Singles
     stride: int
     least_width: float
     tuning: FitTuning
@@ -87,40 +73,51 @@ class NearPixels:
         off = c0 + c1 * sample.x + c2 * sample.y - sample.d
         close = np.abs(off) < tuning.reach * sample.tolerance
         stride = -(-int(np.count_nonzero(close)) // tuning.pixels) or 1
-        places = np.flatnonzero(close[::stride])  # so that one pixel more moves no other
+        close = close[::stride]
+        places = np.flatnonzero(close)  # so that one pixel more moves no other
         near = places * stride
-        shown = places % max(1, round(len(places) / tuning.lane_pixels)) == 0
-        kept = (sample.x, sample.y, sample.d, sample.tolerance)
-        x, y, alone, tolerance = (pixels[near] for pixels in kept)
-        d = averaged(sample, road.plane, near)
-        across, along = model.across(x, y), model.along(x, y)
+        rows = np.empty((8, len(near)), np.float32)
+        for row, pixels in ((X, sample.x), (Y, sample.y), (ALONE, sample.d), (TOLERANCE, sample.tolerance)):
+            rows[row] = pixels.take(near)
+        rows[D] = averaged(sample, road.plane, near)
+        across, along = model.turned(rows[:2])
         half_height = sample.grid.centre_v / sample.grid.scale
-        place = np.square(road_weights(sample, road.plane, near))
-        place *= _seen(across, along, half_height, model.theta, tuning)
-        side = np.square(across * (model.alpha[1] / tuning.lane) / d)
-        ahead: Singles = np.exp(-np.minimum(np.square(side), _MOST_FADED))
+        np.square(road_weights(sample, road.plane, near), out=rows[PLACE])
+        rows[PLACE] *= _seen(across, along, half_height, model.theta, tuning)
+        across *= model.alpha[1] / tuning.lane
+        across /= rows[D]
+        np.exp(-np.minimum(np.square(np.square(across)), _MOST_FADED), out=rows[AHEAD])
+        shown = np.zeros(len(close), np.float32)
+        shown[:: max(1, round(len(places) / tuning.lane_pixels))] = 1
+        rows[SHOWN] = shown.take(places)
         # the steps of a map of whole pixels are no spread: within less, only stripes of one value are left
         usual = math.hypot(sample.noise, sample.tuning.sample.uneven_share * sample.typical)
-        least = max(tuning.least_width, sample.quantum / usual)
-        return cls(x, y, d, alone, tolerance, place, ahead, shown, stride, least, tuning)
+        return cls(rows, stride, max(tuning.least_width, sample.quantum / usual), tuning)
+
+    def pixels(self, some: NDArray[np.intp]) -> Floats:
+        """Return x, y and the disparity of some of them, shape (3, M)."""
+        return self.rows[: D + 1].take(some, 1).astype(np.float64)
 
     def lane(self) -> "NearPixels":
         """Return some of them, weighted so that the lane ahead counts."""
-        few = np.flatnonzero(self.shown)
-        arrays = {name: getattr(self, name)[few] for name in _KEPT}
-        return replace(self, **arrays, place=self.place[few] * arrays["ahead"])
+        rows = self.rows.take(np.flatnonzero(self.rows[SHOWN] > 0), 1)
+        rows[PLACE] *= rows[AHEAD]
+        return replace(self, rows=rows)
 
     def profile(self, lane: RoadModel, tuning: ProfileTuning) -> tuple[Profile, "NearPixels"]:
         """Read the profile across the lane; return it, and the pixels weighted by it."""
-        road = lane.disparity_along(lane.along(self.x, self.y))
-        least = self.d * tuning.least_road
-        side = lane.side(lane.across(self.x, self.y), np.maximum(road, least))
-        used = np.flatnonzero((self.place > tuning.least_place) & (road > least))
-        profile = read_profile(side[used], self.d[used] / road[used] - 1, tuning)
+        d = self.rows[D]
+        across, along = lane.turned(self.rows[:2])
+        road = lane.disparity_along(along)
+        least = d * tuning.least_road
+        side = lane.side(across, np.maximum(road, least))
+        used = np.flatnonzero((self.rows[PLACE] > tuning.least_place) & (road > least))
+        profile = read_profile(side.take(used), d.take(used) / road.take(used) - 1, tuning)
         weights: Singles = profile.at(side).astype(np.float32, copy=False)
         kept = np.flatnonzero(weights > self.tuning.least_weight)
-        arrays = {name: getattr(self, name)[kept] for name in _KEPT}
-        return profile, replace(self, **arrays, place=self.place[kept] * weights[kept])
+        rows = self.rows.take(kept, 1)
+        rows[PLACE] *= weights.take(kept)
+        return profile, replace(self, rows=rows)
 
     def fit(self, start: RoadModel, rounds: int, *, parabolic: bool, cambered: bool = False) -> Fit:
         """Fit (a0, a1, a2, theta) and the camber, starting from the road's plane or from an earlier fit.
@@ -128,10 +125,10 @@ class NearPixels:
         Gauss-Newton with Tukey's biweight, whose width shrinks from two tolerances as far as the spread of
         the pixels ahead allows. The camber has a prior: where the pixels do not determine it, it stays small.
         """
-        design = np.empty((6, len(self.d)), np.float32)
+        design = np.empty((6, self.rows.shape[1]), np.float32)
         design[0], design[4] = 1, 0
-        ahead = self.ahead + np.float32(self.tuning.beside)
-        across, squares = self._lay_out(design, start, self.d, cambered=cambered)
+        ahead = self.rows[AHEAD] + np.float32(self.tuning.beside)
+        across, squares = self._lay_out(design, start, self.rows[D], cambered=cambered)
         fit = Fit(start, squares, self.tuning.start_width)
         for _ in range(rounds):
             weights = self.weights(fit)
@@ -146,7 +143,7 @@ class NearPixels:
                 products[4, 5] -= precision * fit.model.camber
             steps = inverse_of_normal(products[:5, :5]) @ products[:5, 5]
             model = self._moved(fit.model, steps.tolist())
-            across, squares = self._lay_out(design, model, self.d, cambered=cambered)
+            across, squares = self._lay_out(design, model, self.rows[D], cambered=cambered)
             weights *= ahead
             fit = Fit(model, squares, min(fit.limit, self._width(squares, weights)), precision)
         return fit
@@ -160,9 +157,9 @@ class NearPixels:
 
         Averaged ones lie closer together.
         """
-        design = np.ones((6, len(self.d)), np.float32)
-        _, squares = self._lay_out(design, model, self.alone, cambered=True)
-        ahead = self.ahead + np.float32(self.tuning.beside)
+        design = np.ones((6, self.rows.shape[1]), np.float32)
+        _, squares = self._lay_out(design, model, self.rows[ALONE], cambered=True)
+        ahead = self.rows[AHEAD] + np.float32(self.tuning.beside)
         limit = self.tuning.start_width
         for _ in range(self.tuning.rounds):
             limit = min(limit, self._width(squares, self._weights(squares, limit) * ahead))
@@ -176,15 +173,14 @@ class NearPixels:
         The last is what the road leaves of some disparities. Return the coordinate across the road, and the
         squares of what is left, in tolerances.
         """
-        across: Singles = model.across(self.x, self.y)
-        design[1] = model.along(self.x, self.y)
+        across, design[1] = model.turned(self.rows[:2])
         np.square(design[1], out=design[2])
         road: Singles = np.array(model.alpha, np.float32) @ design[:3]  # RoadModel.disparity takes longer
         if cambered:
             design[4] = model.bulge(across, road)
             road += np.float32(model.camber) * design[4]
         np.subtract(d, road, out=design[5])
-        squares = design[5] / self.tolerance
+        squares: Singles = design[5] / self.rows[TOLERANCE]
         squares *= squares
         return across, squares
 
@@ -201,8 +197,8 @@ class NearPixels:
         weights += 1
         np.maximum(weights, 0, out=weights)
         weights *= weights
-        weights *= self.place
-        if np.count_nonzero(weights) < self.tuning.least_pixels:
+        weights *= self.rows[PLACE]
+        if np.count_nonzero(weights > 0) < self.tuning.least_pixels:
             raise EstimationError(HARDLY_A_PIXEL)
         return weights
 

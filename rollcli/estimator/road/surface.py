@@ -142,8 +142,8 @@ def _surface(
 ) -> Surface:
     """Return the pixels that a fit leaves, and the fit."""
     weights, model = near.weights(fit), fit.model
-    used = np.flatnonzero(weights)
-    x, y, d = (values[used].astype(np.float64) for values in (near.x, near.y, near.d))
+    used = np.flatnonzero(weights > 0)  # of floats alone it takes three times as long
+    x, y, d = near.pixels(used)
     plain = model.disparity_along(model.along(x, y))
     return Surface(
         x=x,

@@ -9,7 +9,18 @@ import pytest
 from rollcli.errors import EstimationError
 from rollcli.estimator.road.find import Road, road_weights
 from rollcli.estimator.road.model import RoadModel
-from rollcli.estimator.road.robust_fit import NearPixels, inverse_of_normal
+from rollcli.estimator.road.robust_fit import (
+    AHEAD,
+    ALONE,
+    PLACE,
+    SHOWN,
+    TOLERANCE,
+    D,
+    NearPixels,
+    X,
+    Y,
+    inverse_of_normal,
+)
 from rollcli.estimator.road.subsample import take_sample
 from rollcli.estimator.road.tuning import ROAD_TUNING, FitTuning
 from tests.estimator.synthetic_maps import flat_road
@@ -24,28 +35,37 @@ def near_pixels(spread=0.1, count=900, tuning=TUNING, road=ROAD, least_width=0.2
     x, y = rng.uniform(-0.9, 0.9, count), rng.uniform(0.05, 0.6, count)
     tolerance, place, ahead = rng.uniform(0.4, 0.9, count), rng.uniform(0.3, 1, count), rng.random(count)
     d = road.disparity(x, y) + spread * tolerance * rng.normal(size=count)
-    fields = {"x": x, "y": y, "d": d, "alone": d, "tolerance": tolerance, "place": place, "ahead": ahead}
-    singles = {name: field.astype(np.float32) for name, field in fields.items()}
-    shown = np.arange(count) % 3 == 0
-    return NearPixels(**singles, shown=shown, stride=1, least_width=least_width, tuning=tuning)
+    rows = np.empty((8, count), np.float32)
+    rows[X], rows[Y], rows[D], rows[ALONE], rows[TOLERANCE] = x, y, d, d, tolerance
+    rows[PLACE], rows[AHEAD], rows[SHOWN] = place, ahead, np.arange(count) % 3 == 0
+    return NearPixels(rows, stride=1, least_width=least_width, tuning=tuning)
+
+
+def with_row(near, row, values):
+    """The same pixels with other values of one kind."""
+    rows = near.rows.copy()
+    rows[row] = values
+    return dataclasses.replace(near, rows=rows)
 
 
 def biweights(near, road, limit):
     """Tukey's weights around a road, and how many tolerances it is off."""
-    off = (road.disparity(near.x.astype(float), near.y.astype(float)) - near.d) / near.tolerance
-    return near.place * np.where(abs(off) < limit, (1 - (off / limit) ** 2) ** 2, 0), off
+    off = (road.disparity(near.rows[X].astype(float), near.rows[Y].astype(float)) - near.rows[D]) / near.rows[
+        TOLERANCE
+    ]
+    return near.rows[PLACE] * np.where(abs(off) < limit, (1 - (off / limit) ** 2) ** 2, 0), off
 
 
 def usual_width(near, off, weights):
     """The standard deviation ahead, times 3 on an even road, up to 3.5 on an uneven one."""
-    ahead = weights * (near.ahead + 0.05)
+    ahead = weights * (near.rows[AHEAD] + 0.05)
     spread = 1.3 * math.sqrt(np.average(off**2, weights=ahead))
     return spread * np.interp(spread, [0.35, 0.55], [3, 3.5])
 
 
 def derivatives(road, near):
     """Those of the disparity by a0, a1, a2 and theta, and the bulge of a camber of 1."""
-    x, y, step = near.x.astype(float), near.y.astype(float), 1e-5
+    x, y, step = near.rows[X].astype(float), near.rows[Y].astype(float), 1e-5
 
     def disparity(a0, a1, a2, turned, camber):
         alpha = (road.alpha[0] + a0, road.alpha[1] + a1, road.alpha[2] + a2)
@@ -74,12 +94,12 @@ def test_each_round_is_a_weighted_least_squares_fit_about_the_one_before(spread,
         root = np.sqrt(weights)
         prior = 0.0
         if cambered:  # the pixels' variance over the prior's, as often as neighbours repeat each other
-            variance = np.average((off * near.tolerance) ** 2, weights=weights)
+            variance = np.average((off * near.rows[TOLERANCE]) ** 2, weights=weights)
             prior = variance * max(1, weights.sum() / 50) / 0.02**2
             assert found.camber_precision == pytest.approx(prior, rel=2e-3)
         # all but theta enter as they are: they are solved for anew, and theta's change with them
         rows = np.vstack([design * root[:, None], [0, 0, 0, 0, math.sqrt(prior)]])
-        a0, a1, a2, turned, camber = np.linalg.lstsq(rows, np.append(near.d * root, 0), rcond=None)[0]
+        a0, a1, a2, turned, camber = np.linalg.lstsq(rows, np.append(near.rows[D] * root, 0), rcond=None)[0]
         model = RoadModel(model.theta + turned, (a0, a1, a2), camber)
         np.testing.assert_allclose(found.model.alpha, model.alpha, rtol=2e-3, atol=5e-3)
         assert found.model.theta == pytest.approx(model.theta, abs=2e-5)
@@ -117,11 +137,11 @@ def test_a_surface_needs_30_pixels(count, enough):
 def test_single_pixels_end_where_their_own_spread_says(camber):
     road = ROAD._replace(camber=camber)
     averaged = near_pixels(spread=0.05, road=road)
-    noise = 0.3 * averaged.tolerance * np.random.default_rng(2).normal(size=len(averaged.d))
-    near = dataclasses.replace(averaged, alone=averaged.d + noise.astype(np.float32))
+    noise = 0.3 * averaged.rows[TOLERANCE] * np.random.default_rng(2).normal(size=len(averaged.rows[D]))
+    near = with_row(averaged, ALONE, averaged.rows[D] + noise)
     limit = 2.0
     for _ in range(TUNING.rounds):
-        weights, off = biweights(dataclasses.replace(near, d=near.alone), road, limit)
+        weights, off = biweights(with_row(near, D, near.rows[ALONE]), road, limit)
         limit = usual_width(near, off, weights)
     assert near.limit_alone(road) == pytest.approx(limit, rel=1e-4)
     assert limit > near.fit(road, 3, parabolic=True).limit
@@ -150,26 +170,26 @@ def test_the_pixels_near_a_plane_are_weighted_by_place(roll_deg):
     stride = math.ceil(close.sum() / 2500)
     taken = [place for place in range(0, len(close), stride) if close[place]]
     assert (near.stride, stride > 1) == (stride, True)
-    np.testing.assert_array_equal(near.alone, sample.d[taken])
-    assert near.shown.sum() == pytest.approx(400, rel=0.2)
+    np.testing.assert_array_equal(near.rows[ALONE], sample.d[taken])
+    assert near.rows[SHOWN].sum() == pytest.approx(400, rel=0.2)
 
     model = road.model
-    across, along = model.across(near.x, near.y), model.along(near.x, near.y)
-    side = across * model.alpha[1] / near.d
-    np.testing.assert_allclose(near.ahead, np.exp(-((side / 0.7) ** 4)), rtol=1e-3, atol=1e-6)
+    across, along = model.across(near.rows[X], near.rows[Y]), model.along(near.rows[X], near.rows[Y])
+    side = across * model.alpha[1] / near.rows[D]
+    np.testing.assert_allclose(near.rows[AHEAD], np.exp(-((side / 0.7) ** 4)), rtol=1e-3, atol=1e-6)
     # what a rig rolled by 0.1 more or less would not see lies below the picture's lower edge, turned
     bottom = 239.5 / 320 / math.cos(model.theta) + max(0, abs(math.tan(model.theta)) - 0.2)
     seen = 1 / (1 + np.exp((along + 0.1 * abs(across) - bottom) / 0.01))
     expected = road_weights(sample, road.plane, np.array(taken)) ** 2 * seen
-    np.testing.assert_allclose(near.place, expected, rtol=1e-3, atol=1e-6)
-    assert near.place.min() < 0.05 < 0.9 < near.place.max()
+    np.testing.assert_allclose(near.rows[PLACE], expected, rtol=1e-3, atol=1e-6)
+    assert near.rows[PLACE].min() < 0.05 < 0.9 < near.rows[PLACE].max()
 
 
 def test_the_lane_is_what_is_shown_weighted_by_how_far_ahead_it_is():
     near = near_pixels()
     lane = near.lane()
-    np.testing.assert_array_equal(lane.d, near.d[::3])
-    np.testing.assert_allclose(lane.place, near.place[::3] * near.ahead[::3])
+    np.testing.assert_array_equal(lane.rows[D], near.rows[D][::3])
+    np.testing.assert_allclose(lane.rows[PLACE], near.rows[PLACE][::3] * near.rows[AHEAD][::3])
 
 
 def test_a_step_of_whole_pixels_counts_in_any_case():
