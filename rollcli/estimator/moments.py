@@ -129,12 +129,14 @@ def point_moments(
     p: Floats, q: Floats, disparity: Floats, weights: Floats, grid: Grid, plane: tuple[float, float, float]
 ) -> Moments:
     """Sum scattered pixels, given by their normalised coordinates; all arrays have shape (N,)."""
-    rows, columns = powers(p), powers(q)
     residual = disparity - (plane[0] + plane[1] * p + plane[2] * q)
     pull = weights * residual
-    s = (rows * weights) @ columns.T
-    t = (rows[:3] * pull) @ columns[:3].T
-    return Moments(grid, plane, s, t, float(pull @ residual))
+    columns = np.empty((8, len(q)))  # powers of q, five with the weights and three with their pull
+    columns[0], columns[5] = weights, pull
+    for k in (1, 2, 3, 4, 6, 7):
+        np.multiply(columns[k - 1], q, out=columns[k])
+    sums = powers(p) @ columns.T
+    return Moments(grid, plane, sums[:, :5], sums[:3, 5:], float(pull @ residual))
 
 
 def powers(x: NDArray[np.floating[Any]], degree: int = 4) -> Floats:

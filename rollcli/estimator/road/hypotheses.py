@@ -20,7 +20,8 @@ def draw_planes(sample: Sample, max_roll: float, seed: int) -> Singles:
         return np.empty((0, 3), np.float32)
     column = coarse.column[pool]
     pool = pool[np.argsort(column, kind="stable")]
-    before = np.concatenate([[0], np.cumsum(np.bincount(column))])  # how many lie left of each column
+    before = np.zeros(int(column.max()) + 2, np.intp)  # how many lie left of each column
+    np.cumsum(np.bincount(column), out=before[1:])
     x, y, d = coarse.x, coarse.y, coarse.d
     first, second, third = _draws(seed, tuning.draws)
     central = pool[np.abs(x[pool]) < radius]  # the road is more likely there
@@ -40,7 +41,9 @@ def draw_planes(sample: Sample, max_roll: float, seed: int) -> Singles:
     steep = c2 * radius > tuning.least_rise * coarse.tolerance[a]  # a wall's noise is not a road
     good = np.flatnonzero(wide & steep & (np.abs(c1) <= math.tan(max_roll) * c2))[: tuning.kept]
     c1, c2, a = c1[good], c2[good], a[good]
-    return np.stack([d[a] - c1 * x[a] - c2 * y[a], c1, c2], 1)
+    planes = np.empty((len(good), 3), np.float32)
+    planes[:, 0], planes[:, 1], planes[:, 2] = d[a] - c1 * x[a] - c2 * y[a], c1, c2
+    return planes
 
 
 @lru_cache(maxsize=8)

@@ -48,9 +48,10 @@ def to_slopes(steps: Singles, per_unit: float) -> Singles:
 
 def rising(slopes: Singles) -> NDArray[np.bool_]:
     """Return where the disparity grows downward, above the pixel or below it."""
-    up, down = slopes[2:]
-    grows: NDArray[np.bool_] = ((up > 0) & (up < NO_SLOPE)) | ((down > 0) & (down < NO_SLOPE))
-    return grows
+    grows = slopes[2:] > 0
+    grows &= slopes[2:] < NO_SLOPE
+    either: NDArray[np.bool_] = grows[0] | grows[1]
+    return either
 
 
 def count_true(agreeing: NDArray[np.bool_]) -> Singles:
@@ -61,7 +62,7 @@ def count_true(agreeing: NDArray[np.bool_]) -> Singles:
 
 def smallest_step(jumps: Singles, part: int) -> float:
     """Return the 1/part quantile of the steps to the right and down, px: 0 if there are none."""
-    some: Singles = jumps[1::2].ravel()
+    some: Singles = jumps[1::2, ::2].ravel()
     some = some.compress((some > 0) & (some < NO_SLOPE))
     place = len(some) // part
     return float(np.partition(some, place)[place]) if len(some) else 0.0

@@ -59,7 +59,7 @@ class PlaneScorer:
         """Take the coarse pixels of a sample."""
         tuning, coarse = sample.tuning.score, sample.coarse
         near = np.minimum(coarse.d, np.float32(tuning.nearness * sample.typical))
-        near /= near.mean()
+        near *= len(near) / near.sum()
         scaled, caps = _scaled(coarse, slice(None), tuning)
         bearings = scaled[1:3] / scaled[3]
         np.negative(bearings[1], out=bearings[1])
@@ -77,9 +77,14 @@ class PlaneScorer:
         scores = _explained(lost, slope, core, self.tuning.least_core)
         scores += _explained(lost, slope, corridor, self.tuning.least_corridor)
         scores /= 2
-        rise = np.square(planes[:, 1]) + np.square(planes[:, 2])
-        steep = np.square(planes[:, 0]) / np.maximum(rise, np.float32(1e-30))
-        return np.where(scores > 0, scores / (1 + steep * np.float32(self.tuning.horizon**-2)), scores)
+        found = [self._less_for_walls(*each) for each in zip(scores.tolist(), planes.tolist(), strict=True)]
+        return np.array(found, np.float32)
+
+    def _less_for_walls(self, score: float, plane: list[float]) -> float:
+        """Return a score, less if it is good and the plane's horizon is far away."""
+        c0, c1, c2 = plane
+        steep = c0 * c0 / max(c1 * c1 + c2 * c2, 1e-30)
+        return score / (1 + steep / self.tuning.horizon**2) if score > 0 else score
 
     def fitted(self, planes: Singles) -> Singles:
         """Fit each plane (K, 3) to the pixels on it, a few times over."""
@@ -123,8 +128,9 @@ def slope_weights(slopes: Singles, slope_noise: float, planes: Singles, tuning: 
     left, right, up, down = slopes
     weights = _off_slope(left, right, c1)
     weights += _off_slope(up, down, c2)
-    share = np.float32(tuning.slope_share**2)
-    weights *= -0.5 / (share * (c1 * c1 + c2 * c2) + np.float32(slope_noise**2))
+    share, noise = tuning.slope_share**2, slope_noise**2
+    scales = [-0.5 / (share * (across * across + down * down) + noise) for _, across, down in planes.tolist()]
+    weights *= np.array(scales, np.float32)[:, None]
     np.exp(weights, out=weights)
     weights *= np.float32(1 - tuning.off_slope_weight)
     weights += np.float32(tuning.off_slope_weight)
