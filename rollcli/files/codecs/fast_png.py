@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from rollcli.files.codecs.unpack import imagecodecs
 
 _SUB, _LAST_FILTER = 1, 4
+_FULL_WINDOW = b"\x78"  # of less OpenCV's zlib minds references that go further back; other decoders do not
 _HEAD_SHARE = 32  # the part of the data that shows whether rows have other filters than Sub
 _LONGEST_BLOCK = 0xFFFF  # bytes of a stored block of Deflate
 
@@ -43,6 +44,8 @@ def decode_grey16(
     ndarray of uint16, shape (H, W), or None
         None where OpenCV is as fast, or where something is wrong: then its verdict counts.
     """
+    if not packed.startswith(_FULL_WINDOW):
+        return None
     if imagecodecs() is not None:
         rows = _inflated(packed, width, height)
         return None if rows is None else _unfiltered(rows, packed[-4:], file_of)

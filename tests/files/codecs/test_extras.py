@@ -119,9 +119,10 @@ def test_rows_of_every_filter_read_as_opencv_reads_them(installed, shape, filter
 
 
 def test_what_opencv_writes_needs_no_opencv_to_be_read(installed, monkeypatch):
-    file = cv2.imencode(".png", DEEP)[1].tobytes()
+    values = np.tile(DEEP, (5, 5))
+    file = cv2.imencode(".png", values)[1].tobytes()
     monkeypatch.setattr(png.cv2, "imdecode", None)
-    np.testing.assert_array_equal(decode_stored(file, "x").values, DEEP)
+    np.testing.assert_array_equal(decode_stored(file, "x").values, values)
 
 
 PLAIN = filtered(DEEP, [1])
@@ -141,6 +142,7 @@ NO_SUCH_FILTER = zlib.compress(b"\5" + PLAIN[1:])
         zlib.compress(PLAIN + b"\0"),
         zlib.compress(PLAIN[:-1]),
         b"\x77" + PACKED[1:],
+        b"\x18\x19" + PACKED[2:],  # a window of 512 bytes, and references that go further back
         NO_SUCH_FILTER,
         zlib.compress(PLAIN[:-107] + b"\5" + PLAIN[-106:]),
         b"",
