@@ -200,8 +200,11 @@ def _by_group(rows: Floats, position: Reals, share: Reals | None, groups: int) -
         heights = np.cumsum(share.take(order))
         cuts = np.searchsorted(heights, heights[-1] * np.arange(1, groups) / groups).tolist()
     ordered = rows.take(order, 1)
-    parts = [ordered[:, start:end] for start, end in itertools.pairwise([0, *cuts, len(order)])]
-    return np.stack([part @ part.T for part in parts])
+    products = np.empty((groups, 6, 6))
+    for product, (start, end) in zip(products, itertools.pairwise([0, *cuts, len(order)]), strict=True):
+        part = ordered[:, start:end]
+        np.matmul(part, part.T, out=product)
+    return products
 
 
 class _Solutions(NamedTuple):

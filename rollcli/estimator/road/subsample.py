@@ -159,9 +159,10 @@ def take_sample(
         )
     disparity = np.ascontiguousarray(disparity)
     first = _first(reach, step)
+    chosen = chosen.astype(np.int32 if disparity.size < 2**31 else np.intp)  # the shorter, if it will do
     rows = chosen // taken.shape[1]  # divmod would take longer
     columns = chosen - rows * taken.shape[1]
-    places = (rows * width + columns) * step + first * (width + 1)
+    places = ((rows * width + columns) * step + first * (width + 1)).astype(np.intp)
     with np.errstate(over="ignore"):
         d: Singles = disparity.reshape(-1).take(places).astype(np.float32, copy=False)
     few = every(len(d), numbers.coarse_pixels)
@@ -183,8 +184,9 @@ def take_sample(
         typical = _median(coherent)
         noise = _noise(typical, quantum, numbers)
     tolerance = _tolerance(d, noise, numbers)
-    x = ((np.arange(first, width, step) - grid.centre_u) / grid.scale).astype(np.float32).take(columns)
-    y = ((np.arange(first, height, step) - grid.centre_v) / grid.scale).astype(np.float32).take(rows)
+    pitch = step / grid.scale
+    x = _normalised(columns, pitch, (first - grid.centre_u) / grid.scale)
+    y = _normalised(rows, pitch, (first - grid.centre_v) / grid.scale)
     coarse = CoarseSample(
         x=x[few],
         y=y[few],
@@ -204,7 +206,7 @@ def take_sample(
         noise=noise,
         places=places,
         coarse=coarse,
-        pitch=step / grid.scale,
+        pitch=pitch,
         quantum=quantum,
         disparity=disparity,
         usable=usable,
@@ -253,6 +255,14 @@ def _taken(
     with np.errstate(invalid="ignore"):
         taken: NDArray[np.bool_] = _strided(disparity, reach, step) > 0
     return taken if usable is None else taken & _strided(usable, reach, step)
+
+
+def _normalised(counted: NDArray[np.integer[Any]], pitch: float, first: float) -> Singles:
+    """Return the coordinates of rows or columns, so far apart, from a first one on."""
+    coordinates: Singles = counted.astype(np.float32)
+    coordinates *= pitch
+    coordinates += first
+    return coordinates
 
 
 def _median(values: Singles) -> float:
