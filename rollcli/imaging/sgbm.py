@@ -76,7 +76,7 @@ def match_views(views: Views, first: int, count: int, options: StereoOptions) ->
 def match_rows(
     views: Views, first: int, count: int, options: StereoOptions, rows: slice = ALL_ROWS, above: int = 0
 ) -> Map:
-    """Match only what some rows need, and of these the ones above a row at half the size.
+    """Match only what some rows need, and of these the ones above a row at a third of the size.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def match_rows(
 
 
 def _match_coarsely(views: Views, first: int, count: int, options: StereoOptions) -> Map:
-    """Match at half the size; the map has the size of the views."""
+    """Match at a third of the size; the map has the size of the views."""
     small = shrink_both(views, _SMALLER)
     first //= _SMALLER
     count = usable_range(-(-count // _SMALLER), first, small[0].shape[1], options.block_size)

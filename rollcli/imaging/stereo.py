@@ -25,7 +25,8 @@ from rollcli.imaging.views import Map, Views, prepare_views
 _MATCHES = 4  # until a pair counts as one that cannot be levelled
 _ROUNDS = 8  # of measuring; on empty roads with much noise each takes away a fifth of what is left
 _LEFT_IN_ROWS = 0.3  # px, where not all rows are matched
-# Of the height: fewer rows at half the size hardly save time, and more would be no road's
+# Of the height. Fewer rows at a third of the size would not save what finding them takes, and more would be a
+# mistake: of 248 pairs the road's first row was at 0.49 at most
 _LEAST_ABOVE, _MOST_ABOVE = 0.1, 0.6
 # A scale that no rig in use has, in blocks that do not agree. Of 468 warped pairs 12 had both: three angles
 # of them were wrong by 0.3 degrees. Of the others two were wrong, by 0.11
@@ -49,7 +50,7 @@ class Wanted(NamedTuple):
         Rows that are used, of the size matched at; the others may hold no data.
     first_row : callable or None
         Finds the first row, counted from 0, that is wanted at full size, in a small map of the pair: float32,
-        shape (h, w), pixels with 0 for no data. What lies above it is matched at half the size.
+        shape (h, w), pixels with 0 for no data. What lies above it is matched at a third of the size.
     whole : bool
         Whether a map with all rows at full size is wanted beside that, to be looked at.
     """

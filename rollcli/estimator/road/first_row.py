@@ -9,7 +9,8 @@ from rollcli.errors import EstimationError
 from rollcli.estimator.road.find import find_road
 from rollcli.estimator.road.subsample import take_sample
 
-# rows above the horizon of the plane that was found, of a map of about 16,000 pixels
+# Rows of a map of about 16,000 pixels, above the horizon of the plane. In 224 pairs that was too low by 1.05
+# rows (95 %), and by more than two in four of them, against the horizon of the map at full size
 _SPARE = 2
 
 
