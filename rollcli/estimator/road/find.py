@@ -86,7 +86,7 @@ def find_road(sample: Sample, max_roll: float, seed: int) -> Road:
     scorer = PlaneScorer.of(sample)
     fitted = scorer.fitted(planes)
     kept = np.abs(fitted[:, 1]) <= math.tan(max_roll) * fitted[:, 2]
-    fitted = fitted[kept] if kept.any() else planes[:1]
+    fitted = _distinct(fitted[kept] if kept.any() else planes[:1], tuning.same_plane * sample.noise)
     scores = scorer.scores(fitted)
     winner = int(np.argmax(scores))
     if not fitted[winner, 2] > 0:  # fitted to no pixel, it scores 0, and the others have more against them
@@ -115,6 +115,19 @@ def _varied(costs: Singles, rolls: Singles, tuning: SearchTuning) -> list[int]:
             if len(chosen) == tuning.refined:
                 break
     return chosen
+
+
+def _distinct(planes: Singles, least: float) -> Singles:
+    """Return those planes that differ from all before them, by so much somewhere within a unit, px.
+
+    Most fits on a good map end at the same plane.
+    """
+    distinct: list[list[float]] = []
+    for plane in planes.tolist():
+        a0, a1, a2 = plane
+        if all(abs(a0 - b0) + abs(a1 - b1) + abs(a2 - b2) >= least for b0, b1, b2 in distinct):
+            distinct.append(plane)
+    return np.array(distinct, np.float32)
 
 
 def _rolls(planes: Singles) -> Singles:

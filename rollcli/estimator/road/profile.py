@@ -44,8 +44,9 @@ class Profile:
         """Return how much of the lane's level the ground there has, 0 to 1, however far it is."""
         # np.interp takes three times as long
         weights = self.weights.astype(side.dtype)
-        rises = np.zeros_like(weights)
+        rises = np.empty_like(weights)
         np.subtract(weights[1:], weights[:-1], out=rises[:-1])
+        rises[-1] = 0
         last = len(weights) - 1
         places = np.fmin(np.fmax(side / self.tuning.bin_width + last / 2, 0), last)
         below = np.floor(places)

@@ -11,6 +11,7 @@ import pytest
 
 from rollcli.errors import EstimationError, UsageError
 from rollcli.estimator.estimate import estimate_roll
+from rollcli.estimator.road.find import _distinct
 from rollcli.files.formats import read_image
 from rollcli.imaging.derotate import derotate
 from rollcli.imaging.stereo import StereoOptions, match_pair
@@ -303,3 +304,10 @@ def test_what_is_too_large_is_no_data(matched, sentinel):
 def test_what_cannot_be_squared_is_refused(matched, factor):
     with pytest.raises(EstimationError, match="in pixels"):
         estimate_roll(matched[0][2] * np.float32(factor))
+
+
+def test_of_planes_that_hardly_differ_anywhere_the_first_is_judged():
+    one = [30.0, -2.0, 20.0]
+    planes = np.array([one, [30.2, -2.2, 20.2], [30.0, -2.0, 20.9], [30.5, -1.5, 20.5], one], np.float32)
+    np.testing.assert_array_equal(_distinct(planes, 0.7), planes[[0, 2, 3]])
+    np.testing.assert_array_equal(_distinct(planes, 0.0), planes)
