@@ -9,7 +9,7 @@ from rollcli.files.durable import sync_files
 
 _MOST_IMAGES = 512
 _LONGEST_S = 1.0  # a row waits no longer for the others of its group
-_SHARE = 25  # a group lasts so many times as long as the last one took to sync: 4 % of the time at most
+_SHARE = 100  # a group lasts so many times as long as the last one took to sync: 1 % of the time at most
 
 
 class DurableRows:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from rollcli.errors import OutputError, UsageError
 from rollcli.files.atomic import atomic_file, output_error
+from rollcli.files.existence import look_at
 from rollcli.files.locking import locked
 from rollcli.files.results import Format, format_header
 
@@ -109,7 +110,7 @@ class ResultFile:
     def is_there(self) -> bool:
         """Tell whether the open file still has its name."""
         try:
-            return os.path.samestat(Path(self._name).stat(), os.fstat(self.descriptor))
+            return os.path.samestat(look_at(self._name), os.fstat(self.descriptor))
         except OSError:
             return False
 
