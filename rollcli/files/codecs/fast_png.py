@@ -20,6 +20,9 @@ from rollcli.files.codecs.unpack import imagecodecs
 _SUB, _LAST_FILTER = 1, 4
 _FULL_WINDOW = b"\x78"  # of less OpenCV's zlib minds references that go further back; other decoders do not
 _HEAD_SHARE = 32  # the part of the data that shows whether rows have other filters than Sub
+# Bytes after a stream that are looked for; more would have to end in its checksum. To look through the whole
+# stream takes a fortieth of OpenCV's time
+_MOST_AFTER = 1 << 16
 _LONGEST_BLOCK = 0xFFFF  # bytes of a stored block of Deflate
 
 Rows = NDArray[np.uint8]
@@ -63,8 +66,8 @@ def _inflated(packed: bytes, width: int, height: int) -> Rows | None:
     except (RuntimeError, ValueError):  # its errors are RuntimeErrors
         return None
     checksum = imagecodecs().deflate_adler32(plain).to_bytes(4, "big")
-    # libdeflate does not tell where the stream ends; its checksum does, if it is found once, at the end
-    ends = packed.endswith(checksum) and packed.rfind(checksum, 0, -1) < 0
+    # libdeflate does not tell where the stream ends; its checksum does, if it is at the end and not before
+    ends = packed.endswith(checksum) and packed.rfind(checksum, -_MOST_AFTER, -1) < 0
     return rows if len(plain) == rows.size and ends else None
 
 
