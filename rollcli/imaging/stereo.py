@@ -72,7 +72,7 @@ class StereoMatch:
     disparity : ndarray of float32, shape (H, W)
         Pixels of the size matched at; no data is 0.
     whole : ndarray of float32, shape (H, W), or None
-        The same with all rows at full size, if that was wanted.
+        The same with all rows at full size, if that was wanted and is another one.
     min_disparity, num_disparities : int
         The range searched.
     end_fraction : float
@@ -174,9 +174,9 @@ def match_pair(
         matched, corrected, doubt = _match_levelled(of_these, wanted.rows, small, look, first < 0)
     valid = cv2.countNonZero(matched)
     whole = None
-    if wanted.whole:
-        start, stop, _ = wanted.rows.indices(height)
-        full = slice(max(start, above), stop)
+    start, stop, _ = wanted.rows.indices(height)
+    full = slice(max(start, above), stop)
+    if wanted.whole and full != slice(0, height):
         whole = refined(_completed(matched, full, partial(match, corrected)), views, corrected)
     return StereoMatch(
         disparity=refined(matched, views, corrected),
