@@ -52,8 +52,8 @@ def decode_grey16(
     if imagecodecs() is not None:
         rows = _inflated(packed, width, height)
         return None if rows is None else _unfiltered(rows, packed[-4:], file_of)
-    if _decoders() is not None:
-        return _by_wuffs(file_of(packed), width, height)
+    if (make_decoder := _decoders()) is not None:
+        return _by_wuffs(make_decoder(), file_of(packed), width, height)
     rows = _inflated_sub(packed, width, height)
     return None if rows is None else _summed(rows)
 
@@ -97,9 +97,9 @@ def _unfiltered(rows: Rows, checksum: bytes, file_of: Callable[[bytes], bytes]) 
     if most > _LAST_FILTER:
         return None
     file = file_of(_stored(rows, checksum))
-    if _decoders() is not None:
+    if (make_decoder := _decoders()) is not None:
         height, stride = rows.shape
-        return _by_wuffs(file, stride // 2, height)
+        return _by_wuffs(make_decoder(), file, stride // 2, height)
     pixels = cv2.imdecode(np.frombuffer(file, np.uint8), cv2.IMREAD_UNCHANGED)
     return None if pixels is None else pixels.astype(np.uint16, copy=False)
 
@@ -127,11 +127,9 @@ def _stored(rows: Rows, checksum: bytes) -> bytes:
     return b"".join([*parts, checksum])
 
 
-def _by_wuffs(file: bytes, width: int, height: int) -> NDArray[np.uint16] | None:
-    """Decode a file; None where wuffs finds something wrong."""
-    make_decoder = _decoders()
-    assert make_decoder is not None  # the caller has asked
-    result = make_decoder().decode(file)  # one decoder in two threads crashes
+def _by_wuffs(decoder: Any, file: bytes, width: int, height: int) -> NDArray[np.uint16] | None:
+    """Decode a file by a decoder of its own: one in two threads crashes. None where something is wrong."""
+    result = decoder.decode(file)
     # what it has not reached is 0, and it says so here alone
     if result.error_message or (buffer := result.pixbuf).shape != (height, width, 2):
         return None

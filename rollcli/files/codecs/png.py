@@ -67,6 +67,11 @@ class _Whole(NamedTuple):
     image: list[memoryview]
 
     @property
+    def packed_size(self) -> int:
+        """Bytes of the pixel data."""
+        return sum(len(chunk) - 12 for chunk in self.image)
+
+    @property
     def packed(self) -> bytes:
         """The pixel data: a zlib stream."""
         return b"".join(chunk[8:-4] for chunk in self.image)
@@ -158,10 +163,10 @@ def _checked(data: bytes, name: str, mask: bool = False) -> _Whole:
             raise InputError(f"{name}: is no standard PNG: chunk {kind.decode('latin-1')!r} is unknown")
         position = end
     assert header is not None
-    compressed = sum(len(chunk) - 12 for chunk in image)
-    require_decoded_fits(*header[:2], header.pixel_bytes, compressed, name, mask=mask)
-    _require_data(header, image, name)
-    return _Whole(header, palette, transparent, image)
+    whole = _Whole(header, palette, transparent, image)
+    require_decoded_fits(*header[:2], header.pixel_bytes, whole.packed_size, name, mask=mask)
+    _require_data(whole, name)
+    return whole
 
 
 def _header(body: bytes, name: str) -> _Header:
@@ -176,13 +181,13 @@ def _header(body: bytes, name: str) -> _Header:
     return header
 
 
-def _require_data(header: _Header, image: list[memoryview], name: str) -> None:
+def _require_data(whole: _Whole, name: str) -> None:
     """Refuse a header that claims more than the compressed data hold."""
-    compressed = sum(len(chunk) - 12 for chunk in image)
+    header, compressed = whole.header, whole.packed_size
     claim = f"its header claims {header.width} x {header.height} pixels"
     if header.height * header.row_bytes(header.width) > _MAX_EXPANSION * compressed:
         raise InputError(f"{name}: {claim}, more than {compressed} bytes can hold")
-    if compressed <= _SMALL and not _begins_well(header, b"".join(chunk[8:-4] for chunk in image)):
+    if compressed <= _SMALL and not _begins_well(header, whole.packed):
         raise InputError(f"{name}: is a damaged PNG: its pixel data do not match {claim}")
 
 
