@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError, OutputError
+from rollcli.files.codecs.extras import crc32
 from rollcli.files.codecs.fast_png import decode_grey16
 from rollcli.files.codecs.mute_stderr import decoding
 from rollcli.files.codecs.raw_map import COLOUR_REMEDY, PICTURE_FLAGS, require_decoded_fits
-from rollcli.files.codecs.unpack import crc32
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _GREY, _COLOUR, _PALETTE, _GREY_ALPHA, _COLOUR_ALPHA = 0, 2, 3, 4, 6

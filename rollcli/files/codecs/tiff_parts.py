@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rollcli.files.codecs.extras import imagecodecs
 from rollcli.files.codecs.raw_map import native
-from rollcli.files.codecs.unpack import imagecodecs, unpacked
+from rollcli.files.codecs.unpack import unpacked
 
 _NO_PREDICTOR, _HORIZONTAL, _FLOATING_POINT = 1, 2, 3
 

@@ -4,9 +4,8 @@ The verdict is always that of Python: what imagecodecs does not read as just wha
 """
 
 import zlib
-from functools import lru_cache
-from typing import Any
 
+from rollcli.files.codecs.extras import imagecodecs
 from rollcli.files.codecs.lzw import LzwError, decode_lzw
 
 _NONE, _LZW, _DEFLATE, _OLD_DEFLATE, _PACKBITS = 1, 5, 8, 32946, 32773
@@ -17,23 +16,6 @@ _PADDING = 1  # bytes after uncompressed data: parts begin at even places
 
 class DamagedPartError(ValueError):
     """The bytes of a strip or tile are not its pixels."""
-
-
-@lru_cache(maxsize=1)
-def imagecodecs() -> Any:
-    """Return the package, or None where it is not installed."""
-    try:
-        import imagecodecs as package
-    except ImportError:
-        return None
-    return package
-
-
-def crc32(data: bytes | memoryview) -> int:
-    """Return the checksum of PNG and gzip, by libdeflate in a twentieth of the time where it is installed."""
-    codecs = imagecodecs()
-    found: int = zlib.crc32(data) if codecs is None else codecs.deflate_crc32(data)
-    return found
 
 
 def unpacked(compression: int, packed: bytes, size: int, most: int) -> bytes:

@@ -64,7 +64,7 @@ def imagecodecs():
 @pytest.fixture(params=["imagecodecs and pywuffs", "imagecodecs", "pywuffs", "nothing"])
 def installed(request, monkeypatch):
     """What of the extra `fast` is there, one after the other."""
-    for package, where in (("imagecodecs", "imagecodecs"), ("pywuffs", "_decoders")):
+    for package, where in (("imagecodecs", "imagecodecs"), ("pywuffs", "png_decoders")):
         if package in request.param:
             pytest.importorskip(package, reason="the extra fast is not installed")
         else:
