@@ -9,10 +9,11 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from rollcli.estimator.road.lattice import Spacing
 from rollcli.estimator.road.neighbours import Singles, count_true
 from rollcli.estimator.road.subsample import Sample
 
-# in fifths of the sample's step: with the pixel itself, each row and column of its 5 by 5 cell has one
+# in fifths of the sample's spacing: with the pixel itself, each row and column of its 5 by 5 cell has one
 _AROUND = ((2, 1), (-2, -1), (1, -2), (-1, 2))
 
 
@@ -34,7 +35,7 @@ def averaged(sample: Sample, plane: NDArray[np.float64], near: NDArray[np.intp])
         belong to another surface, or are wrong.
     """
     d = sample.d[near]
-    moves = _moves(sample.step, sample.reach)
+    moves = _moves(sample.spacing, sample.reach)
     if not len(moves):
         return d
     there = sample.places[near] + moves @ np.array([[sample.disparity.shape[1]], [1]])
@@ -55,7 +56,7 @@ def averaged(sample: Sample, plane: NDArray[np.float64], near: NDArray[np.intp])
 
 
 @lru_cache(maxsize=8)
-def _moves(step: int, reach: int) -> NDArray[np.intp]:
-    """Return how far down and right of a pixel others are averaged with it, px (M, 2); nothing at step 1."""
-    moves = [[max(-reach, min(reach, round(fifths * step / 5))) for fifths in move] for move in _AROUND]
-    return np.array([move for move in moves if any(move)], np.intp).reshape(-1, 2)
+def _moves(spacing: Spacing, reach: int) -> NDArray[np.intp]:
+    """Return how far down and right of a pixel others are averaged with it, px (M, 2); nothing at 1 by 1."""
+    moves = np.rint(np.array(_AROUND) * spacing / 5).clip(-reach, reach).astype(np.intp)
+    return moves[moves.any(axis=1)]

@@ -1,6 +1,5 @@
 """A sample of a map's pixels: all for the fit, and fewer, with their neighbours, for finding the road."""
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,6 +8,7 @@ from numpy.typing import NDArray
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.moments import Grid
+from rollcli.estimator.road.lattice import Spacing, lattice_of, strided
 from rollcli.estimator.road.neighbours import (
     NO_SLOPE,
     Singles,
@@ -81,8 +81,9 @@ class Sample:
         The map.
     usable : ndarray of bool, shape (H, W), or None
         Its pixels that may be taken, where not all may.
-    reach, step : int
-        How far every pixel is from the border at least, and how far apart they are, px.
+    reach : int
+        How far every pixel is from the border at least, px.
+    spacing : Spacing
     tuning : RoadTuning
         The numbers by which the map was sampled, and by which its road is to be found.
     """
@@ -101,7 +102,7 @@ class Sample:
     disparity: NDArray[Any]
     usable: NDArray[np.bool_] | None
     reach: int
-    step: int
+    spacing: Spacing
     tuning: RoadTuning
 
     @property
@@ -145,24 +146,22 @@ def take_sample(
     grid = Grid.of_shape(height, width)
     numbers = tuning.sample
     reach = reach_of(height, width, numbers)
-    step = _step(math.sqrt(height * width / numbers.pixels))
-    taken = _taken(disparity, usable, reach, step)
+    spacing = Spacing.of(height * width / numbers.pixels)
+    taken = _taken(disparity, usable, reach, spacing)
     count = int(np.count_nonzero(taken))
-    if count < numbers.sparse_share * numbers.pixels and step > 1:
-        aimed = numbers.finer_share * numbers.pixels
-        step = _step(step * math.sqrt(max(count, numbers.least_pixels) / aimed))
-        taken = _taken(disparity, usable, reach, step)
+    while count < numbers.sparse_share * numbers.pixels and spacing != (1, 1):  # the valid ones may be a grid
+        share = max(count, numbers.least_pixels) / (numbers.finer_share * numbers.pixels)
+        spacing = Spacing.of(spacing.rows * spacing.columns * share)
+        taken = _taken(disparity, usable, reach, spacing)
+        count = int(np.count_nonzero(taken))
     chosen = np.flatnonzero(taken)
     if len(chosen) < numbers.least_pixels:
         raise EstimationError(
             f"only {len(chosen)} valid pixels away from the border: too few to find a road in"
         )
     disparity = np.ascontiguousarray(disparity)
-    first = _first(reach, step)
-    chosen = chosen.astype(np.int32 if disparity.size < 2**31 else np.intp)  # the shorter, if it will do
-    rows = chosen // taken.shape[1]  # divmod would take longer
-    columns = chosen - rows * taken.shape[1]
-    places = ((rows * width + columns) * step + first * (width + 1)).astype(np.intp)
+    lattice = lattice_of(height, width, reach, spacing)
+    places = lattice.places.take(chosen)
     with np.errstate(over="ignore"):
         d: Singles = disparity.reshape(-1).take(places).astype(np.float32, copy=False)
     few = every(len(d), numbers.coarse_pixels)
@@ -184,15 +183,13 @@ def take_sample(
         typical = _median(coherent)
         noise = _noise(typical, quantum, numbers)
     tolerance = _tolerance(d, noise, numbers)
-    pitch = step / grid.scale
-    x = _normalised(columns, pitch, (first - grid.centre_u) / grid.scale)
-    y = _normalised(rows, pitch, (first - grid.centre_v) / grid.scale)
+    x, y = lattice.x.take(chosen), lattice.y.take(chosen)
     coarse = CoarseSample(
         x=x[few],
         y=y[few],
         d=few_d,
         tolerance=tolerance[few],
-        column=columns[few].astype(np.uint16),
+        column=lattice.column.take(chosen[few]),
         coherence=coherence,
         slopes=to_slopes(steps, grid.scale / reach),
     )
@@ -206,12 +203,12 @@ def take_sample(
         noise=noise,
         places=places,
         coarse=coarse,
-        pitch=pitch,
+        pitch=spacing.columns / grid.scale,
         quantum=quantum,
         disparity=disparity,
         usable=usable,
         reach=reach,
-        step=step,
+        spacing=spacing,
         tuning=tuning,
     )
 
@@ -227,42 +224,12 @@ def reach_of(height: int, width: int, numbers: SampleTuning) -> int:
     return min(numbers.neighbour_most, wanted, max(1, min(height, width) // numbers.border_part))
 
 
-def _step(wanted: float) -> int:
-    """Return how many rows and columns apart pixels are sampled: as many as wanted, but no multiple of 3.
-
-    Matchers prefer whole pixels, and from row to row a road's disparity grows by baseline over camera height,
-    which is about a third of a pixel in most cars: every third row has the same part of that error.
-    """
-    step = max(1, int(wanted))
-    return step - (step % 3 == 0)
-
-
-def _first(reach: int, step: int) -> int:
-    """Return the first row and column that is sampled."""
-    return reach + (step // 2) % step
-
-
-def _strided(array: NDArray[Any], reach: int, step: int, dv: int = 0, du: int = 0) -> NDArray[Any]:
-    """Return every step-th pixel, moved by (dv, du), that has neighbours at `reach` on all sides."""
-    height, width = array.shape
-    first = _first(reach, step)
-    return array[first + dv : height - reach + dv : step, first + du : width - reach + du : step]
-
-
 def _taken(
-    disparity: NDArray[Any], usable: NDArray[np.bool_] | None, reach: int, step: int
+    disparity: NDArray[Any], usable: NDArray[np.bool_] | None, reach: int, spacing: Spacing
 ) -> NDArray[np.bool_]:
     with np.errstate(invalid="ignore"):
-        taken: NDArray[np.bool_] = _strided(disparity, reach, step) > 0
-    return taken if usable is None else taken & _strided(usable, reach, step)
-
-
-def _normalised(counted: NDArray[np.integer[Any]], pitch: float, first: float) -> Singles:
-    """Return the coordinates of rows or columns, so far apart, from a first one on."""
-    coordinates: Singles = counted.astype(np.float32)
-    coordinates *= pitch
-    coordinates += first
-    return coordinates
+        taken: NDArray[np.bool_] = strided(disparity, reach, spacing) > 0
+    return taken if usable is None else taken & strided(usable, reach, spacing)
 
 
 def _median(values: Singles) -> float:

@@ -105,5 +105,5 @@ def test_where_every_pixel_is_sampled_there_is_nothing_to_average():
 
     every = np.arange(len(sample.d))
 
-    assert sample.step == 1
+    assert sample.spacing == (1, 1)
     np.testing.assert_array_equal(averaged(sample, np.array([30.0, -1.0, 10.0]), every), sample.d)

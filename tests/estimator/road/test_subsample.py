@@ -126,6 +126,16 @@ def test_a_pixel_half_of_whose_neighbours_agree_is_no_noise():
     assert sample.typical >= 50
 
 
+@pytest.mark.parametrize("apart", [4, 5, 6, 12])
+@pytest.mark.parametrize("first", [4, 5])
+def test_a_grid_of_valid_pixels_is_found_between_the_rows_and_columns_of_the_sample(street, apart, first):
+    alone = np.zeros_like(street)
+    alone[first::apart, first::apart] = street[first::apart, first::apart]
+    sample = take_sample(alone)
+    assert len(sample.d) >= min(5400, np.count_nonzero(alone > 0)) * 0.95
+    assert sample.typical == pytest.approx(take_sample(street).typical, rel=0.1)
+
+
 @pytest.mark.parametrize("size", [(480, 640), (375, 1242), (1080, 1920), (90, 100)])
 def test_places_are_where_the_sampled_disparities_are(size):
     disparity = np.random.default_rng(2).uniform(10, 20, size).astype(np.float32)
@@ -135,8 +145,10 @@ def test_places_are_where_the_sampled_disparities_are(size):
     v, u = np.divmod(places, size[1])
     np.testing.assert_allclose(sample.x, (u - (size[1] - 1) / 2) / (size[1] / 2), atol=1e-6)
     np.testing.assert_allclose(sample.y, (v - (size[0] - 1) / 2) / (size[1] / 2), atol=1e-6)
-    assert sample.pitch == pytest.approx(sample.step / (size[1] / 2))
-    assert sample.step == 1 or sample.step % 3 != 0
+    assert sample.pitch == pytest.approx(sample.spacing.columns / (size[1] / 2))
+    assert sample.spacing.rows % 3 != 0
+    for each, apart in ((u, sample.spacing.columns), (v, sample.spacing.rows)):
+        assert set(np.diff(np.unique(each))) == {apart}
     assert min(u.min(), v.min(), size[1] - 1 - u.max(), size[0] - 1 - v.max()) >= sample.reach
 
 
