@@ -30,16 +30,32 @@ class Tangent:
         The y where it touches, px from the centre of the top-left pixel: the mean of the pixels used.
     disparity, slope : float
         px, and px per px.
-    changes : ndarray, shape (N, 3), or None
-        Independent errors of (disparity, slope, theta), px and radians: their squares add up. None where
-        the map is too small to tell.
+    jackknife : Jackknife or None
+        Of the pixels used; None where the map is too small for one.
+    grid : Grid
+        Its coordinates.
     """
 
     theta: float
     row: float
     disparity: float
     slope: float
-    changes: Floats | None = field(repr=False, compare=False)
+    jackknife: Jackknife | None = field(default=None, repr=False, compare=False)
+    grid: Grid = field(default=Grid(0.0, 0.0, 1.0), repr=False, compare=False)
+
+    @property
+    def changes(self) -> Floats | None:
+        """Independent errors of (disparity, slope, theta), px and radians, (N, 3): their squares add up.
+
+        None where the map is too small to tell.
+        """
+        if self.jackknife is None:
+            return None
+        grid, flat = self.grid, RoadModel(self.theta, (0.0, 0.0, 0.0))
+        row, across = (of(grid.centre_u, grid.centre_v) for of in (flat.along, flat.across))
+        return _in_pixels(
+            _errors(self.jackknife), (self.row - row) / grid.scale, grid.scale, self.slope * across
+        )
 
     def turned_by(self, slope: float) -> float:
         """Return by how much a slope along the rows, px per px, turns this road, radians."""
@@ -84,11 +100,7 @@ def touch(
     disparity, slope = road.disparity_along(row), a1 + 2 * a2 * row
     third = _third_power(disparity, slope, a2, cubic[1])
     disparity, slope = disparity - third * cubic[0], slope - third * cubic[1]
-    changes = None
-    if jackknife is not None:
-        across = road.across(grid.centre_u, grid.centre_v)
-        changes = _in_pixels(_errors(jackknife), centre, grid.scale, slope * across)
-    return Tangent(theta, row, disparity, slope, changes)
+    return Tangent(theta, row, disparity, slope, jackknife, grid)
 
 
 def _parabola_of_cubic(along: Reals, weights: Floats) -> tuple[float, float]:
