@@ -17,16 +17,19 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rollcli.estimator.moments import Floats
+from rollcli.estimator.normal import regular
 from rollcli.estimator.road.model import Reals, RoadModel
-from rollcli.estimator.road.robust_fit import inverse_of_normal
 from rollcli.estimator.road.surface import Surface
 from rollcli.estimator.tuning import IntervalTuning
 
 # 97.5 % quantiles of Student's t for 1, 2, ... degrees of freedom
 _T975 = (12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228, 2.201, 2.179)
 _NORMAL = 1.96  # 97.5 % quantile of the normal distribution
+_LAST_STEP = 65535  # of 16 bits, whose sort takes a fifth of the time of single precision
+_LEAST_SPAN = 1e-30  # units; keeps a division finite
 _THETA, _CAMBER = 3, 4  # columns of the design
 
 
@@ -138,16 +141,18 @@ def jackknife(surface: Surface, theta: float, tuning: IntervalTuning) -> Jackkni
     -------
     Jackknife
     """
-    model, weights = surface.model._replace(theta=theta), surface.weights
-    across, along = model.across(surface.x, surface.y), model.along(surface.x, surface.y)
+    model = surface.model._replace(theta=theta)
+    # in single precision, which takes a third less time: the angle itself does not come from here
+    across, along = model.turned(np.array([surface.x, surface.y], np.float32))
+    weights = surface.weights.astype(np.float32)
     cambered = math.isfinite(surface.camber_precision)
     prior = surface.camber_precision if cambered else 0.0
     plain = model.disparity_along(along)
-    rows = np.empty((6, len(along)))
+    rows = np.empty((6, len(along)), np.float32)
     rows[0], rows[1], rows[2] = 1, along, along * along * surface.parabolic
     model.turning(across, along, out=rows[3])
     rows[4] = model.bulge(across, plain) if cambered else 0
-    np.subtract(surface.d, plain, out=rows[5])
+    rows[5] = surface.d - plain
     rows *= np.sqrt(weights)  # from here on all products are weighted
 
     bands = _by_group(rows, along, None, tuning.groups)
@@ -180,20 +185,20 @@ def _lane(side: Reals) -> Reals:
     return lane
 
 
-def _near(weights: Floats, along: Reals, tuning: IntervalTuning) -> Reals:
+def _near(weights: Reals, along: Reals, tuning: IntervalTuning) -> Reals:
     """Return how much each pixel belongs to the near half, 0 to 1."""
     middle = float(weights @ along) / float(weights.sum())
     near: Reals = 1 / (1 + np.exp(np.minimum((middle - along) / tuning.depth_fade, 50)))
     return near
 
 
-def _by_group(rows: Floats, position: Reals, share: Reals | None, groups: int) -> Floats:
+def _by_group(rows: Reals, position: Reals, share: Reals | None, groups: int) -> Floats:
     """Return the products (groups, 6, 6) of groups of equal total `share`, or number, cut along `position`.
 
     Of the six rows five are the design's; with the sixth, the residuals, a product is a group's normal
     equations, right-hand side included.
     """
-    order = np.argsort(position)
+    order = _order(position)
     if share is None:
         cuts = [math.ceil(len(order) * group / groups) - 1 for group in range(1, groups)]
     else:
@@ -202,7 +207,14 @@ def _by_group(rows: Floats, position: Reals, share: Reals | None, groups: int) -
     ordered = rows.take(order, 1)
     columns = ordered.copy().T  # BLAS takes twice as long for the product of an array with itself
     bounds = itertools.pairwise([0, *cuts, len(order)])
-    return np.stack([ordered[:, start:end] @ columns[start:end] for start, end in bounds])
+    return np.array([ordered[:, start:end] @ columns[start:end] for start, end in bounds], np.float64)
+
+
+def _order(position: Reals) -> NDArray[np.intp]:
+    """Return what sorts pixels along a position, to a step of its span."""
+    first, last = float(position.min()), float(position.max())
+    steps = (position - first) * (_LAST_STEP / max(last - first, _LEAST_SPAN))
+    return np.argsort(steps.astype(np.uint16), kind="stable")
 
 
 class _Solutions(NamedTuple):
@@ -238,11 +250,11 @@ def _solved(total: Floats, groups: Floats, halves: Floats, prior: float) -> tupl
     pulls[-1, _CAMBER] = 0
     normal[:free, _CAMBER, _CAMBER] += prior
     normal[free:, _CAMBER] = normal[free:, :, _CAMBER] = 0
-    inverses = inverse_of_normal(normal, normal[0])
-    solutions = (inverses @ pulls)[..., 0]
+    normal = regular(normal, normal[0])
+    solutions = np.linalg.solve(normal, pulls)[..., 0]
     whole = solutions[0]
     changes = (whole - solutions[1:free])[:, :4]
-    return _Solutions(whole, changes, solutions[free:-1], solutions[-1]), inverses[0]
+    return _Solutions(whole, changes, solutions[free:-1], solutions[-1]), np.linalg.inv(normal[0])
 
 
 def _white(total: Floats, whole: Floats, tuning: IntervalTuning) -> float:

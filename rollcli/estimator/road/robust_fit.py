@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.moments import Floats
+from rollcli.estimator.normal import solve_normal
 from rollcli.estimator.road.average import averaged
 from rollcli.estimator.road.find import HARDLY_A_PIXEL, Road, road_weights
 from rollcli.estimator.road.model import RoadModel
@@ -18,8 +19,9 @@ from rollcli.estimator.road.subsample import Sample
 from rollcli.estimator.road.tuning import FitTuning, ProfileTuning
 
 X, Y, D, ALONE, TOLERANCE, PLACE, AHEAD, SHOWN = range(8)  # rows of `NearPixels.rows`
+# rows of a design, after 1, the coordinate along the road, and its square
+BULGE, TURNING, LEFT = range(3, 6)
 _MOST_FADED = 30.0  # as exp(-30): products of such weights are no denormals, which take ten times as long
-_RIDGE = 1e-10 * np.eye(5)  # of normal matrices with a diagonal of ones, up to this size
 
 
 class Fit(NamedTuple):
@@ -126,24 +128,25 @@ class NearPixels:
         the pixels ahead allows. The camber has a prior: where the pixels do not determine it, it stays small.
         """
         design = np.empty((6, self.rows.shape[1]), np.float32)
-        design[0], design[4] = 1, 0
+        design[0], design[BULGE] = 1, 0
+        if cambered:  # of the start: it changes so little that its changes need not be followed
+            design[BULGE] = self._bulge(start)
         ahead = self.rows[AHEAD] + np.float32(self.tuning.beside)
-        across, squares = self._lay_out(design, start, self.rows[D], cambered=cambered)
+        across, squares = self._lay_out(design, start, self.rows[D])
         fit = Fit(start, squares, self.tuning.start_width)
         for _ in range(rounds):
             weights = self.weights(fit)
             if not parabolic:
                 design[2] = 0
-            fit.model.turning(across, design[1], out=design[3])
-            products = ((design * weights) @ design.T).astype(np.float64)
+            fit.model.turning(across, design[1], out=design[TURNING])
+            products = ((design * weights) @ design.T).tolist()
             precision = math.inf
             if cambered:
                 precision = self._camber_precision(products)
-                products[4, 4] += precision
-                products[4, 5] -= precision * fit.model.camber
-            steps = inverse_of_normal(products[:5, :5]) @ products[:5, 5]
-            model = self._moved(fit.model, steps.tolist())
-            across, squares = self._lay_out(design, model, self.rows[D], cambered=cambered)
+                products[BULGE][BULGE] += precision
+                products[BULGE][LEFT] -= precision * fit.model.camber
+            model = self._moved(fit.model, solve_normal(products[:LEFT]))
+            across, squares = self._lay_out(design, model, self.rows[D])
             weights *= ahead
             fit = Fit(model, squares, min(fit.limit, self._width(squares, weights)), precision)
         return fit
@@ -158,36 +161,36 @@ class NearPixels:
         Averaged ones lie closer together.
         """
         design = np.ones((6, self.rows.shape[1]), np.float32)
-        _, squares = self._lay_out(design, model, self.rows[ALONE], cambered=True)
+        design[BULGE] = self._bulge(model)
+        _, squares = self._lay_out(design, model, self.rows[ALONE])
         ahead = self.rows[AHEAD] + np.float32(self.tuning.beside)
         limit = self.tuning.start_width
         for _ in range(self.tuning.rounds):
             limit = min(limit, self._width(squares, self._weights(squares, limit) * ahead))
         return limit
 
-    def _lay_out(
-        self, design: Singles, model: RoadModel, d: Singles, *, cambered: bool
-    ) -> tuple[Singles, Singles]:
-        """Set a design's rows 1 and 2, the coordinate along the road and its square, 4, the bulge, and 5.
+    def _bulge(self, model: RoadModel) -> Singles:
+        """Return what a camber of 1 adds to the disparities of a road, px."""
+        across, along = model.turned(self.rows[:2])
+        return model.bulge(across, model.disparity_along(along))
 
-        The last is what the road leaves of some disparities. Return the coordinate across the road, and the
-        squares of what is left, in tolerances.
+    def _lay_out(self, design: Singles, model: RoadModel, d: Singles) -> tuple[Singles, Singles]:
+        """Set what a design has of a road: along it, the square of that, and what it leaves of disparities.
+
+        Return the coordinate across the road, and the squares of what is left, in tolerances.
         """
         across, design[1] = model.turned(self.rows[:2])
         np.square(design[1], out=design[2])
-        road: Singles = np.array(model.alpha, np.float32) @ design[:3]  # RoadModel.disparity takes longer
-        if cambered:
-            design[4] = model.bulge(across, road)
-            road += np.float32(model.camber) * design[4]
-        np.subtract(d, road, out=design[5])
-        squares: Singles = design[5] / self.rows[TOLERANCE]
+        road: Singles = np.array([*model.alpha, model.camber], np.float32) @ design[: BULGE + 1]
+        np.subtract(d, road, out=design[LEFT])
+        squares: Singles = design[LEFT] / self.rows[TOLERANCE]
         squares *= squares
         return across, squares
 
     def _moved(self, model: RoadModel, steps: list[float]) -> RoadModel:
         """Return a road whose parameters differ by some steps; no round turns it by more than it may."""
         most, (a0, a1, a2) = self.tuning.most_turn, model.alpha
-        d0, d1, d2, turned, camber = steps
+        d0, d1, d2, camber, turned = steps
         turned = max(-most, min(most, turned))
         return RoadModel(model.theta + turned, (a0 + d0, a1 + d1, a2 + d2), model.camber + camber)
 
@@ -202,14 +205,14 @@ class NearPixels:
             raise EstimationError(HARDLY_A_PIXEL)
         return weights
 
-    def _camber_precision(self, products: Floats) -> float:
+    def _camber_precision(self, products: list[list[float]]) -> float:
         """Return what the camber's prior adds to its normal equation.
 
         The variance of the pixels over that of the prior, times how often neighbouring pixels repeat each
         other.
         """
-        total = float(products[0, 0])
-        variance = float(products[5, 5]) / total
+        total = products[0][0]
+        variance = products[LEFT][LEFT] / total
         repeated = max(1.0, total / self.tuning.independent_pixels)
         return variance * repeated / self.tuning.camber**2
 
@@ -223,29 +226,6 @@ class NearPixels:
         mix = (spread - tuning.even_spread) / (tuning.uneven_spread - tuning.even_spread)
         times = tuning.even_width + max(0.0, min(1.0, mix)) * (tuning.uneven_width - tuning.even_width)
         return max(self.least_width, times * spread)
-
-
-def inverse_of_normal(normal: Floats, like: Floats | None = None) -> Floats:
-    """Invert normal matrices of parameters in different units, some of which may be missing.
-
-    Parameters
-    ----------
-    normal : ndarray, shape (..., N, N)
-        Normal matrix; where a parameter is missing, its row and column are 0.
-    like : ndarray, shape (N, N), optional
-        A normal matrix whose units are taken; `normal` itself by default.
-
-    Returns
-    -------
-    ndarray, shape (..., N, N)
-        Times right-hand sides that are 0 for what is missing, 0 for it, too.
-    """
-    diagonal = np.diagonal(normal if like is None else like, axis1=-2, axis2=-1)
-    unit = 1 / np.sqrt(np.where(diagonal > 0, diagonal, 1))
-    units = unit[..., :, None] * unit[..., None, :]
-    size = normal.shape[-1]
-    inverse: Floats = np.linalg.inv(normal * units + _RIDGE[:size, :size]) * units
-    return inverse
 
 
 def _seen(across: Singles, along: Singles, half_height: float, theta: float, tuning: FitTuning) -> Singles:

@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rollcli.estimator.normal import solve_normal
 from rollcli.estimator.road.neighbours import Singles, rising
 from rollcli.estimator.road.subsample import CoarseSample, Sample
 from rollcli.estimator.road.tuning import ScoreTuning
 
 _LEAST_ROOT = np.float32(1e-4)  # its 8th power is no denormal: these take ten times as long
-_RIDGE, _TINY = 1 + 1e-8 * np.eye(3), 1e-30 * np.eye(3)  # let singular normal equations be solved
 
 
 def first_costs(sample: Sample, planes: Singles, pixels: int) -> Singles:
@@ -99,8 +99,8 @@ class PlaneScorer:
             weight += 1
             np.maximum(weight, 0, out=weight)
             weight *= fixed
-            sums = (weight @ products.T).astype(np.float64).reshape(-1, 3, 4)
-            planes = np.linalg.solve(sums[..., :3] * _RIDGE + _TINY, sums[..., 3:])[..., 0].astype(np.float32)
+            sums = (weight @ products.T).reshape(-1, 3, 4).tolist()
+            planes = np.array([solve_normal(each) for each in sums], np.float32)
         return planes
 
     def _weights(self, planes: Singles) -> tuple[Singles, Singles, Singles]:
