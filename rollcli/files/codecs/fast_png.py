@@ -109,23 +109,26 @@ def _summed(rows: Rows) -> NDArray[np.uint16]:
     """Undo the filters None and Sub: a pixel's bytes are the sums, modulo 256, of those up to it."""
     height, stride = rows.shape
     differences = rows[:, 1:].reshape(height, stride // 2, 2)
-    sums = np.empty_like(differences, order="C")
-    if (codecs := imagecodecs()) is not None:
-        codecs.delta_decode(differences, axis=1, out=sums)
+    if (codecs := imagecodecs()) is None:
+        sums = _doubled(differences).view(">u2")
     else:
-        _add_up(differences, sums)
+        bytewise = np.empty(differences.shape, np.uint8)
+        codecs.delta_decode(differences[..., ::-1], axis=1, out=bytewise)
+        sums = bytewise.view("<u2")
+    pixels: NDArray[np.uint16] = sums[..., 0].astype(np.uint16, copy=False)
     plain = rows[:, 0] != _SUB
     if plain.any():
-        sums[plain] = differences[plain]
-    return sums.view(">u2")[..., 0].astype(np.uint16)
+        pixels[plain] = rows[plain, 1:].view(">u2")
+    return pixels
 
 
-def _add_up(differences: Rows, sums: Rows) -> None:
-    """Set the running sums along rows of pixels, shape (H, W, 2): of 2 pixels, then of 4, of 8 and so on.
+def _doubled(differences: Rows) -> Rows:
+    """Return the running sums along rows of pixels, shape (H, W, 2): of 2 pixels, then of 4, of 8 and so on.
 
     This takes a fourth of the time of `np.add.accumulate`, which waits for each sum before the next one.
     """
-    height, width, _ = sums.shape
+    height, width, _ = differences.shape
+    sums = np.empty(differences.shape, np.uint8)
     step = max(1, _BLOCK // (2 * width))
     for top in range(0, height, step):
         block = sums[top : top + step]
@@ -135,6 +138,7 @@ def _add_up(differences: Rows, sums: Rows) -> None:
             np.add(now[:, added:], now[:, :-added], out=then[:, added:])
             now, then = then, now
         block[...] = now
+    return sums
 
 
 def _stored(rows: Rows, checksum: bytes) -> bytes:
