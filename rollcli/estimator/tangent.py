@@ -47,7 +47,7 @@ class Tangent:
     def changes(self) -> Floats | None:
         """Independent errors of (disparity, slope, theta), px and radians, (N, 3): their squares add up.
 
-        None where the map is too small to tell.
+        None where the map is too small to tell. They are made anew each time: few estimates need them.
         """
         if self.jackknife is None:
             return None

@@ -177,9 +177,10 @@ def _joined(message: str, more: str) -> str:
 
 
 def _half_widths(tangent: Tangent, calibration: Calibration) -> tuple[float | None, float | None]:
-    if tangent.changes is None:
+    changes = tangent.changes
+    if changes is None:
         return None, None
-    moved = tangent.changes @ pose_jacobian(tangent, calibration)[1:].T
+    moved = changes @ pose_jacobian(tangent, calibration)[1:].T
     pitch, height = (TUNING.factor * np.sqrt(np.square(moved).sum(axis=0))).tolist()
     return pitch, height
 

@@ -125,21 +125,27 @@ def streets() -> None:
 
 
 def cost() -> None:
-    """Print the time of a pose as a share of an estimate's."""
+    """Print the time of a pose as a share of an estimate's, and of a frame's with its decoding."""
     v, u = np.mgrid[:375, :1242].astype(np.float32)
     noise = np.random.default_rng(0).normal(0, 0.2, v.shape)
     road = np.where(v > 190, 0.33 * (v - 180) + 0.01 * u + noise, 0).astype(np.float32)
+    png = cv2.imencode(".png", np.rint(road * 256).astype(np.uint16))[1]
     calibration = KITTI_2012.for_size(1242, 375)
-    times: dict[str, list[float]] = {"estimate": [], "pose": []}
+    times: dict[str, list[float]] = {"decode": [], "estimate": [], "pose": []}
     for _ in range(100):
+        before = time.process_time()
+        cv2.imdecode(png, cv2.IMREAD_UNCHANGED)
         start = time.process_time()
         estimate = estimate_roll(road)
         middle = time.process_time()
         with_pose(estimate, calibration)
+        times["decode"].append(start - before)
         times["estimate"].append(middle - start)
         times["pose"].append(time.process_time() - middle)
-    whole, part = (1000 * float(np.median(times[name])) for name in ("estimate", "pose"))
-    print(f"cost: estimate {whole:.2f} ms, pose {part:.3f} ms: {100 * part / whole:.1f} %")
+    decoding, estimating, pose = (1000 * float(np.median(each)) for each in times.values())
+    of_estimate, of_frame = pose / estimating, pose / (decoding + estimating + pose)
+    shares = f"{of_estimate:.1%} of it, {of_frame:.1%} of a frame"
+    print(f"cost: decoding {decoding:.2f} ms, estimate {estimating:.2f} ms, pose {pose:.3f} ms: {shares}")
 
 
 def main() -> None:

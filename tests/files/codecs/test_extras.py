@@ -125,6 +125,12 @@ def test_what_opencv_writes_needs_no_opencv_to_be_read(installed, monkeypatch):
     np.testing.assert_array_equal(decode_stored(file, "x").values, values)
 
 
+@pytest.mark.parametrize("block", [1, 500, 1000, 3000])
+def test_rows_are_summed_in_blocks(installed, monkeypatch, block):
+    monkeypatch.setattr(fast_png, "_BLOCK", block)
+    np.testing.assert_array_equal(decoded(np.tile(DEEP, (2, 5)), [1]), np.tile(DEEP, (2, 5)))
+
+
 PLAIN = filtered(DEEP, [1])
 PACKED = zlib.compress(PLAIN)
 NO_SUCH_FILTER = zlib.compress(b"\5" + PLAIN[1:])
