@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rollcli.estimator.solvers import trigonometric
 from rollcli.estimator.solvers.trigonometric import DEGREE, SAMPLES, derivative, rising_zeros, zeros
 from tests.estimator.synthetic_maps import repeatable
 
@@ -59,6 +60,16 @@ def test_zeros_that_are_proven_are_all_and_no_others(seed, mean, fade):
 def test_most_smooth_polynomials_are_proven():
     proven = [rising_zeros(polynomial(seed, 0.0, 0.5)[0](PLACES)) is not None for seed in range(400)]
     assert np.mean(proven) > 0.95
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_the_bounds_between_two_places_are_what_a_wave_and_its_slope_bend_by(order):
+    matrices = trigonometric._matrices()
+    bounds = matrices.bends @ np.abs(matrices.to_waves @ np.cos(order * PLACES))
+    half = math.pi / trigonometric._FINE  # of what lies between two places
+    bend = 1 - math.cos(order * half)  # of the wave off the chord, where it is most curved
+    for bound, most in zip(bounds, (bend, order * bend), strict=True):
+        assert most <= bound < 1.01 * most
 
 
 @repeatable
