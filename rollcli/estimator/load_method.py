@@ -1,5 +1,6 @@
 """Load the function of a method by its name, and no other method with it."""
 
+from functools import cache
 from importlib import import_module
 from typing import Any
 
@@ -20,5 +21,6 @@ def load_area_method(name: str) -> AreaMethod:
     return method
 
 
+@cache
 def _load(folder: str, method: Method) -> Any:
     return getattr(import_module(f"rollcli.estimator.{folder}.{method.file}"), method.file)

@@ -128,16 +128,17 @@ def _doubled(differences: Rows) -> Rows:
     This takes a fourth of the time of `np.add.accumulate`, which waits for each sum before the next one.
     """
     height, width, _ = differences.shape
-    sums = np.empty(differences.shape, np.uint8)
-    step = max(1, _BLOCK // (2 * width))
-    for top in range(0, height, step):
-        block = sums[top : top + step]
-        now, then = differences[top : top + step].copy(), np.empty_like(block)
-        for added in (1 << power for power in range((width - 1).bit_length())):
+    steps, rows = (width - 1).bit_length(), max(1, _BLOCK // (2 * width))
+    sums, other = np.empty(differences.shape, np.uint8), np.empty((rows, width, 2), np.uint8)
+    for top in range(0, height, rows):
+        now, block = differences[top : top + rows], sums[top : top + rows]
+        for step in range(steps):
+            added, then = 1 << step, other[: len(block)] if (steps - step) % 2 == 0 else block
             then[:, :added] = now[:, :added]
             np.add(now[:, added:], now[:, :-added], out=then[:, added:])
-            now, then = then, now
-        block[...] = now
+            now = then
+        if not steps:
+            block[...] = now
     return sums
 
 
