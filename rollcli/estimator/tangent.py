@@ -33,7 +33,7 @@ class Tangent:
     jackknife : Jackknife or None
         Of the pixels used; None where the map is too small for one.
     grid : Grid
-        Its coordinates.
+        The coordinates that it is in.
     """
 
     theta: float
