@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from rollcli.estimator.moments import Floats
 from rollcli.estimator.normal import regular
 from rollcli.estimator.road.model import Reals, RoadModel
+from rollcli.estimator.road.robust_fit import MOST_FADED
 from rollcli.estimator.road.surface import Surface
 from rollcli.estimator.tuning import IntervalTuning
 
@@ -181,14 +182,14 @@ def jackknife(surface: Surface, theta: float, tuning: IntervalTuning) -> Jackkni
 
 def _lane(side: Reals) -> Reals:
     """Return how much each pixel belongs to the lane ahead, 0 to 1."""
-    lane: Reals = np.exp(-np.minimum(np.square(np.square(side)), 80))
+    lane: Reals = np.exp(-np.minimum(np.square(np.square(side)), MOST_FADED))
     return lane
 
 
 def _near(weights: Reals, along: Reals, tuning: IntervalTuning) -> Reals:
     """Return how much each pixel belongs to the near half, 0 to 1."""
     middle = float(weights @ along) / float(weights.sum())
-    near: Reals = 1 / (1 + np.exp(np.minimum((middle - along) / tuning.depth_fade, 50)))
+    near: Reals = 1 / (1 + np.exp(np.minimum((middle - along) / tuning.depth_fade, MOST_FADED)))
     return near
 
 

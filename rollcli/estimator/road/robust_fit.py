@@ -21,7 +21,7 @@ from rollcli.estimator.road.tuning import FitTuning, ProfileTuning
 X, Y, D, ALONE, TOLERANCE, PLACE, AHEAD, SHOWN = range(8)  # rows of `NearPixels.rows`
 # rows of a design, after 1, the coordinate along the road, and its square
 BULGE, TURNING, LEFT = range(3, 6)
-_MOST_FADED = 30.0  # as exp(-30): products of such weights are no denormals, which take ten times as long
+MOST_FADED = 30.0  # as exp(-30): products of such weights are no denormals, which take ten times as long
 
 
 class Fit(NamedTuple):
@@ -88,7 +88,7 @@ class NearPixels:
         rows[PLACE] *= _seen(across, along, half_height, model.theta, tuning)
         across *= model.alpha[1] / tuning.lane
         across /= rows[D]
-        np.exp(-np.minimum(np.square(np.square(across)), _MOST_FADED), out=rows[AHEAD])
+        np.exp(-np.minimum(np.square(np.square(across)), MOST_FADED), out=rows[AHEAD])
         shown = np.zeros(len(close), np.float32)
         shown[:: max(1, round(len(places) / tuning.lane_pixels))] = 1
         rows[SHOWN] = shown.take(places)
@@ -239,5 +239,5 @@ def _seen(across: Singles, along: Singles, half_height: float, theta: float, tun
     """
     bottom = half_height / math.cos(theta) + max(0.0, abs(math.tan(theta)) - tuning.large_roll)
     beyond = along + tuning.other_roll * np.abs(across) - bottom
-    seen: Singles = np.reciprocal(1 + np.exp(np.minimum(beyond / tuning.corner_fade, _MOST_FADED)))
+    seen: Singles = np.reciprocal(1 + np.exp(np.minimum(beyond / tuning.corner_fade, MOST_FADED)))
     return seen
