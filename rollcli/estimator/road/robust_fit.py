@@ -133,10 +133,9 @@ class NearPixels:
         """
         design = np.empty((6, self.rows.shape[1]), np.float32)
         design[0], design[BULGE] = 1, 0
-        if cambered:  # of the start: it changes so little that its changes need not be followed
-            design[BULGE] = self._bulge(start)
         ahead = self.rows[AHEAD] + np.float32(self.tuning.beside)
-        across, squares = self._lay_out(design, start, self.rows[D])
+        # the bulge of the start: it changes so little that its changes need not be followed
+        across, squares = self._lay_out(design, start, self.rows[D], bulge=cambered)
         fit = Fit(start, squares, self.tuning.start_width)
         for _ in range(rounds):
             weights = self.weights(fit)
@@ -165,26 +164,25 @@ class NearPixels:
         Averaged ones lie closer together.
         """
         design = np.ones((6, self.rows.shape[1]), np.float32)
-        design[BULGE] = self._bulge(model)
-        _, squares = self._lay_out(design, model, self.rows[ALONE])
+        _, squares = self._lay_out(design, model, self.rows[ALONE], bulge=True)
         ahead = self.rows[AHEAD] + np.float32(self.tuning.beside)
         limit = self.tuning.start_width
         for _ in range(self.tuning.rounds):
             limit = min(limit, self._width(squares, self._weights(squares, limit) * ahead))
         return limit
 
-    def _bulge(self, model: RoadModel) -> Singles:
-        """Return what a camber of 1 adds to the disparities of a road, px."""
-        across, along = model.turned(self.rows[:2])
-        return model.bulge(across, model.disparity_along(along))
-
-    def _lay_out(self, design: Singles, model: RoadModel, d: Singles) -> tuple[Singles, Singles]:
+    def _lay_out(
+        self, design: Singles, model: RoadModel, d: Singles, *, bulge: bool = False
+    ) -> tuple[Singles, Singles]:
         """Set what a design has of a road: along it, the square of that, and what it leaves of disparities.
 
-        Return the coordinate across the road, and the squares of what is left, in tolerances.
+        Its bulge, too, if asked for. Return the coordinate across the road, and the squares of what is
+        left, in tolerances.
         """
         across, design[1] = model.turned(self.rows[:2])
         np.square(design[1], out=design[2])
+        if bulge:
+            design[BULGE] = model.bulge(across, np.array(model.alpha, np.float32) @ design[:BULGE])
         road: Singles = np.array([*model.alpha, model.camber], np.float32) @ design[: BULGE + 1]
         np.subtract(d, road, out=design[LEFT])
         squares: Singles = design[LEFT] / self.rows[TOLERANCE]
