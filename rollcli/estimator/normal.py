@@ -13,8 +13,8 @@ def solve_normal(rows: list[list[float]]) -> list[float]:
     Parameters
     ----------
     rows : list of list of float
-        N rows of N + 1: a normal matrix, and the right-hand side. Where a parameter is missing, its row and
-        column are 0.
+        N rows of N + 1: a normal matrix, and the right-hand side; they are overwritten. Where a parameter is
+        missing, its row and column are 0.
 
     Returns
     -------
@@ -22,23 +22,21 @@ def solve_normal(rows: list[list[float]]) -> list[float]:
         0 for what is missing.
     """
     size = len(rows)
-    upper = [row[k:] for k, row in enumerate(rows)]  # a normal matrix is symmetric
-    for row in upper:
-        row[0] *= 1 + _RIDGE
-    for k, top in enumerate(upper):
-        if top[0] > 0:
-            for below in range(1, size - k):
-                factor, row = top[below] / top[0], upper[k + below]
-                for j in range(len(row)):
-                    row[j] -= factor * top[below + j]
+    for k, top in enumerate(rows):  # a normal matrix is symmetric: what is left of the diagonal is not read
+        top[k] *= 1 + _RIDGE
+        if top[k] > 0:
+            for i in range(k + 1, size):
+                factor, row = top[i] / top[k], rows[i]
+                for j in range(i, size + 1):
+                    row[j] -= factor * top[j]
     found = [0.0] * size
     for k in range(size - 1, -1, -1):
-        row = upper[k]
-        if row[0] > 0:
-            rest = row[-1]
+        row = rows[k]
+        if row[k] > 0:
+            rest = row[size]
             for j in range(k + 1, size):
-                rest -= row[j - k] * found[j]
-            found[k] = rest / row[0]
+                rest -= row[j] * found[j]
+            found[k] = rest / row[k]
     return found
 
 

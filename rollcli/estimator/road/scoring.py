@@ -157,7 +157,8 @@ def _explained(lost: Singles, slope: Singles, place: Singles, least: float) -> S
 def _excess(planes: Singles, scaled: Singles, caps: Singles) -> Singles:
     """Return squared residuals in tolerances (K, N), at most 1 above a plane and more below it."""
     off = _residuals(planes, scaled)
-    np.clip(off, -1, caps, out=off)
+    np.maximum(off, -1, out=off)  # np.clip takes twice as long
+    np.minimum(off, caps, out=off)
     np.square(off, out=off)
     return off
 
