@@ -99,8 +99,8 @@ class Energy:
             raise EstimationError(f"disparities up to {peak:g}: their squares leave double precision")
         p, q = float(moments.s[1, 0]) / n, float(moments.s[0, 1]) / n
         along_p, along_q = to_powers_of_sum(np.array([-p, -q]))
-        s = (along_p @ moments.s @ along_q.T).tolist()  # NumPy is slow on single numbers
-        t = (along_p[:3, :3] @ moments.t @ along_q[:3, :3].T).tolist()
+        s = along_p.dot(moments.s).dot(along_q.T).tolist()  # NumPy is slow on single numbers
+        t = along_p[:3, :3].dot(moments.t).dot(along_q[:3, :3].T).tolist()
         spread = s[2][0] * s[0][2] - s[1][1] ** 2
         if spread <= _SINGULAR * (s[2][0] + s[0][2]) ** 2:
             raise EstimationError("the valid pixels lie on one line: they do not determine a roll angle")
@@ -115,7 +115,7 @@ class Energy:
         grid = moments.grid
         centred = Grid(grid.centre_u + p * grid.scale, grid.centre_v + q * grid.scale, grid.scale)
         plane = (float(c0 + c1 * p + c2 * q + dc0), float(c1 + dc1), float(c2 + dc2))
-        forms = _rotations() @ np.array(sources + residual + higher)
+        forms = _rotations().dot(sources + residual + higher)
         energy = cls(n, peak, parabolic, centred, plane, rest, forms)
         if energy.slope_energy + max(map(abs, residual)) ** 2 / n <= 1e-18 * n * peak**2:
             raise EstimationError(SAME_EVERYWHERE)
@@ -222,7 +222,7 @@ class Energy:
         basis = np.array(
             [cc, cs, ss, cc * c, cc * s, c * ss, ss * s, cc * cc, cc * cs, cc * ss, cs * ss, ss * ss]
         )
-        rotated: list[Any] = list(self.forms @ basis) if basis.ndim > 1 else (self.forms @ basis).tolist()
+        rotated: list[Any] = list(self.forms.dot(basis)) if basis.ndim > 1 else self.forms.dot(basis).tolist()
         _, c1, c2 = self.plane
         return [*rotated, c1 * c + c2 * s, c2 * c - c1 * s]
 

@@ -72,7 +72,7 @@ class Jackknife:
         """Return the half-widths of theta's interval, radians: by bands, by columns, and the textbook's."""
         turned = (self.bands[:, _THETA], self.columns[:, _THETA])
         bands, columns = (
-            _student(freedom) * math.sqrt(float(thetas @ thetas))
+            _student(freedom) * math.sqrt(float(thetas.dot(thetas)))
             for thetas, freedom in zip(turned, self.freedom, strict=True)
         )
         return bands, columns, _NORMAL * math.sqrt(self.white[_THETA, _THETA])
@@ -160,7 +160,7 @@ def jackknife(surface: Surface, theta: float, tuning: IntervalTuning) -> Jackkni
     columns = _by_group(rows, across, np.square(rows[3]), tuning.groups)
     total = bands.sum(0)
     parts = _lane(model.side(across, plain)), _near(weights, along, tuning)
-    lane, near = ((rows * part) @ rows.T for part in parts)
+    lane, near = ((rows * part).dot(rows.T) for part in parts)
     halves = np.stack([lane, total, near, total - near]) + tuning.whole_share * total
     found, inverse = _solved(total, np.concatenate([bands, columns]), halves, prior)
 
@@ -188,7 +188,7 @@ def _lane(side: Reals) -> Reals:
 
 def _near(weights: Reals, along: Reals, tuning: IntervalTuning) -> Reals:
     """Return how much each pixel belongs to the near half, 0 to 1."""
-    middle = float(weights @ along) / float(weights.sum())
+    middle = float(weights.dot(along)) / float(weights.sum())
     near: Reals = 1 / (1 + np.exp(np.minimum((middle - along) / tuning.depth_fade, MOST_FADED)))
     return near
 
@@ -208,7 +208,7 @@ def _by_group(rows: Reals, position: Reals, share: Reals | None, groups: int) ->
     ordered = rows.take(order, 1)
     columns = ordered.copy().T  # BLAS takes twice as long for the product of an array with itself
     bounds = itertools.pairwise([0, *cuts, len(order)])
-    return np.array([ordered[:, start:end] @ columns[start:end] for start, end in bounds], np.float64)
+    return np.array([ordered[:, start:end].dot(columns[start:end]) for start, end in bounds], np.float64)
 
 
 def _order(position: Reals) -> NDArray[np.intp]:
@@ -261,7 +261,7 @@ def _solved(total: Floats, groups: Floats, halves: Floats, prior: float) -> tupl
 def _white(total: Floats, whole: Floats, tuning: IntervalTuning) -> float:
     """Return the variance of a pixel, times how many repeat each other, px^2."""
     independent = max(1.0, float(total[0, 0]) / tuning.independent_pixels)
-    rest = max(0.0, float(total[5, 5] - whole @ total[:5, 5]))
+    rest = max(0.0, float(total[5, 5] - whole.dot(total[:5, 5])))
     return rest / float(total[0, 0]) * independent
 
 

@@ -135,8 +135,8 @@ def point_moments(
     columns[0], columns[5] = weights, pull
     for k in (1, 2, 3, 4, 6, 7):
         np.multiply(columns[k - 1], q, out=columns[k])
-    sums = powers(p) @ columns.T
-    return Moments(grid, plane, sums[:, :5], sums[:3, 5:], float(pull @ residual))
+    sums = powers(p).dot(columns.T)
+    return Moments(grid, plane, sums[:, :5], sums[:3, 5:], float(pull.dot(residual)))
 
 
 def powers(x: NDArray[np.floating[Any]], degree: int = 4) -> Floats:

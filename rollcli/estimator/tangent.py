@@ -92,7 +92,7 @@ def touch(
     if surface is not None:
         grid = surface.grid
         along = road.along(surface.x, surface.y)
-        centre = float(surface.weights @ along) / float(surface.weights.sum())
+        centre = float(surface.weights.dot(along)) / float(surface.weights.sum())
         value, moved = _parabola_of_cubic(along - centre, surface.weights)
         cubic = value * grid.scale**3, moved * grid.scale**2  # px^3 and px^2
     row = centre * grid.scale + road.along(grid.centre_u, grid.centre_v)
@@ -108,8 +108,8 @@ def _parabola_of_cubic(along: Reals, weights: Floats) -> tuple[float, float]:
     squares = along * along
     weighted = weights * squares
     cubes = squares * along
-    n, two, three = float(weights.sum()), float(weighted.sum()), float(weighted @ along)
-    four, five = float(weighted @ squares), float(weighted @ cubes)
+    n, two, three = float(weights.sum()), float(weighted.sum()), float(weighted.dot(along))
+    four, five = float(weighted.dot(squares)), float(weighted.dot(cubes))
     if not two > 0:
         return 0.0, 0.0
     skew, mean = three / two, two / n  # y^2 - skew y - mean is orthogonal to 1 and y

@@ -59,7 +59,8 @@ class RoadModel(NamedTuple):
     def turned(self, places: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return across and along, shape (2, N), of x and y, shape (2, N): several times faster."""
         c, s = math.cos(self.theta), math.sin(self.theta)
-        return np.array([[c, s], [-s, c]], np.float32) @ places
+        turned: NDArray[np.float32] = np.array([[c, s], [-s, c]], np.float32).dot(places)
+        return turned
 
     def disparity(self, x: Reals, y: Reals) -> Reals:
         """Return the road's disparity, px, camber included."""

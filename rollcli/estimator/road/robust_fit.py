@@ -142,7 +142,7 @@ class NearPixels:
             if not parabolic:
                 design[2] = 0
             fit.model.turning(across, design[1], out=design[TURNING])
-            products = ((design * weights) @ design.T).tolist()
+            products = (design * weights).dot(design.T).tolist()
             precision = math.inf
             if cambered:
                 precision = self._camber_precision(products)
@@ -182,8 +182,8 @@ class NearPixels:
         across, design[1] = model.turned(self.rows[:2])
         np.square(design[1], out=design[2])
         if bulge:
-            design[BULGE] = model.bulge(across, np.array(model.alpha, np.float32) @ design[:BULGE])
-        road: Singles = np.array([*model.alpha, model.camber], np.float32) @ design[: BULGE + 1]
+            design[BULGE] = model.bulge(across, np.array(model.alpha, np.float32).dot(design[:BULGE]))
+        road: Singles = np.array([*model.alpha, model.camber], np.float32).dot(design[: BULGE + 1])
         np.subtract(d, road, out=design[LEFT])
         squares: Singles = design[LEFT] / self.rows[TOLERANCE]
         squares *= squares
@@ -224,7 +224,7 @@ class NearPixels:
         Every step is smooth: a pixel more or less must not turn the road.
         """
         tuning = self.tuning
-        spread = tuning.biweight_spread * math.sqrt(float(weights @ squares) / float(weights.sum()))
+        spread = tuning.biweight_spread * math.sqrt(float(weights.dot(squares)) / float(weights.sum()))
         mix = (spread - tuning.even_spread) / (tuning.uneven_spread - tuning.even_spread)
         times = tuning.even_width + max(0.0, min(1.0, mix)) * (tuning.uneven_width - tuning.even_width)
         return max(self.least_width, times * spread)

@@ -22,7 +22,7 @@ def first_costs(sample: Sample, planes: Singles, pixels: int) -> Singles:
     beside = tuning.beside_weight
     corridor = beside + (1 - beside) * np.exp(side * np.float32(-1 / tuning.corridor**2))
     weight = np.where(rising(coarse.slopes[:, few]), 1, np.float32(tuning.off_slope_weight)) * corridor
-    costs: Singles = _excess(planes, *_scaled(coarse, few, tuning)) @ weight
+    costs: Singles = _excess(planes, *_scaled(coarse, few, tuning)).dot(weight)
     return costs
 
 
@@ -99,14 +99,14 @@ class PlaneScorer:
             weight += 1
             np.maximum(weight, 0, out=weight)
             weight *= fixed
-            sums = (weight @ products.T).reshape(-1, 3, 4).tolist()
+            sums = weight.dot(products.T).reshape(-1, 3, 4).tolist()
             planes = np.array([solve_normal(each) for each in sums], np.float32)
         return planes
 
     def _weights(self, planes: Singles) -> tuple[Singles, Singles, Singles]:
         """Return, for each plane and pixel, the agreement of slopes and the places in core and corridor."""
         # how far to the side each pixel lies, in camera heights, as `RoadModel.side` says
-        corridor = planes[:, :0:-1] @ self.bearings
+        corridor = planes[:, :0:-1].dot(self.bearings)
         np.square(corridor, out=corridor)
         corridor *= np.float32(-1 / self.tuning.corridor**2)
         np.exp(corridor, out=corridor)
@@ -166,7 +166,7 @@ def _excess(planes: Singles, scaled: Singles, caps: Singles) -> Singles:
 def _residuals(planes: Singles, scaled: Singles) -> Singles:
     """Return plane minus disparity in tolerances, (K, N); `scaled` holds 1, x, y and d."""
     minus = np.full((len(planes), 1), -1, np.float32)
-    residuals: Singles = np.concatenate([planes, minus], 1) @ scaled
+    residuals: Singles = np.concatenate([planes, minus], 1).dot(scaled)
     return residuals
 
 

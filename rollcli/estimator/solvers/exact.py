@@ -75,7 +75,7 @@ def _line_minimum(energy: Energy) -> Minimum:
 
 def _numerator(energy: Energy, frame: Floats) -> Floats:
     """Return the numerator of the derivative at even angles of a frame, shape (SAMPLES,)."""
-    over, under = energy.as_quotient(*(frame @ _CIRCLE))
+    over, under = energy.as_quotient(*(frame.dot(_CIRCLE)))
     numerator: Floats = derivative(over) * under - over * derivative(under)
     return numerator
 

@@ -39,10 +39,10 @@ def rising_zeros(samples: Floats) -> list[float] | None:
     has no zero. Where that holds for its derivative, it has one if its sign changes, else none.
     """
     matrices = _matrices()
-    waves = matrices.to_waves @ samples
-    curves = (matrices.to_curves @ samples).reshape(2, _FINE)
+    waves = matrices.to_waves.dot(samples)
+    curves = matrices.to_curves.dot(samples).reshape(2, _FINE)
     following = curves.take(_FOLLOWING, 1)
-    most = (matrices.bends @ np.abs(waves))[:, None]
+    most = matrices.bends.dot(np.abs(waves))[:, None]
     sure = (np.minimum(curves, following) > most) | (np.maximum(curves, following) < -most)
     if not (sure[0] | sure[1]).all():
         return None
@@ -73,7 +73,7 @@ def zeros(samples: Floats) -> list[float]:
 
 def derivative(samples: Floats) -> Floats:
     """Return samples of the derivative of a polynomial of degree `DEGREE` at most."""
-    slopes: Floats = _matrices().to_derivative @ samples
+    slopes: Floats = _matrices().to_derivative.dot(samples)
     return slopes
 
 
