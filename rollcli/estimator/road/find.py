@@ -17,7 +17,7 @@ from rollcli.errors import EstimationError
 from rollcli.estimator.road.hypotheses import draw_planes
 from rollcli.estimator.road.model import RoadModel
 from rollcli.estimator.road.neighbours import Singles
-from rollcli.estimator.road.scoring import PlaneScorer, first_costs, slope_weights
+from rollcli.estimator.road.scoring import PlaneScorer
 from rollcli.estimator.road.subsample import Sample
 from rollcli.estimator.road.tuning import SearchTuning
 
@@ -81,13 +81,13 @@ def find_road(sample: Sample, max_roll: float, seed: int) -> Road:
     if len(planes) == 0:
         raise EstimationError("no road: nowhere does the disparity grow downward, as it does on a road")
     tuning = sample.tuning.search
-    planes = planes[_varied(first_costs(sample, planes, tuning.first_pixels), _rolls(planes), tuning)]
     scorer = PlaneScorer.of(sample)
+    planes = planes[_varied(scorer.first_costs(planes, tuning.first_pixels), _rolls(planes), tuning)]
     fitted = scorer.fitted(planes)
     kept = np.abs(fitted[:, 1]) <= math.tan(max_roll) * fitted[:, 2]
     fitted = _distinct(fitted[kept] if kept.any() else planes[:1], tuning.same_plane * sample.noise)
     scores = scorer.scores(fitted)
-    winner = int(np.argmax(scores))
+    winner = int(scores.argmax())
     if not fitted[winner, 2] > 0:  # fitted to no pixel, it scores 0, and the others have more against them
         raise EstimationError(HARDLY_A_PIXEL)
     rolls = _rolls(fitted)
@@ -95,19 +95,12 @@ def find_road(sample: Sample, max_roll: float, seed: int) -> Road:
     return Road(fitted[winner].astype(np.float64), float(scores[winner]), float(scores[far].max(initial=-1)))
 
 
-def road_weights(sample: Sample, plane: NDArray[np.float64], near: NDArray[np.intp]) -> Singles:
-    """Return 0.2 to 1 for each of some pixels: how well the map's slopes around it agree with the plane's."""
-    one = plane[None].astype(np.float32)
-    weights: Singles = slope_weights(sample.slopes(near), sample.slope_noise, one, sample.tuning.score)[0]
-    return weights
-
-
 def _varied(costs: Singles, rolls: Singles, tuning: SearchTuning) -> list[int]:
     """Return the cheapest planes, few of each roll: a wide verge must not crowd out the road."""
-    bins = np.floor(rolls / tuning.rival_angle).tolist()
+    bins = np.floor(rolls / tuning.rival_angle).astype(np.intp).tolist()
     taken = dict.fromkeys(bins, 0)  # a Counter takes longer
     chosen: list[int] = []
-    for plane in np.argsort(costs, kind="stable").tolist():
+    for plane in costs.argsort(kind="stable").tolist():
         alike = bins[plane]
         if taken[alike] < tuning.of_each_roll:
             taken[alike] += 1

@@ -33,7 +33,7 @@ def steps_around(disparity: NDArray[Any], places: NDArray[np.intp], d: Singles, 
     down = reach * disparity.shape[1]
     there = places + np.array([[-reach], [reach], [-down], [down]])
     with np.errstate(invalid="ignore", over="ignore"):
-        steps: Singles = disparity.reshape(-1).take(there).astype(np.float32, copy=False)
+        steps: Singles = disparity.reshape(-1).take(there, mode="clip").astype(np.float32, copy=False)
         unknown = ~(steps > 0)
     steps -= d
     np.copyto(steps, NO_SLOPE, where=unknown)

@@ -15,6 +15,8 @@ from rollcli.estimator.moments import Floats
 from rollcli.estimator.road.model import Reals
 from rollcli.estimator.road.tuning import ProfileTuning
 
+_MOST_OFF = 10  # times `off_level`: ground that is farther over or under the lane weighs nothing
+
 
 @dataclass(frozen=True, eq=False)
 class Profile:
@@ -63,7 +65,7 @@ def read_profile(side: Reals, height: Reals, tuning: ProfileTuning) -> Profile:
     Parameters
     ----------
     side : ndarray, shape (N,)
-        How far to the right of the middle each pixel lies, camera heights; finite.
+        How far to the right of the middle each pixel lies, camera heights; infinite where it does not count.
     height : ndarray, shape (N,)
         Its height over the lane, camera heights.
     tuning : ProfileTuning
@@ -72,22 +74,26 @@ def read_profile(side: Reals, height: Reals, tuning: ProfileTuning) -> Profile:
     -------
     Profile
     """
-    places = np.floor(side / tuning.bin_width) + tuning.bins
-    level = np.array(_outward(_medians(places, height, tuning), tuning)) / tuning.off_level
+    level = np.array(_outward(_medians(side, height, tuning), tuning)) / tuning.off_level
     return Profile(1 / (1 + np.square(np.square(level))), tuning)
 
 
-def _medians(places: Reals, heights: Reals, tuning: ProfileTuning) -> list[float]:
+def _medians(sides: Reals, heights: Reals, tuning: ProfileTuning) -> list[float]:
     """Return the median height of each bin, left to right; NaN where hardly a pixel is."""
-    # one sort for all bins: heights, far below 1, are the fractions
-    keys = np.minimum(np.maximum(heights, -0.4), 0.4)
-    keys += places
-    keys += 0.5
-    keys.sort()
-    bounds = np.searchsorted(keys, np.arange(2 * tuning.bins + 1, dtype=keys.dtype)).tolist()
+    # one sort for all bins, and one bin more to each side; of 16 bits it takes a quarter of the time
+    levels = 2**16 // (2 * tuning.bins + 2)
+    level = levels // 2
+    step, most = tuning.off_level / ((level - 1) // _MOST_OFF), _MOST_OFF * tuning.off_level
+    steps = np.minimum(np.maximum(heights, -most), most) / step + (level + 0.5)
+    places = np.floor(sides / tuning.bin_width) + (tuning.bins + 1)
+    keys = (np.minimum(np.maximum(places, 0), 2 * tuning.bins + 1) * levels).astype(np.uint16)
+    keys += steps.astype(np.uint16)
+    keys.sort(kind="stable")
+    starts = np.arange(1, 2 * tuning.bins + 2) * levels
+    bounds = itertools.pairwise(keys.searchsorted(starts.astype(np.uint16)).tolist())
     return [
-        float(keys[(low + high) // 2]) - place - 0.5 if high - low >= tuning.bin_pixels else math.nan
-        for place, (low, high) in enumerate(itertools.pairwise(bounds))
+        (int(keys[(low + high) // 2]) - start - level) * step if high - low >= tuning.bin_pixels else math.nan
+        for start, (low, high) in zip(starts.tolist(), bounds, strict=False)
     ]
 
 

@@ -10,18 +10,19 @@ from numpy.typing import NDArray
 from rollcli.errors import EstimationError
 from rollcli.estimator.moments import Floats
 from rollcli.estimator.normal import solve_normal
-from rollcli.estimator.road.average import averaged
-from rollcli.estimator.road.find import HARDLY_A_PIXEL, Road, road_weights
+from rollcli.estimator.road.find import HARDLY_A_PIXEL, Road
 from rollcli.estimator.road.model import RoadModel
 from rollcli.estimator.road.neighbours import Singles
 from rollcli.estimator.road.profile import Profile, read_profile
 from rollcli.estimator.road.subsample import Sample
+from rollcli.estimator.road.surroundings import look_around
 from rollcli.estimator.road.tuning import FitTuning, ProfileTuning
 
-X, Y, D, ALONE, TOLERANCE, PLACE, AHEAD, SHOWN = range(8)  # rows of `NearPixels.rows`
+X, Y, D, ALONE, TOLERANCE, PLACE, AHEAD = range(7)  # rows of `NearPixels.rows`
 # rows of a design, after 1, the coordinate along the road, and its square
 BULGE, TURNING, LEFT = range(3, 6)
 MOST_FADED = 30.0  # as exp(-30): products of such weights are no denormals, which take ten times as long
+_LEAST_ROOT = np.float32(math.exp(-MOST_FADED / 4))
 
 
 class Fit(NamedTuple):
@@ -34,13 +35,16 @@ class Fit(NamedTuple):
         Squared distances from the road, in tolerances.
     limit : float
         Where the weights end, in tolerances.
+    bulge : ndarray, shape (N,)
+        What a camber of 1 adds to the disparities, px.
     camber_precision : float
-        What the prior adds to the normal equation of the camber; infinite where none is fitted.
+        What the prior adds to the normal equation of the camber.
     """
 
     model: RoadModel
     squares: Singles
     limit: float
+    bulge: Singles
     camber_precision: float = math.inf
 
 
@@ -50,11 +54,10 @@ class NearPixels:
 
     Attributes
     ----------
-    rows : ndarray of float32, shape (8, N)
+    rows : ndarray of float32, shape (7, N)
         x, y and tolerance as in `Sample`; disparity, averaged with pixels around, and that of the pixel
-        alone, px; `place`, weights from 0 to 1 by place in the image and by slopes; `ahead`, 1 in the middle
-        of the lane ahead, fading towards its sides; and `shown`, 1 for those that the lane is fitted to,
-        else 0. One array: pixels are picked at once.
+        alone, px; `place`, weights from 0 to 1 by place in the image and by slopes; and `ahead`, 1 in the
+        middle of the lane ahead, fading towards its sides. One array: pixels are picked at once.
     stride : int
         How many near pixels of the sample each of them stands for.
     least_width : float
@@ -72,26 +75,24 @@ class NearPixels:
         """Take the pixels near a road's plane from a sample."""
         tuning, model = sample.tuning.fit, road.model
         c0, c1, c2 = road.plane.tolist()  # of NumPy's double precision they would make everything double
-        off = c0 + c1 * sample.x + c2 * sample.y - sample.d
-        close = np.abs(off) < tuning.reach * sample.tolerance
+        off = c1 * sample.x
+        off += c2 * sample.y
+        off += c0
+        off -= sample.d
+        close = np.abs(off, out=off) < tuning.reach * sample.tolerance
         stride = -(-int(np.count_nonzero(close)) // tuning.pixels) or 1
-        close = close[::stride]
-        places = np.flatnonzero(close)  # so that one pixel more moves no other
-        near = places * stride
-        rows = np.empty((8, len(near)), np.float32)
+        near = close[::stride].nonzero()[0] * stride  # so that one pixel more moves no other
+        rows = np.empty((7, len(near)), np.float32)
         for row, pixels in ((X, sample.x), (Y, sample.y), (ALONE, sample.d), (TOLERANCE, sample.tolerance)):
-            rows[row] = pixels.take(near)
-        rows[D] = averaged(sample, road.plane, near)
+            pixels.take(near, out=rows[row], mode="clip")  # other modes make a copy first
+        rows[D], rows[PLACE] = look_around(sample, road.plane, near)
         across, along = model.turned(rows[:2])
         half_height = sample.grid.centre_v / sample.grid.scale
-        np.square(road_weights(sample, road.plane, near), out=rows[PLACE])
+        rows[PLACE] *= rows[PLACE]
         rows[PLACE] *= _seen(across, along, half_height, model.theta, tuning)
         across *= model.alpha[1] / tuning.lane
         across /= rows[D]
         np.exp(-np.minimum(np.square(np.square(across)), MOST_FADED), out=rows[AHEAD])
-        shown = np.zeros(len(close), np.float32)
-        shown[:: max(1, round(len(places) / tuning.lane_pixels))] = 1
-        rows[SHOWN] = shown.take(places)
         # the steps of a map of whole pixels are no spread: within less, only stripes of one value are left
         usual = math.hypot(sample.noise, sample.tuning.sample.uneven_share * sample.typical)
         return cls(rows, stride, max(tuning.least_width, sample.quantum / usual), tuning)
@@ -100,58 +101,56 @@ class NearPixels:
         """Return x, y and the disparity of some of them, shape (3, M)."""
         return self.rows[: D + 1].take(some, 1).astype(np.float64)
 
-    def lane(self) -> "NearPixels":
-        """Return some of them, weighted so that the lane ahead counts."""
-        rows = self.rows.take(np.flatnonzero(self.rows[SHOWN] > 0), 1)
-        rows[PLACE] *= rows[AHEAD]
-        return self._with(rows)
+    def lane(self, start: RoadModel, *, parabolic: bool) -> RoadModel:
+        """Fit the lane ahead, in one round: it only has to show the profile.
+
+        Its middle, for there is no second round that leaves out a verge: with the square of `ahead` in place
+        of its 4th power, ground that is 0.0125 camera heights higher beside the lane passes for road.
+        """
+        design = self._design()
+        across, squares = self._lay_out(design, start, self.rows[D])
+        weights = self._weights(squares, self.tuning.start_width)
+        weights *= np.square(np.square(np.maximum(self.rows[AHEAD], _LEAST_ROOT)))
+        products = _products(design, start, across, weights, parabolic=parabolic)
+        return self._moved(start, solve_normal(products[:LEFT]))
 
     def profile(self, lane: RoadModel, tuning: ProfileTuning) -> tuple[Profile, "NearPixels"]:
         """Read the profile across the lane; return it, and the pixels weighted by it."""
         d = self.rows[D]
         across, along = lane.turned(self.rows[:2])
-        road = lane.disparity_along(along)
         least = d * tuning.least_road
-        side = lane.side(across, np.maximum(road, least))
-        used = np.flatnonzero((self.rows[PLACE] > tuning.least_place) & (road > least))
-        profile = read_profile(side.take(used), d.take(used) / road.take(used) - 1, tuning)
+        road = np.maximum(lane.disparity_along(along), least)
+        side = lane.side(across, road)
+        unseen = (self.rows[PLACE] <= tuning.least_place) | (road <= least)
+        profile = read_profile(np.where(unseen, np.inf, side), d / road - 1, tuning)
         weights: Singles = profile.at(side).astype(np.float32, copy=False)
-        kept = np.flatnonzero(weights > self.tuning.least_weight)
+        kept = (weights > self.tuning.least_weight).nonzero()[0]
         rows = self.rows.take(kept, 1)
         rows[PLACE] *= weights.take(kept)
-        return profile, self._with(rows)
+        return profile, NearPixels(rows, self.stride, self.least_width, self.tuning)
 
-    def _with(self, rows: Singles) -> "NearPixels":
-        """Return some of these pixels; `dataclasses.replace` takes four times as long."""
-        return NearPixels(rows, self.stride, self.least_width, self.tuning)
-
-    def fit(self, start: RoadModel, rounds: int, *, parabolic: bool, cambered: bool = False) -> Fit:
-        """Fit (a0, a1, a2, theta) and the camber, starting from the road's plane or from an earlier fit.
+    def fit(self, start: RoadModel, *, parabolic: bool) -> Fit:
+        """Fit (a0, a1, a2, theta) and the camber, starting from the lane's.
 
         Gauss-Newton with Tukey's biweight, whose width shrinks from two tolerances as far as the spread of
         the pixels ahead allows. The camber has a prior: where the pixels do not determine it, it stays small.
         """
-        design = np.empty((6, self.rows.shape[1]), np.float32)
-        design[0], design[BULGE] = 1, 0
+        design = self._design()
         ahead = self.rows[AHEAD] + np.float32(self.tuning.beside)
         # the bulge of the start: it changes so little that its changes need not be followed
-        across, squares = self._lay_out(design, start, self.rows[D], bulge=cambered)
-        fit = Fit(start, squares, self.tuning.start_width)
-        for _ in range(rounds):
+        across, squares = self._lay_out(design, start, self.rows[D], bulge=True)
+        fit = Fit(start, squares, self.tuning.start_width, design[BULGE])
+        for _ in range(self.tuning.rounds):
             weights = self.weights(fit)
-            if not parabolic:
-                design[2] = 0
-            fit.model.turning(across, design[1], out=design[TURNING])
-            products = (design * weights).dot(design.T).tolist()
-            precision = math.inf
-            if cambered:
-                precision = self._camber_precision(products)
-                products[BULGE][BULGE] += precision
-                products[BULGE][LEFT] -= precision * fit.model.camber
+            products = _products(design, fit.model, across, weights, parabolic=parabolic)
+            precision = self._camber_precision(products)
+            products[BULGE][BULGE] += precision
+            products[BULGE][LEFT] -= precision * fit.model.camber
             model = self._moved(fit.model, solve_normal(products[:LEFT]))
             across, squares = self._lay_out(design, model, self.rows[D])
             weights *= ahead
-            fit = Fit(model, squares, min(fit.limit, self._width(squares, weights)), precision)
+            limit = min(fit.limit, self._width(squares, weights))
+            fit = Fit(model, squares, limit, fit.bulge, precision)
         return fit
 
     def weights(self, fit: Fit) -> Singles:
@@ -163,13 +162,19 @@ class NearPixels:
 
         Averaged ones lie closer together.
         """
-        design = np.ones((6, self.rows.shape[1]), np.float32)
+        design = self._design()
         _, squares = self._lay_out(design, model, self.rows[ALONE], bulge=True)
         ahead = self.rows[AHEAD] + np.float32(self.tuning.beside)
         limit = self.tuning.start_width
         for _ in range(self.tuning.rounds):
             limit = min(limit, self._width(squares, self._weights(squares, limit) * ahead))
         return limit
+
+    def _design(self) -> Singles:
+        """Return room for a design, whose parabola has a constant and whose bulge is 0."""
+        design = np.empty((6, self.rows.shape[1]), np.float32)
+        design[0], design[BULGE] = 1, 0
+        return design
 
     def _lay_out(
         self, design: Singles, model: RoadModel, d: Singles, *, bulge: bool = False
@@ -228,6 +233,17 @@ class NearPixels:
         mix = (spread - tuning.even_spread) / (tuning.uneven_spread - tuning.even_spread)
         times = tuning.even_width + max(0.0, min(1.0, mix)) * (tuning.uneven_width - tuning.even_width)
         return max(self.least_width, times * spread)
+
+
+def _products(
+    design: Singles, model: RoadModel, across: Singles, weights: Singles, *, parabolic: bool
+) -> list[list[float]]:
+    """Return the normal equations of a round, with what a road leaves as one row more, (6, 6)."""
+    if not parabolic:
+        design[2] = 0
+    model.turning(across, design[1], out=design[TURNING])
+    products: list[list[float]] = (design * weights).dot(design.T).tolist()
+    return products
 
 
 def _seen(across: Singles, along: Singles, half_height: float, theta: float, tuning: FitTuning) -> Singles:

@@ -6,24 +6,10 @@ import numpy as np
 
 from rollcli.estimator.normal import solve_normal
 from rollcli.estimator.road.neighbours import Singles, rising
-from rollcli.estimator.road.subsample import CoarseSample, Sample
+from rollcli.estimator.road.subsample import Sample, every
 from rollcli.estimator.road.tuning import ScoreTuning
 
 _LEAST_ROOT = np.float32(1e-4)  # its 8th power is no denormal: these take ten times as long
-
-
-def first_costs(sample: Sample, planes: Singles, pixels: int) -> Singles:
-    """Return a cheap cost for each plane, with one guess of the road's slope for the corridor of all."""
-    coarse, tuning = sample.coarse, sample.tuning.score
-    few = coarse.about(pixels)
-    x, d = coarse.x[few], coarse.d[few]
-    middle = len(planes) // 2
-    side = np.square(x * np.partition(planes[:, 2], middle)[middle] / d)
-    beside = tuning.beside_weight
-    corridor = beside + (1 - beside) * np.exp(side * np.float32(-1 / tuning.corridor**2))
-    weight = np.where(rising(coarse.slopes[:, few]), 1, np.float32(tuning.off_slope_weight)) * corridor
-    costs: Singles = _excess(planes, *_scaled(coarse, few, tuning)).dot(weight)
-    return costs
 
 
 @dataclass(frozen=True)
@@ -60,10 +46,25 @@ class PlaneScorer:
         tuning, coarse = sample.tuning.score, sample.coarse
         near = np.minimum(coarse.d, np.float32(tuning.nearness * sample.typical))
         near *= len(near) / near.sum()
-        scaled, caps = _scaled(coarse, slice(None), tuning)
+        scaled = np.empty((4, len(coarse.d)), np.float32)
+        scaled[0], scaled[1], scaled[2], scaled[3] = 1, coarse.x, coarse.y, coarse.d
+        scaled /= coarse.tolerance
+        caps = np.sqrt(1 + np.float32(tuning.below_penalty) * coarse.coherence)
         bearings = scaled[1:3] / scaled[3]
         np.negative(bearings[1], out=bearings[1])
         return cls(bearings, scaled, caps, near, coarse.slopes, sample.slope_noise, tuning)
+
+    def first_costs(self, planes: Singles, pixels: int) -> Singles:
+        """Return a cheap cost for each plane, on about so many of the pixels, with one corridor for all."""
+        few, tuning = every(len(self.caps), pixels), self.tuning
+        middle = len(planes) // 2
+        usual = np.partition(planes[:, 2], middle)[middle]  # a guess of the road's slope
+        side = np.square(self.bearings[0, few] * usual)
+        beside = tuning.beside_weight
+        corridor = beside + (1 - beside) * np.exp(side * np.float32(-1 / tuning.corridor**2))
+        weight = np.where(rising(self.slopes[:, few]), 1, np.float32(tuning.off_slope_weight)) * corridor
+        costs: Singles = _excess(planes, self.scaled[:, few].copy(), self.caps[few]).dot(weight)
+        return costs
 
     def scores(self, planes: Singles) -> Singles:
         """Return the score of each plane (K, 3); see `Road.score`."""
@@ -74,14 +75,15 @@ class PlaneScorer:
         lost = np.minimum(excess, 0)
         lost *= slope
         lost += np.maximum(excess, 0, out=excess)
-        scores = _explained(lost, slope, core, self.tuning.least_core)
-        scores += _explained(lost, slope, corridor, self.tuning.least_corridor)
-        scores /= 2
-        found = [self._less_for_walls(*each) for each in zip(scores.tolist(), planes.tolist(), strict=True)]
-        return np.array(found, np.float32)
+        each = zip(planes.tolist(), lost, slope, core, corridor, strict=True)
+        return np.array([self._score(*one) for one in each], np.float32)
 
-    def _less_for_walls(self, score: float, plane: list[float]) -> float:
-        """Return a score, less if it is good and the plane's horizon is far away."""
+    def _score(
+        self, plane: list[float], lost: Singles, slope: Singles, core: Singles, corridor: Singles
+    ) -> float:
+        """Return the mean of two shares, less if it is good and the plane's horizon is far away."""
+        score = _explained(lost, slope, core, self.tuning.least_core) / 2
+        score += _explained(lost, slope, corridor, self.tuning.least_corridor) / 2
         c0, c1, c2 = plane
         steep = c0 * c0 / max(c1 * c1 + c2 * c2, 1e-30)
         return score / (1 + steep / self.tuning.horizon**2) if score > 0 else score
@@ -131,7 +133,12 @@ def slope_weights(slopes: Singles, slope_noise: float, planes: Singles, tuning: 
     share, noise = tuning.slope_share**2, slope_noise**2
     scales = [-0.5 / (share * (across * across + down * down) + noise) for _, across, down in planes.tolist()]
     weights *= np.array(scales, np.float32)[:, None]
-    np.exp(weights, out=weights)
+    return slope_agreement(weights, tuning)
+
+
+def slope_agreement(exponents: Singles, tuning: ScoreTuning) -> Singles:
+    """Return weights that are 1 at 0 and fade towards `off_slope_weight`; the exponents are overwritten."""
+    weights: Singles = np.exp(exponents, out=exponents)
     weights *= np.float32(1 - tuning.off_slope_weight)
     weights += np.float32(tuning.off_slope_weight)
     return weights
@@ -147,11 +154,9 @@ def _off_slope(one: Singles, other: Singles, slope: Singles) -> Singles:
     return squares
 
 
-def _explained(lost: Singles, slope: Singles, place: Singles, least: float) -> Singles:
-    """Return (K,): the share of the road-like pixels of a place that lie on each plane, less those below."""
-    reached = np.einsum("kn,kn->k", place, slope)
-    shares: Singles = -np.einsum("kn,kn->k", place, lost) / (reached + np.float32(least * place.shape[1]))
-    return shares
+def _explained(lost: Singles, slope: Singles, place: Singles, least: float) -> float:
+    """Return the share of the road-like pixels of a place that lie on a plane, less those below."""
+    return -float(place.dot(lost)) / (float(place.dot(slope)) + least * len(place))
 
 
 def _excess(planes: Singles, scaled: Singles, caps: Singles) -> Singles:
@@ -168,11 +173,3 @@ def _residuals(planes: Singles, scaled: Singles) -> Singles:
     minus = np.full((len(planes), 1), -1, np.float32)
     residuals: Singles = np.concatenate([planes, minus], 1).dot(scaled)
     return residuals
-
-
-def _scaled(coarse: CoarseSample, few: slice, tuning: ScoreTuning) -> tuple[Singles, Singles]:
-    """Return 1, x, y and d over the tolerance, (4, N), and how many of it below a plane cost the most."""
-    scaled = np.empty((4, len(coarse.d[few])), np.float32)
-    scaled[0], scaled[1], scaled[2], scaled[3] = 1, coarse.x[few], coarse.y[few], coarse.d[few]
-    scaled /= coarse.tolerance[few]
-    return scaled, np.sqrt(1 + np.float32(tuning.below_penalty) * coarse.coherence[few])

@@ -35,7 +35,8 @@ class CoarseSample:
     coherence : ndarray of float32
         The share of the valid ones among four neighbours whose disparity is within tolerance.
     slopes : ndarray of float32, shape (4, M)
-        As `Sample.slopes` returns them.
+        One-sided derivatives of d to the left, right, up and down, px per unit of x or y; infinite where the
+        neighbour is no data.
     """
 
     x: Singles
@@ -45,10 +46,6 @@ class CoarseSample:
     column: NDArray[np.uint16]
     coherence: Singles
     slopes: Singles
-
-    def about(self, pixels: int) -> slice:
-        """Return a slice that takes about so many of the pixels, evenly."""
-        return every(len(self.d), pixels)
 
 
 @dataclass(frozen=True)
@@ -110,15 +107,6 @@ class Sample:
         """What the noise makes of a slope, px per unit."""
         return self.noise * self.grid.scale / self.reach
 
-    def slopes(self, some: NDArray[np.intp]) -> Singles:
-        """Return the slopes around some of the pixels, shape (4, M).
-
-        One-sided derivatives of d to the left, right, up and down, px per unit of x or y; infinite where the
-        neighbour is no data.
-        """
-        steps = steps_around(self.disparity, self.places[some], self.d[some], self.reach)
-        return to_slopes(steps, self.grid.scale / self.reach)
-
 
 def take_sample(
     disparity: NDArray[Any], usable: NDArray[np.bool_] | None = None, tuning: RoadTuning = ROAD_TUNING
@@ -147,14 +135,12 @@ def take_sample(
     numbers = tuning.sample
     reach = reach_of(height, width, numbers)
     spacing = Spacing.of(height * width / numbers.pixels)
-    taken = _taken(disparity, usable, reach, spacing)
-    count = int(np.count_nonzero(taken))
-    while count < numbers.sparse_share * numbers.pixels and spacing != (1, 1):  # the valid ones may be a grid
-        share = max(count, numbers.least_pixels) / (numbers.finer_share * numbers.pixels)
+    chosen = _chosen(disparity, usable, reach, spacing)
+    while len(chosen) < numbers.sparse_share * numbers.pixels and spacing != (1, 1):
+        # the valid ones may be a grid
+        share = max(len(chosen), numbers.least_pixels) / (numbers.finer_share * numbers.pixels)
         spacing = Spacing.of(spacing.rows * spacing.columns * share)
-        taken = _taken(disparity, usable, reach, spacing)
-        count = int(np.count_nonzero(taken))
-    chosen = np.flatnonzero(taken)
+        chosen = _chosen(disparity, usable, reach, spacing)
     if len(chosen) < numbers.least_pixels:
         raise EstimationError(
             f"only {len(chosen)} valid pixels away from the border: too few to find a road in"
@@ -224,12 +210,15 @@ def reach_of(height: int, width: int, numbers: SampleTuning) -> int:
     return min(numbers.neighbour_most, wanted, max(1, min(height, width) // numbers.border_part))
 
 
-def _taken(
+def _chosen(
     disparity: NDArray[Any], usable: NDArray[np.bool_] | None, reach: int, spacing: Spacing
-) -> NDArray[np.bool_]:
+) -> NDArray[np.intp]:
+    """Return which pixels of the lattice may be taken."""
     with np.errstate(invalid="ignore"):
-        taken: NDArray[np.bool_] = strided(disparity, reach, spacing) > 0
-    return taken if usable is None else taken & strided(usable, reach, spacing)
+        chosen: NDArray[np.bool_] = strided(disparity, reach, spacing) > 0
+    if usable is not None:
+        chosen &= strided(usable, reach, spacing)
+    return chosen.ravel().nonzero()[0]
 
 
 def _median(values: Singles) -> float:

@@ -131,9 +131,9 @@ def fit_surface(sample: Sample, road: Road, *, parabolic: bool) -> Surface:
         When hardly any pixel lies on the road.
     """
     near, tuning = NearPixels.of(sample, road), sample.tuning
-    lane = near.lane().fit(road.model, tuning.fit.lane_rounds, parabolic=parabolic).model
+    lane = near.lane(road.model, parabolic=parabolic)
     profile, weighted = near.profile(lane, tuning.profile)
-    fit = weighted.fit(lane, tuning.fit.rounds, parabolic=parabolic, cambered=True)
+    fit = weighted.fit(lane, parabolic=parabolic)
     return _surface(weighted, fit, profile, sample, road, parabolic=parabolic)
 
 
@@ -142,13 +142,12 @@ def _surface(
 ) -> Surface:
     """Return the pixels that a fit leaves, and the fit."""
     weights, model = near.weights(fit), fit.model
-    used = np.flatnonzero(weights > 0)  # of floats alone it takes three times as long
+    used = (weights > 0).nonzero()[0]  # of floats alone it takes three times as long
     x, y, d = near.pixels(used)
-    plain = model.disparity_along(model.along(x, y))
     return Surface(
         x=x,
         y=y,
-        d=d - model.camber * model.bulge(model.across(x, y), plain),
+        d=d - model.camber * fit.bulge.take(used),
         weights=weights[used].astype(np.float64),
         model=model,
         grid=sample.grid,

@@ -117,16 +117,12 @@ class FitTuning:
     pixels: int = 4500
     """Pixels near the plane that are looked at, each averaged with those around it. With 3,000 the median
     error on rendered roads is a seventh larger, and all takes 4 % less time."""
-    lane_pixels: int = 1500
-    """Pixels of the fit of the lane ahead, which only has to show the profile."""
     least_pixels: int = 30
     """Pixels with some weight, without which there is no road."""
     reach: float = 3.0
     """Tolerances from the plane beyond which a pixel is not looked at again."""
-    lane_rounds: int = 2
-    """Rounds of the fit of the lane ahead. With 3 the same errors, and 4 % more time."""
     rounds: int = 3
-    """Rounds of the fit to the road, which starts from there."""
+    """Rounds of the fit to the road, which starts from the lane ahead."""
     most_turn: float = 0.2
     """Radians that a round may turn the road by."""
     start_width: float = 2.0

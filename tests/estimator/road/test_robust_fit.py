@@ -7,20 +7,11 @@ import numpy as np
 import pytest
 
 from rollcli.errors import EstimationError
-from rollcli.estimator.road.find import Road, road_weights
+from rollcli.estimator.road.find import Road
 from rollcli.estimator.road.model import RoadModel
-from rollcli.estimator.road.robust_fit import (
-    AHEAD,
-    ALONE,
-    PLACE,
-    SHOWN,
-    TOLERANCE,
-    D,
-    NearPixels,
-    X,
-    Y,
-)
+from rollcli.estimator.road.robust_fit import AHEAD, ALONE, PLACE, TOLERANCE, D, NearPixels, X, Y
 from rollcli.estimator.road.subsample import take_sample
+from rollcli.estimator.road.surroundings import look_around
 from rollcli.estimator.road.tuning import ROAD_TUNING, FitTuning
 from tests.estimator.synthetic_maps import flat_road
 
@@ -34,9 +25,9 @@ def near_pixels(spread=0.1, count=900, tuning=TUNING, road=ROAD, least_width=0.2
     x, y = rng.uniform(-0.9, 0.9, count), rng.uniform(0.05, 0.6, count)
     tolerance, place, ahead = rng.uniform(0.4, 0.9, count), rng.uniform(0.3, 1, count), rng.random(count)
     d = road.disparity(x, y) + spread * tolerance * rng.normal(size=count)
-    rows = np.empty((8, count), np.float32)
+    rows = np.empty((7, count), np.float32)
     rows[X], rows[Y], rows[D], rows[ALONE], rows[TOLERANCE] = x, y, d, d, tolerance
-    rows[PLACE], rows[AHEAD], rows[SHOWN] = place, ahead, np.arange(count) % 3 == 0
+    rows[PLACE], rows[AHEAD] = place, ahead
     return NearPixels(rows, stride=1, least_width=least_width, tuning=tuning)
 
 
@@ -45,6 +36,11 @@ def with_row(near, row, values):
     rows = near.rows.copy()
     rows[row] = values
     return dataclasses.replace(near, rows=rows)
+
+
+def in_rounds(near, rounds):
+    """The same pixels, which are to be fitted in so many rounds."""
+    return dataclasses.replace(near, tuning=dataclasses.replace(near.tuning, rounds=rounds))
 
 
 def biweights(near, road, limit, bulge=None):
@@ -78,24 +74,23 @@ def derivatives(road, near):
 
 
 @pytest.mark.parametrize("spread", [0.1, 0.33, 0.5])
-@pytest.mark.parametrize(("parabolic", "cambered"), [(True, False), (False, False), (True, True)])
-def test_each_round_is_a_weighted_least_squares_fit_about_the_one_before(spread, parabolic, cambered):
+@pytest.mark.parametrize("parabolic", [True, False])
+def test_each_round_is_a_weighted_least_squares_fit_about_the_one_before(spread, parabolic):
     near = near_pixels(spread)
     start = RoadModel(0.1, (30.1, 61.0, 5.0 if parabolic else 0.0))
-    bulge = derivatives(start, near)[:, 4] * cambered  # stays that of the start
+    bulge = derivatives(start, near)[:, 4]  # stays that of the start
     model, limit = start, 2.0
     for rounds in (1, 2):
-        found = near.fit(start, rounds, parabolic=parabolic, cambered=cambered)
+        found = in_rounds(near, rounds).fit(start, parabolic=parabolic)
         weights, off = biweights(near, model, limit, bulge)
         design = derivatives(model._replace(camber=0.0), near)
         design[:, 2] *= parabolic
         design[:, 4] = bulge
         root = np.sqrt(weights)
-        prior = 0.0
-        if cambered:  # the pixels' variance over the prior's, as often as neighbours repeat each other
-            variance = np.average((off * near.rows[TOLERANCE]) ** 2, weights=weights)
-            prior = variance * max(1, weights.sum() / 50) / 0.02**2
-            assert found.camber_precision == pytest.approx(prior, rel=2e-3)
+        # the pixels' variance over the prior's, as often as neighbours repeat each other
+        variance = np.average((off * near.rows[TOLERANCE]) ** 2, weights=weights)
+        prior = variance * max(1, weights.sum() / 50) / 0.02**2
+        assert found.camber_precision == pytest.approx(prior, rel=2e-3)
         # all but theta enter as they are: they are solved for anew, and theta's change with them
         rows = np.vstack([design * root[:, None], [0, 0, 0, 0, math.sqrt(prior)]])
         a0, a1, a2, turned, camber = np.linalg.lstsq(rows, np.append(near.rows[D] * root, 0), rcond=None)[0]
@@ -107,29 +102,45 @@ def test_each_round_is_a_weighted_least_squares_fit_about_the_one_before(spread,
         limit = max(0.2, min(limit, usual_width(near, off, weights)))
         assert found.limit == pytest.approx(limit, rel=2e-3)
         np.testing.assert_allclose(np.sqrt(found.squares), abs(off), atol=5e-3)
+        np.testing.assert_allclose(found.bulge, bulge, rtol=1e-3, atol=1e-3)
+
+
+@pytest.mark.parametrize("parabolic", [True, False])
+def test_the_lane_is_a_fit_of_its_middle_without_camber(parabolic):
+    near = near_pixels(0.33)
+    start = RoadModel(0.1, (30.1, 61.0, 0.0))
+    weights, _ = biweights(near, start, 2.0)
+    design = derivatives(start, near)[:, :4]
+    design[:, 2] *= parabolic
+    root = np.sqrt(weights * near.rows[AHEAD] ** 4)
+    *alpha, turned = np.linalg.lstsq(design * root[:, None], near.rows[D] * root, rcond=None)[0]
+    lane = near.lane(start, parabolic=parabolic)
+    np.testing.assert_allclose(lane.alpha, alpha, rtol=2e-3, atol=5e-3)
+    assert lane.theta == pytest.approx(0.1 + turned, abs=2e-5)
+    assert lane.camber == 0
 
 
 def test_a_round_turns_the_road_by_no_more_than_it_may():
     for sign in (-1, 1):
         far = RoadModel(0.12 + 0.5 * sign, ROAD.alpha)
         wide = near_pixels(tuning=dataclasses.replace(TUNING, start_width=200.0))
-        assert wide.fit(far, 1, parabolic=True).model.theta == pytest.approx(0.12 + 0.3 * sign)
+        assert in_rounds(wide, 1).fit(far, parabolic=True).model.theta == pytest.approx(0.12 + 0.3 * sign)
 
 
 @pytest.mark.parametrize("least", [0.2, 1.0])
 def test_no_width_is_less_than_the_least(least):
     near = near_pixels(spread=1e-4, least_width=least)
-    assert near.fit(ROAD, 3, parabolic=True).limit == least
+    assert near.fit(ROAD, parabolic=True).limit == least
 
 
 @pytest.mark.parametrize(("count", "enough"), [(29, False), (30, True)])
 def test_a_surface_needs_30_pixels(count, enough):
     near = near_pixels(spread=0.01, count=count)
     if enough:
-        assert near.fit(ROAD, 1, parabolic=True).limit < 2
+        assert near.fit(ROAD, parabolic=True).limit < 2
     else:
         with pytest.raises(EstimationError, match="hardly a pixel lies"):
-            near.fit(ROAD, 1, parabolic=True)
+            near.fit(ROAD, parabolic=True)
 
 
 @pytest.mark.parametrize("camber", [0.0, 0.02])
@@ -143,7 +154,7 @@ def test_single_pixels_end_where_their_own_spread_says(camber):
         weights, off = biweights(with_row(near, D, near.rows[ALONE]), road, limit)
         limit = usual_width(near, off, weights)
     assert near.limit_alone(road) == pytest.approx(limit, rel=1e-4)
-    assert limit > near.fit(road, 3, parabolic=True).limit
+    assert limit > near.fit(road, parabolic=True).limit
 
 
 def found_road(roll_deg=4.0):
@@ -160,7 +171,7 @@ def found_road(roll_deg=4.0):
 @pytest.mark.parametrize("roll_deg", [-25.0, 4.0])
 def test_the_pixels_near_a_plane_are_weighted_by_place(roll_deg):
     sample, road = found_road(roll_deg)
-    tuning = dataclasses.replace(FitTuning(), pixels=2500, lane_pixels=400, reach=1.5, lane=0.7)
+    tuning = dataclasses.replace(FitTuning(), pixels=2500, reach=1.5, lane=0.7)
     sample = dataclasses.replace(sample, tuning=dataclasses.replace(ROAD_TUNING, fit=tuning))
     near = NearPixels.of(sample, road)
 
@@ -170,7 +181,8 @@ def test_the_pixels_near_a_plane_are_weighted_by_place(roll_deg):
     taken = [place for place in range(0, len(close), stride) if close[place]]
     assert (near.stride, stride > 1) == (stride, True)
     np.testing.assert_array_equal(near.rows[ALONE], sample.d[taken])
-    assert near.rows[SHOWN].sum() == pytest.approx(400, rel=0.2)
+    around = look_around(sample, road.plane, np.array(taken))
+    np.testing.assert_array_equal(near.rows[D], around.mean)
 
     model = road.model
     across, along = model.across(near.rows[X], near.rows[Y]), model.along(near.rows[X], near.rows[Y])
@@ -179,16 +191,9 @@ def test_the_pixels_near_a_plane_are_weighted_by_place(roll_deg):
     # what a rig rolled by 0.1 more or less would not see lies below the picture's lower edge, turned
     bottom = 239.5 / 320 / math.cos(model.theta) + max(0, abs(math.tan(model.theta)) - 0.2)
     seen = 1 / (1 + np.exp((along + 0.1 * abs(across) - bottom) / 0.01))
-    expected = road_weights(sample, road.plane, np.array(taken)) ** 2 * seen
+    expected = around.agreement**2 * seen
     np.testing.assert_allclose(near.rows[PLACE], expected, rtol=1e-3, atol=1e-6)
     assert near.rows[PLACE].min() < 0.05 < 0.9 < near.rows[PLACE].max()
-
-
-def test_the_lane_is_what_is_shown_weighted_by_how_far_ahead_it_is():
-    near = near_pixels()
-    lane = near.lane()
-    np.testing.assert_array_equal(lane.rows[D], near.rows[D][::3])
-    np.testing.assert_allclose(lane.rows[PLACE], near.rows[PLACE][::3] * near.rows[AHEAD][::3])
 
 
 def test_a_step_of_whole_pixels_counts_in_any_case():

@@ -9,7 +9,7 @@ import pytest
 from rollcli.estimator.road.find import find_road
 from rollcli.estimator.road.model import RoadModel
 from rollcli.estimator.road.neighbours import NO_SLOPE, rising
-from rollcli.estimator.road.scoring import PlaneScorer, first_costs, slope_weights
+from rollcli.estimator.road.scoring import PlaneScorer, slope_weights
 from rollcli.estimator.road.subsample import take_sample
 from rollcli.estimator.road.tuning import ROAD_TUNING, SampleTuning, ScoreTuning
 from tests.estimator.synthetic_maps import flat_road
@@ -134,7 +134,7 @@ def test_the_first_costs_are_those_of_pixels_ahead_of_a_usual_plane(sample, plan
     ahead = 0.1 + 0.9 * np.exp(-((x * np.sort(planes[:, 2])[len(planes) // 2] / d / 0.8) ** 2))
     weights = ahead * np.where(rising(sample.coarse.slopes), 1, 0.3)
     expected = [weights @ costs(plane, x, y, d, tolerance, sample.coarse.coherence) for plane in planes]
-    np.testing.assert_allclose(first_costs(sample, planes, len(x)), expected, rtol=1e-4)
+    np.testing.assert_allclose(PlaneScorer.of(sample).first_costs(planes, len(x)), expected, rtol=1e-4)
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2, 3])
