@@ -206,9 +206,9 @@ class Energy:
         a0, a1, a2 = level - slope * y + bend * y * y, slope - 2 * bend * y, bend
         return float(a0), float(a1), float(a2)
 
-    def rmse(self, theta: float) -> float:
-        """Root of the mean squared residual at `theta`, px."""
-        return math.sqrt(max(0.0, self.at(theta).value) / self.weight)
+    def rmse(self, value: float) -> float:
+        """Root of the mean squared residual, px, where E_min has this value."""
+        return math.sqrt(max(0.0, value) / self.weight)
 
     def _rotated(self, theta: Any) -> list[Any]:
         """Return the moments in the frame rotated by theta, then the plane's slopes along x and y."""
@@ -219,12 +219,10 @@ class Energy:
     def _in_frame(self, c: Any, s: Any) -> list[Any]:
         """Return the same for the frame x = c p + s q, y = c q - s p."""
         cc, cs, ss = c * c, c * s, s * s
-        basis = np.array(
-            [cc, cs, ss, cc * c, cc * s, c * ss, ss * s, cc * cc, cc * cs, cc * ss, cs * ss, ss * ss]
-        )
-        rotated: list[Any] = list(self.forms.dot(basis)) if basis.ndim > 1 else self.forms.dot(basis).tolist()
+        basis = [cc, cs, ss, cc * c, cc * s, c * ss, ss * s, cc * cc, cc * cs, cc * ss, cs * ss, ss * ss]
+        rotated = self.forms.dot(basis)
         _, c1, c2 = self.plane
-        return [*rotated, c1 * c + c2 * s, c2 * c - c1 * s]
+        return [*(rotated if rotated.ndim > 1 else rotated.tolist()), c1 * c + c2 * s, c2 * c - c1 * s]
 
     def _inverse(self, norm: Any, scale: Any) -> Any:
         """Return 1 / norm, or 0, which drops the square: for a line, or where y has two values only."""

@@ -117,7 +117,7 @@ def estimate_roll(
         iterations=certified.solution.iterations,
         converged=certified.solution.status.converged,
         global_minimum=None if method in AREAS else certified.is_global,
-        rmse=pixels.energy.rmse(theta),
+        rmse=pixels.energy.rmse(certified.energy),
         alpha=alpha,
         valid_fraction=checked.count / checked.values.size,
         road_fraction=pixels.share,

@@ -32,6 +32,7 @@ _NORMAL = 1.96  # 97.5 % quantile of the normal distribution
 _LAST_STEP = 65535  # of 16 bits, whose sort takes a fifth of the time of single precision
 _LEAST_SPAN = 1e-30  # units; keeps a division finite
 _THETA, _CAMBER = 3, 4  # columns of the design
+_UNITS = np.eye(5)
 
 
 @dataclass(frozen=True)
@@ -161,10 +162,10 @@ def jackknife(surface: Surface, theta: float, tuning: IntervalTuning) -> Jackkni
     total = bands.sum(0)
     parts = _lane(model.side(across, plain)), _near(weights, along, tuning)
     lane, near = ((rows * part).dot(rows.T) for part in parts)
-    halves = np.stack([lane, total, near, total - near]) + tuning.whole_share * total
-    found, inverse = _solved(total, np.concatenate([bands, columns]), halves, prior)
+    halves = [part + tuning.whole_share * total for part in (lane, total, near, total - near)]
+    found = _solved(total, np.concatenate([bands, columns]), halves, prior)
 
-    white: Floats = inverse * _white(total, found.whole, tuning)
+    white: Floats = found.inverse * _white(total, found.whole, tuning)
     if not surface.parabolic:  # there is no a2 to err
         white[2] = white[:, 2] = 0
     of_lane, of_all, of_near, of_far = found.halves[:, _THETA].tolist()
@@ -176,7 +177,7 @@ def jackknife(surface: Surface, theta: float, tuning: IntervalTuning) -> Jackkni
         lateral=abs(of_lane - of_all),
         depth=abs(of_near - of_far),
         bend=abs(model.camber * float(found.bulge[_THETA])),
-        camber=_camber(model, prior * float(inverse[_CAMBER, _CAMBER])) if cambered else None,
+        camber=_camber(model, prior * float(found.inverse[_CAMBER, _CAMBER])) if cambered else None,
     )
 
 
@@ -203,19 +204,21 @@ def _by_group(rows: Reals, position: Reals, share: Reals | None, groups: int) ->
     if share is None:
         cuts = [math.ceil(len(order) * group / groups) - 1 for group in range(1, groups)]
     else:
-        heights = np.cumsum(share.take(order))
-        cuts = np.searchsorted(heights, heights[-1] * np.arange(1, groups) / groups).tolist()
-    ordered = rows.take(order, 1)
+        heights = share.take(order).cumsum()
+        cuts = heights.searchsorted(heights[-1] * np.arange(1, groups) / groups).tolist()
+    ordered = rows.take(order, 1, mode="clip")
     columns = ordered.copy().T  # BLAS takes twice as long for the product of an array with itself
-    bounds = itertools.pairwise([0, *cuts, len(order)])
-    return np.array([ordered[:, start:end].dot(columns[start:end]) for start, end in bounds], np.float64)
+    products = np.empty((groups, 6, 6), np.float32)
+    for product, (start, end) in zip(products, itertools.pairwise([0, *cuts, len(order)]), strict=True):
+        np.dot(ordered[:, start:end], columns[start:end], out=product)
+    return products.astype(np.float64)
 
 
 def _order(position: Reals) -> NDArray[np.intp]:
     """Return what sorts pixels along a position, to a step of its span."""
     first, last = float(position.min()), float(position.max())
     steps = (position - first) * (_LAST_STEP / max(last - first, _LEAST_SPAN))
-    return np.argsort(steps.astype(np.uint16), kind="stable")
+    return steps.astype(np.uint16).argsort(kind="stable")
 
 
 class _Solutions(NamedTuple):
@@ -223,6 +226,8 @@ class _Solutions(NamedTuple):
 
     Attributes
     ----------
+    inverse : ndarray, shape (5, 5)
+        Of the normal matrix of all pixels.
     whole : ndarray, shape (5,)
         From the surface's parabola to the best one.
     changes : ndarray, shape (groups, 4)
@@ -233,29 +238,30 @@ class _Solutions(NamedTuple):
         What a camber of 1 adds to the others, where it is not known.
     """
 
+    inverse: Floats
     whole: Floats
     changes: Floats
     halves: Floats
     bulge: Floats
 
 
-def _solved(total: Floats, groups: Floats, halves: Floats, prior: float) -> tuple[_Solutions, Floats]:
-    """Solve the normal equations of all pixels, of all but a group, and of parts. At once takes less time.
-
-    Return the inverse of the first normal matrix, too.
-    """
-    free = 1 + len(groups)  # of these the camber is free
-    products = np.concatenate([total[None], total - groups, halves, total[None]])
+def _solved(total: Floats, groups: Floats, halves: list[Floats], prior: float) -> _Solutions:
+    """Solve the normal equations of all pixels, of all but a group, and of parts. At once takes less time."""
+    free = 6 + len(groups)  # of these the camber is free
+    products = np.empty((free + len(halves) + 1, 6, 6))
+    products[:6] = products[-1] = total
+    np.subtract(total, groups, out=products[6:free])
+    products[free:-1] = halves
     normal, pulls = products[:, :5, :5], products[:, :5, 5:]
+    pulls[:5, :, 0] = _UNITS  # whose solutions are the inverse
     pulls[-1] = normal[-1, :, _CAMBER:]
     pulls[-1, _CAMBER] = 0
     normal[:free, _CAMBER, _CAMBER] += prior
     normal[free:, _CAMBER] = normal[free:, :, _CAMBER] = 0
-    normal = regular(normal, normal[0])
-    solutions = np.linalg.solve(normal, pulls)[..., 0]
-    whole = solutions[0]
-    changes = (whole - solutions[1:free])[:, :4]
-    return _Solutions(whole, changes, solutions[free:-1], solutions[-1]), np.linalg.inv(normal[0])
+    solutions: Floats = np.asarray(np.linalg.solve(regular(normal, normal[0]), pulls)[..., 0], np.float64)
+    inverse, whole = solutions[:5], solutions[5]
+    changes = (whole - solutions[6:free])[:, :4]
+    return _Solutions(inverse, whole, changes, solutions[free:-1], solutions[-1])
 
 
 def _white(total: Floats, whole: Floats, tuning: IntervalTuning) -> float:

@@ -1,5 +1,7 @@
 """Normal equations of a few parameters in different units, some of which may be missing."""
 
+from functools import cache
+
 import numpy as np
 
 from rollcli.estimator.moments import Floats
@@ -55,5 +57,10 @@ def regular(normal: Floats, like: Floats) -> Floats:
     ndarray, shape (..., N, N)
     """
     diagonal = like.diagonal()
-    added: Floats = np.diag(np.where(diagonal > 0, _RIDGE * diagonal, 1.0))
+    added: Floats = np.where(diagonal > 0, _RIDGE * diagonal, 1.0) * _unit(len(diagonal))
     return normal + added
+
+
+@cache
+def _unit(size: int) -> Floats:
+    return np.eye(size)

@@ -153,7 +153,7 @@ def doubts_about(energy, elsewhere, slope, score, horizon, rival, moved, theta, 
     surface = SimpleNamespace(moved=moved, model=SimpleNamespace(theta=theta))
     evidence = Evidence(
         energy=SimpleNamespace(plane=(9.0, 0.0, slope)),
-        certified=CertifiedSolution(Solution(0.0, 1), found, is_global=True),
+        certified=CertifiedSolution(Solution(0.0, 1), found[0].energy, found, is_global=True),
         road=Road(np.array([2 * horizon, 0.0, 2.0]), score, rival),
         surface=surface,
         max_roll=1.0,
@@ -195,7 +195,7 @@ def test_what_is_just_beyond_a_bound_is_doubted_for_that_alone(beyond, says):
 def test_which_way_is_down_is_told_along_the_rolled_road(sign, grows_upward):
     roll = 1.2
     plane = (9.0, -sign * 0.2 * math.sin(roll), sign * 0.2 * math.cos(roll))
-    certified = CertifiedSolution(Solution(roll, 1), [Minimum(roll, 64.0)], is_global=True)
+    certified = CertifiedSolution(Solution(roll, 1), 64.0, [Minimum(roll, 64.0)], is_global=True)
     evidence = Evidence(SimpleNamespace(plane=plane), certified, None, None, 1.5, 1.0, None)
     assert (
         doubts_of(evidence, BOUNDS)

@@ -112,7 +112,7 @@ def test_the_parabola_is_the_least_squares_fit_in_pixels(disparity, theta):
 def test_rmse_is_the_root_of_the_mean_squared_residual():
     disparity = bent_road(10, noise=0.25)
     energy = energy_of(disparity)
-    assert energy.rmse(math.radians(10)) == pytest.approx(0.25, rel=0.02)
+    assert energy.rmse(energy.at(math.radians(10)).value) == pytest.approx(0.25, rel=0.02)
 
 
 @pytest.mark.parametrize("roll_deg", [-33, -4, 0, 11, 45])

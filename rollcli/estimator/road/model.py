@@ -95,9 +95,8 @@ class RoadModel(NamedTuple):
         A surface that is higher by h camera heights is nearer, and its disparity larger by the factor
         1 / (1 - h), in first order 1 + h.
         """
-        slope = abs(self.alpha[1])
-        positive = np.maximum(road, _HARDLY * slope + 1e-30)
-        bulge = across * slope
+        positive = self._positive(road)
+        bulge = across * abs(self.alpha[1])
         bulge *= bulge
         bulge /= positive
         np.minimum(bulge, positive * _FARTHEST**2, out=bulge)
@@ -112,7 +111,7 @@ class RoadModel(NamedTuple):
         across : ndarray
             Coordinate across the road.
         disparity : ndarray
-            Of the road there, px; above the horizon, where it is not positive, the result is infinite.
+            Of the road there, px; above the horizon, where it is not positive, the result is very large.
 
         Notes
         -----
@@ -120,6 +119,11 @@ class RoadModel(NamedTuple):
         road's slope is a1 = B / H, for baseline B and camera height H. So across a1 / d = X / H, whatever the
         focal length and the unit of the disparities.
         """
-        with np.errstate(divide="ignore", invalid="ignore"):
-            side: Reals = across * abs(self.alpha[1]) / np.maximum(disparity, 0)
+        side: Reals = across * abs(self.alpha[1])
+        side /= self._positive(disparity)
         return side
+
+    def _positive(self, disparity: Reals) -> Reals:
+        """Return disparities, px, that one can divide by."""
+        positive: Reals = np.maximum(disparity, _HARDLY * abs(self.alpha[1]) + 1e-30)
+        return positive

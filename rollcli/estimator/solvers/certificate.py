@@ -17,6 +17,8 @@ class CertifiedSolution:
     Attributes
     ----------
     solution : Solution
+    energy : float
+        E_min at the solution, px^2.
     minima : list of Minimum
         Of the energy, the lowest first.
     is_global : bool
@@ -26,6 +28,7 @@ class CertifiedSolution:
     """
 
     solution: Solution
+    energy: float
     minima: list[Minimum]
     is_global: bool
     replaced: float | None = None
@@ -33,8 +36,7 @@ class CertifiedSolution:
 
 def certify(energy: Energy, solution: Solution) -> CertifiedSolution:
     """Compare a solution with all minima of the energy."""
-    found = minima(energy)
-    return CertifiedSolution(solution, found, _is_lowest(energy, solution.theta, found))
+    return _beside(minima(energy), energy, solution)
 
 
 def certify_near(
@@ -58,9 +60,12 @@ def certify_near(
     if angle_between(solution.theta, meant) > max(10 * tolerance, _SAME_BASIN):
         replaced = solution.theta
         solution = replace(solution, theta=meant)
-    return CertifiedSolution(solution, found, _is_lowest(energy, solution.theta, found), replaced)
+    return _beside(found, energy, solution, replaced)
 
 
-def _is_lowest(energy: Energy, theta: float, found: list[Minimum]) -> bool:
+def _beside(
+    found: list[Minimum], energy: Energy, solution: Solution, replaced: float | None = None
+) -> CertifiedSolution:
+    value = float(energy.at(solution.theta).value)
     slack = 1e-9 * (energy.rest + energy.slope_energy)
-    return float(energy.at(theta).value) <= found[0].energy + slack
+    return CertifiedSolution(solution, value, found, value <= found[0].energy + slack, replaced)

@@ -16,7 +16,7 @@ from rollcli.estimator.moments import Floats
 DEGREE = 5
 SAMPLES = 16  # more than 2 DEGREE + 1
 _FINE = 256  # places of the grid; with 128 the bound proves it for 95 % of the roads instead of 99
-_STEPS = 4  # of Newton's method
+_STEPS = 3  # of Newton's method
 _FOLLOWING = (np.arange(_FINE) + 1) % _FINE
 
 
@@ -46,7 +46,7 @@ def rising_zeros(samples: Floats) -> list[float] | None:
     sure = (np.minimum(curves, following) > most) | (np.maximum(curves, following) < -most)
     if not (sure[0] | sure[1]).all():
         return None
-    before = np.flatnonzero((curves[0] < 0) & (following[0] >= 0))
+    before = ((curves[0] < 0) & (following[0] >= 0)).nonzero()[0]
     mean, *parts = waves.tolist()
     series = [mean, *(complex(a, -b) for a, b in zip(parts[:DEGREE], parts[DEGREE:], strict=True))]
     return [_polished(series, (place + 0.5) * (2 * math.pi / _FINE)) for place in before.tolist()]

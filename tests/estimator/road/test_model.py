@@ -64,11 +64,11 @@ def test_the_side_of_a_pixel_is_its_way_to_the_right_in_camera_heights(roll_deg)
     )
 
 
-def test_above_the_horizon_everything_is_infinitely_far_to_the_side():
+def test_above_the_horizon_everything_is_very_far_to_the_side():
     model = RoadModel(0.0, (0.0, 1.0, 0.0))
-    side = model.side(np.array([-1.0, 1.0]), np.array([-1.0, -1.0]))
+    left, right = model.side(np.array([-1e-3, 1e-3]), np.array([-1.0, 0.0]))
 
-    np.testing.assert_array_equal(side, [-np.inf, np.inf])
+    assert -left == right > 1e5
 
 
 def test_camber_lifts_the_road_by_half_the_side_squared():
