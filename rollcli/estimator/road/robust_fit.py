@@ -23,6 +23,7 @@ X, Y, D, ALONE, TOLERANCE, PLACE, AHEAD = range(7)  # rows of `NearPixels.rows`
 BULGE, TURNING, LEFT = range(3, 6)
 MOST_FADED = 30.0  # as exp(-30): products of such weights are no denormals, which take ten times as long
 _LEAST_ROOT = np.float32(math.exp(-MOST_FADED / 4))
+_LEAST_TOTAL = 1e-30  # of weights; keeps a division finite
 
 
 class Fit(NamedTuple):
@@ -141,7 +142,7 @@ class NearPixels:
         across, squares = self._lay_out(design, start, self.rows[D], bulge=True)
         fit = Fit(start, squares, self.tuning.start_width, design[BULGE])
         for _ in range(self.tuning.rounds):
-            weights = self.weights(fit)
+            weights = self._weights(fit.squares, fit.limit)
             products = _products(design, fit.model, across, weights, parabolic=parabolic)
             precision = self._camber_precision(products)
             products[BULGE][BULGE] += precision
@@ -155,7 +156,10 @@ class NearPixels:
 
     def weights(self, fit: Fit) -> Singles:
         """Return the weights that a fit leaves, 0 to 1; refuse a surface with hardly a pixel on it."""
-        return self._weights(fit.squares, fit.limit)
+        weights = self._weights(fit.squares, fit.limit)
+        if np.count_nonzero(weights > 0) < self.tuning.least_pixels:
+            raise EstimationError(HARDLY_A_PIXEL)
+        return weights
 
     def limit_alone(self, model: RoadModel) -> float:
         """Return where the weights of single pixels around a road would end, in tolerances.
@@ -202,14 +206,12 @@ class NearPixels:
         return RoadModel(model.theta + turned, (a0 + d0, a1 + d1, a2 + d2), model.camber + camber)
 
     def _weights(self, squares: Singles, limit: float) -> Singles:
-        """Return the weights; refuse a surface with hardly a pixel on it."""
+        """Return Tukey's weights, times those by place."""
         weights = squares * (-1 / limit**2)
         weights += 1
         np.maximum(weights, 0, out=weights)
         weights *= weights
         weights *= self.rows[PLACE]
-        if np.count_nonzero(weights > 0) < self.tuning.least_pixels:
-            raise EstimationError(HARDLY_A_PIXEL)
         return weights
 
     def _camber_precision(self, products: list[list[float]]) -> float:
@@ -229,7 +231,8 @@ class NearPixels:
         Every step is smooth: a pixel more or less must not turn the road.
         """
         tuning = self.tuning
-        spread = tuning.biweight_spread * math.sqrt(float(weights.dot(squares)) / float(weights.sum()))
+        total = max(float(weights.sum()), _LEAST_TOTAL)
+        spread = tuning.biweight_spread * math.sqrt(float(weights.dot(squares)) / total)
         mix = (spread - tuning.even_spread) / (tuning.uneven_spread - tuning.even_spread)
         times = tuning.even_width + max(0.0, min(1.0, mix)) * (tuning.uneven_width - tuning.even_width)
         return max(self.least_width, times * spread)
@@ -243,6 +246,8 @@ def _products(
         design[2] = 0
     model.turning(across, design[1], out=design[TURNING])
     products: list[list[float]] = (design * weights).dot(design.T).tolist()
+    if not products[0][0] > 0:
+        raise EstimationError(HARDLY_A_PIXEL)
     return products
 
 

@@ -147,9 +147,9 @@ def take_sample(
         )
     disparity = np.ascontiguousarray(disparity)
     lattice = lattice_of(height, width, reach, spacing)
-    places = lattice.places.take(chosen)
+    places = lattice.places.take(chosen, mode="clip")  # no index is out of bounds, and none is looked for
     with np.errstate(over="ignore"):
-        d: Singles = disparity.reshape(-1).take(places).astype(np.float32, copy=False)
+        d: Singles = disparity.reshape(-1).take(places, mode="clip").astype(np.float32, copy=False)
     few = every(len(d), numbers.coarse_pixels)
     few_d = d[few].copy()
     typical = _median(few_d)
@@ -169,7 +169,7 @@ def take_sample(
         typical = _median(coherent)
         noise = _noise(typical, quantum, numbers)
     tolerance = _tolerance(d, noise, numbers)
-    x, y = lattice.x.take(chosen), lattice.y.take(chosen)
+    x, y = (each.take(chosen, mode="clip") for each in (lattice.x, lattice.y))
     coarse = CoarseSample(
         x=x[few],
         y=y[few],

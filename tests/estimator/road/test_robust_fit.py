@@ -136,11 +136,24 @@ def test_no_width_is_less_than_the_least(least):
 @pytest.mark.parametrize(("count", "enough"), [(29, False), (30, True)])
 def test_a_surface_needs_30_pixels(count, enough):
     near = near_pixels(spread=0.01, count=count)
+    fit = near.fit(ROAD, parabolic=True)
     if enough:
-        assert near.fit(ROAD, parabolic=True).limit < 2
+        assert np.count_nonzero(near.weights(fit)) == 30
     else:
         with pytest.raises(EstimationError, match="hardly a pixel lies"):
-            near.fit(ROAD, parabolic=True)
+            near.weights(fit)
+
+
+def test_a_road_without_any_pixel_on_it_is_none():
+    far = ROAD._replace(alpha=(90.0, 60.0, 5.0))
+    for fitted in (near_pixels().lane, near_pixels().fit):
+        with pytest.raises(EstimationError, match="hardly a pixel lies"):
+            fitted(far, parabolic=True)
+
+
+def test_where_no_single_pixel_is_on_the_road_they_end_at_the_least_width():
+    near = near_pixels()
+    assert with_row(near, ALONE, near.rows[ALONE] + 90).limit_alone(ROAD) == 0.2
 
 
 @pytest.mark.parametrize("camber", [0.0, 0.02])
