@@ -136,8 +136,8 @@ def take_sample(
     reach = reach_of(height, width, numbers)
     spacing = Spacing.of(height * width / numbers.pixels)
     chosen = _chosen(disparity, usable, reach, spacing)
-    while len(chosen) < numbers.sparse_share * numbers.pixels and spacing != (1, 1):
-        # the valid ones may be a grid
+    enough = min(numbers.sparse_share, numbers.finer_share) * numbers.pixels  # each round has to be finer
+    while len(chosen) < enough and spacing != (1, 1):  # the valid ones may be a grid
         share = max(len(chosen), numbers.least_pixels) / (numbers.finer_share * numbers.pixels)
         spacing = Spacing.of(spacing.rows * spacing.columns * share)
         chosen = _chosen(disparity, usable, reach, spacing)

@@ -1,5 +1,6 @@
 """What a sample says of its map does not change with what is wrong in the map."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -100,6 +101,15 @@ def test_a_sparse_map_is_sampled_more_finely(size):
     found = len(take_sample(sparse).d)
     assert found > 3 * 0.1 * len(take_sample(whole).d)
     assert found < 2 * ROAD_TUNING.sample.finer_share * ROAD_TUNING.sample.pixels  # not all there are
+
+
+def test_a_finer_grid_ends_the_search_where_it_aims_at_fewer_pixels_than_are_enough():
+    tuning = dataclasses.replace(ROAD_TUNING.sample, sparse_share=0.95, finer_share=0.3)
+    half = np.where(np.arange(640) < 320, 50.0, 0).astype(np.float32).repeat(480).reshape(640, 480)
+
+    sample = take_sample(half, tuning=dataclasses.replace(ROAD_TUNING, sample=tuning))
+
+    assert 0.3 * tuning.pixels < len(sample.d) < tuning.pixels
 
 
 def pixels_alone(count):
