@@ -7,7 +7,7 @@ First the errors on rendered scenes matched by SGBM, half of them with rolls wit
 from a 16-bit PNG, on such maps of 1242x375 and one of 3840x2160. scikit-learn, scikit-image and Open3D (pip
 install scikit-learn scikit-image open3d) are left out with a word where they are not installed.
 
-Bars: estimate within 0.8 times the decoding at 1242x375, 0.3 times at 3840x2160.
+Bars: estimate within 0.45 times the decoding at 1242x375, 0.3 times at 3840x2160.
 """
 
 import math
