@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.estimator.moments import Floats
-from rollcli.estimator.normal import regular
+from rollcli.estimator.normal import regular, unit
 from rollcli.estimator.road.model import Reals, RoadModel
 from rollcli.estimator.road.robust_fit import MOST_FADED
 from rollcli.estimator.road.surface import Surface
@@ -32,7 +32,6 @@ _NORMAL = 1.96  # 97.5 % quantile of the normal distribution
 _LAST_STEP = 65535  # of 16 bits, whose sort takes a fifth of the time of single precision
 _LEAST_SPAN = 1e-30  # units; keeps a division finite
 _THETA, _CAMBER = 3, 4  # columns of the design
-_UNITS = np.eye(5)
 
 
 @dataclass(frozen=True)
@@ -253,7 +252,7 @@ def _solved(total: Floats, groups: Floats, halves: list[Floats], prior: float) -
     np.subtract(total, groups, out=products[6:free])
     products[free:-1] = halves
     normal, pulls = products[:, :5, :5], products[:, :5, 5:]
-    pulls[:5, :, 0] = _UNITS  # whose solutions are the inverse
+    pulls[:5, :, 0] = unit(5)  # whose solutions are the inverse
     pulls[-1] = normal[-1, :, _CAMBER:]
     pulls[-1, _CAMBER] = 0
     normal[:free, _CAMBER, _CAMBER] += prior

@@ -57,10 +57,11 @@ def regular(normal: Floats, like: Floats) -> Floats:
     ndarray, shape (..., N, N)
     """
     diagonal = like.diagonal()
-    added: Floats = np.where(diagonal > 0, _RIDGE * diagonal, 1.0) * _unit(len(diagonal))
+    added: Floats = np.where(diagonal > 0, _RIDGE * diagonal, 1.0) * unit(len(diagonal))
     return normal + added
 
 
 @cache
-def _unit(size: int) -> Floats:
+def unit(size: int) -> Floats:
+    """Return the unit matrix of this size."""
     return np.eye(size)

@@ -11,27 +11,29 @@ NO_SLOPE = np.float32(np.inf)  # agrees with no road
 _TOWARDS = np.array([[-1], [1], [-1], [1]], np.float32)  # left, right, up and down along x or y
 
 
-def steps_around(disparity: NDArray[Any], places: NDArray[np.intp], d: Singles, reach: int) -> Singles:
-    """Return how the disparity changes from some pixels to their neighbours.
+def to_sides(reach: int, width: int) -> NDArray[np.intp]:
+    """Return how far the neighbours of a pixel are, counted row by row: left, right, up and down, (4, 1)."""
+    down = reach * width
+    return np.array([[-reach], [reach], [-down], [down]])
+
+
+def steps_to(there: NDArray[np.intp], disparity: NDArray[Any], d: Singles) -> Singles:
+    """Return how the disparity changes from some pixels to others.
 
     Parameters
     ----------
+    there : ndarray of int, shape (M, N)
+        Where M others of each are in the map, counted row by row.
     disparity : ndarray, shape (H, W)
         The map; contiguous, or this takes time.
-    places : ndarray of int, shape (N,)
-        Where the pixels are, counted row by row; at least `reach` from the border.
     d : ndarray of float32, shape (N,)
-        Their disparities.
-    reach : int
-        How far away the neighbours are, px.
+        The disparities of the pixels.
 
     Returns
     -------
-    ndarray of float32, shape (4, N)
-        To the left, right, up and down, px; `NO_SLOPE` where the neighbour is no data.
+    ndarray of float32, shape (M, N)
+        px; `NO_SLOPE` where the other is no data.
     """
-    down = reach * disparity.shape[1]
-    there = places + np.array([[-reach], [reach], [-down], [down]])
     with np.errstate(invalid="ignore", over="ignore"):
         steps: Singles = disparity.reshape(-1).take(there, mode="clip").astype(np.float32, copy=False)
         unknown = ~(steps > 0)

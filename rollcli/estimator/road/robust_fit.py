@@ -39,7 +39,7 @@ class Fit(NamedTuple):
     bulge : ndarray, shape (N,)
         What a camber of 1 adds to the disparities, px.
     camber_precision : float
-        What the prior adds to the normal equation of the camber.
+        What the prior adds to the normal equation of the camber; infinite before the first round.
     """
 
     model: RoadModel

@@ -14,7 +14,8 @@ from rollcli.estimator.road.neighbours import (
     Singles,
     count_true,
     smallest_step,
-    steps_around,
+    steps_to,
+    to_sides,
     to_slopes,
 )
 from rollcli.estimator.road.tuning import ROAD_TUNING, RoadTuning, SampleTuning
@@ -155,7 +156,7 @@ def take_sample(
     typical = _median(few_d)
     if not _SMALLEST < typical < _LARGEST:
         raise EstimationError(f"disparities of about {typical:g}: they have to be in pixels, or nearly so")
-    steps = steps_around(disparity, places[few], few_d, reach)
+    steps = steps_to(places[few] + to_sides(reach, width), disparity, few_d)
     jumps = np.abs(steps)
     quantum = smallest_step(jumps, numbers.quantum_part)
     noise = _noise(typical, quantum, numbers)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.estimator.road.lattice import Spacing
-from rollcli.estimator.road.neighbours import NO_SLOPE, Singles, count_true
+from rollcli.estimator.road.neighbours import Singles, count_true, steps_to
 from rollcli.estimator.road.scoring import slope_agreement
 from rollcli.estimator.road.subsample import Sample
 
@@ -57,12 +57,8 @@ def look_around(sample: Sample, plane: NDArray[np.float64], near: NDArray[np.int
     moves, offsets, lengths = _moves(sample.spacing, sample.reach, sample.disparity.shape[1])
     there = sample.places[near] + offsets
     slope = plane[:0:-1] / sample.grid.scale
-    with np.errstate(over="ignore", invalid="ignore"):
-        off = sample.disparity.reshape(-1).take(there, mode="clip").astype(np.float32, copy=False)
-        unknown = ~(off > 0)
-        off -= d
-        off -= moves.dot(slope).astype(np.float32)[:, None]
-    np.copyto(off, NO_SLOPE, where=unknown)
+    off = steps_to(there, sample.disparity, d)
+    off -= moves.dot(slope).astype(np.float32)[:, None]
     apart = np.abs(off)
     better = np.minimum(apart[::2], apart[1::2])
     steepness = tuning.slope_share**2 * float(slope.dot(slope))

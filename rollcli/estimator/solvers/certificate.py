@@ -66,6 +66,7 @@ def certify_near(
 def _beside(
     found: list[Minimum], energy: Energy, solution: Solution, replaced: float | None = None
 ) -> CertifiedSolution:
+    """Put a solution beside the minima that were found."""
     value = float(energy.at(solution.theta).value)
     slack = 1e-9 * (energy.rest + energy.slope_energy)
     return CertifiedSolution(solution, value, found, value <= found[0].energy + slack, replaced)

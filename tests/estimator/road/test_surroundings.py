@@ -21,17 +21,19 @@ ROAD = np.where(ROAD > 2, ROAD, 0)
 AROUND = ((3, 2), (-3, -2), (2, -3), (-2, 3))  # px, where every fifth row and column is sampled
 
 
+def road_plane(sample):
+    """The plane of `ROAD` on a sample's grid."""
+    unit = sample.grid.scale
+    return np.array([30.0 + 0.3 * (239.5 - 240) - 0.03 * (319.5 - 320), -0.03 * unit, 0.3 * unit])
+
+
 def mean_of(disparity, mask=None, scale=1):
     """The sample of a map, the means of all its pixels, and what a road `scale` times as near has there."""
     sample = take_sample(disparity, mask)
     every = np.arange(len(sample.d))
-    unit = sample.grid.scale
-    plane = scale * np.array([30.0 + 0.3 * (239.5 - 240) - 0.03 * (319.5 - 320), -0.03 * unit, 0.3 * unit])
-    return (
-        sample,
-        look_around(sample, plane, every).mean,
-        plane[0] + plane[1] * sample.x + plane[2] * sample.y,
-    )
+    plane = scale * road_plane(sample)
+    mean = look_around(sample, plane, every).mean
+    return sample, mean, plane[0] + plane[1] * sample.x + plane[2] * sample.y
 
 
 def spread(values):
@@ -164,7 +166,7 @@ def test_where_a_wall_crosses_the_plane_pixels_weigh_less():
     wall = np.where(U > 400, 40.0, ROAD)
     sample = take_sample(wall.astype(np.float32))
     unit = sample.grid.scale
-    plane = np.array([30.0 + 0.3 * (239.5 - 240) - 0.03 * (319.5 - 320), -0.03 * unit, 0.3 * unit])
+    plane = road_plane(sample)
     on_it = np.abs(plane @ [np.ones_like(sample.x), sample.x, sample.y] - sample.d) < 0.2
     on_wall = sample.x * unit > 410 - 319.5
 
