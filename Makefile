@@ -4,15 +4,17 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 TOUCH := $(BIN)/python -c "import pathlib, sys; pathlib.Path(sys.argv[1]).touch()"
-HALF := tests/batch tests/cli tests/convert tests/files tests/parallel
+# tests of one file stay in one process: they share what is dear to make
+SHARED_OUT := --numprocesses 2 --dist loadfile
 REMOVE := $(PYTHON) -c "import glob, os, shutil, sys; [shutil.rmtree(p) if os.path.isdir(p) else os.remove(p) for a in sys.argv[1:] for p in glob.glob(a)]"
 
 .DEFAULT_GOAL := help
-.PHONY: help run test lint types format readme bench fuzz clean
+.PHONY: help run test test-all lint types format readme bench fuzz clean
 
 help:
 	@echo "make run     install into .venv, and estimate the roll of sample_data into out/"
-	@echo "make test    run the whole test suite"
+	@echo "make test    run the tests that every change runs"
+	@echo "make test-all  and the slow ones: clusters, TLS, browsers, injected faults, long kills"
 	@echo "make lint    ruff: style and format"
 	@echo "make types   mypy, strict"
 	@echo "make format  let ruff rewrite the code"
@@ -36,13 +38,11 @@ $(BIN)/.dev: $(BIN)/.run
 run: $(BIN)/.run
 	$(BIN)/rollcli estimate sample_data/maps --overwrite -o out/rolls.csv --derotated out/derotated --vdisparity out/vdisparity
 
-# two processes for two processors; what the second one prints comes after the first one's. A shell lets
-# processes in its background ignore Ctrl-C: tests of signals are in the first half.
 test: $(BIN)/.dev
-	@printed=$$(mktemp); $(BIN)/python -m pytest $(addprefix --ignore=,$(HALF)) > $$printed 2>&1 & second=$$!; \
-	trap 'kill $$second' INT TERM; \
-	$(BIN)/python -m pytest $(HALF); first=$$?; \
-	wait $$second; second=$$?; cat $$printed; rm $$printed; exit $$((first + second))
+	$(BIN)/python -m pytest $(SHARED_OUT) -m "not slow"
+
+test-all: $(BIN)/.dev
+	$(BIN)/python -m pytest $(SHARED_OUT)
 
 lint: $(BIN)/.dev
 	$(BIN)/ruff check .

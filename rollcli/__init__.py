@@ -13,27 +13,27 @@ if TYPE_CHECKING:
     from rollcli.errors import RollcliError as RollcliError
     from rollcli.estimator.result import RollEstimate as RollEstimate
     from rollcli.files.encodings import read_disparity as read_disparity
-    from rollcli.frames.calibration import read_calibration as read_calibration
-    from rollcli.imaging.derotate import derotate as derotate
-    from rollcli.imaging.stereo import compute_disparity as compute_disparity
-    from rollcli.imaging.vdisparity import v_disparity as v_disparity
-    from rollcli.rig.assess import RigAssessment as RigAssessment
-    from rollcli.rig.assess import assess_rig as assess_rig
+    from rollcli.pictures.derotate import derotate as derotate
+    from rollcli.pictures.vdisparity import v_disparity as v_disparity
     from rollcli.rig.calibration import Calibration as Calibration
-    from rollcli.rig.estimate import estimate_roll as estimate_roll
+    from rollcli.rig.drive.assess import RigAssessment as RigAssessment
+    from rollcli.rig.drive.assess import assess_rig as assess_rig
+    from rollcli.rig.pose import estimate_roll as estimate_roll
+    from rollcli.run.calibration import read_calibration as read_calibration
+    from rollcli.stereo.match import compute_disparity as compute_disparity
 
 _HOMES = {
     "Calibration": "rollcli.rig.calibration",
-    "RigAssessment": "rollcli.rig.assess",
+    "RigAssessment": "rollcli.rig.drive.assess",
     "RollEstimate": "rollcli.estimator.result",
     "RollcliError": "rollcli.errors",
-    "assess_rig": "rollcli.rig.assess",
-    "compute_disparity": "rollcli.imaging.stereo",
-    "derotate": "rollcli.imaging.derotate",
-    "estimate_roll": "rollcli.rig.estimate",
-    "read_calibration": "rollcli.frames.calibration",
+    "assess_rig": "rollcli.rig.drive.assess",
+    "compute_disparity": "rollcli.stereo.match",
+    "derotate": "rollcli.pictures.derotate",
+    "estimate_roll": "rollcli.rig.pose",
+    "read_calibration": "rollcli.run.calibration",
     "read_disparity": "rollcli.files.encodings",
-    "v_disparity": "rollcli.imaging.vdisparity",
+    "v_disparity": "rollcli.pictures.vdisparity",
 }
 __all__ = [
     "Calibration",

@@ -16,7 +16,7 @@ def main() -> None:
     """Run the program; an error that nobody expected is one line too."""
     sys.excepthook = _say_in_one_line
     try:
-        from rollcli.parallel.interrupt import raise_on_signals
+        from rollcli.run.workers.interrupt import raise_on_signals
 
         raise_on_signals()
         from rollcli.messages import let_stderr_fail
@@ -28,7 +28,7 @@ def main() -> None:
     except KeyboardInterrupt:  # before there was anything to resume
         _say_interrupted()
     except RuntimeError as error:
-        from rollcli.parallel.interrupt import came_of_interrupt
+        from rollcli.run.workers.interrupt import came_of_interrupt
 
         if not came_of_interrupt(error):
             raise
@@ -40,13 +40,13 @@ def main() -> None:
             _end_interrupted()
         raise
     finally:
-        from rollcli.parallel.interrupt import ignore_signals
+        from rollcli.run.workers.interrupt import ignore_signals
 
         ignore_signals()
 
 
 def _say_interrupted() -> "NoReturn":
-    from rollcli.parallel.interrupt import ignore_signals
+    from rollcli.run.workers.interrupt import ignore_signals
 
     ignore_signals()
     from rollcli.messages import let_stderr_fail, say

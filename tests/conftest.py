@@ -7,7 +7,7 @@ import shutil
 import hypothesis
 import pytest
 
-from rollcli.parallel.process_setup import limit_blas_threads
+from rollcli.run.workers.pool import limit_blas_threads
 from tests.object_store import object_store
 
 limit_blas_threads()  # as every command does; NumPy is not loaded yet

@@ -13,10 +13,10 @@ from typing import NamedTuple, TextIO
 import cv2
 
 from rollcli.cli.main import main
-from rollcli.files.codecs import mute_stderr
-from rollcli.files.stores import turns
+from rollcli.files.codecs import png as mute_stderr
+from rollcli.files.stores import locations as turns
 from rollcli.messages import let_stderr_fail
-from rollcli.parallel.interrupt import stop_signals
+from rollcli.run.workers.interrupt import stop_signals
 
 
 class Finished(NamedTuple):

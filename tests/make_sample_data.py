@@ -14,9 +14,9 @@ import numpy as np
 from rollcli.files.atomic import write_atomic
 from rollcli.files.encodings import from_disparity
 from rollcli.files.formats import encode_stored, read_image
-from rollcli.imaging.stereo import compute_disparity
 from rollcli.simulate.dataset import Dataset, write_dataset
 from rollcli.simulate.spec import FrameSpec
+from rollcli.stereo.match import compute_disparity
 
 SAMPLES = Path(__file__).resolve().parent.parent / "sample_data"
 _RIG = {"size": (480, 360), "focal": 278.4, "colour": False}

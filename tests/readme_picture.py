@@ -9,9 +9,8 @@ import numpy as np
 
 import rollcli
 from rollcli.files.atomic import write_atomic
-from rollcli.imaging.pictures.overlay import draw_disparity
-from rollcli.imaging.pictures.vdisparity_picture import draw_v_disparity
-from rollcli.imaging.vdisparity import row_offset
+from rollcli.pictures.overlay import draw_disparity
+from rollcli.pictures.vdisparity import draw_v_disparity, row_offset
 from tests.run_cli import ROOT
 
 MAP, PICTURE = ROOT / "sample_data" / "maps" / "frame_0001.png", ROOT / ".github" / "readme.png"

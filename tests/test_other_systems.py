@@ -14,8 +14,8 @@ import pytest
 from rollcli.files import atomic, inputs
 from rollcli.files.inputs import find_inputs
 from rollcli.files.stores.locations import is_url, public_name
-from rollcli.rig.options import CalibrationOptions
-from rollcli.rig.parse import parse_calibration
+from rollcli.rig.calibration import CalibrationOptions
+from rollcli.rig.read_calibration import parse_calibration
 from tests.rig import calibration_files
 from tests.run_cli import contents, environment, rollcli, write_maps
 

@@ -63,7 +63,7 @@ class Command(click.Command):
 
         Its matrices are small: threads spend ten times as long waiting for each other as working.
         """
-        from rollcli.parallel.process_setup import limit_blas_threads
+        from rollcli.run.workers.pool import limit_blas_threads
 
         limit_blas_threads()
         return super().invoke(ctx)

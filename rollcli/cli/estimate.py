@@ -1,14 +1,18 @@
-"""`rollcli estimate`: the main job."""
+"""`rollcli estimate`: the main job, with what an existing result allows."""
 
+import shutil
+import sys
+from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
-from rollcli.batch.options import EstimateOptions, ResultOptions
-from rollcli.cli.calibration_options import calibration_options
 from rollcli.cli.command import command, option, record, tell_idle
 from rollcli.cli.config import config_option
 from rollcli.cli.options import (
+    calibration_options,
     cluster_options,
     encoding_options,
     image_options,
@@ -18,8 +22,70 @@ from rollcli.cli.options import (
     region_options,
     stereo_options,
 )
-from rollcli.cli.resume import one_start, resume_command
 from rollcli.cli.types import Choice, Number, OutputFile, Shard
+from rollcli.messages import without_secrets
+from rollcli.run.options import EstimateOptions, ResultOptions
+
+_STARTS = ("--overwrite", "--resume")
+_NEAREST_FIRST = [ParameterSource.COMMANDLINE, ParameterSource.ENVIRONMENT, ParameterSource.DEFAULT_MAP]
+
+
+def one_start(ctx: click.Context, *, resume: bool, overwrite: bool) -> tuple[bool, bool]:
+    """Decide between --resume and --overwrite: flags win over the environment, and that over --config.
+
+    Returns
+    -------
+    tuple of bool
+        (resume, overwrite); both where both are given in the same place, which is an error later.
+    """
+    if not (resume and overwrite):
+        return resume, overwrite
+    to_resume, to_overwrite = (_distance(ctx, name) for name in ("resume", "overwrite"))
+    return to_resume <= to_overwrite, to_overwrite <= to_resume
+
+
+def _distance(ctx: click.Context, name: str) -> int:
+    source = ctx.get_parameter_source(name)
+    return _NEAREST_FIRST.index(source) if source in _NEAREST_FIRST else len(_NEAREST_FIRST)
+
+
+def resume_command(ctx: click.Context) -> str:
+    """Make a command that can be pasted into any shell: settings from the environment become options."""
+    import shlex  # here: every --help imports this module
+
+    words = sys.argv[1:]
+    end = words.index("--") if "--" in words else len(words)
+    options = [word for word in words[:end] if word not in _STARTS]
+    line = [_program(), *options, *_from_environment(ctx), "--resume", *words[end:]]
+    shown = [without_secrets(word) for word in line]
+    hints = ["with the same list on stdin"] if _reads_stdin(ctx) else []
+    hints += ["with the signed addresses"] if shown != line else []
+    return shlex.join(shown) + ("  # " + " and ".join(hints) if hints else "")
+
+
+def _program() -> str:
+    """Name the program, or its path when the shell would not find it."""
+    called = sys.argv[0]
+    return called if Path(called).name == "rollcli" and not shutil.which("rollcli") else "rollcli"
+
+
+def _reads_stdin(ctx: click.Context) -> bool:
+    given = ctx.params.get("inputs") or ()
+    return "-" in given or ctx.params.get("files_from") == "-"
+
+
+def _from_environment(ctx: click.Context) -> Iterator[str]:
+    for param in ctx.command.params:
+        flag = param.opts[-1]
+        if ctx.get_parameter_source(str(param.name)) is not ParameterSource.ENVIRONMENT or flag in _STARTS:
+            continue
+        value = param.value_from_envvar(ctx)
+        if isinstance(param, click.Option) and param.is_flag:
+            yield from [flag] if param.type_cast_value(ctx, value) else []
+        else:
+            for text in value if isinstance(value, list | tuple) else [value]:
+                yield from (flag, str(text))
+
 
 result_options = record(
     "result",
@@ -120,9 +186,8 @@ def estimate(ctx: click.Context, /, **records: Any) -> None:
         running=options.running._replace(overwrite=overwrite),
     )
 
-    from rollcli.batch.idle import idle_in_estimate
-    from rollcli.batch.run import run_estimate
-    from rollcli.frames.idle import repeated_inputs
+    from rollcli.run.estimate import run_estimate
+    from rollcli.run.unused import idle_in_estimate, repeated_inputs
 
     tell_idle(ctx, idle_in_estimate(options), repeated_inputs(options.inputs), quiet=options.running.quiet)
     ctx.exit(run_estimate(options, resume_command=resume_command(ctx)))

@@ -1,10 +1,12 @@
 """The `rollcli` group: it imports a command when it is called, and ends every error as one line."""
 
 import os
+import platform
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from importlib import import_module
+from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 import click
@@ -13,17 +15,46 @@ from rollcli import __version__
 from rollcli.errors import ExitStatus, InputError, RollcliError, UsageError
 from rollcli.messages import say
 
+OPENCV = (
+    "opencv-python-headless",
+    "opencv-python",
+    "opencv-contrib-python-headless",
+    "opencv-contrib-python",
+)
+REQUIRED = ("numpy", OPENCV, "click", "tqdm", "tifffile")
+OPTIONAL = ("dask", "distributed", "imagecodecs", "jinja2", "obstore", "plotly", "pyarrow", "pywuffs")
+
+
+def versions() -> Iterator[tuple[str, str]]:
+    """Yield (name, version) of rollcli, Python and each package it uses; of extras, those installed."""
+    yield "rollcli", __version__
+    yield "Python", f"{platform.python_version()} ({platform.python_implementation()}, {platform.platform()})"
+    for names in REQUIRED:
+        yield _installed(names) or (names if isinstance(names, str) else names[0], "not installed")
+    yield from filter(None, map(_installed, OPTIONAL))
+
+
+def _installed(names: str | tuple[str, ...]) -> tuple[str, str] | None:
+    """Find the first installed one of several packages that contain the same module."""
+    for name in (names,) if isinstance(names, str) else names:
+        try:
+            return name, version(name)
+        except PackageNotFoundError:
+            continue
+    return None
+
+
 # name -> (module, one-line help): `rollcli --help` needs no command's module
 COMMANDS = {
     "estimate": (
         "rollcli.cli.estimate",
         "The roll of each disparity map or stereo pair, as CSV or JSON Lines.",
     ),
-    "disparity": ("rollcli.cli.disparity", "Stereo pairs to disparity maps with OpenCV SGBM."),
-    "derotate": ("rollcli.cli.derotate", "Rotate maps by one angle, or by the angles of a result."),
-    "vdisparity": ("rollcli.cli.vdisparity", "v-disparity images of maps."),
+    "disparity": ("rollcli.cli.images", "Stereo pairs to disparity maps with OpenCV SGBM."),
+    "derotate": ("rollcli.cli.images", "Rotate maps by one angle, or by the angles of a result."),
+    "vdisparity": ("rollcli.cli.images", "v-disparity images of maps."),
     "simulate": ("rollcli.cli.simulate", "Render road stereo pairs and true disparity with known roll."),
-    "evaluate": ("rollcli.cli.evaluate.group", "The paper's experiments; accuracy against known angles."),
+    "evaluate": ("rollcli.cli.evaluate", "The paper's experiments; accuracy against known angles."),
     "rig": ("rollcli.cli.rig", "What a result says about the rig: mounting, drift, jumps; a gate for CI."),
     "report": ("rollcli.cli.report", "An HTML report of a result."),
 }
@@ -124,8 +155,6 @@ def _discard_stdout() -> None:
 
 def _print_versions(ctx: click.Context, param: click.Parameter, asked: bool) -> None:
     if asked and not ctx.resilient_parsing:
-        from rollcli.cli.versions import versions
-
         click.echo("\n".join(f"{name} {version}" for name, version in versions()))
         ctx.exit()
 

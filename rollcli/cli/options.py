@@ -1,11 +1,12 @@
-"""The options that commands share, each declared once; a command receives a group of them as one record."""
+"""The options that commands share, each declared once."""
 
 from typing import Any
 
 from rollcli.cli.command import argument, option, record
-from rollcli.cli.types import Choice, FilePath, Number, NumberOrNan, Polygon, Roi
-from rollcli.estimator.methods import MAX_ROLL_LIMIT_DEG, METHODS, MODELS, ROADS
-from rollcli.frames.options import (
+from rollcli.cli.types import Choice, FilePath, Number, NumberOrNan, Point, Polygon, Roi
+from rollcli.estimator.request import MAX_ROLL_LIMIT_DEG, METHODS, MODELS, ROADS
+from rollcli.rig.calibration import CalibrationOptions
+from rollcli.run.options import (
     EncodingOptions,
     ImageOptions,
     InputOptions,
@@ -14,7 +15,7 @@ from rollcli.frames.options import (
     RegionOptions,
     RunningOptions,
 )
-from rollcli.imaging.stereo_options import ALIGN, MODES, StereoOptions
+from rollcli.stereo.options import ALIGN, MODES, StereoOptions
 
 _METHOD = MethodOptions()
 PATH = FilePath()  # whether it exists, its reader says: in the same words wherever the name came from
@@ -297,4 +298,35 @@ cluster_options = record(
     RunningOptions,
     *_running,
     option("--scheduler", metavar="ADDRESS", help="Run on this Dask cluster, such as tcp://host:8786."),
+)
+
+
+calibration_options = record(
+    "calibration",
+    "Calibration of the rectified pair, for pitch, height, horizon and depth maps",
+    CalibrationOptions,
+    option(
+        "--calib",
+        type=PATH,
+        multiple=True,
+        metavar="PATH",
+        help="A file, or a folder with one of the same stem each: KITTI, Middlebury, ETH3D, OpenCV, ROS "
+        "(twice: left, right), Cityscapes, ORB-SLAM, DrivingStereo; recognised by content.",
+    ),
+    option("--focal", type=Number("PX", above=0), help="Focal length, pixels.  [default: the file's]"),
+    option(
+        "--principal-point",
+        type=Point(),
+        help="Optical axis in the left view, from the centre of the top-left pixel.  [default: the file's]",
+    ),
+    option(
+        "--baseline",
+        type=Number("M", above=0),
+        help="Distance between the cameras, metres; gives the height.  [default: the file's]",
+    ),
+    option(
+        "--doffs",
+        type=Number("PX"),
+        help="CX of the right view less that of the left one, pixels.  [default: the file's, else 0]",
+    ),
 )

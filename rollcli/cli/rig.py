@@ -8,7 +8,7 @@ from rollcli.cli.command import argument, command, option, record
 from rollcli.cli.config import config_option
 from rollcli.cli.options import PATH, running_options
 from rollcli.cli.types import TABLE_FILE, TABLE_FORMATS, Choice, Number, table_format
-from rollcli.rig_check.options import GateOptions, RigOptions
+from rollcli.run.rig_options import GateOptions, RigOptions
 
 gate_options = record(
     "gates",
@@ -96,7 +96,7 @@ def rig(ctx: click.Context, /, **options: Any) -> None:
     about how many frames that takes. Suspect frames are counted and not used. After a jump, the roll is that
     of the frames since: of the rig as it is now.
     """
-    from rollcli.rig_check.run import run_rig
+    from rollcli.run.rig import run_rig
 
     form = table_format(options.pop("format"), options["output"])
     ctx.exit(run_rig(RigOptions(**options, format=form)))

@@ -9,10 +9,10 @@ import click
 
 from rollcli.cli.command import argument, command, option, record
 from rollcli.cli.config import config_option
+from rollcli.cli.estimate import one_start, resume_command
 from rollcli.cli.options import PATH, running_options
-from rollcli.cli.resume import one_start, resume_command
 from rollcli.cli.types import Choice, Number, ParamType, Point
-from rollcli.frames.options import RunningOptions
+from rollcli.run.options import RunningOptions
 from rollcli.simulate.options import (
     BASELINE,
     CROSS_SECTIONS,

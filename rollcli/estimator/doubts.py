@@ -7,11 +7,11 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
+from rollcli.estimator.certificate import CertifiedSolution
 from rollcli.estimator.energy import Energy
 from rollcli.estimator.interval import Interval
 from rollcli.estimator.road.find import Road
 from rollcli.estimator.road.surface import Surface
-from rollcli.estimator.solvers.certificate import CertifiedSolution
 from rollcli.estimator.solvers.solution import angle_between
 from rollcli.estimator.tuning import DoubtTuning
 

@@ -4,25 +4,22 @@ import math
 
 from numpy.typing import ArrayLike
 
+from rollcli.estimator.certificate import CertifiedSolution, certify, certify_near
 from rollcli.estimator.doubts import Evidence, doubts_of
-from rollcli.estimator.interval import interval_of, jackknife
-from rollcli.estimator.load_method import load_solver
-from rollcli.estimator.methods import (
+from rollcli.estimator.interval import interval_of, jackknife, touch
+from rollcli.estimator.moments import CheckedMap, Grid
+from rollcli.estimator.request import (
     AREAS,
     DEFAULT_SOLVER,
     MAX_INTERVAL_DEG,
     MAX_ROLL_DEG,
     LearningRate,
+    Request,
     SolverSettings,
 )
-from rollcli.estimator.moments import Grid
-from rollcli.estimator.request import Request
 from rollcli.estimator.result import RollEstimate
-from rollcli.estimator.selection import PixelSet, select_pixels
-from rollcli.estimator.solvers.certificate import CertifiedSolution, certify, certify_near
-from rollcli.estimator.tangent import touch
+from rollcli.estimator.road.pixels import PixelSet, load_solver, select_pixels
 from rollcli.estimator.tuning import TUNING, Tuning
-from rollcli.estimator.validity import CheckedMap
 
 
 def estimate_roll(

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.estimator.tangent import Tangent
+from rollcli.estimator.interval import Tangent
 
 
 @dataclass(frozen=True)

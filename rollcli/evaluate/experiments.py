@@ -1,26 +1,57 @@
-"""The paper's experiments on one map: iterations, the first learning rate, and rotations by known angles."""
+"""The paper's experiments on one map: accuracy, rotations, and run times (Tables I and II, Figs. 3 to 5)."""
 
 import math
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import EstimationError
-from rollcli.estimator.areas.plane import fit_plane
 from rollcli.estimator.energy import Energy
 from rollcli.estimator.estimate import estimate_roll
-from rollcli.estimator.load_method import load_area_method, load_solver
-from rollcli.estimator.methods import MAX_ROLL_DEG, MAX_ROLL_LIMIT_DEG, AreaSettings, SolverSettings
-from rollcli.estimator.moments import map_moments
+from rollcli.estimator.moments import CheckedMap, map_moments
+from rollcli.estimator.request import LAMBDA0, MAX_ROLL_DEG, MAX_ROLL_LIMIT_DEG, AreaSettings, SolverSettings
+from rollcli.estimator.road.pixels import load_area_method, load_solver
+from rollcli.estimator.solvers.areas import fit_plane
 from rollcli.estimator.solvers.exact import exact, minima
 from rollcli.estimator.solvers.golden_section import golden_section
 from rollcli.estimator.solvers.gradient_descent import gradient_descent
-from rollcli.estimator.solvers.solution import angle_between
-from rollcli.estimator.validity import CheckedMap
-from rollcli.evaluate.rotate import rotate_nearest
+from rollcli.estimator.solvers.solution import Solution, Solver, angle_between
+from rollcli.evaluate.textbook import Textbook
+
+
+def rotate_nearest(disparity: NDArray[Any], angle: float) -> NDArray[Any]:
+    """Turn a map about its centre so that its roll grows by `angle`; the nearest pixel gives the value.
+
+    Parameters
+    ----------
+    disparity : ndarray, shape (H, W)
+        Pixels; 0 is no data.
+    angle : float
+        Radians.
+
+    Returns
+    -------
+    ndarray, shape (H', W')
+        Large enough to keep the corners: an estimate that does not follow by `angle` was moved by the
+        rounding of coordinates, not by a loss of pixels. No data is 0.
+    """
+    height, width = disparity.shape
+    c, s = math.cos(angle), math.sin(angle)
+    new_width = math.ceil(abs(width * c) + abs(height * s) - 1e-9)
+    new_height = math.ceil(abs(width * s) + abs(height * c) - 1e-9)
+    u, v = np.arange(new_width) - (new_width - 1) / 2, np.arange(new_height) - (new_height - 1) / 2
+    columns = np.rint(np.add.outer(v * s, u * c) + (width - 1) / 2).astype(np.int32)
+    rows = np.rint(np.add.outer(v * c, -u * s) + (height - 1) / 2).astype(np.int32)
+    inside = (columns >= 0) & (columns < width) & (rows >= 0) & (rows < height)
+    rotated = np.zeros((new_height, new_width), disparity.dtype)
+    rotated[inside] = disparity[rows[inside], columns[inside]]
+    return rotated
+
 
 DELTAS = tuple(math.pi / k for k in (1.8e3, 1.8e4, 1.8e5, 1.8e6))
 LAMBDAS = tuple(float(rate) for rate in range(1, 101))
@@ -184,3 +215,52 @@ def _angle(method: Callable[[NDArray[Any]], float], disparity: NDArray[Any]) -> 
         return method(disparity)
     except EstimationError:
         return None
+
+
+FORMS = ("moments", "with_pass", "textbook")
+
+
+@dataclass(frozen=True)
+class Times:
+    """Seconds for each of `DELTAS`, by solver and form.
+
+    The forms: on the moments alone; with the pass over the map that sums them; and with the paper's n x 3
+    matrices, built anew in each iteration.
+    """
+
+    pixels: int
+    seconds: dict[tuple[str, str], tuple[float, ...]]
+
+
+def time_solvers(disparity: NDArray[Any]) -> Times:
+    """Time both solvers in all three forms on one map (H, W), px, 0 is no data."""
+    peak = float(disparity.max())
+    energy, textbook = Energy.of(map_moments(disparity), peak), Textbook.of(disparity)
+
+    def with_pass(solve: Solver, delta: float) -> None:
+        solve(Energy.of(map_moments(disparity), peak), SolverSettings(delta))
+
+    seconds: dict[tuple[str, str], tuple[float, ...]] = {}
+    solvers: dict[str, Solver] = {"gss": golden_section, "gd": gradient_descent}
+    written_out: dict[str, Callable[[float], Solution]] = {
+        "gss": textbook.golden_section,
+        "gd": partial(textbook.gradient_descent, lambda0=LAMBDA0),
+    }
+    for name, solve in solvers.items():
+        seconds[name, "moments"] = tuple(
+            _best(partial(solve, energy, SolverSettings(delta)), 50) for delta in DELTAS
+        )
+        seconds[name, "with_pass"] = tuple(_best(partial(with_pass, solve, delta), 10) for delta in DELTAS)
+        with np.errstate(all="ignore"):  # unguarded, it may run away
+            seconds[name, "textbook"] = tuple(_best(partial(written_out[name], delta), 2) for delta in DELTAS)
+    return Times(len(textbook.d), seconds)
+
+
+def _best(function: Callable[[], Any], times: int) -> float:
+    """Return the seconds of the fastest of several runs."""
+    best = math.inf
+    for _ in range(times):
+        start = time.perf_counter()
+        function()
+        best = min(best, time.perf_counter() - start)
+    return best

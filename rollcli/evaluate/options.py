@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from rollcli.frames.options import (
+from rollcli.run.options import (
     EncodingOptions,
     FrameOptions,
     ImageOptions,
@@ -11,7 +11,7 @@ from rollcli.frames.options import (
     RegionOptions,
     RunningOptions,
 )
-from rollcli.imaging.stereo_options import StereoOptions
+from rollcli.stereo.options import StereoOptions
 
 TURNS_DEG = (-20.0, 20.0, 2.0)
 TIMED = 3

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rollcli.evaluate.experiments import DELTAS, LAMBDAS, METHODS, SOLVERS, Findings
-from rollcli.evaluate.timing import FORMS, Times
+from rollcli.evaluate.experiments import DELTAS, FORMS, LAMBDAS, METHODS, SOLVERS, Findings, Times
 
 Value = str | int | float | None
 

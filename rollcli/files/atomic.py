@@ -1,24 +1,160 @@
-"""Files that appear whole or not at all: written beside their target, then renamed onto it.
-
-The temporary file is `.NAME.RANDOM.part`. Its name begins with the target's, so that the next run of the same
-outputs finds what a killed one left, and nobody can guess the rest: a link, pipe or file put in its way
-beforehand is never opened. A link in the target's own place is replaced; what it points to stays as it is.
-"""
+"""Files that appear whole or not at all: written beside their target, synced, then renamed onto it."""
 
 import contextlib
 import errno
 import os
 import posixpath
 import re
+import stat
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
+from threading import Thread
 from typing import BinaryIO
 
 from rollcli.errors import OutputError
-from rollcli.files.durable import sync_file, sync_names
 from rollcli.files.locking import being_written, nobody_writes
 from rollcli.files.stores.locations import is_url
+
+
+def is_folder(path: str | Path) -> bool:
+    """Tell whether this is a folder, or a link to one."""
+    return stat.S_ISDIR(_mode(path))
+
+
+def is_file(path: str | Path) -> bool:
+    """Tell whether this is a regular file, or a link to one."""
+    return stat.S_ISREG(_mode(path))
+
+
+def is_there(path: str | Path) -> bool:
+    """Tell whether this is anything at all; a link to nothing is not."""
+    return _mode(path) != 0
+
+
+def is_mount(path: str | Path) -> bool:
+    """Tell whether another file system begins at this folder."""
+    return os.path.ismount(path)  # Path.is_mount raises where the system fails to look
+
+
+def look_at(path: str | Path) -> os.stat_result:
+    """Ask the system for size, kind and time of a file; an error of the disk may pass, so it is asked twice.
+
+    Raises
+    ------
+    OSError
+        The system refuses, or fails twice.
+    ValueError
+        No file can have this name.
+    """
+    try:
+        return os.stat(path)  # noqa: PTH116 (a path of text is not worth a Path)
+    except OSError as error:
+        if error.errno != errno.EIO:
+            raise
+    return os.stat(path)  # noqa: PTH116
+
+
+def _mode(path: str | Path) -> int:
+    """Return kind and rights of what is there; 0 where nothing is."""
+    try:
+        return look_at(path).st_mode
+    except (OSError, ValueError):
+        return 0
+
+
+_THREADS = 16  # 64 files of 300 kB: 0.3 ms each on ext4, where one thread takes 4 ms each
+# a file system that cannot force a folder, or that Windows opens none
+_NOT_FOR_FOLDERS = (errno.EINVAL, errno.ENOTSUP, errno.EBADF, errno.EACCES, errno.EPERM)
+
+
+def sync_files(paths: Iterable[str | Path], named: set[Path] | None = None) -> None:
+    """Force files that have been written, by this process or another, and their names to the disk.
+
+    Parameters
+    ----------
+    paths : iterable of str or Path
+        Whole files, under their final names. One that is gone by now is left out.
+    named : set of Path, optional
+        Folders whose own names are on the disk, from earlier calls; those of this call are added.
+
+    Raises
+    ------
+    OutputError
+        The disk fails to take one; it is named.
+    """
+    every = [Path(path) for path in paths]
+    _in_threads(_sync_path, every)
+    sync_names(every, named)
+
+
+def sync_names(paths: Iterable[Path], named: set[Path] | None = None) -> None:
+    """Force the names of files to the disk, and those of the folders above them, unless they are `named`."""
+    named = set() if named is None else named
+    folders: dict[Path, None] = {}
+    for path in paths:
+        for folder in path.absolute().parents:  # those above may be new as well
+            if folder in folders:
+                break
+            folders[folder] = None
+            if folder in named or is_mount(folder):
+                break
+    _in_threads(_sync_folder, list(folders))
+    named.update(folders)
+
+
+def _in_threads(sync: Callable[[Path], None], paths: Sequence[Path]) -> None:
+    """Force several paths at once: the disk then takes a tenth of the time that one after the other takes.
+
+    Raises
+    ------
+    OutputError
+        The disk fails to take one; it is named.
+    """
+    failed: list[tuple[Path, OSError]] = []
+
+    def work(part: Sequence[Path]) -> None:
+        for path in part:
+            try:
+                sync(path)
+            except OSError as error:
+                failed.append((path, error))
+                return
+
+    threads = [Thread(target=work, args=(paths[first::_THREADS],)) for first in range(_THREADS)]
+    for thread in threads[: len(paths)]:
+        thread.start()
+    for thread in threads[: len(paths)]:
+        thread.join()
+    for path, error in failed:
+        raise OutputError(
+            f"{path}: cannot be forced to the disk: {(error.strerror or str(error)).lower()}"
+        ) from error
+
+
+def _sync_path(path: Path) -> None:
+    # Windows forces only what is open for writing
+    with contextlib.suppress(FileNotFoundError), path.open("r+b" if os.name == "nt" else "rb") as file:
+        os.fsync(file.fileno())
+
+
+def _sync_folder(folder: Path) -> None:
+    try:
+        descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+    except OSError as error:
+        if error.errno not in _NOT_FOR_FOLDERS:
+            raise
+
+
+def sync_file(file: BinaryIO) -> None:
+    """Force what was written to an open file to the disk."""
+    file.flush()
+    os.fsync(file.fileno())
+
 
 _LONGEST_NAME = 225  # bytes; file systems allow 255 with what is added
 _ON_WINDOWS = os.name == "nt"

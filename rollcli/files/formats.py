@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError, UsageError
-from rollcli.files.codecs import npy, pfm, pictures, png, tiff
+from rollcli.files.codecs import arrays, pictures, png, tiff
 from rollcli.files.codecs.raw_map import Stored as Stored
 from rollcli.files.codecs.raw_map import native
 from rollcli.files.storage import read_bytes
@@ -46,14 +46,14 @@ MAP_FORMATS = {
     ),
     "tiff": MapFormat(tiff.SIGNATURES, tiff.decode_tiff, tiff.encode_tiff),
     "npy": MapFormat(
-        (npy.MAGIC,),
-        lambda data, name: Stored(native(npy.decode_npy(data, name)), "npy"),
-        lambda values, _: npy.encode_npy(values),
+        (arrays.MAGIC,),
+        lambda data, name: Stored(native(arrays.decode_npy(data, name)), "npy"),
+        lambda values, _: arrays.encode_npy(values),
     ),
     "pfm": MapFormat(
-        pfm.MAGICS,
-        lambda data, name: Stored(native(pfm.decode_pfm(data, name)), "pfm"),
-        lambda values, _: pfm.encode_pfm(values),
+        arrays.MAGICS,
+        lambda data, name: Stored(native(arrays.decode_pfm(data, name)), "pfm"),
+        lambda values, _: arrays.encode_pfm(values),
     ),
 }
 _KNOWN = {

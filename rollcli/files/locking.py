@@ -1,15 +1,16 @@
-"""Lock a result for one run; the system releases the lock when its holders end, however they end."""
+"""One run at a time writes a result, and only a run of the same kind continues it."""
 
 import contextlib
 import errno
+import json
 import os
 import platform
 import stat
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 from rollcli.errors import OutputError, UsageError
 from rollcli.messages import say
@@ -204,3 +205,22 @@ def _holders(descriptor: int) -> str:
     if not others:
         return ""
     return f" (process{'es' if len(others) > 1 else ''} {', '.join(map(str, others))})"
+
+
+def not_resumable(name: str, reason: str) -> UsageError:
+    """Make the error that refuses to continue a result; its one line says what to do."""
+    return UsageError(f"{name}: cannot be resumed: {reason}; --overwrite starts anew")
+
+
+def differences(was: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]:
+    """Yield what differs between the version and the options of two records, in words."""
+    if was["rollcli"] != now["rollcli"]:
+        yield f"it was begun by rollcli {was['rollcli']}, this is {now['rollcli']}"
+    options_was, options_now = was["options"], json.loads(json.dumps(now["options"]))
+    for key in (*options_now, *(key for key in options_was if key not in options_now)):
+        if options_was.get(key) != options_now.get(key):
+            yield f"--{key} was {_shown(options_was.get(key))}, is now {_shown(options_now.get(key))}"
+
+
+def _shown(value: Any) -> str:
+    return "not given" if value in (None, []) else str(value)

@@ -14,13 +14,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError
+from rollcli.files.atomic import is_file
 from rollcli.files.codecs.parquet import MAGIC, decode_parquet
-from rollcli.files.codecs.row_text import csv_rows, json_rows
-from rollcli.files.existence import is_file
-from rollcli.files.results import BOUNDS, STATUSES, STDIN, TEXT, read_run, value_of
+from rollcli.files.results import (
+    BOUNDS,
+    STATUSES,
+    STDIN,
+    TEXT,
+    csv_rows,
+    json_rows,
+    part_names,
+    read_parts,
+    read_run,
+    value_of,
+)
 from rollcli.files.storage import list_names, read_bytes
 from rollcli.files.stores.locations import is_url
-from rollcli.files.stores.parts import part_names, read_parts
 
 _CHUNK = 300  # rows that are held as text: twenty thousand do not fit into a cache, and take a third longer
 _MOST_SPACE = 1000  # empty lines before what tells the format

@@ -1,21 +1,96 @@
-"""Results, one row a frame: CSV (RFC 4180 quoting, lines end in \\n) or JSON Lines, written and read back."""
+"""Read the rows of a result: CSV, JSON Lines, Parquet, and folders of parts."""
 
+import csv
 import io
 import json
 import math
 import re
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Literal, get_args, get_type_hints
 
 from rollcli.errors import InputError
 from rollcli.files.codecs.parquet import MAGIC, decode_parquet
-from rollcli.files.codecs.row_text import csv_rows, json_rows
 from rollcli.files.storage import exists, list_names, read_bytes
 from rollcli.files.stores.locations import is_url, is_web_url
-from rollcli.files.stores.parts import part_names, read_parts
+
+REQUIRED = ("file", "status", "roll_deg")  # columns that every result has
+
+
+def csv_rows(stream: Iterable[str], path: str | Path) -> Iterator[tuple[int, list[str]]]:
+    """Yield the header and then each line of a result, with its number; all have the header's length.
+
+    Raises
+    ------
+    InputError
+        It is not CSV, or not a result of `rollcli estimate`.
+    """
+    lines = csv.reader(stream, strict=True)
+    try:
+        header = next(lines, [])
+        missing = [name for name in REQUIRED if name not in header]
+        if missing:
+            raise InputError(
+                f"{path}: is not a result of rollcli estimate: it has no column {', '.join(missing)}"
+            )
+        yield lines.line_num, header
+        width = len(header)
+        for line in lines:
+            if len(line) == width:
+                yield lines.line_num, line
+            elif line:
+                raise InputError(f"{path}: line {lines.line_num}: {len(line)} values for {width} columns")
+    except csv.Error as error:
+        raise InputError(f"{path}: line {lines.line_num}: is not CSV: {error}") from error
+
+
+def json_rows(lines: Iterable[str], path: str | Path) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Yield the values of each line of a result in JSON Lines, with its number.
+
+    Raises
+    ------
+    InputError
+        A line is not JSON, or no row of `rollcli estimate`.
+    """
+    for number, line in enumerate(lines, 1):
+        if not line.strip():
+            continue
+        try:
+            values = json.loads(line)
+        except (ValueError, RecursionError) as error:
+            raise InputError(f"{path}: line {number}: is not JSON: {error}") from error
+        missing = [name for name in REQUIRED if not isinstance(values, dict) or name not in values]
+        if missing:
+            raise InputError(f"{path}: line {number}: is no row of rollcli estimate: no {', '.join(missing)}")
+        yield number, values
+
+
+_PART = re.compile(r"part-(\d{5,})\.(csv|jsonl|parquet)")
+
+
+def part_names(names: Iterable[str]) -> list[str]:
+    """Return those of the names that are parts, in the order of their rows."""
+    numbered = sorted((int(match[1]), name) for name in names if (match := _PART.fullmatch(name)))
+    return [name for _, name in numbered]
+
+
+def read_parts(folder: str, names: Iterable[str]) -> Iterator[tuple[str, bytes]]:
+    """Yield the location and the bytes of each part; a part of CSV gets the header that only the first has.
+
+    Raises
+    ------
+    InputError
+        A part cannot be read.
+    """
+    header = b""
+    for name in names:
+        part = read_bytes(f"{folder}/{name}")
+        yield f"{folder}/{name}", header + part
+        if name.endswith(".csv") and not header:
+            header = part[: part.index(b"\n") + 1]
+
 
 Format = Literal["csv", "jsonl", "parquet"]
 # file names are bytes: those that are not UTF-8 come back as the bytes they were

@@ -6,13 +6,13 @@ from typing import Any
 from rollcli import __version__
 from rollcli.files.results import Result, Row
 from rollcli.files.stores.locations import public_name
-from rollcli.report.charts.axis_range import outside
-from rollcli.report.charts.chart import Chart
-from rollcli.report.drawing.still import with_still
-from rollcli.report.gallery import SPREAD, SUSPECT, WIDEST, Choice
+from rollcli.report.chart import Chart
+from rollcli.report.charts import outside
+from rollcli.report.figures import with_still
 from rollcli.report.options import ReportOptions
 from rollcli.report.page import Rows, render_page
 from rollcli.report.pictures import Pictures
+from rollcli.report.sources import SPREAD, SUSPECT, WIDEST, Choice
 from rollcli.report.summary import (
     degrees,
     frame_count,
@@ -22,7 +22,7 @@ from rollcli.report.summary import (
     with_interval,
     written_at,
 )
-from rollcli.rig.assess import RigAssessment
+from rollcli.rig.drive.assess import RigAssessment
 from rollcli.rig.quantities import QUANTITIES
 from rollcli.rig.words import answer, counts, decimals, findings, now_in_words
 

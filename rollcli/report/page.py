@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from rollcli.errors import UsageError
-from rollcli.report.charts.chart import script_json
-from rollcli.report.drawing.colours import style_sheet
+from rollcli.report.chart import script_json
+from rollcli.report.colours import style_sheet
 
 _NEEDED = ("plotly", "jinja2")
 # plotly adds a style sheet for geographic maps unless an element has its id; the policy would refuse it aloud

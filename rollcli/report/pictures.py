@@ -14,14 +14,13 @@ from rollcli.errors import InputError
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.files.encodings import read_disparity, to_disparity
 from rollcli.files.formats import read_image, read_stored
-from rollcli.frames.guard import FRAME_ERRORS
-from rollcli.frames.options import FrameOptions
-from rollcli.frames.read import Source, read_source
-from rollcli.imaging.derotate import derotate
-from rollcli.imaging.pictures.overlay import draw_disparity, draw_road_on_photo
-from rollcli.imaging.pictures.vdisparity_picture import draw_v_disparity
-from rollcli.imaging.vdisparity import row_offset, v_disparity
+from rollcli.pictures.derotate import derotate
+from rollcli.pictures.overlay import draw_disparity, draw_road_on_photo
+from rollcli.pictures.vdisparity import draw_v_disparity, row_offset, v_disparity
 from rollcli.report.sources import Subject
+from rollcli.run.frame_errors import FRAME_ERRORS
+from rollcli.run.options import FrameOptions
+from rollcli.run.read import Source, read_source
 
 # small enough that a page with a dozen frames opens at once, large enough to see a stripe of noise
 _WIDEST, _MOST_BINS, _QUALITY = 1280, 320, 82

@@ -5,24 +5,21 @@ from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
-from rollcli.batch.run_record import recorded_options
 from rollcli.errors import ExitStatus, InputError, UsageError
 from rollcli.files.naming import listed
 from rollcli.files.results import Result, read_result, run_path
 from rollcli.files.stream import is_stream, write_output
-from rollcli.frames.checks import check_writes, list_files
-from rollcli.frames.options import EncodingOptions, FrameOptions
-from rollcli.frames.progress import Progress
-from rollcli.parallel.in_order import Work
-from rollcli.parallel.interrupt import stop_on_signals
-from rollcli.parallel.run_tasks import run_tasks
-from rollcli.parallel.workers import Workers
-from rollcli.report.charts.names import chart_names
-from rollcli.report.gallery import Choice, choose
-from rollcli.report.options import ReportOptions
+from rollcli.report.options import ReportOptions, chart_names
 from rollcli.report.page import require_extra
-from rollcli.report.sources import Subject, subjects
+from rollcli.report.sources import Choice, Subject, choose, subjects
 from rollcli.report.summary import frame_count
+from rollcli.run.find import check_writes, list_files
+from rollcli.run.options import EncodingOptions, FrameOptions
+from rollcli.run.progress import Progress
+from rollcli.run.record import recorded_options
+from rollcli.run.workers.in_order import Work, Workers
+from rollcli.run.workers.interrupt import stop_on_signals
+from rollcli.run.workers.tasks import run_tasks
 
 if TYPE_CHECKING:
     from rollcli.report.pictures import Pictures
@@ -90,10 +87,10 @@ def _write(
     found: Sequence[Subject],
     recorded: FrameOptions,
 ) -> ExitStatus:
-    from rollcli.report.chart_files import chart_files
-    from rollcli.report.charts.all_charts import all_charts
+    from rollcli.report.charts import all_charts
     from rollcli.report.content import report_page
-    from rollcli.rig.assess import assess_rig
+    from rollcli.report.figures import chart_files
+    from rollcli.rig.drive.assess import assess_rig
 
     progress = Progress(len(found), options.running, EncodingOptions())
     pictures = _take(found, recorded, options.running.jobs)

@@ -1,4 +1,4 @@
-"""Where the pictures of a row come from: images that `estimate` wrote, or its inputs."""
+"""Where the pictures of a frame come from, and which frames the gallery shows."""
 
 import math
 from collections.abc import Collection, Iterator, Sequence
@@ -6,14 +6,61 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from rollcli.errors import UsageError
-from rollcli.files.existence import is_file, is_folder, is_there
+from rollcli.files.atomic import is_file, is_folder, is_there
 from rollcli.files.inputs import MAP_ENDINGS
 from rollcli.files.naming import listed
 from rollcli.files.results import Row
+from rollcli.files.search import objects_behind
 from rollcli.files.stores.locations import base_name, is_url
-from rollcli.files.stores.search import objects_behind
-from rollcli.frames.frame import Frame
-from rollcli.frames.options import ImageOptions
+from rollcli.run.frame import Frame
+from rollcli.run.options import ImageOptions
+
+WIDEST, SUSPECT, SPREAD = "widest interval", "suspect", "evenly spread"
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A frame to show, by its place among the rows, and why."""
+
+    place: int
+    reason: str
+
+
+def choose(rows: Sequence[Row], count: int) -> list[Choice]:
+    """Choose up to `count` frames that have an angle: a third each of the kinds that there are.
+
+    Parameters
+    ----------
+    rows : sequence of Row
+    count : int
+
+    Returns
+    -------
+    list of Choice
+        The widest intervals first, from the widest on; then suspect frames and others, in their order.
+    """
+    angled = [place for place, row in enumerate(rows) if row.roll_deg is not None]
+    share = count // 3
+    widths = [(-(rows[place].roll_ci95_deg or 0.0), place) for place in angled]
+    chosen = [Choice(place, WIDEST) for width, place in sorted(widths)[:share] if width < 0]
+    rest = _without(angled, chosen)
+    doubtful = [place for place in rest if rows[place].status == "suspect"]
+    chosen += [Choice(place, SUSPECT) for place in spread(doubtful, share)]
+    rest = _without(angled, chosen)
+    return chosen + [Choice(place, SPREAD) for place in spread(rest, count - len(chosen))]
+
+
+def spread(places: Sequence[int], count: int) -> list[int]:
+    """Up to `count` of the places, evenly spread, each in the middle of its stretch."""
+    if count >= len(places):
+        return list(places)
+    return [places[(2 * i + 1) * len(places) // (2 * count)] for i in range(count)]
+
+
+def _without(places: Sequence[int], chosen: Sequence[Choice]) -> list[int]:
+    taken = {each.place for each in chosen}
+    return [place for place in places if place not in taken]
+
 
 KINDS = ("derotated", "vdisparity", "disparity", "road_mask")
 

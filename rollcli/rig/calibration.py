@@ -1,12 +1,30 @@
-"""The calibration of a rectified stereo pair, as the pose needs it.
-
-Nothing heavy is imported here, since every frame carries a calibration to its worker.
-"""
+"""The calibration of a rectified stereo pair, and the numbers that win over its file."""
 
 import math
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from rollcli.errors import UsageError
+
+
+class CalibrationOptions(NamedTuple):
+    """Files and numbers of the calibration; each number wins over the files.
+
+    `calib` names a file, a folder, or the left and the right file of ROS; `focal` and `doffs` are in px,
+    `principal_point` is (cx, cy) in px, `baseline` in metres.
+    """
+
+    calib: tuple[str, ...] = ()
+    focal: float | None = None
+    principal_point: tuple[float, float] | None = None
+    baseline: float | None = None
+    doffs: float | None = None
+
+    @property
+    def given(self) -> bool:
+        """Whether anything is said of the calibration."""
+        return self != CalibrationOptions()
+
 
 # px: both sides of a scaled image are rounded to the nearest pixel, down, or up
 _ROUNDINGS = (-0.5, 0.0, -1.0)

@@ -1,26 +1,15 @@
-"""Pitch and height of the rig from the tangent of the road's parabola.
-
-With X right, Y down and Z forward, a road n P = h (n its unit normal, down; h the height of the left camera)
-has the disparity
-
-    d + doffs = (fx B / h) (n_x (u - cx) / fx + n_y (v - cy) / fy + n_z),
-
-so a plane d = d_p + c1 (u - cx) + c2 (v - cy) gives the vector
-
-    q = (c1 / B, c2 fy / (fx B), (d_p + doffs) / (fx B)) = n / h,
-
-and n = (-sin(roll) cos(pitch), cos(roll) cos(pitch), sin(pitch)): first the pitch about the level lateral
-axis, then the roll about the optical axis.
-"""
+"""Pitch and height of the rig from the tangent of the road, with their intervals, beside its roll."""
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from rollcli.estimator import estimate as estimator
+from rollcli.estimator.interval import Tangent
 from rollcli.estimator.result import RollEstimate
-from rollcli.estimator.tangent import Tangent
 from rollcli.rig.calibration import Calibration
 
 Floats = NDArray[np.float64]
@@ -216,3 +205,47 @@ def _normal_jacobian(tangent: Tangent, calibration: Calibration) -> Floats:
         )
         / baseline
     )
+
+
+def estimate_roll(
+    disparity: ArrayLike, *, calibration: Calibration | None = None, **settings: Any
+) -> RollEstimate:
+    """Estimate the roll angle of the rig that a disparity map was taken with; its pose, given a calibration.
+
+    Parameters
+    ----------
+    disparity : array_like, shape (H, W)
+        Real numbers, px; <= 0, NaN and what is beyond 1e15 are no data.
+    calibration : Calibration, optional
+        Of the rectified left view, at the map's size or at another one; see `read_calibration`.
+    **settings
+        mask, method, model, road, lambda0, tolerance, max_roll, max_interval, seed and road_mask: see
+        `rollcli.estimator.estimate.estimate_roll`.
+
+    Returns
+    -------
+    RollEstimate
+        Angles in radians, the height in metres.
+
+    Raises
+    ------
+    UsageError
+        When an argument is out of range, or the calibration is of another view.
+    EstimationError
+        When the pixels do not determine an angle.
+
+    Examples
+    --------
+    A level road 1.5 m below a rig that looks down by 0.2 radians:
+
+    >>> import numpy as np
+    >>> from rollcli.rig.calibration import Calibration
+    >>> rig = Calibration(fx=200, fy=200, cx=79.5, cy=59.5, baseline=0.5)
+    >>> v = np.mgrid[:120, :160][0]
+    >>> road = 200 * 0.5 / 1.5 * ((v - 59.5) / 200 * np.cos(0.2) + np.sin(0.2))
+    >>> found = estimate_roll(road, calibration=rig)
+    >>> round(found.pitch, 4), round(found.height_m, 4)
+    (0.2, 1.5)
+    """
+    estimate = estimator.estimate_roll(disparity, **settings)
+    return estimate if calibration is None else with_pose(estimate, calibration)

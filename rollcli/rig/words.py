@@ -3,11 +3,11 @@
 import math
 from collections.abc import Iterator
 
-from rollcli.rig.assess import DriveAssessment, RigAssessment
+from rollcli.rig.drive.assess import DriveAssessment, RigAssessment
+from rollcli.rig.drive.noise import Estimate
+from rollcli.rig.drive.quantity import SequenceAssessment
+from rollcli.rig.drive.tuning import TUNING
 from rollcli.rig.quantities import HEIGHT, QUANTITIES, ROLL, Quantity
-from rollcli.rig.sequence.assess import SequenceAssessment
-from rollcli.rig.sequence.blocks import Estimate
-from rollcli.rig.sequence.tuning import TUNING
 
 _FEWEST_DIGITS, _MOST_DIGITS = 2, 4
 

@@ -8,8 +8,7 @@ from enum import IntEnum
 import numpy as np
 
 from rollcli.errors import UsageError
-from rollcli.simulate.geometry.camera import Camera, rig_axes
-from rollcli.simulate.geometry.vectors import Array
+from rollcli.simulate.camera import Camera, rig_axes
 from rollcli.simulate.options import (
     BASELINE,
     CROSS_SECTIONS,
@@ -20,6 +19,7 @@ from rollcli.simulate.options import (
     SCENES,
     SIZE,
 )
+from rollcli.simulate.vectors import Array
 
 Span = tuple[float, float]
 

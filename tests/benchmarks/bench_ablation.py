@@ -30,7 +30,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from rollcli.parallel.process_setup import limit_blas_threads
+from rollcli.run.workers.pool import limit_blas_threads
 
 limit_blas_threads()
 

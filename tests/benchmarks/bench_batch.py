@@ -34,12 +34,12 @@ start = time.perf_counter()
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
-from rollcli.parallel.process_setup import limit_blas_threads, prepare_worker
+from rollcli.run.workers.pool import limit_blas_threads, prepare_worker
 limit_blas_threads()
 prepare_worker()
-from rollcli.batch.frame_task import run_frame
-from rollcli.frames.frame import Frame
-from rollcli.frames.options import *
+from rollcli.run.estimate_frame import run_frame
+from rollcli.run.frame import Frame
+from rollcli.run.options import *
 options = FrameOptions(EncodingOptions(), StereoOptions(), RegionOptions(), MethodOptions(), ImageOptions())
 paths = map(str, sorted(Path(sys.argv[1]).iterdir()))
 frames = [Frame(path, "", path, "", Path(path).name, None) for path in paths]

@@ -22,8 +22,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from rollcli.files.encodings import to_disparity
 from rollcli.files.formats import Stored
-from rollcli.frames.diagnosis import looks_like
-from rollcli.frames.options import FrameOptions
+from rollcli.run.diagnosis import looks_like
+from rollcli.run.options import FrameOptions
 
 SHARED = Path(__file__).resolve().parents[3] / "shared"
 MAPS = (

@@ -17,10 +17,10 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from rollcli.estimator.areas.iterative import iterative
 from rollcli.estimator.energy import Energy
-from rollcli.estimator.methods import LAMBDA0, SolverSettings
 from rollcli.estimator.moments import map_moments
+from rollcli.estimator.request import LAMBDA0, SolverSettings
+from rollcli.estimator.solvers.areas import iterative
 from rollcli.estimator.solvers.exact import exact
 from rollcli.estimator.solvers.golden_section import golden_section
 from rollcli.estimator.solvers.gradient_descent import gradient_descent

@@ -17,16 +17,17 @@ sys.path.insert(0, str(ROOT))
 import cv2
 import numpy as np
 
-from rollcli.files.codecs import fast_png, tiff_parts, unpack
+from rollcli.files.codecs import png as fast_png
+from rollcli.files.codecs import tiff as tiff_parts
+from rollcli.files.codecs import tiff as unpack
 from rollcli.files.encodings import to_disparity
 from rollcli.files.formats import decode_stored, encode_stored
-from rollcli.imaging.derotate import derotate
-from rollcli.imaging.pictures.overlay import draw_road
-from rollcli.imaging.pictures.vdisparity_picture import draw_v_disparity
-from rollcli.imaging.stereo import StereoOptions, match_pair
-from rollcli.imaging.vdisparity import v_disparity
+from rollcli.pictures.derotate import derotate
+from rollcli.pictures.overlay import draw_road
+from rollcli.pictures.vdisparity import draw_v_disparity, v_disparity
 from rollcli.simulate.render import render_frame
 from rollcli.simulate.spec import FrameSpec
+from rollcli.stereo.match import StereoOptions, match_pair
 from tests.binary_files import disparity_map, make_tiff
 
 SIZE = (1242, 375)

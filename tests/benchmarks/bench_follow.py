@@ -23,7 +23,7 @@ from rollcli.estimator.estimate import estimate_roll
 from rollcli.files.encodings import read_disparity
 from rollcli.files.formats import read_image
 from rollcli.files.inputs import pair_inputs
-from rollcli.imaging.stereo import StereoOptions, match_pair
+from rollcli.stereo.match import StereoOptions, match_pair
 
 SHARED = Path(__file__).resolve().parents[3] / "shared"
 TURNS_DEG = (-6, -2, 3, 8)

@@ -26,10 +26,10 @@ from rollcli.errors import RollcliError
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.result import RollEstimate
 from rollcli.files.formats import read_image
-from rollcli.imaging.misalignment import LEVEL
-from rollcli.imaging.stereo import StereoMatch
 from rollcli.simulate.draw import draw_specs
 from rollcli.simulate.render import render_frame
+from rollcli.stereo.match import StereoMatch
+from rollcli.stereo.misalignment import LEVEL
 
 STREETS = Path(__file__).parents[3] / "shared" / "streets"
 SEED = 812

@@ -4,7 +4,7 @@
 
 PAIRS rendered pairs (60) of 640x480 with rolls within +-10 degrees and half as many within +-35: CPU time of
 matching and estimating a pair on one thread, as multiples of `3way` at full size; errors, degrees; coverage
-of the 95 % interval; and how many rows are suspect. Prints the table of rollcli/imaging/README.md.
+of the 95 % interval; and how many rows are suspect. Prints the table of rollcli/stereo/README.md.
 """
 
 import math
@@ -20,9 +20,9 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.estimate import estimate_roll
-from rollcli.imaging.stereo import StereoOptions
 from rollcli.simulate.draw import draw_specs
 from rollcli.simulate.render import RenderedFrame, render_frame
+from rollcli.stereo.match import StereoOptions
 
 KINDS = [("3way", 1), ("sgbm", 1), ("hh", 1), ("3way", 1.5), ("3way", 2), ("hh", 2), ("3way", 3)]
 SEEDS = {10: 8301, 35: 8302}

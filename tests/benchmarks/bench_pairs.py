@@ -26,9 +26,9 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.files.formats import read_image
-from rollcli.imaging.misalignment import LEVEL
 from rollcli.simulate.draw import draw_specs
 from rollcli.simulate.render import render_frame
+from rollcli.stereo.misalignment import LEVEL
 
 STREETS = Path(__file__).parents[3] / "shared" / "streets"
 ROUNDS = 3

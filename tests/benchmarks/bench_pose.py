@@ -26,9 +26,9 @@ from matched import Matched, match_as_estimated, matched
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.estimate import estimate_roll
-from rollcli.imaging.stereo import StereoOptions
 from rollcli.rig.calibration import Calibration
 from rollcli.rig.pose import with_pose
+from rollcli.stereo.match import StereoOptions
 
 SEED = 7714
 STREETS = Path(__file__).parents[3] / "shared" / "streets"

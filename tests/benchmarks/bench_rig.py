@@ -3,7 +3,7 @@
     python tests/benchmarks/bench_rig.py [series] [first seed]
 
 Series: AR(1) of the car and the road, each frame's own error drawn evenly from 0.02 to 0.3 degrees. The
-numbers of rollcli/rig/sequence/tuning.py were chosen on seeds below 1,000; the default begins at 100,000.
+numbers of rollcli/rig/drive/tuning.py were chosen on seeds below 1,000; the default begins at 100,000.
 """
 
 import json
@@ -15,16 +15,16 @@ import time
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-from rollcli.parallel.process_setup import limit_blas_threads
+from rollcli.run.workers.pool import limit_blas_threads
 
 limit_blas_threads()  # as the program does; with two, the series take twenty times as long on a busy machine
 
 import numpy as np
 
 from rollcli.files.results import Row, format_header, format_row
-from rollcli.rig.sequence.assess import assess_sequence
-from rollcli.rig.sequence.blocks import block_length
-from tests.rig.sequence.series import drive
+from rollcli.rig.drive.noise import block_length
+from rollcli.rig.drive.quantity import assess_sequence
+from tests.rig.drive.series import drive
 from tests.run_cli import command, environment
 
 SERIES, FIRST_SEED, ROWS = 500, 100_000, 1_000_000

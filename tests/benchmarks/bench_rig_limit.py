@@ -12,14 +12,14 @@ import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-from rollcli.parallel.process_setup import limit_blas_threads
+from rollcli.run.workers.pool import limit_blas_threads
 
 limit_blas_threads()
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular, toeplitz
 
-from tests.rig.sequence.series import drive
+from tests.rig.drive.series import drive
 
 FRAMES, EVERY, MARGIN = 2000, 8, 40  # jumps are looked for at every 8th frame, 40 from both ends
 SETTINGS = [(0.90, 0.1), (0.94, 0.2), (0.94, 0.3), (0.97, 0.4)]  # phi, sd in degrees

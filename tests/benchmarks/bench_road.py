@@ -16,7 +16,7 @@ import timeit
 from collections.abc import Callable
 from importlib.util import find_spec
 
-from rollcli.parallel.process_setup import limit_blas_threads
+from rollcli.run.workers.pool import limit_blas_threads
 
 limit_blas_threads()
 

@@ -18,12 +18,12 @@ sys.path.insert(0, str(ROOT))
 
 from rollcli.files.encodings import read_disparity
 from rollcli.files.formats import read_image
-from rollcli.imaging.stereo import compute_disparity
 from rollcli.simulate.dataset import write_dataset
 from rollcli.simulate.draw import draw_specs
 from rollcli.simulate.options import SCENES, SimulateOptions
-from rollcli.simulate.plan import plan_dataset
 from rollcli.simulate.render import render_frame
+from rollcli.simulate.run import plan_dataset
+from rollcli.stereo.match import compute_disparity
 
 MODES = ("3way", "sgbm", "hh")
 STREETS = ROOT.parent / "shared" / "streets"

@@ -18,11 +18,10 @@ from matched import matched
 from rollcli.errors import EstimationError
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.interval import jackknife, noise_of
-from rollcli.estimator.methods import DEFAULT_SOLVER, MAX_INTERVAL_DEG, MAX_ROLL_DEG
-from rollcli.estimator.request import Request
-from rollcli.estimator.selection import select_pixels
+from rollcli.estimator.moments import CheckedMap
+from rollcli.estimator.request import DEFAULT_SOLVER, MAX_INTERVAL_DEG, MAX_ROLL_DEG, Request
+from rollcli.estimator.road.pixels import select_pixels
 from rollcli.estimator.tuning import TUNING
-from rollcli.estimator.validity import CheckedMap
 
 FIT_SEEDS, JUDGE_SEEDS = (81, 82), (83, 84)
 REQUEST = Request(

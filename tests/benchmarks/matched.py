@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from rollcli.frames.options import FrameOptions
-from rollcli.frames.read import wanted_of
-from rollcli.imaging.stereo import StereoMatch, StereoOptions, match_pair
+from rollcli.run.options import FrameOptions
+from rollcli.run.read import wanted_of
 from rollcli.simulate.draw import draw_specs
 from rollcli.simulate.render import render_frame
 from rollcli.simulate.spec import FrameSpec
+from rollcli.stereo.match import StereoMatch, StereoOptions, match_pair
 
 
 class Matched(NamedTuple):

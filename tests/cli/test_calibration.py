@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from rollcli.rig.calibration import Calibration
+from rollcli.simulate.dataset import calibration
 from rollcli.simulate.draw import draw_specs
 from rollcli.simulate.render import render_frame
-from rollcli.simulate.truth import calibration
 from tests.rig import calibration_files as samples
 from tests.rig.calibration_files import Rig
 from tests.rig.test_pose import cast

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from rollcli.cli.main import main
-from rollcli.evaluate import job
-from rollcli.evaluate.run_paper import PAGE, TABLES
-from rollcli.parallel import run_tasks
+from rollcli.evaluate import paper_job as job
+from rollcli.evaluate.paper import PAGE, TABLES
+from rollcli.run.workers import tasks as run_tasks
 from tests.estimator.synthetic_maps import bent_road
 from tests.run_cli import contents, rollcli
 

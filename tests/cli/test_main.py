@@ -9,7 +9,7 @@ from importlib.metadata import PackageNotFoundError
 import pytest
 
 import rollcli as package
-from rollcli.cli import versions
+from rollcli.cli import main as versions
 from tests.run_cli import ROOT, environment, rollcli, rollcli_process, write_maps
 
 
@@ -118,8 +118,8 @@ def test_help_calls_the_program_rollcli(tmp_path):
 def test_what_nobody_thought_of_is_one_line_too(tmp_path, work, said):
     code = f"""
 import sys
-import rollcli.batch.run
-rollcli.batch.run.make_plan = lambda options: {work}
+import rollcli.run.estimate
+rollcli.run.estimate.make_plan = lambda options: {work}
 sys.argv = ["rollcli", "estimate", "."]
 from rollcli.__main__ import main
 main()
@@ -208,7 +208,7 @@ print(sorted(set(sys.modules) - before))
 @pytest.mark.parametrize(
     ("number", "module"),
     [
-        ("SIGINT", "rollcli.parallel.interrupt"),  # where Python's own handler is still in place
+        ("SIGINT", "rollcli.run.workers.interrupt"),  # where Python's own handler is still in place
         *itertools.product(("SIGINT", "SIGTERM"), ("rollcli.messages", "rollcli.cli.main", "click")),
     ],
 )

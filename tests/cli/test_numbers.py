@@ -8,7 +8,7 @@ from click.testing import CliRunner
 
 from rollcli.cli.main import main
 from rollcli.errors import ExitStatus, RollcliError
-from rollcli.files.codecs import mute_stderr
+from rollcli.files.codecs import png as mute_stderr
 from tests.readme_tables import commands
 from tests.run_cli import write_maps
 

@@ -9,7 +9,7 @@ import pytest
 from rollcli.cli.main import COMMANDS, main
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.files.results import columns
-from rollcli.frames.options import MethodOptions
+from rollcli.run.options import MethodOptions
 from tests.readme_tables import OPTIONS_PAGE, commands
 from tests.run_cli import ROOT
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from rollcli.files.results import Row, format_header, format_row
-from rollcli.rig_check.values import rounded
-from tests.rig.sequence.series import drive
+from rollcli.run.rig_text import rounded
+from tests.rig.drive.series import drive
 from tests.run_cli import rollcli
 
 JUMP = {"seed": 1, "frames": 3000, "sd": 0.1, "jump": 0.8, "at": 1500}

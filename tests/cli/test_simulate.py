@@ -25,7 +25,7 @@ def test_it_writes_pairs_maps_and_truth_and_says_so(tmp_path):
 
 
 def test_off_a_terminal_lines_tell_how_far_it_is_and_how_long_it_takes(tmp_path, monkeypatch):
-    monkeypatch.setattr("rollcli.parallel.progress._LINE_EVERY_S", 0.0)
+    monkeypatch.setattr("rollcli.run.progress._LINE_EVERY_S", 0.0)
     done = rollcli("simulate", "rig", *TINY, cwd=tmp_path)
     first, second, summary = done.err.splitlines()
     assert re.fullmatch(r"rollcli: 1 of 2 frames, [\d.]+ frames/s, about \d+ s left", first)

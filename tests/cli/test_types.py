@@ -6,7 +6,7 @@ import click
 import numpy as np
 import pytest
 
-from rollcli.cli.evaluate.paper import Turns
+from rollcli.cli.evaluate import Turns
 from rollcli.cli.simulate import Size, Span
 from rollcli.cli.types import (
     Choice,

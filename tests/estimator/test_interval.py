@@ -10,13 +10,11 @@ from rollcli.errors import UsageError
 from rollcli.estimator.energy import Energy
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.interval import Jackknife, interval_of, jackknife
-from rollcli.estimator.methods import DEFAULT_SOLVER
-from rollcli.estimator.moments import point_moments
-from rollcli.estimator.request import Request
-from rollcli.estimator.selection import select_pixels
+from rollcli.estimator.moments import CheckedMap, point_moments
+from rollcli.estimator.request import DEFAULT_SOLVER, Request
+from rollcli.estimator.road.pixels import select_pixels
 from rollcli.estimator.solvers.exact import exact
 from rollcli.estimator.tuning import TUNING, IntervalTuning
-from rollcli.estimator.validity import CheckedMap
 from tests.estimator.synthetic_maps import flat_road
 
 SIZE = {"width": 320, "height": 240, "focal": 280.0}

@@ -11,8 +11,7 @@ from rollcli.estimator.interval import jackknife
 from rollcli.estimator.moments import Floats, Grid
 from rollcli.estimator.road.model import RoadModel
 from rollcli.estimator.road.surface import Surface
-from rollcli.estimator.road.tuning import ROAD_TUNING
-from rollcli.estimator.tuning import TUNING
+from rollcli.estimator.tuning import ROAD_TUNING, TUNING
 
 
 class Fitted(NamedTuple):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rollcli.estimator.normal import regular, solve_normal
+from rollcli.estimator.least_squares import regular, solve_normal
 
 
 @pytest.mark.parametrize("missing", [[], [3], [0, 4], [2, 3, 4]])

@@ -6,8 +6,7 @@ import math
 import pytest
 
 from rollcli.errors import UsageError
-from rollcli.estimator.methods import DEFAULT_SOLVER
-from rollcli.estimator.request import Request
+from rollcli.estimator.request import DEFAULT_SOLVER, Request
 from rollcli.estimator.tuning import TUNING
 
 USUAL = Request("gd", "parabola", "auto", DEFAULT_SOLVER, 0.7, 0.01, 0.0, 0, TUNING)

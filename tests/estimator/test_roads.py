@@ -7,13 +7,13 @@ import pytest
 
 from rollcli.estimator.energy import Energy
 from rollcli.estimator.estimate import estimate_roll
-from rollcli.estimator.methods import SolverSettings
 from rollcli.estimator.moments import map_moments
+from rollcli.estimator.request import SolverSettings
 from rollcli.estimator.solvers.exact import minima
 from rollcli.estimator.solvers.golden_section import golden_section
 from rollcli.estimator.solvers.gradient_descent import gradient_descent
 from rollcli.files.formats import read_image
-from rollcli.imaging.stereo import StereoOptions, match_pair
+from rollcli.stereo.match import StereoOptions, match_pair
 from tests.estimator.synthetic_maps import ROADS, degrees_apart
 
 ROLL_DEG = {"m1_L1": -3.47, "m1_L5": -1.62, "m2_L9": -2.54, "m2_L18": -4.30, "m3_L3": 2.36}

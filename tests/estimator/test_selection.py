@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rollcli.estimator.estimate import estimate_roll
-from rollcli.estimator.road.subsample import take_sample
+from rollcli.estimator.road.sample import take_sample
 from rollcli.estimator.road.surface import whole_surface
 from tests.estimator.synthetic_maps import bent_road, energy_of, flat_road
 

@@ -5,11 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from rollcli.estimator.interval import Jackknife
+from rollcli.estimator.interval import Jackknife, touch
 from rollcli.estimator.moments import Grid
-from rollcli.estimator.road.subsample import take_sample
+from rollcli.estimator.road.sample import take_sample
 from rollcli.estimator.road.surface import whole_surface
-from rollcli.estimator.tangent import touch
 from tests.estimator.synthetic_maps import bent_road, energy_of
 
 GRID = Grid.of_shape(375, 1242)

@@ -7,8 +7,8 @@ import pytest
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.estimate import estimate_roll
-from rollcli.estimator.methods import METHODS
-from rollcli.estimator.validity import CheckedMap, require_pixels
+from rollcli.estimator.moments import CheckedMap, require_pixels
+from rollcli.estimator.request import METHODS
 from tests.estimator.synthetic_maps import bent_road
 
 V, U = np.mgrid[:120, :160]

@@ -9,9 +9,8 @@ import math
 import pytest
 
 from rollcli.errors import InputError, UsageError
-from rollcli.evaluate.accuracy import assess
-from rollcli.evaluate.accuracy_text import as_csv, as_json, as_table
-from rollcli.evaluate.pose_accuracy import assess_height, assess_pitch
+from rollcli.evaluate.accuracy import assess, assess_height, assess_pitch
+from rollcli.evaluate.run_accuracy import as_csv, as_json, as_table
 from rollcli.evaluate.truth import KnownPose, read_known_poses, read_truth
 from rollcli.files.matching import stem_of
 from rollcli.files.results import Row

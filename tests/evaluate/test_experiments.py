@@ -11,11 +11,19 @@ import pytest
 from rollcli.errors import EstimationError
 from rollcli.estimator.solvers.exact import exact
 from rollcli.estimator.solvers.solution import SolverStatus
-from rollcli.evaluate.experiments import DELTAS, LAMBDAS, METHODS, SOLVERS, examine
-from rollcli.evaluate.rotate import rotate_nearest
+from rollcli.evaluate.experiments import (
+    DELTAS,
+    FORMS,
+    LAMBDAS,
+    METHODS,
+    SOLVERS,
+    Times,
+    examine,
+    rotate_nearest,
+    time_solvers,
+)
 from rollcli.evaluate.tables import DELTAS_DEG, all_tables
 from rollcli.evaluate.textbook import Textbook
-from rollcli.evaluate.timing import FORMS, Times, time_solvers
 from tests.estimator.synthetic_maps import bent_road, degrees_apart, energy_of
 
 TURNS = [math.radians(turn) for turn in (-10, 0, 15)]

@@ -8,12 +8,11 @@ from dataclasses import replace
 import pytest
 
 from rollcli.evaluate import paper_page
-from rollcli.evaluate.charts import METHOD_NAMES, SOLVER_NAMES, charts
-from rollcli.evaluate.experiments import DELTAS, LAMBDAS, METHODS, SOLVERS, Findings
+from rollcli.evaluate.experiments import DELTAS, FORMS, LAMBDAS, METHODS, SOLVERS, Findings, Times
 from rollcli.evaluate.options import ExperimentOptions, PaperOptions
+from rollcli.evaluate.paper_page import METHOD_NAMES, SOLVER_NAMES, charts
 from rollcli.evaluate.tables import DELTAS_DEG, all_tables
-from rollcli.evaluate.timing import FORMS, Times
-from rollcli.frames.options import EncodingOptions, InputOptions, RegionOptions, RunningOptions
+from rollcli.run.options import EncodingOptions, InputOptions, RegionOptions, RunningOptions
 
 TOLERANCES = ["0.1°", "0.01°", "0.001°", "0.0001°"]
 

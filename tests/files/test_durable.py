@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 
 from rollcli.errors import OutputError
-from rollcli.files.atomic import write_atomic
-from rollcli.files.durable import sync_files
+from rollcli.files.atomic import sync_files, write_atomic
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="Windows forces no folders")
 

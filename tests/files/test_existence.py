@@ -5,7 +5,7 @@ import os
 
 import pytest
 
-from rollcli.files.existence import is_file, is_folder, is_mount, is_there, look_at
+from rollcli.files.atomic import is_file, is_folder, is_mount, is_there, look_at
 
 
 @pytest.fixture

@@ -7,9 +7,9 @@ import pytest
 
 from rollcli.errors import InputError, OutputError, UsageError
 from rollcli.files import storage
+from rollcli.files.search import objects_behind
 from rollcli.files.stores.locations import public_name
 from rollcli.files.stores.objects import list_objects
-from rollcli.files.stores.search import objects_behind
 from rollcli.messages import without_secrets
 
 

@@ -10,7 +10,7 @@ from typing import BinaryIO
 from rollcli.errors import InputError
 from rollcli.files.encodings import to_disparity
 from rollcli.files.formats import decode_image, decode_mask, decode_stored
-from rollcli.parallel.process_setup import prepare_worker
+from rollcli.run.workers.pool import prepare_worker
 from tests.fuzz.corpus import corpus
 from tests.fuzz.texts import read_text, texts
 

@@ -3,10 +3,19 @@
 import numpy as np
 import pytest
 
-from rollcli.report.charts.chart import Chart
-from rollcli.report.drawing.axes import Axes, Axis, axis_items, legend_items, margins
-from rollcli.report.drawing.lay_out import lay_out
-from rollcli.report.drawing.sketch import Area, Line, Marks, Words
+from rollcli.report.chart import Chart
+from rollcli.report.figures import (
+    Area,
+    Axes,
+    Axis,
+    Line,
+    Marks,
+    Words,
+    axis_items,
+    lay_out,
+    legend_items,
+    margins,
+)
 
 FONT = 20.0
 AXES = Axes(Axis((0.0, 10.0), "frame"), Axis((-1.0, 1.0), "roll", zero=True))

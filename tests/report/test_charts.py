@@ -5,11 +5,9 @@ import html
 import numpy as np
 import pytest
 
-from rollcli.report.charts.axis_range import outside, view
-from rollcli.report.charts.histogram import histogram
-from rollcli.report.charts.over_frames import chart_over_frames
+from rollcli.report.charts import chart_over_frames, histogram, outside, view
 from rollcli.report.summary import degrees, option_lines, summarize, with_interval
-from rollcli.rig.assess import assess_rig
+from rollcli.rig.drive.assess import assess_rig
 from tests.report.results import row
 
 ROWS = [

@@ -7,13 +7,10 @@ import cv2
 import numpy as np
 import pytest
 
-from rollcli.report.charts.all_charts import all_charts
-from rollcli.report.drawing.colours import DARK, LIGHT, rgb
-from rollcli.report.drawing.lay_out import lay_out
-from rollcli.report.drawing.png import png_file
-from rollcli.report.drawing.sketch import Line, Sketch, Words
-from rollcli.report.drawing.svg import svg_file
-from rollcli.rig.assess import assess_rig
+from rollcli.report.charts import all_charts
+from rollcli.report.colours import DARK, LIGHT, rgb
+from rollcli.report.figures import Line, Sketch, Words, lay_out, png_file, svg_file
+from rollcli.rig.drive.assess import assess_rig
 from tests.report.results import row
 
 SVG = "{http://www.w3.org/2000/svg}"

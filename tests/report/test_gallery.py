@@ -2,7 +2,7 @@
 
 import pytest
 
-from rollcli.report.gallery import SPREAD, SUSPECT, WIDEST, choose, spread
+from rollcli.report.sources import SPREAD, SUSPECT, WIDEST, choose, spread
 from tests.report.results import row
 
 

@@ -6,9 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
-from rollcli.report.drawing.colours import LIGHT, rgb
-from rollcli.report.drawing.png import png_file
-from rollcli.report.drawing.sketch import Area, Line, Marks, Sketch, Words
+from rollcli.report.colours import LIGHT, rgb
+from rollcli.report.figures import Area, Line, Marks, Sketch, Words, png_file
 
 WIDTH, HEIGHT, FRAME = 200, 120, (40, 20, 140, 80)  # the frame reaches from (40, 20) to (180, 100)
 

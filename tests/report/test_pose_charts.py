@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rollcli.report.charts.all_charts import all_charts
-from rollcli.rig.assess import assess_rig
+from rollcli.report.charts import all_charts
+from rollcli.rig.drive.assess import assess_rig
 from tests.report.results import row
 
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from rollcli.errors import UsageError
-from rollcli.frames.options import ImageOptions
 from rollcli.report import sources
 from rollcli.report.sources import subjects
+from rollcli.run.options import ImageOptions
 from tests.report.results import row
 
 NONE = ImageOptions()

@@ -9,15 +9,11 @@ import numpy as np
 import pytest
 
 from rollcli.report import content
-from rollcli.report.charts.axis_range import outside, view
-from rollcli.report.charts.chart import Chart, script_json
-from rollcli.report.charts.histogram import _bins, histogram
-from rollcli.report.charts.labels import label
-from rollcli.report.charts.names import chart_names
-from rollcli.report.charts.over_frames import chart_over_frames
-from rollcli.report.gallery import SPREAD, SUSPECT, WIDEST, Choice
-from rollcli.report.options import ReportOptions
+from rollcli.report.chart import Chart, label, script_json
+from rollcli.report.charts import _bins, chart_over_frames, histogram, outside, view
+from rollcli.report.options import ReportOptions, chart_names
 from rollcli.report.pictures import Picture, Pictures, _encoded, no_pictures
+from rollcli.report.sources import SPREAD, SUSPECT, WIDEST, Choice
 from rollcli.report.summary import degrees, frame_count, input_folders, option_lines, summarize, written_at
 from rollcli.rig.quantities import HEIGHT, PITCH, QUANTITIES
 from tests.report.results import row

@@ -6,11 +6,9 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
-from rollcli.report.charts.chart import Chart
-from rollcli.report.drawing.colours import DARK, LIGHT, rgb, style_sheet
-from rollcli.report.drawing.sketch import Area, Line, Marks, Sketch, Words
-from rollcli.report.drawing.still import with_still
-from rollcli.report.drawing.svg import svg_file, svg_for_page
+from rollcli.report.chart import Chart
+from rollcli.report.colours import DARK, LIGHT, rgb, style_sheet
+from rollcli.report.figures import Area, Line, Marks, Sketch, Words, svg_file, svg_for_page, with_still
 
 SVG = "{http://www.w3.org/2000/svg}"
 POINTS = np.array([(10.04, 20.0), (13.0, 18.26), (-4.5, 1e4)])

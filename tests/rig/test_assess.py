@@ -8,10 +8,10 @@ from scipy.stats import t as student
 from scipy.stats import ttest_ind_from_stats
 
 import rollcli
-from rollcli.rig.assess import difference
-from rollcli.rig.sequence.blocks import Estimate
+from rollcli.rig.drive.assess import difference
+from rollcli.rig.drive.noise import Estimate
 from rollcli.rig.words import answer, findings, one_line
-from tests.rig.sequence.series import drive
+from tests.rig.drive.series import drive
 
 SCHEMA = make_dataclass("Row", ["file", "status", "roll_deg", "roll_ci95_deg"])
 

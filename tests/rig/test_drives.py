@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rollcli.errors import UsageError
-from rollcli.rig.drives import split_drives
+from rollcli.rig.drive.assess import split_drives
 
 
 def folders(*counts):

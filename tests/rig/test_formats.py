@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 
 from rollcli.errors import InputError, RollcliError, UsageError
-from rollcli.rig.calibration import Calibration
-from rollcli.rig.options import CalibrationOptions
-from rollcli.rig.parse import parse_calibration
-from rollcli.rig.plain_yaml import parse_yaml
+from rollcli.rig.calibration import Calibration, CalibrationOptions
+from rollcli.rig.formats.yaml import parse_yaml
+from rollcli.rig.read_calibration import parse_calibration
 from tests.rig import calibration_files as samples
 from tests.rig.calibration_files import Rig
 

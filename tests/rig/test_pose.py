@@ -9,7 +9,7 @@ import pytest
 
 from rollcli.errors import UsageError
 from rollcli.estimator.estimate import estimate_roll
-from rollcli.estimator.tangent import Tangent
+from rollcli.estimator.interval import Tangent
 from rollcli.rig.calibration import Calibration
 from rollcli.rig.pose import horizon_row, pose_jacobian, pose_of, taken_as_exact, with_pose
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from rollcli.estimator.estimate import estimate_roll
-from rollcli.imaging.stereo import StereoOptions, match_pair
 from rollcli.rig.calibration import Calibration
 from rollcli.rig.pose import with_pose
+from rollcli.stereo.match import StereoOptions, match_pair
 from tests.run_cli import ROOT
 
 STREETS = ROOT.parent / "shared" / "streets"

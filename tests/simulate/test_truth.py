@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from rollcli.simulate.dataset import calibration
 from rollcli.simulate.render import render_frame, true_disparity
 from rollcli.simulate.spec import FrameSpec
-from rollcli.simulate.truth import calibration
 
 SMALL = {"size": (320, 240), "focal": 186.0}
 

@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable
 
 from rollcli.estimator.energy import Energy
-from rollcli.estimator.methods import DEFAULT_SOLVER, SolverSettings
+from rollcli.estimator.request import DEFAULT_SOLVER, SolverSettings
 from rollcli.estimator.solvers.solution import Solution, principal
 
 _RATIO = (math.sqrt(5) - 1) / 2

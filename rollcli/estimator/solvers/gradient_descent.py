@@ -7,7 +7,7 @@ arXiv:1906.01894.
 import math
 
 from rollcli.estimator.energy import Energy
-from rollcli.estimator.methods import DEFAULT_SOLVER, LAMBDA0, SolverSettings
+from rollcli.estimator.request import DEFAULT_SOLVER, LAMBDA0, SolverSettings
 from rollcli.estimator.solvers.solution import Solution, SolverStatus, principal
 
 _MAX_ITERATIONS = 100

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from rollcli.estimator.energy import Energy
-from rollcli.estimator.methods import SolverSettings
+from rollcli.estimator.request import SolverSettings
 
 
 class SolverStatus(Enum):

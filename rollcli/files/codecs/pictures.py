@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError
-from rollcli.files.codecs.mute_stderr import decoding
+from rollcli.files.codecs.png import decoding
 from rollcli.files.codecs.raw_map import PICTURE_FLAGS, native, require_decoded_fits
 
 LOSSLESS = (b"BM", b"P5", b"P6")

@@ -6,8 +6,7 @@ import urllib.error
 import urllib.request
 
 from rollcli.errors import InputError
-from rollcli.files.stores.locations import public_name
-from rollcli.files.stores.turns import wait_for_room, waiting_for_network
+from rollcli.files.stores.locations import public_name, wait_for_room, waiting_for_network
 
 _TIMEOUT_S = 60.0
 _TRIES = 4

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from rollcli.errors import InputError
-from rollcli.rig.plain_yaml import Value
+from rollcli.rig.formats.yaml import Value
 
 _LONGEST = 40  # characters of a number: no calibration has more digits
 _SAME_FOCAL = 1e-3  # relative: the views of a rectified pair have one focal length

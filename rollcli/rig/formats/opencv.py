@@ -13,7 +13,7 @@ from xml.etree.ElementTree import ParseError, XMLParser
 
 from rollcli.errors import InputError
 from rollcli.rig.formats.fields import Fields, File, Projection, numbers, pair_of, swapped
-from rollcli.rig.plain_yaml import Value, parse_yaml
+from rollcli.rig.formats.yaml import Value, parse_yaml
 
 _KEYS = re.compile(r"""(?:^|[\s<{,"])(?:P1|P2|Q|M1)(?:"?\s*:|[\s>])""")
 _MARKS = ("%YAML:1.0", "%YAML 1.0", "<opencv_storage>", "opencv-matrix")

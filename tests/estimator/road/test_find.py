@@ -13,11 +13,11 @@ from rollcli.errors import EstimationError, UsageError
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.road.find import _distinct
 from rollcli.files.formats import read_image
-from rollcli.imaging.derotate import derotate
-from rollcli.imaging.stereo import StereoOptions, match_pair
+from rollcli.pictures.derotate import derotate
 from rollcli.simulate.draw import draw_specs
 from rollcli.simulate.render import render_frame, true_disparity
 from rollcli.simulate.spec import FrameSpec
+from rollcli.stereo.match import StereoOptions, match_pair
 
 STREETS = Path(__file__).parents[3].parent / "shared" / "streets"
 # of the lane ahead, lowest and highest of 1 to 2.5 m to each side, 5 to 12 and 8 to 20 m away; the others

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from rollcli.estimator.road.first_row import first_row_of_road
+from rollcli.estimator.road.find import first_row_of_road
 
 MAX_ROLL = math.radians(45)
 

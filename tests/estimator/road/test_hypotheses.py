@@ -6,9 +6,9 @@ import math
 import numpy as np
 import pytest
 
-from rollcli.estimator.road.hypotheses import draw_planes
-from rollcli.estimator.road.subsample import take_sample
-from rollcli.estimator.road.tuning import ROAD_TUNING
+from rollcli.estimator.road.find import draw_planes
+from rollcli.estimator.road.sample import take_sample
+from rollcli.estimator.tuning import ROAD_TUNING
 from tests.estimator.synthetic_maps import flat_road
 
 MAX_ROLL = math.radians(45)

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from rollcli.estimator.road.profile import Profile, read_profile
-from rollcli.estimator.road.tuning import ProfileTuning
+from rollcli.estimator.road.surface import Profile, read_profile
+from rollcli.estimator.tuning import ProfileTuning
 
 SIDES = np.array([0.125, 0.375, 0.625, 0.875, 1.125, 1.375, 1.625, 1.875, 2.125, 2.375])  # middles of bins
 

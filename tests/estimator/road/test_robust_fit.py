@@ -9,10 +9,9 @@ import pytest
 from rollcli.errors import EstimationError
 from rollcli.estimator.road.find import Road
 from rollcli.estimator.road.model import RoadModel
-from rollcli.estimator.road.robust_fit import AHEAD, ALONE, PLACE, TOLERANCE, D, NearPixels, X, Y
-from rollcli.estimator.road.subsample import take_sample
-from rollcli.estimator.road.surroundings import look_around
-from rollcli.estimator.road.tuning import ROAD_TUNING, FitTuning
+from rollcli.estimator.road.sample import take_sample
+from rollcli.estimator.road.surface import AHEAD, ALONE, PLACE, TOLERANCE, D, NearPixels, X, Y, look_around
+from rollcli.estimator.tuning import ROAD_TUNING, FitTuning
 from tests.estimator.synthetic_maps import flat_road
 
 TUNING = FitTuning(independent_pixels=50, camber=0.02, biweight_spread=1.3, beside=0.05)

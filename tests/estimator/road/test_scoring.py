@@ -6,12 +6,10 @@ import math
 import numpy as np
 import pytest
 
-from rollcli.estimator.road.find import find_road
+from rollcli.estimator.road.find import PlaneScorer, find_road, slope_weights
 from rollcli.estimator.road.model import RoadModel
-from rollcli.estimator.road.neighbours import NO_SLOPE, rising
-from rollcli.estimator.road.scoring import PlaneScorer, slope_weights
-from rollcli.estimator.road.subsample import take_sample
-from rollcli.estimator.road.tuning import ROAD_TUNING, SampleTuning, ScoreTuning
+from rollcli.estimator.road.sample import NO_SLOPE, rising, take_sample
+from rollcli.estimator.tuning import ROAD_TUNING, SampleTuning, ScoreTuning
 from tests.estimator.synthetic_maps import flat_road
 
 TUNING = ScoreTuning(  # other numbers than the defaults, each of them felt

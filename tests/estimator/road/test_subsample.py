@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from rollcli.errors import EstimationError
-from rollcli.estimator.road.neighbours import NO_SLOPE, rising
-from rollcli.estimator.road.subsample import reach_of, take_sample
-from rollcli.estimator.road.tuning import ROAD_TUNING
+from rollcli.estimator.road.sample import NO_SLOPE, reach_of, rising, take_sample
+from rollcli.estimator.tuning import ROAD_TUNING
 from rollcli.simulate.render import true_disparity
 from rollcli.simulate.spec import FrameSpec
 

@@ -8,7 +8,7 @@ import pytest
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.road import surface
 from rollcli.estimator.road.find import find_road
-from rollcli.estimator.road.subsample import take_sample
+from rollcli.estimator.road.sample import take_sample
 from rollcli.estimator.road.surface import fit_surface
 from tests.estimator.synthetic_maps import flat_road
 

@@ -11,9 +11,9 @@ import cv2
 import numpy as np
 import pytest
 
-from rollcli.estimator.road.subsample import take_sample
-from rollcli.estimator.road.surroundings import look_around
-from rollcli.estimator.road.tuning import ROAD_TUNING
+from rollcli.estimator.road.sample import take_sample
+from rollcli.estimator.road.surface import look_around
+from rollcli.estimator.tuning import ROAD_TUNING
 
 V, U = np.mgrid[:480, :640]
 ROAD = 30 + 0.3 * (V - 240) - 0.03 * (U - 320)  # px; 5.7 degrees of roll

@@ -8,7 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from rollcli.errors import EstimationError
-from rollcli.estimator.methods import SolverSettings
+from rollcli.estimator.request import SolverSettings
 from rollcli.estimator.solvers.exact import exact, minima
 from rollcli.estimator.solvers.golden_section import golden_section
 from rollcli.estimator.solvers.gradient_descent import gradient_descent

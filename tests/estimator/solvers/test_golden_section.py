@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rollcli.estimator.methods import SolverSettings
+from rollcli.estimator.request import SolverSettings
 from rollcli.estimator.solvers.exact import exact, minima
 from rollcli.estimator.solvers.golden_section import golden_section
 from rollcli.evaluate.textbook import Textbook

@@ -8,7 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from rollcli.estimator.energy import Terms
-from rollcli.estimator.methods import LAMBDA0, SolverSettings
+from rollcli.estimator.request import LAMBDA0, SolverSettings
 from rollcli.estimator.solvers.exact import exact, minima
 from rollcli.estimator.solvers.gradient_descent import gradient_descent
 from rollcli.estimator.solvers.solution import SolverStatus

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rollcli.estimator.solvers import trigonometric
-from rollcli.estimator.solvers.trigonometric import DEGREE, SAMPLES, derivative, rising_zeros, zeros
+from rollcli.estimator.solvers import exact as trigonometric
+from rollcli.estimator.solvers.exact import DEGREE, SAMPLES, derivative, rising_zeros, zeros
 from tests.estimator.synthetic_maps import repeatable
 
 PLACES = np.arange(SAMPLES) * (2 * math.pi / SAMPLES)

@@ -12,7 +12,10 @@ import numpy as np
 import pytest
 
 from rollcli.errors import InputError
-from rollcli.files.codecs import fast_png, png, tiff_parts, unpack
+from rollcli.files.codecs import png
+from rollcli.files.codecs import png as fast_png
+from rollcli.files.codecs import tiff as tiff_parts
+from rollcli.files.codecs import tiff as unpack
 from rollcli.files.formats import decode_image, decode_mask, decode_stored
 from tests.binary_files import disparity_map, make_png, make_tiff, png_file, png_header, png_rows
 from tests.fuzz.corpus import corpus

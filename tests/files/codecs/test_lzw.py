@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rollcli.files.codecs.lzw import LzwError, decode_lzw
+from rollcli.files.codecs.tiff import LzwError, decode_lzw
 from tests.binary_files import lzw_encode
 
 

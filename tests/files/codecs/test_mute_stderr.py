@@ -3,11 +3,11 @@
 import subprocess
 import sys
 
-from rollcli.files.codecs.mute_stderr import decoding
+from rollcli.files.codecs.png import decoding
 
 TALK = """
 import contextlib, os, sys
-from rollcli.files.codecs.mute_stderr import decoding, silence_decoders
+from rollcli.files.codecs.png import decoding, silence_decoders
 {before}
 print("a", file=sys.stderr, flush=True)
 with decoding(), contextlib.suppress(OSError):

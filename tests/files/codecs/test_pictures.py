@@ -18,7 +18,7 @@ END = b"\xff\xd9"
 READ = (
     "import sys\n"
     "from rollcli.errors import InputError\n"
-    "from rollcli.files.codecs.mute_stderr import silence_decoders\n"
+    "from rollcli.files.codecs.png import silence_decoders\n"
     "from rollcli.files.codecs.pictures import decode_picture\n"
     "silence_decoders()\n"
     "try:\n"

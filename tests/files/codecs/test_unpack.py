@@ -4,8 +4,8 @@ import zlib
 
 import pytest
 
-from rollcli.files.codecs import unpack
-from rollcli.files.codecs.unpack import unpacked
+from rollcli.files.codecs import tiff as unpack
+from rollcli.files.codecs.tiff import unpacked
 
 PACKBITS, DEFLATE, DEFLATE_OF_BEFORE = 32773, 8, 32946  # of libtiff's tiff.h
 # of Apple's Technical Note TN1023

@@ -3,6 +3,8 @@
 import pytest
 
 from rollcli.errors import InputError, UsageError
+from rollcli.files.results import part_names, read_parts
+from rollcli.files.search import _fits, is_folder_url
 from rollcli.files.stores.locations import (
     base_name,
     is_object_url,
@@ -12,8 +14,6 @@ from rollcli.files.stores.locations import (
     scheme_of,
     split_url,
 )
-from rollcli.files.stores.parts import part_names, read_parts
-from rollcli.files.stores.search import _fits, is_folder_url
 
 
 @pytest.mark.parametrize(

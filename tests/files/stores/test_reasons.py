@@ -2,7 +2,7 @@
 
 import pytest
 
-from rollcli.files.stores.reasons import holds_for_all, is_final, reason_of, what_is_missing
+from rollcli.files.stores.objects import holds_for_all, is_final, reason_of, what_is_missing
 
 NO_BUCKET = "there is no such bucket"
 DENIED = "access is denied; check the rights of these keys"

@@ -3,12 +3,11 @@
 import threading
 
 from rollcli.files import storage
-from rollcli.files.stores import turns
-from rollcli.files.stores.turns import computing, tasks_in_hand, wait_for_room, waiting_for_network
-from rollcli.parallel.in_order import Work
-from rollcli.parallel.interrupt import Stop
-from rollcli.parallel.run_tasks import run_tasks
-from rollcli.parallel.workers import Workers
+from rollcli.files.stores import locations as turns
+from rollcli.files.stores.locations import computing, tasks_in_hand, wait_for_room, waiting_for_network
+from rollcli.run.workers.in_order import Work, Workers
+from rollcli.run.workers.interrupt import Stop
+from rollcli.run.workers.tasks import run_tasks
 
 _COUNT = 4
 _together = threading.Barrier(_COUNT)

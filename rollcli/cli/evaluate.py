@@ -1,0 +1,147 @@
+"""`rollcli evaluate accuracy` and `rollcli evaluate paper`."""
+
+from typing import Any
+
+import click
+
+from rollcli.cli.command import argument, command, option, record
+from rollcli.cli.config import config_option
+from rollcli.cli.options import PATH, encoding_options, input_options, region_options, running_options
+from rollcli.cli.types import TABLE_FILE, TABLE_FORMATS, Choice, Number, ParamType, table_format
+from rollcli.evaluate.options import TIMED, TURNS_DEG, ExperimentOptions, PaperOptions
+from rollcli.run.options import RunningOptions
+
+
+@command(
+    short_help="Errors of a result against known angles.",
+    examples=[
+        (
+            "Angles against those of `simulate`",
+            "rollcli evaluate accuracy rig/rolls.csv --truth rig/truth.csv",
+        )
+    ],
+)
+@argument("result", type=PATH)
+@option(
+    "--truth",
+    type=PATH,
+    metavar="FILE",
+    required=True,
+    section="Figures",
+    help="The known angles: CSV with the columns file and roll_deg, degrees.",
+)
+@option(
+    "-o",
+    "--output",
+    type=TABLE_FILE,
+    metavar="FILE",
+    default="-",
+    section="Figures",
+    help="Where the figures go (-: stdout).",
+)
+@option(
+    "--format",
+    type=Choice(*TABLE_FORMATS),
+    section="Figures",
+    help="A table to read, or degrees and shares from 0 to 1 for programs.  "
+    "[default: by FILE's ending, else table]",
+)
+@running_options
+@config_option
+@click.pass_context
+def accuracy(
+    ctx: click.Context, /, result: str, truth: str, output: str, running: RunningOptions, **options: Any
+) -> None:
+    """Compare the angles of RESULT, which estimate wrote, with known ones.
+
+    Frames are matched by the names of their files, without folder and ending. Those without a partner are
+    counted on stderr; exit status 3 when a frame of the truth has no angle.
+    """
+    from rollcli.evaluate.run_accuracy import run_accuracy
+
+    ctx.exit(run_accuracy(result, truth, table_format(options["format"], output), output, running))
+
+
+class Turns(ParamType):
+    """A:B:STEP with A <= B and a step above 0, all within a quarter turn; at most 1000 angles."""
+
+    name = "A:B:STEP"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[float, float, float]:
+        if isinstance(value, tuple):
+            return value  # the default
+        try:
+            first, last, step = map(float, str(value).split(":"))
+        except ValueError:
+            first, last, step = 0.0, -1.0, 1.0
+        if not (-90 <= first <= last <= 90 and step > 0 and last - first <= 1000 * step):
+            self.fail(
+                f"{value!r} is not A:B:STEP in degrees with -90 <= A <= B <= 90, such as -20:20:2", param, ctx
+            )
+        return first, last, step
+
+
+experiment_options = record(
+    "experiments",
+    "Experiments",
+    ExperimentOptions,
+    option(
+        "-o", "--output", type=PATH, metavar="DIR", required=True, help="Where paper.html and its CSVs go."
+    ),
+    option(
+        "--turns",
+        type=Turns(),
+        default=TURNS_DEG,
+        show_default=False,
+        help="Rotate each map by these angles, degrees.  [default: -20:20:2]",
+    ),
+    option(
+        "--timed",
+        type=Number("N", at_least=1, whole=True),
+        default=TIMED,
+        help="Take the run times on the first N maps; the paper's n x 3 form is slow.",
+    ),
+    option(
+        "--truth",
+        type=PATH,
+        metavar="FILE",
+        help="Known angles of the maps: CSV with file and roll_deg.  [default: each map's own estimate]",
+    ),
+)
+
+
+@command(
+    short_help="The paper's tables and figures on your maps.",
+    examples=[("The page, and its CSVs", "rollcli evaluate paper maps/ -o paper/")],
+)
+@input_options
+@experiment_options
+@encoding_options
+@region_options
+@running_options
+@config_option
+@click.pass_context
+def paper(ctx: click.Context, /, **records: Any) -> None:
+    """Repeat the paper's tables and figures on these maps, and write them as CSV and one HTML page of charts.
+
+    Iterations and run times of golden section and gradient descent (Tables I and II), first learning rates
+    from 1 to 100 (Fig. 3), accuracy after known rotations (Fig. 6), and the same for the other methods. Every
+    valid pixel is used, as in the paper. The page needs the extra: pip install "rollcli[report]".
+    """
+    from rollcli.evaluate.paper import run_paper
+
+    ctx.exit(run_paper(PaperOptions(**records)))
+
+
+@click.group(invoke_without_command=True)
+@click.pass_context
+def evaluate(ctx: click.Context) -> None:
+    """Repeat the paper's experiments on your maps; compare results with known angles."""
+    if ctx.invoked_subcommand is None:
+        click.echo(ctx.get_help())
+
+
+evaluate.add_command(accuracy)
+evaluate.add_command(paper)

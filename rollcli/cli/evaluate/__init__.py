@@ -1,1 +1,0 @@
-"""The commands of `rollcli evaluate`, one file each."""

@@ -1,0 +1,178 @@
+"""`rollcli derotate`, `rollcli vdisparity` and `rollcli disparity`: the commands that write images."""
+
+from typing import Any
+
+import click
+
+from rollcli.cli.command import command, option, record, tell_idle
+from rollcli.cli.config import config_option
+from rollcli.cli.options import (
+    PATH,
+    calibration_options,
+    cluster_options,
+    encoding_options,
+    folder_options,
+    input_options,
+    output_folder_option,
+    pair_options,
+    save_as_option,
+    stereo_options,
+)
+from rollcli.cli.types import Number
+from rollcli.run.options import (
+    CountOptions,
+    DerotateOptions,
+    DisparityOptions,
+    RotationOptions,
+    VDisparityOptions,
+)
+
+
+def _rotation(*, roll: float | None, **values: Any) -> RotationOptions:
+    return RotationOptions(roll_deg=roll, result=values.pop("from"), **values)
+
+
+rotation_options = record(
+    "rotation",
+    "Angle",
+    _rotation,
+    option(
+        "--roll",
+        type=Number("DEG", at_least=-180, at_most=180),
+        help="Of the rig, for every map, degrees; positive: its right end is up.",
+    ),
+    option(
+        "--from",
+        type=PATH,
+        metavar="RESULT",
+        help="The angle of each map, from what `rollcli estimate` wrote; matched by stem.",
+    ),
+    option("--skip-suspect", is_flag=True, help="With --from, leave out the maps whose angle is suspect."),
+    option("--expand", is_flag=True, help="Enlarge the maps so that their corners are kept."),
+)
+
+
+@command(
+    examples=[
+        ("The angles that estimate found", "rollcli derotate maps/ --from rolls.csv -o upright/"),
+        ("One angle for all, nothing cut off", "rollcli derotate maps/ --roll 2.5 --expand -o upright/"),
+    ]
+)
+@input_options
+@rotation_options
+@output_folder_option
+@encoding_options
+@cluster_options
+@config_option
+@click.pass_context
+def derotate(ctx: click.Context, /, **records: Any) -> None:
+    """Rotate disparity maps by their roll, so that rows of the road become constant.
+
+    INPUTS are maps (PNG, TIFF, NPY, PFM), folders of them, quoted patterns, or - for paths on stdin. A map
+    keeps its type, encoding and format. Values are interpolated between valid pixels alone, and what is no
+    data stays no data.
+
+    With --from, every map needs its row and every row with an angle its map: what has no partner is an error
+    that names it, before anything is written. Suspect angles are used, and a line says how many there are;
+    --skip-suspect leaves their maps out.
+    """
+    from rollcli.run.convert import run_derotate
+    from rollcli.run.unused import idle_in_derotate, repeated_inputs
+
+    options = DerotateOptions(**records)
+    tell_idle(ctx, idle_in_derotate(options), repeated_inputs(options.inputs), quiet=options.running.quiet)
+    ctx.exit(run_derotate(options))
+
+
+@command(
+    examples=[
+        ("A folder of pairs", "rollcli disparity --left cam/left --right cam/right -o maps/"),
+        (
+            "At half the size, as floating-point TIFF",
+            "rollcli disparity --left 'im0*.png' --right 'im1*.png' --downscale 2 --save-as tiff -o maps/",
+        ),
+    ],
+    instead="images are given by --left and --right",
+)
+@pair_options
+@folder_options
+@output_folder_option
+@save_as_option
+@option(
+    "--preview",
+    type=PATH,
+    metavar="DIR",
+    section="Output",
+    help="Also write each map as a picture to look at, in colour with a scale in pixels, PNG.",
+)
+@stereo_options
+@cluster_options
+@config_option
+@click.pass_context
+def disparity(ctx: click.Context, /, **records: Any) -> None:
+    """Match rectified stereo pairs with OpenCV SGBM: one disparity map a pair, named after the left image.
+
+    Images are PNG, JPEG, TIFF, BMP, PGM or PPM, of 8 or 16 bits, grey or colour. An image without a partner
+    is an error that names it, before anything runs.
+    """
+    from rollcli.run.convert import run_disparity
+    from rollcli.run.unused import idle_in_disparity
+
+    options = DisparityOptions(**records)
+    tell_idle(ctx, idle_in_disparity(options), quiet=options.running.quiet)
+    ctx.exit(run_disparity(options))
+
+
+count_options = record(
+    "count",
+    "Counting",
+    CountOptions,
+    option(
+        "--bins",
+        type=Number("N", at_least=1, at_most=65535, whole=True),
+        help="Columns of the histogram.  [default: one a pixel of disparity for maps of whole pixels, else "
+        "four; 256 to 1024]",
+    ),
+    option(
+        "--max-disparity",
+        type=Number("PX", above=0),
+        help="Right end of the histogram, pixels; its last bin also holds what lies beyond.  "
+        "[default: just above the map's largest]",
+    ),
+    option(
+        "--counts",
+        is_flag=True,
+        help="Write the counts too, as a 32-bit TIFF beside the picture; a row sums to its valid pixels.",
+    ),
+)
+
+
+@command(
+    examples=[
+        ("Pictures to look at", "rollcli vdisparity maps/ -o vdisparity/"),
+        ("Counts to compute with", "rollcli vdisparity maps/ --counts --max-disparity 128 -o vdisparity/"),
+    ]
+)
+@input_options
+@count_options
+@output_folder_option
+@encoding_options
+@calibration_options
+@cluster_options
+@config_option
+@click.pass_context
+def vdisparity(ctx: click.Context, /, **records: Any) -> None:
+    """Draw the v-disparity image of each map: the histogram of each row's disparities.
+
+    INPUTS are maps (PNG, TIFF, NPY, PFM), folders of them, quoted patterns, or - for paths on stdin. The
+    picture is an 8-bit PNG on a log scale; its first rows are those of the map. The map is taken as it is,
+    whereas `estimate --vdisparity` rotates it upright first. Where a road is found, its disparity along the
+    middle column is drawn as a dashed curve: on a de-rotated map the road's pixels lie on it. With a
+    calibration, the road's horizon on that column is drawn, too.
+    """
+    from rollcli.run.convert import run_vdisparity
+    from rollcli.run.unused import idle_in_vdisparity, repeated_inputs
+
+    options = VDisparityOptions(**records)
+    tell_idle(ctx, idle_in_vdisparity(options), repeated_inputs(options.inputs), quiet=options.running.quiet)
+    ctx.exit(run_vdisparity(options))

@@ -1,1 +1,0 @@
-"""Convert maps and pairs to other files: de-rotated maps, v-disparity images, disparity maps."""

@@ -1,0 +1,143 @@
+"""Which pixels an angle rests on: the road, a part of it, or every valid pixel."""
+
+import math
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollcli.errors import EstimationError
+from rollcli.estimator.energy import Energy
+from rollcli.estimator.moments import CheckedMap, map_moments, point_moments
+from rollcli.estimator.request import AREAS, SOLVERS, AreaSettings, Method, Request
+from rollcli.estimator.road.find import Road, find_road
+from rollcli.estimator.road.sample import take_sample
+from rollcli.estimator.road.surface import Surface, fit_surface, whole_surface
+from rollcli.estimator.solvers.areas import AreaMethod, fit_plane
+from rollcli.estimator.solvers.solution import Solution, Solver
+from rollcli.estimator.tuning import RoadTuning
+
+
+def load_solver(name: str) -> Solver:
+    """Return the function of a solver."""
+    solver: Solver = _load("solvers", SOLVERS[name])
+    return solver
+
+
+def load_area_method(name: str) -> AreaMethod:
+    """Return the function of a method that chooses pixels."""
+    method: AreaMethod = _load("areas", AREAS[name])
+    return method
+
+
+@cache
+def _load(folder: str, method: Method) -> Any:
+    return getattr(import_module(f"rollcli.estimator.{folder}.{method.file}"), method.file)
+
+
+@dataclass(frozen=True)
+class PixelSet:
+    """What an angle rests on.
+
+    Attributes
+    ----------
+    energy : Energy
+        Of the pixels.
+    surface : Surface or None
+        A sample of them and their road; None where the map is too small for one.
+    road : Road or None
+        The plane of the road, where it was looked for.
+    share : float
+        Share of the valid pixels that is used.
+    area : ndarray of bool, shape (H, W), or None
+        The pixels that a method of `AREAS` chose.
+    solution : Solution or None
+        What such a method found.
+    """
+
+    energy: Energy
+    surface: Surface | None
+    road: Road | None
+    share: float
+    area: NDArray[np.bool_] | None = None
+    solution: Solution | None = None
+
+    def mask(self, checked: CheckedMap) -> NDArray[np.bool_]:
+        """Return these pixels of the map that they were selected from, (H, W) of bool."""
+        if self.area is not None:
+            return self.area
+        if self.road is not None and self.surface is not None:
+            return checked.valid & self.surface.covers(checked.values)
+        return checked.valid
+
+
+class FoundRoad(NamedTuple):
+    """The plane of a road, and its surface."""
+
+    plane: Road
+    surface: Surface
+
+
+def select_pixels(checked: CheckedMap, request: Request) -> PixelSet:
+    """Find the road if that is asked for, and sum the pixels that the method works on.
+
+    Raises
+    ------
+    EstimationError
+        When there is no road, or its pixels do not determine an angle.
+    """
+    found = _find(checked, request) if request.road == "auto" else None
+    if request.method in AREAS:
+        return _area_pixels(checked, found, request)
+    return _all_pixels(checked, request) if found is None else _road_pixels(found)
+
+
+def _find(checked: CheckedMap, request: Request) -> FoundRoad:
+    sample = take_sample(checked.values, checked.usable, request.tuning.road)
+    plane = find_road(sample, request.max_roll, request.seed)
+    return FoundRoad(plane, fit_surface(sample, plane, parabolic=request.parabolic))
+
+
+def _road_pixels(found: FoundRoad) -> PixelSet:
+    """Sum the road's pixels by their weights."""
+    road, surface = found
+    moments = point_moments(
+        surface.x, surface.y, surface.d, surface.weights, surface.grid, surface.model.plane
+    )
+    energy = Energy.of(moments, float(surface.d.max()), parabolic=surface.parabolic)
+    return PixelSet(energy, surface, road, surface.share)
+
+
+def _all_pixels(checked: CheckedMap, request: Request) -> PixelSet:
+    """Sum every valid pixel, as the paper does; a sample of them serves the interval."""
+    values, usable = checked.values, checked.usable
+    used = values if usable is None else np.where(usable, values, 0)
+    peak = float(used.max())
+    if not math.isfinite(peak):
+        peak = float(used[np.isfinite(used)].max())
+    energy = Energy.of(map_moments(used), peak, parabolic=request.parabolic)
+    return PixelSet(energy, _sampled_surface(values, usable, energy, request.tuning.road), None, 1.0)
+
+
+def _area_pixels(checked: CheckedMap, found: FoundRoad | None, request: Request) -> PixelSet:
+    """Let the method choose among the road's pixels, or the valid ones; a mask is the chosen area."""
+    values = checked.values
+    candidates = checked.valid if found is None else checked.valid & found.surface.covers(values)
+    settings = AreaSettings(request.max_roll, chosen=checked.usable is not None)
+    pixels = load_area_method(request.method)(values, candidates, settings)
+    energy, solution = fit_plane(values, pixels)
+    surface = _sampled_surface(values, pixels.used, energy, request.tuning.road)
+    share = np.count_nonzero(pixels.used) / checked.count
+    return PixelSet(energy, surface, None if found is None else found.plane, share, pixels.used, solution)
+
+
+def _sampled_surface(
+    values: NDArray[Any], used: NDArray[np.bool_] | None, energy: Energy, tuning: RoadTuning
+) -> Surface | None:
+    try:
+        return whole_surface(take_sample(values, used, tuning), energy)
+    except EstimationError:  # too small a map to be sampled: an angle without an interval
+        return None

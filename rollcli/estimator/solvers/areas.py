@@ -1,0 +1,337 @@
+"""Planes in chosen areas of the map [Plane, Areas]."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollcli.errors import EstimationError
+from rollcli.estimator.energy import SAME_EVERYWHERE, Energy
+from rollcli.estimator.moments import Floats, Grid, map_moments, require_pixels
+from rollcli.estimator.request import DEFAULT_AREA, AreaSettings
+from rollcli.estimator.solvers.exact import exact
+from rollcli.estimator.solvers.solution import Solution, SolverStatus
+
+
+@dataclass(frozen=True)
+class Tiles:
+    """The sums of a map's tiles.
+
+    Attributes
+    ----------
+    grid : Grid
+        The coordinates p, q, those of the map's `Moments`.
+    side : int
+        Of a square tile, px; the last row and column of tiles reach over the edge of the map.
+    gram : ndarray, shape (R, C, 4, 4)
+        sum w x x' per tile, x = (1, p, q, d): the moments up to degree 2, with d in px. They add: over all
+        tiles they give the entries of `Moments`.
+    """
+
+    grid: Grid
+    side: int
+    gram: Floats
+
+    def areas(self, size: int, step: int) -> Floats:
+        """Sum squares of tiles.
+
+        Parameters
+        ----------
+        size, step : int
+            Side of an area, and the distance from one to the next, in tiles.
+
+        Returns
+        -------
+        ndarray, shape (R', C', 4, 4)
+            Area [i, j] has its top-left tile at (i step, j step); none reaches over the last tile.
+        """
+        total = np.pad(self.gram, ((1, 0), (1, 0), (0, 0), (0, 0))).cumsum(axis=0).cumsum(axis=1)
+        summed: Floats = (
+            total[size:, size:] - total[:-size, size:] - total[size:, :-size] + total[:-size, :-size]
+        )
+        return summed[::step, ::step]
+
+
+def tile_sums(disparity: NDArray[Any], weights: NDArray[Any] | None, side: int) -> Tiles:
+    """Sum a map tile by tile.
+
+    Parameters
+    ----------
+    disparity : ndarray, shape (H, W)
+        Real numbers, px; values <= 0, NaN and inf are no data and weigh nothing.
+    weights : ndarray, shape (H, W), optional
+        Finite and not negative (or bool); all ones by default.
+    side : int
+        Of a tile, px.
+
+    Returns
+    -------
+    Tiles
+    """
+    height, width = disparity.shape
+    rows, columns = -(-height // side), -(-width // side)
+    step = np.arange(side) - (side - 1) / 2
+    powers = np.stack([np.ones(side), step, step * step])
+    local = np.empty((rows, columns, 4, 4))
+    known = np.zeros((side, columns * side))
+    mask = np.zeros_like(known)
+    for row in range(rows):
+        block = disparity[row * side : (row + 1) * side]
+        used = (block > 0) & (block < np.inf)
+        known[:], mask[:] = 0, 0
+        mask[: len(block), :width] = (
+            used if weights is None else used * weights[row * side : (row + 1) * side]
+        )
+        np.copyto(known[: len(block), :width], block, where=used)
+        along = [
+            (each.reshape(side, columns, side) @ powers.T) for each in (mask, mask * known, mask * known**2)
+        ]
+        n, d, dd = (
+            np.einsum("ki,ijl->jkl", powers, each) for each in along
+        )  # [column, power of q, power of p]
+        local[row] = _symmetric(n, d, dd)
+    grid = Grid.of_shape(height, width)
+    return Tiles(grid, side, _on_grid(local, grid, side))
+
+
+def _symmetric(n: Floats, d: Floats, dd: Floats) -> Floats:
+    """Arrange sums [..., power of y, power of x] of w, w d and w d^2 as sum w z z', z = (1, x, y, d)."""
+    return np.stack(
+        [
+            np.stack([n[..., 0, 0], n[..., 0, 1], n[..., 1, 0], d[..., 0, 0]], axis=-1),
+            np.stack([n[..., 0, 1], n[..., 0, 2], n[..., 1, 1], d[..., 0, 1]], axis=-1),
+            np.stack([n[..., 1, 0], n[..., 1, 1], n[..., 2, 0], d[..., 1, 0]], axis=-1),
+            np.stack([d[..., 0, 0], d[..., 0, 1], d[..., 1, 0], dd[..., 0, 0]], axis=-1),
+        ],
+        axis=-2,
+    )
+
+
+def _on_grid(local: Floats, grid: Grid, side: int) -> Floats:
+    """Move sums from pixels around each tile's centre to the grid's coordinates."""
+    rows, columns = local.shape[:2]
+    middle = (side - 1) / 2
+    moved = np.zeros((rows, columns, 4, 4))
+    moved[..., 0, 0] = moved[..., 3, 3] = 1
+    moved[..., 1, 1] = moved[..., 2, 2] = 1 / grid.scale
+    moved[..., 1, 0] = (np.arange(columns) * side + middle - grid.centre_u) / grid.scale
+    moved[..., 2, 0] = ((np.arange(rows) * side + middle - grid.centre_v) / grid.scale)[:, None]
+    on_grid: Floats = moved @ local @ np.swapaxes(moved, -1, -2)
+    return on_grid
+
+
+@dataclass(frozen=True)
+class AreaPixels:
+    """The pixels that a method chose.
+
+    Attributes
+    ----------
+    used : ndarray of bool, shape (H, W)
+        All of them have a disparity.
+    iterations : int
+        How often the method chose anew.
+    status : SolverStatus
+        Whether its choice settled.
+    """
+
+    used: NDArray[np.bool_]
+    iterations: int = 0
+    status: SolverStatus = SolverStatus.CONVERGED
+
+
+# from a map (H, W), px, and which of its pixels are valid and may be used, (H, W) of bool
+AreaMethod = Callable[[NDArray[Any], NDArray[np.bool_], AreaSettings], AreaPixels]
+
+
+class PlaneFit(NamedTuple):
+    """The energy of the line model over some pixels, and its minimum."""
+
+    energy: Energy
+    solution: Solution
+
+
+def fit_plane(disparity: NDArray[Any], pixels: AreaPixels) -> PlaneFit:
+    """Fit a plane to the chosen pixels of a map (H, W) by least squares.
+
+    Raises
+    ------
+    EstimationError
+        When the pixels do not determine a plane.
+    """
+    require_pixels(pixels.used)
+    peak = float(disparity.max(where=pixels.used, initial=0))
+    energy = Energy.of(map_moments(disparity, pixels.used), peak, parabolic=False)
+    return PlaneFit(energy, Solution(exact(energy).theta, pixels.iterations, pixels.status))
+
+
+_TILES = 100  # along the longer side of the map
+_SIZE, _STEP = 4, 2  # of an area, in tiles
+_FILLED = 0.5
+_TOLERANCE = 0.01  # of the mean disparity
+_NOISE, _SMOOTH = 1.5, 0.1  # or 1.5 times the residual of the smoothest tenth: noise, whole pixels
+_TRIED = 200  # about as many planes compete to be the best
+_ROUNDS = 20
+_ROUNDING = 1e-10
+
+
+def iterative(
+    disparity: NDArray[Any], usable: NDArray[np.bool_], settings: AreaSettings = DEFAULT_AREA
+) -> AreaPixels:
+    """Fit planes to many small areas, and choose those that agree on one.
+
+    Parameters
+    ----------
+    disparity : ndarray, shape (H, W)
+        Real numbers, px.
+    usable : ndarray of bool, shape (H, W)
+        The pixels that are valid and may be used.
+    settings : AreaSettings
+        The largest roll of an area's plane.
+
+    Returns
+    -------
+    AreaPixels
+        `iterations` counts the rounds of step 4.
+
+    Raises
+    ------
+    EstimationError
+        When no area has enough valid pixels, or none looks like a road.
+    """
+    require_pixels(usable)
+    side = max(2, round(max(disparity.shape) / _TILES))
+    grams = tile_sums(disparity, usable, side).areas(_SIZE, _STEP)
+    across, grams = grams.shape[1], grams.reshape(-1, 4, 4)
+    extent = _SIZE * side
+    filled = np.flatnonzero(grams[:, 0, 0] >= _FILLED * extent**2)
+    if len(filled) == 0:
+        raise EstimationError(f"no area of {extent}x{extent} pixels is at least half valid")
+    grams = grams[filled]
+    planes = _fitted(grams)
+    roads = _look_like_road(planes, settings.max_roll)
+    if not roads.any():
+        if np.ptp(disparity[usable]) == 0:
+            raise EstimationError(SAME_EVERYWHERE)
+        raise EstimationError("no area looks like a road: disparity grows downward in none")
+    agreeing, rounds, status = _agreeing(grams, planes, roads, settings.max_roll)
+    covered = _covered(filled[agreeing], across, _STEP * side, extent, disparity.shape)
+    return AreaPixels(usable & covered, rounds, status)
+
+
+def _fitted(grams: Floats) -> Floats:
+    """Return the least-squares planes (c0, c1, c2) of areas (N, 4, 4).
+
+    An area is at least half valid, so that its pixels do determine a plane.
+    """
+    n = grams[:, 0, 0]
+    p, q, d = (grams[:, 0, k] / n for k in (1, 2, 3))
+    pp, qq = grams[:, 1, 1] - n * p * p, grams[:, 2, 2] - n * q * q
+    pq = grams[:, 1, 2] - n * p * q
+    pd, qd = grams[:, 1, 3] - n * p * d, grams[:, 2, 3] - n * q * d
+    spread = pp * qq - pq * pq
+    rounding = _ROUNDING * d * np.sqrt(n * (pp + qq))  # lest a constant area rise by rounding alone
+    spread = np.where(np.hypot(pd, qd) <= rounding, np.inf, spread)
+    c1, c2 = (qq * pd - pq * qd) / spread, (pp * qd - pq * pd) / spread
+    return np.stack([d - c1 * p - c2 * q, c1, c2], axis=-1)
+
+
+def _misfit(grams: Floats, planes: Floats) -> Floats:
+    """Return the root mean squared residual of each plane (P, 3) in each area (A, 4, 4), shape (A, P), px."""
+    x = np.concatenate([-planes, np.ones((len(planes), 1))], axis=1)
+    forms = (x[:, :, None] * x[:, None, :]).reshape(-1, 16)
+    squares = grams.reshape(-1, 16) @ forms.T / grams[:, :1, 0]
+    misfit: Floats = np.sqrt(np.maximum(squares, 0))
+    return misfit
+
+
+def _look_like_road(planes: Floats, max_roll: float) -> NDArray[np.bool_]:
+    """Return which planes (N, 3) have a disparity that grows downward, and a roll within bounds."""
+    _, c1, c2 = planes.T
+    roads: NDArray[np.bool_] = (c2 > 0) & (np.abs(c1) <= math.tan(max_roll) * c2)
+    return roads
+
+
+def _agreeing(
+    grams: Floats, planes: Floats, roads: NDArray[np.bool_], max_roll: float
+) -> tuple[NDArray[np.bool_], int, SolverStatus]:
+    """Return which areas (A,) share one plane, after how many rounds, and whether these settled.
+
+    Parameters
+    ----------
+    grams : ndarray, shape (A, 4, 4)
+        Sums of the areas.
+    planes : ndarray, shape (A, 3)
+        Their own planes.
+    roads : ndarray of bool, shape (A,)
+        Which of these look like a road and compete to be the best.
+    max_roll : float
+        Radians.
+    """
+    competing = np.flatnonzero(roads)[:: max(1, np.count_nonzero(roads) // _TRIED)]
+    misfit = _misfit(grams, planes[competing])
+    own = misfit[competing, np.arange(len(competing))]
+    mean = grams[roads, 0, 3].sum() / grams[roads, 0, 0].sum()
+    tolerance = max(_TOLERANCE * float(mean), _NOISE * float(np.quantile(own, _SMOOTH)))
+    explained = misfit <= tolerance
+    chosen = explained[:, int(np.argmax(grams[:, 0, 0] @ explained))]
+    for rounds in range(1, _ROUNDS + 1):
+        plane = _fitted(grams[chosen].sum(axis=0, keepdims=True))
+        again = _misfit(grams, plane)[:, 0] <= tolerance
+        if not again.any() or not _look_like_road(plane, max_roll).all():
+            return chosen, rounds, SolverStatus.DRIFTED
+        if (again == chosen).all():
+            return chosen, rounds, SolverStatus.CONVERGED
+        chosen = again
+    return chosen, _ROUNDS, SolverStatus.STEP_LIMIT
+
+
+def _covered(
+    areas: NDArray[np.intp], across: int, step: int, extent: int, shape: tuple[int, ...]
+) -> NDArray[np.bool_]:
+    """Return the pixels (H, W) of areas given by their number, `across` in a row."""
+    covered = np.zeros(shape, np.bool_)
+    for row, column in zip(*np.divmod(areas, across), strict=True):
+        covered[row * step : row * step + extent, column * step : column * step + extent] = True
+    return covered
+
+
+_ROWS = (0.6, 0.9)  # below the horizon, above a bonnet
+_COLUMNS = (0.35, 0.65)
+
+
+def lower_centre(
+    disparity: NDArray[Any], usable: NDArray[np.bool_], settings: AreaSettings = DEFAULT_AREA
+) -> AreaPixels:
+    """Choose 60 to 90 % of the height and 35 to 65 % of the width, or all usable pixels.
+
+    Parameters
+    ----------
+    disparity : ndarray, shape (H, W)
+        Real numbers, px.
+    usable : ndarray of bool, shape (H, W)
+        The pixels that are valid and may be used.
+    settings : AreaSettings
+        Whether the usable pixels are the chosen area.
+
+    Returns
+    -------
+    AreaPixels
+        With 0 iterations.
+    """
+    if settings.chosen:
+        return AreaPixels(usable)
+    used = np.zeros(disparity.shape, np.bool_)
+    area = lower_centre_slices(*disparity.shape)
+    used[area] = usable[area]
+    return AreaPixels(used)
+
+
+def lower_centre_slices(height: int, width: int) -> tuple[slice, slice]:
+    """Return the rows and columns of the default area."""
+    rows, columns = (
+        slice(round(low * n), round(high * n)) for (low, high), n in ((_ROWS, height), (_COLUMNS, width))
+    )
+    return rows, columns

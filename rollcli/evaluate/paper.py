@@ -1,0 +1,130 @@
+"""`evaluate paper` from the command line: maps to workers, their findings to tables and one page."""
+
+import contextlib
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rollcli.errors import ExitStatus, UsageError
+from rollcli.evaluate.options import PaperOptions
+from rollcli.evaluate.truth import read_truth
+from rollcli.files.atomic import remove_leftovers, write_atomic
+from rollcli.files.matching import stem_of
+from rollcli.report.page import require_extra
+from rollcli.run.find import check_writes, list_files, map_frames
+from rollcli.run.frame import Frame
+from rollcli.run.progress import Progress
+from rollcli.run.workers.in_order import Work, Workers
+from rollcli.run.workers.interrupt import stop_on_signals
+from rollcli.run.workers.tasks import run_tasks
+
+if TYPE_CHECKING:
+    from rollcli.evaluate.experiments import Findings, Times
+
+PAGE = "paper.html"
+TABLES = ("maps", "table1_iterations", "table2_runtime", "fig3_lambda0", "fig6_accuracy", "methods_accuracy")
+
+
+def run_paper(options: PaperOptions) -> ExitStatus:
+    """Repeat the paper's experiments on maps.
+
+    Parameters
+    ----------
+    options : PaperOptions
+
+    Returns
+    -------
+    ExitStatus
+        FRAMES_FAILED when a map gave no angle, INTERRUPTED when interrupted.
+
+    Raises
+    ------
+    UsageError, InputError
+        Exit status 2.
+    OutputError
+        Exit status 1.
+    """
+    require_extra("the page of charts")
+    if options.encoding.encoding == "depth":
+        raise UsageError("--encoding depth: the experiments are made on disparity maps, not on depth maps")
+    folder, running = options.experiments.output, options.running
+    frames = map_frames(options.inputs, region=options.region, skip=[folder])
+    truth = _known_angles(frames, options)
+    writes = [str(Path(folder, name)) for name in (*(f"{name}.csv" for name in TABLES), PAGE)]
+    reads = [path for frame in frames for path in frame.reads()]
+    check_writes(reads, writes, overwrite=running.overwrite)
+    if running.dry_run:
+        list_files([(reads, writes)])
+        return ExitStatus.DONE
+    return _run(frames, truth, options)
+
+
+def _known_angles(frames: list[Frame], options: PaperOptions) -> Mapping[str, float]:
+    if options.experiments.truth is None:
+        return {}
+    truth = read_truth(options.experiments.truth)
+    for frame in frames:
+        if stem_of(frame.file) not in truth:
+            raise UsageError(f"{frame.file}: has no known angle in {options.experiments.truth}")
+    return truth
+
+
+def _run(frames: list[Frame], truth: Mapping[str, float], options: PaperOptions) -> ExitStatus:
+    from rollcli.evaluate.paper_job import examine_file, lost
+
+    work = Work(partial(examine_file, options=options, truth=truth), lost)
+    progress = Progress(len(frames), options.running, options.encoding, statuses=("ok",))
+    found: list[Findings] = []
+    failed: list[tuple[str, str]] = []
+    with (
+        stop_on_signals() as stop,
+        progress,
+        contextlib.closing(run_tasks(frames, work, stop, Workers(options.running.jobs))) as all_examined,
+    ):
+        for examined in all_examined:
+            progress.add(examined.result)
+            if examined.findings is None:
+                failed.append((examined.result.row.file, examined.result.row.message))
+            else:
+                found.append(examined.findings)
+    if stop.asked:
+        progress.say(f"interrupted after {progress.done} of {progress.total} maps; nothing is written")
+        return ExitStatus.INTERRUPTED
+    progress.tell_end()
+    if not found:
+        progress.say("no map gave an angle: there is nothing to tabulate")
+        return progress.status
+    times = _time(frames, found, options, progress)
+    _write(found, failed, times, options)
+    progress.note(f"{Path(options.experiments.output, PAGE)} and {len(TABLES)} tables are written")
+    return progress.status
+
+
+def _time(
+    frames: list[Frame], found: "list[Findings]", options: PaperOptions, progress: Progress
+) -> "list[Times]":
+    """Take the run times on the first maps, in this process alone."""
+    from rollcli.evaluate.experiments import time_solvers
+    from rollcli.evaluate.paper_job import usable_pixels
+    from rollcli.run.read import read_source
+
+    good = {findings.file for findings in found}
+    chosen = [frame for frame in frames if frame.file in good][: options.experiments.timed]
+    progress.note(f"run times, on {len(chosen)} of the maps")
+    return [time_solvers(usable_pixels(read_source(frame, options.frame))) for frame in chosen]
+
+
+def _write(
+    found: "list[Findings]", failed: list[tuple[str, str]], times: "list[Times]", options: PaperOptions
+) -> None:
+    from rollcli.evaluate.paper_page import paper_page
+    from rollcli.evaluate.tables import all_tables
+
+    tables = all_tables(found, failed, times)
+    folder = Path(options.experiments.output)
+    page = paper_page(tables, found, failed, times, options)
+    written = {folder / f"{name}.csv": tables[name].csv() for name in TABLES} | {folder / PAGE: page}
+    remove_leftovers(written)
+    for path, data in written.items():
+        write_atomic(path, data)

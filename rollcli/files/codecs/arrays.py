@@ -1,0 +1,111 @@
+"""NPY files, and portable float maps [http://www.pauldebevec.com/Research/HDR/PFM/]."""
+
+import io
+import math
+import re
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollcli.errors import InputError, OutputError
+from rollcli.files.codecs.raw_map import require_decoded_fits, require_map_shape
+
+MAGIC = b"\x93NUMPY"
+_MAX_HEADER = 10_000
+# Not ast.literal_eval, as NumPy has it: that warns on the terminal, and bounds neither time nor memory
+_ENTRIES = {
+    "descr": re.compile(r"""['"]descr['"]\s*:\s*('[ -&(-~]*'|"[ !#-~]*"|\[)"""),
+    "fortran_order": re.compile(r"""['"]fortran_order['"]\s*:\s*(True|False)\b"""),
+    "shape": re.compile(r"""['"]shape['"]\s*:\s*\(((?:\s*\d{1,18}L?\s*,)*(?:\s*\d{1,18}L?)?)\s*\)"""),
+}
+_REAL = re.compile(r"[<>|=]?[biuf]\d+")
+_UNREAL = {
+    "O": "Python objects (a pickle, which is never loaded)",
+    "c": "complex numbers",
+    "[": "records",
+}
+
+
+def decode_npy(data: bytes, name: str) -> NDArray[Any]:
+    """Return the array of an .npy file: real numbers or booleans, shape (H, W), any byte and axis order."""
+    dtype, fortran, shape, start = _header(data, name)
+    require_map_shape(shape, name)
+    count = math.prod(shape)
+    needed, there = count * dtype.itemsize, len(data) - start
+    if there < needed:
+        raise InputError(
+            f"{name}: is truncated: shape {shape} of {dtype} needs {needed} bytes, {there} are there"
+        )
+    require_decoded_fits(shape[1], shape[0], dtype.itemsize, len(data), name)
+    values = np.frombuffer(data, dtype, count=count, offset=start)
+    return values.reshape(shape, order="F" if fortran else "C")
+
+
+def encode_npy(values: NDArray[Any]) -> bytes:
+    """Return an .npy file of the array."""
+    buffer = io.BytesIO()
+    np.lib.format.write_array(buffer, np.ascontiguousarray(values), allow_pickle=False)
+    return buffer.getvalue()
+
+
+def _header(data: bytes, name: str) -> tuple[np.dtype[Any], bool, tuple[int, ...], int]:
+    """Return dtype, Fortran order, shape, and where the numbers start."""
+    width = 2 if data[6:7] == b"\x01" else 4
+    start = 8 + width + int.from_bytes(data[8 : 8 + width], "little")
+    if len(data) < 8 + width or start > len(data):
+        raise InputError(f"{name}: is truncated within its NPY header")
+    text = data[8 + width : start][:_MAX_HEADER].decode("latin-1")
+    entries = {key: pattern.search(text) for key, pattern in _ENTRIES.items()}
+    descr, order, shape = entries["descr"], entries["fortran_order"], entries["shape"]
+    if descr is None or order is None or shape is None:
+        raise InputError(f"{name}: its NPY header cannot be read")
+    sides = tuple(int(side) for side in re.findall(r"\d+", shape[1]))
+    return _real_dtype(descr[1], name), order[1] == "True", sides, start
+
+
+def _real_dtype(descr: str, name: str) -> np.dtype[Any]:
+    """Return the dtype when it holds real numbers; objects, records, complex numbers, text are refused."""
+    if _REAL.fullmatch(descr[1:-1]):
+        try:
+            return np.dtype(descr[1:-1])
+        except TypeError:
+            pass
+    kind = descr.lstrip("'\"<>|=")[:1]
+    what = _UNREAL.get(kind, f"data of type {descr[1:-1][:40]}")
+    raise InputError(f"{name}: holds {what}; a disparity map is a 2-D array of real numbers")
+
+
+MAGICS = (b"Pf", b"PF")
+_GAP = rb"(?:\s|#[^\n]*\n)+"
+_FLOAT = rb"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,3})?)"
+_HEADER = re.compile(rb"P([fF])" + 2 * (_GAP + rb"(\d{1,9})") + _GAP + _FLOAT + rb"[ \t]*\r?\n")
+
+
+def decode_pfm(data: bytes, name: str) -> NDArray[Any]:
+    """Return the float32 values of a single-channel PFM file, top row first."""
+    header = _HEADER.match(data, 0, min(len(data), 1000))
+    if header is None or float(header[4]) == 0:
+        raise InputError(f"{name}: its PFM header cannot be read (expected: Pf, width height, scale)")
+    if header[1] == b"F":
+        raise InputError(f"{name}: is a colour PFM (PF); a disparity map has one channel (Pf)")
+    width, height = int(header[2]), int(header[3])
+    if width * height == 0:
+        raise InputError(f"{name}: has no pixels ({width} x {height})")
+    needed, there = 4 * width * height, len(data) - header.end()
+    if there < needed:
+        raise InputError(
+            f"{name}: is truncated: {width} x {height} pixels need {needed} bytes, {there} are there"
+        )
+    require_decoded_fits(width, height, 4, len(data), name)
+    order = "<f4" if header[4].startswith(b"-") else ">f4"
+    rows = np.frombuffer(data, order, count=width * height, offset=header.end()).reshape(height, width)
+    return rows[::-1]  # PFM stores the bottom row first
+
+
+def encode_pfm(values: NDArray[Any]) -> bytes:
+    """Return a little-endian single-channel PFM file of float32 values."""
+    if values.dtype != np.float32:
+        raise OutputError(f"a PFM holds float32, not {values.dtype}: write TIFF or NPY instead")
+    height, width = values.shape
+    return b"Pf\n%d %d\n-1.0\n" % (width, height) + values[::-1].astype("<f4").tobytes()

@@ -1,1 +1,0 @@
-"""What OpenCV does for us: stereo matching, de-rotation, v-disparity images."""

@@ -1,0 +1,146 @@
+"""Pictures of disparity maps, and of the road found in them."""
+
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from rollcli.pictures.round_step import round_step
+
+_ROAD = (220, 230, 40)  # BGR
+_TINT = 0.5
+_BLOCK = 2**20  # pixels
+BAR_WIDTH = 64  # of the colour bar, pixels
+_LABEL_EVERY = 50  # pixels along the bar
+_INK = (60, 60, 60)
+_FONT = cv2.FONT_HERSHEY_SIMPLEX
+
+
+def draw_disparity(disparity: NDArray[Any]) -> NDArray[np.uint8]:
+    """Draw a map in colour: dark is far, bright is near, black is no data.
+
+    Parameters
+    ----------
+    disparity : ndarray, shape (H, W)
+        Pixels; NaN, inf and <= 0 are no data.
+
+    Returns
+    -------
+    ndarray of uint8, shape (H, W, 3)
+        BGR.
+    """
+    return _coloured(_levels(disparity), _colours())
+
+
+def draw_road(disparity: NDArray[Any], mask: NDArray[Any]) -> NDArray[np.uint8]:
+    """Draw a map in colour, as `draw_disparity` has it, with the road tinted and outlined.
+
+    Parameters
+    ----------
+    disparity : ndarray, shape (H, W)
+        Pixels; NaN, inf and <= 0 are no data.
+    mask : ndarray, shape (H, W)
+        Non-zero where the road is.
+
+    Returns
+    -------
+    ndarray of uint8, shape (H, W, 3)
+        BGR.
+    """
+    levels = _levels(disparity)
+    road = (np.asarray(mask) != 0).astype(np.uint8)
+    colours = _colours()
+    tinted = (colours * (1 - _TINT) + np.array(_ROAD) * _TINT).astype(np.uint8)
+    picture = _coloured(levels, colours)
+    cv2.copyTo(_coloured(levels, tinted), road, picture)
+    return _outlined(picture, road)
+
+
+def draw_road_on_photo(photo: NDArray[Any], mask: NDArray[Any]) -> NDArray[np.uint8]:
+    """Draw a camera image with the road tinted and outlined.
+
+    Parameters
+    ----------
+    photo : ndarray, shape (H, W) or (H, W, 3)
+        Grey or BGR, uint8 or uint16; of any size, it is drawn at the size of the mask.
+    mask : ndarray, shape (H', W')
+        Non-zero where the road is.
+
+    Returns
+    -------
+    ndarray of uint8, shape (H', W', 3)
+        BGR.
+    """
+    road = (np.asarray(mask) != 0).astype(np.uint8)
+    pixels = photo if photo.dtype == np.uint8 else (photo >> 8).astype(np.uint8)
+    if pixels.shape[:2] != road.shape:
+        pixels = cv2.resize(pixels, road.shape[::-1], interpolation=cv2.INTER_AREA)
+    picture = cv2.cvtColor(pixels, cv2.COLOR_GRAY2BGR) if pixels.ndim == 2 else pixels.copy()
+    tinted = (picture * (1 - _TINT) + np.array(_ROAD) * _TINT).astype(np.uint8)
+    return _outlined(cv2.copyTo(tinted, road, picture).astype(np.uint8, copy=False), road)
+
+
+def draw_preview(disparity: NDArray[Any]) -> NDArray[np.uint8]:
+    """Draw a map in colour, as `draw_disparity` has it, with a colour bar that names disparities in pixels.
+
+    Parameters
+    ----------
+    disparity : ndarray, shape (H, W)
+        Pixels; NaN, inf and <= 0 are no data.
+
+    Returns
+    -------
+    ndarray of uint8, shape (H, W + BAR_WIDTH, 3)
+        BGR.
+    """
+    picture = draw_disparity(disparity)
+    height = len(picture)
+    bar = np.full((height, BAR_WIDTH, 3), 255, np.uint8)
+    levels = np.linspace(255, 1, height).astype(np.uint8)[:, None]
+    bar[:, 8:24] = _coloured(levels, _colours())
+    top = _top(np.asarray(disparity))
+    step = round_step(top * _LABEL_EVERY / height) if height > _LABEL_EVERY else top
+    for number in range(int(top / step * (1 + 1e-9)) + 1):
+        label = number * step
+        row = min(max(round((1 - label / top) * (height - 1)) + 4, 9), height - 4)
+        text = f"{label:g}" if label else "0 px"
+        cv2.putText(bar, text, (28, row), _FONT, 0.36, _INK, 1, cv2.LINE_AA)
+    return np.hstack([picture, bar])
+
+
+def _outlined(picture: NDArray[np.uint8], road: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    outlines, _ = cv2.findContours(road, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    return cv2.drawContours(picture, outlines, -1, _ROAD, 1).astype(np.uint8, copy=False)
+
+
+def _top(values: NDArray[Any]) -> float:
+    """Return the disparity that gets the brightest colour, px: a few outliers must not darken the rest."""
+    valid = np.isfinite(values) & (values > 0)
+    return float(np.percentile(values[valid], 99)) if valid.any() else 1.0
+
+
+def _levels(disparity: NDArray[Any]) -> NDArray[np.uint8]:
+    """Return 0 for no data, 1..255 for small to large disparities."""
+    values = np.asarray(disparity)
+    top, levels = _top(values), np.empty(values.shape, np.uint8)
+    step = max(1, _BLOCK // max(1, values.shape[1]))  # a few rows at a time, for the memory of large maps
+    for first in range(0, len(values), step):
+        some = values[first : first + step]
+        valid = np.isfinite(some) & (some > 0)
+        levels[first : first + step] = np.where(
+            valid, np.clip(np.where(valid, some, 0) * (255 / top), 1, 255), 0
+        )
+    return levels
+
+
+def _coloured(levels: NDArray[np.uint8], colours: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    return cv2.applyColorMap(levels, colours.reshape(256, 1, 3)).astype(np.uint8, copy=False)
+
+
+def _colours() -> NDArray[np.uint8]:
+    """Return the BGR of each level, shape (256, 3); even the smallest disparity differs from no data."""
+    ramp = np.linspace(40, 255, 256).astype(np.uint8)
+    colours = cv2.applyColorMap(ramp, cv2.COLORMAP_INFERNO).reshape(256, 3).astype(np.uint8, copy=False)
+    colours[0] = 0
+    return colours

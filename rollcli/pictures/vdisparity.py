@@ -1,0 +1,244 @@
+"""v-disparity [VD]: the histogram of each row's disparities, as counts and as a picture."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from rollcli.errors import UsageError
+from rollcli.pictures.round_step import round_step
+
+_MAX_BINS = 1024
+_BLOCK = 1 << 22  # pixels counted at a time: a large map would take 40 bytes a pixel
+
+
+@dataclass(frozen=True)
+class VDisparity:
+    """Counts of disparities, row by row.
+
+    Attributes
+    ----------
+    counts : ndarray of int32, shape (H, bins)
+        counts[v, b]: valid pixels of row v with a disparity in bin b; a row sums to its valid pixels.
+    max_disparity : float
+        Pixels; the bins divide 0..max_disparity evenly, and the last also holds what lies beyond.
+    """
+
+    counts: NDArray[np.int32]
+    max_disparity: float
+
+
+def v_disparity(
+    disparity: NDArray[Any], *, bins: int | None = None, max_disparity: float | None = None
+) -> VDisparity:
+    """Count the disparities of each row.
+
+    Parameters
+    ----------
+    disparity : ndarray, shape (H, W)
+        Pixels; NaN, inf and <= 0 are no data.
+    bins : int, optional
+        By default one a pixel for maps of whole pixels, else four a pixel and at least 256; at most 1024.
+    max_disparity : float, optional
+        Pixels; by default just above the largest of the map.
+
+    Raises
+    ------
+    UsageError
+        bins or max_disparity is not positive, or the array is not 2-D.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> v_disparity(np.array([[1, 2, 2], [0, 3, 3]])).counts
+    array([[0, 1, 2, 0],
+           [0, 0, 0, 2]], dtype=int32)
+    """
+    values = np.asarray(disparity)
+    if values.ndim != 2:
+        raise UsageError(f"a disparity map is 2-D, not of shape {values.shape}")
+    step = max(1, _BLOCK // max(1, values.shape[1]))
+    blocks = [values[top : top + step] for top in range(0, len(values), step)]
+    if max_disparity is None:
+        max_disparity = math.floor(max((_pixels(each).max(initial=0) for each in blocks), default=0)) + 1.0
+    if not 0 < max_disparity < math.inf or (bins is not None and bins < 1):
+        raise UsageError(f"bins {bins} and max-disparity {max_disparity}: both must be positive")
+    if bins is None:
+        whole = all(bool((pixels == np.rint(pixels)).all()) for pixels in map(_pixels, blocks))
+        bins = min(math.ceil(max_disparity) if whole else max(256, math.ceil(4 * max_disparity)), _MAX_BINS)
+    counts = [_counts(_pixels(each), bins, max_disparity) for each in blocks]
+    return VDisparity(np.concatenate([np.zeros((0, bins), np.int32), *counts]), max_disparity)
+
+
+def _pixels(values: NDArray[Any]) -> NDArray[np.float64]:
+    """Disparities; what is no data is 0."""
+    return np.where(np.isfinite(values) & (values > 0), values, 0).astype(np.float64)
+
+
+def _counts(pixels: NDArray[np.float64], bins: int, max_disparity: float) -> NDArray[np.int32]:
+    """Return the histogram of each row; the last bin also holds what lies beyond."""
+    shares = np.minimum(pixels, max_disparity) / max_disparity
+    cells = np.minimum(shares * bins, bins - 1).astype(np.int64)
+    cells[pixels == 0] = bins  # one bin more, for what is no data
+    cells += np.arange(len(pixels))[:, None] * (bins + 1)
+    counts = np.bincount(cells.ravel(), minlength=len(pixels) * (bins + 1)).reshape(len(pixels), bins + 1)
+    return np.ascontiguousarray(counts[:, :-1], dtype=np.int32)
+
+
+def row_offset(theta: float, width: int, height: int) -> float:
+    """Return what to add to a row of the map de-rotated about its centre to get y of the method, pixels.
+
+    y = v cos - u sin is measured from the top-left pixel of the map as it was; `derotate` keeps the centre.
+    """
+    u, v = (width - 1) / 2, (height - 1) / 2
+    return v * math.cos(theta) - u * math.sin(theta) - v
+
+
+def profile(alpha: tuple[float, float, float], theta: float, width: int) -> tuple[float, float, float]:
+    """Return the road's disparity along the middle column of a map, as a parabola of the row.
+
+    Parameters
+    ----------
+    alpha : tuple of float
+        The road: d = a0 + a1 y + a2 y^2, pixels, y measured as the method does.
+    theta : float
+        Roll of the map, radians.
+    width : int
+        Of the map, pixels.
+    """
+    a0, a1, a2 = alpha
+    start, step = _middle_column(theta, width)
+    return a0 + a1 * start + a2 * start**2, (a1 + 2 * a2 * start) * step, a2 * step**2
+
+
+def middle_row(y: float, theta: float, width: int) -> float:
+    """Return the row where the middle column of a map has a y of the method, pixels."""
+    start, step = _middle_column(theta, width)
+    return (y - start) / step
+
+
+def _middle_column(theta: float, width: int) -> tuple[float, float]:
+    """Return start and step of y = start + step * row along the middle column of a map."""
+    return -(width - 1) / 2 * math.sin(theta), math.cos(theta)
+
+
+_UNIT_ROWS = 480  # sizes below are pixels; a map of so many times these rows has them so many times larger
+LEFT_MARGIN, BOTTOM_MARGIN = 40, 32  # the first rows of a picture are the rows of the map
+_SHOWN = 0.998  # share of the pixels within the shown range: a few outliers must not squeeze the road
+_ROUND_PX = 16.0  # the range ends at a multiple of this, so that frames of one drive share their scale
+_WIDTH = 320  # of the chart: all pictures of one size of map have the same size
+_LABEL_EVERY = (60, 40)  # pixels between labels, along the disparities and along the rows
+_DASH = 8
+_SHIFT = 4  # bits of a coordinate after the point
+_ROAD = (255, 255, 0)  # BGR: cyan, which the colours of the counts do not have
+_HORIZON = (120, 220, 120)
+_PAPER, _INK = (255, 255, 255), (60, 60, 60)
+_FONT, _SIZE = cv2.FONT_HERSHEY_SIMPLEX, 0.36
+
+
+def draw_v_disparity(
+    histogram: VDisparity,
+    alpha: tuple[float, float, float] | None = None,
+    offset: float = 0.0,
+    horizon: float | None = None,
+) -> NDArray[np.uint8]:
+    """Draw counts: log scale, bright where many, with the road's parabola and the horizon over them.
+
+    Parameters
+    ----------
+    histogram : VDisparity
+        Of a de-rotated map, where the road is a thin line.
+    alpha : tuple of float, optional
+        The road: d = a0 + a1 y + a2 y^2, pixels, with y = row + offset.
+    offset : float
+        See `row_offset`.
+    horizon : float, optional
+        The row of the road's horizon, pixels.
+
+    Returns
+    -------
+    ndarray of uint8, shape (H + BOTTOM_MARGIN, LEFT_MARGIN + width, 3)
+        BGR. Its first H rows are the rows of the map; the margins name rows and disparities, in pixels.
+        Width, margins and letters are twice as large for 960 rows, three times for 1440, and so on.
+    """
+    unit = max(1, len(histogram.counts) // _UNIT_ROWS)
+    counts, top = _shown(histogram, _WIDTH * unit)
+    light = np.log1p(counts)
+    brightest = float(np.percentile(light[counts > 0], 99.9)) if counts.any() else 1.0
+    grey = np.minimum(light * (255 / brightest), 255).astype(np.uint8)
+    chart = cv2.applyColorMap(grey, cv2.COLORMAP_INFERNO).astype(np.uint8, copy=False)
+    if horizon is not None and 0 <= horizon <= len(chart) - 1:
+        _draw_horizon(chart, round(horizon), unit)
+    if alpha is not None:
+        _draw_road(chart, np.polynomial.Polynomial(alpha), offset, top, unit)
+    return _with_margins(chart, top, unit)
+
+
+def _shown(histogram: VDisparity, width: int) -> tuple[NDArray[np.float32], float]:
+    """Return the counts of the range that is shown, `width` columns wide, and its end, px."""
+    counts, end = histogram.counts, histogram.max_disparity
+    reached = np.cumsum(counts.sum(axis=0))
+    total = int(reached[-1])
+    last = int(np.searchsorted(reached, _SHOWN * total)) + 1 if total else counts.shape[1]
+    per_bin = end / counts.shape[1]
+    bins = min(counts.shape[1], math.ceil(math.ceil(last * per_bin / _ROUND_PX) * _ROUND_PX / per_bin))
+    kind = cv2.INTER_AREA if bins > width else cv2.INTER_NEAREST
+    shown = cv2.resize(counts[:, :bins].astype(np.float32), (width, len(counts)), interpolation=kind)
+    return shown.astype(np.float32, copy=False), bins * per_bin
+
+
+def _draw_road(
+    chart: NDArray[np.uint8], road: "np.polynomial.Polynomial", offset: float, top: float, unit: int
+) -> None:
+    """Draw the road's curve, dashed so that what it lies on can be seen."""
+    height, width = chart.shape[:2]
+    for start in range(0, height, 2 * _DASH * unit):
+        rows = np.arange(start, min(start + _DASH * unit, height))
+        columns = road(rows + offset) * (width / top)
+        points = np.column_stack([columns, rows])[(columns >= 0) & (columns < width)]
+        sides = [points + np.array([side, 0.0]) for side in (-0.5 * unit, 0.5 * unit)]
+        fixed = [np.rint(each * 2**_SHIFT).astype(np.int32) for each in sides]
+        cv2.polylines(chart, fixed, False, _ROAD, unit, cv2.LINE_AA, _SHIFT)
+
+
+def _draw_horizon(chart: NDArray[np.uint8], row: int, unit: int) -> None:
+    dash = _DASH * unit
+    for start in range(0, chart.shape[1], 2 * dash):
+        cv2.line(chart, (start, row), (start + dash - 1, row), _HORIZON, unit)
+    place = (4 * unit, max(row - 4 * unit, 10 * unit))
+    cv2.putText(chart, "horizon", place, _FONT, _SIZE * unit, _HORIZON, unit, cv2.LINE_AA)
+
+
+def _with_margins(chart: NDArray[np.uint8], top: float, unit: int) -> NDArray[np.uint8]:
+    """Return the chart with rows named on its left and disparities below it."""
+    height, width = chart.shape[:2]
+    left, tick = LEFT_MARGIN * unit, 4 * unit
+    picture = np.full((height + BOTTOM_MARGIN * unit, left + width, 3), _PAPER, np.uint8)
+    picture[:height, left:] = chart
+    for row in _ticks(float(height), float(_LABEL_EVERY[1] * unit)):
+        cv2.line(picture, (left - tick, int(row)), (left - 1, int(row)), _INK, unit)
+        _write(picture, f"{row:g}", left - 7 * unit, max(int(row) + 4 * unit, 9 * unit), unit, align=1.0)
+    for disparity in _ticks(top, _LABEL_EVERY[0] * unit * top / width):
+        column = left + round(disparity * width / top)
+        cv2.line(picture, (column, height), (column, height + tick - 1), _INK, unit)
+        _write(picture, f"{disparity:g}", column, height + 14 * unit, unit, align=0.5)
+    _write(picture, "disparity, px", left + width // 2, height + 27 * unit, unit, align=0.5)
+    _write(picture, "row", left - 7 * unit, height + 27 * unit, unit, align=1.0)
+    return picture
+
+
+def _ticks(end: float, least_step: float) -> Iterator[float]:
+    """Yield round numbers from 0 up to `end`, at least `least_step` apart: steps of 1, 2 or 5 times 10^n."""
+    step = round_step(least_step)
+    yield from (number * step for number in range(int(end / step) + 1) if number * step < end)
+
+
+def _write(picture: NDArray[np.uint8], text: str, column: int, row: int, unit: int, *, align: float) -> None:
+    """Write a line; `align` 0 starts at the column, 0.5 is centred there, 1 ends there."""
+    (width, _), _ = cv2.getTextSize(text, _FONT, _SIZE * unit, unit)
+    left = min(max(column - round(align * width), 0), picture.shape[1] - width)
+    cv2.putText(picture, text, (left, row), _FONT, _SIZE * unit, _INK, unit, cv2.LINE_AA)

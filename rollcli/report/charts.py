@@ -1,0 +1,438 @@
+"""Every chart of a result: what its page shows, and what is written for slides."""
+
+import html
+import math
+from collections.abc import Iterable, Sequence, Set
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollcli.files.results import Row
+from rollcli.pictures.round_step import round_step
+from rollcli.report.chart import Chart, label
+from rollcli.report.options import HISTOGRAM, chart_names
+from rollcli.report.summary import degrees, with_interval
+from rollcli.rig.drive.assess import DriveAssessment, RigAssessment
+from rollcli.rig.drive.quantity import SequenceAssessment
+from rollcli.rig.drive.smoothing import smooth
+from rollcli.rig.quantities import HEIGHT, QUANTITIES, ROLL, Quantity
+from rollcli.rig.words import answer, decimals
+
+_FEWEST_TO_SMOOTH = 24  # frames: fewer are seen as they are
+
+RigTrace = dict[str, Any]
+
+
+def drive_starts(rig: RigAssessment) -> set[int]:
+    """Return the numbers, from 1, of the frames that begin a drive; no line is drawn into them."""
+    drives = [-1] * rig.count
+    for number, drive in enumerate(rig.drives):
+        for place in drive.frames.tolist():
+            drives[place] = number
+    return {place + 1 for place in range(1, rig.count) if drives[place] != drives[place - 1]}
+
+
+def rig_traces(rig: RigAssessment, quantity: Quantity, ends: tuple[float, float]) -> list[RigTrace]:
+    """Return the traces of all drives.
+
+    Parameters
+    ----------
+    rig : RigAssessment
+    quantity : Quantity
+    ends : (float, float)
+        The lower and upper end of the chart, degrees or metres, from which to which a jump is marked.
+
+    Returns
+    -------
+    list of dict
+        As plotly takes them; empty ones are left out.
+    """
+    band, means, smoothed, jumps = (
+        _trace("mounting, 95 %"),
+        _trace("mounting"),
+        _trace("smoothed"),
+        _trace("jump"),
+    )
+    band |= {"fill": "toself", "fillcolor": "@band", "line": {"width": 0}, "hoverinfo": "skip"}
+    means["line"] = {"color": "@c3", "width": 2}
+    smoothed["line"] = {"color": "@c4", "width": 1.5, "dash": "dot"}
+    jumps["line"] = {"color": "@error", "width": 1.5, "dash": "dash"}
+    for drive in rig.drives:
+        found = drive.quantities.get(quantity.name)
+        if found is not None:
+            _add_segments(drive, quantity, found, band, means)
+            _add_smoothed(drive, quantity, found, smoothed)
+            _add_jumps(rig, drive, quantity, found, jumps, ends)
+    return [trace for trace in (band, means, smoothed, jumps) if trace["x"]]
+
+
+def _trace(name: str) -> RigTrace:
+    labels = {"text": [], "hovertemplate": "%{text}<extra></extra>"}
+    return {"type": "scatter", "mode": "lines", "name": name, "x": [], "y": [], **labels}
+
+
+def _add(trace: RigTrace, x: Sequence[float], y: Sequence[float], text: str) -> None:
+    """Add a stretch; None parts it from the next."""
+    trace["x"] += [*x, None]
+    trace["y"] += [*(round(each, 4) for each in y), None]
+    trace["text"] += [*([html.escape(text)] * len(x)), None]
+
+
+def _add_segments(
+    drive: DriveAssessment, quantity: Quantity, found: SequenceAssessment, band: RigTrace, means: RigTrace
+) -> None:
+    for segment in found.segments:
+        value, half = segment.mean.value, segment.mean.ci95
+        if value is None or segment.first == segment.last:  # a frame alone is its own mean
+            continue
+        first, last = (int(drive.frames[place]) + 1 for place in (segment.first, segment.last))
+        said = f"mounting {quantity.name} {answer(segment.mean, quantity)}, of {segment.used:,} frames"
+        _add(means, [first, last], [value, value], said)
+        if half is not None:
+            low, high = value - half, value + half
+            _add(band, [first, last, last, first], [high, high, low, low], "")
+
+
+def _add_smoothed(
+    drive: DriveAssessment, quantity: Quantity, found: SequenceAssessment, smoothed: RigTrace
+) -> None:
+    for segment in found.segments:
+        if found.noise is None or segment.used < _FEWEST_TO_SMOOTH:
+            continue
+        part = slice(segment.first, segment.last + 1)
+        curve = smooth(found.values[part], found.weights[part], found.noise)
+        numbers = drive.frames[(curve.frames + segment.first).astype(int)] + 1
+        # neither across cells whose frames are all suspect, nor across frames of another drive
+        ends = np.flatnonzero(np.diff(numbers) > 1.5 * curve.cell) + 1
+        said = f"mounting {quantity.name}, smoothed"
+        for along, level in zip(np.split(numbers, ends), np.split(curve.level, ends), strict=True):
+            _add(smoothed, along.tolist(), level.tolist(), said)
+
+
+def _add_jumps(
+    rig: RigAssessment,
+    drive: DriveAssessment,
+    quantity: Quantity,
+    found: SequenceAssessment,
+    jumps: RigTrace,
+    ends: tuple[float, float],
+) -> None:
+    for jump in found.jumps:
+        frame = int(drive.frames[jump.frame])
+        said = f"jump by {answer(jump.change, quantity, change=True)} at {rig.frames.files[frame]}"
+        _add(jumps, [frame + 0.5, frame + 0.5], ends, said)
+
+
+@dataclass(frozen=True, slots=True)
+class Value:
+    """A frame and its value; degrees or metres.
+
+    Attributes
+    ----------
+    number : int
+        Of the frame, from 1.
+    value : float or None
+        None where the frame has none.
+    half_width : float or None
+        Of the 95 % interval.
+    row : Row
+    """
+
+    number: int
+    value: float | None
+    half_width: float | None
+    row: Row
+
+
+def values_of(rows: Sequence[Row], quantity: Quantity) -> list[Value]:
+    """Return the value of each frame."""
+    return [
+        Value(number, getattr(row, quantity.column), getattr(row, quantity.ci_column), row)
+        for number, row in enumerate(rows, 1)
+    ]
+
+
+def in_words(each: Value, quantity: Quantity) -> str:
+    """Return a value with its interval and unit; "" where there is none."""
+    if each.value is None:
+        return ""
+    if quantity is not HEIGHT:
+        return with_interval(each.value, each.half_width)
+    digits = decimals(each.half_width)
+    half = "" if each.half_width is None else f" ± {each.half_width:.{digits}f}"
+    return f"{each.value:.{digits}f}{half}{quantity.unit}"
+
+
+_BEYOND = 0.35  # a suspect value may widen the view by this share of the others' range, and by half a degree
+_WIDEST = 1.0  # degrees: a wider interval is seen to leave the view
+_DEGREE_IN_METRES = 0.1  # what of a height is as much as a degree of an angle
+
+
+def view(rows: Sequence[Row], quantity: Quantity = ROLL) -> tuple[float, float]:
+    """Return the ends of the axis: all values that are ok, and suspect ones that are not far off.
+
+    Parameters
+    ----------
+    rows : sequence of Row
+    quantity : Quantity
+
+    Returns
+    -------
+    tuple of float
+        Degrees or metres, the lower end first.
+    """
+    unit = _DEGREE_IN_METRES if quantity is HEIGHT else 1.0
+    there = [each for each in values_of(rows, quantity) if each.value is not None]
+    if not there:
+        return -unit, unit
+    low, high = _span([each for each in there if each.row.status == "ok"] or there, unit)
+    beyond = _BEYOND * (high - low) + 0.5 * unit
+    near = [value for each in there if low - beyond <= (value := each.value or 0.0) <= high + beyond]
+    low, high = min(low, *near), max(high, *near)  # without their intervals, which are wide
+    margin = 0.06 * (high - low) + 0.05 * unit
+    return round(low - margin, 3), round(high + margin, 3)
+
+
+def outside(rows: Sequence[Row], quantity: Quantity = ROLL) -> int:
+    """Return how many values lie outside of the view."""
+    low, high = view(rows, quantity)
+    return sum(each.value is not None and not low <= each.value <= high for each in values_of(rows, quantity))
+
+
+def _span(values: Iterable[Value], unit: float) -> tuple[float, float]:
+    """From the lowest to the highest end of an interval."""
+    ends = [
+        (each.value or 0.0) + side * min(each.half_width or 0.0, _WIDEST * unit)
+        for each in values
+        for side in (-1, 1)
+    ]
+    return min(ends), max(ends)
+
+
+_MOST_BINS = 40
+_NARROWEST = 0.01  # degrees
+_FEWEST_STEPS = 6
+
+
+def histogram(rows: Sequence[Row]) -> Chart:
+    """Return how many frames have which roll, suspect ones on top of the others."""
+    low, high = view(rows)
+    shown = [row.roll_deg for row in rows if row.roll_deg is not None and low <= row.roll_deg <= high]
+    low, high = min(shown, default=low), max(shown, default=high)
+    step = round_step(max((high - low) / _bins(len(shown)), _NARROWEST))
+    edges = np.arange(math.floor(low / step), math.floor(high / step) + 2) * step
+    spans = [f"{degrees(start, 3)} to {degrees(end, 3)}" for start, end in pairwise(edges.tolist())]
+    data = []
+    for status, colour in (("ok", "@c1"), ("suspect", "@suspect")):
+        rolls = [row.roll_deg for row in rows if row.roll_deg is not None and row.status == status]
+        bars = {
+            "type": "bar",
+            "name": status,
+            "x": np.round(edges[:-1], 6).tolist(),
+            "offset": 0,
+            "y": np.histogram(rolls, edges)[0].tolist(),
+            "width": step,
+            "marker": {"color": colour, "line": {"color": "@card", "width": 1}},
+            "customdata": spans,
+            "hovertemplate": "%{customdata}<br>%{y} frames<extra></extra>",
+        }
+        data += [bars] if rolls else []
+    layout = {
+        "barmode": "stack",
+        "showlegend": [trace["name"] for trace in data] != ["ok"],
+        "xaxis": {"title": {"text": "roll, degrees"}, "range": _padded(edges, step), "zeroline": False},
+        "yaxis": {"title": {"text": "frames"}, **_counted(int(np.histogram(shown, edges)[0].max()))},
+    }
+    return Chart(HISTOGRAM, "How many frames have which roll", data, layout)
+
+
+def _bins(count: int) -> int:
+    """Return fewer bins for fewer frames, so that bars are higher than one."""
+    return min(_MOST_BINS, max(5, math.ceil(2 * math.sqrt(count))))
+
+
+def _counted(highest: int) -> dict[str, Any]:
+    """Let the axis begin at nothing, with ticks at whole frames where bars are low."""
+    return {"range": [0, 1.05 * max(highest, 1)], **({"dtick": 1} if highest <= _FEWEST_STEPS else {})}
+
+
+def _padded(edges: NDArray[Any], step: float) -> list[float]:
+    """Widen the axis around a single bar, which would fill the chart."""
+    width = float(np.ptp(edges))
+    margin = max(0.02 * width, (_FEWEST_STEPS * step - width) / 2)
+    return [float(edges[0]) - margin, float(edges[-1]) + margin]
+
+
+_MANY = 400  # up to so many frames each has a dot, and marks are large
+_FEW = 10
+_FAILED_AT = 0.035  # of the chart's height
+_AXIS_UNITS = {"deg": "degrees", "m": "m"}
+
+_VALUES = ("x", "y", "customdata")
+
+Values = Sequence[Value]
+Trace = dict[str, Any]
+
+
+def chart_over_frames(
+    rows: Sequence[Row], quantity: Quantity = ROLL, rig: RigAssessment | None = None
+) -> Chart:
+    """Return the value of each frame: a line, its interval as a band, suspect and failed frames marked.
+
+    With `rig`, its segments, jumps and smoothed mounting value too. A line neither bridges a suspect frame
+    nor leads from one drive to another.
+
+    Parameters
+    ----------
+    rows : sequence of Row
+    quantity : Quantity
+    rig : RigAssessment, optional
+
+    Returns
+    -------
+    Chart
+        Its name is the quantity's.
+    """
+    values = values_of(rows, quantity)
+    ends = view(rows, quantity)
+    suspect = [each for each in values if each.row.status == "suspect" and each.value is not None]
+    failed = [each for each in values if each.row.status == "error"]
+    sure = [each for each in values if each.row.status == "ok" and each.value is not None]
+    starts = set() if rig is None else drive_starts(rig)
+    many = len(rows) > _MANY
+    # what is sure lies on top: suspect marks of a long run would hide it
+    data = [
+        _band(sure, starts),
+        _suspect(suspect, quantity, bars=not many),
+        *_lines(sure, starts, quantity, dots=not many),
+        _failed(failed, quantity),
+    ]
+    data = [trace for trace in data if trace["x"]]  # plotly's legend stumbles over what is empty
+    for trace in data:
+        trace["marker"] = {"size": 5 if many else 8, **trace.get("marker", {})}
+    data += [] if rig is None else rig_traces(rig, quantity, ends)
+    margin = max(0.5, 0.01 * len(rows))
+    unit = _AXIS_UNITS[quantity.suffix]
+    layout = {
+        "hovermode": "closest",
+        "hoverdistance": -1,
+        "showlegend": True,
+        "xaxis": {
+            "title": {"text": "frame"},
+            "range": [1 - margin, len(rows) + margin],
+            "zeroline": False,
+            "tickformat": ",d",
+            **({"dtick": 1} if len(rows) <= _FEW else {}),  # there are no half frames
+        },
+        "yaxis": {
+            "title": {"text": f"{quantity.name}, {unit}"},
+            "range": list(ends),
+            "zeroline": quantity is ROLL,
+        },
+        "yaxis2": {"overlaying": "y", "range": [0, 1], "visible": False, "fixedrange": True},
+    }
+    what = (
+        f"{quantity.name.capitalize()} in {unit} over {len(rows)} frames; "
+        f"{len(suspect)} suspect and {len(failed)} failed are marked"
+    )
+    return Chart(quantity.name, what, data, layout)
+
+
+def _lines(values: Values, starts: Set[int], quantity: Quantity, *, dots: bool) -> list[Trace]:
+    """Return the line and, where not every frame has a dot, the dots of frames that no line leads to.
+
+    A browser takes a second for 10,000 dots, which a line of so many frames would hide anyway.
+    """
+    stretches = _stretches(values, starts)
+    parts = [_points(stretch, quantity) for stretch in stretches]
+    line = {
+        "mode": "lines+markers" if dots else "lines",
+        "name": quantity.name,
+        "line": {"color": "@c1", "width": 1.5},
+        "marker": {"color": "@c1"},
+        **_points((), quantity),
+        **{name: [each for part in parts for each in (*part[name], None)] for name in _VALUES},
+    }
+    alone = {
+        "mode": "markers",
+        "name": f"{quantity.name}, alone",
+        "showlegend": False,
+        "marker": {"color": "@c1", "size": 2.5},
+        **_points([stretch[0] for stretch in stretches if len(stretch) == 1], quantity),
+    }
+    return [line] if dots else [line, alone]
+
+
+def _suspect(values: Values, quantity: Quantity, *, bars: bool) -> Trace:
+    widths = [each.half_width or 0.0 for each in values]
+    bar = {"type": "data", "array": widths, "color": "@suspect", "thickness": 1, "width": 0}
+    return {
+        "mode": "markers",
+        "name": "suspect",
+        "legendrank": 1001,  # after the line
+        "marker": {"color": "@suspect", "symbol": "diamond"},
+        **({"error_y": bar} if bars else {}),
+        **_points(values, quantity),
+    }
+
+
+def _failed(values: Values, quantity: Quantity) -> Trace:
+    """Along the lower edge, since they have no value."""
+    cross = {"color": "@error", "symbol": "x-thin", "line": {"color": "@error", "width": 2}}
+    points = {**_points(values, quantity), "y": [_FAILED_AT] * len(values), "yaxis": "y2"}
+    return {"mode": "markers", "name": "failed", "legendrank": 1002, "marker": cross, **points}
+
+
+def _points(values: Values, quantity: Quantity) -> Trace:
+    return {
+        "type": "scatter",
+        "x": [each.number for each in values],
+        "y": [each.value for each in values],
+        "customdata": [label(each.row, in_words(each, quantity)) for each in values],
+        "hovertemplate": "%{customdata}<extra></extra>",
+    }
+
+
+def _band(values: Values, starts: Set[int]) -> Trace:
+    """Return one polygon for each stretch of frames that have an interval; None parts them."""
+    x: list[int | None] = []
+    y: list[float | None] = []
+    for stretch in _stretches([each for each in values if each.half_width is not None], starts):
+        along = [each.number for each in stretch]
+        ends = [(each.value or 0.0, each.half_width or 0.0) for each in stretch]
+        x += [*along, *reversed(along), None]
+        y += [round(value + half, 4) for value, half in ends]
+        y += [*(round(value - half, 4) for value, half in reversed(ends)), None]
+    return {
+        "type": "scatter",
+        "mode": "lines",
+        "name": "95 % interval",
+        "x": x,
+        "y": y,
+        "fill": "toself",
+        "fillcolor": "@band",
+        "line": {"color": "@band", "width": 1},  # a frame alone is seen too
+        "hoverinfo": "skip",
+    }
+
+
+def _stretches(values: Values, starts: Set[int]) -> list[Values]:
+    """Return runs of frames that follow each other, each within one drive."""
+    ends = [
+        place
+        for place, (before, after) in enumerate(pairwise(values), 1)
+        if after.number - before.number > 1 or after.number in starts
+    ]
+    return [values[start:end] for start, end in pairwise([0, *ends, len(values)]) if end > start]
+
+
+def all_charts(rows: Sequence[Row], rig: RigAssessment | None = None) -> dict[str, Chart]:
+    """Return the charts of `chart_names` by their names."""
+    quantities = {each.name: each for each in QUANTITIES}
+    return {
+        name: histogram(rows) if name == HISTOGRAM else chart_over_frames(rows, quantities[name], rig)
+        for name in chart_names(rows)
+    }

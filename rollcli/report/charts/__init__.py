@@ -1,1 +1,0 @@
-"""The charts of a report: what they hold, as plotly takes it."""

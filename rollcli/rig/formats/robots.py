@@ -1,0 +1,129 @@
+"""The calibrations of ROS camera_info and ORB-SLAM, and of rigs that are not rectified (Kalibr, ZED)."""
+
+import math
+import re
+
+from rollcli.errors import InputError
+from rollcli.rig.formats.fields import Fields, File, Projection, number, numbers, pair_of, size
+from rollcli.rig.formats.yaml import parse_yaml
+
+_STEREO_KEY = re.compile(r"^[ \t]*(?:Camera\.bf|Stereo\.b)[ \t]*:", re.MULTILINE)
+
+
+def is_orb_slam(text: str) -> bool:
+    """Tell whether a text is a file of settings for stereo."""
+    return _STEREO_KEY.search(text) is not None
+
+
+def read_orb_slam(file: File) -> Fields:
+    """Read the camera and the baseline."""
+    values = parse_yaml(file.text, file.name)
+
+    def read(*keys: str) -> float:
+        for key in keys:
+            if key in values:
+                return number(values[key], f"{file.name}: {key}")
+        raise InputError(f"{file.name}: has no {keys[0]}")
+
+    fx, fy, cx, cy = (read(f"Camera.{each}", f"Camera1.{each}") for each in ("fx", "fy", "cx", "cy"))
+    if fx == 0:
+        raise InputError(f"{file.name}: Camera.fx is 0: a focal length is more")
+    baseline = read("Camera.bf") / fx if "Camera.bf" in values else read("Stereo.b")
+    width = height = None
+    if "Camera.width" in values and "Camera.height" in values:
+        width, height = size(values["Camera.width"], values["Camera.height"], f"{file.name}: Camera.width")
+    return Fields("ORB-SLAM", fx, fy, cx, cy, baseline, 0.0, width, height)
+
+
+_CHAIN = re.compile(r"^[ \t]*T_cn_cnm1[ \t]*:", re.MULTILINE)
+_ZED = re.compile(r"^[ \t]*\[LEFT_CAM_\w+\]", re.MULTILINE)
+_STEREO = re.compile(
+    r"^[ \t]*\[STEREO\][^\[]*?^[ \t]*baseline[ \t]*=[ \t]*(\S+)", re.MULTILINE | re.IGNORECASE
+)
+_MM = 1e-3
+_RAW = "is of the raw images, and gives the baseline alone"
+
+
+def is_kalibr(text: str) -> bool:
+    """Tell whether a text is a camchain of Kalibr."""
+    return _CHAIN.search(text) is not None
+
+
+def read_kalibr(file: File) -> Fields:
+    """Read the distance between cam0 and cam1, metres: the last column of T_cn_cnm1."""
+    camera = parse_yaml(file.text, file.name).get("cam1")
+    rows = camera.get("T_cn_cnm1") if isinstance(camera, dict) else None
+    what = f"{file.name}: T_cn_cnm1 of cam1"
+    matrix = [numbers(row, what) for row in rows] if isinstance(rows, list) else []
+    if len(matrix) != 4 or any(len(row) != 4 for row in matrix):
+        raise InputError(f"{what} is no 4x4 matrix: the file is cut off or damaged")
+    x, y, z = (row[3] for row in matrix[:3])
+    if abs(y) > abs(x):
+        raise InputError(
+            f"{file.name} is a vertical rig, one camera above the other: only horizontal ones are read"
+        )
+    return Fields("Kalibr", baseline=math.hypot(x, y, z), lacks=_RAW)
+
+
+def is_zed(text: str) -> bool:
+    """Tell whether a text is a ZED camera's SN*.conf."""
+    return _ZED.search(text) is not None
+
+
+def read_zed(file: File) -> Fields:
+    """Read the baseline, which the file gives in millimetres."""
+    found = _STEREO.search(file.text)
+    if found is None:
+        raise InputError(f"{file.name}: has no Baseline below [STEREO]: the file is cut off")
+    return Fields("ZED", baseline=_MM * number(found[1], f"{file.name}: Baseline"), lacks=_RAW)
+
+
+_KEY = re.compile(r"^\s*projection_matrix\s*:", re.MULTILINE)
+
+
+def is_ros(text: str) -> bool:
+    """Tell whether a text is a camera_info file."""
+    return _KEY.search(text) is not None
+
+
+def read_ros(first: File, second: File | None = None) -> Fields:
+    """Read the pair; which file is the right view's, its Tx says."""
+    views = [_view(file) for file in (first, second) if file is not None]
+    left, width, height = views[0]
+    known = (left.fx, left.fy, left.cx, left.cy)
+    if len(views) == 1:
+        if left.tx != 0:
+            raise InputError(
+                f"{first.name}: is one view of a pair, the right one: give both, --calib LEFT --calib RIGHT"
+            )
+        lacks = "is the left view alone, without the baseline: give both, --calib LEFT --calib RIGHT"
+        return Fields("ROS camera_info", *known, width=width, height=height, lacks=lacks)
+    right, *right_size = views[1]
+    where = f"{first.name} and {second.name if second else ''}"
+    if left.tx != 0 and right.tx == 0:
+        raise InputError(f"{where}: are in the wrong order: give --calib LEFT --calib RIGHT")
+    if [width, height] != right_size:
+        raise InputError(
+            f"{where}: are of images of different sizes, {width}x{height} and {right_size[0]}x{right_size[1]}"
+        )
+    baseline, doffs = pair_of(left, right, f"{where}:")
+    notes: tuple[str, ...] = ()
+    if baseline < 0:
+        notes = (
+            f"{where}: the right view's Tx is positive, against ROS's convention; its size is taken, "
+            f"for a baseline of {-baseline:.5f} m",
+        )
+    return Fields("ROS camera_info", *known, abs(baseline), doffs, width, height, notes=notes)
+
+
+def _view(file: File) -> tuple[Projection, int | None, int | None]:
+    values = parse_yaml(file.text, file.name)
+    matrix = values.get("projection_matrix", "")
+    if not matrix:
+        raise InputError(f"{file.name}: has no projection_matrix, or not at its top level")
+    data = matrix.get("data", []) if isinstance(matrix, dict) else matrix
+    what = f"{file.name}: projection_matrix"
+    view = Projection.of(numbers(data, what), what)
+    if "image_width" not in values or "image_height" not in values:
+        return view, None, None
+    return view, *size(values["image_width"], values["image_height"], f"{file.name}: image size")

@@ -1,0 +1,144 @@
+"""From the bytes of calibration files, and a user's numbers, to a calibration."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+from rollcli.errors import InputError, UsageError
+from rollcli.rig.calibration import Calibration, CalibrationOptions
+from rollcli.rig.formats import datasets, opencv, robots
+from rollcli.rig.formats.fields import Fields, File
+
+
+class Format(NamedTuple):
+    """How a format is recognised by its text, and how one file of it is read.
+
+    `files` is how many files make a calibration at most: `read` takes so many.
+    """
+
+    name: str
+    recognise: Callable[[str], bool]
+    read: Callable[..., Fields]
+    files: int = 1
+
+
+# the first that recognises a file reads it: ORB-SLAM's settings can hold OpenCV's matrices
+FORMATS = (
+    Format("KITTI", datasets.is_kitti, datasets.read_kitti),
+    Format("DrivingStereo", datasets.is_driving_stereo, datasets.read_driving_stereo),
+    Format("Middlebury or ETH3D", datasets.is_middlebury, datasets.read_middlebury),
+    Format("ORB-SLAM", robots.is_orb_slam, robots.read_orb_slam),
+    Format("ROS camera_info", robots.is_ros, robots.read_ros, files=2),
+    Format("OpenCV stereoRectify", opencv.is_opencv, opencv.read_opencv),
+    Format("Cityscapes", datasets.is_cityscapes, datasets.read_cityscapes),
+    Format("Kalibr", robots.is_kalibr, robots.read_kalibr),
+    Format("ZED", robots.is_zed, robots.read_zed),
+)
+
+
+MAX_BYTES = 1 << 20  # real ones have a few thousand
+
+
+def parse_calibration(
+    files: Sequence[tuple[str, bytes]], given: CalibrationOptions | None = None
+) -> Calibration:
+    """Read a calibration.
+
+    Parameters
+    ----------
+    files : sequence of (name, data)
+        One file of any format of `FORMATS`, two for ROS (left, right), or none.
+    given : CalibrationOptions, optional
+        Numbers that win over those of the files.
+
+    Returns
+    -------
+    Calibration
+
+    Raises
+    ------
+    InputError
+        A file is of no known format, damaged, or contradicts itself.
+    UsageError
+        Numbers are missing or cannot be those of a rig; the message says which options to add.
+    """
+    given = given or CalibrationOptions()
+    fields = _read([_text(name, data) for name, data in files]) if files else Fields()
+    source = " and ".join(name for name, _ in files)
+    options = [
+        option
+        for option, value in (
+            ("--focal", given.focal),
+            ("--principal-point", given.principal_point),
+            ("--baseline", given.baseline),
+            ("--doffs", given.doffs),
+        )
+        if value is not None
+    ]
+    return _complete(_overridden(fields, given), ", ".join(filter(None, [source, *options])), source)
+
+
+def _text(name: str, data: bytes) -> File:
+    if len(data) > MAX_BYTES:
+        raise InputError(f"{name}: has {len(data)} bytes; no calibration is larger than {MAX_BYTES >> 20} MB")
+    try:
+        return File(name, data.decode("utf-8-sig"))
+    except UnicodeDecodeError:
+        raise InputError(f"{name}: is not text, so it is no calibration") from None
+
+
+def _read(files: Sequence[File]) -> Fields:
+    forms = []
+    for file in files:
+        form = next((each for each in FORMATS if each.recognise(file.text)), None)
+        if form is None:
+            known = ", ".join(each.name for each in FORMATS)
+            raise InputError(f"{file.name}: is no calibration of a known format ({known})")
+        forms.append(form)
+    if len(files) > min(form.files for form in forms) or len(set(forms)) > 1:
+        raise InputError(
+            f"{files[1].name}: only a pair of ROS camera_info files is given as two --calib; give one file"
+        )
+    return forms[0].read(*files)
+
+
+def _overridden(fields: Fields, given: CalibrationOptions) -> Fields:
+    if given.focal is not None:
+        fields = replace(fields, fx=given.focal, fy=given.focal)
+    if given.principal_point is not None:
+        cx, cy = given.principal_point
+        fields = replace(fields, cx=cx, cy=cy)
+    if given.baseline is not None:
+        # what the file's notes say is about its own baseline
+        fields = replace(fields, baseline=given.baseline, notes=())
+    return fields if given.doffs is None else replace(fields, doffs=given.doffs)
+
+
+def _complete(fields: Fields, source: str, file: str) -> Calibration:
+    """Return the calibration; refuse one without what a pose needs."""
+    missing = [
+        option
+        for option, value in (("--focal PX", fields.fx), ("--principal-point CX,CY", fields.cx))
+        if value is None
+    ]
+    if fields.baseline is None and fields.lacks:
+        missing.append("--baseline M")
+    if missing:
+        start = f"{file}: {fields.lacks or 'says too little'}" if file else "the calibration is not complete"
+        raise UsageError(f"{start}; add {' and '.join(missing)}")
+    assert fields.fx is not None
+    assert fields.fy is not None
+    assert fields.cx is not None
+    assert fields.cy is not None
+    return Calibration(
+        fields.fx,
+        fields.fy,
+        fields.cx,
+        fields.cy,
+        fields.baseline,
+        fields.doffs or 0.0,
+        fields.width,
+        fields.height,
+        source,
+        fields.notes,
+    )

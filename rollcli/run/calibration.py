@@ -1,0 +1,178 @@
+"""The calibration of each frame: one for all, or one of the same stem each."""
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path, PurePosixPath
+
+from rollcli.errors import InputError, UsageError
+from rollcli.files.atomic import is_file
+from rollcli.files.search import is_place, objects_behind
+from rollcli.files.storage import fetch_all, read_bytes
+from rollcli.files.stores.locations import is_url, public_name
+from rollcli.rig.calibration import Calibration, CalibrationOptions
+from rollcli.rig.read_calibration import MAX_BYTES, parse_calibration
+from rollcli.run.frame import Frame
+from rollcli.run.options import EncodingOptions, FrameOptions
+
+_MARK = "_camera"  # Cityscapes: aachen_000000_000019_camera.json
+
+
+def read_calibration(path: str | os.PathLike[str], *right: str | os.PathLike[str]) -> Calibration:
+    """Read the calibration of a rectified stereo pair.
+
+    Parameters
+    ----------
+    path : str or path
+        A file of KITTI, Middlebury, ETH3D, OpenCV, ROS, Cityscapes, ORB-SLAM or DrivingStereo, recognised by
+        its content.
+    *right : str or path
+        The file of the right view, where each view has one (ROS).
+
+    Returns
+    -------
+    Calibration
+        Lengths in metres, the rest in pixels.
+
+    Raises
+    ------
+    InputError
+        A file cannot be read, is of no known format, or contradicts itself.
+    UsageError
+        What it says is not enough for a pose, or cannot be a rig.
+
+    Examples
+    --------
+    A calibration in KITTI's form, of cameras half a metre apart:
+
+    >>> import tempfile
+    >>> file = Path(tempfile.mkdtemp(), "calib.txt")
+    >>> left, right = "700 0 600 0 0 700 180 0 0 0 1 0", "700 0 600 -350 0 700 180 0 0 0 1 0"
+    >>> characters = file.write_text(f"P0: {left}\\nP1: {right}\\n")
+    >>> found = read_calibration(file)
+    >>> found.fx, found.cy, found.baseline
+    (700.0, 180.0, 0.5)
+    """
+    return _read([os.fspath(each) for each in (path, *right)], CalibrationOptions())
+
+
+class Calibrations:
+    """What a user said of the calibration, found and read.
+
+    Raises
+    ------
+    UsageError, InputError
+        See `parse_calibration`; or there is no such file.
+    """
+
+    def __init__(self, given: CalibrationOptions) -> None:
+        self._given = given
+        self._by_stem: dict[str, list[str]] | None = None
+        self._fetched: dict[str, bytes] = {}  # of an object store, where one after the other takes long
+        self._one: Calibration | None = None
+        if len(given.calib) == 1 and is_place(given.calib[0]):
+            files = _files(given.calib[0])
+            self._by_stem = _stems(files)
+            self._fetched = fetch_all(filter(is_url, files))
+        elif given.given:
+            self._one = _read(given.calib, given)
+
+    def of(self, name: str) -> Calibration | None:
+        """Return the calibration of a frame: of its stem, or of the stem up to one of its underscores."""
+        if self._by_stem is None:
+            return self._one
+        folder, stem = self._given.calib[0], PurePosixPath(name).stem
+        shorter = stem  # KITTI's 000010.txt is for 000010_10.png
+        while shorter not in self._by_stem:
+            shorter = shorter.rpartition("_")[0]
+            if not shorter:
+                raise UsageError(f"{name}: has no calibration of its name in {folder}")
+        paths = self._by_stem[shorter]
+        if len(paths) > 1:
+            raise UsageError(f"{name}: has more than one calibration of its name: {paths[0]}, {paths[1]}")
+        return _read([paths[0]], self._given, self._fetched)
+
+
+def calibration_files(given: CalibrationOptions) -> list[str]:
+    """List the files that a user named, those of a folder one by one."""
+    return [path for name in given.calib for path in (_files(name) if is_place(name) else [name])]
+
+
+def calibration_notes(frames: Sequence[Frame]) -> list[str]:
+    """List what the user should know about how the calibrations were read, each once."""
+    used = dict.fromkeys(frame.calibration for frame in frames if frame.calibration is not None)
+    return list(dict.fromkeys(note for calibration in used for note in calibration.notes))
+
+
+def check_first_size(frames: Sequence[Frame], options: FrameOptions) -> None:
+    """Refuse a calibration that is not for the size of the first frame, before anything runs.
+
+    Raises
+    ------
+    UsageError
+    """
+    first = next((frame for frame in frames if frame.calibration is not None), None)
+    if first is None or first.calibration is None:
+        return
+    from rollcli.files.formats import read_image, read_stored  # only here does a dispatcher decode an image
+
+    try:
+        if first.right_file:
+            height, width = read_image(options.at(first.path), first.file).shape[:2]
+        else:
+            height, width = read_stored(options.at(first.path), first.file).values.shape
+    except InputError:
+        return  # its row will say so
+    first.calibration.for_size(width, height)
+
+
+def check_depth(frames: Sequence[Frame], encoding: EncodingOptions) -> None:
+    """Refuse depth maps without the calibration that turns their numbers into disparities.
+
+    Raises
+    ------
+    UsageError
+    """
+    if encoding.encoding != "depth":
+        return
+    for frame in frames:
+        if frame.calibration is None or frame.calibration.baseline is None:
+            raise UsageError(
+                "--encoding depth needs a focal length and a baseline, which turn a depth into a disparity: "
+                "give --calib, or --focal, --principal-point and --baseline"
+            )
+
+
+def _stems(files: Sequence[str]) -> dict[str, list[str]]:
+    found: dict[str, list[str]] = {}
+    for path in files:
+        found.setdefault(PurePosixPath(path).stem.removesuffix(_MARK), []).append(path)
+    return found
+
+
+def _files(folder: str) -> list[str]:
+    if is_url(folder):
+        return sorted(path for path, _ in objects_behind(folder, recursive=True))
+    found = (path for path in Path(folder).rglob("*") if is_file(path) and not path.name.startswith("."))
+    return [str(path) for path in sorted(found)]
+
+
+def _read(
+    paths: Sequence[str], given: CalibrationOptions, fetched: Mapping[str, bytes] | None = None
+) -> Calibration:
+    if len(paths) > 2:
+        raise UsageError("--calib is given at most twice: for the left and the right view of ROS")
+    fetched = fetched or {}
+    files = [(public_name(path), fetched[path] if path in fetched else _bytes(path)) for path in paths]
+    return parse_calibration(files, given)
+
+
+def _bytes(path: str) -> bytes:
+    if is_url(path):
+        return read_bytes(path)
+    try:
+        size = Path(path).stat().st_size
+    except (OSError, ValueError):
+        size = 0  # what is wrong is said by who reads it
+    if size > MAX_BYTES:
+        raise InputError(f"{path}: has {size} bytes; no calibration is larger than {MAX_BYTES >> 20} MB")
+    return read_bytes(path)

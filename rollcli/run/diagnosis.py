@@ -1,0 +1,189 @@
+"""What a file that is no disparity map in pixels seems to be, and what to do about it.
+
+Of 105 real maps none is taken for anything else, stretched to 8 bits or not. Of the depth maps made of them
+104 and more are told, up to a quarter as depth or upside down; of the maps turned upside down 104, a tenth
+likewise. Each of 86 real photographs is told; blurred and dark ones are not. The numbers lie amid the gaps
+that these files leave (python tests/benchmarks/bench_diagnosis.py).
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollcli.errors import EstimationError, InputError
+from rollcli.estimator.estimate import estimate_roll
+from rollcli.files.encodings import Encoding
+from rollcli.files.formats import Stored
+from rollcli.run.options import FrameOptions
+
+_DIVISORS = (("sgbm", 16), ("kitti", 256))
+_DEPTH_MAP = "like a depth map: give --encoding depth and its calibration, such as --calib FILE"
+_UPSIDE_DOWN = "upside down: reverse the order of its rows"
+
+
+@dataclass(frozen=True)
+class DiagnosisTuning:
+    """The numbers that tell what a file looks like; what they were found on stands above.
+
+    Attributes
+    ----------
+    beyond : float
+        Share of the disparities that are larger than the map is wide: from here on they are not outliers.
+    plausible : float
+        Share of the map's width up to which its nearest disparities may reach; in real maps a quarter. A
+        divisor that leaves them larger does not explain the map.
+    textured, equal : float
+        Shares of the neighbours in a row, in 256 levels. In photographs 57 to 83 % differ by more than a
+        level and 6 to 24 % are equal; in maps at most 31 %, and at least 38 %.
+    noise_step, noise : float
+        A step of levels, and the share of steps beyond it that noise has and no photograph.
+    downward : float
+        Correlation of a row and the median of its disparities from which a map has its near parts below:
+        no need to try what else it may be. In depth maps and in maps that are upside down -0.95 to 0.0.
+    every : int
+        Take each such row, and column where these need not be neighbours: enough for shares and medians.
+    wide : float
+        How wide an interval may be where only the road counts, radians.
+    """
+
+    beyond: float = 0.01
+    plausible: float = 0.5
+    textured: float = 0.45
+    equal: float = 0.3
+    noise_step: int = 64
+    noise: float = 0.1
+    downward: float = 0.2
+    every: int = 4
+    wide: float = math.radians(5.0)
+
+
+TUNING = DiagnosisTuning()
+
+
+def require_positive(stored: Stored, name: str) -> None:
+    """Refuse a map of nothing but negative numbers; a single one, repeated, is a mark for no data.
+
+    Raises
+    ------
+    InputError
+    """
+    values = stored.values
+    if values.dtype.kind not in "if" or values.max() > 0 or np.any(values > 0):  # the maximum may be NaN
+        return
+    negative = values[values < 0]
+    negative = negative[np.isfinite(negative)]
+    if negative.size and negative.min() < (top := negative.max()):
+        raise InputError(
+            f"{name}: every number is negative, {negative.min():g} to {top:g}: is the map stored with the "
+            "other sign? Negate its numbers"
+        )
+
+
+def too_large(disparity: NDArray[Any], stored: Stored, encoding: str) -> str:
+    """Say that the disparities cannot be pixels, and what would divide them; empty when they can.
+
+    Parameters
+    ----------
+    disparity : ndarray, shape (H, W)
+        Pixels; 0 is no data.
+    stored : Stored
+        What the file holds.
+    encoding : str
+        How it was read.
+    """
+    width = disparity.shape[1]
+    if not disparity.max() > width:
+        return ""
+    valid = disparity[disparity > 0]
+    share = np.count_nonzero(valid > width) / valid.size
+    if share < TUNING.beyond:
+        return ""
+    said = (
+        f"{share:.0%} of the disparities are larger than the map is wide, {width} px "
+        f"(up to {valid.max():.0f})"
+    )
+    if encoding == Encoding.DEPTH:
+        return f"{said}: give --scale, the metres that a stored number of 1 stands for"
+    numbers = stored.values[disparity > 0]
+    near = float(np.quantile(numbers.astype(np.float64), 1 - TUNING.beyond))
+    fitting = [
+        (name, by) for name, by in _DIVISORS if name != encoding and near / by <= TUNING.plausible * width
+    ]
+    if not fitting:
+        return f"{said}: give --scale, the pixels that a stored number of 1 stands for"
+    times = " or ".join(str(by) for _, by in fitting)
+    remedy = " or ".join(f"--encoding {name} (stored / {by})" for name, by in fitting)
+    return f"{said}: the numbers look {times} times too large; give {remedy}"
+
+
+def looks_like(disparity: NDArray[Any], stored: Stored | None, options: FrameOptions) -> str:
+    """Say what a map without a sure angle looks like instead; empty when it looks like nothing known.
+
+    Parameters
+    ----------
+    disparity : ndarray, shape (H, W)
+        Pixels; 0 is no data.
+    stored : Stored or None
+        What the file holds; None for a map that was matched from a pair.
+    options : FrameOptions
+    """
+    return "" if stored is None else next(_likenesses(disparity, stored, options), "")
+
+
+def _likenesses(disparity: NDArray[Any], stored: Stored, options: FrameOptions) -> Iterator[str]:
+    if _is_photograph(stored.values):
+        yield "looks like a photograph, not a disparity map: give photographs by --left and --right"
+    if _grows_downward(disparity):
+        return
+    depth = options.encoding.encoding != Encoding.DEPTH and _has_road(_inverse(disparity), options)
+    reversed_rows = _has_road(disparity[::-1], options)
+    if depth and reversed_rows:  # few roads tell which
+        yield f"looks {_DEPTH_MAP}; or it is {_UPSIDE_DOWN}"
+    elif depth:
+        yield f"looks {_DEPTH_MAP}"
+    elif reversed_rows:
+        yield f"looks {_UPSIDE_DOWN}"
+
+
+def _is_photograph(values: NDArray[Any]) -> bool:
+    """Tell whether whole numbers have the texture of a photograph; `DiagnosisTuning` says how maps differ."""
+    if values.dtype.kind != "u" or values.shape[1] < 2:
+        return False
+    levels = values[:: TUNING.every].astype(np.int64)
+    top = int(levels.max())
+    if top > 255:
+        levels = levels * 255 // top
+    steps = np.abs(np.diff(levels, axis=1))
+    return bool(
+        np.mean(steps > 1) > TUNING.textured
+        and np.mean(steps == 0) < TUNING.equal
+        and np.mean(steps > TUNING.noise_step) < TUNING.noise
+    )
+
+
+def _grows_downward(disparity: NDArray[Any]) -> bool:
+    """Tell whether the lower a row lies, the larger its disparities are, as in a map with a road."""
+    few = disparity[:: TUNING.every, :: TUNING.every]
+    rows = [(v, row[(row > 0) & np.isfinite(row)]) for v, row in enumerate(few)]
+    medians = np.array([(v, np.median(valid)) for v, valid in rows if valid.size])
+    if len(medians) < 3 or not np.ptp(medians[:, 1]) > 0:
+        return False
+    return bool(np.corrcoef(medians.T)[0, 1] > TUNING.downward)
+
+
+def _inverse(values: NDArray[Any]) -> NDArray[Any]:
+    valid = values > 0
+    return np.where(valid, 1 / np.where(valid, values, 1), 0)
+
+
+def _has_road(disparity: NDArray[Any], options: FrameOptions) -> bool:
+    """Tell whether a road is found that gives no reason for doubt, however wide its interval."""
+    seed = options.method.seed
+    try:
+        return estimate_roll(disparity, max_interval=TUNING.wide, seed=seed).status == "ok"
+    except EstimationError:
+        return False

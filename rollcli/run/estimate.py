@@ -1,0 +1,204 @@
+"""`rollcli estimate` from options to exit status."""
+
+import contextlib
+import os
+from collections.abc import Iterator, Sequence
+from functools import partial
+from itertools import islice
+
+from rollcli.errors import ClusterError, ExitStatus, OutputError, WorkerError
+from rollcli.files.results import run_path
+from rollcli.files.stores.locations import is_url, tasks_in_hand
+from rollcli.files.stream import STDOUT
+from rollcli.run.calibration import calibration_files, calibration_notes
+from rollcli.run.find import list_files
+from rollcli.run.frame import Frame, FrameResult, failed_frame
+from rollcli.run.options import EstimateOptions, FrameOptions
+from rollcli.run.outputs import every_path, image_paths, remove_image_leftovers, write_outputs
+from rollcli.run.plan import Plan, make_plan
+from rollcli.run.progress import Progress
+from rollcli.run.result import Output, frames_to_do, open_output
+from rollcli.run.rig_answer import RigAnswer
+from rollcli.run.workers.in_order import SharedPaths, Work, Workers
+from rollcli.run.workers.interrupt import Stop, stop_on_signals
+from rollcli.run.workers.tasks import require_scheduler, run_tasks
+
+
+def estimate_frame(frame: Frame, options: FrameOptions) -> FrameResult:
+    """Estimate the roll of a frame, on a worker."""
+    from rollcli.run.estimate_frame import run_frame
+
+    return run_frame(frame, options)
+
+
+def lost_frame(frame: Frame, reason: str, options: FrameOptions) -> FrameResult:
+    """Make the row of a frame whose worker died, and remove its images of an earlier run."""
+    paths = every_path(frame, options.images)
+    write_outputs({}, paths, replaces=options.replaces, retry_of=options.retry_of)
+    return failed_frame(frame, reason)
+
+
+def clear_frame(frame: Frame, options: FrameOptions) -> None:
+    """Remove the halves of images that a worker left which died amid this frame."""
+    if not options.retry_of:  # they go when the row is written, with marks that are needed until then
+        remove_image_leftovers([frame], options.images)
+
+
+_RETRIED_AT_ONCE = 1000  # frames whose work a kill costs; starting the workers anew adds 3 % of their time
+_NOTES = 3  # on how calibrations were read; the record of the run has those of more files
+
+
+def run_estimate(options: EstimateOptions, resume_command: str = "") -> ExitStatus:
+    """Estimate the roll of every frame.
+
+    Parameters
+    ----------
+    options : EstimateOptions
+    resume_command : str
+        What to type to continue this run, for the message when it is interrupted.
+
+    Raises
+    ------
+    UsageError, OutputError, ClusterError, WorkerError
+        The run cannot start or cannot go on.
+    """
+    plan = make_plan(options)
+    if options.running.dry_run:
+        _list(plan, options)
+        return ExitStatus.DONE
+    require_scheduler(options.running.scheduler)
+    progress = Progress(len(plan.frames), options.running, options.encoding)
+    with open_output(plan, options) as output:
+        kept = output.kept
+        progress.keep(kept.totals, kept.alignment)
+        answer = kept.answer
+        for note in islice(calibration_notes(plan.frames), _NOTES):
+            progress.note(note)
+        try:
+            with stop_on_signals() as stop, progress:
+                _restore_images(options, output, progress, stop)
+                if not _retry_failed(plan, options, output, progress, answer, stop):
+                    _run_frames(plan.frames[kept.count :], options, output, progress, answer, stop)
+        except KeyboardInterrupt:  # the second Ctrl-C: without waiting for the frames that have begun
+            progress.stopped_early = True
+        except (OutputError, ClusterError, WorkerError) as error:
+            raise type(error)(f"{error}{output.hint()}") from error
+        status = _end(output, progress, stop, resume_command)
+        if not (progress.stopped_early or options.running.quiet):
+            progress.say(answer.line())
+        return status
+
+
+def _run_frames(
+    frames: Sequence[Frame],
+    options: EstimateOptions,
+    output: Output,
+    progress: Progress,
+    answer: RigAnswer,
+    stop: Stop,
+) -> None:
+    """Write the row of each frame, in order; its images are written by then."""
+    with _results(frames, options, output, stop) as results:
+        for frame, result in zip(frames, results, strict=False):
+            output.append(frame, result)
+            progress.add(result)
+            answer.add(result.row)
+            if options.result.fail_fast and result.row.status == "error":
+                progress.stopped_early = True
+                return
+    if stop.asked and progress.done < progress.total:
+        progress.stopped_early = True
+
+
+def _restore_images(options: EstimateOptions, output: Output, progress: Progress, stop: Stop) -> None:
+    """Make the images again that kept rows should have."""
+    frames = output.kept.incomplete
+    if not frames:
+        return
+    progress.note(f"images are missing or empty for {len(frames)} of the kept rows: they are made again")
+    progress.stopped_early = True  # unless every one is made
+    with _results(frames, options, output, stop) as results:
+        restored = 0
+        for frame, result in zip(frames, results, strict=False):
+            output.restore(frame, result)
+            restored += 1
+    progress.stopped_early = restored < len(frames)
+
+
+def _retry_failed(
+    plan: Plan, options: EstimateOptions, output: Output, progress: Progress, answer: RigAnswer, stop: Stop
+) -> bool:
+    """Do the failed frames of kept rows again; return whether the run ends here.
+
+    A result takes the new rows once the workers have ended, which hold the lock of the file that it was.
+    """
+    for first in range(0, len(output.kept.failed), _RETRIED_AT_ONCE):
+        positions = output.kept.failed[first : first + _RETRIED_AT_ONCE]
+        frames = [plan.frames[position] for position in positions]
+        with _results(frames, options, output, stop, _name_of(plan.output)) as results:
+            for position, frame, result in zip(positions, frames, results, strict=False):
+                output.replace(position, frame, result)
+                progress.add(result)
+                answer.replace(position, result.row)
+                if options.result.fail_fast and result.row.status == "error":
+                    progress.stopped_early = True
+                    return True
+        if stop.asked:
+            progress.stopped_early = progress.done < progress.total
+            return True
+    return False
+
+
+def _name_of(result: str) -> str:
+    """Name a result in one way, from whichever folder it is resumed."""
+    return result if is_url(result) else os.path.realpath(result)
+
+
+@contextlib.contextmanager
+def _results(
+    frames: Sequence[Frame], options: EstimateOptions, output: Output, stop: Stop, retry_of: str = ""
+) -> Iterator[Iterator[FrameResult]]:
+    """Open the results of frames from whichever workers were asked for; the output is complete afterwards."""
+    told = options.frame._replace(replaces=output.replaces, retry_of=retry_of)
+    work = Work(
+        partial(estimate_frame, options=told),
+        partial(lost_frame, options=told),
+        partial(clear_frame, options=told),
+    )
+    sample = (*frames[:1], *frames[-1:])
+    shared = SharedPaths(
+        files=tuple(path for frame in sample for path in frame.reads()),
+        folders=tuple(folder for _, folder in options.images.folders()),
+    )
+    threads = tasks_in_hand((*shared.files, *shared.folders))
+    workers = Workers(options.running.jobs, options.running.scheduler, shared, output.keep_open, threads)
+    try:
+        with contextlib.closing(run_tasks(frames, work, stop, workers)) as results:
+            yield results
+    finally:
+        output.commit()
+        # a worker that died elsewhere cannot be waited for; a retry has removed what is not needed any more
+        if workers.scheduler is not None and not retry_of:
+            remove_image_leftovers(frames, options.images)
+
+
+def _end(output: Output, progress: Progress, stop: Stop, resume_command: str) -> ExitStatus:
+    if not progress.stopped_early:
+        output.finish(progress.totals, progress.alignment.summary())
+    progress.tell_end()
+    if progress.alignment.advice:
+        progress.note(f"median over the pairs: {progress.alignment.advice}")
+    if stop.asked and progress.stopped_early:
+        how = f"; continue with: {resume_command}" if output.resumable else ""
+        progress.say(f"interrupted{how}")
+        return ExitStatus.INTERRUPTED
+    return progress.status
+
+
+def _list(plan: Plan, options: EstimateOptions) -> None:
+    """Print what would be read and written, a line each."""
+    frames = frames_to_do(plan, options)
+    list_files([(calibration_files(options.calibration), ())])
+    list_files((frame.reads(), (path for _, path in image_paths(frame, options.images))) for frame in frames)
+    if plan.output != STDOUT:
+        list_files([((), (plan.output, run_path(plan.output)))])

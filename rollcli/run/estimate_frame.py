@@ -1,0 +1,120 @@
+"""One frame in, one row out."""
+
+import math
+import time
+from dataclasses import replace
+
+from rollcli.errors import EstimationError
+from rollcli.estimator.estimate import estimate_roll
+from rollcli.estimator.result import RollEstimate
+from rollcli.files.results import Row
+from rollcli.rig.calibration import Calibration
+from rollcli.rig.pose import horizon_row, with_pose
+from rollcli.run.diagnosis import looks_like
+from rollcli.run.frame import Frame, FrameResult
+from rollcli.run.frame_errors import guarded
+from rollcli.run.images import encode_images
+from rollcli.run.options import FrameOptions
+from rollcli.run.outputs import every_path, write_outputs
+from rollcli.run.read import Source, read_source
+
+
+def run_frame(frame: Frame, options: FrameOptions) -> FrameResult:
+    """Estimate the roll of one frame and write its images; what is wrong with it becomes an `error` row.
+
+    Raises
+    ------
+    OutputError
+        An image cannot be written, which ends the run.
+    """
+    start = time.perf_counter()
+    images: dict[str, bytes] = {}
+    result = guarded(frame, lambda: _estimate(frame, options, images))
+    paths = every_path(frame, options.images, options.root)
+    write_outputs(images, paths, replaces=options.replaces, retry_of=options.retry_of)
+    elapsed = 1000 * (time.perf_counter() - start)
+    return replace(result, row=replace(result.row, elapsed_ms=elapsed))
+
+
+def _estimate(frame: Frame, options: FrameOptions, images: dict[str, bytes]) -> FrameResult:
+    """Make the row, and last the images: a frame that fails has none."""
+    source = read_source(frame, options)
+    estimate, likeness = _estimate_roll(source, options)
+    calibration = _calibration(frame, source, estimate)
+    horizon = None if calibration is None else horizon_row(estimate.tangent, calibration)
+    # the images are turned by the angle of the pixels, which is not the rig's where fx and fy differ
+    made, note = encode_images(frame, source, estimate, options, horizon)
+    if calibration is not None:
+        estimate = with_pose(estimate, calibration)
+    row = _row(frame, source, estimate, note, likeness)
+    images.update(made)
+    warning = "; ".join(filter(None, [source.warning, source.beyond, likeness]))
+    return FrameResult(row, source.encoding, warning, source.searched)
+
+
+def _estimate_roll(source: Source, options: FrameOptions) -> tuple[RollEstimate, str]:
+    """Estimate the roll; where there is no sure angle, say what the map looks like instead."""
+    wanted = options.images.road_mask is not None
+    arguments = options.method.arguments()
+    try:
+        estimate = estimate_roll(
+            source.disparity,
+            mask=source.allowed,
+            slope_error=source.slope_error,
+            road_mask=wanted,
+            **arguments,
+        )
+    except EstimationError as error:
+        likeness = looks_like(source.disparity, source.stored, options)
+        raise EstimationError(f"{likeness}; {error}" if likeness else str(error)) from error
+    doubtful = estimate.status != "ok"
+    return estimate, looks_like(source.disparity, source.stored, options) if doubtful else ""
+
+
+def _calibration(frame: Frame, source: Source, estimate: RollEstimate) -> Calibration | None:
+    """Scale the frame's calibration from its images to its map."""
+    if frame.calibration is None:
+        return None
+    calibration = frame.calibration
+    if source.size is not None:
+        calibration = calibration.for_size(*source.size)
+    return calibration.for_size(estimate.width, estimate.height)
+
+
+def _row(frame: Frame, source: Source, estimate: RollEstimate, note: str, likeness: str) -> Row:
+    reasons = [reason for reason in (likeness, estimate.message) if reason]
+    status = estimate.status
+    if source.doubt:
+        status = "suspect"
+        reasons.append(source.doubt)
+    reasons += filter(None, [source.note, note])
+    alpha0, alpha1, alpha2 = estimate.alpha
+    return Row(
+        file=frame.file,
+        right_file=frame.right_file,
+        status=status,
+        roll_deg=math.degrees(estimate.theta),
+        roll_ci95_deg=_degrees(estimate.ci95),
+        pitch_deg=_degrees(estimate.pitch),
+        pitch_ci95_deg=_degrees(estimate.pitch_ci95),
+        height_m=estimate.height_m,
+        height_ci95_m=estimate.height_ci95_m,
+        camber=estimate.camber,
+        method=estimate.method,
+        iterations=estimate.iterations,
+        converged=estimate.converged,
+        global_minimum=estimate.global_minimum,
+        rmse_px=estimate.rmse,
+        alpha0=alpha0,
+        alpha1=alpha1,
+        alpha2=alpha2,
+        valid_fraction=estimate.valid_fraction,
+        road_fraction=estimate.road_fraction,
+        width=estimate.width,
+        height=estimate.height,
+        message="; ".join(reasons),
+    )
+
+
+def _degrees(angle: float | None) -> float | None:
+    return None if angle is None else math.degrees(angle)

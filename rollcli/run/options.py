@@ -1,0 +1,228 @@
+"""The options of `estimate` and of the conversions. Import-light: the command line loads it for its help."""
+
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
+
+from rollcli.estimator.request import LAMBDA0, MAX_INTERVAL_DEG, MAX_ROLL_DEG, TOLERANCE_DEG, LearningRate
+from rollcli.rig.calibration import CalibrationOptions
+from rollcli.stereo.options import StereoOptions
+
+
+class InputOptions(NamedTuple):
+    """Which maps to read."""
+
+    inputs: tuple[str, ...] = ()
+    files_from: str | None = None
+    recursive: bool = False
+    include: tuple[str, ...] = ()
+    exclude: tuple[str, ...] = ()
+
+
+class PairOptions(NamedTuple):
+    """Which stereo pairs to read, instead of maps."""
+
+    left: str | None = None
+    right: str | None = None
+    match: Literal["name", "order"] = "name"
+
+
+class EncodingOptions(NamedTuple):
+    """How stored numbers become pixels of disparity."""
+
+    encoding: str = "auto"
+    scale: float | None = None
+    invalid: tuple[float, ...] = ()
+
+
+class RegionOptions(NamedTuple):
+    """Which pixels may be used. `roi` is (x0, y0, x1, y1) in pixels, x1 and y1 excluded."""
+
+    mask: str | None = None
+    roi: tuple[int, int, int, int] | None = None
+    polygon: tuple[tuple[float, float], ...] | None = None
+
+
+class MethodOptions(NamedTuple):
+    """How the angle is found; `rollcli.estimator.methods` has the names."""
+
+    method: str = "gd"
+    model: str = "parabola"
+    road: str = "auto"
+    lambda0: LearningRate = LAMBDA0
+    tolerance_deg: float = TOLERANCE_DEG
+    max_roll_deg: float = MAX_ROLL_DEG
+    max_interval_deg: float = MAX_INTERVAL_DEG
+    seed: int = 0
+
+    def arguments(self) -> dict[str, Any]:
+        """Return the arguments that `estimate_roll` takes."""
+        return {
+            "method": self.method,
+            "model": self.model,
+            "road": self.road,
+            "lambda0": self.lambda0,
+            "tolerance": math.radians(self.tolerance_deg),
+            "max_roll": math.radians(self.max_roll_deg),
+            "max_interval": math.radians(self.max_interval_deg),
+            "seed": self.seed,
+        }
+
+
+class ImageOptions(NamedTuple):
+    """Which images to write, each kind into a folder of its own."""
+
+    derotated: str | None = None
+    vdisparity: str | None = None
+    disparity: str | None = None
+    road_mask: str | None = None
+    save_as: Literal["png", "tiff", "npy"] = "png"
+
+    def folders(self) -> list[tuple[str, str]]:
+        """List (kind, folder) of the images that were requested."""
+        kinds = ("derotated", "vdisparity", "disparity", "road_mask")
+        return [(kind, folder) for kind in kinds if (folder := getattr(self, kind)) is not None]
+
+
+class RunningOptions(NamedTuple):
+    """How the program runs and how much it says.
+
+    `jobs` None: the usable processors. `scheduler`: the address of a Dask cluster to run on instead.
+    """
+
+    jobs: int | None = None
+    scheduler: str | None = None
+    overwrite: bool = False
+    dry_run: bool = False
+    quiet: bool = False
+    verbose: bool = False
+
+    @property
+    def root(self) -> str:
+        """The folder where relative paths start, for workers on other machines; empty for this one."""
+        return str(Path.cwd()) if self.scheduler is not None else ""
+
+
+class FrameOptions(NamedTuple):
+    """What decides the row and the images of a frame: everything that a worker is told beside the frame.
+
+    `root` is the folder where relative paths start, for workers on other machines; empty for this one.
+    `replaces` tells whether files that are in the place of an image are replaced. `retry_of` names the result
+    whose failed frames are done again; empty otherwise.
+    """
+
+    encoding: EncodingOptions = EncodingOptions()
+    stereo: StereoOptions = StereoOptions()
+    region: RegionOptions = RegionOptions()
+    method: MethodOptions = MethodOptions()
+    images: ImageOptions = ImageOptions()
+    root: str = ""
+    replaces: bool = False
+    retry_of: str = ""
+
+    def at(self, path: str) -> str:
+        """Locate a path on this worker."""
+        from rollcli.files.stores.locations import located
+
+        return located(self.root, path)
+
+
+class ResultOptions(NamedTuple):
+    """Where the rows go, and which frames they are of. `shard` is (I, N), I from 1."""
+
+    output: str = "-"
+    format: Literal["csv", "jsonl", "parquet"] | None = None
+    resume: bool = False
+    retry_failed: bool = False
+    shard: tuple[int, int] = (1, 1)
+    fail_fast: bool = False
+    timing: bool = False
+    part_rows: int = 1000
+
+    @property
+    def form(self) -> Literal["csv", "jsonl", "parquet"]:
+        """The format of the rows: the one given, else by the ending of the output."""
+        if self.format is not None:
+            return self.format
+        lower = self.output.lower().rstrip("/")
+        if lower.endswith((".jsonl", ".ndjson")):
+            return "jsonl"
+        return "parquet" if lower.endswith(".parquet") else "csv"
+
+
+class EstimateOptions(NamedTuple):
+    """Every option of `rollcli estimate`."""
+
+    inputs: InputOptions
+    pairs: PairOptions
+    encoding: EncodingOptions
+    stereo: StereoOptions
+    region: RegionOptions
+    method: MethodOptions
+    images: ImageOptions
+    result: ResultOptions
+    running: RunningOptions
+    calibration: CalibrationOptions = CalibrationOptions()
+
+    @property
+    def frame(self) -> FrameOptions:
+        """The part that decides the row and the images of a frame."""
+        return FrameOptions(
+            self.encoding, self.stereo, self.region, self.method, self.images, self.running.root
+        )
+
+
+@dataclass(frozen=True)
+class RotationOptions:
+    """Where the angles come from: one for all maps, or a result with one for each."""
+
+    roll_deg: float | None
+    result: str | None
+    expand: bool
+    skip_suspect: bool
+
+
+@dataclass(frozen=True)
+class CountOptions:
+    """How disparities are counted. None: chosen for each map."""
+
+    bins: int | None = None
+    max_disparity: float | None = None
+    counts: bool = False
+
+
+@dataclass(frozen=True)
+class DerotateOptions:
+    """Every option of `rollcli derotate`."""
+
+    inputs: InputOptions
+    rotation: RotationOptions
+    output: str
+    encoding: EncodingOptions
+    running: RunningOptions
+
+
+@dataclass(frozen=True)
+class VDisparityOptions:
+    """Every option of `rollcli vdisparity`."""
+
+    inputs: InputOptions
+    count: CountOptions
+    output: str
+    encoding: EncodingOptions
+    running: RunningOptions
+    calibration: CalibrationOptions = field(default_factory=CalibrationOptions)
+
+
+@dataclass(frozen=True)
+class DisparityOptions:
+    """Every option of `rollcli disparity`."""
+
+    inputs: InputOptions
+    pairs: PairOptions
+    output: str
+    save_as: Literal["png", "tiff", "npy"]
+    stereo: StereoOptions
+    running: RunningOptions
+    preview: str | None = None

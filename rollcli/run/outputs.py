@@ -1,0 +1,161 @@
+"""Where the files that are written for a frame lie."""
+
+import contextlib
+import hashlib
+import posixpath
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from functools import lru_cache
+from pathlib import Path
+
+from rollcli.errors import InputError, OutputError
+from rollcli.files.atomic import mark_path, remove_leftovers
+from rollcli.files.storage import read_bytes, remove, remove_all, write_bytes, write_new
+from rollcli.files.stores.locations import is_object_url, is_url, located
+from rollcli.files.stores.objects import list_objects
+from rollcli.run.frame import Frame
+from rollcli.run.options import ImageOptions
+
+ENDING_OF_FORMAT = {"png": ".png", "tiff": ".tif", "npy": ".npy"}  # of maps computed from pairs
+
+
+def image_paths(frame: Frame, images: ImageOptions) -> Iterator[tuple[str, str]]:
+    """Yield (kind, path) of each image that is written for a frame."""
+    for kind, folder, ending in _kinds(images, computed=bool(frame.right_file)):
+        yield kind, output_path(frame, folder, ending)
+
+
+@lru_cache(maxsize=16)  # the same for each of a million frames
+def _kinds(images: ImageOptions, *, computed: bool) -> tuple[tuple[str, str, str | None], ...]:
+    """List (kind, folder, ending) of the images; None is the ending of the frame's own file."""
+    of_maps = ENDING_OF_FORMAT[images.save_as]
+    endings = {
+        "derotated": of_maps if computed else None,
+        "vdisparity": ".png",
+        "disparity": of_maps,
+        "road_mask": ".png",
+    }
+    return tuple((kind, folder, endings[kind]) for kind, folder in images.folders())
+
+
+def roomy_path(path: str) -> str:
+    """Name the TIFF that is written in place of a KITTI PNG which cannot hold the map."""
+    return posixpath.splitext(path)[0] + ENDING_OF_FORMAT["tiff"]
+
+
+def possible_paths(frame: Frame, images: ImageOptions) -> Iterator[tuple[str, ...]]:
+    """Yield, for each image of a frame, the paths of which one is written."""
+    for kind, path in image_paths(frame, images):
+        computed = frame.right_file and kind in ("derotated", "disparity") and images.save_as == "png"
+        yield (path, roomy_path(path)) if computed else (path,)
+
+
+def local_images(frame: Frame, images: ImageOptions) -> Iterator[str]:
+    """Yield the images of a frame that may lie on local disk, where a power cut may take them."""
+    return (path for paths in possible_paths(frame, images) for path in paths if not is_url(path))
+
+
+class MadeImages:
+    """Which images of a run exist and are not empty.
+
+    A folder of an object store is listed once: asking for each object would take as long as making it again.
+    """
+
+    def __init__(self, images: ImageOptions) -> None:
+        self._images = images
+        folders = [f"{folder.rstrip('/')}/" for _, folder in images.folders() if is_object_url(folder)]
+        self._objects = {url for folder in folders for url, size in list_objects(folder) if size}
+
+    def has_all(self, frame: Frame) -> bool:
+        """Tell whether every image of a frame is there."""
+        return all(any(map(self._is_there, paths)) for paths in possible_paths(frame, self._images))
+
+    def _is_there(self, path: str) -> bool:
+        if is_url(path):
+            return path in self._objects
+        try:
+            return Path(path).stat().st_size > 0
+        except OSError:
+            return False
+
+
+def output_path(frame: Frame, folder: str, ending: str | None = None) -> str:
+    """Name the file of a frame below `folder`; it keeps the frame's own ending unless one is given."""
+    name = frame.relative if ending is None else posixpath.splitext(frame.relative)[0] + ending
+    return f"{folder}{name}" if folder.endswith("/") else f"{folder}/{name}"
+
+
+def every_path(frame: Frame, images: ImageOptions, root: str = "") -> list[str]:
+    """List every image that may be written for a frame, from a folder where relative paths start."""
+    return [located(root, path) for paths in possible_paths(frame, images) for path in paths]
+
+
+def write_outputs(
+    files: Mapping[str, bytes], paths: Collection[str], *, replaces: bool, retry_of: str = ""
+) -> None:
+    """Write the files of a frame, each whole or not at all; a failed frame has none.
+
+    Parameters
+    ----------
+    files : mapping from str to bytes
+        What is written, by its path.
+    paths : collection of str
+        All that may be written for the frame.
+    replaces : bool
+        Whether files of an earlier run are replaced, and those that are not written now removed: they would
+        pass for this run's. Otherwise nothing that another run or program wrote is touched.
+    retry_of : str
+        The result whose failed frame is done again. What an earlier retry of it made and did not live to
+        write a row of is taken back: a mark beside such a file says so until the row is in the result.
+
+    Raises
+    ------
+    OutputError
+        One cannot be written, or must not be replaced.
+    """
+    if retry_of and not replaces:
+        _write_marked(files, paths, retry_of)
+        return
+    write = write_bytes if replaces else write_new
+    for path, data in files.items():
+        write(path, data)
+    if replaces:
+        for path in paths:
+            if path not in files:
+                with contextlib.suppress(OutputError):  # the row says what is wrong with the frame
+                    remove(path)
+
+
+def _write_marked(files: Mapping[str, bytes], paths: Collection[str], result: str) -> None:
+    for path in paths:
+        _take_back(path, result)
+    for path, data in files.items():
+        write_bytes(mark_path(path), _mark(data, result))
+        try:
+            write_new(path, data)
+        except OutputError:
+            remove(mark_path(path))
+            raise
+
+
+def _take_back(path: str, result: str) -> None:
+    """Remove a file that a retry of this result made, unless somebody has changed it since."""
+    with contextlib.suppress(InputError):  # it was not marked, or is gone
+        if read_bytes(mark_path(path)) == _mark(read_bytes(path), result):
+            remove(path)
+
+
+def _mark(data: bytes, result: str) -> bytes:
+    return hashlib.sha256(result.encode("utf-8", "surrogateescape") + b"\0" + data).hexdigest().encode()
+
+
+def remove_marks(frames: Collection[Frame], images: ImageOptions) -> None:
+    """Remove the marks beside the images of frames that were done again, and what killed workers left."""
+    paths = [path for frame in frames for path in every_path(frame, images)]
+    marks = [mark_path(path) for path in paths]
+    remove_leftovers([*paths, *marks])
+    remove_all(filter(is_url, marks))
+
+
+def remove_image_leftovers(frames: Iterable[Frame], images: ImageOptions) -> None:
+    """Remove the temporary files that killed workers left beside the images of these frames."""
+    remove_leftovers(path for frame in frames for path in every_path(frame, images))

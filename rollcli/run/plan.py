@@ -1,0 +1,102 @@
+"""Decide and check what a run will read and write, before anything runs."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from itertools import chain
+
+from rollcli.errors import UsageError
+from rollcli.files.results import Format, run_path
+from rollcli.files.stores.locations import is_url
+from rollcli.files.stream import is_stream
+from rollcli.run.calibration import calibration_files, check_depth, check_first_size
+from rollcli.run.find import (
+    check_inputs_are_kept,
+    check_nothing_is_there,
+    check_one_owner,
+    check_places,
+    map_frames,
+    pair_frames,
+)
+from rollcli.run.frame import Frame
+from rollcli.run.options import EstimateOptions
+from rollcli.run.outputs import every_path
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The frames of a run, in the order of their rows; where the rows go, and in which form."""
+
+    frames: list[Frame]
+    output: str
+    format: Format
+    timing: bool = False
+
+    @property
+    def in_parts(self) -> bool:
+        """Whether the result is a folder of parts."""
+        return self.format == "parquet" or is_url(self.output)
+
+
+def make_plan(options: EstimateOptions) -> Plan:
+    """Find the frames and check what can be checked before they run.
+
+    Raises
+    ------
+    UsageError
+        No input; pairs, masks or calibrations without partner; a calibration that is not for the images; two
+        frames with the same image; an image or a result that would replace an input, or that exists already.
+    """
+    if options.result.retry_failed and not options.result.resume:
+        raise UsageError("--retry-failed does again what failed in an earlier run: give --resume with it")
+    part, parts = options.result.shard
+    frames = _find_frames(options)
+    if options.pairs.left is None:
+        check_depth(frames, options.encoding)
+    output = options.result.output
+    results = [] if is_stream(output) else [output, run_path(output)]
+    check_one_owner(((frame, _images([frame], options)) for frame in frames), results)
+    reads = [path for frame in frames for path in frame.reads()]
+    reads += calibration_files(options.calibration)
+    check_inputs_are_kept(reads, chain(results, _images(frames, options)))
+    frames = frames[part - 1 :: parts]
+    check_places(frames, [folder for _, folder in options.images.folders()])
+    check_first_size(frames, options.frame)
+    if not (options.running.overwrite or options.result.resume):
+        check_images_are_new(frames, options)
+    form = options.result.form
+    if form == "parquet" and is_stream(output):
+        raise UsageError("Parquet is a folder of parts: name it with --output")
+    return Plan(frames, output, form, options.result.timing)
+
+
+def check_images_are_new(frames: Iterable[Frame], options: EstimateOptions) -> None:
+    """Check that no image of these frames exists.
+
+    Raises
+    ------
+    UsageError
+        Names the first that does.
+    """
+    check_nothing_is_there(_images(frames, options))
+
+
+def _images(frames: Iterable[Frame], options: EstimateOptions) -> Iterator[str]:
+    """Yield every image that may be written; a list of them would take most of our memory."""
+    return (path for frame in frames for path in every_path(frame, options.images))
+
+
+def _find_frames(options: EstimateOptions) -> list[Frame]:
+    given, pairs = options.inputs, options.pairs
+    skip = [folder for _, folder in options.images.folders()]
+    named, paired = bool(given.inputs or given.files_from), bool(pairs.left or pairs.right)
+    if named and paired:
+        raise UsageError("give either maps, or pairs by --left and --right")
+    if not named and not paired:
+        raise UsageError(
+            "no input: name maps (files, folders, patterns, or - for a list on stdin) or --left and --right"
+        )
+    if paired:
+        return pair_frames(given, pairs, region=options.region, calibration=options.calibration, skip=skip)
+    if options.images.disparity is not None:
+        raise UsageError("--disparity writes maps computed from --left and --right; here maps are the input")
+    return map_frames(given, region=options.region, calibration=options.calibration, skip=skip)

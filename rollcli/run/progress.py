@@ -1,0 +1,353 @@
+"""What is said while frames run: a bar or lines, counts, causes of failure, and how the views lie."""
+
+import os
+import re
+import sys
+import time
+from array import array
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import astuple, dataclass, replace
+from statistics import median
+from types import TracebackType
+from typing import Any
+
+from rollcli.errors import ExitStatus
+from rollcli.files.results import Row
+from rollcli.messages import say
+from rollcli.run.frame import FrameResult, named_message
+from rollcli.run.options import EncodingOptions, RunningOptions
+from rollcli.stereo.misalignment import Misalignment
+from rollcli.stereo.misalignment_words import NOT_LEVELLED, TOO_LITTLE, advice_of, read_note
+
+_LINE_EVERY_S = 30.0
+_UNKNOWN_SIZE = {"ncols": 80, "nrows": 24}  # of a terminal that does not tell its size
+
+
+class TaskProgress:
+    """Shows a bar on a terminal; elsewhere writes a line every half minute.
+
+    Parameters
+    ----------
+    total : int
+        Frames to do.
+    quiet, verbose : bool
+        Whether to write errors alone, or details too.
+    """
+
+    def __init__(self, total: int, *, quiet: bool = False, verbose: bool = False) -> None:
+        self.total, self.kept = total, 0
+        self._quiet, self._verbose = quiet, verbose
+        self._finished = 0
+        self._shown: set[str] = set()
+        self._start = self._last_line = time.monotonic()
+        self._bar: Any = None
+
+    def __enter__(self) -> "TaskProgress":
+        if not self._quiet and sys.stderr.isatty():
+            from tqdm import tqdm  # loaded only where a person reads it
+
+            self._bar = tqdm(
+                total=self.total, initial=self.kept, unit=" frames", leave=False, **_terminal_size()
+            )
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None
+    ) -> None:
+        if self._bar is not None:
+            self._bar.close()
+
+    @property
+    def done(self) -> int:
+        """The number of frames that are done, those of an interrupted run included."""
+        return self.kept + self._finished
+
+    @property
+    def seconds(self) -> float:
+        """The time since the start, seconds."""
+        return time.monotonic() - self._start
+
+    def say(self, message: str) -> None:
+        """Write one line, even when quiet."""
+        if self._bar is not None:
+            self._bar.clear()
+        say(message)
+        if self._bar is not None:
+            self._bar.refresh()
+
+    def note(self, message: str, topic: str = "") -> None:
+        """Write one line unless quiet; the same message, or another one of the same topic, only once."""
+        if (topic or message) not in self._shown and not self._quiet:
+            self._shown.add(topic or message)
+            self.say(message)
+
+    def detail(self, message: str) -> None:
+        """Write one line when verbose."""
+        if self._verbose and not self._quiet:
+            self.say(message)
+
+    def advance(self) -> None:
+        """Count a frame, and show it when there is something to show."""
+        self._finished += 1
+        if self._bar is not None:
+            self._bar.set_postfix(self.counted(), refresh=False)
+            self._bar.update()
+        elif time.monotonic() - self._last_line >= _LINE_EVERY_S:
+            self._last_line = time.monotonic()
+            if not self._quiet:
+                counted = "".join(f", {number} {what}" for what, number in self.counted().items())
+                self.say(f"{self.done} of {self.total} frames{counted}, {self.speed()}{self._left()}")
+
+    def counted(self) -> dict[str, int]:
+        """Name what else is shown beside the number of frames."""
+        return {}
+
+    def speed(self) -> str:
+        """Say how many frames were done in a second, those of an interrupted run left out."""
+        return f"{self._finished / max(self.seconds, 1e-9):.1f} frames/s"
+
+    def _left(self) -> str:
+        """Say how long the rest takes at this speed."""
+        seconds = self.seconds / self._finished * (self.total - self.done)
+        return f", about {_rough(seconds)} left" if seconds else ""
+
+
+def _rough(seconds: float) -> str:
+    """Say how long something takes, in the unit of which there are a few."""
+    for name, size in (("h", 3600), ("min", 60)):
+        if seconds >= 1.5 * size:
+            return f"{seconds / size:.0f} {name}"
+    return f"{seconds:.0f} s"
+
+
+def _terminal_size() -> dict[str, Any]:
+    """Choose the size of the bar: the terminal's, if that tells one."""
+    try:
+        known = os.get_terminal_size(sys.stderr.fileno()).columns > 0
+    except OSError:  # the terminal is gone
+        known = False
+    return {"dynamic_ncols": True} if known else _UNKNOWN_SIZE
+
+
+class RigAlignment:
+    """Collects what rows say was corrected; a pair that was matched as it is counts as level.
+
+    One that could not be levelled, or not be checked, says nothing: what was tried is no measurement.
+    """
+
+    def __init__(self) -> None:
+        self._parts = [array("d") for _ in astuple(Misalignment())]
+        self._size = (0, 0)
+        self._corrected = 0
+
+    def add(self, row: Row) -> None:
+        """Take in a row; those of maps and those without an angle say nothing."""
+        if not row.right_file or row.height is None or row.width is None:
+            return
+        if NOT_LEVELLED in row.message or TOO_LITTLE in row.message:
+            return
+        self._size = row.height, row.width
+        found = read_note(row.message, *self._size)
+        self._corrected += found != Misalignment()
+        for part, value in zip(self._parts, astuple(found), strict=True):
+            part.append(value)
+
+    @property
+    def median(self) -> Misalignment:
+        """The median of each part over the frames."""
+        return Misalignment(*(median(part) if part else 0.0 for part in self._parts))
+
+    @property
+    def advice(self) -> str:
+        """What to do about it, in a sentence; empty where the median is level."""
+        return advice_of(self.median, *self._size)
+
+    def summary(self) -> dict[str, float | int | str] | None:
+        """Return the entry of the run's record; None where no pair was corrected."""
+        if not self._corrected:
+            return None
+        found = self.median
+        return {
+            "frames": len(self._parts[0]),
+            "corrected": self._corrected,
+            "right_lower_px": round(found.offset, 3),
+            "right_camera_roll_deg": round(found.rotation_deg, 4),
+            "right_larger_percent": round(100 * found.scale, 4),
+            "rows_skewed_px": round(found.shifts(*self._size)[3], 3),
+            "advice": self.advice,
+        }
+
+
+_NUMBER = re.compile(r"\d[\d.]*(?:e[-+]?\d+)?")
+_CAUSES = 5  # that are said; a batch where every frame fails differently is no list to read
+
+
+def cause_of(message: str) -> str:
+    """Return what messages of one cause share: the text without its numbers."""
+    return _NUMBER.sub("#", message)
+
+
+@dataclass
+class _Cause:
+    first: Row
+    frames: int = 1
+    alike: bool = True  # whether all messages are the same, to the number
+
+
+class Causes:
+    """Groups the messages of frames; those that differ in numbers alone have one cause."""
+
+    def __init__(self) -> None:
+        self._causes: dict[str, _Cause] = {}
+        self._others = 0
+
+    def add(self, row: Row) -> str:
+        """Take the row of a frame, with its message; return what is to be said of it now, or nothing."""
+        key = cause_of(row.message)
+        cause = self._causes.get(key)
+        if cause is not None:
+            cause.frames += 1
+            cause.alike &= row.message == cause.first.message
+            return ""
+        if len(self._causes) == _CAUSES:
+            self._others += 1
+            return ""
+        self._causes[key] = _Cause(row)
+        return named_message(row)
+
+    def repeated(self) -> list[str]:
+        """Make a line of each cause that several frames had, and one of the causes that were not said."""
+        lines = []
+        for cause in self._causes.values():
+            if cause.frames > 1:
+                what = (
+                    f": {cause.first.message}" if cause.alike else f", such as {named_message(cause.first)}"
+                )
+                lines.append(f"{cause.frames} frames{what}")
+        if self._others:
+            frames = "frame" if self._others == 1 else "frames"
+            lines.append(f"{self._others} further {frames}: other causes, which -v names")
+        return lines
+
+
+_MEANING = {
+    "px": "pixels as stored",
+    "kitti": "stored / 256",
+    "cityscapes": "(stored - 1) / 256",
+    "sgbm": "stored / 16",
+}
+
+
+class Progress(TaskProgress):
+    """Counts the frames of a run, and says on stderr how far it is.
+
+    Parameters
+    ----------
+    total : int
+        Frames to do.
+    running : RunningOptions
+        How much to say.
+    encoding : EncodingOptions
+        An encoding that was found rather than given is named once.
+    statuses : sequence of str
+        The statuses of rows that the summary counts, besides "error".
+    """
+
+    def __init__(
+        self,
+        total: int,
+        running: RunningOptions,
+        encoding: EncodingOptions,
+        statuses: Sequence[str] = ("ok", "suspect"),
+    ) -> None:
+        super().__init__(total, quiet=running.quiet, verbose=running.verbose)
+        self.counts: Counter[str] = Counter()
+        self.stopped_early = False
+        self._statuses = statuses
+        self._auto = encoding.encoding == "auto" and encoding.scale is None
+        self.alignment = RigAlignment()
+        self._failures, self._warnings = Causes(), Causes()
+
+    def __enter__(self) -> "Progress":
+        super().__enter__()
+        return self
+
+    def keep(self, totals: Mapping[str, int], alignment: RigAlignment) -> None:
+        """Count the rows that an interrupted run has left, by their status, and go on with its alignment."""
+        self.counts.update(totals)
+        self.kept += sum(totals.values())
+        self.alignment = alignment
+
+    def counted(self) -> dict[str, int]:
+        """Name the failures."""
+        return {"failed": self.counts["error"]}
+
+    @property
+    def totals(self) -> dict[str, int]:
+        """The number of frames by status."""
+        return {"frames": self.done, **{status: self.counts[status] for status in ("ok", "suspect", "error")}}
+
+    def add(self, result: FrameResult) -> None:
+        """Count a row that is written, and say what the user should know about it."""
+        row = result.row
+        self.counts[row.status] += 1
+        self.alignment.add(row)
+        self._tell_input(result)
+        if row.status == "error":
+            self._tell_failure(row)
+        elif row.status == "suspect":
+            self.detail(f"{row.file}: suspect: {row.message}")
+        self.advance()
+
+    def _tell_input(self, result: FrameResult) -> None:
+        """Say once how numbers were read, and which disparities were searched."""
+        name, searched = result.row.file, result.searched
+        if result.encoding and self._auto:
+            how = f"{name}: read as {result.encoding} ({_MEANING[result.encoding]})"
+            self.note(how, topic=result.encoding)
+        if result.warning:
+            self._tell_warning(replace(result.row, message=f"warning: {result.warning}"))
+        if searched is not None:
+            how = f"{name}: searched disparities from {searched[0]} to {searched[1]} px"
+            if self._verbose:
+                self.detail(how)
+            else:
+                self.note(how, topic="searched")
+
+    def _tell_warning(self, row: Row) -> None:
+        line = self._warnings.add(row)
+        if self._verbose:
+            self.detail(named_message(row))
+        elif line:
+            self.note(line)
+
+    def _tell_failure(self, row: Row) -> None:
+        line = self._failures.add(row)
+        if self._verbose:
+            self.say(named_message(row))
+        elif line:
+            self.say(line)
+
+    def tell_end(self) -> None:
+        """Say which causes of warnings and failures were met more than once, and the summary."""
+        if not self._verbose:
+            for line in self._warnings.repeated():
+                self.note(line)
+            for line in self._failures.repeated():
+                self.say(line)
+        self.note(self.summary())
+
+    def summary(self) -> str:
+        """Make the last line of a run: how many frames came to what, and how fast."""
+        counts = self.counts
+        kept = f" ({self.kept} kept)" if self.kept else ""
+        by_status = [f"{counts[status]} {status}" for status in self._statuses]
+        by_status.append(f"{counts['error']} failed")
+        frames = f"{self.done} frame{'' if self.done == 1 else 's'}{kept}"
+        return f"{frames}: {', '.join(by_status)}; {self.seconds:.1f} s, {self.speed()}"
+
+    @property
+    def status(self) -> ExitStatus:
+        """The exit status of a run that came to its end."""
+        return ExitStatus.FRAMES_FAILED if self.counts["error"] else ExitStatus.DONE

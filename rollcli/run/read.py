@@ -1,0 +1,244 @@
+"""Read a frame: its disparity, from a map or matched from a pair, and the pixels that may be used."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import lru_cache, partial
+from typing import TYPE_CHECKING, Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from rollcli.errors import InputError
+from rollcli.estimator.road.find import first_row_of_road
+from rollcli.files.encodings import read_mask, to_disparity
+from rollcli.files.formats import Stored, read_image, read_stored
+from rollcli.run.diagnosis import require_positive, too_large
+from rollcli.run.frame import Frame
+from rollcli.run.options import FrameOptions, MethodOptions, RegionOptions
+from rollcli.stereo.misalignment_words import note_of
+
+if TYPE_CHECKING:
+    from rollcli.stereo.match import StereoMatch, Wanted
+
+
+Corner = tuple[float, float]
+_FAR = 2**17  # pixels; a side that leaves the map there is still straight to a hundredth of a pixel
+
+
+def region_mask(mask: str | None, options: FrameOptions, shape: tuple[int, ...]) -> NDArray[np.bool_] | None:
+    """Find the pixels inside all that is given, shape (H, W); None when nothing is given.
+
+    Raises
+    ------
+    InputError
+        The mask cannot be read or has another size, or no pixel is left.
+    """
+    region = options.region
+    if mask is None and region.roi is None and region.polygon is None:
+        return None
+    allowed = _drawn(region, shape)
+    if mask is not None:
+        usable = _mask_file(options.at(mask), mask)
+        if usable.shape != shape:
+            raise InputError(f"the mask {mask} is {_size(usable.shape)}, the map {_size(shape)}")
+        allowed = allowed & usable
+    if not allowed.any():
+        raise InputError(f"no pixel of this {_size(shape)} map lies inside the mask, --roi and --polygon")
+    return allowed
+
+
+@lru_cache(maxsize=4)  # the maps of a batch have one size, or a few
+def _drawn(options: RegionOptions, shape: tuple[int, ...]) -> NDArray[np.bool_]:
+    inside = np.zeros(shape, np.uint8)
+    x0, y0, x1, y1 = options.roi or (0, 0, shape[1], shape[0])
+    inside[y0:y1, x0:x1] = 1
+    if options.polygon is not None:
+        area: NDArray[Any] = np.zeros(shape, np.uint8)
+        if corners := _near(options.polygon):
+            cv2.fillPoly(area, [np.rint(corners).astype(np.int32)], 1)
+        inside &= area
+    return inside.astype(np.bool_)
+
+
+def _near(corners: Sequence[Corner]) -> Sequence[Corner]:
+    """Cut off what lies far outside of any map [Sutherland, Hodgman 1974]: OpenCV would fill that, too.
+
+    In fractions, for of a step between 1e300 and a pixel a float keeps nothing.
+    """
+    exact = [(Fraction(u), Fraction(v)) for u, v in corners]
+    for axis in (0, 1):
+        for bound, side in ((-_FAR, 1), (_FAR, -1)):
+            kept: list[tuple[Fraction, Fraction]] = []
+            for one, other in zip(exact, (*exact[1:], *exact[:1]), strict=True):
+                first, second = side * (one[axis] - bound), side * (other[axis] - bound)
+                if first >= 0:
+                    kept.append(one)
+                if (first >= 0) != (second >= 0):
+                    share = first / (first - second)
+                    cut = [a + share * (b - a) for a, b in zip(one, other, strict=True)]
+                    kept.append((cut[0], cut[1]))
+            exact = kept
+    return [(float(u), float(v)) for u, v in exact]
+
+
+@lru_cache(maxsize=1)  # a mask for all frames is read once
+def _mask_file(path: str, name: str) -> NDArray[np.bool_]:
+    return read_mask(path, name)
+
+
+def _size(shape: tuple[int, ...]) -> str:
+    return "x".join(map(str, reversed(shape)))
+
+
+# when more of the map than this lies at the end of the searched range, the range was too short
+_MUCH_AT_END = 0.05
+
+
+@dataclass(frozen=True)
+class Source:
+    """The disparity of a frame, where it comes from, and which pixels of it may be used.
+
+    Attributes
+    ----------
+    disparity : ndarray, shape (H, W)
+        What the angle is estimated from; pixels, 0 is no data.
+    allowed : ndarray of bool, shape (H, W), or None
+        Pixels inside the mask, --roi and --polygon; None when none of them is given.
+    stored : Stored or None
+        What the map file holds; None for a pair.
+    encoding, warning : str
+        How the stored numbers were read, and why that may be wrong.
+    beyond : str
+        Why the disparities are too large to be pixels, and what would divide them; empty when they are not.
+    searched : tuple of int, or None
+        First and last disparity searched, px; pairs only.
+    slope_error : float
+        Standard deviation of a slope that all disparities may have beside the road's, px per px.
+    doubt : str
+        Why the map itself may be wrong; empty when there is no reason.
+    note : str
+        What was done about the pair; empty when nothing.
+    size : tuple of int, or None
+        Width and height of the images in the files, px, where the map was matched from them.
+    whole : ndarray, shape (H, W), or None
+        The map of a pair with all rows at full size, where images are to show it.
+    photo : ndarray or None
+        The left image of a pair, grey or BGR, where the road is to be drawn on it.
+    """
+
+    disparity: NDArray[Any]
+    allowed: NDArray[np.bool_] | None = None
+    stored: Stored | None = None
+    encoding: str = ""
+    warning: str = ""
+    beyond: str = ""
+    searched: tuple[int, int] | None = None
+    slope_error: float = 0.0
+    doubt: str = ""
+    note: str = ""
+    size: tuple[int, int] | None = None
+    whole: NDArray[Any] | None = None
+    photo: NDArray[Any] | None = None
+
+    @property
+    def shown(self) -> NDArray[Any]:
+        """The map that images show, px, shape (H, W)."""
+        return self.disparity if self.whole is None else self.whole
+
+
+def read_source(frame: Frame, options: FrameOptions) -> Source:
+    """Read the frame's map, or match its pair, and draw its region.
+
+    Raises
+    ------
+    InputError
+        A file cannot be read as what it should be, or no pixel may be used.
+    """
+    if frame.right_file:
+        return _match(frame, options)
+    source = _read(frame, options)
+    allowed = region_mask(frame.mask, options, source.disparity.shape)
+    return source if allowed is None else replace(source, allowed=allowed)
+
+
+def _read(frame: Frame, options: FrameOptions) -> Source:
+    stored = read_stored(options.at(frame.path), frame.file)
+    require_positive(stored, frame.file)
+    given = options.encoding
+    found = to_disparity(
+        stored,
+        encoding=given.encoding,
+        scale=given.scale,
+        invalid=given.invalid,
+        calibration=frame.calibration,
+    )
+    encoding = found.encoding.value
+    beyond = too_large(found.disparity, stored, encoding)
+    return Source(
+        found.disparity,
+        stored=stored,
+        encoding=encoding,
+        warning=found.warning or "",
+        beyond=beyond,
+        # the roll is the same at any scale, pitch and height are not
+        doubt=beyond if frame.calibration is not None else "",
+    )
+
+
+def _match(frame: Frame, options: FrameOptions) -> Source:
+    from rollcli.stereo.match import match_pair
+    from rollcli.stereo.views import matched_shape
+
+    left = read_image(options.at(frame.path), frame.file)
+    right = read_image(options.at(frame.right_path), frame.right_file)
+    allowed = region_mask(frame.mask, options, matched_shape(left.shape, options.stereo.downscale))
+    match = match_pair(left, right, options.stereo, wanted_of(allowed, options))
+    searched = (match.min_disparity, match.min_disparity + match.num_disparities - 1)
+    height, width = left.shape[:2]
+    return Source(
+        match.disparity,
+        searched=searched,
+        slope_error=match.slope_error,
+        doubt="; ".join(_doubts(match)),
+        note=note_of(match.corrected, *match.disparity.shape) if options.stereo.measures_alignment else "",
+        size=(width, height),
+        whole=match.whole,
+        photo=left if options.images.road_mask is not None else None,
+        allowed=allowed,
+    )
+
+
+def wanted_of(allowed: NDArray[np.bool_] | None, options: FrameOptions) -> "Wanted":
+    """Say what of the map the estimate needs, and whether images show more."""
+    from rollcli.stereo.match import Wanted
+
+    return Wanted(
+        rows=slice(None) if allowed is None else _used_rows(allowed),
+        first_row=partial(_first_row, allowed, options.method) if options.method.road == "auto" else None,
+        whole=bool(options.images.folders()),
+    )
+
+
+def _used_rows(allowed: NDArray[np.bool_]) -> slice:
+    """Return the rows from the first to the last that has an allowed pixel."""
+    (used,) = np.nonzero(allowed.any(axis=1))
+    return slice(int(used[0]), int(used[-1]) + 1)
+
+
+def _first_row(allowed: NDArray[np.bool_] | None, method: MethodOptions, small: NDArray[Any]) -> float:
+    """Return the first row of a small map that the road in the region can reach."""
+    if allowed is not None:
+        v, u = (np.arange(few) * many // few for few, many in zip(small.shape, allowed.shape, strict=True))
+        allowed = allowed[v[:, None], u]
+    return first_row_of_road(small, allowed, math.radians(method.max_roll_deg), method.seed)
+
+
+def _doubts(match: "StereoMatch") -> Iterator[str]:
+    if match.end_fraction > _MUCH_AT_END:
+        share = f"{match.end_fraction:.0%} of the map lies at the end of the searched range"
+        yield f"{share}; use a larger --num-disparities"
+    if match.doubt:
+        yield match.doubt

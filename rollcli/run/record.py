@@ -1,0 +1,303 @@
+"""FILE.run.json: what a result was made with; it is written for people and for `--resume`, and read back."""
+
+import errno
+import hashlib
+import json
+import os
+import uuid
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import asdict
+from itertools import islice
+from pathlib import Path
+from typing import Any, TypeVar
+
+from rollcli import __version__
+from rollcli.errors import InputError, UsageError
+from rollcli.files.atomic import look_at
+from rollcli.files.results import run_path
+from rollcli.files.storage import owner_of, write_bytes
+from rollcli.files.stores.locations import is_url, public_name
+from rollcli.run.frame import Frame
+from rollcli.run.options import (
+    EncodingOptions,
+    EstimateOptions,
+    FrameOptions,
+    ImageOptions,
+    MethodOptions,
+    RegionOptions,
+)
+from rollcli.run.plan import Plan
+from rollcli.stereo.options import StereoOptions
+
+# what these errors say of a path, they say again the next time; others may pass, such as EIO
+_LASTING = (errno.ENOENT, errno.ENOTDIR, errno.ENAMETOOLONG, errno.EACCES, errno.ELOOP, errno.EINVAL)
+
+
+def fingerprint(frames: Sequence[Frame], unknown: Collection[str] = ()) -> dict[str, Any]:
+    """Summarise the frames: how many, their names, and size and time of every file that they need.
+
+    Parameters
+    ----------
+    frames : sequence of Frame
+    unknown : collection of str
+        Files to leave out.
+
+    Returns
+    -------
+    dict
+        "frames", "names" and "files"; "unknown" lists the files that were left out, and those whose size
+        could not be read, if there are any.
+    """
+    names, files = hashlib.sha256(), hashlib.sha256()
+    shared: dict[str, bytes | None] = {}  # a mask for all frames is looked at once
+    left_out = set(unknown)
+    for frame in frames:
+        names.update(os.fsencode(f"{frame.file}\0{frame.right_file}\0"))
+        for path in frame.reads():
+            if path in left_out:
+                continue
+            state = shared[path] if path in shared else _state(path)
+            if path == frame.mask:
+                shared[path] = state
+            if state is None:
+                left_out.add(path)
+            else:
+                files.update(state)
+    found = {"frames": len(frames), "names": names.hexdigest(), "files": files.hexdigest()}
+    return {**found, "unknown": sorted(left_out)} if left_out else found
+
+
+def changed_input(frames: Sequence[Frame], since_ns: int) -> str | None:
+    """Find the first file that is missing, or newer than a time in nanoseconds."""
+    for path in (path for frame in frames for path in frame.reads()):
+        if is_url(path):
+            continue
+        try:
+            if look_at(path).st_mtime_ns > since_ns:
+                return path
+        except (OSError, ValueError):
+            return path
+    return None
+
+
+def _state(path: str) -> bytes | None:
+    """Summarise a file; None when the system fails to look at it."""
+    if is_url(path):  # asking for the state of each object would take as long as reading it
+        return b"url\0"
+    try:
+        found = look_at(path)
+    except ValueError:  # no file can have this name
+        return b"missing\0"
+    except OSError as error:
+        return b"missing\0" if error.errno in _LASTING else None
+    return b"%d %d\0" % (found.st_size, found.st_mtime_ns)
+
+
+CONVENTIONS = {
+    "roll_deg": "theta, degrees, (-90, 90]; positive: the rig is rolled counter-clockwise seen from behind",
+    "roll_ci95_deg": "half-width of the 95 % interval, degrees",
+    "pitch_deg": "angle of the optical axis to the road near ahead, degrees; positive: looks down",
+    "height_m": "of the left camera over the road near ahead, metres",
+    "camber": "curvature across the road, 1/(camera height): x camera heights to the side, the surface is "
+    "higher by camber/2 x^2 camera heights; negative: crowned",
+    "alignment": "median over the pairs of what was corrected, the right image or camera against the left; "
+    "px of the size matched at; right_camera_roll_deg is positive counter-clockwise, seen from behind",
+    "alpha0, alpha1, alpha2": "road disparity in px = alpha0 + alpha1 y + alpha2 y^2",
+    "y": "v cos(theta) - u sin(theta), px; u right, v down, from the centre of the top-left pixel",
+}
+
+# fields whose option has another name
+_OPTION_NAMES = {
+    "tolerance_deg": "tolerance",
+    "max_roll_deg": "max-roll",
+    "max_interval_deg": "max-interval",
+    "mode": "sgbm-mode",
+}
+_REPLACES = "replaces_images"  # while a run with --overwrite is not over
+_NUMBERS = ("scale", "num_disparities", "vertical_offset")  # options that are None by default
+Options = TypeVar("Options", EncodingOptions, ImageOptions, MethodOptions, RegionOptions, StereoOptions)
+
+
+class RunRecord:
+    """The record of one run; the same run gives the same bytes, whether it was interrupted or not.
+
+    `unknown` are the inputs that an interrupted run could not look at.
+    """
+
+    def __init__(self, plan: Plan, options: EstimateOptions, unknown: Collection[str] = ()) -> None:
+        self._output = plan.output
+        self._encodings: set[str] = set()
+        self._searched: list[int] = []
+        self.run = uuid.uuid4().hex  # tells our objects from those of another run
+        self._begun = False
+        self.replaces = options.running.overwrite  # older images, now and after a resume
+        self.fixed = {
+            "rollcli": __version__,
+            "options": _effective(plan, options),
+            "inputs": fingerprint(plan.frames, unknown),
+        }
+        if options.calibration.given:
+            self.fixed["calibration"] = _calibrations(plan.frames)
+
+    def check_owned(self) -> None:
+        """Check that no other run has begun since on a result in an object store, which has no locks.
+
+        The run that begins last goes on, and those before it end: they may hang, or have lost their network.
+
+        Raises
+        ------
+        UsageError
+            Another one has.
+        """
+        if not (self._begun and is_url(self._output)):
+            return
+        if owner_of(run_path(self._output)) not in (self.run, ""):
+            raise UsageError(
+                f"{public_name(self._output)}: another run has begun to write this result, so this one ends; "
+                "give each an --output of its own"
+            )
+
+    @property
+    def of_rows(self) -> dict[str, Any]:
+        """What holds for rows whichever they are: all that was fixed before the run but its inputs."""
+        return {key: value for key, value in self.fixed.items() if key != "inputs"}
+
+    def continue_from(self, earlier: Mapping[str, Any]) -> None:
+        """Take over what the interrupted run has recorded about its inputs."""
+        self._encodings.update(earlier["encoding"])
+        self._searched = list(earlier["disparities_searched_px"])
+        self.replaces |= earlier.get(_REPLACES) is True
+
+    def saw(self, encoding: str, searched: tuple[int, int] | None) -> None:
+        """Record how a frame was read; the file says so before its row is written."""
+        before = self._encodings.copy(), self._searched
+        if encoding:
+            self._encodings.add(encoding)
+        if searched is not None:
+            ends = [*self._searched, *searched]
+            self._searched = [min(ends), max(ends)]
+        if (self._encodings, self._searched) != before:
+            self.write({})
+
+    def write(self, counts: Mapping[str, int], alignment: Mapping[str, Any] | None = None) -> None:
+        """Write the file, whole or not at all; `counts` is empty until the run is over, `alignment` None.
+
+        Raises
+        ------
+        UsageError
+            See `check_owned`.
+        OutputError
+            It cannot be written.
+        """
+        self.check_owned()
+        record = {
+            **self.fixed,
+            "encoding": sorted(self._encodings),
+            "disparities_searched_px": self._searched,
+            "alignment": alignment,
+            "conventions": CONVENTIONS,
+            "counts": counts,
+            **({_REPLACES: True} if self.replaces and not counts else {}),
+        }
+        data = json.dumps(record, indent=2).encode() + b"\n"
+        write_bytes(run_path(self._output), data, durable=True, owner=self.run)
+        self._begun = True
+
+
+def _effective(plan: Plan, options: EstimateOptions) -> dict[str, Any]:
+    """Collect the options that decide the bytes of rows and images, by their names on the command line."""
+    read = _by_name(options.encoding) if options.pairs.left is None else _by_name(options.stereo)
+    values = {**_by_name(options.method), **_by_name(options.region), **_by_name(options.images), **read}
+    values |= {
+        "format": plan.format,
+        "timing": options.result.timing,
+        **({"part-rows": options.result.part_rows} if plan.in_parts else {}),
+        "shard": "/".join(map(str, options.result.shard)),
+    }
+    return {_OPTION_NAMES.get(key, key).replace("_", "-"): _public(value) for key, value in values.items()}
+
+
+def _public(value: Any) -> Any:
+    """Return the value of an option without the signature of a URL."""
+    return public_name(value) if isinstance(value, str) else value
+
+
+def _by_name(options: Options) -> dict[str, Any]:
+    return asdict(options) if isinstance(options, StereoOptions) else options._asdict()
+
+
+def _calibrations(frames: Sequence[Frame]) -> dict[str, Any]:
+    """List the first few calibrations used, and where they are from; count how many differ."""
+    used = dict.fromkeys(frame.calibration for frame in frames if frame.calibration is not None)
+    digest = hashlib.sha256("\n".join(map(repr, used)).encode("utf-8", "surrogateescape"))
+    return {
+        "different": len(used),
+        "sha256": digest.hexdigest(),
+        "first": [asdict(calibration) for calibration in islice(used, _CALIBRATIONS_LISTED)],
+    }
+
+
+_CALIBRATIONS_LISTED = 3
+
+
+def is_replaceable_record(path: str) -> bool:
+    """Tell whether a new run may write its record here: there is none, or one of an earlier run."""
+    try:
+        data = Path(path).read_bytes()
+        return not data or isinstance(json.loads(data)["rollcli"], str)
+    except OSError:
+        return True  # it does not exist, or writing it will say what is wrong
+    except (ValueError, RecursionError, KeyError, TypeError):
+        return False
+
+
+def recorded_options(run: Mapping[str, Any] | None, name: str) -> FrameOptions:
+    """Read back how the run read, matched and wrote its frames; the defaults where there is no record.
+
+    Parameters
+    ----------
+    run : mapping or None
+        The content of FILE.run.json.
+    name : str
+        What errors call it.
+
+    Raises
+    ------
+    InputError
+        It is not the record of a run.
+    """
+    given = (run or {}).get("options", {})
+    if not isinstance(given, Mapping):
+        raise InputError(f"{name}: is not the record of a run: its options are no table")
+    try:
+        return FrameOptions(
+            encoding=_filled(EncodingOptions(), given),
+            method=_filled(MethodOptions(), given),
+            stereo=_filled(StereoOptions(), given),
+            images=_filled(ImageOptions(), given),
+        )
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{name}: is not the record of a run: {error}") from error
+
+
+def _filled(defaults: Options, given: Mapping[str, Any]) -> Options:
+    """Replace the defaults by what is given."""
+    values: dict[str, Any] = {}
+    for name, before in _by_name(defaults).items():
+        key = _OPTION_NAMES.get(name, name).replace("_", "-")
+        value: Any = given.get(key, before)
+        if isinstance(before, tuple) and isinstance(value, list):
+            value = tuple(map(float, value))
+        if not isinstance(value, _kinds(name, before)) or isinstance(value, bool):
+            raise TypeError(f"{key} is {value!r}")
+        values[name] = value
+    return type(defaults)(**values)
+
+
+def _kinds(name: str, default: Any) -> tuple[type, ...]:
+    """List the types that JSON may hold for an option."""
+    if name == "lambda0":
+        return (str, int, float)
+    if default is None:
+        return (type(None), int, float) if name in _NUMBERS else (type(None), str)
+    return {int: (int,), float: (int, float), tuple: (tuple,)}.get(type(default), (str,))

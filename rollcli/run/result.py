@@ -1,0 +1,267 @@
+"""Where the rows of a run go: to a stream, or to a file with the record of the run beside it."""
+
+import contextlib
+import os
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, Protocol
+
+from rollcli.errors import InputError, UsageError
+from rollcli.files.atomic import remove_leftovers
+from rollcli.files.locking import not_resumable
+from rollcli.files.results import format_header, format_row, parse_rows, read_run, run_path
+from rollcli.files.stream import STDOUT, STDOUT_NAME, is_stream, open_stream, stdout_descriptor, write_stream
+from rollcli.run.frame import Frame, FrameResult
+from rollcli.run.options import EstimateOptions, ImageOptions
+from rollcli.run.outputs import local_images, remove_image_leftovers, remove_marks
+from rollcli.run.parts import kept_in_parts, open_parts
+from rollcli.run.plan import Plan
+from rollcli.run.record import RunRecord, is_replaceable_record
+from rollcli.run.result_file import DurableRows, ResultFile, has_rows, kept_rows, open_result
+from rollcli.run.resume import KeptRows, check_restored, new_record
+
+
+class Output(Protocol):
+    """Takes the results of frames in their order.
+
+    Attributes
+    ----------
+    kept : KeptRows
+        What is known of the rows of an interrupted run, which is resumed.
+    keep_open : int or None
+        A descriptor for workers to inherit.
+    resumable : bool
+        Whether an interrupted run can be resumed.
+    replaces : bool
+        Whether images are replaced that were there before the run: it was begun with --overwrite.
+    """
+
+    kept: KeptRows
+    keep_open: int | None
+    resumable: bool
+    replaces: bool
+
+    def append(self, frame: Frame, result: FrameResult) -> None:
+        """Write the row, at once or with others after it."""
+
+    def restore(self, frame: Frame, result: FrameResult) -> None:
+        """Take the images of an incomplete frame, which were made again."""
+
+    def replace(self, position: int, frame: Frame, result: FrameResult) -> None:
+        """Write the row in the place of a kept one, at once or with others after it; positions increase."""
+
+    def commit(self) -> None:
+        """Write every row that was appended or replaces another."""
+
+    def finish(self, totals: Mapping[str, int], alignment: Mapping[str, Any] | None) -> None:
+        """Say that all rows are written, how many of each status, and how the views of pairs lay."""
+
+    def hint(self) -> str:
+        """Say how to continue after an error; empty when nothing can be continued."""
+
+
+class StreamOutput:
+    """Rows to stdout, a pipe or a device."""
+
+    keep_open: int | None = None
+    resumable = False
+
+    def __init__(self, descriptor: int, name: str, plan: Plan, options: EstimateOptions) -> None:
+        self.kept = KeptRows(plan, options)
+        self.replaces = options.running.overwrite
+        self._descriptor, self._name, self._plan = descriptor, name, plan
+        self._write(format_header(plan.format, plan.timing))
+
+    def append(self, frame: Frame, result: FrameResult) -> None:
+        """Write the row; it has left this process when this returns."""
+        self._write(format_row(result.row, self._plan.format, self._plan.timing))
+
+    def finish(self, totals: Mapping[str, int], alignment: Mapping[str, Any] | None) -> None:
+        """Do nothing: a stream has no record."""
+
+    def restore(self, frame: Frame, result: FrameResult) -> None:
+        """Do nothing: a stream keeps no rows."""
+
+    def replace(self, position: int, frame: Frame, result: FrameResult) -> None:
+        """Do nothing: a stream keeps no rows."""
+
+    def commit(self) -> None:
+        """Do nothing: no row waits."""
+
+    def hint(self) -> str:
+        """Return nothing: a stream cannot be resumed."""
+        return ""
+
+    def _write(self, data: bytes) -> None:
+        write_stream(self._descriptor, data, self._name)
+
+
+class FileOutput:
+    """Rows to a locked file, and FILE.run.json beside it; a row is written once its images are durable."""
+
+    resumable = True
+
+    def __init__(
+        self,
+        file: ResultFile,
+        record: RunRecord,
+        plan: Plan,
+        kept: KeptRows,
+        images: ImageOptions,
+    ) -> None:
+        self.kept = kept
+        self.keep_open: int | None = file.descriptor
+        self.replaces = record.replaces
+        self._file, self._record, self._plan, self._images = file, record, plan, images
+        self._rows = DurableRows(file)
+        self._replacing: dict[int, bytes] = {}
+
+    def append(self, frame: Frame, result: FrameResult) -> None:
+        """Add the row, after the record knows how its frame was read."""
+        self._record.saw(result.encoding, result.searched)
+        row = format_row(result.row, self._plan.format, self._plan.timing)
+        self._rows.append(row, self._paths(frame, result))
+
+    def restore(self, frame: Frame, result: FrameResult) -> None:
+        """Take the images of an incomplete frame, which were made again.
+
+        Raises
+        ------
+        OutputError
+            They could not be made: its row no longer holds.
+        """
+        check_restored(frame, result)
+        self._rows.restore(self._paths(frame, result))
+
+    def replace(self, position: int, frame: Frame, result: FrameResult) -> None:
+        """Take the row and its images; the file gets them all at once, in `commit`."""
+        self._record.saw(result.encoding, result.searched)
+        self._replacing[position] = format_row(result.row, self._plan.format, self._plan.timing)
+        self._rows.restore(self._paths(frame, result))
+
+    def commit(self) -> None:
+        """Force the images and rows that were added to the disk."""
+        self._rows.commit()
+        if self._replacing:
+            self._file.replace(self._replacing, self._plan.format)
+            remove_marks([self._plan.frames[position] for position in self._replacing], self._images)
+            self._replacing.clear()
+
+    def finish(self, totals: Mapping[str, int], alignment: Mapping[str, Any] | None) -> None:
+        """Write both into the record."""
+        self._record.write(totals, alignment)
+
+    def hint(self) -> str:
+        """Say that --resume continues, if rows were written and their file still is there."""
+        rows = self.kept.count + self._rows.written
+        return f"; {rows} rows are kept, continue with --resume" if rows and self._file.is_there() else ""
+
+    def _paths(self, frame: Frame, result: FrameResult) -> Iterator[str]:
+        if result.row.status != "error":
+            yield from local_images(frame, self._images)
+
+
+@contextlib.contextmanager
+def open_output(plan: Plan, options: EstimateOptions) -> Iterator[Output]:
+    """Begin a result, or continue that of an interrupted run.
+
+    Raises
+    ------
+    UsageError
+        A result exists and neither --resume nor --overwrite is given, another run is writing it, or it
+        cannot be resumed.
+    OutputError
+        It cannot be written.
+    """
+    if plan.in_parts and plan.output != STDOUT:
+        with open_parts(plan, options) as parts:
+            yield parts
+        return
+    _check_permitted(plan.output, options)
+    if plan.output == STDOUT:
+        yield StreamOutput(stdout_descriptor(), STDOUT_NAME, plan, options)
+    elif is_stream(plan.output):
+        descriptor = open_stream(plan.output)
+        try:
+            yield StreamOutput(descriptor, plan.output, plan, options)
+        finally:
+            os.close(descriptor)
+    else:
+        with open_result(plan.output) as file:
+            _check_permitted(plan.output, options)  # again, now that no other run can write it
+            yield _begin(file, plan, options)
+
+
+def frames_to_do(plan: Plan, options: EstimateOptions) -> list[Frame]:
+    """List the frames that a run would work on, without opening the result for writing.
+
+    Raises
+    ------
+    UsageError
+        As `open_output`.
+    """
+    if plan.in_parts:
+        kept = kept_in_parts(plan, options)
+    else:
+        _check_permitted(plan.output, options)
+        kept = _kept_in_file(plan, options)
+    failed = [plan.frames[position] for position in kept.failed]
+    return [*kept.incomplete, *failed, *plan.frames[kept.count :]]
+
+
+def _kept_in_file(plan: Plan, options: EstimateOptions) -> KeptRows:
+    if not options.result.resume:
+        return KeptRows(plan, options)
+    try:
+        data = Path(plan.output).read_bytes()
+    except OSError:
+        return KeptRows(plan, options)
+    return _parsed(kept_rows(data, plan.output, plan.format), plan, options)
+
+
+def _parsed(data: bytes, plan: Plan, options: EstimateOptions) -> KeptRows:
+    """Take in the rows of a file that is cut after its last whole row; it may have none, nor a header."""
+    return KeptRows(plan, options, parse_rows(data, plan.output) if data else ())
+
+
+def _begin(file: ResultFile, plan: Plan, options: EstimateOptions) -> FileOutput:
+    data = kept_rows(file.read(), plan.output, plan.format) if options.result.resume else b""
+    try:
+        kept = _parsed(data, plan, options)
+        earlier = read_run(plan.output) if kept.count else None
+    except InputError as error:
+        raise not_resumable(plan.output, str(error)) from error
+    record = new_record(plan, options, kept, earlier)
+    if options.result.resume or options.running.overwrite:
+        first = 0 if options.result.retry_failed else kept.count
+        remove_image_leftovers(kept.not_failed(first), options.images)
+    remove_leftovers([run_path(plan.output), os.path.realpath(plan.output)])
+    # in this order, a run that is killed in between can be resumed: an empty file counts as a new one
+    file.truncate(len(data) if kept.count else 0)
+    record.write({})
+    if not kept.count:
+        file.append(format_header(plan.format, plan.timing))
+    return FileOutput(file, record, plan, kept, options.images)
+
+
+def _check_permitted(name: str, options: EstimateOptions) -> None:
+    """Refuse to touch a result that exists, unless --resume or --overwrite is given."""
+    resume, overwrite = options.result.resume, options.running.overwrite
+    if resume and overwrite:
+        raise UsageError("give either --resume or --overwrite")
+    if is_stream(name):
+        if resume:
+            raise UsageError("--resume needs a result file: name it with --output")
+        return
+    if overwrite:
+        return
+    if has_rows(name):
+        if not resume:
+            raise UsageError(
+                f"{name}: exists already; give --resume to continue it or --overwrite to replace it"
+            )
+    elif not is_replaceable_record(run_path(name)):
+        raise UsageError(
+            f"{run_path(name)}: exists already and is not the record of a run; give another --output, or "
+            "--overwrite to replace it"
+        )

@@ -1,0 +1,284 @@
+"""A result as a file: rows that reach the disk, locked against a second run."""
+
+import contextlib
+import errno
+import os
+import stat
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+
+from rollcli.errors import OutputError, UsageError
+from rollcli.files.atomic import atomic_file, look_at, output_error, sync_files
+from rollcli.files.locking import locked
+from rollcli.files.results import Format, format_header
+
+_HEADERS = (format_header("csv"), format_header("csv", timing=True))
+_STARTS = (*_HEADERS, b'{"file": "')  # of the files that `rollcli estimate` writes
+_MORE_THAN_A_HEADER = 1000  # bytes
+
+
+class ResultFile:
+    """A regular file that is open, locked, and grows by whole rows.
+
+    Attributes
+    ----------
+    descriptor : int
+        The open file. Workers inherit it, so that the lock outlasts a killed run until they have ended.
+    """
+
+    def __init__(self, descriptor: int, name: str) -> None:
+        self.descriptor, self._name = descriptor, name
+
+    def read(self) -> bytes:
+        """Read the whole file."""
+        os.lseek(self.descriptor, 0, os.SEEK_SET)  # locking moves the position on Windows
+        with open(self.descriptor, "rb", closefd=False) as file:
+            return file.read()
+
+    def truncate(self, size: int) -> None:
+        """Keep the first `size` bytes, and continue after them.
+
+        Raises
+        ------
+        OutputError
+            The file system refuses.
+        """
+        try:
+            os.ftruncate(self.descriptor, size)
+            os.lseek(self.descriptor, 0, os.SEEK_END)
+        except OSError as error:
+            raise output_error(self._name, error) from error
+
+    def append(self, line: bytes) -> None:
+        """Write one line, whole or not at all.
+
+        Raises
+        ------
+        OutputError
+            The disk is full, or the file was moved or removed.
+        """
+        if not self.is_there():
+            raise OutputError(f"{self._name}: was moved or removed while this run was writing it")
+        try:
+            before = os.lseek(self.descriptor, 0, os.SEEK_CUR)
+            _write_all(self.descriptor, line)
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                os.ftruncate(self.descriptor, before)
+            raise output_error(self._name, error) from error
+
+    def replace(self, rows: Mapping[int, bytes], form: Format) -> None:
+        """Write rows in the place of those at these positions, from 0, all in one step.
+
+        The new file is locked before it takes the name. A run that is killed leaves the old one or the new.
+
+        Raises
+        ------
+        OutputError
+            The disk does not take the new file; the old one is as it was.
+        """
+        target = os.path.realpath(self._name)  # a link stays one
+        first = -1 if form == "csv" else 0  # the header
+        with contextlib.ExitStack() as held:
+            try:
+                with Path(target).open("rb") as old, atomic_file(target, durable=True) as new:
+                    if hasattr(os, "fchmod"):
+                        os.fchmod(new.fileno(), stat.S_IMODE(os.fstat(self.descriptor).st_mode))
+                    for position, line in enumerate(_lines(old, form), first):
+                        new.write(rows.get(position, line))
+                    locked_file = os.dup(new.fileno())  # the lock is the open file's, and stays with it
+                    held.callback(os.close, locked_file)
+                os.dup2(locked_file, self.descriptor, inheritable=False)
+            except OSError as error:
+                raise output_error(self._name, error) from error
+
+    def sync(self) -> None:
+        """Force the rows to the disk, where its file system can.
+
+        Raises
+        ------
+        OutputError
+            The disk fails to take them.
+        """
+        try:
+            os.fsync(self.descriptor)
+        except OSError as error:
+            if error.errno not in (errno.EINVAL, errno.ENOTSUP):
+                raise output_error(self._name, error) from error
+
+    def is_there(self) -> bool:
+        """Tell whether the open file still has its name."""
+        try:
+            return os.path.samestat(look_at(self._name), os.fstat(self.descriptor))
+        except OSError:
+            return False
+
+
+@contextlib.contextmanager
+def open_result(name: str) -> Iterator[ResultFile]:
+    """Open and lock the file of a result; it is made if it does not exist, and not changed if it does.
+
+    Raises
+    ------
+    UsageError
+        Another run is writing it.
+    OutputError
+        It cannot be written.
+    """
+    flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
+    while True:
+        try:
+            Path(name).parent.mkdir(parents=True, exist_ok=True)
+            descriptor = os.open(name, flags, 0o666)
+        except OSError as error:
+            raise output_error(name, error) from error
+        try:
+            with locked(descriptor, name):
+                file = ResultFile(descriptor, name)
+                if file.is_there():  # the run that held it may have replaced it
+                    yield file
+                    return
+        finally:
+            with contextlib.suppress(OSError):  # what it would report, `sync` has reported
+                os.close(descriptor)
+
+
+def has_rows(name: str) -> bool:
+    """Tell whether a file holds more than the header of a run that wrote no row."""
+    try:
+        with Path(name).open("rb") as file:
+            start = file.read(_MORE_THAN_A_HEADER)
+    except OSError:
+        return False  # it does not exist, or opening it for writing will say what is wrong
+    return start not in (b"", *_HEADERS)
+
+
+def kept_rows(data: bytes, name: str, form: Format) -> bytes:
+    """Cut what an interrupted run has left after its last whole row.
+
+    Raises
+    ------
+    UsageError
+        It is not a result: another program's file must not be emptied.
+    """
+    if not any(data.startswith(start) or start.startswith(data) for start in _STARTS):
+        raise UsageError(
+            f"{name}: is not a result as rollcli estimate writes it; "
+            "give another --output, or --overwrite to replace it"
+        )
+    return whole_rows(data, form)
+
+
+def whole_rows(data: bytes, form: Format) -> bytes:
+    """Cut the data after the last row that is whole.
+
+    A row of CSV ends at a newline outside quotes: a file name may hold newlines.
+    """
+    end = data.rfind(b"\n") + 1
+    if form == "jsonl":
+        return data[:end]
+    quotes = data.count(b'"', 0, end)
+    while end and quotes % 2:
+        before = data.rfind(b"\n", 0, end - 1) + 1
+        quotes -= data.count(b'"', before, end)
+        end = before
+    return data[:end]
+
+
+def _lines(file: Iterable[bytes], form: Format) -> Iterator[bytes]:
+    """Yield the header and the rows of a whole result; a row of CSV may hold newlines in quotes."""
+    line = b""
+    for piece in file:
+        line += piece
+        if form == "jsonl" or line.count(b'"') % 2 == 0:
+            yield line
+            line = b""
+
+
+def _write_all(descriptor: int, data: bytes) -> None:
+    while data:  # a full disk takes a part of it, and reports the error at the next call
+        data = data[os.write(descriptor, data) :]
+
+
+_MOST_IMAGES = 512
+_LONGEST_S = 1.0  # a row waits no longer for the others of its group
+_SHARE = 100  # a group lasts so many times as long as the last one took to sync: 1 % of the time at most
+
+
+class DurableRows:
+    """Collects rows, forces their images to the disk, then writes them and forces them too.
+
+    Rows without images are written at once; a killed run loses none of them.
+
+    Attributes
+    ----------
+    written : int
+        The number of rows in the file that this object wrote.
+    """
+
+    def __init__(self, file: ResultFile) -> None:
+        self.written = 0
+        self._file = file
+        self._rows: list[bytes] = []
+        self._images: list[str] = []
+        self._folders: set[Path] = set()  # whose names are on the disk
+        self._unsynced = False
+        self._last, self._wait_s = time.monotonic(), 0.0
+
+    def append(self, row: bytes, images: Iterable[str]) -> None:
+        """Add a row and the images that must be on the disk before it.
+
+        Raises
+        ------
+        OutputError
+            The disk does not take an image or a row.
+        """
+        before = len(self._images)
+        self._images.extend(images)
+        if self._rows or len(self._images) > before:
+            self._rows.append(row)
+        else:
+            self._write(row)
+        self._commit_in_time()
+
+    def restore(self, images: Iterable[str]) -> None:
+        """Add images whose row is in the result already.
+
+        Raises
+        ------
+        OutputError
+            The disk does not take an image or a row.
+        """
+        self._images.extend(images)
+        self._commit_in_time()
+
+    def commit(self) -> None:
+        """Force everything to the disk that was added.
+
+        Raises
+        ------
+        OutputError
+            The disk does not take it.
+        """
+        start = time.monotonic()
+        if self._images:
+            sync_files(self._images, self._folders)
+            self._images.clear()
+        while self._rows:
+            self._write(self._rows[0])
+            del self._rows[0]
+        if self._unsynced:
+            self._file.sync()
+            self._unsynced = False
+        self._last = time.monotonic()
+        self._wait_s = min(_SHARE * (self._last - start), _LONGEST_S)
+
+    def _commit_in_time(self) -> None:
+        if time.monotonic() - self._last >= self._wait_s or len(self._images) >= _MOST_IMAGES:
+            self.commit()
+
+    def _write(self, row: bytes) -> None:
+        self._file.append(row)
+        self.written += 1
+        self._unsynced = True

@@ -1,0 +1,266 @@
+"""Continue an interrupted run: compare it with this one, and keep the rows it finished."""
+
+import json
+from collections import Counter
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+from rollcli.errors import InputError, OutputError
+from rollcli.files.locking import differences, not_resumable
+from rollcli.files.results import Row, read_run, run_path
+from rollcli.files.storage import modified_ns
+from rollcli.files.stores.locations import base_name
+from rollcli.run.frame import Frame, FrameResult
+from rollcli.run.options import EstimateOptions
+from rollcli.run.outputs import MadeImages
+from rollcli.run.plan import Plan, check_images_are_new
+from rollcli.run.progress import RigAlignment
+from rollcli.run.record import RunRecord, changed_input
+from rollcli.run.rig_answer import RigAnswer
+
+
+class Mismatch(NamedTuple):
+    """The first row that is not of the frame in its place; and whether no row is of that frame."""
+
+    row_file: str
+    frame_file: str
+    frame_is_new: bool
+
+
+class KeptRows:
+    """Takes in the rows in their order, and holds none of them: there may be a million.
+
+    Attributes
+    ----------
+    count : int
+        How many they are.
+    errors : list of int
+        Positions, from 0, of those without an angle.
+    incomplete : list of Frame
+        Frames whose images are missing or empty, whatever the cause.
+    totals : Counter of str
+        How many have each status, apart from those whose frames are done again.
+    alignment : RigAlignment
+    answer : RigAnswer
+    mismatch : Mismatch or None
+    """
+
+    def __init__(self, plan: Plan, options: EstimateOptions, rows: Iterable[Row] = ()) -> None:
+        self.count = 0
+        self.errors: list[int] = []
+        self.incomplete: list[Frame] = []
+        self.totals: Counter[str] = Counter()
+        self.alignment, self.answer = RigAlignment(), RigAnswer()
+        self.mismatch: Mismatch | None = None
+        self._frames, self._images = plan.frames, options.images
+        self._retries = options.result.retry_failed
+        self._made: MadeImages | None = None
+        for row in rows:
+            self.add(row)
+
+    @property
+    def failed(self) -> list[int]:
+        """Positions of the rows whose frames are done again."""
+        return self.errors if self._retries else []
+
+    def not_failed(self, first: int = 0) -> Iterator[Frame]:
+        """Yield the frames from a position on whose row is not `error`, or not there yet.
+
+        Marks beside images of the others are needed until these are done again.
+        """
+        failed = set(self.errors)
+        return (
+            self._frames[position] for position in range(first, len(self._frames)) if position not in failed
+        )
+
+    def add(self, row: Row) -> None:
+        """Take in the next row."""
+        if self.count < len(self._frames):
+            frame = self._frames[self.count]
+            self._compare(row, frame)
+            if row.status != "error" and not self._has_images(frame):
+                self.incomplete.append(frame)
+        if row.status == "error":
+            self.errors.append(self.count)
+        if row.status != "error" or not self._retries:
+            self.totals[row.status] += 1
+            self.alignment.add(row)
+        self.answer.add(row)
+        self.count += 1
+
+    def _compare(self, row: Row, frame: Frame) -> None:
+        found = self.mismatch
+        if found is None and (row.file, row.right_file) != (frame.file, frame.right_file):
+            self.mismatch = Mismatch(row.file, frame.file, row.file != frame.file)
+        elif found is not None and row.file == found.frame_file:
+            self.mismatch = found._replace(frame_is_new=False)
+
+    def _has_images(self, frame: Frame) -> bool:
+        if not self._images.folders():
+            return True
+        self._made = self._made or MadeImages(self._images)
+        return self._made.has_all(frame)
+
+
+_SORT_LAST = "new frames must sort last: estimate these into a result of their own"
+
+
+def check_restored(frame: Frame, result: FrameResult) -> None:
+    """Check that the images of a kept row were made again.
+
+    Raises
+    ------
+    OutputError
+        They could not be: the row no longer holds.
+    """
+    if result.row.status == "error":
+        raise OutputError(f"the images of {frame.file} cannot be made again: {result.row.message}")
+
+
+def new_record(
+    plan: Plan, options: EstimateOptions, kept: KeptRows, earlier: Mapping[str, Any] | None
+) -> RunRecord:
+    """Make the record of a run, which continues that of an interrupted run where rows are kept.
+
+    Parameters
+    ----------
+    plan : Plan
+    options : EstimateOptions
+    kept : KeptRows
+    earlier : mapping or None
+        Its record.
+
+    Raises
+    ------
+    UsageError
+        It cannot be continued; says what differs. Or it is a first start, and there are images already.
+    """
+    unknown = unknown_inputs(earlier)
+    retried = kept.failed
+    begun = begun_plan(plan, earlier)
+    record = RunRecord(plan, options, () if retried else unknown)
+    if kept.count:
+        same = record if begun is plan and not (retried and unknown) else RunRecord(begun, options, unknown)
+        added = len(plan.frames) - len(begun.frames)
+        record.continue_from(check_resumable(kept, earlier, same, begun, added))
+    elif options.result.resume:
+        _start_or_continue(record, plan, options, kept)
+    return record
+
+
+def begun_plan(plan: Plan, run: Mapping[str, Any] | None) -> Plan:
+    """Return the plan without the frames that have been added since a run began, if these sort last."""
+    inputs = (run or {}).get("inputs")
+    count = inputs.get("frames") if isinstance(inputs, dict) else None
+    if not isinstance(count, int) or not 0 < count < len(plan.frames):
+        return plan
+    return replace(plan, frames=plan.frames[:count])
+
+
+def check_resumable(
+    kept: KeptRows, run: Mapping[str, Any] | None, record: RunRecord, plan: Plan, added: int = 0
+) -> Mapping[str, Any]:
+    """Refuse to continue a result of another version, other options or other inputs.
+
+    Parameters
+    ----------
+    kept : KeptRows
+        Of the interrupted run; the files of frames that are done again may have changed.
+    run : mapping or None
+        Its record.
+    record : RunRecord
+        Of the plan.
+    plan : Plan
+        As many frames as the interrupted run had, if there are as many; see `begun_plan`.
+    added : int
+        How many frames there are beyond them.
+
+    Returns
+    -------
+    mapping
+        The record of the interrupted run.
+
+    Raises
+    ------
+    UsageError
+        Says what differs.
+    """
+    record_name = base_name(run_path(plan.output))
+    if run is None:
+        raise not_resumable(plan.output, f"there is no {record_name}")
+    if not _is_whole(run):
+        raise not_resumable(plan.output, f"{record_name} is damaged")
+    for difference in _differences(kept, run, record.fixed, plan, added):
+        raise not_resumable(plan.output, difference)
+    return run
+
+
+def _start_or_continue(record: RunRecord, plan: Plan, options: EstimateOptions, kept: KeptRows) -> None:
+    """Find out what a resume without rows is: a first start, or the same run, which had got no further.
+
+    Raises
+    ------
+    UsageError
+        A first start, and there are images: they belong to another run.
+    """
+    try:
+        run = read_run(plan.output)
+    except InputError:
+        run = None
+    if run is not None and _is_whole(run) and not any(_differences(kept, run, record.fixed, plan, 0)):
+        record.continue_from(run)
+    else:
+        check_images_are_new(plan.frames, options)
+
+
+def unknown_inputs(run: Mapping[str, Any] | None) -> list[str]:
+    """List the inputs that the interrupted run could not look at, by its record."""
+    inputs = (run or {}).get("inputs")
+    listed = inputs.get("unknown", []) if isinstance(inputs, dict) else []
+    return [each for each in listed if isinstance(each, str)] if isinstance(listed, list) else []
+
+
+def _differences(
+    kept: KeptRows, was: Mapping[str, Any], now: Mapping[str, Any], plan: Plan, added: int
+) -> Iterator[str]:
+    yield from differences(was, now)
+    if was.get("calibration") != json.loads(json.dumps(now.get("calibration"))):
+        yield "the calibration differs"
+    if found := kept.mismatch:
+        if added and found.frame_is_new:
+            yield f"{found.frame_file} has been added and sorts before {found.row_file}; {_SORT_LAST}"
+        yield f"the inputs differ: its row is of {found.row_file}, where now {found.frame_file} is"
+    if kept.count > len(plan.frames):
+        yield f"it has {kept.count} rows, and there are {len(plan.frames)} frames"
+    inputs_was, inputs_now = was["inputs"], now["inputs"]
+    if inputs_was.get("frames") != inputs_now["frames"]:
+        yield f"it was begun with {inputs_was.get('frames')} frames, now there are {inputs_now['frames']}"
+    if added and inputs_was.get("names") != inputs_now["names"]:
+        yield f"frames have been added that sort before others of its frames; {_SORT_LAST}"
+    if inputs_was.get("names") != inputs_now["names"]:
+        yield "the names of the inputs differ"
+    if inputs_was != inputs_now:
+        changed = _changed_input(plan, set(kept.failed))
+        if changed or not kept.failed:
+            yield f"{changed or 'an input'} has changed since"
+
+
+def _changed_input(plan: Plan, retried: Collection[int]) -> str | None:
+    """Find an input that is newer than the record, or missing, apart from those of frames done again."""
+    frames = [frame for position, frame in enumerate(plan.frames) if position not in retried]
+    return changed_input(frames, modified_ns(run_path(plan.output)))
+
+
+def _is_whole(run: Mapping[str, Any]) -> bool:
+    """Tell whether a record holds all that a run writes, each of its type."""
+    encodings, searched = run.get("encoding"), run.get("disparities_searched_px")
+    return (
+        isinstance(run.get("rollcli"), str)
+        and isinstance(run.get("options"), dict)
+        and isinstance(run.get("inputs"), dict)
+        and isinstance(encodings, list)
+        and all(isinstance(each, str) for each in encodings)
+        and isinstance(searched, list)
+        and all(isinstance(each, int) for each in searched)
+    )

@@ -1,0 +1,264 @@
+"""`rollcli rig` from the command line: what is read and written, and the exit status."""
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollcli.errors import ExitStatus, InputError, UsageError
+from rollcli.files.naming import listed, natural_key
+from rollcli.files.result_columns import ResultColumns, read_columns
+from rollcli.files.results import STATUSES, run_path
+from rollcli.files.stores.locations import base_name
+from rollcli.files.stream import is_stream, write_output
+from rollcli.messages import say
+from rollcli.rig.drive.assess import RigAssessment, RigFrames, assess_frames, difference
+from rollcli.rig.drive.noise import Estimate
+from rollcli.rig.quantities import COLUMNS, QUANTITIES, ROLL
+from rollcli.rig.words import findings
+from rollcli.run.find import check_writes, list_files
+from rollcli.run.rig_gates import check_options, run_checks
+from rollcli.run.rig_options import RigOptions
+from rollcli.run.rig_text import FORMATS, Findings
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Source:
+    """Frames, and what is to be said about where they are from.
+
+    Attributes
+    ----------
+    frames : RigFrames
+    missing : str
+        Why frames of the run are not there; empty when all are.
+    notes : tuple of str
+        Lines for stderr.
+    """
+
+    frames: RigFrames
+    missing: str
+    notes: tuple[str, ...]
+
+
+def read_source(paths: Sequence[str]) -> Source:
+    """Read one result, or the shards of one run.
+
+    Parameters
+    ----------
+    paths : sequence of str
+        Results as `rollcli estimate` wrote them, in any order.
+
+    Returns
+    -------
+    Source
+
+    Raises
+    ------
+    InputError
+        A file is not a result, or has no rows.
+    UsageError
+        The results are not the shards of one run, a shard is missing, or the rows are of several methods.
+    """
+    parts = [read_columns(path, COLUMNS) for path in paths]
+    for part in parts:
+        if not part.files:
+            raise InputError(f"{part.path}: has no rows: there is nothing to assess")
+    _check_one_method(parts)
+    order = _order(parts)
+    joined = [file for part in parts for file in part.files]
+    status = np.concatenate([part.status for part in parts])[order]
+    return Source(
+        RigFrames(
+            [joined[place] for place in order] if len(parts) > 1 else joined,
+            status == STATUSES.index("ok"),
+            status == STATUSES.index("suspect"),
+            {name: _joined(parts, name)[order] for name in COLUMNS if any(name in p.numbers for p in parts)},
+        ),
+        _unfinished(parts),
+        tuple(_notes(parts)),
+    )
+
+
+def _joined(parts: Sequence[ResultColumns], name: str) -> NDArray[np.float64]:
+    return np.concatenate([part.numbers.get(name, np.full(len(part.files), np.nan)) for part in parts])
+
+
+def _check_one_method(parts: Sequence[ResultColumns]) -> None:
+    methods = sorted(set().union(*(part.methods for part in parts)))
+    if len(methods) > 1:
+        names = listed(part.path for part in parts)
+        raise UsageError(f"{names}: rows of the methods {', '.join(methods)}: assess each method by itself")
+
+
+def _order(parts: Sequence[ResultColumns]) -> NDArray[np.intp]:
+    """Return the places of all rows, one part after the other, in the order of the run."""
+    shards = [_shard(part) for part in parts]
+    if len(parts) == 1 and shards[0] in (None, (1, 1)):
+        return np.arange(len(parts[0].files))
+    if all(shard is None for shard in shards):
+        return _by_name(parts)
+    for part, shard in zip(parts, shards, strict=True):
+        if shard is None:
+            raise UsageError(
+                f"{part.path}: there is no {base_name(run_path(part.path))} to say which shard it is"
+            )
+    known = [shard for shard in shards if shard is not None]
+    _check_shards(parts, known)
+    places = [
+        index - 1 + count * np.arange(len(p.files)) for p, (index, count) in zip(parts, known, strict=True)
+    ]
+    return np.argsort(np.concatenate(places), kind="stable")
+
+
+def _check_shards(parts: Sequence[ResultColumns], shards: Sequence[tuple[int, int]]) -> None:
+    """One run's shards, each once."""
+    first, (_, count) = parts[0], shards[0]
+    for part, (_, each) in zip(parts, shards, strict=True):
+        if each != count or (count == 1 and len(parts) > 1):
+            raise UsageError(
+                f"{first.path} and {(part if part is not first else parts[1]).path} are not shards of one "
+                "run: assess each by itself, or compare two with --against"
+            )
+        for name, was, now in _different(first, part):
+            names = f"{first.path} and {part.path}"
+            raise UsageError(f"{names} are not shards of one run: {name} was {was} and {now}")
+    indices = [index for index, _ in shards]
+    twice = next((index for index in indices if indices.count(index) > 1), None)
+    if twice is not None:
+        same = [p.path for p, index in zip(parts, indices, strict=True) if index == twice]
+        raise UsageError(f"{listed(same)}: are both shard {twice}/{count}")
+    gone = [f"{index}/{count}" for index in range(1, count + 1) if index not in indices]
+    if gone:
+        raise UsageError(
+            f"{first.path}: is one of {count} shards; missing: {listed(gone)}: name their results too"
+        )
+
+
+def _different(one: ResultColumns, other: ResultColumns) -> list[tuple[str, Any, Any]]:
+    """Options, shard aside, and versions that differ between two runs."""
+    options, others = _options(one.run), _options(other.run)
+    found = [
+        (f"--{name}", options.get(name), others.get(name))
+        for name in sorted({*options, *others} - {"shard"})
+        if options.get(name) != others.get(name)
+    ]
+    was, now = ((part.run or {}).get("rollcli") for part in (one, other))
+    return [*found, ("the version of rollcli", was, now)] if was != now else found
+
+
+def _options(run: Mapping[str, Any] | None) -> Mapping[str, Any]:
+    options = (run or {}).get("options")
+    return options if isinstance(options, Mapping) else {}
+
+
+def _shard(part: ResultColumns) -> tuple[int, int] | None:
+    """Which shard a result is, by its record; None where there is no record."""
+    if part.run is None:
+        return None
+    found = re.fullmatch(r"(\d{1,9})/(\d{1,9})", str(_options(part.run).get("shard", "1/1")))
+    index, count = (int(found[1]), int(found[2])) if found else (0, 0)
+    if not 1 <= index <= count:
+        raise InputError(f"{run_path(part.path)}: is not the record of a run: its shard is no I/N")
+    return index, count
+
+
+def _by_name(parts: Sequence[ResultColumns]) -> NDArray[np.intp]:
+    """Without records: the natural order of the names, in which a run's frames are."""
+    owner: dict[str, str] = {}
+    for part in parts:
+        for file in part.files:
+            first = owner.setdefault(file, part.path)
+            if first != part.path:
+                raise UsageError(
+                    f"{first} and {part.path} both have a row of {file}: they are no shards of one run"
+                )
+    keys = [natural_key(file) for part in parts for file in part.files]
+    return np.array(sorted(range(len(keys)), key=keys.__getitem__), dtype=np.intp)
+
+
+def _unfinished(parts: Sequence[ResultColumns]) -> str:
+    """Which run is not over, or was interrupted."""
+    for part in parts:
+        inputs = (part.run or {}).get("inputs")
+        frames = inputs.get("frames") if isinstance(inputs, Mapping) else None
+        if isinstance(frames, int) and frames > len(part.files):
+            return f"{part.path}: holds {len(part.files):,} of {frames:,} frames: its run has not ended"
+    return ""
+
+
+def _notes(parts: Sequence[ResultColumns]) -> list[str]:
+    encodings = [(part.run or {}).get("encoding") for part in parts]
+    seen = sorted({str(name) for names in encodings if isinstance(names, list) for name in names})
+    if len(seen) < 2:
+        return []
+    return [
+        f"{listed(part.path for part in parts)}: maps were read as {', '.join(seen)}: are they one rig's?"
+    ]
+
+
+def run_rig(options: RigOptions) -> int:
+    """Assess the rig of a result, and check it.
+
+    Parameters
+    ----------
+    options : RigOptions
+
+    Returns
+    -------
+    int
+        The exit status: 4 when a check fails.
+
+    Raises
+    ------
+    UsageError, InputError
+        Exit status 2: a file is not what it should be, or shards are missing.
+    OutputError
+        Exit status 1.
+    """
+    reads = [*options.results, *filter(None, [options.against])]
+    writes = [] if is_stream(options.output) else [options.output]
+    if len(set(reads)) < len(reads):
+        raise UsageError(f"{next(each for each in reads if reads.count(each) > 1)}: is named twice")
+    check_options(options.gates)
+    check_writes(reads, writes, overwrite=options.running.overwrite)
+    if options.running.dry_run:
+        list_files([(reads, writes)])
+        return 0
+    source = read_source(options.results)
+    rig = _assessed(source, options)
+    later = None if options.against is None else read_source([options.against])
+    after = None if later is None else _assessed(later, options)
+    changes = {} if after is None else _changes(rig, after)
+    missing = source.missing or (later.missing if later is not None else "")
+    checks = run_checks(rig, options.gates, missing, changes.get(ROLL.name))
+    found = Findings(rig, checks, after, changes)
+    write_output(options.output, FORMATS[options.format](found).encode("utf-8", "surrogateescape"))
+    if not options.running.quiet:
+        for each in filter(None, [source, later]):
+            _tell(each)
+        if options.format != "table" or writes:
+            _say(findings(rig))
+    _say(check.message for check in checks if not check.ok or check.close)
+    return 0 if all(check.ok for check in checks) else ExitStatus.CHECK_FAILED
+
+
+def _assessed(source: Source, options: RigOptions) -> RigAssessment:
+    return assess_frames(source.frames, include_suspect=options.include_suspect, groups=options.groups)
+
+
+def _changes(before: RigAssessment, after: RigAssessment) -> dict[str, Estimate]:
+    return {each.name: difference(before.now(each), after.now(each)) for each in QUANTITIES}
+
+
+def _tell(source: Source) -> None:
+    """Say what is to be known about where the frames are from."""
+    _say(filter(None, [*source.notes, source.missing]))
+
+
+def _say(lines: Iterable[str]) -> None:
+    """One line each on stderr."""
+    for line in lines:
+        say(line)

@@ -1,0 +1,244 @@
+"""An assessment of the rig as a table to read, as CSV and as JSON."""
+
+import csv
+import io
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from rollcli.rig.drive.assess import DriveAssessment, RigAssessment
+from rollcli.rig.drive.noise import Estimate
+from rollcli.rig.drive.quantity import Segment
+from rollcli.rig.quantities import QUANTITIES, ROLL, Quantity
+from rollcli.rig.words import answer, counts, findings, now_in_words
+from rollcli.run.rig_gates import Check
+
+_DIGITS = 6
+
+
+def named(prefix: str, estimate: Estimate, suffix: str = "deg") -> dict[str, float | None]:
+    """Return a value and its interval under the names of the interface."""
+    return {
+        f"{prefix}_{suffix}": rounded(estimate.value),
+        f"{prefix}_ci95_{suffix}": rounded(estimate.ci95),
+    }
+
+
+def rounded(value: float | None) -> float | None:
+    """Round to a millionth of a degree or of a metre, far below any noise."""
+    return None if value is None else round(value, _DIGITS) + 0.0
+
+
+def rig_values(
+    rig: RigAssessment, checks: Sequence[Check], against: tuple[RigAssessment, dict[str, Estimate]] | None
+) -> dict[str, Any]:
+    """Return the assessment as one JSON object."""
+    latest = rig.latest()
+    values: dict[str, Any] = {
+        "frames": rig.count,
+        "used": rig.used,
+        "suspect": rig.suspect,
+        "failed": rig.failed,
+        "outliers": rig.outliers,
+    }
+    for quantity in QUANTITIES:
+        values |= named(quantity.name, rig.now(quantity), quantity.suffix)
+    values["between_frames_sd_deg"] = rounded(latest.between_sd) if latest else None
+    values["status"] = latest.status if latest else "few"
+    for quantity in QUANTITIES:
+        found = rig.latest(quantity)
+        prefix = "drift" if quantity is ROLL else f"{quantity.name}_drift"
+        values |= named(prefix, found.drift if found else Estimate(), quantity.suffix)
+    for quantity in QUANTITIES:
+        values["jumps" if quantity is ROLL else f"{quantity.name}_jumps"] = _jumps(rig, quantity)
+    values["segments"] = [
+        _segment(rig, drive, place) for drive in rig.drives for place in range(len(_segments(drive)))
+    ]
+    if against is not None:
+        values["against"] = _against(*against)
+    values["checks"] = [{"name": c.name, "ok": c.ok, "message": c.message} for c in checks]
+    return values
+
+
+def _jumps(rig: RigAssessment, quantity: Quantity) -> list[dict[str, Any]]:
+    found = []
+    for drive in rig.drives:
+        assessed = drive.quantities.get(quantity.name)
+        for jump in assessed.jumps if assessed else ():
+            frame = int(drive.frames[jump.frame])
+            change = named("change", jump.change, quantity.suffix)
+            found.append({"frame": frame, "file": rig.frames.files[frame], **change})
+    return found
+
+
+def _segments(drive: DriveAssessment) -> Sequence[Segment]:
+    return drive.quantities[ROLL.name].segments
+
+
+def _segment(rig: RigAssessment, drive: DriveAssessment, place: int) -> dict[str, Any]:
+    """One segment of the roll, with the other quantities over the same frames."""
+    roll = _segments(drive)[place]
+    frames = drive.frames[roll.first : roll.last + 1]
+    values: dict[str, Any] = {
+        "drive": drive.name,
+        "first": int(frames[0]),
+        "last": int(frames[-1]),
+        "frames": len(frames),
+        "used": roll.used,
+        "suspect": int(rig.frames.suspect[frames].sum()),
+    }
+    for quantity in QUANTITIES:
+        found = drive.quantities.get(quantity.name)
+        mean = found.mean_over(roll.first, roll.last) if found else Estimate()
+        values |= named(quantity.name, roll.mean if quantity is ROLL else mean, quantity.suffix)
+    return values
+
+
+def segment_rows(rig: RigAssessment) -> list[dict[str, Any]]:
+    """Return the segments with what else is known of their drive: the lines of the CSV."""
+    rows = []
+    for drive in rig.drives:
+        found = drive.quantities[ROLL.name]
+        for place in range(len(found.segments)):
+            segment = _segment(rig, drive, place)
+            change = found.jumps[place - 1].change if place else drive.change
+            rows.append(
+                {
+                    **segment,
+                    "first_file": rig.frames.files[segment["first"]],
+                    "last_file": rig.frames.files[segment["last"]],
+                    "between_frames_sd_deg": rounded(found.between_sd),
+                    **named("drift", found.drift),
+                    **named("change", change),
+                    "status": found.status,
+                }
+            )
+    return rows
+
+
+def _against(after: RigAssessment, changes: dict[str, Estimate]) -> dict[str, Any]:
+    """How much more each quantity is in the later result, and whether the rig has moved."""
+    values: dict[str, Any] = {"frames": after.count, "used": after.used}
+    for quantity in QUANTITIES:
+        change = changes[quantity.name]
+        values |= named(f"{quantity.name}_change", change, quantity.suffix)
+        values[f"{quantity.name}_moved"] = moved(change)
+    return values
+
+
+def moved(change: Estimate) -> bool | None:
+    """Whether a change is more than its interval; None where that cannot be told."""
+    if change.value is None or change.ci95 is None:
+        return None
+    return abs(change.value) > change.ci95
+
+
+_SEGMENTS_SHOWN = 40
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Findings:
+    """All that is to be printed.
+
+    Attributes
+    ----------
+    rig : RigAssessment
+    checks : sequence of Check
+    after : RigAssessment or None
+        Of the later result.
+    changes : dict of str to Estimate
+        From the rig to `after`, by quantity.
+    """
+
+    rig: RigAssessment
+    checks: Sequence[Check]
+    after: RigAssessment | None
+    changes: dict[str, Estimate]
+
+
+def as_table(found: Findings) -> str:
+    """Write the answer first, then what happened over the drives."""
+    return "".join(f"{line}\n" for line in _lines(found))
+
+
+def as_csv(found: Findings) -> str:
+    """Return a header, and a line for each segment."""
+    buffer = io.StringIO()
+    rows = segment_rows(found.rig)
+    lines = csv.DictWriter(buffer, list(rows[0]) if rows else ["drive"], lineterminator="\n")
+    lines.writeheader()
+    lines.writerows(rows)
+    return buffer.getvalue()
+
+
+def as_json(found: Findings) -> str:
+    """One object."""
+    against = None if found.after is None else (found.after, found.changes)
+    return json.dumps(rig_values(found.rig, found.checks, against), indent=2) + "\n"
+
+
+FORMATS = {"table": as_table, "csv": as_csv, "json": as_json}
+
+
+def _lines(found: Findings) -> Iterator[str]:
+    rig = found.rig
+    for quantity in QUANTITIES:
+        if quantity is ROLL or rig.latest(quantity) is not None:
+            now = f"{answer(rig.now(quantity), quantity)} {now_in_words(rig, quantity)}".rstrip()
+            yield f"{quantity.name:8}{now}" + (f"  ({counts(rig)})" if quantity is ROLL else "")
+    drive = rig.latest_drive()
+    if drive is not None:
+        drift, over = drive.quantities[ROLL.name].drift, drive.name if len(rig.drives) > 1 else ""
+        if drift.ci95 is not None:
+            yield f"drift   {answer(drift, change=True)} over {over or 'the drive'}"
+        yield f"jumps   {_jump_count(rig)}"
+    yield from (f"        {line}" for line in _roll_jumps(rig))
+    yield from _segment_lines(rig)
+    for name, change in found.changes.items():
+        yield from _moved(name, change)
+    sentences = findings(rig)
+    if sentences:
+        yield ""
+    yield from sentences
+    for check in found.checks:
+        yield f"{'ok' if check.ok else 'FAILED'}: {check.message}"
+
+
+def _jump_count(rig: RigAssessment) -> str:
+    """How many jumps of the roll there are; none only where every drive has frames enough to tell."""
+    told = all(drive.quantities[ROLL.name].now.ci95 is not None for drive in rig.drives)
+    return str(len(_roll_jumps(rig)) or ("none" if told else "unknown"))
+
+
+def _roll_jumps(rig: RigAssessment) -> list[str]:
+    return [
+        f"{answer(jump.change, change=True)} at {rig.frames.files[drive.frames[jump.frame]]}"
+        for drive in rig.drives
+        for jump in drive.quantities[ROLL.name].jumps
+    ]
+
+
+def _segment_lines(rig: RigAssessment) -> Iterator[str]:
+    """Return a table of the segments, where there is more than one."""
+    rows = [(drive, segment) for drive in rig.drives for segment in drive.quantities[ROLL.name].segments]
+    if len(rows) < 2:
+        return
+    yield ""
+    yield f"{'roll':>18}  {'frames':>9}  {'used':>9}  from, to"
+    for drive, segment in rows[:_SEGMENTS_SHOWN]:
+        first, last = (rig.frames.files[drive.frames[place]] for place in (segment.first, segment.last))
+        count = segment.last - segment.first + 1
+        differs = "  differs" if drive.differs and segment.first == 0 else ""
+        yield f"{answer(segment.mean):>18}  {count:9,}  {segment.used:9,}  {first}, {last}{differs}"
+    if len(rows) > _SEGMENTS_SHOWN:
+        yield f"and {len(rows) - _SEGMENTS_SHOWN:,} more segments; --format csv lists all"
+
+
+def _moved(name: str, change: Estimate) -> Iterator[str]:
+    """Whether the rig has moved from one result to the other."""
+    if change.value is None:
+        return
+    quantity = next(each for each in QUANTITIES if each.name == name)
+    told = {True: "it has moved", False: "no move is seen", None: "too few frames for an interval"}
+    yield f"{name} against the other result: {answer(change, quantity, change=True)}, {told[moved(change)]}"

@@ -1,1 +1,0 @@
-"""Cameras, rays, and the surfaces and solids that rays hit."""

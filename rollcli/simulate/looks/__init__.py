@@ -1,1 +1,0 @@
-"""The appearance of surfaces: textures and materials."""

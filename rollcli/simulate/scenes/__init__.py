@@ -1,1 +1,0 @@
-"""Scenes: the road, what stands beside it and on it, and the light."""

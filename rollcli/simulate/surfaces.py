@@ -1,0 +1,223 @@
+"""The interface of surfaces, and the ground and walls that follow the course of the road.
+
+A surface computes where rays hit it (`intersect`) and, at these points, its normal and its texture
+coordinates (`sample`). The road rises, bends and is cambered as parabolas, so that each intersection is the
+root of a polynomial: exact, and without a step size.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollcli.simulate.vectors import Array, Vectors, first_crossing
+
+NEAR = 0.05  # metres: nearer surfaces are not hit
+_SEAM = 1e-9  # metres: adjacent grounds overlap by it, so that rounding lets no ray pass between them
+_FARTHEST = 1e6  # metres
+
+Indices = NDArray[np.intp]
+
+
+class SurfaceSample(NamedTuple):
+    """The surface at N points; vectors are (3, N), or (3, 1) where they are the same everywhere.
+
+    `p` and `q` (N,) are texture coordinates in metres, `grad_p` and `grad_q` their gradients in the world;
+    `material` is an index into the scene's materials, one or (N,).
+    """
+
+    normal: Vectors
+    p: Vectors
+    q: Vectors
+    grad_p: Vectors
+    grad_q: Vectors
+    material: int | Indices
+
+
+class Surface(Protocol):
+    """What a ray can hit."""
+
+    def intersect(self, origin: Array, direction: Array) -> Array:
+        """Return the ray parameters (N,) of the first hits, inf for a miss; `origin` is (3, N) or (3, 1)."""
+
+    def sample(self, points: Array) -> SurfaceSample:
+        """Return normals, texture coordinates and materials at points (3, N) on the surface."""
+
+    def bounds(self) -> Array | None:
+        """Return the corners (3, 8) of a box around the surface; None for one without end."""
+
+
+@dataclass(frozen=True)
+class Course:
+    """The line that the road follows: heading (slope), bend and vertical curvature, both 1/m.
+
+    A point has the road coordinates lateral = X - heading Z - bend Z^2 / 2, Z, and
+    elevation = Y - curvature Z^2 / 2.
+    """
+
+    heading: float = 0.0
+    bend: float = 0.0
+    curvature: float = 0.0
+
+    def lateral(self, points: Array) -> Array:
+        """Return the distance to the right of the course, metres."""
+        x, _, z = points
+        return np.asarray(x - z * (self.heading + self.bend / 2 * z))
+
+    def elevation(self, points: Array) -> Array:
+        """Return the height above the course, metres."""
+        _, y, z = points
+        return np.asarray(y - self.curvature / 2 * z * z)
+
+    def point(self, lateral: float, z: float, elevation: float = 0.0) -> Array:
+        """Return the world point (3,) of road coordinates."""
+        x = lateral + z * (self.heading + self.bend / 2 * z)
+        return np.array([x, elevation + self.curvature / 2 * z * z, z])
+
+    def frame(self, z: float, slope: float = 0.0) -> Array:
+        """Return the right, up and ahead axes, rows of (3, 3), at `z` where the slope across is this."""
+        ahead = np.array([self.heading + self.bend * z, self.curvature * z, 1.0])
+        ahead /= np.linalg.norm(ahead)
+        up = np.array([-slope, 1.0, 0.0]) - (ahead[1] - slope * ahead[0]) * ahead
+        up /= np.linalg.norm(up)
+        return np.array([np.cross(up, ahead), up, ahead])
+
+    def across(self, z: Array) -> Array:
+        """Return the gradient (3, N) of `lateral` at points with these z."""
+        return np.array([np.ones_like(z), np.zeros_like(z), -self.heading - self.bend * z])
+
+
+@dataclass(frozen=True)
+class Ground:
+    """The sheet elevation = offset + slope * lateral + camber / 2 * lateral^2, in strips side by side.
+
+    Strip i lies between edges[i] and edges[i + 1] (lateral, metres) and is of materials[i].
+    """
+
+    course: Course
+    edges: tuple[float, ...]
+    materials: tuple[int, ...]
+    far: float
+    slope: float = 0.0
+    offset: float = 0.0
+    camber: float = 0.0
+
+    def intersect(self, origin: Array, direction: Array) -> Array:
+        (ox, _, oz), (rx, _, rz) = origin, direction
+        t = self._first_hit(origin, direction)
+        z = oz + t * rz
+        lateral = ox + t * rx - z * (self.course.heading + self.course.bend / 2 * z)
+        inside = (lateral >= self.edges[0] - _SEAM) & (lateral < self.edges[-1] + _SEAM) & (z < self.far)
+        return np.where(inside, t, np.inf)
+
+    def _first_hit(self, origin: Array, direction: Array) -> Array:
+        """Return the ray parameters where rays first hit the sheet, edges ignored; nan where they miss."""
+        (ox, oy, oz), (rx, ry, rz) = origin, direction
+        lean = self.slope * self.course.bend - self.course.curvature
+        a = lean / 2 * rz * rz
+        b = ry - self.slope * (rx - self.course.heading * rz) + lean * oz * rz
+        c = oy - self.slope * (ox - self.course.heading * oz) + lean / 2 * oz * oz - self.offset
+        if not self.camber:
+            return first_root(a, b, c)
+        # along a ray, lateral = l0 + l1 t + l2 t^2, and the camber adds its square
+        l0 = ox - oz * (self.course.heading + self.course.bend / 2 * oz)
+        l1 = rx - rz * (self.course.heading + self.course.bend * oz)
+        l2 = -self.course.bend / 2 * rz * rz
+        half = self.camber / 2
+        a, b, c = a - half * (l1 * l1 + 2 * l0 * l2), b - self.camber * l0 * l1, c - half * l0 * l0
+        if not self.course.bend:
+            return first_root(a, b, c)
+        terms = np.broadcast_arrays(c, b, a, -self.camber * l1 * l2, -half * l2 * l2)
+        with np.errstate(divide="ignore"):
+            end = np.where(rz > 0, (self.far - oz) / rz, _FARTHEST)
+        t = first_crossing(np.array(terms), np.minimum(end, _FARTHEST))
+        return np.where(t > NEAR, t, np.nan)
+
+    def sample(self, points: Array) -> SurfaceSample:
+        z = points[2]
+        across, lateral = self.course.across(z), self.course.lateral(points)
+        normal = -(self.slope + self.camber * lateral) * across
+        normal[1] += 1.0
+        normal[2] -= self.course.curvature * z
+        strip = np.clip(np.searchsorted(self.edges, lateral, side="right") - 1, 0, len(self.materials) - 1)
+        return SurfaceSample(normal, lateral, z, across, _AHEAD, np.array(self.materials)[strip])
+
+    def bounds(self) -> Array | None:
+        return None
+
+
+@dataclass(frozen=True)
+class Wall:
+    """The vertical face at `lateral`: from edges[i] to edges[i + 1] in Z it rises from `base` to tops[i]."""
+
+    course: Course
+    lateral: float
+    base: float
+    edges: Array
+    tops: Array
+    material: int
+
+    def intersect(self, origin: Array, direction: Array) -> Array:
+        (ox, oy, oz), (rx, ry, rz) = origin, direction
+        heading, bend = self.course.heading, self.course.bend
+        c = ox - oz * (heading + bend / 2 * oz) - self.lateral
+        side = np.where(c < 0, -1.0, 1.0)  # first_root needs the origin on the positive side
+        b = rx - rz * (heading + bend * oz)
+        t = first_root(-side * bend / 2 * rz * rz, side * b, side * c)
+        z = oz + t * rz
+        elevation = oy + t * ry - self.course.curvature / 2 * z * z
+        section = np.searchsorted(self.edges, z) - 1
+        inside = (section >= 0) & (section < len(self.tops))
+        top = self.tops[np.where(inside, section, 0)]
+        return np.where(inside & (elevation >= self.base) & (elevation < top), t, np.inf)
+
+    def sample(self, points: Array) -> SurfaceSample:
+        z = points[2]
+        up = np.array([np.zeros_like(z), np.ones_like(z), -self.course.curvature * z])
+        elevation = self.course.elevation(points)
+        return SurfaceSample(self.course.across(z), z, elevation, _AHEAD, up, self.material)
+
+    def bounds(self) -> Array | None:
+        return None
+
+
+@dataclass(frozen=True)
+class Backdrop:
+    """A plane across the world at Z = `far`, from `base` to a skyline: metres over the course, each 2 m."""
+
+    course: Course
+    far: float
+    base: float
+    skyline: Array
+    material: int
+
+    def intersect(self, origin: Array, direction: Array) -> Array:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            t = (self.far - origin[2]) / direction[2]
+        ahead = np.where(t > NEAR, t, 0.0)
+        elevation = origin[1] + ahead * direction[1] - self.course.curvature / 2 * self.far**2
+        place = (origin[0] + ahead * direction[0]) / 2 + len(self.skyline) / 2
+        top = np.interp(place, np.arange(len(self.skyline)), self.skyline)
+        return np.where((t > NEAR) & (elevation >= self.base) & (elevation < top), t, np.inf)
+
+    def sample(self, points: Array) -> SurfaceSample:
+        elevation = self.course.elevation(points)
+        return SurfaceSample(-_AHEAD, points[0], elevation, _RIGHT, _UP, self.material)
+
+    def bounds(self) -> Array | None:
+        return None
+
+
+def first_root(a: Array, b: Array, c: Array) -> Array:
+    """Return the first t > NEAR with a t^2 + b t + c = 0, where c > 0; nan where there is none.
+
+    The form 2c / (-b + sqrt(discriminant)) stays exact as `a` vanishes.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = 2 * c / (np.sqrt(b * b - 4 * a * c) - b)
+        return np.where((c > 0) & (t > NEAR) & (t < _FARTHEST), t, np.nan)
+
+
+# single precision: double precision would double the cost of shading
+_RIGHT, _UP, _AHEAD = np.eye(3, dtype=np.float32)[:, :, None]

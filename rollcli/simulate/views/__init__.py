@@ -1,1 +1,0 @@
-"""The view of a camera: trace rays, shade what they hit, and expose the image."""

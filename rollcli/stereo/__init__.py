@@ -1,0 +1,1 @@
+"""A stereo pair becomes a disparity map: views levelled, range found, matched, refined."""

@@ -1,0 +1,437 @@
+"""How the right view of a pair lies: its vertical disparity measured, and views levelled by it."""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from rollcli.stereo.misalignment import LEVEL, Misalignment
+from rollcli.stereo.views import (
+    BLOCK,
+    Map,
+    View,
+    Views,
+    block_means,
+    blocks_at,
+    resampled,
+    seen_at,
+    shrink_both,
+)
+
+Floats = NDArray[np.float32]
+Doubles = NDArray[np.float64]
+_SMOOTHING = 0.7  # px: more takes away the grain that tells on an empty road, less leaves the noise
+_KNOWN = 0.7  # share of a block that has to have a disparity
+_RIDGE = 0.2  # squared grey levels per pixel: gradients along the rows below this are noise
+_LEAST = 2.0  # the same, across the rows: a block with less says nothing
+_ROUNDING = 0.99  # of a sum of 64 float32
+_MOST = 50.0  # and one with more counts no more than with this
+_FEWEST = 40  # blocks
+_FIT_ROUNDS = 12
+_SAME = 0.005  # of the spread: a fit that changes it by less has settled
+_TUNING = 1.5  # standard deviations off, a block counts a quarter
+_LONGEST_STEP = 1.5  # px, anywhere; along the rows, shorter ones take twice as many rounds
+# px: after one this small, another changes a hundredth, or a fortieth where noise is strong
+_SMALL_STEP = 0.05
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What the vertical disparities of a pair say.
+
+    Attributes
+    ----------
+    misalignment : Misalignment
+        Of the right view, pixels of the size measured at.
+    share : float
+        Of the blocks that the view is cut into, those that told.
+    errors : Misalignment
+        Standard error of each part.
+    spread : float
+        Standard deviation of their vertical disparities from what is explained, outliers aside, pixels.
+    """
+
+    misalignment: Misalignment
+    errors: Misalignment
+    share: float
+    spread: float
+
+    def resized(self, factor: float) -> "Measured":
+        """Return this measurement, of views `factor` times as large."""
+        there, errors = self.misalignment.resized(factor), self.errors.resized(factor)
+        return Measured(there, errors, self.share, factor * self.spread)
+
+
+class Texture(NamedTuple):
+    """What is compared of two views: smoothed grey levels, and their gradients in the left one.
+
+    Arrays of shape (H, W): grey levels, and grey levels per pixel along the rows and down the columns.
+    """
+
+    left: Floats
+    right: Floats
+    across: Floats
+    down: Floats
+
+    @staticmethod
+    def of(views: Views) -> "Texture":
+        """Work it out; a pair that is measured again and again needs it once."""
+        left, right = (_smooth(view) for view in views)
+        return Texture(left, right, *_gradients(left))
+
+
+def measure_misalignment(
+    texture: Texture, disparity: Floats, start: Misalignment = LEVEL, rounds: int = 2, every: int = 1
+) -> Measured | None:
+    """Measure how the right view lies against the left one.
+
+    Least squares on the grey levels at matched pixels [Lucas and Kanade 1981], in small blocks: each gives a
+    horizontal shift, which takes up what is wrong in its disparity, and a vertical one. A robust fit of
+    offset, rotation, scale and twist to the vertical ones is the answer. Each round starts where the one
+    before has moved the blocks, both ways.
+
+    Parameters
+    ----------
+    texture : Texture
+        Of the views as they were given.
+    disparity : ndarray of float32, shape (H, W)
+        From the left view to the right one that is levelled by `start`, pixels; no data is 0.
+    start : Misalignment
+        Where to begin.
+    rounds : int
+        Steps at most.
+    every : int
+        One block of so many is looked at.
+
+    Returns
+    -------
+    Measured or None
+        None where too few blocks tell.
+    """
+    if min(disparity.shape) < BLOCK:
+        return None
+    blocks = _Blocks(texture, disparity, every)
+    found, errors, spread, count = start, LEVEL, 0.0, 0
+    for _ in range(rounds):
+        seen = blocks.vertical(found)
+        count = len(seen.shift)
+        if count < _FEWEST:
+            return None
+        step, errors, spread = _fit(seen)
+        reach = step.reach(*disparity.shape)
+        step = step.times(_LONGEST_STEP / max(reach, _LONGEST_STEP))
+        found = found + step
+        blocks.follow(step)
+        if reach < _SMALL_STEP:
+            break
+    return Measured(found, errors, count / blocks.count, spread)
+
+
+def textured_share(view: View) -> float:
+    """Return the share of a view's blocks that could tell a vertical disparity, were they matched."""
+    if min(view.shape) < BLOCK:
+        return 0.0
+    across, down = _gradients(_smooth(view))
+    along = block_means(across * across) + np.float32(_RIDGE)
+    weight = block_means(down * down) - np.square(block_means(across * down)) / along
+    return float(np.mean(weight > _LEAST))
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """Vertical disparities (px) of blocks at (x, y) from the centre of the right view, and their weights."""
+
+    x: Floats
+    y: Floats
+    shift: Floats
+    weight: Floats
+
+
+class _Shares(NamedTuple):
+    """What each pixel says of its block's shift down the rows and along them, and where the blocks lie.
+
+    The least-squares shift is the sum of the grey differences, each times a share that the gradients decide.
+    `share` is for the shift down the rows, `along` for that along them, less `mixed` times the one down the
+    rows. Arrays of pixels have shape (blocks, pixels of a block).
+    """
+
+    share: Floats
+    along: Floats
+    mixed: Floats
+    weight: Floats
+    x: Floats
+    y: Floats
+
+    @staticmethod
+    def of(across: Floats, down: Floats, seen: Floats, x: Floats, y: Floats) -> "_Shares":
+        """Work them out from the gradients and places of the pixels that are `seen` (1; others 0)."""
+        count = np.maximum(seen.sum(axis=1), np.float32(1))
+        across, down = across * seen, down * seen
+
+        def mean(one: Floats, other: Floats) -> Floats:
+            found: Floats = np.einsum("ij,ij->i", one, other) / count
+            return found
+
+        # covariances within a block: the views' brightness may differ from place to place
+        mean_across, mean_down = mean(across, seen), mean(down, seen)
+        varies = mean(across, across) - np.square(mean_across) + np.float32(_RIDGE)
+        mixed = (mean(across, down) - mean_across * mean_down) / varies
+        weight = mean(down, down) - np.square(mean_down) - np.square(mixed) * varies
+        weight[(weight <= _LEAST) | (count <= _KNOWN * BLOCK**2)] = 0
+        along = across - mean_across[:, None] * seen
+        share = down - mean_down[:, None] * seen - mixed[:, None] * along
+        share /= (np.maximum(weight, np.float32(_LEAST)) * count)[:, None]
+        along /= (varies * count)[:, None]
+        most = np.float32(_MOST)
+        return _Shares(share, along, mixed, np.minimum(weight, most), mean(x, seen), mean(y, seen))
+
+
+class _Blocks:
+    """The blocks of a pair; what does not change from round to round is computed once."""
+
+    def __init__(self, texture: Texture, disparity: Floats, every: int = 1) -> None:
+        self._right = texture.right
+        known = (disparity > 0).astype(np.float32)
+        row, column = (np.arange(side // BLOCK) for side in known.shape)
+        looked_at = (row[:, None] + 2 * column) % every == 0
+        self.count = int(np.count_nonzero(looked_at))
+        places = looked_at & (block_means(known) > _KNOWN) & _may_tell(texture.down)
+
+        self._left, self._seen = blocks_at(texture.left, places), blocks_at(known, places)
+        self._across, self._down = blocks_at(texture.across, places), blocks_at(texture.down, places)
+        rows, columns = (BLOCK * place[:, None].astype(np.float32) for place in np.nonzero(places))
+        within = np.arange(BLOCK, dtype=np.float32)
+        self._v = rows + np.repeat(within, BLOCK)
+        self._u = columns + np.tile(within, BLOCK) - blocks_at(disparity, places)
+        self._centre_x, centre_y = (np.float32((side - 1) / 2) for side in reversed(disparity.shape))
+        self._y = self._v - centre_y
+        self._shares = _Shares.of(self._across, self._down, self._seen, self._u - self._centre_x, self._y)
+        self._along = np.zeros(len(self._u), np.float32)
+
+    def vertical(self, at: Misalignment) -> _Seen:
+        """Return the vertical disparities that are left when the right view is levelled by `at`."""
+        x, y = self._u - self._centre_x, self._y
+        u, v = seen_at(at, self._u, self._v, self._right.shape)
+        if not len(u):
+            return _Seen(x[:, 0], x[:, 0], x[:, 0], x[:, 0])
+        height, width = self._right.shape
+        off = self._left - cv2.remap(self._right, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        shift = np.einsum("ij,ij->i", self._shares.share, off)
+        self._along = np.einsum("ij,ij->i", self._shares.along, off)
+        weight, mean_x, mean_y = (each.copy() for each in self._shares[3:])
+        inside = (u > 1) & (u < width - 2) & (v > 1) & (v < height - 2)
+        cut = np.flatnonzero(~inside.all(axis=1))  # few: those at the border
+        part = _Shares.of(self._across[cut], self._down[cut], self._seen[cut] * inside[cut], x[cut], y[cut])
+        shift[cut] = np.einsum("ij,ij->i", part.share, off[cut])
+        weight[cut], mean_x[cut], mean_y[cut] = part[3:]
+        telling = weight > 0
+        return _Seen(mean_x[telling], mean_y[telling], shift[telling], weight[telling])
+
+    def follow(self, step: Misalignment) -> None:
+        """Move the blocks along the rows, to where the grey levels agree once the views lie `step` further.
+
+        A disparity that was matched in the wrong row is wrong by what hides that. Noise in the gradients lets
+        least squares take up a part of it only: without this, a fifth to a half stays hidden.
+        """
+        down = step.down(self._shares.x, self._shares.y)
+        moved = np.clip(self._along - self._shares.mixed * down, -_LONGEST_STEP, _LONGEST_STEP)
+        self._u += moved[:, None]
+
+
+def _may_tell(down: Floats) -> NDArray[np.bool_]:
+    """Tell which blocks vary enough down the columns, whatever part of them has a disparity.
+
+    What is left of a block's squares is no more than all of them, over a count of `_KNOWN` of it or more.
+    """
+    varies = block_means(down * down) - np.square(block_means(down))
+    enough: NDArray[np.bool_] = varies > np.float32(_LEAST * _KNOWN * _ROUNDING)
+    return enough
+
+
+def _fit(seen: _Seen) -> tuple[Misalignment, Misalignment, float]:
+    """Return the misalignment that explains most blocks, its standard errors, and the spread of the rest."""
+    size = max(1.0, float(np.abs(seen.x).max()), float(np.abs(seen.y).max()))
+    x, y = seen.x.astype(np.float64) / size, seen.y.astype(np.float64) / size
+    columns = np.stack([np.ones_like(x), x, y, x * y])
+    shift, fixed = seen.shift.astype(np.float64), seen.weight.astype(np.float64)
+    weight, off, spread = fixed, np.zeros_like(fixed), 1.0
+    for _ in range(_FIT_ROUNDS):
+        weight = fixed * _believed(off, spread)
+        weighted = columns * weight
+        normal = weighted @ columns.T
+        inverse = np.linalg.inv(normal + 1e-6 * np.trace(normal) * np.eye(4))
+        values = inverse @ (weighted @ shift)
+        off = shift - values @ columns
+        before, spread = spread, 1.4826 * _median(np.abs(off)) + 1e-3
+        if abs(spread - before) < _SAME * spread:
+            break
+    scores = inverse @ (weighted * off)
+    errors = np.sqrt(np.square(scores).sum(axis=1))
+    units = np.array([1, size, size, size**2])
+    return Misalignment(*(values / units).tolist()), Misalignment(*(errors / units).tolist()), spread
+
+
+def _median(values: Doubles) -> float:
+    """Return the median, in a fifth of the time that `numpy.median` takes for a few hundred values."""
+    middle = (values.size - 1) // 2, values.size // 2
+    return float(np.partition(values, middle)[list(middle)].mean())
+
+
+def _believed(off: Doubles, spread: float) -> Doubles:
+    """Return the weights of blocks by their residuals: far ones hardly count, and none is thrown away."""
+    doubt: Doubles = 1 + np.square(off / (_TUNING * spread))
+    return 1 / np.square(doubt)
+
+
+def _smooth(view: View) -> Floats:
+    smooth = cv2.GaussianBlur(view.astype(np.float32), (0, 0), _SMOOTHING)
+    return smooth.astype(np.float32, copy=False)
+
+
+def _gradients(view: Floats) -> tuple[Floats, Floats]:
+    """Grey levels per pixel along the rows and down the columns."""
+    across, down = (
+        cv2.Sobel(view, cv2.CV_32F, *order, ksize=3, scale=0.125).astype(np.float32, copy=False)
+        for order in ((1, 0), (0, 1))
+    )
+    return across, down
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """What is level enough, beside some standard errors of what was measured.
+
+    Level rendered pairs measure up to 0.03 px, 0.008 degrees, 0.04 % and 0.18 px; empty roads with much noise
+    up to 0.08 px, 0.024 degrees, 0.07 % and 0.24 px, with standard errors of a sixth of that.
+    """
+
+    offset: float = 0.06
+    """Pixels; turns a road by 0.03 degrees."""
+    rotation: float = 0.00025
+    """Radians (0.014 degrees); turns a road by 0.03 degrees."""
+    scale: float = 0.0003
+    """Turns a road by 0.08 degrees."""
+    twist: float = 0.15
+    """Pixels in the corners; turns a road by 0.03 degrees."""
+    sure: float = 4.0
+    """Standard errors. Blocks beside each other err together: they are said to err less than they do."""
+
+
+TOLERANCE = Tolerance()
+_MEASURED_AT = 120_000  # px: larger views are measured at this size, which keeps a fifth of the tolerance
+# px, before a pair is matched again: the whole of most views. A level road of fine grain seems 0.06 % larger
+# at 120,000 and 0.02 % at its 307,000. More would take 25 bytes for each pixel of a large photo
+_CLOSER = 480_000
+_FURTHEST = 2.0  # times the last change; further away, two measurements do not tell
+_NO_CHANGE = 1e-6  # px^2
+
+
+def is_level(
+    lies: Misalignment, errors: Misalignment, shape: tuple[int, ...], tolerance: Tolerance = TOLERANCE
+) -> bool:
+    """Tell whether views of this shape that lie so, with these standard errors, are within a tolerance."""
+    corner = shape[0] * shape[1] / 4
+    limits = (tolerance.offset, tolerance.rotation, tolerance.scale, tolerance.twist / corner)
+    parts = zip(lies.parts, errors.parts, limits, strict=True)
+    return all(abs(value) < limit + tolerance.sure * error for value, error, limit in parts)
+
+
+def level(right: View, misalignment: Misalignment) -> View:
+    """Resample the right view once, as a level camera would have seen it; rows at the border repeat."""
+    if misalignment == LEVEL:
+        return right
+    height, width = right.shape
+    u = np.arange(width, dtype=np.float32)
+    v = np.arange(height, dtype=np.float32)[:, None]
+    at_u, at_v = seen_at(misalignment, u, v, right.shape)
+    levelled = cv2.remap(right, at_u, at_v, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
+    return levelled.astype(np.uint8, copy=False)
+
+
+class Approach:
+    """Where to measure next, from where was measured before and what came of it.
+
+    A map that was matched with a misalignment hides a part of it, up to four fifths where the texture is
+    slanted. Two measurements tell how much: the next attempt is the fixed point of the line through them
+    [Anderson 1965, depth 1].
+    """
+
+    def __init__(self, shape: tuple[int, ...]) -> None:
+        self._shape = shape
+        self._before: tuple[Misalignment, Misalignment] | None = None
+
+    def next(self, at: Misalignment, measured: Misalignment) -> Misalignment:
+        """Return the next start after `measured` was found from `at`."""
+        before, self._before = self._before, (measured, measured - at)
+        if before is None:
+            return measured
+        measured_before, left_before = before
+        left = measured - at
+        change = np.array((left - left_before).shifts(*self._shape))
+        share = float(np.dot(left.shifts(*self._shape), change) / (np.dot(change, change) + _NO_CHANGE))
+        share = max(-_FURTHEST, min(_FURTHEST, share))
+        return measured - (measured - measured_before).times(share)
+
+
+def size_factor(shape: tuple[int, ...], pixels: int) -> float:
+    """Return the factor that shrinks a view of this shape to that many pixels; 1 if it has no more."""
+    return max(1.0, math.sqrt(shape[0] * shape[1] / pixels))
+
+
+class SmallViews:
+    """The views of a pair at the size that they are measured at; large ones are shrunk once.
+
+    Attributes
+    ----------
+    shape : tuple of int
+        Of the whole views.
+    views : pair of ndarray of uint8, shape (h, w)
+        Left and right.
+    factor : float
+        How many times smaller they are than the whole ones.
+    """
+
+    def __init__(self, whole: Views, pixels: int = _MEASURED_AT) -> None:
+        self.shape = whole[0].shape
+        self.factor = size_factor(self.shape, pixels)
+        self.views = shrink_both(whole, self.factor)
+        self._every = max(1, round(self.views[0].size / _MEASURED_AT))
+        self._whole = whole
+
+    @cached_property
+    def closer(self) -> "SmallViews":
+        """The same pair at four times as many pixels, as far as it has them."""
+        return SmallViews(self._whole, _CLOSER)
+
+    @cached_property
+    def _texture(self) -> Texture:
+        return Texture.of(self.views)
+
+    def swapped(self) -> "SmallViews":
+        """Return the views with left and right exchanged."""
+        return SmallViews((self.views[1], self.views[0]))
+
+    def measure(self, disparity: Map, start: Misalignment, rounds: int = 2) -> Measured | None:
+        """Measure how the right view lies.
+
+        Parameters
+        ----------
+        disparity : ndarray of float32
+            Of the pair at any size, in its own pixels; no data is 0.
+        start : Misalignment
+            Where to begin; pixels of the whole views.
+        rounds : int
+            See `measure_misalignment`.
+
+        Returns
+        -------
+        Measured or None
+            Pixels of the whole views.
+        """
+        seen = resampled(disparity, self.views[0].shape)
+        found = measure_misalignment(self._texture, seen, start.resized(1 / self.factor), rounds, self._every)
+        return None if found is None else found.resized(self.factor)

@@ -1,0 +1,271 @@
+"""A first look at a pair, on small views: how far to search, and how the right view lies."""
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollcli.stereo.alignment import (
+    Approach,
+    Measured,
+    SmallViews,
+    Texture,
+    Tolerance,
+    is_level,
+    level,
+    measure_misalignment,
+    size_factor,
+)
+from rollcli.stereo.misalignment import LEVEL, Misalignment
+from rollcli.stereo.options import StereoOptions
+from rollcli.stereo.sgbm import NARROWEST, match_views, usable_range
+from rollcli.stereo.views import Views, shrink_both
+
+Matcher = Callable[[float], NDArray[Any]]
+"""The disparity map, in pixels with 0 for no data, of a search as wide as given, pixels."""
+
+_RANGE_ROUNDS = 4
+_MIN_SHARE = 0.01  # of the pixels, to say anything
+
+
+class Range(NamedTuple):
+    """The largest disparity of a pair, outliers aside, and the map that shows it."""
+
+    top: float
+    disparity: NDArray[Any]
+
+
+def largest_disparity(match: Matcher, width: int, start: float | None = None) -> Range | None:
+    """Find the largest disparity of a pair, and a map of what may be believed.
+
+    Parameters
+    ----------
+    match : callable
+        Matches the pair within a range.
+    width : int
+        Of the images, pixels.
+    start : float, optional
+        About how large it is; None: find that, too.
+
+    Returns
+    -------
+    Range or None
+        Pixels; None where nothing can be matched.
+
+    Notes
+    -----
+    A search over half the width finds any disparity that a pair can have, but leaves out the left half of
+    the image. What it finds starts a narrower one, which grows for as long as it meets its end. Where there
+    is nothing to match, any candidate wins, and with more of them another one: so only what a search twice as
+    wide finds too is believed.
+    """
+    top = rough_largest(match, width) if start is None else start
+    found = None
+    for _ in range(_RANGE_ROUNDS):
+        if top is None:
+            return None
+        searched = 1.4 * top + 4
+        narrow, wide = match(searched), match(min(2 * searched, width / 2))
+        believed = np.where(np.abs(narrow - wide) < 1, narrow, 0)
+        top = _top(believed, 99)
+        found = None if top is None else Range(top, np.where(wide > 0, believed, narrow))
+        if top is not None and top < 0.85 * searched:
+            break
+    return found
+
+
+def rough_largest(match: Matcher, width: int) -> float | None:
+    """Find about how large disparities get, by one search over half the width; None where none is found."""
+    return _top(match(width / 2), 98)
+
+
+def _top(disparity: NDArray[Any], percentile: float) -> float | None:
+    valid = disparity[disparity > 0]
+    return float(np.percentile(valid, percentile)) if valid.size > _MIN_SHARE * disparity.size else None
+
+
+_PIXELS = 16_000  # of the views that are looked at
+_OPTIONS = StereoOptions(mode="3way", speckle_size=50, speckle_range=1)
+_ROUNDS = 6
+_NEAR = 0.25  # of the width: beyond it, so much of a view is hidden that half its size shows too little
+# px of the small view, anywhere: the end. Larger views show what is left; half of it takes a quarter longer
+# and makes no angle better
+_STEP = 0.6
+_CLOSER_ROUNDS = 4  # of measuring at larger views
+_MARGIN = 1.1  # beyond the largest disparity seen, to search
+# Of small views, which tell a scale to 0.2 %: level pairs need no closer look. Real rigs twist more
+_AS_GOOD_AS_LEVEL = Tolerance(offset=0.15, rotation=0.0005, scale=0.002, twist=0.4, sure=2.0)
+# px of the whole view; standard error of the offset. Above it small views cannot tell: 0.21 and more in dark
+# streets that are 0.3 px off, up to 0.11 on level roads of fine grain
+_TELLING_ERROR = 0.15
+# From a start 3 px off, a view of little texture can end at an offset and a scale that deny each other. Its
+# scale tells, with blocks that do not agree or a larger view that does not: other starts then show which
+# leaves less. Of 288 warped pairs, wrong ends had errors from 0.018 px or steps from 1.4 px on; of the right
+# ones of such a scale, nine in ten had less
+_UNSURE_SCALE = 0.003
+_UNSURE_ERROR = 0.014  # px of the whole view; standard error of the offset
+_UNSURE_STEP = 1.2  # px of the whole view, anywhere; from what small views said
+_STARTS = (-4.0, 4.0)  # px of the whole view; offset of the further attempts
+
+
+@dataclass(frozen=True)
+class FirstLook:
+    """What small views say about a pair, in pixels of the whole ones.
+
+    Attributes
+    ----------
+    range : int or None
+        Disparities from 0 to this are worth a search; None where nothing was matched.
+    measured : Measured or None
+        How the right view lies; None where that cannot be told, or was not asked.
+    disparity : ndarray of float32, or None
+        The small map, in its own pixels; None where nothing was matched.
+    """
+
+    range: int | None
+    measured: Measured | None
+    disparity: NDArray[np.float32] | None = None
+
+
+@dataclass(frozen=True)
+class _Small:
+    """A small match: largest disparity, map, and how the right view lies; pixels of the small views."""
+
+    top: float
+    disparity: NDArray[np.float32]
+    measured: Measured | None
+
+
+class _Pair(NamedTuple):
+    """Small views, and what is compared of them."""
+
+    views: Views
+    texture: Texture
+
+    @staticmethod
+    def of(views: Views, factor: float) -> "_Pair":
+        """Shrink the views by `factor`."""
+        small = shrink_both(views, factor)
+        return _Pair(small, Texture.of(small))
+
+
+def look_for_range(views: Views) -> FirstLook:
+    """Find the range of a pair alone: how its right view lies is not measured."""
+    factor = size_factor(views[0].shape, _PIXELS)
+    return _seen(_match_small(shrink_both(views, factor)), factor, None)
+
+
+def first_look(small: SmallViews) -> FirstLook:
+    """Find the range of a pair, and how its right view lies, coarse to fine."""
+    factor = size_factor(small.views[0].shape, _PIXELS)
+    pair = _Pair.of(small.views, factor)
+    factor *= small.factor
+    first = _look(pair, LEVEL)
+    plain = _plainly_level(first, factor, small.shape)
+    if plain is not None:
+        return plain
+    first = _climb(pair, LEVEL, first)
+    look, sure = _closer(small, first, factor)
+    if sure:
+        return look
+    starts = (Misalignment(offset / factor) for offset in _STARTS)
+    clearest = _clearest([first, *(_climb(pair, start) for start in starts)])
+    return look if clearest is first else _closer(small, clearest, factor)[0]
+
+
+def _plainly_level(found: _Small | None, factor: float, shape: tuple[int, ...]) -> FirstLook | None:
+    """Return what was found where small views say level, as far as they tell; the match decides."""
+    if found is None or found.measured is None:
+        return None
+    seen = found.measured.resized(factor)
+    if seen.errors.offset > _TELLING_ERROR or not is_level(
+        seen.misalignment, seen.errors, shape, _AS_GOOD_AS_LEVEL
+    ):
+        return None
+    return _seen(found, factor, replace(seen, misalignment=LEVEL))
+
+
+def _closer(small: SmallViews, found: _Small | None, factor: float) -> tuple[FirstLook, bool]:
+    """Measure at larger views, from where those that are `factor` times smaller have ended; is it sure?"""
+    if found is None or found.measured is None:
+        return _seen(found, factor, None), False
+    coarse = found.measured.resized(factor)
+    measured = small.measure(found.disparity, coarse.misalignment, _CLOSER_ROUNDS)
+    return _seen(found, factor, measured), _is_sure(coarse, measured, small.shape)
+
+
+def _is_sure(coarse: Measured, measured: Measured | None, shape: tuple[int, ...]) -> bool:
+    if measured is None:
+        return False
+    if abs(measured.misalignment.scale) < _UNSURE_SCALE:
+        return True
+    step = (measured.misalignment - coarse.misalignment).reach(*shape)
+    return measured.errors.offset < _UNSURE_ERROR and step < _UNSURE_STEP
+
+
+def _clearest(attempts: Iterable[_Small | None]) -> _Small | None:
+    """Return the attempt that leaves the least unexplained, of those that tell anything."""
+    some = [each for each in attempts if each is not None]
+    return min(some, key=lambda each: each.measured.spread if each.measured else math.inf, default=None)
+
+
+def _climb(pair: _Pair, start: Misalignment, first: _Small | None = None) -> _Small | None:
+    """Level, match and measure in turn, until the right view lies still; `first` is what `start` gave."""
+    shape = pair.views[0].shape
+    found, at, approach = None, start, Approach(shape)
+    for _ in range(_ROUNDS):
+        seen, first = first or _look(pair, at), None
+        if seen is None:
+            return found
+        found = seen
+        if found.measured is None:
+            return found
+        step = (found.measured.misalignment - at).reach(*shape)
+        if step < _STEP:
+            return found
+        at = approach.next(at, found.measured.misalignment)
+    return found
+
+
+def _look(pair: _Pair, at: Misalignment) -> _Small | None:
+    """Level, match and measure once."""
+    left, right = pair.views
+    matched = _match_small((left, level(right, at)))
+    if matched is None:
+        return None
+    measured = measure_misalignment(pair.texture, matched.disparity, at)
+    return _Small(matched.top, matched.disparity, measured)
+
+
+def _match_small(pair: Views) -> _Small | None:
+    """Match over the range that is found to be enough."""
+    half = shrink_both(pair, 2)
+    rough = rough_largest(lambda count: _match(half, count), half[0].shape[1])
+    width = pair[0].shape[1]
+
+    def match(count: float) -> NDArray[np.float32]:
+        return _match(pair, count)
+
+    found = None
+    if rough is not None and rough < _NEAR * half[0].shape[1]:
+        found = largest_disparity(match, width, 2 * rough)
+    if found is None:  # a near scene, or grain that is gone at half the size
+        found = largest_disparity(match, width)
+    return None if found is None else _Small(found.top, found.disparity.astype(np.float32, copy=False), None)
+
+
+def _seen(found: _Small | None, factor: float, measured: Measured | None) -> FirstLook:
+    """Say what was found at views that are `factor` times smaller, and how the right one lies."""
+    if found is None:
+        return FirstLook(None, None)
+    return FirstLook(math.ceil(_MARGIN * found.top * factor) + 8, measured, found.disparity)
+
+
+def _match(pair: Views, count: float) -> NDArray[np.float32]:
+    usable = usable_range(math.ceil(count), 0, pair[0].shape[1], _OPTIONS.block_size)
+    if usable < NARROWEST:
+        return np.zeros(pair[0].shape, np.float32)
+    return match_views(pair, 0, usable, _OPTIONS)

@@ -1,0 +1,338 @@
+"""Disparity maps from stereo pairs: views levelled, range found, then one semi-global match."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
+from typing import Any, NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from rollcli.errors import InputError
+from rollcli.stereo.alignment import (
+    Approach,
+    Measured,
+    SmallViews,
+    Tolerance,
+    is_level,
+    level,
+    textured_share,
+)
+from rollcli.stereo.first_look import FirstLook, first_look, look_for_range
+from rollcli.stereo.misalignment import LEVEL, Misalignment
+from rollcli.stereo.misalignment_words import NOT_LEVELLED, TOO_LITTLE
+from rollcli.stereo.options import StereoOptions as StereoOptions
+from rollcli.stereo.refinement import refined
+from rollcli.stereo.sgbm import ALL_ROWS, NARROWEST, match_rows, usable_range, without_lag
+from rollcli.stereo.views import Map, Views, prepare_views
+
+# Shares of the textured blocks that tell
+_SURE = 0.3  # from here on the images are what they should be
+_FEW = 0.2  # below it, they show two scenes
+_PLAIN = 0.4  # from here on swapped images are swapped
+_LEAST_TEXTURE = 0.07  # share of the blocks; images with less may show the same scene
+
+
+def check_same_scene(small: SmallViews, look: FirstLook, measured: Measured | None) -> None:
+    """See that the images show one scene from the left and from the right.
+
+    Parameters
+    ----------
+    small : SmallViews
+    look : FirstLook
+        What was seen before the match.
+    measured : Measured or None
+        How the right view lies, as far as the match tells.
+
+    Raises
+    ------
+    InputError
+        They are one image, are swapped, or show two scenes.
+    """
+    matched = max(_share(look.measured), _share(measured))
+    if matched >= _SURE:
+        return  # most pairs: their texture need not be looked at
+    textured = min(map(textured_share, small.views))
+    if textured < _LEAST_TEXTURE or matched >= _SURE * textured:
+        return
+    if np.array_equal(*small.views):
+        raise InputError("the left and the right image are the same")
+    if _share(first_look(small.swapped()).measured) >= _PLAIN * textured:
+        raise InputError(
+            "the views seem swapped: the scene is matched when the right image is taken for the left one"
+        )
+    if matched < _FEW * textured:
+        raise InputError(
+            "the two images do not show the same scene: hardly anything in one is found in the other"
+        )
+
+
+def _share(measured: Measured | None) -> float:
+    return 0.0 if measured is None else measured.share
+
+
+_MATCHES = 4  # until a pair counts as one that cannot be levelled
+_ROUNDS = 8  # of measuring; on empty roads with much noise each takes away a fifth of what is left
+_LEFT_IN_ROWS = 0.3  # px, where not all rows are matched
+# Of the height. Fewer rows at a third of the size would not save what finding them takes, and more would be a
+# mistake: of 248 pairs the road's first row was at 0.49 at most
+_LEAST_ABOVE, _MOST_ABOVE = 0.1, 0.6
+# A scale that no rig in use has, in blocks that do not agree. Of 468 warped pairs 12 had both: three angles
+# of them were wrong by 0.3 degrees. Of the others two were wrong, by 0.11
+_UNUSUAL_SCALE = 0.003
+_UNUSUAL_ERROR = 0.01  # px; standard error of the offset
+# What refinement takes away where blocks spread by `_KEPT_SPREAD`; of more, the pair is matched again. Noise
+# hides more of what is left. At 0.15 px a ninth of the streets are matched twice, at 0.2 half as many; but of
+# 216 warped pairs one is off by 0.12 degrees (tests/benchmarks/bench_level.py 12), and warped empty roads
+# with much noise by 0.018 (median) in place of 0.016. At 0.25 three times as many of these are off by 0.1
+_KEPT = Tolerance(0.3, 0.0014, 0.0014, 0.8, sure=0.0)
+_KEPT_SPREAD = 0.15  # px
+_FURTHEST = Misalignment(12.0, 0.03, 0.02, 0.0)  # what no rig in use has: px, radians, share
+
+
+class Wanted(NamedTuple):
+    """What of a map is wanted: by default all of it, at full size.
+
+    Attributes
+    ----------
+    rows : slice
+        Rows that are used, of the size matched at; the others may hold no data.
+    first_row : callable or None
+        Finds the first row, counted from 0, that is wanted at full size, in a small map of the pair: float32,
+        shape (h, w), pixels with 0 for no data. What lies above it is matched at a third of the size.
+    whole : bool
+        Whether a map with all rows at full size is wanted beside that, to be looked at.
+    """
+
+    rows: slice = ALL_ROWS
+    first_row: Callable[[Map], float] | None = None
+    whole: bool = False
+
+
+_EVERYTHING = Wanted()
+
+
+@dataclass(frozen=True)
+class StereoMatch:
+    """A disparity map, the range it was searched in, and how the right view lay.
+
+    Attributes
+    ----------
+    disparity : ndarray of float32, shape (H, W)
+        Pixels of the size matched at; no data is 0.
+    whole : ndarray of float32, shape (H, W), or None
+        The same with all rows at full size, if that was wanted and is another one.
+    min_disparity, num_disparities : int
+        The range searched.
+    end_fraction : float
+        Share of the valid pixels within a pixel of the range's end: if large, the range was too short.
+    corrected : Misalignment
+        What the right view was levelled by, pixels of the size matched at; `LEVEL` if it was left as it is.
+    slope_error : float
+        Standard deviation of the slope along the rows that levelling left in the disparities, px per px; 0 if
+        nothing was measured and corrected.
+    doubt : str
+        Why the views may not be level now; empty if there is no reason.
+    """
+
+    disparity: Map
+    whole: Map | None
+    min_disparity: int
+    num_disparities: int
+    end_fraction: float
+    corrected: Misalignment
+    slope_error: float
+    doubt: str
+
+
+def compute_disparity(left: NDArray[Any], right: NDArray[Any], **options: Any) -> Map:
+    """Return the disparity map of a rectified pair.
+
+    Parameters
+    ----------
+    left, right : ndarray, shape (H, W) or (H, W, 3)
+        uint8 or uint16, grey or BGR, of equal size.
+    **options
+        Fields of `StereoOptions`.
+
+    Returns
+    -------
+    ndarray of float32, shape (H, W)
+        Pixels; no data is 0.
+
+    Raises
+    ------
+    InputError
+        The images differ in size, are too small to match, are swapped, or do not show the same scene.
+    UsageError
+        An option makes no sense.
+
+    Examples
+    --------
+    >>> left = np.random.default_rng(0).integers(0, 256, (60, 200), dtype=np.uint8)
+    >>> right = np.roll(left, -12, axis=1)
+    >>> disparity = compute_disparity(left, right, num_disparities=32)
+    >>> float(np.median(disparity[disparity > 0]))
+    12.0
+    """
+    return match_pair(left, right, StereoOptions(**options)).disparity
+
+
+def match_pair(
+    left: NDArray[Any], right: NDArray[Any], options: StereoOptions, wanted: Wanted = _EVERYTHING
+) -> StereoMatch:
+    """Match a rectified pair, and keep all that was found on the way.
+
+    Parameters
+    ----------
+    left, right, options
+        See `compute_disparity`.
+    wanted : Wanted
+        What of the map is wanted.
+
+    Raises
+    ------
+    InputError, UsageError
+        See `compute_disparity`.
+    """
+    views = prepare_views(left, right, options.downscale)
+    (height, width), first = views[0].shape, options.min_disparity
+    if usable_range(1, first, width, options.block_size) < NARROWEST:
+        raise InputError(f"images {width} px wide are too narrow to match from disparity {first} on")
+    small = SmallViews(views) if options.measures_alignment else None
+    look = _look_as_given(views, options) if small is None else first_look(small)
+    count = options.num_disparities
+    if count is None:
+        count = (width // 8 if look.range is None else look.range) - first
+    count = usable_range(count, first, width, options.block_size)
+
+    @lru_cache(maxsize=1)
+    def levelled(lies: Misalignment) -> Views:
+        return views[0], level(views[1], lies)
+
+    def match(lies: Misalignment, rows: slice, above: int = 0) -> Map:
+        found = match_rows(levelled(lies), first, count, options, rows, above)
+        return without_lag(found, options.mode)
+
+    above = _rows_above(look, wanted, height) if first >= 0 else 0
+    of_these = partial(match, above=above)
+    if small is None:
+        corrected, doubt = Misalignment(options.vertical_offset or 0.0), ""
+        matched = of_these(corrected, wanted.rows)
+    else:
+        matched, corrected, doubt = _match_levelled(of_these, wanted.rows, small, look, first < 0)
+    valid = cv2.countNonZero(matched)
+    whole = None
+    start, stop, _ = wanted.rows.indices(height)
+    full = slice(max(start, above), stop)
+    if wanted.whole and full != slice(0, height):
+        whole = refined(_completed(matched, full, partial(match, corrected)), views, corrected)
+    return StereoMatch(
+        disparity=refined(matched, views, corrected),
+        whole=whole,
+        min_disparity=first,
+        num_disparities=count,
+        end_fraction=np.count_nonzero(matched >= first + count - 2) / valid if valid else 0.0,
+        corrected=corrected,
+        slope_error=0.0 if small is None else corrected.stretch_error,
+        doubt=doubt,
+    )
+
+
+def _rows_above(look: FirstLook, wanted: Wanted, height: int) -> int:
+    """Return how many rows need not be matched at full size."""
+    if wanted.first_row is None or look.disparity is None:
+        return 0
+    share = wanted.first_row(look.disparity) / len(look.disparity)
+    return 0 if share < _LEAST_ABOVE else int(min(share, _MOST_ABOVE) * height)
+
+
+def _completed(disparity: Map, full: slice, match: Callable[[slice], Map]) -> Map:
+    """Return the map with the rows that are not at full size matched apart."""
+    whole = disparity.copy()
+    for rows in (slice(0, full.start), slice(full.stop, len(disparity))):
+        if rows.start < rows.stop:
+            whole[rows] = match(rows)[rows]
+    return whole
+
+
+def _look_as_given(views: Views, options: StereoOptions) -> FirstLook:
+    """Look at views that lie as the user says, where their range is not given."""
+    if options.num_disparities is not None:
+        return FirstLook(None, None)
+    return look_for_range((views[0], level(views[1], Misalignment(options.vertical_offset or 0.0))))
+
+
+def _match_levelled(
+    match: Callable[[Misalignment, slice], Map],
+    rows: slice,
+    small: SmallViews,
+    look: FirstLook,
+    any_scene: bool,
+) -> tuple[Map, Misalignment, str]:
+    """Match once the views are level; the map, what was corrected, and why that may be wrong."""
+    looked_at = _worth_correcting(look.measured, small.shape)
+    at, approach = looked_at, Approach(small.shape)
+    for matched in range(_MATCHES):
+        disparity = match(at, rows)
+        measured = small.closer.measure(disparity, at, _ROUNDS)
+        if not any_scene:
+            check_same_scene(small, look, measured)
+        if rows != ALL_ROWS:
+            if look.measured is not None and _is_confirmed(measured, at, small.shape, rows):
+                return disparity, at, _doubt(at, measured)
+            rows = ALL_ROWS  # a few rows say that something is wrong, but not what
+            continue
+        if measured is None:
+            return disparity, at, TOO_LITTLE
+        wanted = _wanted(measured, approach.next(at, measured.misalignment), small.shape)
+        if wanted == at:
+            return disparity, at, _doubt(at, measured)
+        if wanted != LEVEL and _is_kept(measured, at, small.shape):
+            return disparity, measured.misalignment, _doubt(measured.misalignment, measured)
+        at = wanted
+        if matched == 1 and looked_at != LEVEL:  # which may have led astray
+            at, approach = LEVEL, Approach(small.shape)
+    return disparity, at, NOT_LEVELLED
+
+
+def _is_confirmed(measured: Measured | None, at: Misalignment, shape: tuple[int, ...], rows: slice) -> bool:
+    """Tell whether what is left in the rows that were matched is small, as far as they tell."""
+    if measured is None:
+        return True
+    height, width = shape
+    start, stop, _ = rows.indices(height)
+    return (measured.misalignment - at).reach_in_rows(height, width, start, stop) < _LEFT_IN_ROWS
+
+
+def _wanted(measured: Measured, reached: Misalignment, shape: tuple[int, ...]) -> Misalignment:
+    """Return where to match next: where this measurement and that before it lead to; level if either is."""
+    either = (
+        _worth_correcting(replace(measured, misalignment=each), shape)
+        for each in (measured.misalignment, reached)
+    )
+    return LEVEL if LEVEL in either else reached
+
+
+def _is_kept(measured: Measured, at: Misalignment, shape: tuple[int, ...]) -> bool:
+    """Tell whether a map that was matched at `at` is so nearly right that refinement does the rest."""
+    left = (measured.misalignment - at).times(measured.spread / _KEPT_SPREAD)
+    return is_level(left, measured.errors, shape, _KEPT)
+
+
+def _worth_correcting(measured: Measured | None, shape: tuple[int, ...]) -> Misalignment:
+    if measured is None or is_level(measured.misalignment, measured.errors, shape):
+        return LEVEL
+    return measured.misalignment
+
+
+def _doubt(corrected: Misalignment, left: Measured | None) -> str:
+    far = (
+        abs(corrected.offset) > _FURTHEST.offset
+        or abs(corrected.rotation) > _FURTHEST.rotation
+        or abs(corrected.scale) > _FURTHEST.scale
+    )
+    unusual = abs(corrected.scale) > _UNUSUAL_SCALE
+    far |= unusual and left is not None and left.errors.offset > _UNUSUAL_ERROR
+    return "the views lie too far from level to be sure of the correction" if far else ""

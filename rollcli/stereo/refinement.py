@@ -1,0 +1,151 @@
+"""Shift a map, block by block, to where the grey levels of both views agree.
+
+Semi-global matching [Hirschmueller 2008] smooths along paths and truncates its costs: how far its disparities
+lie off depends on the texture and the slant, and is one amount over whole parts of a road. That tilts its
+plane. Least squares on the grey levels [Lucas and Kanade 1981] does neither: in each block, the left view is
+compared with what the right view shows where a plane through the map leads, and the plane is shifted.
+"""
+
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from rollcli.stereo.misalignment import LEVEL, Misalignment
+from rollcli.stereo.sgbm import STEEPEST
+from rollcli.stereo.views import BLOCK, View, Views, block_means, blocks_at, seen_at
+
+Floats = NDArray[np.float32]
+
+_KNOWN = 0.7  # share of a block that has to have a disparity: else its mean is not that of its middle
+# px: how far the mean of the four blocks around may lie off; further is an edge. At half of it the noisy
+# blocks of a road are left as they were, and its median error grows by a sixth; at twice it that is the same
+_EDGE = 0.5
+# px per row: the least that a road rises by, which is the baseline over the camera's height (0.07 and more)
+# times the cosine of the roll. Walls, trees and sky are left as they are: they only take time
+_LEAST_RISE = 0.01
+# Squared grey levels per pixel: what a noise of one grey level adds to a squared gradient. Blocks with less
+# texture keep most of what SGBM says. From 0.2 to 1 the errors of angles are the same
+_RIDGE = 0.5
+_ROUNDS = 2  # a weak block goes about half of the way in one; a third changes no angle any more
+# Where the right view is not quite as it was levelled for the match: roads matched with 0.1 degrees left are
+# then 0.010 degrees wrong (95 %: 0.043), after two rounds 0.021 (0.063)
+_ROUNDS_LEVELLED = 4
+_LONGEST_STEP = 0.5  # px
+_TOGETHER = 1 << 17  # pixels shifted at a time: what they need stays in the processor's cache
+
+_OFF_MIDDLE = np.arange(BLOCK, dtype=np.float32) - np.float32((BLOCK - 1) / 2)
+_PLANE = np.stack(  # what a value in the middle, a slope across and a slope down add at each pixel of a block
+    [np.ones(BLOCK**2, np.float32), np.tile(_OFF_MIDDLE, BLOCK), np.repeat(_OFF_MIDDLE, BLOCK)]
+)
+
+
+def refined(disparity: Floats, views: Views, lies: Misalignment = LEVEL) -> Floats:
+    """Shift each part of a map to where the grey levels agree.
+
+    Parameters
+    ----------
+    disparity : ndarray of float32, shape (H, W)
+        Pixels, right to about half a pixel; no data is <= 0 and stays.
+    views : pair of ndarray of uint8, shape (H, W)
+        As they were given.
+    lies : Misalignment
+        How the right one lies, pixels; it may have been levelled by a little less or more for the match.
+
+    Returns
+    -------
+    ndarray of float32, shape (H, W)
+        What does not rise down the image, as a road does, parts with little texture, edges and what lies
+        alone are left as they are.
+    """
+    height, width = (side // BLOCK for side in disparity.shape)
+    if min(height, width) < 2:
+        return disparity
+    known = disparity > 0
+    planes = _Planes.through(disparity, known)
+    left, right = views[0], views[1].astype(np.float32)
+    gradient = cv2.Sobel(left, cv2.CV_32F, 1, 0, ksize=1, scale=0.5).astype(np.float32, copy=False)
+    shifts = np.zeros((height, width), np.float32)
+    many = max(1, _TOGETHER // (width * BLOCK**2))
+    for top in range(0, height, many):
+        rows = slice(top, top + many)
+        if planes.told[rows].any():
+            shifts[rows][planes.told[rows]] = _found(left, gradient, right, planes, rows, lies)
+    result = disparity.copy()
+    whole = slice(0, height * BLOCK), slice(0, width * BLOCK)
+    cv2.add(disparity[whole], _between(shifts), dst=result[whole], mask=known.view(np.uint8)[whole])
+    return result
+
+
+class _Planes(NamedTuple):
+    """A plane through each block; arrays of shape (h, w).
+
+    Attributes
+    ----------
+    middle : ndarray of float32
+        Disparity in the middle, px.
+    across, down : ndarray of float32
+        Slopes, px per px.
+    told : ndarray of bool
+        Whether the map tells a plane there.
+    """
+
+    middle: Floats
+    across: Floats
+    down: Floats
+    told: NDArray[np.bool_]
+
+    @staticmethod
+    def through(disparity: Floats, known: NDArray[np.bool_]) -> "_Planes":
+        """Lay them through a map with these `known` pixels."""
+        share = block_means(known.astype(np.float32))
+        middle = block_means(disparity)
+        middle /= np.maximum(share, np.float32(1e-3))
+        beside = _continued(middle)
+        left, right, above, below = beside[1:-1, :-2], beside[1:-1, 2:], beside[:-2, 1:-1], beside[2:, 1:-1]
+        apart = np.float32(2 * BLOCK)
+        across, down = (right - left) / apart, (below - above) / apart
+        told = (share > _KNOWN) & (np.abs((left + right + above + below) / 4 - middle) < _EDGE)
+        told &= (np.abs(across) < STEEPEST) & (down > _LEAST_RISE) & (down < STEEPEST)
+        return _Planes(middle, across, down, told)
+
+
+def _found(
+    left: View, gradient: Floats, right: Floats, planes: _Planes, rows: slice, lies: Misalignment
+) -> Floats:
+    """Find the shifts of the planes that are told in some rows of blocks, px."""
+    told, pixels = planes.told[rows], slice(rows.start * BLOCK, rows.stop * BLOCK)
+    middle, across, down = (each[rows][told] for each in (planes.middle, planes.across, planes.down))
+    row, column = (BLOCK * place.astype(np.float32) - _OFF_MIDDLE[0] for place in np.nonzero(told))
+    row += np.float32(pixels.start)
+    none = np.zeros_like(row)
+    u = np.stack([column - middle, 1 - across, -down], axis=1) @ _PLANE
+    v = np.stack([row, none, none + 1], axis=1) @ _PLANE
+    u, v = seen_at(lies, u, v, right.shape)
+    grey = blocks_at(left[pixels], told).astype(np.float32)
+    weight = blocks_at(gradient[pixels], told)
+    weight -= weight.mean(axis=1, keepdims=True)  # one view may be brighter than the other
+    weight /= (np.einsum("ij,ij->i", weight, weight) + np.float32(_RIDGE * BLOCK**2))[:, None]
+    weight *= (1 - across)[:, None]  # the right view is that much less stretched than the left one
+    shift: Floats = none
+    for _ in range(_ROUNDS if lies == LEVEL else _ROUNDS_LEVELLED):
+        off = cv2.remap(right, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE) - grey
+        step = np.clip(np.einsum("ij,ij->i", weight, off), -_LONGEST_STEP, _LONGEST_STEP)
+        u -= step[:, None]
+        shift += step
+    return shift
+
+
+def _continued(blocks: Floats) -> Floats:
+    """Return values of blocks with one more on each side, as straight on as they go there."""
+    wider: Floats = np.pad(blocks, 1, mode="reflect", reflect_type="odd")
+    return wider
+
+
+def _between(blocks: Floats) -> Floats:
+    """Return values of blocks at every pixel, interpolated between their middles."""
+    wider = _continued(blocks)
+    size = wider.shape[1] * BLOCK, wider.shape[0] * BLOCK
+    smooth = cv2.resize(wider, size, interpolation=cv2.INTER_LINEAR)[BLOCK:-BLOCK, BLOCK:-BLOCK]
+    return smooth.astype(np.float32, copy=False)

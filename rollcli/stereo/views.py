@@ -1,0 +1,110 @@
+"""The two views of a pair as they are matched: grey, 8 bits, at one size."""
+
+from typing import Any, TypeVar
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from rollcli.errors import InputError
+from rollcli.stereo.misalignment import LEVEL, Misalignment
+
+_Number = TypeVar("_Number", np.float32, np.uint8)
+
+View = NDArray[np.uint8]
+"""Shape (H, W)."""
+
+Views = tuple[View, View]
+"""Left and right."""
+
+Map = NDArray[np.float32]
+"""Disparities in pixels, shape (H, W); no data is 0."""
+
+BLOCK = 8  # px: the side of what gets one shift where the grey levels of both views are compared
+
+
+def prepare_views(left: NDArray[Any], right: NDArray[Any], downscale: float) -> Views:
+    """Make both views grey, 8 bits deep and `downscale` times smaller.
+
+    Raises
+    ------
+    InputError
+        The images differ in size, or are of a kind that cannot be matched.
+    """
+    if left.shape[:2] != right.shape[:2]:
+        sizes = " and ".join(f"{each.shape[1]}x{each.shape[0]}" for each in (left, right))
+        raise InputError(f"left and right image differ in size: {sizes}")
+    # cameras leave some of 16 bits unused: a fixed shift would make their images black
+    brightest = max(int(left.max(initial=1)), int(right.max(initial=1)))
+    return _plain(left, brightest, downscale), _plain(right, brightest, downscale)
+
+
+def matched_shape(shape: tuple[int, ...], downscale: float) -> tuple[int, int]:
+    """Return the shape that an image of this shape is matched at."""
+    height, width = (max(1, round(side / downscale)) for side in shape[:2])
+    return height, width
+
+
+def shrink(view: NDArray[Any], factor: float) -> View:
+    """Shrink the view by `factor`; 1 leaves it as it is."""
+    if factor == 1:
+        return view
+    height, width = matched_shape(view.shape, factor)
+    return cv2.resize(view, (width, height), interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
+
+
+def shrink_both(views: Views, factor: float) -> Views:
+    """Both views, `factor` times smaller."""
+    return shrink(views[0], factor), shrink(views[1], factor)
+
+
+def resampled(disparity: Map, shape: tuple[int, ...]) -> Map:
+    """Return a map at another size, in pixels of that; 0 where not all that a value is made of is known."""
+    if disparity.shape == shape:
+        return disparity
+    size = shape[1], shape[0]
+    scale = np.float32(shape[1] / disparity.shape[1])
+    if scale < 1:  # one pixel of a few says the same, and edges stay edges
+        fewer: Map = cv2.resize(disparity, size, interpolation=cv2.INTER_NEAREST) * scale
+        return fewer
+    known = cv2.resize((disparity > 0).astype(np.float32), size, interpolation=cv2.INTER_LINEAR)
+    larger = cv2.resize(disparity, size, interpolation=cv2.INTER_LINEAR) * scale
+    return np.where(known > np.float32(0.999), larger, np.float32(0))
+
+
+def seen_at(
+    lies: Misalignment, u: NDArray[np.float32], v: NDArray[np.float32], shape: tuple[int, ...]
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return where a right view of this shape that `lies` so shows the points (u, v) of a level one, px."""
+    if lies == LEVEL:
+        return u, v
+    height, width = shape
+    x, y = u - np.float32((width - 1) / 2), v - np.float32((height - 1) / 2)
+    return u + lies.stretch * x - lies.rotation * y, v + lies.down(x, y)
+
+
+def block_means(pixels: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return the means of the blocks that fit into an image, shape (H // BLOCK, W // BLOCK)."""
+    height, width = (side // BLOCK for side in pixels.shape)
+    whole = pixels[: height * BLOCK, : width * BLOCK]
+    means = cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA)
+    return means.astype(np.float32, copy=False)
+
+
+def blocks_at(pixels: NDArray[_Number], places: NDArray[np.bool_]) -> NDArray[_Number]:
+    """Return the pixels of some of the blocks of an image, shape (blocks, BLOCK ** 2)."""
+    height, width = (side // BLOCK for side in pixels.shape)
+    blocks = pixels[: height * BLOCK, : width * BLOCK].reshape(height, BLOCK, width, BLOCK)
+    return blocks.swapaxes(1, 2)[places].reshape(-1, BLOCK**2)
+
+
+def _plain(image: NDArray[Any], brightest: int, downscale: float) -> View:
+    if image.dtype not in (np.uint8, np.uint16) or not (image.ndim == 2 or image.shape[2:] == (3,)):
+        raise InputError(
+            f"an image of {image.dtype} and shape {image.shape} cannot be matched: "
+            "grey and BGR images of 8 and 16 bits can"
+        )
+    if image.dtype == np.uint16:
+        image = cv2.convertScaleAbs(image, alpha=255 / brightest)
+    grey = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) if image.ndim == 3 else image
+    return shrink(grey.astype(np.uint8, copy=False), downscale)

@@ -1,0 +1,124 @@
+"""Planes in many areas, and those that agree."""
+
+import math
+
+import numpy as np
+import pytest
+
+from rollcli.errors import EstimationError
+from rollcli.estimator.estimate import estimate_roll
+from rollcli.estimator.solvers.areas import fit_plane, iterative
+from rollcli.estimator.solvers.solution import SolverStatus
+from tests.estimator.synthetic_maps import bent_road, flat_road
+
+SIZE = {"width": 320, "height": 240, "focal": 280.0}
+
+
+def areas(disparity, usable=True):
+    """The solution, and the pixels it rests on."""
+    pixels = iterative(disparity, (disparity > 0) & usable)
+    return fit_plane(disparity, pixels).solution, pixels.used
+
+
+def road_with_obstacles(roll_deg, seed=0):
+    """A road with noise, on which three boxes stand: fronts of constant disparity."""
+    road = flat_road(roll_deg, **SIZE)
+    rng = np.random.default_rng(seed)
+    road = np.where(road > 0, road + rng.normal(0, 0.1, road.shape), 0)
+    for top, left, height, width in ((120, 130, 70, 60), (100, 10, 90, 70), (110, 240, 60, 80)):
+        road[top : top + height, left : left + width] = road[top + height - 1, left + width // 2]
+    return road
+
+
+@pytest.mark.parametrize("roll_deg", [-44, -12, 0, 3, 40])
+def test_the_exact_map_of_a_flat_road_gives_its_roll(roll_deg):
+    found, _ = areas(flat_road(roll_deg, **SIZE))
+    assert math.degrees(found.theta) == pytest.approx(roll_deg, abs=1e-6)
+    assert found.status.converged
+
+
+@pytest.mark.parametrize("roll_deg", [-15, -2, 0, 8])
+def test_obstacles_are_left_out(roll_deg):
+    disparity = road_with_obstacles(roll_deg)
+    found, used = areas(disparity)
+    assert math.degrees(found.theta) == pytest.approx(roll_deg, abs=0.05)
+    assert not used[150, 160]  # the box in the middle
+    assert abs(math.degrees(estimate_roll(disparity, method="exact", road="all").theta) - roll_deg) > 0.5
+
+
+def test_walls_beside_a_road_are_no_candidates():
+    road = flat_road(2, **SIZE)
+    u = np.arange(SIZE["width"])
+    wall = np.broadcast_to(30 - 0.25 * u, road.shape)
+    found, _ = areas(np.where(u < 110, wall, road))
+    assert math.degrees(found.theta) == pytest.approx(2, abs=0.01)
+
+
+@pytest.mark.parametrize("factor", [0.01, 3.0, 1000.0])
+def test_a_constant_factor_gives_the_same_angle(factor):
+    disparity = road_with_obstacles(5)
+    (scaled, _), (found, _) = areas(disparity * factor), areas(disparity)
+    assert scaled.theta == pytest.approx(found.theta, abs=1e-9)
+
+
+def test_whole_pixels_still_agree():
+    found, _ = areas(np.rint(flat_road(4, **SIZE)).astype(np.uint8))
+    assert math.degrees(found.theta) == pytest.approx(4, abs=0.1)
+
+
+def test_masked_pixels_have_no_say():
+    disparity = flat_road(-5, **SIZE)
+    usable = np.zeros(disparity.shape, bool)
+    usable[130:, 60:260] = True
+    spoilt = np.where(usable, disparity, np.random.default_rng(1).uniform(1, 90, disparity.shape))
+    found, used = areas(spoilt, usable)
+    assert math.degrees(found.theta) == pytest.approx(-5, abs=1e-6)
+    assert not (used & ~usable).any()
+
+
+def test_estimate_says_which_pixels_it_used():
+    disparity = road_with_obstacles(3)
+    found = estimate_roll(disparity, method="areas", road="all", road_mask=True)
+    assert found.road_mask.sum() == pytest.approx(found.road_fraction * (disparity > 0).sum())
+    assert found.iterations >= 1
+    assert found.global_minimum is None
+    _, _, bend = found.alpha
+    assert bend == 0
+
+
+def test_a_depth_map_is_refused_with_the_reason():
+    with pytest.raises(EstimationError, match="grows downward in none"):
+        areas(np.flipud(bent_road(0, bend=0)))
+
+
+def test_scattered_pixels_are_refused_with_the_reason():
+    sparse = flat_road(5, **SIZE) * (np.random.default_rng(0).random((240, 320)) < 0.05)
+    with pytest.raises(EstimationError, match="at least half valid"):
+        areas(sparse)
+
+
+def test_areas_of_noise_whose_common_plane_is_no_road_have_not_converged():
+    noise = np.random.default_rng(5).uniform(1, 9, (60, 80))
+    pixels = iterative(noise, noise > 0)
+    assert pixels.status is SolverStatus.DRIFTED
+    v, u = np.nonzero(pixels.used)
+    (_, c1, c2), *_ = np.linalg.lstsq(np.stack([np.ones(len(u)), u, v], axis=1), noise[v, u], rcond=None)
+    assert c2 <= 0 or abs(c1) > math.tan(math.radians(45)) * c2
+
+
+def test_areas_that_still_change_after_the_last_round_have_not_converged():
+    v, u = np.mgrid[:60, :80] - np.array([29.5, 39.5])[:, None, None]
+    curved = 80 + 0.3 * v - 0.004409 * v * v - 0.003132 * u * u - 0.00561 * u * v
+    pixels = iterative(curved, curved > 0)
+    assert pixels.status is SolverStatus.STEP_LIMIT
+    assert pixels.iterations == 20
+
+
+def test_an_area_of_which_half_is_valid_is_enough():
+    road = bent_road(4, bend=0, width=80, height=60)
+    half = np.where(np.arange(80) % 2 == 0, road, 0)
+    found, _ = areas(half)
+    assert math.degrees(found.theta) == pytest.approx(4, abs=1e-6)
+    half[::4, ::8] = 0
+    with pytest.raises(EstimationError, match="at least half valid"):
+        areas(half)

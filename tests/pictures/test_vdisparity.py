@@ -1,0 +1,99 @@
+"""v-disparity: each row's disparities are counted, and the picture shows the road."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+
+from rollcli.errors import UsageError
+from rollcli.estimator.estimate import estimate_roll
+from rollcli.pictures.derotate import derotate
+from rollcli.pictures.vdisparity import BOTTOM_MARGIN, draw_v_disparity, profile, row_offset, v_disparity
+
+MAPS = arrays.arrays(
+    st.sampled_from([np.uint8, np.uint16, np.int16, np.float32, np.float64]),
+    arrays.array_shapes(min_dims=2, max_dims=2, max_side=12),
+)
+
+
+@given(MAPS, st.integers(1, 50), st.floats(0.01, 1000))
+def test_counts_sum_to_the_valid_pixels_of_each_row(values, bins, top):
+    with np.errstate(invalid="ignore"):
+        valid = np.isfinite(values) & (values > 0)
+
+    histogram = v_disparity(values, bins=bins, max_disparity=top)
+
+    assert histogram.counts.shape == (len(values), bins)
+    np.testing.assert_array_equal(histogram.counts.sum(axis=1), valid.sum(axis=1))
+
+
+@given(MAPS)
+def test_defaults_count_every_valid_pixel_too(values):
+    if np.abs(values[np.isfinite(values)]).max(initial=0) > 1e6:
+        values = np.zeros((1, 1))
+
+    histogram = v_disparity(values)
+
+    np.testing.assert_array_equal(
+        histogram.counts.sum(axis=1), (np.isfinite(values) & (values > 0)).sum(axis=1)
+    )
+    assert draw_v_disparity(histogram).shape[0] == len(values) + BOTTOM_MARGIN
+
+
+def test_a_disparity_lies_in_its_bin():
+    counts = v_disparity(np.array([[0.5, 1.5, 3.99], [4.0, 9.0, np.nan]]), bins=4, max_disparity=4).counts
+
+    assert counts.tolist() == [[1, 1, 0, 1], [0, 0, 0, 2]]
+
+
+def test_whole_pixel_maps_get_a_bin_a_pixel_and_others_finer_ones():
+    assert v_disparity(np.array([[1, 63]], np.uint8)).counts.shape == (1, 64)
+    assert v_disparity(np.array([[1.0, 63.25]])).counts.shape == (1, 256)
+    assert v_disparity(np.array([[1.0, 163.25]])).counts.shape == (1, 656)
+    assert v_disparity(np.array([[1.0, 5163.25]])).counts.shape == (1, 1024)
+
+
+def test_an_empty_map_has_an_empty_histogram():
+    histogram = v_disparity(np.zeros((3, 4)))
+
+    assert histogram.counts.sum() == 0
+    assert draw_v_disparity(histogram).shape[0] == 3 + BOTTOM_MARGIN
+
+
+@pytest.mark.parametrize("options", [{"bins": 0}, {"max_disparity": 0}, {"max_disparity": math.inf}])
+def test_options_without_sense_are_refused(options):
+    with pytest.raises(UsageError, match="must be positive"):
+        v_disparity(np.ones((2, 2)), **options)
+
+
+def test_more_than_two_dimensions_are_refused():
+    with pytest.raises(UsageError, match="is 2-D"):
+        v_disparity(np.ones((2, 2, 2)))
+
+
+@pytest.mark.parametrize("roll_deg", [-20, 0, 3, 15])
+def test_the_parabola_lies_on_the_road_of_the_derotated_map(roll_deg):
+    theta = math.radians(roll_deg)
+    v, u = np.mgrid[:200, :300]
+    y = v * math.cos(theta) - u * math.sin(theta)
+    disparity = 30 + 0.2 * y + 2e-4 * y**2
+    estimate = estimate_roll(disparity, road="all")
+
+    level = derotate(disparity, estimate.theta)
+    y = np.arange(200) + row_offset(estimate.theta, 300, 200)
+    road = estimate.alpha[0] + estimate.alpha[1] * y + estimate.alpha[2] * y**2
+
+    np.testing.assert_allclose(level[:, 150], road, atol=0.01)
+
+
+@pytest.mark.parametrize("width", [1, 2, 141])
+@pytest.mark.parametrize("roll_deg", [-12, 0, 25])
+def test_the_profile_is_the_road_along_the_middle_column(width, roll_deg):
+    theta, alpha = math.radians(roll_deg), (20.0, 0.4, 0.003)
+    rows = np.arange(97)
+    y = rows * math.cos(theta) - (width - 1) / 2 * math.sin(theta)
+    road = np.polynomial.Polynomial(alpha)(y)
+    np.testing.assert_allclose(np.polynomial.Polynomial(profile(alpha, theta, width))(rows), road)

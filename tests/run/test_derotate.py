@@ -1,0 +1,345 @@
+"""`rollcli derotate`: maps keep what they are, and every map gets its own angle."""
+
+import math
+import shutil
+import signal
+from itertools import product
+
+import numpy as np
+import pytest
+
+from rollcli.estimator.estimate import estimate_roll
+from rollcli.files.encodings import from_disparity, read_disparity
+from rollcli.files.formats import encode_stored, read_stored
+from rollcli.run import convert_frame as work
+from rollcli.run.convert import run_derotate
+from rollcli.run.convert_frame import derotate_map
+from rollcli.run.options import (
+    DerotateOptions,
+    EncodingOptions,
+    InputOptions,
+    RotationOptions,
+    RunningOptions,
+)
+from tests.run_cli import contents, road_map, rollcli, write_kitti, write_maps
+
+TYPES = {
+    "png": ["u1", "u2"],
+    "tiff": ["u1", "i1", "u2", "i2", "u4", "i4", "f4", "f8"],
+    "npy": ["u1", "i1", "u2", "i2", "u4", "i4", "f2", "f4", "f8"],
+    "pfm": ["f4"],
+}
+STEPS = {"px": 1, "kitti": 1 / 256, "cityscapes": 1 / 256, "sgbm": 1 / 16}
+KINDS = [(form, dtype) for form, dtypes in TYPES.items() for dtype in dtypes]
+COMBINATIONS = [
+    (form, dtype, encoding)
+    for (form, dtype), encoding in product(KINDS, STEPS)
+    if encoding == "px" or dtype[1] > "1"
+]
+
+
+def derotated(folder, roll_deg, *, encoding="auto", expand=False, invalid=()):
+    """Every map of folder/maps rotated into folder/out, in this process; the exit status."""
+    return run_derotate(
+        DerotateOptions(
+            InputOptions((str(folder / "maps"),)),
+            RotationOptions(roll_deg, None, expand, False),
+            str(folder / "out"),
+            EncodingOptions(encoding, invalid=invalid),
+            RunningOptions(jobs=1, quiet=True, overwrite=True),
+        )
+    )
+
+
+def written(folder, form, dtype, encoding):
+    """A rolled road with holes, stored as asked for; where it is, and what it became."""
+    disparity = road_map(math.radians(4), height=90) / 2 + 8
+    disparity[20:30, 40:60] = 0
+    stored = from_disparity(disparity, encoding, np.dtype(dtype))
+    ending = "tif" if form == "tiff" else form
+    (folder / "maps").mkdir()
+    (folder / "maps" / f"a.{ending}").write_bytes(encode_stored(stored, form))
+    return folder / "maps" / f"a.{ending}", folder / "out" / f"a.{ending}"
+
+
+@pytest.mark.parametrize(("form", "dtype", "encoding"), COMBINATIONS)
+def test_a_map_keeps_its_format_type_and_encoding(tmp_path, form, dtype, encoding):
+    before, after = written(tmp_path, form, dtype, encoding)
+
+    assert derotated(tmp_path, 4, encoding=encoding) == 0
+
+    stored = read_stored(after)
+    assert (stored.format, stored.values.dtype) == (form, np.dtype(dtype))
+    assert stored.values.shape == read_stored(before).values.shape
+    level = read_disparity(after, encoding=encoding)
+    assert level.max() == pytest.approx(read_disparity(before, encoding=encoding).max(), rel=0.15)
+    roll = estimate_roll(level, road="all").theta
+    assert math.degrees(roll) == pytest.approx(0, abs=0.05 + 2 * STEPS[encoding])
+
+
+@pytest.mark.parametrize(("form", "dtype", "encoding"), COMBINATIONS)
+def test_by_nothing_a_map_keeps_its_pixels(tmp_path, form, dtype, encoding):
+    before, after = written(tmp_path, form, dtype, encoding)
+
+    assert derotated(tmp_path, 0, encoding=encoding) == 0
+
+    np.testing.assert_array_equal(read_stored(after).values, read_stored(before).values)
+
+
+@pytest.mark.parametrize(("form", "dtype", "encoding"), COMBINATIONS)
+def test_there_and_back_no_invalid_pixel_turns_valid_and_values_stay(tmp_path, form, dtype, encoding):
+    before, after = written(tmp_path, form, dtype, encoding)
+    original = read_disparity(before, encoding=encoding)
+
+    derotated(tmp_path, 7, encoding=encoding)
+    before.write_bytes(after.read_bytes())
+    derotated(tmp_path, -7, encoding=encoding)
+
+    back = read_disparity(after, encoding=encoding)
+    assert not (back > 0)[original == 0].any()
+    both = (back > 0) & (original > 0)
+    assert both.sum() > 0.6 * (original > 0).sum()
+    # the road rises by 0.15 px a row and holds noise of 0.025 px; numbers are rounded twice
+    assert np.abs(back - original)[both].max() < 0.4 + STEPS[encoding]
+
+
+def test_further_invalid_numbers_stay_what_they_are(tmp_path):
+    disparity = road_map(0.05)
+    disparity[:20] = 99
+    write_kitti(tmp_path / "maps" / "a.png", disparity)
+
+    derotated(tmp_path, 10, invalid=(99 * 256.0,))
+
+    level = read_stored(tmp_path / "out" / "a.png").values
+    assert level.max() < 98 * 256
+
+
+def test_expanding_keeps_the_corners(tmp_path):
+    disparity = np.zeros((60, 100), np.float32)
+    corners = ([0, 0, -1, -1], [0, -1, 0, -1])
+    for (row, column), value in zip([(0, 0), (0, 1), (1, 0), (1, 1)], [10, 20, 30, 40], strict=True):
+        disparity[-5 * row : 60 if row else 5, -5 * column : 100 if column else 5] = value
+    (tmp_path / "maps").mkdir()
+    (tmp_path / "maps" / "a.npy").write_bytes(encode_stored(disparity, "npy"))
+
+    derotated(tmp_path, 30)
+    cut = read_stored(tmp_path / "out" / "a.npy").values
+    derotated(tmp_path, 30, expand=True)
+    whole = read_stored(tmp_path / "out" / "a.npy").values
+
+    assert disparity[corners].tolist() == [10, 20, 30, 40]
+    assert set(np.unique(np.rint(cut))) < {0, 10, 20, 30, 40}
+    assert set(np.unique(np.rint(whole))) == {0, 10, 20, 30, 40}
+    assert whole.shape > disparity.shape
+
+
+@pytest.fixture(scope="module")
+def estimated(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("estimated")
+    write_maps(folder / "maps", 4)
+    line = ["estimate", "maps", "-o", "rolls.csv", "--derotated", "upright"]
+    assert rollcli(*line, cwd=folder).status == 0
+    return folder
+
+
+@pytest.fixture
+def folder(tmp_path, estimated):
+    return shutil.copytree(estimated, tmp_path, dirs_exist_ok=True)
+
+
+def test_each_map_gets_the_angle_of_its_row(folder):
+    done = rollcli("derotate", "maps", "--from", "rolls.csv", "-o", "out", "-j2", cwd=folder)
+
+    assert (done.status, done.out) == (0, "")
+    assert sorted(contents(folder / "out")) == [f"frame{i}.png" for i in range(4)]
+    for index in range(4):
+        level = estimate_roll(read_disparity(folder / "out" / f"frame{index}.png"), road="all")
+        assert math.degrees(level.theta) == pytest.approx(0, abs=0.1)
+
+
+def test_any_number_of_workers_gives_the_same_files(folder):
+    for jobs in ("1", "2"):
+        rollcli("derotate", "maps", "--from", "rolls.csv", "-o", f"out{jobs}", "-j", jobs, cwd=folder)
+    assert contents(folder / "out1") == contents(folder / "out2")
+
+
+def test_the_same_map_comes_from_estimate_and_from_derotate(folder):
+    rollcli("derotate", "maps", "--from", "rolls.csv", "-o", "out", cwd=folder)
+    for index in range(4):
+        one, other = (
+            read_stored(folder / each / f"frame{index}.png").values.astype(int) for each in ("upright", "out")
+        )
+        # the result holds millionths of a degree, which may round a number the other way
+        assert np.abs(one - other).max() <= 1
+        assert (one != other).mean() < 0.001
+
+
+def test_maps_are_matched_with_rows_of_another_folder_and_ending_by_stem(folder):
+    (folder / "elsewhere").mkdir()
+    for index in range(4):
+        stored = read_stored(folder / "maps" / f"frame{index}.png").values
+        (folder / "elsewhere" / f"frame{index}.tif").write_bytes(encode_stored(stored, "tiff"))
+    assert rollcli("derotate", "elsewhere", "--from", "rolls.csv", "-o", "out", cwd=folder).status == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["maps/frame1.png", "--from", "rolls.csv"], ["rolls.csv", "maps/frame0.png, maps/frame2.png"]),
+        (["maps", "more", "--from", "rolls.csv"], ["rolls.csv: has no row for more/frame9.png"]),
+        (["maps", "copy", "--from", "rolls.csv"], ["maps/frame1.png", "copy/frame1.png"]),
+        (["maps"], ["--roll", "--from"]),
+        (["maps", "--roll", "3", "--from", "rolls.csv"], ["--roll", "--from"]),
+        (["maps", "--from", "maps/frame0.png"], ["maps/frame0.png: is not"]),
+        (["maps", "--from", "other.csv"], ["other.csv", "no column", "status"]),
+        (["maps", "--from", "nothing.csv"], ["nothing.csv: cannot be read"]),
+        (["maps", "--roll", "much"], ["'much' is not a number"]),
+    ],
+)
+def test_what_does_not_fit_is_refused_and_named_before_anything_is_written(folder, arguments, words):
+    write_kitti(folder / "more" / "frame9.png", road_map())
+    write_kitti(folder / "copy" / "frame1.png", road_map())
+    (folder / "other.csv").write_text("file,angle\nmaps/frame0.png,3\n")
+
+    done = rollcli("derotate", *arguments, "-o", "out", cwd=folder)
+
+    assert done.status == 2
+    assert done.err.count("\n") == 1
+    for word in words:
+        assert word in done.err
+    assert not (folder / "out").exists()
+
+
+def test_a_map_whose_row_has_no_angle_fails_and_the_others_are_done(folder):
+    lines = (folder / "rolls.csv").read_text().splitlines()
+    lines[2] = "maps/frame1.png,,error" + "," * (lines[0].count(",") - 2)
+    (folder / "rolls.csv").write_text("\n".join(lines) + "\n")
+
+    done = rollcli("derotate", "maps", "--from", "rolls.csv", "-o", "out", cwd=folder)
+
+    assert done.status == 3
+    assert "maps/frame1.png: has no angle in rolls.csv" in done.err
+    assert sorted(contents(folder / "out")) == ["frame0.png", "frame2.png", "frame3.png"]
+
+
+def test_its_own_results_never_become_inputs(folder):
+    for _ in range(2):
+        done = rollcli(
+            "derotate", "maps", "--recursive", "--roll", "2", "-o", "maps/out", "--overwrite", cwd=folder
+        )
+        assert done.status == 0
+    assert sorted(contents(folder / "maps" / "out")) == [f"frame{i}.png" for i in range(4)]
+    done = rollcli("derotate", "maps", "--roll", "2", "-o", "maps", "--overwrite", cwd=folder)
+    assert done.status == 2
+    assert "write the results elsewhere" in done.err
+    done = rollcli("derotate", "maps/frame1.png", "--roll", "2", "-o", "maps", "--overwrite", cwd=folder)
+    assert done.status == 2
+    assert "maps/frame1.png: would be replaced" in done.err
+
+
+def test_what_is_there_is_kept_unless_it_may_be_overwritten(folder):
+    (folder / "out").mkdir()
+    (folder / "out" / "frame2.png").write_text("mine")
+    line = ["derotate", "maps", "--roll", "2", "-o", "out"]
+
+    assert rollcli(*line, cwd=folder).status == 2
+    assert contents(folder / "out") == {"frame2.png": b"mine"}
+    assert rollcli(*line, "--overwrite", cwd=folder).status == 0
+    assert len(contents(folder / "out")) == 4
+
+
+def test_a_dry_run_lists_and_writes_nothing(folder):
+    done = rollcli("derotate", "maps", "--roll", "2", "-o", "out", "--dry-run", cwd=folder)
+    assert done.out.splitlines()[:2] == ["read  maps/frame0.png", "write out/frame0.png"]
+    assert (done.status, (folder / "out").exists()) == (0, False)
+
+
+def test_a_broken_map_costs_itself_alone(folder):
+    (folder / "maps" / "frame2.png").write_bytes(b"")
+    (folder / "out").mkdir()
+    (folder / "out" / "frame2.png").write_text("of an earlier run")
+    done = rollcli("derotate", "maps", "--roll", "2", "-o", "out", "--overwrite", cwd=folder)
+    assert done.status == 3
+    assert "maps/frame2.png: is empty" in done.err
+    assert len(contents(folder / "out")) == 3
+
+
+def test_an_interrupted_run_says_that_what_is_written_is_whole(folder, monkeypatch):
+    assert rollcli("derotate", "maps", "--roll", "2", "-o", "whole", cwd=folder).status == 0
+
+    def interrupted(*arguments):
+        signal.raise_signal(signal.SIGINT)
+        return derotate_map(*arguments)
+
+    monkeypatch.setattr(work, "derotate_map", interrupted)
+    done = rollcli("derotate", "maps", "--roll", "2", "-o", "out", cwd=folder)
+    assert done.status == 130
+    assert "interrupted; what is written is whole, and --overwrite starts anew" in done.err
+    assert contents(folder / "out") == {"frame0.png": contents(folder / "whole")["frame0.png"]}
+
+
+def test_a_run_that_is_interrupted_at_its_last_map_has_done_all(folder, monkeypatch):
+    def interrupted(*arguments):
+        signal.raise_signal(signal.SIGINT)
+        return derotate_map(*arguments)
+
+    monkeypatch.setattr(work, "derotate_map", interrupted)
+    done = rollcli("derotate", "maps/frame1.png", "--roll", "2", "-o", "out", cwd=folder)
+    assert (done.status, "interrupted" in done.err) == (0, False)
+    assert list(contents(folder / "out")) == ["frame1.png"]
+
+
+def make_suspect(folder, *names):
+    lines = (folder / "rolls.csv").read_text().splitlines(keepends=True)
+    doubted = [line.replace(",ok,", ",suspect,") if line.startswith(names) else line for line in lines]
+    (folder / "rolls.csv").write_text("".join(doubted))
+
+
+def test_suspect_angles_are_used_and_counted_or_their_maps_are_left_out(folder):
+    make_suspect(folder, "maps/frame1", "maps/frame3")
+    line = ("derotate", "maps", "--from", "rolls.csv")
+
+    used = rollcli(*line, "-o", "all", cwd=folder)
+    assert "rolls.csv: 2 of 4 angles are suspect and used; --skip-suspect leaves such maps out" in used.err
+    assert len(contents(folder / "all")) == 4
+
+    left_out = rollcli(*line, "-o", "sure", "--skip-suspect", cwd=folder)
+    assert "rolls.csv: 2 of 4 angles are suspect; such maps are left out" in left_out.err
+    assert (left_out.status, sorted(contents(folder / "sure"))) == (0, ["frame0.png", "frame2.png"])
+
+    quiet = rollcli(*line, "-o", "quiet", "-q", cwd=folder)
+    assert (quiet.status, quiet.err) == (0, "")
+
+
+def test_one_suspect_angle_is_told_as_one(folder):
+    make_suspect(folder, "maps/frame1")
+    used = rollcli("derotate", "maps", "--from", "rolls.csv", "-o", "all", cwd=folder)
+    assert "rolls.csv: 1 of 4 angles is suspect and used; " in used.err
+
+
+def test_leaving_out_every_map_or_none_that_is_doubted_is_refused(folder):
+    one = rollcli("derotate", "maps", "--roll", "2", "--skip-suspect", "-o", "out", cwd=folder)
+    assert (one.status, "--skip-suspect needs --from" in one.err) == (2, True)
+    make_suspect(folder, "maps/")
+    every = rollcli("derotate", "maps", "--from", "rolls.csv", "--skip-suspect", "-o", "out", cwd=folder)
+    assert (every.status, "every angle is suspect" in every.err) == (2, True)
+    assert not (folder / "out").exists()
+
+
+def test_numbers_that_are_kept_are_not_warned_of(tmp_path):
+    np.save(tmp_path / "x256.npy", 256 * road_map())
+    assert "256 times too large" in rollcli("vdisparity", "x256.npy", "-o", "v", cwd=tmp_path).err
+    done = rollcli("derotate", "x256.npy", "--roll", "2", "-o", "out", cwd=tmp_path)
+    assert (done.status, "too large" in done.err) == (0, False)
+
+
+def test_a_cityscapes_map_is_turned_with_its_ones_left_out(tmp_path):
+    stored = np.full((90, 120), 256 * 20 + 1, np.uint16)
+    stored[20:40, 30:60] = 1  # no disparity could be measured
+    (tmp_path / "maps").mkdir()
+    (tmp_path / "maps" / "a.png").write_bytes(encode_stored(stored, "png"))
+    line = ("derotate", "maps", "--roll", "3", "--encoding", "cityscapes", "-o", "up")
+    run = rollcli(*line, cwd=tmp_path)
+    assert (run.status, "no effect" in run.err) == (0, False)
+    turned = read_stored(tmp_path / "up" / "a.png").values
+    assert set(np.unique(turned)) == {0, 256 * 20 + 1}  # nothing between a road and what is not known

@@ -1,0 +1,138 @@
+"""What is no disparity map in pixels is told what it looks like, and nothing else is."""
+
+import math
+
+import cv2
+import numpy as np
+import pytest
+
+from rollcli.errors import InputError
+from rollcli.files.encodings import read_disparity, to_disparity
+from rollcli.files.formats import Stored, read_stored
+from rollcli.rig.calibration import Calibration
+from rollcli.run.diagnosis import looks_like, require_positive, too_large
+from rollcli.run.options import FrameOptions
+from tests.run_cli import ROOT, road_map
+
+SAMPLES = sorted((ROOT / "sample_data" / "maps").iterdir())
+PHOTOGRAPHS = sorted((ROOT / "sample_data").glob("[lr]*t/*.png"))
+SHARED = ROOT.parent / "shared"
+PHOTOGRAPH, DEPTH, UPSIDE_DOWN = "looks like a photograph", "looks like a depth map", "upside down"
+
+
+def verdict(values):
+    stored = Stored(np.ascontiguousarray(values), "npy")
+    return looks_like(to_disparity(stored).disparity, stored, FrameOptions())
+
+
+def depth_of(disparity):
+    return np.where(disparity > 0, 150 / np.where(disparity > 0, disparity, 1), 0)
+
+
+def stretched(disparity):
+    return np.rint(disparity * (255 / disparity.max())).astype(np.uint8)
+
+
+@pytest.mark.parametrize("path", SAMPLES, ids=lambda path: path.name)
+def test_a_map_is_taken_for_nothing_else_and_its_depths_and_its_reverse_are_known(path):
+    disparity = read_disparity(path)
+    depth = depth_of(disparity)
+
+    assert verdict(read_stored(path).values) == ""
+    assert verdict(stretched(disparity)) == ""
+    assert DEPTH in verdict(depth.astype(np.float32))
+    assert DEPTH in verdict(np.clip(np.rint(1000 * depth), 0, 65535).astype(np.uint16))
+    assert UPSIDE_DOWN in verdict(disparity[::-1])  # or a depth map: few roads tell which
+
+
+@pytest.mark.parametrize("path", PHOTOGRAPHS, ids=lambda path: f"{path.parent.name}-{path.stem}")
+def test_photographs_of_8_and_16_bits_are_known(path):
+    grey = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+    for values in (grey, grey.astype(np.uint16) * 257, grey.astype(np.uint16) * 16):
+        assert PHOTOGRAPH in verdict(values)
+
+
+def test_noise_walls_and_small_maps_are_taken_for_nothing():
+    random = np.random.default_rng(0)
+    assert verdict(random.integers(0, 256, (120, 160), dtype=np.uint8)) == ""
+    assert verdict(np.full((120, 160), 40, np.uint8)) == ""
+    assert verdict(np.array([[1], [2]], np.uint8)) == ""
+    assert verdict(np.zeros((5, 5), np.float32)) == ""
+    assert looks_like(road_map(), None, FrameOptions()) == ""  # matched from a pair
+
+
+def test_real_maps_and_photographs_are_told_apart():
+    folders = ("raw", "refined", "sgm", "post", "network")
+    maps = [str(path) for each in folders for path in sorted(SHARED.glob(f"realmaps/{each}/*.png"))[3::8]]
+    photographs = [str(path) for path in sorted(SHARED.glob("streets/left/*.png"))[::4]]
+    if not (maps and photographs):
+        pytest.skip(f"the real maps and photographs are not there: {SHARED}")
+    assert [path for path in maps if verdict(cv2.imread(path, cv2.IMREAD_UNCHANGED))] == []
+    assert all(PHOTOGRAPH in verdict(cv2.imread(path, cv2.IMREAD_GRAYSCALE)) for path in photographs)
+
+
+@pytest.mark.parametrize(
+    ("times", "dtype", "remedy"),
+    [
+        (16, np.float32, "16 or 256 times too large; give --encoding sgbm (stored / 16) or --encoding kitti"),
+        (256, np.float32, "look 256 times too large; give --encoding kitti (stored / 256)"),
+        (256, np.uint32, "look 256 times too large; give --encoding kitti (stored / 256)"),
+        (65536, np.float32, "give --scale, the pixels that a stored number of 1 stands for"),
+    ],
+)
+def test_disparities_beyond_the_width_are_told_what_divides_them(times, dtype, remedy):
+    stored = Stored((road_map() * times).astype(dtype), "npy")
+    said = too_large(to_disparity(stored).disparity, stored, "px")
+    assert remedy in said
+    assert "larger than the map is wide, 160 px" in said
+
+
+def test_a_map_that_fits_its_width_is_not_too_large_whatever_a_few_pixels_hold():
+    disparity = road_map()
+    disparity[:1, :100] = 1e6  # half a per cent
+    assert too_large(disparity, Stored(disparity, "npy"), "px") == ""
+
+
+def test_three_in_a_hundred_beyond_the_width_are_enough_to_tell():
+    disparity = road_map()
+    disparity *= disparity.shape[1] / np.quantile(disparity[disparity > 0], 0.97)
+    said = too_large(disparity, Stored(disparity, "npy"), "px")
+    assert said.startswith("3% of the disparities are larger than the map is wide, 160 px")
+
+
+@pytest.mark.parametrize("empty", [0, np.nan, -np.inf])
+def test_a_map_of_negative_numbers_is_asked_for_its_sign(empty):
+    values = -road_map()
+    values[:10] = empty
+    with pytest.raises(InputError, match=r"a.npy: every number is negative, -5\d.* other sign\? Negate"):
+        require_positive(Stored(values, "npy"), "a.npy")
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        np.full((9, 9), -16, np.int16),
+        np.zeros((9, 9)),
+        road_map() - 30,
+        np.full((9, 9), np.nan),
+        np.array([[np.nan, -2.0, -1.0], [3.0, 4.0, 5.0]]),
+        np.array([[-np.inf, -np.inf]]),
+    ],
+    ids=["no data", "zero", "both signs", "nan", "nan and both signs", "infinite"],
+)
+def test_a_map_without_disparities_is_not_asked_for_its_sign(values):
+    require_positive(Stored(values, "npy"), "a.npy")
+
+
+def test_a_depth_becomes_the_disparity_of_its_calibration():
+    depth = np.array([[0.5, 2.0, np.inf], [0.0, -1.0, np.nan]], np.float32)
+    rig = Calibration(fx=100, fy=100, cx=1, cy=0.5, baseline=0.2, doffs=3.0, width=3, height=2)
+    # 100 px * 0.2 m / z, less 3 px
+    found = to_disparity(Stored(depth, "npy"), encoding="depth", calibration=rig)
+    assert found.disparity.ravel() == pytest.approx([37.0, 7.0, 0.0, 0.0, 0.0, 0.0])
+    millimetres = np.array([[500, 2000, 65535], [0, 60000, 0]], np.uint16)
+    found = to_disparity(Stored(millimetres, "png"), encoding="depth", calibration=rig, invalid=[60000])
+    assert found.disparity.ravel() == pytest.approx([37.0, 7.0, 0.0, 0.0, 0.0, 0.0])
+    kitti = to_disparity(Stored(np.array([[512]], np.uint16), "png"), encoding="depth", scale=1 / 256)
+    assert found.scale == 1e-3
+    assert math.isclose(kitti.disparity[0, 0], 0.5)  # 1/z of 2 m, where there is no calibration

@@ -1,0 +1,195 @@
+"""`rollcli disparity`: one map a pair, as stereo matching has it."""
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from rollcli.files.encodings import read_disparity
+from rollcli.files.formats import read_image, read_stored
+from rollcli.stereo.match import compute_disparity
+from tests.run_cli import ROOT, contents, road_map, rollcli, write_pair
+
+ROADS = ROOT.parent / "shared" / "roads"
+
+
+@pytest.fixture(scope="module")
+def pairs(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("pairs")
+    line = ["simulate", "rig", "--frames", "3", "--size", "256x192", "--seed", "5", "-q"]
+    assert rollcli(*line, cwd=folder).status == 0
+    return folder
+
+
+def match(folder, *arguments, left="rig/left", right="rig/right"):
+    return rollcli("disparity", "--left", left, "--right", right, *arguments, cwd=folder)
+
+
+def test_each_pair_gives_a_kitti_map_named_after_its_left_image(pairs):
+    done = match(pairs, "-o", "png", "-j2")
+    assert (done.status, done.out) == (0, "")
+    names = sorted(contents(pairs / "png"))
+    assert names == [path.name for path in sorted((pairs / "rig" / "left").iterdir())]
+    for name in names:
+        stored = read_stored(pairs / "png" / name)
+        assert (stored.format, stored.values.dtype) == ("png", np.uint16)
+        found, truth = (read_disparity(pairs / each / name) for each in ("png", "rig/disparity"))
+        both = (found > 0) & (truth > 0)
+        assert both.sum() > 0.6 * (truth > 0).sum()  # the left margin has no partner in the right image
+        assert np.median(np.abs(found - truth)[both]) < 0.5
+
+
+@pytest.mark.parametrize(("save_as", "ending"), [("tiff", ".tif"), ("npy", ".npy")])
+def test_other_formats_hold_pixels_as_they_are(pairs, save_as, ending):
+    assert match(pairs, "-o", save_as, "--save-as", save_as).status == 0
+    for path in (pairs / save_as).iterdir():
+        assert path.suffix == ending
+        stored = read_stored(path)
+        assert (stored.format, stored.values.dtype) == (save_as, np.float32)
+        left, right = (read_image(pairs / "rig" / side / f"{path.stem}.png") for side in ("left", "right"))
+        np.testing.assert_array_equal(stored.values, compute_disparity(left, right))
+
+
+def test_stereo_options_reach_the_matcher(pairs):
+    options = ["--num-disparities", "32", "--block-size", "7", "--downscale", "2", "--save-as", "npy"]
+    assert match(pairs, "-o", "small", *options).status == 0
+    path = next((pairs / "small").iterdir())
+    left, right = (read_image(pairs / "rig" / side / f"{path.stem}.png") for side in ("left", "right"))
+    expected = compute_disparity(left, right, num_disparities=32, block_size=7, downscale=2)
+    np.testing.assert_array_equal(np.load(path), expected)
+
+
+def test_a_pair_that_cannot_be_matched_costs_itself_alone(pairs, tmp_path):
+    for side in ("left", "right"):
+        (tmp_path / side).mkdir()
+        for path in (pairs / "rig" / side).iterdir():
+            (tmp_path / side / path.name).write_bytes(path.read_bytes())
+    first, second, _ = sorted((tmp_path / "left").iterdir())
+    first.write_bytes(first.read_bytes()[:200])
+    second.write_bytes((pairs / "rig" / "disparity" / second.name).read_bytes())
+    done = match(tmp_path, "-o", "maps", left="left", right="right")
+    assert done.status == 3
+    assert f"left/{first.name}: " in done.err
+    assert len(contents(tmp_path / "maps")) in (1, 2)  # the second is an image, if no left one
+
+
+@pytest.mark.parametrize("program", [["disparity", "-o"], ["estimate", "-o", "rolls.csv", "--disparity"]])
+def test_a_map_that_a_16_bit_png_cannot_hold_is_written_as_tiff_and_that_is_said(tmp_path, program):
+    for name, near in (("a.png", 0), ("b.png", 280), ("c.png", 0)):
+        write_pair(tmp_path, name, road_map(0.02, width=900) / 2 + near)
+    line = [*program, "maps", "--left", "left", "--right", "right", "--num-disparities", "352"]
+    done = rollcli(*line, cwd=tmp_path)
+    assert done.status == 0
+    said = done.err + (tmp_path / "rolls.csv").read_text() if program[0] == "estimate" else done.err
+    words = "written as TIFF: a disparity is above the 256 px of a KITTI PNG"
+    lines = [line for line in said.splitlines() if words in line]
+    assert lines
+    assert all("left/b.png" in line for line in lines)
+    assert sorted(contents(tmp_path / "maps")) == ["a.png", "b.tif", "c.png"]
+    assert read_disparity(tmp_path / "maps" / "b.tif").max() > 300
+    (tmp_path / "maps" / "b.png").write_bytes(b"of an earlier run")
+    assert rollcli(*line, "--overwrite", cwd=tmp_path).status == 0
+    assert sorted(contents(tmp_path / "maps")) == ["a.png", "b.tif", "c.png"]
+
+
+def test_a_resume_finds_the_tiff_that_stands_for_a_png(tmp_path):
+    for name, near in (("a.png", 0), ("b.png", 280)):
+        write_pair(tmp_path, name, road_map(0.02, width=900) / 2 + near)
+    line = ["estimate", "--left", "left", "--right", "right", "--num-disparities", "352", "-o", "rolls.csv"]
+    line += ["--disparity", "maps"]
+    assert rollcli(*line, cwd=tmp_path).status == 0
+    assert "made again" not in rollcli(*line, "--resume", cwd=tmp_path).err
+    (tmp_path / "maps" / "b.tif").unlink()
+    assert "made again" in rollcli(*line, "--resume", cwd=tmp_path).err
+    assert sorted(contents(tmp_path / "maps")) == ["a.png", "b.tif"]
+
+
+def test_a_preview_is_a_colour_picture_beside_the_map(tmp_path):
+    write_pair(tmp_path, "a.png", road_map(0.02, width=900) / 2)
+    line = ["disparity", "--left", "left", "--right", "right", "-o", "maps", "--preview", "look"]
+    done = rollcli(*line, cwd=tmp_path)
+    assert (done.status, sorted(contents(tmp_path / "maps"))) == (0, ["a.png"])
+    picture = cv2.imread(str(tmp_path / "look" / "a.png"), cv2.IMREAD_UNCHANGED)
+    assert (picture.dtype, picture.shape[2]) == (np.uint8, 3)
+    assert rollcli(*line, cwd=tmp_path).status == 2  # both are there already
+
+
+def test_the_road_of_a_pair_is_drawn_on_its_photo(tmp_path):
+    write_pair(tmp_path, "a.png", road_map(0.02, width=900) / 2)
+    line = [
+        "estimate",
+        "--left",
+        "left",
+        "--right",
+        "right",
+        "--num-disparities",
+        "64",
+        "--road-mask",
+        "road",
+    ]
+    assert rollcli(*line, cwd=tmp_path).status == 0
+    drawn = cv2.imread(str(tmp_path / "road" / "a.png")).astype(int)
+    photo = cv2.imread(str(tmp_path / "left" / "a.png")).astype(int)
+    assert drawn.shape == photo.shape
+    unchanged = (drawn == photo).all(axis=2)
+    assert 0.02 < unchanged.mean() < 0.98
+
+
+@pytest.mark.parametrize(
+    ("left", "right", "words"),
+    [
+        ("rig/left", "rig/nothing", "rig/nothing"),
+        ("rig/left", "rig/right/frame_0001.png", "no partner found for rig/left/frame_0002.png"),
+    ],
+)
+def test_what_has_no_partner_is_named_before_anything_is_written(pairs, left, right, words):
+    done = match(pairs, "-o", "never", left=left, right=right)
+    assert done.status == 2
+    assert words in done.err
+    assert not (pairs / "never").exists()
+
+
+def test_one_side_alone_is_refused(pairs):
+    done = rollcli("disparity", "--left", "rig/left", "-o", "never", cwd=pairs)
+    assert done.status == 2
+    assert "--right" in done.err
+
+
+@pytest.mark.skipif(not ROADS.is_dir(), reason="the real road pairs (../shared/roads) are not here")
+def test_on_real_roads_most_pixels_of_the_matched_region_are_valid(tmp_path):
+    done = match(
+        tmp_path, "-o", "maps", "--downscale", "2", left=str(ROADS / "left"), right=str(ROADS / "right")
+    )
+    assert done.status == 0
+    maps = sorted((tmp_path / "maps").iterdir())
+    assert len(maps) == len(list((ROADS / "left").iterdir()))
+    shares = {path.name: matched_share(path) for path in maps}
+    assert min(shares.values()) > 0.7, shares
+
+
+def matched_share(path: Path) -> float:
+    """The valid share of the columns whose partner lies inside the right image."""
+    disparity = read_disparity(path)
+    seen_by_both = disparity[:, int(disparity.max()) + 1 :]
+    return float((seen_by_both > 0).mean())
+
+
+def test_its_own_maps_and_previews_never_become_inputs(tmp_path):
+    write_pair(tmp_path, "a.png", road_map(width=160, height=80) / 2)
+    outputs = ("-o", "left/maps", "--preview", "right/previews", "--overwrite")
+    for _ in range(2):
+        done = match(tmp_path, "--recursive", *outputs, left="left", right="right")
+        assert done.status == 0, done.err
+    assert sorted(contents(tmp_path / "left")) == ["a.png", "maps/a.png"]
+    assert sorted(contents(tmp_path / "right")) == ["a.png", "previews/a.png"]
+
+
+def test_views_without_a_pixel_that_matches_have_no_map(tmp_path):
+    for side in ("left", "right"):
+        (tmp_path / side).mkdir()
+        cv2.imwrite(str(tmp_path / side / "a.png"), np.full((120, 320), 128, np.uint8))
+    run = rollcli("disparity", "--left", "left", "--right", "right", "-o", "maps", cwd=tmp_path)
+    assert run.status == 3
+    assert "left/a.png: no pixel could be matched with the right image" in run.err
+    assert not list((tmp_path / "maps").glob("*"))

@@ -1,0 +1,153 @@
+"""Rows enter the result once their images survive a power cut, and a resume restores images that are gone."""
+
+import os
+
+import pytest
+
+from rollcli.run import result_file as durable_rows
+from rollcli.run.result_file import DurableRows
+from tests.run_cli import contents, rollcli, write_maps
+
+IMAGES = ("--derotated", "up", "--vdisparity", "v")
+
+
+class WatchedFile:
+    """A result that notes, with each row, which files were forced to the disk before it."""
+
+    def __init__(self, forced):
+        self.forced, self.rows, self.synced = forced, {}, 0
+
+    def append(self, row):
+        self.rows[row] = set(self.forced)
+
+    def sync(self):
+        self.synced = len(self.rows)
+
+
+@pytest.fixture
+def file(monkeypatch):
+    forced, fsync = [], os.fsync
+
+    def watch(descriptor):
+        fsync(descriptor)
+        forced.append(os.fstat(descriptor).st_ino)
+
+    monkeypatch.setattr(os, "fsync", watch)
+    return WatchedFile(forced)
+
+
+def image(folder, number):
+    path = folder / f"{number}.png"
+    path.write_bytes(b"image")
+    return path
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows forces no folders")
+def test_a_row_is_written_after_its_images_and_their_folder_are_on_the_disk(tmp_path, file):
+    rows = DurableRows(file)
+    paths = [image(tmp_path, number) for number in range(40)]
+    for number, path in enumerate(paths):
+        rows.append(b"%d" % number, [str(path)])
+    rows.commit()
+    assert list(file.rows) == [b"%d" % number for number in range(40)]
+    for path, forced in zip(paths, file.rows.values(), strict=True):
+        assert {path.stat().st_ino, tmp_path.stat().st_ino} <= forced
+    assert file.synced == rows.written == 40
+
+
+def test_a_row_without_images_is_written_at_once_and_after_those_that_wait(tmp_path, file):
+    rows = DurableRows(file)
+    rows.append(b"0", [])
+    assert list(file.rows) == [b"0"]
+    for number in range(1, 5):
+        rows.append(b"%d" % number, [str(image(tmp_path, number))] if number % 2 else [])
+    rows.commit()
+    assert list(file.rows) == [b"%d" % number for number in range(5)]
+
+
+class Clock:
+    """Time that passes when it is told to, and while images are forced to the disk."""
+
+    def __init__(self, sync_s):
+        self.now, self.sync_s = 100.0, sync_s
+
+    def monotonic(self):
+        return self.now
+
+    def sync(self, images, folders):
+        self.now += self.sync_s
+
+
+@pytest.mark.parametrize(
+    ("sync_s", "wait_s"),
+    [(10.0, 1.0), (0.005, 0.5)],
+    ids=["a second at most", "100 times what the sync took"],
+)
+def test_a_row_waits_so_long_for_the_others_of_its_group(monkeypatch, file, sync_s, wait_s):
+    clock = Clock(sync_s)
+    monkeypatch.setattr(durable_rows, "time", clock)
+    monkeypatch.setattr(durable_rows, "sync_files", clock.sync)
+    rows = DurableRows(file)
+    rows.append(b"0", ["0.png"])
+    assert list(file.rows) == [b"0"]
+    start = clock.now
+    for share, written in ((0.0, 1), (0.98, 1), (1.02, 4)):
+        clock.now = start + share * wait_s
+        rows.append(b"%g" % (share + 1), ["1.png"])
+        assert len(file.rows) == written
+
+
+def test_a_group_ends_early_when_it_has_many_images(monkeypatch, file):
+    clock = Clock(10.0)
+    monkeypatch.setattr(durable_rows, "time", clock)
+    monkeypatch.setattr(durable_rows, "sync_files", clock.sync)
+    rows = DurableRows(file)
+    for number in range(1 + 512):
+        assert len(file.rows) == min(number, 1)
+        rows.append(b"%d" % number, ["image.png"])
+    assert len(file.rows) == 513
+
+
+@pytest.fixture
+def finished(tmp_path):
+    write_maps(tmp_path / "maps", 6)
+    (tmp_path / "maps" / "frame3.png").write_bytes(b"no map")
+    assert rollcli("estimate", "maps", "-o", "rolls.csv", *IMAGES, cwd=tmp_path).status == 3
+    return tmp_path
+
+
+def resume(folder, *arguments):
+    return rollcli("estimate", "maps", "-o", "rolls.csv", *IMAGES, "--resume", *arguments, cwd=folder)
+
+
+@pytest.mark.parametrize("jobs", ["-j1", "-j2"])
+@pytest.mark.parametrize("rows", [6, 4])
+def test_a_resume_makes_missing_and_empty_images_of_kept_rows_again(finished, rows, jobs):
+    before = contents(finished)
+    lines = (finished / "rolls.csv").read_bytes().splitlines(keepends=True)
+    (finished / "rolls.csv").write_bytes(b"".join(lines[: rows + 1]))
+    (finished / "up" / "frame0.png").unlink()
+    (finished / "v" / "frame1.png").write_bytes(b"")
+    kept = (finished / "up" / "frame2.png").stat().st_mtime_ns
+    done = resume(finished, jobs)
+    assert done.status == 3
+    assert "images are missing or empty for 2 of the kept rows" in done.err
+    assert contents(finished) == before
+    assert (finished / "up" / "frame2.png").stat().st_mtime_ns == kept
+
+
+def test_a_dry_run_of_a_resume_lists_images_that_are_missing(finished):
+    assert [line for line in resume(finished, "--dry-run").out.splitlines() if "frame" in line] == []
+    (finished / "up" / "frame4.png").unlink()
+    assert "write up/frame4.png" in resume(finished, "--dry-run").out.splitlines()
+
+
+def test_images_that_cannot_be_made_again_end_the_resume_with_one_line(finished):
+    state = (finished / "maps" / "frame0.png").stat()
+    size = (finished / "maps" / "frame0.png").stat().st_size
+    (finished / "maps" / "frame0.png").write_bytes(b"x" * size)
+    os.utime(finished / "maps" / "frame0.png", ns=(state.st_atime_ns, state.st_mtime_ns))
+    (finished / "up" / "frame0.png").unlink()
+    done = resume(finished)
+    assert done.status == 1
+    assert "the images of maps/frame0.png cannot be made again: is text; " in done.err

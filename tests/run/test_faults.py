@@ -1,0 +1,332 @@
+"""Full disks, lost files, dead workers, closed pipes: the documented status, one line, and nothing lost."""
+
+import os
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from rollcli.files.results import parse_rows
+from tests.run_cli import ROOT, command, contents, environment, holding, rollcli, wait_until, write_maps
+
+FRAMES = 12
+
+
+@pytest.fixture
+def maps(tmp_path):
+    write_maps(tmp_path / "maps", FRAMES)
+    return tmp_path
+
+
+def one_line(done):
+    """The only line of an error."""
+    assert done.err.count("\n") == 1
+    return done.err
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_a_full_device_ends_the_run_with_status_1(maps, jobs):
+    done = rollcli("estimate", "maps", "-o", "/dev/full", "-q", "-j", jobs, cwd=maps)
+    assert done.status == 1
+    assert "/dev/full: cannot be written: no space left on device" in one_line(done)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
+def test_a_full_standard_output_ends_the_run_with_status_1(maps):
+    line = command("estimate", "maps", "-q")
+    with Path("/dev/full").open("wb") as full:
+        done = subprocess.run(
+            line, cwd=maps, env=environment(), stdout=full, stderr=subprocess.PIPE, check=False
+        )
+    assert done.returncode == 1
+    assert done.stderr.decode() == "rollcli: standard output: cannot be written: no space left on device\n"
+
+
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_a_result_that_may_not_grow_keeps_its_whole_rows_and_is_resumed_later(maps, jobs):
+    write_maps(maps / "maps", 40)
+    arguments = ("estimate", "maps", "-o", "rolls.csv", "-q", "-j", jobs)
+    rollcli("estimate", "maps", "-o", "whole.csv", "-q", cwd=maps)
+    whole = (maps / "whole.csv").read_bytes()
+    limited = subprocess.run(
+        command(*arguments),
+        cwd=maps,
+        env=environment(PYTHONDONTWRITEBYTECODE="1"),  # it would keep the first 4,000 bytes of each module
+        capture_output=True,
+        text=True,
+        check=False,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (4000, 4000)),
+    )
+    assert limited.returncode == 1
+    assert "rolls.csv" in limited.stderr
+    assert limited.stderr.count("\n") == 1
+    kept = (maps / "rolls.csv").read_bytes()
+    assert whole.startswith(kept)
+    assert kept.endswith(b"\n")
+    assert rollcli(*arguments, "--resume", cwd=maps).status == 0
+    assert (maps / "rolls.csv").read_bytes() == whole
+
+
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_a_full_disk_of_images_keeps_the_rows_before_it(maps, jobs):
+    disk = maps / "disk"
+    disk.mkdir()
+    # room for more than the eight images that two workers may be ahead of the first row with
+    mount = ["mount", "-t", "tmpfs", "-o", "size=200k", "tmpfs", disk]
+    mounted = subprocess.run(mount, capture_output=True, check=False)
+    if mounted.returncode:
+        pytest.skip("a small file system cannot be mounted here")
+    try:
+        arguments = ("estimate", "maps", "-o", "rolls.csv", "-q", "-j", jobs, "--derotated", "disk/upright")
+        done = rollcli(*arguments, cwd=maps)
+        assert done.status == 1
+        assert "no space left" in one_line(done)
+        rows = (maps / "rolls.csv").read_text().splitlines()[1:]
+        assert 0 < len(rows) < FRAMES
+        for row in rows:
+            name = row.split(",")[0].removeprefix("maps/")
+            assert (disk / "upright" / name).stat().st_size > 0
+        subprocess.run(["mount", "-o", "remount,size=8m", disk], check=True)
+        assert rollcli(*arguments, "--resume", cwd=maps).status == 0
+        assert len(contents(disk)) == FRAMES
+    finally:
+        subprocess.run(["umount", disk], check=True)
+
+
+def test_an_output_folder_that_cannot_be_made_ends_the_run_with_status_1(maps):
+    (maps / "file").touch()
+    done = rollcli("estimate", "maps", "-o", "file/rolls.csv", cwd=maps)
+    assert (done.status, "file/rolls.csv: cannot be written" in one_line(done)) == (1, True)
+    done = rollcli("estimate", "maps", "-q", "--derotated", "file/upright", cwd=maps)
+    assert (done.status, "cannot be written" in one_line(done)) == (1, True)
+
+
+def test_an_output_that_is_a_folder_ends_the_run_with_status_1(maps):
+    (maps / "out").mkdir()
+    done = rollcli("estimate", "maps", "-o", "out", cwd=maps)
+    assert (done.status, "out: cannot be written: is a directory" in one_line(done)) == (1, True)
+
+
+@pytest.mark.parametrize(("jobs", "moved"), [("1", True), ("2", False)])
+def test_a_result_that_is_moved_or_removed_while_running_ends_the_run_with_status_1(maps, jobs, moved):
+    write_maps(maps / "maps", 300)
+    run = subprocess.Popen(
+        command("estimate", "maps", "-o", "rolls.csv", "-q", "-j", jobs),
+        cwd=maps,
+        env=environment(),
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    result = maps / "rolls.csv"
+    wait_for_bytes(result, 2000)
+    if moved:
+        result.rename(maps / "moved.csv")
+    else:
+        result.unlink()
+    _, err = run.communicate(timeout=60)
+    assert run.returncode == 1
+    assert err == "rollcli: rolls.csv: was moved or removed while this run was writing it\n"
+    assert not result.exists()
+
+
+def test_a_map_that_vanishes_while_running_costs_its_row(maps):
+    gone = maps / "maps" / "frame11.png"
+    code = f"""
+import pathlib, sys
+import rollcli.run.estimate as run
+plan = run.make_plan
+def planned(options):
+    made = plan(options)
+    pathlib.Path({str(gone)!r}).unlink()
+    return made
+run.make_plan = planned
+sys.argv = ["rollcli", "estimate", "maps", "-j1"]
+from rollcli.__main__ import main
+main()
+"""
+    line = [sys.executable, "-c", code]
+    done = subprocess.run(line, cwd=maps, env=environment(), capture_output=True, text=True, check=False)
+    assert done.returncode == 3
+    assert done.stdout.splitlines()[-1].endswith(",no such file")
+    assert done.stdout.count(",ok,") == FRAMES - 1
+
+
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_a_closed_pipe_ends_the_run_quietly(maps, jobs):
+    run = subprocess.Popen(
+        command("estimate", "maps", "-j", jobs, "-q"),
+        cwd=maps,
+        env=environment(),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
+    run.stdout.readline()
+    run.stdout.close()
+    err = run.stderr.read()
+    run.stderr.close()
+    assert run.wait(60) == 0
+    assert err == b""
+
+
+def test_a_closed_standard_output_is_an_error_in_one_line(maps):
+    line = " ".join(command("estimate", "maps", "-q")) + " >&-"
+    done = subprocess.run(
+        ["sh", "-c", line], cwd=maps, env=environment(), capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 1
+    assert done.stderr == "rollcli: standard output: is closed\n"
+
+
+# Python imports sitecustomize as it starts: in a worker, reading certain maps then kills it
+SITECUSTOMIZE = """
+import os, pathlib, signal, sys
+if "spawn_main" in " ".join(sys.orig_argv):
+    import rollcli.files.formats as formats
+    read = formats.read_stored
+    def read_stored(path, name=None):
+        deaths = list(pathlib.Path(".").glob(f"died-of-{pathlib.Path(path).stem}-*"))
+        if pathlib.Path(path).stem in DEADLY and len(deaths) < TIMES:
+            pathlib.Path(f"died-of-{pathlib.Path(path).stem}-{os.getpid()}").touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        return read(path, name)
+    formats.read_stored = read_stored
+"""
+
+
+ESTIMATE = ("estimate", "maps", "-j2", "-o", "rolls.csv", "-q")
+
+
+def run_with_deaths(maps, deadly, times, arguments=ESTIMATE):
+    """A run in which reading certain frames kills the worker, so many times each."""
+    (maps / "hook").mkdir()
+    settings = f"DEADLY, TIMES = {deadly!r}, {times}\n"
+    (maps / "hook" / "sitecustomize.py").write_text(settings + SITECUSTOMIZE)
+    path = os.pathsep.join([str(maps / "hook"), str(ROOT)])
+    return rollcli(*arguments, cwd=maps, PYTHONPATH=path)
+
+
+def test_a_worker_that_dies_once_costs_nothing(maps):
+    rollcli("estimate", "maps", "-o", "undisturbed.csv", "-q", cwd=maps)
+    done = run_with_deaths(maps, ["frame3", "frame8"], 1)
+    assert done.status == 0
+    assert len(list(maps.glob("died-of-*"))) == 2
+    assert (maps / "rolls.csv").read_bytes() == (maps / "undisturbed.csv").read_bytes()
+
+
+def test_a_frame_that_kills_its_worker_twice_is_an_error_row_and_the_batch_goes_on(maps):
+    done = run_with_deaths(maps, ["frame3"], 99)
+    assert done.status == 3
+    assert len(list(maps.glob("died-of-*"))) == 2
+    rows = list(parse_rows((maps / "rolls.csv").read_bytes(), "rolls.csv"))
+    assert len(rows) == FRAMES
+    assert [(row.file, row.message) for row in rows if row.status == "error"] == [
+        ("maps/frame3.png", "its worker died twice: killed for memory, perhaps, or crashed")
+    ]
+
+
+def test_a_map_that_kills_its_worker_twice_is_not_derotated_and_the_others_are(maps):
+    (maps / "out").mkdir()
+    (maps / "out" / "frame3.png").write_text("of an earlier run")
+    line = ("derotate", "maps", "-j2", "--roll", "2", "-o", "out", "--overwrite")
+    done = run_with_deaths(maps, ["frame3"], 99, line)
+    assert done.status == 3
+    assert "maps/frame3.png: its worker died twice: killed for memory, perhaps, or crashed" in done.err
+    assert sorted(contents(maps / "out")) == sorted(f"frame{n}.png" for n in range(FRAMES) if n != 3)
+
+
+# the first worker that gives an image of a certain frame its name dies just before or after it
+DEADLY_NAMES = """
+import os, pathlib, signal, sys
+if "spawn_main" in " ".join(sys.orig_argv):
+    def deadly(give_name):
+        def give(source, target, **options):
+            first = FRAME in str(target) and not pathlib.Path("died").exists()
+            if first:
+                pathlib.Path("died").touch()
+            if not first or AFTER:
+                give_name(source, target, **options)
+            if first:
+                os.kill(os.getpid(), signal.SIGKILL)
+        return give
+    os.link, os.replace, os.rename = map(deadly, (os.link, os.replace, os.rename))
+"""
+WRITE_IMAGES = {
+    "estimate": ("frame3", "estimate maps -o out/rolls.csv --derotated out/up --vdisparity out/v"),
+    "derotate": ("frame3", "derotate maps --roll 2 -o out"),
+    "simulate": ("frame_0002", "simulate out --frames 3 --size 64x48"),
+}
+
+
+@pytest.mark.parametrize(("name", "after"), [*((each, False) for each in WRITE_IMAGES), ("estimate", True)])
+def test_a_worker_that_dies_while_it_writes_an_image_leaves_nothing_behind(maps, name, after):
+    frame, line = WRITE_IMAGES[name]
+    (maps / "out").mkdir()
+    assert rollcli(*line.split(), "-j1", cwd=maps).status == 0
+    expected = contents(maps / "out")
+    shutil.rmtree(maps / "out")
+    (maps / "out").mkdir()
+    (maps / "hook").mkdir()
+    (maps / "hook" / "sitecustomize.py").write_text(f"FRAME, AFTER = {frame!r}, {after}\n{DEADLY_NAMES}")
+    path = os.pathsep.join([str(maps / "hook"), str(ROOT)])
+
+    done = rollcli(*line.split(), "-j2", cwd=maps, PYTHONPATH=path)
+
+    assert (maps / "died").exists()
+    assert done.status == 0, done.err
+    assert contents(maps / "out") == expected
+
+
+def cannot_start(maps, **how):
+    """The one line of a run whose two workers cannot start."""
+    line = command("estimate", "maps", "-j2", "-o", "rolls.csv", "-q")
+    done = subprocess.run(line, cwd=maps, capture_output=True, text=True, check=False, **how)
+    assert done.returncode == 1
+    assert done.stderr.startswith("rollcli: a worker process cannot start: ")
+    assert done.stderr.endswith("; try fewer of them, with --jobs\n")
+    assert done.stderr.count("\n") == 1
+    assert (maps / "rolls.csv").read_bytes().count(b"\n") == 1  # no frame has to answer for it
+    return done.stderr
+
+
+def test_too_few_open_files_for_workers_end_the_run_in_one_line(maps):
+    limit = partial(resource.setrlimit, resource.RLIMIT_NOFILE, (14, 14))
+    assert "Too many open files" in cannot_start(maps, env=environment(), preexec_fn=limit)
+
+
+def test_a_worker_that_cannot_load_its_libraries_ends_the_run_in_one_line(maps):
+    hook = "import sys\nif 'spawn_main' in ' '.join(sys.orig_argv): sys.modules['cv2'] = None\n"
+    (maps / "hook").mkdir()
+    (maps / "hook" / "sitecustomize.py").write_text(hook)
+    path = os.pathsep.join([str(maps / "hook"), str(ROOT)])
+    assert "cv2" in cannot_start(maps, env=environment(PYTHONPATH=path))
+
+
+def test_workers_end_with_a_run_that_is_killed_also_in_the_middle_of_a_frame(maps):
+    run = subprocess.Popen(
+        command("estimate", "maps", "-j2", "-o", "rolls.csv", "-q"),
+        cwd=maps,
+        env=holding(maps, "frame8"),
+        start_new_session=True,
+    )
+    wait_until((maps / "has-begun").exists)
+    run.kill()
+    run.wait()
+    wait_until(lambda: not alive_in_group(run.pid))
+
+
+def wait_for_bytes(result, size):
+    wait_until(lambda: result.exists() and result.stat().st_size > size)
+
+
+def alive_in_group(group):
+    try:
+        os.killpg(group, signal.SIGCONT)
+    except ProcessLookupError:
+        return False
+    return True

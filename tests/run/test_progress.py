@@ -1,0 +1,133 @@
+"""Counts, lines and the exit status of a run."""
+
+import pytest
+
+from rollcli.errors import ExitStatus
+from rollcli.files.results import Row
+from rollcli.run.frame import Frame, FrameResult, failed_frame, named_message
+from rollcli.run.options import EncodingOptions, RunningOptions
+from rollcli.run.progress import Progress, RigAlignment
+
+GUESSED = EncodingOptions()
+
+
+def progress(total=3, encoding=GUESSED, **running):
+    return Progress(total, RunningOptions(**running), encoding)
+
+
+def result(status="ok", message="", **values):
+    return FrameResult(Row("a.png", status=status, message=message), **values)
+
+
+@pytest.fixture
+def lines(capsys):
+    return lambda: capsys.readouterr().err.splitlines()
+
+
+def test_it_counts_kept_and_new_rows_by_status(lines):
+    counted = progress(4)
+    counted.keep({"ok": 1, "suspect": 1}, RigAlignment())
+    counted.add(result())
+    counted.add(result("suspect"))
+    assert counted.done == 4
+    assert counted.totals == {"frames": 4, "ok": 2, "suspect": 2, "error": 0}
+    assert counted.summary().startswith("4 frames (2 kept): 2 ok, 2 suspect, 0 failed; ")
+    assert lines() == []
+
+
+def test_the_exit_status_says_whether_a_frame_failed(lines):
+    counted = progress()
+    counted.add(result("suspect"))
+    assert counted.status is ExitStatus.DONE
+    counted.add(result("error", "is no map"))
+    assert counted.status is ExitStatus.FRAMES_FAILED
+    assert lines() == ["rollcli: a.png: is no map"]
+
+
+def test_a_cause_is_said_once_and_at_the_end_for_how_many_frames(lines):
+    counted = progress(quiet=True)
+    for name, message in [
+        ("a", "is empty"),
+        ("b", "only 37 valid pixels"),
+        ("c", "is empty"),
+        ("d", "only 5 valid pixels"),
+        ("e", "is text"),
+        ("f", "is empty"),
+    ]:
+        counted.add(FrameResult(Row(name, message=message)))
+    assert lines() == ["rollcli: a: is empty", "rollcli: b: only 37 valid pixels", "rollcli: e: is text"]
+    counted.tell_end()
+    assert lines() == ["rollcli: 3 frames: is empty", "rollcli: 2 frames, such as b: only 37 valid pixels"]
+
+
+def test_of_many_causes_the_first_five_are_said(lines):
+    counted = progress(quiet=True)
+    for cause in "abcdefg":
+        counted.add(FrameResult(Row("x", message=cause)))
+    counted.tell_end()
+    assert lines() == [
+        *(f"rollcli: x: {cause}" for cause in "abcde"),
+        "rollcli: 2 further frames: other causes, which -v names",
+    ]
+
+
+def test_a_verbose_run_names_every_failure(lines):
+    counted = progress(verbose=True)
+    for number in range(8):
+        counted.add(result("error", f"{number}"))
+    counted.tell_end()
+    assert [line for line in lines() if "a.png" in line] == [f"rollcli: a.png: {n}" for n in range(8)]
+
+
+PAIR = Frame("left/a.png", "right/a.png", "left/a.png", "right/a.png", "a.png", None)
+MAP = Frame("a.png", "", "a.png", "", "a.png", None)
+
+
+@pytest.mark.parametrize(
+    ("frame", "reason", "message", "said"),
+    [
+        (MAP, "a.png: is empty", "is empty", "a.png: is empty"),
+        (MAP, "no road", "no road", "a.png: no road"),
+        (MAP, "a.png.tif: is empty", "a.png.tif: is empty", "a.png: a.png.tif: is empty"),
+        (PAIR, "left/a.png: is empty", "left image: is empty", "left/a.png: is empty"),
+        (PAIR, "right/a.png: is empty", "right image: is empty", "right/a.png: is empty"),
+        (PAIR, "no road", "no road", "left/a.png: no road"),
+    ],
+)
+def test_a_row_does_not_repeat_its_file_and_stderr_names_it(frame, reason, message, said):
+    row = failed_frame(frame, reason).row
+    assert (row.message, named_message(row)) == (message, said)
+
+
+def test_how_numbers_were_read_is_said_once_unless_it_was_given(lines):
+    found, given = progress(), progress(encoding=EncodingOptions(encoding="kitti"))
+    for _ in range(2):
+        found.add(result(encoding="kitti"))
+        given.add(result(encoding="kitti"))
+    assert lines() == ["rollcli: a.png: read as kitti (stored / 256)"]
+
+
+def test_a_quiet_run_says_errors_alone(lines):
+    counted = progress(quiet=True, verbose=True)
+    counted.add(result("suspect", "is doubtful", encoding="px", warning="may be wrong", searched=(0, 63)))
+    counted.note(counted.summary())
+    counted.detail("a detail")
+    assert lines() == []
+    counted.say("an error")
+    assert lines() == ["rollcli: an error"]
+
+
+def test_doubts_are_said_when_verbose(lines):
+    counted = progress(verbose=True)
+    counted.add(result("suspect", "is doubtful"))
+    assert lines() == ["rollcli: a.png: suspect: is doubtful"]
+
+
+def test_the_last_line_is_the_summary_and_a_quiet_run_has_none(lines):
+    for quiet in (False, True):
+        counted = progress(2, quiet=quiet)
+        counted.add(result())
+        counted.tell_end()
+        assert [line.partition("; ")[0] for line in lines()] == [
+            "rollcli: 1 frame: 1 ok, 0 suspect, 0 failed"
+        ] * (not quiet)

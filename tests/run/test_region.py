@@ -1,0 +1,39 @@
+"""The pixels that --roi, --polygon and --mask allow."""
+
+import numpy as np
+import pytest
+
+from rollcli.run.options import FrameOptions, RegionOptions
+from rollcli.run.read import region_mask
+
+SHAPE = (120, 160)
+
+
+def allowed(*corners):
+    """The pixels inside a polygon."""
+    options = FrameOptions(region=RegionOptions(polygon=tuple(corners)))
+    return region_mask(None, options, SHAPE)
+
+
+@pytest.mark.parametrize("far", [1e5, 1e9, 1e300, 1.7e308])
+def test_a_polygon_may_reach_as_far_as_it_likes(far):
+    v, u = np.mgrid[: SHAPE[0], : SHAPE[1]]
+
+    assert allowed((-far, -far), (far, -far), (far, far), (-far, far)).all()
+    np.testing.assert_array_equal(allowed((80, -far), (far, -far), (far, far), (80, far)), u >= 80)
+    np.testing.assert_array_equal(allowed((-far, 60), (far, 60), (far, far), (-far, far)), v >= 60)
+
+
+@pytest.mark.parametrize("far", [1e6, 1e9, 1e300, 1.7e308])
+def test_a_slanted_side_that_reaches_far_keeps_its_place(far):
+    v, u = np.mgrid[: SHAPE[0], : SHAPE[1]]
+    found = allowed((-far, -far), (far, far), (-far, far))
+
+    assert found[v > u].all()
+    assert not found[v < u].any()
+    np.testing.assert_array_equal(allowed((0, 0), (far, 0), (far, far)), v <= u)
+
+
+def test_a_polygon_that_lies_elsewhere_is_said_to_leave_nothing():
+    with pytest.raises(Exception, match="no pixel of this 160x120 map lies inside"):
+        allowed((1e9, 1e9), (2e9, 1e9), (2e9, 2e9))

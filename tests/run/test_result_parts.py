@@ -1,0 +1,89 @@
+"""A result of parts in a folder: what is in the way, damaged, or left by a run that was killed."""
+
+import pytest
+
+from rollcli.errors import OutputError
+from rollcli.run import parts as result_parts
+from tests.run_cli import contents, leave_half, rollcli, write_maps
+
+
+@pytest.fixture
+def parts(tmp_path):
+    """A whole result of three parts, and the command that made it."""
+    pytest.importorskip("pyarrow", reason="pyarrow, of the extra parquet, is not here")
+    line = ("estimate", "maps", "-o", "rolls.parquet", "--part-rows", "2")
+    write_maps(tmp_path / "maps", 6)
+    assert rollcli(*line, cwd=tmp_path).status == 0
+    return tmp_path, line
+
+
+@pytest.mark.parametrize("half_written", ["part-00001.parquet", "part-00002.parquet"])
+@pytest.mark.parametrize("flag", ["--resume", "--overwrite"])
+def test_half_a_part_of_a_killed_run_is_removed(parts, half_written, flag):
+    folder, line = parts
+    whole = contents(folder)
+    (folder / "rolls.parquet" / "part-00002.parquet").unlink()
+    leave_half(folder / "rolls.parquet" / half_written)
+    assert len(contents(folder)) == len(whole)
+
+    assert rollcli(*line, flag, cwd=folder).status == 0
+
+    assert contents(folder) == whole
+
+
+@pytest.mark.parametrize("flags", [(), ("--dry-run",)])
+def test_parts_that_exist_are_kept_unless_told_otherwise(parts, flags):
+    folder, line = parts
+    whole = contents(folder)
+    done = rollcli(*line, *flags, cwd=folder)
+    assert done.status == 2
+    assert done.err == (
+        "rollcli: rolls.parquet: exists already; give --resume to continue it or --overwrite to replace it\n"
+    )
+    assert contents(folder) == whole
+
+
+def test_a_file_in_the_place_of_the_folder_is_refused(parts):
+    folder, line = parts
+    (folder / "other.parquet").write_bytes(b"mine")
+    done = rollcli(*line, "-o", "other.parquet", "--overwrite", cwd=folder)
+    assert (done.status, (folder / "other.parquet").read_bytes()) == (2, b"mine")
+    assert "other.parquet: is a file; a result of parts is a folder" in done.err
+
+
+@pytest.mark.parametrize(
+    ("damaged", "words"),
+    [
+        ("rolls.parquet/part-00001.parquet", "rolls.parquet/part-00001.parquet: is damaged"),
+        ("rolls.parquet.run.json", "rolls.parquet.run.json"),
+    ],
+)
+def test_damaged_parts_are_not_resumed(parts, damaged, words):
+    folder, line = parts
+    (folder / damaged).write_bytes((folder / damaged).read_bytes()[:-20])
+    before = contents(folder)
+    done = rollcli(*line, "--resume", cwd=folder)
+    assert (done.status, done.err.count("\n")) == (2, 1)
+    assert words in done.err
+    assert contents(folder) == before
+
+
+def test_a_full_disk_keeps_the_parts_before_it_and_says_how_to_go_on(parts, monkeypatch):
+    folder, line = parts
+    whole = contents(folder)
+    for number in (1, 2):
+        (folder / "rolls.parquet" / f"part-0000{number}.parquet").unlink()
+
+    def no_room(location, data, run):
+        raise OutputError(f"{location}: cannot be written: no space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(result_parts, "create", no_room)
+        done = rollcli(*line, "--resume", cwd=folder)
+    assert done.status == 1
+    assert done.err.endswith(
+        "rollcli: rolls.parquet/part-00001.parquet: cannot be written: no space left on device; "
+        "2 rows are kept, continue with --resume\n"
+    )
+    assert rollcli(*line, "--resume", cwd=folder).status == 0
+    assert contents(folder) == whole

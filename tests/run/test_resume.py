@@ -1,0 +1,450 @@
+"""What survives when a run is killed, interrupted or started twice."""
+
+import json
+import os
+import shlex
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+from rollcli.files.results import parse_rows
+from rollcli.run.result_file import whole_rows
+from tests.run_cli import command, contents, environment, road_map, rollcli, write_kitti, write_maps
+
+FRAMES = 40
+IMAGES = ("--derotated", "upright", "--vdisparity", "v")
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory):
+    """A folder of maps with the result and images of a run that nothing disturbed."""
+    folder = tmp_path_factory.mktemp("undisturbed")
+    write_maps(folder / "maps", FRAMES, width=300, height=200)
+    (folder / "maps" / "frame7.png").write_bytes(b"no map")
+    assert rollcli("estimate", "maps", "-o", "rolls.csv", *IMAGES, cwd=folder).status == 3
+    return folder
+
+
+@pytest.fixture
+def folder(undisturbed, tmp_path):
+    """The same maps, and nothing else."""
+    (tmp_path / "maps").symlink_to(undisturbed / "maps")
+    return tmp_path
+
+
+def results(folder):
+    """Everything but the maps."""
+    return {name: data for name, data in contents(folder).items() if not name.startswith("maps/")}
+
+
+def start(folder, *arguments):
+    """A run in a process group of its own, as a shell would start it."""
+    return subprocess.Popen(
+        command("estimate", "maps", "-o", "rolls.csv", *IMAGES, *arguments),
+        cwd=folder,
+        env=environment(),
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+
+
+def wait_for_rows(folder, count, run, name="rolls.csv"):
+    """Until so many rows are there."""
+    result, give_up = folder / name, time.monotonic() + 60
+    while run.poll() is None and not (result.exists() and result.read_bytes().count(b"\n") > count):
+        assert time.monotonic() < give_up
+        time.sleep(0.002)
+
+
+def wait_for_images(folder, count, run):
+    """Until so many frames are done: rows with images follow theirs in groups, up to a second later."""
+    images, give_up = folder / "upright", time.monotonic() + 60
+    while run.poll() is None and not (images.exists() and len(list(images.glob("*.png"))) >= count):
+        assert time.monotonic() < give_up
+        time.sleep(0.002)
+
+
+def kill(run):
+    run.kill()
+    run.wait()
+    run.stderr.close()
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_a_run_killed_again_and_again_ends_in_the_same_bytes_and_leaves_nothing_else(
+    undisturbed, folder, jobs
+):
+    for rows in (0, 9, 21):
+        run = start(folder, "-j", str(jobs), *(["--resume"] if rows else []))
+        wait_for_rows(folder, rows, run)
+        kill(run)
+    done = rollcli("estimate", "maps", "-o", "rolls.csv", *IMAGES, "--resume", cwd=folder)
+    assert done.status == 3
+    assert results(folder) == results(undisturbed)
+
+
+def test_a_half_written_last_line_is_dropped_on_resume(undisturbed, folder):
+    whole = (undisturbed / "rolls.csv").read_bytes()
+    for name, data in results(undisturbed).items():
+        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / name).write_bytes(data)
+    (folder / "rolls.csv").write_bytes(whole[: len(whole) // 2])
+    assert rollcli("estimate", "maps", "-o", "rolls.csv", *IMAGES, "--resume", cwd=folder).status == 3
+    assert results(folder) == results(undisturbed)
+
+
+def test_resume_does_not_do_again_what_is_done(undisturbed, folder):
+    run = start(folder, "-j1")
+    wait_for_rows(folder, 10, run)
+    kill(run)
+    before = {path: path.stat().st_mtime_ns for path in (folder / "upright").iterdir()}
+    done = (folder / "rolls.csv").read_text().splitlines()[1:-1]
+    rollcli("estimate", "maps", "-o", "rolls.csv", *IMAGES, "--resume", cwd=folder)
+    for line in done:
+        path = folder / "upright" / line.split(",")[0].removeprefix("maps/")
+        assert line.split(",")[2] == "error" or path.stat().st_mtime_ns == before[path]
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_ctrl_c_keeps_what_is_done_and_prints_the_command_that_resumes(undisturbed, folder, jobs):
+    run = start(folder, "-j", str(jobs))
+    wait_for_images(folder, 4, run)
+    os.killpg(run.pid, signal.SIGINT)  # a terminal sends it to the workers as well
+    _, err = run.communicate(timeout=60)
+    assert run.returncode == 130
+    assert "Traceback" not in err
+    line = err.splitlines()[-1].partition("continue with: ")[2]
+    assert line.startswith("rollcli estimate maps -o rolls.csv")
+    assert rollcli(*shlex.split(line)[1:], cwd=folder).status == 3
+    assert results(folder) == results(undisturbed)
+
+
+def test_the_command_that_resumes_can_be_pasted_whatever_its_words_are(undisturbed, tmp_path):
+    program = tmp_path / "bin" / "rollcli"
+    program.parent.mkdir()
+    program.write_text(f'#!/bin/sh\nexec {shlex.join(command())} "$@"\n')
+    program.chmod(0o755)
+    folder = '-it\'s "mine"'
+    (tmp_path / folder).symlink_to(undisturbed / "maps")
+    (tmp_path / "a b.toml").write_text("overwrite = true\nseed = 3\n")
+    path = os.pathsep.join([str(program.parent), os.environ["PATH"]])
+    settings = {"ROLLCLI_ESTIMATE_INVALID": "5 6", "ROLLCLI_ESTIMATE_TIMING": "0"}
+    run = subprocess.Popen(
+        command("estimate", "-o", "my rolls.csv", "--config", "a b.toml", "--", folder),
+        cwd=tmp_path,
+        env=environment(PATH=path, ROLLCLI_ESTIMATE_ROAD="all", **settings),
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    wait_for_rows(tmp_path, 4, run, "my rolls.csv")
+    run.send_signal(signal.SIGINT)
+    _, err = run.communicate(timeout=60)
+    assert run.returncode == 130
+    line = err.splitlines()[-1].partition("continue with: ")[2]
+    pasted = subprocess.run(
+        ["sh", "-c", line],
+        cwd=tmp_path,
+        env=environment(PATH=path),  # what was set for one command is no longer there
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert pasted.returncode == 3, pasted.stderr
+    assert "kept" in pasted.stderr
+    assert (tmp_path / "my rolls.csv").read_bytes().count(b"\n") == FRAMES + 1
+
+
+def test_the_command_that_resumes_a_list_says_that_it_is_needed_again(undisturbed, tmp_path):
+    maps = sorted(map(str, (undisturbed / "maps").iterdir()))
+    with (tmp_path / "list").open("w") as names:
+        names.write("\n".join(maps))
+    with (tmp_path / "list").open() as names:
+        run = subprocess.Popen(
+            command("estimate", "-", "-o", "rolls.csv"),
+            cwd=tmp_path,
+            env=environment(),
+            stdin=names,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+    wait_for_rows(tmp_path, 4, run)
+    run.send_signal(signal.SIGINT)
+    _, err = run.communicate(timeout=60)
+    assert err.endswith("--resume  # with the same list on stdin\n")
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_ctrl_c_again_and_again_ends_at_once_in_one_piece(undisturbed, folder, jobs):
+    run = start(folder, "-j", str(jobs))
+    wait_for_images(folder, 4, run)
+    err = interrupt_until_it_ends(run)
+    assert "Traceback" not in err
+    assert "interrupted; continue with: rollcli estimate maps" in err
+    assert rollcli("estimate", "maps", "-o", "rolls.csv", *IMAGES, "--resume", cwd=folder).status == 3
+    assert results(folder) == results(undisturbed)
+
+
+def test_ctrl_c_twice_ends_a_run_whose_worker_has_been_stopped(folder):
+    run = start(folder, "-j2")
+    wait_for_images(folder, 4, run)
+    stopped = workers_of(run)[0]
+    os.kill(stopped, signal.SIGSTOP)
+    interrupt_until_it_ends(run)
+    assert run.returncode == 130
+    with pytest.raises(ProcessLookupError):
+        os.kill(stopped, 0)
+
+
+def interrupt_until_it_ends(run):
+    """Ctrl-C by someone without patience; what the run said."""
+    give_up = time.monotonic() + 60
+    while run.poll() is None:
+        assert time.monotonic() < give_up
+        run.send_signal(signal.SIGINT)
+        time.sleep(0.005)
+    return run.communicate()[1]
+
+
+def workers_of(run):
+    """The worker processes of a run, oldest first."""
+    listed = subprocess.run(
+        ["ps", "-A", "-ww", "-o", "ppid=,pid=,args="], capture_output=True, text=True, check=True
+    ).stdout.splitlines()
+    found = [line.split(None, 2) for line in listed]
+    return [int(pid) for parent, pid, args in found if int(parent) == run.pid and "spawn_main" in args]
+
+
+def test_sigterm_stops_a_run_as_ctrl_c_does(undisturbed, folder):
+    run = start(folder, "-j2")
+    wait_for_images(folder, 4, run)
+    run.terminate()
+    assert (run.communicate(timeout=60), run.returncode)[1] == 130
+    assert rollcli("estimate", "maps", "-o", "rolls.csv", *IMAGES, "--resume", cwd=folder).status == 3
+    assert results(folder) == results(undisturbed)
+
+
+def test_a_second_run_on_the_same_result_is_refused(folder, monkeypatch):
+    monkeypatch.setattr("rollcli.files.locking._PATIENCE_S", 0.1)
+    first = start(folder, "-j1")
+    wait_for_images(folder, 1, first)
+    first.send_signal(signal.SIGSTOP)
+    for flag in ("--resume", "--overwrite"):
+        done = rollcli("estimate", "maps", "-o", "rolls.csv", *IMAGES, flag, cwd=folder)
+        assert done.status == 2
+        assert "another run" in done.err
+        if Path("/proc/self/fd").exists():
+            assert f"(process {first.pid})" in done.err
+    first.send_signal(signal.SIGCONT)
+    first.communicate(timeout=60)
+    assert first.returncode == 3
+
+
+@pytest.fixture
+def interrupted(tmp_path):
+    """A result of 5 of 10 frames."""
+    write_maps(tmp_path / "maps", 10)
+    rollcli("estimate", "maps", "-o", "rolls.csv", cwd=tmp_path)
+    lines = (tmp_path / "rolls.csv").read_text().splitlines(keepends=True)
+    (tmp_path / "rolls.csv").write_text("".join(lines[:6]))
+    return tmp_path
+
+
+def refused(folder, *arguments):
+    """The one line that refuses to resume; the result stays as it was."""
+    before = (folder / "rolls.csv").read_bytes()
+    done = rollcli("estimate", "maps", "-o", "rolls.csv", "--resume", *arguments, cwd=folder)
+    assert done.status == 2
+    assert done.err.count("\n") == 1
+    assert (folder / "rolls.csv").read_bytes() == before
+    return done.err
+
+
+def test_a_resume_with_other_options_says_which(interrupted):
+    assert "--tolerance was 0.0001, is now 0.01" in refused(interrupted, "--tolerance", "0.01")
+    assert "--derotated was not given, is now upright" in refused(interrupted, "--derotated", "upright")
+
+
+def test_a_resume_by_another_version_says_which(interrupted):
+    record = interrupted / "rolls.csv.run.json"
+    record.write_text(record.read_text().replace('"rollcli": "', '"rollcli": "0.0.'))
+    assert "begun by rollcli 0.0." in refused(interrupted)
+
+
+def test_a_resume_with_changed_inputs_is_refused(interrupted):
+    write_kitti(interrupted / "maps" / "frame2.png", road_map(0.3))
+    assert "maps/frame2.png has changed since" in refused(interrupted)
+
+
+def test_a_resume_with_fewer_or_other_inputs_is_refused(interrupted):
+    (interrupted / "maps" / "frame9.png").unlink()
+    assert "10 frames, now there are 9" in refused(interrupted)
+    write_kitti(interrupted / "maps" / "frame10.png", road_map())
+    assert "the names of the inputs differ" in refused(interrupted)
+    (interrupted / "maps" / "frame3.png").unlink()
+    assert "maps/frame3.png, where now maps/frame4.png" in refused(interrupted)
+
+
+@pytest.mark.parametrize(("count", "shard"), [(7, []), (7, ["--shard", "2/2"]), (1, [])])
+def test_a_folder_that_has_grown_at_its_end_is_resumed_to_the_bytes_of_one_run(tmp_path, count, shard):
+    write_maps(tmp_path / "maps", count)
+    rollcli("estimate", "maps", "-o", "rolls.csv", *shard, cwd=tmp_path)
+    before = (tmp_path / "rolls.csv").read_bytes()
+    for index in (7, 8, 10):
+        write_kitti(tmp_path / "maps" / f"frame{index}.png", road_map(0.1, seed=index))
+    done = rollcli("estimate", "maps", "-o", "rolls.csv", "--resume", *shard, cwd=tmp_path)
+    assert done.status == 0
+    assert f"({len(before.splitlines()) - 1} kept)" in done.err
+    rollcli("estimate", "maps", "-o", "anew.csv", *shard, cwd=tmp_path)
+    assert (tmp_path / "rolls.csv").read_bytes() == (tmp_path / "anew.csv").read_bytes()
+    record = "rolls.csv.run.json"
+    assert (tmp_path / record).read_bytes() == (tmp_path / "anew.csv.run.json").read_bytes()
+
+
+def test_a_folder_that_has_grown_elsewhere_is_refused_and_says_what_to_do(interrupted):
+    write_kitti(interrupted / "maps" / "frame7a.png", road_map())
+    said = refused(interrupted)
+    assert "frames have been added that sort before others" in said
+    assert "estimate these into a result of their own" in said
+    write_kitti(interrupted / "maps" / "frame1a.png", road_map())
+    assert "maps/frame1a.png has been added and sorts before maps/frame2.png" in refused(interrupted)
+
+
+def test_a_folder_that_has_grown_and_changed_is_refused(interrupted):
+    write_kitti(interrupted / "maps" / "frame10.png", road_map())
+    write_kitti(interrupted / "maps" / "frame2.png", road_map(0.3))
+    assert "has changed since" in refused(interrupted)
+
+
+def test_a_resume_without_the_record_of_the_run_is_refused(interrupted):
+    (interrupted / "rolls.csv.run.json").unlink()
+    assert "rolls.csv.run.json" in refused(interrupted)
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("rollcli", None),
+        ("options", [1]),
+        ("inputs", "x"),
+        ("encoding", [1]),
+        ("disparities_searched_px", 5),
+    ],
+)
+def test_a_resume_with_a_damaged_record_is_refused(interrupted, key, value):
+    record = interrupted / "rolls.csv.run.json"
+    record.write_text(json.dumps({**json.loads(record.read_text()), key: value}))
+    assert "rolls.csv.run.json is damaged; --overwrite starts anew" in refused(interrupted)
+
+
+@pytest.mark.parametrize("text", ["", "{", "[" * 20_000, "[]"])
+def test_a_resume_with_a_record_that_is_none_is_refused(interrupted, text):
+    (interrupted / "rolls.csv.run.json").write_text(text)
+    assert "rolls.csv.run.json: is not" in (error := refused(interrupted))
+    assert error.endswith("; --overwrite starts anew\n")
+
+
+@pytest.mark.parametrize("data", [b"a,b\n1,2\n", b"my notes", b"\x89PNG", b"[1]"])
+def test_a_file_of_another_program_is_not_resumed(interrupted, data):
+    (interrupted / "rolls.csv").write_bytes(data)
+    assert "is not a result as rollcli estimate writes it" in refused(interrupted)
+
+
+@pytest.mark.parametrize("edit", [("file,", "\ufefffile,"), ("\n", "\r\n"), ("roll_deg", "Roll")])
+def test_a_result_that_an_editor_has_changed_is_not_resumed(interrupted, edit):
+    result = interrupted / "rolls.csv"
+    result.write_bytes(result.read_text().replace(*edit).encode())
+    assert "is not a result as rollcli estimate writes it" in refused(interrupted)
+
+
+def test_a_result_with_more_rows_than_frames_is_not_resumed(interrupted):
+    rollcli("estimate", "maps", "-o", "rolls.csv", "--resume", cwd=interrupted)
+    whole = (interrupted / "rolls.csv").read_text()
+    (interrupted / "rolls.csv").write_text(whole + whole.partition("\n")[2])
+    assert "it has 20 rows, and there are 10 frames" in refused(interrupted)
+
+
+@pytest.mark.parametrize("ending", ["csv", "jsonl"])
+def test_a_result_cut_anywhere_is_resumed_to_the_same_bytes(tmp_path, ending):
+    names = ['comma, "quote".png', "new\nline.png", "return\rhere.png", "umlaut ü.png", b"no text \xff.png"]
+    (tmp_path / "maps").mkdir()
+    for name in names:
+        (tmp_path / "maps" / os.fsdecode(name)).write_bytes(b"no map")
+    result = tmp_path / f"rolls.{ending}"
+    assert rollcli("estimate", "maps", "-o", result.name, cwd=tmp_path).status == 3
+    whole = result.read_bytes()
+    rows = list(parse_rows(whole, "whole"))
+    assert len(rows) == len(names)
+    for end in range(len(whole) + 1):
+        kept = whole_rows(whole[:end], ending)
+        assert list(parse_rows(kept, "kept")) == rows[: kept.count(b"error")] if kept else end < len(whole)
+    for end in (whole.index(b"ne.png") - 1, len(whole) - 2):
+        result.write_bytes(whole[:end])
+        assert rollcli("estimate", "maps", "-o", result.name, "--resume", cwd=tmp_path).status == 3
+        assert result.read_bytes() == whole
+
+
+def test_other_ways_to_run_do_not_hinder_a_resume(interrupted):
+    done = rollcli(
+        "estimate", "maps", "-o", "rolls.csv", "--resume", "-j2", "-v", "--fail-fast", cwd=interrupted
+    )
+    assert done.status == 0
+    assert (interrupted / "rolls.csv").read_text().count("\n") == 11
+
+
+def test_the_record_holds_version_options_encoding_conventions_and_counts(undisturbed):
+    record = json.loads((undisturbed / "rolls.csv.run.json").read_text())
+    assert record["counts"] == {"frames": FRAMES, "ok": FRAMES - 1, "suspect": 0, "error": 1}
+    assert record["encoding"] == ["kitti"]
+    assert record["options"]["method"] == "gd"
+    assert "counter-clockwise" in record["conventions"]["roll_deg"]
+
+
+def test_fail_fast_stops_at_the_first_failure_and_can_be_resumed(undisturbed, folder):
+    done = rollcli("estimate", "maps", "-o", "rolls.csv", *IMAGES, "--fail-fast", "-j2", cwd=folder)
+    rows = (folder / "rolls.csv").read_text().splitlines()
+    assert (done.status, len(rows)) == (3, 9)
+    rollcli("estimate", "maps", "-o", "rolls.csv", *IMAGES, "--resume", cwd=folder)
+    assert results(folder) == results(undisturbed)
+
+
+@pytest.mark.parametrize("flag", [[], ["--resume"], ["--overwrite"]])
+def test_an_empty_file_is_no_result(tmp_path, flag):
+    write_maps(tmp_path / "maps", 2)
+    (tmp_path / "rolls.csv").touch()
+    assert rollcli("estimate", "maps", "-o", "rolls.csv", *flag, cwd=tmp_path).status == 0
+
+
+def test_a_record_of_another_program_is_replaced_only_when_told_so(tmp_path):
+    write_maps(tmp_path / "maps", 1)
+    record = tmp_path / "rolls.csv.run.json"
+    for foreign in ("my notes", "[1]", '{"rollcli": 1}', "{}"):
+        record.write_text(foreign)
+        done = rollcli("estimate", "maps", "-o", "rolls.csv", cwd=tmp_path)
+        assert (done.status, record.read_text()) == (2, foreign)
+        assert "rolls.csv.run.json: exists already and is not the record of a run" in done.err
+        assert not (tmp_path / "rolls.csv").exists()
+    assert rollcli("estimate", "maps", "-o", "rolls.csv", "--overwrite", cwd=tmp_path).status == 0
+    (tmp_path / "rolls.csv").unlink()  # a record of an earlier run is ours
+    assert rollcli("estimate", "maps", "-o", "rolls.csv", cwd=tmp_path).status == 0
+
+
+def test_whole_rows_are_found_in_one_pass_behind_a_stray_quote():
+    row = b"maps/frame.png,,ok\n"
+
+    class Counted(bytes):
+        """Bytes that add up how many of them are searched for quotes."""
+
+        searched = 0
+
+        def count(self, sub, start=0, end=None):
+            end = len(self) if end is None else end
+            Counted.searched += end - start
+            return super().count(sub, start, end)
+
+    data = Counted(row * 50 + b'stray",' + row * 20_000)
+    assert whole_rows(data, "csv") == row * 50
+    assert Counted.searched < 3 * len(data)

@@ -1,0 +1,324 @@
+"""What failed is done again, and the result is the one of a run in which nothing failed."""
+
+import json
+import shutil
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+from rollcli.errors import OutputError, UsageError
+from rollcli.files.results import read_result
+from rollcli.files.storage import list_names, modified_ns, read_bytes, remove, write_bytes
+from rollcli.run import estimate as batch_run
+from rollcli.run import result_file as durable_rows
+from rollcli.run.estimate import estimate_frame
+from rollcli.run.result_file import ResultFile, open_result
+from tests.object_store import upload
+from tests.run_cli import command, contents, environment, road_map, rollcli, write_kitti, write_maps
+
+FRAMES = 12
+BROKEN = (2, 3, 9)
+COUNT = 30
+RETRY = ("--resume", "--retry-failed")
+
+
+@pytest.fixture(scope="module")
+def maps(tmp_path_factory):
+    """Whole maps that nobody changes."""
+    folder = tmp_path_factory.mktemp("whole")
+    write_maps(folder, FRAMES)
+    return folder
+
+
+@pytest.fixture
+def folder(maps, tmp_path):
+    """The same maps, some of them broken."""
+    shutil.copytree(maps, tmp_path / "maps")
+    for index in BROKEN:
+        (tmp_path / "maps" / f"frame{index}.png").write_bytes(b"no map")
+    return tmp_path
+
+
+def mend(folder, maps, *indices):
+    """Put whole maps in the place of broken ones, newer than any record."""
+    for index in indices:
+        name = f"frame{index}.png"
+        shutil.copyfile(maps / name, folder / "maps" / name)
+
+
+def made(folder):
+    """Every file that the program wrote."""
+    return {name: data for name, data in contents(folder).items() if not name.startswith("maps/")}
+
+
+def anew(folder, line):
+    """Everything that a run makes of these maps, written to the same names."""
+    kept = folder / "kept"
+    kept.mkdir()
+    for path in [each for each in folder.iterdir() if each.name not in ("maps", "kept")]:
+        path.rename(kept / path.name)
+    assert rollcli(*line, cwd=folder).status == 0
+    fresh = {name: data for name, data in made(folder).items() if not name.startswith("kept/")}
+    return fresh, contents(kept)
+
+
+@pytest.mark.parametrize("result", ["rolls.csv", "rolls.jsonl", "rolls.parquet"])
+def test_frames_whose_files_were_mended_end_in_the_bytes_of_a_run_without_failures(folder, maps, result):
+    if result.endswith("parquet"):
+        pytest.importorskip("pyarrow", reason="pyarrow, of the extra parquet, is not here")
+    line = ("estimate", "maps", "-o", result, "--derotated", "up", "--part-rows", "5")
+    assert rollcli(*line, cwd=folder).status == 3
+    mend(folder, maps, 2, 9)
+    once = rollcli(*line, *RETRY, cwd=folder)
+    assert (once.status, "(9 kept): 11 ok, 0 suspect, 1 failed" in once.err) == (3, True), once.err
+    before = {path: path.stat().st_ino for path in folder.glob("rolls.parquet/*")}
+    mend(folder, maps, 3)
+    twice = rollcli(*line, *RETRY, cwd=folder)
+    assert twice.status == 0, twice.err
+    changed = {path.name for path, inode in before.items() if path.stat().st_ino != inode}
+    assert changed <= {"part-00000.parquet"}
+    fresh, kept = anew(folder, line)
+    assert kept == fresh
+
+
+def test_what_fails_again_stays_as_it_was(folder):
+    line = ("estimate", "maps", "-o", "rolls.csv")
+    assert rollcli(*line, cwd=folder).status == 3
+    before = made(folder)
+    assert rollcli(*line, *RETRY, cwd=folder).status == 3
+    assert made(folder) == before
+
+
+def test_a_retry_that_is_interrupted_keeps_what_it_has_done_and_is_taken_up_again(folder, maps, monkeypatch):
+    line = ("estimate", "maps", "-o", "rolls.csv", "--derotated", "up")
+    assert rollcli(*line, cwd=folder).status == 3
+    mend(folder, maps, *BROKEN)
+
+    def interrupted(frame, options):
+        signal.raise_signal(signal.SIGINT)
+        return estimate_frame(frame, options)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(batch_run, "estimate_frame", interrupted)
+        done = rollcli(*line, *RETRY, cwd=folder)
+    assert done.status == 130
+    assert "interrupted; continue with: rollcli estimate maps" in done.err
+    statuses = [row.status for row in read_result(folder / "rolls.csv").rows]
+    assert [statuses[index] for index in BROKEN] == ["ok", "error", "error"]
+    assert rollcli(*line, *RETRY, cwd=folder).status == 0
+    fresh, kept = anew(folder, line)
+    assert kept == fresh
+
+
+def test_images_of_retried_frames_are_on_the_disk_before_their_rows(folder, maps, monkeypatch):
+    line = ("estimate", "maps", "-o", "rolls.csv", "--derotated", "up")
+    assert rollcli(*line, cwd=folder).status == 3
+    mend(folder, maps, *BROKEN)
+    events, sync_files, replace = [], durable_rows.sync_files, ResultFile.replace
+
+    def sync(images, folders):
+        events.extend(Path(each).name for each in images)
+        sync_files(images, folders)
+
+    def write(file, rows, form):
+        events.append(sorted(rows))
+        replace(file, rows, form)
+
+    monkeypatch.setattr(durable_rows, "sync_files", sync)
+    monkeypatch.setattr(ResultFile, "replace", write)
+    assert rollcli(*line, *RETRY, cwd=folder).status == 0
+    assert events == [*(f"frame{index}.png" for index in BROKEN), list(BROKEN)]
+
+
+def test_a_retry_that_may_not_fail_stops_at_the_first_failure(folder, maps):
+    line = ("estimate", "maps", "-o", "rolls.csv")
+    assert rollcli(*line, cwd=folder).status == 3
+    mend(folder, maps, 2, 9)
+    assert rollcli(*line, *RETRY, "--fail-fast", cwd=folder).status == 3
+    statuses = [row.status for row in read_result(folder / "rolls.csv").rows]
+    assert [statuses[index] for index in BROKEN] == ["ok", "error", "error"]
+
+
+def test_rows_whose_names_hold_newlines_and_quotes_keep_their_places(maps, tmp_path):
+    names = ['a "1".png', "b\n2.png", 'c,\n"3".png', "d.png"]
+    (tmp_path / "maps").mkdir()
+    for name in names:
+        (tmp_path / "maps" / name).write_bytes(b"no map")
+    line = ("estimate", "maps", "-o", "rolls.csv")
+    assert rollcli(*line, cwd=tmp_path).status == 3
+    shutil.copyfile(maps / "frame1.png", tmp_path / "maps" / names[2])
+    assert rollcli(*line, *RETRY, cwd=tmp_path).status == 3
+    retried = (tmp_path / "rolls.csv").read_bytes()
+    assert rollcli(*line, "--overwrite", cwd=tmp_path).status == 3
+    assert (tmp_path / "rolls.csv").read_bytes() == retried
+
+
+def test_a_retry_killed_at_any_time_loses_no_row_and_is_taken_up_again(tmp_path):
+    for index in range(COUNT):
+        (tmp_path / "maps").mkdir(exist_ok=True)
+        (tmp_path / "maps" / f"frame{index:02}.png").write_bytes(b"no map")
+    line = ("estimate", "maps", "-o", "rolls.csv", "--derotated", "up")
+    assert rollcli(*line, cwd=tmp_path).status == 3
+    for seed, count in ((0, 5), (1, COUNT - 5)):
+        for index in range(COUNT):
+            disparity = road_map(0.01 * index, width=300, height=200, seed=seed)
+            write_kitti(tmp_path / "maps" / f"frame{index:02}.png", disparity)
+        run = subprocess.Popen(command(*line, *RETRY, "-j", "2"), cwd=tmp_path, env=environment())
+        give_up = time.monotonic() + 60
+        while run.poll() is None and len(list(tmp_path.glob("up/[!.]*.png"))) < count:
+            assert time.monotonic() < give_up
+            time.sleep(0.002)
+        run.kill()
+        run.wait()
+        rows = (tmp_path / "rolls.csv").read_text().splitlines()[1:]
+        assert [row.split(",")[0] for row in rows] == [f"maps/frame{index:02}.png" for index in range(COUNT)]
+    assert rollcli(*line, *RETRY, cwd=tmp_path).status == 0
+    fresh, kept = anew(tmp_path, line)
+    assert kept == fresh
+
+
+def test_an_interrupted_run_with_failures_is_mended_and_finished_in_one_go(folder, maps):
+    line = ("estimate", "maps", "-o", "rolls.csv")
+    rollcli(*line, cwd=folder)
+    lines = (folder / "rolls.csv").read_bytes().splitlines(keepends=True)
+    (folder / "rolls.csv").write_bytes(b"".join(lines[:7]) + lines[7][:9])
+    record = folder / "rolls.csv.run.json"
+    record.write_text(json.dumps({**json.loads(record.read_text()), "counts": {}}))
+    mend(folder, maps, 2, 3)
+    listed = rollcli(*line, *RETRY, "--dry-run", cwd=folder).out
+    reads = [each.split("/")[-1] for each in listed.splitlines() if each.startswith("read")]
+    assert reads == [f"frame{index}.png" for index in (2, 3, 6, 7, 8, 9, 10, 11)]
+    assert rollcli(*line, *RETRY, cwd=folder).status == 3
+    mend(folder, maps, 9)
+    assert rollcli(*line, *RETRY, cwd=folder).status == 0
+    fresh, kept = anew(folder, line)
+    assert kept == fresh
+
+
+def test_a_link_to_a_result_stays_one_and_its_file_keeps_its_rights(folder, maps):
+    (folder / "elsewhere").mkdir()
+    (folder / "rolls.csv").symlink_to("elsewhere/rows.csv")
+    line = ("estimate", "maps", "-o", "rolls.csv")
+    assert rollcli(*line, cwd=folder).status == 3
+    (folder / "elsewhere" / "rows.csv").chmod(0o640)
+    mend(folder, maps, *BROKEN)
+    assert rollcli(*line, *RETRY, cwd=folder).status == 0
+    assert (folder / "rolls.csv").is_symlink()
+    assert (folder / "elsewhere" / "rows.csv").stat().st_mode & 0o777 == 0o640
+    assert b"error" not in (folder / "rolls.csv").read_bytes()
+
+
+def test_a_retry_refuses_when_the_file_of_a_kept_row_has_changed(folder, maps):
+    line = ("estimate", "maps", "-o", "rolls.csv")
+    assert rollcli(*line, cwd=folder).status == 3
+    before = (folder / "rolls.csv").read_bytes()
+    mend(folder, maps, 2)
+    write_kitti(folder / "maps" / "frame5.png", road_map(0.3))
+    done = rollcli(*line, *RETRY, cwd=folder)
+    assert (done.status, done.err.count("\n")) == (2, 1)
+    assert "maps/frame5.png has changed since" in done.err
+    assert (folder / "rolls.csv").read_bytes() == before
+
+
+def test_retry_failed_alone_says_what_it_goes_with(folder):
+    done = rollcli("estimate", "maps", "-o", "rolls.csv", "--retry-failed", cwd=folder)
+    assert (done.status, done.err.count("\n")) == (2, 1)
+    assert "give --resume with it" in done.err
+    assert not (folder / "rolls.csv").exists()
+
+
+def test_a_result_whose_rows_were_replaced_is_still_locked_and_grows(tmp_path, monkeypatch):
+    monkeypatch.setattr("rollcli.files.locking._PATIENCE_S", 0.0)
+    name = str(tmp_path / "rows.jsonl")
+    with open_result(name) as file:
+        for row in (b"one\n", b"two\n", b"three\n"):
+            file.append(row)
+        file.replace({1: b"2\n"}, "jsonl")
+        with pytest.raises(UsageError, match="another run is writing this result"), open_result(name):
+            pass
+        file.append(b"four\n")
+    with open_result(name) as file:
+        assert file.read() == b"one\n2\nthree\nfour\n"
+
+
+@pytest.mark.parametrize("ending", ["csv", "parquet"])
+def test_failed_frames_of_a_bucket_are_done_again_and_other_parts_stay(bucket, folder, maps, ending):
+    if ending == "parquet":
+        pytest.importorskip("pyarrow", reason="pyarrow, of the extra parquet, is not here")
+    upload(folder / "maps", f"{bucket}/maps")
+
+    def line(result):
+        return ("estimate", f"{bucket}/maps", "-o", f"{bucket}/{result}.{ending}", "--part-rows", "4")
+
+    def parts(result):
+        names = list_names(f"{bucket}/{result}.{ending}")
+        return {name: read_bytes(f"{bucket}/{result}.{ending}/{name}") for name in names}
+
+    assert rollcli(*line("rolls"), cwd=folder).status == 3
+    middle = f"{bucket}/rolls.{ending}/part-00001.{ending}"
+    before = modified_ns(middle)
+    for index in BROKEN:
+        write_bytes(f"{bucket}/maps/frame{index}.png", (maps / f"frame{index}.png").read_bytes())
+    assert rollcli(*line("rolls"), *RETRY, cwd=folder).status == 0
+    assert modified_ns(middle) == before
+    assert rollcli(*line("anew"), cwd=folder).status == 0
+    assert parts("rolls") == parts("anew")
+    records = [read_bytes(f"{bucket}/{name}.{ending}.run.json") for name in ("rolls", "anew")]
+    assert records[0] == records[1]
+
+
+@pytest.fixture(params=["rolls.csv", "rolls.parquet", "bucket"])
+def stopped(request, folder, maps, monkeypatch):
+    """A folder, and the line of a run whose retry made images and could not write their rows."""
+    if request.param == "rolls.parquet":
+        pytest.importorskip("pyarrow", reason="pyarrow, of the extra parquet, is not here")
+    place = f"{request.getfixturevalue('bucket')}/" if request.param == "bucket" else ""
+    result = "rolls.csv" if place else request.param
+    line = ("estimate", "maps", "-o", place + result, "--derotated", f"{place}up", "--part-rows", "5")
+    assert rollcli(*line, cwd=folder).status == 3
+    mend(folder, maps, *BROKEN)
+
+    def full(*_, **__):
+        raise OutputError("the disk is full")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("rollcli.run.result_file.ResultFile.replace", full)
+        patch.setattr("rollcli.run.parts.write_bytes", full)
+        done = rollcli(*line, *RETRY, cwd=folder)
+    assert (done.status, "the disk is full" in done.err) == (1, True)
+    return folder, place or f"{folder}/", line
+
+
+def test_frames_that_are_mended_again_after_a_stopped_retry_get_the_images_of_their_last_files(stopped):
+    folder, place, line = stopped
+    for index in BROKEN[:2]:
+        write_kitti(folder / "maps" / f"frame{index}.png", road_map(0.2, seed=50 + index))
+    (folder / "maps" / f"frame{BROKEN[2]}.png").write_bytes(b"broken again")
+    assert rollcli(*line, *RETRY, cwd=folder).status == 3
+    retried = everything(place)
+    assert f"up/frame{BROKEN[2]}.png" not in retried
+    assert rollcli(*line, "--overwrite", cwd=folder).status == 3
+    assert everything(place) == retried
+
+
+def test_an_image_that_took_the_place_of_one_of_a_stopped_retry_is_kept(stopped):
+    folder, place, line = stopped
+    write_bytes(f"{place}up/frame2.png", b"precious")
+    done = rollcli(*line, *RETRY, cwd=folder)
+    assert (done.status, "up/frame2.png: exists already and is not of this run" in done.err) == (1, True)
+    assert read_bytes(f"{place}up/frame2.png") == b"precious"
+    remove(f"{place}up/frame2.png")
+    assert rollcli(*line, *RETRY, cwd=folder).status == 0
+    retried = everything(place)
+    assert rollcli(*line, "--overwrite", cwd=folder).status == 0
+    assert everything(place) == retried
+
+
+def everything(place):
+    """What lies in a folder or below a prefix, apart from maps, by its name."""
+    if place.startswith("s3://"):
+        return {name: read_bytes(f"{place}{name}") for name in list_names(place)}
+    return made(Path(place))

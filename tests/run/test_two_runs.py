@@ -1,0 +1,101 @@
+"""Two runs on one result of parts are told apart before they mix their rows."""
+
+import pytest
+
+from rollcli.errors import UsageError
+from rollcli.files.locking import locked_folder
+from rollcli.files.results import Row
+from rollcli.run.frame import FrameResult
+from rollcli.run.options import InputOptions, ResultOptions
+from rollcli.run.plan import make_plan
+from rollcli.run.record import RunRecord
+from rollcli.run.result import open_output
+from tests.run.estimate_options import estimate_options
+from tests.run_cli import contents, rollcli, write_maps
+
+
+def options(maps, output):
+    """Those of a run over a folder, in parts of two rows."""
+    result = ResultOptions(output=output, part_rows=2)
+    return estimate_options(inputs=InputOptions((str(maps),)), result=result)
+
+
+def append(output, frames):
+    """The rows of frames, as workers would return them."""
+    for frame in frames:
+        output.append(frame, FrameResult(Row(frame.file, status="ok", roll_deg=1.0)))
+
+
+@pytest.fixture
+def maps(tmp_path):
+    """Four maps on disk."""
+    write_maps(tmp_path / "maps", 4)
+    return tmp_path / "maps"
+
+
+def test_of_two_runs_in_a_bucket_the_last_to_begin_goes_on_and_the_other_ends(bucket, maps):
+    given = options(maps, f"{bucket}/rolls.csv")
+    plan = make_plan(given)
+    with open_output(plan, given) as first, open_output(plan, given) as last:
+        append(first, plan.frames[:1])
+        with pytest.raises(UsageError, match="another run has begun to write this result"):
+            append(first, plan.frames[1:])
+        append(last, plan.frames)
+        last.finish({"frames": 4}, None)
+        with pytest.raises(UsageError, match="another run has begun"):
+            first.finish({"frames": 1}, None)
+    from rollcli.files.results import read_result
+
+    result = read_result(f"{bucket}/rolls.csv")
+    assert [row.file for row in result.rows] == [frame.file for frame in plan.frames]
+    assert result.run["counts"] == {"frames": 4}
+    with pytest.raises(UsageError, match="exists already"), open_output(plan, given):
+        pass
+
+
+def test_a_run_whose_rows_come_slowly_looks_now_and_then(bucket, maps, monkeypatch):
+    monkeypatch.setattr("rollcli.run.parts._CHECK_S", 0.0)
+    given = options(maps, f"{bucket}/rolls.csv")
+    plan = make_plan(given)
+    with open_output(plan, given) as first:
+        append(first, plan.frames[:1])
+        with (
+            open_output(plan, given),
+            pytest.raises(UsageError, match="another run has begun to write this result"),
+        ):
+            append(first, plan.frames[1:2])  # the part is not full
+
+
+def test_two_runs_that_begin_in_the_same_second_are_told_apart_at_once(bucket, maps, monkeypatch):
+    given = options(maps, f"{bucket}/rolls.csv")
+    plan = make_plan(given)
+    others = []
+    written = RunRecord.write
+
+    def write(record, *arguments, **words):
+        """The other one writes right after the first."""
+        written(record, *arguments, **words)
+        if not others:
+            others.append(open_output(plan, given))
+            others.append(others[0].__enter__())
+
+    monkeypatch.setattr(RunRecord, "write", write)
+    with pytest.raises(UsageError, match="another run has begun"), open_output(plan, given):
+        pass
+    append(others[1], plan.frames)
+    others[0].__exit__(None, None, None)
+
+
+def test_a_folder_of_parts_on_disk_is_locked_while_a_run_writes_it(tmp_path, monkeypatch):
+    pytest.importorskip("pyarrow", reason="pyarrow, of the extra parquet, is not here")
+    monkeypatch.setattr("rollcli.files.locking._PATIENCE_S", 0.0)
+    write_maps(tmp_path / "maps", 2)
+    line = ("estimate", "maps", "-o", "rolls.parquet")
+    with locked_folder(str(tmp_path / "rolls.parquet")) as descriptor:
+        assert descriptor is not None
+        done = rollcli(*line, cwd=tmp_path)
+        assert (done.status, done.err.count("\n")) == (2, 1)
+        assert "another run is writing this result" in done.err
+        assert not contents(tmp_path / "rolls.parquet")
+    assert rollcli(*line, cwd=tmp_path).status == 0
+    assert sorted(contents(tmp_path / "rolls.parquet")) == ["part-00000.parquet"]

@@ -1,0 +1,345 @@
+"""A real Dask scheduler and two real workers, on this machine."""
+
+import json
+import logging
+import os
+import shutil
+import socket
+import subprocess
+import sys
+import threading
+import time
+from concurrent.futures import Future
+from itertools import count
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from tests.in_process import run_here
+from tests.object_store import joined, upload
+from tests.run_cli import command, contents, environment, road_map, rollcli, write_maps, write_pair
+
+pytest.importorskip("distributed", reason="the extra cluster is not installed")
+
+from distributed import LocalCluster
+
+from rollcli import __version__
+from rollcli.errors import ClusterError
+from rollcli.files.storage import list_names, read_bytes
+from rollcli.run.workers import cluster
+from rollcli.run.workers.cluster import ClusterFuture, _check_workers, probe
+from rollcli.run.workers.in_order import SharedPaths
+
+FRAMES = 40
+IMAGES = ("--derotated", "upright", "--vdisparity", "v")
+
+
+LOCAL = ("--host", "127.0.0.1", "--no-dashboard")
+ONE_PROCESS = ("--nthreads", "1", "--no-nanny")
+
+
+class Cluster:
+    """A scheduler and workers that several tests use; what a test kills is started anew for the next one."""
+
+    def __init__(self, folder):
+        self.folder, self.starts = folder, count()
+        self.process, self.address, self.processes, self.store = None, "", [], {}
+
+    def scheduler(self):
+        """The address of a scheduler that lives."""
+        if self.process is None or self.process.poll() is not None:
+            self.end()
+            state = self.folder / f"scheduler{next(self.starts)}.json"
+            self.process = dask("scheduler", self.folder, *LOCAL, "--port", "0", "--scheduler-file", state)
+            wait_for(lambda: state.exists() and state.read_text().endswith("}"))
+            self.address = json.loads(state.read_text())["address"]
+        return self.address
+
+    def workers(self):
+        """Two live worker processes, each in a folder of its own, which may use the store of a test."""
+        address = self.scheduler()
+        store = {name: value for name, value in environment().items() if name.startswith("AWS_")}
+        if self.store != store:
+            self.end_workers()
+        self.store = store
+        self.processes = [each for each in self.processes if each.poll() is None]
+        while len(self.processes) < 2:
+            folder = self.folder / f"worker{next(self.starts)}"
+            folder.mkdir()
+            self.processes.append(dask("worker", folder, address, *LOCAL, *ONE_PROCESS))
+        return self.processes
+
+    def end_workers(self):
+        while self.processes:
+            end(self.processes.pop())
+
+    def end(self):
+        self.end_workers()
+        if self.process is not None:
+            end(self.process)
+
+
+@pytest.fixture(scope="module")
+def cluster_here(tmp_path_factory):
+    """Nothing yet: processes start when a test asks for them."""
+    cluster_of_tests = Cluster(tmp_path_factory.mktemp("cluster"))
+    yield cluster_of_tests
+    cluster_of_tests.end()
+
+
+@pytest.fixture
+def scheduler(cluster_here):
+    """The address of the scheduler."""
+    return cluster_here.scheduler()
+
+
+@pytest.fixture
+def workers(cluster_here):
+    """The processes of two workers."""
+    return cluster_here.workers()
+
+
+def end(process):
+    process.kill()
+    process.wait()
+
+
+def dask(kind, folder, *arguments):
+    """A Dask process that works in a folder of its own, as on another machine."""
+    with (folder / f"{kind}.log").open("wb") as log:
+        return subprocess.Popen(
+            [sys.executable, "-m", f"distributed.cli.dask_{kind}", *map(str, arguments)],
+            cwd=folder,
+            env=environment(),
+            stdout=log,
+            stderr=subprocess.STDOUT,
+        )
+
+
+def wait_for(condition):
+    give_up = time.monotonic() + 60
+    while not (found := condition()):
+        assert time.monotonic() < give_up
+        time.sleep(0.02)
+    return found
+
+
+@pytest.fixture(scope="module")
+def local(tmp_path_factory):
+    """Maps, one of them broken, and what a run on this machine makes of them."""
+    folder = tmp_path_factory.mktemp("local")
+    write_maps(folder / "maps", FRAMES, width=300, height=200)
+    (folder / "maps" / "frame5.png").write_bytes(b"")
+    assert rollcli("estimate", "maps", "-o", "rolls.csv", *IMAGES, cwd=folder).status == 3
+    return folder
+
+
+@pytest.fixture
+def far(local, tmp_path):
+    """The same maps in a folder of the test's own."""
+    shutil.copytree(local / "maps", tmp_path / "far" / "maps")
+    return tmp_path / "far"
+
+
+def assert_is_that_of_a_local_run(far, local):
+    record = "rolls.csv.run.json"  # holds the times of the inputs, which differ
+    assert differing(contents(local), contents(far)) <= {record}
+    counts = [json.loads((folder / record).read_text())["counts"] for folder in (local, far)]
+    assert counts[0] == counts[1]
+
+
+def differing(one, other):
+    return {name for name in one.keys() | other.keys() if one.get(name) != other.get(name)}
+
+
+# the program, which gives up sooner on a scheduler that it has lost
+IMPATIENT = """
+from rollcli.__main__ import main
+from rollcli.parallel import cluster
+cluster._CONNECT_S = 2
+main()
+"""
+
+
+def start(far, scheduler):
+    """A run on the cluster."""
+    arguments = ("estimate", "maps", "-q", "-o", "rolls.csv", *IMAGES, "--scheduler", scheduler)
+    line = [sys.executable, "-c", IMPATIENT, *arguments]
+    return subprocess.Popen(line, cwd=far, env=environment(), stderr=subprocess.PIPE, text=True)
+
+
+def wait_for_images(far, run):
+    """Until some frames are done."""
+    wait_for(lambda: run.poll() is not None or len(list(far.glob("v/[!.]*.png"))) > 8)
+
+
+def test_a_cluster_that_loses_a_worker_gives_the_bytes_of_a_local_run(local, far, scheduler, workers):
+    run = start(far, scheduler)
+    wait_for_images(far, run)
+    workers[0].kill()
+    _, err = run.communicate(timeout=120)
+    assert run.returncode == 3, err
+    assert_is_that_of_a_local_run(far, local)
+
+
+def test_conversions_on_a_cluster_give_the_bytes_of_a_local_run(tmp_path, scheduler, workers):
+    write_maps(tmp_path / "maps", 3)
+    write_pair(tmp_path, "a.png", road_map(width=160, height=80) / 2)
+    (tmp_path / "maps" / "frame1.png").write_bytes(b"no map")
+    lines = {
+        "derotate": ("maps", "--roll", "2"),
+        "vdisparity": ("maps", "--counts"),
+        "disparity": ("--left", "left", "--right", "right", "--num-disparities", "32"),
+    }
+    for name, arguments in lines.items():
+        status = 0 if name == "disparity" else 3
+        assert rollcli(name, *arguments, "-o", f"here/{name}", cwd=tmp_path).status == status
+        far = rollcli(name, *arguments, "-o", f"far/{name}", "--scheduler", scheduler, cwd=tmp_path)
+        assert far.status == status, far.err
+    assert contents(tmp_path / "far") == contents(tmp_path / "here")
+
+
+def test_a_scheduler_that_is_lost_ends_the_run_which_goes_on_without_it(local, far, cluster_here, workers):
+    run = start(far, cluster_here.address)
+    wait_for_images(far, run)
+    cluster_here.process.kill()
+    _, err = run.communicate(timeout=60)
+    assert run.returncode == 1
+    broken, said = err.splitlines()
+    assert broken == "rollcli: maps/frame5.png: is empty"
+    assert said.startswith(f"rollcli: {cluster_here.address}: the connection to the scheduler is lost; ")
+    assert said.endswith(" rows are kept, continue with --resume")
+    assert rollcli("estimate", "maps", "-q", "-o", "rolls.csv", *IMAGES, "--resume", cwd=far).status == 3
+    assert_is_that_of_a_local_run(far, local)
+
+
+def test_nobody_waits_for_what_was_sent_while_the_connection_broke(monkeypatch):
+    monkeypatch.setattr(cluster, "_POLL_S", 0.01)
+    client = SimpleNamespace(status="closed")
+    with pytest.raises(ClusterError, match="the connection to the scheduler is lost"):
+        ClusterFuture(Future(), client, "tcp://far:8786").result()
+
+
+@pytest.mark.parametrize(
+    ("answer", "said"),
+    [
+        ("does not see a.png", "worker tcp://second:1: does not see a.png"),
+        (ImportError("no module"), "worker tcp://second:1: cannot run rollcli .*: no module"),
+    ],
+)
+def test_a_run_with_a_worker_that_cannot_take_part_is_refused_and_leaves_no_mark(tmp_path, answer, said):
+    def ask(function, version, sizes, marks, on_error):
+        assert [Path(mark).exists() for mark in marks] == [True]
+        return {"tcp://first:1": "", "tcp://second:1": answer}
+
+    with pytest.raises(ClusterError, match=said):
+        _check_workers(SimpleNamespace(run=ask), SharedPaths((), (str(tmp_path / "up"),)))
+    assert list((tmp_path / "up").iterdir()) == []
+
+
+def test_a_worker_that_has_no_such_program_or_files_is_named(tmp_path):
+    there = tmp_path / "a.png"
+    there.write_bytes(b"123")
+    assert probe(__version__, {str(there): 3}, [str(tmp_path / "a.png")]) == ""
+    assert "this is 0.0" in probe("0.0", {}, [])
+    assert f"does not see {tmp_path / 'b.png'}" in probe(__version__, {str(tmp_path / "b.png"): 3}, [])
+    assert "does not see" in probe(__version__, {str(there): 4}, [])
+    assert "image folders must lie on storage" in probe(__version__, {}, [str(tmp_path / "v" / "mark")])
+
+
+def test_dask_may_log_again_once_the_cluster_is_left():
+    before = logging.root.manager.disable
+    with cluster._silenced_logging():
+        assert not logging.getLogger("distributed").isEnabledFor(logging.CRITICAL)
+    assert logging.root.manager.disable == before
+
+
+def test_a_worker_that_may_not_write_is_named(tmp_path, monkeypatch):
+    (tmp_path / "mark").touch()
+    assert probe(__version__, {}, [str(tmp_path / "mark")]) == ""
+    monkeypatch.setattr(os, "access", lambda path, mode: mode != os.W_OK)
+    assert probe(__version__, {}, [str(tmp_path / "mark")]) == f"cannot write to {tmp_path}"
+
+
+def estimate_here(address, cwd, *more):
+    """Run in this process, whose patience with clusters a test can set."""
+    line = ("estimate", "maps", "-o", "rolls.csv", "--scheduler", address, *more)
+    return run_here(line, cwd, "", environment())
+
+
+def test_a_scheduler_that_does_not_answer_ends_the_run(tmp_path, monkeypatch):
+    monkeypatch.setattr(cluster, "_CONNECT_S", 0.5)
+    write_maps(tmp_path / "maps", 2)
+    done = estimate_here("tcp://127.0.0.1:9", tmp_path)
+    assert done.status == 1
+    assert "tcp://127.0.0.1:9: no Dask scheduler answers there" in done.err
+    assert done.err.count("\n") == 1
+
+
+@pytest.mark.parametrize("greeting", [b"", b"HTTP/1.1 400 Bad Request\r\nServer: x\r\n\r\n"])
+def test_a_server_that_is_no_scheduler_ends_the_run(tmp_path, monkeypatch, greeting):
+    monkeypatch.setattr(cluster, "_CONNECT_S", 0.5)
+    monkeypatch.setattr(cluster, "_GREETING_S", 0.0)
+    write_maps(tmp_path / "maps", 1)
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        answering = threading.Thread(target=greet, args=(server, greeting), daemon=True)
+        answering.start()
+        address = f"127.0.0.1:{server.getsockname()[1]}"
+        done = estimate_here(address, tmp_path)
+    assert (done.status, done.err) == (1, f"rollcli: {address}: no Dask scheduler answers there\n")
+
+
+def greet(server, greeting):
+    """Say something to whoever comes, and wait until he goes."""
+    caller, _ = server.accept()
+    with caller:
+        caller.sendall(greeting)
+        while caller.recv(1000):
+            pass
+
+
+@pytest.mark.parametrize("address", ["", "node0", "http://node0:8786", "tcp://node0:x", "tls://node0:8786"])
+def test_what_is_no_address_is_refused_and_the_result_that_is_there_is_kept(tmp_path, address):
+    write_maps(tmp_path / "maps", 1)
+    rollcli("estimate", "maps", "-o", "rolls.csv", cwd=tmp_path)
+    before = contents(tmp_path)
+    done = estimate_here(address, tmp_path, "--overwrite")
+    assert done.status == 2
+    assert done.err.startswith(f"rollcli: --scheduler {address!r}: ")
+    assert done.err.endswith("; an address looks like tcp://host:8786\n")
+    assert contents(tmp_path) == before
+
+
+def test_a_scheduler_without_workers_ends_the_run(tmp_path, monkeypatch):
+    monkeypatch.setattr(cluster, "_FIRST_WORKER_S", 0.5)
+    write_maps(tmp_path / "maps", 2)
+    here = {"host": "127.0.0.1", "protocol": "tcp", "dashboard_address": ":0"}
+    with LocalCluster(n_workers=0, processes=False, **here) as empty:
+        done = estimate_here(empty.scheduler_address, tmp_path)
+    assert done.status == 1
+    assert f"{empty.scheduler_address}: has no workers" in done.err
+    assert rollcli("estimate", "maps", "-o", "rolls.csv", cwd=tmp_path).status == 0
+
+
+# the bucket comes first: workers take its settings over when they start
+def test_workers_that_share_only_a_bucket_give_the_bytes_of_a_local_run(
+    bucket, local, tmp_path, scheduler, workers
+):
+    upload(local / "maps", f"{bucket}/maps")
+    line = ("estimate", f"{bucket}/maps/", "-o", f"{bucket}/rolls.csv", "--derotated", f"{bucket}/upright")
+    line = (*line, "--part-rows", "8", "--scheduler", scheduler)
+    (tmp_path / "driver").mkdir()
+    run = subprocess.Popen(command(*line), cwd=tmp_path / "driver", env=environment())
+    wait_for(lambda: run.poll() is not None or len(list_names(f"{bucket}/rolls.csv")) > 1)
+    run.kill()
+    assert run.wait() != 0
+    resumed = subprocess.Popen(command(*line, "--resume", "-q"), cwd=tmp_path / "driver", env=environment())
+    wait_for(lambda: resumed.poll() is not None or len(list_names(f"{bucket}/rolls.csv")) > 3)
+    workers[0].kill()
+    assert resumed.wait(timeout=120) == 3
+
+    expected = (local / "rolls.csv").read_bytes().replace(b"maps/", f"{bucket}/maps/".encode())
+    assert joined(f"{bucket}/rolls.csv") == expected
+    images = {name: read_bytes(f"{bucket}/upright/{name}") for name in list_names(f"{bucket}/upright")}
+    assert images == contents(local / "upright")

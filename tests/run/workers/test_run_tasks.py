@@ -1,0 +1,68 @@
+"""Which executor the tasks get, and how it ends."""
+
+import os
+from types import SimpleNamespace
+
+import pytest
+
+from rollcli.errors import UsageError
+from rollcli.run.workers import tasks as runs
+from rollcli.run.workers.in_order import Work, Workers
+from rollcli.run.workers.interrupt import Stop
+from rollcli.run.workers.pool import PoolExecutor
+from rollcli.run.workers.tasks import LocalExecutor, require_scheduler, run_tasks
+from tests.run.workers.tasks import lost, run
+
+WORK = Work(run, lost)
+
+
+@pytest.mark.parametrize(
+    ("count", "jobs", "threads", "processes"),
+    [
+        (5, 1, 1, 0),
+        (5, 2, 1, 2),
+        (2, 3, 1, 2),
+        (1, 3, 1, 0),
+        (0, 3, 1, 0),
+        (1, 1, 2, 1),
+        (0, 1, 4, 0),
+        (3, 2, 4, 2),
+    ],
+)
+def test_there_are_as_many_processes_as_tasks_and_jobs_allow(count, jobs, threads, processes):
+    executor = runs._executor(count, WORK, Workers(jobs, threads=threads))
+    executor.close(at_once=True)
+    if processes == 0:
+        assert isinstance(executor, LocalExecutor)
+    else:
+        assert isinstance(executor, PoolExecutor)
+        assert len(executor._workers) == processes
+
+
+def test_without_a_number_of_jobs_there_is_one_for_each_usable_processor(monkeypatch):
+    monkeypatch.setattr(runs.os, "sched_getaffinity", lambda process: {0, 3, 5}, raising=False)
+    monkeypatch.setattr("rollcli.run.workers.pool.PoolExecutor", lambda jobs, *_: SimpleNamespace(jobs=jobs))
+    assert runs._executor(100, WORK, Workers()).jobs == 3
+    monkeypatch.delattr(runs.os, "sched_getaffinity")
+    monkeypatch.setattr(os, "cpu_count", lambda: 7)
+    assert runs._executor(100, WORK, Workers()).jobs == 7
+    monkeypatch.setattr(os, "cpu_count", lambda: None)
+    assert isinstance(runs._executor(100, WORK, Workers()), LocalExecutor)
+
+
+@pytest.mark.parametrize("at_once", [False, True])
+def test_the_executor_is_closed_as_the_run_was_stopped(monkeypatch, at_once):
+    closed = []
+    monkeypatch.setattr(LocalExecutor, "close", lambda self, *, at_once: closed.append(at_once))
+    stop = Stop()
+    results = run_tasks([("give", 1), ("give", 2)], WORK, stop, Workers(1))
+    assert next(results) == 1
+    stop.asked, stop.at_once = True, at_once
+    assert list(results) == []
+    assert closed == [at_once]
+
+
+def test_no_scheduler_is_asked_for_unless_one_is_named():
+    require_scheduler(None)
+    with pytest.raises(UsageError, match=r"^--scheduler"):
+        require_scheduler("")

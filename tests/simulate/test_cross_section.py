@@ -1,0 +1,323 @@
+"""Roads with a cross section: each pixel shows the point that an independent march along its ray finds."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rollcli.simulate.build import build_scene, road_camber
+from rollcli.simulate.draw import draw_specs
+from rollcli.simulate.render import render_frame, true_disparity
+from rollcli.simulate.road import Piece, draw_carriageway
+from rollcli.simulate.roadside import car_materials, vehicle
+from rollcli.simulate.scene import draw_light
+from rollcli.simulate.spec import FrameSpec
+from rollcli.simulate.surfaces import Course, Ground
+from rollcli.simulate.vectors import first_crossing
+
+SMALL = {"size": (320, 240), "focal": 186.0, "crossfall": 0.04}
+SHAPES = ("crown", "roof", "dish", "superelevated")
+BENT, STRAIGHT = 4, 2  # seeds of an open road
+
+
+def drawn_road(spec):
+    """The carriageway that the frame's random numbers stand for."""
+    rng = spec.scene_rng()
+    draw_light(rng)
+    return draw_carriageway(rng, spec)
+
+
+def road_height(spec, road, lateral):
+    """Elevation of the carriageway, written down per shape; 0 at lateral 0."""
+
+    def profile(x):
+        from_middle = x - (road.left + road.right) / 2
+        half, fall = (road.right - road.left) / 2, spec.crossfall
+        # measured in the gutter from its inner edge
+        inner = np.clip(from_middle, -half + 0.35, half - 0.35) if spec.gutter else from_middle
+        beyond = np.abs(from_middle) - np.abs(inner)
+        rising = 1.0 if road.course.bend < 0 else -1.0
+        height, steepness = {
+            "flat": (0.0 * inner, 0.0),
+            "crown": (-fall * inner**2 / (2 * half), -fall * inner / half),
+            "dish": (fall * inner**2 / (2 * half), fall * inner / half),
+            "roof": (-fall * np.abs(inner), -fall * np.sign(inner)),
+            "superelevated": (rising * fall * inner, rising * fall),
+        }[spec.cross_section]
+        return height + beyond * (steepness * np.sign(from_middle) - spec.gutter)
+
+    return profile(lateral) - profile(np.zeros(1))
+
+
+def camera_in_world(spec, road):
+    """Columns: the camera's right, down and forward axes; and its position."""
+    slope = float((road_height(spec, road, np.array([1e-6])) - road_height(spec, road, np.array([-1e-6])))[0])
+    slope /= 2e-6
+    right = np.array([1.0, slope, 0.0]) / math.hypot(1.0, slope)
+    up = np.array([-slope, 1.0, slope * road.course.heading])
+    up /= np.linalg.norm(up)
+    ahead = np.cross(right, up)
+    cos_p, sin_p, cos_r, sin_r = (f(a) for a in (spec.pitch, spec.roll) for f in (math.cos, math.sin))
+    forward, level_down = cos_p * ahead - sin_p * up, -sin_p * ahead - cos_p * up
+    axes = np.stack([cos_r * right - sin_r * level_down, sin_r * right + cos_r * level_down, forward], axis=1)
+    return axes, spec.height * up
+
+
+def height_over_road(spec, road, points):
+    """Of world points (..., 3), measured upward; and the lateral position."""
+    x, y, z = np.moveaxis(points, -1, 0)
+    lateral = x - road.course.heading * z - road.course.bend / 2 * z**2
+    return y - spec.curvature / 2 * z**2 - road_height(spec, road, lateral), lateral
+
+
+def marched_disparity(spec, road, u, v):
+    """f B / depth of the first point at which a ray comes below the road; nan where none is found."""
+    axes, place = camera_in_world(spec, road)
+    x, y = ((at - (size - 1) / 2) / spec.focal for at, size in zip((u, v), spec.size, strict=True))
+    rays = np.stack([x, y, np.ones_like(x)], axis=1) @ axes.T
+    steps = np.arange(0.1, 45, 0.02)
+    over, lateral = height_over_road(spec, road, place + steps[:, None, None] * rays)
+    met = (over <= 0) & (lateral > road.left) & (lateral < road.right)
+    first = np.argmax(met, axis=0)
+    low, high = steps[first] - 0.02, steps[first]
+    for _ in range(60):
+        middle = (low + high) / 2
+        above = height_over_road(spec, road, place + middle[:, None] * rays)[0] > 0
+        low, high = np.where(above, middle, low), np.where(above, high, middle)
+    return np.where(met.any(axis=0), spec.focal * spec.baseline / low, np.nan)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("gutter", [0.0, 0.08])
+@pytest.mark.parametrize(
+    ("seed", "roll_deg", "pitch_deg", "curvature"),
+    [(BENT, 0.0, 2.0, 0.0), (BENT, 7.0, 4.0, 0.001), (STRAIGHT, -25.0, 1.0, -0.001)],
+)
+def test_every_road_pixel_shows_the_first_point_that_a_march_along_its_ray_finds(
+    shape, gutter, seed, roll_deg, pitch_deg, curvature
+):
+    spec = FrameSpec(
+        "open",
+        math.radians(roll_deg),
+        math.radians(pitch_deg),
+        curvature,
+        shape,
+        gutter=gutter,
+        seed=seed,
+        **SMALL,
+    )
+    road = drawn_road(spec)
+    assert (road.course.bend != 0) == (seed == BENT)
+    disparity, is_road = true_disparity(spec)
+    near = is_road & (disparity > spec.focal * spec.baseline / 40)
+    v, u = (at[::53] for at in np.nonzero(near))
+    assert len(u) > 150
+    marched = marched_disparity(spec, road, u, v)
+    # a march can step over the outermost centimetres of the road beside a kerb
+    assert np.mean(np.isnan(marched)) < 0.01
+    assert np.nanmax(np.abs(marched - disparity[v, u])) < 1e-6
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize(("roll_deg", "pitch_deg"), [(0.0, 3.0), (9.0, 5.0), (-30.0, 2.0)])
+def test_roll_is_the_angle_of_the_plane_through_the_road_along_the_path_of_the_rig(
+    shape, roll_deg, pitch_deg
+):
+    spec = FrameSpec("bare", math.radians(roll_deg), math.radians(pitch_deg), 0.0, shape, seed=4, **SMALL)
+    road = drawn_road(spec)
+    disparity, is_road = true_disparity(spec)
+    v, u = np.nonzero(is_road)
+    axes, place = camera_in_world(spec, road)
+    depth = spec.focal * spec.baseline / disparity[is_road]
+    rays = np.stack([(u - 159.5) / spec.focal, (v - 119.5) / spec.focal, np.ones(len(u))], axis=1)
+    _, lateral = height_over_road(spec, road, place + depth[:, None] * (rays @ axes.T))
+    path = np.abs(lateral) < 0.25
+    assert path.sum() > 300
+    design = np.stack([np.ones(path.sum()), u[path], v[path]], axis=1)
+    _, c1, c2 = np.linalg.lstsq(design, disparity[is_road][path], rcond=None)[0]
+    slack = 1e-6 if shape in ("roof", "superelevated") else 0.01
+    assert math.degrees(math.atan(-c1 / c2)) == pytest.approx(roll_deg, abs=slack)
+
+
+@pytest.mark.parametrize(("shape", "sign"), [("crown", -1), ("dish", 1)])
+def test_camber_is_the_curvature_across_in_camera_heights_negative_on_a_crown(shape, sign):
+    spec = FrameSpec("bare", pitch=0.1, cross_section=shape, seed=4, **SMALL)
+    road = drawn_road(spec)
+    steps = road_height(spec, road, np.array([-0.01, 0.0, 0.01]) * spec.height) / spec.height
+    slope = (steps[2] - steps[0]) / 0.02
+    second = (steps[0] - 2 * steps[1] + steps[2]) / 0.01**2
+    assert road_camber(spec) == pytest.approx(second / (1 + slope**2) ** 1.5, rel=1e-6)
+    assert np.sign(road_camber(spec)) == sign
+
+
+@pytest.mark.parametrize("shape", ["flat", "superelevated"])
+def test_a_plane_has_no_camber(shape):
+    assert road_camber(FrameSpec("open", cross_section=shape, seed=BENT, **SMALL)) == 0
+
+
+def test_a_superelevated_road_without_anything_beside_it_looks_like_a_flat_one():
+    banked = FrameSpec("open", 0.1, 0.05, 0.0, "superelevated", seed=STRAIGHT, **SMALL)
+    flat = replace(banked, cross_section="flat", crossfall=0.0)
+    (disparity, road), (level, level_road) = true_disparity(banked), true_disparity(flat)
+    both = road & level_road & (level > 3)
+    assert both.sum() > 5000
+    assert np.abs(disparity - level)[both].max() < 0.02  # the edges' lines differ by the slope's cosine
+    assert (road != level_road).any()
+
+
+def test_the_outer_side_of_a_bend_is_up_and_a_straight_road_falls_to_the_right():
+    for seed in range(12):
+        spec = FrameSpec("open", cross_section="superelevated", seed=seed, **SMALL)
+        road = drawn_road(spec)
+        right_is_up = road.section.elevation(road.right) > road.section.elevation(road.left)
+        # a road with a positive bend turns to the right: its outer side is the left one
+        assert right_is_up == (road.course.bend < 0)
+
+
+def test_kerbs_have_the_height_asked_for_above_the_gutter():
+    spec = FrameSpec("street", 0.0, 0.15, 0.0, "crown", gutter=0.1, kerb=(0.03, 0.03), seed=3, **SMALL)
+    road, scene = drawn_road(spec), build_scene(spec)
+    for side, edge in road.sides:
+        outside = np.array([[edge + side * 1.0], [5.0], [4.0]])
+        outside[0] += road.course.point(0.0, 4.0)[0]
+        down = np.array([[0.0], [-1.0], [0.0]])
+        met = min(float(s.intersect(outside, down)[0]) for s in scene.surfaces if isinstance(s, Ground))
+        height = 5.0 - met - spec.curvature / 2 * 16
+        inner = road_height(spec, road, np.array([edge - side * 1e-9]))[0]
+        assert height == pytest.approx(inner + 0.03, abs=1e-6)
+
+
+def test_vehicles_stand_on_the_road_that_is_below_them():
+    spec = FrameSpec("street", 0.0, 0.05, 0.0, "roof", seed=11, **SMALL)
+    road, scene = drawn_road(spec), build_scene(spec)
+    assert scene.cars
+    for car in scene.cars:
+        over, lateral = height_over_road(spec, road, car.place)
+        assert abs(over[0]) < 1e-9
+        side = np.array([[-0.5], [0.5]]) * np.sign(lateral) * car.frame[0]
+        assert np.abs(height_over_road(spec, road, car.place + side)[0]).max() < 2e-3
+
+
+def test_cross_sections_are_drawn_without_changing_what_else_is_drawn():
+    flat = draw_specs(30, seed=5)
+    mixed = draw_specs(30, seed=5, cross_section="mixed", crossfall=(0.01, 0.04), gutter=(0.0, 0.1))
+    level = {"cross_section": "flat", "crossfall": 0.0, "gutter": 0.0}
+    assert [replace(spec, **level) for spec in mixed] == flat
+    assert {spec.cross_section for spec in mixed} == {"flat", *SHAPES}
+    assert all(
+        spec.crossfall == 0 if spec.cross_section == "flat" else 0.01 <= spec.crossfall <= 0.04
+        for spec in mixed
+    )
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_no_ray_slips_between_two_pieces_of_the_ground(shape):
+    spec = FrameSpec("bare", 0.0, 0.3, 0.0, shape, gutter=0.05, seed=4, size=(321, 241), focal=186.0)
+    frame = render_frame(replace(spec, crossfall=0.04))
+    assert frame.disparity[120:].min() > 0
+
+
+def test_the_first_of_several_roots_is_found():
+    rng = np.random.default_rng(1)
+    roots = np.sort(rng.uniform(-1, 2, (400, 4)), axis=1)
+    coefficients = np.array([np.poly(each)[::-1] for each in roots]).T
+    coefficients *= np.sign(coefficients[0])
+    expected = [min((r for r in each if 0 < r < 1), default=np.nan) for each in roots]
+    found = first_crossing(coefficients, np.ones(400))
+    assert np.array_equal(np.isnan(found), np.isnan(expected))
+    assert np.nanmax(np.abs(found - expected)) < 1e-6
+
+
+@pytest.mark.parametrize("scene", ["bare", "open", "street", "verge"])
+def test_lanes_are_as_wide_as_real_ones_and_only_country_roads_have_a_single_lane(scene):
+    roads = [drawn_road(FrameSpec(scene, seed=seed)) for seed in range(120)]
+    assert all(2.8 <= road.lane <= 3.7 for road in roads)
+    country = scene in ("bare", "verge")
+    assert any(road.single for road in roads) == country
+    assert any(road.parking for road in roads) == (not country)
+    assert any(road.course.bend > 0 for road in roads) == (scene != "bare")
+    assert any(road.course.bend < 0 for road in roads) == (scene != "bare")
+    for road in roads:
+        # beyond the edge of the right lane, in which the rig drives, lies a shoulder
+        shoulder = road.right - road.shift - 0.5 * road.lane
+        assert shoulder == pytest.approx(2.2) if road.parking else 0.1 <= shoulder <= 0.6
+        lanes = 1 if road.single else 2
+        assert road.right - road.left == pytest.approx(lanes * road.lane + 2 * shoulder)
+
+
+def test_a_roof_has_two_lanes_and_its_ridge_between_them():
+    for seed in range(40):
+        road = drawn_road(FrameSpec("verge", cross_section="roof", crossfall=0.03, seed=seed))
+        assert not road.single
+        left, right = road.section.pieces
+        assert left.end == right.start == pytest.approx(road.shift - road.lane / 2)
+        assert (left.slope, right.slope) == (0.03, -0.03)
+
+
+def test_kerbs_are_drawn_from_their_range():
+    heights = []
+    for seed in range(30):
+        spec = FrameSpec("open", seed=seed)
+        road, scene = drawn_road(spec), build_scene(spec)
+        sidewalks = [s for s in scene.surfaces if isinstance(s, Ground) and s.offset and not s.slope]
+        heights += [s.offset for s in sidewalks if {road.left, road.right} & set(s.edges)]
+    assert 0.1 <= min(heights) < 0.11
+    assert 0.19 < max(heights) <= 0.2
+
+
+@pytest.mark.parametrize("oncoming", [False, True])
+def test_a_vehicle_ahead_shows_its_rear_and_an_oncoming_one_its_front(oncoming):
+    course = Course(heading=0.02, bend=0.003)
+    car = vehicle(np.random.default_rng(3), course, Piece(-5, 5), 1.0, 12.0, 0, oncoming)
+    assert (car.frame[2, 2] > 0) == (not oncoming)
+    assert car.frame[1] @ [0, 1, 0] > 0.99
+    assert np.linalg.det(car.frame) == pytest.approx(1)
+
+
+@pytest.mark.parametrize("seed", range(9))  # cars and trucks
+def test_no_part_of_a_vehicle_covers_a_light_or_a_number_plate(seed):
+    *_, red, white, _ = range(len(car_materials(0.0)))  # in the order that its docstring gives
+    car = vehicle(np.random.default_rng(seed), Course(0.0, 0.0), Piece(-5, 5), 1.0, 12.0, 0, False)
+    lights = [part for part in car.parts if part.material in (red, white)]
+    assert len(lights) >= 4
+    for light in lights:
+        bounds = np.array(
+            [
+                [side * light.offsets[np.argmax(side * light.normals @ axis)] for side in (-1, 1)]
+                for axis in np.eye(3)
+            ]
+        )
+        outward = np.sign(bounds[2].mean())
+        shares = np.linspace(0.01, 0.99, 30)
+        right, up = (low + shares * (high - low) for low, high in bounds[:2])
+        face = np.stack(
+            [*map(np.ravel, np.meshgrid(right, up)), np.full(900, outward * np.abs(bounds[2]).max())]
+        )
+        face[2] += outward * 1e-3  # just before it
+        for part in car.parts:
+            assert not (part.normals @ face <= part.offsets[:, None]).all(axis=0).any()
+
+
+def test_a_positive_bend_turns_to_the_right_and_zero_is_straight():
+    right, straight = (drawn_road(FrameSpec("bare", bend=bend, seed=4)).course for bend in (0.01, 0.0))
+    assert right.point(0.0, 20.0)[0] - straight.point(0.0, 20.0)[0] == pytest.approx(0.01 / 2 * 20**2)
+    assert straight.bend == 0
+
+
+@pytest.mark.parametrize("shape", ["flat", *SHAPES])
+@pytest.mark.parametrize("scene", ["bare", "verge"])
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_the_ground_of_a_country_road_has_no_steps(shape, scene, seed):
+    crossfall = 0.0 if shape == "flat" else 0.04
+    spec = FrameSpec(scene, cross_section=shape, crossfall=crossfall, gutter=0.1, seed=seed)
+    road, grounds = drawn_road(spec), [s for s in build_scene(spec).surfaces if isinstance(s, Ground)]
+    edges = {edge for ground in grounds for edge in ground.edges if math.isfinite(edge)}
+    assert len(edges) >= 2
+    down = np.array([[0.0], [-1.0], [0.0]])
+    for edge in edges:
+        heights = []
+        for lateral in (edge - 1e-7, edge + 1e-7):
+            above = road.course.point(lateral, 6.0, 50.0)[:, None]
+            heights.append(50.0 - min(float(ground.intersect(above, down)[0]) for ground in grounds))
+        assert abs(heights[0] - heights[1]) < 1e-6

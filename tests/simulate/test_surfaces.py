@@ -1,0 +1,142 @@
+"""Rays meet surfaces where a slow march along the ray says so, and textures do not stretch."""
+
+import numpy as np
+import pytest
+
+from rollcli.simulate.road import Piece
+from rollcli.simulate.roadside import box, vehicle
+from rollcli.simulate.solids import Post, Solid, TreeCrown
+from rollcli.simulate.surfaces import Backdrop, Course, Ground, Wall
+
+COURSE = Course(heading=0.03, bend=1 / 300, curvature=0.001)
+ORIGIN = np.array([[0.3], [1.6], [0.1]])
+GROUND = Ground(COURSE, (-4.0, 1.0, 9.0), (0, 1), far=80.0, slope=0.1, offset=-0.2)
+WALL = Wall(COURSE, -6.0, 0.0, np.array([-5.0, 20.0, 50.0]), np.array([9.0, 4.0]), 0)
+BACKDROP = Backdrop(COURSE, 60.0, -5.0, np.full(200, 7.0), 0)
+CAR = vehicle(np.random.default_rng(3), COURSE, Piece(-5, 5), 1.0, 9.0, 0, oncoming=True)
+POST = Post(COURSE.point(2.0, 8.0), 0.3, 4.0, 0)
+TREE_CROWN = TreeCrown(COURSE.point(-1.0, 12.0, 2.5), 1.8, 2.2, 0)
+
+
+def inside_car(points):
+    local = CAR.frame @ (points - CAR.place[:, None])
+    return np.any([np.all(n @ local <= d[:, None], axis=0) for n, d, _ in CAR.parts], axis=0)
+
+
+def inside_post(points):
+    x, y, z = points - POST.foot[:, None]
+    return (np.hypot(x, z) <= 0.3) & (y >= 0) & (y < 4)
+
+
+def below_ground(points):
+    lateral, elevation = COURSE.lateral(points), COURSE.elevation(points)
+    return (elevation < -0.2 + 0.1 * lateral) & (lateral >= -4) & (lateral < 9) & (points[2] < 80)
+
+
+def behind_wall(points):
+    elevation, z = COURSE.elevation(points), points[2]
+    top = np.where(z < 20, 9.0, 4.0)
+    return (COURSE.lateral(points) < -6) & (elevation >= 0) & (elevation < top) & (z > -5) & (z < 50)
+
+
+def beyond_backdrop(points):
+    rise = COURSE.curvature / 2 * 60**2
+    return (points[2] > 60) & (points[1] - rise >= -5) & (points[1] - rise < 7)
+
+
+def rays(count, toward, spread, seed=0):
+    """Directions around one, of length one along Z."""
+    rng = np.random.default_rng(seed)
+    aim = (np.array(toward)[:, None] - ORIGIN) + rng.uniform(-spread, spread, (3, count))
+    return aim / aim[2]
+
+
+SURFACES = [
+    pytest.param(GROUND, below_ground, (2, 0, 15), 6, id="ground"),
+    pytest.param(WALL, behind_wall, (-6, 3, 18), 6, id="wall"),
+    pytest.param(BACKDROP, beyond_backdrop, (0, 5, 60), 12, id="backdrop"),
+    pytest.param(CAR, inside_car, COURSE.point(1.0, 9.0, 0.7), 1.6, id="car"),
+    pytest.param(POST, inside_post, COURSE.point(2.0, 8.0, 2.0), 1.2, id="post"),
+    pytest.param(POST, inside_post, COURSE.point(2.0, 8.0, 0.1), 0.8, id="foot of a post"),
+]
+
+
+@pytest.mark.parametrize(("surface", "inside", "toward", "spread"), SURFACES)
+def test_a_ray_meets_a_surface_where_marching_along_it_first_comes_inside(surface, inside, toward, spread):
+    direction = rays(300, toward, spread)
+    # along rays of any length
+    scale = np.random.default_rng(1).uniform(0.3, 3, 300)
+    met = surface.intersect(ORIGIN, direction * scale) * scale
+    step = 0.02
+    marched = np.full(300, np.inf)
+    for t in np.arange(step, 75, step)[::-1]:
+        marched[inside(ORIGIN + t * direction)] = t
+    hits = np.isfinite(met)
+    assert 50 < hits.sum() < 300
+    # a corner can be thinner than a step, and a wall be entered from its end
+    agree = np.isclose(met, marched, atol=step * 1.01) | (hits == np.isfinite(marched)) & ~hits
+    assert agree.mean() > 0.97
+
+
+def test_a_point_on_the_line_between_two_strips_belongs_to_the_right_one():
+    x = np.array([-4.0, np.nextafter(1.0, 0), 1.0, 9.0])
+    ground = Ground(Course(), (-4.0, 1.0, 9.0), (5, 6), far=80.0)
+    points = np.array([x, np.zeros(4), np.full(4, 10.0)])
+    assert list(ground.sample(points).material) == [5, 5, 6, 6]
+
+
+@pytest.mark.parametrize(("distance", "met"), [(0.049, False), (0.051, True), (99.0, True), (101.0, False)])
+def test_a_surface_is_met_from_five_centimetres_to_its_far_end(distance, met):
+    ground = Ground(Course(), (-np.inf, np.inf), (0,), far=100.0)
+    origin = np.array([[0.0], [distance / 10], [0.0]])
+    t = ground.intersect(origin, np.array([[0.0], [-0.1], [1.0]]))
+    assert np.isfinite(t[0]) == met
+
+
+def test_a_crown_of_a_tree_is_met_on_its_ellipsoid_and_seen_through():
+    direction = rays(2000, TREE_CROWN.centre, 1.5)
+    met = TREE_CROWN.intersect(ORIGIN, direction)
+    hits = np.isfinite(met)
+    x, y, z = (ORIGIN + met[hits] * direction[:, hits]) - TREE_CROWN.centre[:, None]
+    assert np.allclose((x / 1.8) ** 2 + (y / 2.2) ** 2 + (z / 1.8) ** 2, 1)
+    assert np.any(z < 0)
+    assert np.any(z > 0)
+
+
+@pytest.mark.parametrize(
+    ("surface", "toward"),
+    [
+        (GROUND, (0, 0, 12)),
+        (WALL, (-6, 3, 18)),
+        (BACKDROP, (0, 5, 60)),
+        (CAR, (1.3, 0.7, 9)),
+        (POST, (2.4, 2, 8)),
+        (TREE_CROWN, (-0.4, 2.5, 12)),
+    ],
+)
+def test_normals_and_gradients_are_those_of_the_surface(surface, toward):
+    direction = rays(400, toward, 2.0)
+    neighbour = direction + np.array([[1e-5], [1e-5], [0.0]])
+    first, second = surface.intersect(ORIGIN, direction), surface.intersect(ORIGIN, neighbour)
+    both = np.isfinite(first) & np.isfinite(second)
+    here, there = ORIGIN + first[both] * direction[:, both], ORIGIN + second[both] * neighbour[:, both]
+    at, beside = surface.sample(here), surface.sample(there)
+    moved = there - here
+    same_face = np.linalg.norm(moved, axis=0) < 1e-2
+    along_normal = (at.normal * moved).sum(axis=0) / np.linalg.norm(moved, axis=0)
+    assert same_face.sum() > 30
+    assert np.median(np.abs(along_normal[same_face])) < 1e-3
+    moves = np.median(np.linalg.norm(moved, axis=0))
+    for before, after, gradient in ((at.p, beside.p, at.grad_p), (at.q, beside.q, at.grad_q)):
+        change = (gradient * moved).sum(axis=0)
+        assert np.median(np.abs(after - before - change)[same_face]) < 0.01 * moves
+
+
+@pytest.mark.parametrize("mirror", [1.0, -1.0])
+def test_a_ray_along_the_faces_of_a_box_meets_its_front_where_it_does_not_pass_by(mirror):
+    extent = np.array([[-1.0, 1.0], [0.0, 2.0], [-3.0, 3.0]])
+    body = Solid(np.diag([mirror, 1, 1]), np.array([0.0, 0.0, 10.0]), (box(1.0, 2.0, 3.0, 0),), extent)
+    x, y = (each.ravel() for each in np.meshgrid([-1.5, -0.5, 0.5, 1.5], [-0.5, 0.5, 1.5, 2.5]))
+    origin = np.array([x, y, np.zeros(16)])
+    met = body.intersect(origin, np.tile([[0.0], [0.0], [1.0]], 16))
+    assert np.array_equal(met, np.where((np.abs(x) < 1) & (y > 0) & (y < 2), 7.0, np.inf))

@@ -1,0 +1,120 @@
+"""The two views differ by parallax and noise alone, and hold no detail finer than their pixels."""
+
+import math
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from rollcli.simulate.build import build_scene
+from rollcli.simulate.render import render_frame, render_view
+from rollcli.simulate.spec import FrameSpec
+from rollcli.stereo.match import compute_disparity
+
+CLEAN = {"noise": 0.0, "colour": False}
+STREET = FrameSpec("street", math.radians(6), math.radians(2), seed=12, size=(320, 240), focal=186.0, **CLEAN)
+
+
+def warped(image, disparity):
+    """`image` of the right view, read where the left view's pixels are to be found."""
+    v, u = np.indices(disparity.shape, np.float32)
+    return cv2.remap(image.astype(np.float32), u - disparity, v, cv2.INTER_LINEAR, borderValue=np.nan)
+
+
+@pytest.mark.parametrize("scene", ["open", "street", "verge"])
+def test_the_right_view_moved_by_the_true_disparity_is_the_left_view(scene):
+    spec = replace(STREET, scene=scene)
+    frame = render_frame(spec)
+    right_depth = render_view(build_scene(spec), spec.cameras()[1]).depth
+    expected = spec.focal * spec.baseline / np.maximum(frame.disparity, 1e-6)
+    seen_by_both = np.abs(warped(1 / right_depth, frame.disparity) * expected - 1) < 0.01
+    seen_by_both &= np.indices(frame.disparity.shape)[1] - frame.disparity > 1
+    assert seen_by_both.mean() > 0.4
+    # the mean squared difference is a parabola of the shift: its lowest point is where the views agree
+    shifts = (-0.5, 0.0, 0.5)
+    before, there, after = (
+        np.mean((warped(frame.right, frame.disparity + shift) - frame.left)[seen_by_both] ** 2)
+        for shift in shifts
+    )
+    assert there < 0.5 * min(before, after)
+    assert abs((before - after) / (before + after - 2 * there)) * 0.25 < 0.05
+
+
+def test_without_noise_and_gain_the_views_have_the_same_brightness():
+    frame = render_frame(STREET)
+    v, u = np.nonzero(frame.road[150:])
+    assert abs(float(frame.left[150:][v, u].mean()) - float(frame.right[150:][v, u].mean())) < 3
+
+
+def test_gain_makes_the_right_view_brighter_and_leaves_the_left_one_alone():
+    plain, bright = render_frame(STREET), render_frame(replace(STREET, gain=1.3))
+    assert np.array_equal(plain.left, bright.left)
+    dark = (plain.right > 40) & (plain.right < 200)
+    ratio = (bright.right[dark] / plain.right[dark].astype(float)) ** 2
+    assert np.median(ratio) == pytest.approx(1.3, abs=0.01)
+
+
+def test_noise_has_the_strength_asked_for_and_differs_between_the_views():
+    clean, noisy = render_frame(STREET), render_frame(replace(STREET, noise=4.0))
+    errors = []
+    for before, after in ((clean.left, noisy.left), (clean.right, noisy.right)):
+        errors.append(after.astype(float) - before)
+        inside = (before > 30) & (before < 225)
+        assert errors[-1][inside].std() == pytest.approx(4.0, rel=0.05)
+    assert abs(np.corrcoef(errors[0].ravel(), errors[1].ravel())[0, 1]) < 0.01
+    assert np.array_equal(clean.disparity, noisy.disparity)
+
+
+@pytest.mark.parametrize("scene", ["bare", "street"])
+def test_no_pixel_shows_detail_finer_than_itself(scene):
+    spec = FrameSpec(scene, pitch=math.radians(2), size=(160, 120), focal=93, seed=5, **CLEAN)
+    frame = render_frame(spec)
+    fine = render_frame(replace(spec, size=(960, 720), focal=558)).left.astype(float)
+    # what a pixel should show: the mean of 36 rays, each with a footprint of its own
+    reference = fine.reshape(120, 6, 160, 6).mean(axis=(1, 3))
+    far = frame.road & (np.arange(120) < 80)[:, None]  # there a pixel covers metres of road
+    assert far.sum() > 300
+    shown, sampled = (
+        np.sqrt(np.mean((image - reference)[far] ** 2)) for image in (frame.left, fine[3::6, 3::6])
+    )
+    assert shown < 0.3 * reference[far].std()
+    assert shown < 0.6 * sampled, "hardly better than one point of each pixel"
+
+
+@pytest.mark.parametrize(("horizon", "ground"), [(119.25, 0.25), (118.75, 0.75)])
+def test_a_pixel_on_the_horizon_shows_sky_and_ground_in_the_share_of_its_rays(horizon, ground):
+    # the ground ends 2 km away, a little below the row of the principal point
+    centre = (159.5, horizon - 186.0 * 1.65 / 2000)
+    spec = FrameSpec("bare", principal_point=centre, seed=5, size=(320, 240), focal=186.0, **CLEAN)
+    scene = build_scene(spec)
+    light = render_view(scene, spec.cameras(scene.normal)[0]).light[..., 0]
+    share = (light[119] - light[118]) / (light[120] - light[118])
+    assert np.median(share) == pytest.approx(ground, abs=0.05)
+
+
+@pytest.mark.parametrize("scene", ["open", "street"])
+def test_a_stereo_matcher_finds_the_road_as_well_as_on_real_pairs(scene):
+    frame = render_frame(FrameSpec(scene, math.radians(-5), math.radians(2), seed=31))
+    found = compute_disparity(frame.left, frame.right, mode="3way")
+    error = np.abs(found - frame.disparity)[frame.road & (found > 0)]
+    assert len(error) > 0.6 * frame.road.sum()
+    assert 0.05 < np.median(error) < 0.3
+    assert np.mean(error > 1) < 0.03
+
+
+def test_a_picture_is_the_same_rendered_in_one_band_of_rows_or_in_many(monkeypatch):
+    whole = render_frame(STREET)
+    monkeypatch.setattr("rollcli.simulate.render._BAND", 17 * 320)
+    banded = render_frame(STREET)
+    assert np.array_equal(whole.left, banded.left)
+    assert np.array_equal(whole.right, banded.right)
+    assert np.array_equal(whole.disparity, banded.disparity)
+    assert np.array_equal(whole.road, banded.road)
+
+
+def test_colour_and_grey_show_the_same_picture():
+    grey, colour = render_frame(STREET).left, render_frame(replace(STREET, colour=True)).left
+    assert grey.shape == (240, 320)
+    assert colour.shape == (240, 320, 3)
+    assert np.abs(cv2.cvtColor(colour, cv2.COLOR_BGR2GRAY).astype(float) - grey).mean() < 3

@@ -1,0 +1,280 @@
+"""A right view that is shifted, turned or enlarged is levelled, so that it does not pass for a roll."""
+
+import math
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from rollcli.errors import InputError, UsageError
+from rollcli.estimator.estimate import estimate_roll
+from rollcli.files.formats import read_image
+from rollcli.files.inputs import pair_inputs
+from rollcli.simulate.draw import draw_specs
+from rollcli.simulate.render import render_frame
+from rollcli.simulate.spec import FrameSpec
+from rollcli.stereo.alignment import Approach, level
+from rollcli.stereo.match import StereoOptions, match_pair
+from rollcli.stereo.misalignment import LEVEL, Misalignment
+
+SHARED = Path(__file__).parents[2].parent / "shared"
+ROLL = math.radians(-3)
+ODD_RIGS = [  # degrees clockwise, percent larger, pixels lower
+    (0.3, 0.0, 0.0),
+    (-0.8, 0.0, 0.0),
+    (0.0, 0.4, 0.0),
+    (0.0, -0.8, 0.0),
+    (0.0, 0.0, -0.6),
+    (0.0, 0.0, 4.0),
+    (0.6, 0.8, -4.0),
+    (-0.8, -0.4, 2.0),
+]
+
+
+@pytest.fixture(scope="module", params=["open", "street"])
+def frame(request):
+    return render_frame(FrameSpec(scene=request.param, roll=ROLL, seed=31, colour=False))
+
+
+def seen_by(view, *, clockwise_deg=0.0, larger_percent=0.0, lower=0.0):
+    """The view as an odd camera sees it; OpenCV's own matrix, not the program's formulas."""
+    height, width = view.shape[:2]
+    centre = (width - 1) / 2, (height - 1) / 2
+    matrix = cv2.getRotationMatrix2D(centre, -clockwise_deg, 1 + larger_percent / 100)
+    matrix[1, 2] += lower
+    return cv2.warpAffine(
+        view, matrix, (width, height), flags=cv2.INTER_LANCZOS4, borderMode=cv2.BORDER_REFLECT
+    )
+
+
+def roll_deg(left, right, **options):
+    return math.degrees(estimate_roll(match_pair(left, right, StereoOptions(**options)).disparity).theta)
+
+
+@pytest.mark.parametrize(("clockwise_deg", "larger_percent", "lower"), ODD_RIGS)
+def test_what_a_camera_was_moved_by_is_found_and_taken_away(frame, clockwise_deg, larger_percent, lower):
+    odd = {"clockwise_deg": clockwise_deg, "larger_percent": larger_percent, "lower": lower}
+
+    match = match_pair(frame.left, seen_by(frame.right, **odd), StereoOptions())
+
+    assert match.doubt == ""
+    assert match.corrected.rotation_deg == pytest.approx(clockwise_deg, abs=0.03)
+    assert 100 * match.corrected.scale == pytest.approx(larger_percent, abs=0.05)
+    assert match.corrected.offset == pytest.approx(lower, abs=0.15)
+    found = math.degrees(estimate_roll(match.disparity).theta)
+    assert found == pytest.approx(roll_deg(frame.left, frame.right), abs=0.1)
+
+
+def test_uncorrected_they_would_turn_the_road(frame):
+    right = seen_by(frame.right, clockwise_deg=0.3)
+
+    assert abs(roll_deg(frame.left, right, align="off") - roll_deg(frame.left, right)) > 0.2
+
+
+def test_the_interval_knows_that_levelling_errs():
+    """Enlarged views of six empty roads: without what levelling leaves, it misses two of the twelve rolls."""
+    rolls = np.radians(np.linspace(-8, 8, 6))
+    frames = [render_frame(FrameSpec(roll=roll, seed=seed, colour=False)) for seed, roll in enumerate(rolls)]
+    reached = []
+    for roll, frame in zip(rolls, frames, strict=True):
+        for larger_percent in (0.2, -0.4):
+            right = seen_by(frame.right, larger_percent=larger_percent)
+            match = match_pair(frame.left, right, StereoOptions())
+            found = estimate_roll(match.disparity, slope_error=match.slope_error)
+            reached.append(abs(found.theta - roll) <= found.ci95)
+
+    assert sum(reached) >= 0.9 * len(reached)
+
+
+def test_a_pair_that_was_not_levelled_has_no_error_of_levelling(frame):
+    assert match_pair(frame.left, frame.right, StereoOptions()).slope_error == 0
+    lower = seen_by(frame.right, lower=2.0)
+    assert match_pair(frame.left, lower, StereoOptions(vertical_offset=2.0)).slope_error == 0
+    assert match_pair(frame.left, lower, StereoOptions()).slope_error > 0
+
+
+def test_rows_that_a_lens_has_skewed_are_straightened(frame):
+    height, width = frame.right.shape
+    columns, rows = np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32))
+    x, y = columns - (width - 1) / 2, rows - (height - 1) / 2
+    skew = 1.4 / (width * height / 4)  # 1.4 px in the corners, as on KITTI
+    right = cv2.remap(frame.right, columns, rows - np.float32(skew) * x * y, cv2.INTER_LANCZOS4)
+
+    match = match_pair(frame.left, right, StereoOptions())
+
+    # less than 0.3 px in the corners counts as level
+    assert match.corrected.shifts(height, width)[3] == pytest.approx(1.4, abs=0.3)
+    found = math.degrees(estimate_roll(match.disparity).theta)
+    assert found == pytest.approx(roll_deg(frame.left, frame.right), abs=0.05)
+
+
+@pytest.mark.parametrize("downscale", [1.0, 2.0])
+def test_a_level_pair_is_left_as_it_is(frame, downscale):
+    match = match_pair(frame.left, frame.right, StereoOptions(downscale=downscale))
+
+    assert match.corrected == LEVEL
+    assert match.doubt == ""
+    count = match.num_disparities
+    off = match_pair(
+        frame.left, frame.right, StereoOptions(align="off", num_disparities=count, downscale=downscale)
+    )
+    np.testing.assert_array_equal(match.disparity, off.disparity)
+
+
+@pytest.fixture(scope="module", params=[1, 5, 14])
+def empty_road(request):
+    """Grain and noise: of two of these, small views say that the right one is turned and skewed."""
+    span = math.radians(10)
+    specs = draw_specs(
+        request.param + 1, scene="bare", roll=(-span, span), noise=4.0, seed=6101, colour=False
+    )
+    return render_frame(specs[-1])
+
+
+def test_a_level_pair_of_an_empty_road_is_left_as_it_is(empty_road):
+    match = match_pair(empty_road.left, empty_road.right, StereoOptions())
+
+    assert match.corrected == LEVEL
+    assert match.doubt == ""
+
+
+@pytest.mark.parametrize(("larger_percent", "lower"), [(0.2, 0.0), (0.0, 0.3), (0.0, 0.4), (0.0, -2.0)])
+def test_what_a_map_of_an_empty_road_hides_is_found_or_doubted(empty_road, larger_percent, lower):
+    right = seen_by(empty_road.right, larger_percent=larger_percent, lower=lower)
+
+    match = match_pair(empty_road.left, right, StereoOptions())
+
+    found = math.degrees(estimate_roll(match.disparity).theta)
+    assert match.doubt or found == pytest.approx(roll_deg(empty_road.left, empty_road.right), abs=0.1)
+
+
+def test_brightness_is_no_misalignment(frame):
+    brighter = np.clip(frame.right.astype(np.float32) * 1.1 + 12, 0, 255).astype(np.uint8)
+
+    assert match_pair(frame.left, brighter, StereoOptions()).corrected == LEVEL
+
+
+def test_what_is_measured_at_half_size_is_in_pixels_of_that(frame):
+    match = match_pair(frame.left, seen_by(frame.right, lower=3), StereoOptions(downscale=2))
+
+    assert match.corrected.offset == pytest.approx(1.5, abs=0.1)
+
+
+def test_an_offset_that_is_given_is_not_measured(frame):
+    match = match_pair(frame.left, seen_by(frame.right, lower=0.6), StereoOptions(vertical_offset=0.5))
+
+    assert match.corrected == Misalignment(offset=0.5)
+
+
+def test_align_off_measures_nothing(frame):
+    match = match_pair(frame.left, seen_by(frame.right, lower=3), StereoOptions(align="off"))
+
+    assert match.corrected == LEVEL
+    assert match.doubt == ""
+
+
+def test_where_nothing_tells_whether_the_views_are_level_that_is_said():
+    plain = np.full((120, 400), 90, np.uint8)
+
+    assert "to tell whether the views are level" in match_pair(plain, plain, StereoOptions()).doubt
+
+
+def test_a_camera_that_is_too_far_off_is_never_corrected_without_a_word(frame):
+    right = seen_by(frame.right, clockwise_deg=3)
+
+    assert match_pair(frame.left, right, StereoOptions()).doubt
+
+
+def test_swapped_views_are_told(frame):
+    with pytest.raises(InputError, match="the views seem swapped"):
+        match_pair(frame.right, frame.left, StereoOptions())
+
+
+def test_swapped_and_turned_views_are_told(frame):
+    with pytest.raises(InputError, match="the views seem swapped"):
+        match_pair(seen_by(frame.right, clockwise_deg=0.4, lower=1), frame.left, StereoOptions())
+
+
+def test_images_of_two_places_are_told(frame):
+    elsewhere = render_frame(FrameSpec(scene="street", roll=0.05, seed=77, colour=False))
+
+    with pytest.raises(InputError, match="do not show the same scene"):
+        match_pair(frame.left, elsewhere.right, StereoOptions())
+
+
+def test_one_image_given_twice_is_told(frame):
+    with pytest.raises(InputError, match="the left and the right image are the same"):
+        match_pair(frame.left, frame.left.copy(), StereoOptions())
+
+
+@pytest.mark.parametrize("height", [1, 2, 7])
+def test_views_of_a_few_rows_tell_nothing(frame, height):
+    match = match_pair(frame.left[:height], frame.right[:height], StereoOptions())
+
+    assert match.disparity.shape == (height, frame.left.shape[1])
+    assert "to tell whether the views are level" in match.doubt
+
+
+def test_who_searches_below_zero_may_swap_the_views(frame):
+    match = match_pair(frame.right, frame.left, StereoOptions(min_disparity=-96, num_disparities=96))
+
+    assert not (match.disparity > 2).mean() > 0.1  # what is below 0 is no data
+
+
+def test_whole_pixels_move_rows():
+    view = np.random.default_rng(0).integers(0, 256, (20, 30), dtype=np.uint8)
+
+    np.testing.assert_array_equal(level(view, Misalignment(offset=2))[:-2], view[2:])
+    np.testing.assert_array_equal(level(view, Misalignment(offset=-1))[1:], view[:-1])
+
+
+def test_levelling_is_the_inverse_of_what_the_camera_did():
+    rng = np.random.default_rng(1)
+    view = cv2.GaussianBlur(rng.integers(0, 256, (240, 320), dtype=np.uint8), (0, 0), 3)
+    odd = seen_by(view, clockwise_deg=0.8, larger_percent=0.8, lower=3)
+
+    again = level(odd, Misalignment(offset=3, rotation=math.radians(0.8), scale=0.008))
+
+    inside = np.s_[12:-12, 12:-12]
+    assert np.abs(again[inside].astype(int) - view[inside]).max() <= 2
+
+
+def test_what_a_map_hides_is_found_from_two_measurements():
+    """A rig 2 px low, of which each map hides two thirds."""
+    approach, at = Approach((200, 300)), LEVEL
+    for _ in range(3):
+        at = approach.next(at, at + (Misalignment(offset=2) - at).times(1 / 3))
+
+    assert at.offset == pytest.approx(2)
+
+
+@pytest.mark.parametrize("offset", [-101, 100.5, math.nan])
+def test_an_offset_that_cannot_be_is_refused(offset):
+    with pytest.raises(UsageError, match="vertical-offset"):
+        StereoOptions(vertical_offset=offset)
+
+
+def test_a_way_to_align_that_is_not_there_is_refused():
+    with pytest.raises(UsageError, match="align"):
+        StereoOptions(align="on")
+
+
+@pytest.mark.skipif(not (SHARED / "streets").is_dir(), reason="no real street pairs at ../shared/streets")
+@pytest.mark.parametrize(("clockwise_deg", "larger_percent", "lower"), [(0.5, 0.0, -2.0), (-0.8, 0.8, 4.0)])
+def test_real_street_pairs_are_levelled_by_what_was_added(clockwise_deg, larger_percent, lower):
+    odd = {"clockwise_deg": clockwise_deg, "larger_percent": larger_percent, "lower": lower}
+    compared = 0
+    for pair in pair_inputs(str(SHARED / "streets" / "left"), str(SHARED / "streets" / "right"))[::6]:
+        left, right = read_image(pair.left.path), read_image(pair.right.path)
+        as_it_is = match_pair(left, right, StereoOptions())
+        match = match_pair(left, seen_by(right, **odd), StereoOptions())
+
+        added = match.corrected - as_it_is.corrected
+        assert added.rotation_deg == pytest.approx(clockwise_deg, abs=0.03)
+        assert added.offset == pytest.approx(lower, abs=0.1)
+        found, before = estimate_roll(match.disparity), estimate_roll(as_it_is.disparity)
+        if before.status == "ok":  # a suspect angle may be either of two planes
+            assert math.degrees(found.theta - before.theta) == pytest.approx(0, abs=0.1)
+            compared += 1
+    assert compared >= 2

@@ -1,0 +1,99 @@
+"""How views lie, added, resized and said, against numbers worked out by hand."""
+
+import math
+
+import pytest
+
+from rollcli.stereo.misalignment import LEVEL, Misalignment
+from rollcli.stereo.misalignment_words import advice_of, note_of, read_note
+
+
+def test_parts_are_added_taken_away_and_multiplied():
+    one, other = Misalignment(1, 0.2, 0.03, 0.004), Misalignment(0.5, -0.1, 0.01, 0.001)
+    for found, expected in (
+        (one + other, (1.5, 0.1, 0.04, 0.005)),
+        (one - other, (0.5, 0.3, 0.02, 0.003)),
+        (one.times(-2), (-2, -0.4, -0.06, -0.008)),
+    ):
+        assert (found.offset, found.rotation, found.scale, found.twist) == pytest.approx(expected)
+
+
+def test_views_twice_as_large_shift_twice_as_far_everywhere():
+    lies = Misalignment(1.5, 0.02, -0.03, 0.004)
+
+    assert lies.resized(2).shifts(200, 600) == pytest.approx([2 * each for each in lies.shifts(100, 300)])
+    assert lies.shifts(100, 300) == pytest.approx((1.5, 0.02 * 150, -0.03 * 50, 0.004 * 150 * 50))
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_a_large_scale_is_in_the_columns_too_and_a_small_one_is_not(sign):
+    assert Misalignment(scale=sign * 0.01).stretch == pytest.approx(sign * 0.01, rel=0.01)
+    assert abs(Misalignment(scale=sign * 0.00005).stretch) < 0.05 * 0.00005
+    assert LEVEL.stretch == 0
+
+
+def test_the_error_of_a_stretch_is_that_of_the_scale_and_of_the_doubt_about_it():
+    assert LEVEL.stretch_error == 0
+    small, large = (Misalignment(1, scale=scale).stretch_error for scale in (0, 0.02))
+    # on rendered pairs scales are wrong by 0.025 %, and a lens bends rows by 0.03 %
+    assert small == pytest.approx(0.00025, rel=0.2)
+    assert large == pytest.approx(math.hypot(0.00025, 0.0003), rel=0.2)
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_what_would_be_written_as_nothing_is_not_said(sign):
+    corner = 200 * 1000 / 4
+    for least, part in (
+        (0.005, lambda value: Misalignment(offset=value)),
+        (0.0005, lambda value: Misalignment(rotation=math.radians(value))),
+        (0.0005, lambda value: Misalignment(scale=value / 100)),
+        (0.005, lambda value: Misalignment(twist=value / corner)),
+    ):
+        assert note_of(part(0.98 * sign * least), 200, 1000) == ""
+        said = note_of(part(1.02 * sign * least), 200, 1000)
+        assert said.startswith("corrected: the right image ")
+        assert read_note(said, 200, 1000) != LEVEL
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_each_part_is_read_back_whichever_way_it_points(sign):
+    odd = Misalignment(*(sign * each for each in (1.25, math.radians(0.125), 0.00375, 3e-5)))
+
+    found = read_note(note_of(odd, 200, 1000), 200, 1000)
+
+    assert found.offset == pytest.approx(odd.offset)
+    assert found.rotation == pytest.approx(odd.rotation)
+    assert found.scale == pytest.approx(odd.scale)
+    assert found.twist == pytest.approx(odd.twist)
+
+
+@pytest.mark.parametrize(
+    ("odd", "words"),
+    [
+        (Misalignment(rotation=math.radians(0.2)), "0.20 degrees against the left, counter-clockwise"),
+        (Misalignment(rotation=math.radians(-0.2)), "0.20 degrees against the left, clockwise"),
+        (Misalignment(offset=0.4), "lies 0.40 px lower"),
+        (Misalignment(offset=-0.4), "lies 0.40 px higher"),
+        (Misalignment(scale=0.004), "is 0.40 % larger"),
+        (Misalignment(scale=-0.004), "is 0.40 % smaller"),
+        (Misalignment(twist=-2e-5), "skewed by 1.0 px in the corners"),
+    ],
+)
+def test_advice_names_the_way_of_each_part_alone(odd, words):
+    advice = advice_of(odd, 200, 1000)
+
+    assert words in advice
+    assert advice.endswith(": recalibrate")
+    assert advice.count("px") + advice.count("degrees") + advice.count("%") == 1
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_no_advice_is_given_for_what_turns_a_road_by_less_than_a_tenth_of_a_degree(sign):
+    for limit, part in (
+        (0.03, lambda value: Misalignment(rotation=math.radians(value))),
+        (0.15, lambda value: Misalignment(offset=value)),
+        (0.1, lambda value: Misalignment(scale=value / 100)),
+        (0.5, lambda value: Misalignment(twist=value / 50_000)),
+    ):
+        assert advice_of(part(0.99 * sign * limit), 200, 1000) == ""
+        assert advice_of(part(1.01 * sign * limit), 200, 1000)

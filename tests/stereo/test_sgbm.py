@@ -1,0 +1,181 @@
+"""What OpenCV is asked to match, against OpenCV itself."""
+
+import cv2
+import numpy as np
+import pytest
+
+from rollcli.errors import UsageError
+from rollcli.stereo import sgbm
+from rollcli.stereo.options import StereoOptions
+from rollcli.stereo.sgbm import match_rows, match_views, usable_range
+from rollcli.stereo.views import resampled
+
+
+@pytest.fixture(scope="module")
+def views():
+    """A slope of noise, a few outliers, and a part that cannot be matched."""
+    rng = np.random.default_rng(5)
+    texture = cv2.GaussianBlur(rng.integers(0, 256, (140, 300), dtype=np.uint8), (0, 0), 1)
+    left = texture[:, 60:260]
+    rows = [texture[v, 60 + 8 + v // 10 : 260 + 8 + v // 10] for v in range(140)]
+    right = np.stack(rows)
+    right = np.clip(right + rng.normal(0, 6, right.shape), 0, 255).astype(np.uint8)
+    right[30:50, 100:160] = 128
+    return np.ascontiguousarray(left), right
+
+
+@pytest.mark.parametrize(
+    ("count", "first", "width", "block", "usable"),
+    [
+        (1, 0, 400, 5, 16),
+        (0, 0, 400, 5, 16),
+        (-7, 0, 400, 5, 16),
+        (16, 0, 400, 5, 16),
+        (17, 0, 400, 5, 32),
+        (1000, 0, 400, 5, 384),
+        (1000, 0, 405, 5, 400),
+        (1000, 0, 404, 5, 384),
+        (1000, 100, 405, 5, 288),
+        (1000, -100, 405, 5, 288),
+        (1000, 0, 405, 7, 384),
+        (64, 0, 20, 5, 0),
+        (64, 0, 21, 5, 16),
+    ],
+)
+def test_ranges_are_multiples_of_16_that_leave_columns_to_match(count, first, width, block, usable):
+    assert usable_range(count, first, width, block) == usable
+
+
+@pytest.mark.parametrize("mode", ["3way", "sgbm", "hh"])
+@pytest.mark.parametrize(
+    "given", [{}, {"block_size": 9, "uniqueness": 40}, {"speckle_size": 400, "speckle_range": 1}]
+)
+def test_a_match_is_opencvs_own_in_pixels(views, mode, given):
+    modes = {"3way": cv2.STEREO_SGBM_MODE_SGBM_3WAY, "sgbm": cv2.STEREO_SGBM_MODE_SGBM}
+    options = StereoOptions(mode=mode, **given)
+    matcher = cv2.StereoSGBM.create(-16, 48, options.block_size)
+    matcher.setMode(modes.get(mode, cv2.STEREO_SGBM_MODE_HH))
+    matcher.setP1(8 * options.block_size**2 // 2)  # half of what OpenCV's samples take
+    matcher.setP2(32 * options.block_size**2 // 2)
+    matcher.setDisp12MaxDiff(1)
+    matcher.setUniquenessRatio(options.uniqueness)
+    matcher.setSpeckleWindowSize(options.speckle_size)
+    matcher.setSpeckleRange(options.speckle_range)
+    sixteenths = matcher.compute(*views)
+
+    disparity = match_views(views, -16, 48, options)
+
+    assert disparity.dtype == np.float32
+    assert (disparity > 0).mean() > 0.3
+    np.testing.assert_array_equal(disparity, np.where(sixteenths > 0, sixteenths / 16, 0))
+
+
+@pytest.mark.parametrize(
+    ("rows", "seen"),
+    [
+        (slice(60, 80), slice(44, 96)),
+        (slice(10, 20), slice(0, 36)),
+        (slice(100, 140), slice(84, 140)),
+        (slice(17, 24), slice(1, 40)),
+        (slice(60, 123), slice(44, 139)),
+    ],
+)
+def test_rows_that_are_needed_are_matched_with_16_beside_them(views, rows, seen):
+    options = StereoOptions()
+
+    disparity = match_rows(views, 0, 48, options, rows)
+
+    left, right = views
+    alone = match_views((left[seen], right[seen]), 0, 48, options)
+    np.testing.assert_array_equal(disparity[seen], alone)
+    disparity[seen] = 0
+    assert not disparity.any()
+
+
+@pytest.mark.parametrize("rows", [slice(None), slice(16, 124), slice(5, 130), slice(0, 200)])
+def test_rows_that_need_all_are_matched_as_a_whole(views, rows):
+    options = StereoOptions()
+    whole = match_views(views, 0, 48, options)
+    np.testing.assert_array_equal(match_rows(views, 0, 48, options, rows), whole)
+
+
+@pytest.mark.parametrize(("above", "top"), [(60, 44), (17, 1), (150, 124)])
+def test_rows_above_are_matched_at_a_third_of_the_size(views, above, top):
+    disparity = match_rows(views, 0, 40, StereoOptions(speckle_size=90), above=above)
+
+    below = match_rows(views, 0, 40, StereoOptions(speckle_size=90), slice(above, None))
+    np.testing.assert_array_equal(disparity[top:], below[top:])
+    size = round(200 / 3), round((top + 16) / 3)
+    left, right = (cv2.resize(view[: top + 16], size, interpolation=cv2.INTER_AREA) for view in views)
+    small = match_views((left, right), 0, 16, StereoOptions(speckle_size=10))
+    np.testing.assert_array_equal(disparity[:top], resampled(small, (top + 16, 200))[:top])
+
+
+def test_coarse_rows_show_what_fine_ones_do(views):
+    fine, coarse = (match_rows(views, 0, 48, StereoOptions(), above=above) for above in (0, 120))
+    both = (fine[:100] > 0) & (coarse[:100] > 0)
+    assert both.mean() > 0.5
+    assert np.median(np.abs(fine - coarse)[:100][both]) < 0.5
+
+
+def test_the_first_disparity_and_the_range_are_those_of_small_views(views, monkeypatch):
+    asked = []
+    match = sgbm.match_views
+    monkeypatch.setattr(sgbm, "match_views", lambda *of: asked.append(of[1:3]) or match(*of))
+    match_rows(views, 8, 64, StereoOptions(), above=100)
+    assert asked == [(8, 64), (2, 32)]
+
+
+def test_rows_above_those_that_are_needed_hold_no_data(views):
+    options = StereoOptions()
+
+    disparity = match_rows(views, 0, 48, options, slice(20, 130), 80)
+
+    assert not disparity[:20].any()
+    assert disparity[20:64].any()
+    np.testing.assert_array_equal(disparity[64:], match_rows(views, 0, 48, options, slice(80, 130))[64:])
+
+
+def test_above_the_first_needed_row_nothing_is_left_to_match_small(views):
+    options = StereoOptions()
+    rows = slice(60, 100)
+    expected = match_rows(views, 0, 48, options, rows)
+    np.testing.assert_array_equal(match_rows(views, 0, 48, options, rows, 40), expected)
+
+
+def test_views_that_are_too_narrow_at_a_third_hold_no_data_above(views):
+    narrow = tuple(view[:, :60] for view in views)
+    disparity = match_rows(narrow, 0, 16, StereoOptions(), above=80)
+    assert not disparity[:64].any()
+    assert disparity[64:].any()
+
+
+@pytest.mark.parametrize(
+    ("name", "low", "high"),
+    [
+        ("num_disparities", 1, 2000),
+        ("min_disparity", -2000, 2000),
+        ("block_size", 1, 21),
+        ("uniqueness", 0, 99),
+        ("speckle_size", 0, 1_000_000),
+        ("speckle_range", 0, 1000),
+        ("downscale", 1, 64),
+        ("vertical_offset", -100, 100),
+    ],
+)
+def test_each_option_has_its_limits(name, low, high):
+    step = 2 if name == "block_size" else 1
+    for value in (low, high):
+        assert getattr(StereoOptions(**{name: value}), name) == value
+    for value in (low - step, high + step):
+        with pytest.raises(
+            UsageError, match=f"{name.replace('_', '-')} {value}: must be from {low} to {high}"
+        ):
+            StereoOptions(**{name: value})
+
+
+def test_views_are_measured_unless_the_user_says_how_they_lie():
+    assert StereoOptions().measures_alignment
+    assert not StereoOptions(align="off").measures_alignment
+    assert not StereoOptions(vertical_offset=0).measures_alignment
+    assert not StereoOptions(align="off", vertical_offset=1).measures_alignment

@@ -1,0 +1,333 @@
+"""Pairs are matched over a range that they show themselves."""
+
+import math
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from rollcli.errors import InputError, UsageError
+from rollcli.estimator.estimate import estimate_roll
+from rollcli.files.formats import read_image
+from rollcli.files.inputs import pair_inputs
+from rollcli.simulate.render import render_frame
+from rollcli.simulate.spec import FrameSpec
+from rollcli.stereo import match as stereo
+from rollcli.stereo import sgbm
+from rollcli.stereo.match import StereoOptions, Wanted, compute_disparity, match_pair
+from rollcli.stereo.views import matched_shape
+
+SHARED = Path(__file__).parents[2].parent / "shared"
+ROADS = {"m1_L1": -3.47, "m1_L5": -1.62, "m2_L9": -2.54, "m2_L18": -4.30, "m3_L3": 2.36}
+
+
+def pair_at(disparity, shape=(120, 400), seed=0):
+    """A random texture, seen again `disparity` pixels (a number, or one a row) further left."""
+    texture = np.random.default_rng(seed).integers(0, 256, (shape[0], 2 * shape[1]), dtype=np.uint8)
+    texture = cv2.GaussianBlur(texture, (3, 3), 0)
+    columns = np.arange(shape[1]) + shape[1] // 2
+    shifts = np.broadcast_to(np.rint(disparity).astype(int), shape[0])
+    right = np.stack([row[columns + shift] for row, shift in zip(texture, shifts, strict=True)])
+    return texture[:, columns], right
+
+
+@pytest.fixture(scope="module")
+def street():
+    return render_frame(FrameSpec(scene="street", roll=math.radians(4), size=(320, 240), seed=3))
+
+
+@pytest.mark.parametrize("mode", ["3way", "sgbm", "hh"])
+def test_a_shifted_image_gives_its_shift(mode):
+    left, right = pair_at(23)
+
+    match = match_pair(left, right, StereoOptions(mode=mode))
+
+    inside = match.disparity[:, match.num_disparities + 5 : -5]
+    assert match.disparity.dtype == np.float32
+    assert match.disparity.shape == left.shape
+    assert (np.abs(inside - 23) < 0.5).mean() > 0.95
+
+
+@pytest.mark.parametrize("largest", [5, 40, 110, 170])
+def test_the_range_found_holds_the_disparities_and_not_much_more(largest):
+    left, right = pair_at(np.linspace(largest / 4, largest, 120))
+
+    match = match_pair(left, right, StereoOptions(align="off"))
+
+    assert largest + 2 <= match.num_disparities <= 1.3 * largest + 48
+    assert match.end_fraction < 0.01
+
+
+@pytest.mark.parametrize("first", [-16, 0, 24])
+def test_the_range_found_ends_where_it_does_whatever_it_begins_with(first):
+    left, right = pair_at(np.linspace(30, 60, 120))
+
+    match = match_pair(left, right, StereoOptions(align="off", min_disparity=first))
+
+    assert match.min_disparity == first
+    assert 62 <= first + match.num_disparities <= 1.3 * 60 + 48
+
+
+def test_the_range_does_not_follow_what_cannot_be_matched():
+    left, right = pair_at(20)
+    left[:, :250] = right[:, :200] = 255  # a low sun
+
+    assert match_pair(left, right, StereoOptions()).num_disparities <= 80
+
+
+def test_a_range_that_is_too_short_is_seen_at_its_end():
+    left, right = pair_at(np.linspace(10, 40, 120))
+
+    assert match_pair(left, right, StereoOptions(num_disparities=32)).end_fraction > 0.04
+    assert match_pair(left, right, StereoOptions(num_disparities=64)).end_fraction < 0.001
+
+
+def test_a_given_range_is_rounded_up_and_kept_within_the_image():
+    left, right = pair_at(20)
+
+    assert match_pair(left, right, StereoOptions(num_disparities=50)).num_disparities == 64
+    assert match_pair(left, right, StereoOptions(num_disparities=2000)).num_disparities == 384
+
+
+def test_a_range_may_start_anywhere():
+    left, right = pair_at(150)
+
+    match = match_pair(left, right, StereoOptions(min_disparity=128, num_disparities=32))
+
+    assert (match.min_disparity, match.num_disparities) == (128, 32)
+    assert np.median(match.disparity[match.disparity > 0]) == pytest.approx(150, abs=0.1)
+
+
+def test_disparities_below_zero_are_no_data():
+    left, right = pair_at(-10)
+
+    disparity = compute_disparity(left, right, min_disparity=-32, num_disparities=64)
+
+    assert (disparity >= 0).all()
+    assert (disparity > 0).mean() < 0.05
+
+
+def test_matching_small_gives_a_small_map_in_its_own_pixels():
+    left, right = pair_at(40)
+
+    disparity = compute_disparity(left, right, downscale=2)
+
+    assert disparity.shape == (60, 200)
+    assert np.median(disparity[disparity > 0]) == pytest.approx(20, abs=0.1)
+
+
+@pytest.mark.parametrize("colours", [(), (3,), (4,)])
+@pytest.mark.parametrize(("downscale", "expected"), [(1, (241, 322)), (2, (120, 161)), (1000, (1, 1))])
+def test_the_shape_that_is_matched_does_not_depend_on_colours(downscale, expected, colours):
+    assert matched_shape((241, 322, *colours), downscale) == expected
+
+
+def test_colour_grey_and_16_bits_give_much_the_same(street):
+    grey = [cv2.cvtColor(view, cv2.COLOR_BGR2GRAY) for view in (street.left, street.right)]
+    twelve_bits = [view.astype(np.uint16) * 16 for view in grey]
+
+    from_colour = compute_disparity(street.left, street.right)
+
+    np.testing.assert_array_equal(compute_disparity(*grey), from_colour)
+    both = (compute_disparity(*twelve_bits) > 0) & (from_colour > 0)
+    assert both.sum() > 0.9 * (from_colour > 0).sum()
+    assert np.median(np.abs(compute_disparity(*twelve_bits) - from_colour)[both]) < 0.1
+
+
+@pytest.mark.parametrize("lower", [0, 3])
+def test_rows_that_are_needed_are_matched_as_in_the_whole(street, lower):
+    right = np.roll(street.right, lower, axis=0)
+    whole = match_pair(street.left, right, StereoOptions())
+    part = match_pair(street.left, right, StereoOptions(), Wanted(slice(140, 200)))
+
+    needed = np.s_[140:200]
+    both = (whole.disparity[needed] > 0) & (part.disparity[needed] > 0)
+    assert both.sum() > 0.97 * (whole.disparity[needed] > 0).sum()
+    assert (np.abs(whole.disparity - part.disparity)[needed][both] < 0.1).mean() > 0.97
+    assert not part.disparity[:100].any()
+    assert part.disparity.shape == whole.disparity.shape
+    assert part.corrected.offset == pytest.approx(lower, abs=0.15)
+    assert part.doubt == ""
+
+
+def in_row(row):
+    """Find the first row of a small map of 240 rows' views."""
+    return lambda small: row * len(small) / 240
+
+
+@pytest.mark.parametrize("lower", [0, 3])
+def test_below_the_first_row_a_pair_is_matched_as_in_the_whole(street, lower):
+    right = np.roll(street.right, lower, axis=0)
+    whole = match_pair(street.left, right, StereoOptions())
+    part = match_pair(street.left, right, StereoOptions(), Wanted(first_row=in_row(100)))
+
+    both = (whole.disparity[100:] > 0) & (part.disparity[100:] > 0)
+    assert both.sum() > 0.97 * (whole.disparity[100:] > 0).sum()
+    assert (np.abs(whole.disparity - part.disparity)[100:][both] < 0.1).mean() > 0.97
+    above = (whole.disparity[:80] > 0) & (part.disparity[:80] > 0)
+    assert above.mean() > 0.5 * (whole.disparity[:80] > 0).mean()
+    assert np.median(np.abs(whole.disparity - part.disparity)[:80][above]) < 0.5
+    assert part.corrected.offset == pytest.approx(lower, abs=0.15)
+    assert (part.doubt, part.whole) == ("", None)
+
+
+@pytest.mark.parametrize(
+    ("row", "above"), [(-5.0, 0), (0.0, 0), (23.9, 0), (24.0, 24), (80.4, 80), (144.0, 144), (200.0, 144)]
+)
+def test_as_many_rows_are_matched_small_as_are_worth_it_and_may_be_none_of_a_road(row, above, monkeypatch):
+    asked = []
+    match = stereo.match_rows
+    monkeypatch.setattr(stereo, "match_rows", lambda *of: asked.append(of[5]) or match(*of))
+    match_pair(*pair_at(20, shape=(240, 400)), StereoOptions(), Wanted(first_row=in_row(row)))
+    assert asked == [above]
+
+
+@pytest.mark.parametrize(
+    ("options", "above"),
+    [
+        ({"align": "off"}, 100),
+        ({"align": "off", "num_disparities": 48}, 0),  # no small map to look at
+        ({"vertical_offset": 0.5}, 100),
+        ({"min_disparity": -16}, 0),  # what is behind the horizon of a road is no road's
+    ],
+)
+def test_without_a_look_at_small_views_all_rows_are_matched_at_full_size(street, options, above, monkeypatch):
+    asked = []
+    match = stereo.match_rows
+    monkeypatch.setattr(stereo, "match_rows", lambda *of: asked.append(of[5]) or match(*of))
+    match_pair(street.left, street.right, StereoOptions(**options), Wanted(first_row=in_row(100)))
+    assert asked[0] == above
+
+
+@pytest.mark.parametrize("rows", [slice(None), slice(60, 180), slice(150, 190)])
+def test_the_whole_map_beside_it_has_every_row_at_full_size(street, rows):
+    at_once = match_pair(street.left, street.right, StereoOptions()).disparity
+    wanted = Wanted(rows, in_row(100))
+    alone = match_pair(street.left, street.right, StereoOptions(), wanted)
+    shown = match_pair(street.left, street.right, StereoOptions(), wanted._replace(whole=True))
+
+    np.testing.assert_array_equal(shown.disparity, alone.disparity)
+    both = (at_once > 0) & (shown.whole > 0)
+    assert both.sum() > 0.97 * (at_once > 0).sum()
+    assert (np.abs(at_once - shown.whole)[both] < 0.1).mean() > 0.97
+
+
+def test_a_rendered_street_is_matched_as_it_is(street):
+    disparity = compute_disparity(street.left, street.right)
+
+    both = (disparity > 0) & (street.disparity > 0)
+    errors = np.abs(disparity - street.disparity)[both]
+    assert both.mean() > 0.4
+    assert np.median(errors) < 0.3
+    assert (errors > 3).mean() < 0.05
+
+
+def test_the_same_pair_gives_the_same_map_whatever_the_threads(street):
+    threads = cv2.getNumThreads()
+    maps = []
+    try:
+        for count in (1, 2, 5):
+            cv2.setNumThreads(count)
+            maps.append(compute_disparity(street.left, street.right))
+    finally:
+        cv2.setNumThreads(threads)
+
+    np.testing.assert_array_equal(maps[0], maps[1])
+    np.testing.assert_array_equal(maps[0], maps[2])
+
+
+def test_a_pair_without_texture_has_no_disparities():
+    flat = np.full((120, 400), 90, np.uint8)
+
+    match = match_pair(flat, flat, StereoOptions())
+
+    assert not match.disparity.any()
+    assert match.end_fraction == 0
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (2, 3), (5, 20), (300, 10)])
+def test_images_too_narrow_to_match_are_refused(shape):
+    image = np.zeros(shape, np.uint8)
+
+    with pytest.raises(InputError, match="px wide are too narrow"):
+        compute_disparity(image, image)
+
+
+def test_images_of_different_size_are_refused():
+    with pytest.raises(InputError, match="differ in size: 400x120 and 399x120"):
+        compute_disparity(np.zeros((120, 400), np.uint8), np.zeros((120, 399), np.uint8))
+
+
+@pytest.mark.parametrize(
+    "image", [np.zeros((120, 400)), np.zeros((120, 400, 2), np.uint8), np.zeros(400, np.uint8)]
+)
+def test_what_is_no_image_is_refused(image):
+    with pytest.raises(InputError, match="cannot be matched"):
+        compute_disparity(image, image)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"num_disparities": 0},
+        {"num_disparities": 10**9},
+        {"min_disparity": 10**9},
+        {"block_size": 4},
+        {"block_size": 0},
+        {"block_size": 99},
+        {"uniqueness": 100},
+        {"uniqueness": -1},
+        {"speckle_size": -1},
+        {"speckle_range": -1},
+        {"downscale": 0.5},
+        {"downscale": math.nan},
+        {"mode": "bm"},
+    ],
+)
+def test_options_that_make_no_sense_are_refused(options):
+    name = next(iter(options)).replace("_", "-")
+
+    with pytest.raises(UsageError, match=name):
+        StereoOptions(**options)
+
+
+@pytest.mark.skipif(not (SHARED / "roads").is_dir(), reason="no real road pairs at ../shared/roads")
+def test_real_road_pairs_need_and_get_a_wide_range():
+    for pair in pair_inputs(str(SHARED / "roads" / "left"), str(SHARED / "roads" / "right")):
+        match = match_pair(
+            read_image(pair.left.path), read_image(pair.right.path), StereoOptions(downscale=4)
+        )
+        inside = match.disparity[:, match.num_disparities :]
+
+        assert 4 * match.num_disparities > 331
+        assert match.end_fraction < 0.001
+        assert (inside > 0).mean() > 0.9
+        roll_deg = math.degrees(estimate_roll(match.disparity, road="all").theta)
+        assert roll_deg == pytest.approx(ROADS[pair.left.path.stem], abs=0.15)
+
+
+@pytest.mark.skipif(not (SHARED / "streets").is_dir(), reason="no real street pairs at ../shared/streets")
+def test_real_street_pairs_get_a_range_that_fits():
+    for pair in pair_inputs(str(SHARED / "streets" / "left"), str(SHARED / "streets" / "right")):
+        match = match_pair(
+            read_image(pair.left.path), read_image(pair.right.path), StereoOptions(downscale=2)
+        )
+
+        assert 32 <= match.num_disparities <= 112
+        assert match.end_fraction < 0.03
+        assert (match.disparity[:, match.num_disparities :] > 0).mean() > 0.6
+
+
+def test_what_the_mode_hh_would_take_is_counted_before_it_is_taken(monkeypatch):
+    blank = np.zeros((2160, 4096), np.uint8)
+    options = StereoOptions(mode="hh", num_disparities=512, vertical_offset=0)
+    with pytest.raises(InputError, match=r"would take 14\.8 GiB, and 4 are allowed; give --downscale 2"):
+        match_pair(blank, blank, options)
+    pair = pair_at(20)
+    options = StereoOptions(mode="hh", num_disparities=64, vertical_offset=0)
+    monkeypatch.setattr(sgbm, "_MOST_HH_BYTES", 4 * 120 * (400 - 64) * 64)
+    assert match_pair(*pair, options).disparity.any()
+    monkeypatch.setattr(sgbm, "_MOST_HH_BYTES", 4 * 120 * (400 - 64) * 64 - 1)
+    with pytest.raises(InputError, match="in the mode hh"):
+        match_pair(*pair, options)

@@ -1,0 +1,320 @@
+"""Vertical disparities of synthetic views, against what these were warped by and plain least squares."""
+
+import math
+
+import cv2
+import numpy as np
+import pytest
+
+from rollcli.stereo import alignment as vertical
+from rollcli.stereo.alignment import Measured, Texture, measure_misalignment, textured_share
+from rollcli.stereo.misalignment import LEVEL, Misalignment
+
+SHAPE = (160, 240)
+
+
+def texture_of(shape=SHAPE, seed=0):
+    noise = np.random.default_rng(seed).uniform(0, 255, shape).astype(np.float32)
+    smooth = cv2.GaussianBlur(noise, (0, 0), 1.5)
+    return np.clip(127 + 4 * (smooth - 127), 0, 255).astype(np.uint8)
+
+
+def warped(view, lies, disparity=0.0):
+    """The right view of a wall: at each place the grey that the level view has where it comes from."""
+    height, width = view.shape
+    v, u = np.mgrid[:height, :width].astype(np.float64)
+    x, y = u - (width - 1) / 2, v - (height - 1) / 2
+    at_x, at_y = x, y
+    for _ in range(20):  # the fixed point: (at_x, at_y) of the level view lies at (x, y) of this one
+        at_x = x - lies.stretch * at_x + lies.rotation * at_y
+        at_y = y - lies.offset - lies.rotation * at_x - lies.scale * at_y - lies.twist * at_x * at_y
+    at_u, at_v = at_x + (width - 1) / 2 + disparity, at_y + (height - 1) / 2
+    return cv2.remap(
+        view,
+        at_u.astype(np.float32),
+        at_v.astype(np.float32),
+        cv2.INTER_LANCZOS4,
+        borderMode=cv2.BORDER_REFLECT,
+    )
+
+
+def wall(disparity=10.0, shape=SHAPE):
+    return np.full(shape, disparity, np.float32)
+
+
+@pytest.mark.parametrize(
+    "lies",
+    [
+        Misalignment(0.4),
+        Misalignment(-0.7),
+        Misalignment(rotation=0.004),
+        Misalignment(rotation=-0.003),
+        Misalignment(scale=0.005),
+        Misalignment(scale=-0.006),
+        Misalignment(twist=5e-5),
+        Misalignment(-0.3, 0.003, -0.004, -4e-5),
+    ],
+)
+def test_what_a_view_was_warped_by_is_measured(lies):
+    left = texture_of()
+
+    found = measure_misalignment(Texture.of((left, warped(left, lies, 10))), wall(), rounds=4)
+
+    within = 0.01 + 0.05 * lies.reach(*SHAPE)  # a last step below 0.1 px is not checked by another
+    assert found.misalignment.shifts(*SHAPE) == pytest.approx(lies.shifts(*SHAPE), abs=within)
+    assert found.share > 0.85
+    assert found.spread < 0.05
+    assert max(map(abs, found.errors.shifts(*SHAPE))) < 0.02
+
+
+def test_a_view_that_is_levelled_in_part_is_measured_as_a_whole():
+    left, lies = texture_of(), Misalignment(2.5, 0.01)
+
+    found = measure_misalignment(Texture.of((left, warped(left, lies, 10))), wall(), Misalignment(2.2, 0.011))
+
+    assert found.misalignment.shifts(*SHAPE) == pytest.approx(lies.shifts(*SHAPE), abs=0.02)
+
+
+def test_one_round_goes_no_further_than_may_be_believed():
+    left = cv2.GaussianBlur(texture_of(), (0, 0), 3)
+    left = cv2.normalize(left, None, 0, 255, cv2.NORM_MINMAX)
+    views = Texture.of((left, warped(left, Misalignment(5.0), 10)))
+
+    first = measure_misalignment(views, wall(), rounds=1).misalignment
+    many = measure_misalignment(views, wall(), rounds=12).misalignment
+
+    assert first.reach(*SHAPE) == pytest.approx(1.5)
+    assert many.offset == pytest.approx(5, abs=0.05)
+
+
+def test_a_measurement_that_has_settled_takes_no_further_round(monkeypatch):
+    left, rounds = texture_of(), []
+    fit = vertical._fit
+    monkeypatch.setattr(vertical, "_fit", lambda seen: rounds.append(fit(seen)) or rounds[-1])
+
+    measure_misalignment(Texture.of((left, warped(left, Misalignment(0.6), 10))), wall(), rounds=9)
+
+    reaches = [step.reach(*SHAPE) for step, _, _ in rounds]
+    assert all(each >= 0.05 for each in reaches[:-1])
+    assert reaches[-1] < 0.05
+    assert 2 <= len(reaches) <= 4
+
+
+@pytest.mark.parametrize("noise", [0.0, 10.0, 15.0])
+def test_a_disparity_that_hides_the_offset_is_taken_back(noise):
+    """Slanted stripes 0.4 px lower look like ones 0.4 px further along the row, and are matched there."""
+    rng = np.random.default_rng(3)
+    stripes = cv2.warpAffine(
+        texture_of((400, 800)), np.array([[1.0, 1.0, -200], [0, 4.0, -400]]), SHAPE[::-1]
+    )
+    right = warped(stripes, Misalignment(0.4), 10)
+    noisy = (view + noise * rng.standard_normal(SHAPE) for view in (stripes, right))
+    left, right = (np.clip(np.rint(view), 0, 255).astype(np.uint8) for view in noisy)
+
+    found = measure_misalignment(Texture.of((left, right)), wall(10.4), rounds=30)
+
+    assert found.misalignment.offset == pytest.approx(0.4, abs=0.03)
+
+
+@pytest.mark.parametrize("every", [2, 3, 4])
+def test_a_part_of_the_blocks_says_the_same_and_is_their_share(every):
+    left, lies = texture_of(), Misalignment(0.5, 0.004, -0.003, 4e-5)
+    views = Texture.of((left, warped(left, lies, 10)))
+
+    all_blocks = measure_misalignment(views, wall(), rounds=8)
+    some = measure_misalignment(views, wall(), rounds=8, every=every)
+
+    assert some.misalignment.shifts(*SHAPE) == pytest.approx(lies.shifts(*SHAPE), abs=0.03)
+    assert some.share == pytest.approx(all_blocks.share, abs=0.03)
+    assert some.errors.offset > 1.2 * all_blocks.errors.offset
+
+
+@pytest.mark.parametrize("known", [39, 40, 77])
+def test_the_blocks_that_tell_are_counted(known):
+    left = texture_of()
+    disparity = wall()
+    rows, columns = SHAPE[0] // 8, SHAPE[1] // 8
+    inner = [(row, column) for row in range(2, rows - 2) for column in range(4, columns - 2)]
+    chosen = set(inner[:: len(inner) // 80][:known])
+    for row in range(rows):
+        for column in range(columns):
+            if (row, column) not in chosen:
+                disparity[8 * row : 8 * row + 8, 8 * column : 8 * column + 8] = 0
+
+    found = measure_misalignment(Texture.of((left, warped(left, LEVEL, 10))), disparity)
+
+    assert len(chosen) == known
+    if known < 40:
+        assert found is None
+    else:
+        assert found.share == pytest.approx(known / (rows * columns))
+
+
+@pytest.mark.parametrize(("pixels", "tells"), [(44, False), (45, True)])
+def test_a_block_needs_seven_tenths_of_its_disparities(pixels, tells):
+    left = texture_of()
+    disparity = wall(0)
+    for row in range(16, 136, 8):
+        for column in range(40, 216, 8):
+            known = np.arange(64).reshape(8, 8) < pixels
+            disparity[row : row + 8, column : column + 8][known] = 10
+
+    found = measure_misalignment(Texture.of((left, warped(left, Misalignment(0.3), 10))), disparity)
+
+    assert (found is not None) == tells
+    if tells:
+        assert found.misalignment.offset == pytest.approx(0.3, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("disparity", "first"), [(14.0, 2), (17.0, 3), (21.5, 3), (22.5, 3), (23.5, 3), (25.5, 4)]
+)  # the first block with 0.7 of its pixels more than a pixel inside of the right view
+def test_blocks_that_leave_the_right_view_do_not_count(disparity, first):
+    left = texture_of()
+    blocks = vertical._Blocks(Texture.of((left, left)), wall(disparity))
+
+    seen = blocks.vertical(LEVEL)
+
+    inside = np.arange(8 * first, 8 * first + 8) - disparity > 1
+    assert inside.mean() > 0.7
+    assert np.mean(np.arange(8 * first - 8, 8 * first) - disparity > 1) <= 0.7
+    middle = np.arange(8 * first, 8 * first + 8)[inside].mean() - disparity - (SHAPE[1] - 1) / 2
+    assert seen.x.min() == pytest.approx(middle, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("offset", "rows"),
+    [(0.0, (2, 157)), (0.5, (1, 157)), (-0.5, (2, 158)), (2.0, (0, 155)), (-2.0, (4, 159))],
+)
+def test_rows_that_leave_the_right_view_do_not_count(offset, rows):
+    left = texture_of()
+    blocks = vertical._Blocks(Texture.of((left, left)), wall(20.0))
+
+    seen = blocks.vertical(Misalignment(offset))
+
+    inner = [[v for v in range(8 * k, 8 * k + 8) if rows[0] <= v <= rows[1]] for k in range(SHAPE[0] // 8)]
+    counted = [np.mean(each) - (SHAPE[0] - 1) / 2 for each in inner if len(each) > 0.7 * 8]
+    assert (seen.y.min(), seen.y.max()) == pytest.approx((counted[0], counted[-1]), abs=1e-3)
+
+
+@pytest.mark.parametrize("shape", [(7, 100), (100, 7)])
+def test_views_smaller_than_a_block_tell_nothing(shape):
+    view = texture_of(shape)
+    assert measure_misalignment(Texture.of((view, view)), wall(1, shape)) is None
+    assert textured_share(view) == 0
+
+
+def test_the_share_with_texture_is_that_of_the_blocks_which_have_some():
+    noise = texture_of((80, 80))
+    assert textured_share(noise) == 1
+    assert textured_share(noise[:8, :8]) == 1
+    assert textured_share(np.full((80, 80), 90, np.uint8)) == 0
+    half = noise.copy()
+    half[36:] = 127
+    half[:40] = cv2.normalize(noise[:40], None, 30, 220, cv2.NORM_MINMAX)
+    half[40:] = half[39]  # columns of one grey each, as a fence: no gradient down
+    assert textured_share(half) == pytest.approx(0.5, abs=0.01)
+
+
+@pytest.mark.parametrize(("slope", "share"), [(0.0, 1.0), (1.0, 0.0), (-2.0, 0.0)])
+def test_straight_edges_tell_only_where_they_lie_along_the_rows(slope, share):
+    v, u = np.mgrid[:800, :800]
+    edges = 127 + 100 * np.sin((v + slope * u) / 2.5)
+    assert textured_share(edges.astype(np.uint8)) == pytest.approx(share, abs=0.05)
+
+
+def test_gradients_are_those_of_a_slope():
+    v, u = np.mgrid[:24, :32].astype(np.float32)
+    across, down = vertical._gradients(3 * u - 5 * v + 7)
+    assert across[1:-1, 1:-1] == pytest.approx(3)
+    assert down[1:-1, 1:-1] == pytest.approx(-5)
+
+
+def test_the_shift_of_a_block_is_that_of_least_squares():
+    """Grey differences = a across + b down + brightness, with a held back by a little: b is the shift."""
+    rng = np.random.default_rng(3)
+    across, down, off = (rng.normal(0, size, (50, 64)).astype(np.float32) for size in (3, 5, 4))
+    down += 0.5 * across + 2
+    across += 1
+    seen = (rng.random((50, 64)) < 0.9).astype(np.float32)
+    x, y = (rng.uniform(-90, 90, (50, 64)).astype(np.float32) for _ in range(2))
+
+    shares = vertical._Shares.of(across, down, seen, x, y)
+
+    for block in range(50):
+        known = seen[block] > 0
+        rows = np.stack([across[block], down[block], np.ones(64)], axis=1)[known].astype(np.float64)
+        held = np.vstack([rows, [math.sqrt(0.2 * known.sum()), 0, 0]])
+        values = np.linalg.lstsq(held, np.append(off[block][known], 0), rcond=None)[0]
+        assert (shares.share[block] @ off[block]) == pytest.approx(values[1], abs=1e-4)
+        weight = 1 / np.linalg.inv(held.T @ held)[1, 1] / known.sum()
+        assert shares.weight[block] == pytest.approx(min(weight, 50), rel=1e-3)
+        assert shares.x[block] == pytest.approx(x[block][known].mean(), abs=1e-3)
+        assert shares.y[block] == pytest.approx(y[block][known].mean(), abs=1e-3)
+
+
+@pytest.mark.parametrize("pixels", [45, 64])
+@pytest.mark.parametrize(("variance", "tells"), [(1.3, False), (2.02, True)])
+def test_no_block_that_could_tell_is_left_out_before_it_is_looked_at(pixels, variance, tells):
+    """Those of its pixels that have a disparity vary by so much, the others not at all."""
+    down = np.full((8, 8), 3, np.float32)
+    wave = np.resize([1.0, -1.0], pixels)
+    down.flat[:pixels] += wave * math.sqrt(variance) / wave.std() - wave.mean()
+    assert down.flat[:pixels].var() == pytest.approx(variance, rel=1e-4)
+    assert vertical._may_tell(down).item() == tells
+
+
+def seen_at(lies, noise=0.0, count=400, seed=0):
+    rng = np.random.default_rng(seed)
+    x, y = rng.uniform(-150, 150, count), rng.uniform(-80, 80, count)
+    shift = lies.offset + lies.rotation * x + lies.scale * y + lies.twist * x * y
+    shift += rng.normal(0, 1, count) * noise
+    parts = x, y, shift, rng.uniform(2, 50, count)
+    return vertical._Seen(*(part.astype(np.float32) for part in parts))
+
+
+def test_a_fit_without_noise_is_exact_and_outliers_do_not_move_it():
+    lies = Misalignment(0.5, -0.004, 0.006, 5e-5)
+    seen = seen_at(lies)
+    exact, _, spread = vertical._fit(seen)
+    assert exact.shifts(160, 300) == pytest.approx(lies.shifts(160, 300), abs=1e-4)
+    assert spread == pytest.approx(0.001, abs=2e-4)
+    seen.shift[::6] += 5
+    robust, _, _ = vertical._fit(seen)
+    assert robust.shifts(160, 300) == pytest.approx(lies.shifts(160, 300), abs=1e-2)
+
+
+def test_the_errors_of_a_fit_are_whites_for_weighted_least_squares():
+    seen = seen_at(Misalignment(0.5, -0.004, 0.006, 5e-5), noise=0.2)
+    found, errors, spread = vertical._fit(seen)
+
+    x, y = seen.x.astype(float), seen.y.astype(float)
+    columns = np.stack([np.ones_like(x), x, y, x * y], axis=1)
+    off = seen.shift - columns @ [found.offset, found.rotation, found.scale, found.twist]
+    weight = seen.weight / (1 + (off / (1.5 * spread)) ** 2) ** 2
+    inverse = np.linalg.inv(columns.T @ (columns * weight[:, None]))
+    middle = columns.T @ (columns * ((weight * off) ** 2)[:, None])
+    expected = np.sqrt(np.diag(inverse @ middle @ inverse))
+    np.testing.assert_allclose(
+        [errors.offset, errors.rotation, errors.scale, errors.twist], expected, rtol=0.01
+    )
+    assert spread == pytest.approx(0.2, rel=0.1)
+    best = inverse @ (columns.T @ (weight * seen.shift))
+    assert found.shifts(160, 300) == pytest.approx(Misalignment(*best).shifts(160, 300), abs=5e-3)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 4, 7, 10])
+def test_the_median_is_numpys(count):
+    values = np.random.default_rng(count).normal(size=count)
+    assert vertical._median(values) == pytest.approx(np.median(values))
+
+
+def test_far_blocks_count_a_quarter_and_less():
+    off = np.array([0, 1.5, -1.5, 15]) * 0.4
+    np.testing.assert_allclose(vertical._believed(off, 0.4), [1, 0.25, 0.25, 1 / 101**2])
+
+
+def test_a_measurement_of_larger_views_is_as_much_larger():
+    small = Measured(Misalignment(1, 0.2, 0.3, 0.4), Misalignment(0.1, 0.02, 0.03, 0.04), 0.7, 0.05)
+    large = Measured(Misalignment(2, 0.2, 0.3, 0.2), Misalignment(0.2, 0.02, 0.03, 0.02), 0.7, 0.1)
+    assert small.resized(2) == large
