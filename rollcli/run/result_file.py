@@ -265,9 +265,9 @@ class DurableRows:
         if self._images:
             sync_files(self._images, self._folders)
             self._images.clear()
-        while self._rows:
-            self._write(self._rows[0])
-            del self._rows[0]
+        rows, self._rows = self._rows, []  # first: a commit after an interrupt must not write one again
+        for row in rows:
+            self._write(row)
         if self._unsynced:
             self._file.sync()
             self._unsynced = False

@@ -1,11 +1,12 @@
 """Rows enter the result once their images survive a power cut, and a resume restores images that are gone."""
 
 import os
+import sys
 
 import pytest
 
 from rollcli.run import result_file as durable_rows
-from rollcli.run.result_file import DurableRows
+from rollcli.run.result_file import DurableRows, open_result
 from tests.run_cli import contents, rollcli, write_maps
 
 IMAGES = ("--derotated", "up", "--vdisparity", "v")
@@ -151,3 +152,47 @@ def test_images_that_cannot_be_made_again_end_the_resume_with_one_line(finished)
     done = resume(finished)
     assert done.status == 1
     assert "the images of maps/frame0.png cannot be made again: is text; " in done.err
+
+
+def interrupted_at(step, work):
+    """Run `work` until a line of a result's modules, as a second Ctrl-C would; return whether it came."""
+    left = [step]
+
+    def trace(frame, event, argument):
+        if "durable_rows" not in frame.f_code.co_filename and "result_file" not in frame.f_code.co_filename:
+            return None
+        if event == "line":
+            left[0] -= 1
+            if left[0] == 0:
+                raise KeyboardInterrupt
+        return trace
+
+    sys.settrace(trace)
+    try:
+        work()
+    except KeyboardInterrupt:
+        return True
+    finally:
+        sys.settrace(None)
+    return False
+
+
+def test_a_second_interrupt_at_any_line_writes_no_row_twice_and_leaves_none_out(tmp_path):
+    expected, step, came = [b"%d\n" % number for number in range(6)], 0, True
+    while came:
+        step += 1
+        path = tmp_path / f"{step}.csv"
+        with open_result(str(path)) as file:
+            rows = DurableRows(file)
+
+            def work(rows=rows):
+                for number, row in enumerate(expected):
+                    rows.append(row, [str(image(tmp_path, number))] if number else [])
+                rows.commit()
+
+            came = interrupted_at(step, work)
+            rows.commit()  # as the run does whatever ended it
+        lines = path.read_bytes().splitlines(keepends=True)
+        assert lines == expected[: len(lines)], step
+    assert step > 50
+    assert lines == expected
