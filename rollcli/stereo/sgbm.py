@@ -106,7 +106,7 @@ def match_views(views: Views, first: int, count: int, options: StereoOptions) ->
     Returns
     -------
     ndarray of float32, shape (H, W)
-        Pixels; no data is 0.
+        Pixels; no data is 0: also at `first` and below, where the best match may lie outside of the range.
 
     Raises
     ------
@@ -134,7 +134,8 @@ def match_views(views: Views, first: int, count: int, options: StereoOptions) ->
         speckleRange=options.speckle_range,
         mode=_MODES[options.mode],
     )
-    sixteenths = np.maximum(matcher.compute(*views), 0)
+    # what has no match is (first - 1) * 16 to OpenCV, which is a disparity where first > 1
+    _, sixteenths = cv2.threshold(matcher.compute(*views), _SUBPIXELS * max(first, 0), 0, cv2.THRESH_TOZERO)
     disparity = cv2.addWeighted(sixteenths, 1 / _SUBPIXELS, sixteenths, 0, 0, dtype=cv2.CV_32F)
     return disparity.astype(np.float32, copy=False)
 

@@ -179,3 +179,19 @@ def test_views_are_measured_unless_the_user_says_how_they_lie():
     assert not StereoOptions(align="off").measures_alignment
     assert not StereoOptions(vertical_offset=0).measures_alignment
     assert not StereoOptions(align="off", vertical_offset=1).measures_alignment
+
+
+@pytest.mark.parametrize("mode", ["3way", "sgbm", "hh"])
+@pytest.mark.parametrize("first", [4, 12])
+def test_below_the_first_disparity_searched_there_is_no_data(views, mode, first):
+    options = StereoOptions(mode=mode)
+    disparity = match_views(views, first, 32, options)
+
+    wide = match_views(views, 0, 48, options)
+    unmatched = (disparity == 0) & (wide == 0)
+    assert unmatched.mean() > 0.05
+    assert not disparity[:, : first + 2].any()
+    assert disparity[disparity > 0].min() > first  # at the very edge the best cost may lie beyond
+    both = (disparity > 0) & (wide > 0)
+    assert both.mean() > 0.5
+    assert np.median(np.abs(disparity - wide)[both]) == 0

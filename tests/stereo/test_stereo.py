@@ -331,3 +331,16 @@ def test_what_the_mode_hh_would_take_is_counted_before_it_is_taken(monkeypatch):
     monkeypatch.setattr(sgbm, "_MOST_HH_BYTES", 4 * 120 * (400 - 64) * 64 - 1)
     with pytest.raises(InputError, match="in the mode hh"):
         match_pair(*pair, options)
+
+
+@pytest.mark.parametrize("first", [10, 20])
+@pytest.mark.parametrize(
+    ("name", "truth"), [("frame_0001", -8.0), ("frame_0003", 12.0), ("frame_0004", -4.0)]
+)
+def test_a_range_that_begins_nearer_leaves_the_roll_as_it_is(name, truth, first):
+    left, right = (read_image(f"sample_data/{side}/{name}.png") for side in ("left", "right"))
+
+    disparity = compute_disparity(left, right, min_disparity=first, align="off")
+
+    assert disparity[disparity > 0].min() > first
+    assert np.degrees(estimate_roll(disparity).theta) == pytest.approx(truth, abs=0.03)
