@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from rollcli.errors import InputError, UsageError
 from rollcli.files.formats import Stored, decode_mask, read_stored
+from rollcli.files.plateaus import without_plateaus
 from rollcli.files.storage import read_bytes
 from rollcli.rig.calibration import Calibration
 
@@ -77,7 +78,8 @@ def to_disparity(
     scale : float, optional
         Pixels (of a depth: metres) per stored unit, in place of the encoding's own; makes "auto" take px.
     invalid : iterable of float
-        Stored values that mean no data, besides NaN, inf, <= 0, the file's own tag, and 65535 in uint16.
+        Stored values that mean no data, besides NaN, inf, <= 0, the file's own tag, 65535 in uint16, and a
+        constant plateau at either end of the range (`plateaus`).
     calibration : Calibration, optional
         What turns a depth into a disparity; without it, the disparity of a depth z is 1/z.
 
@@ -97,8 +99,9 @@ def to_disparity(
             else _scaled(stored.values, used, factor)
         )
         _blank(disparity, stored.values, (*invalid, *stored.nodata, *_saturated(stored.values)))
+    plateau = without_plateaus(disparity)
     doubt = _doubt(stored.values, used) if encoding == "auto" and scale is None else ""
-    warning = "; ".join(each for each in (stored.note, doubt) if each)
+    warning = "; ".join(each for each in (stored.note, doubt, plateau) if each)
     return DisparityMap(disparity, used, factor, stored, warning or None)
 
 
