@@ -51,6 +51,12 @@ from rollcli.report.options import GALLERY, ReportOptions
     help="How many frames to show in pictures: the widest intervals, suspect ones, and some evenly spread.",
 )
 @option(
+    "--fetch",
+    is_flag=True,
+    section="Page",
+    help="Read inputs from whichever server or bucket the result names; else only from the one it lies in.",
+)
+@option(
     "--svg",
     type=PATH,
     metavar="DIR",
@@ -70,8 +76,9 @@ def report(ctx: click.Context, /, **options: Any) -> None:
     each roll occurs; a summary; and a gallery of maps before and after de-rotation with their v-disparity
     images. One file that opens from disk without a network.
 
-    Inputs are looked for under the names that RESULT gives them, from here or from its folder. The page needs
-    the extra: pip install "rollcli[report]". Charts alone (--svg, --png) do not.
+    Inputs are looked for under the names that RESULT gives them, from here or from its folder; remote ones
+    only where RESULT lies on the same server or in the same bucket, or with --fetch. The page needs the
+    extra: pip install "rollcli[report]". Charts alone (--svg, --png) do not.
     """
     from rollcli.report.run import run_report
 

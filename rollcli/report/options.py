@@ -15,7 +15,7 @@ class ReportOptions:
     """Everything that `rollcli report` was asked.
 
     `output` is the page, `png` and `svg` are folders for its charts; `gallery` is how many frames the page
-    shows in pictures.
+    shows in pictures; `fetch` follows rows to any store.
     """
 
     result: str
@@ -25,6 +25,7 @@ class ReportOptions:
     images: str | None = None
     title: str | None = None
     gallery: int = GALLERY
+    fetch: bool = False
     running: RunningOptions = field(default_factory=RunningOptions)
 
     def chart_paths(self, name: str) -> dict[str, str]:

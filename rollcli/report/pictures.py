@@ -94,6 +94,8 @@ def _source(subject: Subject, options: FrameOptions) -> Source:
         return Source(read_disparity(subject.images["disparity"]))
     if subject.images_only:
         raise InputError(f"{subject.frame.file}: there is no map of it among the images")
+    if subject.refused:
+        raise InputError(subject.refused)
     # a pair's left image is kept where the road is to be drawn on it
     return read_source(subject.frame, options._replace(images=options.images._replace(road_mask="")))
 

@@ -56,7 +56,7 @@ def run_report(options: ReportOptions) -> ExitStatus:
     recorded = recorded_options(result.run, run_path(options.result))
     chosen = choose(result.rows, options.gallery if options.output is not None else 0)
     rows = [result.rows[each.place] for each in chosen]
-    found = subjects(rows, options.result, options.images, recorded.images)
+    found = subjects(rows, options.result, options.images, recorded.images, fetch=options.fetch)
     reads = [
         options.result,
         *(path for each in found for path in (*each.frame.reads(), *each.images.values())),

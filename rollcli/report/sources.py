@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
 from rollcli.errors import UsageError
@@ -11,7 +11,7 @@ from rollcli.files.inputs import MAP_ENDINGS
 from rollcli.files.naming import listed
 from rollcli.files.results import Row
 from rollcli.files.search import objects_behind
-from rollcli.files.stores.locations import base_name, is_url
+from rollcli.files.stores.locations import base_name, is_remote, is_url, store_of
 from rollcli.run.frame import Frame
 from rollcli.run.options import ImageOptions
 
@@ -81,6 +81,8 @@ class Subject:
         The files that `estimate` wrote for it, by kind.
     images_only : bool
         Whether pictures come from these alone: a result from elsewhere may name any file.
+    refused : str
+        Why the inputs are not read; empty where they may be.
     """
 
     frame: Frame
@@ -88,9 +90,12 @@ class Subject:
     alpha: tuple[float, float, float] | None
     images: dict[str, str]
     images_only: bool = False
+    refused: str = ""
 
 
-def subjects(rows: Sequence[Row], result: str, images: str | None, recorded: ImageOptions) -> list[Subject]:
+def subjects(
+    rows: Sequence[Row], result: str, images: str | None, recorded: ImageOptions, *, fetch: bool = False
+) -> list[Subject]:
     """Find the files of rows that have an angle.
 
     Parameters
@@ -102,6 +107,9 @@ def subjects(rows: Sequence[Row], result: str, images: str | None, recorded: Ima
         The folder of images, or of folders of images, that `estimate` wrote.
     recorded : ImageOptions
         Which folders the run wrote them to.
+    fetch : bool
+        Whether inputs are asked for in whichever store a row names: a result from elsewhere may name a
+        service of this network, or a bucket that the user's keys open. By default only in the result's own.
 
     Raises
     ------
@@ -118,10 +126,23 @@ def subjects(rows: Sequence[Row], result: str, images: str | None, recorded: Ima
         )
     only = images is not None
     folder = Path() if is_url(result) else Path(result).parent  # names in a bucket are whole URLs
-    return [_subject(row, folder, files, only) for row, files in zip(rows, found, strict=True)]
+    return [
+        replace(
+            _subject(row, folder, files), images_only=only, refused="" if fetch else _refusal(row, result)
+        )
+        for row, files in zip(rows, found, strict=True)
+    ]
 
 
-def _subject(row: Row, folder: Path, images: dict[str, str], images_only: bool) -> Subject:
+def _refusal(row: Row, result: str) -> str:
+    """Say why a row's inputs are not asked for; empty where they are local or lie in the result's store."""
+    for name in filter(None, (row.file, row.right_file)):
+        if is_remote(name) and not (is_url(name) and is_url(result) and store_of(name) == store_of(result)):
+            return f"{name}: is remote, and the result does not lie there; --fetch follows it"
+    return ""
+
+
+def _subject(row: Row, folder: Path, images: dict[str, str]) -> Subject:
     frame = Frame(
         file=row.file,
         right_file=row.right_file,
@@ -132,13 +153,15 @@ def _subject(row: Row, folder: Path, images: dict[str, str], images_only: bool) 
     )
     alpha = (row.alpha0, row.alpha1, row.alpha2)
     whole = None if None in alpha else alpha
-    return Subject(frame, math.radians(row.roll_deg or 0.0), whole, images, images_only)  # type: ignore[arg-type]
+    return Subject(frame, math.radians(row.roll_deg or 0.0), whole, images)  # type: ignore[arg-type]
 
 
 def _located(name: str, folder: Path) -> str:
     """Return a file named from where `estimate` ran: here, or else from the result's folder."""
+    if not name or is_remote(name):  # even a look at a share of Windows is a request
+        return name
     beside = folder / name
-    return str(beside) if name and not is_there(name) and is_there(beside) else name
+    return str(beside) if not is_there(name) and is_there(beside) else name
 
 
 class _ImageFolder:

@@ -1,6 +1,7 @@
 """The parts of a URL, and turns at computing while other tasks wait for the network."""
 
 import contextlib
+import os
 import posixpath
 import re
 import threading
@@ -12,7 +13,7 @@ from rollcli.errors import UsageError
 
 OBJECT_STORES = ("s3", "gs", "az")
 WEB_SERVERS = ("http", "https")
-_QUERY = re.compile("[?#]")
+_QUERY, _HOST_END = re.compile("[?#]"), re.compile(r"[/?#\\]")
 _SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]+)://")  # two letters or more: "c:/" is a drive of Windows
 
 
@@ -63,6 +64,18 @@ def split_url(url: str) -> tuple[str, str]:
     if not bucket:
         raise UsageError(f"{public_name(url)}: names no bucket; write {scheme}://bucket/prefix")
     return f"{scheme}://{bucket}", key
+
+
+def store_of(url: str) -> str:
+    """Return the scheme and the server or bucket of a URL, as it was written but for case."""
+    scheme, _, rest = url.partition("://")
+    return f"{scheme}://{_HOST_END.split(rest, maxsplit=1)[0]}".lower()
+
+
+def is_remote(location: str) -> bool:
+    """Return whether reading a location asks another machine by its name: a URL, or a share of Windows."""
+    share = os.name == "nt" and location.replace("\\", "/").startswith("//")
+    return share or is_url(location)
 
 
 def public_name(location: str) -> str:
