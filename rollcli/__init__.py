@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from rollcli.errors import RollcliError as RollcliError
-    from rollcli.estimator.result import RollEstimate as RollEstimate
+    from rollcli.estimator.estimate import RollEstimate as RollEstimate
     from rollcli.files.encodings import read_disparity as read_disparity
     from rollcli.pictures.derotate import derotate as derotate
     from rollcli.pictures.vdisparity import v_disparity as v_disparity
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "Calibration": "rollcli.rig.calibration",
     "RigAssessment": "rollcli.rig.drive.assess",
-    "RollEstimate": "rollcli.estimator.result",
+    "RollEstimate": "rollcli.estimator.estimate",
     "RollcliError": "rollcli.errors",
     "assess_rig": "rollcli.rig.drive.assess",
     "compute_disparity": "rollcli.stereo.match",

@@ -1,4 +1,10 @@
-"""What is asked of the estimator: the method, the model and their settings."""
+"""What may be asked of the estimator, by name, with its defaults; and what is asked, checked.
+
+Import-light: the command line reads this module and loads neither NumPy nor a solver.
+
+Add a solver: a file in `solvers` with a `Solver`, and one line in `SOLVERS`.
+Add a method that chooses pixels: an `AreaMethod` in ``solvers/areas.py``, and one line in `AREAS`.
+"""
 
 import math
 from collections.abc import Collection
@@ -18,20 +24,20 @@ LearningRate = float | Literal["auto"]
 
 
 class Method(NamedTuple):
-    """The file that holds a method's function, and what the help says of it."""
+    """Where in `solvers` a method's function is, and what the help says of it."""
 
-    file: str
+    function: str
     summary: str
 
 
 SOLVERS = {
-    "gd": Method("gradient_descent", "gradient descent"),
-    "gss": Method("golden_section", "golden section search"),
-    "exact": Method("exact", "the global minimum, from polynomial roots"),
+    "gd": Method("gradient_descent.gradient_descent", "gradient descent"),
+    "gss": Method("golden_section.golden_section", "golden section search"),
+    "exact": Method("exact.exact", "the global minimum, from polynomial roots"),
 }
 AREAS = {
-    "plane": Method("lower_centre", "one least-squares plane"),
-    "areas": Method("iterative", "planes of many small areas"),
+    "plane": Method("areas.lower_centre", "one least-squares plane"),
+    "areas": Method("areas.iterative", "planes of many small areas"),
 }
 METHODS = {**SOLVERS, **AREAS}
 MODELS = ("parabola", "line")

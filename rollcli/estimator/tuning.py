@@ -1,4 +1,9 @@
-"""The tuned numbers of the estimator, in one record."""
+"""Every tuned number of the estimator: its unit, its reason, and what it does.
+
+One frozen record a stage, all of them in `Tuning`. ``tests/benchmarks/bench_ablation.py`` changes one number
+at a time; its table is in ``rollcli/estimator/README.md``. Lengths are in camera heights where it says so,
+else in units of half the map's longer side; a tolerance is `Sample.tolerance`, a pixel's own.
+"""
 
 import math
 from dataclasses import dataclass, field

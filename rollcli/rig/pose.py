@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rollcli.estimator import estimate as estimator
+from rollcli.estimator.estimate import RollEstimate
 from rollcli.estimator.interval import Tangent
-from rollcli.estimator.result import RollEstimate
 from rollcli.rig.calibration import Calibration
 
 Floats = NDArray[np.float64]

@@ -6,8 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from rollcli.errors import EstimationError, InputError
-from rollcli.estimator.estimate import estimate_roll
-from rollcli.estimator.result import RollEstimate
+from rollcli.estimator.estimate import RollEstimate, estimate_roll
 from rollcli.files.codecs.png import encode_png
 from rollcli.files.formats import encode_stored
 from rollcli.files.results import Row

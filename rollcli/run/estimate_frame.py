@@ -5,8 +5,7 @@ import time
 from dataclasses import replace
 
 from rollcli.errors import EstimationError
-from rollcli.estimator.estimate import estimate_roll
-from rollcli.estimator.result import RollEstimate
+from rollcli.estimator.estimate import RollEstimate, estimate_roll
 from rollcli.files.results import Row
 from rollcli.rig.calibration import Calibration
 from rollcli.rig.pose import horizon_row, with_pose

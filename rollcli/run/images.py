@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.estimator.result import RollEstimate
+from rollcli.estimator.estimate import RollEstimate
 from rollcli.files.codecs.png import encode_png
 from rollcli.files.encodings import KITTI_TOP, Encoding, from_disparity
 from rollcli.files.formats import Stored, encode_stored

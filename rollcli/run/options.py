@@ -45,7 +45,7 @@ class RegionOptions(NamedTuple):
 
 
 class MethodOptions(NamedTuple):
-    """How the angle is found; `rollcli.estimator.methods` has the names."""
+    """How the angle is found; `rollcli.estimator.request` has the names."""
 
     method: str = "gd"
     model: str = "parabola"

@@ -23,8 +23,7 @@ from numpy.typing import NDArray
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from rollcli.errors import RollcliError
-from rollcli.estimator.estimate import estimate_roll
-from rollcli.estimator.result import RollEstimate
+from rollcli.estimator.estimate import RollEstimate, estimate_roll
 from rollcli.files.formats import read_image
 from rollcli.simulate.draw import draw_specs
 from rollcli.simulate.render import render_frame

@@ -19,8 +19,7 @@ from matched import match_as_estimated
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from rollcli.estimator.estimate import estimate_roll
-from rollcli.estimator.result import RollEstimate
+from rollcli.estimator.estimate import RollEstimate, estimate_roll
 from rollcli.files.formats import read_image
 
 REALMAPS = Path(__file__).resolve().parents[3] / "shared" / "realmaps"

@@ -1,4 +1,11 @@
-"""Find the road: planes through triples of pixels, scored, and the best ones refined."""
+"""Which pixels are road: the plane that best explains what lies ahead of the rig.
+
+Planes through triples of pixels are judged by what they leave unexplained. Three things tell a road from the
+walls, verges and sky that may cover more of the image: nothing lies below a road; around each of its pixels
+the map rises as the road itself does; and it is what the rig drives on, so it fills the corridor straight
+ahead, a few camera heights wide. All three are measured in units of the hypothesis itself: they need neither
+the focal length nor the scale of the disparities.
+"""
 
 import math
 from dataclasses import dataclass

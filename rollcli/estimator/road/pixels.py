@@ -23,19 +23,20 @@ from rollcli.estimator.tuning import RoadTuning
 
 def load_solver(name: str) -> Solver:
     """Return the function of a solver."""
-    solver: Solver = _load("solvers", SOLVERS[name])
+    solver: Solver = _load(SOLVERS[name])
     return solver
 
 
 def load_area_method(name: str) -> AreaMethod:
     """Return the function of a method that chooses pixels."""
-    method: AreaMethod = _load("areas", AREAS[name])
+    method: AreaMethod = _load(AREAS[name])
     return method
 
 
 @cache
-def _load(folder: str, method: Method) -> Any:
-    return getattr(import_module(f"rollcli.estimator.{folder}.{method.file}"), method.file)
+def _load(method: Method) -> Any:
+    module, function = method.function.split(".")
+    return getattr(import_module(f"rollcli.estimator.solvers.{module}"), function)
 
 
 @dataclass(frozen=True)

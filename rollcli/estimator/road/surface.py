@@ -1,4 +1,12 @@
-"""The surface of a road: its parabola, its edges and its pixels."""
+"""The surface of a road: a robust fit of its parabola, roll and camber, its edges and its pixels.
+
+Each pixel is averaged with those around it. Most of what a matcher gets wrong differs from pixel to pixel and
+from row to row, among other things because it prefers whole pixels: a mean of five has less of it.
+
+The profile across the lane ahead tells how far to the sides the ground belongs to it. Heights above the road,
+in camera heights, are relative differences of disparity: h = d / road - 1. Nothing is cut off: weights fade,
+so that a kerb that is a little lower, or half a bin farther away, turns the angle a little and not at once.
+"""
 
 import itertools
 import math

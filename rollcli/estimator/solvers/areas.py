@@ -1,4 +1,19 @@
-"""Planes in chosen areas of the map [Plane, Areas]."""
+"""Methods that choose pixels and take the angle of their best plane [Plane]: one area, or many that agree.
+
+[Plane]: Ozgunalp, Fan, Ai, Dahnoun, "Multiple lane detection algorithm based on novel dense vanishing point
+estimation", IEEE T-ITS 18(3) (2017). The plane d = c0 + c1 u + c2 v gives theta = atan(-c1 / c2).
+
+[Areas]: Evans, Fan, Dahnoun, "Iterative roll angle estimation from dense disparity map", MECO 2018. One
+chosen area may hold an obstacle; among many, the road's are those whose planes agree. The steps here:
+
+1. Sum the map in tiles, 100 along its longer side; an area is 4 x 4 tiles, half of it overlapping the next.
+2. Fit a plane to each area that is at least half valid. Keep those whose disparity grows downward and whose
+   roll is within bounds: no walls beside the road, no sky.
+3. A plane explains an area if it passes its pixels with a root mean square residual within a tolerance. The
+   best area is the one whose plane explains the most pixels.
+4. Fit a plane to all areas explained, and look again which areas it explains, until they stay the same.
+5. The angle is that of the best plane of all pixels of these areas.
+"""
 
 import math
 from collections.abc import Callable
@@ -14,6 +29,89 @@ from rollcli.estimator.moments import Floats, Grid, map_moments, require_pixels
 from rollcli.estimator.request import DEFAULT_AREA, AreaSettings
 from rollcli.estimator.solvers.exact import exact
 from rollcli.estimator.solvers.solution import Solution, SolverStatus
+
+
+@dataclass(frozen=True)
+class AreaPixels:
+    """The pixels that a method chose.
+
+    Attributes
+    ----------
+    used : ndarray of bool, shape (H, W)
+        All of them have a disparity.
+    iterations : int
+        How often the method chose anew.
+    status : SolverStatus
+        Whether its choice settled.
+    """
+
+    used: NDArray[np.bool_]
+    iterations: int = 0
+    status: SolverStatus = SolverStatus.CONVERGED
+
+
+# from a map (H, W), px, and which of its pixels are valid and may be used, (H, W) of bool
+AreaMethod = Callable[[NDArray[Any], NDArray[np.bool_], AreaSettings], AreaPixels]
+
+
+class PlaneFit(NamedTuple):
+    """The energy of the line model over some pixels, and its minimum."""
+
+    energy: Energy
+    solution: Solution
+
+
+def fit_plane(disparity: NDArray[Any], pixels: AreaPixels) -> PlaneFit:
+    """Fit a plane to the chosen pixels of a map (H, W) by least squares.
+
+    Raises
+    ------
+    EstimationError
+        When the pixels do not determine a plane.
+    """
+    require_pixels(pixels.used)
+    peak = float(disparity.max(where=pixels.used, initial=0))
+    energy = Energy.of(map_moments(disparity, pixels.used), peak, parabolic=False)
+    return PlaneFit(energy, Solution(exact(energy).theta, pixels.iterations, pixels.status))
+
+
+_ROWS = (0.6, 0.9)  # below the horizon, above a bonnet
+_COLUMNS = (0.35, 0.65)
+
+
+def lower_centre(
+    disparity: NDArray[Any], usable: NDArray[np.bool_], settings: AreaSettings = DEFAULT_AREA
+) -> AreaPixels:
+    """Choose 60 to 90 % of the height and 35 to 65 % of the width, or all usable pixels.
+
+    Parameters
+    ----------
+    disparity : ndarray, shape (H, W)
+        Real numbers, px.
+    usable : ndarray of bool, shape (H, W)
+        The pixels that are valid and may be used.
+    settings : AreaSettings
+        Whether the usable pixels are the chosen area.
+
+    Returns
+    -------
+    AreaPixels
+        With 0 iterations.
+    """
+    if settings.chosen:
+        return AreaPixels(usable)
+    used = np.zeros(disparity.shape, np.bool_)
+    area = lower_centre_slices(*disparity.shape)
+    used[area] = usable[area]
+    return AreaPixels(used)
+
+
+def lower_centre_slices(height: int, width: int) -> tuple[slice, slice]:
+    """Return the rows and columns of the default area."""
+    rows, columns = (
+        slice(round(low * n), round(high * n)) for (low, high), n in ((_ROWS, height), (_COLUMNS, width))
+    )
+    return rows, columns
 
 
 @dataclass(frozen=True)
@@ -121,50 +219,6 @@ def _on_grid(local: Floats, grid: Grid, side: int) -> Floats:
     moved[..., 2, 0] = ((np.arange(rows) * side + middle - grid.centre_v) / grid.scale)[:, None]
     on_grid: Floats = moved @ local @ np.swapaxes(moved, -1, -2)
     return on_grid
-
-
-@dataclass(frozen=True)
-class AreaPixels:
-    """The pixels that a method chose.
-
-    Attributes
-    ----------
-    used : ndarray of bool, shape (H, W)
-        All of them have a disparity.
-    iterations : int
-        How often the method chose anew.
-    status : SolverStatus
-        Whether its choice settled.
-    """
-
-    used: NDArray[np.bool_]
-    iterations: int = 0
-    status: SolverStatus = SolverStatus.CONVERGED
-
-
-# from a map (H, W), px, and which of its pixels are valid and may be used, (H, W) of bool
-AreaMethod = Callable[[NDArray[Any], NDArray[np.bool_], AreaSettings], AreaPixels]
-
-
-class PlaneFit(NamedTuple):
-    """The energy of the line model over some pixels, and its minimum."""
-
-    energy: Energy
-    solution: Solution
-
-
-def fit_plane(disparity: NDArray[Any], pixels: AreaPixels) -> PlaneFit:
-    """Fit a plane to the chosen pixels of a map (H, W) by least squares.
-
-    Raises
-    ------
-    EstimationError
-        When the pixels do not determine a plane.
-    """
-    require_pixels(pixels.used)
-    peak = float(disparity.max(where=pixels.used, initial=0))
-    energy = Energy.of(map_moments(disparity, pixels.used), peak, parabolic=False)
-    return PlaneFit(energy, Solution(exact(energy).theta, pixels.iterations, pixels.status))
 
 
 _TILES = 100  # along the longer side of the map
@@ -296,42 +350,3 @@ def _covered(
     for row, column in zip(*np.divmod(areas, across), strict=True):
         covered[row * step : row * step + extent, column * step : column * step + extent] = True
     return covered
-
-
-_ROWS = (0.6, 0.9)  # below the horizon, above a bonnet
-_COLUMNS = (0.35, 0.65)
-
-
-def lower_centre(
-    disparity: NDArray[Any], usable: NDArray[np.bool_], settings: AreaSettings = DEFAULT_AREA
-) -> AreaPixels:
-    """Choose 60 to 90 % of the height and 35 to 65 % of the width, or all usable pixels.
-
-    Parameters
-    ----------
-    disparity : ndarray, shape (H, W)
-        Real numbers, px.
-    usable : ndarray of bool, shape (H, W)
-        The pixels that are valid and may be used.
-    settings : AreaSettings
-        Whether the usable pixels are the chosen area.
-
-    Returns
-    -------
-    AreaPixels
-        With 0 iterations.
-    """
-    if settings.chosen:
-        return AreaPixels(usable)
-    used = np.zeros(disparity.shape, np.bool_)
-    area = lower_centre_slices(*disparity.shape)
-    used[area] = usable[area]
-    return AreaPixels(used)
-
-
-def lower_centre_slices(height: int, width: int) -> tuple[slice, slice]:
-    """Return the rows and columns of the default area."""
-    rows, columns = (
-        slice(round(low * n), round(high * n)) for (low, high), n in ((_ROWS, height), (_COLUMNS, width))
-    )
-    return rows, columns

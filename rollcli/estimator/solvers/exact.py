@@ -1,4 +1,14 @@
-"""The global minimum of the energy, without a start value."""
+"""The global minimum of the energy, without a start value.
+
+E_min = d'd - N/D, where N and D = det(Y'Y) are homogeneous of degree 6 in cos(theta) and sin(theta). Its
+derivative is (N D' - N' D) / D^2, and this numerator is a trigonometric polynomial of degree 5 in 2 theta:
+a polynomial of degree 10 in tan(theta), but well conditioned at every angle, 90 degrees included. Samples of
+N and D give it without error, and its zeros are all the angles at which E_min can have a minimum. Most have
+few zeros, far apart: values on a fine grid bracket them, and a bound on the derivatives proves that none
+hides between. Else they are the roots of an ordinary polynomial, which takes several times as long.
+
+[TITS]: Fan, Liu, "Road Damage Detection Based on Unsupervised Disparity Map Segmentation", IEEE T-ITS (2019).
+"""
 
 import cmath
 import math
@@ -49,7 +59,7 @@ def rising_zeros(samples: Floats) -> list[float] | None:
     before = ((curves[0] < 0) & (following[0] >= 0)).nonzero()[0]
     mean, *parts = waves.tolist()
     series = [mean, *(complex(a, -b) for a, b in zip(parts[:DEGREE], parts[DEGREE:], strict=True))]
-    return [_polished(series, (place + 0.5) * (2 * math.pi / _FINE)) for place in before.tolist()]
+    return [_newton(series, (place + 0.5) * (2 * math.pi / _FINE)) for place in before.tolist()]
 
 
 def zeros(samples: Floats) -> list[float]:
@@ -77,7 +87,7 @@ def derivative(samples: Floats) -> Floats:
     return slopes
 
 
-def _polished(series: list[complex], angle: float) -> float:
+def _newton(series: list[complex], angle: float) -> float:
     """Take Newton steps on the real part of a power series in exp(i angle)."""
     for _ in range(_STEPS):
         z = cmath.rect(1, angle)

@@ -1,15 +1,18 @@
-"""Planes in many areas, and those that agree."""
+"""Planes in one area, and in many that agree."""
 
 import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.estimate import estimate_roll
-from rollcli.estimator.solvers.areas import fit_plane, iterative
+from rollcli.estimator.moments import map_moments
+from rollcli.estimator.solvers.areas import fit_plane, iterative, lower_centre, lower_centre_slices, tile_sums
 from rollcli.estimator.solvers.solution import SolverStatus
-from tests.estimator.synthetic_maps import bent_road, flat_road
+from tests.estimator.synthetic_maps import bent_road, flat_road, random_maps, repeatable
 
 SIZE = {"width": 320, "height": 240, "focal": 280.0}
 
@@ -122,3 +125,111 @@ def test_an_area_of_which_half_is_valid_is_enough():
     half[::4, ::8] = 0
     with pytest.raises(EstimationError, match="at least half valid"):
         areas(half)
+
+
+def plane_of(disparity):
+    """The solution of the default area."""
+    return fit_plane(disparity, lower_centre(disparity, disparity > 0)).solution
+
+
+@pytest.mark.parametrize("roll_deg", [-45, -12, 0, 3, 44])
+def test_one_plane_of_a_flat_road_gives_its_roll(roll_deg):
+    assert math.degrees(plane_of(flat_road(roll_deg, pitch_deg=25)).theta) == pytest.approx(
+        roll_deg, abs=1e-6
+    )
+
+
+def test_by_default_the_area_is_the_lower_centre():
+    disparity = flat_road(6)
+    rows, columns = lower_centre_slices(*disparity.shape)
+    used = lower_centre(disparity, disparity > 0).used
+    assert used[rows, columns].all()
+    assert np.count_nonzero(used) == used[rows, columns].size
+    assert rows.start / disparity.shape[0] > 0.5
+    assert rows.stop < disparity.shape[0]
+
+
+def test_what_lies_outside_the_area_has_no_say():
+    clean = flat_road(6, pitch_deg=20)
+    rows, columns = lower_centre_slices(*clean.shape)
+    spoilt = np.random.default_rng(0).uniform(1, 90, clean.shape)
+    spoilt[rows, columns] = clean[rows, columns]
+    assert plane_of(spoilt).theta == pytest.approx(plane_of(clean).theta, abs=1e-9)
+
+
+def test_a_mask_is_the_chosen_area():
+    rolled, level = bent_road(9, bend=0), bent_road(0, bend=0)
+    both = np.where(np.arange(160) < 80, rolled, level)
+    left = np.zeros(both.shape, bool)
+    left[:, :80] = True
+    found = estimate_roll(both, mask=left, method="plane", road="all", road_mask=True)
+    assert math.degrees(found.theta) == pytest.approx(9, abs=1e-6)
+    assert found.road_mask.sum() == left.sum()
+    assert (found.iterations, found.global_minimum) == (0, None)
+
+
+def test_it_is_the_least_squares_plane_and_says_its_error():
+    disparity = bent_road(4, noise=0.3, seed=5)
+    pixels = lower_centre(disparity, disparity > 0)
+    energy, found = fit_plane(disparity, pixels)
+    v, u = np.nonzero(pixels.used)
+    design = np.stack([np.ones(len(u)), u, v], axis=1)
+    plane, squares, *_ = np.linalg.lstsq(design, disparity[v, u], rcond=None)
+    assert found.theta == pytest.approx(math.atan(-plane[1] / plane[2]), abs=1e-9)
+    assert energy.rmse(energy.at(found.theta).value) == pytest.approx(
+        math.sqrt(squares[0] / len(u)), rel=1e-6
+    )
+
+
+def test_an_area_without_pixels_is_refused_with_the_reason():
+    disparity = flat_road(6)
+    rows, columns = lower_centre_slices(*disparity.shape)
+    disparity[rows, columns] = 0
+    with pytest.raises(EstimationError, match="no valid pixel"):
+        plane_of(disparity)
+
+
+def gram_of(moments):
+    """sum x x', x = (1, p, q, d), from moments about the plane 0."""
+    s, t = moments.s, moments.t
+    return np.array(
+        [
+            [s[0, 0], s[1, 0], s[0, 1], t[0, 0]],
+            [s[1, 0], s[2, 0], s[1, 1], t[1, 0]],
+            [s[0, 1], s[1, 1], s[0, 2], t[0, 1]],
+            [t[0, 0], t[1, 0], t[0, 1], moments.rr],
+        ]
+    )
+
+
+@repeatable
+@given(random_maps(), st.integers(2, 20))
+def test_tiles_add_to_the_moments_of_the_map(disparity, side):
+    total = tile_sums(disparity, None, side).gram.sum(axis=(0, 1))
+    expected = gram_of(map_moments(disparity, plane=(0.0, 0.0, 0.0)))
+    np.testing.assert_allclose(total, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
+
+
+def test_weights_and_no_data_are_those_of_the_moments():
+    disparity = bent_road(5, noise=0.2)
+    disparity[::9, ::4] = np.nan
+    disparity[5] = np.inf
+    weights = np.random.default_rng(3).uniform(0, 1, disparity.shape)
+    total = tile_sums(disparity, weights, 16).gram.sum(axis=(0, 1))
+    np.testing.assert_allclose(
+        total, gram_of(map_moments(disparity, weights, plane=(0.0, 0.0, 0.0))), rtol=1e-9
+    )
+
+
+@pytest.mark.parametrize(("size", "step"), [(1, 1), (4, 2), (3, 1)])
+def test_an_area_is_the_sum_of_its_tiles(size, step):
+    tiles = tile_sums(bent_road(5, noise=0.2), None, 10)  # 12 x 16 tiles
+    areas = tiles.areas(size, step)
+    assert areas.shape[:2] == ((12 - size) // step + 1, (16 - size) // step + 1)
+    for i, j in ((0, 0), (2, 3), (areas.shape[0] - 1, areas.shape[1] - 1)):
+        inside = tiles.gram[i * step : i * step + size, j * step : j * step + size]
+        np.testing.assert_allclose(areas[i, j], inside.sum(axis=(0, 1)), rtol=1e-9)
+
+
+def test_a_map_smaller_than_an_area_has_none():
+    assert tile_sums(bent_road(5, width=20, height=20), None, 10).areas(4, 2).size == 0
