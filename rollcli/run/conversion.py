@@ -2,7 +2,7 @@
 
 import contextlib
 from collections.abc import Callable, Generator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 from rollcli.errors import ExitStatus
@@ -70,6 +70,7 @@ def convert(
     UsageError, OutputError, ClusterError, WorkerError
         The run cannot start or cannot go on.
     """
+    conversions = [each if each.frame.relative else replace(each, writes=()) for each in conversions]
     _check(conversions, folder, overwrite=running.overwrite)
     if running.dry_run:
         list_files((each.frame.reads(), each.writes) for each in conversions)

@@ -13,7 +13,7 @@ from rollcli.files import storage
 from rollcli.files.atomic import is_file, is_folder
 from rollcli.files.inputs import Input, find_inputs, pair_inputs
 from rollcli.files.search import is_place
-from rollcli.files.stores.locations import is_object_url, is_url, public_name, split_url
+from rollcli.files.stores.locations import is_object_url, is_url, names_a_file, public_name, split_url
 from rollcli.files.stores.objects import list_objects
 from rollcli.files.stream import write_stdout
 from rollcli.rig.calibration import CalibrationOptions
@@ -263,7 +263,7 @@ def _frame(left: Input, right: Input | None, masks: "_Masks", calibrations: Cali
         right_file=right.name if right else "",
         path=left.location,
         right_path=right.location if right else "",
-        relative=left.relative,
+        relative=left.relative if not is_url(left.location) or names_a_file(left.relative) else "",
         mask=masks.of(left),
         calibration=calibrations.of(left.name),
     )

@@ -19,7 +19,8 @@ class Frame:
     path, right_path : str
         Where they are.
     relative : str
-        Path below the folder it was found in; names its images.
+        Path below the folder it was found in; names its images. Empty where its URL names no file: the frame
+        is an error.
     mask : str or None
         The mask file of this frame.
     calibration : Calibration or None

@@ -20,6 +20,8 @@ ENDING_OF_FORMAT = {"png": ".png", "tiff": ".tif", "npy": ".npy"}  # of maps com
 
 def image_paths(frame: Frame, images: ImageOptions) -> Iterator[tuple[str, str]]:
     """Yield (kind, path) of each image that is written for a frame."""
+    if not frame.relative:
+        return
     for kind, folder, ending in _kinds(images, computed=bool(frame.right_file)):
         yield kind, output_path(frame, folder, ending)
 

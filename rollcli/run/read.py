@@ -157,6 +157,8 @@ def read_source(frame: Frame, options: FrameOptions) -> Source:
     InputError
         A file cannot be read as what it should be, or no pixel may be used.
     """
+    if not frame.relative:
+        raise InputError(f"{frame.file}: its URL names no file, by which what is made of it could be named")
     if frame.right_file:
         return _match(frame, options)
     source = _read(frame, options)

@@ -14,6 +14,12 @@ from rollcli.errors import UsageError
 OBJECT_STORES = ("s3", "gs", "az")
 WEB_SERVERS = ("http", "https")
 _QUERY, _HOST_END = re.compile("[?#]"), re.compile(r"[/?#\\]")
+_ON_WINDOWS = os.name == "nt"
+_NOWHERE = re.compile(r"[\0\\]|^[A-Za-z]:")
+_NOT_ON_WINDOWS = re.compile(
+    r'[<>:"|?*\x00-\x1f]|[. ]$|^(?:con|prn|aux|nul|conin\$|conout\$|com[0-9]|lpt[0-9]) *(?:\.|$)',
+    re.IGNORECASE,
+)
 _SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]+)://")  # two letters or more: "c:/" is a drive of Windows
 
 
@@ -74,7 +80,7 @@ def store_of(url: str) -> str:
 
 def is_remote(location: str) -> bool:
     """Return whether reading a location asks another machine by its name: a URL, or a share of Windows."""
-    share = os.name == "nt" and location.replace("\\", "/").startswith("//")
+    share = _ON_WINDOWS and location.replace("\\", "/").startswith("//")
     return share or is_url(location)
 
 
@@ -87,6 +93,18 @@ def public_name(location: str) -> str:
         rest = _QUERY.split(rest, maxsplit=1)[0]
     host, slash, path = rest.partition("/")
     return f"{scheme}://{host.rpartition('@')[2]}{slash}{path}"
+
+
+def names_a_file(relative: str) -> bool:
+    """Return whether a decoded path of a URL names a file below a folder, and nothing else.
+
+    By the rules of every system: with a backslash, or a drive at its start, it would lead elsewhere on
+    Windows. Devices, streams and what else Windows alone does not take are refused there.
+    """
+    parts = relative.split("/")
+    if parts[-1] == "" or any(part in (".", "..") or _NOWHERE.search(part) for part in parts):
+        return False
+    return not (_ON_WINDOWS and any(map(_NOT_ON_WINDOWS.search, parts)))
 
 
 def located(root: str, location: str) -> str:

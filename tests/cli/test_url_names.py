@@ -1,0 +1,133 @@
+"""Names that URLs give: none leads out of the output folder, on no system, and none ends the batch."""
+
+import csv
+import threading
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+
+import pytest
+
+from rollcli.files.stores import locations
+from rollcli.files.stores.locations import names_a_file
+from tests.object_store import object_store
+from tests.run_cli import rollcli, write_maps
+
+
+@pytest.fixture
+def server(tmp_path):
+    """Gives the same map under every name."""
+    write_maps(tmp_path / "map", 1)
+    data = (tmp_path / "map" / "frame0.png").read_bytes()
+
+    class Handler(BaseHTTPRequestHandler):
+        def do_GET(self):
+            self.send_response(200)
+            self.send_header("Content-Length", str(len(data)))
+            self.end_headers()
+            self.wfile.write(data)
+
+        def log_message(self, *_):
+            pass
+
+    with ThreadingHTTPServer(("127.0.0.1", 0), Handler) as server:
+        threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01}, daemon=True).start()
+        yield f"http://127.0.0.1:{server.server_port}"
+        server.shutdown()
+
+
+BAD = [
+    "..%5C..%5CStartup%5Cevil.png",
+    "C:%5CStartup%5Cevil.png",
+    "c:evil.png",
+    "a%00.png",
+    "a/",
+    "",
+    "%2e%2e",
+    "a/%2e%2e",
+    "%2E",
+    "%2F",
+    "..%2f..%2f",
+]
+
+
+def rows_of(path):
+    return csv.DictReader(path.read_text().splitlines())
+
+
+def keys_of(store):
+    return {name.lower(): store[name] for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY")}
+
+
+def written(folder):
+    return sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file())
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_a_url_that_names_no_file_is_that_frames_error_and_writes_nothing(tmp_path, server, name):
+    cwd = tmp_path / "cwd"
+    cwd.mkdir()
+    maps = [f"{server}/{name}", f"{server}/good.png"]
+    done = rollcli("estimate", *maps, "-o", "rolls.csv", "--derotated", "up", "--vdisparity", "v", cwd=cwd)
+    assert done.status == 3, done.err
+    rows = {each["file"]: each for each in rows_of(cwd / "rolls.csv")}
+    assert "its URL names no file" in rows[maps[0]]["message"]
+    assert rows[maps[1]]["status"] == "ok"
+    assert written(cwd) == ["rolls.csv", "rolls.csv.run.json", "up/good.png", "v/good.png"]
+    assert written(tmp_path / "map") == ["frame0.png"]
+
+
+@pytest.mark.parametrize("name", ["..%5Cevil.png", "a%00.png", "%2e%2e"])
+@pytest.mark.parametrize("command", [("vdisparity",), ("derotate", "--roll", "3"), ("evaluate", "paper")])
+def test_other_commands_refuse_such_a_url_too(tmp_path, server, name, command):
+    cwd = tmp_path / "cwd"
+    cwd.mkdir()
+    done = rollcli(*command, f"{server}/{name}", "-o", "out", cwd=cwd)
+    assert done.status in (2, 3), done.err
+    assert "its URL names no file" in done.err
+    assert written(tmp_path) == ["map/frame0.png"]
+
+
+def test_names_of_objects_are_checked_likewise(tmp_path):
+    import boto3
+
+    write_maps(tmp_path / "map", 1)
+    data = (tmp_path / "map" / "frame0.png").read_bytes()
+    keys = ["run/a\\..\\..\\evil.png", "run/C:\\evil.png", "run/a:b.png", "run/2024-05-01T12:00:00.png"]
+    with object_store() as store:
+        client = boto3.client("s3", "us-east-1", endpoint_url=store["AWS_ENDPOINT_URL"], **keys_of(store))
+        for key in keys:
+            client.put_object(Bucket="maps", Key=key, Body=data)
+        done = rollcli(
+            "estimate", "s3://maps/run/", "-o", "r.csv", "--derotated", "up", cwd=tmp_path, **store
+        )
+    assert done.status == 3, done.err
+    rows = {
+        each["file"].rsplit("/")[-1]: each
+        for each in csv.DictReader((tmp_path / "r.csv").read_text().splitlines())
+    }
+    assert {name: row["status"] for name, row in rows.items()} == {
+        "a\\..\\..\\evil.png": "error",
+        "C:\\evil.png": "error",
+        "a:b.png": "error",
+        "2024-05-01T12:00:00.png": "ok",
+    }
+    assert written(tmp_path / "up") == ["2024-05-01T12:00:00.png"]
+
+
+def test_names_that_windows_gives_to_devices_and_streams_are_no_files_there(monkeypatch):
+    names = [
+        "NUL",
+        "con.png",
+        "COM1.tif",
+        "a.png:stream",
+        "a?.png",
+        "a.png.",
+        "a.png ",
+        "x/aux/a.png",
+        "a\x1f",
+    ]
+    assert all(map(names_a_file, names))
+    monkeypatch.setattr(locations, "_ON_WINDOWS", True)
+    assert not any(map(names_a_file, names))
+    assert names_a_file("run 7/frame (2).png")
+    assert Path("run 7/frame (2).png").name
