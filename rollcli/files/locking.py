@@ -126,7 +126,7 @@ def locked(descriptor: int, name: str) -> Iterator[None]:
         The lock file cannot be made.
     """
     try:
-        _wait_for(descriptor, name)
+        take_lock(descriptor, name)
     except _NoLocksError:
         say(f"{name}: its file system has no locks; {name}{_LOCK} keeps other runs away")
         with _lock_file(name):
@@ -200,7 +200,14 @@ def _has_ended(path: Path) -> bool:
     return False
 
 
-def _wait_for(descriptor: int, name: str) -> None:
+def take_lock(descriptor: int, name: str) -> None:
+    """Take the lock on an open file, which lasts until the file is closed, or say who has it.
+
+    Raises
+    ------
+    UsageError
+        Another run holds it.
+    """
     give_up = time.monotonic() + _PATIENCE_S
     while not _try_lock(descriptor):
         if time.monotonic() > give_up:

@@ -2,6 +2,7 @@
 
 import contextlib
 import errno
+import io
 import os
 import stat
 import time
@@ -9,12 +10,14 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from rollcli.errors import OutputError, UsageError
-from rollcli.files.atomic import atomic_file, look_at, output_error, sync_files
-from rollcli.files.locking import locked
+from rollcli.files.atomic import atomic_file, look_at, output_error, sync_files, write_atomic
+from rollcli.files.locking import locked, take_lock
 from rollcli.files.results import Format, format_header
 
 _HEADERS = (format_header("csv"), format_header("csv", timing=True))
 _STARTS = (*_HEADERS, b'{"file": "')  # of the files that `rollcli estimate` writes
+_FLAGS = os.O_RDWR | os.O_CREAT | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
+_ON_WINDOWS = os.name == "nt"
 _MORE_THAN_A_HEADER = 1000  # bytes
 
 
@@ -80,6 +83,10 @@ class ResultFile:
         """
         target = os.path.realpath(self._name)  # a link stays one
         first = -1 if form == "csv" else 0  # the header
+        if _ON_WINDOWS:
+            rest = enumerate(_lines(io.BytesIO(self.read()), form), first)
+            self._replace_closed(target, b"".join(rows.get(position, line) for position, line in rest))
+            return
         with contextlib.ExitStack() as held:
             try:
                 with Path(target).open("rb") as old, atomic_file(target, durable=True) as new:
@@ -92,6 +99,22 @@ class ResultFile:
                 os.dup2(locked_file, self.descriptor, inheritable=False)
             except OSError as error:
                 raise output_error(self._name, error) from error
+
+    def _replace_closed(self, target: str, data: bytes) -> None:
+        """Write the file anew while it is closed: Windows renames onto no open file.
+
+        Another run may take it in this moment; then this one ends, and has lost nothing.
+        """
+        try:
+            _reopen(self.descriptor, os.devnull, os.O_RDONLY)
+            try:
+                write_atomic(target, data, durable=True)
+            finally:
+                _reopen(self.descriptor, target, _FLAGS)
+        except OSError as error:
+            raise output_error(self._name, error) from error
+        take_lock(self.descriptor, self._name)
+        os.lseek(self.descriptor, 0, os.SEEK_END)
 
     def sync(self) -> None:
         """Force the rows to the disk, where its file system can.
@@ -126,11 +149,10 @@ def open_result(name: str) -> Iterator[ResultFile]:
     OutputError
         It cannot be written.
     """
-    flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
     while True:
         try:
             Path(name).parent.mkdir(parents=True, exist_ok=True)
-            descriptor = os.open(name, flags, 0o666)
+            descriptor = os.open(name, _FLAGS, 0o666)
         except OSError as error:
             raise output_error(name, error) from error
         try:
@@ -194,6 +216,15 @@ def _lines(file: Iterable[bytes], form: Format) -> Iterator[bytes]:
         if form == "jsonl" or line.count(b'"') % 2 == 0:
             yield line
             line = b""
+
+
+def _reopen(descriptor: int, path: str, flags: int) -> None:
+    """Let an open descriptor be that of another file."""
+    opened = os.open(path, flags)
+    try:
+        os.dup2(opened, descriptor, inheritable=False)
+    finally:
+        os.close(opened)
 
 
 def _write_all(descriptor: int, data: bytes) -> None:
