@@ -7,13 +7,14 @@ Keys at the top are for every command that has such an option. Keys in a table, 
 import re
 import sys
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import click
 
 from rollcli.cli.command import option
 from rollcli.cli.types import FilePath
+from rollcli.errors import InputError
+from rollcli.files.bounded import MOST_SETTINGS, read_given
 
 _PARTS = 8  # of a dotted key; no command has more than two words, and no option more than one
 _MANY_PARTS = re.compile(
@@ -78,12 +79,14 @@ def _load(path: str) -> dict[str, Any]:
         import tomli as tomllib
 
     try:
-        text = Path(path).read_text("utf-8")
+        text = read_given(path, MOST_SETTINGS).decode()
         if _MANY_PARTS.search(text):  # which takes time that grows with the square of their number
             raise click.UsageError(f"{path}: is no file of options: it has a key of more than {_PARTS} parts")
         return tomllib.loads(text)
     except OSError as error:
         raise click.UsageError(f"{path}: cannot be read: {error.strerror}") from error
+    except InputError as error:
+        raise click.UsageError(str(error)) from error
     except (ValueError, RecursionError) as error:  # TOML, UTF-8, numbers of thousands of digits
         raise click.UsageError(f"{path}: is not TOML: {error}") from error
 

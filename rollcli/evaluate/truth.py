@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rollcli.errors import InputError, UsageError
+from rollcli.files.bounded import read_given
 from rollcli.files.matching import stem_of
 from rollcli.files.results import TEXT
 from rollcli.files.storage import read_bytes
@@ -79,7 +80,7 @@ def read_known_poses(path: str | Path) -> dict[str, KnownPose]:
     camera, and are left out where `curvature_per_m` says that the road ahead bends away from it.
     """
     try:
-        data = read_bytes(path) if is_url(str(path)) else Path(path).read_bytes()
+        data = read_bytes(path) if is_url(str(path)) else read_given(path)
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from error
     rows = list(_rows(data.removeprefix(b"\xef\xbb\xbf").decode(**TEXT), path))

@@ -71,7 +71,7 @@ _TEXT = re.compile(rb"[\t\n\r\f\x20-\x7e]{8}")  # no format begins with eight pr
 
 def read_stored(path: str | Path, name: str | None = None) -> Stored:
     """Read a disparity map file: the numbers as they are stored; see `decode_stored`."""
-    return decode_stored(read_bytes(path, name), name or str(path))
+    return decode_stored(read_bytes(path, name, begins=_check_beginning), name or str(path))
 
 
 def decode_stored(data: bytes, name: str) -> Stored:
@@ -157,6 +157,16 @@ def decode_mask(data: bytes, name: str) -> NDArray[np.bool_]:
         pixels = _decoded(data, name).values
     mask: NDArray[np.bool_] = (pixels if pixels.ndim == 2 else pixels.max(axis=2)) != 0
     return mask
+
+
+def _check_beginning(head: bytes, size: int, name: str) -> None:
+    """Refuse a file that is no map by its first bytes: the rest of it need not be read."""
+    if head.startswith(arrays.MAGIC):
+        arrays.check_npy(head, size, name)
+    elif head.startswith(arrays.MAGICS):
+        arrays.check_pfm(head, size, name)
+    elif not any(head.startswith(each.signatures) for each in MAP_FORMATS.values()):
+        _decoded(head, name)  # which says what it is instead
 
 
 def _decoded(data: bytes, name: str) -> Stored:

@@ -2,12 +2,14 @@
 
 import functools
 import os
+import re
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from rollcli.errors import InputError, UsageError
+from rollcli.files.bounded import MOST_LISTED, read_given, read_stream
 from rollcli.files.naming import listed, match_names, natural_key
 from rollcli.files.search import Search
 from rollcli.files.storage import read_bytes
@@ -213,7 +215,7 @@ def _arguments(
         yield from ((line, True) for line in _stdin_lines(stdin))
     elif files_from is not None:
         try:
-            data = read_bytes(files_from) if is_url(files_from) else Path(files_from).read_bytes()
+            data = _list_behind(files_from)
         except InputError as error:
             raise UsageError(str(error)) from None
         except OSError as error:
@@ -222,15 +224,22 @@ def _arguments(
         yield from ((line, True) for line in _lines(data))
 
 
+def _list_behind(location: str) -> bytes:
+    return read_bytes(location, most=MOST_LISTED) if is_url(location) else read_given(location, MOST_LISTED)
+
+
 def _stdin_lines(stdin: Iterable[str] | None) -> Iterator[str]:
     if stdin is None:
         if sys.stdin is None:
             raise UsageError("-: stdin is closed; nothing can be read from it")
-        return _lines(sys.stdin.buffer.read())
+        return _lines(read_stream(sys.stdin.buffer, "-", MOST_LISTED))
     return (name for line in stdin if (name := line.rstrip("\r\n")))
 
 
 def _lines(data: bytes) -> Iterator[str]:
     """Split paths, one a line or as `find -print0` writes them; bytes, for file names need not be text."""
-    lines = data.split(b"\0") if b"\0" in data else data.replace(b"\r\n", b"\n").split(b"\n")
+    # one after the other: all at once, a list of line ends alone would take ten times its memory
+    if b"\0" in data:
+        return (os.fsdecode(line[0]) for line in re.finditer(rb"[^\0]+", data))
+    lines = (line[0].removesuffix(b"\r") for line in re.finditer(rb"[^\n]+", data))
     return (os.fsdecode(line) for line in lines if line)

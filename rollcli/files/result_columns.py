@@ -5,6 +5,7 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from itertools import chain, islice
 from operator import itemgetter
 from pathlib import Path
@@ -32,6 +33,7 @@ from rollcli.files.storage import list_names, read_bytes
 from rollcli.files.stores.locations import is_url
 
 _CHUNK = 300  # rows that are held as text: twenty thousand do not fit into a cache, and take a third longer
+_LONGEST_LINE = 2**20  # characters that are read of one: a file or a pipe may never end its first
 _MOST_SPACE = 1000  # empty lines before what tells the format
 
 
@@ -153,14 +155,15 @@ def _opened(path: str) -> Iterator[TextIO]:
 
 def _cells(stream: TextIO, path: str, wanted: Sequence[str]) -> tuple[list[str], Iterator[tuple[Any, ...]]]:
     """Return the names of the columns that are there, and for each row its line and their cells."""
-    start = [stream.readline().removeprefix("\ufeff")]
+    read_line = partial(stream.readline, _LONGEST_LINE)
+    start = [read_line().removeprefix("\ufeff")]
     while start[-1].isspace() and len(start) < _MOST_SPACE:
-        start.append(stream.readline())
-    lines = chain(start, stream)
+        start.append(read_line())
+    lines = chain(start, iter(read_line, ""))
     names = ["file", "status", "method", *wanted]
     if start[-1].lstrip().startswith("{"):
         return names, (
-            (number, *map(values.get, names)) for number, values in json_rows(_by_newline(lines), path)
+            (number, *map(values.get, names)) for number, values in json_rows(_by_newline(lines, path), path)
         )
     rows = csv_rows(lines, path)
     _, header = next(rows)
@@ -169,11 +172,13 @@ def _cells(stream: TextIO, path: str, wanted: Sequence[str]) -> tuple[list[str],
     return names, ((number, *pick(row)) for number, row in rows)
 
 
-def _by_newline(pieces: Iterable[str]) -> Iterator[str]:
+def _by_newline(pieces: Iterable[str], path: str) -> Iterator[str]:
     """Join what a carriage return has cut: in JSON it is white space, and a newline alone ends a line."""
     held: list[str] = []
     for piece in pieces:
         held.append(piece)
+        if len(piece) >= _LONGEST_LINE or len(held) >= _LONGEST_LINE:
+            raise InputError(f"{path}: has a line of more than {_LONGEST_LINE} characters; no result has one")
         if piece.endswith("\n"):
             yield "".join(held)
             held.clear()

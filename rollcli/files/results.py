@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Literal, get_args, get_type_hints
 
 from rollcli.errors import InputError
+from rollcli.files.bounded import read_given, read_stream
 from rollcli.files.codecs.parquet import MAGIC, decode_parquet
 from rollcli.files.storage import exists, list_names, read_bytes
 from rollcli.files.stores.locations import is_url, is_web_url
@@ -290,7 +291,7 @@ def _read(path: str | Path) -> bytes:
     if is_url(str(path)):
         return read_bytes(path)
     try:
-        return sys.stdin.buffer.read() if str(path) == STDIN else Path(path).read_bytes()
+        return read_stream(sys.stdin.buffer, STDIN) if str(path) == STDIN else read_given(path)
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from error
 

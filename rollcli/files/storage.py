@@ -6,11 +6,13 @@ Import-light: obstore is loaded when the first URL of an object store is read or
 import hashlib
 import os
 import stat
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from functools import partial
 from pathlib import Path
 
 from rollcli.errors import InputError, OutputError
 from rollcli.files.atomic import NameTakenError, output_error, write_atomic
+from rollcli.files.bounded import MOST_BYTES, too_large
 from rollcli.files.stores.locations import WEB_SERVERS, is_url, public_name, scheme_of
 from rollcli.files.stores.objects import (
     create_object,
@@ -25,12 +27,15 @@ from rollcli.files.stores.objects import (
     write_object,
 )
 
-_MAX_BYTES = 2**32
+Beginning = Callable[[bytes, int, str], None] | None
+_HEAD = 2**16  # bytes: the header of an array
 _READ_ONLY = "web servers are read from, not written to"
 _AT_ONCE = 16  # requests, of 50 ms each: 10,000 small objects take half a minute
 
 
-def read_bytes(location: str | Path, name: str | None = None) -> bytes:
+def read_bytes(
+    location: str | Path, name: str | None = None, *, most: int = MOST_BYTES, begins: Beginning = None
+) -> bytes:
     """Return the bytes of a file or an object.
 
     Parameters
@@ -39,22 +44,27 @@ def read_bytes(location: str | Path, name: str | None = None) -> bytes:
         A path, or a URL of s3, gs, az, http or https.
     name : str, optional
         What errors call it; by default the location, without secrets.
+    most : int
+        Bytes that are read; a larger file is refused before it is read.
+    begins : callable, optional
+        Refuses a file on disk by its first bytes, its size and its name, before the rest is read.
 
     Raises
     ------
     InputError
-        It does not exist, may not be read, is empty, is no regular file, or its store does not answer.
+        It does not exist, has more bytes than `most`, may not be read, is empty, is no regular file, or its
+        store does not answer.
     """
     location = str(location)
     name = name or public_name(location)
-    data = _read_url(location) if is_url(location) else _read_file(location, name)
+    data = _read_url(location, most) if is_url(location) else _read_file(location, name, most, begins)
     if not data:
         raise InputError(f"{name}: is empty")
     return data
 
 
-def fetch_all(locations: Iterable[str]) -> dict[str, bytes]:
-    """Read many small objects at once.
+def fetch_all(locations: Iterable[str], most: int = MOST_BYTES) -> dict[str, bytes]:
+    """Read many small objects at once, each of so many bytes at most.
 
     Raises
     ------
@@ -67,15 +77,15 @@ def fetch_all(locations: Iterable[str]) -> dict[str, bytes]:
     if not every:
         return {}
     with ThreadPoolExecutor(_AT_ONCE) as pool:
-        return dict(zip(every, pool.map(read_bytes, every), strict=True))
+        return dict(zip(every, pool.map(partial(read_bytes, most=most), every), strict=True))
 
 
-def _read_url(location: str) -> bytes:
+def _read_url(location: str, most: int) -> bytes:
     if scheme_of(location) in WEB_SERVERS:
         from rollcli.files.stores.web import read_web_file  # urllib takes longer to load than all of this
 
-        return read_web_file(location)
-    return read_object(location)
+        return read_web_file(location, most)
+    return read_object(location, most)
 
 
 def read_problem(url: str) -> str:
@@ -267,7 +277,7 @@ def remove_all(locations: Iterable[str]) -> None:
             list(pool.map(remove, every))  # asked for, so that an error is raised
 
 
-def _read_file(path: str, name: str) -> bytes:
+def _read_file(path: str, name: str, most: int = MOST_BYTES, begins: Beginning = None) -> bytes:
     """Return the bytes of a regular file; pipes and devices could be read for ever."""
     try:
         # not blocking: a named pipe would otherwise wait for its writer for ever
@@ -276,9 +286,14 @@ def _read_file(path: str, name: str) -> bytes:
             status = os.fstat(file.fileno())
             if not stat.S_ISREG(status.st_mode):
                 raise InputError(f"{name}: is not a regular file")
-            if status.st_size > _MAX_BYTES:
-                raise InputError(f"{name}: has {status.st_size} bytes; no disparity map is that large")
-            data = file.read()
+            if status.st_size > most:
+                raise too_large(name, status.st_size, most)
+            if begins is not None and status.st_size > _HEAD:
+                begins(file.read(_HEAD), status.st_size, name)
+                file.seek(0)
+            data = file.read(most + 1)
+            if len(data) > most:  # it has grown, or lies in a file system that says no sizes
+                raise too_large(name, None, most)
     except IsADirectoryError:
         raise InputError(f"{name}: is a folder, not a file") from None
     except FileNotFoundError:

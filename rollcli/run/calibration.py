@@ -72,7 +72,7 @@ class Calibrations:
         if len(given.calib) == 1 and is_place(given.calib[0]):
             files = _files(given.calib[0])
             self._by_stem = _stems(files)
-            self._fetched = fetch_all(filter(is_url, files))
+            self._fetched = fetch_all(filter(is_url, files), MAX_BYTES)
         elif given.given:
             self._one = _read(given.calib, given)
 
@@ -162,17 +162,5 @@ def _read(
     if len(paths) > 2:
         raise UsageError("--calib is given at most twice: for the left and the right view of ROS")
     fetched = fetched or {}
-    files = [(public_name(path), fetched[path] if path in fetched else _bytes(path)) for path in paths]
+    files = [(public_name(path), fetched.get(path) or read_bytes(path, most=MAX_BYTES)) for path in paths]
     return parse_calibration(files, given)
-
-
-def _bytes(path: str) -> bytes:
-    if is_url(path):
-        return read_bytes(path)
-    try:
-        size = Path(path).stat().st_size
-    except (OSError, ValueError):
-        size = 0  # what is wrong is said by who reads it
-    if size > MAX_BYTES:
-        raise InputError(f"{path}: has {size} bytes; no calibration is larger than {MAX_BYTES >> 20} MB")
-    return read_bytes(path)

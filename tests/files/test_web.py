@@ -86,18 +86,18 @@ def test_a_refusal_is_not_asked_again(serve, pauses, status):
     assert pauses == []
 
 
-def test_no_address_and_a_file_without_end_are_said_at_once(serve, pauses, monkeypatch):
+def test_no_address_and_a_file_without_end_are_said_at_once(serve, pauses):
     assert refusal("http://user:secret@[/map.png") == "this is no address"
-    monkeypatch.setattr(web, "_LARGEST", len(DATA) - 1)
-    assert refusal(serve(200)) == "it has more bytes than any disparity map"
+    with pytest.raises(InputError, match="has 5000 bytes; up to 4999 bytes are read"):
+        web.read_web_file(serve(200), len(DATA) - 1)
     assert pauses == []
 
 
 def test_a_server_that_is_silent_or_not_there_is_said(pauses, monkeypatch):
-    monkeypatch.setattr(web, "_TIMEOUT_S", 0.05)
+    monkeypatch.setenv("ROLLCLI_STORE_TIMEOUT", "0.05")
     with socket.create_server(("127.0.0.1", 0)) as silent:
         url = f"http://127.0.0.1:{silent.getsockname()[1]}/map.png?secret"
-        assert refusal(url) == "the server takes too long"
+        assert refusal(url).startswith("the server takes too long; ROLLCLI_STORE_TIMEOUT ")
     assert refusal(url) == "the server does not answer"
 
 

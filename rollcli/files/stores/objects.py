@@ -9,9 +9,11 @@ from functools import lru_cache
 from typing import Any, TypeVar
 
 from rollcli.errors import InputError, OutputError, UsageError
+from rollcli.files.bounded import MOST_BYTES, too_large
 from rollcli.files.stores.locations import public_name, split_url, wait_for_room, waiting_for_network
 
 TIMEOUT_VARIABLE = "ROLLCLI_STORE_TIMEOUT"  # seconds a request may take
+_REQUEST_S = 60.0  # a map of 10 MB at 1.4 Mbit/s takes as long
 DENIED = "access is denied; check the rights of these keys"
 _NO_BUCKET = "there is no such bucket"
 _EXPIRED = "the keys have expired; fetch new ones"
@@ -35,6 +37,24 @@ _CODES = {
 }
 _NO_KEYS = "169.254.169.254"  # where machines of a cloud find theirs
 _STATUS = re.compile(r"non-2xx status code: (\d+)")
+
+
+def request_seconds() -> float:
+    """Return how long a request to a store or a web server may take as a whole.
+
+    Raises
+    ------
+    UsageError
+        The variable holds no number of seconds.
+    """
+    text = os.environ.get(TIMEOUT_VARIABLE, "")
+    try:
+        seconds = float(text) if text else _REQUEST_S
+    except ValueError:
+        seconds = 0.0
+    if not 0 < seconds < 1e6:
+        raise UsageError(f"{TIMEOUT_VARIABLE}={text}: give seconds, such as 60")
+    return seconds
 
 
 def reason_of(error: Exception) -> str:
@@ -85,7 +105,6 @@ def holds_for_all(reason: str) -> bool:
 Value = TypeVar("Value")
 
 _CONNECT_S = 5
-_REQUEST_S = 60  # a map of 10 MB at 1.4 Mbit/s takes as long
 _RETRIES = 6  # by obstore: answers 5xx and refused connections
 _RETRY_S = 60
 _PAGE = 1000
@@ -94,13 +113,14 @@ _FIRST_PAUSE_S = 0.2
 _OWNER = "rollcli-run"  # attribute of an object: who wrote it
 
 
-def read_object(url: str) -> bytes:
+def read_object(url: str, most: int = MOST_BYTES) -> bytes:
     """Return the bytes of an object.
 
     Raises
     ------
     InputError
-        There is no such object, it may not be read, or the store does not answer.
+        There is no such object, it has more bytes than `most`, it may not be read, or the store does not
+        answer.
     """
     store, key = _open(url)
 
@@ -109,6 +129,8 @@ def read_object(url: str) -> bytes:
     def fetch() -> bytes:
         nonlocal counted
         answer = store.get(key)
+        if answer.meta["size"] > most:
+            raise too_large(public_name(url), answer.meta["size"], most)
         if not counted:
             wait_for_room(answer.meta["size"])
             counted = True
@@ -330,7 +352,7 @@ def _store(root: str, process: int) -> Any:
         raise UsageError(f"{root}: needs the extra storage: pip install 'rollcli[storage]'") from error
     from obstore.exceptions import BaseError
 
-    seconds = _request_seconds()
+    seconds = request_seconds()
     client = {"connect_timeout": f"{_CONNECT_S}s", "timeout": f"{seconds:g}s"}
     if os.environ.get("AWS_ENDPOINT_URL", os.environ.get("AWS_ENDPOINT", "")).startswith("http://"):
         client["allow_http"] = "true"
@@ -339,17 +361,6 @@ def _store(root: str, process: int) -> Any:
         return from_url(root, client_options=client, retry_config=retry)  # type: ignore[call-overload]
     except (BaseError, ValueError) as error:
         raise UsageError(f"{root}: cannot be opened: {reason_of(error)}") from None
-
-
-def _request_seconds() -> float:
-    text = os.environ.get(TIMEOUT_VARIABLE, "")
-    try:
-        seconds = float(text) if text else float(_REQUEST_S)
-    except ValueError:
-        seconds = 0.0
-    if not 0 < seconds < 1e6:
-        raise UsageError(f"{TIMEOUT_VARIABLE}={text}: give seconds, such as 60")
-    return seconds
 
 
 def _store_errors() -> tuple[type[Exception], ...]:

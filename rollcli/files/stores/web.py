@@ -1,42 +1,55 @@
 """Single files of web servers; signed addresses work, and are never shown."""
 
 import http.client
+import io
+import socket
 import time
 import urllib.error
 import urllib.request
+from functools import partial
+from typing import Any
 
 from rollcli.errors import InputError
+from rollcli.files.bounded import MOST_BYTES, too_large
 from rollcli.files.stores.locations import public_name, wait_for_room, waiting_for_network
+from rollcli.files.stores.objects import TIMEOUT_VARIABLE, request_seconds
 
-_TIMEOUT_S = 60.0
 _TRIES = 4
 _FIRST_PAUSE_S = 0.2
-_LARGEST = 2**32
+_PIECE = 2**20  # bytes
 
 
-class _TooLargeError(OSError):
-    """A file of more bytes than are read."""
-
-
-def read_web_file(url: str) -> bytes:
+def read_web_file(url: str, most: int = MOST_BYTES) -> bytes:
     """Return the bytes behind an http or https URL.
+
+    Parameters
+    ----------
+    url : str
+    most : int
+        Bytes that are read.
 
     Raises
     ------
     InputError
-        There is no such file, it may not be read, or the server does not answer.
+        There is no such file, it may not be read, it has more bytes, or the server does not answer, or takes
+        longer than `ROLLCLI_STORE_TIMEOUT` seconds for the whole of it.
+    UsageError
+        That variable holds no number of seconds.
     """
+    seconds = request_seconds()
+    give_up = time.monotonic() + seconds
     for attempt in range(_TRIES):
         try:
             with waiting_for_network():
-                return _fetched(url)
+                return _fetched(url, give_up, most)
         except urllib.error.HTTPError as error:
             reason, final = f"the server answered {error.code} {error.reason}", error.code < 500
         except (OSError, http.client.HTTPException, ValueError) as error:
-            reason, final = _reason(error), isinstance(error, (_TooLargeError, ValueError))
-        if final:
+            reason, final = _reason(error, seconds), isinstance(error, ValueError)
+        pause = _FIRST_PAUSE_S * 4**attempt
+        if final or time.monotonic() + pause > give_up:
             break
-        time.sleep(_FIRST_PAUSE_S * 4**attempt)
+        time.sleep(pause)
     raise InputError(f"{public_name(url)}: cannot be read: {reason}")
 
 
@@ -44,7 +57,7 @@ def web_problem(url: str) -> str:
     """Say why a server refuses a file that it may have; empty where it does not refuse it."""
     request = urllib.request.Request(url, headers={"Range": "bytes=0-0"})
     try:
-        urllib.request.urlopen(request, timeout=_TIMEOUT_S).close()
+        _opened(request, time.monotonic() + request_seconds()).close()
     except urllib.error.HTTPError as error:
         if error.code in (400, 401, 403):  # Amazon answers 400 when temporary keys have expired
             answer = f"the server answered {error.code} {error.reason}"
@@ -54,27 +67,101 @@ def web_problem(url: str) -> str:
     return ""
 
 
-def _fetched(url: str) -> bytes:
-    with urllib.request.urlopen(url, timeout=_TIMEOUT_S) as answer:
+def _fetched(url: str, give_up: float, most: int) -> bytes:
+    with _opened(urllib.request.Request(url), give_up) as answer:
+        if answer.length is not None and answer.length > most:
+            raise too_large(public_name(url), answer.length, most)
         wait_for_room(answer.length or 0)
-        data: bytes = answer.read(_LARGEST + 1)
-        missing = answer.length
-    if len(data) > _LARGEST:
-        raise _TooLargeError
-    if missing:  # a bounded read of a body that is cut ends as one that is whole
-        raise http.client.IncompleteRead(data, missing)
-    return data
+        data = bytearray()
+        while piece := answer.read(_PIECE):
+            data += piece
+            if len(data) > most:  # of an answer that does not say its length
+                raise too_large(public_name(url), None, most)
+        if answer.length:  # a bounded read of a body that is cut ends as one that is whole
+            raise http.client.IncompleteRead(bytes(data), answer.length)
+    return bytes(data)
 
 
-def _reason(error: Exception) -> str:
+def _opened(request: urllib.request.Request, give_up: float) -> Any:
+    """Open a URL; whatever is read of the answers to it, of those that redirect too, is read in time."""
+    opener = urllib.request.build_opener(_Http(give_up), _Https(give_up), _Redirects)
+    return opener.open(request, timeout=max(give_up - time.monotonic(), 0.001))
+
+
+class _Http(urllib.request.HTTPHandler):
+    def __init__(self, give_up: float) -> None:
+        super().__init__()
+        self._give_up = give_up
+
+    def http_open(self, req: urllib.request.Request) -> http.client.HTTPResponse:
+        return self.do_open(partial(_connection, http.client.HTTPConnection, self._give_up), req)
+
+
+class _Https(urllib.request.HTTPSHandler):
+    def __init__(self, give_up: float) -> None:
+        super().__init__()
+        self._give_up = give_up
+
+    def https_open(self, req: urllib.request.Request) -> http.client.HTTPResponse:
+        return self.do_open(partial(_connection, http.client.HTTPSConnection, self._give_up), req)
+
+
+class _Redirects(urllib.request.HTTPRedirectHandler):
+    def redirect_request(self, req: Any, fp: Any, code: Any, msg: Any, headers: Any, newurl: str) -> Any:
+        if not newurl.lower().startswith(
+            ("http://", "https://")
+        ):  # Python would go on to FTP, which no limit of time holds for
+            raise http.client.HTTPException
+        return super().redirect_request(req, fp, code, msg, headers, newurl)
+
+
+def _connection(kind: Any, give_up: float, host: str, **settings: Any) -> http.client.HTTPConnection:
+    connection: http.client.HTTPConnection = kind(host, **settings)
+    connection.response_class = partial(_answer, give_up)  # type: ignore[assignment]
+    return connection
+
+
+def _answer(give_up: float, sock: socket.socket, *args: Any, **settings: Any) -> http.client.HTTPResponse:
+    return http.client.HTTPResponse(_InTime(sock, give_up), *args, **settings)  # type: ignore[arg-type]
+
+
+class _InTime:
+    """Stands for a socket where an answer is read: Python bounds each read alone, and never their sum."""
+
+    def __init__(self, sock: socket.socket, give_up: float) -> None:
+        self._sock, self._give_up = sock, give_up
+
+    def makefile(self, mode: str) -> io.BufferedReader:
+        return io.BufferedReader(_ReadInTime(self._sock, self._give_up))
+
+
+class _ReadInTime(io.RawIOBase):
+    def __init__(self, sock: socket.socket, give_up: float) -> None:
+        self._sock, self._give_up = sock, give_up
+        self._raw = sock.makefile("rb", buffering=0)
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: Any) -> int | None:
+        left = self._give_up - time.monotonic()
+        if left <= 0:
+            raise TimeoutError
+        self._sock.settimeout(left)
+        return self._raw.readinto(buffer)
+
+    def close(self) -> None:
+        self._raw.close()
+        super().close()
+
+
+def _reason(error: Exception, seconds: float) -> str:
     if isinstance(error, TimeoutError) or "timed out" in str(error):
-        return "the server takes too long"
+        return f"the server takes too long; {TIMEOUT_VARIABLE} sets the seconds it may take ({seconds:g})"
     if isinstance(error, http.client.IncompleteRead):
         return "the answer of the server was cut short"
     if isinstance(error, urllib.error.URLError):
         return "the server does not answer"
-    if isinstance(error, _TooLargeError):
-        return "it has more bytes than any disparity map"
     if isinstance(error, ValueError):
         return "this is no address"  # what Python says of it would show its password or its signature
     return "the server does not answer as one of the web does"

@@ -1,0 +1,60 @@
+"""Read what a user named, up to a size: files, pipes and standard input. Import-light."""
+
+import os
+import stat
+from pathlib import Path
+from typing import BinaryIO
+
+from rollcli.errors import InputError
+
+# The largest map or picture that is decoded takes 512 MB (codecs/raw_map); a result of a million rows 200 MB
+MOST_BYTES = 2**30
+MOST_LISTED = 2**28  # of a list of files: two million paths
+MOST_SETTINGS = 2**20  # of a TOML file
+_OF_DEVICES = 2**20  # /dev/null has an end, /dev/zero has none
+
+
+def too_large(name: str, size: int | None, most: int) -> InputError:
+    """Make the error of a file of more bytes than are read; `size` is None where its end was not seen."""
+    has = f"more than {most}" if size is None else str(size)
+    return InputError(f"{name}: has {has} bytes; up to {_in_words(most)} are read")
+
+
+def read_given(path: str | Path, most: int = MOST_BYTES) -> bytes:
+    """Return the bytes of a file, pipe or device that a user named.
+
+    Raises
+    ------
+    InputError
+        It has more bytes than `most`.
+    OSError
+        It cannot be read.
+    """
+    with Path(path).open("rb") as file:
+        return read_stream(file, str(path), most)
+
+
+def read_stream(file: BinaryIO, name: str, most: int = MOST_BYTES) -> bytes:
+    """Return the bytes of an open file, which errors call `name`; see `read_given`."""
+    most, size = _limit_of(file, most)
+    if size > most:
+        raise too_large(name, size, most)
+    data = file.read(most + 1)
+    if len(data) > most:
+        raise too_large(name, None, most)
+    return data
+
+
+def _limit_of(file: BinaryIO, most: int) -> tuple[int, int]:
+    """Return how much of an open file is read, and how much it says that it has, bytes."""
+    try:
+        status = os.fstat(file.fileno())
+    except (OSError, ValueError):  # no file of the system's
+        return most, 0
+    if stat.S_ISCHR(status.st_mode) and not os.isatty(file.fileno()):
+        return min(most, _OF_DEVICES), 0
+    return most, status.st_size if stat.S_ISREG(status.st_mode) else 0
+
+
+def _in_words(size: int) -> str:
+    return f"{size >> 30} GB" if size >= 2**30 else f"{size >> 20} MB" if size >= 2**20 else f"{size} bytes"

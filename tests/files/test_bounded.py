@@ -1,0 +1,224 @@
+"""What is read is bounded before it is read: in bytes, and in time where a server gives it."""
+
+import contextlib
+import os
+import socket
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from rollcli.errors import InputError
+from rollcli.files import bounded
+from rollcli.files.bounded import read_given
+from rollcli.files.storage import read_bytes
+from tests.run_cli import command, environment, write_maps
+
+GIB = 2**30
+
+
+def limited(*arguments, cwd, memory=2 * GIB, stdin=None, **variables):
+    """Run the program with so much memory, and at most 20 s."""
+    import resource
+
+    return subprocess.run(
+        command(*arguments),
+        cwd=cwd,
+        env={**environment(**variables), "OPENBLAS_NUM_THREADS": "1"},
+        stdin=stdin,
+        capture_output=True,
+        text=True,
+        timeout=20,
+        check=False,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (memory, memory)),
+    )
+
+
+def sparse(path, size, start=b""):
+    path.write_bytes(start)
+    os.truncate(path, size)
+    return path
+
+
+def npy_header(shape, descr="<f4"):
+    text = f"{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}".encode()
+    return b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text
+
+
+needs_devices = pytest.mark.skipif(not Path("/dev/zero").exists(), reason="needs /dev/zero")
+
+
+@needs_devices
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("report", "/dev/zero", "--svg", "s"),
+        ("rig", "/dev/zero"),
+        ("rig", "-"),
+        ("derotate", "maps", "--from", "/dev/zero", "-o", "o"),
+        ("estimate", "--files-from", "/dev/zero"),
+        ("estimate", "-"),
+        ("estimate", "maps", "--config", "/dev/zero"),
+        ("estimate", "maps", "--calib", "/dev/zero"),
+        ("estimate", "maps", "--mask", "/dev/zero"),
+        ("estimate", "/dev/zero"),
+        ("evaluate", "accuracy", "r.csv", "--truth", "/dev/zero"),
+        ("evaluate", "accuracy", "/dev/zero", "--truth", "r.csv"),
+    ],
+)
+def test_a_device_without_end_is_refused(tmp_path, words):
+    write_maps(tmp_path / "maps", 1)
+    (tmp_path / "r.csv").write_text("file,status,roll_deg\nframe0.png,ok,1\n")
+    with Path("/dev/zero").open("rb") as zero:
+        done = limited(*words, cwd=tmp_path, stdin=zero)
+    assert done.returncode in (2, 3), done.stderr
+    assert "out of memory" not in done.stderr
+    assert "internal error" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("rig", "big"),
+        ("report", "big", "--svg", "s"),
+        ("estimate", "--files-from", "big"),
+        ("estimate", "maps", "--config", "big"),
+        ("evaluate", "accuracy", "r.csv", "--truth", "big"),
+    ],
+)
+def test_a_file_of_100_gib_is_refused_before_it_is_read(tmp_path, words):
+    sparse(tmp_path / "big", 100 * GIB)
+    write_maps(tmp_path / "maps", 1)
+    (tmp_path / "r.csv").write_text("file,status,roll_deg\nframe0.png,ok,1\n")
+    done = limited(*words, cwd=tmp_path)
+    assert done.returncode == 2, done.stderr
+    assert "out of memory" not in done.stderr
+
+
+def test_an_array_is_refused_by_its_header(tmp_path):
+    for size, shape, reason in [
+        (int(3.6 * GIB), (30000, 30000), "has 3865470566 bytes; up to 1 GB are read"),
+        (800 * 2**20, (10, 10, 3), "is a 3-D array of shape"),
+        (800 * 2**20, (14000, 14000), "its header claims 14000 x 14000 pixels"),
+        (800 * 2**20, (30000, 30000), "is truncated"),
+    ]:
+        sparse(tmp_path / "a.npy", size, npy_header(shape))
+        done = limited("estimate", "a.npy", cwd=tmp_path)
+        assert done.returncode == 3, done.stderr
+        assert reason in done.stderr
+
+
+def test_what_has_an_end_is_read_whatever_it_is(tmp_path):
+    (tmp_path / "list").write_text("x")
+    assert read_given(tmp_path / "list", 1) == b"x"
+    (tmp_path / "list").write_text("xy")
+    with pytest.raises(InputError, match="has 2 bytes; up to 1 bytes are read"):
+        read_given(tmp_path / "list", 1)
+    if Path("/dev/null").exists():
+        assert read_given("/dev/null") == b""
+    if sys.platform == "linux":
+        with pytest.raises(InputError, match=f"more than {bounded._OF_DEVICES} bytes"):
+            read_given("/dev/zero")
+
+
+@contextlib.contextmanager
+def served(answer):
+    """A server that answers each request with what `answer` sends."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        asked = []
+
+        def serve():
+            with contextlib.suppress(OSError):
+                while True:
+                    client, _ = server.accept()
+                    asked.append(client)
+                    threading.Thread(target=talk, args=(client,), daemon=True).start()
+
+        def talk(client):
+            with contextlib.suppress(OSError), client:
+                client.recv(65536)
+                answer(client)
+
+        threading.Thread(target=serve, daemon=True).start()
+        yield f"http://127.0.0.1:{server.getsockname()[1]}/map.png", asked
+
+
+def drip(start):
+    def answer(client):
+        client.sendall(start)
+        while True:
+            client.sendall(b"x")
+            time.sleep(0.1)
+
+    return answer
+
+
+def flood(start):
+    def answer(client):
+        client.sendall(start)
+        while True:
+            client.sendall(b"x" * 2**20)
+
+    return answer
+
+
+@pytest.mark.parametrize(
+    "start",
+    [
+        b"HTTP/1.1 200 OK\r\n\r\n",
+        b"HTTP/1.1 200 OK\r\nContent-Length: 1000000\r\n\r\n",
+        b"HTTP/1.1 200 OK\r\nA: ",
+    ],
+    ids=["without length", "with length", "in the headers"],
+)
+def test_a_server_that_never_ends_is_left_after_the_time_for_the_whole(monkeypatch, start):
+    monkeypatch.setenv("ROLLCLI_STORE_TIMEOUT", "1")
+    with served(drip(b"HTTP/1.1 200 OK\r\n" + start)) as (url, asked):
+        began = time.monotonic()
+        with pytest.raises(InputError, match=r"too long; ROLLCLI_STORE_TIMEOUT sets the seconds .*\(1\)"):
+            read_bytes(url)
+        assert time.monotonic() - began < 3
+        assert len(asked) == 1
+
+
+def test_a_server_that_gives_ever_more_is_left_after_the_bytes_that_are_read():
+    with served(flood(b"HTTP/1.1 200 OK\r\n\r\n")) as (url, asked):
+        with pytest.raises(InputError, match="has more than 10000000 bytes; up to 9 MB are read"):
+            read_bytes(url, most=10**7)
+        assert len(asked) == 1
+
+
+def test_a_large_object_is_refused_by_what_its_server_says_of_it(monkeypatch):
+    size = 100 * GIB
+    head = f'HTTP/1.1 200 OK\r\nContent-Length: {size}\r\nETag: "a"\r\n'
+    head += "Last-Modified: Mon, 01 Jan 2024 00:00:00 GMT\r\n\r\n"
+    with served(flood(head.encode())) as (url, _):
+        with pytest.raises(InputError, match=f"has {size} bytes; up to 1 GB are read"):
+            read_bytes(url)
+        pytest.importorskip("obstore", reason="obstore, of the extra storage, is not here")
+        monkeypatch.setenv("AWS_ENDPOINT_URL", url.removesuffix("/map.png"))
+        for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"):
+            monkeypatch.setenv(name, "a")
+        with pytest.raises(InputError, match=f"has {size} bytes; up to 1 GB are read"):
+            read_bytes("s3://large/map.png")
+
+
+def test_a_redirect_leads_to_the_web_alone():
+    def answer(client):
+        client.sendall(b"HTTP/1.1 302 Found\r\nLocation: ftp://127.0.0.1:9/x\r\nContent-Length: 0\r\n\r\n")
+
+    with (
+        served(answer) as (url, _),
+        pytest.raises(InputError, match="as one of the web"),
+    ):
+        read_bytes(url)
+
+
+def test_a_list_of_line_ends_takes_no_memory_of_their_number(tmp_path):
+    (tmp_path / "list").write_bytes(b"\n" * (200 * 2**20))
+    done = limited("estimate", "--files-from", "list", cwd=tmp_path)
+    assert done.returncode == 2
+    assert "the list is empty" in done.stderr
