@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import logging
 import os
+import uuid
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError, wait
 from concurrent.futures import Future as ConcurrentFuture
@@ -12,7 +13,7 @@ from pathlib import Path
 from typing import Any, Generic
 
 from rollcli import __version__
-from rollcli.errors import ClusterError, UsageError
+from rollcli.errors import ClusterError, OutputError, UsageError
 from rollcli.files.atomic import is_file, is_there, write_atomic
 from rollcli.files.storage import remove
 from rollcli.files.stores.locations import computing, is_url
@@ -209,16 +210,18 @@ def _check_workers(client: Any, shared: SharedPaths) -> None:
     """Ask every worker whether it has this rollcli and sees the files and folders that this process sees."""
     files = {path.absolute() for path in map(Path, shared.files) if is_file(path)}
     sizes = {str(path): path.stat().st_size for path in files}
-    marks = [Path(folder).absolute() / ".rollcli-check" for folder in shared.folders if not is_url(folder)]
+    name = f".rollcli-check-{uuid.uuid4().hex}"  # of this run's own: another one may be asking now
+    marks = [Path(folder).absolute() / name for folder in shared.folders if not is_url(folder)]
     made: list[Path] = []
     try:
         for mark in marks:
-            write_atomic(mark, b"")
             made.append(mark)
+            write_atomic(mark, b"")
         answers = client.run(probe, __version__, sizes, [str(mark) for mark in marks], on_error="return")
     finally:
         for mark in made:
-            remove(str(mark))
+            with contextlib.suppress(OutputError):  # the one that could not be made
+                remove(str(mark))
     for worker, answer in answers.items():
         problem = answer if isinstance(answer, str) else f"cannot run rollcli {__version__}: {answer}"
         if problem:

@@ -110,22 +110,21 @@ def test_workers_are_asked_for_files_that_are_there_and_folders_that_are_no_urls
     (tmp_path / "folder").mkdir()
     shared = SharedPaths(("a.png", "none.png", "folder", "s3://bucket/b.png"), ("up", "s3://bucket/up"))
     ClusterExecutor("tcp://far:1", WORK, shared, 1).close(at_once=False)
-    assert client.asked == [
-        (
-            cluster.probe,
-            __version__,
-            {str(tmp_path / "a.png"): 3},
-            [str(tmp_path / "up" / ".rollcli-check")],
-            "return",
-        )
-    ]
+    ClusterExecutor("tcp://far:1", WORK, shared, 1).close(at_once=False)
+    marks = []
+    for probe, version, sizes, [mark], on_error in client.asked:
+        assert (probe, version, on_error) == (cluster.probe, __version__, "return")
+        assert sizes == {str(tmp_path / "a.png"): 3}
+        assert mark.startswith(str(tmp_path / "up" / ".rollcli-check-"))
+        marks.append(mark)
+    assert len(set(marks)) == 2  # two runs at once do not remove each other's
     assert list((tmp_path / "up").iterdir()) == []
 
 
 def test_a_folder_that_cannot_be_written_is_named_and_no_mark_is_left_in_the_others(client, tmp_path):
     (tmp_path / "file").write_bytes(b"")
     shared = SharedPaths((), (str(tmp_path / "up"), str(tmp_path / "file" / "v"), str(tmp_path / "road")))
-    with pytest.raises(OutputError, match=r"file/v/\.rollcli-check: cannot be written: not a directory$"):
+    with pytest.raises(OutputError, match=r"file/v/\.rollcli-check-\w+: cannot be written: not a directory$"):
         ClusterExecutor("tcp://far:1", WORK, shared, 1)
     assert client.asked == []
     assert len(client.closed) == 1
