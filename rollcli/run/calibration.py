@@ -69,6 +69,7 @@ class Calibrations:
         self._by_stem: dict[str, list[str]] | None = None
         self._fetched: dict[str, bytes] = {}  # of an object store, where one after the other takes long
         self._one: Calibration | None = None
+        self._of_path: dict[str, Calibration] = {}  # one may be for a thousand frames
         if len(given.calib) == 1 and is_place(given.calib[0]):
             files = _files(given.calib[0])
             self._by_stem = _stems(files)
@@ -89,7 +90,9 @@ class Calibrations:
         paths = self._by_stem[shorter]
         if len(paths) > 1:
             raise UsageError(f"{name}: has more than one calibration of its name: {paths[0]}, {paths[1]}")
-        return _read([paths[0]], self._given, self._fetched)
+        if paths[0] not in self._of_path:
+            self._of_path[paths[0]] = _read([paths[0]], self._given, self._fetched)
+        return self._of_path[paths[0]]
 
 
 def calibration_files(given: CalibrationOptions) -> list[str]:
