@@ -73,12 +73,9 @@ def _end_interrupted() -> "NoReturn":
 
 
 def _say_in_one_line(kind: type[BaseException], error: BaseException, at: "TracebackType | None") -> None:
-    from rollcli.messages import say
+    from rollcli.messages import say_unexpected
 
-    while at is not None and at.tb_next is not None:
-        at = at.tb_next
-    where = f"{at.tb_frame.f_code.co_filename}:{at.tb_lineno}" if at else "nowhere"
-    say(f"internal error, please report it: {kind.__name__}: {error} ({where})")
+    say_unexpected(error)
 
 
 if __name__ == "__main__":

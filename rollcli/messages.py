@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+_shows_tracebacks = False
 _ADDRESS = re.compile(r"(https?://)(?:[^\s/?#@]*@)?([^\s?#'\"]*)(?:[?#][^\s'\"]*)?", re.IGNORECASE)
 _NAMES = "x-amz-[a-z-]+|x-goog-[a-z-]+|sig|signature|awsaccesskeyid|googleaccessid|key-pair-id|policy|token"
 _SIGNATURE = re.compile(rf"[?&](?:{_NAMES})=[^\s&'\"]*()", re.IGNORECASE)  # of a URL with a space before it
@@ -19,6 +20,26 @@ def say(message: str) -> None:
     Control characters are escaped: a file name must neither forge a line nor command the terminal.
     """
     sys.stderr.write(f"rollcli: {printable(without_secrets(message))}\n")
+
+
+def show_tracebacks() -> None:
+    """Show from now on where an error is from that nobody expected."""
+    global _shows_tracebacks
+    _shows_tracebacks = True
+
+
+def say_unexpected(error: BaseException) -> None:
+    """Write an error that nobody expected as one line; with --verbose, its traceback below."""
+    import traceback  # only here: it takes a while to load
+
+    last = error.__traceback__
+    while last is not None and last.tb_next is not None:
+        last = last.tb_next
+    where = f"{last.tb_frame.f_code.co_filename}:{last.tb_lineno}" if last else "nowhere"
+    say(f"internal error, please report it: {type(error).__name__}: {error} ({where})")
+    if _shows_tracebacks:
+        for line in "".join(traceback.format_exception(error)).splitlines():
+            sys.stderr.write(f"{printable(without_secrets(line))}\n")
 
 
 def without_secrets(text: str) -> str:

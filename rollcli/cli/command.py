@@ -6,8 +6,9 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
+from rollcli.cli.environment import tell_mistaken_variables
 from rollcli.errors import ExitStatus
-from rollcli.messages import say
+from rollcli.messages import say, show_tracebacks
 
 OTHER = "Other options"
 Values = dict[str, Any]
@@ -59,13 +60,17 @@ class Command(click.Command):
         return rest
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run the command with one thread of linear algebra.
+        """Run the command with one thread of linear algebra, once mistaken variables have been told.
 
         Its matrices are small: threads spend ten times as long waiting for each other as working.
         """
         from rollcli.run.workers.pool import limit_blas_threads
 
         limit_blas_threads()
+        if ctx.params.get("verbose"):
+            show_tracebacks()
+        if not ctx.params.get("quiet"):
+            tell_mistaken_variables(ctx)
         return super().invoke(ctx)
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
