@@ -21,8 +21,18 @@ OPENCV = (
     "opencv-contrib-python-headless",
     "opencv-contrib-python",
 )
-REQUIRED = ("numpy", OPENCV, "click", "tqdm", "tifffile")
-OPTIONAL = ("dask", "distributed", "imagecodecs", "jinja2", "obstore", "plotly", "pyarrow", "pywuffs")
+REQUIRED = ("numpy", OPENCV, "click", "tqdm", "tifffile", "PyYAML")
+OPTIONAL = (
+    "dask",
+    "distributed",
+    "imagecodecs",
+    "jinja2",
+    "matplotlib",
+    "obstore",
+    "plotly",
+    "pyarrow",
+    "pywuffs",
+)
 
 
 def versions() -> Iterator[tuple[str, str]]:

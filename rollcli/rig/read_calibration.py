@@ -9,6 +9,8 @@ from rollcli.rig.calibration import Calibration, CalibrationOptions
 from rollcli.rig.formats import datasets, opencv, robots
 from rollcli.rig.formats.fields import Fields, File
 
+MAX_BYTES = 1 << 20  # real ones have a few thousand
+
 
 class Format(NamedTuple):
     """How a format is recognised by its text, and how one file of it is read.
@@ -34,9 +36,6 @@ FORMATS = (
     Format("Kalibr", robots.is_kalibr, robots.read_kalibr),
     Format("ZED", robots.is_zed, robots.read_zed),
 )
-
-
-MAX_BYTES = 1 << 20  # real ones have a few thousand
 
 
 def parse_calibration(

@@ -1,8 +1,8 @@
 """Calibration files of every format, real and hostile."""
 
-import json
 import math
 import re
+import time
 import tracemalloc
 
 import cv2
@@ -207,30 +207,47 @@ def test_a_bad_file_is_refused_in_one_line_that_names_it(text, words):
     ("text", "words"),
     [
         ("# nothing but a comment\n", "holds no value"),
-        ("- 1\n- 2\n", "line 2 is not plain YAML"),
-        ("a: 1\n b: 2\n", "line 2 is not plain YAML"),
-        ("a: 1\n\tb: 2\n", "line 2 is indented by a tab"),
-        ("a: 1]\n", "line 1 closes a bracket that is not open"),
-        ("a: 1\nb\n", "line 2 is not plain YAML"),
-        ("a: 1\nb: 2\na: 3\n", "line 3 gives a a second time"),
-        ("a:\n-\n", "line 2 is not plain YAML"),
-        ("a: [1] 2\n", "line 1 is not plain YAML"),
-        ("a: |\n", "line 1 begins with |"),
-        ("a: {b 1}\n", "line 1 is not plain YAML"),
-        ("a: {b: 1, b: 2}\n", "line 1 is not plain YAML"),
-        ("a: [1 {b: 2}]\n", "line 1 is not plain YAML"),
-        ("a: [1, {b: 2]}\n", "line 1 is not plain YAML"),
-        ("a: [,]\n", "line 1 is not plain YAML"),
-        ("a: [&x, 2]\n", "line 1 is not plain YAML"),
-        ("a: {b: *x}\n", "line 1 is not plain YAML"),
-        ('a: [1, "]"\n', "line 1 is not plain YAML"),
-        ('a: {b: "}"\n', "line 1 is not plain YAML"),
+        ("- 1\n- 2\n", "holds no value that has a name"),
+        ("a: 1\n b: 2\n", "line 2 is no YAML"),
+        ("a: 1\n\tb: 2\n", "line 2 is no YAML"),
+        ("a: 1\nb: 2\na: 3\n", "gives a a second time"),
+        ("a: {b: 1, b: 2}\n", "line 1 ends a mapping that gives b a second time"),
+        ("a: [1] 2\n", "line 1 is no YAML"),
+        ("a: [1, {b: 2]}\n", "line 1 is no YAML"),
+        ("a: {]:\n", "line 1 is no YAML"),
+        ("P1: {]:", "line 1 is no YAML"),
+        ('a: [1, "]"\n', "line 2 is no YAML"),
+        ("a: [1,\n2", "cut off"),
+        ("a: 'b", "cut off"),
+        ("a: [&x, 2]\n", "line 1 has the anchor or alias x"),
+        ("a: {b: *x}\n", "line 1 has the anchor or alias x"),
+        ("a: 1\nb: !!binary |\n  YQ==\n", "line 2 has the tag"),
+        ("a: !thing {b: 1}\n", "line 1 has the tag !thing"),
+        ("? [a]\n: b\n", "a key that is no text"),
+        ("a: \0\n", "is no YAML"),
+        ("a: [" + "1," * 60_000 + "]", "line 1 has more values"),
     ],
 )
-def test_what_is_no_plain_yaml_is_refused_by_its_line(text, words):
+def test_yaml_that_calibrations_have_no_use_for_is_refused_by_its_line(text, words):
     with pytest.raises(InputError, match=r"^f: ") as caught:
         parse_yaml(text, "f")
     assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "values"),
+    [
+        ('a: "b # c"  # d\n', {"a": "b # c"}),
+        ("%YAML:1.0\n---\na:1\nb.c: {d: 2}\n", {"a": "1", "b.c": {"d": "2"}}),
+        ("%YAML 1.0\na: 1\n", {"a": "1"}),
+        ("a:\t1\t\nb: \t[1,\t2]\n\t\n", {"a": "1", "b": ["1", "2"]}),
+        ("a: !!opencv-matrix\n   data: [ 1., 2. ]\n", {"a": {"data": ["1.", "2."]}}),
+        ("a:\n- - x\n  - y\n- b: c\n", {"a": [["x", "y"], {"b": "c"}]}),
+    ],
+)
+def test_yaml_is_read_as_text_and_so_are_the_dialects_of_robots(text, values):
+    assert parse_yaml(text, "f") == values
 
 
 def test_what_follows_the_end_of_a_document_is_left_alone():
@@ -268,8 +285,8 @@ HOSTILE = {
     "dashes": ROS_HEAD + "- " * 100_000 + "1\n",
     "indents": ROS_HEAD + "".join(" " * n + "a:\n" for n in range(1, 1400)),
     "an open bracket": ROS_HEAD + "  data: [1, 2\n" * 20_000,
-    "spaces": ROS_HEAD + "  data" + " " * 900_000 + "x\n",
-    "spaces in brackets": ROS_HEAD + "  data: [1" + " " * 900_000 + ", 2]\n",
+    "spaces": ROS_HEAD + "  data" + " " * 90_000 + "x\n",
+    "spaces in brackets": ROS_HEAD + "  data: [1" + " " * 90_000 + ", 2]\n",
     "digits": ROS_HEAD + "  data: [" + "7" * 5000 + "]\n",
     "quotes": ROS_HEAD + "  data: ['" + '"' * 100_000 + "\n",
     "deep JSON": '{"intrinsic": {"u0": ' + "[" * 100_000 + "]" * 100_000 + "}}",
@@ -291,22 +308,31 @@ def test_a_hostile_file_is_refused_without_running_code_or_filling_memory(what, 
     assert not list(tmp_path.iterdir())
 
 
-def test_plain_yaml_is_read_as_a_library_reads_it():
-    yaml = pytest.importorskip("yaml", reason="PyYAML, the oracle here, is not installed")
+WHITE = 1 << 17  # characters: a reader that takes the square of their number takes minutes
+STARTS = {
+    "KITTI": "P0: 1\nP1: x{}x",
+    "KITTI's key": "P0: 1\n{}x",
+    "DrivingStereo": "P_rect_101:{}x",
+    "Middlebury": "cam0=[1]\ndoffs{}= 1{}x",
+    "ORB-SLAM": "Camera.bf: 1\na{}",
+    "ROS": "projection_matrix: [1]{}x",
+    "OpenCV": "%YAML:1.0\nP1: !!opencv-matrix{}x",
+    "OpenCV's XML": "<opencv_storage><P1 >{}",
+    "OpenCV's JSON": '{{"P1": "opencv-matrix"{}',
+    "Cityscapes": '{{"intrinsic": {{"u0": 1}}{}',
+    "Kalibr": "cam1:\n  T_cn_cnm1: 1{}x",
+    "ZED": "[LEFT_CAM_HD]\n[STEREO]\nBaseline{}x",
+    "none": "{}",
+}
 
-    def as_text(value):
-        if isinstance(value, dict):
-            return {str(key): as_text(each) for key, each in value.items()}
-        return [as_text(each) for each in value] if isinstance(value, list) else str(value)
 
-    nested = "a:\n- - x\n  - y\n- b: {c: [u, v], d: w}\n  e: f\n"
-    nested += "'q': \"r\"\nlong: [one,\n  two,  # and so on\n  three]\n"
-    for text in (samples.ros(RIG, right=True), samples.KALIBR, nested):
-        oracle = yaml.load(text, Loader=yaml.BaseLoader)
-        assert parse_yaml(text, "f") == as_text(oracle)
-    assert parse_yaml(json.dumps({"a": ["b", {"c": "d"}]}).replace("{", "", 1)[:-1], "f") == {
-        "a": ["b", {"c": "d"}]
-    }
+@pytest.mark.parametrize("white", [" ", "\n", "\t", "\r\n", "\n ", "P1 ", "P1: ", "[STEREO]\n"], ids=repr)
+@pytest.mark.parametrize("form", STARTS)
+def test_white_space_and_repeated_keys_take_a_time_in_proportion_to_their_number(form, white):
+    text = STARTS[form].replace("{}", white * (WHITE // len(white))).replace("{{", "{").replace("}}", "}")
+    before = time.process_time()
+    refusal(text)
+    assert time.process_time() - before < 3
 
 
 def test_a_calibration_cannot_be_made_of_impossible_numbers():
@@ -413,26 +439,17 @@ def test_a_calibration_without_a_size_has_no_edge_that_its_centre_could_be_near(
 
 
 def nested(levels):
-    """YAML of mappings, YAML of lists in brackets, and an XML of OpenCV with elements in each other."""
+    """YAML of mappings, and YAML of lists in brackets, in each other."""
     keys = "".join(" " * place + "a:\n" for place in range(levels)) + " " * levels + "a: x\n"
-    lists = f"a: {'[' * levels}x{']' * levels}\n"
-    q = "<Q><data>1 0 0 -600 0 1 0 -180 0 0 0 700 0 0 2 0</data></Q>"
-    inner = "<a>" * (levels - 1) + "</a>" * (levels - 1)
-    return keys, lists, f"<?xml version='1.0'?><opencv_storage>{q}{inner}</opencv_storage>"
+    return keys, f"a: {'[' * levels}x{']' * levels}\n"
 
 
-def test_a_calibration_nests_sixteen_levels_deep():
-    keys, lists, xml = nested(16)
+def test_a_calibration_nests_sixteen_levels_deep_and_no_deeper():
+    keys, lists = nested(16)
     found, listed = parse_yaml(keys, "f"), parse_yaml(lists, "f")["a"]
     for _ in range(16):
         found, (listed,) = found["a"], listed
     assert (found, listed) == ({"a": "x"}, "x")
-    assert parse(xml).baseline == 0.5
-
-
-def test_a_calibration_that_nests_deeper_is_refused():
-    keys, lists, xml = nested(17)
-    for text in (keys, lists):
+    for text in nested(17):
         with pytest.raises(InputError, match="nests deeper than a calibration does"):
             parse_yaml(text, "f")
-    assert "nests deeper than a calibration does" in refusal(xml)

@@ -1,6 +1,13 @@
-"""The calibrations of KITTI, Middlebury, ETH3D, DrivingStereo and Cityscapes."""
+"""Calibrations of datasets: KITTI, DrivingStereo, Middlebury with ETH3D, and Cityscapes.
 
-import re
+KITTI (Geiger et al., "Are we ready for autonomous driving?", CVPR 2012): calib_cam_to_cam.txt of the raw data
+(P_rect_00 ...) and calib.txt of the benchmarks (P0 ...). DrivingStereo (Yang et al., CVPR 2019) names its
+views 101 and 103 in files of the same kind. Middlebury 2014 and 2021 (Scharstein et al., GCPR 2014), and
+ETH3D's two-view sets: calib.txt with cam0=[...], a baseline in mm, and `doffs` where the right view's
+principal point lies elsewhere than the left one's. Cityscapes (Cordts et al., CVPR 2016, and its
+calibration.pdf): *_camera.json with intrinsic {fx, fy, u0, v0} and extrinsic {baseline}, metres.
+"""
+
 from collections.abc import Mapping
 
 from rollcli.errors import InputError
@@ -8,6 +15,8 @@ from rollcli.rig.formats.fields import (
     Fields,
     File,
     Projection,
+    json_values,
+    keys_and_values,
     number,
     numbers,
     pair_of,
@@ -15,69 +24,72 @@ from rollcli.rig.formats.fields import (
     size,
     swapped,
 )
-from rollcli.rig.formats.opencv import json_values
 
-_LINE = re.compile(r"^([A-Za-z_0-9]+):[ \t]*(.*?)[ \t]*\r?$", re.MULTILINE)
-_RAW, _BENCHMARK, _DRIVING_STEREO = (
-    re.compile(pattern, re.MULTILINE)
-    for pattern in (r"^P_rect_0[0-3]:", r"^P[0-3]:[ \t]*[-+.0-9na]", r"^P_rect_10[13]:")
-)
+_RAW = {f"P_rect_0{view}" for view in range(4)}
+_BENCHMARK = {f"P{view}" for view in range(4)}
+_DRIVING_STEREO = ("P_rect_101", "P_rect_103")
 _GREY, _COLOUR = ("0", "1"), ("2", "3")
+_MM = 1e-3
+_SAME_DOFFS = 0.5  # px
 
 
 def is_kitti(text: str) -> bool:
     """Tell whether a text is one of KITTI's calibrations."""
-    return bool(_RAW.search(text) or _BENCHMARK.search(text))
+    return any(
+        # ROS and OpenCV name a matrix P1 as well; its value is no plain number
+        key in _RAW or (key in _BENCHMARK and value[:1] in tuple("-+.0123456789na"))
+        for key, value in keys_and_values(text, ":")
+    )
 
 
 def read_kitti(file: File) -> Fields:
     """Read the grey pair (0, 1) where it is there, else the colour pair (2, 3)."""
-    values = _values(file)
-    raw = _RAW.search(file.text) is not None
-    key = "P_rect_0{}" if raw else "P{}"
+    values = _kitti_values(file)
+    key = "P_rect_0{}" if _RAW & values.keys() else "P{}"
     pairs = [pair for pair in (_GREY, _COLOUR) if all(key.format(view) in values for view in pair)]
     if not pairs:
-        views = ", ".join(sorted(name for name in values if re.fullmatch(r"P(_rect_0)?[0-3]", name)))
+        views = ", ".join(sorted((_RAW | _BENCHMARK) & values.keys()))
         raise InputError(
             f"{file.name}: has only {views}: the projections of both views are needed, "
             f"{key.format(0)} and {key.format(1)} or {key.format(2)} and {key.format(3)}"
         )
-    fields = [_pair(file, values, *(key.format(view) for view in pair)) for pair in pairs]
+    fields = [_kitti_pair(file, values, *(key.format(view) for view in pair)) for pair in pairs]
     notes: tuple[str, ...] = ()
     if len(pairs) == 2:
         notes = (
             f"{file.name}: the baseline is that of the grey cameras 0 and 1, {fields[0][1]:.5f} m; "
             f"for images of the colour cameras 2 and 3 give --baseline {fields[1][1]:.5f}",
         )
-    return _filled("KITTI", file, values, "S_rect_0" + pairs[0][0], *fields[0], notes)
+    return _kitti_fields("KITTI", file, values, "S_rect_0" + pairs[0][0], *fields[0], notes)
 
 
 def is_driving_stereo(text: str) -> bool:
     """Tell whether a text is a calibration of DrivingStereo."""
-    return _DRIVING_STEREO.search(text) is not None
+    return any(key in _DRIVING_STEREO for key, _ in keys_and_values(text, ":"))
 
 
 def read_driving_stereo(file: File) -> Fields:
-    """Read views 101 (left) and 103 (right); Yang et al., "DrivingStereo", CVPR 2019."""
-    values = _values(file)
-    missing = [key for key in ("P_rect_101", "P_rect_103") if key not in values]
+    """Read views 101 (left) and 103 (right)."""
+    values = _kitti_values(file)
+    missing = [key for key in _DRIVING_STEREO if key not in values]
     if missing:
         raise InputError(f"{file.name}: has no {missing[0]}: the file is cut off")
-    return _filled(
-        "DrivingStereo", file, values, "S_rect_101", *_pair(file, values, "P_rect_101", "P_rect_103")
-    )
+    pair = _kitti_pair(file, values, *_DRIVING_STEREO)
+    return _kitti_fields("DrivingStereo", file, values, "S_rect_101", *pair)
 
 
-def _values(file: File) -> dict[str, str]:
+def _kitti_values(file: File) -> dict[str, str]:
     values: dict[str, str] = {}
-    for key, value in _LINE.findall(file.text):
+    for key, value in keys_and_values(file.text, ":"):
         if key in values and values[key] != value and key.startswith("P"):
             raise InputError(f"{file.name}: is contradictory: it gives {key} twice")
         values[key] = value
     return values
 
 
-def _pair(file: File, values: Mapping[str, str], left: str, right: str) -> tuple[Projection, float, float]:
+def _kitti_pair(
+    file: File, values: Mapping[str, str], left: str, right: str
+) -> tuple[Projection, float, float]:
     """Return the left view, the baseline in metres and doffs."""
     views = [
         Projection.of(numbers(values[key].split(), f"{file.name}: {key}"), f"{file.name}: {key}")
@@ -89,7 +101,7 @@ def _pair(file: File, values: Mapping[str, str], left: str, right: str) -> tuple
     return views[0], baseline, doffs
 
 
-def _filled(
+def _kitti_fields(
     form: str,
     file: File,
     values: Mapping[str, str],
@@ -109,20 +121,14 @@ def _filled(
     return Fields(form, view.fx, view.fy, view.cx, view.cy, baseline, doffs, width, height, notes=notes)
 
 
-_ASSIGNMENT = re.compile(r"^[ \t]*(\w+)[ \t]*=[ \t]*(.*?)[ \t]*\r?$", re.MULTILINE)
-_CAMERA = re.compile(r"^[ \t]*cam0[ \t]*=", re.MULTILINE)
-_MM = 1e-3
-_SAME_DOFFS = 0.5  # px
-
-
 def is_middlebury(text: str) -> bool:
-    """Tell whether a text is such a calibration."""
-    return _CAMERA.search(text) is not None
+    """Tell whether a text is a calibration of Middlebury or ETH3D."""
+    return any(key == "cam0" for key, _ in keys_and_values(text, "="))
 
 
 def read_middlebury(file: File) -> Fields:
     """Read the left camera, the baseline and doffs."""
-    values = dict(_ASSIGNMENT.findall(file.text))
+    values = dict(keys_and_values(file.text, "="))
     fx, fy, cx, cy = _camera(values["cam0"], f"{file.name}: cam0")
     right = _camera(values["cam1"], f"{file.name}: cam1") if "cam1" in values else None
     doffs = number(values["doffs"], f"{file.name}: doffs") if "doffs" in values else None
@@ -152,16 +158,16 @@ def _camera(text: str, what: str) -> tuple[float, float, float, float]:
 
 
 def is_cityscapes(text: str) -> bool:
-    """Tell whether a text is such a calibration."""
+    """Tell whether a text is a calibration of Cityscapes."""
     return '"intrinsic"' in text and '"u0"' in text
 
 
 def read_cityscapes(file: File) -> Fields:
     """Read the camera and the baseline."""
     values = json_values(file)
-    tables = [values.get(key) for key in ("intrinsic", "extrinsic")]
     found = []
-    for table, keys in zip(tables, (("fx", "fy", "u0", "v0"), ("baseline",)), strict=True):
+    for name, keys in (("intrinsic", ("fx", "fy", "u0", "v0")), ("extrinsic", ("baseline",))):
+        table = values.get(name)
         for key in keys:
             if not isinstance(table, dict) or key not in table:
                 raise InputError(f"{file.name}: has no {key}")

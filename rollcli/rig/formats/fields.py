@@ -1,7 +1,8 @@
 """What a calibration file says, and the steps that several formats share."""
 
+import json
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -70,6 +71,26 @@ class Projection(NamedTuple):
         if last != [0, 0, 1] or zero != 0 or skew != 0 or fx == 0 or fy == 0:
             raise InputError(f"{what} is no projection of a rectified view")
         return cls(fx, fy, cx, cy, (px - cx * tz) / fx, (py - cy * tz) / fy)
+
+
+def keys_and_values(text: str, sign: str) -> Iterator[tuple[str, str]]:
+    """Yield key and value of each line that has the sign between them."""
+    for line in text.splitlines():
+        key, found, value = line.partition(sign)
+        if found:
+            yield key.strip(), value.strip()
+
+
+def json_values(file: File) -> dict[str, Value]:
+    """Return the values of a JSON object, numbers as text."""
+    try:
+        # as text: Python reads numbers of thousands of digits slowly, or refuses them
+        values = json.loads(file.text, parse_int=str, parse_float=str, parse_constant=str)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{file.name}: is not whole JSON: {error}") from error
+    if not isinstance(values, dict):
+        raise InputError(f"{file.name}: is no JSON object")
+    return values
 
 
 def number(value: Value, what: str) -> float:

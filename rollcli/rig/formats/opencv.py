@@ -6,20 +6,18 @@ the user measured them, which the file does not say. The files are read here ins
 whose parser is not made for files of strangers and prints what it dislikes.
 """
 
-import json
 import re
 from collections.abc import Mapping, Sequence
-from xml.etree.ElementTree import ParseError, XMLParser
+from xml.etree import ElementTree
 
 from rollcli.errors import InputError
-from rollcli.rig.formats.fields import Fields, File, Projection, numbers, pair_of, swapped
+from rollcli.rig.formats.fields import Fields, File, Projection, json_values, numbers, pair_of, swapped
 from rollcli.rig.formats.yaml import Value, parse_yaml
 
 _KEYS = re.compile(r"""(?:^|[\s<{,"])(?:P1|P2|Q|M1)(?:"?\s*:|[\s>])""")
 _MARKS = ("%YAML:1.0", "%YAML 1.0", "<opencv_storage>", "opencv-matrix")
 _METRES = (0.005, 5.0)  # no rig on a vehicle is smaller or larger: another number has another unit
 _SAME = 1e-3  # relative: P2 and Q are of one rig
-_MAX_DEPTH = 16
 _IN_BOTH = (
     ("focal length", 0),
     ("principal point's column", 2),
@@ -101,46 +99,11 @@ def _matrices(file: File) -> dict[str, list[float]]:
     return found
 
 
-def json_values(file: File) -> dict[str, Value]:
-    """Return the values of a JSON object, numbers as text."""
-    try:
-        # as text: Python reads numbers of thousands of digits slowly, or refuses them
-        values = json.loads(file.text, parse_int=str, parse_float=str, parse_constant=str)
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{file.name}: is not whole JSON: {error}") from error
-    if not isinstance(values, dict):
-        raise InputError(f"{file.name}: is no JSON object")
-    return values
-
-
-class _Target:
-    """Collects the <data> of the matrices directly below <opencv_storage>."""
-
-    def __init__(self) -> None:
-        self.path: list[str] = []
-        self.parts: dict[str, list[str]] = {}
-
-    def start(self, tag: str, attributes: Mapping[str, str]) -> None:
-        self.path.append(tag)
-        if len(self.path) > _MAX_DEPTH:
-            raise ParseError("nests deeper than a calibration does")
-
-    def end(self, tag: str) -> None:
-        self.path.pop()
-
-    def data(self, text: str) -> None:
-        if len(self.path) == 3 and self.path[2] == "data":
-            self.parts.setdefault(self.path[1], []).append(text)
-
-
 def _xml_values(file: File) -> dict[str, Value]:
     if "<!DOCTYPE" in file.text or "<!ENTITY" in file.text:
         raise InputError(f"{file.name}: declares XML entities, which calibration files have no use for")
-    target = _Target()
-    parser = XMLParser(target=target)
     try:
-        parser.feed(file.text)
-        parser.close()
-    except ParseError as error:
+        root = ElementTree.fromstring(file.text)
+    except ElementTree.ParseError as error:
         raise InputError(f"{file.name}: is not whole XML: {error}") from error
-    return {key: {"data": list("".join(parts).split())} for key, parts in target.parts.items()}
+    return {each.tag: {"data": list((each.findtext("data") or "").split())} for each in root}

@@ -1,89 +1,39 @@
-"""The calibrations of ROS camera_info and ORB-SLAM, and of rigs that are not rectified (Kalibr, ZED)."""
+"""Calibrations of robots: ROS, ORB-SLAM, Kalibr and ZED.
+
+ROS camera_info YAML: one file a view, as camera_calibration and camera_calibration_parsers write it.
+sensor_msgs/CameraInfo: `projection_matrix` is of the rectified view, `camera_matrix` of the raw one; the
+right view's fourth number is Tx = -fx baseline, in metres. ORB-SLAM 2 and 3: settings with Camera.fx ... and
+Camera.bf = fx baseline, or, in 3's new form, Stereo.b; the numbers are those of the images that the settings
+are for, raw or rectified. Kalibr and ZED are of raw images, and tell of the rectified pair its baseline
+alone: rectification chooses focal length and principal point anew, and neither file holds what it chose.
+"""
 
 import math
-import re
 
 from rollcli.errors import InputError
-from rollcli.rig.formats.fields import Fields, File, Projection, number, numbers, pair_of, size
+from rollcli.rig.formats.fields import (
+    Fields,
+    File,
+    Projection,
+    keys_and_values,
+    number,
+    numbers,
+    pair_of,
+    size,
+)
 from rollcli.rig.formats.yaml import parse_yaml
 
-_STEREO_KEY = re.compile(r"^[ \t]*(?:Camera\.bf|Stereo\.b)[ \t]*:", re.MULTILINE)
-
-
-def is_orb_slam(text: str) -> bool:
-    """Tell whether a text is a file of settings for stereo."""
-    return _STEREO_KEY.search(text) is not None
-
-
-def read_orb_slam(file: File) -> Fields:
-    """Read the camera and the baseline."""
-    values = parse_yaml(file.text, file.name)
-
-    def read(*keys: str) -> float:
-        for key in keys:
-            if key in values:
-                return number(values[key], f"{file.name}: {key}")
-        raise InputError(f"{file.name}: has no {keys[0]}")
-
-    fx, fy, cx, cy = (read(f"Camera.{each}", f"Camera1.{each}") for each in ("fx", "fy", "cx", "cy"))
-    if fx == 0:
-        raise InputError(f"{file.name}: Camera.fx is 0: a focal length is more")
-    baseline = read("Camera.bf") / fx if "Camera.bf" in values else read("Stereo.b")
-    width = height = None
-    if "Camera.width" in values and "Camera.height" in values:
-        width, height = size(values["Camera.width"], values["Camera.height"], f"{file.name}: Camera.width")
-    return Fields("ORB-SLAM", fx, fy, cx, cy, baseline, 0.0, width, height)
-
-
-_CHAIN = re.compile(r"^[ \t]*T_cn_cnm1[ \t]*:", re.MULTILINE)
-_ZED = re.compile(r"^[ \t]*\[LEFT_CAM_\w+\]", re.MULTILINE)
-_STEREO = re.compile(
-    r"^[ \t]*\[STEREO\][^\[]*?^[ \t]*baseline[ \t]*=[ \t]*(\S+)", re.MULTILINE | re.IGNORECASE
-)
 _MM = 1e-3
 _RAW = "is of the raw images, and gives the baseline alone"
 
 
-def is_kalibr(text: str) -> bool:
-    """Tell whether a text is a camchain of Kalibr."""
-    return _CHAIN.search(text) is not None
-
-
-def read_kalibr(file: File) -> Fields:
-    """Read the distance between cam0 and cam1, metres: the last column of T_cn_cnm1."""
-    camera = parse_yaml(file.text, file.name).get("cam1")
-    rows = camera.get("T_cn_cnm1") if isinstance(camera, dict) else None
-    what = f"{file.name}: T_cn_cnm1 of cam1"
-    matrix = [numbers(row, what) for row in rows] if isinstance(rows, list) else []
-    if len(matrix) != 4 or any(len(row) != 4 for row in matrix):
-        raise InputError(f"{what} is no 4x4 matrix: the file is cut off or damaged")
-    x, y, z = (row[3] for row in matrix[:3])
-    if abs(y) > abs(x):
-        raise InputError(
-            f"{file.name} is a vertical rig, one camera above the other: only horizontal ones are read"
-        )
-    return Fields("Kalibr", baseline=math.hypot(x, y, z), lacks=_RAW)
-
-
-def is_zed(text: str) -> bool:
-    """Tell whether a text is a ZED camera's SN*.conf."""
-    return _ZED.search(text) is not None
-
-
-def read_zed(file: File) -> Fields:
-    """Read the baseline, which the file gives in millimetres."""
-    found = _STEREO.search(file.text)
-    if found is None:
-        raise InputError(f"{file.name}: has no Baseline below [STEREO]: the file is cut off")
-    return Fields("ZED", baseline=_MM * number(found[1], f"{file.name}: Baseline"), lacks=_RAW)
-
-
-_KEY = re.compile(r"^\s*projection_matrix\s*:", re.MULTILINE)
+def _has_key(text: str, *keys: str) -> bool:
+    return any(key in keys for key, _ in keys_and_values(text, ":"))
 
 
 def is_ros(text: str) -> bool:
     """Tell whether a text is a camera_info file."""
-    return _KEY.search(text) is not None
+    return _has_key(text, "projection_matrix")
 
 
 def read_ros(first: File, second: File | None = None) -> Fields:
@@ -127,3 +77,66 @@ def _view(file: File) -> tuple[Projection, int | None, int | None]:
     if "image_width" not in values or "image_height" not in values:
         return view, None, None
     return view, *size(values["image_width"], values["image_height"], f"{file.name}: image size")
+
+
+def is_orb_slam(text: str) -> bool:
+    """Tell whether a text is a file of settings for stereo."""
+    return _has_key(text, "Camera.bf", "Stereo.b")
+
+
+def read_orb_slam(file: File) -> Fields:
+    """Read the camera and the baseline."""
+    values = parse_yaml(file.text, file.name)
+
+    def read(*keys: str) -> float:
+        for key in keys:
+            if key in values:
+                return number(values[key], f"{file.name}: {key}")
+        raise InputError(f"{file.name}: has no {keys[0]}")
+
+    fx, fy, cx, cy = (read(f"Camera.{each}", f"Camera1.{each}") for each in ("fx", "fy", "cx", "cy"))
+    if fx == 0:
+        raise InputError(f"{file.name}: Camera.fx is 0: a focal length is more")
+    baseline = read("Camera.bf") / fx if "Camera.bf" in values else read("Stereo.b")
+    width = height = None
+    if "Camera.width" in values and "Camera.height" in values:
+        width, height = size(values["Camera.width"], values["Camera.height"], f"{file.name}: Camera.width")
+    return Fields("ORB-SLAM", fx, fy, cx, cy, baseline, 0.0, width, height)
+
+
+def is_kalibr(text: str) -> bool:
+    """Tell whether a text is a camchain of Kalibr."""
+    return _has_key(text, "T_cn_cnm1")
+
+
+def read_kalibr(file: File) -> Fields:
+    """Read the distance between cam0 and cam1, metres: the last column of T_cn_cnm1."""
+    camera = parse_yaml(file.text, file.name).get("cam1")
+    rows = camera.get("T_cn_cnm1") if isinstance(camera, dict) else None
+    what = f"{file.name}: T_cn_cnm1 of cam1"
+    matrix = [numbers(row, what) for row in rows] if isinstance(rows, list) else []
+    if len(matrix) != 4 or any(len(row) != 4 for row in matrix):
+        raise InputError(f"{what} is no 4x4 matrix: the file is cut off or damaged")
+    x, y, z = (row[3] for row in matrix[:3])
+    if abs(y) > abs(x):
+        raise InputError(
+            f"{file.name} is a vertical rig, one camera above the other: only horizontal ones are read"
+        )
+    return Fields("Kalibr", baseline=math.hypot(x, y, z), lacks=_RAW)
+
+
+def is_zed(text: str) -> bool:
+    """Tell whether a text is a ZED camera's SN*.conf."""
+    return any(line.lstrip().startswith("[LEFT_CAM_") for line in text.splitlines())
+
+
+def read_zed(file: File) -> Fields:
+    """Read the baseline, which the file gives in millimetres."""
+    section = ""
+    for line in file.text.splitlines():
+        if line.lstrip().startswith("["):
+            section = line.strip().lower()
+        key, sign, value = line.partition("=")
+        if section == "[stereo]" and sign and key.strip().lower() == "baseline":
+            return Fields("ZED", baseline=_MM * number(value.strip(), f"{file.name}: Baseline"), lacks=_RAW)
+    raise InputError(f"{file.name}: has no Baseline below [STEREO]: the file is cut off")

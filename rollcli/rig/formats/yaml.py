@@ -1,34 +1,22 @@
-"""A reader of plain YAML: mappings, sequences and scalars, as calibration files have them.
+"""The YAML of calibration files, parsed by PyYAML: mappings, sequences, and scalars that stay text.
 
-Calibration files of ROS, Kalibr, ORB-SLAM and OpenCV use a small part of YAML. This reader knows that part
-alone: it has no anchors, builds no objects from tags and converts no numbers, so a hostile file can neither
-run code nor take more memory than its own size. A library would add a dependency for the parts that are
-unwanted here, and refuses the ``%YAML:1.0`` line of OpenCV.
+ROS, Kalibr, ORB-SLAM and OpenCV write it. What they have no use for is refused as soon as the parser meets
+it: aliases, which can make a few lines fill the memory, and tags, which name objects.
 """
 
 import re
-from typing import NamedTuple, Union
+from typing import Union
 
 from rollcli.errors import InputError
 
 Value = Union[str, list["Value"], dict[str, "Value"]]  # noqa: UP007 - the alias names itself
 
 _MAX_DEPTH = 16  # calibration files nest three levels deep
-_MATRIX_TAG = "!!opencv-matrix"
-_NO_KEY = re.compile(r"""[\[\]{},"'#&*!|>%@`]""")
-_FLOW = re.compile(
-    r"""\s*("[^"]*"|'[^']*'|[\[\]{},]|:(?=[\s\[{]|$)|(?:[^\s\[\]{},:]|:(?=[^\s\[{])|\s(?=[^\s\[\]{},:]))+)"""
-)
-_BRACKET = re.compile(r"[\[\]{}]")
-_COMMENT = re.compile(r"""(?:^|(?<=\s))#.*""")
-
-
-class _Line(NamedTuple):
-    """A line without its comment; one that opens a bracket goes on to where it is closed."""
-
-    number: int
-    indent: int
-    text: str
+_MAX_EVENTS = 30_000  # a matrix has 16 numbers; PyYAML parses so many in a second
+_MATRIX = "tag:yaml.org,2002:opencv-"
+# OpenCV's first line is no directive of YAML, and its files may lack the space after a key's colon
+_DIRECTIVE = re.compile(r"^%YAML.*", re.MULTILINE)
+_TIGHT_KEY = re.compile(r"^( *[\w.]+):(?=\S)", re.MULTILINE)
 
 
 def parse_yaml(text: str, name: str) -> dict[str, Value]:
@@ -37,7 +25,7 @@ def parse_yaml(text: str, name: str) -> dict[str, Value]:
     Parameters
     ----------
     text : str
-        One document; numbers stay the text they are.
+        What follows the end of its first document is left alone; numbers stay the text they are.
     name : str
         What errors call the file.
 
@@ -48,162 +36,77 @@ def parse_yaml(text: str, name: str) -> dict[str, Value]:
     Raises
     ------
     InputError
-        The document uses what plain YAML files do not have; the line is named.
+        The text is no YAML, or has what calibration files have no use for; the line is named.
     """
-    lines = _lines(text, name)
-    if not lines:
-        raise InputError(f"{name}: holds no value")
-    value, rest = _block(lines, 0, name, 0)
-    if rest < len(lines) or not isinstance(value, dict):
-        raise _unreadable(name, lines[min(rest, len(lines) - 1)].number)
-    return value
+    import yaml  # takes 25 ms, and most calibrations are no YAML
+
+    if "%YAML:" in text:
+        text = _TIGHT_KEY.sub(r"\1: ", text)
+    text = _without_inner_tabs(_DIRECTIVE.sub("", text, count=1))
+    parents: list[list[Value]] = []
+    values: list[Value] = []
+    try:
+        for count, event in enumerate(yaml.parse(text, Loader=yaml.BaseLoader)):
+            line = event.start_mark.line + 1 if event.start_mark else 1
+            if count > _MAX_EVENTS:
+                raise _unreadable(name, line, "has more values before it than a calibration has")
+            if isinstance(event, yaml.DocumentEndEvent):
+                break
+            if isinstance(event, yaml.NodeEvent):
+                _require_plain(name, line, event.anchor, getattr(event, "tag", None))
+            if isinstance(event, yaml.ScalarEvent):
+                values.append(event.value)
+            elif isinstance(event, yaml.CollectionStartEvent):
+                parents.append(values)
+                values = []
+                if len(parents) > _MAX_DEPTH + 1:
+                    raise _unreadable(name, line, "nests deeper than a calibration does")
+            elif isinstance(event, yaml.MappingEndEvent):
+                parents[-1].append(_mapping(name, line, values))
+                values = parents.pop()
+            elif isinstance(event, yaml.SequenceEndEvent):
+                parents[-1].append(values)
+                values = parents.pop()
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        why = " ".join(filter(None, (error.context, error.problem)))
+        why += ": the file is cut off" if "<stream end>" in why or "end of stream" in why else ""
+        raise _unreadable(name, mark.line + 1 if mark else 1, f"is no YAML: {why}") from error
+    except yaml.YAMLError as error:
+        raise InputError(f"{name}: is no YAML: {' '.join(str(error).split())}") from error
+    if not values or not isinstance(values[0], dict):
+        raise InputError(f"{name}: holds no value that has a name")
+    return values[0]
 
 
-def _unreadable(name: str, number: int, why: str = "is not plain YAML") -> InputError:
-    return InputError(f"{name}: line {number} {why}")
+def _without_inner_tabs(text: str) -> str:
+    """Put spaces where PyYAML refuses tabs and other readers do not: anywhere but in the indentation."""
+    if "\t" not in text:
+        return text
+    lines = (line.rstrip() for line in text.splitlines())
+    return "\n".join(
+        line[: len(line) - len(line.lstrip())] + line.lstrip().replace("\t", " ") for line in lines
+    )
 
 
-def _lines(text: str, name: str) -> list[_Line]:
-    """Return the lines with content."""
-    found: list[_Line] = []
-    parts: list[str] = []  # of a line whose brackets are still open
-    begun = depth = 0
-    for number, raw in enumerate(text.splitlines(), 1):
-        line = _without_comment(raw).rstrip()
-        if depth == 0 and (line.startswith("%") or line in ("", "---")):
-            continue
-        if depth == 0 and line == "...":
-            break
-        if depth == 0:
-            begun, parts = number, []
-            if "\t" in line[: len(line) - len(line.lstrip())]:
-                raise _unreadable(name, number, "is indented by a tab")
-        parts.append(line)
-        for bracket in _BRACKET.findall(line):
-            depth += 1 if bracket in "[{" else -1
-            if depth > _MAX_DEPTH:
-                raise _unreadable(name, number, "nests deeper than a calibration does")
-            if depth < 0:
-                raise _unreadable(name, number, "closes a bracket that is not open")
-        if depth == 0:
-            first = parts[0]
-            indent = len(first) - len(first.lstrip())
-            found.append(_Line(begun, indent, " ".join(" ".join(parts).split())))
-    if depth:
-        raise _unreadable(name, begun, "opens a bracket that is never closed: the file is cut off")
+def _require_plain(name: str, line: int, anchor: str | None, tag: str | None) -> None:
+    if anchor is not None:
+        raise _unreadable(name, line, f"has the anchor or alias {anchor}, which calibrations have no use for")
+    if tag is not None and not tag.startswith(_MATRIX):
+        raise _unreadable(name, line, f"has the tag {tag}, which calibrations have no use for")
+
+
+def _mapping(name: str, line: int, flat: list[Value]) -> dict[str, Value]:
+    """Return the mapping whose keys and values were listed in turn."""
+    found: dict[str, Value] = {}
+    for key, value in zip(flat[::2], flat[1::2], strict=True):
+        if not isinstance(key, str):
+            raise _unreadable(name, line, "ends a mapping with a key that is no text")
+        if key in found:
+            raise _unreadable(name, line, f"ends a mapping that gives {key} a second time")
+        found[key] = value
     return found
 
 
-def _without_comment(line: str) -> str:
-    # a number sign inside of quotes is rare enough in a calibration to be left to the error of the quote
-    return _COMMENT.sub("", line, count=1) if "#" in line else line
-
-
-def _block(lines: list[_Line], at: int, name: str, depth: int) -> tuple[Value, int]:
-    """Read the mapping or sequence that begins at a line; return it and the line after it."""
-    if depth > _MAX_DEPTH:
-        raise _unreadable(name, lines[at].number, "nests deeper than a calibration does")
-    if lines[at].text == "-" or lines[at].text.startswith("- "):
-        return _sequence(lines, at, name, depth)
-    return _mapping(lines, at, name, depth)
-
-
-def _mapping(lines: list[_Line], at: int, name: str, depth: int) -> tuple[dict[str, Value], int]:
-    values: dict[str, Value] = {}
-    indent = lines[at].indent
-    while at < len(lines) and lines[at].indent == indent:
-        line = lines[at]
-        split = _split_key(line.text)
-        if split is None:
-            raise _unreadable(name, line.number)
-        key, text = split
-        if key in values:
-            raise _unreadable(name, line.number, f"gives {key} a second time")
-        text = text.removeprefix(_MATRIX_TAG).strip()
-        at += 1
-        if text:
-            values[key] = _scalar_or_flow(text, name, line.number)
-        elif at < len(lines) and (
-            lines[at].indent > indent or (lines[at].indent == indent and lines[at].text.startswith("-"))
-        ):
-            values[key], at = _block(lines, at, name, depth + 1)
-        else:
-            values[key] = ""
-    if at < len(lines) and lines[at].indent > indent:
-        raise _unreadable(name, lines[at].number)
-    return values, at
-
-
-def _split_key(text: str) -> tuple[str, str] | None:
-    """Return key and value of a line of a mapping, or None where it is no such line."""
-    key, colon, value = text.partition(": ")
-    if not colon:
-        key, colon, value = text.partition(":")  # a key at the end of its line, or OpenCV's `key:value`
-    key = key.strip().strip("\"'")
-    return (key, value.strip()) if colon and key and not _NO_KEY.search(key) else None
-
-
-def _sequence(lines: list[_Line], at: int, name: str, depth: int) -> tuple[list[Value], int]:
-    values: list[Value] = []
-    indent = lines[at].indent
-    while at < len(lines) and lines[at].indent == indent and lines[at].text.startswith("-"):
-        line = lines[at]
-        text = line.text[1:].lstrip()
-        if not text:
-            raise _unreadable(name, line.number)
-        if text.startswith("- ") or (_split_key(text) and text[0] not in "[{"):
-            # what follows the dash is a block of its own, indented to where it stands
-            lines[at] = _Line(line.number, indent + len(line.text) - len(text), text)
-            value, at = _block(lines, at, name, depth + 1)
-        else:
-            value, at = _scalar_or_flow(text, name, line.number), at + 1
-        values.append(value)
-    return values, at
-
-
-def _scalar_or_flow(text: str, name: str, number: int) -> Value:
-    if text[0] in "[{":
-        tokens = _FLOW.findall(text)
-        value, rest = _flow(tokens, 0, name, number)
-        if rest != len(tokens):
-            raise _unreadable(name, number)
-        return value
-    if text[0] in "&*!|>@`":
-        raise _unreadable(name, number, f"begins with {text[0]}, which calibration files have no use for")
-    return text.strip("\"'")
-
-
-def _flow(tokens: list[str], at: int, name: str, number: int) -> tuple[Value, int]:
-    """Read one value in brackets; how deep they nest is checked before."""
-    token = tokens[at]
-    if token == "[":
-        items: list[Value] = []
-        at += 1
-        while tokens[at] != "]":
-            item, at = _flow(tokens, at, name, number)
-            items.append(item)
-            at = _after_comma(tokens, at, "]", name, number)
-        return items, at + 1
-    if token == "{":
-        values: dict[str, Value] = {}
-        at += 1
-        while tokens[at] != "}":
-            key = tokens[at].strip("\"'")
-            if at + 1 >= len(tokens) or tokens[at + 1] != ":" or key in values:
-                raise _unreadable(name, number)
-            values[key], at = _flow(tokens, at + 2, name, number)
-            at = _after_comma(tokens, at, "}", name, number)
-        return values, at + 1
-    if token in "]},:" or token[0] in "&*!":
-        raise _unreadable(name, number)
-    return token.strip().strip("\"'"), at + 1
-
-
-def _after_comma(tokens: list[str], at: int, close: str, name: str, number: int) -> int:
-    if at < len(tokens) and tokens[at] == ",":
-        at += 1
-    elif at >= len(tokens) or tokens[at] != close:
-        raise _unreadable(name, number)
-    if at >= len(tokens):
-        raise _unreadable(name, number)
-    return at
+def _unreadable(name: str, line: int, why: str) -> InputError:
+    return InputError(f"{name}: line {line} {why}")
