@@ -63,6 +63,7 @@ from rollcli.report.options import GALLERY, ReportOptions
     section="Charts for slides",
     help="Write each chart of the page as an SVG: roll, histogram, and pitch and height where there are any.",
 )
+@option("--pdf", type=PATH, metavar="DIR", section="Charts for slides", help="The same as PDFs.")
 @option(
     "--png", type=PATH, metavar="DIR", section="Charts for slides", help="The same as PNGs, 1920 pixels wide."
 )
@@ -77,8 +78,8 @@ def report(ctx: click.Context, /, **options: Any) -> None:
     images. One file that opens from disk without a network.
 
     Inputs are looked for under the names that RESULT gives them, from here or from its folder; remote ones
-    only where RESULT lies on the same server or in the same bucket, or with --fetch. The page needs the
-    extra: pip install "rollcli[report]". Charts alone (--svg, --png) do not.
+    only where RESULT lies on the same server or in the same bucket, or with --fetch. This command needs the
+    extra: pip install "rollcli[report]".
     """
     from rollcli.report.run import run_report
 

@@ -1,13 +1,18 @@
-"""One chart of the page: its traces as plotly takes them, and its labels."""
+"""A chart, how a page holds it, and which charts a result has.
+
+Import-light: files are checked before any chart is made.
+"""
 
 import html
 import json
-import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from rollcli.files.results import Row
+from rollcli.rig.quantities import QUANTITIES, ROLL
+
+HISTOGRAM = "histogram"
 
 
 @dataclass(frozen=True)
@@ -54,18 +59,13 @@ def script_json(value: Any) -> str:
     return content
 
 
-_LONGEST = 44  # characters in a line, so that a label fits a narrow screen
-_LINES = 5  # of a reason; the table and the gallery show all of it
+def chart_names(rows: Sequence[Row]) -> list[str]:
+    """Return the names of the charts, `roll` first.
 
-
-def label(row: Row, value: str) -> str:
-    """Return the name of a frame, its value, and why it is suspect or has failed.
-
-    plotly takes tags and entities in a label for its own, so names and reasons are escaped.
+    Pitch and height have charts where a calibration has given them, the histogram where more than
+    one frame has an angle.
     """
-    name = row.file if len(row.file) <= _LONGEST else f"…{row.file[1 - _LONGEST :]}"
-    lines = [name, *([value] if value else [])]
-    if row.status != "ok":
-        lines.append("failed" if row.status == "error" else "suspect")
-        lines += textwrap.wrap(row.message, _LONGEST, max_lines=_LINES, placeholder=" …")
-    return "<br>".join(map(html.escape, lines))
+    there = {each.name: any(getattr(row, each.column) is not None for row in rows) for each in QUANTITIES}
+    over_frames = [name for name, some in there.items() if some or name == ROLL.name]
+    angles = sum(row.roll_deg is not None for row in rows)
+    return [*over_frames, *([HISTOGRAM] if angles > 1 else [])]

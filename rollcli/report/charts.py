@@ -2,6 +2,7 @@
 
 import html
 import math
+import textwrap
 from collections.abc import Iterable, Sequence, Set
 from dataclasses import dataclass
 from itertools import pairwise
@@ -12,8 +13,7 @@ from numpy.typing import NDArray
 
 from rollcli.files.results import Row
 from rollcli.pictures.round_step import round_step
-from rollcli.report.chart import Chart, label
-from rollcli.report.options import HISTOGRAM, chart_names
+from rollcli.report.chart import HISTOGRAM, Chart, chart_names
 from rollcli.report.summary import degrees, with_interval
 from rollcli.rig.drive.assess import DriveAssessment, RigAssessment
 from rollcli.rig.drive.quantity import SequenceAssessment
@@ -126,6 +126,13 @@ def _add_jumps(
         _add(jumps, [frame + 0.5, frame + 0.5], ends, said)
 
 
+_LONGEST = 44  # characters in a line, so that a label fits a narrow screen
+_LINES = 5  # of a reason; the table and the gallery show all of it
+_BEYOND = 0.35  # a suspect value may widen the view by this share of the others' range, and by half a degree
+_WIDEST = 1.0  # degrees: a wider interval is seen to leave the view
+_DEGREE_IN_METRES = 0.1  # what of a height is as much as a degree of an angle
+
+
 @dataclass(frozen=True, slots=True)
 class Value:
     """A frame and its value; degrees or metres.
@@ -166,9 +173,17 @@ def in_words(each: Value, quantity: Quantity) -> str:
     return f"{each.value:.{digits}f}{half}{quantity.unit}"
 
 
-_BEYOND = 0.35  # a suspect value may widen the view by this share of the others' range, and by half a degree
-_WIDEST = 1.0  # degrees: a wider interval is seen to leave the view
-_DEGREE_IN_METRES = 0.1  # what of a height is as much as a degree of an angle
+def label(row: Row, value: str) -> str:
+    """Return the name of a frame, its value, and why it is suspect or has failed.
+
+    plotly takes tags and entities in a label for its own, so names and reasons are escaped.
+    """
+    name = row.file if len(row.file) <= _LONGEST else f"…{row.file[1 - _LONGEST :]}"
+    lines = [name, *([value] if value else [])]
+    if row.status != "ok":
+        lines.append("failed" if row.status == "error" else "suspect")
+        lines += textwrap.wrap(row.message, _LONGEST, max_lines=_LINES, placeholder=" …")
+    return "<br>".join(map(html.escape, lines))
 
 
 def view(rows: Sequence[Row], quantity: Quantity = ROLL) -> tuple[float, float]:
@@ -212,62 +227,11 @@ def _span(values: Iterable[Value], unit: float) -> tuple[float, float]:
     return min(ends), max(ends)
 
 
-_MOST_BINS = 40
-_NARROWEST = 0.01  # degrees
-_FEWEST_STEPS = 6
-
-
-def histogram(rows: Sequence[Row]) -> Chart:
-    """Return how many frames have which roll, suspect ones on top of the others."""
-    low, high = view(rows)
-    shown = [row.roll_deg for row in rows if row.roll_deg is not None and low <= row.roll_deg <= high]
-    low, high = min(shown, default=low), max(shown, default=high)
-    step = round_step(max((high - low) / _bins(len(shown)), _NARROWEST))
-    edges = np.arange(math.floor(low / step), math.floor(high / step) + 2) * step
-    spans = [f"{degrees(start, 3)} to {degrees(end, 3)}" for start, end in pairwise(edges.tolist())]
-    data = []
-    for status, colour in (("ok", "@c1"), ("suspect", "@suspect")):
-        rolls = [row.roll_deg for row in rows if row.roll_deg is not None and row.status == status]
-        bars = {
-            "type": "bar",
-            "name": status,
-            "x": np.round(edges[:-1], 6).tolist(),
-            "offset": 0,
-            "y": np.histogram(rolls, edges)[0].tolist(),
-            "width": step,
-            "marker": {"color": colour, "line": {"color": "@card", "width": 1}},
-            "customdata": spans,
-            "hovertemplate": "%{customdata}<br>%{y} frames<extra></extra>",
-        }
-        data += [bars] if rolls else []
-    layout = {
-        "barmode": "stack",
-        "showlegend": [trace["name"] for trace in data] != ["ok"],
-        "xaxis": {"title": {"text": "roll, degrees"}, "range": _padded(edges, step), "zeroline": False},
-        "yaxis": {"title": {"text": "frames"}, **_counted(int(np.histogram(shown, edges)[0].max()))},
-    }
-    return Chart(HISTOGRAM, "How many frames have which roll", data, layout)
-
-
-def _bins(count: int) -> int:
-    """Return fewer bins for fewer frames, so that bars are higher than one."""
-    return min(_MOST_BINS, max(5, math.ceil(2 * math.sqrt(count))))
-
-
-def _counted(highest: int) -> dict[str, Any]:
-    """Let the axis begin at nothing, with ticks at whole frames where bars are low."""
-    return {"range": [0, 1.05 * max(highest, 1)], **({"dtick": 1} if highest <= _FEWEST_STEPS else {})}
-
-
-def _padded(edges: NDArray[Any], step: float) -> list[float]:
-    """Widen the axis around a single bar, which would fill the chart."""
-    width = float(np.ptp(edges))
-    margin = max(0.02 * width, (_FEWEST_STEPS * step - width) / 2)
-    return [float(edges[0]) - margin, float(edges[-1]) + margin]
-
-
 _MANY = 400  # up to so many frames each has a dot, and marks are large
 _FEW = 10
+_MOST_BINS = 40
+_NARROWEST = 0.01  # degrees
+_FEW_BINS = 6
 _FAILED_AT = 0.035  # of the chart's height
 _AXIS_UNITS = {"deg": "degrees", "m": "m"}
 
@@ -275,6 +239,15 @@ _VALUES = ("x", "y", "customdata")
 
 Values = Sequence[Value]
 Trace = dict[str, Any]
+
+
+def all_charts(rows: Sequence[Row], rig: RigAssessment | None = None) -> dict[str, Chart]:
+    """Return the charts of `chart_names` by their names."""
+    quantities = {each.name: each for each in QUANTITIES}
+    return {
+        name: histogram(rows) if name == HISTOGRAM else chart_over_frames(rows, quantities[name], rig)
+        for name in chart_names(rows)
+    }
 
 
 def chart_over_frames(
@@ -429,10 +402,50 @@ def _stretches(values: Values, starts: Set[int]) -> list[Values]:
     return [values[start:end] for start, end in pairwise([0, *ends, len(values)]) if end > start]
 
 
-def all_charts(rows: Sequence[Row], rig: RigAssessment | None = None) -> dict[str, Chart]:
-    """Return the charts of `chart_names` by their names."""
-    quantities = {each.name: each for each in QUANTITIES}
-    return {
-        name: histogram(rows) if name == HISTOGRAM else chart_over_frames(rows, quantities[name], rig)
-        for name in chart_names(rows)
+def histogram(rows: Sequence[Row]) -> Chart:
+    """Return how many frames have which roll, suspect ones on top of the others."""
+    low, high = view(rows)
+    shown = [row.roll_deg for row in rows if row.roll_deg is not None and low <= row.roll_deg <= high]
+    low, high = min(shown, default=low), max(shown, default=high)
+    step = round_step(max((high - low) / _bins(len(shown)), _NARROWEST))
+    edges = np.arange(math.floor(low / step), math.floor(high / step) + 2) * step
+    spans = [f"{degrees(start, 3)} to {degrees(end, 3)}" for start, end in pairwise(edges.tolist())]
+    data = []
+    for status, colour in (("ok", "@c1"), ("suspect", "@suspect")):
+        rolls = [row.roll_deg for row in rows if row.roll_deg is not None and row.status == status]
+        bars = {
+            "type": "bar",
+            "name": status,
+            "x": np.round(edges[:-1], 6).tolist(),
+            "offset": 0,
+            "y": np.histogram(rolls, edges)[0].tolist(),
+            "width": step,
+            "marker": {"color": colour, "line": {"color": "@card", "width": 1}},
+            "customdata": spans,
+            "hovertemplate": "%{customdata}<br>%{y} frames<extra></extra>",
+        }
+        data += [bars] if rolls else []
+    layout = {
+        "barmode": "stack",
+        "showlegend": [trace["name"] for trace in data] != ["ok"],
+        "xaxis": {"title": {"text": "roll, degrees"}, "range": _padded(edges, step), "zeroline": False},
+        "yaxis": {"title": {"text": "frames"}, **_counted(int(np.histogram(shown, edges)[0].max()))},
     }
+    return Chart(HISTOGRAM, "How many frames have which roll", data, layout)
+
+
+def _bins(count: int) -> int:
+    """Return fewer bins for fewer frames, so that bars are higher than one."""
+    return min(_MOST_BINS, max(5, math.ceil(2 * math.sqrt(count))))
+
+
+def _counted(highest: int) -> dict[str, Any]:
+    """Let the axis begin at nothing, with ticks at whole frames where bars are low."""
+    return {"range": [0, 1.05 * max(highest, 1)], **({"dtick": 1} if highest <= _FEW_BINS else {})}
+
+
+def _padded(edges: NDArray[Any], step: float) -> list[float]:
+    """Widen the axis around a single bar, which would fill the chart."""
+    width = float(np.ptp(edges))
+    margin = max(0.02 * width, (_FEW_BINS * step - width) / 2)
+    return [float(edges[0]) - margin, float(edges[-1]) + margin]

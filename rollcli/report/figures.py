@@ -1,578 +1,309 @@
-"""Charts as pictures that need neither a script nor a browser."""
+"""Charts as figures that need neither a script nor a browser: matplotlib draws them as SVG, PDF and PNG.
+
+What the charts of this program hold is understood, and no more: `scatter` with lines, marks, bars of error
+and filled bands, and `bar` on top of each other, over linear, logarithmic and named axes. matplotlib is part
+of the extra `report` and takes a second to load: this module is imported once something is to be drawn.
+"""
 
 import html
-import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, Literal, NamedTuple
+import io
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any, NamedTuple
 
-import cv2
+import matplotlib as mpl
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import (
+    FuncFormatter,
+    MaxNLocator,
+    MultipleLocator,
+    NullLocator,
+)
 from numpy.typing import NDArray
 
-from rollcli.pictures.round_step import round_step
 from rollcli.report.chart import Chart
-from rollcli.report.colours import LIGHT, rgb
-from rollcli.report.options import ReportOptions
-
-Points = NDArray[np.floating[Any]]  # shape (N, 2): x to the right, y down, pixels
-Symbol = Literal["circle", "diamond", "cross"]
-Anchor = Literal["start", "middle", "end"]
-
-
-@dataclass(frozen=True, eq=False)
-class Line:
-    """A line through points; `dash` is how long a dash and a gap are, pixels, 0 for none."""
-
-    points: Points
-    colour: str
-    width: float
-    dash: float = 0.0
-
-
-@dataclass(frozen=True, eq=False)
-class Area:
-    """A filled polygon."""
-
-    points: Points
-    colour: str
-
-
-@dataclass(frozen=True, eq=False)
-class Marks:
-    """The same symbol at each of the points; `size` is its diameter, pixels."""
-
-    points: Points
-    colour: str
-    symbol: Symbol
-    size: float
-
-
-@dataclass(frozen=True)
-class Words:
-    """A line of text; `x` and `y` are of its baseline. One that is `upright` reads from below to above."""
-
-    x: float
-    y: float
-    text: str
-    colour: str
-    anchor: Anchor = "start"
-    upright: bool = False
-
-
-Item = Line | Area | Marks | Words
-
-
-@dataclass(frozen=True, eq=False)
-class Sketch:
-    """A chart, laid out.
-
-    Attributes
-    ----------
-    label : str
-        What it shows, for those who cannot see it.
-    width, height : int
-        Pixels.
-    font : float
-        Size of its text, pixels.
-    frame : (int, int, int, int)
-        Left, top, width and height of the part where the values are.
-    inside : tuple of Item
-        In this order, cut off at the frame; their places count from its corner.
-    around : tuple of Item
-        Axes and legend.
-    """
-
-    label: str
-    width: int
-    height: int
-    font: float
-    frame: tuple[int, int, int, int]
-    inside: tuple[Item, ...]
-    around: tuple[Item, ...]
-
-
-_DASHES = {"dot": 3.0, "dash": 8.0}  # pixels
-_SYMBOLS: Mapping[str, Symbol] = {"diamond": "diamond", "x-thin": "cross"}
-
-
-def colour_of(name: str) -> str:
-    """Return one of the page's colours: "@c1" is "c1"."""
-    return name.removeprefix("@")
-
-
-def dash_of(line: Mapping[str, Any]) -> float:
-    """Return how long a dash is, pixels; 0 for a whole line."""
-    return _DASHES.get(line.get("dash", ""), 0.0)
-
-
-def symbol_of(marker: Mapping[str, Any]) -> Symbol:
-    """Return the shape of a mark."""
-    return _SYMBOLS.get(marker.get("symbol", ""), "circle")
-
-
-_FINER = 2  # drawn so many times larger, then averaged: smooth edges, and lines of any width
-_SHIFT = 4  # bits of a coordinate after the point
-_CORNERS = 24  # of what stands for a circle
-_LETTERS = cv2.FONT_HERSHEY_SIMPLEX
-_CAPITAL = 21.0  # height of a capital of the font at scale 1, pixels
-_CAPITAL_SHARE = 0.72  # of a font's size, in the fonts of browsers
-
-Canvas = NDArray[np.uint8]
-
-
-def png_file(sketch: Sketch, scale: float = 1.5) -> bytes:
-    """Return a chart on white.
-
-    Parameters
-    ----------
-    sketch : Sketch
-    scale : float
-        Pixels of the picture for each of the sketch.
-
-    Returns
-    -------
-    bytes
-        A PNG, 8 bit, RGB.
-    """
-    finer = scale * _FINER
-    size = (math.ceil(sketch.height * finer), math.ceil(sketch.width * finer), 3)
-    canvas = np.full(size, rgb("card"), np.uint8)
-    left, top, width, height = (round(each * finer) for each in sketch.frame)
-    inside = canvas[top : top + height, left : left + width].copy()  # cuts off what lies outside of it
-    for item in sketch.inside:
-        _draw(inside, item, sketch.font, finer)
-    canvas[top : top + height, left : left + width] = inside
-    for item in sketch.around:
-        _draw(canvas, item, sketch.font, finer)
-    target = (round(sketch.width * scale), round(sketch.height * scale))
-    picture = cv2.resize(canvas, target, interpolation=cv2.INTER_AREA)
-    _, data = cv2.imencode(".png", cv2.cvtColor(picture, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_PNG_COMPRESSION, 9])
-    return data.tobytes()
-
-
-def _draw(canvas: Canvas, item: Item, font: float, scale: float) -> None:
-    if isinstance(item, Words):
-        _draw_words(canvas, item, font, scale)
-        return
-    points, pen = item.points * scale, 0
-    if isinstance(item, Line):
-        pen = max(1, round(item.width * scale))
-        parts = _dashes(points, item.dash * scale) if item.dash else [points]
-    elif isinstance(item, Marks):
-        pen = round(item.size * scale / 4) if item.symbol == "cross" else 0
-        parts = [stroke + point for point in points for stroke in _shape(item, scale)]
-    else:
-        parts = [points]
-    opacity, colour = LIGHT[item.colour][1], rgb(item.colour)
-    if not parts:
-        return
-    if opacity == 1:
-        _paint(canvas, parts, colour, pen)
-        return
-    part, corner = _around(canvas, points, pen)
-    painted = part.copy()
-    _paint(painted, [each - corner for each in parts], colour, pen)
-    part[:] = cv2.addWeighted(painted, opacity, part, 1 - opacity, 0)
-
-
-def _paint(canvas: Canvas, parts: Sequence[Points], colour: tuple[int, int, int], pen: int) -> None:
-    """Draw lines of this width, or fill shapes where it is 0."""
-    fixed = [np.rint(part * 2**_SHIFT).astype(np.int32) for part in parts]
-    if pen:
-        cv2.polylines(canvas, fixed, False, colour, pen, cv2.LINE_AA, _SHIFT)
-    else:
-        for each in fixed:  # one by one: where two overlap, fillPoly would leave a hole
-            cv2.fillPoly(canvas, [each], colour, cv2.LINE_AA, _SHIFT)
-
-
-def _around(canvas: Canvas, points: Points, pen: int) -> tuple[Canvas, Points]:
-    """Return the part of a canvas that holds these points, and its corner."""
-    size = np.array(canvas.shape[1::-1])
-    low = np.clip(np.floor(points.min(axis=0)) - pen - 2, 0, size - 1).astype(int)
-    high = np.clip(np.ceil(points.max(axis=0)) + pen + 2, low + 1, size).astype(int)
-    return canvas[low[1] : high[1], low[0] : high[0]], low.astype(float)
-
-
-def _shape(marks: Marks, scale: float) -> list[Points]:
-    """Return the strokes or the outline of a mark around the origin."""
-    half = marks.size * scale / 2
-    if marks.symbol == "cross":
-        return [half * np.array([(-1.0, -1.0), (1.0, 1.0)]), half * np.array([(-1.0, 1.0), (1.0, -1.0)])]
-    if marks.symbol == "diamond":
-        return [half * np.array([(0.0, -1.0), (1.0, 0.0), (0.0, 1.0), (-1.0, 0.0)])]
-    turns = np.linspace(0, 2 * np.pi, _CORNERS, endpoint=False)
-    return [half * np.column_stack([np.cos(turns), np.sin(turns)])]
-
-
-def _dashes(points: Points, dash: float) -> list[Points]:
-    """Cut a line into dashes with gaps of the same length between them."""
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
-    parts = []
-    for start in np.arange(0, along[-1], 2 * dash):
-        ends = np.array([start, min(start + dash, along[-1])])
-        places = np.unique(np.concatenate([ends, along[(along > ends[0]) & (along < ends[1])]]))
-        parts.append(np.column_stack([np.interp(places, along, points[:, axis]) for axis in (0, 1)]))
-    return parts
-
-
-def _draw_words(canvas: Canvas, words: Words, font: float, scale: float) -> None:
-    """Write a line; what the font does not have is written with what it has."""
-    text = words.text.replace("−", "-")
-    pixels = font * scale
-    size, pen = pixels * _CAPITAL_SHARE / _CAPITAL, max(1, round(pixels / 13))
-    (width, height), below = cv2.getTextSize(text, _LETTERS, size, pen)
-    patch = np.full((height + below + 2 * pen, width + 2 * pen, 3), rgb("card"), np.uint8)
-    cv2.putText(patch, text, (pen, height + pen), _LETTERS, size, rgb(words.colour), pen, cv2.LINE_AA)
-    before = {"start": 0.0, "middle": width / 2, "end": float(width)}[words.anchor]
-    x, y = words.x * scale, words.y * scale
-    if words.upright:
-        patch = np.rot90(patch)
-        left, top = x - height - pen, y - width + before - pen
-    else:
-        left, top = x - before - pen, y - height - pen
-    _put(canvas, patch, round(left), round(top))
-
-
-def _put(canvas: Canvas, patch: Canvas, left: int, top: int) -> None:
-    """Lay dark words on the canvas where both overlap."""
-    x0, y0 = max(left, 0), max(top, 0)
-    part = canvas[y0 : max(top + patch.shape[0], 0), x0 : max(left + patch.shape[1], 0)]
-    cut = patch[y0 - top : y0 - top + part.shape[0], x0 - left : x0 - left + part.shape[1]]
-    np.minimum(part, cut, out=part)
-
-
-_NAMESPACE = 'xmlns="http://www.w3.org/2000/svg"'
-_FONTS = "system-ui, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, 'DejaVu Sans', sans-serif"
-
-Paint = Callable[[str, str], str]  # from an attribute and the name of a colour to attributes
-
-
-def svg_for_page(sketch: Sketch, kind: str) -> str:
-    """Return an element of a page, in the page's colours and font.
-
-    Parameters
-    ----------
-    sketch : Sketch
-    kind : str
-        Its class.
-    """
-    box = f'viewBox="0 0 {sketch.width} {sketch.height}" font-size="{sketch.font:g}"'
-    return f'<svg class="{kind}" {box} aria-hidden="true">{_items(sketch, _page_paint)}</svg>'
-
-
-def svg_file(sketch: Sketch) -> bytes:
-    """Return a file of its own: light colours on white, as slides have it."""
-    size = f'width="{sketch.width}" height="{sketch.height}" viewBox="0 0 {sketch.width} {sketch.height}"'
-    text = (
-        f'<svg {_NAMESPACE} {size} role="img" font-family="{_FONTS}" font-size="{sketch.font:g}">\n'
-        f"<title>{html.escape(sketch.label)}</title>\n"
-        f'<rect width="100%" height="100%" {_file_paint("fill", "card")}/>\n'
-        f"{_items(sketch, _file_paint)}</svg>\n"
-    )
-    return text.encode("utf-8", "replace")
-
-
-def _page_paint(attribute: str, colour: str) -> str:
-    return f'{attribute}="var(--{colour})"'
-
-
-def _file_paint(attribute: str, colour: str) -> str:
-    digits, opacity = LIGHT[colour]
-    return f'{attribute}="#{digits}"' + (f' {attribute}-opacity="{opacity:g}"' if opacity < 1 else "")
-
-
-def _items(sketch: Sketch, paint: Paint) -> str:
-    """Return the items; an inner `svg` cuts off what lies outside of the frame."""
-    left, top, width, height = sketch.frame
-    inside = "".join(f"{_item(each, paint)}\n" for each in sketch.inside)
-    around = "".join(f"{_item(each, paint)}\n" for each in sketch.around)
-    place = f'x="{left}" y="{top}" width="{width}" height="{height}" overflow="hidden"'
-    return f"<svg {place}>\n{inside}</svg>\n{around}"
-
-
-def _item(item: Item, paint: Paint) -> str:
-    if isinstance(item, Line):
-        dash = f' stroke-dasharray="{item.dash:g}"' if item.dash else ""
-        pen = f'fill="none" {paint("stroke", item.colour)} stroke-width="{item.width:.4g}"{dash}'
-        return f'<path d="{_path(item.points)}" {pen}/>'
-    if isinstance(item, Area):
-        return f'<path d="{_path(item.points)}Z" {paint("fill", item.colour)}/>'
-    if isinstance(item, Marks):
-        return _marks(item, paint)
-    return _words(item, paint)
-
-
-def _path(points: Points) -> str:
-    """Return a path to tenths of a pixel; each point is told by how far it is from the one before."""
-    tenths = (points * 10).round().astype(int)
-    steps = tenths[1:] - tenths[:-1]
-    start = f"M{tenths[0, 0] / 10:g} {tenths[0, 1] / 10:g}"
-    return start + "".join(f"l{x / 10:g} {y / 10:g}" for x, y in steps.tolist())
-
-
-def _marks(marks: Marks, paint: Paint) -> str:
-    half = marks.size / 2
-    r, d = f"{half:.3g}", f"{2 * half:.3g}"
-    shapes = {
-        "circle": f"m-{r} 0a{r} {r} 0 1 0 {d} 0a{r} {r} 0 1 0 -{d} 0",
-        "diamond": f"m0 -{r}l{r} {r}l-{r} {r}l-{r} -{r}Z",
-        "cross": f"m-{r} -{r}l{d} {d}m0 -{d}l-{d} {d}",
-    }
-    path = "".join(f"M{x:.1f} {y:.1f}{shapes[marks.symbol]}" for x, y in marks.points.tolist())
-    if marks.symbol == "cross":
-        return f'<path d="{path}" fill="none" {paint("stroke", marks.colour)} stroke-width="{half / 2:.3g}"/>'
-    return f'<path d="{path}" {paint("fill", marks.colour)}/>'
-
-
-def _words(words: Words, paint: Paint) -> str:
-    place = f'x="{words.x:.4g}" y="{words.y:.4g}" text-anchor="{words.anchor}"'
-    if words.upright:
-        place += f' transform="rotate(-90 {words.x:.4g} {words.y:.4g})"'
-    return f"<text {place} {paint('fill', words.colour)}>{html.escape(words.text)}</text>"
-
-
-_LETTER = 0.56  # width of a letter, of the font's size: digits of the usual fonts have this width
-_SWATCH, _APART = 2.3, 1.1  # of the legend, of the font's size
-_ROW = 1.55
-_FAR_APART = 9.0  # labels along the frames, of the font's size; half of it along the values
-_RANKS = 1000  # of a trace that names none, as plotly has it
-
-
-class Axis(NamedTuple):
-    """One axis: its ends, its name, the step that its labels must have (0: any), and if zero is marked."""
-
-    ends: tuple[float, float]
-    name: str
-    step: float = 0.0
-    zero: bool = False
-
-    @classmethod
-    def of(cls, layout: Mapping[str, Any]) -> "Axis":
-        """Take what is needed of plotly's words."""
-        low, high = layout["range"]
-        step = float(layout.get("dtick", 0.0))
-        return cls((float(low), float(high)), layout["title"]["text"], step, layout.get("zeroline", False))
-
-    def ticks(self, length: int, apart: float) -> list[tuple[float, str]]:
-        """Return where labels stand, pixels from the lower end, and what they say."""
-        low, high = self.ends
-        step = max(round_step(apart * (high - low) / length), self.step)
-        digits = max(0, -math.floor(math.log10(step) + 1e-9))
-        numbers = [k * step for k in range(math.ceil(low / step), math.floor(high / step) + 1)]
-        return [((each - low) / (high - low) * length, _number(each, digits)) for each in numbers]
-
-
-class Axes(NamedTuple):
-    """Both axes."""
-
-    x: Axis
-    y: Axis
-
-    @classmethod
-    def of(cls, layout: Mapping[str, Any]) -> "Axes":
-        """Take what is needed of plotly's words."""
-        return cls(Axis.of(layout["xaxis"]), Axis.of(layout["yaxis"]))
-
-    def names(self, left: int, top: int, width: int, height: int, font: float) -> Iterator[Item]:
-        """Yield the labels and names beside a frame."""
-        for along, text in self.x.ticks(width, _FAR_APART * font):
-            yield Words(left + along, top + height + 1.4 * font, text, "text", "middle")
-        for up, text in self.y.ticks(height, _FAR_APART * font / 2):
-            yield Words(left - 0.5 * font, top + height - up + 0.35 * font, text, "text", "end")
-        yield Words(left + width / 2, top + height + 3.0 * font, self.x.name, "text", "middle")
-        yield Words(1.1 * font, top + height / 2, self.y.name, "text", "middle", upright=True)
-
-
-def margins(axes: Axes, height: int, font: float, rows: int) -> tuple[int, int, int, int]:
-    """Return the space left of a frame, above, right and below it, pixels; the legend has some rows."""
-    widest = max(len(text) for _, text in axes.y.ticks(height, _FAR_APART * font / 2))
-    left = round(font * (2.2 + _LETTER * widest))
-    return left, round(font * (0.7 + rows * _ROW)), round(0.9 * font), round(3.7 * font)
-
-
-def axis_items(axes: Axes, width: int, height: int, font: float) -> Iterator[Item]:
-    """Yield the lines behind the values."""
-    for along, _ in axes.x.ticks(width, _FAR_APART * font):
-        yield Line(np.array([(along, 0.0), (along, float(height))]), "grid", font / 13)
-    for up, text in axes.y.ticks(height, _FAR_APART * font / 2):
-        zero = axes.y.zero and float(text.replace("−", "-").replace(",", "")) == 0
-        ends = np.array([(0.0, height - up), (float(width), height - up)])
-        yield Line(ends, "line" if zero else "grid", font / (6.5 if zero else 13))
-
-
-def legend_items(chart: Chart, width: int, font: float) -> Iterator[list[Item]]:
-    """Yield the rows of the legend, none where the chart has none."""
-    if not chart.layout.get("showlegend", True):
-        return
-    named = [trace for trace in chart.data if trace.get("showlegend", True)]
-    row: list[Item] = []
-    x, y = 0.5 * font, 0.9 * font
-    for trace in sorted(named, key=lambda each: each.get("legendrank", _RANKS)):
-        needed = font * (_SWATCH + 0.5 + _LETTER * len(trace["name"]))
-        if row and x + needed > width:
-            yield row
-            row, x, y = [], 0.5 * font, y + _ROW * font
-        name = Words(x + (_SWATCH + 0.5) * font, y + 0.35 * font, trace["name"], "text")
-        row += [*_swatch(trace, x, y, font), name]
-        x += needed + _APART * font
-    yield row
-
-
-def _swatch(trace: Mapping[str, Any], x: float, y: float, font: float) -> Iterator[Item]:
-    """Yield the sample of a trace: a box, a line or a mark."""
-    width, half = _SWATCH * font, 0.35 * font
-    box = np.array([(x, y - half), (x + width, y - half), (x + width, y + half), (x, y + half)])
-    line, marker = trace.get("line", {}), trace.get("marker", {})
-    if trace["type"] == "bar":
-        yield Area(box, colour_of(marker["color"]))
-    elif trace.get("fill"):
-        yield Area(box, colour_of(trace["fillcolor"]))
-    elif "lines" in trace["mode"]:
-        ends = np.array([(x, y), (x + width, y)])
-        yield Line(ends, colour_of(line["color"]), line["width"] * font / 13, dash_of(line) * font / 13)
-    else:
-        yield Marks(np.array([(x + width / 2, y)]), colour_of(marker["color"]), symbol_of(marker), 0.6 * font)
-
-
-def _number(value: float, digits: int) -> str:
-    text = f"{value:,.{digits}f}"
-    return text.replace("-", "−") if float(text.replace(",", "")) else text.lstrip("-")
-
-
-_FAR = 50.0  # heights of the frame: what lies further off is drawn so far off
-_FEWEST_TO_THIN = 4  # points of a line in one column of pixels; fewer are kept as they are
+from rollcli.report.colours import LIGHT
+
+COLUMN = 3.5 * 72  # pt: the width of a column in journals of two columns
+_MOST_TO_KEEP = 2000  # points of a line or band; of more, those are kept that reach furthest in each column
+_COLUMNS = 1000  # of thinning: no figure shows finer ones
+_LETTER, _SWATCH = 0.56, 4.0  # widths in a legend, of the font's size
+_GREEK_INDEX = re.compile(r"(\w)<sub>(\w+)</sub>")
+_LINES = {"dot": (0, (1.5, 1.5)), "dash": (0, (4.0, 3.0))}  # of a line's width
+_MARKS = {"diamond": "D", "x-thin": "x", "circle-open": "o"}
+_COLOUR = re.compile("#[0-9a-f]{6}")
+_VARIABLES = {f"#{digits}": f"var(--{name})" for name, (digits, _) in reversed([*LIGHT.items()])}
+_STYLE: dict[Any, Any] = {
+    "axes.axisbelow": True,
+    "axes.edgecolor": f"#{LIGHT['line'][0]}",
+    "axes.grid": True,
+    "axes.labelcolor": f"#{LIGHT['text'][0]}",
+    "grid.color": f"#{LIGHT['grid'][0]}",
+    "legend.frameon": False,
+    "pdf.fonttype": 42,  # letters stay letters
+    "svg.fonttype": "none",
+    "text.color": f"#{LIGHT['text'][0]}",
+    "xtick.color": f"#{LIGHT['line'][0]}",
+    "xtick.labelcolor": f"#{LIGHT['text'][0]}",
+    "ytick.color": f"#{LIGHT['line'][0]}",
+    "ytick.labelcolor": f"#{LIGHT['text'][0]}",
+}
 
 Trace = Mapping[str, Any]
 
 
-class _Place(NamedTuple):
-    """The frame's size, pixels, and the axes."""
+class Size(NamedTuple):
+    """The size of a figure, and of its letters; pt."""
 
-    width: int
-    height: int
-    axes: Axes
+    width: float
+    height: float
+    font: float
 
 
-def lay_out(chart: Chart, width: int, height: int, font: float = 13.0) -> Sketch:
-    """Return a chart at some size.
+SLIDE = Size(960.0, 420.0, 13.5)  # a slide leaves so much below its title
+PRINT = Size(COLUMN, 0.62 * COLUMN, 7.0)
+# places of a chart on the page; its styles show one of them
+_WIDE, _NARROW = Size(1000.0, 368.0, 13.0), Size(350.0, 352.0, 11.0)
+
+
+@contextmanager
+def drawing_style(size: Size, salt: str = "") -> Iterator[None]:
+    """Draw as this program does, whatever a user has set for matplotlib; what he has set is put back."""
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        sizes: dict[Any, Any] = {
+            "font.size": size.font,
+            "axes.linewidth": size.font / 13,
+            "grid.linewidth": size.font / 13,
+        }
+        sizes |= {"legend.fontsize": size.font, "axes.titlesize": size.font}
+        mpl.rcParams.update(_STYLE | sizes | {"svg.hashsalt": f"rollcli {salt}"})
+        yield
+
+
+def figure_file(figure: Figure, kind: str, title: str) -> bytes:
+    """Return a figure as a file, the same bytes each time; within `drawing_style`.
 
     Parameters
     ----------
-    chart : Chart
-        Its axes have ranges; see the module.
-    width, height : int
-        Pixels.
-    font : float
-        Size of its text, pixels; lines and marks grow with it.
-
-    Returns
-    -------
-    Sketch
+    figure : Figure
+    kind : {"svg", "pdf", "png"}
+        PNGs have 144 pixels an inch on a slide, and 600 at the width of a column.
+    title : str
+        What it shows, for those who cannot see it.
     """
-    axes = Axes.of(chart.layout)
-    legend = list(legend_items(chart, width, font))
-    left, top, right, bottom = margins(axes, height, font, rows=len(legend))
-    place = _Place(width - left - right, height - top - bottom, axes)
-    scale = font / 13.0
-    scatters = [trace for trace in chart.data if trace["type"] == "scatter"]
-    bars = [trace for trace in chart.data if trace["type"] == "bar"]
-    inside = [
-        *axis_items(axes, place.width, place.height, font),
-        *(item for trace in scatters for item in _scatter(trace, place, scale)),
-        *_bars(bars, place),
-    ]
-    around = [
-        *(item for row in legend for item in row),
-        *axes.names(left, top, place.width, place.height, font),
-    ]
-    frame = (left, top, place.width, place.height)
-    return Sketch(chart.label, width, height, font, frame, tuple(inside), tuple(around))
+    metadata: dict[str, str | None] = {"Title": title}
+    if kind == "svg":
+        metadata |= dict.fromkeys(("Date", "Creator", "Format", "Type"))
+    elif kind == "pdf":
+        metadata |= dict.fromkeys(("CreationDate", "Creator", "Producer"))
+    else:
+        metadata |= {"Software": None}
+    buffer = io.BytesIO()
+    dots = 600 if figure.get_figwidth() * 72 <= 2 * COLUMN else 144
+    figure.savefig(buffer, format=kind, dpi=dots, metadata=metadata, facecolor=f"#{LIGHT['card'][0]}")
+    return buffer.getvalue()
 
 
-def _scatter(trace: Trace, place: _Place, scale: float) -> Iterator[Item]:
-    low, high = (0.0, 1.0) if trace.get("yaxis") == "y2" else place.axes.y.ends
-    x, y = (np.array([np.nan if each is None else each for each in trace[name]], float) for name in "xy")
-    across = (x - place.axes.x.ends[0]) / np.ptp(place.axes.x.ends) * place.width
-    down = (high - y) / (high - low) * place.height
-    points = np.column_stack([across, np.clip(down, -_FAR * place.height, _FAR * place.height)])
-    line, marker = trace.get("line", {}), trace.get("marker", {})
-    for stretch in _stretches(points) if "lines" in trace["mode"] else ():
-        thinned = _thinned(stretch)
-        if trace.get("fill"):
-            yield Area(thinned, colour_of(trace["fillcolor"]))
-        if line.get("width"):
-            yield Line(thinned, colour_of(line["color"]), line["width"] * scale, dash_of(line) * scale)
-    if "markers" in trace["mode"]:
-        known = points[np.isfinite(points).all(axis=1)]
-        if "error_y" in trace:
-            yield from _error_bars(known, trace["error_y"], place.height / (high - low), scale)
-        yield Marks(known, colour_of(marker["color"]), symbol_of(marker), marker["size"] * scale)
-
-
-def _error_bars(points: Points, bars: Trace, per_unit: float, scale: float) -> Iterator[Item]:
-    for (x, y), half in zip(points.tolist(), bars["array"], strict=True):
-        ends = np.array([(x, y - half * per_unit), (x, y + half * per_unit)])
-        yield Line(ends, colour_of(bars["color"]), bars["thickness"] * scale)
-
-
-def _bars(traces: Sequence[Trace], place: _Place) -> Iterator[Item]:
-    """Stack the bars of later traces on those of earlier ones, a gap of a pixel between neighbours."""
-    (low, high), top = place.axes.x.ends, place.axes.y.ends[1]
-    base = np.zeros(len(traces[0]["y"])) if traces else np.zeros(0)
-    for trace in traces:
-        counts, starts = np.asarray(trace["y"], float), np.asarray(trace["x"], float)
-        left = (starts - low) / (high - low) * place.width + 0.5
-        right = (starts + trace["width"] - low) / (high - low) * place.width - 0.5
-        lower, upper = (place.height * (1 - each / top) for each in (base, base + counts))
-        for x0, x1, y0, y1, count in zip(left, right, upper, lower, counts, strict=True):
-            if count:
-                corners = np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
-                yield Area(corners, colour_of(trace["marker"]["color"]))
-        base = base + counts
-
-
-def _stretches(points: Points) -> list[Points]:
-    """Return the runs of points between gaps."""
-    gaps = np.flatnonzero(~np.isfinite(points).all(axis=1))
-    runs = np.split(points, gaps)
-    return [run[np.isfinite(run).all(axis=1)] for run in runs if np.isfinite(run).all(axis=1).any()]
-
-
-def _thinned(points: Points) -> Points:
-    """Keep of each column of pixels where the line enters and leaves it, and its ends: it looks the same."""
-    columns = np.floor(points[:, 0])
-    starts = np.flatnonzero(np.diff(columns, prepend=np.nan) != 0)
-    ends = np.append(starts[1:], len(points))
-    kept: list[int] = []
-    for start, end in zip(starts.tolist(), ends.tolist(), strict=True):
-        if end - start <= _FEWEST_TO_THIN:
-            kept += range(start, end)
-        else:
-            heights = points[start:end, 1]
-            kept += sorted({start, start + int(heights.argmin()), start + int(heights.argmax()), end - 1})
-    return points[kept]
-
-
-_WIDTH, _HEIGHT, _FONT = 1280, 560, 18.0  # pixels: a slide leaves so much below its title
-_WRITERS = {"svg": svg_file, "png": png_file}
-
-
-def chart_files(charts: Mapping[str, Chart], options: ReportOptions) -> dict[str, bytes]:
-    """Return the content of each file that is asked for."""
-    files: dict[str, bytes] = {}
-    for name, chart in charts.items():
-        for kind, path in options.chart_paths(name).items():
-            files[path] = _WRITERS[kind](lay_out(chart, _WIDTH, _HEIGHT, _FONT))
-    return files
-
-
-# width, height and font of the chart's place on the page, pixels; the page's styles show one of them
-_WIDE, _NARROW = (1000, 368, 13.0), (350, 352, 11.0)
+def chart_file(chart: Chart, kind: str, size: Size = SLIDE) -> bytes:
+    """Return a chart as a file on white: "svg", "pdf" or "png"."""
+    with drawing_style(size):
+        return figure_file(_drawn(chart, size), kind, chart.label)
 
 
 def with_still(chart: Chart) -> Chart:
-    """Return the chart with its pictures for wide and for narrow screens."""
-    wide = svg_for_page(lay_out(chart, *_WIDE), "still wide-screen")
-    narrow = svg_for_page(lay_out(chart, *_NARROW), "still narrow-screen")
-    return replace(chart, still=wide + narrow)
+    """Return the chart with its pictures for wide and for narrow screens.
+
+    They stand where a page's charts will be, so that a page is whole before any script has run.
+    """
+    stills = (("wide-screen", _WIDE), ("narrow-screen", _NARROW))
+    return replace(chart, still="".join(_still(chart, name, size) for name, size in stills))
+
+
+def _still(chart: Chart, name: str, size: Size) -> str:
+    """Return an element of a page, in the page's colours and font."""
+    with drawing_style(size, f"{chart.name} {name}"):  # the salt keeps what it refers to apart from others'
+        svg = figure_file(_drawn(chart, size), "svg", "").decode()
+    inner = svg[svg.index("</defs>", svg.index("<style")) + len("</defs>") :]
+    inner = re.sub(r' id="[\w.]+_\d+"|\n *', "", inner)
+    inner = re.sub(r"font: ([\d.]+)px [^;\"]*", r"font-size: \1px", inner)  # as older versions have it
+    inner = re.sub(r"font-family: [^;\"]*;? ?", "", inner)
+    inner = _COLOUR.sub(lambda found: _VARIABLES[found[0]], inner)
+    # as attributes, whatever the page's policy says of styles
+    inner = re.sub(
+        r'style="([^"]*)"', lambda found: re.sub(r"([\w-]+): ([^;]*);? ?", r'\1="\2" ', found[1]), inner
+    )
+    box = f'viewBox="0 0 {size.width:g} {size.height:g}" stroke-linejoin="round" aria-hidden="true"'
+    return f'<svg class="still {name}" {box}>{inner}'
+
+
+def _drawn(chart: Chart, size: Size) -> Figure:
+    figure = Figure((size.width / 72, size.height / 72), dpi=72, layout="constrained")
+    axes = figure.add_subplot()
+    scale = size.font / 13  # of widths and marks, which charts give for letters of 13 pixels
+    across, up = (_Scale(chart, name) for name in "xy")
+    base, look = np.zeros(1), dict[str, Any]()
+    for order, trace in enumerate(chart.data, 2):
+        if trace["type"] == "bar":
+            counts = np.asarray(trace["y"], float)
+            look = {"color": _colour(trace["marker"]["color"])[0], "edgecolor": _colour("@card")[0]}
+            axes.bar(trace["x"], counts, trace["width"], base, align="edge", linewidth=scale, **look)
+            base = base + counts
+        else:
+            _draw_scatter(axes, trace, across, up, scale, order)
+    for shape, words in zip(chart.layout.get("shapes", ()), chart.layout.get("annotations", ()), strict=True):
+        style = _LINES[shape["line"]["dash"]]
+        axes.axvline(shape["x0"], color=_colour(shape["line"]["color"])[0], linewidth=scale, linestyle=style)
+        place, anchor = (words["x"], words["y"]), axes.get_xaxis_transform()
+        axes.annotate(f" {words['text']}", place, xycoords=anchor, va="top", color=_colour("@muted")[0])
+    across.set(axes)
+    up.set(axes)
+    for side in axes.spines.values():
+        side.set_visible(False)
+    axes.tick_params(length=0, which="both")
+    if chart.layout.get("yaxis", {}).get("zeroline"):
+        axes.axhline(0, color=_colour("@line")[0], linewidth=2 * scale, zorder=1)
+    _add_legend(figure, chart, size, scale)
+    return figure
+
+
+class _Scale:
+    """One axis: what plotly's words for it mean, and places for names in place of numbers."""
+
+    def __init__(self, chart: Chart, name: str) -> None:
+        self._name, self._layout = name, chart.layout.get(f"{name}axis", {})
+        values = [trace[name] for trace in chart.data]
+        self._names: dict[str, None] = {}
+        if values and isinstance(values[0][0], str | list):
+            self._names = dict.fromkeys(each for some in values for each in _flat(some))
+
+    def places(self, values: Sequence[Any]) -> NDArray[Any]:
+        """Return numbers; NaN where there is no value."""
+        if self._names:
+            order = list(self._names)
+            return np.array([order.index(each) for each in _flat(values)], float)
+        return np.array([np.nan if each is None else each for each in values], float)
+
+    def set(self, axes: Axes) -> None:
+        """Set ends, labels and name."""
+        layout, axis = self._layout, axes.xaxis if self._name == "x" else axes.yaxis
+        get_ends, set_ends, set_scale = (
+            getattr(axes, each.format(self._name)) for each in ("get_{}lim", "set_{}lim", "set_{}scale")
+        )
+        if layout.get("type") == "log":
+            set_scale("log")
+            axis.set_minor_locator(NullLocator())
+            axis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}{layout.get('ticksuffix', '')}"))
+        elif "dtick" in layout:
+            axis.set_major_locator(MultipleLocator(layout["dtick"]))
+        elif not self._names:
+            axis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 5, 10], integer="tickformat" in layout))
+        if "tickformat" in layout:
+            axis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:,.0f}"))
+        named = (range(len(self._names)), [_words(each) for each in self._names])
+        places, names = (layout["tickvals"], layout["ticktext"]) if "tickvals" in layout else named
+        if names:
+            axis.set_ticks(places, names)
+        axis.set_label_text(_words(layout.get("title", {}).get("text", "")))
+        low, high = get_ends()
+        set_ends(layout.get("range", (0 if layout.get("rangemode") == "tozero" else low, high)))
+        axis.set_inverted(layout.get("autorange") == "reversed")
+
+
+def _flat(values: Sequence[Any]) -> list[str]:
+    """Return names; those of two levels as two lines."""
+    if values and isinstance(values[0], list):
+        return [f"{inner}\n{outer}" for outer, inner in zip(*values, strict=True)]
+    return list(values)
+
+
+def _draw_scatter(axes: Axes, trace: Trace, across: _Scale, up: _Scale, scale: float, order: int) -> None:
+    x, y = across.places(trace["x"]), up.places(trace["y"])
+    if trace.get("fill"):
+        colour, opacity = _colour(trace["fillcolor"])
+        width = trace["line"].get("width", 0) * scale
+        for run in _runs(x, y):
+            axes.fill(*run.T, color=colour, alpha=opacity, linewidth=width, zorder=order)
+        return
+    if "error_y" in trace:
+        bars = trace["error_y"]
+        pen = {"ecolor": _colour(bars["color"])[0], "elinewidth": bars["thickness"] * scale}
+        axes.errorbar(x, y, bars["array"], fmt="none", zorder=order, **pen)
+    if trace["mode"] == "lines":
+        gap = [[np.nan, np.nan]]
+        x, y = np.vstack([part for run in _runs(x, y) for part in (run, gap)]).T
+    where: dict[str, Any] = {"transform": axes.get_xaxis_transform()} if trace.get("yaxis") == "y2" else {}
+    axes.plot(x, y, zorder=order, **_look(trace, scale), **where)
+
+
+def _runs(x: NDArray[Any], y: NDArray[Any]) -> Iterator[NDArray[Any]]:
+    """Yield the points between gaps, shape (N, 2); of many, those that make the same picture."""
+    points = np.column_stack([x, y])
+    known = np.isfinite(points).all(axis=1)
+    columns = np.floor(x * (_COLUMNS / max(float(np.ptp(x[known])), 1e-9)))
+    for run in np.split(np.arange(len(x)), np.flatnonzero(~known)):
+        shown = run[known[run]]
+        if len(x) > _MOST_TO_KEEP and len(shown):
+            parts = np.split(shown, np.flatnonzero(np.diff(columns[shown])) + 1)
+            # where a line enters and leaves a column of pixels, and how far it reaches in between
+            kept = [(part[0], part[y[part].argmin()], part[y[part].argmax()], part[-1]) for part in parts]
+            shown = np.unique(kept)
+        if len(shown):
+            yield points[shown]
+
+
+def _look(trace: Trace, scale: float) -> dict[str, Any]:
+    """Return what a trace looks like, in the words of matplotlib's lines."""
+    line, marker = trace.get("line", {}), trace.get("marker", {})
+    colour = _colour(line.get("color") or marker["color"])[0]
+    lines, marks = "lines" in trace["mode"], "markers" in trace["mode"]
+    symbol = marker.get("symbol", "circle")
+    is_open = symbol in ("circle-open", "x-thin")
+    # plotly's size is that of a circle; a square on its tip is larger by the root of two
+    size = marker.get("size", 6) * scale * (0.7 if symbol == "diamond" else 1.0)
+    return {
+        "color": colour,
+        "linestyle": _LINES.get(line.get("dash", ""), "-") if lines else "none",
+        "linewidth": line.get("width", 2) * scale if lines else 0,
+        "marker": _MARKS.get(symbol, "o") if marks else "",
+        "markersize": size,
+        "markerfacecolor": "none" if is_open else colour,
+        "markeredgewidth": marker.get("line", {}).get("width", 2) * scale if is_open else 0,
+    }
+
+
+def _add_legend(figure: Figure, chart: Chart, size: Size, scale: float) -> None:
+    """Add the legend above the axes, in as many columns as fit."""
+    named = [trace for trace in chart.data if trace.get("showlegend", True)]
+    if not chart.layout.get("showlegend", True) or not named:
+        return
+    named.sort(key=lambda each: each.get("legendrank", 1000))  # plotly's rank of a trace that names none
+    names = [_words(trace["name"]) for trace in named]
+    needed = (_SWATCH + _LETTER * max(map(len, names))) * size.font
+    columns = min(len(names), max(1, int(size.width / needed)))
+    samples = [_sample(trace, scale) for trace in named]
+    figure.legend(samples, names, loc="outside upper left", ncols=columns, handlelength=2, borderpad=0)
+
+
+def _sample(trace: Trace, scale: float) -> Any:
+    if trace["type"] == "bar" or trace.get("fill"):
+        colour, opacity = _colour(trace.get("fillcolor") or trace["marker"]["color"])
+        return Patch(facecolor=colour, alpha=opacity)
+    return Line2D([], [], **_look(trace, scale))
+
+
+def _colour(name: str) -> tuple[str, float]:
+    """Return one of the page's colours and its opacity: "@c1" is that of "c1"."""
+    digits, opacity = LIGHT[name.removeprefix("@")]
+    return f"#{digits}", opacity
+
+
+def _words(text: str) -> str:
+    """Return a name with its indices as matplotlib writes them."""
+    return _GREEK_INDEX.sub(r"$\\mathregular{\1_{\2}}$", html.unescape(text))

@@ -19,7 +19,7 @@ from rollcli.errors import UsageError
 from rollcli.report.chart import script_json
 from rollcli.report.colours import style_sheet
 
-_NEEDED = ("plotly", "jinja2")
+_NEEDED = ("plotly", "jinja2", "matplotlib")
 # plotly adds a style sheet for geographic maps unless an element has its id; the policy would refuse it aloud
 _STYLE_OF_MAPS = re.compile(r'document\.getElementById\("([0-9a-f]{64})"\)')
 _PLOTLY_STYLES = ("",)  # plotly makes an empty style element, which it fills by rules

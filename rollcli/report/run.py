@@ -9,7 +9,8 @@ from rollcli.errors import ExitStatus, InputError, UsageError
 from rollcli.files.naming import listed
 from rollcli.files.results import Result, read_result, run_path
 from rollcli.files.stream import is_stream, write_output
-from rollcli.report.options import ReportOptions, chart_names
+from rollcli.report.chart import chart_names
+from rollcli.report.options import ReportOptions
 from rollcli.report.page import require_extra
 from rollcli.report.sources import Choice, Subject, choose, subjects
 from rollcli.report.summary import frame_count
@@ -48,8 +49,7 @@ def run_report(options: ReportOptions) -> ExitStatus:
     """
     if options.output is None:
         _require_charts_alone(options)
-    else:
-        require_extra("report")
+    require_extra("report")
     result = read_result(options.result)
     if not result.rows:
         raise InputError(f"{options.result}: has no rows: there is nothing to report")
@@ -73,8 +73,10 @@ def run_report(options: ReportOptions) -> ExitStatus:
 
 def _require_charts_alone(options: ReportOptions) -> None:
     """Refuse to write nothing, and what is for a page alone."""
-    if options.png is None and options.svg is None:
-        raise UsageError("nothing to write: name a page with -o, or a folder for charts with --svg or --png")
+    if not options.chart_paths(""):
+        raise UsageError(
+            "nothing to write: name a page with -o, or a folder for charts with --svg, --pdf or --png"
+        )
     if options.images is not None or options.title is not None:
         name = "--title" if options.images is None else "--images"
         raise UsageError(f"{name} is for a page: name one with -o")
@@ -89,7 +91,7 @@ def _write(
 ) -> ExitStatus:
     from rollcli.report.charts import all_charts
     from rollcli.report.content import report_page
-    from rollcli.report.figures import chart_files
+    from rollcli.report.figures import chart_file
     from rollcli.rig.drive.assess import assess_rig
 
     progress = Progress(len(found), options.running, EncodingOptions())
@@ -99,7 +101,11 @@ def _write(
         return ExitStatus.INTERRUPTED
     rig = assess_rig(result.rows)
     charts = all_charts(result.rows, rig)
-    files = chart_files(charts, options)
+    files = {
+        path: chart_file(chart, kind)
+        for name, chart in charts.items()
+        for kind, path in options.chart_paths(name).items()
+    }
     for path, data in files.items():
         write_output(path, data)
     if files:

@@ -407,17 +407,18 @@ def test_a_long_list_of_doubtful_frames_is_cut_short_and_says_where_the_others_a
 
 
 def test_charts_are_written_for_slides_with_or_without_a_page(folder):
-    alone = rollcli("report", "out/rolls.csv", "--svg", "slides", "--png", "slides", cwd=folder)
+    kinds = ("pdf", "png", "svg")
+    folders = [word for kind in kinds for word in (f"--{kind}", "slides")]
+    alone = rollcli("report", "out/rolls.csv", *folders, cwd=folder)
     assert (alone.status, alone.out) == (0, "")
     written = contents(folder / "slides")
-    assert sorted(written) == ["histogram.png", "histogram.svg", "roll.png", "roll.svg"]
-    for name in ("histogram", "roll"):
-        head = written[f"{name}.svg"].partition(b">")[0]
-        assert all(each in head for each in (b' width="1280" height="560"', b' font-size="18"'))
+    assert sorted(written) == [f"{name}.{kind}" for name in ("histogram", "roll") for kind in kinds]
+    starts = {"pdf": b"%PDF", "png": b"\x89PNG", "svg": b"<?xml"}
+    assert all(data.startswith(starts[name[-3:]]) for name, data in written.items())
 
     again = rollcli("report", "out/rolls.csv", "--svg", "slides", cwd=folder)
     assert (again.status, "slides/roll.svg: exists already" in again.err) == (2, True)
-    assert report(folder, "out/rolls.csv", "--svg", "slides", "--overwrite").status == 0
+    assert report(folder, "out/rolls.csv", *folders, "--overwrite").status == 0
     assert contents(folder / "slides") == written
     assert (folder / "page.html").exists()
 
@@ -436,7 +437,7 @@ def test_a_dry_run_names_the_charts(folder):
     [
         ([], "nothing to write: name a page with -o"),
         (["--png", "slides", "--title", "x"], "--title is for a page"),
-        (["--svg", "slides", "--images", "out"], "--images is for a page"),
+        (["--pdf", "slides", "--images", "out"], "--images is for a page"),
     ],
 )
 def test_what_would_do_nothing_is_refused(folder, arguments, words):

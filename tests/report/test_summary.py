@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from rollcli.report import content
-from rollcli.report.chart import Chart, label, script_json
-from rollcli.report.charts import _bins, chart_over_frames, histogram, outside, view
-from rollcli.report.options import ReportOptions, chart_names
+from rollcli.report.chart import Chart, chart_names, script_json
+from rollcli.report.charts import _bins, chart_over_frames, histogram, label, outside, view
+from rollcli.report.options import ReportOptions
 from rollcli.report.pictures import Picture, Pictures, _encoded, no_pictures
 from rollcli.report.sources import SPREAD, SUSPECT, WIDEST, Choice
 from rollcli.report.summary import degrees, frame_count, input_folders, option_lines, summarize, written_at
