@@ -123,10 +123,14 @@ def disparity(ctx: click.Context, /, **records: Any) -> None:
     ctx.exit(run_disparity(options))
 
 
+def _count(**values: Any) -> CountOptions:
+    return CountOptions(result=values.pop("from"), **values)
+
+
 count_options = record(
     "count",
     "Counting",
-    CountOptions,
+    _count,
     option(
         "--bins",
         type=Number("N", at_least=1, at_most=65535, whole=True),
@@ -144,6 +148,19 @@ count_options = record(
         is_flag=True,
         help="Write the counts too, as a 32-bit TIFF beside the picture; a row sums to its valid pixels.",
     ),
+    option(
+        "--figure",
+        type=click.Choice(["svg", "pdf", "png"]),
+        help="Write a figure for a paper in place of the picture: map and v-disparity, as they are and "
+        "de-rotated, with the road's curve, as wide as a journal's column (3.5 inches).",
+    ),
+    option(
+        "--from",
+        type=PATH,
+        metavar="RESULT",
+        help="The angles and curves of --figure, from what `rollcli estimate` wrote; matched by stem.  "
+        "[default: estimate them]",
+    ),
 )
 
 
@@ -151,6 +168,10 @@ count_options = record(
     examples=[
         ("Pictures to look at", "rollcli vdisparity maps/ -o vdisparity/"),
         ("Counts to compute with", "rollcli vdisparity maps/ --counts --max-disparity 128 -o vdisparity/"),
+        (
+            "A figure for a paper",
+            "rollcli vdisparity maps/7.png --figure pdf --from rolls.csv -o figures/",
+        ),
     ]
 )
 @input_options
@@ -168,7 +189,8 @@ def vdisparity(ctx: click.Context, /, **records: Any) -> None:
     picture is an 8-bit PNG on a log scale; its first rows are those of the map. The map is taken as it is,
     whereas `estimate --vdisparity` rotates it upright first. Where a road is found, its disparity along the
     middle column is drawn as a dashed curve: on a de-rotated map the road's pixels lie on it. With a
-    calibration, the road's horizon on that column is drawn, too.
+    calibration, the road's horizon on that column is drawn, too. --figure needs the extra:
+    pip install "rollcli[report]".
     """
     from rollcli.run.convert import run_vdisparity
     from rollcli.run.unused import idle_in_vdisparity, repeated_inputs

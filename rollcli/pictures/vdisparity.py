@@ -166,7 +166,7 @@ def draw_v_disparity(
         Width, margins and letters are twice as large for 960 rows, three times for 1440, and so on.
     """
     unit = max(1, len(histogram.counts) // _UNIT_ROWS)
-    counts, top = _shown(histogram, _WIDTH * unit)
+    counts, top = shown_counts(histogram, _WIDTH * unit)
     light = np.log1p(counts)
     brightest = float(np.percentile(light[counts > 0], 99.9)) if counts.any() else 1.0
     grey = np.minimum(light * (255 / brightest), 255).astype(np.uint8)
@@ -178,7 +178,7 @@ def draw_v_disparity(
     return _with_margins(chart, top, unit)
 
 
-def _shown(histogram: VDisparity, width: int) -> tuple[NDArray[np.float32], float]:
+def shown_counts(histogram: VDisparity, width: int) -> tuple[NDArray[np.float32], float]:
     """Return the counts of the range that is shown, `width` columns wide, and its end, px."""
     counts, end = histogram.counts, histogram.max_disparity
     reached = np.cumsum(counts.sum(axis=0))

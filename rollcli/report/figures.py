@@ -7,7 +7,9 @@ of the extra `report` and takes a second to load: this module is imported once s
 
 import html
 import io
+import logging
 import re
+import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -30,6 +32,8 @@ from numpy.typing import NDArray
 from rollcli.report.chart import Chart
 from rollcli.report.colours import LIGHT
 
+logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it tells of its own files
+_SETTINGS = threading.Lock()  # matplotlib has one set of them for all threads
 COLUMN = 3.5 * 72  # pt: the width of a column in journals of two columns
 _MOST_TO_KEEP = 2000  # points of a line or band; of more, those are kept that reach furthest in each column
 _COLUMNS = 1000  # of thinning: no figure shows finer ones
@@ -75,13 +79,15 @@ _WIDE, _NARROW = Size(1000.0, 368.0, 13.0), Size(350.0, 352.0, 11.0)
 @contextmanager
 def drawing_style(size: Size, salt: str = "") -> Iterator[None]:
     """Draw as this program does, whatever a user has set for matplotlib; what he has set is put back."""
-    with mpl.rc_context():
+    with _SETTINGS, mpl.rc_context():
         mpl.rcdefaults()
         sizes: dict[Any, Any] = {
             "font.size": size.font,
             "axes.linewidth": size.font / 13,
             "grid.linewidth": size.font / 13,
         }
+        sizes |= {f"{axis}tick.major.width": size.font / 13 for axis in "xy"}
+        sizes |= {f"{axis}tick.major.size": size.font / 4 for axis in "xy"}
         sizes |= {"legend.fontsize": size.font, "axes.titlesize": size.font}
         mpl.rcParams.update(_STYLE | sizes | {"svg.hashsalt": f"rollcli {salt}"})
         yield

@@ -34,6 +34,8 @@ class Conversion:
         Why this frame cannot be converted; empty when it can.
     keeps_numbers : bool
         What is stored stays as it is: how it is read does not matter.
+    alpha : tuple of float, or None
+        The road's parabola of a result, px.
     """
 
     frame: Frame
@@ -41,6 +43,7 @@ class Conversion:
     roll: float = 0.0
     refused: str = ""
     keeps_numbers: bool = False
+    alpha: tuple[float, float, float] | None = None
 
 
 def convert(

@@ -9,6 +9,7 @@ from rollcli.files.matching import match_paths
 from rollcli.files.naming import listed
 from rollcli.files.results import Row, read_result
 from rollcli.messages import say
+from rollcli.report.page import require_extra
 from rollcli.run.calibration import check_depth, check_first_size
 from rollcli.run.conversion import Conversion, convert
 from rollcli.run.find import map_frames, pair_frames
@@ -45,7 +46,7 @@ def _conversions(frames: Sequence[Frame], options: DerotateOptions) -> Iterator[
     rotation = options.rotation
     rows: Sequence[Row | None] = [None] * len(frames)
     if rotation.result is not None:
-        rows = found = _rows_of(frames, rotation.result)
+        rows = found = rows_of(frames, rotation.result)
         _tell_suspects(found, rotation, options.running)
     for frame, row in zip(frames, rows, strict=True):
         if row is not None and row.status == "suspect" and rotation.skip_suspect:
@@ -76,13 +77,14 @@ def _tell_suspects(rows: Sequence[Row], rotation: RotationOptions, running: Runn
         say(f"{of} and used; --skip-suspect leaves such maps out")
 
 
-def _rows_of(frames: Sequence[Frame], result: str) -> list[Row]:
+def rows_of(frames: Sequence[Frame], result: str, *, every_row: bool = True) -> list[Row]:
     """Find the row of each frame.
 
     Raises
     ------
     UsageError
-        Names maps without a row, rows that have an angle but no map, and what matches more than one.
+        Names maps without a row, with `every_row` rows that have an angle but no map, and what matches more
+        than one.
     """
     rows = read_result(result).rows
     found = match_paths([frame.file for frame in frames], [row.file for row in rows], result)
@@ -91,7 +93,7 @@ def _rows_of(frames: Sequence[Frame], result: str) -> list[Row]:
         raise UsageError(f"{result}: has no row for {listed(alone)}")
     used = [at for at in found if at is not None]
     lost = [rows[at] for at in sorted(set(range(len(rows))).difference(used))]
-    if any(row.roll_deg is not None for row in lost):
+    if every_row and any(row.roll_deg is not None for row in lost):
         names = listed(row.file for row in lost if row.roll_deg is not None)
         raise UsageError(f"{result}: no map is given for its rows of {names}")
     return [rows[at] for at in used]
@@ -135,22 +137,45 @@ def _match(conversion: Conversion, options: FrameOptions, save_as: str, preview:
 
 def run_vdisparity(options: VDisparityOptions) -> ExitStatus:
     """Count the disparities of every map, row by row, and draw them."""
-    running = options.running
+    running, count = options.running, options.count
+    if count.figure is not None:
+        require_extra("--figure")
+        if count.counts:
+            raise UsageError("--counts goes with the picture: give it without --figure")
+    elif count.result is not None:
+        raise UsageError("--from is for --figure: a picture shows the map as it is")
     frames = map_frames(options.inputs, calibration=options.calibration, skip=[options.output])
     check_depth(frames, options.encoding)
-    conversions = [Conversion(frame, _vdisparity_writes(frame, options)) for frame in frames]
+    conversions = list(_vdisparity_conversions(frames, options))
     read = FrameOptions(encoding=options.encoding, root=running.root, replaces=running.overwrite)
     check_first_size(frames, read)
-    do = partial(_count, options=read, count=options.count)
+    do = partial(_count, options=read, count=count)
     return convert(conversions, do, options.output, running, options.encoding)
 
 
+def _vdisparity_conversions(frames: Sequence[Frame], options: VDisparityOptions) -> Iterator[Conversion]:
+    result = options.count.result
+    if result is None:
+        yield from (Conversion(frame, _vdisparity_writes(frame, options)) for frame in frames)
+        return
+    for frame, row in zip(frames, rows_of(frames, result, every_row=False), strict=True):
+        refused = "" if row.roll_deg is not None else f"has no angle in {result}"
+        coefficients = [each for each in (row.alpha0, row.alpha1, row.alpha2) if each is not None]
+        alpha = (coefficients[0], coefficients[1], coefficients[2]) if len(coefficients) == 3 else None
+        roll = math.radians(row.roll_deg or 0.0)
+        yield Conversion(frame, _vdisparity_writes(frame, options), roll, refused, alpha=alpha)
+
+
 def _vdisparity_writes(frame: Frame, options: VDisparityOptions) -> tuple[str, ...]:
+    if options.count.figure is not None:
+        return (output_path(frame, options.output, f".{options.count.figure}"),)
     picture = output_path(frame, options.output, ".png")
     return (picture, output_path(frame, options.output, ".tif")) if options.count.counts else (picture,)
 
 
 def _count(conversion: Conversion, options: FrameOptions, count: CountOptions) -> FrameResult:
-    from rollcli.run.convert_frame import count_map  # loads NumPy: only on a worker
+    from rollcli.run.convert_frame import count_map, draw_figure  # loads NumPy: only on a worker
 
+    if count.figure is not None:
+        return draw_figure(conversion, options, count)
     return count_map(conversion, options, count)

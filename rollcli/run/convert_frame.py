@@ -58,6 +58,28 @@ def count_map(conversion: Conversion, options: FrameOptions, count: CountOptions
     return replace(result, warning="; ".join(filter(None, [result.warning, likeness])))
 
 
+def draw_figure(conversion: Conversion, options: FrameOptions, count: CountOptions) -> FrameResult:
+    """Write the figure of the map and its v-disparity, by the angle of a result or by its own estimate."""
+    from rollcli.run.vdisparity_figure import v_disparity_figure  # loads matplotlib, an extra
+
+    def make(source: Source) -> dict[str, bytes]:
+        theta, alpha = conversion.roll, conversion.alpha
+        if count.result is None:
+            estimate = estimate_roll(source.disparity)
+            theta, alpha = estimate.theta, estimate.alpha
+        figure = v_disparity_figure(
+            source.disparity,
+            theta,
+            alpha,
+            count.figure or "svg",
+            bins=count.bins,
+            max_disparity=count.max_disparity,
+        )
+        return {options.at(conversion.writes[0]): figure}
+
+    return _convert(conversion, options, make)
+
+
 def match_frame(
     conversion: Conversion, options: FrameOptions, save_as: str, *, preview: bool = False
 ) -> FrameResult:

@@ -185,11 +185,17 @@ class RotationOptions:
 
 @dataclass(frozen=True)
 class CountOptions:
-    """How disparities are counted. None: chosen for each map."""
+    """How disparities are counted, and what is drawn of them. None: chosen for each map.
+
+    `figure` is the kind of a figure for a paper, in place of the picture: "svg", "pdf" or "png"; `result`
+    names the result with its angles.
+    """
 
     bins: int | None = None
     max_disparity: float | None = None
     counts: bool = False
+    figure: str | None = None
+    result: str | None = None
 
 
 @dataclass(frozen=True)

@@ -137,5 +137,7 @@ def idle_in_vdisparity(options: VDisparityOptions) -> Iterator[Idle]:
     """Yield the options without effect on a run of `vdisparity`."""
     if options.encoding.encoding != "depth":
         yield Idle(("baseline",), "the horizon does not depend on it; only --encoding depth needs it")
+        if options.count.figure is not None:
+            yield Idle(("calib", "focal", "principal_point", "doffs"), "a figure shows no horizon")
     yield from idle_folders(options.inputs, PairOptions())
     yield from idle_running(options.running)

@@ -1,6 +1,8 @@
 """`rollcli vdisparity`: pictures to look at, counts that add up."""
 
 import math
+import re
+import xml.etree.ElementTree as ET
 
 import cv2
 import numpy as np
@@ -107,3 +109,69 @@ def test_depth_maps_are_counted_as_the_disparities_of_their_calibration(maps):
         moved = np.abs(np.cumsum(one - other, axis=1)).sum()  # by rounding, into the next bin
         assert one.sum() == other.sum() > 0
         assert moved < 0.01 * one.sum()
+
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+def numbers_beside_axes(root, anchor):
+    """The numbers that axes have, each with its place in the figure, shape (N, 3)."""
+    texts = [each for each in root.iter(f"{SVG}text") if f"text-anchor: {anchor}" in each.get("style")]
+    numbered = [each for each in texts if re.fullmatch(r"[\d.]+", each.text)]
+    return np.array([[float(each.text), float(each.get("x")), float(each.get("y"))] for each in numbered])
+
+
+def test_a_figure_has_map_and_counts_before_and_after_with_the_roads_curve_where_it_is(maps):
+    roll = math.radians(8)
+    write_kitti(maps / "maps" / "rolled.png", road_map(roll, noise=0.0))
+    assert rollcli("estimate", "maps", "-o", "rolls.csv", cwd=maps).status == 0
+    line = ["vdisparity", "maps/rolled.png", "--figure", "svg", "--from", "rolls.csv", "-o", "v"]
+    assert rollcli(*line, cwd=maps).status == 0
+    root = ET.parse(maps / "v" / "rolled.svg").getroot()
+    assert root.get("width") == "252pt"  # a journal's column: 3.5 inches
+    words = [each.text for each in root.iter(f"{SVG}text")]
+    expected = ["row v, px", "column u, px", "disparity, px", "as it is", "de-rotated by 8.00°"]
+    assert [each for each in expected if each not in words] == []
+    assert len(list(root.iter(f"{SVG}image"))) == 5  # two maps, two v-disparities, the bar of colours
+
+    curves = [each for each in root.iter(f"{SVG}path") if "#00e5ff" in each.get("style", "")]
+    assert len(curves) == 2
+    places = np.array([float(each) for each in re.findall(r"[-\d.]+", curves[1].get("d"))]).reshape(-1, 2)
+    top = places[:, 1].min()
+    below = numbers_beside_axes(root, "middle")
+    below = below[below[:, 1] > 170]  # of the v-disparity
+    disparity = np.polynomial.Polynomial.fit(below[:, 1], below[:, 0], 1)
+    beside = numbers_beside_axes(root, "end")
+    beside = beside[beside[:, 2] > top]
+    row = np.polynomial.Polynomial.fit(beside[:, 2] - 0.38 * 7, beside[:, 0], 1)  # from a number's foot
+    # the truth at the columns' middle of the de-rotated map: y of its rows, whatever the column
+    v, u = np.mgrid[:120, :160]
+    y = v * np.cos(roll) - u * np.sin(roll)
+    centre = 59.5 * np.cos(roll) - 79.5 * np.sin(roll)
+    truth = 20 + 0.3 * (centre + row(places[:, 1]) - 59.5 - y.min())
+    np.testing.assert_allclose(disparity(places[:, 0]), truth, atol=0.3)
+
+
+def test_a_figure_is_the_same_each_time_and_needs_no_result(maps):
+    kinds = ("pdf", "png", "svg")
+    for kind in kinds:
+        line = ["vdisparity", "maps", "--figure", kind, "-o"]
+        assert rollcli(*line, "one", "-j1", cwd=maps).status == 0
+        assert rollcli(*line, "two", "-j2", cwd=maps).status == 0
+    assert sorted(contents(maps / "one")) == [f"frame{i}.{kind}" for i in range(3) for kind in kinds]
+    assert contents(maps / "one") == contents(maps / "two")
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--from", "rolls.csv"], "--from is for --figure"),
+        (["--figure", "pdf", "--counts"], "--counts goes with the picture"),
+        (["--figure", "pdf", "--from", "rolls.csv"], "rolls.csv: has no row for maps/frame1.png"),
+    ],
+)
+def test_what_a_figure_cannot_be_is_refused_before_anything_is_written(maps, options, words):
+    assert rollcli("estimate", "maps/frame0.png", "-o", "rolls.csv", cwd=maps).status == 0
+    done = rollcli("vdisparity", "maps", *options, "-o", "v", cwd=maps)
+    assert (done.status, words in done.err) == (2, True), done.err
+    assert not (maps / "v").exists()
