@@ -124,6 +124,10 @@ class Row:
     road_fraction: float | None = None
     width: int | None = None
     height: int | None = None
+    right_lower_px: float | None = None
+    right_clockwise_deg: float | None = None
+    right_larger_percent: float | None = None
+    right_twist_px: float | None = None
     message: str = ""
     elapsed_ms: float | None = None
 
@@ -133,6 +137,8 @@ TIMING = "elapsed_ms"
 COLUMNS = tuple(field.name for field in fields(Row) if field.name != TIMING)
 STDIN = "-"
 _MOST_SPACE = 1000  # bytes before what tells the format
+# how the right view of a pair lay against the left one
+ALIGNMENT_COLUMNS = ("right_lower_px", "right_clockwise_deg", "right_larger_percent", "right_twist_px")
 _SPECIAL = re.compile(r'[,"\r\n]')  # what a field of CSV holds in quotes only
 # a millionth of a degree is far below any map's noise; nine digits keep alpha2, which is small, whole
 _DIGITS = {
@@ -149,6 +155,10 @@ _DIGITS = {
     "alpha2": ".9g",
     "valid_fraction": ".6f",
     "road_fraction": ".6f",
+    "right_lower_px": ".4f",
+    "right_clockwise_deg": ".4f",
+    "right_larger_percent": ".4f",
+    "right_twist_px": ".4f",
     "elapsed_ms": ".3f",
 }
 

@@ -134,7 +134,6 @@ def with_pose(estimate: RollEstimate, calibration: Calibration) -> RollEstimate:
         pitch_ci95=pitch_ci95,
         height_m=pose.height,
         height_ci95_m=None if pose.height is None else height_ci95,
-        message=_joined(estimate.message, taken_as_exact(tangent, calibration, pose.pitch)),
     )
 
 
@@ -148,17 +147,25 @@ def horizon_row(tangent: Tangent, calibration: Calibration) -> float | None:
     return tangent.row - (tangent.disparity + calibration.doffs) / tangent.slope
 
 
-def taken_as_exact(tangent: Tangent, calibration: Calibration, pitch: float) -> str:
-    """Say in one line what the intervals cannot know: errors of the calibration, and what they would do."""
+def taken_as_exact(calibration: Calibration, pitch: float, height: float | None) -> str:
+    """Say in one line what the intervals cannot know: errors of the calibration, and what they would do.
+
+    Parameters
+    ----------
+    calibration : Calibration
+    pitch : float
+        Radians.
+    height : float or None
+        Metres; None without a baseline.
+    """
     turn = math.degrees(math.cos(pitch) ** 2)
-    height = calibration.baseline is not None
-    return (
-        f"{'pitch and height take' if height else 'pitch takes'} the calibration as exact: "
-        f"{turn / calibration.fy:.3f} degrees of pitch per px of cy, "
-        f"{0.1 * turn / (calibration.fx * tangent.slope):.3f} per 0.1 px of disparity (vergence)"
-        f"{', 1 % of height per 1 % of baseline' if height else ''}"
-        f"{_AT_EDGE if calibration.at_edge else ''}"
-    )
+    said = f"the calibration as exact: {turn / calibration.fy:.3f} degrees of pitch per px of cy"
+    if calibration.baseline is not None and height is not None:
+        down = calibration.fx * calibration.baseline * math.cos(pitch) / height  # fx times the slope, px
+        said += f", {0.1 * turn / down:.3f} per 0.1 px of disparity (vergence)"
+        said += ", 1 % of height per 1 % of baseline"
+    edge = _AT_EDGE if calibration.at_edge else ""
+    return f"{'pitch and height take' if calibration.baseline is not None else 'pitch takes'} {said}{edge}"
 
 
 def _joined(message: str, more: str) -> str:

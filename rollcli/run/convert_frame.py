@@ -109,10 +109,10 @@ def _convert(
             raise InputError(f"{frame.file}: {conversion.refused}")
         source = read_source(frame, options)
         made.update(make(source))
-        row = Row(frame.file, frame.right_file, "ok")
+        row = Row(frame.file, frame.right_file, "ok", **source.alignment)
         too_large = "" if paths[0] in made else TOO_LARGE_FOR_PNG
         beyond = "" if conversion.keeps_numbers else source.beyond
-        warning = source.warning or beyond or source.doubt or source.note or too_large
+        warning = source.warning or beyond or source.doubt or too_large
         return FrameResult(row, source.encoding, warning, source.searched)
 
     result = guarded(frame, work)

@@ -85,6 +85,9 @@ def run_estimate(options: EstimateOptions, resume_command: str = "") -> ExitStat
             raise type(error)(f"{error}{output.hint()}") from error
         status = _end(output, progress, stop, resume_command)
         if not (progress.stopped_early or options.running.quiet):
+            calibrated = (frame.calibration for frame in plan.frames if frame.calibration is not None)
+            if note := answer.pose_note(next(calibrated, None)):
+                progress.say(note)
             progress.say(answer.line())
         return status
 
@@ -186,8 +189,6 @@ def _end(output: Output, progress: Progress, stop: Stop, resume_command: str) ->
     if not progress.stopped_early:
         output.finish(progress.totals, progress.alignment.summary())
     progress.tell_end()
-    if progress.alignment.advice:
-        progress.note(f"median over the pairs: {progress.alignment.advice}")
     if stop.asked and progress.stopped_early:
         how = f"; continue with: {resume_command}" if output.resumable else ""
         progress.say(f"interrupted{how}")

@@ -86,7 +86,7 @@ def _row(frame: Frame, source: Source, estimate: RollEstimate, note: str, likene
     if source.doubt:
         status = "suspect"
         reasons.append(source.doubt)
-    reasons += filter(None, [source.note, note])
+    reasons += filter(None, [note])
     alpha0, alpha1, alpha2 = estimate.alpha
     return Row(
         file=frame.file,
@@ -111,6 +111,7 @@ def _row(frame: Frame, source: Source, estimate: RollEstimate, note: str, likene
         road_fraction=estimate.road_fraction,
         width=estimate.width,
         height=estimate.height,
+        **source.alignment,
         message="; ".join(reasons),
     )
 

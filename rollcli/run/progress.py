@@ -7,18 +7,17 @@ import time
 from array import array
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import astuple, dataclass, replace
+from dataclasses import dataclass, replace
 from statistics import median
 from types import TracebackType
 from typing import Any
 
 from rollcli.errors import ExitStatus
-from rollcli.files.results import Row
+from rollcli.files.results import ALIGNMENT_COLUMNS, Row
 from rollcli.messages import say
 from rollcli.run.frame import FrameResult, named_message
 from rollcli.run.options import EncodingOptions, RunningOptions
-from rollcli.stereo.misalignment import Misalignment
-from rollcli.stereo.misalignment_words import NOT_LEVELLED, TOO_LITTLE, advice_of, read_note
+from rollcli.stereo.misalignment_words import advice_of
 
 _LINE_EVERY_S = 30.0
 _UNKNOWN_SIZE = {"ncols": 80, "nrows": 24}  # of a terminal that does not tell its size
@@ -131,52 +130,37 @@ def _terminal_size() -> dict[str, Any]:
 
 
 class RigAlignment:
-    """Collects what rows say was corrected; a pair that was matched as it is counts as level.
-
-    One that could not be levelled, or not be checked, says nothing: what was tried is no measurement.
-    """
+    """Collects what rows say of how the right view lay; rows of maps, and without an angle, say nothing."""
 
     def __init__(self) -> None:
-        self._parts = [array("d") for _ in astuple(Misalignment())]
-        self._size = (0, 0)
-        self._corrected = 0
+        self._columns = {name: array("d") for name in ALIGNMENT_COLUMNS}
 
     def add(self, row: Row) -> None:
-        """Take in a row; those of maps and those without an angle say nothing."""
-        if not row.right_file or row.height is None or row.width is None:
-            return
-        if NOT_LEVELLED in row.message or TOO_LITTLE in row.message:
-            return
-        self._size = row.height, row.width
-        found = read_note(row.message, *self._size)
-        self._corrected += found != Misalignment()
-        for part, value in zip(self._parts, astuple(found), strict=True):
-            part.append(value)
+        """Take in a row."""
+        for name, column in self._columns.items():
+            value = getattr(row, name)
+            if value is not None:
+                column.append(value)
 
     @property
-    def median(self) -> Misalignment:
-        """The median of each part over the frames."""
-        return Misalignment(*(median(part) if part else 0.0 for part in self._parts))
+    def median(self) -> dict[str, float]:
+        """The median of each column over the frames; empty where no pair was measured."""
+        return {name: median(column) for name, column in self._columns.items() if column}
 
     @property
     def advice(self) -> str:
         """What to do about it, in a sentence; empty where the median is level."""
-        return advice_of(self.median, *self._size)
+        found = self.median
+        return advice_of(*(found[name] for name in ALIGNMENT_COLUMNS)) if found else ""
 
     def summary(self) -> dict[str, float | int | str] | None:
-        """Return the entry of the run's record; None where no pair was corrected."""
-        if not self._corrected:
-            return None
+        """Return the entry of the run's record; None where no pair was measured."""
         found = self.median
-        return {
-            "frames": len(self._parts[0]),
-            "corrected": self._corrected,
-            "right_lower_px": round(found.offset, 3),
-            "right_camera_roll_deg": round(found.rotation_deg, 4),
-            "right_larger_percent": round(100 * found.scale, 4),
-            "rows_skewed_px": round(found.shifts(*self._size)[3], 3),
-            "advice": self.advice,
-        }
+        if not found:
+            return None
+        frames = len(self._columns[ALIGNMENT_COLUMNS[0]])
+        rounded = {name: round(value, 4) + 0.0 for name, value in found.items()}
+        return {"frames": frames, **rounded, "advice": self.advice}
 
 
 _NUMBER = re.compile(r"\d[\d.]*(?:e[-+]?\d+)?")
@@ -337,6 +321,8 @@ class Progress(TaskProgress):
             for line in self._failures.repeated():
                 self.say(line)
         self.note(self.summary())
+        if self.alignment.advice:
+            self.note(f"median over the pairs: {self.alignment.advice}")
 
     def summary(self) -> str:
         """Make the last line of a run: how many frames came to what, and how fast."""

@@ -1,8 +1,8 @@
 """Read a frame: its disparity, from a map or matched from a pair, and the pixels that may be used."""
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
@@ -15,10 +15,10 @@ from rollcli.errors import InputError
 from rollcli.estimator.road.find import first_row_of_road
 from rollcli.files.encodings import read_mask, to_disparity
 from rollcli.files.formats import Stored, read_image, read_stored
+from rollcli.files.results import ALIGNMENT_COLUMNS
 from rollcli.run.diagnosis import require_positive, too_large
 from rollcli.run.frame import Frame
 from rollcli.run.options import FrameOptions, MethodOptions, RegionOptions
-from rollcli.stereo.misalignment_words import note_of
 
 if TYPE_CHECKING:
     from rollcli.stereo.match import StereoMatch, Wanted
@@ -119,8 +119,8 @@ class Source:
         Standard deviation of a slope that all disparities may have beside the road's, px per px.
     doubt : str
         Why the map itself may be wrong; empty when there is no reason.
-    note : str
-        What was done about the pair; empty when nothing.
+    alignment : mapping of str to float
+        How the right view lay, by column of a result; empty for a map, and where that could not be told.
     size : tuple of int, or None
         Width and height of the images in the files, px, where the map was matched from them.
     whole : ndarray, shape (H, W), or None
@@ -138,7 +138,7 @@ class Source:
     searched: tuple[int, int] | None = None
     slope_error: float = 0.0
     doubt: str = ""
-    note: str = ""
+    alignment: Mapping[str, Any] = field(default_factory=dict)
     size: tuple[int, int] | None = None
     whole: NDArray[Any] | None = None
     photo: NDArray[Any] | None = None
@@ -205,12 +205,20 @@ def _match(frame: Frame, options: FrameOptions) -> Source:
         searched=searched,
         slope_error=match.slope_error,
         doubt="; ".join(_doubts(match)),
-        note=note_of(match.corrected, *match.disparity.shape) if options.stereo.measures_alignment else "",
+        alignment=_alignment(match),
         size=(width, height),
         whole=match.whole,
         photo=left if options.images.road_mask is not None else None,
         allowed=allowed,
     )
+
+
+def _alignment(match: "StereoMatch") -> dict[str, float]:
+    """Return the columns of how the right view lay, rounded: a resumed run reads them from its rows."""
+    if match.lies is None:
+        return {}
+    values = match.lies.values(*match.disparity.shape)
+    return {name: round(each, 4) for name, each in zip(ALIGNMENT_COLUMNS, values, strict=True)}
 
 
 def wanted_of(allowed: NDArray[np.bool_] | None, options: FrameOptions) -> "Wanted":

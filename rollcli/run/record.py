@@ -100,8 +100,9 @@ CONVENTIONS = {
     "height_m": "of the left camera over the road near ahead, metres",
     "camber": "curvature across the road, 1/(camera height): x camera heights to the side, the surface is "
     "higher by camber/2 x^2 camera heights; negative: crowned",
-    "alignment": "median over the pairs of what was corrected, the right image or camera against the left; "
-    "px of the size matched at; right_camera_roll_deg is positive counter-clockwise, seen from behind",
+    "right_lower_px, right_clockwise_deg, right_larger_percent, right_twist_px": "how the right view lay "
+    "against the left one, px of the size matched at; twist: vertical shift in the corners",
+    "alignment": "medians of these over the pairs",
     "alpha0, alpha1, alpha2": "road disparity in px = alpha0 + alpha1 y + alpha2 y^2",
     "y": "v cos(theta) - u sin(theta), px; u right, v down, from the centre of the top-left pixel",
 }

@@ -1,8 +1,12 @@
-"""The last line of a run: what its frames say about the rig."""
+"""The last lines of a run: what its frames say about the rig."""
 
+import math
 from array import array
+from statistics import median
 
 from rollcli.files.results import STATUSES, Row
+from rollcli.rig.calibration import Calibration
+from rollcli.rig.quantities import COLUMNS
 
 
 class RigAnswer:
@@ -14,30 +18,43 @@ class RigAnswer:
     def __init__(self) -> None:
         self._files: list[str] = []
         self._status = bytearray()
-        self._rolls, self._halves = array("d"), array("d")
+        self._numbers = {name: array("d") for name in COLUMNS}
 
     def add(self, row: Row) -> None:
         """Take a row that is written."""
         self._files.append(row.file)
         self._status.append(STATUSES.index(row.status))
-        self._rolls.append(float("nan") if row.roll_deg is None else row.roll_deg)
-        self._halves.append(float("nan") if row.roll_ci95_deg is None else row.roll_ci95_deg)
+        for name, column in self._numbers.items():
+            column.append(_number(row, name))
 
     def replace(self, position: int, row: Row) -> None:
         """Take a row that is written in the place of the one at a position, from 0."""
         self._status[position] = STATUSES.index(row.status)
-        self._rolls[position] = float("nan") if row.roll_deg is None else row.roll_deg
-        self._halves[position] = float("nan") if row.roll_ci95_deg is None else row.roll_ci95_deg
+        for name, column in self._numbers.items():
+            column[position] = _number(row, name)
 
     def line(self) -> str:
         """Return the answer in one line, such as `roll -0.44 ± 0.06°, 5 ok, 0 suspect, 0 failed`."""
         from rollcli.rig.drive.assess import assess_rig
         from rollcli.rig.words import one_line
 
-        columns = {
-            "file": self._files,
-            "status": [STATUSES[each] for each in self._status],
-            "roll_deg": self._rolls,
-            "roll_ci95_deg": self._halves,
-        }
-        return one_line(assess_rig(columns))
+        statuses = [STATUSES[each] for each in self._status]
+        return one_line(assess_rig({"file": self._files, "status": statuses, **self._numbers}))
+
+    def pose_note(self, calibration: Calibration | None) -> str:
+        """Return what the intervals of pitch and height leave out; empty where no frame has a pitch."""
+        pitch, height = self._median("pitch_deg"), self._median("height_m")
+        if calibration is None or pitch is None:
+            return ""
+        from rollcli.rig.pose import taken_as_exact
+
+        return taken_as_exact(calibration, math.radians(pitch), height)
+
+    def _median(self, name: str) -> float | None:
+        known = [each for each in self._numbers[name] if not math.isnan(each)]
+        return median(known) if known else None
+
+
+def _number(row: Row, name: str) -> float:
+    value: float | None = getattr(row, name)
+    return math.nan if value is None else value

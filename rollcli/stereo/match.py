@@ -129,6 +129,9 @@ class StereoMatch:
         Share of the valid pixels within a pixel of the range's end: if large, the range was too short.
     corrected : Misalignment
         What the right view was levelled by, pixels of the size matched at; `LEVEL` if it was left as it is.
+    lies : Misalignment or None
+        How the right view lies as measured, the same where it was corrected; None where it was not measured,
+        or could not be.
     slope_error : float
         Standard deviation of the slope along the rows that levelling left in the disparities, px per px; 0 if
         nothing was measured and corrected.
@@ -142,6 +145,7 @@ class StereoMatch:
     num_disparities: int
     end_fraction: float
     corrected: Misalignment
+    lies: Misalignment | None
     slope_error: float
     doubt: str
 
@@ -218,10 +222,10 @@ def match_pair(
     above = _rows_above(look, wanted, height) if first >= 0 else 0
     of_these = partial(match, above=above)
     if small is None:
-        corrected, doubt = Misalignment(options.vertical_offset or 0.0), ""
+        corrected, lies, doubt = Misalignment(options.vertical_offset or 0.0), None, ""
         matched = of_these(corrected, wanted.rows)
     else:
-        matched, corrected, doubt = _match_levelled(of_these, wanted.rows, small, look, first < 0)
+        matched, corrected, lies, doubt = _match_levelled(of_these, wanted.rows, small, look, first < 0)
     valid = cv2.countNonZero(matched)
     whole = None
     start, stop, _ = wanted.rows.indices(height)
@@ -235,6 +239,7 @@ def match_pair(
         num_disparities=count,
         end_fraction=np.count_nonzero(matched >= first + count - 2) / valid if valid else 0.0,
         corrected=corrected,
+        lies=lies,
         slope_error=0.0 if small is None else corrected.stretch_error,
         doubt=doubt,
     )
@@ -270,8 +275,8 @@ def _match_levelled(
     small: SmallViews,
     look: FirstLook,
     any_scene: bool,
-) -> tuple[Map, Misalignment, str]:
-    """Match once the views are level; the map, what was corrected, and why that may be wrong."""
+) -> tuple[Map, Misalignment, Misalignment | None, str]:
+    """Match once the views are level; the map, what was corrected and measured, and why that may be wrong."""
     looked_at = _worth_correcting(look.measured, small.shape)
     at, approach = looked_at, Approach(small.shape)
     for matched in range(_MATCHES):
@@ -281,20 +286,23 @@ def _match_levelled(
             check_same_scene(small, look, measured)
         if rows != ALL_ROWS:
             if look.measured is not None and _is_confirmed(measured, at, small.shape, rows):
-                return disparity, at, _doubt(at, measured)
+                lies = at if at != LEVEL else look.measured.misalignment
+                return disparity, at, lies, _doubt(at, measured)
             rows = ALL_ROWS  # a few rows say that something is wrong, but not what
             continue
         if measured is None:
-            return disparity, at, TOO_LITTLE
+            return disparity, at, None, TOO_LITTLE
         wanted = _wanted(measured, approach.next(at, measured.misalignment), small.shape)
         if wanted == at:
-            return disparity, at, _doubt(at, measured)
+            lies = at if at != LEVEL else measured.misalignment
+            return disparity, at, lies, _doubt(at, measured)
         if wanted != LEVEL and _is_kept(measured, at, small.shape):
-            return disparity, measured.misalignment, _doubt(measured.misalignment, measured)
+            found = measured.misalignment
+            return disparity, found, found, _doubt(found, measured)
         at = wanted
         if matched == 1 and looked_at != LEVEL:  # which may have led astray
             at, approach = LEVEL, Approach(small.shape)
-    return disparity, at, NOT_LEVELLED
+    return disparity, at, None, NOT_LEVELLED
 
 
 def _is_confirmed(measured: Measured | None, at: Misalignment, shape: tuple[int, ...], rows: slice) -> bool:

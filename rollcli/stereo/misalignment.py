@@ -1,6 +1,7 @@
 """How the right view of a pair lies against the left one; import-light, since run records read it too."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -78,6 +79,17 @@ class Misalignment:
         x, rows = width / 4, (start - height / 2, stop - height / 2)
         largest: float = max(abs(self.down(u, v)) for u in (-x, x) for v in rows)
         return largest
+
+    def values(self, height: int, width: int) -> tuple[float, float, float, float]:
+        """Return the parts in the units of a result: px, degrees, per cent, and px in the corners."""
+        twist = self.shifts(height, width)[3]
+        return self.offset, self.rotation_deg, 100 * self.scale, twist
+
+    @staticmethod
+    def of_values(values: Sequence[float], height: int, width: int) -> "Misalignment":
+        """Return what has these `values` in a view of this size."""
+        lower, clockwise, larger, twist = values
+        return Misalignment(lower, math.radians(clockwise), larger / 100, twist / (height * width / 4))
 
     @property
     def stretch(self) -> float:

@@ -12,7 +12,8 @@ from tests.run_cli import contents, rollcli, write_maps
 COLUMNS = (
     "file,right_file,status,roll_deg,roll_ci95_deg,pitch_deg,pitch_ci95_deg,height_m,height_ci95_m,camber,"
     "method,iterations,converged,global_minimum,rmse_px,"
-    "alpha0,alpha1,alpha2,valid_fraction,road_fraction,width,height,message"
+    "alpha0,alpha1,alpha2,valid_fraction,road_fraction,width,height,right_lower_px,"
+    "right_clockwise_deg,right_larger_percent,right_twist_px,message"
 )
 
 

@@ -137,11 +137,13 @@ def test_a_pair_whose_views_are_not_level_is_corrected_and_says_so(tmp_path):
     pair = ("--left", "left", "--right", "right")
 
     done = rollcli("estimate", *pair, cwd=tmp_path)
-    assert re.search(r"corrected: the right image lay (0\.[89]|1\.[01])\d px lower", done.out)
+    assert float(column(done.out, "right_lower_px")[0]) == pytest.approx(1, abs=0.1)
+    assert float(column(done.out, "right_clockwise_deg")[0]) == pytest.approx(0, abs=0.05)
+    assert column(done.out, "message") == [""]
     assert float(column(done.out, "roll_deg")[0]) == pytest.approx(np.degrees(0.05), abs=0.3)
     assert re.search(r"median over the pairs: the right image lies \d\.\d\d px lower: recalibrate", done.err)
     for untouched in (("--vertical-offset", "1"), ("--align", "off")):
-        assert "corrected" not in rollcli("estimate", *pair, *untouched, cwd=tmp_path).out
+        assert column(rollcli("estimate", *pair, *untouched, cwd=tmp_path).out, "right_lower_px") == [""]
     given = rollcli("estimate", *pair, "--vertical-offset", "1", cwd=tmp_path)
     half_width, half_width_given = (float(column(each.out, "roll_ci95_deg")[0]) for each in (done, given))
     assert half_width > half_width_given  # what was measured has an error of its own
@@ -158,8 +160,8 @@ def test_the_record_of_a_run_says_how_the_cameras_lie(tmp_path):
     done = rollcli("estimate", "--left", "left", "--right", "right", "-o", "r.csv", cwd=tmp_path)
 
     alignment = json.loads((tmp_path / "r.csv.run.json").read_text())["alignment"]
-    assert (alignment["frames"], alignment["corrected"]) == (3, 3)
-    assert alignment["right_camera_roll_deg"] == pytest.approx(0.31, abs=0.03)
+    assert alignment["frames"] == 3
+    assert alignment["right_clockwise_deg"] == pytest.approx(0.31, abs=0.03)
     assert re.match(r"the right camera is rolled by 0\.3\d degrees against the left", alignment["advice"])
     assert alignment["advice"] in done.err
 

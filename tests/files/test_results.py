@@ -7,6 +7,7 @@ import pytest
 
 from rollcli.errors import InputError
 from rollcli.files.results import (
+    ALIGNMENT_COLUMNS,
     COLUMNS,
     Row,
     column_types,
@@ -39,6 +40,10 @@ ROW = Row(
     road_fraction=0.5,
     width=1242,
     height=375,
+    right_lower_px=-0.51236,
+    right_clockwise_deg=0.15004,
+    right_larger_percent=0.3,
+    right_twist_px=-0.00001,
     message='one, "two"',
 )
 FAILED = Row(file="maps/b.png", status="error", message="maps/b.png: is empty")
@@ -48,7 +53,7 @@ def test_a_row_of_csv_has_fixed_digits_and_rfc_4180_quotes():
     assert format_row(ROW, "csv") == (
         b"maps/a.png,,suspect,-1.250000,0.012346,2.500000,0.032346,1.651235,0.004000,-0.012346,"
         b"gd,4,true,false,0.123457,-45.0018767,0.300002217,"
-        b'-3.83765039e-09,0.597333,0.500000,1242,375,"one, ""two"""\n'
+        b'-3.83765039e-09,0.597333,0.500000,1242,375,-0.5124,0.1500,0.3000,0.0000,"one, ""two"""\n'
     )
 
 
@@ -60,7 +65,7 @@ def test_what_csv_gives_a_meaning_is_quoted(text):
 
 
 def test_an_error_row_holds_no_numbers():
-    assert format_row(FAILED, "csv") == b"maps/b.png,,error" + b"," * 20 + b"maps/b.png: is empty\n"
+    assert format_row(FAILED, "csv") == b"maps/b.png,,error" + b"," * 24 + b"maps/b.png: is empty\n"
 
 
 def test_timing_is_a_column_of_its_own_at_the_end():
@@ -98,7 +103,7 @@ def test_rounding_makes_no_negative_zero_and_stays_within_the_half_open_range(th
 
 
 def test_numbers_that_are_not_finite_are_left_empty():
-    assert format_row(Row("a", rmse_px=math.nan, alpha0=math.inf), "csv") == b"a,,error" + b"," * 20 + b"\n"
+    assert format_row(Row("a", rmse_px=math.nan, alpha0=math.inf), "csv") == b"a,,error" + b"," * 24 + b"\n"
 
 
 def test_a_result_is_read_with_the_record_of_its_run(tmp_path):
@@ -196,6 +201,7 @@ def test_every_number_has_its_digits_in_every_form():
     numbers = {name: 1.23456789012 for name, kind in column_types(timing=True).items() if kind is float}
     digits = {"rmse_px": "1.23457", **dict.fromkeys(("alpha0", "alpha1", "alpha2"), "1.23456789")}
     texts = {name: digits.get(name, "1.234568") for name in numbers} | {"elapsed_ms": "1.235"}
+    texts |= dict.fromkeys(ALIGNMENT_COLUMNS, "1.2346")
 
     line = format_row(Row("a", **numbers), "csv", timing=True).decode().rstrip("\n").split(",")
     values = json.loads(format_row(Row("a", **numbers), "jsonl", timing=True))
@@ -218,6 +224,7 @@ def test_columns_have_the_types_of_their_values():
         **dict.fromkeys(("converged", "global_minimum"), bool),
         **dict.fromkeys(("rmse_px", "alpha0", "alpha1", "alpha2", "valid_fraction", "road_fraction"), float),
         **dict.fromkeys(("width", "height"), int),
+        **dict.fromkeys(ALIGNMENT_COLUMNS, float),
         "message": str,
         "elapsed_ms": float,
     }

@@ -159,7 +159,7 @@ def test_the_message_says_what_the_calibrations_errors_do():
     one_lower = replace(calibration, cy=calibration.cy + 1)
     vergence = replace(calibration, doffs=0.1)
     pitch = pose_of(tangent, calibration).pitch
-    message = taken_as_exact(tangent, calibration, pitch)
+    message = taken_as_exact(calibration, pitch, pose_of(tangent, calibration).height)
     for other, unit in ((one_lower, "px of cy"), (vergence, "0.1 px of disparity")):
         moved = math.degrees(pose_of(tangent, other).pitch - pitch)
         (said,) = re.findall(rf"([\d.]+) (?:degrees of pitch )?per {unit}", message)
@@ -214,10 +214,13 @@ def test_a_doffs_that_puts_the_road_behind_the_camera_gives_no_pose():
 
 def test_the_calibration_of_twice_the_size_is_doubted_where_the_file_states_no_size():
     calibration = Calibration(250.0, 250.0, WIDTH / 2 + 4.0, HEIGHT / 2 - 3.0, 0.5)
-    estimate = estimate_roll(cast(calibration, 0.02, 0.2, 1.5))
-    assert "is it of images of this size?" not in with_pose(estimate, calibration).message
     twice = Calibration(500.0, 500.0, WIDTH - 2.0, HEIGHT - 6.0, 0.5)
-    assert "lies near the edge: is it of images of this size?" in with_pose(estimate, twice).message
+    asked = [
+        "lies near the edge: is it of images of this size?"
+        in taken_as_exact(each.for_size(WIDTH, HEIGHT), 0.2, 1.5)
+        for each in (calibration, twice)
+    ]
+    assert asked == [False, True]
 
 
 @pytest.mark.parametrize("slope", [0.0, -0.3])

@@ -103,7 +103,7 @@ class Rig:
             self.checked += 1
 
         monkeypatch.setattr(stereo, "check_same_scene", check)
-        disparity, corrected, doubt = stereo._match_levelled(
+        disparity, corrected, _, doubt = stereo._match_levelled(
             self.match, rows, self, FirstLook(20, look), any_scene
         )
         assert disparity[0, 0] == len(self.matched)  # the map of the last match

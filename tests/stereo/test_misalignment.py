@@ -5,7 +5,7 @@ import math
 import pytest
 
 from rollcli.stereo.misalignment import LEVEL, Misalignment
-from rollcli.stereo.misalignment_words import advice_of, note_of, read_note
+from rollcli.stereo.misalignment_words import advice_of
 
 
 def test_parts_are_added_taken_away_and_multiplied():
@@ -41,30 +41,14 @@ def test_the_error_of_a_stretch_is_that_of_the_scale_and_of_the_doubt_about_it()
 
 
 @pytest.mark.parametrize("sign", [-1, 1])
-def test_what_would_be_written_as_nothing_is_not_said(sign):
-    corner = 200 * 1000 / 4
-    for least, part in (
-        (0.005, lambda value: Misalignment(offset=value)),
-        (0.0005, lambda value: Misalignment(rotation=math.radians(value))),
-        (0.0005, lambda value: Misalignment(scale=value / 100)),
-        (0.005, lambda value: Misalignment(twist=value / corner)),
-    ):
-        assert note_of(part(0.98 * sign * least), 200, 1000) == ""
-        said = note_of(part(1.02 * sign * least), 200, 1000)
-        assert said.startswith("corrected: the right image ")
-        assert read_note(said, 200, 1000) != LEVEL
-
-
-@pytest.mark.parametrize("sign", [-1, 1])
-def test_each_part_is_read_back_whichever_way_it_points(sign):
+def test_what_a_result_says_is_in_px_degrees_and_per_cent_and_is_read_back(sign):
     odd = Misalignment(*(sign * each for each in (1.25, math.radians(0.125), 0.00375, 3e-5)))
 
-    found = read_note(note_of(odd, 200, 1000), 200, 1000)
+    values = odd.values(200, 1000)
+    found = Misalignment.of_values(values, 200, 1000)
 
-    assert found.offset == pytest.approx(odd.offset)
-    assert found.rotation == pytest.approx(odd.rotation)
-    assert found.scale == pytest.approx(odd.scale)
-    assert found.twist == pytest.approx(odd.twist)
+    assert values == pytest.approx([sign * each for each in (1.25, 0.125, 0.375, 1.5)])
+    assert found.parts == pytest.approx(odd.parts)
 
 
 @pytest.mark.parametrize(
@@ -80,7 +64,7 @@ def test_each_part_is_read_back_whichever_way_it_points(sign):
     ],
 )
 def test_advice_names_the_way_of_each_part_alone(odd, words):
-    advice = advice_of(odd, 200, 1000)
+    advice = advice_of(*odd.values(200, 1000))
 
     assert words in advice
     assert advice.endswith(": recalibrate")
@@ -95,5 +79,5 @@ def test_no_advice_is_given_for_what_turns_a_road_by_less_than_a_tenth_of_a_degr
         (0.1, lambda value: Misalignment(scale=value / 100)),
         (0.5, lambda value: Misalignment(twist=value / 50_000)),
     ):
-        assert advice_of(part(0.99 * sign * limit), 200, 1000) == ""
-        assert advice_of(part(1.01 * sign * limit), 200, 1000)
+        assert advice_of(*part(0.99 * sign * limit).values(200, 1000)) == ""
+        assert advice_of(*part(1.01 * sign * limit).values(200, 1000))
