@@ -15,7 +15,8 @@ from rollcli.report.page import require_extra
 from rollcli.run.find import check_writes, list_files, map_frames
 from rollcli.run.frame import Frame
 from rollcli.run.progress import Progress
-from rollcli.run.workers.in_order import Work, Workers
+from rollcli.run.workers.chunks import Work
+from rollcli.run.workers.in_order import Workers
 from rollcli.run.workers.interrupt import stop_on_signals
 from rollcli.run.workers.tasks import run_tasks
 

@@ -18,7 +18,8 @@ from rollcli.run.find import check_writes, list_files
 from rollcli.run.options import EncodingOptions, FrameOptions
 from rollcli.run.progress import Progress
 from rollcli.run.record import recorded_options
-from rollcli.run.workers.in_order import Work, Workers
+from rollcli.run.workers.chunks import Work
+from rollcli.run.workers.in_order import Workers
 from rollcli.run.workers.interrupt import stop_on_signals
 from rollcli.run.workers.tasks import run_tasks
 

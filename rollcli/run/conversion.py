@@ -13,7 +13,8 @@ from rollcli.run.frame import Frame, FrameResult, failed_frame
 from rollcli.run.options import EncodingOptions, RunningOptions
 from rollcli.run.outputs import write_outputs
 from rollcli.run.progress import Progress
-from rollcli.run.workers.in_order import SharedPaths, Work, Workers
+from rollcli.run.workers.chunks import Work
+from rollcli.run.workers.in_order import SharedPaths, Workers
 from rollcli.run.workers.interrupt import Stop, stop_on_signals
 from rollcli.run.workers.tasks import require_scheduler, run_tasks
 

@@ -19,7 +19,8 @@ from rollcli.run.plan import Plan, make_plan
 from rollcli.run.progress import Progress
 from rollcli.run.result import Output, frames_to_do, open_output
 from rollcli.run.rig_answer import RigAnswer
-from rollcli.run.workers.in_order import SharedPaths, Work, Workers
+from rollcli.run.workers.chunks import Work
+from rollcli.run.workers.in_order import SharedPaths, Workers
 from rollcli.run.workers.interrupt import Stop, stop_on_signals
 from rollcli.run.workers.tasks import require_scheduler, run_tasks
 

@@ -19,7 +19,8 @@ from rollcli.files.atomic import output_error, remove_leftovers, write_atomic
 from rollcli.files.encodings import KITTI_TOP, from_disparity
 from rollcli.files.formats import encode_stored
 from rollcli.files.results import run_path
-from rollcli.run.workers.in_order import Work, Workers
+from rollcli.run.workers.chunks import Work
+from rollcli.run.workers.in_order import Workers
 from rollcli.run.workers.interrupt import Stop
 from rollcli.run.workers.tasks import run_tasks
 from rollcli.simulate.build import carriageway_of, road_camber

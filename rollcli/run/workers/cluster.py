@@ -2,42 +2,48 @@
 
 import asyncio
 import contextlib
+import json
 import logging
 import os
+import threading
+import time
 import uuid
-from collections.abc import Callable, Iterator
-from concurrent.futures import CancelledError, wait
-from concurrent.futures import Future as ConcurrentFuture
-from functools import partial
+import weakref
+from collections.abc import Callable, Collection, Iterator, Sequence
+from concurrent.futures import CancelledError, ThreadPoolExecutor
 from pathlib import Path
-from typing import Any, Generic
+from typing import Any, Generic, cast
 
 from rollcli import __version__
-from rollcli.errors import ClusterError, OutputError, UsageError
+from rollcli.errors import ClusterError, OutputError, UsageError, WorkerError
 from rollcli.files.atomic import is_file, is_there, write_atomic
 from rollcli.files.storage import remove
-from rollcli.files.stores.locations import computing, is_url
-from rollcli.run.workers.in_order import Result, SharedPaths, Task, Work
+from rollcli.files.stores.locations import is_url
+from rollcli.messages import say
+from rollcli.run.workers.chunks import Chunk, Done, Result, Task, Work
+from rollcli.run.workers.in_order import SharedPaths
 from rollcli.run.workers.pool import prepare_worker
 
-_CONNECT_S, _GREETING_S, _FIRST_WORKER_S, _POLL_S = 6, 2, 5, 2
-_IN_FLIGHT_PER_THREAD = 4
+_CONNECT_S, _GREETING_S, _FIRST_WORKER_S = 6, 2, 5
+_POLL_S, _LOOK_S = 0.2, 1.0
+_MOST_TRIES = 5  # of a chunk, with workers that cannot do it
 _DIED = "every worker that tried it died: killed for memory, perhaps, or crashed"
 
 
-def check_scheduler(address: str) -> None:
-    """Check that a scheduler answers, before anything is written.
+def check_scheduler(given: str) -> None:
+    """Check that a scheduler, named by its address or its file, answers, before anything is written.
 
     Dask's own client would take longer to give up, and end with a traceback.
 
     Raises
     ------
     UsageError
-        That is no address, or the extra `cluster` is not installed.
+        That is no address and no scheduler's file, or the extra `cluster` is not installed.
     ClusterError
         No scheduler answers there.
     """
     _require_extra()
+    address = scheduler_address(given)
     try:
         with _silenced_logging():
             asyncio.run(asyncio.wait_for(_open_and_close(address), _CONNECT_S + _GREETING_S))
@@ -59,12 +65,14 @@ async def _open_and_close(address: str) -> None:
 
 
 class ClusterExecutor(Generic[Task, Result]):
-    """Runs tasks on the workers of a scheduler; Dask itself gives the task of a dead worker to another.
+    """Runs chunks on the workers of a scheduler; Dask itself gives the chunk of a dead worker to another.
+
+    Workers that join are used at once, unless they cannot take part: a line says so then.
 
     Parameters
     ----------
-    address : str
-        Of the scheduler.
+    given : str
+        The address of the scheduler, or its file.
     work : Work
         What the workers do.
     shared : SharedPaths
@@ -78,75 +86,226 @@ class ClusterExecutor(Generic[Task, Result]):
         No scheduler or no worker answers, a worker has another rollcli, or does not see the files.
     """
 
-    def __init__(self, address: str, work: Work[Task, Result], shared: SharedPaths, threads: int) -> None:
+    def __init__(self, given: str, work: Work[Task, Result], shared: SharedPaths, threads: int) -> None:
         _require_extra()
         from distributed import KilledWorker
 
         self.worker_died: tuple[type[BaseException], ...] = (KilledWorker,)
-        self._address, self._work = address, work
+        self.threads, self.address = threads, scheduler_address(given)
+        self._work, self._shared, self._stopped = work, shared, False
+        self._run = uuid.uuid4().hex
+        self._threads_of: dict[str, int] = {}  # by the addresses of the workers that take part
+        self._refused: set[str] = set()
+        self._in_flight: weakref.WeakSet[ClusterFuture[Task, Result]] = weakref.WeakSet()
         self._resources = contextlib.ExitStack()
         self._resources.enter_context(_silenced_logging())
         try:
-            self._client = _connect(address)
+            self._client = _connect(self.address)
             self._resources.callback(self._client.close, timeout=2)
-            _check_workers(self._client, shared)
+            for worker, problem in self._look_for_workers().items():
+                raise ClusterError(f"worker {worker}: {problem}")
             self._client.register_plugin(_worker_plugin())
         except BaseException:
             self._resources.close()
             raise
-        self._do = partial(_in_turn, work.do) if threads > 1 else work.do
-        self.window = max(_IN_FLIGHT_PER_THREAD, threads) * sum(self._client.nthreads().values())
-        self._executor = self._client.get_executor(pure=False)
 
-    def submit(self, task: Task) -> "ClusterFuture[Result]":
-        """Queue a task for whichever worker is free."""
+    @property
+    def workers(self) -> int:
+        """The number of threads of the workers that take part; it is asked for once a second."""
+        if time.monotonic() - self._looked > _LOOK_S:
+            for worker, problem in self._look_for_workers().items():
+                say(f"worker {worker}: {problem}; it gets no work")
+        return max(sum(self._threads_of.values()), 1)
+
+    def submit(self, chunk: Sequence[Task], *, first: bool = False) -> "ClusterFuture[Task, Result]":
+        """Queue a chunk for whichever worker is free."""
+        future: ClusterFuture[Task, Result] = ClusterFuture(self, chunk, priority=int(first))
+        self._in_flight.add(future)
+        return future
+
+    def send(self, chunk: Sequence[Task], priority: int) -> tuple[Any, set[str]]:
+        """Give a chunk to Dask; return its future, and the workers that may do it, if not all may."""
+        self.check_connection()
+        chosen = set(self._threads_of) if self._refused else set()
+        sent = self._client.submit(
+            *(_do_chunk, __version__, self._run, self._work.do, chunk, self.threads),
+            pure=False,
+            priority=priority,
+            workers=sorted(chosen) or None,
+        )
+        return sent, chosen
+
+    def check_connection(self) -> None:
+        """Raise ClusterError where the scheduler is lost."""
         if self._client.status == "closed":
-            raise _connection_lost(self._address)
-        return ClusterFuture(self._executor.submit(self._do, task), self._client, self._address)
+            raise _connection_lost(self.address)
 
-    def retry(self, task: Task) -> Result:
-        """Return the result of a lost task: several workers have tried it already."""
-        return self._work.lost(task, _DIED)
+    def wait(self, future: "ClusterFuture[Task, Result]") -> None:
+        """Wait until a chunk is done, or for a fifth of a second."""
+        self.check_connection()
+        future.wait(_POLL_S)
+
+    def retry(self, task: Task) -> Done[Result]:
+        """Run a task again whose workers died: Dask blames all that were theirs, the next in line, too."""
+        future = self.submit([task], first=True)
+        while not future.done():
+            self.wait(future)
+        try:
+            return future.result()
+        except self.worker_died:
+            return Done([self._work.lost(task, _DIED)], 0.0)
+
+    def stop(self) -> None:
+        """Let workers begin no further task."""
+        if not self._stopped and self._client.status == "running":
+            self._client.run(_stop_run, self._run, on_error="ignore")
+        self._stopped = True
 
     def close(self, *, at_once: bool) -> None:
         """Disconnect; the workers belong to the cluster and go on."""
-        self._resources.close()
+        try:
+            if not at_once:
+                self.stop()
+        finally:
+            self._resources.close()
+
+    def _look_for_workers(self) -> dict[str, str]:
+        """Take in workers that have joined, and leave out those that have gone; return problems by worker."""
+        there = self._client.nthreads()
+        new = [worker for worker in there if worker not in self._threads_of and worker not in self._refused]
+        problems = _problems(self._client, self._shared, new) if new else {}
+        self._refused.update(problems)
+        self._threads_of = {worker: n for worker, n in there.items() if worker not in self._refused}
+        for future in self._in_flight if self._threads_of else ():
+            if future.chosen and future.chosen.isdisjoint(self._threads_of):
+                future.send_again()  # all who might do it have gone
+        self._looked = time.monotonic()
+        return problems
+
+    def look_again(self) -> None:
+        """Look for workers the next time that their number is asked for."""
+        self._looked = 0.0
 
 
-class ClusterFuture(Generic[Result]):
-    """A future that does not outlive its client: a task that is sent while a connection breaks has no end.
+class ClusterFuture(Generic[Task, Result]):
+    """A chunk that was submitted to a cluster.
+
+    One that came to a worker which cannot take part is sent to others.
+    """
+
+    def __init__(self, executor: ClusterExecutor[Task, Result], chunk: Sequence[Task], priority: int) -> None:
+        self._executor, self._chunk, self._priority = executor, chunk, priority
+        self._tries = 0
+        self.send_again()
+
+    def send_again(self) -> None:
+        """Give the chunk to workers that take part."""
+        self._tries += 1
+        self._sent, self.chosen = self._executor.send(self._chunk, self._priority)
+        settled = self._settled = threading.Event()
+        self._sent.add_done_callback(lambda _: settled.set())
+
+    def wait(self, timeout: float) -> None:
+        """Wait until the chunk is done, or for so many seconds."""
+        self._settled.wait(timeout)
+
+    def done(self) -> bool:
+        """Tell whether the result is there."""
+        if not self._sent.done():
+            return False
+        if self._sent.status == "error" and self._tries < _MOST_TRIES:
+            error = self._sent.exception()
+            if not isinstance(error, self._executor.worker_died):  # of the worker: tasks' errors are results
+                self._executor.look_again()
+                _ = self._executor.workers
+                self.send_again()
+                return False
+        return True
+
+    def result(self) -> Done[Result]:
+        """Return what was done.
+
+        Raises
+        ------
+        KilledWorker
+            Workers have died.
+        ClusterError
+            The scheduler is lost, or workers cannot do the work.
+        """
+        try:
+            self._executor.check_connection()
+            error = self._sent.exception()
+            if error is None:
+                return cast(Done[Result], self._sent.result())
+        except CancelledError as lost:
+            raise _connection_lost(self._executor.address) from lost
+        if isinstance(error, self._executor.worker_died):
+            raise error
+        raise ClusterError(f"{self._executor.address}: workers cannot do the work: {error}")
+
+
+class _RunHere:
+    """A run that this worker takes part in."""
+
+    def __init__(self, threads: int) -> None:
+        self.stopped = threading.Event()
+        self.threads = ThreadPoolExecutor(threads) if threads > 1 else None
+
+
+_RUNS: dict[str, _RunHere] = {}
+_RUNS_KEPT = 8
+_LOCK = threading.Lock()
+
+
+def _run_here(run: str, threads: int = 1) -> _RunHere:
+    with _LOCK:
+        here = _RUNS.setdefault(run, _RunHere(threads))
+        while len(_RUNS) > _RUNS_KEPT:
+            del _RUNS[next(iter(_RUNS))]
+        return here
+
+
+def _stop_run(run: str) -> None:
+    _run_here(run).stopped.set()
+
+
+def _do_chunk(
+    version: str, run: str, do: Callable[[Task], Result], tasks: Sequence[Task], threads: int
+) -> Done[Result]:
+    """Do a chunk on a worker, which begins another one while the last tasks wait for the network."""
+    if version != __version__:
+        raise WorkerError(_other_version(version))
+    here = _run_here(run, threads)
+    chunk = Chunk(do, tasks, here.stopped, here.threads)
+    if here.threads is not None:
+        from distributed import secede
+
+        chunk.wait_until_begun()
+        secede()
+    return chunk.done()
+
+
+def _other_version(version: str) -> str:
+    return f"has rollcli {__version__}, this is {version}"
+
+
+def scheduler_address(given: str) -> str:
+    """Return the address of a scheduler, from its file where that is given.
 
     Raises
     ------
-    ClusterError
-        When its result is asked for and the scheduler is lost.
+    UsageError
+        There is no such file, or it is no scheduler's.
     """
-
-    def __init__(self, future: "ConcurrentFuture[Result]", client: Any, address: str) -> None:
-        self._future, self._client, self._address = future, client, address
-
-    def result(self) -> Result:
-        """Wait for the result."""
-        while not wait([self._future], timeout=_POLL_S).done:
-            if self._client.status == "closed":
-                raise _connection_lost(self._address)
-        try:
-            return self._future.result()
-        except CancelledError as error:
-            raise _connection_lost(self._address) from error
-
-    def cancel(self) -> bool:
-        """Withdraw the task, unless it is done."""
-        return self._future.cancel()
-
-
-def _in_turn(do: Callable[[Task], Result], task: Task) -> Result:
-    """Run a task that waits for the network; the worker takes others meanwhile, and one computes."""
-    from distributed import secede
-
-    secede()
-    with computing():
-        return do(task)
+    if "://" in given or not (given.endswith(".json") or os.sep in given):
+        return given
+    try:
+        return str(json.loads(Path(given).read_bytes())["address"])
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise UsageError(f"--scheduler {given}: the scheduler file cannot be read: {reason}") from error
+    except (ValueError, RecursionError, KeyError, TypeError) as error:
+        raise UsageError(f"--scheduler {given}: is not a file that dask scheduler wrote") from error
 
 
 def _connection_lost(address: str) -> ClusterError:
@@ -206,8 +365,14 @@ def _worker_plugin() -> Any:
     return PrepareWorker()
 
 
-def _check_workers(client: Any, shared: SharedPaths) -> None:
-    """Ask every worker whether it has this rollcli and sees the files and folders that this process sees."""
+def _problems(client: Any, shared: SharedPaths, workers: Collection[str]) -> dict[str, str]:
+    """Ask workers whether they have this rollcli and see the files and folders that this process sees.
+
+    Returns
+    -------
+    dict of str
+        What keeps a worker from taking part, by its address; those that can are left out.
+    """
     files = {path.absolute() for path in map(Path, shared.files) if is_file(path)}
     sizes = {str(path): path.stat().st_size for path in files}
     name = f".rollcli-check-{uuid.uuid4().hex}"  # of this run's own: another one may be asking now
@@ -217,21 +382,24 @@ def _check_workers(client: Any, shared: SharedPaths) -> None:
         for mark in marks:
             made.append(mark)
             write_atomic(mark, b"")
-        answers = client.run(probe, __version__, sizes, [str(mark) for mark in marks], on_error="return")
+        names = [str(mark) for mark in marks]
+        answers = client.run(probe, __version__, sizes, names, workers=list(workers), on_error="return")
     finally:
         for mark in made:
             with contextlib.suppress(OutputError):  # the one that could not be made
                 remove(str(mark))
-    for worker, answer in answers.items():
-        problem = answer if isinstance(answer, str) else f"cannot run rollcli {__version__}: {answer}"
-        if problem:
-            raise ClusterError(f"worker {worker}: {problem}")
+    unable = f"cannot run rollcli {__version__}: "
+    problems = {
+        worker: answer if isinstance(answer, str) else unable + " ".join(str(answer).split())
+        for worker, answer in answers.items()
+    }
+    return {worker: problem for worker, problem in problems.items() if problem}
 
 
 def probe(version: str, sizes: dict[str, int], marks: list[str]) -> str:
     """Say what keeps this worker from running tasks; empty when nothing does. Runs on the worker."""
     if version != __version__:
-        return f"has rollcli {__version__}, this is {version}"
+        return _other_version(version)
     for path, size in sizes.items():
         if not is_file(path) or Path(path).stat().st_size != size:
             return f"does not see {path}; inputs must lie on storage that the workers share"

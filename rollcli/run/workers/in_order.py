@@ -1,11 +1,11 @@
 """Give tasks to an executor and yield their results in the tasks' order, with few tasks in flight."""
 
 from collections import deque
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Generator, Iterable, Sequence
 from dataclasses import dataclass
-from itertools import islice
-from typing import Generic, Protocol, TypeVar
+from typing import Protocol, TypeVar
 
+from rollcli.run.workers.chunks import Chunks, Done, Result, Task
 from rollcli.run.workers.interrupt import Stop
 
 
@@ -51,65 +51,52 @@ class Workers:
     threads: int = 1
 
 
-Task = TypeVar("Task")
-Result = TypeVar("Result")
 _Task = TypeVar("_Task", contravariant=True)
-_Result = TypeVar("_Result", covariant=True)
+# a worker's own, one that waits there, and one that lets it go on while a slow one holds back the results
+_IN_FLIGHT = 3
 
 
-def _nothing(task: object) -> None:
-    """Leave everything as it is: the tasks write no files."""
+class Future(Protocol[Result]):
+    """A chunk that was submitted."""
+
+    def done(self) -> bool:
+        """Tell whether its result is there."""
+
+    def result(self) -> Done[Result]:
+        """Return what was done of it; raise an error that says that its worker died, once it is there."""
 
 
-@dataclass(frozen=True)
-class Work(Generic[Task, Result]):
-    """What to do with each task.
-
-    Attributes
-    ----------
-    do : callable
-        Turns a task into its result. A task that cannot be done gets a result that says so. It is pickled
-        and sent to workers: name it in a module.
-    lost : callable
-        Makes the result of a task whose worker died, from the task and the reason.
-    clear : callable
-        Removes the half-written files that a worker left which died amid the task.
-    """
-
-    do: Callable[[Task], Result]
-    lost: Callable[[Task, str], Result]
-    clear: Callable[[Task], None] = _nothing
-
-
-class Future(Protocol[_Result]):
-    """A task that was submitted: a `concurrent.futures.Future`, or an object with these two methods."""
-
-    def result(self) -> _Result:
-        """Wait for the result; raise what the task raised, or an error that says that its worker died."""
-
-    def cancel(self) -> bool:
-        """Withdraw the task; return False when a worker has started it."""
-
-
-class Executor(Protocol[_Task, _Result]):
+class Executor(Protocol[_Task, Result]):
     """Workers, wherever they run.
 
     Attributes
     ----------
-    window : int
-        The number of tasks in flight: large enough to keep every worker busy, and bounded to bound memory.
+    workers : int
+        How many there are now.
+    threads : int
+        Tasks that each of them has in hand at once.
     worker_died : tuple of exception types
-        What `Future.result` raises when the task's worker has died.
+        What `Future.result` raises when the worker of the chunk has died.
     """
 
-    window: int
+    threads: int
     worker_died: tuple[type[BaseException], ...]
 
-    def submit(self, task: _Task) -> Future[_Result]:
-        """Queue a task."""
+    @property
+    def workers(self) -> int:
+        """The number may change while they work."""
 
-    def retry(self, task: _Task) -> _Result:
-        """Run a task again whose worker died; if this worker dies too, return the result of a lost task."""
+    def submit(self, chunk: Sequence[_Task], *, first: bool = False) -> Future[Result]:
+        """Queue a chunk; `first`: before those that wait."""
+
+    def wait(self, future: Future[Result]) -> None:
+        """Wait until a chunk is done, or for a fifth of a second."""
+
+    def retry(self, task: _Task) -> Done[Result]:
+        """Run a task again that kills workers; if this one dies too, return the result of a lost task."""
+
+    def stop(self) -> None:
+        """Let workers begin no further task."""
 
     def close(self, *, at_once: bool) -> None:
         """End the workers: after their current task, or at once."""
@@ -120,22 +107,45 @@ def in_order(
 ) -> Generator[Result, None, None]:
     """Yield the result of each task, in the tasks' order.
 
-    Once `stop` is requested, no task is submitted, queued tasks are cancelled, and the results of those that
-    were started are still yielded.
+    A chunk whose worker died is done again in halves: what kills workers is alone in the end. Once `stop` is
+    requested, no further task begins; results are yielded up to the first task that was not begun.
     """
-    remaining, in_flight = iter(tasks), deque[tuple[Task, Future[Result]]]()
+    chunks = Chunks(tasks, executor.threads)
+    in_flight = deque[tuple[Sequence[Task], Future[Result]]]()
+
+    def submit_first(*some: Sequence[Task]) -> None:
+        for each in reversed(some):
+            in_flight.appendleft((each, executor.submit(each, first=True)))
+
     while True:
-        for task in islice(remaining, 0 if stop.asked else executor.window - len(in_flight)):
-            in_flight.append((task, executor.submit(task)))
-        while stop.asked and in_flight and in_flight[-1][1].cancel():
-            in_flight.pop()
+        while not stop.asked and len(in_flight) < _IN_FLIGHT * executor.workers:
+            chunk: Sequence[Task] = chunks.take(executor.workers)
+            if not chunk:
+                break
+            in_flight.append((chunk, executor.submit(chunk)))
         if not in_flight:
             return
-        task, future = in_flight.popleft()
+        if stop.asked:
+            executor.stop()
+        chunk, future = in_flight[0]
+        if not future.done():
+            executor.wait(future)
+            continue
+        in_flight.popleft()
         try:
-            result = future.result()
+            done = future.result()
         except executor.worker_died:
             if stop.asked:
                 return  # whoever asked has ended the workers too
-            result = executor.retry(task)
-        yield result
+            if len(chunk) > 1:
+                submit_first(chunk[: len(chunk) // 2], chunk[len(chunk) // 2 :])
+                continue
+            done = executor.retry(chunk[0])
+        chunks.measure(done)
+        yield from done.results
+        if done.error is not None:
+            raise done.error
+        if rest := chunk[len(done.results) :]:
+            if stop.asked:
+                return
+            submit_first(rest)

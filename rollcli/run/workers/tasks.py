@@ -1,55 +1,17 @@
 """The one entry of this package: run tasks on the workers that were asked for."""
 
 import os
-from collections.abc import Callable, Generator, Sequence
-from dataclasses import dataclass
-from typing import Any, Generic
+from collections.abc import Generator, Iterable, Sized
+from typing import Any
 
-from rollcli.run.workers.in_order import Executor, Result, Task, Work, Workers, in_order
+from rollcli.run.workers.chunks import Result, Task, Work
+from rollcli.run.workers.in_order import Workers, in_order
 from rollcli.run.workers.interrupt import Stop
 from rollcli.run.workers.pool import prepare_worker
 
 
-class LocalExecutor(Generic[Task, Result]):
-    """Runs each task in this process, when its result is asked for."""
-
-    window = 1
-    worker_died: tuple[type[BaseException], ...] = ()
-
-    def __init__(self, work: Work[Task, Result]) -> None:
-        prepare_worker()
-        self._work = work
-
-    def submit(self, task: Task) -> "LocalFuture[Task, Result]":
-        """Remember the task."""
-        return LocalFuture(self._work.do, task)
-
-    def retry(self, task: Task) -> Result:
-        """Run the task; nothing calls this, since this process cannot outlive its worker."""
-        return self._work.do(task)
-
-    def close(self, *, at_once: bool) -> None:
-        """Do nothing: there are no workers to end."""
-
-
-@dataclass(frozen=True)
-class LocalFuture(Generic[Task, Result]):
-    """A task that waits for someone to need its result."""
-
-    do: Callable[[Task], Result]
-    task: Task
-
-    def result(self) -> Result:
-        """Run the task."""
-        return self.do(self.task)
-
-    def cancel(self) -> bool:
-        """Withdraw the task: it has not started."""
-        return True
-
-
 def run_tasks(
-    tasks: Sequence[Task], work: Work[Task, Result], stop: Stop, workers: Workers
+    tasks: Iterable[Task], work: Work[Task, Result], stop: Stop, workers: Workers
 ) -> Generator[Result, None, None]:
     """Yield the result of each task, in the tasks' order.
 
@@ -60,11 +22,19 @@ def run_tasks(
     ClusterError
         The cluster cannot do the work, or its scheduler is lost.
     """
-    executor: Executor[Task, Result] = _executor(len(tasks), work, workers)
+    count = len(tasks) if isinstance(tasks, Sized) else None
+    executor = _executor(count, work, workers)
+    if executor is None:
+        yield from _run_here(tasks, work, stop)
+        return
     try:
         yield from in_order(tasks, executor, stop)
     finally:
-        executor.close(at_once=stop.at_once)
+        try:
+            executor.close(at_once=stop.at_once)
+        except KeyboardInterrupt:  # the second Ctrl-C, while they end
+            executor.close(at_once=True)
+            raise
 
 
 def require_scheduler(address: str | None) -> None:
@@ -83,19 +53,29 @@ def require_scheduler(address: str | None) -> None:
         check_scheduler(address)
 
 
-def _executor(count: int, work: Work[Any, Any], workers: Workers) -> Any:
-    """Make the executor for so many tasks; each one's module is loaded only when it is used."""
+def _run_here(tasks: Iterable[Task], work: Work[Task, Result], stop: Stop) -> Generator[Result, None, None]:
+    """Do each task in this process, when its result is asked for."""
+    prepare_worker()
+    for task in tasks:
+        if stop.asked:
+            return
+        yield work.do(task)
+
+
+def _executor(count: int | None, work: Work[Any, Any], workers: Workers) -> Any:
+    """Make the executor; None: this process does the tasks. Modules load only when they are used."""
     if workers.scheduler is not None:
         from rollcli.run.workers.cluster import ClusterExecutor
 
         return ClusterExecutor(workers.scheduler, work, workers.shared, workers.threads)
-    jobs = min(workers.jobs or _usable_processors(), count)
-    if jobs > 1 or (count and workers.threads > 1):
+    jobs = workers.jobs or _usable_processors()
+    if count is not None:
+        jobs = min(jobs, count)
+    if jobs > 1 or (jobs and workers.threads > 1):
         from rollcli.run.workers.pool import PoolExecutor
 
         return PoolExecutor(jobs, work, workers.keep_open, workers.threads)
-
-    return LocalExecutor(work)
+    return None
 
 
 def _usable_processors() -> int:

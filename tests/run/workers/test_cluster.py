@@ -3,13 +3,13 @@
 import json
 import logging
 import os
+import re
 import shutil
 import socket
 import subprocess
 import sys
 import threading
 import time
-from concurrent.futures import Future
 from itertools import count
 from pathlib import Path
 from types import SimpleNamespace
@@ -25,10 +25,9 @@ pytest.importorskip("distributed", reason="the extra cluster is not installed")
 from distributed import LocalCluster
 
 from rollcli import __version__
-from rollcli.errors import ClusterError
 from rollcli.files.storage import list_names, read_bytes
 from rollcli.run.workers import cluster
-from rollcli.run.workers.cluster import ClusterFuture, _check_workers, probe
+from rollcli.run.workers.cluster import _problems, probe
 from rollcli.run.workers.in_order import SharedPaths
 
 FRAMES = 40
@@ -214,11 +213,42 @@ def test_a_scheduler_that_is_lost_ends_the_run_which_goes_on_without_it(local, f
     assert_is_that_of_a_local_run(far, local)
 
 
-def test_nobody_waits_for_what_was_sent_while_the_connection_broke(monkeypatch):
-    monkeypatch.setattr(cluster, "_POLL_S", 0.01)
-    client = SimpleNamespace(status="closed")
-    with pytest.raises(ClusterError, match="the connection to the scheduler is lost"):
-        ClusterFuture(Future(), client, "tcp://far:8786").result()
+# a worker of another version, which notes what it does
+ODD = """
+from pathlib import Path
+import rollcli
+from rollcli.parallel import cluster
+rollcli.__version__ = cluster.__version__ = "0.0"
+from rollcli.batch import frame_task
+run_frame = frame_task.run_frame
+def noted(*given):
+    Path("worked").touch()
+    return run_frame(*given)
+frame_task.run_frame = noted
+"""
+
+
+def test_a_worker_of_another_version_that_joins_later_gets_no_work_and_a_line_says_so(
+    local, far, tmp_path, cluster_here, scheduler, workers
+):
+    odd = tmp_path / "odd"
+    odd.mkdir()
+    (odd / "preload.py").write_text(ODD)
+    for number in range(400):  # so many that the worker is there before the end
+        shutil.copy(local / "maps" / "frame0.png", far / "maps" / f"more{number:03}.png")
+    run = start(far, scheduler)
+    wait_for_images(far, run)
+    joined_late = dask("worker", odd, scheduler, *LOCAL, *ONE_PROCESS, "--preload", "preload.py")
+    try:
+        _, err = run.communicate(timeout=300)
+    finally:
+        end(joined_late)
+    assert run.returncode == 3, err
+    (said,) = [line for line in err.splitlines() if "gets no work" in line]
+    assert said.startswith("rollcli: worker tcp://")
+    assert said.endswith(f": has rollcli 0.0, this is {__version__}; it gets no work")
+    assert not (odd / "worked").exists()
+    assert len((far / "rolls.csv").read_text().splitlines()) == 1 + FRAMES + 400
 
 
 @pytest.mark.parametrize(
@@ -228,13 +258,15 @@ def test_nobody_waits_for_what_was_sent_while_the_connection_broke(monkeypatch):
         (ImportError("no module"), "worker tcp://second:1: cannot run rollcli .*: no module"),
     ],
 )
-def test_a_run_with_a_worker_that_cannot_take_part_is_refused_and_leaves_no_mark(tmp_path, answer, said):
-    def ask(function, version, sizes, marks, on_error):
+def test_a_worker_that_cannot_take_part_is_known_and_no_mark_is_left(tmp_path, answer, said):
+    def ask(function, version, sizes, marks, workers, on_error):
         assert [Path(mark).exists() for mark in marks] == [True]
-        return {"tcp://first:1": "", "tcp://second:1": answer}
+        return dict(zip(workers, ("", answer), strict=True))
 
-    with pytest.raises(ClusterError, match=said):
-        _check_workers(SimpleNamespace(run=ask), SharedPaths((), (str(tmp_path / "up"),)))
+    shared = SharedPaths((), (str(tmp_path / "up"),))
+    problems = _problems(SimpleNamespace(run=ask), shared, ["tcp://first:1", "tcp://second:1"])
+    assert problems.keys() == {"tcp://second:1"}
+    assert re.match(said, f"worker tcp://second:1: {problems['tcp://second:1']}")
     assert list((tmp_path / "up").iterdir()) == []
 
 

@@ -1,63 +1,38 @@
-"""What the executor for a cluster asks of Dask's client, without a scheduler."""
+"""Chunks on a Dask cluster of this process, or of processes that may die."""
 
+import json
 import logging
 import sys
-from concurrent.futures import Future
-from types import SimpleNamespace
+import threading
+import time
+from pathlib import Path
 
 import cv2
 import pytest
 
 pytest.importorskip("distributed", reason="the extra cluster is not installed")
 
-from distributed import KilledWorker
+import dask
+from distributed import LocalCluster
 
-from rollcli import __version__
 from rollcli.errors import ClusterError, OutputError, UsageError
 from rollcli.files.stores import locations as turns
 from rollcli.run.workers import cluster
-from rollcli.run.workers.cluster import ClusterExecutor, ClusterFuture, check_scheduler
-from rollcli.run.workers.in_order import SharedPaths, Work
+from rollcli.run.workers.chunks import Work
+from rollcli.run.workers.cluster import ClusterExecutor, check_scheduler, scheduler_address
+from rollcli.run.workers.in_order import SharedPaths, in_order
+from rollcli.run.workers.interrupt import Stop
+from tests.run.workers.tasks import lost, run
 
-WORK = Work(lambda task: ("did", task, turns._turn.locked()), lambda task, reason: ("lost", task, reason))
-
-
-class Client:
-    """A client of two workers, of one thread and of two, which runs what is submitted at once."""
-
-    status = "running"
-
-    def __init__(self):
-        self.asked, self.plugins, self.closed, self.answers = [], [], [], {"a": "", "b": ""}
-
-    def run(self, function, version, sizes, marks, *, on_error):
-        self.asked.append((function, version, sizes, marks, on_error))
-        return self.answers
-
-    def register_plugin(self, plugin):
-        self.plugins.append(plugin)
-
-    def nthreads(self):
-        return {"a": 1, "b": 2}
-
-    def get_executor(self, *, pure):
-        assert not pure  # equal tasks are tasks of their own
-        return self
-
-    def submit(self, do, task):
-        future = Future()
-        future.set_result(do(task))
-        return future
-
-    def close(self, **options):
-        self.closed.append(options)
+WORK = Work(run, lost)
+HERE = {"host": "127.0.0.1", "protocol": "tcp", "dashboard_address": ":0", "threads_per_worker": 1}
 
 
-@pytest.fixture
-def client(monkeypatch):
-    client = Client()
-    monkeypatch.setattr(cluster, "_connect", lambda address: client)
-    return client
+@pytest.fixture(scope="module")
+def workers_here():
+    """Two workers in this process."""
+    with LocalCluster(n_workers=2, processes=False, **HERE) as made:
+        yield made
 
 
 @pytest.fixture(autouse=True)
@@ -67,102 +42,165 @@ def logging_of_before():
     assert logging.root.manager.disable == before
 
 
-@pytest.mark.parametrize(("threads", "window"), [(1, 12), (4, 12), (16, 48)])
-def test_every_thread_of_the_cluster_has_tasks_in_hand(client, monkeypatch, threads, window):
-    left = []
-    monkeypatch.setattr("distributed.secede", lambda: left.append(True))
-    executor = ClusterExecutor("tcp://far:1", WORK, SharedPaths(), threads)
-    assert executor.window == window
-    assert executor.worker_died == (KilledWorker,)
-    # of several tasks a thread lets others begin, and has its turn while it computes
-    assert executor.submit(5).result() == ("did", 5, threads > 1)
-    assert len(left) == (threads > 1)
-    executor.close(at_once=False)
+def executor_on(made, work=WORK, threads=1, shared=None):
+    return ClusterExecutor(made.scheduler_address, work, shared or SharedPaths(), threads)
 
 
-def test_workers_are_prepared_and_dask_is_silent_until_the_cluster_is_left(client, monkeypatch):
+def results(made, tasks, threads=1, stop=None):
+    executor = executor_on(made, threads=threads)
+    try:
+        yield from in_order(tasks, executor, stop or Stop())
+    finally:
+        executor.close(at_once=False)
+
+
+@pytest.mark.parametrize("threads", [1, 4])
+def test_results_come_in_the_order_of_the_tasks(workers_here, threads):
+    tasks = [("give", number) for number in range(500)]
+    assert list(results(workers_here, tasks, threads)) == list(range(500))
+
+
+_together = threading.Barrier(4)
+
+
+def wait_together(task):
+    """Wait until three others wait, too: alone, this would break the barrier."""
+    with turns.waiting_for_network():
+        _together.wait(timeout=30)
+    return task
+
+
+def test_tasks_that_wait_for_the_network_wait_together(workers_here):
+    executor = executor_on(workers_here, Work(wait_together, lost), threads=4)
+    try:
+        assert list(in_order(range(16), executor, Stop())) == list(range(16))
+    finally:
+        executor.close(at_once=False)
+
+
+def test_an_error_of_a_task_ends_the_run_after_the_results_before_it(workers_here):
+    done = results(workers_here, [("give", 1), ("give", 2), ("raise", "key"), ("give", 3)])
+    assert [next(done), next(done)] == [1, 2]
+    with pytest.raises(RuntimeError, match=r"KeyError in .*tasks\.py:\d+: 'key'"):
+        next(done)
+
+
+def test_a_stop_ends_a_chunk_after_the_task_in_hand(workers_here, tmp_path):
+    event, busy = tmp_path / "event", tmp_path / "busy"
+    executor = executor_on(workers_here)
+    try:
+        late = ("append", tmp_path / "late", "x")
+        future = executor.submit([("hold", busy, event), late, late])
+        while not busy.exists():
+            time.sleep(0.01)
+        executor.stop()
+        event.touch()
+        while not future.done():
+            executor.wait(future)
+        assert future.result().results == ["held"]
+    finally:
+        executor.close(at_once=False)
+    assert not (tmp_path / "late").exists()
+
+
+def test_workers_that_join_are_counted_and_used_and_those_that_leave_are_not(workers_here, monkeypatch):
+    monkeypatch.setattr(cluster, "_LOOK_S", 0.1)
+    executor = executor_on(workers_here)
+    try:
+        assert executor.workers == 2
+        workers_here.scale(5)
+        wait_for(lambda: executor.workers == 5)
+        workers_here.scale(2)
+        wait_for(lambda: executor.workers == 2)
+    finally:
+        workers_here.scale(2)
+        executor.close(at_once=False)
+
+
+def wait_for(condition):
+    give_up = time.monotonic() + 60
+    while not condition():
+        assert time.monotonic() < give_up
+        time.sleep(0.02)
+
+
+def test_what_kills_workers_is_found_in_its_chunk_and_costs_no_other_task(monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[2]))
+    settings = {"distributed.scheduler.allowed-failures": 0, "distributed.admin.log-length": 0}
+    with dask.config.set(settings), LocalCluster(n_workers=2, processes=True, **HERE) as made:
+        executor = executor_on(made)
+        try:
+            tasks = [*(("give", number) for number in range(5)), ("die",), ("give", 6), ("give", 7)]
+            futures = [executor.submit(tasks[:4]), executor.submit(tasks[4:])]
+            while not all(future.done() for future in futures):
+                executor.wait(futures[1])
+            assert futures[0].result().results == [0, 1, 2, 3]
+            with pytest.raises(executor.worker_died):
+                futures[1].result()
+            done = list(in_order(tasks, executor, Stop()))
+        finally:
+            executor.close(at_once=True)
+    assert done.pop(5) == ("lost", ("die",), cluster._DIED)
+    assert done == [0, 1, 2, 3, 4, 6, 7]
+
+
+def test_workers_are_prepared_and_dask_is_silent_until_the_cluster_is_left(workers_here, monkeypatch):
     told = []
     monkeypatch.setattr(cv2, "setNumThreads", told.append)
-    executor = ClusterExecutor("tcp://far:1", WORK, SharedPaths(), 1)
+    executor = executor_on(workers_here)
     assert not logging.getLogger("distributed").isEnabledFor(logging.CRITICAL)
-    (plugin,) = client.plugins
-    assert plugin.name == "rollcli"
-    plugin.setup(None)
-    assert told == [1]
-    assert client.closed == []
+    assert told == [1, 1]
     executor.close(at_once=True)
-    assert len(client.closed) == 1
 
 
-def test_a_cluster_that_cannot_take_part_is_left(client):
-    client.answers = {"a": "", "b": "does not see a.png"}
-    with pytest.raises(ClusterError, match=r"^worker b: does not see a\.png$"):
-        ClusterExecutor("tcp://far:1", WORK, SharedPaths(), 1)
-    assert len(client.closed) == 1
-    assert client.plugins == []
-
-
-def test_workers_are_asked_for_files_that_are_there_and_folders_that_are_no_urls(
-    client, tmp_path, monkeypatch
-):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "a.png").write_bytes(b"123")
-    (tmp_path / "folder").mkdir()
-    shared = SharedPaths(("a.png", "none.png", "folder", "s3://bucket/b.png"), ("up", "s3://bucket/up"))
-    ClusterExecutor("tcp://far:1", WORK, shared, 1).close(at_once=False)
-    ClusterExecutor("tcp://far:1", WORK, shared, 1).close(at_once=False)
-    marks = []
-    for probe, version, sizes, [mark], on_error in client.asked:
-        assert (probe, version, on_error) == (cluster.probe, __version__, "return")
-        assert sizes == {str(tmp_path / "a.png"): 3}
-        assert mark.startswith(str(tmp_path / "up" / ".rollcli-check-"))
-        marks.append(mark)
-    assert len(set(marks)) == 2  # two runs at once do not remove each other's
-    assert list((tmp_path / "up").iterdir()) == []
-
-
-def test_a_folder_that_cannot_be_written_is_named_and_no_mark_is_left_in_the_others(client, tmp_path):
+def test_a_folder_that_cannot_be_written_is_named_and_no_mark_is_left_in_the_others(workers_here, tmp_path):
     (tmp_path / "file").write_bytes(b"")
     shared = SharedPaths((), (str(tmp_path / "up"), str(tmp_path / "file" / "v"), str(tmp_path / "road")))
     with pytest.raises(OutputError, match=r"file/v/\.rollcli-check-\w+: cannot be written: not a directory$"):
-        ClusterExecutor("tcp://far:1", WORK, shared, 1)
-    assert client.asked == []
-    assert len(client.closed) == 1
+        executor_on(workers_here, shared=shared)
     assert sorted(path.name for path in tmp_path.rglob("*")) == ["file", "up"]
 
 
-def test_a_task_that_killed_its_workers_is_lost(client):
-    executor = ClusterExecutor("tcp://far:1", WORK, SharedPaths(), 1)
-    assert executor.retry(7) == (
-        "lost",
-        7,
-        "every worker that tried it died: killed for memory, perhaps, or crashed",
-    )
+def test_a_lost_connection_is_said_when_chunks_are_sent_and_when_results_are_wanted(workers_here, tmp_path):
+    executor = executor_on(workers_here)
+    future = executor.submit([("wait", tmp_path / "event")])
+    executor._client.close()
+    (tmp_path / "event").touch()
+    lost_connection = f"^{workers_here.scheduler_address}: the connection to the scheduler is lost$"
+    with pytest.raises(ClusterError, match=lost_connection):
+        executor.submit([("give", 1)])
+    with pytest.raises(ClusterError, match=lost_connection):
+        executor.wait(future)
+    with pytest.raises(ClusterError, match=lost_connection):
+        future.result()
     executor.close(at_once=False)
 
 
-def test_a_lost_connection_is_said_when_tasks_are_sent_and_when_results_are_wanted(client):
-    executor = ClusterExecutor("tcp://far:1", WORK, SharedPaths(), 1)
-    client.status = "closed"
-    lost = r"^tcp://far:1: the connection to the scheduler is lost$"
-    with pytest.raises(ClusterError, match=lost):
-        executor.submit(1)
-    executor.close(at_once=False)
-
-    future = Future()
-    waiting = ClusterFuture(future, SimpleNamespace(status="running"), "tcp://far:1")
-    assert waiting.cancel()
-    future.set_running_or_notify_cancel()  # as Dask does with the tasks of a client that closes
-    with pytest.raises(ClusterError, match=lost):
-        waiting.result()
+def test_a_scheduler_is_named_by_its_file_too(workers_here, tmp_path):
+    file = tmp_path / "scheduler.json"
+    file.write_text(json.dumps({"type": "Scheduler", "address": workers_here.scheduler_address}))
+    check_scheduler(str(file))
+    assert scheduler_address("tcp://far:8786") == "tcp://far:8786"
+    assert scheduler_address("far:8786") == "far:8786"
 
 
-def test_a_task_that_is_done_cannot_be_withdrawn():
-    done = Future()
-    done.set_result(3)
-    future = ClusterFuture(done, SimpleNamespace(status="closed"), "tcp://far:1")
-    assert not future.cancel()
-    assert future.result() == 3
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (None, "the scheduler file cannot be read: no such file or directory"),
+        (b"", "is not a file that dask scheduler wrote"),
+        (b"[" * 100_000, "is not a file that dask scheduler wrote"),
+        (b'{"id": 1}', "is not a file that dask scheduler wrote"),
+        (b"[1]", "is not a file that dask scheduler wrote"),
+    ],
+)
+def test_a_scheduler_file_that_is_not_there_or_is_none_is_refused(tmp_path, content, said):
+    file = tmp_path / "scheduler.json"
+    if content is not None:
+        file.write_bytes(content)
+    with pytest.raises(UsageError) as caught:
+        check_scheduler(str(file))
+    assert str(caught.value) == f"--scheduler {file}: {said}"
 
 
 @pytest.mark.parametrize(

@@ -1,10 +1,15 @@
-"""The order of results, the bound on tasks in flight, retries and stops, with a fake executor."""
+"""The order of results, the sizes of chunks, halving and stops, with an executor in this process."""
+
+import threading
+from collections import Counter
 
 import pytest
 
-from rollcli.run.workers.in_order import Work, in_order
+from rollcli.run.workers import chunks as chunk_sizes
+from rollcli.run.workers.chunks import Chunk, Chunks, Done, Work
+from rollcli.run.workers.in_order import Workers, in_order
 from rollcli.run.workers.interrupt import Stop
-from rollcli.run.workers.tasks import LocalExecutor
+from rollcli.run.workers.tasks import run_tasks
 
 
 class DiedError(Exception):
@@ -12,85 +17,173 @@ class DiedError(Exception):
 
 
 class FakeFuture:
-    def __init__(self, executor, task):
-        self.executor, self.task, self.started = executor, task, False
+    def __init__(self, executor, chunk):
+        self.executor, self.chunk, self.polled = executor, chunk, False
+
+    def done(self):
+        return self.polled
 
     def result(self):
-        self.started = True
-        if self.task in self.executor.deadly:
+        if self.executor.deadly & set(self.chunk):
+            self.executor.deaths.update(self.executor.deadly & set(self.chunk))
             raise DiedError
-        return f"did {self.task}"
-
-    def cancel(self):
-        return not (self.started or self.task in self.executor.begun)
+        return self.executor.do(self.chunk)
 
 
 class FakeExecutor:
-    """Runs tasks when they are waited for; `begun` cannot be cancelled, `deadly` kill their worker."""
+    """Does a chunk when it is waited for; `deadly` tasks kill their worker, `seconds` is a task's time."""
 
     worker_died = (DiedError,)
+    threads = 1
 
-    def __init__(self, window=3, begun=(), deadly=()):
-        self.window, self.begun, self.deadly = window, begun, deadly
-        self.submitted, self.retried = [], []
+    def __init__(self, workers=1, deadly=(), seconds=0.1, most=10**9):
+        self.workers, self.deadly, self.seconds, self.most = workers, set(deadly), seconds, most
+        self.submitted, self.retried, self.deaths, self.stops = [], [], Counter(), 0
+        self.in_hand = self.most_in_hand = 0
 
-    def submit(self, task):
-        self.submitted.append(task)
-        return FakeFuture(self, task)
+    def submit(self, chunk, *, first=False):
+        self.submitted.append(list(chunk))
+        self.in_hand += 1
+        self.most_in_hand = max(self.most_in_hand, self.in_hand)
+        return FakeFuture(self, chunk)
+
+    def wait(self, future):
+        self.in_hand -= 1
+        future.polled = True
+
+    def do(self, chunk):
+        done = [] if self.stops else chunk[: self.most]
+        return Done([f"did {task}" for task in done], self.seconds * len(done))
 
     def retry(self, task):
         self.retried.append(task)
-        return f"retried {task}"
+        return Done([f"lost {task}"], 0.0)
+
+    def stop(self):
+        self.stops += 1
 
 
-def test_results_come_in_the_order_of_the_tasks():
-    assert list(in_order("abcdef", FakeExecutor(), Stop())) == [f"did {task}" for task in "abcdef"]
+@pytest.mark.parametrize("count", [0, 1, 2, 7, 1000])
+@pytest.mark.parametrize("workers", [1, 3, 64])
+@pytest.mark.parametrize("seconds", [1e-6, 0.005, 0.1, 30.0])
+@pytest.mark.parametrize("known", [True, False])
+def test_results_are_those_of_single_tasks_in_their_order(count, workers, seconds, known):
+    executor = FakeExecutor(workers, seconds=seconds)
+    tasks = range(count) if known else iter(range(count))
+    assert list(in_order(tasks, executor, Stop())) == [f"did {task}" for task in range(count)]
+    assert [task for chunk in executor.submitted for task in chunk] == list(range(count))
+    assert executor.most_in_hand <= 3 * workers
 
 
-def test_no_more_tasks_are_taken_than_the_window_holds():
-    taken, executor = [], FakeExecutor(window=3)
-    results = in_order((taken.append(task) or task for task in range(100)), executor, Stop())
-    for done in range(1, 50):
-        next(results)
-        assert len(taken) - done < 3
-    assert taken == executor.submitted
+@pytest.mark.parametrize(("seconds", "size"), [(0.005, 200), (0.1, 10), (5.0, 1)])
+def test_a_chunk_is_worth_about_a_second(seconds, size):
+    executor = FakeExecutor(2, seconds=seconds)
+    list(in_order(iter(range(4000)), executor, Stop()))
+    assert {len(chunk) for chunk in executor.submitted[-8:-1]} <= {size, size - 1}
 
 
-def test_a_task_whose_worker_died_is_retried_in_its_place():
-    executor = FakeExecutor(deadly="c")
-    assert list(in_order("abcd", executor, Stop())) == ["did a", "did b", "retried c", "did d"]
-    assert executor.retried == ["c"]
+def test_chunks_get_smaller_towards_the_end_so_that_all_workers_end_together():
+    executor = FakeExecutor(4, seconds=0.005)
+    list(in_order(range(2000), executor, Stop()))
+    left = 2000
+    for chunk in executor.submitted:
+        assert len(chunk) <= max(1, left // 8)
+        left -= len(chunk)
+    assert [len(chunk) for chunk in executor.submitted[-3:]] == [1, 1, 1]
 
 
-def test_a_stop_yields_what_has_begun_and_cancels_the_rest():
-    stop, executor = Stop(), FakeExecutor(window=4, begun="abc")
-    results = in_order("abcdefgh", executor, stop)
-    assert next(results) == "did a"
+def test_tasks_that_get_slower_make_smaller_chunks():
+    chunks = Chunks(iter(range(10**6)))
+    for _ in range(20):
+        chunks.measure(Done([0] * 100, 0.5))
+    assert len(chunks.take(1)) in (199, 200)
+    for _ in range(10):
+        chunks.measure(Done([0], 5.0))
+    assert len(chunks.take(1)) == 1
+
+
+@pytest.mark.parametrize("deadly", [{0}, {517}, {999}, {300, 301, 640}])
+def test_what_kills_workers_is_alone_in_the_end_and_costs_no_other_task(deadly):
+    executor = FakeExecutor(2, deadly, seconds=0.005)
+    done = list(in_order(range(1000), executor, Stop()))
+    assert done == [f"lost {task}" if task in deadly else f"did {task}" for task in range(1000)]
+    assert executor.retried == sorted(deadly)
+    assert max(executor.deaths.values()) <= 9  # 200 tasks are halved eight times
+
+
+def test_the_rest_of_a_chunk_that_took_too_long_comes_before_all_others():
+    executor = FakeExecutor(2, seconds=0.01, most=7)
+    assert list(in_order(range(500), executor, Stop())) == [f"did {task}" for task in range(500)]
+
+
+def test_a_stop_ends_the_results_before_the_first_task_that_was_not_begun():
+    stop, executor = Stop(), FakeExecutor(2)
+    results = in_order(range(100), executor, stop)
+    assert [next(results) for _ in range(5)] == [f"did {task}" for task in range(5)]
     stop.asked = True
-    assert list(results) == ["did b", "did c"]
-    assert executor.submitted == list("abcd")
+    rest = list(results)
+    assert rest == [f"did {task}" for task in range(5, 5 + len(rest))]
+    assert executor.stops
+    assert len(rest) < 60
 
 
 def test_a_worker_that_dies_after_a_stop_is_not_retried():
-    stop, executor = Stop(), FakeExecutor(window=4, begun="abcd", deadly="b")
-    results = in_order("abcd", executor, stop)
+    stop, executor = Stop(), FakeExecutor(2, deadly={1})
+    results = in_order(range(10), executor, stop)
     next(results)
     stop.asked = True
     assert list(results) == []
     assert executor.retried == []
 
 
-def test_an_error_of_a_task_reaches_the_caller():
-    def fail(task):
-        raise ValueError(task)
+def chunk_of(do, tasks, stopped=None):
+    return Chunk(do, tasks, stopped or threading.Event())
 
-    with pytest.raises(ValueError, match="a"):
-        next(in_order("a", LocalExecutor(Work(fail, None)), Stop()))
+
+def test_a_chunk_ends_between_tasks_when_it_is_stopped():
+    stopped = threading.Event()
+
+    def do(task):
+        if task == 3:
+            stopped.set()
+        return task
+
+    assert chunk_of(do, range(10), stopped).done().results == [0, 1, 2, 3]
+    assert chunk_of(do, range(10), stopped).done().results == []
+
+
+def test_a_chunk_gives_back_what_it_has_not_begun_in_time(monkeypatch):
+    times = iter([0.0, 0.0, 0.5, 1.5, 2.5, 3.5, 4.0, 5.0])
+    monkeypatch.setattr(chunk_sizes.time, "monotonic", lambda: next(times))
+    done = chunk_of(lambda task: task, range(5)).done()
+    assert (done.results, done.error) == ([0, 1, 2], None)
+
+
+def test_an_error_ends_a_chunk_after_the_results_before_it():
+    def fail(task):
+        if task == 2:
+            raise ValueError(task)
+        return task
+
+    done = chunk_of(fail, range(5)).done()
+    assert done.results == [0, 1]
+    assert isinstance(done.error, RuntimeError)
+    assert "ValueError in " in str(done.error)
+
+
+def test_an_error_of_a_task_reaches_the_caller_after_the_results_before_it():
+    executor = FakeExecutor()
+    executor.do = lambda chunk: Done([], 0.0, ValueError(chunk[0])) if chunk[0] else Done(["did"], 0.1)
+    results = in_order(range(100), executor, Stop())
+    assert next(results) == "did"
+    with pytest.raises(ValueError, match="1"):
+        next(results)
 
 
 def test_this_process_begins_no_task_after_a_stop():
     stop, begun = Stop(), []
-    results = in_order("abc", LocalExecutor(Work(lambda task: begun.append(task) or task, None)), stop)
+    work = Work(lambda task: begun.append(task) or task, None)
+    results = run_tasks("abc", work, stop, Workers(1))
     assert next(results) == "a"
     stop.asked = True
     assert list(results) == []

@@ -4,16 +4,18 @@ import contextlib
 import os
 import signal
 import sys
+import threading
+import time
 from types import SimpleNamespace
 
 import pytest
 
 from rollcli.errors import InputError, WorkerError
 from rollcli.run.workers import pool as pools
-from rollcli.run.workers import pool as workers
-from rollcli.run.workers.in_order import Work, Workers
+from rollcli.run.workers.chunks import Work
+from rollcli.run.workers.in_order import Workers
 from rollcli.run.workers.interrupt import Stop, stop_signals
-from rollcli.run.workers.pool import PoolExecutor
+from rollcli.run.workers.pool import PoolExecutor, WorkerDiedError
 from rollcli.run.workers.tasks import run_tasks
 from tests.run.workers.tasks import lost, run
 
@@ -25,35 +27,30 @@ def results(*tasks, jobs=2):
 
 
 @contextlib.contextmanager
-def pool(jobs=2):
-    executor = PoolExecutor(jobs, WORK)
+def pool(jobs=2, work=WORK):
+    executor = PoolExecutor(jobs, work)
     try:
         yield executor
     finally:
         executor.close(at_once=True)
 
 
+def settled(executor, future):
+    """What was done of a chunk."""
+    while not future.done():
+        executor.wait(future)
+    return future.result().results
+
+
 def test_a_slow_task_keeps_its_place_before_quick_ones(tmp_path):
     event = tmp_path / "event"
-    tasks = [("wait", event), *(("give", number) for number in range(5)), ("touch", event)]
-    assert results(*tasks) == ["waited", 0, 1, 2, 3, 4, "touched"]
+    tasks = [("wait", event), *(("give", number) for number in range(4)), ("touch", event)]
+    assert results(*tasks) == ["waited", 0, 1, 2, 3, "touched"]
 
 
 def test_a_task_that_kills_its_worker_once_is_done_by_another(tmp_path):
     tasks = [("give", 1), ("die_once", tmp_path / "mark"), *(("give", number) for number in range(2, 12))]
     assert results(*tasks) == [1, "survived", *range(2, 12)]
-
-
-def test_tasks_that_wait_while_one_is_tried_again_are_done_though_none_follows(tmp_path):
-    with pool(jobs=1) as executor:
-        dying, *others = [
-            executor.submit(task)
-            for task in [("die_once", tmp_path / "mark"), *(("give", number) for number in range(3))]
-        ]
-        with pytest.raises(executor.worker_died):
-            dying.result()
-        assert executor.retry(dying.task) == "survived"
-        assert [other.result() for other in others] == [0, 1, 2]
 
 
 def test_a_task_that_kills_two_workers_is_lost_and_costs_no_other_task():
@@ -74,53 +71,70 @@ def test_a_worker_computes_in_one_thread():
     assert results(("threads",), ("threads",)) == [1, 1]
 
 
-def test_a_queued_task_can_be_cancelled_and_a_running_one_cannot(tmp_path):
-    event = tmp_path / "event"
+def test_one_task_of_a_large_chunk_that_kills_workers_is_found_and_named():
+    tasks = [("give", number) for number in range(3000)]
+    tasks[2000] = ("die",)
+    done = results(*tasks)
+    assert done[2000][:2] == ("lost", ("die",))
+    assert [*done[:2000], *done[2001:]] == [*range(2000), *range(2001, 3000)]
+
+
+def test_what_kills_workers_is_done_alone_and_chunks_that_wait_meanwhile_are_done(tmp_path):
+    mark, busy, event = (tmp_path / name for name in ("mark", "busy", "event"))
     with pool() as executor:
-        running = executor.submit(("wait", event))
-        futures = [executor.submit(("wait", event)) for _ in range(7)]
-        assert not running.cancel()
-        assert futures[-1].cancel()
-        assert not futures[-1].cancel()
-        event.touch()
-        assert running.result() == "waited"
+        held = executor.submit([("hold", busy, event)])
+        dying = executor.submit([("die_then_look", mark, busy)])
+        others = [executor.submit([("give", number)]) for number in range(3)]
+        while not dying.done():
+            executor.wait(dying)
+        with pytest.raises(WorkerDiedError):
+            dying.result()
+        threading.Timer(0.3, event.touch).start()
+        assert executor.retry(dying.chunk[0]).results == [False]
+        assert settled(executor, held) == ["held"]
+        assert [settled(executor, other) for other in others] == [[0], [1], [2]]
 
 
-def test_beside_its_task_a_worker_has_one_more_which_a_stop_cannot_withdraw(tmp_path):
+def test_a_stop_ends_a_chunk_after_the_task_in_hand_and_begins_no_other(tmp_path):
     event = tmp_path / "event"
     with pool(jobs=1) as executor:
-        running, spare, queued = (executor.submit(("wait", event)) for _ in range(3))
-        assert [future.cancel() for future in (running, spare, queued)] == [False, False, True]
+        tasks = [("hold", tmp_path / "busy", event), *(("append", tmp_path / "late", "x") for _ in range(5))]
+        running, spare, queued = (executor.submit(tasks) for _ in range(3))
+        while not (tmp_path / "busy").exists():
+            time.sleep(0.01)
+        executor.stop()
+        executor.stop()
+        assert queued.done()
+        time.sleep(0.1)  # the worker hears of it meanwhile
         event.touch()
-        assert [future.result() for future in (running, spare)] == ["waited", "waited"]
+        assert [settled(executor, each) for each in (running, spare, queued)] == [["held"], [], []]
+    assert not (tmp_path / "late").exists()
 
 
-def test_a_worker_that_died_idle_is_replaced_before_its_next_task():
+def test_a_worker_that_died_with_nothing_to_do_is_replaced_before_its_next_chunk():
     with pool() as executor:
-        assert executor.submit(("give", 1)).result() == 1
-        for worker in executor._workers:
+        assert settled(executor, executor.submit([("give", 1)])) == [1]
+        for worker in executor._pool:
             worker.kill()
             worker._process.join()
-        assert executor.submit(("give", 2)).result() == 2
+        assert settled(executor, executor.submit([("give", 2)])) == [2]
 
 
 def test_workers_end_with_their_executor():
     with pool() as executor:
-        assert executor.submit(("give", 1)).result() == 1
-        processes = [worker._process for worker in executor._workers]
-    for process in processes:
-        with pytest.raises(ProcessLookupError):
-            os.kill(process.pid, 0)
+        assert settled(executor, executor.submit([("give", 1)])) == [1]
+        processes = [worker._process for worker in executor._pool]
+    assert [process.is_alive() for process in processes] == [False, False]
 
 
-def test_an_inherited_file_stays_open_in_the_workers(tmp_path):
+def test_a_file_stays_open_in_the_workers(tmp_path):
     fcntl = pytest.importorskip("fcntl", reason="this system has no flock")
     path = tmp_path / "locked"
     descriptor = os.open(path, os.O_RDWR | os.O_CREAT)
     fcntl.flock(descriptor, fcntl.LOCK_EX)
     executor = PoolExecutor(1, WORK, keep_open=descriptor)
     try:
-        assert executor.submit(("give", 1)).result() == 1
+        assert settled(executor, executor.submit([("give", 1)])) == [1]
         os.close(descriptor)  # the lock stays, since the worker holds the same open file
         with path.open() as other, pytest.raises(BlockingIOError):
             fcntl.flock(other, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -128,87 +142,73 @@ def test_an_inherited_file_stays_open_in_the_workers(tmp_path):
         executor.close(at_once=True)
 
 
-def test_a_task_is_tried_again_when_no_other_runs(tmp_path):
-    mark, busy, event = (tmp_path / name for name in ("mark", "busy", "event"))
-    with pool() as executor:
-        held = executor.submit(("hold", busy, event))
-        dying = executor.submit(("die_then_look", mark, busy))
-        with pytest.raises(executor.worker_died):
-            dying.result()
-        make_progress = executor.make_progress
-
-        def let_go():
-            event.touch()
-            make_progress()
-
-        executor.make_progress = let_go
-        assert executor.retry(dying.task) is False
-        assert held.result() == "held"
-
-
-def test_what_a_dead_worker_left_is_cleared_before_its_task_is_tried_again(tmp_path):
+def test_what_a_dead_worker_left_is_cleared_before_its_chunk_is_known_to_be_lost(tmp_path):
     cleared = []
-    executor = PoolExecutor(1, Work(run, lost, cleared.append))
-    try:
-        tasks = [("give", 1), ("die_once", tmp_path / "mark"), ("give", 2), ("give", 3)]
-        futures = [executor.submit(task) for task in tasks]
-        assert futures[0].result() == 1
-        assert cleared == []
-        with pytest.raises(executor.worker_died):
-            futures[1].result()
-        assert cleared[0] == tasks[1]
-        assert [future.result() for future in futures[2:]] == [2, 3]
-    finally:
-        executor.close(at_once=True)
+    with pool(1, Work(run, lost, cleared.append)) as executor:
+        tasks = [("give", 1), ("die_once", tmp_path / "mark"), ("give", 2)]
+        dying, spare = executor.submit(tasks), executor.submit([("give", 3)])
+        while not dying.done():
+            assert cleared == []
+            executor.wait(dying)
+        assert cleared[:3] == tasks
+        assert settled(executor, spare) == [3]
 
 
-def test_the_tasks_after_one_that_killed_its_worker_keep_their_order(tmp_path):
-    tasks = [
-        ("die_once", tmp_path / "mark"),
-        *(("append", tmp_path / "order", str(number)) for number in range(8)),
-    ]
+def test_the_chunks_after_one_that_killed_its_worker_keep_their_order(tmp_path):
     with pool(jobs=1) as executor:
-        dying, *others = [executor.submit(task) for task in tasks]
-        with pytest.raises(executor.worker_died):
-            dying.result()
-        for other in others:
-            other.result()
+        chunks = [executor.submit([("die_once", tmp_path / "mark")])]
+        chunks += [executor.submit([("append", tmp_path / "order", str(number))]) for number in range(8)]
+        for each in chunks:
+            while not each.done():
+                executor.wait(each)
     assert (tmp_path / "order").read_text() == "01234567"
 
 
-def test_of_few_tasks_each_worker_gets_one(tmp_path):
+def test_of_few_chunks_each_worker_gets_one(tmp_path):
     event = tmp_path / "event"
     with pool() as executor:  # the first one waits for what the second one does
-        futures = [executor.submit(("wait", event)), executor.submit(("touch", event))]
-        assert [future.result() for future in futures] == ["waited", "touched"]
+        futures = [executor.submit([("wait", event)]), executor.submit([("touch", event)])]
+        assert [settled(executor, future) for future in futures] == [["waited"], ["touched"]]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 def test_workers_leave_the_signals_to_their_parent():
     with pool(jobs=1) as executor:
-        process, ignored, blocked = executor.submit(("signals",)).result()
+        ((process, ignored, blocked),) = settled(executor, executor.submit([("signals",)]))
         assert {*stop_signals()} <= ignored
         assert {*stop_signals()} <= blocked
         for each in (signal.SIGINT, signal.SIGTERM):
             os.kill(process, each)
-        assert executor.submit(("signals",)).result()[0] == process
+        assert settled(executor, executor.submit([("signals",)]))[0][0] == process
 
 
 def test_workers_end_after_their_task_or_at_once(tmp_path):
     for at_once, status in ((False, 0), (True, -signal.SIGKILL)):
+        busy, event = tmp_path / f"busy{at_once}", tmp_path / f"event{at_once}"
         executor = PoolExecutor(1, WORK)
-        executor.submit(("append", tmp_path / f"{at_once}", "done")).result()
-        executor.submit(("append", tmp_path / f"{at_once}", " done"))
-        (worker,) = executor._workers
+        executor.submit([("hold", busy, event), ("append", tmp_path / "late", "x")])
+        while not busy.exists():
+            time.sleep(0.01)
+        threading.Timer(0.3, event.touch).start()
+        (worker,) = executor._pool
         executor.close(at_once=at_once)
         assert worker._process.exitcode == status
-    assert (tmp_path / "False").read_text() == "done done"
+        assert busy.exists() == at_once  # it was let go once it was held
+    assert not (tmp_path / "late").exists()
+
+
+def test_results_that_nobody_asks_for_do_not_keep_workers_from_ending():
+    with pool() as executor:
+        for _ in range(6):
+            executor.submit([("give", "x" * 1_000_000)])
+        time.sleep(0.5)
+        executor.close(at_once=False)
 
 
 def test_when_a_further_worker_cannot_start_the_others_end(monkeypatch):
     started = []
 
-    class Limited(workers.Worker):
+    class Limited(pools.Worker):
         def __init__(self, *arguments):
             if len(started) == 2:
                 raise WorkerError("no more")
@@ -226,7 +226,7 @@ def test_a_system_that_starts_no_process_is_said_with_a_remedy(monkeypatch):
         raise OSError(24, "Too many open files")
 
     spawn = SimpleNamespace(Pipe=fail)
-    monkeypatch.setattr(workers.multiprocessing, "get_context", lambda kind: {"spawn": spawn}[kind])
+    monkeypatch.setattr(pools.multiprocessing, "get_context", lambda kind: {"spawn": spawn}[kind])
     with pytest.raises(
         WorkerError,
         match=r"^a worker process cannot start: .*Too many open files; try fewer of them, with --jobs$",
@@ -235,13 +235,11 @@ def test_a_system_that_starts_no_process_is_said_with_a_remedy(monkeypatch):
 
 
 @pytest.mark.parametrize("error", [ImportError("no NumPy"), OSError("no library"), MemoryError("no memory")])
-def test_a_worker_that_cannot_be_set_up_answers_with_the_reason(monkeypatch, error):
+def test_a_worker_that_cannot_be_set_up_answers_with_the_reason(error):
     def fail():
         raise error
 
-    monkeypatch.setattr(workers, "prepare_worker", fail)
-    found = workers._prepare()
+    found = pools._error_of(fail)
     assert isinstance(found, WorkerError)
     assert str(found) == f"a worker process cannot start: {error}; try fewer of them, with --jobs"
-    monkeypatch.setattr(workers, "prepare_worker", lambda: None)
-    assert workers._prepare() is None
+    assert pools._error_of(lambda: None) is None

@@ -7,10 +7,11 @@ import pytest
 
 from rollcli.errors import UsageError
 from rollcli.run.workers import tasks as runs
-from rollcli.run.workers.in_order import Work, Workers
+from rollcli.run.workers.chunks import Work
+from rollcli.run.workers.in_order import Workers
 from rollcli.run.workers.interrupt import Stop
 from rollcli.run.workers.pool import PoolExecutor
-from rollcli.run.workers.tasks import LocalExecutor, require_scheduler, run_tasks
+from rollcli.run.workers.tasks import require_scheduler, run_tasks
 from tests.run.workers.tasks import lost, run
 
 WORK = Work(run, lost)
@@ -31,12 +32,12 @@ WORK = Work(run, lost)
 )
 def test_there_are_as_many_processes_as_tasks_and_jobs_allow(count, jobs, threads, processes):
     executor = runs._executor(count, WORK, Workers(jobs, threads=threads))
-    executor.close(at_once=True)
     if processes == 0:
-        assert isinstance(executor, LocalExecutor)
+        assert executor is None
     else:
+        executor.close(at_once=True)
         assert isinstance(executor, PoolExecutor)
-        assert len(executor._workers) == processes
+        assert len(executor._pool) == processes
 
 
 def test_without_a_number_of_jobs_there_is_one_for_each_usable_processor(monkeypatch):
@@ -47,18 +48,23 @@ def test_without_a_number_of_jobs_there_is_one_for_each_usable_processor(monkeyp
     monkeypatch.setattr(os, "cpu_count", lambda: 7)
     assert runs._executor(100, WORK, Workers()).jobs == 7
     monkeypatch.setattr(os, "cpu_count", lambda: None)
-    assert isinstance(runs._executor(100, WORK, Workers()), LocalExecutor)
+    assert runs._executor(100, WORK, Workers()) is None
 
 
 @pytest.mark.parametrize("at_once", [False, True])
 def test_the_executor_is_closed_as_the_run_was_stopped(monkeypatch, at_once):
-    closed = []
-    monkeypatch.setattr(LocalExecutor, "close", lambda self, *, at_once: closed.append(at_once))
+    closed, close = [], PoolExecutor.close
+
+    def closing(self, *, at_once):
+        closed.append(at_once)
+        close(self, at_once=at_once)
+
+    monkeypatch.setattr(PoolExecutor, "close", closing)
     stop = Stop()
-    results = run_tasks([("give", 1), ("give", 2)], WORK, stop, Workers(1))
-    assert next(results) == 1
+    results = run_tasks([("give", number) for number in range(9)], WORK, stop, Workers(2))
+    assert next(results) == 0
     stop.asked, stop.at_once = True, at_once
-    assert list(results) == []
+    list(results)
     assert closed == [at_once]
 
 

@@ -1,0 +1,179 @@
+"""Runs of consecutive tasks: how many a worker gets at once, and how it does them.
+
+A task of a batch is often a few milliseconds long, and handing it over costs a tenth of that in a pool and as
+much again on a cluster. Workers therefore get chunks that take about a second. Results stay those of single
+tasks: in their order, and the same for any chunks.
+"""
+
+import itertools
+import threading
+import time
+import traceback
+from collections.abc import Callable, Iterable, Sequence, Sized
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
+
+from rollcli.errors import RollcliError
+from rollcli.files.stores.locations import computing
+
+if TYPE_CHECKING:
+    from concurrent.futures import ThreadPoolExecutor
+
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+
+# of a chunk: hand-over then costs a hundredth of the work, and a lost worker a second
+CHUNK_S = 1.0
+# a worker gives back what it has not begun by then: tasks that are slower than those before are no long chunk
+_LONGEST_S = 2.0
+_SHARES = 2  # a chunk is at most this part of what each worker still has to do, so that all end together
+
+
+def _leave(task: object) -> None:
+    """Leave everything as it is: the tasks write no files."""
+
+
+@dataclass(frozen=True)
+class Work(Generic[Task, Result]):
+    """What to do with each task.
+
+    Attributes
+    ----------
+    do : callable
+        Turns a task into its result. A task that cannot be done gets a result that says so. It is pickled
+        and sent to workers: name it in a module.
+    lost : callable
+        Makes the result of a task whose worker died, from the task and the reason.
+    clear : callable
+        Removes the half-written files that a worker left which died amid the task.
+    """
+
+    do: Callable[[Task], Result]
+    lost: Callable[[Task, str], Result]
+    clear: Callable[[Task], None] = _leave
+
+
+@dataclass(frozen=True)
+class Done(Generic[Result]):
+    """What a worker did of a chunk.
+
+    Attributes
+    ----------
+    results : list
+        Of its first tasks, in order; the others were not begun.
+    seconds : float
+        The time that this took of the worker.
+    error : Exception or None
+        What the next task raised: it ends the run.
+    """
+
+    results: list[Result]
+    seconds: float
+    error: Exception | None = None
+
+
+class Chunks(Generic[Task]):
+    """Cuts tasks into chunks, by the time that the last ones took.
+
+    Parameters
+    ----------
+    tasks : iterable
+        Chunks get smaller towards the end where their number is known.
+    first : int
+        The size of the first ones.
+    """
+
+    def __init__(self, tasks: Iterable[Task], first: int = 1) -> None:
+        self._left = len(tasks) if isinstance(tasks, Sized) else None
+        self._tasks = iter(tasks)
+        self._size = float(first)
+
+    def take(self, workers: int) -> list[Task]:
+        """Take the next chunk, for one of so many workers; empty when there are no more tasks."""
+        size = int(self._size)
+        if self._left is not None:
+            size = min(size, self._left // (_SHARES * workers))
+        chunk = list(itertools.islice(self._tasks, max(size, 1)))
+        if self._left is not None:
+            self._left -= len(chunk)
+        return chunk
+
+    def measure(self, done: Done[Any]) -> None:
+        """Learn from a chunk how many tasks are worth a second: half from it, half from those before."""
+        if done.results:
+            self._size = (self._size + CHUNK_S * len(done.results) / max(done.seconds, 1e-6)) / 2
+
+
+class _Attempt(NamedTuple):
+    """What came of a task that was begun."""
+
+    result: Any
+    error: Exception | None = None
+
+
+class Chunk(Generic[Task, Result]):
+    """A chunk that a worker has in hand.
+
+    Parameters
+    ----------
+    do : callable
+        Turns a task into its result.
+    tasks : sequence
+    stopped : Event
+        Once it is set, no further task begins.
+    threads : ThreadPoolExecutor, optional
+        The tasks wait for the network: they begin at once, in these threads, and one at a time computes.
+        Otherwise each begins when the one before it is done, and the first when someone asks what was done.
+    """
+
+    def __init__(
+        self,
+        do: Callable[[Task], Result],
+        tasks: Sequence[Task],
+        stopped: threading.Event,
+        threads: "ThreadPoolExecutor | None" = None,
+    ) -> None:
+        self._do, self._stopped = do, stopped
+        self._over, self._failed = 0.0, False
+        self._attempts: Iterable[_Attempt | None] = map(self._attempt, tasks)
+        if threads is not None:
+            futures = [threads.submit(self._attempt_in_turn, task) for task in tasks]
+            self._all_begun = threads.submit(lambda: None)  # begins after them
+            self._attempts = (future.result() for future in futures)
+
+    def wait_until_begun(self) -> None:
+        """Wait until all the tasks have begun in their threads."""
+        self._all_begun.result()
+
+    def done(self) -> Done[Result]:
+        """Wait for the end of the chunk; return what was done of it."""
+        start = time.monotonic()
+        every = list(self._attempts)  # all of them: none goes on when the worker ends
+        begun = list(itertools.takewhile(lambda attempt: attempt is not None, every))
+        error = next((each.error for each in begun if each and each.error), None)
+        results = [each.result for each in begun if each and not each.error]
+        return Done(results, time.monotonic() - start, error)
+
+    def _attempt_in_turn(self, task: Task) -> _Attempt | None:
+        with computing():
+            return self._attempt(task)
+
+    def _attempt(self, task: Task) -> _Attempt | None:
+        """Do a task; None where the chunk has ended before it."""
+        now = time.monotonic()
+        self._over = self._over or now + _LONGEST_S
+        if self._stopped.is_set() or self._failed or now > self._over:
+            return None
+        try:
+            return _Attempt(self._do(task))
+        except Exception as error:  # noqa: BLE001 (whoever asked for the result raises it)
+            self._failed = True
+            return _Attempt(None, _portable(error))
+
+
+def _portable(error: Exception) -> Exception:
+    """Make of an error one that another process can raise: ours as it is, others with their place."""
+    if isinstance(error, RollcliError):
+        return error
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    return RuntimeError(f"{type(error).__name__} in {place.filename}:{place.lineno}: {error}")
