@@ -5,8 +5,10 @@ import os
 from collections.abc import Iterator, Sequence
 from functools import partial
 from itertools import islice
+from typing import Any, NamedTuple
 
 from rollcli.errors import ClusterError, ExitStatus, OutputError, WorkerError
+from rollcli.files.atomic import is_file
 from rollcli.files.results import run_path
 from rollcli.files.stores.locations import is_url, tasks_in_hand
 from rollcli.files.stream import STDOUT
@@ -22,7 +24,15 @@ from rollcli.run.rig_answer import RigAnswer
 from rollcli.run.workers.chunks import Work
 from rollcli.run.workers.in_order import SharedPaths, Workers
 from rollcli.run.workers.interrupt import Stop, stop_on_signals
-from rollcli.run.workers.tasks import require_scheduler, run_tasks
+from rollcli.run.workers.tasks import require_scheduler, run_tasks, started_early
+
+
+def load_estimator() -> None:
+    """Load what a worker needs for frames, before it gets one."""
+    from rollcli.run.workers.pool import prepare_worker
+
+    prepare_worker()
+    import rollcli.batch.frame_task  # noqa: F401 (to have loaded it)
 
 
 def estimate_frame(frame: Frame, options: FrameOptions) -> FrameResult:
@@ -63,10 +73,25 @@ def run_estimate(options: EstimateOptions, resume_command: str = "") -> ExitStat
     UsageError, OutputError, ClusterError, WorkerError
         The run cannot start or cannot go on.
     """
-    plan = make_plan(options)
     if options.running.dry_run:
-        _list(plan, options)
+        _list(make_plan(options), options)
         return ExitStatus.DONE
+    with contextlib.ExitStack() as early:
+        started: list[Any] = []
+        if _is_batch(options):
+            started = early.enter_context(started_early(options.running.jobs, load_estimator))
+        return _run(make_plan(options), options, resume_command, started)
+
+
+def _is_batch(options: EstimateOptions) -> bool:
+    """Tell whether workers of this machine will be needed, as far as that is known before a plan is made."""
+    given, pairs, running = options.inputs, options.pairs, options.running
+    names = [*given.inputs, *filter(None, [pairs.left])]
+    one_by_one = given.files_from is None and all(map(is_file, names))
+    return running.scheduler is None and running.jobs != 1 and not one_by_one
+
+
+def _run(plan: Plan, options: EstimateOptions, resume_command: str, started: list[Any]) -> ExitStatus:
     require_scheduler(options.running.scheduler)
     progress = Progress(len(plan.frames), options.running, options.encoding)
     with open_output(plan, options) as output:
@@ -77,9 +102,10 @@ def run_estimate(options: EstimateOptions, resume_command: str = "") -> ExitStat
             progress.note(note)
         try:
             with stop_on_signals() as stop, progress:
-                _restore_images(options, output, progress, stop)
-                if not _retry_failed(plan, options, output, progress, answer, stop):
-                    _run_frames(plan.frames[kept.count :], options, output, progress, answer, stop)
+                run = _Run(options, output, progress, answer, stop, started)
+                _restore_images(run)
+                if not _retry_failed(plan, run):
+                    _run_frames(plan.frames[kept.count :], run)
         except KeyboardInterrupt:  # the second Ctrl-C: without waiting for the frames that have begun
             progress.stopped_early = True
         except (OutputError, ClusterError, WorkerError) as error:
@@ -93,61 +119,68 @@ def run_estimate(options: EstimateOptions, resume_command: str = "") -> ExitStat
         return status
 
 
-def _run_frames(
-    frames: Sequence[Frame],
-    options: EstimateOptions,
-    output: Output,
-    progress: Progress,
-    answer: RigAnswer,
-    stop: Stop,
-) -> None:
+class _Run(NamedTuple):
+    """What every part of a run works with; `started` are workers that wait for it."""
+
+    options: EstimateOptions
+    output: Output
+    progress: Progress
+    answer: RigAnswer
+    stop: Stop
+    started: list[Any]
+
+    def ends_with(self, result: FrameResult) -> bool:
+        """Tell whether a frame that has failed ends the run, and note it."""
+        ends = self.options.result.fail_fast and result.row.status == "error"
+        self.progress.stopped_early |= ends
+        return ends
+
+
+def _run_frames(frames: Sequence[Frame], run: _Run) -> None:
     """Write the row of each frame, in order; its images are written by then."""
-    with _results(frames, options, output, stop) as results:
+    with _results(frames, run) as results:
         for frame, result in zip(frames, results, strict=False):
-            output.append(frame, result)
-            progress.add(result)
-            answer.add(result.row)
-            if options.result.fail_fast and result.row.status == "error":
-                progress.stopped_early = True
+            run.output.append(frame, result)
+            run.progress.add(result)
+            run.answer.add(result.row)
+            if run.ends_with(result):
                 return
-    if stop.asked and progress.done < progress.total:
-        progress.stopped_early = True
+    if run.stop.asked and run.progress.done < run.progress.total:
+        run.progress.stopped_early = True
 
 
-def _restore_images(options: EstimateOptions, output: Output, progress: Progress, stop: Stop) -> None:
+def _restore_images(run: _Run) -> None:
     """Make the images again that kept rows should have."""
-    frames = output.kept.incomplete
+    frames, progress = run.output.kept.incomplete, run.progress
     if not frames:
         return
     progress.note(f"images are missing or empty for {len(frames)} of the kept rows: they are made again")
     progress.stopped_early = True  # unless every one is made
-    with _results(frames, options, output, stop) as results:
+    with _results(frames, run) as results:
         restored = 0
         for frame, result in zip(frames, results, strict=False):
-            output.restore(frame, result)
+            run.output.restore(frame, result)
             restored += 1
     progress.stopped_early = restored < len(frames)
 
 
-def _retry_failed(
-    plan: Plan, options: EstimateOptions, output: Output, progress: Progress, answer: RigAnswer, stop: Stop
-) -> bool:
+def _retry_failed(plan: Plan, run: _Run) -> bool:
     """Do the failed frames of kept rows again; return whether the run ends here.
 
     A result takes the new rows once the workers have ended, which hold the lock of the file that it was.
     """
-    for first in range(0, len(output.kept.failed), _RETRIED_AT_ONCE):
-        positions = output.kept.failed[first : first + _RETRIED_AT_ONCE]
+    failed, progress = run.output.kept.failed, run.progress
+    for first in range(0, len(failed), _RETRIED_AT_ONCE):
+        positions = failed[first : first + _RETRIED_AT_ONCE]
         frames = [plan.frames[position] for position in positions]
-        with _results(frames, options, output, stop, _name_of(plan.output)) as results:
+        with _results(frames, run, _name_of(plan.output)) as results:
             for position, frame, result in zip(positions, frames, results, strict=False):
-                output.replace(position, frame, result)
+                run.output.replace(position, frame, result)
                 progress.add(result)
-                answer.replace(position, result.row)
-                if options.result.fail_fast and result.row.status == "error":
-                    progress.stopped_early = True
+                run.answer.replace(position, result.row)
+                if run.ends_with(result):
                     return True
-        if stop.asked:
+        if run.stop.asked:
             progress.stopped_early = progress.done < progress.total
             return True
     return False
@@ -159,10 +192,9 @@ def _name_of(result: str) -> str:
 
 
 @contextlib.contextmanager
-def _results(
-    frames: Sequence[Frame], options: EstimateOptions, output: Output, stop: Stop, retry_of: str = ""
-) -> Iterator[Iterator[FrameResult]]:
+def _results(frames: Sequence[Frame], run: _Run, retry_of: str = "") -> Iterator[Iterator[FrameResult]]:
     """Open the results of frames from whichever workers were asked for; the output is complete afterwards."""
+    options, output = run.options, run.output
     told = options.frame._replace(replaces=output.replaces, retry_of=retry_of)
     work = Work(
         partial(estimate_frame, options=told),
@@ -175,9 +207,11 @@ def _results(
         folders=tuple(folder for _, folder in options.images.folders()),
     )
     threads = tasks_in_hand((*shared.files, *shared.folders))
-    workers = Workers(options.running.jobs, options.running.scheduler, shared, output.keep_open, threads)
+    workers = Workers(
+        options.running.jobs, options.running.scheduler, shared, output.keep_open, threads, run.started
+    )
     try:
-        with contextlib.closing(run_tasks(frames, work, stop, workers)) as results:
+        with contextlib.closing(run_tasks(frames, work, run.stop, workers)) as results:
             yield results
     finally:
         output.commit()

@@ -290,7 +290,8 @@ def cannot_start(maps, **how):
     assert done.stderr.startswith("rollcli: a worker process cannot start: ")
     assert done.stderr.endswith("; try fewer of them, with --jobs\n")
     assert done.stderr.count("\n") == 1
-    assert (maps / "rolls.csv").read_bytes().count(b"\n") == 1  # no frame has to answer for it
+    result = maps / "rolls.csv"  # no frame has to answer for it
+    assert not result.exists() or result.read_bytes().count(b"\n") == 1
     return done.stderr
 
 

@@ -113,9 +113,13 @@ class ClusterExecutor(Generic[Task, Result]):
     def workers(self) -> int:
         """The number of threads of the workers that take part; it is asked for once a second."""
         if time.monotonic() - self._looked > _LOOK_S:
-            for worker, problem in self._look_for_workers().items():
-                say(f"worker {worker}: {problem}; it gets no work")
+            self.take_in_workers()
         return max(sum(self._threads_of.values()), 1)
+
+    def take_in_workers(self) -> None:
+        """Take in workers that have joined, and say which of them cannot take part."""
+        for worker, problem in self._look_for_workers().items():
+            say(f"worker {worker}: {problem}; it gets no work")
 
     def submit(self, chunk: Sequence[Task], *, first: bool = False) -> "ClusterFuture[Task, Result]":
         """Queue a chunk for whichever worker is free."""
@@ -182,10 +186,6 @@ class ClusterExecutor(Generic[Task, Result]):
         self._looked = time.monotonic()
         return problems
 
-    def look_again(self) -> None:
-        """Look for workers the next time that their number is asked for."""
-        self._looked = 0.0
-
 
 class ClusterFuture(Generic[Task, Result]):
     """A chunk that was submitted to a cluster.
@@ -216,8 +216,7 @@ class ClusterFuture(Generic[Task, Result]):
         if self._sent.status == "error" and self._tries < _MOST_TRIES:
             error = self._sent.exception()
             if not isinstance(error, self._executor.worker_died):  # of the worker: tasks' errors are results
-                self._executor.look_again()
-                _ = self._executor.workers
+                self._executor.take_in_workers()
                 self.send_again()
                 return False
         return True
@@ -252,17 +251,16 @@ class _RunHere:
         self.threads = ThreadPoolExecutor(threads) if threads > 1 else None
 
 
-_RUNS: dict[str, _RunHere] = {}
+_RUNS: dict[str, _RunHere] = {}  # the last ones, by their ids
 _RUNS_KEPT = 8
 _LOCK = threading.Lock()
 
 
 def _run_here(run: str, threads: int = 1) -> _RunHere:
     with _LOCK:
-        here = _RUNS.setdefault(run, _RunHere(threads))
-        while len(_RUNS) > _RUNS_KEPT:
+        while run not in _RUNS and len(_RUNS) >= _RUNS_KEPT:
             del _RUNS[next(iter(_RUNS))]
-        return here
+        return _RUNS.setdefault(run, _RunHere(threads))
 
 
 def _stop_run(run: str) -> None:

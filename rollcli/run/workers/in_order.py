@@ -2,8 +2,8 @@
 
 from collections import deque
 from collections.abc import Generator, Iterable, Sequence
-from dataclasses import dataclass
-from typing import Protocol, TypeVar
+from dataclasses import dataclass, field
+from typing import Any, Protocol, TypeVar
 
 from rollcli.run.workers.chunks import Chunks, Done, Result, Task
 from rollcli.run.workers.interrupt import Stop
@@ -42,6 +42,8 @@ class Workers:
     threads : int
         Tasks that each worker has in hand at once: more than one where they wait for the network. One of
         them computes at a time.
+    started : list of pool.Worker
+        Processes that were started before the tasks were known; those that are used are taken out.
     """
 
     jobs: int | None = None
@@ -49,6 +51,7 @@ class Workers:
     shared: SharedPaths = SharedPaths()
     keep_open: int | None = None
     threads: int = 1
+    started: list[Any] = field(default_factory=list)
 
 
 _Task = TypeVar("_Task", contravariant=True)

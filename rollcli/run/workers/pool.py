@@ -73,6 +73,8 @@ class PoolExecutor(Generic[Task, Result]):
         A file descriptor that they inherit and keep open until they end.
     threads : int
         Tasks that each has in hand at once; see `files.stores.turns`.
+    started : list of Worker, optional
+        Processes to begin with; they are taken out of the list.
 
     Raises
     ------
@@ -83,7 +85,12 @@ class PoolExecutor(Generic[Task, Result]):
     worker_died: tuple[type[BaseException], ...] = (WorkerDiedError,)
 
     def __init__(
-        self, workers: int, work: Work[Task, Result], keep_open: int | None = None, threads: int = 1
+        self,
+        workers: int,
+        work: Work[Task, Result],
+        keep_open: int | None = None,
+        threads: int = 1,
+        started: "list[Worker[Task, Result]] | None" = None,
     ) -> None:
         self.workers, self.threads = workers, threads
         self._work, self._keep_open, self._stopped = work, keep_open, False
@@ -91,7 +98,7 @@ class PoolExecutor(Generic[Task, Result]):
         self._queue: deque[PoolFuture[Task, Result]] = deque()
         try:
             for _ in range(workers):
-                self._pool.append(self._started())
+                self._pool.append(self._begun(started.pop() if started else Worker()))
         except BaseException:
             self.close(at_once=True)
             raise
@@ -184,10 +191,9 @@ class PoolExecutor(Generic[Task, Result]):
         self._queue.extendleft(reversed(worker.in_hand))
         worker.join()
         if not self._stopped:
-            self._pool[index] = self._started()
+            self._pool[index] = self._begun(Worker())
 
-    def _started(self) -> "Worker[Task, Result]":
-        worker: Worker[Task, Result] = Worker()
+    def _begun(self, worker: "Worker[Task, Result]") -> "Worker[Task, Result]":
         worker.begin(self._work.do, self._keep_open, self.threads)
         return worker
 

@@ -1,13 +1,16 @@
 """The one entry of this package: run tasks on the workers that were asked for."""
 
+import contextlib
 import os
-from collections.abc import Generator, Iterable, Sized
+from collections.abc import Callable, Generator, Iterable, Iterator, Sized
 from typing import Any
 
 from rollcli.run.workers.chunks import Result, Task, Work
 from rollcli.run.workers.in_order import Workers, in_order
 from rollcli.run.workers.interrupt import Stop
 from rollcli.run.workers.pool import prepare_worker
+
+_MOST_EARLY = 4  # of the workers: there may be fewer tasks, and those of a longer run need not hurry
 
 
 def run_tasks(
@@ -35,6 +38,36 @@ def run_tasks(
         except KeyboardInterrupt:  # the second Ctrl-C, while they end
             executor.close(at_once=True)
             raise
+
+
+@contextlib.contextmanager
+def started_early(jobs: int | None, load: Callable[[], None]) -> Iterator[list[Any]]:
+    """Start a few worker processes while the tasks are still looked for; those that nobody takes end.
+
+    Parameters
+    ----------
+    jobs : int or None
+        The workers that were asked for; None: one for each usable processor.
+    load : callable
+        What a worker loads, apart from what all of them load.
+
+    Raises
+    ------
+    WorkerError
+        This machine starts no further process.
+    """
+    from rollcli.run.workers.pool import Worker
+
+    most = min(jobs or _usable_processors(), _MOST_EARLY)
+    started: list[Worker[Any, Any]] = []
+    try:
+        for _ in range(most if most > 1 else 0):
+            started.append(Worker(load))
+        yield started
+    finally:
+        for worker in started:
+            worker.kill()
+            worker.join()
 
 
 def require_scheduler(address: str | None) -> None:
@@ -74,7 +107,7 @@ def _executor(count: int | None, work: Work[Any, Any], workers: Workers) -> Any:
     if jobs > 1 or (jobs and workers.threads > 1):
         from rollcli.run.workers.pool import PoolExecutor
 
-        return PoolExecutor(jobs, work, workers.keep_open, workers.threads)
+        return PoolExecutor(jobs, work, workers.keep_open, workers.threads, workers.started)
     return None
 
 
