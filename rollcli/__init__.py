@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from rollcli.estimator.estimate import RollEstimate as RollEstimate
     from rollcli.files.encodings import read_disparity as read_disparity
     from rollcli.pictures.derotate import derotate as derotate
+    from rollcli.pictures.heights import height_map as height_map
     from rollcli.pictures.vdisparity import v_disparity as v_disparity
     from rollcli.rig.calibration import Calibration as Calibration
     from rollcli.rig.drive.assess import RigAssessment as RigAssessment
@@ -31,6 +32,7 @@ _HOMES = {
     "compute_disparity": "rollcli.stereo.match",
     "derotate": "rollcli.pictures.derotate",
     "estimate_roll": "rollcli.rig.pose",
+    "height_map": "rollcli.pictures.heights",
     "read_calibration": "rollcli.run.calibration",
     "read_disparity": "rollcli.files.encodings",
     "v_disparity": "rollcli.pictures.vdisparity",
@@ -45,6 +47,7 @@ __all__ = [
     "compute_disparity",
     "derotate",
     "estimate_roll",
+    "height_map",
     "read_calibration",
     "read_disparity",
     "v_disparity",

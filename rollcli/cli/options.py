@@ -3,10 +3,12 @@
 from typing import Any
 
 from rollcli.cli.command import argument, option, record
-from rollcli.cli.types import Choice, FilePath, Number, NumberOrNan, Point, Polygon, Roi
+from rollcli.cli.types import Choice, FilePath, Number, NumberOrNan, Point, Polygon, Roi, Span
 from rollcli.estimator.request import MAX_ROLL_LIMIT_DEG, METHODS, MODELS, ROADS
 from rollcli.rig.calibration import CalibrationOptions
+from rollcli.run.image_kinds import KINDS
 from rollcli.run.options import (
+    HEIGHTS_RANGE,
     EncodingOptions,
     ImageOptions,
     InputOptions,
@@ -235,13 +237,23 @@ method_options = record(
     ),
 )
 
+heights_range_option = option(
+    "--heights-range",
+    section="Output",
+    type=Span(wide=True),
+    default=HEIGHTS_RANGE,
+    show_default=False,
+    help="Heights with the outermost colours of a preview, A:B, metres or camera heights.  "
+    f"[default: {HEIGHTS_RANGE[0]:.2f}:{HEIGHTS_RANGE[1]:.2f}]",
+)
+
 save_as_option = option(
     "--save-as",
     section="Output",
     type=Choice("png", "tiff", "npy"),
     default="png",
     help="Format of maps computed from pairs: 16-bit KITTI PNG (TIFF for a map beyond its 256 px), float32 "
-    "TIFF or float32 NPY.",
+    "TIFF or float32 NPY; of heights: TIFF, or NPY.",
 )
 
 output_folder_option = option(
@@ -258,22 +270,8 @@ image_options = record(
     "images",
     "Images to write, named after their input",
     ImageOptions,
-    option(
-        "--derotated", type=PATH, metavar="DIR", help="The map rotated upright; type and format of the input."
-    ),
-    option(
-        "--vdisparity",
-        type=PATH,
-        metavar="DIR",
-        help="v-disparity of the map rotated upright, with the road, PNG; vdisparity draws maps as they are.",
-    ),
-    option("--disparity", type=PATH, metavar="DIR", help="The disparity map that was computed from a pair."),
-    option(
-        "--road-mask",
-        type=PATH,
-        metavar="DIR",
-        help="The found road, drawn on the left image of a pair or on the map, PNG.",
-    ),
+    *(option(f"--{kind.name.replace('_', '-')}", type=PATH, metavar="DIR", help=kind.help) for kind in KINDS),
+    heights_range_option,
     save_as_option,
 )
 

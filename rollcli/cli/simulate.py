@@ -1,6 +1,5 @@
 """`rollcli simulate`: render stereo pairs whose roll is known."""
 
-import math
 import re
 from dataclasses import replace
 from typing import Any
@@ -11,7 +10,7 @@ from rollcli.cli.command import argument, command, option, record
 from rollcli.cli.config import config_option
 from rollcli.cli.estimate import one_start, resume_command
 from rollcli.cli.options import PATH, running_options
-from rollcli.cli.types import Choice, Number, ParamType, Point
+from rollcli.cli.types import Choice, Number, ParamType, Point, Span
 from rollcli.run.options import RunningOptions
 from rollcli.simulate.options import (
     BASELINE,
@@ -30,25 +29,6 @@ from rollcli.simulate.options import (
     SIZE,
     SimulateOptions,
 )
-
-
-class Span(ParamType):
-    """A:B, from the lowest to the highest; one number stands for both."""
-
-    name = "A:B"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[float, float]:
-        if isinstance(value, tuple):
-            return value  # the default
-        try:
-            ends = [float(end) for end in str(value).split(":")]
-        except ValueError:
-            ends = []
-        if len(ends) not in (1, 2) or not all(map(math.isfinite, ends)) or ends[0] > ends[-1]:
-            self.fail(f"{value!r} is not A:B with A <= B, such as -5:5, nor a single number", param, ctx)
-        return ends[0], ends[-1]
 
 
 class Size(ParamType):

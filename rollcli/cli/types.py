@@ -115,6 +115,30 @@ class Number(ParamType):
         )
 
 
+class Span(ParamType):
+    """A:B, from the lowest to the highest; one number stands for both, unless they must differ."""
+
+    name = "A:B"
+
+    def __init__(self, *, wide: bool = False) -> None:
+        self.wide = wide
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[float, float]:
+        if isinstance(value, tuple):
+            return value  # the default
+        try:
+            ends = [float(end) for end in str(value).split(":")]
+        except ValueError:
+            ends = []
+        if self.wide and (len(ends) != 2 or not ends[0] < ends[1] or not all(map(math.isfinite, ends))):
+            self.fail(f"{value!r} is not A:B with A < B, such as -0.1:0.1", param, ctx)
+        if len(ends) not in (1, 2) or not all(map(math.isfinite, ends)) or ends[0] > ends[-1]:
+            self.fail(f"{value!r} is not A:B with A <= B, such as -5:5, nor a single number", param, ctx)
+        return ends[0], ends[-1]
+
+
 class NumberOrNan(ParamType):
     """Any number that a pixel may hold: also nan and inf."""
 

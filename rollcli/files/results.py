@@ -131,6 +131,13 @@ class Row:
     message: str = ""
     elapsed_ms: float | None = None
 
+    @property
+    def alpha(self) -> tuple[float, float, float] | None:
+        """The road's parabola, px; None where the row has none."""
+        if self.alpha0 is None or self.alpha1 is None or self.alpha2 is None:
+            return None
+        return self.alpha0, self.alpha1, self.alpha2
+
 
 STATUSES = ("ok", "suspect", "error")
 TIMING = "elapsed_ms"

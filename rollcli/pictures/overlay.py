@@ -1,5 +1,6 @@
 """Pictures of disparity maps, and of the road found in them."""
 
+from collections.abc import Iterable
 from typing import Any
 
 import cv2
@@ -73,10 +74,7 @@ def draw_road_on_photo(photo: NDArray[Any], mask: NDArray[Any]) -> NDArray[np.ui
         BGR.
     """
     road = (np.asarray(mask) != 0).astype(np.uint8)
-    pixels = photo if photo.dtype == np.uint8 else (photo >> 8).astype(np.uint8)
-    if pixels.shape[:2] != road.shape:
-        pixels = cv2.resize(pixels, road.shape[::-1], interpolation=cv2.INTER_AREA)
-    picture = cv2.cvtColor(pixels, cv2.COLOR_GRAY2BGR) if pixels.ndim == 2 else pixels.copy()
+    picture = as_bgr(photo, (road.shape[1], road.shape[0]))
     tinted = (picture * (1 - _TINT) + np.array(_ROAD) * _TINT).astype(np.uint8)
     return _outlined(cv2.copyTo(tinted, road, picture).astype(np.uint8, copy=False), road)
 
@@ -95,16 +93,47 @@ def draw_preview(disparity: NDArray[Any]) -> NDArray[np.uint8]:
         BGR.
     """
     picture = draw_disparity(disparity)
+    height, top = len(picture), _top(np.asarray(disparity))
+    step = round_step(top * _LABEL_EVERY / height) if height > _LABEL_EVERY else top
+    labels = (number * step for number in range(int(top / step * (1 + 1e-9)) + 1))
+    ticks = [(label / top, f"{label:g}" if label else "0 px") for label in labels]
+    return with_bar(picture, _colours()[:0:-1], ticks)
+
+
+def as_bgr(photo: NDArray[Any], size: tuple[int, int]) -> NDArray[np.uint8]:
+    """Return a new BGR image, uint8, of a camera image, grey or BGR, uint8 or uint16, at (width, height)."""
+    pixels = photo if photo.dtype == np.uint8 else (photo >> 8).astype(np.uint8)
+    if pixels.shape[1::-1] != size:
+        pixels = cv2.resize(pixels, size, interpolation=cv2.INTER_AREA)
+    picture = cv2.cvtColor(pixels, cv2.COLOR_GRAY2BGR) if pixels.ndim == 2 else pixels.copy()
+    return picture.astype(np.uint8, copy=False)
+
+
+def with_bar(
+    picture: NDArray[np.uint8], colours: NDArray[np.uint8], ticks: Iterable[tuple[float, str]]
+) -> NDArray[np.uint8]:
+    """Put a colour bar on the right of a picture.
+
+    Parameters
+    ----------
+    picture : ndarray of uint8, shape (H, W, 3)
+        BGR.
+    colours : ndarray of uint8, shape (N, 3)
+        BGR, the topmost first.
+    ticks : iterable of (float, str)
+        Places along the bar, 0 at its bottom and 1 at its top, and what is written there.
+
+    Returns
+    -------
+    ndarray of uint8, shape (H, W + BAR_WIDTH, 3)
+        BGR.
+    """
     height = len(picture)
     bar = np.full((height, BAR_WIDTH, 3), 255, np.uint8)
-    levels = np.linspace(255, 1, height).astype(np.uint8)[:, None]
-    bar[:, 8:24] = _coloured(levels, _colours())
-    top = _top(np.asarray(disparity))
-    step = round_step(top * _LABEL_EVERY / height) if height > _LABEL_EVERY else top
-    for number in range(int(top / step * (1 + 1e-9)) + 1):
-        label = number * step
-        row = min(max(round((1 - label / top) * (height - 1)) + 4, 9), height - 4)
-        text = f"{label:g}" if label else "0 px"
+    levels = np.linspace(len(colours) - 1, 0, height).astype(np.intp)
+    bar[:, 8:24] = colours[::-1][levels][:, None]
+    for place, text in ticks:
+        row = min(max(round((1 - place) * (height - 1)) + 4, 9), height - 4)
         cv2.putText(bar, text, (28, row), _FONT, 0.36, _INK, 1, cv2.LINE_AA)
     return np.hstack([picture, bar])
 

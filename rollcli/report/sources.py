@@ -13,6 +13,7 @@ from rollcli.files.results import Row
 from rollcli.files.search import objects_behind
 from rollcli.files.stores.locations import base_name, is_remote, is_url, store_of
 from rollcli.run.frame import Frame
+from rollcli.run.image_kinds import KINDS, ImageKind
 from rollcli.run.options import ImageOptions
 
 WIDEST, SUSPECT, SPREAD = "widest interval", "suspect", "evenly spread"
@@ -60,9 +61,6 @@ def spread(places: Sequence[int], count: int) -> list[int]:
 def _without(places: Sequence[int], chosen: Sequence[Choice]) -> list[int]:
     taken = {each.place for each in chosen}
     return [place for place in places if place not in taken]
-
-
-KINDS = ("derotated", "vdisparity", "disparity", "road_mask")
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,13 +197,13 @@ class _ImageFolder:
 
 
 def _images(row: Row, images: _ImageFolder, recorded: ImageOptions) -> dict[str, str]:
-    return {kind: path for kind in KINDS if (path := _image(kind, row, images, recorded))}
+    return {kind.name: path for kind in KINDS if (path := _image(kind, row, images, recorded))}
 
 
-def _image(kind: str, row: Row, images: _ImageFolder, recorded: ImageOptions) -> str | None:
-    for folder in _folders(kind, images, getattr(recorded, kind)):
+def _image(kind: ImageKind, row: Row, images: _ImageFolder, recorded: ImageOptions) -> str | None:
+    for folder in _folders(kind.name, images, getattr(recorded, kind.name)):
         for name in _tails(row.file):
-            for ending in (".png",) if kind in ("vdisparity", "road_mask") else MAP_ENDINGS:
+            for ending in (".png",) if kind.holds == "picture" else MAP_ENDINGS:
                 if found := images.find(f"{folder}{name}{ending}"):
                     return found
     return None

@@ -7,6 +7,7 @@ from functools import partial
 
 from rollcli.errors import ExitStatus
 from rollcli.files.atomic import remove_leftovers
+from rollcli.files.results import Row
 from rollcli.files.stores.locations import tasks_in_hand
 from rollcli.run.find import check_one_owner, check_places, check_writes, list_files
 from rollcli.run.frame import Frame, FrameResult, failed_frame
@@ -31,20 +32,20 @@ class Conversion:
         The files that are written.
     roll : float
         Angle to rotate by, radians.
+    row : Row or None
+        Of the frame in a result.
     refused : str
         Why this frame cannot be converted; empty when it can.
     keeps_numbers : bool
         What is stored stays as it is: how it is read does not matter.
-    alpha : tuple of float, or None
-        The road's parabola of a result, px.
     """
 
     frame: Frame
     writes: tuple[str, ...]
     roll: float = 0.0
+    row: Row | None = None
     refused: str = ""
     keeps_numbers: bool = False
-    alpha: tuple[float, float, float] | None = None
 
 
 def convert(

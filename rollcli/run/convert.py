@@ -5,15 +5,13 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 
 from rollcli.errors import ExitStatus, UsageError
-from rollcli.files.matching import match_paths
-from rollcli.files.naming import listed
-from rollcli.files.results import Row, read_result
-from rollcli.messages import say
+from rollcli.files.results import Row
 from rollcli.report.page import require_extra
 from rollcli.run.calibration import check_depth, check_first_size
 from rollcli.run.conversion import Conversion, convert
 from rollcli.run.find import map_frames, pair_frames
 from rollcli.run.frame import Frame, FrameResult
+from rollcli.run.image_kinds import ENDING_OF_FORMAT
 from rollcli.run.options import (
     CountOptions,
     DerotateOptions,
@@ -21,11 +19,10 @@ from rollcli.run.options import (
     EncodingOptions,
     FrameOptions,
     MethodOptions,
-    RotationOptions,
-    RunningOptions,
     VDisparityOptions,
 )
-from rollcli.run.outputs import ENDING_OF_FORMAT, output_path, roomy_path
+from rollcli.run.outputs import output_path, roomy_path
+from rollcli.run.result_rows import rows_of
 
 
 def run_derotate(options: DerotateOptions) -> ExitStatus:
@@ -46,57 +43,16 @@ def _conversions(frames: Sequence[Frame], options: DerotateOptions) -> Iterator[
     rotation = options.rotation
     rows: Sequence[Row | None] = [None] * len(frames)
     if rotation.result is not None:
-        rows = found = rows_of(frames, rotation.result)
-        _tell_suspects(found, rotation, options.running)
+        quiet = options.running.quiet
+        rows = rows_of(frames, rotation.result, skip_suspect=rotation.skip_suspect, quiet=quiet)
     for frame, row in zip(frames, rows, strict=True):
         if row is not None and row.status == "suspect" and rotation.skip_suspect:
             continue
         roll_deg = rotation.roll_deg if row is None else row.roll_deg
         refused = "" if roll_deg is not None else f"has no angle in {rotation.result}"
         writes = (output_path(frame, options.output),)
-        yield Conversion(frame, writes, math.radians(roll_deg or 0.0), refused, keeps_numbers=True)
-
-
-def _tell_suspects(rows: Sequence[Row], rotation: RotationOptions, running: RunningOptions) -> None:
-    """Say how many angles are suspect, and whether they are used.
-
-    Raises
-    ------
-    UsageError
-        They are left out, and there are no others.
-    """
-    suspects = sum(row.status == "suspect" for row in rows)
-    if rotation.skip_suspect and suspects == len(rows):
-        raise UsageError(f"{rotation.result}: every angle is suspect: --skip-suspect leaves out all maps")
-    if not suspects or running.quiet:
-        return
-    of = f"{rotation.result}: {suspects} of {len(rows)} angles {'is' if suspects == 1 else 'are'} suspect"
-    if rotation.skip_suspect:
-        say(f"{of}; such maps are left out")
-    else:
-        say(f"{of} and used; --skip-suspect leaves such maps out")
-
-
-def rows_of(frames: Sequence[Frame], result: str, *, every_row: bool = True) -> list[Row]:
-    """Find the row of each frame.
-
-    Raises
-    ------
-    UsageError
-        Names maps without a row, with `every_row` rows that have an angle but no map, and what matches more
-        than one.
-    """
-    rows = read_result(result).rows
-    found = match_paths([frame.file for frame in frames], [row.file for row in rows], result)
-    alone = [frame.file for frame, at in zip(frames, found, strict=True) if at is None]
-    if alone:
-        raise UsageError(f"{result}: has no row for {listed(alone)}")
-    used = [at for at in found if at is not None]
-    lost = [rows[at] for at in sorted(set(range(len(rows))).difference(used))]
-    if every_row and any(row.roll_deg is not None for row in lost):
-        names = listed(row.file for row in lost if row.roll_deg is not None)
-        raise UsageError(f"{result}: no map is given for its rows of {names}")
-    return [rows[at] for at in used]
+        roll = math.radians(roll_deg or 0.0)
+        yield Conversion(frame, writes, roll, refused=refused, keeps_numbers=True)
 
 
 def _derotate(conversion: Conversion, options: FrameOptions, expand: bool) -> FrameResult:
@@ -158,12 +114,10 @@ def _vdisparity_conversions(frames: Sequence[Frame], options: VDisparityOptions)
     if result is None:
         yield from (Conversion(frame, _vdisparity_writes(frame, options)) for frame in frames)
         return
-    for frame, row in zip(frames, rows_of(frames, result, every_row=False), strict=True):
+    rows = rows_of(frames, result, quiet=options.running.quiet, every_row=False)
+    for frame, row in zip(frames, rows, strict=True):
         refused = "" if row.roll_deg is not None else f"has no angle in {result}"
-        coefficients = [each for each in (row.alpha0, row.alpha1, row.alpha2) if each is not None]
-        alpha = (coefficients[0], coefficients[1], coefficients[2]) if len(coefficients) == 3 else None
-        roll = math.radians(row.roll_deg or 0.0)
-        yield Conversion(frame, _vdisparity_writes(frame, options), roll, refused, alpha=alpha)
+        yield Conversion(frame, _vdisparity_writes(frame, options), row=row, refused=refused)
 
 
 def _vdisparity_writes(frame: Frame, options: VDisparityOptions) -> tuple[str, ...]:

@@ -1,5 +1,6 @@
 """Convert one frame, on a worker: read, compute, write."""
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -10,6 +11,7 @@ from rollcli.estimator.estimate import RollEstimate, estimate_roll
 from rollcli.files.codecs.png import encode_png
 from rollcli.files.formats import encode_stored
 from rollcli.files.results import Row
+from rollcli.pictures.heights import FittedRoad, heights_over, unit_of
 from rollcli.pictures.overlay import draw_preview
 from rollcli.pictures.vdisparity import draw_v_disparity, middle_row, profile, v_disparity
 from rollcli.rig.calibration import Calibration
@@ -18,7 +20,13 @@ from rollcli.run.conversion import Conversion
 from rollcli.run.diagnosis import looks_like
 from rollcli.run.frame import FrameResult
 from rollcli.run.frame_errors import guarded
-from rollcli.run.images import TOO_LARGE_FOR_PNG, encode_computed, encode_turned
+from rollcli.run.images import (
+    TOO_LARGE_FOR_PNG,
+    encode_computed,
+    encode_heights,
+    encode_heights_preview,
+    encode_turned,
+)
 from rollcli.run.options import CountOptions, FrameOptions
 from rollcli.run.outputs import write_outputs
 from rollcli.run.read import Source, read_source
@@ -58,15 +66,40 @@ def count_map(conversion: Conversion, options: FrameOptions, count: CountOptions
     return replace(result, warning="; ".join(filter(None, [result.warning, likeness])))
 
 
+def heights_of_map(conversion: Conversion, options: FrameOptions, result: str) -> FrameResult:
+    """Write the heights of the map over the road of its row, and a picture of them if that was requested."""
+    row, frame = conversion.row, conversion.frame
+
+    def make(source: Source) -> dict[str, bytes]:
+        height, width = source.disparity.shape
+        calibration = None if frame.calibration is None else frame.calibration.for_size(width, height)
+        road = None if row is None else FittedRoad.of_row(row, calibration)
+        if road is None:
+            raise InputError(f"{frame.file}: its row in {result} has no road (alpha0, alpha1, alpha2)")
+        if (road.width, road.height) != (width, height):
+            raise InputError(
+                f"{frame.file}: has {width}x{height} px, its row in {result} {road.width}x{road.height}: "
+                "name the result of these maps"
+            )
+        heights, unit = heights_over(source.disparity, road, calibration), unit_of(calibration)
+        images = [encode_heights(heights, options.images.save_as, unit)]
+        if len(conversion.writes) > 1:
+            images.append(encode_heights_preview(heights, options.images.heights_range, unit))
+        return dict(zip(map(options.at, conversion.writes), images, strict=True))
+
+    return _convert(conversion, options, make)
+
+
 def draw_figure(conversion: Conversion, options: FrameOptions, count: CountOptions) -> FrameResult:
     """Write the figure of the map and its v-disparity, by the angle of a result or by its own estimate."""
     from rollcli.run.vdisparity_figure import v_disparity_figure  # loads matplotlib, an extra
 
     def make(source: Source) -> dict[str, bytes]:
-        theta, alpha = conversion.roll, conversion.alpha
-        if count.result is None:
+        if conversion.row is None:
             estimate = estimate_roll(source.disparity)
             theta, alpha = estimate.theta, estimate.alpha
+        else:
+            theta, alpha = math.radians(conversion.row.roll_deg or 0.0), conversion.row.alpha
         figure = v_disparity_figure(
             source.disparity,
             theta,

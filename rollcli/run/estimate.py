@@ -32,7 +32,7 @@ def load_estimator() -> None:
     from rollcli.run.workers.pool import prepare_worker
 
     prepare_worker()
-    import rollcli.batch.frame_task  # noqa: F401 (to have loaded it)
+    import rollcli.run.estimate_frame  # noqa: F401 (to have loaded it)
 
 
 def estimate_frame(frame: Frame, options: FrameOptions) -> FrameResult:

@@ -8,11 +8,11 @@ from rollcli.errors import EstimationError
 from rollcli.estimator.estimate import RollEstimate, estimate_roll
 from rollcli.files.results import Row
 from rollcli.rig.calibration import Calibration
-from rollcli.rig.pose import horizon_row, with_pose
+from rollcli.rig.pose import with_pose
 from rollcli.run.diagnosis import looks_like
 from rollcli.run.frame import Frame, FrameResult
 from rollcli.run.frame_errors import guarded
-from rollcli.run.images import encode_images
+from rollcli.run.images import Pictured, encode_images
 from rollcli.run.options import FrameOptions
 from rollcli.run.outputs import every_path, write_outputs
 from rollcli.run.read import Source, read_source
@@ -40,9 +40,8 @@ def _estimate(frame: Frame, options: FrameOptions, images: dict[str, bytes]) -> 
     source = read_source(frame, options)
     estimate, likeness = _estimate_roll(source, options)
     calibration = _calibration(frame, source, estimate)
-    horizon = None if calibration is None else horizon_row(estimate.tangent, calibration)
     # the images are turned by the angle of the pixels, which is not the rig's where fx and fy differ
-    made, note = encode_images(frame, source, estimate, options, horizon)
+    made, note = encode_images(frame, Pictured(source, estimate, options, calibration))
     if calibration is not None:
         estimate = with_pose(estimate, calibration)
     row = _row(frame, source, estimate, note, likeness)

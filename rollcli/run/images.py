@@ -1,6 +1,8 @@
 """Draw, encode and write the images of a frame."""
 
 from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -8,11 +10,16 @@ from numpy.typing import NDArray
 
 from rollcli.estimator.estimate import RollEstimate
 from rollcli.files.codecs.png import encode_png
+from rollcli.files.codecs.tiff import encode_tiff
 from rollcli.files.encodings import KITTI_TOP, Encoding, from_disparity
 from rollcli.files.formats import Stored, encode_stored
 from rollcli.pictures.derotate import derotate
+from rollcli.pictures.heights import FittedRoad, heights_over, unit_of
+from rollcli.pictures.heights_preview import draw_heights
 from rollcli.pictures.overlay import draw_road, draw_road_on_photo
 from rollcli.pictures.vdisparity import draw_v_disparity, row_offset, v_disparity
+from rollcli.rig.calibration import Calibration
+from rollcli.rig.pose import horizon_row
 from rollcli.run.frame import Frame
 from rollcli.run.options import FrameOptions
 from rollcli.run.outputs import image_paths, roomy_path
@@ -21,21 +28,37 @@ from rollcli.run.read import Source
 TOO_LARGE_FOR_PNG = f"written as TIFF: a disparity is above the {KITTI_TOP:.0f} px of a KITTI PNG"
 
 
-def encode_images(
-    frame: Frame,
-    source: Source,
-    estimate: RollEstimate,
-    options: FrameOptions,
-    horizon: float | None = None,
-) -> tuple[dict[str, bytes], str]:
-    """Make the images that were requested, by their paths, and what the row should say of them.
+@dataclass(frozen=True)  # without slots, for the cached heights
+class Pictured:
+    """A frame whose images are made.
 
-    `horizon` is the y of the road's horizon, px, where a calibration tells it.
+    Attributes
+    ----------
+    source : Source
+    estimate : RollEstimate
+        In the pixels of the map: its roll is not the rig's where fx and fy differ.
+    options : FrameOptions
+    calibration : Calibration or None
+        Of the map.
     """
+
+    source: Source
+    estimate: RollEstimate
+    options: FrameOptions
+    calibration: Calibration | None = None
+
+    @cached_property
+    def heights(self) -> NDArray[np.float32]:
+        """The heights over the road; an image and its preview share them."""
+        return heights_over(self.source.shown, FittedRoad.of_estimate(self.estimate), self.calibration)
+
+
+def encode_images(frame: Frame, pictured: Pictured) -> tuple[dict[str, bytes], str]:
+    """Make the images that were requested, by their paths, and what the row should say of them."""
     images, note = {}, ""
-    for kind, path in image_paths(frame, options.images):
-        planned = options.at(path)
-        target, data = _ENCODERS[kind](planned, source, estimate, options, horizon)
+    for kind, path in image_paths(frame, pictured.options.images):
+        planned = pictured.options.at(path)
+        target, data = _ENCODERS[kind.name](planned, pictured)
         images[target] = data
         if target != planned:
             note = TOO_LARGE_FOR_PNG
@@ -65,44 +88,66 @@ def encode_computed(path: str, disparity: NDArray[Any], save_as: str) -> tuple[s
     return (roomy_path(path) if save_as == "png" else path), data
 
 
+def encode_heights(heights: NDArray[np.float32], save_as: str, unit: str) -> bytes:
+    """Encode heights over the road as a float32 TIFF, which names their unit, or NPY."""
+    if save_as == "npy":
+        return encode_stored(heights, "npy")
+    return encode_tiff(heights, description=f"height over the road, {unit}")
+
+
+def encode_heights_preview(
+    heights: NDArray[np.float32], span: tuple[float, float], unit: str, photo: NDArray[Any] | None = None
+) -> bytes:
+    """Draw heights over the road, over the left image where there is one, and encode them."""
+    return encode_png(draw_heights(heights, span, unit, photo))
+
+
 _Named = tuple[str, bytes]
 
 
-def _derotated(
-    path: str, source: Source, estimate: RollEstimate, options: FrameOptions, horizon: float | None
-) -> _Named:
+def _derotated(path: str, of: Pictured) -> _Named:
+    source, theta = of.source, of.estimate.theta
     if source.stored is None:
-        return encode_computed(path, derotate(source.shown, estimate.theta), options.images.save_as)
-    return path, encode_turned(source.stored, estimate.theta, source.encoding, options.encoding.invalid)
+        return encode_computed(path, derotate(source.shown, theta), of.options.images.save_as)
+    return path, encode_turned(source.stored, theta, source.encoding, of.options.encoding.invalid)
 
 
-def _v_disparity(
-    path: str, source: Source, estimate: RollEstimate, options: FrameOptions, horizon: float | None
-) -> _Named:
-    histogram = v_disparity(derotate(source.shown, estimate.theta))
+def _v_disparity(path: str, of: Pictured) -> _Named:
+    estimate = of.estimate
+    histogram = v_disparity(derotate(of.source.shown, estimate.theta))
     offset = row_offset(estimate.theta, estimate.width, estimate.height)
+    horizon = None if of.calibration is None else horizon_row(estimate.tangent, of.calibration)
     row = None if horizon is None else horizon - offset
     return path, encode_png(draw_v_disparity(histogram, estimate.alpha, offset, row))
 
 
-def _disparity(
-    path: str, source: Source, estimate: RollEstimate, options: FrameOptions, horizon: float | None
-) -> _Named:
-    return encode_computed(path, source.shown, options.images.save_as)
+def _disparity(path: str, of: Pictured) -> _Named:
+    return encode_computed(path, of.source.shown, of.options.images.save_as)
 
 
-def _road_mask(
-    path: str, source: Source, estimate: RollEstimate, options: FrameOptions, horizon: float | None
-) -> _Named:
-    assert estimate.road_mask is not None  # the frame's task asks for it
+def _road_mask(path: str, of: Pictured) -> _Named:
+    source, road = of.source, of.estimate.road_mask
+    assert road is not None  # the frame's task asks for it
     if source.photo is not None:
-        return path, encode_png(draw_road_on_photo(source.photo, estimate.road_mask))
-    return path, encode_png(draw_road(source.shown, estimate.road_mask))
+        return path, encode_png(draw_road_on_photo(source.photo, road))
+    return path, encode_png(draw_road(source.shown, road))
 
 
+def _heights(path: str, of: Pictured) -> _Named:
+    return path, encode_heights(of.heights, of.options.images.save_as, unit_of(of.calibration))
+
+
+def _heights_preview(path: str, of: Pictured) -> _Named:
+    span = of.options.images.heights_range
+    return path, encode_heights_preview(of.heights, span, unit_of(of.calibration), of.source.photo)
+
+
+# by the names of `KINDS`
 _ENCODERS = {
     "derotated": _derotated,
     "vdisparity": _v_disparity,
     "disparity": _disparity,
     "road_mask": _road_mask,
+    "heights": _heights,
+    "heights_preview": _heights_preview,
 }

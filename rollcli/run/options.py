@@ -7,7 +7,10 @@ from typing import Any, Literal, NamedTuple
 
 from rollcli.estimator.request import LAMBDA0, MAX_INTERVAL_DEG, MAX_ROLL_DEG, TOLERANCE_DEG, LearningRate
 from rollcli.rig.calibration import CalibrationOptions
+from rollcli.run.image_kinds import KINDS, ImageKind, Save
 from rollcli.stereo.options import StereoOptions
+
+HEIGHTS_RANGE = (-0.10, 0.10)
 
 
 class InputOptions(NamedTuple):
@@ -71,18 +74,28 @@ class MethodOptions(NamedTuple):
 
 
 class ImageOptions(NamedTuple):
-    """Which images to write, each kind into a folder of its own."""
+    """Which images to write, each kind of `image_kinds` into a folder of its own.
+
+    `heights_range` is what has the outermost colours of a preview, lowest first, in the heights' unit.
+    """
 
     derotated: str | None = None
     vdisparity: str | None = None
     disparity: str | None = None
     road_mask: str | None = None
-    save_as: Literal["png", "tiff", "npy"] = "png"
+    heights: str | None = None
+    heights_preview: str | None = None
+    heights_range: tuple[float, float] = HEIGHTS_RANGE
+    save_as: Save = "png"
 
-    def folders(self) -> list[tuple[str, str]]:
+    def folders(self) -> list[tuple[ImageKind, str]]:
         """List (kind, folder) of the images that were requested."""
-        kinds = ("derotated", "vdisparity", "disparity", "road_mask")
-        return [(kind, folder) for kind in kinds if (folder := getattr(self, kind)) is not None]
+        return [(kind, folder) for kind in KINDS if (folder := getattr(self, kind.name)) is not None]
+
+    @property
+    def needs_photo(self) -> bool:
+        """Whether something is drawn on the left image of a pair."""
+        return self.road_mask is not None or self.heights_preview is not None
 
 
 class RunningOptions(NamedTuple):
@@ -206,6 +219,22 @@ class DerotateOptions:
     rotation: RotationOptions
     output: str
     encoding: EncodingOptions
+    running: RunningOptions
+
+
+@dataclass(frozen=True)
+class HeightsOptions:
+    """Every option of `rollcli heights`. `result` has the road of each map."""
+
+    inputs: InputOptions
+    result: str
+    skip_suspect: bool
+    output: str
+    preview: str | None
+    heights_range: tuple[float, float]
+    save_as: Literal["tiff", "npy"]
+    encoding: EncodingOptions
+    calibration: CalibrationOptions
     running: RunningOptions
 
 

@@ -13,12 +13,11 @@ from rollcli.files.storage import read_bytes, remove, remove_all, write_bytes, w
 from rollcli.files.stores.locations import is_object_url, is_url, located
 from rollcli.files.stores.objects import list_objects
 from rollcli.run.frame import Frame
+from rollcli.run.image_kinds import ENDING_OF_FORMAT, ImageKind
 from rollcli.run.options import ImageOptions
 
-ENDING_OF_FORMAT = {"png": ".png", "tiff": ".tif", "npy": ".npy"}  # of maps computed from pairs
 
-
-def image_paths(frame: Frame, images: ImageOptions) -> Iterator[tuple[str, str]]:
+def image_paths(frame: Frame, images: ImageOptions) -> Iterator[tuple[ImageKind, str]]:
     """Yield (kind, path) of each image that is written for a frame."""
     if not frame.relative:
         return
@@ -27,16 +26,11 @@ def image_paths(frame: Frame, images: ImageOptions) -> Iterator[tuple[str, str]]
 
 
 @lru_cache(maxsize=16)  # the same for each of a million frames
-def _kinds(images: ImageOptions, *, computed: bool) -> tuple[tuple[str, str, str | None], ...]:
+def _kinds(images: ImageOptions, *, computed: bool) -> tuple[tuple[ImageKind, str, str | None], ...]:
     """List (kind, folder, ending) of the images; None is the ending of the frame's own file."""
-    of_maps = ENDING_OF_FORMAT[images.save_as]
-    endings = {
-        "derotated": of_maps if computed else None,
-        "vdisparity": ".png",
-        "disparity": of_maps,
-        "road_mask": ".png",
-    }
-    return tuple((kind, folder, endings[kind]) for kind, folder in images.folders())
+    return tuple(
+        (kind, folder, kind.ending(images.save_as, computed=computed)) for kind, folder in images.folders()
+    )
 
 
 def roomy_path(path: str) -> str:
@@ -47,8 +41,8 @@ def roomy_path(path: str) -> str:
 def possible_paths(frame: Frame, images: ImageOptions) -> Iterator[tuple[str, ...]]:
     """Yield, for each image of a frame, the paths of which one is written."""
     for kind, path in image_paths(frame, images):
-        computed = frame.right_file and kind in ("derotated", "disparity") and images.save_as == "png"
-        yield (path, roomy_path(path)) if computed else (path,)
+        overflows = kind.can_overflow(images.save_as, computed=bool(frame.right_file))
+        yield (path, roomy_path(path)) if overflows else (path,)
 
 
 def local_images(frame: Frame, images: ImageOptions) -> Iterator[str]:

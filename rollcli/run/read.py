@@ -126,7 +126,7 @@ class Source:
     whole : ndarray, shape (H, W), or None
         The map of a pair with all rows at full size, where images are to show it.
     photo : ndarray or None
-        The left image of a pair, grey or BGR, where the road is to be drawn on it.
+        The left image of a pair, grey or BGR, where something is to be drawn on it.
     """
 
     disparity: NDArray[Any]
@@ -208,7 +208,7 @@ def _match(frame: Frame, options: FrameOptions) -> Source:
         alignment=_alignment(match),
         size=(width, height),
         whole=match.whole,
-        photo=left if options.images.road_mask is not None else None,
+        photo=left if options.images.needs_photo else None,
         allowed=allowed,
     )
 

@@ -289,6 +289,8 @@ def _filled(defaults: Options, given: Mapping[str, Any]) -> Options:
         value: Any = given.get(key, before)
         if isinstance(before, tuple) and isinstance(value, list):
             value = tuple(map(float, value))
+            if before and len(value) != len(before):
+                raise TypeError(f"{key} is {list(value)!r}")
         if not isinstance(value, _kinds(name, before)) or isinstance(value, bool):
             raise TypeError(f"{key} is {value!r}")
         values[name] = value

@@ -12,6 +12,7 @@ from rollcli.run.options import (
     DerotateOptions,
     DisparityOptions,
     EstimateOptions,
+    HeightsOptions,
     InputOptions,
     MethodOptions,
     PairOptions,
@@ -105,11 +106,14 @@ def idle_in_estimate(options: EstimateOptions) -> Iterator[Idle]:
     if paired:
         yield Idle(("encoding", "scale", "invalid"), "pairs are matched, and no stored disparities are read")
         yield from idle_stereo(options.stereo)
-        if options.images.disparity is None and options.images.derotated is None:
-            yield Idle(("save_as",), "only --disparity and --derotated write maps")
+        if not any(kind.holds != "picture" for kind, _ in options.images.folders()):
+            yield Idle(("save_as",), "only --disparity, --derotated and --heights write maps")
     else:
         yield Idle(_STEREO, "the inputs are maps, which are not matched")
-        yield Idle(("save_as",), "a map keeps the format of its input")
+        if options.images.heights is None:
+            yield Idle(("save_as",), "a map keeps the format of its input")
+    if options.images.heights_preview is None:
+        yield Idle(("heights_range",), "only --heights-preview has colours")
     yield from idle_method(options.method)
     yield from idle_folders(options.inputs, options.pairs)
     yield from idle_running(options.running)
@@ -129,6 +133,14 @@ def idle_in_derotate(options: DerotateOptions) -> Iterator[Idle]:
     yield Idle(("scale",), "rotated maps keep their stored numbers")
     if options.encoding.encoding != "cityscapes":  # where a stored 1 is no data
         yield Idle(("encoding",), "rotated maps keep their stored numbers")
+    yield from idle_folders(options.inputs, PairOptions())
+    yield from idle_running(options.running)
+
+
+def idle_in_heights(options: HeightsOptions) -> Iterator[Idle]:
+    """Yield the options without effect on a run of `heights`."""
+    if options.preview is None:
+        yield Idle(("heights_range",), "only --preview has colours")
     yield from idle_folders(options.inputs, PairOptions())
     yield from idle_running(options.running)
 

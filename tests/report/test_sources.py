@@ -46,9 +46,9 @@ def test_images_are_found_by_kind_in_their_folders_and_by_the_ending_of_a_map(fo
     touch("out/derotated/a.tif", "out/vdisparity/a.tif", "out/road_mask/a.npy", "out/disparity/run/a.npy")
     (found,) = subjects([row("run/a.png")], "rolls.csv", "out/", NONE)
     assert found.images == {"derotated": "out/derotated/a.tif", "disparity": "out/disparity/run/a.npy"}
-    touch("out/vdisparity/a.png", "out/road_mask/a.png")
+    touch("out/vdisparity/a.png", "out/road_mask/a.png", "out/heights/a.npy", "out/heights_preview/a.png")
     (found,) = subjects([row("run/a.png")], "rolls.csv", "out", NONE)
-    assert found.images.keys() == set(sources.KINDS)
+    assert found.images.keys() == {kind.name for kind in sources.KINDS}
     assert found.images_only
 
 

@@ -15,7 +15,7 @@ Coordinate = TypeVar("Coordinate", float, Reals)
 
 
 _HARDLY = 1e-9  # of the slope: a disparity that is none, by which squares can be divided
-_FARTHEST = 4.0  # camera heights to the side; camber is not extrapolated beyond
+FARTHEST_SIDE = 4.0  # camera heights to the side; camber is not extrapolated beyond
 
 
 class RoadModel(NamedTuple):
@@ -99,7 +99,7 @@ class RoadModel(NamedTuple):
         bulge = across * abs(self.alpha[1])
         bulge *= bulge
         bulge /= positive
-        np.minimum(bulge, positive * _FARTHEST**2, out=bulge)
+        np.minimum(bulge, positive * FARTHEST_SIDE**2, out=bulge)
         bulge *= 0.5
         return bulge
 

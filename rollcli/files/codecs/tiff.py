@@ -341,8 +341,11 @@ def picture(data: bytes, name: str) -> NDArray[Any]:
     return pixels
 
 
-def encode_tiff(values: NDArray[Any], nodata: tuple[float, ...] = ()) -> bytes:
-    """Return a single-page TIFF file; not compressed, so that its bytes depend on no library."""
+def encode_tiff(values: NDArray[Any], nodata: tuple[float, ...] = (), description: str = "") -> bytes:
+    """Return a single-page TIFF file; not compressed, so that its bytes depend on no library.
+
+    `description` goes to the tag of that name, in ASCII.
+    """
     import tifffile
 
     tags = [(_GDAL_NODATA, "s", 0, f"{nodata[0]:.17g}", True)] if nodata else []
@@ -352,6 +355,7 @@ def encode_tiff(values: NDArray[Any], nodata: tuple[float, ...] = ()) -> bytes:
         values,
         photometric="minisblack",
         metadata=None,
+        description=description or None,
         software=False,
         extratags=tags,
     )

@@ -1,0 +1,344 @@
+"""Heights over the road: what is left of a map once the fitted road is taken away.
+
+A pixel of disparity d sees a point; the road is a surface g of disparities: parabola, roll and camber. The
+road's point of the same disparity and the same place across lies straight below that point in the rolled
+camera, `gap` pixels further down, near the foot of the perpendicular; on hills and dips the road that the
+pixel's own ray meets may lie far behind. The plane that touches the road there is, in disparities (see
+`rollcli.rig.pose`),
+
+    g + doffs = fx B q (X, Y, Z) / Z,   |q| = 1 / its distance from the camera,
+
+so that the point's distance from it is (1 - (g + doffs) / (d + doffs)) / |q| = rise gap / ((d + doffs) |q|),
+with the plane's rise per pixel along the road. For a flat road this is H (1 - g / d), exactly. On a road of
+curvature k the foot lies h tan(pitch) from where the plane touches, which leaves k (h tan(pitch))^2 / 2: at a
+curvature of 0.01 1/m and a pitch of 10 degrees 0.4 mm for a point 1.5 m above the road.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rollcli.errors import UsageError
+from rollcli.estimator.moments import LARGEST, Grid
+from rollcli.estimator.result import RollEstimate
+from rollcli.estimator.road.model import FARTHEST_SIDE
+from rollcli.files.results import Row
+from rollcli.rig.calibration import Calibration
+
+Singles = NDArray[np.float32]
+
+_BLOCK = 1 << 16  # pixels at a time: what they need stays in the processor's cache
+_FLATTEST = 0.2  # of the rise near ahead: a parabola that is flatter is no road, which then goes on straight
+METRES, CAMERA_HEIGHTS = "metres", "camera heights"
+
+
+@dataclass(frozen=True)
+class FittedRoad:
+    """The road of a map as it was fitted.
+
+    Attributes
+    ----------
+    theta : float
+        Roll in the pixels of the map, radians.
+    alpha : tuple of float
+        (a0, a1, a2), px, y measured from the centre of the top-left pixel.
+    camber : float
+        Curvature across the road, 1/(camera height).
+    width, height : int
+        Of the map, px.
+    """
+
+    theta: float
+    alpha: tuple[float, float, float]
+    camber: float
+    width: int
+    height: int
+
+    @classmethod
+    def of_estimate(cls, estimate: RollEstimate) -> "FittedRoad":
+        """Take the road of an estimate, with or without a pose."""
+        # the angle of the pixels, which is not the rig's where fx and fy differ
+        theta, camber = estimate.tangent.theta, estimate.camber or 0.0
+        return cls(theta, estimate.alpha, camber, estimate.width, estimate.height)
+
+    @classmethod
+    def of_row(cls, row: Row, calibration: Calibration | None) -> "FittedRoad | None":
+        """Take the road of a row of a result; None where the row has none.
+
+        The roll of a row with a pitch is the rig's: where fx and fy differ, `calibration` turns it back into
+        that of the pixels.
+        """
+        if row.roll_deg is None or row.width is None or row.height is None or row.alpha is None:
+            return None
+        theta = math.radians(row.roll_deg)
+        if calibration is not None and row.pitch_deg is not None:
+            theta = math.atan2(math.sin(theta) * calibration.fy / calibration.fx, math.cos(theta))
+        return cls(theta, row.alpha, row.camber or 0.0, row.width, row.height)
+
+
+def unit_of(calibration: Calibration | None) -> str:
+    """Return the unit of heights: metres where the calibration has a baseline, else camera heights."""
+    return CAMERA_HEIGHTS if calibration is None or calibration.baseline is None else METRES
+
+
+def height_map(
+    disparity: ArrayLike, estimate: RollEstimate, calibration: Calibration | None = None
+) -> NDArray[np.float32]:
+    """Return how high each pixel of a map lies over the road that was fitted to it.
+
+    Parameters
+    ----------
+    disparity : array_like, shape (H, W)
+        Real numbers, px; <= 0, NaN and what is beyond 1e15 are no data.
+    estimate : RollEstimate
+        Of this map, or of one in which the rig stood as it does here.
+    calibration : Calibration, optional
+        Of the rectified left view, at the map's size or at another one.
+
+    Returns
+    -------
+    ndarray of float32, shape (H, W)
+        Along the road's normal, over the fitted parabola with roll and camber; positive: above it. Metres,
+        or without a calibration that has a baseline camera heights: of the camera over the road at twice
+        the distance of the nearest road that the map's middle shows. NaN where there is no disparity, and
+        everywhere where the estimate's disparity does not grow downward: that is no road.
+
+    Raises
+    ------
+    UsageError
+        The map is not of the estimate's size, or the calibration is of another view.
+
+    Examples
+    --------
+    A level road 1.5 m below a rig of f = 200 px and B = 0.5 m, and a box of 30 cm on it:
+
+    >>> import numpy as np
+    >>> import rollcli
+    >>> rig = rollcli.Calibration(fx=200, fy=200, cx=79.5, cy=29.5, baseline=0.5)
+    >>> v = np.mgrid[:120, :160][0]
+    >>> road = np.maximum(0.5 / 1.5 * (v - 29.5), 0)
+    >>> estimate = rollcli.estimate_roll(road)
+    >>> road[80:90, 60:100] = 0.5 / 1.2 * (v[80:90, 60:100] - 29.5)
+    >>> bool(np.allclose(rollcli.height_map(road, estimate, rig)[80:90, 60:100], 0.3, atol=1e-3))
+    True
+    """
+    values = np.asarray(disparity)
+    return heights_over(values, FittedRoad.of_estimate(estimate), calibration)
+
+
+def heights_over(
+    disparity: NDArray[Any], road: FittedRoad, calibration: Calibration | None
+) -> NDArray[np.float32]:
+    """Return the heights of a map over a road; see `height_map`."""
+    if disparity.shape != (road.height, road.width) or disparity.dtype.kind not in "fiu":
+        size = "x".join(map(str, disparity.shape[::-1]))
+        raise UsageError(
+            f"a {disparity.dtype} map of {size} px is not one of the {road.width}x{road.height} px that "
+            "its road was fitted to"
+        )
+    if calibration is not None:
+        calibration = calibration.for_size(road.width, road.height)
+    heights = np.full(disparity.shape, np.nan, np.float32)
+    profile = _Profile.of(road)
+    if profile is None:
+        return heights
+    measured = calibration if unit_of(calibration) == METRES else None
+    over = _Heights(road, profile, measured)
+    step = max(1, _BLOCK // road.width)
+    for top in range(0, road.height, step):
+        over.fill(disparity[top : top + step], top, heights[top : top + step])
+    return heights
+
+
+@dataclass(frozen=True)
+class _Profile:
+    """The road along its middle, about a row near ahead: d = disparity + rise y + bend y^2, px."""
+
+    row: float
+    disparity: float
+    rise: float
+    bend: float
+
+    @classmethod
+    def of(cls, road: FittedRoad) -> "_Profile | None":
+        """Take the row where the road is twice as far as at the bottom; None where there is no such row.
+
+        The bottom is half the map's height below its centre, along the road: the same on a rolled copy.
+        """
+        a0, a1, a2 = road.alpha
+        bottom = _centre_along(road) + (road.height - 1) / 2
+        half = (a0 + bottom * (a1 + a2 * bottom)) / 2
+        square = a1 * a1 + 4 * a2 * (half - a0)
+        if not (half > 0 and square > 0 and a1 + 2 * a2 * bottom > 0):
+            return None
+        rise = math.sqrt(square)
+        # of the two rows with that disparity the one on the rising branch, in a form that bears a2 = 0
+        centre = _centre_along(road)
+        c0, c1 = a0 + centre * (a1 + a2 * centre), a1 + 2 * a2 * centre
+        row = centre + (2 * (half - c0) / (c1 + rise) if c1 > 0 else (rise - c1) / (2 * a2))
+        return cls(row, half, rise, a2)
+
+    def at(self, disparity: Singles) -> tuple[Singles, Singles]:
+        """Return the rows, px from this one, where the road has these disparities, and its rise there."""
+        rise = disparity - np.float32(self.disparity)
+        if not self.bend:
+            foot = rise / np.float32(self.rise)
+            rise.fill(self.rise)
+            return foot, rise
+        end = np.float32((_FLATTEST**2 - 1) * self.rise**2 / (4 * self.bend))
+        bent = np.maximum(rise, end) if self.bend > 0 else np.minimum(rise, end)
+        rise -= bent
+        straight = rise if rise.any() else None
+        rise = bent * np.float32(4 * self.bend)
+        rise += np.float32(self.rise**2)
+        np.sqrt(rise, out=rise)
+        bent /= (rise + np.float32(self.rise)) * np.float32(0.5)
+        if straight is not None:
+            bent += straight / rise
+        return bent, rise
+
+
+def _centre_along(road: FittedRoad) -> float:
+    """Return the map's centre along the road, px."""
+    centre = Grid.of_shape(road.height, road.width)
+    return centre.centre_v * math.cos(road.theta) - centre.centre_u * math.sin(road.theta)
+
+
+@dataclass(frozen=True)
+class _Heights:
+    """What turns disparities into heights, some rows at a time.
+
+    Attributes
+    ----------
+    road : FittedRoad
+    profile : _Profile
+        Places along the road are from its row, places across it from the map's middle, px.
+    calibration : Calibration or None
+        With a baseline; None: heights are in camera heights.
+    """
+
+    road: FittedRoad
+    profile: _Profile
+    calibration: Calibration | None
+
+    def fill(self, stored: NDArray[Any], top: int, heights: Singles) -> None:
+        """Write the heights of some rows, from row `top` on."""
+        d = stored.astype(np.float32)
+        doffs = 0.0 if self.calibration is None else self.calibration.doffs
+        known = d > max(0.0, -doffs)
+        known &= d <= LARGEST
+        unknown = ~known
+        np.copyto(d, np.float32(self.profile.disparity), where=unknown)
+        shifted = d + np.float32(doffs) if doffs else d
+        columns, rows = (np.arange(side, dtype=np.float32) for side in stored.shape[::-1])
+        rows = (rows + np.float32(top))[:, None]
+        camber = self._camber(d, self._across(columns, rows)) if self.road.camber else None
+        foot, rise = self.profile.at(d if camber is None else d * camber.rest)
+        if camber is not None:
+            rise *= camber.root
+        gap = foot - columns * np.float32(-math.sin(self.road.theta))
+        gap -= rows * np.float32(math.cos(self.road.theta)) - np.float32(self.profile.row)
+        if self.calibration is None:
+            gap *= np.float32(self.profile.rise)
+            np.divide(gap, d, out=heights)
+        else:
+            length = self._length(self.calibration, shifted, foot, rise, camber)
+            length *= shifted
+            np.divide(gap, length, out=heights)
+        np.copyto(heights, np.float32(np.nan), where=unknown)
+
+    def _across(self, columns: Singles, rows: Singles) -> Singles:
+        centre = Grid.of_shape(self.road.height, self.road.width)
+        cosine, sine = math.cos(self.road.theta), math.sin(self.road.theta)
+        across: Singles = (columns - np.float32(centre.centre_u)) * np.float32(cosine) + (
+            rows - np.float32(centre.centre_v)
+        ) * np.float32(sine)
+        return across
+
+    def _camber(self, d: Singles, across: Singles) -> "_Camber":
+        """Take from disparities what camber adds, which is of the disparity without it [RoadModel]."""
+        camber = self.road.camber
+        side = across * np.float32(_centre_rise(self.road))
+        side /= d
+        # camber is not extrapolated beyond `FARTHEST_SIDE`, which is of the disparity without it
+        most = np.float32(FARTHEST_SIDE / max(1 + camber / 2 * FARTHEST_SIDE**2, _FLATTEST))
+        beyond = np.abs(side) > most if max(side.max(), -side.min()) > most else None
+        if beyond is not None:
+            np.clip(side, -most, most, out=side)
+        root = side * side
+        root *= np.float32(-2 * camber)
+        root += 1
+        np.maximum(root, np.float32(_FLATTEST**2), out=root)
+        np.sqrt(root, out=root)
+        rest = root * np.float32(0.5)
+        rest += np.float32(0.5)
+        if beyond is not None:
+            np.copyto(side, 0, where=beyond)
+            np.copyto(root, 1, where=beyond)
+        return _Camber(across, side, rest, root)
+
+    def _length(
+        self,
+        calibration: Calibration,
+        shifted: Singles,
+        foot: Singles,
+        rise: Singles,
+        camber: "_Camber | None",
+    ) -> Singles:
+        """Return |q| of the planes that touch the road, by their rise, 1/m."""
+        cosine, sine = math.cos(self.road.theta), math.sin(self.road.theta)
+        aspect = calibration.fy / calibration.fx
+        at = np.array([[calibration.cx]], np.float32), np.array([[calibration.cy]], np.float32)
+        along = calibration.cy * cosine - calibration.cx * sine - self.profile.row
+        ahead = (shifted if camber is None else shifted * camber.rest) / rise
+        ahead -= foot
+        ahead += np.float32(along)
+        square = np.float32(sine**2 + (aspect * cosine) ** 2)
+        lean: Singles | np.float32 = square
+        if camber is not None:
+            tilt = camber.side / rise
+            tilt *= np.float32(self.road.camber * _centre_rise(self.road))
+            ahead += tilt * (self._across(*at) - camber.across)
+            leant = tilt * np.float32(cosine**2 + (aspect * sine) ** 2)
+            if aspect != 1:
+                leant += np.float32(2 * (aspect**2 - 1) * cosine * sine)
+            leant *= tilt
+            leant += square
+            lean = leant
+        ahead *= np.float32(1 / calibration.fx)
+        ahead *= ahead
+        ahead += lean
+        length: Singles = np.sqrt(ahead, out=ahead)
+        length *= np.float32(1 / (calibration.baseline or 1.0))
+        return length
+
+
+@dataclass(frozen=True)
+class _Camber:
+    """What camber does to the road at some pixels; arrays (H, W).
+
+    Attributes
+    ----------
+    across : ndarray
+        Place across the road, px from the map's middle.
+    side : ndarray
+        The same in camera heights, of the disparity with camber; 0 beyond where camber is extrapolated.
+    rest : ndarray
+        The share of the disparity that is not camber's.
+    root : ndarray
+        Times the rise of the road without camber, by `rest`: its rise with it.
+    """
+
+    across: Singles
+    side: Singles
+    rest: Singles
+    root: Singles
+
+
+def _centre_rise(road: FittedRoad) -> float:
+    """Return the rise at the map's centre, px per px: it is the unit of camber."""
+    _, a1, a2 = road.alpha
+    return abs(a1 + 2 * a2 * _centre_along(road))

@@ -1,0 +1,49 @@
+"""The row of a result that each map has."""
+
+from collections.abc import Sequence
+
+from rollcli.errors import UsageError
+from rollcli.files.matching import match_paths
+from rollcli.files.naming import listed
+from rollcli.files.results import Row, read_result
+from rollcli.messages import say
+from rollcli.run.frame import Frame
+
+
+def rows_of(
+    frames: Sequence[Frame], result: str, *, quiet: bool, skip_suspect: bool = False, every_row: bool = True
+) -> list[Row]:
+    """Find the row of each frame, and say how many angles are suspect, and whether they are used.
+
+    Raises
+    ------
+    UsageError
+        Names maps without a row, with `every_row` rows that have an angle but no map, and what matches more
+        than one; or every angle is suspect, and such are left out.
+    """
+    rows = read_result(result).rows
+    found = match_paths([frame.file for frame in frames], [row.file for row in rows], result)
+    alone = [frame.file for frame, at in zip(frames, found, strict=True) if at is None]
+    if alone:
+        raise UsageError(f"{result}: has no row for {listed(alone)}")
+    used = [at for at in found if at is not None]
+    lost = [rows[at] for at in sorted(set(range(len(rows))).difference(used))]
+    if every_row and any(row.roll_deg is not None for row in lost):
+        names = listed(row.file for row in lost if row.roll_deg is not None)
+        raise UsageError(f"{result}: no map is given for its rows of {names}")
+    matched = [rows[at] for at in used]
+    _tell_suspects(matched, result, skip_suspect=skip_suspect, quiet=quiet)
+    return matched
+
+
+def _tell_suspects(rows: Sequence[Row], result: str, *, skip_suspect: bool, quiet: bool) -> None:
+    suspects = sum(row.status == "suspect" for row in rows)
+    if skip_suspect and suspects == len(rows):
+        raise UsageError(f"{result}: every angle is suspect: --skip-suspect leaves out all maps")
+    if not suspects or quiet:
+        return
+    of = f"{result}: {suspects} of {len(rows)} angles {'is' if suspects == 1 else 'are'} suspect"
+    if skip_suspect:
+        say(f"{of}; such maps are left out")
+    else:
+        say(f"{of} and used; --skip-suspect leaves such maps out")

@@ -1,0 +1,162 @@
+"""Heights over the road against a search for the nearest point of the surface in space."""
+
+import math
+
+import numpy as np
+import pytest
+
+import rollcli
+from rollcli.errors import UsageError
+from rollcli.estimator.road.model import RoadModel
+from rollcli.files.results import Row
+from rollcli.pictures.heights import FittedRoad, heights_over, unit_of
+from rollcli.rig.calibration import Calibration
+
+WIDTH, HEIGHT = 640, 240
+CENTRE = (WIDTH - 1) / 2, (HEIGHT - 1) / 2
+
+
+def road_of(theta, level, rise, bend, camber):
+    """A road whose parabola is given about the map's centre, and the same as the estimator's model of it."""
+    centre = CENTRE[1] * math.cos(theta) - CENTRE[0] * math.sin(theta)
+    alpha = (level - rise * centre + bend * centre**2, rise - 2 * bend * centre, bend)
+    road = FittedRoad(theta, alpha, camber, WIDTH, HEIGHT)
+    return road, RoadModel(theta, (level, rise, bend), camber)
+
+
+class Space:
+    """Points of pixels in space, metres."""
+
+    def __init__(self, model, rig):
+        self.model, self.rig = model, rig
+
+    def road(self, u, v):
+        return self.model.disparity(u - CENTRE[0], v - CENTRE[1])
+
+    def points(self, u, v, d):
+        rig = self.rig
+        depth = rig.fx * rig.baseline / (d + rig.doffs)
+        return np.array([(u - rig.cx) * depth / rig.fx, (v - rig.cy) * depth / rig.fy, depth])
+
+    def distance(self, u, v, d):
+        """How far a pixel's point is from the surface: the best of finer and finer grids around it."""
+        point = self.points(u, v, d)[:, None, None]
+        reach = 120.0
+        for _ in range(45):
+            near = np.linspace(-reach, reach, 21)
+            x, y = np.meshgrid(u + near, v + near)
+            g = self.road(x, y)
+            g[g + self.rig.doffs <= 1] = np.nan
+            away = ((self.points(x, y, g) - point) ** 2).sum(axis=0)
+            best = np.unravel_index(np.nanargmin(away), away.shape)
+            u, v, reach = x[best], y[best], reach * 0.7
+        return math.sqrt(away[best])
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_heights_are_the_distances_from_the_nearest_points_of_the_surface(seed):
+    rng = np.random.default_rng(seed)
+    fx = rng.uniform(300, 450)
+    rig = Calibration(
+        fx=fx,
+        fy=fx * rng.uniform(0.9, 1.1),
+        cx=CENTRE[0] + rng.uniform(-30, 30),
+        cy=CENTRE[1] + rng.uniform(-30, 10),
+        baseline=0.54,
+        doffs=rng.choice([0, rng.uniform(-4, 20)]),
+    )
+    theta, rise = rng.uniform(-0.4, 0.4), 0.54 / rng.uniform(1.2, 2)
+    level = rise * fx * math.tan(rng.uniform(-0.02, 0.2)) - rig.doffs
+    bend, camber = rise * rng.uniform(-3e-4, 3e-4), rng.choice([0, rng.uniform(-0.03, 0.03)])
+    road, model = road_of(theta, level, rise, bend, camber)
+    space, map_ = Space(model, rig), np.zeros((HEIGHT, WIDTH), np.float32)
+    u, v = rng.integers(150, 490, 15), rng.integers(150, HEIGHT, 15)
+    ground = space.road(u.astype(float), v.astype(float))
+    map_[v, u] = ground * (1 + rng.uniform(-0.05, 0.08, 15))
+    found = heights_over(map_, road, rig)
+    compared = 0
+    for x, y in zip(u, v, strict=True):
+        g = float(space.road(np.array([float(x)]), np.array([float(y)]))[0])
+        if min(g, g + rig.doffs) > 10:
+            expected = math.copysign(space.distance(x, y, float(map_[y, x])), map_[y, x] - g)
+            assert found[y, x] == pytest.approx(expected, abs=1e-4)
+            compared += 1
+    assert compared > 4
+
+
+def test_far_above_a_plane_heights_are_exact_and_need_no_calibration():
+    rig = Calibration(fx=400, fy=400, cx=CENTRE[0], cy=CENTRE[1], baseline=0.5)
+    road, model = road_of(0.2, 30, 0.4, 0, 0)
+    v, u = np.mgrid[:HEIGHT, :WIDTH].astype(float)
+    g = model.disparity(u - CENTRE[0], v - CENTRE[1])
+    d = np.where(g > 5, g * 2.5, 0)
+    in_heights = heights_over(d, road, None)
+    assert np.allclose(in_heights[d > 0], 1 - 1 / 2.5, atol=1e-5)
+    camera = 1 / np.linalg.norm([0.4 / 0.5, 30 / (400 * 0.5)])
+    assert np.allclose(heights_over(d, road, rig)[d > 0], camera * (1 - 1 / 2.5), atol=1e-5)
+    assert np.isnan(in_heights[d == 0]).all()
+
+
+def test_without_a_disparity_there_is_no_height():
+    road, _ = road_of(0, 30, 0.4, 0, 0.01)
+    d = np.full((HEIGHT, WIDTH), 60.0)
+    d[0, :6] = 0, -3, np.nan, np.inf, 2e15, 7
+    heights = heights_over(d, road, Calibration(400, 400, *CENTRE, 0.5))
+    assert np.isnan(heights[0, :6]).tolist() == [True] * 5 + [False]
+    assert np.isfinite(heights[1:]).all()
+    behind = heights_over(d, road, Calibration(400, 400, *CENTRE, 0.5, doffs=-30))
+    assert np.isnan(behind[0, 5])
+
+
+@pytest.mark.parametrize("alpha", [(60, -0.3, 0), (-60, 0.3, 0), (10, 0, 0)])
+def test_no_road_no_heights(alpha):
+    """Its disparity does not grow downward, or all of the map is above its horizon."""
+    road = FittedRoad(0.0, alpha, 0.0, 64, 48)
+    assert np.isnan(heights_over(np.full((48, 64), 9.0), road, None)).all()
+
+
+def test_a_flattening_road_goes_on_straight():
+    """Beyond the vertex of its parabola there is no row of such a disparity."""
+    road, _ = road_of(0, 20, 0.4, -8e-4, 0)
+    d = np.full((HEIGHT, WIDTH), 300.0)
+    heights = heights_over(d, road, Calibration(400, 400, *CENTRE, 0.5))
+    assert np.isfinite(heights).all()
+    assert (np.diff(heights, axis=0) < 0).all()
+
+
+def test_a_row_of_a_result_has_the_road_of_its_estimate():
+    v, u = np.mgrid[:120, :160]
+    rig = Calibration(fx=200, fy=190, cx=79.5, cy=29.5, baseline=0.5)
+    disparity = np.maximum(0.3 * (v - 20) - 0.03 * u + 5, 0).astype(np.float32)
+    estimate = rollcli.estimate_roll(disparity, calibration=rig)
+    a0, a1, a2 = estimate.alpha
+    row = Row(
+        file="a.png",
+        status="ok",
+        roll_deg=math.degrees(estimate.theta),
+        pitch_deg=1.0,
+        camber=estimate.camber,
+        alpha0=a0,
+        alpha1=a1,
+        alpha2=a2,
+        width=160,
+        height=120,
+    )
+    road = FittedRoad.of_row(row, rig)
+    assert road is not None
+    assert road.theta == pytest.approx(FittedRoad.of_estimate(estimate).theta, abs=1e-9)
+    expected = rollcli.height_map(disparity, estimate, rig)
+    assert np.allclose(heights_over(disparity, road, rig), expected, atol=1e-6, equal_nan=True)
+    assert FittedRoad.of_row(Row(file="a.png"), rig) is None
+
+
+def test_a_map_of_another_size_is_refused():
+    v = np.mgrid[:120, :160][0]
+    estimate = rollcli.estimate_roll(20 + 0.3 * v)
+    with pytest.raises(UsageError, match=r"80x60 px is not one of the 160x120 px"):
+        rollcli.height_map(np.ones((60, 80)), estimate)
+
+
+def test_the_unit_is_metres_with_a_baseline_alone():
+    assert unit_of(None) == unit_of(Calibration(400, 400, 1, 1)) == "camera heights"
+    assert unit_of(Calibration(400, 400, 1, 1, 0.5)) == "metres"
