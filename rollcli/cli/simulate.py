@@ -21,6 +21,7 @@ from rollcli.simulate.options import (
     GUTTER_WIDTH,
     HEIGHT,
     KERB,
+    MAX_DIPS,
     MIXED,
     NOISE,
     PITCH_DEG,
@@ -124,6 +125,12 @@ simulate_options = record(
         type=Span(),
         help="Height of kerbs and pavements (open, street) above the road's edge, metres, drawn evenly from "
         f"A to B.  [default: {KERB[0]:g}:{KERB[1]:g}]",
+    ),
+    option(
+        "--dips",
+        type=Number("N", at_least=0, at_most=MAX_DIPS, whole=True),
+        help="Dips and bumps of 2.5 to 7 cm in the lane ahead of each road, and DIR/heights: how high the "
+        "ground lies over the road, metres, float32 TIFF; 0: kerbs and pavements alone.  [default: neither]",
     ),
     option(
         "--size",

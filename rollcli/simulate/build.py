@@ -5,6 +5,7 @@ from itertools import groupby
 
 import numpy as np
 
+from rollcli.simulate.dips import add_dips
 from rollcli.simulate.materials import Plain
 from rollcli.simulate.road import Carriageway, Piece, draw_asphalt, draw_carriageway
 from rollcli.simulate.roadside import (
@@ -31,6 +32,7 @@ def build_scene(spec: FrameSpec) -> Scene:
     scene = Scene(light, normal=carriageway.normal)
     scene.road = scene.material(draw_asphalt(rng, carriageway))
     _KINDS[spec.scene](scene, rng, carriageway)
+    add_dips(scene, spec, carriageway)
     return scene
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from rollcli.errors import OutputError
 from rollcli.files.atomic import output_error, remove_leftovers, write_atomic
+from rollcli.files.codecs.tiff import encode_tiff
 from rollcli.files.encodings import KITTI_TOP, from_disparity
 from rollcli.files.formats import encode_stored
 from rollcli.files.results import run_path
@@ -86,7 +87,7 @@ def _number(value: float) -> str:
 
 _PARTS = ("left", "right", "disparity")
 TRUTH = "truth.csv"
-_CALIBRATION = "calib"
+_CALIBRATION, _HEIGHTS = "calib", "heights"
 _OURS = re.compile(r"frame_\d{4,}\.png")
 
 
@@ -103,8 +104,13 @@ class RenderTask:
         return self.folder / part / f"{self.stem}.png"
 
     def images(self) -> list[Path]:
-        """Name the three files of the frame."""
-        return [self.image(part) for part in _PARTS]
+        """Name the files of the frame."""
+        return [self.image(part) for part in _PARTS] + ([] if self.heights is None else [self.heights])
+
+    @property
+    def heights(self) -> Path | None:
+        """Name the file of true heights; None where there is none."""
+        return None if self.spec.dips is None else self.folder / _HEIGHTS / f"{self.stem}.tif"
 
 
 @dataclass(frozen=True)
@@ -196,6 +202,8 @@ def _write_frame(task: RenderTask) -> str:
     near = frame.disparity > KITTI_TOP
     stored = from_disparity(np.where(near, 0, frame.disparity), "kitti", np.uint16)
     write_atomic(task.image("disparity"), encode_stored(stored, "png"))
+    if task.heights is not None and frame.heights is not None:
+        write_atomic(task.heights, encode_tiff(frame.heights, description="height over the road, metres"))
     return task.stem
 
 
@@ -238,4 +246,5 @@ def _earlier_frames(folder: Path) -> list[Path]:
     names = set.intersection(*({path.name for path in each.iterdir()} for each in folders))
     ours = [name for name in names if _OURS.fullmatch(name)]
     calibrations = [(folder / _CALIBRATION / name).with_suffix(".txt") for name in ours]
-    return [each / name for name in ours for each in folders] + calibrations
+    heights = [(folder / _HEIGHTS / name).with_suffix(".tif") for name in ours]
+    return [each / name for name in ours for each in folders] + calibrations + heights

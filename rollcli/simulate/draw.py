@@ -39,6 +39,7 @@ def draw_specs(
     crossfall: Span = _CROSSFALL,
     gutter: Span = _NONE,
     kerb: Span = KERB,
+    dips: int | None = None,
     size: tuple[int, int] = SIZE,
     focal: float | None = None,
     principal_point: Span | None = None,
@@ -102,6 +103,7 @@ def draw_specs(
         gain=gain,
         colour=colour,
         kerb=kerb,
+        dips=dips,
         seed=seed,
     )
     spans = {

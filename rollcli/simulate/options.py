@@ -21,6 +21,7 @@ PITCH_DEG = (-2.0, 6.0)
 CROSSFALL = (1.0, 4.0)  # per cent, of roads that are not flat: what road design manuals allow without a bend
 GUTTER_WIDTH = 0.35  # metres, at each edge of the carriageway
 KERB = (0.10, 0.20)
+MAX_DIPS = 12
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,8 @@ class SimulateOptions:
 
     Ranges are (lowest, highest): `roll_deg` and `pitch_deg`, `curvature` and `bend` in 1/m or None: by scene,
     `crossfall` and `gutter` in per cent, `kerb` and `height` in metres, `principal_offset` in pixels. None
-    stands for `CROSSFALL` and `KERB`. `size` is (width, height) in pixels, `focal` in pixels or None:
+    stands for `CROSSFALL` and `KERB`. `dips` is how many dips and bumps each road has; None: none, and no
+    true heights. `size` is (width, height) in pixels, `focal` in pixels or None:
     `FOCAL_PER_WIDTH` times the width, `principal_point` (column, row) in pixels or None: the image's centre.
     """
 
@@ -43,6 +45,7 @@ class SimulateOptions:
     crossfall: tuple[float, float] | None = None
     gutter: tuple[float, float] = (0.0, 0.0)
     kerb: tuple[float, float] | None = None
+    dips: int | None = None
     size: tuple[int, int] = SIZE
     focal: float | None = None
     principal_point: tuple[float, float] | None = None

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.simulate.build import build_scene
+from rollcli.simulate.build import build_scene, carriageway_of
 from rollcli.simulate.camera import Camera, PixelRays, Rays, expose
+from rollcli.simulate.dips import true_heights
 from rollcli.simulate.materials import Material, Values
 from rollcli.simulate.scene import Scene, air_below, in_shadow, sky
 from rollcli.simulate.spec import FrameSpec
@@ -240,6 +241,9 @@ class RenderedFrame:
         bool (H, W): True where the left view shows the carriageway.
     spec : FrameSpec
         What was rendered.
+    heights : numpy.ndarray or None
+        float32 (H, W), metres: how high the ground in the left view lies over the road without dips and
+        bumps; NaN where it shows no ground. None unless the spec has a number of dips.
     """
 
     left: NDArray[np.uint8]
@@ -247,6 +251,7 @@ class RenderedFrame:
     disparity: NDArray[np.float32]
     road: NDArray[np.bool_]
     spec: FrameSpec
+    heights: NDArray[np.float32] | None = None
 
     @property
     def roll(self) -> float:
@@ -262,13 +267,20 @@ class RenderedFrame:
 def render_frame(spec: FrameSpec) -> RenderedFrame:
     """Render both views, the true disparity of the left one, and which of its pixels are road."""
     scene, rng = build_scene(spec), spec.sensor_rng()
-    views = [render_view(scene, camera) for camera in spec.cameras(scene.normal)]
+    cameras = spec.cameras(scene.normal)
+    views = [render_view(scene, camera) for camera in cameras]
     left, right = (
         expose(view.light, spec.noise, gain, spec.colour, rng)
         for view, gain in zip(views, (1.0, spec.gain), strict=True)
     )
     disparity = (spec.focal * spec.baseline / views[0].depth).astype(np.float32)
-    return RenderedFrame(left, right, disparity, views[0].material == scene.road, spec)
+    return RenderedFrame(left, right, disparity, views[0].material == scene.road, spec, _heights(scene, spec))
+
+
+def _heights(scene: Scene, spec: FrameSpec) -> NDArray[np.float32] | None:
+    if spec.dips is None:
+        return None
+    return true_heights(scene, spec, carriageway_of(spec), spec.cameras(scene.normal)[0])
 
 
 def true_disparity(spec: FrameSpec) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:

@@ -15,6 +15,7 @@ from rollcli.simulate.options import (
     FOCAL_PER_WIDTH,
     HEIGHT,
     KERB,
+    MAX_DIPS,
     NOISE,
     SCENES,
     SIZE,
@@ -39,6 +40,7 @@ class Stream(IntEnum):
     SENSOR = 2
     CROSS_SECTION = 3
     RIG = 4
+    DIPS = 6
 
 
 @dataclass(frozen=True)
@@ -65,6 +67,8 @@ class FrameSpec:
         The lowest and the highest kerb, metres above the edge of the carriageway.
     bend : float or None
         Horizontal curvature of the road, 1/m; positive bends to the right. None: drawn with the scene.
+    dips : int or None
+        How many dips and bumps the lane ahead has, as far as there is room; None: none, and no true heights.
     size : tuple of int
         Width and height, pixels.
     focal : float
@@ -92,6 +96,7 @@ class FrameSpec:
     gutter: float = 0.0
     kerb: Span = KERB
     bend: float | None = None
+    dips: int | None = None
     size: tuple[int, int] = SIZE
     focal: float = FOCAL_PER_WIDTH * SIZE[0]
     principal_point: tuple[float, float] | None = None
@@ -174,6 +179,8 @@ def _problems(spec: FrameSpec) -> Iterator[str]:
     if not 0 <= spec.kerb[0] <= spec.kerb[1] <= MAX_KERB:
         low, high = spec.kerb
         yield f"kerbs of {low:g} to {high:g} m do not lie within 0 and {MAX_KERB:g} m, the lower one first"
+    if not 0 <= (spec.dips or 0) <= MAX_DIPS:
+        yield f"{spec.dips} dips are not within 0 and {MAX_DIPS}"
     if not (16 <= width <= 16384 and 16 <= height <= 16384):
         yield f"a size of {width}x{height} is not one of 16 to 16384 pixels each way"
     if spec.focal <= 0:

@@ -63,7 +63,7 @@ def test_heights_are_the_distances_from_the_nearest_points_of_the_surface(seed):
         cx=CENTRE[0] + rng.uniform(-30, 30),
         cy=CENTRE[1] + rng.uniform(-30, 10),
         baseline=0.54,
-        doffs=rng.choice([0, rng.uniform(-4, 20)]),
+        doffs=rng.choice([0, rng.uniform(-4, 8)]),
     )
     theta, rise = rng.uniform(-0.4, 0.4), 0.54 / rng.uniform(1.2, 2)
     level = rise * fx * math.tan(rng.uniform(-0.02, 0.2)) - rig.doffs
