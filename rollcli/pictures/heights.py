@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rollcli.errors import UsageError
+from rollcli.estimator.estimate import RollEstimate
 from rollcli.estimator.moments import LARGEST, Grid
-from rollcli.estimator.result import RollEstimate
 from rollcli.estimator.road.model import FARTHEST_SIDE
 from rollcli.files.results import Row
 from rollcli.rig.calibration import Calibration

@@ -95,15 +95,13 @@ def draw_figure(conversion: Conversion, options: FrameOptions, count: CountOptio
     from rollcli.run.vdisparity_figure import v_disparity_figure  # loads matplotlib, an extra
 
     def make(source: Source) -> dict[str, bytes]:
-        if conversion.row is None:
-            estimate = estimate_roll(source.disparity)
-            theta, alpha = estimate.theta, estimate.alpha
-        else:
-            theta, alpha = math.radians(conversion.row.roll_deg or 0.0), conversion.row.alpha
+        row = conversion.row
+        road: Row | RollEstimate = estimate_roll(source.disparity) if row is None else row
+        theta = math.radians(road.roll_deg or 0.0) if isinstance(road, Row) else road.theta
         figure = v_disparity_figure(
             source.disparity,
             theta,
-            alpha,
+            road.alpha,
             count.figure or "svg",
             bins=count.bins,
             max_disparity=count.max_disparity,
