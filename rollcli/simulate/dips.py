@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.simulate.camera import Camera, PixelRays
-from rollcli.simulate.render import first_hits
 from rollcli.simulate.road import Carriageway, CrossSection, cross_section
 from rollcli.simulate.scene import Scene, draw
 from rollcli.simulate.spec import FrameSpec, Stream
 from rollcli.simulate.surfaces import Course, Ground, Surface, SurfaceSample
 from rollcli.simulate.vectors import Array
+from rollcli.simulate.views import first_hits
 
 _DEPTH = (0.025, 0.07)  # metres, of dips as of bumps
 _RADIUS = (0.25, 0.5)  # metres

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from rollcli.simulate.materials import Plain
-from rollcli.simulate.render import AIR, LONG, LONG_P, LONG_Q, NONE, SHORT, SUN, P, Q, shade
 from rollcli.simulate.scene import Light, Scene
+from rollcli.simulate.views import AIR, LONG, LONG_P, LONG_Q, NONE, SHORT, SUN, P, Q, shade
 
 AHEAD = np.array([[0.0], [0.0], [1.0]])
 

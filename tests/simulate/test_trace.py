@@ -7,9 +7,9 @@ import pytest
 
 from rollcli.simulate.build import build_scene
 from rollcli.simulate.camera import PixelRays
-from rollcli.simulate.render import NONE, first_hits, trace
 from rollcli.simulate.spec import FrameSpec
 from rollcli.simulate.surfaces import NEAR
+from rollcli.simulate.views import NONE, first_hits, trace
 
 SPEC = FrameSpec("street", math.radians(8), math.radians(3), seed=11, size=(160, 120), focal=93.0)
 

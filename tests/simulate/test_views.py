@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from rollcli.simulate.build import build_scene
-from rollcli.simulate.render import render_frame, render_view
+from rollcli.simulate.render import render_frame
 from rollcli.simulate.spec import FrameSpec
+from rollcli.simulate.views import render_view
 from rollcli.stereo.match import compute_disparity
 
 CLEAN = {"noise": 0.0, "colour": False}
@@ -105,7 +106,7 @@ def test_a_stereo_matcher_finds_the_road_as_well_as_on_real_pairs(scene):
 
 def test_a_picture_is_the_same_rendered_in_one_band_of_rows_or_in_many(monkeypatch):
     whole = render_frame(STREET)
-    monkeypatch.setattr("rollcli.simulate.render._BAND", 17 * 320)
+    monkeypatch.setattr("rollcli.simulate.views._BAND", 17 * 320)
     banded = render_frame(STREET)
     assert np.array_equal(whole.left, banded.left)
     assert np.array_equal(whole.right, banded.right)

@@ -1,0 +1,224 @@
+"""The view of a camera: trace rays, shade what they hit, and expose the image."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollcli.simulate.camera import Camera, PixelRays, Rays
+from rollcli.simulate.materials import Material, Values
+from rollcli.simulate.scene import Scene, air_below, in_shadow, sky
+from rollcli.simulate.surfaces import Ground, Indices, Surface, SurfaceSample, Wall
+from rollcli.simulate.vectors import Array, Vectors, dot, groups
+
+NONE = -1  # the material of the sky
+# the rows of `Hits.reads`
+P, Q, LONG_P, LONG_Q, LONG, SHORT, SUN, AIR = range(8)
+
+
+@dataclass(frozen=True)
+class Hits:
+    """For N rays: depth (inf: sky), indices of surface and material (-1: sky), and the input of shading.
+
+    `reads` (8, N) holds texture coordinates P and Q; the long axis of the pixel's footprint on them as LONG_P
+    and LONG_Q, its length LONG, and the footprint's length across, SHORT, all in metres; the share of the
+    sun's light, SUN, and of the sky's, AIR.
+    """
+
+    depth: Array
+    surface: NDArray[np.int16]
+    material: NDArray[np.int16]
+    reads: Values
+
+
+def trace(scene: Scene, pixels: PixelRays) -> Hits:
+    """Trace the rays, and evaluate the surfaces where they are hit."""
+    depth, owner = first_hits(scene, pixels)
+    hits = Hits(depth, owner, np.full(len(depth), NONE, np.int16), np.ones((8, len(depth)), np.float32))
+    direction = pixels.rays.direction.astype(np.float32)
+    for k, at in groups(owner, len(scene.surfaces)):
+        _read(scene, scene.surfaces[k], pixels.rays, direction.take(at, axis=1), at, hits)
+    _dim_below_cars(scene, pixels, hits)
+    return hits
+
+
+def first_hits(scene: Scene, pixels: PixelRays) -> tuple[Array, NDArray[np.int16]]:
+    """Return the depth (inf for sky) and the index of the surface (-1 for sky) that each ray hits first."""
+    rays = pixels.rays
+    depth = np.full(len(pixels.u), np.inf)
+    owner = np.full(len(pixels.u), -1, np.int16)
+    for k, surface in enumerate(scene.surfaces):
+        window = pixels.window(surface.bounds())
+        if window is None:
+            t = surface.intersect(rays.origin, rays.direction)
+            nearer = t < depth
+            np.copyto(depth, t, where=nearer)
+            owner[nearer] = k
+        elif len(window):
+            t = surface.intersect(rays.origin, rays.direction[:, window])
+            nearer = t < depth[window]
+            depth[window[nearer]] = t[nearer]
+            owner[window[nearer]] = k
+    return depth, owner
+
+
+def _read(scene: Scene, surface: Surface, rays: Rays, direction: Values, at: Indices, hits: Hits) -> None:
+    """Fill `hits` for the rays `at`, which go in `direction` and hit this surface."""
+    depth = hits.depth[at].astype(np.float32)
+    points = rays.origin.astype(np.float32) + depth * direction
+    sample = surface.sample(points)
+    # light the side that faces the camera
+    facing = -np.sign(dot(sample.normal, direction))
+    lambert = facing * dot(sample.normal, scene.light.sun.astype(np.float32))
+    sun = np.maximum(lambert / np.sqrt(dot(sample.normal, sample.normal)), 0)
+    if scene.light.sunny and isinstance(surface, Ground | Wall):
+        casters = [s for s in scene.surfaces if not isinstance(s, Ground)]
+        lit = np.flatnonzero(sun)
+        sun[lit[in_shadow(points[:, lit], scene.light.sun, casters)]] = 0
+    hits.material[at] = sample.material
+    footprint = _footprint(sample, direction, depth, rays)
+    found = (sample.p, sample.q, *footprint, sun)
+    for row, values in zip((P, Q, LONG_P, LONG_Q, LONG, SHORT, SUN), found, strict=True):
+        hits.reads[row][at] = values
+
+
+def _dim_below_cars(scene: Scene, pixels: PixelRays, hits: Hits) -> None:
+    """Reduce the sky's light on the ground near and below cars."""
+    ground = np.array([isinstance(s, Ground) for s in scene.surfaces] + [False])[hits.surface]
+    for car in scene.cars:
+        window = pixels.window(car.bounds(margin=1.0))
+        near = np.flatnonzero(ground) if window is None else window[ground[window]]
+        points = pixels.rays.origin + hits.depth[near] * pixels.rays.direction[:, near]
+        hits.reads[AIR][near] *= air_below(points, car)
+
+
+def _footprint(sample: SurfaceSample, direction: Vectors, depth: Vectors, rays: Rays) -> tuple[Vectors, ...]:
+    """Return the ellipse that a pixel covers on the texture: its long axis (p, q) and both lengths, m."""
+    per_ray = dot(sample.normal, direction)
+    scale = depth / np.where(np.abs(per_ray) < 1e-9, 1e-9, per_ray)
+    ray_p, ray_q = dot(sample.grad_p, direction), dot(sample.grad_q, direction)
+    slopes = []
+    for step in (rays.across.astype(np.float32), rays.down.astype(np.float32)):
+        slide = dot(sample.normal, step) * scale
+        slopes += [
+            dot(sample.grad_p, step) * depth - slide * ray_p,
+            dot(sample.grad_q, step) * depth - slide * ray_q,
+        ]
+    pu, qu, pv, qv = slopes
+    pp, qq, pq = pu * pu + pv * pv, qu * qu + qv * qv, pu * qu + pv * qv
+    half = (pp - qq) * 0.5
+    spread = np.sqrt(half * half + pq * pq)
+    long = np.maximum(np.sqrt((pp + qq) * 0.5 + spread), 1e-5)
+    short = np.maximum(np.abs(pu * qv - pv * qu) / long, 1e-5)
+    # the eigenvector of the larger eigenvalue, from the row without cancellation
+    long_p, long_q = np.where(half > 0, spread + half, pq), np.where(half > 0, pq, spread - half)
+    stretch = long / np.maximum(np.sqrt(long_p * long_p + long_q * long_q), 1e-20)
+    return long_p * stretch, long_q * stretch, long, short
+
+
+_MAX_TAPS = 8
+
+
+def shade(scene: Scene, direction: Array, kinds: NDArray[np.int16], reads: Values) -> Values:
+    """Return the light (N, 3) of rays in `direction` (3, N); `kinds` are materials, `reads` as in `Hits`."""
+    light = np.empty((len(kinds), 3), np.float32)
+    nothing = kinds == NONE
+    light[nothing] = sky(scene.light, direction[:, nothing])
+    ambient = np.float32(scene.light.ambient)
+    strength = np.float32(scene.light.exposure) * (ambient * reads[AIR] + (1 - ambient) * reads[SUN])
+    for k, at in groups(kinds, len(scene.materials)):
+        material, mine = scene.materials[k], reads[: SHORT + 1].take(at, axis=1)
+        bright = _albedo(material, mine) * strength[at]
+        light[at] = bright[:, None] * material.colour(mine[P], mine[Q])
+    return light
+
+
+def _albedo(material: Material, reads: Values) -> Values:
+    """Average the albedo over each pixel's footprint: taps along its long axis, as wide as its short one."""
+    albedo = np.empty(reads.shape[1], np.float32)
+    power = np.ceil(np.log2(np.clip(reads[LONG] / reads[SHORT], 1, _MAX_TAPS)) - 0.5).astype(np.int16)
+    for k, at in groups(power, power.max() + 1):
+        p, q, long_p, long_q, long, short = reads.take(at, axis=1)
+        taps = 1 << k
+        steps = (((np.arange(taps) + 0.5) / taps - 0.5)[:, None]).astype(np.float32)
+        width = np.tile(np.maximum(short, long / np.float32(taps)), taps)
+        values = material.albedo((p + steps * long_p).ravel(), (q + steps * long_q).ravel(), width)
+        albedo[at] = values.reshape(taps, -1).mean(axis=0)
+    return albedo
+
+
+_BAND = 350_000  # pixels; an image of 640x480 is one band
+# four positions inside a pixel, no two in the same row or column
+_SUBPIXELS = np.array([[-0.375, -0.125], [0.125, -0.375], [0.375, 0.125], [-0.125, 0.375]])
+
+
+@dataclass(frozen=True)
+class View:
+    """A camera's image: depth (H, W) in metres, inf in the sky; material (H, W); light (H, W, 3)."""
+
+    depth: Array
+    material: NDArray[np.int16]
+    light: Values
+
+
+def render_view(scene: Scene, camera: Camera) -> View:
+    """Render the image of a camera; pixels at edges are the mean of four rays."""
+    bands = [_render_band(scene, camera, rows) for rows in _bands(camera)]
+    return View(
+        np.concatenate([band.depth for band in bands]),
+        np.concatenate([band.material for band in bands]),
+        np.concatenate([band.light for band in bands]),
+    )
+
+
+def depths(scene: Scene, camera: Camera) -> tuple[Array, NDArray[np.int16]]:
+    """Return depth and material (H, W) of a camera's image, as in `View`, without rendering its light."""
+    shape = (camera.height, camera.width)
+    bands = [trace(scene, PixelRays.of_rows(camera, rows)) for rows in _bands(camera)]
+    depth = np.concatenate([band.depth for band in bands])
+    return depth.reshape(shape), np.concatenate([band.material for band in bands]).reshape(shape)
+
+
+def _bands(camera: Camera) -> list[range]:
+    step = max(1, _BAND // camera.width)
+    return [range(top, min(top + step, camera.height)) for top in range(0, camera.height, step)]
+
+
+def _render_band(scene: Scene, camera: Camera, rows: range) -> View:
+    """Render these rows of a camera's image."""
+    # one more row above and below: an edge is where a pixel differs from its neighbour
+    around = range(max(rows.start - 1, 0), min(rows.stop + 1, camera.height))
+    pixels = PixelRays.of_rows(camera, around)
+    hits = trace(scene, pixels)
+    edge = np.flatnonzero(_edges(hits, camera.width))
+    u = (pixels.u[edge] + _SUBPIXELS[:, :1]).ravel()
+    v = (pixels.v[edge] + _SUBPIXELS[:, 1:]).ravel()
+    between = PixelRays.at(camera, u, v)
+    finer = trace(scene, between)
+    light = shade(
+        scene,
+        np.concatenate([pixels.rays.direction, between.rays.direction], axis=1),
+        np.concatenate([hits.material, finer.material]),
+        np.concatenate([hits.reads, finer.reads], axis=1),
+    )
+    light[edge] = light[len(pixels.u) :].reshape(4, -1, 3).mean(axis=0)
+    shape, inner = (len(around), camera.width), slice(rows.start - around.start, rows.stop - around.start)
+    return View(
+        hits.depth.reshape(shape)[inner],
+        hits.material.reshape(shape)[inner],
+        light[: len(pixels.u)].reshape(*shape, 3)[inner],
+    )
+
+
+def _edges(hits: Hits, width: int) -> NDArray[np.bool_]:
+    """Find pixels that differ from a neighbour in surface, material or shadow."""
+    shadow = hits.reads[SUN] == 0
+    kind = (hits.surface.astype(np.int32) << 17) + (hits.material.astype(np.int32) << 1) + shadow
+    kind = kind.reshape(-1, width)
+    edge = np.zeros(kind.shape, bool)
+    beside, below = np.diff(kind, axis=1) != 0, np.diff(kind, axis=0) != 0
+    edge[:, 1:] |= beside
+    edge[:, :-1] |= beside
+    edge[1:] |= below
+    edge[:-1] |= below
+    return edge.ravel()
