@@ -26,6 +26,7 @@ from rollcli.simulate.options import (
     NOISE,
     PITCH_DEG,
     ROLL_DEG,
+    ROUGHNESS,
     SCENES,
     SIZE,
     SimulateOptions,
@@ -131,6 +132,13 @@ simulate_options = record(
         type=Number("N", at_least=0, at_most=MAX_DIPS, whole=True),
         help="Dips and bumps of 2.5 to 7 cm in the lane ahead of each road, and DIR/heights: how high the "
         "ground lies over the road, metres, float32 TIFF; 0: kerbs and pavements alone.  [default: neither]",
+    ),
+    option(
+        "--roughness",
+        type=Choice(*ROUGHNESS),
+        help="Class of the road's unevenness by ISO 8608, along and across, with mended patches and "
+        "sunken tracks; A: new asphalt, C: an old road, E: gravel. Roll, pitch and height are against the "
+        "plane that fits the lane ahead.  [default: a smooth road]",
     ),
     option(
         "--size",

@@ -127,7 +127,7 @@ def _grounds(carriageway: Carriageway, strips: list[tuple[Piece, int]], far: flo
     for (slope, camber, offset), group in groupby(strips, key=lambda strip: strip[0][2:]):
         pieces, materials = zip(*group, strict=True)
         edges = (*(piece.start for piece in pieces), pieces[-1].end)
-        yield Ground(carriageway.course, edges, materials, far, slope, offset, camber)
+        yield Ground(carriageway.course, edges, materials, far, slope, offset, camber, carriageway.relief)
 
 
 _KINDS = {"bare": _bare, "open": _open, "street": _street, "verge": _verge}

@@ -26,6 +26,7 @@ from rollcli.run.workers.interrupt import Stop
 from rollcli.run.workers.tasks import run_tasks
 from rollcli.simulate.build import carriageway_of, road_camber
 from rollcli.simulate.camera import rig_axes
+from rollcli.simulate.lane import lane_points, lane_rolls
 from rollcli.simulate.render import render_frame
 from rollcli.simulate.spec import LEVEL, FrameSpec
 
@@ -46,6 +47,9 @@ COLUMNS = (
     "gutter_percent",
     "camber",
     "bend_per_m",
+    "roughness",
+    "lane_lo_deg",
+    "lane_hi_deg",
 )
 
 
@@ -61,8 +65,27 @@ def truth_csv(frames: Iterable[tuple[str, FrameSpec]]) -> bytes:
         # a roof has a ridge instead of a curvature
         camber = "" if spec.cross_section == "roof" else _number(road_camber(spec))
         road = (spec.cross_section, *slopes, camber, _number(carriageway_of(spec).course.bend))
-        rows.writerow((stem, *angles, spec.scene, *rig, spec.seed, *road))
+        lane = (f"{math.degrees(angle) + 0.0:.6f}" for angle in lane_rolls_of(spec))
+        rows.writerow((stem, *angles, spec.scene, *rig, spec.seed, *road, spec.roughness or "", *lane))
     return text.getvalue().encode()
+
+
+def lane_rolls_of(spec: FrameSpec) -> tuple[float, float]:
+    """Return the least and the greatest roll of the lane ahead, radians, as a lidar tells them: `lane_rolls`.
+
+    Of a flat and smooth road both are `FrameSpec.roll`.
+    """
+    carriageway, lane = carriageway_of(spec), lane_points()
+    lane = lane._replace(
+        weight=lane.weight * ((lane.lateral > carriageway.left) & (lane.lateral < carriageway.right))
+    )
+    height = np.array([carriageway.section.elevation(lateral) for lateral in lane.lateral.tolist()])
+    if carriageway.relief is not None:
+        height += carriageway.relief.height(lane.lateral, lane.z)
+    course, camera = carriageway.course, spec.cameras(carriageway.normal)[0]
+    right = lane.lateral + lane.z * (course.heading + course.bend / 2 * lane.z)
+    points = np.array([right, height + course.curvature / 2 * lane.z**2, lane.z])
+    return lane_rolls(camera.axes @ (points - camera.position[:, None]), lane)
 
 
 def calibration(spec: FrameSpec) -> bytes:

@@ -39,6 +39,7 @@ def draw_specs(
     crossfall: Span = _CROSSFALL,
     gutter: Span = _NONE,
     kerb: Span = KERB,
+    roughness: str | None = None,
     dips: int | None = None,
     size: tuple[int, int] = SIZE,
     focal: float | None = None,
@@ -103,6 +104,7 @@ def draw_specs(
         gain=gain,
         colour=colour,
         kerb=kerb,
+        roughness=roughness,
         dips=dips,
         seed=seed,
     )

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 SCENES = ("bare", "open", "street", "verge")
 CROSS_SECTIONS = ("flat", "crown", "roof", "dish", "superelevated")
+ROUGHNESS = ("A", "B", "C", "D", "E")  # of ISO 8608: from new asphalt to a track of gravel
 KERBED = ("open", "street")  # the scenes with kerbs
 MIXED = "mixed"  # each frame draws one of the scenes, or of the cross sections
 
@@ -30,9 +31,10 @@ class SimulateOptions:
 
     Ranges are (lowest, highest): `roll_deg` and `pitch_deg`, `curvature` and `bend` in 1/m or None: by scene,
     `crossfall` and `gutter` in per cent, `kerb` and `height` in metres, `principal_offset` in pixels. None
-    stands for `CROSSFALL` and `KERB`. `dips` is how many dips and bumps each road has; None: none, and no
-    true heights. `size` is (width, height) in pixels, `focal` in pixels or None:
-    `FOCAL_PER_WIDTH` times the width, `principal_point` (column, row) in pixels or None: the image's centre.
+    stands for `CROSSFALL` and `KERB`. `roughness` is one of `ROUGHNESS`, or None: smooth. `dips` is how
+    many dips and bumps each road has; None: none, and no true heights. `size` is (width, height) in pixels,
+    `focal` in pixels or None: `FOCAL_PER_WIDTH` times the width, `principal_point` (column, row) in pixels or
+    None: the image's centre.
     """
 
     frames: int = FRAMES
@@ -45,6 +47,7 @@ class SimulateOptions:
     crossfall: tuple[float, float] | None = None
     gutter: tuple[float, float] = (0.0, 0.0)
     kerb: tuple[float, float] | None = None
+    roughness: str | None = None
     dips: int | None = None
     size: tuple[int, int] = SIZE
     focal: float | None = None

@@ -6,10 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rollcli.simulate.lane import lane_plane
 from rollcli.simulate.materials import Asphalt, Mark, Patch
 from rollcli.simulate.options import GUTTER_WIDTH
+from rollcli.simulate.relief import Relief
+from rollcli.simulate.roughness import draw_relief
 from rollcli.simulate.scene import FAR, draw, draw_offset
-from rollcli.simulate.spec import FrameSpec
+from rollcli.simulate.spec import FrameSpec, Stream
 from rollcli.simulate.surfaces import Course
 from rollcli.simulate.vectors import Array
 
@@ -135,7 +138,7 @@ class Carriageway:
     """One or two lanes between two edges (lateral, metres).
 
     The rig drives in the right lane, whose middle is at `shift`. `kerb` is the lowest and the highest kerb,
-    metres.
+    metres, `relief` its unevenness.
     """
 
     course: Course
@@ -147,6 +150,7 @@ class Carriageway:
     parking: bool
     section: CrossSection
     kerb: tuple[float, float]
+    relief: Relief | None = None
 
     @property
     def sides(self) -> tuple[tuple[int, float], tuple[int, float]]:
@@ -155,9 +159,15 @@ class Carriageway:
 
     @property
     def normal(self) -> Array:
-        """The upward unit normal (3,) of the plane that touches the road where the rig stands."""
-        slope = self.section.piece(0.0).slope_at(0.0)
-        normal = np.array([-slope, 1.0, slope * self.course.heading])
+        """The upward unit normal (3,) of the plane that touches the road where the rig stands.
+
+        On a rough road: of the plane that fits the lane ahead, in place of what lies below the wheels.
+        """
+        slope, rising = self.section.piece(0.0).slope_at(0.0), 0.0
+        if self.relief is not None:
+            _, right, rising = lane_plane(self.relief)
+            slope += right
+        normal = np.array([-slope, 1.0, slope * self.course.heading - rising])
         return np.asarray(normal / np.linalg.norm(normal))
 
 
@@ -179,7 +189,11 @@ def draw_carriageway(rng: np.random.Generator, spec: FrameSpec) -> Carriageway:
     left = shift - (0.5 if single else 1.5) * lane - shoulder
     right = shift + 0.5 * lane + shoulder
     section = cross_section(spec.cross_section, spec.crossfall, spec.gutter, left, right, course.bend)
-    return Carriageway(course, left, right, lane, shift, single, parking, section, spec.kerb)
+    relief = None
+    if spec.roughness is not None:
+        wheels = shift - lane / 4, shift + lane / 4
+        relief = draw_relief(spec.rng(Stream.ROUGHNESS), spec.roughness, (left, right), wheels)
+    return Carriageway(course, left, right, lane, shift, single, parking, section, spec.kerb, relief)
 
 
 def draw_asphalt(rng: np.random.Generator, carriageway: Carriageway) -> Asphalt:

@@ -1,5 +1,6 @@
 """Objects beside a road and on it: walls, trees, poles and cars."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -188,7 +189,8 @@ def add_slope(
     """Add ground from `start` outward to `end`, which starts at elevation `level` with an outward `slope`."""
     signed = side * slope
     edges = (start, end) if side > 0 else (end, start)
-    scene.surfaces.append(Ground(carriageway.course, edges, (material,), FAR, signed, level - signed * start))
+    ground = Ground(carriageway.course, edges, (material,), FAR, signed, level - signed * start)
+    scene.surfaces.append(replace(ground, relief=carriageway.relief))
 
 
 def add_sidewalk(
@@ -213,8 +215,10 @@ def add_sidewalk(
     if beyond is not None:
         ends.append(side * np.inf)
         materials.append(beyond)
-    kerb = Wall(carriageway.course, edge, base, np.array([-50.0, FAR]), np.array([level]), stone)
+    foot = base + (carriageway.relief.lowest if carriageway.relief else 0.0)
+    kerb = Wall(carriageway.course, edge, foot, np.array([-50.0, FAR]), np.array([level]), stone)
     strips = Ground(carriageway.course, tuple(ends[::side]), tuple(materials[::side]), FAR, offset=level)
+    strips = replace(strips, relief=carriageway.relief)
     scene.surfaces += [kerb, strips]
     return level, edge + side * width
 

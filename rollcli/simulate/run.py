@@ -53,6 +53,7 @@ def plan_dataset(folder: str | Path, options: SimulateOptions, *, overwrite: boo
         crossfall=_shares(options.crossfall or CROSSFALL),
         gutter=_shares(options.gutter),
         kerb=options.kerb or KERB,
+        roughness=options.roughness,
         dips=options.dips,
         size=options.size,
         focal=options.focal,

@@ -17,6 +17,7 @@ from rollcli.simulate.options import (
     KERB,
     MAX_DIPS,
     NOISE,
+    ROUGHNESS,
     SCENES,
     SIZE,
 )
@@ -40,6 +41,7 @@ class Stream(IntEnum):
     SENSOR = 2
     CROSS_SECTION = 3
     RIG = 4
+    ROUGHNESS = 5
     DIPS = 6
 
 
@@ -65,6 +67,8 @@ class FrameSpec:
         How much more steeply the carriageway falls outward in its gutters, metres per metre.
     kerb : tuple of float
         The lowest and the highest kerb, metres above the edge of the carriageway.
+    roughness : str or None
+        The class of ISO 8608, one of `ROUGHNESS`; None: a smooth road.
     bend : float or None
         Horizontal curvature of the road, 1/m; positive bends to the right. None: drawn with the scene.
     dips : int or None
@@ -95,6 +99,7 @@ class FrameSpec:
     crossfall: float = 0.0
     gutter: float = 0.0
     kerb: Span = KERB
+    roughness: str | None = None
     bend: float | None = None
     dips: int | None = None
     size: tuple[int, int] = SIZE
@@ -172,6 +177,8 @@ def _problems(spec: FrameSpec) -> Iterator[str]:
         yield not_one_of("scene", spec.scene, SCENES)
     if spec.cross_section not in CROSS_SECTIONS:
         yield not_one_of("cross section", spec.cross_section, CROSS_SECTIONS)
+    if spec.roughness is not None and spec.roughness not in ROUGHNESS:
+        yield not_one_of("roughness", spec.roughness, ROUGHNESS)
     if not 0 <= spec.crossfall <= MAX_CROSSFALL:
         yield f"a crossfall of {100 * spec.crossfall:g} % is not within 0 and {100 * MAX_CROSSFALL:g} %"
     if not 0 <= spec.gutter <= MAX_GUTTER:

@@ -2,20 +2,23 @@
 
 A surface computes where rays hit it (`intersect`) and, at these points, its normal and its texture
 coordinates (`sample`). The road rises, bends and is cambered as parabolas, so that each intersection is the
-root of a polynomial: exact, and without a step size.
+root of a polynomial: exact, and without a step size. Only to uneven ground a ray is followed in steps.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rollcli.simulate.relief import Relief
 from rollcli.simulate.vectors import Array, Vectors, first_crossing
 
 NEAR = 0.05  # metres: nearer surfaces are not hit
 _SEAM = 1e-9  # metres: adjacent grounds overlap by it, so that rounding lets no ray pass between them
 _FARTHEST = 1e6  # metres
+_STEPS, _BISECTIONS = 12, 12  # between the highest and the lowest ground that a ray may hit
 
 Indices = NDArray[np.intp]
 
@@ -93,6 +96,7 @@ class Ground:
     """The sheet elevation = offset + slope * lateral + camber / 2 * lateral^2, in strips side by side.
 
     Strip i lies between edges[i] and edges[i + 1] (lateral, metres) and is of materials[i].
+    A `relief` makes it uneven.
     """
 
     course: Course
@@ -102,6 +106,7 @@ class Ground:
     slope: float = 0.0
     offset: float = 0.0
     camber: float = 0.0
+    relief: Relief | None = None
 
     def intersect(self, origin: Array, direction: Array) -> Array:
         (ox, _, oz), (rx, _, rz) = origin, direction
@@ -113,6 +118,31 @@ class Ground:
 
     def _first_hit(self, origin: Array, direction: Array) -> Array:
         """Return the ray parameters where rays first hit the sheet, edges ignored; nan where they miss."""
+        if self.relief is None:
+            return self._first_smooth_hit(origin, direction)
+        first, last = (
+            replace(self, offset=self.offset + raised)._first_smooth_hit(origin, direction)
+            for raised in (self.relief.highest, self.relief.lowest)
+        )
+        last = np.fmax(first, last)
+        sides = [self.course.lateral(origin + t * direction) for t in (first, last)]
+        inside = (np.fmax(*sides) >= self.edges[0]) & (np.fmin(*sides) < self.edges[-1])
+        reached = np.flatnonzero(inside & (origin[2] + first * direction[2] < self.far))  # nan is not
+        start = np.broadcast_to(origin, direction.shape)[:, reached]
+        ahead, near, far = direction[:, reached], first[reached], last[reached]
+        hits = np.full(first.shape, np.nan)
+        hits[reached] = _first_descent(lambda t: self._above(start + t * ahead), near, far)
+        return hits
+
+    def _above(self, points: Array) -> Array:
+        """Return how far points (3, N) are above the uneven sheet, metres."""
+        lateral = self.course.lateral(points)
+        smooth = self.offset + (self.slope + self.camber / 2 * lateral) * lateral
+        uneven = self.relief.height(lateral, points[2]) if self.relief else 0.0
+        return np.asarray(self.course.elevation(points) - smooth - uneven)
+
+    def _first_smooth_hit(self, origin: Array, direction: Array) -> Array:
+        """Return the same for the sheet without its relief."""
         (ox, oy, oz), (rx, ry, rz) = origin, direction
         lean = self.slope * self.course.bend - self.course.curvature
         a = lean / 2 * rz * rz
@@ -137,9 +167,10 @@ class Ground:
     def sample(self, points: Array) -> SurfaceSample:
         z = points[2]
         across, lateral = self.course.across(z), self.course.lateral(points)
-        normal = -(self.slope + self.camber * lateral) * across
+        right, ahead = self.relief.slopes(lateral, z) if self.relief else (0.0, 0.0)
+        normal = -(self.slope + self.camber * lateral + right) * across
         normal[1] += 1.0
-        normal[2] -= self.course.curvature * z
+        normal[2] -= self.course.curvature * z + ahead
         strip = np.clip(np.searchsorted(self.edges, lateral, side="right") - 1, 0, len(self.materials) - 1)
         return SurfaceSample(normal, lateral, z, across, _AHEAD, np.array(self.materials)[strip])
 
@@ -217,6 +248,22 @@ def first_root(a: Array, b: Array, c: Array) -> Array:
     with np.errstate(divide="ignore", invalid="ignore"):
         t = 2 * c / (np.sqrt(b * b - 4 * a * c) - b)
         return np.where((c > 0) & (t > NEAR) & (t < _FARTHEST), t, np.nan)
+
+
+def _first_descent(above: Callable[[Array], Array], first: Array, last: Array) -> Array:
+    """Return where rays first come below 0 between two of their parameters, by steps and bisection."""
+    low, high, searched = first, last, np.ones(first.shape, bool)
+    for step in range(1, _STEPS + 1):
+        t = first + (last - first) * (step / _STEPS)
+        over = above(t) > 0
+        low = np.where(searched & over, t, low)
+        high = np.where(searched & ~over, t, high)
+        searched &= over
+    for _ in range(_BISECTIONS):
+        middle = (low + high) / 2
+        over = above(middle) > 0
+        low, high = np.where(over, middle, low), np.where(over, high, middle)
+    return high
 
 
 # single precision: double precision would double the cost of shading

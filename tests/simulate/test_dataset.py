@@ -57,7 +57,7 @@ def test_truth_has_the_documented_columns_and_each_frames_values(rig):
     first = (rig / "truth.csv").read_text().splitlines()[0]
     assert first == (
         "file,roll_deg,pitch_deg,scene,focal_px,cx_px,cy_px,baseline_m,height_m,curvature_per_m,seed,"
-        "cross_section,crossfall_percent,gutter_percent,camber,bend_per_m"
+        "cross_section,crossfall_percent,gutter_percent,camber,bend_per_m,roughness,lane_lo_deg,lane_hi_deg"
     )
     specs = plan_dataset(rig, TINY, overwrite=True).specs
     for number, (row, spec) in enumerate(zip(rows(rig), specs, strict=True), 1):
@@ -68,7 +68,10 @@ def test_truth_has_the_documented_columns_and_each_frames_values(rig):
         assert (row["scene"], float(row["focal_px"]), row["seed"]) == (spec.scene, 37.12, "9")
         assert (float(row["baseline_m"]), float(row["height_m"])) == (0.54, 1.65)
         assert (row["cx_px"], row["cy_px"]) == ("31.5", "23.5")
-        assert [row[name] for name in first.split(",")[-5:-1]] == ["flat", "0", "0", "0"]
+        assert [row[name] for name in first.split(",")[-8:-4]] == ["flat", "0", "0", "0"]
+        assert row["roughness"] == ""
+        for end in ("lane_lo_deg", "lane_hi_deg"):
+            assert float(row[end]) == pytest.approx(math.degrees(spec.roll), abs=1e-5)
 
 
 def test_truth_says_what_the_road_is_like_across(tmp_path):
