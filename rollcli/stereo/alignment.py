@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.stereo.misalignment import LEVEL, Misalignment
+from rollcli.stereo.row_fit import NOTHING_KNOWN, ScaleSupport, SeenBlocks, fit_rows, scale_support
 from rollcli.stereo.views import (
     BLOCK,
     Map,
@@ -23,7 +24,6 @@ from rollcli.stereo.views import (
 )
 
 Floats = NDArray[np.float32]
-Doubles = NDArray[np.float64]
 _SMOOTHING = 0.7  # px: more takes away the grain that tells on an empty road, less leaves the noise
 _KNOWN = 0.7  # share of a block that has to have a disparity
 _RIDGE = 0.2  # squared grey levels per pixel: gradients along the rows below this are noise
@@ -31,9 +31,6 @@ _LEAST = 2.0  # the same, across the rows: a block with less says nothing
 _ROUNDING = 0.99  # of a sum of 64 float32
 _MOST = 50.0  # and one with more counts no more than with this
 _FEWEST = 40  # blocks
-_FIT_ROUNDS = 12
-_SAME = 0.005  # of the spread: a fit that changes it by less has settled
-_TUNING = 1.5  # standard deviations off, a block counts a quarter
 _LONGEST_STEP = 1.5  # px, anywhere; along the rows, shorter ones take twice as many rounds
 # px: after one this small, another changes a hundredth, or a fortieth where noise is strong
 _SMALL_STEP = 0.05
@@ -53,17 +50,20 @@ class Measured:
         Standard error of each part.
     spread : float
         Standard deviation of their vertical disparities from what is explained, outliers aside, pixels.
+    support : ScaleSupport
+        What of the scale is believed to be in the columns, too.
     """
 
     misalignment: Misalignment
     errors: Misalignment
     share: float
     spread: float
+    support: ScaleSupport = NOTHING_KNOWN
 
     def resized(self, factor: float) -> "Measured":
         """Return this measurement, of views `factor` times as large."""
         there, errors = self.misalignment.resized(factor), self.errors.resized(factor)
-        return Measured(there, errors, self.share, factor * self.spread)
+        return Measured(there, errors, self.share, factor * self.spread, self.support)
 
 
 class Texture(NamedTuple):
@@ -115,20 +115,20 @@ def measure_misalignment(
     if min(disparity.shape) < BLOCK:
         return None
     blocks = _Blocks(texture, disparity, every)
-    found, errors, spread, count = start, LEVEL, 0.0, 0
+    before = found = start
     for _ in range(rounds):
         seen = blocks.vertical(found)
-        count = len(seen.shift)
-        if count < _FEWEST:
+        if len(seen.shift) < _FEWEST:
             return None
-        step, errors, spread = _fit(seen)
-        reach = step.reach(*disparity.shape)
-        step = step.times(_LONGEST_STEP / max(reach, _LONGEST_STEP))
-        found = found + step
+        fit = fit_rows(seen)
+        reach = fit.lies.reach(*disparity.shape)
+        step = fit.lies.times(_LONGEST_STEP / max(reach, _LONGEST_STEP))
+        before, found = found, found + step
         blocks.follow(step)
         if reach < _SMALL_STEP:
             break
-    return Measured(found, errors, count / blocks.count, spread)
+    support = scale_support(seen, before, fit.spread)
+    return Measured(found, fit.errors, len(seen.shift) / blocks.count, fit.spread, support)
 
 
 def textured_share(view: View) -> float:
@@ -139,16 +139,6 @@ def textured_share(view: View) -> float:
     along = block_means(across * across) + np.float32(_RIDGE)
     weight = block_means(down * down) - np.square(block_means(across * down)) / along
     return float(np.mean(weight > _LEAST))
-
-
-@dataclass(frozen=True)
-class _Seen:
-    """Vertical disparities (px) of blocks at (x, y) from the centre of the right view, and their weights."""
-
-    x: Floats
-    y: Floats
-    shift: Floats
-    weight: Floats
 
 
 class _Shares(NamedTuple):
@@ -206,18 +196,20 @@ class _Blocks:
         rows, columns = (BLOCK * place[:, None].astype(np.float32) for place in np.nonzero(places))
         within = np.arange(BLOCK, dtype=np.float32)
         self._v = rows + np.repeat(within, BLOCK)
-        self._u = columns + np.tile(within, BLOCK) - blocks_at(disparity, places)
+        far = blocks_at(disparity, places)
+        self._u = columns + np.tile(within, BLOCK) - far
+        self._near = far.sum(axis=1) / np.maximum(self._seen.sum(axis=1), np.float32(1))
         self._centre_x, centre_y = (np.float32((side - 1) / 2) for side in reversed(disparity.shape))
         self._y = self._v - centre_y
         self._shares = _Shares.of(self._across, self._down, self._seen, self._u - self._centre_x, self._y)
         self._along = np.zeros(len(self._u), np.float32)
 
-    def vertical(self, at: Misalignment) -> _Seen:
+    def vertical(self, at: Misalignment) -> SeenBlocks:
         """Return the vertical disparities that are left when the right view is levelled by `at`."""
         x, y = self._u - self._centre_x, self._y
-        u, v = seen_at(at, self._u, self._v, self._right.shape)
+        u, v = seen_at(at, self._u, self._v, self._right.shape, self._near[:, None])
         if not len(u):
-            return _Seen(x[:, 0], x[:, 0], x[:, 0], x[:, 0])
+            return SeenBlocks(*(x[:, 0],) * 5)
         height, width = self._right.shape
         off = self._left - cv2.remap(self._right, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         shift = np.einsum("ij,ij->i", self._shares.share, off)
@@ -229,7 +221,9 @@ class _Blocks:
         shift[cut] = np.einsum("ij,ij->i", part.share, off[cut])
         weight[cut], mean_x[cut], mean_y[cut] = part[3:]
         telling = weight > 0
-        return _Seen(mean_x[telling], mean_y[telling], shift[telling], weight[telling])
+        return SeenBlocks(
+            mean_x[telling], mean_y[telling], self._near[telling], shift[telling], weight[telling]
+        )
 
     def follow(self, step: Misalignment) -> None:
         """Move the blocks along the rows, to where the grey levels agree once the views lie `step` further.
@@ -237,7 +231,7 @@ class _Blocks:
         A disparity that was matched in the wrong row is wrong by what hides that. Noise in the gradients lets
         least squares take up a part of it only: without this, a fifth to a half stays hidden.
         """
-        down = step.down(self._shares.x, self._shares.y)
+        down = step.down(self._shares.x, self._shares.y, self._near)
         moved = np.clip(self._along - self._shares.mixed * down, -_LONGEST_STEP, _LONGEST_STEP)
         self._u += moved[:, None]
 
@@ -250,41 +244,6 @@ def _may_tell(down: Floats) -> NDArray[np.bool_]:
     varies = block_means(down * down) - np.square(block_means(down))
     enough: NDArray[np.bool_] = varies > np.float32(_LEAST * _KNOWN * _ROUNDING)
     return enough
-
-
-def _fit(seen: _Seen) -> tuple[Misalignment, Misalignment, float]:
-    """Return the misalignment that explains most blocks, its standard errors, and the spread of the rest."""
-    size = max(1.0, float(np.abs(seen.x).max()), float(np.abs(seen.y).max()))
-    x, y = seen.x.astype(np.float64) / size, seen.y.astype(np.float64) / size
-    columns = np.stack([np.ones_like(x), x, y, x * y])
-    shift, fixed = seen.shift.astype(np.float64), seen.weight.astype(np.float64)
-    weight, off, spread = fixed, np.zeros_like(fixed), 1.0
-    for _ in range(_FIT_ROUNDS):
-        weight = fixed * _believed(off, spread)
-        weighted = columns * weight
-        normal = weighted @ columns.T
-        inverse = np.linalg.inv(normal + 1e-6 * np.trace(normal) * np.eye(4))
-        values = inverse @ (weighted @ shift)
-        off = shift - values @ columns
-        before, spread = spread, 1.4826 * _median(np.abs(off)) + 1e-3
-        if abs(spread - before) < _SAME * spread:
-            break
-    scores = inverse @ (weighted * off)
-    errors = np.sqrt(np.square(scores).sum(axis=1))
-    units = np.array([1, size, size, size**2])
-    return Misalignment(*(values / units).tolist()), Misalignment(*(errors / units).tolist()), spread
-
-
-def _median(values: Doubles) -> float:
-    """Return the median, in a fifth of the time that `numpy.median` takes for a few hundred values."""
-    middle = (values.size - 1) // 2, values.size // 2
-    return float(np.partition(values, middle)[list(middle)].mean())
-
-
-def _believed(off: Doubles, spread: float) -> Doubles:
-    """Return the weights of blocks by their residuals: far ones hardly count, and none is thrown away."""
-    doubt: Doubles = 1 + np.square(off / (_TUNING * spread))
-    return 1 / np.square(doubt)
 
 
 def _smooth(view: View) -> Floats:
@@ -317,6 +276,8 @@ class Tolerance:
     """Turns a road by 0.08 degrees."""
     twist: float = 0.15
     """Pixels in the corners; turns a road by 0.03 degrees."""
+    tilt: float = 0.1
+    """Pixels at a disparity of a sixteenth of the width."""
     sure: float = 4.0
     """Standard errors. Blocks beside each other err together: they are said to err less than they do."""
 
@@ -328,28 +289,65 @@ _MEASURED_AT = 120_000  # px: larger views are measured at this size, which keep
 _CLOSER = 480_000
 _FURTHEST = 2.0  # times the last change; further away, two measurements do not tell
 _NO_CHANGE = 1e-6  # px^2
+_AROUND = 7  # px of a small map: what is smoothed; a tilt moves by 0.3 px at most, and this is a tenth of it
 
 
 def is_level(
     lies: Misalignment, errors: Misalignment, shape: tuple[int, ...], tolerance: Tolerance = TOLERANCE
 ) -> bool:
     """Tell whether views of this shape that lie so, with these standard errors, are within a tolerance."""
-    corner = shape[0] * shape[1] / 4
-    limits = (tolerance.offset, tolerance.rotation, tolerance.scale, tolerance.twist / corner)
+    _, _, _, corner, near = Misalignment(twist=1, tilt=1).shifts(shape[0], shape[1])
+    limits = (
+        tolerance.offset,
+        tolerance.rotation,
+        tolerance.scale,
+        tolerance.twist / corner,
+        tolerance.tilt / near,
+    )
     parts = zip(lies.parts, errors.parts, limits, strict=True)
     return all(abs(value) < limit + tolerance.sure * error for value, error, limit in parts)
 
 
-def level(right: View, misalignment: Misalignment) -> View:
-    """Resample the right view once, as a level camera would have seen it; rows at the border repeat."""
+def level(right: View, misalignment: Misalignment, near: Map | None = None) -> View:
+    """Resample the right view once, as a level camera would have seen it; rows at the border repeat.
+
+    Parameters
+    ----------
+    right : ndarray of uint8, shape (H, W)
+    misalignment : Misalignment
+    near : ndarray of float32, optional
+        Disparities of the right view at any size, in its own pixels: without them a tilt is left as it is.
+    """
     if misalignment == LEVEL:
         return right
     height, width = right.shape
     u = np.arange(width, dtype=np.float32)
     v = np.arange(height, dtype=np.float32)[:, None]
-    at_u, at_v = seen_at(misalignment, u, v, right.shape)
+    far: Map | float = 0.0
+    if near is not None and misalignment.tilt:
+        far = cv2.resize(near, (width, height), interpolation=cv2.INTER_LINEAR).astype(np.float32, copy=False)
+        far *= np.float32(width / near.shape[1])
+    at_u, at_v = seen_at(misalignment, u, v, right.shape, far)
     levelled = cv2.remap(right, at_u, at_v, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
     return levelled.astype(np.uint8, copy=False)
+
+
+def seen_from_right(disparity: Map) -> Map:
+    """Return a smooth map of the right view's disparities, px, from the left view's; 0 is no data there.
+
+    What hides the rest counts, and gaps are filled from around.
+    """
+    height, width = disparity.shape
+    v, u = np.nonzero(disparity > 0)
+    known = disparity[v, u]
+    at = np.rint(u - known).astype(np.intp)
+    order = np.flatnonzero(at >= 0)[np.argsort(known[at >= 0], kind="stable")]
+    seen = np.zeros_like(disparity)
+    seen[v[order], at[order]] = known[order]
+    around = _AROUND, _AROUND
+    share = cv2.blur((seen > 0).astype(np.float32), around)
+    smooth: Map = np.divide(cv2.blur(seen, around), np.maximum(share, np.float32(1e-3)), dtype=np.float32)
+    return smooth
 
 
 class Approach:

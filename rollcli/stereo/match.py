@@ -17,13 +17,16 @@ from rollcli.stereo.alignment import (
     Tolerance,
     is_level,
     level,
+    seen_from_right,
     textured_share,
 )
+from rollcli.stereo.columns import with_believed_columns
 from rollcli.stereo.first_look import FirstLook, first_look, look_for_range
 from rollcli.stereo.misalignment import LEVEL, Misalignment
 from rollcli.stereo.misalignment_words import NOT_LEVELLED, TOO_LITTLE
 from rollcli.stereo.options import StereoOptions as StereoOptions
 from rollcli.stereo.refinement import refined
+from rollcli.stereo.row_fit import NOTHING_KNOWN
 from rollcli.stereo.sgbm import ALL_ROWS, NARROWEST, match_rows, usable_range, without_lag
 from rollcli.stereo.views import Map, Views, prepare_views
 
@@ -86,7 +89,7 @@ _UNUSUAL_ERROR = 0.01  # px; standard error of the offset
 # hides more of what is left. At 0.15 px a ninth of the streets are matched twice, at 0.2 half as many; but of
 # 216 warped pairs one is off by 0.12 degrees (tests/benchmarks/bench_level.py 12), and warped empty roads
 # with much noise by 0.018 (median) in place of 0.016. At 0.25 three times as many of these are off by 0.1
-_KEPT = Tolerance(0.3, 0.0014, 0.0014, 0.8, sure=0.0)
+_KEPT = Tolerance(0.3, 0.0014, 0.0014, 0.8, 0.3, sure=0.0)
 _KEPT_SPREAD = 0.15  # px
 _FURTHEST = Misalignment(12.0, 0.03, 0.02, 0.0)  # what no rig in use has: px, radians, share
 
@@ -129,9 +132,9 @@ class StereoMatch:
         Share of the valid pixels within a pixel of the range's end: if large, the range was too short.
     corrected : Misalignment
         What the right view was levelled by, pixels of the size matched at; `LEVEL` if it was left as it is.
-    lies : Misalignment or None
-        How the right view lies as measured, the same where it was corrected; None where it was not measured,
-        or could not be.
+    measured : Measured or None
+        How the right view lies, with the standard error of each part, pixels of the size matched at; None where
+        that was not asked, or could not be told.
     slope_error : float
         Standard deviation of the slope along the rows that levelling left in the disparities, px per px; 0 if
         nothing was measured and corrected.
@@ -145,9 +148,19 @@ class StereoMatch:
     num_disparities: int
     end_fraction: float
     corrected: Misalignment
-    lies: Misalignment | None
+    measured: Measured | None
     slope_error: float
     doubt: str
+
+    @property
+    def lies(self) -> Misalignment | None:
+        """How the right view lies: as corrected, or as measured where that was too little to correct.
+
+        None where nothing was measured, or what was measured could not be corrected.
+        """
+        if self.measured is None or self.doubt in (TOO_LITTLE, NOT_LEVELLED):
+            return None
+        return self.measured.misalignment if self.corrected == LEVEL else self.corrected
 
 
 def compute_disparity(left: NDArray[Any], right: NDArray[Any], **options: Any) -> Map:
@@ -211,9 +224,11 @@ def match_pair(
         count = (width // 8 if look.range is None else look.range) - first
     count = usable_range(count, first, width, options.block_size)
 
+    near = None if look.disparity is None else seen_from_right(look.disparity)
+
     @lru_cache(maxsize=1)
     def levelled(lies: Misalignment) -> Views:
-        return views[0], level(views[1], lies)
+        return views[0], level(views[1], lies, near)
 
     def match(lies: Misalignment, rows: slice, above: int = 0) -> Map:
         found = match_rows(levelled(lies), first, count, options, rows, above)
@@ -222,25 +237,30 @@ def match_pair(
     above = _rows_above(look, wanted, height) if first >= 0 else 0
     of_these = partial(match, above=above)
     if small is None:
-        corrected, lies, doubt = Misalignment(options.vertical_offset or 0.0), None, ""
+        corrected, measured, doubt = Misalignment(options.vertical_offset or 0.0), None, ""
         matched = of_these(corrected, wanted.rows)
     else:
-        matched, corrected, lies, doubt = _match_levelled(of_these, wanted.rows, small, look, first < 0)
+        matched, corrected, measured, doubt = _match_levelled(of_these, wanted.rows, small, look, first < 0)
+    support = NOTHING_KNOWN if measured is None or corrected == LEVEL else measured.support
+
+    def finished(found: Map) -> Map:
+        return with_believed_columns(refined(found, views, corrected), corrected, support)
+
     valid = cv2.countNonZero(matched)
     whole = None
     start, stop, _ = wanted.rows.indices(height)
     full = slice(max(start, above), stop)
     if wanted.whole and full != slice(0, height):
-        whole = refined(_completed(matched, full, partial(match, corrected)), views, corrected)
+        whole = finished(_completed(matched, full, partial(match, corrected)))
     return StereoMatch(
-        disparity=refined(matched, views, corrected),
+        disparity=finished(matched),
         whole=whole,
         min_disparity=first,
         num_disparities=count,
         end_fraction=np.count_nonzero(matched >= first + count - 2) / valid if valid else 0.0,
         corrected=corrected,
-        lies=lies,
-        slope_error=0.0 if small is None else corrected.stretch_error,
+        measured=measured,
+        slope_error=support.error,
         doubt=doubt,
     )
 
@@ -275,34 +295,31 @@ def _match_levelled(
     small: SmallViews,
     look: FirstLook,
     any_scene: bool,
-) -> tuple[Map, Misalignment, Misalignment | None, str]:
-    """Match once the views are level; the map, what was corrected and measured, and why that may be wrong."""
+) -> tuple[Map, Misalignment, Measured | None, str]:
+    """Match once the views are level; the map, what was corrected, what was measured, and why it may be wrong."""
     looked_at = _worth_correcting(look.measured, small.shape)
-    at, approach = looked_at, Approach(small.shape)
+    wanted, approach = looked_at, Approach(small.shape)
     for matched in range(_MATCHES):
+        at = wanted
         disparity = match(at, rows)
         measured = small.closer.measure(disparity, at, _ROUNDS)
         if not any_scene:
             check_same_scene(small, look, measured)
         if rows != ALL_ROWS:
             if look.measured is not None and _is_confirmed(measured, at, small.shape, rows):
-                lies = at if at != LEVEL else look.measured.misalignment
-                return disparity, at, lies, _doubt(at, measured)
+                return disparity, at, look.measured, _doubt(at, measured)
             rows = ALL_ROWS  # a few rows say that something is wrong, but not what
             continue
         if measured is None:
-            return disparity, at, None, TOO_LITTLE
+            return disparity, at, look.measured, TOO_LITTLE
         wanted = _wanted(measured, approach.next(at, measured.misalignment), small.shape)
         if wanted == at:
-            lies = at if at != LEVEL else measured.misalignment
-            return disparity, at, lies, _doubt(at, measured)
+            return disparity, at, measured, _doubt(at, measured)
         if wanted != LEVEL and _is_kept(measured, at, small.shape):
-            found = measured.misalignment
-            return disparity, found, found, _doubt(found, measured)
-        at = wanted
+            return disparity, measured.misalignment, measured, _doubt(measured.misalignment, measured)
         if matched == 1 and looked_at != LEVEL:  # which may have led astray
-            at, approach = LEVEL, Approach(small.shape)
-    return disparity, at, None, NOT_LEVELLED
+            wanted, approach = LEVEL, Approach(small.shape)
+    return disparity, at, measured, NOT_LEVELLED
 
 
 def _is_confirmed(measured: Measured | None, at: Misalignment, shape: tuple[int, ...], rows: slice) -> bool:

@@ -5,12 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-# A scale this small is as likely a bend of the rows that a lens has left. On KITTI vertical disparities grow
-# by 0.03 to 0.1 % down the image; lidar says that nothing of it is in the horizontal ones.
-_DOUBTFUL_SCALE = 0.0003
-# What is wrong in a measured scale. The standard error from the blocks is a fifth of it: they share most of
-# their error. Without it the interval covers the roll of half the rendered pairs that were levelled.
-_SCALE_ERROR = 0.00025
+_NEAR = 1 / 16  # of the width of a view: the disparity of what is near, where a shift by a tilt is told
 
 
 @dataclass(frozen=True)
@@ -18,7 +13,7 @@ class Misalignment:
     """A right view that is moved, turned and enlarged against a level one, about the centre of the image.
 
     A point of the level view at (x, y) from the centre lies in the given one at
-    ``x + stretch x - rotation y`` and ``y + offset + rotation x + scale y + twist x y``.
+    ``x + scale x - rotation y`` and ``y + offset + rotation x + scale y + twist x y + tilt d``, d the disparity.
 
     Attributes
     ----------
@@ -31,17 +26,21 @@ class Misalignment:
     twist : float
         How the slope of its rows changes down the image, 1/pixels: what rectification leaves on real rigs. It
         moves rows only, and is no rotation, no scale and no offset.
+    tilt : float
+        Of the baseline against the rows, radians: how much lower near points lie, pixels per pixel of disparity.
+        It moves rows only.
     """
 
     offset: float = 0.0
     rotation: float = 0.0
     scale: float = 0.0
     twist: float = 0.0
+    tilt: float = 0.0
 
     @property
-    def parts(self) -> tuple[float, float, float, float]:
-        """The four numbers; `dataclasses.astuple` takes ten times and more."""
-        return self.offset, self.rotation, self.scale, self.twist
+    def parts(self) -> tuple[float, float, float, float, float]:
+        """The five numbers; `dataclasses.astuple` takes ten times and more."""
+        return self.offset, self.rotation, self.scale, self.twist, self.tilt
 
     def __add__(self, other: "Misalignment") -> "Misalignment":
         """Both, one after the other, to first order."""
@@ -57,22 +56,26 @@ class Misalignment:
 
     def resized(self, factor: float) -> "Misalignment":
         """Return this misalignment, of views `factor` times as large."""
-        return Misalignment(self.offset * factor, self.rotation, self.scale, self.twist / factor)
+        return Misalignment(self.offset * factor, self.rotation, self.scale, self.twist / factor, self.tilt)
 
-    def down(self, x: Any, y: Any) -> Any:
-        """Return how far down points (x, y) from the centre are seen, pixels; numbers, or arrays alike."""
-        return self.offset + self.rotation * x + (self.scale + self.twist * x) * y
+    def down(self, x: Any, y: Any, near: Any = 0.0) -> Any:
+        """Return how far down points (x, y) from the centre are seen, pixels; numbers, or arrays alike.
 
-    def shifts(self, height: int, width: int) -> tuple[float, float, float, float]:
+        `near` are their disparities, pixels.
+        """
+        return self.offset + self.rotation * x + (self.scale + self.twist * x) * y + self.tilt * near
+
+    def shifts(self, height: int, width: int) -> tuple[float, float, float, float, float]:
         """Return the largest vertical shift of each part in a view of this size, pixels; signed."""
         x, y = width / 2, height / 2
-        return self.offset, self.rotation * x, self.scale * y, self.twist * x * y
+        return self.offset, self.rotation * x, self.scale * y, self.twist * x * y, self.tilt * width * _NEAR
 
     def reach(self, height: int, width: int) -> float:
         """Return the largest vertical shift in a view of this size, pixels."""
-        offset, rotation, scale, twist = self.shifts(height, width)
+        offset, rotation, scale, twist, tilt = self.shifts(height, width)
         corners = ((1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1))
-        return max(abs(offset + u * rotation + v * scale + uv * twist) for u, v, uv in corners)
+        flat = [offset + u * rotation + v * scale + uv * twist for u, v, uv in corners]
+        return max(abs(each + near) for each in flat for near in (0.0, tilt))
 
     def reach_in_rows(self, height: int, width: int, start: int, stop: int) -> float:
         """Return the largest vertical shift in the middle half of some rows of such a view, pixels."""
@@ -90,20 +93,6 @@ class Misalignment:
         """Return what has these `values` in a view of this size."""
         lower, clockwise, larger, twist = values
         return Misalignment(lower, math.radians(clockwise), larger / 100, twist / (height * width / 4))
-
-    @property
-    def stretch(self) -> float:
-        """The part of the scale that is believed to be in the columns, too."""
-        return self.scale * self._believed
-
-    @property
-    def stretch_error(self) -> float:
-        """Standard deviation of `stretch`, as it was measured; 0 where nothing was to be corrected."""
-        return 0.0 if self == LEVEL else math.hypot(_SCALE_ERROR, _DOUBTFUL_SCALE * self._believed)
-
-    @property
-    def _believed(self) -> float:
-        return self.scale**2 / (self.scale**2 + _DOUBTFUL_SCALE**2)
 
     @property
     def rotation_deg(self) -> float:

@@ -122,7 +122,7 @@ def _found(
     none = np.zeros_like(row)
     u = np.stack([column - middle, 1 - across, -down], axis=1) @ _PLANE
     v = np.stack([row, none, none + 1], axis=1) @ _PLANE
-    u, v = seen_at(lies, u, v, right.shape)
+    u, v = seen_at(lies, u, v, right.shape, middle[:, None])
     grey = blocks_at(left[pixels], told).astype(np.float32)
     weight = blocks_at(gradient[pixels], told)
     weight -= weight.mean(axis=1, keepdims=True)  # one view may be brighter than the other

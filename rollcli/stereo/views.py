@@ -73,14 +73,21 @@ def resampled(disparity: Map, shape: tuple[int, ...]) -> Map:
 
 
 def seen_at(
-    lies: Misalignment, u: NDArray[np.float32], v: NDArray[np.float32], shape: tuple[int, ...]
+    lies: Misalignment,
+    u: NDArray[np.float32],
+    v: NDArray[np.float32],
+    shape: tuple[int, ...],
+    near: NDArray[np.float32] | float = 0.0,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return where a right view of this shape that `lies` so shows the points (u, v) of a level one, px."""
+    """Return where a right view of this shape that `lies` so shows the points (u, v) of a level one, px.
+
+    `near` are the points' disparities, px: a tilt moves near points further down.
+    """
     if lies == LEVEL:
         return u, v
     height, width = shape
     x, y = u - np.float32((width - 1) / 2), v - np.float32((height - 1) / 2)
-    return u + lies.stretch * x - lies.rotation * y, v + lies.down(x, y)
+    return u + lies.scale * x - lies.rotation * y, v + lies.down(x, y, near)
 
 
 def block_means(pixels: NDArray[np.float32]) -> NDArray[np.float32]:
