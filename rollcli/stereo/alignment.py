@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.stereo.misalignment import LEVEL, Misalignment
-from rollcli.stereo.row_fit import NOTHING_KNOWN, ScaleSupport, SeenBlocks, fit_rows, scale_support
+from rollcli.stereo.row_fit import NOTHING_KNOWN, ColumnSupport, SeenBlocks, column_support, fit_rows
 from rollcli.stereo.views import (
     BLOCK,
     Map,
@@ -50,20 +50,21 @@ class Measured:
         Standard error of each part.
     spread : float
         Standard deviation of their vertical disparities from what is explained, outliers aside, pixels.
-    support : ScaleSupport
-        What of the scale is believed to be in the columns, too.
+    support : ColumnSupport
+        What of it is believed to be in the columns, too.
     """
 
     misalignment: Misalignment
     errors: Misalignment
     share: float
     spread: float
-    support: ScaleSupport = NOTHING_KNOWN
+    support: ColumnSupport = NOTHING_KNOWN
 
     def resized(self, factor: float) -> "Measured":
         """Return this measurement, of views `factor` times as large."""
         there, errors = self.misalignment.resized(factor), self.errors.resized(factor)
-        return Measured(there, errors, self.share, factor * self.spread, self.support)
+        support = self.support.resized(factor)
+        return Measured(there, errors, self.share, factor * self.spread, support)
 
 
 class Texture(NamedTuple):
@@ -127,7 +128,8 @@ def measure_misalignment(
         blocks.follow(step)
         if reach < _SMALL_STEP:
             break
-    support = scale_support(seen, before, fit.spread)
+    height, width = disparity.shape
+    support = column_support(seen, before, fit.spread, (height, width))
     return Measured(found, fit.errors, len(seen.shift) / blocks.count, fit.spread, support)
 
 
@@ -278,6 +280,8 @@ class Tolerance:
     """Pixels in the corners; turns a road by 0.03 degrees."""
     tilt: float = 0.1
     """Pixels at a disparity of a sixteenth of the width."""
+    curve: float = 0.1
+    """Pixels in the first and last row."""
     sure: float = 4.0
     """Standard errors. Blocks beside each other err together: they are said to err less than they do."""
 
@@ -296,13 +300,14 @@ def is_level(
     lies: Misalignment, errors: Misalignment, shape: tuple[int, ...], tolerance: Tolerance = TOLERANCE
 ) -> bool:
     """Tell whether views of this shape that lie so, with these standard errors, are within a tolerance."""
-    _, _, _, corner, near = Misalignment(twist=1, tilt=1).shifts(shape[0], shape[1])
+    corner, near, edge = Misalignment(twist=1, tilt=1, curve=1).shifts(shape[0], shape[1])[3:]
     limits = (
         tolerance.offset,
         tolerance.rotation,
         tolerance.scale,
         tolerance.twist / corner,
         tolerance.tilt / near,
+        tolerance.curve / edge,
     )
     parts = zip(lies.parts, errors.parts, limits, strict=True)
     return all(abs(value) < limit + tolerance.sure * error for value, error, limit in parts)
@@ -337,7 +342,6 @@ def seen_from_right(disparity: Map) -> Map:
 
     What hides the rest counts, and gaps are filled from around.
     """
-    height, width = disparity.shape
     v, u = np.nonzero(disparity > 0)
     known = disparity[v, u]
     at = np.rint(u - known).astype(np.intp)

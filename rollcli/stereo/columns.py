@@ -1,17 +1,18 @@
 """What rows that were measured say of the columns, and disparities that are put right by it.
 
 Views are warped by all that their rows show, for the match needs rows that agree. A scale of the rows is in
-the columns only as far as it is supported; the rest of it is taken out of the disparities again.
+the columns only as far as it is supported, and the rest of it is taken out of the disparities again; a yaw and
+a pitch move columns by the squares of what they move rows by.
 """
 
 import numpy as np
 
 from rollcli.stereo.misalignment import Misalignment
-from rollcli.stereo.row_fit import ScaleSupport
+from rollcli.stereo.row_fit import NOTHING_KNOWN, ColumnSupport
 from rollcli.stereo.views import Map
 
 
-def with_believed_columns(disparity: Map, matched: Misalignment, support: ScaleSupport) -> Map:
+def with_believed_columns(disparity: Map, matched: Misalignment, support: ColumnSupport) -> Map:
     """Return the map of a pair whose columns lie as is believed.
 
     Parameters
@@ -20,13 +21,14 @@ def with_believed_columns(disparity: Map, matched: Misalignment, support: ScaleS
         Of views of which the right one was levelled by `matched`, px; no data is 0.
     matched : Misalignment
         Pixels of this size.
-    support : ScaleSupport
-        What of its scale is in the columns.
+    support : ColumnSupport
+        What is in the columns.
     """
-    surplus = np.float32(support.scale - matched.scale)
-    if not surplus:
+    if support == NOTHING_KNOWN and not matched.scale:
         return disparity
-    width = disparity.shape[1]
-    x = np.arange(width, dtype=np.float32) - np.float32((width - 1) / 2)
-    moved = disparity + surplus * (x - disparity)
-    return np.where(disparity > 0, np.maximum(moved, np.float32(1e-3)), np.float32(0))
+    height, width = disparity.shape
+    x = np.arange(width, dtype=np.float32) - np.float32((width - 1) / 2) - disparity
+    y = np.arange(height, dtype=np.float32)[:, None] - np.float32((height - 1) / 2)
+    slope = np.float32(support.twist) * x + np.float32(support.pitch) * y
+    slope += np.float32(support.scale - matched.scale)
+    return np.where(disparity > 0, np.maximum(disparity + slope * x, np.float32(1e-3)), np.float32(0))

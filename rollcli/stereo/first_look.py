@@ -97,7 +97,9 @@ _STEP = 0.6
 _CLOSER_ROUNDS = 4  # of measuring at larger views
 _MARGIN = 1.1  # beyond the largest disparity seen, to search
 # Of small views, which tell a scale to 0.2 %: level pairs need no closer look. Real rigs twist more
-_AS_GOOD_AS_LEVEL = Tolerance(offset=0.15, rotation=0.0005, scale=0.002, twist=0.4, tilt=0.3, sure=2.0)
+_AS_GOOD_AS_LEVEL = Tolerance(
+    offset=0.15, rotation=0.0005, scale=0.002, twist=0.4, tilt=0.3, curve=0.3, sure=2.0
+)
 # px of the whole view; standard error of the offset. Above it small views cannot tell: 0.21 and more in dark
 # streets that are 0.3 px off, up to 0.11 on level roads of fine grain
 _TELLING_ERROR = 0.15

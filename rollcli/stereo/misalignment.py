@@ -13,7 +13,8 @@ class Misalignment:
     """A right view that is moved, turned and enlarged against a level one, about the centre of the image.
 
     A point of the level view at (x, y) from the centre lies in the given one at
-    ``x + scale x - rotation y`` and ``y + offset + rotation x + scale y + twist x y + tilt d``, d the disparity.
+    ``x + scale x - rotation y`` and ``y + offset + rotation x + scale y + twist x y + tilt d + curve y^2``,
+    with d its disparity.
 
     Attributes
     ----------
@@ -24,11 +25,11 @@ class Misalignment:
     scale : float
         By which share it is larger.
     twist : float
-        How the slope of its rows changes down the image, 1/pixels: what rectification leaves on real rigs. It
-        moves rows only, and is no rotation, no scale and no offset.
+        How the slope of its rows changes down the image, 1/pixels: a yaw, or what rectification leaves.
     tilt : float
-        Of the baseline against the rows, radians: how much lower near points lie, pixels per pixel of disparity.
-        It moves rows only.
+        Of the baseline against the rows, radians: how much lower near points lie, px per px of disparity.
+    curve : float
+        How the scale of its rows changes down the image, 1/pixels: a pitch, or what the lens model leaves.
     """
 
     offset: float = 0.0
@@ -36,11 +37,12 @@ class Misalignment:
     scale: float = 0.0
     twist: float = 0.0
     tilt: float = 0.0
+    curve: float = 0.0
 
     @property
-    def parts(self) -> tuple[float, float, float, float, float]:
-        """The five numbers; `dataclasses.astuple` takes ten times and more."""
-        return self.offset, self.rotation, self.scale, self.twist, self.tilt
+    def parts(self) -> tuple[float, float, float, float, float, float]:
+        """The six numbers; `dataclasses.astuple` takes ten times and more."""
+        return self.offset, self.rotation, self.scale, self.twist, self.tilt, self.curve
 
     def __add__(self, other: "Misalignment") -> "Misalignment":
         """Both, one after the other, to first order."""
@@ -56,26 +58,30 @@ class Misalignment:
 
     def resized(self, factor: float) -> "Misalignment":
         """Return this misalignment, of views `factor` times as large."""
-        return Misalignment(self.offset * factor, self.rotation, self.scale, self.twist / factor, self.tilt)
+        twist, curve = self.twist / factor, self.curve / factor
+        return Misalignment(self.offset * factor, self.rotation, self.scale, twist, self.tilt, curve)
 
     def down(self, x: Any, y: Any, near: Any = 0.0) -> Any:
         """Return how far down points (x, y) from the centre are seen, pixels; numbers, or arrays alike.
 
         `near` are their disparities, pixels.
         """
-        return self.offset + self.rotation * x + (self.scale + self.twist * x) * y + self.tilt * near
+        slope = self.scale + self.twist * x + self.curve * y
+        return self.offset + self.rotation * x + slope * y + self.tilt * near
 
-    def shifts(self, height: int, width: int) -> tuple[float, float, float, float, float]:
+    def shifts(self, height: int, width: int) -> tuple[float, float, float, float, float, float]:
         """Return the largest vertical shift of each part in a view of this size, pixels; signed."""
         x, y = width / 2, height / 2
-        return self.offset, self.rotation * x, self.scale * y, self.twist * x * y, self.tilt * width * _NEAR
+        tilt, curve = self.tilt * width * _NEAR, self.curve * y**2
+        return self.offset, self.rotation * x, self.scale * y, self.twist * x * y, tilt, curve
 
     def reach(self, height: int, width: int) -> float:
         """Return the largest vertical shift in a view of this size, pixels."""
-        offset, rotation, scale, twist, tilt = self.shifts(height, width)
+        offset, rotation, scale, twist, tilt, curve = self.shifts(height, width)
         corners = ((1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1))
-        flat = [offset + u * rotation + v * scale + uv * twist for u, v, uv in corners]
-        return max(abs(each + near) for each in flat for near in (0.0, tilt))
+        edge = [offset + curve + u * rotation + v * scale + uv * twist for u, v, uv in corners]
+        middle = [offset + u * rotation for u in (-1, 1)]
+        return max(abs(each + near) for each in edge + middle for near in (0.0, tilt))
 
     def reach_in_rows(self, height: int, width: int, start: int, stop: int) -> float:
         """Return the largest vertical shift in the middle half of some rows of such a view, pixels."""

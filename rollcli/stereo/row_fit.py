@@ -22,13 +22,14 @@ _FIT_ROUNDS = 12
 _SAME = 0.005  # of the spread: a fit that changes it by less has settled
 _TUNING = 1.5  # standard deviations off, a block counts a quarter
 _TILE = 64.0  # px of the size measured at: blocks within it err together
-_LINEAR = slice(0, 4)  # offset, rotation, scale, twist
-_SURE = 4.0  # standard errors: a tilt of less is none. Plain roads cannot tell it from a scale
+_LINEAR = (0, 1, 2, 3)  # offset, rotation, scale, twist
+_SURE = 4.0  # standard errors: a tilt or a curve of less is none. Plain roads cannot tell it from a scale
+_ROAD_ACROSS, _ROAD_DOWN = 0.05, 0.3  # of width and height: how far from the centre the lane's middle lies
 
 
 @dataclass(frozen=True)
 class BeliefTuning:
-    """What is known of rigs before a pair is seen; no number is fitted to a recording.
+    """What is known of rigs before a pair is seen; no number is fitted to the rolls of a recording.
 
     Attributes
     ----------
@@ -36,6 +37,15 @@ class BeliefTuning:
         How large they are where there are any, standard deviations: share, radians, share.
     has_scale, has_tilt, has_bend : float
         How often there are any.
+    pitch : float
+        How often an offset is a pitch, and no shift of the image.
+    focal : tuple of float
+        Focal lengths of rigs, in widths of the image.
+    yaw : float
+        Standard deviation, radians.
+    lens_twist : float
+        How much more than its other shapes the lens model leaves as a twist: on KITTI's grey cameras ten times
+        (1.4 px in the corners, which lidar does not see in the columns: a yaw would move them by 4.4 px).
     least : float
         What no pair tells of a scale: blocks between which it lies share a part of their error.
     tiles : float
@@ -46,8 +56,12 @@ class BeliefTuning:
     tilt: float = 0.005
     bend: float = 0.002
     has_scale: float = 0.5
-    has_tilt: float = 0.25
-    has_bend: float = 0.25
+    has_tilt: float = 0.1
+    has_bend: float = 0.1
+    pitch: float = 0.6
+    focal: tuple[float, ...] = (0.5, 0.6, 0.75, 1.0, 1.5)
+    yaw: float = 0.0035
+    lens_twist: float = 10.0
     least: float = 0.0001
     tiles: float = 2.0
 
@@ -56,14 +70,30 @@ BELIEF = BeliefTuning()
 
 
 @dataclass(frozen=True)
-class ScaleSupport:
-    """What is believed of a scale in the columns, and its standard deviation; shares."""
+class ColumnSupport:
+    """What is believed of how the columns lie: a point at (x, y) lies ``x (scale + twist x + pitch y)`` further.
+
+    Attributes
+    ----------
+    scale : float
+        Share.
+    twist, pitch : float
+        Of a yaw and of a pitch, 1/pixels.
+    error : float
+        Standard deviation of the slope along the rows that this leaves on the road, px per px.
+    """
 
     scale: float
+    twist: float
+    pitch: float
     error: float
 
+    def resized(self, factor: float) -> "ColumnSupport":
+        """Return the same of views `factor` times as large."""
+        return ColumnSupport(self.scale, self.twist / factor, self.pitch / factor, self.error)
 
-NOTHING_KNOWN = ScaleSupport(0.0, 0.0)
+
+NOTHING_KNOWN = ColumnSupport(0.0, 0.0, 0.0, 0.0)
 
 
 class SeenBlocks(NamedTuple):
@@ -97,7 +127,7 @@ class RowFit(NamedTuple):
 
 
 def fit_rows(seen: SeenBlocks) -> RowFit:
-    """Fit offset, rotation, scale and twist, and a tilt where it is sure.
+    """Fit offset, rotation, scale and twist, and a tilt and a curve where they are sure.
 
     Parameters
     ----------
@@ -107,22 +137,29 @@ def fit_rows(seen: SeenBlocks) -> RowFit:
     frame = _Frame.of(seen)
     design = frame.design(seen)
     shift, fixed = seen.shift.astype(np.float64), seen.weight.astype(np.float64)
-    fit = _robust(design[_LINEAR], shift, fixed)
-    wide = _least_squares(design[:5], shift, fit.weight)
-    variance = _variance(design[_LINEAR], _least_squares(design[_LINEAR], shift, fit.weight), frame.tile)
-    if wide.values[4] ** 2 > _SURE**2 * variance * wide.inverse[4, 4]:
-        fit = _robust(design[:5], shift, fixed)
-    errors = np.sqrt(np.square(fit.inverse @ (design[: len(fit.values)] * fit.weight * fit.off)).sum(axis=1))
-    parts = (np.pad(each, (0, 5 - len(each))) / frame.units for each in (fit.values, errors))
-    lies, errors_of = (Misalignment(*part.tolist()) for part in parts)
+    used = list(_LINEAR)
+    fit = _robust(design[used], shift, fixed)
+    variance = _variance(design[used], fit, frame.tile)
+    wide = _least_squares(design[:6], shift, fit.weight)
+    used += [
+        each for each in (4, 5) if wide.values[each] ** 2 > _SURE**2 * variance * wide.inverse[each, each]
+    ]
+    if len(used) > len(_LINEAR):
+        fit = _robust(design[used], shift, fixed)
+    errors = np.sqrt(np.square(fit.inverse @ (design[used] * fit.weight * fit.off)).sum(axis=1))
+    parts = np.zeros((2, 6))
+    parts[:, used] = (fit.values, errors)
+    lies, errors_of = (Misalignment(*part.tolist()) for part in parts / frame.units)
     return RowFit(lies, errors_of, fit.spread)
 
 
-def scale_support(seen: SeenBlocks, at: Misalignment, spread: float) -> ScaleSupport:
-    """Tell what of a vertical scale is believed to be in the columns, too.
+def column_support(
+    seen: SeenBlocks, at: Misalignment, spread: float, shape: tuple[int, int]
+) -> ColumnSupport:
+    """Tell what of a scale, a twist and an offset is believed to be in the columns, too.
 
-    Every choice of scale, tilt and bend explains the blocks, with what is known of rigs; the answer is the
-    mean over them, each as likely as it explains what was seen. Whatever else curves the field (four shapes
+    Every choice of scale, tilt, bend and pitch explains the blocks, with what is known of rigs; the answer is
+    the mean over them, each as likely as it explains what was seen. Whatever else curves the field (four shapes
     of second and third degree) tells how evenly the lens has left the rest.
 
     Parameters
@@ -132,57 +169,85 @@ def scale_support(seen: SeenBlocks, at: Misalignment, spread: float) -> ScaleSup
     at : Misalignment
     spread : float
         Of the blocks from what is explained, px.
+    shape : tuple of int
+        Height and width of the view, px.
     """
     frame = _Frame.of(seen)
     design = frame.design(seen)
-    shift = seen.shift.astype(np.float64) + at.scale * seen.y + at.tilt * seen.near
-    start = _least_squares(design[:6], shift, seen.weight.astype(np.float64))
+    shift = seen.shift + np.float64(1) * at.down(seen.x, seen.y, seen.near)
+    start = _least_squares(design[:7], shift, seen.weight.astype(np.float64))
     weight = seen.weight * _believed(start.off, spread)
-    linear, whole = (_least_squares(design[:count], shift, weight) for count in (4, len(design)))
-    variance = _variance(design[_LINEAR], linear, frame.tile)
-    beyond = (
-        np.square(whole.values[7:]) - BELIEF.tiles**2 * np.diag(_covariance(design, whole, frame.tile))[7:]
+    fit, whole = (_least_squares(design[:count], shift, weight) for count in (7, len(design)))
+    variance = _variance(
+        design[list(_LINEAR)], _least_squares(design[list(_LINEAR)], shift, weight), frame.tile
     )
-    lens = BELIEF.least**2 + float(np.maximum(beyond, 0).mean()) / frame.half_height**2
-    units = np.array([1, 1, frame.half_height, 1, frame.near, frame.half_height])[:, None]
-    six = design[:6] * units
-    told, other = np.array([2, 4, 5]), np.array([0, 1, 3])
-    normal, right = (six * weight) @ six.T / variance, (six * weight) @ shift / variance
+    x, y, near = frame.half_width, frame.half_height, frame.near
+    beyond = np.square(whole.values[7:]) - variance * np.diag(whole.inverse)[7:]
+    lens = max(0.0, float(beyond.mean())) + (BELIEF.least * y) ** 2
+    units = np.array([1, x, y, x * y, near, y * y, y])[:, None]
+    by_units = design[:7] * units
+    told, other = np.array([2, 4, 6, 5]), np.array([0, 1, 3])
+    normal, right = (by_units * weight) @ by_units.T / variance, (by_units * weight) @ shift / variance
     through = normal[np.ix_(told, other)] @ np.linalg.inv(normal[np.ix_(other, other)])
     information = normal[np.ix_(told, told)] - through @ normal[np.ix_(other, told)]
-    return _mean_over_causes(information, right[told] - through @ right[other], lens)
+    height, width = shape
+    scale, pitch = _mean_over_causes(
+        information,
+        right[told] - through @ right[other],
+        np.array([lens / y**2, 0, 0, lens / y**4]),
+        fit.values[0] / np.square(np.array(BELIEF.focal) * width),
+    )
+    yaw = (BELIEF.yaw / (0.7 * width)) ** 2
+    doubt = (BELIEF.lens_twist**2 * lens + variance * fit.inverse[3, 3]) / (x * y) ** 2
+    twist = fit.values[3] / (x * y) * yaw / (yaw + doubt)
+    twist_error = np.sqrt(yaw * doubt / (yaw + doubt))
+    parts = scale[1], 2 * twist_error * width * _ROAD_ACROSS, pitch[1] * height * _ROAD_DOWN
+    return ColumnSupport(scale[0], float(twist), pitch[0], float(np.linalg.norm(parts)))
 
 
-def _mean_over_causes(information: Doubles, told: Doubles, lens: float) -> ScaleSupport:
-    """Return the mean and the standard deviation of the scale over all choices of causes.
+def _mean_over_causes(
+    information: Doubles, told: Doubles, lens: Doubles, pitches: Doubles
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return mean and standard deviation of scale and of pitch over all choices of causes.
 
     Parameters
     ----------
-    information : ndarray, shape (3, 3)
-        Of scale, tilt and bend: what the blocks tell, the rest being free.
-    told : ndarray, shape (3,)
+    information : ndarray, shape (4, 4)
+        Of scale, tilt, bend and curve: what the blocks tell, the rest being free.
+    told : ndarray, shape (4,)
         The same, times their values.
-    lens : float
-        Variance of what the lens leaves in the scale of the rows.
+    lens : ndarray, shape (4,)
+        Variances of what the lens leaves in each.
+    pitches : ndarray
+        Curves that the offset would have, were it a pitch, 1/px.
     """
     often = np.array([BELIEF.has_scale, BELIEF.has_tilt, BELIEF.has_bend])
     size = np.array([BELIEF.scale, BELIEF.tilt, BELIEF.bend])
-    likely, means, squares = [], [], []
+    curves = [(1 - BELIEF.pitch, 0.0), *((BELIEF.pitch / len(pitches), curve) for curve in pitches)]
+    likely, scales, squares, pitched = [], [], [], []
     for causes in product((False, True), repeat=3):
-        prior = np.where(causes, np.square(size), 0)
-        own = prior[0] / (prior[0] + lens)  # what of the rows' scale is one of the columns
-        prior[0] += lens
-        spread = np.eye(3) + information * prior
+        prior = np.append(np.where(causes, np.square(size), 0), 0)
+        own = prior[0] / (prior[0] + lens[0])  # what of the rows' scale is one of the columns
+        prior += lens
+        spread = np.eye(4) + information * prior
         covariance = prior[:, None] * np.linalg.inv(spread)
-        values = covariance @ told
-        chance = np.log(np.where(causes, often, 1 - often)).sum()
-        likely.append(chance + (told @ values - np.linalg.slogdet(spread)[1]) / 2)
-        means.append(own * values[0])
-        squares.append(means[-1] ** 2 + own**2 * covariance[0, 0] + own * lens)
+        chance = np.log(np.where(causes, often, 1 - often)).sum() - np.linalg.slogdet(spread)[1] / 2
+        for how_often, curve in curves:
+            rest = told - information[:, 3] * curve
+            values = covariance @ rest
+            known = told[3] * curve - information[3, 3] * curve**2 / 2
+            likely.append(chance + np.log(how_often) + known + rest @ values / 2)
+            scales.append(own * values[0])
+            squares.append(scales[-1] ** 2 + own**2 * covariance[0, 0] + own * lens[0])
+            pitched.append(curve)
     share = np.exp(np.array(likely) - max(likely))
     share /= share.sum()
-    mean = float(share @ means)
-    return ScaleSupport(mean, float(np.sqrt(max(share @ squares - mean**2, 0.0))))
+
+    def summed(values: list[float], squared: Doubles) -> tuple[float, float]:
+        mean = float(share @ values)
+        return mean, float(np.sqrt(max(share @ squared - mean**2, 0.0)))
+
+    return summed(scales, np.array(squares)), summed(pitched, np.square(pitched))
 
 
 class _Frame(NamedTuple):
@@ -202,16 +267,16 @@ class _Frame(NamedTuple):
 
     @property
     def units(self) -> Doubles:
-        """What values of the first five columns are divided by to be parts of a misalignment."""
+        """What values of the first six columns are divided by to be parts of a misalignment."""
         x, y = self.half_width, self.half_height
-        return np.array([1, x, y, x * y, self.near])
+        return np.array([1, x, y, x * y, self.near, y * y])
 
     def design(self, seen: SeenBlocks) -> Doubles:
-        """Return the columns: a misalignment's five, a bend of the lower half, a curve, and four shapes."""
+        """Return the columns: a misalignment's six, a bend of the lower half, and four shapes."""
         x, y = seen.x / np.float64(self.half_width), seen.y / np.float64(self.half_height)
         near = seen.near / np.float64(self.near)
         ones = np.ones_like(x)
-        rest = (np.maximum(y, 0), y * y, x * x, x * x * y, x * y * y, y**3)
+        rest = (y * y, np.maximum(y, 0), x * x, x * x * y, x * y * y, y**3)
         return np.stack([ones, x, y, x * y, near, *rest])
 
 
