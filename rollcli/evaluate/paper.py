@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from rollcli.errors import ExitStatus, UsageError
 from rollcli.evaluate.options import PaperOptions
 from rollcli.evaluate.truth import read_truth
-from rollcli.files.atomic import remove_leftovers, write_atomic
 from rollcli.files.matching import stem_of
+from rollcli.files.stream import write_output
 from rollcli.report.page import require_extra
 from rollcli.run.find import check_writes, list_files, map_frames
 from rollcli.run.frame import Frame
@@ -126,6 +126,5 @@ def _write(
     folder = Path(options.experiments.output)
     page = paper_page(tables, found, failed, times, options)
     written = {folder / f"{name}.csv": tables[name].csv() for name in TABLES} | {folder / PAGE: page}
-    remove_leftovers(written)
     for path, data in written.items():
-        write_atomic(path, data)
+        write_output(str(path), data, overwrite=options.running.overwrite)

@@ -129,7 +129,7 @@ def run_accuracy(result: str, truth: str, form: str, output: str, running: Runni
     _name_unmatched(accuracy, result, truth, running)
     _count_bent(rows, known, truth, running)
     data = FORMATS[form](accuracy).encode("utf-8", "surrogateescape")
-    write_output(output, data)
+    write_output(output, data, overwrite=running.overwrite)
     return ExitStatus.FRAMES_FAILED if accuracy.no_angle else ExitStatus.DONE
 
 

@@ -3,11 +3,12 @@
 import os
 import stat
 import sys
+import uuid
 from pathlib import Path
 
-from rollcli.errors import OutputError
+from rollcli.errors import OutputError, UsageError
 from rollcli.files.atomic import output_error, remove_leftovers
-from rollcli.files.storage import write_bytes
+from rollcli.files.storage import create, write_bytes
 
 STDOUT = "-"  # how the command line names it
 STDOUT_NAME = "standard output"
@@ -24,11 +25,22 @@ def is_stream(name: str) -> bool:
     return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
 
 
-def write_output(name: str, data: bytes) -> None:
+def write_output(name: str, data: bytes, *, overwrite: bool) -> None:
     """Write to standard output, into a device or pipe, or as a file or object that is whole or not there.
+
+    Parameters
+    ----------
+    name : str
+        A path, a URL of an object store, or "-".
+    data : bytes
+    overwrite : bool
+        Whether a file or object is replaced; otherwise it stays, also where another program has written it
+        since this one looked.
 
     Raises
     ------
+    UsageError
+        There is one, and it is not replaced.
     OutputError
         It cannot be written.
     BrokenPipeError
@@ -44,7 +56,10 @@ def write_output(name: str, data: bytes) -> None:
             os.close(descriptor)
     else:
         remove_leftovers([name])
-        write_bytes(name, data)
+        if overwrite:
+            write_bytes(name, data)
+        elif not create(name, data, uuid.uuid4().hex):
+            raise UsageError(f"{name}: exists already; give --overwrite to replace it")
 
 
 def open_stream(name: str) -> int:

@@ -108,13 +108,13 @@ def _write(
         for kind, path in options.chart_paths(name).items()
     }
     for path, data in files.items():
-        write_output(path, data)
+        write_output(path, data, overwrite=options.running.overwrite)
     if files:
         progress.note(f"{listed(list(files))}: written")
     if options.output is None:
         return ExitStatus.DONE
     page = report_page(result, options, list(zip(chosen, pictures, strict=True)), rig, charts)
-    write_output(options.output, page)
+    write_output(options.output, page, overwrite=options.running.overwrite)
     missing = [each.missing for each in pictures if each.empty]
     for reason in missing[:_REASONS]:
         progress.say(f"no picture of {reason}")

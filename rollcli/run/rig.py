@@ -235,7 +235,11 @@ def run_rig(options: RigOptions) -> int:
     missing = source.missing or (later.missing if later is not None else "")
     checks = run_checks(rig, options.gates, missing, changes.get(ROLL.name))
     found = Findings(rig, checks, after, changes)
-    write_output(options.output, FORMATS[options.format](found).encode("utf-8", "surrogateescape"))
+    write_output(
+        options.output,
+        FORMATS[options.format](found).encode("utf-8", "surrogateescape"),
+        overwrite=options.running.overwrite,
+    )
     if not options.running.quiet:
         for each in filter(None, [source, later]):
             _tell(each)

@@ -38,7 +38,7 @@ def test_a_pipe_gets_all_of_the_bytes_and_stays_a_pipe(tmp_path):
     os.mkfifo(path)
     reader = threading.Thread(target=lambda: found.append(path.read_bytes()))
     reader.start()
-    stream.write_output(str(path), data)
+    stream.write_output(str(path), data, overwrite=False)
     reader.join(timeout=60)
     assert found == [data]
     assert path.is_fifo()
@@ -48,7 +48,7 @@ def test_a_file_is_replaced_and_what_a_killed_run_left_of_it_is_removed(tmp_path
     path = tmp_path / "page.html"
     path.write_bytes(b"old")
     (tmp_path / ".page.html.0123456789abcdef.part").write_bytes(b"half")
-    stream.write_output(str(path), b"new")
+    stream.write_output(str(path), b"new", overwrite=True)
     assert path.read_bytes() == b"new"
     assert [each.name for each in tmp_path.iterdir()] == ["page.html"]
 
@@ -81,4 +81,4 @@ def test_what_cannot_be_opened_is_named(tmp_path):
 
 def test_a_device_that_takes_nothing_is_named():
     with pytest.raises(OutputError, match=r"^/dev/full: cannot be written: no space left on device$"):
-        stream.write_output("/dev/full", b"data")
+        stream.write_output("/dev/full", b"data", overwrite=True)
