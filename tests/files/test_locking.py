@@ -3,8 +3,10 @@
 import errno
 import importlib.util
 import os
+import platform
 import subprocess
 import sys
+import threading
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -245,3 +247,38 @@ def test_only_a_regular_file_that_nobody_writes_is_abandoned(tmp_path):
             assert not abandoned
     with locking.nobody_writes(str(path)) as abandoned:
         assert abandoned
+
+
+def test_of_many_that_find_the_lock_file_of_an_ended_run_one_wins(tmp_path, monkeypatch):
+    line = [sys.executable, "-c", "import os; print(os.getpid())"]
+    ended = subprocess.run(line, capture_output=True, check=True)
+    stale = f"{int(ended.stdout)} {platform.node()}\nx\n"
+    monkeypatch.setattr(locking, "_POLL_S", 0)
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        for number in range(150):
+            name = tmp_path / f"{number}.csv"
+            Path(f"{name}.lock").write_text(stale)
+            start, hold = threading.Barrier(4), threading.Barrier(4)
+            won = []
+
+            def take(name=name, start=start, hold=hold, won=won):
+                start.wait()
+                try:
+                    with locking._lock_file(str(name)):
+                        won.append(1)
+                        hold.wait()
+                except UsageError:
+                    hold.wait()
+
+            threads = [threading.Thread(target=take) for _ in range(4)]
+            for thread in threads:
+                thread.start()
+            for thread in threads:
+                thread.join()
+            assert len(won) == 1, number
+            assert not list(tmp_path.glob(f"{number}.csv.lock.break"))
+            assert not Path(f"{name}.lock").exists()
+    finally:
+        sys.setswitchinterval(before)
