@@ -19,17 +19,28 @@ from rollcli.files.stores.locations import (
     scheme_of,
     split_url,
 )
-from rollcli.files.stores.objects import list_objects
+from rollcli.files.stores.objects import has_objects, list_objects
 
+_OF_FILES = (
+    *(".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm", ".npy", ".pfm"),
+    *(".csv", ".jsonl", ".parquet", ".txt", ".json", ".yaml", ".yml", ".xml", ".toml"),
+)
 _MAGIC = re.compile(r"[*?[]")
 
 
 def is_folder_url(url: str) -> bool:
-    """Return whether a URL names a prefix: it ends at a slash or a bucket, or its last part has no ending."""
+    """Return whether a URL names a prefix.
+
+    It ends at a slash or a bucket, or its last part has no ending; or it has one that no file has which is
+    read here, as of a date, and objects lie below it.
+    """
     if scheme_of(url) not in OBJECT_STORES:
         return False
     key = split_url(url)[1]
-    return key in ("", "/") or key.endswith("/") or posixpath.splitext(key)[1] == ""
+    ending = posixpath.splitext(key)[1].lower()
+    if key in ("", "/") or key.endswith("/") or ending == "":
+        return True
+    return not (ending in _OF_FILES or glob.has_magic(url)) and has_objects(f"{url}/")
 
 
 def is_place(location: str) -> bool:

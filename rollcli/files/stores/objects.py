@@ -35,7 +35,10 @@ _CODES = {
     "AuthorizationHeaderMalformed": "the bucket is in another region; set AWS_REGION",
     "IllegalLocationConstraintException": "the bucket is in another region; set AWS_REGION",
 }
-_NO_KEYS = "169.254.169.254"  # where machines of a cloud find theirs
+_NO_KEYS = ("169.254.169.254", "metadata.google.internal")  # where machines of a cloud find theirs
+_REDIRECT = re.compile("Received redirect without LOCATION|301 Moved Permanently")
+# what holds names of buckets and objects, which say nothing of what is wrong
+_PATH, _ELEMENT = re.compile(r"(https?://[^/\s\"]*)[^\s\"]*"), re.compile(r"<(?!/?Code>)[^<>]*>[^<]*")
 _STATUS = re.compile(r"non-2xx status code: (\d+)")
 
 
@@ -59,13 +62,13 @@ def request_seconds() -> float:
 
 def reason_of(error: Exception) -> str:
     """Say what a store objects to."""
-    text = str(error)
+    text = _without_names(error)
     for code, meaning in _CODES.items():
         if f"<Code>{code}</Code>" in text:
             return meaning
-    if _NO_KEYS in text or "metadata" in text.lower():
+    if any(each in text for each in _NO_KEYS):
         return "no keys are given; set AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, or the store's own"
-    if "301 Moved Permanently" in text or "redirect" in text.lower():
+    if _REDIRECT.search(text):
         return "the bucket is in another region; set AWS_REGION"
     if "MissingAccount" in text:
         return "no account is given; set AZURE_STORAGE_ACCOUNT_NAME"
@@ -80,16 +83,22 @@ def reason_of(error: Exception) -> str:
     return _CUT if "body" in text else _REFUSED
 
 
+def _without_names(error: Exception) -> str:
+    """Return what an error says without names of buckets and objects: hosts stay, and codes of answers."""
+    return _ELEMENT.sub("", _PATH.sub(r"\1", str(error)))
+
+
 def what_is_missing(error: Exception) -> str:
     """Tell a bucket that does not exist from an object."""
-    text = str(error)
-    return _NO_BUCKET if "NoSuchBucket" in text or "ContainerNotFound" in text else _NO_OBJECT
+    text = _without_names(error)
+    missing = any(f"<Code>{each}</Code>" in text for each in ("NoSuchBucket", "ContainerNotFound"))
+    return _NO_BUCKET if missing else _NO_OBJECT
 
 
 def is_final(error: Exception) -> bool:
     """Tell whether a store would answer the same again: it has understood the request and refuses it."""
-    text = str(error)
-    if "redirect" in text.lower() or _NO_KEYS in text:
+    text = _without_names(error)
+    if _REDIRECT.search(text) or any(each in text for each in _NO_KEYS):
         return True
     status = _STATUS.search(text)
     passing = "<Code>RequestTimeout</Code>" in text or (status and status[1] in ("408", "429"))
@@ -286,6 +295,14 @@ def list_objects(url: str) -> Iterator[tuple[str, int]]:
         raise UsageError(f"{public_name(url)}: {what_is_missing(error)}") from None
     except _store_errors() as error:
         raise UsageError(f"{public_name(url)}: cannot be listed: {reason_of(error)}") from None
+
+
+def has_objects(url: str) -> bool:
+    """Return whether objects are seen below a prefix, which ends at a slash."""
+    try:
+        return next(list_objects(url), None) is not None
+    except UsageError:  # who reads there says what is wrong
+        return False
 
 
 def _listed(store: Any, prefix: str | None) -> Iterator[Any]:

@@ -15,6 +15,25 @@ def answer(status, code=""):
     return Exception(f"Generic S3 error: Server returned non-2xx status code: {status}{body}")
 
 
+NAMED = (
+    "Generic S3 error: Error performing GET http://127.0.0.1:9/maps/{0}/a%20b.png in 11 ms - Server returned "
+    "non-2xx status code: {1}: <Error><Code>X</Code><Resource>/maps/{0}/a b.png</Resource><Key>{0}</Key>"
+    "</Error>"
+    "\n\nDebug source:\nGeneric {{ uri: Some(\n http://127.0.0.1:9/maps/{0}/a%20b.png,\n) }}"
+)
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["metadata", "redirects", "MissingAccount", "169.254.169.254", "NoSuchBucket", "301 Moved Permanently"],
+)
+def test_names_of_objects_say_nothing_of_what_is_wrong(name):
+    passing = Exception(NAMED.format(name, "503 Service Unavailable"))
+    assert reason_of(passing) == "the store answered 503"
+    assert not is_final(passing)
+    assert what_is_missing(Exception(NAMED.format(name, "404 Not Found"))) == "there is no such object"
+
+
 # the codes are those of the lists of errors of Amazon S3 and of Azure Blob Storage
 @pytest.mark.parametrize(
     ("error", "said", "of_all", "final"),
