@@ -14,7 +14,7 @@ import click
 from rollcli.cli.command import option
 from rollcli.cli.types import FilePath
 from rollcli.errors import InputError
-from rollcli.files.bounded import MOST_SETTINGS, read_given
+from rollcli.files.bounded import MOST_SETTINGS, as_utf8, read_given
 
 _PARTS = 8  # of a dotted key; no command has more than two words, and no option more than one
 _MANY_PARTS = re.compile(
@@ -79,7 +79,7 @@ def _load(path: str) -> dict[str, Any]:
         import tomli as tomllib
 
     try:
-        text = read_given(path, MOST_SETTINGS).decode()
+        text = as_utf8(read_given(path, MOST_SETTINGS), path).decode()
         if _MANY_PARTS.search(text):  # which takes time that grows with the square of their number
             raise click.UsageError(f"{path}: is no file of options: it has a key of more than {_PARTS} parts")
         return tomllib.loads(text)

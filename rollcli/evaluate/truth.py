@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rollcli.errors import InputError, UsageError
-from rollcli.files.bounded import read_given
+from rollcli.files.bounded import as_utf8, read_given
 from rollcli.files.matching import stem_of
 from rollcli.files.results import TEXT
 from rollcli.files.storage import read_bytes
@@ -83,7 +83,7 @@ def read_known_poses(path: str | Path) -> dict[str, KnownPose]:
         data = read_bytes(path) if is_url(str(path)) else read_given(path)
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from error
-    rows = list(_rows(data.removeprefix(b"\xef\xbb\xbf").decode(**TEXT), path))
+    rows = list(_rows(as_utf8(data, str(path)).decode(**TEXT), path))
     if not rows:
         raise InputError(f"{path}: holds no angle")
     places = by_stem((name for name, _ in rows), str(path))

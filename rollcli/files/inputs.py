@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rollcli.errors import InputError, UsageError
-from rollcli.files.bounded import MOST_LISTED, read_given, read_stream
+from rollcli.files.bounded import MOST_LISTED, as_utf8, read_given, read_stream
 from rollcli.files.naming import listed, match_names, natural_key
 from rollcli.files.search import Search
 from rollcli.files.storage import read_bytes
@@ -215,7 +215,7 @@ def _arguments(
         yield from ((line, True) for line in _stdin_lines(stdin))
     elif files_from is not None:
         try:
-            data = _list_behind(files_from)
+            data = as_utf8(_list_behind(files_from), files_from)
         except InputError as error:
             raise UsageError(str(error)) from None
         except OSError as error:
@@ -232,7 +232,7 @@ def _stdin_lines(stdin: Iterable[str] | None) -> Iterator[str]:
     if stdin is None:
         if sys.stdin is None:
             raise UsageError("-: stdin is closed; nothing can be read from it")
-        return _lines(read_stream(sys.stdin.buffer, "-", MOST_LISTED))
+        return _lines(as_utf8(read_stream(sys.stdin.buffer, "-", MOST_LISTED), "-"))
     return (name for line in stdin if (name := line.rstrip("\r\n")))
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from rollcli.errors import InputError
 from rollcli.files.atomic import is_file
+from rollcli.files.bounded import UTF16_MARKS
 from rollcli.files.codecs.parquet import MAGIC, decode_parquet
 from rollcli.files.results import (
     BOUNDS,
@@ -122,9 +123,7 @@ def _tables(path: str, wanted: Sequence[str]) -> Iterator[tuple[str, list[str], 
 
 def _table(data: bytes, path: str, wanted: Sequence[str]) -> tuple[list[str], Iterator[tuple[Any, ...]]]:
     if not data.startswith(MAGIC):
-        return _cells(
-            io.TextIOWrapper(io.BytesIO(data), TEXT["encoding"], TEXT["errors"], newline=""), path, wanted
-        )
+        return _cells(_text(io.BufferedReader(io.BytesIO(data))), path, wanted)
     names = ["file", "status", "method", *wanted]
     rows = ((number, *map(values.get, names)) for number, values in decode_parquet(data, path))
     return names, rows
@@ -145,12 +144,19 @@ def _opened(path: str) -> Iterator[TextIO]:
     """Open the file as text, line ends as they are."""
     try:
         if path == STDIN:
-            yield io.TextIOWrapper(sys.stdin.buffer, TEXT["encoding"], TEXT["errors"], newline="")
+            yield _text(sys.stdin.buffer)
             return
-        with Path(path).open("r", -1, TEXT["encoding"], TEXT["errors"], newline="") as stream:
+        with Path(path).open("rb") as file, _text(file) as stream:
             yield stream
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from error
+
+
+def _text(file: Any) -> TextIO:
+    """Open a buffered file as text: UTF-8, or the UTF-16 that Windows marks."""
+    if file.peek(2)[:2] in UTF16_MARKS:
+        return io.TextIOWrapper(file, "utf-16", "replace", newline="")
+    return io.TextIOWrapper(file, TEXT["encoding"], TEXT["errors"], newline="")
 
 
 def _cells(stream: TextIO, path: str, wanted: Sequence[str]) -> tuple[list[str], Iterator[tuple[Any, ...]]]:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Literal, get_args, get_type_hints
 
 from rollcli.errors import InputError
-from rollcli.files.bounded import read_given, read_stream
+from rollcli.files.bounded import as_utf8, read_given, read_stream
 from rollcli.files.codecs.parquet import MAGIC, decode_parquet
 from rollcli.files.storage import exists, list_names, read_bytes
 from rollcli.files.stores.locations import is_url, is_web_url
@@ -270,9 +270,10 @@ def parse_rows(data: bytes, name: str | Path) -> Iterator[Row]:
         table = decode_parquet(data, str(name))
         yield from (_row(values, f"{name}: row {number}") for number, values in table)
         return
+    data = as_utf8(data, str(name))
     # decoded piece by piece: as one text, a million rows would take a gigabyte more
-    stream = io.BytesIO(data.removeprefix(b"\xef\xbb\xbf"))
-    if data[:_MOST_SPACE].removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"{"):
+    stream = io.BytesIO(data)
+    if data[:_MOST_SPACE].lstrip().startswith(b"{"):
         texts = (line.removesuffix(b"\n").decode(**TEXT) for line in stream)
         yield from (_row(values, f"{name}: line {number}") for number, values in json_rows(texts, name))
         return
@@ -296,7 +297,7 @@ def read_run(path: str | Path) -> Mapping[str, Any] | None:
         data = _read(record)
         if b"\\u0000" in data:  # no option holds one
             raise ValueError("it holds a NUL character")
-        run = json.loads(data)
+        run = json.loads(as_utf8(data, record))
     except (ValueError, RecursionError) as error:
         raise InputError(f"{record}: is not JSON: {error}") from error
     if not isinstance(run, dict):

@@ -111,7 +111,7 @@ def test_columns_of_text_are_those_of_the_rows(tmp_path, form, before):
 def test_columns_come_from_stdin_too(monkeypatch, tmp_path, form):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "-.run.json").write_text('{"rollcli": "1"}')
-    monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=io.BytesIO(bytes_of(form))))
+    monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=io.BufferedReader(io.BytesIO(bytes_of(form)))))
 
     found = read_columns("-", ["roll_deg", "pitch_deg"])
 
