@@ -105,7 +105,7 @@ class Request:
         lambda0, tolerance = self.solver.lambda0, self.solver.tolerance
         if lambda0 != "auto" and not 0 < lambda0 < math.inf:
             raise UsageError(f"lambda0 {lambda0}: give a positive number, or auto")
-        if not tolerance > 0:
+        if not 0 < tolerance < math.inf:
             raise UsageError(f"a tolerance of {math.degrees(tolerance):g} degrees: give a positive angle")
         if not 0 < self.max_roll <= math.radians(MAX_ROLL_LIMIT_DEG) * (1 + 1e-12):
             raise UsageError(
@@ -115,6 +115,8 @@ class Request:
 
         if not 0 <= self.slope_error < math.inf:
             raise UsageError(f"a slope error of {self.slope_error:g}: give 0 or more px per px")
+        if self.seed < 0:
+            raise UsageError(f"seed {self.seed}: give 0 or a larger whole number")
         if not self.max_interval > 0:
             raise UsageError(
                 f"a widest interval of {math.degrees(self.max_interval):g} degrees: give a positive angle"

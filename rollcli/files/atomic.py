@@ -9,12 +9,12 @@ import stat
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
-from threading import Thread
 from typing import BinaryIO
 
 from rollcli.errors import OutputError
 from rollcli.files.locking import being_written, nobody_writes
 from rollcli.files.stores.locations import is_url
+from rollcli.files.threads import in_threads
 
 
 def is_folder(path: str | Path) -> bool:
@@ -111,25 +111,16 @@ def _in_threads(sync: Callable[[Path], None], paths: Sequence[Path]) -> None:
     OutputError
         The disk fails to take one; it is named.
     """
-    failed: list[tuple[Path, OSError]] = []
 
-    def work(part: Sequence[Path]) -> None:
-        for path in part:
-            try:
-                sync(path)
-            except OSError as error:
-                failed.append((path, error))
-                return
+    def try_to(path: Path) -> None:
+        try:
+            sync(path)
+        except OSError as error:
+            raise OutputError(
+                f"{path}: cannot be forced to the disk: {(error.strerror or str(error)).lower()}"
+            ) from error
 
-    threads = [Thread(target=work, args=(paths[first::_THREADS],)) for first in range(_THREADS)]
-    for thread in threads[: len(paths)]:
-        thread.start()
-    for thread in threads[: len(paths)]:
-        thread.join()
-    for path, error in failed:
-        raise OutputError(
-            f"{path}: cannot be forced to the disk: {(error.strerror or str(error)).lower()}"
-        ) from error
+    in_threads(try_to, paths, _THREADS)
 
 
 def _sync_path(path: Path) -> None:

@@ -24,6 +24,7 @@ from rollcli.files.results import (
     STDIN,
     TEXT,
     csv_rows,
+    is_text,
     json_rows,
     part_names,
     read_parts,
@@ -194,7 +195,7 @@ def _by_newline(pieces: Iterable[str], path: str) -> Iterator[str]:
 
 def _files(cells: Sequence[Any], lines: Sequence[int], path: str) -> list[str]:
     names = list(map(str, cells))
-    if not all(cells) or "\0" in "".join(names):  # an empty name, or one that no file can have
+    if not all(cells) or not is_text("".join(names)):  # an empty name, or one that no file can have
         _name_fault("file", cells, lines, path)
     return names
 
@@ -219,7 +220,7 @@ def _numbers(name: str, cells: Sequence[Any], lines: Sequence[int], path: str) -
             empty = np.array([cell is None or cell == "" for cell in cells])
             pairs = zip(empty.tolist(), cells, strict=True)
             numbers = np.array([np.nan if none else float(cell) for none, cell in pairs])
-    except (ValueError, TypeError):
+    except (ValueError, TypeError, OverflowError):
         _name_fault(name, cells, lines, path)
         raise
     fits = np.isfinite(numbers) & (numbers >= low) & (numbers <= high)

@@ -15,7 +15,7 @@ from rollcli.errors import InputError
 from rollcli.files.bounded import as_utf8, read_given, read_stream
 from rollcli.files.codecs.parquet import MAGIC, decode_parquet
 from rollcli.files.storage import exists, list_names, read_bytes
-from rollcli.files.stores.locations import is_url, is_web_url
+from rollcli.files.stores.locations import is_url, is_web_url, public_name
 
 REQUIRED = ("file", "status", "roll_deg")  # columns that every result has
 
@@ -90,7 +90,10 @@ def read_parts(folder: str, names: Iterable[str]) -> Iterator[tuple[str, bytes]]
         part = read_bytes(f"{folder}/{name}")
         yield f"{folder}/{name}", header + part
         if name.endswith(".csv") and not header:
-            header = part[: part.index(b"\n") + 1]
+            header, end, _ = part.partition(b"\n")
+            if not end:
+                raise InputError(f"{public_name(folder)}/{name}: is damaged: it has no whole line")
+            header += end
 
 
 Format = Literal["csv", "jsonl", "parquet"]
@@ -330,13 +333,24 @@ BOUNDS = {
 }
 
 
+def is_text(text: str) -> bool:
+    """Tell whether a file can have this name and hold this text: no NUL, and no half of a character.
+
+    JSON may hold such halves. Those that stand for bytes of names which are no UTF-8 are none.
+    """
+    try:
+        return b"\0" not in text.encode(**TEXT)
+    except UnicodeEncodeError:
+        return False
+
+
 def value_of(name: str, value: Any, where: str) -> Any:
     """Convert the text (CSV) or JSON value of a column."""
     if name == "status" and value not in STATUSES:
         raise InputError(f"{where}: {value!r:.80} is no status: {', '.join(STATUSES)}")
     if name not in _DIGITS and name not in _FLAGS and name not in _COUNTS:
         text = "" if value is None else str(value)
-        if "\0" in text or (name == "file" and not text):  # names no file anywhere
+        if not is_text(text) or (name == "file" and not text):  # names no file anywhere
             raise InputError(f"{where}: {text!r:.80} is no value for {name}")
         return text
     if value is None or value == "":

@@ -26,6 +26,7 @@ from rollcli.files.stores.objects import (
     remove_object,
     write_object,
 )
+from rollcli.files.threads import in_threads
 
 Beginning = Callable[[bytes, int, str], None] | None
 _HEAD = 2**16  # bytes: the header of an array
@@ -71,13 +72,8 @@ def fetch_all(locations: Iterable[str], most: int = MOST_BYTES) -> dict[str, byt
     InputError
         One of them cannot be read.
     """
-    from concurrent.futures import ThreadPoolExecutor  # takes a while to load
-
     every = list(locations)
-    if not every:
-        return {}
-    with ThreadPoolExecutor(_AT_ONCE) as pool:
-        return dict(zip(every, pool.map(partial(read_bytes, most=most), every), strict=True))
+    return dict(zip(every, in_threads(partial(read_bytes, most=most), every, _AT_ONCE), strict=True))
 
 
 def _read_url(location: str, most: int) -> bytes:
@@ -269,12 +265,7 @@ def remove(location: str) -> None:
 
 def remove_all(locations: Iterable[str]) -> None:
     """Remove many files or objects at once; see `remove`."""
-    from concurrent.futures import ThreadPoolExecutor
-
-    every = list(locations)
-    if every:
-        with ThreadPoolExecutor(_AT_ONCE) as pool:
-            list(pool.map(remove, every))  # asked for, so that an error is raised
+    in_threads(remove, list(locations), _AT_ONCE)
 
 
 def _read_file(path: str, name: str, most: int = MOST_BYTES, begins: Beginning = None) -> bytes:

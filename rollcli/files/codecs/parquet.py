@@ -98,5 +98,5 @@ def decode_parquet(data: bytes, name: str) -> Iterator[tuple[int, dict[str, Any]
                 yield number, values
         if number != file.metadata.num_rows:
             raise InputError(f"{name}: is damaged: it has {number} of {file.metadata.num_rows} rows")
-    except (pyarrow.ArrowException, OSError, ValueError) as error:
+    except (pyarrow.ArrowException, OSError, ValueError, OverflowError) as error:
         raise InputError(f"{name}: is damaged: {' '.join(str(error).split())[:200]}") from error
