@@ -188,7 +188,7 @@ def estimate_roll(
         height=height,
         camber=None if knife is None else knife.camber,
         tangent=tangent,
-        road_mask=pixels.mask(checked) if road_mask else None,
+        road_mask=pixels.mask(checked, tuning) if road_mask else None,
     )
 
 

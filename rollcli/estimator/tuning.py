@@ -16,198 +16,76 @@ class SampleTuning:
     pixels: int = 12000
     """Pixels aimed at. With 9,000 rotations of real maps are followed worse, more only take longer."""
     coarse_pixels: int = 2000
-    """Pixels of these that planes are drawn through, fitted to and judged by. With 600, two of 92 rotations
-    are grossly off, and three of 69 maps with 30 % of noise."""
-    sparse_share: float = 0.45
-    """Share of `pixels` below which a sparse map is sampled anew on a finer grid."""
-    finer_share: float = 0.6
-    """Share of `pixels` that the finer grid aims at."""
-    least_pixels: int = 50
-    """Pixels without which no road is looked for."""
+    """Pixels of these that planes are drawn through, fitted to and judged by."""
     noise_share: float = 0.012
     """Share of the median disparity that matching gets wrong on real roads, whatever the scale."""
     uneven_share: float = 0.02
     """Share of a pixel's own disparity: 2 % of the camera's height, 3 cm on a car."""
-    quantum_share: float = 0.29
-    """Of the smallest step in the map: rounding is off by 1 / sqrt(12) steps, root mean square."""
-    quantum_part: int = 20
-    """The smallest step is the 1/20 quantile of all steps: smaller ones are rounding of floats."""
-    coherent_share: float = 0.03
-    """Share of the median disparity by which neighbours may differ and still agree."""
-    coherent_from: float = 0.5
-    """Share of agreeing neighbours from which a pixel is coherent, that is no noise."""
-    neighbour_part: int = 310
-    """Neighbours are 1/310 of the longer side away: 4 px at 1242. Nearer ones share a matcher's errors."""
-    neighbour_least: int = 3
-    """Neighbours are at least this far away, px: matchers blur over less."""
-    neighbour_most: int = 16
-    """Neighbours are at most this far away, px."""
-    border_part: int = 8
-    """Neighbours are at most 1/8 of the shorter side away: a small map needs its pixels."""
-
-
-@dataclass(frozen=True)
-class HypothesisTuning:
-    """Numbers of `draw_planes`."""
-
-    draws: int = 512
-    """Triples drawn; about half are planes that could be a road."""
-    kept: int = 160
-    """Planes kept of these, the first ones. With 40 of 128, five of 92 rotations of real maps are grossly
-    off, instead of none (`bench_follow.py`)."""
-    radius: float = 0.35
-    """Of a triple, units. Smaller: planes are noise; larger: triples leave the road."""
-    least_area: float = 0.004
-    """Twice the area of a triangle, square units: below, its plane is ill conditioned."""
-    least_rise: float = 4.0
-    """Tolerances by which a road rises within the radius: less is the noise of a wall, or of a car ahead."""
-
-
-@dataclass(frozen=True)
-class ScoreTuning:
-    """Numbers of `PlaneScorer`: what makes a plane a road."""
-
-    corridor: float = 1.0
-    """Half-width of the corridor ahead, camera heights; that of its core is 1 / sqrt(8) of it."""
-    fits: int = 2
-    """Weighted fits of each plane that is judged again."""
-    first_fit_width: float = 2.0
-    """Tolerances within which a pixel counts in the first of these fits, 1 in the others."""
-    below_penalty: float = 0.85
-    """Added cost of a coherent pixel below the plane (off it: 1); nothing lies below a road."""
-    off_slope_weight: float = 0.2
-    """Weight of a pixel around which the map does not rise as the road does."""
-    slope_share: float = 0.4
-    """Of the road's own slope: how far the map's may be off."""
-    beside_weight: float = 0.03
-    """Weight of a pixel far beside the corridor. Higher: wide verges and walls win."""
-    nearness: float = 1.5
-    """Typical disparities up to which weights grow: what is near ahead is the road driven on."""
-    horizon: float = 2.0
-    """Units from the centre: a plane whose horizon is farther away is rather a wall, or an own bonnet."""
-    least_corridor: float = 0.025
-    """Share of the pixels that the corridor should weigh: an emptier one scores less, and depth maps are told
-    as such. Twice this, and twice `least_core`, give a narrow lane to the verge, 4.7 degrees off."""
-    least_core: float = 0.01
-    """The same for its core."""
+    reach: float = 1 / 310
+    """Of the map's longer side: how far away neighbours are. Nearer ones share a matcher's errors."""
 
 
 @dataclass(frozen=True)
 class SearchTuning:
-    """Numbers of `find_road`: how many planes are judged on how many pixels."""
+    """Numbers of `find_road`: which planes are tried, and what makes a plane a road."""
 
+    draws: int = 320
+    """Triples drawn; about half are planes that could be a road."""
+    radius: float = 0.35
+    """Of a triple, units. Smaller: planes are noise; larger: triples leave the road."""
+    least_rise: float = 4.0
+    """Tolerances by which a road rises within the radius: less is the noise of a wall, or of a car ahead."""
     first_pixels: int = 320
-    """Pixels on which all planes are judged cheaply. With 80 one of 92 rotations of real maps is grossly off,
-    instead of none."""
-    of_each_roll: int = 2
-    """Planes of one roll that go on: a wide verge must not crowd out the road."""
+    """Pixels on which all planes are judged."""
     refined: int = 5
-    """Planes that go on: they are fitted, and judged again. With 6 the same errors, and 2 % more time; with
-    4, seven of 2,240 degraded maps are wrong and called ok, instead of four."""
-    same_plane: float = 1.0
-    """Of the noise: of planes that differ by less, everywhere in the map, one is judged. More than half are
-    such; without this the same errors, and 1 % more time."""
+    """Planes that go on, each the best of its roll: they are fitted, and judged on more pixels."""
     rival_angle: float = math.radians(2)
-    """Radians by which another plane's roll differs, to be a rival."""
+    """Radians by which rolls differ that are not the same."""
+    corridor: float = 1.0
+    """Half-width of the corridor ahead, camera heights."""
+    below_penalty: float = 0.85
+    """Most that a coherent pixel below the plane counts against it, where one on it counts 1."""
+    off_slope_weight: float = 0.2
+    """Weight of a pixel around which the map does not rise as the road does."""
+    slope_share: float = 0.4
+    """Of the road's own slope: how far the map's may be off."""
+    horizon: float = 2.0
+    """Units from the centre: a plane whose horizon is farther away is rather a wall, or an own bonnet."""
+    least_corridor: float = 0.025
+    """Share of the pixels that the corridor should weigh: an emptier one scores less, and depth maps are told
+    as such."""
 
 
 @dataclass(frozen=True)
 class FitTuning:
-    """Numbers of `NearPixels`: the robust fit of parabola and roll."""
+    """Numbers of `fit_surface`: the robust fit of parabola, roll and camber, and the profile across."""
 
     pixels: int = 4500
-    """Pixels near the plane that are looked at, each averaged with those around it. With 3,000 the median
-    error on rendered roads is a seventh larger, and all takes 4 % less time."""
-    least_pixels: int = 30
-    """Pixels with some weight, without which there is no road."""
-    reach: float = 3.0
-    """Tolerances from the plane beyond which a pixel is not looked at again."""
+    """Pixels near the plane that are looked at, each averaged with those around it."""
     rounds: int = 3
     """Rounds of the fit to the road, which starts from the lane ahead."""
-    most_turn: float = 0.2
-    """Radians that a round may turn the road by."""
     start_width: float = 2.0
     """Tolerances within which a pixel counts at first."""
-    even_width: float = 3.0
-    """Standard deviations within which a pixel of an even road counts in the end."""
-    uneven_width: float = 3.5
-    """The same for an uneven road: its rises and dips are no noise."""
+    width: float = 3.75
+    """Of the pixels' root mean square distance: within which they count in the end."""
     least_width: float = 0.2
     """Tolerances within which a pixel counts in any case; at least one step of a map of whole pixels."""
-    even_spread: float = 0.35
-    """Standard deviation up to which a road is even, tolerances."""
-    uneven_spread: float = 0.55
-    """Standard deviation from which a road is uneven, tolerances; between the two the widths are mixed."""
-    biweight_spread: float = 1.25
-    """Standard deviation of a normal distribution over its root mean square under biweights."""
     lane: float = 1.0
     """Half-width of the lane ahead, camera heights; it ends as exp(-(side / lane)^4)."""
+    other_roll: float = 0.10
+    """Radians: what a rig rolled by this much more or less would not see does not count."""
     camber: float = 0.003
     """How much camber a road has, as the standard deviation of a prior, 1/(camera height). With 0.002 the
     errors on crowned roads are a quarter larger (95 %)."""
     independent_pixels: int = 120
-    """Pixels that could be independent: neighbouring ones repeat each other, more do not tell more. With 200
-    rotations of real maps are followed within 0.07 degrees (95 %) instead of 0.06."""
-    least_weight: float = 0.001
-    """Weight by the profile below which a pixel is left out: it would only take time."""
-    beside: float = 0.01
-    """Weight of a pixel beside the lane when its spread is measured: a lane may be hidden."""
-    other_roll: float = 0.10
-    """Radians: what a rig rolled by this much more or less would not see does not count."""
-    large_roll: float = 0.2
-    """Tangent of the roll from which on less and less of the corners is left out."""
-    corner_fade: float = 0.01
-    """Units over which the weight fades out there."""
-
-
-@dataclass(frozen=True)
-class ProfileTuning:
-    """Numbers of `read_profile`: the profile across the road, in bins of height over the lane ahead."""
-
+    """Pixels that could be independent: neighbouring ones repeat each other, more do not tell more."""
     bin_width: float = 0.25
-    """Camera heights."""
-    bins: int = 10
-    """To each side."""
-    bin_pixels: int = 12
-    """Pixels without which a bin has no height."""
-    least_place: float = 0.1
-    """Weight by place and slope (`NearPixels.place`) from which a pixel is looked at."""
-    least_road: float = 0.1
-    """Share of a pixel's disparity that the road's must have: above the horizon there is no profile."""
-    core_bins: int = 2
-    """Bins from the middle that are the lane's in any case."""
+    """Camera heights, of the profile's bins."""
     off_level: float = 0.01
     """Camera heights over or under the lane at which the weight is halved: on gentle verges and the far side
     of a crown there is no step."""
-    width: float = 1.25
-    """Camera heights to the side at which weights end, as exp(-(side / width)^8). With 1.5 the errors on
-    crowned roads are a fifth larger (95 %), and the intervals of real ones 6 % wider."""
-
-
-@dataclass(frozen=True)
-class SurfaceTuning:
-    """Numbers of `Surface.covers`."""
-
-    steady: float = 0.5
-    """Of the road's own rise: how far that of the map may be off. Higher: feet of walls are road."""
-    least_level: float = 0.5
-    """How much of the lane's level the ground has from which it is shown as road (`Profile.level`)."""
-
-
-@dataclass(frozen=True)
-class RoadTuning:
-    """Every tuned number of road finding, by stage."""
-
-    sample: SampleTuning = field(default_factory=SampleTuning)
-    hypotheses: HypothesisTuning = field(default_factory=HypothesisTuning)
-    score: ScoreTuning = field(default_factory=ScoreTuning)
-    search: SearchTuning = field(default_factory=SearchTuning)
-    fit: FitTuning = field(default_factory=FitTuning)
-    profile: ProfileTuning = field(default_factory=ProfileTuning)
-    surface: SurfaceTuning = field(default_factory=SurfaceTuning)
-
-
-ROAD_TUNING = RoadTuning()
+    profile: float = 1.25
+    """Camera heights to the side at which weights end, as exp(-(side / profile)^8)."""
 
 
 @dataclass(frozen=True)
@@ -269,7 +147,9 @@ class DoubtTuning:
 class Tuning:
     """Every tuned number of the estimator."""
 
-    road: RoadTuning = field(default_factory=RoadTuning)
+    sample: SampleTuning = field(default_factory=SampleTuning)
+    search: SearchTuning = field(default_factory=SearchTuning)
+    fit: FitTuning = field(default_factory=FitTuning)
     interval: IntervalTuning = field(default_factory=IntervalTuning)
     doubts: DoubtTuning = field(default_factory=DoubtTuning)
 

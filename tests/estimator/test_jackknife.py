@@ -11,7 +11,7 @@ from rollcli.estimator.interval import jackknife
 from rollcli.estimator.moments import Floats, Grid
 from rollcli.estimator.road.model import RoadModel
 from rollcli.estimator.road.surface import Surface
-from rollcli.estimator.tuning import ROAD_TUNING, TUNING
+from rollcli.estimator.tuning import TUNING
 
 
 class Fitted(NamedTuple):
@@ -55,13 +55,8 @@ def fitted(*, prior=4e3, parabolic=True, heavy=1.0, count=241, noise=0.3):
         model=RoadModel(0.0, tuple(alpha), camber),
         grid=Grid.of_shape(480, 640),
         noise=0.1,
-        share=1.0,
-        moved=0.0,
         parabolic=parabolic,
-        profile=None,
         camber_precision=prior,
-        near=None,
-        tuning=ROAD_TUNING,
     )
     return Fitted(surface, design, wanted, prior if math.isfinite(prior) else 0.0), theta
 

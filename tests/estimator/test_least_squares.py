@@ -17,7 +17,7 @@ def test_missing_parameters_are_0_and_units_do_not_matter(missing):
     expected = np.zeros(5)
     expected[known] = np.linalg.lstsq(design[:, known], d, rcond=None)[0]
 
-    found = solve_normal(np.column_stack([normal, right]).tolist())
+    found = solve_normal(normal, right)
     stacked = np.linalg.solve(regular(np.stack([normal, 2 * normal]), 3 * normal), right[:, None])[..., 0]
 
     np.testing.assert_allclose(found, expected, rtol=1e-7)
@@ -29,7 +29,7 @@ def test_what_two_parameters_tell_together_is_shared_by_them_and_finite():
     design = np.column_stack([x, x, np.ones(20)])
     normal, right = design.T @ design, design.T @ (3 * x + 5)
     solutions = [
-        solve_normal(np.column_stack([normal, right]).tolist()),
+        solve_normal(normal, right),
         np.linalg.solve(regular(normal, normal), right).tolist(),
     ]
     for first, second, level in solutions:

@@ -9,6 +9,7 @@ from rollcli.estimator.interval import Jackknife, touch
 from rollcli.estimator.moments import Grid
 from rollcli.estimator.road.sample import take_sample
 from rollcli.estimator.road.surface import whole_surface
+from rollcli.estimator.tuning import TUNING
 from tests.estimator.synthetic_maps import bent_road, energy_of
 
 GRID = Grid.of_shape(375, 1242)
@@ -66,7 +67,7 @@ def test_what_it_shows_has_no_array_in_it():
 
 def touched(disparity, alpha=None):
     """The tangent of a map's parabola, or of another, amid all of its pixels, and the mean of their rows."""
-    surface = whole_surface(take_sample(disparity), energy := energy_of(disparity))
+    surface = whole_surface(take_sample(disparity, None, TUNING.sample), energy := energy_of(disparity))
     u, v = (each * surface.grid.scale for each in (surface.x, surface.y))
     y = (v + 119.5) * math.cos(THETA) - (u + 159.5) * math.sin(THETA)
     return touch(alpha or energy.parabola(THETA), THETA, GRID, surface, None), y.mean()

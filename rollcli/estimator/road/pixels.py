@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from rollcli.estimator.road.sample import take_sample
 from rollcli.estimator.road.surface import Surface, fit_surface, whole_surface
 from rollcli.estimator.solvers.areas import AreaMethod, fit_plane
 from rollcli.estimator.solvers.solution import Solution, Solver
-from rollcli.estimator.tuning import RoadTuning
+from rollcli.estimator.tuning import SampleTuning, Tuning
 
 
 def load_solver(name: str) -> Solver:
@@ -66,20 +66,13 @@ class PixelSet:
     area: NDArray[np.bool_] | None = None
     solution: Solution | None = None
 
-    def mask(self, checked: CheckedMap) -> NDArray[np.bool_]:
+    def mask(self, checked: CheckedMap, tuning: Tuning) -> NDArray[np.bool_]:
         """Return these pixels of the map that they were selected from, (H, W) of bool."""
         if self.area is not None:
             return self.area
         if self.road is not None and self.surface is not None:
-            return checked.valid & self.surface.covers(checked.values)
+            return checked.valid & self.surface.covers(checked.values, tuning)
         return checked.valid
-
-
-class FoundRoad(NamedTuple):
-    """The plane of a road, and its surface."""
-
-    plane: Road
-    surface: Surface
 
 
 def select_pixels(checked: CheckedMap, request: Request) -> PixelSet:
@@ -93,18 +86,18 @@ def select_pixels(checked: CheckedMap, request: Request) -> PixelSet:
     found = _find(checked, request) if request.road == "auto" else None
     if request.method in AREAS:
         return _area_pixels(checked, found, request)
-    return _all_pixels(checked, request) if found is None else _road_pixels(found)
+    return _all_pixels(checked, request) if found is None else _road_pixels(*found)
 
 
-def _find(checked: CheckedMap, request: Request) -> FoundRoad:
-    sample = take_sample(checked.values, checked.usable, request.tuning.road)
-    plane = find_road(sample, request.max_roll, request.seed)
-    return FoundRoad(plane, fit_surface(sample, plane, parabolic=request.parabolic))
+def _find(checked: CheckedMap, request: Request) -> tuple[Road, Surface]:
+    tuning = request.tuning
+    sample = take_sample(checked.values, checked.usable, tuning.sample)
+    road = find_road(sample, request.max_roll, request.seed, tuning.search)
+    return road, fit_surface(sample, road, parabolic=request.parabolic, tuning=tuning)
 
 
-def _road_pixels(found: FoundRoad) -> PixelSet:
+def _road_pixels(road: Road, surface: Surface) -> PixelSet:
     """Sum the road's pixels by their weights."""
-    road, surface = found
     moments = point_moments(
         surface.x, surface.y, surface.d, surface.weights, surface.grid, surface.model.plane
     )
@@ -120,23 +113,24 @@ def _all_pixels(checked: CheckedMap, request: Request) -> PixelSet:
     if not math.isfinite(peak):
         peak = float(used[np.isfinite(used)].max())
     energy = Energy.of(map_moments(used), peak, parabolic=request.parabolic)
-    return PixelSet(energy, _sampled_surface(values, usable, energy, request.tuning.road), None, 1.0)
+    return PixelSet(energy, _sampled_surface(values, usable, energy, request.tuning.sample), None, 1.0)
 
 
-def _area_pixels(checked: CheckedMap, found: FoundRoad | None, request: Request) -> PixelSet:
+def _area_pixels(checked: CheckedMap, found: tuple[Road, Surface] | None, request: Request) -> PixelSet:
     """Let the method choose among the road's pixels, or the valid ones; a mask is the chosen area."""
     values = checked.values
-    candidates = checked.valid if found is None else checked.valid & found.surface.covers(values)
+    road, surface = found or (None, None)
+    candidates = checked.valid if surface is None else checked.valid & surface.covers(values, request.tuning)
     settings = AreaSettings(request.max_roll, chosen=checked.usable is not None)
     pixels = load_area_method(request.method)(values, candidates, settings)
     energy, solution = fit_plane(values, pixels)
-    surface = _sampled_surface(values, pixels.used, energy, request.tuning.road)
+    sampled = _sampled_surface(values, pixels.used, energy, request.tuning.sample)
     share = np.count_nonzero(pixels.used) / checked.count
-    return PixelSet(energy, surface, None if found is None else found.plane, share, pixels.used, solution)
+    return PixelSet(energy, sampled, road, share, pixels.used, solution)
 
 
 def _sampled_surface(
-    values: NDArray[Any], used: NDArray[np.bool_] | None, energy: Energy, tuning: RoadTuning
+    values: NDArray[Any], used: NDArray[np.bool_] | None, energy: Energy, tuning: SampleTuning
 ) -> Surface | None:
     try:
         return whole_surface(take_sample(values, used, tuning), energy)

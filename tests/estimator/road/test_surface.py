@@ -10,6 +10,7 @@ from rollcli.estimator.road import surface
 from rollcli.estimator.road.find import find_road
 from rollcli.estimator.road.sample import take_sample
 from rollcli.estimator.road.surface import fit_surface
+from rollcli.estimator.tuning import TUNING
 from tests.estimator.synthetic_maps import flat_road
 
 WIDTH, HEIGHT, FOCAL = 640, 480, 400.0
@@ -36,9 +37,14 @@ def disparity_of(height_at, roll_deg=0.0, pitch_deg=6.0):
     return np.where(far < 59, FOCAL * BASELINE / far + noise, 0)
 
 
+def surface_of(disparity, *, parabolic=True):
+    sample = take_sample(disparity, None, TUNING.sample)
+    road = find_road(sample, math.radians(45), 0, TUNING.search)
+    return fit_surface(sample, road, parabolic=parabolic, tuning=TUNING)
+
+
 def found_in(height_at, roll_deg=0.0):
-    sample = take_sample(disparity_of(height_at, roll_deg))
-    return fit_surface(sample, find_road(sample, math.radians(45), 0), parabolic=True)
+    return surface_of(disparity_of(height_at, roll_deg))
 
 
 @pytest.mark.parametrize("roll_deg", [-8, 0, 3])
@@ -120,15 +126,10 @@ def road_and_sides(sigma=0.1):
     return np.where(road > 1, road + noise, 0), side
 
 
-def surface_of(disparity):
-    sample = take_sample(disparity)
-    return fit_surface(sample, find_road(sample, math.radians(45), 0), parabolic=True)
-
-
 def test_pixels_with_noise_that_averages_out_are_road():
     disparity, side = road_and_sides(sigma=0.2)
 
-    covered = surface_of(disparity).covers(disparity)
+    covered = surface_of(disparity).covers(disparity, TUNING)
 
     assert covered[(np.abs(side) < 1) & (disparity > 5)].mean() > 0.96
 
@@ -138,7 +139,7 @@ def test_a_verge_beyond_the_edge_of_the_road_is_no_road(slope):
     road, side = road_and_sides()
     disparity = road * (1 + slope * np.maximum(0, side - 1.4))
 
-    covered = surface_of(disparity).covers(disparity)
+    covered = surface_of(disparity).covers(disparity, TUNING)
 
     assert not covered[side > 2].any()
     assert covered[(np.abs(side) < 1) & (road > 0)].mean() > 0.95
@@ -151,7 +152,7 @@ def test_ground_that_counts_half_as_much_as_the_lane_is_shown_as_road(share, is_
     to_the_right = (np.mgrid[:HEIGHT, :WIDTH][1] - (WIDTH - 1) / 2) * BASELINE / np.maximum(disparity, 1e-9)
     step = (disparity > 8) & (to_the_right > 1.4) & (to_the_right < 2.6)
 
-    covered = surface_of(disparity).covers(disparity)
+    covered = surface_of(disparity).covers(disparity, TUNING)
 
     assert step.sum() > 20_000
     assert covered[step].mean() > 0.95 if is_road else covered[step].mean() < 0.05
@@ -162,7 +163,7 @@ def test_a_surface_that_crosses_the_road_without_rising_as_it_does_is_no_road():
     crossing = np.abs(side + 1.8) < 0.5
     disparity = np.where(crossing & (road > 0), 15, road)
 
-    covered = surface_of(disparity).covers(disparity)
+    covered = surface_of(disparity).covers(disparity, TUNING)
 
     near = crossing & (np.abs(road - 15) < 0.6)
     assert near.sum() > 100
@@ -174,18 +175,17 @@ def test_a_few_rows_at_a_time_cover_the_same_pixels(monkeypatch, rows):
     road, side = road_and_sides()
     disparity = np.where(np.abs(side + 1.8) < 0.5, 15, road)
     found = surface_of(disparity)
-    whole = found.covers(disparity)
+    whole = found.covers(disparity, TUNING)
 
     monkeypatch.setattr(surface, "_BLOCK", rows * WIDTH)
 
-    assert np.array_equal(found.covers(disparity), whole)
+    assert np.array_equal(found.covers(disparity, TUNING), whole)
     assert 0.1 < whole.mean() < 0.9
 
 
 @pytest.mark.parametrize("roll_deg", [-8, 3])
 def test_the_line_model_finds_the_roll_of_a_flat_road_and_has_no_bend(roll_deg):
-    sample = take_sample(disparity_of(lambda x: 0 * x, roll_deg))
-    found = fit_surface(sample, find_road(sample, math.radians(45), 0), parabolic=False)
+    found = surface_of(disparity_of(lambda x: 0 * x, roll_deg), parabolic=False)
 
     assert math.degrees(found.model.theta) == pytest.approx(roll_deg, abs=0.02)
     assert found.model.alpha[2] == 0
@@ -196,8 +196,6 @@ def test_pixels_that_do_not_lie_on_the_road_have_no_part_in_its_share():
     for others in (0.0, 0.3):
         disparity = disparity_of(lambda x: 0 * x)
         above = (np.random.default_rng(4).random(disparity.shape) < others) & (disparity > 0)
-        sample = take_sample(disparity * (1 + 0.06 * above))  # three tolerances
-        road = find_road(sample, math.radians(45), 0)
-        shares[others] = fit_surface(sample, road, parabolic=True).share
+        shares[others] = surface_of(disparity * (1 + 0.06 * above)).share  # three tolerances
 
     assert shares[0.3] == pytest.approx(0.7 * shares[0.0], rel=0.05)
