@@ -25,8 +25,7 @@ def solve_normal(normal: Floats, pull: Floats) -> Floats:
     regular = normal.copy()
     diagonal = np.einsum("...ii->...i", regular)  # a view
     diagonal += np.where(diagonal > 0, _RIDGE * diagonal, 1.0)
-    solution: Floats = np.linalg.solve(regular, pull[..., None])[..., 0]
-    return solution
+    return np.asarray(np.linalg.solve(regular, pull[..., None])[..., 0], np.float64)
 
 
 def regular(normal: Floats, like: Floats) -> Floats:

@@ -43,8 +43,6 @@ class SearchTuning:
     """Radians by which rolls differ that are not the same."""
     corridor: float = 1.0
     """Half-width of the corridor ahead, camera heights."""
-    below_penalty: float = 0.85
-    """Most that a coherent pixel below the plane counts against it, where one on it counts 1."""
     off_slope_weight: float = 0.2
     """Weight of a pixel around which the map does not rise as the road does."""
     slope_share: float = 0.4

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from rollcli.estimator import estimate as estimator
 from rollcli.estimator.estimate import RollEstimate
 from rollcli.estimator.interval import Tangent
+from rollcli.estimator.request import DEFAULT_SOLVER, MAX_INTERVAL_DEG, MAX_ROLL_DEG, LearningRate
 from rollcli.rig.calibration import Calibration
 
 Floats = NDArray[np.float64]
@@ -215,7 +215,20 @@ def _normal_jacobian(tangent: Tangent, calibration: Calibration) -> Floats:
 
 
 def estimate_roll(
-    disparity: ArrayLike, *, calibration: Calibration | None = None, **settings: Any
+    disparity: ArrayLike,
+    *,
+    calibration: Calibration | None = None,
+    mask: ArrayLike | None = None,
+    method: str = "gd",
+    model: str = "parabola",
+    road: str = "auto",
+    lambda0: LearningRate = DEFAULT_SOLVER.lambda0,
+    tolerance: float = DEFAULT_SOLVER.tolerance,
+    max_roll: float = math.radians(MAX_ROLL_DEG),
+    max_interval: float = math.radians(MAX_INTERVAL_DEG),
+    slope_error: float = 0.0,
+    seed: int = 0,
+    road_mask: bool = False,
 ) -> RollEstimate:
     """Estimate the roll angle of the rig that a disparity map was taken with; its pose, given a calibration.
 
@@ -225,9 +238,8 @@ def estimate_roll(
         Real numbers, px; <= 0, NaN and what is beyond 1e15 are no data.
     calibration : Calibration, optional
         Of the rectified left view, at the map's size or at another one; see `read_calibration`.
-    **settings
-        mask, method, model, road, lambda0, tolerance, max_roll, max_interval, seed and road_mask: see
-        `rollcli.estimator.estimate.estimate_roll`.
+    mask, method, model, road, lambda0, tolerance, max_roll, max_interval, slope_error, seed, road_mask
+        See `rollcli.estimator.estimate.estimate_roll`.
 
     Returns
     -------
@@ -254,5 +266,18 @@ def estimate_roll(
     >>> round(found.pitch, 4), round(found.height_m, 4)
     (0.2, 1.5)
     """
-    estimate = estimator.estimate_roll(disparity, **settings)
+    estimate = estimator.estimate_roll(
+        disparity,
+        mask=mask,
+        method=method,
+        model=model,
+        road=road,
+        lambda0=lambda0,
+        tolerance=tolerance,
+        max_roll=max_roll,
+        max_interval=max_interval,
+        slope_error=slope_error,
+        seed=seed,
+        road_mask=road_mask,
+    )
     return estimate if calibration is None else with_pose(estimate, calibration)

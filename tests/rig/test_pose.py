@@ -1,5 +1,6 @@
 """Pitch and height against rigs whose planes are made by ray casting, and against central differences."""
 
+import inspect
 import math
 import re
 from dataclasses import replace
@@ -7,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import rollcli
 from rollcli.errors import UsageError
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.interval import Tangent
@@ -227,3 +229,13 @@ def test_the_calibration_of_twice_the_size_is_doubted_where_the_file_states_no_s
 def test_a_plane_whose_disparity_does_not_grow_downward_has_no_horizon(slope):
     calibration = Calibration(250.0, 250.0, 160.0, 90.0, 0.5)
     assert horizon_row(Tangent(0.0, 100.0, 20.0, slope, None), calibration) is None
+
+
+def test_the_public_function_names_every_setting_of_the_estimator_with_its_default():
+    public, own = (inspect.signature(each).parameters for each in (rollcli.estimate_roll, estimate_roll))
+    assert {name: public[name].default for name in own if name != "tuning"} == {
+        name: each.default for name, each in own.items() if name != "tuning"
+    }
+    assert public.keys() - own.keys() == {"calibration"}
+    with pytest.raises(TypeError, match="metod"):
+        rollcli.estimate_roll(np.ones((50, 50)), metod="exact")

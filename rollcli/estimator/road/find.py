@@ -154,7 +154,8 @@ class Judge:
         self._products = (self._rows[:3, None] * self._rows[None]).reshape(12, -1)
         self._bearings = np.stack([-y / d, x / d])
         self._slopes = np.stack([-across, -along, np.ones_like(d), across**2 + along**2])
-        self._caps = np.where(sample.coherent, np.float32(math.sqrt(1 + tuning.below_penalty)), np.float32(1))
+        # below a plane a coherent pixel costs twice as much as one that is merely off it
+        self._caps = np.where(sample.coherent, np.float32(math.sqrt(2)), np.float32(1))
 
     def scores(self, planes: Singles, some: slice) -> Singles:
         """Return the score of each plane (K, 3) on some of the pixels; see `Road.score`."""

@@ -130,13 +130,14 @@ def take_sample(disparity: NDArray[Any], usable: NDArray[np.bool_] | None, tunin
         When too few pixels are valid to look for a road among them, or their disparities cannot be squared.
     """
     disparity = np.ascontiguousarray(disparity)
-    grid, reach = Grid.of_shape(*disparity.shape), reach_of(*disparity.shape, tuning)
+    height, width = disparity.shape
+    grid, reach = Grid.of_shape(height, width), reach_of(height, width, tuning)
     spacing, rows, columns = _chosen(disparity, usable, reach, tuning)
     top, left = spacing.first(reach)
-    places = (top + rows * spacing.rows) * disparity.shape[1] + (left + columns * spacing.columns)
+    places = (top + rows * spacing.rows) * width + (left + columns * spacing.columns)
     d = values_at(places, disparity)
     few = every(len(d), tuning.coarse_pixels)
-    steps = steps_to(places[few] + sides(reach, disparity.shape[1]), disparity, d[few])
+    steps = steps_to(places[few] + sides(reach, width), disparity, d[few])
     jumps, typical = np.abs(steps), quantile(d[few], 0.5)
     if not _SMALLEST < typical < _LARGEST:
         raise EstimationError(f"disparities of about {typical:g}: they have to be in pixels, or nearly so")

@@ -154,8 +154,8 @@ def fit_surface(sample: Sample, road: Road, *, parabolic: bool, tuning: Tuning) 
     near, stride = _near_pixels(sample, road, tuning)
     lane = near.lane(road.model, parabolic=parabolic)
     level = near.level(lane)
-    side = lane.side(*lane.turned(near.places)[:1], near.road(lane))
-    fade = np.exp(-np.minimum(np.square(np.square(np.square(side / fit.profile))), MOST_FADED))
+    side = lane.side(lane.turned(near.places)[0], near.road(lane))
+    fade = np.exp(-np.square(np.square(np.minimum(np.square(side / np.float32(fit.profile)), 4))))
     near = near.weighted(_level_at(level, side, fit) * fade)
     model, left, precision, limit = near.fitted(lane, parabolic=parabolic)
     used = (left > 0).nonzero()[0]
@@ -221,7 +221,8 @@ class NearPixels:
 
     def road(self, model: RoadModel) -> Singles:
         """Return the disparity of a road without camber; above the horizon, a tenth of the pixel's own."""
-        return np.maximum(model.disparity_along(model.turned(self.places)[1]), self.d / 10)
+        road: Singles = np.maximum(model.disparity_along(model.turned(self.places)[1]), self.d / 10)
+        return road
 
     def lane(self, start: RoadModel, *, parabolic: bool) -> RoadModel:
         """Fit the lane ahead, in one round: it only has to show the profile.
@@ -312,11 +313,13 @@ class NearPixels:
         np.square(along, out=design[2])
         model.turning(across, along, out=design[4])
         np.subtract(self.d, np.array([*model.alpha, model.camber], np.float32).dot(design[:4]), out=design[5])
-        return np.square(design[5] / self.tolerance)
+        squares: Singles = np.square(design[5] / self.tolerance)
+        return squares
 
     def _weights(self, squares: Singles, limit: float) -> Singles:
         """Return Tukey's weights, times those by place."""
-        return np.square(np.maximum(1 - squares / np.float32(limit**2), 0)) * self.place
+        weights: Singles = np.square(np.maximum(1 - squares / np.float32(limit**2), 0)) * self.place
+        return weights
 
     def _width(self, squares: Singles, weights: Singles) -> float:
         """Return how wide the weights should be, from the spread of the pixels ahead that have some.
