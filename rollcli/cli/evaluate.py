@@ -109,6 +109,11 @@ experiment_options = record(
         metavar="FILE",
         help="Known angles of the maps: CSV with file and roll_deg.  [default: each map's own estimate]",
     ),
+    option(
+        "--figure",
+        type=click.Choice(["svg", "pdf", "png"]),
+        help="Write each chart of the page as a figure, too, as wide as a journal's column (3.5 inches).",
+    ),
 )
 
 

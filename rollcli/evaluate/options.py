@@ -31,12 +31,15 @@ class ExperimentOptions:
         How many maps, from the first, the run times are taken on.
     truth : str or None
         A CSV of known angles.
+    figure : str or None
+        The kind of the figures for a paper: "svg", "pdf" or "png".
     """
 
     output: str
     turns: tuple[float, float, float] = TURNS_DEG
     timed: int = TIMED
     truth: str | None = None
+    figure: str | None = None
 
     @property
     def turns_deg(self) -> tuple[float, ...]:

@@ -24,7 +24,14 @@ if TYPE_CHECKING:
     from rollcli.evaluate.experiments import Findings, Times
 
 PAGE = "paper.html"
-TABLES = ("maps", "table1_iterations", "table2_runtime", "fig3_lambda0", "fig6_accuracy", "methods_accuracy")
+FIGURES = {  # by the chart of the page
+    "iterations": "table1_iterations",
+    "runtime": "table2_runtime",
+    "lambda0": "fig3_lambda0",
+    "accuracy": "fig6_accuracy",
+    "methods": "methods_accuracy",
+}
+TABLES = ("maps", *FIGURES.values())
 
 
 def run_paper(options: PaperOptions) -> ExitStatus:
@@ -52,7 +59,9 @@ def run_paper(options: PaperOptions) -> ExitStatus:
     folder, running = options.experiments.output, options.running
     frames = map_frames(options.inputs, region=options.region, skip=[folder])
     truth = _known_angles(frames, options)
-    writes = [str(Path(folder, name)) for name in (*(f"{name}.csv" for name in TABLES), PAGE)]
+    kind = options.experiments.figure
+    names = [f"{name}.{kind}" for name in FIGURES.values()] if kind is not None else []
+    writes = [str(Path(folder, name)) for name in (*(f"{name}.csv" for name in TABLES), *names, PAGE)]
     reads = [path for frame in frames for path in frame.reads()]
     check_writes(reads, writes, overwrite=running.overwrite)
     if running.dry_run:
@@ -119,12 +128,16 @@ def _time(
 def _write(
     found: "list[Findings]", failed: list[tuple[str, str]], times: "list[Times]", options: PaperOptions
 ) -> None:
-    from rollcli.evaluate.paper_page import paper_page
+    from rollcli.evaluate.paper_page import charts, paper_page
     from rollcli.evaluate.tables import all_tables
+    from rollcli.report.figures import PRINT, chart_file
 
     tables = all_tables(found, failed, times)
     folder = Path(options.experiments.output)
     page = paper_page(tables, found, failed, times, options)
     written = {folder / f"{name}.csv": tables[name].csv() for name in TABLES} | {folder / PAGE: page}
+    if (kind := options.experiments.figure) is not None:
+        for name, chart in charts(tables).items():
+            written[folder / f"{FIGURES[name]}.{kind}"] = chart_file(chart, kind, PRINT)
     for path, data in written.items():
         write_output(str(path), data, overwrite=options.running.overwrite)

@@ -10,18 +10,10 @@ from rollcli import __version__
 from rollcli.estimator.request import LAMBDA0
 from rollcli.evaluate.experiments import Findings, Times
 from rollcli.evaluate.options import PaperOptions
-from rollcli.evaluate.tables import DELTAS_DEG, Table
+from rollcli.evaluate.tables import DELTAS_DEG, METHOD_NAMES, SOLVER_NAMES, Table
 from rollcli.report.chart import Chart
 from rollcli.report.page import render_page
 
-SOLVER_NAMES = {"gd": "gradient descent", "gss": "golden section", "exact": "exact"}
-METHOD_NAMES = {
-    "gd": "parabola, all pixels",
-    "line": "line, all pixels",
-    "plane": "plane in one area",
-    "areas": "planes in many areas",
-    "auto": "road found first",
-}
 _COLOURS = {"gd": "@c1", "gss": "@c2", "exact": "@c3"}
 _DEGREES = [f"{delta:g}°" for delta in DELTAS_DEG]
 _DECADES = ("10 µs", "100 µs", "1 ms", "10 ms", "100 ms", "1 s", "10 s")
@@ -128,12 +120,12 @@ def _sweep(table: Table) -> Chart:
     }
     text = {
         "x": LAMBDA0,
-        "y": 1,
+        "y": 0,
         "yref": "paper",
         "text": "26",
         "showarrow": False,
         "xanchor": "left",
-        "yanchor": "top",
+        "yanchor": "bottom",
         "font": {"color": "@muted"},
     }
     layout = {

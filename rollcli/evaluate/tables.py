@@ -16,6 +16,15 @@ DELTAS_DEG = (0.1, 0.01, 0.001, 0.0001)
 # [GD] Tables I and II
 PAPER_ITERATIONS = {"gss": (16, 21, 26, 30), "gd": (3, 4, 4, 4)}
 PAPER_SECONDS = {"gss": (1.551, 1.986, 2.457, 2.810), "gd": (0.412, 0.401, 0.511, 0.512)}
+SOLVER_NAMES = {"gd": "gradient descent", "gss": "golden section", "exact": "exact"}
+METHOD_NAMES = {
+    "gd": "parabola, all pixels",
+    "line": "line, all pixels",
+    "plane": "plane in one area",
+    "areas": "planes in many areas",
+    "auto": "road found first",
+}
+_WHOLE_NAMES = {"solver": SOLVER_NAMES, "method": METHOD_NAMES}
 
 
 @dataclass(frozen=True)
@@ -35,11 +44,15 @@ class Table:
     rows: tuple[tuple[Value, ...], ...]
 
     def csv(self) -> bytes:
-        """Return the table as CSV; floats with seven digits, nothing where there is no value."""
+        """Return the table as CSV: whole names, floats with seven digits, nothing where there is no value."""
         buffer = io.StringIO()
         lines = csv.writer(buffer, lineterminator="\n")
         lines.writerow(self.columns)
-        lines.writerows([_text(value) for value in row] for row in self.rows)
+        names = [_WHOLE_NAMES.get(column, {}) for column in self.columns]
+        lines.writerows(
+            [each.get(text := _text(value), text) for each, value in zip(names, row, strict=True)]
+            for row in self.rows
+        )
         return buffer.getvalue().encode("utf-8", "surrogateescape")
 
     def column(self, name: str) -> list[Value]:
@@ -56,7 +69,11 @@ class Table:
 
 def maps_table(found: Sequence[Findings], failed: Sequence[tuple[str, str]]) -> Table:
     """Return each map: its angle, and the iterations on it."""
-    counts = [f"{solver}_{delta:g}" for solver in ("gss", "gd") for delta in DELTAS_DEG]
+    counts = [
+        f"{SOLVER_NAMES[solver].replace(' ', '_')}_{delta:g}"
+        for solver in ("gss", "gd")
+        for delta in DELTAS_DEG
+    ]
     columns = ("file", "width", "height", "pixels", "theta_deg", *counts, "message")
     rows: list[tuple[Value, ...]] = [
         (each.file, each.width, each.height, each.pixels, math.degrees(each.theta), *each.gss, *each.gd, "")

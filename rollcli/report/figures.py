@@ -167,7 +167,9 @@ def _drawn(chart: Chart, size: Size) -> Figure:
         style = _LINES[shape["line"]["dash"]]
         axes.axvline(shape["x0"], color=_colour(shape["line"]["color"])[0], linewidth=scale, linestyle=style)
         place, anchor = (words["x"], words["y"]), axes.get_xaxis_transform()
-        axes.annotate(f" {words['text']}", place, xycoords=anchor, va="top", color=_colour("@muted")[0])
+        axes.annotate(
+            f" {words['text']}", place, xycoords=anchor, va=words["yanchor"], color=_colour("@muted")[0]
+        )
     across.set(axes)
     up.set(axes)
     for side in axes.spines.values():
@@ -212,10 +214,17 @@ class _Scale:
             axis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 5, 10], integer="tickformat" in layout))
         if "tickformat" in layout:
             axis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:,.0f}"))
-        named = (range(len(self._names)), [_words(each) for each in self._names])
+        named = (range(len(self._names)), [_words(each.rpartition("\t")[2]) for each in self._names])
         places, names = (layout["tickvals"], layout["ticktext"]) if "tickvals" in layout else named
         if names:
             axis.set_ticks(places, names)
+        groups = [each.rpartition("\t")[0] for each in self._names]
+        if any(groups):
+            axes.tick_params(axis="x", rotation=45)
+            for each in dict.fromkeys(groups):
+                middle = np.mean([at for at, name in enumerate(groups) if name == each])
+                where: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "ha": "center"}
+                axes.text(float(middle), 1.02, each, va="bottom", **where)
         axis.set_label_text(_words(layout.get("title", {}).get("text", "")))
         low, high = get_ends()
         set_ends(layout.get("range", (0 if layout.get("rangemode") == "tozero" else low, high)))
@@ -223,9 +232,9 @@ class _Scale:
 
 
 def _flat(values: Sequence[Any]) -> list[str]:
-    """Return names; those of two levels as two lines."""
+    """Return names; those of two levels as the outer one, a tab, and the inner one."""
     if values and isinstance(values[0], list):
-        return [f"{inner}\n{outer}" for outer, inner in zip(*values, strict=True)]
+        return [f"{outer}\t{inner}" for outer, inner in zip(*values, strict=True)]
     return list(values)
 
 
@@ -291,7 +300,8 @@ def _add_legend(figure: Figure, chart: Chart, size: Size, scale: float) -> None:
         return
     named.sort(key=lambda each: each.get("legendrank", 1000))  # plotly's rank of a trace that names none
     names = [_words(trace["name"]) for trace in named]
-    needed = (_SWATCH + _LETTER * max(map(len, names))) * size.font
+    letters = max(len(re.sub("<[^>]+>", "", trace["name"])) for trace in named)
+    needed = (_SWATCH + _LETTER * letters) * size.font
     columns = min(len(names), max(1, int(size.width / needed)))
     samples = [_sample(trace, scale) for trace in named]
     figure.legend(samples, names, loc="outside upper left", ncols=columns, handlelength=2, borderpad=0)

@@ -12,6 +12,7 @@ import pytest
 from rollcli.cli.main import main
 from rollcli.evaluate import paper_job as job
 from rollcli.evaluate.paper import PAGE, TABLES
+from rollcli.evaluate.tables import METHOD_NAMES, SOLVER_NAMES
 from rollcli.run.workers import tasks as run_tasks
 from tests.estimator.synthetic_maps import bent_road
 from tests.run_cli import contents, rollcli
@@ -20,7 +21,8 @@ FAST = ("--turns", "-8:8:8", "--timed", "1")
 FILES = {PAGE, *(f"{name}.csv" for name in TABLES)}
 
 needs_extra = pytest.mark.skipif(
-    not all(map(importlib.util.find_spec, ("plotly", "jinja2"))), reason="the extra `report` is not installed"
+    not all(map(importlib.util.find_spec, ("plotly", "jinja2", "matplotlib"))),
+    reason="the extra `report` is not installed",
 )
 
 
@@ -68,8 +70,31 @@ def test_a_map_that_cannot_be_read_is_named_and_ends_it_with_3(done):
 @needs_extra
 def test_golden_section_takes_the_papers_iterations(done):
     rows = read(done[0] / "out/table1_iterations.csv")
-    ours = [(row["paper"], row["mean"], row["min"], row["max"]) for row in rows if row["solver"] == "gss"]
+    ours = [
+        (row["paper"], row["mean"], row["min"], row["max"])
+        for row in rows
+        if row["solver"] == "golden section"
+    ]
     assert ours == [(count,) * 4 for count in ("16", "21", "26", "30")]
+
+
+@needs_extra
+def test_tables_have_whole_names(done):
+    folder = done[0] / "out"
+    assert {row["solver"] for row in read(folder / "fig6_accuracy.csv")} == set(SOLVER_NAMES.values())
+    assert [row["method"] for row in read(folder / "methods_accuracy.csv")] == list(METHOD_NAMES.values())
+    assert "golden_section_0.001" in read(folder / "maps.csv")[0]
+
+
+@needs_extra
+@pytest.mark.parametrize("kind", ["svg", "pdf"])
+def test_each_chart_is_a_figure_as_wide_as_a_column_too(tmp_path, kind):
+    write_maps(tmp_path / "maps", "a.npy")
+    assert paper(tmp_path, "--figure", kind, "-q").status == 0
+    figures = {name: data for name, data in contents(tmp_path / "out").items() if name.endswith(kind)}
+    assert sorted(figures) == sorted(f"{name}.{kind}" for name in TABLES[1:])
+    width = {"svg": b'width="252pt"', "pdf": b"/MediaBox [ 0 0 252 "}[kind]
+    assert all(width in data for data in figures.values())
 
 
 @needs_extra

@@ -10,8 +10,8 @@ import pytest
 from rollcli.evaluate import paper_page
 from rollcli.evaluate.experiments import DELTAS, FORMS, LAMBDAS, METHODS, SOLVERS, Findings, Times
 from rollcli.evaluate.options import ExperimentOptions, PaperOptions
-from rollcli.evaluate.paper_page import METHOD_NAMES, SOLVER_NAMES, charts
-from rollcli.evaluate.tables import DELTAS_DEG, all_tables
+from rollcli.evaluate.paper_page import charts
+from rollcli.evaluate.tables import DELTAS_DEG, METHOD_NAMES, SOLVER_NAMES, all_tables
 from rollcli.run.options import EncodingOptions, InputOptions, RegionOptions, RunningOptions
 
 TOLERANCES = ["0.1°", "0.01°", "0.001°", "0.0001°"]
@@ -157,7 +157,7 @@ def test_the_sweep_is_drawn_over_every_first_rate_with_the_papers_marked(tables)
     assert (mark["x0"], mark["x1"], mark["y0"], mark["y1"]) == (26, 26, 0, 1)
     assert mark["line"]["width"] < min(trace["line"]["width"] for trace in chart.data)
     (text,) = chart.layout["annotations"]
-    assert (text["x"], text["y"], text["text"], text["showarrow"]) == (26, 1, "26", False)
+    assert (text["x"], text["y"], text["text"], text["showarrow"]) == (26, 0, "26", False)
 
 
 def test_mean_errors_of_the_solvers_are_drawn_in_degrees(tables):
