@@ -22,17 +22,7 @@ OPENCV = (
     "opencv-contrib-python",
 )
 REQUIRED = ("numpy", OPENCV, "click", "tqdm", "tifffile", "PyYAML")
-OPTIONAL = (
-    "dask",
-    "distributed",
-    "imagecodecs",
-    "jinja2",
-    "matplotlib",
-    "obstore",
-    "plotly",
-    "pyarrow",
-    "pywuffs",
-)
+OPTIONAL = ("dask", "distributed", "imagecodecs", "jinja2", "matplotlib", "obstore", "plotly", "pyarrow")
 
 
 def versions() -> Iterator[tuple[str, str]]:

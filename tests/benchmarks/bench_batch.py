@@ -73,8 +73,7 @@ def without_extras(folder: Path) -> str:
     """Make a path for Python on which the extra `fast` seems not to be installed."""
     hidden = folder / "hidden"
     hidden.mkdir()
-    for name in ("imagecodecs", "pywuffs"):
-        (hidden / f"{name}.py").write_text("raise ImportError\n")
+    (hidden / "imagecodecs.py").write_text("raise ImportError\n")
     return os.pathsep.join([str(hidden), str(ROOT)])
 
 

@@ -1,7 +1,6 @@
-"""What the packages of the extras `fast` and `tiff` do, and what is done where they are not installed."""
+"""What imagecodecs, of the extras `fast` and `tiff`, does, and what is done where it is not installed."""
 
 import zlib
-from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 
@@ -14,25 +13,6 @@ def imagecodecs() -> Any:
     except ImportError:
         return None
     return package
-
-
-@lru_cache(maxsize=1)
-def png_decoders() -> Callable[[], Any] | None:
-    """Return what makes decoders of PNG alone that verify checksums; None where wuffs is not installed."""
-    try:
-        from pywuffs import ImageDecoderQuirks, ImageDecoderType, PixelFormat
-        from pywuffs.aux import ImageDecoder, ImageDecoderConfig
-    except ImportError:
-        return None
-
-    def make() -> Any:
-        config = ImageDecoderConfig()
-        config.enabled_decoders = [ImageDecoderType.PNG]
-        config.pixel_format = PixelFormat.Y_16LE
-        config.quirks = {ImageDecoderQuirks.IGNORE_CHECKSUM: 0}
-        return ImageDecoder(config)
-
-    return make
 
 
 def crc32(data: bytes | memoryview) -> int:
