@@ -15,7 +15,7 @@ LAYERS = (
     {"run"},
     {"pictures", "stereo", "files", "rig"},
     {"estimator"},
-    {"errors", "messages"},
+    {"errors", "extras", "messages"},
 )
 # modules that import something of rollcli inside a function, and why
 DOORS = {

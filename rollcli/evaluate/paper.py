@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 from rollcli.errors import ExitStatus, UsageError
 from rollcli.evaluate.options import PaperOptions
 from rollcli.evaluate.truth import read_truth
+from rollcli.extras import require_extra
 from rollcli.files.matching import stem_of
 from rollcli.files.stream import write_output
-from rollcli.report.page import require_extra
 from rollcli.run.find import check_writes, list_files, map_frames
 from rollcli.run.frame import Frame
 from rollcli.run.progress import Progress
@@ -53,7 +53,7 @@ def run_paper(options: PaperOptions) -> ExitStatus:
     OutputError
         Exit status 1.
     """
-    require_extra("the page of charts")
+    require_extra("report", "the page of charts")
     if options.encoding.encoding == "depth":
         raise UsageError("--encoding depth: the experiments are made on disparity maps, not on depth maps")
     folder, running = options.experiments.output, options.running

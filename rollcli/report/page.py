@@ -9,17 +9,14 @@ is made.
 import base64
 import hashlib
 import importlib.resources
-import importlib.util
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from rollcli.errors import UsageError
 from rollcli.report.chart import script_json
 from rollcli.report.colours import style_sheet
 
-_NEEDED = ("plotly", "jinja2", "matplotlib")
 # plotly adds a style sheet for geographic maps unless an element has its id; the policy would refuse it aloud
 _STYLE_OF_MAPS = re.compile(r'document\.getElementById\("([0-9a-f]{64})"\)')
 _PLOTLY_STYLES = ("",)  # plotly makes an empty style element, which it fills by rules
@@ -34,19 +31,6 @@ class Rows:
     def __html__(self) -> str:
         """Return the rows as JSON."""
         return f'<script type="application/json" id="rows">{script_json({"rows": self.rows})}</script>'
-
-
-def require_extra(what: str) -> None:
-    """Refuse, before any work is done, where the extra `report` is not installed; `what` needs it.
-
-    Raises
-    ------
-    UsageError
-        Says what to install.
-    """
-    missing = [name for name in _NEEDED if importlib.util.find_spec(name) is None]
-    if missing:
-        raise UsageError(f'{what} needs {" and ".join(missing)}: pip install "rollcli[report]"')
 
 
 def render_page(package: str, template: str, *more: str, **values: Any) -> bytes:

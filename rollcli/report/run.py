@@ -6,12 +6,12 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from rollcli.errors import ExitStatus, InputError, UsageError
+from rollcli.extras import require_extra
 from rollcli.files.naming import listed
 from rollcli.files.results import Result, read_result, run_path
 from rollcli.files.stream import is_stream, write_output
 from rollcli.report.chart import chart_names
 from rollcli.report.options import ReportOptions
-from rollcli.report.page import require_extra
 from rollcli.report.sources import Choice, Subject, choose, subjects
 from rollcli.report.summary import frame_count
 from rollcli.run.find import check_writes, list_files
@@ -50,7 +50,7 @@ def run_report(options: ReportOptions) -> ExitStatus:
     """
     if options.output is None:
         _require_charts_alone(options)
-    require_extra("report")
+    require_extra("report", "the page")
     result = read_result(options.result)
     if not result.rows:
         raise InputError(f"{options.result}: has no rows: there is nothing to report")

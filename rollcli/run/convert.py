@@ -5,8 +5,8 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 
 from rollcli.errors import ExitStatus, UsageError
+from rollcli.extras import require_extra
 from rollcli.files.results import Row
-from rollcli.report.page import require_extra
 from rollcli.run.calibration import check_depth, check_first_size
 from rollcli.run.conversion import Conversion, convert
 from rollcli.run.find import map_frames, pair_frames
@@ -95,7 +95,7 @@ def run_vdisparity(options: VDisparityOptions) -> ExitStatus:
     """Count the disparities of every map, row by row, and draw them."""
     running, count = options.running, options.count
     if count.figure is not None:
-        require_extra("--figure")
+        require_extra("report", "--figure")
         if count.counts:
             raise UsageError("--counts goes with the picture: give it without --figure")
     elif count.result is not None:

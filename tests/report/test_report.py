@@ -16,9 +16,8 @@ import cv2
 import numpy as np
 import pytest
 
-from rollcli.errors import UsageError
 from rollcli.files.results import read_result
-from rollcli.report import page, pictures
+from rollcli.report import pictures
 from tests.report.results import row, write_result
 from tests.run_cli import contents, road_map, rollcli, write_kitti, write_maps
 
@@ -381,12 +380,6 @@ def test_a_dry_run_lists_and_writes_nothing(folder):
     assert done.out.splitlines()[0] == "read  out/rolls.csv"
     assert done.out.splitlines()[-1] == "write page.html"
     assert not (folder / "page.html").exists()
-
-
-def test_without_the_extra_it_says_what_to_install(monkeypatch):
-    monkeypatch.setattr(page, "_NEEDED", ("jinja2", "no_such_package"))
-    with pytest.raises(UsageError, match=r'report needs no_such_package: pip install "rollcli\[report\]"'):
-        page.require_extra("report")
 
 
 def test_the_page_of_one_frame_describes_what_it_shows_and_no_more(folder):

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from rollcli.errors import InputError, UsageError
+from rollcli.extras import require_extra
 
 MAGIC = b"PAR1"
 _ROWS_AT_ONCE = 1000
@@ -24,10 +25,7 @@ def require_parquet() -> None:
     UsageError
         The extra `parquet` is not installed.
     """
-    try:
-        import pyarrow.parquet  # noqa: F401 (this is the question)
-    except ImportError as error:
-        raise UsageError("Parquet needs the extra parquet: pip install 'rollcli[parquet]'") from error
+    require_extra("parquet", "Parquet")
 
 
 def encode_parquet(

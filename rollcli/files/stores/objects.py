@@ -9,6 +9,7 @@ from functools import lru_cache
 from typing import Any, TypeVar
 
 from rollcli.errors import InputError, OutputError, UsageError
+from rollcli.extras import require_extra
 from rollcli.files.bounded import MOST_BYTES, too_large
 from rollcli.files.stores.locations import public_name, split_url, wait_for_room, waiting_for_network
 
@@ -363,11 +364,9 @@ def _open(url: str) -> tuple[Any, str]:
 @lru_cache(maxsize=64)
 def _store(root: str, process: int) -> Any:
     """Open a bucket; its endpoint and keys come from the environment. `process` keeps forks apart."""
-    try:
-        from obstore.store import from_url
-    except ImportError as error:
-        raise UsageError(f"{root}: needs the extra storage: pip install 'rollcli[storage]'") from error
+    require_extra("storage", f"{root}:")
     from obstore.exceptions import BaseError
+    from obstore.store import from_url
 
     seconds = request_seconds()
     client = {"connect_timeout": f"{_CONNECT_S}s", "timeout": f"{seconds:g}s"}

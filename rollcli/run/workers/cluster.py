@@ -16,6 +16,7 @@ from typing import Any, Generic, cast
 
 from rollcli import __version__
 from rollcli.errors import ClusterError, OutputError, UsageError, WorkerError
+from rollcli.extras import require_extra
 from rollcli.files.atomic import is_file, is_there, write_atomic
 from rollcli.files.storage import remove
 from rollcli.files.stores.locations import is_url
@@ -42,7 +43,7 @@ def check_scheduler(given: str) -> None:
     ClusterError
         No scheduler answers there.
     """
-    _require_extra()
+    require_extra("cluster", "--scheduler")
     address = scheduler_address(given)
     try:
         with _silenced_logging():
@@ -87,7 +88,7 @@ class ClusterExecutor(Generic[Task, Result]):
     """
 
     def __init__(self, given: str, work: Work[Task, Result], shared: SharedPaths, threads: int) -> None:
-        _require_extra()
+        require_extra("cluster", "--scheduler")
         from distributed import KilledWorker
 
         self.worker_died: tuple[type[BaseException], ...] = (KilledWorker,)
@@ -312,13 +313,6 @@ def _connection_lost(address: str) -> ClusterError:
 
 def _no_scheduler(address: str) -> ClusterError:
     return ClusterError(f"{address}: no Dask scheduler answers there")
-
-
-def _require_extra() -> None:
-    try:
-        import distributed  # noqa: F401 (it sets up its logging when it is loaded)
-    except ImportError as error:
-        raise UsageError("--scheduler needs the extra cluster: pip install 'rollcli[cluster]'") from error
 
 
 @contextlib.contextmanager
