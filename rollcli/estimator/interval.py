@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rollcli.estimator.least_squares import regular, unit
 from rollcli.estimator.moments import Floats, Grid
 from rollcli.estimator.road.model import Reals, RoadModel
-from rollcli.estimator.road.surface import MOST_FADED, Surface
+from rollcli.estimator.road.surface import Surface
 from rollcli.estimator.tuning import IntervalTuning
 
 # 97.5 % quantiles of Student's t for 1, 2, ... degrees of freedom
@@ -20,6 +20,7 @@ _NORMAL = 1.96  # 97.5 % quantile of the normal distribution
 _LAST_STEP = 65535  # of 16 bits, whose sort takes a fifth of the time of single precision
 _LEAST_SPAN = 1e-30  # units; keeps a division finite
 _THETA, _CAMBER = 3, 4  # columns of the design
+_FARTHEST = 0.02  # of the nearest disparity: farther pixels have no height
 
 
 @dataclass(frozen=True)
@@ -36,10 +37,9 @@ class Jackknife:
         The textbook covariance, for as many pixels as could be independent.
     freedom : tuple of float
         Degrees of freedom of theta's change over bands and over columns.
-    lateral : float
-        By how much the theta of the lane ahead differs from that of all pixels.
-    depth : float
-        By how much the theta of the near half differs from that of the far half.
+    uneven : float
+        How far the road's patches lie over or under its parabola, root mean square, over the width of the
+        view where it is nearest: an angle, radians.
     bend : float
         By how much the camber that was fitted moves theta.
     camber : float or None
@@ -51,8 +51,7 @@ class Jackknife:
     columns: Floats
     white: Floats
     freedom: tuple[float, float]
-    lateral: float
-    depth: float
+    uneven: float
     bend: float
     camber: float | None
 
@@ -75,7 +74,7 @@ class Interval:
     noise : float
         The part of the half-width that noise and misfit make.
     half_width : float
-        All of it: with the part that the choice of surface makes.
+        All of it: with the part that an uneven road makes. At most a right angle: there are no other rolls.
     """
 
     noise: float
@@ -95,9 +94,9 @@ def interval_of(jackknife: Jackknife, theta: float, turned: float, tuning: Inter
     tuning : IntervalTuning
     """
     noise = tuning.factor * noise_of(jackknife, theta, tuning)
-    lateral, depth = tuning.lateral * jackknife.lateral, tuning.depth * jackknife.depth
-    bend = tuning.bend * jackknife.bend
-    return Interval(noise, math.sqrt(noise**2 + lateral**2 + depth**2 + bend**2 + (_NORMAL * turned) ** 2))
+    uneven, bend = tuning.uneven * jackknife.uneven, tuning.bend * jackknife.bend
+    half_width = math.hypot(noise, uneven, bend, _NORMAL * turned)
+    return Interval(min(noise, math.pi / 2), min(half_width, math.pi / 2))
 
 
 def noise_of(jackknife: Jackknife, theta: float, tuning: IntervalTuning) -> float:
@@ -116,7 +115,7 @@ def slant(theta: float, tuning: IntervalTuning) -> float:
 
 
 def jackknife(surface: Surface, theta: float, tuning: IntervalTuning) -> Jackknife:
-    """Leave out one group of the road's pixels after the other [Jackknife], and compare its parts.
+    """Leave out one group of the road's pixels after the other [Jackknife], and measure its unevenness.
 
     Parameters
     ----------
@@ -142,63 +141,85 @@ def jackknife(surface: Surface, theta: float, tuning: IntervalTuning) -> Jackkni
     model.turning(across, along, out=rows[3])
     rows[4] = model.bulge(across, plain) if cambered else 0
     rows[5] = surface.d - plain
+    nearest = float(plain.max())
+    heights = rows[5] / np.maximum(plain, _FARTHEST * nearest)
     rows *= np.sqrt(weights)  # from here on all products are weighted
 
+    leverage = np.square(rows[3])
     bands = _by_group(rows, along, None, tuning.groups)
-    columns = _by_group(rows, across, np.square(rows[3]), tuning.groups)
-    total = bands.sum(0)
-    parts = _lane(model.side(across, plain)), _near(weights, along, tuning)
-    lane, near = ((rows * part).dot(rows.T) for part in parts)
-    halves = [part + tuning.whole_share * total for part in (lane, total, near, total - near)]
-    found = _solved(total, np.concatenate([bands, columns]), halves, prior)
+    columns = _by_group(rows, across, leverage, tuning.groups)
+    total = bands.products.sum(0)
+    found = _solved(total, np.concatenate([bands.products, columns.products]), prior)
+    uneven = _unevenness(heights, leverage, bands, columns, tuning.levelled)
+    view = _view_width(surface.grid, theta) * abs(model.alpha[1]) / nearest
 
     white: Floats = found.inverse * _white(total, found.whole, tuning)
     if not surface.parabolic:  # there is no a2 to err
         white[2] = white[:, 2] = 0
-    of_lane, of_all, of_near, of_far = found.halves[:, _THETA].tolist()
     return Jackknife(
         bands=found.changes[: tuning.groups],
         columns=found.changes[tuning.groups :],
         white=white[:4, :4],
-        freedom=(_freedom(bands), _freedom(columns)),
-        lateral=abs(of_lane - of_all),
-        depth=abs(of_near - of_far),
+        freedom=(_freedom(bands.products), _freedom(columns.products)),
+        uneven=uneven / view,
         bend=abs(model.camber * float(found.bulge[_THETA])),
         camber=_camber(model, prior * float(found.inverse[_CAMBER, _CAMBER])) if cambered else None,
     )
 
 
-def _lane(side: Reals) -> Reals:
-    """Return how much each pixel belongs to the lane ahead, 0 to 1."""
-    lane: Reals = np.exp(-np.minimum(np.square(np.square(side)), MOST_FADED))
-    return lane
+def _view_width(grid: Grid, theta: float) -> float:
+    """Return how wide the view is across a road of this roll, units."""
+    return 2 * (grid.centre_u * abs(math.cos(theta)) + grid.centre_v * abs(math.sin(theta))) / grid.scale
 
 
-def _near(weights: Reals, along: Reals, tuning: IntervalTuning) -> Reals:
-    """Return how much each pixel belongs to the near half, 0 to 1."""
-    middle = float(weights.dot(along)) / float(weights.sum())
-    near: Reals = 1 / (1 + np.exp(np.minimum((middle - along) / tuning.depth_fade, MOST_FADED)))
-    return near
+class _Groups(NamedTuple):
+    """Groups of pixels: the products (groups, 6, 6) of each, and in which half group (N,) each pixel is."""
+
+    products: Floats
+    half: NDArray[np.intp]
 
 
-def _by_group(rows: Reals, position: Reals, share: Reals | None, groups: int) -> Floats:
-    """Return the products (groups, 6, 6) of groups of equal total `share`, or number, cut along `position`.
+def _unevenness(heights: Reals, leverage: Reals, bands: _Groups, columns: _Groups, factor: float) -> float:
+    """Return the root mean square of the patches' mean heights, in the unit of `heights`.
+
+    A patch is what a band and a column have in common, and counts as much as it turns the road. Noise falls
+    by `factor` from a quarter of a patch to the whole, an uneven road's heights hardly do: that tells them
+    apart.
+    """
+    weighted = leverage * heights
+
+    def of_patches(groups: int, band: NDArray[np.intp], column: NDArray[np.intp]) -> float:
+        patch = band * groups + column
+        sums, totals = np.bincount(patch, weighted), np.bincount(patch, leverage)
+        return float((np.square(sums) / np.maximum(totals, _LEAST_SPAN)).sum())
+
+    groups = 2 * len(bands.products)
+    quarters = of_patches(groups, bands.half, columns.half)
+    patches = of_patches(groups // 2, bands.half // 2, columns.half // 2)
+    uneven = (factor * patches - quarters) / (factor - 1)
+    return math.sqrt(max(0.0, uneven) / max(float(leverage.sum()), _LEAST_SPAN))
+
+
+def _by_group(rows: Reals, position: Reals, share: Reals | None, groups: int) -> _Groups:
+    """Return groups of equal total `share`, or number, cut along `position`.
 
     Of the six rows five are the design's; with the sixth, the residuals, a product is a group's normal
     equations, right-hand side included.
     """
-    order = _order(position)
+    order, halves = _order(position), 2 * groups
     if share is None:
-        cuts = [math.ceil(len(order) * group / groups) - 1 for group in range(1, groups)]
+        cuts = [math.ceil(len(order) * half / halves) - 1 for half in range(1, halves)]
     else:
         heights = share.take(order).cumsum()
-        cuts = heights.searchsorted(heights[-1] * np.arange(1, groups) / groups).tolist()
+        cuts = heights.searchsorted(heights[-1] * np.arange(1, halves) / halves).tolist()
+    half = np.empty(len(order), np.intp)
+    half[order] = np.repeat(np.arange(halves), np.diff([0, *cuts, len(order)]))
     ordered = rows.take(order, 1, mode="clip")
     columns = ordered.copy().T  # BLAS takes twice as long for the product of an array with itself
     products = np.empty((groups, 6, 6), np.float32)
-    for product, (start, end) in zip(products, itertools.pairwise([0, *cuts, len(order)]), strict=True):
+    for product, (start, end) in zip(products, itertools.pairwise([0, *cuts[1::2], len(order)]), strict=True):
         np.dot(ordered[:, start:end], columns[start:end], out=product)
-    return products.astype(np.float64)
+    return _Groups(products.astype(np.float64), half)
 
 
 def _order(position: Reals) -> NDArray[np.intp]:
@@ -219,8 +240,6 @@ class _Solutions(NamedTuple):
         From the surface's parabola to the best one.
     changes : ndarray, shape (groups, 4)
         How the first four change as one group after the other is left out.
-    halves : ndarray, shape (4, 5)
-        Of parts, at the fitted camber.
     bulge : ndarray, shape (5,)
         What a camber of 1 adds to the others, where it is not known.
     """
@@ -228,27 +247,23 @@ class _Solutions(NamedTuple):
     inverse: Floats
     whole: Floats
     changes: Floats
-    halves: Floats
     bulge: Floats
 
 
-def _solved(total: Floats, groups: Floats, halves: list[Floats], prior: float) -> _Solutions:
-    """Solve the normal equations of all pixels, of all but a group, and of parts. At once takes less time."""
-    free = 6 + len(groups)  # of these the camber is free
-    products = np.empty((free + len(halves) + 1, 6, 6))
+def _solved(total: Floats, groups: Floats, prior: float) -> _Solutions:
+    """Solve the normal equations of all pixels, and of all but a group. At once takes less time."""
+    products = np.empty((7 + len(groups), 6, 6))
     products[:6] = products[-1] = total
-    np.subtract(total, groups, out=products[6:free])
-    products[free:-1] = halves
+    np.subtract(total, groups, out=products[6:-1])
     normal, pulls = products[:, :5, :5], products[:, :5, 5:]
     pulls[:5, :, 0] = unit(5)  # whose solutions are the inverse
     pulls[-1] = normal[-1, :, _CAMBER:]
     pulls[-1, _CAMBER] = 0
-    normal[:free, _CAMBER, _CAMBER] += prior
-    normal[free:, _CAMBER] = normal[free:, :, _CAMBER] = 0
+    normal[:-1, _CAMBER, _CAMBER] += prior
+    normal[-1, _CAMBER] = normal[-1, :, _CAMBER] = 0
     solutions: Floats = np.asarray(np.linalg.solve(regular(normal, normal[0]), pulls)[..., 0], np.float64)
     inverse, whole = solutions[:5], solutions[5]
-    changes = (whole - solutions[6:free])[:, :4]
-    return _Solutions(inverse, whole, changes, solutions[free:-1], solutions[-1])
+    return _Solutions(inverse, whole, (whole - solutions[6:-1])[:, :4], solutions[-1])
 
 
 def _white(total: Floats, whole: Floats, tuning: IntervalTuning) -> float:

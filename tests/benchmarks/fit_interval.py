@@ -1,11 +1,12 @@
-"""Fit the factor of the interval on rendered scenes, and judge it on others.
+"""Fit the factors of the interval on rendered scenes, and judge them on others.
 
     python tests/benchmarks/fit_interval.py [FRAMES]
 
 Prints the factor of the noise with which 95 % of the intervals hold the true roll on the first half of the
-scenes, and the coverage that it and the factor in use give on the second half, by kind of scene. Half of the
-frames have rolls within +-10, half within +-35 degrees; half of the roads are flat, the others have all cross
-sections.
+smooth scenes, then the factor of the unevenness with which they hold the roll of the lane on rough ones; and
+the coverage that these and the factors in use give on the second half, by kind of scene. Half of the frames
+have rolls within +-10, half within +-35 degrees; half of the roads are flat, the others have all cross
+sections. Rough roads are of the classes A to D; their lane has a range of rolls, as a lidar's (`lane_rolls`).
 """
 
 import itertools
@@ -22,6 +23,7 @@ from rollcli.estimator.moments import CheckedMap
 from rollcli.estimator.request import DEFAULT_SOLVER, MAX_INTERVAL_DEG, MAX_ROLL_DEG, Request
 from rollcli.estimator.road.pixels import select_pixels
 from rollcli.estimator.tuning import TUNING
+from rollcli.simulate.dataset import lane_rolls_of
 
 FIT_SEEDS, JUDGE_SEEDS = (81, 82), (83, 84)
 REQUEST = Request(
@@ -37,43 +39,59 @@ REQUEST = Request(
 )
 
 
-def terms(frames: int, seeds: tuple[int, int]) -> tuple[np.ndarray, list[str]]:
-    """Rows of (error, noise before the factor, choice of surface), degrees; and the kinds of scene."""
+def terms(frames: int, seeds: tuple[int, int], roughness: str | None) -> tuple[np.ndarray, list[str]]:
+    """Rows of (error, noise, unevenness, camber), before the factors, degrees; and the kinds of scene."""
     tuning, rows, kinds = TUNING.interval, [], []
     for (seed, span), section in itertools.product(zip(seeds, (10, 35), strict=True), ("flat", "mixed")):
-        for disparity, roll_deg, scene, _ in matched(frames // 4, seed, span, cross_section=section):
+        for disparity, _, scene, spec in matched(
+            frames // 4, seed, span, cross_section=section, roughness=roughness
+        ):
             try:
                 theta = estimate_roll(disparity).theta
                 surface = select_pixels(CheckedMap.of(disparity, None), REQUEST).surface
             except EstimationError as error:
-                print(f"{scene} {roll_deg:.2f}: {error}")
+                print(f"{scene} {math.degrees(spec.roll):.2f}: {error}")
                 continue
             assert surface is not None
             knife = jackknife(surface, theta, tuning)
-            noise = noise_of(knife, theta, tuning)
-            choice = math.hypot(
-                tuning.lateral * knife.lateral, tuning.depth * knife.depth, tuning.bend * knife.bend
-            )
-            error = abs(math.degrees(theta) - roll_deg)
-            rows.append((error, math.degrees(noise), math.degrees(choice)))
-            kinds.append(f"{scene} {section}")
-    return np.array(rows), kinds
+            low, high = lane_rolls_of(spec) if roughness else (spec.roll, spec.roll)
+            error = max(0.0, low - theta, theta - high)
+            rows.append((error, noise_of(knife, theta, tuning), knife.uneven, tuning.bend * knife.bend))
+            kinds.append(f"class {roughness}" if roughness else f"{scene} {section}")
+    return np.degrees(rows), kinds
+
+
+def fitted(error: np.ndarray, part: np.ndarray, others: np.ndarray) -> float:
+    """The factor of a part with which 95 % of the intervals hold, the others being as they are."""
+    left = np.sqrt(np.maximum(0, error**2 - others**2))
+    return float(np.percentile(left / np.maximum(part, 1e-9), 95))
+
+
+def all_terms(frames: int, seeds: tuple[int, int]) -> tuple[np.ndarray, list[str]]:
+    """Those of smooth roads, and of half as many rough ones."""
+    found = [terms(frames, seeds, None), *(terms(frames // 8, seeds, each) for each in "ABCD")]
+    return np.concatenate([rows for rows, _ in found]), [kind for _, kinds in found for kind in kinds]
 
 
 def main() -> None:
-    """Print the factor found, and the coverage of that and of the one in use."""
+    """Print the factors found, and the coverage of those and of the ones in use."""
     frames = int(sys.argv[1]) if len(sys.argv) > 1 else 400
-    error, noise, choice = terms(frames, FIT_SEEDS)[0].T
-    found = float(np.percentile(np.sqrt(np.maximum(0, error**2 - choice**2)) / noise, 95))
-    judged, kinds = terms(frames, JUDGE_SEEDS)
-    error, noise, choice = judged.T
-    print(f"{frames} scenes to fit on, {len(judged)} to judge on")
-    for name, factor in (("found", found), ("in use", TUNING.interval.factor)):
-        half = np.hypot(factor * noise, choice)
+    used = TUNING.interval.factor, TUNING.interval.uneven
+    rows, kinds = all_terms(frames, FIT_SEEDS)
+    rough = np.array([kind.startswith("class") for kind in kinds])
+    error, noise, uneven, bend = rows[~rough].T
+    factor = fitted(error, noise, np.hypot(used[1] * uneven, bend))
+    error, noise, uneven, bend = rows[rough].T
+    found = factor, fitted(error, uneven, np.hypot(used[0] * noise, bend))
+    judged, kinds = all_terms(frames, JUDGE_SEEDS)
+    error, noise, uneven, bend = judged.T
+    print(f"{len(rows)} scenes to fit on, {len(judged)} to judge on")
+    for name, (factor, times) in (("found", found), ("in use", used)):
+        half = np.sqrt((factor * noise) ** 2 + (times * uneven) ** 2 + bend**2)
         held = error <= half
         by_kind = {kind: held[[each == kind for each in kinds]].mean() for kind in sorted(set(kinds))}
         shares = "  ".join(f"{kind} {share:.2f}" for kind, share in by_kind.items())
-        print(f"{name:6}: factor {factor:.2f}, coverage {held.mean():.3f}", end="")
+        print(f"{name:6}: factor {factor:.2f}, uneven {times:.1f}, coverage {held.mean():.3f}", end="")
         print(f", median half-width {np.median(half):.4f}; {shares}")
 
 

@@ -9,12 +9,15 @@ import pytest
 from rollcli.errors import UsageError
 from rollcli.estimator.energy import Energy
 from rollcli.estimator.estimate import estimate_roll
-from rollcli.estimator.interval import Jackknife, interval_of, jackknife
+from rollcli.estimator.interval import Interval, Jackknife, interval_of, jackknife
 from rollcli.estimator.moments import CheckedMap, point_moments
 from rollcli.estimator.request import DEFAULT_SOLVER, Request
 from rollcli.estimator.road.pixels import select_pixels
 from rollcli.estimator.solvers.exact import exact
 from rollcli.estimator.tuning import TUNING, IntervalTuning
+from rollcli.simulate.dataset import lane_rolls_of
+from rollcli.simulate.render import true_disparity
+from rollcli.simulate.spec import FrameSpec
 from tests.estimator.synthetic_maps import flat_road
 
 SIZE = {"width": 320, "height": 240, "focal": 280.0}
@@ -51,6 +54,21 @@ def test_95_percent_of_the_intervals_hold_the_true_roll():
     # three standard deviations of a binomial of 100 draws at 0.95
     assert np.mean(error <= half_width) >= 0.95 - 3 * math.sqrt(0.95 * 0.05 / MAPS)
     assert np.median(half_width) < 6 * np.median(error)
+
+
+def test_on_rough_roads_they_hold_the_roll_of_the_lane_that_a_lidar_would_say():
+    """Roads of ISO 8608's classes A to D, at half the size of the cameras of KITTI."""
+    rig = {"size": (620, 188), "focal": 360.0, "height": 1.65, "cross_section": "flat"}
+    rng, held = np.random.default_rng(6), []
+    for seed in range(28):
+        spec = FrameSpec("bare", rng.uniform(-0.1, 0.1), 0.01, roughness="ABCD"[seed % 4], seed=seed, **rig)
+        disparity, _ = true_disparity(spec)
+        noisy = np.where(disparity > 0, disparity + rng.normal(0, 0.1, disparity.shape), 0)
+        found = estimate_roll(noisy)
+        low, high = lane_rolls_of(spec)
+        held.append(low - found.ci95 <= found.theta <= high + found.ci95)
+    # three standard deviations of a binomial of 28 draws at 0.95
+    assert np.mean(held) >= 0.95 - 3 * math.sqrt(0.95 * 0.05 / 28)
 
 
 @pytest.mark.parametrize("roll_deg", [-50, 0, 30])
@@ -108,7 +126,7 @@ def test_the_jackknife_is_what_refitting_without_each_band_gives(roll_deg):
 def knife(bands=(0.0,), columns=(0.0,), white=0.0, freedom=(5.0, 5.0), **parts):
     """A jackknife whose groups change theta alone."""
     changes = [np.array([[0, 0, 0, change] for change in group]) for group in (bands, columns)]
-    others = {"lateral": 0.0, "depth": 0.0, "bend": 0.0, "camber": None} | parts
+    others = {"uneven": 0.0, "bend": 0.0, "camber": None} | parts
     return Jackknife(*changes, np.diag([0, 0, 0, white]), freedom, **others)
 
 
@@ -138,9 +156,14 @@ def test_the_textbooks_part_is_that_of_a_normal_distribution():
 
 
 def test_its_parts_add_as_independent_errors_do():
-    tuning = IntervalTuning(white=0.5, factor=2.0, lateral=3.0, depth=5.0, bend=7.0, slant=0.4)
-    one = knife((0.3,), (0.4,), 0.09, (12.0, 12.0), lateral=0.01, depth=0.02, bend=0.03)
+    tuning = IntervalTuning(white=0.5, factor=2.0, uneven=5.0, bend=7.0, slant=0.4)
+    one = knife((0.03,), (0.04,), 0.0009, (12.0, 12.0), uneven=0.02, bend=0.03)
     found = interval_of(one, math.radians(-30), 0.2, tuning)
-    noise = 2 * (1 + 0.4 * 0.5) * math.hypot(2.179 * 0.3, 2.179 * 0.4, 0.5 * 1.96 * 0.3)
+    noise = 2 * (1 + 0.4 * 0.5) * math.hypot(2.179 * 0.03, 2.179 * 0.04, 0.5 * 1.96 * 0.03)
     assert found.noise == pytest.approx(noise)
-    assert found.half_width == pytest.approx(math.hypot(noise, 0.03, 0.1, 0.21, 1.96 * 0.2))
+    assert found.half_width == pytest.approx(math.hypot(noise, 0.1, 0.21, 1.96 * 0.2))
+
+
+def test_no_interval_is_wider_than_all_rolls():
+    vague = knife((9.0,), (8.0,), 7.0, uneven=1.0)
+    assert interval_of(vague, 0.0, 0.0, TUNING.interval) == Interval(math.pi / 2, math.pi / 2)

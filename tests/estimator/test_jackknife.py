@@ -1,12 +1,14 @@
 """The jackknife is that of weighted least squares, solved group by group and part by part."""
 
 import dataclasses
+import itertools
 import math
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 
+from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.interval import jackknife
 from rollcli.estimator.moments import Floats, Grid
 from rollcli.estimator.road.model import RoadModel
@@ -61,11 +63,11 @@ def fitted(*, prior=4e3, parabolic=True, heavy=1.0, count=241, noise=0.3):
     return Fitted(surface, design, wanted, prior if math.isfinite(prior) else 0.0), theta
 
 
-def equal_shares(position, share):
-    """The group of each pixel, when six of equal share are cut along a position."""
+def equal_shares(position, share, count=6):
+    """The group of each pixel, when so many of equal share are cut along a position."""
     order = np.argsort(position)
     groups = np.empty(len(order), int)
-    groups[order] = np.minimum(6 * np.cumsum(share[order]) // share.sum(), 5)
+    groups[order] = np.minimum(count * np.cumsum(share[order]) // share.sum(), count - 1)
     return groups
 
 
@@ -118,23 +120,47 @@ def test_pixels_without_any_error_have_no_textbook_error():
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_the_angles_of_lane_and_of_near_and_far_half_are_those_of_fits_to_them(case):
+@pytest.mark.parametrize("uneven", [0.0, 0.02])
+def test_unevenness_is_what_patches_are_off_the_road_by_beyond_their_noise(case, uneven):
     problem, theta = fitted(**case)
-    surface, weights = problem.surface, problem.surface.weights
+    surface = problem.surface
+    surface = dataclasses.replace(surface, d=surface.d * (1 + uneven * np.sin(20 * surface.x) ** 3))
     road = RoadModel(theta, surface.model.alpha)
-    along = road.along(surface.x, surface.y)
-    side = road.side(road.across(surface.x, surface.y), road.disparity(surface.x, surface.y))
-    lane = weights * np.exp(-(side**4))
-    middle = np.average(along, weights=weights)
-    near = weights / (1 + np.exp((middle - along) / TUNING.interval.depth_fade))
+    across, along = road.across(surface.x, surface.y), road.along(surface.x, surface.y)
+    plain = road.disparity_along(along)
+    height, leverage = surface.d / plain - 1, surface.weights * problem.design[:, 3] ** 2
+    quarters, patches = (
+        sum(
+            (leverage[inside] @ height[inside]) ** 2 / leverage[inside].sum()
+            for band, column in itertools.product(range(count), range(count))
+            if (inside := (bands == band) & (columns == column)).any()
+        )
+        for count, bands, columns in (
+            (each, equal_shares(along, np.ones_like(along), each), equal_shares(across, leverage, each))
+            for each in (12, 6)
+        )
+    )
+    square = (TUNING.interval.levelled * patches - quarters) / (TUNING.interval.levelled - 1)
+    grid = surface.grid
+    extent = 2 * (grid.centre_u * math.cos(theta) + grid.centre_v * abs(math.sin(theta))) / grid.scale
+    view = extent * surface.model.alpha[1] / plain.max()  # camera heights
+    found = jackknife(surface, theta, TUNING.interval).uneven
+    assert found == pytest.approx(math.sqrt(max(0.0, square) / leverage.sum()) / view, rel=1e-3, abs=1e-6)
 
-    def angle(part):
-        return problem.solve(part + TUNING.interval.whole_share * weights, slice(4))[0][3]
 
-    found = jackknife(surface, theta, TUNING.interval)
-    whole = problem.solve(weights, slice(4))[0][3]
-    assert found.lateral == pytest.approx(abs(angle(lane) - whole), rel=1e-4, abs=1e-7)
-    assert found.depth == pytest.approx(abs(angle(near) - angle(weights - near)), rel=1e-4, abs=1e-7)
+def test_the_unevenness_of_waves_is_theirs_and_that_of_noise_is_none():
+    rng = np.random.default_rng(3)
+    rows, columns = np.mgrid[:300, :400].astype(float)
+    plane = 5 + 0.2 * rows
+    side = (columns - 199.5) * 0.2 / plane  # camera heights
+    waves = 0.004 * np.sin(2 * math.pi * side / 1.7) * np.sin(40 / plane)
+    noise = rng.normal(0, 0.2, plane.shape)
+    rough, smooth = (
+        estimate_roll(plane * (1 + height) + noise).tangent.jackknife.uneven for height in (waves, 0)
+    )
+    view = 400 * 0.2 / plane.max()
+    assert 0.4 < rough * view / np.sqrt(np.mean(waves**2)) < 1.2
+    assert smooth < 0.15 * rough
 
 
 def test_the_part_of_the_camber_is_what_a_fit_without_it_turns_by():

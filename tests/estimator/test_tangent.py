@@ -17,7 +17,7 @@ THETA = 0.2
 
 
 def knife(bands, columns, white):
-    return Jackknife(np.array(bands), np.array(columns), np.array(white), (3.0, 5.0), 0.0, 0.0, 0.0, None)
+    return Jackknife(np.array(bands), np.array(columns), np.array(white), (3.0, 5.0), 0.0, 0.0, None)
 
 
 @pytest.mark.parametrize("size", [1.0, 1e-4])

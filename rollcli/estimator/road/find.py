@@ -80,12 +80,12 @@ def find_road(sample: Sample, max_roll: float, seed: int, tuning: SearchTuning) 
     Raises
     ------
     EstimationError
-        When no plane through the pixels rises downward in the image, as a road's disparity does, or none
-        has pixels on it.
+        When no plane through the pixels rises downward in the image, as a road's disparity does, and is
+        rolled by less than `max_roll`, or none has pixels on it.
     """
     planes = draw_planes(sample, max_roll, seed, tuning)
     if len(planes) == 0:
-        raise EstimationError("no road: nowhere does the disparity grow downward, as it does on a road")
+        raise EstimationError(_why_no_plane(sample, max_roll))
     judge = Judge(sample, tuning)
     order = np.argsort(-judge.scores(planes, every(judge.pixels, tuning.first_pixels)), kind="stable")
     # the best of each roll: a wide verge must not crowd out the road
@@ -102,6 +102,16 @@ def find_road(sample: Sample, max_roll: float, seed: int, tuning: SearchTuning) 
         raise EstimationError(HARDLY_A_PIXEL)
     far = np.abs(rolls - rolls[winner]) > tuning.rival_angle
     return Road(planes[winner].astype(np.float64), float(scores[winner]), float(scores[far].max(initial=-1)))
+
+
+def _why_no_plane(sample: Sample, max_roll: float) -> str:
+    """Say why no plane through the pixels can be a road."""
+    if (sample.slopes[1] > 0).mean() < 0.5:  # noise alone rises at some pixels
+        return "no road: nowhere does the disparity grow downward, as it does on a road"
+    return (
+        "no road: what grows downward in the map does so by hardly more than its noise, or is rolled by more "
+        f"than {math.degrees(max_roll):.0f} degrees"
+    )
 
 
 def draw_planes(sample: Sample, max_roll: float, seed: int, tuning: SearchTuning) -> Singles:

@@ -171,6 +171,15 @@ def test_a_frame_in_which_nothing_rises_downward_is_refused():
         estimate_roll(no_road()["a ceiling"])
 
 
+@pytest.mark.parametrize("roll_deg", [-75, 75])
+def test_a_plane_that_grows_downward_is_not_said_to_grow_nowhere(roll_deg):
+    rows, columns = np.mgrid[-120:120, -160:160].astype(np.float32)
+    along = rows * math.cos(math.radians(roll_deg)) - columns * math.sin(math.radians(roll_deg))
+    with pytest.raises(EstimationError, match="rolled by more than 45 degrees") as caught:
+        estimate_roll(60 + 0.2 * along)
+    assert "nowhere" not in str(caught.value)
+
+
 @pytest.mark.parametrize("name", sorted(no_road()))
 def test_a_frame_without_a_road_is_refused_or_suspect_and_says_why(name):
     assert says_no_road(verdict(no_road()[name]))
