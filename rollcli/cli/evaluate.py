@@ -31,6 +31,14 @@ from rollcli.run.options import RunningOptions
     help="The known angles: CSV with the columns file and roll_deg, degrees.",
 )
 @option(
+    "--heights",
+    type=PATH,
+    metavar="DIR",
+    section="Figures",
+    help="Heights over the road that estimate wrote, compared with heights/ beside the known angles at 5, 10 "
+    "and 20 m.  [default: where the run of RESULT wrote them, if both exist]",
+)
+@option(
     "-o",
     "--output",
     type=TABLE_FILE,
@@ -50,16 +58,24 @@ from rollcli.run.options import RunningOptions
 @config_option
 @click.pass_context
 def accuracy(
-    ctx: click.Context, /, result: str, truth: str, output: str, running: RunningOptions, **options: Any
+    ctx: click.Context,
+    /,
+    result: str,
+    truth: str,
+    heights: str | None,
+    output: str,
+    running: RunningOptions,
+    **options: Any,
 ) -> None:
-    """Compare the angles of RESULT, which estimate wrote, with known ones.
+    """Compare the angles of RESULT, which estimate wrote, with known ones; its heights over the road, too.
 
     Frames are matched by the names of their files, without folder and ending. Those without a partner are
     counted on stderr; exit status 3 when a frame of the truth has no angle.
     """
     from rollcli.evaluate.run_accuracy import run_accuracy
 
-    ctx.exit(run_accuracy(result, truth, table_format(options["format"], output), output, running))
+    form = table_format(options["format"], output)
+    ctx.exit(run_accuracy(result, truth, form, output, running, heights))
 
 
 class Turns(ParamType):

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rollcli.errors import UsageError
+from rollcli.evaluate.map_accuracy import HeightsAt
 from rollcli.evaluate.truth import KnownPose, by_stem
 from rollcli.files.matching import stem_of
 from rollcli.files.results import Row
@@ -107,6 +108,8 @@ class Accuracy:
         Rows of the result whose angle is not known.
     pitch, height : PoseAccuracy or None
         Of pitch, degrees, and height, metres; None where the truth or the result has none.
+    heights : tuple of HeightsAt
+        Of the heights over the road at some distances; empty where the truth or the run has none.
     """
 
     count: int
@@ -124,6 +127,7 @@ class Accuracy:
     no_truth: tuple[str, ...]
     pitch: PoseAccuracy | None = None
     height: PoseAccuracy | None = None
+    heights: tuple[HeightsAt, ...] = ()
 
 
 def assess(rows: Sequence[Row], truth: Mapping[str, float], result_name: str = "the result") -> Accuracy:

@@ -16,14 +16,17 @@ from rollcli.evaluate.accuracy import (
     assess_height,
     assess_pitch,
 )
+from rollcli.evaluate.map_accuracy import DISTANCES_M, HeightsAt, assess_heights, height_files
 from rollcli.evaluate.truth import KnownPose, read_known_poses
+from rollcli.files.atomic import is_folder
 from rollcli.files.matching import stem_of
 from rollcli.files.naming import listed
-from rollcli.files.results import Row, read_result
+from rollcli.files.results import Row, read_result, run_path
 from rollcli.files.stream import is_stream, write_output
 from rollcli.messages import say
 from rollcli.run.find import check_writes, list_files
 from rollcli.run.options import RunningOptions
+from rollcli.run.record import recorded_options
 
 _NAMES = {"no_angle", "no_truth"}
 _DIGITS = 6
@@ -54,6 +57,14 @@ def as_table(accuracy: Accuracy) -> str:
                 (f"{name}, mean, signed", f"{part.bias:.4f} {unit}"),
                 (f"{name}, in its interval", _percent(part.coverage_95, part.count)),
             ]
+    for at in accuracy.heights:
+        name = f"heights, {at.distance} m"
+        lines += [
+            (f"{name}, frames", str(at.frames)),
+            (f"{name}, median", f"{at.median:.4f} m"),
+            (f"{name}, 95 %", f"{at.p95:.4f} m"),
+            (f"{name}, signed", f"{at.bias:.4f} m"),
+        ]
     return "".join(f"{name:26}{value}\n" for name, value in lines)
 
 
@@ -82,6 +93,12 @@ def _values(accuracy: Accuracy) -> dict[str, Any]:
         for field in fields(PoseAccuracy):
             suffix = f"_{unit}" if field.name in _LENGTHS else ""
             values[f"{name}_{field.name}{suffix}"] = getattr(part, field.name, None)
+    heights = {at.distance: at for at in values.pop("heights")}
+    for distance in DISTANCES_M:
+        for name in ("frames", "median", "p95", "bias"):
+            suffix = "_m" if name in _LENGTHS else ""
+            key = f"over_road_at_{distance}_m_{name}{suffix}"
+            values[key] = getattr(heights.get(distance), name, None)
     return {name: round(v, _DIGITS) if isinstance(v, float) else v for name, v in values.items()}
 
 
@@ -93,7 +110,14 @@ def _percent(share: float | None, of: int) -> str:
     return "-" if share is None else f"{100 * share:.1f} % ({round(share * of)} of {of})"
 
 
-def run_accuracy(result: str, truth: str, form: str, output: str, running: RunningOptions) -> ExitStatus:
+def run_accuracy(
+    result: str,
+    truth: str,
+    form: str,
+    output: str,
+    running: RunningOptions,
+    heights: str | None = None,
+) -> ExitStatus:
     """Compare a result with known angles.
 
     Parameters
@@ -105,6 +129,9 @@ def run_accuracy(result: str, truth: str, form: str, output: str, running: Runni
     output : str
         A file, or "-" for stdout.
     running : RunningOptions
+    heights : str, optional
+        The folder of heights over the road that the run wrote; by default the one that its record names, if
+        it and `heights/` beside the truth exist.
 
     Returns
     -------
@@ -123,14 +150,34 @@ def run_accuracy(result: str, truth: str, form: str, output: str, running: Runni
     if running.dry_run:
         list_files([((result, truth), writes)])
         return ExitStatus.DONE
-    rows, known = read_result(result).rows, read_known_poses(truth)
+    found, known = read_result(result), read_known_poses(truth)
+    rows = found.rows
     accuracy = assess(rows, {stem: pose.theta for stem, pose in known.items()}, result)
     accuracy = replace(accuracy, pitch=assess_pitch(rows, known), height=assess_height(rows, known))
+    beside = truth.rpartition("/")[0] or "."
+    if heights is None:
+        recorded = recorded_options(found.run, run_path(result)).images.heights
+        both = recorded is not None and is_folder(recorded) and is_folder(f"{beside}/heights")
+        heights = recorded if both else None
+    if heights is not None:
+        accuracy = replace(accuracy, heights=_heights(rows, known, heights, beside, running))
     _name_unmatched(accuracy, result, truth, running)
     _count_bent(rows, known, truth, running)
     data = FORMATS[form](accuracy).encode("utf-8", "surrogateescape")
     write_output(output, data, overwrite=running.overwrite)
     return ExitStatus.FRAMES_FAILED if accuracy.no_angle else ExitStatus.DONE
+
+
+def _heights(
+    rows: Sequence[Row], known: Mapping[str, KnownPose], heights: str, beside: str, running: RunningOptions
+) -> tuple[HeightsAt, ...]:
+    files = height_files(rows, known, heights, beside)
+    if not files and not running.quiet:
+        say(
+            f"{heights}: no heights are compared: they need metres (estimate --calib), and the truth columns "
+            "focal_px and baseline_m"
+        )
+    return assess_heights(files)
 
 
 def _name_unmatched(accuracy: Accuracy, result: str, truth: str, running: RunningOptions) -> None:

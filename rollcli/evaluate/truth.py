@@ -21,6 +21,8 @@ _NEEDED = ("file", "roll_deg")
 class KnownPose:
     """What is known of a rig: its roll, radians; pitch, degrees, and height, metres, or None.
 
+    `focal_baseline` is its focal length times its baseline, px m: what depth times disparity is.
+
     `bends` says that the road does, so that pitch and height over the road ahead are others.
     """
 
@@ -28,6 +30,7 @@ class KnownPose:
     pitch_deg: float | None = None
     height_m: float | None = None
     bends: bool = False
+    focal_baseline: float | None = None
 
 
 def by_stem(names: Iterable[str], where: str) -> dict[str, int]:
@@ -109,7 +112,9 @@ def _known(line: Mapping[str, str | None], where: str) -> KnownPose:
         _number(line, name, where) if line.get(name) and not bends else None
         for name in ("pitch_deg", "height_m")
     )
-    return KnownPose(math.radians(_number(line, "roll_deg", where)), pitch, height, bends)
+    rig = [_number(line, name, where) for name in ("focal_px", "baseline_m") if line.get(name)]
+    scale = rig[0] * rig[1] if len(rig) == 2 else None
+    return KnownPose(math.radians(_number(line, "roll_deg", where)), pitch, height, bends, scale)
 
 
 def _number(line: Mapping[str, str | None], name: str, where: str) -> float:

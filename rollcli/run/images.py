@@ -14,7 +14,7 @@ from rollcli.files.codecs.tiff import encode_tiff
 from rollcli.files.encodings import KITTI_TOP, Encoding, from_disparity
 from rollcli.files.formats import Stored, encode_stored
 from rollcli.pictures.derotate import derotate
-from rollcli.pictures.heights import FittedRoad, heights_over, unit_of
+from rollcli.pictures.heights import FittedRoad, heights_over, steadied, unit_of
 from rollcli.pictures.heights_preview import draw_heights
 from rollcli.pictures.overlay import draw_road, draw_road_on_photo
 from rollcli.pictures.vdisparity import draw_v_disparity, row_offset, v_disparity
@@ -49,8 +49,10 @@ class Pictured:
 
     @cached_property
     def heights(self) -> NDArray[np.float32]:
-        """The heights over the road; an image and its preview share them."""
-        return heights_over(self.source.shown, FittedRoad.of_estimate(self.estimate), self.calibration)
+        """The heights over the road, of a pair steadied; an image and its preview share them."""
+        road = FittedRoad.of_estimate(self.estimate)
+        heights = heights_over(self.source.shown, road, self.calibration)
+        return heights if self.source.stored is not None else steadied(heights)
 
 
 def encode_images(frame: Frame, pictured: Pictured) -> tuple[dict[str, bytes], str]:

@@ -1,0 +1,201 @@
+"""Heights over the road from the command line, against rendered truth and against the contract."""
+
+import csv
+import math
+
+import numpy as np
+import pytest
+import tifffile
+
+from rollcli.simulate.dataset import Dataset, write_dataset
+from rollcli.simulate.spec import FrameSpec
+from tests.run_cli import contents, road_map, rollcli, write_kitti, write_maps, write_pair
+
+RIG = ("--focal", "300", "--principal-point", "79.5,20", "--baseline", "0.5")
+
+
+@pytest.fixture(scope="module")
+def rendered(tmp_path_factory):
+    """Two rendered streets with their truth, maps and rows."""
+    folder = tmp_path_factory.mktemp("rig")
+    size = {"size": (621, 188), "focal": 360.0, "pitch": 0.06, "kerb": (0.1, 0.1), "dips": 3}
+    specs = tuple(FrameSpec("street", roll, index=i, seed=8, **size) for i, roll in enumerate((0.1, -0.05)))
+    assert len(list(write_dataset(Dataset(folder, specs)))) == 2
+    done = rollcli(
+        *("estimate", "disparity", "--calib", "calib.txt", "-o", "rolls.csv", "--heights", "out"), cwd=folder
+    )
+    assert done.status == 0, done.err
+    return folder
+
+
+def test_heights_of_true_maps_are_true(rendered):
+    for name in ("frame_0001.tif", "frame_0002.tif"):
+        heights, truth = (tifffile.imread(rendered / part / name) for part in ("out", "heights"))
+        assert heights.dtype == np.float32
+        known = np.isfinite(truth) & np.isfinite(heights)
+        off = np.abs(heights - truth)[known]
+        assert np.median(off) < 0.002
+        kerb = known & (np.abs(truth - 0.1) < 1e-4)
+        assert np.median(heights[kerb]) == pytest.approx(0.1, abs=0.005)
+
+
+def test_accuracy_compares_heights_where_truth_has_them(rendered):
+    arguments = ("evaluate", "accuracy", "rolls.csv", "--truth", "truth.csv", "--format", "csv")
+    done = rollcli(*arguments, cwd=rendered)
+    assert done.status == 0, done.err
+    (figures,) = csv.DictReader(done.out.splitlines())
+    assert figures["over_road_at_5_m_frames"] == figures["over_road_at_10_m_frames"] == "2"
+    depth_at = {}
+    for name in ("frame_0001", "frame_0002"):
+        heights, truth = (tifffile.imread(rendered / part / f"{name}.tif") for part in ("out", "heights"))
+        disparity = np.float64(np.asarray(_png(rendered / "disparity" / f"{name}.png"))) / 256
+        with np.errstate(divide="ignore"):
+            depth = 360 * 0.54 / disparity
+        for distance in (5, 10, 20):
+            here = (depth > 0.8 * distance) & (depth < 1.2 * distance) & np.isfinite(heights - truth)
+            depth_at.setdefault(distance, []).append((heights - truth)[here])
+    for distance, parts in depth_at.items():
+        expected = np.median(np.abs(np.concatenate(parts)))
+        assert float(figures[f"over_road_at_{distance}_m_median_m"]) == pytest.approx(expected, abs=2e-6)
+    table = rollcli(*arguments[:-2], cwd=rendered).out
+    assert "heights, 10 m, median" in table
+    assert "heights" not in rollcli(*arguments[:-2], "--truth", "none/truth.csv", cwd=_apart(rendered)).out
+
+
+def _png(path):
+    import cv2
+
+    return cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+
+
+def _apart(rendered):
+    """The same folder, with its truth without heights."""
+    (rendered / "none").mkdir(exist_ok=True)
+    (rendered / "none" / "truth.csv").write_bytes((rendered / "truth.csv").read_bytes())
+    return rendered
+
+
+def test_heights_of_a_result_are_those_of_the_run(rendered):
+    done = rollcli(
+        *("heights", "disparity", "--from", "rolls.csv", "--calib", "calib.txt"),
+        *("-o", "again", "--preview", "seen", "--heights-range", "-0.2:0.2"),
+        cwd=rendered,
+    )
+    assert done.status == 0, done.err
+    for name in ("frame_0001.tif", "frame_0002.tif"):
+        again, first = (tifffile.imread(rendered / part / name) for part in ("again", "out"))
+        near = np.abs(first) < 1
+        assert np.allclose(again[near], first[near], atol=1e-4)
+        assert (np.isnan(again) == np.isnan(first)).all()
+    assert sorted(contents(rendered / "seen")) == ["frame_0001.png", "frame_0002.png"]
+
+
+def test_rolled_copies_have_the_same_heights(tmp_path):
+    """A box on a plane, seen by rigs that are rolled about their optical axis."""
+    found = []
+    for roll in (-0.3, 0.0, 0.25):
+        v, u = np.mgrid[:200, :300].astype(float)
+        x, y = u - 149.5, v - 99.5
+        side, down = x * math.cos(roll) + y * math.sin(roll), y * math.cos(roll) - x * math.sin(roll)
+        d = np.maximum(0.4 * (down + 40), 0)
+        box = (np.abs(side) < 12) & (np.abs(down - 30) < 8)
+        d[box] *= 1.1
+        np.save(tmp_path / "a.npy", d.astype(np.float32))
+        rig = ("--focal", "300", "--principal-point", "149.5,99.5", "--baseline", "0.5")
+        folder = f"h{roll}"
+        done = rollcli("estimate", "a.npy", *rig, "--heights", folder, cwd=tmp_path)
+        assert done.status == 0, done.err
+        found.append(np.median(tifffile.imread(tmp_path / folder / "a.tif")[box]))
+    assert np.ptp(found) < 1e-4
+    height = 0.5 / 0.4 * math.cos(math.atan(40 / 300))
+    assert found[1] == pytest.approx(height * (1 - 1 / 1.1), abs=2e-4)
+
+
+def description(path):
+    return tifffile.TiffFile(path).pages[0].description
+
+
+def test_the_unit_stands_in_the_file_and_npy_is_written_if_asked_for(tmp_path):
+    write_kitti(tmp_path / "maps" / "day" / "a.png", road_map(0.1))
+    run = ("estimate", "maps", "--recursive", "-o")
+    assert rollcli(*run, "1.csv", "--heights", "h", "--heights-preview", "p", cwd=tmp_path).status == 0
+    assert description(tmp_path / "h" / "day" / "a.tif") == "height over the road, camera heights"
+    assert sorted(contents(tmp_path / "p")) == ["day/a.png"]
+    assert rollcli(*run, "2.csv", "--heights", "m", *RIG, cwd=tmp_path).status == 0
+    assert description(tmp_path / "m" / "day" / "a.tif") == "height over the road, metres"
+    assert rollcli(*run, "3.csv", "--heights", "n", "--save-as", "npy", cwd=tmp_path).status == 0
+    heights = np.load(tmp_path / "n" / "day" / "a.npy")
+    assert np.array_equal(heights, tifffile.imread(tmp_path / "h" / "day" / "a.tif"), equal_nan=True)
+    done = rollcli("heights", "maps/day", "--from", "2.csv", "-o", "again", cwd=tmp_path)
+    assert "was made with a calibration: give it with --calib" in done.err
+
+
+def test_pairs_have_heights_and_pictures_over_their_left_image(tmp_path):
+    write_pair(tmp_path, "a.png", road_map(0.05, width=320, height=160) / 2)
+    pair = ("--left", "left", "--right", "right", "--num-disparities", "48")
+    done = rollcli("estimate", *pair, "--heights", "h", "--heights-preview", "p", cwd=tmp_path)
+    assert done.status == 0, done.err
+    heights = tifffile.imread(tmp_path / "h" / "a.tif")
+    assert heights.shape == (160, 320)
+    assert abs(np.nanmedian(heights[100:])) < 0.01
+    assert sorted(contents(tmp_path / "p")) == ["a.png"]
+
+
+def test_a_failed_row_has_no_heights_and_resume_makes_what_is_missing(tmp_path):
+    write_maps(tmp_path / "maps", 2)
+    (tmp_path / "maps" / "frame9.png").write_bytes(b"no map")
+    run = ("estimate", "maps", "-o", "rolls.csv", "--heights", "h")
+    assert rollcli(*run, cwd=tmp_path).status == 3
+    before = contents(tmp_path / "h")
+    assert sorted(before) == ["frame0.tif", "frame1.tif"]
+    (tmp_path / "h" / "frame1.tif").unlink()
+    assert rollcli(*run, "--resume", cwd=tmp_path).status == 3
+    assert contents(tmp_path / "h") == before
+    done = rollcli("heights", "maps", "--from", "rolls.csv", "-o", "again", cwd=tmp_path)
+    assert done.status == 3
+    assert "frame9.png: has no angle in rolls.csv" in done.err
+    assert sorted(contents(tmp_path / "again")) == sorted(before)
+
+
+def with_statuses(folder, *statuses):
+    """Give the rows of a result these statuses."""
+    rows = (folder / "rolls.csv").read_text().splitlines()
+    for place, status in enumerate(statuses, 1):
+        rows[place] = rows[place].replace(",ok,", f",{status},")
+    (folder / "rolls.csv").write_text("\n".join(rows) + "\n")
+
+
+def test_suspect_angles_are_used_and_counted_or_left_out(tmp_path):
+    write_maps(tmp_path / "maps", 2)
+    assert rollcli("estimate", "maps", "-o", "rolls.csv", cwd=tmp_path).status == 0
+    with_statuses(tmp_path, "suspect", "ok")
+    run = ("heights", "maps", "--from", "rolls.csv", "-o")
+    done = rollcli(*run, "all", cwd=tmp_path)
+    assert (done.status, len(contents(tmp_path / "all"))) == (0, 2)
+    assert "1 of 2 angles is suspect and used" in done.err
+    done = rollcli(*run, "sure", "--skip-suspect", cwd=tmp_path)
+    assert (done.status, sorted(contents(tmp_path / "sure"))) == (0, ["frame1.tif"])
+
+
+def test_a_result_of_other_maps_is_refused_in_a_line(tmp_path):
+    write_maps(tmp_path / "maps", 2)
+    assert rollcli("estimate", "maps", "-o", "rolls.csv", cwd=tmp_path).status == 0
+    write_kitti(tmp_path / "maps" / "frame1.png", road_map(0.1, width=200, height=100))
+    done = rollcli("heights", "maps", "--from", "rolls.csv", "-o", "h", cwd=tmp_path)
+    assert done.status == 3
+    (line,) = (line for line in done.err.splitlines() if "frame1.png: " in line)
+    assert "has 200x100 px, its row in rolls.csv 160x120: name the result of these maps" in line
+    assert sorted(contents(tmp_path / "h")) == ["frame0.tif"]
+    write_maps(tmp_path / "other", 3)
+    done = rollcli("heights", "other", "--from", "rolls.csv", "-o", "o", cwd=tmp_path)
+    assert (done.status, done.err.count("\n")) == (2, 1)
+    assert "has no row for other/frame2.png" in done.err
+    assert not (tmp_path / "o").exists()
+
+
+@pytest.mark.parametrize("given", ["0.1", "0.1:-0.1", "0:0", "a:b", "-inf:1"])
+def test_a_range_of_colours_has_two_ends(tmp_path, given):
+    write_maps(tmp_path / "maps", 1)
+    done = rollcli("estimate", "maps", "--heights-preview", "p", "--heights-range", given, cwd=tmp_path)
+    assert done.status == 2
+    assert "is not A:B with A < B" in done.err

@@ -1,0 +1,88 @@
+"""Dips and bumps: what is rendered against a march along each ray, and the true heights against points in space."""
+
+import math
+
+import numpy as np
+import pytest
+
+from rollcli.errors import UsageError
+from rollcli.simulate.build import build_scene, carriageway_of
+from rollcli.simulate.dips import DippedGround, draw_dips
+from rollcli.simulate.render import render_frame, true_disparity
+from rollcli.simulate.spec import FrameSpec
+
+SMALL = {"size": (320, 120), "focal": 186.0, "pitch": 0.08}
+
+
+def spec_of(**values):
+    return FrameSpec(**{"scene": "bare", "dips": 4, "seed": 3, **SMALL, **values})
+
+
+@pytest.mark.parametrize(
+    "values", [{}, {"curvature": 0.003, "roll": 0.3}, {"cross_section": "crown", "crossfall": 0.03}]
+)
+def test_rays_meet_the_relief_where_a_march_in_small_steps_does(values):
+    spec = spec_of(**values)
+    scene = build_scene(spec)
+    (ground,) = (each for each in scene.surfaces if isinstance(each, DippedGround))
+    camera = spec.cameras(scene.normal)[0]
+    rng = np.random.default_rng(1)
+    met = 0
+    for dip in ground.dips:
+        x, z = rng.uniform(-1.1, 1.1, (2, 20))
+        lateral, ahead = dip.lateral + x * dip.across, dip.z + z * dip.along
+        targets = np.array([ground.course.point(a, b) for a, b in zip(lateral, ahead, strict=True)]).T
+        u, v, _ = camera.project(targets)
+        rays = camera.rays(u, v)
+        found = ground.intersect(rays.origin, rays.direction)
+        for i in range(20):
+            t = np.linspace(found[i] - 1.5, found[i] + 1.5, 30001)
+            points = rays.origin + t * rays.direction[:, i : i + 1]
+            side = ground.course.lateral(points)
+            sheet = ground.offset + (ground.slope + ground.camber / 2 * side) * side
+            relief = sum(each.relief(side, points[2])[0] for each in ground.dips)
+            below = points[1] - ground.course.curvature / 2 * points[2] ** 2 <= sheet + relief
+            assert t[below.argmax()] == pytest.approx(found[i], abs=2e-4)
+            met += abs(relief[below.argmax()]) > 0.01
+    assert met > 20
+
+
+def test_true_heights_are_distances_from_the_plain_road():
+    """Of a flat road under a rig: the distance of each pixel's point from the plane, by the pose alone."""
+    spec = spec_of(roll=0.2)
+    frame, (disparity, _) = render_frame(spec), true_disparity(spec)
+    depth = spec.focal * spec.baseline / disparity
+    v, u = np.indices(disparity.shape)
+    x, y = ((each - at) / spec.focal for each, at in ((u, spec.centre[0]), (v, spec.centre[1])))
+    normal = (-math.sin(0.2) * math.cos(0.08), math.cos(0.2) * math.cos(0.08), math.sin(0.08))
+    heights = spec.height - depth * (normal[0] * x + normal[1] * y + normal[2])
+    assert np.allclose(frame.heights[frame.road], heights[frame.road], atol=1e-5)
+    dips = draw_dips(spec, carriageway_of(spec))
+    assert len(dips) == 4
+    assert np.nanmin(frame.heights[frame.road]) == pytest.approx(min(dip.height for dip in dips), abs=1e-4)
+    assert {np.sign(dip.height) for dip in dips} == {-1, 1}
+    assert all(0.025 <= abs(dip.height) <= 0.07 for dip in dips)
+
+
+def test_kerbs_are_as_high_as_they_were_built_and_walls_have_no_height():
+    frame = render_frame(spec_of(scene="street", kerb=(0.1, 0.1), dips=0, roll=0.1))
+    pavement = frame.heights[np.isfinite(frame.heights) & ~frame.road]
+    assert len(pavement) > 500
+    assert np.allclose(pavement, 0.1, atol=1e-5)
+    assert np.allclose(frame.heights[frame.road], 0, atol=1e-5)
+    assert np.isnan(frame.heights[:20]).any()
+
+
+def test_dips_change_nothing_else():
+    plain, dipped = (render_frame(spec_of(dips=n)) for n in (None, 2))
+    assert plain.heights is None
+    level = np.abs(dipped.heights) < 1e-7
+    assert 0.5 < level[dipped.road].mean() < 1
+    same = plain.road & dipped.road & level
+    assert np.allclose(plain.disparity[same], dipped.disparity[same], atol=1e-4)
+    assert (plain.left[~plain.road & ~dipped.road] == dipped.left[~plain.road & ~dipped.road]).mean() > 0.98
+
+
+def test_too_many_dips_are_refused():
+    with pytest.raises(UsageError, match="13 dips are not within 0 and 12"):
+        spec_of(dips=13)
