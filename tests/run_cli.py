@@ -14,7 +14,10 @@ import numpy as np
 from tests.in_process import Finished, run_here
 
 ROOT = Path(__file__).resolve().parent.parent
-_WITH_WORKERS = ("estimate", "disparity", "derotate", "vdisparity", "simulate", "report", "evaluate_accuracy")
+_WITH_WORKERS = (
+    *("estimate", "disparity", "derotate", "vdisparity", "heights", "simulate", "report"),
+    "evaluate_accuracy",
+)
 _ONE_WORKER = {f"ROLLCLI_{name.upper()}_JOBS": "1" for name in _WITH_WORKERS}
 # processes compile the program once, not each of them anew
 _NOT_KEPT = ("ROLLCLI", "PYTHONDONTWRITEBYTECODE")

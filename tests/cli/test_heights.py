@@ -112,7 +112,8 @@ def test_rolled_copies_have_the_same_heights(tmp_path):
 
 
 def description(path):
-    return tifffile.TiffFile(path).pages[0].description
+    with tifffile.TiffFile(path) as file:
+        return file.pages[0].description
 
 
 def test_the_unit_stands_in_the_file_and_npy_is_written_if_asked_for(tmp_path):

@@ -1,4 +1,4 @@
-"""Dips and bumps: what is rendered against a march along each ray, and the true heights against points in space."""
+"""Dips and bumps against a march along each ray; true heights against points in space."""
 
 import math
 
@@ -29,29 +29,29 @@ def test_rays_meet_the_relief_where_a_march_in_small_steps_does(values):
     rng = np.random.default_rng(1)
     met = 0
     for dip in ground.dips:
-        x, z = rng.uniform(-1.1, 1.1, (2, 20))
+        x, z = rng.uniform(-1.1, 1.1, (2, 10))
         lateral, ahead = dip.lateral + x * dip.across, dip.z + z * dip.along
         targets = np.array([ground.course.point(a, b) for a, b in zip(lateral, ahead, strict=True)]).T
         u, v, _ = camera.project(targets)
         rays = camera.rays(u, v)
         found = ground.intersect(rays.origin, rays.direction)
-        for i in range(20):
-            t = np.linspace(found[i] - 1.5, found[i] + 1.5, 30001)
+        for i in range(10):
+            t = np.linspace(found[i] - 1.5, found[i] + 1.5, 6001)
             points = rays.origin + t * rays.direction[:, i : i + 1]
             side = ground.course.lateral(points)
             sheet = ground.offset + (ground.slope + ground.camber / 2 * side) * side
             relief = sum(each.relief(side, points[2])[0] for each in ground.dips)
             below = points[1] - ground.course.curvature / 2 * points[2] ** 2 <= sheet + relief
-            assert t[below.argmax()] == pytest.approx(found[i], abs=2e-4)
+            assert t[below.argmax()] == pytest.approx(found[i], abs=6e-4)
             met += abs(relief[below.argmax()]) > 0.01
-    assert met > 20
+    assert met > 10
 
 
 def test_true_heights_are_distances_from_the_plain_road():
     """Of a flat road under a rig: the distance of each pixel's point from the plane, by the pose alone."""
     spec = spec_of(roll=0.2)
     frame, (disparity, _) = render_frame(spec), true_disparity(spec)
-    depth = spec.focal * spec.baseline / disparity
+    depth = spec.focal * spec.baseline / np.where(disparity > 0, disparity, np.nan)
     v, u = np.indices(disparity.shape)
     x, y = ((each - at) / spec.focal for each, at in ((u, spec.centre[0]), (v, spec.centre[1])))
     normal = (-math.sin(0.2) * math.cos(0.08), math.cos(0.2) * math.cos(0.08), math.sin(0.08))
