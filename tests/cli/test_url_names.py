@@ -76,6 +76,12 @@ def test_a_url_that_names_no_file_is_that_frames_error_and_writes_nothing(tmp_pa
     assert written(tmp_path / "map") == ["frame0.png"]
 
 
+def test_a_url_that_is_no_address_is_that_frames_error(tmp_path):
+    done = rollcli("estimate", "http://[/a.png", "http://[::1]:x/b.png", cwd=tmp_path)
+    assert done.status == 3
+    assert "http://[/a.png: its URL names no file" in done.err
+
+
 @pytest.mark.parametrize("name", ["..%5Cevil.png", "a%00.png", "%2e%2e"])
 @pytest.mark.parametrize("command", [("vdisparity",), ("derotate", "--roll", "3"), ("evaluate", "paper")])
 def test_other_commands_refuse_such_a_url_too(tmp_path, server, name, command):

@@ -2,7 +2,8 @@
 
 Every file must be read or refused with one line: no other exception, no crash, no more than two seconds of
 processor and a gigabyte, and nothing on the terminal. Texts (results, records of runs, settings,
-calibrations, known angles, lists) are read by a command, which must end with a status that its help names.
+calibrations, known angles, lists) are read by a command, which must end with a status that its help names;
+URLs by what makes names of them, which must lead nowhere else.
 """
 
 import argparse

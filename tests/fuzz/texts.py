@@ -1,7 +1,9 @@
 """Whole texts that the program reads, each with the command that reads it."""
 
 import atexit
+import ntpath
 import os
+import posixpath
 import shutil
 import tempfile
 from collections.abc import Iterable
@@ -9,6 +11,16 @@ from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
+from rollcli.errors import UsageError
+from rollcli.files.stores.locations import (
+    base_name,
+    is_object_url,
+    is_url,
+    names_a_file,
+    public_name,
+    split_url,
+    store_of,
+)
 from tests.rig.calibration_files import KALIBR, WHOLE, Rig, zed
 from tests.run_cli import rollcli, write_maps
 
@@ -20,6 +32,7 @@ READ_BY = {
     "calibrations": ("estimate", MAPS, "--calib", "text", "--dry-run"),
     "truths": ("evaluate", "accuracy", RESULT, "--truth", "text"),
     "lists": ("estimate", "--files-from", "text", "--dry-run"),
+    "urls": (),  # by no command: one would ask the servers that they name
 }
 _SETTINGS = """\
 quiet = true
@@ -36,6 +49,16 @@ max-roll = 30.0
 timing = true
 [evaluate.accuracy]
 format = "json"
+"""
+_LIST = "".join(f"maps/frame{index}.png\n" for index in range(3))
+_URLS = """\
+http://user:secret@host:8080/drive%201/..%5Cframe.png?X-Amz-Signature=secret#part
+https://host/%2e%2e/a%00.png
+HTTP://host/
+s3://bucket/drive/2024.05.01/C:\\frame 1.png
+gs://bucket/../key
+az://keys@container/key
+ftp://host/frame.png
 """
 _TRUTH = """\
 file,roll_deg,pitch_deg,height_m,curvature_per_m
@@ -69,16 +92,45 @@ def _whole() -> dict[str, bytes]:
         "records/json": (folder / RECORD).read_bytes(),
         "settings/toml": _SETTINGS.encode(),
         "truths/csv": _TRUTH.encode(),
-        "lists/txt": b"".join(b"maps/frame%d.png\n" % index for index in range(3)),
+        "lists/txt": _LIST.encode(),
+        "lists/print0": _LIST.replace("\n", "\0").encode(),
+        "lists/utf-16": _LIST.replace("\n", "\r\n").encode("utf-16"),
+        "results/utf-16": rolls.decode().encode("utf-16"),
+        "settings/utf-16": _SETTINGS.encode("utf-16"),
+        "urls/txt": _URLS.encode(),
         "calibrations/unrectified-kalibr": KALIBR.encode(),
         "calibrations/unrectified-zed": zed(_RIG).encode(),
         **{f"calibrations/{form}": write(_RIG).encode() for form, write in WHOLE.items()},
     }
 
 
+def _read_urls(data: bytes) -> str:
+    """Take each line for a URL, and check what is made of it by the rules of both systems."""
+    answer = "read"
+    for line in data.decode("utf-8", "surrogateescape").splitlines():
+        if not is_url(line):
+            continue
+        public_name(line), store_of(line)
+        try:
+            name = base_name(line)
+            if is_object_url(line):
+                name = split_url(line)[1]
+        except UsageError:
+            answer = "refused"
+            continue
+        if names_a_file(name):
+            for system, folder in ((posixpath, "/out"), (ntpath, r"C:\out")):
+                place = system.normpath(f"{folder}{system.sep}{name}")
+                if not place.startswith(f"{folder}{system.sep}") or "\0" in place:
+                    raise ValueError(f"{line!r} leads to {place!r}")
+    return answer
+
+
 def read_text(data: bytes, name: str) -> str:
     """ "read" or "refused" by the command that reads such texts; anything else is raised."""
     reader = name.partition("/")[0]
+    if reader == "urls":
+        return _read_urls(data)
     folder = _workplace()
     given = {RESULT: _whole()["results/csv"], RECORD: _whole()["records/json"]}
     given[RECORD if reader == "records" else "text"] = data

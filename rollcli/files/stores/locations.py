@@ -113,9 +113,12 @@ def located(root: str, location: str) -> str:
 
 
 def base_name(location: str) -> str:
-    """Return the last part of a location's path."""
+    """Return the last part of a location's path; empty for a URL that is no address."""
     if is_url(location) and scheme_of(location) in WEB_SERVERS:
-        return posixpath.basename(unquote(urlsplit(location).path))
+        try:
+            return posixpath.basename(unquote(urlsplit(location).path))
+        except ValueError:
+            return ""
     return posixpath.basename(location)
 
 

@@ -55,8 +55,8 @@ def read_web_file(url: str, most: int = MOST_BYTES) -> bytes:
 
 def web_problem(url: str) -> str:
     """Say why a server refuses a file that it may have; empty where it does not refuse it."""
-    request = urllib.request.Request(url, headers={"Range": "bytes=0-0"})
     try:
+        request = urllib.request.Request(url, headers={"Range": "bytes=0-0"})
         _opened(request, time.monotonic() + request_seconds()).close()
     except urllib.error.HTTPError as error:
         if error.code in (400, 401, 403):  # Amazon answers 400 when temporary keys have expired
