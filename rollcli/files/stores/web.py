@@ -45,7 +45,8 @@ def read_web_file(url: str, most: int = MOST_BYTES) -> bytes:
         except urllib.error.HTTPError as error:
             reason, final = f"the server answered {error.code} {error.reason}", error.code < 500
         except (OSError, http.client.HTTPException, ValueError) as error:
-            reason, final = _reason(error, seconds), isinstance(error, ValueError)
+            reason = _reason(error, seconds)
+            final = isinstance(error, ValueError | http.client.InvalidURL)  # no address, whoever is asked
         pause = _FIRST_PAUSE_S * 4**attempt
         if final or time.monotonic() + pause > give_up:
             break
