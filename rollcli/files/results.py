@@ -6,8 +6,9 @@ import json
 import math
 import re
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, Literal, get_args, get_type_hints
 
@@ -256,9 +257,61 @@ def read_result(path: str | Path) -> Result:
         The file cannot be read, or is not a result of `rollcli estimate`; the line is named.
     """
     path = str(path)
+    rows = tuple(row for name, data in pieces_of(path) for row in parse_rows(data, name))
+    return Result(rows, read_run(path))
+
+
+def pieces_of(path: str) -> Iterator[tuple[str, bytes]]:
+    """Yield the name and the bytes of a result: one file, standard input ("-"), or its parts in order.
+
+    Raises
+    ------
+    InputError
+        It cannot be read, or is larger than any result.
+    """
     parts = () if path == STDIN else part_names(list_names(path))
-    pieces = read_parts(path, parts) if parts else [(path, _read(path))]
-    return Result(tuple(row for name, data in pieces for row in parse_rows(data, name)), read_run(path))
+    if parts:
+        yield from read_parts(path, parts)
+    else:
+        yield path, _read(path)
+
+
+def cells_of(data: bytes, name: str, wanted: Sequence[str]) -> tuple[list[str], Iterator[tuple[Any, ...]]]:
+    """Parse the bytes of a result, which errors call `name`.
+
+    Parameters
+    ----------
+    data : bytes
+        CSV, JSON Lines or Parquet, which the first bytes tell.
+    name : str
+    wanted : sequence of str
+        Columns; those that are not there are left out.
+
+    Returns
+    -------
+    list of str, iterator of tuple
+        The columns that are there; and for each row where it stands ("line 7"), and their cells.
+
+    Raises
+    ------
+    InputError
+        They are no result; the line is named.
+    """
+    if data.startswith(MAGIC):
+        table = decode_parquet(data, name)
+        return list(wanted), ((f"row {number}", *map(values.get, wanted)) for number, values in table)
+    data = as_utf8(data, name)
+    # decoded piece by piece: as one text, a million rows would take a gigabyte more
+    stream = io.BytesIO(data)
+    if data[:_MOST_SPACE].lstrip().startswith(b"{"):
+        texts = (line.removesuffix(b"\n").decode(**TEXT) for line in stream)
+        rows = json_rows(texts, name)
+        return list(wanted), ((f"line {number}", *map(values.get, wanted)) for number, values in rows)
+    lines = csv_rows(io.TextIOWrapper(stream, TEXT["encoding"], TEXT["errors"], newline=""), name)
+    _, header = next(lines)
+    there = [column for column in wanted if column in header]
+    pick = itemgetter(*map(header.index, there))
+    return there, ((f"line {number}", *pick(line)) for number, line in lines)
 
 
 def parse_rows(data: bytes, name: str | Path) -> Iterator[Row]:
@@ -269,21 +322,12 @@ def parse_rows(data: bytes, name: str | Path) -> Iterator[Row]:
     InputError
         They are no result; the line is named.
     """
-    if data.startswith(MAGIC):
-        table = decode_parquet(data, str(name))
-        yield from (_row(values, f"{name}: row {number}") for number, values in table)
-        return
-    data = as_utf8(data, str(name))
-    # decoded piece by piece: as one text, a million rows would take a gigabyte more
-    stream = io.BytesIO(data)
-    if data[:_MOST_SPACE].lstrip().startswith(b"{"):
-        texts = (line.removesuffix(b"\n").decode(**TEXT) for line in stream)
-        yield from (_row(values, f"{name}: line {number}") for number, values in json_rows(texts, name))
-        return
-    lines = csv_rows(io.TextIOWrapper(stream, TEXT["encoding"], TEXT["errors"], newline=""), name)
-    _, header = next(lines)
-    for number, line in lines:
-        yield _row(dict(zip(header, line, strict=True)), f"{name}: line {number}")
+    names, rows = cells_of(data, str(name), [field.name for field in fields(Row)])
+    absent = {field.name: None for field in fields(Row)}
+    for where, *cells in rows:
+        values = absent | dict(zip(names, cells, strict=True))
+        place = f"{name}: {where}"
+        yield Row(**{column: value_of(column, value, place) for column, value in values.items()})
 
 
 def run_path(path: str | Path) -> str:
@@ -315,10 +359,6 @@ def _read(path: str | Path) -> bytes:
         return read_stream(sys.stdin.buffer, STDIN) if str(path) == STDIN else read_given(path)
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from error
-
-
-def _row(values: Mapping[str, Any], where: str) -> Row:
-    return Row(**{field.name: value_of(field.name, values.get(field.name), where) for field in fields(Row)})
 
 
 _FLAGS = {"converged", "global_minimum"}
@@ -356,8 +396,12 @@ def value_of(name: str, value: Any, where: str) -> Any:
     if value is None or value == "":
         return None
     try:
+        if isinstance(value, bool) is not (name in _FLAGS) and not isinstance(value, str):
+            raise ValueError(value)  # a flag is no number
         if name in _FLAGS:
             return {"true": True, "false": False}[str(value).lower()]
+        if "_" in str(value):
+            raise ValueError(value)  # Python's notation
         return int(value) if name in _COUNTS else _within(float(value), *BOUNDS.get(name, _ANY))
     except (KeyError, ValueError, TypeError, OverflowError) as error:
         raise InputError(f"{where}: {value!r:.80} is no value for {name}") from error
