@@ -32,7 +32,6 @@ from rollcli.run.options import HeightsOptions
 @input_options
 @option(
     "--from",
-    "result",
     type=PATH,
     metavar="RESULT",
     required=True,
@@ -76,6 +75,6 @@ def heights(ctx: click.Context, /, **options: Any) -> None:
     from rollcli.run.heights import run_heights
     from rollcli.run.unused import idle_in_heights, repeated_inputs
 
-    given = HeightsOptions(**options)
+    given = HeightsOptions(result=options.pop("from"), **options)
     tell_idle(ctx, idle_in_heights(given), repeated_inputs(given.inputs), quiet=given.running.quiet)
     ctx.exit(run_heights(given))

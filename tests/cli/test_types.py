@@ -33,6 +33,7 @@ BOUNDED = {
     "--num-disparities": ("1 16 auto", "0 1.5 Auto"),
     "--bins": ("1 65535", "0 65536"),  # what a TIFF of 16 bits is wide
     "--seed": WHOLE,
+    "--dips": ("0 12", "-1 13 0.5"),
     "--speckle-size": WHOLE,
     "--speckle-range": WHOLE,
     "--gallery": WHOLE,
