@@ -1,8 +1,9 @@
 """What rows that were measured say of the columns, and disparities that are put right by it.
 
 Views are warped by all that their rows show, for the match needs rows that agree. A scale of the rows is in
-the columns only as far as it is supported, and the rest of it is taken out of the disparities again; a yaw and
-a pitch move columns by the squares of what they move rows by.
+the columns only as far as it is supported, and the rest of it is taken out of the disparities again. A yaw
+moves the columns by t x^2 where it moves the rows by t x y, and a pitch by q x y where it moves the rows by
+q y^2.
 """
 
 import numpy as np

@@ -44,20 +44,20 @@ class BeliefTuning:
     yaw : float
         Standard deviation, radians.
     lens_twist : float
-        How much more than its other shapes the lens model leaves as a twist: on KITTI's grey cameras ten times
-        (1.4 px in the corners, which lidar does not see in the columns: a yaw would move them by 4.4 px).
+        How much more than its other shapes the lens model leaves as a twist: on KITTI's grey cameras ten
+        times (1.4 px in the corners, of which lidar sees nothing in the columns: a yaw would move them by 4.4).
     least : float
         What no pair tells of a scale: blocks between which it lies share a part of their error.
     tiles : float
-        Standard errors from tiles are that much too small: of consecutive streets scales differ by twice them.
+        Standard errors from tiles are that much too small: scales of consecutive streets differ by twice them.
     """
 
     scale: float = 0.004
     tilt: float = 0.005
     bend: float = 0.002
     has_scale: float = 0.5
-    has_tilt: float = 0.1
-    has_bend: float = 0.1
+    has_tilt: float = 0.03
+    has_bend: float = 0.03
     pitch: float = 0.6
     focal: tuple[float, ...] = (0.5, 0.6, 0.75, 1.0, 1.5)
     yaw: float = 0.0035
@@ -71,7 +71,7 @@ BELIEF = BeliefTuning()
 
 @dataclass(frozen=True)
 class ColumnSupport:
-    """What is believed of how the columns lie: a point at (x, y) lies ``x (scale + twist x + pitch y)`` further.
+    """What is believed of how the columns lie: a point (x, y) lies ``x (scale + twist x + pitch y)`` further.
 
     Attributes
     ----------
@@ -183,7 +183,8 @@ def column_support(
     )
     x, y, near = frame.half_width, frame.half_height, frame.near
     beyond = np.square(whole.values[7:]) - variance * np.diag(whole.inverse)[7:]
-    lens = max(0.0, float(beyond.mean())) + (BELIEF.least * y) ** 2
+    uneven = max(0.0, float(beyond.mean()))
+    lens = uneven + (BELIEF.least * y) ** 2
     units = np.array([1, x, y, x * y, near, y * y, y])[:, None]
     by_units = design[:7] * units
     told, other = np.array([2, 4, 6, 5]), np.array([0, 1, 3])
@@ -198,7 +199,7 @@ def column_support(
         fit.values[0] / np.square(np.array(BELIEF.focal) * width),
     )
     yaw = (BELIEF.yaw / (0.7 * width)) ** 2
-    doubt = (BELIEF.lens_twist**2 * lens + variance * fit.inverse[3, 3]) / (x * y) ** 2
+    doubt = (BELIEF.lens_twist**2 * uneven + variance * fit.inverse[3, 3]) / (x * y) ** 2
     twist = fit.values[3] / (x * y) * yaw / (yaw + doubt)
     twist_error = np.sqrt(yaw * doubt / (yaw + doubt))
     parts = scale[1], 2 * twist_error * width * _ROAD_ACROSS, pitch[1] * height * _ROAD_DOWN

@@ -94,12 +94,12 @@ def test_a_pair_that_was_not_levelled_has_no_error_of_levelling(frame):
     assert match_pair(frame.left, lower, StereoOptions()).slope_error > 0
 
 
-def test_rows_that_a_lens_has_skewed_are_straightened(frame):
+def test_a_yaw_is_taken_out_of_rows_and_columns(frame):
     height, width = frame.right.shape
     columns, rows = np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32))
     x, y = columns - (width - 1) / 2, rows - (height - 1) / 2
-    skew = 1.4 / (width * height / 4)  # 1.4 px in the corners, as on KITTI
-    right = cv2.remap(frame.right, columns, rows - np.float32(skew) * x * y, cv2.INTER_LANCZOS4)
+    skew = np.float32(1.4 / (width * height / 4))  # 1.4 px in the corners: 0.4 degrees
+    right = cv2.remap(frame.right, columns - skew * x * x, rows - skew * x * y, cv2.INTER_LANCZOS4)
 
     match = match_pair(frame.left, right, StereoOptions())
 

@@ -51,7 +51,7 @@ def test_each_pixel_comes_from_where_the_definition_says(lies):
     v, u = np.mgrid[:height, :width]
     x, y = u - (width - 1) / 2, v - (height - 1) / 2
     from_v = v + lies.offset + lies.rotation * x + lies.scale * y + lies.twist * x * y
-    from_u = u + lies.stretch * x - lies.rotation * y
+    from_u = u + lies.scale * x - lies.rotation * y
 
     rows, columns = level(v.astype(np.uint8), lies), level(u.astype(np.uint8), lies)
 

@@ -26,7 +26,7 @@ def warped(view, lies, disparity=0.0):
     x, y = u - (width - 1) / 2, v - (height - 1) / 2
     at_x, at_y = x, y
     for _ in range(20):  # the fixed point: (at_x, at_y) of the level view lies at (x, y) of this one
-        at_x = x - lies.stretch * at_x + lies.rotation * at_y
+        at_x = x - lies.scale * at_x + lies.rotation * at_y
         at_y = y - lies.offset - lies.rotation * at_x - lies.scale * at_y - lies.twist * at_x * at_y
     at_u, at_v = at_x + (width - 1) / 2 + disparity, at_y + (height - 1) / 2
     return cv2.remap(
@@ -89,8 +89,8 @@ def test_one_round_goes_no_further_than_may_be_believed():
 
 def test_a_measurement_that_has_settled_takes_no_further_round(monkeypatch):
     left, rounds = texture_of(), []
-    fit = vertical._fit
-    monkeypatch.setattr(vertical, "_fit", lambda seen: rounds.append(fit(seen)) or rounds[-1])
+    fit = vertical.fit_rows
+    monkeypatch.setattr(vertical, "fit_rows", lambda seen: rounds.append(fit(seen)) or rounds[-1])
 
     measure_misalignment(Texture.of((left, warped(left, Misalignment(0.6), 10))), wall(), rounds=9)
 
@@ -262,56 +262,6 @@ def test_no_block_that_could_tell_is_left_out_before_it_is_looked_at(pixels, var
     down.flat[:pixels] += wave * math.sqrt(variance) / wave.std() - wave.mean()
     assert down.flat[:pixels].var() == pytest.approx(variance, rel=1e-4)
     assert vertical._may_tell(down).item() == tells
-
-
-def seen_at(lies, noise=0.0, count=400, seed=0):
-    rng = np.random.default_rng(seed)
-    x, y = rng.uniform(-150, 150, count), rng.uniform(-80, 80, count)
-    shift = lies.offset + lies.rotation * x + lies.scale * y + lies.twist * x * y
-    shift += rng.normal(0, 1, count) * noise
-    parts = x, y, shift, rng.uniform(2, 50, count)
-    return vertical._Seen(*(part.astype(np.float32) for part in parts))
-
-
-def test_a_fit_without_noise_is_exact_and_outliers_do_not_move_it():
-    lies = Misalignment(0.5, -0.004, 0.006, 5e-5)
-    seen = seen_at(lies)
-    exact, _, spread = vertical._fit(seen)
-    assert exact.shifts(160, 300) == pytest.approx(lies.shifts(160, 300), abs=1e-4)
-    assert spread == pytest.approx(0.001, abs=2e-4)
-    seen.shift[::6] += 5
-    robust, _, _ = vertical._fit(seen)
-    assert robust.shifts(160, 300) == pytest.approx(lies.shifts(160, 300), abs=1e-2)
-
-
-def test_the_errors_of_a_fit_are_whites_for_weighted_least_squares():
-    seen = seen_at(Misalignment(0.5, -0.004, 0.006, 5e-5), noise=0.2)
-    found, errors, spread = vertical._fit(seen)
-
-    x, y = seen.x.astype(float), seen.y.astype(float)
-    columns = np.stack([np.ones_like(x), x, y, x * y], axis=1)
-    off = seen.shift - columns @ [found.offset, found.rotation, found.scale, found.twist]
-    weight = seen.weight / (1 + (off / (1.5 * spread)) ** 2) ** 2
-    inverse = np.linalg.inv(columns.T @ (columns * weight[:, None]))
-    middle = columns.T @ (columns * ((weight * off) ** 2)[:, None])
-    expected = np.sqrt(np.diag(inverse @ middle @ inverse))
-    np.testing.assert_allclose(
-        [errors.offset, errors.rotation, errors.scale, errors.twist], expected, rtol=0.01
-    )
-    assert spread == pytest.approx(0.2, rel=0.1)
-    best = inverse @ (columns.T @ (weight * seen.shift))
-    assert found.shifts(160, 300) == pytest.approx(Misalignment(*best).shifts(160, 300), abs=5e-3)
-
-
-@pytest.mark.parametrize("count", [1, 2, 3, 4, 7, 10])
-def test_the_median_is_numpys(count):
-    values = np.random.default_rng(count).normal(size=count)
-    assert vertical._median(values) == pytest.approx(np.median(values))
-
-
-def test_far_blocks_count_a_quarter_and_less():
-    off = np.array([0, 1.5, -1.5, 15]) * 0.4
-    np.testing.assert_allclose(vertical._believed(off, 0.4), [1, 0.25, 0.25, 1 / 101**2])
 
 
 def test_a_measurement_of_larger_views_is_as_much_larger():
