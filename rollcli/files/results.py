@@ -132,6 +132,7 @@ class Row:
     right_clockwise_deg: float | None = None
     right_larger_percent: float | None = None
     right_twist_px: float | None = None
+    image_roll_deg: float | None = None
     message: str = ""
     elapsed_ms: float | None = None
 
@@ -170,8 +171,12 @@ _DIGITS = {
     "right_clockwise_deg": ".4f",
     "right_larger_percent": ".4f",
     "right_twist_px": ".4f",
+    "image_roll_deg": ".6f",
     "elapsed_ms": ".3f",
 }
+
+
+_ROLLS = ("roll_deg", "image_roll_deg")
 
 
 @dataclass(frozen=True)
@@ -227,7 +232,7 @@ def _text(name: str, value: Any) -> str:
     if name in _DIGITS and float(text) == 0:
         return text.lstrip("-")
     # rounding must not leave the half-open range (-90, 90]
-    return "90.000000" if name == "roll_deg" and text == "-90.000000" else text
+    return "90.000000" if name in _ROLLS and text == "-90.000000" else text
 
 
 def _plain(name: str, value: Any) -> Any:
@@ -367,6 +372,7 @@ _COUNTS = {"iterations", "width", "height"}
 _ANY = (-math.inf, math.inf)
 BOUNDS = {
     "roll_deg": (-90.0, 90.0),
+    "image_roll_deg": (-90.0, 90.0),
     "roll_ci95_deg": (0.0, math.inf),
     "pitch_deg": (-90.0, 90.0),
     "height_m": (0.0, math.inf),

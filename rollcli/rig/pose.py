@@ -127,9 +127,11 @@ def with_pose(estimate: RollEstimate, calibration: Calibration) -> RollEstimate:
         return replace(estimate, message=_joined(estimate.message, behind))
     pose = pose_of(tangent, calibration)
     pitch_ci95, height_ci95 = _half_widths(tangent, calibration)
+    turns = float(pose_jacobian(tangent, calibration)[0, 2])  # 1 where fx = fy
     return replace(
         estimate,
         theta=pose.roll,
+        ci95=None if estimate.ci95 is None else estimate.ci95 * turns,
         pitch=pose.pitch,
         pitch_ci95=pitch_ci95,
         height_m=pose.height,

@@ -111,6 +111,7 @@ def _row(frame: Frame, source: Source, estimate: RollEstimate, note: str, likene
         width=estimate.width,
         height=estimate.height,
         **source.alignment,
+        image_roll_deg=math.degrees(estimate.tangent.theta),
         message="; ".join(reasons),
     )
 

@@ -133,7 +133,7 @@ class StereoMatch:
     corrected : Misalignment
         What the right view was levelled by, pixels of the size matched at; `LEVEL` if it was left as it is.
     measured : Measured or None
-        How the right view lies, with the standard error of each part, pixels of the size matched at; None where
+        How the right view lies, with the standard error of each part, px of the size matched at; None where
         that was not asked, or could not be told.
     slope_error : float
         Standard deviation of the slope along the rows that levelling left in the disparities, px per px; 0 if
@@ -296,7 +296,7 @@ def _match_levelled(
     look: FirstLook,
     any_scene: bool,
 ) -> tuple[Map, Misalignment, Measured | None, str]:
-    """Match once the views are level; the map, what was corrected, what was measured, and why it may be wrong."""
+    """Match once the views are level; the map, what was corrected and measured, and why it may be wrong."""
     looked_at = _worth_correcting(look.measured, small.shape)
     wanted, approach = looked_at, Approach(small.shape)
     for matched in range(_MATCHES):

@@ -45,11 +45,11 @@ class BeliefTuning:
         Standard deviation, radians.
     lens_twist : float
         How much more than its other shapes the lens model leaves as a twist: on KITTI's grey cameras ten
-        times (1.4 px in the corners, of which lidar sees nothing in the columns: a yaw would move them by 4.4).
+        times (1.4 px in the corners, and lidar sees nothing of it in the columns: a yaw moves them by 4.4).
     least : float
         What no pair tells of a scale: blocks between which it lies share a part of their error.
     tiles : float
-        Standard errors from tiles are that much too small: scales of consecutive streets differ by twice them.
+        Standard errors from tiles are too small by this: scales of consecutive streets differ by twice them.
     """
 
     scale: float = 0.004
@@ -159,7 +159,7 @@ def column_support(
     """Tell what of a scale, a twist and an offset is believed to be in the columns, too.
 
     Every choice of scale, tilt, bend and pitch explains the blocks, with what is known of rigs; the answer is
-    the mean over them, each as likely as it explains what was seen. Whatever else curves the field (four shapes
+    the mean over them, each as likely as it explains what was seen. What else curves the field (four shapes
     of second and third degree) tells how evenly the lens has left the rest.
 
     Parameters

@@ -54,6 +54,7 @@ def test_a_row_of_csv_has_fixed_digits_and_rfc_4180_quotes():
         b"maps/a.png,,suspect,-1.250000,0.012346,2.500000,0.032346,1.651235,0.004000,-0.012346,"
         b"gd,4,true,false,0.123457,-45.0018767,0.300002217,"
         b'-3.83765039e-09,0.597333,0.500000,1242,375,-0.5124,0.1500,0.3000,0.0000,"one, ""two"""\n'
+        b'-3.83765039e-09,0.597333,0.500000,1242,375,,"one, ""two"""\n'
     )
 
 
@@ -225,6 +226,7 @@ def test_columns_have_the_types_of_their_values():
         **dict.fromkeys(("rmse_px", "alpha0", "alpha1", "alpha2", "valid_fraction", "road_fraction"), float),
         **dict.fromkeys(("width", "height"), int),
         **dict.fromkeys(ALIGNMENT_COLUMNS, float),
+        "image_roll_deg": float,
         "message": str,
         "elapsed_ms": float,
     }

@@ -107,6 +107,21 @@ def test_pixels_that_are_not_square_correct_the_roll():
     assert with_pose(estimate, calibration).theta == pytest.approx(roll, abs=1e-6)
 
 
+def test_the_interval_of_the_roll_is_turned_as_the_roll_is():
+    """The image's angle moved by a little, both ways: the rig's moves by as much more as its interval is."""
+    calibration = Calibration(300.0, 150.0, 170.0, 80.0, 0.5)
+    disparity = cast(calibration, math.radians(10), 0.4, 1.6)
+    noise = np.random.default_rng(2).normal(0, 0.3, disparity.shape)
+    estimate = estimate_roll(np.where(disparity > 0, disparity + noise, 0))
+    step = 1e-4
+    rolls = [math.atan(2 * math.tan(estimate.theta + each)) for each in (-step, step)]
+    ratio = (rolls[1] - rolls[0]) / (2 * step)
+    posed = with_pose(estimate, calibration)
+    assert abs(ratio - 1) > 0.3
+    assert posed.ci95 == pytest.approx(ratio * estimate.ci95, rel=1e-3)
+    assert posed.tangent.theta == estimate.theta
+
+
 def test_a_map_at_half_the_size_gives_the_same_pose():
     calibration = Calibration(250.0, 250.0, 170.3, 80.7, 0.5, 2.0, WIDTH, HEIGHT)
     half = calibration.for_size(WIDTH // 2, HEIGHT // 2)

@@ -1,5 +1,6 @@
 """`rollcli derotate`: maps keep what they are, and every map gets its own angle."""
 
+import csv
 import math
 import shutil
 import signal
@@ -343,3 +344,23 @@ def test_a_cityscapes_map_is_turned_with_its_ones_left_out(tmp_path):
     assert (run.status, "no effect" in run.err) == (0, False)
     turned = read_stored(tmp_path / "up" / "a.png").values
     assert set(np.unique(turned)) == {0, 256 * 20 + 1}  # nothing between a road and what is not known
+
+
+def test_a_map_whose_pixels_are_not_square_is_turned_by_the_images_angle(tmp_path):
+    roll = math.radians(4)
+    disparity = road_map(roll)
+    (tmp_path / "maps").mkdir()
+    np.save(tmp_path / "maps" / "one.npy", disparity)
+    camera = "P{}: 200 0 79.5 {} 0 100 59.5 0 0 0 1 0\n"
+    (tmp_path / "calib.txt").write_text(camera.format(0, 0) + camera.format(1, -100))
+    done = rollcli("estimate", "maps", "--calib", "calib.txt", "-o", "rolls.csv", cwd=tmp_path)
+    assert done.status == 0
+    row = next(csv.DictReader((tmp_path / "rolls.csv").read_text().splitlines()))
+    assert float(row["image_roll_deg"]) == pytest.approx(4, abs=0.02)
+    rig_deg = math.degrees(math.atan(2 * math.tan(roll)))
+    assert float(row["roll_deg"]) == pytest.approx(rig_deg, abs=0.05)
+
+    assert rollcli("derotate", "maps", "--from", "rolls.csv", "-o", "out", cwd=tmp_path).status == 0
+
+    left = estimate_roll(np.load(tmp_path / "out" / "one.npy"))
+    assert math.degrees(left.theta) == pytest.approx(0, abs=0.05)
