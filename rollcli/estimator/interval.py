@@ -62,7 +62,7 @@ class Jackknife:
             _student(freedom) * math.sqrt(float(thetas.dot(thetas)))
             for thetas, freedom in zip(turned, self.freedom, strict=True)
         )
-        return bands, columns, _NORMAL * math.sqrt(self.white[_THETA, _THETA])
+        return bands, columns, _NORMAL * math.sqrt(max(0.0, self.white[_THETA, _THETA]))
 
 
 @dataclass(frozen=True)

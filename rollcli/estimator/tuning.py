@@ -15,7 +15,7 @@ class SampleTuning:
 
     pixels: int = 12000
     """Pixels aimed at. With 9,000 rotations of real maps are followed worse, more only take longer."""
-    coarse_pixels: int = 2000
+    coarse_pixels: int = 1600
     """Pixels of these that planes are drawn through, fitted to and judged by."""
     noise_share: float = 0.012
     """Share of the median disparity that matching gets wrong on real roads, whatever the scale."""
@@ -29,29 +29,22 @@ class SampleTuning:
 class SearchTuning:
     """Numbers of `find_road`: which planes are tried, and what makes a plane a road."""
 
-    draws: int = 320
+    draws: int = 256
     """Triples drawn; about half are planes that could be a road."""
     radius: float = 0.35
     """Of a triple, units. Smaller: planes are noise; larger: triples leave the road."""
-    least_rise: float = 4.0
-    """Tolerances by which a road rises within the radius: less is the noise of a wall, or of a car ahead."""
-    first_pixels: int = 320
+    first_pixels: int = 240
     """Pixels on which all planes are judged."""
-    refined: int = 5
+    refined: int = 4
     """Planes that go on, each the best of its roll: they are fitted, and judged on more pixels."""
-    rival_angle: float = math.radians(2)
-    """Radians by which rolls differ that are not the same."""
     corridor: float = 1.0
-    """Half-width of the corridor ahead, camera heights."""
+    """Half-width of the corridor ahead, and of the lane in it, camera heights."""
     off_slope_weight: float = 0.2
     """Weight of a pixel around which the map does not rise as the road does."""
     slope_share: float = 0.4
     """Of the road's own slope: how far the map's may be off."""
     horizon: float = 2.0
     """Units from the centre: a plane whose horizon is farther away is rather a wall, or an own bonnet."""
-    least_corridor: float = 0.025
-    """Share of the pixels that the corridor should weigh: an emptier one scores less, and depth maps are told
-    as such."""
 
 
 @dataclass(frozen=True)
@@ -66,19 +59,11 @@ class FitTuning:
     """Tolerances within which a pixel counts at first."""
     width: float = 3.75
     """Of the pixels' root mean square distance: within which they count in the end."""
-    least_width: float = 0.2
-    """Tolerances within which a pixel counts in any case; at least one step of a map of whole pixels."""
-    lane: float = 1.0
-    """Half-width of the lane ahead, camera heights; it ends as exp(-(side / lane)^4)."""
     other_roll: float = 0.10
     """Radians: what a rig rolled by this much more or less would not see does not count."""
     camber: float = 0.003
     """How much camber a road has, as the standard deviation of a prior, 1/(camera height). With 0.002 the
     errors on crowned roads are a quarter larger (95 %)."""
-    independent_pixels: int = 120
-    """Pixels that could be independent: neighbouring ones repeat each other, more do not tell more."""
-    bin_width: float = 0.25
-    """Camera heights, of the profile's bins."""
     off_level: float = 0.01
     """Camera heights over or under the lane at which the weight is halved: on gentle verges and the far side
     of a crown there is no step."""

@@ -1,6 +1,6 @@
 """What each tuned number of the estimator does: change one at a time, and look at error and coverage.
 
-    python tests/benchmarks/bench_ablation.py [FRAMES] [--only NAME] [--off] [--markdown]
+    python tests/benchmarks/bench_ablation.py [FRAMES] [--only NAME] [--off] [--together A,B] [--markdown]
 
 Render FRAMES stereo pairs (40 by default), half with rolls within +-10 degrees, half within +-35, and match
 each once by SGBM. Make two worse maps of each: noise on two thirds of the pixels, disparities rounded to four
@@ -8,7 +8,8 @@ pixels, one pixel in 50 left, an own bonnet, a truck ahead, or a wall over nearl
 without a road: upside down, a depth map, a wall, or patches of sky. Where real maps with known rolls lie in
 ../shared/realmaps, take every third of them too. Then estimate all maps with each number of `Tuning` times
 0.67, times 1.5, and switched off where that means something; with --off, only switched off, which many
-frames can then be had for.
+frames can then be had for; with --together, some numbers switched off at once, which shows substitutes.
+Every second rendered map is also turned by 5 degrees, nearest pixel: what is "turned" has a known roll, too.
 
 Columns: 95 % and worst error of the rendered maps, degrees; gross errors (above 0.5 degrees, or no angle) of
 rendered + degraded + real maps; wrong angles that are called ok, of rendered + degraded + real + roadless;
@@ -25,7 +26,7 @@ import pickle
 import tempfile
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import fields, replace
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -34,6 +35,7 @@ from rollcli.run.workers.pool import limit_blas_threads
 
 limit_blas_threads()
 
+import cv2
 import numpy as np
 from matched import matched
 from numpy.typing import NDArray
@@ -47,21 +49,10 @@ REAL = Path(__file__).parents[3] / "shared" / "realmaps"
 SEEDS = {81: 10, 82: 35}  # seed, and the largest roll, degrees
 OFF = {
     "sample.uneven_share": 0.0,
-    "sample.quantum_share": 0.0,
-    "sample.coherent_from": 0.0,
-    "score.below_penalty": 0.0,
-    "score.off_slope_weight": 1.0,
-    "score.beside_weight": 1.0,
-    "score.nearness": 1e-6,
-    "score.horizon": 1e6,
-    "score.least_corridor": 0.0,
-    "score.least_core": 0.0,
-    "search.of_each_roll": 10**6,
-    "fit.other_roll": -1e6,
-    "fit.large_roll": 1e6,
-    "profile.off_level": 1e6,
-    "profile.width": 1e6,
-    "surface.steady": 1e6,
+    "search.off_slope_weight": 1.0,
+    "search.horizon": 1e6,
+    "fit.other_roll": 1e-6,
+    "fit.off_level": 1e6,
     "interval.white": 0.0,
     "interval.slant": 0.0,
     "doubts.near_minimum": 0.0,
@@ -73,6 +64,7 @@ OFF = {
     "doubts.noise_share": 1e6,
 }
 WORSE = ("noise", "rounded", "sparse", "bonnet", "truck", "wall")
+TURN_DEG = 5.0
 ROADLESS = ("upside down", "depth", "wall", "sky")
 NAN = math.nan
 Map = NDArray[np.float32]
@@ -105,24 +97,20 @@ class Outcomes(NamedTuple):
     ok: NDArray[np.bool_]
 
 
-def numbers(record: Any, path: str = "") -> Iterator[tuple[str, float]]:
-    """Yield the path and the value of every number in a record of records."""
-    for field in fields(record):
-        value, name = getattr(record, field.name), f"{path}{field.name}"
-        if is_dataclass(value):
-            yield from numbers(value, "" if name == "road" else f"{name}.")
-        elif isinstance(value, int | float) and not isinstance(value, bool):
-            yield name, value
+def numbers(tuning: Tuning) -> Iterator[tuple[str, float]]:
+    """Yield the path and the value of every number of a tuning."""
+    for group in fields(tuning):
+        record = getattr(tuning, group.name)
+        for field in fields(record):
+            yield f"{group.name}.{field.name}", getattr(record, field.name)
 
 
-def changed(tuning: Tuning, change: Change) -> Tuning:
-    """Return a tuning with one number changed."""
-    group, name = change.name.split(".")
-    if hasattr(tuning, group):
-        record = replace(getattr(tuning, group), **{name: change.value})
-        return replace(tuning, **{group: record})
-    record = replace(getattr(tuning.road, group), **{name: change.value})
-    return replace(tuning, road=replace(tuning.road, **{group: record}))
+def changed(tuning: Tuning, changes: "tuple[Change, ...]") -> Tuning:
+    """Return a tuning with some numbers changed."""
+    for change in changes:
+        group, name = change.name.split(".")
+        tuning = replace(tuning, **{group: replace(getattr(tuning, group), **{name: change.value})})
+    return tuning
 
 
 def changes(only: str, factors: tuple[float, ...]) -> list[Change]:
@@ -166,6 +154,13 @@ def degraded(disparity: Map, kind: str, rng: np.random.Generator) -> Map:
     return truck
 
 
+def turned(disparity: Map) -> Map:
+    """Return the map as a rig sees it that is rolled by `TURN_DEG` more, 0 outside."""
+    height, width = disparity.shape
+    turn = cv2.getRotationMatrix2D(((width - 1) / 2, (height - 1) / 2), -TURN_DEG, 1)
+    return np.asarray(cv2.warpAffine(disparity, turn, (width, height), flags=cv2.INTER_NEAREST), np.float32)
+
+
 def without_road(disparity: Map, kind: str, rng: np.random.Generator) -> Map:
     """Return a map without a road, in one of `ROADLESS` ways."""
     if kind == "upside down":
@@ -188,6 +183,8 @@ def cases(frames: int, every: int) -> list[Case]:
         for index, frame in enumerate(matched(frames // 2, seed, span)):
             disparity, roll = frame.disparity, frame.roll_deg
             found.append(Case(disparity, roll, roll, "rendered"))
+            if index % 2 == 0:
+                found.append(Case(turned(disparity), roll + TURN_DEG, roll + TURN_DEG, "degraded"))
             for way in (WORSE[index % 6], WORSE[(index + 1 + index // 6) % 6]):
                 found.append(Case(degraded(disparity, way, rng), roll, roll, "degraded"))
             found.append(Case(without_road(disparity, ROADLESS[index % 4], rng), NAN, NAN, "roadless"))
@@ -272,22 +269,30 @@ def main() -> None:
     parser.add_argument("frames", nargs="?", type=int, default=40)
     parser.add_argument("--only", default="", help="numbers whose path contains this")
     parser.add_argument("--off", action="store_true", help="only switch numbers off, on every real map")
+    parser.add_argument("--together", default="", help="numbers to switch off at once, with commas")
     parser.add_argument("--markdown", action="store_true")
     arguments = parser.parse_args()
     found = cases(arguments.frames, 1 if arguments.off else 3)
     kinds = np.array([case.kind for case in found])
     print(", ".join(f"{np.count_nonzero(kinds == kind)} {kind}" for kind in dict.fromkeys(kinds.tolist())))
-    tried, values = changes(arguments.only, () if arguments.off else (0.67, 1.5)), dict(numbers(TUNING))
+    values = dict(numbers(TUNING))
+    if arguments.together:
+        tried = [tuple(Change(name, "off", OFF[name]) for name in arguments.together.split(","))]
+    else:
+        tried = [(each,) for each in changes(arguments.only, () if arguments.off else (0.67, 1.5))]
     print(line(("number", "value", "changed", *HEADINGS), arguments.markdown))
     if arguments.markdown:
         print("|" + "---|" * len(WIDTHS))
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "maps")
         path.write_bytes(pickle.dumps(found))
-        tunings = [TUNING, *(changed(TUNING, change) for change in tried)]
+        tunings = [TUNING, *(changed(TUNING, group) for group in tried)]
         with ProcessPoolExecutor(os.cpu_count(), get_context("spawn"), load, (str(path),)) as pool:
             names = [("as it is", "", "")]
-            names += [(each.name, f"{values[each.name]:.4g}", each.how) for each in tried]
+            names += [
+                (" ".join(each.name for each in group), f"{values[group[0].name]:.4g}", group[0].how)
+                for group in tried
+            ]
             as_it_is = None
             for name, outcomes in zip(names, pool.map(estimate_all, tunings), strict=True):
                 as_it_is = as_it_is or outcomes

@@ -42,7 +42,7 @@ class Road:
         The share of the road-like pixels ahead that lie on the plane, less those below it; at most 1. A plane
         whose horizon is far outside of the image, as that of a wall, scores less.
     rival : float
-        The best score of another plane, one whose roll differs by `SearchTuning.rival_angle` or more.
+        The best score of another plane, one whose roll differs by `DoubtTuning.other_angle` or more.
     """
 
     plane: Floats
@@ -61,7 +61,7 @@ class Road:
         return abs(float(c0)) / math.hypot(c1, c2)
 
 
-def find_road(sample: Sample, max_roll: float, seed: int, tuning: SearchTuning) -> Road:
+def find_road(sample: Sample, max_roll: float, seed: int, tuning: Tuning) -> Road:
     """Find the plane of the road.
 
     Parameters
@@ -71,7 +71,7 @@ def find_road(sample: Sample, max_roll: float, seed: int, tuning: SearchTuning) 
         The largest abs(roll) considered, radians; more than 0, less than pi / 2.
     seed : int
         Of the triples drawn.
-    tuning : SearchTuning
+    tuning : Tuning
 
     Returns
     -------
@@ -83,14 +83,15 @@ def find_road(sample: Sample, max_roll: float, seed: int, tuning: SearchTuning) 
         When no plane through the pixels rises downward in the image, as a road's disparity does, and is
         rolled by less than `max_roll`, or none has pixels on it.
     """
-    planes = draw_planes(sample, max_roll, seed, tuning)
+    search, other = tuning.search, tuning.doubts.other_angle
+    planes = draw_planes(sample, max_roll, seed, search)
     if len(planes) == 0:
         raise EstimationError(_why_no_plane(sample, max_roll))
-    judge = Judge(sample, tuning)
-    order = np.argsort(-judge.scores(planes, every(judge.pixels, tuning.first_pixels)), kind="stable")
+    judge = Judge(sample, search)
+    order = np.argsort(-judge.scores(planes, every(judge.pixels, search.first_pixels)), kind="stable")
     # the best of each roll: a wide verge must not crowd out the road
-    _, first = np.unique(np.floor(_rolls(planes[order]) / tuning.rival_angle), return_index=True)
-    start = planes[order[np.sort(first)[: tuning.refined]]]
+    _, first = np.unique(np.floor(_rolls(planes[order]) / other), return_index=True)
+    start = planes[order[np.sort(first)[: search.refined]]]
     planes = start
     for _ in range(_FITS):
         planes = judge.refined(planes)
@@ -100,7 +101,7 @@ def find_road(sample: Sample, max_roll: float, seed: int, tuning: SearchTuning) 
     winner = int(scores.argmax())
     if not planes[winner, 2] > 0:  # fitted to no pixel, it scores 0, and the others have more against them
         raise EstimationError(HARDLY_A_PIXEL)
-    far = np.abs(rolls - rolls[winner]) > tuning.rival_angle
+    far = np.abs(rolls - rolls[winner]) > other
     return Road(planes[winner].astype(np.float64), float(scores[winner]), float(scores[far].max(initial=-1)))
 
 
@@ -117,7 +118,7 @@ def _why_no_plane(sample: Sample, max_roll: float) -> str:
 def draw_planes(sample: Sample, max_roll: float, seed: int, tuning: SearchTuning) -> Singles:
     """Return planes (K, 3) through triples of neighbouring coherent pixels, disparity growing downward."""
     radius = tuning.radius
-    x, y, d, tolerance = (each[sample.few] for each in (sample.x, sample.y, sample.d, sample.tolerance))
+    x, y, d = (each[sample.few] for each in (sample.x, sample.y, sample.d))
     pool = (sample.coherent & (sample.slopes[1] > 0)).nonzero()[0]
     if len(pool) < 3:
         return np.empty((0, 3), np.float32)
@@ -136,8 +137,7 @@ def draw_planes(sample: Sample, max_roll: float, seed: int, tuning: SearchTuning
     wide = (np.abs(area) > 0.03 * radius**2) & (np.maximum(np.abs(y1), np.abs(y2)) < radius)
     area = np.where(wide, area, 1)
     c1, c2 = (d1 * y2 - d2 * y1) / area, (x1 * d2 - x2 * d1) / area
-    steep = c2 * radius > tuning.least_rise * tolerance[a]  # a wall's noise is not a road
-    good = (wide & steep & (np.abs(c1) <= math.tan(max_roll) * c2)).nonzero()[0][: tuning.draws // 2]
+    good = (wide & (c2 > 0) & (np.abs(c1) <= math.tan(max_roll) * c2)).nonzero()[0][: tuning.draws // 2]
     planes: Singles = np.stack([d[a] - c1 * x[a] - c2 * y[a], c1, c2], 1)[good]
     return planes
 
@@ -169,19 +169,18 @@ class Judge:
 
     def scores(self, planes: Singles, some: slice) -> Singles:
         """Return the score of each plane (K, 3) on some of the pixels; see `Road.score`."""
-        tuning, (c0, c1, c2) = self._tuning, planes.T
         place, slope, off = self._weighed(planes, some)
         cost = np.minimum(np.maximum(off, -1, out=off), self._caps[some], out=off)
         cost *= cost
         cost -= 1
-        # what speaks for a plane counts as far as the slopes agree, what speaks against it in any case
-        lost = np.einsum("kn,kn->k", place, np.maximum(cost, 0))
         slope *= place
-        lost += np.einsum("kn,kn->k", slope, np.minimum(cost, 0, out=cost))
-        scores = -lost / (slope.sum(1) + np.float32(tuning.least_corridor * cost.shape[1]))
-        steep = c0 * c0 / (c1 * c1 + c2 * c2 + np.float32(1e-30))
-        better: Singles = np.where(scores > 0, scores / (1 + steep / np.float32(tuning.horizon**2)), scores)
-        return better
+        place *= np.maximum(cost, 0)
+        # what speaks for a plane counts as far as the slopes agree, what speaks against it in any case
+        lost = place.sum(1) + np.einsum("kn,kn->k", slope, np.minimum(cost, 0, out=cost))
+        scores: Singles = -lost / np.maximum(slope.sum(1), np.float32(1e-30))
+        c0, c1, c2 = planes.T
+        steep = c0 * c0 / np.maximum(c1 * c1 + c2 * c2, np.float32(1e-30))
+        return np.where(scores > 0, scores / (1 + steep / np.float32(self._tuning.horizon**2)), scores)
 
     def refined(self, planes: Singles) -> Singles:
         """Fit each plane (K, 3) to the pixels on it."""
@@ -252,7 +251,7 @@ def first_row_of_road(
     """
     try:
         sample = take_sample(disparity, usable, tuning.sample)
-        c0, c1, c2 = find_road(sample, max_roll, seed, tuning.search).plane.tolist()
+        c0, c1, c2 = find_road(sample, max_roll, seed, tuning).plane.tolist()
     except EstimationError:
         return 0.0
     grid = sample.grid

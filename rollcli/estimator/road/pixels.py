@@ -92,7 +92,7 @@ def select_pixels(checked: CheckedMap, request: Request) -> PixelSet:
 def _find(checked: CheckedMap, request: Request) -> tuple[Road, Surface]:
     tuning = request.tuning
     sample = take_sample(checked.values, checked.usable, tuning.sample)
-    road = find_road(sample, request.max_roll, request.seed, tuning.search)
+    road = find_road(sample, request.max_roll, request.seed, tuning)
     return road, fit_surface(sample, road, parabolic=request.parabolic, tuning=tuning)
 
 

@@ -134,7 +134,8 @@ def take_sample(disparity: NDArray[Any], usable: NDArray[np.bool_] | None, tunin
     grid, reach = Grid.of_shape(height, width), reach_of(height, width, tuning)
     spacing, rows, columns = _chosen(disparity, usable, reach, tuning)
     top, left = spacing.first(reach)
-    places = (top + rows * spacing.rows) * width + (left + columns * spacing.columns)
+    v, u = np.arange(top, height, spacing.rows), np.arange(left, width, spacing.columns)
+    places = (v * width)[rows] + u[columns]
     d = values_at(places, disparity)
     few = every(len(d), tuning.coarse_pixels)
     steps = steps_to(places[few] + sides(reach, width), disparity, d[few])
@@ -147,14 +148,14 @@ def take_sample(disparity: NDArray[Any], usable: NDArray[np.bool_] | None, tunin
     for _ in range(2):  # again without the noise, which has another median
         noise = max(tuning.noise_share * typical, quantum / math.sqrt(12))
         tolerance = tolerance_of(d[few], noise, tuning)
-        agree = np.count_nonzero(jumps <= tolerance, 0)
-        coherent = (agree > 0) & (2 * agree >= np.count_nonzero(jumps < NO_STEP, 0))
+        agree = count(jumps <= tolerance)
+        coherent = (agree > 0) & (2 * agree >= count(jumps < NO_STEP))
         if coherent.any():
             typical = quantile(d[few][coherent], 0.5)
     return Sample(
         grid=grid,
-        x=((left + columns * spacing.columns - grid.centre_u) / grid.scale).astype(np.float32),
-        y=((top + rows * spacing.rows - grid.centre_v) / grid.scale).astype(np.float32),
+        x=((u - grid.centre_u) / grid.scale).astype(np.float32)[columns],
+        y=((v - grid.centre_v) / grid.scale).astype(np.float32)[rows],
         d=d,
         tolerance=tolerance_of(d, noise, tuning),
         places=places,
@@ -196,6 +197,12 @@ def _chosen(
 def every(count: int, pixels: int) -> slice:
     """Return a slice that takes about so many of a number of pixels, evenly."""
     return slice(None, None, max(1, round(count / pixels)))
+
+
+def count(agreeing: NDArray[np.bool_]) -> NDArray[np.uint8]:
+    """Return how many of a pixel's neighbours agree, (neighbours, N), ten times as fast as a sum of bool."""
+    counts: NDArray[np.uint8] = agreeing.view(np.uint8).sum(0, dtype=np.uint8)
+    return counts
 
 
 def quantile(values: NDArray[np.floating[Any]], part: float) -> float:

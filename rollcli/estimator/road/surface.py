@@ -22,14 +22,16 @@ from rollcli.estimator.least_squares import solve_normal
 from rollcli.estimator.moments import Floats, Grid, powers
 from rollcli.estimator.road.find import HARDLY_A_PIXEL, Road, agreement
 from rollcli.estimator.road.model import Reals, RoadModel
-from rollcli.estimator.road.sample import Sample, Singles, quantile, reach_of, steps_to, tolerance_of
+from rollcli.estimator.road.sample import Sample, Singles, count, quantile, reach_of, steps_to, tolerance_of
 from rollcli.estimator.tuning import FitTuning, Tuning
 
 MOST_FADED = 30.0  # as exp(-30): products of such weights are no denormals, which take ten times as long
 _LEAST_PIXELS = 30  # with some weight, without which there is no road
 _REACH = 3.0  # tolerances from the plane beyond which a pixel is not looked at again
+_LEAST_WIDTH = 0.01  # tolerances, of a map without any error
 _MOST_TURN = 0.2  # radians that a round may turn the road by
 _LEAST_LEVEL = 0.5  # of the lane's level that ground has which is shown as road
+_BINS = 10  # to each side of the profile, which reaches to twice its width
 _BLOCK = 2**20  # pixels
 # around a pixel: two pairs of opposite sides, in rows and columns of their own
 _AROUND = np.array(((2, 1), (-2, -1), (1, -2), (-1, 2)))
@@ -198,6 +200,8 @@ class NearPixels:
         1 in the middle of the lane ahead, fading towards its sides.
     least_width : float
         Tolerances within which a pixel counts in any case.
+    independent_pixels : int
+        As in `IntervalTuning`.
     tuning : FitTuning
     """
 
@@ -208,6 +212,7 @@ class NearPixels:
     place: Singles
     ahead: Singles
     least_width: float
+    independent_pixels: int
     tuning: FitTuning
 
     def weighted(self, weights: Reals) -> "NearPixels":
@@ -241,26 +246,22 @@ class NearPixels:
     def level(self, lane: RoadModel) -> Floats:
         """Return how much of the lane's level the ground has in bins across, left to right, 0 to 1."""
         tuning = self.tuning
-        bins = round(2 * tuning.profile / tuning.bin_width)
         road = self.road(lane)
         places = lane.side(lane.turned(self.places)[0], road)
-        places = np.minimum(
-            np.maximum(np.floor(places / np.float32(tuning.bin_width)) + (bins + 1), 0), 2 * bins + 1
-        )
-        places *= (self.place > 0.1) & (
-            road > self.d / 10
-        )  # what does not count is in the first, beyond the rest
+        places = np.floor(places / np.float32(2 * tuning.profile / _BINS)) + (_BINS + 1)
+        places = np.minimum(np.maximum(places, 0), 2 * _BINS + 1)
+        places *= (self.place > 0.1) & (road > self.d / 10)  # the first is beyond all bins
         places = places.astype(np.uint16)
         order = places.argsort(kind="stable")
         heights = (self.d / road - 1)[order]
-        bounds = places[order].searchsorted(np.arange(1, 2 * bins + 2, dtype=np.uint16)).tolist()
+        bounds = places[order].searchsorted(np.arange(1, 2 * _BINS + 2, dtype=np.uint16)).tolist()
         medians = [
             quantile(heights[low:high], 0.5) if high - low >= 12 else math.nan
             for low, high in itertools.pairwise(bounds)
         ]
-        medians[bins - 2 : bins + 2] = [0.0] * 4  # the lane is level
-        for place in range(bins - 3, -1, -1):  # and where nothing is seen it goes on outward
-            for here, inner in ((place, place + 1), (2 * bins - 1 - place, 2 * bins - 2 - place)):
+        medians[_BINS - 2 : _BINS + 2] = [0.0] * 4  # the lane is level
+        for place in range(_BINS - 3, -1, -1):  # and where nothing is seen it goes on outward
+            for here, inner in ((place, place + 1), (2 * _BINS - 1 - place, 2 * _BINS - 2 - place)):
                 medians[here] = medians[inner] if math.isnan(medians[here]) else medians[here]
         return 1 / (1 + (np.array(medians) / tuning.off_level) ** 4)
 
@@ -284,7 +285,7 @@ class NearPixels:
             products = _products(design, weights, parabolic=parabolic)
             # the variance of the pixels over that of the prior, times how often they repeat each other
             total = products[0, 0]
-            repeated = max(1.0, total / tuning.independent_pixels)
+            repeated = max(1.0, total / self.independent_pixels)
             precision = products[5, 5] / total * repeated / tuning.camber**2
             products[3, 3] += precision
             products[3, 5] -= precision * model.camber
@@ -345,9 +346,9 @@ def _near_pixels(sample: Sample, road: Road, tuning: Tuning) -> tuple[NearPixels
     bottom = sample.grid.centre_v / sample.grid.scale / math.cos(model.theta)
     beyond = (along + fit.other_roll * np.abs(across) - bottom) * (10 / fit.other_roll)
     place = np.square(place) / (1 + np.exp(np.minimum(beyond, MOST_FADED)))
-    ahead = np.square(np.square(across * (model.alpha[1] / fit.lane) / mean))
+    ahead = np.square(np.square(across * (model.alpha[1] / tuning.search.corridor) / mean))
     # the steps of a map of whole pixels are no spread: within less, only stripes of one value are left
-    least = max(fit.least_width, sample.quantum / quantile(sample.tolerance, 0.5))
+    least = max(_LEAST_WIDTH, sample.quantum / quantile(sample.tolerance, 0.5))
     return (
         NearPixels(
             places=places,
@@ -357,6 +358,7 @@ def _near_pixels(sample: Sample, road: Road, tuning: Tuning) -> tuple[NearPixels
             place=place,
             ahead=np.exp(-np.minimum(ahead, MOST_FADED)),
             least_width=least,
+            independent_pixels=tuning.interval.independent_pixels,
             tuning=fit,
         ),
         stride,
@@ -386,13 +388,13 @@ def _look_around(
     same = apart <= np.maximum(sample.tolerance[near], np.float32(sample.quantum))
     if sample.usable is not None:
         same &= sample.usable.reshape(-1)[there]
-    mean: Singles = d + np.where(same, off, 0).sum(0) / (1 + np.count_nonzero(same, 0)).astype(np.float32)
+    mean: Singles = d + np.where(same, off, 0).sum(0) / (1 + count(same)).astype(np.float32)
     return mean, agreeing
 
 
 def _level_at(level: Floats, side: Reals, tuning: FitTuning) -> Reals:
     """Return how much of the lane's level the ground has, so far to the right of the middle, 0 to 1."""
-    centres = (np.arange(len(level)) - (len(level) - 1) / 2) * tuning.bin_width
+    centres = (np.arange(len(level)) - (len(level) - 1) / 2) * (2 * tuning.profile / _BINS)
     return np.interp(side, centres, level)
 
 

@@ -48,7 +48,7 @@ def test_the_plane_that_is_found_is_near_that_of_the_road(share, most):
     for slope, across in ((0.3, 0.02), (0.2, -0.1), (0.35, 0.2)):
         road = np.maximum(slope * (v - 200) + across * (u - 320), 0)
         sample = take_sample(replaced(road, share), None, TUNING.sample)
-        found = find_road(sample, math.radians(45), 0, TUNING.search).plane
+        found = find_road(sample, math.radians(45), 0, TUNING).plane
         grid = sample.grid
         plane = (
             slope * (grid.centre_v - 200) + across * (grid.centre_u - 320),
@@ -140,6 +140,6 @@ def test_neighbours_outside_a_mask_do_not_count():
 
 def test_the_score_of_a_road_is_high_and_that_of_a_rival_is_not():
     sample = take_sample(street(), None, TUNING.sample)
-    road = find_road(sample, math.radians(45), 0, TUNING.search)
+    road = find_road(sample, math.radians(45), 0, TUNING)
     assert 0.5 < road.score <= 1
     assert road.rival < 0.5 * road.score

@@ -39,7 +39,7 @@ def disparity_of(height_at, roll_deg=0.0, pitch_deg=6.0):
 
 def surface_of(disparity, *, parabolic=True):
     sample = take_sample(disparity, None, TUNING.sample)
-    road = find_road(sample, math.radians(45), 0, TUNING.search)
+    road = find_road(sample, math.radians(45), 0, TUNING)
     return fit_surface(sample, road, parabolic=parabolic, tuning=TUNING)
 
 
