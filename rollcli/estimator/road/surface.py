@@ -11,7 +11,7 @@ so that a kerb that is a little lower, or half a bin farther away, turns the ang
 import itertools
 import math
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -152,34 +152,52 @@ def fit_surface(sample: Sample, road: Road, *, parabolic: bool, tuning: Tuning) 
     EstimationError
         When hardly any pixel lies on the road.
     """
-    fit = tuning.fit
     near, stride = _near_pixels(sample, road, tuning)
     lane = near.lane(road.model, parabolic=parabolic)
-    level = near.level(lane)
-    side = lane.side(lane.turned(near.places)[0], near.road(lane))
-    fade = np.exp(-np.square(np.square(np.minimum(np.square(side / np.float32(fit.profile)), 4))))
-    near = near.weighted(_level_at(level, side, fit) * fade)
-    model, left, precision, limit = near.fitted(lane, parabolic=parabolic)
-    used = (left > 0).nonzero()[0]
+    level, near = near.profiled(lane)
+    fit = near.fitted(lane, parabolic=parabolic)
+    used = (fit.weights > 0).nonzero()[0]
     if len(used) < _LEAST_PIXELS:
         raise EstimationError(HARDLY_A_PIXEL)
-    (x, y), d = near.places[:, used].astype(np.float64), near.d[used].astype(np.float64)
-    bulge = model.bulge(model.across(x, y), model.disparity_along(model.along(x, y)))
+    x, y = near.places[:, used].astype(np.float64)
     return Surface(
         x,
         y,
-        d - model.camber * bulge,
-        left[used].astype(np.float64),
-        model,
+        (near.d - np.float32(fit.model.camber) * fit.bulge)[used].astype(np.float64),
+        fit.weights[used].astype(np.float64),
+        fit.model,
         sample.grid,
         sample.noise,
         parabolic,
         share=min(1.0, len(used) * stride / len(sample.d)),
-        moved=abs(model.theta - road.model.theta),
+        moved=abs(fit.model.theta - road.model.theta),
         level=level,
-        camber_precision=precision,
-        limit=limit,
+        camber_precision=fit.camber_precision,
+        limit=fit.limit,
     )
+
+
+class Fit(NamedTuple):
+    """A road, and how pixels lie around it; arrays of shape (N,).
+
+    Attributes
+    ----------
+    model : RoadModel
+    weights : ndarray
+        Those that it leaves the pixels.
+    bulge : ndarray
+        What a camber of 1 adds to the disparities, px.
+    camber_precision : float
+        What the prior adds to the normal equation of the camber.
+    limit : float
+        How far single pixels of the road are off it at most, tolerances.
+    """
+
+    model: RoadModel
+    weights: Singles
+    bulge: Singles
+    camber_precision: float
+    limit: float
 
 
 @dataclass(frozen=True)
@@ -215,20 +233,6 @@ class NearPixels:
     independent_pixels: int
     tuning: FitTuning
 
-    def weighted(self, weights: Reals) -> "NearPixels":
-        """Return the pixels that have some weight, weighted."""
-        kept = (weights > 1e-3).nonzero()[0]
-        place = self.place[kept] * weights[kept].astype(np.float32)
-        d, alone, tolerance, ahead = (each[kept] for each in (self.d, self.alone, self.tolerance, self.ahead))
-        return replace(
-            self, places=self.places[:, kept], d=d, alone=alone, tolerance=tolerance, place=place, ahead=ahead
-        )
-
-    def road(self, model: RoadModel) -> Singles:
-        """Return the disparity of a road without camber; above the horizon, a tenth of the pixel's own."""
-        road: Singles = np.maximum(model.disparity_along(model.turned(self.places)[1]), self.d / 10)
-        return road
-
     def lane(self, start: RoadModel, *, parabolic: bool) -> RoadModel:
         """Fit the lane ahead, in one round: it only has to show the profile.
 
@@ -238,17 +242,19 @@ class NearPixels:
         design = np.ones((6, len(self.d)), np.float32)
         design[3] = 0
         squares = self._place_on(design, start)
-        weights = self._weights(squares, self.tuning.start_width) * np.maximum(
-            np.square(np.square(self.ahead)), np.float32(1e-13)
-        )
+        weights = self._weights(squares, self.tuning.start_width) * np.square(np.square(self.ahead))
         return _moved(start, _products(design, weights, parabolic=parabolic))
 
-    def level(self, lane: RoadModel) -> Floats:
-        """Return how much of the lane's level the ground has in bins across, left to right, 0 to 1."""
+    def profiled(self, lane: RoadModel) -> tuple[Floats, "NearPixels"]:
+        """Return how much of the lane's level the ground has in bins across, left to right, 0 to 1.
+
+        And the pixels that count, weighted by that and by how far to the side they lie.
+        """
         tuning = self.tuning
-        road = self.road(lane)
-        places = lane.side(lane.turned(self.places)[0], road)
-        places = np.floor(places / np.float32(2 * tuning.profile / _BINS)) + (_BINS + 1)
+        across, along = lane.turned(self.places)
+        road = np.maximum(lane.disparity_along(along), self.d / 10)
+        side = lane.side(across, road)
+        places = np.floor(side / np.float32(2 * tuning.profile / _BINS)) + (_BINS + 1)
         places = np.minimum(np.maximum(places, 0), 2 * _BINS + 1)
         places *= (self.place > 0.1) & (road > self.d / 10)  # the first is beyond all bins
         places = places.astype(np.uint16)
@@ -263,22 +269,33 @@ class NearPixels:
         for place in range(_BINS - 3, -1, -1):  # and where nothing is seen it goes on outward
             for here, inner in ((place, place + 1), (2 * _BINS - 1 - place, 2 * _BINS - 2 - place)):
                 medians[here] = medians[inner] if math.isnan(medians[here]) else medians[here]
-        return 1 / (1 + (np.array(medians) / tuning.off_level) ** 4)
+        level = 1 / (1 + (np.array(medians) / tuning.off_level) ** 4)
+        fade = np.exp(-np.square(np.square(np.minimum(np.square(side / np.float32(tuning.profile)), 4))))
+        weights = (_level_at(level, side, tuning) * fade).astype(np.float32)
+        kept = (weights > 1e-3).nonzero()[0]  # others would only take time
+        d, alone, tolerance, ahead = (each[kept] for each in (self.d, self.alone, self.tolerance, self.ahead))
+        near = replace(
+            self,
+            places=self.places[:, kept],
+            d=d,
+            alone=alone,
+            tolerance=tolerance,
+            place=self.place[kept] * weights[kept],
+            ahead=ahead,
+        )
+        return level, near
 
-    def fitted(self, start: RoadModel, *, parabolic: bool) -> tuple[RoadModel, Singles, float, float]:
+    def fitted(self, start: RoadModel, *, parabolic: bool) -> Fit:
         """Fit (a0, a1, a2, theta) and the camber, starting from the lane's.
 
         Gauss-Newton with Tukey's biweight, whose width shrinks from `start_width` as far as the spread of
         the pixels ahead allows. The camber has a prior: where the pixels do not determine it, it stays small.
-
-        Returns
-        -------
-        tuple
-            The road, the weights that it leaves the pixels, what the prior adds to the normal equation of
-            the camber, and how far single pixels of the road are off it at most, tolerances.
         """
         tuning, limit, precision = self.tuning, self.tuning.start_width, math.inf
-        model, design = start, self._design(start)
+        model, design = start, np.ones((6, len(self.d)), np.float32)
+        across, along = start.turned(self.places)
+        # of the start: camber adds so much the same to roads that differ little
+        design[3] = start.bulge(across, start.disparity_along(along))
         squares = self._place_on(design, model)
         weights = self._weights(squares, limit)
         for _ in range(tuning.rounds):
@@ -294,21 +311,15 @@ class NearPixels:
             limit = min(limit, self._width(squares, weights))
             weights = self._weights(squares, limit)
         alone = np.square((design[5] + self.alone - self.d) / self.tolerance)
-        return model, weights, float(precision), min(tuning.start_width, self._width(alone, weights))
-
-    def _design(self, model: RoadModel) -> Singles:
-        """Return the rows (6, N) of a design: 1, the coordinate along the road and its square, ...
-
-        what a camber of 1 adds, the derivative by theta, and what is left of the disparities. Camber adds so
-        much the same to roads that differ little that only this row is the start's in all rounds.
-        """
-        across, along = model.turned(self.places)
-        design = np.ones((6, len(self.d)), np.float32)
-        design[3] = model.bulge(across, model.disparity_along(along))
-        return design
+        limit = min(tuning.start_width, self._width(alone, weights))
+        return Fit(model, weights, design[3], float(precision), limit)
 
     def _place_on(self, design: Singles, model: RoadModel) -> Singles:
-        """Set the rows of a design for a road; return the squares of what is left, in tolerances."""
+        """Lay out a design for a road; return the squares of what is left of disparities, in tolerances.
+
+        Its rows (6, N): 1, the coordinate along the road and its square, what a camber of 1 adds, the
+        derivative by theta, and what is left.
+        """
         across, along = model.turned(self.places)
         design[1] = along
         np.square(along, out=design[2])
@@ -327,7 +338,7 @@ class NearPixels:
 
         Every step is smooth: a pixel more or less must not turn the road.
         """
-        weights = weights * (self.ahead + np.float32(0.01))  # a lane may be hidden
+        weights = weights * self.ahead
         total = max(float(weights.sum()), 1e-30)
         return max(self.least_width, self.tuning.width * math.sqrt(float(weights.dot(squares)) / total))
 
@@ -356,7 +367,7 @@ def _near_pixels(sample: Sample, road: Road, tuning: Tuning) -> tuple[NearPixels
             alone=sample.d[near],
             tolerance=sample.tolerance[near],
             place=place,
-            ahead=np.exp(-np.minimum(ahead, MOST_FADED)),
+            ahead=np.exp(-np.minimum(ahead, MOST_FADED)) + np.float32(0.01),  # a lane may be hidden
             least_width=least,
             independent_pixels=tuning.interval.independent_pixels,
             tuning=fit,
