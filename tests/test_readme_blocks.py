@@ -118,6 +118,7 @@ def test_derotation_by_a_result_and_by_one_angle_and_then_v_disparity(tmp_path):
     assert sorted(contents(tmp_path / "vdisparity")) == [
         f"{stem}{ending}" for stem in stems for ending in (".png", ".tif")
     ]
+    assert sorted(contents(tmp_path / "figures")) == [f"{stem}.pdf" for stem in stems]
 
 
 def test_pitch_and_height(tmp_path):
