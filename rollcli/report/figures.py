@@ -7,7 +7,6 @@ of the extra `report` and takes a second to load: this module is imported once s
 
 import html
 import io
-import logging
 import re
 import threading
 from collections.abc import Iterator, Mapping, Sequence
@@ -32,7 +31,6 @@ from numpy.typing import NDArray
 from rollcli.report.chart import Chart
 from rollcli.report.colours import LIGHT
 
-logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it tells of its own files
 _SETTINGS = threading.Lock()  # matplotlib has one set of them for all threads
 COLUMN = 3.5 * 72  # pt: the width of a column in journals of two columns
 _MOST_TO_KEEP = 2000  # points of a line or band; of more, those are kept that reach furthest in each column

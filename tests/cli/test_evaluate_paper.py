@@ -220,7 +220,7 @@ def test_rotations_that_make_no_sense_are_refused_with_an_example(tmp_path, turn
     assert "such as -20:20:2" in run.err
 
 
-@pytest.mark.parametrize("missing", ["plotly", "jinja2"])
+@pytest.mark.parametrize("missing", ["plotly", "jinja2", "matplotlib"])
 def test_without_the_extra_it_says_what_to_install_before_any_work(tmp_path, monkeypatch, capsys, missing):
     monkeypatch.setitem(sys.modules, missing, None)
     monkeypatch.chdir(tmp_path)

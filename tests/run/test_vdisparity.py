@@ -2,6 +2,7 @@
 
 import math
 import re
+import subprocess
 import xml.etree.ElementTree as ET
 
 import cv2
@@ -11,7 +12,8 @@ import pytest
 from rollcli.files.encodings import read_disparity
 from rollcli.files.formats import read_stored
 from rollcli.pictures.vdisparity import BOTTOM_MARGIN, LEFT_MARGIN
-from tests.run_cli import contents, road_map, rollcli, write_kitti
+from rollcli.report import page
+from tests.run_cli import command, contents, environment, road_map, rollcli, write_kitti
 
 
 def road_pixels(picture):
@@ -175,3 +177,19 @@ def test_what_a_figure_cannot_be_is_refused_before_anything_is_written(maps, opt
     done = rollcli("vdisparity", "maps", *options, "-o", "v", cwd=maps)
     assert (done.status, words in done.err) == (2, True), done.err
     assert not (maps / "v").exists()
+
+
+def test_a_figure_without_the_extra_is_refused_in_one_line_that_says_how_to_install_it(maps, monkeypatch):
+    monkeypatch.setattr(page, "_NEEDED", ("jinja2", "no_such_package"))
+    done = rollcli("vdisparity", "maps", "--figure", "pdf", "-o", "v", cwd=maps)
+    words = 'rollcli: --figure needs no_such_package: pip install "rollcli[report]"\n'
+    assert (done.status, done.err) == (2, words)
+
+
+def test_nothing_of_matplotlibs_own_files_is_told(maps):
+    nowhere = dict.fromkeys(("HOME", "MPLCONFIGDIR", "XDG_CACHE_HOME", "XDG_CONFIG_HOME"), "/dev/null/no")
+    line = command("vdisparity", "maps/frame0.png", "--figure", "svg", "-o", "v", "-q")
+    done = subprocess.run(
+        line, cwd=maps, env=environment(**nowhere), capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
