@@ -195,7 +195,13 @@ def _name_of(result: str) -> str:
 def _results(frames: Sequence[Frame], run: _Run, retry_of: str = "") -> Iterator[Iterator[FrameResult]]:
     """Open the results of frames from whichever workers were asked for; the output is complete afterwards."""
     options, output = run.options, run.output
-    told = options.frame._replace(replaces=output.replaces, retry_of=retry_of)
+    form, timing = options.result.form, options.result.timing
+    told = options.frame._replace(
+        replaces=output.replaces,
+        retry_of=retry_of,
+        lines="" if form == "parquet" else form,
+        timing=timing,
+    )
     work = Work(
         partial(estimate_frame, options=told),
         partial(lost_frame, options=told),

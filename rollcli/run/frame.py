@@ -57,12 +57,15 @@ class FrameResult:
         Why that may be wrong; empty when there is no doubt.
     searched : tuple of int, or None
         First and last disparity searched, px; pairs only.
+    line : bytes
+        The row as it stands in the result, where workers were told its format.
     """
 
     row: Row
     encoding: str = ""
     warning: str = ""
     searched: tuple[int, int] | None = None
+    line: bytes = b""
 
 
 _LEFT, _RIGHT = "left image: ", "right image: "  # what a message calls the files of a pair

@@ -74,7 +74,7 @@ class StreamOutput:
 
     def append(self, frame: Frame, result: FrameResult) -> None:
         """Write the row; it has left this process when this returns."""
-        self._write(format_row(result.row, self._plan.format, self._plan.timing))
+        self._write(_line(result, self._plan))
 
     def finish(self, totals: Mapping[str, int], alignment: Mapping[str, Any] | None) -> None:
         """Do nothing: a stream has no record."""
@@ -119,8 +119,7 @@ class FileOutput:
     def append(self, frame: Frame, result: FrameResult) -> None:
         """Add the row, after the record knows how its frame was read."""
         self._record.saw(result.encoding, result.searched)
-        row = format_row(result.row, self._plan.format, self._plan.timing)
-        self._rows.append(row, self._paths(frame, result))
+        self._rows.append(_line(result, self._plan), self._paths(frame, result))
 
     def restore(self, frame: Frame, result: FrameResult) -> None:
         """Take the images of an incomplete frame, which were made again.
@@ -136,7 +135,7 @@ class FileOutput:
     def replace(self, position: int, frame: Frame, result: FrameResult) -> None:
         """Take the row and its images; the file gets them all at once, in `commit`."""
         self._record.saw(result.encoding, result.searched)
-        self._replacing[position] = format_row(result.row, self._plan.format, self._plan.timing)
+        self._replacing[position] = _line(result, self._plan)
         self._rows.restore(self._paths(frame, result))
 
     def commit(self) -> None:
@@ -159,6 +158,11 @@ class FileOutput:
     def _paths(self, frame: Frame, result: FrameResult) -> Iterator[str]:
         if result.row.status != "error":
             yield from local_images(frame, self._images)
+
+
+def _line(result: FrameResult, plan: Plan) -> bytes:
+    """Return the line of a row: as its worker made it, or made here for one whose worker died."""
+    return result.line or format_row(result.row, plan.format, plan.timing)
 
 
 @contextlib.contextmanager

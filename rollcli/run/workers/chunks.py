@@ -22,11 +22,17 @@ if TYPE_CHECKING:
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 
-# of a chunk: hand-over then costs a hundredth of the work, and a lost worker a second
-CHUNK_S = 1.0
-# a worker gives back what it has not begun by then: tasks that are slower than those before are no long chunk
-_LONGEST_S = 2.0
-_SHARES = 2  # a chunk is at most this part of what each worker still has to do, so that all end together
+# of a chunk: handing it over costs a hundredth of the work, and a lost worker costs a second
+_CHUNK_S = 1.0
+# all workers together, which bounds the CPU time of whoever hands chunks over: a chunk costs Dask's scheduler
+# and its client 3 ms each; from so many workers on, chunks are longer
+_CHUNKS_A_SECOND = 100
+_MOST_S = 8.0
+# a worker gives back what it has not begun by then: tasks may be slower than those before
+LONGEST_S = 2.0
+LONGEST_ON_CLUSTER_S = 2 * _MOST_S
+_SHARES = 2  # a chunk is at most this part of what each worker still has to do, so that all end together,
+_LEAST_S = 0.05  # unless that is less than this, or than half of what _CHUNKS_A_SECOND allows
 
 
 def _leave(task: object) -> None:
@@ -86,22 +92,30 @@ class Chunks(Generic[Task]):
     def __init__(self, tasks: Iterable[Task], first: int = 1) -> None:
         self._left = len(tasks) if isinstance(tasks, Sized) else None
         self._tasks = iter(tasks)
-        self._size = float(first)
+        self._first, self._a_second = first, 0.0
 
     def take(self, workers: int) -> list[Task]:
         """Take the next chunk, for one of so many workers; empty when there are no more tasks."""
-        size = int(self._size)
+        seconds = min(max(_CHUNK_S, workers / _CHUNKS_A_SECOND), _MOST_S)
+        size = int(self._a_second * seconds) if self.measured else self._first
         if self._left is not None:
-            size = min(size, self._left // (_SHARES * workers))
+            least_s = max(_LEAST_S, workers / _CHUNKS_A_SECOND / 2)
+            size = min(size, max(self._left // (_SHARES * workers), int(self._a_second * least_s)))
         chunk = list(itertools.islice(self._tasks, max(size, 1)))
         if self._left is not None:
             self._left -= len(chunk)
         return chunk
 
+    @property
+    def measured(self) -> bool:
+        """Whether a chunk was measured."""
+        return self._a_second > 0
+
     def measure(self, done: Done[Any]) -> None:
         """Learn from a chunk how many tasks are worth a second: half from it, half from those before."""
         if done.results:
-            self._size = (self._size + CHUNK_S * len(done.results) / max(done.seconds, 1e-6)) / 2
+            found = len(done.results) / max(done.seconds, 1e-6)
+            self._a_second = (self._a_second + found) / 2 if self.measured else found
 
 
 class _Attempt(NamedTuple):
@@ -124,6 +138,8 @@ class Chunk(Generic[Task, Result]):
     threads : ThreadPoolExecutor, optional
         The tasks wait for the network: they begin at once, in these threads, and one at a time computes.
         Otherwise each begins when the one before it is done, and the first when someone asks what was done.
+    longest_s : float
+        No further task begins so many seconds after the first.
     """
 
     def __init__(
@@ -132,8 +148,9 @@ class Chunk(Generic[Task, Result]):
         tasks: Sequence[Task],
         stopped: threading.Event,
         threads: "ThreadPoolExecutor | None" = None,
+        longest_s: float = LONGEST_S,
     ) -> None:
-        self._do, self._stopped = do, stopped
+        self._do, self._stopped, self._longest_s = do, stopped, longest_s
         self._over, self._failed = 0.0, False
         self._attempts: Iterable[_Attempt | None] = map(self._attempt, tasks)
         if threads is not None:
@@ -161,7 +178,7 @@ class Chunk(Generic[Task, Result]):
     def _attempt(self, task: Task) -> _Attempt | None:
         """Do a task; None where the chunk has ended before it."""
         now = time.monotonic()
-        self._over = self._over or now + _LONGEST_S
+        self._over = self._over or now + self._longest_s
         if self._stopped.is_set() or self._failed or now > self._over:
             return None
         try:

@@ -21,7 +21,7 @@ from rollcli.files.atomic import is_file, is_there, write_atomic
 from rollcli.files.storage import remove
 from rollcli.files.stores.locations import is_url
 from rollcli.messages import say
-from rollcli.run.workers.chunks import Chunk, Done, Result, Task, Work
+from rollcli.run.workers.chunks import LONGEST_ON_CLUSTER_S, Chunk, Done, Result, Task, Work
 from rollcli.run.workers.in_order import SharedPaths
 from rollcli.run.workers.pool import prepare_worker
 
@@ -275,7 +275,7 @@ def _do_chunk(
     if version != __version__:
         raise WorkerError(_other_version(version))
     here = _run_here(run, threads)
-    chunk = Chunk(do, tasks, here.stopped, here.threads)
+    chunk = Chunk(do, tasks, here.stopped, here.threads, LONGEST_ON_CLUSTER_S)
     if here.threads is not None:
         from distributed import secede
 

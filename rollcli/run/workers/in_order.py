@@ -121,7 +121,8 @@ def in_order(
             in_flight.appendleft((each, executor.submit(each, first=True)))
 
     while True:
-        while not stop.asked and len(in_flight) < _IN_FLIGHT * executor.workers:
+        most = executor.workers * (_IN_FLIGHT if chunks.measured else 1)
+        while not stop.asked and len(in_flight) < most:
             chunk: Sequence[Task] = chunks.take(executor.workers)
             if not chunk:
                 break

@@ -87,9 +87,15 @@ def test_chunks_get_smaller_towards_the_end_so_that_all_workers_end_together():
     list(in_order(range(2000), executor, Stop()))
     left = 2000
     for chunk in executor.submitted:
-        assert len(chunk) <= max(1, left // 8)
+        assert len(chunk) <= max(10, left // 8)  # 10 are 50 ms
         left -= len(chunk)
-    assert [len(chunk) for chunk in executor.submitted[-3:]] == [1, 1, 1]
+    assert {len(chunk) for chunk in executor.submitted[-8:-1]} <= {9, 10}
+
+
+def test_many_workers_get_chunks_so_long_that_those_who_hand_them_over_keep_up():
+    executor = FakeExecutor(800, seconds=0.005)
+    list(in_order(iter(range(2_000_000)), executor, Stop()))
+    assert {len(chunk) for chunk in executor.submitted[-100:-1]} <= {1599, 1600}  # 8 s
 
 
 def test_tasks_that_get_slower_make_smaller_chunks():
