@@ -126,6 +126,12 @@ result_options = record(
         show_default=False,
         help="Take every N-th frame from the I-th.  [default: 1/1]",
     ),
+    option(
+        "--shard-by",
+        type=Choice("every", "range"),
+        default="every",
+        help="every: --shard takes every N-th frame; range: the I-th of N runs of consecutive frames.",
+    ),
     option("--fail-fast", is_flag=True, help="Stop at the first frame that fails."),
     option("--timing", is_flag=True, help="Add the column elapsed_ms: milliseconds spent on the frame."),
 )

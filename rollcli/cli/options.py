@@ -55,6 +55,12 @@ input_options = record(
         metavar="FILE",
         help="Read further inputs from FILE, one a line (-: stdin).",
     ),
+    option(
+        "--sorted",
+        is_flag=True,
+        help="The names of --files-from are sorted already (frame2 before frame10) and name one map each: "
+        "they are read as they are needed, so that a hundred million take no memory.",
+    ),
     *_folders,
 )
 

@@ -1,7 +1,7 @@
 """`evaluate paper` from the command line: maps to workers, their findings to tables and one page."""
 
 import contextlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -70,7 +70,7 @@ def run_paper(options: PaperOptions) -> ExitStatus:
     return _run(frames, truth, options)
 
 
-def _known_angles(frames: list[Frame], options: PaperOptions) -> Mapping[str, float]:
+def _known_angles(frames: Sequence[Frame], options: PaperOptions) -> Mapping[str, float]:
     if options.experiments.truth is None:
         return {}
     truth = read_truth(options.experiments.truth)
@@ -80,7 +80,7 @@ def _known_angles(frames: list[Frame], options: PaperOptions) -> Mapping[str, fl
     return truth
 
 
-def _run(frames: list[Frame], truth: Mapping[str, float], options: PaperOptions) -> ExitStatus:
+def _run(frames: Sequence[Frame], truth: Mapping[str, float], options: PaperOptions) -> ExitStatus:
     from rollcli.evaluate.paper_job import examine_file, lost
 
     work = Work(partial(examine_file, options=options, truth=truth), lost)
@@ -112,7 +112,7 @@ def _run(frames: list[Frame], truth: Mapping[str, float], options: PaperOptions)
 
 
 def _time(
-    frames: list[Frame], found: "list[Findings]", options: PaperOptions, progress: Progress
+    frames: Sequence[Frame], found: "list[Findings]", options: PaperOptions, progress: Progress
 ) -> "list[Times]":
     """Take the run times on the first maps, in this process alone."""
     from rollcli.evaluate.experiments import time_solvers

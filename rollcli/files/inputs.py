@@ -13,7 +13,7 @@ from rollcli.files.bounded import MOST_LISTED, as_utf8, read_given, read_stream
 from rollcli.files.naming import listed, match_names, natural_key
 from rollcli.files.search import Search
 from rollcli.files.storage import read_bytes
-from rollcli.files.stores.locations import is_url, public_name
+from rollcli.files.stores.locations import base_name, is_url, public_name
 
 MAP_ENDINGS = (".png", ".tif", ".tiff", ".npy", ".pfm")
 IMAGE_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm")
@@ -115,6 +115,11 @@ def find_inputs(
         raise UsageError(f"no input found: {named + ': no such file' if named else 'the list is empty'}")
     found.sort(key=lambda each: natural_key(each.name))
     return found
+
+
+def named_input(location: str) -> Input:
+    """Make the input of a file that was named by itself."""
+    return Input(location, _shown(location), base_name(location) if is_url(location) else Path(location).name)
 
 
 def _shown(location: str) -> str:

@@ -4,7 +4,6 @@ import contextlib
 import os
 from collections.abc import Iterator, Sequence
 from functools import partial
-from itertools import islice
 from typing import Any, NamedTuple
 
 from rollcli.errors import ClusterError, ExitStatus, OutputError, WorkerError
@@ -98,7 +97,8 @@ def _run(plan: Plan, options: EstimateOptions, resume_command: str, started: lis
         kept = output.kept
         progress.keep(kept.totals, kept.alignment)
         answer = kept.answer
-        for note in islice(calibration_notes(plan.frames), _NOTES):
+        notes = calibration_notes(plan.frames) if options.calibration.given else []
+        for note in notes[:_NOTES]:
             progress.note(note)
         try:
             with stop_on_signals() as stop, progress:

@@ -2,16 +2,18 @@
 
 import contextlib
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import lru_cache
 from itertools import islice
 from pathlib import Path, PurePath
+from typing import overload
 from unicodedata import normalize
 
 from rollcli.errors import UsageError
 from rollcli.files import storage
 from rollcli.files.atomic import is_file, is_folder
-from rollcli.files.inputs import Input, find_inputs, pair_inputs
+from rollcli.files.inputs import Input, find_inputs, named_input, pair_inputs
+from rollcli.files.manifest import Manifest
 from rollcli.files.search import is_place
 from rollcli.files.stores.locations import is_object_url, is_url, names_a_file, public_name, split_url
 from rollcli.files.stores.objects import list_objects
@@ -88,23 +90,29 @@ def check_writes(reads: Sequence[str], writes: Sequence[str], *, overwrite: bool
     UsageError
         Names the file.
     """
-    check_inputs_are_kept(reads, writes)
+    check_inputs_are_kept(lambda: reads, writes)
     if not overwrite:
         check_nothing_is_there(writes)
 
 
-def check_inputs_are_kept(reads: Sequence[str], writes: Iterable[str]) -> None:
+def check_inputs_are_kept(reads: Callable[[], Iterable[str]], writes: Iterable[str]) -> None:
     """Check that no input is written, however differently its path is spelled.
+
+    Parameters
+    ----------
+    reads : callable
+        Begins to yield the inputs anew; a list of them may be too long.
+    writes : iterable of str
 
     Raises
     ------
     UsageError
         Names the file.
     """
-    folders = {_real_folder(_split(path)[0]) for path in reads}
+    folders = {_real_folder(_split(path)[0]) for path in reads()}
     # only what is written beside an input can replace one
     written = {_place(path) for path in writes if _real_folder(_split(path)[0]) in folders}
-    for path in reads if written else ():
+    for path in reads() if written else ():
         if _place(path) in written:
             raise UsageError(f"{path}: would be replaced by an output; write somewhere else")
 
@@ -205,14 +213,16 @@ def map_frames(
     region: RegionOptions | None = None,
     calibration: CalibrationOptions | None = None,
     skip: Sequence[str] = (),
-) -> list[Frame]:
+) -> Sequence[Frame]:
     """Make a frame of each map; `skip` holds the output folders, which are not searched.
 
     Raises
     ------
     UsageError
-        Nothing is named or found, or a mask or a calibration is missing.
+        Nothing is named or found, a mask or a calibration is missing, or names are not sorted that should be.
     """
+    if given.sorted:
+        return _sorted_frames(given, region, calibration)
     if not (given.inputs or given.files_from):
         raise UsageError("no input: name maps (files, folders, patterns, or - for a list on stdin)")
     masks, calibrations = _Masks(region), Calibrations(calibration or CalibrationOptions())
@@ -225,6 +235,49 @@ def map_frames(
         skip=skip,
     )
     return [_frame(each, None, masks, calibrations) for each in found]
+
+
+def _sorted_frames(
+    given: InputOptions, region: RegionOptions | None, calibration: CalibrationOptions | None
+) -> "SortedFrames":
+    if given.inputs or given.files_from is None or given.files_from == "-" or is_url(given.files_from):
+        raise UsageError("--sorted takes the names of one file on disk: give --files-from FILE and no input")
+    manifest = Manifest(given.files_from)
+    return SortedFrames(
+        manifest, _Masks(region), Calibrations(calibration or CalibrationOptions()), range(len(manifest))
+    )
+
+
+class SortedFrames(Sequence[Frame]):
+    """The frames of a manifest, made when they are asked for; a slice of them is another such sequence."""
+
+    def __init__(
+        self, manifest: Manifest, masks: "_Masks", calibrations: Calibrations, places: range
+    ) -> None:
+        self._manifest, self._masks, self._calibrations = manifest, masks, calibrations
+        self._places = places
+
+    def __len__(self) -> int:
+        return len(self._places)
+
+    def __iter__(self) -> Iterator[Frame]:
+        for name in self._manifest.names(self._places):
+            yield _frame(named_input(name), None, self._masks, self._calibrations)
+
+    @overload
+    def __getitem__(self, index: int) -> Frame: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> "SortedFrames": ...
+
+    def __getitem__(self, index: int | slice) -> "Frame | SortedFrames":
+        if isinstance(index, int):
+            place = self._places[index]
+            return next(iter(self._at(range(place, place + 1))))
+        return self._at(self._places[index])
+
+    def _at(self, places: range) -> "SortedFrames":
+        return SortedFrames(self._manifest, self._masks, self._calibrations, places)
 
 
 def pair_frames(

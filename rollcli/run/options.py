@@ -21,6 +21,7 @@ class InputOptions(NamedTuple):
     recursive: bool = False
     include: tuple[str, ...] = ()
     exclude: tuple[str, ...] = ()
+    sorted: bool = False
 
 
 class PairOptions(NamedTuple):
@@ -145,13 +146,17 @@ class FrameOptions(NamedTuple):
 
 
 class ResultOptions(NamedTuple):
-    """Where the rows go, and which frames they are of. `shard` is (I, N), I from 1."""
+    """Where the rows go, and which frames they are of.
+
+    `shard` is (I, N), I from 1: every N-th frame, or one of N runs of consecutive ones, as `shard_by` says.
+    """
 
     output: str = "-"
     format: Literal["csv", "jsonl", "parquet"] | None = None
     resume: bool = False
     retry_failed: bool = False
     shard: tuple[int, int] = (1, 1)
+    shard_by: Literal["every", "range"] = "every"
     fail_fast: bool = False
     timing: bool = False
     part_rows: int = 1000

@@ -1,6 +1,6 @@
 """Decide and check what a run will read and write, before anything runs."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain
 
@@ -18,7 +18,7 @@ from rollcli.run.find import (
     pair_frames,
 )
 from rollcli.run.frame import Frame
-from rollcli.run.options import EstimateOptions
+from rollcli.run.options import EstimateOptions, ResultOptions
 from rollcli.run.outputs import every_path
 
 
@@ -26,7 +26,7 @@ from rollcli.run.outputs import every_path
 class Plan:
     """The frames of a run, in the order of their rows; where the rows go, and in which form."""
 
-    frames: list[Frame]
+    frames: Sequence[Frame]
     output: str
     format: Format
     timing: bool = False
@@ -48,25 +48,35 @@ def make_plan(options: EstimateOptions) -> Plan:
     """
     if options.result.retry_failed and not options.result.resume:
         raise UsageError("--retry-failed does again what failed in an earlier run: give --resume with it")
-    part, parts = options.result.shard
     frames = _find_frames(options)
     if options.pairs.left is None:
         check_depth(frames, options.encoding)
     output = options.result.output
     results = [] if is_stream(output) else [output, run_path(output)]
-    check_one_owner(((frame, _images([frame], options)) for frame in frames), results)
-    reads = [path for frame in frames for path in frame.reads()]
-    reads += calibration_files(options.calibration)
-    check_inputs_are_kept(reads, chain(results, _images(frames, options)))
-    frames = frames[part - 1 :: parts]
+    if options.images.folders():
+        check_one_owner(((frame, _images([frame], options)) for frame in frames), results)
+    calibrations, every = calibration_files(options.calibration), frames
+    check_inputs_are_kept(
+        lambda: chain(calibrations, (path for frame in every for path in frame.reads())),
+        chain(results, _images(every, options)),
+    )
+    frames = _shard(frames, options.result)
     check_places(frames, [folder for _, folder in options.images.folders()])
-    check_first_size(frames, options.frame)
+    if options.calibration.given:
+        check_first_size(frames, options.frame)
     if not (options.running.overwrite or options.result.resume):
         check_images_are_new(frames, options)
     form = options.result.form
     if form == "parquet" and is_stream(output):
         raise UsageError("Parquet is a folder of parts: name it with --output")
     return Plan(frames, output, form, options.result.timing)
+
+
+def _shard(frames: Sequence[Frame], options: ResultOptions) -> Sequence[Frame]:
+    part, parts = options.shard
+    if options.shard_by == "range":
+        return frames[(part - 1) * len(frames) // parts : part * len(frames) // parts]
+    return frames[part - 1 :: parts]
 
 
 def check_images_are_new(frames: Iterable[Frame], options: EstimateOptions) -> None:
@@ -82,10 +92,12 @@ def check_images_are_new(frames: Iterable[Frame], options: EstimateOptions) -> N
 
 def _images(frames: Iterable[Frame], options: EstimateOptions) -> Iterator[str]:
     """Yield every image that may be written; a list of them would take most of our memory."""
+    if not options.images.folders():
+        return iter(())
     return (path for frame in frames for path in every_path(frame, options.images))
 
 
-def _find_frames(options: EstimateOptions) -> list[Frame]:
+def _find_frames(options: EstimateOptions) -> Sequence[Frame]:
     given, pairs = options.inputs, options.pairs
     skip = [folder for _, folder in options.images.folders()]
     named, paired = bool(given.inputs or given.files_from), bool(pairs.left or pairs.right)
@@ -95,6 +107,8 @@ def _find_frames(options: EstimateOptions) -> list[Frame]:
         raise UsageError(
             "no input: name maps (files, folders, patterns, or - for a list on stdin) or --left and --right"
         )
+    if paired and given.sorted:
+        raise UsageError("--sorted takes a list of maps, not --left and --right")
     if paired:
         return pair_frames(given, pairs, region=options.region, calibration=options.calibration, skip=skip)
     if options.images.disparity is not None:

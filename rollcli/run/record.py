@@ -214,6 +214,7 @@ def _effective(plan: Plan, options: EstimateOptions) -> dict[str, Any]:
         "timing": options.result.timing,
         **({"part-rows": options.result.part_rows} if plan.in_parts else {}),
         "shard": "/".join(map(str, options.result.shard)),
+        **({"shard-by": "range"} if options.result.shard_by == "range" else {}),
     }
     return {_OPTION_NAMES.get(key, key).replace("_", "-"): _public(value) for key, value in values.items()}
 

@@ -3,6 +3,7 @@
 import contextlib
 import os
 from collections.abc import Iterator, Mapping
+from itertools import chain
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -196,8 +197,8 @@ def open_output(plan: Plan, options: EstimateOptions) -> Iterator[Output]:
             yield _begin(file, plan, options)
 
 
-def frames_to_do(plan: Plan, options: EstimateOptions) -> list[Frame]:
-    """List the frames that a run would work on, without opening the result for writing.
+def frames_to_do(plan: Plan, options: EstimateOptions) -> Iterator[Frame]:
+    """Yield the frames that a run would work on, without opening the result for writing.
 
     Raises
     ------
@@ -209,8 +210,8 @@ def frames_to_do(plan: Plan, options: EstimateOptions) -> list[Frame]:
     else:
         _check_permitted(plan.output, options)
         kept = _kept_in_file(plan, options)
-    failed = [plan.frames[position] for position in kept.failed]
-    return [*kept.incomplete, *failed, *plan.frames[kept.count :]]
+    failed = (plan.frames[position] for position in kept.failed)
+    return chain(kept.incomplete, failed, plan.frames[kept.count :])
 
 
 def _kept_in_file(plan: Plan, options: EstimateOptions) -> KeptRows:

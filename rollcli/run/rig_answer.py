@@ -8,20 +8,27 @@ from rollcli.files.results import STATUSES, Row
 from rollcli.rig.calibration import Calibration
 from rollcli.rig.quantities import COLUMNS
 
+_MOST_FRAMES = 1_000_000  # their names and numbers take 150 MB
+
 
 class RigAnswer:
-    """Keeps of each row what the answer needs; a batch has a hundred thousand of them.
+    """Keeps of each row what the answer needs, of a million rows at most.
 
     Import-light: the dispatcher loads NumPy only for the answer, once the workers have ended.
     """
 
     def __init__(self) -> None:
+        self._too_many = False
         self._files: list[str] = []
         self._status = bytearray()
         self._numbers = {name: array("d") for name in COLUMNS}
 
     def add(self, row: Row) -> None:
         """Take a row that is written."""
+        if len(self._files) == _MOST_FRAMES:
+            self._too_many = True
+        if self._too_many:
+            return
         self._files.append(row.file)
         self._status.append(STATUSES.index(row.status))
         for name, column in self._numbers.items():
@@ -29,12 +36,16 @@ class RigAnswer:
 
     def replace(self, position: int, row: Row) -> None:
         """Take a row that is written in the place of the one at a position, from 0."""
+        if position >= len(self._files):
+            return
         self._status[position] = STATUSES.index(row.status)
         for name, column in self._numbers.items():
             column[position] = _number(row, name)
 
     def line(self) -> str:
         """Return the answer in one line, such as `roll -0.44 ± 0.06°, 5 ok, 0 suspect, 0 failed`."""
+        if self._too_many:
+            return f"more than {_MOST_FRAMES:,} frames: rollcli rig RESULT says what they say of the rig"
         from rollcli.rig.drive.assess import assess_rig
         from rollcli.rig.words import one_line
 

@@ -117,6 +117,8 @@ def idle_in_estimate(options: EstimateOptions) -> Iterator[Idle]:
     yield from idle_method(options.method)
     yield from idle_folders(options.inputs, options.pairs)
     yield from idle_running(options.running)
+    if options.result.shard == (1, 1):
+        yield Idle(("shard_by",), "there is one shard")
     if options.result.form != "parquet" and not is_url(options.result.output):
         yield Idle(("part_rows",), "only Parquet and results in an object store have parts")
 

@@ -1,0 +1,134 @@
+"""Names of a sorted list, read as they are needed, are those of a list that is read and sorted at once."""
+
+import subprocess
+import sys
+
+import pytest
+
+from rollcli.errors import UsageError
+from rollcli.files import manifest as manifests
+from rollcli.files.manifest import Manifest
+from rollcli.files.naming import natural_key
+from tests.run_cli import environment, rollcli, write_maps
+
+
+@pytest.fixture
+def names(tmp_path, monkeypatch):
+    """1,000 sorted names and the file that lists them, with blank lines and both kinds of line ends."""
+    monkeypatch.setattr(manifests, "_BLOCK", 7)
+    every = sorted((f"a{i % 3}/frame{i}.png" for i in range(1000)), key=natural_key)
+    ends = ["\n", "\r\n", "\n\n"]
+    text = "".join(name + ends[i % 3] for i, name in enumerate(every))
+    (tmp_path / "list.txt").write_bytes(text.encode())
+    return every, str(tmp_path / "list.txt")
+
+
+@pytest.mark.parametrize(
+    "part",
+    [
+        slice(None),
+        slice(5, 9),
+        slice(993, None),
+        slice(3, None, 8),
+        slice(6, 8),
+        slice(9, 9),
+        slice(-1, None),
+    ],
+)
+def test_any_run_of_names_is_read_from_its_place(names, part):
+    every, path = names
+    manifest = Manifest(path)
+    assert len(manifest) == 1000
+    assert list(manifest.names(range(1000)[part])) == every[part]
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (
+            b"frame1.png\n\nframe10.png\nframe2.png\n",
+            "line 4: frame2.png sorts before frame10.png",
+        ),
+        (b"a.png\na.png\n", "line 2: a.png is there twice"),
+        (b"\n\n", "no input found: the list is empty"),
+        (None, "the list of files cannot be read: no such file or directory"),
+    ],
+)
+def test_a_list_that_is_not_sorted_is_refused_and_the_line_is_named(tmp_path, content, said):
+    path = tmp_path / "list.txt"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(UsageError) as caught:
+        Manifest(str(path))
+    assert str(caught.value).startswith(f"{path}: {said}")
+
+
+@pytest.fixture
+def maps(tmp_path):
+    write_maps(tmp_path / "maps", 12)
+    (tmp_path / "maps" / "frame3.png").unlink()
+    (tmp_path / "list.txt").write_text("".join(f"maps/frame{i}.png\n" for i in range(12)))
+    return tmp_path
+
+
+def test_a_sorted_list_gives_the_bytes_of_one_that_is_read_at_once_also_after_a_resume(maps):
+    line = ("estimate", "--files-from", "list.txt", "-q")
+    assert rollcli(*line, "-o", "whole.csv", cwd=maps).status == 3
+    assert rollcli(*line, "--sorted", "-o", "rolls.csv", "-j", "2", cwd=maps).status == 3
+    whole = (maps / "whole.csv").read_bytes()
+    assert (maps / "rolls.csv").read_bytes() == whole
+    records = [(maps / f"{name}.csv.run.json").read_bytes() for name in ("rolls", "whole")]
+    assert records[0] == records[1]
+    (maps / "rolls.csv").write_bytes(b"".join(whole.splitlines(keepends=True)[:6]))
+    assert rollcli(*line, "--sorted", "-o", "rolls.csv", "--resume", cwd=maps).status == 3
+    assert (maps / "rolls.csv").read_bytes() == whole
+
+
+def test_shards_by_range_are_the_whole_one_after_the_other(maps):
+    line = ("estimate", "--files-from", "list.txt", "--sorted", "-q")
+    rollcli(*line, "-o", "whole.csv", cwd=maps)
+    rows = []
+    for part in range(1, 6):
+        name = f"part{part}.csv"
+        rollcli(*line, "--shard", f"{part}/5", "--shard-by", "range", "-o", name, cwd=maps)
+        rows += (maps / name).read_bytes().splitlines(keepends=True)[1:]
+    assert b"".join(rows) == (maps / "whole.csv").read_bytes().partition(b"\n")[2]
+    told = rollcli("rig", *(f"part{part}.csv" for part in (3, 1, 5, 2, 4)), cwd=maps)
+    assert told.out == rollcli("rig", "whole.csv", cwd=maps).out != ""
+
+
+@pytest.mark.parametrize(
+    "given",
+    [("maps",), ("--files-from", "-"), ("maps", "--files-from", "list.txt"), ("--left", "a", "--right", "b")],
+)
+def test_sorted_takes_the_names_of_one_file_alone(maps, given):
+    done = rollcli("estimate", *given, "--sorted", cwd=maps)
+    assert (done.status, done.err.count("\n")) == (2, 1)
+    assert "--sorted takes" in done.err
+
+
+# a program that says how much memory it has taken, kB
+PEAK = """
+import sys
+from pathlib import Path
+from rollcli.__main__ import main
+try:
+    main()
+finally:
+    print(Path("/proc/self/status").read_text().partition("VmHWM:")[2].split()[0], file=sys.stderr)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="it looks into /proc")
+def test_a_long_list_takes_no_memory(tmp_path):
+    peaks, listed = [], tmp_path / "listed"
+    for count in (1000, 200_000):
+        (tmp_path / "list.txt").write_text("".join(f"/none/frame{i:09}.png\n" for i in range(count)))
+        line = [sys.executable, "-c", PEAK, "estimate", "--files-from", "list.txt", "--sorted", "--dry-run"]
+        with listed.open("wb") as out:
+            done = subprocess.run(
+                line, cwd=tmp_path, env=environment(), stdout=out, stderr=subprocess.PIPE, check=False
+            )
+        assert listed.read_bytes().count(b"\n") == count, done.stderr
+        peaks.append(int(done.stderr.split()[-1]))
+    assert peaks[1] - peaks[0] < 8_000  # a list of the names alone would take 14 MB
