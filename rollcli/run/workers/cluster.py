@@ -178,9 +178,10 @@ class ClusterExecutor(Generic[Task, Result]):
         """Take in workers that have joined, and leave out those that have gone; return problems by worker."""
         there = self._client.nthreads()
         new = [worker for worker in there if worker not in self._threads_of and worker not in self._refused]
-        problems = _problems(self._client, self._shared, new) if new else {}
+        problems, silent = _problems(self._client, self._shared, new) if new else ({}, set())
         self._refused.update(problems)
-        self._threads_of = {worker: n for worker, n in there.items() if worker not in self._refused}
+        left_out = self._refused | silent  # those that did not answer are asked again
+        self._threads_of = {worker: n for worker, n in there.items() if worker not in left_out}
         for future in self._in_flight if self._threads_of else ():
             if future.chosen and future.chosen.isdisjoint(self._threads_of):
                 future.send_again()  # all who might do it have gone
@@ -357,13 +358,15 @@ def _worker_plugin() -> Any:
     return PrepareWorker()
 
 
-def _problems(client: Any, shared: SharedPaths, workers: Collection[str]) -> dict[str, str]:
+def _problems(client: Any, shared: SharedPaths, workers: Collection[str]) -> tuple[dict[str, str], set[str]]:
     """Ask workers whether they have this rollcli and see the files and folders that this process sees.
 
     Returns
     -------
-    dict of str
+    problems : dict of str
         What keeps a worker from taking part, by its address; those that can are left out.
+    silent : set of str
+        Those that did not answer: they may have died.
     """
     files = {path.absolute() for path in map(Path, shared.files) if is_file(path)}
     sizes = {str(path): path.stat().st_size for path in files}
@@ -381,11 +384,13 @@ def _problems(client: Any, shared: SharedPaths, workers: Collection[str]) -> dic
             with contextlib.suppress(OutputError):  # the one that could not be made
                 remove(str(mark))
     unable = f"cannot run rollcli {__version__}: "
+    silent = {worker for worker, answer in answers.items() if isinstance(answer, OSError)}
     problems = {
         worker: answer if isinstance(answer, str) else unable + " ".join(str(answer).split())
         for worker, answer in answers.items()
+        if answer and worker not in silent
     }
-    return {worker: problem for worker, problem in problems.items() if problem}
+    return problems, silent
 
 
 def probe(version: str, sizes: dict[str, int], marks: list[str]) -> str:

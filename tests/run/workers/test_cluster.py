@@ -264,7 +264,8 @@ def test_a_worker_that_cannot_take_part_is_known_and_no_mark_is_left(tmp_path, a
         return dict(zip(workers, ("", answer), strict=True))
 
     shared = SharedPaths((), (str(tmp_path / "up"),))
-    problems = _problems(SimpleNamespace(run=ask), shared, ["tcp://first:1", "tcp://second:1"])
+    problems, silent = _problems(SimpleNamespace(run=ask), shared, ["tcp://first:1", "tcp://second:1"])
+    assert silent == set()
     assert problems.keys() == {"tcp://second:1"}
     assert re.match(said, f"worker tcp://second:1: {problems['tcp://second:1']}")
     assert list((tmp_path / "up").iterdir()) == []
