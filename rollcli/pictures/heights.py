@@ -103,7 +103,7 @@ def height_map(
         Returns
         -------
         ndarray of float32, shape (H, W)
-            Along the road's normal, over the fitted parabola with roll and camber; positive: above it. Metres,
+            Along the road's normal, over the fitted parabola with roll and camber; positive: above it. Metres
             or without a calibration that has a baseline, camera heights: of the camera over the road at twice
             the distance of the nearest road that the map's middle shows. NaN where there is no disparity, and
             everywhere where the estimate's disparity does not grow downward: that is no road.

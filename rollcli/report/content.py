@@ -132,6 +132,7 @@ def _card(rows: Sequence[Row], choice: Choice, pictures: Pictures) -> dict[str, 
         "missing": pictures.missing,
         "empty": pictures.empty,
         "show": "before" if pictures.map else "after",
+        "heights": pictures.heights is not None,
         "columns": [
             [
                 ("", "Left image, the found road tinted", "road on the left image", pictures.road, ""),
@@ -142,6 +143,13 @@ def _card(rows: Sequence[Row], choice: Choice, pictures: Pictures) -> dict[str, 
                     f"map de-rotated by {roll}",
                     pictures.level,
                     "Map, de-rotated: not there",
+                ),
+                (
+                    "heights",
+                    "Heights over the road",
+                    "heights over the road",
+                    pictures.heights,
+                    "Heights over the road: not there",
                 ),
             ],
             [

@@ -15,6 +15,8 @@ from rollcli.estimator.estimate import estimate_roll
 from rollcli.files.encodings import read_disparity, to_disparity
 from rollcli.files.formats import read_image, read_stored
 from rollcli.pictures.derotate import derotate
+from rollcli.pictures.heights import CAMERA_HEIGHTS, METRES, FittedRoad, heights_over, steadied
+from rollcli.pictures.heights_preview import draw_heights
 from rollcli.pictures.overlay import draw_disparity, draw_road_on_photo
 from rollcli.pictures.vdisparity import draw_v_disparity, row_offset, v_disparity
 from rollcli.report.sources import Subject
@@ -52,12 +54,13 @@ class Pictures:
     map_counts: Picture | None = None
     level: Picture | None = None
     level_counts: Picture | None = None
+    heights: Picture | None = None
     missing: str = ""
 
     @property
     def empty(self) -> bool:
         """There is nothing to show at all."""
-        return self.road is self.map is self.level is self.level_counts is None
+        return self.road is self.map is self.level is self.level_counts is self.heights is None
 
 
 def take_pictures(subject: Subject, options: FrameOptions) -> Pictures:
@@ -67,12 +70,14 @@ def take_pictures(subject: Subject, options: FrameOptions) -> Pictures:
     road, _ = _attempt(lambda: _road(subject, source, options))
     level, _ = _attempt(lambda: _level(subject, disparity, options))
     counts, _ = _attempt(lambda: _level_counts(subject, disparity, level))
+    heights, _ = _attempt(lambda: _heights(subject, source, options))
     return Pictures(
         road=None if road is None else _encoded(road),
         map=None if disparity is None else _encoded(draw_disparity(disparity)),
         map_counts=None if disparity is None else _encoded(_counts(disparity, disparity)),
         level=None if level is None else _encoded(draw_disparity(level)),
         level_counts=None if counts is None else _encoded(counts),
+        heights=None if heights is None else _encoded(heights),
         missing=missing,
     )
 
@@ -132,6 +137,27 @@ def _level_counts(
     height, width = level.shape
     scale = level if disparity is None else disparity
     return _counts(level, scale, subject.alpha, row_offset(subject.theta, width, height))
+
+
+def _heights(subject: Subject, source: Source | None, options: FrameOptions) -> NDArray[Any]:
+    """Draw the heights over the road: as `estimate` drew or wrote them, else those of the map.
+
+    Of a map they are in metres where the row has the camera's height.
+    """
+    if "heights_preview" in subject.images:
+        return read_image(subject.images["heights_preview"])
+    span, camera = options.images.heights_range, subject.row.height_m
+    photo = None if source is None else source.photo
+    unit = CAMERA_HEIGHTS if camera is None else METRES
+    if "heights" in subject.images:
+        written = read_stored(subject.images["heights"]).values.astype(np.float32)
+        return draw_heights(written, span, unit, photo)
+    disparity = _required(None if source is None else source.shown)
+    road = FittedRoad.of_row(subject.row, None)
+    if road is None:
+        raise InputError(f"{subject.frame.file}: its row has no road")
+    heights = heights_over(disparity, road, None) * np.float32(camera or 1.0)
+    return draw_heights(steadied(heights) if subject.frame.right_file else heights, span, unit, photo)
 
 
 def _counts(

@@ -77,6 +77,8 @@ class Subject:
         The road's parabola, px.
     images : dict of str to str
         The files that `estimate` wrote for it, by kind.
+    row : Row
+        What the result says of it.
     images_only : bool
         Whether pictures come from these alone: a result from elsewhere may name any file.
     refused : str
@@ -87,6 +89,7 @@ class Subject:
     theta: float
     alpha: tuple[float, float, float] | None
     images: dict[str, str]
+    row: Row
     images_only: bool = False
     refused: str = ""
 
@@ -149,9 +152,7 @@ def _subject(row: Row, folder: Path, images: dict[str, str]) -> Subject:
         relative=row.file,
         mask=None,
     )
-    alpha = (row.alpha0, row.alpha1, row.alpha2)
-    whole = None if None in alpha else alpha
-    return Subject(frame, math.radians(row.roll_deg or 0.0), whole, images)  # type: ignore[arg-type]
+    return Subject(frame, math.radians(row.roll_deg or 0.0), row.alpha, images, row)
 
 
 def _located(name: str, folder: Path) -> str:

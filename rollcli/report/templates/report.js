@@ -29,7 +29,7 @@
   dialog.querySelector("[data-close]").addEventListener("click", () => dialog.close());
   dialog.addEventListener("click", event => { if (event.target === dialog) dialog.close(); });
   dialog.addEventListener("close", () => {
-    const side = ["before", "after"].find(each => pictures[current].classList.contains(each));
+    const side = ["before", "after", "heights"].find(each => pictures[current].classList.contains(each));
     if (side) turn(pictures[current].closest(".pictures"), side);
     pictures[current].focus();
   });
