@@ -128,6 +128,13 @@ def test_pitch_and_height(tmp_path):
     assert all(row[header.index(name)] for row in rows for name in ("pitch_deg", "height_m"))
 
 
+def test_heights_of_pairs_and_of_the_maps_of_a_result(tmp_path):
+    shutil.copytree(SAMPLES, tmp_path, dirs_exist_ok=True)
+    run_block("rollcli estimate --left left --right right --calib calib.txt -o pairs.csv", tmp_path)
+    assert len(contents(tmp_path / "seen")) == len(contents(tmp_path / "left"))
+    assert len(contents(tmp_path / "over")) == len(contents(tmp_path / "maps"))
+
+
 def test_the_check_in_ci_passes_a_rig_that_holds_and_fails_one_that_does_not(tmp_path):
     for index in range(40):
         write_kitti(tmp_path / "calibration" / "maps" / f"{index}.png", road_map(0.001, seed=index))
