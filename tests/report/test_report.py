@@ -91,7 +91,8 @@ def test_a_page_holds_everything_it_shows(folder):
     done = report(folder, "out/rolls.csv")
     assert (done.status, done.out) == (0, "")
     text = page_of(folder)
-    assert len(PICTURES.findall(text)) == 4 * 3
+    assert len(PICTURES.findall(text)) == 5 * 3
+    assert text.count('<button type="button" data-show="heights"') == 3
     assert "is empty" in text
     # plotly's script names addresses of maps that it could draw; the page itself asks for nothing
     outside_of_scripts = re.sub(r"<script.*?</script>", "", text, flags=re.S)
@@ -217,8 +218,10 @@ def test_pairs_are_shown_from_their_computed_maps_or_matched_anew(tmp_path):
     shutil.rmtree(tmp_path / "maps")
     assert report(tmp_path, "rolls.csv", "--overwrite").status == 0
     anew = PICTURES.findall(page_of(tmp_path))
-    assert [each for place, each in enumerate(anew) if place % 5] == from_maps
-    assert len(from_maps) == 8
+    # without the left image there is no road on it, and heights are not drawn over it
+    matched = [each for place, each in enumerate(anew) if place % 6 not in (0, 3)]
+    assert matched == [each for place, each in enumerate(from_maps) if place % 5 != 2]
+    assert (len(anew), len(from_maps)) == (12, 10)
 
 
 def test_the_road_is_tinted_on_the_left_image_of_a_pair_as_estimate_draws_it(tmp_path):
@@ -240,7 +243,7 @@ def test_a_road_that_the_result_was_not_made_from_is_not_shown(tmp_path):
     (made,) = read_result(tmp_path / "rolls.csv").rows
     write_result(tmp_path / "rolls.csv", [replace(made, roll_deg=made.roll_deg + 0.01)])
     assert report(tmp_path, "rolls.csv").status == 0
-    assert len(PICTURES.findall(page_of(tmp_path))) == 4
+    assert len(PICTURES.findall(page_of(tmp_path))) == 5
 
 
 def test_files_are_found_from_the_results_folder_too(folder, tmp_path):
@@ -248,7 +251,7 @@ def test_files_are_found_from_the_results_folder_too(folder, tmp_path):
     (folder / "elsewhere").mkdir()
     done = rollcli("report", "../rolls.csv", "-o", "page.html", cwd=folder / "elsewhere")
     assert done.status == 0
-    assert len(PICTURES.findall((folder / "elsewhere" / "page.html").read_text("utf-8"))) == 12
+    assert len(PICTURES.findall((folder / "elsewhere" / "page.html").read_text("utf-8"))) == 15
 
 
 def test_maps_that_are_gone_leave_a_page_that_says_so_and_status_3(folder):
@@ -257,7 +260,7 @@ def test_maps_that_are_gone_leave_a_page_that_says_so_and_status_3(folder):
     assert done.status == 3
     assert "maps/frame1.png: no such file" in done.err
     assert "1 of 3 frames without pictures" in done.err
-    assert len(PICTURES.findall(page_of(folder))) == 8
+    assert len(PICTURES.findall(page_of(folder))) == 10
     assert page_of(folder).count("maps/frame1.png: no such file") == 1
     assert "page.html: pictures of 2 frames, " in done.err
     assert report(folder, "out/rolls.csv", "--gallery", "0", "--overwrite").status == 0
@@ -444,7 +447,7 @@ def test_a_result_from_a_pipe_and_a_page_to_one(folder):
     assert (done.status, done.err) == (0, "")
     assert done.out.startswith("<!doctype html>")
     assert done.out.endswith("</html>")
-    assert len(PICTURES.findall(done.out)) == 4
+    assert len(PICTURES.findall(done.out)) == 5
     assert not (folder / "-").exists()
 
 
@@ -456,3 +459,21 @@ def test_a_page_to_a_device_or_pipe_goes_into_it_and_leaves_it_there(folder):
         assert rollcli("report", "out/rolls.csv", "-o", "pipe", "--gallery", "0", cwd=folder).status == 0
     assert page.result().endswith("</html>")
     assert pipe.is_fifo()
+
+
+def test_heights_are_shown_as_estimate_drew_them_or_made_in_the_same_colours(tmp_path):
+    v = np.mgrid[:120, :160][0]
+    road = np.maximum(0.4 * (v - 20), 0).astype(np.float32)
+    road[80:90, 60:100] += 1.0
+    (tmp_path / "maps").mkdir()
+    np.save(tmp_path / "maps" / "a.npy", road)
+    rig = ("--focal", "200", "--principal-point", "79.5,20", "--baseline", "0.5")
+    rollcli(
+        "estimate", "maps", "-o", "rolls.csv", *rig, "--heights-preview", "out/heights_preview", cwd=tmp_path
+    )
+    (drawn,) = (cv2.imread(str(path)) for path in (tmp_path / "out" / "heights_preview").iterdir())
+    for images in ([], ["--images", "out"]):
+        assert report(tmp_path, "rolls.csv", *images, "--overwrite").status == 0
+        data = base64.b64decode(PICTURES.findall(page_of(tmp_path))[0 if images else 2])
+        shown = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+        assert np.abs(shown.astype(float) - drawn).mean() < 4  # WebP loses a little
