@@ -16,18 +16,22 @@ def bucket(bucket, tmp_path):
 
 
 def test_maps_and_images_and_rows_in_a_bucket_are_those_on_disk(bucket, tmp_path):
-    local = rollcli("estimate", "maps", "-o", "rolls.csv", "--derotated", "level", cwd=tmp_path)
+    images = ("--derotated", "level", "--heights", "h", "--heights-preview", "seen")
+    local = rollcli("estimate", "maps", "-o", "rolls.csv", *images, cwd=tmp_path)
     assert local.status == 0
     there = rollcli(
         *("estimate", f"{bucket}/maps", "-o", f"{bucket}/rolls.csv", "--derotated", f"{bucket}/level"),
+        *("--heights", f"{bucket}/h", "--heights-preview", f"{bucket}/seen"),
         *("--part-rows", "2", "-j", "2"),
         cwd=tmp_path,
     )
     assert (there.status, contents(tmp_path).keys()) == (0, contents(tmp_path).keys())
     expected = (tmp_path / "rolls.csv").read_bytes().replace(b"maps/", f"{bucket}/maps/".encode())
     assert joined(f"{bucket}/rolls.csv") == expected
-    for name, data in contents(tmp_path / "level").items():
-        assert read_bytes(f"{bucket}/level/{name}") == data
+    for folder in ("level", "h", "seen"):
+        assert len(contents(tmp_path / folder)) == 5
+        for name, data in contents(tmp_path / folder).items():
+            assert read_bytes(f"{bucket}/{folder}/{name}") == data
 
 
 def test_a_result_in_a_bucket_is_kept_resumed_and_replaced_as_asked(bucket, tmp_path):
