@@ -132,8 +132,8 @@ class Row:
     right_clockwise_deg: float | None = None
     right_larger_percent: float | None = None
     right_twist_px: float | None = None
-    image_roll_deg: float | None = None
     message: str = ""
+    image_roll_deg: float | None = None
     elapsed_ms: float | None = None
 
     @property
@@ -145,8 +145,9 @@ class Row:
 
 
 STATUSES = ("ok", "suspect", "error")
-TIMING = "elapsed_ms"
-COLUMNS = tuple(field.name for field in fields(Row) if field.name != TIMING)
+# columns that a result has only where they say something: where fx and fy differ, and with --timing
+IMAGE_ROLL, TIMING = FURTHER = ("image_roll_deg", "elapsed_ms")
+COLUMNS = tuple(field.name for field in fields(Row) if field.name not in FURTHER)
 STDIN = "-"
 _MOST_SPACE = 1000  # bytes before what tells the format
 # how the right view of a pair lay against the left one
@@ -187,33 +188,33 @@ class Result:
     run: Mapping[str, Any] | None
 
 
-def columns(timing: bool = False) -> tuple[str, ...]:
-    """List the names of the columns, in order."""
-    return (*COLUMNS, TIMING) if timing else COLUMNS
+def columns(further: Sequence[str] = ()) -> tuple[str, ...]:
+    """List the names of the columns, in order; `further` are those of `FURTHER` that a result has."""
+    return (*COLUMNS, *further)
 
 
-def column_types(timing: bool = False) -> dict[str, type]:
+def column_types(further: Sequence[str] = ()) -> dict[str, type]:
     """Return the type of each column's values, in the columns' order."""
     hints = get_type_hints(Row)
-    return {name: next(kind for kind in (*get_args(hints[name]), hints[name])) for name in columns(timing)}
+    return {name: next(kind for kind in (*get_args(hints[name]), hints[name])) for name in columns(further)}
 
 
-def format_header(form: Format, timing: bool = False) -> bytes:
+def format_header(form: Format, further: Sequence[str] = ()) -> bytes:
     """Format what stands before the first row."""
-    return ",".join(columns(timing)).encode() + b"\n" if form == "csv" else b""
+    return ",".join(columns(further)).encode() + b"\n" if form == "csv" else b""
 
 
-def format_row(row: Row, form: Format, timing: bool = False) -> bytes:
+def format_row(row: Row, form: Format, further: Sequence[str] = ()) -> bytes:
     """Format one line; the same row gives the same bytes."""
     if form == "csv":
-        texts = (_text(name, getattr(row, name)) for name in columns(timing))
+        texts = (_text(name, getattr(row, name)) for name in columns(further))
         return (",".join(map(_quoted, texts)) + "\n").encode(**TEXT)
-    return json.dumps(plain_values(row, timing)).encode() + b"\n"
+    return json.dumps(plain_values(row, further)).encode() + b"\n"
 
 
-def plain_values(row: Row, timing: bool = False) -> dict[str, Any]:
+def plain_values(row: Row, further: Sequence[str] = ()) -> dict[str, Any]:
     """Return the values as the CSV shows them, so that every form says the same; None for an empty one."""
-    return {name: _plain(name, getattr(row, name)) for name in columns(timing)}
+    return {name: _plain(name, getattr(row, name)) for name in columns(further)}
 
 
 def _quoted(text: str) -> str:

@@ -16,7 +16,7 @@ from rollcli.run.find import list_files
 from rollcli.run.frame import Frame, FrameResult, failed_frame
 from rollcli.run.options import EstimateOptions, FrameOptions
 from rollcli.run.outputs import every_path, image_paths, remove_image_leftovers, write_outputs
-from rollcli.run.plan import Plan, make_plan
+from rollcli.run.plan import Plan, further_columns, make_plan
 from rollcli.run.progress import Progress
 from rollcli.run.result import Output, frames_to_do, open_output
 from rollcli.run.rig_answer import RigAnswer
@@ -195,12 +195,12 @@ def _name_of(result: str) -> str:
 def _results(frames: Sequence[Frame], run: _Run, retry_of: str = "") -> Iterator[Iterator[FrameResult]]:
     """Open the results of frames from whichever workers were asked for; the output is complete afterwards."""
     options, output = run.options, run.output
-    form, timing = options.result.form, options.result.timing
+    form = options.result.form
     told = options.frame._replace(
         replaces=output.replaces,
         retry_of=retry_of,
         lines="" if form == "parquet" else form,
-        timing=timing,
+        further=further_columns(frames, options.result),
     )
     work = Work(
         partial(estimate_frame, options=told),

@@ -33,7 +33,7 @@ def run_frame(frame: Frame, options: FrameOptions) -> FrameResult:
     write_outputs(images, paths, replaces=options.replaces, retry_of=options.retry_of)
     elapsed = 1000 * (time.perf_counter() - start)
     row = replace(result.row, elapsed_ms=elapsed)
-    line = format_row(row, options.lines, options.timing) if options.lines else b""
+    line = format_row(row, options.lines, options.further) if options.lines else b""
     return replace(result, row=row, line=line)
 
 

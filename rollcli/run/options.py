@@ -124,7 +124,7 @@ class FrameOptions(NamedTuple):
     `root` is the folder where relative paths start, for workers on other machines; empty for this one.
     `replaces` tells whether files that are in the place of an image are replaced. `retry_of` names the result
     whose failed frames are done again; empty otherwise. `lines` is the format of the lines of a result, which
-    workers make of their rows, with the column of times if `timing`; empty where they make none.
+    workers make of their rows, with the `further` columns; empty where they make none.
     """
 
     encoding: EncodingOptions = EncodingOptions()
@@ -136,7 +136,7 @@ class FrameOptions(NamedTuple):
     replaces: bool = False
     retry_of: str = ""
     lines: Literal["csv", "jsonl", ""] = ""
-    timing: bool = False
+    further: tuple[str, ...] = ()
 
     def at(self, path: str) -> str:
         """Locate a path on this worker."""

@@ -145,10 +145,10 @@ class PartsOutput:
     def _encoded(self, number: int, rows: Sequence[Row]) -> bytes:
         plan = self._plan
         if plan.format == "parquet":
-            values = [plain_values(row, plan.timing) for row in rows]
-            return encode_parquet(column_types(plan.timing), values, self._record.of_rows)
-        header = format_header(plan.format, plan.timing) if number == 0 else b""
-        return header + b"".join(format_row(row, plan.format, plan.timing) for row in rows)
+            values = [plain_values(row, plan.further) for row in rows]
+            return encode_parquet(column_types(plan.further), values, self._record.of_rows)
+        header = format_header(plan.format, plan.further) if number == 0 else b""
+        return header + b"".join(format_row(row, plan.format, plan.further) for row in rows)
 
 
 @contextlib.contextmanager

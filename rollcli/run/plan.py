@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from itertools import chain
 
 from rollcli.errors import UsageError
-from rollcli.files.results import Format, run_path
+from rollcli.files.results import IMAGE_ROLL, TIMING, Format, run_path
 from rollcli.files.stores.locations import is_url
 from rollcli.files.stream import is_stream
 from rollcli.run.calibration import calibration_files, check_depth, check_first_size
@@ -29,7 +29,7 @@ class Plan:
     frames: Sequence[Frame]
     output: str
     format: Format
-    timing: bool = False
+    further: tuple[str, ...] = ()
 
     @property
     def in_parts(self) -> bool:
@@ -69,7 +69,17 @@ def make_plan(options: EstimateOptions) -> Plan:
     form = options.result.form
     if form == "parquet" and is_stream(output):
         raise UsageError("Parquet is a folder of parts: name it with --output")
-    return Plan(frames, output, form, options.result.timing)
+    return Plan(frames, output, form, further_columns(frames, options.result))
+
+
+def further_columns(frames: Sequence[Frame], options: ResultOptions) -> tuple[str, ...]:
+    """List the columns that the result has beside those of every result.
+
+    The first frame's calibration tells of all: a rig has one camera.
+    """
+    camera = frames[0].calibration if frames else None
+    stretched = camera is not None and camera.fx != camera.fy
+    return (*((IMAGE_ROLL,) if stretched else ()), *((TIMING,) if options.timing else ()))
 
 
 def _shard(frames: Sequence[Frame], options: ResultOptions) -> Sequence[Frame]:

@@ -71,7 +71,7 @@ class StreamOutput:
         self.kept = KeptRows(plan, options)
         self.replaces = options.running.overwrite
         self._descriptor, self._name, self._plan = descriptor, name, plan
-        self._write(format_header(plan.format, plan.timing))
+        self._write(format_header(plan.format, plan.further))
 
     def append(self, frame: Frame, result: FrameResult) -> None:
         """Write the row; it has left this process when this returns."""
@@ -163,7 +163,7 @@ class FileOutput:
 
 def _line(result: FrameResult, plan: Plan) -> bytes:
     """Return the line of a row: as its worker made it, or made here for one whose worker died."""
-    return result.line or format_row(result.row, plan.format, plan.timing)
+    return result.line or format_row(result.row, plan.format, plan.further)
 
 
 @contextlib.contextmanager
@@ -245,7 +245,7 @@ def _begin(file: ResultFile, plan: Plan, options: EstimateOptions) -> FileOutput
     file.truncate(len(data) if kept.count else 0)
     record.write({})
     if not kept.count:
-        file.append(format_header(plan.format, plan.timing))
+        file.append(format_header(plan.format, plan.further))
     return FileOutput(file, record, plan, kept, options.images)
 
 

@@ -7,14 +7,19 @@ import os
 import stat
 import time
 from collections.abc import Iterable, Iterator, Mapping
+from itertools import combinations
 from pathlib import Path
 
 from rollcli.errors import OutputError, UsageError
 from rollcli.files.atomic import atomic_file, look_at, output_error, sync_files, write_atomic
 from rollcli.files.locking import locked, take_lock
-from rollcli.files.results import Format, format_header
+from rollcli.files.results import FURTHER, Format, format_header
 
-_HEADERS = (format_header("csv"), format_header("csv", timing=True))
+_HEADERS = tuple(
+    format_header("csv", further)
+    for count in range(len(FURTHER) + 1)
+    for further in combinations(FURTHER, count)
+)
 _STARTS = (*_HEADERS, b'{"file": "')  # of the files that `rollcli estimate` writes
 _FLAGS = os.O_RDWR | os.O_CREAT | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
 _ON_WINDOWS = os.name == "nt"

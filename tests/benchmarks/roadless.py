@@ -1,4 +1,4 @@
-"""Disparity maps of scenes without a road, by casting rays at rectangles: rooms, tables, boards, flying boxes.
+"""Disparity maps of scenes without a road: rays cast at the rectangles of rooms, tables, boards, flying boxes.
 
 The planes in them are as even as a road: what tells them from one is how much of the view they fill, and how
 wide the view is from where the camera stands.
@@ -80,7 +80,7 @@ def _box(rotation: Array, low: Array, high: Array) -> Iterator[Rectangle]:
 def _things(
     rng: np.random.Generator, rotation: Array, top: float, area: Array, count: int
 ) -> Iterator[Rectangle]:
-    """Yield boxes that stand on a level `top` (down is positive), within an area of (x, z) from low to high."""
+    """Yield boxes that stand on a level `top` (down is positive), within an area of (x, z), low to high."""
     for _ in range(count):
         x, z = rng.uniform(area[0], area[1])
         wide, tall, deep = rng.uniform(0.03, 0.3, 3) * (area[1] - area[0]).mean()

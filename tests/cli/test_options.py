@@ -8,7 +8,7 @@ import pytest
 
 from rollcli.cli.main import COMMANDS, main
 from rollcli.estimator.estimate import estimate_roll
-from rollcli.files.results import columns
+from rollcli.files.results import FURTHER, columns
 from rollcli.run.options import MethodOptions
 from tests.readme_tables import OPTIONS_PAGE, commands
 from tests.run_cli import ROOT
@@ -43,7 +43,7 @@ def test_every_option_is_on_the_page_of_options():
 
 def test_every_column_and_exit_status_is_documented_in_the_readme():
     readme = (ROOT / "README.md").read_text("utf-8")
-    assert [name for name in columns(timing=True) if f"`{name}`" not in readme] == []
+    assert [name for name in columns(FURTHER) if f"`{name}`" not in readme] == []
     assert all(f"\n| {status} | " in readme for status in (0, 1, 2, 3, 130))
 
 

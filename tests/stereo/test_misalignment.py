@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from rollcli.stereo.misalignment import LEVEL, Misalignment
+from rollcli.stereo.misalignment import Misalignment
 from rollcli.stereo.misalignment_words import advice_of
 
 
