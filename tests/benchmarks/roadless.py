@@ -1,4 +1,4 @@
-"""Disparity maps of scenes without a road: rays cast at the rectangles of rooms, tables, boards, flying boxes.
+"""Disparity maps without a road: rays cast at the rectangles of rooms, tables, boards, flying boxes.
 
 The planes in them are as even as a road: what tells them from one is how much of the view they fill, and how
 wide the view is from where the camera stands.

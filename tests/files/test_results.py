@@ -7,10 +7,10 @@ import pytest
 
 from rollcli.errors import InputError
 from rollcli.files.results import (
-    FURTHER,
-    TIMING,
     ALIGNMENT_COLUMNS,
     COLUMNS,
+    FURTHER,
+    TIMING,
     Row,
     column_types,
     columns,
