@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from rollcli.rig.drive.assess import assess_rig as assess_rig
     from rollcli.rig.pose import estimate_roll as estimate_roll
     from rollcli.run.calibration import read_calibration as read_calibration
+    from rollcli.run.estimate_pair import estimate_pair as estimate_pair
     from rollcli.stereo.match import compute_disparity as compute_disparity
 
 _HOMES = {
@@ -31,6 +32,7 @@ _HOMES = {
     "assess_rig": "rollcli.rig.drive.assess",
     "compute_disparity": "rollcli.stereo.match",
     "derotate": "rollcli.pictures.derotate",
+    "estimate_pair": "rollcli.run.estimate_pair",
     "estimate_roll": "rollcli.rig.pose",
     "height_map": "rollcli.pictures.heights",
     "read_calibration": "rollcli.run.calibration",
@@ -46,6 +48,7 @@ __all__ = [
     "assess_rig",
     "compute_disparity",
     "derotate",
+    "estimate_pair",
     "estimate_roll",
     "height_map",
     "read_calibration",

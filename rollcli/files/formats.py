@@ -29,31 +29,31 @@ class MapFormat(NamedTuple):
     decode : callable
         From bytes, and the name for errors, to `Stored`.
     encode : callable
-        From an array (H, W), and the values that mean no data, to bytes.
+        From an array (H, W), the values that mean no data, and a text, to bytes.
     """
 
     signatures: tuple[bytes, ...]
     decode: Callable[[bytes, str], Stored]
-    encode: Callable[[NDArray[Any], tuple[float, ...]], bytes]
+    encode: Callable[[NDArray[Any], tuple[float, ...], str], bytes]
 
 
 # a new format: a file in `codecs`, a line here, and its ending in `inputs`, which loads no decoder
 MAP_FORMATS = {
     "png": MapFormat(
         (png.SIGNATURE,),
-        lambda data, name: Stored(png.grey_values(data, name), "png"),
-        lambda values, _: png.encode_png(values),
+        lambda data, name: Stored(png.grey_values(data, name), "png", text=png.text_of(data)),
+        lambda values, _, text: png.encode_png(values, text),
     ),
     "tiff": MapFormat(tiff.SIGNATURES, tiff.decode_tiff, tiff.encode_tiff),
     "npy": MapFormat(
         (arrays.MAGIC,),
         lambda data, name: Stored(native(arrays.decode_npy(data, name)), "npy"),
-        lambda values, _: arrays.encode_npy(values),
+        lambda values, *_: arrays.encode_npy(values),
     ),
     "pfm": MapFormat(
         arrays.MAGICS,
         lambda data, name: Stored(native(arrays.decode_pfm(data, name)), "pfm"),
-        lambda values, _: arrays.encode_pfm(values),
+        lambda values, *_: arrays.encode_pfm(values),
     ),
 }
 _KNOWN = {
@@ -100,7 +100,12 @@ def decode_stored(data: bytes, name: str) -> Stored:
     return stored
 
 
-def encode_stored(values: NDArray[Any], format: str, nodata: tuple[float, ...] = ()) -> bytes:  # noqa: A002
+def encode_stored(
+    values: NDArray[Any],
+    format: str,  # noqa: A002
+    nodata: tuple[float, ...] = (),
+    text: str = "",
+) -> bytes:
     """Encode numbers as a map file.
 
     Parameters
@@ -111,6 +116,8 @@ def encode_stored(values: NDArray[Any], format: str, nodata: tuple[float, ...] =
         "png", "tiff", "npy" or "pfm".
     nodata : tuple of float
         The stored values that mean no data; written as GDAL's tag to a TIFF.
+    text : str
+        ASCII that PNG and TIFF keep beside the numbers, and `decode_stored` returns; NPY and PFM cannot.
 
     Raises
     ------
@@ -121,7 +128,7 @@ def encode_stored(values: NDArray[Any], format: str, nodata: tuple[float, ...] =
     """
     if format not in MAP_FORMATS:
         raise UsageError(f"{format}: unknown map format; {', '.join(MAP_FORMATS)} are written")
-    return MAP_FORMATS[format].encode(values, nodata)
+    return MAP_FORMATS[format].encode(values, nodata, text)
 
 
 def read_image(path: str | Path, name: str | None = None) -> NDArray[Any]:

@@ -78,15 +78,15 @@ def encode_turned(
     return encode_stored(turned, stored.format, stored.nodata)
 
 
-def encode_computed(path: str, disparity: NDArray[Any], save_as: str) -> tuple[str, bytes]:
+def encode_computed(path: str, disparity: NDArray[Any], save_as: str, text: str = "") -> tuple[str, bytes]:
     """Name and encode a map computed from a pair: a PNG in KITTI's 16 bits, other formats in pixels.
 
-    A map that reaches further than such a PNG holds becomes a TIFF of the same stem.
+    A map that reaches further than such a PNG holds becomes a TIFF of the same stem. Both carry `text`.
     """
     if save_as == "png" and np.max(disparity, initial=0) <= KITTI_TOP:
-        return path, encode_stored(from_disparity(disparity, "kitti", np.uint16), "png")
+        return path, encode_stored(from_disparity(disparity, "kitti", np.uint16), "png", text=text)
     form = "tiff" if save_as == "png" else save_as
-    data = encode_stored(disparity.astype(np.float32, copy=False), form)
+    data = encode_stored(disparity.astype(np.float32, copy=False), form, text=text)
     return (roomy_path(path) if save_as == "png" else path), data
 
 
@@ -124,7 +124,7 @@ def _v_disparity(path: str, of: Pictured) -> _Named:
 
 
 def _disparity(path: str, of: Pictured) -> _Named:
-    return encode_computed(path, of.source.shown, of.options.images.save_as)
+    return encode_computed(path, of.source.shown, of.options.images.save_as, of.source.provenance.text)
 
 
 def _road_mask(path: str, of: Pictured) -> _Named:

@@ -19,6 +19,7 @@ from rollcli.files.results import ALIGNMENT_COLUMNS
 from rollcli.run.diagnosis import require_positive, too_large
 from rollcli.run.frame import Frame
 from rollcli.run.options import FrameOptions, MethodOptions, RegionOptions
+from rollcli.run.provenance import Provenance
 
 if TYPE_CHECKING:
     from rollcli.stereo.match import StereoMatch, Wanted
@@ -144,6 +145,11 @@ class Source:
     photo: NDArray[Any] | None = None
 
     @property
+    def provenance(self) -> Provenance:
+        """What a file of the map carries."""
+        return Provenance(self.slope_error, self.doubt, self.alignment)
+
+    @property
     def shown(self) -> NDArray[Any]:
         """The map that images show, px, shape (H, W)."""
         return self.disparity if self.whole is None else self.whole
@@ -179,24 +185,37 @@ def _read(frame: Frame, options: FrameOptions) -> Source:
     )
     encoding = found.encoding.value
     beyond = too_large(found.disparity, stored, encoding)
+    carried = Provenance.of_text(stored.text)
+    # the roll is the same at any scale, pitch and height are not
+    doubts = [carried.doubt, beyond if frame.calibration is not None else ""]
     return Source(
         found.disparity,
         stored=stored,
         encoding=encoding,
         warning=found.warning or "",
         beyond=beyond,
-        # the roll is the same at any scale, pitch and height are not
-        doubt=beyond if frame.calibration is not None else "",
+        slope_error=carried.slope_error,
+        doubt="; ".join(filter(None, doubts)),
+        alignment=carried.alignment,
     )
 
 
 def _match(frame: Frame, options: FrameOptions) -> Source:
-    from rollcli.stereo.match import match_pair
     from rollcli.stereo.views import matched_shape
 
     left = read_image(options.at(frame.path), frame.file)
     right = read_image(options.at(frame.right_path), frame.right_file)
     allowed = region_mask(frame.mask, options, matched_shape(left.shape, options.stereo.downscale))
+    source = matched_source(left, right, allowed, options)
+    return replace(source, photo=left if options.images.needs_photo else None)
+
+
+def matched_source(
+    left: NDArray[Any], right: NDArray[Any], allowed: NDArray[np.bool_] | None, options: FrameOptions
+) -> Source:
+    """Match a pair for the estimate; `allowed` has the shape that is matched at."""
+    from rollcli.stereo.match import match_pair
+
     match = match_pair(left, right, options.stereo, wanted_of(allowed, options))
     searched = (match.min_disparity, match.min_disparity + match.num_disparities - 1)
     height, width = left.shape[:2]
@@ -208,7 +227,6 @@ def _match(frame: Frame, options: FrameOptions) -> Source:
         alignment=_alignment(match),
         size=(width, height),
         whole=match.whole,
-        photo=left if options.images.needs_photo else None,
         allowed=allowed,
     )
 

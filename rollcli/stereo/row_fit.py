@@ -24,6 +24,7 @@ _TUNING = 1.5  # standard deviations off, a block counts a quarter
 _TILE = 64.0  # px of the size measured at: blocks within it err together
 _LINEAR = (0, 1, 2, 3)  # offset, rotation, scale, twist
 _SURE = 4.0  # standard errors: a tilt or a curve of less is none. Plain roads cannot tell it from a scale
+_EXACT = 1e-9  # px^2 times a weight: views without noise are known no better
 _ROAD_ACROSS, _ROAD_DOWN = 0.05, 0.3  # of width and height: how far from the centre the lane's middle lies
 
 
@@ -324,7 +325,8 @@ def _variance(design: Doubles, fit: _Fit, tile: NDArray[np.intp]) -> float:
     From well determined values: where two columns are nearly one, sums over tiles do not see the doubt.
     """
     normal = (design * fit.weight) @ design.T
-    return BELIEF.tiles**2 * float(np.trace(normal @ _covariance(design, fit, tile))) / len(design)
+    found = BELIEF.tiles**2 * float(np.trace(normal @ _covariance(design, fit, tile))) / len(design)
+    return max(found, _EXACT)
 
 
 def _median(values: Doubles) -> float:

@@ -103,7 +103,7 @@ class Rig:
             self.checked += 1
 
         monkeypatch.setattr(stereo, "check_same_scene", check)
-        disparity, corrected, _, doubt = stereo._match_levelled(
+        disparity, corrected, self.told, doubt = stereo._match_levelled(
             self.match, rows, self, FirstLook(20, look), any_scene
         )
         assert disparity[0, 0] == len(self.matched)  # the map of the last match
@@ -152,8 +152,10 @@ def test_what_each_map_hides_is_found_in_three_matches(monkeypatch):
 
 def test_a_pair_that_runs_away_is_given_up_after_four_matches(monkeypatch):
     rig = Rig(lambda at: at + 1.0)
-    assert rig.run(monkeypatch, lies(0.0))[1] == NOT_LEVELLED
+    corrected, doubt = rig.run(monkeypatch, lies(0.0))
+    assert doubt == NOT_LEVELLED
     assert len(rig.matched) == 4
+    assert corrected == rig.matched[-1][0]  # what was matched, not what would be tried next
 
 
 def test_a_pair_that_a_look_led_astray_is_matched_as_it_is_too(monkeypatch):

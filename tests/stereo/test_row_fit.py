@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rollcli.stereo import row_fit
-from rollcli.stereo.misalignment import Misalignment
+from rollcli.stereo.misalignment import LEVEL, Misalignment
 from rollcli.stereo.row_fit import SeenBlocks
 
 
@@ -13,7 +13,8 @@ def seen_at(lies, noise=0.0, count=400, seed=0):
     x, y = rng.uniform(-150, 150, count), rng.uniform(-80, 80, count)
     shift = lies.offset + lies.rotation * x + lies.scale * y + lies.twist * x * y
     shift += rng.normal(0, 1, count) * noise
-    parts = x, y, rng.uniform(0, 60, count), shift, rng.uniform(2, 50, count)
+    weight, near = rng.uniform(2, 50, count), rng.uniform(0, 60, count)
+    parts = x, y, near, shift, weight
     return SeenBlocks(*(part.astype(np.float32) for part in parts))
 
 
@@ -56,3 +57,58 @@ def test_the_median_is_numpys(count):
 def test_far_blocks_count_a_quarter_and_less():
     off = np.array([0, 1.5, -1.5, 15]) * 0.4
     np.testing.assert_allclose(row_fit._believed(off, 0.4), [1, 0.25, 0.25, 1 / 101**2])
+
+
+def blocks_of(rng, field, *, below_horizon=False, noise=0.1, count=1500):
+    """Blocks of a street: a road, and walls of any distance to both sides."""
+    x, y = rng.uniform(-600, 600, count), rng.uniform(-20 if below_horizon else -180, 180, count)
+    road = 0.32 * np.maximum(y + 10, 3)
+    wall = np.abs(x) * rng.uniform(0.03, 0.15, count)
+    near = np.where(rng.random(count) < (1.0 if below_horizon else 0.4), road, np.maximum(road, wall))
+    shift = field(x, y, near) + noise * rng.normal(size=count)
+    parts = x, y, near, shift, np.full(count, 20.0)
+    return SeenBlocks(*(part.astype(np.float32) for part in parts))
+
+
+def support_of(field, **street):
+    seen = blocks_of(np.random.default_rng(5), field, **street)
+    return row_fit.column_support(seen, LEVEL, 0.1, (375, 1242))
+
+
+@pytest.mark.parametrize("scale", [-0.005, -0.002, 0.001, 0.002, 0.005])
+def test_a_scale_that_near_and_far_and_both_halves_show_is_in_the_columns(scale):
+    found = support_of(lambda x, y, near: scale * y)
+    assert found.scale == pytest.approx(scale, abs=0.0002)
+    assert found.error < 0.001
+
+
+@pytest.mark.parametrize(
+    "field",
+    [lambda x, y, near: 0.005 * near, lambda x, y, near: 0.0015 * np.maximum(y, 0)],
+    ids=["tilt", "bend"],
+)
+def test_a_tilt_and_a_bend_are_in_no_column(field):
+    assert abs(support_of(field).scale) < 0.0002
+
+
+def test_what_a_plain_road_cannot_tell_apart_is_doubted():
+    told, plain = (support_of(lambda x, y, near: 0.001 * y, below_horizon=each) for each in (False, True))
+    assert plain.error > 2 * told.error
+
+
+@pytest.mark.parametrize("pitch_deg", [-0.2, 0.2])
+def test_an_offset_is_a_pitch_where_its_rows_curve_as_those_of_one(pitch_deg):
+    focal, turn = 0.6 * 1242, np.radians(pitch_deg)
+    curve = turn / focal
+    found = support_of(lambda x, y, near: turn * focal + curve * y**2)
+    assert found.pitch == pytest.approx(curve, rel=0.2)
+    assert abs(support_of(lambda x, y, near: turn * focal + 0 * y).pitch) < 0.1 * abs(curve)
+
+
+def test_an_even_twist_is_a_yaw_and_an_uneven_one_mostly_a_lens():
+    yaw = np.radians(0.2) / 720
+    even = support_of(lambda x, y, near: yaw * x * y)
+    assert even.twist == pytest.approx(yaw, rel=0.1)
+    lens = support_of(lambda x, y, near: yaw * x * y + 0.2 * (x / 600) ** 2 - 0.2 * (y / 180) ** 3)
+    assert abs(lens.twist) < 0.5 * yaw
+    assert lens.error > even.error

@@ -173,6 +173,7 @@ _DEPTHS = {
     _GREY_ALPHA: (8, 16),
     _COLOUR_ALPHA: (8, 16),
 }
+_TEXT_KEY = b"rollcli\0"
 _MAX_SIDE = 1_000_000  # libpng's own limit
 _MAX_EXPANSION = 1032  # of Deflate
 # Checksums can be right over wrong data. Inflating all of it twice would cost 70 % more time: only the start
@@ -260,11 +261,27 @@ def picture(data: bytes, name: str, *, mask: bool = False) -> NDArray[Any]:
     return _decoded(_checked(data, name, mask), name, PICTURE_FLAGS)
 
 
-def encode_png(values: NDArray[Any]) -> bytes:
-    """Return a PNG file of (H, W) or BGR (H, W, 3) values, uint8 or uint16."""
+def text_of(data: bytes) -> str:
+    """Return what rollcli wrote into a whole PNG file beside the pixels; empty where that is nothing."""
+    position, kind = len(SIGNATURE), b""
+    while kind not in (b"IDAT", b"IEND"):
+        end = position + 12 + int.from_bytes(data[position : position + 4], "big")
+        kind, body = data[position + 4 : position + 8], data[position + 8 : end - 4]
+        if kind == b"tEXt" and body.startswith(_TEXT_KEY):
+            return body.removeprefix(_TEXT_KEY).decode("latin-1")
+        position = end
+    return ""
+
+
+def encode_png(values: NDArray[Any], text: str = "") -> bytes:
+    """Return a PNG file of (H, W) or BGR (H, W, 3) values, uint8 or uint16, and an ASCII text beside them."""
     if values.dtype not in (np.uint8, np.uint16):
         raise OutputError(f"a PNG holds uint8 or uint16, not {values.dtype}: write TIFF or NPY instead")
-    return bytes(cv2.imencode(".png", values)[1])
+    file = bytes(cv2.imencode(".png", values)[1])
+    if not text:
+        return file
+    first = len(SIGNATURE) + 25  # the header, which must be first
+    return file[:first] + _chunk(b"tEXt", _TEXT_KEY + text.encode("ascii")) + file[first:]
 
 
 def _decoded(whole: _Whole, name: str, flags: int) -> NDArray[Any]:

@@ -37,12 +37,15 @@ class Stored:
         The stored values that the file itself says mean no data (GDAL's tag).
     note : str
         What a user should know about how the file was read, or "".
+    text : str
+        What rollcli wrote beside the numbers (PNG text chunk, TIFF description), or "".
     """
 
     values: NDArray[Any]
     format: str
     nodata: tuple[float, ...] = ()
     note: str = ""
+    text: str = ""
 
 
 def require_map_shape(shape: tuple[int, ...], name: str) -> None:

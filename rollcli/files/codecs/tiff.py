@@ -292,6 +292,7 @@ _CHUNKY = 1
 _LARGE_TILE = 2**22  # pixels; a small image may lie in one large tile
 _NOT_A_PAGE_OF_ITS_OWN = 0b101  # a reduced copy, or a mask, of another page
 _GDAL_NODATA = 42113
+_DESCRIPTION = 270
 # how tifffile fails on damaged tags: it has no one error for that
 _DAMAGE = (
     ValueError,
@@ -317,7 +318,7 @@ def decode_tiff(data: bytes, name: str) -> Stored:
             what = "a palette" if page.photometric == _PALETTE else f"{page.samplesperpixel} channels"
             raise InputError(f"{name}: is a colour image ({what}); {COLOUR_REMEDY}")
         values = _pixels(page, data, name)[..., 0]
-        return Stored(native(values), "tiff", nodata=_nodata(page), note=_note(file, name))
+        return Stored(native(values), "tiff", nodata=_nodata(page), note=_note(file, name), text=_text(page))
 
     decoded: Stored = _with_first_page(data, name, decode)
     return decoded
@@ -452,6 +453,12 @@ def _nodata(page: Any) -> tuple[float, ...]:
         return () if tag is None else (float(str(tag.value).strip("\0 ")),)
     except ValueError:
         return ()
+
+
+def _text(page: Any) -> str:
+    """Return the description."""
+    tag = page.tags.get(_DESCRIPTION)
+    return "" if tag is None else str(tag.value)
 
 
 def _note(file: Any, name: str) -> str:

@@ -1,0 +1,108 @@
+"""A pair, its map and the call in Python say the same."""
+
+import csv
+import math
+
+import cv2
+import numpy as np
+import pytest
+
+import rollcli as package
+from rollcli.errors import UsageError
+from rollcli.files.formats import decode_stored, encode_stored
+from rollcli.files.results import ALIGNMENT_COLUMNS
+from rollcli.run.provenance import Provenance
+from rollcli.simulate.render import render_frame
+from rollcli.simulate.spec import FrameSpec
+from tests.run_cli import rollcli
+
+CAMERA = "P{}: {f} 0 {x} {} 0 {f} {y} 0 0 0 1 0\n"
+
+
+@pytest.fixture(scope="module")
+def pair(tmp_path_factory):
+    """A pair in files, whose right view is 0.4 % larger and 1 px lower; its calibration beside it."""
+    folder = tmp_path_factory.mktemp("pair")
+    frame = render_frame(FrameSpec(scene="open", roll=math.radians(3), seed=12, colour=False))
+    height, width = frame.right.shape
+    matrix = cv2.getRotationMatrix2D(((width - 1) / 2, (height - 1) / 2), 0, 1.004)
+    matrix[1, 2] += 1
+    right = cv2.warpAffine(frame.right, matrix, (width, height), flags=cv2.INTER_CUBIC)
+    for side, view in (("left", frame.left), ("right", right)):
+        (folder / side).mkdir()
+        cv2.imwrite(str(folder / side / "a.png"), view)
+    where = {"f": 0.58 * width, "x": (width - 1) / 2, "y": (height - 1) / 2}
+    lines = CAMERA.format(0, 0, **where) + CAMERA.format(1, -0.3 * width, **where)
+    (folder / "calib.txt").write_text(lines)
+    return folder, frame.left, right
+
+
+def row_of(folder, *inputs):
+    done = rollcli("estimate", *inputs, "--calib", "calib.txt", "-o", "rolls.csv", "--overwrite", cwd=folder)
+    assert done.status == 0
+    return next(csv.DictReader((folder / "rolls.csv").read_text().splitlines()))
+
+
+@pytest.mark.parametrize("form", ["png", "tiff"])
+def test_a_pair_and_its_map_give_the_same_row(pair, form):
+    folder, _, _ = pair
+    of_pair = row_of(folder, "--left", "left", "--right", "right")
+    out = f"maps-{form}"
+    done = rollcli(
+        "disparity", "--left", "left", "--right", "right", "-o", out, "--save-as", form, cwd=folder
+    )
+    assert done.status == 0
+    of_map = row_of(folder, out)
+
+    assert float(of_pair["roll_ci95_deg"]) > 0.03  # of which levelling is the most
+    assert of_map["message"] == of_pair["message"]
+    assert [of_map[name] for name in ALIGNMENT_COLUMNS] == [of_pair[name] for name in ALIGNMENT_COLUMNS]
+    assert float(of_map["right_larger_percent"]) > 0.05
+    assert of_map["status"] == of_pair["status"]
+    for column, within in (
+        ("roll_deg", 0.01),
+        ("roll_ci95_deg", 0.01),
+        ("pitch_deg", 0.01),
+        ("height_m", 0.01),
+    ):
+        assert float(of_map[column]) == pytest.approx(float(of_pair[column]), abs=within)
+
+
+def test_the_call_says_what_the_command_does(pair):
+    folder, left, right = pair
+    row = row_of(folder, "--left", "left", "--right", "right")
+
+    found = package.estimate_pair(left, right, calibration=package.read_calibration(folder / "calib.txt"))
+
+    assert math.degrees(found.theta) == pytest.approx(float(row["roll_deg"]), abs=1e-5)
+    assert math.degrees(found.ci95) == pytest.approx(float(row["roll_ci95_deg"]), abs=1e-5)
+    assert math.degrees(found.pitch) == pytest.approx(float(row["pitch_deg"]), abs=1e-5)
+    assert found.height_m == pytest.approx(float(row["height_m"]), abs=1e-5)
+    assert (found.status, found.message) == (row["status"], row["message"])
+
+
+def test_a_largest_roll_that_is_none_is_refused_before_the_match(pair):
+    _, left, right = pair
+    with pytest.raises(UsageError, match="largest roll"):
+        package.estimate_pair(left, right, max_roll=0)
+
+
+def test_what_a_file_carries_is_read_back_and_what_others_wrote_is_not():
+    carried = Provenance(0.00125, 'a "doubt"', {"right_lower_px": 1.25})
+    assert Provenance.of_text(carried.text) == carried
+    assert Provenance().text == ""
+    assert carried.text.isascii()
+    for other in ("", "{}", "[1]", "null", '{"slope_error": -1, "doubt": "", "alignment": {}}', "nonsense"):
+        assert Provenance.of_text(other) == Provenance()
+
+
+def test_maps_with_and_without_a_text_hold_the_same_numbers():
+    values = np.arange(12, dtype=np.uint16).reshape(3, 4)
+    for form in ("png", "tiff"):
+        plain, said = encode_stored(values, form), encode_stored(values, form, text="one line")
+        assert (decode_stored(plain, "x").text, decode_stored(said, "x").text) == ("", "one line")
+        np.testing.assert_array_equal(decode_stored(said, "x").values, values)
+        np.testing.assert_array_equal(
+            cv2.imdecode(np.frombuffer(said, np.uint8), cv2.IMREAD_UNCHANGED), values
+        )
+    assert decode_stored(encode_stored(values, "npy", text="one line"), "x").text == ""
