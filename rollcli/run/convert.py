@@ -18,7 +18,7 @@ from rollcli.run.options import (
     DisparityOptions,
     EncodingOptions,
     FrameOptions,
-    MethodOptions,
+    ImageOptions,
     VDisparityOptions,
 )
 from rollcli.run.outputs import output_path, roomy_path
@@ -71,7 +71,7 @@ def run_disparity(options: DisparityOptions) -> ExitStatus:
     conversions = [Conversion(frame, _disparity_writes(frame, options)) for frame in frames]
     read = FrameOptions(
         stereo=options.stereo,
-        method=MethodOptions(road="all"),  # every row is wanted at full size
+        images=ImageOptions(disparity=options.output),  # levelled as the estimate does, then every row
         root=options.running.root,
         replaces=options.running.overwrite,
     )

@@ -120,11 +120,11 @@ def match_frame(
         if not np.any(source.disparity):
             raise InputError(f"{conversion.frame.file}: no pixel could be matched with the right image")
         path, data = encode_computed(
-            options.at(conversion.writes[0]), source.disparity, save_as, source.provenance.text
+            options.at(conversion.writes[0]), source.shown, save_as, source.provenance.text
         )
         if not preview:
             return {path: data}
-        return {path: data, options.at(conversion.writes[-1]): encode_png(draw_preview(source.disparity))}
+        return {path: data, options.at(conversion.writes[-1]): encode_png(draw_preview(source.shown))}
 
     return _convert(conversion, options, make)
 
