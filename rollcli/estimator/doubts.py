@@ -14,6 +14,7 @@ from rollcli.estimator.road.find import Road
 from rollcli.estimator.road.surface import Surface
 from rollcli.estimator.solvers.solution import angle_between
 from rollcli.estimator.tuning import DoubtTuning
+from rollcli.estimator.view import View
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,8 @@ class Evidence:
     max_interval : float
         The half-width from which an interval is too wide to be ok, radians.
     interval : Interval or None
+    view : View or None
+        Of a road that was looked for.
     """
 
     energy: Energy
@@ -43,6 +46,7 @@ class Evidence:
     max_roll: float
     max_interval: float
     interval: Interval | None
+    view: View | None = None
 
 
 def doubts_of(evidence: Evidence, tuning: DoubtTuning) -> list[str]:
@@ -89,6 +93,15 @@ def _least_score(road: Road, tuning: DoubtTuning) -> float:
     return tuning.least_score if road.horizon < tuning.steep else tuning.least_steep_score
 
 
+def _narrow_view(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
+    view = evidence.view
+    if view is None:
+        return
+    little = view.width < tuning.narrow and view.seen < tuning.least_seen
+    if little or view.width < tuning.narrowest:
+        yield f"the view is as narrow as that of a table or a room: {view.width:.1f} camera heights"
+
+
 def _rival_plane(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
     road = evidence.road
     if not road or road.score < _least_score(road, tuning):
@@ -128,6 +141,7 @@ REASONS: tuple[Reason, ...] = (
     _near_minimum,
     _grows_upward,
     _little_road,
+    _narrow_view,
     _rival_plane,
     _fit_moved,
     _at_bound,

@@ -21,6 +21,7 @@ from rollcli.estimator.request import (
 )
 from rollcli.estimator.road.pixels import PixelSet, load_solver, select_pixels
 from rollcli.estimator.tuning import TUNING, Tuning
+from rollcli.estimator.view import view_of
 
 
 @dataclass(frozen=True)
@@ -169,7 +170,11 @@ def estimate_roll(
     tangent = touch(alpha, theta, Grid.of_shape(height, width), surface, knife)
     turned = tangent.turned_by(slope_error)
     interval = None if knife is None else interval_of(knife, theta, turned, tuning.interval)
-    evidence = Evidence(pixels.energy, certified, pixels.road, surface, max_roll, max_interval, interval)
+    rmse = pixels.energy.rmse(certified.energy)
+    view = view_of(checked.values, checked.valid, surface, rmse) if pixels.road and surface else None
+    evidence = Evidence(
+        pixels.energy, certified, pixels.road, surface, max_roll, max_interval, interval, view
+    )
     doubts = doubts_of(evidence, tuning.doubts)
     return RollEstimate(
         theta=theta,
@@ -180,7 +185,7 @@ def estimate_roll(
         iterations=certified.solution.iterations,
         converged=certified.solution.status.converged,
         global_minimum=None if method in AREAS else certified.is_global,
-        rmse=pixels.energy.rmse(certified.energy),
+        rmse=rmse,
         alpha=alpha,
         valid_fraction=checked.count / checked.values.size,
         road_fraction=pixels.share,

@@ -115,6 +115,14 @@ class DoubtTuning:
     """The same for a plane whose horizon is far away: tables and stairs have up to 0.17."""
     steep: float = 0.5
     """Units from the centre beyond which a horizon is far away: of roads it is within 0.2, of tables 1.5."""
+    narrow: float = 2.0
+    """Camera heights below which a view is narrow: streets have 5 to 8, rendered ones from 2.2 on, tables and
+    rooms up to 2.8. With 3.1 more rooms are told, and roads on which a car hides the lane are doubted."""
+    least_seen: float = 0.75
+    """Share of the lane that is to be on the road in a narrow view. With 0.5 a seventh of the tables, rooms
+    and shelves that are ok otherwise stays so."""
+    narrowest: float = 0.8
+    """Camera heights at the least: cameras that look down at the road see 1.06, those at a table 0.6."""
     rival_share: float = 0.75
     """Share of the road's score from which another plane explains the map nearly as well."""
     longest_move: float = math.radians(1)

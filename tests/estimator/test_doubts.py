@@ -72,6 +72,10 @@ MAPS = {
     "the energy is nearly as low at -30.96 degrees": (saddle, {"road": "all", "method": "exact"}),
     "the disparity grows upward": (lambda: road(4)[::-1], {"road": "all"}),
     "little of what lies ahead looks like a road": (lambda: np.minimum(road(-10), road(10)), {}),
+    "the view is as narrow as that of a table or a room": (
+        lambda: with_noise(50 + 0.06 * (V - 240), 0.05),
+        {},
+    ),
     "another plane, with another roll": (lambda: np.maximum(road(-10), road(10)), {}),
     "the road's pixels moved the roll": (twisted_road, {}),
     "the roll is at its bound": (lambda: road(20.2), {"max_roll": math.radians(20.25)}),
