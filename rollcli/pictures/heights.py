@@ -91,42 +91,41 @@ def height_map(
 ) -> NDArray[np.float32]:
     """Return how high each pixel of a map lies over the road that was fitted to it.
 
-        Parameters
-        ----------
-        disparity : array_like, shape (H, W)
-            Real numbers, px; <= 0, NaN and what is beyond 1e15 are no data.
-        estimate : RollEstimate
-            Of this map, or of one in which the rig stood as it does here.
-        calibration : Calibration, optional
-            Of the rectified left view, at the map's size or at another one.
+    Parameters
+    ----------
+    disparity : array_like, shape (H, W)
+        Real numbers, px; <= 0, NaN and what is beyond 1e15 are no data.
+    estimate : RollEstimate
+        Of this map, or of one in which the rig stood as it does here.
+    calibration : Calibration, optional
+        Of the rectified left view, at the map's size or at another one.
 
-        Returns
-        -------
-        ndarray of float32, shape (H, W)
-            Along the road's normal, over the fitted parabola with roll and camber; positive: above it. Metres
-            or without a calibration that has a baseline, camera heights: of the camera over the road at twice
-            the distance of the nearest road that the map's middle shows. NaN where there is no disparity, and
-            everywhere where the estimate's disparity does not grow downward: that is no road.
+    Returns
+    -------
+    ndarray of float32, shape (H, W)
+        Along the road's normal, over the fitted parabola with roll and camber; positive: above it. Metres,
+        or without a calibration that has a baseline, camera heights: of the camera over the road at twice
+        the distance of the nearest road that the map's middle shows. NaN where there is no disparity, and
+        everywhere where the estimate's disparity does not grow downward: that is no road.
 
-        Raises
-        ------
-        UsageError
-            The map is not of the estimate's size, or the calibration is of another view.
+    Raises
+    ------
+    UsageError
+        The map is not of the estimate's size, or the calibration is of another view.
 
-        Examples
-        --------
-        A level road 1.5 m below a rig of f = 200 px and B = 0.5 m, and a box of 30 cm on it:
+    Examples
+    --------
+    A level road 1.5 m below a rig of f = 200 px and B = 0.5 m, and a box of 30 cm on it:
 
-        >>> import cv2
-    import numpy as np
-        >>> import rollcli
-        >>> rig = rollcli.Calibration(fx=200, fy=200, cx=79.5, cy=29.5, baseline=0.5)
-        >>> v = np.mgrid[:120, :160][0]
-        >>> road = np.maximum(0.5 / 1.5 * (v - 29.5), 0)
-        >>> estimate = rollcli.estimate_roll(road)
-        >>> road[80:90, 60:100] = 0.5 / 1.2 * (v[80:90, 60:100] - 29.5)
-        >>> bool(np.allclose(rollcli.height_map(road, estimate, rig)[80:90, 60:100], 0.3, atol=1e-3))
-        True
+    >>> import numpy as np
+    >>> import rollcli
+    >>> rig = rollcli.Calibration(fx=200, fy=200, cx=79.5, cy=29.5, baseline=0.5)
+    >>> v = np.mgrid[:120, :160][0]
+    >>> road = np.maximum(0.5 / 1.5 * (v - 29.5), 0)
+    >>> estimate = rollcli.estimate_roll(road)
+    >>> road[80:90, 60:100] = 0.5 / 1.2 * (v[80:90, 60:100] - 29.5)
+    >>> bool(np.allclose(rollcli.height_map(road, estimate, rig)[80:90, 60:100], 0.3, atol=1e-3))
+    True
     """
     values = np.asarray(disparity)
     return heights_over(values, FittedRoad.of_estimate(estimate), calibration)
