@@ -19,7 +19,7 @@ from rollcli.errors import EstimationError
 from rollcli.estimator.least_squares import solve_normal
 from rollcli.estimator.moments import Floats
 from rollcli.estimator.road.model import RoadModel
-from rollcli.estimator.road.sample import Sample, Singles, every, take_sample
+from rollcli.estimator.road.sample import Sample, Singles, every, quantile, take_sample
 from rollcli.estimator.tuning import TUNING, SearchTuning, Tuning
 
 HARDLY_A_PIXEL = "no road: hardly a pixel lies on the best plane that was found"
@@ -161,7 +161,8 @@ class Judge:
         across, along = sample.slopes
         self._tuning, self._slope_noise, self.pixels = tuning, sample.slope_noise, len(d)
         self._rows = np.stack([np.ones_like(d), x, y, d]) / tolerance
-        self._products = (self._rows[:3, None] * self._rows[None]).reshape(12, -1)
+        self._near = np.minimum(d, quantile(d, 0.5))  # what is near ahead is the road driven on
+        self._products = (self._rows[:3, None] * self._rows[None]).reshape(12, -1) * self._near
         self._bearings = np.stack([-y / d, x / d])
         self._slopes = np.stack([-across, -along, np.ones_like(d), across**2 + along**2])
         # below a plane a coherent pixel costs twice as much as one that is merely off it
@@ -176,8 +177,10 @@ class Judge:
         slope *= place
         place *= np.maximum(cost, 0)
         # what speaks for a plane counts as far as the slopes agree, what speaks against it in any case
-        lost = place.sum(1) + np.einsum("kn,kn->k", slope, np.minimum(cost, 0, out=cost))
-        scores: Singles = -lost / np.maximum(slope.sum(1), np.float32(1e-30))
+        total, lost = slope.dot(self._near[some]), place.dot(self._near[some])
+        slope *= np.minimum(cost, 0, out=cost)
+        lost += slope.dot(self._near[some])
+        scores: Singles = -lost / np.maximum(total, np.float32(1e-30))
         c0, c1, c2 = planes.T
         steep = c0 * c0 / np.maximum(c1 * c1 + c2 * c2, np.float32(1e-30))
         return np.where(scores > 0, scores / (1 + steep / np.float32(self._tuning.horizon**2)), scores)
