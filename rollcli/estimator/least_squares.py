@@ -1,5 +1,7 @@
 """Least squares of a few parameters in different units, some of which may be missing."""
 
+from functools import cache
+
 import numpy as np
 
 from rollcli.estimator.moments import Floats
@@ -22,10 +24,11 @@ def solve_normal(normal: Floats, pull: Floats) -> Floats:
     ndarray, shape (..., N)
         0 for what is missing.
     """
-    regular = normal.copy()
-    diagonal = np.einsum("...ii->...i", regular)  # a view
-    diagonal += np.where(diagonal > 0, _RIDGE * diagonal, 1.0)
-    return np.asarray(np.linalg.solve(regular, pull[..., None])[..., 0], np.float64)
+    added = np.einsum("...ii->...i", normal) * _RIDGE
+    added[added <= 0] = 1.0
+    return np.asarray(
+        np.linalg.solve(normal + added[..., None] * unit(len(added.T)), pull[..., None])[..., 0]
+    )
 
 
 def regular(normal: Floats, like: Floats) -> Floats:
@@ -47,6 +50,7 @@ def regular(normal: Floats, like: Floats) -> Floats:
     return normal + added
 
 
+@cache
 def unit(size: int) -> Floats:
     """Return the unit matrix of this size."""
     return np.eye(size)

@@ -88,11 +88,13 @@ def find_road(sample: Sample, max_roll: float, seed: int, tuning: Tuning) -> Roa
     if len(planes) == 0:
         raise EstimationError(_why_no_plane(sample, max_roll))
     judge = Judge(sample, search)
-    order = np.argsort(-judge.scores(planes, every(judge.pixels, search.first_pixels)), kind="stable")
-    # the best of each roll: a wide verge must not crowd out the road
-    _, first = np.unique(np.floor(_rolls(planes[order]) / other), return_index=True)
-    start = planes[order[np.sort(first)[: search.refined]]]
-    planes = start
+    scores = judge.scores(planes, every(judge.pixels, search.first_pixels))
+    bins, best = np.floor(_rolls(planes) / other).tolist(), dict[float, int]()
+    for plane in (-scores).argsort(kind="stable").tolist():
+        best.setdefault(bins[plane], plane)  # of each roll: a wide verge must not crowd out the road
+        if len(best) == search.refined:
+            break
+    planes = start = planes[list(best.values())]
     for _ in range(_FITS):
         planes = judge.refined(planes)
     within = np.abs(planes[:, 1]) <= math.tan(max_roll) * planes[:, 2]

@@ -359,7 +359,7 @@ def _near_pixels(sample: Sample, road: Road, tuning: Tuning) -> tuple[NearPixels
     place = np.square(place) / (1 + np.exp(np.minimum(beyond, MOST_FADED)))
     ahead = np.square(np.square(across * (model.alpha[1] / tuning.search.corridor) / mean))
     # the steps of a map of whole pixels are no spread: within less, only stripes of one value are left
-    least = max(_LEAST_WIDTH, sample.quantum / quantile(sample.tolerance, 0.5))
+    least = max(_LEAST_WIDTH, sample.quantum / quantile(sample.tolerance[sample.few], 0.5))
     return (
         NearPixels(
             places=places,
