@@ -44,7 +44,7 @@ class SearchTuning:
     slope_share: float = 0.4
     """Of the road's own slope: how far the map's may be off."""
     horizon: float = 2.0
-    """Units from the centre: a plane whose horizon is farther away is rather a wall, or an own bonnet."""
+    """Units from the centre: a plane whose horizon is farther away is rather a wall, or a table."""
 
 
 @dataclass(frozen=True)
@@ -53,8 +53,6 @@ class FitTuning:
 
     pixels: int = 4500
     """Pixels near the plane that are looked at, each averaged with those around it."""
-    rounds: int = 3
-    """Rounds of the fit to the road, which starts from the lane ahead."""
     start_width: float = 2.0
     """Tolerances within which a pixel counts at first."""
     width: float = 3.75

@@ -179,9 +179,10 @@ class Judge:
         slope *= place
         place *= np.maximum(cost, 0)
         # what speaks for a plane counts as far as the slopes agree, what speaks against it in any case
-        total, lost = slope.dot(self._near[some]), place.dot(self._near[some])
+        near = self._near[some]
+        total, lost = slope.dot(near), place.dot(near)
         slope *= np.minimum(cost, 0, out=cost)
-        lost += slope.dot(self._near[some])
+        lost += slope.dot(near)
         scores: Singles = -lost / np.maximum(total, np.float32(1e-30))
         c0, c1, c2 = planes.T
         steep = c0 * c0 / np.maximum(c1 * c1 + c2 * c2, np.float32(1e-30))

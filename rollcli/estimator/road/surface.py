@@ -31,6 +31,7 @@ _REACH = 3.0  # tolerances from the plane beyond which a pixel is not looked at 
 _LEAST_WIDTH = 0.01  # tolerances, of a map without any error
 _MOST_TURN = 0.2  # radians that a round may turn the road by
 _LEAST_LEVEL = 0.5  # of the lane's level that ground has which is shown as road
+_ROUNDS = 3  # of the fit to the road, which starts from the lane ahead; with 2 it has not settled
 _BINS = 10  # to each side of the profile, which reaches to twice its width
 _BLOCK = 2**20  # pixels
 # around a pixel: two pairs of opposite sides, in rows and columns of their own
@@ -298,7 +299,7 @@ class NearPixels:
         design[3] = start.bulge(across, start.disparity_along(along))
         squares = self._place_on(design, model)
         weights = self._weights(squares, limit)
-        for _ in range(tuning.rounds):
+        for _ in range(_ROUNDS):
             products = _products(design, weights, parabolic=parabolic)
             # the variance of the pixels over that of the prior, times how often they repeat each other
             total = products[0, 0]
