@@ -22,7 +22,8 @@ class ExitStatus(IntEnum):
     FAILED = 1, "the program could not do its job: an output cannot be written, the disk is full"
     USAGE = 2, "wrong usage, or no input found"
     FRAMES_FAILED = 3, "finished, and at least one frame failed; each says why"
-    CHECK_FAILED = 4, "a check has failed, or there are too few frames to tell"
+    CHECK_FAILED = 4, "a check has failed"
+    UNTOLD = 5, "no check has failed, and at least one cannot be told"
     INTERRUPTED = 130, "interrupted"
 
 

@@ -46,7 +46,8 @@ class Command(click.Command):
         super().__init__(*args, **attributes)
         self.examples = tuple(examples)
         self.instead = instead
-        self.statuses = [each for each in ExitStatus if checks or each is not ExitStatus.CHECK_FAILED]
+        of_checks = (ExitStatus.CHECK_FAILED, ExitStatus.UNTOLD)
+        self.statuses = [each for each in ExitStatus if checks or each not in of_checks]
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Parse the words; where there should be none, say what should be there instead."""

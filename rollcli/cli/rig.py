@@ -6,13 +6,13 @@ import click
 
 from rollcli.cli.command import argument, command, option, record
 from rollcli.cli.config import config_option
-from rollcli.cli.options import PATH, running_options
+from rollcli.cli.options import PATH, calibration_options, running_options
 from rollcli.cli.types import TABLE_FILE, TABLE_FORMATS, Choice, Number, table_format
 from rollcli.run.rig_options import GateOptions, RigOptions
 
 gate_options = record(
     "gates",
-    "Checks: exit status 4 when one fails",
+    "Checks: exit status 4 when one fails, 5 when none fails and one cannot be told",
     GateOptions,
     option("--expect-roll", type=Number("DEG"), help="The roll must be this, degrees; with --within."),
     option("--expect-pitch", type=Number("DEG"), help="The pitch must be this, degrees; with --within."),
@@ -31,6 +31,11 @@ gate_options = record(
         "--max-drift", type=Number("DEG", at_least=0), help="Largest drift of the roll over a drive, degrees."
     ),
     option("--max-jump", type=Number("DEG", at_least=0), help="Largest jump of the roll, degrees."),
+    option(
+        "--max-misalignment",
+        type=Number("PX", at_least=0),
+        help="Largest vertical shift between the views of a pair anywhere in the image, pixels.",
+    ),
     option(
         "--min-ok",
         type=Number("SHARE", at_least=0, at_most=1),
@@ -84,6 +89,15 @@ gate_options = record(
     help="A table to read, or for programs; csv has a line for each segment, from one jump to the next.  "
     "[default: by FILE's ending, else table]",
 )
+@option(
+    "--correction",
+    type=PATH,
+    metavar="FILE",
+    section="Assessment",
+    help="Also write how the right view of the pairs has to be corrected: JSON with the numbers, a 3x3 "
+    "matrix and the OpenCV call, for `estimate --align FILE`.",
+)
+@calibration_options
 @gate_options
 @running_options
 @config_option
@@ -91,10 +105,10 @@ gate_options = record(
 def rig(ctx: click.Context, /, **options: Any) -> None:
     """Say how the rig is mounted, whether it has drifted, and when it has jumped.
 
-    RESULTS is one result of `rollcli estimate`, or the shards of one run. Neighbouring frames are alike, so
-    the 95 % intervals rest on blocks of frames instead of single ones. They need eight blocks: a message says
-    about how many frames that takes. Suspect frames are counted and not used. After a jump, the roll is that
-    of the frames since: of the rig as it is now.
+    RESULTS are results of `rollcli estimate`, or the shards of one run. Neighbouring frames are alike: the
+    95 % intervals allow for as much of that as the frames do, and there is one from 8 frames on. Suspect
+    frames are counted and not used. After a jump, the roll is that of the frames since, and with a drift
+    that at the end: of the rig as it is now.
     """
     from rollcli.run.rig import run_rig
 

@@ -17,11 +17,8 @@ from rollcli.report.chart import HISTOGRAM, Chart, chart_names
 from rollcli.report.summary import degrees, with_interval
 from rollcli.rig.drive.assess import DriveAssessment, RigAssessment
 from rollcli.rig.drive.quantity import SequenceAssessment
-from rollcli.rig.drive.smoothing import smooth
 from rollcli.rig.quantities import HEIGHT, QUANTITIES, ROLL, Quantity
 from rollcli.rig.words import answer, decimals
-
-_FEWEST_TO_SMOOTH = 24  # frames: fewer are seen as they are
 
 RigTrace = dict[str, Any]
 
@@ -50,23 +47,16 @@ def rig_traces(rig: RigAssessment, quantity: Quantity, ends: tuple[float, float]
     list of dict
         As plotly takes them; empty ones are left out.
     """
-    band, means, smoothed, jumps = (
-        _trace("mounting, 95 %"),
-        _trace("mounting"),
-        _trace("smoothed"),
-        _trace("jump"),
-    )
+    band, means, jumps = _trace("mounting, 95 %"), _trace("mounting"), _trace("jump")
     band |= {"fill": "toself", "fillcolor": "@band", "line": {"width": 0}, "hoverinfo": "skip"}
     means["line"] = {"color": "@c3", "width": 2}
-    smoothed["line"] = {"color": "@c4", "width": 1.5, "dash": "dot"}
     jumps["line"] = {"color": "@error", "width": 1.5, "dash": "dash"}
     for drive in rig.drives:
         found = drive.quantities.get(quantity.name)
         if found is not None:
             _add_segments(drive, quantity, found, band, means)
-            _add_smoothed(drive, quantity, found, smoothed)
             _add_jumps(rig, drive, quantity, found, jumps, ends)
-    return [trace for trace in (band, means, smoothed, jumps) if trace["x"]]
+    return [trace for trace in (band, means, jumps) if trace["x"]]
 
 
 def _trace(name: str) -> RigTrace:
@@ -85,31 +75,16 @@ def _add_segments(
     drive: DriveAssessment, quantity: Quantity, found: SequenceAssessment, band: RigTrace, means: RigTrace
 ) -> None:
     for segment in found.segments:
-        value, half = segment.mean.value, segment.mean.ci95
-        if value is None or segment.first == segment.last:  # a frame alone is its own mean
+        if segment.mean.value is None or segment.first == segment.last:  # a frame alone is its own mean
             continue
         first, last = (int(drive.frames[place]) + 1 for place in (segment.first, segment.last))
-        said = f"mounting {quantity.name} {answer(segment.mean, quantity)}, of {segment.used:,} frames"
-        _add(means, [first, last], [value, value], said)
-        if half is not None:
-            low, high = value - half, value + half
-            _add(band, [first, last, last, first], [high, high, low, low], "")
-
-
-def _add_smoothed(
-    drive: DriveAssessment, quantity: Quantity, found: SequenceAssessment, smoothed: RigTrace
-) -> None:
-    for segment in found.segments:
-        if found.noise is None or segment.used < _FEWEST_TO_SMOOTH:
-            continue
-        part = slice(segment.first, segment.last + 1)
-        curve = smooth(found.values[part], found.weights[part], found.noise)
-        numbers = drive.frames[(curve.frames + segment.first).astype(int)] + 1
-        # neither across cells whose frames are all suspect, nor across frames of another drive
-        ends = np.flatnonzero(np.diff(numbers) > 1.5 * curve.cell) + 1
-        said = f"mounting {quantity.name}, smoothed"
-        for along, level in zip(np.split(numbers, ends), np.split(curve.level, ends), strict=True):
-            _add(smoothed, along.tolist(), level.tolist(), said)
+        said = f"mounting {quantity.name} {answer(segment.end, quantity)}, of {segment.used:,} frames"
+        ends = [each.value or 0.0 for each in (segment.begin, segment.end)]
+        _add(means, [first, last], ends, said)
+        if segment.begin.ci95 is not None and segment.end.ci95 is not None:
+            halves = segment.begin.ci95, segment.end.ci95
+            low, high = ([v + side * h for v, h in zip(ends, halves, strict=True)] for side in (-1, 1))
+            _add(band, [first, last, last, first], [*high, *low[::-1]], "")
 
 
 def _add_jumps(
@@ -122,7 +97,7 @@ def _add_jumps(
 ) -> None:
     for jump in found.jumps:
         frame = int(drive.frames[jump.frame])
-        said = f"jump by {answer(jump.change, quantity, change=True)} at {rig.frames.files[frame]}"
+        said = f"jump by {answer(jump.change, quantity, change=True)} at {rig.names[frame]}"
         _add(jumps, [frame + 0.5, frame + 0.5], ends, said)
 
 
@@ -255,7 +230,7 @@ def chart_over_frames(
 ) -> Chart:
     """Return the value of each frame: a line, its interval as a band, suspect and failed frames marked.
 
-    With `rig`, its segments, jumps and smoothed mounting value too. A line neither bridges a suspect frame
+    With `rig`, its segments, drifts and jumps too. A line neither bridges a suspect frame
     nor leads from one drive to another.
 
     Parameters

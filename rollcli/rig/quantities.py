@@ -17,6 +17,8 @@ class Quantity:
         What follows a number: "°" or " m".
     suffix : str
         What names end in: "deg" or "m".
+    scale : float
+        What of it is as much as a degree of an angle.
     """
 
     name: str
@@ -24,10 +26,19 @@ class Quantity:
     ci_column: str
     unit: str
     suffix: str
+    scale: float = 1.0
 
 
 ROLL = Quantity("roll", "roll_deg", "roll_ci95_deg", "°", "deg")
 PITCH = Quantity("pitch", "pitch_deg", "pitch_ci95_deg", "°", "deg")
-HEIGHT = Quantity("height", "height_m", "height_ci95_m", " m", "m")
+HEIGHT = Quantity("height", "height_m", "height_ci95_m", " m", "m", 0.1)
 QUANTITIES = (ROLL, PITCH, HEIGHT)
-COLUMNS = tuple(name for each in QUANTITIES for name in (each.column, each.ci_column))
+# how the right view of a pair lies; the frames have no interval of these
+ALIGNMENT = (
+    Quantity("right_lower", "right_lower_px", "", " px", "px", 0.2),
+    Quantity("right_clockwise", "right_clockwise_deg", "", "°", "deg", 0.1),
+    Quantity("right_larger", "right_larger_percent", "", " %", "percent", 0.1),
+    Quantity("right_twist", "right_twist_px", "", " px", "px", 0.2),
+)
+SIZE = ("width", "height")
+COLUMNS = tuple(name for each in (*QUANTITIES, *ALIGNMENT) for name in (each.column, each.ci_column) if name)

@@ -3,13 +3,17 @@
 import math
 from collections.abc import Iterator
 
+import numpy as np
+
 from rollcli.rig.drive.assess import DriveAssessment, RigAssessment
-from rollcli.rig.drive.noise import Estimate
+from rollcli.rig.drive.posterior import Estimate
 from rollcli.rig.drive.quantity import SequenceAssessment
 from rollcli.rig.drive.tuning import TUNING
 from rollcli.rig.quantities import HEIGHT, QUANTITIES, ROLL, Quantity
 
-_FEWEST_DIGITS, _MOST_DIGITS = 2, 4
+# a thousandth of a degree or of a metre is below what any calibration is worth
+_FEWEST_DIGITS, _MOST_DIGITS = 2, 3
+_NAMED = 3  # other drives that the last line of a run names
 
 
 def answer(estimate: Estimate, quantity: Quantity = ROLL, *, change: bool = False) -> str:
@@ -30,7 +34,7 @@ def answer(estimate: Estimate, quantity: Quantity = ROLL, *, change: bool = Fals
     text = f"{estimate.value:{sign}.{digits}f}"
     if float(text) == 0:
         text = text.lstrip("+-")
-    half = "" if estimate.ci95 is None else f" ± {estimate.ci95:.{digits}f}"
+    half = "" if estimate.ci95 is None else f" ± {max(estimate.ci95, 10.0**-digits):.{digits}f}"
     return f"{text}{half}{quantity.unit}"
 
 
@@ -44,10 +48,17 @@ def decimals(half: float | None) -> int:
 def one_line(rig: RigAssessment) -> str:
     """Return the answer in one line: `roll -0.44 ± 0.06°, 5 ok, 0 suspect, 0 failed`."""
     ok = int(rig.frames.ok.sum())
-    now = rig.now()
+    drive, now = rig.latest_drive(), rig.now()
     where = f" {now_in_words(rig)}".rstrip()
-    if now.value is not None and now.ci95 is None:
-        where += " (too few frames for an interval)"
+    if drive is not None and now.ci95 is None:
+        where += f" ({too_few(drive.quantities[ROLL.name])})"
+    others = [each for each in rig.drives if each is not drive and each.quantities[ROLL.name].used]
+    if any(each.differs for each in rig.drives):
+        named = [
+            f"{answer(each.quantities[ROLL.name].now)} in {rig.name_of(each)}" for each in others[:_NAMED]
+        ]
+        more = f" and {len(others) - _NAMED} more" if len(others) > _NAMED else ""
+        where += f"; the drives differ: {', '.join(named)}{more}"
     return f"roll {answer(now)}{where}, {ok:,} ok, {rig.suspect:,} suspect, {rig.failed:,} failed"
 
 
@@ -66,53 +77,72 @@ def counts(rig: RigAssessment) -> str:
 
 
 def now_in_words(rig: RigAssessment, quantity: Quantity = ROLL) -> str:
-    """Return of which frames the answer is, where it is not of all: after a jump, or of the last drive."""
+    """Return of which frames the answer is, where it is not of all: after a jump, a drift, or of a drive."""
     drive = rig.latest_drive(quantity)
     if drive is None:
         return ""
     found = drive.quantities[quantity.name]
+    words = []
     if found.jumps:
-        return f"since {rig.frames.files[drive.frames[found.jumps[-1].frame]]}"
-    return f"in {drive.name}" if len(rig.drives) > 1 else ""
+        jump = found.jumps[-1]
+        change = answer(jump.change, quantity, change=True)
+        words.append(f"since {frame_name(rig, drive, jump.frame)}, where it jumped by {change}")
+    elif len(rig.drives) > 1:
+        words.append(f"in {rig.name_of(drive)}" if drive.name else "")
+    if found.drifts:
+        words.append(
+            f"at the end, after a drift of {answer(found.drift, quantity, change=True)} over the drive"
+        )
+    return ", ".join(filter(None, words))
 
 
-def findings(rig: RigAssessment) -> list[str]:
-    """Return a sentence for each thing that is wrong: jumps, drift, drives that differ, too few frames."""
+def frame_name(rig: RigAssessment, drive: DriveAssessment, place: int) -> str:
+    """Return the name of a frame of a drive, without the folders that all have in common."""
+    return rig.names[int(drive.frames[place])]
+
+
+def findings(rig: RigAssessment, *, roll: bool = True) -> list[str]:
+    """Return a sentence for each thing that is wrong: jumps, drift, drives that differ, too few frames.
+
+    Parameters
+    ----------
+    rig : RigAssessment
+    roll : bool
+        Whether to say the jumps and drifts of the roll too, which the table has already.
+    """
     sentences = []
     for place, drive in enumerate(rig.drives):
         if drive.differs:
-            before = rig.drives[place - 1].name
-            sentences.append(f"{drive.name} differs from {before} by {answer(drive.change, change=True)}")
+            before = rig.name_of(rig.drives[place - 1])
+            sentences.append(
+                f"{rig.name_of(drive)} differs from {before} by {answer(drive.change, change=True)}"
+            )
         for quantity in QUANTITIES:
             found = drive.quantities.get(quantity.name)
             if found is not None:
-                sentences += _of_one(rig, drive, quantity, found)
+                sentences += _of_one(rig, drive, quantity, found, moved=roll or quantity is not ROLL)
     return sentences
 
 
 def _of_one(
-    rig: RigAssessment, drive: DriveAssessment, quantity: Quantity, found: SequenceAssessment
+    rig: RigAssessment, drive: DriveAssessment, quantity: Quantity, found: SequenceAssessment, *, moved: bool
 ) -> Iterator[str]:
     """Return the sentences of one quantity of one drive."""
-    where = f" of {drive.name}" if len(rig.drives) > 1 and drive.name else ""
-    for jump in found.jumps:
-        file = rig.frames.files[drive.frames[jump.frame]]
-        yield f"{quantity.name} jumped by {answer(jump.change, quantity, change=True)} at {file}"
-    if found.drifts:
+    where = f" of {rig.name_of(drive)}" if len(rig.drives) > 1 and drive.name else ""
+    for jump in found.jumps if moved else ():
+        change = answer(jump.change, quantity, change=True)
+        yield f"{quantity.name} jumped by {change} at {frame_name(rig, drive, jump.frame)}"
+    if found.drifts and moved:
         yield f"{quantity.name}{where} drifted by {answer(found.drift, quantity, change=True)} over the drive"
     if found.now.ci95 is None:
         yield f"no interval for the {quantity.name}{where}: {too_few(found)}"
 
 
 def too_few(found: SequenceAssessment) -> str:
-    """Return why there is no interval, and what it would take."""
+    """Return why there is no interval, and how far the frames spread."""
     if not found.used:
         return "no frame counts"
-    last = found.segments[-1]
-    frames = last.last - last.first + 1
-    since = " since the last jump" if found.jumps else ""
-    holds = "frame" if frames == 1 else "frames"
-    return (
-        f"{frames:,} {holds}{since}, and about {last.mean.needed:,} are needed for "
-        f"{TUNING.fewest_blocks} independent blocks of frames"
-    )
+    if found.used == 1:
+        return "a single frame"
+    spread = float(np.ptp(found.series.values[found.series.used]))
+    return f"{found.used:,} frames, which spread over {spread:.2f}; an interval takes {TUNING.fewest}"

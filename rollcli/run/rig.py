@@ -3,12 +3,12 @@
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.errors import ExitStatus, InputError, UsageError
+from rollcli.errors import InputError, UsageError
 from rollcli.files.naming import listed, natural_key
 from rollcli.files.result_columns import ResultColumns, read_columns
 from rollcli.files.results import STATUSES, run_path
@@ -16,13 +16,18 @@ from rollcli.files.stores.locations import base_name
 from rollcli.files.stream import is_stream, write_output
 from rollcli.messages import say
 from rollcli.rig.drive.assess import RigAssessment, RigFrames, assess_frames, difference
-from rollcli.rig.drive.noise import Estimate
-from rollcli.rig.quantities import COLUMNS, QUANTITIES, ROLL
+from rollcli.rig.drive.posterior import Estimate
+from rollcli.rig.quantities import COLUMNS as QUANTITY_COLUMNS
+from rollcli.rig.quantities import QUANTITIES, ROLL, SIZE
 from rollcli.rig.words import findings
+from rollcli.run.calibration import Calibrations
 from rollcli.run.find import check_writes, list_files
-from rollcli.run.rig_gates import check_options, run_checks
+from rollcli.run.rig_gates import check_options, run_checks, status_of
+from rollcli.run.rig_health import correction_text, health_of
 from rollcli.run.rig_options import RigOptions
 from rollcli.run.rig_text import FORMATS, Findings
+
+COLUMNS = (*QUANTITY_COLUMNS, *SIZE)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,7 +49,7 @@ class Source:
 
 
 def read_source(paths: Sequence[str]) -> Source:
-    """Read one result, or the shards of one run.
+    """Read one result, the shards of one run, or results of several.
 
     Parameters
     ----------
@@ -60,15 +65,16 @@ def read_source(paths: Sequence[str]) -> Source:
     InputError
         A file is not a result, or has no rows.
     UsageError
-        The results are not the shards of one run, a shard is missing, or the rows are of several methods.
+        Shards are not of one run, one is missing, or the rows are of several methods.
     """
     parts = [read_columns(path, COLUMNS) for path in paths]
     for part in parts:
         if not part.files:
             raise InputError(f"{part.path}: has no rows: there is nothing to assess")
     _check_one_method(parts)
-    order = _order(parts)
+    order, whole = order_of(parts), are_whole(parts)
     joined = [file for part in parts for file in part.files]
+    origins = [base_name(part.path) for part in parts for _ in part.files] if whole else ()
     status = np.concatenate([part.status for part in parts])[order]
     return Source(
         RigFrames(
@@ -76,6 +82,7 @@ def read_source(paths: Sequence[str]) -> Source:
             status == STATUSES.index("ok"),
             status == STATUSES.index("suspect"),
             {name: _joined(parts, name)[order] for name in COLUMNS if any(name in p.numbers for p in parts)},
+            origins,
         ),
         _unfinished(parts),
         tuple(_notes(parts)),
@@ -93,11 +100,33 @@ def _check_one_method(parts: Sequence[ResultColumns]) -> None:
         raise UsageError(f"{names}: rows of the methods {', '.join(methods)}: assess each method by itself")
 
 
-def _order(parts: Sequence[ResultColumns]) -> NDArray[np.intp]:
+class Part(Protocol):
+    """A result, or one of several that are put together: what their order depends on."""
+
+    @property
+    def path(self) -> str:
+        """Where it is."""
+
+    @property
+    def files(self) -> Sequence[str]:
+        """The column `file`."""
+
+    @property
+    def run(self) -> Mapping[str, Any] | None:
+        """The content of FILE.run.json."""
+
+
+def are_whole(parts: Sequence[Part]) -> bool:
+    """Tell whether there are several results, each of a whole run."""
+    shards = [_shard(part) for part in parts]
+    return len(parts) > 1 and (1, 1) in shards and all(each in (None, (1, 1)) for each in shards)
+
+
+def order_of(parts: Sequence[Part]) -> NDArray[np.intp]:
     """Return the places of all rows, one part after the other, in the order of the run."""
     shards = [_shard(part) for part in parts]
-    if len(parts) == 1 and shards[0] in (None, (1, 1)):
-        return np.arange(len(parts[0].files))
+    if are_whole(parts) or (len(parts) == 1 and shards[0] in (None, (1, 1))):
+        return np.arange(sum(len(part.files) for part in parts))
     if all(shard is None for shard in shards):
         return _by_name(parts)
     for part, shard in zip(parts, shards, strict=True):
@@ -117,14 +146,14 @@ def _order(parts: Sequence[ResultColumns]) -> NDArray[np.intp]:
     return np.argsort(np.concatenate(places), kind="stable")
 
 
-def _check_shards(parts: Sequence[ResultColumns], shards: Sequence[tuple[int, int]]) -> None:
+def _check_shards(parts: Sequence[Part], shards: Sequence[tuple[int, int]]) -> None:
     """One run's shards, each once."""
     first, (_, count) = parts[0], shards[0]
     for part, (_, each) in zip(parts, shards, strict=True):
         if each != count or (count == 1 and len(parts) > 1):
             raise UsageError(
                 f"{first.path} and {(part if part is not first else parts[1]).path} are not shards of one "
-                "run: assess each by itself, or compare two with --against"
+                "run: name all shards of one run, or results of whole runs"
             )
         for name, was, now in _different(first, part):
             names = f"{first.path} and {part.path}"
@@ -141,7 +170,7 @@ def _check_shards(parts: Sequence[ResultColumns], shards: Sequence[tuple[int, in
         )
 
 
-def _different(one: ResultColumns, other: ResultColumns) -> list[tuple[str, Any, Any]]:
+def _different(one: Part, other: Part) -> list[tuple[str, Any, Any]]:
     """Options, shard aside, and versions that differ between two runs."""
     options, others = _options(one.run), _options(other.run)
     found = [
@@ -158,7 +187,7 @@ def _options(run: Mapping[str, Any] | None) -> Mapping[str, Any]:
     return options if isinstance(options, Mapping) else {}
 
 
-def _shard(part: ResultColumns) -> tuple[int, int] | None:
+def _shard(part: Part) -> tuple[int, int] | None:
     """Which shard a result is, by its record; None where there is no record."""
     if part.run is None:
         return None
@@ -169,7 +198,7 @@ def _shard(part: ResultColumns) -> tuple[int, int] | None:
     return index, count
 
 
-def _by_name(parts: Sequence[ResultColumns]) -> NDArray[np.intp]:
+def _by_name(parts: Sequence[Part]) -> NDArray[np.intp]:
     """Without records: the natural order of the names, in which a run's frames are."""
     owner: dict[str, str] = {}
     for part in parts:
@@ -213,7 +242,7 @@ def run_rig(options: RigOptions) -> int:
     Returns
     -------
     int
-        The exit status: 4 when a check fails.
+        The exit status: 4 when a check fails, 5 when none fails and one cannot be told.
 
     Raises
     ------
@@ -223,7 +252,8 @@ def run_rig(options: RigOptions) -> int:
         Exit status 1.
     """
     reads = [*options.results, *filter(None, [options.against])]
-    writes = [] if is_stream(options.output) else [options.output]
+    outputs = filter(None, [options.output, options.correction])
+    writes = [each for each in outputs if not is_stream(each)]
     if len(set(reads)) < len(reads):
         raise UsageError(f"{next(each for each in reads if reads.count(each) > 1)}: is named twice")
     check_options(options.gates)
@@ -237,20 +267,24 @@ def run_rig(options: RigOptions) -> int:
     after = None if later is None else _assessed(later, options)
     changes = {} if after is None else _changes(rig, after)
     missing = source.missing or (later.missing if later is not None else "")
-    checks = run_checks(rig, options.gates, missing, changes.get(ROLL.name))
-    found = Findings(rig, checks, after, changes)
-    write_output(
-        options.output,
-        FORMATS[options.format](found).encode("utf-8", "surrogateescape"),
-        overwrite=options.running.overwrite,
-    )
+    given = options.calibration
+    health = health_of(rig, Calibrations(given).of(rig.frames.files[-1]) if given.given else None)
+    checks = run_checks(rig, options.gates, missing, changes.get(ROLL.name), health)
+    found = Findings(rig, checks, after, changes, health)
+    replace = options.running.overwrite
+    data = FORMATS[options.format](found).encode("utf-8", "surrogateescape")
+    write_output(options.output, data, overwrite=replace)
+    if options.correction is not None:
+        correction = correction_text(health, options.results).encode()
+        write_output(options.correction, correction, overwrite=replace)
     if not options.running.quiet:
         for each in filter(None, [source, later]):
             _tell(each)
-        if options.format != "table" or writes:
+        if options.format != "table" or not is_stream(options.output):
             _say(findings(rig))
-    _say(check.message for check in checks if not check.ok or check.close)
-    return 0 if all(check.ok for check in checks) else ExitStatus.CHECK_FAILED
+    said = {False: "FAILED", None: "cannot tell"}
+    _say(f"{said[check.ok]}: {check.message}" for check in checks if not check.ok)
+    return status_of(checks)
 
 
 def _assessed(source: Source, options: RigOptions) -> RigAssessment:

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 
+from rollcli.rig.calibration import CalibrationOptions
 from rollcli.run.options import RunningOptions
 
 
@@ -21,6 +22,8 @@ class GateOptions:
         Metres.
     max_drift, max_jump : float or None
         Of the roll, degrees; the drift over a drive.
+    max_misalignment : float or None
+        Largest vertical shift between the views in the image, px.
     min_ok : float or None
         Share of the frames that are ok, 0 to 1.
     """
@@ -32,6 +35,7 @@ class GateOptions:
     within_height: float | None = None
     max_drift: float | None = None
     max_jump: float | None = None
+    max_misalignment: float | None = None
     min_ok: float | None = None
 
 
@@ -42,13 +46,17 @@ class RigOptions:
     Attributes
     ----------
     results : tuple of str
-        One result, or the shards of one run.
+        One result or several, or the shards of one run.
     against : str or None
         A later result to compare with.
     include_suspect : bool
     groups : str
         "auto", "none" or a pattern of folders.
     output, format : str
+    correction : str or None
+        Where to write how the right view has to be corrected.
+    calibration : CalibrationOptions
+        For what a misalignment does to depth.
     gates : GateOptions
     running : RunningOptions
     """
@@ -59,5 +67,7 @@ class RigOptions:
     groups: str = "auto"
     output: str = "-"
     format: str = "table"
+    correction: str | None = None
+    calibration: CalibrationOptions = field(default_factory=CalibrationOptions)
     gates: GateOptions = field(default_factory=GateOptions)
     running: RunningOptions = field(default_factory=RunningOptions)

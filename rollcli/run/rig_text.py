@@ -8,11 +8,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from rollcli.rig.drive.assess import DriveAssessment, RigAssessment
-from rollcli.rig.drive.noise import Estimate
+from rollcli.rig.drive.posterior import Estimate
 from rollcli.rig.drive.quantity import Segment
-from rollcli.rig.quantities import QUANTITIES, ROLL, Quantity
-from rollcli.rig.words import answer, counts, findings, now_in_words
+from rollcli.rig.quantities import ALIGNMENT, QUANTITIES, ROLL, Quantity
+from rollcli.rig.words import answer, counts, findings, frame_name, now_in_words
 from rollcli.run.rig_gates import Check
+from rollcli.run.rig_health import DISTANCES, Health
 
 _DIGITS = 6
 
@@ -31,7 +32,10 @@ def rounded(value: float | None) -> float | None:
 
 
 def rig_values(
-    rig: RigAssessment, checks: Sequence[Check], against: tuple[RigAssessment, dict[str, Estimate]] | None
+    rig: RigAssessment,
+    checks: Sequence[Check],
+    against: tuple[RigAssessment, dict[str, Estimate]] | None,
+    health: Health | None = None,
 ) -> dict[str, Any]:
     """Return the assessment as one JSON object."""
     latest = rig.latest()
@@ -55,10 +59,21 @@ def rig_values(
     values["segments"] = [
         _segment(rig, drive, place) for drive in rig.drives for place in range(len(_segments(drive)))
     ]
+    values["alignment"] = None if health is None else alignment_values(health)
     if against is not None:
         values["against"] = _against(*against)
     values["checks"] = [{"name": c.name, "ok": c.ok, "message": c.message} for c in checks]
     return values
+
+
+def alignment_values(health: Health) -> dict[str, Any]:
+    """Return how the right view lies, with intervals, and what that does."""
+    values: dict[str, Any] = {"frames": health.frames}
+    for quantity, part in zip(ALIGNMENT, health.parts, strict=True):
+        values |= named(quantity.name, part, quantity.suffix)
+    values |= named("largest_shift", health.reach, "px")
+    depths = {f"{each}_m": rounded(health.depth_percent(each)) for each in DISTANCES}
+    return {**values, "depth_error_percent": depths, "advice": health.verdict}
 
 
 def _jumps(rig: RigAssessment, quantity: Quantity) -> list[dict[str, Any]]:
@@ -88,10 +103,11 @@ def _segment(rig: RigAssessment, drive: DriveAssessment, place: int) -> dict[str
         "used": roll.used,
         "suspect": int(rig.frames.suspect[frames].sum()),
     }
+    starts = drive.quantities[ROLL.name].starts
     for quantity in QUANTITIES:
         found = drive.quantities.get(quantity.name)
-        mean = found.mean_over(roll.first, roll.last) if found else Estimate()
-        values |= named(quantity.name, roll.mean if quantity is ROLL else mean, quantity.suffix)
+        mean = roll.mean if quantity is ROLL else found.means(starts)[place] if found else Estimate()
+        values |= named(quantity.name, mean, quantity.suffix)
     return values
 
 
@@ -149,12 +165,15 @@ class Findings:
         Of the later result.
     changes : dict of str to Estimate
         From the rig to `after`, by quantity.
+    health : Health or None
+        Of the pair.
     """
 
     rig: RigAssessment
     checks: Sequence[Check]
     after: RigAssessment | None
     changes: dict[str, Estimate]
+    health: Health | None = None
 
 
 def as_table(found: Findings) -> str:
@@ -175,7 +194,7 @@ def as_csv(found: Findings) -> str:
 def as_json(found: Findings) -> str:
     """One object."""
     against = None if found.after is None else (found.after, found.changes)
-    return json.dumps(rig_values(found.rig, found.checks, against), indent=2) + "\n"
+    return json.dumps(rig_values(found.rig, found.checks, against, found.health), indent=2) + "\n"
 
 
 FORMATS = {"table": as_table, "csv": as_csv, "json": as_json}
@@ -189,31 +208,33 @@ def _lines(found: Findings) -> Iterator[str]:
             yield f"{quantity.name:8}{now}" + (f"  ({counts(rig)})" if quantity is ROLL else "")
     drive = rig.latest_drive()
     if drive is not None:
-        drift, over = drive.quantities[ROLL.name].drift, drive.name if len(rig.drives) > 1 else ""
-        if drift.ci95 is not None:
-            yield f"drift   {answer(drift, change=True)} over {over or 'the drive'}"
+        found_roll, over = drive.quantities[ROLL.name], rig.name_of(drive) if len(rig.drives) > 1 else ""
+        if found_roll.drift.ci95 is not None:
+            drifts = f"{answer(found_roll.drift, change=True)} over {over or 'the drive'}"
+            yield f"drift   {drifts}" + ("" if found_roll.drifts else ": none is seen")
         yield f"jumps   {_jump_count(rig)}"
     yield from (f"        {line}" for line in _roll_jumps(rig))
     yield from _segment_lines(rig)
     for name, change in found.changes.items():
         yield from _moved(name, change)
-    sentences = findings(rig)
+    if found.health is not None:
+        yield from found.health.lines()
+    sentences = findings(rig, roll=False)
     if sentences:
         yield ""
     yield from sentences
-    for check in found.checks:
-        yield f"{'ok' if check.ok else 'FAILED'}: {check.message}"
+    yield from (f"ok: {check.message}" for check in found.checks if check.ok)
 
 
 def _jump_count(rig: RigAssessment) -> str:
     """How many jumps of the roll there are; none only where every drive has frames enough to tell."""
     told = all(drive.quantities[ROLL.name].now.ci95 is not None for drive in rig.drives)
-    return str(len(_roll_jumps(rig)) or ("none" if told else "unknown"))
+    return str(len(_roll_jumps(rig)) or ("none" if told else "too few frames to tell"))
 
 
 def _roll_jumps(rig: RigAssessment) -> list[str]:
     return [
-        f"{answer(jump.change, change=True)} at {rig.frames.files[drive.frames[jump.frame]]}"
+        f"{answer(jump.change, change=True)} at {frame_name(rig, drive, jump.frame)}"
         for drive in rig.drives
         for jump in drive.quantities[ROLL.name].jumps
     ]
@@ -227,7 +248,7 @@ def _segment_lines(rig: RigAssessment) -> Iterator[str]:
     yield ""
     yield f"{'roll':>18}  {'frames':>9}  {'used':>9}  from, to"
     for drive, segment in rows[:_SEGMENTS_SHOWN]:
-        first, last = (rig.frames.files[drive.frames[place]] for place in (segment.first, segment.last))
+        first, last = (frame_name(rig, drive, place) for place in (segment.first, segment.last))
         count = segment.last - segment.first + 1
         differs = "  differs" if drive.differs and segment.first == 0 else ""
         yield f"{answer(segment.mean):>18}  {count:9,}  {segment.used:9,}  {first}, {last}{differs}"

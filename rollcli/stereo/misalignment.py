@@ -100,6 +100,16 @@ class Misalignment:
         lower, clockwise, larger, twist = values
         return Misalignment(lower, math.radians(clockwise), larger / 100, twist / (height * width / 4))
 
+    def matrix(self, height: int, width: int) -> list[list[float]]:
+        """Return the affine map from pixels (u, v, 1) of a level view to the given one, without twist."""
+        x, y = (width - 1) / 2, (height - 1) / 2
+        across, down = 1 + self.stretch, 1 + self.scale
+        return [
+            [across, -self.rotation, x - across * x + self.rotation * y],
+            [self.rotation, down, y + self.offset - self.rotation * x - down * y],
+            [0.0, 0.0, 1.0],
+        ]
+
     @property
     def rotation_deg(self) -> float:
         """The rotation in degrees."""

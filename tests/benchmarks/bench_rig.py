@@ -20,9 +20,9 @@ from rollcli.run.workers.pool import limit_blas_threads
 limit_blas_threads()  # as the program does; with two, the series take twenty times as long on a busy machine
 
 import numpy as np
+from rollcli.rig.drive.noise import block_length
 
 from rollcli.files.results import Row, format_header, format_row
-from rollcli.rig.drive.noise import block_length
 from rollcli.rig.drive.quantity import assess_sequence
 from tests.rig.drive.series import drive
 from tests.run_cli import command, environment

@@ -67,7 +67,7 @@ def test_a_height_is_told_in_metres_with_as_many_decimals_as_its_interval_is_wor
     assert traces(pose_charts([each])[0])["height"]["customdata"][0] == "a.png<br>1.654 ± 0.004 m"
 
 
-def test_jumps_segments_and_the_smoothed_value_are_shown_and_no_line_leads_to_another_drive():
+def test_jumps_and_segments_are_shown_and_no_line_leads_to_another_drive():
     rng = np.random.default_rng(4)
     rows = [
         replace(posed(f"{folder}/{place}.png", 3.0, 0.05), height_m=1.5 + jump + noise, height_ci95_m=0.01)
@@ -83,5 +83,4 @@ def test_jumps_segments_and_the_smoothed_value_are_shown_and_no_line_leads_to_an
     assert shown["mounting"]["text"][0].startswith("mounting height 1.50")
     assert shown["jump"]["x"] == [300.5, 300.5, None]
     assert shown["height"]["x"][199:202] == [200, None, 201]
-    assert shown["smoothed"]["x"][199:202] == [200, None, 201]
     assert "jump" not in traces(pitch)

@@ -1,15 +1,14 @@
 """The rig from rows, as a user of Python calls it."""
 
+import re
 from dataclasses import make_dataclass
 
 import numpy as np
 import pytest
-from scipy.stats import t as student
-from scipy.stats import ttest_ind_from_stats
 
 import rollcli
 from rollcli.rig.drive.assess import difference
-from rollcli.rig.drive.noise import Estimate
+from rollcli.rig.drive.posterior import Estimate
 from rollcli.rig.words import answer, findings, one_line
 from tests.rig.drive.series import drive
 
@@ -86,16 +85,34 @@ def test_groups_name_the_folders_that_are_drives():
         rollcli.assess_rig(joined(*parts), groups="nothing*")
 
 
-def test_two_drives_differ_by_welchs_test():
-    before, after = Estimate(0.3, 0.1, 0.05, 9), Estimate(0.7, 0.2, 0.08, 14)
-    # standard deviations of 10 and 15 frames whose means have these errors
-    welch = ttest_ind_from_stats(0.7, 0.08 * 15**0.5, 15, 0.3, 0.05 * 10**0.5, 10, equal_var=False)
+def test_the_interval_of_a_difference_is_that_of_both():
+    change = difference(Estimate(0.3, 0.3), Estimate(0.7, 0.4))
+    assert (change.value, change.ci95) == pytest.approx((0.4, 0.5))
+    assert difference(Estimate(0.3), Estimate(0.7, 0.4)).ci95 is None
 
-    change = difference(before, after)
 
-    assert change.value == pytest.approx(0.4)
-    assert change.value / change.error == pytest.approx(welch.statistic)
-    assert 2 * student.sf(welch.statistic, change.freedom) == pytest.approx(welch.pvalue)
+@pytest.mark.parametrize("frames", [3, 10])
+def test_rigs_that_differ_are_not_pooled_however_few_their_frames(frames):
+    rng = np.random.default_rng(0)
+    parts = [
+        columns(level + rng.normal(0, 0.1, frames), [0.1] * frames, folder=f"data/{name}/")
+        for name, level in (("a", 2.8), ("b", -3.0), ("c", -0.4))
+    ]
+    rig = rollcli.assess_rig(joined(*parts))
+    assert [each.differs for each in rig.drives] == [False, True, True]
+    line = one_line(rig)
+    assert line.startswith("roll -0.")
+    assert " in c" in line
+    assert re.search(r"the drives differ: \+2\.\S+( ± \S+)? in a, -[23]\.\S+( ± \S+)? in b", line)
+
+
+def test_images_of_two_sizes_are_two_drives_and_so_are_two_results():
+    given = columns(*drive(1, 40, sd=0.1)) | {
+        "width": [640] * 20 + [320] * 20,
+        "height": [480] * 20 + [240] * 20,
+    }
+    names = [each.name for each in rollcli.assess_rig(given).drives]
+    assert names == ["run (640x480)", "run (320x240)"]
 
 
 def test_pitch_and_height_are_assessed_by_themselves_where_they_are_there():
@@ -129,17 +146,18 @@ def test_the_answer_in_one_line_counts_every_frame():
 
 def test_the_answer_in_one_line_says_why_it_has_no_interval():
     few = one_line(rollcli.assess_rig(columns(np.full(5, 1.5), np.full(5, 0.1))))
-    assert few == "roll +1.50° (too few frames for an interval), 5 ok, 0 suspect, 0 failed"
+    assert few == (
+        "roll +1.50° (5 frames, which spread over 0.00; an interval takes 8), 5 ok, 0 suspect, 0 failed"
+    )
     failed = {**columns(np.full(5, 1.5), np.full(5, 0.1)), "status": ["error"] * 5}
-    assert "too few" not in one_line(rollcli.assess_rig(failed))
+    assert "spread" not in one_line(rollcli.assess_rig(failed))
 
 
-def test_too_few_frames_have_a_value_without_an_interval_and_say_what_it_takes():
+def test_too_few_frames_have_a_value_without_an_interval_and_say_how_far_they_spread():
     rig = rollcli.assess_rig(columns([0.1, 0.2, 0.3], [0.05] * 3))
     assert answer(rig.now()) == "+0.20°"
     (sentence,) = findings(rig)
-    assert sentence.startswith("no interval for the roll: 3 frames, and about ")
-    assert sentence.endswith(" are needed for 8 independent blocks of frames")
+    assert sentence == "no interval for the roll: 3 frames, which spread over 0.20; an interval takes 8"
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 import numpy as np
 
 from rollcli.rig.drive.assess import DriveAssessment, RigAssessment, RigFrames
-from rollcli.rig.drive.noise import Estimate, Noise
+from rollcli.rig.drive.posterior import Estimate, Series
 from rollcli.rig.drive.quantity import Jump, Segment, SequenceAssessment
 
 UNKNOWN = Estimate()
@@ -11,19 +11,19 @@ UNKNOWN = Estimate()
 
 def known(value, half):
     """A value with its interval."""
-    return Estimate(value, half, half / 2, 20.0)
+    return Estimate(value, half)
 
 
-def short(value, needed):
+def short(value):
     """A value of too few frames for an interval."""
-    return Estimate(value, needed=needed)
+    return Estimate(value)
 
 
 def sequence(count, *means, jumps=(), drift=UNKNOWN, drifts=False, values=None, used=None, outliers=0):
     """One quantity over `count` frames; `jumps` are frames with changes, between which the means hold."""
     bounds = [0, *(frame for frame, _ in jumps), count]
     segments = tuple(
-        Segment(first, end - 1, end - first, mean)
+        Segment(first, end - 1, end - first, mean, mean, mean)
         for first, end, mean in zip(bounds, bounds[1:], means, strict=False)
     )
     return SequenceAssessment(
@@ -36,9 +36,12 @@ def sequence(count, *means, jumps=(), drift=UNKNOWN, drifts=False, values=None, 
         drifts,
         "jump" if jumps else "drift" if drifts else "stable" if means else "few",
         0.125,
-        Noise(1.0, 0.0, 0.0, 1.0),
-        np.zeros(count) if values is None else np.asarray(values, dtype=float),
-        np.ones(count),
+        Series(
+            np.zeros(count) if values is None else np.asarray(values, dtype=float),
+            np.full(count, 0.01),
+            np.ones(count, dtype=bool),
+        ),
+        1.0,
     )
 
 

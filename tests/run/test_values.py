@@ -40,7 +40,7 @@ CHANGES = {"roll": known(0.5, 0.25), "pitch": known(0.125, 0.25), "height": UNKN
 
 
 def test_json_is_every_number_of_the_assessment():
-    checks = [Check("min-ok", True, "fine"), Check("max-jump", False, "far", close=True)]
+    checks = [Check("min-ok", True, "fine"), Check("max-jump", False, "far")]
     after = rig(("c", {"roll": sequence(7, known(0.0, 0.1), used=6)}))
     values = json.loads(as_json(Findings(assessed(), checks, after, CHANGES)))
     segments, against = values.pop("segments"), values.pop("against")
@@ -67,6 +67,7 @@ def test_json_is_every_number_of_the_assessment():
         "jumps": [{"frame": 10, "file": "a/10", "change_deg": 0.5, "change_ci95_deg": 0.05}],
         "pitch_jumps": [{"frame": 35, "file": "b/5", "change_deg": 1.0, "change_ci95_deg": 0.1}],
         "height_jumps": [],
+        "alignment": None,
         "checks": [
             {"name": "min-ok", "ok": True, "message": "fine"},
             {"name": "max-jump", "ok": False, "message": "far"},
@@ -79,8 +80,8 @@ def test_json_is_every_number_of_the_assessment():
         ["b", 30, 49, 20, 20, 0, -2.0, 0.1],
     ]
     # the pitch over the frames of the roll's segment, a jump of its own aside
-    assert [each["pitch_deg"] for each in segments] == [None, None, 3.75]
-    assert [each["height_m"] for each in segments] == [None, None, 1.65]
+    assert [each["pitch_deg"] for each in segments] == [None, None, pytest.approx(3.75, abs=0.1)]
+    assert [each["height_m"] for each in segments] == [None, None, pytest.approx(1.65)]
     assert against == {
         "frames": 7,
         "used": 6,
@@ -117,8 +118,9 @@ def test_csv_is_a_line_for_each_segment_with_what_came_before_it():
 def test_the_table_is_the_answer_then_what_happened_then_the_sentences_and_checks():
     checks = [Check("min-ok", True, "fine"), Check("max-jump", False, "far")]
     assert as_table(Findings(assessed(), checks, rig(), CHANGES)).splitlines() == [
-        "roll    -2.00 ± 0.10° in b  (48 of 50 frames, 3 suspect, 1 failed, 2 far off their neighbours)",
-        "pitch   +4.00 ± 0.10° since b/5",
+        "roll    -2.00 ± 0.10° in b, at the end, after a drift of -0.25 ± 0.03° over the drive  "
+        "(48 of 50 frames, 3 suspect, 1 failed, 2 far off their neighbours)",
+        "pitch   +4.00 ± 0.10° since b/5, where it jumped by +1.00 ± 0.10°",
         "height  1.65 ± 0.01 m in b",
         "drift   -0.25 ± 0.03° over b",
         "jumps   1",
@@ -131,12 +133,9 @@ def test_the_table_is_the_answer_then_what_happened_then_the_sentences_and_check
         "roll against the other result: +0.50 ± 0.25°, it has moved",
         "pitch against the other result: +0.12 ± 0.25°, no move is seen",
         "",
-        "roll jumped by +0.50 ± 0.05° at a/10",
         "b differs from a by -3.00 ± 0.10°",
-        "roll of b drifted by -0.25 ± 0.03° over the drive",
         "pitch jumped by +1.00 ± 0.10° at b/5",
         "ok: fine",
-        "FAILED: far",
     ]
 
 
@@ -144,21 +143,21 @@ def test_one_drive_without_findings_is_told_in_three_lines():
     quiet = rig(("a", {"roll": sequence(9, known(1.0, 0.1), drift=known(0.0, 0.1))}))
     assert as_table(Findings(quiet, [], None, {})).splitlines() == [
         "roll    +1.00 ± 0.10°  (9 of 9 frames)",
-        "drift   0.00 ± 0.10° over the drive",
+        "drift   0.00 ± 0.10° over the drive: none is seen",
         "jumps   none",
     ]
 
 
 def test_too_few_frames_are_told_instead_of_a_drift_and_of_jumps():
     few = rig(
-        ("a", {"roll": sequence(9, short(1.0, 40))}), include_suspect=True, suspect=[True] * 9, ok=[False] * 9
+        ("a", {"roll": sequence(7, short(1.0))}), include_suspect=True, suspect=[True] * 7, ok=[False] * 7
     )
-    assert as_table(Findings(few, [], None, {"roll": short(0.5, 9)})).splitlines() == [
-        "roll    +1.00°  (9 of 9 frames, 9 suspect, counted)",
-        "jumps   unknown",
+    assert as_table(Findings(few, [], None, {"roll": short(0.5)})).splitlines() == [
+        "roll    +1.00°  (7 of 7 frames, 7 suspect, counted)",
+        "jumps   too few frames to tell",
         "roll against the other result: +0.50°, too few frames for an interval",
         "",
-        "no interval for the roll: 9 frames, and about 40 are needed for 8 independent blocks of frames",
+        "no interval for the roll: 7 frames, which spread over 0.00; an interval takes 8",
     ]
     assert as_table(Findings(rig(), [], None, {})) == "roll    unknown  (0 of 0 frames)\n"
 
@@ -179,7 +178,7 @@ def test_of_many_segments_the_table_shows_forty(drives, more):
         (known(-0.5, 0.25), True),
         (known(0.25, 0.25), False),
         (known(0.0, 0.25), False),
-        (short(9.0, 5), None),
+        (short(9.0), None),
         (UNKNOWN, None),
     ],
 )

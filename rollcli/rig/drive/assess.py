@@ -4,22 +4,32 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
+from functools import cached_property
 from pathlib import PurePosixPath
+from statistics import NormalDist
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import UsageError
-from rollcli.rig.drive.noise import Estimate, Flags, Floats, t_quantile, with_interval
+from rollcli.rig.drive.outliers import Flags, Floats
+from rollcli.rig.drive.posterior import Estimate
 from rollcli.rig.drive.quantity import SequenceAssessment, assess_sequence
-from rollcli.rig.quantities import COLUMNS, QUANTITIES, ROLL, Quantity
+from rollcli.rig.quantities import ALIGNMENT, COLUMNS, QUANTITIES, ROLL, SIZE, Quantity
 
 AUTO, NONE = "auto", "none"
 _FRAMES_OF_A_DRIVE = 8  # folders of fewer frames on average are not drives but single frames
+_APART = 4.0  # standard deviations within a group; medians of a hundred groups of one rig are 3.5 apart
+_LEAST_SPREAD = 0.05  # degrees
 
 
-def split_drives(files: Sequence[str], groups: str = AUTO) -> list[tuple[str, NDArray[np.intp]]]:
+def split_drives(
+    files: Sequence[str],
+    groups: str = AUTO,
+    kinds: Sequence[str] = (),
+    rolls: NDArray[np.float64] | None = None,
+) -> list[tuple[str, NDArray[np.intp]]]:
     """Group frames into drives.
 
     Parameters
@@ -27,8 +37,13 @@ def split_drives(files: Sequence[str], groups: str = AUTO) -> list[tuple[str, ND
     files : sequence of str
         Paths with "/" separators, in the order of the frames.
     groups : str
-        "auto": frames of one folder are one drive, unless folders hold hardly a frame each; "none": all are
-        one; else a pattern such as "data/run*": the folders that it matches are drives, with all below them.
+        "auto": frames of one folder are one drive, unless folders hold hardly a frame each and their rolls do
+        not differ beyond their spread; "none": all are one; else a pattern such as "data/run*": the folders
+        that it matches are drives, with all below them.
+    kinds : sequence of str, optional
+        What else tells the frames of a folder apart, such as their size.
+    rolls : ndarray of float, shape (N,), optional
+        Degrees; NaN where a frame does not count.
 
     Returns
     -------
@@ -47,14 +62,25 @@ def split_drives(files: Sequence[str], groups: str = AUTO) -> list[tuple[str, ND
     names = {folder: _matching(folder, pattern) if pattern else folder for folder in dict.fromkeys(folders)}
     if pattern and not any(_matches(folder, pattern) for folder in names):
         raise UsageError(f"--groups {groups}: matches no folder of the frames, such as {next(iter(names))}")
-    drives = {name: number for number, name in enumerate(dict.fromkeys(names.values()))}
-    if groups == AUTO and len(files) < _FRAMES_OF_A_DRIVE * len(drives):
-        return [("", np.arange(len(files)))]
-    of_folder = {folder: drives[name] for folder, name in names.items()}
-    numbers = np.fromiter(map(of_folder.__getitem__, folders), np.intp, len(files))
+    keys = [(names[folder], kind) for folder, kind in zip(folders, kinds or [""] * len(files), strict=True)]
+    drives = {key: number for number, key in enumerate(dict.fromkeys(keys))}
+    numbers = np.fromiter(map(drives.__getitem__, keys), np.intp, len(files))
     order = np.argsort(numbers, kind="stable")
-    ends = np.searchsorted(numbers[order], np.arange(1, len(drives)))
-    return list(zip(drives, np.split(order, ends), strict=True))
+    places = np.split(order, np.searchsorted(numbers[order], np.arange(1, len(drives))))
+    few = groups == AUTO and len(files) < _FRAMES_OF_A_DRIVE * len(drives)
+    if few and (rolls is None or not _differ([rolls[each] for each in places])):
+        return [("", np.arange(len(files)))]
+    texts = (f"{folder} ({kind})" if kind and folder else folder or kind for folder, kind in drives)
+    return list(zip(texts, places, strict=True))
+
+
+def _differ(groups: Sequence[NDArray[np.float64]]) -> bool:
+    """Tell whether groups of rolls are further apart than the frames of a group are."""
+    known = [found for each in groups if len(found := each[np.isfinite(each)]) > 1]
+    if len(known) < 2:
+        return False
+    spread = math.sqrt(float(np.mean([np.var(each, ddof=1) for each in known])))
+    return float(np.ptp([np.median(each) for each in known])) > _APART * max(spread, _LEAST_SPREAD)
 
 
 def _matching(folder: str, pattern: str) -> str:
@@ -83,12 +109,15 @@ class RigFrames:
         A frame that is neither has failed.
     numbers : mapping of str to ndarray of float, shape (N,)
         `roll_deg`, `roll_ci95_deg` and so on; NaN where there is nothing. Columns may be missing.
+    origins : sequence of str
+        Which result each frame is from, where they are of several runs that are not one; else empty.
     """
 
     files: Sequence[str]
     ok: Flags
     suspect: Flags
     numbers: Mapping[str, Floats]
+    origins: Sequence[str] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,7 +131,8 @@ class DriveAssessment:
     frames : ndarray of int
         Its frames among all, from 0.
     quantities : mapping of str to SequenceAssessment
-        "roll", and "pitch" and "height" where the result has them. Their frames count within the drive.
+        "roll", and "pitch", "height" and the parts of `ALIGNMENT` where the result has them. Their frames
+        count within the drive.
     change : Estimate
         By how much its first segment's roll is more than the last one's of the drive before.
     differs : bool
@@ -116,7 +146,7 @@ class DriveAssessment:
     differs: bool = False
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class RigAssessment:
     """What the frames of a result say about the rig.
 
@@ -140,6 +170,16 @@ class RigAssessment:
     outliers: int
     include_suspect: bool
     drives: tuple[DriveAssessment, ...]
+
+    @cached_property
+    def names(self) -> list[str]:
+        """The files, without the folders that all have in common."""
+        return short_names(self.frames.files)
+
+    def name_of(self, drive: DriveAssessment) -> str:
+        """Return the name of a drive, without the folders that all files have in common."""
+        before = self.frames.files[0].removesuffix(self.names[0]) if self.count else ""
+        return drive.name.removeprefix(before)
 
     @property
     def count(self) -> int:
@@ -205,36 +245,60 @@ def assess_frames(frames: RigFrames, *, include_suspect: bool = False, groups: s
     """Assess frames that are columns already; see `assess_rig`."""
     counted = frames.ok | frames.suspect if include_suspect else frames.ok
     drives: list[DriveAssessment] = []
-    for name, places in split_drives(frames.files, groups):
+    rolls = np.where(counted, frames.numbers[ROLL.column], np.nan)
+    for name, places in split_drives(frames.files, groups, _kinds(frames), rolls):
         found = {
             quantity.name: _assessed(frames, places, counted, quantity)
-            for quantity in QUANTITIES
+            for quantity in (*QUANTITIES, *ALIGNMENT)
             if quantity is ROLL or np.isfinite(frames.numbers.get(quantity.column, np.empty(0))).any()
         }
         drives.append(DriveAssessment(name, places, found))
-    rolls = [drive.quantities[ROLL.name] for drive in drives]
+    found_rolls = [drive.quantities[ROLL.name] for drive in drives]
     return RigAssessment(
         frames,
-        used=sum(each.used for each in rolls),
+        used=sum(each.used for each in found_rolls),
         suspect=int(frames.suspect.sum()),
         failed=int((~(frames.ok | frames.suspect)).sum()),
-        outliers=sum(each.outliers for each in rolls),
+        outliers=sum(each.outliers for each in found_rolls),
         include_suspect=include_suspect,
         drives=_compared(drives),
     )
 
 
 def difference(before: Estimate, after: Estimate) -> Estimate:
-    """How much larger `after` is, with Welch's degrees of freedom; no interval where one of them has none."""
+    """How much larger `after` is; no interval where one of them has none."""
     if before.value is None or after.value is None:
         return Estimate()
     change = after.value - before.value
-    if before.error is None or after.error is None:
-        return Estimate(change, needed=max(before.needed, after.needed))
-    squares = (before.error**2, after.error**2)
-    parts = squares[0] ** 2 / before.freedom + squares[1] ** 2 / after.freedom
-    freedom = sum(squares) ** 2 / parts if parts > 0 else min(before.freedom, after.freedom)
-    return with_interval(change, math.sqrt(sum(squares)), freedom)
+    if before.ci95 is None or after.ci95 is None:
+        return Estimate(change)
+    return Estimate(change, math.hypot(before.ci95, after.ci95))
+
+
+def short_names(files: Sequence[str]) -> list[str]:
+    """Return paths without the folders that all have in common."""
+    folders = {file.rpartition("/")[0] for file in files}
+    parts = [folder.split("/") for folder in folders]
+    common = 0
+    for column in zip(*parts, strict=False):
+        if len(set(column)) > 1:
+            break
+        common += 1
+    if not common or folders == {""}:
+        return list(files)
+    skipped = sum(len(part) + 1 for part in parts[0][: common - (len(folders) == 1)])
+    return [file[skipped:] for file in files]
+
+
+def _kinds(frames: RigFrames) -> list[str]:
+    """Return what tells frames of one folder apart: the result, and the size where there are several."""
+    count = len(frames.files)
+    wide, high = (frames.numbers.get(name, np.full(count, np.nan)) for name in SIZE)
+    origins = frames.origins or [""] * count
+    if len(np.unique(wide[np.isfinite(wide)])) < 2 and len(np.unique(high[np.isfinite(high)])) < 2:
+        return list(origins)
+    sizes = [f"{w:.0f}x{h:.0f}" if w == w else "" for w, h in zip(wide.tolist(), high.tolist(), strict=True)]
+    return [" ".join(filter(None, each)) for each in zip(origins, sizes, strict=True)]
 
 
 def _assessed(
@@ -246,7 +310,7 @@ def _assessed(
     halves = frames.numbers.get(quantity.ci_column, nothing)[places]
     if quantity is ROLL:
         values = _unwrapped(values)
-    return assess_sequence(values, halves * _TO_SD)
+    return assess_sequence(values, halves * _TO_SD, quantity.scale)
 
 
 def _unwrapped(rolls: Floats) -> Floats:
@@ -261,17 +325,25 @@ def _unwrapped(rolls: Floats) -> Floats:
 def _compared(drives: Sequence[DriveAssessment]) -> tuple[DriveAssessment, ...]:
     """Each drive with how much its roll differs from the drive before it that has one."""
     result: list[DriveAssessment] = []
-    before = Estimate()
-    chance = 0.05 / max(1, len(drives) - 1)
+    before, reach = Estimate(), 0.0
+    # with as many comparisons as there are, fewer of each may be wrong
+    sterner = NormalDist().inv_cdf(1 - 0.025 / max(1, len(drives) - 1)) * _TO_SD
     for drive in drives:
         roll = drive.quantities[ROLL.name]
-        first = roll.segments[0].mean if roll.segments else Estimate()
+        first = roll.segments[0].begin if roll.segments else Estimate()
         change = difference(before, first)
-        wide = t_quantile(change.freedom, chance) * change.error if change.error is not None else math.inf
+        wide = sterner * (change.ci95 if change.ci95 is not None else math.hypot(reach, _spread(roll)))
         differs = change.value is not None and abs(change.value) > wide
         result.append(DriveAssessment(drive.name, drive.frames, drive.quantities, change, differs))
-        before = roll.now if roll.now.value is not None else before
+        if roll.used:
+            before, reach = roll.now, _spread(roll)
     return tuple(result)
+
+
+def _spread(found: SequenceAssessment) -> float:
+    """How far a few frames are apart: what there is where there is no interval."""
+    used = found.series.values[found.series.used]
+    return float(np.ptp(used)) if len(used) > 1 else math.inf
 
 
 def _frames(rows: Any) -> RigFrames:
@@ -284,7 +356,7 @@ def _frames(rows: Any) -> RigFrames:
     files = column("file")
     files = [f"frame {place}" for place in range(len(status))] if files is None else list(map(str, files))
     states = np.array(list(map(str, status)), dtype=str)
-    numbers = {name: _floats(found) for name in COLUMNS if (found := column(name)) is not None}
+    numbers = {name: _floats(found) for name in (*COLUMNS, *SIZE) if (found := column(name)) is not None}
     if len({len(states), len(files), *map(len, numbers.values())}) > 1:
         raise UsageError("the columns differ in length")
     unknown = sorted(set(states.tolist()) - {"ok", "suspect", "error"})

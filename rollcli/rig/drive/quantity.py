@@ -1,29 +1,20 @@
 """One quantity over one drive: its mounting value, its drift and its jumps, with intervals that hold.
 
 Frames of a drive repeat each other: the car rolls and the road turns for many frames, so that an interval of
-independent frames covers 5 to 30 % instead of 95. Blocks of several correlation lengths are independent.
+independent frames covers 5 to 30 % instead of 95. The posterior knows of it, from eight frames on.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rollcli.rig.drive.jumps import Fit, Series, bounds_of, fit_residuals, place_jump, search
-from rollcli.rig.drive.noise import (
-    Estimate,
-    Floats,
-    Noise,
-    block_count,
-    frames_needed,
-    gross_outliers,
-    hidden,
-    make_blocks,
-    mean_of_blocks,
-    t_quantile,
-)
+from rollcli.rig.drive.jumps import bounds_of, design_of, search
+from rollcli.rig.drive.outliers import Flags, Floats, gross_outliers
+from rollcli.rig.drive.posterior import Estimate, Fit, Likelihood, Series, make_cells
 from rollcli.rig.drive.tuning import TUNING
 
 Status = Literal["stable", "drift", "jump", "few"]
@@ -55,13 +46,16 @@ class Segment:
         Frames, both included, from 0.
     used : int
         Frames that the mean is taken of.
-    mean : Estimate
+    mean, begin, end : Estimate
+        Over its frames, at its first and at its last one; alike where nothing drifts.
     """
 
     first: int
     last: int
     used: int
     mean: Estimate
+    begin: Estimate
+    end: Estimate
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,11 +76,7 @@ class SequenceAssessment:
     status : {"stable", "drift", "jump", "few"}
         few: too few frames for an interval, or none.
     between_sd : float or None
-        Standard deviation between frames, beyond their own errors.
-    noise : Noise or None
-        How frames are correlated; None without frames.
-    values, weights : ndarray of float, shape (N,)
-        What was assessed: 0 where a frame is left out.
+        Standard deviation between frames, beyond their own errors; None without frames.
     """
 
     frames: int
@@ -98,24 +88,29 @@ class SequenceAssessment:
     drifts: bool
     status: Status
     between_sd: float | None
-    noise: Noise | None
-    values: Floats
-    weights: Floats
-
-    def mean_over(self, first: int, last: int) -> Estimate:
-        """Return the mean of some frames, both ends included; with the interval of their blocks."""
-        if self.noise is None:
-            return Estimate()
-        part = slice(first, last + 1)
-        return mean_of_blocks(self.values[part], self.weights[part], self.noise)
+    series: Series
+    unit: float
 
     @property
     def now(self) -> Estimate:
-        """The mean of the last segment: the rig as it is at the end of the drive."""
-        return self.segments[-1].mean if self.segments else Estimate()
+        """The rig as it is at the end of the drive."""
+        return self.segments[-1].end if self.segments else Estimate()
+
+    @property
+    def starts(self) -> list[int]:
+        """The first frame of each segment but the first."""
+        return [each.frame for each in self.jumps]
+
+    def means(self, starts: Sequence[int]) -> list[Estimate]:
+        """Return the mean of each stretch between such frames."""
+        if not self.used:
+            return [Estimate()] * (len(starts) + 1)
+        edges = sorted({*starts, *self.starts})
+        fitted = _Fitted(self.series, edges, self.drifts, self.unit)
+        return [fitted.mean_over(first, end) for first, end in bounds_of(starts, self.frames)]
 
 
-def assess_sequence(values: ArrayLike, errors: ArrayLike) -> SequenceAssessment:
+def assess_sequence(values: ArrayLike, errors: ArrayLike, unit: float = 1.0) -> SequenceAssessment:
     """Assess one quantity over the frames of one drive.
 
     Parameters
@@ -123,7 +118,10 @@ def assess_sequence(values: ArrayLike, errors: ArrayLike) -> SequenceAssessment:
     values : array_like of float, shape (N,)
         In the order of the frames; NaN where a frame is left out.
     errors : array_like of float, shape (N,)
-        Standard error of each value, in its unit; NaN where it is not known, which takes the others' median.
+        Standard error of each value, in its unit; NaN where it is not known, which takes the others' median,
+        or where there are none, what neighbouring frames differ by.
+    unit : float
+        What of the quantity is as much as a degree of an angle: 0.1 m of a height.
 
     Returns
     -------
@@ -138,143 +136,119 @@ def assess_sequence(values: ArrayLike, errors: ArrayLike) -> SequenceAssessment:
     ('stable', 1.0)
     """
     given = np.asarray(values, dtype=float)
-    series, outliers = _prepared(given, np.asarray(errors, dtype=float))
-    if not series.used.any():
-        none = np.zeros(len(given))
-        return SequenceAssessment(
-            len(given), 0, outliers, (), (), Estimate(), False, "few", None, None, none, none
+    series, outliers = _prepared(given, np.asarray(errors, dtype=float), unit)
+    used = int(series.used.sum())
+    if not used:
+        nothing = Estimate()
+        return SequenceAssessment(len(given), 0, outliers, (), (), nothing, False, "few", None, series, unit)
+    found = search(series, unit)
+    fitted = _Fitted(series, found.starts, found.drift, unit)
+    jumps = tuple(
+        Jump(start, fitted.estimate(fitted.unit_row(place + 1) - fitted.unit_row(place)))
+        for place, start in enumerate(found.starts)
+    )
+    status: Status = "jump" if jumps else "drift" if found.drift else "stable"
+    return SequenceAssessment(
+        frames=len(given),
+        used=used,
+        outliers=outliers,
+        segments=tuple(fitted.segments()),
+        jumps=jumps,
+        drift=fitted.drift() if found.drift else _Fitted(series, found.starts, True, unit).drift(),
+        drifts=found.drift,
+        status="few" if used < TUNING.fewest else status,
+        between_sd=fitted.between_sd(),
+        series=series,
+        unit=unit,
+    )
+
+
+class _Fitted:
+    """A series with its levels and its line."""
+
+    def __init__(self, series: Series, starts: Sequence[int], drift: bool, unit: float) -> None:
+        self._series, self._starts, self._drift = series, starts, drift
+        self._frames = len(series.values)
+        self._cells = make_cells(series, starts)
+        design = design_of(self._cells, starts, drift, self._frames)
+        self._there: Flags = np.asarray(design.any(axis=0))  # a stretch may have no frame that counts
+        self._fit: Fit = Likelihood(self._cells, unit).fit(design[:, self._there])
+
+    def unit_row(self, place: int) -> Floats:
+        """Return the contrast of one coefficient."""
+        row = np.zeros(len(self._there))
+        row[place] = 1
+        return row
+
+    def estimate(self, contrast: Floats) -> Estimate:
+        """Return a combination of levels; unknown where one of them is, without interval of few frames."""
+        if (contrast != 0)[~self._there].any():
+            return Estimate()
+        found = self._fit.estimate(contrast[self._there])
+        return found if self._series.used.sum() >= TUNING.fewest else Estimate(found.value)
+
+    def drift(self) -> Estimate:
+        """Return the change over the drive; unknown of a few frames."""
+        if self._series.used.sum() < TUNING.fewest or not self._there[-1]:
+            return Estimate()
+        return self.estimate(self.unit_row(-1))
+
+    def segments(self) -> list[Segment]:
+        """Return the stretches with their values."""
+        return [
+            Segment(first, end - 1, int(self._series.used[first:end].sum()), *self._values(place, first, end))
+            for place, (first, end) in enumerate(bounds_of(self._starts, self._frames))
+        ]
+
+    def mean_over(self, first: int, end: int) -> Estimate:
+        """Return the mean of frames whose ends are ends of stretches."""
+        row = np.zeros(len(self._there))
+        for place, (begin, stop) in enumerate(bounds_of(self._starts, self._frames)):
+            if first <= begin and stop <= end and self._there[place]:
+                row[place] = int(self._series.used[begin:stop].sum())
+        row /= max(row.sum(), 1.0)
+        if self._drift:
+            row[-1] = ((first + end - 1) / 2 - (self._frames - 1)) / max(self._frames - 1, 1)
+        return self.estimate(row) if row.any() else Estimate()
+
+    def _values(self, place: int, first: int, end: int) -> tuple[Estimate, Estimate, Estimate]:
+        if not self._drift:
+            mean = self.estimate(self.unit_row(place))
+            return mean, mean, mean
+        mean, begin, last = (
+            self.estimate(
+                self.unit_row(place)
+                + (frame - (self._frames - 1)) / max(self._frames - 1, 1) * self.unit_row(-1)
+            )
+            for frame in ((first + end - 1) / 2, first, end - 1)
         )
-    short, width = _thinned(series)
-    found = search(short)
-    starts = [place_jump(series, found, place, width) for place in range(len(found.starts))]
-    return _assessment(series, outliers, found, starts, width)
+        return mean, begin, last
+
+    def between_sd(self) -> float:
+        """Return the standard deviation of frames from the fitted level, beyond their own errors."""
+        used, frames = self._series.used, np.arange(self._frames)
+        level = np.zeros(self._frames)
+        for each in self.segments():
+            part = slice(each.first, each.last + 1)
+            if each.begin.value is not None and each.end.value is not None:
+                level[part] = np.interp(
+                    frames[part], [each.first, each.last], [each.begin.value, each.end.value]
+                )
+        squares = (self._series.values - level)[used] ** 2 - self._series.variances[used]
+        return math.sqrt(max(0.0, float(squares.mean())))
 
 
-def _prepared(values: Floats, errors: Floats) -> tuple[Series, int]:
+def _prepared(values: Floats, errors: Floats, unit: float) -> tuple[Series, int]:
     """Zeros where nothing is used, errors where none is known, and gross outliers left out."""
     used = np.isfinite(values)
     known = np.isfinite(errors) & (errors >= 0)
-    usual = float(np.median(errors[known & used])) if (known & used).any() else 0.0
-    own = np.maximum(np.where(known, errors, usual), TUNING.least_error) ** 2
+    if (known & used).any():
+        usual = float(np.median(errors[known & used]))
+    else:
+        steps = np.abs(np.diff(values[used]))
+        usual = float(np.median(steps)) if len(steps) else 0.0
+    own = np.maximum(np.where(known, errors, usual), TUNING.least_error * unit) ** 2
     gross = np.zeros(len(values), dtype=bool)
     gross[used] = gross_outliers(values[used], own[used])
     kept = used & ~gross
     return Series(np.where(kept, values, 0.0), own, kept), int(gross.sum())
-
-
-def _thinned(series: Series) -> tuple[Series, int]:
-    """Averages of neighbours, where frames are too many to search one by one; and how many make one."""
-    width = -(-len(series.values) // TUNING.longest)
-    if width == 1:
-        return series, 1
-    middle = float(np.median(series.values[series.used]))
-    spread = float(np.median((series.values[series.used] - middle) ** 2))
-    weights = np.where(series.used, 1 / (series.variances + spread), 0.0)
-    starts = np.arange(0, len(series.values), width)
-    total = np.add.reduceat(weights, starts)
-    safe = np.where(total > 0, total, 1.0)
-    values = np.add.reduceat(weights * series.values, starts) / safe
-    variances = np.add.reduceat(weights**2 * series.variances, starts) / safe**2
-    used = total > 0
-    return Series(values, np.where(used, variances, 1.0), used), width
-
-
-def _assessment(
-    series: Series, outliers: int, found: Fit, starts: list[int], width: int
-) -> SequenceAssessment:
-    n = len(series.values)
-    bounds = bounds_of(starts, n)
-    slope = _slope(found, width) if found.drift else 0.0
-    weights, tau2, noise, _, _ = fit_residuals(series, _level(series, found.weights, bounds, slope, width))
-    segments = tuple(
-        Segment(
-            first,
-            end - 1,
-            int(series.used[first:end].sum()),
-            mean_of_blocks(
-                series.values[first:end], weights[first:end], noise, slope, 2 if found.drift else 1
-            ),
-        )
-        for first, end in bounds
-    )
-    drift = _drift(series, weights, bounds, noise)
-    jumps = tuple(Jump(start, _change(found, place, n, noise)) for place, start in enumerate(starts))
-    enough = segments[-1].mean.ci95 is not None
-    status: Status = "jump" if jumps else "few" if not enough else "drift" if found.drift else "stable"
-    used = int(series.used.sum())
-    return SequenceAssessment(
-        n,
-        used,
-        outliers,
-        segments,
-        jumps,
-        drift,
-        found.drift,
-        status,
-        math.sqrt(tau2),
-        noise,
-        series.values,
-        weights,
-    )
-
-
-def _level(
-    series: Series, weights: Floats, bounds: list[tuple[int, int]], slope: float, width: int
-) -> Floats:
-    """Return the mounting value at each frame."""
-    n = len(series.values)
-    known = np.where(series.used, np.repeat(weights, width)[:n] if width > 1 else weights, 0.0)
-    level, frames = np.zeros(n), np.arange(n, dtype=float)
-    for first, end in bounds:
-        part = slice(first, end)
-        if known[part].any():
-            middle = np.average(frames[part], weights=known[part])
-            level[part] = np.average(series.values[part], weights=known[part]) + slope * (
-                frames[part] - middle
-            )
-    return level
-
-
-def _slope(found: Fit, width: int) -> float:
-    """Change per frame of the line that was fitted."""
-    beta, _, _ = found.cells.solve(found.cells.design(found.starts, True))
-    return float(beta[1]) / max(float(np.ptp(found.cells.first)), 1.0) / width
-
-
-def _change(found: Fit, place: int, frames: int, noise: Noise) -> Estimate:
-    """How large a jump is, by generalised least squares."""
-    cells = found.cells
-    design = cells.design(found.starts, found.drift)
-    beta, covariance, squares = cells.solve(design)
-    at = design.shape[1] - len(found.starts) + place
-    scale = squares / max(len(cells.values) - design.shape[1], 1)
-    error = math.sqrt(float(covariance[at, at]) * scale)
-    freedom = max(block_count(frames, noise), TUNING.fewest_blocks) - 1.0
-    return Estimate(float(beta[at]), t_quantile(freedom) * error, error, freedom)
-
-
-def _drift(series: Series, weights: Floats, bounds: list[tuple[int, int]], noise: Noise) -> Estimate:
-    """Return a weighted line through the blocks of all segments, each with a level of its own."""
-    n = len(series.values)
-    columns, values, shares = [], [], []
-    for place, (first, end) in enumerate(bounds):
-        if not weights[first:end].any():
-            continue
-        blocks = make_blocks(
-            series.values[first:end], weights[first:end], max(1, block_count(end - first, noise))
-        )
-        level = np.zeros((len(blocks.means), len(bounds)))
-        level[:, place] = 1
-        columns.append(np.column_stack([(blocks.centres + first) / max(n - 1, 1), level]))
-        values.append(blocks.means)
-        shares.append(blocks.weights)
-    design, means, share = np.concatenate(columns), np.concatenate(values), np.concatenate(shares)
-    design = design[:, design.any(axis=0)]
-    freedom = len(means) - design.shape[1]
-    if len(means) < TUNING.fewest_blocks or freedom < TUNING.fewest_blocks - 2:
-        return Estimate(needed=frames_needed(noise))
-    covariance = np.linalg.pinv(design.T @ (share[:, None] * design), hermitian=True)
-    beta = covariance @ (design.T @ (share * means))
-    variance = float(share @ (means - design @ beta) ** 2) / freedom
-    error = math.sqrt(float(covariance[0, 0]) * variance * hidden(noise, n, len(means)))
-    return Estimate(float(beta[0]), t_quantile(freedom) * error, error, float(freedom))

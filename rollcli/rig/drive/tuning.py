@@ -12,69 +12,60 @@ class SequenceTuning:
 
     Attributes
     ----------
-    huber : float
-        Standardised residual from which on a frame loses weight. Huber's 1.345 makes blocks that wander off
-        count less, and intervals 13 % too short; at 2.5 it is 1 %, and gross outliers are left out before.
     gross : float
         Robust standard deviations from the neighbouring frames beyond which a frame is a gross outlier.
     neighbours : int
         Frames on each side whose median a frame is compared with; odd.
     least_error : float
-        Smallest own standard error, degrees or metres: an interval of nothing must not take all the weight.
-    fewest_times, most_times : float
-        Block length in integrated autocorrelation times (IAT); one IAT of AR(1) is two e-folding lengths. As
-        long as a dozen blocks are left, they are longer than need be.
-    fewest_blocks : int
-        Blocks below which there is no interval: Student's t of fewer is hardly an interval.
-    enough_blocks : int
-        Blocks that are left when there is a choice.
-    most_blocks : int
-        Longer drives get longer blocks: they need no correction, and 60 degrees of freedom are enough.
+        Smallest own standard error of a frame, in units of the quantity: an interval of nothing must not take
+        all the weight.
+    correlations : tuple of float
+        What of the car's and the road's own movement is left in the next cell: even in log correlation time.
+    spreads : tuple of float
+        Least and most standard deviation of that movement, in units of the quantity; even in log between.
+    spread_steps : int
+        How many there are: at 14 neighbours differ by a factor of 1.5.
+    error_factors : tuple of (float, float)
+        What the frames' own variances may have to be multiplied by, and the prior probability of it. Where
+        they are right, doubting them widens intervals by nothing from 20 frames on.
     cells : int
-        Stretches into which a drive is cut for generalised least squares; dense, so cost grows as its cube.
-    longest : int
-        Frames beyond which neighbours are averaged before anything else, so that a million rows take seconds.
+        Stretches into which a longer drive is cut; their covariance is dense, so cost grows as the cube.
+    fewest : int
+        Frames below which there is no interval, but the spread of the frames.
+    shortest : int
+        Frames of the shortest stretch between two jumps, or between a jump and an end.
+    shortest_share : float
+        The same as a share of the drive: what is gone sooner is a bend of the road.
     jump_penalty : float
-        Gain in -2 log likelihood that a jump must bring: it also chooses its frame among hundreds.
-    scarce_penalty : float
-        What is added to it, times the share of one correlation time in the drive, and half of it to the
-        drift's: the noise is then uncertain too. Without a jump 95 % of the gains are below 13 at 190
-        correlation times, and below 22 at 30.
+        Log odds against a jump at any one place, before the frames are seen.
     drift_penalty : float
-        Gain in -2 log likelihood that a drift must bring; 6.6 is chi-squared's 99 % point.
-    told_apart : float
-        What a line must bring beyond its penalty, in -2 log likelihood, to be taken instead of jumps or
-        beside them: a jump pays a higher penalty only since its frame is chosen.
-    fewest_to_search : int
-        Frames below which neither jumps nor drift are looked for: two blocks of eight frames tell nothing.
-    apart : float
-        Correlation times between two jumps, at most a twelfth of the drive: what is gone sooner is a bend of
-        the road.
-    persistence : float
-        Share of a jump's size that the levels beside it must show without the step itself: a kick that fades
-        is no jump.
+        Log odds against a drift.
     most_jumps : int
         Jumps beyond which the search stops: a drive with more is not a mounted rig.
     """
 
-    huber: float = 2.5
     gross: float = 8.0
     neighbours: int = 7
-    least_error: float = 1e-4
-    fewest_times: float = 2.0
-    most_times: float = 4.0
-    fewest_blocks: int = 8
-    enough_blocks: int = 12
-    most_blocks: int = 60
-    cells: int = 250
-    longest: int = 40_000
-    jump_penalty: float = 14.0
-    scarce_penalty: float = 250.0
-    drift_penalty: float = 6.6
-    told_apart: float = 2.5
-    fewest_to_search: int = 24
-    apart: float = 4.0
-    persistence: float = 0.5
+    least_error: float = 1e-3
+    correlations: tuple[float, ...] = (
+        *(0.0, 0.3, 0.5, 0.65, 0.75, 0.82, 0.87),
+        *(0.91, 0.94, 0.96, 0.975, 0.985, 0.993),
+    )
+    spreads: tuple[float, float] = (0.01, 1.5)
+    spread_steps: int = 14
+    error_factors: tuple[tuple[float, float], ...] = (
+        (1 / 16, 0.1),
+        (1 / 4, 0.2),
+        (1, 0.4),
+        (4, 0.2),
+        (16, 0.1),
+    )
+    cells: int = 240
+    fewest: int = 8
+    shortest: int = 8
+    shortest_share: float = 0.03
+    jump_penalty: float = 5.0
+    drift_penalty: float = 2.0
     most_jumps: int = 12
 
 

@@ -2,8 +2,6 @@
 
 import numpy as np
 
-from rollcli.rig.drive.jumps import Series
-
 
 def ar1(rng, frames, phi, sd):
     """Stationary AR(1)."""
@@ -36,11 +34,3 @@ def drive(
     bad = rng.random(frames) < gross
     values[bad] = rng.uniform(0, 30, bad.sum())
     return values, own
-
-
-def two_jumps(drift):
-    """A `Series` of 150 frames whose level rises by 1 degree at frame 50 and falls by 0.7 at 110."""
-    values, errors = drive(7, 150, phi=0.5, sd=0.02, errors=(0.01, 0.02), drift=drift)
-    values[50:] += 1.0
-    values[110:] -= 0.7
-    return Series(values, errors**2, np.ones(150, dtype=bool))

@@ -2,14 +2,9 @@
 
 import numpy as np
 import pytest
-import statsmodels.api as sm
-from scipy.stats import t as student
 
-from rollcli.rig.drive import quantity as assess
-from rollcli.rig.drive.jumps import Series, search
-from rollcli.rig.drive.noise import block_count, frames_needed, hidden, make_blocks
 from rollcli.rig.drive.quantity import assess_sequence
-from tests.rig.drive.series import drive, two_jumps
+from tests.rig.drive.series import drive
 
 SEEDS = range(4)
 
@@ -69,14 +64,24 @@ def test_a_kick_that_fades_is_no_jump():
 def test_frames_without_an_order_need_no_long_blocks():
     rng = np.random.default_rng(2)
     found = assess_sequence(rng.normal(0.2, 0.1, 60), np.full(60, 0.05))
-    assert found.now.ci95 == pytest.approx(2.1 * 0.1 / np.sqrt(60), rel=0.35)
+    assert 2 * 0.1 / np.sqrt(60) < found.now.ci95 < 0.06
 
 
-def test_a_few_frames_of_a_drive_have_no_interval():
-    values, errors = drive(4, 60, phi=0.95, sd=0.3, errors=(0.02, 0.05))
+@pytest.mark.parametrize("frames", [2, 7, 8, 60])
+def test_there_is_an_interval_from_eight_frames_on(frames):
+    values, errors = drive(4, frames, phi=0.95, sd=0.3, errors=(0.02, 0.05))
     found = assess_sequence(values, errors)
-    assert (found.status, found.now.ci95) == ("few", None)
-    assert found.now.needed > 60
+    assert (found.now.ci95 is not None) == (found.drift.ci95 is not None) == (frames >= 8)
+    assert (found.status == "few") == (frames < 8)
+
+
+def test_with_a_drift_the_rig_is_as_it_is_at_the_end():
+    rng = np.random.default_rng(0)
+    found = assess_sequence(np.linspace(0.78, -0.01, 120) + rng.normal(0, 0.1, 120), np.full(120, 0.1))
+    (segment,) = found.segments
+    assert (found.status, found.now) == ("drift", segment.end)
+    for end, truth in ((segment.begin, 0.78), (segment.mean, 0.385), (segment.end, -0.01)):
+        assert abs(end.value - truth) <= min(end.ci95, 0.15)
 
 
 def test_frames_that_are_left_out_keep_their_time():
@@ -111,12 +116,15 @@ def test_few_equal_or_missing_values_are_assessed_without_complaint(values, erro
     found = assess_sequence(values, errors)
     assert found.frames == len(values)
     assert found.used == np.isfinite(values).sum()
-    assert found.now.value is None or min(np.array(values)[np.isfinite(values)]) <= found.now.value <= 2
+    assert (
+        found.now.value is None or min(np.array(values)[np.isfinite(values)]) - 1e-9 <= found.now.value <= 2
+    )
 
 
-def test_equal_frames_have_an_interval_of_nothing():
+def test_equal_frames_have_an_interval_of_hardly_anything():
     found = assess_sequence([2.00012] * 24, [0.00014] * 24)
-    assert found.now.ci95 == pytest.approx(0, abs=1e-9)
+    assert found.now.value == pytest.approx(2.00012, abs=1e-6)
+    assert 0 < found.now.ci95 < 0.02
     assert (found.status, found.jumps) == ("stable", ())
 
 
@@ -134,34 +142,10 @@ def test_a_frame_without_an_error_has_the_usual_one_of_the_frames_that_are_used(
     holed[40::2] = np.nan
     holed[:40] = 5.0  # of frames without a value
     assert assess_sequence(values, holed).now == assess_sequence(values, whole).now
-    assert assess_sequence(values, np.full(400, np.nan)).now == assess_sequence(values, np.zeros(400)).now
 
 
 def white(frames, sd=0.1, seed=0):
     return np.random.default_rng(seed).normal(0, sd, frames)
-
-
-def test_the_drift_is_the_line_through_the_blocks_and_its_error_that_of_statsmodels():
-    values = white(600) + np.linspace(-0.2, 0.3, 600)
-    found = assess_sequence(values, np.full(600, 0.01))
-    assert found.noise.correlation_time <= 2
-    count = block_count(600, found.noise)
-    blocks = make_blocks(found.values, found.weights, count)
-    line = sm.WLS(blocks.means, sm.add_constant(blocks.centres / 599), weights=blocks.weights).fit()
-    assert found.drift.value == pytest.approx(line.params[1], rel=1e-9)
-    inflation = hidden(found.noise, 600, count)
-    assert found.drift.error == pytest.approx(line.bse[1] * np.sqrt(inflation), rel=1e-6)
-    assert found.drift.freedom == line.df_resid == count - 2
-    assert found.drift.ci95 == pytest.approx(student.ppf(0.975, count - 2) * found.drift.error, rel=1e-4)
-    assert found.drift.value == pytest.approx(0.5, abs=2 * found.drift.ci95)
-
-
-def test_the_error_of_a_drift_grows_with_what_the_blocks_hide(monkeypatch):
-    values = white(500), np.full(500, 0.01)
-    monkeypatch.setattr(assess, "hidden", lambda *_: 1.0)
-    told = assess_sequence(*values).drift
-    monkeypatch.setattr(assess, "hidden", lambda *_: 4.0)
-    assert assess_sequence(*values).drift.error == pytest.approx(2 * told.error)
 
 
 def test_a_drift_beside_a_jump_is_that_of_the_line_between_levels():
@@ -170,72 +154,8 @@ def test_a_drift_beside_a_jump_is_that_of_the_line_between_levels():
     found = assess_sequence(values, np.full(200, 0.01))
     (jump,) = found.jumps
     assert (jump.frame, found.drifts, found.status) == (100, True, "jump")
-    frames = np.arange(200)
-    steps = np.column_stack([frames / 199, frames < 100, frames >= 100]).astype(float)
-    line = sm.OLS(values, steps).fit()
-    assert found.drift.value == pytest.approx(line.params[0], abs=0.1 * line.bse[0] + 0.01)
-    assert jump.change.value == pytest.approx(line.params[2] - line.params[1], abs=0.02)
-
-
-@pytest.mark.parametrize("drift", [0.0, 1.0])
-def test_the_size_of_a_jump_has_the_error_that_statsmodels_finds_with_the_same_noise(drift):
-    fit = search(two_jumps(drift))
-    cells = fit.cells
-    oracle = sm.GLS(cells.values, cells.design(fit.starts, fit.drift), np.linalg.inv(cells.precision)).fit()
-    for place in (0, 1):
-        change = assess._change(fit, place, 150, fit.noise)
-        assert change.value == pytest.approx(oracle.params[place - 2], rel=1e-6)
-        assert change.error == pytest.approx(oracle.bse[place - 2], rel=1e-6)
-        assert change.freedom == max(block_count(150, fit.noise), 8) - 1
-        assert change.ci95 == pytest.approx(student.ppf(0.975, change.freedom) * change.error, rel=1e-3)
-
-
-def test_a_known_drift_is_no_spread_of_the_mean():
-    still, moving = (
-        assess_sequence(white(800) + drift, np.full(800, 0.01)).now for drift in (0, np.linspace(-2, 2, 800))
-    )
-    assert moving.value == pytest.approx(still.value, abs=1e-3)
-    # one degree of freedom less, and a block holds what the line does not explain
-    assert moving.ci95 == pytest.approx(still.ci95, rel=0.25)
-    assert moving.freedom == still.freedom - 1
-
-
-def test_few_blocks_have_no_drift_but_say_how_many_frames_it_takes():
-    values, errors = drive(4, 60, phi=0.95, sd=0.3, errors=(0.02, 0.05))
-    found = assess_sequence(values, errors)
-    assert (found.drift.value, found.drift.ci95) == (None, None)
-    assert found.drift.needed == frames_needed(found.noise) > 60
-
-
-def test_the_mean_over_some_frames_is_that_of_theirs():
-    values = white(300) + np.repeat([0.0, 1.0, 2.0], 100)
-    found = assess_sequence(values, np.full(300, 0.01))
-    for first, last in ((0, 99), (100, 199), (3, 3)):
-        part = slice(first, last + 1)
-        expected = np.average(values[part], weights=found.weights[part])
-        assert found.mean_over(first, last).value == pytest.approx(expected)
-    assert assess_sequence([np.nan], [0.1]).mean_over(0, 0).value is None
-
-
-def test_a_drive_of_too_many_frames_is_searched_in_averages_of_as_few_neighbours_as_possible():
-    for frames, width in ((40_000, 1), (40_001, 2), (80_000, 2), (80_001, 3)):
-        rng = np.random.default_rng(frames)
-        used = rng.random(frames) < 0.6
-        used[6:12] = False
-        given = Series(np.where(used, rng.normal(1, 0.2, frames), 0), rng.uniform(0.01, 0.1, frames), used)
-        short, by = assess._thinned(given)
-        assert (by, len(short.values)) == (width, -(-frames // width))
-        if width == 1:
-            continue
-        middle = np.median(given.values[used])
-        share = np.where(used, 1 / (given.variances + np.median((given.values[used] - middle) ** 2)), 0)
-        for place in (0, 1, 5, 6, 200, len(short.values) - 1):
-            part = slice(place * width, (place + 1) * width)
-            assert short.used[place] == used[part].any()
-            if used[part].any():
-                mean = np.average(given.values[part], weights=share[part])
-                variance = (share[part] ** 2 @ given.variances[part]) / share[part].sum() ** 2
-                assert (short.values[place], short.variances[place]) == pytest.approx((mean, variance))
+    assert found.drift.value == pytest.approx(1.0, abs=found.drift.ci95)
+    assert jump.change.value == pytest.approx(2.0, abs=jump.change.ci95)
 
 
 def test_of_what_is_assessed_only_what_is_used_has_a_value_and_weight():
@@ -245,8 +165,8 @@ def test_of_what_is_assessed_only_what_is_used_has_a_value_and_weight():
     found = assess_sequence(values, errors)
     left_out = np.isin(np.arange(200), [*range(20, 30), 100])
     assert (found.frames, found.used, found.outliers) == (200, 189, 1)
-    assert np.array_equal(found.weights == 0, left_out)
-    assert np.array_equal(found.values == 0, left_out)
+    assert np.array_equal(found.series.used, ~left_out)
+    assert np.array_equal(found.series.values == 0, left_out)
     errors[50:70] = 0.05
     assert assess_sequence(values, errors).now == found.now
 

@@ -1,0 +1,244 @@
+"""What a drive says of a mounting value: the posterior under noise that is not known.
+
+The car's and the road's own movement is AR(1) of unknown correlation and size, seen with each frame's own
+error. For every noise of a grid, levels and a line are fitted by generalised least squares [Aitken 1936],
+with the likelihood of what is left once they are integrated out; the normal distributions that follow are
+mixed by it. So there is an interval for few frames as for many, wide where the noise could be slow.
+
+One eigendecomposition a correlation makes every covariance of the grid diagonal: with R the correlations
+and D the own variances, s^2 R + c D = D^1/2 Q (s^2 L + c) Q' D^1/2.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollcli.rig.drive.outliers import Flags, Floats
+from rollcli.rig.drive.tuning import TUNING
+
+_erf = np.vectorize(math.erf, otypes=[float])
+_BISECTIONS = 40
+_LEAST_PROBABILITY = 1e-6  # of the likeliest noise: what is less likely is left out
+_ROOM = 3.0  # times the spread of the frames must fit into the grid
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """A value and how sure it is.
+
+    Attributes
+    ----------
+    value : float or None
+        In the unit of the series; None where nothing is known.
+    ci95 : float or None
+        Half-width of the 95 % interval; None where there are too few frames.
+    """
+
+    value: float | None = None
+    ci95: float | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Series:
+    """One quantity over the frames of one drive.
+
+    Attributes
+    ----------
+    values : ndarray of float, shape (N,)
+        0 where a frame is left out.
+    variances : ndarray of float, shape (N,)
+        The square of each frame's own standard error.
+    used : ndarray of bool, shape (N,)
+    """
+
+    values: Floats
+    variances: Floats
+    used: Flags
+
+    def part(self, first: int, end: int) -> "Series":
+        """Return some of the frames."""
+        return Series(self.values[first:end], self.variances[first:end], self.used[first:end])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cells:
+    """Weighted means of stretches of frames; where there are few frames, the frames themselves.
+
+    Attributes
+    ----------
+    first : ndarray of int, shape (C,)
+        The first frame of each cell; cells without a frame that is used are left out.
+    centres : ndarray of float, shape (C,)
+        Frames.
+    width : int
+        Frames of a cell.
+    values, variances : ndarray of float, shape (C,)
+    """
+
+    first: NDArray[np.intp]
+    centres: Floats
+    width: int
+    values: Floats
+    variances: Floats
+
+    def levels(self, starts: Sequence[int]) -> Floats:
+        """Return a column for each stretch between frames at which a jump is, shape (C, stretches)."""
+        stretch = np.searchsorted(np.asarray(starts), self.first, side="right")
+        columns: Floats = (stretch[:, None] == np.arange(len(starts) + 1)).astype(float)
+        return columns
+
+
+def make_cells(series: Series, starts: Sequence[int] = (), most: int = TUNING.cells) -> Cells:
+    """Average a series in at most so many cells, and one more for each jump: no cell reaches across one."""
+    count = len(series.values)
+    width = max(1, -(-count // most))
+    edges = np.unique(np.concatenate([np.arange(0, count, width), np.asarray(starts, dtype=np.intp)]))
+    spread = float(np.var(series.values[series.used])) if width > 1 else 0.0
+    weights = np.where(series.used, 1 / (series.variances + spread), 0.0)
+    total = np.add.reduceat(weights, edges)
+    there = total > 0
+    frames = np.arange(count, dtype=float)
+    values, centres = (
+        np.add.reduceat(weights * each, edges)[there] / total[there] for each in (series.values, frames)
+    )
+    variances = np.add.reduceat(weights**2 * series.variances, edges)[there] / total[there] ** 2
+    return Cells(edges[there], centres, width, values, variances)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fit:
+    """Coefficients for every noise of the grid; the grid has the shape (P, G).
+
+    Attributes
+    ----------
+    beta : ndarray of float, shape (P, G, M)
+    covariance : ndarray of float, shape (P, G, M, M)
+    log_evidence : ndarray of float, shape (P, G)
+        Of the noise and the design; coefficients beyond the first have the prior of one unit.
+    """
+
+    beta: Floats
+    covariance: Floats
+    log_evidence: Floats
+
+    @property
+    def evidence(self) -> float:
+        """The logarithm of the likelihood of the design, whatever the noise."""
+        return float(_log_sum(self.log_evidence.ravel()))
+
+    def estimate(self, contrast: Sequence[float] | Floats) -> Estimate:
+        """Return a combination of the coefficients, with the 95 % interval of the mixture."""
+        share = np.exp(self.log_evidence - self.log_evidence.max()).ravel()
+        kept = share > _LEAST_PROBABILITY
+        share = share[kept] / share[kept].sum()
+        row = np.asarray(contrast, dtype=float)
+        means = (self.beta @ row).ravel()[kept]
+        deviations = np.sqrt(np.maximum(self.covariance @ row @ row, 1e-300)).ravel()[kept]
+        middle = float(share @ means)
+        low, high = 0.0, float(np.abs(means - middle).max() + 9 * deviations.max())
+        for _ in range(_BISECTIONS):
+            half = (low + high) / 2
+            ends = [(middle + side * half - means) / (math.sqrt(2) * deviations) for side in (1, -1)]
+            inside = float(share @ (_erf(ends[0]) - _erf(ends[1]))) / 2
+            low, high = (low, half) if inside > 0.95 else (half, high)
+        return Estimate(middle, high)
+
+
+class Likelihood:
+    """The likelihood of cells for every noise of the grid.
+
+    Parameters
+    ----------
+    cells : Cells
+    unit : float
+        Of the quantity: what of it is as much as a degree of an angle.
+    """
+
+    def __init__(self, cells: Cells, unit: float = 1.0) -> None:
+        self.cells = cells
+        places = cells.centres / cells.width
+        distance = np.abs(places[:, None] - places)
+        correlations = np.array(TUNING.correlations)[:, None, None] ** distance
+        root = 1 / np.sqrt(cells.variances)
+        values, vectors = np.linalg.eigh(correlations * root[:, None] * root)
+        self._rotate = np.swapaxes(vectors, 1, 2) * root  # (P, C, C): Q' D^-1/2
+        low, high = TUNING.spreads
+        largest = max(high * unit, _ROOM * float(np.std(cells.values)))
+        squares = np.geomspace(low * unit, largest, TUNING.spread_steps)[:, None] ** 2
+        factors, prior = np.array(TUNING.error_factors).T
+        slow, own = (each.ravel()[:, None] for each in np.broadcast_arrays(squares, factors))
+        self._weights = 1 / (slow * np.maximum(values, 0)[:, None, :] + own)  # (P, G, C)
+        self._base = np.tile(np.log(prior), len(squares)) + np.log(self._weights).sum(-1) / 2
+        self._unit = unit
+        self._values = self.rotated(cells.values[:, None])
+
+    def rotated(self, columns: Floats) -> Floats:
+        """Return columns in the coordinates in which all covariances are diagonal, shape (P, C, M)."""
+        return np.asarray(self._rotate @ columns)
+
+    def fit(self, design: Floats) -> Fit:
+        """Fit the columns of a design, shape (C, M), for every noise."""
+        columns = self.rotated(design)
+        normal = self._products(columns[..., :, None] * columns[..., None, :])
+        pull = self._products(columns * self._values)
+        covariance = np.asarray(np.linalg.inv(normal))
+        beta = (covariance @ pull[..., None])[..., 0]
+        left = self._products(self._values**2)[..., 0] - (beta * pull).sum(-1)
+        determinant = np.linalg.slogdet(normal)[1]
+        priors = (design.shape[1] - 1) * math.log(self._unit)
+        return Fit(beta, covariance, self._base - left / 2 - determinant / 2 - priors)
+
+    def scan(self, design: Floats, fit: Fit) -> Floats:
+        """Return the evidence of one more step, at the beginning of each cell, shape (C,)."""
+        steps, columns = self._steps, self.rotated(design)
+        left = self._products(steps * self._values)  # (P, G, C)
+        own = self._own_of_steps.copy()
+        crossed = np.stack(
+            [self._products(steps * columns[..., place, None]) for place in range(design.shape[1])], -1
+        )
+        left -= (crossed * fit.beta[:, :, None, :]).sum(-1)
+        own -= ((crossed @ fit.covariance) * crossed).sum(-1)
+        known = own > 1e-9 * self._own_of_steps.max(axis=-1, keepdims=True)
+        safe = np.where(known, own, 1.0)
+        gain = np.where(known, left**2 / safe / 2 - np.log(safe) / 2 - math.log(self._unit), -np.inf)
+        return _log_sum((fit.log_evidence[..., None] + gain).reshape(-1, gain.shape[-1]))
+
+    def pairs(self, design: Floats, fit: Fit) -> Floats:
+        """Return the gain of two more steps in log likelihood, shape (C, C), with the likeliest noise.
+
+        A rise and a fall that cancel are not seen by one step alone.
+        """
+        at, noise = np.unravel_index(int(fit.log_evidence.argmax()), fit.log_evidence.shape)
+        weights = self._weights[at, noise][:, None]
+        steps, columns = self._steps[at], self.rotated(design)[at]
+        crossed = steps.T @ (weights * columns)
+        left = steps.T @ (weights * self._values[at])[:, 0] - crossed @ fit.beta[at, noise]
+        normal = steps.T @ (weights * steps) - crossed @ fit.covariance[at, noise] @ crossed.T
+        own = np.diagonal(normal)
+        determinant = own[:, None] * own - normal**2
+        safe = determinant > 1e-9 * own[:, None] * own
+        squares = left[:, None] ** 2 * own + left**2 * own[:, None] - 2 * np.outer(left, left) * normal
+        return np.where(safe, squares / np.where(safe, determinant, 1.0) / 2, -np.inf)
+
+    @cached_property
+    def _steps(self) -> Floats:
+        return np.asarray(np.cumsum(self._rotate[..., ::-1], axis=-1)[..., ::-1])
+
+    @cached_property
+    def _own_of_steps(self) -> Floats:
+        return self._products(self._steps**2)
+
+    def _products(self, columns: Floats) -> Floats:
+        """Weigh products of rotated columns, shape (P, C, ...), for every noise: (P, G, ...)."""
+        flat = self._weights @ columns.reshape(*columns.shape[:2], -1)
+        return np.asarray(flat.reshape(*flat.shape[:2], *columns.shape[2:]))
+
+
+def _log_sum(logs: Floats) -> Floats:
+    """Return the logarithm of the sum over the first axis."""
+    most = np.maximum(logs.max(axis=0), -1e300)
+    return np.asarray(most + np.log(np.maximum(np.exp(logs - most).sum(axis=0), 1e-300)))

@@ -1,0 +1,123 @@
+"""The posterior: its parts against statsmodels and scipy, its interval against simulated truth."""
+
+import numpy as np
+import pytest
+import statsmodels.api as sm
+from scipy.stats import multivariate_normal, norm
+
+from rollcli.rig.drive.posterior import Fit, Likelihood, Series, make_cells
+from rollcli.rig.drive.quantity import assess_sequence
+from rollcli.rig.drive.tuning import TUNING
+from tests.rig.drive.series import ar1
+
+FRAMES = 40
+
+
+@pytest.fixture(scope="module")
+def cells():
+    rng = np.random.default_rng(3)
+    errors = rng.uniform(0.02, 0.1, FRAMES)
+    values = 1.0 + ar1(rng, FRAMES, 0.8, 0.2) + rng.normal(0, 1, FRAMES) * errors
+    used = rng.random(FRAMES) < 0.9
+    return make_cells(Series(np.where(used, values, 0), errors**2, used))
+
+
+def covariance_of(cells, place, noise):
+    """The covariance of one noise of the grid, written out."""
+    spreads = np.geomspace(*TUNING.spreads, TUNING.spread_steps)
+    spread, (factor, _) = spreads[noise // 5], TUNING.error_factors[noise % 5]
+    distance = np.abs(cells.centres[:, None] - cells.centres)
+    return spread**2 * TUNING.correlations[place] ** distance + factor * np.diag(cells.variances)
+
+
+@pytest.mark.parametrize(("place", "noise"), [(0, 2), (4, 30), (12, 69), (8, 41)])
+def test_each_noise_has_the_fit_of_statsmodels_and_the_likelihood_of_scipy(cells, place, noise):
+    design = np.column_stack([np.ones(len(cells.first)), cells.centres / FRAMES])
+    fit = Likelihood(cells).fit(design)
+    covariance = covariance_of(cells, place, noise)
+    oracle = sm.GLS(cells.values, design, covariance).fit()
+    assert fit.beta[place, noise] == pytest.approx(oracle.params, rel=1e-6)
+    assert fit.covariance[place, noise] == pytest.approx(oracle.normalized_cov_params, rel=1e-6)
+    left = multivariate_normal(oracle.fittedvalues, covariance).logpdf(cells.values)
+    level = np.linalg.slogdet(np.linalg.inv(oracle.normalized_cov_params))[1]
+    expected = left - level / 2 + np.log(TUNING.error_factors[noise % 5][1])
+    constant = len(cells.values) / 2 * np.log(2 * np.pi) + np.log(cells.variances).sum() / 2
+    assert fit.log_evidence[place, noise] == pytest.approx(expected + constant, rel=1e-6)
+
+
+def test_the_scan_is_the_evidence_of_each_design_with_one_more_step(cells):
+    likelihood, level = Likelihood(cells), np.ones((len(cells.first), 1))
+    scanned = likelihood.scan(level, likelihood.fit(level))
+    for at in (5, 17, 30):
+        step = (np.arange(len(level)) >= at).astype(float)
+        assert scanned[at] == pytest.approx(likelihood.fit(np.column_stack([level, step])).evidence, rel=1e-6)
+
+
+def test_a_pair_of_steps_gains_what_its_fit_gains(cells):
+    likelihood, level = Likelihood(cells), np.ones((len(cells.first), 1))
+    fit = likelihood.fit(level)
+    gains = likelihood.pairs(level, fit)
+    at, noise = np.unravel_index(fit.log_evidence.argmax(), fit.log_evidence.shape)
+    places = np.arange(len(level))
+    both = np.column_stack([level, places >= 9, places >= 21]).astype(float)
+    covariance = covariance_of(cells, at, noise)
+    left = [np.sum(sm.GLS(cells.values, each, covariance).fit().wresid ** 2) for each in (level, both)]
+    assert gains[9, 21] == pytest.approx((left[0] - left[1]) / 2, rel=1e-6)
+
+
+def test_the_interval_of_a_mixture_holds_95_per_cent_of_it():
+    means, deviations, shares = np.array([0.0, 0.5]), np.array([0.1, 1.0]), np.array([0.7, 0.3])
+    fit = Fit(means[None, :, None], (deviations**2)[None, :, None, None], np.log(shares)[None])
+    found = fit.estimate([1.0])
+    ends = [found.value - found.ci95, found.value + found.ci95]
+    low, high = (shares @ norm.cdf(end, means, deviations) for end in ends)
+    assert found.value == pytest.approx(0.15)
+    assert high - low == pytest.approx(0.95, abs=1e-6)
+
+
+def test_cells_are_weighted_means_that_do_not_reach_across_a_jump():
+    rng = np.random.default_rng(0)
+    used = rng.random(1000) < 0.7
+    used[20:30] = False
+    given = Series(np.where(used, rng.normal(1, 0.2, 1000), 0), rng.uniform(0.01, 0.1, 1000), used)
+    found = make_cells(given, [503], most=100)
+    assert found.width == 10
+    assert 503 in found.first
+    assert 20 not in found.first
+    weights = np.where(used, 1 / (given.variances + np.var(given.values[used])), 0)
+    part = slice(500, 503)
+    at = found.first.tolist().index(500)
+    assert found.values[at] == pytest.approx(np.average(given.values[part], weights=weights[part]))
+
+
+@pytest.mark.parametrize(
+    ("frames", "phi", "sd", "widest"),
+    [
+        (8, 0.0, 0.1, 1.1),
+        (20, 0.9, 0.1, 0.5),
+        (60, 0.7, 0.15, 0.38),
+        (120, 0.5, 0.2, 0.11),
+        (240, 0.94, 0.3, 0.5),
+    ],
+)
+def test_the_interval_holds_from_eight_frames_on_and_is_not_too_wide(frames, phi, sd, widest):
+    inside, halves = 0, []
+    for seed in range(30):
+        rng = np.random.default_rng([seed, frames])
+        errors = rng.uniform(0.015, 0.1, frames)
+        values = -0.44 + ar1(rng, frames, phi, sd) + rng.normal(0, 1, frames) * errors
+        now = assess_sequence(values, errors).segments[0].mean
+        inside += abs(now.value + 0.44) <= now.ci95
+        halves.append(now.ci95)
+    assert inside >= 26  # of thirty, where 95 % are inside, 99.7 % have as many
+    assert np.median(halves) <= widest
+
+
+def test_errors_that_are_said_too_small_do_not_make_the_interval_too_narrow():
+    inside = 0
+    for seed in range(30):
+        rng = np.random.default_rng(seed)
+        values = ar1(rng, 120, 0.9, 0.1) + rng.normal(0, 0.15, 120)
+        now = assess_sequence(values, np.full(120, 0.05)).now
+        inside += abs(now.value) <= now.ci95
+    assert inside >= 26
