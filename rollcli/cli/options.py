@@ -17,7 +17,7 @@ from rollcli.run.options import (
     RegionOptions,
     RunningOptions,
 )
-from rollcli.stereo.options import ALIGN, MODES, StereoOptions
+from rollcli.stereo.options import MODES, StereoOptions
 
 _METHOD = MethodOptions()
 PATH = FilePath()  # whether it exists, its reader says: in the same words wherever the name came from
@@ -134,10 +134,12 @@ stereo_options = record(
     ),
     option(
         "--align",
-        type=Choice(*ALIGN),
+        type=PATH,
+        metavar="auto|off|FILE",
         default=StereoOptions.align,
         help="auto: measure how much lower, larger and how far turned the right image is against the left, "
-        "correct that before matching, and say so in the row; off: match the images as they are.",
+        "correct that before matching, and say so in the row; off: match the images as they are; FILE: "
+        "correct all pairs as `rollcli rig --correction FILE` says.",
     ),
     option(
         "--vertical-offset",

@@ -21,6 +21,7 @@ from rollcli.stereo.alignment import (
     textured_share,
 )
 from rollcli.stereo.columns import with_believed_columns
+from rollcli.stereo.correction import CONTRADICTS
 from rollcli.stereo.first_look import FirstLook, first_look, look_for_range
 from rollcli.stereo.misalignment import LEVEL, Misalignment
 from rollcli.stereo.misalignment_words import NOT_LEVELLED, TOO_LITTLE
@@ -160,7 +161,8 @@ class StereoMatch:
         """
         if self.measured is None or self.doubt in (TOO_LITTLE, NOT_LEVELLED):
             return None
-        return self.measured.misalignment if self.corrected == LEVEL else self.corrected
+        as_measured = self.corrected == LEVEL or self.doubt == CONTRADICTS
+        return self.measured.misalignment if as_measured else self.corrected
 
 
 def compute_disparity(left: NDArray[Any], right: NDArray[Any], **options: Any) -> Map:
@@ -237,8 +239,11 @@ def match_pair(
     above = _rows_above(look, wanted, height) if first >= 0 else 0
     of_these = partial(match, above=above)
     if small is None:
-        corrected, measured, doubt = Misalignment(options.vertical_offset or 0.0), None, ""
+        corrected, measured, doubt = options.given_alignment(width), None, ""
         matched = of_these(corrected, wanted.rows)
+        if options.checks_alignment:
+            measured = SmallViews(views).measure(matched, corrected)
+            doubt = "" if measured is None or _agrees(measured, corrected, views[0].shape) else CONTRADICTS
     else:
         matched, corrected, measured, doubt = _match_levelled(of_these, wanted.rows, small, look, first < 0)
     support = NOTHING_KNOWN if measured is None or corrected == LEVEL else measured.support
@@ -265,6 +270,11 @@ def match_pair(
     )
 
 
+def _agrees(measured: Measured, corrected: Misalignment, shape: tuple[int, ...]) -> bool:
+    """Tell whether views that were levelled as a file says are level, but for what refinement takes away."""
+    return is_level(measured.misalignment - corrected, measured.errors, shape, replace(_KEPT, sure=4.0))
+
+
 def _rows_above(look: FirstLook, wanted: Wanted, height: int) -> int:
     """Return how many rows need not be matched at full size."""
     if wanted.first_row is None or look.disparity is None:
@@ -286,7 +296,7 @@ def _look_as_given(views: Views, options: StereoOptions) -> FirstLook:
     """Look at views that lie as the user says, where their range is not given."""
     if options.num_disparities is not None:
         return FirstLook(None, None)
-    return look_for_range((views[0], level(views[1], Misalignment(options.vertical_offset or 0.0))))
+    return look_for_range((views[0], level(views[1], options.given_alignment(views[0].shape[1]))))
 
 
 def _match_levelled(

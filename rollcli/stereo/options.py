@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 
 from rollcli.errors import UsageError
+from rollcli.stereo.correction import read_correction
+from rollcli.stereo.misalignment import Misalignment
 
 MODES = ("sgbm", "hh", "3way")
 ALIGN = ("auto", "off")
@@ -42,8 +44,9 @@ class StereoOptions:
         Disparity step that ends an island, pixels.
     downscale : float
         Match at 1/downscale of the size.
-    align : {"auto", "off"}
-        Whether to measure how the right view lies against the left one, and to level it.
+    align : {"auto", "off"} or str
+        Whether to measure how the right view lies against the left one, and to level it; or the file of a
+        correction for all pairs.
     vertical_offset : float or None
         How much lower the right image lies, pixels of the size matched at: corrected as given, and nothing is
         measured; None: as `align` says.
@@ -70,7 +73,19 @@ class StereoOptions:
         if self.mode not in MODES:
             raise UsageError(f"sgbm-mode {self.mode!r}: choose one of {', '.join(MODES)}")
         if self.align not in ALIGN:
-            raise UsageError(f"align {self.align!r}: choose one of {', '.join(ALIGN)}")
+            read_correction(self.align)
+
+    def given_alignment(self, width: int) -> Misalignment:
+        """Return how the right view lies as the user says, of views so wide."""
+        if self.vertical_offset is not None or self.align in ALIGN:
+            return Misalignment(self.vertical_offset or 0.0)
+        lies, of_width = read_correction(self.align)
+        return lies.resized(width / of_width)
+
+    @property
+    def checks_alignment(self) -> bool:
+        """Whether what a file says is compared with what the views show."""
+        return self.vertical_offset is None and self.align not in ALIGN
 
     @property
     def measures_alignment(self) -> bool:

@@ -20,14 +20,23 @@ from rollcli.run.workers.pool import limit_blas_threads
 limit_blas_threads()  # as the program does; with two, the series take twenty times as long on a busy machine
 
 import numpy as np
-from rollcli.rig.drive.noise import block_length
 
 from rollcli.files.results import Row, format_header, format_row
 from rollcli.rig.drive.quantity import assess_sequence
-from tests.rig.drive.series import drive
+from tests.rig.drive.series import ar1, drive
 from tests.run_cli import command, environment
 
 SERIES, FIRST_SEED, ROWS = 500, 100_000, 1_000_000
+NEAR = 25  # frames
+NOISES = [(0, 0.1), (0.5, 0.2), (0.7, 0.15), (0.9, 0.1), (0.94, 0.3), (0.97, 0.4)]  # phi, sd in degrees
+# half-widths of the posterior when it was first tried, by frames and noise
+SHORT = {
+    8: [0.73, 1.18, 0.81, 0.34, 0.85, 0.73],
+    20: [0.17, 0.85, 0.60, 0.33, 0.79, 0.79],
+    60: [0.03, 0.12, 0.25, 0.27, 0.71, 0.80],
+    120: [0.02, 0.07, 0.08, 0.18, 0.58, 0.65],
+    240: [0.01, 0.05, 0.05, 0.09, 0.33, 0.46],
+}
 LEVEL = -0.44
 # what happens, frames, phi, sd in degrees
 SETTINGS = [
@@ -74,7 +83,7 @@ def assess_many(what: str, frames: int, phi: float, sd: float, series: int, firs
     }
     if what == "jump 0.5":
         row["found"] = np.mean([bool(rig.jumps) for rig, _ in found])
-        row["near"] = np.mean([_misses(rig, at) <= _half_block(rig) for rig, at in found if rig.jumps])
+        row["near"] = np.mean([_misses(rig, at) <= NEAR for rig, at in found if rig.jumps])
         row["miss"] = np.median([_misses(rig, at) for rig, at in found if rig.jumps])
     elif what == "drift 1":
         row["found"] = np.mean([rig.status == "drift" for rig, _ in found])
@@ -90,8 +99,26 @@ def _misses(rig, at: int) -> int:
     return min(abs(jump.frame - at) for jump in rig.jumps)
 
 
-def _half_block(rig) -> float:
-    return block_length(rig.frames, rig.noise) / 2
+def short_drives(series: int, first: int) -> None:
+    """Print, for each cell: share inside, and the half-width against that of RIG.md E."""
+    print("short drives: inside the interval, median half-width, and as a share of the reference's")
+    inside = []
+    for frames, references in SHORT.items():
+        row = []
+        for (phi, sd), reference in zip(NOISES, references, strict=True):
+            held, halves = [], []
+            for seed in range(first, first + series):
+                rng = np.random.default_rng([seed, frames, round(100 * phi)])
+                own = rng.uniform(0.015, 0.1, frames)
+                values = LEVEL + ar1(rng, frames, phi, sd) + rng.normal(0, 1, frames) * own
+                now = assess_sequence(values, own).now
+                held.append(abs(now.value - LEVEL) <= now.ci95)
+                halves.append(now.ci95)
+            inside += held
+            half = float(np.median(halves))
+            row.append(f"{np.mean(held):.2f} {half:.3f} ({half / reference:.2f})")
+        print(f"{frames:4}  " + "  ".join(row), flush=True)
+    print(f"pooled {np.mean(inside):.3f}", flush=True)
 
 
 def assess_a_million() -> str:
@@ -143,6 +170,7 @@ def main() -> None:
     """Print one table."""
     series, first = [int(text) for text in sys.argv[1:3]] + [SERIES, FIRST_SEED][len(sys.argv) - 1 :]
     print(assess_a_million(), flush=True)
+    short_drives(series, first)
     print(f"{series} series each, seeds from {first}; degrees, shares from 0 to 1, frames")
     names = ("inside", "without", "rms", "wrong", "found", "near", "miss")
     heads = (
@@ -151,7 +179,7 @@ def main() -> None:
         "rms error",
         "wrong jumps",
         "found",
-        "in half a block",
+        "in 25 frames",
         "off by",
     )
     print(f"{'what':10} {'frames':>6} {'phi':>5} {'sd':>4}  " + "  ".join(heads))

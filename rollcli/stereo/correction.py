@@ -1,0 +1,39 @@
+"""A correction for all pairs of a rig, as `rollcli rig --correction` writes it."""
+
+import json
+import math
+from functools import lru_cache
+from pathlib import Path
+
+from rollcli.errors import UsageError
+from rollcli.stereo.misalignment import Misalignment
+
+_VALUES = ("right_lower_px", "right_clockwise_deg", "right_larger_percent", "right_twist_px")
+_LARGEST = (100.0, 45.0, 50.0, 100.0)  # of each; what is more is damage
+CONTRADICTS = "the views do not lie as the correction says"
+"""The doubt of a pair that was levelled as a file says, and is not level then."""
+
+
+@lru_cache(maxsize=8)
+def read_correction(path: str) -> tuple[Misalignment, int]:
+    """Return how the right view lies, and the width of the views that this is for, px.
+
+    Raises
+    ------
+    UsageError
+        The file cannot be read, or is no correction.
+    """
+    try:
+        found = json.loads(Path(path).read_bytes())
+        values = [float(found[name]) for name in _VALUES]
+        width, height = int(found["width"]), int(found["height"])
+    except OSError as error:
+        raise UsageError(
+            f"--align {path}: cannot be read: {(error.strerror or str(error)).lower()}"
+        ) from error
+    except (ValueError, KeyError, TypeError, RecursionError, OverflowError) as error:
+        raise UsageError(f"--align {path}: is no correction that `rollcli rig --correction` wrote") from error
+    fits = all(math.isfinite(each) and abs(each) <= most for each, most in zip(values, _LARGEST, strict=True))
+    if not (fits and width > 0 and height > 0):
+        raise UsageError(f"--align {path}: holds numbers that no rig has")
+    return Misalignment.of_values(values, height, width), width

@@ -1,0 +1,95 @@
+"""The health of a pair, from rendered views that are turned, lowered and enlarged, to its correction."""
+
+import csv
+import json
+import math
+
+import cv2
+import numpy as np
+import pytest
+
+from tests.run_cli import rollcli
+
+TRUTH = {"right_lower_px": 1.2, "right_clockwise_deg": 0.15, "right_larger_percent": 0.3}
+NEAR = {"right_lower_px": 0.1, "right_clockwise_deg": 0.02, "right_larger_percent": 0.05}
+
+
+def put_off(path, target):
+    """Turn a view by 0.15 degrees about its centre, enlarge it by 0.3 % and lower it by 1.2 px."""
+    view = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    height, width = view.shape[:2]
+    turn = cv2.getRotationMatrix2D(((width - 1) / 2, (height - 1) / 2), -0.15, 1.003)
+    turn[1, 2] += 1.2
+    moved = cv2.warpAffine(
+        view, turn, (width, height), flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE
+    )
+    cv2.imwrite(str(target / path.name), moved)
+
+
+def rolls(path):
+    return np.array([float(row["roll_deg"]) for row in csv.DictReader(path.open())])
+
+
+@pytest.fixture(scope="module")
+def pairs(tmp_path_factory):
+    """Eight pairs, the same with right views that are put off, and what was measured of these."""
+    folder = tmp_path_factory.mktemp("pairs")
+    scene = ("--scene", "mixed", "--size", "480x360", "--roll=-3:3", "-q")
+    assert rollcli("simulate", ".", "--frames", "8", *scene, cwd=folder).status == 0
+    (folder / "off").mkdir()
+    for path in sorted((folder / "right").iterdir()):
+        put_off(path, folder / "off")
+    for name, right in (("level", "right"), ("off", "off")):
+        done = rollcli("estimate", "--left", "left", "--right", right, "-o", f"{name}.csv", "-q", cwd=folder)
+        assert done.status == 0
+    return folder
+
+
+def test_how_the_right_view_lies_is_found_within_its_interval_and_gated(pairs):
+    asked = ("--max-misalignment", "1", "--correction", "c.json", "--overwrite", "--format", "json", "-q")
+    done = rollcli("rig", "off.csv", *asked, cwd=pairs)
+    assert done.status == 4
+    found = json.loads(done.out)["alignment"]
+    assert found["advice"] == "recalibrate"
+    for name, truth in TRUTH.items():
+        prefix, _, suffix = name.rpartition("_")
+        assert abs(found[name] - truth) <= min(NEAR[name], found[f"{prefix}_ci95_{suffix}"])
+    level = json.loads(rollcli("rig", "level.csv", "--format", "json", "-q", cwd=pairs).out)["alignment"]
+    assert level["advice"] == "level"
+
+
+def test_with_a_correction_the_angles_are_those_of_the_untouched_pairs(pairs):
+    assert rollcli("rig", "off.csv", "--correction", "use.json", "-q", cwd=pairs).status == 0
+    given = ("--align", "use.json", "-o", "corrected.csv", "-q")
+    assert rollcli("estimate", "--left", "left", "--right", "off", *given, cwd=pairs).status == 0
+    apart = np.abs(rolls(pairs / "corrected.csv") - rolls(pairs / "level.csv"))
+    assert np.median(apart) <= 0.02
+    assert apart.max() <= 0.08
+
+
+def test_the_matrix_brings_the_right_view_back(pairs):
+    rollcli("rig", "off.csv", "--correction", "matrix.json", "-q", cwd=pairs)
+    found = json.loads((pairs / "matrix.json").read_text())
+    corner = np.array([0.0, 0.0, 1.0])
+    x, y = -479 / 2, -359 / 2
+    turned = math.radians(0.15)
+    expected = [1.003 * x - turned * y - x, turned * x + 1.003 * y + 1.2 - y]
+    assert (np.array(found["matrix"]) @ corner)[:2] == pytest.approx(expected, abs=0.15)
+
+
+def test_a_pair_that_contradicts_the_correction_is_suspect(pairs):
+    rollcli("rig", "off.csv", "--correction", "other.json", "-q", cwd=pairs)
+    done = rollcli("estimate", "--left", "left", "--right", "right", "--align", "other.json", cwd=pairs)
+    rows = list(csv.DictReader(done.out.splitlines()))
+    assert {row["status"] for row in rows} == {"suspect"}
+    assert all("do not lie as the correction says" in row["message"] for row in rows)
+
+
+@pytest.mark.parametrize(("text", "reason"), [(None, "cannot be read"), ("{}", "is no correction")])
+def test_what_is_no_correction_is_refused(pairs, text, reason):
+    if text is not None:
+        (pairs / "bad.json").write_text(text)
+    name = "none.json" if text is None else "bad.json"
+    done = rollcli("estimate", "--left", "left", "--right", "off", "--align", name, cwd=pairs)
+    assert (done.status, done.out) == (2, "")
+    assert reason in done.err
