@@ -103,10 +103,10 @@ class Misalignment:
     def matrix(self, height: int, width: int) -> list[list[float]]:
         """Return the affine map from pixels (u, v, 1) of a level view to the given one, without twist."""
         x, y = (width - 1) / 2, (height - 1) / 2
-        across, down = 1 + self.stretch, 1 + self.scale
+        larger = 1 + self.scale
         return [
-            [across, -self.rotation, x - across * x + self.rotation * y],
-            [self.rotation, down, y + self.offset - self.rotation * x - down * y],
+            [larger, -self.rotation, x - larger * x + self.rotation * y],
+            [self.rotation, larger, y + self.offset - self.rotation * x - larger * y],
             [0.0, 0.0, 1.0],
         ]
 
