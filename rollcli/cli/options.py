@@ -304,7 +304,11 @@ cluster_options = record(
     "Running",
     RunningOptions,
     *_running,
-    option("--scheduler", metavar="ADDRESS", help="Run on this Dask cluster, such as tcp://host:8786."),
+    option(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="Run on this Dask cluster: its scheduler's address, such as tcp://host:8786, or scheduler file.",
+    ),
 )
 
 

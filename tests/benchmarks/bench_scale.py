@@ -175,21 +175,26 @@ def busy(workers: int, frame_s: float, seconds: float) -> float:
 
 
 def print_model(found: dict[str, float]) -> None:
-    """Frames a second by the number of workers: the least of what each part of a run can do."""
-    print(
-        f"\n{'workers':>8} {'maps/s':>9} {'limit':10} {'pairs/s':>9} {'limit':10} {'maps/s, parts':>14} limit"
-    )
+    """Frames a second by the number of workers: the least of what each part of a run can do.
+
+    A chunk is worth a second, and more where there are more than 100 workers: a frame's share of the
+    scheduler's time grows with the time of the frame, and falls with the number of workers beyond these.
+    """
+    cases = (("maps", MAP_S, "driver"), ("maps, parts", MAP_S, "driver, parts"), ("pairs", PAIR_S, "driver"))
+    print("\nframes/s and what limits them")
+    print(f"{'workers':>8}" + "".join(f"{name:>22}" for name, _, _ in cases))
     for workers in (1, 16, 64, 256, 1000):
-        row = [f"{workers:8}"]
-        for frame_s, driver in ((MAP_S, "driver"), (PAIR_S, "driver"), (MAP_S, "driver, parts")):
+        row = f"{workers:8}"
+        for _, frame_s, driver in cases:
+            share = frame_s / (found["alone"] / 1000) / max(1, min(workers, 800) / 100)
             able = {
                 "workers": workers / frame_s,
                 "driver": 1000 / max(found[driver], 1e-3),
-                "scheduler": 1000 / max(found["scheduler"], 1e-3),
+                "scheduler": 1000 / max(found["scheduler"] * share, 1e-3),
             }
             limit = min(able, key=lambda each: able[each])
-            row.append(f"{able[limit]:9.0f} {limit:10}")
-        print(" ".join(row))
+            row += f"{able[limit]:12.0f} {limit:9}"
+        print(row)
 
 
 def main() -> None:
