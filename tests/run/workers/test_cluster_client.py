@@ -3,7 +3,6 @@
 import json
 import logging
 import sys
-import threading
 import time
 from pathlib import Path
 
@@ -60,22 +59,27 @@ def test_results_come_in_the_order_of_the_tasks(workers_here, threads):
     assert list(results(workers_here, tasks, threads)) == list(range(500))
 
 
-_together = threading.Barrier(4)
+_waiting: list[int] = []
+_together: set[int] = set()
 
 
-def wait_together(task):
-    """Wait until three others wait, too: alone, this would break the barrier."""
+def wait_a_while(task):
+    """Note how many tasks wait at once."""
     with turns.waiting_for_network():
-        _together.wait(timeout=30)
+        _waiting.append(task)
+        time.sleep(0.05)
+        _together.add(len(_waiting))
+        _waiting.remove(task)
     return task
 
 
 def test_tasks_that_wait_for_the_network_wait_together(workers_here):
-    executor = executor_on(workers_here, Work(wait_together, lost), threads=4)
+    executor = executor_on(workers_here, Work(wait_a_while, lost), threads=4)
     try:
-        assert list(in_order(range(16), executor, Stop())) == list(range(16))
+        assert list(in_order(range(64), executor, Stop())) == list(range(64))
     finally:
         executor.close(at_once=False)
+    assert max(_together) == 4  # workers of one process share its threads
 
 
 def test_an_error_of_a_task_ends_the_run_after_the_results_before_it(workers_here):
