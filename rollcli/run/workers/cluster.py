@@ -119,7 +119,12 @@ class ClusterExecutor(Generic[Task, Result]):
 
     def take_in_workers(self) -> None:
         """Take in workers that have joined, and say which of them cannot take part."""
-        for worker, problem in self._look_for_workers().items():
+        try:
+            problems = self._look_for_workers()
+        except OSError:  # the scheduler is lost, which is said once Dask gives it up
+            self._looked = time.monotonic()
+            return
+        for worker, problem in problems.items():
             say(f"worker {worker}: {problem}; it gets no work")
 
     def submit(self, chunk: Sequence[Task], *, first: bool = False) -> "ClusterFuture[Task, Result]":
@@ -163,7 +168,8 @@ class ClusterExecutor(Generic[Task, Result]):
     def stop(self) -> None:
         """Let workers begin no further task."""
         if not self._stopped and self._client.status == "running":
-            self._client.run(_stop_run, self._run, on_error="ignore")
+            with contextlib.suppress(OSError):  # the scheduler is lost
+                self._client.run(_stop_run, self._run, on_error="ignore")
         self._stopped = True
 
     def close(self, *, at_once: bool) -> None:
@@ -238,7 +244,7 @@ class ClusterFuture(Generic[Task, Result]):
             error = self._sent.exception()
             if error is None:
                 return cast(Done[Result], self._sent.result())
-        except CancelledError as lost:
+        except (CancelledError, OSError) as lost:  # the latter where it is lost amid a result
             raise _connection_lost(self._executor.address) from lost
         if isinstance(error, self._executor.worker_died):
             raise error
