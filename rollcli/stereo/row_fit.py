@@ -50,9 +50,9 @@ class BeliefTuning:
     least : float
         What no pair tells of a scale: blocks between which it lies share a part of their error.
     tiles : float
-        Standard errors from tiles are too small by this: scales of consecutive streets scatter so. With 3, the
-        lidar's pairs are off by -0.06 degrees in place of -0.03, and enlarged rendered ones by 0.086 at most
-        in place of 0.119.
+        Standard errors from tiles are too small by this: scales of consecutive streets scatter so. With 3,
+        pairs with lidar are off by -0.06 degrees in place of -0.03, and enlarged rendered ones by 0.086 at
+        most in place of 0.119.
     """
 
     scale: float = 0.004
