@@ -61,7 +61,7 @@ class BeliefTuning:
     has_scale: float = 0.5
     has_tilt: float = 0.03
     has_bend: float = 0.03
-    pitch: float = 0.6
+    pitch: float = 0.4
     focal: tuple[float, ...] = (0.5, 0.6, 0.75, 1.0, 1.5)
     yaw: float = 0.0035
     lens_twist: float = 10.0
