@@ -27,7 +27,7 @@ def put_off(path, target):
 
 
 def rolls(path):
-    return np.array([float(row["roll_deg"]) for row in csv.DictReader(path.open())])
+    return np.array([float(row["roll_deg"]) for row in csv.DictReader(path.read_text().splitlines())])
 
 
 @pytest.fixture(scope="module")
