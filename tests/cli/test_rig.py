@@ -67,7 +67,9 @@ def test_the_table_begins_with_the_answer_and_names_the_frame_of_a_jump(folder):
     assert done.status == 0
     first, *rest = done.out.splitlines()
     assert first.startswith("roll    +0.")
-    assert re.search(r"± 0\.\d+° since maps/frame_1[45]\d\d\.png  \(", first)
+    assert re.search(
+        r"± 0\.\d+° since maps/frame_1[45]\d\d\.png, where it jumped by \+0\.\d+ ± 0\.\d+°  \(", first
+    )
     assert " of 3,000 frames, 2 suspect, 1 failed" in first
     (sentence,) = (line for line in rest if line.startswith("        +0."))
     assert "° at maps/frame_" in sentence
