@@ -32,4 +32,4 @@ def test_a_gate_on_roll_pitch_and_height_passes_and_one_on_another_rig_fails(dri
     assert rollcli("rig", "rolls.csv", *asked, cwd=drive).status == 0
     other = rollcli("rig", "rolls.csv", "--within", "0.2", "--expect-roll", "0", cwd=drive)
     assert other.status == 4
-    assert "the roll of rig/disparity/frame_0001.png to rig/disparity/frame_0024.png is +2" in other.err
+    assert "the roll of disparity/frame_0001.png to disparity/frame_0024.png is +2" in other.err

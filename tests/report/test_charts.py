@@ -170,7 +170,7 @@ def drive_rows(folder, level, frames=400, jump=0.0):
     return [row(f"{folder}/{place}.png", float(roll), 0.05) for place, roll in enumerate(rolls)]
 
 
-def test_the_chart_shows_segments_jumps_and_the_smoothed_roll():
+def test_the_chart_shows_segments_and_jumps():
     rows = drive_rows("run", 0.2, jump=0.8)
     shown = {trace["name"]: trace for trace in chart_over_frames(rows, rig=assess_rig(rows)).data}
     assert shown["jump"]["x"] == [200.5, 200.5, None]
@@ -178,19 +178,7 @@ def test_the_chart_shows_segments_jumps_and_the_smoothed_roll():
     assert shown["jump"]["text"][0].endswith(" at run/200.png")
     assert shown["mounting"]["x"] == [1, 200, None, 201, 400, None]
     assert shown["mounting"]["y"][0] == pytest.approx(0.2, abs=0.03)
-    told = [each for each in shown["smoothed"]["y"] if each is not None]
-    assert told == [round(each, 4) for each in told] != [round(each, 3) for each in told]
     assert shown["mounting"]["y"][3] == pytest.approx(1.0, abs=0.03)
-    smoothed = np.array([value for value in shown["smoothed"]["y"] if value is not None])
-    assert np.abs(smoothed - np.repeat([0.2, 1.0], 200)).max() < 0.1
-
-
-@pytest.mark.parametrize("end", [21, 24], ids=["one", "four"])
-def test_the_smoothed_roll_is_not_drawn_across_suspect_frames(end):
-    rows = drive_rows("run", 0.2, frames=80)
-    rows[20:end] = [row(f"run/{place}.png", 9.0, 1.0, "suspect") for place in range(20, end)]
-    shown = {trace["name"]: trace for trace in chart_over_frames(rows, rig=assess_rig(rows)).data}
-    assert shown["smoothed"]["x"] == [*range(1, 21), None, *range(end + 1, 81), None]
 
 
 def test_a_long_run_has_a_line_without_dots_and_a_dot_for_each_frame_that_stands_alone():
@@ -211,7 +199,7 @@ def test_what_is_measured_stands_out_from_what_is_said_of_it():
     shown = {trace["name"]: trace for trace in chart.data}
     width = {name: trace["line"]["width"] for name, trace in shown.items() if "line" in trace}
     assert width["mounting, 95 %"] == 0  # an area alone
-    assert width["95 % interval"] < width["roll"] == width["smoothed"] == width["jump"] < width["mounting"]
+    assert width["95 % interval"] < width["roll"] == width["jump"] < width["mounting"]
     assert (
         shown["suspect"]["error_y"]["thickness"] < width["roll"] < shown["failed"]["marker"]["line"]["width"]
     )
