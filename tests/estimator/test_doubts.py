@@ -33,7 +33,7 @@ def with_noise(disparity, sigma=0.15):
 def twisted_road():
     """A road whose roll changes from near to far."""
     y = (V - 300) * math.cos(0.05) - (U - 320) * math.sin(0.05)
-    return with_noise(np.where(y > -150, 40 + 0.25 * y + 0.001 * (U - 320) * y, 0))
+    return with_noise(np.where(y > -150, 40 + 0.25 * y + 0.0015 * (U - 320) * y, 0))
 
 
 def noise_alone():
