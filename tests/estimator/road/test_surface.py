@@ -145,7 +145,7 @@ def test_a_verge_beyond_the_edge_of_the_road_is_no_road(slope):
     assert covered[(np.abs(side) < 1) & (road > 0)].mean() > 0.95
 
 
-# of the height of the camera: at a hundredth the ground counts half, as `ProfileTuning.off_level` says
+# of the height of the camera: at a hundredth the ground counts half, as `FitTuning.off_level` says
 @pytest.mark.parametrize(("share", "is_road"), [(0.004, True), (0.008, True), (0.0125, False), (0.03, False)])
 def test_ground_that_counts_half_as_much_as_the_lane_is_shown_as_road(share, is_road):
     disparity = disparity_of(lambda x: share * CAMERA_HEIGHT * np.clip((x - 1.2) / 0.1, 0, 1))
