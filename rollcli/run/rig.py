@@ -23,9 +23,9 @@ from rollcli.rig.words import findings
 from rollcli.run.calibration import Calibrations
 from rollcli.run.find import check_writes, list_files
 from rollcli.run.rig_gates import check_options, run_checks, status_of
-from rollcli.run.rig_health import correction_text, health_of
+from rollcli.run.rig_health import health_of
 from rollcli.run.rig_options import RigOptions
-from rollcli.run.rig_text import FORMATS, Findings
+from rollcli.run.rig_text import FORMATS, Findings, correction_text
 
 COLUMNS = (*QUANTITY_COLUMNS, *SIZE)
 

@@ -1,19 +1,15 @@
 """How the views of a pair lie over a drive, what that does to roll and depth, and the correction for it."""
 
-import json
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from rollcli.errors import UsageError
 from rollcli.rig.calibration import Calibration
 from rollcli.rig.drive.assess import RigAssessment
 from rollcli.rig.drive.posterior import Estimate
 from rollcli.rig.quantities import ALIGNMENT, SIZE, Quantity
 from rollcli.rig.words import answer
-from rollcli.run.rig_text import alignment_values
 from rollcli.stereo.misalignment import Misalignment
 
 PIXELS = Quantity("shift", "", "", " px", "px")
@@ -148,32 +144,3 @@ def _reach(parts: tuple[Estimate, ...], width: int, height: int) -> Estimate:
     lower, clockwise, larger, twist = (half or 0.0 for half in halves)
     shifts = Misalignment.of_values((lower, clockwise, larger, twist), height, width).shifts(height, width)
     return Estimate(value, math.hypot(*shifts))
-
-
-_CALL = (
-    "cv2.warpPerspective(right, np.array(matrix), (width, height), "
-    "flags=cv2.INTER_CUBIC | cv2.WARP_INVERSE_MAP, borderMode=cv2.BORDER_REPLICATE)"
-)
-
-
-def correction_text(health: Health | None, results: Sequence[str]) -> str:
-    """Return the JSON of a correction.
-
-    Raises
-    ------
-    UsageError
-        The results have no pairs whose views were measured.
-    """
-    if health is None:
-        raise UsageError(f"{results[0]}: no pair was measured, so there is no correction to write")
-    width, height = health.size
-    values = {
-        **alignment_values(health),
-        "width": width,
-        "height": height,
-        "matrix": health.misalignment.matrix(height, width),
-        "opencv": _CALL,
-        "note": "matrix: from a pixel of the corrected right view to the given one, without the twist, "
-        f"which no matrix holds; {NOT_SEEN}",
-    }
-    return json.dumps(values, indent=2) + "\n"

@@ -7,13 +7,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from rollcli.errors import UsageError
 from rollcli.rig.drive.assess import DriveAssessment, RigAssessment
 from rollcli.rig.drive.posterior import Estimate
 from rollcli.rig.drive.quantity import Segment
 from rollcli.rig.quantities import ALIGNMENT, QUANTITIES, ROLL, Quantity
 from rollcli.rig.words import answer, counts, findings, frame_name, now_in_words
 from rollcli.run.rig_gates import Check
-from rollcli.run.rig_health import DISTANCES, Health
+from rollcli.run.rig_health import DISTANCES, NOT_SEEN, Health
 
 _DIGITS = 6
 
@@ -263,3 +264,32 @@ def _moved(name: str, change: Estimate) -> Iterator[str]:
     quantity = next(each for each in QUANTITIES if each.name == name)
     told = {True: "it has moved", False: "no move is seen", None: "too few frames for an interval"}
     yield f"{name} against the other result: {answer(change, quantity, change=True)}, {told[moved(change)]}"
+
+
+_CALL = (
+    "cv2.warpPerspective(right, np.array(matrix), (width, height), "
+    "flags=cv2.INTER_CUBIC | cv2.WARP_INVERSE_MAP, borderMode=cv2.BORDER_REPLICATE)"
+)
+
+
+def correction_text(health: Health | None, results: Sequence[str]) -> str:
+    """Return the JSON of a correction.
+
+    Raises
+    ------
+    UsageError
+        The results have no pairs whose views were measured.
+    """
+    if health is None:
+        raise UsageError(f"{results[0]}: no pair was measured, so there is no correction to write")
+    width, height = health.size
+    values = {
+        **alignment_values(health),
+        "width": width,
+        "height": height,
+        "matrix": health.misalignment.matrix(height, width),
+        "opencv": _CALL,
+        "note": "matrix: from a pixel of the corrected right view to the given one, without the twist, "
+        f"which no matrix holds; {NOT_SEEN}",
+    }
+    return json.dumps(values, indent=2) + "\n"
