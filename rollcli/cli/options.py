@@ -261,8 +261,8 @@ save_as_option = option(
     type=Choice("png", "tiff", "npy"),
     default="png",
     help="Format of maps computed from pairs: 16-bit KITTI PNG (TIFF for a map beyond its 256 px), float32 "
-    "TIFF or float32 NPY; of heights: TIFF, or NPY. Maps as PNG and TIFF carry what levelling left uncertain, for "
-    "`estimate`; NPY cannot.",
+    "TIFF or float32 NPY; of heights: TIFF, or NPY. Maps as PNG and TIFF carry what levelling left "
+    "uncertain, for `estimate`; NPY cannot.",
 )
 
 output_folder_option = option(

@@ -1,4 +1,4 @@
-"""What a map that was matched from a pair carries in its own file: what levelling left, and how the views lay."""
+"""What a map from a pair carries in its own file: what levelling left, and how the views lay."""
 
 import json
 import math
