@@ -181,7 +181,10 @@ class Likelihood:
         return np.asarray(self._rotate @ columns)
 
     def fit(self, design: Floats) -> Fit:
-        """Fit the columns of a design, shape (C, M), for every noise."""
+        """Fit the columns of a design, shape (C, M), for every noise; without evidence where they depend."""
+        if np.linalg.matrix_rank(design) < design.shape[1]:
+            grid, size = self._base.shape, design.shape[1]
+            return Fit(np.zeros((*grid, size)), np.zeros((*grid, size, size)), np.full(grid, -np.inf))
         columns = self.rotated(design)
         normal = self._products(columns[..., :, None] * columns[..., None, :])
         pull = self._products(columns * self._values)

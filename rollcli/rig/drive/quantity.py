@@ -147,6 +147,9 @@ def assess_sequence(values: ArrayLike, errors: ArrayLike, unit: float = 1.0) -> 
         Jump(start, fitted.estimate(fitted.unit_row(place + 1) - fitted.unit_row(place)))
         for place, start in enumerate(found.starts)
     )
+    line = fitted
+    if not found.drift and used >= TUNING.fewest:
+        line = _Fitted(series, found.starts, True, unit)
     status: Status = "jump" if jumps else "drift" if found.drift else "stable"
     return SequenceAssessment(
         frames=len(given),
@@ -154,7 +157,7 @@ def assess_sequence(values: ArrayLike, errors: ArrayLike, unit: float = 1.0) -> 
         outliers=outliers,
         segments=tuple(fitted.segments()),
         jumps=jumps,
-        drift=fitted.drift() if found.drift else _Fitted(series, found.starts, True, unit).drift(),
+        drift=line.drift(),
         drifts=found.drift,
         status="few" if used < TUNING.fewest else status,
         between_sd=fitted.between_sd(),
@@ -172,6 +175,8 @@ class _Fitted:
         self._cells = make_cells(series, starts)
         design = design_of(self._cells, starts, drift, self._frames)
         self._there: Flags = np.asarray(design.any(axis=0))  # a stretch may have no frame that counts
+        if drift and np.linalg.matrix_rank(design[:, self._there]) < self._there.sum():
+            self._there[-1] = False  # too few cells for a line beside the levels
         self._fit: Fit = Likelihood(self._cells, unit).fit(design[:, self._there])
 
     def unit_row(self, place: int) -> Floats:
