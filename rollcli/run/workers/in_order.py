@@ -1,5 +1,6 @@
 """Give tasks to an executor and yield their results in the tasks' order, with few tasks in flight."""
 
+import contextlib
 from collections import deque
 from collections.abc import Generator, Iterable, Sequence
 from dataclasses import dataclass, field
@@ -134,6 +135,8 @@ def in_order(
         chunk, future = in_flight[0]
         if not future.done():
             executor.wait(future)
+            if not chunks.measured:  # one slow first task must not keep the other workers waiting
+                _measure_any(chunks, [each for _, each in in_flight], executor)
             continue
         in_flight.popleft()
         try:
@@ -153,3 +156,14 @@ def in_order(
             if stop.asked:
                 return
             submit_first(rest)
+
+
+def _measure_any(
+    chunks: Chunks[Task], futures: Iterable[Future[Result]], executor: Executor[Task, Result]
+) -> None:
+    """Learn what a task costs from the first chunk that is done, whichever it is."""
+    for future in futures:
+        if future.done():
+            with contextlib.suppress(*executor.worker_died):
+                chunks.measure(future.result())
+                return
