@@ -1,5 +1,6 @@
 """The extras: packages that some features need, and what installs them beside the rollcli that runs."""
 
+import logging
 import shlex
 import sys
 from importlib import import_module
@@ -17,6 +18,9 @@ EXTRAS = {
     "storage": ("obstore",),
     "tiff": ("imagecodecs",),
 }
+
+# where matplotlib's folders cannot be written it says so on stderr, as soon as it is imported
+logging.getLogger("matplotlib").setLevel(logging.ERROR)
 
 
 def require_extra(extra: str, what: str) -> None:

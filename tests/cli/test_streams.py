@@ -22,7 +22,7 @@ def test_results_alone_go_to_standard_output(maps):
     counts, answer = done.err.splitlines()[-2:]
     assert counts.startswith("rollcli: 3 frames: 3 ok, 0 suspect, 0 failed; ")
     assert answer.startswith("rollcli: roll +0.5")
-    assert answer.endswith("° (too few frames for an interval), 3 ok, 0 suspect, 0 failed")
+    assert answer.endswith("; an interval takes 8), 3 ok, 0 suspect, 0 failed")
 
 
 def test_quiet_says_nothing_when_all_is_well(maps):

@@ -54,6 +54,7 @@ BOUNDED = {
     "--within-height": SIZE,
     "--max-drift": SIZE,
     "--max-jump": SIZE,
+    "--max-misalignment": SIZE,
     "--min-ok": ("0 1", "-0.001 1.001"),  # a share
 }
 

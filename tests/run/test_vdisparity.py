@@ -3,6 +3,7 @@
 import math
 import re
 import subprocess
+import sys
 import xml.etree.ElementTree as ET
 
 import cv2
@@ -12,7 +13,6 @@ import pytest
 from rollcli.files.encodings import read_disparity
 from rollcli.files.formats import read_stored
 from rollcli.pictures.vdisparity import BOTTOM_MARGIN, LEFT_MARGIN
-from rollcli.report import page
 from tests.run_cli import command, contents, environment, road_map, rollcli, write_kitti
 
 
@@ -180,9 +180,9 @@ def test_what_a_figure_cannot_be_is_refused_before_anything_is_written(maps, opt
 
 
 def test_a_figure_without_the_extra_is_refused_in_one_line_that_says_how_to_install_it(maps, monkeypatch):
-    monkeypatch.setattr(page, "_NEEDED", ("jinja2", "no_such_package"))
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
     done = rollcli("vdisparity", "maps", "--figure", "pdf", "-o", "v", cwd=maps)
-    words = 'rollcli: --figure needs no_such_package: pip install "rollcli[report]"\n'
+    words = f"rollcli: --figure needs the extra report: {sys.executable} -m pip install matplotlib\n"
     assert (done.status, done.err) == (2, words)
 
 
