@@ -71,6 +71,10 @@ def equal_shares(position, share, count=6):
     return groups
 
 
+# of a parameter's largest change, or of its textbook error: the sums are in single precision (6e-8), and the
+# normal equations have condition numbers of up to 260, more where a group is left out
+SINGLE = 1e-4
+
 CASES = [{}, {"prior": math.inf}, {"parabolic": False}, {"heavy": 0.3}, {"prior": 5e4}]
 
 
@@ -90,7 +94,8 @@ def test_without_each_group_all_parameters_are_those_of_a_least_squares_fit(case
     ):
         groups = equal_shares(position, share)
         without = [problem.solve(weights * (groups != k))[0][:4] for k in range(6)]
-        np.testing.assert_allclose(changes, whole[:4] - without, rtol=1e-4, atol=1e-6)
+        expected = whole[:4] - without
+        assert (np.abs(changes - expected) < SINGLE * np.abs(expected).max(axis=0) + 1e-9).all()
         leverage = np.bincount(groups, turning) / turning.sum()
         assert freedom == pytest.approx(1 / np.sum(leverage**2) - 1, rel=1e-6)
 
@@ -107,7 +112,8 @@ def test_the_textbooks_covariance_is_that_of_as_many_pixels_as_could_be_independ
     inverse = np.linalg.inv(normal[np.ix_(known, known)])
     expected[np.ix_(known, known)] = inverse * squares / weights.sum() * independent
     white = jackknife(problem.surface, theta, TUNING.interval).white
-    np.testing.assert_allclose(white, expected[:4, :4], rtol=1e-5, atol=1e-12)
+    errors = np.sqrt(expected.diagonal()[:4])
+    assert (np.abs(white - expected[:4, :4]) <= SINGLE * np.outer(errors, errors)).all()
 
 
 def test_pixels_without_any_error_have_no_textbook_error():
