@@ -6,15 +6,78 @@ Add a reason: a function that yields it, and its name in `REASONS`.
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
-from rollcli.estimator.certificate import CertifiedSolution
+import numpy as np
+from numpy.typing import NDArray
+
 from rollcli.estimator.energy import Energy
 from rollcli.estimator.interval import Interval
 from rollcli.estimator.road.find import Road
 from rollcli.estimator.road.surface import Surface
+from rollcli.estimator.solvers.exact import CertifiedSolution
 from rollcli.estimator.solvers.solution import angle_between
 from rollcli.estimator.tuning import DoubtTuning
-from rollcli.estimator.view import View
+
+_COLUMNS = 160  # of a view that are looked at; shares need no more
+_ON_ROAD = 0.03  # of the road's disparity, within which a pixel is on it
+
+
+@dataclass(frozen=True)
+class View:
+    """A map as seen from the place of the camera over a road.
+
+    Tables, shelves and the floors of rooms are as even as roads. But a camera that stands on a road sees
+    several of its own heights to the sides, and most of the lane ahead; a road seen from close by fills it.
+
+    Attributes
+    ----------
+    disparity : ndarray, shape (H, W)
+        px.
+    valid : ndarray of bool, shape (H, W)
+    surface : Surface
+        The road.
+    rmse : float
+        Of its pixels, px.
+    """
+
+    disparity: NDArray[Any]
+    valid: NDArray[np.bool_]
+    surface: Surface
+    rmse: float
+
+    @property
+    def width(self) -> float:
+        """How wide the view is at its bottom, camera heights."""
+        (height, width), grid, model = self.disparity.shape, self.surface.grid, self.surface.model
+        _, slope, bend = model.alpha
+        bottom = model.along(0.0, (height - 1 - grid.centre_v) / grid.scale)
+        nearest = model.disparity_along(bottom)
+        return width / grid.scale * abs(slope + 2 * bend * bottom) / nearest if nearest > 0 else math.inf
+
+    def seen(self) -> float:
+        """Return which share of the lane is seen, 0 to 1.
+
+        The mean of the shares in the middle and in the far third of the ground, of the pixels with data.
+        """
+        height, width = self.disparity.shape
+        step = -(-width // _COLUMNS)
+        model, grid = self.surface.model, self.surface.grid
+        level, slope, _ = model.alpha
+        x = (np.arange(0, width, step) - grid.centre_u) / grid.scale
+        y = ((np.arange(0, height, step) - grid.centre_v) / grid.scale)[:, None]
+        along = model.along(x, y)
+        road = model.disparity_along(along)
+        d, usable = self.disparity[::step, ::step], self.valid[::step, ::step]
+        lane = usable & (road > 0) & (np.abs(model.side(model.across(x, y), road)) < 1)
+        on_road = np.abs(d - road) < _ON_ROAD * road + 3 * self.rmse
+        horizon = max(float(along.min()), -level / slope if slope else -np.inf)
+        thirds = 3 * (along - horizon) / max(float(along.max()) - horizon, 1e-9)
+        shares: list[float] = []
+        for first in (0, 1):
+            there = lane & (thirds >= first) & (thirds < first + 1)
+            shares.append(float((on_road & there).sum()) / max(1.0, float(there.sum())))
+        return float(np.mean(shares))
 
 
 @dataclass(frozen=True)
@@ -97,9 +160,9 @@ def _narrow_view(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
     view = evidence.view
     if view is None:
         return
-    little = view.width < tuning.narrow and view.seen < tuning.least_seen
-    if little or view.width < tuning.narrowest:
-        yield f"the view is as narrow as that of a table or a room: {view.width:.1f} camera heights"
+    width = view.width
+    if width < tuning.narrowest or (width < tuning.narrow and view.seen() < tuning.least_seen):
+        yield f"the view is as narrow as that of a table or a room: {width:.1f} camera heights"
 
 
 def _rival_plane(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:

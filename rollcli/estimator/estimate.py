@@ -6,8 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rollcli.estimator.certificate import CertifiedSolution, certify, certify_near
-from rollcli.estimator.doubts import Evidence, doubts_of
+from rollcli.estimator.doubts import Evidence, View, doubts_of
 from rollcli.estimator.interval import Tangent, interval_of, jackknife, touch
 from rollcli.estimator.moments import CheckedMap, Grid
 from rollcli.estimator.request import (
@@ -20,8 +19,8 @@ from rollcli.estimator.request import (
     SolverSettings,
 )
 from rollcli.estimator.road.pixels import PixelSet, load_solver, select_pixels
+from rollcli.estimator.solvers.exact import CertifiedSolution, certify, certify_near
 from rollcli.estimator.tuning import TUNING, Tuning
-from rollcli.estimator.view import view_of
 
 
 @dataclass(frozen=True)
@@ -171,7 +170,7 @@ def estimate_roll(
     turned = tangent.turned_by(slope_error)
     interval = None if knife is None else interval_of(knife, theta, turned, tuning.interval)
     rmse = pixels.energy.rmse(certified.energy)
-    view = view_of(checked.values, checked.valid, surface, rmse) if pixels.road and surface else None
+    view = View(checked.values, checked.valid, surface, rmse) if pixels.road and surface else None
     evidence = Evidence(
         pixels.energy, certified, pixels.road, surface, max_roll, max_interval, interval, view
     )

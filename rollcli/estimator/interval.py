@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.estimator.least_squares import regular, unit
-from rollcli.estimator.moments import Floats, Grid
+from rollcli.estimator.least_squares import regular, solve_normal, unit
+from rollcli.estimator.moments import Floats, Grid, powers
 from rollcli.estimator.road.model import Reals, RoadModel
 from rollcli.estimator.road.surface import Surface
 from rollcli.estimator.tuning import IntervalTuning
@@ -186,16 +186,19 @@ def _unevenness(heights: Reals, leverage: Reals, bands: _Groups, columns: _Group
     by `factor` from a quarter of a patch to the whole, an uneven road's heights hardly do: that tells them
     apart.
     """
-    weighted = leverage * heights
+    groups = len(bands.products)
+    quarter = bands.half * (2 * groups) + columns.half
 
-    def of_patches(groups: int, band: NDArray[np.intp], column: NDArray[np.intp]) -> float:
-        patch = band * groups + column
-        sums, totals = np.bincount(patch, weighted), np.bincount(patch, leverage)
+    def sums_of(values: Reals) -> Floats:
+        sums = np.bincount(quarter, values, 4 * groups**2)
+        return np.asarray(sums, np.float64).reshape(groups, 2, groups, 2)
+
+    def squares(sums: Floats, totals: Floats) -> float:
         return float((np.square(sums) / np.maximum(totals, _LEAST_SPAN)).sum())
 
-    groups = 2 * len(bands.products)
-    quarters = of_patches(groups, bands.half, columns.half)
-    patches = of_patches(groups // 2, bands.half // 2, columns.half // 2)
+    sums, totals = sums_of(leverage * heights), sums_of(leverage)
+    quarters = squares(sums, totals)
+    patches = squares(sums.sum((1, 3)), totals.sum((1, 3)))
     uneven = (factor * patches - quarters) / (factor - 1)
     return math.sqrt(max(0.0, uneven) / max(float(leverage.sum()), _LEAST_SPAN))
 
@@ -385,17 +388,10 @@ def touch(
 
 def _parabola_of_cubic(along: Reals, weights: Floats) -> tuple[float, float]:
     """Return value and slope at 0 of the parabola that fits the cubes of some positions of mean 0."""
-    squares = along * along
-    weighted = weights * squares
-    cubes = squares * along
-    n, two, three = float(weights.sum()), float(weighted.sum()), float(weighted.dot(along))
-    four, five = float(weighted.dot(squares)), float(weighted.dot(cubes))
-    if not two > 0:
-        return 0.0, 0.0
-    skew, mean = three / two, two / n  # y^2 - skew y - mean is orthogonal to 1 and y
-    norm = four - skew * three - mean * two
-    bend = (five - skew * four - mean * three) / norm if norm > _SINGULAR * four else 0.0
-    return three / n - mean * bend, four / two - skew * bend
+    rows = powers(along, 3)
+    products = (rows[:3] * weights).dot(rows.T)
+    value, slope, _ = solve_normal(products[:, :3], products[:, 3]).tolist()
+    return value, slope
 
 
 def _third_power(disparity: float, slope: float, bend: float, moved: float) -> float:

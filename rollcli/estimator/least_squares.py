@@ -3,10 +3,12 @@
 from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
 
-from rollcli.estimator.moments import Floats
+Floats = NDArray[np.float64]
 
 _RIDGE = 1e-10  # of each diagonal element: a parameter that the pixels do not determine stays finite
+_LEAST = 1e-200  # of a diagonal element, by which a row of zeros can be divided
 
 
 def solve_normal(normal: Floats, pull: Floats) -> Floats:
@@ -24,10 +26,9 @@ def solve_normal(normal: Floats, pull: Floats) -> Floats:
     ndarray, shape (..., N)
         0 for what is missing.
     """
-    added = np.einsum("...ii->...i", normal) * _RIDGE
-    added[added <= 0] = 1.0
+    ridge = unit(normal.shape[-1])
     return np.asarray(
-        np.linalg.solve(normal + added[..., None] * unit(len(added.T)), pull[..., None])[..., 0]
+        np.linalg.solve(normal * (1 + _RIDGE * ridge) + _LEAST * ridge, pull[..., None])[..., 0]
     )
 
 

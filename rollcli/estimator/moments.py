@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rollcli.errors import EstimationError, UsageError
+from rollcli.estimator.least_squares import solve_normal
 
 LARGEST = np.float32(1e15)  # beyond this it is no disparity, and single precision could not square it
 MIN_PIXELS = 100
@@ -335,7 +336,7 @@ def _exact_steps(plane: tuple[float, float, float], scale: float) -> tuple[float
 def _first_fit(
     disparity: NDArray[Any], weights: NDArray[Any] | None, p: Floats, q: Floats
 ) -> tuple[float, float, float]:
-    """Fit a plane to a coarse grid of the pixels; (mean, 0, 0) where they do not determine one."""
+    """Fit a plane to a coarse grid of the pixels."""
     height, width = disparity.shape
     rows = slice(height // _GUESS_SIDE // 2, None, max(1, height // _GUESS_SIDE))
     columns = slice(width // _GUESS_SIDE // 2, None, max(1, width // _GUESS_SIDE))
@@ -346,14 +347,6 @@ def _first_fit(
     x, y = powers(p[columns], 2), powers(q[rows], 2)
     s = y @ used @ x.T
     t = y[:2] @ np.where(used, sample, 0) @ x[:2].T
-    n = float(s[0, 0])
-    if n == 0:
-        return 0.0, 0.0, 0.0
-    p0, q0, mean = float(s[0, 1]) / n, float(s[1, 0]) / n, float(t[0, 0]) / n
-    pp, pq, qq = s[0, 2] - n * p0 * p0, s[1, 1] - n * p0 * q0, s[2, 0] - n * q0 * q0
-    spread = pp * qq - pq * pq
-    if spread <= 1e-8 * (pp + qq) ** 2:
-        return mean, 0.0, 0.0
-    dp, dq = t[0, 1] - n * p0 * mean, t[1, 0] - n * q0 * mean
-    c1, c2 = float((qq * dp - pq * dq) / spread), float((pp * dq - pq * dp) / spread)
-    return mean - c1 * p0 - c2 * q0, c1, c2
+    normal = np.array([[s[0, 0], s[0, 1], s[1, 0]], [s[0, 1], s[0, 2], s[1, 1]], [s[1, 0], s[1, 1], s[2, 0]]])
+    c0, c1, c2 = solve_normal(normal, np.array([t[0, 0], t[0, 1], t[1, 0]])).tolist()
+    return c0, c1, c2

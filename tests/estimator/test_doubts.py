@@ -6,12 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rollcli.estimator.certificate import CertifiedSolution
 from rollcli.estimator.doubts import REASONS, Evidence, doubts_of
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.interval import Interval
 from rollcli.estimator.road.find import Road
-from rollcli.estimator.solvers.exact import Minimum
+from rollcli.estimator.solvers.exact import CertifiedSolution, Minimum
 from rollcli.estimator.solvers.solution import Solution
 from rollcli.estimator.tuning import DoubtTuning
 from tests.estimator.synthetic_maps import bent_road, flat_road

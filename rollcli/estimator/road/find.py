@@ -95,8 +95,7 @@ def find_road(sample: Sample, max_roll: float, seed: int, tuning: Tuning) -> Roa
         if len(best) == search.refined:
             break
     planes = start = planes[list(best.values())]
-    for _ in range(_FITS):
-        planes = judge.refined(planes)
+    planes = judge.refined(planes)
     within = np.abs(planes[:, 1]) <= math.tan(max_roll) * planes[:, 2]
     planes = planes[within] if within.any() else start[:1]
     scores, rolls = judge.scores(planes, slice(None)), _rolls(planes)
@@ -189,14 +188,22 @@ class Judge:
         return np.where(scores > 0, scores / (1 + steep / np.float32(self._tuning.horizon**2)), scores)
 
     def refined(self, planes: Singles) -> Singles:
-        """Fit each plane (K, 3) to the pixels on it."""
+        """Fit each plane (K, 3) to the pixels on it, a few times, by the places and slopes of the first."""
         place, slope, off = self._weighed(planes, slice(None))
-        off *= off
-        weight = np.maximum(1 - off, 0, out=off)
-        weight *= slope
-        weight *= place
-        sums = weight.dot(self._products.T).reshape(-1, 3, 4).astype(np.float64)
-        return solve_normal(sums[..., :3], sums[..., 3]).astype(np.float32)
+        place *= slope
+        for fit in range(_FITS):
+            off = self._off(planes, slice(None)) if fit else off
+            off *= off
+            weight = np.maximum(1 - off, 0, out=off)
+            weight *= place
+            sums = weight.dot(self._products.T).reshape(-1, 3, 4).astype(np.float64)
+            planes = solve_normal(sums[..., :3], sums[..., 3]).astype(np.float32)
+        return planes
+
+    def _off(self, planes: Singles, some: slice) -> Singles:
+        """Return what planes are over pixels, in tolerances, (K, N)."""
+        off: Singles = np.column_stack([planes, np.full_like(planes[:, 0], -1)]).dot(self._rows[:, some])
+        return off
 
     def _weighed(self, planes: Singles, some: slice) -> tuple[Singles, Singles, Singles]:
         """Return the weights of pixels by place and by slopes, and what planes are over them, (K, N).
@@ -204,7 +211,6 @@ class Judge:
         The latter in tolerances.
         """
         tuning, (_, c1, c2) = self._tuning, planes.T
-        off = np.column_stack([planes, np.full_like(c1, -1)]).dot(self._rows[:, some])
         # how far to the side each pixel lies, in camera heights, as `RoadModel.side` says
         place = planes[:, 1:].dot(self._bearings[:, some])
         place *= place
@@ -215,7 +221,7 @@ class Judge:
         steepness = c1 * c1 + c2 * c2
         variance = np.float32(tuning.slope_share**2) * steepness + np.float32(self._slope_noise**2)
         apart = np.stack([2 * c1, 2 * c2, steepness, np.ones_like(c1)], 1) / (-2 * variance[:, None])
-        return place, agreement(apart.dot(self._slopes[:, some]), tuning), off
+        return place, agreement(apart.dot(self._slopes[:, some]), tuning), self._off(planes, some)
 
 
 def agreement(exponents: Singles, tuning: SearchTuning) -> Singles:

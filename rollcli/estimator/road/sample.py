@@ -208,8 +208,9 @@ def count(agreeing: NDArray[np.bool_]) -> NDArray[np.uint8]:
 
 def quantile(values: NDArray[np.floating[Any]], part: float) -> float:
     """Return the value that this part of others is below; in a tenth of the time of `np.quantile`."""
-    place = int(len(values) * part)
-    return float(np.partition(values, place)[place])
+    place, values = int(len(values) * part), values.copy()
+    values.partition(place)
+    return float(values[place])
 
 
 def reach_of(height: int, width: int, tuning: SampleTuning) -> int:

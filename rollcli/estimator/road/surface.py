@@ -262,10 +262,12 @@ class NearPixels:
         order = places.argsort(kind="stable")
         heights = (self.d / road - 1)[order]
         bounds = places[order].searchsorted(np.arange(1, 2 * _BINS + 2, dtype=np.uint16)).tolist()
-        medians = [
-            quantile(heights[low:high], 0.5) if high - low >= 12 else math.nan
-            for low, high in itertools.pairwise(bounds)
-        ]
+        medians = [math.nan] * (2 * _BINS)
+        for place, (low, high) in enumerate(itertools.pairwise(bounds)):
+            if high - low >= 12:
+                some, middle = heights[low:high], (high - low) // 2
+                some.partition(middle)
+                medians[place] = float(some[middle])
         medians[_BINS - 2 : _BINS + 2] = [0.0] * 4  # the lane is level
         for place in range(_BINS - 3, -1, -1):  # and where nothing is seen it goes on outward
             for here, inner in ((place, place + 1), (2 * _BINS - 1 - place, 2 * _BINS - 2 - place)):

@@ -5,8 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from rollcli.estimator.certificate import certify, certify_near
-from rollcli.estimator.solvers.exact import minima
+from rollcli.estimator.solvers.exact import certify, certify_near, minima
 from rollcli.estimator.solvers.solution import Solution
 from tests.estimator.synthetic_maps import energy_of
 
