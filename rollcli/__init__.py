@@ -10,30 +10,42 @@ TYPE_CHECKING = False  # as type checkers know it, without loading typing
 if TYPE_CHECKING:
     from typing import Any
 
+    from rollcli.errors import EstimationError as EstimationError
+    from rollcli.errors import InputError as InputError
     from rollcli.errors import RollcliError as RollcliError
+    from rollcli.errors import UsageError as UsageError
     from rollcli.estimator.estimate import RollEstimate as RollEstimate
+    from rollcli.estimator.interval import Tangent as Tangent
     from rollcli.files.encodings import read_disparity as read_disparity
     from rollcli.pictures.derotate import derotate as derotate
     from rollcli.pictures.heights import height_map as height_map
+    from rollcli.pictures.vdisparity import VDisparity as VDisparity
     from rollcli.pictures.vdisparity import v_disparity as v_disparity
     from rollcli.rig.calibration import Calibration as Calibration
     from rollcli.rig.drive.assess import RigAssessment as RigAssessment
     from rollcli.rig.drive.assess import assess_rig as assess_rig
-    from rollcli.rig.pose import estimate_roll as estimate_roll
     from rollcli.run.calibration import read_calibration as read_calibration
+    from rollcli.run.estimate_map import estimate_roll as estimate_roll
     from rollcli.run.estimate_pair import estimate_pair as estimate_pair
     from rollcli.stereo.match import compute_disparity as compute_disparity
+    from rollcli.stereo.options import StereoOptions as StereoOptions
 
 _HOMES = {
     "Calibration": "rollcli.rig.calibration",
+    "EstimationError": "rollcli.errors",
+    "InputError": "rollcli.errors",
     "RigAssessment": "rollcli.rig.drive.assess",
     "RollEstimate": "rollcli.estimator.estimate",
     "RollcliError": "rollcli.errors",
+    "StereoOptions": "rollcli.stereo.options",
+    "Tangent": "rollcli.estimator.interval",
+    "UsageError": "rollcli.errors",
+    "VDisparity": "rollcli.pictures.vdisparity",
     "assess_rig": "rollcli.rig.drive.assess",
     "compute_disparity": "rollcli.stereo.match",
     "derotate": "rollcli.pictures.derotate",
     "estimate_pair": "rollcli.run.estimate_pair",
-    "estimate_roll": "rollcli.rig.pose",
+    "estimate_roll": "rollcli.run.estimate_map",
     "height_map": "rollcli.pictures.heights",
     "read_calibration": "rollcli.run.calibration",
     "read_disparity": "rollcli.files.encodings",
@@ -41,9 +53,15 @@ _HOMES = {
 }
 __all__ = [
     "Calibration",
+    "EstimationError",
+    "InputError",
     "RigAssessment",
     "RollEstimate",
     "RollcliError",
+    "StereoOptions",
+    "Tangent",
+    "UsageError",
+    "VDisparity",
     "__version__",
     "assess_rig",
     "compute_disparity",

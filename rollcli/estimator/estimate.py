@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -87,6 +88,69 @@ class RollEstimate:
     height_ci95_m: float | None = None
     road_mask: NDArray[np.bool_] | None = field(default=None, repr=False, compare=False)
 
+    @property
+    def roll_deg(self) -> float:
+        """`theta` in degrees, as the column of a result; so are the next four."""
+        return math.degrees(self.theta)
+
+    @property
+    def roll_ci95_deg(self) -> float | None:
+        """`ci95` in degrees."""
+        return _degrees(self.ci95)
+
+    @property
+    def pitch_deg(self) -> float | None:
+        """`pitch` in degrees."""
+        return _degrees(self.pitch)
+
+    @property
+    def pitch_ci95_deg(self) -> float | None:
+        """`pitch_ci95` in degrees."""
+        return _degrees(self.pitch_ci95)
+
+    @property
+    def image_roll_deg(self) -> float:
+        """Angle that the map is turned by, degrees: another one than the rig's where fx and fy differ."""
+        return math.degrees(self.tangent.theta)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what a row of a result says of the estimate, by column: strings, numbers and None.
+
+        Returns
+        -------
+        dict
+            As JSON can write it; `assess_rig` takes a list of these.
+        """
+        alpha0, alpha1, alpha2 = self.alpha
+        return {
+            "status": self.status,
+            "roll_deg": self.roll_deg,
+            "roll_ci95_deg": self.roll_ci95_deg,
+            "pitch_deg": self.pitch_deg,
+            "pitch_ci95_deg": self.pitch_ci95_deg,
+            "height_m": self.height_m,
+            "height_ci95_m": self.height_ci95_m,
+            "camber": self.camber,
+            "method": self.method,
+            "iterations": self.iterations,
+            "converged": self.converged,
+            "global_minimum": self.global_minimum,
+            "rmse_px": self.rmse,
+            "alpha0": alpha0,
+            "alpha1": alpha1,
+            "alpha2": alpha2,
+            "valid_fraction": self.valid_fraction,
+            "road_fraction": self.road_fraction,
+            "width": self.width,
+            "height": self.height,
+            "message": self.message,
+            "image_roll_deg": self.image_roll_deg,
+        }
+
+
+def _degrees(angle: float | None) -> float | None:
+    return None if angle is None else math.degrees(angle)
+
 
 def estimate_roll(
     disparity: ArrayLike,
@@ -125,7 +189,7 @@ def estimate_roll(
         The largest abs(roll) that road finding considers, radians.
     max_interval : float
         Half-width of the 95 % interval above which an angle is doubted, radians; so is one of which noise
-        alone makes 0.45 of that.
+        and unevenness make more than 0.45 times that.
     slope_error : float
         Standard deviation of a slope along the rows, px per px, that all disparities may have beside the
         road's: what is left of it where the views of a pair were levelled (`StereoMatch.slope_error`).

@@ -57,7 +57,7 @@ class CheckedMap:
         EstimationError
             When there are too few valid pixels; see `require_pixels`.
         """
-        values = np.asarray(disparity)
+        values = map_of(disparity)
         if values.ndim != 2 or values.dtype.kind not in "fiub":
             raise UsageError(
                 f"a disparity map is a 2-D array of real numbers, not {values.ndim}-D {values.dtype}"
@@ -69,6 +69,24 @@ class CheckedMap:
         if usable is not None:
             valid &= usable
         return cls(values, usable, valid, require_pixels(valid))
+
+
+def map_of(disparity: ArrayLike | None) -> NDArray[Any]:
+    """Return a map as an array; what a masked array hides is no data, 0.
+
+    Raises
+    ------
+    UsageError
+        It is None, or no array.
+    """
+    if disparity is None:
+        raise UsageError("the disparity map is None: nothing was read")
+    if isinstance(disparity, np.ma.MaskedArray):
+        return np.asarray(disparity.filled(0))
+    try:
+        return np.asarray(disparity)
+    except (TypeError, ValueError) as error:
+        raise UsageError(f"a disparity map is a 2-D array of real numbers: {error}") from error
 
 
 def require_pixels(valid: NDArray[np.bool_]) -> int:

@@ -14,7 +14,7 @@ from rollcli.errors import InputError, UsageError
 from rollcli.files.formats import Stored, decode_mask, read_stored
 from rollcli.files.plateaus import without_plateaus
 from rollcli.files.storage import read_bytes
-from rollcli.rig.calibration import Calibration
+from rollcli.rig.calibration import Calibration, require_calibration
 
 
 class Encoding(str, Enum):
@@ -113,9 +113,32 @@ def read_disparity(
     invalid: float | None = None,
     calibration: Calibration | None = None,
 ) -> NDArray[Any]:
-    """Read a disparity map: pixels, shape (H, W), float32 (float64 if the file holds that); no data is 0.
+    """Read a disparity map.
 
-    Parameters are those of `to_disparity`; the file may be PNG, TIFF, NPY or PFM.
+    Parameters
+    ----------
+    path : str or path
+        A PNG, TIFF, NPY or PFM file.
+    encoding : {"auto", "px", "kitti", "cityscapes", "sgbm", "depth"}
+        auto: uint16 is kitti, int16 is sgbm, everything else px. depth: metres, in whole numbers millimetres.
+    scale : float, optional
+        Pixels (of a depth: metres) per stored unit, in place of the encoding's own; makes "auto" take px.
+    invalid : float, optional
+        A stored value that means no data, besides NaN, inf, <= 0 and what the file itself marks.
+    calibration : Calibration, optional
+        What turns a depth into a disparity; without it, the disparity of a depth z is 1/z.
+
+    Returns
+    -------
+    ndarray of float32, or of float64 if the file holds that, shape (H, W)
+        Pixels; no data is 0.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, or is no map.
+    UsageError
+        Unknown encoding, a scale that is not positive, or a calibration of another view.
 
     Examples
     --------
@@ -126,6 +149,7 @@ def read_disparity(
     array([[0. , 1. , 2.5]], dtype=float32)
     """
     values = () if invalid is None else (invalid,)
+    require_calibration(calibration)
     found = to_disparity(
         read_stored(path), encoding=encoding, scale=scale, invalid=values, calibration=calibration
     )

@@ -6,25 +6,33 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from rollcli.errors import UsageError
+from rollcli.estimator.moments import map_of
 
 _BLOCK = 1 << 16  # pixels turned at a time: what they need stays in the processor's cache
 
 
 def derotate(
-    disparity: NDArray[Any], roll: float, *, expand: bool = False, invalid: Iterable[float] = ()
+    disparity: ArrayLike,
+    roll: float | None = None,
+    *,
+    roll_deg: float | None = None,
+    expand: bool = False,
+    invalid: Iterable[float] = (),
 ) -> NDArray[Any]:
     """Rotate a map about its centre so that a rig rolled by `roll` seems level.
 
     Parameters
     ----------
-    disparity : ndarray, shape (H, W)
-        Any real dtype: pixels, or numbers as they are stored. NaN, inf, <= 0, and the largest number of
-        16 bits are no data.
+    disparity : array_like, shape (H, W)
+        Any real dtype: pixels, or numbers as they are stored. NaN, inf, <= 0, the largest number of 16 bits
+        and what a masked array hides are no data.
     roll : float
-        theta of the estimate, radians.
+        theta of the estimate, radians, from -pi to pi.
+    roll_deg : float
+        The same in degrees, in place of `roll`.
     expand : bool
         Enlarge the result so that it keeps the corners.
     invalid : iterable of float
@@ -38,7 +46,8 @@ def derotate(
     Raises
     ------
     UsageError
-        The map is no 2-D array of real numbers, or the roll no number.
+        The map is no 2-D array of real numbers, or the roll no angle: not finite, beyond pi, given twice or
+        not at all.
 
     Notes
     -----
@@ -55,9 +64,10 @@ def derotate(
     >>> bool(np.ptp(level[2]) < 1e-9)
     True
     """
-    values: NDArray[Any] = np.array(disparity)
-    if values.ndim != 2 or values.dtype.kind not in "fiu" or not math.isfinite(roll):
-        raise UsageError(f"cannot rotate a {values.ndim}-D array of {values.dtype} by {roll} radians")
+    roll = _radians(roll, roll_deg)
+    values: NDArray[Any] = map_of(disparity).copy()
+    if values.ndim != 2 or values.dtype.kind not in "fiu":
+        raise UsageError(f"cannot rotate a {values.ndim}-D array of {values.dtype}: a map is 2-D and real")
     if roll == 0 or values.size == 0:
         return values
     valid = _validity(values, invalid)
@@ -74,6 +84,17 @@ def derotate(
         known &= kept[rows]
         np.copyto(result[rows], _as_stored(turned, values.dtype), where=known, casting="unsafe")
     return result
+
+
+def _radians(roll: float | None, roll_deg: float | None) -> float:
+    if (roll is None) == (roll_deg is None):
+        raise UsageError("give the angle once: roll, in radians, or roll_deg, in degrees")
+    angle = roll if roll is not None else math.radians(roll_deg or 0.0)
+    if not math.isfinite(angle):
+        raise UsageError(f"cannot rotate by {angle} radians")
+    if roll is not None and abs(roll) > math.pi:
+        raise UsageError(f"a roll of {roll:g} radians is beyond pi: give degrees as roll_deg={roll:g}")
+    return angle
 
 
 @dataclass(frozen=True)

@@ -24,10 +24,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from rollcli.errors import UsageError
 from rollcli.estimator.estimate import RollEstimate
-from rollcli.estimator.moments import LARGEST, Grid
+from rollcli.estimator.moments import LARGEST, Grid, map_of
 from rollcli.estimator.road.model import FARTHEST_SIDE
 from rollcli.files.results import Row
-from rollcli.rig.calibration import Calibration
+from rollcli.rig.calibration import Calibration, require_calibration
 
 Singles = NDArray[np.float32]
 
@@ -127,7 +127,8 @@ def height_map(
     >>> bool(np.allclose(rollcli.height_map(road, estimate, rig)[80:90, 60:100], 0.3, atol=1e-3))
     True
     """
-    values = np.asarray(disparity)
+    values = map_of(disparity)
+    require_calibration(calibration)
     return heights_over(values, FittedRoad.of_estimate(estimate), calibration)
 
 

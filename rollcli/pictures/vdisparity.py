@@ -7,9 +7,10 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from rollcli.errors import UsageError
+from rollcli.estimator.moments import map_of
 from rollcli.pictures.round_step import round_step
 
 _MAX_BINS = 1024
@@ -33,14 +34,14 @@ class VDisparity:
 
 
 def v_disparity(
-    disparity: NDArray[Any], *, bins: int | None = None, max_disparity: float | None = None
+    disparity: ArrayLike, *, bins: int | None = None, max_disparity: float | None = None
 ) -> VDisparity:
     """Count the disparities of each row.
 
     Parameters
     ----------
-    disparity : ndarray, shape (H, W)
-        Pixels; NaN, inf and <= 0 are no data.
+    disparity : array_like, shape (H, W)
+        Pixels; NaN, inf, <= 0 and what a masked array hides are no data.
     bins : int, optional
         By default one a pixel for maps of whole pixels, else four a pixel and at least 256; at most 1024.
     max_disparity : float, optional
@@ -58,9 +59,9 @@ def v_disparity(
     array([[0, 1, 2, 0],
            [0, 0, 0, 2]], dtype=int32)
     """
-    values = np.asarray(disparity)
-    if values.ndim != 2:
-        raise UsageError(f"a disparity map is 2-D, not of shape {values.shape}")
+    values = map_of(disparity)
+    if values.ndim != 2 or values.dtype.kind not in "fiub":
+        raise UsageError(f"a disparity map is 2-D and real, not of shape {values.shape} and {values.dtype}")
     step = max(1, _BLOCK // max(1, values.shape[1]))
     blocks = [values[top : top + step] for top in range(0, len(values), step)]
     if max_disparity is None:

@@ -153,6 +153,17 @@ class Calibration:
         )
 
 
+def require_calibration(calibration: object) -> None:
+    """Refuse what is given as a calibration and is none, such as a path.
+
+    Raises
+    ------
+    UsageError
+    """
+    if calibration is not None and not isinstance(calibration, Calibration):
+        raise UsageError(f"{calibration!r} is no calibration: give rollcli.read_calibration(path)")
+
+
 def _one_factor(width: int, of_width: int, height: int, of_height: int) -> bool:
     """Whether one factor makes a size of another, rounded to whole pixels."""
     sides = ((width, of_width), (height, of_height))

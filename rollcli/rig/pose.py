@@ -4,12 +4,10 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from rollcli.estimator import estimate as estimator
 from rollcli.estimator.estimate import RollEstimate
 from rollcli.estimator.interval import Tangent
-from rollcli.estimator.request import DEFAULT_SOLVER, MAX_INTERVAL_DEG, MAX_ROLL_DEG, LearningRate
 from rollcli.rig.calibration import Calibration
 
 Floats = NDArray[np.float64]
@@ -214,72 +212,3 @@ def _normal_jacobian(tangent: Tangent, calibration: Calibration) -> Floats:
         )
         / baseline
     )
-
-
-def estimate_roll(
-    disparity: ArrayLike,
-    *,
-    calibration: Calibration | None = None,
-    mask: ArrayLike | None = None,
-    method: str = "gd",
-    model: str = "parabola",
-    road: str = "auto",
-    lambda0: LearningRate = DEFAULT_SOLVER.lambda0,
-    tolerance: float = DEFAULT_SOLVER.tolerance,
-    max_roll: float = math.radians(MAX_ROLL_DEG),
-    max_interval: float = math.radians(MAX_INTERVAL_DEG),
-    slope_error: float = 0.0,
-    seed: int = 0,
-    road_mask: bool = False,
-) -> RollEstimate:
-    """Estimate the roll angle of the rig that a disparity map was taken with; its pose, given a calibration.
-
-    Parameters
-    ----------
-    disparity : array_like, shape (H, W)
-        Real numbers, px; <= 0, NaN and what is beyond 1e15 are no data.
-    calibration : Calibration, optional
-        Of the rectified left view, at the map's size or at another one; see `read_calibration`.
-    mask, method, model, road, lambda0, tolerance, max_roll, max_interval, slope_error, seed, road_mask
-        See `rollcli.estimator.estimate.estimate_roll`.
-
-    Returns
-    -------
-    RollEstimate
-        Angles in radians, the height in metres.
-
-    Raises
-    ------
-    UsageError
-        When an argument is out of range, or the calibration is of another view.
-    EstimationError
-        When the pixels do not determine an angle.
-
-    Examples
-    --------
-    A level road 1.5 m below a rig that looks down by 0.2 radians:
-
-    >>> import numpy as np
-    >>> from rollcli.rig.calibration import Calibration
-    >>> rig = Calibration(fx=200, fy=200, cx=79.5, cy=59.5, baseline=0.5)
-    >>> v = np.mgrid[:120, :160][0]
-    >>> road = 200 * 0.5 / 1.5 * ((v - 59.5) / 200 * np.cos(0.2) + np.sin(0.2))
-    >>> found = estimate_roll(road, calibration=rig)
-    >>> round(found.pitch, 4), round(found.height_m, 4)
-    (0.2, 1.5)
-    """
-    estimate = estimator.estimate_roll(
-        disparity,
-        mask=mask,
-        method=method,
-        model=model,
-        road=road,
-        lambda0=lambda0,
-        tolerance=tolerance,
-        max_roll=max_roll,
-        max_interval=max_interval,
-        slope_error=slope_error,
-        seed=seed,
-        road_mask=road_mask,
-    )
-    return estimate if calibration is None else with_pose(estimate, calibration)

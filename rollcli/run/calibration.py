@@ -9,7 +9,7 @@ from rollcli.files.atomic import is_file
 from rollcli.files.search import is_place, objects_behind
 from rollcli.files.storage import fetch_all, read_bytes
 from rollcli.files.stores.locations import is_url, public_name
-from rollcli.rig.calibration import Calibration, CalibrationOptions
+from rollcli.rig.calibration import Calibration, CalibrationOptions, require_calibration
 from rollcli.rig.read_calibration import MAX_BYTES, parse_calibration
 from rollcli.run.frame import Frame
 from rollcli.run.options import EncodingOptions, FrameOptions
@@ -53,6 +53,14 @@ def read_calibration(path: str | os.PathLike[str], *right: str | os.PathLike[str
     (700.0, 180.0, 0.5)
     """
     return _read([os.fspath(each) for each in (path, *right)], CalibrationOptions())
+
+
+def given_calibration(calibration: Calibration | str | os.PathLike[str] | None) -> Calibration | None:
+    """Return the calibration that was given as it is, or as the path of its file; see `read_calibration`."""
+    if isinstance(calibration, str | os.PathLike):
+        return read_calibration(calibration)
+    require_calibration(calibration)
+    return calibration
 
 
 class Calibrations:

@@ -9,7 +9,7 @@ leave (python tests/benchmarks/bench_diagnosis.py).
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,23 @@ from rollcli.files.formats import Stored
 from rollcli.run.options import FrameOptions
 
 _DIVISORS = (("sgbm", 16), ("kitti", 256))
-_DEPTH_MAP = "like a depth map: give --encoding depth and its calibration, such as --calib FILE"
+
+
+class Remedies(NamedTuple):
+    """What to do about a depth map and a photograph, in the words of who is told."""
+
+    depth: str
+    photograph: str
+
+
+COMMAND = Remedies(
+    depth="give --encoding depth and its calibration, such as --calib FILE",
+    photograph="give photographs by --left and --right",
+)
+PYTHON = Remedies(
+    depth="give focal length times baseline, over the depth",
+    photograph="give both views to rollcli.estimate_pair",
+)
 _UPSIDE_DOWN = "upside down: reverse the order of its rows"
 
 
@@ -127,7 +143,9 @@ def too_large(disparity: NDArray[Any], stored: Stored, encoding: str) -> str:
     return f"{said}: the numbers look {times} times too large; give {remedy}"
 
 
-def looks_like(disparity: NDArray[Any], stored: Stored | None, options: FrameOptions) -> str:
+def looks_like(
+    disparity: NDArray[Any], stored: Stored | None, options: FrameOptions, remedies: Remedies = COMMAND
+) -> str:
     """Say what a map without a sure angle looks like instead; empty when it looks like nothing known.
 
     Parameters
@@ -137,21 +155,25 @@ def looks_like(disparity: NDArray[Any], stored: Stored | None, options: FrameOpt
     stored : Stored or None
         What the file holds; None for a map that was matched from a pair.
     options : FrameOptions
+    remedies : Remedies
+        `COMMAND` or `PYTHON`.
     """
-    return "" if stored is None else next(_likenesses(disparity, stored, options), "")
+    return "" if stored is None else next(_likenesses(disparity, stored, options, remedies), "")
 
 
-def _likenesses(disparity: NDArray[Any], stored: Stored, options: FrameOptions) -> Iterator[str]:
+def _likenesses(
+    disparity: NDArray[Any], stored: Stored, options: FrameOptions, remedies: Remedies
+) -> Iterator[str]:
     if _is_photograph(stored.values):
-        yield "looks like a photograph, not a disparity map: give photographs by --left and --right"
+        yield f"looks like a photograph, not a disparity map: {remedies.photograph}"
     if _grows_downward(disparity):
         return
     depth = options.encoding.encoding != Encoding.DEPTH and _has_road(_inverse(disparity), options)
     reversed_rows = _has_road(disparity[::-1], options)
     if depth and reversed_rows:  # few roads tell which
-        yield f"looks {_DEPTH_MAP}; or it is {_UPSIDE_DOWN}"
+        yield f"looks like a depth map: {remedies.depth}; or it is {_UPSIDE_DOWN}"
     elif depth:
-        yield f"looks {_DEPTH_MAP}"
+        yield f"looks like a depth map: {remedies.depth}"
     elif reversed_rows:
         yield f"looks {_UPSIDE_DOWN}"
 

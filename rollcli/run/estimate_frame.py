@@ -1,6 +1,5 @@
 """One frame in, one row out."""
 
-import math
 import time
 from dataclasses import replace
 
@@ -82,41 +81,8 @@ def _calibration(frame: Frame, source: Source, estimate: RollEstimate) -> Calibr
 
 
 def _row(frame: Frame, source: Source, estimate: RollEstimate, note: str, likeness: str) -> Row:
-    reasons = [reason for reason in (likeness, estimate.message) if reason]
-    status = estimate.status
+    reasons = list(filter(None, [likeness, estimate.message, source.doubt, note]))
+    said = {**estimate.to_dict(), **source.alignment, "message": "; ".join(reasons)}
     if source.doubt:
-        status = "suspect"
-        reasons.append(source.doubt)
-    reasons += filter(None, [note])
-    alpha0, alpha1, alpha2 = estimate.alpha
-    return Row(
-        file=frame.file,
-        right_file=frame.right_file,
-        status=status,
-        roll_deg=math.degrees(estimate.theta),
-        roll_ci95_deg=_degrees(estimate.ci95),
-        pitch_deg=_degrees(estimate.pitch),
-        pitch_ci95_deg=_degrees(estimate.pitch_ci95),
-        height_m=estimate.height_m,
-        height_ci95_m=estimate.height_ci95_m,
-        camber=estimate.camber,
-        method=estimate.method,
-        iterations=estimate.iterations,
-        converged=estimate.converged,
-        global_minimum=estimate.global_minimum,
-        rmse_px=estimate.rmse,
-        alpha0=alpha0,
-        alpha1=alpha1,
-        alpha2=alpha2,
-        valid_fraction=estimate.valid_fraction,
-        road_fraction=estimate.road_fraction,
-        width=estimate.width,
-        height=estimate.height,
-        **source.alignment,
-        image_roll_deg=math.degrees(estimate.tangent.theta),
-        message="; ".join(reasons),
-    )
-
-
-def _degrees(angle: float | None) -> float | None:
-    return None if angle is None else math.degrees(angle)
+        said["status"] = "suspect"
+    return Row(file=frame.file, right_file=frame.right_file, **said)

@@ -1,14 +1,15 @@
 """The roll of a stereo pair in one call, as `rollcli estimate --left --right` finds it."""
 
 import math
+import os
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from rollcli.errors import UsageError
-from rollcli.estimator.estimate import RollEstimate
+from rollcli.estimator.estimate import RollEstimate, estimate_roll
 from rollcli.estimator.request import (
     DEFAULT_SOLVER,
     MAX_INTERVAL_DEG,
@@ -17,7 +18,8 @@ from rollcli.estimator.request import (
     LearningRate,
 )
 from rollcli.rig.calibration import Calibration
-from rollcli.rig.pose import estimate_roll
+from rollcli.rig.pose import with_pose
+from rollcli.run.calibration import given_calibration
 from rollcli.run.options import FrameOptions, MethodOptions
 from rollcli.run.read import matched_source
 from rollcli.stereo.match import StereoOptions
@@ -27,8 +29,8 @@ def estimate_pair(
     left: NDArray[Any],
     right: NDArray[Any],
     *,
-    calibration: Calibration | None = None,
-    mask: NDArray[np.bool_] | None = None,
+    calibration: Calibration | str | os.PathLike[str] | None = None,
+    mask: ArrayLike | None = None,
     stereo: StereoOptions | None = None,
     method: str = "gd",
     model: str = "parabola",
@@ -46,10 +48,10 @@ def estimate_pair(
     ----------
     left, right : ndarray, shape (H, W) or (H, W, 3)
         uint8 or uint16, grey or BGR, of equal size.
-    calibration : Calibration, optional
+    calibration : Calibration or path, optional
         Of the rectified left image; see `read_calibration`.
-    mask : ndarray of bool, optional
-        Pixels that may be used, of the shape that is matched at: (H, W) over `stereo.downscale`.
+    mask : array_like, optional
+        Non-zero where a pixel may be used; of the shape that is matched at: (H, W) over `stereo.downscale`.
     stereo : StereoOptions, optional
         How the pair is matched; by default as the command does.
     method, model, road, lambda0, tolerance, max_roll, max_interval, seed, road_mask
@@ -81,13 +83,15 @@ def estimate_pair(
         raise UsageError(f"a largest roll of {math.degrees(max_roll):g} degrees: give more than 0")
     asked = MethodOptions(road=road, max_roll_deg=math.degrees(max_roll), seed=seed)
     options = FrameOptions(stereo=stereo or StereoOptions(), method=asked)
-    source = matched_source(left, right, mask, options)
+    rig = given_calibration(calibration)
+    allowed = None if mask is None else np.asarray(mask) != 0
+    if allowed is not None and not (allowed.ndim == 2 and allowed.any()):
+        raise UsageError("the mask leaves no pixel of the map: give an array that is not all zero")
+    source = matched_source(left, right, allowed, options)
     height, width = left.shape[:2]
-    of_view = None if calibration is None else calibration.for_size(width, height)
     estimate = estimate_roll(
         source.disparity,
-        calibration=of_view,
-        mask=mask,
+        mask=allowed,
         slope_error=source.slope_error,
         method=method,
         model=model,
@@ -99,6 +103,7 @@ def estimate_pair(
         seed=seed,
         road_mask=road_mask,
     )
-    status = "suspect" if source.doubt else estimate.status
-    message = "; ".join(filter(None, [estimate.message, source.doubt]))
-    return replace(estimate, status=status, message=message)
+    if source.doubt:
+        message = "; ".join(filter(None, [estimate.message, source.doubt]))
+        estimate = replace(estimate, status="suspect", message=message)
+    return estimate if rig is None else with_pose(estimate, rig.for_size(width, height))

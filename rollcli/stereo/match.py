@@ -165,15 +165,32 @@ class StereoMatch:
         return self.measured.misalignment if as_measured else self.corrected
 
 
-def compute_disparity(left: NDArray[Any], right: NDArray[Any], **options: Any) -> Map:
+_DEFAULT = StereoOptions()
+
+
+def compute_disparity(
+    left: NDArray[Any],
+    right: NDArray[Any],
+    *,
+    num_disparities: int | None = _DEFAULT.num_disparities,
+    min_disparity: int = _DEFAULT.min_disparity,
+    block_size: int = _DEFAULT.block_size,
+    mode: str = _DEFAULT.mode,
+    uniqueness: int = _DEFAULT.uniqueness,
+    speckle_size: int = _DEFAULT.speckle_size,
+    speckle_range: int = _DEFAULT.speckle_range,
+    downscale: float = _DEFAULT.downscale,
+    align: str = _DEFAULT.align,
+    vertical_offset: float | None = _DEFAULT.vertical_offset,
+) -> Map:
     """Return the disparity map of a rectified pair.
 
     Parameters
     ----------
     left, right : ndarray, shape (H, W) or (H, W, 3)
         uint8 or uint16, grey or BGR, of equal size.
-    **options
-        Fields of `StereoOptions`.
+    num_disparities, min_disparity, block_size, mode, uniqueness, speckle_size, speckle_range, downscale
+        See `StereoOptions`; so for `align` and `vertical_offset`.
 
     Returns
     -------
@@ -195,7 +212,19 @@ def compute_disparity(left: NDArray[Any], right: NDArray[Any], **options: Any) -
     >>> float(np.median(disparity[disparity > 0]))
     12.0
     """
-    return match_pair(left, right, StereoOptions(**options)).disparity
+    options = StereoOptions(
+        num_disparities,
+        min_disparity,
+        block_size,
+        mode,
+        uniqueness,
+        speckle_size,
+        speckle_range,
+        downscale,
+        align,
+        vertical_offset,
+    )
+    return match_pair(left, right, options).disparity
 
 
 def match_pair(

@@ -29,8 +29,12 @@ def prepare_views(left: NDArray[Any], right: NDArray[Any], downscale: float) -> 
     Raises
     ------
     InputError
-        The images differ in size, or are of a kind that cannot be matched.
+        An image is None, or of a kind that cannot be matched, or they differ in size.
     """
+    for side, image in (("left", left), ("right", right)):
+        if not isinstance(image, np.ndarray):
+            reason = "is None: it was not read" if image is None else "is no array of pixels"
+            raise InputError(f"the {side} image {reason}")
     if left.shape[:2] != right.shape[:2]:
         sizes = " and ".join(f"{each.shape[1]}x{each.shape[0]}" for each in (left, right))
         raise InputError(f"left and right image differ in size: {sizes}")

@@ -1,0 +1,141 @@
+"""The roll of a map in one call, as `rollcli estimate` finds it."""
+
+import math
+import os
+from dataclasses import replace
+from typing import Any
+
+from numpy.typing import ArrayLike, NDArray
+
+from rollcli.errors import EstimationError, UsageError
+from rollcli.estimator import estimate as estimator
+from rollcli.estimator.estimate import RollEstimate
+from rollcli.estimator.moments import map_of
+from rollcli.estimator.request import DEFAULT_SOLVER, MAX_INTERVAL_DEG, MAX_ROLL_DEG, LearningRate
+from rollcli.files.encodings import to_disparity
+from rollcli.files.formats import Stored
+from rollcli.rig.calibration import Calibration
+from rollcli.rig.pose import with_pose
+from rollcli.run.calibration import given_calibration
+from rollcli.run.diagnosis import PYTHON, looks_like
+from rollcli.run.options import FrameOptions, MethodOptions
+
+
+def estimate_roll(
+    disparity: ArrayLike,
+    *,
+    calibration: Calibration | str | os.PathLike[str] | None = None,
+    mask: ArrayLike | None = None,
+    method: str = "gd",
+    model: str = "parabola",
+    road: str = "auto",
+    lambda0: LearningRate = DEFAULT_SOLVER.lambda0,
+    tolerance: float = DEFAULT_SOLVER.tolerance,
+    max_roll: float = math.radians(MAX_ROLL_DEG),
+    max_interval: float = math.radians(MAX_INTERVAL_DEG),
+    slope_error: float = 0.0,
+    seed: int = 0,
+    road_mask: bool = False,
+) -> RollEstimate:
+    """Estimate the roll angle of the rig that a disparity map was taken with; its pose, given a calibration.
+
+    Parameters
+    ----------
+    disparity : array_like, shape (H, W)
+        Real numbers, px; <= 0, NaN, what is beyond 1e15 and what a masked array hides are no data.
+    calibration : Calibration or path, optional
+        Of the rectified left view, at the map's size or at another one; see `read_calibration`.
+    mask : array_like, shape (H, W), optional
+        Non-zero where a pixel may be used.
+    method : {"gd", "gss", "exact", "plane", "areas"}
+        The solver: gradient descent, golden section search, the global minimum; or one plane, many areas.
+    model : {"parabola", "line"}
+        Of the road.
+    road : {"auto", "all"}
+        Find the road first, or use every valid pixel as the paper does.
+    lambda0 : float or "auto"
+        First learning rate of "gd".
+    tolerance : float
+        delta_theta of the paper, radians.
+    max_roll : float
+        The largest abs(roll) that road finding considers, radians.
+    max_interval : float
+        Half-width of the 95 % interval above which an angle is doubted, radians.
+    slope_error : float
+        Standard deviation of a slope along the rows that all disparities may have beside the road's, px per
+        px: what levelling left of it in the map of a pair.
+    seed : int
+        Of road finding.
+    road_mask : bool
+        Whether to return which pixels were used as road.
+
+    Returns
+    -------
+    RollEstimate
+        Angles in radians, the height in metres. The message of a doubtful one says what the map looks like
+        instead: a depth map, a photograph, a map that is upside down.
+
+    Raises
+    ------
+    UsageError
+        When an argument is out of range, or the calibration is of another view.
+    InputError
+        When the calibration's file cannot be read.
+    EstimationError
+        When the pixels do not determine an angle.
+
+    Notes
+    -----
+    The functions keep no state: threads may call them at the same time. NumPy and OpenCV release the
+    interpreter in part only; for many maps, processes (or the command) are faster.
+
+    Examples
+    --------
+    A level road 1.5 m below a rig that looks down by 0.2 radians:
+
+    >>> import numpy as np
+    >>> from rollcli.rig.calibration import Calibration
+    >>> rig = Calibration(fx=200, fy=200, cx=79.5, cy=59.5, baseline=0.5)
+    >>> v = np.mgrid[:120, :160][0]
+    >>> road = 200 * 0.5 / 1.5 * ((v - 59.5) / 200 * np.cos(0.2) + np.sin(0.2))
+    >>> found = estimate_roll(road, calibration=rig)
+    >>> round(found.pitch, 4), round(found.height_m, 4)
+    (0.2, 1.5)
+    """
+    rig = given_calibration(calibration)
+    values = map_of(disparity)
+    if values.ndim == 3 and values.shape[2] in (3, 4):
+        raise UsageError(f"an array of shape {values.shape} is no disparity map: {PYTHON.photograph}")
+
+    def said(reason: str) -> str:
+        return "; ".join(filter(None, [_likeness(values, seed), reason]))
+
+    try:
+        estimate = estimator.estimate_roll(
+            values,
+            mask=mask,
+            method=method,
+            model=model,
+            road=road,
+            lambda0=lambda0,
+            tolerance=tolerance,
+            max_roll=max_roll,
+            max_interval=max_interval,
+            slope_error=slope_error,
+            seed=seed,
+            road_mask=road_mask,
+        )
+    except EstimationError as error:
+        raise EstimationError(said(str(error))) from error
+    if estimate.status != "ok":
+        estimate = replace(estimate, message=said(estimate.message))
+    return estimate if rig is None else with_pose(estimate, rig)
+
+
+def _likeness(values: NDArray[Any], seed: int) -> str:
+    """Say what an array without a sure angle looks like instead of a map; empty when like nothing known."""
+    if values.dtype.kind not in "fiu":
+        return ""
+    stored = Stored(values, "npy")
+    disparity = to_disparity(stored, encoding="px").disparity
+    return looks_like(disparity, stored, FrameOptions(method=MethodOptions(seed=seed)), PYTHON)

@@ -1,0 +1,226 @@
+"""What a programmer meets: every public name typed, and each mistake one clear error."""
+
+import dataclasses
+import inspect
+import json
+import math
+import re
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+
+import cv2
+import numpy as np
+import pytest
+
+import rollcli
+from rollcli.rig.calibration import Calibration
+from tests import typed_client
+from tests.run_cli import ROOT
+from tests.run_cli import rollcli as run
+
+MAP = ROOT / "sample_data" / "maps" / "frame_0001.png"
+CALIB = ROOT / "sample_data" / "calib.txt"
+
+
+@pytest.fixture(scope="module")
+def disparity():
+    return rollcli.read_disparity(MAP)
+
+
+def test_a_client_that_uses_every_public_name_runs(tmp_path):
+    rig = typed_client.main(tmp_path)
+    assert rig.used == 12
+    assert abs(rig.now().value - math.degrees(0.1)) < 0.05
+    source = (ROOT / "tests" / "typed_client.py").read_text("utf-8")
+    missing = [name for name in rollcli.__all__ if not re.search(rf"\b{name}\b", source)]
+    assert missing == []
+
+
+@pytest.mark.slow
+def test_that_client_type_checks_against_an_editable_install(tmp_path):
+    pytest.importorskip("mypy", reason="mypy, of what tests need, is not here")
+    client = tmp_path / "client.py"
+    client.write_text((ROOT / "tests" / "typed_client.py").read_text("utf-8"), "utf-8")
+    python = _editable(tmp_path / "environment")
+    for text, status in (("", 0), ("\nrollcli.derotate(1, rol=2)\n", 1)):
+        client.write_text(client.read_text("utf-8") + text, "utf-8")
+        line = [sys.executable, "-m", "mypy", "--strict", "--no-incremental", "--python-executable", python]
+        done = subprocess.run([*line, "client.py"], cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert done.returncode == status, done.stdout + done.stderr
+
+
+def _editable(folder):
+    """Make an environment with an editable rollcli, and the packages of this one; return its Python."""
+    subprocess.run([sys.executable, "-m", "venv", "--system-site-packages", str(folder)], check=True)
+    (site,) = folder.glob("lib/python*/site-packages")
+    others = [path for path in sys.path if "site-packages" in path]
+    (site / "others.pth").write_text("\n".join(others) + "\n")
+    python = str(folder / "bin" / "python")
+    line = [
+        python,
+        "-m",
+        "pip",
+        "install",
+        "--quiet",
+        "--no-deps",
+        "--editable",
+        str(ROOT),
+    ]
+    done = subprocess.run(line, capture_output=True, text=True, check=False)
+    if done.returncode:
+        pytest.skip(f"pip cannot build here: {done.stderr.strip()[-200:]}")
+    return python
+
+
+def test_keywords_of_compute_disparity_are_the_fields_of_its_options():
+    keywords = {
+        name: each.default
+        for name, each in inspect.signature(rollcli.compute_disparity).parameters.items()
+        if each.kind is each.KEYWORD_ONLY
+    }
+    assert keywords == {each.name: each.default for each in dataclasses.fields(rollcli.StereoOptions)}
+
+
+def test_every_parameter_and_result_of_a_public_function_has_a_type():
+    for name in rollcli.__all__:
+        if inspect.isfunction(function := getattr(rollcli, name)):
+            signature = inspect.signature(function)
+            annotations = [each.annotation for each in signature.parameters.values()]
+            assert inspect.Signature.empty not in (*annotations, signature.return_annotation), name
+            assert not any(each.kind is each.VAR_KEYWORD for each in signature.parameters.values()), name
+
+
+@pytest.mark.parametrize("roll", [-8, 8, 3.2, math.inf, math.nan])
+def test_degrees_given_as_radians_are_refused(disparity, roll):
+    with pytest.raises(
+        rollcli.UsageError, match="roll_deg=" if math.isfinite(roll) else "cannot rotate|beyond"
+    ):
+        rollcli.derotate(disparity, roll)
+
+
+def test_an_angle_is_given_in_radians_or_in_degrees_and_once(disparity):
+    turned = rollcli.derotate(disparity, roll_deg=-8)
+    assert np.array_equal(turned, rollcli.derotate(disparity, math.radians(-8)))
+    assert not np.array_equal(turned, disparity)
+    for arguments in ({}, {"roll": 0.1, "roll_deg": 5.7}):
+        with pytest.raises(rollcli.UsageError, match="once"):
+            rollcli.derotate(disparity, **arguments)
+
+
+def test_half_a_turn_is_allowed(disparity):
+    assert rollcli.derotate(disparity, math.pi).shape == disparity.shape
+
+
+def test_a_calibration_may_be_the_path_of_its_file(disparity):
+    read = rollcli.estimate_roll(disparity, calibration=rollcli.read_calibration(CALIB))
+    assert read.pitch is not None
+    assert rollcli.estimate_roll(disparity, calibration=CALIB).to_dict() == read.to_dict()
+    assert rollcli.estimate_roll(disparity, calibration=str(CALIB)).to_dict() == read.to_dict()
+    left, right = (
+        cv2.imread(str(ROOT / "sample_data" / side / "frame_0001.png")) for side in ("left", "right")
+    )
+    assert rollcli.estimate_pair(left, right, calibration=str(CALIB)).height_m > 1
+
+
+def test_what_is_no_calibration_is_said(disparity):
+    estimate = rollcli.estimate_roll(disparity)
+    for call in (
+        lambda: rollcli.estimate_roll(disparity, calibration="no such file.txt"),
+        lambda: rollcli.estimate_roll(disparity, calibration=700.0),
+        lambda: rollcli.height_map(disparity, estimate, str(CALIB)),
+        lambda: rollcli.read_disparity(MAP, encoding="depth", calibration=str(CALIB)),
+    ):
+        with pytest.raises(
+            rollcli.RollcliError, match=r"no such file|no calibration: give rollcli\.read_cal"
+        ):
+            call()
+
+
+def test_an_image_that_was_not_read_is_said():
+    image = np.zeros((100, 200), np.uint8)
+    for call in (rollcli.compute_disparity, rollcli.estimate_pair):
+        with pytest.raises(rollcli.InputError, match="left image is None"):
+            call(None, image)
+        with pytest.raises(rollcli.InputError, match="right image is None"):
+            call(image, None)
+        with pytest.raises(rollcli.InputError, match="right image is no array"):
+            call(image, "right.png")
+    estimate = rollcli.estimate_roll(rollcli.read_disparity(MAP))
+    for call in (
+        rollcli.estimate_roll,
+        rollcli.v_disparity,
+        lambda each: rollcli.derotate(each, 0.1),
+        lambda each: rollcli.height_map(each, estimate),
+    ):
+        for wrong in (None, [[1, 2], [3]], "map.png"):
+            with pytest.raises(rollcli.UsageError, match=r"map"):
+                call(wrong)
+
+
+def test_a_mask_that_leaves_nothing_of_a_pair_is_said():
+    image = np.random.default_rng(0).integers(0, 256, (100, 200), dtype=np.uint8)
+    with pytest.raises(rollcli.UsageError, match="mask leaves no pixel"):
+        rollcli.estimate_pair(image, image, mask=np.zeros(image.shape))
+
+
+def test_what_a_masked_array_hides_is_no_data(disparity):
+    hidden = np.zeros(disparity.shape, bool)
+    hidden[:, 300:] = True
+    masked = np.ma.MaskedArray(disparity, hidden)
+    cut = np.where(hidden, 0, disparity)
+    estimate = rollcli.estimate_roll(masked)
+    assert estimate.to_dict() == rollcli.estimate_roll(cut).to_dict()
+    assert estimate.to_dict() != rollcli.estimate_roll(disparity).to_dict()
+    assert np.array_equal(rollcli.v_disparity(masked).counts, rollcli.v_disparity(cut).counts)
+    assert np.array_equal(rollcli.derotate(masked, 0.1), rollcli.derotate(cut, 0.1))
+    heights, same = (rollcli.height_map(each, estimate) for each in (masked, cut))
+    assert np.array_equal(heights, same, equal_nan=True)
+
+
+def test_an_estimate_is_json_and_its_columns_are_those_of_the_command(tmp_path):
+    estimate = rollcli.estimate_roll(rollcli.read_disparity(MAP), calibration=CALIB)
+    said = json.loads(json.dumps(estimate.to_dict()))
+    done = run("estimate", str(MAP), "--calib", str(CALIB), "--format", "jsonl", "-q", cwd=tmp_path)
+    row = json.loads(done.out)
+    for name, value in said.items():
+        if name != "image_roll_deg":  # a column where fx and fy differ
+            assert row[name] == (
+                pytest.approx(value, abs=1e-6, rel=1e-6) if isinstance(value, float) else value
+            )
+    assert said["roll_deg"] == estimate.roll_deg == math.degrees(estimate.theta)
+
+
+def test_a_rig_is_assessed_from_estimates_as_from_their_rows(disparity):
+    estimates = [rollcli.estimate_roll(typed_client.road(0.1, seed)) for seed in range(10)]
+    from_rows = rollcli.assess_rig([each.to_dict() for each in estimates])
+    assert rollcli.assess_rig(estimates).now() == from_rows.now()
+    assert from_rows.now().value == pytest.approx(math.degrees(0.1), abs=0.05)
+
+
+def test_a_depth_map_is_told_as_the_command_tells_it(disparity):
+    depth = np.where(disparity > 0, 400 / np.maximum(disparity, 1e-3), 0).astype(np.float32)
+    found = rollcli.estimate_roll(depth)
+    assert found.status == "suspect"
+    assert found.message.startswith("looks like a depth map: give focal length times baseline")
+    assert "--" not in found.message
+
+
+def test_a_photograph_is_told_as_the_command_tells_it():
+    colours = cv2.imread(str(ROOT / "sample_data" / "left" / "frame_0001.png"))
+    with pytest.raises(rollcli.UsageError, match=r"give both views to rollcli\.estimate_pair"):
+        rollcli.estimate_roll(colours)
+    try:
+        said = rollcli.estimate_roll(cv2.cvtColor(colours, cv2.COLOR_BGR2GRAY)).message
+    except rollcli.EstimationError as error:
+        said = str(error)
+    assert said.startswith("looks like a photograph")
+    assert "estimate_pair" in said
+
+
+def test_threads_may_call_it_at_the_same_time():
+    maps = [rollcli.read_disparity(path) for path in sorted(MAP.parent.iterdir())] * 3
+    one_by_one = [rollcli.estimate_roll(each).to_dict() for each in maps]
+    with ThreadPoolExecutor(4) as pool:
+        assert [each.to_dict() for each in pool.map(rollcli.estimate_roll, maps)] == one_by_one
+    assert isinstance(rollcli.read_calibration(CALIB), Calibration)
