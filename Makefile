@@ -18,7 +18,7 @@ help:
 	@echo "make lint    ruff: style and format"
 	@echo "make types   mypy, strict"
 	@echo "make format  let ruff rewrite the code"
-	@echo "make readme  write the tables of options in rollcli/cli/README.md"
+	@echo "make readme  write the tables of options in rollcli/cli/README.md, and rollcli/REFERENCE.md"
 	@echo "make bench   run every benchmark of tests/benchmarks"
 	@echo "make fuzz    throw broken files at the readers, and let every system call of a run fail"
 	@echo "make clean   remove all that make made"
@@ -57,6 +57,7 @@ format: $(BIN)/.dev
 
 readme: $(BIN)/.dev
 	$(BIN)/python -m tests.readme_tables
+	$(BIN)/python -m tests.reference_page
 
 bench: $(BIN)/.dev
 	@for each in tests/benchmarks/bench_*.py; do echo "== $$each"; $(BIN)/python $$each || exit 1; done

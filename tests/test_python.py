@@ -16,6 +16,7 @@ import pytest
 import rollcli
 from rollcli.rig.calibration import Calibration
 from tests import typed_client
+from tests.reference_page import PAGE, page
 from tests.run_cli import ROOT
 from tests.run_cli import rollcli as run
 
@@ -224,3 +225,10 @@ def test_threads_may_call_it_at_the_same_time():
     with ThreadPoolExecutor(4) as pool:
         assert [each.to_dict() for each in pool.map(rollcli.estimate_roll, maps)] == one_by_one
     assert isinstance(rollcli.read_calibration(CALIB), Calibration)
+
+
+def test_the_page_of_reference_is_what_the_docstrings_say():
+    assert PAGE.read_text("utf-8") == page(), "run python -m tests.reference_page"
+    for name in rollcli.__all__:
+        if not name.startswith("_"):
+            assert f"\n### {name}\n" in page()
