@@ -32,7 +32,8 @@ $(BIN)/.run: pyproject.toml
 
 $(BIN)/.dev: $(BIN)/.run
 	@echo "installing what the tests need into $(VENV) ..."
-	@$(PIP) --editable '.[dev,all]'
+	@$(PIP) 'pip>=25.1'  # older ones know no groups
+	@$(PIP) --editable '.[all]' --group dev
 	@$(TOUCH) $@
 
 run: $(BIN)/.run
@@ -67,4 +68,4 @@ fuzz: $(BIN)/.dev
 	$(BIN)/python -m tests.fuzz.faults
 
 clean:
-	@$(REMOVE) $(VENV) out build "*.egg-info" .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	@$(REMOVE) $(VENV) out build dist "*.egg-info" .pytest_cache .mypy_cache .ruff_cache .hypothesis
