@@ -22,10 +22,11 @@ from rollcli.report.options import GALLERY, ReportOptions
             "rollcli estimate maps/ -o out/rolls.csv --derotated out/upright --vdisparity out/vdisparity\n"
             "rollcli report out/rolls.csv --images out -o out/rolls.html",
         ),
+        ("Several drives, or the shards of one run", "rollcli report monday.csv tuesday.csv -o both.html"),
         ("Its charts for slides, without a page", "rollcli report rolls.csv --svg slides --png slides"),
     ]
 )
-@argument("result", type=PATH)
+@argument("results", nargs=-1, required=True, type=PATH)
 @option(
     "-o",
     "--output",
@@ -71,15 +72,15 @@ from rollcli.report.options import GALLERY, ReportOptions
 @config_option
 @click.pass_context
 def report(ctx: click.Context, /, **options: Any) -> None:
-    """Make an HTML page of RESULT, which `rollcli estimate` wrote.
+    """Make an HTML page of RESULTS, which `rollcli estimate` wrote: one, several, or the shards of one run.
 
     It shows the roll over the frames with its 95 % interval, suspect and failed frames marked; how often
     each roll occurs; a summary; and a gallery of maps before and after de-rotation with their v-disparity
     images. One file that opens from disk without a network.
 
-    Inputs are looked for under the names that RESULT gives them, from here or from its folder; remote ones
-    only where RESULT lies on the same server or in the same bucket, or with --fetch. This command needs the
-    extra: pip install "rollcli[report]".
+    Inputs are looked for under the names that RESULTS give them, from here or from their folder; remote ones
+    only where their result lies on the same server or in the same bucket, or with --fetch. This command needs
+    the extra: pip install "rollcli[report]".
     """
     from rollcli.report.run import run_report
 

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rollcli import __version__
+from rollcli.files.naming import listed
 from rollcli.files.results import Result, Row
 from rollcli.files.stores.locations import public_name
 from rollcli.report.chart import Chart
@@ -49,7 +50,7 @@ def report_page(
         "report.html",
         "frames",
         title=options.title or f"Roll of {frame_count(len(rows))}",
-        result=public_name(options.result),
+        result=listed(map(public_name, options.results)),
         version=run.get("rollcli"),
         page_version=__version__,
         summary=summary,
@@ -58,7 +59,7 @@ def report_page(
         decimals=decimals,
         folders=folders[:_FOLDERS],
         more_folders=len(folders) - _FOLDERS,
-        written=written_at(options.result),
+        written=max(map(written_at, options.results)),
         options=option_lines(result.run),
         encodings=", ".join(map(str, run["encoding"])) if isinstance(run.get("encoding"), list) else "",
         charts={name: with_still(chart) for name, chart in charts.items()},

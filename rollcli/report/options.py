@@ -11,11 +11,12 @@ GALLERY = 12
 class ReportOptions:
     """Everything that `rollcli report` was asked.
 
-    `output` is the page, `svg`, `pdf` and `png` are folders for its charts; `gallery` is how many frames the
-    page shows in pictures; `fetch` follows rows to any store.
+    `results` are one result, the shards of one run, or results of several; `output` is the page, `svg`, `pdf`
+    and `png` are folders for its charts; `gallery` is how many frames the page shows in pictures; `fetch`
+    follows rows to any store.
     """
 
-    result: str
+    results: tuple[str, ...]
     output: str | None = None
     svg: str | None = None
     pdf: str | None = None

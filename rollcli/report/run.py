@@ -1,23 +1,25 @@
 """`rollcli report`: a result to one HTML page, and its charts to files for slides."""
 
 import contextlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rollcli.errors import ExitStatus, InputError, UsageError
 from rollcli.extras import require_extra
 from rollcli.files.naming import listed
-from rollcli.files.results import Result, read_result, run_path
+from rollcli.files.results import Result, Row, read_result, run_path
 from rollcli.files.stream import is_stream, write_output
 from rollcli.report.chart import chart_names
 from rollcli.report.options import ReportOptions
 from rollcli.report.sources import Choice, Subject, choose, subjects
-from rollcli.report.summary import frame_count
+from rollcli.report.summary import common_run, frame_count
 from rollcli.run.find import check_writes, list_files
 from rollcli.run.options import EncodingOptions, FrameOptions
 from rollcli.run.progress import Progress
 from rollcli.run.record import recorded_options
+from rollcli.run.rig import order_of, origins_of
 from rollcli.run.workers.chunks import Work
 from rollcli.run.workers.in_order import Workers
 from rollcli.run.workers.interrupt import stop_on_signals
@@ -51,25 +53,23 @@ def run_report(options: ReportOptions) -> ExitStatus:
     if options.output is None:
         _require_charts_alone(options)
     require_extra("report", "the page")
-    result = read_result(options.result)
-    if not result.rows:
-        raise InputError(f"{options.result}: has no rows: there is nothing to report")
-    recorded = recorded_options(result.run, run_path(options.result))
-    chosen = choose(result.rows, options.gallery if options.output is not None else 0)
-    rows = [result.rows[each.place] for each in chosen]
-    found = subjects(rows, options.result, options.images, recorded.images, fetch=options.fetch)
+    if len(set(options.results)) < len(options.results):
+        raise UsageError(f"{listed(options.results)}: a result is named twice")
+    joined = _joined([_read(path) for path in options.results])
+    chosen = choose(joined.rows, options.gallery if options.output is not None else 0)
+    found = _subjects(joined, chosen, options)
     reads = [
-        options.result,
+        *options.results,
         *(path for each in found for path in (*each.frame.reads(), *each.images.values())),
     ]
     page = [] if options.output is None or is_stream(options.output) else [options.output]
-    charts = [path for name in chart_names(result.rows) for path in options.chart_paths(name).values()]
+    charts = [path for name in chart_names(joined.rows) for path in options.chart_paths(name).values()]
     writes = [*charts, *page]
     check_writes(reads, writes, overwrite=options.running.overwrite)
     if options.running.dry_run:
         list_files([(reads, writes)])
         return ExitStatus.DONE
-    return _write(options, result, chosen, found, recorded)
+    return _write(options, joined, chosen, found)
 
 
 def _require_charts_alone(options: ReportOptions) -> None:
@@ -85,10 +85,9 @@ def _require_charts_alone(options: ReportOptions) -> None:
 
 def _write(
     options: ReportOptions,
-    result: Result,
+    joined: "_Joined",
     chosen: Sequence[Choice],
     found: Sequence[Subject],
-    recorded: FrameOptions,
 ) -> ExitStatus:
     from rollcli.report.charts import all_charts
     from rollcli.report.content import report_page
@@ -96,12 +95,13 @@ def _write(
     from rollcli.rig.drive.assess import assess_rig
 
     progress = Progress(len(found), options.running, EncodingOptions())
+    recorded = [joined.parts[joined.owners[each.place]].recorded for each in chosen]
     pictures = _take(found, recorded, options.running.jobs)
     if len(pictures) < len(found):
         progress.say("interrupted; nothing is written")
         return ExitStatus.INTERRUPTED
-    rig = assess_rig(result.rows)
-    charts = all_charts(result.rows, rig)
+    rig = assess_rig(joined.rows, origins=joined.origins)
+    charts = all_charts(joined.rows, rig)
     files = {
         path: chart_file(chart, kind)
         for name, chart in charts.items()
@@ -113,7 +113,9 @@ def _write(
         progress.note(f"{listed(list(files))}: written")
     if options.output is None:
         return ExitStatus.DONE
-    page = report_page(result, options, list(zip(chosen, pictures, strict=True)), rig, charts)
+    page = report_page(
+        Result(joined.rows, joined.run), options, list(zip(chosen, pictures, strict=True)), rig, charts
+    )
     write_output(options.output, page, overwrite=options.running.overwrite)
     missing = [each.missing for each in pictures if each.empty]
     for reason in missing[:_REASONS]:
@@ -128,10 +130,75 @@ def _write(
     return ExitStatus.FRAMES_FAILED if missing else ExitStatus.DONE
 
 
-def _take(found: Sequence[Subject], recorded: FrameOptions, jobs: int | None) -> "list[Pictures]":
-    """Return the pictures of each subject, fewer when interrupted."""
+def _take(found: Sequence[Subject], recorded: Sequence[FrameOptions], jobs: int | None) -> "list[Pictures]":
+    """Return the pictures of each subject, fewer when interrupted; those of one way to read go together."""
     from rollcli.report.pictures import no_pictures, take_pictures
 
-    work = Work(partial(take_pictures, options=recorded), no_pictures)
-    with stop_on_signals() as stop, contextlib.closing(run_tasks(found, work, stop, Workers(jobs))) as taken:
-        return list(taken)
+    pictures: dict[int, Pictures] = {}
+    with stop_on_signals() as stop:
+        for given in (each for at, each in enumerate(recorded) if each not in recorded[:at]):
+            places = [place for place, each in enumerate(recorded) if each == given]
+            work = Work(partial(take_pictures, options=given), no_pictures)
+            tasks = run_tasks([found[place] for place in places], work, stop, Workers(jobs))
+            with contextlib.closing(tasks) as taken:
+                pictures |= dict(zip(places, taken, strict=False))
+    return [pictures[place] for place in sorted(pictures)]
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """One of the results that are told."""
+
+    path: str
+    rows: tuple[Row, ...]
+    run: Mapping[str, Any] | None
+    recorded: FrameOptions
+
+    @property
+    def files(self) -> list[str]:
+        """The column `file`."""
+        return [row.file for row in self.rows]
+
+
+@dataclass(frozen=True, slots=True)
+class _Joined:
+    """All rows in the order of the run, or one result after the other; `owners` are the parts they are of."""
+
+    parts: Sequence[_Part]
+    rows: tuple[Row, ...]
+    owners: Sequence[int]
+    origins: Sequence[str]
+    run: Mapping[str, Any] | None
+
+
+def _read(path: str) -> _Part:
+    result = read_result(path)
+    if not result.rows:
+        raise InputError(f"{path}: has no rows: there is nothing to report")
+    return _Part(path, result.rows, result.run, recorded_options(result.run, run_path(path)))
+
+
+def _joined(parts: Sequence[_Part]) -> _Joined:
+    rows = [row for part in parts for row in part.rows]
+    owners = [number for number, part in enumerate(parts) for _ in part.rows]
+    order = order_of(parts).tolist() if len(parts) > 1 else range(len(rows))  # a shard alone may be shown
+    return _Joined(
+        parts,
+        tuple(rows[place] for place in order),
+        [owners[place] for place in order],
+        origins_of(parts),
+        common_run([part.run for part in parts]),
+    )
+
+
+def _subjects(joined: _Joined, chosen: Sequence[Choice], options: ReportOptions) -> list[Subject]:
+    """Find the files of the frames to show, each from where its own result lies."""
+    found: dict[int, Subject] = {}
+    for number, part in enumerate(joined.parts):
+        places = [each.place for each in chosen if joined.owners[each.place] == number]
+        rows = [joined.rows[place] for place in places]
+        if rows or len(joined.parts) == 1:
+            images = part.recorded.images
+            of_part = subjects(rows, part.path, options.images, images, fetch=options.fetch)
+            found |= dict(zip(places, of_part, strict=True))
+    return [found[each.place] for each in chosen]

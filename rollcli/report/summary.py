@@ -77,6 +77,22 @@ def written_at(result: str) -> str:
     return datetime.fromtimestamp(seconds, timezone.utc).strftime("%Y-%m-%d %H:%M UTC")
 
 
+def common_run(runs: Sequence[Mapping[str, Any] | None]) -> Mapping[str, Any] | None:
+    """Return what the records of several runs have in common, and every encoding that was seen."""
+    first = runs[0]
+    if first is None or len(runs) == 1 or any(each is None for each in runs):
+        return first if len(runs) == 1 else None
+    known = [each for each in runs if each is not None]
+    encodings = [name for each in known for name in each.get("encoding") or ()]
+    options = {
+        name: value
+        for name, value in first.get("options", {}).items()
+        if all(each.get("options", {}).get(name) == value for each in known)
+    }
+    same = {name: first[name] for name in first if all(each.get(name) == first[name] for each in known)}
+    return {**same, "options": options, "encoding": list(dict.fromkeys(encodings))}
+
+
 def option_lines(run: Mapping[str, Any] | None) -> list[tuple[str, str]]:
     """Return the options that the run was given, by their names on the command line."""
     options = (run or {}).get("options", {})

@@ -15,7 +15,7 @@ from rollcli.files.results import STATUSES, run_path
 from rollcli.files.stores.locations import base_name
 from rollcli.files.stream import is_stream, write_output
 from rollcli.messages import say
-from rollcli.rig.drive.assess import RigAssessment, RigFrames, assess_frames, difference
+from rollcli.rig.drive.assess import RigAssessment, RigFrames, assess_frames, difference, short_names
 from rollcli.rig.drive.posterior import Estimate
 from rollcli.rig.quantities import COLUMNS as QUANTITY_COLUMNS
 from rollcli.rig.quantities import QUANTITIES, ROLL, SIZE
@@ -72,9 +72,8 @@ def read_source(paths: Sequence[str]) -> Source:
         if not part.files:
             raise InputError(f"{part.path}: has no rows: there is nothing to assess")
     _check_one_method(parts)
-    order, whole = order_of(parts), are_whole(parts)
+    order = order_of(parts)
     joined = [file for part in parts for file in part.files]
-    origins = [base_name(part.path) for part in parts for _ in part.files] if whole else ()
     status = np.concatenate([part.status for part in parts])[order]
     return Source(
         RigFrames(
@@ -82,7 +81,7 @@ def read_source(paths: Sequence[str]) -> Source:
             status == STATUSES.index("ok"),
             status == STATUSES.index("suspect"),
             {name: _joined(parts, name)[order] for name in COLUMNS if any(name in p.numbers for p in parts)},
-            origins,
+            origins_of(parts),
         ),
         _unfinished(parts),
         tuple(_notes(parts)),
@@ -120,6 +119,16 @@ def are_whole(parts: Sequence[Part]) -> bool:
     """Tell whether there are several results, each of a whole run."""
     shards = [_shard(part) for part in parts]
     return len(parts) > 1 and (1, 1) in shards and all(each in (None, (1, 1)) for each in shards)
+
+
+def origins_of(parts: Sequence[Part]) -> list[str]:
+    """Return the name of the result of each row, one part after the other; nothing unless they are whole."""
+    if not are_whole(parts):
+        return []
+    names = [base_name(part.path) for part in parts]
+    if len(set(names)) < len(names):
+        names = short_names([part.path for part in parts])
+    return [name for name, part in zip(names, parts, strict=True) for _ in part.files]
 
 
 def order_of(parts: Sequence[Part]) -> NDArray[np.intp]:

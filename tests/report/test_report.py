@@ -477,3 +477,28 @@ def test_heights_are_shown_as_estimate_drew_them_or_made_in_the_same_colours(tmp
         data = base64.b64decode(PICTURES.findall(page_of(tmp_path))[0 if images else 2])
         shown = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
         assert np.abs(shown.astype(float) - drawn).mean() < 4  # WebP loses a little
+
+
+def test_results_of_several_runs_are_drives_and_shards_are_one(tmp_path):
+    for name, roll in (("a", 1.0), ("b", -2.0)):
+        turns = np.random.default_rng(5).normal(roll, 0.05, 40)
+        write_result(tmp_path / f"{name}.csv", [row(f"m/{at:03}.png", turn) for at, turn in enumerate(turns)])
+        (tmp_path / f"{name}.csv.run.json").write_text(json.dumps({"options": {"shard": "1/1"}}))
+
+    assert rollcli("report", "a.csv", "b.csv", "-o", "page.html", "--gallery", "0", cwd=tmp_path).status == 0
+
+    page = page_of(tmp_path)
+    assert re.search(r"<h1>Roll of 80 frames</h1>.*<code>a\.csv, b\.csv</code>", page, re.DOTALL)
+    assert re.search(r'class="value">roll −[12]\.\d+ ± [\d.]+° <span>in m \(b\.csv\)</span>', page)
+    assert "m (b.csv) differs from m (a.csv) by -" in page
+
+    for name, index in (("a", 1), ("b", 2)):
+        (tmp_path / f"{name}.csv.run.json").write_text(json.dumps({"options": {"shard": f"{index}/2"}}))
+    again = ("--overwrite", "--gallery", "0", "-o", "page.html")
+    assert rollcli("report", "b.csv", "a.csv", *again, cwd=tmp_path).status == 0
+    assert re.search(r'class="value">roll [−\d]', page_of(tmp_path))
+    rows = re.search(r'id="rows">(.*?)</script>', page_of(tmp_path), re.DOTALL)[1]
+    first = [each[3] for each in json.loads(rows)["rows"][:4]]
+    assert [number > 0 for number in first] == [True, False, True, False]
+    refused = rollcli("report", "a.csv", "a.csv", *again, cwd=tmp_path)
+    assert (refused.status, "named twice" in refused.err) == (2, True)

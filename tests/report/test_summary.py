@@ -67,10 +67,10 @@ def test_options_are_shown_but_those_that_were_not_given():
 
 
 def test_a_chart_of_its_own_is_beside_the_others_of_its_folder():
-    options = ReportOptions("rolls.csv", png="slides/", svg="s3://maps/svg")
+    options = ReportOptions(("rolls.csv",), png="slides/", svg="s3://maps/svg")
     assert options.chart_paths("roll") == {"svg": "s3://maps/svg/roll.svg", "png": "slides/roll.png"}
-    assert ReportOptions("rolls.csv").chart_paths("roll") == {}
-    assert (ReportOptions("rolls.csv").gallery, options.output) == (12, None)
+    assert ReportOptions(("rolls.csv",)).chart_paths("roll") == {}
+    assert (ReportOptions(("rolls.csv",)).gallery, options.output) == (12, None)
 
 
 def test_the_axis_reaches_a_little_beyond_the_values():

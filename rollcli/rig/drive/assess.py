@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import PurePosixPath
@@ -205,7 +205,9 @@ class RigAssessment:
         return found.now if found is not None else Estimate()
 
 
-def assess_rig(rows: Any, *, include_suspect: bool = False, groups: str = AUTO) -> RigAssessment:
+def assess_rig(
+    rows: Any, *, include_suspect: bool = False, groups: str = AUTO, origins: Sequence[str] = ()
+) -> RigAssessment:
     """Assess how a rig is mounted, whether it drifts, and when it jumped.
 
     Parameters
@@ -219,6 +221,8 @@ def assess_rig(rows: Any, *, include_suspect: bool = False, groups: str = AUTO) 
         Let suspect frames count too.
     groups : str
         "auto": frames of one folder are one drive; "none": all are one drive; else a pattern of folders.
+    origins : sequence of str
+        Which result each row is from, where they are of several runs that are not one; else empty.
 
     Returns
     -------
@@ -238,7 +242,8 @@ def assess_rig(rows: Any, *, include_suspect: bool = False, groups: str = AUTO) 
     >>> [jump.frame for jump in rig.latest().jumps], round(rig.now().value, 1)
     ([300], 1.0)
     """
-    return assess_frames(_frames(rows), include_suspect=include_suspect, groups=groups)
+    frames = replace(_frames(rows), origins=origins)
+    return assess_frames(frames, include_suspect=include_suspect, groups=groups)
 
 
 def assess_frames(frames: RigFrames, *, include_suspect: bool = False, groups: str = AUTO) -> RigAssessment:
