@@ -130,7 +130,8 @@ def _write(
 ) -> None:
     from rollcli.evaluate.paper_page import charts, paper_page
     from rollcli.evaluate.tables import all_tables
-    from rollcli.report.figures import PRINT, chart_file
+    from rollcli.pictures.figures import PRINT
+    from rollcli.report.figures import chart_file
 
     tables = all_tables(found, failed, times)
     folder = Path(options.experiments.output)

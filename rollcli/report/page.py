@@ -14,8 +14,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from rollcli.pictures.colours import style_sheet
 from rollcli.report.chart import script_json
-from rollcli.report.colours import style_sheet
 
 # plotly adds a style sheet for geographic maps unless an element has its id; the policy would refuse it aloud
 _STYLE_OF_MAPS = re.compile(r'document\.getElementById\("([0-9a-f]{64})"\)')

@@ -92,7 +92,7 @@ def heights_of_map(conversion: Conversion, options: FrameOptions, result: str) -
 
 def draw_figure(conversion: Conversion, options: FrameOptions, count: CountOptions) -> FrameResult:
     """Write the figure of the map and its v-disparity, by the angle of a result or by its own estimate."""
-    from rollcli.run.vdisparity_figure import v_disparity_figure  # loads matplotlib, an extra
+    from rollcli.pictures.vdisparity_figure import v_disparity_figure  # loads matplotlib, an extra
 
     def make(source: Source) -> dict[str, bytes]:
         row = conversion.row

@@ -8,10 +8,11 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
+from rollcli.pictures.colours import DARK, LIGHT, rgb, style_sheet
+from rollcli.pictures.figures import SLIDE
 from rollcli.report import figures
 from rollcli.report.charts import all_charts
-from rollcli.report.colours import DARK, LIGHT, rgb, style_sheet
-from rollcli.report.figures import SLIDE, chart_file, with_still
+from rollcli.report.figures import chart_file, with_still
 from rollcli.rig.drive.assess import assess_rig
 from tests.report.results import row
 

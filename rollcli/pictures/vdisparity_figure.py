@@ -10,8 +10,8 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from rollcli.pictures.derotate import derotate
+from rollcli.pictures.figures import COLUMN, PRINT, drawing_style, figure_file
 from rollcli.pictures.vdisparity import VDisparity, profile, row_offset, shown_counts, v_disparity
-from rollcli.report.figures import COLUMN, PRINT, drawing_style, figure_file
 
 _MAP_SHARE = 1.8  # the width of a map, of that of its v-disparity
 _MAP_WIDTH = 0.5 * COLUMN  # pt, about; the rest are v-disparity, numbers and names
