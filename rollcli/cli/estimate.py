@@ -181,7 +181,8 @@ def estimate(ctx: click.Context, /, **records: Any) -> None:
       rollcli estimate --left left/ --right right/ -o rolls.csv
       rollcli report rolls.csv -o rolls.html
 
-    INPUTS are maps (PNG, TIFF, NPY, PFM), folders of them, quoted patterns, or - for paths on stdin.
+    INPUTS are maps (PNG, TIFF, NPY, NPZ, PFM, EXR), folders, .zip and .tar of them, quoted
+    patterns, or - for paths on stdin.
 
     A positive roll means that the rig is rolled counter-clockwise seen from behind: its right end is up.
     """

@@ -63,7 +63,8 @@ from rollcli.run.options import HeightsOptions
 def heights(ctx: click.Context, /, **options: Any) -> None:
     """Write how high each pixel of disparity maps lies over the road.
 
-    INPUTS are maps (PNG, TIFF, NPY, PFM), folders of them, quoted patterns, or - for paths on stdin. Heights
+    INPUTS are maps (PNG, TIFF, NPY, NPZ, PFM, EXR), folders, .zip and .tar of them, quoted
+    patterns, or - for paths on stdin. Heights
     are along the road's normal, over the parabola, roll and camber that RESULT has for each map; positive:
     above the road; NaN: no disparity. They are metres with a calibration that has a baseline, else camera
     heights.

@@ -68,7 +68,8 @@ rotation_options = record(
 def derotate(ctx: click.Context, /, **records: Any) -> None:
     """Rotate disparity maps by their roll, so that rows of the road become constant.
 
-    INPUTS are maps (PNG, TIFF, NPY, PFM), folders of them, quoted patterns, or - for paths on stdin. A map
+    INPUTS are maps (PNG, TIFF, NPY, NPZ, PFM, EXR), folders, .zip and .tar of them, quoted
+    patterns, or - for paths on stdin. A map
     keeps its type, encoding and format. Values are interpolated between valid pixels alone, and what is no
     data stays no data.
 
@@ -185,7 +186,8 @@ count_options = record(
 def vdisparity(ctx: click.Context, /, **records: Any) -> None:
     """Draw the v-disparity image of each map: the histogram of each row's disparities.
 
-    INPUTS are maps (PNG, TIFF, NPY, PFM), folders of them, quoted patterns, or - for paths on stdin. The
+    INPUTS are maps (PNG, TIFF, NPY, NPZ, PFM, EXR), folders, .zip and .tar of them, quoted
+    patterns, or - for paths on stdin. The
     picture is an 8-bit PNG on a log scale; its first rows are those of the map. The map is taken as it is,
     whereas `estimate --vdisparity` rotates it upright first. Where a road is found, its disparity along the
     middle column is drawn as a dashed curve: on a de-rotated map the road's pixels lie on it. With a

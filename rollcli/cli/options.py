@@ -156,17 +156,18 @@ encoding_options = record(
     EncodingOptions,
     option(
         "--encoding",
-        type=Choice("auto", "px", "kitti", "cityscapes", "sgbm", "depth"),
+        type=Choice("auto", "px", "kitti", "cityscapes", "sgbm", "depth", "foundationstereo"),
         default="auto",
         help="px: pixels as they are; kitti: p/256; cityscapes: (p-1)/256; sgbm: p/16, negative is no data; "
         "depth: metres (whole numbers: millimetres), which a calibration turns into disparities; "
+        "foundationstereo: (R*255*255 + G*255 + B)/1000 of an RGB PNG; "
         "auto: float and uint8 are px, uint16 is kitti, int16 is sgbm.",
     ),
     option(
         "--scale",
-        type=Number("F", above=0),
+        type=Number("F", but=0),
         help="Pixels = stored number * F (depth: metres = stored number * F); F replaces the factor of an "
-        "encoding.",
+        "encoding, and is negative where maps are stored negative.",
     ),
     option(
         "--invalid",

@@ -82,8 +82,9 @@ class Number(ParamType):
         at_most: float = math.inf,
         auto: bool = False,
         whole: bool = False,
+        but: float | None = None,
     ) -> None:
-        self.name = unit
+        self.name, self.but = unit, but
         self.above, self.at_least, self.at_most = above, at_least, at_most
         self.auto, self.whole = auto, whole
 
@@ -97,7 +98,12 @@ class Number(ParamType):
             number = int(value) if self.whole and not isinstance(value, float) else float(value)
         except (TypeError, ValueError, OverflowError):
             number = math.nan
-        fits = math.isfinite(number) and self.above < number and self.at_least <= number <= self.at_most
+        fits = (
+            math.isfinite(number)
+            and number != self.but
+            and self.above < number
+            and self.at_least <= number <= self.at_most
+        )
         if not fits or isinstance(value, bool) or (self.whole and number != int(number)):
             self.fail(f"{value!r} is not {self.describe()}", param, ctx)
         return int(number) if self.whole else number
@@ -107,6 +113,7 @@ class Number(ParamType):
         words = "a whole number" if self.whole else "a number"
         bounds = [
             f"above {self.above:g}" if self.above > -math.inf else "",
+            f"other than {self.but:g}" if self.but is not None else "",
             f"of at least {self.at_least:g}" if self.at_least > -math.inf else "",
             f"of at most {self.at_most:g}" if self.at_most < math.inf else "",
         ]

@@ -13,6 +13,8 @@ MOST_BYTES = 2**30
 MOST_LISTED = 2**28  # of a list of files: two million paths
 MOST_SETTINGS = 2**20  # of a TOML file
 UTF16_MARKS = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+MOST_SMALL = 2**25  # bytes that a small compressed file may stand for: an empty map compresses well
+MOST_EXPANSION = 48  # bytes that each byte of a larger file may stand for; real maps reach 20
 _TOLD_BY = 64  # bytes at the start of a text, by which its encoding is told
 _OF_DEVICES = 2**20  # /dev/null has an end, /dev/zero has none
 
@@ -46,6 +48,11 @@ def read_stream(file: BinaryIO, name: str, most: int = MOST_BYTES) -> bytes:
     if len(data) > most:
         raise too_large(name, None, most)
     return data
+
+
+def most_unpacked(packed: int) -> int:
+    """Return how many bytes so many compressed ones may become."""
+    return min(MOST_BYTES, max(MOST_SMALL, MOST_EXPANSION * packed))
 
 
 def as_utf8(data: bytes, name: str) -> bytes:

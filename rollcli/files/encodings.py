@@ -24,11 +24,18 @@ class Encoding(str, Enum):
     KITTI = "kitti"  # p / 256; 0 is no data
     CITYSCAPES = "cityscapes"  # (p - 1) / 256; 0 is no data
     SGBM = "sgbm"  # p / 16; negative is no data
+    FOUNDATIONSTEREO = "foundationstereo"  # (R * 255^2 + G * 255 + B) / 1000 of an RGB PNG; 0 is no data
     DEPTH = "depth"  # a distance z: focal length * baseline / z - doffs
 
 
 KITTI_TOP = 65534 / 256  # px: the largest disparity of a KITTI PNG; 65535 is never one
-_SCALE = {Encoding.PX: 1.0, Encoding.KITTI: 1 / 256, Encoding.CITYSCAPES: 1 / 256, Encoding.SGBM: 1 / 16}
+_SCALE = {
+    Encoding.PX: 1.0,
+    Encoding.KITTI: 1 / 256,
+    Encoding.CITYSCAPES: 1 / 256,
+    Encoding.SGBM: 1 / 16,
+    Encoding.FOUNDATIONSTEREO: 1 / 1000,
+}
 _METRES = {"f": 1.0, "i": 1e-3, "u": 1e-3}  # a stored depth, by its kind: metres, or whole millimetres
 _AUTO = {np.dtype(np.uint16): Encoding.KITTI, np.dtype(np.int16): Encoding.SGBM}
 _WHOLE_PIXELS_BELOW = 512
@@ -73,10 +80,11 @@ def to_disparity(
     ----------
     stored : Stored
         What a file holds.
-    encoding : {"auto", "px", "kitti", "cityscapes", "sgbm", "depth"}
+    encoding : {"auto", "px", "kitti", "cityscapes", "sgbm", "foundationstereo", "depth"}
         auto: uint16 is kitti, int16 is sgbm, everything else px. depth: metres, in whole numbers millimetres.
     scale : float, optional
         Pixels (of a depth: metres) per stored unit, in place of the encoding's own; makes "auto" take px.
+        Negative where the numbers are stored negative: no data are then NaN, inf and >= 0.
     invalid : iterable of float
         Stored values that mean no data, besides NaN, inf, <= 0, the file's own tag, 65535 in uint16, and a
         constant plateau at either end of the range (`plateaus`).
@@ -86,17 +94,20 @@ def to_disparity(
     Raises
     ------
     UsageError
-        Unknown encoding, a scale that is not positive, or a calibration of another view.
+        Unknown encoding, a scale of 0, a negative one for unsigned numbers, or a calibration of another view.
     """
     used = resolve_encoding(encoding, stored.values.dtype, scale)
     factor = _factor(used, stored.values.dtype) if scale is None else scale
-    if not (math.isfinite(factor) and factor > 0):
-        raise UsageError(f"scale {factor}: must be a positive number, pixels per stored unit")
+    if not math.isfinite(factor) or factor == 0:
+        raise UsageError(f"scale {factor}: must be a number other than 0, pixels per stored unit")
+    if factor < 0 and stored.values.dtype.kind == "u":
+        raise UsageError(f"scale {factor}: the stored numbers have no sign ({stored.values.dtype})")
     with np.errstate(all="ignore"):  # numbers too large for float32 become inf, and inf no data
+        positive = stored.values if factor > 0 else _negated(stored.values)
         disparity = (
-            _from_depth(stored.values, factor, calibration)
+            _from_depth(positive, abs(factor), calibration)
             if used is Encoding.DEPTH
-            else _scaled(stored.values, used, factor)
+            else _scaled(positive, used, abs(factor))
         )
         _blank(disparity, stored.values, (*invalid, *stored.nodata, *_saturated(stored.values)))
     plateau = without_plateaus(disparity)
@@ -118,11 +129,12 @@ def read_disparity(
     Parameters
     ----------
     path : str or path
-        A PNG, TIFF, NPY or PFM file.
-    encoding : {"auto", "px", "kitti", "cityscapes", "sgbm", "depth"}
+        A PNG, TIFF, NPY, NPZ, PFM or EXR file.
+    encoding : {"auto", "px", "kitti", "cityscapes", "sgbm", "depth", "foundationstereo"}
         auto: uint16 is kitti, int16 is sgbm, everything else px. depth: metres, in whole numbers millimetres.
     scale : float, optional
         Pixels (of a depth: metres) per stored unit, in place of the encoding's own; makes "auto" take px.
+        Negative where maps are stored negative.
     invalid : float, optional
         A stored value that means no data, besides NaN, inf, <= 0 and what the file itself marks.
     calibration : Calibration, optional
@@ -138,7 +150,7 @@ def read_disparity(
     InputError
         The file cannot be read, or is no map.
     UsageError
-        Unknown encoding, a scale that is not positive, or a calibration of another view.
+        Unknown encoding, a scale of 0, or a calibration of another view.
 
     Examples
     --------
@@ -150,9 +162,8 @@ def read_disparity(
     """
     values = () if invalid is None else (invalid,)
     require_calibration(calibration)
-    found = to_disparity(
-        read_stored(path), encoding=encoding, scale=scale, invalid=values, calibration=calibration
-    )
+    stored = read_stored(path, rgb=encoding == Encoding.FOUNDATIONSTEREO)
+    found = to_disparity(stored, encoding=encoding, scale=scale, invalid=values, calibration=calibration)
     return found.disparity
 
 
@@ -165,7 +176,7 @@ def from_disparity(
     ----------
     disparity : ndarray, shape (H, W)
         Pixels; NaN, inf and <= 0 are no data, stored as 0 (-16 in sgbm, as OpenCV does).
-    encoding : {"auto", "px", "kitti", "cityscapes", "sgbm"}
+    encoding : {"auto", "px", "kitti", "cityscapes", "sgbm", "foundationstereo"}
         How a number stands for a disparity; auto goes by the dtype.
     dtype : dtype
         Of the result; whole-number types are rounded, but never down to no data.
@@ -212,6 +223,11 @@ def resolve_encoding(encoding: str, dtype: np.dtype[Any], scale: float | None) -
         raise UsageError(f"encoding {encoding!r} is unknown: choose one of {names}") from None
 
 
+def _negated(values: NDArray[Any]) -> NDArray[Any]:
+    """Turn the sign of numbers; whole ones get room for their lowest."""
+    return -(values if values.dtype.kind == "f" else values.astype(np.float64))
+
+
 def _scaled(values: NDArray[Any], encoding: Encoding, scale: float) -> NDArray[Any]:
     """Pixels; whatever is not a positive finite number becomes 0."""
     real = np.float64 if values.dtype.kind == "f" and values.dtype.itemsize >= 8 else np.float32
@@ -249,7 +265,7 @@ def _from_depth(values: NDArray[Any], metres: float, calibration: Calibration | 
 def _blank(disparity: NDArray[Any], values: NDArray[Any], invalid: tuple[float, ...]) -> None:
     """Set to 0 the pixels whose stored value means no data."""
     for value in invalid:
-        if value > 0 and math.isfinite(value):  # the others are no data already
+        if math.isfinite(value):  # the others are no data already
             disparity[values == value] = 0
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError, UsageError
-from rollcli.files.codecs import arrays, pictures, png, tiff
+from rollcli.files.codecs import arrays, channels, pictures, png, tiff
 from rollcli.files.codecs.raw_map import Stored as Stored
 from rollcli.files.codecs.raw_map import native
 from rollcli.files.storage import read_bytes
@@ -55,10 +55,25 @@ MAP_FORMATS = {
         lambda data, name: Stored(native(arrays.decode_pfm(data, name)), "pfm"),
         lambda values, *_: arrays.encode_pfm(values),
     ),
+    "npz": MapFormat(
+        (arrays.MAGIC_NPZ,),
+        lambda data, name: Stored(native(arrays.decode_npz(data, name)), "npz"),
+        lambda values, *_: arrays.encode_npz(values),
+    ),
+    "exr": MapFormat(
+        (channels.MAGIC_EXR,),
+        lambda data, name: Stored(native(channels.decode_exr(data, name)), "exr"),
+        lambda values, *_: channels.encode_exr(values),
+    ),
+    # told by --encoding alone: to all others such a PNG is a photograph
+    "rgb": MapFormat(
+        (),
+        lambda data, name: Stored(channels.decode_rgb(data, name), "rgb"),
+        lambda values, *_: channels.encode_rgb(values),
+    ),
 }
 _KNOWN = {
     b"\xff\xd8\xff": "a JPEG image",
-    b"PK\x03\x04": "a ZIP or NPZ archive",
     b"BM": "a BMP image",
     b"GIF8": "a GIF image",
     b"%PDF": "a PDF document",
@@ -69,8 +84,13 @@ _KNOWN = {
 _TEXT = re.compile(rb"[\t\n\r\f\x20-\x7e]{8}")  # no format begins with eight printable characters
 
 
-def read_stored(path: str | Path, name: str | None = None) -> Stored:
-    """Read a disparity map file: the numbers as they are stored; see `decode_stored`."""
+def read_stored(path: str | Path, name: str | None = None, *, rgb: bool = False) -> Stored:
+    """Read a disparity map file: the numbers as they are stored; see `decode_stored`.
+
+    `rgb`: they are in the three channels of a PNG, as FoundationStereo writes them.
+    """
+    if rgb:
+        return MAP_FORMATS["rgb"].decode(read_bytes(path, name), name or str(path))
     return decode_stored(read_bytes(path, name, begins=_check_beginning), name or str(path))
 
 
@@ -80,7 +100,7 @@ def decode_stored(data: bytes, name: str) -> Stored:
     Parameters
     ----------
     data : bytes
-        A whole PNG, TIFF, NPY or PFM file.
+        A whole PNG, TIFF, NPY, NPZ, PFM or EXR file.
     name : str
         What error messages call it.
 
@@ -113,7 +133,7 @@ def encode_stored(
     values : ndarray, shape (H, W)
         PNG holds uint8 and uint16, PFM float32, TIFF and NPY any real dtype.
     format : str
-        "png", "tiff", "npy" or "pfm".
+        "png", "tiff", "npy", "npz", "pfm", "exr" or "rgb".
     nodata : tuple of float
         The stored values that mean no data; written as GDAL's tag to a TIFF.
     text : str
@@ -181,7 +201,9 @@ def _decoded(data: bytes, name: str) -> Stored:
         if data.startswith(each.signatures):
             return each.decode(data, name)
     hint = "; photographs are given by --left and --right" if data.startswith(pictures.SIGNATURES) else ""
-    raise InputError(f"{name}: is {_what(data)}; a disparity map is a PNG, TIFF, NPY or PFM file{hint}")
+    raise InputError(
+        f"{name}: is {_what(data)}; a disparity map is a PNG, TIFF, NPY, NPZ, PFM or EXR file{hint}"
+    )
 
 
 def _what(data: bytes) -> str:

@@ -4,19 +4,26 @@ import functools
 import os
 import re
 import sys
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from rollcli.errors import InputError, UsageError
 from rollcli.files.bounded import MOST_LISTED, as_utf8, read_given, read_stream
+from rollcli.files.containers import file_of, shown
 from rollcli.files.naming import listed, match_names, natural_key
 from rollcli.files.search import Search
 from rollcli.files.storage import read_bytes
 from rollcli.files.stores.locations import base_name, is_url, public_name
 
-MAP_ENDINGS = (".png", ".tif", ".tiff", ".npy", ".pfm")
+MAP_ENDINGS = (".png", ".tif", ".tiff", ".npy", ".npz", ".pfm", ".exr")
 IMAGE_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm")
+_KINDS_NAMED = 5  # endings of what is not read
+_NO_TEXT = (  # what images and archives begin with
+    *(b"\x89PNG", b"II*\0", b"MM\0*", b"\x93NUMPY", b"Pf\n", b"PF\n"),
+    *(b"\xff\xd8\xff", b"PK\x03\x04", b"v/1\x01"),
+)
 _OTHER_SIDE = "name the images of the other camera"
 
 
@@ -62,6 +69,8 @@ def find_inputs(
     exclude: Sequence[str] = (),
     skip: Sequence[str | Path] = (),
     endings: Sequence[str] = MAP_ENDINGS,
+    maps: bool = False,
+    notes: list[str] | None = None,
 ) -> list[Input]:
     """Find every file that the arguments name, sorted naturally, each once.
 
@@ -81,6 +90,10 @@ def find_inputs(
         Folders that are never searched: this run's results go there.
     endings : sequence of str
         What counts as readable in a folder.
+    maps : bool
+        They are disparity maps: the views of pairs are refused.
+    notes : list of str, optional
+        Gets a line on what the folders hold beside what is read.
 
     Returns
     -------
@@ -93,7 +106,7 @@ def find_inputs(
     UsageError
         Nothing is found at all, or a folder or pattern holds nothing, or a list cannot be read.
     """
-    search = Search(endings, recursive, include, exclude, skip)
+    search = Search(endings, recursive, include, exclude, skip, maps)
     found: list[Input] = []
     seen: dict[str, set[str]] = {}  # names by their folders, whose texts they share
     real = functools.cache(os.path.realpath)  # one folder holds thousands of files
@@ -103,18 +116,28 @@ def find_inputs(
             if is_url(path):
                 folder, base = "", path
             else:
-                folder, base = os.path.split(path)
+                folder, base = os.path.split(shown(path))
                 folder = real(folder)
             names = seen.setdefault(folder, set())
             if base not in names:
                 names.add(base)
                 found.append(Input(path, _shown(path), relative))
+    if search.left_out and notes is not None:
+        notes.append(_left_out(search.left_out))
     del seen  # before the keys of the sort take its place
-    if not any(is_url(each.location) or os.path.lexists(each.location) for each in found):
+    if not any(is_url(each.location) or os.path.lexists(file_of(each.location)) for each in found):
         named = listed(each.name for each in found)
         raise UsageError(f"no input found: {named + ': no such file' if named else 'the list is empty'}")
     found.sort(key=lambda each: natural_key(each.name))
     return found
+
+
+def _left_out(counts: Counter[str]) -> str:
+    named = counts.most_common(_KINDS_NAMED)
+    more = sum(counts.values()) - sum(count for _, count in named)
+    kinds = [f"{count} {ending or 'without an ending'}" for ending, count in named]
+    kinds += [f"{more} others"] if more else []
+    return f"files in the folders that are not read: {', '.join(kinds)}"
 
 
 def named_input(location: str) -> Input:
@@ -124,7 +147,7 @@ def named_input(location: str) -> Input:
 
 def _shown(location: str) -> str:
     """Return a location as rows show it; on Linux that is the same text, which takes no further memory."""
-    return public_name(location) if is_url(location) else location.replace(os.sep, "/")
+    return public_name(location) if is_url(location) else shown(location).replace(os.sep, "/")
 
 
 def pair_inputs(
@@ -136,6 +159,7 @@ def pair_inputs(
     include: Sequence[str] = (),
     exclude: Sequence[str] = (),
     skip: Sequence[str | Path] = (),
+    notes: list[str] | None = None,
 ) -> list[Pair]:
     """Pair the images of two files, folders or patterns.
 
@@ -147,7 +171,7 @@ def pair_inputs(
         name: the same name, or the same once left and right marks are taken away (left/right, l/r, L1/R1,
         im0/im1, image_2/image_3, ...), in folder names too.
         order: the first with the first, in natural order.
-    recursive, include, exclude, skip
+    recursive, include, exclude, skip, notes
         As in `find_inputs`.
 
     Returns
@@ -162,7 +186,13 @@ def pair_inputs(
     """
     lefts, rights = (
         find_inputs(
-            [side], recursive=recursive, include=include, exclude=exclude, skip=skip, endings=IMAGE_ENDINGS
+            [side],
+            recursive=recursive,
+            include=include,
+            exclude=exclude,
+            skip=skip,
+            endings=IMAGE_ENDINGS,
+            notes=notes,
         )
         for side in (left, right)
     )
@@ -237,7 +267,13 @@ def _stdin_lines(stdin: Iterable[str] | None) -> Iterator[str]:
     if stdin is None:
         if sys.stdin is None:
             raise UsageError("-: stdin is closed; nothing can be read from it")
-        return _lines(as_utf8(read_stream(sys.stdin.buffer, "-", MOST_LISTED), "-"))
+        data = read_stream(sys.stdin.buffer, "-", MOST_LISTED)
+        if data.startswith(_NO_TEXT):
+            raise UsageError(
+                "-: stands for a list of files on stdin, one a line; what came is an image or an archive: "
+                "name its file in place of -"
+            )
+        return _lines(as_utf8(data, "-"))
     return (name for line in stdin if (name := line.rstrip("\r\n")))
 
 

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from pathlib import PurePosixPath
 
 from rollcli.errors import UsageError
+from rollcli.files.containers import frame_name
 from rollcli.files.inputs import IMAGE_ENDINGS, MAP_ENDINGS
 from rollcli.files.naming import listed
 
@@ -13,7 +14,7 @@ _ENDINGS = {*MAP_ENDINGS, *IMAGE_ENDINGS}
 
 def stem_of(name: str) -> str:
     """Cut folders and ending off a frame's name; a table may leave out both."""
-    path = PurePosixPath(name.replace("\\", "/"))
+    path = PurePosixPath(frame_name(name).replace("\\", "/"))
     return path.stem if path.suffix.lower() in _ENDINGS else path.name
 
 

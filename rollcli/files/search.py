@@ -5,12 +5,15 @@ import glob
 import os
 import posixpath
 import re
+import shlex
 import stat
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from rollcli.errors import UsageError
-from rollcli.files.atomic import is_folder
+from rollcli.files.atomic import is_file, is_folder
+from rollcli.files.containers import frame_name, is_archive, members, refuse_packed
 from rollcli.files.stores.locations import (
     OBJECT_STORES,
     base_name,
@@ -22,7 +25,7 @@ from rollcli.files.stores.locations import (
 from rollcli.files.stores.objects import has_objects, list_objects
 
 _OF_FILES = (
-    *(".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm", ".npy", ".pfm"),
+    *(".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm", ".npy", ".npz", ".pfm", ".exr"),
     *(".csv", ".jsonl", ".parquet", ".txt", ".json", ".yaml", ".yml", ".xml", ".toml"),
 )
 _MAGIC = re.compile(r"[*?[]")
@@ -94,6 +97,11 @@ def _hidden(relative: str) -> bool:
 
 _NOWHERE = (0, 0)
 _LOOKED_AT = 1000  # names of a folder without inputs, to say what it holds
+_SIDES = (
+    {"left", "im0", "image_2", "image_02", "image_0", "image_00"},
+    {"right", "im1", "image_3", "image_03", "image_1", "image_01"},
+)
+_PHOTOGRAPHS = (".png", ".tif", ".tiff")  # of what is read as maps, what may be photographs, too
 
 
 class Search:
@@ -109,6 +117,13 @@ class Search:
         Globs on names and relative paths.
     skip : sequence of path
         Folders that are never searched: results go there.
+    maps : bool
+        Maps are looked for: what are the two views of pairs is never taken for such.
+
+    Attributes
+    ----------
+    left_out : Counter of str
+        How many files the folders hold that are not read, by their endings.
     """
 
     def __init__(
@@ -118,7 +133,10 @@ class Search:
         include: Sequence[str] = (),
         exclude: Sequence[str] = (),
         skip: Sequence[str | Path] = (),
+        maps: bool = False,
     ) -> None:
+        self.left_out: Counter[str] = Counter()
+        self._maps = maps
         self._endings = tuple(endings)
         self._recursive = recursive
         self._include, self._exclude = tuple(include), tuple(exclude)
@@ -148,18 +166,23 @@ class Search:
         if is_folder(path):
             return self._wanted(argument, self._in_folder(path), "folder")
         if literal or not glob.has_magic(argument) or os.path.lexists(path):
-            return iter([(argument, path.name)])
+            refuse_packed(argument)
+            if is_archive(argument) and is_file(path):
+                return self._wanted(argument, self._in_archive(argument), "archive")
+            return iter([(argument, frame_name(path.name) if "#" in argument else path.name)])
         return self._wanted(argument, self._in_pattern(argument), "pattern")
 
     def _wanted(
         self, argument: str, files: Iterator[tuple[str, str]], kind: str
     ) -> Iterator[tuple[str, str]]:
         """Yield the files that --include and --exclude allow; finding none is an error."""
-        none = True
+        none, views = True, _Views(argument) if self._maps and kind != "pattern" else None
         for path, relative in files:
-            names = (relative, os.path.basename(path))  # noqa: PTH119 (URLs are no paths)
+            names = (relative, posixpath.basename(relative))
             if (not self._include or _match(names, self._include)) and not _match(names, self._exclude):
                 none = False
+                if views is not None:
+                    views.refuse(relative)
                 yield path, relative
         if none:
             hint = "" if kind == "pattern" else self._in_place_of_inputs(argument)
@@ -173,6 +196,10 @@ class Search:
         endings = {Path(name).suffix.lower() for name in names[:_LOOKED_AT]} - {"", *self._endings}
         hint = f"; it holds {' '.join(sorted(endings)[:3])} files" if endings else ""
         inner = any(is_folder(Path(folder, name)) for name in names[:_LOOKED_AT])
+        lower = {name.lower(): name for name in names}
+        left, right = (next((lower[name] for name in sorted(side) if name in lower), "") for side in _SIDES)
+        if left and right:
+            return hint + f"; {_as_pairs(f'{folder}/{left}', f'{folder}/{right}')}"
         return hint + ("; --recursive searches its folders" if inner and not self._recursive else "")
 
     def _in_folder(self, folder: Path) -> Iterator[tuple[str, str]]:
@@ -194,15 +221,29 @@ class Search:
                 mode = stat.S_IFREG if entry.is_file(follow_symlinks=False) else _mode(entry.path)
                 if stat.S_ISDIR(mode):
                     inner.append(entry.path)
-                elif self._reads(entry.name) and stat.S_ISREG(mode):
+                elif stat.S_ISREG(mode):
                     path = entry.path.removeprefix(f"{os.curdir}{os.sep}")
-                    yield path, path[cut:].replace(os.sep, "/")
+                    relative = path[cut:].replace(os.sep, "/")
+                    if self._reads(entry.name):
+                        yield path, relative
+                    elif self._recursive and is_archive(path):
+                        yield from ((each, f"{relative}/{below}") for each, below in self._in_archive(path))
+                    else:
+                        self.left_out[Path(entry.name).suffix.lower()] += 1
             opened = []
             for each in sorted(inner) if self._recursive else ():
                 if (identity := _identity(each)) not in closed:
                     closed.add(identity)
                     opened.append(each)
             waiting += reversed(opened)
+
+    def _in_archive(self, path: str) -> Iterator[tuple[str, str]]:
+        """Yield readable members; all of its folders, for nobody sees which there are."""
+        for location, name in members(path):
+            if self._reads(name):
+                yield location, name
+            else:
+                self.left_out[posixpath.splitext(name)[1].lower()] += 1
 
     def _in_pattern(self, pattern: str) -> Iterator[tuple[str, str]]:
         """Yield the files that match; unless the pattern names an ending, only readable ones."""
@@ -215,7 +256,11 @@ class Search:
             inside = {os.path.realpath(base / parent) for parent in relative.parents[:-1]}
             wanted = at_its_word or self._reads(match)
             if wanted and self._skip.isdisjoint(inside) and stat.S_ISREG(_mode(match)):
-                yield str(path), _below(relative).as_posix()
+                below = _below(relative).as_posix()
+                if is_archive(match):
+                    yield from ((each, f"{below}/{name}") for each, name in self._in_archive(str(path)))
+                else:
+                    yield str(path), below
 
     def _behind_url(self, url: str, *, literal: bool) -> Iterator[tuple[str, str]]:
         """Yield the objects behind a URL: one, or those of a prefix or pattern that are readable."""
@@ -231,6 +276,48 @@ class Search:
 
     def _reads(self, name: str) -> bool:
         return name.lower().endswith(self._endings)
+
+
+class _Views:
+    """Notices that what a folder holds are the two views of pairs, not maps."""
+
+    def __init__(self, folder: str) -> None:
+        self._folder = folder.rstrip("/")
+        self._sides: dict[str, tuple[int, str]] = {}  # of places that are the same but for the side
+
+    def refuse(self, relative: str) -> None:
+        """Take in a file.
+
+        Raises
+        ------
+        UsageError
+            Its place, but for the side, is that of a file before it.
+        """
+        stem, ending = posixpath.splitext(relative)
+        if ending.lower() not in _PHOTOGRAPHS:
+            return
+        folders, name = stem.split("/")[:-1], stem.rpartition("/")[2]
+        before, _, mark = name.rpartition(".")
+        self._compare("/".join([*folders, before, "*"]), mark, "/".join(folders))
+        for place, part in enumerate(folders):
+            self._compare("/".join([*folders[:place], "*"]), part, "/".join(folders[: place + 1]))
+
+    def _compare(self, key: str, mark: str, folder: str) -> None:
+        side = next((each for each in (0, 1) if mark.lower() in _SIDES[each]), None)
+        if side is None:
+            return
+        other, there = self._sides.setdefault(key, (side, folder))
+        if other != side:
+            left, right = (there, folder) if side == 1 else (folder, there)
+            join = "" if is_archive(self._folder) else "/"
+            left, right = (f"{self._folder}{join and f'/{each}'}".rstrip("/") for each in (left, right))
+            raise UsageError(f"{self._folder}: {_as_pairs(left, right)}")
+
+
+def _as_pairs(left: str, right: str) -> str:
+    """Say what to type for pairs; they are not taken as such, since scripts should say which they mean."""
+    command = shlex.join(["--left", left, "--right", right])
+    return f"it holds the left and right views of pairs: give {command}; or name its maps alone"
 
 
 def _match(names: tuple[str, str], patterns: tuple[str, ...]) -> bool:

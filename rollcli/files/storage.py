@@ -13,6 +13,7 @@ from pathlib import Path
 from rollcli.errors import InputError, OutputError
 from rollcli.files.atomic import NameTakenError, output_error, write_atomic
 from rollcli.files.bounded import MOST_BYTES, too_large
+from rollcli.files.containers import read_member
 from rollcli.files.stores.locations import WEB_SERVERS, is_url, public_name, scheme_of
 from rollcli.files.stores.objects import (
     create_object,
@@ -42,7 +43,7 @@ def read_bytes(
     Parameters
     ----------
     location : str or Path
-        A path, or a URL of s3, gs, az, http or https.
+        A path, a frame inside of a file (see `containers`), or a URL of s3, gs, az, http or https.
     name : str, optional
         What errors call it; by default the location, without secrets.
     most : int
@@ -58,7 +59,11 @@ def read_bytes(
     """
     location = str(location)
     name = name or public_name(location)
-    data = _read_url(location, most) if is_url(location) else _read_file(location, name, most, begins)
+    if is_url(location):
+        data = _read_url(location, most)
+    else:
+        inside = read_member(location, name, most) if "#" in location else None
+        data = _read_file(location, name, most, begins) if inside is None else inside
     if not data:
         raise InputError(f"{name}: is empty")
     return data

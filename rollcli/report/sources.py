@@ -7,6 +7,7 @@ from pathlib import Path, PurePosixPath
 
 from rollcli.errors import UsageError
 from rollcli.files.atomic import is_file, is_folder, is_there
+from rollcli.files.containers import frame_name
 from rollcli.files.inputs import MAP_ENDINGS
 from rollcli.files.naming import listed
 from rollcli.files.results import Row
@@ -221,7 +222,7 @@ def _folders(kind: str, images: _ImageFolder, recorded: str | None) -> Iterator[
 
 def _tails(file: str) -> Iterator[str]:
     """Yield the path without its ending, then without its first folder, and so on."""
-    path = PurePosixPath(file)
+    path = PurePosixPath(frame_name(file))
     parts = path.with_suffix("").parts if path.name else ()  # "/" and "." name no file
     for first in range(1 if path.is_absolute() else 0, len(parts)):
         if ".." not in parts[first:]:  # which would lead out of the folder of images

@@ -6,6 +6,7 @@ from pathlib import Path, PurePosixPath
 
 from rollcli.errors import InputError, UsageError
 from rollcli.files.atomic import is_file
+from rollcli.files.containers import frame_name
 from rollcli.files.search import is_place, objects_behind
 from rollcli.files.storage import fetch_all, read_bytes
 from rollcli.files.stores.locations import is_url, public_name
@@ -89,7 +90,7 @@ class Calibrations:
         """Return the calibration of a frame: of its stem, or of the stem up to one of its underscores."""
         if self._by_stem is None:
             return self._one
-        folder, stem = self._given.calib[0], PurePosixPath(name).stem
+        folder, stem = self._given.calib[0], PurePosixPath(frame_name(name)).stem
         shorter = stem  # KITTI's 000010.txt is for 000010_10.png
         while shorter not in self._by_stem:
             shorter = shorter.rpartition("_")[0]
@@ -130,7 +131,9 @@ def check_first_size(frames: Sequence[Frame], options: FrameOptions) -> None:
         if first.right_file:
             height, width = read_image(options.at(first.path), first.file).shape[:2]
         else:
-            height, width = read_stored(options.at(first.path), first.file).values.shape
+            height, width = read_stored(
+                options.at(first.path), first.file, rgb=options.encoding.encoding == "foundationstereo"
+            ).values.shape
     except InputError:
         return  # its row will say so
     first.calibration.for_size(width, height)

@@ -7,6 +7,7 @@ from functools import partial
 
 from rollcli.errors import ExitStatus
 from rollcli.files.atomic import remove_leftovers
+from rollcli.files.containers import file_of
 from rollcli.files.results import Row
 from rollcli.files.stores.locations import tasks_in_hand
 from rollcli.run.find import check_one_owner, check_places, check_writes, list_files
@@ -106,7 +107,7 @@ def _results(
 ) -> Generator[FrameResult, None, None]:
     """Yield the result of each conversion from whichever workers were asked for."""
     sample = (*conversions[:1], *conversions[-1:])
-    files = tuple(path for each in sample for path in each.frame.reads())
+    files = tuple(file_of(path) for each in sample for path in each.frame.reads())
     shared = SharedPaths(files, (folder,))
     workers = Workers(running.jobs, running.scheduler, shared, threads=tasks_in_hand((*files, folder)))
     work = Work(do, partial(_lost, replaces=running.overwrite), lambda each: remove_leftovers(each.writes))

@@ -32,7 +32,7 @@ def run_derotate(options: DerotateOptions) -> ExitStatus:
         raise UsageError("give either --roll, one angle for all maps, or --from, a result with one for each")
     if rotation.skip_suspect and rotation.result is None:
         raise UsageError("--skip-suspect needs --from: one angle for all maps is not doubted")
-    frames = map_frames(options.inputs, skip=[options.output])
+    frames = map_frames(options.inputs, skip=[options.output], quiet=running.quiet)
     conversions = list(_conversions(frames, options))
     read = FrameOptions(encoding=options.encoding, root=running.root, replaces=running.overwrite)
     do = partial(_derotate, options=read, expand=rotation.expand)
@@ -66,7 +66,10 @@ def _derotate(conversion: Conversion, options: FrameOptions, expand: bool) -> Fr
 def run_disparity(options: DisparityOptions) -> ExitStatus:
     """Match every pair."""
     frames = pair_frames(
-        options.inputs, options.pairs, skip=[*filter(None, [options.output, options.preview])]
+        options.inputs,
+        options.pairs,
+        skip=[*filter(None, [options.output, options.preview])],
+        quiet=options.running.quiet,
     )
     conversions = [Conversion(frame, _disparity_writes(frame, options)) for frame in frames]
     read = FrameOptions(
@@ -102,7 +105,9 @@ def run_vdisparity(options: VDisparityOptions) -> ExitStatus:
             raise UsageError("--counts goes with the picture: give it without --figure")
     elif count.result is not None:
         raise UsageError("--from is for --figure: a picture shows the map as it is")
-    frames = map_frames(options.inputs, calibration=options.calibration, skip=[options.output])
+    frames = map_frames(
+        options.inputs, calibration=options.calibration, skip=[options.output], quiet=running.quiet
+    )
     check_depth(frames, options.encoding)
     conversions = list(_vdisparity_conversions(frames, options))
     read = FrameOptions(encoding=options.encoding, root=running.root, replaces=running.overwrite)

@@ -37,8 +37,8 @@ def derotate_map(conversion: Conversion, options: FrameOptions, expand: bool) ->
 
     def make(source: Source) -> dict[str, bytes]:
         assert source.stored is not None  # a map, not a pair
-        invalid = options.encoding.invalid
-        data = encode_turned(source.stored, conversion.roll, source.encoding, invalid, expand=expand)
+        given = options.encoding
+        data = encode_turned(source.stored, conversion.roll, source.encoding, given, expand=expand)
         return {options.at(conversion.writes[0]): data}
 
     return _convert(conversion, options, make)

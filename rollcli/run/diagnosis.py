@@ -102,7 +102,7 @@ def require_positive(stored: Stored, name: str) -> None:
     if negative.size and negative.min() < (top := negative.max()):
         raise InputError(
             f"{name}: every number is negative, {negative.min():g} to {top:g}: is the map stored with the "
-            "other sign? Negate its numbers"
+            "other sign? Give --scale -1"
         )
 
 

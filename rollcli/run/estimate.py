@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 from rollcli.errors import ClusterError, ExitStatus, OutputError, WorkerError
 from rollcli.files.atomic import is_file
+from rollcli.files.containers import file_of
 from rollcli.files.results import run_path
 from rollcli.files.stores.locations import is_url, tasks_in_hand
 from rollcli.files.stream import STDOUT
@@ -209,7 +210,7 @@ def _results(frames: Sequence[Frame], run: _Run, retry_of: str = "") -> Iterator
     )
     sample = (*frames[:1], *frames[-1:])
     shared = SharedPaths(
-        files=tuple(path for frame in sample for path in frame.reads()),
+        files=tuple(file_of(path) for frame in sample for path in frame.reads()),
         folders=tuple(folder for _, folder in options.images.folders()),
     )
     threads = tasks_in_hand((*shared.files, *shared.folders))

@@ -12,12 +12,14 @@ from unicodedata import normalize
 from rollcli.errors import UsageError
 from rollcli.files import storage
 from rollcli.files.atomic import is_file, is_folder
+from rollcli.files.containers import file_of, frame_name, shown
 from rollcli.files.inputs import Input, find_inputs, named_input, pair_inputs
 from rollcli.files.manifest import Manifest
 from rollcli.files.search import is_place
 from rollcli.files.stores.locations import is_object_url, is_url, names_a_file, public_name, split_url
 from rollcli.files.stores.objects import list_objects
 from rollcli.files.stream import write_stdout
+from rollcli.messages import say
 from rollcli.rig.calibration import CalibrationOptions
 from rollcli.run.calibration import Calibrations
 from rollcli.run.frame import Frame
@@ -109,11 +111,11 @@ def check_inputs_are_kept(reads: Callable[[], Iterable[str]], writes: Iterable[s
     UsageError
         Names the file.
     """
-    folders = {_real_folder(_split(path)[0]) for path in reads()}
+    folders = {_real_folder(_split(file_of(path))[0]) for path in reads()}
     # only what is written beside an input can replace one
     written = {_place(path) for path in writes if _real_folder(_split(path)[0]) in folders}
     for path in reads() if written else ():
-        if _place(path) in written:
+        if _place(file_of(path)) in written:
             raise UsageError(f"{path}: would be replaced by an output; write somewhere else")
 
 
@@ -151,7 +153,7 @@ class _Existing:
 def list_files(frames: Iterable[tuple[Iterable[str], Iterable[str]]]) -> None:
     """Print what would be read and written, a line each; `frames` holds (reads, writes)."""
     lines = (
-        f"{does} {public_name(path)}\n"
+        f"{does} {shown(public_name(path))}\n"
         for reads, writes in frames
         for does, paths in (("read ", reads), ("write", writes))
         for path in paths
@@ -213,8 +215,11 @@ def map_frames(
     region: RegionOptions | None = None,
     calibration: CalibrationOptions | None = None,
     skip: Sequence[str] = (),
+    quiet: bool = True,
 ) -> Sequence[Frame]:
     """Make a frame of each map; `skip` holds the output folders, which are not searched.
+
+    Unless `quiet`, a line says what the folders hold beside what is read.
 
     Raises
     ------
@@ -226,6 +231,7 @@ def map_frames(
     if not (given.inputs or given.files_from):
         raise UsageError("no input: name maps (files, folders, patterns, or - for a list on stdin)")
     masks, calibrations = _Masks(region), Calibrations(calibration or CalibrationOptions())
+    notes: list[str] = []
     found = find_inputs(
         given.inputs,
         files_from=given.files_from,
@@ -233,8 +239,16 @@ def map_frames(
         include=given.include,
         exclude=given.exclude,
         skip=skip,
+        maps=True,
+        notes=notes,
     )
+    _say(notes, quiet=quiet)
     return [_frame(each, None, masks, calibrations) for each in found]
+
+
+def _say(notes: Iterable[str], *, quiet: bool) -> None:
+    for note in () if quiet else dict.fromkeys(notes):
+        say(note)
 
 
 def _sorted_frames(
@@ -287,6 +301,7 @@ def pair_frames(
     region: RegionOptions | None = None,
     calibration: CalibrationOptions | None = None,
     skip: Sequence[str] = (),
+    quiet: bool = True,
 ) -> list[Frame]:
     """Make a frame of each stereo pair; `skip` holds the output folders, which are not searched.
 
@@ -298,6 +313,7 @@ def pair_frames(
     if pairs.left is None or pairs.right is None:
         raise UsageError("--left and --right are given together")
     masks, calibrations = _Masks(region), Calibrations(calibration or CalibrationOptions())
+    notes: list[str] = []
     found = pair_inputs(
         pairs.left,
         pairs.right,
@@ -306,7 +322,9 @@ def pair_frames(
         include=given.include,
         exclude=given.exclude,
         skip=skip,
+        notes=notes,
     )
+    _say(notes, quiet=quiet)
     return [_frame(pair.left, pair.right, masks, calibrations) for pair in found]
 
 
@@ -316,10 +334,16 @@ def _frame(left: Input, right: Input | None, masks: "_Masks", calibrations: Cali
         right_file=right.name if right else "",
         path=left.location,
         right_path=right.location if right else "",
-        relative=left.relative if not is_url(left.location) or names_a_file(left.relative) else "",
+        relative=left.relative if _is_safe(left) else "",
         mask=masks.of(left),
         calibration=calibrations.of(left.name),
     )
+
+
+def _is_safe(each: Input) -> bool:
+    """Tell whether what is made of an input stays in its folder, whatever a store or an archive calls it."""
+    foreign = is_url(each.location) or file_of(each.location) != each.location
+    return not foreign or names_a_file(each.relative)
 
 
 class _Masks:
@@ -329,7 +353,7 @@ class _Masks:
         self.one, self.by_stem = region.mask if region else None, None
         if self.one is not None and is_place(self.one):
             found = find_inputs([self.one], recursive=True)
-            self.by_stem = {Path(each.name).stem: each.location for each in found}
+            self.by_stem = {Path(frame_name(each.name)).stem: each.location for each in found}
         elif self.one is not None and not (is_url(self.one) or is_file(self.one)):
             raise UsageError(f"{self.one}: no such mask file or folder")
 
@@ -338,6 +362,6 @@ class _Masks:
         if self.by_stem is None:
             return self.one
         try:
-            return self.by_stem[PurePath(left.name).stem]
+            return self.by_stem[PurePath(frame_name(left.name)).stem]
         except KeyError:
             raise UsageError(f"{left.name}: has no mask of its name in {self.one}") from None

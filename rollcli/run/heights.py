@@ -19,7 +19,7 @@ from rollcli.run.result_rows import rows_of
 def run_heights(options: HeightsOptions) -> ExitStatus:
     """Write the heights of every map."""
     running, skip = options.running, [*filter(None, [options.output, options.preview])]
-    frames = map_frames(options.inputs, calibration=options.calibration, skip=skip)
+    frames = map_frames(options.inputs, calibration=options.calibration, skip=skip, quiet=running.quiet)
     check_depth(frames, options.encoding)
     rows = rows_of(frames, options.result, skip_suspect=options.skip_suspect, quiet=running.quiet)
     _tell_unit(frames, rows, options)

@@ -1,6 +1,5 @@
 """Draw, encode and write the images of a frame."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -21,7 +20,7 @@ from rollcli.pictures.vdisparity import draw_v_disparity, row_offset, v_disparit
 from rollcli.rig.calibration import Calibration
 from rollcli.rig.pose import horizon_row
 from rollcli.run.frame import Frame
-from rollcli.run.options import FrameOptions
+from rollcli.run.options import EncodingOptions, FrameOptions
 from rollcli.run.outputs import image_paths, roomy_path
 from rollcli.run.read import Source
 
@@ -68,14 +67,18 @@ def encode_images(frame: Frame, pictured: Pictured) -> tuple[dict[str, bytes], s
 
 
 def encode_turned(
-    stored: Stored, roll: float, encoding: str, invalid: Iterable[float], *, expand: bool = False
+    stored: Stored, roll: float, encoding: str, given: EncodingOptions, *, expand: bool = False
 ) -> bytes:
     """Rotate a map by `roll` radians, and encode it in its own type, encoding and format."""
-    no_data = [*invalid, *stored.nodata]
+    sign = -1 if given.scale is not None and given.scale < 0 else 1
+    no_data = [sign * each for each in (*given.invalid, *stored.nodata)]
     if encoding == Encoding.CITYSCAPES:
         no_data.append(1)  # (1 - 1) / 256 is a disparity of 0
-    turned = derotate(stored.values, roll, expand=expand, invalid=no_data)
-    return encode_stored(turned, stored.format, stored.nodata)
+    values = stored.values
+    if sign < 0:  # positive numbers are data to the rotation; whole ones get room for their lowest
+        values = -(values if values.dtype.kind == "f" else values.astype(np.int64))
+    turned = sign * derotate(values, roll, expand=expand, invalid=no_data)
+    return encode_stored(turned.astype(stored.values.dtype, copy=False), stored.format, stored.nodata)
 
 
 def encode_computed(path: str, disparity: NDArray[Any], save_as: str, text: str = "") -> tuple[str, bytes]:
@@ -111,7 +114,7 @@ def _derotated(path: str, of: Pictured) -> _Named:
     source, theta = of.source, of.estimate.theta
     if source.stored is None:
         return encode_computed(path, derotate(source.shown, theta), of.options.images.save_as)
-    return path, encode_turned(source.stored, theta, source.encoding, of.options.encoding.invalid)
+    return path, encode_turned(source.stored, theta, source.encoding, of.options.encoding)
 
 
 def _v_disparity(path: str, of: Pictured) -> _Named:

@@ -108,7 +108,7 @@ def _images(frames: Iterable[Frame], options: EstimateOptions) -> Iterator[str]:
 
 
 def _find_frames(options: EstimateOptions) -> Sequence[Frame]:
-    given, pairs = options.inputs, options.pairs
+    given, pairs, quiet = options.inputs, options.pairs, options.running.quiet
     skip = [folder for _, folder in options.images.folders()]
     named, paired = bool(given.inputs or given.files_from), bool(pairs.left or pairs.right)
     if named and paired:
@@ -120,7 +120,9 @@ def _find_frames(options: EstimateOptions) -> Sequence[Frame]:
     if paired and given.sorted:
         raise UsageError("--sorted takes a list of maps, not --left and --right")
     if paired:
-        return pair_frames(given, pairs, region=options.region, calibration=options.calibration, skip=skip)
+        return pair_frames(
+            given, pairs, region=options.region, calibration=options.calibration, skip=skip, quiet=quiet
+        )
     if options.images.disparity is not None:
         raise UsageError("--disparity writes maps computed from --left and --right; here maps are the input")
-    return map_frames(given, region=options.region, calibration=options.calibration, skip=skip)
+    return map_frames(given, region=options.region, calibration=options.calibration, skip=skip, quiet=quiet)

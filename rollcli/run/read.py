@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rollcli.errors import InputError
 from rollcli.estimator.road.find import first_row_of_road
-from rollcli.files.encodings import read_mask, to_disparity
+from rollcli.files.encodings import Encoding, read_mask, to_disparity
 from rollcli.files.formats import Stored, read_image, read_stored
 from rollcli.files.results import ALIGNMENT_COLUMNS
 from rollcli.run.diagnosis import require_positive, too_large
@@ -164,7 +164,10 @@ def read_source(frame: Frame, options: FrameOptions) -> Source:
         A file cannot be read as what it should be, or no pixel may be used.
     """
     if not frame.relative:
-        raise InputError(f"{frame.file}: its URL names no file, by which what is made of it could be named")
+        raise InputError(
+            f"{frame.file}: its name in the store or archive names no file below a folder, by which "
+            "what is made of it could be named"
+        )
     if frame.right_file:
         return _match(frame, options)
     source = _read(frame, options)
@@ -173,9 +176,10 @@ def read_source(frame: Frame, options: FrameOptions) -> Source:
 
 
 def _read(frame: Frame, options: FrameOptions) -> Source:
-    stored = read_stored(options.at(frame.path), frame.file)
-    require_positive(stored, frame.file)
     given = options.encoding
+    stored = read_stored(options.at(frame.path), frame.file, rgb=given.encoding == Encoding.FOUNDATIONSTEREO)
+    if given.scale is None or given.scale > 0:
+        require_positive(stored, frame.file)
     found = to_disparity(
         stored,
         encoding=given.encoding,

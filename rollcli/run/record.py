@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 from rollcli import __version__
 from rollcli.errors import InputError, UsageError
 from rollcli.files.atomic import look_at
+from rollcli.files.containers import file_of
 from rollcli.files.results import run_path
 from rollcli.files.storage import owner_of, write_bytes
 from rollcli.files.stores.locations import is_url, public_name
@@ -53,11 +54,11 @@ def fingerprint(frames: Sequence[Frame], unknown: Collection[str] = ()) -> dict[
     left_out = set(unknown)
     for frame in frames:
         names.update(os.fsencode(f"{frame.file}\0{frame.right_file}\0"))
-        for path in frame.reads():
+        for path in map(file_of, frame.reads()):
             if path in left_out:
                 continue
             state = shared[path] if path in shared else _state(path)
-            if path == frame.mask:
+            if path == frame.mask or path != frame.path:  # an archive holds many frames
                 shared[path] = state
             if state is None:
                 left_out.add(path)
@@ -69,7 +70,7 @@ def fingerprint(frames: Sequence[Frame], unknown: Collection[str] = ()) -> dict[
 
 def changed_input(frames: Sequence[Frame], since_ns: int) -> str | None:
     """Find the first file that is missing, or newer than a time in nanoseconds."""
-    for path in (path for frame in frames for path in frame.reads()):
+    for path in dict.fromkeys(file_of(path) for frame in frames for path in frame.reads()):
         if is_url(path):
             continue
         try:

@@ -132,8 +132,9 @@ def idle_in_disparity(options: DisparityOptions) -> Iterator[Idle]:
 
 def idle_in_derotate(options: DerotateOptions) -> Iterator[Idle]:
     """Yield the options without effect on a run of `derotate`."""
-    yield Idle(("scale",), "rotated maps keep their stored numbers")
-    if options.encoding.encoding != "cityscapes":  # where a stored 1 is no data
+    if options.encoding.scale is None or options.encoding.scale > 0:
+        yield Idle(("scale",), "rotated maps keep their stored numbers")
+    if options.encoding.encoding not in ("cityscapes", "foundationstereo"):  # where a stored 1 is no data
         yield Idle(("encoding",), "rotated maps keep their stored numbers")
     yield from idle_folders(options.inputs, PairOptions())
     yield from idle_running(options.running)

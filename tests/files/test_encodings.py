@@ -57,9 +57,9 @@ def test_a_scale_stands_in_for_the_encoding():
     assert pixels([0, 9], "u2", encoding="cityscapes", scale=0.25) == [0, 2]
 
 
-@pytest.mark.parametrize("scale", [0, -1, float("nan"), float("inf")])
+@pytest.mark.parametrize("scale", [0, float("nan"), float("inf")])
 def test_a_scale_that_is_no_factor_is_refused(scale):
-    with pytest.raises(UsageError, match="must be a positive number"):
+    with pytest.raises(UsageError, match="must be a number other than 0"):
         to_disparity(stored([1], "f4"), scale=scale)
 
 

@@ -58,18 +58,21 @@ def test_names_of_any_alphabet_are_read(tmp_path):
     ("content", "reason"),
     [
         (b"", "is empty"),
-        (b"frame,roll\n1,2\n", r"is text; a disparity map is a PNG, TIFF, NPY or PFM file"),
+        (b"frame,roll\n1,2\n", r"is text; a disparity map is a PNG, TIFF, NPY, NPZ, PFM or EXR file"),
         (b"\x89PN", "is only 3 bytes long; "),
         (b"abcdefg", "is only 7 bytes long; "),
-        (b"abcdefgh", "is text; a disparity map is a PNG, TIFF, NPY or PFM file$"),
-        (b"abcdefg\0", "is no file of a known format; a disparity map is a PNG, TIFF, NPY or PFM file$"),
+        (b"abcdefgh", "is text; a disparity map is a PNG, TIFF, NPY, NPZ, PFM or EXR file$"),
+        (
+            b"abcdefg\0",
+            "is no file of a known format; a disparity map is a PNG, TIFF, NPY, NPZ, PFM or EXR file$",
+        ),
         (bytes(1000), "is no file of a known format"),
         (
             b"\xff\xd8\xff\xe0" + bytes(100),
             "is a JPEG image; .*; photographs are given by --left and --right$",
         ),
         (b"BM" + bytes(100), "is a BMP image; .*; photographs are given by --left and --right$"),
-        (b"PK\x03\x04" + bytes(100), "is a ZIP or NPZ archive"),
+        (b"PK\x03\x04" + bytes(100), "is a damaged ZIP or NPZ archive"),
         (b"GIF89a" + bytes(100), "is a GIF image"),
     ],
 )

@@ -104,7 +104,9 @@ def test_three_in_a_hundred_beyond_the_width_are_enough_to_tell():
 def test_a_map_of_negative_numbers_is_asked_for_its_sign(empty):
     values = -road_map()
     values[:10] = empty
-    with pytest.raises(InputError, match=r"a.npy: every number is negative, -5\d.* other sign\? Negate"):
+    with pytest.raises(
+        InputError, match=r"a.npy: every number is negative, -5\d.* other sign\? Give --scale -1"
+    ):
         require_positive(Stored(values, "npy"), "a.npy")
 
 

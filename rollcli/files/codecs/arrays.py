@@ -1,17 +1,22 @@
-"""NPY files, and portable float maps [http://www.pauldebevec.com/Research/HDR/PFM/]."""
+"""NPY and NPZ files, and portable float maps [http://www.pauldebevec.com/Research/HDR/PFM/]."""
 
 import io
 import math
 import re
+import zipfile
+import zlib
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError, OutputError
+from rollcli.files.bounded import most_unpacked
 from rollcli.files.codecs.raw_map import require_decoded_fits, require_map_shape
 
 MAGIC = b"\x93NUMPY"
+MAGIC_NPZ = b"PK\x03\x04"
+_NAMED = "disparity.npy"  # the array of an NPZ that is taken where there are several
 _MAX_HEADER = 10_000
 # Not ast.literal_eval, as NumPy has it: that warns on the terminal, and bounds neither time nor memory
 _ENTRIES = {
@@ -28,7 +33,10 @@ _UNREAL = {
 
 
 def decode_npy(data: bytes, name: str) -> NDArray[Any]:
-    """Return the array of an .npy file: real numbers or booleans, shape (H, W), any byte and axis order."""
+    """Return the array of an .npy file: real numbers or booleans, shape (H, W), any byte and axis order.
+
+    (1, H, W) and (H, W, 1), as networks write them, are (H, W).
+    """
     dtype, fortran, shape, start = check_npy(data, len(data), name)
     values = np.frombuffer(data, dtype, count=math.prod(shape), offset=start)
     return values.reshape(shape, order="F" if fortran else "C")
@@ -43,6 +51,7 @@ def check_npy(head: bytes, size: int, name: str) -> tuple[np.dtype[Any], bool, t
         dtype, Fortran order, shape (H, W), and where the numbers start.
     """
     dtype, fortran, shape, start = _header(head, name)
+    shape = _without_single_axis(shape)
     require_map_shape(shape, name)
     needed, there = math.prod(shape) * dtype.itemsize, size - start
     if there < needed:
@@ -57,6 +66,46 @@ def encode_npy(values: NDArray[Any]) -> bytes:
     """Return an .npy file of the array."""
     buffer = io.BytesIO()
     np.lib.format.write_array(buffer, np.ascontiguousarray(values), allow_pickle=False)
+    return buffer.getvalue()
+
+
+def _without_single_axis(shape: tuple[int, ...]) -> tuple[int, ...]:
+    """Return (H, W) of an array with one axis of length 1 before or behind: its numbers lie as those do."""
+    if len(shape) == 3 and shape[0] == 1:
+        return shape[1:]
+    return shape[:2] if len(shape) == 3 and shape[2] == 1 else shape
+
+
+def decode_npz(data: bytes, name: str) -> NDArray[Any]:
+    """Return the one array of an .npz file, or of several the one named disparity; see `decode_npy`."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            held = {each.filename: each for each in archive.infolist() if each.filename.endswith(".npy")}
+            chosen = held.get(_NAMED) or (next(iter(held.values())) if len(held) == 1 else None)
+            if chosen is None:
+                names = ", ".join(each.removesuffix(".npy") for each in list(held)[:5]) or "none"
+                raise InputError(
+                    f"{name}: an NPZ map holds one array, or one of the name disparity; here: {names}"
+                )
+            most = most_unpacked(chosen.compress_size)
+            with archive.open(chosen) as file:
+                array = file.read(most + 1)
+    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, ValueError, OSError):
+        raise InputError(f"{name}: is a damaged ZIP or NPZ archive") from None
+    if len(array) > most:
+        raise InputError(
+            f"{name}: its array has more than {most >> 20} MB once unpacked; save it uncompressed"
+        )
+    if not array.startswith(MAGIC):
+        raise InputError(f"{name}: is a ZIP archive whose {chosen.filename} is no array")
+    return decode_npy(array, name)
+
+
+def encode_npz(values: NDArray[Any]) -> bytes:
+    """Return an .npz file with the array as disparity."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr(zipfile.ZipInfo(_NAMED), encode_npy(values), zipfile.ZIP_DEFLATED)
     return buffer.getvalue()
 
 

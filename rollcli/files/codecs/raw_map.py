@@ -8,14 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError
+from rollcli.files.bounded import MOST_EXPANSION, MOST_SMALL
 
 # A compressed file may claim any size in a few bytes. What it would take is counted before memory is taken:
 # as disparities in float32, or in the file's own numbers where these are larger. What is computed from a map
 # takes up to fifteen times as much (with every image), so that a file of 1 MB never takes 1 GB
 _FLOAT32 = 4
 _MOST = 2**29  # bytes: 134 million pixels
-_ALWAYS = 2**25  # bytes that a small file may stand for, 8 million pixels: an empty map compresses well
-_EXPANSION = 48  # bytes that each byte of a larger file may stand for; real maps reach 20
 
 COLOUR_REMEDY = "a disparity map has one channel; photographs are given by --left and --right"
 
@@ -32,7 +31,7 @@ class Stored:
     values : ndarray, shape (H, W)
         A real dtype in native byte order, C-contiguous; may be read-only.
     format : str
-        "png", "tiff", "npy" or "pfm".
+        "png", "tiff", "npy", "npz", "pfm", "exr", or "rgb" for numbers in the three channels of a PNG.
     nodata : tuple of float
         The stored values that the file itself says mean no data (GDAL's tag).
     note : str
@@ -79,7 +78,7 @@ def require_decoded_fits(
         Nothing is computed from it: it may stand for as much as any file, and masks compress best of all.
     """
     needed = width * height * (pixel_bytes if mask else max(pixel_bytes, _FLOAT32))
-    limit = _MOST if mask else min(_MOST, max(_ALWAYS, _EXPANSION * stored))
+    limit = _MOST if mask else min(_MOST, max(MOST_SMALL, MOST_EXPANSION * stored))
     hint = "; save it uncompressed" if needed <= _MOST else ""
     if needed > limit:
         raise InputError(

@@ -1,0 +1,183 @@
+"""Frames inside of one file: members of archives, and the names that frames of recordings have.
+
+A frame inside of a file is a path like any other, ``run.zip#maps/a.png``. Where it lies may stand
+behind, for a worker that reads it: ``run.tar#maps/a.png#@512+9000``; rows and lists leave that out (`shown`).
+Import-light.
+"""
+
+import os
+import re
+import tarfile
+import zipfile
+import zlib
+from collections.abc import Iterator
+from functools import lru_cache
+from pathlib import Path
+
+from rollcli.errors import InputError, UsageError
+from rollcli.files.bounded import most_unpacked, too_large
+from rollcli.files.stores.locations import is_url
+
+ARCHIVES = (".zip", ".tar")
+_PACKED = (".tar.gz", ".tgz", ".tar.xz", ".tar.bz2", ".tar.zst", ".7z", ".rar")
+_INSIDE = re.compile(r"(.*?\.(?:zip|tar))#(.*)", re.IGNORECASE | re.DOTALL)
+_POSITION = re.compile(r"#@([0-9]+)\+([0-9]+)$")
+
+
+def split_member(location: str) -> tuple[str, str] | None:
+    """Return the file that a frame lies in, and its name there; None for a file of its own."""
+    if "#" not in location or is_url(location):
+        return None
+    found = _INSIDE.fullmatch(location)
+    if found is None or os.path.lexists(location):  # a file may have any name
+        return None
+    return found[1], found[2]
+
+
+def file_of(location: str) -> str:
+    """Return the file on disk, or the URL, that holds a frame."""
+    member = split_member(location)
+    return location if member is None else member[0]
+
+
+def shown(location: str) -> str:
+    """Return a location without where its frame lies in the file."""
+    return _POSITION.sub("", location) if "#@" in location else location
+
+
+def frame_name(name: str) -> str:
+    """Return the name of a frame below its archive; any other name as it is."""
+    found = _INSIDE.fullmatch(name) if "#" in name else None
+    return name if found is None else found[2]
+
+
+def is_archive(location: str) -> bool:
+    """Tell whether this names an archive, which is read as a folder."""
+    return location.lower().endswith(ARCHIVES) and not is_url(location)
+
+
+def refuse_packed(location: str) -> None:
+    """Refuse an archive whose members cannot be read one by one.
+
+    Raises
+    ------
+    UsageError
+    """
+    if location.lower().endswith(_PACKED):
+        raise UsageError(
+            f"{location}: its members cannot be read one by one; unpack it, or pack it as .zip or .tar"
+        )
+
+
+def members(path: str) -> Iterator[tuple[str, str]]:
+    """Yield the location of each regular file in an archive, and its name there; not of hidden ones.
+
+    Raises
+    ------
+    UsageError
+        It is damaged, or cannot be read.
+    """
+    found = _tar_members(path) if path.lower().endswith(".tar") else _zip_members(path)
+    for name, position in found:
+        if not any(part.startswith((".", "__MACOSX")) and part != ".." for part in name.split("/")):
+            yield f"{path}#{name}{position}", name
+
+
+def _zip_members(path: str) -> Iterator[tuple[str, str]]:
+    try:
+        for each in _zip(path).infolist():
+            if not each.is_dir():
+                yield each.filename, ""
+    except InputError as error:
+        raise UsageError(str(error)) from None
+
+
+def _tar_members(path: str) -> Iterator[tuple[str, str]]:
+    try:
+        with tarfile.open(path, "r:") as archive:
+            for each in archive:
+                archive.members = []  # type: ignore[attr-defined]  # a shard may have a million of them
+                if each.isreg() and not each.issparse():
+                    yield each.name.removeprefix("./"), f"#@{each.offset_data}+{each.size}"
+    except (tarfile.TarError, ValueError, EOFError) as error:
+        raise UsageError(f"{path}: is a damaged archive: {str(error) or 'it ends too early'}") from None
+    except OSError as error:
+        raise UsageError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from None
+
+
+def read_member(location: str, name: str, most: int) -> bytes | None:
+    """Return the bytes of an archive's member; None where the location is a file of its own.
+
+    Raises
+    ------
+    InputError
+        It is not there, damaged, encrypted, or too large: beyond `most`, or for its packed bytes.
+    """
+    inside = split_member(location)
+    if inside is None:
+        return None
+    path, member = inside
+    try:
+        if path.lower().endswith(".tar"):
+            return _read_tar(path, member, name, most)
+        return _read_zip(path, member, name, most)
+    except OSError as error:
+        raise InputError(f"{name}: cannot be read: {(error.strerror or str(error)).lower()}") from None
+
+
+def _read_tar(path: str, member: str, name: str, most: int) -> bytes:
+    found = _POSITION.search(member)
+    if found is None:
+        try:
+            positions = dict(_tar_members(path))
+        except UsageError as error:
+            raise InputError(str(error)) from None
+        found = _POSITION.search(positions.get(member, ""))
+    if found is None:
+        raise InputError(f"{name}: no such file in {path}")
+    start, size = int(found[1]), int(found[2])
+    if size > most:
+        raise too_large(name, size, most)
+    with Path(path).open("rb") as file:
+        file.seek(start)
+        data = file.read(size)
+    if len(data) < size:
+        raise InputError(f"{name}: is truncated: {size} bytes lie in {path}, {len(data)} are there")
+    return data
+
+
+def _read_zip(path: str, member: str, name: str, most: int) -> bytes:
+    archive = _zip(path)
+    try:
+        each = archive.getinfo(member)
+    except KeyError:
+        raise InputError(f"{name}: no such file in {path}") from None
+    if each.flag_bits & 1:
+        raise InputError(f"{name}: is encrypted; unpack it")
+    if each.compress_type != zipfile.ZIP_STORED:
+        most = min(most, most_unpacked(each.compress_size))
+    if each.file_size > most:
+        raise too_large(name, each.file_size, most)
+    try:
+        with archive.open(each) as file:
+            data = file.read(most + 1)
+    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, ValueError) as error:
+        raise InputError(f"{name}: is damaged in {path}: {str(error) or 'it ends too early'}") from None
+    if len(data) > most:
+        raise too_large(name, None, most)
+    return data
+
+
+def _zip(path: str) -> zipfile.ZipFile:
+    try:
+        found = Path(path).stat()
+        return _opened_zip(path, found.st_size, found.st_mtime_ns)
+    except (zipfile.BadZipFile, ValueError, NotImplementedError):
+        raise InputError(f"{path}: is no ZIP archive, or a damaged one") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from None
+
+
+@lru_cache(maxsize=4)  # its directory is read once by each worker; it changes with size and time
+def _opened_zip(path: str, size: int, modified_ns: int) -> zipfile.ZipFile:
+    return zipfile.ZipFile(path)

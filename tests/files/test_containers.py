@@ -1,0 +1,165 @@
+"""Archives are read as folders; what is in them can neither fill memory nor name a file elsewhere."""
+
+import csv
+import io
+import tarfile
+import zipfile
+
+import cv2
+import numpy as np
+import pytest
+
+from rollcli.errors import InputError, UsageError
+from rollcli.files.containers import file_of, members, shown
+from rollcli.files.storage import read_bytes
+from tests.run_cli import road_map, rollcli, write_maps, write_pair
+
+
+def packed(folder, archive):
+    """Pack the files of a folder."""
+    if archive.suffix == ".tar":
+        with tarfile.open(archive, "w") as file:
+            file.add(folder, ".")
+    else:
+        with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as file:
+            for path in sorted(folder.rglob("*.*")):
+                file.write(path, path.relative_to(folder).as_posix())
+    return archive
+
+
+def rows(text):
+    return list(csv.DictReader(io.StringIO(text)))
+
+
+@pytest.mark.parametrize("name", ["run.zip", "run.tar"])
+def test_an_archive_gives_the_rows_of_its_folder(tmp_path, name):
+    write_maps(tmp_path / "all" / "maps", 3)
+    packed(tmp_path / "all", tmp_path / name)
+    whole = rows(rollcli("estimate", "all/maps", cwd=tmp_path).out)
+    done = rollcli("estimate", name, "-j", "2", "--derotated", "upright", cwd=tmp_path)
+    found = rows(done.out)
+    assert [row["file"] for row in found] == [f"{name}#maps/frame{each}.png" for each in range(3)]
+    assert [row["roll_deg"] for row in found] == [row["roll_deg"] for row in whole]
+    assert sorted(path.name for path in (tmp_path / "upright/maps").iterdir()) == [
+        f"frame{each}.png" for each in range(3)
+    ]
+    listed = rollcli("estimate", name, "--dry-run", cwd=tmp_path).out.splitlines()
+    assert listed[0] == f"read  {name}#maps/frame0.png"
+    again = rollcli("estimate", f"{name}#maps/frame1.png", cwd=tmp_path)
+    assert rows(again.out)[0]["roll_deg"] == whole[1]["roll_deg"]
+
+
+def test_a_run_over_an_archive_is_resumed_until_the_archive_changes(tmp_path):
+    write_maps(tmp_path / "maps", 3)
+    packed(tmp_path / "maps", tmp_path / "run.tar")
+    rollcli("estimate", "run.tar", "-o", "rolls.csv", cwd=tmp_path)
+    whole = (tmp_path / "rolls.csv").read_bytes()
+    (tmp_path / "rolls.csv").write_bytes(b"".join(whole.splitlines(keepends=True)[:2]))
+    assert rollcli("estimate", "run.tar", "-o", "rolls.csv", "--resume", cwd=tmp_path).status == 0
+    assert (tmp_path / "rolls.csv").read_bytes() == whole
+    packed(tmp_path, tmp_path / "run.tar")
+    assert rollcli("estimate", "run.tar", "-o", "rolls.csv", "--resume", cwd=tmp_path).status == 2
+
+
+def test_the_views_of_a_shard_pair_up_and_are_never_taken_for_maps(tmp_path):
+    write_pair(tmp_path / "pairs", "000001.png", road_map())
+    left, right = sorted((tmp_path / "pairs").rglob("*.png"))
+    with tarfile.open(tmp_path / "shard.tar", "w") as file:
+        file.add(left, "000001.left.png")
+        file.add(right, "000001.right.png")
+        file.add(left, "000002.left.png")
+        file.add(right, "000002.right.png")
+    pairs = rollcli("estimate", "--left", "shard.tar", "--right", "shard.tar", cwd=tmp_path)
+    assert [(row["file"], row["right_file"]) for row in rows(pairs.out)] == [
+        (f"shard.tar#00000{each}.left.png", f"shard.tar#00000{each}.right.png") for each in (1, 2)
+    ]
+    maps = rollcli("estimate", "shard.tar", cwd=tmp_path)
+    assert (maps.status, "--left shard.tar --right shard.tar" in maps.err) == (2, True)
+
+
+@pytest.mark.parametrize(("left", "right"), [("left", "right"), ("image_2", "image_3")])
+def test_a_folder_of_views_is_told_with_what_to_type(tmp_path, left, right):
+    for side in (left, right):
+        (tmp_path / "drive" / side).mkdir(parents=True)
+        cv2.imwrite(str(tmp_path / "drive" / side / "0.png"), np.zeros((20, 20), np.uint8))
+    for more in ([], ["--recursive"]):
+        done = rollcli("estimate", "drive", *more, cwd=tmp_path)
+        assert done.status == 2
+        assert f"give --left drive/{left} --right drive/{right}" in done.err
+    cv2.imwrite(str(tmp_path / "im0.png"), np.zeros((20, 20), np.uint8))
+    cv2.imwrite(str(tmp_path / "im1.png"), np.zeros((20, 20), np.uint8))
+    assert "--left . --right ." in rollcli("estimate", ".", cwd=tmp_path).err
+
+
+def test_what_a_folder_holds_beside_maps_is_counted_by_ending(tmp_path):
+    write_maps(tmp_path / "maps", 1)
+    for name in ("a.mat", "b.mat", "readme"):
+        (tmp_path / "maps" / name).write_text("x")
+    done = rollcli("estimate", "maps", cwd=tmp_path)
+    assert "files in the folders that are not read: 2 .mat, 1 without an ending" in done.err
+    assert "not read" not in rollcli("estimate", "maps", "-q", cwd=tmp_path).err
+
+
+def test_a_member_cannot_name_a_file_elsewhere(tmp_path):
+    write_maps(tmp_path / "maps", 1)
+    with zipfile.ZipFile(tmp_path / "bad.zip", "w") as file:
+        file.write(tmp_path / "maps/frame0.png", "../../outside.png")
+    done = rollcli("estimate", "bad.zip", "--derotated", "in/side", cwd=tmp_path)
+    assert (done.status, rows(done.out)[0]["status"]) == (3, "error")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["bad.zip", "maps"]
+
+
+def test_members_that_would_fill_memory_or_are_damaged_are_refused(tmp_path):
+    with zipfile.ZipFile(tmp_path / "bomb.zip", "w", zipfile.ZIP_DEFLATED) as file:
+        file.writestr("a.npy", bytes(40 * 2**20))
+        file.writestr("b.npy", b"fine")
+    with pytest.raises(InputError, match="bomb.zip#a.npy: has 41943040 bytes; up to 32 MB"):
+        read_bytes(tmp_path / "bomb.zip#a.npy")
+    assert read_bytes(tmp_path / "bomb.zip#b.npy") == b"fine"
+    with pytest.raises(InputError, match="no such file in"):
+        read_bytes(tmp_path / "bomb.zip#c.npy")
+    whole = packed(write_maps(tmp_path / "maps", 1) or tmp_path / "maps", tmp_path / "run.tar").read_bytes()
+    (tmp_path / "cut.tar").write_bytes(whole[:2000])
+    (tmp_path / "cut.zip").write_bytes((tmp_path / "bomb.zip").read_bytes()[:200])
+    for name in ("cut.tar", "cut.zip"):
+        done = rollcli("estimate", name, cwd=tmp_path)
+        assert done.status in (2, 3)
+        assert "Traceback" not in done.err
+    with pytest.raises(UsageError, match=r"unpack it, or pack it as \.zip or \.tar"):
+        from rollcli.files.search import Search
+
+        Search((".png",)).files("run.tar.gz")
+
+
+def test_a_file_may_have_a_number_sign_in_its_name(tmp_path):
+    path = tmp_path / "a.zip#b.png"
+    path.write_bytes(b"itself")
+    assert read_bytes(path) == b"itself"
+    assert file_of(str(path)) == str(path)
+    assert shown("run.tar#a.png#@512+9") == "run.tar#a.png"
+
+
+def test_hidden_members_are_left_out(tmp_path):
+    with zipfile.ZipFile(tmp_path / "run.zip", "w") as file:
+        for name in ("a.png", ".b.png", "__MACOSX/c.png", "d/.e/f.png"):
+            file.writestr(name, b"x")
+    assert [name for _, name in members(str(tmp_path / "run.zip"))] == ["a.png"]
+
+
+def test_an_image_on_stdin_is_told_what_a_dash_means(tmp_path):
+    write_maps(tmp_path / "maps", 1)
+    import subprocess
+
+    from tests.run_cli import command, environment
+
+    data = (tmp_path / "maps/frame0.png").read_bytes()
+    done = subprocess.run(
+        command("estimate", "-"),
+        input=data,
+        capture_output=True,
+        env=environment(),
+        cwd=tmp_path,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert b"-: stands for a list of files on stdin" in done.stderr
