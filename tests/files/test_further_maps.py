@@ -85,7 +85,7 @@ def test_maps_stored_negative_are_read_with_a_negative_scale(tmp_path):
     np.save(tmp_path / "a.npy", disparity)
     np.save(tmp_path / "negative.npy", -disparity)
     rolls = [
-        list(csv.DictReader(io.StringIO(rollcli("estimate", *given, cwd=tmp_path).out)))[0]["roll_deg"]
+        next(iter(csv.DictReader(io.StringIO(rollcli("estimate", *given, cwd=tmp_path).out))))["roll_deg"]
         for given in (["a.npy"], ["negative.npy", "--scale", "-1"])
     ]
     assert rolls[0] == rolls[1] != ""
