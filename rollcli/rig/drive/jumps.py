@@ -1,5 +1,6 @@
 """When the mount moved, and whether it drifts: designs of more levels and of a line, by their evidence."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -40,6 +41,11 @@ def design_of(cells: Cells, starts: Sequence[int], drift: bool, frames: int) -> 
     return np.column_stack([columns, (cells.centres - (frames - 1)) / max(frames - 1, 1)])
 
 
+def is_told(design: Floats) -> bool:
+    """Tell whether the cells are enough for every column: frames that count may all lie in a cell or two."""
+    return bool(np.linalg.matrix_rank(design) == design.shape[1])
+
+
 def search(series: Series, unit: float) -> Found:
     """Find the jumps of a series, and whether it drifts.
 
@@ -57,7 +63,9 @@ def search(series: Series, unit: float) -> Found:
     if series.used.sum() < 2 * TUNING.fewest:
         return Found((), False, 0.0)
     seen = _Search(series, unit)
-    found = max((seen.jumps(drift) for drift in (False, True)), key=lambda each: each.score)
+    places = np.flatnonzero(series.used)
+    spanned = 2 * (places[-1] - places[0]) >= len(series.values)  # else a line would be drawn out far
+    found = max((seen.jumps(drift) for drift in (False, True)[: 1 + spanned]), key=lambda each: each.score)
     return Found(tuple(_placed(series, found, unit, seen.width)), found.drift, found.score)
 
 
@@ -74,7 +82,7 @@ class _Search:
     def jumps(self, drift: bool) -> Found:
         """Return the best jumps with a drift, or without."""
         best = self._scored((), drift)
-        while len(best.starts) < TUNING.most_jumps:
+        while len(best.starts) < TUNING.most_jumps and best.score > -math.inf:
             proposed = [self._scored(starts, drift) for starts in self._proposals(best)]
             better = max(proposed, key=lambda each: each.score, default=best)
             if better.score <= best.score:
@@ -97,6 +105,8 @@ class _Search:
         return self._likelihood.fit(self._design(starts, drift))
 
     def _scored(self, starts: Sequence[int], drift: bool) -> Found:
+        if not is_told(self._design(starts, drift)):
+            return Found(tuple(starts), drift, -math.inf)
         penalty = TUNING.jump_penalty * len(starts) + TUNING.drift_penalty * drift
         return Found(tuple(starts), drift, self._fit(starts, drift).evidence - penalty)
 

@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rollcli.rig.drive.jumps import bounds_of, design_of, search
+from rollcli.rig.drive.jumps import bounds_of, design_of, is_told, search
 from rollcli.rig.drive.outliers import Flags, Floats, gross_outliers
 from rollcli.rig.drive.posterior import Estimate, Fit, Likelihood, Series, make_cells
 from rollcli.rig.drive.tuning import TUNING
@@ -147,9 +147,6 @@ def assess_sequence(values: ArrayLike, errors: ArrayLike, unit: float = 1.0) -> 
         Jump(start, fitted.estimate(fitted.unit_row(place + 1) - fitted.unit_row(place)))
         for place, start in enumerate(found.starts)
     )
-    line = fitted
-    if not found.drift and used >= TUNING.fewest:
-        line = _Fitted(series, found.starts, True, unit)
     status: Status = "jump" if jumps else "drift" if found.drift else "stable"
     return SequenceAssessment(
         frames=len(given),
@@ -157,7 +154,7 @@ def assess_sequence(values: ArrayLike, errors: ArrayLike, unit: float = 1.0) -> 
         outliers=outliers,
         segments=tuple(fitted.segments()),
         jumps=jumps,
-        drift=line.drift(),
+        drift=(fitted if found.drift else _Fitted(series, found.starts, True, unit)).drift(),
         drifts=found.drift,
         status="few" if used < TUNING.fewest else status,
         between_sd=fitted.between_sd(),
@@ -175,8 +172,8 @@ class _Fitted:
         self._cells = make_cells(series, starts)
         design = design_of(self._cells, starts, drift, self._frames)
         self._there: Flags = np.asarray(design.any(axis=0))  # a stretch may have no frame that counts
-        if drift and np.linalg.matrix_rank(design[:, self._there]) < self._there.sum():
-            self._there[-1] = False  # too few cells for a line beside the levels
+        if drift and not is_told(design[:, self._there]):
+            self._there[-1] = False
         self._fit: Fit = Likelihood(self._cells, unit).fit(design[:, self._there])
 
     def unit_row(self, place: int) -> Floats:
