@@ -5,6 +5,9 @@ NOT_LEVELLED = "the views are not level, and could not be levelled"
 TOO_LITTLE = "too little can be compared to tell whether the views are level"
 """The doubt of a pair whose correction could not be checked."""
 
+NOT_TOLD_BY_ROWS = "the rows do not tell whether the right view is larger or its rows are bent: recalibrate"
+"""The doubt of a pair that was levelled, but whose columns may be far from where they are believed to be."""
+
 
 def advice_of(lower: float, clockwise: float, larger: float, twist: float) -> str:
     """Return what a run says of its rig, in a sentence; empty where nothing is far enough from level.

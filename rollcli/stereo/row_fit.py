@@ -25,7 +25,8 @@ _TILE = 64.0  # px of the size measured at: blocks within it err together
 _LINEAR = (0, 1, 2, 3)  # offset, rotation, scale, twist
 _SURE = 4.0  # standard errors: a tilt or a curve of less is none. Plain roads cannot tell it from a scale
 _EXACT = 1e-9  # px^2 times a weight: views without noise are known no better
-_ROAD_ACROSS, _ROAD_DOWN = 0.05, 0.3  # of width and height: how far from the centre the lane's middle lies
+_FOCAL = 0.7  # widths: of most rigs
+_ROAD_ACROSS, _ROAD_DOWN = 0.13, 0.4  # of the height, from the centre: where a twist and a pitch turn a road
 
 
 @dataclass(frozen=True)
@@ -42,11 +43,18 @@ class BeliefTuning:
         How often an offset is a pitch, and no shift of the image.
     focal : tuple of float
         Focal lengths of rigs, in widths of the image.
-    yaw : float
-        Standard deviation, radians.
-    lens_twist : float
-        How much more than its other shapes the lens model leaves as a twist: on KITTI's grey cameras ten
-        times (1.4 px in the corners, and lidar sees nothing of it in the columns: a yaw moves them by 4.4).
+    yaw, skew : float
+        Standard deviations of a yaw, and of the yaw that rows which are skewed alone seem to be, radians. On
+        KITTI's grey cameras 1.4 px in the corners look like 0.5 degrees, and lidar sees nothing of it in the
+        columns.
+    has_skew : float
+        How often rows are skewed alone.
+    lens_shape, no_shape : float
+        Shapes of second and third degree at the border of what was seen, px, standard deviations: of rows
+        that a lens has skewed alone (KITTI's grey cameras: 0.11 along x²), and of others (rendered: 0.02).
+    may_scale, may_tilt, may_bend, may_skew : float
+        The same as the interval has it. Where the rows cannot tell two causes apart, it reaches both of them;
+        a quarter makes twice the standard deviation of a scale all of it.
     least : float
         What no pair tells of a scale: blocks between which it lies share a part of their error.
     tiles : float
@@ -64,7 +72,14 @@ class BeliefTuning:
     pitch: float = 0.4
     focal: tuple[float, ...] = (0.5, 0.6, 0.75, 1.0, 1.5)
     yaw: float = 0.0035
-    lens_twist: float = 10.0
+    skew: float = 0.01
+    has_skew: float = 0.1
+    lens_shape: float = 0.1
+    no_shape: float = 0.02
+    may_scale: float = 0.5
+    may_tilt: float = 0.1
+    may_bend: float = 0.25
+    may_skew: float = 0.3
     least: float = 0.0001
     tiles: float = 2.0
 
@@ -144,9 +159,8 @@ def fit_rows(seen: SeenBlocks) -> RowFit:
     fit = _robust(design[used], shift, fixed)
     variance = _variance(design[used], fit, frame.tile)
     held = np.zeros(6)
-    held[4] = (
-        variance / (BELIEF.tilt * frame.near) ** 2
-    )  # a plain road's tilt and scale could cancel each other
+    # a plain road's tilt or curve and its scale could cancel each other
+    held[4:] = variance / np.square([BELIEF.tilt * frame.near, BELIEF.bend * frame.half_height])
     wide = _least_squares(design[:6], shift, fit.weight, held)
     used += [
         each for each in (4, 5) if wide.values[each] ** 2 > _SURE**2 * variance * wide.inverse[each, each]
@@ -205,12 +219,44 @@ def column_support(
         np.array([lens / y**2, 0, 0, lens / y**4]),
         fit.values[0] / np.square(np.array(BELIEF.focal) * width),
     )
-    yaw = (BELIEF.yaw / (0.7 * width)) ** 2
-    doubt = (BELIEF.lens_twist**2 * uneven + variance * fit.inverse[3, 3]) / (x * y) ** 2
-    twist = fit.values[3] / (x * y) * yaw / (yaw + doubt)
-    twist_error = np.sqrt(yaw * doubt / (yaw + doubt))
-    parts = scale[1], 2 * twist_error * width * _ROAD_ACROSS, pitch[1] * height * _ROAD_DOWN
-    return ColumnSupport(scale[0], float(twist), pitch[0], float(np.linalg.norm(parts)))
+    own_error = (uneven + variance * fit.inverse[3, 3]) / (x * y) ** 2
+    yaw, skew = np.square(np.array([BELIEF.yaw, BELIEF.skew]) / (_FOCAL * width))
+    uneven_by_lens = _lens_ratio(whole.values[7:], variance / BELIEF.tiles**2 * np.diag(whole.inverse)[7:])
+    twist, twist_error = _yaw_of_twist(fit.values[3] / (x * y), own_error, yaw, skew, uneven_by_lens)
+    parts = scale[1], 2 * twist_error * height * _ROAD_ACROSS, pitch[1] * height * _ROAD_DOWN
+    return ColumnSupport(scale[0], twist, pitch[0], float(np.linalg.norm(parts)))
+
+
+def _lens_ratio(shapes: Doubles, variances: Doubles) -> float:
+    """Return how many times likelier shapes of a lens are than none, px and px^2; a yaw makes none."""
+    lens, even = (variances + each**2 for each in (BELIEF.lens_shape, BELIEF.no_shape))
+    return float(
+        np.sqrt(np.prod(even / lens)) * np.exp((np.square(shapes) * (1 / even - 1 / lens)).sum() / 2)
+    )
+
+
+def _yaw_of_twist(twist: float, error: float, yaw: float, skew: float, ratio: float) -> tuple[float, float]:
+    """Return mean and standard deviation of what of a twist is a yaw, where its rows may be skewed alone.
+
+    Parameters
+    ----------
+    twist : float
+        1/pixels.
+    error, yaw, skew : float
+        Variances: of the twist, of those that yaws make, and of those of rows alone.
+    ratio : float
+        How many times likelier the rest of the field makes it that the rows alone are skewed.
+    """
+    other = np.array([error, error + skew])
+    whole = yaw + other
+    density = np.exp(-(twist**2) / (2 * whole)) / np.sqrt(whole)
+    values, variances = twist * yaw / whole, yaw * other / whole
+    often = np.array([1 - BELIEF.has_skew, BELIEF.has_skew * ratio]) * density
+    # rows may be skewed with no other shape: that there is none narrows no interval
+    often_doubted = np.array([1 - BELIEF.may_skew, BELIEF.may_skew * max(1.0, ratio)]) * density
+    mean = float(often @ values / often.sum())
+    variance = often_doubted @ (np.square(values - mean) + variances) / often_doubted.sum()
+    return mean, float(np.sqrt(variance))
 
 
 def _mean_over_causes(
@@ -230,32 +276,34 @@ def _mean_over_causes(
         Curves that the offset would have, were it a pitch, 1/px.
     """
     often = np.array([BELIEF.has_scale, BELIEF.has_tilt, BELIEF.has_bend])
+    often_doubted = np.array([BELIEF.may_scale, BELIEF.may_tilt, BELIEF.may_bend])
     size = np.array([BELIEF.scale, BELIEF.tilt, BELIEF.bend])
     curves = [(1 - BELIEF.pitch, 0.0), *((BELIEF.pitch / len(pitches), curve) for curve in pitches)]
-    likely, scales, squares, pitched = [], [], [], []
+    likely, scales, variances, pitched = [], [], [], []
     for causes in product((False, True), repeat=3):
         prior = np.append(np.where(causes, np.square(size), 0), 0)
         own = prior[0] / (prior[0] + lens[0])  # what of the rows' scale is one of the columns
         prior += lens
         spread = np.eye(4) + information * prior
         covariance = prior[:, None] * np.linalg.inv(spread)
-        chance = np.log(np.where(causes, often, 1 - often)).sum() - np.linalg.slogdet(spread)[1] / 2
+        chances = [np.log(np.where(causes, each, 1 - each)).sum() for each in (often, often_doubted)]
+        chances -= np.linalg.slogdet(spread)[1] / 2
         for how_often, curve in curves:
             rest = told - information[:, 3] * curve
             values = covariance @ rest
             known = told[3] * curve - information[3, 3] * curve**2 / 2
-            likely.append(chance + np.log(how_often) + known + rest @ values / 2)
+            likely.append(chances + np.log(how_often) + known + rest @ values / 2)
             scales.append(own * values[0])
-            squares.append(scales[-1] ** 2 + own**2 * covariance[0, 0] + own * lens[0])
+            variances.append(own**2 * covariance[0, 0] + own * lens[0])
             pitched.append(curve)
-    share = np.exp(np.array(likely) - max(likely))
-    share /= share.sum()
+    shares = np.exp(np.array(likely) - np.max(likely, axis=0))
+    believed, doubted = (shares / shares.sum(axis=0)).T
 
-    def summed(values: list[float], squared: Doubles) -> tuple[float, float]:
-        mean = float(share @ values)
-        return mean, float(np.sqrt(max(share @ squared - mean**2, 0.0)))
+    def summed(values: Doubles, variance: Doubles | float) -> tuple[float, float]:
+        mean = float(believed @ values)
+        return mean, float(np.sqrt(doubted @ (np.square(values - mean) + variance)))
 
-    return summed(scales, np.array(squares)), summed(pitched, np.square(pitched))
+    return summed(np.array(scales), np.array(variances)), summed(np.array(pitched), 0.0)
 
 
 class _Frame(NamedTuple):

@@ -105,6 +105,20 @@ def test_an_offset_is_a_pitch_where_its_rows_curve_as_those_of_one(pitch_deg):
     assert abs(support_of(lambda x, y, near: turn * focal + 0 * y).pitch) < 0.1 * abs(curve)
 
 
+@pytest.mark.parametrize("bend", [-0.002, 0.002])
+def test_a_bend_that_a_plain_road_cannot_tell_from_a_scale_is_in_the_error(bend):
+    found = support_of(lambda x, y, near: bend * np.maximum(y, 0), below_horizon=True)
+    assert 1.96 * found.error > abs(found.scale) > 0.5 * abs(bend)
+
+
+def test_rows_that_are_skewed_alone_are_in_the_error():
+    skew = 1.4 / (600 * 180)
+    found = support_of(lambda x, y, near: skew * x * y)
+    assert 1.96 * found.error > found.twist * 0.15 * 375  # twice an eighth of the height: a lane's middle
+    level = support_of(lambda x, y, near: 0 * x)
+    assert found.error > 2 * level.error
+
+
 def test_an_even_twist_is_a_yaw_and_an_uneven_one_mostly_a_lens():
     yaw = np.radians(0.2) / 720
     even = support_of(lambda x, y, near: yaw * x * y)
