@@ -31,7 +31,7 @@ DOORS = {
     "rollcli.run.heights": "loads NumPy only on a worker",
     "rollcli.run.options": "the command line's help needs no URLs",
     "rollcli.run.read": "loads OpenCV's matcher only for pairs",
-    "rollcli.run.rig_answer": "loads NumPy only at the end of a run, to tell the rig's roll",
+    "rollcli.run.summary": "loads NumPy only at the end of a run, to tell the rig's roll",
     "rollcli.run.workers.pool": "a worker's door",
     "rollcli.run.workers.tasks": "loads the executor that is used; the cluster is an extra",
 }

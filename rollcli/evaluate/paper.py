@@ -104,11 +104,11 @@ def _run(frames: Sequence[Frame], truth: Mapping[str, float], options: PaperOpti
     progress.tell_end()
     if not found:
         progress.say("no map gave an angle: there is nothing to tabulate")
-        return progress.status
+        return progress.summary.status
     times = _time(frames, found, options, progress)
     _write(found, failed, times, options)
     progress.note(f"{Path(options.experiments.output, PAGE)} and {len(TABLES)} tables are written")
-    return progress.status
+    return progress.summary.status
 
 
 def _time(

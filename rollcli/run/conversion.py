@@ -95,7 +95,7 @@ def convert(
     if stop.asked and progress.done < progress.total:
         progress.say("interrupted; what is written is whole, and --overwrite starts anew")
         return ExitStatus.INTERRUPTED
-    return progress.status
+    return progress.summary.status
 
 
 def _results(

@@ -20,7 +20,6 @@ from rollcli.run.outputs import every_path, image_paths, remove_image_leftovers,
 from rollcli.run.plan import Plan, further_columns, make_plan
 from rollcli.run.progress import Progress
 from rollcli.run.result import Output, frames_to_do, open_output
-from rollcli.run.rig_answer import RigAnswer
 from rollcli.run.workers.chunks import Work
 from rollcli.run.workers.in_order import SharedPaths, Workers
 from rollcli.run.workers.interrupt import Stop, stop_on_signals
@@ -93,17 +92,15 @@ def _is_batch(options: EstimateOptions) -> bool:
 
 def _run(plan: Plan, options: EstimateOptions, resume_command: str, started: list[Any]) -> ExitStatus:
     require_scheduler(options.running.scheduler)
-    progress = Progress(len(plan.frames), options.running, options.encoding)
     with open_output(plan, options) as output:
         kept = output.kept
-        progress.keep(kept.totals, kept.alignment)
-        answer = kept.answer
+        progress = Progress(len(plan.frames), options.running, options.encoding, summary=kept.summary)
         notes = calibration_notes(plan.frames) if options.calibration.given else []
         for note in notes[:_NOTES]:
             progress.note(note)
         try:
             with stop_on_signals() as stop, progress:
-                run = _Run(options, output, progress, answer, stop, started)
+                run = _Run(options, output, progress, stop, started)
                 _restore_images(run)
                 if not _retry_failed(plan, run):
                     _run_frames(plan.frames[kept.count :], run)
@@ -114,9 +111,9 @@ def _run(plan: Plan, options: EstimateOptions, resume_command: str, started: lis
         status = _end(output, progress, stop, resume_command)
         if not (progress.stopped_early or options.running.quiet):
             calibrated = (frame.calibration for frame in plan.frames if frame.calibration is not None)
-            if note := answer.pose_note(next(calibrated, None)):
+            if note := progress.summary.pose_note(next(calibrated, None)):
                 progress.say(note)
-            progress.say(answer.line())
+            progress.say(progress.summary.rig_roll())
         return status
 
 
@@ -126,7 +123,6 @@ class _Run(NamedTuple):
     options: EstimateOptions
     output: Output
     progress: Progress
-    answer: RigAnswer
     stop: Stop
     started: list[Any]
 
@@ -143,7 +139,6 @@ def _run_frames(frames: Sequence[Frame], run: _Run) -> None:
         for frame, result in zip(frames, results, strict=False):
             run.output.append(frame, result)
             run.progress.add(result)
-            run.answer.add(result.row)
             if run.ends_with(result):
                 return
     if run.stop.asked and run.progress.done < run.progress.total:
@@ -177,8 +172,7 @@ def _retry_failed(plan: Plan, run: _Run) -> bool:
         with _results(frames, run, _name_of(plan.output)) as results:
             for position, frame, result in zip(positions, frames, results, strict=False):
                 run.output.replace(position, frame, result)
-                progress.add(result)
-                run.answer.replace(position, result.row)
+                progress.add(result, replaces=position)
                 if run.ends_with(result):
                     return True
         if run.stop.asked:
@@ -229,13 +223,13 @@ def _results(frames: Sequence[Frame], run: _Run, retry_of: str = "") -> Iterator
 
 def _end(output: Output, progress: Progress, stop: Stop, resume_command: str) -> ExitStatus:
     if not progress.stopped_early:
-        output.finish(progress.totals, progress.alignment.summary())
+        output.finish(progress.summary)
     progress.tell_end()
     if stop.asked and progress.stopped_early:
         how = f"; continue with: {resume_command}" if output.resumable else ""
         progress.say(f"interrupted{how}")
         return ExitStatus.INTERRUPTED
-    return progress.status
+    return progress.summary.status
 
 
 def _list(plan: Plan, options: EstimateOptions) -> None:

@@ -35,6 +35,7 @@ from rollcli.run.outputs import local_images, remove_image_leftovers, remove_mar
 from rollcli.run.plan import Plan
 from rollcli.run.record import RunRecord
 from rollcli.run.resume import KeptRows, check_restored, new_record
+from rollcli.run.summary import RunSummary
 
 _CHECK_S = 10.0  # a request of 50 ms now and then
 
@@ -73,11 +74,11 @@ class PartsOutput:
         if len(self._waiting) == self._part_rows:
             self._write()
 
-    def finish(self, totals: Mapping[str, int], alignment: Mapping[str, Any] | None) -> None:
-        """Write the last part, and both into the record."""
+    def finish(self, summary: RunSummary) -> None:
+        """Write the last part, and the summary into the record."""
         if self._waiting or not self._written:
             self._write()
-        self._record.write(totals, alignment)
+        self._record.write(summary)
 
     def restore(self, frame: Frame, result: FrameResult) -> None:
         """Take the images of an incomplete frame, which were made again.
@@ -185,7 +186,7 @@ def _begin(plan: Plan, options: EstimateOptions, keep_open: int | None) -> Parts
         remove_image_leftovers(kept.not_failed(), options.images)
     for name in parts[_whole_parts(kept.count, options.result.part_rows) :]:
         remove(f"{plan.output}/{name}")
-    record.write({})
+    record.write()
     record.check_owned()  # another run may have begun in this very second
     return PartsOutput(plan, record, kept, options, keep_open)
 

@@ -1,23 +1,19 @@
-"""What is said while frames run: a bar or lines, counts, causes of failure, and how the views lie."""
+"""What is said while frames run: a bar or lines, counts, causes of failure, and what the run comes to."""
 
 import os
 import re
 import sys
 import time
-from array import array
-from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from statistics import median
 from types import TracebackType
 from typing import Any
 
-from rollcli.errors import ExitStatus
-from rollcli.files.results import ALIGNMENT_COLUMNS, Row
+from rollcli.files.results import Row
 from rollcli.messages import say
 from rollcli.run.frame import FrameResult, named_message
 from rollcli.run.options import EncodingOptions, RunningOptions
-from rollcli.stereo.misalignment_words import advice_of
+from rollcli.run.summary import RunSummary
 
 _LINE_EVERY_S = 30.0
 _UNKNOWN_SIZE = {"ncols": 80, "nrows": 24}  # of a terminal that does not tell its size
@@ -129,40 +125,6 @@ def _terminal_size() -> dict[str, Any]:
     return {"dynamic_ncols": True} if known else _UNKNOWN_SIZE
 
 
-class RigAlignment:
-    """Collects what rows say of how the right view lay; rows of maps, and without an angle, say nothing."""
-
-    def __init__(self) -> None:
-        self._columns = {name: array("d") for name in ALIGNMENT_COLUMNS}
-
-    def add(self, row: Row) -> None:
-        """Take in a row."""
-        for name, column in self._columns.items():
-            value = getattr(row, name)
-            if value is not None:
-                column.append(value)
-
-    @property
-    def median(self) -> dict[str, float]:
-        """The median of each column over the frames; empty where no pair was measured."""
-        return {name: median(column) for name, column in self._columns.items() if column}
-
-    @property
-    def advice(self) -> str:
-        """What to do about it, in a sentence; empty where the median is level."""
-        found = self.median
-        return advice_of(*(found[name] for name in ALIGNMENT_COLUMNS)) if found else ""
-
-    def summary(self) -> dict[str, float | int | str] | None:
-        """Return the entry of the run's record; None where no pair was measured."""
-        found = self.median
-        if not found:
-            return None
-        frames = len(self._columns[ALIGNMENT_COLUMNS[0]])
-        rounded = {name: round(value, 4) + 0.0 for name, value in found.items()}
-        return {"frames": frames, **rounded, "advice": self.advice}
-
-
 _NUMBER = re.compile(r"\d[\d.]*(?:e[-+]?\d+)?")
 _CAUSES = 5  # that are said; a batch where every frame fails differently is no list to read
 
@@ -224,7 +186,7 @@ _MEANING = {
 
 
 class Progress(TaskProgress):
-    """Counts the frames of a run, and says on stderr how far it is.
+    """Says on stderr how far a run is.
 
     Parameters
     ----------
@@ -235,7 +197,9 @@ class Progress(TaskProgress):
     encoding : EncodingOptions
         An encoding that was found rather than given is named once.
     statuses : sequence of str
-        The statuses of rows that the summary counts, besides "error".
+        The statuses of rows that the last line counts, besides "error".
+    summary : RunSummary or None
+        What the rows of an interrupted run come to, which this one goes on with.
     """
 
     def __init__(
@@ -244,39 +208,34 @@ class Progress(TaskProgress):
         running: RunningOptions,
         encoding: EncodingOptions,
         statuses: Sequence[str] = ("ok", "suspect"),
+        summary: RunSummary | None = None,
     ) -> None:
         super().__init__(total, quiet=running.quiet, verbose=running.verbose)
-        self.counts: Counter[str] = Counter()
+        self.summary = summary or RunSummary()
+        self.kept = self.summary.frames
         self.stopped_early = False
         self._statuses = statuses
         self._auto = encoding.encoding == "auto" and encoding.scale is None
-        self.alignment = RigAlignment()
         self._failures, self._warnings = Causes(), Causes()
 
     def __enter__(self) -> "Progress":
         super().__enter__()
         return self
 
-    def keep(self, totals: Mapping[str, int], alignment: RigAlignment) -> None:
-        """Count the rows that an interrupted run has left, by their status, and go on with its alignment."""
-        self.counts.update(totals)
-        self.kept += sum(totals.values())
-        self.alignment = alignment
-
     def counted(self) -> dict[str, int]:
         """Name the failures."""
-        return {"failed": self.counts["error"]}
+        return {"failed": self.summary.counts["error"]}
 
-    @property
-    def totals(self) -> dict[str, int]:
-        """The number of frames by status."""
-        return {"frames": self.done, **{status: self.counts[status] for status in ("ok", "suspect", "error")}}
+    def add(self, result: FrameResult, replaces: int | None = None) -> None:
+        """Count a row that is written, and say what the user should know about it.
 
-    def add(self, result: FrameResult) -> None:
-        """Count a row that is written, and say what the user should know about it."""
+        It replaces a row at a position, from 0, where its frame was done again.
+        """
         row = result.row
-        self.counts[row.status] += 1
-        self.alignment.add(row)
+        if replaces is None:
+            self.summary.add(row)
+        else:
+            self.summary.replace(replaces, row)
         self._tell_input(result)
         if row.status == "error":
             self._tell_failure(row)
@@ -320,20 +279,15 @@ class Progress(TaskProgress):
                 self.note(line)
             for line in self._failures.repeated():
                 self.say(line)
-        self.note(self.summary())
-        if self.alignment.advice:
-            self.note(f"median over the pairs: {self.alignment.advice}")
+        self.note(self.last_line())
+        if advice := self.summary.advice:
+            self.note(f"median over the pairs: {advice}")
 
-    def summary(self) -> str:
-        """Make the last line of a run: how many frames came to what, and how fast."""
-        counts = self.counts
+    def last_line(self) -> str:
+        """Say how many frames came to what, and how fast."""
+        counts = self.summary.counts
         kept = f" ({self.kept} kept)" if self.kept else ""
         by_status = [f"{counts[status]} {status}" for status in self._statuses]
         by_status.append(f"{counts['error']} failed")
         frames = f"{self.done} frame{'' if self.done == 1 else 's'}{kept}"
         return f"{frames}: {', '.join(by_status)}; {self.seconds:.1f} s, {self.speed()}"
-
-    @property
-    def status(self) -> ExitStatus:
-        """The exit status of a run that came to its end."""
-        return ExitStatus.FRAMES_FAILED if self.counts["error"] else ExitStatus.DONE

@@ -28,6 +28,7 @@ from rollcli.run.options import (
     RegionOptions,
 )
 from rollcli.run.plan import Plan
+from rollcli.run.summary import RunSummary
 from rollcli.stereo.options import StereoOptions
 
 # what these errors say of a path, they say again the next time; others may pass, such as EIO
@@ -179,10 +180,10 @@ class RunRecord:
             ends = [*self._searched, *searched]
             self._searched = [min(ends), max(ends)]
         if (self._encodings, self._searched) != before:
-            self.write({})
+            self.write()
 
-    def write(self, counts: Mapping[str, int], alignment: Mapping[str, Any] | None = None) -> None:
-        """Write the file, whole or not at all; `counts` is empty until the run is over, `alignment` None.
+    def write(self, summary: RunSummary | None = None) -> None:
+        """Write the file, whole or not at all; there is no summary until the run is over.
 
         Raises
         ------
@@ -196,10 +197,10 @@ class RunRecord:
             **self.fixed,
             "encoding": sorted(self._encodings),
             "disparities_searched_px": self._searched,
-            "alignment": alignment,
+            "alignment": summary and summary.alignment(),
             "conventions": CONVENTIONS,
-            "counts": counts,
-            **({_REPLACES: True} if self.replaces and not counts else {}),
+            "counts": summary.totals if summary else {},
+            **({_REPLACES: True} if self.replaces and not summary else {}),
         }
         data = json.dumps(record, indent=2).encode() + b"\n"
         write_bytes(run_path(self._output), data, durable=True, owner=self.run)

@@ -2,10 +2,10 @@
 
 import contextlib
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from itertools import chain
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 from rollcli.errors import InputError, UsageError
 from rollcli.files.atomic import remove_leftovers
@@ -20,6 +20,7 @@ from rollcli.run.plan import Plan
 from rollcli.run.record import RunRecord, is_replaceable_record
 from rollcli.run.result_file import DurableRows, ResultFile, has_rows, kept_rows, open_result
 from rollcli.run.resume import KeptRows, check_restored, new_record
+from rollcli.run.summary import RunSummary
 
 
 class Output(Protocol):
@@ -54,8 +55,8 @@ class Output(Protocol):
     def commit(self) -> None:
         """Write every row that was appended or replaces another."""
 
-    def finish(self, totals: Mapping[str, int], alignment: Mapping[str, Any] | None) -> None:
-        """Say that all rows are written, how many of each status, and how the views of pairs lay."""
+    def finish(self, summary: RunSummary) -> None:
+        """Say that all rows are written, and what they come to."""
 
     def hint(self) -> str:
         """Say how to continue after an error; empty when nothing can be continued."""
@@ -77,7 +78,7 @@ class StreamOutput:
         """Write the row; it has left this process when this returns."""
         self._write(_line(result, self._plan))
 
-    def finish(self, totals: Mapping[str, int], alignment: Mapping[str, Any] | None) -> None:
+    def finish(self, summary: RunSummary) -> None:
         """Do nothing: a stream has no record."""
 
     def restore(self, frame: Frame, result: FrameResult) -> None:
@@ -147,9 +148,9 @@ class FileOutput:
             remove_marks([self._plan.frames[position] for position in self._replacing], self._images)
             self._replacing.clear()
 
-    def finish(self, totals: Mapping[str, int], alignment: Mapping[str, Any] | None) -> None:
-        """Write both into the record."""
-        self._record.write(totals, alignment)
+    def finish(self, summary: RunSummary) -> None:
+        """Write it into the record."""
+        self._record.write(summary)
 
     def hint(self) -> str:
         """Say that --resume continues, if rows were written and their file still is there."""
@@ -243,7 +244,7 @@ def _begin(file: ResultFile, plan: Plan, options: EstimateOptions) -> FileOutput
     remove_leftovers([run_path(plan.output), os.path.realpath(plan.output)])
     # in this order, a run that is killed in between can be resumed: an empty file counts as a new one
     file.truncate(len(data) if kept.count else 0)
-    record.write({})
+    record.write()
     if not kept.count:
         file.append(format_header(plan.format, plan.further))
     return FileOutput(file, record, plan, kept, options.images)

@@ -1,7 +1,6 @@
 """Continue an interrupted run: compare it with this one, and keep the rows it finished."""
 
 import json
-from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -15,9 +14,8 @@ from rollcli.run.frame import Frame, FrameResult
 from rollcli.run.options import EstimateOptions
 from rollcli.run.outputs import MadeImages
 from rollcli.run.plan import Plan, check_images_are_new
-from rollcli.run.progress import RigAlignment
 from rollcli.run.record import RunRecord, changed_input
-from rollcli.run.rig_answer import RigAnswer
+from rollcli.run.summary import RunSummary
 
 
 class Mismatch(NamedTuple):
@@ -39,10 +37,7 @@ class KeptRows:
         Positions, from 0, of those without an angle.
     incomplete : list of Frame
         Frames whose images are missing or empty, whatever the cause.
-    totals : Counter of str
-        How many have each status, apart from those whose frames are done again.
-    alignment : RigAlignment
-    answer : RigAnswer
+    summary : RunSummary
     mismatch : Mismatch or None
     """
 
@@ -50,8 +45,7 @@ class KeptRows:
         self.count = 0
         self.errors: list[int] = []
         self.incomplete: list[Frame] = []
-        self.totals: Counter[str] = Counter()
-        self.alignment, self.answer = RigAlignment(), RigAnswer()
+        self.summary = RunSummary()
         self.mismatch: Mismatch | None = None
         self._frames, self._images = plan.frames, options.images
         self._retries = options.result.retry_failed
@@ -83,10 +77,7 @@ class KeptRows:
                 self.incomplete.append(frame)
         if row.status == "error":
             self.errors.append(self.count)
-        if row.status != "error" or not self._retries:
-            self.totals[row.status] += 1
-            self.alignment.add(row)
-        self.answer.add(row)
+        self.summary.add(row, is_retried=row.status == "error" and self._retries)
         self.count += 1
 
     def _compare(self, row: Row, frame: Frame) -> None:

@@ -6,7 +6,8 @@ from rollcli.errors import ExitStatus
 from rollcli.files.results import Row
 from rollcli.run.frame import Frame, FrameResult, failed_frame, named_message
 from rollcli.run.options import EncodingOptions, RunningOptions
-from rollcli.run.progress import Progress, RigAlignment
+from rollcli.run.progress import Progress
+from rollcli.run.summary import RunSummary
 
 GUESSED = EncodingOptions()
 
@@ -25,22 +26,24 @@ def lines(capsys):
 
 
 def test_it_counts_kept_and_new_rows_by_status(lines):
-    counted = progress(4)
-    counted.keep({"ok": 1, "suspect": 1}, RigAlignment())
+    kept = RunSummary()
+    for status in ("ok", "suspect"):
+        kept.add(Row("kept.png", status=status))
+    counted = Progress(4, RunningOptions(), GUESSED, summary=kept)
     counted.add(result())
     counted.add(result("suspect"))
     assert counted.done == 4
-    assert counted.totals == {"frames": 4, "ok": 2, "suspect": 2, "error": 0}
-    assert counted.summary().startswith("4 frames (2 kept): 2 ok, 2 suspect, 0 failed; ")
+    assert counted.summary.totals == {"frames": 4, "ok": 2, "suspect": 2, "error": 0}
+    assert counted.last_line().startswith("4 frames (2 kept): 2 ok, 2 suspect, 0 failed; ")
     assert lines() == []
 
 
 def test_the_exit_status_says_whether_a_frame_failed(lines):
     counted = progress()
     counted.add(result("suspect"))
-    assert counted.status is ExitStatus.DONE
+    assert counted.summary.status is ExitStatus.DONE
     counted.add(result("error", "is no map"))
-    assert counted.status is ExitStatus.FRAMES_FAILED
+    assert counted.summary.status is ExitStatus.FRAMES_FAILED
     assert lines() == ["rollcli: a.png: is no map"]
 
 
@@ -110,7 +113,7 @@ def test_how_numbers_were_read_is_said_once_unless_it_was_given(lines):
 def test_a_quiet_run_says_errors_alone(lines):
     counted = progress(quiet=True, verbose=True)
     counted.add(result("suspect", "is doubtful", encoding="px", warning="may be wrong", searched=(0, 63)))
-    counted.note(counted.summary())
+    counted.note(counted.last_line())
     counted.detail("a detail")
     assert lines() == []
     counted.say("an error")

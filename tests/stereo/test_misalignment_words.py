@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rollcli.files.results import Row
-from rollcli.run.progress import RigAlignment
+from rollcli.run.summary import RunSummary
 from rollcli.stereo.misalignment import Misalignment
 from rollcli.stereo.misalignment_words import advice_of
 
@@ -20,12 +20,12 @@ def row(lower=None, clockwise=0.0, **more):
 
 
 def test_a_run_says_the_median_over_its_pairs_and_what_to_do():
-    rig = RigAlignment()
+    rig = RunSummary()
     for turned in (0.3, 0.31, 0.5):
         rig.add(row(0.0, turned))
 
-    assert rig.summary()["right_clockwise_deg"] == 0.31
-    assert rig.summary()["frames"] == 3
+    assert rig.alignment()["right_clockwise_deg"] == 0.31
+    assert rig.alignment()["frames"] == 3
     assert rig.advice == (
         "the right camera is rolled by 0.31 degrees against the left, counter-clockwise seen from behind: "
         "recalibrate"
@@ -33,21 +33,21 @@ def test_a_run_says_the_median_over_its_pairs_and_what_to_do():
 
 
 def test_a_run_of_mostly_level_pairs_asks_for_nothing():
-    rig = RigAlignment()
+    rig = RunSummary()
     for lower in (0.01, -0.02, 1.0):
         rig.add(row(lower))
 
     assert rig.advice == ""
-    assert rig.summary()["right_lower_px"] == 0.01
+    assert rig.alignment()["right_lower_px"] == 0.01
 
 
 def test_a_run_of_maps_or_of_pairs_that_could_not_be_measured_has_nothing_to_say():
-    rig = RigAlignment()
+    rig = RunSummary()
     rig.add(Row("l.png", status="ok"))
     rig.add(row(message="the views are not level, and could not be levelled"))
     rig.add(Row("l.png", "r.png", "error", message="l.png: cannot be read"))
 
-    assert rig.summary() is None
+    assert rig.alignment() is None
     assert rig.advice == ""
 
 
