@@ -1,6 +1,6 @@
 """Commands whose help is in sections, and how their options are declared."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import click
@@ -12,6 +12,8 @@ from rollcli.messages import say, show_tracebacks
 
 OTHER = "Other options"
 Values = dict[str, Any]
+_ALWAYS = (ExitStatus.FAILED, ExitStatus.USAGE, ExitStatus.INTERRUPTED)
+_OF_FRAMES = {each: each.meaning for each in (ExitStatus.DONE, ExitStatus.FRAMES_FAILED)}
 
 
 class Option(click.Option):
@@ -31,8 +33,8 @@ class Command(click.Command):
         A purpose, and the command line for it; several lines are steps.
     instead : str
         What to give in place of arguments, to those who give some to a command that takes none.
-    checks : bool
-        Whether its exit status can tell that a check has failed.
+    statuses : mapping of ExitStatus to str
+        How it ends, where this is not how frames are worked through; wrong usage and so on are added.
     """
 
     def __init__(
@@ -40,14 +42,15 @@ class Command(click.Command):
         *args: Any,
         examples: Sequence[tuple[str, str]] = (),
         instead: str = "",
-        checks: bool = False,
+        statuses: Mapping[ExitStatus, str] | None = None,
         **attributes: Any,
     ) -> None:
         super().__init__(*args, **attributes)
         self.examples = tuple(examples)
         self.instead = instead
-        of_checks = (ExitStatus.CHECK_FAILED, ExitStatus.UNTOLD)
-        self.statuses = [each for each in ExitStatus if checks or each not in of_checks]
+        own = _OF_FRAMES if statuses is None else statuses
+        meant = {**{each: each.meaning for each in _ALWAYS}, **own}
+        self.statuses = {each: meant[each] for each in sorted(meant)}
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Parse the words; where there should be none, say what should be there instead."""
@@ -98,7 +101,7 @@ class Command(click.Command):
                 f"{ctx.auto_envvar_prefix}_QUIET=1; flags win over it."
             )
         with formatter.section("Exit status"):
-            formatter.write_dl([(str(int(status)), status.meaning) for status in self.statuses])
+            formatter.write_dl([(str(int(status)), meaning) for status, meaning in self.statuses.items()])
 
 
 class Declared:
@@ -185,7 +188,7 @@ def command(
     examples: Sequence[tuple[str, str]] = (),
     short_help: str | None = None,
     instead: str = "",
-    checks: bool = False,
+    statuses: Mapping[ExitStatus, str] | None = None,
 ) -> Callable[[Declared], Command]:
     """Make a command of a function, named after it; its docstring is the help."""
 
@@ -199,7 +202,7 @@ def command(
             short_help=short_help,
             examples=examples,
             instead=instead,
-            checks=checks,
+            statuses=statuses,
         )
 
     return make

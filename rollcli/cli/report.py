@@ -8,6 +8,7 @@ from rollcli.cli.command import argument, command, option
 from rollcli.cli.config import config_option
 from rollcli.cli.options import PATH, running_options
 from rollcli.cli.types import Number, OutputFile
+from rollcli.errors import ExitStatus
 from rollcli.report.options import GALLERY, ReportOptions
 
 
@@ -24,7 +25,11 @@ from rollcli.report.options import GALLERY, ReportOptions
         ),
         ("Several drives, or the shards of one run", "rollcli report monday.csv tuesday.csv -o both.html"),
         ("Its charts for slides, without a page", "rollcli report rolls.csv --svg slides --png slides"),
-    ]
+    ],
+    statuses={
+        ExitStatus.DONE: "the page and the charts are written",
+        ExitStatus.FRAMES_FAILED: "they are written, and pictures of at least one frame cannot be made",
+    },
 )
 @argument("results", nargs=-1, required=True, type=PATH)
 @option(

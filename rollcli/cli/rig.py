@@ -8,6 +8,7 @@ from rollcli.cli.command import argument, command, option, record
 from rollcli.cli.config import config_option
 from rollcli.cli.options import PATH, calibration_options, running_options
 from rollcli.cli.types import TABLE_FILE, TABLE_FORMATS, Choice, Number, table_format
+from rollcli.errors import ExitStatus
 from rollcli.run.rig_options import GateOptions, RigOptions
 
 gate_options = record(
@@ -54,7 +55,11 @@ gate_options = record(
         ("The shards of one run, in any order", "rollcli rig part1.csv part2.csv part3.csv"),
         ("Has it moved since?", "rollcli rig before.csv --against after.csv"),
     ],
-    checks=True,
+    statuses={
+        ExitStatus.DONE: "the rig is assessed, and every check holds",
+        ExitStatus.CHECK_FAILED: "at least one check has failed; a line for each says which frames",
+        ExitStatus.UNTOLD: ExitStatus.UNTOLD.meaning,
+    },
 )
 @argument("results", nargs=-1, required=True, type=PATH)
 @option(

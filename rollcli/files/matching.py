@@ -1,5 +1,6 @@
 """Match the rows of a table with files by name, wherever the table was made."""
 
+import posixpath
 from bisect import bisect_left
 from collections.abc import Sequence
 from pathlib import PurePosixPath
@@ -52,6 +53,44 @@ def match_paths(names: Sequence[str], rows: Sequence[str], table: str) -> list[i
         if best and owner.setdefault(best[0], name) != name:
             raise UsageError(f"{table}: the row of {rows[best[0]]} fits {owner[best[0]]} and {name}")
     return found
+
+
+def is_elsewhere(name: str, row: str, *, of_pair: bool = False) -> bool:
+    """Tell whether a row is about a file of the same stem in another drive.
+
+    Paths are compared from the stem up, and, where they start in the same place, from there down. What
+    differs between is another drive. Where it is one folder, a map may have been made of the row's file: of
+    a pair, or in another format.
+
+    Parameters
+    ----------
+    name, row : str
+        Paths with the same stem; a shorter one may leave out the folders above.
+    of_pair : bool
+        Whether the row is that of a pair.
+    """
+    one, other = _folders(name), _folders(row)
+    if one[:1] != other[:1] and (_is_rooted(one) or _is_rooted(other)):
+        return False  # one of them may be the same folder, as another machine calls it
+    while one and other and one[-1] == other[-1]:
+        one, other = one[:-1], other[:-1]
+    rooted, same = _is_rooted(one), _common(one, other)
+    least = min(len(one), len(other)) - same
+    if rooted and same < 2:  # a root alone, or a scheme: the same folder may be mounted elsewhere
+        return False
+    made = of_pair or PurePosixPath(name).suffix.lower() != PurePosixPath(row).suffix.lower()
+    return least > (1 if made else 0)
+
+
+def _is_rooted(folders: Sequence[str]) -> bool:
+    """Tell whether folders begin at a root, a drive letter or a scheme."""
+    return bool(folders) and (folders[0].endswith(":") or folders[0] == "/")
+
+
+def _folders(path: str) -> list[str]:
+    """Split a path's folders, without the steps up that a relative one begins with."""
+    parts = PurePosixPath(posixpath.normpath(path.replace("\\", "/"))).parent.parts
+    return [part for part in parts if part != ".."]
 
 
 def _parts(path: str) -> list[str]:

@@ -32,6 +32,7 @@ _ROUNDINGS = (-0.5, 0.0, -1.0)
 _FOCAL = (1.0, 1e6)  # px
 _PLACE = 1e6  # px from the first pixel
 _BASELINE = (1e-4, 1e4)  # m
+_OFF = 0.12  # as a factor from 1: lenses are centred to a few hundredths, and common scalings are beyond it
 _EDGE = 0.1  # of a side: there lies the principal point of twice the size, but hardly that of a crop
 
 
@@ -111,6 +112,25 @@ class Calibration:
         if self.width is None or self.height is None:
             return False
         return max((self.cx + 0.5) / self.width, (self.cy + 0.5) / self.height) > 1 - _EDGE
+
+    def seems_of_another_size(self, width: int, height: int) -> str:
+        """Say that numbers without a size seem to be of images of another size than this; else empty.
+
+        The principal point is near the middle of an image. Numbers for twice the size have it at the lower
+        right corner, those for half the size amid the upper left quarter. A crop moves it too, but hardly by
+        one factor across and down.
+        """
+        if self.width is not None:
+            return ""
+        across, down = 2 * (self.cx + 0.5) / width, 2 * (self.cy + 0.5) / height
+        factor = math.sqrt(across * down)
+        if abs(math.log(factor)) < _OFF or abs(math.log(across / down)) > abs(math.log(factor)):
+            return ""
+        return (
+            f"{self.source}: states no image size, and its principal point {self.cx:g},{self.cy:g} is that "
+            f"of images of about {width * factor:.0f}x{height * factor:.0f} px; these have {width}x{height}: "
+            "pitch and height are wrong unless the calibration is of this size"
+        )
 
     def for_size(self, width: int, height: int) -> "Calibration":
         """Return the calibration of the same view at another size.

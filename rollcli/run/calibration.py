@@ -115,8 +115,8 @@ def calibration_notes(frames: Sequence[Frame]) -> list[str]:
     return list(dict.fromkeys(note for calibration in used for note in calibration.notes))
 
 
-def check_first_size(frames: Sequence[Frame], options: FrameOptions) -> None:
-    """Refuse a calibration that is not for the size of the first frame, before anything runs.
+def check_first_size(frames: Sequence[Frame], options: FrameOptions) -> list[str]:
+    """Refuse a calibration that is not for the size of the first frame; say what speaks against its size.
 
     Raises
     ------
@@ -124,7 +124,7 @@ def check_first_size(frames: Sequence[Frame], options: FrameOptions) -> None:
     """
     first = next((frame for frame in frames if frame.calibration is not None), None)
     if first is None or first.calibration is None:
-        return
+        return []
     from rollcli.files.formats import read_image, read_stored  # only here does a dispatcher decode an image
 
     try:
@@ -135,8 +135,12 @@ def check_first_size(frames: Sequence[Frame], options: FrameOptions) -> None:
                 options.at(first.path), first.file, rgb=options.encoding.encoding == "foundationstereo"
             ).values.shape
     except InputError:
-        return  # its row will say so
+        return []  # its row will say so
+    doubt = first.calibration.seems_of_another_size(width, height)
+    if doubt:
+        return [doubt]
     first.calibration.for_size(width, height)
+    return []
 
 
 def check_depth(frames: Sequence[Frame], encoding: EncodingOptions) -> None:

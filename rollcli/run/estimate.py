@@ -95,7 +95,7 @@ def _run(plan: Plan, options: EstimateOptions, resume_command: str, started: lis
     with open_output(plan, options) as output:
         kept = output.kept
         progress = Progress(len(plan.frames), options.running, options.encoding, summary=kept.summary)
-        notes = calibration_notes(plan.frames) if options.calibration.given else []
+        notes = [*plan.notes, *(calibration_notes(plan.frames) if options.calibration.given else [])]
         for note in notes[:_NOTES]:
             progress.note(note)
         try:

@@ -30,7 +30,8 @@ def run_heights(options: HeightsOptions) -> ExitStatus:
         root=running.root,
         replaces=running.overwrite,
     )
-    check_first_size(frames, read)
+    for note in check_first_size(frames, read):
+        say(note)
     do = partial(_heights, options=read, result=options.result)
     return convert(conversions, do, options.output, running, options.encoding)
 

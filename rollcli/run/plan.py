@@ -24,12 +24,13 @@ from rollcli.run.outputs import every_path
 
 @dataclass(frozen=True)
 class Plan:
-    """The frames of a run, in the order of their rows; where the rows go, and in which form."""
+    """The frames of a run, in the order of their rows; where the rows go, and how; what to say before."""
 
     frames: Sequence[Frame]
     output: str
     format: Format
     further: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def in_parts(self) -> bool:
@@ -62,14 +63,13 @@ def make_plan(options: EstimateOptions) -> Plan:
     )
     frames = _shard(frames, options.result)
     check_places(frames, [folder for _, folder in options.images.folders()])
-    if options.calibration.given:
-        check_first_size(frames, options.frame)
+    notes = check_first_size(frames, options.frame) if options.calibration.given else []
     if not (options.running.overwrite or options.result.resume):
         check_images_are_new(frames, options)
     form = options.result.form
     if form == "parquet" and is_stream(output):
         raise UsageError("Parquet is a folder of parts: name it with --output")
-    return Plan(frames, output, form, further_columns(frames, options.result))
+    return Plan(frames, output, form, further_columns(frames, options.result), tuple(notes))
 
 
 def further_columns(frames: Sequence[Frame], options: ResultOptions) -> tuple[str, ...]:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from rollcli.errors import UsageError
-from rollcli.files.matching import match_paths
+from rollcli.files.matching import is_elsewhere, match_paths
 from rollcli.files.naming import listed
 from rollcli.files.results import Row, read_result
 from rollcli.messages import say
@@ -19,7 +19,7 @@ def rows_of(
     ------
     UsageError
         Names maps without a row, with `every_row` rows that have an angle but no map, and what matches more
-        than one; or every angle is suspect, and such are left out.
+        than one; a row is of another drive; or every angle is suspect, and such are left out.
     """
     rows = read_result(result).rows
     found = match_paths([frame.file for frame in frames], [row.file for row in rows], result)
@@ -32,6 +32,11 @@ def rows_of(
         names = listed(row.file for row in lost if row.roll_deg is not None)
         raise UsageError(f"{result}: no map is given for its rows of {names}")
     matched = [rows[at] for at in used]
+    for frame, row in zip(frames, matched, strict=True):
+        if is_elsewhere(frame.file, row.file, of_pair=bool(row.right_file)):
+            raise UsageError(
+                f"{result}: its row is of {row.file}, and not of {frame.file}: give the result of these maps"
+            )
     _tell_suspects(matched, result, skip_suspect=skip_suspect, quiet=quiet)
     return matched
 

@@ -1,5 +1,6 @@
 """Each command's manual page."""
 
+import re
 import shlex
 import subprocess
 import sys
@@ -8,7 +9,7 @@ import click
 import pytest
 
 from tests.readme_tables import commands
-from tests.run_cli import environment
+from tests.run_cli import environment, rollcli
 
 COMMANDS = dict(commands())
 HELP = """
@@ -59,3 +60,19 @@ def test_every_option_says_what_it_does(name):
             assert (param.help or "").rstrip("]").endswith(".") or "[default:" in (param.help or ""), (
                 param.name
             )
+
+
+def test_rig_and_report_tell_how_they_end_themselves():
+    ends = {
+        name: rollcli(name, "--help").out.partition("Exit status:")[2].split("\n\n")[0]
+        for name in ("rig", "report", "estimate")
+    }
+    starts = {name: re.findall(r"^  (\d+) ", text, flags=re.M) for name, text in ends.items()}
+    assert starts == {
+        "rig": ["0", "1", "2", "4", "5", "130"],
+        "report": ["0", "1", "2", "3", "130"],
+        "estimate": ["0", "1", "2", "3", "130"],
+    }
+    assert "every check holds" in ends["rig"]
+    assert "page" in ends["report"]
+    assert "every frame" not in ends["rig"] + ends["report"]

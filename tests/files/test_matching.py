@@ -4,7 +4,7 @@ import pytest
 
 from rollcli.errors import UsageError
 from rollcli.files import matching
-from rollcli.files.matching import match_paths
+from rollcli.files.matching import is_elsewhere, match_paths
 
 
 @pytest.mark.parametrize(
@@ -42,3 +42,29 @@ def test_equal_stems_in_many_folders_are_told_apart_without_comparing_all_with_a
 
     assert match_paths(names, rows, "rolls.csv") == list(reversed(range(2000)))
     assert len(compared) <= 2 * len(names)
+
+
+@pytest.mark.parametrize(
+    ("name", "row", "of_pair", "elsewhere"),
+    [
+        ("b/0.png", "a/0.png", False, True),
+        ("day2/maps/0.png", "day1/maps/0.png", False, True),
+        ("/data/day2/maps/0.png", "/data/day1/maps/0.png", False, True),
+        ("day2/maps/0.png", "day1/left/0.png", True, True),
+        ("maps/0.png", "left/0.png", True, False),
+        ("floats/0.tif", "maps/0.png", False, False),
+        ("day2/floats/0.tif", "day1/maps/0.png", False, True),
+        ("day1/maps/0.png", "day1/left/0.png", True, False),
+        ("out/x/0.png", "left/x/0.png", True, False),
+        ("out/maps/0.png", "day1/out/maps/0.png", False, False),
+        ("0.png", "day1/maps/0.png", False, False),
+        ("../maps/0.png", "maps/0.png", False, False),
+        ("./maps/0.png", "maps/0.tif", False, False),
+        ("/mnt/run7/maps/0.png", "/data/run7/maps/0.png", False, False),
+        ("run7/maps/0.png", "/data/drives/run7/maps/0.png", False, False),
+        ("s3://mine/run7/0.png", "run7/0.png", False, False),
+        ("s3://mine/run8/0.png", "s3://mine/run7/0.png", False, True),
+    ],
+)
+def test_a_row_of_another_drive_is_told_by_the_folders_that_differ(name, row, of_pair, elsewhere):
+    assert is_elsewhere(name, row, of_pair=of_pair) is elsewhere

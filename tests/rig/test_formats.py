@@ -4,6 +4,7 @@ import math
 import re
 import time
 import tracemalloc
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -453,3 +454,22 @@ def test_a_calibration_nests_sixteen_levels_deep_and_no_deeper():
     for text in nested(17):
         with pytest.raises(InputError, match="nests deeper than a calibration does"):
             parse_yaml(text, "f")
+
+
+@pytest.mark.parametrize(
+    ("size", "told"),
+    [
+        ((1242, 375), False),
+        ((1226, 370), False),
+        ((621, 188), True),
+        ((2484, 750), True),
+        ((1242, 300), False),
+    ],
+)
+def test_numbers_without_a_size_that_are_of_images_of_another_size_are_said(size, told):
+    camera = Calibration(fx=721.5, fy=721.5, cx=609.6, cy=172.9, baseline=0.54)
+    said = camera.seems_of_another_size(*size)
+    assert bool(said) == told
+    if told:
+        assert "1219x346" in said
+    assert not replace(camera, width=1242, height=375).seems_of_another_size(*size)
