@@ -67,7 +67,7 @@ from rollcli.report.options import GALLERY, ReportOptions
     type=PATH,
     metavar="DIR",
     section="Charts for slides",
-    help="Write each chart of the page as an SVG: roll, histogram, and pitch and height where there are any.",
+    help="Write each chart of the page as an SVG: roll, histogram, and pitch, height and how the right view lies where known.",
 )
 @option("--pdf", type=PATH, metavar="DIR", section="Charts for slides", help="The same as PDFs.")
 @option(

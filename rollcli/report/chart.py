@@ -13,6 +13,7 @@ from rollcli.files.results import Row
 from rollcli.rig.quantities import QUANTITIES, ROLL
 
 HISTOGRAM = "histogram"
+ALIGNED = "alignment"
 
 
 @dataclass(frozen=True)
@@ -62,10 +63,11 @@ def script_json(value: Any) -> str:
 def chart_names(rows: Sequence[Row]) -> list[str]:
     """Return the names of the charts, `roll` first.
 
-    Pitch and height have charts where a calibration has given them, the histogram where more than
-    one frame has an angle.
+    Pitch and height have charts where a calibration has given them, the histogram where more than one frame
+    has an angle, and how the right view lies where more than one pair was measured.
     """
     there = {each.name: any(getattr(row, each.column) is not None for row in rows) for each in QUANTITIES}
     over_frames = [name for name, some in there.items() if some or name == ROLL.name]
     angles = sum(row.roll_deg is not None for row in rows)
-    return [*over_frames, *([HISTOGRAM] if angles > 1 else [])]
+    pairs = sum(row.right_lower_px is not None for row in rows)
+    return [*over_frames, *([HISTOGRAM] if angles > 1 else []), *([ALIGNED] if pairs > 1 else [])]

@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 
 from rollcli.files.results import Row
 from rollcli.pictures.round_step import round_step
-from rollcli.report.chart import HISTOGRAM, Chart, chart_names
+from rollcli.report.chart import ALIGNED, HISTOGRAM, Chart, chart_names
 from rollcli.report.summary import degrees, with_interval
 from rollcli.rig.drive.assess import DriveAssessment, RigAssessment
 from rollcli.rig.drive.quantity import SequenceAssessment
-from rollcli.rig.quantities import HEIGHT, QUANTITIES, ROLL, Quantity
+from rollcli.rig.quantities import ALIGNMENT, HEIGHT, QUANTITIES, ROLL, Quantity
 from rollcli.rig.words import answer, decimals
+from rollcli.stereo.misalignment import Misalignment
 
 RigTrace = dict[str, Any]
 
@@ -210,6 +211,8 @@ _FEW_BINS = 6
 _FAILED_AT = 0.035  # of the chart's height
 _AXIS_UNITS = {"deg": "degrees", "m": "m"}
 
+# as a legend calls the parts of the alignment, and their colours
+_PARTS = (("lower", "@c1"), ("turned", "@c2"), ("larger", "@c3"), ("twisted", "@c4"))
 _VALUES = ("x", "y", "customdata")
 
 Values = Sequence[Value]
@@ -218,11 +221,98 @@ Trace = dict[str, Any]
 
 def all_charts(rows: Sequence[Row], rig: RigAssessment | None = None) -> dict[str, Chart]:
     """Return the charts of `chart_names` by their names."""
+    made = {HISTOGRAM: histogram, ALIGNED: lambda rows: alignment(rows, rig)}
     quantities = {each.name: each for each in QUANTITIES}
     return {
-        name: histogram(rows) if name == HISTOGRAM else chart_over_frames(rows, quantities[name], rig)
+        name: made[name](rows) if name in made else chart_over_frames(rows, quantities[name], rig)
         for name in chart_names(rows)
     }
+
+
+def alignment(rows: Sequence[Row], rig: RigAssessment | None = None) -> Chart:
+    """Return how the right view lies over the frames: the shift of rows by each part at its largest, px.
+
+    One unit for all parts tells at a glance which of them matters. Dots are pairs; with `rig`, lines are what
+    the drive says, with its drifts and jumps.
+
+    Parameters
+    ----------
+    rows : sequence of Row
+    rig : RigAssessment, optional
+
+    Returns
+    -------
+    Chart
+    """
+    data: list[Trace] = []
+    for place, (quantity, (words, colour)) in enumerate(zip(ALIGNMENT, _PARTS, strict=True)):
+        known = [
+            (number, row, float(getattr(row, quantity.column)))
+            for number, row in enumerate(rows, 1)
+            if getattr(row, quantity.column) is not None
+        ]
+        scale = [_shift_of(place, row) for _, row, _ in known]
+        dots = {
+            "type": "scatter",
+            "mode": "markers",
+            "name": words,
+            "marker": {"color": colour, "size": 5 if len(rows) <= _MANY else 2.5},
+            "x": [number for number, _, _ in known],
+            "y": [round(value * each, 3) for (_, _, value), each in zip(known, scale, strict=True)],
+            "customdata": [
+                label(row, f"{value:+.3f}{quantity.unit}: {value * each:+.2f} px")
+                for (_, row, value), each in zip(known, scale, strict=True)
+            ],
+            "hovertemplate": "%{customdata}<extra></extra>",
+        }
+        data.append(dots)
+        if rig is not None and scale:
+            line = _level_line(rig, quantity, float(np.median(scale)))
+            data += [
+                {
+                    **line,
+                    "name": f"{words}, over the drive",
+                    "showlegend": False,
+                    "line": {"color": colour, "width": 2},
+                }
+            ]
+    largest = max((abs(each) for trace in data for each in trace["y"] if each is not None), default=0.0)
+    end = 1.1 * max(largest, 0.5)
+    layout = {
+        "hovermode": "closest",
+        "showlegend": True,
+        "xaxis": {
+            "title": {"text": "frame"},
+            "range": [1 - max(0.5, 0.01 * len(rows)), len(rows) + max(0.5, 0.01 * len(rows))],
+            "zeroline": False,
+            "tickformat": ",d",
+            **({"dtick": 1} if len(rows) <= _FEW else {}),
+        },
+        "yaxis": {"title": {"text": "shift of rows, px"}, "range": [-end, end], "zeroline": True},
+    }
+    return Chart(ALIGNED, f"How the right view lies over {len(rows)} frames, px", data, layout)
+
+
+def _shift_of(place: int, row: Row) -> float:
+    """Return by how many pixels a unit of a part of the alignment shifts rows where it does most."""
+    unit = [float(each == place) for each in range(len(ALIGNMENT))]
+    height, width = row.height or 0, row.width or 0
+    if not height or not width:
+        return 1.0
+    return Misalignment.of_values(unit, height, width).shifts(height, width)[place]
+
+
+def _level_line(rig: RigAssessment, quantity: Quantity, scale: float) -> RigTrace:
+    """Return the level of each segment of each drive, from its first frame to its last."""
+    trace = _trace(quantity.name)
+    for drive in rig.drives:
+        found = drive.quantities.get(quantity.name)
+        for segment in found.segments if found is not None else ():
+            if segment.begin.value is not None and segment.end.value is not None:
+                ends = [int(drive.frames[place]) + 1 for place in (segment.first, segment.last)]
+                said = f"{quantity.name.replace('_', ' ')} {answer(segment.end, quantity, change=True)}"
+                _add(trace, ends, [scale * segment.begin.value, scale * segment.end.value], said)
+    return trace
 
 
 def chart_over_frames(

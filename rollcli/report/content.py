@@ -23,9 +23,11 @@ from rollcli.report.summary import (
     with_interval,
     written_at,
 )
+from rollcli.rig.calibration import Calibration
 from rollcli.rig.drive.assess import RigAssessment
 from rollcli.rig.quantities import QUANTITIES
 from rollcli.rig.words import answer, counts, decimals, findings, now_in_words
+from rollcli.run.rig_health import NOT_SEEN, health_of
 
 _FOLDERS = 6  # of inputs that the summary names
 _LISTED = 20  # doubtful frames in a list of their own; the table has all
@@ -68,6 +70,8 @@ def report_page(
         now=now_in_words(rig),
         others=_others(rig),
         counts=counts(rig),
+        health=health_of(rig, _calibration(run)),
+        not_seen=NOT_SEEN,
         findings=findings(rig) or ["Neither a jump nor a drift is seen."],
         outside=outside(rows),
         doubtful=doubtful[:_LISTED],
@@ -76,6 +80,14 @@ def report_page(
         gallery=[_card(rows, choice, pictures) for choice, pictures in shown],
         chosen=_chosen_text(rows, [choice for choice, _ in shown]),
     )
+
+
+def _calibration(run: Mapping[str, Any]) -> Calibration | None:
+    """Return the first calibration that the run's record lists; None where there is none to be read."""
+    try:
+        return Calibration(**run["calibration"]["first"][0])
+    except (KeyError, IndexError, TypeError, ValueError):
+        return None
 
 
 def _others(rig: RigAssessment) -> list[str]:

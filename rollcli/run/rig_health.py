@@ -93,24 +93,33 @@ class Health:
         shift = abs(lies.rotation) * height / 2 + abs(lies.scale) * width / 2
         return 100 * distance * shift / (self.calibration.fx * self.calibration.baseline)
 
-    def lines(self) -> list[str]:
-        """Return the sentences of the table, of stderr and of the page."""
-        words = ("px lower", "degrees clockwise", "% larger", "px twisted in the corners")
-        parts = [
-            f"{answer(each, PIXELS, change=True).removesuffix(' px')} {what}"
-            for each, what in zip(self.parts, words, strict=True)
-        ]
-        reach = self.reach.value or 0.0
-        turned = f"uncorrected, it would turn the roll by up to {TUNING.roll_per_px * reach:.2f}°"
+    @property
+    def summary(self) -> str:
+        """The verdict, with how far the right view is off."""
+        off = answer(self.reach, PIXELS).lstrip("+")
+        return f"{self.verdict}: up to {off} off in the image ({self.frames:,} pairs)"
+
+    @property
+    def effect(self) -> str:
+        """What the misalignment would do to the roll, and to depth where a calibration tells."""
+        turned = TUNING.roll_per_px * (self.reach.value or 0.0)
         depths = [f"{self.depth_percent(each):.1f} % at {each} m" for each in DISTANCES if self._metric]
-        depth = (
-            f" and depth in the corners would err by {', '.join(depths)}" if depths and self._metric else ""
-        )
+        depth = f" and depth in the corners would err by {', '.join(depths)}" if depths else ""
+        return f"uncorrected, it would turn the roll by up to {turned:.2f}°{depth}"
+
+    def table(self) -> list[tuple[str, str]]:
+        """Return what each part is called, and its value with its interval."""
+        words = ("px lower", "degrees clockwise", "% larger", "px twisted in the corners")
+        values = (answer(each, PIXELS, change=True).removesuffix(" px") for each in self.parts)
+        return list(zip(words, values, strict=True))
+
+    def lines(self) -> list[str]:
+        """Return the sentences of the table and of stderr."""
+        parts = [f"{value} {what}" for what, value in self.table()]
         return [
-            f"pair    {self.verdict}: up to {answer(self.reach, PIXELS).lstrip('+')} off in the image "
-            f"({self.frames:,} pairs)",
+            f"pair    {self.summary}",
             f"        the right view lies {', '.join(parts)}",
-            f"        {turned}{depth}; {NOT_SEEN}",
+            f"        {self.effect}; {NOT_SEEN}",
         ]
 
     @property

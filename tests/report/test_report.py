@@ -502,3 +502,35 @@ def test_results_of_several_runs_are_drives_and_shards_are_one(tmp_path):
     assert [number > 0 for number in first] == [True, False, True, False]
     refused = rollcli("report", "a.csv", "a.csv", *again, cwd=tmp_path)
     assert (refused.status, "named twice" in refused.err) == (2, True)
+
+
+def test_the_page_says_how_the_right_view_lies_and_shows_it_over_the_drive(tmp_path):
+    noise = np.random.default_rng(6).normal(0, 0.02, 60)
+    rows = [
+        replace(
+            row(f"m/{at:03}.png", 1.0 + off),
+            right_lower_px=1.5 + off,
+            right_clockwise_deg=-0.2,
+            right_larger_percent=0.0,
+            right_twist_px=0.0,
+        )
+        for at, off in enumerate(noise.tolist())
+    ]
+    write_result(tmp_path / "pairs.csv", rows)
+    calibration = {"fx": 100.0, "fy": 100.0, "cx": 80.0, "cy": 60.0, "baseline": 0.5}
+    record = {"options": {}, "calibration": {"first": [calibration]}}
+    (tmp_path / "pairs.csv.run.json").write_text(json.dumps(record))
+
+    assert report(tmp_path, "pairs.csv", "--gallery", "0").status == 0
+
+    page = page_of(tmp_path)
+    # 0.2 degrees over half of 160 columns are 0.28 px, over half of 120 rows 0.21 px of disparity
+    assert re.search(r"<b>Recalibrate</b>: up to 1\.7[789] ± 0\.\d+ px off in the image \(60 pairs\)", page)
+    assert re.search(r"<th>px lower</th><td>\+1\.[45]\d* ± 0\.\d+</td>", page)
+    assert re.search(r"<th>degrees clockwise</th><td>−0\.20", page)
+    assert "4.2 % at 10 m, 8.4 % at 20 m, 20.9 % at 50 m" in page
+    assert "not seen in rows: constant vergence and baseline" in page
+    chart = json.loads(re.search(r'data-chart="alignment">(.*?)</script>', page, re.DOTALL)[1])
+    traces = {trace["name"]: trace["y"] for trace in chart["data"]}
+    assert traces["turned"] == pytest.approx([-np.radians(0.2) * 80] * 60, abs=1e-3)
+    assert traces["lower"] == pytest.approx(1.5 + noise, abs=1e-3)

@@ -166,6 +166,9 @@ def test_a_histogram_is_of_two_angles_or_more():
     assert chart_names([row("a.png"), row("b.png", None)]) == ["roll"]
     posed = replace(row("a.png", None), pitch_deg=0.0, height_m=1.5)
     assert chart_names([row("b.png", None), posed]) == ["roll", "pitch", "height"]
+    pairs = [replace(row(f"{name}.png", None), right_lower_px=0.1) for name in "ab"]
+    assert chart_names(pairs) == ["roll", "alignment"]
+    assert chart_names(pairs[:1]) == ["roll"]
 
 
 def test_a_label_is_cut_to_44_characters_a_line_and_five_lines():
