@@ -279,6 +279,8 @@ def match_pair(
     else:
         matched, corrected, measured, doubt = _match_levelled(of_these, wanted.rows, small, look, first < 0)
     support = NOTHING_KNOWN if measured is None or corrected == LEVEL else measured.support
+    if support.error > _OPEN_COLUMNS and not doubt:
+        doubt = NOT_TOLD_BY_ROWS
 
     def finished(found: Map) -> Map:
         return with_believed_columns(refined(found, views, corrected), corrected, support)
@@ -402,7 +404,4 @@ def _doubt(corrected: Misalignment, left: Measured | None) -> str:
     )
     unusual = abs(corrected.scale) > _UNUSUAL_SCALE
     far |= unusual and left is not None and left.errors.offset > _UNUSUAL_ERROR
-    if far:
-        return "the views lie too far from level to be sure of the correction"
-    open_columns = left is not None and corrected != LEVEL and left.support.error > _OPEN_COLUMNS
-    return NOT_TOLD_BY_ROWS if open_columns else ""
+    return "the views lie too far from level to be sure of the correction" if far else ""
