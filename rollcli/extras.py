@@ -10,7 +10,7 @@ from rollcli.errors import UsageError
 
 # of each extra, as they are installed and imported
 EXTRAS = {
-    "bags": ("rosbags", "mcap"),
+    "bags": ("rosbags",),
     "cluster": ("dask", "distributed"),
     "fast": ("imagecodecs",),
     "parquet": ("pyarrow",),

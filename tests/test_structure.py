@@ -22,6 +22,8 @@ DOORS = {
     "rollcli": "names load when they are first used, so that `import rollcli` costs nothing",
     "rollcli.__main__": "a worker process imports it anew, and a signal during imports is one line",
     "rollcli.evaluate.paper": "loads the experiments, NumPy and the charts once the request is checked",
+    "rollcli.files.containers": "loads the reader of bags, an extra, and NumPy only for bags",
+    "rollcli.run.find": "loads the reader of bags, an extra, and NumPy only for bags",
     "rollcli.files.storage": "urllib loads only for URLs of web servers",
     "rollcli.report.run": "loads NumPy and the charts once the request is checked",
     "rollcli.run.calibration": "decodes an image, which loads NumPy, only for its size",

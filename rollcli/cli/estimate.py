@@ -21,6 +21,7 @@ from rollcli.cli.options import (
     pair_options,
     region_options,
     stereo_options,
+    topic_options,
 )
 from rollcli.cli.types import Choice, Number, OutputFile, Shard
 from rollcli.messages import without_secrets
@@ -162,6 +163,7 @@ result_options = record(
 )
 @input_options
 @pair_options
+@topic_options
 @result_options
 @image_options
 @encoding_options

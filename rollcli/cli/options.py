@@ -16,6 +16,7 @@ from rollcli.run.options import (
     PairOptions,
     RegionOptions,
     RunningOptions,
+    TopicOptions,
 )
 from rollcli.stereo.options import MODES, StereoOptions
 
@@ -42,6 +43,12 @@ _folders = (
         "--include", multiple=True, metavar="GLOB", help="Of folders, take only files that match. Repeatable."
     ),
     option("--exclude", multiple=True, metavar="GLOB", help="Leave out files that match. Repeatable."),
+    option(
+        "--every",
+        type=Number("N", at_least=1, whole=True),
+        default=InputOptions().every,
+        help="Take every N-th frame of what is found.",
+    ),
 )
 
 input_options = record(
@@ -61,6 +68,11 @@ input_options = record(
         help="The names of --files-from are sorted already (frame2 before frame10) and name one map each: "
         "they are read as they are needed, so that a hundred million take no memory.",
     ),
+    option(
+        "--topic",
+        metavar="TOPIC",
+        help="The disparity or depth maps of a bag.  [default: the only topic that fits]",
+    ),
     *_folders,
 )
 
@@ -77,6 +89,20 @@ pair_options = record(
         type=Choice("name", "order"),
         default="name",
         help="By name (the same but for left/right, l/r, L1/R1, image_2/image_3, im0/im1 …), or by order.",
+    ),
+)
+
+topic_options = record(
+    "topics",
+    "Views of a bag",
+    TopicOptions,
+    option("--left-topic", metavar="TOPIC", help="Left views of the bag that INPUTS name."),
+    option("--right-topic", metavar="TOPIC", help="Right views of the bag that INPUTS name."),
+    option(
+        "--sync-tolerance",
+        type=Number("MS", at_least=0),
+        default=TopicOptions().sync_tolerance,
+        help="How far apart the header stamps of a pair may be, milliseconds.",
     ),
 )
 

@@ -6,6 +6,7 @@ Import-light.
 """
 
 import os
+import posixpath
 import re
 import tarfile
 import zipfile
@@ -15,13 +16,16 @@ from functools import lru_cache
 from pathlib import Path
 
 from rollcli.errors import InputError, UsageError
+from rollcli.files.atomic import is_file, is_folder
 from rollcli.files.bounded import most_unpacked, too_large
+from rollcli.files.naming import natural_key
 from rollcli.files.stores.locations import is_url
 
 ARCHIVES = (".zip", ".tar")
+BAGS = (".bag", ".db3", ".mcap")
 _PACKED = (".tar.gz", ".tgz", ".tar.xz", ".tar.bz2", ".tar.zst", ".7z", ".rar")
-_INSIDE = re.compile(r"(.*?\.(?:zip|tar))#(.*)", re.IGNORECASE | re.DOTALL)
-_POSITION = re.compile(r"#@([0-9]+)\+([0-9]+)$")
+_INSIDE = re.compile(r"(.*?\.(?:zip|tar|bag|db3|mcap))#(.*)", re.IGNORECASE | re.DOTALL)
+_POSITION = re.compile(r"#@([0-9]+(?:\+[0-9]+)+)$")
 
 
 def split_member(location: str) -> tuple[str, str] | None:
@@ -46,14 +50,38 @@ def shown(location: str) -> str:
 
 
 def frame_name(name: str) -> str:
-    """Return the name of a frame below its archive; any other name as it is."""
+    """Return the name of a frame below its archive, of a bag's file and stamp; others as they are."""
     found = _INSIDE.fullmatch(name) if "#" in name else None
-    return name if found is None else found[2]
+    if found is None:
+        return name
+    if found[1].lower().endswith(BAGS):
+        stem = posixpath.splitext(posixpath.basename(found[1].replace(os.sep, "/")))[0]
+        return f"{stem}_{found[2].rpartition('@')[2].replace('.', '_')}"
+    return found[2]
 
 
 def is_archive(location: str) -> bool:
     """Tell whether this names an archive, which is read as a folder."""
     return location.lower().endswith(ARCHIVES) and not is_url(location)
+
+
+def bag_files(location: str) -> list[str]:
+    """List the files of a bag: itself, or those of a rosbag2 folder in order; none where this is no bag.
+
+    Raises
+    ------
+    UsageError
+        They are compressed as whole files.
+    """
+    if location.lower().endswith(BAGS) and not is_folder(location):
+        return [location]
+    if not is_file(os.path.join(location, "metadata.yaml")):  # noqa: PTH118
+        return []
+    names = sorted(os.listdir(location), key=natural_key)  # noqa: PTH208
+    packed = [name for name in names if name.lower().endswith((".db3.zstd", ".mcap.zstd"))]
+    if packed:
+        raise UsageError(f"{location}: its file {packed[0]} is compressed as a whole; unpack it by zstd -d")
+    return [f"{location.rstrip('/')}/{name}" for name in names if name.lower().endswith(BAGS)]
 
 
 def refuse_packed(location: str) -> None:
@@ -120,9 +148,20 @@ def read_member(location: str, name: str, most: int) -> bytes | None:
     try:
         if path.lower().endswith(".tar"):
             return _read_tar(path, member, name, most)
+        if path.lower().endswith(BAGS):
+            return _read_bag(path, member, name)
         return _read_zip(path, member, name, most)
     except OSError as error:
         raise InputError(f"{name}: cannot be read: {(error.strerror or str(error)).lower()}") from None
+
+
+def _read_bag(path: str, member: str, name: str) -> bytes:
+    from rollcli.files.recordings.frames import broken_part, read_frame
+
+    if member == "rest":
+        raise InputError(f"{name}: {broken_part(path)}")
+    place = _POSITION.search(member)
+    return read_frame(path, shown(member), [int(each) for each in place[1].split("+")] if place else [], name)
 
 
 def _read_tar(path: str, member: str, name: str, most: int) -> bytes:
@@ -135,7 +174,7 @@ def _read_tar(path: str, member: str, name: str, most: int) -> bytes:
         found = _POSITION.search(positions.get(member, ""))
     if found is None:
         raise InputError(f"{name}: no such file in {path}")
-    start, size = int(found[1]), int(found[2])
+    start, size = map(int, found[1].split("+"))
     if size > most:
         raise too_large(name, size, most)
     with Path(path).open("rb") as file:

@@ -166,6 +166,11 @@ def decode_image(data: bytes, name: str) -> NDArray[Any]:
     """
     if data.startswith(png.SIGNATURE):
         return png.picture(data, name)
+    if data.startswith(arrays.MAGIC) and (grey := arrays.decode_npy(data, name)).dtype in (
+        np.uint8,
+        np.uint16,
+    ):
+        return native(grey)
     if data.startswith(tiff.SIGNATURES):
         return tiff.picture(data, name)
     if data.startswith(pictures.SIGNATURES):

@@ -74,6 +74,7 @@ class Calibrations:
     """
 
     def __init__(self, given: CalibrationOptions) -> None:
+        self.given = given.given
         self._given = given
         self._by_stem: dict[str, list[str]] | None = None
         self._fetched: dict[str, bytes] = {}  # of an object store, where one after the other takes long

@@ -3,16 +3,18 @@
 import contextlib
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from itertools import islice
 from pathlib import Path, PurePath
-from typing import overload
+from typing import TYPE_CHECKING, overload
 from unicodedata import normalize
 
 from rollcli.errors import UsageError
+from rollcli.extras import require_extra
 from rollcli.files import storage
 from rollcli.files.atomic import is_file, is_folder
-from rollcli.files.containers import file_of, frame_name, shown
+from rollcli.files.containers import BAGS, bag_files, file_of, frame_name, shown
 from rollcli.files.inputs import Input, find_inputs, named_input, pair_inputs
 from rollcli.files.manifest import Manifest
 from rollcli.files.search import is_place
@@ -23,7 +25,10 @@ from rollcli.messages import say
 from rollcli.rig.calibration import CalibrationOptions
 from rollcli.run.calibration import Calibrations
 from rollcli.run.frame import Frame
-from rollcli.run.options import InputOptions, PairOptions, RegionOptions
+from rollcli.run.options import InputOptions, PairOptions, RegionOptions, TopicOptions
+
+if TYPE_CHECKING:
+    from rollcli.files.recordings.frames import BagFrames
 
 _LISTED_AT_ONCE = 10_000
 
@@ -231,6 +236,13 @@ def map_frames(
     if not (given.inputs or given.files_from):
         raise UsageError("no input: name maps (files, folders, patterns, or - for a list on stdin)")
     masks, calibrations = _Masks(region), Calibrations(calibration or CalibrationOptions())
+    if bags := _bags(given):
+        from rollcli.files.recordings.frames import maps_of_bag
+
+        found_maps = [maps_of_bag(files, name, given.topic) for name, files in bags]
+        return _bag_frames(found_maps, masks, calibrations, quiet=quiet)[:: given.every]
+    if given.topic is not None:
+        raise UsageError("--topic is of a bag (.bag, .db3, .mcap or a rosbag2 folder), and none is given")
     notes: list[str] = []
     found = find_inputs(
         given.inputs,
@@ -243,7 +255,7 @@ def map_frames(
         notes=notes,
     )
     _say(notes, quiet=quiet)
-    return [_frame(each, None, masks, calibrations) for each in found]
+    return [_frame(each, None, masks, calibrations) for each in found[:: given.every]]
 
 
 def _say(notes: Iterable[str], *, quiet: bool) -> None:
@@ -258,7 +270,10 @@ def _sorted_frames(
         raise UsageError("--sorted takes the names of one file on disk: give --files-from FILE and no input")
     manifest = Manifest(given.files_from)
     return SortedFrames(
-        manifest, _Masks(region), Calibrations(calibration or CalibrationOptions()), range(len(manifest))
+        manifest,
+        _Masks(region),
+        Calibrations(calibration or CalibrationOptions()),
+        range(0, len(manifest), given.every),
     )
 
 
@@ -325,7 +340,78 @@ def pair_frames(
         notes=notes,
     )
     _say(notes, quiet=quiet)
-    return [_frame(pair.left, pair.right, masks, calibrations) for pair in found]
+    return [_frame(pair.left, pair.right, masks, calibrations) for pair in found[:: given.every]]
+
+
+def bag_pairs(
+    given: InputOptions,
+    topics: TopicOptions,
+    *,
+    region: RegionOptions | None = None,
+    calibration: CalibrationOptions | None = None,
+    quiet: bool = True,
+) -> list[Frame]:
+    """Make a frame of each pair of views in bags.
+
+    Raises
+    ------
+    UsageError
+        No bag is named, a topic is missing, or nothing pairs.
+    """
+    left, right = topics.left_topic, topics.right_topic
+    if left is None or right is None:
+        raise UsageError("--left-topic and --right-topic are given together")
+    bags = _bags(given)
+    if not bags:
+        raise UsageError(
+            "--left-topic and --right-topic are of a bag: name a .bag, .db3, .mcap or rosbag2 folder"
+        )
+    from rollcli.files.recordings.frames import pairs_of_bag
+
+    tolerance = round(topics.sync_tolerance * 1e6)
+    found = [pairs_of_bag(files, name, left, right, tolerance) for name, files in bags]
+    masks, calibrations = _Masks(region), Calibrations(calibration or CalibrationOptions())
+    return _bag_frames(found, masks, calibrations, quiet=quiet)[:: given.every]
+
+
+def _bags(given: InputOptions) -> list[tuple[str, list[str]]]:
+    """List the bags among the inputs, each with its files; all inputs are bags, or none is.
+
+    Raises
+    ------
+    UsageError
+        Some are, or one is in a store, or the extra is missing.
+    """
+    bags = []
+    for name in given.inputs:
+        if is_url(name) and name.lower().endswith(BAGS):
+            raise UsageError(f"{public_name(name)}: bags are read from local disk: download it first")
+        if files := [] if is_url(name) else bag_files(name):
+            bags.append((name, files))
+    if bags and (len(bags) < len(given.inputs) or given.files_from is not None):
+        raise UsageError(f"{bags[0][0]}: is a bag: give bags and other inputs in runs of their own")
+    if bags:
+        require_extra("bags", bags[0][0])
+    return bags
+
+
+def _bag_frames(
+    bags: "Iterable[BagFrames]", masks: "_Masks", calibrations: Calibrations, *, quiet: bool
+) -> list[Frame]:
+    frames = []
+    for bag in bags:
+        _say(bag.notes, quiet=quiet)
+        for pair in bag.frames:
+            left, right = (each and Input(each.location, _named(each.name), each.relative) for each in pair)
+            if left is not None:
+                frame = _frame(left, right, masks, calibrations)
+                own = calibrations.given
+                frames.append(frame if own else replace(frame, calibration=bag.calibration))
+    return frames
+
+
+def _named(name: str) -> str:
+    return name.replace(os.sep, "/")
 
 
 def _frame(left: Input, right: Input | None, masks: "_Masks", calibrations: Calibrations) -> Frame:

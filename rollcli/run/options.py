@@ -22,6 +22,8 @@ class InputOptions(NamedTuple):
     include: tuple[str, ...] = ()
     exclude: tuple[str, ...] = ()
     sorted: bool = False
+    topic: str | None = None
+    every: int = 1
 
 
 class PairOptions(NamedTuple):
@@ -30,6 +32,14 @@ class PairOptions(NamedTuple):
     left: str | None = None
     right: str | None = None
     match: Literal["name", "order"] = "name"
+
+
+class TopicOptions(NamedTuple):
+    """Which views of a bag make pairs, and how far apart their header stamps may be, ms."""
+
+    left_topic: str | None = None
+    right_topic: str | None = None
+    sync_tolerance: float = 1.0
 
 
 class EncodingOptions(NamedTuple):
@@ -185,6 +195,7 @@ class EstimateOptions(NamedTuple):
     result: ResultOptions
     running: RunningOptions
     calibration: CalibrationOptions = CalibrationOptions()
+    topics: TopicOptions = TopicOptions()
 
     @property
     def frame(self) -> FrameOptions:

@@ -10,6 +10,7 @@ from rollcli.files.stores.locations import is_url
 from rollcli.files.stream import is_stream
 from rollcli.run.calibration import calibration_files, check_depth, check_first_size
 from rollcli.run.find import (
+    bag_pairs,
     check_inputs_are_kept,
     check_nothing_is_there,
     check_one_owner,
@@ -110,6 +111,11 @@ def _images(frames: Iterable[Frame], options: EstimateOptions) -> Iterator[str]:
 def _find_frames(options: EstimateOptions) -> Sequence[Frame]:
     given, pairs, quiet = options.inputs, options.pairs, options.running.quiet
     skip = [folder for _, folder in options.images.folders()]
+    views = options.topics.left_topic, options.topics.right_topic
+    if any(views):
+        return bag_pairs(
+            given, options.topics, region=options.region, calibration=options.calibration, quiet=quiet
+        )
     named, paired = bool(given.inputs or given.files_from), bool(pairs.left or pairs.right)
     if named and paired:
         raise UsageError("give either maps, or pairs by --left and --right")

@@ -11,6 +11,7 @@ import pytest
 
 from rollcli.errors import InputError, UsageError
 from rollcli.files.containers import file_of, members, shown
+from rollcli.files.search import Search
 from rollcli.files.storage import read_bytes
 from tests.run_cli import road_map, rollcli, write_maps, write_pair
 
@@ -113,7 +114,7 @@ def test_members_that_would_fill_memory_or_are_damaged_are_refused(tmp_path):
     with zipfile.ZipFile(tmp_path / "bomb.zip", "w", zipfile.ZIP_DEFLATED) as file:
         file.writestr("a.npy", bytes(40 * 2**20))
         file.writestr("b.npy", b"fine")
-    with pytest.raises(InputError, match="bomb.zip#a.npy: has 41943040 bytes; up to 32 MB"):
+    with pytest.raises(InputError, match=r"bomb\.zip#a\.npy: has 41943040 bytes; up to 32 MB"):
         read_bytes(tmp_path / "bomb.zip#a.npy")
     assert read_bytes(tmp_path / "bomb.zip#b.npy") == b"fine"
     with pytest.raises(InputError, match="no such file in"):
@@ -126,8 +127,6 @@ def test_members_that_would_fill_memory_or_are_damaged_are_refused(tmp_path):
         assert done.status in (2, 3)
         assert "Traceback" not in done.err
     with pytest.raises(UsageError, match=r"unpack it, or pack it as \.zip or \.tar"):
-        from rollcli.files.search import Search
-
         Search((".png",)).files("run.tar.gz")
 
 

@@ -1,0 +1,375 @@
+"""The frames of a bag: which topics fit, what belongs together, and one frame by its place."""
+
+import os
+from bisect import bisect_left
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import NamedTuple
+
+from rollcli.errors import InputError, UsageError
+from rollcli.files.naming import listed
+from rollcli.files.recordings import messages
+from rollcli.files.recordings.bags import Bag, Topic, opened
+from rollcli.files.recordings.messages import CAMERA_INFO, COMPRESSED, DISPARITY, IMAGE, CameraInfo
+from rollcli.rig.calibration import Calibration
+
+_VIEWS = (IMAGE, COMPRESSED)
+_LISTED = 20  # topics that an error names
+_RAW = "image_raw"
+
+
+class BagFrame(NamedTuple):
+    """A message: where it is, as rows name it, the file name of what is made of it, and its stamp, ns."""
+
+    location: str
+    name: str
+    relative: str
+    stamp: int
+
+
+@dataclass
+class BagFrames:
+    """What a bag, of one file or several, has for a run.
+
+    Attributes
+    ----------
+    frames : list of (BagFrame, BagFrame or None)
+        Maps, or left and right views.
+    calibration : Calibration or None
+        Of the rectified pair, by CameraInfo.
+    notes : list of str
+        What the user should know, a line each.
+    """
+
+    frames: list[tuple[BagFrame, BagFrame | None]] = field(default_factory=list)
+    calibration: Calibration | None = None
+    notes: list[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class _Found:
+    """The frames of some topics, the CameraInfo of cameras and their places, and what is broken."""
+
+    frames: dict[str, list[BagFrame]]
+    cameras: dict[str, CameraInfo]
+    places: dict[tuple[str, str], str]
+    broken: list[tuple[str, str]]
+
+
+def maps_of_bag(files: Sequence[str], name: str, topic: str | None) -> BagFrames:
+    """Find the disparity or depth maps of a bag.
+
+    Parameters
+    ----------
+    files : sequence of str
+        Its files, in their order.
+    name : str
+        What errors call it.
+    topic : str or None
+        The topic; None: the only one that fits.
+
+    Raises
+    ------
+    UsageError
+        There is no such topic, or none or several that fit.
+    """
+    topics = _topics(files)
+    chosen = topic or _only_map_topic(files, topics, name)
+    found = _scan(files, [_known(topics, chosen, name)], topics)
+    bag = BagFrames([(each, None) for each in found.frames[chosen]])
+    left = _camera(found, chosen, right=False)
+    right = _camera(found, chosen, right=True)
+    stated = (0.0, 0.0)
+    if topics[chosen].type == DISPARITY and bag.frames:
+        opened_bag, place = _placed(bag.frames[0][0].location)
+        stated = messages.baseline_of(topics[chosen], opened_bag.read(place).data, chosen)
+    bag.calibration = _calibration(left, right, stated[1], f"CameraInfo of {name}")
+    if bag.calibration is None and topics[chosen].type == DISPARITY:
+        bag.notes.append(
+            f"{name}: no CameraInfo with a principal point: no pitch and no height without --calib"
+        )
+    _finish(bag, found, name, chosen)
+    return bag
+
+
+def pairs_of_bag(files: Sequence[str], name: str, left: str, right: str, tolerance_ns: int) -> BagFrames:
+    """Pair the views of two topics by their header stamps, each with the nearest one within a tolerance.
+
+    Raises
+    ------
+    UsageError
+        There is no such topic, or no pair.
+    """
+    topics = _topics(files)
+    found = _scan(files, [_known(topics, each, name) for each in (left, right)], topics)
+    lefts, rights = found.frames[left], found.frames[right]
+    bag = BagFrames()
+    partners = nearest([each.stamp for each in lefts], [each.stamp for each in rights], tolerance_ns)
+    for topic in (left, right):
+        if _is_raw(found, topic):
+            bag.notes.append(f"{topic}: raw views are rectified by D, K, R and P of {_beside(topic)}")
+            found.frames[topic][:] = [_rectified(found, topic, each) for each in found.frames[topic]]
+    bag.frames = [(each, rights[at]) for each, at in zip(lefts, partners, strict=True) if at is not None]
+    paired = {at for at in partners if at is not None}
+    for side, alone in (
+        ("left", [each for each, at in zip(lefts, partners, strict=True) if at is None]),
+        ("right", [each for at, each in enumerate(rights) if at not in paired]),
+    ):
+        if alone:
+            bag.notes.append(
+                f"{name}: {len(alone)} {side} views have no partner within {tolerance_ns / 1e6:g} ms and "
+                f"are left out: {listed(f'@{each.stamp}' for each in alone)}"
+            )
+    if not bag.frames and (lefts or rights):
+        raise UsageError(
+            f"{name}: no views of {left} and {right} are within {tolerance_ns / 1e6:g} ms: --sync-tolerance"
+        )
+    one, other = (found.cameras.get(_beside(topic)) for topic in (left, right))
+    bag.calibration = _calibration(one, other, 0.0, f"CameraInfo of {name}")
+    _finish(bag, found, name, f"{left} and {right}")
+    return bag
+
+
+def nearest(lefts: Sequence[int], rights: Sequence[int], tolerance: int) -> list[int | None]:
+    """Find for each left stamp the nearest right one; both must be each other's nearest.
+
+    Returns
+    -------
+    list of int or None
+        The position of the right stamp; None where none is within the tolerance.
+    """
+    left_order, right_order = (sorted(range(len(each)), key=each.__getitem__) for each in (lefts, rights))
+
+    def closest(stamp: int, order: Sequence[int], stamps: Sequence[int]) -> int | None:
+        at = bisect_left(order, stamp, key=stamps.__getitem__)
+        around = [each for each in order[max(at - 1, 0) : at + 1] if abs(stamps[each] - stamp) <= tolerance]
+        return min(around, key=lambda each: abs(stamps[each] - stamp), default=None)
+
+    partners: list[int | None] = []
+    for place, stamp in enumerate(lefts):
+        right = closest(stamp, right_order, rights)
+        back = None if right is None else closest(rights[right], left_order, lefts)
+        partners.append(right if right is not None and back in (place, None) else None)
+    return partners
+
+
+def read_frame(path: str, member: str, place: Sequence[int], name: str) -> bytes:
+    """Read one frame of a bag as a whole file; see `messages.as_file`.
+
+    Parameters
+    ----------
+    path : str
+        The bag's file.
+    member : str
+        The topic and the stamp, ``/stereo/disparity@1700000000123456789``.
+    place : sequence of int
+        Two numbers; two more of the CameraInfo by which a raw view is rectified; none: it is searched.
+    name : str
+        What errors call it.
+    """
+    bag = _opened(path)
+    topic_name, _, stamp = member.rpartition("@")
+    topic = _known_topics(*_state(path)).get(topic_name)
+    if topic is None:
+        raise InputError(f"{name}: no such topic in {path}")
+    if not place:
+        place = _index(path, topic_name).get(stamp, ())
+    if not place:
+        raise InputError(f"{name}: no such frame in {path}")
+    raw_of = None
+    if len(place) == 4:
+        message = bag.read((place[2], place[3]))
+        raw_of = messages.camera_info(Topic(message.topic, CAMERA_INFO, topic.encoding), message.data, name)
+    return messages.as_file(topic, bag.read((place[0], place[1])).data, name, raw_of)
+
+
+def broken_part(path: str) -> str:
+    """Say what is wrong behind the whole messages of a bag."""
+    bag = _opened(path)
+    for _ in bag.messages(set()):
+        pass
+    return f"{bag.broken or 'is whole'}; the whole messages before are used"
+
+
+def _state(path: str) -> tuple[str, int, int]:
+    try:
+        found = os.stat(path)  # noqa: PTH116
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from None
+    return path, found.st_size, found.st_mtime_ns
+
+
+def _opened(path: str) -> Bag:
+    return opened(*_state(path))
+
+
+@lru_cache(maxsize=4)  # for a bag without an index they are known once it is read
+def _known_topics(path: str, size: int, modified_ns: int) -> dict[str, Topic]:
+    return opened(path, size, modified_ns).topics()
+
+
+@lru_cache(maxsize=2)  # for names without a place, such as those of a result that is drawn
+def _index(path: str, topic: str) -> dict[str, tuple[int, ...]]:
+    found = _scan([path], [_topics([path])[topic]], {})
+    return {each.name.rpartition("@")[2]: _place(each.location) for each in found.frames[topic]}
+
+
+def _topics(files: Iterable[str]) -> dict[str, Topic]:
+    topics: dict[str, Topic] = {}
+    for path in files:
+        try:
+            topics |= _known_topics(*_state(path))
+        except InputError as error:
+            raise UsageError(str(error)) from None
+    return topics
+
+
+def _known(topics: dict[str, Topic], topic: str, name: str) -> Topic:
+    if topic not in topics:
+        raise UsageError(f"{name}: has no topic {topic}; {_all(topics)}")
+    try:
+        messages.check_decoder(topics[topic], name)
+    except InputError as error:
+        raise UsageError(str(error)) from None
+    return topics[topic]
+
+
+def _all(topics: dict[str, Topic]) -> str:
+    if not topics:
+        return "it has no topics"
+    some = [f"{each.name} ({each.type})" for each in sorted(topics.values(), key=lambda each: each.name)]
+    more = f" and {len(some) - _LISTED} more" if len(some) > _LISTED else ""
+    return f"its topics: {', '.join(some[:_LISTED])}{more}"
+
+
+def _only_map_topic(files: Sequence[str], topics: dict[str, Topic], name: str) -> str:
+    """Return the only topic of maps."""
+    images = {
+        each.name for each in topics.values() if each.type == IMAGE and each.encoding in ("cdr", "ros1")
+    }
+    fitting = [each.name for each in topics.values() if each.type == DISPARITY]
+    fitting += [
+        each
+        for each, pixels in _first_encodings(files, topics, images).items()
+        if pixels in messages.MAP_ENCODINGS
+    ]
+    if len(fitting) == 1:
+        return fitting[0]
+    options = " or ".join(f"--topic {each}" for each in sorted(fitting))
+    if fitting:
+        raise UsageError(f"{name}: several topics fit: give one of {options}")
+    views = any(each.type in _VIEWS for each in topics.values())
+    hint = "; for views give --left-topic and --right-topic" if views else ""
+    raise UsageError(f"{name}: has no topic of disparity or depth maps{hint}; {_all(topics)}")
+
+
+def _first_encodings(files: Sequence[str], topics: dict[str, Topic], images: set[str]) -> dict[str, str]:
+    found: dict[str, str] = {}
+    for path in files:
+        for message in _opened(path).messages(images):
+            if message.topic not in found:
+                try:
+                    found[message.topic] = messages.image_encoding(topics[message.topic], message.data, path)
+                except InputError:
+                    continue
+            if len(found) == len(images):
+                return found
+    return found
+
+
+def _scan(files: Sequence[str], wanted: Sequence[Topic], topics: dict[str, Topic]) -> _Found:
+    """Read through the files once: the stamps of the wanted topics, and a CameraInfo of each camera."""
+    by_name = {each.name: each for each in wanted}
+    infos = {
+        each.name for each in topics.values() if each.type == CAMERA_INFO and each.encoding in ("cdr", "ros1")
+    }
+    frames: dict[str, list[BagFrame]] = {each: [] for each in by_name}
+    cameras: dict[str, CameraInfo] = {}
+    places: dict[tuple[str, str], str] = {}
+    broken = []
+    seen: dict[str, int] = {}
+    for path in files:
+        bag = _opened(path)
+        stem = os.path.splitext(os.path.basename(path))[0]  # noqa: PTH119, PTH122
+        for message in bag.messages({*by_name, *infos}):
+            place = "{}+{}".format(*message.place)
+            if (topic := by_name.get(message.topic)) is None:
+                if (path, message.topic) not in places:
+                    info = messages.camera_info(topics[message.topic], message.data, message.topic)
+                    cameras.setdefault(message.topic, info)
+                    places[path, message.topic] = place
+                continue
+            stamp = messages.stamp_of(topic, message.data, message.log_time)
+            name = f"{path}#{topic.name}@{stamp}"
+            seen[name] = seen.get(name, -1) + 1
+            again = f".{seen[name]}" if seen[name] else ""  # a recorder may write a message twice
+            ending = ".png" if topic.type == COMPRESSED else ".npy"
+            relative = f"{stem}_{stamp}{again.replace('.', '_')}{ending}"
+            frames[topic.name].append(BagFrame(f"{name}{again}#@{place}", f"{name}{again}", relative, stamp))
+        if bag.broken:
+            broken.append((path, stem))
+    return _Found(frames, cameras, places, broken)
+
+
+def _finish(bag: BagFrames, found: _Found, name: str, topic: str) -> None:
+    """Add a frame for what is broken, which fails and says so; refuse a bag without any."""
+    if not bag.frames and not found.broken:
+        raise UsageError(f"{name}: has no messages of {topic}")
+    for path, stem in found.broken:
+        rest = BagFrame(f"{path}#rest", f"{path}#rest", f"{stem}_rest.npy", 0)
+        bag.frames.append((rest, None if not bag.frames or bag.frames[0][1] is None else rest))
+
+
+def _beside(topic: str) -> str:
+    """Name the CameraInfo of an image topic: it lies in the same namespace."""
+    return f"{topic.rpartition('/')[0]}/camera_info"
+
+
+def _camera(found: _Found, topic: str, *, right: bool) -> CameraInfo | None:
+    """Return the one left, or right, camera; of several the one whose namespace has most in common."""
+    fitting = [
+        (_in_common(name, topic), name)
+        for name, info in found.cameras.items()
+        if info.usable and (info.p[3] != 0) is right
+    ]
+    return found.cameras[max(fitting)[1]] if fitting else None
+
+
+def _in_common(one: str, other: str) -> int:
+    """Count the first characters that two names share."""
+    return next((at for at, (a, b) in enumerate(zip(one, other, strict=False)) if a != b), len(one))
+
+
+def _calibration(
+    left: CameraInfo | None, right: CameraInfo | None, baseline: float, source: str
+) -> Calibration | None:
+    """Make the calibration of the rectified pair; None where the left camera's P is not known."""
+    if left is None or not left.usable:
+        return None
+    p, doffs = left.p, 0.0
+    if right is not None and right.usable and right.p[3] != 0:
+        baseline, doffs = abs(right.p[3] / right.p[0]), right.p[2] - p[2]
+    size = (left.width or None, left.height or None)
+    return Calibration(p[0], p[5], p[2], p[6], baseline or None, doffs, *size, source=source)
+
+
+def _is_raw(found: _Found, topic: str) -> bool:
+    """Tell whether the views of a topic must be rectified."""
+    info = found.cameras.get(_beside(topic))
+    return _RAW in topic and info is not None and info.changes_raw_views
+
+
+def _rectified(found: _Found, topic: str, frame: BagFrame) -> BagFrame:
+    """Add to a frame's location where its CameraInfo is; a file of a split bag without one stays as it is."""
+    place = found.places.get((frame.location.partition("#")[0], _beside(topic)))
+    return frame if place is None else frame._replace(location=f"{frame.location}+{place}")
+
+
+def _place(location: str) -> tuple[int, ...]:
+    return tuple(map(int, location.rpartition("#@")[2].split("+")))
+
+
+def _placed(location: str) -> tuple[Bag, tuple[int, int]]:
+    place = _place(location)
+    return _opened(location.partition("#")[0]), (place[0], place[1])

@@ -1,0 +1,247 @@
+"""Messages of ROS to files that every reader of images knows: numbers to NPY, colours to PPM."""
+
+import io
+import math
+import struct
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from rollcli.errors import InputError
+from rollcli.extras import require_extra
+from rollcli.files.bounded import MOST_BYTES
+from rollcli.files.codecs import arrays, pictures, png
+from rollcli.files.recordings.bags import Topic
+
+DISPARITY, IMAGE, COMPRESSED = (
+    "stereo_msgs/DisparityImage",
+    "sensor_msgs/Image",
+    "sensor_msgs/CompressedImage",
+)
+CAMERA_INFO = "sensor_msgs/CameraInfo"
+MAP_ENCODINGS = ("mono16", "16UC1", "16SC1", "32FC1")  # of images that hold disparities or depths
+# numpy's dtype, and the channels
+_PIXELS = {
+    "mono8": ("u1", 1),
+    "8UC1": ("u1", 1),
+    "mono16": ("u2", 1),
+    "16UC1": ("u2", 1),
+    "16SC1": ("i2", 1),
+    "32FC1": ("f4", 1),
+    "64FC1": ("f8", 1),
+    "rgb8": ("u1", 3),
+    "bgr8": ("u1", 3),
+    "8UC3": ("u1", 3),
+    "rgba8": ("u1", 4),
+    "bgra8": ("u1", 4),
+    "8UC4": ("u1", 4),
+    "rgb16": ("u2", 3),
+    "bgr16": ("u2", 3),
+}
+# ROS names the first two pixels of a row of the mosaic, OpenCV those of its second row from the second on
+_BAYER = {
+    "rggb": cv2.COLOR_BayerBG2BGR,
+    "bggr": cv2.COLOR_BayerRG2BGR,
+    "gbrg": cv2.COLOR_BayerGR2BGR,
+    "grbg": cv2.COLOR_BayerGB2BGR,
+}
+
+
+@dataclass(frozen=True)
+class CameraInfo:
+    """The intrinsics of one camera: of the raw view (D, K, R) and of the rectified one (P); ROS's names."""
+
+    width: int
+    height: int
+    model: str
+    d: tuple[float, ...]
+    k: tuple[float, ...]
+    r: tuple[float, ...]
+    p: tuple[float, ...]
+
+    @property
+    def usable(self) -> bool:
+        """Whether P is there: drivers that were not calibrated write zeros."""
+        return all(map(math.isfinite, self.p)) and self.p[0] > 0 and self.p[5] > 0
+
+    @property
+    def changes_raw_views(self) -> bool:
+        """Whether a raw view is not the rectified one."""
+        turned = any(
+            abs(each - one) > 1e-9 for each, one in zip(self.r, (1, 0, 0, 0, 1, 0, 0, 0, 1), strict=True)
+        )
+        return self.usable and self.k[0] > 0 and (any(self.d) or (turned and any(self.r)))
+
+
+def stamp_of(topic: Topic, data: bytes, log_time: int) -> int:
+    """Return the header's time, ns, without decoding the message; the time of recording where it has none."""
+    try:
+        if topic.encoding == "ros1":
+            seconds, nanoseconds = struct.unpack_from("<II", data, 4)
+        else:
+            seconds, nanoseconds = struct.unpack_from("<iI" if data[1] & 1 else ">iI", data, 4)
+    except (struct.error, IndexError):
+        return log_time
+    return int(seconds) * 10**9 + int(nanoseconds) or log_time
+
+
+def check_decoder(topic: Topic, name: str) -> None:
+    """Refuse a topic that no decoder is for.
+
+    Raises
+    ------
+    InputError
+    """
+    if topic.type not in (DISPARITY, IMAGE, COMPRESSED):
+        hint = ": such video must be decoded in order; record images" if "Video" in topic.type else ""
+        raise InputError(
+            f"{name}: {topic.name} has messages of the type {topic.type or 'unknown'}, not images{hint}"
+        )
+    if topic.encoding not in ("cdr", "ros1"):
+        raise InputError(
+            f"{name}: {topic.name} is serialized as {topic.encoding or 'nothing'}; cdr and ros1 are read"
+        )
+
+
+def camera_info(topic: Topic, data: bytes, name: str) -> CameraInfo:
+    """Decode a CameraInfo."""
+    found = _decoded(topic, data, name)
+    fields = {key: tuple(map(float, getattr(found, key, getattr(found, key.upper(), ())))) for key in "dkrp"}
+    if [len(fields[key]) for key in "krp"] != [9, 9, 12]:
+        raise InputError(f"{name}: its CameraInfo is damaged")
+    return CameraInfo(int(found.width), int(found.height), str(found.distortion_model), **fields)
+
+
+def image_encoding(topic: Topic, data: bytes, name: str) -> str:
+    """Return what the pixels of an Image are; empty for other types."""
+    return str(_decoded(topic, data, name).encoding) if topic.type == IMAGE else ""
+
+
+def baseline_of(topic: Topic, data: bytes, name: str) -> tuple[float, float]:
+    """Return f in px and |T| in m of a DisparityImage; 0 where they are not stated."""
+    found = _decoded(topic, data, name)
+    values = float(found.f), abs(float(getattr(found, "t", getattr(found, "T", 0.0))))
+    return values if all(map(math.isfinite, values)) else (0.0, 0.0)
+
+
+def as_file(topic: Topic, data: bytes, name: str, raw_of: CameraInfo | None = None) -> bytes:
+    """Make a whole file of a message: NPY of one channel, PPM of colours, or what a CompressedImage holds.
+
+    Parameters
+    ----------
+    topic : Topic
+    data : bytes
+        The message as it is serialized.
+    name : str
+        What errors call it.
+    raw_of : CameraInfo or None
+        The message is a raw view of this camera: it is rectified.
+
+    Raises
+    ------
+    InputError
+        It is damaged, or of a type or pixels that no decoder is for.
+    """
+    check_decoder(topic, name)
+    found = _decoded(topic, data, name)
+    if topic.type == COMPRESSED:
+        packed = bytes(found.data)
+        if "compressedDepth" in str(found.format):
+            packed = packed[max(packed.find(png.SIGNATURE), 0) :]
+        if raw_of is None:
+            return packed
+        decode = png.picture if packed.startswith(png.SIGNATURE) else pictures.decode_picture
+        return _file_of(_rectified(decode(packed, name), raw_of))
+    if topic.type == DISPARITY:
+        values = _pixels(found.image, name)
+        least = float(found.min_disparity)
+        below = values < least
+        if values.ndim == 2 and values.dtype.kind == "f" and below.any() and not below.all():
+            values = np.where(below, np.nan, values).astype(values.dtype)
+        return _file_of(values)
+    values = _pixels(found, name)
+    return _file_of(values if raw_of is None else _rectified(values, raw_of))
+
+
+def _decoded(topic: Topic, data: bytes, name: str) -> Any:
+    decode = _decoders()["ros1" if topic.encoding == "ros1" else "cdr"]
+    try:
+        return decode(data, topic.type.replace("/", "/msg/"))
+    except Exception as error:  # noqa: BLE001 (a damaged message fails anywhere in the decoder)
+        raise InputError(f"{name}: is a damaged message of {topic.type}: {type(error).__name__}") from None
+
+
+@lru_cache(maxsize=1)
+def _decoders() -> dict[str, Any]:
+    require_extra("bags", "reading a bag")
+    from rosbags.typesys import Stores, get_typestore
+
+    return {
+        "cdr": get_typestore(Stores.ROS2_HUMBLE).deserialize_cdr,
+        "ros1": get_typestore(Stores.ROS1_NOETIC).deserialize_ros1,
+    }
+
+
+def _pixels(image: Any, name: str) -> NDArray[Any]:
+    """Return the pixels of an Image: (H, W), or BGR (H, W, 3); rows may be longer than their pixels."""
+    encoding, width, height, step = str(image.encoding), int(image.width), int(image.height), int(image.step)
+    bayer, bits = encoding[6:10], encoding[10:]
+    if encoding.startswith("bayer_") and bayer in _BAYER and bits in ("8", "16"):
+        kind, channels = f"u{int(bits) // 8}", 1
+    elif encoding in _PIXELS:
+        kind, channels = _PIXELS[encoding]
+    else:
+        raise InputError(f"{name}: has pixels of the encoding {encoding[:40]!r}, which is not read")
+    dtype = np.dtype(kind).newbyteorder(">" if image.is_bigendian else "<")
+    row = width * channels * dtype.itemsize
+    if width == 0 or height == 0:
+        raise InputError(f"{name}: has no pixels ({width} x {height})")
+    if step < row:
+        raise InputError(
+            f"{name}: its rows have {step} bytes, of {row} that {width} pixels of {encoding} need"
+        )
+    data = np.asarray(image.data, np.uint8)
+    needed = step * (height - 1) + row
+    if needed > min(data.size, MOST_BYTES):
+        raise InputError(f"{name}: is truncated: {needed} bytes are needed, {data.size} are there")
+    rows = np.lib.stride_tricks.as_strided(data, (height, row), (step, 1), writeable=False)
+    values = np.ascontiguousarray(rows).view(dtype).astype(dtype.newbyteorder("="), copy=False)
+    if channels > 1:
+        values = values.reshape(height, width, channels)[..., :3]
+        return values[..., ::-1] if encoding.startswith("rgb") else values
+    return cv2.cvtColor(values, _BAYER[bayer]) if encoding.startswith("bayer_") else values
+
+
+def _file_of(values: NDArray[Any]) -> bytes:
+    if values.ndim == 2:
+        return arrays.encode_npy(values)
+    height, width = values.shape[:2]
+    top, kind = (255, "u1") if values.dtype == np.uint8 else (65535, ">u2")
+    buffer = io.BytesIO(b"P6\n%d %d\n%d\n" % (width, height, top))
+    buffer.seek(0, io.SEEK_END)
+    buffer.write(np.ascontiguousarray(values[..., ::-1], kind).data)
+    return buffer.getvalue()
+
+
+def _rectified(values: NDArray[Any], info: CameraInfo) -> NDArray[Any]:
+    if values.shape[:2] != (info.height, info.width):
+        seen = f"{values.shape[1]}x{values.shape[0]}"
+        raise InputError(f"the raw view is {seen}, and its CameraInfo is of {info.width}x{info.height}")
+    columns, rows = _rectification(info)
+    return cv2.remap(values, columns, rows, cv2.INTER_LINEAR)
+
+
+@lru_cache(maxsize=4)  # the two cameras of a rig
+def _rectification(info: CameraInfo) -> tuple[NDArray[Any], NDArray[Any]]:
+    size = (info.width, info.height)
+    k, r, p = (np.array(each).reshape(3, -1) for each in (info.k, info.r, info.p))
+    r = r if r.any() else np.eye(3)
+    if info.model in ("equidistant", "fisheye"):
+        found = cv2.fisheye.initUndistortRectifyMap(k, np.array(info.d[:4]), r, p[:, :3], size, cv2.CV_32FC1)
+    else:
+        found = cv2.initUndistortRectifyMap(k, np.array(info.d), r, p[:, :3], size, cv2.CV_32FC1)
+    return found[0], found[1]

@@ -1,0 +1,241 @@
+"""Bags in all kinds give the rolls of the same frames from files; what is broken in them is told."""
+
+import csv
+import io
+import math
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from tests.files.recordings.bag_files import (
+    KINDS,
+    camera_info,
+    compressed,
+    disparity_image,
+    image,
+    write_bag,
+)
+from tests.run_cli import road_map, rollcli, write_pair
+
+START = 1_700_000_000_123_456_789
+STEP = 100_000_000
+SIZE = (320, 240)
+P = (350.0, 0, 80, 0, 0, 350, 60, 0, 0, 0, 1, 0)
+P_RIGHT = (350.0, 0, 80, -175, 0, 350, 60, 0, 0, 0, 1, 0)
+SHARED = Path(__file__).parents[3].parent / "shared" / "bags"
+
+
+def rows(text):
+    return list(csv.DictReader(io.StringIO(text)))
+
+
+def maps(count):
+    return [road_map(math.radians(each)).astype(np.float32) for each in range(count)]
+
+
+def drive(count, values=None):
+    """Messages of a drive of disparity maps, with the calibration of both cameras."""
+
+    def make(store):
+        frames = maps(count) if values is None else values
+        height, width = frames[0].shape
+        for number, each in enumerate(frames):
+            stamp = START + number * STEP
+            for side, p in (("left", P), ("right", P_RIGHT)):
+                info = camera_info(store, stamp, (width, height), p, number=number)
+                yield f"/stereo/{side}/camera_info", stamp + 5_000_000, info
+            yield "/stereo/disparity", stamp + 5_000_000, disparity_image(store, each, stamp, number)
+
+    return make
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_disparity_images_give_the_rows_of_the_same_maps_in_files(tmp_path, kind):
+    (tmp_path / "maps").mkdir()
+    for number, each in enumerate(maps(3)):
+        np.save(tmp_path / "maps" / f"{number}.npy", each)
+    path = write_bag(tmp_path, "drive", kind, drive(3)).name
+    numbers = ["--focal", "350", "--principal-point", "80,60", "--baseline", "0.5"]
+    files = rows(rollcli("estimate", "maps", *numbers, cwd=tmp_path).out)
+    done = rollcli("estimate", path, "-j", "2", "--derotated", "upright", cwd=tmp_path)
+    found = rows(done.out)
+    assert (done.status, len(found)) == (0, 3), done.err
+    for one, other in zip(files, found, strict=True):
+        for column in ("roll_deg", "pitch_deg", "height_m"):
+            assert float(one[column]) == pytest.approx(float(other[column]), abs=1e-4), column
+    inside = f"{path}/drive.mcap" if kind == "folder" else path
+    assert [row["file"] for row in found] == [
+        f"{inside}#/stereo/disparity@{START + each * STEP}" for each in range(3)
+    ]
+    made = sorted(each.name for each in (tmp_path / "upright").iterdir())
+    assert made == [f"drive_{START + each * STEP}.npy" for each in range(3)]
+    (tmp_path / "rolls.csv").write_text(done.out)
+    turned = rollcli("derotate", path, "--from", "rolls.csv", "-o", "again", cwd=tmp_path)
+    assert turned.status == 0, turned.err
+    for name in made:
+        upright, again = (np.load(tmp_path / folder / name) for folder in ("upright", "again"))
+        np.testing.assert_allclose(upright, again, rtol=1e-5)  # a result rounds its angles
+    one = rollcli("estimate", found[1]["file"], cwd=tmp_path)
+    assert rows(one.out)[0]["roll_deg"] == found[1]["roll_deg"]
+    every = rollcli("estimate", path, "--every", "2", cwd=tmp_path)
+    assert rows(every.out) == [found[0], found[2]]
+    listed = rollcli("estimate", path, "--dry-run", cwd=tmp_path).out.splitlines()
+    assert listed == [f"read  {row['file']}" for row in found]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_views_are_paired_by_their_stamps_never_by_order(tmp_path, kind):
+    for number in range(4):
+        write_pair(tmp_path / "pairs", f"{number}.png", road_map(math.radians(number)), seed=number)
+    views = {
+        side: [cv2.imread(str(tmp_path / "pairs" / side / f"{each}.png"), 0) for each in range(4)]
+        for side in ("left", "right")
+    }
+
+    def make(store):
+        for number in range(4):
+            stamp = START + number * STEP
+            yield (
+                "/l/image_rect",
+                stamp,
+                image(store, views["left"][number], "mono8", stamp, number, padding=5),
+            )
+            if number != 1:  # dropped
+                late = stamp + 15_000  # as OAK's cameras
+                yield "/r/image_rect", late, image(store, views["right"][number], "mono8", late, number)
+
+    path = write_bag(tmp_path, "drive", kind, make).name
+    (tmp_path / "pairs/left/1.png").unlink()
+    (tmp_path / "pairs/right/1.png").unlink()
+    files = rows(rollcli("estimate", "--left", "pairs/left", "--right", "pairs/right", cwd=tmp_path).out)
+    given = ["--left-topic", "/l/image_rect", "--right-topic", "/r/image_rect"]
+    done = rollcli("estimate", path, *given, cwd=tmp_path)
+    assert done.status == 0, done.err
+    found = rows(done.out)
+    assert [row["file"].rpartition("@")[2] for row in found] == [
+        str(START + each * STEP) for each in (0, 2, 3)
+    ]
+    assert [row["right_file"].rpartition("@")[2] for row in found] == [
+        str(START + each * STEP + 15_000) for each in (0, 2, 3)
+    ]
+    for one, other in zip(files, found, strict=True):
+        assert float(one["roll_deg"]) == pytest.approx(float(other["roll_deg"]), abs=0.005)
+    assert f"1 left views have no partner within 1 ms and are left out: @{START + STEP}" in done.err
+    strict = rollcli("estimate", path, *given, "--sync-tolerance", "0.01", cwd=tmp_path)
+    assert (strict.status, "within 0.01 ms" in strict.err) == (2, True)
+
+
+def test_raw_views_are_rectified_and_a_line_says_so(tmp_path):
+    write_pair(tmp_path / "pairs", "0.png", road_map(math.radians(3)))
+    views = {side: cv2.imread(str(tmp_path / "pairs" / side / "0.png"), 0) for side in ("left", "right")}
+    height, width = views["left"].shape
+    k = np.array([[350.0, 0, 80], [0, 350, 60], [0, 0, 1]])
+    d = np.array([-0.2, 0.05, 0.001, -0.001, 0.0])
+    # the raw view by its definition: each of its pixels shows what lies at its undistorted place
+    v, u = np.mgrid[:height, :width].astype(np.float64)
+    places = cv2.undistortPoints(np.dstack([u, v]).reshape(-1, 1, 2), k, d, P=k).reshape(height, width, 2)
+    raw = {
+        side: cv2.remap(each, places.astype(np.float32), None, cv2.INTER_CUBIC)
+        for side, each in views.items()
+    }
+
+    def make(store):
+        for side, p in (("left", P), ("right", P_RIGHT)):
+            info = camera_info(store, START, (width, height), p, d, k.ravel())
+            yield f"/{side}/camera_info", START, info
+            yield f"/{side}/image_raw", START, image(store, raw[side], "mono8", START)
+
+    path = write_bag(tmp_path, "drive", "mcap", make).name
+    for side, each in raw.items():
+        upright = cv2.undistort(each, k, d, None, np.reshape(P, (3, 4))[:, :3])
+        cv2.imwrite(str(tmp_path / "pairs" / side / "0.png"), upright)
+    files = rows(rollcli("estimate", "--left", "pairs/left", "--right", "pairs/right", cwd=tmp_path).out)
+    done = rollcli(
+        "estimate", path, "--left-topic", "/left/image_raw", "--right-topic", "/right/image_raw", cwd=tmp_path
+    )
+    assert "raw views are rectified by D, K, R and P of /left/camera_info" in done.err
+    found = rows(done.out)[0]
+    assert float(found["roll_deg"]) == pytest.approx(float(files[0]["roll_deg"]), abs=0.005)
+    assert found["height_m"] != ""
+
+
+def test_numbers_of_images_and_compressed_ones_are_read(tmp_path):
+    values = maps(1)[0]
+    whole = np.rint(values * 256).astype(np.uint16)
+    depth = np.where(values > 0, 350 * 0.5 / np.maximum(values, 1e-3), 0).astype(np.float32)
+
+    def make(store):
+        yield "/disparity16", START, image(store, whole.astype(">u2"), "mono16", START)
+        yield "/depth", START, image(store, depth, "32FC1", START)
+        yield (
+            "/png/compressed",
+            START,
+            compressed(store, cv2.imencode(".png", whole)[1].tobytes(), "png", START),
+        )
+        yield "/photo", START, image(store, np.zeros((*whole.shape, 3), np.uint8), "bgr8", START)
+        yield "/short", START, image(store, whole, "mono8", START)
+
+    path = write_bag(tmp_path, "drive", "db3", make).name
+    np.save(tmp_path / "whole.npy", whole)
+    expected = rows(rollcli("estimate", "whole.npy", cwd=tmp_path).out)[0]["roll_deg"]
+    several = rollcli("estimate", path, cwd=tmp_path)
+    assert (several.status, "give one of --topic /depth or --topic /disparity16" in several.err) == (2, True)
+    for topic in ("/disparity16", "/png/compressed"):
+        assert rows(rollcli("estimate", path, "--topic", topic, cwd=tmp_path).out)[0]["roll_deg"] == expected
+    numbers = ["--encoding", "depth", "--focal", "350", "--principal-point", "80,60", "--baseline", "0.5"]
+    found = rows(rollcli("estimate", path, "--topic", "/depth", *numbers, cwd=tmp_path).out)[0]
+    assert float(found["roll_deg"]) == pytest.approx(float(expected), abs=0.02)
+    none = rollcli("estimate", path, "--topic", "/nothing", cwd=tmp_path)
+    assert (none.status, "has no topic /nothing; its topics: /depth (sensor_msgs/Image)" in none.err) == (
+        2,
+        True,
+    )
+    photo = rollcli("estimate", path, "--topic", "/photo", cwd=tmp_path)
+    assert (photo.status, rows(photo.out)[0]["status"]) == (3, "error")
+
+
+@pytest.mark.parametrize("kind", ["bag", "db3", "mcap"])
+def test_a_bag_that_is_cut_gives_every_whole_message_and_a_line(tmp_path, kind):
+    frames = [
+        each + np.float32(0.001) * np.random.default_rng(1).random(each.shape, np.float32) for each in maps(6)
+    ]
+    path = write_bag(tmp_path, "drive", kind, drive(6, frames))
+    whole = {row["file"]: row["roll_deg"] for row in rows(rollcli("estimate", path.name, cwd=tmp_path).out)}
+    data = path.read_bytes()
+    counts = []
+    for tenth in range(1, 10):
+        path.write_bytes(data[: len(data) * tenth // 10])
+        done = rollcli("estimate", path.name, "-j", "1", cwd=tmp_path)
+        assert "internal error" not in done.err
+        assert "Traceback" not in done.err
+        found = rows(done.out)
+        counts.append(max(len(found) - 1, 0))
+        for row in found[:-1]:
+            assert whole[row["file"]] == row["roll_deg"]
+        if found:
+            assert done.status == 3
+            assert (found[-1]["file"], found[-1]["status"]) == (f"{path.name}#rest", "error")
+            assert "cut off" in found[-1]["message"]
+    assert counts == sorted(counts)
+    assert counts[-1] >= 4
+
+
+def test_an_interrupted_run_over_a_bag_is_resumed_to_the_same_bytes(tmp_path):
+    path = write_bag(tmp_path, "drive", "mcap", drive(3)).name
+    rollcli("estimate", path, "-o", "rolls.csv", cwd=tmp_path)
+    whole = (tmp_path / "rolls.csv").read_bytes()
+    (tmp_path / "rolls.csv").write_bytes(b"".join(whole.splitlines(keepends=True)[:2]))
+    assert rollcli("estimate", path, "-o", "rolls.csv", "--resume", cwd=tmp_path).status == 0
+    assert (tmp_path / "rolls.csv").read_bytes() == whole
+
+
+@pytest.mark.skipif(not SHARED.is_dir(), reason="the bags of other programs are not here")
+def test_bags_of_other_programs_without_images_end_in_a_line_with_their_topics():
+    paths = [path for path in sorted(SHARED.iterdir()) if path.suffix in (".bag", ".db3", ".mcap")]
+    for path in paths:
+        done = rollcli("estimate", str(path), cwd=SHARED)
+        assert done.status == 2, path
+        assert len(done.err.splitlines()) == 1, path
+        assert "its topics: " in done.err or "it has no topics" in done.err, path
