@@ -67,7 +67,8 @@ from rollcli.report.options import GALLERY, ReportOptions
     type=PATH,
     metavar="DIR",
     section="Charts for slides",
-    help="Write each chart of the page as an SVG: roll, histogram, and pitch, height and how the right view lies where known.",
+    help="Write each chart of the page as an SVG: roll, histogram, and where there are any, pitch, height "
+    "and how the right view lies.",
 )
 @option("--pdf", type=PATH, metavar="DIR", section="Charts for slides", help="The same as PDFs.")
 @option(

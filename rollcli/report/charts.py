@@ -3,7 +3,7 @@
 import html
 import math
 import textwrap
-from collections.abc import Callable, Iterable, Sequence, Set
+from collections.abc import Iterable, Sequence, Set
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -221,15 +221,16 @@ Trace = dict[str, Any]
 
 def all_charts(rows: Sequence[Row], rig: RigAssessment | None = None) -> dict[str, Chart]:
     """Return the charts of `chart_names` by their names."""
-    made: dict[str, Callable[[Sequence[Row]], Chart]] = {
-        HISTOGRAM: histogram,
-        ALIGNED: lambda rows: alignment(rows, rig),
-    }
-    quantities = {each.name: each for each in QUANTITIES}
-    return {
-        name: made[name](rows) if name in made else chart_over_frames(rows, quantities[name], rig)
-        for name in chart_names(rows)
-    }
+    charts = {}
+    for name in chart_names(rows):
+        if name == HISTOGRAM:
+            charts[name] = histogram(rows)
+        elif name == ALIGNED:
+            charts[name] = alignment(rows, rig)
+        else:
+            quantity = next(each for each in QUANTITIES if each.name == name)
+            charts[name] = chart_over_frames(rows, quantity, rig)
+    return charts
 
 
 def alignment(rows: Sequence[Row], rig: RigAssessment | None = None) -> Chart:
