@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.estimator.least_squares import regular, solve_normal, unit
-from rollcli.estimator.moments import Floats, Grid, powers
+from rollcli.estimator.moments import Floats, Grid
 from rollcli.estimator.road.model import Reals, RoadModel
 from rollcli.estimator.road.surface import Surface
 from rollcli.estimator.tuning import IntervalTuning
@@ -388,8 +388,11 @@ def touch(
 
 def _parabola_of_cubic(along: Reals, weights: Floats) -> tuple[float, float]:
     """Return value and slope at 0 of the parabola that fits the cubes of some positions of mean 0."""
-    rows = powers(along, 3)
-    products = (rows[:3] * weights).dot(rows.T)
+    squares = along * along
+    weighted = weights * squares
+    n, two, three = weights.sum(), weighted.sum(), weighted.dot(along)
+    four, five = weighted.dot(squares), weighted.dot(squares * along)
+    products = np.array([[n, 0, two, three], [0, two, three, four], [two, three, four, five]])
     value, slope, _ = solve_normal(products[:, :3], products[:, 3]).tolist()
     return value, slope
 

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -132,35 +133,37 @@ def take_sample(disparity: NDArray[Any], usable: NDArray[np.bool_] | None, tunin
     disparity = np.ascontiguousarray(disparity)
     height, width = disparity.shape
     grid, reach = Grid.of_shape(height, width), reach_of(height, width, tuning)
-    spacing, rows, columns = _chosen(disparity, usable, reach, tuning)
-    top, left = spacing.first(reach)
-    v, u = np.arange(top, height, spacing.rows), np.arange(left, width, spacing.columns)
-    places = (v * width)[rows] + u[columns]
+    spacing, chosen = _chosen(disparity, usable, reach, tuning)
+    at, right, down, columns = _lattice(height, width, reach, spacing)
+    places, column = at.take(chosen, mode="clip"), columns.take(chosen, mode="clip")
+    x, y = right.take(chosen, mode="clip"), down.take(chosen, mode="clip")
     d = values_at(places, disparity)
     few = every(len(d), tuning.coarse_pixels)
-    steps = steps_to(places[few] + sides(reach, width), disparity, d[few])
-    jumps, typical = np.abs(steps), quantile(d[few], 0.5)
+    few_d = d[few].copy()
+    steps = steps_to(places[few] + sides(reach, width), disparity, few_d)
+    jumps, typical = np.abs(steps), quantile(few_d, 0.5)
     if not _SMALLEST < typical < _LARGEST:
         raise EstimationError(f"disparities of about {typical:g}: they have to be in pixels, or nearly so")
     known = jumps[1::2, ::2]
     known = known[(known > 0) & (known < NO_STEP)]
     quantum = quantile(known, 1 / 20) if len(known) else 0.0  # smaller ones are noise, or rounding of floats
+    with_data = count(jumps < NO_STEP)
     for _ in range(2):  # again without the noise, which has another median
         noise = max(tuning.noise_share * typical, quantum / math.sqrt(12))
-        tolerance = tolerance_of(d[few], noise, tuning)
+        tolerance = tolerance_of(few_d, noise, tuning)
         agree = count(jumps <= tolerance)
-        coherent = (agree > 0) & (2 * agree >= count(jumps < NO_STEP))
+        coherent = (agree > 0) & (2 * agree >= with_data)
         if coherent.any():
-            typical = quantile(d[few][coherent], 0.5)
+            typical = quantile(few_d.compress(coherent), 0.5)
     return Sample(
         grid=grid,
-        x=((u - grid.centre_u) / grid.scale).astype(np.float32)[columns],
-        y=((v - grid.centre_v) / grid.scale).astype(np.float32)[rows],
+        x=x,
+        y=y,
         d=d,
         tolerance=tolerance_of(d, noise, tuning),
         places=places,
         few=few,
-        column=columns[few].astype(np.uint16),
+        column=column[few],
         coherent=coherent,
         slopes=_slopes(steps, 2 * np.maximum(tolerance, np.float32(quantum)))
         * np.float32(grid.scale / reach),
@@ -175,8 +178,8 @@ def take_sample(disparity: NDArray[Any], usable: NDArray[np.bool_] | None, tunin
 
 def _chosen(
     disparity: NDArray[Any], usable: NDArray[np.bool_] | None, reach: int, tuning: SampleTuning
-) -> tuple[Spacing, NDArray[np.intp], NDArray[np.intp]]:
-    """Return a spacing, and the rows and columns, counted in it, of the valid pixels."""
+) -> tuple[Spacing, NDArray[np.intp]]:
+    """Return a spacing, and which of the pixels so far apart are valid, counted row by row."""
     spacing = Spacing.of(disparity.size / tuning.pixels)
     while True:
         with np.errstate(invalid="ignore"):
@@ -190,9 +193,24 @@ def _chosen(
         spacing = Spacing.of(spacing.rows * spacing.columns * max(count, LEAST_PIXELS) / tuning.pixels)
     if count < LEAST_PIXELS:
         raise EstimationError(f"only {count} valid pixels away from the border: too few to find a road in")
-    index = chosen.ravel().nonzero()[0]
-    rows = index // chosen.shape[1]
-    return spacing, rows, index - rows * chosen.shape[1]
+    return spacing, chosen.ravel().nonzero()[0]
+
+
+@lru_cache(maxsize=4)
+def _lattice(
+    height: int, width: int, reach: int, spacing: Spacing
+) -> tuple[NDArray[np.intp], Singles, Singles, NDArray[np.uint16]]:
+    """Return the places in the map, x, y and the column in the lattice of all pixels so far apart."""
+    grid, (top, left) = Grid.of_shape(height, width), spacing.first(reach)
+    v, u = np.arange(top, height - reach, spacing.rows), np.arange(left, width - reach, spacing.columns)
+    x, y = ((u - grid.centre_u) / grid.scale).astype(np.float32), (v - grid.centre_v) / grid.scale
+    shape = (len(v), len(u))
+    return (
+        (v[:, None] * width + u).ravel(),
+        np.broadcast_to(x, shape).ravel(),
+        np.broadcast_to(y.astype(np.float32)[:, None], shape).ravel(),
+        np.broadcast_to(np.arange(len(u), dtype=np.uint16), shape).ravel(),
+    )
 
 
 def every(count: int, pixels: int) -> slice:
@@ -226,9 +244,9 @@ def tolerance_of(d: NDArray[Any], noise: float, tuning: SampleTuning) -> Singles
 
 
 def values_at(places: NDArray[np.intp], disparity: NDArray[Any]) -> Singles:
-    """Return the disparities of a map at some places, counted row by row."""
+    """Return the disparities of a map at some places, counted row by row; all are inside."""
     with np.errstate(over="ignore", invalid="ignore"):
-        values: Singles = disparity.reshape(-1).take(places).astype(np.float32, copy=False)
+        values: Singles = disparity.reshape(-1).take(places, mode="clip").astype(np.float32, copy=False)
     return values
 
 

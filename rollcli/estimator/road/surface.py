@@ -353,7 +353,7 @@ def _near_pixels(sample: Sample, road: Road, tuning: Tuning) -> tuple[NearPixels
     close = np.abs(c0 + c1 * sample.x + c2 * sample.y - sample.d) < _REACH * sample.tolerance
     stride = -(-int(np.count_nonzero(close)) // fit.pixels) or 1
     near = close[::stride].nonzero()[0] * stride  # so that one pixel more moves no other
-    places = np.stack([sample.x[near], sample.y[near]])
+    places = np.array([sample.x.take(near), sample.y.take(near)])
     mean, place = _look_around(sample, road.plane, near, tuning)
     across, along = model.turned(places)
     # what a rig does not see that is rolled a little more or less would turn the angle of a cambered road
