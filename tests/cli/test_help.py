@@ -9,7 +9,7 @@ import click
 import pytest
 
 from tests.readme_tables import commands
-from tests.run_cli import environment, rollcli
+from tests.run_cli import ROOT, environment, rollcli
 
 COMMANDS = dict(commands())
 HELP = """
@@ -64,7 +64,7 @@ def test_every_option_says_what_it_does(name):
 
 def test_rig_and_report_tell_how_they_end_themselves():
     ends = {
-        name: rollcli(name, "--help").out.partition("Exit status:")[2].split("\n\n")[0]
+        name: rollcli(name, "--help", cwd=ROOT).out.partition("Exit status:")[2].split("\n\n")[0]
         for name in ("rig", "report", "estimate")
     }
     starts = {name: re.findall(r"^  (\d+) ", text, flags=re.M) for name, text in ends.items()}

@@ -354,7 +354,7 @@ def test_a_table_of_few_frames_has_no_empty_space_and_the_chart_a_picture_until_
     box, last = (page.locator(each).bounding_box() for each in (".rows", ".rows .row:last-child"))
     assert last["y"] + last["height"] == pytest.approx(box["y"] + box["height"], abs=3)
     page.wait_for_selector("#histogram .main-svg")
-    assert page.locator(".still").count() == 0
+    assert page.locator(".still:visible").count() == 0
 
     for width, shown in ((1280, ".wide-screen"), (400, ".narrow-screen")):
         still = browser.new_page(viewport={"width": width, "height": 900}, java_script_enabled=False)

@@ -34,7 +34,7 @@
       modeBarButtons: [["toImage"], ["zoom2d", "pan2d"], ["zoomIn2d", "zoomOut2d", "resetScale2d"]], plotlyServerURL: "",
       toImageButtonOptions: { filename: name, scale: 2 },
     });
-    place.querySelectorAll(":scope > .still").forEach(each => each.remove());
+    place.classList.add("drawn");  // its still is for paper
   };
   const charts = [...document.querySelectorAll("[data-chart]")];
   // one thing at a time, so that the page answers in between

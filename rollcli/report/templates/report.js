@@ -17,7 +17,9 @@
   };
   document.addEventListener("click", event => {
     const button = event.target.closest(".switch button");
-    if (button) turn(button.closest(".pictures"), button.dataset.show);
+    if (!button) return;
+    const boxes = button.closest(".switch-all") ? document.querySelectorAll(".gallery .pictures") : [button.closest(".pictures")];
+    boxes.forEach(box => turn(box, button.dataset.show));
   });
   // also from a copy of the pictures, which the table shows
   document.addEventListener("click", event => {
