@@ -6,7 +6,7 @@ import os
 import pytest
 
 from rollcli.errors import InputError
-from rollcli.files.results import read_run
+from rollcli.files.results import Row, read_run
 from rollcli.run.options import (
     EncodingOptions,
     FrameOptions,
@@ -18,6 +18,7 @@ from rollcli.run.options import (
 )
 from rollcli.run.plan import make_plan
 from rollcli.run.record import RunRecord, changed_input, fingerprint, recorded_options
+from rollcli.run.summary import RunSummary
 from tests.run.estimate_options import estimate_options
 from tests.run_cli import write_maps
 
@@ -35,12 +36,20 @@ def options(tmp_path):
     )
 
 
+def summary_of(frames):
+    """The summary of a run of so many frames."""
+    summary = RunSummary()
+    for _ in range(frames):
+        summary.add(Row("a.png", status="ok"))
+    return summary
+
+
 def written(options, *seen):
     """The record of a run that saw these encodings and ranges."""
     record = RunRecord(make_plan(options), options)
     for encoding, searched in seen:
         record.saw(encoding, searched)
-    record.write({"frames": 3})
+    record.write(summary_of(3))
     return read_run(options.result.output)
 
 
@@ -75,7 +84,7 @@ def test_a_resumed_run_writes_the_record_of_an_undisturbed_one(options):
     record = RunRecord(make_plan(options), options)
     record.continue_from(json.loads(json.dumps(written(options, ("kitti", (0, 63))))))
     record.saw("px", (0, 79))
-    record.write({"frames": 3})
+    record.write(summary_of(3))
     assert read_run(options.result.output) == whole
 
 
