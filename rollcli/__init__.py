@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from rollcli.estimator.estimate import RollEstimate as RollEstimate
     from rollcli.estimator.interval import Tangent as Tangent
     from rollcli.files.encodings import read_disparity as read_disparity
+    from rollcli.files.recordings.open import open_recording as open_recording
     from rollcli.pictures.derotate import derotate as derotate
     from rollcli.pictures.heights import height_map as height_map
     from rollcli.pictures.vdisparity import VDisparity as VDisparity
@@ -47,6 +48,7 @@ _HOMES = {
     "estimate_pair": "rollcli.run.estimate_pair",
     "estimate_roll": "rollcli.run.estimate_map",
     "height_map": "rollcli.pictures.heights",
+    "open_recording": "rollcli.files.recordings.open",
     "read_calibration": "rollcli.run.calibration",
     "read_disparity": "rollcli.files.encodings",
     "v_disparity": "rollcli.pictures.vdisparity",
@@ -69,6 +71,7 @@ __all__ = [
     "estimate_pair",
     "estimate_roll",
     "height_map",
+    "open_recording",
     "read_calibration",
     "read_disparity",
     "v_disparity",

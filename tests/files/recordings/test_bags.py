@@ -9,6 +9,8 @@ import cv2
 import numpy as np
 import pytest
 
+import rollcli as package
+from rollcli.errors import InputError
 from tests.files.recordings.bag_files import (
     KINDS,
     camera_info,
@@ -239,3 +241,15 @@ def test_bags_of_other_programs_without_images_end_in_a_line_with_their_topics()
         assert done.status == 2, path
         assert len(done.err.splitlines()) == 1, path
         assert "its topics: " in done.err or "it has no topics" in done.err, path
+
+
+def test_python_iterates_the_frames_of_a_bag(tmp_path):
+    path = write_bag(tmp_path, "drive", "bag", drive(2))
+    found = list(package.open_recording(path))
+    assert [each.stamp for each in found] == [START, START + STEP]
+    for each, values in zip(found, maps(2), strict=True):
+        np.testing.assert_array_equal(each.disparity, values)
+    assert (found[0].calibration.fx, found[0].calibration.baseline) == (350, 0.5)
+    path.write_bytes(path.read_bytes()[:-90_000])
+    with pytest.raises(InputError, match="cut off at"):
+        list(package.open_recording(path))
