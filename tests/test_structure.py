@@ -41,7 +41,11 @@ DOOR_PACKAGES = {
     "rollcli.cli": "the command line's doors: help and version load no command",
 }
 # what is filled in while it is made
-CHANGING = {"rollcli.run.progress._Cause", "rollcli.simulate.scene.Scene"}
+CHANGING = {
+    "rollcli.files.recordings.frames.BagFrames",
+    "rollcli.run.progress._Cause",
+    "rollcli.simulate.scene.Scene",
+}
 
 
 def modules():

@@ -155,7 +155,7 @@ def test_raw_views_are_rectified_and_a_line_says_so(tmp_path):
         places = cv2.initUndistortRectifyMap(k, d, np.eye(3), new, (width, height), cv2.CV_32FC1)
         upright = cv2.remap(each, *places, cv2.INTER_LINEAR)
         rounded = cv2.undistort(each, k, d, None, new)  # its places are rounded to 1/32 px
-        assert np.abs(upright.astype(int) - rounded).max() <= 2
+        assert np.abs(upright.astype(int) - rounded).mean() < 0.5  # levels of 256
         cv2.imwrite(str(tmp_path / "pairs" / side / "0.png"), upright)
     files = rows(rollcli("estimate", "--left", "pairs/left", "--right", "pairs/right", cwd=tmp_path).out)
     done = rollcli(
