@@ -71,12 +71,12 @@ import pathlib, sys, time
 if "spawn_main" in " ".join(sys.orig_argv):
     import rollcli.files.formats as formats
     read = formats.read_stored
-    def read_stored(path, name=None):
+    def read_stored(path, name=None, **how):
         if pathlib.Path(path).stem == "STEM":
             pathlib.Path("has-begun").touch()
             while not pathlib.Path("may-go-on").exists():
                 time.sleep(0.01)
-        return read(path, name)
+        return read(path, name, **how)
     formats.read_stored = read_stored
 """
 

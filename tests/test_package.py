@@ -12,7 +12,6 @@ import zipfile
 import pytest
 import yaml
 
-from setup import description
 from tests.run_cli import ROOT
 
 ACTION = yaml.safe_load((ROOT / ".github" / "action" / "action.yml").read_text("utf-8"))
@@ -88,7 +87,10 @@ def test_the_wheel_holds_the_program_alone_and_says_what_it_is(built):
     assert metadata["Author"]
     assert metadata["Description-Content-Type"] == "text/markdown"
     assert "dev" not in metadata.get_all("Provides-Extra")
-    assert "## Install" in metadata.get_payload()
+    shown = metadata.get_payload()
+    assert "## Install" in shown
+    assert re.findall(r"\]\((?!https://)[^)]*\)", shown) == []  # links that lead nowhere on an index
+    assert len(shown.split()) > 0.8 * len((ROOT / "README.md").read_text("utf-8").split())
 
 
 @pytest.mark.slow
@@ -172,32 +174,3 @@ def test_the_container_copies_what_is_there_and_is_not_root():
         assert (ROOT / name).exists()
     (user,) = re.findall(r"^USER (\d+)", text, flags=re.M)
     assert int(user) > 0
-
-
-README = """# Name
-![A picture](a.png)
-
-*Its caption, over
-two lines.*
-
-See [the rest](rest/README.md#top), [below](#below) and [elsewhere](https://example.com).
-"""
-
-
-def test_where_relative_links_lead_nowhere_they_are_their_text():
-    assert description(README, "") == (
-        "# Name\n\nSee the rest, below and [elsewhere](https://example.com).\n"
-    )
-
-
-def test_where_the_source_is_known_links_lead_there():
-    shown = description(README, "https://example.com/blob/main/")
-    assert "![A picture](https://example.com/blob/main/a.png?raw=true)" in shown
-    assert "[the rest](https://example.com/blob/main/rest/README.md#top)" in shown
-    assert "[below](#below)" in shown
-
-
-def test_the_description_of_the_readme_has_no_relative_link_or_picture():
-    shown = description((ROOT / "README.md").read_text("utf-8"), "")
-    assert re.findall(r"\]\((?!https://)[^)]*\)", shown) == []
-    assert len(shown.split()) > 0.8 * len((ROOT / "README.md").read_text("utf-8").split())

@@ -70,7 +70,7 @@ def test_a_url_that_names_no_file_is_that_frames_error_and_writes_nothing(tmp_pa
     done = rollcli("estimate", *maps, "-o", "rolls.csv", "--derotated", "up", "--vdisparity", "v", cwd=cwd)
     assert done.status == 3, done.err
     rows = {each["file"]: each for each in rows_of(cwd / "rolls.csv")}
-    assert "its URL names no file" in rows[maps[0]]["message"]
+    assert "names no file below a folder" in rows[maps[0]]["message"]
     assert rows[maps[1]]["status"] == "ok"
     assert written(cwd) == ["rolls.csv", "rolls.csv.run.json", "up/good.png", "v/good.png"]
     assert written(tmp_path / "map") == ["frame0.png"]
@@ -79,7 +79,7 @@ def test_a_url_that_names_no_file_is_that_frames_error_and_writes_nothing(tmp_pa
 def test_a_url_that_is_no_address_is_that_frames_error(tmp_path):
     done = rollcli("estimate", "http://[/a.png", "http://[::1]:x/b.png", cwd=tmp_path)
     assert done.status == 3
-    assert "http://[/a.png: its URL names no file" in done.err
+    assert "http://[/a.png: its name in the store or archive names no file" in done.err
 
 
 @pytest.mark.parametrize("name", ["..%5Cevil.png", "a%00.png", "%2e%2e"])
@@ -89,7 +89,7 @@ def test_other_commands_refuse_such_a_url_too(tmp_path, server, name, command):
     cwd.mkdir()
     done = rollcli(*command, f"{server}/{name}", "-o", "out", cwd=cwd)
     assert done.status in (2, 3), done.err
-    assert "its URL names no file" in done.err
+    assert "names no file below a folder" in done.err
     assert written(tmp_path) == ["map/frame0.png"]
 
 

@@ -174,10 +174,10 @@ COUNTED = {
 def test_a_file_is_read_up_to_the_limit_and_no_further(monkeypatch, name):
     decode, make, pixel_bytes = COUNTED[name]
     data, needed = make(), 13 * 7 * pixel_bytes
-    monkeypatch.setattr(raw_map, "_ALWAYS", 0)
+    monkeypatch.setattr(raw_map, "MOST_SMALL", 0)
 
     monkeypatch.setattr(raw_map, "_MOST", needed)
-    monkeypatch.setattr(raw_map, "_EXPANSION", 2 * needed)
+    monkeypatch.setattr(raw_map, "MOST_EXPANSION", 2 * needed)
     found = decode(data, "x")
     assert (found.values if decode is decode_stored else found).shape[:2] == (7, 13)
     monkeypatch.setattr(raw_map, "_MOST", needed - 1)

@@ -190,12 +190,12 @@ import os, pathlib, signal, sys
 if "spawn_main" in " ".join(sys.orig_argv):
     import rollcli.files.formats as formats
     read = formats.read_stored
-    def read_stored(path, name=None):
+    def read_stored(path, name=None, **how):
         deaths = list(pathlib.Path(".").glob(f"died-of-{pathlib.Path(path).stem}-*"))
         if pathlib.Path(path).stem in DEADLY and len(deaths) < TIMES:
             pathlib.Path(f"died-of-{pathlib.Path(path).stem}-{os.getpid()}").touch()
             os.kill(os.getpid(), signal.SIGKILL)
-        return read(path, name)
+        return read(path, name, **how)
     formats.read_stored = read_stored
 """
 
