@@ -230,6 +230,7 @@ def test_a_card_shows_the_map_first_and_names_its_pictures():
         ("", "road on the left image"),
         ("before", "map"),
         ("after", "map de-rotated by −2.345°"),
+        ("heights", "heights over the road"),
     ]
     assert [side for side, *_ in right] == ["before", "after"]
     gone = content._card(rows, Choice(0, SPREAD), no_pictures(None, "its worker died"))
