@@ -80,16 +80,25 @@ def test_the_page_is_made_from_a_result_and_from_what_make_run_wrote(tmp_path):
     assert rollcli("estimate", "sample_data/maps", "-o", "rolls.csv", cwd=tmp_path).status == 0
     (line,) = re.findall(r"^\t\$\(BIN\)/rollcli (.*)", (ROOT / "Makefile").read_text(), flags=re.M)
     assert rollcli(*shlex.split(line), cwd=tmp_path).status == 0
+    for day, name in (("monday", "frame_0001.png"), ("tuesday", "frame_0002.png")):
+        assert rollcli("estimate", f"sample_data/maps/{name}", "-o", f"{day}.csv", cwd=tmp_path).status == 0
     run_block("rollcli report rolls.csv", tmp_path)
-    for page in ("rolls.html", "out.html"):
+    for page in ("rolls.html", "out.html", "both.html"):
         assert "frame_0004.npy" in (tmp_path / page).read_text("utf-8")
 
 
-def test_a_folder_of_kitti_pngs(tmp_path):
-    maps(tmp_path / "training" / "disp_occ_0", "frame_0001.png", "frame_0002.png")
-    run_block("rollcli estimate training/disp_occ_0", tmp_path)
-    assert sorted(contents(tmp_path / "upright")) == ["frame_0001.png", "frame_0002.png"]
-    assert (tmp_path / "rolls.csv").read_text().count(",ok,") == 2
+def test_a_bag(tmp_path):
+    pytest.importorskip("rosbags", reason="rosbags, of the extra bags, is not here")
+    from tests.files.recordings.bag_files import disparity_image, write_bag
+
+    def messages(store):
+        for number in range(2):
+            stamp = (100 + number) * 10**9
+            yield "/stereo/disparity", stamp, disparity_image(store, road_map(0.05, seed=number), stamp)
+
+    write_bag(tmp_path, "drive", "mcap", messages)
+    run_block("rollcli estimate drive.mcap", tmp_path)
+    assert (tmp_path / "rolls.csv").read_text().count(",ok,2.8") == 2
 
 
 def test_two_folders_of_images(tmp_path):

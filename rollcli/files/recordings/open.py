@@ -73,6 +73,14 @@ def open_recording(
         This is no bag, a topic is missing or not clear, or the extra is not installed.
     InputError
         A frame cannot be read; of a broken bag behind its last whole frame.
+
+    Examples
+    --------
+    >>> for frame in open_recording("rolls.csv"):
+    ...     print(frame.stamp, frame.disparity.shape)
+    Traceback (most recent call last):
+    ...
+    rollcli.errors.UsageError: rolls.csv: is no .bag, .db3, .mcap or rosbag2 folder
     """
     name = os.fspath(path)
     files = bag_files(name)
