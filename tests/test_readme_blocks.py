@@ -83,7 +83,8 @@ def test_the_page_is_made_from_a_result_and_from_what_make_run_wrote(tmp_path):
     for day, name in (("monday", "frame_0001.png"), ("tuesday", "frame_0002.png")):
         assert rollcli("estimate", f"sample_data/maps/{name}", "-o", f"{day}.csv", cwd=tmp_path).status == 0
     run_block("rollcli report rolls.csv", tmp_path)
-    for page in ("rolls.html", "out.html", "both.html"):
+    assert "frame_0002.png" in (tmp_path / "both.html").read_text("utf-8")
+    for page in ("rolls.html", "out.html"):
         assert "frame_0004.npy" in (tmp_path / page).read_text("utf-8")
 
 
