@@ -10,7 +10,7 @@ from rollcli.errors import UsageError
 
 # of each extra, as they are installed and imported
 EXTRAS = {
-    "bags": ("rosbags",),
+    "bags": ("lz4", "rosbags", "zstandard"),
     "cluster": ("dask", "distributed"),
     "fast": ("imagecodecs",),
     "parquet": ("pyarrow",),

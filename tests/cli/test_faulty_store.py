@@ -7,6 +7,8 @@ from tests.object_store import joined, upload
 from tests.run_cli import contents, rollcli, write_maps
 from tests.store_proxy import Faults, proxied
 
+pytestmark = pytest.mark.slow
+
 MAPS = 80
 
 

@@ -17,6 +17,8 @@ from rollcli.files.bounded import read_given
 from rollcli.files.storage import read_bytes
 from tests.run_cli import command, environment, write_maps
 
+pytestmark = pytest.mark.slow
+
 GIB = 2**30
 
 

@@ -10,6 +10,8 @@ from rollcli.files import storage
 from rollcli.files.stores.objects import _listed, _store, list_objects
 from tests.store_proxy import CUT, NEVER, PASS, Faults, answer, proxied
 
+pytestmark = pytest.mark.slow
+
 DOINGS = {
     "read": lambda url: storage.read_bytes(url),
     "list": lambda url: list(list_objects(url.rpartition("/")[0])),

@@ -11,6 +11,8 @@ from tests.page_picture import PICTURE, SHOWN, WIDTH, photograph
 from tests.report.results import row, write_result
 from tests.run_cli import road_map, rollcli, write_kitti, write_maps
 
+pytestmark = pytest.mark.slow
+
 pytest.importorskip("plotly", reason="plotly, of the extra report, is not here")
 pytest.importorskip("jinja2", reason="jinja2, of the extra report, is not here")
 

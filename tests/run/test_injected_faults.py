@@ -9,6 +9,8 @@ import pytest
 
 from tests.run_cli import ROOT, environment
 
+pytestmark = pytest.mark.slow
+
 if not hasattr(os, "fork"):
     pytest.skip("faults are injected into forked processes", allow_module_level=True)
 

@@ -30,6 +30,8 @@ from rollcli.run.workers import cluster
 from rollcli.run.workers.cluster import _problems, probe
 from rollcli.run.workers.in_order import SharedPaths
 
+pytestmark = pytest.mark.slow
+
 FRAMES = 40
 IMAGES = ("--derotated", "upright", "--vdisparity", "v")
 

@@ -23,6 +23,8 @@ from rollcli.run.workers.in_order import SharedPaths, in_order
 from rollcli.run.workers.interrupt import Stop
 from tests.run.workers.tasks import lost, run
 
+pytestmark = pytest.mark.slow
+
 WORK = Work(run, lost)
 HERE = {"host": "127.0.0.1", "protocol": "tcp", "dashboard_address": ":0", "threads_per_worker": 1}
 

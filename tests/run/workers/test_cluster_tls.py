@@ -11,9 +11,10 @@ import pytest
 from tests.run_cli import environment, rollcli, write_maps
 
 pytest.importorskip("distributed", reason="the extra cluster is not installed")
-pytestmark = pytest.mark.skipif(
-    shutil.which("openssl") is None, reason="no openssl to make certificates with"
-)
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(shutil.which("openssl") is None, reason="no openssl to make certificates with"),
+]
 
 LOCAL = ("--host", "127.0.0.1", "--no-dashboard", "--protocol", "tls")
 
