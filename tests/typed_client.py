@@ -61,6 +61,11 @@ def main(folder: Path) -> RigAssessment:
     assert abs(said["roll_deg"] - math.degrees(0.1)) < 0.1, said
     assert matched() < 1
     try:
+        stamps: list[int] = [frame.stamp for frame in rollcli.open_recording(folder / "map.npy")]
+        raise SystemExit(f"a map is no bag: {stamps}")
+    except rollcli.UsageError:
+        pass
+    try:
         return rollcli.assess_rig([rollcli.estimate_roll(road(0.1, seed)) for seed in range(12)])
     except rollcli.RollcliError as error:
         raise SystemExit(str(error)) from error

@@ -22,7 +22,19 @@ OPENCV = (
     "opencv-contrib-python",
 )
 REQUIRED = ("numpy", OPENCV, "click", "tqdm", "tifffile", "PyYAML")
-OPTIONAL = ("dask", "distributed", "imagecodecs", "jinja2", "matplotlib", "obstore", "plotly", "pyarrow")
+OPTIONAL = (
+    "dask",
+    "distributed",
+    "imagecodecs",
+    "jinja2",
+    "lz4",
+    "matplotlib",
+    "obstore",
+    "plotly",
+    "pyarrow",
+    "rosbags",
+    "zstandard",
+)
 
 
 def versions() -> Iterator[tuple[str, str]]:

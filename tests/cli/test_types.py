@@ -28,6 +28,7 @@ BOUNDED = {
     "--part-rows": COUNT,
     "--block-size": COUNT,
     "--jobs": COUNT,
+    "--every": COUNT,
     "--frames": COUNT,
     "--timed": COUNT,
     "--num-disparities": ("1 16 auto", "0 1.5 Auto"),
@@ -55,6 +56,7 @@ BOUNDED = {
     "--max-drift": SIZE,
     "--max-jump": SIZE,
     "--max-misalignment": SIZE,
+    "--sync-tolerance": SIZE,
     "--min-ok": ("0 1", "-0.001 1.001"),  # a share
 }
 

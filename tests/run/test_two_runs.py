@@ -10,6 +10,7 @@ from rollcli.run.options import InputOptions, ResultOptions
 from rollcli.run.plan import make_plan
 from rollcli.run.record import RunRecord
 from rollcli.run.result import open_output
+from rollcli.run.summary import RunSummary
 from tests.run.estimate_options import estimate_options
 from tests.run_cli import contents, rollcli, write_maps
 
@@ -41,14 +42,17 @@ def test_of_two_runs_in_a_bucket_the_last_to_begin_goes_on_and_the_other_ends(bu
         with pytest.raises(UsageError, match="another run has begun to write this result"):
             append(first, plan.frames[1:])
         append(last, plan.frames)
-        last.finish({"frames": 4}, None)
+        summary = RunSummary()
+        for frame in plan.frames:
+            summary.add(Row(frame.file, status="ok"))
+        last.finish(summary)
         with pytest.raises(UsageError, match="another run has begun"):
-            first.finish({"frames": 1}, None)
+            first.finish(RunSummary())
     from rollcli.files.results import read_result
 
     result = read_result(f"{bucket}/rolls.csv")
     assert [row.file for row in result.rows] == [frame.file for frame in plan.frames]
-    assert result.run["counts"] == {"frames": 4}
+    assert result.run["counts"] == {"frames": 4, "ok": 4, "suspect": 0, "error": 0}
     with pytest.raises(UsageError, match="exists already"), open_output(plan, given):
         pass
 

@@ -157,7 +157,7 @@ def differing(one, other):
 # the program, which gives up sooner on a scheduler that it has lost
 IMPATIENT = """
 from rollcli.__main__ import main
-from rollcli.parallel import cluster
+from rollcli.run.workers import cluster
 cluster._CONNECT_S = 2
 main()
 """
@@ -219,9 +219,9 @@ def test_a_scheduler_that_is_lost_ends_the_run_which_goes_on_without_it(local, f
 ODD = """
 from pathlib import Path
 import rollcli
-from rollcli.parallel import cluster
+from rollcli.run.workers import cluster
 rollcli.__version__ = cluster.__version__ = "0.0"
-from rollcli.batch import frame_task
+from rollcli.run import estimate_frame as frame_task
 run_frame = frame_task.run_frame
 def noted(*given):
     Path("worked").touch()
