@@ -84,7 +84,9 @@ def test_the_page_says_since_when_a_height_holds(tmp_path):
     ]
     write_result(tmp_path / "rolls.csv", rows)
     assert report(tmp_path, "rolls.csv", "--gallery", "0").status == 0
-    assert re.search(r">height 1\.(?:59|60)\d* ± 0\.\d+ m since m/0500\.png, where it jumped by", page_of(tmp_path))
+    assert re.search(
+        r">height 1\.(?:59|60)\d* ± 0\.\d+ m since m/0500\.png, where it jumped by", page_of(tmp_path)
+    )
 
 
 def test_a_page_holds_everything_it_shows(folder):
