@@ -2,11 +2,11 @@
 
 import math
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from rollcli.errors import UsageError
-from rollcli.files.atomic import is_file, is_folder, is_there
+from rollcli.files.atomic import is_file, is_folder
 from rollcli.files.containers import frame_name
 from rollcli.files.inputs import MAP_ENDINGS
 from rollcli.files.naming import listed
@@ -16,6 +16,7 @@ from rollcli.files.stores.locations import base_name, is_remote, is_url, store_o
 from rollcli.run.frame import Frame
 from rollcli.run.image_kinds import KINDS, ImageKind
 from rollcli.run.options import ImageOptions
+from rollcli.run.result_rows import frame_of_row
 
 WIDEST, SUSPECT, SPREAD = "widest interval", "suspect", "evenly spread"
 
@@ -127,10 +128,15 @@ def subjects(
             "wrote, or leave --images out to have the pictures made from the inputs"
         )
     only = images is not None
-    folder = Path() if is_url(result) else Path(result).parent  # names in a bucket are whole URLs
     return [
-        replace(
-            _subject(row, folder, files), images_only=only, refused="" if fetch else _refusal(row, result)
+        Subject(
+            frame_of_row(row, result),
+            math.radians(row.roll_deg or 0.0),
+            row.alpha,
+            files,
+            row,
+            images_only=only,
+            refused="" if fetch else _refusal(row, result),
         )
         for row, files in zip(rows, found, strict=True)
     ]
@@ -142,26 +148,6 @@ def _refusal(row: Row, result: str) -> str:
         if is_remote(name) and not (is_url(name) and is_url(result) and store_of(name) == store_of(result)):
             return f"{name}: is remote, and the result does not lie there; --fetch follows it"
     return ""
-
-
-def _subject(row: Row, folder: Path, images: dict[str, str]) -> Subject:
-    frame = Frame(
-        file=row.file,
-        right_file=row.right_file,
-        path=_located(row.file, folder),
-        right_path=_located(row.right_file, folder),
-        relative=row.file,
-        mask=None,
-    )
-    return Subject(frame, math.radians(row.roll_deg or 0.0), row.alpha, images, row)
-
-
-def _located(name: str, folder: Path) -> str:
-    """Return a file named from where `estimate` ran: here, or else from the result's folder."""
-    if not name or is_remote(name):  # even a look at a share of Windows is a request
-        return name
-    beside = folder / name
-    return str(beside) if not is_there(name) and is_there(beside) else name
 
 
 class _ImageFolder:

@@ -1,11 +1,14 @@
-"""The row of a result that each map has."""
+"""The row of a result that each map has, and the frame that each row has."""
 
 from collections.abc import Sequence
+from pathlib import Path
 
 from rollcli.errors import UsageError
+from rollcli.files.atomic import is_there
 from rollcli.files.matching import is_elsewhere, match_paths
 from rollcli.files.naming import listed
 from rollcli.files.results import Row, read_result
+from rollcli.files.stores.locations import is_remote, is_url
 from rollcli.messages import say
 from rollcli.run.frame import Frame
 
@@ -39,6 +42,20 @@ def rows_of(
             )
     _tell_suspects(matched, result, skip_suspect=skip_suspect, quiet=quiet)
     return matched
+
+
+def frame_of_row(row: Row, result: str) -> Frame:
+    """Return the frame of a row; names are of where `estimate` ran: of this folder, or of the result's."""
+    folder = Path() if is_url(result) else Path(result).parent  # names in a bucket are whole URLs
+    path, right = (_located(name, folder) for name in (row.file, row.right_file))
+    return Frame(row.file, row.right_file, path, right, relative=row.file, mask=None)
+
+
+def _located(name: str, folder: Path) -> str:
+    if not name or is_remote(name):  # even a look at a share of Windows is a request
+        return name
+    beside = folder / name
+    return str(beside) if not is_there(name) and is_there(beside) else name
 
 
 def _tell_suspects(rows: Sequence[Row], result: str, *, skip_suspect: bool, quiet: bool) -> None:

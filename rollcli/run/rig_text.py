@@ -15,6 +15,8 @@ from rollcli.rig.quantities import ALIGNMENT, QUANTITIES, ROLL, Quantity
 from rollcli.rig.words import answer, counts, findings, frame_name, now_in_words
 from rollcli.run.rig_gates import Check
 from rollcli.run.rig_health import DISTANCES, NOT_SEEN, Health
+from rollcli.stereo.correction import columns_as_text
+from rollcli.stereo.misalignment import ColumnSupport
 
 _DIGITS = 6
 
@@ -272,8 +274,11 @@ _CALL = (
 )
 
 
-def correction_text(health: Health | None, results: Sequence[str]) -> str:
-    """Return the JSON of a correction.
+NO_COLUMNS = "its pairs cannot be read here, so each one tells by itself what of a scale is in the columns"
+
+
+def correction_text(health: Health | None, columns: ColumnSupport | None, results: Sequence[str]) -> str:
+    """Return the JSON of a correction; `columns` are of the size matched at, if the drive tells.
 
     Raises
     ------
@@ -287,6 +292,7 @@ def correction_text(health: Health | None, results: Sequence[str]) -> str:
         **alignment_values(health),
         "width": width,
         "height": height,
+        **({"columns": columns_as_text(columns)} if columns is not None else {}),
         "matrix": health.misalignment.matrix(height, width),
         "opencv": _CALL,
         "note": "matrix: from a pixel of the corrected right view to the given one, without the twist, "

@@ -9,11 +9,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.stereo.misalignment import LEVEL, Misalignment
+from rollcli.stereo.misalignment import LEVEL, NOTHING_KNOWN, ColumnSupport, Misalignment
 from rollcli.stereo.row_fit import (
-    NOTHING_KNOWN,
     ColumnEvidence,
-    ColumnSupport,
     SeenBlocks,
     column_evidence,
     column_support,

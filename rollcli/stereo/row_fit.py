@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.stereo.misalignment import LEVEL, Misalignment
+from rollcli.stereo.misalignment import LEVEL, ColumnSupport, Misalignment
 
 Doubles = NDArray[np.float64]
 
@@ -49,8 +49,8 @@ class BeliefTuning:
         Standard deviations of a yaw, and of the yaw that rows which are skewed alone seem to be, radians. On
         KITTI's grey cameras 1.4 px in the corners look like 0.5 degrees, and lidar sees nothing of it in the
         columns.
-    has_skew : float
-        How often rows are skewed alone.
+    has_yaw, has_skew : float
+        How often there is a yaw, and how often rows are skewed alone.
     lens_shape, no_shape : float
         Shapes of second and third degree at the border of what was seen, px, standard deviations: of rows
         that a lens has skewed alone (KITTI's grey cameras: 0.11 along x²), and of others (rendered: 0.02).
@@ -58,11 +58,11 @@ class BeliefTuning:
         The same as the interval has it. Where the rows cannot tell two causes apart, it reaches both of them;
         a quarter makes twice the standard deviation of a scale all of it.
     least : float
-        What no pair tells of a scale: blocks between which it lies share a part of their error.
+        What no pair tells of a scale or, in px at the border, of a twist: blocks share a part of their error.
     tiles : float
         Standard errors from tiles are too small by this: scales of consecutive streets scatter so. With 3,
-        pairs with lidar are off by -0.05 degrees in place of -0.02; with 1, one of 60 warped rendered roads by
-        0.1 degrees and more in place of none.
+        pairs with lidar are off by -0.05 degrees in place of -0.02; with 1, one of 60 warped rendered roads
+        by 0.1 degrees and more in place of none.
     """
 
     scale: float = 0.004
@@ -75,6 +75,7 @@ class BeliefTuning:
     focal: tuple[float, ...] = (0.5, 0.6, 0.75, 1.0, 1.5)
     yaw: float = 0.0035
     skew: float = 0.01
+    has_yaw: float = 0.5
     has_skew: float = 0.1
     lens_shape: float = 0.1
     no_shape: float = 0.02
@@ -87,33 +88,6 @@ class BeliefTuning:
 
 
 BELIEF = BeliefTuning()
-
-
-@dataclass(frozen=True)
-class ColumnSupport:
-    """What is believed of how the columns lie: a point (x, y) lies ``x (scale + twist x + pitch y)`` further.
-
-    Attributes
-    ----------
-    scale : float
-        Share.
-    twist, pitch : float
-        Of a yaw and of a pitch, 1/pixels.
-    error : float
-        Standard deviation of the slope along the rows that this leaves on the road, px per px.
-    """
-
-    scale: float
-    twist: float
-    pitch: float
-    error: float
-
-    def resized(self, factor: float) -> "ColumnSupport":
-        """Return the same of views `factor` times as large."""
-        return ColumnSupport(self.scale, self.twist / factor, self.pitch / factor, self.error)
-
-
-NOTHING_KNOWN = ColumnSupport(0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -307,7 +281,7 @@ def column_support(seen: ColumnEvidence) -> ColumnSupport:
     yaw, skew = np.square(np.array([BELIEF.yaw, BELIEF.skew]) / (_FOCAL * width))
     twist, twist_error = _yaw_of_twist(
         seen.twist,
-        seen.unevenness / (x * y) ** 2 + seen.twist_variance,
+        lens / (x * y) ** 2 + seen.twist_variance,
         yaw,
         skew,
         _lens_ratio(seen.shapes, seen.shape_variances),
@@ -337,14 +311,16 @@ def _yaw_of_twist(twist: float, error: float, yaw: float, skew: float, ratio: fl
         How many times likelier the rest of the field makes it that the rows alone are skewed.
     """
     other = np.array([error, error + skew])
-    whole = yaw + other
+    yaws = np.array([[0.0], [yaw]])
+    whole = yaws + other
     density = np.exp(-(twist**2) / (2 * whole)) / np.sqrt(whole)
-    values, variances = twist * yaw / whole, yaw * other / whole
-    often = np.array([1 - BELIEF.has_skew, BELIEF.has_skew * ratio]) * density
+    density *= np.array([[1 - BELIEF.has_yaw], [BELIEF.has_yaw]])
+    values, variances = twist * yaws / whole, yaws * other / whole
+    often = density * [1 - BELIEF.has_skew, BELIEF.has_skew * ratio]
     # rows may be skewed with no other shape: that there is none narrows no interval
-    often_doubted = np.array([1 - BELIEF.may_skew, BELIEF.may_skew * max(1.0, ratio)]) * density
-    mean = float(often @ values / often.sum())
-    variance = often_doubted @ (np.square(values - mean) + variances) / often_doubted.sum()
+    often_doubted = density * [1 - BELIEF.may_skew, BELIEF.may_skew * max(1.0, ratio)]
+    mean = float((often * values).sum() / often.sum())
+    variance = (often_doubted * (np.square(values - mean) + variances)).sum() / often_doubted.sum()
     return mean, float(np.sqrt(variance))
 
 

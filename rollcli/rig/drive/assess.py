@@ -248,12 +248,13 @@ def assess_rig(
 
 def assess_frames(frames: RigFrames, *, include_suspect: bool = False, groups: str = AUTO) -> RigAssessment:
     """Assess frames that are columns already; see `assess_rig`."""
-    counted = frames.ok | frames.suspect if include_suspect else frames.ok
+    measured = frames.ok | frames.suspect  # how the views lie is told where the angle is not, too
+    counted = measured if include_suspect else frames.ok
     drives: list[DriveAssessment] = []
     rolls = np.where(counted, frames.numbers[ROLL.column], np.nan)
     for name, places in split_drives(frames.files, groups, _kinds(frames), rolls):
         found = {
-            quantity.name: _assessed(frames, places, counted, quantity)
+            quantity.name: _assessed(frames, places, measured if quantity in ALIGNMENT else counted, quantity)
             for quantity in (*QUANTITIES, *ALIGNMENT)
             if quantity is ROLL or np.isfinite(frames.numbers.get(quantity.column, np.empty(0))).any()
         }
