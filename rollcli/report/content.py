@@ -13,7 +13,7 @@ from rollcli.report.figures import with_still
 from rollcli.report.options import ReportOptions
 from rollcli.report.page import Rows, render_page
 from rollcli.report.pictures import Pictures
-from rollcli.report.sources import SPREAD, SUSPECT, WIDEST, Choice
+from rollcli.report.sources import JUMP, SPREAD, SUSPECT, WIDEST, Choice
 from rollcli.report.summary import (
     degrees,
     frame_count,
@@ -56,6 +56,7 @@ def report_page(
         version=run.get("rollcli"),
         page_version=__version__,
         summary=summary,
+        between=_between(rig),
         degrees=degrees,
         with_interval=with_interval,
         decimals=decimals,
@@ -88,6 +89,12 @@ def _calibration(run: Mapping[str, Any]) -> Calibration | None:
         return Calibration(**run["calibration"]["first"][0])
     except (KeyError, IndexError, TypeError, ValueError):
         return None
+
+
+def _between(rig: RigAssessment) -> float | None:
+    """Return the standard deviation of the roll between frames, degrees."""
+    latest = rig.latest()
+    return None if latest is None else latest.between_sd
 
 
 def _others(rig: RigAssessment) -> list[str]:
@@ -123,8 +130,11 @@ def _chosen_text(rows: Sequence[Row], choices: Sequence[Choice]) -> str:
     angled = sum(row.roll_deg is not None for row in rows)
     if len(choices) in (0, angled):
         return "Every frame that has an angle."
-    counts = {reason: sum(each.reason == reason for each in choices) for reason in (WIDEST, SUSPECT, SPREAD)}
+    counts = {
+        reason: sum(each.reason == reason for each in choices) for reason in (JUMP, WIDEST, SUSPECT, SPREAD)
+    }
     parts = {
+        JUMP: "{} around a jump",
         WIDEST: "the {} with the widest interval",
         SUSPECT: "{} of the other suspect ones" if counts[WIDEST] else "{} of the suspect ones",
         SPREAD: "{} evenly spread" + (" over the rest" if len(choices) > counts[SPREAD] else ""),
@@ -168,7 +178,7 @@ def _card(rows: Sequence[Row], choice: Choice, pictures: Pictures) -> dict[str, 
             [
                 ("before", "v-disparity", "v-disparity of the map", pictures.map_counts, ""),
                 (
-                    "after",
+                    "after heights",
                     "v-disparity, de-rotated",
                     "v-disparity once de-rotated",
                     pictures.level_counts,

@@ -1,5 +1,6 @@
 """Where the pictures of a frame come from, and which frames the gallery shows."""
 
+import bisect
 import math
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
@@ -18,7 +19,7 @@ from rollcli.run.image_kinds import KINDS, ImageKind
 from rollcli.run.options import ImageOptions
 from rollcli.run.result_rows import frame_of_row
 
-WIDEST, SUSPECT, SPREAD = "widest interval", "suspect", "evenly spread"
+JUMP, WIDEST, SUSPECT, SPREAD = "around a jump", "widest interval", "suspect", "evenly spread"
 
 
 @dataclass(frozen=True)
@@ -29,23 +30,32 @@ class Choice:
     reason: str
 
 
-def choose(rows: Sequence[Row], count: int) -> list[Choice]:
-    """Choose up to `count` frames that have an angle: a third each of the kinds that there are.
+def choose(rows: Sequence[Row], count: int, jumps: Sequence[int] = ()) -> list[Choice]:
+    """Choose up to `count` frames that have an angle: those around jumps, and a third each of other kinds.
 
     Parameters
     ----------
     rows : sequence of Row
     count : int
+    jumps : sequence of int
+        The places of the first frames after a jump.
 
     Returns
     -------
     list of Choice
-        The widest intervals first, from the widest on; then suspect frames and others, in their order.
+        The last frame before each jump and the first after it, for up to half of `count`, the latest jumps;
+        the widest intervals, from the widest on; then suspect frames and others, in their order.
     """
     angled = [place for place, row in enumerate(rows) if row.roll_deg is not None]
-    share = count // 3
-    widths = [(-(rows[place].roll_ci95_deg or 0.0), place) for place in angled]
-    chosen = [Choice(place, WIDEST) for width, place in sorted(widths)[:share] if width < 0]
+    around = dict[int, None]()
+    for jump in sorted(jumps)[::-1][: count // 4]:
+        at = bisect.bisect_left(angled, jump)
+        around |= dict.fromkeys(angled[max(at - 1, 0) : at + 1])
+    chosen = [Choice(place, JUMP) for place in sorted(around)]
+    rest = _without(angled, chosen)
+    share = (count - len(chosen)) // 3
+    widths = [(-(rows[place].roll_ci95_deg or 0.0), place) for place in rest]
+    chosen += [Choice(place, WIDEST) for width, place in sorted(widths)[:share] if width < 0]
     rest = _without(angled, chosen)
     doubtful = [place for place in rest if rows[place].status == "suspect"]
     chosen += [Choice(place, SUSPECT) for place in spread(doubtful, share)]
