@@ -84,7 +84,7 @@ class Subject:
     frame : Frame
         Where its map or its pair is.
     theta : float
-        Its roll, radians.
+        What its map is turned by, radians.
     alpha : tuple of float, or None
         The road's parabola, px.
     images : dict of str to str
@@ -141,7 +141,7 @@ def subjects(
     return [
         Subject(
             frame_of_row(row, result),
-            math.radians(row.roll_deg or 0.0),
+            math.radians(row.map_roll_deg or 0.0),
             row.alpha,
             files,
             row,

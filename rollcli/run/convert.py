@@ -48,9 +48,7 @@ def _conversions(frames: Sequence[Frame], options: DerotateOptions) -> Iterator[
     for frame, row in zip(frames, rows, strict=True):
         if row is not None and row.status == "suspect" and rotation.skip_suspect:
             continue
-        roll_deg = rotation.roll_deg
-        if row is not None:  # results of other programs have the rig's angle alone
-            roll_deg = row.roll_deg if row.image_roll_deg is None else row.image_roll_deg
+        roll_deg = rotation.roll_deg if row is None else row.map_roll_deg
         refused = "" if roll_deg is not None else f"has no angle in {rotation.result}"
         writes = (output_path(frame, options.output),)
         roll = math.radians(roll_deg or 0.0)
