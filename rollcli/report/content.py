@@ -56,7 +56,6 @@ def report_page(
         version=run.get("rollcli"),
         page_version=__version__,
         summary=summary,
-        between=_between(rig),
         degrees=degrees,
         with_interval=with_interval,
         decimals=decimals,
@@ -89,12 +88,6 @@ def _calibration(run: Mapping[str, Any]) -> Calibration | None:
         return Calibration(**run["calibration"]["first"][0])
     except (KeyError, IndexError, TypeError, ValueError):
         return None
-
-
-def _between(rig: RigAssessment) -> float | None:
-    """Return the standard deviation of the roll between frames, degrees."""
-    latest = rig.latest()
-    return None if latest is None else latest.between_sd
 
 
 def _others(rig: RigAssessment) -> list[str]:
