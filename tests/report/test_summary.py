@@ -10,7 +10,6 @@ import pytest
 
 from rollcli.report import content
 from rollcli.report.chart import Chart, chart_names, script_json
-from rollcli.report.options import ReportOptions
 from rollcli.report.pictures import _encoded
 from rollcli.report.sources import SPREAD, SUSPECT, WIDEST, Choice
 from rollcli.report.summary import frame_count, input_folders, summarize, written_at
@@ -44,13 +43,6 @@ def test_the_time_of_a_file_is_told_in_utc_and_that_of_a_stream_is_not(tmp_path)
     os.utime(tmp_path / "rolls.csv", (86_400 * 365 + 3_720, 86_400 * 365 + 3_720))
     assert written_at(str(tmp_path / "rolls.csv")) == "1971-01-01 01:02 UTC"
     assert written_at("-") == written_at("s3://maps/rolls.csv") == written_at("a\0b") == ""
-
-
-def test_a_chart_of_its_own_is_beside_the_others_of_its_folder():
-    options = ReportOptions(("rolls.csv",), png="slides/", svg="s3://maps/svg")
-    assert options.chart_paths("roll") == {"svg": "s3://maps/svg/roll.svg", "png": "slides/roll.png"}
-    assert ReportOptions(("rolls.csv",)).chart_paths("roll") == {}
-    assert (ReportOptions(("rolls.csv",)).gallery, options.output) == (12, None)
 
 
 def test_a_histogram_is_of_two_angles_or_more():
