@@ -9,9 +9,7 @@ from typing import Any, NamedTuple
 from rollcli.errors import ClusterError, ExitStatus, OutputError, WorkerError
 from rollcli.files.atomic import is_file
 from rollcli.files.containers import file_of
-from rollcli.files.results import run_path
 from rollcli.files.stores.locations import is_url, tasks_in_hand
-from rollcli.files.stream import STDOUT
 from rollcli.run.calibration import calibration_files, calibration_notes
 from rollcli.run.find import list_files
 from rollcli.run.frame import Frame, FrameResult, failed_frame
@@ -96,13 +94,13 @@ def _run(plan: Plan, options: EstimateOptions, resume_command: str, started: lis
         kept = output.kept
         progress = Progress(len(plan.frames), options.running, options.encoding, summary=kept.summary)
         notes = [*plan.notes, *(calibration_notes(plan.frames) if options.calibration.given else [])]
-        for note in notes[:_NOTES]:
+        for note in (*notes[:_NOTES], *kept.notes()):
             progress.note(note)
         try:
             with stop_on_signals() as stop, progress:
                 run = _Run(options, output, progress, stop, started)
                 _restore_images(run)
-                if not _retry_failed(plan, run):
+                if not _do_again(plan, run):
                     _run_frames(plan.frames[kept.count :], run)
         except KeyboardInterrupt:  # the second Ctrl-C: without waiting for the frames that have begun
             progress.stopped_early = True
@@ -160,14 +158,14 @@ def _restore_images(run: _Run) -> None:
     progress.stopped_early = restored < len(frames)
 
 
-def _retry_failed(plan: Plan, run: _Run) -> bool:
-    """Do the failed frames of kept rows again; return whether the run ends here.
+def _do_again(plan: Plan, run: _Run) -> bool:
+    """Do the frames of kept rows again that have failed or changed; return whether the run ends here.
 
     A result takes the new rows once the workers have ended, which hold the lock of the file that it was.
     """
-    failed, progress = run.output.kept.failed, run.progress
-    for first in range(0, len(failed), _RETRIED_AT_ONCE):
-        positions = failed[first : first + _RETRIED_AT_ONCE]
+    again, progress = run.output.kept.again, run.progress
+    for first in range(0, len(again), _RETRIED_AT_ONCE):
+        positions = again[first : first + _RETRIED_AT_ONCE]
         frames = [plan.frames[position] for position in positions]
         with _results(frames, run, _name_of(plan.output)) as results:
             for position, frame, result in zip(positions, frames, results, strict=False):
@@ -196,6 +194,7 @@ def _results(frames: Sequence[Frame], run: _Run, retry_of: str = "") -> Iterator
         retry_of=retry_of,
         lines="" if form == "parquet" else form,
         further=further_columns(frames, options.result),
+        notes=output.notes,
     )
     work = Work(
         partial(estimate_frame, options=told),
@@ -237,5 +236,4 @@ def _list(plan: Plan, options: EstimateOptions) -> None:
     frames = frames_to_do(plan, options)
     list_files([(calibration_files(options.calibration), ())])
     list_files((frame.reads(), (path for _, path in image_paths(frame, options.images))) for frame in frames)
-    if plan.output != STDOUT:
-        list_files([((), (plan.output, run_path(plan.output)))])
+    list_files([((), plan.files)])

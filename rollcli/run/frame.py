@@ -59,6 +59,8 @@ class FrameResult:
         First and last disparity searched, px; pairs only.
     line : bytes
         The row as it stands in the result, where workers were told its format.
+    inputs : bytes
+        What the frame was read from, where workers were told to note it: see `inputs.inputs_line`.
     """
 
     row: Row
@@ -66,6 +68,7 @@ class FrameResult:
     warning: str = ""
     searched: tuple[int, int] | None = None
     line: bytes = b""
+    inputs: bytes = b""
 
 
 _LEFT, _RIGHT = "left image: ", "right image: "  # what a message calls the files of a pair

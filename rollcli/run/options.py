@@ -134,7 +134,8 @@ class FrameOptions(NamedTuple):
     `root` is the folder where relative paths start, for workers on other machines; empty for this one.
     `replaces` tells whether files that are in the place of an image are replaced. `retry_of` names the result
     whose failed frames are done again; empty otherwise. `lines` is the format of the lines of a result, which
-    workers make of their rows, with the `further` columns; empty where they make none.
+    workers make of their rows, with the `further` columns; empty where they make none. `notes` tells whether
+    they say what each frame was read from.
     """
 
     encoding: EncodingOptions = EncodingOptions()
@@ -147,6 +148,7 @@ class FrameOptions(NamedTuple):
     retry_of: str = ""
     lines: Literal["csv", "jsonl", ""] = ""
     further: tuple[str, ...] = ()
+    notes: bool = False
 
     def at(self, path: str) -> str:
         """Locate a path on this worker."""
@@ -159,11 +161,13 @@ class ResultOptions(NamedTuple):
     """Where the rows go, and which frames they are of.
 
     `shard` is (I, N), I from 1: every N-th frame, or one of N runs of consecutive ones, as `shard_by` says.
+    An `update` is a `resume` as well.
     """
 
     output: str = "-"
     format: Literal["csv", "jsonl", "parquet"] | None = None
     resume: bool = False
+    update: bool = False
     retry_failed: bool = False
     shard: tuple[int, int] = (1, 1)
     shard_by: Literal["every", "range"] = "every"

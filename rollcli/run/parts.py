@@ -43,7 +43,7 @@ _CHECK_S = 10.0  # a request of 50 ms now and then
 class PartsOutput:
     """Rows to a folder of parts, and FILE.run.json beside it."""
 
-    resumable = True
+    resumable, notes = True, False
 
     def __init__(
         self,

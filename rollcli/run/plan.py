@@ -19,6 +19,7 @@ from rollcli.run.find import (
     pair_frames,
 )
 from rollcli.run.frame import Frame
+from rollcli.run.inputs import inputs_path
 from rollcli.run.options import EstimateOptions, ResultOptions
 from rollcli.run.outputs import every_path
 
@@ -36,7 +37,24 @@ class Plan:
     @property
     def in_parts(self) -> bool:
         """Whether the result is a folder of parts."""
-        return self.format == "parquet" or is_url(self.output)
+        return is_in_parts(self.output, self.format)
+
+    @property
+    def files(self) -> list[str]:
+        """What is written beside images."""
+        return _result_files(self.output, self.format)
+
+
+def is_in_parts(output: str, form: Format) -> bool:
+    """Tell whether a result is a folder of parts."""
+    return form == "parquet" or is_url(output)
+
+
+def _result_files(output: str, form: Format) -> list[str]:
+    """List the result, what its rows were made from, and the record of its run; none of these of a stream."""
+    if is_stream(output):
+        return []
+    return [output, *([] if is_in_parts(output, form) else [inputs_path(output)]), run_path(output)]
 
 
 def make_plan(options: EstimateOptions) -> Plan:
@@ -53,8 +71,13 @@ def make_plan(options: EstimateOptions) -> Plan:
     frames = _find_frames(options)
     if options.pairs.left is None:
         check_depth(frames, options.encoding)
-    output = options.result.output
-    results = [] if is_stream(output) else [output, run_path(output)]
+    output, form = options.result.output, options.result.form
+    if options.result.update and is_in_parts(output, form):
+        raise UsageError(
+            f"{output}: a result in parts (Parquet, or below a URL) does not say what its rows were made "
+            "from: --update takes a result in one file of CSV or JSON Lines"
+        )
+    results = _result_files(output, form)
     if options.images.folders():
         check_one_owner(((frame, _images([frame], options)) for frame in frames), results)
     calibrations, every = calibration_files(options.calibration), frames
@@ -67,7 +90,6 @@ def make_plan(options: EstimateOptions) -> Plan:
     notes = check_first_size(frames, options.frame) if options.calibration.given else []
     if not (options.running.overwrite or options.result.resume):
         check_images_are_new(frames, options)
-    form = options.result.form
     if form == "parquet" and is_stream(output):
         raise UsageError("Parquet is a folder of parts: name it with --output")
     return Plan(frames, output, form, further_columns(frames, options.result), tuple(notes))

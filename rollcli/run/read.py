@@ -16,6 +16,7 @@ from rollcli.estimator.road.find import first_row_of_road
 from rollcli.files.encodings import Encoding, read_mask, to_disparity
 from rollcli.files.formats import Stored, read_image, read_stored
 from rollcli.files.results import ALIGNMENT_COLUMNS
+from rollcli.files.storage import state_of
 from rollcli.run.diagnosis import require_positive, too_large
 from rollcli.run.frame import Frame
 from rollcli.run.options import FrameOptions, MethodOptions, RegionOptions
@@ -42,7 +43,7 @@ def region_mask(mask: str | None, options: FrameOptions, shape: tuple[int, ...])
         return None
     allowed = _drawn(region, shape)
     if mask is not None:
-        usable = _mask_file(options.at(mask), mask)
+        usable = _mask_file(options.at(mask), mask, state_of(options.at(mask)))
         if usable.shape != shape:
             raise InputError(f"the mask {mask} is {_size(usable.shape)}, the map {_size(shape)}")
         allowed = allowed & usable
@@ -85,8 +86,8 @@ def _near(corners: Sequence[Corner]) -> Sequence[Corner]:
     return [(float(u), float(v)) for u, v in exact]
 
 
-@lru_cache(maxsize=1)  # a mask for all frames is read once
-def _mask_file(path: str, name: str) -> NDArray[np.bool_]:
+@lru_cache(maxsize=1)  # a mask for all frames is read once, unless it changes: workers outlive runs
+def _mask_file(path: str, name: str, state: str) -> NDArray[np.bool_]:
     return read_mask(path, name)
 
 

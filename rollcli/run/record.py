@@ -35,6 +35,14 @@ from rollcli.stereo.options import StereoOptions
 _LASTING = (errno.ENOENT, errno.ENOTDIR, errno.ENAMETOOLONG, errno.EACCES, errno.ELOOP, errno.EINVAL)
 
 
+def names_of(frames: Sequence[Frame]) -> dict[str, Any]:
+    """Summarise the frames: how many, and a digest of their names."""
+    names = hashlib.sha256()
+    for frame in frames:
+        names.update(os.fsencode(f"{frame.file}\0{frame.right_file}\0"))
+    return {"frames": len(frames), "names": names.hexdigest()}
+
+
 def fingerprint(frames: Sequence[Frame], unknown: Collection[str] = ()) -> dict[str, Any]:
     """Summarise the frames: how many, their names, and size and time of every file that they need.
 
@@ -50,11 +58,10 @@ def fingerprint(frames: Sequence[Frame], unknown: Collection[str] = ()) -> dict[
         "frames", "names" and "files"; "unknown" lists the files that were left out, and those whose size
         could not be read, if there are any.
     """
-    names, files = hashlib.sha256(), hashlib.sha256()
+    files = hashlib.sha256()
     shared: dict[str, bytes | None] = {}  # a mask for all frames is looked at once
     left_out = set(unknown)
     for frame in frames:
-        names.update(os.fsencode(f"{frame.file}\0{frame.right_file}\0"))
         for path in map(file_of, frame.reads()):
             if path in left_out:
                 continue
@@ -65,7 +72,7 @@ def fingerprint(frames: Sequence[Frame], unknown: Collection[str] = ()) -> dict[
                 left_out.add(path)
             else:
                 files.update(state)
-    found = {"frames": len(frames), "names": names.hexdigest(), "files": files.hexdigest()}
+    found = {**names_of(frames), "files": files.hexdigest()}
     return {**found, "unknown": sorted(left_out)} if left_out else found
 
 
@@ -133,11 +140,12 @@ class RunRecord:
         self._searched: list[int] = []
         self.run = uuid.uuid4().hex  # tells our objects from those of another run
         self._begun = False
-        self.replaces = options.running.overwrite  # older images, now and after a resume
+        # older images, now and after a resume
+        self.replaces = options.running.overwrite or options.result.update
         self.fixed = {
             "rollcli": __version__,
             "options": _effective(plan, options),
-            "inputs": fingerprint(plan.frames, unknown),
+            "inputs": fingerprint(plan.frames, unknown) if plan.in_parts else names_of(plan.frames),
         }
         if options.calibration.given:
             self.fixed["calibration"] = _calibrations(plan.frames)

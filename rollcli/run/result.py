@@ -1,9 +1,10 @@
 """Where the rows of a run go: to a stream, or to a file with the record of the run beside it."""
 
 import contextlib
+import io
 import os
 from collections.abc import Iterator
-from itertools import chain
+from itertools import chain, islice
 from pathlib import Path
 from typing import Protocol
 
@@ -11,15 +12,17 @@ from rollcli.errors import InputError, UsageError
 from rollcli.files.atomic import remove_leftovers
 from rollcli.files.locking import not_resumable
 from rollcli.files.results import format_header, format_row, parse_rows, read_run, run_path
+from rollcli.files.stores.locations import base_name
 from rollcli.files.stream import STDOUT, STDOUT_NAME, is_stream, open_stream, stdout_descriptor, write_stream
 from rollcli.run.frame import Frame, FrameResult
+from rollcli.run.inputs import Inputs, inputs_line, inputs_path, is_inputs
 from rollcli.run.options import EstimateOptions, ImageOptions
 from rollcli.run.outputs import local_images, remove_image_leftovers, remove_marks
 from rollcli.run.parts import kept_in_parts, open_parts
 from rollcli.run.plan import Plan
 from rollcli.run.record import RunRecord, is_replaceable_record
-from rollcli.run.result_file import DurableRows, ResultFile, has_rows, kept_rows, open_result
-from rollcli.run.resume import KeptRows, check_restored, new_record
+from rollcli.run.result_file import DurableRows, ResultFile, has_rows, kept_rows, open_result, row_lines
+from rollcli.run.resume import KeptRows, arranged, check_restored, new_record
 from rollcli.run.summary import RunSummary
 
 
@@ -34,6 +37,8 @@ class Output(Protocol):
         A descriptor for workers to inherit.
     resumable : bool
         Whether an interrupted run can be resumed.
+    notes : bool
+        Whether it keeps what each row was made from.
     replaces : bool
         Whether images are replaced that were there before the run: it was begun with --overwrite.
     """
@@ -41,6 +46,7 @@ class Output(Protocol):
     kept: KeptRows
     keep_open: int | None
     resumable: bool
+    notes: bool
     replaces: bool
 
     def append(self, frame: Frame, result: FrameResult) -> None:
@@ -66,7 +72,7 @@ class StreamOutput:
     """Rows to stdout, a pipe or a device."""
 
     keep_open: int | None = None
-    resumable = False
+    resumable = notes = False
 
     def __init__(self, descriptor: int, name: str, plan: Plan, options: EstimateOptions) -> None:
         self.kept = KeptRows(plan, options)
@@ -99,13 +105,14 @@ class StreamOutput:
 
 
 class FileOutput:
-    """Rows to a locked file, and FILE.run.json beside it; a row is written once its images are durable."""
+    """Rows to a locked file, FILE.inputs and FILE.run.json beside it; images are durable before their row."""
 
-    resumable = True
+    resumable = notes = True
 
     def __init__(
         self,
         file: ResultFile,
+        inputs: ResultFile,
         record: RunRecord,
         plan: Plan,
         kept: KeptRows,
@@ -115,13 +122,14 @@ class FileOutput:
         self.keep_open: int | None = file.descriptor
         self.replaces = record.replaces
         self._file, self._record, self._plan, self._images = file, record, plan, images
-        self._rows = DurableRows(file)
-        self._replacing: dict[int, bytes] = {}
+        self._inputs, self._rows = inputs, DurableRows(file, inputs)
+        self._replacing: dict[int, tuple[bytes, bytes]] = {}  # rows, and the lines of their inputs
 
     def append(self, frame: Frame, result: FrameResult) -> None:
         """Add the row, after the record knows how its frame was read."""
         self._record.saw(result.encoding, result.searched)
-        self._rows.append(_line(result, self._plan), self._paths(frame, result))
+        inputs = result.inputs or inputs_line(frame, {})
+        self._rows.append(_line(result, self._plan), inputs, self._paths(frame, result))
 
     def restore(self, frame: Frame, result: FrameResult) -> None:
         """Take the images of an incomplete frame, which were made again.
@@ -137,14 +145,16 @@ class FileOutput:
     def replace(self, position: int, frame: Frame, result: FrameResult) -> None:
         """Take the row and its images; the file gets them all at once, in `commit`."""
         self._record.saw(result.encoding, result.searched)
-        self._replacing[position] = _line(result, self._plan)
+        self._replacing[position] = _line(result, self._plan), result.inputs or inputs_line(frame, {})
         self._rows.restore(self._paths(frame, result))
 
     def commit(self) -> None:
         """Force the images and rows that were added to the disk."""
         self._rows.commit()
         if self._replacing:
-            self._file.replace(self._replacing, self._plan.format)
+            # in this order: of a run that is killed in between, the rows are made again
+            self._file.replace({at: row for at, (row, _) in self._replacing.items()}, self._plan.format)
+            self._inputs.replace({at: line for at, (_, line) in self._replacing.items()}, "jsonl")
             remove_marks([self._plan.frames[position] for position in self._replacing], self._images)
             self._replacing.clear()
 
@@ -195,7 +205,8 @@ def open_output(plan: Plan, options: EstimateOptions) -> Iterator[Output]:
     else:
         with open_result(plan.output) as file:
             _check_permitted(plan.output, options)  # again, now that no other run can write it
-            yield _begin(file, plan, options)
+            with open_result(inputs_path(plan.output)) as inputs:
+                yield _begin(file, inputs, plan, options)
 
 
 def frames_to_do(plan: Plan, options: EstimateOptions) -> Iterator[Frame]:
@@ -211,8 +222,8 @@ def frames_to_do(plan: Plan, options: EstimateOptions) -> Iterator[Frame]:
     else:
         _check_permitted(plan.output, options)
         kept = _kept_in_file(plan, options)
-    failed = (plan.frames[position] for position in kept.failed)
-    return chain(kept.incomplete, failed, plan.frames[kept.count :])
+    again = (plan.frames[position] for position in kept.again)
+    return chain(kept.incomplete, again, plan.frames[kept.count :])
 
 
 def _kept_in_file(plan: Plan, options: EstimateOptions) -> KeptRows:
@@ -222,18 +233,30 @@ def _kept_in_file(plan: Plan, options: EstimateOptions) -> KeptRows:
         data = Path(plan.output).read_bytes()
     except OSError:
         return KeptRows(plan, options)
-    return _parsed(kept_rows(data, plan.output, plan.format), plan, options)
+    return _parsed(data, plan, options)[1]
 
 
-def _parsed(data: bytes, plan: Plan, options: EstimateOptions) -> KeptRows:
-    """Take in the rows of a file that is cut after its last whole row; it may have none, nor a header."""
-    return KeptRows(plan, options, parse_rows(data, plan.output) if data else ())
+def _parsed(data: bytes, plan: Plan, options: EstimateOptions) -> tuple[bytes, KeptRows]:
+    """Take in the rows of a file as far as they count, in the order of the frames; return their bytes too."""
+    data = kept_rows(data, plan.output, plan.format)
+    if not data:
+        return b"", KeptRows(plan, options)
+    update, gone = options.result.update, 0
+    inputs = Inputs(plan.output, updates=update)
+    if update:
+        data, gone = arranged(data, plan)
+    kept = KeptRows(plan, options, parse_rows(data, plan.output), inputs)
+    kept.gone = gone
+    lines = row_lines(io.BytesIO(data), plan.format)
+    return b"".join(islice(lines, kept.count + (plan.format == "csv"))), kept
 
 
-def _begin(file: ResultFile, plan: Plan, options: EstimateOptions) -> FileOutput:
-    data = kept_rows(file.read(), plan.output, plan.format) if options.result.resume else b""
+def _begin(file: ResultFile, inputs: ResultFile, plan: Plan, options: EstimateOptions) -> FileOutput:
+    data, kept = b"", KeptRows(plan, options)
+    before = file.read() if options.result.resume else b""
     try:
-        kept = _parsed(data, plan, options)
+        if before:
+            data, kept = _parsed(before, plan, options)
         earlier = read_run(plan.output) if kept.count else None
     except InputError as error:
         raise not_resumable(plan.output, str(error)) from error
@@ -241,23 +264,31 @@ def _begin(file: ResultFile, plan: Plan, options: EstimateOptions) -> FileOutput
     if options.result.resume or options.running.overwrite:
         first = 0 if options.result.retry_failed else kept.count
         remove_image_leftovers(kept.not_failed(first), options.images)
-    remove_leftovers([run_path(plan.output), os.path.realpath(plan.output)])
+    written = (plan.output, inputs_path(plan.output))
+    remove_leftovers([run_path(plan.output), *map(os.path.realpath, written)])
     # in this order, a run that is killed in between can be resumed: an empty file counts as a new one
+    if not before.startswith(data):
+        file.rewrite([data])  # before the other: a row without its line counts for nothing
     file.truncate(len(data) if kept.count else 0)
+    lines = bytes(kept.inputs.lines) if kept.inputs else b""
+    if not inputs.read().startswith(lines):
+        inputs.rewrite([lines])
+    inputs.truncate(len(lines))
     record.write()
     if not kept.count:
         file.append(format_header(plan.format, plan.further))
-    return FileOutput(file, record, plan, kept, options.images)
+    return FileOutput(file, inputs, record, plan, kept, options.images)
 
 
 def _check_permitted(name: str, options: EstimateOptions) -> None:
     """Refuse to touch a result that exists, unless --resume or --overwrite is given."""
     resume, overwrite = options.result.resume, options.running.overwrite
     if resume and overwrite:
-        raise UsageError("give either --resume or --overwrite")
+        raise UsageError(f"give either {'--update' if options.result.update else '--resume'} or --overwrite")
     if is_stream(name):
         if resume:
-            raise UsageError("--resume needs a result file: name it with --output")
+            flag = "--update" if options.result.update else "--resume"
+            raise UsageError(f"{flag} needs a result file: name it with --output")
         return
     if overwrite:
         return
@@ -266,6 +297,13 @@ def _check_permitted(name: str, options: EstimateOptions) -> None:
             raise UsageError(
                 f"{name}: exists already; give --resume to continue it or --overwrite to replace it"
             )
+        if not Path(inputs_path(name)).exists():
+            raise not_resumable(name, f"there is no {base_name(inputs_path(name))}")
+    elif not is_inputs(inputs_path(name)):
+        raise UsageError(
+            f"{inputs_path(name)}: exists already and is not of a run; give another --output, or --overwrite "
+            "to replace it"
+        )
     elif not is_replaceable_record(run_path(name)):
         raise UsageError(
             f"{run_path(name)}: exists already and is not the record of a run; give another --output, or "

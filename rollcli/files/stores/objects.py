@@ -123,8 +123,8 @@ _FIRST_PAUSE_S = 0.2
 _OWNER = "rollcli-run"  # attribute of an object: who wrote it
 
 
-def read_object(url: str, most: int = MOST_BYTES) -> bytes:
-    """Return the bytes of an object.
+def read_object(url: str, most: int = MOST_BYTES) -> tuple[bytes, str]:
+    """Return the bytes of an object, and its entity tag; that is empty where the store has none.
 
     Raises
     ------
@@ -136,7 +136,7 @@ def read_object(url: str, most: int = MOST_BYTES) -> bytes:
 
     counted = False
 
-    def fetch() -> bytes:
+    def fetch() -> tuple[bytes, str]:
         nonlocal counted
         answer = store.get(key)
         if answer.meta["size"] > most:
@@ -144,7 +144,7 @@ def read_object(url: str, most: int = MOST_BYTES) -> bytes:
         if not counted:
             wait_for_room(answer.meta["size"])
             counted = True
-        return bytes(answer.bytes())
+        return bytes(answer.bytes()), answer.meta["e_tag"] or ""
 
     try:
         with waiting_for_network():
@@ -287,11 +287,20 @@ def list_objects(url: str) -> Iterator[tuple[str, int]]:
     UsageError
         There is no such bucket, or it may not be listed.
     """
+    return ((found, meta["size"]) for found, meta in _list(url))
+
+
+def list_tags(url: str) -> Iterator[tuple[str, str]]:
+    """Yield the URL and entity tag of each object below a prefix, as `list_objects` does its size."""
+    return ((found, meta["e_tag"] or "") for found, meta in _list(url))
+
+
+def _list(url: str) -> Iterator[tuple[str, Any]]:
     store, prefix = _open(url)
     root = split_url(url)[0]
     try:
         for found in _listed(store, prefix.rstrip("/") or None):
-            yield f"{root}/{found['path']}", found["size"]
+            yield f"{root}/{found['path']}", found
     except FileNotFoundError as error:
         raise UsageError(f"{public_name(url)}: {what_is_missing(error)}") from None
     except _store_errors() as error:
