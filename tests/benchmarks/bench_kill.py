@@ -4,13 +4,15 @@ python tests/benchmarks/bench_kill.py [--count 1000] [--frames 60] [--seed 0] [K
 
 A disturbance counts when it has met a living run. A finding is another status than the documented ones, a
 traceback or an internal error, a process that outlives its run, a second run that is let in, or, at the end
-of a trial, another byte in the result, its record or the images. What ends a run while Python itself still
-starts is none: then the signal ends it, or a KeyboardInterrupt in modules of Python's. Linux alone: it looks
-into /proc.
+of a trial, another byte in the result, its record or the images. Trials read a folder of maps, or a bag (with
+the extra), or update a whole result of a folder in which maps have changed, were added and have gone. What
+ends a run while Python itself still starts is none: then the signal does, or a KeyboardInterrupt in modules
+of Python's. Linux alone: it looks into /proc.
 """
 
 import argparse
 import contextlib
+import itertools
 import os
 import pty
 import random
@@ -24,13 +26,14 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from fcntl import ioctl
+from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
-from tests.run_cli import command, contents, environment, write_maps
+from tests.run_cli import command, contents, environment, road_map, rollcli, write_kitti, write_maps
 
 RESULTS = ("rolls.csv", "rolls.jsonl")
 IMAGES = ("--derotated", "up", "--vdisparity", "v", "--road-mask", "road")
@@ -48,6 +51,14 @@ def _in_front_of(messages: str) -> None:
         ioctl(2, termios.TIOCSCTTY, 0)
 
 
+class Task(NamedTuple):
+    """What runs are asked for: what they read, how they begin, and what is there before them."""
+
+    inputs: str
+    flag: str = "--resume"
+    before: Path | None = None
+
+
 class Run:
     """A run in a session of its own, which writes a result and three images a frame into the folder.
 
@@ -56,13 +67,14 @@ class Run:
     folder : Path
     result : str
     jobs : int
+    task : Task
     messages : str
         Where they go: `file`, `pipe` or `terminal`.
     """
 
-    def __init__(self, folder: Path, result: str, jobs: int, messages: str = "file") -> None:
-        self.folder, self.result, self.jobs = folder, result, jobs
-        self.reader = -1
+    def __init__(self, folder: Path, result: str, jobs: int, task: Task, messages: str = "file") -> None:
+        self.folder, self.result, self.jobs, self.task = folder, result, jobs, task
+        self.reader, self._began = -1, time.time_ns()
         self._said = folder.with_suffix(".messages")
         self._said.unlink(missing_ok=True)  # those of another run
         if messages == "file":
@@ -72,7 +84,7 @@ class Run:
         else:
             self.reader, writer = pty.openpty()
         self.process = subprocess.Popen(
-            command("estimate", "../maps", "-v", "-o", result, "-j", str(jobs), "--resume", *IMAGES),
+            command("estimate", task.inputs, "-v", "-o", result, "-j", str(jobs), task.flag, *IMAGES),
             cwd=folder,
             env=environment(),
             stdout=subprocess.DEVNULL,
@@ -111,14 +123,15 @@ class Run:
 
     def goes_on(self, images: int) -> bool:
         """Wait until it has made so many images more than were there; whether it still runs then."""
-        wanted = images + self._images()
-        while self.process.poll() is None and self._images() < wanted:
+        while self.process.poll() is None and self._images() < images:
             time.sleep(0.002)
         return self.process.poll() is None
 
     def _images(self) -> int:
-        folder = self.folder / IMAGES[1]
-        return sum(1 for _ in folder.iterdir()) if folder.exists() else 0
+        made = Path(self.folder / IMAGES[1]).glob("*.png")
+        with contextlib.suppress(OSError):  # one was replaced
+            return sum(each.stat().st_mtime_ns > self._began for each in made)
+        return 0
 
     def leave(self) -> None:
         """Close the end where its messages are read."""
@@ -177,7 +190,7 @@ def second_run(run: Run, chance: random.Random) -> str:
     """Stop it, and start a second run on its result, which has to be refused once the first one holds it."""
     run.send_all(signal.SIGSTOP)
     held = f" {run.process.pid} " in Path("/proc/locks").read_text()
-    second = Run(run.folder, run.result, run.jobs, "pipe") if held else None
+    second = Run(run.folder, run.result, run.jobs, run.task, "pipe") if held else None
     status, said = second.end() if second else (2, "another run")
     run.send_all(signal.SIGCONT)
     return "" if status == 2 and "another run" in said else f"a second run ended with {status}: {said[-300:]}"
@@ -222,10 +235,10 @@ KINDS = {
 }
 
 
-def disturbed(folder: Path, result: str, jobs: int, name: str, chance: random.Random):
+def disturbed(folder: Path, result: str, jobs: int, task: Task, name: str, chance: random.Random):
     """Disturb one run; whether it met it alive, and early, whether the work is done, and what was found."""
     kind = KINDS[name]
-    run = Run(folder, result, jobs, kind.messages)
+    run = Run(folder, result, jobs, task, kind.messages)
     if chance.random() < STARTING:
         time.sleep(chance.uniform(0, START_S))
     elif run.goes_on(chance.randint(0, MOST_IMAGES)):
@@ -250,6 +263,35 @@ def disturbed(folder: Path, result: str, jobs: int, name: str, chance: random.Ra
     return met, early, status == 0, found
 
 
+def make_tasks(folder: Path, frames: int) -> list[Task]:
+    """Make what the tasks read."""
+    write_maps(folder / "maps", frames)
+    tasks = [Task("../maps"), Task("../grown", "--update", folder / "earlier")]
+    write_maps(folder / "grown", frames)
+    (folder / "earlier").mkdir()
+    for result in RESULTS:
+        line = ("estimate", "../grown", "-o", result, *IMAGES, "--overwrite")
+        assert rollcli(*line, cwd=folder / "earlier").status == 0
+    for number in range(0, frames, 3):
+        write_kitti(folder / "grown" / f"frame{number}.png", road_map(0.2, seed=1000 + number))
+    for number in range(1, frames, 4):
+        write_kitti(folder / "grown" / f"frame{number}a.png", road_map(0.1, seed=2000 + number))
+    for number in range(2, frames, 6):
+        (folder / "grown" / f"frame{number}.png").unlink()
+    if find_spec("rosbags") is None:
+        print("without bags: the extra bags is not here")
+        return tasks
+    from tests.files.recordings.bag_files import disparity_image, write_bag
+
+    def messages(store):
+        for number in range(frames):
+            values = road_map(0.01 * (number % 40), seed=number)
+            yield "/disparity", number, disparity_image(store, values, number + 1)
+
+    write_bag(folder, "run", "mcap", messages)
+    return [*tasks, Task("../run.mcap")]
+
+
 def main() -> None:
     """Print a line for each finding and each ten trials, and how often each kind met a run."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
@@ -263,31 +305,35 @@ def main() -> None:
     trials, same, findings, early_ones = 0, 0, 0, 0
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        write_maps(folder / "maps", given.frames)
-        expected = {}
-        for result in RESULTS:
-            (folder / f"undisturbed-{result}").mkdir()
-            Run(folder / f"undisturbed-{result}", result, 2).end()
-            expected[result] = contents(folder / f"undisturbed-{result}")
+        tasks, expected = make_tasks(folder, given.frames), {}
+        for number, (task, result) in enumerate(itertools.product(tasks, RESULTS)):
+            undisturbed = folder / f"undisturbed{number}"
+            undisturbed.mkdir()
+            Run(undisturbed, result, 2, task._replace(flag="--overwrite")).end()
+            before = contents(task.before) if task.before else {}
+            expected[task, result] = before | contents(undisturbed)
         while counts.total() < given.count:
-            result, jobs = RESULTS[trials // 2 % 2], 1 + trials % 2
+            result, jobs, task = RESULTS[trials // 2 % 2], 1 + trials % 2, tasks[trials // 4 % len(tasks)]
             trial = folder / f"trial{trials}"
-            trial.mkdir()
+            if task.before:
+                shutil.copytree(task.before, trial)
+            else:
+                trial.mkdir()
             done = False
             while not done:
                 kind = chance.choice([each for each in kinds if jobs in KINDS[each].jobs])
-                met, early, done, found = disturbed(trial, result, jobs, kind, chance)
+                met, early, done, found = disturbed(trial, result, jobs, task, kind, chance)
                 counts[kind] += met
                 early_ones += met and early
                 if found:
                     findings += 1
-                    print(f"FOUND by {kind}, -j{jobs}, {result}: {found}", flush=True)
+                    print(f"FOUND by {kind}, -j{jobs}, {result}, {task.inputs}: {found}", flush=True)
             trials += 1
-            if contents(trial) == expected[result]:
+            if contents(trial) == expected[task, result]:
                 same += 1
                 shutil.rmtree(trial)
             else:
-                print(f"DIFFERENT bytes, -j{jobs}, {result}, after {kind}", flush=True)
+                print(f"DIFFERENT bytes, -j{jobs}, {result}, {task.inputs}, after {kind}", flush=True)
             if trials % 10 == 0:
                 said = ", ".join(f"{kind} {counts[kind]}" for kind in kinds)
                 print(f"{counts.total()} ({said}); {same} of {trials} trials the same", flush=True)
