@@ -165,6 +165,7 @@ result_options = record(
             "Pitch and camera height too, with a calibration file of each frame",
             "rollcli estimate --left image_0 --right image_1 --calib calib/ -o pose.csv",
         ),
+        ("A video that holds both views", "rollcli estimate drive.mp4 --side-by-side -o rolls.csv"),
         (
             "The paper's setting: every pixel is road",
             "rollcli estimate crops/ --road all --method gd -o rolls.csv",
@@ -194,7 +195,7 @@ def estimate(ctx: click.Context, /, **records: Any) -> None:
       rollcli report rolls.csv -o rolls.html
 
     INPUTS are maps (PNG, TIFF, NPY, NPZ, PFM, EXR), folders, .zip and .tar of them, quoted
-    patterns, or - for paths on stdin.
+    patterns, or - for paths on stdin; bags; with --side-by-side images and videos that hold both views.
 
     A positive roll means that the rig is rolled counter-clockwise seen from behind: its right end is up.
     """

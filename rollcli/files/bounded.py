@@ -28,6 +28,21 @@ def too_large(name: str, size: int | None, most: int, within: str = "") -> Input
     return InputError(f"{name}: has {has} bytes; up to {in_words(most)} are read{within}")
 
 
+def state_of(path: str) -> tuple[str, int, int]:
+    """Return the path, size and time of change, ns, of a file that stays open: it may be replaced.
+
+    Raises
+    ------
+    InputError
+        It cannot be read.
+    """
+    try:
+        found = os.stat(path)  # noqa: PTH116
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from None
+    return path, found.st_size, found.st_mtime_ns
+
+
 def read_given(path: str | Path, most: int = MOST_BYTES) -> bytes:
     """Return the bytes of a file, pipe or device that a user named.
 

@@ -66,6 +66,7 @@ def run_disparity(options: DisparityOptions) -> ExitStatus:
     frames = pair_frames(
         options.inputs,
         options.pairs,
+        options.topics,
         skip=[*filter(None, [options.output, options.preview])],
         quiet=options.running.quiet,
     )
@@ -75,7 +76,9 @@ def run_disparity(options: DisparityOptions) -> ExitStatus:
         images=ImageOptions(disparity=options.output),  # levelled as the estimate does, then every row
         root=options.running.root,
         replaces=options.running.overwrite,
+        side_by_side=options.pairs.side_by_side,
     )
+    check_first_size(frames, read)
     do = partial(_match, options=read, save_as=options.save_as, preview=options.preview is not None)
     return convert(conversions, do, options.output, options.running, EncodingOptions())
 

@@ -38,7 +38,7 @@ class Frame:
     def reads(self) -> Iterator[str]:
         """Yield every file that this frame needs."""
         yield self.path
-        if self.right_path:
+        if self.right_path not in ("", self.path):  # one image may hold both views
             yield self.right_path
         if self.mask is not None:
             yield self.mask
@@ -79,7 +79,9 @@ def failed_frame(frame: Frame, reason: str) -> FrameResult:
     message, left, right = (
         " ".join(text.split()) for text in (without_secrets(reason), frame.file, frame.right_file)
     )
-    if right and message.startswith(f"{right}: "):
+    if right == left and message.startswith(f"{left}: "):  # one image holds both views
+        message = message.removeprefix(f"{left}: ")
+    elif right and message.startswith(f"{right}: "):
         message = _RIGHT + message.removeprefix(f"{right}: ")
     elif message.startswith(f"{left}: "):
         message = (_LEFT if right else "") + message.removeprefix(f"{left}: ")

@@ -10,6 +10,7 @@ from rollcli.rig.calibration import CalibrationOptions
 from rollcli.run.image_kinds import KINDS, ImageKind, Save
 from rollcli.stereo.options import StereoOptions
 
+Layout = Literal["left-right", "top-bottom"]
 HEIGHTS_RANGE = (-0.10, 0.10)
 
 
@@ -27,11 +28,12 @@ class InputOptions(NamedTuple):
 
 
 class PairOptions(NamedTuple):
-    """Which stereo pairs to read, instead of maps."""
+    """Which stereo pairs to read, instead of maps. `side_by_side`: how each input holds both views."""
 
     left: str | None = None
     right: str | None = None
     match: Literal["name", "order"] = "name"
+    side_by_side: Layout | None = None
 
 
 class TopicOptions(NamedTuple):
@@ -149,6 +151,7 @@ class FrameOptions(NamedTuple):
     lines: Literal["csv", "jsonl", ""] = ""
     further: tuple[str, ...] = ()
     notes: bool = False
+    side_by_side: Layout | None = None
 
     def at(self, path: str) -> str:
         """Locate a path on this worker."""
@@ -205,8 +208,19 @@ class EstimateOptions(NamedTuple):
     def frame(self) -> FrameOptions:
         """The part that decides the row and the images of a frame."""
         return FrameOptions(
-            self.encoding, self.stereo, self.region, self.method, self.images, self.running.root
+            self.encoding,
+            self.stereo,
+            self.region,
+            self.method,
+            self.images,
+            self.running.root,
+            side_by_side=self.pairs.side_by_side,
         )
+
+    @property
+    def paired(self) -> bool:
+        """Whether the frames are stereo pairs."""
+        return any((*self.pairs[:2], self.pairs.side_by_side, *self.topics[:2]))
 
 
 @dataclass(frozen=True)
@@ -284,3 +298,4 @@ class DisparityOptions:
     stereo: StereoOptions
     running: RunningOptions
     preview: str | None = None
+    topics: TopicOptions = field(default_factory=TopicOptions)

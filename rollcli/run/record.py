@@ -24,6 +24,7 @@ from rollcli.run.options import (
     EstimateOptions,
     FrameOptions,
     ImageOptions,
+    Layout,
     MethodOptions,
     RegionOptions,
 )
@@ -217,7 +218,8 @@ class RunRecord:
 
 def _effective(plan: Plan, options: EstimateOptions) -> dict[str, Any]:
     """Collect the options that decide the bytes of rows and images, by their names on the command line."""
-    read = _by_name(options.encoding) if options.pairs.left is None else _by_name(options.stereo)
+    read = _by_name(options.stereo) if options.paired else _by_name(options.encoding)
+    layout = options.pairs.side_by_side
     values = {**_by_name(options.method), **_by_name(options.region), **_by_name(options.images), **read}
     values |= {
         "format": plan.format,
@@ -225,6 +227,7 @@ def _effective(plan: Plan, options: EstimateOptions) -> dict[str, Any]:
         **({"part-rows": options.result.part_rows} if plan.in_parts else {}),
         "shard": "/".join(map(str, options.result.shard)),
         **({"shard-by": "range"} if options.result.shard_by == "range" else {}),
+        **({"side-by-side": layout} if layout else {}),
     }
     return {_OPTION_NAMES.get(key, key).replace("_", "-"): _public(value) for key, value in values.items()}
 
@@ -287,9 +290,17 @@ def recorded_options(run: Mapping[str, Any] | None, name: str) -> FrameOptions:
             method=_filled(MethodOptions(), given),
             stereo=_filled(StereoOptions(), given),
             images=_filled(ImageOptions(), given),
+            side_by_side=_layout(given.get("side-by-side")),
         )
     except (TypeError, ValueError) as error:
         raise InputError(f"{name}: is not the record of a run: {error}") from error
+
+
+def _layout(given: Any) -> Layout | None:
+    layouts: dict[Any, Layout] = {"left-right": "left-right", "top-bottom": "top-bottom"}
+    if given is not None and given not in layouts:
+        raise TypeError(f"side-by-side is {given!r}")
+    return layouts.get(given)
 
 
 def _filled(defaults: Options, given: Mapping[str, Any]) -> Options:

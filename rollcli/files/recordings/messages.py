@@ -155,16 +155,16 @@ def as_file(topic: Topic, data: bytes, name: str, raw_of: CameraInfo | None = No
         if raw_of is None:
             return packed
         decode = png.picture if packed.startswith(png.SIGNATURE) else pictures.decode_picture
-        return _file_of(_rectified(decode(packed, name), raw_of))
+        return image_file(_rectified(decode(packed, name), raw_of))
     if topic.type == DISPARITY:
         values = _pixels(found.image, name)
         least = float(found.min_disparity)
         below = values < least
         if values.ndim == 2 and values.dtype.kind == "f" and below.any() and not below.all():
             values = np.where(below, np.nan, values).astype(values.dtype)
-        return _file_of(values)
+        return image_file(values)
     values = _pixels(found, name)
-    return _file_of(values if raw_of is None else _rectified(values, raw_of))
+    return image_file(values if raw_of is None else _rectified(values, raw_of))
 
 
 def _decoded(topic: Topic, data: bytes, name: str) -> Any:
@@ -216,7 +216,8 @@ def _pixels(image: Any, name: str) -> NDArray[Any]:
     return cv2.cvtColor(values, _BAYER[bayer]) if encoding.startswith("bayer_") else values
 
 
-def _file_of(values: NDArray[Any]) -> bytes:
+def image_file(values: NDArray[Any]) -> bytes:
+    """Make a whole file of an image, BGR where it has colours."""
     if values.ndim == 2:
         return arrays.encode_npy(values)
     height, width = values.shape[:2]
