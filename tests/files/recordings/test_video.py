@@ -219,7 +219,7 @@ def test_what_is_no_usable_video_is_told_in_a_line(tmp_path, drive):
     frames = beside(views)
     write_video(tmp_path / "drive.mkv", frames)
     odd = write_video(tmp_path / "odd.avi", frames, "png ")  # the writer makes widths even
-    smaller = cv2.imencode(".png", frames[0][:, :201])[1].tobytes()
+    smaller = cv2.imencode(".png", frames[0][:, :101])[1].tobytes()
     larger = re.compile(rb"\x89PNG.*?IEND....", re.DOTALL)
     odd.write_bytes(larger.sub(lambda found: padded(smaller, len(found[0])), odd.read_bytes()))
     write_video(tmp_path / "narrow.mkv", [cv2.resize(each, (160, 120)) for each in frames], "FFV1")
@@ -232,7 +232,7 @@ def test_what_is_no_usable_video_is_told_in_a_line(tmp_path, drive):
         (["--left", "drive.mkv"], "--left and --right are given together"),
         (["--side-by-side"], "name pairs in one way"),
         (["drive.mkv", "--side-by-side", "--left", "a", "--right", "b"], "name pairs in one way"),
-        (["odd.avi", "--side-by-side"], "odd.avi: is 201 px wide, which cannot be halved"),
+        (["odd.avi", "--side-by-side"], "odd.avi: is 101 px wide, which cannot be halved"),
         (["narrow.mkv", "--side-by-side"], "its views would be 80x120 px, higher than wide"),
         (["noise.mp4", "--side-by-side"], "noise.mp4: is no MP4, MOV, AVI or Matroska file"),
         (["header.mp4", "--side-by-side"], "header.mp4: cannot be opened"),
