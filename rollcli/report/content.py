@@ -10,6 +10,7 @@ from rollcli.files.stores.locations import public_name
 from rollcli.report.chart import Chart
 from rollcli.report.charts import outside
 from rollcli.report.figures import with_still
+from rollcli.report.frame_axis import frame_axis
 from rollcli.report.options import ReportOptions
 from rollcli.report.page import Rows, render_page
 from rollcli.report.pictures import Pictures
@@ -76,7 +77,7 @@ def report_page(
         outside=outside(rows),
         doubtful=doubtful[:_LISTED],
         more_doubtful=max(0, len(doubtful) - _LISTED),
-        rows=_table(rows),
+        rows=_table(rows, rig),
         gallery=[_card(rows, choice, pictures) for choice, pictures in shown],
         chosen=_chosen_text(rows, [choice for choice, _ in shown]),
     )
@@ -101,7 +102,7 @@ def _others(rig: RigAssessment) -> list[str]:
     return others
 
 
-def _table(rows: Sequence[Row]) -> Rows:
+def _table(rows: Sequence[Row], rig: RigAssessment | None = None) -> Rows:
     """Return what the table shows of each frame: number, file, status, roll, roll in words, reason."""
     return Rows(
         [
@@ -114,7 +115,8 @@ def _table(rows: Sequence[Row]) -> Rows:
                 row.message,
             )
             for number, row in enumerate(rows, 1)
-        ]
+        ],
+        frame_axis(rows, rig).places,
     )
 
 

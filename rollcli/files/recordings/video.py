@@ -1,9 +1,9 @@
 """Videos: their frames, decoded in order.
 
 A video cannot be sought exactly: where rates vary, or frames refer to later ones, another frame comes.
-So each worker opens the video itself, decodes from its start, and passes over what others do. That gives the
-same frames for any workers, on a cluster too, and keeps one frame in memory. It costs each worker the decoding
-of all frames: some ms each of what cameras write, where matching takes 100.
+So each worker opens the video itself, decodes from its start, and passes over what others do. That gives
+the same frames for any workers, on a cluster too, and keeps one frame in memory. It costs each worker the
+decoding of all frames: some ms each of what cameras write, where matching takes 100.
 """
 
 import os
