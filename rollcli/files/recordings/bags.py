@@ -255,6 +255,8 @@ class _Ros1(_Chunked):
         fields = _fields(_exactly(self._file, length))
         (length,) = struct.unpack("<I", _exactly(self._file, 4))
         after, op = self._file.tell() + length, fields["op"][0]
+        if fields.get("encryptor"):
+            raise InputError(f"{self.path}: is encrypted: decrypt it first (rosbag decrypt)")
         if op not in (0x02, 0x05, 0x07):
             return _Records([], after, after <= self._size)
         if op != 0x05:

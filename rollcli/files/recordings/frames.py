@@ -18,6 +18,7 @@ from rollcli.rig.calibration import Calibration
 _VIEWS = (IMAGE, COMPRESSED)
 _LISTED = 20  # topics that an error names
 _RAW = "image_raw"
+_NO_P = "no CameraInfo with a principal point (P): no pitch and no height without --calib"
 
 
 class RecordingFrame(NamedTuple):
@@ -86,10 +87,8 @@ def maps_of_bag(files: Sequence[str], name: str, topic: str | None) -> BagFrames
         opened_bag, place = _placed(bag.frames[0][0].location)
         stated = messages.baseline_of(topics[chosen], opened_bag.read(place).data, chosen)
     bag.calibration = _calibration(left, right, stated[1], f"CameraInfo of {name}")
-    if bag.calibration is None and topics[chosen].type == DISPARITY:
-        bag.notes.append(
-            f"{name}: no CameraInfo with a principal point: no pitch and no height without --calib"
-        )
+    if bag.calibration is None and (found.cameras or topics[chosen].type == DISPARITY):
+        bag.notes.append(f"{name}: {_NO_P}")
     _finish(bag, found, name, chosen)
     return bag
 
@@ -111,6 +110,8 @@ def pairs_of_bag(files: Sequence[str], name: str, left: str, right: str, toleran
         if _is_raw(found, topic):
             bag.notes.append(f"{topic}: raw views are rectified by D, K, R and P of {_beside(topic)}")
             found.frames[topic][:] = [_rectified(found, topic, each) for each in found.frames[topic]]
+        elif _RAW in topic and not _usable(found, topic):
+            bag.notes.append(f"{topic}: raw views are taken as they are: no CameraInfo with P rectifies them")
     bag.frames = [(each, rights[at]) for each, at in zip(lefts, partners, strict=True) if at is not None]
     paired = {at for at in partners if at is not None}
     for side, alone in (
@@ -128,6 +129,8 @@ def pairs_of_bag(files: Sequence[str], name: str, left: str, right: str, toleran
         )
     one, other = (found.cameras.get(_beside(topic)) for topic in (left, right))
     bag.calibration = _calibration(one, other, 0.0, f"CameraInfo of {name}")
+    if bag.calibration is None and found.cameras:
+        bag.notes.append(f"{name}: {_NO_P}")
     _finish(bag, found, name, f"{left} and {right}")
     return bag
 
@@ -228,6 +231,13 @@ def _known(topics: dict[str, Topic], topic: str, name: str) -> Topic:
     return topics[topic]
 
 
+def _check_format(topic: Topic, data: bytes, name: str) -> None:
+    try:
+        messages.check_format(topic, data, name)
+    except InputError as error:
+        raise UsageError(str(error)) from None
+
+
 def _all(topics: dict[str, Topic]) -> str:
     if not topics:
         return "it has no topics"
@@ -293,6 +303,8 @@ def _scan(files: Sequence[str], wanted: Sequence[Topic], topics: dict[str, Topic
                     cameras.setdefault(message.topic, info)
                     places[path, message.topic] = place
                 continue
+            if not frames[topic.name]:
+                _check_format(topic, message.data, path)
             stamp = messages.stamp_of(topic, message.data, message.log_time)
             name = f"{path}#{topic.name}@{stamp}"
             seen[name] = seen.get(name, -1) + 1
@@ -353,6 +365,11 @@ def _is_raw(found: _Found, topic: str) -> bool:
     """Tell whether the views of a topic must be rectified."""
     info = found.cameras.get(_beside(topic))
     return _RAW in topic and info is not None and info.changes_raw_views
+
+
+def _usable(found: _Found, topic: str) -> bool:
+    info = found.cameras.get(_beside(topic))
+    return info is not None and info.usable
 
 
 def _rectified(found: _Found, topic: str, frame: RecordingFrame) -> RecordingFrame:

@@ -2,6 +2,7 @@
 
 import io
 import math
+import re
 import struct
 from dataclasses import dataclass
 from functools import lru_cache
@@ -24,6 +25,7 @@ DISPARITY, IMAGE, COMPRESSED = (
 )
 CAMERA_INFO = "sensor_msgs/CameraInfo"
 MAP_ENCODINGS = ("mono16", "16UC1", "16SC1", "32FC1")  # of images that hold disparities or depths
+_VIDEO = re.compile("h\\.?26[45]|hevc|avc|av1|vp[89]", re.IGNORECASE)
 # numpy's dtype, and the channels
 _PIXELS = {
     "mono8": ("u1", 1),
@@ -98,9 +100,8 @@ def check_decoder(topic: Topic, name: str) -> None:
     """
     if topic.type not in (DISPARITY, IMAGE, COMPRESSED):
         hint = ": such video must be decoded in order; record images" if "Video" in topic.type else ""
-        raise InputError(
-            f"{name}: {topic.name} has messages of the type {topic.type or 'unknown'}, not images{hint}"
-        )
+        kind = topic.type or "unknown"
+        raise InputError(f"{name}: {topic.name} has messages of the type {kind}, not images of ROS{hint}")
     if topic.encoding not in ("cdr", "ros1"):
         raise InputError(
             f"{name}: {topic.name} is serialized as {topic.encoding or 'nothing'}; cdr and ros1 are read"
@@ -114,6 +115,23 @@ def camera_info(topic: Topic, data: bytes, name: str) -> CameraInfo:
     if [len(fields[key]) for key in "krp"] != [9, 9, 12]:
         raise InputError(f"{name}: its CameraInfo is damaged")
     return CameraInfo(int(found.width), int(found.height), str(found.distortion_model), **fields)
+
+
+def check_format(topic: Topic, data: bytes, name: str) -> None:
+    """Refuse a CompressedImage that is a part of a video, by what it says of its format.
+
+    Raises
+    ------
+    InputError
+    """
+    if topic.type != COMPRESSED:
+        return
+    form = str(_decoded(topic, data, name).format)
+    if _VIDEO.search(form):
+        raise InputError(
+            f"{name}: {topic.name} holds video ({form[:20]}), which must be decoded in order: record images, "
+            "or export it as .mp4"
+        )
 
 
 def image_encoding(topic: Topic, data: bytes, name: str) -> str:
