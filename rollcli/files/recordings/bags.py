@@ -45,7 +45,7 @@ class Message(NamedTuple):
     topic: str
     log_time: int
     place: tuple[int, int]
-    data: bytes
+    data: memoryview
 
 
 class Bag(Protocol):
@@ -97,13 +97,13 @@ def _exactly(file: BinaryIO, count: int) -> bytes:
     return data
 
 
-def _unpacked(compression: str, data: bytes, size: int) -> bytes:
+def _unpacked(compression: str, data: memoryview, size: int) -> memoryview:
     """Unpack a chunk, or what is there of it, to no more than it claims and its bytes may stand for."""
     if compression in ("", "none"):
         return data
     if not 0 <= size <= most_unpacked(len(data)):
         raise _BrokenError
-    found = b""
+    found: bytes | bytearray = b""
     try:
         if compression == "bz2":
             found = bz2.BZ2Decompressor().decompress(data, size)
@@ -117,13 +117,16 @@ def _unpacked(compression: str, data: bytes, size: int) -> bytes:
             found = zstandard.ZstdDecompressor().stream_reader(data).read(size)
     except Exception as error:  # each library has errors of its own
         raise _BrokenError from error
-    return found
+    return memoryview(found)
+
+
+_DAMAGED = (_BrokenError, struct.error, ValueError, KeyError, IndexError)
 
 
 class _Records(NamedTuple):
     """Messages of a record (channel, log time, bytes); where the next one begins; whether it is whole."""
 
-    messages: list[tuple[int, int, bytes]]
+    messages: list[tuple[int, int, memoryview]]
     after: int
     whole: bool = True
 
@@ -143,9 +146,17 @@ class _Chunked:
             self._file.close()
 
     def topics(self) -> dict[str, Topic]:
-        """Return the topics by name."""
-        for _ in self.messages(set()):
-            pass
+        """Return the topics by name: as the index says, or what a whole look through the file finds."""
+        try:
+            index = self._index()
+            while 0 < index < self._size:
+                found = self._record(index)
+                index = found.after if found.whole else 0
+        except _DAMAGED:
+            index = 0
+        if not (index and self._topics and all(each.type for each in self._topics.values())):
+            for _ in self.messages(set()):
+                pass
         return {each.name: each for each in self._topics.values()}
 
     def messages(self, topics: set[str]) -> Iterator[Message]:
@@ -163,7 +174,7 @@ class _Chunked:
                 if found.after <= offset:  # the end of the messages
                     return
                 offset = found.after
-        except (_BrokenError, struct.error, ValueError, KeyError, IndexError, UnicodeDecodeError):
+        except _DAMAGED:
             share = offset / max(self._size, 1)
             self.broken = f"is damaged or cut off at {share:.0%} of its {self._size} bytes"
 
@@ -174,12 +185,16 @@ class _Chunked:
             if self._chunk[0] != offset:
                 self._chunk = offset, self._record(offset)
             channel, time, data = self._chunk[1].messages[number]
-        except (_BrokenError, struct.error, ValueError, KeyError, IndexError):
+        except _DAMAGED:
             raise InputError(f"{self.path}: there is no whole message at byte {offset}") from None
         topic = self._topics.get(channel)
         return Message(topic.name if topic else "", time, place, data)
 
     def _start(self) -> int:
+        raise NotImplementedError
+
+    def _index(self) -> int:
+        """Return where topics are listed behind the messages; 0 where they are not."""
         raise NotImplementedError
 
     def _record(self, offset: int) -> _Records:
@@ -197,6 +212,11 @@ class _Mcap(_Chunked):
     def _start(self) -> int:
         return len(_MCAP)
 
+    def _index(self) -> int:
+        self._file.seek(max(self._size - 37, 0))  # the footer: opcode, length, where the summary starts, …
+        opcode, start = struct.unpack_from("<B8xQ", _exactly(self._file, 17))
+        return int(start) if opcode == 0x02 else 0
+
     def _record(self, offset: int) -> _Records:
         self._file.seek(offset)
         opcode, length = struct.unpack("<BQ", _exactly(self._file, 9))
@@ -206,14 +226,14 @@ class _Mcap(_Chunked):
         if opcode not in (0x03, 0x04, 0x05, 0x06):
             return _Records([], after, after <= self._size)
         if opcode != 0x06:
-            return _Records(self._inner(opcode, _exactly(self._file, length)), after)
+            return _Records(self._inner(opcode, memoryview(_exactly(self._file, length))), after)
         if length > MOST_BYTES:
             raise _BrokenError
-        content = self._file.read(length)
+        content = memoryview(self._file.read(length))
         size, name_length = struct.unpack_from("<Q4xI", content, 16)
         start = 32 + name_length + 8
-        data = _unpacked(content[32 : 32 + name_length].decode(), content[start:], size)
-        found, at = list[tuple[int, int, bytes]](), 0
+        data = _unpacked(bytes(content[32 : 32 + name_length]).decode(), content[start:], size)
+        found, at = list[tuple[int, int, memoryview]](), 0
         while at + 9 <= len(data):
             opcode, length = struct.unpack_from("<BQ", data, at)
             if at + 9 + length > len(data):
@@ -222,7 +242,7 @@ class _Mcap(_Chunked):
             at += 9 + length
         return _Records(found, after, at == len(data) == size)
 
-    def _inner(self, opcode: int, content: bytes) -> list[tuple[int, int, bytes]]:
+    def _inner(self, opcode: int, content: memoryview) -> list[tuple[int, int, memoryview]]:
         if opcode == 0x05:
             channel, time = struct.unpack_from("<H4xQ", content)
             return [(channel, time, content[22:])]
@@ -238,9 +258,9 @@ class _Mcap(_Chunked):
         return []
 
 
-def _text(content: bytes, at: int) -> tuple[str, int]:
+def _text(content: memoryview, at: int) -> tuple[str, int]:
     (length,) = struct.unpack_from("<I", content, at)
-    return content[at + 4 : at + 4 + length].decode("utf-8", "replace"), at + 4 + length
+    return bytes(content[at + 4 : at + 4 + length]).decode("utf-8", "replace"), at + 4 + length
 
 
 class _Ros1(_Chunked):
@@ -248,6 +268,11 @@ class _Ros1(_Chunked):
 
     def _start(self) -> int:
         return len(_BAG)
+
+    def _index(self) -> int:
+        self._file.seek(len(_BAG))
+        (length,) = struct.unpack("<I", _exactly(self._file, 4))
+        return int(struct.unpack("<Q", _fields(_exactly(self._file, length))["index_pos"])[0])
 
     def _record(self, offset: int) -> _Records:
         self._file.seek(offset)
@@ -260,18 +285,18 @@ class _Ros1(_Chunked):
         if op not in (0x02, 0x05, 0x07):
             return _Records([], after, after <= self._size)
         if op != 0x05:
-            return _Records(self._inner(op, fields, _exactly(self._file, length)), after)
+            return _Records(self._inner(op, fields, memoryview(_exactly(self._file, length))), after)
         if length > MOST_BYTES:
             raise _BrokenError
         (size,) = struct.unpack("<I", fields["size"])
-        data = _unpacked(fields["compression"].decode(), self._file.read(length), size)
-        found, at = list[tuple[int, int, bytes]](), 0
+        data = _unpacked(fields["compression"].decode(), memoryview(self._file.read(length)), size)
+        found, at = list[tuple[int, int, memoryview]](), 0
         while at + 4 <= len(data):
             (length,) = struct.unpack_from("<I", data, at)
             start = at + 4 + length
             if start + 4 > len(data):
                 break
-            inner = _fields(data[at + 4 : start])
+            inner = _fields(bytes(data[at + 4 : start]))
             (length,) = struct.unpack_from("<I", data, start)
             if start + 4 + length > len(data):
                 break
@@ -279,12 +304,14 @@ class _Ros1(_Chunked):
             at = start + 4 + length
         return _Records(found, after, at == len(data) == size)
 
-    def _inner(self, op: int, fields: dict[str, bytes], data: bytes) -> list[tuple[int, int, bytes]]:
+    def _inner(
+        self, op: int, fields: dict[str, bytes], data: memoryview
+    ) -> list[tuple[int, int, memoryview]]:
         if op == 0x02:
             seconds, nanoseconds = struct.unpack("<II", fields["time"])
             return [(struct.unpack("<I", fields["conn"])[0], seconds * 10**9 + nanoseconds, data)]
         if op == 0x07:
-            kind = _fields(data).get("type", b"").decode("utf-8", "replace")
+            kind = _fields(bytes(data)).get("type", b"").decode("utf-8", "replace")
             name = fields["topic"].decode("utf-8", "replace")
             self._topics[struct.unpack("<I", fields["conn"])[0]] = Topic(name, kind, "ros1")
         return []
@@ -334,7 +361,7 @@ class _Sqlite:
             for number, topic, time, data in rows:
                 count += 1
                 if (name := self._names.get(topic)) in topics and isinstance(data, bytes):
-                    yield Message(str(name), int(time), (number, 0), data)
+                    yield Message(str(name), int(time), (number, 0), memoryview(data))
         except sqlite3.Error:
             self.broken = f"is damaged or cut off behind {count} messages"
 
@@ -347,7 +374,7 @@ class _Sqlite:
             row = None
         if row is None:
             raise InputError(f"{self.path}: there is no whole message {place[0]}")
-        return Message(self._names.get(row[0], ""), int(row[1]), place, row[2])
+        return Message(self._names.get(row[0], ""), int(row[1]), place, memoryview(row[2]))
 
 
 @lru_cache(maxsize=4)  # a process opens a bag once; it changes with size and time

@@ -231,7 +231,7 @@ def _known(topics: dict[str, Topic], topic: str, name: str) -> Topic:
     return topics[topic]
 
 
-def _check_format(topic: Topic, data: bytes, name: str) -> None:
+def _check_format(topic: Topic, data: memoryview, name: str) -> None:
     try:
         messages.check_format(topic, data, name)
     except InputError as error:

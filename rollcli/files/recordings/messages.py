@@ -1,6 +1,5 @@
-"""Messages of ROS to files that every reader of images knows: numbers to NPY, colours to PPM."""
+"""Messages of ROS to files that every reader of images knows: numbers to NPY, colours to BMP or PPM."""
 
-import io
 import math
 import re
 import struct
@@ -79,7 +78,7 @@ class CameraInfo:
         return self.usable and self.k[0] > 0 and (any(self.d) or (turned and any(self.r)))
 
 
-def stamp_of(topic: Topic, data: bytes, log_time: int) -> int:
+def stamp_of(topic: Topic, data: memoryview, log_time: int) -> int:
     """Return the header's time, ns, without decoding the message; the time of recording where it has none."""
     try:
         if topic.encoding == "ros1":
@@ -108,7 +107,7 @@ def check_decoder(topic: Topic, name: str) -> None:
         )
 
 
-def camera_info(topic: Topic, data: bytes, name: str) -> CameraInfo:
+def camera_info(topic: Topic, data: memoryview, name: str) -> CameraInfo:
     """Decode a CameraInfo."""
     found = _decoded(topic, data, name)
     fields = {key: tuple(map(float, getattr(found, key, getattr(found, key.upper(), ())))) for key in "dkrp"}
@@ -117,7 +116,7 @@ def camera_info(topic: Topic, data: bytes, name: str) -> CameraInfo:
     return CameraInfo(int(found.width), int(found.height), str(found.distortion_model), **fields)
 
 
-def check_format(topic: Topic, data: bytes, name: str) -> None:
+def check_format(topic: Topic, data: memoryview, name: str) -> None:
     """Refuse a CompressedImage that is a part of a video, by what it says of its format.
 
     Raises
@@ -134,20 +133,20 @@ def check_format(topic: Topic, data: bytes, name: str) -> None:
         )
 
 
-def image_encoding(topic: Topic, data: bytes, name: str) -> str:
+def image_encoding(topic: Topic, data: memoryview, name: str) -> str:
     """Return what the pixels of an Image are; empty for other types."""
     return str(_decoded(topic, data, name).encoding) if topic.type == IMAGE else ""
 
 
-def baseline_of(topic: Topic, data: bytes, name: str) -> tuple[float, float]:
+def baseline_of(topic: Topic, data: memoryview, name: str) -> tuple[float, float]:
     """Return f in px and |T| in m of a DisparityImage; 0 where they are not stated."""
     found = _decoded(topic, data, name)
     values = float(found.f), abs(float(getattr(found, "t", getattr(found, "T", 0.0))))
     return values if all(map(math.isfinite, values)) else (0.0, 0.0)
 
 
-def as_file(topic: Topic, data: bytes, name: str, raw_of: CameraInfo | None = None) -> bytes:
-    """Make a whole file of a message: NPY of one channel, PPM of colours, or what a CompressedImage holds.
+def as_file(topic: Topic, data: memoryview, name: str, raw_of: CameraInfo | None = None) -> bytes:
+    """Make a whole file of a message: NPY of one channel, BMP or PPM of colours; of a CompressedImage its own.
 
     Parameters
     ----------
@@ -185,7 +184,7 @@ def as_file(topic: Topic, data: bytes, name: str, raw_of: CameraInfo | None = No
     return image_file(values if raw_of is None else _rectified(values, raw_of))
 
 
-def _decoded(topic: Topic, data: bytes, name: str) -> Any:
+def _decoded(topic: Topic, data: memoryview, name: str) -> Any:
     decode = _decoders()["ros1" if topic.encoding == "ros1" else "cdr"]
     try:
         return decode(data, topic.type.replace("/", "/msg/"))
@@ -235,15 +234,11 @@ def _pixels(image: Any, name: str) -> NDArray[Any]:
 
 
 def image_file(values: NDArray[Any]) -> bytes:
-    """Make a whole file of an image, BGR where it has colours."""
+    """Make a whole file of an image, BGR where it has colours: of those that lose nothing the quickest."""
     if values.ndim == 2:
         return arrays.encode_npy(values)
-    height, width = values.shape[:2]
-    top, kind = (255, "u1") if values.dtype == np.uint8 else (65535, ">u2")
-    buffer = io.BytesIO(b"P6\n%d %d\n%d\n" % (width, height, top))
-    buffer.seek(0, io.SEEK_END)
-    buffer.write(np.ascontiguousarray(values[..., ::-1], kind).data)
-    return buffer.getvalue()
+    ending = ".bmp" if values.dtype == np.uint8 else ".ppm"
+    return cv2.imencode(ending, np.ascontiguousarray(values))[1].tobytes()
 
 
 def _rectified(values: NDArray[Any], info: CameraInfo) -> NDArray[Any]:
