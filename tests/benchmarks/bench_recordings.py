@@ -4,8 +4,7 @@ python tests/benchmarks/bench_recordings.py [messages [rounds]]
 
 Frames of 640 x 480 pixels. The library is rosbags, which opens the bag, reads and deserializes each message,
 and what NumPy and OpenCV need to make an array of it; here the bag is looked through, and each frame is read
-by its place, in order. The two take turns; times are CPU times, the least of some rounds. Workers take elapsed
-time.
+by its place, in order. The two take turns; times are CPU times, the least of some rounds.
 """
 
 import math

@@ -9,7 +9,7 @@ number.
 import bz2
 import sqlite3
 import struct
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -18,6 +18,7 @@ from typing import Any, BinaryIO, NamedTuple, Protocol
 from rollcli.errors import InputError
 from rollcli.files.bounded import MOST_BYTES, most_unpacked
 
+_BEGINNING = 64  # bytes: a header's time and more
 _MCAP, _BAG, _SQLITE = b"\x89MCAP0\r\n", b"#ROSBAG V2.0\n", b"SQLite format 3\0"
 
 
@@ -56,8 +57,8 @@ class Bag(Protocol):
     def topics(self) -> dict[str, Topic]:
         """Return the topics by name."""
 
-    def messages(self, topics: set[str]) -> Iterator[Message]:
-        """Yield every whole message of some topics, in the order of the file."""
+    def messages(self, topics: set[str], begins: Collection[str] = ()) -> Iterator[Message]:
+        """Yield every whole message of some topics, in the file's order; of some the beginning will do."""
 
     def read(self, place: tuple[int, int]) -> Message:
         """Read one message."""
@@ -159,7 +160,7 @@ class _Chunked:
                 pass
         return {each.name: each for each in self._topics.values()}
 
-    def messages(self, topics: set[str]) -> Iterator[Message]:
+    def messages(self, topics: set[str], begins: Collection[str] = ()) -> Iterator[Message]:
         """Yield every whole message of some topics, in the order of the file."""
         offset = self._start()
         try:
@@ -352,18 +353,34 @@ class _Sqlite:
         self._names = {number: name for number, name, *_ in rows}
         return {name: Topic(name, kind.replace("/msg/", "/"), form) for _, name, kind, form in rows}
 
-    def messages(self, topics: set[str]) -> Iterator[Message]:
-        """Yield every whole message of some topics, in the order of the file."""
+    def messages(self, topics: set[str], begins: Collection[str] = ()) -> Iterator[Message]:
+        """Yield every whole message of some topics, in the file's order; of some the beginning will do."""
         self.topics()
-        count = 0
+        count, whole = 0, self._is_whole() and hasattr(self._base, "blobopen")  # from Python 3.11 on
         try:
-            rows = self._base.execute("SELECT id, topic_id, timestamp, data FROM messages ORDER BY id")
-            for number, topic, time, data in rows:
+            for number, topic, time in self._base.execute(
+                "SELECT id, topic_id, timestamp FROM messages ORDER BY id"
+            ):
+                name = str(self._names.get(topic))
+                if whole and name in begins:
+                    with self._base.blobopen("messages", "data", number, readonly=True) as blob:
+                        data = blob.read(_BEGINNING)
+                elif (
+                    name in topics or not whole
+                ):  # of a file that is cut off, the first that is not there ends it
+                    data = self.read((number, 0)).data
                 count += 1
-                if (name := self._names.get(topic)) in topics and isinstance(data, bytes):
-                    yield Message(str(name), int(time), (number, 0), memoryview(data))
-        except sqlite3.Error:
+                if name in topics:
+                    yield Message(name, int(time), (number, 0), memoryview(data))
+        except (sqlite3.Error, InputError):
             self.broken = f"is damaged or cut off behind {count} messages"
+
+    def _is_whole(self) -> bool:
+        """Tell whether the file has as many pages as its header says [https://www.sqlite.org/fileformat.html]."""
+        with Path(self.path).open("rb") as file:
+            size, pages = struct.unpack(">16xH10xI", file.read(32))
+        needed: int = pages * (size if size > 1 else 65536)
+        return Path(self.path).stat().st_size >= needed
 
     def read(self, place: tuple[int, int]) -> Message:
         """Read one message."""
@@ -372,7 +389,7 @@ class _Sqlite:
             row = self._base.execute(asked, place[:1]).fetchone()
         except sqlite3.Error:
             row = None
-        if row is None:
+        if row is None or not isinstance(row[2], bytes):
             raise InputError(f"{self.path}: there is no whole message {place[0]}")
         return Message(self._names.get(row[0], ""), int(row[1]), place, memoryview(row[2]))
 

@@ -295,7 +295,7 @@ def _scan(files: Sequence[str], wanted: Sequence[Topic], topics: dict[str, Topic
     for path in files:
         bag = _opened(path)
         stem = os.path.splitext(os.path.basename(path))[0]  # noqa: PTH119, PTH122
-        for message in bag.messages({*by_name, *infos}):
+        for message in bag.messages({*by_name, *infos}, by_name):
             place = "{}+{}".format(*message.place)
             if (topic := by_name.get(message.topic)) is None:
                 if (path, message.topic) not in places:
@@ -303,8 +303,8 @@ def _scan(files: Sequence[str], wanted: Sequence[Topic], topics: dict[str, Topic
                     cameras.setdefault(message.topic, info)
                     places[path, message.topic] = place
                 continue
-            if not frames[topic.name]:
-                _check_format(topic, message.data, path)
+            if topic.type == COMPRESSED and not frames[topic.name]:
+                _check_format(topic, bag.read(message.place).data, path)
             stamp = messages.stamp_of(topic, message.data, message.log_time)
             name = f"{path}#{topic.name}@{stamp}"
             seen[name] = seen.get(name, -1) + 1

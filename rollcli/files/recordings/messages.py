@@ -123,8 +123,6 @@ def check_format(topic: Topic, data: memoryview, name: str) -> None:
     ------
     InputError
     """
-    if topic.type != COMPRESSED:
-        return
     form = str(_decoded(topic, data, name).format)
     if _VIDEO.search(form):
         raise InputError(
@@ -146,7 +144,7 @@ def baseline_of(topic: Topic, data: memoryview, name: str) -> tuple[float, float
 
 
 def as_file(topic: Topic, data: memoryview, name: str, raw_of: CameraInfo | None = None) -> bytes:
-    """Make a whole file of a message: NPY of one channel, BMP or PPM of colours; of a CompressedImage its own.
+    """Make a whole file of a message: NPY of one channel, BMP or PPM of colours; CompressedImage has its own.
 
     Parameters
     ----------
