@@ -16,9 +16,9 @@ from rollcli.report.options import ReportOptions
 from rollcli.report.sources import Choice, Subject, choose, subjects
 from rollcli.report.summary import common_run, frame_count
 from rollcli.rig.drive.assess import RigAssessment, assess_rig
-from rollcli.run.find import check_writes, list_files
 from rollcli.run.options import EncodingOptions, FrameOptions
 from rollcli.run.progress import Progress
+from rollcli.run.reads_and_writes import check_writes, list_files
 from rollcli.run.record import recorded_options
 from rollcli.run.rig import order_of, origins_of
 from rollcli.run.workers.chunks import Work
