@@ -37,8 +37,8 @@ def columns_of_drive(rig: RigAssessment, results: Sequence[str]) -> ColumnSuppor
     found: list[ColumnEvidence] = []
     for frame, options in _pairs(rig, results):
         try:
-            views = read_views(frame, options)
-            measured = match_pair(*views, options.stereo, wanted_of(None, options)).measured
+            left, right = read_views(frame, options)
+            measured = match_pair(left, right, options.stereo, wanted_of(None, options)).measured
         except FRAME_ERRORS:  # the pairs that are left may be enough
             continue
         if measured is not None and measured.evidence is not None:
