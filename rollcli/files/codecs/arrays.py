@@ -64,9 +64,9 @@ def check_npy(head: bytes, size: int, name: str) -> tuple[np.dtype[Any], bool, t
 
 def encode_npy(values: NDArray[Any]) -> bytes:
     """Return an .npy file of the array."""
-    buffer = io.BytesIO()
-    np.lib.format.write_array(buffer, np.ascontiguousarray(values), allow_pickle=False)
-    return buffer.getvalue()
+    values, buffer = np.ascontiguousarray(values), io.BytesIO()
+    np.lib.format.write_array_header_1_0(buffer, np.lib.format.header_data_from_array_1_0(values))
+    return b"".join([buffer.getvalue(), values.data])  # write_array copies the numbers twice
 
 
 def _without_single_axis(shape: tuple[int, ...]) -> tuple[int, ...]:
