@@ -24,6 +24,7 @@ from rollcli.files.recordings.messages import image_file
 
 _BOXES = (b"ftyp", b"moov", b"mdat", b"wide", b"free", b"skip", b"styp")  # that MP4 and MOV begin with
 _EBML, _SEGMENT = 0x1A45DFA3, 0x18538067  # Matroska's
+_SILENT = 0  # OpenCV's level
 # a packet that is cut off makes no frame, and what a file names elsewhere is not followed
 _OPTIONS = "fflags;discardcorrupt|protocol_whitelist;file"
 
@@ -135,10 +136,10 @@ class _Decoder:
                 raise InputError(f"{self._name}: is no MP4, MOV, AVI or Matroska file")
         os.environ["OPENCV_FFMPEG_CAPTURE_OPTIONS"] = _OPTIONS
         os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # its errors are ours to tell
-        level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+        level = _set_log_level(_SILENT)
         settings = [cv2.CAP_PROP_N_THREADS, self._threads]
         self._capture = cv2.VideoCapture(os.path.abspath(self._path), cv2.CAP_FFMPEG, settings)  # noqa: PTH100
-        cv2.utils.logging.setLogLevel(level)
+        _set_log_level(level)
         self._capture.set(cv2.CAP_PROP_ORIENTATION_AUTO, 0)  # turned views would not be rectified any more
         self._next = 0
         if not self._capture.isOpened():
@@ -166,6 +167,12 @@ class _Decoder:
         if not found:
             raise InputError(f"{name}: cannot be decoded")
         return values
+
+
+def _set_log_level(level: int) -> int:
+    """Set how much OpenCV prints, and return how much it did."""
+    set_level = getattr(cv2, "setLogLevel", None) or cv2.utils.logging.setLogLevel  # OpenCV 4, or 5
+    return int(set_level(level))
 
 
 def broken_end(path: str) -> str:
