@@ -66,6 +66,7 @@ class KeptRows:
         self.summary = RunSummary()
         self.mismatch: Mismatch | None = None
         self._frames, self._images = plan.frames, options.images
+        self._following, self._at = iter(plan.frames), 0
         self._retries = options.result.retry_failed
         self._made: MadeImages | None = None
         self.inputs = inputs
@@ -87,7 +88,7 @@ class KeptRows:
         """Take in the next row; one that does not count is left out, and so are those behind it."""
         is_again = row.message == _NOT_YET or (row.status == "error" and self._retries)
         if self.count < len(self._frames):
-            frame = self._frames[self.count]
+            frame = self._frame(self.count)
             self._compare(row, frame)
             if self.inputs is not None and self.mismatch is None:
                 if row.message == _NOT_YET:
@@ -114,6 +115,13 @@ class KeptRows:
             yield f"frames that are done again, since what they were made from has changed: {self.changed}"
         if self.gone:
             yield f"frames that are gone, whose rows leave the result and whose images stay: {self.gone}"
+
+    def _frame(self, position: int) -> Frame:
+        """Return the frame at a position; they increase: a sorted list reads a block of names for one."""
+        if position != self._at:
+            self._following = iter(self._frames[position:])
+        self._at = position + 1
+        return next(self._following)
 
     def _compare(self, row: Row, frame: Frame) -> None:
         found = self.mismatch

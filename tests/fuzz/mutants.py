@@ -30,20 +30,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PROGRAM, TESTS = "rollcli", "tests"
 # the tests of a package beyond the folder of its name, the quickest first
 FURTHER = {
-    "batch": (
-        "cli/test_outputs.py",
-        "cli/test_idle_options.py",
-        "cli/test_estimate.py",
-        "cli/test_frames.py",
-    ),
-    "cli": ("batch/test_resume.py", "test_messages.py", "test_readme.py"),
-    "convert": (
-        "cli/test_idle_options.py",
-        "cli/test_outputs.py",
-        "cli/test_horizon.py",
-        "cli/test_calibration.py",
-        "cli/test_lost_readers.py",
-    ),
+    "cli": ("run/test_resume.py", "test_messages.py", "test_readme.py"),
     "estimator": ("rig/test_pose.py",),
     "evaluate": (
         "cli/test_evaluate.py",
@@ -52,11 +39,12 @@ FURTHER = {
         "estimator/solvers",
     ),
     "files": (
-        "batch/test_resume.py",
-        "batch/test_kept_rows.py",
-        "batch/test_retry_failed.py",
-        "batch/test_two_runs.py",
-        "batch/test_result_parts.py",
+        "run/test_update.py",
+        "run/test_resume.py",
+        "run/test_kept_rows.py",
+        "run/test_retry_failed.py",
+        "run/test_two_runs.py",
+        "run/test_result_parts.py",
         "cli/test_frames.py",
         "cli/test_outputs.py",
         "cli/test_options.py",
@@ -65,41 +53,37 @@ FURTHER = {
         "cli/test_faulty_store.py",
         "cli/test_bad_stores.py",
     ),
-    "frames": (
-        "cli/test_idle_options.py",
-        "cli/test_options.py",
-        "cli/test_frames.py",
-        "cli/test_outputs.py",
-        "cli/test_streams.py",
-        "cli/test_estimate.py",
-        "cli/test_calibration.py",
-        "cli/test_horizon.py",
-        "cli/test_bad_stores.py",
-        "convert",
-        "batch/test_kept_rows.py",
-        "batch/test_images_of_others.py",
-    ),
-    "parallel": (
-        "files/stores/test_turns.py",
-        "cli/test_lost_readers.py",
-        "batch/test_faults.py",
-        "batch/test_resume.py",
-    ),
-    "rig_check": ("cli/test_rig.py", "cli/test_urls.py", "cli/test_buckets.py"),
+    "pictures": ("run/test_derotate.py", "run/test_vdisparity.py", "cli/test_heights.py"),
     "rig": (
         "cli/test_calibration.py",
         "cli/test_horizon.py",
         "cli/test_rig.py",
-        "frames/test_diagnosis.py",
-        "report/test_pose_charts.py",
+        "run/test_diagnosis.py",
+    ),
+    "run": (
+        "files/stores/test_turns.py",
+        "cli/test_outputs.py",
+        "cli/test_idle_options.py",
+        "cli/test_options.py",
+        "cli/test_estimate.py",
+        "cli/test_frames.py",
+        "cli/test_streams.py",
+        "cli/test_calibration.py",
+        "cli/test_horizon.py",
+        "cli/test_rig.py",
+        "cli/test_lost_readers.py",
+        "cli/test_bad_stores.py",
+        "cli/test_urls.py",
+        "cli/test_buckets.py",
     ),
     "simulate": (
         "cli/test_simulate.py",
         "cli/test_rendered_drive.py",
         "cli/test_lost_readers.py",
-        "imaging/test_alignment.py",
-        "imaging/test_stereo.py",
+        "stereo/test_alignment.py",
+        "stereo/test_stereo.py",
     ),
+    "stereo": ("run/test_estimate_pair.py",),
 }
 _QUICKLY = ("-x", "-q", "-p", "no:cacheprovider")
 _NOTICED = (pytest.ExitCode.TESTS_FAILED, pytest.ExitCode.INTERRUPTED, pytest.ExitCode.USAGE_ERROR)
@@ -285,6 +269,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
         every = sorted(path.parent.name for path in (tree / PROGRAM).glob("*/__init__.py"))
         for unknown in set(given.packages) - set(every):
             parser.error(f"no package of {PROGRAM}: {unknown}")
+        for lost in (
+            each for files in FURTHER.values() for each in files if not (tree / TESTS / each).exists()
+        ):
+            parser.error(f"FURTHER names tests that are not there: {lost}")
         for package in given.packages or every:
             modules = sorted(path.relative_to(tree) for path in (tree / PROGRAM / package).rglob("*.py"))
             said = failure(tree, tests_of(tree, modules[0]))
