@@ -286,7 +286,8 @@ def test_a_cell_that_its_column_cannot_have_is_refused(name, text):
 def test_a_row_names_a_file_and_no_text_holds_a_nul():
     for line, said in (
         (b",ok,1", "'' is no value for file"),
-        (b"a\0b,ok,1", r"'a\\x00b' is no value for file"),
+        # the latter by the csv module of Python 3.10
+        (b"a\0b,ok,1", r"('a\\x00b' is no value for file|is not CSV: line contains NUL)"),
     ):
         with pytest.raises(InputError, match=rf"^x: line 2: {said}$"):
             list(parse_rows(b"file,status,roll_deg\n" + line + b"\n", "x"))
