@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from rollcli.files.results import Row
 from rollcli.messages import without_secrets
@@ -43,6 +44,22 @@ class Frame:
         if self.mask is not None:
             yield self.mask
 
+    def __reduce__(self) -> tuple[type["Frame"], tuple[object, ...]]:
+        """Pickle the values alone: what a dataclass with slots does takes five times as long."""
+        return Frame, tuple(getattr(self, name) for name in self.__slots__)
+
+
+class Inputs(NamedTuple):
+    """How frames were read: the encodings, and the first and last disparity searched, px."""
+
+    encodings: frozenset[str] = frozenset()
+    searched: tuple[int, int] | None = None
+
+    def joined(self, other: "Inputs") -> "Inputs":
+        """Return how these and other frames were read."""
+        ends = [*(self.searched or ()), *(other.searched or ())]
+        return Inputs(self.encodings | other.encodings, (min(ends), max(ends)) if ends else None)
+
 
 @dataclass(frozen=True)
 class FrameResult:
@@ -57,15 +74,12 @@ class FrameResult:
         Why that may be wrong; empty when there is no doubt.
     searched : tuple of int, or None
         First and last disparity searched, px; pairs only.
-    line : bytes
-        The row as it stands in the result, where workers were told its format.
     """
 
     row: Row
     encoding: str = ""
     warning: str = ""
     searched: tuple[int, int] | None = None
-    line: bytes = b""
 
 
 _LEFT, _RIGHT = "left image: ", "right image: "  # what a message calls the files of a pair

@@ -133,8 +133,7 @@ class FrameOptions(NamedTuple):
 
     `root` is the folder where relative paths start, for workers on other machines; empty for this one.
     `replaces` tells whether files that are in the place of an image are replaced. `retry_of` names the result
-    whose failed frames are done again; empty otherwise. `lines` is the format of the lines of a result, which
-    workers make of their rows, with the `further` columns; empty where they make none.
+    whose failed frames are done again; empty otherwise.
     """
 
     encoding: EncodingOptions = EncodingOptions()
@@ -145,8 +144,6 @@ class FrameOptions(NamedTuple):
     root: str = ""
     replaces: bool = False
     retry_of: str = ""
-    lines: Literal["csv", "jsonl", ""] = ""
-    further: tuple[str, ...] = ()
 
     def at(self, path: str) -> str:
         """Locate a path on this worker."""

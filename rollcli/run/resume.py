@@ -10,7 +10,8 @@ from rollcli.files.locking import differences, not_resumable
 from rollcli.files.results import Row, read_run, run_path
 from rollcli.files.storage import modified_ns
 from rollcli.files.stores.locations import base_name
-from rollcli.run.frame import Frame, FrameResult
+from rollcli.run.batch import Batch
+from rollcli.run.frame import Frame
 from rollcli.run.options import EstimateOptions
 from rollcli.run.outputs import MadeImages
 from rollcli.run.plan import Plan, check_images_are_new
@@ -32,9 +33,11 @@ class KeptRows:
     Attributes
     ----------
     count : int
-        How many they are.
+        How many they are, holes included.
     errors : list of int
         Positions, from 0, of those without an angle.
+    holes : list of range
+        Positions before others that have no row: parts that workers had not written.
     incomplete : list of Frame
         Frames whose images are missing or empty, whatever the cause.
     summary : RunSummary
@@ -43,6 +46,7 @@ class KeptRows:
 
     def __init__(self, plan: Plan, options: EstimateOptions, rows: Iterable[Row] = ()) -> None:
         self.count = 0
+        self.holes: list[range] = []
         self.errors: list[int] = []
         self.incomplete: list[Frame] = []
         self.summary = RunSummary()
@@ -77,8 +81,18 @@ class KeptRows:
                 self.incomplete.append(frame)
         if row.status == "error":
             self.errors.append(self.count)
-        self.summary.add(row, is_retried=row.status == "error" and self._retries)
+        if row.status == "error" and self._retries:
+            self.summary.leave_places([row.file])
+        else:
+            self.summary.add_row(row)
         self.count += 1
+
+    def skip_to(self, position: int) -> None:
+        """Leave a hole before the row at a position."""
+        if position > self.count:
+            self.holes.append(range(self.count, position))
+            self.summary.leave_places([frame.file for frame in self._frames[self.count : position]])
+            self.count = position
 
     def _compare(self, row: Row, frame: Frame) -> None:
         found = self.mismatch
@@ -97,16 +111,17 @@ class KeptRows:
 _SORT_LAST = "new frames must sort last: estimate these into a result of their own"
 
 
-def check_restored(frame: Frame, result: FrameResult) -> None:
-    """Check that the images of a kept row were made again.
+def check_restored(batch: Batch) -> None:
+    """Check that the images of kept rows were made again.
 
     Raises
     ------
     OutputError
-        They could not be: the row no longer holds.
+        They could not be: a row no longer holds.
     """
-    if result.row.status == "error":
-        raise OutputError(f"the images of {frame.file} cannot be made again: {result.row.message}")
+    for row in (result.row for result in batch.told):
+        if row.status == "error":
+            raise OutputError(f"the images of {row.file} cannot be made again: {row.message}")
 
 
 def new_record(

@@ -1,15 +1,24 @@
 """The order of results, the sizes of chunks, halving and stops, with an executor in this process."""
 
+import itertools
 import threading
 from collections import Counter
 
 import pytest
 
 from rollcli.run.workers import chunks as chunk_sizes
+from rollcli.run.workers import in_order as ordered
 from rollcli.run.workers.chunks import Chunk, Chunks, Done, Work
-from rollcli.run.workers.in_order import Workers, in_order
+from rollcli.run.workers.in_order import Workers
 from rollcli.run.workers.interrupt import Stop
 from rollcli.run.workers.tasks import run_tasks
+
+WORK = Work(str, str)
+
+
+def in_order(tasks, executor, stop, work=WORK):
+    """The results one by one."""
+    return itertools.chain.from_iterable(ordered.in_order(tasks, work, executor, stop))
 
 
 class DiedError(Exception):
@@ -55,9 +64,9 @@ class FakeExecutor:
         done = [] if self.stops else chunk[: self.most]
         return Done([f"did {task}" for task in done], self.seconds * len(done))
 
-    def retry(self, task):
-        self.retried.append(task)
-        return Done([f"lost {task}"], 0.0)
+    def retry(self, chunk):
+        self.retried.extend(chunk)
+        return Done([f"lost {task}" for task in chunk], 0.0)
 
     def stop(self):
         self.stops += 1
@@ -143,7 +152,7 @@ def test_a_worker_that_dies_after_a_stop_is_not_retried():
 
 
 def chunk_of(do, tasks, stopped=None):
-    return Chunk(do, tasks, stopped or threading.Event())
+    return Chunk(do, WORK.join, tasks, stopped or threading.Event(), WORK.longest_s)
 
 
 def test_a_chunk_ends_between_tasks_when_it_is_stopped():
