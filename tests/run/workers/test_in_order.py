@@ -1,24 +1,18 @@
 """The order of results, the sizes of chunks, halving and stops, with an executor in this process."""
 
-import itertools
 import threading
 from collections import Counter
 
 import pytest
 
 from rollcli.run.workers import chunks as chunk_sizes
-from rollcli.run.workers import in_order as ordered
 from rollcli.run.workers.chunks import Chunk, Chunks, Done, Work
 from rollcli.run.workers.in_order import Workers
 from rollcli.run.workers.interrupt import Stop
 from rollcli.run.workers.tasks import run_tasks
+from tests.run.workers.tasks import in_order
 
 WORK = Work(str, str)
-
-
-def in_order(tasks, executor, stop, work=WORK):
-    """The results one by one."""
-    return itertools.chain.from_iterable(ordered.in_order(tasks, work, executor, stop))
 
 
 class DiedError(Exception):
