@@ -9,7 +9,7 @@ import itertools
 import threading
 import time
 import traceback
-from collections.abc import Callable, Iterable, Sequence, Sized
+from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar, overload
 
@@ -152,43 +152,53 @@ class Chunks(Generic[Task]):
     def __init__(self, tasks: Iterable[Task], first: int = 1, unit: int = 1) -> None:
         self._left = len(tasks) if isinstance(tasks, Sized) else None
         self._tasks = iter(tasks)
-        self._first, self._unit, self._a_second = first, unit, 0.0
+        self._first, self._unit, self._task_s = first, unit, 0.0
         self._taken = 0
 
     def take(self, workers: int, told: Any = None) -> Span[Task]:
         """Take the next chunk, for one of so many workers; empty when there are no more tasks."""
-        seconds = min(max(_CHUNK_S, workers / _CHUNKS_A_SECOND), _MOST_S)
-        size, most = int(self._a_second * seconds) if self.measured else self._first, self._unit
-        if self._left is not None:
-            least_s = max(_LEAST_S, workers / _CHUNKS_A_SECOND / 2)
-            most = max(self._left // (_SHARES * workers), int(self._a_second * least_s))
-            size = min(size, most)
-        size = self._fitted(max(size, 1), most)
+        size = self._size(self._taken, self._left, workers)
         chunk = Span(list(itertools.islice(self._tasks, size)), self._taken, told)
         self._taken += len(chunk)
         if self._left is not None:
             self._left -= len(chunk)
         return chunk
 
-    def _fitted(self, size: int, most: int) -> int:
-        """Make of a size some whole units, one where time and `most` allow more tasks, or a piece of one."""
-        begun = self._taken % self._unit
+    def cut(self, rest: Span[Task], workers: int) -> Iterator[Span[Task]]:
+        """Cut what a worker has not begun in time: its tasks are slower than those before."""
+        least = -(-len(rest) // (_SHARES * workers))
+        while rest:
+            size = max(self._size(rest.first, len(rest), workers), least)
+            yield rest[:size]
+            rest = rest[size:]
+
+    def _size(self, first: int, left: int | None, workers: int) -> int:
+        """Choose the size of a chunk from the position of its first task and the number of tasks to come."""
+        size, most = self._first, self._unit
+        worth = 1 / self._task_s if self.measured else 0.0  # tasks that a second is worth
+        if self.measured:
+            size = int(worth * min(max(_CHUNK_S, workers / _CHUNKS_A_SECOND), _MOST_S))
+        if left is not None:
+            least_s = max(_LEAST_S, workers / _CHUNKS_A_SECOND / 2)
+            most = max(left // (_SHARES * workers), int(worth * least_s))
+            size = min(size, most)
+        size, begun = max(size, 1), first % self._unit
         if begun == 0 and size >= self._unit:
             return size - size % self._unit
-        if begun == 0 and self._unit <= min(most, int(self._a_second * _MOST_S)):
+        if begun == 0 and self._unit <= min(most, int(worth * _MOST_S)):
             return self._unit
         return min(size, self._unit - begun)
 
     @property
     def measured(self) -> bool:
         """Whether a chunk was measured."""
-        return self._a_second > 0
+        return self._task_s > 0
 
     def measure(self, done: Done[Any]) -> None:
-        """Learn from a chunk how many tasks are worth a second: half from it, half from those before."""
+        """Learn from a chunk what a task takes: half from it, half from those before."""
         if done.results:
-            found = len(done.results) / max(done.seconds, 1e-6)
-            self._a_second = (self._a_second + found) / 2 if self.measured else found
+            found = max(done.seconds, 1e-6) / len(done.results)
+            self._task_s = (self._task_s + found) / 2 if self.measured else found
 
 
 class _Attempt(NamedTuple):

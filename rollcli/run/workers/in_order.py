@@ -156,7 +156,7 @@ def in_order(
         if rest := chunk[len(done.results) :]:
             if stop.asked:
                 return
-            submit_first(rest)
+            submit_first(*chunks.cut(rest, executor.workers))
 
 
 def _measure_any(

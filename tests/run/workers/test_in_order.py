@@ -125,6 +125,23 @@ def test_the_rest_of_a_chunk_that_took_too_long_comes_before_all_others():
     assert list(in_order(range(500), executor, Stop())) == [f"did {task}" for task in range(500)]
 
 
+@pytest.mark.parametrize("fast", [1e-6, 1e-4])
+def test_what_fast_tasks_made_too_large_a_chunk_of_is_done_by_all_workers(fast):
+    executor = FakeExecutor(4, most=200)
+    executor.seconds = fast
+    executor.do = lambda chunk: do_and_slow_down(executor, chunk)
+    assert list(in_order(iter(range(5000)), executor, Stop())) == [f"did {task}" for task in range(5000)]
+    sizes = [len(chunk) for chunk in executor.submitted]
+    assert max(sizes) > 1000
+    assert len([size for size in sizes if 50 <= size <= 700]) >= 8
+
+
+def do_and_slow_down(executor, chunk):
+    """After four fast tasks all are slow, and no worker does more than 200 of a chunk."""
+    done = chunk[: executor.most]
+    return Done([f"did {task}" for task in done], (executor.seconds if chunk[0] < 4 else 0.01) * len(done))
+
+
 def test_a_stop_ends_the_results_before_the_first_task_that_was_not_begun():
     stop, executor = Stop(), FakeExecutor(2)
     results = in_order(range(100), executor, stop)
