@@ -44,11 +44,11 @@ _owed: dict[int, float] = {}
 
 
 def sleep_for(seconds: float) -> int:
-    """Take the time of a frame, in naps of a twentieth of a second: shorter ones take CPU time."""
+    """Take the time of a frame, in naps of a quarter of a second: shorter ones take CPU time."""
     me, now = threading.get_ident(), time.monotonic()
     idle = _owed.get(me, 0.0) < now - 0.01
     _owed[me] = (now if idle else _owed[me]) + seconds
-    if idle or _owed[me] - now > 0.05:
+    if idle or _owed[me] - now > 0.25:
         time.sleep(max(_owed[me] - time.monotonic(), 0.0))
     return 0
 
@@ -68,10 +68,11 @@ def cpu_of(processes: list["subprocess.Popen[bytes]"]) -> float:
 
 
 def dask(folder: Path, kind: str, *arguments: object) -> "subprocess.Popen[bytes]":
-    """Start a Dask process."""
+    """Start a Dask process, whose profiler does not look at all of its threads 100 times a second."""
     line = [sys.executable, "-m", f"distributed.cli.dask_{kind}", *map(str, arguments)]
+    settings = environment(DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED="false")
     with (folder / f"{kind}.log").open("ab") as log:
-        return subprocess.Popen(line, cwd=folder, env=environment(), stdout=log, stderr=log)
+        return subprocess.Popen(line, cwd=folder, env=settings, stdout=log, stderr=log)
 
 
 @contextlib.contextmanager
@@ -155,8 +156,11 @@ def costs(frames: int) -> dict[str, float]:
     }
 
 
-def busy(workers: int, frame_s: float, seconds: float) -> float:
-    """Share of the time from the first chunk to the last result that simulated workers sleep for frames."""
+def busy(workers: int, frame_s: float, seconds: float) -> tuple[float, list[float]]:
+    """How busy simulated workers are, and what the driver, the scheduler and the workers take of a CPU.
+
+    Busy is the share of the time from the first chunk to the last result that they sleep for frames.
+    """
     from rollcli.run.workers.chunks import Work
     from rollcli.run.workers.in_order import Workers
     from rollcli.run.workers.interrupt import Stop
@@ -165,13 +169,21 @@ def busy(workers: int, frame_s: float, seconds: float) -> float:
 
     tasks = [frame_s] * int(workers * seconds / frame_s)
     work = Work(bench_scale.sleep_for, bench_scale.lost)
-    with tempfile.TemporaryDirectory() as name, cluster(Path(name), 4, workers // 4) as (scheduler, _):
+    with (
+        tempfile.TemporaryDirectory() as name,
+        cluster(Path(name), 4, workers // 4) as (scheduler, processes),
+    ):
+
+        def used() -> list[float]:
+            return [time.process_time(), cpu_of(processes[:1]), cpu_of(processes[1:])]
+
         time.sleep(10)  # the workers join
         list(run_tasks(tasks[: 2 * workers], work, Stop(), Workers(scheduler=scheduler)))
-        start = time.monotonic()
+        start, before = time.monotonic(), used()
         lost_frames = sum(run_tasks(tasks, work, Stop(), Workers(scheduler=scheduler)))
         wall = time.monotonic() - start
-    return 0.0 if lost_frames else len(tasks) * frame_s / (workers * wall)
+        shares = [(after - used_before) / wall for after, used_before in zip(used(), before, strict=True)]
+    return 0.0 if lost_frames else len(tasks) * frame_s / (workers * wall), shares
 
 
 def print_model(found: dict[str, float]) -> None:
@@ -213,9 +225,11 @@ def main() -> None:
         print(f"Dask worker / local worker {found['Dask worker'] / found['local worker']:.2f}")
         print_model(found)
     for workers in given.simulated:
-        share = busy(workers, 0.005, given.seconds)
+        share, (driver, scheduler, slept) = busy(workers, 0.005, given.seconds)
         print(
-            f"{workers} simulated workers, 5 ms a frame: {100 * share:.0f} % busy (to reach: 80)", flush=True
+            f"{workers} simulated workers, 5 ms a frame: {100 * share:.0f} % busy (to reach: 80); "
+            f"driver {driver:.2f}, scheduler {scheduler:.2f}, workers {slept:.2f} of a CPU",
+            flush=True,
         )
 
 
