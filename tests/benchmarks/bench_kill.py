@@ -32,7 +32,8 @@ sys.path.insert(0, str(ROOT))
 
 from tests.run_cli import command, contents, environment, write_maps
 
-RESULTS = ("rolls.csv", "rolls.jsonl")
+RESULTS = ("rolls.csv", "rolls.jsonl", "rolls.parquet")
+PARTS = ("--part-rows", "4")  # so that workers write some, and others write pieces of one
 IMAGES = ("--derotated", "up", "--vdisparity", "v", "--road-mask", "road")
 STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _BY_SIGNAL = [-number for number in STOPS]
@@ -71,8 +72,9 @@ class Run:
             self.reader, writer = os.pipe()
         else:
             self.reader, writer = pty.openpty()
+        parts = PARTS if result.endswith(".parquet") else ()
         self.process = subprocess.Popen(
-            command("estimate", "../maps", "-v", "-o", result, "-j", str(jobs), "--resume", *IMAGES),
+            command("estimate", "../maps", "-v", "-o", result, "-j", str(jobs), "--resume", *IMAGES, *parts),
             cwd=folder,
             env=environment(),
             stdout=subprocess.DEVNULL,
@@ -270,7 +272,7 @@ def main() -> None:
             Run(folder / f"undisturbed-{result}", result, 2).end()
             expected[result] = contents(folder / f"undisturbed-{result}")
         while counts.total() < given.count:
-            result, jobs = RESULTS[trials // 2 % 2], 1 + trials % 2
+            result, jobs = RESULTS[trials // 2 % len(RESULTS)], 1 + trials % 2
             trial = folder / f"trial{trials}"
             trial.mkdir()
             done = False

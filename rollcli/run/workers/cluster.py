@@ -412,7 +412,7 @@ def probe(version: str, sizes: dict[str, int], marks: list[str]) -> str:
     for mark in marks:
         folder = Path(mark).parent
         if not is_there(mark):
-            return f"does not see {folder}; image folders must lie on storage that the workers share"
+            return f"does not see {folder}; what they write must lie on storage that the workers share"
         if not os.access(folder, os.W_OK):
             return f"cannot write to {folder}"
     return ""
