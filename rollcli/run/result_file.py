@@ -74,6 +74,7 @@ class ResultFile:
         except OSError as error:
             with contextlib.suppress(OSError):
                 os.ftruncate(self.descriptor, before)
+                os.lseek(self.descriptor, before, os.SEEK_SET)
             raise output_error(self._name, error) from error
 
     def replace(self, rows: Mapping[int, bytes], form: Format) -> None:
