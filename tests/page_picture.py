@@ -43,7 +43,7 @@ def photograph(browser: Any, page: Path) -> bytes:
     tab.wait_for_selector("#histogram .main-svg")
     tab.evaluate(
         """shown => {
-            for (const each of document.querySelectorAll("main > section:not(.answer)"))
+            for (const each of document.querySelectorAll("main section:not(.answer)"))
                 if (!shown.includes(each.querySelector("h2").textContent)) each.remove();
             document.querySelectorAll("figure").forEach((each, place) => { if (place) each.remove(); });
             document.querySelectorAll("footer").forEach(each => each.remove());

@@ -1,5 +1,6 @@
 """Every block of the README does what it says: here, or in the test that is named beside it."""
 
+import math
 import re
 import shlex
 import shutil
@@ -10,6 +11,7 @@ import cv2
 import numpy as np
 import pytest
 
+from rollcli import assess_rig
 from tests.readme_tables import commands
 from tests.run_cli import ROOT, contents, road_map, rollcli, rollcli_process, write_kitti
 from tests.test_readme import PAGES, README, make, needs_make, write_program
@@ -153,6 +155,21 @@ def test_the_check_in_ci_passes_a_rig_that_holds_and_fails_one_that_does_not(tmp
     gate = shlex.split(block("rollcli estimate calibration/maps").splitlines()[1])[1:]
     loose = rollcli(*("2" if word == "0" else word for word in gate), cwd=tmp_path)
     assert loose.status == 4
+
+
+def test_how_wide_the_interval_of_120_frames_is():
+    at_random, slowly = map(float, re.findall(r"±(0\.\d+)° where", README))
+    for correlation, said in ((0.0, at_random), (0.94, slowly)):
+        widths = []
+        for seed in range(8):
+            steps = np.random.default_rng(seed).normal(0, 0.3, 120)
+            rolls = [steps[0]]
+            for step in steps[1:]:
+                rolls.append(correlation * rolls[-1] + math.sqrt(1 - correlation**2) * step)
+            frames = {"file": [f"{i:03}.png" for i in range(120)], "status": ["ok"] * 120}
+            rig = assess_rig({**frames, "roll_deg": rolls, "roll_ci95_deg": [0.05] * 120})
+            widths.append(rig.now().ci95)
+        assert np.median(widths) == pytest.approx(said, rel=0.15)
 
 
 def test_what_the_result_says_of_the_rig(tmp_path):

@@ -17,11 +17,29 @@ _OF_FRAMES = {each: each.meaning for each in (ExitStatus.DONE, ExitStatus.FRAMES
 
 
 class Option(click.Option):
-    """An option that is listed under a heading; the last heading by default."""
+    """An option that is listed under a heading; the last heading by default.
 
-    def __init__(self, *args: Any, section: str = OTHER, **attributes: Any) -> None:
+    `without_word` is its value where none of its words follows: click would take an input for its value.
+    """
+
+    def __init__(
+        self, *args: Any, section: str = OTHER, without_word: str | None = None, **attributes: Any
+    ) -> None:
         super().__init__(*args, **attributes)
-        self.section = section
+        self.section, self.without_word = section, without_word
+
+    def completed(self, args: list[str]) -> list[str]:
+        """Add the value to those words of the command line that name the option alone."""
+        if self.without_word is None or not isinstance(self.type, click.Choice):
+            return args
+        words = [str(each) for each in self.type.choices]
+        end = args.index("--") if "--" in args else len(args)
+        return [
+            f"{each}={self.without_word}"
+            if each in self.opts and at < end and "".join(args[at + 1 : at + 2]).lower() not in words
+            else each
+            for at, each in enumerate(args)
+        ]
 
 
 class Command(click.Command):
@@ -31,8 +49,6 @@ class Command(click.Command):
     ----------
     examples : sequence of (str, str)
         A purpose, and the command line for it; several lines are steps.
-    instead : str
-        What to give in place of arguments, to those who give some to a command that takes none.
     statuses : mapping of ExitStatus to str
         How it ends, where this is not how frames are worked through; wrong usage and so on are added.
     """
@@ -41,27 +57,20 @@ class Command(click.Command):
         self,
         *args: Any,
         examples: Sequence[tuple[str, str]] = (),
-        instead: str = "",
         statuses: Mapping[ExitStatus, str] | None = None,
         **attributes: Any,
     ) -> None:
         super().__init__(*args, **attributes)
         self.examples = tuple(examples)
-        self.instead = instead
         own = _OF_FRAMES if statuses is None else statuses
         meant = {**{each: each.meaning for each in _ALWAYS}, **own}
         self.statuses = {each: meant[each] for each in sorted(meant)}
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Parse the words; where there should be none, say what should be there instead."""
-        takes_any = any(isinstance(param, click.Argument) for param in self.get_params(ctx))
-        if takes_any or not self.instead or ctx.resilient_parsing:
-            return super().parse_args(ctx, args)
-        ctx.allow_extra_args = True
-        rest = super().parse_args(ctx, args)
-        if rest:
-            raise click.UsageError(f"{' '.join(rest)}: {self.instead}", ctx)
-        return rest
+        """Parse the words, with the values that options have by themselves."""
+        for param in self.get_params(ctx):
+            args = param.completed(args) if isinstance(param, Option) else args
+        return super().parse_args(ctx, args)
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command with one thread of linear algebra, once mistaken variables have been told.
@@ -187,7 +196,6 @@ def record(name: str, title: str, make: Callable[..., Any], *declarations: Decla
 def command(
     examples: Sequence[tuple[str, str]] = (),
     short_help: str | None = None,
-    instead: str = "",
     statuses: Mapping[ExitStatus, str] | None = None,
 ) -> Callable[[Declared], Command]:
     """Make a command of a function, named after it; its docstring is the help."""
@@ -201,7 +209,6 @@ def command(
             help=function.__doc__,
             short_help=short_help,
             examples=examples,
-            instead=instead,
             statuses=statuses,
         )
 

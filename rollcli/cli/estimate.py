@@ -27,12 +27,12 @@ from rollcli.cli.types import Choice, Number, OutputFile, Shard
 from rollcli.messages import without_secrets
 from rollcli.run.options import EstimateOptions, ResultOptions
 
-_STARTS = ("--overwrite", "--resume")
+_STARTS = ("--overwrite", "--resume", "--update")
 _NEAREST_FIRST = [ParameterSource.COMMANDLINE, ParameterSource.ENVIRONMENT, ParameterSource.DEFAULT_MAP]
 
 
 def one_start(ctx: click.Context, *, resume: bool, overwrite: bool) -> tuple[bool, bool]:
-    """Decide between --resume and --overwrite: flags win over the environment, and that over --config.
+    """Decide between --resume, --update and --overwrite: flags win over the environment, that over --config.
 
     Returns
     -------
@@ -41,7 +41,8 @@ def one_start(ctx: click.Context, *, resume: bool, overwrite: bool) -> tuple[boo
     """
     if not (resume and overwrite):
         return resume, overwrite
-    to_resume, to_overwrite = (_distance(ctx, name) for name in ("resume", "overwrite"))
+    to_resume, to_update, to_overwrite = (_distance(ctx, name) for name in ("resume", "update", "overwrite"))
+    to_resume = min(to_resume, to_update)
     return to_resume <= to_overwrite, to_overwrite <= to_resume
 
 
@@ -57,7 +58,8 @@ def resume_command(ctx: click.Context) -> str:
     words = sys.argv[1:]
     end = words.index("--") if "--" in words else len(words)
     options = [word for word in words[:end] if word not in _STARTS]
-    line = [_program(), *options, *_from_environment(ctx), "--resume", *words[end:]]
+    start = "--update" if ctx.params.get("update") else "--resume"
+    line = [_program(), *options, *_from_environment(ctx), start, *words[end:]]
     shown = [without_secrets(word) for word in line]
     hints = ["with the same list on stdin"] if _reads_stdin(ctx) else []
     hints += ["with the signed addresses"] if shown != line else []
@@ -116,9 +118,16 @@ result_options = record(
     ),
     option("--resume", is_flag=True, help="Keep the rows of an interrupted run and do the rest."),
     option(
+        "--update",
+        is_flag=True,
+        help="As --resume, also of a whole result: do the frames again whose content has changed, add new "
+        "ones, and leave out those that are gone.",
+    ),
+    option(
         "--retry-failed",
         is_flag=True,
-        help="With --resume: do the frames again whose rows are error, such as those of files mended since.",
+        help="With --resume or --update: do the frames again whose rows are error, such as those of files "
+        "mended since.",
     ),
     option(
         "--shard",
@@ -147,6 +156,7 @@ result_options = record(
             "--vdisparity vdisparity/",
         ),
         ("Go on where an interrupted run has stopped", "rollcli estimate maps/ -o rolls.csv --resume"),
+        ("Do what is new or has changed since", "rollcli estimate maps/ -o rolls.csv --update"),
         (
             "Another program's list of files, angles to yet another one",
             "find . -name '*_disp.png' | rollcli estimate - | sort -t, -gk4",
@@ -155,6 +165,7 @@ result_options = record(
             "Pitch and camera height too, with a calibration file of each frame",
             "rollcli estimate --left image_0 --right image_1 --calib calib/ -o pose.csv",
         ),
+        ("A video that holds both views", "rollcli estimate drive.mp4 --side-by-side -o rolls.csv"),
         (
             "The paper's setting: every pixel is road",
             "rollcli estimate crops/ --road all --method gd -o rolls.csv",
@@ -184,14 +195,16 @@ def estimate(ctx: click.Context, /, **records: Any) -> None:
       rollcli report rolls.csv -o rolls.html
 
     INPUTS are maps (PNG, TIFF, NPY, NPZ, PFM, EXR), folders, .zip and .tar of them, quoted
-    patterns, or - for paths on stdin.
+    patterns, or - for paths on stdin; bags; with --side-by-side images and videos that hold both views.
 
     A positive roll means that the rig is rolled counter-clockwise seen from behind: its right end is up.
     """
     options = EstimateOptions(**records)
-    resume, overwrite = one_start(ctx, resume=options.result.resume, overwrite=options.running.overwrite)
+    result = options.result
+    resume = result.resume or result.update
+    resume, overwrite = one_start(ctx, resume=resume, overwrite=options.running.overwrite)
     options = options._replace(
-        result=options.result._replace(resume=resume),
+        result=result._replace(resume=resume, update=resume and result.update),
         running=options.running._replace(overwrite=overwrite),
     )
 

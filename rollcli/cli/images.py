@@ -11,12 +11,13 @@ from rollcli.cli.options import (
     calibration_options,
     cluster_options,
     encoding_options,
-    folder_options,
     input_options,
     output_folder_option,
+    pair_input_options,
     pair_options,
     save_as_option,
     stereo_options,
+    topic_options,
 )
 from rollcli.cli.types import Number
 from rollcli.run.options import (
@@ -92,11 +93,12 @@ def derotate(ctx: click.Context, /, **records: Any) -> None:
             "At half the size, as floating-point TIFF",
             "rollcli disparity --left 'im0*.png' --right 'im1*.png' --downscale 2 --save-as tiff -o maps/",
         ),
+        ("A video that holds both views", "rollcli disparity drive.mp4 --side-by-side -o maps/"),
     ],
-    instead="images are given by --left and --right",
 )
+@pair_input_options
 @pair_options
-@folder_options
+@topic_options
 @output_folder_option
 @save_as_option
 @option(
@@ -114,7 +116,8 @@ def disparity(ctx: click.Context, /, **records: Any) -> None:
     """Match rectified stereo pairs with OpenCV SGBM: one disparity map a pair, named after the left image.
 
     Images are PNG, JPEG, TIFF, BMP, PGM or PPM, of 8 or 16 bits, grey or colour. An image without a partner
-    is an error that names it, before anything runs.
+    is an error that names it, before anything runs. INPUTS are images or videos that hold both views
+    (--side-by-side), or bags (--left-topic, --right-topic).
     """
     from rollcli.run.convert import run_disparity
     from rollcli.run.unused import idle_in_disparity

@@ -1,6 +1,6 @@
 """The options that commands share, each declared once."""
 
-from typing import Any
+from typing import Any, get_args
 
 from rollcli.cli.command import argument, option, record
 from rollcli.cli.types import Choice, FilePath, Number, NumberOrNan, Point, Polygon, Roi, Span
@@ -12,6 +12,7 @@ from rollcli.run.options import (
     EncodingOptions,
     ImageOptions,
     InputOptions,
+    Layout,
     MethodOptions,
     PairOptions,
     RegionOptions,
@@ -51,10 +52,7 @@ _folders = (
     ),
 )
 
-input_options = record(
-    "inputs",
-    "Input",
-    InputOptions,
+_named = (
     argument("inputs", nargs=-1, type=PATH),
     option(
         "--files-from",
@@ -62,6 +60,13 @@ input_options = record(
         metavar="FILE",
         help="Read further inputs from FILE, one a line (-: stdin).",
     ),
+)
+
+input_options = record(
+    "inputs",
+    "Input",
+    InputOptions,
+    *_named,
     option(
         "--sorted",
         is_flag=True,
@@ -76,19 +81,31 @@ input_options = record(
     *_folders,
 )
 
-folder_options = record("inputs", "Input", InputOptions, *_folders)
+pair_input_options = record("inputs", "Input", InputOptions, *_named, *_folders)
 
 pair_options = record(
     "pairs",
     "Stereo pairs",
     PairOptions,
-    option("--left", type=PATH, metavar="PATH", help="Left images: a file, a folder or a quoted pattern."),
-    option("--right", type=PATH, metavar="PATH", help="Right images: a file, a folder or a quoted pattern."),
+    option(
+        "--left",
+        type=PATH,
+        metavar="PATH",
+        help="Left images: a file, folder, quoted pattern, or a video.",
+    ),
+    option("--right", type=PATH, metavar="PATH", help="Right images, or a video of as many frames."),
     option(
         "--match",
         type=Choice("name", "order"),
         default="name",
         help="By name (the same but for left/right, l/r, L1/R1, image_2/image_3, im0/im1 …), or by order.",
+    ),
+    option(
+        "--side-by-side",
+        type=Choice(*get_args(Layout)),
+        without_word="left-right",
+        help="INPUTS are images, or videos (.mp4, .avi, .mkv, .mov), that hold both views; left-right unless "
+        "the word is given.",
     ),
 )
 

@@ -54,7 +54,8 @@ from rollcli.report.options import GALLERY, ReportOptions
     type=Number("N", at_least=0, whole=True),
     default=GALLERY,
     section="Page",
-    help="How many frames to show in pictures: the widest intervals, suspect ones, and some evenly spread.",
+    help="How many frames to show in pictures: those around jumps, the widest intervals, suspect ones, and "
+    "some evenly spread.",
 )
 @option(
     "--fetch",

@@ -100,7 +100,8 @@ gate_options = record(
     metavar="FILE",
     section="Assessment",
     help="Also write how the right view of the pairs has to be corrected: JSON with the numbers, a 3x3 "
-    "matrix and the OpenCV call, for `estimate --align FILE`.",
+    "matrix and the OpenCV call, for `estimate --align FILE`. Up to 24 of the pairs are matched again, to "
+    "tell what of a scale is in the columns.",
 )
 @calibration_options
 @gate_options

@@ -19,10 +19,28 @@ _TOLD_BY = 64  # bytes at the start of a text, by which its encoding is told
 _OF_DEVICES = 2**20  # /dev/null has an end, /dev/zero has none
 
 
-def too_large(name: str, size: int | None, most: int) -> InputError:
-    """Make the error of a file of more bytes than are read; `size` is None where its end was not seen."""
+def too_large(name: str, size: int | None, most: int, within: str = "") -> InputError:
+    """Make the error of a file of more bytes than are read.
+
+    `size` is None where its end was not seen; `within` names the limit of time, where there is one.
+    """
     has = f"more than {most}" if size is None else str(size)
-    return InputError(f"{name}: has {has} bytes; up to {_in_words(most)} are read")
+    return InputError(f"{name}: has {has} bytes; up to {in_words(most)} are read{within}")
+
+
+def state_of(path: str) -> tuple[str, int, int]:
+    """Return the path, size and time of change, ns, of a file that stays open: it may be replaced.
+
+    Raises
+    ------
+    InputError
+        It cannot be read.
+    """
+    try:
+        found = os.stat(path)  # noqa: PTH116
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from None
+    return path, found.st_size, found.st_mtime_ns
 
 
 def read_given(path: str | Path, most: int = MOST_BYTES) -> bytes:
@@ -93,5 +111,6 @@ def _limit_of(file: BinaryIO, most: int) -> tuple[int, int]:
     return most, status.st_size if stat.S_ISREG(status.st_mode) else 0
 
 
-def _in_words(size: int) -> str:
+def in_words(size: int) -> str:
+    """Say how many bytes a limit is."""
     return f"{size >> 30} GB" if size >= 2**30 else f"{size >> 20} MB" if size >= 2**20 else f"{size} bytes"

@@ -17,14 +17,16 @@ from pathlib import Path
 
 from rollcli.errors import InputError, UsageError
 from rollcli.files.atomic import is_file, is_folder
-from rollcli.files.bounded import most_unpacked, too_large
+from rollcli.files.bounded import most_unpacked, state_of, too_large
 from rollcli.files.naming import natural_key
 from rollcli.files.stores.locations import is_url
 
 ARCHIVES = (".zip", ".tar")
 BAGS = (".bag", ".db3", ".mcap")
+VIDEOS = (".mp4", ".avi", ".mkv", ".mov")
 _PACKED = (".tar.gz", ".tgz", ".tar.xz", ".tar.bz2", ".tar.zst", ".7z", ".rar")
-_INSIDE = re.compile(r"(.*?\.(?:zip|tar|bag|db3|mcap))#(.*)", re.IGNORECASE | re.DOTALL)
+_KINDS = "|".join(each[1:] for each in (*ARCHIVES, *BAGS, *VIDEOS))
+_INSIDE = re.compile(rf"(.*?\.(?:{_KINDS}))#(.*)", re.IGNORECASE | re.DOTALL)
 _POSITION = re.compile(r"#@([0-9]+(?:\+[0-9]+)+)$")
 
 
@@ -50,11 +52,11 @@ def shown(location: str) -> str:
 
 
 def frame_name(name: str) -> str:
-    """Return the name of a frame below its archive, of a bag's file and stamp; others as they are."""
+    """Return the name of a frame below its archive, of a recording's file and stamp; others as they are."""
     found = _INSIDE.fullmatch(name) if "#" in name else None
     if found is None:
         return name
-    if found[1].lower().endswith(BAGS):
+    if found[1].lower().endswith((*BAGS, *VIDEOS)):
         stem = posixpath.splitext(posixpath.basename(found[1].replace(os.sep, "/")))[0]
         return f"{stem}_{found[2].rpartition('@')[2].replace('.', '_')}"
     return found[2]
@@ -63,6 +65,11 @@ def frame_name(name: str) -> str:
 def is_archive(location: str) -> bool:
     """Tell whether this names an archive, which is read as a folder."""
     return location.lower().endswith(ARCHIVES) and not is_url(location)
+
+
+def is_video(location: str) -> bool:
+    """Tell whether this names a video, not one of its frames."""
+    return location.lower().endswith(VIDEOS)
 
 
 def bag_files(location: str) -> list[str]:
@@ -150,6 +157,10 @@ def read_member(location: str, name: str, most: int) -> bytes | None:
             return _read_tar(path, member, name, most)
         if path.lower().endswith(BAGS):
             return _read_bag(path, member, name)
+        if path.lower().endswith(VIDEOS):
+            from rollcli.files.recordings.video import read_video_frame
+
+            return read_video_frame(path, member, name)
         return _read_zip(path, member, name, most)
     except OSError as error:
         raise InputError(f"{name}: cannot be read: {(error.strerror or str(error)).lower()}") from None
@@ -209,8 +220,7 @@ def _read_zip(path: str, member: str, name: str, most: int) -> bytes:
 
 def _zip(path: str) -> zipfile.ZipFile:
     try:
-        found = Path(path).stat()
-        return _opened_zip(path, found.st_size, found.st_mtime_ns)
+        return _opened_zip(*state_of(path))
     except (zipfile.BadZipFile, ValueError, NotImplementedError):
         raise InputError(f"{path}: is no ZIP archive, or a damaged one") from None
     except OSError as error:

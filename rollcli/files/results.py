@@ -138,6 +138,11 @@ class Row:
     elapsed_ms: float | None = None
 
     @property
+    def map_roll_deg(self) -> float | None:
+        """The angle that turns the map upright; the rig's where other programs have that alone."""
+        return self.roll_deg if self.image_roll_deg is None else self.image_roll_deg
+
+    @property
     def alpha(self) -> tuple[float, float, float] | None:
         """The road's parabola, px; None where the row has none."""
         if self.alpha0 is None or self.alpha1 is None or self.alpha2 is None:

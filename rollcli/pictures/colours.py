@@ -52,7 +52,7 @@ def rgb(name: str, colours: Colours = LIGHT) -> tuple[int, int, int]:
 
 def style_sheet() -> str:
     """Return the colours as custom properties of a page, which follow light and dark mode."""
-    dark = f"@media (prefers-color-scheme: dark) {{ :root {{ {_properties(DARK)} }} }}"
+    dark = f"@media screen and (prefers-color-scheme: dark) {{ :root {{ {_properties(DARK)} }} }}"
     return f":root {{ {_properties(LIGHT)} }}\n{dark}\n"
 
 

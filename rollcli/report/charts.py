@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from rollcli.files.results import Row
 from rollcli.pictures.round_step import round_step
 from rollcli.report.chart import ALIGNED, HISTOGRAM, Chart, chart_names
+from rollcli.report.frame_axis import FrameAxis, frame_axis
 from rollcli.report.summary import degrees, with_interval
 from rollcli.rig.drive.assess import DriveAssessment, RigAssessment
 from rollcli.rig.drive.quantity import SequenceAssessment
@@ -33,7 +34,9 @@ def drive_starts(rig: RigAssessment) -> set[int]:
     return {place + 1 for place in range(1, rig.count) if drives[place] != drives[place - 1]}
 
 
-def rig_traces(rig: RigAssessment, quantity: Quantity, ends: tuple[float, float]) -> list[RigTrace]:
+def rig_traces(
+    rig: RigAssessment, quantity: Quantity, ends: tuple[float, float], axis: FrameAxis
+) -> list[RigTrace]:
     """Return the traces of all drives.
 
     Parameters
@@ -42,6 +45,7 @@ def rig_traces(rig: RigAssessment, quantity: Quantity, ends: tuple[float, float]
     quantity : Quantity
     ends : (float, float)
         The lower and upper end of the chart, degrees or metres, from which to which a jump is marked.
+    axis : FrameAxis
 
     Returns
     -------
@@ -55,8 +59,8 @@ def rig_traces(rig: RigAssessment, quantity: Quantity, ends: tuple[float, float]
     for drive in rig.drives:
         found = drive.quantities.get(quantity.name)
         if found is not None:
-            _add_segments(drive, quantity, found, band, means)
-            _add_jumps(rig, drive, quantity, found, jumps, ends)
+            _add_segments(drive, quantity, found, band, means, axis)
+            _add_jumps(rig, drive, quantity, found, jumps, ends, axis)
     return [trace for trace in (band, means, jumps) if trace["x"]]
 
 
@@ -73,12 +77,17 @@ def _add(trace: RigTrace, x: Sequence[float], y: Sequence[float], text: str) -> 
 
 
 def _add_segments(
-    drive: DriveAssessment, quantity: Quantity, found: SequenceAssessment, band: RigTrace, means: RigTrace
+    drive: DriveAssessment,
+    quantity: Quantity,
+    found: SequenceAssessment,
+    band: RigTrace,
+    means: RigTrace,
+    axis: FrameAxis,
 ) -> None:
     for segment in found.segments:
         if segment.mean.value is None or segment.first == segment.last:  # a frame alone is its own mean
             continue
-        first, last = (int(drive.frames[place]) + 1 for place in (segment.first, segment.last))
+        first, last = (axis.at(int(drive.frames[place]) + 1) for place in (segment.first, segment.last))
         said = f"mounting {quantity.name} {answer(segment.end, quantity)}, of {segment.used:,} frames"
         ends = [each.value or 0.0 for each in (segment.begin, segment.end)]
         _add(means, [first, last], ends, said)
@@ -95,11 +104,12 @@ def _add_jumps(
     found: SequenceAssessment,
     jumps: RigTrace,
     ends: tuple[float, float],
+    axis: FrameAxis,
 ) -> None:
     for jump in found.jumps:
         frame = int(drive.frames[jump.frame])
         said = f"jump by {answer(jump.change, quantity, change=True)} at {rig.names[frame]}"
-        _add(jumps, [frame + 0.5, frame + 0.5], ends, said)
+        _add(jumps, [axis.at(frame + 0.5)] * 2, ends, said)
 
 
 _LONGEST = 44  # characters in a line, so that a label fits a narrow screen
@@ -117,6 +127,8 @@ class Value:
     ----------
     number : int
         Of the frame, from 1.
+    x : float
+        Where it stands along the chart.
     value : float or None
         None where the frame has none.
     half_width : float or None
@@ -125,15 +137,17 @@ class Value:
     """
 
     number: int
+    x: float
     value: float | None
     half_width: float | None
     row: Row
 
 
-def values_of(rows: Sequence[Row], quantity: Quantity) -> list[Value]:
+def values_of(rows: Sequence[Row], quantity: Quantity, axis: FrameAxis | None = None) -> list[Value]:
     """Return the value of each frame."""
+    at = (axis or FrameAxis(len(rows))).at
     return [
-        Value(number, getattr(row, quantity.column), getattr(row, quantity.ci_column), row)
+        Value(number, at(number), getattr(row, quantity.column), getattr(row, quantity.ci_column), row)
         for number, row in enumerate(rows, 1)
     ]
 
@@ -204,7 +218,6 @@ def _span(values: Iterable[Value], unit: float) -> tuple[float, float]:
 
 
 _MANY = 400  # up to so many frames each has a dot, and marks are large
-_FEW = 10
 _MOST_BINS = 40
 _NARROWEST = 0.01  # degrees
 _FEW_BINS = 6
@@ -249,6 +262,7 @@ def alignment(rows: Sequence[Row], rig: RigAssessment | None = None) -> Chart:
     Chart
     """
     data: list[Trace] = []
+    axis = frame_axis(rows, rig)
     for place, (quantity, (words, colour)) in enumerate(zip(ALIGNMENT, _PARTS, strict=True)):
         known = [
             (number, row, float(getattr(row, quantity.column)))
@@ -261,7 +275,7 @@ def alignment(rows: Sequence[Row], rig: RigAssessment | None = None) -> Chart:
             "mode": "markers",
             "name": words,
             "marker": {"color": colour, "size": 5 if len(rows) <= _MANY else 2.5},
-            "x": [number for number, _, _ in known],
+            "x": [axis.at(number) for number, _, _ in known],
             "y": [round(value * each, 3) for (_, _, value), each in zip(known, scale, strict=True)],
             "customdata": [
                 label(row, f"{value:+.3f}{quantity.unit}: {value * each:+.2f} px")
@@ -271,7 +285,7 @@ def alignment(rows: Sequence[Row], rig: RigAssessment | None = None) -> Chart:
         }
         data.append(dots)
         if rig is not None and scale:
-            line = _level_line(rig, quantity, float(np.median(scale)))
+            line = _level_line(rig, quantity, float(np.median(scale)), axis)
             data += [
                 {
                     **line,
@@ -285,13 +299,7 @@ def alignment(rows: Sequence[Row], rig: RigAssessment | None = None) -> Chart:
     layout = {
         "hovermode": "closest",
         "showlegend": True,
-        "xaxis": {
-            "title": {"text": "frame"},
-            "range": [1 - max(0.5, 0.01 * len(rows)), len(rows) + max(0.5, 0.01 * len(rows))],
-            "zeroline": False,
-            "tickformat": ",d",
-            **({"dtick": 1} if len(rows) <= _FEW else {}),
-        },
+        "xaxis": axis.layout(),
         "yaxis": {"title": {"text": "shift of rows, px"}, "range": [-end, end], "zeroline": True},
     }
     return Chart(ALIGNED, f"How the right view lies over {len(rows)} frames, px", data, layout)
@@ -306,14 +314,14 @@ def _shift_of(place: int, row: Row) -> float:
     return Misalignment.of_values(unit, height, width).shifts(height, width)[place]
 
 
-def _level_line(rig: RigAssessment, quantity: Quantity, scale: float) -> RigTrace:
+def _level_line(rig: RigAssessment, quantity: Quantity, scale: float, axis: FrameAxis) -> RigTrace:
     """Return the level of each segment of each drive, from its first frame to its last."""
     trace = _trace(quantity.name)
     for drive in rig.drives:
         found = drive.quantities.get(quantity.name)
         for segment in found.segments if found is not None else ():
             if segment.begin.value is not None and segment.end.value is not None:
-                ends = [int(drive.frames[place]) + 1 for place in (segment.first, segment.last)]
+                ends = [axis.at(int(drive.frames[place]) + 1) for place in (segment.first, segment.last)]
                 said = f"{quantity.name.replace('_', ' ')} {answer(segment.end, quantity, change=True)}"
                 _add(trace, ends, [scale * segment.begin.value, scale * segment.end.value], said)
     return trace
@@ -338,7 +346,8 @@ def chart_over_frames(
     Chart
         Its name is the quantity's.
     """
-    values = values_of(rows, quantity)
+    axis = frame_axis(rows, rig)
+    values = values_of(rows, quantity, axis)
     ends = view(rows, quantity)
     suspect = [each for each in values if each.row.status == "suspect" and each.value is not None]
     failed = [each for each in values if each.row.status == "error"]
@@ -355,20 +364,13 @@ def chart_over_frames(
     data = [trace for trace in data if trace["x"]]  # plotly's legend stumbles over what is empty
     for trace in data:
         trace["marker"] = {"size": 5 if many else 8, **trace.get("marker", {})}
-    data += [] if rig is None else rig_traces(rig, quantity, ends)
-    margin = max(0.5, 0.01 * len(rows))
+    data += [] if rig is None else rig_traces(rig, quantity, ends, axis)
     unit = _AXIS_UNITS[quantity.suffix]
     layout = {
         "hovermode": "closest",
         "hoverdistance": -1,
         "showlegend": True,
-        "xaxis": {
-            "title": {"text": "frame"},
-            "range": [1 - margin, len(rows) + margin],
-            "zeroline": False,
-            "tickformat": ",d",
-            **({"dtick": 1} if len(rows) <= _FEW else {}),  # there are no half frames
-        },
+        "xaxis": axis.layout(),
         "yaxis": {
             "title": {"text": f"{quantity.name}, {unit}"},
             "range": list(ends),
@@ -431,7 +433,7 @@ def _failed(values: Values, quantity: Quantity) -> Trace:
 def _points(values: Values, quantity: Quantity) -> Trace:
     return {
         "type": "scatter",
-        "x": [each.number for each in values],
+        "x": [each.x for each in values],
         "y": [each.value for each in values],
         "customdata": [label(each.row, in_words(each, quantity)) for each in values],
         "hovertemplate": "%{customdata}<extra></extra>",
@@ -440,10 +442,10 @@ def _points(values: Values, quantity: Quantity) -> Trace:
 
 def _band(values: Values, starts: Set[int]) -> Trace:
     """Return one polygon for each stretch of frames that have an interval; None parts them."""
-    x: list[int | None] = []
+    x: list[float | None] = []
     y: list[float | None] = []
     for stretch in _stretches([each for each in values if each.half_width is not None], starts):
-        along = [each.number for each in stretch]
+        along = [each.x for each in stretch]
         ends = [(each.value or 0.0, each.half_width or 0.0) for each in stretch]
         x += [*along, *reversed(along), None]
         y += [round(value + half, 4) for value, half in ends]

@@ -10,10 +10,11 @@ from rollcli.files.stores.locations import public_name
 from rollcli.report.chart import Chart
 from rollcli.report.charts import outside
 from rollcli.report.figures import with_still
+from rollcli.report.frame_axis import frame_axis
 from rollcli.report.options import ReportOptions
 from rollcli.report.page import Rows, render_page
 from rollcli.report.pictures import Pictures
-from rollcli.report.sources import SPREAD, SUSPECT, WIDEST, Choice
+from rollcli.report.sources import JUMP, SPREAD, SUSPECT, WIDEST, Choice
 from rollcli.report.summary import (
     degrees,
     frame_count,
@@ -76,7 +77,7 @@ def report_page(
         outside=outside(rows),
         doubtful=doubtful[:_LISTED],
         more_doubtful=max(0, len(doubtful) - _LISTED),
-        rows=_table(rows),
+        rows=_table(rows, rig),
         gallery=[_card(rows, choice, pictures) for choice, pictures in shown],
         chosen=_chosen_text(rows, [choice for choice, _ in shown]),
     )
@@ -101,7 +102,7 @@ def _others(rig: RigAssessment) -> list[str]:
     return others
 
 
-def _table(rows: Sequence[Row]) -> Rows:
+def _table(rows: Sequence[Row], rig: RigAssessment | None = None) -> Rows:
     """Return what the table shows of each frame: number, file, status, roll, roll in words, reason."""
     return Rows(
         [
@@ -114,7 +115,8 @@ def _table(rows: Sequence[Row]) -> Rows:
                 row.message,
             )
             for number, row in enumerate(rows, 1)
-        ]
+        ],
+        frame_axis(rows, rig).places,
     )
 
 
@@ -123,8 +125,11 @@ def _chosen_text(rows: Sequence[Row], choices: Sequence[Choice]) -> str:
     angled = sum(row.roll_deg is not None for row in rows)
     if len(choices) in (0, angled):
         return "Every frame that has an angle."
-    counts = {reason: sum(each.reason == reason for each in choices) for reason in (WIDEST, SUSPECT, SPREAD)}
+    counts = {
+        reason: sum(each.reason == reason for each in choices) for reason in (JUMP, WIDEST, SUSPECT, SPREAD)
+    }
     parts = {
+        JUMP: "{} around a jump",
         WIDEST: "the {} with the widest interval",
         SUSPECT: "{} of the other suspect ones" if counts[WIDEST] else "{} of the suspect ones",
         SPREAD: "{} evenly spread" + (" over the rest" if len(choices) > counts[SPREAD] else ""),
@@ -168,7 +173,7 @@ def _card(rows: Sequence[Row], choice: Choice, pictures: Pictures) -> dict[str, 
             [
                 ("before", "v-disparity", "v-disparity of the map", pictures.map_counts, ""),
                 (
-                    "after",
+                    "after heights",
                     "v-disparity, de-rotated",
                     "v-disparity once de-rotated",
                     pictures.level_counts,

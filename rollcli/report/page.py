@@ -24,13 +24,18 @@ _PLOTLY_STYLES = ("",)  # plotly makes an empty style element, which it fills by
 
 @dataclass(frozen=True)
 class Rows:
-    """What a script of the page reads as the element `rows`; prints itself in a template."""
+    """What a script of the page reads as the element `rows`; prints itself in a template.
+
+    `places` is where they stand along charts; None: at their numbers.
+    """
 
     rows: Sequence[Sequence[Any]]
+    places: Sequence[float] | None = None
 
     def __html__(self) -> str:
         """Return the rows as JSON."""
-        return f'<script type="application/json" id="rows">{script_json({"rows": self.rows})}</script>'
+        content = script_json({"rows": self.rows, "places": self.places})
+        return f'<script type="application/json" id="rows">{content}</script>'
 
 
 def render_page(package: str, template: str, *more: str, **values: Any) -> bytes:

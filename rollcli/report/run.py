@@ -15,6 +15,7 @@ from rollcli.report.chart import chart_names
 from rollcli.report.options import ReportOptions
 from rollcli.report.sources import Choice, Subject, choose, subjects
 from rollcli.report.summary import common_run, frame_count
+from rollcli.rig.drive.assess import RigAssessment, assess_rig
 from rollcli.run.find import check_writes, list_files
 from rollcli.run.options import EncodingOptions, FrameOptions
 from rollcli.run.progress import Progress
@@ -56,7 +57,14 @@ def run_report(options: ReportOptions) -> ExitStatus:
     if len(set(options.results)) < len(options.results):
         raise UsageError(f"{listed(options.results)}: a result is named twice")
     joined = _joined([_read(path) for path in options.results])
-    chosen = choose(joined.rows, options.gallery if options.output is not None else 0)
+    rig = assess_rig(joined.rows, origins=joined.origins)
+    jumps = [
+        int(drive.frames[jump.frame])
+        for drive in rig.drives
+        for found in drive.quantities.values()
+        for jump in found.jumps
+    ]
+    chosen = choose(joined.rows, options.gallery if options.output is not None else 0, sorted({*jumps}))
     found = _subjects(joined, chosen, options)
     reads = [
         *options.results,
@@ -69,7 +77,7 @@ def run_report(options: ReportOptions) -> ExitStatus:
     if options.running.dry_run:
         list_files([(reads, writes)])
         return ExitStatus.DONE
-    return _write(options, joined, chosen, found)
+    return _write(options, joined, chosen, found, rig)
 
 
 def _require_charts_alone(options: ReportOptions) -> None:
@@ -88,11 +96,11 @@ def _write(
     joined: "_Joined",
     chosen: Sequence[Choice],
     found: Sequence[Subject],
+    rig: RigAssessment,
 ) -> ExitStatus:
     from rollcli.report.charts import all_charts
     from rollcli.report.content import report_page
     from rollcli.report.figures import chart_file
-    from rollcli.rig.drive.assess import assess_rig
 
     progress = Progress(len(found), options.running, EncodingOptions())
     recorded = [joined.parts[joined.owners[each.place]].recorded for each in chosen]
@@ -100,7 +108,6 @@ def _write(
     if len(pictures) < len(found):
         progress.say("interrupted; nothing is written")
         return ExitStatus.INTERRUPTED
-    rig = assess_rig(joined.rows, origins=joined.origins)
     charts = all_charts(joined.rows, rig)
     files = {
         path: chart_file(chart, kind)

@@ -1,12 +1,13 @@
 """Where the pictures of a frame come from, and which frames the gallery shows."""
 
+import bisect
 import math
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from rollcli.errors import UsageError
-from rollcli.files.atomic import is_file, is_folder, is_there
+from rollcli.files.atomic import is_file, is_folder
 from rollcli.files.containers import frame_name
 from rollcli.files.inputs import MAP_ENDINGS
 from rollcli.files.naming import listed
@@ -16,8 +17,9 @@ from rollcli.files.stores.locations import base_name, is_remote, is_url, store_o
 from rollcli.run.frame import Frame
 from rollcli.run.image_kinds import KINDS, ImageKind
 from rollcli.run.options import ImageOptions
+from rollcli.run.result_rows import frame_of_row
 
-WIDEST, SUSPECT, SPREAD = "widest interval", "suspect", "evenly spread"
+JUMP, WIDEST, SUSPECT, SPREAD = "around a jump", "widest interval", "suspect", "evenly spread"
 
 
 @dataclass(frozen=True)
@@ -28,23 +30,32 @@ class Choice:
     reason: str
 
 
-def choose(rows: Sequence[Row], count: int) -> list[Choice]:
-    """Choose up to `count` frames that have an angle: a third each of the kinds that there are.
+def choose(rows: Sequence[Row], count: int, jumps: Sequence[int] = ()) -> list[Choice]:
+    """Choose up to `count` frames that have an angle: those around jumps, and a third each of other kinds.
 
     Parameters
     ----------
     rows : sequence of Row
     count : int
+    jumps : sequence of int
+        The places of the first frames after a jump.
 
     Returns
     -------
     list of Choice
-        The widest intervals first, from the widest on; then suspect frames and others, in their order.
+        The last frame before each jump and the first after it, for up to half of `count`, the latest jumps;
+        the widest intervals, from the widest on; then suspect frames and others, in their order.
     """
     angled = [place for place, row in enumerate(rows) if row.roll_deg is not None]
-    share = count // 3
-    widths = [(-(rows[place].roll_ci95_deg or 0.0), place) for place in angled]
-    chosen = [Choice(place, WIDEST) for width, place in sorted(widths)[:share] if width < 0]
+    around = dict[int, None]()
+    for jump in sorted(jumps)[::-1][: count // 4]:
+        at = bisect.bisect_left(angled, jump)
+        around |= dict.fromkeys(angled[max(at - 1, 0) : at + 1])
+    chosen = [Choice(place, JUMP) for place in sorted(around)]
+    rest = _without(angled, chosen)
+    share = (count - len(chosen)) // 3
+    widths = [(-(rows[place].roll_ci95_deg or 0.0), place) for place in rest]
+    chosen += [Choice(place, WIDEST) for width, place in sorted(widths)[:share] if width < 0]
     rest = _without(angled, chosen)
     doubtful = [place for place in rest if rows[place].status == "suspect"]
     chosen += [Choice(place, SUSPECT) for place in spread(doubtful, share)]
@@ -73,7 +84,7 @@ class Subject:
     frame : Frame
         Where its map or its pair is.
     theta : float
-        Its roll, radians.
+        What its map is turned by, radians.
     alpha : tuple of float, or None
         The road's parabola, px.
     images : dict of str to str
@@ -127,10 +138,15 @@ def subjects(
             "wrote, or leave --images out to have the pictures made from the inputs"
         )
     only = images is not None
-    folder = Path() if is_url(result) else Path(result).parent  # names in a bucket are whole URLs
     return [
-        replace(
-            _subject(row, folder, files), images_only=only, refused="" if fetch else _refusal(row, result)
+        Subject(
+            frame_of_row(row, result),
+            math.radians(row.map_roll_deg or 0.0),
+            row.alpha,
+            files,
+            row,
+            images_only=only,
+            refused="" if fetch else _refusal(row, result),
         )
         for row, files in zip(rows, found, strict=True)
     ]
@@ -142,26 +158,6 @@ def _refusal(row: Row, result: str) -> str:
         if is_remote(name) and not (is_url(name) and is_url(result) and store_of(name) == store_of(result)):
             return f"{name}: is remote, and the result does not lie there; --fetch follows it"
     return ""
-
-
-def _subject(row: Row, folder: Path, images: dict[str, str]) -> Subject:
-    frame = Frame(
-        file=row.file,
-        right_file=row.right_file,
-        path=_located(row.file, folder),
-        right_path=_located(row.right_file, folder),
-        relative=row.file,
-        mask=None,
-    )
-    return Subject(frame, math.radians(row.roll_deg or 0.0), row.alpha, images, row)
-
-
-def _located(name: str, folder: Path) -> str:
-    """Return a file named from where `estimate` ran: here, or else from the result's folder."""
-    if not name or is_remote(name):  # even a look at a share of Windows is a request
-        return name
-    beside = folder / name
-    return str(beside) if not is_there(name) and is_there(beside) else name
 
 
 class _ImageFolder:

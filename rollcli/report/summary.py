@@ -19,7 +19,6 @@ class Summary:
     """Figures of the frames that have an angle; degrees, None where there is nothing to take them of."""
 
     counts: Mapping[str, int]
-    median: float | None
     middle: tuple[float, float] | None  # 5th and 95th percentile
     extremes: tuple[float, float] | None
     half_width: float | None  # median
@@ -37,7 +36,6 @@ def summarize(rows: Sequence[Row]) -> Summary:
     widths = [row.roll_ci95_deg for row in rows if row.roll_ci95_deg is not None]
     return Summary(
         counts={status: found[status] for status in STATUSES},
-        median=float(np.median(rolls)) if rolls else None,
         middle=(float(np.percentile(rolls, 5)), float(np.percentile(rolls, 95))) if rolls else None,
         extremes=(min(rolls), max(rolls)) if rolls else None,
         half_width=float(np.median(widths)) if widths else None,

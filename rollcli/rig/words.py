@@ -90,10 +90,17 @@ def now_in_words(rig: RigAssessment, quantity: Quantity = ROLL) -> str:
     elif len(rig.drives) > 1:
         words.append(f"in {rig.name_of(drive)}" if drive.name else "")
     if found.drifts:
-        words.append(
-            f"at the end, after a drift of {answer(found.drift, quantity, change=True)} over the drive"
-        )
+        words.append(f"at the end, after a drift of {drift_in_words(rig, drive, quantity)}")
     return ", ".join(filter(None, words))
+
+
+def drift_in_words(
+    rig: RigAssessment, drive: DriveAssessment, quantity: Quantity = ROLL, over: str = "the drive"
+) -> str:
+    """Return a drift over its drive and, where names have stamps, an hour."""
+    whole = f"{answer(drive.quantities[quantity.name].drift, quantity, change=True)} over {over}"
+    hourly = rig.drift_per_hour(drive, quantity)
+    return whole if hourly.value is None else f"{whole}, {answer(hourly, quantity, change=True)} an hour"
 
 
 def frame_name(rig: RigAssessment, drive: DriveAssessment, place: int) -> str:
@@ -133,7 +140,7 @@ def _of_one(
         change = answer(jump.change, quantity, change=True)
         yield f"{quantity.name} jumped by {change} at {frame_name(rig, drive, jump.frame)}"
     if found.drifts and moved:
-        yield f"{quantity.name}{where} drifted by {answer(found.drift, quantity, change=True)} over the drive"
+        yield f"{quantity.name}{where} drifted by {drift_in_words(rig, drive, quantity)}"
     if found.now.ci95 is None:
         yield f"no interval for the {quantity.name}{where}: {too_few(found)}"
 

@@ -15,7 +15,8 @@ from rollcli.files.codecs.parquet import encode_parquet
 from rollcli.files.results import Format, column_types, format_header, format_row, run_path
 from rollcli.files.storage import create, owner_of
 from rollcli.files.stores.locations import is_url, public_name
-from rollcli.run.frame import Frame, FrameResult, Inputs
+from rollcli.run.frame import Frame, FrameResult, ReadAs
+from rollcli.run.inputs import inputs_line
 from rollcli.run.options import ImageOptions
 from rollcli.run.outputs import local_images
 from rollcli.run.summary import Figures
@@ -33,7 +34,9 @@ class Batch:
         How many rows, from the first on, stand in parts that the worker has written.
     lines : list of bytes
         The other rows as they stand in the result.
-    inputs : Inputs
+    notes : list of bytes
+        What frames were read from, where the result keeps it; see `inputs.inputs_line`.
+    read_as : ReadAs
     told : list of FrameResult
         Those of which the user is told.
     """
@@ -41,7 +44,8 @@ class Batch:
     figures: Figures
     in_parts: int
     lines: list[bytes]
-    inputs: Inputs
+    notes: list[bytes]
+    read_as: ReadAs
     told: list[FrameResult]
 
     def __len__(self) -> int:
@@ -162,6 +166,8 @@ class BatchOptions(NamedTuple):
         Whether the user is told of every frame.
     fail_fast : bool
         Whether the first frame without an angle ends the run.
+    notes : bool
+        Whether the result keeps what each row was made from.
     parts : Parts or None
         Where whole parts go; None: all rows come back.
     """
@@ -172,6 +178,7 @@ class BatchOptions(NamedTuple):
     root: str
     verbose: bool
     fail_fast: bool
+    notes: bool = False
     parts: Parts | None = None
 
 
@@ -191,16 +198,18 @@ def join_results(frames: Span[Frame], results: Sequence[FrameResult], options: B
     if ends:
         results = results[: figures.first_error + 1]
         figures = Figures.of([result.row for result in results])
-    inputs = Inputs()
+    read_as = ReadAs()
     for encoding, searched in {(result.encoding, result.searched) for result in results}:
-        inputs = inputs.joined(Inputs(frozenset(filter(None, [encoding])), searched))
+        read_as = read_as.joined(ReadAs(frozenset(filter(None, [encoding])), searched))
     lines = [format_row(result.row, options.form, options.further) for result in results]
-    known: Inputs = frames.told
+    known: ReadAs = frames.told
     in_parts = 0
-    if options.parts is not None and not ends and known.joined(inputs) == known:
+    if options.parts is not None and not ends and known.joined(read_as) == known:
         in_parts = _write_parts(frames, figures.status, lines, options)
     told = list(results) if options.verbose else list(_told(results))
-    return Batch(figures, in_parts, lines[in_parts:], inputs, told)
+    made = zip(frames, results, strict=False)
+    notes = [result.inputs or inputs_line(frame, {}) for frame, result in made] if options.notes else []
+    return Batch(figures, in_parts, lines[in_parts:], notes, read_as, told)
 
 
 def _write_parts(frames: Span[Frame], status: bytes, lines: Sequence[bytes], options: BatchOptions) -> int:

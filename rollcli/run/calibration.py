@@ -122,21 +122,31 @@ def check_first_size(frames: Sequence[Frame], options: FrameOptions) -> list[str
     Raises
     ------
     UsageError
+        So it is; or views side by side seem squeezed, and no calibration says that they are not.
     """
-    first = next((frame for frame in frames if frame.calibration is not None), None)
-    if first is None or first.calibration is None:
+    first = next((frame for frame in frames if frame.calibration is not None or options.side_by_side), None)
+    if first is None:
         return []
-    from rollcli.files.formats import read_image, read_stored  # only here does a dispatcher decode an image
+    from rollcli.files.formats import read_stored  # only here does a dispatcher decode an image
+    from rollcli.run.read import read_views
 
     try:
         if first.right_file:
-            height, width = read_image(options.at(first.path), first.file).shape[:2]
+            height, width = read_views(first, options)[0].shape[:2]
         else:
             height, width = read_stored(
                 options.at(first.path), first.file, rgb=options.encoding.encoding == "foundationstereo"
             ).values.shape
     except InputError:
         return []  # its row will say so
+    if first.calibration is None:
+        if width < height and options.side_by_side == "left-right":
+            raise UsageError(
+                f"{first.file}: its views would be {width}x{height} px, higher than wide, as where both are "
+                "squeezed into one image, which changes angles: stretch them to twice their width, or give "
+                "--calib, or --focal and --principal-point, of the views as they are"
+            )
+        return []
     doubt = first.calibration.seems_of_another_size(width, height)
     if doubt:
         return [doubt]

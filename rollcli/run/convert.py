@@ -48,9 +48,7 @@ def _conversions(frames: Sequence[Frame], options: DerotateOptions) -> Iterator[
     for frame, row in zip(frames, rows, strict=True):
         if row is not None and row.status == "suspect" and rotation.skip_suspect:
             continue
-        roll_deg = rotation.roll_deg
-        if row is not None:  # results of other programs have the rig's angle alone
-            roll_deg = row.roll_deg if row.image_roll_deg is None else row.image_roll_deg
+        roll_deg = rotation.roll_deg if row is None else row.map_roll_deg
         refused = "" if roll_deg is not None else f"has no angle in {rotation.result}"
         writes = (output_path(frame, options.output),)
         roll = math.radians(roll_deg or 0.0)
@@ -68,6 +66,7 @@ def run_disparity(options: DisparityOptions) -> ExitStatus:
     frames = pair_frames(
         options.inputs,
         options.pairs,
+        options.topics,
         skip=[*filter(None, [options.output, options.preview])],
         quiet=options.running.quiet,
     )
@@ -77,7 +76,9 @@ def run_disparity(options: DisparityOptions) -> ExitStatus:
         images=ImageOptions(disparity=options.output),  # levelled as the estimate does, then every row
         root=options.running.root,
         replaces=options.running.overwrite,
+        side_by_side=options.pairs.side_by_side,
     )
+    check_first_size(frames, read)
     do = partial(_match, options=read, save_as=options.save_as, preview=options.preview is not None)
     return convert(conversions, do, options.output, options.running, EncodingOptions())
 

@@ -10,9 +10,7 @@ from typing import Any, NamedTuple
 from rollcli.errors import ClusterError, ExitStatus, OutputError, WorkerError
 from rollcli.files.atomic import is_file
 from rollcli.files.containers import file_of
-from rollcli.files.results import run_path
 from rollcli.files.stores.locations import is_url, tasks_in_hand
-from rollcli.files.stream import STDOUT
 from rollcli.run.batch import Batch, BatchOptions, Parts, join_results, line_form
 from rollcli.run.calibration import calibration_files, calibration_notes
 from rollcli.run.find import list_files
@@ -98,13 +96,13 @@ def _run(plan: Plan, options: EstimateOptions, resume_command: str, started: lis
         kept = output.kept
         progress = Progress(len(plan.frames), options.running, options.encoding, summary=kept.summary)
         notes = [*plan.notes, *(calibration_notes(plan.frames) if options.calibration.given else [])]
-        for note in notes[:_NOTES]:
+        for note in (*notes[:_NOTES], *kept.notes()):
             progress.note(note)
         try:
             with stop_on_signals() as stop, progress:
                 run = _Run(plan, options, output, progress, stop, started)
                 _restore_images(run)
-                if not _retry_failed(run):
+                if not _do_again(run):
                     _run_frames(run)
         except KeyboardInterrupt:  # the second Ctrl-C: without waiting for the frames that have begun
             progress.stopped_early = True
@@ -184,14 +182,14 @@ def _restore_images(run: _Run) -> None:
     progress.stopped_early = restored < len(incomplete)
 
 
-def _retry_failed(run: _Run) -> bool:
-    """Do the failed frames of kept rows again; return whether the run ends here.
+def _do_again(run: _Run) -> bool:
+    """Do the frames of kept rows again that have failed or changed; return whether the run ends here.
 
     A result takes the new rows once the workers have ended, which hold the lock of the file that it was.
     """
-    failed, progress = run.output.kept.failed, run.progress
-    for first in range(0, len(failed), _RETRIED_AT_ONCE):
-        rest = failed[first : first + _RETRIED_AT_ONCE]
+    again, progress = run.output.kept.again, run.progress
+    for first in range(0, len(again), _RETRIED_AT_ONCE):
+        rest = again[first : first + _RETRIED_AT_ONCE]
         every = _frames_at(run.plan, rest)
         with _results(every, run, _name_of(run.plan.output)) as batches:
             for frames, batch in _with_frames(every, batches):
@@ -217,7 +215,7 @@ def _results(
 ) -> Iterator[Iterator[Batch]]:
     """Open the results of frames from whichever workers were asked for; the output is complete afterwards."""
     options, output = run.options, run.output
-    told = options.frame._replace(replaces=output.replaces, retry_of=retry_of)
+    told = options.frame._replace(replaces=output.replaces, retry_of=retry_of, notes=output.notes)
     rows = BatchOptions(
         line_form(options.result.form),
         run.plan.further,
@@ -225,6 +223,7 @@ def _results(
         told.root,
         verbose=options.running.verbose,
         fail_fast=options.result.fail_fast,
+        notes=output.notes,
         parts=parts,
     )
     work = Work(
@@ -232,7 +231,7 @@ def _results(
         partial(lost_frame, options=told),
         partial(clear_frame, options=told),
         partial(join_results, options=rows),
-        lambda: output.inputs,
+        lambda: output.read_as,
         parts.rows if parts else 1,
     )
     sample = (*frames[:1], *frames[-1:])
@@ -270,5 +269,4 @@ def _list(plan: Plan, options: EstimateOptions) -> None:
     frames = frames_to_do(plan, options)
     list_files([(calibration_files(options.calibration), ())])
     list_files((frame.reads(), (path for _, path in image_paths(frame, options.images))) for frame in frames)
-    if plan.output != STDOUT:
-        list_files([((), (plan.output, run_path(plan.output)))])
+    list_files([((), plan.files)])

@@ -1,17 +1,20 @@
 """One frame in, one row out."""
 
+import contextlib
 import time
 from dataclasses import replace
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.estimate import RollEstimate, estimate_roll
 from rollcli.files.results import Row
+from rollcli.files.storage import noting
 from rollcli.rig.calibration import Calibration
 from rollcli.rig.pose import with_pose
 from rollcli.run.diagnosis import looks_like
 from rollcli.run.frame import Frame, FrameResult
 from rollcli.run.frame_errors import guarded
 from rollcli.run.images import Pictured, encode_images
+from rollcli.run.inputs import inputs_line
 from rollcli.run.options import FrameOptions
 from rollcli.run.outputs import every_path, write_outputs
 from rollcli.run.read import Source, read_source
@@ -27,11 +30,14 @@ def run_frame(frame: Frame, options: FrameOptions) -> FrameResult:
     """
     start = time.perf_counter()
     images: dict[str, bytes] = {}
-    result = guarded(frame, lambda: _estimate(frame, options, images))
+    with contextlib.ExitStack() as reading:
+        notes = reading.enter_context(noting()) if options.notes else {}
+        result = guarded(frame, lambda: _estimate(frame, options, images))
     paths = every_path(frame, options.images, options.root)
     write_outputs(images, paths, replaces=options.replaces, retry_of=options.retry_of)
     elapsed = 1000 * (time.perf_counter() - start)
-    return replace(result, row=replace(result.row, elapsed_ms=elapsed))
+    inputs = inputs_line(frame, notes, options.at) if options.notes else b""
+    return replace(result, row=replace(result.row, elapsed_ms=elapsed), inputs=inputs)
 
 
 def _estimate(frame: Frame, options: FrameOptions, images: dict[str, bytes]) -> FrameResult:

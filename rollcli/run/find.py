@@ -14,8 +14,8 @@ from rollcli.errors import UsageError
 from rollcli.extras import require_extra
 from rollcli.files import storage
 from rollcli.files.atomic import is_file, is_folder
-from rollcli.files.containers import BAGS, bag_files, file_of, frame_name, shown
-from rollcli.files.inputs import Input, find_inputs, named_input, pair_inputs
+from rollcli.files.containers import BAGS, VIDEOS, bag_files, file_of, frame_name, is_video, shown
+from rollcli.files.inputs import IMAGE_ENDINGS, Input, Pair, find_inputs, named_input, pair_inputs
 from rollcli.files.manifest import Manifest
 from rollcli.files.search import is_place
 from rollcli.files.stores.locations import is_object_url, is_url, names_a_file, public_name, split_url
@@ -25,10 +25,10 @@ from rollcli.messages import say
 from rollcli.rig.calibration import CalibrationOptions
 from rollcli.run.calibration import Calibrations
 from rollcli.run.frame import Frame
-from rollcli.run.options import InputOptions, PairOptions, RegionOptions, TopicOptions
+from rollcli.run.options import InputOptions, Layout, PairOptions, RegionOptions, TopicOptions
 
 if TYPE_CHECKING:
-    from rollcli.files.recordings.frames import BagFrames
+    from rollcli.files.recordings.frames import BagFrames, RecordingFrame
 
 _LISTED_AT_ONCE = 10_000
 
@@ -255,6 +255,11 @@ def map_frames(
         notes=notes,
     )
     _say(notes, quiet=quiet)
+    if video := next((each.name for each in found if is_video(each.location)), None):
+        raise UsageError(
+            f"{video}: is a video, of views and not of maps: give --side-by-side (estimate, disparity) "
+            "where its frames hold both, or --left and --right with a video each"
+        )
     return [_frame(each, None, masks, calibrations) for each in found[:: given.every]]
 
 
@@ -312,52 +317,109 @@ class SortedFrames(Sequence[Frame]):
 def pair_frames(
     given: InputOptions,
     pairs: PairOptions,
+    topics: TopicOptions,
     *,
     region: RegionOptions | None = None,
     calibration: CalibrationOptions | None = None,
     skip: Sequence[str] = (),
     quiet: bool = True,
 ) -> list[Frame]:
-    """Make a frame of each stereo pair; `skip` holds the output folders, which are not searched.
+    """Make a frame of each stereo pair: of two places, of topics of bags, or of images that hold both views.
+
+    `skip` holds the output folders, which are not searched.
 
     Raises
     ------
     UsageError
-        A side is not named, an image has no partner, or a mask or a calibration is missing.
+        Pairs are named in no way, or in several; a side is missing, an image has no partner, or a mask or a
+        calibration is missing.
     """
-    if pairs.left is None or pairs.right is None:
-        raise UsageError("--left and --right are given together")
+    named = bool(given.inputs or given.files_from)
+    sides, views = (pairs.left, pairs.right), (topics.left_topic, topics.right_topic)
+    ways = [any(sides), any(views), pairs.side_by_side is not None]
+    if named and ways == [True, False, False]:
+        raise UsageError("give either maps, or pairs by --left and --right")
+    if named and not any(ways):
+        raise UsageError(
+            f"{' '.join(given.inputs[:2])}: images are given by --left and --right; with --side-by-side, or "
+            "--left-topic and --right-topic, INPUTS are images, videos or bags"
+        )
+    if sum(ways) != 1 or named is any(sides):
+        raise UsageError(
+            "name pairs in one way: --left and --right alone; or INPUTS, with --left-topic and --right-topic "
+            "for bags, or --side-by-side for images and videos that hold both views"
+        )
     masks, calibrations = _Masks(region), Calibrations(calibration or CalibrationOptions())
+    if any(views):
+        return _bag_pairs(given, topics, masks, calibrations, quiet=quiet)[:: given.every]
     notes: list[str] = []
-    found = pair_inputs(
-        pairs.left,
-        pairs.right,
-        match=pairs.match,
-        recursive=given.recursive,
-        include=given.include,
-        exclude=given.exclude,
-        skip=skip,
-        notes=notes,
-    )
+    if pairs.side_by_side is not None:
+        found = find_inputs(
+            given.inputs,
+            files_from=given.files_from,
+            recursive=given.recursive,
+            include=given.include,
+            exclude=given.exclude,
+            skip=skip,
+            endings=(*IMAGE_ENDINGS, *VIDEOS),
+            notes=notes,
+        )
+        both = [views for each in found for views in _halved(each, pairs.side_by_side)]
+    elif pairs.left is None or pairs.right is None:
+        raise UsageError("--left and --right are given together")
+    else:
+        matched = pair_inputs(
+            pairs.left,
+            pairs.right,
+            match=pairs.match,
+            recursive=given.recursive,
+            include=given.include,
+            exclude=given.exclude,
+            skip=skip,
+            notes=notes,
+        )
+        both = [views for pair in matched for views in _paired(pair)]
     _say(notes, quiet=quiet)
-    return [_frame(pair.left, pair.right, masks, calibrations) for pair in found[:: given.every]]
+    return [_frame(left, right, masks, calibrations) for left, right in both[:: given.every]]
 
 
-def bag_pairs(
-    given: InputOptions,
-    topics: TopicOptions,
-    *,
-    region: RegionOptions | None = None,
-    calibration: CalibrationOptions | None = None,
-    quiet: bool = True,
+def _halved(each: Input, layout: Layout) -> list[tuple[Input, Input]]:
+    """List the frames of a video as pairs, and an image as one."""
+    if not is_video(each.location):
+        return [(each, each)]
+    _require_local(each.location)
+    from rollcli.files.recordings.video import frames_of_video
+
+    found = frames_of_video(each.location, each.name, each.relative, layout)
+    return [(view, view) for view in map(_recorded, found)]
+
+
+def _paired(pair: Pair) -> list[tuple[Input, Input]]:
+    """Pair the frames of two videos; images are a pair themselves."""
+    both = pair.left, pair.right
+    if not any(is_video(each.location) for each in both):
+        return [both]
+    for each in both:
+        _require_local(each.location)
+    from rollcli.files.recordings.video import frames_of_pair
+
+    found = frames_of_pair(*((each.location, each.name, each.relative) for each in both))
+    return [(_recorded(one), _recorded(other)) for one, other in found]
+
+
+def _recorded(frame: "RecordingFrame") -> Input:
+    return Input(frame.location, frame.name.replace(os.sep, "/"), frame.relative)
+
+
+def _require_local(location: str) -> None:
+    """Refuse a recording in a store, which can only be read from its start to its end."""
+    if is_url(location):
+        raise UsageError(f"{public_name(location)}: recordings are read from local disk: download it first")
+
+
+def _bag_pairs(
+    given: InputOptions, topics: TopicOptions, masks: "_Masks", calibrations: Calibrations, *, quiet: bool
 ) -> list[Frame]:
-    """Make a frame of each pair of views in bags.
-
-    Raises
-    ------
-    UsageError
-        No bag is named, a topic is missing, or nothing pairs.
-    """
     left, right = topics.left_topic, topics.right_topic
     if left is None or right is None:
         raise UsageError("--left-topic and --right-topic are given together")
@@ -370,8 +432,7 @@ def bag_pairs(
 
     tolerance = round(topics.sync_tolerance * 1e6)
     found = [pairs_of_bag(files, name, left, right, tolerance) for name, files in bags]
-    masks, calibrations = _Masks(region), Calibrations(calibration or CalibrationOptions())
-    return _bag_frames(found, masks, calibrations, quiet=quiet)[:: given.every]
+    return _bag_frames(found, masks, calibrations, quiet=quiet)
 
 
 def _bags(given: InputOptions) -> list[tuple[str, list[str]]]:
@@ -384,8 +445,8 @@ def _bags(given: InputOptions) -> list[tuple[str, list[str]]]:
     """
     bags = []
     for name in given.inputs:
-        if is_url(name) and name.lower().endswith(BAGS):
-            raise UsageError(f"{public_name(name)}: bags are read from local disk: download it first")
+        if name.lower().endswith(BAGS):
+            _require_local(name)
         if files := [] if is_url(name) else bag_files(name):
             bags.append((name, files))
     if bags and (len(bags) < len(given.inputs) or given.files_from is not None):
@@ -402,16 +463,12 @@ def _bag_frames(
     for bag in bags:
         _say(bag.notes, quiet=quiet)
         for pair in bag.frames:
-            left, right = (each and Input(each.location, _named(each.name), each.relative) for each in pair)
+            left, right = (each and _recorded(each) for each in pair)
             if left is not None:
                 frame = _frame(left, right, masks, calibrations)
                 own = calibrations.given
                 frames.append(frame if own else replace(frame, calibration=bag.calibration))
     return frames
-
-
-def _named(name: str) -> str:
-    return name.replace(os.sep, "/")
 
 
 def _frame(left: Input, right: Input | None, masks: "_Masks", calibrations: Calibrations) -> Frame:

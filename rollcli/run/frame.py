@@ -39,7 +39,7 @@ class Frame:
     def reads(self) -> Iterator[str]:
         """Yield every file that this frame needs."""
         yield self.path
-        if self.right_path:
+        if self.right_path not in ("", self.path):  # one image may hold both views
             yield self.right_path
         if self.mask is not None:
             yield self.mask
@@ -49,16 +49,16 @@ class Frame:
         return Frame, tuple(getattr(self, name) for name in self.__slots__)
 
 
-class Inputs(NamedTuple):
+class ReadAs(NamedTuple):
     """How frames were read: the encodings, and the first and last disparity searched, px."""
 
     encodings: frozenset[str] = frozenset()
     searched: tuple[int, int] | None = None
 
-    def joined(self, other: "Inputs") -> "Inputs":
+    def joined(self, other: "ReadAs") -> "ReadAs":
         """Return how these and other frames were read."""
         ends = [*(self.searched or ()), *(other.searched or ())]
-        return Inputs(self.encodings | other.encodings, (min(ends), max(ends)) if ends else None)
+        return ReadAs(self.encodings | other.encodings, (min(ends), max(ends)) if ends else None)
 
 
 @dataclass(frozen=True)
@@ -74,12 +74,15 @@ class FrameResult:
         Why that may be wrong; empty when there is no doubt.
     searched : tuple of int, or None
         First and last disparity searched, px; pairs only.
+    inputs : bytes
+        What the frame was read from, where workers were told to note it: see `inputs.inputs_line`.
     """
 
     row: Row
     encoding: str = ""
     warning: str = ""
     searched: tuple[int, int] | None = None
+    inputs: bytes = b""
 
 
 _LEFT, _RIGHT = "left image: ", "right image: "  # what a message calls the files of a pair
@@ -90,7 +93,9 @@ def failed_frame(frame: Frame, reason: str) -> FrameResult:
     message, left, right = (
         " ".join(text.split()) for text in (without_secrets(reason), frame.file, frame.right_file)
     )
-    if right and message.startswith(f"{right}: "):
+    if right == left and message.startswith(f"{left}: "):  # one image holds both views
+        message = message.removeprefix(f"{left}: ")
+    elif right and message.startswith(f"{right}: "):
         message = _RIGHT + message.removeprefix(f"{right}: ")
     elif message.startswith(f"{left}: "):
         message = (_LEFT if right else "") + message.removeprefix(f"{left}: ")

@@ -10,6 +10,7 @@ from rollcli.rig.calibration import CalibrationOptions
 from rollcli.run.image_kinds import KINDS, ImageKind, Save
 from rollcli.stereo.options import StereoOptions
 
+Layout = Literal["left-right", "top-bottom"]
 HEIGHTS_RANGE = (-0.10, 0.10)
 
 
@@ -27,11 +28,12 @@ class InputOptions(NamedTuple):
 
 
 class PairOptions(NamedTuple):
-    """Which stereo pairs to read, instead of maps."""
+    """Which stereo pairs to read, instead of maps. `side_by_side`: how each input holds both views."""
 
     left: str | None = None
     right: str | None = None
     match: Literal["name", "order"] = "name"
+    side_by_side: Layout | None = None
 
 
 class TopicOptions(NamedTuple):
@@ -133,7 +135,8 @@ class FrameOptions(NamedTuple):
 
     `root` is the folder where relative paths start, for workers on other machines; empty for this one.
     `replaces` tells whether files that are in the place of an image are replaced. `retry_of` names the result
-    whose failed frames are done again; empty otherwise.
+    whose failed frames are done again; empty otherwise. `notes` tells whether workers say what each frame was
+    read from.
     """
 
     encoding: EncodingOptions = EncodingOptions()
@@ -144,6 +147,8 @@ class FrameOptions(NamedTuple):
     root: str = ""
     replaces: bool = False
     retry_of: str = ""
+    notes: bool = False
+    side_by_side: Layout | None = None
 
     def at(self, path: str) -> str:
         """Locate a path on this worker."""
@@ -156,11 +161,13 @@ class ResultOptions(NamedTuple):
     """Where the rows go, and which frames they are of.
 
     `shard` is (I, N), I from 1: every N-th frame, or one of N runs of consecutive ones, as `shard_by` says.
+    An `update` is a `resume` as well.
     """
 
     output: str = "-"
     format: Literal["csv", "jsonl", "parquet"] | None = None
     resume: bool = False
+    update: bool = False
     retry_failed: bool = False
     shard: tuple[int, int] = (1, 1)
     shard_by: Literal["every", "range"] = "every"
@@ -198,8 +205,19 @@ class EstimateOptions(NamedTuple):
     def frame(self) -> FrameOptions:
         """The part that decides the row and the images of a frame."""
         return FrameOptions(
-            self.encoding, self.stereo, self.region, self.method, self.images, self.running.root
+            self.encoding,
+            self.stereo,
+            self.region,
+            self.method,
+            self.images,
+            self.running.root,
+            side_by_side=self.pairs.side_by_side,
         )
+
+    @property
+    def paired(self) -> bool:
+        """Whether the frames are stereo pairs."""
+        return any((*self.pairs[:2], self.pairs.side_by_side, *self.topics[:2]))
 
 
 @dataclass(frozen=True)
@@ -277,3 +295,4 @@ class DisparityOptions:
     stereo: StereoOptions
     running: RunningOptions
     preview: str | None = None
+    topics: TopicOptions = field(default_factory=TopicOptions)

@@ -29,7 +29,7 @@ from rollcli.files.results import (
 from rollcli.files.storage import list_names, remove, write_bytes
 from rollcli.files.stores.locations import base_name, is_url, located
 from rollcli.run.batch import Batch, Parts, Pass, line_form, part_location
-from rollcli.run.frame import Frame, Inputs
+from rollcli.run.frame import Frame, ReadAs
 from rollcli.run.options import EstimateOptions
 from rollcli.run.outputs import local_images, remove_image_leftovers, remove_marks
 from rollcli.run.plan import Plan
@@ -46,7 +46,7 @@ class PartsOutput:
     Workers write the parts of which they have all rows. This process writes the others.
     """
 
-    resumable = True
+    resumable, notes = True, False
 
     def __init__(
         self,
@@ -70,9 +70,9 @@ class PartsOutput:
         self._written = kept.count - sum(map(len, kept.holes))
 
     @property
-    def inputs(self) -> Inputs:
+    def read_as(self) -> ReadAs:
         """How frames were read, as the record says."""
-        return self._record.inputs
+        return self._record.read_as
 
     def passes(self) -> Iterator[Pass]:
         """Yield the frames of parts that are missing before others, then those after all of them."""
@@ -93,7 +93,7 @@ class PartsOutput:
         """Take the rows; every full part is written."""
         if time.monotonic() - self._checked > _CHECK_S:
             self._check_owned()
-        self._record.saw(batch.inputs)
+        self._record.saw(batch.read_as)
         for _ in range(_whole_parts(batch.in_parts, self._part_rows)):
             next(self._numbers)
         self._written += batch.in_parts
@@ -124,7 +124,7 @@ class PartsOutput:
 
     def replace(self, positions: Sequence[int], frames: Sequence[Frame], batch: Batch) -> None:
         """Take rows; a part is written anew once its last such row is known."""
-        self._record.saw(batch.inputs)
+        self._record.saw(batch.read_as)
         for at, (position, line) in enumerate(zip(positions, batch.lines, strict=True)):
             if position // self._part_rows != self._replaced_part:
                 self.commit()

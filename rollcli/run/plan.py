@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain
+from typing import Any
 
 from rollcli.errors import UsageError
 from rollcli.files.results import IMAGE_ROLL, TIMING, Format, run_path
@@ -10,7 +11,6 @@ from rollcli.files.stores.locations import is_url
 from rollcli.files.stream import is_stream
 from rollcli.run.calibration import calibration_files, check_depth, check_first_size
 from rollcli.run.find import (
-    bag_pairs,
     check_inputs_are_kept,
     check_nothing_is_there,
     check_one_owner,
@@ -19,6 +19,7 @@ from rollcli.run.find import (
     pair_frames,
 )
 from rollcli.run.frame import Frame
+from rollcli.run.inputs import inputs_path
 from rollcli.run.options import EstimateOptions, ResultOptions
 from rollcli.run.outputs import every_path
 
@@ -36,7 +37,24 @@ class Plan:
     @property
     def in_parts(self) -> bool:
         """Whether the result is a folder of parts."""
-        return self.format == "parquet" or is_url(self.output)
+        return is_in_parts(self.output, self.format)
+
+    @property
+    def files(self) -> list[str]:
+        """What is written beside images."""
+        return _result_files(self.output, self.format)
+
+
+def is_in_parts(output: str, form: Format) -> bool:
+    """Tell whether a result is a folder of parts."""
+    return form == "parquet" or is_url(output)
+
+
+def _result_files(output: str, form: Format) -> list[str]:
+    """List the result, what its rows were made from, and the record of its run; none of these of a stream."""
+    if is_stream(output):
+        return []
+    return [output, *([] if is_in_parts(output, form) else [inputs_path(output)]), run_path(output)]
 
 
 def make_plan(options: EstimateOptions) -> Plan:
@@ -51,10 +69,15 @@ def make_plan(options: EstimateOptions) -> Plan:
     if options.result.retry_failed and not options.result.resume:
         raise UsageError("--retry-failed does again what failed in an earlier run: give --resume with it")
     frames = _find_frames(options)
-    if options.pairs.left is None:
+    if not options.paired:
         check_depth(frames, options.encoding)
-    output = options.result.output
-    results = [] if is_stream(output) else [output, run_path(output)]
+    output, form = options.result.output, options.result.form
+    if options.result.update and is_in_parts(output, form):
+        raise UsageError(
+            f"{output}: a result in parts (Parquet, or below a URL) does not say what its rows were made "
+            "from: --update takes a result in one file of CSV or JSON Lines"
+        )
+    results = _result_files(output, form)
     if options.images.folders():
         check_one_owner(((frame, _images([frame], options)) for frame in frames), results)
     calibrations, every = calibration_files(options.calibration), frames
@@ -64,10 +87,10 @@ def make_plan(options: EstimateOptions) -> Plan:
     )
     frames = _shard(frames, options.result)
     check_places(frames, [folder for _, folder in options.images.folders()])
-    notes = check_first_size(frames, options.frame) if options.calibration.given else []
+    checked = options.calibration.given or options.pairs.side_by_side is not None
+    notes = check_first_size(frames, options.frame) if checked else []
     if not (options.running.overwrite or options.result.resume):
         check_images_are_new(frames, options)
-    form = options.result.form
     if form == "parquet" and is_stream(output):
         raise UsageError("Parquet is a folder of parts: name it with --output")
     return Plan(frames, output, form, further_columns(frames, options.result), tuple(notes))
@@ -111,24 +134,15 @@ def _images(frames: Iterable[Frame], options: EstimateOptions) -> Iterator[str]:
 def _find_frames(options: EstimateOptions) -> Sequence[Frame]:
     given, pairs, quiet = options.inputs, options.pairs, options.running.quiet
     skip = [folder for _, folder in options.images.folders()]
-    views = options.topics.left_topic, options.topics.right_topic
-    if any(views):
-        return bag_pairs(
-            given, options.topics, region=options.region, calibration=options.calibration, quiet=quiet
-        )
-    named, paired = bool(given.inputs or given.files_from), bool(pairs.left or pairs.right)
-    if named and paired:
-        raise UsageError("give either maps, or pairs by --left and --right")
-    if not named and not paired:
+    if not (options.paired or given.inputs or given.files_from):
         raise UsageError(
             "no input: name maps (files, folders, patterns, or - for a list on stdin) or --left and --right"
         )
-    if paired and given.sorted:
-        raise UsageError("--sorted takes a list of maps, not --left and --right")
-    if paired:
-        return pair_frames(
-            given, pairs, region=options.region, calibration=options.calibration, skip=skip, quiet=quiet
-        )
+    if options.paired and given.sorted:
+        raise UsageError("--sorted takes a list of maps, not of pairs")
+    chosen: dict[str, Any] = {"region": options.region, "calibration": options.calibration, "skip": skip}
+    if options.paired:
+        return pair_frames(given, pairs, options.topics, quiet=quiet, **chosen)
     if options.images.disparity is not None:
         raise UsageError("--disparity writes maps computed from --left and --right; here maps are the input")
-    return map_frames(given, region=options.region, calibration=options.calibration, skip=skip, quiet=quiet)
+    return map_frames(given, quiet=quiet, **chosen)

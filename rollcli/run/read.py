@@ -13,9 +13,11 @@ from numpy.typing import NDArray
 
 from rollcli.errors import InputError
 from rollcli.estimator.road.find import first_row_of_road
+from rollcli.files.codecs.pictures import views_of
 from rollcli.files.encodings import Encoding, read_mask, to_disparity
 from rollcli.files.formats import Stored, read_image, read_stored
 from rollcli.files.results import ALIGNMENT_COLUMNS
+from rollcli.files.storage import state_of
 from rollcli.run.diagnosis import require_positive, too_large
 from rollcli.run.frame import Frame
 from rollcli.run.options import FrameOptions, MethodOptions, RegionOptions
@@ -42,7 +44,7 @@ def region_mask(mask: str | None, options: FrameOptions, shape: tuple[int, ...])
         return None
     allowed = _drawn(region, shape)
     if mask is not None:
-        usable = _mask_file(options.at(mask), mask)
+        usable = _mask_file(options.at(mask), mask, state_of(options.at(mask)))
         if usable.shape != shape:
             raise InputError(f"the mask {mask} is {_size(usable.shape)}, the map {_size(shape)}")
         allowed = allowed & usable
@@ -85,8 +87,8 @@ def _near(corners: Sequence[Corner]) -> Sequence[Corner]:
     return [(float(u), float(v)) for u, v in exact]
 
 
-@lru_cache(maxsize=1)  # a mask for all frames is read once
-def _mask_file(path: str, name: str) -> NDArray[np.bool_]:
+@lru_cache(maxsize=1)  # a mask for all frames is read once, unless it changes: workers outlive runs
+def _mask_file(path: str, name: str, state: str) -> NDArray[np.bool_]:
     return read_mask(path, name)
 
 
@@ -207,11 +209,18 @@ def _read(frame: Frame, options: FrameOptions) -> Source:
 def _match(frame: Frame, options: FrameOptions) -> Source:
     from rollcli.stereo.views import matched_shape
 
-    left = read_image(options.at(frame.path), frame.file)
-    right = read_image(options.at(frame.right_path), frame.right_file)
+    left, right = read_views(frame, options)
     allowed = region_mask(frame.mask, options, matched_shape(left.shape, options.stereo.downscale))
     source = matched_source(left, right, allowed, options)
     return replace(source, photo=left if options.images.needs_photo else None)
+
+
+def read_views(frame: Frame, options: FrameOptions) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Read the left and the right view of a pair: of two images, or of one that holds both."""
+    left = read_image(options.at(frame.path), frame.file)
+    if options.side_by_side is not None:
+        return views_of(left, options.side_by_side, frame.file)
+    return left, read_image(options.at(frame.right_path), frame.right_file)
 
 
 def matched_source(

@@ -19,12 +19,13 @@ from rollcli.files.results import run_path
 from rollcli.files.storage import write_bytes
 from rollcli.files.stores.locations import is_url, public_name
 from rollcli.run.batch import check_owned
-from rollcli.run.frame import Frame, Inputs
+from rollcli.run.frame import Frame, ReadAs
 from rollcli.run.options import (
     EncodingOptions,
     EstimateOptions,
     FrameOptions,
     ImageOptions,
+    Layout,
     MethodOptions,
     RegionOptions,
 )
@@ -34,6 +35,14 @@ from rollcli.stereo.options import StereoOptions
 
 # what these errors say of a path, they say again the next time; others may pass, such as EIO
 _LASTING = (errno.ENOENT, errno.ENOTDIR, errno.ENAMETOOLONG, errno.EACCES, errno.ELOOP, errno.EINVAL)
+
+
+def names_of(frames: Sequence[Frame]) -> dict[str, Any]:
+    """Summarise the frames: how many, and a digest of their names."""
+    names = hashlib.sha256()
+    for frame in frames:
+        names.update(os.fsencode(f"{frame.file}\0{frame.right_file}\0"))
+    return {"frames": len(frames), "names": names.hexdigest()}
 
 
 def fingerprint(frames: Sequence[Frame], unknown: Collection[str] = ()) -> dict[str, Any]:
@@ -51,11 +60,10 @@ def fingerprint(frames: Sequence[Frame], unknown: Collection[str] = ()) -> dict[
         "frames", "names" and "files"; "unknown" lists the files that were left out, and those whose size
         could not be read, if there are any.
     """
-    names, files = hashlib.sha256(), hashlib.sha256()
+    files = hashlib.sha256()
     shared: dict[str, bytes | None] = {}  # a mask for all frames is looked at once
     left_out = set(unknown)
     for frame in frames:
-        names.update(os.fsencode(f"{frame.file}\0{frame.right_file}\0"))
         for path in map(file_of, frame.reads()):
             if path in left_out:
                 continue
@@ -66,7 +74,7 @@ def fingerprint(frames: Sequence[Frame], unknown: Collection[str] = ()) -> dict[
                 left_out.add(path)
             else:
                 files.update(state)
-    found = {"frames": len(frames), "names": names.hexdigest(), "files": files.hexdigest()}
+    found = {**names_of(frames), "files": files.hexdigest()}
     return {**found, "unknown": sorted(left_out)} if left_out else found
 
 
@@ -130,14 +138,15 @@ class RunRecord:
 
     def __init__(self, plan: Plan, options: EstimateOptions, unknown: Collection[str] = ()) -> None:
         self._output = plan.output
-        self.inputs = Inputs()
+        self.read_as = ReadAs()
         self.run = uuid.uuid4().hex  # tells our objects from those of another run
         self._begun = False
-        self.replaces = options.running.overwrite  # older images, now and after a resume
+        # older images, now and after a resume
+        self.replaces = options.running.overwrite or options.result.update
         self.fixed = {
             "rollcli": __version__,
             "options": _effective(plan, options),
-            "inputs": fingerprint(plan.frames, unknown),
+            "inputs": fingerprint(plan.frames, unknown) if plan.in_parts else names_of(plan.frames),
         }
         if options.calibration.given:
             self.fixed["calibration"] = _calibrations(plan.frames)
@@ -155,13 +164,13 @@ class RunRecord:
     def continue_from(self, earlier: Mapping[str, Any]) -> None:
         """Take over what the interrupted run has recorded about its inputs."""
         searched = earlier["disparities_searched_px"]
-        self.inputs = Inputs(frozenset(earlier["encoding"]), tuple(searched) if searched else None)
+        self.read_as = ReadAs(frozenset(earlier["encoding"]), tuple(searched) if searched else None)
         self.replaces |= earlier.get(_REPLACES) is True
 
-    def saw(self, inputs: Inputs) -> None:
+    def saw(self, read_as: ReadAs) -> None:
         """Record how frames were read; the file says so before their rows are written."""
-        before, self.inputs = self.inputs, self.inputs.joined(inputs)
-        if self.inputs != before:
+        before, self.read_as = self.read_as, self.read_as.joined(read_as)
+        if self.read_as != before:
             self.write()
 
     def write(self, summary: RunSummary | None = None) -> None:
@@ -177,8 +186,8 @@ class RunRecord:
         self.check_owned()
         record = {
             **self.fixed,
-            "encoding": sorted(self.inputs.encodings),
-            "disparities_searched_px": list(self.inputs.searched or ()),
+            "encoding": sorted(self.read_as.encodings),
+            "disparities_searched_px": list(self.read_as.searched or ()),
             "alignment": summary and summary.alignment(),
             "conventions": CONVENTIONS,
             "counts": summary.totals if summary else {},
@@ -191,7 +200,8 @@ class RunRecord:
 
 def _effective(plan: Plan, options: EstimateOptions) -> dict[str, Any]:
     """Collect the options that decide the bytes of rows and images, by their names on the command line."""
-    read = _by_name(options.encoding) if options.pairs.left is None else _by_name(options.stereo)
+    read = _by_name(options.stereo) if options.paired else _by_name(options.encoding)
+    layout = options.pairs.side_by_side
     values = {**_by_name(options.method), **_by_name(options.region), **_by_name(options.images), **read}
     values |= {
         "format": plan.format,
@@ -199,6 +209,7 @@ def _effective(plan: Plan, options: EstimateOptions) -> dict[str, Any]:
         **({"part-rows": options.result.part_rows} if plan.in_parts else {}),
         "shard": "/".join(map(str, options.result.shard)),
         **({"shard-by": "range"} if options.result.shard_by == "range" else {}),
+        **({"side-by-side": layout} if layout else {}),
     }
     return {_OPTION_NAMES.get(key, key).replace("_", "-"): _public(value) for key, value in values.items()}
 
@@ -261,9 +272,17 @@ def recorded_options(run: Mapping[str, Any] | None, name: str) -> FrameOptions:
             method=_filled(MethodOptions(), given),
             stereo=_filled(StereoOptions(), given),
             images=_filled(ImageOptions(), given),
+            side_by_side=_layout(given.get("side-by-side")),
         )
     except (TypeError, ValueError) as error:
         raise InputError(f"{name}: is not the record of a run: {error}") from error
+
+
+def _layout(given: Any) -> Layout | None:
+    layouts: dict[Any, Layout] = {"left-right": "left-right", "top-bottom": "top-bottom"}
+    if given is not None and given not in layouts:
+        raise TypeError(f"side-by-side is {given!r}")
+    return layouts.get(given)
 
 
 def _filled(defaults: Options, given: Mapping[str, Any]) -> Options:

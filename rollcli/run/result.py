@@ -1,9 +1,10 @@
 """Where the rows of a run go: to a stream, or to a file with the record of the run beside it."""
 
 import contextlib
+import io
 import os
 from collections.abc import Iterator, Sequence
-from itertools import chain
+from itertools import chain, islice
 from pathlib import Path
 from typing import Protocol
 
@@ -11,16 +12,18 @@ from rollcli.errors import InputError, UsageError
 from rollcli.files.atomic import remove_leftovers
 from rollcli.files.locking import not_resumable
 from rollcli.files.results import format_header, parse_rows, read_run, run_path
+from rollcli.files.stores.locations import base_name
 from rollcli.files.stream import STDOUT, STDOUT_NAME, is_stream, open_stream, stdout_descriptor, write_stream
 from rollcli.run.batch import Batch, Pass
-from rollcli.run.frame import Frame, Inputs
+from rollcli.run.frame import Frame, ReadAs
+from rollcli.run.inputs import Inputs, inputs_path, is_inputs
 from rollcli.run.options import EstimateOptions, ImageOptions
 from rollcli.run.outputs import local_images, remove_image_leftovers, remove_marks
 from rollcli.run.parts import kept_in_parts, open_parts
 from rollcli.run.plan import Plan
 from rollcli.run.record import RunRecord, is_replaceable_record
-from rollcli.run.result_file import DurableRows, ResultFile, has_rows, kept_rows, open_result
-from rollcli.run.resume import KeptRows, check_restored, new_record
+from rollcli.run.result_file import DurableRows, ResultFile, has_rows, kept_rows, open_result, row_lines
+from rollcli.run.resume import KeptRows, arranged, check_restored, new_record
 from rollcli.run.summary import RunSummary
 
 
@@ -35,19 +38,22 @@ class Output(Protocol):
         A descriptor for workers to inherit.
     resumable : bool
         Whether an interrupted run can be resumed.
+    notes : bool
+        Whether it keeps what each row was made from.
     replaces : bool
         Whether images are replaced that were there before the run: it was begun with --overwrite.
-    inputs : Inputs
+    read_as : ReadAs
         How frames were read, as far as the record of the run says so.
     """
 
     kept: KeptRows
     keep_open: int | None
     resumable: bool
+    notes: bool
     replaces: bool
 
     @property
-    def inputs(self) -> Inputs:
+    def read_as(self) -> ReadAs:
         """The record knows more with every batch."""
 
     def passes(self) -> Iterator[Pass]:
@@ -76,8 +82,8 @@ class StreamOutput:
     """Rows to stdout, a pipe or a device."""
 
     keep_open: int | None = None
-    resumable = False
-    inputs = Inputs()
+    resumable = notes = False
+    read_as = ReadAs()
 
     def __init__(self, descriptor: int, name: str, plan: Plan, options: EstimateOptions) -> None:
         self.kept = KeptRows(plan, options)
@@ -114,13 +120,14 @@ class StreamOutput:
 
 
 class FileOutput:
-    """Rows to a locked file, and FILE.run.json beside it; a row is written once its images are durable."""
+    """Rows to a locked file, FILE.inputs and FILE.run.json beside it; images are durable before their row."""
 
-    resumable = True
+    resumable = notes = True
 
     def __init__(
         self,
         file: ResultFile,
+        inputs: ResultFile,
         record: RunRecord,
         plan: Plan,
         kept: KeptRows,
@@ -130,8 +137,8 @@ class FileOutput:
         self.keep_open: int | None = file.descriptor
         self.replaces = record.replaces
         self._file, self._record, self._plan, self._images = file, record, plan, images
-        self._rows = DurableRows(file)
-        self._replacing: dict[int, bytes] = {}
+        self._inputs, self._rows = inputs, DurableRows(file, inputs)
+        self._replacing: dict[int, tuple[bytes, bytes]] = {}  # rows, and the lines of their inputs
 
     def passes(self) -> Iterator[Pass]:
         """Yield the frames after the rows that are kept."""
@@ -139,8 +146,8 @@ class FileOutput:
 
     def append(self, frames: Sequence[Frame], batch: Batch) -> None:
         """Add the rows, after the record knows how their frames were read."""
-        self._record.saw(batch.inputs)
-        self._rows.append(batch.lines, local_images(frames, batch.figures.status, self._images))
+        self._record.saw(batch.read_as)
+        self._rows.append(batch.lines, batch.notes, local_images(frames, batch.figures.status, self._images))
 
     def restore(self, frames: Sequence[Frame], batch: Batch) -> None:
         """Take the images of incomplete frames, which were made again.
@@ -155,22 +162,24 @@ class FileOutput:
 
     def replace(self, positions: Sequence[int], frames: Sequence[Frame], batch: Batch) -> None:
         """Take rows and their images; the file gets them all at once, in `commit`."""
-        self._record.saw(batch.inputs)
-        self._replacing.update(zip(positions, batch.lines, strict=True))
+        self._record.saw(batch.read_as)
+        self._replacing.update(zip(positions, zip(batch.lines, batch.notes, strict=True), strict=True))
         self._rows.restore(local_images(frames, batch.figures.status, self._images))
 
     def commit(self) -> None:
         """Force the images and rows that were added to the disk."""
         self._rows.commit()
         if self._replacing:
-            self._file.replace(self._replacing, self._plan.format)
+            # in this order: of a run that is killed in between, the rows are made again
+            self._file.replace({at: row for at, (row, _) in self._replacing.items()}, self._plan.format)
+            self._inputs.replace({at: line for at, (_, line) in self._replacing.items()}, "jsonl")
             remove_marks([self._plan.frames[position] for position in self._replacing], self._images)
             self._replacing.clear()
 
     @property
-    def inputs(self) -> Inputs:
+    def read_as(self) -> ReadAs:
         """How frames were read, as the record says."""
-        return self._record.inputs
+        return self._record.read_as
 
     def finish(self, summary: RunSummary) -> None:
         """Write it into the record."""
@@ -210,7 +219,8 @@ def open_output(plan: Plan, options: EstimateOptions) -> Iterator[Output]:
     else:
         with open_result(plan.output) as file:
             _check_permitted(plan.output, options)  # again, now that no other run can write it
-            yield _begin(file, plan, options)
+            with open_result(inputs_path(plan.output)) as inputs:
+                yield _begin(file, inputs, plan, options)
 
 
 def frames_to_do(plan: Plan, options: EstimateOptions) -> Iterator[Frame]:
@@ -226,9 +236,9 @@ def frames_to_do(plan: Plan, options: EstimateOptions) -> Iterator[Frame]:
     else:
         _check_permitted(plan.output, options)
         kept = _kept_in_file(plan, options)
-    failed = (plan.frames[position] for position in kept.failed)
+    again = (plan.frames[position] for position in kept.again)
     holes = (frame for hole in kept.holes for frame in plan.frames[hole.start : hole.stop])
-    return chain(kept.incomplete, failed, holes, plan.frames[kept.count :])
+    return chain(kept.incomplete, again, holes, plan.frames[kept.count :])
 
 
 def _kept_in_file(plan: Plan, options: EstimateOptions) -> KeptRows:
@@ -238,18 +248,30 @@ def _kept_in_file(plan: Plan, options: EstimateOptions) -> KeptRows:
         data = Path(plan.output).read_bytes()
     except OSError:
         return KeptRows(plan, options)
-    return _parsed(kept_rows(data, plan.output, plan.format), plan, options)
+    return _parsed(data, plan, options)[1]
 
 
-def _parsed(data: bytes, plan: Plan, options: EstimateOptions) -> KeptRows:
-    """Take in the rows of a file that is cut after its last whole row; it may have none, nor a header."""
-    return KeptRows(plan, options, parse_rows(data, plan.output) if data else ())
+def _parsed(data: bytes, plan: Plan, options: EstimateOptions) -> tuple[bytes, KeptRows]:
+    """Take in the rows of a file as far as they count, in the order of the frames; return their bytes too."""
+    data = kept_rows(data, plan.output, plan.format)
+    if not data:
+        return b"", KeptRows(plan, options)
+    update, gone = options.result.update, 0
+    inputs = Inputs(plan.output, updates=update)
+    if update:
+        data, gone = arranged(data, plan)
+    kept = KeptRows(plan, options, parse_rows(data, plan.output), inputs)
+    kept.gone = gone
+    lines = row_lines(io.BytesIO(data), plan.format)
+    return b"".join(islice(lines, kept.count + (plan.format == "csv"))), kept
 
 
-def _begin(file: ResultFile, plan: Plan, options: EstimateOptions) -> FileOutput:
-    data = kept_rows(file.read(), plan.output, plan.format) if options.result.resume else b""
+def _begin(file: ResultFile, inputs: ResultFile, plan: Plan, options: EstimateOptions) -> FileOutput:
+    data, kept = b"", KeptRows(plan, options)
+    before = file.read() if options.result.resume else b""
     try:
-        kept = _parsed(data, plan, options)
+        if before:
+            data, kept = _parsed(before, plan, options)
         earlier = read_run(plan.output) if kept.count else None
     except InputError as error:
         raise not_resumable(plan.output, str(error)) from error
@@ -257,23 +279,31 @@ def _begin(file: ResultFile, plan: Plan, options: EstimateOptions) -> FileOutput
     if options.result.resume or options.running.overwrite:
         first = 0 if options.result.retry_failed else kept.count
         remove_image_leftovers(kept.not_failed(first), options.images)
-    remove_leftovers([run_path(plan.output), os.path.realpath(plan.output)])
+    written = (plan.output, inputs_path(plan.output))
+    remove_leftovers([run_path(plan.output), *map(os.path.realpath, written)])
     # in this order, a run that is killed in between can be resumed: an empty file counts as a new one
+    if not before.startswith(data):
+        file.rewrite([data])  # before the other: a row without its line counts for nothing
     file.truncate(len(data) if kept.count else 0)
+    lines = bytes(kept.inputs.lines) if kept.inputs else b""
+    if not inputs.read().startswith(lines):
+        inputs.rewrite([lines])
+    inputs.truncate(len(lines))
     record.write()
     if not kept.count:
         file.append(format_header(plan.format, plan.further))
-    return FileOutput(file, record, plan, kept, options.images)
+    return FileOutput(file, inputs, record, plan, kept, options.images)
 
 
 def _check_permitted(name: str, options: EstimateOptions) -> None:
     """Refuse to touch a result that exists, unless --resume or --overwrite is given."""
     resume, overwrite = options.result.resume, options.running.overwrite
     if resume and overwrite:
-        raise UsageError("give either --resume or --overwrite")
+        raise UsageError(f"give either {'--update' if options.result.update else '--resume'} or --overwrite")
     if is_stream(name):
         if resume:
-            raise UsageError("--resume needs a result file: name it with --output")
+            flag = "--update" if options.result.update else "--resume"
+            raise UsageError(f"{flag} needs a result file: name it with --output")
         return
     if overwrite:
         return
@@ -282,6 +312,13 @@ def _check_permitted(name: str, options: EstimateOptions) -> None:
             raise UsageError(
                 f"{name}: exists already; give --resume to continue it or --overwrite to replace it"
             )
+        if not Path(inputs_path(name)).exists():
+            raise not_resumable(name, f"there is no {base_name(inputs_path(name))}")
+    elif not is_inputs(inputs_path(name)):
+        raise UsageError(
+            f"{inputs_path(name)}: exists already and is not of a run; give another --output, or --overwrite "
+            "to replace it"
+        )
     elif not is_replaceable_record(run_path(name)):
         raise UsageError(
             f"{run_path(name)}: exists already and is not the record of a run; give another --output, or "

@@ -87,24 +87,34 @@ class ResultFile:
         OutputError
             The disk does not take the new file; the old one is as it was.
         """
-        target = os.path.realpath(self._name)  # a link stays one
         first = -1 if form == "csv" else 0  # the header
+        rest = enumerate(row_lines(self._old_lines(), form), first)
+        self.rewrite(rows.get(position, line) for position, line in rest)
+
+    def rewrite(self, lines: Iterable[bytes]) -> None:
+        """Write the file anew, all in one step, and continue behind these lines; see `replace`."""
+        target = os.path.realpath(self._name)  # a link stays one
         if _ON_WINDOWS:
-            rest = enumerate(_lines(io.BytesIO(self.read()), form), first)
-            self._replace_closed(target, b"".join(rows.get(position, line) for position, line in rest))
+            self._replace_closed(target, b"".join(lines))
             return
         with contextlib.ExitStack() as held:
             try:
-                with Path(target).open("rb") as old, atomic_file(target, durable=True) as new:
+                with atomic_file(target, durable=True) as new:
                     if hasattr(os, "fchmod"):
                         os.fchmod(new.fileno(), stat.S_IMODE(os.fstat(self.descriptor).st_mode))
-                    for position, line in enumerate(_lines(old, form), first):
-                        new.write(rows.get(position, line))
+                    new.writelines(lines)
                     locked_file = os.dup(new.fileno())  # the lock is the open file's, and stays with it
                     held.callback(os.close, locked_file)
                 os.dup2(locked_file, self.descriptor, inheritable=False)
             except OSError as error:
                 raise output_error(self._name, error) from error
+
+    def _old_lines(self) -> Iterator[bytes]:
+        if _ON_WINDOWS:  # it renames onto no open file
+            yield from io.BytesIO(self.read())
+            return
+        with Path(os.path.realpath(self._name)).open("rb") as old:
+            yield from old
 
     def _replace_closed(self, target: str, data: bytes) -> None:
         """Write the file anew while it is closed: Windows renames onto no open file.
@@ -214,7 +224,7 @@ def whole_rows(data: bytes, form: Format) -> bytes:
     return data[:end]
 
 
-def _lines(file: Iterable[bytes], form: Format) -> Iterator[bytes]:
+def row_lines(file: Iterable[bytes], form: Format) -> Iterator[bytes]:
     """Yield the header and the rows of a whole result; a row of CSV may hold newlines in quotes."""
     line = b""
     for piece in file:
@@ -246,7 +256,8 @@ _SHARE = 100  # a group lasts so many times as long as the last one took to sync
 class DurableRows:
     """Collects rows, forces their images to the disk, then writes them and forces them too.
 
-    Rows without images are written at once; a killed run loses none of them.
+    Rows without images are written at once; a killed run loses none of them. What a row was made from is
+    written before it (see `inputs`), and counts without it for nothing.
 
     Attributes
     ----------
@@ -254,17 +265,17 @@ class DurableRows:
         The number of rows in the file that this object wrote.
     """
 
-    def __init__(self, file: ResultFile) -> None:
+    def __init__(self, file: ResultFile, inputs: ResultFile) -> None:
         self.written = 0
-        self._file = file
+        self._file, self._inputs = file, inputs
         self._rows: list[bytes] = []
         self._images: list[str] = []
         self._folders: set[Path] = set()  # whose names are on the disk
         self._unsynced = False
         self._last, self._wait_s = time.monotonic(), 0.0
 
-    def append(self, rows: Sequence[bytes], images: Iterable[str]) -> None:
-        """Add rows and the images that must be on the disk before them.
+    def append(self, rows: Sequence[bytes], inputs: Sequence[bytes], images: Iterable[str]) -> None:
+        """Add rows, the lines of their inputs, and the images that must be on the disk before them.
 
         Raises
         ------
@@ -272,6 +283,7 @@ class DurableRows:
             The disk does not take an image or a row.
         """
         before = len(self._images)
+        self._inputs.append(b"".join(inputs))
         self._images.extend(images)
         if self._rows or len(self._images) > before:
             self._rows.extend(rows)
@@ -305,6 +317,7 @@ class DurableRows:
         rows, self._rows = self._rows, []  # first: a commit after an interrupt must not write one again
         self._write(rows)
         if self._unsynced:
+            self._inputs.sync()
             self._file.sync()
             self._unsynced = False
         self._last = time.monotonic()

@@ -1,13 +1,22 @@
-"""The row of a result that each map has."""
+"""The row of a result that each map has, and the frame that each row has."""
 
+import math
 from collections.abc import Sequence
+from pathlib import Path
 
-from rollcli.errors import UsageError
+from rollcli.errors import RollcliError, UsageError
+from rollcli.files.atomic import is_there
 from rollcli.files.matching import is_elsewhere, match_paths
 from rollcli.files.naming import listed
-from rollcli.files.results import Row, read_result
+from rollcli.files.results import Row, read_result, run_path
+from rollcli.files.stores.locations import is_remote, is_url
 from rollcli.messages import say
 from rollcli.run.frame import Frame
+from rollcli.run.options import FrameOptions
+from rollcli.run.record import recorded_options
+
+_COMPARED = 3  # maps in other folders than their rows': the first, the last and one between
+_SAME_DEG = 1e-4  # a result holds angles to a millionth of a degree
 
 
 def rows_of(
@@ -15,13 +24,17 @@ def rows_of(
 ) -> list[Row]:
     """Find the row of each frame, and say how many angles are suspect, and whether they are used.
 
+    Frames and rows are compared by path as far as they agree. Where folders differ, names do not tell a copy
+    from another drive: some of these maps are estimated again, and have to give the angles of their rows.
+
     Raises
     ------
     UsageError
         Names maps without a row, with `every_row` rows that have an angle but no map, and what matches more
         than one; a row is of another drive; or every angle is suspect, and such are left out.
     """
-    rows = read_result(result).rows
+    read = read_result(result)
+    rows = read.rows
     found = match_paths([frame.file for frame in frames], [row.file for row in rows], result)
     alone = [frame.file for frame, at in zip(frames, found, strict=True) if at is None]
     if alone:
@@ -32,13 +45,47 @@ def rows_of(
         names = listed(row.file for row in lost if row.roll_deg is not None)
         raise UsageError(f"{result}: no map is given for its rows of {names}")
     matched = [rows[at] for at in used]
-    for frame, row in zip(frames, matched, strict=True):
-        if is_elsewhere(frame.file, row.file, of_pair=bool(row.right_file)):
-            raise UsageError(
-                f"{result}: its row is of {row.file}, and not of {frame.file}: give the result of these maps"
-            )
+    elsewhere = [
+        (frame, row)
+        for frame, row in zip(frames, matched, strict=True)
+        if row.roll_deg is not None and is_elsewhere(frame.file, row.file, of_pair=bool(row.right_file))
+    ]
+    if elsewhere:
+        recorded = recorded_options(read.run, run_path(result))
+        for at in {round(i * (len(elsewhere) - 1) / (_COMPARED - 1)): None for i in range(_COMPARED)}:
+            frame, row = elsewhere[at]
+            if not _is_copy(frame, row, recorded):
+                differ = f"its row is of {row.file}, and not of {frame.file}"
+                raise UsageError(f"{result}: {differ}: give the result of these maps")
     _tell_suspects(matched, result, skip_suspect=skip_suspect, quiet=quiet)
     return matched
+
+
+def frame_of_row(row: Row, result: str) -> Frame:
+    """Return the frame of a row; names are of where `estimate` ran: of this folder, or of the result's."""
+    folder = Path() if is_url(result) else Path(result).parent  # names in a bucket are whole URLs
+    path, right = (_located(name, folder) for name in (row.file, row.right_file))
+    return Frame(row.file, row.right_file, path, right, relative=row.file, mask=None)
+
+
+def _located(name: str, folder: Path) -> str:
+    if not name or is_remote(name):  # even a look at a share of Windows is a request
+        return name
+    beside = folder / name
+    return str(beside) if not is_there(name) and is_there(beside) else name
+
+
+def _is_copy(frame: Frame, row: Row, options: FrameOptions) -> bool:
+    """Tell whether a map gives the angle of a row."""
+    from rollcli.estimator.estimate import estimate_roll
+    from rollcli.run.read import read_source
+
+    try:
+        source = read_source(frame, options)
+        found = estimate_roll(source.disparity, mask=source.allowed, **options.method.arguments())
+    except (OSError, RollcliError):
+        return False
+    return abs(math.degrees(found.theta) - (row.map_roll_deg or 0.0)) < _SAME_DEG
 
 
 def _tell_suspects(rows: Sequence[Row], result: str, *, skip_suspect: bool, quiet: bool) -> None:

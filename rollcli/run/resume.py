@@ -1,5 +1,6 @@
 """Continue an interrupted run: compare it with this one, and keep the rows it finished."""
 
+import io
 import json
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
@@ -7,15 +8,17 @@ from typing import Any, NamedTuple
 
 from rollcli.errors import InputError, OutputError
 from rollcli.files.locking import differences, not_resumable
-from rollcli.files.results import Row, read_run, run_path
+from rollcli.files.results import Row, format_row, parse_rows, read_run, run_path
 from rollcli.files.storage import modified_ns
 from rollcli.files.stores.locations import base_name
 from rollcli.run.batch import Batch
 from rollcli.run.frame import Frame
+from rollcli.run.inputs import Inputs
 from rollcli.run.options import EstimateOptions
 from rollcli.run.outputs import MadeImages
 from rollcli.run.plan import Plan, check_images_are_new
 from rollcli.run.record import RunRecord, changed_input
+from rollcli.run.result_file import row_lines
 from rollcli.run.summary import RunSummary
 
 
@@ -38,29 +41,41 @@ class KeptRows:
         Positions, from 0, of those without an angle.
     holes : list of range
         Positions before others that have no row: parts that workers had not written.
+    again : list of int
+        Positions of those whose frames are done again: they have failed, have changed, or are not done yet.
+    changed : int
+        How many frames hold something else than their rows were made from.
+    first_changed : str
+        The file of the first of them; empty where there is none.
+    gone : int
+        How many rows have left the result, since their frames are gone.
     incomplete : list of Frame
         Frames whose images are missing or empty, whatever the cause.
     summary : RunSummary
     mismatch : Mismatch or None
     """
 
-    def __init__(self, plan: Plan, options: EstimateOptions, rows: Iterable[Row] = ()) -> None:
-        self.count = 0
+    def __init__(
+        self,
+        plan: Plan,
+        options: EstimateOptions,
+        rows: Iterable[Row] = (),
+        inputs: Inputs | None = None,
+    ) -> None:
+        self.count, self.changed, self.first_changed, self.gone = 0, 0, "", 0
         self.holes: list[range] = []
         self.errors: list[int] = []
+        self.again: list[int] = []
         self.incomplete: list[Frame] = []
         self.summary = RunSummary()
         self.mismatch: Mismatch | None = None
         self._frames, self._images = plan.frames, options.images
         self._retries = options.result.retry_failed
         self._made: MadeImages | None = None
+        self.inputs = inputs
         for row in rows:
-            self.add(row)
-
-    @property
-    def failed(self) -> list[int]:
-        """Positions of the rows whose frames are done again."""
-        return self.errors if self._retries else []
+            if not self.add(row):
+                break
 
     def not_failed(self, first: int = 0) -> Iterator[Frame]:
         """Yield the frames from a position on whose row is not `error`, or not there yet.
@@ -72,20 +87,39 @@ class KeptRows:
             self._frames[position] for position in range(first, len(self._frames)) if position not in failed
         )
 
-    def add(self, row: Row) -> None:
-        """Take in the next row."""
+    def add(self, row: Row) -> bool:
+        """Take in the next row; one that does not count is left out, and so are those behind it."""
+        is_again = row.message == _NOT_YET or (row.status == "error" and self._retries)
         if self.count < len(self._frames):
             frame = self._frames[self.count]
             self._compare(row, frame)
-            if row.status != "error" and not self._has_images(frame):
+            if self.inputs is not None and self.mismatch is None:
+                if row.message == _NOT_YET:
+                    self.inputs.take_unknown(frame)
+                elif not self.inputs.take(frame):
+                    return False
+                if not is_again and self.inputs.has_changed(frame):
+                    self.changed += 1
+                    self.first_changed = self.first_changed or frame.file
+                    is_again = True
+            if row.status != "error" and not is_again and not self._has_images(frame):
                 self.incomplete.append(frame)
         if row.status == "error":
             self.errors.append(self.count)
-        if row.status == "error" and self._retries:
+        if is_again:
+            self.again.append(self.count)
             self.summary.leave_places([row.file])
         else:
             self.summary.add_row(row)
         self.count += 1
+        return True
+
+    def notes(self) -> Iterator[str]:
+        """Yield what is said of an update before it begins."""
+        if self.changed:
+            yield f"frames that are done again, since what they were made from has changed: {self.changed}"
+        if self.gone:
+            yield f"frames that are gone, whose rows leave the result and whose images stay: {self.gone}"
 
     def skip_to(self, position: int) -> None:
         """Leave a hole before the row at a position."""
@@ -108,7 +142,54 @@ class KeptRows:
         return self._made.has_all(frame)
 
 
-_SORT_LAST = "new frames must sort last: estimate these into a result of their own"
+_SORT_LAST = "new frames must sort last, or be added by --update"
+_NOT_YET = "not estimated yet: the run that adds this frame is not over"  # in its row until then
+
+
+def arranged(data: bytes, plan: Plan) -> tuple[bytes, int]:
+    """Put the rows of a result into the order of the frames; those added amid them get rows that say so.
+
+    Parameters
+    ----------
+    data : bytes
+        A result, cut after its last whole row.
+    plan : Plan
+        Its frames may have been added, or have gone; those behind the last row are added after this.
+
+    Returns
+    -------
+    bytes, int
+        The result; and how many rows have left it, since their frames are gone.
+    """
+    if _is_in_order(data, plan):
+        return data, 0
+    lines = row_lines(io.BytesIO(data), plan.format)
+    header = next(lines) if plan.format == "csv" else b""
+    places, ends, end = dict[int, int](), [len(header)], len(header)
+    for row, line in zip(parse_rows(data, plan.output), lines, strict=False):
+        places[hash((row.file, row.right_file))] = len(ends) - 1
+        end += len(line)
+        ends.append(end)
+    pieces, waiting = [header], list[bytes]()
+    for frame in plan.frames:
+        place = places.pop(hash((frame.file, frame.right_file)), None)
+        if place is None:
+            row = Row(frame.file, frame.right_file, "error", message=_NOT_YET)
+            waiting.append(format_row(row, plan.format, plan.further))
+        else:
+            pieces += [*waiting, data[ends[place] : ends[place + 1]]]
+            waiting.clear()
+    return b"".join(pieces), len(places)
+
+
+def _is_in_order(data: bytes, plan: Plan) -> bool:
+    """Tell whether each row is of the frame in its place."""
+    frames = iter(plan.frames)
+    for row in parse_rows(data, plan.output):
+        frame = next(frames, None)
+        if frame is None or (frame.file, frame.right_file) != (row.file, row.right_file):
+            return False
+    return True
 
 
 def check_restored(batch: Batch) -> None:
@@ -142,8 +223,12 @@ def new_record(
     UsageError
         It cannot be continued; says what differs. Or it is a first start, and there are images already.
     """
+    if options.result.update and kept.count:
+        record = RunRecord(plan, options)
+        record.continue_from(_check_updatable(earlier, record, plan))
+        return record
     unknown = unknown_inputs(earlier)
-    retried = kept.failed
+    retried = kept.again
     begun = begun_plan(plan, earlier)
     record = RunRecord(plan, options, () if retried else unknown)
     if kept.count:
@@ -192,13 +277,26 @@ def check_resumable(
     UsageError
         Says what differs.
     """
+    run = _whole(run, plan)
+    for difference in _differences(kept, run, record.fixed, plan, added):
+        raise not_resumable(plan.output, difference)
+    return run
+
+
+def _check_updatable(run: Mapping[str, Any] | None, record: RunRecord, plan: Plan) -> Mapping[str, Any]:
+    """Refuse to update a result of another version or other options, by its record; return that."""
+    run = _whole(run, plan)
+    for difference in differences(run, record.fixed):
+        raise not_resumable(plan.output, difference)
+    return run
+
+
+def _whole(run: Mapping[str, Any] | None, plan: Plan) -> Mapping[str, Any]:
     record_name = base_name(run_path(plan.output))
     if run is None:
         raise not_resumable(plan.output, f"there is no {record_name}")
     if not _is_whole(run):
         raise not_resumable(plan.output, f"{record_name} is damaged")
-    for difference in _differences(kept, run, record.fixed, plan, added):
-        raise not_resumable(plan.output, difference)
     return run
 
 
@@ -246,9 +344,11 @@ def _differences(
         yield f"frames have been added that sort before others of its frames; {_SORT_LAST}"
     if inputs_was.get("names") != inputs_now["names"]:
         yield "the names of the inputs differ"
+    if kept.first_changed:
+        yield f"{kept.first_changed} has changed since; --update does again what has changed"
     if inputs_was != inputs_now:
-        changed = _changed_input(plan, set(kept.failed))
-        if changed or not kept.failed:
+        changed = _changed_input(plan, set(kept.again))
+        if changed or not kept.again:
             yield f"{changed or 'an input'} has changed since"
 
 

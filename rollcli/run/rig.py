@@ -22,10 +22,11 @@ from rollcli.rig.quantities import QUANTITIES, ROLL, SIZE
 from rollcli.rig.words import findings
 from rollcli.run.calibration import Calibrations
 from rollcli.run.find import check_writes, list_files
+from rollcli.run.rig_columns import columns_of_drive
 from rollcli.run.rig_gates import check_options, run_checks, status_of
 from rollcli.run.rig_health import health_of
 from rollcli.run.rig_options import RigOptions
-from rollcli.run.rig_text import FORMATS, Findings, correction_text
+from rollcli.run.rig_text import FORMATS, NO_COLUMNS, Findings, correction_text
 
 COLUMNS = (*QUANTITY_COLUMNS, *SIZE)
 
@@ -284,7 +285,10 @@ def run_rig(options: RigOptions) -> int:
     data = FORMATS[options.format](found).encode("utf-8", "surrogateescape")
     write_output(options.output, data, overwrite=replace)
     if options.correction is not None:
-        correction = correction_text(health, options.results).encode()
+        columns = None if health is None else columns_of_drive(rig, options.results)
+        correction = correction_text(health, columns, options.results).encode()
+        if columns is None and not options.running.quiet:
+            say(f"{options.correction}: {NO_COLUMNS}")
         write_output(options.correction, correction, overwrite=replace)
     if not options.running.quiet:
         for each in filter(None, [source, later]):

@@ -12,9 +12,11 @@ from rollcli.rig.drive.assess import DriveAssessment, RigAssessment
 from rollcli.rig.drive.posterior import Estimate
 from rollcli.rig.drive.quantity import Segment
 from rollcli.rig.quantities import ALIGNMENT, QUANTITIES, ROLL, Quantity
-from rollcli.rig.words import answer, counts, findings, frame_name, now_in_words
+from rollcli.rig.words import answer, counts, drift_in_words, findings, frame_name, now_in_words
 from rollcli.run.rig_gates import Check
 from rollcli.run.rig_health import DISTANCES, NOT_SEEN, Health
+from rollcli.stereo.correction import columns_as_text
+from rollcli.stereo.misalignment import ColumnSupport
 
 _DIGITS = 6
 
@@ -55,6 +57,8 @@ def rig_values(
         found = rig.latest(quantity)
         prefix = "drift" if quantity is ROLL else f"{quantity.name}_drift"
         values |= named(prefix, found.drift if found else Estimate(), quantity.suffix)
+        hourly = rig.drift_per_hour(rig.latest_drive(quantity), quantity)
+        values |= named(prefix, hourly, f"{quantity.suffix}_per_hour")
     for quantity in QUANTITIES:
         values["jumps" if quantity is ROLL else f"{quantity.name}_jumps"] = _jumps(rig, quantity)
     values["segments"] = [
@@ -127,6 +131,7 @@ def segment_rows(rig: RigAssessment) -> list[dict[str, Any]]:
                     "last_file": rig.frames.files[segment["last"]],
                     "between_frames_sd_deg": rounded(found.between_sd),
                     **named("drift", found.drift),
+                    **named("drift", rig.drift_per_hour(drive), "deg_per_hour"),
                     **named("change", change),
                     "status": found.status,
                 }
@@ -211,7 +216,7 @@ def _lines(found: Findings) -> Iterator[str]:
     if drive is not None:
         found_roll, over = drive.quantities[ROLL.name], rig.name_of(drive) if len(rig.drives) > 1 else ""
         if found_roll.drift.ci95 is not None:
-            drifts = f"{answer(found_roll.drift, change=True)} over {over or 'the drive'}"
+            drifts = drift_in_words(rig, drive, over=over or "the drive")
             yield f"drift   {drifts}" + ("" if found_roll.drifts else ": none is seen")
         yield f"jumps   {_jump_count(rig)}"
     yield from (f"        {line}" for line in _roll_jumps(rig))
@@ -272,8 +277,11 @@ _CALL = (
 )
 
 
-def correction_text(health: Health | None, results: Sequence[str]) -> str:
-    """Return the JSON of a correction.
+NO_COLUMNS = "its pairs cannot be read here, so each one tells by itself what of a scale is in the columns"
+
+
+def correction_text(health: Health | None, columns: ColumnSupport | None, results: Sequence[str]) -> str:
+    """Return the JSON of a correction; `columns` are of the size matched at, if the drive tells.
 
     Raises
     ------
@@ -287,6 +295,7 @@ def correction_text(health: Health | None, results: Sequence[str]) -> str:
         **alignment_values(health),
         "width": width,
         "height": height,
+        **({"columns": columns_as_text(columns)} if columns is not None else {}),
         "matrix": health.misalignment.matrix(height, width),
         "opencv": _CALL,
         "note": "matrix: from a pixel of the corrected right view to the given one, without the twist, "

@@ -102,8 +102,7 @@ _STEREO = (
 
 def idle_in_estimate(options: EstimateOptions) -> Iterator[Idle]:
     """Yield the options without effect on a run of `estimate`."""
-    paired = options.pairs.left is not None
-    if paired:
+    if options.paired:
         yield Idle(("encoding", "scale", "invalid"), "pairs are matched, and no stored disparities are read")
         yield from idle_stereo(options.stereo)
         if not any(kind.holds != "picture" for kind, _ in options.images.folders()):

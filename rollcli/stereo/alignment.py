@@ -9,8 +9,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.stereo.misalignment import LEVEL, Misalignment
-from rollcli.stereo.row_fit import NOTHING_KNOWN, ColumnSupport, SeenBlocks, column_support, fit_rows
+from rollcli.stereo.misalignment import LEVEL, NOTHING_KNOWN, ColumnSupport, Misalignment
+from rollcli.stereo.row_fit import (
+    ColumnEvidence,
+    SeenBlocks,
+    column_evidence,
+    column_support,
+    fit_rows,
+)
 from rollcli.stereo.views import (
     BLOCK,
     Map,
@@ -18,13 +24,18 @@ from rollcli.stereo.views import (
     Views,
     block_means,
     blocks_at,
+    grey_between,
     resampled,
     seen_at,
     shrink_both,
+    smoothed_at_pixels,
+    smoothed_between,
 )
 
 Floats = NDArray[np.float32]
-_SMOOTHING = 0.7  # px: more takes away the grain that tells on an empty road, less leaves the noise
+# px, and `smoothed_at_pixels` smooths as much again: more takes away the grain that tells on an empty road,
+# less leaves the noise
+_SMOOTHING = 0.5
 _KNOWN = 0.7  # share of a block that has to have a disparity
 _RIDGE = 0.2  # squared grey levels per pixel: gradients along the rows below this are noise
 _LEAST = 2.0  # the same, across the rows: a block with less says nothing
@@ -50,27 +61,33 @@ class Measured:
         Standard error of each part.
     spread : float
         Standard deviation of their vertical disparities from what is explained, outliers aside, pixels.
-    support : ColumnSupport
-        What of it is believed to be in the columns, too.
+    evidence : ColumnEvidence or None
+        What the rows say of the columns.
     """
 
     misalignment: Misalignment
     errors: Misalignment
     share: float
     spread: float
-    support: ColumnSupport = NOTHING_KNOWN
+    evidence: ColumnEvidence | None = None
+
+    @cached_property
+    def support(self) -> ColumnSupport:
+        """What of it is believed to be in the columns, too."""
+        return NOTHING_KNOWN if self.evidence is None else column_support(self.evidence)
 
     def resized(self, factor: float) -> "Measured":
         """Return this measurement, of views `factor` times as large."""
         there, errors = self.misalignment.resized(factor), self.errors.resized(factor)
-        support = self.support.resized(factor)
-        return Measured(there, errors, self.share, factor * self.spread, support)
+        evidence = self.evidence and self.evidence.resized(factor)
+        return Measured(there, errors, self.share, factor * self.spread, evidence)
 
 
 class Texture(NamedTuple):
     """What is compared of two views: smoothed grey levels, and their gradients in the left one.
 
-    Arrays of shape (H, W): grey levels, and grey levels per pixel along the rows and down the columns.
+    Arrays of shape (H, W): grey levels, and grey levels per pixel along the rows and down the columns; of the
+    right view twice as large.
     """
 
     left: Floats
@@ -81,8 +98,8 @@ class Texture(NamedTuple):
     @staticmethod
     def of(views: Views) -> "Texture":
         """Work it out; a pair that is measured again and again needs it once."""
-        left, right = (_smooth(view) for view in views)
-        return Texture(left, right, *_gradients(left))
+        left = smoothed_at_pixels(_smooth(views[0]))
+        return Texture(left, smoothed_between(_smooth(views[1])), *_gradients(left))
 
 
 def measure_misalignment(
@@ -121,7 +138,7 @@ def measure_misalignment(
         seen = blocks.vertical(found)
         if len(seen.shift) < _FEWEST:
             return None
-        fit = fit_rows(seen)
+        fit = fit_rows(seen, found)
         reach = fit.lies.reach(*disparity.shape)
         step = fit.lies.times(_LONGEST_STEP / max(reach, _LONGEST_STEP))
         before, found = found, found + step
@@ -129,15 +146,15 @@ def measure_misalignment(
         if reach < _SMALL_STEP:
             break
     height, width = disparity.shape
-    support = column_support(seen, before, fit.spread, (height, width))
-    return Measured(found, fit.errors, len(seen.shift) / blocks.count, fit.spread, support)
+    evidence = column_evidence(seen, before, fit.spread, (height, width))
+    return Measured(found, fit.errors, len(seen.shift) / blocks.count, fit.spread, evidence)
 
 
 def textured_share(view: View) -> float:
     """Return the share of a view's blocks that could tell a vertical disparity, were they matched."""
     if min(view.shape) < BLOCK:
         return 0.0
-    across, down = _gradients(_smooth(view))
+    across, down = _gradients(smoothed_at_pixels(_smooth(view)))
     along = block_means(across * across) + np.float32(_RIDGE)
     weight = block_means(down * down) - np.square(block_means(across * down)) / along
     return float(np.mean(weight > _LEAST))
@@ -186,7 +203,7 @@ class _Blocks:
     """The blocks of a pair; what does not change from round to round is computed once."""
 
     def __init__(self, texture: Texture, disparity: Floats, every: int = 1) -> None:
-        self._right = texture.right
+        self._right, self._shape = texture.right, texture.left.shape
         known = (disparity > 0).astype(np.float32)
         row, column = (np.arange(side // BLOCK) for side in known.shape)
         looked_at = (row[:, None] + 2 * column) % every == 0
@@ -209,11 +226,11 @@ class _Blocks:
     def vertical(self, at: Misalignment) -> SeenBlocks:
         """Return the vertical disparities that are left when the right view is levelled by `at`."""
         x, y = self._u - self._centre_x, self._y
-        u, v = seen_at(at, self._u, self._v, self._right.shape, self._near[:, None])
+        height, width = self._shape
+        u, v = seen_at(at, self._u, self._v, self._shape, self._near[:, None])
         if not len(u):
             return SeenBlocks(*(x[:, 0],) * 5)
-        height, width = self._right.shape
-        off = self._left - cv2.remap(self._right, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        off = self._left - grey_between(self._right, u, v)
         shift = np.einsum("ij,ij->i", self._shares.share, off)
         self._along = np.einsum("ij,ij->i", self._shares.along, off)
         weight, mean_x, mean_y = (each.copy() for each in self._shares[3:])

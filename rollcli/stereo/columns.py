@@ -8,8 +8,7 @@ q y^2.
 
 import numpy as np
 
-from rollcli.stereo.misalignment import Misalignment
-from rollcli.stereo.row_fit import NOTHING_KNOWN, ColumnSupport
+from rollcli.stereo.misalignment import NOTHING_KNOWN, ColumnSupport, Misalignment
 from rollcli.stereo.views import Map
 
 

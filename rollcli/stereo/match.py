@@ -23,11 +23,10 @@ from rollcli.stereo.alignment import (
 from rollcli.stereo.columns import with_believed_columns
 from rollcli.stereo.correction import CONTRADICTS
 from rollcli.stereo.first_look import FirstLook, first_look, look_for_range
-from rollcli.stereo.misalignment import LEVEL, Misalignment
+from rollcli.stereo.misalignment import LEVEL, NOTHING_KNOWN, Misalignment
 from rollcli.stereo.misalignment_words import NOT_LEVELLED, NOT_TOLD_BY_ROWS, TOO_LITTLE
 from rollcli.stereo.options import StereoOptions as StereoOptions
 from rollcli.stereo.refinement import refined
-from rollcli.stereo.row_fit import NOTHING_KNOWN
 from rollcli.stereo.sgbm import ALL_ROWS, NARROWEST, match_rows, usable_range, without_lag
 from rollcli.stereo.views import Map, Views, prepare_views
 
@@ -270,15 +269,17 @@ def match_pair(
 
     above = _rows_above(look, wanted, height) if first >= 0 else 0
     of_these = partial(match, above=above)
+    given = None
     if small is None:
-        corrected, measured, doubt = options.given_alignment(width), None, ""
+        corrected, given = options.given_alignment(width)
+        measured, doubt = None, ""
         matched = of_these(corrected, wanted.rows)
         if options.checks_alignment:
             measured = SmallViews(views).measure(matched, corrected)
             doubt = "" if measured is None or _agrees(measured, corrected, views[0].shape) else CONTRADICTS
     else:
         matched, corrected, measured, doubt = _match_levelled(of_these, wanted.rows, small, look, first < 0)
-    support = NOTHING_KNOWN if measured is None or corrected == LEVEL else measured.support
+    support = NOTHING_KNOWN if measured is None or corrected == LEVEL else given or measured.support
     if support.error > _OPEN_COLUMNS and not doubt:
         doubt = NOT_TOLD_BY_ROWS
 
@@ -330,7 +331,7 @@ def _look_as_given(views: Views, options: StereoOptions) -> FirstLook:
     """Look at views that lie as the user says, where their range is not given."""
     if options.num_disparities is not None:
         return FirstLook(None, None)
-    return look_for_range((views[0], level(views[1], options.given_alignment(views[0].shape[1]))))
+    return look_for_range((views[0], level(views[1], options.given_alignment(views[0].shape[1])[0])))
 
 
 def _match_levelled(

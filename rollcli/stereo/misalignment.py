@@ -1,4 +1,4 @@
-"""How the right view of a pair lies against the left one; import-light, since run records read it too."""
+"""How the right view of a pair lies against the left one; and what of it is in its columns; import-light."""
 
 import math
 from collections.abc import Sequence
@@ -117,3 +117,30 @@ class Misalignment:
 
 
 LEVEL = Misalignment()
+
+
+@dataclass(frozen=True)
+class ColumnSupport:
+    """What is believed of how the columns lie: a point (x, y) lies ``x (scale + twist x + pitch y)`` further.
+
+    Attributes
+    ----------
+    scale : float
+        Share.
+    twist, pitch : float
+        Of a yaw and of a pitch, 1/pixels.
+    error : float
+        Standard deviation of the slope along the rows that this leaves on the road, px per px.
+    """
+
+    scale: float
+    twist: float
+    pitch: float
+    error: float
+
+    def resized(self, factor: float) -> "ColumnSupport":
+        """Return the same of views `factor` times as large."""
+        return ColumnSupport(self.scale, self.twist / factor, self.pitch / factor, self.error)
+
+
+NOTHING_KNOWN = ColumnSupport(0.0, 0.0, 0.0, 0.0)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from rollcli.errors import UsageError
 from rollcli.stereo.correction import read_correction
-from rollcli.stereo.misalignment import Misalignment
+from rollcli.stereo.misalignment import ColumnSupport, Misalignment
 
 MODES = ("sgbm", "hh", "3way")
 ALIGN = ("auto", "off")
@@ -75,12 +75,13 @@ class StereoOptions:
         if self.align not in ALIGN:
             read_correction(self.align)
 
-    def given_alignment(self, width: int) -> Misalignment:
-        """Return how the right view lies as the user says, of views so wide."""
+    def given_alignment(self, width: int) -> tuple[Misalignment, ColumnSupport | None]:
+        """Return how the right view lies as the user says, of views so wide; its columns if a file tells."""
         if self.vertical_offset is not None or self.align in ALIGN:
-            return Misalignment(self.vertical_offset or 0.0)
-        lies, of_width = read_correction(self.align)
-        return lies.resized(width / of_width)
+            return Misalignment(self.vertical_offset or 0.0), None
+        lies, columns, of_width = read_correction(self.align)
+        factor = width / of_width
+        return lies.resized(factor), columns and columns.resized(factor)
 
     @property
     def checks_alignment(self) -> bool:

@@ -31,6 +31,7 @@ _RIDGE = 0.5
 _ROUNDS = 2  # a weak block goes about half of the way in one; a third changes no angle any more
 # Where the right view is not quite as it was levelled for the match: roads matched with 0.1 degrees left are
 # then 0.010 degrees wrong (95 %: 0.043), after two rounds 0.021 (0.063)
+# Between rows, linear interpolation turned enlarged and turned views by 0.013 degrees, cubic by 0.003
 _ROUNDS_LEVELLED = 4
 _LONGEST_STEP = 0.5  # px
 _TOGETHER = 1 << 17  # pixels shifted at a time: what they need stays in the processor's cache
@@ -129,8 +130,9 @@ def _found(
     weight /= (np.einsum("ij,ij->i", weight, weight) + np.float32(_RIDGE * BLOCK**2))[:, None]
     weight *= (1 - across)[:, None]  # the right view is that much less stretched than the left one
     shift: Floats = none
-    for _ in range(_ROUNDS if lies == LEVEL else _ROUNDS_LEVELLED):
-        off = cv2.remap(right, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE) - grey
+    rounds, between = (_ROUNDS, cv2.INTER_LINEAR) if lies == LEVEL else (_ROUNDS_LEVELLED, cv2.INTER_CUBIC)
+    for _ in range(rounds):
+        off = cv2.remap(right, u, v, between, borderMode=cv2.BORDER_REPLICATE) - grey
         step = np.clip(np.einsum("ij,ij->i", weight, off), -_LONGEST_STEP, _LONGEST_STEP)
         u -= step[:, None]
         shift += step

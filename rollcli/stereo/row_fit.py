@@ -7,14 +7,15 @@ leaves bends them. A scale shows at every depth, in the upper and in the lower h
 of the field is even. How well each of them explains the blocks decides what the columns get.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.stereo.misalignment import Misalignment
+from rollcli.stereo.misalignment import LEVEL, ColumnSupport, Misalignment
 
 Doubles = NDArray[np.float64]
 
@@ -24,6 +25,7 @@ _TUNING = 1.5  # standard deviations off, a block counts a quarter
 _TILE = 64.0  # px of the size measured at: blocks within it err together
 _LINEAR = (0, 1, 2, 3)  # offset, rotation, scale, twist
 _SURE = 4.0  # standard errors: a tilt or a curve of less is none. Plain roads cannot tell it from a scale
+_FEWEST_TILES = 16  # of fewer, as of a first look, the sums tell no variance
 _EXACT = 1e-9  # px^2 times a weight: views without noise are known no better
 _FOCAL = 0.7  # widths: of most rigs
 _ROAD_ACROSS, _ROAD_DOWN = 0.13, 0.4  # of the height, from the centre: where a twist and a pitch turn a road
@@ -47,8 +49,8 @@ class BeliefTuning:
         Standard deviations of a yaw, and of the yaw that rows which are skewed alone seem to be, radians. On
         KITTI's grey cameras 1.4 px in the corners look like 0.5 degrees, and lidar sees nothing of it in the
         columns.
-    has_skew : float
-        How often rows are skewed alone.
+    has_yaw, has_skew : float
+        How often there is a yaw, and how often rows are skewed alone.
     lens_shape, no_shape : float
         Shapes of second and third degree at the border of what was seen, px, standard deviations: of rows
         that a lens has skewed alone (KITTI's grey cameras: 0.11 along x²), and of others (rendered: 0.02).
@@ -56,11 +58,11 @@ class BeliefTuning:
         The same as the interval has it. Where the rows cannot tell two causes apart, it reaches both of them;
         a quarter makes twice the standard deviation of a scale all of it.
     least : float
-        What no pair tells of a scale: blocks between which it lies share a part of their error.
+        What no pair tells of a scale or, in px at the border, of a twist: blocks share a part of their error.
     tiles : float
         Standard errors from tiles are too small by this: scales of consecutive streets scatter so. With 3,
-        pairs with lidar are off by -0.06 degrees in place of -0.03, and enlarged rendered ones by 0.086 at
-        most in place of 0.119.
+        pairs with lidar are off by -0.05 degrees in place of -0.02; with 1, one of 60 warped rendered roads
+        by 0.1 degrees and more in place of none.
     """
 
     scale: float = 0.004
@@ -73,6 +75,7 @@ class BeliefTuning:
     focal: tuple[float, ...] = (0.5, 0.6, 0.75, 1.0, 1.5)
     yaw: float = 0.0035
     skew: float = 0.01
+    has_yaw: float = 0.5
     has_skew: float = 0.1
     lens_shape: float = 0.1
     no_shape: float = 0.02
@@ -87,31 +90,68 @@ class BeliefTuning:
 BELIEF = BeliefTuning()
 
 
-@dataclass(frozen=True)
-class ColumnSupport:
-    """What is believed of how the columns lie: a point (x, y) lies ``x (scale + twist x + pitch y)`` further.
+@dataclass(frozen=True, eq=False)
+class ColumnEvidence:
+    """What the rows of a pair say of the columns, before what is known of rigs; px of the size measured at.
 
     Attributes
     ----------
-    scale : float
-        Share.
-    twist, pitch : float
-        Of a yaw and of a pitch, 1/pixels.
-    error : float
-        Standard deviation of the slope along the rows that this leaves on the road, px per px.
+    information : ndarray, shape (4, 4)
+        Of scale, tilt, bend and curve: inverse covariance of what the blocks tell, the rest being free.
+    told : ndarray, shape (4,)
+        The same, times their values.
+    offset, twist : float
+        As in a misalignment: px, 1/pixels.
+    twist_variance : float
+    unevenness : float
+        Variance of what the lens leaves at the border, px^2.
+    shapes, shape_variances : ndarray, shape (4,)
+        Of second and third degree at the border, px, px^2.
+    reach : ndarray, shape (2,)
+        How far from the centre blocks were seen, along the rows and down the columns, px.
+    shape : tuple of int
+        Height and width of the view.
+    factor : float
+        How many times larger the views are of which this is asked.
     """
 
-    scale: float
+    information: Doubles
+    told: Doubles
+    offset: float
     twist: float
-    pitch: float
-    error: float
+    twist_variance: float
+    unevenness: float
+    shapes: Doubles
+    shape_variances: Doubles
+    reach: Doubles
+    shape: tuple[int, int]
+    factor: float = 1.0
 
-    def resized(self, factor: float) -> "ColumnSupport":
-        """Return the same of views `factor` times as large."""
-        return ColumnSupport(self.scale, self.twist / factor, self.pitch / factor, self.error)
+    def resized(self, factor: float) -> "ColumnEvidence":
+        """Return what this says of views `factor` times as large."""
+        return replace(self, factor=factor * self.factor)
 
+    @staticmethod
+    def of_drive(pairs: "Sequence[ColumnEvidence]") -> "ColumnEvidence":
+        """Return what pairs of one rig say together: how its cameras lie is the same in all of them.
 
-NOTHING_KNOWN = ColumnSupport(0.0, 0.0, 0.0, 0.0)
+        Noise is each pair's own; what the lens leaves is shared by all.
+        """
+        sure = 1 / np.array([each.twist_variance for each in pairs])
+        sures = 1 / np.array([each.shape_variances for each in pairs])
+        return ColumnEvidence(
+            information=np.sum([each.information for each in pairs], axis=0),
+            told=np.sum([each.told for each in pairs], axis=0),
+            offset=float(np.mean([each.offset for each in pairs])),
+            twist=float(np.average([each.twist for each in pairs], weights=sure)),
+            twist_variance=float(1 / sure.sum()),
+            unevenness=float(np.mean([each.unevenness for each in pairs])),
+            shapes=np.average([each.shapes for each in pairs], axis=0, weights=sures),
+            shape_variances=np.mean([each.shape_variances for each in pairs], axis=0),
+            reach=np.mean([each.reach for each in pairs], axis=0),
+            shape=pairs[0].shape,
+            factor=pairs[0].factor,
+        )
 
 
 class SeenBlocks(NamedTuple):
@@ -144,13 +184,14 @@ class RowFit(NamedTuple):
     spread: float
 
 
-def fit_rows(seen: SeenBlocks) -> RowFit:
-    """Fit offset, rotation, scale and twist, and a tilt and a curve where they are sure.
+def fit_rows(seen: SeenBlocks, at: Misalignment = LEVEL) -> RowFit:
+    """Fit offset, rotation, scale and twist, and a tilt and a curve where they are sure or begun with.
 
     Parameters
     ----------
     seen : SeenBlocks
-        40 of them or more.
+        40 of them or more; what is left of the right view that was levelled by `at`.
+    at : Misalignment
     """
     frame = _Frame.of(seen)
     design = frame.design(seen)
@@ -162,9 +203,9 @@ def fit_rows(seen: SeenBlocks) -> RowFit:
     # a plain road's tilt or curve and its scale could cancel each other
     held[4:] = variance / np.square([BELIEF.tilt * frame.near, BELIEF.bend * frame.half_height])
     wide = _least_squares(design[:6], shift, fit.weight, held)
-    used += [
-        each for each in (4, 5) if wide.values[each] ** 2 > _SURE**2 * variance * wide.inverse[each, each]
-    ]
+    told = np.square(wide.values) > _SURE**2 * variance * np.diag(wide.inverse)
+    told &= frame.tile.max() >= _FEWEST_TILES
+    used += [each for each in (4, 5) if told[each] or at.parts[each]]
     if len(used) > len(_LINEAR):
         fit = _robust(design[used], shift, fixed, held[used])
     errors = np.sqrt(np.square(fit.inverse @ (design[used] * fit.weight * fit.off)).sum(axis=1))
@@ -174,14 +215,13 @@ def fit_rows(seen: SeenBlocks) -> RowFit:
     return RowFit(lies, errors_of, fit.spread)
 
 
-def column_support(
+def column_evidence(
     seen: SeenBlocks, at: Misalignment, spread: float, shape: tuple[int, int]
-) -> ColumnSupport:
-    """Tell what of a scale, a twist and an offset is believed to be in the columns, too.
+) -> ColumnEvidence:
+    """Work out what the rows of a pair say of its columns.
 
-    Every choice of scale, tilt, bend and pitch explains the blocks, with what is known of rigs; the answer is
-    the mean over them, each as likely as it explains what was seen. What else curves the field (four shapes
-    of second and third degree) tells how evenly the lens has left the rest.
+    What else curves the field (four shapes of second and third degree) tells how evenly the lens has left the
+    rest.
 
     Parameters
     ----------
@@ -204,27 +244,50 @@ def column_support(
     )
     x, y, near = frame.half_width, frame.half_height, frame.near
     beyond = np.square(whole.values[7:]) - variance * np.diag(whole.inverse)[7:]
-    uneven = max(0.0, float(beyond.mean()))
-    lens = uneven + (BELIEF.least * y) ** 2
     units = np.array([1, x, y, x * y, near, y * y, y])[:, None]
     by_units = design[:7] * units
     told, other = np.array([2, 4, 6, 5]), np.array([0, 1, 3])
     normal, right = (by_units * weight) @ by_units.T / variance, (by_units * weight) @ shift / variance
     through = normal[np.ix_(told, other)] @ np.linalg.inv(normal[np.ix_(other, other)])
     information = normal[np.ix_(told, told)] - through @ normal[np.ix_(other, told)]
-    height, width = shape
-    scale, pitch = _mean_over_causes(
-        information,
-        right[told] - through @ right[other],
-        np.array([lens / y**2, 0, 0, lens / y**4]),
-        fit.values[0] / np.square(np.array(BELIEF.focal) * width),
+    return ColumnEvidence(
+        information=information,
+        told=right[told] - through @ right[other],
+        offset=float(fit.values[0]),
+        twist=float(fit.values[3] / (x * y)),
+        twist_variance=float(variance * fit.inverse[3, 3] / (x * y) ** 2),
+        unevenness=max(0.0, float(beyond.mean())),
+        shapes=whole.values[7:],
+        shape_variances=variance / BELIEF.tiles**2 * np.diag(whole.inverse)[7:],
+        reach=np.array([x, y]),
+        shape=shape,
     )
-    own_error = (uneven + variance * fit.inverse[3, 3]) / (x * y) ** 2
+
+
+def column_support(seen: ColumnEvidence) -> ColumnSupport:
+    """Tell what of a scale, a twist and an offset is believed to be in the columns, too.
+
+    Every choice of scale, tilt, bend and pitch explains the blocks, with what is known of rigs; the answer is
+    the mean over them, each as likely as it explains what was seen.
+    """
+    (x, y), (height, width) = seen.reach, seen.shape
+    lens = seen.unevenness + (BELIEF.least * y) ** 2
+    scale, pitch = _mean_over_causes(
+        seen.information,
+        seen.told,
+        np.array([lens / y**2, 0, 0, lens / y**4]),
+        seen.offset / np.square(np.array(BELIEF.focal) * width),
+    )
     yaw, skew = np.square(np.array([BELIEF.yaw, BELIEF.skew]) / (_FOCAL * width))
-    uneven_by_lens = _lens_ratio(whole.values[7:], variance / BELIEF.tiles**2 * np.diag(whole.inverse)[7:])
-    twist, twist_error = _yaw_of_twist(fit.values[3] / (x * y), own_error, yaw, skew, uneven_by_lens)
+    twist, twist_error = _yaw_of_twist(
+        seen.twist,
+        lens / (x * y) ** 2 + seen.twist_variance,
+        yaw,
+        skew,
+        _lens_ratio(seen.shapes, seen.shape_variances),
+    )
     parts = scale[1], 2 * twist_error * height * _ROAD_ACROSS, pitch[1] * height * _ROAD_DOWN
-    return ColumnSupport(scale[0], twist, pitch[0], float(np.linalg.norm(parts)))
+    return ColumnSupport(scale[0], twist, pitch[0], float(np.linalg.norm(parts))).resized(seen.factor)
 
 
 def _lens_ratio(shapes: Doubles, variances: Doubles) -> float:
@@ -248,14 +311,16 @@ def _yaw_of_twist(twist: float, error: float, yaw: float, skew: float, ratio: fl
         How many times likelier the rest of the field makes it that the rows alone are skewed.
     """
     other = np.array([error, error + skew])
-    whole = yaw + other
+    yaws = np.array([[0.0], [yaw]])
+    whole = yaws + other
     density = np.exp(-(twist**2) / (2 * whole)) / np.sqrt(whole)
-    values, variances = twist * yaw / whole, yaw * other / whole
-    often = np.array([1 - BELIEF.has_skew, BELIEF.has_skew * ratio]) * density
+    density *= np.array([[1 - BELIEF.has_yaw], [BELIEF.has_yaw]])
+    values, variances = twist * yaws / whole, yaws * other / whole
+    often = density * [1 - BELIEF.has_skew, BELIEF.has_skew * ratio]
     # rows may be skewed with no other shape: that there is none narrows no interval
-    often_doubted = np.array([1 - BELIEF.may_skew, BELIEF.may_skew * max(1.0, ratio)]) * density
-    mean = float(often @ values / often.sum())
-    variance = often_doubted @ (np.square(values - mean) + variances) / often_doubted.sum()
+    often_doubted = density * [1 - BELIEF.may_skew, BELIEF.may_skew * max(1.0, ratio)]
+    mean = float((often * values).sum() / often.sum())
+    variance = (often_doubted * (np.square(values - mean) + variances)).sum() / often_doubted.sum()
     return mean, float(np.sqrt(variance))
 
 

@@ -4,13 +4,15 @@ python tests/benchmarks/bench_kill.py [--count 1000] [--frames 60] [--seed 0] [K
 
 A disturbance counts when it has met a living run. A finding is another status than the documented ones, a
 traceback or an internal error, a process that outlives its run, a second run that is let in, or, at the end
-of a trial, another byte in the result, its record or the images. What ends a run while Python itself still
-starts is none: then the signal ends it, or a KeyboardInterrupt in modules of Python's. Linux alone: it looks
-into /proc.
+of a trial, another byte in the result, its record or the images. Trials read a folder of maps, or a bag (with
+the extra), or update a whole result of a folder in which maps have changed, were added and have gone. What
+ends a run while Python itself still starts is none: then the signal does, or a KeyboardInterrupt in modules
+of Python's. Linux alone: it looks into /proc.
 """
 
 import argparse
 import contextlib
+import itertools
 import os
 import pty
 import random
@@ -24,15 +26,17 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from fcntl import ioctl
+from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
-from tests.run_cli import command, contents, environment, write_maps
+from tests.run_cli import command, contents, environment, road_map, rollcli, write_kitti, write_maps
 
-RESULTS = ("rolls.csv", "rolls.jsonl", "rolls.parquet")
+RESULTS = ("rolls.csv", "rolls.jsonl")
+IN_PARTS = "rolls.parquet"
 PARTS = ("--part-rows", "4")  # so that workers write some, and others write pieces of one
 IMAGES = ("--derotated", "up", "--vdisparity", "v", "--road-mask", "road")
 STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -49,6 +53,14 @@ def _in_front_of(messages: str) -> None:
         ioctl(2, termios.TIOCSCTTY, 0)
 
 
+class Task(NamedTuple):
+    """What runs are asked for: what they read, how they begin, and what is there before them."""
+
+    inputs: str
+    flag: str = "--resume"
+    before: Path | None = None
+
+
 class Run:
     """A run in a session of its own, which writes a result and three images a frame into the folder.
 
@@ -57,13 +69,14 @@ class Run:
     folder : Path
     result : str
     jobs : int
+    task : Task
     messages : str
         Where they go: `file`, `pipe` or `terminal`.
     """
 
-    def __init__(self, folder: Path, result: str, jobs: int, messages: str = "file") -> None:
-        self.folder, self.result, self.jobs = folder, result, jobs
-        self.reader = -1
+    def __init__(self, folder: Path, result: str, jobs: int, task: Task, messages: str = "file") -> None:
+        self.folder, self.result, self.jobs, self.task = folder, result, jobs, task
+        self.reader, self._began = -1, time.time_ns()
         self._said = folder.with_suffix(".messages")
         self._said.unlink(missing_ok=True)  # those of another run
         if messages == "file":
@@ -72,9 +85,11 @@ class Run:
             self.reader, writer = os.pipe()
         else:
             self.reader, writer = pty.openpty()
-        parts = PARTS if result.endswith(".parquet") else ()
+        parts = PARTS if result == IN_PARTS else ()
         self.process = subprocess.Popen(
-            command("estimate", "../maps", "-v", "-o", result, "-j", str(jobs), "--resume", *IMAGES, *parts),
+            command(
+                *("estimate", task.inputs, "-v", "-o", result, "-j", str(jobs), task.flag, *IMAGES, *parts)
+            ),
             cwd=folder,
             env=environment(),
             stdout=subprocess.DEVNULL,
@@ -113,14 +128,15 @@ class Run:
 
     def goes_on(self, images: int) -> bool:
         """Wait until it has made so many images more than were there; whether it still runs then."""
-        wanted = images + self._images()
-        while self.process.poll() is None and self._images() < wanted:
+        while self.process.poll() is None and self._images() < images:
             time.sleep(0.002)
         return self.process.poll() is None
 
     def _images(self) -> int:
-        folder = self.folder / IMAGES[1]
-        return sum(1 for _ in folder.iterdir()) if folder.exists() else 0
+        made = Path(self.folder / IMAGES[1]).glob("*.png")
+        with contextlib.suppress(OSError):  # one was replaced
+            return sum(each.stat().st_mtime_ns > self._began for each in made)
+        return 0
 
     def leave(self) -> None:
         """Close the end where its messages are read."""
@@ -179,7 +195,7 @@ def second_run(run: Run, chance: random.Random) -> str:
     """Stop it, and start a second run on its result, which has to be refused once the first one holds it."""
     run.send_all(signal.SIGSTOP)
     held = f" {run.process.pid} " in Path("/proc/locks").read_text()
-    second = Run(run.folder, run.result, run.jobs, "pipe") if held else None
+    second = Run(run.folder, run.result, run.jobs, run.task, "pipe") if held else None
     status, said = second.end() if second else (2, "another run")
     run.send_all(signal.SIGCONT)
     return "" if status == 2 and "another run" in said else f"a second run ended with {status}: {said[-300:]}"
@@ -224,10 +240,10 @@ KINDS = {
 }
 
 
-def disturbed(folder: Path, result: str, jobs: int, name: str, chance: random.Random):
+def disturbed(folder: Path, result: str, jobs: int, task: Task, name: str, chance: random.Random):
     """Disturb one run; whether it met it alive, and early, whether the work is done, and what was found."""
     kind = KINDS[name]
-    run = Run(folder, result, jobs, kind.messages)
+    run = Run(folder, result, jobs, task, kind.messages)
     if chance.random() < STARTING:
         time.sleep(chance.uniform(0, START_S))
     elif run.goes_on(chance.randint(0, MOST_IMAGES)):
@@ -252,6 +268,35 @@ def disturbed(folder: Path, result: str, jobs: int, name: str, chance: random.Ra
     return met, early, status == 0, found
 
 
+def make_tasks(folder: Path, frames: int) -> list[Task]:
+    """Make what the tasks read."""
+    write_maps(folder / "maps", frames)
+    tasks = [Task("../maps"), Task("../grown", "--update", folder / "earlier")]
+    write_maps(folder / "grown", frames)
+    (folder / "earlier").mkdir()
+    for result in RESULTS:
+        line = ("estimate", "../grown", "-o", result, *IMAGES, "--overwrite")
+        assert rollcli(*line, cwd=folder / "earlier").status == 0
+    for number in range(0, frames, 3):
+        write_kitti(folder / "grown" / f"frame{number}.png", road_map(0.2, seed=1000 + number))
+    for number in range(1, frames, 4):
+        write_kitti(folder / "grown" / f"frame{number}a.png", road_map(0.1, seed=2000 + number))
+    for number in range(2, frames, 6):
+        (folder / "grown" / f"frame{number}.png").unlink()
+    if find_spec("rosbags") is None:
+        print("without bags: the extra bags is not here")
+        return tasks
+    from tests.files.recordings.bag_files import disparity_image, write_bag
+
+    def messages(store):
+        for number in range(frames):
+            values = road_map(0.01 * (number % 40), seed=number)
+            yield "/disparity", number, disparity_image(store, values, number + 1)
+
+    write_bag(folder, "run", "mcap", messages)
+    return [*tasks, Task("../run.mcap")]
+
+
 def main() -> None:
     """Print a line for each finding and each ten trials, and how often each kind met a run."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
@@ -265,31 +310,36 @@ def main() -> None:
     trials, same, findings, early_ones = 0, 0, 0, 0
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        write_maps(folder / "maps", given.frames)
-        expected = {}
-        for result in RESULTS:
-            (folder / f"undisturbed-{result}").mkdir()
-            Run(folder / f"undisturbed-{result}", result, 2).end()
-            expected[result] = contents(folder / f"undisturbed-{result}")
+        tasks, expected = make_tasks(folder, given.frames), {}
+        pairs = [(tasks[0], IN_PARTS), *itertools.product(tasks, RESULTS)]
+        for number, (task, result) in enumerate(pairs):
+            undisturbed = folder / f"undisturbed{number}"
+            undisturbed.mkdir()
+            Run(undisturbed, result, 2, task._replace(flag="--overwrite")).end()
+            before = contents(task.before) if task.before else {}
+            expected[task, result] = before | contents(undisturbed)
         while counts.total() < given.count:
-            result, jobs = RESULTS[trials // 2 % len(RESULTS)], 1 + trials % 2
+            (task, result), jobs = pairs[trials // 2 % len(pairs)], 1 + trials % 2
             trial = folder / f"trial{trials}"
-            trial.mkdir()
+            if task.before:
+                shutil.copytree(task.before, trial)
+            else:
+                trial.mkdir()
             done = False
             while not done:
                 kind = chance.choice([each for each in kinds if jobs in KINDS[each].jobs])
-                met, early, done, found = disturbed(trial, result, jobs, kind, chance)
+                met, early, done, found = disturbed(trial, result, jobs, task, kind, chance)
                 counts[kind] += met
                 early_ones += met and early
                 if found:
                     findings += 1
-                    print(f"FOUND by {kind}, -j{jobs}, {result}: {found}", flush=True)
+                    print(f"FOUND by {kind}, -j{jobs}, {result}, {task.inputs}: {found}", flush=True)
             trials += 1
-            if contents(trial) == expected[result]:
+            if contents(trial) == expected[task, result]:
                 same += 1
                 shutil.rmtree(trial)
             else:
-                print(f"DIFFERENT bytes, -j{jobs}, {result}, after {kind}", flush=True)
+                print(f"DIFFERENT bytes, -j{jobs}, {result}, {task.inputs}, after {kind}", flush=True)
             if trials % 10 == 0:
                 said = ", ".join(f"{kind} {counts[kind]}" for kind in kinds)
                 print(f"{counts.total()} ({said}); {same} of {trials} trials the same", flush=True)

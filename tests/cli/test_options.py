@@ -6,14 +6,11 @@ import math
 import click
 import pytest
 
-from rollcli.cli.main import COMMANDS, main
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.files.results import FURTHER, columns
 from rollcli.run.options import MethodOptions
-from tests.readme_tables import OPTIONS_PAGE, commands
+from tests.readme_tables import commands
 from tests.run_cli import ROOT
-
-ESTIMATE = main.get_command(click.Context(main), "estimate")
 
 
 def test_the_defaults_of_the_method_are_those_of_the_library():
@@ -23,22 +20,6 @@ def test_the_defaults_of_the_method_are_those_of_the_library():
         assert getattr(given, name) == library[name]
     assert math.radians(given.tolerance_deg) == pytest.approx(library["tolerance"])
     assert math.radians(given.max_roll_deg) == pytest.approx(library["max_roll"])
-
-
-@pytest.mark.parametrize("param", ESTIMATE.params, ids=lambda param: param.name)
-def test_every_option_has_a_help_text(param):
-    assert isinstance(param, click.Argument) or param.help
-
-
-@pytest.mark.parametrize("name", COMMANDS)
-def test_every_command_that_is_there_has_a_line_of_help(name):
-    assert COMMANDS[name][1].endswith(".")
-
-
-def test_every_option_is_on_the_page_of_options():
-    readme = OPTIONS_PAGE.read_text("utf-8")
-    flags = [flag for param in ESTIMATE.params if isinstance(param, click.Option) for flag in param.opts]
-    assert [flag for flag in flags if f"`{flag}`" not in readme and f"`{flag} " not in readme] == []
 
 
 def test_every_column_and_exit_status_is_documented_in_the_readme():

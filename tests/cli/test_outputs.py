@@ -104,6 +104,7 @@ def test_a_dry_run_lists_what_is_read_and_written_and_does_nothing(maps):
         "read  maps/frame1.png",
         "write v/frame1.png",
         "write rolls.csv",
+        "write rolls.csv.inputs",
         "write rolls.csv.run.json",
     ]
     assert contents(maps) == before

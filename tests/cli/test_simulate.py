@@ -115,13 +115,6 @@ def test_a_folder_that_cannot_be_written_is_status_1(tmp_path):
     assert (done.status, done.err.count("\n")) == (1, 1)
 
 
-def test_help_loads_neither_numpy_nor_opencv(tmp_path):
-    done = rollcli("simulate", "--help", cwd=tmp_path, PYTHONPROFILEIMPORTTIME="1")
-    loaded = {line.rpartition("|")[2].strip() for line in done.err.splitlines()}
-    assert done.status == 0
-    assert not loaded & {"numpy", "cv2", "tqdm"}
-
-
 def test_disparities_too_large_for_the_file_are_told(tmp_path):
     near = ("--height", "0.2", "--baseline", "2", "--roll", "0", "--frames", "1", "--size", "64x48")
     done = rollcli("simulate", "rig", *near, "-j1", cwd=tmp_path)

@@ -71,7 +71,8 @@ def test_a_url_that_names_no_file_is_that_frames_error_and_writes_nothing(tmp_pa
     rows = {each["file"]: each for each in rows_of(cwd / "rolls.csv")}
     assert "names no file below a folder" in rows[maps[0]]["message"]
     assert rows[maps[1]]["status"] == "ok"
-    assert written(cwd) == ["rolls.csv", "rolls.csv.run.json", "up/good.png", "v/good.png"]
+    results = ["rolls.csv", "rolls.csv.inputs", "rolls.csv.run.json"]
+    assert written(cwd) == [*results, "up/good.png", "v/good.png"]
     assert written(tmp_path / "map") == ["frame0.png"]
 
 

@@ -1,12 +1,13 @@
 """What the charts hold."""
 
 import html
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from rollcli.report.charts import chart_over_frames, histogram, outside, view
-from rollcli.report.summary import degrees, option_lines, summarize, with_interval
+from rollcli.report.charts import all_charts, chart_over_frames, histogram, outside, view
+from rollcli.report.summary import degrees, option_lines, with_interval
 from rollcli.rig.drive.assess import assess_rig
 from tests.report.results import row
 
@@ -21,8 +22,12 @@ ROWS = [
 ]
 
 
+def traces_of(chart):
+    return {trace["name"]: trace for trace in chart.data}
+
+
 def traces(rows):
-    return {trace["name"]: trace for trace in chart_over_frames(rows).data}
+    return traces_of(chart_over_frames(rows))
 
 
 def test_the_line_breaks_where_frames_have_failed_and_leaves_suspect_ones_to_their_marks():
@@ -137,18 +142,6 @@ def test_the_legend_names_what_is_there_even_if_it_is_one_thing(rows, named):
     assert "dtick" not in chart_over_frames(rows * 100).layout["xaxis"]
 
 
-def test_the_summary_counts_and_takes_the_median():
-    summary = summarize(ROWS)
-    assert summary.counts == {"ok": 5, "suspect": 1, "error": 1}
-    assert (summary.frames, summary.median, summary.extremes, summary.half_width) == (
-        7,
-        0.75,
-        (-1.0, 2.0),
-        0.2,
-    )
-    assert summarize([row("a.png", None)]).median is None
-
-
 @pytest.mark.parametrize(
     ("angle", "text"), [(1.234, "+1.23°"), (-1.235, "−1.24°"), (-0.001, "0.00°"), (0.0, "0.00°"), (None, "–")]
 )
@@ -191,35 +184,49 @@ def test_a_long_run_has_a_line_without_dots_and_a_dot_for_each_frame_that_stands
     assert traces(rows[:400])["roll"]["mode"] == "lines+markers"
 
 
-def test_what_is_measured_stands_out_from_what_is_said_of_it():
-    rows = drive_rows("run", 0.2, jump=0.8)
-    rows[50] = row("run/50.png", 9.0, 1.0, "suspect")
-    rows[60] = row("run/60.png", None)
-    chart = chart_over_frames(rows, rig=assess_rig(rows))
-    shown = {trace["name"]: trace for trace in chart.data}
-    width = {name: trace["line"]["width"] for name, trace in shown.items() if "line" in trace}
-    assert width["mounting, 95 %"] == 0  # an area alone
-    assert width["95 % interval"] < width["roll"] == width["jump"] < width["mounting"]
-    assert (
-        shown["suspect"]["error_y"]["thickness"] < width["roll"] < shown["failed"]["marker"]["line"]["width"]
-    )
-    alone = traces([row("a.png"), row("b.png", 9.0, 1.0, "suspect")] * 201)["roll, alone"]
-    assert width["roll"] < alone["marker"]["size"] < 2 * width["roll"]
-    assert not alone["showlegend"]
-    # the nearest frame is told, however far it is; failed frames have a scale of their own, which stays
-    assert (chart.layout["hovermode"], chart.layout["hoverdistance"]) == ("closest", -1)
-    scale = chart.layout["yaxis2"]
-    assert (scale["range"], scale["visible"], scale["fixedrange"]) == ([0, 1], False, True)
-    assert not chart.layout["xaxis"]["zeroline"]
-
-
-def test_the_band_is_told_to_a_ten_thousandth():
-    band = traces([row("a.png", 1.000051, 0.1)])["95 % interval"]
-    assert band["y"] == [1.1001, 0.9001, None]
-
-
 def test_no_line_leads_from_one_drive_to_another():
     rows = [*drive_rows("monday", 0.2, 30), *drive_rows("tuesday", 0.2, 30)]
     shown = {trace["name"]: trace for trace in chart_over_frames(rows, rig=assess_rig(rows)).data}
     assert shown["roll"]["x"] == [*range(1, 31), None, *range(31, 61), None]
     assert shown["mounting"]["x"] == [1, 30, None, 31, 60, None]
+
+
+def posed(name, pitch, half_width, height=None, status="ok"):
+    return replace(row(name, 1.0, 0.1, status), pitch_deg=pitch, pitch_ci95_deg=half_width, height_m=height)
+
+
+def pose_charts(rows, rig=None):
+    return [chart for name, chart in all_charts(rows, rig).items() if name in ("pitch", "height")]
+
+
+def test_a_pitch_without_a_height_is_one_chart():
+    assert [chart.name for chart in pose_charts([posed("a.png", 3.0, 0.1), posed("b.png", 3.2, None)])] == [
+        "pitch"
+    ]
+    both = pose_charts([posed("a.png", 3.0, 0.1, 1.6)])
+    assert [chart.name for chart in both] == ["pitch", "height"]
+    assert both[1].layout["yaxis"]["title"]["text"] == "height, m"
+
+
+def test_a_height_is_told_in_metres_with_as_many_decimals_as_its_interval_is_worth():
+    each = replace(row("a.png"), height_m=1.6543, height_ci95_m=0.004)
+    assert traces_of(pose_charts([each])[0])["height"]["customdata"][0] == "a.png<br>1.654 ± 0.004 m"
+
+
+def test_a_height_has_jumps_and_segments_and_no_line_leads_to_another_drive():
+    rng = np.random.default_rng(4)
+    rows = [
+        replace(posed(f"{folder}/{place}.png", 3.0, 0.05), height_m=1.5 + jump + noise, height_ci95_m=0.01)
+        for folder, jump in (("monday", 0.0), ("tuesday", 0.2))
+        for place, noise in enumerate(rng.normal(0, 0.01, 200))
+    ]
+    for place in range(300, 400):
+        rows[place] = replace(rows[place], height_m=rows[place].height_m + 0.1)
+    pitch, height = pose_charts(rows, assess_rig(rows))
+    shown = traces_of(height)
+    assert shown["mounting"]["x"] == [1, 200, None, 201, 300, None, 301, 400, None]
+    assert shown["mounting"]["y"][::3] == pytest.approx([1.5, 1.7, 1.8], abs=0.01)
+    assert shown["mounting"]["text"][0].startswith("mounting height 1.50")
+    assert shown["jump"]["x"] == [300.5, 300.5, None]
+    assert shown["height"]["x"][199:202] == [200, None, 201]
+    assert "jump" not in traces_of(pitch)

@@ -180,7 +180,7 @@ def test_on_a_page_a_chart_has_two_pictures_in_the_pages_colours_and_font(charts
 
 
 def test_the_style_sheet_holds_every_colour_of_both_modes():
-    light, dark = style_sheet().split("@media (prefers-color-scheme: dark)")
+    light, dark = style_sheet().split("@media screen and (prefers-color-scheme: dark)")
     for sheet, colours in ((light, LIGHT), (dark, DARK)):
         found = dict(re.findall(r"--([\w-]+): rgba(\([^)]+\));", sheet))
         assert found == {name: str((*rgb(name, colours), colours[name][1])) for name in colours}

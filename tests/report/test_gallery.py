@@ -2,7 +2,7 @@
 
 import pytest
 
-from rollcli.report.sources import SPREAD, SUSPECT, WIDEST, choose, spread
+from rollcli.report.sources import JUMP, SPREAD, SUSPECT, WIDEST, choose, spread
 from tests.report.results import row
 
 
@@ -27,6 +27,16 @@ def test_the_widest_then_suspect_ones_then_evenly_spread_ones():
 def test_a_frame_without_an_interval_is_not_one_of_the_widest():
     chosen = choose([row(f"{i}.png", width=None) for i in range(20)], 9)
     assert [each.reason for each in chosen] == [SPREAD] * 9
+
+
+def test_the_frames_around_a_jump_come_first():
+    rows = [row(f"{i}.png", None if i in (49, 51) else 1.0) for i in range(100)]
+    chosen = choose(rows, 12, [10, 50])
+    assert places(chosen, JUMP) == [9, 10, 48, 50]
+    assert len(chosen) == len({each.place for each in chosen}) == 12
+    assert places(choose(rows, 12, [0, 99]), JUMP) == [0, 98, 99]  # a drive may begin with one
+    assert places(choose(rows, 4, range(10, 90, 10)), JUMP) == [79, 80]  # others find room, too
+    assert places(choose(rows, 3, [50]), JUMP) == []
 
 
 def test_frames_without_an_angle_are_never_chosen():

@@ -94,7 +94,7 @@ def test_a_page_holds_everything_it_shows(folder):
     assert (done.status, done.out) == (0, "")
     text = page_of(folder)
     assert len(PICTURES.findall(text)) == 5 * 3
-    assert text.count('<button type="button" data-show="heights"') == 3
+    assert text.count('<button type="button" data-show="heights"') == 3 + 1  # and one for all
     assert "is empty" in text
     # plotly's script names addresses of maps that it could draw; the page itself asks for nothing
     outside_of_scripts = re.sub(r"<script.*?</script>", "", text, flags=re.S)
@@ -109,9 +109,9 @@ def test_the_summary_says_options_version_counts_and_the_sign(folder):
     )
     run = json.loads((folder / "out" / "rolls.csv.run.json").read_text())
     assert f"rollcli {run['rollcli']}" in text
-    assert "4: 3 ok, 0 suspect, 1 failed" in text
+    assert "frames 4 ok 3 suspect 0 failed 1" in text
     assert "--max-roll 45" in text
-    assert "median roll" in text
+    assert "nine in ten frames" in text
     assert "its right end is up" in text
     assert "Every frame that has an angle." in text
     assert "inputs from maps" in text
@@ -527,7 +527,7 @@ def test_the_page_says_how_the_right_view_lies_and_shows_it_over_the_drive(tmp_p
 
     page = page_of(tmp_path)
     # 0.2 degrees over half of 160 columns are 0.28 px, over half of 120 rows 0.21 px of disparity
-    assert re.search(r"<b>Recalibrate</b>: up to 1\.7[789] ± 0\.\d+ px off in the image \(60 pairs\)", page)
+    assert re.search(r"<b>recalibrate</b>: up to 1\.7[789] ± 0\.\d+ px off in the image \(60 pairs\)", page)
     assert re.search(r"<th>px lower</th><td>\+1\.[45]\d* ± 0\.\d+</td>", page)
     assert re.search(r"<th>degrees clockwise</th><td>−0\.20", page)
     assert "4.2 % at 10 m, 8.4 % at 20 m, 20.9 % at 50 m" in page

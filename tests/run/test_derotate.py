@@ -183,6 +183,22 @@ def test_maps_are_matched_with_rows_of_another_folder_and_ending_by_stem(folder)
     assert rollcli("derotate", "elsewhere", "--from", "rolls.csv", "-o", "out", cwd=folder).status == 0
 
 
+def test_a_copy_in_another_folder_is_taken_and_another_drive_is_refused(folder):
+    shutil.copytree(folder / "maps", folder / "day1" / "copied")
+    for index in range(4):
+        write_kitti(folder / "day2" / f"frame{index}.png", road_map(0.3, seed=index))
+    for command in ("derotate", "heights"):
+        line = (command, "--from", "rolls.csv", "-o")
+        assert rollcli(*line, f"{command}-a", "maps", cwd=folder).status == 0
+        assert rollcli(*line, f"{command}-b", "day1/copied", cwd=folder).status == 0
+        assert contents(folder / f"{command}-a") == contents(folder / f"{command}-b")
+
+        done = rollcli(*line, "out", "day2", cwd=folder)
+        assert (done.status, done.err.count("\n")) == (2, 1)
+        assert "rolls.csv: its row is of maps/frame0.png, and not of day2/frame0.png" in done.err
+        assert not (folder / "out").exists()
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

@@ -46,10 +46,10 @@ def image(folder, number):
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows forces no folders")
 def test_a_row_is_written_after_its_images_and_their_folder_are_on_the_disk(tmp_path, file):
-    rows = DurableRows(file)
+    rows = DurableRows(file, WatchedFile([]))
     paths = [image(tmp_path, number) for number in range(40)]
     for number, path in enumerate(paths):
-        rows.append([b"%d " % number], [str(path)])
+        rows.append([b"%d " % number], [b"read"], [str(path)])
     rows.commit()
     assert list(file.rows) == [b"%d" % number for number in range(40)]
     for path, forced in zip(paths, file.rows.values(), strict=True):
@@ -58,11 +58,11 @@ def test_a_row_is_written_after_its_images_and_their_folder_are_on_the_disk(tmp_
 
 
 def test_a_row_without_images_is_written_at_once_and_after_those_that_wait(tmp_path, file):
-    rows = DurableRows(file)
-    rows.append([b"0 "], [])
+    rows = DurableRows(file, WatchedFile([]))
+    rows.append([b"0 "], [b"read"], [])
     assert list(file.rows) == [b"0"]
     for number in range(1, 5):
-        rows.append([b"%d " % number], [str(image(tmp_path, number))] if number % 2 else [])
+        rows.append([b"%d " % number], [b"read"], [str(image(tmp_path, number))] if number % 2 else [])
     rows.commit()
     assert list(file.rows) == [b"%d" % number for number in range(5)]
 
@@ -89,13 +89,13 @@ def test_a_row_waits_so_long_for_the_others_of_its_group(monkeypatch, file, sync
     clock = Clock(sync_s)
     monkeypatch.setattr(durable_rows, "time", clock)
     monkeypatch.setattr(durable_rows, "sync_files", clock.sync)
-    rows = DurableRows(file)
-    rows.append([b"0 "], ["0.png"])
+    rows = DurableRows(file, WatchedFile([]))
+    rows.append([b"0 "], [b"read"], ["0.png"])
     assert list(file.rows) == [b"0"]
     start = clock.now
     for share, written in ((0.0, 1), (0.98, 1), (1.02, 4)):
         clock.now = start + share * wait_s
-        rows.append([b"%g " % (share + 1)], ["1.png"])
+        rows.append([b"%g " % (share + 1)], [b"read"], ["1.png"])
         assert len(file.rows) == written
 
 
@@ -103,10 +103,10 @@ def test_a_group_ends_early_when_it_has_many_images(monkeypatch, file):
     clock = Clock(10.0)
     monkeypatch.setattr(durable_rows, "time", clock)
     monkeypatch.setattr(durable_rows, "sync_files", clock.sync)
-    rows = DurableRows(file)
+    rows = DurableRows(file, WatchedFile([]))
     for number in range(1 + 512):
         assert len(file.rows) == min(number, 1)
-        rows.append([b"%d " % number], ["image.png"])
+        rows.append([b"%d " % number], [b"read"], ["image.png"])
     assert len(file.rows) == 513
 
 
@@ -183,17 +183,20 @@ def test_a_second_interrupt_at_any_line_writes_no_row_twice_and_leaves_none_out(
     while came:
         step += 1
         path = tmp_path / f"{step}.csv"
-        with open_result(str(path)) as file:
-            rows = DurableRows(file)
+        with open_result(str(path)) as file, open_result(f"{path}.inputs") as inputs:
+            rows = DurableRows(file, inputs)
 
             def work(rows=rows):
                 for number, row in enumerate(expected):
-                    rows.append([row], [str(image(tmp_path, number))] if number else [])
+                    rows.append([row], [row], [str(image(tmp_path, number))] if number else [])
                 rows.commit()
 
             came = interrupted_at(step, work)
             rows.commit()  # as the run does whatever ended it
         lines = path.read_bytes().splitlines(keepends=True)
         assert lines == expected[: len(lines)], step
+        read = (tmp_path / f"{step}.csv.inputs").read_bytes().splitlines(keepends=True)
+        assert read == expected[: len(read)], step
+        assert len(read) >= len(lines), step
     assert step > 50
     assert lines == expected

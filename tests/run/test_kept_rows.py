@@ -40,14 +40,14 @@ def test_it_counts_and_holds_no_row(take):
     before = sys.getrefcount(row)
     kept.add(row)
     assert sys.getrefcount(row) == before
-    assert (kept.count, kept.errors, kept.failed) == (3, [1], [])
+    assert (kept.count, kept.errors, kept.again) == (3, [1], [])
     assert kept.summary.counts == {"ok": 1, "suspect": 1, "error": 1}
     assert kept.mismatch is None
 
 
 def test_failed_frames_that_are_done_again_are_not_counted(take):
     kept = take("a.png error", "b.png", "c.png error", retry=True)
-    assert kept.failed == [0, 2]
+    assert kept.again == [0, 2]
     assert kept.summary.counts == {"ok": 1}
     assert kept.count == 3
 

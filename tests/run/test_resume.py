@@ -308,7 +308,7 @@ def test_a_folder_that_has_grown_elsewhere_is_refused_and_says_what_to_do(interr
     write_kitti(interrupted / "maps" / "frame7a.png", road_map())
     said = refused(interrupted)
     assert "frames have been added that sort before others" in said
-    assert "estimate these into a result of their own" in said
+    assert "new frames must sort last, or be added by --update" in said
     write_kitti(interrupted / "maps" / "frame1a.png", road_map())
     assert "maps/frame1a.png has been added and sorts before maps/frame2.png" in refused(interrupted)
 

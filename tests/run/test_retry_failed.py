@@ -124,7 +124,8 @@ def test_images_of_retried_frames_are_on_the_disk_before_their_rows(folder, maps
         sync_files(images, folders)
 
     def write(file, rows, form):
-        events.append(sorted(rows))
+        if form == "csv":  # and not what they were read from
+            events.append(sorted(rows))
         replace(file, rows, form)
 
     monkeypatch.setattr(durable_rows, "sync_files", sync)

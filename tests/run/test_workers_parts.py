@@ -12,13 +12,13 @@ from rollcli.errors import UsageError
 from rollcli.files.results import Row, format_header, format_row
 from rollcli.files.storage import list_names, remove
 from rollcli.run.batch import BatchOptions, Parts, join_results
-from rollcli.run.frame import Frame, FrameResult, Inputs
+from rollcli.run.frame import Frame, FrameResult, ReadAs
 from rollcli.run.options import ImageOptions
 from rollcli.run.workers.chunks import Chunks, Done, Span
 from tests.object_store import joined
 from tests.run_cli import command, contents, environment, rollcli, write_maps
 
-KITTI = Inputs(frozenset(["kitti"]))
+KITTI = ReadAs(frozenset(["kitti"]))
 FRAMES = [Frame(f"{n}.png", "", f"{n}.png", "", f"{n}.png", None) for n in range(11)]
 ROWS = [Row(frame.file, status="ok", roll_deg=float(n)) for n, frame in enumerate(FRAMES)]
 
@@ -66,7 +66,7 @@ def test_parts_that_were_missing_have_their_own_numbers(tmp_path):
     assert sorted(contents(tmp_path)) == ["part-00004.csv", "part-00007.csv"]
 
 
-@pytest.mark.parametrize("known", [Inputs(), Inputs(frozenset(["px"])), Inputs(searched=(0, 63))])
+@pytest.mark.parametrize("known", [ReadAs(), ReadAs(frozenset(["px"])), ReadAs(searched=(0, 63))])
 def test_rows_come_back_of_which_the_record_does_not_say_how_they_were_read(tmp_path, known):
     batch = join(tmp_path, 0, 3, known=known)
     assert (batch.in_parts, batch.lines, contents(tmp_path)) == (0, lines(0, 3), {})

@@ -1,4 +1,4 @@
-"""Camera images that are no maps: JPEG, BMP, PGM and PPM."""
+"""Camera images that are no maps: JPEG, BMP, PGM and PPM; and those that hold both views."""
 
 import re
 from typing import Any
@@ -109,3 +109,40 @@ def _require_whole_bmp(data: bytes, name: str) -> None:
     require_decoded_fits(width, abs(height), bits // 8, len(data), name)
     if start + needed > len(data):
         raise InputError(f"{name}: is truncated: {width} x {abs(height)} pixels end at byte {start + needed}")
+
+
+def half_size(width: int, height: int, layout: str, name: str) -> tuple[int, int]:
+    """Return width and height of each of the two views in an image, px.
+
+    Raises
+    ------
+    InputError
+        The image cannot be halved.
+    """
+    side, what = (width, "wide") if layout == "left-right" else (height, "high")
+    if side % 2:
+        raise InputError(
+            f"{name}: is {side} px {what}, which cannot be halved into two views: cut it to an even number"
+        )
+    return (width // 2, height) if layout == "left-right" else (width, height // 2)
+
+
+def views_of(image: NDArray[Any], layout: str, name: str) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Split an image that holds both views into the left and the right one.
+
+    Parameters
+    ----------
+    image : ndarray, shape (H, W) or (H, W, 3)
+    layout : {"left-right", "top-bottom"}
+        Where they are; the upper one is the left view.
+    name : str
+        What errors call it.
+
+    Raises
+    ------
+    InputError
+        It cannot be halved.
+    """
+    width, height = half_size(image.shape[1], image.shape[0], layout, name)
+    one, other = image[:height, :width], image[-height:, -width:]
+    return np.ascontiguousarray(one), np.ascontiguousarray(other)

@@ -9,7 +9,7 @@ number.
 import bz2
 import sqlite3
 import struct
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -18,6 +18,7 @@ from typing import Any, BinaryIO, NamedTuple, Protocol
 from rollcli.errors import InputError
 from rollcli.files.bounded import MOST_BYTES, most_unpacked
 
+_BEGINNING = 64  # bytes: a header's time and more
 _MCAP, _BAG, _SQLITE = b"\x89MCAP0\r\n", b"#ROSBAG V2.0\n", b"SQLite format 3\0"
 
 
@@ -45,7 +46,7 @@ class Message(NamedTuple):
     topic: str
     log_time: int
     place: tuple[int, int]
-    data: bytes
+    data: memoryview
 
 
 class Bag(Protocol):
@@ -56,8 +57,8 @@ class Bag(Protocol):
     def topics(self) -> dict[str, Topic]:
         """Return the topics by name."""
 
-    def messages(self, topics: set[str]) -> Iterator[Message]:
-        """Yield every whole message of some topics, in the order of the file."""
+    def messages(self, topics: set[str], begins: Collection[str] = ()) -> Iterator[Message]:
+        """Yield every whole message of some topics, in the file's order; of some the beginning will do."""
 
     def read(self, place: tuple[int, int]) -> Message:
         """Read one message."""
@@ -97,13 +98,13 @@ def _exactly(file: BinaryIO, count: int) -> bytes:
     return data
 
 
-def _unpacked(compression: str, data: bytes, size: int) -> bytes:
+def _unpacked(compression: str, data: memoryview, size: int) -> memoryview:
     """Unpack a chunk, or what is there of it, to no more than it claims and its bytes may stand for."""
     if compression in ("", "none"):
         return data
     if not 0 <= size <= most_unpacked(len(data)):
         raise _BrokenError
-    found = b""
+    found: bytes | bytearray = b""
     try:
         if compression == "bz2":
             found = bz2.BZ2Decompressor().decompress(data, size)
@@ -117,13 +118,16 @@ def _unpacked(compression: str, data: bytes, size: int) -> bytes:
             found = zstandard.ZstdDecompressor().stream_reader(data).read(size)
     except Exception as error:  # each library has errors of its own
         raise _BrokenError from error
-    return found
+    return memoryview(found)
+
+
+_DAMAGED = (_BrokenError, struct.error, ValueError, KeyError, IndexError)
 
 
 class _Records(NamedTuple):
     """Messages of a record (channel, log time, bytes); where the next one begins; whether it is whole."""
 
-    messages: list[tuple[int, int, bytes]]
+    messages: list[tuple[int, int, memoryview]]
     after: int
     whole: bool = True
 
@@ -143,12 +147,20 @@ class _Chunked:
             self._file.close()
 
     def topics(self) -> dict[str, Topic]:
-        """Return the topics by name."""
-        for _ in self.messages(set()):
-            pass
+        """Return the topics by name: as the index says, or what a whole look through the file finds."""
+        try:
+            index = self._index()
+            while 0 < index < self._size:
+                found = self._record(index)
+                index = found.after if found.whole else 0
+        except _DAMAGED:
+            index = 0
+        if not (index and self._topics and all(each.type for each in self._topics.values())):
+            for _ in self.messages(set()):
+                pass
         return {each.name: each for each in self._topics.values()}
 
-    def messages(self, topics: set[str]) -> Iterator[Message]:
+    def messages(self, topics: set[str], begins: Collection[str] = ()) -> Iterator[Message]:
         """Yield every whole message of some topics, in the order of the file."""
         offset = self._start()
         try:
@@ -163,7 +175,7 @@ class _Chunked:
                 if found.after <= offset:  # the end of the messages
                     return
                 offset = found.after
-        except (_BrokenError, struct.error, ValueError, KeyError, IndexError, UnicodeDecodeError):
+        except _DAMAGED:
             share = offset / max(self._size, 1)
             self.broken = f"is damaged or cut off at {share:.0%} of its {self._size} bytes"
 
@@ -174,12 +186,16 @@ class _Chunked:
             if self._chunk[0] != offset:
                 self._chunk = offset, self._record(offset)
             channel, time, data = self._chunk[1].messages[number]
-        except (_BrokenError, struct.error, ValueError, KeyError, IndexError):
+        except _DAMAGED:
             raise InputError(f"{self.path}: there is no whole message at byte {offset}") from None
         topic = self._topics.get(channel)
         return Message(topic.name if topic else "", time, place, data)
 
     def _start(self) -> int:
+        raise NotImplementedError
+
+    def _index(self) -> int:
+        """Return where topics are listed behind the messages; 0 where they are not."""
         raise NotImplementedError
 
     def _record(self, offset: int) -> _Records:
@@ -197,6 +213,11 @@ class _Mcap(_Chunked):
     def _start(self) -> int:
         return len(_MCAP)
 
+    def _index(self) -> int:
+        self._file.seek(max(self._size - 37, 0))  # the footer: opcode, length, where the summary starts, …
+        opcode, start = struct.unpack_from("<B8xQ", _exactly(self._file, 17))
+        return int(start) if opcode == 0x02 else 0
+
     def _record(self, offset: int) -> _Records:
         self._file.seek(offset)
         opcode, length = struct.unpack("<BQ", _exactly(self._file, 9))
@@ -206,14 +227,14 @@ class _Mcap(_Chunked):
         if opcode not in (0x03, 0x04, 0x05, 0x06):
             return _Records([], after, after <= self._size)
         if opcode != 0x06:
-            return _Records(self._inner(opcode, _exactly(self._file, length)), after)
+            return _Records(self._inner(opcode, memoryview(_exactly(self._file, length))), after)
         if length > MOST_BYTES:
             raise _BrokenError
-        content = self._file.read(length)
+        content = memoryview(self._file.read(length))
         size, name_length = struct.unpack_from("<Q4xI", content, 16)
         start = 32 + name_length + 8
-        data = _unpacked(content[32 : 32 + name_length].decode(), content[start:], size)
-        found, at = list[tuple[int, int, bytes]](), 0
+        data = _unpacked(bytes(content[32 : 32 + name_length]).decode(), content[start:], size)
+        found, at = list[tuple[int, int, memoryview]](), 0
         while at + 9 <= len(data):
             opcode, length = struct.unpack_from("<BQ", data, at)
             if at + 9 + length > len(data):
@@ -222,7 +243,7 @@ class _Mcap(_Chunked):
             at += 9 + length
         return _Records(found, after, at == len(data) == size)
 
-    def _inner(self, opcode: int, content: bytes) -> list[tuple[int, int, bytes]]:
+    def _inner(self, opcode: int, content: memoryview) -> list[tuple[int, int, memoryview]]:
         if opcode == 0x05:
             channel, time = struct.unpack_from("<H4xQ", content)
             return [(channel, time, content[22:])]
@@ -238,9 +259,9 @@ class _Mcap(_Chunked):
         return []
 
 
-def _text(content: bytes, at: int) -> tuple[str, int]:
+def _text(content: memoryview, at: int) -> tuple[str, int]:
     (length,) = struct.unpack_from("<I", content, at)
-    return content[at + 4 : at + 4 + length].decode("utf-8", "replace"), at + 4 + length
+    return bytes(content[at + 4 : at + 4 + length]).decode("utf-8", "replace"), at + 4 + length
 
 
 class _Ros1(_Chunked):
@@ -249,27 +270,34 @@ class _Ros1(_Chunked):
     def _start(self) -> int:
         return len(_BAG)
 
+    def _index(self) -> int:
+        self._file.seek(len(_BAG))
+        (length,) = struct.unpack("<I", _exactly(self._file, 4))
+        return int(struct.unpack("<Q", _fields(_exactly(self._file, length))["index_pos"])[0])
+
     def _record(self, offset: int) -> _Records:
         self._file.seek(offset)
         (length,) = struct.unpack("<I", _exactly(self._file, 4))
         fields = _fields(_exactly(self._file, length))
         (length,) = struct.unpack("<I", _exactly(self._file, 4))
         after, op = self._file.tell() + length, fields["op"][0]
+        if fields.get("encryptor"):
+            raise InputError(f"{self.path}: is encrypted: decrypt it first (rosbag decrypt)")
         if op not in (0x02, 0x05, 0x07):
             return _Records([], after, after <= self._size)
         if op != 0x05:
-            return _Records(self._inner(op, fields, _exactly(self._file, length)), after)
+            return _Records(self._inner(op, fields, memoryview(_exactly(self._file, length))), after)
         if length > MOST_BYTES:
             raise _BrokenError
         (size,) = struct.unpack("<I", fields["size"])
-        data = _unpacked(fields["compression"].decode(), self._file.read(length), size)
-        found, at = list[tuple[int, int, bytes]](), 0
+        data = _unpacked(fields["compression"].decode(), memoryview(self._file.read(length)), size)
+        found, at = list[tuple[int, int, memoryview]](), 0
         while at + 4 <= len(data):
             (length,) = struct.unpack_from("<I", data, at)
             start = at + 4 + length
             if start + 4 > len(data):
                 break
-            inner = _fields(data[at + 4 : start])
+            inner = _fields(bytes(data[at + 4 : start]))
             (length,) = struct.unpack_from("<I", data, start)
             if start + 4 + length > len(data):
                 break
@@ -277,12 +305,14 @@ class _Ros1(_Chunked):
             at = start + 4 + length
         return _Records(found, after, at == len(data) == size)
 
-    def _inner(self, op: int, fields: dict[str, bytes], data: bytes) -> list[tuple[int, int, bytes]]:
+    def _inner(
+        self, op: int, fields: dict[str, bytes], data: memoryview
+    ) -> list[tuple[int, int, memoryview]]:
         if op == 0x02:
             seconds, nanoseconds = struct.unpack("<II", fields["time"])
             return [(struct.unpack("<I", fields["conn"])[0], seconds * 10**9 + nanoseconds, data)]
         if op == 0x07:
-            kind = _fields(data).get("type", b"").decode("utf-8", "replace")
+            kind = _fields(bytes(data)).get("type", b"").decode("utf-8", "replace")
             name = fields["topic"].decode("utf-8", "replace")
             self._topics[struct.unpack("<I", fields["conn"])[0]] = Topic(name, kind, "ros1")
         return []
@@ -323,18 +353,34 @@ class _Sqlite:
         self._names = {number: name for number, name, *_ in rows}
         return {name: Topic(name, kind.replace("/msg/", "/"), form) for _, name, kind, form in rows}
 
-    def messages(self, topics: set[str]) -> Iterator[Message]:
-        """Yield every whole message of some topics, in the order of the file."""
+    def messages(self, topics: set[str], begins: Collection[str] = ()) -> Iterator[Message]:
+        """Yield every whole message of some topics, in the file's order; of some the beginning will do."""
         self.topics()
-        count = 0
+        count, whole = 0, self._is_whole() and hasattr(self._base, "blobopen")  # from Python 3.11 on
         try:
-            rows = self._base.execute("SELECT id, topic_id, timestamp, data FROM messages ORDER BY id")
-            for number, topic, time, data in rows:
+            for number, topic, time in self._base.execute(
+                "SELECT id, topic_id, timestamp FROM messages ORDER BY id"
+            ):
+                name = str(self._names.get(topic))
+                if whole and name in begins:
+                    with self._base.blobopen("messages", "data", number, readonly=True) as blob:
+                        data = blob.read(_BEGINNING)
+                elif (
+                    name in topics or not whole
+                ):  # of a file that is cut off, the first that is not there ends it
+                    data = self.read((number, 0)).data
                 count += 1
-                if (name := self._names.get(topic)) in topics and isinstance(data, bytes):
-                    yield Message(str(name), int(time), (number, 0), data)
-        except sqlite3.Error:
+                if name in topics:
+                    yield Message(name, int(time), (number, 0), memoryview(data))
+        except (sqlite3.Error, InputError):
             self.broken = f"is damaged or cut off behind {count} messages"
+
+    def _is_whole(self) -> bool:
+        """Tell whether the file has as many pages as its header says [https://www.sqlite.org/fileformat.html]."""
+        with Path(self.path).open("rb") as file:
+            size, pages = struct.unpack(">16xH10xI", file.read(32))
+        needed: int = pages * (size if size > 1 else 65536)
+        return Path(self.path).stat().st_size >= needed
 
     def read(self, place: tuple[int, int]) -> Message:
         """Read one message."""
@@ -343,9 +389,9 @@ class _Sqlite:
             row = self._base.execute(asked, place[:1]).fetchone()
         except sqlite3.Error:
             row = None
-        if row is None:
+        if row is None or not isinstance(row[2], bytes):
             raise InputError(f"{self.path}: there is no whole message {place[0]}")
-        return Message(self._names.get(row[0], ""), int(row[1]), place, row[2])
+        return Message(self._names.get(row[0], ""), int(row[1]), place, memoryview(row[2]))
 
 
 @lru_cache(maxsize=4)  # a process opens a bag once; it changes with size and time

@@ -8,6 +8,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 from rollcli.errors import InputError, UsageError
+from rollcli.files.bounded import state_of
 from rollcli.files.naming import listed
 from rollcli.files.recordings import messages
 from rollcli.files.recordings.bags import Bag, Topic, opened
@@ -17,10 +18,11 @@ from rollcli.rig.calibration import Calibration
 _VIEWS = (IMAGE, COMPRESSED)
 _LISTED = 20  # topics that an error names
 _RAW = "image_raw"
+_NO_P = "no CameraInfo with a principal point (P): no pitch and no height without --calib"
 
 
-class BagFrame(NamedTuple):
-    """A message: where it is, as rows name it, the file name of what is made of it, and its stamp, ns."""
+class RecordingFrame(NamedTuple):
+    """Where a frame is, as rows name it, the file name of what is made of it, and its stamp, ns."""
 
     location: str
     name: str
@@ -34,7 +36,7 @@ class BagFrames:
 
     Attributes
     ----------
-    frames : list of (BagFrame, BagFrame or None)
+    frames : list of (RecordingFrame, RecordingFrame or None)
         Maps, or left and right views.
     calibration : Calibration or None
         Of the rectified pair, by CameraInfo.
@@ -42,7 +44,7 @@ class BagFrames:
         What the user should know, a line each.
     """
 
-    frames: list[tuple[BagFrame, BagFrame | None]] = field(default_factory=list)
+    frames: list[tuple[RecordingFrame, RecordingFrame | None]] = field(default_factory=list)
     calibration: Calibration | None = None
     notes: list[str] = field(default_factory=list)
 
@@ -51,7 +53,7 @@ class BagFrames:
 class _Found:
     """The frames of some topics, the CameraInfo of cameras and their places, and what is broken."""
 
-    frames: dict[str, list[BagFrame]]
+    frames: dict[str, list[RecordingFrame]]
     cameras: dict[str, CameraInfo]
     places: dict[tuple[str, str], str]
     broken: list[tuple[str, str]]
@@ -85,10 +87,8 @@ def maps_of_bag(files: Sequence[str], name: str, topic: str | None) -> BagFrames
         opened_bag, place = _placed(bag.frames[0][0].location)
         stated = messages.baseline_of(topics[chosen], opened_bag.read(place).data, chosen)
     bag.calibration = _calibration(left, right, stated[1], f"CameraInfo of {name}")
-    if bag.calibration is None and topics[chosen].type == DISPARITY:
-        bag.notes.append(
-            f"{name}: no CameraInfo with a principal point: no pitch and no height without --calib"
-        )
+    if bag.calibration is None and (found.cameras or topics[chosen].type == DISPARITY):
+        bag.notes.append(f"{name}: {_NO_P}")
     _finish(bag, found, name, chosen)
     return bag
 
@@ -110,6 +110,8 @@ def pairs_of_bag(files: Sequence[str], name: str, left: str, right: str, toleran
         if _is_raw(found, topic):
             bag.notes.append(f"{topic}: raw views are rectified by D, K, R and P of {_beside(topic)}")
             found.frames[topic][:] = [_rectified(found, topic, each) for each in found.frames[topic]]
+        elif _RAW in topic and not _usable(found, topic):
+            bag.notes.append(f"{topic}: raw views are taken as they are: no CameraInfo with P rectifies them")
     bag.frames = [(each, rights[at]) for each, at in zip(lefts, partners, strict=True) if at is not None]
     paired = {at for at in partners if at is not None}
     for side, alone in (
@@ -127,6 +129,8 @@ def pairs_of_bag(files: Sequence[str], name: str, left: str, right: str, toleran
         )
     one, other = (found.cameras.get(_beside(topic)) for topic in (left, right))
     bag.calibration = _calibration(one, other, 0.0, f"CameraInfo of {name}")
+    if bag.calibration is None and found.cameras:
+        bag.notes.append(f"{name}: {_NO_P}")
     _finish(bag, found, name, f"{left} and {right}")
     return bag
 
@@ -170,7 +174,7 @@ def read_frame(path: str, member: str, place: Sequence[int], name: str) -> bytes
     """
     bag = _opened(path)
     topic_name, _, stamp = member.rpartition("@")
-    topic = _known_topics(*_state(path)).get(topic_name)
+    topic = _known_topics(*state_of(path)).get(topic_name)
     if topic is None:
         raise InputError(f"{name}: no such topic in {path}")
     if not place:
@@ -192,16 +196,8 @@ def broken_part(path: str) -> str:
     return f"{bag.broken or 'is whole'}; the whole messages before are used"
 
 
-def _state(path: str) -> tuple[str, int, int]:
-    try:
-        found = os.stat(path)  # noqa: PTH116
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from None
-    return path, found.st_size, found.st_mtime_ns
-
-
 def _opened(path: str) -> Bag:
-    return opened(*_state(path))
+    return opened(*state_of(path))
 
 
 @lru_cache(maxsize=4)  # for a bag without an index they are known once it is read
@@ -219,7 +215,7 @@ def _topics(files: Iterable[str]) -> dict[str, Topic]:
     topics: dict[str, Topic] = {}
     for path in files:
         try:
-            topics |= _known_topics(*_state(path))
+            topics |= _known_topics(*state_of(path))
         except InputError as error:
             raise UsageError(str(error)) from None
     return topics
@@ -233,6 +229,13 @@ def _known(topics: dict[str, Topic], topic: str, name: str) -> Topic:
     except InputError as error:
         raise UsageError(str(error)) from None
     return topics[topic]
+
+
+def _check_format(topic: Topic, data: memoryview, name: str) -> None:
+    try:
+        messages.check_format(topic, data, name)
+    except InputError as error:
+        raise UsageError(str(error)) from None
 
 
 def _all(topics: dict[str, Topic]) -> str:
@@ -284,7 +287,7 @@ def _scan(files: Sequence[str], wanted: Sequence[Topic], topics: dict[str, Topic
     infos = {
         each.name for each in topics.values() if each.type == CAMERA_INFO and each.encoding in ("cdr", "ros1")
     }
-    frames: dict[str, list[BagFrame]] = {each: [] for each in by_name}
+    frames: dict[str, list[RecordingFrame]] = {each: [] for each in by_name}
     cameras: dict[str, CameraInfo] = {}
     places: dict[tuple[str, str], str] = {}
     broken = []
@@ -292,7 +295,7 @@ def _scan(files: Sequence[str], wanted: Sequence[Topic], topics: dict[str, Topic
     for path in files:
         bag = _opened(path)
         stem = os.path.splitext(os.path.basename(path))[0]  # noqa: PTH119, PTH122
-        for message in bag.messages({*by_name, *infos}):
+        for message in bag.messages({*by_name, *infos}, by_name):
             place = "{}+{}".format(*message.place)
             if (topic := by_name.get(message.topic)) is None:
                 if (path, message.topic) not in places:
@@ -300,13 +303,17 @@ def _scan(files: Sequence[str], wanted: Sequence[Topic], topics: dict[str, Topic
                     cameras.setdefault(message.topic, info)
                     places[path, message.topic] = place
                 continue
+            if topic.type == COMPRESSED and not frames[topic.name]:
+                _check_format(topic, bag.read(message.place).data, path)
             stamp = messages.stamp_of(topic, message.data, message.log_time)
             name = f"{path}#{topic.name}@{stamp}"
             seen[name] = seen.get(name, -1) + 1
             again = f".{seen[name]}" if seen[name] else ""  # a recorder may write a message twice
             ending = ".png" if topic.type == COMPRESSED else ".npy"
             relative = f"{stem}_{stamp}{again.replace('.', '_')}{ending}"
-            frames[topic.name].append(BagFrame(f"{name}{again}#@{place}", f"{name}{again}", relative, stamp))
+            frames[topic.name].append(
+                RecordingFrame(f"{name}{again}#@{place}", f"{name}{again}", relative, stamp)
+            )
         if bag.broken:
             broken.append((path, stem))
     return _Found(frames, cameras, places, broken)
@@ -317,7 +324,7 @@ def _finish(bag: BagFrames, found: _Found, name: str, topic: str) -> None:
     if not bag.frames and not found.broken:
         raise UsageError(f"{name}: has no messages of {topic}")
     for path, stem in found.broken:
-        rest = BagFrame(f"{path}#rest", f"{path}#rest", f"{stem}_rest.npy", 0)
+        rest = RecordingFrame(f"{path}#rest", f"{path}#rest", f"{stem}_rest.npy", 0)
         bag.frames.append((rest, None if not bag.frames or bag.frames[0][1] is None else rest))
 
 
@@ -360,7 +367,12 @@ def _is_raw(found: _Found, topic: str) -> bool:
     return _RAW in topic and info is not None and info.changes_raw_views
 
 
-def _rectified(found: _Found, topic: str, frame: BagFrame) -> BagFrame:
+def _usable(found: _Found, topic: str) -> bool:
+    info = found.cameras.get(_beside(topic))
+    return info is not None and info.usable
+
+
+def _rectified(found: _Found, topic: str, frame: RecordingFrame) -> RecordingFrame:
     """Add to a frame's location where its CameraInfo is; a file of a split bag without one stays as it is."""
     place = found.places.get((frame.location.partition("#")[0], _beside(topic)))
     return frame if place is None else frame._replace(location=f"{frame.location}+{place}")

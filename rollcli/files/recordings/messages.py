@@ -1,7 +1,7 @@
-"""Messages of ROS to files that every reader of images knows: numbers to NPY, colours to PPM."""
+"""Messages of ROS to files that every reader of images knows: numbers to NPY, colours to BMP or PPM."""
 
-import io
 import math
+import re
 import struct
 from dataclasses import dataclass
 from functools import lru_cache
@@ -24,6 +24,7 @@ DISPARITY, IMAGE, COMPRESSED = (
 )
 CAMERA_INFO = "sensor_msgs/CameraInfo"
 MAP_ENCODINGS = ("mono16", "16UC1", "16SC1", "32FC1")  # of images that hold disparities or depths
+_VIDEO = re.compile("h\\.?26[45]|hevc|avc|av1|vp[89]", re.IGNORECASE)
 # numpy's dtype, and the channels
 _PIXELS = {
     "mono8": ("u1", 1),
@@ -77,7 +78,7 @@ class CameraInfo:
         return self.usable and self.k[0] > 0 and (any(self.d) or (turned and any(self.r)))
 
 
-def stamp_of(topic: Topic, data: bytes, log_time: int) -> int:
+def stamp_of(topic: Topic, data: memoryview, log_time: int) -> int:
     """Return the header's time, ns, without decoding the message; the time of recording where it has none."""
     try:
         if topic.encoding == "ros1":
@@ -98,16 +99,15 @@ def check_decoder(topic: Topic, name: str) -> None:
     """
     if topic.type not in (DISPARITY, IMAGE, COMPRESSED):
         hint = ": such video must be decoded in order; record images" if "Video" in topic.type else ""
-        raise InputError(
-            f"{name}: {topic.name} has messages of the type {topic.type or 'unknown'}, not images{hint}"
-        )
+        kind = topic.type or "unknown"
+        raise InputError(f"{name}: {topic.name} has messages of the type {kind}, not images of ROS{hint}")
     if topic.encoding not in ("cdr", "ros1"):
         raise InputError(
             f"{name}: {topic.name} is serialized as {topic.encoding or 'nothing'}; cdr and ros1 are read"
         )
 
 
-def camera_info(topic: Topic, data: bytes, name: str) -> CameraInfo:
+def camera_info(topic: Topic, data: memoryview, name: str) -> CameraInfo:
     """Decode a CameraInfo."""
     found = _decoded(topic, data, name)
     fields = {key: tuple(map(float, getattr(found, key, getattr(found, key.upper(), ())))) for key in "dkrp"}
@@ -116,20 +116,35 @@ def camera_info(topic: Topic, data: bytes, name: str) -> CameraInfo:
     return CameraInfo(int(found.width), int(found.height), str(found.distortion_model), **fields)
 
 
-def image_encoding(topic: Topic, data: bytes, name: str) -> str:
+def check_format(topic: Topic, data: memoryview, name: str) -> None:
+    """Refuse a CompressedImage that is a part of a video, by what it says of its format.
+
+    Raises
+    ------
+    InputError
+    """
+    form = str(_decoded(topic, data, name).format)
+    if _VIDEO.search(form):
+        raise InputError(
+            f"{name}: {topic.name} holds video ({form[:20]}), which must be decoded in order: record images, "
+            "or export it as .mp4"
+        )
+
+
+def image_encoding(topic: Topic, data: memoryview, name: str) -> str:
     """Return what the pixels of an Image are; empty for other types."""
     return str(_decoded(topic, data, name).encoding) if topic.type == IMAGE else ""
 
 
-def baseline_of(topic: Topic, data: bytes, name: str) -> tuple[float, float]:
+def baseline_of(topic: Topic, data: memoryview, name: str) -> tuple[float, float]:
     """Return f in px and |T| in m of a DisparityImage; 0 where they are not stated."""
     found = _decoded(topic, data, name)
     values = float(found.f), abs(float(getattr(found, "t", getattr(found, "T", 0.0))))
     return values if all(map(math.isfinite, values)) else (0.0, 0.0)
 
 
-def as_file(topic: Topic, data: bytes, name: str, raw_of: CameraInfo | None = None) -> bytes:
-    """Make a whole file of a message: NPY of one channel, PPM of colours, or what a CompressedImage holds.
+def as_file(topic: Topic, data: memoryview, name: str, raw_of: CameraInfo | None = None) -> bytes:
+    """Make a whole file of a message: NPY of one channel, BMP or PPM of colours; CompressedImage has its own.
 
     Parameters
     ----------
@@ -155,19 +170,19 @@ def as_file(topic: Topic, data: bytes, name: str, raw_of: CameraInfo | None = No
         if raw_of is None:
             return packed
         decode = png.picture if packed.startswith(png.SIGNATURE) else pictures.decode_picture
-        return _file_of(_rectified(decode(packed, name), raw_of))
+        return image_file(_rectified(decode(packed, name), raw_of))
     if topic.type == DISPARITY:
         values = _pixels(found.image, name)
         least = float(found.min_disparity)
         below = values < least
         if values.ndim == 2 and values.dtype.kind == "f" and below.any() and not below.all():
             values = np.where(below, np.nan, values).astype(values.dtype)
-        return _file_of(values)
+        return image_file(values)
     values = _pixels(found, name)
-    return _file_of(values if raw_of is None else _rectified(values, raw_of))
+    return image_file(values if raw_of is None else _rectified(values, raw_of))
 
 
-def _decoded(topic: Topic, data: bytes, name: str) -> Any:
+def _decoded(topic: Topic, data: memoryview, name: str) -> Any:
     decode = _decoders()["ros1" if topic.encoding == "ros1" else "cdr"]
     try:
         return decode(data, topic.type.replace("/", "/msg/"))
@@ -216,15 +231,12 @@ def _pixels(image: Any, name: str) -> NDArray[Any]:
     return cv2.cvtColor(values, _BAYER[bayer]) if encoding.startswith("bayer_") else values
 
 
-def _file_of(values: NDArray[Any]) -> bytes:
+def image_file(values: NDArray[Any]) -> bytes:
+    """Make a whole file of an image, BGR where it has colours: of those that lose nothing the quickest."""
     if values.ndim == 2:
         return arrays.encode_npy(values)
-    height, width = values.shape[:2]
-    top, kind = (255, "u1") if values.dtype == np.uint8 else (65535, ">u2")
-    buffer = io.BytesIO(b"P6\n%d %d\n%d\n" % (width, height, top))
-    buffer.seek(0, io.SEEK_END)
-    buffer.write(np.ascontiguousarray(values[..., ::-1], kind).data)
-    return buffer.getvalue()
+    ending = ".bmp" if values.dtype == np.uint8 else ".ppm"
+    return cv2.imencode(ending, np.ascontiguousarray(values))[1].tobytes()
 
 
 def _rectified(values: NDArray[Any], info: CameraInfo) -> NDArray[Any]:

@@ -1,4 +1,4 @@
-"""The frames of a bag for Python: `rollcli.open_recording`."""
+"""The frames of a recording for Python: `rollcli.open_recording`."""
 
 import os
 from collections.abc import Iterator
@@ -9,10 +9,12 @@ from numpy.typing import NDArray
 
 from rollcli.errors import UsageError
 from rollcli.extras import require_extra
-from rollcli.files.containers import bag_files
+from rollcli.files.codecs.pictures import views_of
+from rollcli.files.containers import bag_files, is_video
 from rollcli.files.encodings import to_disparity
 from rollcli.files.formats import read_image, read_stored
 from rollcli.files.recordings.frames import maps_of_bag, pairs_of_bag
+from rollcli.files.recordings.video import frames_of_pair, frames_of_video
 from rollcli.rig.calibration import Calibration
 
 
@@ -25,7 +27,7 @@ class RecordedFrame:
     name : str
         As rows name it.
     stamp : int
-        The time of its header, ns; of a pair that of the left view.
+        The time of its header, ns; of a pair that of the left view; of a video 0.
     disparity : ndarray, shape (H, W), or None
         Pixels, 0 is no data; None for a pair.
     left, right : ndarray or None
@@ -51,13 +53,15 @@ def open_recording(
     sync_tolerance: float = 0.001,
     encoding: str = "auto",
     scale: float | None = None,
+    side_by_side: str | None = None,
+    right: str | os.PathLike[str] | None = None,
 ) -> Iterator[RecordedFrame]:
-    """Iterate the frames of a bag, one in memory at a time.
+    """Iterate the frames of a bag or a video, one in memory at a time.
 
     Parameters
     ----------
     path : str or path
-        A ROS 1 `.bag`, a `.db3`, an `.mcap` or a rosbag2 folder.
+        A ROS 1 `.bag`, a `.db3`, an `.mcap` or a rosbag2 folder; or an `.mp4`, `.avi`, `.mkv` or `.mov`.
     topic : str, optional
         The disparity or depth maps; the only topic that fits by default.
     left_topic, right_topic : str, optional
@@ -66,13 +70,18 @@ def open_recording(
         How far apart the header stamps of a pair may be, seconds.
     encoding, scale
         As in `read_disparity`.
+    side_by_side : {"left-right", "top-bottom"}, optional
+        How each frame of a video holds both views.
+    right : str or path, optional
+        The video of the right view, where `path` is that of the left one.
 
     Raises
     ------
     UsageError
-        This is no bag, a topic is missing or not clear, or the extra is not installed.
+        This is no recording, a topic is missing or not clear, the views of a video are not told, or the extra
+        is not installed.
     InputError
-        A frame cannot be read; of a broken bag behind its last whole frame.
+        A frame cannot be read; of a broken recording behind its last whole frame.
 
     Examples
     --------
@@ -83,6 +92,9 @@ def open_recording(
     rollcli.errors.UsageError: rolls.csv: is no .bag, .db3, .mcap or rosbag2 folder
     """
     name = os.fspath(path)
+    if is_video(name):
+        yield from _video(name, None if right is None else os.fspath(right), side_by_side)
+        return
     files = bag_files(name)
     if not files:
         raise UsageError(f"{name}: is no .bag, .db3, .mcap or rosbag2 folder")
@@ -100,5 +112,24 @@ def open_recording(
             read = to_disparity(stored, encoding=encoding, scale=scale, calibration=camera)
             yield RecordedFrame(one.name, one.stamp, read.disparity, None, None, camera)
         else:
-            left, right = (read_image(each.location, each.name) for each in (one, other))
-            yield RecordedFrame(one.name, one.stamp, None, left, right, camera)
+            views = read_image(one.location, one.name), read_image(other.location, other.name)
+            yield RecordedFrame(one.name, one.stamp, None, *views, camera)
+
+
+def _video(name: str, right: str | None, layout: str | None) -> Iterator[RecordedFrame]:
+    if (right is None) == (layout is None) or layout not in (None, "left-right", "top-bottom"):
+        raise UsageError(
+            f'{name}: is a video: give side_by_side="left-right" or "top-bottom" where its frames hold both '
+            "views, or right, the video of the other one"
+        )
+    if right is None:
+        frames = [(each, each) for each in frames_of_video(name, name, name, layout)]
+    else:
+        frames = frames_of_pair((name, name, name), (right, right, right))
+    for one, other in frames:
+        image = read_image(one.location, one.name)
+        if layout is None:
+            views = image, read_image(other.location, other.name)
+        else:
+            views = views_of(image, layout, one.name)
+        yield RecordedFrame(one.name, one.stamp, None, *views, None)

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 from rollcli.errors import InputError, OutputError, UsageError
 from rollcli.extras import require_extra
-from rollcli.files.bounded import MOST_BYTES, too_large
+from rollcli.files.bounded import MOST_BYTES, in_words, too_large
 from rollcli.files.stores.locations import public_name, split_url, wait_for_room, waiting_for_network
 
 TIMEOUT_VARIABLE = "ROLLCLI_STORE_TIMEOUT"  # seconds a request may take
@@ -36,6 +36,7 @@ _CODES = {
     "AuthorizationHeaderMalformed": "the bucket is in another region; set AWS_REGION",
     "IllegalLocationConstraintException": "the bucket is in another region; set AWS_REGION",
 }
+_TOO_LONG = f"the store takes too long; {TIMEOUT_VARIABLE} sets the seconds it may take"
 _NO_KEYS = ("169.254.169.254", "metadata.google.internal")  # where machines of a cloud find theirs
 _REDIRECT = re.compile("Received redirect without LOCATION|301 Moved Permanently")
 # what holds names of buckets and objects, which say nothing of what is wrong
@@ -61,6 +62,11 @@ def request_seconds() -> float:
     return seconds
 
 
+def within_seconds(seconds: float) -> str:
+    """Say how long the bytes of one answer may take, behind how many they may be."""
+    return f", within {seconds:g} s ({TIMEOUT_VARIABLE} sets them)"
+
+
 def reason_of(error: Exception) -> str:
     """Say what a store objects to."""
     text = _without_names(error)
@@ -78,7 +84,7 @@ def reason_of(error: Exception) -> str:
         meanings = {"401": "the keys are not accepted; check them", "403": DENIED}
         return meanings.get(status[1], f"{_ANSWERED} {status[1]}")
     if "kind: Timeout" in text:
-        return f"the store takes too long; {TIMEOUT_VARIABLE} sets the seconds it may take"
+        return _TOO_LONG
     if "error sending request" in text or "onnect" in text:
         return "the store does not answer; check the network and the endpoint"
     return _CUT if "body" in text else _REFUSED
@@ -123,8 +129,8 @@ _FIRST_PAUSE_S = 0.2
 _OWNER = "rollcli-run"  # attribute of an object: who wrote it
 
 
-def read_object(url: str, most: int = MOST_BYTES) -> bytes:
-    """Return the bytes of an object.
+def read_object(url: str, most: int = MOST_BYTES) -> tuple[bytes, str]:
+    """Return the bytes of an object, and its entity tag; that is empty where the store has none.
 
     Raises
     ------
@@ -136,15 +142,15 @@ def read_object(url: str, most: int = MOST_BYTES) -> bytes:
 
     counted = False
 
-    def fetch() -> bytes:
+    def fetch() -> tuple[bytes, str]:
         nonlocal counted
         answer = store.get(key)
         if answer.meta["size"] > most:
-            raise too_large(public_name(url), answer.meta["size"], most)
+            raise too_large(public_name(url), answer.meta["size"], most, within_seconds(request_seconds()))
         if not counted:
             wait_for_room(answer.meta["size"])
             counted = True
-        return bytes(answer.bytes())
+        return bytes(answer.bytes()), answer.meta["e_tag"] or ""
 
     try:
         with waiting_for_network():
@@ -152,7 +158,9 @@ def read_object(url: str, most: int = MOST_BYTES) -> bytes:
     except FileNotFoundError as error:
         raise InputError(f"{public_name(url)}: {what_is_missing(error)}") from None
     except _store_errors() as error:
-        raise InputError(f"{public_name(url)}: cannot be read: {reason_of(error)}") from None
+        reason = reason_of(error)
+        limits = f" ({request_seconds():g}), for up to {in_words(most)}" if reason == _TOO_LONG else ""
+        raise InputError(f"{public_name(url)}: cannot be read: {reason}{limits}") from None
 
 
 def write_object(url: str, data: bytes, owner: str = "") -> None:
@@ -287,11 +295,20 @@ def list_objects(url: str) -> Iterator[tuple[str, int]]:
     UsageError
         There is no such bucket, or it may not be listed.
     """
+    return ((found, meta["size"]) for found, meta in _list(url))
+
+
+def list_tags(url: str) -> Iterator[tuple[str, str]]:
+    """Yield the URL and entity tag of each object below a prefix, as `list_objects` does its size."""
+    return ((found, meta["e_tag"] or "") for found, meta in _list(url))
+
+
+def _list(url: str) -> Iterator[tuple[str, Any]]:
     store, prefix = _open(url)
     root = split_url(url)[0]
     try:
         for found in _listed(store, prefix.rstrip("/") or None):
-            yield f"{root}/{found['path']}", found["size"]
+            yield f"{root}/{found['path']}", found
     except FileNotFoundError as error:
         raise UsageError(f"{public_name(url)}: {what_is_missing(error)}") from None
     except _store_errors() as error:

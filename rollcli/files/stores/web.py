@@ -10,9 +10,9 @@ from functools import partial
 from typing import Any
 
 from rollcli.errors import InputError
-from rollcli.files.bounded import MOST_BYTES, too_large
+from rollcli.files.bounded import MOST_BYTES, in_words, too_large
 from rollcli.files.stores.locations import public_name, wait_for_room, waiting_for_network
-from rollcli.files.stores.objects import TIMEOUT_VARIABLE, request_seconds
+from rollcli.files.stores.objects import TIMEOUT_VARIABLE, request_seconds, within_seconds
 
 _TRIES = 4
 _FIRST_PAUSE_S = 0.2
@@ -41,11 +41,11 @@ def read_web_file(url: str, most: int = MOST_BYTES) -> bytes:
     for attempt in range(_TRIES):
         try:
             with waiting_for_network():
-                return _fetched(url, give_up, most)
+                return _fetched(url, give_up, most, within_seconds(seconds))
         except urllib.error.HTTPError as error:
             reason, final = f"the server answered {error.code} {error.reason}", error.code < 500
         except (OSError, http.client.HTTPException, ValueError) as error:
-            reason = _reason(error, seconds)
+            reason = _reason(error, seconds, most)
             final = isinstance(error, ValueError | http.client.InvalidURL)  # no address, whoever is asked
         pause = _FIRST_PAUSE_S * 4**attempt
         if final or time.monotonic() + pause > give_up:
@@ -68,16 +68,16 @@ def web_problem(url: str) -> str:
     return ""
 
 
-def _fetched(url: str, give_up: float, most: int) -> bytes:
+def _fetched(url: str, give_up: float, most: int, within: str) -> bytes:
     with _opened(urllib.request.Request(url), give_up) as answer:
         if answer.length is not None and answer.length > most:
-            raise too_large(public_name(url), answer.length, most)
+            raise too_large(public_name(url), answer.length, most, within)
         wait_for_room(answer.length or 0)
         data = bytearray()
         while piece := answer.read(_PIECE):
             data += piece
             if len(data) > most:  # of an answer that does not say its length
-                raise too_large(public_name(url), None, most)
+                raise too_large(public_name(url), None, most, within)
         if answer.length:  # a bounded read of a body that is cut ends as one that is whole
             raise http.client.IncompleteRead(bytes(data), answer.length)
     return bytes(data)
@@ -156,9 +156,10 @@ class _ReadInTime(io.RawIOBase):
         super().close()
 
 
-def _reason(error: Exception, seconds: float) -> str:
+def _reason(error: Exception, seconds: float, most: int) -> str:
     if isinstance(error, TimeoutError) or "timed out" in str(error):
-        return f"the server takes too long; {TIMEOUT_VARIABLE} sets the seconds it may take ({seconds:g})"
+        limits = f"({seconds:g}), for up to {in_words(most)}"
+        return f"the server takes too long; {TIMEOUT_VARIABLE} sets the seconds it may take {limits}"
     if isinstance(error, http.client.IncompleteRead):
         return "the answer of the server was cut short"
     if isinstance(error, urllib.error.URLError):

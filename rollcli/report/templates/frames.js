@@ -1,6 +1,6 @@
 (() => {
   // the table of all frames: only the rows in view are in the document, so that 10,000 are as quick as ten
-  const { rows } = JSON.parse(document.getElementById("rows").textContent);
+  const { rows, places } = JSON.parse(document.getElementById("rows").textContent);
   const NUMBER = 0, FILE = 1, STATUS = 2, ROLL = 3, ANGLE = 4, WHY = 5;
   const box = document.querySelector(".frames .rows"), space = box.firstElementChild;
   const search = document.querySelector(".frames input"), count = document.querySelector(".frames .count");
@@ -93,8 +93,9 @@
   window.addEventListener("resize", draw);
   window.addEventListener("hashchange", follow);
   document.addEventListener("drawn", ({ target }) => target.on("plotly_click", event => {
-    const point = event.points.find(each => each.customdata && rows[each.x - 1]);
-    if (point && target.id !== "histogram") open(point.x - 1);
+    const place = each => places ? places.indexOf(each.x) : each.x - 1;
+    const point = event.points.find(each => each.customdata && rows[place(each)]);
+    if (point && target.id !== "histogram") open(place(point));
   }));
   arrange();
   follow();

@@ -10,16 +10,18 @@
     const seen = dialog.querySelector("div");
     seen.scrollLeft = (seen.scrollWidth - seen.clientWidth) / 2;
   };
+  const boxes = [...document.querySelectorAll(".gallery .pictures")];
+  const press = (buttons, shown) => buttons.forEach(
+    each => each.setAttribute("aria-pressed", String(shown(each.dataset.show))));
   const turn = (box, side) => {
     box.dataset.show = side;
-    box.querySelectorAll(".switch button").forEach(
-      each => each.setAttribute("aria-pressed", String(each.dataset.show === side)));
+    press(box.querySelectorAll(".switch button"), each => each === side);
+    press(document.querySelectorAll(".switch-all button"), each => boxes.every(box => box.dataset.show === each));
   };
   document.addEventListener("click", event => {
     const button = event.target.closest(".switch button");
     if (!button) return;
-    const boxes = button.closest(".switch-all") ? document.querySelectorAll(".gallery .pictures") : [button.closest(".pictures")];
-    boxes.forEach(box => turn(box, button.dataset.show));
+    (button.closest(".switch-all") ? boxes : [button.closest(".pictures")]).forEach(box => turn(box, button.dataset.show));
   });
   // also from a copy of the pictures, which the table shows
   document.addEventListener("click", event => {
@@ -31,8 +33,8 @@
   dialog.querySelector("[data-close]").addEventListener("click", () => dialog.close());
   dialog.addEventListener("click", event => { if (event.target === dialog) dialog.close(); });
   dialog.addEventListener("close", () => {
-    const side = ["before", "after", "heights"].find(each => pictures[current].classList.contains(each));
-    if (side) turn(pictures[current].closest(".pictures"), side);
+    const box = pictures[current].closest(".pictures"), sides = [...pictures[current].classList].slice(1);
+    if (sides.length && !sides.includes(box.dataset.show)) turn(box, sides[0]);
     pictures[current].focus();
   });
   dialog.addEventListener("keydown", event => {

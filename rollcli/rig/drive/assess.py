@@ -17,6 +17,7 @@ from rollcli.rig.drive.outliers import Flags, Floats
 from rollcli.rig.drive.posterior import Estimate
 from rollcli.rig.drive.quantity import SequenceAssessment, assess_sequence
 from rollcli.rig.quantities import ALIGNMENT, COLUMNS, QUANTITIES, ROLL, SIZE, Quantity
+from rollcli.rig.stamps import drive_of, hours_between, seconds_of
 
 AUTO, NONE = "auto", "none"
 _FRAMES_OF_A_DRIVE = 8  # folders of fewer frames on average are not drives but single frames
@@ -37,9 +38,9 @@ def split_drives(
     files : sequence of str
         Paths with "/" separators, in the order of the frames.
     groups : str
-        "auto": frames of one folder are one drive, unless folders hold hardly a frame each and their rolls do
-        not differ beyond their spread; "none": all are one; else a pattern such as "data/run*": the folders
-        that it matches are drives, with all below them.
+        "auto": frames of one folder or recording are one drive, unless they hold hardly a frame each and
+        their rolls do not differ beyond their spread; "none": all are one; else a pattern such as
+        "data/run*": the folders that it matches are drives, with all below them.
     kinds : sequence of str, optional
         What else tells the frames of a folder apart, such as their size.
     rolls : ndarray of float, shape (N,), optional
@@ -58,7 +59,7 @@ def split_drives(
     if groups == NONE or not files:
         return [("", np.arange(len(files)))] if files else []
     pattern = "" if groups == AUTO else groups
-    folders = [file.rpartition("/")[0] for file in files]
+    folders = list(map(drive_of, files))
     names = {folder: _matching(folder, pattern) if pattern else folder for folder in dict.fromkeys(folders)}
     if pattern and not any(_matches(folder, pattern) for folder in names):
         raise UsageError(f"--groups {groups}: matches no folder of the frames, such as {next(iter(names))}")
@@ -127,7 +128,7 @@ class DriveAssessment:
     Attributes
     ----------
     name : str
-        Its folder; empty when all frames are one drive.
+        Its folder or recording; empty when all frames are one drive.
     frames : ndarray of int
         Its frames among all, from 0.
     quantities : mapping of str to SequenceAssessment
@@ -180,6 +181,20 @@ class RigAssessment:
         """Return the name of a drive, without the folders that all files have in common."""
         before = self.frames.files[0].removesuffix(self.names[0]) if self.count else ""
         return drive.name.removeprefix(before)
+
+    @cached_property
+    def seconds(self) -> Floats:
+        """When each frame was taken, s since the first; NaN where its name has no stamp."""
+        return seconds_of(self.frames.files)
+
+    def drift_per_hour(self, drive: DriveAssessment | None, quantity: Quantity = ROLL) -> Estimate:
+        """Return the drift of a drive over the time between its ends; unknown where names have no stamps."""
+        found = None if drive is None else drive.quantities.get(quantity.name)
+        hours = None if drive is None else hours_between(self.seconds[drive.frames])
+        if found is None or found.drift.value is None or hours is None:
+            return Estimate()
+        half = found.drift.ci95
+        return Estimate(found.drift.value / hours, None if half is None else half / hours)
 
     @property
     def count(self) -> int:
@@ -248,12 +263,13 @@ def assess_rig(
 
 def assess_frames(frames: RigFrames, *, include_suspect: bool = False, groups: str = AUTO) -> RigAssessment:
     """Assess frames that are columns already; see `assess_rig`."""
-    counted = frames.ok | frames.suspect if include_suspect else frames.ok
+    measured = frames.ok | frames.suspect  # how the views lie is told where the angle is not, too
+    counted = measured if include_suspect else frames.ok
     drives: list[DriveAssessment] = []
     rolls = np.where(counted, frames.numbers[ROLL.column], np.nan)
     for name, places in split_drives(frames.files, groups, _kinds(frames), rolls):
         found = {
-            quantity.name: _assessed(frames, places, counted, quantity)
+            quantity.name: _assessed(frames, places, measured if quantity in ALIGNMENT else counted, quantity)
             for quantity in (*QUANTITIES, *ALIGNMENT)
             if quantity is ROLL or np.isfinite(frames.numbers.get(quantity.column, np.empty(0))).any()
         }

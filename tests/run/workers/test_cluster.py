@@ -144,10 +144,8 @@ def far(local, tmp_path):
 
 
 def assert_is_that_of_a_local_run(far, local):
-    record = "rolls.csv.run.json"  # holds the times of the inputs, which differ
-    assert differing(contents(local), contents(far)) <= {record}
-    counts = [json.loads((folder / record).read_text())["counts"] for folder in (local, far)]
-    assert counts[0] == counts[1]
+    # the one holds the times of the inputs, which differ
+    assert differing(contents(local), contents(far)) <= {"rolls.csv.inputs"}
 
 
 def differing(one, other):

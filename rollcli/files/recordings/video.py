@@ -1,0 +1,241 @@
+"""Videos: their frames, decoded in order.
+
+A video cannot be sought exactly: where rates vary, or frames refer to later ones, another frame comes.
+So each worker opens the video itself, decodes from its start, and passes over what others do. That gives
+the same frames for any workers, on a cluster too, and keeps one frame in memory. It costs each worker the
+decoding of all frames: some ms each of what cameras write, where matching takes 100.
+"""
+
+import os
+import struct
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, BinaryIO, NamedTuple
+
+import cv2
+from numpy.typing import NDArray
+
+from rollcli.errors import InputError, UsageError
+from rollcli.files.bounded import state_of
+from rollcli.files.codecs.pictures import half_size
+from rollcli.files.codecs.raw_map import require_decoded_fits
+from rollcli.files.recordings.frames import RecordingFrame
+from rollcli.files.recordings.messages import image_file
+
+_BOXES = (b"ftyp", b"moov", b"mdat", b"wide", b"free", b"skip", b"styp")  # that MP4 and MOV begin with
+_EBML, _SEGMENT = 0x1A45DFA3, 0x18538067  # Matroska's
+# a packet that is cut off makes no frame, and what a file names elsewhere is not followed
+_OPTIONS = "fflags;discardcorrupt|protocol_whitelist;file"
+
+
+class Video(NamedTuple):
+    """What a video has: whole frames, their size in px, and what is wrong behind them, else empty."""
+
+    frames: int
+    width: int
+    height: int
+    broken: str
+
+
+def look_through(path: str, name: str) -> Video:
+    """Count the frames of a video by decoding it: the number that its container states is a guess.
+
+    Raises
+    ------
+    UsageError
+        It cannot be opened, or has no frame.
+    """
+    try:
+        return _look_through(*state_of(path), name)
+    except InputError as error:
+        raise UsageError(str(error)) from None
+
+
+@lru_cache(maxsize=4)
+def _look_through(path: str, size: int, modified_ns: int, name: str) -> Video:
+    decoder = _Decoder(path, name, threads=os.cpu_count() or 1)
+    count = 0
+    while decoder.grab():
+        count += 1
+    broken = broken_end(path)
+    if count == 0:
+        raise InputError(f"{name}: has no frame that can be decoded{broken and f'; it {broken}'}")
+    return Video(count, decoder.width, decoder.height, broken)
+
+
+def frames_of_video(path: str, name: str, relative: str, layout: str | None) -> list[RecordingFrame]:
+    """List the frames of a video; what is broken behind them is one more, which fails and says so.
+
+    Raises
+    ------
+    UsageError
+        See `look_through`; or its frames cannot be halved as `layout` says.
+    """
+    video, stem = look_through(path, name), os.path.splitext(relative)[0]  # noqa: PTH122
+    if layout is not None:
+        try:
+            half_size(video.width, video.height, layout, name)
+        except InputError as error:
+            raise UsageError(str(error)) from None
+    numbers = [f"{number:06d}" for number in range(video.frames)] + (["rest"] if video.broken else [])
+    return [RecordingFrame(f"{path}#{each}", f"{name}#{each}", f"{stem}_{each}.png", 0) for each in numbers]
+
+
+def frames_of_pair(
+    left: tuple[str, str, str], right: tuple[str, str, str]
+) -> list[tuple[RecordingFrame, RecordingFrame]]:
+    """Pair the frames of two videos, each a path, a name and a relative path, by their numbers.
+
+    Raises
+    ------
+    UsageError
+        They differ in size; or in length, and neither is cut off.
+    """
+    one, other = (look_through(*each[:2]) for each in (left, right))
+    if (one.width, one.height) != (other.width, other.height):
+        raise UsageError(
+            f"{left[1]} has {one.width}x{one.height} px, {right[1]} {other.width}x{other.height}: give two "
+            "views of one size"
+        )
+    if one.frames != other.frames and not (one.broken or other.broken):
+        raise UsageError(
+            f"{left[1]} has {one.frames} frames, {right[1]} {other.frames}: they pair up by number, and "
+            "behind a frame that one camera dropped all pairs are wrong: cut both to the same moments"
+        )
+    both = [frames_of_video(*each, None) for each in (left, right)]
+    few = min(one.frames, other.frames)
+    ends = [frames[-1] for frames, video in zip(both, (one, other), strict=True) if video.broken]
+    return [*zip(both[0][:few], both[1][:few], strict=True), *((end, end) for end in ends)]
+
+
+def read_video_frame(path: str, frame: str, name: str) -> bytes:
+    """Decode one frame of a video as a whole file; frames that follow each other are read in one pass."""
+    if frame == "rest":
+        raise InputError(f"{name}: {broken_end(path) or 'is whole'}; the whole frames before are used")
+    if not frame.isdecimal():
+        raise InputError(f"{name}: no such frame in {path}")
+    return image_file(_decoder(*state_of(path)).read(int(frame), name))
+
+
+@lru_cache(maxsize=4)  # both of a pair, and those of another drive
+def _decoder(path: str, size: int, modified_ns: int) -> "_Decoder":
+    return _Decoder(path, path, threads=1)
+
+
+class _Decoder:
+    """A video that is open."""
+
+    def __init__(self, path: str, name: str, threads: int) -> None:
+        self._path, self._name, self._threads = path, name, threads
+        self._open()
+
+    def _open(self) -> None:
+        with Path(self._path).open("rb") as file:
+            if _container(file.read(16)) is None:
+                raise InputError(f"{self._name}: is no MP4, MOV, AVI or Matroska file")
+        os.environ["OPENCV_FFMPEG_CAPTURE_OPTIONS"] = _OPTIONS
+        os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # its errors are ours to tell
+        level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+        settings = [cv2.CAP_PROP_N_THREADS, self._threads]
+        self._capture = cv2.VideoCapture(os.path.abspath(self._path), cv2.CAP_FFMPEG, settings)  # noqa: PTH100
+        cv2.utils.logging.setLogLevel(level)
+        self._capture.set(cv2.CAP_PROP_ORIENTATION_AUTO, 0)  # turned views would not be rectified any more
+        self._next = 0
+        if not self._capture.isOpened():
+            broken = broken_end(self._path) or "has no video that OpenCV decodes, or no index"
+            raise InputError(f"{self._name}: cannot be opened: it {broken}")
+        sides = (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT)
+        self.width, self.height = (int(self._capture.get(side)) for side in sides)
+        size = Path(self._path).stat().st_size
+        require_decoded_fits(self.width, self.height, 3, size, self._name)
+
+    def grab(self) -> bool:
+        """Decode the next frame; return whether there is one."""
+        found = bool(self._capture.grab())
+        self._next += found
+        return found
+
+    def read(self, number: int, name: str) -> NDArray[Any]:
+        """Return a frame as BGR; one before the last that was read makes it begin anew."""
+        if number < self._next - 1:
+            self._open()
+        while self._next <= number:
+            if not self.grab():
+                raise InputError(f"{name}: no such frame: {self._path} has {self._next} that can be decoded")
+        found, values = self._capture.retrieve()
+        if not found:
+            raise InputError(f"{name}: cannot be decoded")
+        return values
+
+
+def broken_end(path: str) -> str:
+    """Say that a video's file is shorter than its container says; empty where it is whole."""
+    with Path(path).open("rb") as file:
+        size = file.seek(0, os.SEEK_END)
+        file.seek(0)
+        walk = _container(file.read(16))
+        try:
+            end = 0 if walk is None else walk(file, size)
+        except (struct.error, IndexError):  # amid a header
+            end = size + 1
+    return f"is cut off: it ends at byte {size}, amid a part of its file" if end > size else ""
+
+
+def _container(head: bytes) -> Any:
+    """Return what finds the end that a container states, by its first bytes; None for others."""
+    if head[:4] == b"RIFF" and head[8:12] == b"AVI ":
+        return _end_of_avi
+    if head[4:8] in _BOXES:
+        return _end_of_mp4
+    return _end_of_matroska if head[:4] == struct.pack(">I", _EBML) else None
+
+
+def _end_of_avi(file: BinaryIO, size: int) -> int:
+    at = end = 0
+    while at + 8 <= size:  # large files have several RIFFs
+        file.seek(at)
+        mark, length = struct.unpack("<4sI", file.read(8))
+        if mark != b"RIFF":
+            break
+        end = at + 8 + length
+        at = end + length % 2
+    return end
+
+
+def _end_of_mp4(file: BinaryIO, size: int) -> int:
+    at = 0
+    while at + 8 <= size:
+        file.seek(at)
+        (length,) = struct.unpack(">I4x", file.read(8))
+        if length == 1:
+            (length,) = struct.unpack(">Q", file.read(8))
+        if length < 8:  # 0: up to the end of the file
+            break
+        at += length
+    return at
+
+
+def _end_of_matroska(file: BinaryIO, size: int) -> int:
+    at = 0
+    while at < size:
+        file.seek(at)
+        head = file.read(12)
+        mark, after = _number(head, 0)
+        length, content = _number(head, after)
+        bits = 7 * (content - after)
+        length &= (1 << bits) - 1
+        if length < (1 << bits) - 1:
+            at += content + length
+        elif mark == _SEGMENT:  # its length is not known: its parts are looked at
+            at += content
+        else:
+            return size + 1  # the cluster in which its recorder died
+    return at
+
+
+def _number(data: bytes, at: int) -> tuple[int, int]:
+    """Read one of Matroska's numbers, whose first bit that is set says how long it is; and what follows."""
+    length = 9 - data[at].bit_length()
+    if at + length > len(data):
+        raise IndexError
+    return int.from_bytes(data[at : at + length], "big"), at + length

@@ -1,0 +1,274 @@
+"""Videos, and images that hold both views, give the rolls of the same frames from files."""
+
+import csv
+import io
+import math
+import os
+import re
+import struct
+import zlib
+
+import cv2
+import numpy as np
+import pytest
+
+import rollcli as package
+from rollcli.errors import InputError, UsageError
+from tests.run_cli import road_map, rollcli, write_pair
+
+# FFmpeg asks for this once in a process, here for the videos that are written
+os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+
+# lossless, so that frames are those of the files
+LOSSLESS = {"drive.avi": "FFV1", "drive.mkv": "FFV1", "drive.mov": "png ", "drive.mp4": "FFV1"}
+COUNT = 5
+
+
+def write_video(path, frames, codec=None):
+    height, width = frames[0].shape[:2]
+    fourcc = cv2.VideoWriter_fourcc(*(codec or LOSSLESS[path.name]))
+    writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, fourcc, 10, (width, height))
+    if not writer.isOpened():
+        pytest.skip(f"this OpenCV writes no {path.name}")
+    for each in frames:
+        writer.write(each if each.ndim == 3 else cv2.cvtColor(each, cv2.COLOR_GRAY2BGR))
+    writer.release()
+    return path
+
+
+@pytest.fixture(scope="module")
+def drive(tmp_path_factory):
+    """A folder with left/ and right/, the rows of these pairs, and the views."""
+    folder = tmp_path_factory.mktemp("drive")
+    for number in range(COUNT):
+        write_pair(folder, f"{number}.png", road_map(math.radians(number - 2)), seed=number)
+    done = rollcli("estimate", "--left", "left", "--right", "right", cwd=folder)
+    assert done.status == 0, done.err
+    views = [
+        [cv2.imread(str(folder / side / f"{each}.png")) for side in ("left", "right")]
+        for each in range(COUNT)
+    ]
+    return folder, rows(done.out), views
+
+
+def rows(text):
+    return list(csv.DictReader(io.StringIO(text)))
+
+
+def without_names(found):
+    return [{key: each for key, each in row.items() if key not in ("file", "right_file")} for row in found]
+
+
+def padded(png, size):
+    """The same PNG, as long as is asked, by a chunk of text."""
+    chunk = b"tEXt" + b"a" * (size - len(png) - 12)
+    text = struct.pack(">I", len(chunk) - 4) + chunk + struct.pack(">I", zlib.crc32(chunk))
+    return png[:-12] + text + png[-12:]
+
+
+def beside(views):
+    return [np.hstack(each) for each in views]
+
+
+@pytest.mark.parametrize("name", LOSSLESS)
+def test_a_video_gives_the_rows_of_the_same_pairs_in_files(tmp_path, drive, name):
+    _, expected, views = drive
+    write_video(tmp_path / name, beside(views))
+    one = rollcli("estimate", "--side-by-side", name, "--disparity", "maps", cwd=tmp_path)
+    assert (one.status, without_names(rows(one.out))) == (0, without_names(expected)), one.err
+    two = rollcli("estimate", name, "--side-by-side", "-j", "2", cwd=tmp_path)
+    assert two.out == one.out
+    names = [f"{name}#{each:06d}" for each in range(COUNT)]
+    assert [row["file"] for row in rows(one.out)] == names
+    assert [row["right_file"] for row in rows(one.out)] == names
+    made = [f"drive_{each:06d}.png" for each in range(COUNT)]
+    assert sorted(each.name for each in (tmp_path / "maps").iterdir()) == made
+    done = rollcli("disparity", name, "--side-by-side=left-right", "-o", "again", cwd=tmp_path)
+    assert done.status == 0, done.err
+    for each in made:
+        assert (tmp_path / "maps" / each).read_bytes() == (tmp_path / "again" / each).read_bytes()
+    every = rollcli("estimate", name, "--side-by-side", "--every", "2", cwd=tmp_path)
+    assert rows(every.out) == rows(one.out)[::2]
+    alone = rollcli("estimate", names[3], "--side-by-side", cwd=tmp_path)
+    assert rows(alone.out) == [rows(one.out)[3]]
+    listed = rollcli("estimate", name, "--side-by-side", "--dry-run", "--derotated", "up", cwd=tmp_path)
+    assert listed.out.splitlines()[:2] == [f"read  {names[0]}", "write up/drive_000000.png"]
+
+
+def test_two_videos_are_paired_by_the_numbers_of_their_frames(tmp_path, drive):
+    _, expected, views = drive
+    for side, name in enumerate(("a.avi", "b.avi")):
+        write_video(tmp_path / name, [each[side] for each in views], "FFV1")
+    done = rollcli("estimate", "--left", "a.avi", "--right", "b.avi", "-j", "2", cwd=tmp_path)
+    assert (done.status, without_names(rows(done.out))) == (0, without_names(expected)), done.err
+    assert [rows(done.out)[4][key] for key in ("file", "right_file")] == ["a.avi#000004", "b.avi#000004"]
+    write_video(tmp_path / "b.avi", [each[1] for each in views[1:]], "FFV1")
+    shorter = rollcli("estimate", "--left", "a.avi", "--right", "b.avi", cwd=tmp_path)
+    assert (shorter.status, shorter.err.count("\n")) == (2, 1)
+    assert "a.avi has 5 frames, b.avi 4" in shorter.err
+    write_video(tmp_path / "b.avi", [each[1][:, 2:] for each in views], "FFV1")
+    smaller = rollcli("disparity", "--left", "a.avi", "--right", "b.avi", "-o", "maps", cwd=tmp_path)
+    assert (smaller.status, "give two views of one size" in smaller.err) == (2, True)
+
+
+@pytest.mark.parametrize(("layout", "join"), [("left-right", np.hstack), ("top-bottom", np.vstack)])
+def test_images_side_by_side_give_the_same_rows_as_their_halves(tmp_path, drive, layout, join):
+    _, expected, views = drive
+    (tmp_path / "both").mkdir()
+    for number, each in enumerate(views):
+        cv2.imwrite(str(tmp_path / "both" / f"{number}.png"), join(each))
+    done = rollcli("estimate", "both", "--side-by-side", layout, cwd=tmp_path)
+    assert (done.status, without_names(rows(done.out))) == (0, without_names(expected)), done.err
+    odd = join(views[1])
+    cv2.imwrite(str(tmp_path / "both" / "1.png"), odd[:-1, :-1])
+    mixed = rollcli("estimate", "both", "--side-by-side", layout, cwd=tmp_path)
+    found = rows(mixed.out)
+    assert (mixed.status, [row["status"] for row in found].count("error")) == (3, 1)
+    assert "cannot be halved into two views" in found[1]["message"]
+
+
+@pytest.mark.parametrize("name", ["drive.avi", "drive.mkv"])
+def test_a_video_that_is_cut_gives_every_whole_frame_and_a_line(tmp_path, drive, name):
+    _, _, views = drive
+    path = write_video(tmp_path / name, beside(views), "MJPG")
+    whole = rows(rollcli("estimate", name, "--side-by-side", cwd=tmp_path).out)
+    capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG, [cv2.CAP_PROP_FORMAT, -1])
+    packets = [capture.retrieve()[1].tobytes() for _ in iter(capture.grab, False)]
+    capture.release()
+    data = path.read_bytes()
+    ends = [data.index(packet.rstrip(b"\0")) + len(packet) for packet in packets]
+    for tenth in range(1, 10):
+        cut = len(data) * tenth // 10
+        path.write_bytes(data[:cut])
+        done = rollcli("estimate", name, "--side-by-side", cwd=tmp_path)
+        there = sum(end <= cut for end in ends)
+        if not there:
+            assert (done.status, done.err.count("\n")) == (2, 1), done.err
+            assert "is cut off" in done.err
+            continue
+        found = rows(done.out)
+        assert (done.status, len(found), found[:-1]) == (3, there + 1, whole[:there]), done.err
+        assert (found[-1]["file"], found[-1]["status"]) == (f"{name}#rest", "error")
+        assert "is cut off" in found[-1]["message"]
+
+
+@pytest.mark.parametrize("name", ["drive.mp4", "drive.mov"])
+def test_a_video_whose_index_is_cut_off_is_refused_with_a_line(tmp_path, drive, name):
+    path = write_video(tmp_path / name, beside(drive[2]))
+    data = path.read_bytes()
+    for tenth in range(1, 10):
+        path.write_bytes(data[: len(data) * tenth // 10])
+        done = rollcli("estimate", name, "--side-by-side", cwd=tmp_path)
+        assert (done.status, done.out, done.err.count("\n")) == (2, "", 1)
+        assert f"{name}: cannot be opened: it is cut off" in done.err
+
+
+def test_a_pair_of_videos_of_which_one_is_cut_off_uses_what_both_have(tmp_path, drive):
+    _, _, views = drive
+    for side, name in enumerate(("a.avi", "b.avi")):
+        write_video(tmp_path / name, [each[side] for each in views], "FFV1")
+    whole = rows(rollcli("estimate", "--left", "a.avi", "--right", "b.avi", cwd=tmp_path).out)
+    data = (tmp_path / "b.avi").read_bytes()
+    (tmp_path / "b.avi").write_bytes(data[: len(data) * 7 // 10])
+    done = rollcli("estimate", "--left", "a.avi", "--right", "b.avi", cwd=tmp_path)
+    found = rows(done.out)
+    assert (done.status, found[:-1]) == (3, whole[: len(found) - 1])
+    assert len(found) >= 3
+    assert (found[-1]["file"], "is cut off" in found[-1]["message"]) == ("b.avi#rest", True)
+
+
+def test_an_interrupted_run_over_a_video_is_resumed_to_the_same_bytes(tmp_path, drive):
+    write_video(tmp_path / "drive.mkv", beside(drive[2]))
+    given = ["estimate", "drive.mkv", "--side-by-side", "-o", "rolls.csv"]
+    assert rollcli(*given, cwd=tmp_path).status == 0
+    whole = (tmp_path / "rolls.csv").read_bytes()
+    (tmp_path / "rolls.csv").write_bytes(b"".join(whole.splitlines(keepends=True)[:3]))
+    other = rollcli(
+        "estimate", "drive.mkv", "--side-by-side", "top-bottom", *given[3:], "--resume", cwd=tmp_path
+    )
+    assert (other.status, "side-by-side" in other.err) == (2, True)
+    assert rollcli(*given, "--resume", cwd=tmp_path).status == 0
+    assert (tmp_path / "rolls.csv").read_bytes() == whole
+
+
+def test_a_result_of_a_video_goes_on_to_the_other_commands(tmp_path, drive):
+    write_video(tmp_path / "drive.mkv", beside(drive[2]))
+    done = rollcli(
+        "estimate", "drive.mkv", "--side-by-side", "-o", "rolls.csv", "--disparity", "maps", cwd=tmp_path
+    )
+    assert done.status == 0, done.err
+    for given in (
+        ["derotate", "maps", "--from", "rolls.csv", "-o", "upright"],
+        ["heights", "maps", "--from", "rolls.csv", "-o", "heights"],
+        ["vdisparity", "maps", "-o", "counted"],
+        ["report", "rolls.csv", "-o", "page.html"],
+        ["report", "rolls.csv", "-o", "again.html", "--images", "maps"],
+        ["rig", "rolls.csv"],
+    ):
+        found = rollcli(*given, cwd=tmp_path)
+        assert found.status == 0, (given, found.err)
+    assert (tmp_path / "upright" / "drive_000003.png").is_file()
+    for name in ("derotate", "vdisparity", "heights"):
+        further = ["--from", "rolls.csv"] if name != "vdisparity" else []
+        refused = rollcli(name, "drive.mkv", *further, "-o", "none", cwd=tmp_path)
+        assert (refused.status, "drive.mkv: is a video, of views and not of maps" in refused.err) == (2, True)
+
+
+def test_what_is_no_usable_video_is_told_in_a_line(tmp_path, drive):
+    _, _, views = drive
+    frames = beside(views)
+    write_video(tmp_path / "drive.mkv", frames)
+    odd = write_video(tmp_path / "odd.avi", frames, "png ")  # the writer makes widths even
+    smaller = cv2.imencode(".png", frames[0][:, :101])[1].tobytes()
+    larger = re.compile(rb"\x89PNG.*?IEND....", re.DOTALL)
+    odd.write_bytes(larger.sub(lambda found: padded(smaller, len(found[0])), odd.read_bytes()))
+    write_video(tmp_path / "narrow.mkv", [cv2.resize(each, (160, 120)) for each in frames], "FFV1")
+    (tmp_path / "noise.mp4").write_bytes(np.random.default_rng(0).bytes(5000))
+    (tmp_path / "header.mp4").write_bytes(b"\0\0\0\x18ftypisom" + np.random.default_rng(0).bytes(5000))
+    (tmp_path / "list.mp4").write_text("#EXTM3U\nhttp://127.0.0.1:9/a.ts\n")
+    (tmp_path / "empty.mp4").write_bytes(b"")
+    for given, expected in (
+        (["drive.mkv"], "drive.mkv: is a video, of views and not of maps: give --side-by-side"),
+        (["--left", "drive.mkv"], "--left and --right are given together"),
+        (["--side-by-side"], "name pairs in one way"),
+        (["drive.mkv", "--side-by-side", "--left", "a", "--right", "b"], "name pairs in one way"),
+        (["odd.avi", "--side-by-side"], "odd.avi: is 101 px wide, which cannot be halved"),
+        (["narrow.mkv", "--side-by-side"], "its views would be 80x120 px, higher than wide"),
+        (["noise.mp4", "--side-by-side"], "noise.mp4: is no MP4, MOV, AVI or Matroska file"),
+        (["header.mp4", "--side-by-side"], "header.mp4: cannot be opened"),
+        (["list.mp4", "--side-by-side"], "list.mp4: is no MP4, MOV, AVI or Matroska file"),
+        (["empty.mp4", "--side-by-side"], "empty.mp4: is no MP4"),
+        (["none.mp4", "--side-by-side"], "none.mp4: no such file"),
+        (
+            ["s3://bucket/drive.mp4", "--side-by-side"],
+            "recordings are read from local disk: download it first",
+        ),
+    ):
+        done = rollcli("estimate", *given, cwd=tmp_path)
+        assert (done.status, done.out, done.err.count("\n")) == (2, "", 1), (given, done.err)
+        assert expected in done.err, done.err
+    camera = ["--focal", "175", "--principal-point", "40,60"]  # of the views as they are: nothing is squeezed
+    done = rollcli("estimate", "narrow.mkv", "--side-by-side", *camera, cwd=tmp_path)
+    assert len(rows(done.out)) == COUNT, done.err
+
+
+def test_python_iterates_the_frames_of_a_video(tmp_path, drive):
+    _, _, views = drive
+    path = write_video(tmp_path / "drive.mkv", beside(views))
+    found = list(package.open_recording(path, side_by_side="left-right"))
+    assert [each.name for each in found] == [f"{path}#{each:06d}" for each in range(COUNT)]
+    for each, (left, right) in zip(found, views, strict=True):
+        np.testing.assert_array_equal(each.left, left)
+        np.testing.assert_array_equal(each.right, right)
+    for side, name in enumerate(("a.avi", "b.avi")):
+        write_video(tmp_path / name, [each[side] for each in views], "FFV1")
+    for each, (left, right) in zip(
+        package.open_recording(tmp_path / "a.avi", right=tmp_path / "b.avi"), views, strict=True
+    ):
+        np.testing.assert_array_equal(each.left, left)
+        np.testing.assert_array_equal(each.right, right)
+    with pytest.raises(UsageError, match="is a video: give side_by_side"):
+        list(package.open_recording(path))
+    path.write_bytes(path.read_bytes()[:-20_000])
+    with pytest.raises(InputError, match="is cut off"):
+        list(package.open_recording(path, side_by_side="left-right"))

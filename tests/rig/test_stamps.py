@@ -1,0 +1,111 @@
+"""Stamps in the names of frames: a drift an hour, the axis of time, and which frames are one drive."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rollcli.files.results import Row
+from rollcli.report.charts import all_charts
+from rollcli.rig.drive.assess import assess_rig
+from rollcli.rig.stamps import drive_of
+from tests.run_cli import rollcli
+
+START = 1_700_000_000_123_456_789
+RATE = 3.0  # degrees an hour
+NAME = "runs/drive.mcap#/stereo/disparity@{}"
+
+
+def rows(count=600, rate=RATE, name=NAME, start=START, every_s=1.0):
+    """Frames of a second each, a third of them dropped in the first half, whose roll drifts with time."""
+    rng = np.random.default_rng(3)
+    times = np.array([each for each in range(count) if each % 3 or each > count // 2]) * every_s
+    rolls = rng.normal(0.5, 0.05, len(times)) + rate * times / 3600
+    return times, [
+        Row(name.format(start + round(time * 1e9)), "", "ok", roll_deg=float(roll), roll_ci95_deg=0.05)
+        for time, roll in zip(times, rolls, strict=True)
+    ]
+
+
+def test_a_drift_is_told_an_hour_where_names_have_stamps():
+    times, given = rows()
+    rig = assess_rig(given)
+    (drive,) = rig.drives
+    hourly, whole = rig.drift_per_hour(drive), drive.quantities["roll"].drift
+    hours = (times[-1] - times[0]) / 3600
+    assert hourly.value == pytest.approx(whole.value / hours)
+    assert abs(hourly.value - RATE) < hourly.ci95 < 0.6
+    without = assess_rig([replace(each, file=f"{place}.png") for place, each in enumerate(given)])
+    assert without.drift_per_hour(without.drives[0]).value is None
+
+
+def test_rig_says_the_drift_an_hour_in_words_and_in_json(tmp_path):
+    from rollcli.files.results import format_row
+
+    _, given = rows()
+    lines = b"".join(format_row(each, "jsonl", ()) for each in given)
+    (tmp_path / "rolls.jsonl").write_bytes(lines)
+    told = rollcli("rig", "rolls.jsonl", cwd=tmp_path)
+    assert told.status == 0, told.err
+    (line,) = [each for each in told.out.splitlines() if each.startswith("drift")]
+    assert " over the drive, +" in line
+    assert line.endswith("° an hour")
+    found = json.loads(rollcli("rig", "rolls.jsonl", "--format", "json", cwd=tmp_path).out)
+    hourly = found["drift_deg_per_hour"]
+    assert f"+{hourly:.2f}"[:4] in line
+    assert abs(hourly - RATE) < found["drift_ci95_deg_per_hour"]
+    assert found["drift_deg"] == pytest.approx(hourly * 598 / 3600, rel=1e-3)
+    page = rollcli("report", "rolls.jsonl", "-o", "page.html", "--gallery", "0", cwd=tmp_path)
+    assert page.status == 0, page.err
+    assert "an hour" in (tmp_path / "page.html").read_text("utf-8")
+
+
+@pytest.mark.parametrize(("every_s", "unit", "size"), [(0.1, "s", 1), (1.0, "min", 60), (30.0, "h", 3600)])
+def test_the_axis_of_charts_is_time_where_names_have_stamps(every_s, unit, size):
+    times, given = rows(every_s=every_s)
+    given = [replace(each, right_lower_px=0.1, width=640, height=480) for each in given]
+    given.append(Row("runs/drive.mcap#rest", "", "error", message="is cut off"))
+    charts = all_charts(given, assess_rig(given))
+    for name in ("roll", "alignment"):
+        assert charts[name].layout["xaxis"]["title"]["text"] == f"time, {unit}"
+    shown = {trace["name"]: trace for trace in charts["roll"].data}
+    x = [each for each in shown["roll"]["x"] if each is not None]
+    np.testing.assert_allclose(x, (times - times[0]) / size, atol=1e-6)
+    assert shown["failed"]["x"] == [x[-1]]
+    low, high = charts["roll"].layout["xaxis"]["range"]
+    assert low <= 0
+    assert high >= x[-1]
+    mounting = [each for each in shown["mounting"]["x"] if each is not None]
+    assert mounting == [x[0], x[-1]]
+
+
+def test_the_axis_stays_that_of_frames_where_time_would_mislead():
+    _, given = rows(100)
+    again = rows(100, name="runs/other.mcap#/stereo/disparity@{}", start=START + 86_400 * 10**9)[1]
+    for some in (
+        [*given, *again],  # a day between the drives
+        [*given[::-1]],  # stamps that descend
+        [*given, Row("runs/a.png", "", "ok", roll_deg=0.5)],
+        [replace(each, file=f"drive.mp4#{place:06d}") for place, each in enumerate(given)],
+    ):
+        chart = all_charts(some, assess_rig(some))["roll"]
+        assert chart.layout["xaxis"]["title"]["text"] == "frame"
+
+
+def test_frames_of_one_recording_are_one_drive():
+    for file, drive in {
+        "maps/a.png": "maps",
+        "a.png": "",
+        "run.zip#maps/a.png": "run.zip#maps",
+        NAME.format(START): "runs/drive.mcap",
+        "runs/drive.mcap#rest": "runs/drive.mcap",
+        "drive.mp4#000123": "drive.mp4",
+        "runs/night/night_0.mcap#/l@5": "runs/night",  # rosbag2 has split it
+        "runs/night/night_1.mcap#/l@9.1": "runs/night",
+        "runs/night_0.mcap#/l@5": "runs/night_0.mcap",
+    }.items():
+        assert drive_of(file) == drive
+    names = [f"{video}.mp4#{frame:06d}" for video in "ab" for frame in range(20)]
+    rig = assess_rig({"file": names, "roll_deg": np.repeat([0.1, 2.0], 20), "status": ["ok"] * 40})
+    assert [drive.name for drive in rig.drives] == ["a.mp4", "b.mp4"]

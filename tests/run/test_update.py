@@ -1,0 +1,300 @@
+"""A result is updated to the bytes of a run on the inputs as they are; identical bytes count as unchanged."""
+
+import os
+import shutil
+import tarfile
+
+import pytest
+
+from rollcli.files.storage import write_bytes
+from rollcli.run import inputs
+from tests.object_store import upload
+from tests.run_cli import contents, road_map, rollcli, write_kitti, write_maps, write_pair
+
+FRAMES = 8
+IMAGES = ("--derotated", "up")
+
+
+def estimate(folder, *arguments, status=0, result="rolls.csv", inputs=("maps",)):
+    done = rollcli("estimate", *inputs, "-o", result, *arguments, cwd=folder)
+    assert done.status == status, done.err
+    return done
+
+
+def put(folder, *names, roll=0.1):
+    for name in names:
+        write_kitti(folder / "maps" / f"{name}.png", road_map(roll, seed=len(name)))
+
+
+def touch(folder, older=False):
+    """Give every map another time, as a checkout or a cache does."""
+    for number, path in enumerate((folder / "maps").iterdir()):
+        os.utime(path, ns=(0, 10**9 * (number + (1 if older else 2**31))))
+
+
+def written(folder):
+    """What a run writes, but the lines of the inputs' states."""
+    return {name: data for name, data in contents(folder).items() if not name.startswith("maps")}
+
+
+def inodes(folder):
+    return {path.name: path.stat().st_ino for path in (folder / "up").iterdir()}
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A whole result of a few maps, with an image each."""
+    write_maps(tmp_path / "maps", FRAMES)
+    (tmp_path / "maps" / "frame3.png").write_bytes(b"no map")
+    estimate(tmp_path, *IMAGES, status=3)
+    return tmp_path
+
+
+def anew(folder, tmp_path_factory, *arguments, status=3, result="rolls.csv", inputs=("maps",)):
+    """What a run makes of the inputs as they are now."""
+    other = tmp_path_factory.mktemp("anew")
+    for name in ("maps", "masks", "maps.tar", "calib"):
+        if (folder / name).exists():
+            (other / name).symlink_to(folder / name)
+    estimate(other, *arguments, status=status, result=result, inputs=inputs)
+    return {name: data for name, data in written(other).items() if name not in ("masks", "calib")}
+
+
+@pytest.mark.parametrize("older", [True, False])
+def test_a_resume_takes_identical_bytes_with_other_times(folder, tmp_path_factory, older):
+    whole = (folder / "rolls.csv").read_bytes()
+    (folder / "rolls.csv").write_bytes(b"".join(whole.splitlines(keepends=True)[:5]))
+    touch(folder, older)
+    estimate(folder, *IMAGES, "--resume", status=3)
+    assert written(folder) == anew(folder, tmp_path_factory, *IMAGES)
+    assert (folder / "rolls.csv").read_bytes() == whole
+
+
+def test_a_resume_takes_what_changes_before_its_frame_is_done(folder, tmp_path_factory):
+    whole = (folder / "rolls.csv").read_bytes()
+    (folder / "rolls.csv").write_bytes(b"".join(whole.splitlines(keepends=True)[:5]))
+    (folder / "up" / "frame6.png").unlink()
+    put(folder, "frame6")
+    estimate(folder, *IMAGES, "--resume", status=3)
+    assert written(folder) == anew(folder, tmp_path_factory, *IMAGES)
+
+
+def test_times_are_looked_at_anew_once_the_bytes_are_known(folder, monkeypatch):
+    touch(folder)
+    estimate(folder, *IMAGES, "--update", status=3)
+    monkeypatch.setattr("rollcli.run.inputs._read", lambda paths: pytest.fail("it was read again"))
+    estimate(folder, *IMAGES, "--resume", status=3)
+
+
+@pytest.mark.parametrize("result", ["rolls.csv", "rolls.jsonl"])
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_an_update_does_what_has_changed_and_nothing_else(folder, tmp_path_factory, result, jobs):
+    arguments = (*IMAGES, "-j", jobs)
+    if result != "rolls.csv":
+        estimate(folder, *arguments, "--overwrite", status=3, result=result)
+    before, rows = inodes(folder), (folder / result).read_bytes().splitlines()
+    touch(folder)
+    put(folder, "frame5", "frame0", roll=-0.2)
+    done = estimate(folder, *arguments, "--update", status=3, result=result)
+    assert "done again, since what they were made from has changed: 2" in done.err
+    assert "(6 kept)" in done.err
+    fresh = anew(folder, tmp_path_factory, *IMAGES, result=result)
+    assert {name: data for name, data in written(folder).items() if name in fresh} == fresh
+    assert {name for name, inode in inodes(folder).items() if before[name] != inode} == {
+        "frame0.png",
+        "frame5.png",
+    }
+    after = (folder / result).read_bytes().splitlines()
+    assert sum(old != new for old, new in zip(rows, after, strict=True)) == 2
+
+
+def test_an_update_of_what_is_up_to_date_changes_nothing(folder):
+    before, images = contents(folder), inodes(folder)
+    estimate(folder, *IMAGES, "--update", status=3)
+    assert (contents(folder), inodes(folder)) == (before, images)
+
+
+@pytest.mark.parametrize("result", ["rolls.csv", "rolls.jsonl"])
+def test_new_frames_sort_anywhere_and_those_that_are_gone_leave_the_result(folder, tmp_path_factory, result):
+    if result != "rolls.csv":
+        estimate(folder, *IMAGES, "--overwrite", status=3, result=result)
+    put(folder, "frame0a", 'a,\n"b', "frame4a", "frame99")
+    put(folder, "frame6", roll=0.3)
+    for name in ("frame2.png", "frame7.png"):
+        (folder / "maps" / name).unlink()
+    done = estimate(folder, *IMAGES, "--update", status=3, result=result)
+    assert "gone, whose rows leave the result and whose images stay: 2" in done.err
+    assert (folder / "up" / "frame2.png").exists()
+    fresh = anew(folder, tmp_path_factory, *IMAGES, result=result)
+    assert {name: data for name, data in written(folder).items() if name in fresh} == fresh
+
+
+def test_a_frame_without_a_row_of_its_own_stands_as_an_error_until_it_is_done(folder, monkeypatch):
+    put(folder, "frame0a")
+    put(folder, "frame1", roll=0.3)
+
+    def fail(*_):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr("rollcli.run.estimate._do_again", fail)
+        estimate(folder, *IMAGES, "--update", status=3)
+    rows = (folder / "rolls.csv").read_text().splitlines()
+    assert rows[2].startswith("maps/frame0a.png,,error")
+    assert "not estimated yet" in rows[2]
+    said = estimate(folder, *IMAGES, "--resume", status=2).err
+    assert "maps/frame1.png has changed since; --update does" in said
+    put(folder, "frame1", roll=0.1)
+    write_maps(folder / "maps", 2)
+    estimate(folder, *IMAGES, "--resume", status=3)
+    assert "not estimated yet" not in (folder / "rolls.csv").read_text()
+
+
+@pytest.mark.parametrize("line", [0, 3, 7])
+def test_a_row_counts_for_nothing_without_what_it_was_made_from(folder, line):
+    before = written(folder)
+    path = folder / "rolls.csv.inputs"
+    width = len(path.read_bytes()) // FRAMES
+    path.write_bytes(path.read_bytes()[: line * width + 7])
+    done = estimate(folder, *IMAGES, "--resume", status=3)
+    assert f"({line} kept)" in done.err or line == 0
+    assert written(folder) == before
+
+
+def test_a_result_without_its_inputs_is_not_continued(folder):
+    (folder / "rolls.csv.inputs").unlink()
+    for flag in ("--resume", "--update"):
+        said = estimate(folder, *IMAGES, flag, status=2).err
+        assert "there is no rolls.csv.inputs; --overwrite starts anew" in said
+
+
+def test_a_file_of_another_program_is_not_replaced(tmp_path):
+    write_maps(tmp_path / "maps", 2)
+    (tmp_path / "rolls.csv.inputs").write_bytes(b"my notes\n")
+    assert "rolls.csv.inputs: exists already" in estimate(tmp_path, status=2).err
+    assert (tmp_path / "rolls.csv.inputs").read_bytes() == b"my notes\n"
+    estimate(tmp_path, "--overwrite")
+
+
+def test_what_could_not_be_read_is_done_again(folder):
+    write_maps(folder / "maps", 4)
+    done = estimate(folder, *IMAGES, "--update")
+    assert "8 ok, 0 suspect, 0 failed" in done.err
+
+
+def test_a_failed_frame_is_done_again_once_it_changes_or_with_retry_failed(tmp_path):
+    write_maps(tmp_path / "maps", 2)
+    write_kitti(tmp_path / "maps" / "frame1.png", road_map() * 0)
+    estimate(tmp_path, status=3)
+    assert "(2 kept)" in estimate(tmp_path, "--update", status=3).err
+    assert "(1 kept)" in estimate(tmp_path, "--update", "--retry-failed", status=3).err
+    write_maps(tmp_path / "maps", 2)
+    assert "(1 kept): 2 ok" in estimate(tmp_path, "--update").err
+
+
+def test_an_update_begins_a_result_that_is_not_there_and_continues_one_that_is_cut(tmp_path):
+    write_maps(tmp_path / "maps", FRAMES)
+    estimate(tmp_path, "--update")
+    whole = written(tmp_path)
+    (tmp_path / "rolls.csv").write_bytes(b"".join(whole["rolls.csv"].splitlines(keepends=True)[:4]))
+    estimate(tmp_path, "--update")
+    assert written(tmp_path) == whole
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--seed", "4"), "--seed was 0, is now 4"),
+        (("--overwrite",), "give either --update or --overwrite"),
+        (("-o", "-"), "--update needs a result file"),
+        (("-o", "rolls.parquet"), "--update takes a result in one file"),
+        (("-o", "s3://bucket/rolls.csv"), "--update takes a result in one file"),
+    ],
+)
+def test_what_cannot_be_updated_is_refused_in_one_line(folder, arguments, said):
+    before = contents(folder)
+    done = estimate(folder, *IMAGES, "--update", *arguments, status=2)
+    assert said in done.err
+    assert done.err.count("\n") == 1
+    assert contents(folder) == before
+
+
+def test_a_dry_run_names_what_an_update_would_do(folder):
+    touch(folder)
+    put(folder, "frame1a", "frame6")
+    done = estimate(folder, *IMAGES, "--update", "--dry-run")
+    read = [line for line in done.out.splitlines() if line.startswith("read")]
+    assert read == ["read  maps/frame1a.png", "read  maps/frame6.png"]
+    assert "write rolls.csv.inputs" in done.out
+
+
+def test_masks_and_calibrations_count_as_inputs(tmp_path):
+    write_maps(tmp_path / "maps", 3)
+    write_maps(tmp_path / "masks", 3)
+    (tmp_path / "calib").mkdir()
+    camera = "P0: 500 0 150 0 0 500 90 0 0 0 1 0\nP1: 500 0 150 {} 0 500 90 0 0 0 1 0\n"
+    for number in range(3):
+        (tmp_path / "calib" / f"frame{number}.txt").write_text(camera.format(-250))
+    arguments = ("--mask", "masks", "--calib", "calib")
+    estimate(tmp_path, *arguments)
+    mask = road_map()
+    mask[:70] = 0
+    write_kitti(tmp_path / "masks" / "frame1.png", mask)
+    assert "(2 kept)" in estimate(tmp_path, *arguments, "--update").err
+    (tmp_path / "calib" / "frame2.txt").write_text(camera.format(-300))
+    assert "(2 kept)" in estimate(tmp_path, *arguments, "--update").err
+    (tmp_path / "masks" / "all.png").write_bytes((tmp_path / "masks" / "frame1.png").read_bytes())
+    arguments = ("--mask", "masks/all.png", "--calib", "calib")
+    estimate(tmp_path, *arguments, "--overwrite")
+    assert "(3 kept)" in estimate(tmp_path, *arguments, "--update").err
+    shutil.copyfile(tmp_path / "masks" / "frame0.png", tmp_path / "masks" / "all.png")
+    assert "has changed: 3" in estimate(tmp_path, *arguments, "--update").err
+
+
+def test_the_right_view_counts_as_an_input(tmp_path):
+    for number in range(3):
+        write_pair(tmp_path, f"{number}.png", road_map(), seed=number)
+    inputs = ("--left", "left", "--right", "right", "--num-disparities", "64")
+    estimate(tmp_path, inputs=inputs)
+    views = sorted((tmp_path / "right").iterdir())
+    shutil.copyfile(views[0], views[1])
+    assert "(2 kept)" in estimate(tmp_path, "--update", status=3, inputs=inputs).err
+
+
+def test_only_those_frames_of_an_archive_are_done_again_that_differ(folder, tmp_path_factory):
+    def pack():
+        with tarfile.open(folder / "maps.tar", "w") as archive:
+            archive.add(folder / "maps", "maps")
+
+    pack()
+    line = {"inputs": ("maps.tar",), "result": "packed.csv"}
+    estimate(folder, status=3, **line)
+    put(folder, "frame5", "frame1b")
+    pack()
+    done = estimate(folder, "--update", status=3, **line)
+    assert "has changed: 1" in done.err
+    assert "(7 kept)" in done.err
+    fresh = anew(folder, tmp_path_factory, **line)
+    assert (folder / "packed.csv").read_bytes() == fresh["packed.csv"]
+    assert (folder / "packed.csv.inputs").read_bytes() == fresh["packed.csv.inputs"]
+
+
+def _noted(paths, read):
+    for path in paths:
+        read.append(path)
+        yield path
+
+
+def test_objects_are_compared_by_their_tags(tmp_path, bucket, monkeypatch):
+    write_maps(tmp_path / "maps", 4)
+    folder = f"{bucket}/update"
+    upload(tmp_path / "maps", folder)
+    line = {"inputs": (folder + "/",)}
+    estimate(tmp_path, **line)
+    put(tmp_path, "frame2")
+    write_bytes(f"{folder}/frame2.png", (tmp_path / "maps" / "frame2.png").read_bytes())
+    read = []
+    really = inputs._read
+    monkeypatch.setattr(inputs, "_read", lambda paths: really(_noted(paths, read)))
+    assert "(3 kept)" in estimate(tmp_path, "--update", **line).err
+    assert read == [f"{folder}/frame2.png"]
