@@ -139,13 +139,14 @@ def costs(frames: int) -> dict[str, float]:
 
             def on_cluster(output: str) -> Callable[[Path], tuple[float, ...]]:
                 def measure(maps: Path) -> tuple[float, ...]:
-                    before = cpu_of(processes[:1]), cpu_of(processes[1:])
+                    before = time.monotonic(), cpu_of(processes[:1]), cpu_of(processes[1:])
                     own, _ = run(maps, output, "--scheduler", scheduler)
-                    return own, cpu_of(processes[:1]) - before[0], cpu_of(processes[1:]) - before[1]
+                    after = time.monotonic(), cpu_of(processes[:1]), cpu_of(processes[1:])
+                    return own, *(a - b for a, b in zip(after, before, strict=True))
 
                 return measure
 
-            driver, dispatch, far = beyond_start(on_cluster("rolls.csv"), few, many, frames)
+            driver, wall, dispatch, far = beyond_start(on_cluster("rolls.csv"), few, many, frames)
             in_parts = beyond_start(on_cluster("rolls.parquet"), few, many, frames)
             handing_over = chunk_costs(scheduler, processes)
     return {
@@ -154,6 +155,7 @@ def costs(frames: int) -> dict[str, float]:
         "local worker": worker,
         "driver": driver,
         "scheduler": dispatch,
+        "  of it, as if idle": wall / 1000 * handing_over["scheduler, a second"],
         "Dask worker": far,
         "driver, parts": in_parts[0],
         **handing_over,
