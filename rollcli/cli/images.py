@@ -50,6 +50,11 @@ rotation_options = record(
     ),
     option("--skip-suspect", is_flag=True, help="With --from, leave out the maps whose angle is suspect."),
     option("--expand", is_flag=True, help="Enlarge the maps so that their corners are kept."),
+    option(
+        "--save-matrix",
+        is_flag=True,
+        help="Beside each map write NAME.txt: the 3x3 matrix that takes its pixels to the new ones.",
+    ),
 )
 
 
@@ -67,12 +72,12 @@ rotation_options = record(
 @config_option
 @click.pass_context
 def derotate(ctx: click.Context, /, **records: Any) -> None:
-    """Rotate disparity maps by their roll, so that rows of the road become constant.
+    """Rotate disparity maps about their centre by their roll, so that rows of the road become constant.
 
     INPUTS are maps (PNG, TIFF, NPY, NPZ, PFM, EXR), folders, .zip and .tar of them, quoted
     patterns, or - for paths on stdin. A map
     keeps its type, encoding and format. Values are interpolated between valid pixels alone, and what is no
-    data stays no data.
+    data stays no data. With the matrix M of --save-matrix, what the camera K showed at K X is at M K X.
 
     With --from, every map needs its row and every row with an angle its map: what has no partner is an error
     that names it, before anything is written. Suspect angles are used, and a line says how many there are;

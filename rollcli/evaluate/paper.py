@@ -12,9 +12,10 @@ from rollcli.evaluate.truth import read_truth
 from rollcli.extras import require_extra
 from rollcli.files.matching import stem_of
 from rollcli.files.stream import write_output
-from rollcli.run.find import check_writes, list_files, map_frames
+from rollcli.run.find import map_frames
 from rollcli.run.frame import Frame
 from rollcli.run.progress import Progress
+from rollcli.run.reads_and_writes import check_writes, list_files
 from rollcli.run.workers.chunks import Work
 from rollcli.run.workers.in_order import Workers
 from rollcli.run.workers.interrupt import stop_on_signals

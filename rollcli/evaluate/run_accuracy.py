@@ -24,8 +24,8 @@ from rollcli.files.naming import listed
 from rollcli.files.results import Row, read_result, run_path
 from rollcli.files.stream import is_stream, write_output
 from rollcli.messages import say
-from rollcli.run.find import check_writes, list_files
 from rollcli.run.options import RunningOptions
+from rollcli.run.reads_and_writes import check_writes, list_files
 from rollcli.run.record import recorded_options
 
 _NAMES = {"no_angle", "no_truth"}

@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from rollcli.errors import InputError, OutputError
-from rollcli.files.atomic import NameTakenError, look_at, output_error, write_atomic
+from rollcli.files import bounded
+from rollcli.files.atomic import NameTakenError, output_error, write_atomic
 from rollcli.files.bounded import MOST_BYTES, too_large
 from rollcli.files.containers import file_of, read_member
 from rollcli.files.stores.locations import WEB_SERVERS, is_url, public_name, scheme_of
@@ -72,10 +73,10 @@ def state_of(location: str) -> str:
     if is_url(location):
         return ""
     try:
-        found = look_at(file_of(location))
-    except (OSError, ValueError):
+        _, size, time_ns = bounded.state_of(file_of(location))
+    except (InputError, ValueError):
         return ""
-    return f"{found.st_size} {found.st_mtime_ns}"
+    return f"{size} {time_ns}"
 
 
 def read_bytes(

@@ -86,6 +86,32 @@ def derotate(
     return result
 
 
+def rotation_matrix(shape: tuple[int, ...], roll: float, *, expand: bool = False) -> NDArray[np.float64]:
+    """Return the matrix that takes pixels of a map to those of `derotate`'s result.
+
+    Parameters
+    ----------
+    shape : tuple of int
+        (H, W) of the map.
+    roll : float
+        Radians.
+    expand : bool
+        Whether the result is enlarged.
+
+    Returns
+    -------
+    ndarray, shape (3, 3)
+        (u, v, 1) to (x, y, 1), both from the centre of the top-left pixel. What the camera K showed at K X
+        is at matrix K X: with square pixels, as a camera sees it that is turned about its axis and has its
+        principal point at matrix (cx, cy, 1).
+    """
+    turn = _Turn.of(shape, roll, expand)
+    matrix = np.array([[turn.cosine, turn.sine, 0.0], [-turn.sine, turn.cosine, 0.0], [0.0, 0.0, 1.0]])
+    before, after = ((np.array(each[::-1]) - 1) / 2 for each in (turn.shape, turn.size))
+    matrix[:2, 2] = after - matrix[:2, :2] @ before
+    return matrix
+
+
 def _radians(roll: float | None, roll_deg: float | None) -> float:
     if (roll is None) == (roll_deg is None):
         raise UsageError("give the angle once: roll, in radians, or roll_deg, in degrees")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from rollcli.errors import ExitStatus, InputError, UsageError
 from rollcli.extras import require_extra
-from rollcli.files.naming import listed
+from rollcli.files.naming import listed, natural_key
 from rollcli.files.results import Result, Row, read_result, run_path
 from rollcli.files.stream import is_stream, write_output
 from rollcli.report.chart import chart_names
@@ -16,9 +16,9 @@ from rollcli.report.options import ReportOptions
 from rollcli.report.sources import Choice, Subject, choose, subjects
 from rollcli.report.summary import common_run, frame_count
 from rollcli.rig.drive.assess import RigAssessment, assess_rig
-from rollcli.run.find import check_writes, list_files
 from rollcli.run.options import EncodingOptions, FrameOptions
 from rollcli.run.progress import Progress
+from rollcli.run.reads_and_writes import check_writes, list_files
 from rollcli.run.record import recorded_options
 from rollcli.run.rig import order_of, origins_of
 from rollcli.run.workers.chunks import Work
@@ -145,6 +145,7 @@ def _take(found: Sequence[Subject], recorded: Sequence[FrameOptions], jobs: int 
     with stop_on_signals() as stop:
         for given in (each for at, each in enumerate(recorded) if each not in recorded[:at]):
             places = [place for place, each in enumerate(recorded) if each == given]
+            places.sort(key=lambda place: natural_key(found[place].frame.file))  # as a video is decoded
             work = Work(partial(take_pictures, options=given), no_pictures)
             tasks = run_tasks([found[place] for place in places], work, stop, Workers(jobs))
             with contextlib.closing(tasks) as taken:

@@ -10,11 +10,11 @@ from rollcli.files.atomic import remove_leftovers
 from rollcli.files.containers import file_of
 from rollcli.files.results import Row
 from rollcli.files.stores.locations import tasks_in_hand
-from rollcli.run.find import check_one_owner, check_places, check_writes, list_files
 from rollcli.run.frame import Frame, FrameResult, failed_frame
 from rollcli.run.options import EncodingOptions, RunningOptions
 from rollcli.run.outputs import write_outputs
 from rollcli.run.progress import Progress
+from rollcli.run.reads_and_writes import check_one_owner, check_places, check_writes, list_files
 from rollcli.run.workers.chunks import Work
 from rollcli.run.workers.in_order import SharedPaths, Workers
 from rollcli.run.workers.interrupt import Stop, stop_on_signals

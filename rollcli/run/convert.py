@@ -50,7 +50,8 @@ def _conversions(frames: Sequence[Frame], options: DerotateOptions) -> Iterator[
             continue
         roll_deg = rotation.roll_deg if row is None else row.map_roll_deg
         refused = "" if roll_deg is not None else f"has no angle in {rotation.result}"
-        writes = (output_path(frame, options.output),)
+        matrix = (output_path(frame, options.output, ".txt"),) if rotation.save_matrix else ()
+        writes = (output_path(frame, options.output), *matrix)
         roll = math.radians(roll_deg or 0.0)
         yield Conversion(frame, writes, roll, refused=refused, keeps_numbers=True)
 

@@ -11,6 +11,7 @@ from rollcli.estimator.estimate import RollEstimate, estimate_roll
 from rollcli.files.codecs.png import encode_png
 from rollcli.files.formats import encode_stored
 from rollcli.files.results import Row
+from rollcli.pictures.derotate import rotation_matrix
 from rollcli.pictures.heights import FittedRoad, heights_over, unit_of
 from rollcli.pictures.overlay import draw_preview
 from rollcli.pictures.vdisparity import draw_v_disparity, middle_row, profile, v_disparity
@@ -38,10 +39,22 @@ def derotate_map(conversion: Conversion, options: FrameOptions, expand: bool) ->
     def make(source: Source) -> dict[str, bytes]:
         assert source.stored is not None  # a map, not a pair
         given = options.encoding
-        data = encode_turned(source.stored, conversion.roll, source.encoding, given, expand=expand)
-        return {options.at(conversion.writes[0]): data}
+        data = [encode_turned(source.stored, conversion.roll, source.encoding, given, expand=expand)]
+        data += [_matrix_text(source.disparity.shape, conversion.roll, expand)]
+        return dict(zip(map(options.at, conversion.writes), data, strict=False))
 
     return _convert(conversion, options, make)
+
+
+def _matrix_text(shape: tuple[int, ...], roll: float, expand: bool) -> bytes:
+    """Return where pixels go, as `numpy.loadtxt` reads it."""
+    v, u = ((side - 1) / 2 for side in shape)
+    lines = [
+        f"# turned by {math.degrees(roll):.6f} degrees about its centre, ({u:g}, {v:g})",
+        "# pixel (u, v, 1) of the map, from the centre of the top-left one, to (x, y, 1) of the new one",
+        *(" ".join(f"{each:.12g}" for each in row) for row in rotation_matrix(shape, roll, expand=expand)),
+    ]
+    return "\n".join([*lines, ""]).encode()
 
 
 def count_map(conversion: Conversion, options: FrameOptions, count: CountOptions) -> FrameResult:

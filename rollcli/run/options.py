@@ -222,12 +222,13 @@ class EstimateOptions(NamedTuple):
 
 @dataclass(frozen=True)
 class RotationOptions:
-    """Where the angles come from: one for all maps, or a result with one for each."""
+    """Where the angles come from: one for all maps, or a result with one for each; and what is kept."""
 
     roll_deg: float | None
     result: str | None
     expand: bool
     skip_suspect: bool
+    save_matrix: bool
 
 
 @dataclass(frozen=True)

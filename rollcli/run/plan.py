@@ -10,18 +10,17 @@ from rollcli.files.results import IMAGE_ROLL, TIMING, Format, run_path
 from rollcli.files.stores.locations import is_url
 from rollcli.files.stream import is_stream
 from rollcli.run.calibration import calibration_files, check_depth, check_first_size
-from rollcli.run.find import (
-    check_inputs_are_kept,
-    check_nothing_is_there,
-    check_one_owner,
-    check_places,
-    map_frames,
-    pair_frames,
-)
+from rollcli.run.find import map_frames, pair_frames
 from rollcli.run.frame import Frame
 from rollcli.run.inputs import inputs_path
 from rollcli.run.options import EstimateOptions, ResultOptions
 from rollcli.run.outputs import every_path
+from rollcli.run.reads_and_writes import (
+    check_inputs_are_kept,
+    check_nothing_is_there,
+    check_one_owner,
+    check_places,
+)
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from rollcli.errors import RollcliError, UsageError
 from rollcli.files.atomic import is_there
+from rollcli.files.containers import file_of
 from rollcli.files.matching import is_elsewhere, match_paths
 from rollcli.files.naming import listed
 from rollcli.files.results import Row, read_result, run_path
@@ -71,8 +72,8 @@ def frame_of_row(row: Row, result: str) -> Frame:
 def _located(name: str, folder: Path) -> str:
     if not name or is_remote(name):  # even a look at a share of Windows is a request
         return name
-    beside = folder / name
-    return str(beside) if not is_there(name) and is_there(beside) else name
+    beside = str(folder / name)
+    return beside if not is_there(file_of(name)) and is_there(file_of(beside)) else name
 
 
 def _is_copy(frame: Frame, row: Row, options: FrameOptions) -> bool:

@@ -21,7 +21,7 @@ from rollcli.rig.quantities import COLUMNS as QUANTITY_COLUMNS
 from rollcli.rig.quantities import QUANTITIES, ROLL, SIZE
 from rollcli.rig.words import findings
 from rollcli.run.calibration import Calibrations
-from rollcli.run.find import check_writes, list_files
+from rollcli.run.reads_and_writes import check_writes, list_files
 from rollcli.run.rig_columns import columns_of_drive
 from rollcli.run.rig_gates import check_options, run_checks, status_of
 from rollcli.run.rig_health import health_of

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from rollcli.files.formats import read_image
 from rollcli.files.results import parse_rows, pieces_of, read_run, run_path
 from rollcli.files.stores.locations import is_remote
 from rollcli.rig.drive.assess import RigAssessment
@@ -13,7 +12,7 @@ from rollcli.rig.quantities import ALIGNMENT
 from rollcli.run.frame import Frame
 from rollcli.run.frame_errors import FRAME_ERRORS
 from rollcli.run.options import FrameOptions
-from rollcli.run.read import wanted_of
+from rollcli.run.read import read_views, wanted_of
 from rollcli.run.record import recorded_options
 from rollcli.run.result_rows import frame_of_row
 from rollcli.stereo.match import match_pair
@@ -38,10 +37,7 @@ def columns_of_drive(rig: RigAssessment, results: Sequence[str]) -> ColumnSuppor
     found: list[ColumnEvidence] = []
     for frame, options in _pairs(rig, results):
         try:
-            left, right = (
-                read_image(options.at(path), name)
-                for path, name in ((frame.path, frame.file), (frame.right_path, frame.right_file))
-            )
+            left, right = read_views(frame, options)
             measured = match_pair(left, right, options.stereo, wanted_of(None, options)).measured
         except FRAME_ERRORS:  # the pairs that are left may be enough
             continue

@@ -30,6 +30,7 @@ ALL = (*READERS, *READ_BY)
 HANG = 2.0  # seconds of processor: other processes do not count
 PATIENCE = 60.0  # seconds, for what waits and computes nothing
 KEPT = Path("out/fuzz")
+_FIRST = "warm up"
 
 
 class Reader:
@@ -46,7 +47,7 @@ class Reader:
             stdout=subprocess.PIPE,
             stderr=self._printed,
         )
-        self.read(b"", "warm up", hang=PATIENCE)
+        self.read(b"", _FIRST, hang=PATIENCE)
 
     def read(self, data: bytes, name: str, hang: float = HANG) -> str:
         """What became of a file: "read", "refused", or a find."""
@@ -63,6 +64,8 @@ class Reader:
             answer = f"ended with {self._process.wait()}" if ready else f"no answer within {hang} s"
             self._process.kill()
             self.close()
+            if name == _FIRST:  # it would be so for ever
+                raise RuntimeError(f"the reader cannot start: it {answer}")
             self._start()
         elif self._printed.seek(0, 2) > before:
             self._printed.seek(before)

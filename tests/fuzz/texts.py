@@ -1,4 +1,4 @@
-"""Whole texts that the program reads, each with the command that reads it."""
+"""Whole texts and bags that the program reads, each with the command that reads it."""
 
 import atexit
 import ntpath
@@ -22,9 +22,9 @@ from rollcli.files.stores.locations import (
     store_of,
 )
 from tests.rig.calibration_files import KALIBR, WHOLE, Rig, zed
-from tests.run_cli import rollcli, write_maps
+from tests.run_cli import road_map, rollcli, write_maps
 
-MAPS, RESULT, RECORD = "maps", "rolls.csv", "rolls.csv.run.json"
+MAPS, RESULT, RECORD, INPUTS = "maps", "rolls.csv", "rolls.csv.run.json", "rolls.csv.inputs"
 READ_BY = {
     "results": ("rig", "text"),
     "records": ("estimate", MAPS, "-o", RESULT, "--resume"),
@@ -32,6 +32,8 @@ READ_BY = {
     "calibrations": ("estimate", MAPS, "--calib", "text", "--dry-run"),
     "truths": ("evaluate", "accuracy", RESULT, "--truth", "text"),
     "lists": ("estimate", "--files-from", "text", "--dry-run"),
+    "inputs": ("estimate", MAPS, "-o", RESULT, "--update", "-j1"),
+    "bags": ("estimate", "-j1", "text.{}"),  # by its ending
     "urls": (),  # by no command: one would ask the servers that they name
 }
 _SETTINGS = """\
@@ -90,6 +92,8 @@ def _whole() -> dict[str, bytes]:
         "results/jsonl": (folder / "rolls.jsonl").read_bytes(),
         **parquet,
         "records/json": (folder / RECORD).read_bytes(),
+        "inputs/txt": (folder / INPUTS).read_bytes(),
+        **(_bags(folder) if find_spec("rosbags") else {}),  # the extra
         "settings/toml": _SETTINGS.encode(),
         "truths/csv": _TRUTH.encode(),
         "lists/txt": _LIST.encode(),
@@ -102,6 +106,19 @@ def _whole() -> dict[str, bytes]:
         "calibrations/unrectified-zed": zed(_RIG).encode(),
         **{f"calibrations/{form}": write(_RIG).encode() for form, write in WHOLE.items()},
     }
+
+
+def _bags(folder: Path) -> dict[str, bytes]:
+    """A bag of each kind, of small maps: what is broken is the bag more often than its maps."""
+    from tests.files.recordings.bag_files import disparity_image, write_bag
+
+    def messages(store):
+        for number in range(3):
+            values = road_map(0.1 * number, width=32, height=24, seed=number)
+            yield "/disparity", number, disparity_image(store, values, number + 1)
+
+    kinds = ("bag", "db3", "mcap")
+    return {f"bags/{kind}": write_bag(folder, f"whole-{kind}", kind, messages).read_bytes() for kind in kinds}
 
 
 def _read_urls(data: bytes) -> str:
@@ -132,11 +149,16 @@ def read_text(data: bytes, name: str) -> str:
     if reader == "urls":
         return _read_urls(data)
     folder = _workplace()
-    given = {RESULT: _whole()["results/csv"], RECORD: _whole()["records/json"]}
-    given[RECORD if reader == "records" else "text"] = data
+    kind = name.partition("/")[2]
+    given = {
+        RESULT: _whole()["results/csv"],
+        RECORD: _whole()["records/json"],
+        INPUTS: _whole()["inputs/txt"],
+    }
+    given[{"records": RECORD, "inputs": INPUTS, "bags": f"text.{kind}"}.get(reader, "text")] = data
     for each, content in given.items():
         (folder / each).write_bytes(content)
-    done = rollcli(*READ_BY[reader], cwd=folder)
+    done = rollcli(*(word.format(kind) for word in READ_BY[reader]), cwd=folder)
     answer = _ENDED.get(done.status, "")
     said = done.err.startswith(("rollcli: ", "Usage: rollcli "))
     if not answer or "internal error" in done.err or (answer == "refused" and not said):

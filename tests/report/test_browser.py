@@ -443,6 +443,19 @@ def test_a_click_on_a_point_of_the_chart_leads_to_its_row_and_pictures(opened):
     assert "is empty" in page.locator(".detail").inner_text()
 
 
+def test_a_click_on_a_point_leads_to_its_row_where_charts_are_over_time(opened, tmp_path):
+    names = [f"d.mcap#/d@{17 * 10**17 + place * 10**9}" for place in range(20)]
+    write_result(tmp_path / "rolls.csv", [row(name, 0.1 * (place % 5)) for place, name in enumerate(names)])
+    done = rollcli("report", "rolls.csv", "-o", "page.html", "--gallery", "0", cwd=tmp_path)
+    assert done.status == 0, done.err
+    page = opened(url=(tmp_path / "page.html").as_uri())
+    page.locator("#roll").scroll_into_view_if_needed()
+    x, y = page.evaluate(PLACE, names[13])
+    page.mouse.move(x + 1, y + 1)
+    page.mouse.click(x + 1, y + 1)
+    page.locator(".detail h3", has_text=names[13]).wait_for()
+
+
 def test_the_readmes_picture_of_the_page_is_of_the_parts_it_names(browser, url):
     page = Path(url.removeprefix("file://"))
     assert [each for each in SHOWN if f"<h2>{each}</h2>" not in page.read_text("utf-8")] == []

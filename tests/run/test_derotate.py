@@ -44,7 +44,7 @@ def derotated(folder, roll_deg, *, encoding="auto", expand=False, invalid=()):
     return run_derotate(
         DerotateOptions(
             InputOptions((str(folder / "maps"),)),
-            RotationOptions(roll_deg, None, expand, False),
+            RotationOptions(roll_deg, None, expand, False, False),
             str(folder / "out"),
             EncodingOptions(encoding, invalid=invalid),
             RunningOptions(jobs=1, quiet=True, overwrite=True),
@@ -181,6 +181,30 @@ def test_maps_are_matched_with_rows_of_another_folder_and_ending_by_stem(folder)
         stored = read_stored(folder / "maps" / f"frame{index}.png").values
         (folder / "elsewhere" / f"frame{index}.tif").write_bytes(encode_stored(stored, "tiff"))
     assert rollcli("derotate", "elsewhere", "--from", "rolls.csv", "-o", "out", cwd=folder).status == 0
+
+
+@pytest.mark.parametrize("more", [(), ("--expand",)])
+def test_the_matrix_says_where_each_pixel_has_gone(tmp_path, more):
+    spots = {(40, 30): 20.0, (120, 90): 40.0, (80, 20): 60.0}  # (u, v), px
+    values = np.full((121, 161), 5.0)
+    for (u, v), disparity in spots.items():
+        values[v - 2 : v + 3, u - 2 : u + 3] = disparity
+    write_kitti(tmp_path / "maps" / "a.png", values)
+    line = ("derotate", "maps", "--roll", "12.5", "--save-matrix", "-o", "out", *more)
+    assert rollcli(*line, cwd=tmp_path).status == 0
+
+    matrix = np.loadtxt(tmp_path / "out" / "a.txt")
+    turned = read_disparity(tmp_path / "out" / "a.png")
+    for (u, v), disparity in spots.items():
+        rows, columns = np.nonzero(np.abs(turned - disparity) < 0.01)
+        assert matrix @ (u, v, 1) == pytest.approx((columns.mean(), rows.mean(), 1), abs=0.5)
+    centre = (np.array(turned.shape[::-1]) - 1) / 2
+    assert matrix @ (80, 60, 1) == pytest.approx((*centre, 1))
+    assert matrix[:2, :2] @ matrix[:2, :2].T == pytest.approx(np.eye(2))
+    assert matrix @ (181, 60, 1) - matrix @ (81, 60, 1) == pytest.approx(
+        (100 * math.cos(math.radians(12.5)), -100 * math.sin(math.radians(12.5)), 0)
+    )
+    assert "about its centre, (80, 60)" in (tmp_path / "out" / "a.txt").read_text()
 
 
 def test_a_copy_in_another_folder_is_taken_and_another_drive_is_refused(folder):

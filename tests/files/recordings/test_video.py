@@ -2,6 +2,7 @@
 
 import csv
 import io
+import json
 import math
 import os
 import re
@@ -127,6 +128,22 @@ def test_images_side_by_side_give_the_same_rows_as_their_halves(tmp_path, drive,
     assert "cannot be halved into two views" in found[1]["message"]
 
 
+def test_the_correction_of_views_side_by_side_is_that_of_their_files(tmp_path):
+    for number in range(8):
+        write_pair(tmp_path, f"{number}.png", road_map(0.01 * number, width=320, height=200), seed=number)
+    (tmp_path / "both").mkdir()
+    for number in range(8):
+        views = [cv2.imread(str(tmp_path / side / f"{number}.png")) for side in ("left", "right")]
+        cv2.imwrite(str(tmp_path / "both" / f"{number}.png"), np.hstack(views))
+    for name, given in {"a": ["--left", "left", "--right", "right"], "b": ["both", "--side-by-side"]}.items():
+        assert rollcli("estimate", *given, "-o", f"{name}.csv", cwd=tmp_path).status == 0
+        done = rollcli("rig", f"{name}.csv", "--correction", f"{name}.json", cwd=tmp_path)
+        assert done.status == 0, done.err
+    correction = (tmp_path / "a.json").read_bytes()
+    assert json.loads(correction)["columns"] is not None
+    assert (tmp_path / "b.json").read_bytes() == correction
+
+
 @pytest.mark.parametrize("name", ["drive.avi", "drive.mkv"])
 def test_a_video_that_is_cut_gives_every_whole_frame_and_a_line(tmp_path, drive, name):
     _, _, views = drive
@@ -208,6 +225,8 @@ def test_a_result_of_a_video_goes_on_to_the_other_commands(tmp_path, drive):
         found = rollcli(*given, cwd=tmp_path)
         assert found.status == 0, (given, found.err)
     assert (tmp_path / "upright" / "drive_000003.png").is_file()
+    elsewhere = rollcli("report", "../rolls.csv", "-o", "page.html", cwd=tmp_path / "maps")
+    assert (elsewhere.status, "pictures of 5 frames" in elsewhere.err) == (0, True), elsewhere.err
     for name in ("derotate", "vdisparity", "heights"):
         further = ["--from", "rolls.csv"] if name != "vdisparity" else []
         refused = rollcli(name, "drive.mkv", *further, "-o", "none", cwd=tmp_path)

@@ -1,0 +1,68 @@
+"""Runs over recordings that are killed and resumed end in the bytes of an undisturbed one."""
+
+import os
+import signal
+import subprocess
+import time
+
+import cv2
+import numpy as np
+import pytest
+
+from tests.files.recordings.bag_files import image, write_bag
+from tests.files.recordings.test_bags import START, STEP, maps
+from tests.files.recordings.test_video import write_video
+from tests.run_cli import command, environment, road_map, rollcli, write_pair
+
+COUNT = 240
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not hasattr(os, "killpg"), reason="kills a group of processes"),
+]
+
+
+def write_maps(folder):
+    """A bag of many maps, and what to type for it."""
+    some = [np.rint(256 * each).astype(np.uint16) for each in maps(5)]
+
+    def make(store):
+        for number in range(COUNT):
+            stamp = START + number * STEP
+            yield "/maps", stamp, image(store, some[number % 5], "16UC1", stamp)
+
+    return [write_bag(folder, "drive", "mcap", make).name]
+
+
+def write_views(folder):
+    """A video of many pairs, and what to type for it."""
+    pairs = []
+    for number in range(4):
+        write_pair(folder / "pairs", "0.png", road_map(0.01 * number), seed=number)
+        views = [cv2.imread(str(folder / "pairs" / side / "0.png")) for side in ("left", "right")]
+        pairs.append(np.hstack(views))
+    write_video(folder / "drive.avi", [pairs[number % 4] for number in range(COUNT // 4)], "MJPG")
+    return ["drive.avi", "--side-by-side"]
+
+
+@pytest.mark.parametrize(("write", "rows"), [(write_maps, COUNT), (write_views, COUNT // 4)])
+def test_a_run_over_a_recording_killed_again_and_again_ends_in_the_same_bytes(tmp_path, write, rows):
+    given = [*write(tmp_path), "-j", "2"]
+    assert rollcli("estimate", *given, "-o", "whole.csv", cwd=tmp_path).status == 0
+    result = tmp_path / "rolls.csv"
+    for least in (1, rows // 3, rows * 2 // 3):
+        run = subprocess.Popen(
+            command("estimate", *given, "-q", "-o", "rolls.csv", *(["--resume"] if least > 1 else [])),
+            cwd=tmp_path,
+            env=environment(),
+            start_new_session=True,
+        )
+        give_up = time.monotonic() + 120
+        while run.poll() is None and not (result.exists() and result.read_bytes().count(b"\n") > least):
+            assert time.monotonic() < give_up
+            time.sleep(0.005)
+        os.killpg(run.pid, signal.SIGKILL)
+        run.wait()
+    done = rollcli("estimate", *given, "-o", "rolls.csv", "--resume", cwd=tmp_path)
+    assert done.status == 0, done.err
+    assert result.read_bytes() == (tmp_path / "whole.csv").read_bytes()
+    assert result.read_bytes().count(b"\n") == rows + 1
