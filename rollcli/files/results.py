@@ -78,15 +78,16 @@ def part_names(names: Iterable[str]) -> list[str]:
     return [name for _, name in numbered]
 
 
-def read_parts(folder: str, names: Iterable[str]) -> Iterator[tuple[str, bytes]]:
+def read_parts(folder: str, names: Iterable[str], header: bytes = b"") -> Iterator[tuple[str, bytes]]:
     """Yield the location and the bytes of each part; a part of CSV gets the header that only the first has.
+
+    Where the first is not among them, `header` is given.
 
     Raises
     ------
     InputError
         A part cannot be read.
     """
-    header = b""
     for name in names:
         part = read_bytes(f"{folder}/{name}")
         yield f"{folder}/{name}", header + part

@@ -246,6 +246,8 @@ def _beginning_of(path: str, size: int) -> bytes | None:
 def create(location: str, data: bytes, owner: str) -> bool:
     """Write a file or an object unless there is one of this name; return whether this owner wrote it.
 
+    A file that holds these very bytes counts as this owner's.
+
     Parameters
     ----------
     location : str
@@ -263,8 +265,8 @@ def create(location: str, data: bytes, owner: str) -> bool:
     if not is_url(location):
         try:
             write_atomic(location, data, durable=True, replaces=False)
-        except NameTakenError:
-            return False
+        except NameTakenError:  # by a worker that died before it could say so, perhaps
+            return _beginning_of(location, len(data)) == data
         return True
     _require_writable(location)
     return create_object(location, data, owner)

@@ -2,26 +2,28 @@
 
 import contextlib
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
+from itertools import islice
 from typing import Any, NamedTuple
 
 from rollcli.errors import ClusterError, ExitStatus, OutputError, WorkerError
 from rollcli.files.atomic import is_file
 from rollcli.files.containers import file_of
 from rollcli.files.stores.locations import is_url, tasks_in_hand
+from rollcli.run.batch import Batch, BatchOptions, Parts, join_results, line_form
 from rollcli.run.calibration import calibration_files, calibration_notes
 from rollcli.run.frame import Frame, FrameResult, failed_frame
 from rollcli.run.options import EstimateOptions, FrameOptions
 from rollcli.run.outputs import every_path, image_paths, remove_image_leftovers, write_outputs
-from rollcli.run.plan import Plan, further_columns, make_plan
+from rollcli.run.plan import Plan, make_plan
 from rollcli.run.progress import Progress
 from rollcli.run.reads_and_writes import list_files
 from rollcli.run.result import Output, frames_to_do, open_output
 from rollcli.run.workers.chunks import Work
 from rollcli.run.workers.in_order import SharedPaths, Workers
 from rollcli.run.workers.interrupt import Stop, stop_on_signals
-from rollcli.run.workers.tasks import require_scheduler, run_tasks, started_early
+from rollcli.run.workers.tasks import require_scheduler, run_joined, started_early
 
 
 def load_estimator() -> None:
@@ -98,10 +100,10 @@ def _run(plan: Plan, options: EstimateOptions, resume_command: str, started: lis
             progress.note(note)
         try:
             with stop_on_signals() as stop, progress:
-                run = _Run(options, output, progress, stop, started)
+                run = _Run(plan, options, output, progress, stop, started)
                 _restore_images(run)
-                if not _do_again(plan, run):
-                    _run_frames(plan.frames[kept.count :], run)
+                if not _do_again(run):
+                    _run_frames(run)
         except KeyboardInterrupt:  # the second Ctrl-C: without waiting for the frames that have begun
             progress.stopped_early = True
         except (OutputError, ClusterError, WorkerError) as error:
@@ -118,60 +120,83 @@ def _run(plan: Plan, options: EstimateOptions, resume_command: str, started: lis
 class _Run(NamedTuple):
     """What every part of a run works with; `started` are workers that wait for it."""
 
+    plan: Plan
     options: EstimateOptions
     output: Output
     progress: Progress
     stop: Stop
     started: list[Any]
 
-    def ends_with(self, result: FrameResult) -> bool:
+    def ends_with(self, batch: Batch) -> bool:
         """Tell whether a frame that has failed ends the run, and note it."""
-        ends = self.options.result.fail_fast and result.row.status == "error"
+        ends = self.options.result.fail_fast and batch.figures.first_error >= 0
         self.progress.stopped_early |= ends
         return ends
 
 
-def _run_frames(frames: Sequence[Frame], run: _Run) -> None:
-    """Write the row of each frame, in order; its images are written by then."""
-    with _results(frames, run) as results:
-        for frame, result in zip(frames, results, strict=False):
-            run.output.append(frame, result)
-            run.progress.add(result)
-            if run.ends_with(result):
-                return
-    if run.stop.asked and run.progress.done < run.progress.total:
-        run.progress.stopped_early = True
+def _run_frames(run: _Run) -> None:
+    """Write the rows of the frames, in order; their images are written by then."""
+    for each in run.output.passes():
+        every = _frames_at(run.plan, each.positions)
+        replaced = each.positions[0] < run.output.kept.count if each.positions else False
+        at = 0
+        with _results(every, run, parts=each.parts) as batches:
+            for frames, batch in _with_frames(every, batches):
+                run.output.append(frames, batch)
+                positions = each.positions[at : at + len(batch)] if replaced else None
+                files = [frame.file for frame in frames]
+                run.progress.add_rows(files, batch.figures, batch.told, positions)
+                at += len(batch)
+                if run.ends_with(batch):
+                    return
+        if run.stop.asked and run.progress.done < run.progress.total:
+            run.progress.stopped_early = True
+            return
+
+
+def _frames_at(plan: Plan, positions: Sequence[int]) -> Sequence[Frame]:
+    if isinstance(positions, range):
+        return plan.frames[positions.start : positions.stop]
+    return [plan.frames[position] for position in positions]
+
+
+def _with_frames(frames: Iterable[Frame], batches: Iterator[Batch]) -> Iterator[tuple[list[Frame], Batch]]:
+    """Yield each batch with its frames."""
+    rest = iter(frames)
+    for batch in batches:
+        yield list(islice(rest, len(batch))), batch
 
 
 def _restore_images(run: _Run) -> None:
     """Make the images again that kept rows should have."""
-    frames, progress = run.output.kept.incomplete, run.progress
-    if not frames:
+    incomplete, progress = run.output.kept.incomplete, run.progress
+    if not incomplete:
         return
-    progress.note(f"images are missing or empty for {len(frames)} of the kept rows: they are made again")
+    progress.note(f"images are missing or empty for {len(incomplete)} of the kept rows: they are made again")
     progress.stopped_early = True  # unless every one is made
-    with _results(frames, run) as results:
+    with _results(incomplete, run) as batches:
         restored = 0
-        for frame, result in zip(frames, results, strict=False):
-            run.output.restore(frame, result)
-            restored += 1
-    progress.stopped_early = restored < len(frames)
+        for frames, batch in _with_frames(incomplete, batches):
+            run.output.restore(frames, batch)
+            restored += len(batch)
+    progress.stopped_early = restored < len(incomplete)
 
 
-def _do_again(plan: Plan, run: _Run) -> bool:
+def _do_again(run: _Run) -> bool:
     """Do the frames of kept rows again that have failed or changed; return whether the run ends here.
 
     A result takes the new rows once the workers have ended, which hold the lock of the file that it was.
     """
     again, progress = run.output.kept.again, run.progress
     for first in range(0, len(again), _RETRIED_AT_ONCE):
-        positions = again[first : first + _RETRIED_AT_ONCE]
-        frames = [plan.frames[position] for position in positions]
-        with _results(frames, run, _name_of(plan.output)) as results:
-            for position, frame, result in zip(positions, frames, results, strict=False):
-                run.output.replace(position, frame, result)
-                progress.add(result, replaces=position)
-                if run.ends_with(result):
+        rest = again[first : first + _RETRIED_AT_ONCE]
+        every = _frames_at(run.plan, rest)
+        with _results(every, run, _name_of(run.plan.output)) as batches:
+            for frames, batch in _with_frames(every, batches):
+                positions, rest = rest[: len(batch)], rest[len(batch) :]
+                run.output.replace(positions, frames, batch)
+                progress.add_rows([frame.file for frame in frames], batch.figures, batch.told, positions)
+                if run.ends_with(batch):
                     return True
         if run.stop.asked:
             progress.stopped_early = progress.done < progress.total
@@ -185,33 +210,41 @@ def _name_of(result: str) -> str:
 
 
 @contextlib.contextmanager
-def _results(frames: Sequence[Frame], run: _Run, retry_of: str = "") -> Iterator[Iterator[FrameResult]]:
+def _results(
+    frames: Sequence[Frame], run: _Run, retry_of: str = "", parts: Parts | None = None
+) -> Iterator[Iterator[Batch]]:
     """Open the results of frames from whichever workers were asked for; the output is complete afterwards."""
     options, output = run.options, run.output
-    form = options.result.form
-    told = options.frame._replace(
-        replaces=output.replaces,
-        retry_of=retry_of,
-        lines="" if form == "parquet" else form,
-        further=further_columns(frames, options.result),
+    told = options.frame._replace(replaces=output.replaces, retry_of=retry_of, notes=output.notes)
+    rows = BatchOptions(
+        line_form(options.result.form),
+        run.plan.further,
+        options.images,
+        told.root,
+        verbose=options.running.verbose,
+        fail_fast=options.result.fail_fast,
         notes=output.notes,
+        parts=parts,
     )
     work = Work(
         partial(estimate_frame, options=told),
         partial(lost_frame, options=told),
         partial(clear_frame, options=told),
+        partial(join_results, options=rows),
+        lambda: output.read_as,
+        parts.rows if parts else 1,
     )
     sample = (*frames[:1], *frames[-1:])
     shared = SharedPaths(
         files=tuple(file_of(path) for frame in sample for path in frame.reads()),
-        folders=tuple(folder for _, folder in options.images.folders()),
+        folders=tuple(folder for _, folder in options.images.folders()) + ((parts.output,) if parts else ()),
     )
-    threads = tasks_in_hand((*shared.files, *shared.folders))
+    threads = tasks_in_hand((*shared.files, *(folder for _, folder in options.images.folders())))
     workers = Workers(
         options.running.jobs, options.running.scheduler, shared, output.keep_open, threads, run.started
     )
     try:
-        with contextlib.closing(run_tasks(frames, work, run.stop, workers)) as results:
+        with contextlib.closing(run_joined(frames, work, run.stop, workers)) as results:
             yield results
     finally:
         output.commit()

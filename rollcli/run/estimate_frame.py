@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.estimate import RollEstimate, estimate_roll
-from rollcli.files.results import Row, format_row
+from rollcli.files.results import Row
 from rollcli.files.storage import noting
 from rollcli.rig.calibration import Calibration
 from rollcli.rig.pose import with_pose
@@ -36,10 +36,8 @@ def run_frame(frame: Frame, options: FrameOptions) -> FrameResult:
     paths = every_path(frame, options.images, options.root)
     write_outputs(images, paths, replaces=options.replaces, retry_of=options.retry_of)
     elapsed = 1000 * (time.perf_counter() - start)
-    row = replace(result.row, elapsed_ms=elapsed)
-    line = format_row(row, options.lines, options.further) if options.lines else b""
     inputs = inputs_line(frame, notes, options.at) if options.notes else b""
-    return replace(result, row=row, line=line, inputs=inputs)
+    return replace(result, row=replace(result.row, elapsed_ms=elapsed), inputs=inputs)
 
 
 def _estimate(frame: Frame, options: FrameOptions, images: dict[str, bytes]) -> FrameResult:

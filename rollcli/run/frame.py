@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from rollcli.files.results import Row
 from rollcli.messages import without_secrets
@@ -43,6 +44,22 @@ class Frame:
         if self.mask is not None:
             yield self.mask
 
+    def __reduce__(self) -> tuple[type["Frame"], tuple[object, ...]]:
+        """Pickle the values alone: what a dataclass with slots does takes five times as long."""
+        return Frame, tuple(getattr(self, name) for name in self.__slots__)
+
+
+class ReadAs(NamedTuple):
+    """How frames were read: the encodings, and the first and last disparity searched, px."""
+
+    encodings: frozenset[str] = frozenset()
+    searched: tuple[int, int] | None = None
+
+    def joined(self, other: "ReadAs") -> "ReadAs":
+        """Return how these and other frames were read."""
+        ends = [*(self.searched or ()), *(other.searched or ())]
+        return ReadAs(self.encodings | other.encodings, (min(ends), max(ends)) if ends else None)
+
 
 @dataclass(frozen=True)
 class FrameResult:
@@ -57,8 +74,6 @@ class FrameResult:
         Why that may be wrong; empty when there is no doubt.
     searched : tuple of int, or None
         First and last disparity searched, px; pairs only.
-    line : bytes
-        The row as it stands in the result, where workers were told its format.
     inputs : bytes
         What the frame was read from, where workers were told to note it: see `inputs.inputs_line`.
     """
@@ -67,7 +82,6 @@ class FrameResult:
     encoding: str = ""
     warning: str = ""
     searched: tuple[int, int] | None = None
-    line: bytes = b""
     inputs: bytes = b""
 
 

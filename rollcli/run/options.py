@@ -135,9 +135,8 @@ class FrameOptions(NamedTuple):
 
     `root` is the folder where relative paths start, for workers on other machines; empty for this one.
     `replaces` tells whether files that are in the place of an image are replaced. `retry_of` names the result
-    whose failed frames are done again; empty otherwise. `lines` is the format of the lines of a result, which
-    workers make of their rows, with the `further` columns; empty where they make none. `notes` tells whether
-    they say what each frame was read from.
+    whose failed frames are done again; empty otherwise. `notes` tells whether workers say what each frame was
+    read from.
     """
 
     encoding: EncodingOptions = EncodingOptions()
@@ -148,8 +147,6 @@ class FrameOptions(NamedTuple):
     root: str = ""
     replaces: bool = False
     retry_of: str = ""
-    lines: Literal["csv", "jsonl", ""] = ""
-    further: tuple[str, ...] = ()
     notes: bool = False
     side_by_side: Layout | None = None
 

@@ -2,6 +2,7 @@
 
 import contextlib
 import hashlib
+import itertools
 import posixpath
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from functools import lru_cache
@@ -9,6 +10,7 @@ from pathlib import Path
 
 from rollcli.errors import InputError, OutputError
 from rollcli.files.atomic import mark_path, remove_leftovers
+from rollcli.files.results import STATUSES
 from rollcli.files.storage import read_bytes, remove, remove_all, write_bytes, write_new
 from rollcli.files.stores.locations import is_object_url, is_url, located
 from rollcli.files.stores.objects import list_objects
@@ -45,9 +47,15 @@ def possible_paths(frame: Frame, images: ImageOptions) -> Iterator[tuple[str, ..
         yield (path, roomy_path(path)) if overflows else (path,)
 
 
-def local_images(frame: Frame, images: ImageOptions) -> Iterator[str]:
-    """Yield the images of a frame that may lie on local disk, where a power cut may take them."""
-    return (path for paths in possible_paths(frame, images) for path in paths if not is_url(path))
+def local_images(
+    frames: Iterable[Frame], status: bytes, images: ImageOptions, root: str = ""
+) -> Iterator[str]:
+    """Yield the images of those frames that have angles which a power cut may take from a local disk."""
+    if not images.folders():
+        return
+    for frame, place in zip(frames, status, strict=True):
+        if STATUSES[place] != "error":
+            yield from itertools.filterfalse(is_url, every_path(frame, images, root))
 
 
 class MadeImages:

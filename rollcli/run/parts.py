@@ -1,35 +1,35 @@
 """A result as a folder of immutable parts: for Parquet, and for object stores, which cannot append.
 
-A part holds a fixed number of rows, and only the last part holds fewer. It is written whole, and its rows
-count as done when it exists. Parts of CSV and JSON Lines, put together in their order, are the very file that
-a run on a local disk writes.
+A part holds a fixed number of rows, and only the last part holds fewer: neither the workers nor their speed
+change a byte. It is written whole, by the worker that has all of its rows, and these count as done when it
+exists. Parts of CSV and JSON Lines, put together in their order, are the very file that a run on a local disk
+writes.
 """
 
 import contextlib
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from rollcli.errors import InputError, UsageError
 from rollcli.files.atomic import remove_leftovers, sync_files
-from rollcli.files.codecs.parquet import encode_parquet, require_parquet
+from rollcli.files.codecs.parquet import require_parquet
 from rollcli.files.locking import locked_folder, not_resumable
 from rollcli.files.results import (
     Row,
-    column_types,
     format_header,
     format_row,
     parse_rows,
     part_names,
-    plain_values,
     read_parts,
     read_run,
     run_path,
 )
-from rollcli.files.storage import create, list_names, remove, write_bytes
-from rollcli.files.stores.locations import base_name, is_url
-from rollcli.run.frame import Frame, FrameResult
+from rollcli.files.storage import list_names, remove, write_bytes
+from rollcli.files.stores.locations import base_name, is_url, located
+from rollcli.run.batch import Batch, Parts, Pass, line_form, part_location
+from rollcli.run.frame import Frame, ReadAs
 from rollcli.run.options import EstimateOptions
 from rollcli.run.outputs import local_images, remove_image_leftovers, remove_marks
 from rollcli.run.plan import Plan
@@ -41,7 +41,10 @@ _CHECK_S = 10.0  # a request of 50 ms now and then
 
 
 class PartsOutput:
-    """Rows to a folder of parts, and FILE.run.json beside it."""
+    """Rows to a folder of parts, and FILE.run.json beside it.
+
+    Workers write the parts of which they have all rows. This process writes the others.
+    """
 
     resumable, notes = True, False
 
@@ -54,52 +57,81 @@ class PartsOutput:
         keep_open: int | None = None,
     ) -> None:
         self.kept, self.keep_open = kept, keep_open
-        self._plan, self._record, self._part_rows = plan, record, options.result.part_rows
-        self._next = kept.count // self._part_rows
-        self._replaced_part, self._replacing = 0, dict[int, Row]()  # rows by their positions in the result
-        self._waiting: list[Row] = []
+        self._plan, self._record, self._options = plan, record, options
+        self._part_rows = options.result.part_rows
+        self._parts = _parts(plan, record, options)
+        self._numbers: Iterator[int] = iter(())  # of the parts to come
+        self._replaced_part, self._replacing = 0, dict[int, bytes]()  # lines by their positions in the result
+        self._waiting: list[bytes] = []
         self.replaces = record.replaces
         self._image_options = options.images
         self._images: list[str] = []  # those of the part that is being filled
         self._checked = time.monotonic()
-        self._written = kept.count
+        self._written = kept.count - sum(map(len, kept.holes))
 
-    def append(self, frame: Frame, result: FrameResult) -> None:
-        """Take the row; every full part is written."""
+    @property
+    def read_as(self) -> ReadAs:
+        """How frames were read, as the record says."""
+        return self._record.read_as
+
+    def passes(self) -> Iterator[Pass]:
+        """Yield the frames of parts that are missing before others, then those after all of them."""
+        rows, end = self._part_rows, len(self._plan.frames)
+        holes = [position for hole in self.kept.holes for position in hole]
+        missing = [position // rows for position in holes[::rows]]
+        rest = range(self.kept.count, end)
+        for positions, numbers in (
+            (holes, missing),
+            (rest, range(_whole_parts(self.kept.count, rows), _whole_parts(end, rows))),
+        ):
+            if positions:
+                self._numbers = iter(numbers)
+                parts = self._parts._replace(numbers=tuple(numbers), frames=len(positions))
+                yield Pass(positions, parts)
+
+    def append(self, frames: Sequence[Frame], batch: Batch) -> None:
+        """Take the rows; every full part is written."""
         if time.monotonic() - self._checked > _CHECK_S:
             self._check_owned()
-        self._record.saw(result.encoding, result.searched)
-        self._waiting.append(result.row)
-        self._take_images(frame, result)
-        if len(self._waiting) == self._part_rows:
+        self._record.saw(batch.read_as)
+        for _ in range(_whole_parts(batch.in_parts, self._part_rows)):
+            next(self._numbers)
+        self._written += batch.in_parts
+        self._waiting += batch.lines
+        self._images += local_images(
+            frames[batch.in_parts :], batch.figures.status[batch.in_parts :], self._image_options
+        )
+        while len(self._waiting) >= self._part_rows:
             self._write()
 
     def finish(self, summary: RunSummary) -> None:
         """Write the last part, and the summary into the record."""
-        if self._waiting or not self._written:
+        if self._waiting:
             self._write()
         self._record.write(summary)
+        _remove_leftovers(self._plan, self._options)  # of workers that have died
 
-    def restore(self, frame: Frame, result: FrameResult) -> None:
-        """Take the images of an incomplete frame, which were made again.
+    def restore(self, frames: Sequence[Frame], batch: Batch) -> None:
+        """Take the images of incomplete frames, which were made again.
 
         Raises
         ------
         OutputError
-            They could not be made: its row no longer holds.
+            They could not be made: a row no longer holds.
         """
-        check_restored(frame, result)
-        self._take_images(frame, result)
+        check_restored(batch)
+        self._images += local_images(frames, batch.figures.status, self._image_options)
 
-    def replace(self, position: int, frame: Frame, result: FrameResult) -> None:
-        """Take the row; a part is written anew once its last such row is known."""
-        number = position // self._part_rows
-        if number != self._replaced_part:
-            self.commit()
-        self._replaced_part = number
-        self._record.saw(result.encoding, result.searched)
-        self._replacing[position] = result.row
-        self._take_images(frame, result)
+    def replace(self, positions: Sequence[int], frames: Sequence[Frame], batch: Batch) -> None:
+        """Take rows; a part is written anew once its last such row is known."""
+        self._record.saw(batch.read_as)
+        for at, (position, line) in enumerate(zip(positions, batch.lines, strict=True)):
+            if position // self._part_rows != self._replaced_part:
+                self.commit()
+            self._replaced_part = position // self._part_rows
+            self._replacing[position] = line
+            status = batch.figures.status[at : at + 1]
+            self._images += local_images(frames[at : at + 1], status, self._image_options)
 
     def commit(self) -> None:
         """Write the part anew whose rows are replaced, if they differ; a new part waits until it is full."""
@@ -108,22 +140,18 @@ class PartsOutput:
         if not self._replacing:
             return
         number, first = self._replaced_part, self._replaced_part * self._part_rows
-        old = _rows_of_part(self._plan, number)
-        rows = [self._replacing.get(position, row) for position, row in enumerate(old, first)]
-        data = self._encoded(number, rows)
-        if data != self._encoded(number, old):
+        form = line_form(self._plan.format)
+        old = [format_row(row, form, self._plan.further) for row in _rows_of_part(self._plan, number)]
+        lines = [self._replacing.get(position, line) for position, line in enumerate(old, first)]
+        if lines != old:
             self._check_owned()
-            write_bytes(_part_location(self._plan, number), data, durable=True)
+            write_bytes(_location(self._plan, number), self._parts.encoded(number, lines), durable=True)
         remove_marks([self._plan.frames[position] for position in self._replacing], self._image_options)
         self._replacing.clear()
 
     def hint(self) -> str:
         """Say that --resume continues after the last part."""
         return f"; {self._written} rows are kept, continue with --resume" if self._written else ""
-
-    def _take_images(self, frame: Frame, result: FrameResult) -> None:
-        if result.row.status != "error":
-            self._images.extend(local_images(frame, self._image_options))
 
     def _check_owned(self) -> None:
         self._record.check_owned()
@@ -132,24 +160,11 @@ class PartsOutput:
     def _write(self) -> None:
         sync_files(self._images)
         self._images.clear()
-        data = self._encoded(self._next, self._waiting)
-        location = _part_location(self._plan, self._next)
-        self._check_owned()
-        if not create(location, data, self._record.run):
-            raise UsageError(
-                f"{location}: another run has written this part; give each an --output of its own"
-            )
-        self._written += len(self._waiting)
-        self._next += 1
-        self._waiting = []
-
-    def _encoded(self, number: int, rows: Sequence[Row]) -> bytes:
-        plan = self._plan
-        if plan.format == "parquet":
-            values = [plain_values(row, plan.further) for row in rows]
-            return encode_parquet(column_types(plan.further), values, self._record.of_rows)
-        header = format_header(plan.format, plan.further) if number == 0 else b""
-        return header + b"".join(format_row(row, plan.format, plan.further) for row in rows)
+        lines = self._waiting[: self._part_rows]
+        self._parts.write(next(self._numbers), lines)
+        self._checked = time.monotonic()
+        self._written += len(lines)
+        self._waiting = self._waiting[self._part_rows :]
 
 
 @contextlib.contextmanager
@@ -173,22 +188,33 @@ def open_parts(plan: Plan, options: EstimateOptions) -> Iterator[PartsOutput]:
             yield _begin(plan, options, descriptor)
 
 
+def _parts(plan: Plan, record: RunRecord, options: EstimateOptions) -> Parts:
+    output = located(options.running.root, plan.output)
+    rows = options.result.part_rows
+    return Parts(output, plan.format, plan.further, rows, (), 0, record.run, record.of_rows)
+
+
 def _begin(plan: Plan, options: EstimateOptions, keep_open: int | None) -> PartsOutput:
     # again, now that no other run can write it
     parts = check_parts(plan, resume=options.result.resume, overwrite=options.running.overwrite)
     kept = _kept(plan, options, parts)
     record = new_record(plan, options, kept, _earlier(plan) if kept.count else None)
-    if not is_url(plan.output):
-        all_parts = range(_whole_parts(len(plan.frames), options.result.part_rows))
-        to_write = [_part_location(plan, number) for number in all_parts]  # a kill may have met any of them
-        remove_leftovers([run_path(plan.output), *to_write, *(f"{plan.output}/{name}" for name in parts)])
+    _remove_leftovers(plan, options, parts)
     if options.result.resume or options.running.overwrite:
         remove_image_leftovers(kept.not_failed(), options.images)
-    for name in parts[_whole_parts(kept.count, options.result.part_rows) :]:
+    for name in set(parts).difference(_kept_names(plan, options, kept)):
         remove(f"{plan.output}/{name}")
     record.write()
     record.check_owned()  # another run may have begun in this very second
     return PartsOutput(plan, record, kept, options, keep_open)
+
+
+def _remove_leftovers(plan: Plan, options: EstimateOptions, parts: Sequence[str] = ()) -> None:
+    """Remove what killed processes left beside the parts of this run, and these of an earlier one."""
+    if not is_url(plan.output):
+        every = range(_whole_parts(len(plan.frames), options.result.part_rows))
+        to_write = [_location(plan, number) for number in every]
+        remove_leftovers([run_path(plan.output), *to_write, *(f"{plan.output}/{name}" for name in parts)])
 
 
 def check_parts(plan: Plan, *, resume: bool, overwrite: bool) -> list[str]:
@@ -219,31 +245,47 @@ def kept_in_parts(plan: Plan, options: EstimateOptions) -> KeptRows:
 
 
 def _kept(plan: Plan, options: EstimateOptions, parts: list[str]) -> KeptRows:
-    """Take in the rows of the parts from the first one on, as far as none is missing or short.
+    """Take in the rows of the parts that are not short, wherever others are missing.
 
-    The names are sorted: after a missing part, no name has the number of its place.
+    A part is short that was the last one of fewer frames.
     """
     kept = KeptRows(plan, options)
     if not options.result.resume:
         return kept
-    numbered = enumerate(parts)
-    present = [name for number, name in numbered if name == base_name(_part_location(plan, number))]
+    rows, numbered = options.result.part_rows, dict(_numbered(plan, parts))
+    header = b"" if 0 in numbered.values() else format_header(plan.format, plan.further)
     try:
-        for name, data in read_parts(plan.output, present):
-            rows = tuple(parse_rows(data, name))
-            if len(rows) < options.result.part_rows and kept.count + len(rows) != len(plan.frames):
-                break
-            for row in rows:
+        for name, data in read_parts(plan.output, numbered, header):
+            found, first = tuple(parse_rows(data, name)), rows * numbered[base_name(name)]
+            if len(found) < rows and first + len(found) != len(plan.frames):
+                continue
+            kept.skip_to(first)
+            for row in found:
                 kept.add(row)
     except InputError as error:
         raise not_resumable(plan.output, str(error)) from error
     return kept
 
 
+def _numbered(plan: Plan, names: Iterable[str]) -> Iterator[tuple[str, int]]:
+    """Yield names of parts and their numbers, those apart that no run gives to a part."""
+    for name in names:
+        number = int(name.removeprefix("part-").partition(".")[0])
+        if name == base_name(_location(plan, number)):
+            yield name, number
+
+
+def _kept_names(plan: Plan, options: EstimateOptions, kept: KeptRows) -> Iterator[str]:
+    """Yield the names of the parts whose rows are kept."""
+    for number, first in enumerate(range(0, kept.count, options.result.part_rows)):
+        if not any(first in hole for hole in kept.holes):
+            yield base_name(_location(plan, number))
+
+
 def _rows_of_part(plan: Plan, number: int) -> tuple[Row, ...]:
     """Read a part again; the first one has the header of CSV."""
-    names = dict.fromkeys(base_name(_part_location(plan, each)) for each in (0, number))
-    *_, (name, data) = read_parts(plan.output, names)
+    header = format_header(plan.format, plan.further) if number else b""
+    ((name, data),) = read_parts(plan.output, [base_name(_location(plan, number))], header)
     return tuple(parse_rows(data, name))
 
 
@@ -258,5 +300,5 @@ def _earlier(plan: Plan) -> Mapping[str, Any] | None:
         raise not_resumable(plan.output, str(error)) from error
 
 
-def _part_location(plan: Plan, number: int) -> str:
-    return f"{plan.output}/part-{number:05d}.{plan.format}"
+def _location(plan: Plan, number: int) -> str:
+    return part_location(plan.output, plan.format, number)

@@ -4,7 +4,7 @@ import os
 import re
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import Any
@@ -13,7 +13,7 @@ from rollcli.files.results import Row
 from rollcli.messages import say
 from rollcli.run.frame import FrameResult, named_message
 from rollcli.run.options import EncodingOptions, RunningOptions
-from rollcli.run.summary import RunSummary
+from rollcli.run.summary import Figures, RunSummary
 
 _LINE_EVERY_S = 30.0
 _UNKNOWN_SIZE = {"ncols": 80, "nrows": 24}  # of a terminal that does not tell its size
@@ -82,12 +82,12 @@ class TaskProgress:
         if self._verbose and not self._quiet:
             self.say(message)
 
-    def advance(self) -> None:
-        """Count a frame, and show it when there is something to show."""
-        self._finished += 1
+    def advance(self, frames: int = 1) -> None:
+        """Count frames, and show them when there is something to show."""
+        self._finished += frames
         if self._bar is not None:
             self._bar.set_postfix(self.counted(), refresh=False)
-            self._bar.update()
+            self._bar.update(frames)
         elif time.monotonic() - self._last_line >= _LINE_EVERY_S:
             self._last_line = time.monotonic()
             if not self._quiet:
@@ -226,22 +226,32 @@ class Progress(TaskProgress):
         """Name the failures."""
         return {"failed": self.summary.counts["error"]}
 
-    def add(self, result: FrameResult, replaces: int | None = None) -> None:
-        """Count a row that is written, and say what the user should know about it.
+    def add(self, result: FrameResult) -> None:
+        """Count a frame that is done, and say what the user should know about it."""
+        self.add_rows([result.row.file], Figures.of([result.row]), [result])
 
-        It replaces a row at a position, from 0, where its frame was done again.
+    def add_rows(
+        self,
+        files: Sequence[str],
+        figures: Figures,
+        told: Iterable[FrameResult],
+        positions: Sequence[int] | None = None,
+    ) -> None:
+        """Count rows that are written, and say what the user should know about some of their frames.
+
+        They take the places at these positions, from 0, where these have been left to them.
         """
-        row = result.row
-        if replaces is None:
-            self.summary.add(row)
+        if positions is None:
+            self.summary.add(files, figures)
         else:
-            self.summary.replace(replaces, row)
-        self._tell_input(result)
-        if row.status == "error":
-            self._tell_failure(row)
-        elif row.status == "suspect":
-            self.detail(f"{row.file}: suspect: {row.message}")
-        self.advance()
+            self.summary.replace(positions, figures)
+        for result in told:
+            self._tell_input(result)
+            if result.row.status == "error":
+                self._tell_failure(result.row)
+            elif result.row.status == "suspect":
+                self.detail(f"{result.row.file}: suspect: {result.row.message}")
+        self.advance(len(files))
 
     def _tell_input(self, result: FrameResult) -> None:
         """Say once how numbers were read, and which disparities were searched."""

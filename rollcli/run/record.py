@@ -12,13 +12,14 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from rollcli import __version__
-from rollcli.errors import InputError, UsageError
+from rollcli.errors import InputError
 from rollcli.files.atomic import look_at
 from rollcli.files.containers import file_of
 from rollcli.files.results import run_path
-from rollcli.files.storage import owner_of, write_bytes
+from rollcli.files.storage import write_bytes
 from rollcli.files.stores.locations import is_url, public_name
-from rollcli.run.frame import Frame
+from rollcli.run.batch import check_owned
+from rollcli.run.frame import Frame, ReadAs
 from rollcli.run.options import (
     EncodingOptions,
     EstimateOptions,
@@ -137,8 +138,7 @@ class RunRecord:
 
     def __init__(self, plan: Plan, options: EstimateOptions, unknown: Collection[str] = ()) -> None:
         self._output = plan.output
-        self._encodings: set[str] = set()
-        self._searched: list[int] = []
+        self.read_as = ReadAs()
         self.run = uuid.uuid4().hex  # tells our objects from those of another run
         self._begun = False
         # older images, now and after a resume
@@ -152,22 +152,9 @@ class RunRecord:
             self.fixed["calibration"] = _calibrations(plan.frames)
 
     def check_owned(self) -> None:
-        """Check that no other run has begun since on a result in an object store, which has no locks.
-
-        The run that begins last goes on, and those before it end: they may hang, or have lost their network.
-
-        Raises
-        ------
-        UsageError
-            Another one has.
-        """
-        if not (self._begun and is_url(self._output)):
-            return
-        if owner_of(run_path(self._output)) not in (self.run, ""):
-            raise UsageError(
-                f"{public_name(self._output)}: another run has begun to write this result, so this one ends; "
-                "give each an --output of its own"
-            )
+        """Check that no other run has begun since; see `batch.check_owned`."""
+        if self._begun:
+            check_owned(self._output, self.run)
 
     @property
     def of_rows(self) -> dict[str, Any]:
@@ -176,19 +163,14 @@ class RunRecord:
 
     def continue_from(self, earlier: Mapping[str, Any]) -> None:
         """Take over what the interrupted run has recorded about its inputs."""
-        self._encodings.update(earlier["encoding"])
-        self._searched = list(earlier["disparities_searched_px"])
+        searched = earlier["disparities_searched_px"]
+        self.read_as = ReadAs(frozenset(earlier["encoding"]), tuple(searched) if searched else None)
         self.replaces |= earlier.get(_REPLACES) is True
 
-    def saw(self, encoding: str, searched: tuple[int, int] | None) -> None:
-        """Record how a frame was read; the file says so before its row is written."""
-        before = self._encodings.copy(), self._searched
-        if encoding:
-            self._encodings.add(encoding)
-        if searched is not None:
-            ends = [*self._searched, *searched]
-            self._searched = [min(ends), max(ends)]
-        if (self._encodings, self._searched) != before:
+    def saw(self, read_as: ReadAs) -> None:
+        """Record how frames were read; the file says so before their rows are written."""
+        before, self.read_as = self.read_as, self.read_as.joined(read_as)
+        if self.read_as != before:
             self.write()
 
     def write(self, summary: RunSummary | None = None) -> None:
@@ -204,8 +186,8 @@ class RunRecord:
         self.check_owned()
         record = {
             **self.fixed,
-            "encoding": sorted(self._encodings),
-            "disparities_searched_px": self._searched,
+            "encoding": sorted(self.read_as.encodings),
+            "disparities_searched_px": list(self.read_as.searched or ()),
             "alignment": summary and summary.alignment(),
             "conventions": CONVENTIONS,
             "counts": summary.totals if summary else {},

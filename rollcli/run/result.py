@@ -3,7 +3,7 @@
 import contextlib
 import io
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import chain, islice
 from pathlib import Path
 from typing import Protocol
@@ -11,11 +11,12 @@ from typing import Protocol
 from rollcli.errors import InputError, UsageError
 from rollcli.files.atomic import remove_leftovers
 from rollcli.files.locking import not_resumable
-from rollcli.files.results import format_header, format_row, parse_rows, read_run, run_path
+from rollcli.files.results import format_header, parse_rows, read_run, run_path
 from rollcli.files.stores.locations import base_name
 from rollcli.files.stream import STDOUT, STDOUT_NAME, is_stream, open_stream, stdout_descriptor, write_stream
-from rollcli.run.frame import Frame, FrameResult
-from rollcli.run.inputs import Inputs, inputs_line, inputs_path, is_inputs
+from rollcli.run.batch import Batch, Pass
+from rollcli.run.frame import Frame, ReadAs
+from rollcli.run.inputs import Inputs, inputs_path, is_inputs
 from rollcli.run.options import EstimateOptions, ImageOptions
 from rollcli.run.outputs import local_images, remove_image_leftovers, remove_marks
 from rollcli.run.parts import kept_in_parts, open_parts
@@ -41,6 +42,8 @@ class Output(Protocol):
         Whether it keeps what each row was made from.
     replaces : bool
         Whether images are replaced that were there before the run: it was begun with --overwrite.
+    read_as : ReadAs
+        How frames were read, as far as the record of the run says so.
     """
 
     kept: KeptRows
@@ -49,14 +52,21 @@ class Output(Protocol):
     notes: bool
     replaces: bool
 
-    def append(self, frame: Frame, result: FrameResult) -> None:
-        """Write the row, at once or with others after it."""
+    @property
+    def read_as(self) -> ReadAs:
+        """The record knows more with every batch."""
 
-    def restore(self, frame: Frame, result: FrameResult) -> None:
-        """Take the images of an incomplete frame, which were made again."""
+    def passes(self) -> Iterator[Pass]:
+        """Yield the frames to do; each pass begins when the one before has ended."""
 
-    def replace(self, position: int, frame: Frame, result: FrameResult) -> None:
-        """Write the row in the place of a kept one, at once or with others after it; positions increase."""
+    def append(self, frames: Sequence[Frame], batch: Batch) -> None:
+        """Write the next rows, at once or with others after them."""
+
+    def restore(self, frames: Sequence[Frame], batch: Batch) -> None:
+        """Take the images of incomplete frames, which were made again."""
+
+    def replace(self, positions: Sequence[int], frames: Sequence[Frame], batch: Batch) -> None:
+        """Write rows in the place of kept ones, at once or with others after them; positions increase."""
 
     def commit(self) -> None:
         """Write every row that was appended or replaces another."""
@@ -73,6 +83,7 @@ class StreamOutput:
 
     keep_open: int | None = None
     resumable = notes = False
+    read_as = ReadAs()
 
     def __init__(self, descriptor: int, name: str, plan: Plan, options: EstimateOptions) -> None:
         self.kept = KeptRows(plan, options)
@@ -80,17 +91,21 @@ class StreamOutput:
         self._descriptor, self._name, self._plan = descriptor, name, plan
         self._write(format_header(plan.format, plan.further))
 
-    def append(self, frame: Frame, result: FrameResult) -> None:
-        """Write the row; it has left this process when this returns."""
-        self._write(_line(result, self._plan))
+    def passes(self) -> Iterator[Pass]:
+        """Yield all frames."""
+        yield Pass(range(len(self._plan.frames)))
+
+    def append(self, frames: Sequence[Frame], batch: Batch) -> None:
+        """Write the rows; they have left this process when this returns."""
+        self._write(b"".join(batch.lines))
 
     def finish(self, summary: RunSummary) -> None:
         """Do nothing: a stream has no record."""
 
-    def restore(self, frame: Frame, result: FrameResult) -> None:
+    def restore(self, frames: Sequence[Frame], batch: Batch) -> None:
         """Do nothing: a stream keeps no rows."""
 
-    def replace(self, position: int, frame: Frame, result: FrameResult) -> None:
+    def replace(self, positions: Sequence[int], frames: Sequence[Frame], batch: Batch) -> None:
         """Do nothing: a stream keeps no rows."""
 
     def commit(self) -> None:
@@ -125,28 +140,31 @@ class FileOutput:
         self._inputs, self._rows = inputs, DurableRows(file, inputs)
         self._replacing: dict[int, tuple[bytes, bytes]] = {}  # rows, and the lines of their inputs
 
-    def append(self, frame: Frame, result: FrameResult) -> None:
-        """Add the row, after the record knows how its frame was read."""
-        self._record.saw(result.encoding, result.searched)
-        inputs = result.inputs or inputs_line(frame, {})
-        self._rows.append(_line(result, self._plan), inputs, self._paths(frame, result))
+    def passes(self) -> Iterator[Pass]:
+        """Yield the frames after the rows that are kept."""
+        yield Pass(range(self.kept.count, len(self._plan.frames)))
 
-    def restore(self, frame: Frame, result: FrameResult) -> None:
-        """Take the images of an incomplete frame, which were made again.
+    def append(self, frames: Sequence[Frame], batch: Batch) -> None:
+        """Add the rows, after the record knows how their frames were read."""
+        self._record.saw(batch.read_as)
+        self._rows.append(batch.lines, batch.notes, local_images(frames, batch.figures.status, self._images))
+
+    def restore(self, frames: Sequence[Frame], batch: Batch) -> None:
+        """Take the images of incomplete frames, which were made again.
 
         Raises
         ------
         OutputError
-            They could not be made: its row no longer holds.
+            They could not be made: a row no longer holds.
         """
-        check_restored(frame, result)
-        self._rows.restore(self._paths(frame, result))
+        check_restored(batch)
+        self._rows.restore(local_images(frames, batch.figures.status, self._images))
 
-    def replace(self, position: int, frame: Frame, result: FrameResult) -> None:
-        """Take the row and its images; the file gets them all at once, in `commit`."""
-        self._record.saw(result.encoding, result.searched)
-        self._replacing[position] = _line(result, self._plan), result.inputs or inputs_line(frame, {})
-        self._rows.restore(self._paths(frame, result))
+    def replace(self, positions: Sequence[int], frames: Sequence[Frame], batch: Batch) -> None:
+        """Take rows and their images; the file gets them all at once, in `commit`."""
+        self._record.saw(batch.read_as)
+        self._replacing.update(zip(positions, zip(batch.lines, batch.notes, strict=True), strict=True))
+        self._rows.restore(local_images(frames, batch.figures.status, self._images))
 
     def commit(self) -> None:
         """Force the images and rows that were added to the disk."""
@@ -158,6 +176,11 @@ class FileOutput:
             remove_marks([self._plan.frames[position] for position in self._replacing], self._images)
             self._replacing.clear()
 
+    @property
+    def read_as(self) -> ReadAs:
+        """How frames were read, as the record says."""
+        return self._record.read_as
+
     def finish(self, summary: RunSummary) -> None:
         """Write it into the record."""
         self._record.write(summary)
@@ -166,15 +189,6 @@ class FileOutput:
         """Say that --resume continues, if rows were written and their file still is there."""
         rows = self.kept.count + self._rows.written
         return f"; {rows} rows are kept, continue with --resume" if rows and self._file.is_there() else ""
-
-    def _paths(self, frame: Frame, result: FrameResult) -> Iterator[str]:
-        if result.row.status != "error":
-            yield from local_images(frame, self._images)
-
-
-def _line(result: FrameResult, plan: Plan) -> bytes:
-    """Return the line of a row: as its worker made it, or made here for one whose worker died."""
-    return result.line or format_row(result.row, plan.format, plan.further)
 
 
 @contextlib.contextmanager
@@ -223,7 +237,8 @@ def frames_to_do(plan: Plan, options: EstimateOptions) -> Iterator[Frame]:
         _check_permitted(plan.output, options)
         kept = _kept_in_file(plan, options)
     again = (plan.frames[position] for position in kept.again)
-    return chain(kept.incomplete, again, plan.frames[kept.count :])
+    holes = (frame for hole in kept.holes for frame in plan.frames[hole.start : hole.stop])
+    return chain(kept.incomplete, again, holes, plan.frames[kept.count :])
 
 
 def _kept_in_file(plan: Plan, options: EstimateOptions) -> KeptRows:

@@ -6,7 +6,7 @@ import io
 import os
 import stat
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import combinations
 from pathlib import Path
 
@@ -58,8 +58,8 @@ class ResultFile:
         except OSError as error:
             raise output_error(self._name, error) from error
 
-    def append(self, line: bytes) -> None:
-        """Write one line, whole or not at all.
+    def append(self, lines: bytes) -> None:
+        """Write lines, all of them or none.
 
         Raises
         ------
@@ -70,10 +70,11 @@ class ResultFile:
             raise OutputError(f"{self._name}: was moved or removed while this run was writing it")
         try:
             before = os.lseek(self.descriptor, 0, os.SEEK_CUR)
-            _write_all(self.descriptor, line)
+            _write_all(self.descriptor, lines)
         except OSError as error:
             with contextlib.suppress(OSError):
                 os.ftruncate(self.descriptor, before)
+                os.lseek(self.descriptor, before, os.SEEK_SET)
             raise output_error(self._name, error) from error
 
     def replace(self, rows: Mapping[int, bytes], form: Format) -> None:
@@ -273,8 +274,8 @@ class DurableRows:
         self._unsynced = False
         self._last, self._wait_s = time.monotonic(), 0.0
 
-    def append(self, row: bytes, inputs: bytes, images: Iterable[str]) -> None:
-        """Add a row, the line of its inputs, and the images that must be on the disk before it.
+    def append(self, rows: Sequence[bytes], inputs: Sequence[bytes], images: Iterable[str]) -> None:
+        """Add rows, the lines of their inputs, and the images that must be on the disk before them.
 
         Raises
         ------
@@ -282,12 +283,12 @@ class DurableRows:
             The disk does not take an image or a row.
         """
         before = len(self._images)
-        self._inputs.append(inputs)
+        self._inputs.append(b"".join(inputs))
         self._images.extend(images)
         if self._rows or len(self._images) > before:
-            self._rows.append(row)
+            self._rows.extend(rows)
         else:
-            self._write(row)
+            self._write(rows)
         self._commit_in_time()
 
     def restore(self, images: Iterable[str]) -> None:
@@ -314,8 +315,7 @@ class DurableRows:
             sync_files(self._images, self._folders)
             self._images.clear()
         rows, self._rows = self._rows, []  # first: a commit after an interrupt must not write one again
-        for row in rows:
-            self._write(row)
+        self._write(rows)
         if self._unsynced:
             self._inputs.sync()
             self._file.sync()
@@ -327,7 +327,15 @@ class DurableRows:
         if time.monotonic() - self._last >= self._wait_s or len(self._images) >= _MOST_IMAGES:
             self.commit()
 
-    def _write(self, row: bytes) -> None:
-        self._file.append(row)
-        self.written += 1
+    def _write(self, rows: Sequence[bytes]) -> None:
+        if not rows:
+            return
         self._unsynced = True
+        try:
+            self._file.append(b"".join(rows))
+            self.written += len(rows)
+        except OutputError:
+            if len(rows) == 1:
+                raise
+            for row in rows:  # those that the disk still takes
+                self._write([row])

@@ -11,7 +11,8 @@ from rollcli.files.locking import differences, not_resumable
 from rollcli.files.results import Row, format_row, parse_rows, read_run, run_path
 from rollcli.files.storage import modified_ns
 from rollcli.files.stores.locations import base_name
-from rollcli.run.frame import Frame, FrameResult
+from rollcli.run.batch import Batch
+from rollcli.run.frame import Frame
 from rollcli.run.inputs import Inputs
 from rollcli.run.options import EstimateOptions
 from rollcli.run.outputs import MadeImages
@@ -35,9 +36,11 @@ class KeptRows:
     Attributes
     ----------
     count : int
-        How many they are.
+        How many they are, holes included.
     errors : list of int
         Positions, from 0, of those without an angle.
+    holes : list of range
+        Positions before others that have no row: parts that workers had not written.
     again : list of int
         Positions of those whose frames are done again: they have failed, have changed, or are not done yet.
     changed : int
@@ -60,6 +63,7 @@ class KeptRows:
         inputs: Inputs | None = None,
     ) -> None:
         self.count, self.changed, self.first_changed, self.gone = 0, 0, "", 0
+        self.holes: list[range] = []
         self.errors: list[int] = []
         self.again: list[int] = []
         self.incomplete: list[Frame] = []
@@ -105,7 +109,9 @@ class KeptRows:
             self.errors.append(self.count)
         if is_again:
             self.again.append(self.count)
-        self.summary.add(row, is_retried=is_again)
+            self.summary.leave_places([row.file])
+        else:
+            self.summary.add_row(row)
         self.count += 1
         return True
 
@@ -122,6 +128,13 @@ class KeptRows:
             self._following = iter(self._frames[position:])
         self._at = position + 1
         return next(self._following)
+
+    def skip_to(self, position: int) -> None:
+        """Leave a hole before the row at a position."""
+        if position > self.count:
+            self.holes.append(range(self.count, position))
+            self.summary.leave_places([frame.file for frame in self._frames[self.count : position]])
+            self.count = position
 
     def _compare(self, row: Row, frame: Frame) -> None:
         found = self.mismatch
@@ -187,16 +200,17 @@ def _is_in_order(data: bytes, plan: Plan) -> bool:
     return True
 
 
-def check_restored(frame: Frame, result: FrameResult) -> None:
-    """Check that the images of a kept row were made again.
+def check_restored(batch: Batch) -> None:
+    """Check that the images of kept rows were made again.
 
     Raises
     ------
     OutputError
-        They could not be: the row no longer holds.
+        They could not be: a row no longer holds.
     """
-    if result.row.status == "error":
-        raise OutputError(f"the images of {frame.file} cannot be made again: {result.row.message}")
+    for row in (result.row for result in batch.told):
+        if row.status == "error":
+            raise OutputError(f"the images of {row.file} cannot be made again: {row.message}")
 
 
 def new_record(

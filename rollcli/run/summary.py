@@ -6,7 +6,9 @@ Progress, the record of the run and the exit status read it.
 import math
 from array import array
 from collections import Counter
+from collections.abc import Mapping, Sequence
 from statistics import median
+from typing import NamedTuple
 
 from rollcli.errors import ExitStatus
 from rollcli.files.results import ALIGNMENT_COLUMNS, STATUSES, Row
@@ -15,6 +17,42 @@ from rollcli.rig.quantities import COLUMNS
 from rollcli.stereo.misalignment_words import advice_of
 
 _MOST_FRAMES = 1_000_000  # that the rig's roll is told of: their names and numbers take 150 MB
+
+
+_NO_ANGLE = bytes([STATUSES.index("error")])
+
+
+class Figures(NamedTuple):
+    """What the summary takes of consecutive rows.
+
+    Attributes
+    ----------
+    status : bytes
+        Of each row, its position in `STATUSES`.
+    numbers : mapping of str to array of float
+        Those of `COLUMNS` in which a row has a value; NaN where it has none.
+    """
+
+    status: bytes
+    numbers: "Mapping[str, array[float]]"
+
+    @classmethod
+    def of(cls, rows: Sequence[Row]) -> "Figures":
+        """Take them of rows."""
+        columns = {name: [getattr(row, name) for row in rows] for name in COLUMNS}
+        return cls(
+            bytes(STATUSES.index(row.status) for row in rows),
+            {
+                name: array("d", (math.nan if value is None else value for value in values))
+                for name, values in columns.items()
+                if any(value is not None for value in values)
+            },
+        )
+
+    @property
+    def first_error(self) -> int:
+        """The position of the first row without an angle; -1 where there is none."""
+        return self.status.find(_NO_ANGLE)
 
 
 class RunSummary:
@@ -36,33 +74,44 @@ class RunSummary:
         self._status = bytearray()
         self._numbers = {name: array("d") for name in COLUMNS}
 
-    def add(self, row: Row, *, is_retried: bool = False) -> None:
-        """Take the next row; of one whose frame is done again the place alone, until `replace`."""
-        if not is_retried:
-            self._count(row)
-        self._too_many |= len(self._files) == _MOST_FRAMES
+    def add(self, files: Sequence[str], figures: Figures) -> None:
+        """Take the next rows."""
+        self._count(figures)
+        self._append(files, figures)
+
+    def add_row(self, row: Row) -> None:
+        """Take the next row."""
+        self.add([row.file], Figures.of([row]))
+
+    def leave_places(self, files: Sequence[str]) -> None:
+        """Leave the places of rows whose frames will be done, until `replace`."""
+        self._append(files, Figures(_NO_ANGLE * len(files), {}))
+
+    def replace(self, positions: Sequence[int], figures: Figures) -> None:
+        """Take rows in the places at these positions, from 0, that have been left to them."""
+        self._count(figures)
+        for at, position in enumerate(positions):
+            if position < len(self._files):
+                self._status[position] = figures.status[at]
+                for name, column in figures.numbers.items():
+                    self._numbers[name][position] = column[at]
+
+    def _count(self, figures: Figures) -> None:
+        for place, status in enumerate(STATUSES):
+            if found := figures.status.count(place):
+                self.counts[status] += found
+        for name, column in self._alignment.items():
+            column.extend(value for value in figures.numbers.get(name, ()) if not math.isnan(value))
+
+    def _append(self, files: Sequence[str], figures: Figures) -> None:
+        self._too_many |= len(self._files) + len(files) > _MOST_FRAMES
         if self._too_many:
             return
-        self._files.append(row.file)
-        self._status.append(STATUSES.index(row.status))
+        self._files.extend(files)
+        self._status.extend(figures.status)
+        missing = array("d", [math.nan]) * len(files)
         for name, column in self._numbers.items():
-            column.append(_number(row, name))
-
-    def replace(self, position: int, row: Row) -> None:
-        """Take the row of a frame that was done again, in the place of the one at a position, from 0."""
-        self._count(row)
-        if position >= len(self._files):
-            return
-        self._status[position] = STATUSES.index(row.status)
-        for name, column in self._numbers.items():
-            column[position] = _number(row, name)
-
-    def _count(self, row: Row) -> None:
-        self.counts[row.status] += 1
-        for name, column in self._alignment.items():
-            value = getattr(row, name)
-            if value is not None:
-                column.append(value)
+            column.extend(figures.numbers.get(name, missing))
 
     @property
     def frames(self) -> int:
@@ -121,8 +170,3 @@ class RunSummary:
     def _median(self, name: str) -> float | None:
         known = [each for each in self._numbers[name] if not math.isnan(each)]
         return median(known) if known else None
-
-
-def _number(row: Row, name: str) -> float:
-    value: float | None = getattr(row, name)
-    return math.nan if value is None else value

@@ -36,6 +36,8 @@ sys.path.insert(0, str(ROOT))
 from tests.run_cli import command, contents, environment, road_map, rollcli, write_kitti, write_maps
 
 RESULTS = ("rolls.csv", "rolls.jsonl")
+IN_PARTS = "rolls.parquet"
+PARTS = ("--part-rows", "4")  # so that workers write some, and others write pieces of one
 IMAGES = ("--derotated", "up", "--vdisparity", "v", "--road-mask", "road")
 STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _BY_SIGNAL = [-number for number in STOPS]
@@ -83,8 +85,11 @@ class Run:
             self.reader, writer = os.pipe()
         else:
             self.reader, writer = pty.openpty()
+        parts = PARTS if result == IN_PARTS else ()
         self.process = subprocess.Popen(
-            command("estimate", task.inputs, "-v", "-o", result, "-j", str(jobs), task.flag, *IMAGES),
+            command(
+                *("estimate", task.inputs, "-v", "-o", result, "-j", str(jobs), task.flag, *IMAGES, *parts)
+            ),
             cwd=folder,
             env=environment(),
             stdout=subprocess.DEVNULL,
@@ -306,14 +311,15 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         tasks, expected = make_tasks(folder, given.frames), {}
-        for number, (task, result) in enumerate(itertools.product(tasks, RESULTS)):
+        pairs = [(tasks[0], IN_PARTS), *itertools.product(tasks, RESULTS)]
+        for number, (task, result) in enumerate(pairs):
             undisturbed = folder / f"undisturbed{number}"
             undisturbed.mkdir()
             Run(undisturbed, result, 2, task._replace(flag="--overwrite")).end()
             before = contents(task.before) if task.before else {}
             expected[task, result] = before | contents(undisturbed)
         while counts.total() < given.count:
-            result, jobs, task = RESULTS[trials // 2 % 2], 1 + trials % 2, tasks[trials // 4 % len(tasks)]
+            (task, result), jobs = pairs[trials // 2 % len(pairs)], 1 + trials % 2
             trial = folder / f"trial{trials}"
             if task.before:
                 shutil.copytree(task.before, trial)

@@ -21,11 +21,13 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
+from tests.object_store import object_store
 from tests.run_cli import environment, road_map, write_kitti
 
 FEW = 200
 KINDS = 50  # of maps; the others are links to them
 MAP_S, PAIR_S = 0.0055, 0.1  # of a map of 1242x375 and of a pair of that size, on one worker
+REQUEST_S, CHUNKS = 0.05, 200
 LOCAL = ("--host", "127.0.0.1", "--no-dashboard")
 # the program, which tells the CPU seconds of itself and of its workers
 MEASURED = """
@@ -44,11 +46,11 @@ _owed: dict[int, float] = {}
 
 
 def sleep_for(seconds: float) -> int:
-    """Take the time of a frame, in naps of a twentieth of a second: shorter ones take CPU time."""
+    """Take the time of a frame, in naps of a quarter of a second: shorter ones take CPU time."""
     me, now = threading.get_ident(), time.monotonic()
     idle = _owed.get(me, 0.0) < now - 0.01
     _owed[me] = (now if idle else _owed[me]) + seconds
-    if idle or _owed[me] - now > 0.05:
+    if idle or _owed[me] - now > 0.25:
         time.sleep(max(_owed[me] - time.monotonic(), 0.0))
     return 0
 
@@ -68,10 +70,11 @@ def cpu_of(processes: list["subprocess.Popen[bytes]"]) -> float:
 
 
 def dask(folder: Path, kind: str, *arguments: object) -> "subprocess.Popen[bytes]":
-    """Start a Dask process."""
+    """Start a Dask process, whose profiler does not look at all of its threads 100 times a second."""
     line = [sys.executable, "-m", f"distributed.cli.dask_{kind}", *map(str, arguments)]
+    settings = environment(DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED="false")
     with (folder / f"{kind}.log").open("ab") as log:
-        return subprocess.Popen(line, cwd=folder, env=environment(), stdout=log, stderr=log)
+        return subprocess.Popen(line, cwd=folder, env=settings, stdout=log, stderr=log)
 
 
 @contextlib.contextmanager
@@ -136,27 +139,94 @@ def costs(frames: int) -> dict[str, float]:
 
             def on_cluster(output: str) -> Callable[[Path], tuple[float, ...]]:
                 def measure(maps: Path) -> tuple[float, ...]:
-                    before = cpu_of(processes[:1]), cpu_of(processes[1:])
+                    before = time.monotonic(), cpu_of(processes[:1]), cpu_of(processes[1:])
                     own, _ = run(maps, output, "--scheduler", scheduler)
-                    return own, cpu_of(processes[:1]) - before[0], cpu_of(processes[1:]) - before[1]
+                    after = time.monotonic(), cpu_of(processes[:1]), cpu_of(processes[1:])
+                    return own, *(a - b for a, b in zip(after, before, strict=True))
 
                 return measure
 
-            driver, dispatch, far = beyond_start(on_cluster("rolls.csv"), few, many, frames)
+            driver, wall, dispatch, far = beyond_start(on_cluster("rolls.csv"), few, many, frames)
             in_parts = beyond_start(on_cluster("rolls.parquet"), few, many, frames)
+            handing_over = chunk_costs(scheduler, processes)
     return {
         "alone": alone,
         "parent": parent,
         "local worker": worker,
         "driver": driver,
         "scheduler": dispatch,
+        "  of it, as if idle": wall / 1000 * handing_over["scheduler, a second"],
         "Dask worker": far,
         "driver, parts": in_parts[0],
+        **handing_over,
+        "worker, a part of 1000": part_cost(),
+        "worker, a request": request_cost(),
     }
 
 
-def busy(workers: int, frame_s: float, seconds: float) -> float:
-    """Share of the time from the first chunk to the last result that simulated workers sleep for frames."""
+def chunk_costs(scheduler: str, processes: list["subprocess.Popen[bytes]"]) -> dict[str, float]:
+    """CPU that a chunk costs, ms, and a second in which nothing happens."""
+    from rollcli.run.workers.chunks import Work
+    from rollcli.run.workers.cluster import ClusterExecutor
+    from rollcli.run.workers.in_order import SharedPaths
+    from tests.benchmarks import bench_scale  # workers find the tasks there, not in __main__
+
+    def used() -> tuple[float, float, float]:
+        return time.monotonic(), time.process_time(), cpu_of(processes[:1])
+
+    executor = ClusterExecutor(scheduler, Work(bench_scale.sleep_for, bench_scale.lost), SharedPaths(), 1)
+    try:
+        before = used()
+        time.sleep(10)
+        wall, _, idle = (after - b for after, b in zip(used(), before, strict=True))
+        idle /= wall
+        before = used()
+        for future in [executor.submit([0.01]) for _ in range(CHUNKS)]:
+            while not future.done():
+                executor.wait(future)
+            future.result()
+        wall, own, dispatch = (after - b for after, b in zip(used(), before, strict=True))
+    finally:
+        executor.close(at_once=False)
+    each = 1000 / CHUNKS
+    return {"driver, a chunk": each * own, "scheduler, a chunk": each * (dispatch - wall * idle)} | {
+        "scheduler, a second": 1000 * idle
+    }
+
+
+def part_cost() -> float:
+    """CPU of making and writing a part of Parquet of 1,000 rows, ms."""
+    from rollcli.files.results import Row, format_row
+    from rollcli.run.batch import Parts
+
+    rows = [format_row(Row(f"maps/{n:06}.png", status="ok", roll_deg=n / 1000), "jsonl") for n in range(1000)]
+    with tempfile.TemporaryDirectory() as folder:
+        parts = Parts(folder, "parquet", (), 1000, (), 0, "", {})
+        parts.write(0, rows)  # loads what is loaded once
+        start = time.process_time()
+        for number in range(1, 11):
+            parts.write(number, rows)
+        return 100 * (time.process_time() - start)
+
+
+def request_cost() -> float:
+    """CPU of reading an object of 150 kB, ms."""
+    from rollcli.files.storage import read_bytes, write_bytes
+
+    with object_store() as settings:
+        os.environ.update(settings)
+        write_bytes("s3://maps/a", bytes(150_000))
+        start = time.process_time()
+        for _ in range(200):
+            read_bytes("s3://maps/a")
+        return 5 * (time.process_time() - start)
+
+
+def busy(workers: int, frame_s: float, seconds: float) -> tuple[float, list[float]]:
+    """How busy simulated workers are, and what the driver, the scheduler and the workers take of a CPU.
+
+    Busy is the share of the time from the first chunk to the last result that they sleep for frames.
+    """
     from rollcli.run.workers.chunks import Work
     from rollcli.run.workers.in_order import Workers
     from rollcli.run.workers.interrupt import Stop
@@ -165,32 +235,45 @@ def busy(workers: int, frame_s: float, seconds: float) -> float:
 
     tasks = [frame_s] * int(workers * seconds / frame_s)
     work = Work(bench_scale.sleep_for, bench_scale.lost)
-    with tempfile.TemporaryDirectory() as name, cluster(Path(name), 4, workers // 4) as (scheduler, _):
+    with (
+        tempfile.TemporaryDirectory() as name,
+        cluster(Path(name), 4, workers // 4) as (scheduler, processes),
+    ):
+
+        def used() -> list[float]:
+            return [time.process_time(), cpu_of(processes[:1]), cpu_of(processes[1:])]
+
         time.sleep(10)  # the workers join
         list(run_tasks(tasks[: 2 * workers], work, Stop(), Workers(scheduler=scheduler)))
-        start = time.monotonic()
+        start, before = time.monotonic(), used()
         lost_frames = sum(run_tasks(tasks, work, Stop(), Workers(scheduler=scheduler)))
         wall = time.monotonic() - start
-    return 0.0 if lost_frames else len(tasks) * frame_s / (workers * wall)
+        shares = [(after - used_before) / wall for after, used_before in zip(used(), before, strict=True)]
+    return 0.0 if lost_frames else len(tasks) * frame_s / (workers * wall), shares
 
 
 def print_model(found: dict[str, float]) -> None:
     """Frames a second by the number of workers: the least of what each part of a run can do.
 
-    A chunk is worth a second, and more where there are more than 100 workers: a frame's share of the
-    scheduler's time grows with the time of the frame, and falls with the number of workers beyond these.
+    A chunk is worth a second, and more where there are more than 100 workers. A frame of a bucket is two
+    requests, one to read it and one to write an image; a part is two more. A worker has 16 frames in hand, so
+    that requests of 50 ms keep it waiting only where a frame takes less than 6 ms.
     """
-    cases = (("maps", MAP_S, "driver"), ("maps, parts", MAP_S, "driver, parts"), ("pairs", PAIR_S, "driver"))
+    places = (("disk", "driver", 0), ("Parquet", "driver, parts", 0), ("bucket", "driver, parts", 2))
+    cases = [(kind, s, *place) for kind, s in (("maps", MAP_S), ("pairs", PAIR_S)) for place in places]
     print("\nframes/s and what limits them")
-    print(f"{'workers':>8}" + "".join(f"{name:>22}" for name, _, _ in cases))
+    print(f"{'workers':>8}" + "".join(f"{f'{kind}, {where}':>22}" for kind, _, where, _, _ in cases))
     for workers in (1, 16, 64, 256, 1000):
         row = f"{workers:8}"
-        for _, frame_s, driver in cases:
-            share = frame_s / (found["alone"] / 1000) / max(1, min(workers, 800) / 100)
+        for _, frame_s, where, driver, requests in cases:
+            of_part = found["worker, a part of 1000"] / 1000 if where != "disk" else 0.0
+            busy_s = frame_s + (of_part + requests * 1.002 * found["worker, a request"]) / 1000
+            in_chunk = min(max(1, workers / 100), 8) / busy_s
+            dispatch = found["scheduler, a chunk"] / in_chunk / (1 - found["scheduler, a second"] / 1000)
             able = {
-                "workers": workers / frame_s,
-                "driver": 1000 / max(found[driver], 1e-3),
-                "scheduler": 1000 / max(found["scheduler"] * share, 1e-3),
+                "workers": workers / max(busy_s, requests * REQUEST_S / 16),
+                "driver": 1000 / max(found[driver] + found["driver, a chunk"] / in_chunk, 1e-3),
+                "scheduler": 1000 / max(dispatch, 1e-3),
             }
             limit = min(able, key=lambda each: able[each])
             row += f"{able[limit]:12.0f} {limit:9}"
@@ -207,15 +290,19 @@ def main() -> None:
     if given.frames:
         found = costs(given.frames)
         print(f"CPU of a frame, ms, {given.frames} maps of 96x72, beyond start-up (to reach: driver and")
-        print("scheduler 0.1 each, Dask worker 1.15 times the local one)")
+        print(
+            "scheduler 0.1 each, Dask worker 1.15 times the local one); then of a chunk, a part and a request"
+        )
         for who, cost in found.items():
-            print(f"{who:16} {cost:7.3f}")
+            print(f"{who:22} {cost:7.3f}")
         print(f"Dask worker / local worker {found['Dask worker'] / found['local worker']:.2f}")
         print_model(found)
     for workers in given.simulated:
-        share = busy(workers, 0.005, given.seconds)
+        share, (driver, scheduler, slept) = busy(workers, 0.005, given.seconds)
         print(
-            f"{workers} simulated workers, 5 ms a frame: {100 * share:.0f} % busy (to reach: 80)", flush=True
+            f"{workers} simulated workers, 5 ms a frame: {100 * share:.0f} % busy (to reach: 80); "
+            f"driver {driver:.2f}, scheduler {scheduler:.2f}, workers {slept:.2f} of a CPU",
+            flush=True,
         )
 
 

@@ -18,8 +18,9 @@ class WatchedFile:
     def __init__(self, forced):
         self.forced, self.rows, self.synced = forced, {}, 0
 
-    def append(self, row):
-        self.rows[row] = set(self.forced)
+    def append(self, rows):
+        for row in rows.split():
+            self.rows[row] = set(self.forced)
 
     def sync(self):
         self.synced = len(self.rows)
@@ -48,7 +49,7 @@ def test_a_row_is_written_after_its_images_and_their_folder_are_on_the_disk(tmp_
     rows = DurableRows(file, WatchedFile([]))
     paths = [image(tmp_path, number) for number in range(40)]
     for number, path in enumerate(paths):
-        rows.append(b"%d" % number, b"read", [str(path)])
+        rows.append([b"%d " % number], [b"read"], [str(path)])
     rows.commit()
     assert list(file.rows) == [b"%d" % number for number in range(40)]
     for path, forced in zip(paths, file.rows.values(), strict=True):
@@ -58,10 +59,10 @@ def test_a_row_is_written_after_its_images_and_their_folder_are_on_the_disk(tmp_
 
 def test_a_row_without_images_is_written_at_once_and_after_those_that_wait(tmp_path, file):
     rows = DurableRows(file, WatchedFile([]))
-    rows.append(b"0", b"read", [])
+    rows.append([b"0 "], [b"read"], [])
     assert list(file.rows) == [b"0"]
     for number in range(1, 5):
-        rows.append(b"%d" % number, b"read", [str(image(tmp_path, number))] if number % 2 else [])
+        rows.append([b"%d " % number], [b"read"], [str(image(tmp_path, number))] if number % 2 else [])
     rows.commit()
     assert list(file.rows) == [b"%d" % number for number in range(5)]
 
@@ -89,12 +90,12 @@ def test_a_row_waits_so_long_for_the_others_of_its_group(monkeypatch, file, sync
     monkeypatch.setattr(durable_rows, "time", clock)
     monkeypatch.setattr(durable_rows, "sync_files", clock.sync)
     rows = DurableRows(file, WatchedFile([]))
-    rows.append(b"0", b"read", ["0.png"])
+    rows.append([b"0 "], [b"read"], ["0.png"])
     assert list(file.rows) == [b"0"]
     start = clock.now
     for share, written in ((0.0, 1), (0.98, 1), (1.02, 4)):
         clock.now = start + share * wait_s
-        rows.append(b"%g" % (share + 1), b"read", ["1.png"])
+        rows.append([b"%g " % (share + 1)], [b"read"], ["1.png"])
         assert len(file.rows) == written
 
 
@@ -105,7 +106,7 @@ def test_a_group_ends_early_when_it_has_many_images(monkeypatch, file):
     rows = DurableRows(file, WatchedFile([]))
     for number in range(1 + 512):
         assert len(file.rows) == min(number, 1)
-        rows.append(b"%d" % number, b"read", ["image.png"])
+        rows.append([b"%d " % number], [b"read"], ["image.png"])
     assert len(file.rows) == 513
 
 
@@ -187,7 +188,7 @@ def test_a_second_interrupt_at_any_line_writes_no_row_twice_and_leaves_none_out(
 
             def work(rows=rows):
                 for number, row in enumerate(expected):
-                    rows.append(row, row, [str(image(tmp_path, number))] if number else [])
+                    rows.append([row], [row], [str(image(tmp_path, number))] if number else [])
                 rows.commit()
 
             came = interrupted_at(step, work)

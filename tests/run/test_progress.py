@@ -28,7 +28,7 @@ def lines(capsys):
 def test_it_counts_kept_and_new_rows_by_status(lines):
     kept = RunSummary()
     for status in ("ok", "suspect"):
-        kept.add(Row("kept.png", status=status))
+        kept.add_row(Row("kept.png", status=status))
     counted = Progress(4, RunningOptions(), GUESSED, summary=kept)
     counted.add(result())
     counted.add(result("suspect"))

@@ -3,7 +3,7 @@
 import pytest
 
 from rollcli.errors import OutputError
-from rollcli.run import parts as result_parts
+from rollcli.run import batch
 from tests.run_cli import contents, leave_half, rollcli, write_maps
 
 
@@ -78,8 +78,8 @@ def test_a_full_disk_keeps_the_parts_before_it_and_says_how_to_go_on(parts, monk
         raise OutputError(f"{location}: cannot be written: no space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr(result_parts, "create", no_room)
-        done = rollcli(*line, "--resume", cwd=folder)
+        patch.setattr(batch, "create", no_room)
+        done = rollcli(*line, "--resume", "-j", "1", cwd=folder)
     assert done.status == 1
     assert done.err.endswith(
         "rollcli: rolls.parquet/part-00001.parquet: cannot be written: no space left on device; "

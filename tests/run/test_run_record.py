@@ -7,6 +7,7 @@ import pytest
 
 from rollcli.errors import InputError
 from rollcli.files.results import Row, read_run
+from rollcli.run.frame import ReadAs
 from rollcli.run.options import (
     EncodingOptions,
     FrameOptions,
@@ -40,7 +41,7 @@ def summary_of(frames):
     """The summary of a run of so many frames."""
     summary = RunSummary()
     for _ in range(frames):
-        summary.add(Row("a.png", status="ok"))
+        summary.add_row(Row("a.png", status="ok"))
     return summary
 
 
@@ -48,7 +49,7 @@ def written(options, *seen):
     """The record of a run that saw these encodings and ranges."""
     record = RunRecord(make_plan(options), options)
     for encoding, searched in seen:
-        record.saw(encoding, searched)
+        record.saw(ReadAs(frozenset([encoding]), searched))
     record.write(summary_of(3))
     return read_run(options.result.output)
 
@@ -70,9 +71,9 @@ def test_what_is_no_record_of_options_is_refused(given):
 
 def test_it_says_how_inputs_were_read_before_the_run_is_over(options):
     record = RunRecord(make_plan(options), options)
-    record.saw("kitti", None)
-    record.saw("", (0, 63))
-    record.saw("px", (-16, 47))
+    record.saw(ReadAs(frozenset(["kitti"])))
+    record.saw(ReadAs(searched=(0, 63)))
+    record.saw(ReadAs(frozenset(["px"]), (-16, 47)))
     run = read_run(options.result.output)
     assert run["encoding"] == ["kitti", "px"]
     assert run["disparities_searched_px"] == [-16, 63]
@@ -83,7 +84,7 @@ def test_a_resumed_run_writes_the_record_of_an_undisturbed_one(options):
     whole = written(options, ("kitti", (0, 63)), ("px", (0, 79)))
     record = RunRecord(make_plan(options), options)
     record.continue_from(json.loads(json.dumps(written(options, ("kitti", (0, 63))))))
-    record.saw("px", (0, 79))
+    record.saw(ReadAs(frozenset(["px"]), (0, 79)))
     record.write(summary_of(3))
     assert read_run(options.result.output) == whole
 

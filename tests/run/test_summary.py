@@ -5,7 +5,7 @@ import math
 
 from rollcli.files.results import Row
 from rollcli.run import summary
-from rollcli.run.summary import RunSummary
+from rollcli.run.summary import Figures, RunSummary
 from tests.run_cli import road_map, rollcli, write_kitti
 
 
@@ -38,7 +38,7 @@ def test_a_resumed_run_answers_for_all_frames_and_a_quiet_one_does_not(tmp_path)
 
 def test_frames_without_an_angle_leave_the_roll_unknown():
     found = RunSummary()
-    found.add(Row("a.png", message="a.png: is empty"))
+    found.add_row(Row("a.png", message="a.png: is empty"))
     assert found.rig_roll() == "roll unknown, 0 ok, 0 suspect, 1 failed"
 
 
@@ -46,6 +46,6 @@ def test_of_more_frames_than_memory_is_meant_for_the_answer_names_who_has_it(mon
     monkeypatch.setattr(summary, "_MOST_FRAMES", 3)
     found = RunSummary()
     for number in range(5):
-        found.add(Row(f"{number}.png", status="ok", roll_deg=1.0, roll_ci95_deg=0.1))
-        found.replace(number, Row(f"{number}.png"))
+        found.add_row(Row(f"{number}.png", status="ok", roll_deg=1.0, roll_ci95_deg=0.1))
+        found.replace([number], Figures.of([Row(f"{number}.png")]))
     assert found.rig_roll() == "more than 3 frames: rollcli rig RESULT says what they say of the rig"

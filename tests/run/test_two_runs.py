@@ -5,12 +5,14 @@ import pytest
 from rollcli.errors import UsageError
 from rollcli.files.locking import locked_folder
 from rollcli.files.results import Row
+from rollcli.run.batch import BatchOptions, join_results
 from rollcli.run.frame import FrameResult
-from rollcli.run.options import InputOptions, ResultOptions
+from rollcli.run.options import ImageOptions, InputOptions, ResultOptions
 from rollcli.run.plan import make_plan
 from rollcli.run.record import RunRecord
 from rollcli.run.result import open_output
 from rollcli.run.summary import RunSummary
+from rollcli.run.workers.chunks import Span
 from tests.run.estimate_options import estimate_options
 from tests.run_cli import contents, rollcli, write_maps
 
@@ -23,8 +25,11 @@ def options(maps, output):
 
 def append(output, frames):
     """The rows of frames, as workers would return them."""
+    told = BatchOptions("csv", (), ImageOptions(), "", verbose=False, fail_fast=False)
+    next(output.passes())
     for frame in frames:
-        output.append(frame, FrameResult(Row(frame.file, status="ok", roll_deg=1.0)))
+        result = FrameResult(Row(frame.file, status="ok", roll_deg=1.0))
+        output.append([frame], join_results(Span([frame], 0, output.read_as), [result], told))
 
 
 @pytest.fixture
@@ -44,7 +49,7 @@ def test_of_two_runs_in_a_bucket_the_last_to_begin_goes_on_and_the_other_ends(bu
         append(last, plan.frames)
         summary = RunSummary()
         for frame in plan.frames:
-            summary.add(Row(frame.file, status="ok"))
+            summary.add_row(Row(frame.file, status="ok"))
         last.finish(summary)
         with pytest.raises(UsageError, match="another run has begun"):
             first.finish(RunSummary())

@@ -9,9 +9,9 @@ import itertools
 import threading
 import time
 import traceback
-from collections.abc import Callable, Iterable, Sequence, Sized
+from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar, overload
 
 from rollcli.errors import RollcliError
 from rollcli.files.stores.locations import computing
@@ -29,7 +29,7 @@ _CHUNK_S = 1.0
 _CHUNKS_A_SECOND = 100
 _MOST_S = 8.0
 # a worker gives back what it has not begun by then: tasks may be slower than those before
-LONGEST_S = 2.0
+_LONGEST_S = 2.0
 LONGEST_ON_CLUSTER_S = 2 * _MOST_S
 _SHARES = 2  # a chunk is at most this part of what each worker still has to do, so that all end together,
 _LEAST_S = 0.05  # unless that is less than this, or than half of what _CHUNKS_A_SECOND allows
@@ -37,6 +37,44 @@ _LEAST_S = 0.05  # unless that is less than this, or than half of what _CHUNKS_A
 
 def _leave(task: object) -> None:
     """Leave everything as it is: the tasks write no files."""
+
+
+class Span(Sequence[Task]):
+    """Consecutive tasks that a worker gets at once.
+
+    Parameters
+    ----------
+    tasks : sequence
+    first : int
+        The position of the first one among all tasks, from 0.
+    told : object
+        What `Work.tell` said when they were taken.
+    """
+
+    __slots__ = ("first", "tasks", "told")
+
+    def __init__(self, tasks: Sequence[Task], first: int = 0, told: Any = None) -> None:
+        self.tasks, self.first, self.told = tasks, first, told
+
+    def __len__(self) -> int:
+        return len(self.tasks)
+
+    @overload
+    def __getitem__(self, at: int) -> Task: ...
+    @overload
+    def __getitem__(self, at: slice) -> "Span[Task]": ...
+    def __getitem__(self, at: int | slice) -> "Task | Span[Task]":
+        if isinstance(at, int):
+            return self.tasks[at]
+        return Span(self.tasks[at], self.first + at.indices(len(self))[0], self.told)
+
+
+def _as_they_are(chunk: Sequence[Task], results: list[Result]) -> Sequence[Result]:
+    return results
+
+
+def _nothing() -> None:
+    return None
 
 
 @dataclass(frozen=True)
@@ -52,11 +90,31 @@ class Work(Generic[Task, Result]):
         Makes the result of a task whose worker died, from the task and the reason.
     clear : callable
         Removes the half-written files that a worker left which died amid the task.
+    join : callable
+        Makes of a chunk and the results of its first tasks what the worker hands back of it, as long as there
+        are results; pickled as `do` is.
+    tell : callable
+        Returns what `join` is told as `chunk.told`: what was known when the tasks were taken.
+    unit : int
+        Tasks that belong together, counted from the first of all. A chunk is some whole units, or a piece of
+        one where that is worth too much time.
     """
 
     do: Callable[[Task], Result]
     lost: Callable[[Task, str], Result]
     clear: Callable[[Task], None] = _leave
+    join: Callable[[Any, list[Result]], Sized] = _as_they_are
+    tell: Callable[[], Any] = _nothing
+    unit: int = 1
+
+    @property
+    def longest_s(self) -> float:
+        """The time after which a worker of this machine begins no further task of a chunk."""
+        return _LONGEST_S if self.unit == 1 else LONGEST_ON_CLUSTER_S
+
+    def done(self, chunk: Sequence[Task], result: Result) -> "Done[Result]":
+        """Make what is handed back of a single task."""
+        return Done(self.join(chunk, [result]), 0.0)
 
 
 @dataclass(frozen=True)
@@ -65,15 +123,15 @@ class Done(Generic[Result]):
 
     Attributes
     ----------
-    results : list
-        Of its first tasks, in order; the others were not begun.
+    results : sized
+        What `Work.join` made of the results of its first tasks, in order; the others were not begun.
     seconds : float
         The time that this took of the worker.
     error : Exception or None
         What the next task raised: it ends the run.
     """
 
-    results: list[Result]
+    results: Any
     seconds: float
     error: Exception | None = None
 
@@ -87,35 +145,60 @@ class Chunks(Generic[Task]):
         Chunks get smaller towards the end where their number is known.
     first : int
         The size of the first ones.
+    unit : int
+        See `Work`.
     """
 
-    def __init__(self, tasks: Iterable[Task], first: int = 1) -> None:
+    def __init__(self, tasks: Iterable[Task], first: int = 1, unit: int = 1) -> None:
         self._left = len(tasks) if isinstance(tasks, Sized) else None
         self._tasks = iter(tasks)
-        self._first, self._a_second = first, 0.0
+        self._first, self._unit, self._task_s = first, unit, 0.0
+        self._taken = 0
 
-    def take(self, workers: int) -> list[Task]:
+    def take(self, workers: int, told: Any = None) -> Span[Task]:
         """Take the next chunk, for one of so many workers; empty when there are no more tasks."""
-        seconds = min(max(_CHUNK_S, workers / _CHUNKS_A_SECOND), _MOST_S)
-        size = int(self._a_second * seconds) if self.measured else self._first
-        if self._left is not None:
-            least_s = max(_LEAST_S, workers / _CHUNKS_A_SECOND / 2)
-            size = min(size, max(self._left // (_SHARES * workers), int(self._a_second * least_s)))
-        chunk = list(itertools.islice(self._tasks, max(size, 1)))
+        size = self._size(self._taken, self._left, workers)
+        chunk = Span(list(itertools.islice(self._tasks, size)), self._taken, told)
+        self._taken += len(chunk)
         if self._left is not None:
             self._left -= len(chunk)
         return chunk
 
+    def cut(self, rest: Span[Task], workers: int) -> Iterator[Span[Task]]:
+        """Cut what a worker has not begun in time: its tasks are slower than those before."""
+        least = -(-len(rest) // (_SHARES * workers))
+        while rest:
+            size = max(self._size(rest.first, len(rest), workers), least)
+            yield rest[:size]
+            rest = rest[size:]
+
+    def _size(self, first: int, left: int | None, workers: int) -> int:
+        """Choose the size of a chunk from the position of its first task and the number of tasks to come."""
+        size, most = self._first, self._unit
+        worth = 1 / self._task_s if self.measured else 0.0  # tasks that a second is worth
+        if self.measured:
+            size = int(worth * min(max(_CHUNK_S, workers / _CHUNKS_A_SECOND), _MOST_S))
+        if left is not None:
+            least_s = max(_LEAST_S, workers / _CHUNKS_A_SECOND / 2)
+            most = max(left // (_SHARES * workers), int(worth * least_s))
+            size = min(size, most)
+        size, begun = max(size, 1), first % self._unit
+        if begun == 0 and size >= self._unit:
+            return size - size % self._unit
+        if begun == 0 and self._unit <= min(most, int(worth * _MOST_S)):
+            return self._unit
+        return min(size, self._unit - begun)
+
     @property
     def measured(self) -> bool:
         """Whether a chunk was measured."""
-        return self._a_second > 0
+        return self._task_s > 0
 
     def measure(self, done: Done[Any]) -> None:
-        """Learn from a chunk how many tasks are worth a second: half from it, half from those before."""
+        """Learn from a chunk what a task takes: half from it, half from those before."""
         if done.results:
-            found = len(done.results) / max(done.seconds, 1e-6)
-            self._a_second = (self._a_second + found) / 2 if self.measured else found
+            found = max(done.seconds, 1e-6) / len(done.results)
+            self._task_s = (self._task_s + found) / 2 if self.measured else found
 
 
 class _Attempt(NamedTuple):
@@ -130,27 +213,29 @@ class Chunk(Generic[Task, Result]):
 
     Parameters
     ----------
-    do : callable
-        Turns a task into its result.
+    do, join : callable
+        See `Work`.
     tasks : sequence
     stopped : Event
         Once it is set, no further task begins.
+    longest_s : float
+        No further task begins so many seconds after the first.
     threads : ThreadPoolExecutor, optional
         The tasks wait for the network: they begin at once, in these threads, and one at a time computes.
         Otherwise each begins when the one before it is done, and the first when someone asks what was done.
-    longest_s : float
-        No further task begins so many seconds after the first.
     """
 
     def __init__(
         self,
         do: Callable[[Task], Result],
+        join: Callable[[Any, list[Result]], Sized],
         tasks: Sequence[Task],
         stopped: threading.Event,
+        longest_s: float,
         threads: "ThreadPoolExecutor | None" = None,
-        longest_s: float = LONGEST_S,
     ) -> None:
-        self._do, self._stopped, self._longest_s = do, stopped, longest_s
+        self._do, self._join, self._tasks = do, join, tasks
+        self._stopped, self._longest_s = stopped, longest_s
         self._over, self._failed = 0.0, False
         self._attempts: Iterable[_Attempt | None] = map(self._attempt, tasks)
         if threads is not None:
@@ -169,7 +254,11 @@ class Chunk(Generic[Task, Result]):
         begun = list(itertools.takewhile(lambda attempt: attempt is not None, every))
         error = next((each.error for each in begun if each and each.error), None)
         results = [each.result for each in begun if each and not each.error]
-        return Done(results, time.monotonic() - start, error)
+        seconds = time.monotonic() - start  # what else a chunk costs does not grow with its tasks
+        try:
+            return Done(self._join(self._tasks, results) if results else [], seconds, error)
+        except Exception as failed:  # noqa: BLE001 (whoever asked for the results raises it)
+            return Done([], seconds, _portable(failed))
 
     def _attempt_in_turn(self, task: Task) -> _Attempt | None:
         with computing():

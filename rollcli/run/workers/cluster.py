@@ -5,14 +5,15 @@ import contextlib
 import json
 import logging
 import os
+import pickle
 import threading
 import time
 import uuid
 import weakref
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from concurrent.futures import CancelledError, ThreadPoolExecutor
 from pathlib import Path
-from typing import Any, Generic, cast
+from typing import Any, Generic
 
 from rollcli import __version__
 from rollcli.errors import ClusterError, OutputError, UsageError, WorkerError
@@ -137,8 +138,10 @@ class ClusterExecutor(Generic[Task, Result]):
         """Give a chunk to Dask; return its future, and the workers that may do it, if not all may."""
         self.check_connection()
         chosen = set(self._threads_of) if self._refused else set()
+        # bytes: the scheduler would make objects of all else, and pickle them again
+        told = pickle.dumps((self._work.do, self._work.join, chunk), pickle.HIGHEST_PROTOCOL)
         sent = self._client.submit(
-            *(_do_chunk, __version__, self._run, self._work.do, chunk, self.threads),
+            *(_do_chunk, __version__, self._run, told, self.threads),
             pure=False,
             priority=priority,
             workers=sorted(chosen) or None,
@@ -155,15 +158,15 @@ class ClusterExecutor(Generic[Task, Result]):
         self.check_connection()
         future.wait(_POLL_S)
 
-    def retry(self, task: Task) -> Done[Result]:
+    def retry(self, chunk: Sequence[Task]) -> Done[Result]:
         """Run a task again whose workers died: Dask blames all that were theirs, the next in line, too."""
-        future = self.submit([task], first=True)
+        future = self.submit(chunk, first=True)
         while not future.done():
             self.wait(future)
         try:
             return future.result()
         except self.worker_died:
-            return Done([self._work.lost(task, _DIED)], 0.0)
+            return self._work.done(chunk, self._work.lost(chunk[0], _DIED))
 
     def stop(self) -> None:
         """Let workers begin no further task."""
@@ -243,7 +246,8 @@ class ClusterFuture(Generic[Task, Result]):
             self._executor.check_connection()
             error = self._sent.exception()
             if error is None:
-                return cast(Done[Result], self._sent.result())
+                found: Done[Result] = pickle.loads(self._sent.result())  # noqa: S301 (as Dask does)
+                return found
         except (CancelledError, OSError) as lost:  # the latter where it is lost amid a result
             raise _connection_lost(self._executor.address) from lost
         if isinstance(error, self._executor.worker_died):
@@ -275,20 +279,19 @@ def _stop_run(run: str) -> None:
     _run_here(run).stopped.set()
 
 
-def _do_chunk(
-    version: str, run: str, do: Callable[[Task], Result], tasks: Sequence[Task], threads: int
-) -> Done[Result]:
+def _do_chunk(version: str, run: str, told: bytes, threads: int) -> bytes:
     """Do a chunk on a worker, which begins another one while the last tasks wait for the network."""
     if version != __version__:
         raise WorkerError(_other_version(version))
     here = _run_here(run, threads)
-    chunk = Chunk(do, tasks, here.stopped, here.threads, LONGEST_ON_CLUSTER_S)
+    do, join, tasks = pickle.loads(told)  # noqa: S301 (as Dask does)
+    chunk = Chunk(do, join, tasks, here.stopped, LONGEST_ON_CLUSTER_S, here.threads)
     if here.threads is not None:
         from distributed import secede
 
         chunk.wait_until_begun()
         secede()
-    return chunk.done()
+    return pickle.dumps(chunk.done(), pickle.HIGHEST_PROTOCOL)
 
 
 def _other_version(version: str) -> str:
@@ -409,7 +412,7 @@ def probe(version: str, sizes: dict[str, int], marks: list[str]) -> str:
     for mark in marks:
         folder = Path(mark).parent
         if not is_there(mark):
-            return f"does not see {folder}; image folders must lie on storage that the workers share"
+            return f"does not see {folder}; what they write must lie on storage that the workers share"
         if not os.access(folder, os.W_OK):
             return f"cannot write to {folder}"
     return ""

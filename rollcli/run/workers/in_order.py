@@ -6,7 +6,7 @@ from collections.abc import Generator, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar
 
-from rollcli.run.workers.chunks import Chunks, Done, Result, Task
+from rollcli.run.workers.chunks import Chunks, Done, Result, Span, Task, Work
 from rollcli.run.workers.interrupt import Stop
 
 
@@ -96,8 +96,8 @@ class Executor(Protocol[_Task, Result]):
     def wait(self, future: Future[Result]) -> None:
         """Wait until a chunk is done, or for a fifth of a second."""
 
-    def retry(self, task: _Task) -> Done[Result]:
-        """Run a task again that kills workers; if this one dies too, return the result of a lost task."""
+    def retry(self, chunk: Sequence[_Task]) -> Done[Result]:
+        """Run a single task again that kills workers; if this one dies too, return that of a lost task."""
 
     def stop(self) -> None:
         """Let workers begin no further task."""
@@ -107,24 +107,24 @@ class Executor(Protocol[_Task, Result]):
 
 
 def in_order(
-    tasks: Iterable[Task], executor: Executor[Task, Result], stop: Stop
-) -> Generator[Result, None, None]:
-    """Yield the result of each task, in the tasks' order.
+    tasks: Iterable[Task], work: Work[Task, Result], executor: Executor[Task, Result], stop: Stop
+) -> Generator[Any, None, None]:
+    """Yield what `Work.join` made of the results of some tasks and of those after them, in the tasks' order.
 
     A chunk whose worker died is done again in halves: what kills workers is alone in the end. Once `stop` is
     requested, no further task begins; results are yielded up to the first task that was not begun.
     """
-    chunks = Chunks(tasks, executor.threads)
-    in_flight = deque[tuple[Sequence[Task], Future[Result]]]()
+    chunks = Chunks(tasks, executor.threads, work.unit)
+    in_flight = deque[tuple[Span[Task], Future[Result]]]()
 
-    def submit_first(*some: Sequence[Task]) -> None:
+    def submit_first(*some: Span[Task]) -> None:
         for each in reversed(some):
             in_flight.appendleft((each, executor.submit(each, first=True)))
 
     while True:
         most = executor.workers * (_IN_FLIGHT if chunks.measured else 1)
         while not stop.asked and len(in_flight) < most:
-            chunk: Sequence[Task] = chunks.take(executor.workers)
+            chunk = chunks.take(executor.workers, work.tell())
             if not chunk:
                 break
             in_flight.append((chunk, executor.submit(chunk)))
@@ -147,15 +147,16 @@ def in_order(
             if len(chunk) > 1:
                 submit_first(chunk[: len(chunk) // 2], chunk[len(chunk) // 2 :])
                 continue
-            done = executor.retry(chunk[0])
+            done = executor.retry(chunk)
         chunks.measure(done)
-        yield from done.results
+        if done.results:
+            yield done.results
         if done.error is not None:
             raise done.error
         if rest := chunk[len(done.results) :]:
             if stop.asked:
                 return
-            submit_first(rest)
+            submit_first(*chunks.cut(rest, executor.workers))
 
 
 def _measure_any(

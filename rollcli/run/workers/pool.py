@@ -114,19 +114,19 @@ class PoolExecutor(Generic[Task, Result]):
         """Wait until a worker answers or dies, or for a fifth of a second."""
         self._receive(_POLL_S)
 
-    def retry(self, task: Task) -> Done[Result]:
-        """Run a task again that kills workers, alone, so that it has all the memory."""
+    def retry(self, chunk: Sequence[Task]) -> Done[Result]:
+        """Run a single task again that kills workers, alone, so that it has all the memory."""
         waiting, self._queue = self._queue, deque()
         while any(worker.in_hand for worker in self._pool):
             self._receive(None)
-        future = self.submit([task])
+        future = self.submit(chunk)
         while not future.done():
             self._receive(None)
         self._queue.extend(waiting)
         try:
             return future.result()
         except WorkerDiedError:
-            return Done([self._work.lost(task, _DIED)], 0.0)
+            return self._work.done(chunk, self._work.lost(chunk[0], _DIED))
 
     def stop(self) -> None:
         """Let workers begin no further task."""
@@ -194,7 +194,7 @@ class PoolExecutor(Generic[Task, Result]):
             self._pool[index] = self._begun(Worker())
 
     def _begun(self, worker: "Worker[Task, Result]") -> "Worker[Task, Result]":
-        worker.begin(self._work.do, self._keep_open, self.threads)
+        worker.begin(self._work, self._keep_open, self.threads)
         return worker
 
 
@@ -261,11 +261,11 @@ class Worker(Generic[Task, Result]):
         """The number of tasks that it has in hand, or has done and not answered."""
         return sum(len(future.chunk) for future in self.in_hand)
 
-    def begin(self, do: Callable[[Task], Result], keep_open: int | None, threads: int) -> None:
+    def begin(self, work: Work[Task, Result], keep_open: int | None, threads: int) -> None:
         """Say what to do with tasks; see `PoolExecutor`."""
         file = None if sys.platform == "win32" else keep_open
         with contextlib.suppress(OSError):  # it died already, and is replaced
-            self.pipe.send((do, threads, file is not None))
+            self.pipe.send((work.do, work.join, work.longest_s, threads, file is not None))
             if file is not None:
                 reduction.send_handle(self.pipe, file, self._process.pid)
 
@@ -292,7 +292,7 @@ def _serve(pipe: "Connection[Any, Any]", load: Callable[[], None]) -> None:
     ignore_signals()
     start_error = _error_of(load)
     try:
-        do, threads, with_file = pipe.recv()
+        do, join, longest_s, threads, with_file = pipe.recv()
         if with_file:
             reduction.recv_handle(pipe)  # nobody closes it: it is open until this process ends
     except (EOFError, OSError):
@@ -311,7 +311,7 @@ def _serve(pipe: "Connection[Any, Any]", load: Callable[[], None]) -> None:
                 tasks = pipe.recv()
                 if tasks is _STOP:
                     stopped.set()
-                chunks.put(None if tasks is _STOP else Chunk(do, tasks, stopped, pool))
+                chunks.put(None if tasks is _STOP else Chunk(do, join, tasks, stopped, longest_s, pool))
         finally:  # the parent has died: a killed run must leave no workers that go on writing
             os._exit(1)
 

@@ -5,7 +5,7 @@ import os
 from collections.abc import Callable, Generator, Iterable, Iterator, Sized
 from typing import Any
 
-from rollcli.run.workers.chunks import Result, Task, Work
+from rollcli.run.workers.chunks import Result, Span, Task, Work
 from rollcli.run.workers.in_order import Workers, in_order
 from rollcli.run.workers.interrupt import Stop
 from rollcli.run.workers.pool import prepare_worker
@@ -16,7 +16,16 @@ _MOST_EARLY = 4  # of the workers: there may be fewer tasks, and those of a long
 def run_tasks(
     tasks: Iterable[Task], work: Work[Task, Result], stop: Stop, workers: Workers
 ) -> Generator[Result, None, None]:
-    """Yield the result of each task, in the tasks' order.
+    """Yield the result of each task, in the tasks' order; see `run_joined`."""
+    with contextlib.closing(run_joined(tasks, work, stop, workers)) as chunks:
+        for results in chunks:
+            yield from results
+
+
+def run_joined(
+    tasks: Iterable[Task], work: Work[Task, Result], stop: Stop, workers: Workers
+) -> Generator[Any, None, None]:
+    """Yield what `Work.join` makes of the results of the first tasks, and then of those after them.
 
     Raises
     ------
@@ -31,7 +40,7 @@ def run_tasks(
         yield from _run_here(tasks, work, stop)
         return
     try:
-        yield from in_order(tasks, executor, stop)
+        yield from in_order(tasks, work, executor, stop)
     finally:
         try:
             executor.close(at_once=stop.at_once)
@@ -86,13 +95,13 @@ def require_scheduler(address: str | None) -> None:
         check_scheduler(address)
 
 
-def _run_here(tasks: Iterable[Task], work: Work[Task, Result], stop: Stop) -> Generator[Result, None, None]:
+def _run_here(tasks: Iterable[Task], work: Work[Task, Result], stop: Stop) -> Generator[Any, None, None]:
     """Do each task in this process, when its result is asked for."""
     prepare_worker()
-    for task in tasks:
+    for position, task in enumerate(tasks):
         if stop.asked:
             return
-        yield work.do(task)
+        yield work.join(Span([task], position, work.tell()), [work.do(task)])
 
 
 def _executor(count: int | None, work: Work[Any, Any], workers: Workers) -> Any:

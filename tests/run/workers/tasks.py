@@ -3,11 +3,14 @@
 import os
 import signal
 import time
+from itertools import chain
 from pathlib import Path
 
 import cv2
 
 from rollcli.errors import InputError
+from rollcli.run.workers import in_order as ordered
+from rollcli.run.workers.chunks import Work
 
 
 def run(task):
@@ -26,6 +29,11 @@ def run(task):
         "raise": _raise,
         "threads": cv2.getNumThreads,
     }[kind](*arguments)
+
+
+def in_order(tasks, executor, stop):
+    """The results one by one."""
+    return chain.from_iterable(ordered.in_order(tasks, Work(run, lost), executor, stop))
 
 
 def lost(task, reason):

@@ -278,7 +278,7 @@ def test_a_worker_that_has_no_such_program_or_files_is_named(tmp_path):
     assert "this is 0.0" in probe("0.0", {}, [])
     assert f"does not see {tmp_path / 'b.png'}" in probe(__version__, {str(tmp_path / "b.png"): 3}, [])
     assert "does not see" in probe(__version__, {str(there): 4}, [])
-    assert "image folders must lie on storage" in probe(__version__, {}, [str(tmp_path / "v" / "mark")])
+    assert "what they write must lie on storage" in probe(__version__, {}, [str(tmp_path / "v" / "mark")])
 
 
 def test_dask_may_log_again_once_the_cluster_is_left():

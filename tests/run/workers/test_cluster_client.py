@@ -19,9 +19,9 @@ from rollcli.files.stores import locations as turns
 from rollcli.run.workers import cluster
 from rollcli.run.workers.chunks import Work
 from rollcli.run.workers.cluster import ClusterExecutor, check_scheduler, scheduler_address
-from rollcli.run.workers.in_order import SharedPaths, in_order
+from rollcli.run.workers.in_order import SharedPaths
 from rollcli.run.workers.interrupt import Stop
-from tests.run.workers.tasks import lost, run
+from tests.run.workers.tasks import in_order, lost, run
 
 pytestmark = pytest.mark.slow
 

@@ -7,9 +7,12 @@ import pytest
 
 from rollcli.run.workers import chunks as chunk_sizes
 from rollcli.run.workers.chunks import Chunk, Chunks, Done, Work
-from rollcli.run.workers.in_order import Workers, in_order
+from rollcli.run.workers.in_order import Workers
 from rollcli.run.workers.interrupt import Stop
 from rollcli.run.workers.tasks import run_tasks
+from tests.run.workers.tasks import in_order
+
+WORK = Work(str, str)
 
 
 class DiedError(Exception):
@@ -55,9 +58,9 @@ class FakeExecutor:
         done = [] if self.stops else chunk[: self.most]
         return Done([f"did {task}" for task in done], self.seconds * len(done))
 
-    def retry(self, task):
-        self.retried.append(task)
-        return Done([f"lost {task}"], 0.0)
+    def retry(self, chunk):
+        self.retried.extend(chunk)
+        return Done([f"lost {task}" for task in chunk], 0.0)
 
     def stop(self):
         self.stops += 1
@@ -122,6 +125,23 @@ def test_the_rest_of_a_chunk_that_took_too_long_comes_before_all_others():
     assert list(in_order(range(500), executor, Stop())) == [f"did {task}" for task in range(500)]
 
 
+@pytest.mark.parametrize("fast", [1e-6, 1e-4])
+def test_what_fast_tasks_made_too_large_a_chunk_of_is_done_by_all_workers(fast):
+    executor = FakeExecutor(4, most=200)
+    executor.seconds = fast
+    executor.do = lambda chunk: do_and_slow_down(executor, chunk)
+    assert list(in_order(iter(range(5000)), executor, Stop())) == [f"did {task}" for task in range(5000)]
+    sizes = [len(chunk) for chunk in executor.submitted]
+    assert max(sizes) > 1000
+    assert len([size for size in sizes if 50 <= size <= 700]) >= 8
+
+
+def do_and_slow_down(executor, chunk):
+    """After four fast tasks all are slow, and no worker does more than 200 of a chunk."""
+    done = chunk[: executor.most]
+    return Done([f"did {task}" for task in done], (executor.seconds if chunk[0] < 4 else 0.01) * len(done))
+
+
 def test_a_stop_ends_the_results_before_the_first_task_that_was_not_begun():
     stop, executor = Stop(), FakeExecutor(2)
     results = in_order(range(100), executor, stop)
@@ -143,7 +163,7 @@ def test_a_worker_that_dies_after_a_stop_is_not_retried():
 
 
 def chunk_of(do, tasks, stopped=None):
-    return Chunk(do, tasks, stopped or threading.Event())
+    return Chunk(do, WORK.join, tasks, stopped or threading.Event(), WORK.longest_s)
 
 
 def test_a_chunk_ends_between_tasks_when_it_is_stopped():

@@ -90,7 +90,7 @@ def test_what_kills_workers_is_done_alone_and_chunks_that_wait_meanwhile_are_don
         with pytest.raises(WorkerDiedError):
             dying.result()
         threading.Timer(0.3, event.touch).start()
-        assert executor.retry(dying.chunk[0]).results == [False]
+        assert executor.retry(dying.chunk).results == [False]
         assert settled(executor, held) == ["held"]
         assert [settled(executor, other) for other in others] == [[0], [1], [2]]
 

@@ -1,0 +1,236 @@
+"""What a worker hands back of consecutive frames: few bytes, and the rows themselves only if it must.
+
+A worker that has all the rows of a part writes it. The others come back as lines, and the dispatcher writes
+them. Import-light: never loads NumPy.
+"""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple
+
+from rollcli.errors import UsageError
+from rollcli.files.atomic import sync_files
+from rollcli.files.codecs.parquet import encode_parquet
+from rollcli.files.results import Format, column_types, format_header, format_row, run_path
+from rollcli.files.storage import create, owner_of
+from rollcli.files.stores.locations import is_url, public_name
+from rollcli.run.frame import Frame, FrameResult, ReadAs
+from rollcli.run.inputs import inputs_line
+from rollcli.run.options import ImageOptions
+from rollcli.run.outputs import local_images
+from rollcli.run.summary import Figures
+from rollcli.run.workers.chunks import Span
+
+
+@dataclass(frozen=True)
+class Batch:
+    """The results of consecutive frames.
+
+    Attributes
+    ----------
+    figures : Figures
+    in_parts : int
+        How many rows, from the first on, stand in parts that the worker has written.
+    lines : list of bytes
+        The other rows as they stand in the result.
+    notes : list of bytes
+        What frames were read from, where the result keeps it; see `inputs.inputs_line`.
+    read_as : ReadAs
+    told : list of FrameResult
+        Those of which the user is told.
+    """
+
+    figures: Figures
+    in_parts: int
+    lines: list[bytes]
+    notes: list[bytes]
+    read_as: ReadAs
+    told: list[FrameResult]
+
+    def __len__(self) -> int:
+        return len(self.figures.status)
+
+
+class Parts(NamedTuple):
+    """Where the rows of a pass over frames go that are written in parts.
+
+    Attributes
+    ----------
+    output : str
+        The folder, for workers.
+    form : str
+    further : tuple of str
+        Columns beside those of every result.
+    rows : int
+        Of each part but the last one of a result.
+    numbers : sequence of int
+        The parts of the pass, in order.
+    frames : int
+        How many frames the pass has.
+    run : str
+        The run's own name, which objects carry.
+    of_rows : mapping
+        What Parquet's metadata say of them.
+    """
+
+    output: str
+    form: Format
+    further: tuple[str, ...]
+    rows: int
+    numbers: Sequence[int]
+    frames: int
+    run: str
+    of_rows: Mapping[str, Any]
+
+    def write(self, number: int, lines: Sequence[bytes]) -> None:
+        """Write a part, whole, unless there is one.
+
+        Raises
+        ------
+        UsageError
+            Another run has written it, or has begun to write this result.
+        OutputError
+            It cannot be written.
+        """
+        location = part_location(self.output, self.form, number)
+        check_owned(self.output, self.run)
+        if not create(location, self.encoded(number, lines), self.run):
+            raise UsageError(
+                f"{location}: another run has written this part; give each an --output of its own"
+            )
+
+    def encoded(self, number: int, lines: Sequence[bytes]) -> bytes:
+        """Make the bytes of a part of its lines."""
+        if self.form == "parquet":
+            return encode_parquet(column_types(self.further), list(map(json.loads, lines)), self.of_rows)
+        header = format_header(self.form, self.further) if number == 0 else b""
+        return header + b"".join(lines)
+
+
+class Pass(NamedTuple):
+    """Frames that workers do in one go.
+
+    Attributes
+    ----------
+    positions : sequence of int
+        Of their rows in the result, increasing.
+    parts : Parts or None
+        Where their rows go, in parts.
+    """
+
+    positions: Sequence[int]
+    parts: Parts | None = None
+
+
+def line_form(form: Format) -> Literal["csv", "jsonl"]:
+    """Return the form of a row on its way to a result; Parquet's are JSON until a part is full."""
+    return "jsonl" if form == "parquet" else form
+
+
+def part_location(output: str, form: Format, number: int) -> str:
+    """Return where a part lies."""
+    return f"{output}/part-{number:05d}.{form}"
+
+
+def check_owned(output: str, run: str) -> None:
+    """Check that no other run has begun since on a result in an object store, which has no locks.
+
+    The run that begins last goes on, and those before it end: they may hang, or have lost their network.
+
+    Raises
+    ------
+    UsageError
+        Another one has.
+    """
+    if is_url(output) and owner_of(run_path(output)) not in (run, ""):
+        raise UsageError(
+            f"{public_name(output)}: another run has begun to write this result, so this one ends; "
+            "give each an --output of its own"
+        )
+
+
+class BatchOptions(NamedTuple):
+    """What a worker is told of the rows that it makes.
+
+    Attributes
+    ----------
+    form : str
+        Of their lines; those of Parquet are JSON.
+    further : tuple of str
+        Columns beside those of every result.
+    images : ImageOptions
+    root : str
+        Where relative paths start, for workers on other machines.
+    verbose : bool
+        Whether the user is told of every frame.
+    fail_fast : bool
+        Whether the first frame without an angle ends the run.
+    notes : bool
+        Whether the result keeps what each row was made from.
+    parts : Parts or None
+        Where whole parts go; None: all rows come back.
+    """
+
+    form: Literal["csv", "jsonl"]
+    further: tuple[str, ...]
+    images: ImageOptions
+    root: str
+    verbose: bool
+    fail_fast: bool
+    notes: bool = False
+    parts: Parts | None = None
+
+
+def join_results(frames: Span[Frame], results: Sequence[FrameResult], options: BatchOptions) -> Batch:
+    """Make one record of the results of consecutive frames, and write those parts that they fill.
+
+    The run's record says how frames were read before their rows are in the result. Where it does not say so
+    of these by now (`frames.told`), they come back.
+
+    Raises
+    ------
+    UsageError, OutputError
+        A part cannot be written.
+    """
+    figures = Figures.of([result.row for result in results])
+    ends = options.fail_fast and figures.first_error >= 0
+    if ends:
+        results = results[: figures.first_error + 1]
+        figures = Figures.of([result.row for result in results])
+    read_as = ReadAs()
+    for encoding, searched in {(result.encoding, result.searched) for result in results}:
+        read_as = read_as.joined(ReadAs(frozenset(filter(None, [encoding])), searched))
+    lines = [format_row(result.row, options.form, options.further) for result in results]
+    known: ReadAs = frames.told
+    in_parts = 0
+    if options.parts is not None and not ends and known.joined(read_as) == known:
+        in_parts = _write_parts(frames, figures.status, lines, options)
+    told = list(results) if options.verbose else list(_told(results))
+    made = zip(frames, results, strict=False)
+    notes = [result.inputs or inputs_line(frame, {}) for frame, result in made] if options.notes else []
+    return Batch(figures, in_parts, lines[in_parts:], notes, read_as, told)
+
+
+def _write_parts(frames: Span[Frame], status: bytes, lines: Sequence[bytes], options: BatchOptions) -> int:
+    """Write the parts that the lines fill, if they begin with one; return how many lines that were."""
+    parts, written = options.parts, 0
+    while parts and frames.first % parts.rows == 0 and written < len(lines):
+        first = frames.first + written
+        end = written + min(parts.rows, parts.frames - first)
+        if end > len(lines):
+            break
+        sync_files(local_images(frames[written:end], status[written:end], options.images, options.root))
+        parts.write(parts.numbers[first // parts.rows], lines[written:end])
+        written = end
+    return written
+
+
+def _told(results: Sequence[FrameResult]) -> Iterator[FrameResult]:
+    """Yield the results that say something which those before them do not."""
+    known: set[str] = {""}
+    for result in results:
+        says = {result.encoding, "searched" if result.searched else ""} - known
+        if says or result.warning or result.row.status == "error":
+            known |= says
+            yield result

@@ -1,0 +1,205 @@
+"""Parts that workers write: which rows they take, what keeps them from it, and what a resume does."""
+
+import random
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+from rollcli.errors import UsageError
+from rollcli.files.results import Row, format_header, format_row
+from rollcli.files.storage import list_names, remove
+from rollcli.run.batch import BatchOptions, Parts, join_results
+from rollcli.run.frame import Frame, FrameResult, ReadAs
+from rollcli.run.options import ImageOptions
+from rollcli.run.workers.chunks import Chunks, Done, Span
+from tests.object_store import joined
+from tests.run_cli import command, contents, environment, rollcli, write_maps
+
+KITTI = ReadAs(frozenset(["kitti"]))
+FRAMES = [Frame(f"{n}.png", "", f"{n}.png", "", f"{n}.png", None) for n in range(11)]
+ROWS = [Row(frame.file, status="ok", roll_deg=float(n)) for n, frame in enumerate(FRAMES)]
+
+
+def lines(first, end):
+    """The rows as they stand in a CSV."""
+    return [format_row(row, "csv") for row in ROWS[first:end]]
+
+
+def join(folder, first, end, *, known=KITTI, fail_fast=False, rows=ROWS, numbers=range(4)):
+    """What a worker hands back of frames that a run of eleven has, in parts of three rows."""
+    parts = Parts(str(folder), "csv", (), 3, numbers, len(FRAMES), "run", {})
+    told = BatchOptions("csv", (), ImageOptions(), "", verbose=False, fail_fast=fail_fast, parts=parts)
+    results = [FrameResult(row, "kitti") for row in rows[first:end]]
+    return join_results(Span(FRAMES[first:end], first, known), results, told)
+
+
+@pytest.mark.parametrize(
+    ("first", "end", "parts"),
+    [
+        (0, 3, [0]),
+        (0, 8, [0, 1]),
+        (3, 9, [1, 2]),
+        (9, 11, [3]),  # the last one, which is short
+        (6, 11, [2, 3]),
+        (0, 2, []),
+        (9, 10, []),
+        (1, 11, []),  # another worker has the first row
+    ],
+)
+def test_a_worker_writes_the_parts_that_it_has_whole_and_hands_back_other_rows(tmp_path, first, end, parts):
+    batch = join(tmp_path, first, end)
+    expected = {}
+    for number in parts:
+        data = b"".join(lines(3 * number, 3 * number + 3))
+        expected[f"part-0000{number}.csv"] = data if number else format_header("csv") + data
+    assert contents(tmp_path) == expected
+    assert batch.in_parts == sum(min(3, 11 - 3 * number) for number in parts)
+    assert batch.lines == lines(first + batch.in_parts, end)
+    assert len(batch) == end - first
+
+
+def test_parts_that_were_missing_have_their_own_numbers(tmp_path):
+    join(tmp_path, 0, 6, numbers=(4, 7))
+    assert sorted(contents(tmp_path)) == ["part-00004.csv", "part-00007.csv"]
+
+
+@pytest.mark.parametrize("known", [ReadAs(), ReadAs(frozenset(["px"])), ReadAs(searched=(0, 63))])
+def test_rows_come_back_of_which_the_record_does_not_say_how_they_were_read(tmp_path, known):
+    batch = join(tmp_path, 0, 3, known=known)
+    assert (batch.in_parts, batch.lines, contents(tmp_path)) == (0, lines(0, 3), {})
+
+
+def test_rows_that_end_the_run_come_back_up_to_the_frame_that_failed(tmp_path):
+    rows = [*ROWS[:4], Row("4.png", message="broken"), *ROWS[5:]]
+    batch = join(tmp_path, 3, 9, rows=rows, fail_fast=True)
+    assert (batch.in_parts, len(batch), len(batch.lines), contents(tmp_path)) == (0, 2, 2, {})
+    assert join(tmp_path, 3, 9, rows=rows).in_parts == 6
+
+
+def test_a_part_that_a_dying_worker_had_written_counts_and_another_runs_does_not(tmp_path, bucket):
+    for folder in (tmp_path, f"{bucket}/rolls.csv"):
+        assert join(folder, 0, 3).in_parts == 3
+        assert join(folder, 0, 3).in_parts == 3
+    other = [Row(row.file, status="ok", roll_deg=5.0) for row in ROWS]
+    with pytest.raises(UsageError, match="another run has written this part"):
+        join(tmp_path, 0, 3, rows=other)
+
+
+def test_the_numbers_of_a_batch_are_few_bytes_and_those_that_the_summary_takes(tmp_path):
+    batch = join(tmp_path, 0, 9)
+    assert list(batch.figures.numbers) == ["roll_deg"]
+    assert batch.figures.numbers["roll_deg"].tolist() == [float(n) for n in range(9)]
+    assert [result.row.file for result in batch.told] == ["0.png"]  # names the encoding
+
+
+@pytest.mark.parametrize(
+    ("rows", "seconds"), [(1000, 0.001), (1000, 0.005), (7, 0.005), (1000, 0.1), (1, 0.1)]
+)
+def test_chunks_are_whole_parts_or_pieces_of_one(rows, seconds):
+    chunks = Chunks(iter(range(40_000)), unit=rows)
+    sizes = []
+    while chunk := chunks.take(16):
+        pieces = {task // rows for task in chunk}
+        assert len(pieces) == 1 or len(chunk) % rows == chunk[0] % rows == 0 or chunk[-1] == 39_999
+        sizes.append(len(chunk))
+        chunks.measure(Done(range(len(chunk)), seconds * len(chunk)))
+    assert sum(sizes) == 40_000
+    if rows * seconds <= 8:
+        assert all(size % rows == 0 for size in sizes[-20:-1])
+    else:
+        assert max(sizes) * seconds <= 1.01
+
+
+@pytest.fixture
+def maps(tmp_path):
+    """Twenty-three maps, one of them broken, and the CSV of a run on one process."""
+    write_maps(tmp_path / "maps", 23)
+    (tmp_path / "maps" / "frame7.png").write_bytes(b"no map")
+    assert rollcli("estimate", "maps", "-o", "rolls.csv", "-j", "1", cwd=tmp_path).status == 3
+    return tmp_path
+
+
+@pytest.mark.parametrize("rows", ["1", "2", "7", "23", "1000"])
+def test_parts_of_several_workers_are_the_file_of_one_process(maps, bucket, rows):
+    line = ("estimate", "maps", "-o", f"{bucket}/{rows}.csv", "--part-rows", rows, "-j", "2", "-q")
+    assert rollcli(*line, cwd=maps).status == 3
+    assert joined(f"{bucket}/{rows}.csv") == (maps / "rolls.csv").read_bytes()
+    assert len(list_names(f"{bucket}/{rows}.csv")) == -(-23 // int(rows))
+
+
+@pytest.mark.parametrize("missing", [[0], [1, 2, 5], [0, 11], range(12)])
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_a_resume_does_the_parts_that_are_missing_wherever_they_are_and_no_others(maps, missing, jobs):
+    pytest.importorskip("pyarrow", reason="pyarrow, of the extra parquet, is not here")
+    line = ("estimate", "maps", "-o", "rolls.parquet", "--part-rows", "2", "-j", jobs)
+    undisturbed = rollcli(*line, cwd=maps)
+    whole, places = contents(maps), {}
+    for number in range(12):
+        part = maps / "rolls.parquet" / f"part-{number:05d}.parquet"
+        if number in missing:
+            part.unlink()
+        else:
+            places[part] = part.stat().st_ino
+    listed = rollcli(*line, "--resume", "--dry-run", cwd=maps).out
+    positions = [position for number in missing for position in (2 * number, 2 * number + 1) if position < 23]
+    assert [each.split()[1] for each in listed.splitlines() if each.startswith("read")] == [
+        f"maps/frame{position}.png" for position in positions
+    ]
+    done = rollcli(*line, "--resume", cwd=maps)
+    kept = f" ({23 - len(positions)} kept)" if len(positions) < 23 else ""
+    assert (done.status, f"23 frames{kept}: 21 ok, 1 suspect, 1 failed" in done.err) == (3, True), done.err
+    assert done.err.splitlines()[-1] == undisturbed.err.splitlines()[-1]  # the rig's roll
+    assert contents(maps) == whole
+    assert {part: part.stat().st_ino for part in places} == places
+
+
+def test_parts_are_missing_in_a_bucket_too_the_first_one_of_csv_among_them(maps, bucket):
+    line = ("estimate", "maps", "-o", f"{bucket}/rolls.csv", "--part-rows", "5", "-q")
+    assert rollcli(*line, cwd=maps).status == 3
+    for number in (0, 2):
+        remove(f"{bucket}/rolls.csv/part-{number:05d}.csv")
+    assert rollcli(*line, "--resume", "--retry-failed", cwd=maps).status == 3
+    assert joined(f"{bucket}/rolls.csv") == (maps / "rolls.csv").read_bytes()
+
+
+def test_a_hole_is_filled_before_a_failed_frame_of_a_later_part_is_done_again(maps, bucket):
+    line = ("estimate", "maps", "-o", f"{bucket}/rolls.csv", "--part-rows", "3", "-q")
+    assert rollcli(*line, cwd=maps).status == 3
+    remove(f"{bucket}/rolls.csv/part-00000.csv")
+    write_maps(maps / "new", 23)
+    Path(maps / "maps" / "frame7.png").write_bytes((maps / "new" / "frame7.png").read_bytes())
+    assert rollcli(*line, "--resume", "--retry-failed", cwd=maps).status == 0
+    assert rollcli("estimate", "maps", "-o", "rolls.csv", "--overwrite", "-q", cwd=maps).status == 0
+    assert joined(f"{bucket}/rolls.csv") == (maps / "rolls.csv").read_bytes()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(3))
+def test_runs_that_are_stopped_and_killed_end_in_the_parts_of_an_undisturbed_one(tmp_path, seed):
+    pytest.importorskip("pyarrow", reason="pyarrow, of the extra parquet, is not here")
+    write_maps(tmp_path / "maps", 300, width=320, height=240)
+    line = ("estimate", "../maps", "-o", "rolls.parquet", "--part-rows", "4", "-j", "2")
+    for name in ("whole", "disturbed"):
+        (tmp_path / name).mkdir()
+    assert rollcli(*line, cwd=tmp_path / "whole").status == 0
+    chance, parts, status = random.Random(seed), tmp_path / "disturbed" / "rolls.parquet", 1
+    while status != 0:
+        run = subprocess.Popen(
+            command(*line, "--resume", "-q"),
+            cwd=tmp_path / "disturbed",
+            env=environment(),
+            stderr=subprocess.PIPE,
+        )
+        before = len(list(parts.glob("part-*")))
+        end = before + chance.randint(5, 30)
+        while run.poll() is None and len(list(parts.glob("part-*"))) < end:
+            time.sleep(0.005)
+        run.send_signal(chance.choice([signal.SIGKILL, signal.SIGTERM, signal.SIGINT]))
+        _, said = run.communicate(timeout=60)
+        status = run.returncode
+        assert status in (0, 130, -signal.SIGKILL), said
+        assert b"Traceback" not in said
+    assert contents(tmp_path / "disturbed") == contents(tmp_path / "whole")
