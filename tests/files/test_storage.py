@@ -1,6 +1,7 @@
 """Bytes in an object store are read and written as those of local files are."""
 
 import os
+import re
 import time
 
 import pytest
@@ -238,12 +239,12 @@ def test_a_file_of_more_than_4_gib_is_refused_unread(tmp_path):
 
 @pytest.mark.parametrize(
     ("path", "reason"),
-    [("x" * 300, "cannot be read: file name too long"), ("a\0b.png", "cannot be read: embedded null byte")],
+    [("x" * 300, "cannot be read: file name too long"), ("a\0b.png", "cannot be read: .*embedded null .*")],
 )
 def test_what_the_system_objects_to_is_said_in_its_words(path, reason):
     with pytest.raises(InputError) as caught:
         storage.read_bytes(path, "map.png")
-    assert str(caught.value) == f"map.png: {reason}"
+    assert re.fullmatch(f"map.png: {reason}", str(caught.value))  # Pythons word the latter their own way
 
 
 @pytest.mark.parametrize("seconds", ["0", "-1", "nan", "1e6", "x"])
