@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 import cv2
+import numpy as np
 
 from rollcli.errors import EstimationError, InputError, UsageError
 from rollcli.run.frame import Frame, FrameResult, failed_frame
@@ -22,6 +23,7 @@ FRAME_ERRORS = (
 def guarded(frame: Frame, work: Callable[[], FrameResult]) -> FrameResult:
     """Do the work; turn an error that costs only this frame into its `error` row."""
     try:
-        return work()
+        with np.errstate(all="ignore"):  # numbers of damaged maps overflow: the row says what comes of them
+            return work()
     except FRAME_ERRORS as error:
         return failed_frame(frame, str(error) or type(error).__name__)

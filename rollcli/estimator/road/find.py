@@ -205,7 +205,6 @@ class Judge:
         off: Singles = np.column_stack([planes, np.full_like(planes[:, 0], -1)]).dot(self._rows[:, some])
         return off
 
-    @np.errstate(over="ignore", invalid="ignore")  # of damaged maps: no plane fits their numbers
     def _weighed(self, planes: Singles, some: slice) -> tuple[Singles, Singles, Singles]:
         """Return the weights of pixels by place and by slopes, and what planes are over them, (K, N).
 
