@@ -36,6 +36,10 @@ def assessed():
     return rig(("a", first), ("b", second), changes={"b": (known(-3.0, 0.1), True)}, ok=ok, suspect=suspect)
 
 
+DRIFTS = (
+    *("drift_deg", "drift_ci95_deg", "pitch_drift_deg", "pitch_drift_ci95_deg"),
+    *("height_drift_m", "height_drift_ci95_m"),
+)
 CHANGES = {"roll": known(0.5, 0.25), "pitch": known(0.125, 0.25), "height": UNKNOWN}
 
 
@@ -64,6 +68,7 @@ def test_json_is_every_number_of_the_assessment():
         "pitch_drift_ci95_deg": 0.05,
         "height_drift_m": None,
         "height_drift_ci95_m": None,
+        **{f"{name}_per_hour": None for name in DRIFTS},  # frames without stamps
         "jumps": [{"frame": 10, "file": "a/10", "change_deg": 0.5, "change_ci95_deg": 0.05}],
         "pitch_jumps": [{"frame": 35, "file": "b/5", "change_deg": 1.0, "change_ci95_deg": 0.1}],
         "height_jumps": [],
