@@ -55,10 +55,10 @@ class View:
         nearest = model.disparity_along(bottom)
         return width / grid.scale * abs(slope + 2 * bend * bottom) / nearest if nearest > 0 else math.inf
 
-    def seen(self) -> float:
-        """Return which share of the lane is seen, 0 to 1.
+    def seen(self) -> tuple[float, float]:
+        """Return which share of the lane is seen, and which of all that has data is on the road, 0 to 1.
 
-        The mean of the shares in the middle and in the far third of the ground, of the pixels with data.
+        The first is the mean of the shares in the middle and in the far third of the ground.
         """
         height, width = self.disparity.shape
         step = -(-width // _COLUMNS)
@@ -70,14 +70,14 @@ class View:
         road = model.disparity_along(along)
         d, usable = self.disparity[::step, ::step], self.valid[::step, ::step]
         lane = usable & (road > 0) & (np.abs(model.side(model.across(x, y), road)) < 1)
-        on_road = np.abs(d - road) < _ON_ROAD * road + 3 * self.rmse
+        on_road = usable & (np.abs(d - road) < _ON_ROAD * road + 3 * self.rmse)
         horizon = max(float(along.min()), -level / slope if slope else -np.inf)
         thirds = 3 * (along - horizon) / max(float(along.max()) - horizon, 1e-9)
         shares: list[float] = []
         for first in (0, 1):
             there = lane & (thirds >= first) & (thirds < first + 1)
             shares.append(float((on_road & there).sum()) / max(1.0, float(there.sum())))
-        return float(np.mean(shares))
+        return float(np.mean(shares)), float(on_road.sum()) / max(1.0, float(usable.sum()))
 
 
 @dataclass(frozen=True)
@@ -157,11 +157,16 @@ def _least_score(road: Road, tuning: DoubtTuning) -> float:
 
 
 def _narrow_view(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
-    view = evidence.view
-    if view is None:
+    view, road = evidence.view, evidence.road
+    if view is None or road is None:
         return
     width = view.width
-    if width < tuning.narrowest or (width < tuning.narrow and view.seen() < tuning.least_seen):
+    doubted = width < tuning.narrowest
+    if not doubted and width < tuning.narrow:
+        seen, filled = view.seen()
+        hidden = road.horizon < tuning.steep and filled > tuning.least_filled  # by a car, and not a table's
+        doubted = seen < tuning.least_seen and not hidden
+    if doubted:
         yield f"the view is as narrow as that of a table or a room: {width:.1f} camera heights"
 
 

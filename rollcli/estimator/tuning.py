@@ -114,14 +114,17 @@ class DoubtTuning:
     """The same for a plane whose horizon is far away: tables and stairs have up to 0.17."""
     steep: float = 0.5
     """Units from the centre beyond which a horizon is far away: of roads it is within 0.2, of tables 1.5."""
-    narrow: float = 2.0
-    """Camera heights below which a view is narrow: streets have 5 to 8, rendered ones from 2.2 on, tables and
-    rooms up to 2.8. With 3.1 more rooms are told, and roads on which a car hides the lane are doubted."""
-    least_seen: float = 0.75
-    """Share of the lane that is to be on the road in a narrow view. With 0.5 a seventh of the tables, rooms
-    and shelves that are ok otherwise stays so."""
-    narrowest: float = 0.8
-    """Camera heights at the least: cameras that look down at the road see 1.06, those at a table 0.6."""
+    narrow: float = 3.1
+    """Camera heights below which a view is narrow: streets have 5 to 8, rendered ones from 2.3 on, tables,
+    rooms and shelves up to 4. With 2 they are ok four times as often (bench_roadless.py)."""
+    least_seen: float = 0.7
+    """Share of the lane that is to be on the road in a narrow view: 120 rendered streets have 0.74 and more.
+    With 0.5 three times as many tables, shelves and desks are ok."""
+    least_filled: float = 0.5
+    """Or share of all pixels that is on the road, if its horizon is near: a car that hides the lane leaves
+    0.6, rooms and shelves are 0.1 to 0.3."""
+    narrowest: float = 0.9
+    """Camera heights at the least: cameras that look down at a road see 1.06, those at a table 0.6 to 0.9."""
     rival_share: float = 0.75
     """Share of the road's score from which another plane explains the map nearly as well."""
     longest_move: float = math.radians(1)
