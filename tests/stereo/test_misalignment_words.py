@@ -22,7 +22,7 @@ def row(lower=None, clockwise=0.0, **more):
 def test_a_run_says_the_median_over_its_pairs_and_what_to_do():
     rig = RunSummary()
     for turned in (0.3, 0.31, 0.5):
-        rig.add(row(0.0, turned))
+        rig.add_row(row(0.0, turned))
 
     assert rig.alignment()["right_clockwise_deg"] == 0.31
     assert rig.alignment()["frames"] == 3
@@ -35,7 +35,7 @@ def test_a_run_says_the_median_over_its_pairs_and_what_to_do():
 def test_a_run_of_mostly_level_pairs_asks_for_nothing():
     rig = RunSummary()
     for lower in (0.01, -0.02, 1.0):
-        rig.add(row(lower))
+        rig.add_row(row(lower))
 
     assert rig.advice == ""
     assert rig.alignment()["right_lower_px"] == 0.01
@@ -43,9 +43,9 @@ def test_a_run_of_mostly_level_pairs_asks_for_nothing():
 
 def test_a_run_of_maps_or_of_pairs_that_could_not_be_measured_has_nothing_to_say():
     rig = RunSummary()
-    rig.add(Row("l.png", status="ok"))
-    rig.add(row(message="the views are not level, and could not be levelled"))
-    rig.add(Row("l.png", "r.png", "error", message="l.png: cannot be read"))
+    rig.add_row(Row("l.png", status="ok"))
+    rig.add_row(row(message="the views are not level, and could not be levelled"))
+    rig.add_row(Row("l.png", "r.png", "error", message="l.png: cannot be read"))
 
     assert rig.alignment() is None
     assert rig.advice == ""
