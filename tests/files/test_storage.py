@@ -32,7 +32,7 @@ def test_what_was_written_is_read(folder, name):
 def test_only_the_first_creates(folder):
     assert storage.create(f"{folder}/part", b"mine", "me")
     assert not storage.create(f"{folder}/part", b"yours", "you")
-    # a file does not say who wrote it: the same bytes may be those of a worker that died before it could say so
+    # a file does not say who wrote it: the same bytes may be of a worker that died before it could say so
     assert storage.create(f"{folder}/part", b"mine", "you") == (not is_url(folder))
     assert storage.read_bytes(f"{folder}/part") == b"mine"
 
