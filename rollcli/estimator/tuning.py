@@ -123,8 +123,8 @@ class DoubtTuning:
     least_filled: float = 0.5
     """Or share of all pixels that is on the road, if its horizon is near: a car that hides the lane leaves
     0.6, rooms and shelves are 0.1 to 0.3."""
-    narrowest: float = 0.9
-    """Camera heights at the least: cameras that look down at a road see 1.06, those at a table 0.6 to 0.9."""
+    narrowest: float = 0.8
+    """Camera heights at the least: cameras that look down at the road see 1.06, those at a table 0.6."""
     rival_share: float = 0.75
     """Share of the road's score from which another plane explains the map nearly as well."""
     longest_move: float = math.radians(1)
