@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from rollcli.stereo.misalignment import LEVEL, NOTHING_KNOWN, ColumnSupport, Misalignment
 from rollcli.stereo.row_fit import (
     ColumnEvidence,
+    MeasuredRows,
     SeenBlocks,
     column_evidence,
     column_support,
@@ -62,26 +63,32 @@ class Measured:
         Standard error of each part.
     spread : float
         Standard deviation of their vertical disparities from what is explained, outliers aside, pixels.
-    evidence : ColumnEvidence or None
-        What the rows say of the columns.
+    rows : MeasuredRows or None
+        The vertical disparities of the blocks.
     """
 
     misalignment: Misalignment
     errors: Misalignment
     share: float
     spread: float
-    evidence: ColumnEvidence | None = None
+    rows: MeasuredRows | None = None
+
+    @property
+    def evidence(self) -> ColumnEvidence | None:
+        """What the rows say of the columns; worked out when it is asked for: most measurements need none."""
+        return None if self.rows is None else column_evidence(self.rows, self.spread)
 
     @cached_property
     def support(self) -> ColumnSupport:
         """What of it is believed to be in the columns, too."""
-        return NOTHING_KNOWN if self.evidence is None else column_support(self.evidence)
+        evidence = self.evidence
+        return NOTHING_KNOWN if evidence is None else column_support(evidence)
 
     def resized(self, factor: float) -> "Measured":
         """Return this measurement, of views `factor` times as large."""
         there, errors = self.misalignment.resized(factor), self.errors.resized(factor)
-        evidence = self.evidence and self.evidence.resized(factor)
-        return Measured(there, errors, self.share, factor * self.spread, evidence)
+        rows = self.rows and self.rows._replace(factor=factor * self.rows.factor)
+        return Measured(there, errors, self.share, factor * self.spread, rows)
 
 
 class Texture(NamedTuple):
@@ -147,8 +154,8 @@ def measure_misalignment(
         if reach < _SMALL_STEP:
             break
     height, width = disparity.shape
-    evidence = column_evidence(seen, before, fit.spread, (height, width))
-    return Measured(found, fit.errors, len(seen.shift) / blocks.count, fit.spread, evidence)
+    rows = MeasuredRows(seen, before, (height, width))
+    return Measured(found, fit.errors, len(seen.shift) / blocks.count, fit.spread, rows)
 
 
 def textured_share(view: View) -> float:

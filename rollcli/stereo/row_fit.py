@@ -8,7 +8,7 @@ of the field is even. How well each of them explains the blocks decides what the
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
 from typing import NamedTuple
 
@@ -25,7 +25,7 @@ _TUNING = 1.5  # standard deviations off, a block counts a quarter
 _TILE = 64.0  # px of the size measured at: blocks within it err together
 _LINEAR = (0, 1, 2, 3)  # offset, rotation, scale, twist
 _SURE = 4.0  # standard errors: a tilt or a curve of less is none. Plain roads cannot tell it from a scale
-_FEWEST_TILES = 16  # of fewer, as of a first look, the sums tell no variance
+_FEWEST_TILES = 17  # of fewer, as of a first look, the sums tell no variance
 _EXACT = 1e-9  # px^2 times a weight: views without noise are known no better
 _FOCAL = 0.7  # widths: of most rigs
 _ROAD_ACROSS, _ROAD_DOWN = 0.13, 0.4  # of the height, from the centre: where a twist and a pitch turn a road
@@ -125,11 +125,7 @@ class ColumnEvidence:
     shape_variances: Doubles
     reach: Doubles
     shape: tuple[int, int]
-    factor: float = 1.0
-
-    def resized(self, factor: float) -> "ColumnEvidence":
-        """Return what this says of views `factor` times as large."""
-        return replace(self, factor=factor * self.factor)
+    factor: float
 
     @staticmethod
     def of_drive(pairs: "Sequence[ColumnEvidence]") -> "ColumnEvidence":
@@ -176,6 +172,18 @@ class SeenBlocks(NamedTuple):
     weight: NDArray[np.float32]
 
 
+class MeasuredRows(NamedTuple):
+    """Blocks of a right view that was levelled by `at`, which is seen `factor` times smaller than it is.
+
+    `shape` is the height and width that it is seen at, px.
+    """
+
+    seen: SeenBlocks
+    at: Misalignment
+    shape: tuple[int, int]
+    factor: float = 1.0
+
+
 class RowFit(NamedTuple):
     """The misalignment that explains most blocks, its standard errors, and the spread of the rest (px)."""
 
@@ -204,7 +212,7 @@ def fit_rows(seen: SeenBlocks, at: Misalignment = LEVEL) -> RowFit:
     held[4:] = variance / np.square([BELIEF.tilt * frame.near, BELIEF.bend * frame.half_height])
     wide = _least_squares(design[:6], shift, fit.weight, held)
     told = np.square(wide.values) > _SURE**2 * variance * np.diag(wide.inverse)
-    told &= frame.tile.max() >= _FEWEST_TILES
+    told &= frame.tile.max() + 1 >= _FEWEST_TILES
     used += [each for each in (4, 5) if told[each] or at.parts[each]]
     if len(used) > len(_LINEAR):
         fit = _robust(design[used], shift, fixed, held[used])
@@ -215,9 +223,7 @@ def fit_rows(seen: SeenBlocks, at: Misalignment = LEVEL) -> RowFit:
     return RowFit(lies, errors_of, fit.spread)
 
 
-def column_evidence(
-    seen: SeenBlocks, at: Misalignment, spread: float, shape: tuple[int, int]
-) -> ColumnEvidence:
+def column_evidence(rows: MeasuredRows, spread: float) -> ColumnEvidence:
     """Work out what the rows of a pair say of its columns.
 
     What else curves the field (four shapes of second and third degree) tells how evenly the lens has left the
@@ -225,19 +231,16 @@ def column_evidence(
 
     Parameters
     ----------
-    seen : SeenBlocks
-        What is left of the right view that was levelled by `at`.
-    at : Misalignment
+    rows : MeasuredRows
     spread : float
-        Of the blocks from what is explained, px.
-    shape : tuple of int
-        Height and width of the view, px.
+        Of the blocks from what is explained, px of the whole view.
     """
+    seen, at, shape, factor = rows
     frame = _Frame.of(seen)
     design = frame.design(seen)
     shift = seen.shift + np.float64(1) * at.down(seen.x, seen.y, seen.near)
     start = _least_squares(design[:7], shift, seen.weight.astype(np.float64))
-    weight = seen.weight * _believed(start.off, spread)
+    weight = seen.weight * _believed(start.off, spread / factor)
     fit, whole = (_least_squares(design[:count], shift, weight) for count in (7, len(design)))
     variance = _variance(
         design[list(_LINEAR)], _least_squares(design[list(_LINEAR)], shift, weight), frame.tile
@@ -261,6 +264,7 @@ def column_evidence(
         shape_variances=variance / BELIEF.tiles**2 * np.diag(whole.inverse)[7:],
         reach=np.array([x, y]),
         shape=shape,
+        factor=factor,
     )
 
 

@@ -72,7 +72,9 @@ def blocks_of(rng, field, *, below_horizon=False, noise=0.1, count=1500):
 
 def support_of(field, **street):
     seen = blocks_of(np.random.default_rng(5), field, **street)
-    return row_fit.column_support(row_fit.column_evidence(seen, LEVEL, 0.1, (375, 1242)))
+    return row_fit.column_support(
+        row_fit.column_evidence(row_fit.MeasuredRows(seen, LEVEL, (375, 1242)), 0.1)
+    )
 
 
 @pytest.mark.parametrize("scale", [-0.005, -0.002, 0.001, 0.002, 0.005])
