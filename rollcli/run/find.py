@@ -4,7 +4,7 @@ import os
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path, PurePath
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING, TypedDict, overload
 
 from rollcli.errors import UsageError
 from rollcli.extras import require_extra
@@ -54,16 +54,8 @@ def map_frames(
     if given.topic is not None:
         raise UsageError("--topic is of a bag (.bag, .db3, .mcap or a rosbag2 folder), and none is given")
     notes: list[str] = []
-    found = find_inputs(
-        given.inputs,
-        files_from=given.files_from,
-        recursive=given.recursive,
-        include=given.include,
-        exclude=given.exclude,
-        skip=skip,
-        maps=True,
-        notes=notes,
-    )
+    searched = _searched(given, skip, notes)
+    found = find_inputs(given.inputs, files_from=given.files_from, maps=True, **searched)
     _say(notes, quiet=quiet)
     if video := next((each.name for each in found if is_video(each.location)), None):
         raise UsageError(
@@ -71,6 +63,22 @@ def map_frames(
             "where its frames hold both, or --left and --right with a video each"
         )
     return [_frame(each, None, masks, calibrations) for each in found[:: given.every]]
+
+
+class _Searched(TypedDict):
+    """How places are searched, as `find_inputs` and `pair_inputs` take it."""
+
+    recursive: bool
+    include: Sequence[str]
+    exclude: Sequence[str]
+    skip: Sequence[str]
+    notes: list[str]
+
+
+def _searched(given: InputOptions, skip: Sequence[str], notes: list[str]) -> _Searched:
+    return _Searched(
+        recursive=given.recursive, include=given.include, exclude=given.exclude, skip=skip, notes=notes
+    )
 
 
 def _say(notes: Iterable[str], *, quiet: bool) -> None:
@@ -163,31 +171,15 @@ def pair_frames(
     if any(views):
         return _bag_pairs(given, topics, masks, calibrations, quiet=quiet)[:: given.every]
     notes: list[str] = []
+    searched = _searched(given, skip, notes)
     if pairs.side_by_side is not None:
-        found = find_inputs(
-            given.inputs,
-            files_from=given.files_from,
-            recursive=given.recursive,
-            include=given.include,
-            exclude=given.exclude,
-            skip=skip,
-            endings=(*IMAGE_ENDINGS, *VIDEOS),
-            notes=notes,
-        )
+        endings = (*IMAGE_ENDINGS, *VIDEOS)
+        found = find_inputs(given.inputs, files_from=given.files_from, endings=endings, **searched)
         both = [views for each in found for views in _halved(each, pairs.side_by_side)]
     elif pairs.left is None or pairs.right is None:
         raise UsageError("--left and --right are given together")
     else:
-        matched = pair_inputs(
-            pairs.left,
-            pairs.right,
-            match=pairs.match,
-            recursive=given.recursive,
-            include=given.include,
-            exclude=given.exclude,
-            skip=skip,
-            notes=notes,
-        )
+        matched = pair_inputs(pairs.left, pairs.right, match=pairs.match, **searched)
         both = [views for pair in matched for views in _paired(pair)]
     _say(notes, quiet=quiet)
     return [_frame(left, right, masks, calibrations) for left, right in both[:: given.every]]
