@@ -28,7 +28,14 @@ class ExitStatus(IntEnum):
 
 
 class RollcliError(Exception):
-    """Base of every error that rollcli raises on purpose."""
+    """Base of every error that rollcli raises on purpose.
+
+    `code` tells apart causes whose errors are raised at one place: a text without names and numbers.
+    """
+
+    def __init__(self, message: str = "", code: str = "") -> None:
+        super().__init__(message)
+        self.code = code
 
 
 class UsageError(RollcliError):

@@ -30,7 +30,6 @@ DOORS = {
     "rollcli.run.convert": "a worker's door",
     "rollcli.run.convert_frame": "matplotlib, an extra, loads only for figures",
     "rollcli.run.estimate": "a worker's door",
-    "rollcli.run.heights": "loads NumPy only on a worker",
     "rollcli.run.options": "the command line's help needs no URLs",
     "rollcli.run.read": "loads OpenCV's matcher only for pairs",
     "rollcli.run.result_rows": "estimates maps, which loads NumPy, only of other folders than the rows'",

@@ -1,32 +1,60 @@
 """Commands whose help is in sections, and how their options are declared."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
+import functools
+import os
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import click
 from click.core import ParameterSource
 
-from rollcli.cli.environment import tell_mistaken_variables
 from rollcli.errors import ExitStatus
 from rollcli.messages import say, show_tracebacks
 
 OTHER = "Other options"
-Values = dict[str, Any]
+Declaration = Callable[[Callable[..., Any]], Callable[..., Any]]
 _ALWAYS = (ExitStatus.FAILED, ExitStatus.USAGE, ExitStatus.INTERRUPTED)
 _OF_FRAMES = {each: each.meaning for each in (ExitStatus.DONE, ExitStatus.FRAMES_FAILED)}
+
+
+class Needs(NamedTuple):
+    """What an option needs of a command and of its other options, to have an effect.
+
+    Attributes
+    ----------
+    holds : callable
+        Tells whether a run has it.
+    reason : str
+        Why the option has no effect otherwise; may name values of options in braces.
+    """
+
+    holds: Callable[[click.Context], bool]
+    reason: str
 
 
 class Option(click.Option):
     """An option that is listed under a heading; the last heading by default.
 
-    `without_word` is its value where none of its words follows: click would take an input for its value.
+    Parameters
+    ----------
+    section : str
+        The heading.
+    without_word : str or None
+        Its value where none of its words follows: click would take an input for its value.
+    only_with : sequence of Needs
+        Where one of them does not hold, a line says that the option has no effect.
     """
 
     def __init__(
-        self, *args: Any, section: str = OTHER, without_word: str | None = None, **attributes: Any
+        self,
+        *args: Any,
+        section: str = OTHER,
+        without_word: str | None = None,
+        only_with: Sequence[Needs] = (),
+        **attributes: Any,
     ) -> None:
         super().__init__(*args, **attributes)
-        self.section, self.without_word = section, without_word
+        self.section, self.without_word, self.only_with = section, without_word, only_with
 
     def completed(self, args: list[str]) -> list[str]:
         """Add the value to those words of the command line that name the option alone."""
@@ -73,7 +101,7 @@ class Command(click.Command):
         return super().parse_args(ctx, args)
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run the command with one thread of linear algebra, once mistaken variables have been told.
+        """Run the command with one thread of linear algebra, once it is told what has no effect.
 
         Its matrices are small: threads spend ten times as long waiting for each other as working.
         """
@@ -83,7 +111,8 @@ class Command(click.Command):
         if ctx.params.get("verbose"):
             show_tracebacks()
         if not ctx.params.get("quiet"):
-            tell_mistaken_variables(ctx)
+            _tell_mistaken_variables(ctx)
+            _tell_idle(ctx)
         return super().invoke(ctx)
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -113,59 +142,31 @@ class Command(click.Command):
             formatter.write_dl([(str(int(status)), meaning) for status, meaning in self.statuses.items()])
 
 
-class Declared:
-    """A function on its way to be a command: its parameters, and how their values are gathered for it."""
-
-    def __init__(
-        self,
-        function: Callable[..., Any],
-        params: tuple[click.Parameter, ...] = (),
-        gather: tuple[Callable[[Values], None], ...] = (),
-    ) -> None:
-        self.function, self.params, self.gather = function, params, gather
-
-    def __call__(self, **values: Any) -> Any:
-        """Call the function with the values that click has parsed."""
-        for gather in self.gather:
-            gather(values)
-        return self.function(**values)
-
-
-class Declaration:
-    """A decorator that declares parameters of a command.
-
-    Parameters
-    ----------
-    make : callable
-        Makes the parameters: each command has its own.
-    gather : callable or None
-        Replaces their values by one record.
-    """
-
-    def __init__(
-        self, make: Callable[[], list[click.Parameter]], gather: Callable[[Values], None] | None = None
-    ) -> None:
-        self.make, self.gather = make, gather
-
-    def __call__(self, function: Callable[..., Any]) -> Declared:
-        """Declare the parameters before those that are declared below."""
-        inner = function if isinstance(function, Declared) else Declared(function)
-        gather = (self.gather,) if self.gather is not None else ()
-        return Declared(inner.function, (*self.make(), *inner.params), (*gather, *inner.gather))
-
-
 def option(*names: str, **attributes: Any) -> Declaration:
-    """Declare an option; takes what `click.Option` takes, and the `section` of the help."""
-    return Declaration(lambda: [Option(names, **attributes)])
+    """Declare an option; takes what `click.option` and `Option` take."""
+    return click.option(*names, cls=Option, **attributes)
 
 
-def argument(*names: str, **attributes: Any) -> Declaration:
-    """Declare an argument; takes what `click.Argument` takes."""
-    return Declaration(lambda: [click.Argument(names, **attributes)])
+def section(title: str, *declarations: Declaration, only_with: Sequence[Needs] = ()) -> Declaration:
+    """Declare options that stand below one heading of the help, and have the same needs."""
+
+    def declare(function: Callable[..., Any]) -> Callable[..., Any]:
+        for param in _declare(function, declarations):
+            if isinstance(param, Option):
+                param.section, param.only_with = title, (*only_with, *param.only_with)
+        return function
+
+    return declare
 
 
-def record(name: str, title: str, make: Callable[..., Any], *declarations: Declaration) -> Declaration:
-    """Declare options that the command receives as one record.
+def record(
+    name: str,
+    title: str,
+    make: Callable[..., Any],
+    *declarations: Declaration,
+    only_with: Sequence[Needs] = (),
+) -> Declaration:
+    """Declare a section of options that the command receives as one record.
 
     Parameters
     ----------
@@ -176,72 +177,86 @@ def record(name: str, title: str, make: Callable[..., Any], *declarations: Decla
     make : callable
         Makes the record of the values, which it takes by the options' names.
     *declarations
-        What `option` and `argument` return.
+        What `option` and `click.argument` return.
+    only_with : sequence of Needs
+        See `Option`.
     """
 
-    def params() -> list[click.Parameter]:
-        made = [param for declaration in declarations for param in declaration.make()]
-        for param in made:
-            if isinstance(param, Option):
-                param.section = title
-        return made
+    options = section(title, *declarations, only_with=only_with)
 
-    def gather(values: Values) -> None:
-        names = [str(param.name) for param in params()]  # here: --help needs none
-        values[name] = make(**{each: values.pop(each) for each in names})
+    def declare(function: Callable[..., Any]) -> Callable[..., Any]:
+        names = [str(param.name) for param in _declare(function, [options])]
 
-    return Declaration(params, gather)
+        @functools.wraps(function)  # its parameters, too
+        def gathered(**values: Any) -> Any:
+            values[name] = make(**{each: values.pop(each) for each in names})
+            return function(**values)
+
+        return gathered
+
+    return declare
 
 
-def command(
-    examples: Sequence[tuple[str, str]] = (),
-    short_help: str | None = None,
-    statuses: Mapping[ExitStatus, str] | None = None,
-) -> Callable[[Declared], Command]:
+def _declare(function: Callable[..., Any], declarations: Sequence[Declaration]) -> list[click.Parameter]:
+    """Declare parameters before those that the function has; return them, the last one first."""
+    count = len(getattr(function, "__click_params__", ()))
+    for each in reversed(declarations):
+        each(function)
+    declared: list[click.Parameter] = getattr(function, "__click_params__", [])[count:]
+    return declared
+
+
+def command(**attributes: Any) -> Callable[[Callable[..., Any]], Command]:
     """Make a command of a function, named after it; its docstring is the help."""
-
-    def make(declared: Declared) -> Command:
-        function = declared.function
-        return Command(
-            function.__name__,
-            callback=declared,
-            params=list(declared.params),
-            help=function.__doc__,
-            short_help=short_help,
-            examples=examples,
-            statuses=statuses,
-        )
-
-    return make
+    return lambda function: Command(
+        function.__name__,
+        callback=function,
+        params=getattr(function, "__click_params__", [])[::-1],
+        help=function.__doc__,
+        **attributes,
+    )
 
 
-def tell_idle(
-    ctx: click.Context,
-    idle: Iterable[tuple[Sequence[str], str]],
-    repeated: Sequence[str] = (),
-    *,
-    quiet: bool,
-) -> None:
+def _tell_idle(ctx: click.Context) -> None:
     """Say which options of the command line have no effect on this run.
 
     Those of the environment and of --config are not told: they are there for many commands and runs.
-
-    Parameters
-    ----------
-    ctx : click.Context
-    idle : iterable of (names, reason)
-        Parameters that have no effect, and why.
-    repeated : sequence of str
-        Inputs that are named more than once.
-    quiet : bool
-        Whether nothing is said.
     """
-    if quiet:
-        return
-    for name in repeated:
-        say(f"{name}: is named more than once; each of its files is taken once")
-    for names, reason in idle:
-        typed = [name for name in names if ctx.get_parameter_source(name) is ParameterSource.COMMANDLINE]
-        if typed:
-            flags = ", ".join(f"--{name.replace('_', '-')}" for name in typed)
-            say(f"{flags}: no effect here: {reason}")
+    idle: dict[str, list[str]] = {}
+    for param in ctx.command.params:
+        if not isinstance(param, Option):
+            continue
+        if ctx.get_parameter_source(str(param.name)) is ParameterSource.COMMANDLINE:
+            missing = next((each for each in param.only_with if not each.holds(ctx)), None)
+            if missing is not None:
+                idle.setdefault(missing.reason.format(**ctx.params), []).append(max(param.opts, key=len))
+    for reason, flags in idle.items():
+        say(f"{', '.join(flags)}: no effect here: {reason}")
+
+
+_PROGRAM = "ROLLCLI_"
+_SETTINGS = ("ROLLCLI_STORE_TIMEOUT",)  # of no command
+
+
+def _tell_mistaken_variables(ctx: click.Context) -> None:
+    """Say which variables name no option of this command, no other command and no setting."""
+    of_command = f"{ctx.auto_envvar_prefix}_"
+    known = [f"{of_command}{str(param.name).upper()}" for param in ctx.command.params]
+    root = ctx.find_root()
+    assert isinstance(root.command, click.Group)
+    commands = tuple(f"{_PROGRAM}{name.upper()}_" for name in root.command.list_commands(root))
+    for name in sorted(os.environ):
+        if not name.startswith(_PROGRAM) or name in (*known, *_SETTINGS):
+            continue
+        if name.startswith(of_command):
+            _tell_mistaken(name, f"there is no such option of {ctx.command_path}", known, of_command)
+        elif not name.startswith(commands):
+            _tell_mistaken(name, "there is no such command or setting", [*known, *_SETTINGS], _PROGRAM)
+
+
+def _tell_mistaken(name: str, what: str, known: list[str], same: str) -> None:
+    import difflib  # only here: it takes a while to load
+
+    rest = {each.removeprefix(same): each for each in known}
+    close = difflib.get_close_matches(name.removeprefix(same), rest, n=1)
+    say(f"{name}: {what}" + (f"; did you mean {rest[close[0]]}?" if close else ""))

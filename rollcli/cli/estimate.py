@@ -9,7 +9,7 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from rollcli.cli.command import command, option, record, tell_idle
+from rollcli.cli.command import Needs, command, option, record
 from rollcli.cli.config import config_option
 from rollcli.cli.options import (
     calibration_options,
@@ -90,6 +90,13 @@ def _from_environment(ctx: click.Context) -> Iterator[str]:
                 yield from (flag, str(text))
 
 
+def _has_parts(ctx: click.Context) -> bool:
+    from rollcli.files.stores.locations import is_url
+
+    given = ResultOptions(ctx.params["output"], ctx.params["format"])
+    return given.form == "parquet" or is_url(given.output)
+
+
 result_options = record(
     "result",
     "Result",
@@ -114,6 +121,7 @@ result_options = record(
         "--part-rows",
         type=Number("N", at_least=1, whole=True),
         default=ResultOptions().part_rows,
+        only_with=[Needs(_has_parts, "only Parquet and results in an object store have parts")],
         help="Rows of each part, of Parquet and of results in an object store.",
     ),
     option("--resume", is_flag=True, help="Keep the rows of an interrupted run and do the rest."),
@@ -140,6 +148,7 @@ result_options = record(
         "--shard-by",
         type=Choice("every", "range"),
         default="every",
+        only_with=[Needs(lambda ctx: ctx.params["shard"] != (1, 1), "there is one shard")],
         help="every: --shard takes every N-th frame; range: the I-th of N runs of consecutive frames.",
     ),
     option("--fail-fast", is_flag=True, help="Stop at the first frame that fails."),
@@ -209,7 +218,5 @@ def estimate(ctx: click.Context, /, **records: Any) -> None:
     )
 
     from rollcli.run.estimate import run_estimate
-    from rollcli.run.unused import idle_in_estimate, repeated_inputs
 
-    tell_idle(ctx, idle_in_estimate(options), repeated_inputs(options.inputs), quiet=options.running.quiet)
     ctx.exit(run_estimate(options, resume_command=resume_command(ctx)))

@@ -4,7 +4,7 @@ from typing import Any
 
 import click
 
-from rollcli.cli.command import argument, command, option, record
+from rollcli.cli.command import command, option, record
 from rollcli.cli.config import config_option
 from rollcli.cli.options import PATH, encoding_options, input_options, region_options, running_options
 from rollcli.cli.types import TABLE_FILE, TABLE_FORMATS, Choice, Number, ParamType, table_format
@@ -21,7 +21,7 @@ from rollcli.run.options import RunningOptions
         )
     ],
 )
-@argument("result", type=PATH)
+@click.argument("result", type=PATH)
 @option(
     "--truth",
     type=PATH,

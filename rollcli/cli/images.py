@@ -1,16 +1,17 @@
-"""`rollcli derotate`, `rollcli vdisparity` and `rollcli disparity`: the commands that write images."""
+"""`rollcli derotate`, `disparity`, `vdisparity` and `heights`: each frame becomes files."""
 
 from typing import Any
 
 import click
 
-from rollcli.cli.command import command, option, record, tell_idle
+from rollcli.cli.command import command, option, section
 from rollcli.cli.config import config_option
 from rollcli.cli.options import (
     PATH,
     calibration_options,
     cluster_options,
     encoding_options,
+    heights_range_option,
     input_options,
     output_folder_option,
     pair_input_options,
@@ -19,24 +20,24 @@ from rollcli.cli.options import (
     stereo_options,
     topic_options,
 )
-from rollcli.cli.types import Number
+from rollcli.cli.types import Choice, Number
 from rollcli.run.options import (
-    CountOptions,
+    ConvertOptions,
     DerotateOptions,
     DisparityOptions,
-    RotationOptions,
+    HeightsOptions,
     VDisparityOptions,
 )
 
 
-def _rotation(*, roll: float | None, **values: Any) -> RotationOptions:
-    return RotationOptions(roll_deg=roll, result=values.pop("from"), **values)
+def _run(ctx: click.Context, options: ConvertOptions) -> None:
+    from rollcli.run.convert import run_conversion
+
+    ctx.exit(run_conversion(options))
 
 
-rotation_options = record(
-    "rotation",
+rotation_options = section(
     "Angle",
-    _rotation,
     option(
         "--roll",
         type=Number("DEG", at_least=-180, at_most=180),
@@ -71,7 +72,7 @@ rotation_options = record(
 @cluster_options
 @config_option
 @click.pass_context
-def derotate(ctx: click.Context, /, **records: Any) -> None:
+def derotate(ctx: click.Context, /, **options: Any) -> None:
     """Rotate disparity maps about their centre by their roll, so that rows of the road become constant.
 
     INPUTS are maps (PNG, TIFF, NPY, NPZ, PFM, EXR), folders, .zip and .tar of them, quoted
@@ -83,12 +84,8 @@ def derotate(ctx: click.Context, /, **records: Any) -> None:
     that names it, before anything is written. Suspect angles are used, and a line says how many there are;
     --skip-suspect leaves their maps out.
     """
-    from rollcli.run.convert import run_derotate
-    from rollcli.run.unused import idle_in_derotate, repeated_inputs
-
-    options = DerotateOptions(**records)
-    tell_idle(ctx, idle_in_derotate(options), repeated_inputs(options.inputs), quiet=options.running.quiet)
-    ctx.exit(run_derotate(options))
+    result, roll_deg = options.pop("from"), options.pop("roll")
+    _run(ctx, DerotateOptions(**options, result=result, roll_deg=roll_deg))
 
 
 @command(
@@ -117,29 +114,18 @@ def derotate(ctx: click.Context, /, **records: Any) -> None:
 @cluster_options
 @config_option
 @click.pass_context
-def disparity(ctx: click.Context, /, **records: Any) -> None:
+def disparity(ctx: click.Context, /, **options: Any) -> None:
     """Match rectified stereo pairs with OpenCV SGBM: one disparity map a pair, named after the left image.
 
     Images are PNG, JPEG, TIFF, BMP, PGM or PPM, of 8 or 16 bits, grey or colour. An image without a partner
     is an error that names it, before anything runs. INPUTS are images or videos that hold both views
     (--side-by-side), or bags (--left-topic, --right-topic).
     """
-    from rollcli.run.convert import run_disparity
-    from rollcli.run.unused import idle_in_disparity
-
-    options = DisparityOptions(**records)
-    tell_idle(ctx, idle_in_disparity(options), quiet=options.running.quiet)
-    ctx.exit(run_disparity(options))
+    _run(ctx, DisparityOptions(**options))
 
 
-def _count(**values: Any) -> CountOptions:
-    return CountOptions(result=values.pop("from"), **values)
-
-
-count_options = record(
-    "count",
+count_options = section(
     "Counting",
-    _count,
     option(
         "--bins",
         type=Number("N", at_least=1, at_most=65535, whole=True),
@@ -191,7 +177,7 @@ count_options = record(
 @cluster_options
 @config_option
 @click.pass_context
-def vdisparity(ctx: click.Context, /, **records: Any) -> None:
+def vdisparity(ctx: click.Context, /, **options: Any) -> None:
     """Draw the v-disparity image of each map: the histogram of each row's disparities.
 
     INPUTS are maps (PNG, TIFF, NPY, NPZ, PFM, EXR), folders, .zip and .tar of them, quoted
@@ -202,9 +188,61 @@ def vdisparity(ctx: click.Context, /, **records: Any) -> None:
     calibration, the road's horizon on that column is drawn, too. --figure needs the extra:
     pip install "rollcli[report]".
     """
-    from rollcli.run.convert import run_vdisparity
-    from rollcli.run.unused import idle_in_vdisparity, repeated_inputs
+    _run(ctx, VDisparityOptions(result=options.pop("from"), **options))
 
-    options = VDisparityOptions(**records)
-    tell_idle(ctx, idle_in_vdisparity(options), repeated_inputs(options.inputs), quiet=options.running.quiet)
-    ctx.exit(run_vdisparity(options))
+
+@command(
+    examples=[
+        (
+            "Heights in metres over the roads that estimate found, with pictures",
+            "rollcli estimate maps/ --calib calib.txt -o rolls.csv\n"
+            "rollcli heights maps/ --from rolls.csv --calib calib.txt -o heights/ --preview pictures/",
+        ),
+        ("At once, of stereo pairs too", "rollcli estimate maps/ -o rolls.csv --heights heights/"),
+    ]
+)
+@input_options
+@option(
+    "--from",
+    type=PATH,
+    metavar="RESULT",
+    required=True,
+    section="Road",
+    help="The road of each map, from what `rollcli estimate` wrote; matched by stem.",
+)
+@option("--skip-suspect", is_flag=True, section="Road", help="Leave out the maps whose angle is suspect.")
+@output_folder_option
+@option(
+    "--preview",
+    type=PATH,
+    metavar="DIR",
+    section="Output",
+    help="Also write pictures of the heights, PNG, every frame in the same colours.",
+)
+@heights_range_option("preview")
+@option(
+    "--save-as",
+    type=Choice("tiff", "npy"),
+    default="tiff",
+    section="Output",
+    help="float32 TIFF, whose description names the unit, or float32 NPY.",
+)
+@encoding_options
+@calibration_options
+@cluster_options
+@config_option
+@click.pass_context
+def heights(ctx: click.Context, /, **options: Any) -> None:
+    """Write how high each pixel of disparity maps lies over the road.
+
+    INPUTS are maps (PNG, TIFF, NPY, NPZ, PFM, EXR), folders, .zip and .tar of them, quoted
+    patterns, or - for paths on stdin. Heights
+    are along the road's normal, over the parabola, roll and camber that RESULT has for each map; positive:
+    above the road; NaN: no disparity. They are metres with a calibration that has a baseline, else camera
+    heights.
+
+    Every map needs its row and every row with an angle its map: what has no partner is an error that names
+    it, before anything is written. Suspect angles are used, and a line says how many there are;
+    --skip-suspect leaves their maps out.
+    """
+    _run(ctx, HeightsOptions(result=options.pop("from"), **options))

@@ -65,7 +65,7 @@ COMMANDS = {
     "disparity": ("rollcli.cli.images", "Stereo pairs to disparity maps with OpenCV SGBM."),
     "derotate": ("rollcli.cli.images", "Rotate maps by one angle, or by the angles of a result."),
     "vdisparity": ("rollcli.cli.images", "v-disparity images of maps."),
-    "heights": ("rollcli.cli.heights", "Heights over the road, of maps and their result."),
+    "heights": ("rollcli.cli.images", "Heights over the road, of maps and their result."),
     "simulate": ("rollcli.cli.simulate", "Render road stereo pairs and true disparity with known roll."),
     "evaluate": ("rollcli.cli.evaluate", "The paper's experiments; accuracy against known angles."),
     "rig": ("rollcli.cli.rig", "What a result says about the rig: mounting, drift, jumps; a gate for CI."),

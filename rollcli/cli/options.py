@@ -2,9 +2,11 @@
 
 from typing import Any, get_args
 
-from rollcli.cli.command import argument, option, record
+import click
+
+from rollcli.cli.command import Declaration, Needs, option, record
 from rollcli.cli.types import Choice, FilePath, Number, NumberOrNan, Point, Polygon, Roi, Span
-from rollcli.estimator.request import MAX_ROLL_LIMIT_DEG, METHODS, MODELS, ROADS
+from rollcli.estimator.request import AREAS, MAX_ROLL_LIMIT_DEG, METHODS, MODELS, ROADS
 from rollcli.rig.calibration import CalibrationOptions
 from rollcli.run.image_kinds import KINDS
 from rollcli.run.options import (
@@ -25,6 +27,52 @@ _METHOD = MethodOptions()
 PATH = FilePath()  # whether it exists, its reader says: in the same words wherever the name came from
 
 
+def _has_pairs(ctx: click.Context) -> bool:
+    """Tell whether the frames are pairs."""
+    named = ("left", "right", "side_by_side", "left_topic", "right_topic")
+    return ctx.command.name == "disparity" or any(ctx.params.get(name) for name in named)
+
+
+def _keeps_numbers(ctx: click.Context) -> bool:
+    return ctx.command.name == "derotate"
+
+
+def _places(ctx: click.Context) -> list[str] | None:
+    """List what is named to be read; None where lists or URLs may name any files."""
+    from rollcli.files.stores.locations import is_url
+
+    given = ctx.params
+    named = [*given["inputs"], *filter(None, (given.get("left"), given.get("right")))]
+    return None if given["files_from"] or any(name == "-" or is_url(name) for name in named) else named
+
+
+def _has_folder(ctx: click.Context) -> bool:
+    from rollcli.files.atomic import is_folder
+
+    named = _places(ctx)
+    return named is None or any(map(is_folder, named))
+
+
+def _has_more_than_files(ctx: click.Context) -> bool:
+    from rollcli.files.atomic import is_file
+
+    named = _places(ctx)
+    return named is None or not all(map(is_file, named))
+
+
+_PAIRS = Needs(_has_pairs, "the inputs are maps, which are not matched")
+_MAPS = Needs(lambda ctx: not _has_pairs(ctx), "pairs are matched, and no stored disparities are read")
+_FOLDERS = Needs(_has_more_than_files, "they choose among the files of folders, and none is named")
+_HORIZON = Needs(
+    lambda ctx: not ctx.params.get("figure") or ctx.params["encoding"] == "depth",
+    "a figure shows no horizon",
+)
+_BASELINE = Needs(
+    lambda ctx: ctx.command.name != "vdisparity" or ctx.params["encoding"] == "depth",
+    "the horizon does not depend on it; only --encoding depth needs it",
+)
+
+
 def _stereo(
     *, num_disparities: int | str, sgbm_mode: str, vertical_offset: float | str, **values: Any
 ) -> StereoOptions:
@@ -39,11 +87,26 @@ def _method(**values: Any) -> MethodOptions:
 
 
 _folders = (
-    option("--recursive", is_flag=True, help="Search folders recursively."),
     option(
-        "--include", multiple=True, metavar="GLOB", help="Of folders, take only files that match. Repeatable."
+        "--recursive",
+        is_flag=True,
+        only_with=[Needs(_has_folder, "no folder is named")],
+        help="Search folders recursively.",
     ),
-    option("--exclude", multiple=True, metavar="GLOB", help="Leave out files that match. Repeatable."),
+    option(
+        "--include",
+        multiple=True,
+        metavar="GLOB",
+        only_with=[_FOLDERS],
+        help="Of folders, take only files that match. Repeatable.",
+    ),
+    option(
+        "--exclude",
+        multiple=True,
+        metavar="GLOB",
+        only_with=[_FOLDERS],
+        help="Leave out files that match. Repeatable.",
+    ),
     option(
         "--every",
         type=Number("N", at_least=1, whole=True),
@@ -53,7 +116,7 @@ _folders = (
 )
 
 _named = (
-    argument("inputs", nargs=-1, type=PATH),
+    click.argument("inputs", nargs=-1, type=PATH),
     option(
         "--files-from",
         type=PATH,
@@ -98,6 +161,7 @@ pair_options = record(
         "--match",
         type=Choice("name", "order"),
         default="name",
+        only_with=[_PAIRS],
         help="By name (the same but for left/right, l/r, L1/R1, image_2/image_3, im0/im1 …), or by order.",
     ),
     option(
@@ -167,6 +231,7 @@ stereo_options = record(
         "--speckle-range",
         type=Number("PX", at_least=0, whole=True),
         default=StereoOptions.speckle_range,
+        only_with=[Needs(lambda ctx: ctx.params["speckle_size"] != 0, "--speckle-size 0 keeps every patch")],
         help="Disparity step within a patch, pixels.",
     ),
     option(
@@ -180,6 +245,12 @@ stereo_options = record(
         type=PATH,
         metavar="auto|off|FILE",
         default=StereoOptions.align,
+        only_with=[
+            Needs(
+                lambda ctx: ctx.params["vertical_offset"] == "auto",
+                "--vertical-offset says how the right image lies",
+            )
+        ],
         help="auto: measure how much lower, larger and how far turned the right image is against the left, "
         "correct that before matching, and say so in the row; off: match the images as they are; FILE: "
         "correct all pairs as `rollcli rig --correction FILE` says.",
@@ -191,6 +262,7 @@ stereo_options = record(
         help="How much lower the right image lies, pixels: corrected as given, and nothing is measured; "
         "auto: as --align says.",
     ),
+    only_with=[_PAIRS],
 )
 
 encoding_options = record(
@@ -201,6 +273,14 @@ encoding_options = record(
         "--encoding",
         type=Choice("auto", "px", "kitti", "cityscapes", "sgbm", "depth", "foundationstereo"),
         default="auto",
+        only_with=[
+            Needs(  # there a stored 1 is no data
+                lambda ctx: (
+                    not _keeps_numbers(ctx) or ctx.params["encoding"] in ("cityscapes", "foundationstereo")
+                ),
+                "rotated maps keep their stored numbers",
+            )
+        ],
         help="px: pixels as they are; kitti: p/256; cityscapes: (p-1)/256; sgbm: p/16, negative is no data; "
         "depth: metres (whole numbers: millimetres), which a calibration turns into disparities; "
         "foundationstereo: (R*255*255 + G*255 + B)/1000 of an RGB PNG; "
@@ -209,6 +289,12 @@ encoding_options = record(
     option(
         "--scale",
         type=Number("F", but=0),
+        only_with=[
+            Needs(
+                lambda ctx: not _keeps_numbers(ctx) or ctx.params["scale"] < 0,
+                "rotated maps keep their stored numbers",
+            )
+        ],
         help="Pixels = stored number * F (depth: metres = stored number * F); F replaces the factor of an "
         "encoding, and is negative where maps are stored negative.",
     ),
@@ -218,6 +304,7 @@ encoding_options = record(
         multiple=True,
         help="A further stored value that means no data (always: nan, inf, <= 0). Repeatable.",
     ),
+    only_with=[_MAPS],
 )
 
 region_options = record(
@@ -248,6 +335,12 @@ method_options = record(
         "--model",
         type=Choice(*MODELS),
         default=_METHOD.model,
+        only_with=[
+            Needs(
+                lambda ctx: ctx.params["road"] != "all" or ctx.params["method"] not in AREAS,
+                "--method {method} fits planes",
+            )
+        ],
         help="Disparity of the road as a function of the row.",
     ),
     option(
@@ -260,18 +353,31 @@ method_options = record(
         "--lambda0",
         type=Number("FLOAT", above=0, auto=True),
         default=_METHOD.lambda0,
+        only_with=[Needs(lambda ctx: ctx.params["method"] == "gd", "only --method gd has a learning rate")],
         help="First learning rate of gd, rad^2 per unit of energy; auto: 1 / curvature of the energy.",
     ),
     option(
         "--tolerance",
         type=Number("DEG", above=0, at_most=90),
         default=_METHOD.tolerance_deg,
+        only_with=[
+            Needs(
+                lambda ctx: ctx.params["method"] not in AREAS,
+                "--method {method} does not iterate on the angle",
+            )
+        ],
         help="Stop when the angle moves by less than this, degrees.",
     ),
     option(
         "--max-roll",
         type=Number("DEG", above=0, at_most=MAX_ROLL_LIMIT_DEG),
         default=_METHOD.max_roll_deg,
+        only_with=[
+            Needs(  # areas chooses among its planes by their roll
+                lambda ctx: ctx.params["road"] != "all" or ctx.params["method"] == "areas",
+                "--road all looks for no road",
+            )
+        ],
         help="Largest |roll| that road finding considers, degrees.",
     ),
     option(
@@ -285,25 +391,45 @@ method_options = record(
         "--seed",
         type=Number("INT", at_least=0, whole=True),
         default=_METHOD.seed,
+        only_with=[Needs(lambda ctx: ctx.params["road"] != "all", "--road all draws no samples")],
         help="Seed of road finding's samples.",
     ),
 )
 
-heights_range_option = option(
-    "--heights-range",
-    section="Output",
-    type=Span(wide=True),
-    default=HEIGHTS_RANGE,
-    show_default=False,
-    help="Heights with the outermost colours of a preview, A:B, metres or camera heights.  "
-    f"[default: {HEIGHTS_RANGE[0]:.2f}:{HEIGHTS_RANGE[1]:.2f}]",
-)
+
+def heights_range_option(preview: str) -> Declaration:
+    """Declare the colours of a preview, which goes with the option of that name."""
+    has_preview = Needs(lambda ctx: ctx.params[preview.replace("-", "_")], f"only --{preview} has colours")
+    return option(
+        "--heights-range",
+        section="Output",
+        type=Span(wide=True),
+        default=HEIGHTS_RANGE,
+        show_default=False,
+        only_with=[has_preview],
+        help="Heights with the outermost colours of a preview, A:B, metres or camera heights.  "
+        f"[default: {HEIGHTS_RANGE[0]:.2f}:{HEIGHTS_RANGE[1]:.2f}]",
+    )
+
 
 save_as_option = option(
     "--save-as",
     section="Output",
     type=Choice("png", "tiff", "npy"),
     default="png",
+    only_with=[
+        Needs(
+            lambda ctx: _has_pairs(ctx) or ctx.params["heights"],
+            "a map keeps the format of its input",
+        ),
+        Needs(
+            lambda ctx: (
+                ctx.command.name == "disparity"
+                or any(ctx.params[kind.name] for kind in KINDS if kind.holds != "picture")
+            ),
+            "only --disparity, --derotated and --heights write maps",
+        ),
+    ],
     help="Format of maps computed from pairs: 16-bit KITTI PNG (TIFF for a map beyond its 256 px), float32 "
     "TIFF or float32 NPY; of heights: TIFF, or NPY. Maps as PNG and TIFF carry what levelling left "
     "uncertain, for `estimate`; NPY cannot.",
@@ -324,7 +450,7 @@ image_options = record(
     "Images to write, named after their input",
     ImageOptions,
     *(option(f"--{kind.name.replace('_', '-')}", type=PATH, metavar="DIR", help=kind.help) for kind in KINDS),
-    heights_range_option,
+    heights_range_option("heights-preview"),
     save_as_option,
 )
 
@@ -333,6 +459,7 @@ _running = (
         "-j",
         "--jobs",
         type=Number("N", at_least=1, whole=True),
+        only_with=[Needs(lambda ctx: not ctx.params.get("scheduler"), "--scheduler has workers of its own")],
         help="Worker processes.  [default: the usable processors]",
     ),
     option("--overwrite", is_flag=True, help="Replace results and images that are there."),
@@ -368,7 +495,11 @@ calibration_options = record(
         help="A file, or a folder with one of the same stem each: KITTI, Middlebury, ETH3D, OpenCV, ROS "
         "(twice: left, right), Cityscapes, ORB-SLAM, DrivingStereo; recognised by content.",
     ),
-    option("--focal", type=Number("PX", above=0), help="Focal length, pixels.  [default: the file's]"),
+    option(
+        "--focal",
+        type=Number("PX", above=0),
+        help="Focal length, pixels.  [default: the file's]",
+    ),
     option(
         "--principal-point",
         type=Point(),
@@ -377,6 +508,7 @@ calibration_options = record(
     option(
         "--baseline",
         type=Number("M", above=0),
+        only_with=[_BASELINE],
         help="Distance between the cameras, metres; gives the height.  [default: the file's]",
     ),
     option(
@@ -384,4 +516,5 @@ calibration_options = record(
         type=Number("PX"),
         help="CX of the right view less that of the left one, pixels.  [default: the file's, else 0]",
     ),
+    only_with=[_HORIZON],
 )

@@ -4,7 +4,7 @@ from typing import Any
 
 import click
 
-from rollcli.cli.command import argument, command, option
+from rollcli.cli.command import command, option
 from rollcli.cli.config import config_option
 from rollcli.cli.options import PATH, running_options
 from rollcli.cli.types import Number, OutputFile
@@ -31,7 +31,7 @@ from rollcli.report.options import GALLERY, ReportOptions
         ExitStatus.FRAMES_FAILED: "they are written, and pictures of at least one frame cannot be made",
     },
 )
-@argument("results", nargs=-1, required=True, type=PATH)
+@click.argument("results", nargs=-1, required=True, type=PATH)
 @option(
     "-o",
     "--output",

@@ -4,7 +4,7 @@ from typing import Any
 
 import click
 
-from rollcli.cli.command import argument, command, option, record
+from rollcli.cli.command import command, option, record
 from rollcli.cli.config import config_option
 from rollcli.cli.options import PATH, calibration_options, running_options
 from rollcli.cli.types import TABLE_FILE, TABLE_FORMATS, Choice, Number, table_format
@@ -61,7 +61,7 @@ gate_options = record(
         ExitStatus.UNTOLD: ExitStatus.UNTOLD.meaning,
     },
 )
-@argument("results", nargs=-1, required=True, type=PATH)
+@click.argument("results", nargs=-1, required=True, type=PATH)
 @option(
     "--against",
     type=PATH,

@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from rollcli.cli.command import argument, command, option, record
+from rollcli.cli.command import command, option, record
 from rollcli.cli.config import config_option
 from rollcli.cli.estimate import one_start, resume_command
 from rollcli.cli.options import PATH, running_options
@@ -213,7 +213,7 @@ simulate_options = record(
         ),
     ]
 )
-@argument("folder", metavar="DIR", type=PATH)
+@click.argument("folder", metavar="DIR", type=PATH)
 @simulate_options
 @running_options
 @config_option

@@ -13,7 +13,7 @@ from rollcli.evaluate.options import PaperOptions
 from rollcli.files.matching import stem_of
 from rollcli.files.results import Row
 from rollcli.run.frame import Frame, FrameResult, failed_frame
-from rollcli.run.frame_errors import FRAME_ERRORS
+from rollcli.run.frame_errors import FRAME_ERRORS, frame_of_error
 from rollcli.run.read import Source, read_source
 
 
@@ -33,9 +33,8 @@ def examine_file(frame: Frame, options: PaperOptions, truth: Mapping[str, float]
         known = truth.get(stem_of(frame.file))
         findings = examine(frame.file, usable_pixels(source), turns, known, chosen=options.has_region)
     except FRAME_ERRORS as error:
-        return lost(frame, str(error) or type(error).__name__)
-    warning = source.warning or source.beyond
-    return Examined(FrameResult(Row(frame.file, status="ok"), source.encoding, warning), findings)
+        return Examined(frame_of_error(frame, error), None)
+    return Examined(FrameResult(Row(frame.file, status="ok"), source.encoding, source.warnings), findings)
 
 
 def usable_pixels(source: Source) -> NDArray[Any]:

@@ -55,15 +55,20 @@ class DisparityMap:
         Pixels per stored unit; of a depth map, metres per stored unit.
     stored : Stored
         What the file holds.
-    warning : str or None
-        Why the encoding taken by "auto" cannot be right, or what else a user should know.
+    warnings : dict of str to str
+        Why the encoding taken by "auto" cannot be right, and what else a user should know; by their codes.
     """
 
     disparity: NDArray[Any]
     encoding: Encoding
     scale: float
     stored: Stored
-    warning: str | None
+    warnings: dict[str, str]
+
+    @property
+    def warning(self) -> str | None:
+        """All of them."""
+        return "; ".join(self.warnings.values()) or None
 
 
 def to_disparity(
@@ -112,8 +117,9 @@ def to_disparity(
         _blank(disparity, stored.values, (*invalid, *stored.nodata, *_saturated(stored.values)))
     plateau = without_plateaus(disparity)
     doubt = _doubt(stored.values, used) if encoding == "auto" and scale is None else ""
-    warning = "; ".join(each for each in (stored.note, doubt, plateau) if each)
-    return DisparityMap(disparity, used, factor, stored, warning or None)
+    warnings = {"pages": stored.note, "encoding": doubt, "plateau": plateau}
+    told = {code: warning for code, warning in warnings.items() if warning}
+    return DisparityMap(disparity, used, factor, stored, told)
 
 
 def read_disparity(

@@ -175,8 +175,8 @@ def decode_image(data: bytes, name: str) -> NDArray[Any]:
         return tiff.picture(data, name)
     if data.startswith(pictures.SIGNATURES):
         return pictures.decode_picture(data, name)
-    what = "a PNG, JPEG, TIFF, BMP, PGM or PPM file"
-    raise InputError(f"{name}: is {_what(data)}; a camera image is {what}")
+    is_a, what = _what(data), "a PNG, JPEG, TIFF, BMP, PGM or PPM file"
+    raise InputError(f"{name}: is {is_a}; a camera image is {what}", is_a)
 
 
 def decode_mask(data: bytes, name: str) -> NDArray[np.bool_]:

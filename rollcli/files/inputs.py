@@ -93,7 +93,7 @@ def find_inputs(
     maps : bool
         They are disparity maps: the views of pairs are refused.
     notes : list of str, optional
-        Gets a line on what the folders hold beside what is read.
+        Gets lines on what is named twice, and on what the folders hold beside what is read.
 
     Returns
     -------
@@ -111,6 +111,7 @@ def find_inputs(
     seen: dict[str, set[str]] = {}  # names by their folders, whose texts they share
     real = functools.cache(os.path.realpath)  # one folder holds thousands of files
     for argument, literal in _arguments(inputs, files_from, stdin):
+        before, repeats = len(found), False
         for path, relative in search.files(argument, literal=literal):
             # links to files stay themselves: each may be a frame
             if is_url(path):
@@ -122,6 +123,10 @@ def find_inputs(
             if base not in names:
                 names.add(base)
                 found.append(Input(path, _shown(path), relative))
+            else:
+                repeats = True
+        if repeats and len(found) == before and not literal and notes is not None:
+            notes.append(f"{argument}: is named more than once; each of its files is taken once")
     if search.left_out and notes is not None:
         notes.append(_left_out(search.left_out))
     del seen  # before the keys of the sort take its place

@@ -348,7 +348,7 @@ def _read_file(path: str, name: str, most: int = MOST_BYTES, begins: Beginning =
         raise InputError(f"{name}: {'is a link to nothing' if dangling else 'no such file'}") from None
     except (OSError, ValueError) as error:
         reason = str(getattr(error, "strerror", None) or error).lower()
-        raise InputError(f"{name}: cannot be read: {reason}") from None
+        raise InputError(f"{name}: cannot be read: {reason}", reason) from None
     return data
 
 

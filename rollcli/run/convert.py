@@ -1,144 +1,160 @@
-"""`derotate`, `vdisparity` and `disparity`: what is done with each frame."""
+"""`derotate`, `vdisparity`, `heights` and `disparity`: each frame becomes files of its own."""
 
-import math
-from collections.abc import Iterator, Sequence
+import contextlib
+from collections.abc import Generator, Sequence
+from dataclasses import replace
 from functools import partial
 
 from rollcli.errors import ExitStatus, UsageError
 from rollcli.extras import require_extra
+from rollcli.files.atomic import remove_leftovers
+from rollcli.files.containers import file_of
 from rollcli.files.results import Row
+from rollcli.files.stores.locations import tasks_in_hand
+from rollcli.messages import say
 from rollcli.run.calibration import check_depth, check_first_size
-from rollcli.run.conversion import Conversion, convert
 from rollcli.run.find import map_frames, pair_frames
-from rollcli.run.frame import Frame, FrameResult
-from rollcli.run.image_kinds import ENDING_OF_FORMAT
+from rollcli.run.frame import Conversion, Frame, FrameResult, failed_frame
 from rollcli.run.options import (
-    CountOptions,
+    ConvertOptions,
     DerotateOptions,
     DisparityOptions,
-    EncodingOptions,
-    FrameOptions,
-    ImageOptions,
+    HeightsOptions,
+    InputOptions,
     VDisparityOptions,
 )
-from rollcli.run.outputs import output_path, roomy_path
+from rollcli.run.outputs import output_path, write_outputs
+from rollcli.run.progress import Progress
+from rollcli.run.reads_and_writes import check_one_owner, check_places, check_writes, list_files
 from rollcli.run.result_rows import rows_of
+from rollcli.run.workers.chunks import Work
+from rollcli.run.workers.in_order import SharedPaths, Workers
+from rollcli.run.workers.interrupt import Stop, stop_on_signals
+from rollcli.run.workers.tasks import require_scheduler, run_tasks
 
 
-def run_derotate(options: DerotateOptions) -> ExitStatus:
-    """Rotate every map."""
-    rotation, running = options.rotation, options.running
-    if (rotation.roll_deg is None) == (rotation.result is None):
-        raise UsageError("give either --roll, one angle for all maps, or --from, a result with one for each")
-    if rotation.skip_suspect and rotation.result is None:
-        raise UsageError("--skip-suspect needs --from: one angle for all maps is not doubted")
-    frames = map_frames(options.inputs, skip=[options.output], quiet=running.quiet)
-    conversions = list(_conversions(frames, options))
-    read = FrameOptions(encoding=options.encoding, root=running.root, replaces=running.overwrite)
-    do = partial(_derotate, options=read, expand=rotation.expand)
-    return convert(conversions, do, options.output, running, options.encoding)
+def run_conversion(options: ConvertOptions) -> ExitStatus:
+    """Make the files of every frame.
+
+    Raises
+    ------
+    UsageError, OutputError, ClusterError, WorkerError
+        The run cannot start or cannot go on.
+    """
+    running = options.running
+    conversions = _plan(options)
+    if running.dry_run:
+        list_files((each.frame.reads(), each.writes) for each in conversions)
+        return ExitStatus.DONE
+    require_scheduler(running.scheduler)
+    remove_leftovers(path for each in conversions for path in each.writes)
+    progress = Progress(len(conversions), running, options.encoding, statuses=("ok",))
+    with (
+        stop_on_signals() as stop,
+        progress,
+        contextlib.closing(_results(conversions, options, stop)) as results,
+    ):
+        for result in results:
+            progress.add(result)
+    progress.tell_end()
+    if stop.asked and progress.done < progress.total:
+        progress.say("interrupted; what is written is whole, and --overwrite starts anew")
+        return ExitStatus.INTERRUPTED
+    return progress.summary.status
 
 
-def _conversions(frames: Sequence[Frame], options: DerotateOptions) -> Iterator[Conversion]:
-    rotation = options.rotation
-    rows: Sequence[Row | None] = [None] * len(frames)
-    if rotation.result is not None:
-        quiet = options.running.quiet
-        rows = rows_of(frames, rotation.result, skip_suspect=rotation.skip_suspect, quiet=quiet)
+def _plan(options: ConvertOptions) -> list[Conversion]:
+    """Find the frames and their rows, and check what would be read and written."""
+    _check_options(options)
+    frames = _find_frames(options)
+    rows = _find_rows(frames, options)
+    for note in check_first_size(frames, options.frame):
+        say(note)
+    conversions = []
     for frame, row in zip(frames, rows, strict=True):
-        if row is not None and row.status == "suspect" and rotation.skip_suspect:
-            continue
-        roll_deg = rotation.roll_deg if row is None else row.map_roll_deg
-        refused = "" if roll_deg is not None else f"has no angle in {rotation.result}"
-        matrix = (output_path(frame, options.output, ".txt"),) if rotation.save_matrix else ()
-        writes = (output_path(frame, options.output), *matrix)
-        roll = math.radians(roll_deg or 0.0)
-        yield Conversion(frame, writes, roll, refused=refused, keeps_numbers=True)
-
-
-def _derotate(conversion: Conversion, options: FrameOptions, expand: bool) -> FrameResult:
-    from rollcli.run.convert_frame import derotate_map  # loads NumPy: only on a worker
-
-    return derotate_map(conversion, options, expand)
-
-
-def run_disparity(options: DisparityOptions) -> ExitStatus:
-    """Match every pair."""
-    frames = pair_frames(
-        options.inputs,
-        options.pairs,
-        options.topics,
-        skip=[*filter(None, [options.output, options.preview])],
-        quiet=options.running.quiet,
+        if row is None or row.status != "suspect" or not options.skip_suspect:
+            writes = [output_path(frame, folder, ending) for folder, ending in options.writes]
+            conversions.append(Conversion(frame, tuple(writes) if frame.relative else (), row))
+    check_one_owner((each.frame, each.writes) for each in conversions)
+    check_places([each.frame for each in conversions], [options.output])
+    check_writes(
+        [path for each in conversions for path in each.frame.reads()],
+        [path for each in conversions for path in each.writes],
+        overwrite=options.running.overwrite,
     )
-    conversions = [Conversion(frame, _disparity_writes(frame, options)) for frame in frames]
-    read = FrameOptions(
-        stereo=options.stereo,
-        images=ImageOptions(disparity=options.output),  # levelled as the estimate does, then every row
-        root=options.running.root,
-        replaces=options.running.overwrite,
-        side_by_side=options.pairs.side_by_side,
+    return conversions
+
+
+def _check_options(options: ConvertOptions) -> None:
+    if isinstance(options, DerotateOptions):
+        if (options.roll_deg is None) == (options.result is None):
+            raise UsageError(
+                "give either --roll, one angle for all maps, or --from, a result with one for each"
+            )
+        if options.skip_suspect and options.result is None:
+            raise UsageError("--skip-suspect needs --from: one angle for all maps is not doubted")
+    if isinstance(options, VDisparityOptions):
+        if options.figure is not None:
+            require_extra("report", "--figure")
+            if options.counts:
+                raise UsageError("--counts goes with the picture: give it without --figure")
+        elif options.result is not None:
+            raise UsageError("--from is for --figure: a picture shows the map as it is")
+
+
+def _find_frames(options: ConvertOptions) -> Sequence[Frame]:
+    skip, quiet = [folder for folder, _ in options.writes], options.running.quiet
+    if isinstance(options, DisparityOptions):
+        return pair_frames(options.inputs, options.pairs, options.topics, skip=skip, quiet=quiet)
+    frames = map_frames(options.inputs, calibration=options.calibration, skip=skip, quiet=quiet)
+    if not isinstance(options, DerotateOptions):
+        check_depth(frames, options.encoding)
+    return frames
+
+
+def _find_rows(frames: Sequence[Frame], options: ConvertOptions) -> Sequence[Row | None]:
+    if options.result is None:
+        return [None] * len(frames)
+    quiet, skip_suspect = options.running.quiet, options.skip_suspect
+    every_row = not isinstance(options, VDisparityOptions)
+    rows = rows_of(frames, options.result, quiet=quiet, skip_suspect=skip_suspect, every_row=every_row)
+    metric = isinstance(options, HeightsOptions) and any(row.height_m is not None for row in rows)
+    if metric and not quiet and any(frame.calibration is None for frame in frames):
+        say(
+            f"{options.result}: was made with a calibration: give it with --calib to have heights in metres, "
+            "not camera heights"
+        )
+    return rows
+
+
+def _results(
+    conversions: Sequence[Conversion], options: ConvertOptions, stop: Stop
+) -> Generator[FrameResult, None, None]:
+    """Yield the result of each conversion from whichever workers were asked for."""
+    running, folder = options.running, options.output
+    sample = (*conversions[:1], *conversions[-1:])
+    files = tuple(file_of(path) for each in sample for path in each.frame.reads())
+    shared = SharedPaths(files, (folder,))
+    workers = Workers(running.jobs, running.scheduler, shared, threads=tasks_in_hand((*files, folder)))
+    told = replace(options, inputs=InputOptions())  # which may be long
+    work = Work(
+        partial(_convert, options=told),
+        partial(_lost, replaces=running.overwrite),
+        lambda each: remove_leftovers(each.writes),
     )
-    check_first_size(frames, read)
-    do = partial(_match, options=read, save_as=options.save_as, preview=options.preview is not None)
-    return convert(conversions, do, options.output, options.running, EncodingOptions())
+    try:
+        yield from run_tasks(conversions, work, stop, workers)
+    finally:
+        if workers.scheduler is not None:  # a worker that died elsewhere cannot be waited for
+            remove_leftovers(path for each in conversions for path in each.writes)
 
 
-def _disparity_writes(frame: Frame, options: DisparityOptions) -> tuple[str, ...]:
-    """List the map, the TIFF in place of a PNG that cannot hold it, and last the preview."""
-    path = output_path(frame, options.output, ENDING_OF_FORMAT[options.save_as])
-    roomy = (roomy_path(path),) if options.save_as == "png" else ()
-    preview = () if options.preview is None else (output_path(frame, options.preview, ".png"),)
-    return (path, *roomy, *preview)
+def _convert(conversion: Conversion, options: ConvertOptions) -> FrameResult:
+    from rollcli.run.convert_frame import convert_frame  # loads NumPy: only on a worker
+
+    return convert_frame(conversion, options)
 
 
-def _match(conversion: Conversion, options: FrameOptions, save_as: str, preview: bool) -> FrameResult:
-    from rollcli.run.convert_frame import match_frame  # loads NumPy: only on a worker
-
-    return match_frame(conversion, options, save_as, preview=preview)
-
-
-def run_vdisparity(options: VDisparityOptions) -> ExitStatus:
-    """Count the disparities of every map, row by row, and draw them."""
-    running, count = options.running, options.count
-    if count.figure is not None:
-        require_extra("report", "--figure")
-        if count.counts:
-            raise UsageError("--counts goes with the picture: give it without --figure")
-    elif count.result is not None:
-        raise UsageError("--from is for --figure: a picture shows the map as it is")
-    frames = map_frames(
-        options.inputs, calibration=options.calibration, skip=[options.output], quiet=running.quiet
-    )
-    check_depth(frames, options.encoding)
-    conversions = list(_vdisparity_conversions(frames, options))
-    read = FrameOptions(encoding=options.encoding, root=running.root, replaces=running.overwrite)
-    check_first_size(frames, read)
-    do = partial(_count, options=read, count=count)
-    return convert(conversions, do, options.output, running, options.encoding)
-
-
-def _vdisparity_conversions(frames: Sequence[Frame], options: VDisparityOptions) -> Iterator[Conversion]:
-    result = options.count.result
-    if result is None:
-        yield from (Conversion(frame, _vdisparity_writes(frame, options)) for frame in frames)
-        return
-    rows = rows_of(frames, result, quiet=options.running.quiet, every_row=False)
-    for frame, row in zip(frames, rows, strict=True):
-        refused = "" if row.roll_deg is not None else f"has no angle in {result}"
-        yield Conversion(frame, _vdisparity_writes(frame, options), row=row, refused=refused)
-
-
-def _vdisparity_writes(frame: Frame, options: VDisparityOptions) -> tuple[str, ...]:
-    if options.count.figure is not None:
-        return (output_path(frame, options.output, f".{options.count.figure}"),)
-    picture = output_path(frame, options.output, ".png")
-    return (picture, output_path(frame, options.output, ".tif")) if options.count.counts else (picture,)
-
-
-def _count(conversion: Conversion, options: FrameOptions, count: CountOptions) -> FrameResult:
-    from rollcli.run.convert_frame import count_map, draw_figure  # loads NumPy: only on a worker
-
-    if count.figure is not None:
-        return draw_figure(conversion, options, count)
-    return count_map(conversion, options, count)
+def _lost(conversion: Conversion, reason: str, replaces: bool) -> FrameResult:
+    write_outputs({}, conversion.writes, replaces=replaces)
+    return failed_frame(conversion.frame, reason)

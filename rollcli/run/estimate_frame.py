@@ -51,8 +51,7 @@ def _estimate(frame: Frame, options: FrameOptions, images: dict[str, bytes]) -> 
         estimate = with_pose(estimate, calibration)
     row = _row(frame, source, estimate, note, likeness)
     images.update(made)
-    warning = "; ".join(filter(None, [source.warning, source.beyond, likeness]))
-    return FrameResult(row, source.encoding, warning, source.searched)
+    return FrameResult(row, source.encoding, {**source.warnings, likeness: likeness}, source.searched)
 
 
 def _estimate_roll(source: Source, options: FrameOptions) -> tuple[RollEstimate, str]:
@@ -69,7 +68,7 @@ def _estimate_roll(source: Source, options: FrameOptions) -> tuple[RollEstimate,
         )
     except EstimationError as error:
         likeness = looks_like(source.disparity, source.stored, options)
-        raise EstimationError(f"{likeness}; {error}" if likeness else str(error)) from error
+        raise EstimationError(f"{likeness}; {error}" if likeness else str(error), likeness) from error
     doubtful = estimate.status != "ok"
     return estimate, looks_like(source.disparity, source.stored, options) if doubtful else ""
 

@@ -246,12 +246,12 @@ def _bags(given: InputOptions) -> list[tuple[str, list[str]]]:
         Some are, or one is in a store, or the extra is missing.
     """
     bags = []
-    for name in given.inputs:
+    for name in dict.fromkeys(given.inputs):
         if name.lower().endswith(BAGS):
             _require_local(name)
         if files := [] if is_url(name) else bag_files(name):
             bags.append((name, files))
-    if bags and (len(bags) < len(given.inputs) or given.files_from is not None):
+    if bags and (len(bags) < len(set(given.inputs)) or given.files_from is not None):
         raise UsageError(f"{bags[0][0]}: is a bag: give bags and other inputs in runs of their own")
     if bags:
         require_extra("bags", bags[0][0])

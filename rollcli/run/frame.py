@@ -1,7 +1,7 @@
 """The records of a frame: what a worker is told and what it returns. Import-light: never loads NumPy."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from rollcli.files.results import Row
@@ -49,6 +49,24 @@ class Frame:
         return Frame, tuple(getattr(self, name) for name in self.__slots__)
 
 
+class Conversion(NamedTuple):
+    """The task of converting one frame.
+
+    Attributes
+    ----------
+    frame : Frame
+        What is read.
+    writes : tuple of str
+        The files that may be written.
+    row : Row or None
+        Of the frame in the result that is given.
+    """
+
+    frame: Frame
+    writes: tuple[str, ...]
+    row: Row | None = None
+
+
 class ReadAs(NamedTuple):
     """How frames were read: the encodings, and the first and last disparity searched, px."""
 
@@ -70,26 +88,37 @@ class FrameResult:
     row : Row
     encoding : str
         How the map's numbers were read; empty for pairs and failed frames.
-    warning : str
-        Why that may be wrong; empty when there is no doubt.
+    warnings : mapping of str to str
+        Why that may be wrong, and what else the user should know; by code, those that are empty left out.
     searched : tuple of int, or None
         First and last disparity searched, px; pairs only.
     inputs : bytes
         What the frame was read from, where workers were told to note it: see `inputs.inputs_line`.
+    cause : str
+        The code of its error: the same for all frames that failed for one cause.
     """
 
     row: Row
     encoding: str = ""
-    warning: str = ""
+    warnings: Mapping[str, str] = field(default_factory=dict)
     searched: tuple[int, int] | None = None
     inputs: bytes = b""
+    cause: str = ""
+
+    @property
+    def warning(self) -> str:
+        """All warnings; empty when there is none."""
+        return "; ".join(filter(None, self.warnings.values()))
 
 
 _LEFT, _RIGHT = "left image: ", "right image: "  # what a message calls the files of a pair
 
 
-def failed_frame(frame: Frame, reason: str) -> FrameResult:
-    """Make the `error` row of a frame; its message is one line that does not repeat the names of the row."""
+def failed_frame(frame: Frame, reason: str, cause: str = "") -> FrameResult:
+    """Make the `error` row of a frame; its message is one line that does not repeat the names of the row.
+
+    `cause` is its code; by default, the reason names no frame and is the code itself.
+    """
     message, left, right = (
         " ".join(text.split()) for text in (without_secrets(reason), frame.file, frame.right_file)
     )
@@ -99,7 +128,7 @@ def failed_frame(frame: Frame, reason: str) -> FrameResult:
         message = _RIGHT + message.removeprefix(f"{right}: ")
     elif message.startswith(f"{left}: "):
         message = (_LEFT if right else "") + message.removeprefix(f"{left}: ")
-    return FrameResult(Row(frame.file, frame.right_file, "error", message=message))
+    return FrameResult(Row(frame.file, frame.right_file, "error", message=message), cause=cause or reason)
 
 
 def named_message(row: Row) -> str:

@@ -7,7 +7,7 @@ from typing import Any, Literal, NamedTuple
 
 from rollcli.estimator.request import LAMBDA0, MAX_INTERVAL_DEG, MAX_ROLL_DEG, TOLERANCE_DEG, LearningRate
 from rollcli.rig.calibration import CalibrationOptions
-from rollcli.run.image_kinds import KINDS, ImageKind, Save
+from rollcli.run.image_kinds import ENDING_OF_FORMAT, KINDS, ImageKind, Save
 from rollcli.stereo.options import StereoOptions
 
 Layout = Literal["left-right", "top-bottom"]
@@ -220,80 +220,114 @@ class EstimateOptions(NamedTuple):
         return any((*self.pairs[:2], self.pairs.side_by_side, *self.topics[:2]))
 
 
-@dataclass(frozen=True)
-class RotationOptions:
-    """Where the angles come from: one for all maps, or a result with one for each; and what is kept."""
+@dataclass(frozen=True, kw_only=True)
+class ConvertOptions:
+    """What every command is told that makes files of each frame.
 
-    roll_deg: float | None
-    result: str | None
-    expand: bool
-    skip_suspect: bool
-    save_matrix: bool
+    Attributes
+    ----------
+    inputs : InputOptions
+    output : str
+        The folder of what is written.
+    running : RunningOptions
+    encoding, calibration
+        How maps are read.
+    result : str or None
+        Has the row of each map.
+    skip_suspect : bool
+        Leave out the maps whose row is suspect.
+    """
+
+    inputs: InputOptions
+    output: str
+    running: RunningOptions
+    encoding: EncodingOptions = field(default_factory=EncodingOptions)
+    calibration: CalibrationOptions = field(default_factory=CalibrationOptions)
+    result: str | None = None
+    skip_suspect: bool = False
+
+    @property
+    def frame(self) -> FrameOptions:
+        """How a frame is read, and its files are written."""
+        root, replaces = self.running.root, self.running.overwrite
+        return FrameOptions(encoding=self.encoding, root=root, replaces=replaces)
+
+    @property
+    def writes(self) -> list[tuple[str, str | None]]:
+        """Folder and ending of each file that may be written for a frame; None: the frame's own ending."""
+        raise NotImplementedError
 
 
-@dataclass(frozen=True)
-class CountOptions:
-    """How disparities are counted, and what is drawn of them. None: chosen for each map.
+@dataclass(frozen=True, kw_only=True)
+class DerotateOptions(ConvertOptions):
+    """Every option of `rollcli derotate`. `roll_deg` is one angle for all maps, in place of a result."""
 
-    `figure` is the kind of a figure for a paper, in place of the picture: "svg", "pdf" or "png"; `result`
-    names the result with its angles.
+    roll_deg: float | None = None
+    expand: bool = False
+    save_matrix: bool = False
+
+    @property
+    def writes(self) -> list[tuple[str, str | None]]:
+        """The map, and its matrix."""
+        return [(self.output, None), *([(self.output, ".txt")] if self.save_matrix else [])]
+
+
+@dataclass(frozen=True, kw_only=True)
+class HeightsOptions(ConvertOptions):
+    """Every option of `rollcli heights`."""
+
+    result: str
+    preview: str | None = None
+    heights_range: tuple[float, float] = HEIGHTS_RANGE
+    save_as: Literal["tiff", "npy"] = "tiff"
+
+    @property
+    def writes(self) -> list[tuple[str, str | None]]:
+        """The heights, and their picture."""
+        picture = [(self.preview, ".png")] if self.preview is not None else []
+        return [(self.output, ENDING_OF_FORMAT[self.save_as]), *picture]
+
+
+@dataclass(frozen=True, kw_only=True)
+class VDisparityOptions(ConvertOptions):
+    """Every option of `rollcli vdisparity`: how disparities are counted, None: chosen for each map.
+
+    `figure` is the kind of a figure for a paper, in place of the picture: "svg", "pdf" or "png".
     """
 
     bins: int | None = None
     max_disparity: float | None = None
     counts: bool = False
     figure: str | None = None
-    result: str | None = None
+
+    @property
+    def writes(self) -> list[tuple[str, str | None]]:
+        """The figure; or the picture and the counts."""
+        if self.figure is not None:
+            return [(self.output, f".{self.figure}")]
+        return [(self.output, ".png"), *([(self.output, ".tif")] if self.counts else [])]
 
 
-@dataclass(frozen=True)
-class DerotateOptions:
-    """Every option of `rollcli derotate`."""
-
-    inputs: InputOptions
-    rotation: RotationOptions
-    output: str
-    encoding: EncodingOptions
-    running: RunningOptions
-
-
-@dataclass(frozen=True)
-class HeightsOptions:
-    """Every option of `rollcli heights`. `result` has the road of each map."""
-
-    inputs: InputOptions
-    result: str
-    skip_suspect: bool
-    output: str
-    preview: str | None
-    heights_range: tuple[float, float]
-    save_as: Literal["tiff", "npy"]
-    encoding: EncodingOptions
-    calibration: CalibrationOptions
-    running: RunningOptions
-
-
-@dataclass(frozen=True)
-class VDisparityOptions:
-    """Every option of `rollcli vdisparity`."""
-
-    inputs: InputOptions
-    count: CountOptions
-    output: str
-    encoding: EncodingOptions
-    running: RunningOptions
-    calibration: CalibrationOptions = field(default_factory=CalibrationOptions)
-
-
-@dataclass(frozen=True)
-class DisparityOptions:
+@dataclass(frozen=True, kw_only=True)
+class DisparityOptions(ConvertOptions):
     """Every option of `rollcli disparity`."""
 
-    inputs: InputOptions
     pairs: PairOptions
-    output: str
-    save_as: Literal["png", "tiff", "npy"]
-    stereo: StereoOptions
-    running: RunningOptions
-    preview: str | None = None
     topics: TopicOptions = field(default_factory=TopicOptions)
+    stereo: StereoOptions = field(default_factory=StereoOptions)
+    save_as: Save = "png"
+    preview: str | None = None
+
+    @property
+    def frame(self) -> FrameOptions:
+        """How a pair is matched: levelled as the estimate does, then every row."""
+        images = ImageOptions(disparity=self.output)
+        layout = self.pairs.side_by_side
+        return super().frame._replace(stereo=self.stereo, images=images, side_by_side=layout)
+
+    @property
+    def writes(self) -> list[tuple[str, str | None]]:
+        """The map, the TIFF in place of a PNG that cannot hold it, and last the picture."""
+        maps = [(self.output, ENDING_OF_FORMAT[self.save_as])]
+        maps += [(self.output, ENDING_OF_FORMAT["tiff"])] if self.save_as == "png" else []
+        return [*maps, *([(self.preview, ".png")] if self.preview is not None else [])]

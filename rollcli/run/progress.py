@@ -1,7 +1,6 @@
 """What is said while frames run: a bar or lines, counts, causes of failure, and what the run comes to."""
 
 import os
-import re
 import sys
 import time
 from collections.abc import Iterable, Sequence
@@ -125,13 +124,7 @@ def _terminal_size() -> dict[str, Any]:
     return {"dynamic_ncols": True} if known else _UNKNOWN_SIZE
 
 
-_NUMBER = re.compile(r"\d[\d.]*(?:e[-+]?\d+)?")
 _CAUSES = 5  # that are said; a batch where every frame fails differently is no list to read
-
-
-def cause_of(message: str) -> str:
-    """Return what messages of one cause share: the text without its numbers."""
-    return _NUMBER.sub("#", message)
 
 
 @dataclass
@@ -142,16 +135,15 @@ class _Cause:
 
 
 class Causes:
-    """Groups the messages of frames; those that differ in numbers alone have one cause."""
+    """Groups the messages of frames by the codes of their causes."""
 
     def __init__(self) -> None:
         self._causes: dict[str, _Cause] = {}
         self._others = 0
 
-    def add(self, row: Row) -> str:
+    def add(self, code: str, row: Row) -> str:
         """Take the row of a frame, with its message; return what is to be said of it now, or nothing."""
-        key = cause_of(row.message)
-        cause = self._causes.get(key)
+        cause = self._causes.get(code)
         if cause is not None:
             cause.frames += 1
             cause.alike &= row.message == cause.first.message
@@ -159,7 +151,7 @@ class Causes:
         if len(self._causes) == _CAUSES:
             self._others += 1
             return ""
-        self._causes[key] = _Cause(row)
+        self._causes[code] = _Cause(row)
         return named_message(row)
 
     def repeated(self) -> list[str]:
@@ -248,7 +240,11 @@ class Progress(TaskProgress):
         for result in told:
             self._tell_input(result)
             if result.row.status == "error":
-                self._tell_failure(result.row)
+                line = self._failures.add(result.cause, result.row)
+                if self._verbose:
+                    self.say(named_message(result.row))
+                elif line:
+                    self.say(line)
             elif result.row.status == "suspect":
                 self.detail(f"{result.row.file}: suspect: {result.row.message}")
         self.advance(len(files))
@@ -259,28 +255,19 @@ class Progress(TaskProgress):
         if result.encoding and self._auto:
             how = f"{name}: read as {result.encoding} ({_MEANING[result.encoding]})"
             self.note(how, topic=result.encoding)
-        if result.warning:
-            self._tell_warning(replace(result.row, message=f"warning: {result.warning}"))
+        if warning := result.warning:
+            row = replace(result.row, message=f"warning: {warning}")
+            line = self._warnings.add(" ".join(filter(result.warnings.get, result.warnings)), row)
+            if self._verbose:
+                self.detail(named_message(row))
+            elif line:
+                self.note(line)
         if searched is not None:
             how = f"{name}: searched disparities from {searched[0]} to {searched[1]} px"
             if self._verbose:
                 self.detail(how)
             else:
                 self.note(how, topic="searched")
-
-    def _tell_warning(self, row: Row) -> None:
-        line = self._warnings.add(row)
-        if self._verbose:
-            self.detail(named_message(row))
-        elif line:
-            self.note(line)
-
-    def _tell_failure(self, row: Row) -> None:
-        line = self._failures.add(row)
-        if self._verbose:
-            self.say(named_message(row))
-        elif line:
-            self.say(line)
 
     def tell_end(self) -> None:
         """Say which causes of warnings and failures were met more than once, and the summary."""

@@ -1,7 +1,7 @@
 """Read a frame: its disparity, from a map or matched from a pair, and the pixels that may be used."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import lru_cache, partial
@@ -112,16 +112,16 @@ class Source:
         Pixels inside the mask, --roi and --polygon; None when none of them is given.
     stored : Stored or None
         What the map file holds; None for a pair.
-    encoding, warning : str
-        How the stored numbers were read, and why that may be wrong.
-    beyond : str
-        Why the disparities are too large to be pixels, and what would divide them; empty when they are not.
+    encoding : str
+        How the stored numbers were read.
+    warnings : mapping of str to str
+        Why that may be wrong, by code; "beyond": the disparities are too large to be pixels.
     searched : tuple of int, or None
         First and last disparity searched, px; pairs only.
     slope_error : float
         Standard deviation of a slope that all disparities may have beside the road's, px per px.
-    doubt : str
-        Why the map itself may be wrong; empty when there is no reason.
+    doubts : mapping of str to str
+        Why the map itself may be wrong, by code.
     alignment : mapping of str to float
         How the right view lay, by column of a result; empty for a map, and where that could not be told.
     size : tuple of int, or None
@@ -136,15 +136,19 @@ class Source:
     allowed: NDArray[np.bool_] | None = None
     stored: Stored | None = None
     encoding: str = ""
-    warning: str = ""
-    beyond: str = ""
+    warnings: Mapping[str, str] = field(default_factory=dict)
     searched: tuple[int, int] | None = None
     slope_error: float = 0.0
-    doubt: str = ""
+    doubts: Mapping[str, str] = field(default_factory=dict)
     alignment: Mapping[str, Any] = field(default_factory=dict)
     size: tuple[int, int] | None = None
     whole: NDArray[Any] | None = None
     photo: NDArray[Any] | None = None
+
+    @property
+    def doubt(self) -> str:
+        """All the doubts; empty when there is none."""
+        return "; ".join(filter(None, self.doubts.values()))
 
     @property
     def provenance(self) -> Provenance:
@@ -190,18 +194,17 @@ def _read(frame: Frame, options: FrameOptions) -> Source:
         calibration=frame.calibration,
     )
     encoding = found.encoding.value
-    beyond = too_large(found.disparity, stored, encoding)
+    beyond = {"beyond": too_large(found.disparity, stored, encoding)}
     carried = Provenance.of_text(stored.text)
     # the roll is the same at any scale, pitch and height are not
-    doubts = [carried.doubt, beyond if frame.calibration is not None else ""]
+    doubts = {"carried": carried.doubt, **(beyond if frame.calibration is not None else {})}
     return Source(
         found.disparity,
         stored=stored,
         encoding=encoding,
-        warning=found.warning or "",
-        beyond=beyond,
+        warnings={**found.warnings, **beyond},
         slope_error=carried.slope_error,
-        doubt="; ".join(filter(None, doubts)),
+        doubts=doubts,
         alignment=carried.alignment,
     )
 
@@ -236,7 +239,7 @@ def matched_source(
         match.disparity,
         searched=searched,
         slope_error=match.slope_error,
-        doubt="; ".join(_doubts(match)),
+        doubts={"range": _doubt_of_range(match), "match": match.doubt},
         alignment=_alignment(match),
         size=(width, height),
         whole=match.whole,
@@ -277,9 +280,8 @@ def _first_row(allowed: NDArray[np.bool_] | None, method: MethodOptions, small: 
     return first_row_of_road(small, allowed, math.radians(method.max_roll_deg), method.seed)
 
 
-def _doubts(match: "StereoMatch") -> Iterator[str]:
-    if match.end_fraction > _MUCH_AT_END:
-        share = f"{match.end_fraction:.0%} of the map lies at the end of the searched range"
-        yield f"{share}; use a larger --num-disparities"
-    if match.doubt:
-        yield match.doubt
+def _doubt_of_range(match: "StereoMatch") -> str:
+    if match.end_fraction <= _MUCH_AT_END:
+        return ""
+    share = f"{match.end_fraction:.0%} of the map lies at the end of the searched range"
+    return f"{share}; use a larger --num-disparities"

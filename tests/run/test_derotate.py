@@ -13,13 +13,12 @@ from rollcli.estimator.estimate import estimate_roll
 from rollcli.files.encodings import from_disparity, read_disparity
 from rollcli.files.formats import encode_stored, read_stored
 from rollcli.run import convert_frame as work
-from rollcli.run.convert import run_derotate
-from rollcli.run.convert_frame import derotate_map
+from rollcli.run.convert import run_conversion
+from rollcli.run.convert_frame import convert_frame
 from rollcli.run.options import (
     DerotateOptions,
     EncodingOptions,
     InputOptions,
-    RotationOptions,
     RunningOptions,
 )
 from tests.run_cli import contents, road_map, rollcli, write_kitti, write_maps
@@ -41,13 +40,14 @@ COMBINATIONS = [
 
 def derotated(folder, roll_deg, *, encoding="auto", expand=False, invalid=()):
     """Every map of folder/maps rotated into folder/out, in this process; the exit status."""
-    return run_derotate(
+    return run_conversion(
         DerotateOptions(
-            InputOptions((str(folder / "maps"),)),
-            RotationOptions(roll_deg, None, expand, False, False),
-            str(folder / "out"),
-            EncodingOptions(encoding, invalid=invalid),
-            RunningOptions(jobs=1, quiet=True, overwrite=True),
+            inputs=InputOptions((str(folder / "maps"),)),
+            roll_deg=roll_deg,
+            expand=expand,
+            output=str(folder / "out"),
+            encoding=EncodingOptions(encoding, invalid=invalid),
+            running=RunningOptions(jobs=1, quiet=True, overwrite=True),
         )
     )
 
@@ -310,9 +310,9 @@ def test_an_interrupted_run_says_that_what_is_written_is_whole(folder, monkeypat
 
     def interrupted(*arguments):
         signal.raise_signal(signal.SIGINT)
-        return derotate_map(*arguments)
+        return convert_frame(*arguments)
 
-    monkeypatch.setattr(work, "derotate_map", interrupted)
+    monkeypatch.setattr(work, "convert_frame", interrupted)
     done = rollcli("derotate", "maps", "--roll", "2", "-o", "out", cwd=folder)
     assert done.status == 130
     assert "interrupted; what is written is whole, and --overwrite starts anew" in done.err
@@ -322,9 +322,9 @@ def test_an_interrupted_run_says_that_what_is_written_is_whole(folder, monkeypat
 def test_a_run_that_is_interrupted_at_its_last_map_has_done_all(folder, monkeypatch):
     def interrupted(*arguments):
         signal.raise_signal(signal.SIGINT)
-        return derotate_map(*arguments)
+        return convert_frame(*arguments)
 
-    monkeypatch.setattr(work, "derotate_map", interrupted)
+    monkeypatch.setattr(work, "convert_frame", interrupted)
     done = rollcli("derotate", "maps/frame1.png", "--roll", "2", "-o", "out", cwd=folder)
     assert (done.status, "interrupted" in done.err) == (0, False)
     assert list(contents(folder / "out")) == ["frame1.png"]

@@ -49,15 +49,15 @@ def test_the_exit_status_says_whether_a_frame_failed(lines):
 
 def test_a_cause_is_said_once_and_at_the_end_for_how_many_frames(lines):
     counted = progress(quiet=True)
-    for name, message in [
-        ("a", "is empty"),
-        ("b", "only 37 valid pixels"),
-        ("c", "is empty"),
-        ("d", "only 5 valid pixels"),
-        ("e", "is text"),
-        ("f", "is empty"),
+    for name, cause, message in [
+        ("a", "empty", "is empty"),
+        ("b", "few", "only 37 valid pixels"),
+        ("c", "empty", "is empty"),
+        ("d", "few", "only 5 valid pixels"),
+        ("e", "text", "is text"),
+        ("f", "empty", "is empty"),
     ]:
-        counted.add(FrameResult(Row(name, message=message)))
+        counted.add(FrameResult(Row(name, message=message), cause=cause))
     assert lines() == ["rollcli: a: is empty", "rollcli: b: only 37 valid pixels", "rollcli: e: is text"]
     counted.tell_end()
     assert lines() == ["rollcli: 3 frames: is empty", "rollcli: 2 frames, such as b: only 37 valid pixels"]
@@ -66,7 +66,7 @@ def test_a_cause_is_said_once_and_at_the_end_for_how_many_frames(lines):
 def test_of_many_causes_the_first_five_are_said(lines):
     counted = progress(quiet=True)
     for cause in "abcdefg":
-        counted.add(FrameResult(Row("x", message=cause)))
+        counted.add(FrameResult(Row("x", message=cause), cause=cause))
     counted.tell_end()
     assert lines() == [
         *(f"rollcli: x: {cause}" for cause in "abcde"),
@@ -112,7 +112,9 @@ def test_how_numbers_were_read_is_said_once_unless_it_was_given(lines):
 
 def test_a_quiet_run_says_errors_alone(lines):
     counted = progress(quiet=True, verbose=True)
-    counted.add(result("suspect", "is doubtful", encoding="px", warning="may be wrong", searched=(0, 63)))
+    counted.add(
+        result("suspect", "is doubtful", encoding="px", warnings={"doubt": "may be wrong"}, searched=(0, 63))
+    )
     counted.note(counted.last_line())
     counted.detail("a detail")
     assert lines() == []

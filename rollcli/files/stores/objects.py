@@ -156,11 +156,12 @@ def read_object(url: str, most: int = MOST_BYTES) -> tuple[bytes, str]:
         with waiting_for_network():
             return _repeated(fetch)
     except FileNotFoundError as error:
-        raise InputError(f"{public_name(url)}: {what_is_missing(error)}") from None
+        missing = what_is_missing(error)
+        raise InputError(f"{public_name(url)}: {missing}", missing) from None
     except _store_errors() as error:
         reason = reason_of(error)
         limits = f" ({request_seconds():g}), for up to {in_words(most)}" if reason == _TOO_LONG else ""
-        raise InputError(f"{public_name(url)}: cannot be read: {reason}{limits}") from None
+        raise InputError(f"{public_name(url)}: cannot be read: {reason}{limits}", reason) from None
 
 
 def write_object(url: str, data: bytes, owner: str = "") -> None:

@@ -51,7 +51,7 @@ def read_web_file(url: str, most: int = MOST_BYTES) -> bytes:
         if final or time.monotonic() + pause > give_up:
             break
         time.sleep(pause)
-    raise InputError(f"{public_name(url)}: cannot be read: {reason}")
+    raise InputError(f"{public_name(url)}: cannot be read: {reason}", reason)
 
 
 def web_problem(url: str) -> str:
