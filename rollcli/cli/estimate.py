@@ -23,7 +23,7 @@ from rollcli.cli.options import (
     stereo_options,
     topic_options,
 )
-from rollcli.cli.types import Choice, Number, OutputFile, Shard
+from rollcli.cli.types import SHARD, Choice, Number, OutputFile
 from rollcli.messages import without_secrets
 from rollcli.run.options import EstimateOptions, ResultOptions
 
@@ -139,7 +139,7 @@ result_options = record(
     ),
     option(
         "--shard",
-        type=Shard(),
+        type=SHARD,
         default=(1, 1),
         show_default=False,
         help="Take every N-th frame from the I-th.  [default: 1/1]",

@@ -7,7 +7,7 @@ import click
 from rollcli.cli.command import command, option, record
 from rollcli.cli.config import config_option
 from rollcli.cli.options import PATH, encoding_options, input_options, region_options, running_options
-from rollcli.cli.types import TABLE_FILE, TABLE_FORMATS, Choice, Number, ParamType, table_format
+from rollcli.cli.types import TABLE_FILE, TABLE_FORMATS, TURNS, Choice, Number, table_format
 from rollcli.evaluate.options import TIMED, TURNS_DEG, ExperimentOptions, PaperOptions
 from rollcli.run.options import RunningOptions
 
@@ -78,27 +78,6 @@ def accuracy(
     ctx.exit(run_accuracy(result, truth, form, output, running, heights))
 
 
-class Turns(ParamType):
-    """A:B:STEP with A <= B and a step above 0, all within a quarter turn; at most 1000 angles."""
-
-    name = "A:B:STEP"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[float, float, float]:
-        if isinstance(value, tuple):
-            return value  # the default
-        try:
-            first, last, step = map(float, str(value).split(":"))
-        except ValueError:
-            first, last, step = 0.0, -1.0, 1.0
-        if not (-90 <= first <= last <= 90 and step > 0 and last - first <= 1000 * step):
-            self.fail(
-                f"{value!r} is not A:B:STEP in degrees with -90 <= A <= B <= 90, such as -20:20:2", param, ctx
-            )
-        return first, last, step
-
-
 experiment_options = record(
     "experiments",
     "Experiments",
@@ -108,7 +87,7 @@ experiment_options = record(
     ),
     option(
         "--turns",
-        type=Turns(),
+        type=TURNS,
         default=TURNS_DEG,
         show_default=False,
         help="Rotate each map by these angles, degrees.  [default: -20:20:2]",

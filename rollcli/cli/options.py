@@ -5,7 +5,7 @@ from typing import Any, get_args
 import click
 
 from rollcli.cli.command import Declaration, Needs, option, record
-from rollcli.cli.types import Choice, FilePath, Number, NumberOrNan, Point, Polygon, Roi, Span
+from rollcli.cli.types import ANY_NUMBER, POINT, POLYGON, ROI, WIDE_SPAN, Choice, FilePath, Number
 from rollcli.estimator.request import AREAS, MAX_ROLL_LIMIT_DEG, METHODS, MODELS, ROADS
 from rollcli.rig.calibration import CalibrationOptions
 from rollcli.run.image_kinds import KINDS
@@ -300,7 +300,7 @@ encoding_options = record(
     ),
     option(
         "--invalid",
-        type=NumberOrNan(),
+        type=ANY_NUMBER,
         multiple=True,
         help="A further stored value that means no data (always: nan, inf, <= 0). Repeatable.",
     ),
@@ -317,8 +317,8 @@ region_options = record(
         metavar="PATH",
         help="Use only non-zero pixels: one mask for all, or a folder with one of the same stem each.",
     ),
-    option("--roi", type=Roi(), help="Use only this rectangle, pixels; X1 and Y1 are the first left out."),
-    option("--polygon", type=Polygon(), help="Use only the inside of these corners, pixels."),
+    option("--roi", type=ROI, help="Use only this rectangle, pixels; X1 and Y1 are the first left out."),
+    option("--polygon", type=POLYGON, help="Use only the inside of these corners, pixels."),
 )
 
 method_options = record(
@@ -403,7 +403,7 @@ def heights_range_option(preview: str) -> Declaration:
     return option(
         "--heights-range",
         section="Output",
-        type=Span(wide=True),
+        type=WIDE_SPAN,
         default=HEIGHTS_RANGE,
         show_default=False,
         only_with=[has_preview],
@@ -502,7 +502,7 @@ calibration_options = record(
     ),
     option(
         "--principal-point",
-        type=Point(),
+        type=POINT,
         help="Optical axis in the left view, from the centre of the top-left pixel.  [default: the file's]",
     ),
     option(

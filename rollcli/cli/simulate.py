@@ -1,6 +1,5 @@
 """`rollcli simulate`: render stereo pairs whose roll is known."""
 
-import re
 from dataclasses import replace
 from typing import Any
 
@@ -10,7 +9,7 @@ from rollcli.cli.command import command, option, record
 from rollcli.cli.config import config_option
 from rollcli.cli.estimate import one_start, resume_command
 from rollcli.cli.options import PATH, running_options
-from rollcli.cli.types import Choice, Number, ParamType, Point, Span
+from rollcli.cli.types import IMAGE_SIZE, POINT, SPAN, Choice, Number
 from rollcli.run.options import RunningOptions
 from rollcli.simulate.options import (
     BASELINE,
@@ -33,25 +32,6 @@ from rollcli.simulate.options import (
 )
 
 
-class Size(ParamType):
-    """WxH in whole pixels."""
-
-    name = "WxH"
-
-    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
-        return self.name  # click would turn it into capitals
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[int, int]:
-        if isinstance(value, tuple):
-            return value  # the default
-        found = re.fullmatch(r"(\d{1,6})[xX×](\d{1,6})", str(value))
-        if found is None:
-            self.fail(f"{value!r} is not WxH in whole pixels, such as 640x480", param, ctx)
-        return int(found[1]), int(found[2])
-
-
 def _options(*, roll: tuple[float, float], pitch: tuple[float, float], **values: Any) -> SimulateOptions:
     return SimulateOptions(roll_deg=roll, pitch_deg=pitch, **values)
 
@@ -71,7 +51,7 @@ simulate_options = record(
     ),
     option(
         "--roll",
-        type=Span(),
+        type=SPAN,
         default=ROLL_DEG,
         show_default=False,
         help="Roll of the rig against the road, degrees, drawn evenly from A to B; positive: its right "
@@ -80,7 +60,7 @@ simulate_options = record(
     ),
     option(
         "--pitch",
-        type=Span(),
+        type=SPAN,
         default=PITCH_DEG,
         show_default=False,
         help="Pitch of the rig against the road, degrees, drawn evenly from A to B; positive: it looks "
@@ -89,13 +69,13 @@ simulate_options = record(
     ),
     option(
         "--curvature",
-        type=Span(),
+        type=SPAN,
         help="Curvature along the road, 1/m, drawn evenly from A to B; positive: a sag; negative: a crest.  "
         "[default: half of the frames flat, half within +-0.001; bare is flat]",
     ),
     option(
         "--bend",
-        type=Span(),
+        type=SPAN,
         help="Horizontal curvature of the road, 1/m, drawn evenly from A to B; positive: to the right; 0: a "
         "straight road.  [default: half of the roads straight, half within +-0.004; bare is straight]",
     ),
@@ -109,13 +89,13 @@ simulate_options = record(
     ),
     option(
         "--crossfall",
-        type=Span(),
+        type=SPAN,
         help="Slope of a cross section that is not flat, per cent, drawn evenly from A to B; of a crown or "
         f"dish at its edges.  [default: {CROSSFALL[0]:g}:{CROSSFALL[1]:g}]",
     ),
     option(
         "--gutter",
-        type=Span(),
+        type=SPAN,
         default=(0.0, 0.0),
         show_default=False,
         help=f"How much more the outer {100 * GUTTER_WIDTH:g} cm on each side fall outward, per cent, drawn "
@@ -123,7 +103,7 @@ simulate_options = record(
     ),
     option(
         "--kerb",
-        type=Span(),
+        type=SPAN,
         help="Height of kerbs and pavements (open, street) above the road's edge, metres, drawn evenly from "
         f"A to B.  [default: {KERB[0]:g}:{KERB[1]:g}]",
     ),
@@ -142,7 +122,7 @@ simulate_options = record(
     ),
     option(
         "--size",
-        type=Size(),
+        type=IMAGE_SIZE,
         default=SIZE,
         show_default=False,
         help=f"Size of the images, pixels.  [default: {SIZE[0]}x{SIZE[1]}]",
@@ -154,13 +134,13 @@ simulate_options = record(
     ),
     option(
         "--principal-point",
-        type=Point(),
+        type=POINT,
         help="Column and row of the principal point, pixels from the centre of the top-left pixel.  "
         "[default: the image's centre]",
     ),
     option(
         "--principal-offset",
-        type=Span(),
+        type=SPAN,
         default=(0.0, 0.0),
         show_default=False,
         help="Offset of the principal point in each direction, pixels, drawn evenly from A to B.  "
@@ -174,7 +154,7 @@ simulate_options = record(
     ),
     option(
         "--height",
-        type=Span(),
+        type=SPAN,
         default=(HEIGHT, HEIGHT),
         show_default=False,
         help="Height of the left camera above the road, metres, drawn evenly from A to B.  "

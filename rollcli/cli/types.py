@@ -2,6 +2,7 @@
 
 import math
 import re
+from collections.abc import Callable
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
@@ -122,107 +123,113 @@ class Number(ParamType):
         )
 
 
-class Span(ParamType):
-    """A:B, from the lowest to the highest; one number stands for both, unless they must differ."""
+class Parsed(ParamType):
+    """What a function makes of a text, or of a value of TOML; its ValueError or TypeError refuses the value.
 
-    name = "A:B"
+    Parameters
+    ----------
+    metavar : str
+        The placeholder in the help.
+    parse : callable
+    what : str
+        What is accepted, in words.
+    """
 
-    def __init__(self, *, wide: bool = False) -> None:
-        self.wide = wide
+    def __init__(self, metavar: str, parse: Callable[[Any], Any], what: str) -> None:
+        self.name, self.parse, self.what = metavar, parse, what
 
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[float, float]:
-        if isinstance(value, tuple):
-            return value  # the default
+    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
+        return self.name  # click would turn it into capitals
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         try:
-            ends = [float(end) for end in str(value).split(":")]
-        except ValueError:
-            ends = []
-        if self.wide and (len(ends) != 2 or not ends[0] < ends[1] or not all(map(math.isfinite, ends))):
-            self.fail(f"{value!r} is not A:B with A < B, such as -0.1:0.1", param, ctx)
-        if len(ends) not in (1, 2) or not all(map(math.isfinite, ends)) or ends[0] > ends[-1]:
-            self.fail(f"{value!r} is not A:B with A <= B, such as -5:5, nor a single number", param, ctx)
-        return ends[0], ends[-1]
-
-
-class NumberOrNan(ParamType):
-    """Any number that a pixel may hold: also nan and inf."""
-
-    name = "VALUE"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        try:
-            number = None if isinstance(value, bool) else float(value)
+            return self.parse(value)
         except (TypeError, ValueError):
-            number = None
-        return self.fail(f"{value!r} is not a number", param, ctx) if number is None else number
+            self.fail(f"{value!r} is not {self.what}", param, ctx)
 
 
-class Roi(ParamType):
-    """Four whole numbers with X0 < X1 and Y0 < Y1."""
-
-    name = "X0,Y0,X1,Y1"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[int, int, int, int]:
-        text = ",".join(map(str, value)) if isinstance(value, (list, tuple)) else str(value)
-        found = re.fullmatch(r"\s*(\d{1,9})\s*,\s*(\d{1,9})\s*,\s*(\d{1,9})\s*,\s*(\d{1,9})\s*", text)
-        x0, y0, x1, y1 = (int(number) for number in found.groups()) if found else (0, 0, 0, 0)
-        if not (x0 < x1 and y0 < y1):
-            self.fail(f"{text!r} is not X0,Y0,X1,Y1 in whole pixels with X0 < X1 and Y0 < Y1", param, ctx)
-        return x0, y0, x1, y1
+def _require(holds: bool) -> None:
+    if not holds:
+        raise ValueError
 
 
-class Point(ParamType):
-    """A column and a row, which need not be whole."""
-
-    name = "CX,CY"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[float, float]:
-        text = ",".join(map(str, value)) if isinstance(value, (list, tuple)) else str(value)
-        try:
-            numbers = [float(part) for part in text.split(",")]
-        except ValueError:
-            numbers = []
-        if len(numbers) != 2 or not all(map(math.isfinite, numbers)):
-            self.fail(f"{text!r} is not CX,CY in pixels, such as 609.6,172.9", param, ctx)
-        return numbers[0], numbers[1]
+def _parts(value: Any, separators: str) -> list[Any]:
+    return list(value) if isinstance(value, list | tuple) else re.split(f"[{separators}]", str(value))
 
 
-class Polygon(ParamType):
-    """Three or more corners."""
-
-    name = "'x,y x,y x,y …'"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[tuple[float, float], ...]:
-        corners = value.split() if isinstance(value, str) else value
-        try:
-            points = [tuple(map(float, c.split(",") if isinstance(c, str) else c)) for c in corners]
-        except (TypeError, ValueError):
-            points = []
-        if len(points) < 3 or not all(len(p) == 2 and all(map(math.isfinite, p)) for p in points):
-            self.fail(f"{value!r} is not three or more corners such as '0,375 600,180 1242,375'", param, ctx)
-        return tuple((p[0], p[1]) for p in points)
+def _numbers(value: Any, separator: str) -> tuple[float, ...]:
+    numbers = tuple(map(float, _parts(value, separator)))
+    _require(all(map(math.isfinite, numbers)))
+    return numbers
 
 
-class Shard(ParamType):
-    """I/N with 1 <= I <= N."""
+def _whole_numbers(value: Any, separators: str) -> tuple[int, ...]:
+    """Split at one of the characters; all of the numbers have at most nine digits, and no sign."""
+    numbers = tuple(int(str(part)) for part in _parts(value, separators))
+    _require(all(0 <= number < 10**9 for number in numbers))
+    return numbers
 
-    name = "I/N"
 
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[int, int]:
-        if isinstance(value, tuple):
-            return value  # the default
-        found = re.fullmatch(r"(\d{1,9})/(\d{1,9})", str(value))
-        part, parts = (int(found[1]), int(found[2])) if found else (0, 0)
-        if not 1 <= part <= parts:
-            self.fail(f"{value!r} is not I/N with I from 1 to N, such as 2/8", param, ctx)
-        return part, parts
+def _span(value: Any) -> tuple[float, float]:
+    ends = _numbers(value, ":")
+    _require(len(ends) < 3 and ends[0] <= ends[-1])
+    return ends[0], ends[-1]
+
+
+def _wide_span(value: Any) -> tuple[float, float]:
+    first, last = _numbers(value, ":")
+    _require(first < last)
+    return first, last
+
+
+def _any_number(value: Any) -> float:
+    _require(not isinstance(value, bool))
+    return float(value)
+
+
+def _roi(value: Any) -> tuple[int, int, int, int]:
+    x0, y0, x1, y1 = _whole_numbers(value, ",")
+    _require(x0 < x1 and y0 < y1)
+    return x0, y0, x1, y1
+
+
+def _point(value: Any) -> tuple[float, float]:
+    u, v = _numbers(value, ",")
+    return u, v
+
+
+def _polygon(value: Any) -> tuple[tuple[float, float], ...]:
+    corners = tuple(map(_point, value.split() if isinstance(value, str) else value))
+    _require(len(corners) >= 3)
+    return corners
+
+
+def _shard(value: Any) -> tuple[int, int]:
+    part, parts = _whole_numbers(value, "/")
+    _require(1 <= part <= parts)
+    return part, parts
+
+
+def _turns(value: Any) -> tuple[float, float, float]:
+    first, last, step = _numbers(value, ":")
+    _require(-90 <= first <= last <= 90 and step > 0 and last - first <= 1000 * step)
+    return first, last, step
+
+
+def _size(value: Any) -> tuple[int, int]:
+    width, height = _whole_numbers(value, "xX×")
+    _require(max(width, height) < 10**6)
+    return width, height
+
+
+SPAN = Parsed("A:B", _span, "A:B with A <= B, such as -5:5, nor a single number")
+WIDE_SPAN = Parsed("A:B", _wide_span, "A:B with A < B, such as -0.1:0.1")
+ANY_NUMBER = Parsed("VALUE", _any_number, "a number")  # that a pixel may hold: also nan and inf
+ROI = Parsed("X0,Y0,X1,Y1", _roi, "X0,Y0,X1,Y1 in whole pixels with X0 < X1 and Y0 < Y1")
+POINT = Parsed("CX,CY", _point, "CX,CY in pixels, such as 609.6,172.9")
+POLYGON = Parsed("'X,Y X,Y X,Y …'", _polygon, "three or more corners such as '0,375 600,180 1242,375'")
+SHARD = Parsed("I/N", _shard, "I/N with I from 1 to N, such as 2/8")
+TURNS = Parsed(
+    "A:B:STEP", _turns, "A:B:STEP in degrees with -90 <= A <= B <= 90, such as -20:20:2"
+)  # at most 1000 angles
+IMAGE_SIZE = Parsed("WxH", _size, "WxH in whole pixels, such as 640x480")
