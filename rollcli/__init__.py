@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from rollcli.rig.drive.assess import RigAssessment as RigAssessment
     from rollcli.rig.drive.assess import assess_rig as assess_rig
     from rollcli.run.calibration import read_calibration as read_calibration
-    from rollcli.run.estimate_map import estimate_roll as estimate_roll
-    from rollcli.run.estimate_pair import estimate_pair as estimate_pair
+    from rollcli.run.library import estimate_pair as estimate_pair
+    from rollcli.run.library import estimate_roll as estimate_roll
     from rollcli.stereo.match import compute_disparity as compute_disparity
     from rollcli.stereo.options import StereoOptions as StereoOptions
 
@@ -45,8 +45,8 @@ _HOMES = {
     "assess_rig": "rollcli.rig.drive.assess",
     "compute_disparity": "rollcli.stereo.match",
     "derotate": "rollcli.pictures.derotate",
-    "estimate_pair": "rollcli.run.estimate_pair",
-    "estimate_roll": "rollcli.run.estimate_map",
+    "estimate_pair": "rollcli.run.library",
+    "estimate_roll": "rollcli.run.library",
     "height_map": "rollcli.pictures.heights",
     "open_recording": "rollcli.files.recordings.open",
     "read_calibration": "rollcli.run.calibration",

@@ -1,5 +1,6 @@
 """Commands whose help is in sections, and how their options are declared."""
 
+import dataclasses
 import functools
 import os
 from collections.abc import Callable, Mapping, Sequence
@@ -55,6 +56,7 @@ class Option(click.Option):
     ) -> None:
         super().__init__(*args, **attributes)
         self.section, self.without_word, self.only_with = section, without_word, only_with
+        self.has_own_default = "default" in attributes
 
     def completed(self, args: list[str]) -> list[str]:
         """Add the value to those words of the command line that name the option alone."""
@@ -165,8 +167,11 @@ def record(
     make: Callable[..., Any],
     *declarations: Declaration,
     only_with: Sequence[Needs] = (),
+    fields: Any = None,
 ) -> Declaration:
     """Declare a section of options that the command receives as one record.
+
+    An option that declares no default has that of the record's field, whose name may add the unit: `_deg`.
 
     Parameters
     ----------
@@ -175,26 +180,44 @@ def record(
     title : str
         The heading in the help.
     make : callable
-        Makes the record of the values, which it takes by the options' names.
+        Makes the record of the values, which it takes by the names of the fields.
     *declarations
         What `option` and `click.argument` return.
     only_with : sequence of Needs
         See `Option`.
+    fields : class, optional
+        Whose fields have the defaults; by default `make`.
     """
+    options, defaults = section(title, *declarations, only_with=only_with), _defaults(fields or make)
 
-    options = section(title, *declarations, only_with=only_with)
+    def field_of(option: str) -> str:
+        return f"{option}_deg" if f"{option}_deg" in defaults else option
 
     def declare(function: Callable[..., Any]) -> Callable[..., Any]:
-        names = [str(param.name) for param in _declare(function, [options])]
+        params = _declare(function, [options])
+        for param in params:
+            default = defaults.get(field_of(str(param.name)))
+            own = not isinstance(param, Option) or param.has_own_default
+            if not own and not (default is None or default is False or default == ()):
+                param.default = default
 
         @functools.wraps(function)  # its parameters, too
         def gathered(**values: Any) -> Any:
-            values[name] = make(**{each: values.pop(each) for each in names})
+            names = [str(param.name) for param in params]
+            values[name] = make(**{field_of(each): values.pop(each) for each in names})
             return function(**values)
 
         return gathered
 
     return declare
+
+
+def _defaults(record: Any) -> dict[str, Any]:
+    """Return the defaults of the fields of a named tuple or a dataclass; None where there is none."""
+    if dataclasses.is_dataclass(record):
+        known = {field.name: field.default for field in dataclasses.fields(record)}
+        return {name: None if value is dataclasses.MISSING else value for name, value in known.items()}
+    return dict(getattr(record, "_field_defaults", {}))
 
 
 def _declare(function: Callable[..., Any], declarations: Sequence[Declaration]) -> list[click.Parameter]:

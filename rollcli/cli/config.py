@@ -12,7 +12,7 @@ from typing import Any
 import click
 
 from rollcli.cli.command import option
-from rollcli.cli.types import FilePath
+from rollcli.cli.types import FILE
 from rollcli.errors import InputError
 from rollcli.files.bounded import MOST_SETTINGS, as_utf8, read_given
 
@@ -121,8 +121,7 @@ def _key(declared: click.Option) -> str:
 
 config_option = option(
     "--config",
-    type=FilePath(),
-    metavar="FILE",
+    type=FILE,
     is_eager=True,
     expose_value=False,
     callback=_use,

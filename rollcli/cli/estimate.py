@@ -108,8 +108,6 @@ result_options = record(
             (".csv", ".jsonl", ".ndjson", ".parquet"),
             "CSV (.csv), JSON Lines (.jsonl) or Parquet (.parquet)",
         ),
-        metavar="FILE",
-        default="-",
         help="Where the rows go (-: stdout).",
     ),
     option(
@@ -120,7 +118,6 @@ result_options = record(
     option(
         "--part-rows",
         type=Number("N", at_least=1, whole=True),
-        default=ResultOptions().part_rows,
         only_with=[Needs(_has_parts, "only Parquet and results in an object store have parts")],
         help="Rows of each part, of Parquet and of results in an object store.",
     ),
@@ -140,14 +137,12 @@ result_options = record(
     option(
         "--shard",
         type=SHARD,
-        default=(1, 1),
         show_default=False,
         help="Take every N-th frame from the I-th.  [default: 1/1]",
     ),
     option(
         "--shard-by",
         type=Choice("every", "range"),
-        default="every",
         only_with=[Needs(lambda ctx: ctx.params["shard"] != (1, 1), "there is one shard")],
         help="every: --shard takes every N-th frame; range: the I-th of N runs of consecutive frames.",
     ),

@@ -6,9 +6,9 @@ import click
 
 from rollcli.cli.command import command, option, record
 from rollcli.cli.config import config_option
-from rollcli.cli.options import PATH, encoding_options, input_options, region_options, running_options
-from rollcli.cli.types import TABLE_FILE, TABLE_FORMATS, TURNS, Choice, Number, table_format
-from rollcli.evaluate.options import TIMED, TURNS_DEG, ExperimentOptions, PaperOptions
+from rollcli.cli.options import encoding_options, input_options, region_options, running_options
+from rollcli.cli.types import DIR, FILE, PATH, TABLE_FILE, TABLE_FORMATS, TURNS, Choice, Number, table_format
+from rollcli.evaluate.options import ExperimentOptions, PaperOptions
 from rollcli.run.options import RunningOptions
 
 
@@ -24,16 +24,14 @@ from rollcli.run.options import RunningOptions
 @click.argument("result", type=PATH)
 @option(
     "--truth",
-    type=PATH,
-    metavar="FILE",
+    type=FILE,
     required=True,
     section="Figures",
     help="The known angles: CSV with the columns file and roll_deg, degrees.",
 )
 @option(
     "--heights",
-    type=PATH,
-    metavar="DIR",
+    type=DIR,
     section="Figures",
     help="Heights over the road that estimate wrote, compared with heights/ beside the known angles at 5, 10 "
     "and 20 m.  [default: where the run of RESULT wrote them, if both exist]",
@@ -42,7 +40,6 @@ from rollcli.run.options import RunningOptions
     "-o",
     "--output",
     type=TABLE_FILE,
-    metavar="FILE",
     default="-",
     section="Figures",
     help="Where the figures go (-: stdout).",
@@ -82,26 +79,21 @@ experiment_options = record(
     "experiments",
     "Experiments",
     ExperimentOptions,
-    option(
-        "-o", "--output", type=PATH, metavar="DIR", required=True, help="Where paper.html and its CSVs go."
-    ),
+    option("-o", "--output", type=DIR, required=True, help="Where paper.html and its CSVs go."),
     option(
         "--turns",
         type=TURNS,
-        default=TURNS_DEG,
         show_default=False,
         help="Rotate each map by these angles, degrees.  [default: -20:20:2]",
     ),
     option(
         "--timed",
         type=Number("N", at_least=1, whole=True),
-        default=TIMED,
         help="Take the run times on the first N maps; the paper's n x 3 form is slow.",
     ),
     option(
         "--truth",
-        type=PATH,
-        metavar="FILE",
+        type=FILE,
         help="Known angles of the maps: CSV with file and roll_deg.  [default: each map's own estimate]",
     ),
     option(

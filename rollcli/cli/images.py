@@ -7,7 +7,6 @@ import click
 from rollcli.cli.command import command, option, section
 from rollcli.cli.config import config_option
 from rollcli.cli.options import (
-    PATH,
     calibration_options,
     cluster_options,
     encoding_options,
@@ -20,7 +19,7 @@ from rollcli.cli.options import (
     stereo_options,
     topic_options,
 )
-from rollcli.cli.types import Choice, Number
+from rollcli.cli.types import DIR, RESULT, Choice, Number
 from rollcli.run.options import (
     ConvertOptions,
     DerotateOptions,
@@ -45,8 +44,7 @@ rotation_options = section(
     ),
     option(
         "--from",
-        type=PATH,
-        metavar="RESULT",
+        type=RESULT,
         help="The angle of each map, from what `rollcli estimate` wrote; matched by stem.",
     ),
     option("--skip-suspect", is_flag=True, help="With --from, leave out the maps whose angle is suspect."),
@@ -105,8 +103,7 @@ def derotate(ctx: click.Context, /, **options: Any) -> None:
 @save_as_option
 @option(
     "--preview",
-    type=PATH,
-    metavar="DIR",
+    type=DIR,
     section="Output",
     help="Also write each map as a picture to look at, in colour with a scale in pixels, PNG.",
 )
@@ -151,8 +148,7 @@ count_options = section(
     ),
     option(
         "--from",
-        type=PATH,
-        metavar="RESULT",
+        type=RESULT,
         help="The angles and curves of --figure, from what `rollcli estimate` wrote; matched by stem.  "
         "[default: estimate them]",
     ),
@@ -204,8 +200,7 @@ def vdisparity(ctx: click.Context, /, **options: Any) -> None:
 @input_options
 @option(
     "--from",
-    type=PATH,
-    metavar="RESULT",
+    type=RESULT,
     required=True,
     section="Road",
     help="The road of each map, from what `rollcli estimate` wrote; matched by stem.",
@@ -214,8 +209,7 @@ def vdisparity(ctx: click.Context, /, **options: Any) -> None:
 @output_folder_option
 @option(
     "--preview",
-    type=PATH,
-    metavar="DIR",
+    type=DIR,
     section="Output",
     help="Also write pictures of the heights, PNG, every frame in the same colours.",
 )

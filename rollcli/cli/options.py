@@ -5,12 +5,12 @@ from typing import Any, get_args
 import click
 
 from rollcli.cli.command import Declaration, Needs, option, record
-from rollcli.cli.types import ANY_NUMBER, POINT, POLYGON, ROI, WIDE_SPAN, Choice, FilePath, Number
+from rollcli.cli.types import ANY_NUMBER, DIR, FILE, PATH, POINT, POLYGON, ROI, WIDE_SPAN, Choice, Number
 from rollcli.estimator.request import AREAS, MAX_ROLL_LIMIT_DEG, METHODS, MODELS, ROADS
 from rollcli.rig.calibration import CalibrationOptions
-from rollcli.run.image_kinds import KINDS
 from rollcli.run.options import (
     HEIGHTS_RANGE,
+    KINDS,
     EncodingOptions,
     ImageOptions,
     InputOptions,
@@ -22,9 +22,6 @@ from rollcli.run.options import (
     TopicOptions,
 )
 from rollcli.stereo.options import MODES, StereoOptions
-
-_METHOD = MethodOptions()
-PATH = FilePath()  # whether it exists, its reader says: in the same words wherever the name came from
 
 
 def _has_pairs(ctx: click.Context) -> bool:
@@ -81,11 +78,6 @@ def _stereo(
     return StereoOptions(num_disparities=searched, mode=sgbm_mode, vertical_offset=offset, **values)
 
 
-def _method(**values: Any) -> MethodOptions:
-    angles = {f"{name}_deg": values.pop(name) for name in ("tolerance", "max_roll", "max_interval")}
-    return MethodOptions(**angles, **values)
-
-
 _folders = (
     option(
         "--recursive",
@@ -110,7 +102,6 @@ _folders = (
     option(
         "--every",
         type=Number("N", at_least=1, whole=True),
-        default=InputOptions().every,
         help="Take every N-th frame of what is found.",
     ),
 )
@@ -119,8 +110,7 @@ _named = (
     click.argument("inputs", nargs=-1, type=PATH),
     option(
         "--files-from",
-        type=PATH,
-        metavar="FILE",
+        type=FILE,
         help="Read further inputs from FILE, one a line (-: stdin).",
     ),
 )
@@ -153,14 +143,12 @@ pair_options = record(
     option(
         "--left",
         type=PATH,
-        metavar="PATH",
         help="Left images: a file, folder, quoted pattern, or a video.",
     ),
-    option("--right", type=PATH, metavar="PATH", help="Right images, or a video of as many frames."),
+    option("--right", type=PATH, help="Right images, or a video of as many frames."),
     option(
         "--match",
         type=Choice("name", "order"),
-        default="name",
         only_with=[_PAIRS],
         help="By name (the same but for left/right, l/r, L1/R1, image_2/image_3, im0/im1 …), or by order.",
     ),
@@ -182,7 +170,6 @@ topic_options = record(
     option(
         "--sync-tolerance",
         type=Number("MS", at_least=0),
-        default=TopicOptions().sync_tolerance,
         help="How far apart the header stamps of a pair may be, milliseconds.",
     ),
 )
@@ -200,13 +187,11 @@ stereo_options = record(
     option(
         "--min-disparity",
         type=Number("PX", whole=True),
-        default=StereoOptions.min_disparity,
         help="Smallest disparity searched, pixels.",
     ),
     option(
         "--block-size",
         type=Number("PX", at_least=1, whole=True),
-        default=StereoOptions.block_size,
         help="Side of the matched block, pixels, odd.",
     ),
     option(
@@ -218,33 +203,28 @@ stereo_options = record(
     option(
         "--uniqueness",
         type=Number("PERCENT", at_least=0, at_most=100, whole=True),
-        default=StereoOptions.uniqueness,
         help="Margin by which the best match must win, percent.",
     ),
     option(
         "--speckle-size",
         type=Number("PX", at_least=0, whole=True),
-        default=StereoOptions.speckle_size,
         help="Drop patches of up to this many pixels; 0: keep all.",
     ),
     option(
         "--speckle-range",
         type=Number("PX", at_least=0, whole=True),
-        default=StereoOptions.speckle_range,
         only_with=[Needs(lambda ctx: ctx.params["speckle_size"] != 0, "--speckle-size 0 keeps every patch")],
         help="Disparity step within a patch, pixels.",
     ),
     option(
         "--downscale",
         type=Number("F", at_least=1),
-        default=StereoOptions.downscale,
         help="Match at 1/F of the size; maps and pixel columns then refer to that size.",
     ),
     option(
         "--align",
         type=PATH,
         metavar="auto|off|FILE",
-        default=StereoOptions.align,
         only_with=[
             Needs(
                 lambda ctx: ctx.params["vertical_offset"] == "auto",
@@ -263,6 +243,7 @@ stereo_options = record(
         "auto: as --align says.",
     ),
     only_with=[_PAIRS],
+    fields=StereoOptions,
 )
 
 encoding_options = record(
@@ -272,7 +253,6 @@ encoding_options = record(
     option(
         "--encoding",
         type=Choice("auto", "px", "kitti", "cityscapes", "sgbm", "depth", "foundationstereo"),
-        default="auto",
         only_with=[
             Needs(  # there a stored 1 is no data
                 lambda ctx: (
@@ -314,7 +294,6 @@ region_options = record(
     option(
         "--mask",
         type=PATH,
-        metavar="PATH",
         help="Use only non-zero pixels: one mask for all, or a folder with one of the same stem each.",
     ),
     option("--roi", type=ROI, help="Use only this rectangle, pixels; X1 and Y1 are the first left out."),
@@ -324,17 +303,15 @@ region_options = record(
 method_options = record(
     "method",
     "Method",
-    _method,
+    MethodOptions,
     option(
         "--method",
         type=Choice(*METHODS),
-        default=_METHOD.method,
         help="; ".join(f"{name}: {method.summary}" for name, method in METHODS.items()) + ".",
     ),
     option(
         "--model",
         type=Choice(*MODELS),
-        default=_METHOD.model,
         only_with=[
             Needs(
                 lambda ctx: ctx.params["road"] != "all" or ctx.params["method"] not in AREAS,
@@ -346,20 +323,17 @@ method_options = record(
     option(
         "--road",
         type=Choice(*ROADS),
-        default=_METHOD.road,
         help="auto: find the road first; all: use every valid pixel, as the paper does.",
     ),
     option(
         "--lambda0",
         type=Number("FLOAT", above=0, auto=True),
-        default=_METHOD.lambda0,
         only_with=[Needs(lambda ctx: ctx.params["method"] == "gd", "only --method gd has a learning rate")],
         help="First learning rate of gd, rad^2 per unit of energy; auto: 1 / curvature of the energy.",
     ),
     option(
         "--tolerance",
         type=Number("DEG", above=0, at_most=90),
-        default=_METHOD.tolerance_deg,
         only_with=[
             Needs(
                 lambda ctx: ctx.params["method"] not in AREAS,
@@ -371,7 +345,6 @@ method_options = record(
     option(
         "--max-roll",
         type=Number("DEG", above=0, at_most=MAX_ROLL_LIMIT_DEG),
-        default=_METHOD.max_roll_deg,
         only_with=[
             Needs(  # areas chooses among its planes by their roll
                 lambda ctx: ctx.params["road"] != "all" or ctx.params["method"] == "areas",
@@ -383,14 +356,12 @@ method_options = record(
     option(
         "--max-interval",
         type=Number("DEG", above=0, at_most=90),
-        default=_METHOD.max_interval_deg,
         help="An angle is suspect when the half-width of its 95 % interval is above this, or when noise and "
         "unevenness alone make 0.45 of this, degrees.",
     ),
     option(
         "--seed",
         type=Number("INT", at_least=0, whole=True),
-        default=_METHOD.seed,
         only_with=[Needs(lambda ctx: ctx.params["road"] != "all", "--road all draws no samples")],
         help="Seed of road finding's samples.",
     ),
@@ -438,8 +409,7 @@ save_as_option = option(
 output_folder_option = option(
     "-o",
     "--output",
-    type=PATH,
-    metavar="DIR",
+    type=DIR,
     required=True,
     section="Output",
     help="Where the files go, named after their input; folders below the named ones are kept.",
@@ -449,7 +419,7 @@ image_options = record(
     "images",
     "Images to write, named after their input",
     ImageOptions,
-    *(option(f"--{kind.name.replace('_', '-')}", type=PATH, metavar="DIR", help=kind.help) for kind in KINDS),
+    *(option(f"--{kind.name.replace('_', '-')}", type=DIR, help=kind.help) for kind in KINDS),
     heights_range_option("heights-preview"),
     save_as_option,
 )

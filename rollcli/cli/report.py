@@ -6,8 +6,8 @@ import click
 
 from rollcli.cli.command import command, option
 from rollcli.cli.config import config_option
-from rollcli.cli.options import PATH, running_options
-from rollcli.cli.types import Number, OutputFile
+from rollcli.cli.options import running_options
+from rollcli.cli.types import DIR, PATH, Number, OutputFile
 from rollcli.errors import ExitStatus
 from rollcli.report.options import GALLERY, ReportOptions
 
@@ -43,8 +43,7 @@ from rollcli.report.options import GALLERY, ReportOptions
 @option("--title", metavar="TEXT", section="Page", help="Its heading.  [default: Roll of N frames]")
 @option(
     "--images",
-    type=PATH,
-    metavar="DIR",
+    type=DIR,
     section="Page",
     help="A folder that estimate wrote images to, or the folder above: show these.  [default: make them "
     "from the inputs]",
@@ -65,16 +64,13 @@ from rollcli.report.options import GALLERY, ReportOptions
 )
 @option(
     "--svg",
-    type=PATH,
-    metavar="DIR",
+    type=DIR,
     section="Charts for slides",
     help="Write each chart of the page as an SVG: roll, histogram, and where there are any, pitch, height "
     "and how the right view lies.",
 )
-@option("--pdf", type=PATH, metavar="DIR", section="Charts for slides", help="The same as PDFs.")
-@option(
-    "--png", type=PATH, metavar="DIR", section="Charts for slides", help="The same as PNGs, 1920 pixels wide."
-)
+@option("--pdf", type=DIR, section="Charts for slides", help="The same as PDFs.")
+@option("--png", type=DIR, section="Charts for slides", help="The same as PNGs, 1920 pixels wide.")
 @running_options
 @config_option
 @click.pass_context

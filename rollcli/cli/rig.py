@@ -6,10 +6,10 @@ import click
 
 from rollcli.cli.command import command, option, record
 from rollcli.cli.config import config_option
-from rollcli.cli.options import PATH, calibration_options, running_options
-from rollcli.cli.types import TABLE_FILE, TABLE_FORMATS, Choice, Number, table_format
+from rollcli.cli.options import calibration_options, running_options
+from rollcli.cli.types import FILE, PATH, TABLE_FILE, TABLE_FORMATS, Choice, Number, table_format
 from rollcli.errors import ExitStatus
-from rollcli.run.rig_options import GateOptions, RigOptions
+from rollcli.run.options import GateOptions, RigOptions
 
 gate_options = record(
     "gates",
@@ -64,8 +64,7 @@ gate_options = record(
 @click.argument("results", nargs=-1, required=True, type=PATH)
 @option(
     "--against",
-    type=PATH,
-    metavar="FILE",
+    type=FILE,
     section="Assessment",
     help="A later result: say how far the rig has moved until then.",
 )
@@ -82,7 +81,6 @@ gate_options = record(
     "-o",
     "--output",
     type=TABLE_FILE,
-    metavar="FILE",
     default="-",
     section="Assessment",
     help="Where it goes (-: stdout).",
@@ -96,8 +94,7 @@ gate_options = record(
 )
 @option(
     "--correction",
-    type=PATH,
-    metavar="FILE",
+    type=FILE,
     section="Assessment",
     help="Also write how the right view of the pairs has to be corrected: JSON with the numbers, a 3x3 "
     "matrix and the OpenCV call, for `estimate --align FILE`. Up to 24 of the pairs are matched again, to "

@@ -1,28 +1,24 @@
 """`rollcli simulate`: render stereo pairs whose roll is known."""
 
 from dataclasses import replace
-from typing import Any
 
 import click
 
 from rollcli.cli.command import command, option, record
 from rollcli.cli.config import config_option
 from rollcli.cli.estimate import one_start, resume_command
-from rollcli.cli.options import PATH, running_options
-from rollcli.cli.types import IMAGE_SIZE, POINT, SPAN, Choice, Number
+from rollcli.cli.options import running_options
+from rollcli.cli.types import DIR, IMAGE_SIZE, POINT, SPAN, Choice, Number
 from rollcli.run.options import RunningOptions
 from rollcli.simulate.options import (
-    BASELINE,
     CROSS_SECTIONS,
     CROSSFALL,
     FOCAL_PER_WIDTH,
-    FRAMES,
     GUTTER_WIDTH,
     HEIGHT,
     KERB,
     MAX_DIPS,
     MIXED,
-    NOISE,
     PITCH_DEG,
     ROLL_DEG,
     ROUGHNESS,
@@ -31,20 +27,14 @@ from rollcli.simulate.options import (
     SimulateOptions,
 )
 
-
-def _options(*, roll: tuple[float, float], pitch: tuple[float, float], **values: Any) -> SimulateOptions:
-    return SimulateOptions(roll_deg=roll, pitch_deg=pitch, **values)
-
-
 simulate_options = record(
     "options",
     "What to render",
-    _options,
-    option("--frames", type=Number("N", at_least=1, whole=True), default=FRAMES, help="Number of pairs."),
+    SimulateOptions,
+    option("--frames", type=Number("N", at_least=1, whole=True), help="Number of pairs."),
     option(
         "--scene",
         type=Choice(*SCENES, MIXED),
-        default=MIXED,
         help="bare: a road alone; open: with kerbs and cars; street: with house fronts too; verge: between "
         "grass slopes; "
         "mixed: each frame one of these.",
@@ -52,7 +42,6 @@ simulate_options = record(
     option(
         "--roll",
         type=SPAN,
-        default=ROLL_DEG,
         show_default=False,
         help="Roll of the rig against the road, degrees, drawn evenly from A to B; positive: its right "
         "end is up.  "
@@ -61,7 +50,6 @@ simulate_options = record(
     option(
         "--pitch",
         type=SPAN,
-        default=PITCH_DEG,
         show_default=False,
         help="Pitch of the rig against the road, degrees, drawn evenly from A to B; positive: it looks "
         "down.  "
@@ -82,7 +70,6 @@ simulate_options = record(
     option(
         "--cross-section",
         type=Choice(*CROSS_SECTIONS, MIXED),
-        default=CROSS_SECTIONS[0],
         help="Shape of the road across. crown, dish: a parabola, highest or lowest in the middle; roof: two "
         "planes that meet in the middle; superelevated: one plane, its outer side up in a bend; mixed: each "
         "frame one of these. Roll and pitch are against the plane tangent to the road below the left camera.",
@@ -96,7 +83,6 @@ simulate_options = record(
     option(
         "--gutter",
         type=SPAN,
-        default=(0.0, 0.0),
         show_default=False,
         help=f"How much more the outer {100 * GUTTER_WIDTH:g} cm on each side fall outward, per cent, drawn "
         "evenly from A to B.  [default: 0]",
@@ -123,7 +109,6 @@ simulate_options = record(
     option(
         "--size",
         type=IMAGE_SIZE,
-        default=SIZE,
         show_default=False,
         help=f"Size of the images, pixels.  [default: {SIZE[0]}x{SIZE[1]}]",
     ),
@@ -141,7 +126,6 @@ simulate_options = record(
     option(
         "--principal-offset",
         type=SPAN,
-        default=(0.0, 0.0),
         show_default=False,
         help="Offset of the principal point in each direction, pixels, drawn evenly from A to B.  "
         "[default: 0]",
@@ -149,13 +133,11 @@ simulate_options = record(
     option(
         "--baseline",
         type=Number("M", above=0),
-        default=BASELINE,
         help="Distance of the cameras, metres.",
     ),
     option(
         "--height",
         type=SPAN,
-        default=(HEIGHT, HEIGHT),
         show_default=False,
         help="Height of the left camera above the road, metres, drawn evenly from A to B.  "
         f"[default: {HEIGHT:g}]",
@@ -163,13 +145,11 @@ simulate_options = record(
     option(
         "--noise",
         type=Number("SIGMA", at_least=0),
-        default=NOISE,
         help="Noise of the sensor: standard deviation in grey levels of 255.",
     ),
     option(
         "--gain",
         type=Number("F", above=0),
-        default=1.0,
         help="Brightness of the right view relative to the left one.",
     ),
     option("--grey", is_flag=True, help="Write grey images.  [default: colour]"),
@@ -193,7 +173,7 @@ simulate_options = record(
         ),
     ]
 )
-@click.argument("folder", metavar="DIR", type=PATH)
+@click.argument("folder", type=DIR)
 @simulate_options
 @running_options
 @config_option

@@ -31,12 +31,26 @@ class Choice(_Choice):
 
 
 class FilePath(click.Path):
-    """The name of a file or folder; an empty one, which would mean the current folder, is refused."""
+    """The name of a file or folder; an empty one, which would mean the current folder, is refused.
+
+    `metavar` is its placeholder in the help.
+    """
+
+    def __init__(self, metavar: str | None = None) -> None:
+        super().__init__()
+        self.metavar = metavar
+
+    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str | None:
+        return self.metavar
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         if value == "":
             self.fail("the name is empty: is a variable unset?", param, ctx)
         return super().convert(value, param, ctx)
+
+
+# whether they exist, their reader says: in the same words wherever the name came from
+PATH, FILE, DIR, RESULT = FilePath(), FilePath("FILE"), FilePath("DIR"), FilePath("RESULT")
 
 
 class OutputFile(FilePath):
@@ -51,7 +65,7 @@ class OutputFile(FilePath):
     """
 
     def __init__(self, endings: tuple[str, ...], what: str) -> None:
-        super().__init__()
+        super().__init__("FILE")
         self.endings, self.what = endings, what
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:

@@ -13,8 +13,7 @@ from rollcli.evaluate.options import PaperOptions
 from rollcli.files.matching import stem_of
 from rollcli.files.results import Row
 from rollcli.run.frame import Frame, FrameResult, failed_frame
-from rollcli.run.frame_errors import FRAME_ERRORS, frame_of_error
-from rollcli.run.read import Source, read_source
+from rollcli.run.read import FRAME_ERRORS, Source, frame_of_error, read_source
 
 
 @dataclass(frozen=True)

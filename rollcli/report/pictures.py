@@ -20,9 +20,8 @@ from rollcli.pictures.heights_preview import draw_heights
 from rollcli.pictures.overlay import draw_disparity, draw_road_on_photo
 from rollcli.pictures.vdisparity import draw_v_disparity, row_offset, v_disparity
 from rollcli.report.sources import Subject
-from rollcli.run.frame_errors import FRAME_ERRORS
 from rollcli.run.options import FrameOptions
-from rollcli.run.read import Source, read_source
+from rollcli.run.read import FRAME_ERRORS, Source, read_source
 
 # small enough that a page with a dozen frames opens at once, large enough to see a stripe of noise
 _WIDEST, _MOST_BINS, _QUALITY = 1280, 320, 82

@@ -15,8 +15,7 @@ from rollcli.files.results import Row
 from rollcli.files.search import objects_behind
 from rollcli.files.stores.locations import base_name, is_remote, is_url, store_of
 from rollcli.run.frame import Frame
-from rollcli.run.image_kinds import KINDS, ImageKind
-from rollcli.run.options import ImageOptions
+from rollcli.run.options import KINDS, ImageKind, ImageOptions
 from rollcli.run.result_rows import frame_of_row
 
 JUMP, WIDEST, SUSPECT, SPREAD = "around a jump", "widest interval", "suspect", "evenly spread"

@@ -19,7 +19,6 @@ from rollcli.rig.calibration import Calibration
 from rollcli.rig.pose import horizon_row
 from rollcli.run.diagnosis import looks_like
 from rollcli.run.frame import Conversion, FrameResult
-from rollcli.run.frame_errors import guarded
 from rollcli.run.images import TOO_LARGE_FOR_PNG, encode_computed, encode_heights, encode_turned
 from rollcli.run.options import (
     ConvertOptions,
@@ -29,7 +28,7 @@ from rollcli.run.options import (
     VDisparityOptions,
 )
 from rollcli.run.outputs import write_outputs
-from rollcli.run.read import Source, read_source
+from rollcli.run.read import Source, guarded, read_source
 
 _Made = tuple[dict[str, bytes], dict[str, str]]  # files by their paths, and warnings by their codes
 

@@ -2,7 +2,7 @@
 
 import contextlib
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from itertools import islice
 from typing import Any, NamedTuple
@@ -100,10 +100,7 @@ def _run(plan: Plan, options: EstimateOptions, resume_command: str, started: lis
             progress.note(note)
         try:
             with stop_on_signals() as stop, progress:
-                run = _Run(plan, options, output, progress, stop, started)
-                _restore_images(run)
-                if not _do_again(run):
-                    _run_frames(run)
+                _run_steps(_Run(plan, options, output, progress, stop, started))
         except KeyboardInterrupt:  # the second Ctrl-C: without waiting for the frames that have begun
             progress.stopped_early = True
         except (OutputError, ClusterError, WorkerError) as error:
@@ -127,95 +124,98 @@ class _Run(NamedTuple):
     stop: Stop
     started: list[Any]
 
-    def ends_with(self, batch: Batch) -> bool:
-        """Tell whether a frame that has failed ends the run, and note it."""
-        ends = self.options.result.fail_fast and batch.figures.first_error >= 0
-        self.progress.stopped_early |= ends
-        return ends
+
+class _Step(NamedTuple):
+    """Frames that workers do in one go.
+
+    Attributes
+    ----------
+    frames : sequence of Frame
+    take : callable
+        Takes consecutive ones of them, their batch, and the places of their rows; see `Output`.
+    positions : sequence of int
+        Of their rows in the result; none where only images are made.
+    replaces : bool
+        Whether rows have been left these places.
+    parts : Parts or None
+        See `Pass`.
+    retry_of : str
+        See `FrameOptions`.
+    """
+
+    frames: Sequence[Frame]
+    take: Callable[[list[Frame], Batch, Sequence[int]], None]
+    positions: Sequence[int] = ()
+    replaces: bool = False
+    parts: Parts | None = None
+    retry_of: str = ""
 
 
-def _run_frames(run: _Run) -> None:
-    """Write the rows of the frames, in order; their images are written by then."""
-    for each in run.output.passes():
-        every = _frames_at(run.plan, each.positions)
-        replaced = each.positions[0] < run.output.kept.count if each.positions else False
-        at = 0
-        with _results(every, run, parts=each.parts) as batches:
-            for frames, batch in _with_frames(every, batches):
-                run.output.append(frames, batch)
-                positions = each.positions[at : at + len(batch)] if replaced else None
-                files = [frame.file for frame in frames]
-                run.progress.add_rows(files, batch.figures, batch.told, positions)
-                at += len(batch)
-                if run.ends_with(batch):
-                    return
-        if run.stop.asked and run.progress.done < run.progress.total:
-            run.progress.stopped_early = True
+def _steps(run: _Run) -> Iterator[_Step]:
+    """Yield what is to do: images that kept rows should have, rows that are done again, then all others.
+
+    A result takes rows in the place of others once the workers have ended, which hold the lock of the file
+    that it was.
+    """
+    output, kept, result = run.output, run.output.kept, run.plan.output
+    if kept.incomplete:
+        missing = len(kept.incomplete)
+        run.progress.note(f"images are missing or empty for {missing} of the kept rows: they are made again")
+        yield _Step(kept.incomplete, lambda frames, batch, at: output.restore(frames, batch))
+    name = result if is_url(result) else os.path.realpath(result)  # whichever folder it is resumed from
+    for first in range(0, len(kept.again), _RETRIED_AT_ONCE):
+        again = kept.again[first : first + _RETRIED_AT_ONCE]
+        frames = [run.plan.frames[position] for position in again]
+        yield _Step(
+            frames,
+            lambda frames, batch, at: output.replace(at, frames, batch),
+            again,
+            replaces=True,
+            retry_of=name,
+        )
+    for positions, parts in output.passes():
+        if isinstance(positions, range):
+            every = run.plan.frames[positions.start : positions.stop]
+        else:
+            every = [run.plan.frames[position] for position in positions]
+        yield _Step(
+            every,
+            lambda frames, batch, at: output.append(frames, batch),
+            positions,
+            replaces=bool(positions) and positions[0] < kept.count,
+            parts=parts,
+        )
+
+
+def _run_steps(run: _Run) -> None:
+    """Do one step after the other; images are written before rows, and rows in their order."""
+    progress = run.progress
+    for step in _steps(run):
+        done = 0
+        progress.stopped_early = True  # unless all frames are done
+        with _results(step, run) as batches:
+            following = iter(step.frames)
+            for batch in batches:
+                frames = list(islice(following, len(batch)))
+                positions = step.positions[done : done + len(batch)]
+                step.take(frames, batch, positions)
+                done += len(batch)
+                if step.positions:
+                    files = [frame.file for frame in frames]
+                    places = positions if step.replaces else None
+                    progress.add_rows(files, batch.figures, batch.told, places)
+                    if run.options.result.fail_fast and batch.figures.first_error >= 0:
+                        return
+        progress.stopped_early = done < len(step.frames)
+        if progress.stopped_early:
             return
 
 
-def _frames_at(plan: Plan, positions: Sequence[int]) -> Sequence[Frame]:
-    if isinstance(positions, range):
-        return plan.frames[positions.start : positions.stop]
-    return [plan.frames[position] for position in positions]
-
-
-def _with_frames(frames: Iterable[Frame], batches: Iterator[Batch]) -> Iterator[tuple[list[Frame], Batch]]:
-    """Yield each batch with its frames."""
-    rest = iter(frames)
-    for batch in batches:
-        yield list(islice(rest, len(batch))), batch
-
-
-def _restore_images(run: _Run) -> None:
-    """Make the images again that kept rows should have."""
-    incomplete, progress = run.output.kept.incomplete, run.progress
-    if not incomplete:
-        return
-    progress.note(f"images are missing or empty for {len(incomplete)} of the kept rows: they are made again")
-    progress.stopped_early = True  # unless every one is made
-    with _results(incomplete, run) as batches:
-        restored = 0
-        for frames, batch in _with_frames(incomplete, batches):
-            run.output.restore(frames, batch)
-            restored += len(batch)
-    progress.stopped_early = restored < len(incomplete)
-
-
-def _do_again(run: _Run) -> bool:
-    """Do the frames of kept rows again that have failed or changed; return whether the run ends here.
-
-    A result takes the new rows once the workers have ended, which hold the lock of the file that it was.
-    """
-    again, progress = run.output.kept.again, run.progress
-    for first in range(0, len(again), _RETRIED_AT_ONCE):
-        rest = again[first : first + _RETRIED_AT_ONCE]
-        every = _frames_at(run.plan, rest)
-        with _results(every, run, _name_of(run.plan.output)) as batches:
-            for frames, batch in _with_frames(every, batches):
-                positions, rest = rest[: len(batch)], rest[len(batch) :]
-                run.output.replace(positions, frames, batch)
-                progress.add_rows([frame.file for frame in frames], batch.figures, batch.told, positions)
-                if run.ends_with(batch):
-                    return True
-        if run.stop.asked:
-            progress.stopped_early = progress.done < progress.total
-            return True
-    return False
-
-
-def _name_of(result: str) -> str:
-    """Name a result in one way, from whichever folder it is resumed."""
-    return result if is_url(result) else os.path.realpath(result)
-
-
 @contextlib.contextmanager
-def _results(
-    frames: Sequence[Frame], run: _Run, retry_of: str = "", parts: Parts | None = None
-) -> Iterator[Iterator[Batch]]:
-    """Open the results of frames from whichever workers were asked for; the output is complete afterwards."""
-    options, output = run.options, run.output
-    told = options.frame._replace(replaces=output.replaces, retry_of=retry_of, notes=output.notes)
+def _results(step: _Step, run: _Run) -> Iterator[Iterator[Batch]]:
+    """Open the results of a step from whichever workers were asked for; the output is complete afterwards."""
+    options, output, frames, parts = run.options, run.output, step.frames, step.parts
+    told = options.frame._replace(replaces=output.replaces, retry_of=step.retry_of, notes=output.notes)
     rows = BatchOptions(
         line_form(options.result.form),
         run.plan.further,
@@ -249,7 +249,7 @@ def _results(
     finally:
         output.commit()
         # a worker that died elsewhere cannot be waited for; a retry has removed what is not needed any more
-        if workers.scheduler is not None and not retry_of:
+        if workers.scheduler is not None and not step.retry_of:
             remove_image_leftovers(frames, options.images)
 
 

@@ -12,12 +12,11 @@ from rollcli.rig.calibration import Calibration
 from rollcli.rig.pose import with_pose
 from rollcli.run.diagnosis import looks_like
 from rollcli.run.frame import Frame, FrameResult
-from rollcli.run.frame_errors import guarded
 from rollcli.run.images import Pictured, encode_images
 from rollcli.run.inputs import inputs_line
 from rollcli.run.options import FrameOptions
 from rollcli.run.outputs import every_path, write_outputs
-from rollcli.run.read import Source, read_source
+from rollcli.run.read import Source, guarded, read_source
 
 
 def run_frame(frame: Frame, options: FrameOptions) -> FrameResult:

@@ -1,5 +1,6 @@
 """Find the frames that a user named."""
 
+import contextlib
 import os
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -45,24 +46,22 @@ def map_frames(
         return _sorted_frames(given, region, calibration)
     if not (given.inputs or given.files_from):
         raise UsageError("no input: name maps (files, folders, patterns, or - for a list on stdin)")
-    masks, calibrations = _Masks(region), Calibrations(calibration or CalibrationOptions())
+    make = _FrameMaker(region, calibration)
     if bags := _bags(given):
         from rollcli.files.recordings.frames import maps_of_bag
 
         found_maps = [maps_of_bag(files, name, given.topic) for name, files in bags]
-        return _bag_frames(found_maps, masks, calibrations, quiet=quiet)[:: given.every]
+        return _bag_frames(found_maps, make, quiet=quiet)[:: given.every]
     if given.topic is not None:
         raise UsageError("--topic is of a bag (.bag, .db3, .mcap or a rosbag2 folder), and none is given")
-    notes: list[str] = []
-    searched = _searched(given, skip, notes)
-    found = find_inputs(given.inputs, files_from=given.files_from, maps=True, **searched)
-    _say(notes, quiet=quiet)
+    with _searched(given, skip, quiet=quiet) as searched:
+        found = find_inputs(given.inputs, files_from=given.files_from, maps=True, **searched)
     if video := next((each.name for each in found if is_video(each.location)), None):
         raise UsageError(
             f"{video}: is a video, of views and not of maps: give --side-by-side (estimate, disparity) "
             "where its frames hold both, or --left and --right with a video each"
         )
-    return [_frame(each, None, masks, calibrations) for each in found[:: given.every]]
+    return [make.frame(each) for each in found[:: given.every]]
 
 
 class _Searched(TypedDict):
@@ -75,10 +74,14 @@ class _Searched(TypedDict):
     notes: list[str]
 
 
-def _searched(given: InputOptions, skip: Sequence[str], notes: list[str]) -> _Searched:
-    return _Searched(
-        recursive=given.recursive, include=given.include, exclude=given.exclude, skip=skip, notes=notes
+@contextlib.contextmanager
+def _searched(given: InputOptions, skip: Sequence[str], *, quiet: bool) -> Iterator[_Searched]:
+    """Say, once the search is over, what it has noted."""
+    searched = _Searched(
+        recursive=given.recursive, include=given.include, exclude=given.exclude, skip=skip, notes=[]
     )
+    yield searched
+    _say(searched["notes"], quiet=quiet)
 
 
 def _say(notes: Iterable[str], *, quiet: bool) -> None:
@@ -92,29 +95,22 @@ def _sorted_frames(
     if given.inputs or given.files_from is None or given.files_from == "-" or is_url(given.files_from):
         raise UsageError("--sorted takes the names of one file on disk: give --files-from FILE and no input")
     manifest = Manifest(given.files_from)
-    return SortedFrames(
-        manifest,
-        _Masks(region),
-        Calibrations(calibration or CalibrationOptions()),
-        range(0, len(manifest), given.every),
-    )
+    places = range(0, len(manifest), given.every)
+    return SortedFrames(manifest, _FrameMaker(region, calibration), places)
 
 
 class SortedFrames(Sequence[Frame]):
     """The frames of a manifest, made when they are asked for; a slice of them is another such sequence."""
 
-    def __init__(
-        self, manifest: Manifest, masks: "_Masks", calibrations: Calibrations, places: range
-    ) -> None:
-        self._manifest, self._masks, self._calibrations = manifest, masks, calibrations
-        self._places = places
+    def __init__(self, manifest: Manifest, make: "_FrameMaker", places: range) -> None:
+        self._manifest, self._make, self._places = manifest, make, places
 
     def __len__(self) -> int:
         return len(self._places)
 
     def __iter__(self) -> Iterator[Frame]:
         for name in self._manifest.names(self._places):
-            yield _frame(named_input(name), None, self._masks, self._calibrations)
+            yield self._make.frame(named_input(name))
 
     @overload
     def __getitem__(self, index: int) -> Frame: ...
@@ -124,12 +120,8 @@ class SortedFrames(Sequence[Frame]):
 
     def __getitem__(self, index: int | slice) -> "Frame | SortedFrames":
         if isinstance(index, int):
-            place = self._places[index]
-            return next(iter(self._at(range(place, place + 1))))
-        return self._at(self._places[index])
-
-    def _at(self, places: range) -> "SortedFrames":
-        return SortedFrames(self._manifest, self._masks, self._calibrations, places)
+            return next(iter(self[index : index + 1 or None]))
+        return SortedFrames(self._manifest, self._make, self._places[index])
 
 
 def pair_frames(
@@ -167,22 +159,20 @@ def pair_frames(
             "name pairs in one way: --left and --right alone; or INPUTS, with --left-topic and --right-topic "
             "for bags, or --side-by-side for images and videos that hold both views"
         )
-    masks, calibrations = _Masks(region), Calibrations(calibration or CalibrationOptions())
+    make = _FrameMaker(region, calibration)
     if any(views):
-        return _bag_pairs(given, topics, masks, calibrations, quiet=quiet)[:: given.every]
-    notes: list[str] = []
-    searched = _searched(given, skip, notes)
-    if pairs.side_by_side is not None:
-        endings = (*IMAGE_ENDINGS, *VIDEOS)
-        found = find_inputs(given.inputs, files_from=given.files_from, endings=endings, **searched)
-        both = [views for each in found for views in _halved(each, pairs.side_by_side)]
-    elif pairs.left is None or pairs.right is None:
-        raise UsageError("--left and --right are given together")
-    else:
-        matched = pair_inputs(pairs.left, pairs.right, match=pairs.match, **searched)
-        both = [views for pair in matched for views in _paired(pair)]
-    _say(notes, quiet=quiet)
-    return [_frame(left, right, masks, calibrations) for left, right in both[:: given.every]]
+        return _bag_pairs(given, topics, make, quiet=quiet)[:: given.every]
+    with _searched(given, skip, quiet=quiet) as searched:
+        if pairs.side_by_side is not None:
+            endings = (*IMAGE_ENDINGS, *VIDEOS)
+            found = find_inputs(given.inputs, files_from=given.files_from, endings=endings, **searched)
+            both = [views for each in found for views in _halved(each, pairs.side_by_side)]
+        elif pairs.left is None or pairs.right is None:
+            raise UsageError("--left and --right are given together")
+        else:
+            matched = pair_inputs(pairs.left, pairs.right, match=pairs.match, **searched)
+            both = [views for pair in matched for views in _paired(pair)]
+    return [make.frame(left, right) for left, right in both[:: given.every]]
 
 
 def _halved(each: Input, layout: Layout) -> list[tuple[Input, Input]]:
@@ -219,9 +209,7 @@ def _require_local(location: str) -> None:
         raise UsageError(f"{public_name(location)}: recordings are read from local disk: download it first")
 
 
-def _bag_pairs(
-    given: InputOptions, topics: TopicOptions, masks: "_Masks", calibrations: Calibrations, *, quiet: bool
-) -> list[Frame]:
+def _bag_pairs(given: InputOptions, topics: TopicOptions, make: "_FrameMaker", *, quiet: bool) -> list[Frame]:
     left, right = topics.left_topic, topics.right_topic
     if left is None or right is None:
         raise UsageError("--left-topic and --right-topic are given together")
@@ -234,7 +222,7 @@ def _bag_pairs(
 
     tolerance = round(topics.sync_tolerance * 1e6)
     found = [pairs_of_bag(files, name, left, right, tolerance) for name, files in bags]
-    return _bag_frames(found, masks, calibrations, quiet=quiet)
+    return _bag_frames(found, make, quiet=quiet)
 
 
 def _bags(given: InputOptions) -> list[tuple[str, list[str]]]:
@@ -258,55 +246,45 @@ def _bags(given: InputOptions) -> list[tuple[str, list[str]]]:
     return bags
 
 
-def _bag_frames(
-    bags: "Iterable[BagFrames]", masks: "_Masks", calibrations: Calibrations, *, quiet: bool
-) -> list[Frame]:
+def _bag_frames(bags: "Iterable[BagFrames]", make: "_FrameMaker", *, quiet: bool) -> list[Frame]:
     frames = []
     for bag in bags:
         _say(bag.notes, quiet=quiet)
         for pair in bag.frames:
             left, right = (each and _recorded(each) for each in pair)
             if left is not None:
-                frame = _frame(left, right, masks, calibrations)
-                own = calibrations.given
+                frame = make.frame(left, right)
+                own = make.calibrations.given
                 frames.append(frame if own else replace(frame, calibration=bag.calibration))
     return frames
 
 
-def _frame(left: Input, right: Input | None, masks: "_Masks", calibrations: Calibrations) -> Frame:
-    return Frame(
-        file=left.name,
-        right_file=right.name if right else "",
-        path=left.location,
-        right_path=right.location if right else "",
-        relative=left.relative if _is_safe(left) else "",
-        mask=masks.of(left),
-        calibration=calibrations.of(left.name),
-    )
+class _FrameMaker:
+    """Makes frames, with the masks and calibrations that were named: one for all, or one of each stem."""
 
+    def __init__(self, region: RegionOptions | None, calibration: CalibrationOptions | None) -> None:
+        self.calibrations = Calibrations(calibration or CalibrationOptions())
+        self._mask = region.mask if region else None
+        self._masks: dict[str, str] | None = None
+        if self._mask is not None and is_place(self._mask):
+            found = find_inputs([self._mask], recursive=True)
+            self._masks = {Path(frame_name(each.name)).stem: each.location for each in found}
+        elif self._mask is not None and not (is_url(self._mask) or is_file(self._mask)):
+            raise UsageError(f"{self._mask}: no such mask file or folder")
 
-def _is_safe(each: Input) -> bool:
-    """Tell whether what is made of an input stays in its folder, whatever a store or an archive calls it."""
-    foreign = is_url(each.location) or file_of(each.location) != each.location
-    return not foreign or names_a_file(each.relative)
-
-
-class _Masks:
-    """One mask for all frames, or one of the same stem each."""
-
-    def __init__(self, region: RegionOptions | None) -> None:
-        self.one, self.by_stem = region.mask if region else None, None
-        if self.one is not None and is_place(self.one):
-            found = find_inputs([self.one], recursive=True)
-            self.by_stem = {Path(frame_name(each.name)).stem: each.location for each in found}
-        elif self.one is not None and not (is_url(self.one) or is_file(self.one)):
-            raise UsageError(f"{self.one}: no such mask file or folder")
-
-    def of(self, left: Input) -> str | None:
-        """Find the mask of a frame."""
-        if self.by_stem is None:
-            return self.one
-        try:
-            return self.by_stem[PurePath(frame_name(left.name)).stem]
-        except KeyError:
-            raise UsageError(f"{left.name}: has no mask of its name in {self.one}") from None
+    def frame(self, left: Input, right: Input | None = None) -> Frame:
+        """Make the frame of a map, or of the views of a pair."""
+        mask, stem = self._mask, PurePath(frame_name(left.name)).stem
+        if self._masks is not None and (mask := self._masks.get(stem)) is None:
+            raise UsageError(f"{left.name}: has no mask of its name in {self._mask}")
+        # what is made of an input must stay in its folder, whatever a store or an archive calls it
+        foreign = is_url(left.location) or file_of(left.location) != left.location
+        return Frame(
+            file=left.name,
+            right_file=right.name if right else "",
+            path=left.location,
+            right_path=right.location if right else "",
+            relative=left.relative if not foreign or names_a_file(left.relative) else "",
+            mask=mask,
+            calibration=self.calibrations.of(left.name),
+        )

@@ -7,8 +7,65 @@ from typing import Any, Literal, NamedTuple
 
 from rollcli.estimator.request import LAMBDA0, MAX_INTERVAL_DEG, MAX_ROLL_DEG, TOLERANCE_DEG, LearningRate
 from rollcli.rig.calibration import CalibrationOptions
-from rollcli.run.image_kinds import ENDING_OF_FORMAT, KINDS, ImageKind, Save
 from rollcli.stereo.options import StereoOptions
+
+Save = Literal["png", "tiff", "npy"]
+ENDING_OF_FORMAT: dict[Save, str] = {"png": ".png", "tiff": ".tif", "npy": ".npy"}
+
+
+class ImageKind(NamedTuple):
+    """A kind of image.
+
+    Attributes
+    ----------
+    name : str
+        Its field of `ImageOptions`, its option with "-" for "_", and the usual name of its folder.
+    holds : str
+        "picture": an 8-bit PNG to look at; "map": disparities as `--save-as` says; "as input": the same, but
+        in the input's own type and format where that is a map; "numbers": float32, TIFF or NPY.
+    help : str
+        Of its option.
+    """
+
+    name: str
+    holds: Literal["picture", "map", "as input", "numbers"]
+    help: str
+
+    def ending(self, save_as: Save, *, computed: bool) -> str | None:
+        """Return the ending of its files, None for that of the input; `computed`: from a pair."""
+        if self.holds == "picture":
+            return ENDING_OF_FORMAT["png"]
+        if self.holds == "numbers":
+            return ENDING_OF_FORMAT["tiff" if save_as == "png" else save_as]
+        return None if self.holds == "as input" and not computed else ENDING_OF_FORMAT[save_as]
+
+    def can_overflow(self, save_as: Save, *, computed: bool) -> bool:
+        """Tell whether a TIFF takes its place where a KITTI PNG cannot hold the map."""
+        return computed and save_as == "png" and self.holds in ("map", "as input")
+
+
+KINDS = (
+    ImageKind("derotated", "as input", "The map rotated upright; type and format of the input."),
+    ImageKind(
+        "vdisparity",
+        "picture",
+        "v-disparity of the map rotated upright, with the road, PNG; vdisparity draws maps as they are.",
+    ),
+    ImageKind("disparity", "map", "The disparity map that was computed from a pair."),
+    ImageKind("road_mask", "picture", "The found road, drawn on the left image of a pair or the map, PNG."),
+    ImageKind(
+        "heights",
+        "numbers",
+        "Heights over the road, float32 TIFF (--save-as npy: NPY): metres with a calibration that has a "
+        "baseline, else camera heights; NaN where there is no disparity.",
+    ),
+    ImageKind(
+        "heights_preview",
+        "picture",
+        "Heights over the road to look at, over the left image of a pair, PNG; every frame in the same "
+        "colours.",
+    ),
+)
 
 Layout = Literal["left-right", "top-bottom"]
 HEIGHTS_RANGE = (-0.10, 0.10)
@@ -87,7 +144,7 @@ class MethodOptions(NamedTuple):
 
 
 class ImageOptions(NamedTuple):
-    """Which images to write, each kind of `image_kinds` into a folder of its own.
+    """Which images to write, each of `KINDS` into a folder of its own.
 
     `heights_range` is what has the outermost colours of a preview, lowest first, in the heights' unit.
     """
@@ -331,3 +388,70 @@ class DisparityOptions(ConvertOptions):
         maps = [(self.output, ENDING_OF_FORMAT[self.save_as])]
         maps += [(self.output, ENDING_OF_FORMAT["tiff"])] if self.save_as == "png" else []
         return [*maps, *([(self.preview, ".png")] if self.preview is not None else [])]
+
+
+@dataclass(frozen=True)
+class GateOptions:
+    """What the rig must be; None where nothing is asked.
+
+    Attributes
+    ----------
+    expect_roll, expect_pitch : float or None
+        Degrees.
+    expect_height : float or None
+        Metres.
+    within : float or None
+        How far from them the rig may be, degrees; of the height metres, unless `within_height` is given.
+    within_height : float or None
+        Metres.
+    max_drift, max_jump : float or None
+        Of the roll, degrees; the drift over a drive.
+    max_misalignment : float or None
+        Largest vertical shift between the views in the image, px.
+    min_ok : float or None
+        Share of the frames that are ok, 0 to 1.
+    """
+
+    expect_roll: float | None = None
+    expect_pitch: float | None = None
+    expect_height: float | None = None
+    within: float | None = None
+    within_height: float | None = None
+    max_drift: float | None = None
+    max_jump: float | None = None
+    max_misalignment: float | None = None
+    min_ok: float | None = None
+
+
+@dataclass(frozen=True)
+class RigOptions:
+    """Everything that `rollcli rig` was asked.
+
+    Attributes
+    ----------
+    results : tuple of str
+        One result or several, or the shards of one run.
+    against : str or None
+        A later result to compare with.
+    include_suspect : bool
+    groups : str
+        "auto", "none" or a pattern of folders.
+    output, format : str
+    correction : str or None
+        Where to write how the right view has to be corrected.
+    calibration : CalibrationOptions
+        For what a misalignment does to depth.
+    gates : GateOptions
+    running : RunningOptions
+    """
+
+    results: tuple[str, ...]
+    against: str | None = None
+    include_suspect: bool = False
+    groups: str = "auto"
+    output: str = "-"
+    format: str = "table"
+    correction: str | None = None
+    calibration: CalibrationOptions = field(default_factory=CalibrationOptions)
+    gates: GateOptions = field(default_factory=GateOptions)
+    running: RunningOptions = field(default_factory=RunningOptions)

@@ -15,8 +15,7 @@ from rollcli.files.storage import read_bytes, remove, remove_all, write_bytes, w
 from rollcli.files.stores.locations import is_object_url, is_url, located
 from rollcli.files.stores.objects import list_objects
 from rollcli.run.frame import Frame
-from rollcli.run.image_kinds import ENDING_OF_FORMAT, ImageKind
-from rollcli.run.options import ImageOptions
+from rollcli.run.options import ENDING_OF_FORMAT, ImageKind, ImageOptions
 
 
 def image_paths(frame: Frame, images: ImageOptions) -> Iterator[tuple[ImageKind, str]]:

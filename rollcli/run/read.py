@@ -1,8 +1,10 @@
 """Read a frame: its disparity, from a map or matched from a pair, and the pixels that may be used."""
 
+import json
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+import traceback
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from fractions import Fraction
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
@@ -11,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.errors import InputError
+from rollcli.errors import EstimationError, InputError, UsageError
 from rollcli.estimator.road.find import first_row_of_road
 from rollcli.files.codecs.pictures import views_of
 from rollcli.files.encodings import Encoding, read_mask, to_disparity
@@ -19,12 +21,50 @@ from rollcli.files.formats import Stored, read_image, read_stored
 from rollcli.files.results import ALIGNMENT_COLUMNS
 from rollcli.files.storage import state_of
 from rollcli.run.diagnosis import require_positive, too_large
-from rollcli.run.frame import Frame
+from rollcli.run.frame import Frame, FrameResult, failed_frame
 from rollcli.run.options import FrameOptions, MethodOptions, RegionOptions
-from rollcli.run.provenance import Provenance
 
 if TYPE_CHECKING:
     from rollcli.stereo.match import StereoMatch, Wanted
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """How far a map from a pair may be believed.
+
+    Attributes
+    ----------
+    slope_error : float
+        Standard deviation of a slope that all disparities may have beside the road's, px per px.
+    doubt : str
+        Why the map itself may be wrong; empty when there is no reason.
+    alignment : mapping of str to float
+        How the right view lay, by column of a result; empty where that could not be told.
+    """
+
+    slope_error: float = 0.0
+    doubt: str = ""
+    alignment: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def text(self) -> str:
+        """One line of ASCII for a file; empty where there is nothing to carry."""
+        return "" if self == Provenance() else json.dumps(asdict(self))
+
+    @staticmethod
+    def of_text(text: str) -> "Provenance":
+        """Read such a line; nothing is known where another program has written or changed it."""
+        try:
+            carried = json.loads(text)
+            error, doubt, lay = float(carried["slope_error"]), carried["doubt"], carried["alignment"]
+            alignment = {name: float(lay[name]) for name in ALIGNMENT_COLUMNS if name in lay}
+        except (ValueError, TypeError, KeyError, OverflowError, RecursionError):
+            return Provenance()
+        if not (
+            0 <= error < math.inf and isinstance(doubt, str) and all(map(math.isfinite, alignment.values()))
+        ):
+            return Provenance()
+        return Provenance(error, " ".join(doubt.split()), alignment)
 
 
 Corner = tuple[float, float]
@@ -285,3 +325,40 @@ def _doubt_of_range(match: "StereoMatch") -> str:
         return ""
     share = f"{match.end_fraction:.0%} of the map lies at the end of the searched range"
     return f"{share}; use a larger --num-disparities"
+
+
+_NUMERIC_ERRORS = (ArithmeticError, ValueError)  # from numbers that some step cannot deal with
+FRAME_ERRORS = (
+    InputError,
+    EstimationError,
+    UsageError,
+    OSError,
+    MemoryError,
+    cv2.error,
+    *_NUMERIC_ERRORS,
+)
+
+
+def guarded(frame: Frame, work: Callable[[], FrameResult]) -> FrameResult:
+    """Do the work; turn an error that costs only this frame into its `error` row."""
+    try:
+        with np.errstate(all="ignore"):  # numbers of damaged maps overflow: the row says what comes of them
+            return work()
+    except FRAME_ERRORS as error:
+        return frame_of_error(frame, error)
+
+
+def frame_of_error(frame: Frame, error: Exception) -> FrameResult:
+    """Make the row of a frame that an error has cost."""
+    return failed_frame(frame, str(error) or type(error).__name__, _cause_of(error))
+
+
+def _cause_of(error: BaseException | None) -> str:
+    """Return what errors of one cause share: where they, and what led to them, were raised, and why."""
+    places = []
+    while error is not None:
+        *_, (frame, line) = traceback.walk_tb(error.__traceback__)
+        why = getattr(error, "code", "") or getattr(error, "errno", "")
+        places.append(f"{type(error).__name__} {why} {frame.f_code.co_filename}:{line}")
+        error = error.__cause__
+    return " of ".join(places)

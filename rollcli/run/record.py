@@ -1,23 +1,21 @@
 """FILE.run.json: what a result was made with; it is written for people and for `--resume`, and read back."""
 
-import errno
 import hashlib
 import json
 import os
 import uuid
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from functools import lru_cache
 from itertools import islice
 from pathlib import Path
 from typing import Any, TypeVar
 
 from rollcli import __version__
 from rollcli.errors import InputError
-from rollcli.files.atomic import look_at
-from rollcli.files.containers import file_of
 from rollcli.files.results import run_path
-from rollcli.files.storage import write_bytes
-from rollcli.files.stores.locations import is_url, public_name
+from rollcli.files.storage import state_of, write_bytes
+from rollcli.files.stores.locations import public_name
 from rollcli.run.batch import check_owned
 from rollcli.run.frame import Frame, ReadAs
 from rollcli.run.options import (
@@ -33,9 +31,6 @@ from rollcli.run.plan import Plan
 from rollcli.run.summary import RunSummary
 from rollcli.stereo.options import StereoOptions
 
-# what these errors say of a path, they say again the next time; others may pass, such as EIO
-_LASTING = (errno.ENOENT, errno.ENOTDIR, errno.ENAMETOOLONG, errno.EACCES, errno.ELOOP, errno.EINVAL)
-
 
 def names_of(frames: Sequence[Frame]) -> dict[str, Any]:
     """Summarise the frames: how many, and a digest of their names."""
@@ -45,63 +40,14 @@ def names_of(frames: Sequence[Frame]) -> dict[str, Any]:
     return {"frames": len(frames), "names": names.hexdigest()}
 
 
-def fingerprint(frames: Sequence[Frame], unknown: Collection[str] = ()) -> dict[str, Any]:
-    """Summarise the frames: how many, their names, and size and time of every file that they need.
-
-    Parameters
-    ----------
-    frames : sequence of Frame
-    unknown : collection of str
-        Files to leave out.
-
-    Returns
-    -------
-    dict
-        "frames", "names" and "files"; "unknown" lists the files that were left out, and those whose size
-        could not be read, if there are any.
-    """
-    files = hashlib.sha256()
-    shared: dict[str, bytes | None] = {}  # a mask for all frames is looked at once
-    left_out = set(unknown)
+def states_of(frames: Sequence[Frame]) -> str:
+    """Return a digest of size and time of every local file that frames need."""
+    states = hashlib.sha256()
+    look = lru_cache(maxsize=8)(state_of)  # at a mask for all frames, and an archive of many, once
     for frame in frames:
-        for path in map(file_of, frame.reads()):
-            if path in left_out:
-                continue
-            state = shared[path] if path in shared else _state(path)
-            if path == frame.mask or path != frame.path:  # an archive holds many frames
-                shared[path] = state
-            if state is None:
-                left_out.add(path)
-            else:
-                files.update(state)
-    found = {**names_of(frames), "files": files.hexdigest()}
-    return {**found, "unknown": sorted(left_out)} if left_out else found
-
-
-def changed_input(frames: Sequence[Frame], since_ns: int) -> str | None:
-    """Find the first file that is missing, or newer than a time in nanoseconds."""
-    for path in dict.fromkeys(file_of(path) for frame in frames for path in frame.reads()):
-        if is_url(path):
-            continue
-        try:
-            if look_at(path).st_mtime_ns > since_ns:
-                return path
-        except (OSError, ValueError):
-            return path
-    return None
-
-
-def _state(path: str) -> bytes | None:
-    """Summarise a file; None when the system fails to look at it."""
-    if is_url(path):  # asking for the state of each object would take as long as reading it
-        return b"url\0"
-    try:
-        found = look_at(path)
-    except ValueError:  # no file can have this name
-        return b"missing\0"
-    except OSError as error:
-        return b"missing\0" if error.errno in _LASTING else None
-    return b"%d %d\0" % (found.st_size, found.st_mtime_ns)
+        for path in frame.reads():
+            states.update(f"{look(path)}\0".encode())
+    return states.hexdigest()
 
 
 CONVENTIONS = {
@@ -131,22 +77,22 @@ Options = TypeVar("Options", EncodingOptions, ImageOptions, MethodOptions, Regio
 
 
 class RunRecord:
-    """The record of one run; the same run gives the same bytes, whether it was interrupted or not.
+    """The record of one run; the same run gives the same bytes, whether it was interrupted or not."""
 
-    `unknown` are the inputs that an interrupted run could not look at.
-    """
-
-    def __init__(self, plan: Plan, options: EstimateOptions, unknown: Collection[str] = ()) -> None:
+    def __init__(self, plan: Plan, options: EstimateOptions) -> None:
         self._output = plan.output
         self.read_as = ReadAs()
         self.run = uuid.uuid4().hex  # tells our objects from those of another run
         self._begun = False
         # older images, now and after a resume
         self.replaces = options.running.overwrite or options.result.update
+        inputs = names_of(plan.frames)
+        if plan.in_parts:  # which have no FILE.inputs
+            inputs["files"] = states_of(plan.frames)
         self.fixed = {
             "rollcli": __version__,
             "options": _effective(plan, options),
-            "inputs": fingerprint(plan.frames, unknown) if plan.in_parts else names_of(plan.frames),
+            "inputs": inputs,
         }
         if options.calibration.given:
             self.fixed["calibration"] = _calibrations(plan.frames)
@@ -211,12 +157,14 @@ def _effective(plan: Plan, options: EstimateOptions) -> dict[str, Any]:
         **({"shard-by": "range"} if options.result.shard_by == "range" else {}),
         **({"side-by-side": layout} if layout else {}),
     }
-    return {_OPTION_NAMES.get(key, key).replace("_", "-"): _public(value) for key, value in values.items()}
+    return {
+        _option_name(key): public_name(value) if isinstance(value, str) else value
+        for key, value in values.items()
+    }
 
 
-def _public(value: Any) -> Any:
-    """Return the value of an option without the signature of a URL."""
-    return public_name(value) if isinstance(value, str) else value
+def _option_name(field: str) -> str:
+    return _OPTION_NAMES.get(field, field).replace("_", "-")
 
 
 def _by_name(options: Options) -> dict[str, Any]:
@@ -289,7 +237,7 @@ def _filled(defaults: Options, given: Mapping[str, Any]) -> Options:
     """Replace the defaults by what is given."""
     values: dict[str, Any] = {}
     for name, before in _by_name(defaults).items():
-        key = _OPTION_NAMES.get(name, name).replace("_", "-")
+        key = _option_name(name)
         value: Any = given.get(key, before)
         if isinstance(before, tuple) and isinstance(value, list):
             value = tuple(map(float, value))

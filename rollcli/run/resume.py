@@ -7,17 +7,19 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from rollcli.errors import InputError, OutputError
+from rollcli.files.atomic import look_at
+from rollcli.files.containers import file_of
 from rollcli.files.locking import differences, not_resumable
 from rollcli.files.results import Row, format_row, parse_rows, read_run, run_path
 from rollcli.files.storage import modified_ns
-from rollcli.files.stores.locations import base_name
+from rollcli.files.stores.locations import base_name, is_url
 from rollcli.run.batch import Batch
 from rollcli.run.frame import Frame
 from rollcli.run.inputs import Inputs
 from rollcli.run.options import EstimateOptions
 from rollcli.run.outputs import MadeImages
 from rollcli.run.plan import Plan, check_images_are_new
-from rollcli.run.record import RunRecord, changed_input
+from rollcli.run.record import RunRecord
 from rollcli.run.result_file import row_lines
 from rollcli.run.summary import RunSummary
 
@@ -231,20 +233,24 @@ def new_record(
     UsageError
         It cannot be continued; says what differs. Or it is a first start, and there are images already.
     """
-    if options.result.update and kept.count:
-        record = RunRecord(plan, options)
-        record.continue_from(_check_updatable(earlier, record, plan))
+    record = RunRecord(plan, options)
+    if not kept.count:
+        if options.result.resume:
+            _start_or_continue(record, plan, options, kept)
         return record
-    unknown = unknown_inputs(earlier)
-    retried = kept.again
-    begun = begun_plan(plan, earlier)
-    record = RunRecord(plan, options, () if retried else unknown)
-    if kept.count:
-        same = record if begun is plan and not (retried and unknown) else RunRecord(begun, options, unknown)
-        added = len(plan.frames) - len(begun.frames)
-        record.continue_from(check_resumable(kept, earlier, same, begun, added))
-    elif options.result.resume:
-        _start_or_continue(record, plan, options, kept)
+    if earlier is None:
+        raise not_resumable(plan.output, f"there is no {base_name(run_path(plan.output))}")
+    if not _is_whole(earlier):
+        raise not_resumable(plan.output, f"{base_name(run_path(plan.output))} is damaged")
+    if options.result.update:
+        found = differences(earlier, record.fixed)
+    else:
+        begun = begun_plan(plan, earlier)
+        same = record if begun is plan else RunRecord(begun, options)
+        found = _differences(kept, earlier, same.fixed, begun, len(plan.frames) - len(begun.frames))
+    for difference in found:
+        raise not_resumable(plan.output, difference)
+    record.continue_from(earlier)
     return record
 
 
@@ -255,57 +261,6 @@ def begun_plan(plan: Plan, run: Mapping[str, Any] | None) -> Plan:
     if not isinstance(count, int) or not 0 < count < len(plan.frames):
         return plan
     return replace(plan, frames=plan.frames[:count])
-
-
-def check_resumable(
-    kept: KeptRows, run: Mapping[str, Any] | None, record: RunRecord, plan: Plan, added: int = 0
-) -> Mapping[str, Any]:
-    """Refuse to continue a result of another version, other options or other inputs.
-
-    Parameters
-    ----------
-    kept : KeptRows
-        Of the interrupted run; the files of frames that are done again may have changed.
-    run : mapping or None
-        Its record.
-    record : RunRecord
-        Of the plan.
-    plan : Plan
-        As many frames as the interrupted run had, if there are as many; see `begun_plan`.
-    added : int
-        How many frames there are beyond them.
-
-    Returns
-    -------
-    mapping
-        The record of the interrupted run.
-
-    Raises
-    ------
-    UsageError
-        Says what differs.
-    """
-    run = _whole(run, plan)
-    for difference in _differences(kept, run, record.fixed, plan, added):
-        raise not_resumable(plan.output, difference)
-    return run
-
-
-def _check_updatable(run: Mapping[str, Any] | None, record: RunRecord, plan: Plan) -> Mapping[str, Any]:
-    """Refuse to update a result of another version or other options, by its record; return that."""
-    run = _whole(run, plan)
-    for difference in differences(run, record.fixed):
-        raise not_resumable(plan.output, difference)
-    return run
-
-
-def _whole(run: Mapping[str, Any] | None, plan: Plan) -> Mapping[str, Any]:
-    record_name = base_name(run_path(plan.output))
-    if run is None:
-        raise not_resumable(plan.output, f"there is no {record_name}")
-    if not _is_whole(run):
-        raise not_resumable(plan.output, f"{record_name} is damaged")
-    return run
 
 
 def _start_or_continue(record: RunRecord, plan: Plan, options: EstimateOptions, kept: KeptRows) -> None:
@@ -324,13 +279,6 @@ def _start_or_continue(record: RunRecord, plan: Plan, options: EstimateOptions, 
         record.continue_from(run)
     else:
         check_images_are_new(plan.frames, options)
-
-
-def unknown_inputs(run: Mapping[str, Any] | None) -> list[str]:
-    """List the inputs that the interrupted run could not look at, by its record."""
-    inputs = (run or {}).get("inputs")
-    listed = inputs.get("unknown", []) if isinstance(inputs, dict) else []
-    return [each for each in listed if isinstance(each, str)] if isinstance(listed, list) else []
 
 
 def _differences(
@@ -362,8 +310,15 @@ def _differences(
 
 def _changed_input(plan: Plan, retried: Collection[int]) -> str | None:
     """Find an input that is newer than the record, or missing, apart from those of frames done again."""
-    frames = [frame for position, frame in enumerate(plan.frames) if position not in retried]
-    return changed_input(frames, modified_ns(run_path(plan.output)))
+    since_ns = modified_ns(run_path(plan.output))
+    frames = (frame for position, frame in enumerate(plan.frames) if position not in retried)
+    for path in dict.fromkeys(file_of(path) for frame in frames for path in frame.reads()):
+        try:
+            if not is_url(path) and look_at(path).st_mtime_ns > since_ns:
+                return path
+        except (OSError, ValueError):
+            return path
+    return None
 
 
 def _is_whole(run: Mapping[str, Any]) -> bool:

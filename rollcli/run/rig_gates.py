@@ -14,8 +14,8 @@ from rollcli.rig.drive.assess import DriveAssessment, RigAssessment
 from rollcli.rig.drive.posterior import Estimate
 from rollcli.rig.quantities import HEIGHT, PITCH, ROLL, Quantity
 from rollcli.rig.words import answer, frame_name, too_few
+from rollcli.run.options import GateOptions
 from rollcli.run.rig_health import PIXELS, Health
-from rollcli.run.rig_options import GateOptions
 
 
 @dataclass(frozen=True, slots=True)

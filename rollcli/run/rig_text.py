@@ -4,7 +4,7 @@ import csv
 import io
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from rollcli.errors import UsageError
@@ -34,14 +34,9 @@ def rounded(value: float | None) -> float | None:
     return None if value is None else round(value, _DIGITS) + 0.0
 
 
-def rig_values(
-    rig: RigAssessment,
-    checks: Sequence[Check],
-    against: tuple[RigAssessment, dict[str, Estimate]] | None,
-    health: Health | None = None,
-) -> dict[str, Any]:
+def rig_values(found: "Findings") -> dict[str, Any]:
     """Return the assessment as one JSON object."""
-    latest = rig.latest()
+    rig, latest = found.rig, found.rig.latest()
     values: dict[str, Any] = {
         "frames": rig.count,
         "used": rig.used,
@@ -54,9 +49,9 @@ def rig_values(
     values["between_frames_sd_deg"] = rounded(latest.between_sd) if latest else None
     values["status"] = latest.status if latest else "few"
     for quantity in QUANTITIES:
-        found = rig.latest(quantity)
+        assessed = rig.latest(quantity)
         prefix = "drift" if quantity is ROLL else f"{quantity.name}_drift"
-        values |= named(prefix, found.drift if found else Estimate(), quantity.suffix)
+        values |= named(prefix, assessed.drift if assessed else Estimate(), quantity.suffix)
         hourly = rig.drift_per_hour(rig.latest_drive(quantity), quantity)
         values |= named(prefix, hourly, f"{quantity.suffix}_per_hour")
     for quantity in QUANTITIES:
@@ -64,10 +59,10 @@ def rig_values(
     values["segments"] = [
         _segment(rig, drive, place) for drive in rig.drives for place in range(len(_segments(drive)))
     ]
-    values["alignment"] = None if health is None else alignment_values(health)
-    if against is not None:
-        values["against"] = _against(*against)
-    values["checks"] = [{"name": c.name, "ok": c.ok, "message": c.message} for c in checks]
+    values["alignment"] = None if found.health is None else alignment_values(found.health)
+    if found.after is not None:
+        values["against"] = _against(found.after, found.changes)
+    values["checks"] = [asdict(check) for check in found.checks]
     return values
 
 
@@ -199,8 +194,7 @@ def as_csv(found: Findings) -> str:
 
 def as_json(found: Findings) -> str:
     """One object."""
-    against = None if found.after is None else (found.after, found.changes)
-    return json.dumps(rig_values(found.rig, found.checks, against, found.health), indent=2) + "\n"
+    return json.dumps(rig_values(found), indent=2) + "\n"
 
 
 FORMATS = {"table": as_table, "csv": as_csv, "json": as_json}

@@ -68,7 +68,6 @@ class RunSummary:
 
     def __init__(self) -> None:
         self.counts: Counter[str] = Counter()
-        self._alignment = {name: array("d") for name in ALIGNMENT_COLUMNS}
         self._too_many = False
         self._files: list[str] = []
         self._status = bytearray()
@@ -100,8 +99,6 @@ class RunSummary:
         for place, status in enumerate(STATUSES):
             if found := figures.status.count(place):
                 self.counts[status] += found
-        for name, column in self._alignment.items():
-            column.extend(value for value in figures.numbers.get(name, ()) if not math.isnan(value))
 
     def _append(self, files: Sequence[str], figures: Figures) -> None:
         self._too_many |= len(self._files) + len(files) > _MOST_FRAMES
@@ -129,24 +126,17 @@ class RunSummary:
         return ExitStatus.FRAMES_FAILED if self.counts["error"] else ExitStatus.DONE
 
     @property
-    def _median_alignment(self) -> dict[str, float]:
-        """The median of each column over the pairs; empty where no pair was measured."""
-        return {name: median(column) for name, column in self._alignment.items() if column}
-
-    @property
     def advice(self) -> str:
         """What to do about how the views lay, in a sentence; empty where the median is level."""
-        found = self._median_alignment
-        return advice_of(*(found[name] for name in ALIGNMENT_COLUMNS)) if found else ""
+        lay = [self._median(name) for name in ALIGNMENT_COLUMNS]
+        return "" if lay[0] is None else advice_of(*(value or 0.0 for value in lay))
 
     def alignment(self) -> dict[str, float | int | str] | None:
-        """Return how the views lay, for the run's record; None where no pair was measured."""
-        found = self._median_alignment
-        if not found:
-            return None
-        frames = len(self._alignment[ALIGNMENT_COLUMNS[0]])
-        rounded = {name: round(value, 4) + 0.0 for name, value in found.items()}
-        return {"frames": frames, **rounded, "advice": self.advice}
+        """Return the medians of how the views lay, for the run's record; None where no pair was measured."""
+        lay = {name: self._median(name) for name in ALIGNMENT_COLUMNS}
+        frames = len(self._known(ALIGNMENT_COLUMNS[0]))
+        rounded = {name: round(value, 4) + 0.0 for name, value in lay.items() if value is not None}
+        return {"frames": frames, **rounded, "advice": self.advice} if frames else None
 
     def rig_roll(self) -> str:
         """Return the rig's roll in one line, such as `roll -0.44 ± 0.06°, 5 ok, 0 suspect, 0 failed`."""
@@ -168,5 +158,8 @@ class RunSummary:
         return taken_as_exact(calibration, math.radians(pitch), height)
 
     def _median(self, name: str) -> float | None:
-        known = [each for each in self._numbers[name] if not math.isnan(each)]
+        known = self._known(name)
         return median(known) if known else None
+
+    def _known(self, name: str) -> list[float]:
+        return [each for each in self._numbers[name] if not math.isnan(each)]

@@ -118,7 +118,7 @@ def test_resume_and_overwrite_exclude_each_other_unless_one_is_said_nearer(maps)
         ('method = "best"', "'method': 'best' is not one of"),
         ("method = 3", "'method' is a text in quotes, not 3"),
         ('timing = "yes"', "'timing' is true or false, not 'yes'"),
-        ("roi = [5, 5, 5, 9]", "'roi': '5,5,5,9' is not X0,Y0,X1,Y1"),
+        ("roi = [5, 5, 5, 9]", "'roi': [5, 5, 5, 9] is not X0,Y0,X1,Y1"),
         ("seed = ", "is not TOML"),
         ('config = "other.toml"', "there is no option 'config'"),
     ],

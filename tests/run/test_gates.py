@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from rollcli.errors import UsageError
+from rollcli.run.options import GateOptions
 from rollcli.run.rig_gates import Check, check_options, run_checks, status_of
-from rollcli.run.rig_options import GateOptions
 from tests.run.rigs import UNKNOWN, known, rig, sequence, short
 
 
