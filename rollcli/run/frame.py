@@ -96,6 +96,8 @@ class FrameResult:
         What the frame was read from, where workers were told to note it: see `inputs.inputs_line`.
     cause : str
         The code of its error: the same for all frames that failed for one cause.
+    said : str
+        The error as stderr says it: with the name of the file that it is about.
     """
 
     row: Row
@@ -104,14 +106,12 @@ class FrameResult:
     searched: tuple[int, int] | None = None
     inputs: bytes = b""
     cause: str = ""
+    said: str = ""
 
     @property
     def warning(self) -> str:
         """All warnings; empty when there is none."""
         return "; ".join(filter(None, self.warnings.values()))
-
-
-_LEFT, _RIGHT = "left image: ", "right image: "  # what a message calls the files of a pair
 
 
 def failed_frame(frame: Frame, reason: str, cause: str = "") -> FrameResult:
@@ -122,17 +122,12 @@ def failed_frame(frame: Frame, reason: str, cause: str = "") -> FrameResult:
     message, left, right = (
         " ".join(text.split()) for text in (without_secrets(reason), frame.file, frame.right_file)
     )
-    if right == left and message.startswith(f"{left}: "):  # one image holds both views
-        message = message.removeprefix(f"{left}: ")
-    elif right and message.startswith(f"{right}: "):
-        message = _RIGHT + message.removeprefix(f"{right}: ")
-    elif message.startswith(f"{left}: "):
-        message = (_LEFT if right else "") + message.removeprefix(f"{left}: ")
-    return FrameResult(Row(frame.file, frame.right_file, "error", message=message), cause=cause or reason)
-
-
-def named_message(row: Row) -> str:
-    """Return the message of a row behind the name of the file that it is about."""
-    if row.right_file and row.message.startswith(_RIGHT):
-        return f"{row.right_file}: {row.message.removeprefix(_RIGHT)}"
-    return f"{row.file}: {row.message.removeprefix(_LEFT) if row.right_file else row.message}"
+    about, view = frame.file, ""
+    # one image may hold both views
+    views = {left: ""} if right in ("", left) else {right: "right image: ", left: "left image: "}
+    for name in views:
+        if message.startswith(f"{name}: "):
+            about, view, message = name, views[name], message.removeprefix(f"{name}: ")
+            break
+    row = Row(frame.file, frame.right_file, "error", message=view + message)
+    return FrameResult(row, cause=cause or reason, said=f"{about}: {message}")

@@ -1,7 +1,7 @@
 """Decide and check what a run will read and write, before anything runs."""
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from typing import Any
 
@@ -36,24 +36,15 @@ class Plan:
     @property
     def in_parts(self) -> bool:
         """Whether the result is a folder of parts."""
-        return is_in_parts(self.output, self.format)
+        return self.format == "parquet" or is_url(self.output)
 
     @property
     def files(self) -> list[str]:
-        """What is written beside images."""
-        return _result_files(self.output, self.format)
-
-
-def is_in_parts(output: str, form: Format) -> bool:
-    """Tell whether a result is a folder of parts."""
-    return form == "parquet" or is_url(output)
-
-
-def _result_files(output: str, form: Format) -> list[str]:
-    """List the result, what its rows were made from, and the record of its run; none of these of a stream."""
-    if is_stream(output):
-        return []
-    return [output, *([] if is_in_parts(output, form) else [inputs_path(output)]), run_path(output)]
+        """The result, what its rows were made from, and the record of its run; none of these of a stream."""
+        if is_stream(self.output):
+            return []
+        inputs = [] if self.in_parts else [inputs_path(self.output)]
+        return [self.output, *inputs, run_path(self.output)]
 
 
 def make_plan(options: EstimateOptions) -> Plan:
@@ -70,19 +61,18 @@ def make_plan(options: EstimateOptions) -> Plan:
     frames = _find_frames(options)
     if not options.paired:
         check_depth(frames, options.encoding)
-    output, form = options.result.output, options.result.form
-    if options.result.update and is_in_parts(output, form):
+    plan = Plan(frames, options.result.output, options.result.form)
+    if options.result.update and plan.in_parts:
         raise UsageError(
-            f"{output}: a result in parts (Parquet, or below a URL) does not say what its rows were made "
-            "from: --update takes a result in one file of CSV or JSON Lines"
+            f"{plan.output}: a result in parts (Parquet, or below a URL) does not say what its rows were "
+            "made from: --update takes a result in one file of CSV or JSON Lines"
         )
-    results = _result_files(output, form)
     if options.images.folders():
-        check_one_owner(((frame, _images([frame], options)) for frame in frames), results)
-    calibrations, every = calibration_files(options.calibration), frames
+        check_one_owner(((frame, _images([frame], options)) for frame in frames), plan.files)
+    calibrations = calibration_files(options.calibration)
     check_inputs_are_kept(
-        lambda: chain(calibrations, (path for frame in every for path in frame.reads())),
-        chain(results, _images(every, options)),
+        lambda: chain(calibrations, (path for frame in plan.frames for path in frame.reads())),
+        chain(plan.files, _images(plan.frames, options)),
     )
     frames = _shard(frames, options.result)
     check_places(frames, [folder for _, folder in options.images.folders()])
@@ -90,9 +80,10 @@ def make_plan(options: EstimateOptions) -> Plan:
     notes = check_first_size(frames, options.frame) if checked else []
     if not (options.running.overwrite or options.result.resume):
         check_images_are_new(frames, options)
-    if form == "parquet" and is_stream(output):
+    if plan.format == "parquet" and is_stream(plan.output):
         raise UsageError("Parquet is a folder of parts: name it with --output")
-    return Plan(frames, output, form, further_columns(frames, options.result), tuple(notes))
+    further = further_columns(frames, options.result)
+    return replace(plan, frames=frames, further=further, notes=tuple(notes))
 
 
 def further_columns(frames: Sequence[Frame], options: ResultOptions) -> tuple[str, ...]:

@@ -4,13 +4,12 @@ import os
 import sys
 import time
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from types import TracebackType
 from typing import Any
 
-from rollcli.files.results import Row
 from rollcli.messages import say
-from rollcli.run.frame import FrameResult, named_message
+from rollcli.run.frame import FrameResult
 from rollcli.run.options import EncodingOptions, RunningOptions
 from rollcli.run.summary import Figures, RunSummary
 
@@ -129,7 +128,8 @@ _CAUSES = 5  # that are said; a batch where every frame fails differently is no 
 
 @dataclass
 class _Cause:
-    first: Row
+    line: str
+    message: str
     frames: int = 1
     alike: bool = True  # whether all messages are the same, to the number
 
@@ -141,28 +141,26 @@ class Causes:
         self._causes: dict[str, _Cause] = {}
         self._others = 0
 
-    def add(self, code: str, row: Row) -> str:
-        """Take the row of a frame, with its message; return what is to be said of it now, or nothing."""
+    def add(self, code: str, line: str, message: str) -> str:
+        """Take the message of a frame, and the line that names it; return that if it is to be said now."""
         cause = self._causes.get(code)
         if cause is not None:
             cause.frames += 1
-            cause.alike &= row.message == cause.first.message
+            cause.alike &= message == cause.message
             return ""
         if len(self._causes) == _CAUSES:
             self._others += 1
             return ""
-        self._causes[code] = _Cause(row)
-        return named_message(row)
+        self._causes[code] = _Cause(line, message)
+        return line
 
     def repeated(self) -> list[str]:
         """Make a line of each cause that several frames had, and one of the causes that were not said."""
-        lines = []
-        for cause in self._causes.values():
-            if cause.frames > 1:
-                what = (
-                    f": {cause.first.message}" if cause.alike else f", such as {named_message(cause.first)}"
-                )
-                lines.append(f"{cause.frames} frames{what}")
+        lines = [
+            f"{cause.frames} frames" + (f": {cause.message}" if cause.alike else f", such as {cause.line}")
+            for cause in self._causes.values()
+            if cause.frames > 1
+        ]
         if self._others:
             frames = "frame" if self._others == 1 else "frames"
             lines.append(f"{self._others} further {frames}: other causes, which -v names")
@@ -240,11 +238,9 @@ class Progress(TaskProgress):
         for result in told:
             self._tell_input(result)
             if result.row.status == "error":
-                line = self._failures.add(result.cause, result.row)
-                if self._verbose:
-                    self.say(named_message(result.row))
-                elif line:
-                    self.say(line)
+                first = self._failures.add(result.cause, result.said, result.row.message)
+                if first or self._verbose:
+                    self.say(result.said)
             elif result.row.status == "suspect":
                 self.detail(f"{result.row.file}: suspect: {result.row.message}")
         self.advance(len(files))
@@ -256,12 +252,13 @@ class Progress(TaskProgress):
             how = f"{name}: read as {result.encoding} ({_MEANING[result.encoding]})"
             self.note(how, topic=result.encoding)
         if warning := result.warning:
-            row = replace(result.row, message=f"warning: {warning}")
-            line = self._warnings.add(" ".join(filter(result.warnings.get, result.warnings)), row)
+            code = " ".join(filter(result.warnings.get, result.warnings))
+            line = f"{name}: warning: {warning}"
+            first = self._warnings.add(code, line, f"warning: {warning}")
             if self._verbose:
-                self.detail(named_message(row))
-            elif line:
-                self.note(line)
+                self.detail(line)
+            elif first:
+                self.note(first)
         if searched is not None:
             how = f"{name}: searched disparities from {searched[0]} to {searched[1]} px"
             if self._verbose:

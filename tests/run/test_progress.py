@@ -1,10 +1,12 @@
 """Counts, lines and the exit status of a run."""
 
+from dataclasses import replace
+
 import pytest
 
 from rollcli.errors import ExitStatus
 from rollcli.files.results import Row
-from rollcli.run.frame import Frame, FrameResult, failed_frame, named_message
+from rollcli.run.frame import Frame, FrameResult, failed_frame
 from rollcli.run.options import EncodingOptions, RunningOptions
 from rollcli.run.progress import Progress
 from rollcli.run.summary import RunSummary
@@ -16,8 +18,15 @@ def progress(total=3, encoding=GUESSED, **running):
     return Progress(total, RunningOptions(**running), encoding)
 
 
+MAP = Frame("a.png", "", "a.png", "", "a.png", None)
+
+
 def result(status="ok", message="", **values):
     return FrameResult(Row("a.png", status=status, message=message), **values)
+
+
+def failed(name, message, cause):
+    return failed_frame(replace(MAP, file=name), message, cause)
 
 
 @pytest.fixture
@@ -42,7 +51,7 @@ def test_the_exit_status_says_whether_a_frame_failed(lines):
     counted = progress()
     counted.add(result("suspect"))
     assert counted.summary.status is ExitStatus.DONE
-    counted.add(result("error", "is no map"))
+    counted.add(failed("a.png", "is no map", "no map"))
     assert counted.summary.status is ExitStatus.FRAMES_FAILED
     assert lines() == ["rollcli: a.png: is no map"]
 
@@ -57,7 +66,7 @@ def test_a_cause_is_said_once_and_at_the_end_for_how_many_frames(lines):
         ("e", "text", "is text"),
         ("f", "empty", "is empty"),
     ]:
-        counted.add(FrameResult(Row(name, message=message), cause=cause))
+        counted.add(failed(name, message, cause))
     assert lines() == ["rollcli: a: is empty", "rollcli: b: only 37 valid pixels", "rollcli: e: is text"]
     counted.tell_end()
     assert lines() == ["rollcli: 3 frames: is empty", "rollcli: 2 frames, such as b: only 37 valid pixels"]
@@ -66,7 +75,7 @@ def test_a_cause_is_said_once_and_at_the_end_for_how_many_frames(lines):
 def test_of_many_causes_the_first_five_are_said(lines):
     counted = progress(quiet=True)
     for cause in "abcdefg":
-        counted.add(FrameResult(Row("x", message=cause), cause=cause))
+        counted.add(failed("x", cause, cause))
     counted.tell_end()
     assert lines() == [
         *(f"rollcli: x: {cause}" for cause in "abcde"),
@@ -77,13 +86,12 @@ def test_of_many_causes_the_first_five_are_said(lines):
 def test_a_verbose_run_names_every_failure(lines):
     counted = progress(verbose=True)
     for number in range(8):
-        counted.add(result("error", f"{number}"))
+        counted.add(failed("a.png", f"{number}", "number"))
     counted.tell_end()
     assert [line for line in lines() if "a.png" in line] == [f"rollcli: a.png: {n}" for n in range(8)]
 
 
 PAIR = Frame("left/a.png", "right/a.png", "left/a.png", "right/a.png", "a.png", None)
-MAP = Frame("a.png", "", "a.png", "", "a.png", None)
 
 
 @pytest.mark.parametrize(
@@ -98,8 +106,8 @@ MAP = Frame("a.png", "", "a.png", "", "a.png", None)
     ],
 )
 def test_a_row_does_not_repeat_its_file_and_stderr_names_it(frame, reason, message, said):
-    row = failed_frame(frame, reason).row
-    assert (row.message, named_message(row)) == (message, said)
+    failed = failed_frame(frame, reason)
+    assert (failed.row.message, failed.said) == (message, said)
 
 
 def test_how_numbers_were_read_is_said_once_unless_it_was_given(lines):
