@@ -6,14 +6,12 @@ import itertools
 import posixpath
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from functools import lru_cache
-from pathlib import Path
 
 from rollcli.errors import InputError, OutputError
 from rollcli.files.atomic import mark_path, remove_leftovers
 from rollcli.files.results import STATUSES
 from rollcli.files.storage import read_bytes, remove, remove_all, write_bytes, write_new
-from rollcli.files.stores.locations import is_object_url, is_url, located
-from rollcli.files.stores.objects import list_objects
+from rollcli.files.stores.locations import is_url, located
 from rollcli.run.frame import Frame
 from rollcli.run.options import ENDING_OF_FORMAT, ImageKind, ImageOptions
 
@@ -55,30 +53,6 @@ def local_images(
     for frame, place in zip(frames, status, strict=True):
         if STATUSES[place] != "error":
             yield from itertools.filterfalse(is_url, every_path(frame, images, root))
-
-
-class MadeImages:
-    """Which images of a run exist and are not empty.
-
-    A folder of an object store is listed once: asking for each object would take as long as making it again.
-    """
-
-    def __init__(self, images: ImageOptions) -> None:
-        self._images = images
-        folders = [f"{folder.rstrip('/')}/" for _, folder in images.folders() if is_object_url(folder)]
-        self._objects = {url for folder in folders for url, size in list_objects(folder) if size}
-
-    def has_all(self, frame: Frame) -> bool:
-        """Tell whether every image of a frame is there."""
-        return all(any(map(self._is_there, paths)) for paths in possible_paths(frame, self._images))
-
-    def _is_there(self, path: str) -> bool:
-        if is_url(path):
-            return path in self._objects
-        try:
-            return Path(path).stat().st_size > 0
-        except OSError:
-            return False
 
 
 def output_path(frame: Frame, folder: str, ending: str | None = None) -> str:

@@ -119,27 +119,39 @@ def check_nothing_is_there(writes: Iterable[str]) -> None:
     UsageError
         Names the first that does.
     """
-    there = _Existing()
+    there = Existing()
     for path in writes:
         if path in there:
             raise UsageError(f"{path}: exists already; give --overwrite to replace it")
 
 
-class _Existing:
-    """What exists; a folder of an object store is listed once, since each question to it takes a while."""
+class Existing:
+    """What exists; a folder of an object store is listed once, since each question to it takes a while.
 
-    def __init__(self) -> None:
+    Where `filled` is asked for, what is empty does not count.
+    """
+
+    def __init__(self, *, filled: bool = False) -> None:
         self._listed: dict[str, set[str]] = {}
+        self._filled = filled
 
     def __contains__(self, path: str) -> bool:
         if not is_object_url(path):
-            return os.path.lexists(path)
+            return not _is_empty(path) if self._filled else os.path.lexists(path)
         root = split_url(path)[0]
         folder = next((each for each in self._listed if path.startswith(each)), None)
         if folder is None:
             folder = path[: path.rindex("/") + 1] if path.count("/") > root.count("/") + 1 else f"{root}/"
-            self._listed[folder] = {found for found, _ in list_objects(folder)}
+            self._listed[folder] = {found for found, size in list_objects(folder) if size or not self._filled}
         return path in self._listed[folder]
+
+
+def _is_empty(path: str) -> bool:
+    """Tell whether a file is empty, or a link to nothing."""
+    try:
+        return Path(path).stat().st_size == 0
+    except OSError:
+        return True
 
 
 def list_files(frames: Iterable[tuple[Iterable[str], Iterable[str]]]) -> None:

@@ -17,8 +17,9 @@ from rollcli.run.batch import Batch
 from rollcli.run.frame import Frame
 from rollcli.run.inputs import Inputs
 from rollcli.run.options import EstimateOptions
-from rollcli.run.outputs import MadeImages
+from rollcli.run.outputs import possible_paths
 from rollcli.run.plan import Plan, check_images_are_new
+from rollcli.run.reads_and_writes import Existing
 from rollcli.run.record import RunRecord
 from rollcli.run.result_file import row_lines
 from rollcli.run.summary import RunSummary
@@ -74,7 +75,7 @@ class KeptRows:
         self._frames, self._images = plan.frames, options.images
         self._following, self._at = iter(plan.frames), 0
         self._retries = options.result.retry_failed
-        self._made: MadeImages | None = None
+        self._made = Existing(filled=True)
         self.inputs = inputs
         for row in rows:
             if not self.add(row):
@@ -105,8 +106,10 @@ class KeptRows:
                     self.changed += 1
                     self.first_changed = self.first_changed or frame.file
                     is_again = True
-            if row.status != "error" and not is_again and not self._has_images(frame):
-                self.incomplete.append(frame)
+            if row.status != "error" and not is_again:
+                images = possible_paths(frame, self._images)
+                if not all(any(path in self._made for path in paths) for paths in images):
+                    self.incomplete.append(frame)
         if row.status == "error":
             self.errors.append(self.count)
         if is_again:
@@ -144,12 +147,6 @@ class KeptRows:
             self.mismatch = Mismatch(row.file, frame.file, row.file != frame.file)
         elif found is not None and row.file == found.frame_file:
             self.mismatch = found._replace(frame_is_new=False)
-
-    def _has_images(self, frame: Frame) -> bool:
-        if not self._images.folders():
-            return True
-        self._made = self._made or MadeImages(self._images)
-        return self._made.has_all(frame)
 
 
 _SORT_LAST = "new frames must sort last, or be added by --update"
