@@ -1,6 +1,7 @@
 """The options of `estimate` and of the conversions. Import-light: the command line loads it for its help."""
 
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
@@ -278,7 +279,7 @@ class EstimateOptions(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ConvertOptions:
+class ConvertOptions(ABC):
     """What every command is told that makes files of each frame.
 
     Attributes
@@ -310,9 +311,9 @@ class ConvertOptions:
         return FrameOptions(encoding=self.encoding, root=root, replaces=replaces)
 
     @property
+    @abstractmethod
     def writes(self) -> list[tuple[str, str | None]]:
         """Folder and ending of each file that may be written for a frame; None: the frame's own ending."""
-        raise NotImplementedError
 
 
 @dataclass(frozen=True, kw_only=True)

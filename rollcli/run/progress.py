@@ -208,10 +208,6 @@ class Progress(TaskProgress):
         self._auto = encoding.encoding == "auto" and encoding.scale is None
         self._failures, self._warnings = Causes(), Causes()
 
-    def __enter__(self) -> "Progress":
-        super().__enter__()
-        return self
-
     def counted(self) -> dict[str, int]:
         """Name the failures."""
         return {"failed": self.summary.counts["error"]}

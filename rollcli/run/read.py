@@ -357,8 +357,8 @@ def _cause_of(error: BaseException | None) -> str:
     """Return what errors of one cause share: where they, and what led to them, were raised, and why."""
     places = []
     while error is not None:
-        *_, (frame, line) = traceback.walk_tb(error.__traceback__)
+        way = [f"{at.f_globals['__name__']}:{line}" for at, line in traceback.walk_tb(error.__traceback__)]
         why = getattr(error, "code", "") or getattr(error, "errno", "")
-        places.append(f"{type(error).__name__} {why} {frame.f_code.co_filename}:{line}")
+        places.append(f"{type(error).__name__} {why} {''.join(way[-1:])}")
         error = error.__cause__
     return " of ".join(places)
