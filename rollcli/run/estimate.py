@@ -2,7 +2,7 @@
 
 import contextlib
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from itertools import islice
 from typing import Any, NamedTuple
@@ -131,22 +131,16 @@ class _Step(NamedTuple):
     Attributes
     ----------
     frames : sequence of Frame
-    take : callable
-        Takes consecutive ones of them, their batch, and the places of their rows; see `Output`.
     positions : sequence of int
-        Of their rows in the result; none where only images are made.
-    replaces : bool
-        Whether rows have been left these places.
+        Of their rows in the result; none where the images of kept rows are made again.
     parts : Parts or None
         See `Pass`.
     retry_of : str
-        See `FrameOptions`.
+        See `FrameOptions`; empty unless the rows take the place of kept ones.
     """
 
     frames: Sequence[Frame]
-    take: Callable[[list[Frame], Batch, Sequence[int]], None]
     positions: Sequence[int] = ()
-    replaces: bool = False
     parts: Parts | None = None
     retry_of: str = ""
 
@@ -157,39 +151,25 @@ def _steps(run: _Run) -> Iterator[_Step]:
     A result takes rows in the place of others once the workers have ended, which hold the lock of the file
     that it was.
     """
-    output, kept, result = run.output, run.output.kept, run.plan.output
+    kept, result, every = run.output.kept, run.plan.output, run.plan.frames
     if kept.incomplete:
         missing = len(kept.incomplete)
         run.progress.note(f"images are missing or empty for {missing} of the kept rows: they are made again")
-        yield _Step(kept.incomplete, lambda frames, batch, at: output.restore(frames, batch))
+        yield _Step(kept.incomplete)
     name = result if is_url(result) else os.path.realpath(result)  # whichever folder it is resumed from
     for first in range(0, len(kept.again), _RETRIED_AT_ONCE):
         again = kept.again[first : first + _RETRIED_AT_ONCE]
-        frames = [run.plan.frames[position] for position in again]
-        yield _Step(
-            frames,
-            lambda frames, batch, at: output.replace(at, frames, batch),
-            again,
-            replaces=True,
-            retry_of=name,
-        )
-    for positions, parts in output.passes():
+        yield _Step([every[position] for position in again], again, retry_of=name)
+    for positions, parts in run.output.passes():
         if isinstance(positions, range):
-            every = run.plan.frames[positions.start : positions.stop]
+            yield _Step(every[positions.start : positions.stop], positions, parts)
         else:
-            every = [run.plan.frames[position] for position in positions]
-        yield _Step(
-            every,
-            lambda frames, batch, at: output.append(frames, batch),
-            positions,
-            replaces=bool(positions) and positions[0] < kept.count,
-            parts=parts,
-        )
+            yield _Step([every[position] for position in positions], positions, parts)
 
 
 def _run_steps(run: _Run) -> None:
     """Do one step after the other; images are written before rows, and rows in their order."""
-    progress = run.progress
+    output, progress = run.output, run.progress
     for step in _steps(run):
         done = 0
         progress.stopped_early = True  # unless all frames are done
@@ -198,14 +178,18 @@ def _run_steps(run: _Run) -> None:
             for batch in batches:
                 frames = list(islice(following, len(batch)))
                 positions = step.positions[done : done + len(batch)]
-                step.take(frames, batch, positions)
                 done += len(batch)
-                if step.positions:
-                    files = [frame.file for frame in frames]
-                    places = positions if step.replaces else None
-                    progress.add_rows(files, batch.figures, batch.told, places)
-                    if run.options.result.fail_fast and batch.figures.first_error >= 0:
-                        return
+                if not positions:
+                    output.restore(frames, batch)
+                    continue
+                if step.retry_of:
+                    output.replace(positions, frames, batch)
+                else:
+                    output.append(frames, batch)
+                left = positions if positions[0] < output.kept.count else None  # places left to these rows
+                progress.add_rows([frame.file for frame in frames], batch.figures, batch.told, left)
+                if run.options.result.fail_fast and batch.figures.first_error >= 0:
+                    return
         progress.stopped_early = done < len(step.frames)
         if progress.stopped_early:
             return

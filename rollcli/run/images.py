@@ -100,13 +100,6 @@ def encode_heights(heights: NDArray[np.float32], save_as: str, unit: str) -> byt
     return encode_tiff(heights, description=f"height over the road, {unit}")
 
 
-def encode_heights_preview(
-    heights: NDArray[np.float32], span: tuple[float, float], unit: str, photo: NDArray[Any] | None = None
-) -> bytes:
-    """Draw heights over the road, over the left image where there is one, and encode them."""
-    return encode_png(draw_heights(heights, span, unit, photo))
-
-
 _Named = tuple[str, bytes]
 
 
@@ -143,8 +136,8 @@ def _heights(path: str, of: Pictured) -> _Named:
 
 
 def _heights_preview(path: str, of: Pictured) -> _Named:
-    span = of.options.images.heights_range
-    return path, encode_heights_preview(of.heights, span, unit_of(of.calibration), of.source.photo)
+    span, unit = of.options.images.heights_range, unit_of(of.calibration)
+    return path, encode_png(draw_heights(of.heights, span, unit, of.source.photo))
 
 
 # by the names of `KINDS`

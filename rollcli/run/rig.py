@@ -278,11 +278,13 @@ def run_rig(options: RigOptions) -> int:
         list_files([(reads, writes)])
         return 0
     source = read_source(options.results)
-    rig = _assessed(source, options)
-    later = None if options.against is None else read_source([options.against])
-    after = None if later is None else _assessed(later, options)
-    changes = {} if after is None else _changes(rig, after)
-    missing = source.missing or (later.missing if later is not None else "")
+    rig, missing, after, changes = _assessed(source, options), source.missing, None, dict[str, Estimate]()
+    sources = [source]
+    if options.against is not None:
+        later = read_source([options.against])
+        sources.append(later)
+        missing, after = missing or later.missing, _assessed(later, options)
+        changes = {each.name: difference(rig.now(each), after.now(each)) for each in QUANTITIES}
     given = options.calibration
     health = health_of(rig, Calibrations(given).of(rig.frames.files[-1]) if given.given else None)
     checks = run_checks(rig, options.gates, missing, changes.get(ROLL.name), health)
@@ -297,8 +299,8 @@ def run_rig(options: RigOptions) -> int:
             say(f"{options.correction}: {NO_COLUMNS}")
         write_output(options.correction, correction, overwrite=overwrite)
     if not options.running.quiet:
-        for each in filter(None, [source, later]):
-            _tell(each)
+        for each in sources:
+            _say(filter(None, [*each.notes, each.missing]))
         if options.format != "table" or not is_stream(options.output):
             _say(findings(rig))
     said = {False: "FAILED", None: "cannot tell"}
@@ -308,15 +310,6 @@ def run_rig(options: RigOptions) -> int:
 
 def _assessed(source: Source, options: RigOptions) -> RigAssessment:
     return assess_frames(source.frames, include_suspect=options.include_suspect, groups=options.groups)
-
-
-def _changes(before: RigAssessment, after: RigAssessment) -> dict[str, Estimate]:
-    return {each.name: difference(before.now(each), after.now(each)) for each in QUANTITIES}
-
-
-def _tell(source: Source) -> None:
-    """Say what is to be known about where the frames are from."""
-    _say(filter(None, [*source.notes, source.missing]))
 
 
 def _say(lines: Iterable[str]) -> None:
@@ -362,13 +355,9 @@ def _pairs(rig: RigAssessment, results: Sequence[str]) -> Iterator[tuple[Frame, 
     chosen = told[np.linspace(0, len(told) - 1, min(_PAIRS, len(told))).astype(np.intp)]
     names = {rig.frames.files[place] for place in chosen}
     for result in results:
-        options = _matched_as(read_run(result), result)
+        options = recorded_options(read_run(result), run_path(result))
+        options = options._replace(stereo=replace(options.stereo, align="auto", vertical_offset=None))
         for name, data in pieces_of(result):
             for row in parse_rows(data, name):
                 if row.file in names and row.right_file and not is_remote(row.file):
                     yield frame_of_row(row, result), options
-
-
-def _matched_as(run: Mapping[str, object] | None, result: str) -> FrameOptions:
-    options = recorded_options(run, run_path(result))
-    return options._replace(stereo=replace(options.stereo, align="auto", vertical_offset=None))

@@ -103,7 +103,8 @@ class Health:
     def effect(self) -> str:
         """What the misalignment would do to the roll, and to depth where a calibration tells."""
         turned = TUNING.roll_per_px * (self.reach.value or 0.0)
-        depths = [f"{self.depth_percent(each):.1f} % at {each} m" for each in DISTANCES if self._metric]
+        percents = {each: self.depth_percent(each) for each in DISTANCES}
+        depths = [f"{off:.1f} % at {each} m" for each, off in percents.items() if off is not None]
         depth = f" and depth in the corners would err by {', '.join(depths)}" if depths else ""
         return f"uncorrected, it would turn the roll by up to {turned:.2f}°{depth}"
 
@@ -121,10 +122,6 @@ class Health:
             f"        the right view lies {', '.join(parts)}",
             f"        {self.effect}; {NOT_SEEN}",
         ]
-
-    @property
-    def _metric(self) -> bool:
-        return self.calibration is not None and self.calibration.baseline is not None
 
 
 def health_of(rig: RigAssessment, calibration: Calibration | None = None) -> Health | None:
