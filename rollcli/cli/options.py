@@ -108,11 +108,7 @@ _folders = (
 
 _named = (
     click.argument("inputs", nargs=-1, type=PATH),
-    option(
-        "--files-from",
-        type=FILE,
-        help="Read further inputs from FILE, one a line (-: stdin).",
-    ),
+    option("--files-from", type=FILE, help="Read further inputs from FILE, one a line (-: stdin)."),
 )
 
 input_options = record(
@@ -140,11 +136,7 @@ pair_options = record(
     "pairs",
     "Stereo pairs",
     PairOptions,
-    option(
-        "--left",
-        type=PATH,
-        help="Left images: a file, folder, quoted pattern, or a video.",
-    ),
+    option("--left", type=PATH, help="Left images: a file, folder, quoted pattern, or a video."),
     option("--right", type=PATH, help="Right images, or a video of as many frames."),
     option(
         "--match",
@@ -184,11 +176,7 @@ stereo_options = record(
         default="auto",
         help="Width of the searched range, pixels, a multiple of 16; auto: found from each pair.",
     ),
-    option(
-        "--min-disparity",
-        type=Number("PX", whole=True),
-        help="Smallest disparity searched, pixels.",
-    ),
+    option("--min-disparity", type=Number("PX", whole=True), help="Smallest disparity searched, pixels."),
     option(
         "--block-size",
         type=Number("PX", at_least=1, whole=True),
@@ -465,11 +453,7 @@ calibration_options = record(
         help="A file, or a folder with one of the same stem each: KITTI, Middlebury, ETH3D, OpenCV, ROS "
         "(twice: left, right), Cityscapes, ORB-SLAM, DrivingStereo; recognised by content.",
     ),
-    option(
-        "--focal",
-        type=Number("PX", above=0),
-        help="Focal length, pixels.  [default: the file's]",
-    ),
+    option("--focal", type=Number("PX", above=0), help="Focal length, pixels.  [default: the file's]"),
     option(
         "--principal-point",
         type=POINT,

@@ -130,11 +130,7 @@ simulate_options = record(
         help="Offset of the principal point in each direction, pixels, drawn evenly from A to B.  "
         "[default: 0]",
     ),
-    option(
-        "--baseline",
-        type=Number("M", above=0),
-        help="Distance of the cameras, metres.",
-    ),
+    option("--baseline", type=Number("M", above=0), help="Distance of the cameras, metres."),
     option(
         "--height",
         type=SPAN,
