@@ -19,6 +19,7 @@ from rollcli.run.options import (
     ConvertOptions,
     DerotateOptions,
     DisparityOptions,
+    FrameOptions,
     HeightsOptions,
     InputOptions,
     VDisparityOptions,
@@ -138,7 +139,7 @@ def _results(
     workers = Workers(running.jobs, running.scheduler, shared, threads=tasks_in_hand((*files, folder)))
     told = replace(options, inputs=InputOptions())  # which may be long
     work = Work(
-        partial(_convert, options=told),
+        partial(_convert, options=told, read=options.frame),  # made here, where relative paths start
         partial(_lost, replaces=running.overwrite),
         lambda each: remove_leftovers(each.writes),
     )
@@ -149,10 +150,10 @@ def _results(
             remove_leftovers(path for each in conversions for path in each.writes)
 
 
-def _convert(conversion: Conversion, options: ConvertOptions) -> FrameResult:
+def _convert(conversion: Conversion, options: ConvertOptions, read: FrameOptions) -> FrameResult:
     from rollcli.run.convert_frame import convert_frame  # loads NumPy: only on a worker
 
-    return convert_frame(conversion, options)
+    return convert_frame(conversion, options, read)
 
 
 def _lost(conversion: Conversion, reason: str, replaces: bool) -> FrameResult:

@@ -24,6 +24,7 @@ from rollcli.run.options import (
     ConvertOptions,
     DerotateOptions,
     DisparityOptions,
+    FrameOptions,
     HeightsOptions,
     VDisparityOptions,
 )
@@ -33,15 +34,15 @@ from rollcli.run.read import Source, guarded, read_source
 _Made = tuple[dict[str, bytes], dict[str, str]]  # files by their paths, and warnings by their codes
 
 
-def convert_frame(conversion: Conversion, options: ConvertOptions) -> FrameResult:
+def convert_frame(conversion: Conversion, options: ConvertOptions, read: FrameOptions) -> FrameResult:
     """Read a frame and write the files that its command makes of it, each whole or not at all."""
-    frame, paths = conversion.frame, [options.frame.at(path) for path in conversion.writes]
+    frame, paths = conversion.frame, [read.at(path) for path in conversion.writes]
     files: dict[str, bytes] = {}
 
     def work() -> FrameResult:
         if conversion.row is not None and conversion.row.map_roll_deg is None:
             raise InputError(f"{frame.file}: has no angle in {options.result}")
-        source = read_source(frame, options.frame)
+        source = read_source(frame, read)
         made, warnings = _MAKERS[type(options)](source, conversion, options, paths)
         files.update(made)
         row = Row(frame.file, frame.right_file, "ok", **source.alignment)
