@@ -223,6 +223,13 @@ def plain_values(row: Row, further: Sequence[str] = ()) -> dict[str, Any]:
     return {name: _plain(name, getattr(row, name)) for name in columns(further)}
 
 
+def csv_table(rows: Iterable[Iterable[Any]]) -> bytes:
+    """Format a table of another kind as CSV, its header first."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue().encode(**TEXT)
+
+
 def _quoted(text: str) -> str:
     """Quote a field of CSV; the csv module quotes a carriage return only from Python 3.13 on."""
     if not _SPECIAL.search(text):

@@ -1,27 +1,21 @@
-"""Build the scenes, each drawn from the seeds of a frame."""
+"""Build the scenes, each drawn from the seeds of a frame, and render their two views and true disparity."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from itertools import groupby
 
 import numpy as np
+from numpy.typing import NDArray
 
-from rollcli.simulate.dips import add_dips
+from rollcli.simulate import roadside
+from rollcli.simulate.camera import expose
+from rollcli.simulate.dips import add_dips, true_heights
 from rollcli.simulate.materials import Plain
 from rollcli.simulate.road import Carriageway, Piece, draw_asphalt, draw_carriageway
-from rollcli.simulate.roadside import (
-    add_backdrop,
-    add_cars,
-    add_grass,
-    add_hedge,
-    add_houses,
-    add_posts,
-    add_sidewalk,
-    add_slope,
-    add_trees,
-)
 from rollcli.simulate.scene import FAR, Light, Scene, draw, draw_light, draw_offset
-from rollcli.simulate.spec import FrameSpec
+from rollcli.simulate.spec import FrameSpec, Stream
 from rollcli.simulate.surfaces import Ground
+from rollcli.simulate.views import depths, render_view
 
 _HORIZON = 2000.0  # metres: the end of a bare world
 
@@ -48,13 +42,13 @@ def carriageway_of(spec: FrameSpec) -> Carriageway:
 
 def _begin(spec: FrameSpec) -> tuple[np.random.Generator, Light, Carriageway]:
     """Draw the light and the carriageway; return them with the generator for the rest of the scene."""
-    rng = spec.scene_rng()
+    rng = spec.rng(Stream.SCENE)
     return rng, draw_light(rng), draw_carriageway(rng, spec)
 
 
 def _bare(scene: Scene, rng: np.random.Generator, carriageway: Carriageway) -> None:
     """Add the road, and level grass from its edges to the horizon."""
-    grass = add_grass(scene, rng)
+    grass = roadside.add_grass(scene, rng)
     left, right = (
         Piece(*ends, offset=carriageway.section.elevation(edge))
         for ends, edge in (
@@ -69,16 +63,18 @@ def _bare(scene: Scene, rng: np.random.Generator, carriageway: Carriageway) -> N
 def _open(scene: Scene, rng: np.random.Generator, carriageway: Carriageway) -> None:
     """Add a road with kerbs, sidewalks, lawns, trees and cars."""
     _lay_road(scene, carriageway)
-    grass = add_grass(scene, rng)
+    grass = roadside.add_grass(scene, rng)
     for side, edge in carriageway.sides:
-        level, outer = add_sidewalk(scene, rng, carriageway, side, edge)
-        add_slope(scene, carriageway, side, outer, side * np.inf, level, draw(rng, -0.04, 0.06), grass)
+        level, outer = roadside.add_sidewalk(scene, rng, carriageway, side, edge)
+        roadside.add_slope(
+            scene, carriageway, side, outer, side * np.inf, level, draw(rng, -0.04, 0.06), grass
+        )
         if rng.random() < 0.3:
-            add_hedge(scene, rng, carriageway, outer + side * draw(rng, 0.2, 1.0), level - 0.1)
-        add_posts(scene, rng, carriageway, outer - side * 0.3, level)
-        add_trees(scene, rng, carriageway, outer, outer + side * 25, level - 0.4)
-    add_cars(scene, rng, carriageway)
-    add_backdrop(scene, rng, carriageway)
+            roadside.add_hedge(scene, rng, carriageway, outer + side * draw(rng, 0.2, 1.0), level - 0.1)
+        roadside.add_posts(scene, rng, carriageway, outer - side * 0.3, level)
+        roadside.add_trees(scene, rng, carriageway, outer, outer + side * 25, level - 0.4)
+    roadside.add_cars(scene, rng, carriageway)
+    roadside.add_backdrop(scene, rng, carriageway)
 
 
 def _street(scene: Scene, rng: np.random.Generator, carriageway: Carriageway) -> None:
@@ -86,32 +82,34 @@ def _street(scene: Scene, rng: np.random.Generator, carriageway: Carriageway) ->
     _lay_road(scene, carriageway)
     yard = scene.material(Plain(0.3, tint=(0.9, 0.97, 1.0), offset=draw_offset(rng)))
     for side, edge in carriageway.sides:
-        level, outer = add_sidewalk(scene, rng, carriageway, side, edge, beyond=yard)
+        level, outer = roadside.add_sidewalk(scene, rng, carriageway, side, edge, beyond=yard)
         garden = float(rng.choice([0.0, 1.0])) * draw(rng, 1, 6)
-        add_houses(scene, rng, carriageway.course, side, outer + side * garden, level)
-        add_posts(scene, rng, carriageway, edge + side * 0.5, level)
+        roadside.add_houses(scene, rng, carriageway.course, side, outer + side * garden, level)
+        roadside.add_posts(scene, rng, carriageway, edge + side * 0.5, level)
         if rng.random() < 0.35:
-            add_trees(scene, rng, carriageway, edge + side * 0.8, edge + side * 0.9, level)
-    add_cars(scene, rng, carriageway)
-    add_backdrop(scene, rng, carriageway)
+            roadside.add_trees(scene, rng, carriageway, edge + side * 0.8, edge + side * 0.9, level)
+    roadside.add_cars(scene, rng, carriageway)
+    roadside.add_backdrop(scene, rng, carriageway)
 
 
 def _verge(scene: Scene, rng: np.random.Generator, carriageway: Carriageway) -> None:
     """Add a country road between grass slopes that are wider than the road."""
     _lay_road(scene, carriageway)
-    grass = add_grass(scene, rng)
+    grass = roadside.add_grass(scene, rng)
     for side, edge in carriageway.sides:
         level = carriageway.section.elevation(edge)
         slope = float(rng.choice([-1.0, 1.0])) * draw(rng, 0.03, 0.3)
         width = (carriageway.right - carriageway.left) * draw(rng, 1.2, 3)
         foot = edge + side * width
-        add_slope(scene, carriageway, side, edge, foot, level, slope, grass)
-        add_slope(scene, carriageway, side, foot, side * np.inf, level + slope * width, 0.0, grass)
-        add_posts(scene, rng, carriageway, edge + side * 0.6, level + 0.6 * slope, radius=0.05, height=1.0)
+        roadside.add_slope(scene, carriageway, side, edge, foot, level, slope, grass)
+        roadside.add_slope(scene, carriageway, side, foot, side * np.inf, level + slope * width, 0.0, grass)
+        roadside.add_posts(
+            scene, rng, carriageway, edge + side * 0.6, level + 0.6 * slope, radius=0.05, height=1.0
+        )
         if slope < 0.1:
-            add_trees(scene, rng, carriageway, foot, foot + side * 30, level + slope * width)
-    add_cars(scene, rng, carriageway)
-    add_backdrop(scene, rng, carriageway)
+            roadside.add_trees(scene, rng, carriageway, foot, foot + side * 30, level + slope * width)
+    roadside.add_cars(scene, rng, carriageway)
+    roadside.add_backdrop(scene, rng, carriageway)
 
 
 def _lay_road(scene: Scene, carriageway: Carriageway) -> None:
@@ -131,3 +129,63 @@ def _grounds(carriageway: Carriageway, strips: list[tuple[Piece, int]], far: flo
 
 
 _KINDS = {"bare": _bare, "open": _open, "street": _street, "verge": _verge}
+
+
+@dataclass(frozen=True)
+class RenderedFrame:
+    """A rendered stereo pair with its truth.
+
+    Attributes
+    ----------
+    left, right : numpy.ndarray
+        uint8, (H, W, 3) in BGR order, or (H, W) where the spec asks for grey images.
+    disparity : numpy.ndarray
+        float32 (H, W), pixels, of the left view; 0 where there is only sky.
+    road : numpy.ndarray
+        bool (H, W): True where the left view shows the carriageway.
+    spec : FrameSpec
+        What was rendered.
+    heights : numpy.ndarray or None
+        float32 (H, W), metres: how high the ground in the left view lies over the road without dips and
+        bumps; NaN where it shows no ground. None unless the spec has a number of dips.
+    """
+
+    left: NDArray[np.uint8]
+    right: NDArray[np.uint8]
+    disparity: NDArray[np.float32]
+    road: NDArray[np.bool_]
+    spec: FrameSpec
+    heights: NDArray[np.float32] | None = None
+
+    @property
+    def roll(self) -> float:
+        """theta, radians."""
+        return self.spec.roll
+
+    @property
+    def pitch(self) -> float:
+        """Radians, positive looking down."""
+        return self.spec.pitch
+
+
+def render_frame(spec: FrameSpec) -> RenderedFrame:
+    """Render both views, the true disparity of the left one, and which of its pixels are road."""
+    scene, rng = build_scene(spec), spec.rng(Stream.SENSOR)
+    cameras = spec.cameras(scene.normal)
+    views = [render_view(scene, camera) for camera in cameras]
+    left, right = (
+        expose(view.light, spec.noise, gain, spec.colour, rng)
+        for view, gain in zip(views, (1.0, spec.gain), strict=True)
+    )
+    disparity = (spec.focal * spec.baseline / views[0].depth).astype(np.float32)
+    heights = None
+    if spec.dips is not None:
+        heights = true_heights(scene, spec, carriageway_of(spec), cameras[0])
+    return RenderedFrame(left, right, disparity, views[0].material == scene.road, spec, heights)
+
+
+def true_disparity(spec: FrameSpec) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Return the disparity (H, W) of the left view in double precision, 0 in the sky, and its road pixels."""
+    scene = build_scene(spec)
+    depth, material = depths(scene, spec.cameras(scene.normal)[0])
+    return spec.focal * spec.baseline / depth, material == scene.road

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from rollcli.errors import UsageError
-from rollcli.simulate.build import build_scene, carriageway_of
+from rollcli.simulate.build import build_scene, carriageway_of, render_frame, true_disparity
 from rollcli.simulate.dips import DippedGround, draw_dips
-from rollcli.simulate.render import render_frame, true_disparity
 from rollcli.simulate.spec import FrameSpec
 
 SMALL = {"size": (320, 120), "focal": 186.0, "pitch": 0.08}
