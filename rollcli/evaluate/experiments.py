@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -21,7 +21,14 @@ from rollcli.estimator.solvers.exact import exact, minima
 from rollcli.estimator.solvers.golden_section import golden_section
 from rollcli.estimator.solvers.gradient_descent import gradient_descent
 from rollcli.estimator.solvers.solution import Solution, Solver, angle_between
+from rollcli.evaluate.options import PaperOptions
 from rollcli.evaluate.textbook import Textbook
+from rollcli.evaluate.truth import KnownPose
+from rollcli.files.matching import stem_of
+from rollcli.files.results import Row
+from rollcli.run.frame import Frame, FrameResult, failed_frame
+from rollcli.run.frame_errors import FRAME_ERRORS
+from rollcli.run.read import Source, read_source
 
 
 def rotate_nearest(disparity: NDArray[Any], angle: float) -> NDArray[Any]:
@@ -264,3 +271,37 @@ def _best(function: Callable[[], Any], times: int) -> float:
         function()
         best = min(best, time.perf_counter() - start)
     return best
+
+
+@dataclass(frozen=True)
+class Examined:
+    """What became of a map: findings, or a result that says why there are none."""
+
+    result: FrameResult
+    findings: Findings | None
+
+
+def examine_file(frame: Frame, options: PaperOptions, truth: Mapping[str, KnownPose]) -> Examined:
+    """Read a map and run the experiments on it; `truth` holds known angles by stem, or nothing."""
+    turns = [math.radians(turn) for turn in options.experiments.turns_deg]
+    try:
+        source = read_source(frame, options.frame)
+        known = truth.get(stem_of(frame.file))
+        theta = None if known is None else known.theta
+        findings = examine(frame.file, usable_pixels(source), turns, theta, chosen=options.has_region)
+    except FRAME_ERRORS as error:
+        return lost(frame, str(error) or type(error).__name__)
+    warning = source.warning or source.beyond
+    return Examined(FrameResult(Row(frame.file, status="ok"), source.encoding, warning), findings)
+
+
+def usable_pixels(source: Source) -> NDArray[Any]:
+    """Clear the pixels of a map, shape (H, W), that may not be used: 0 is no data."""
+    if source.allowed is None:
+        return source.disparity
+    return np.where(source.allowed, source.disparity, 0)
+
+
+def lost(frame: Frame, reason: str) -> Examined:
+    """Return what is known of a map that could not be examined."""
+    return Examined(failed_frame(frame, reason), None)
