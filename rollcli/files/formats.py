@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError, UsageError
-from rollcli.files.codecs import arrays, channels, pictures, png, tiff
+from rollcli.files.codecs import arrays, pictures, png, tiff
 from rollcli.files.codecs.raw_map import Stored as Stored
 from rollcli.files.codecs.raw_map import native
 from rollcli.files.storage import read_bytes
@@ -61,15 +61,15 @@ MAP_FORMATS = {
         lambda values, *_: arrays.encode_npz(values),
     ),
     "exr": MapFormat(
-        (channels.MAGIC_EXR,),
-        lambda data, name: Stored(native(channels.decode_exr(data, name)), "exr"),
-        lambda values, *_: channels.encode_exr(values),
+        (pictures.MAGIC_EXR,),
+        lambda data, name: Stored(native(pictures.decode_exr(data, name)), "exr"),
+        lambda values, *_: pictures.encode_exr(values),
     ),
     # told by --encoding alone: to all others such a PNG is a photograph
     "rgb": MapFormat(
         (),
-        lambda data, name: Stored(channels.decode_rgb(data, name), "rgb"),
-        lambda values, *_: channels.encode_rgb(values),
+        lambda data, name: Stored(pictures.decode_rgb(data, name), "rgb"),
+        lambda values, *_: pictures.encode_rgb(values),
     ),
 }
 _KNOWN = {

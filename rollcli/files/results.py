@@ -161,28 +161,12 @@ ALIGNMENT_COLUMNS = ("right_lower_px", "right_clockwise_deg", "right_larger_perc
 _SPECIAL = re.compile(r'[,"\r\n]')  # what a field of CSV holds in quotes only
 # a millionth of a degree is far below any map's noise; nine digits keep alpha2, which is small, whole
 _DIGITS = {
-    "roll_deg": ".6f",
-    "roll_ci95_deg": ".6f",
-    "pitch_deg": ".6f",
-    "pitch_ci95_deg": ".6f",
-    "height_m": ".6f",
-    "height_ci95_m": ".6f",
-    "camber": ".6f",
+    **{name: ".6f" for name, kind in get_type_hints(Row).items() if kind == float | None},
+    **dict.fromkeys(("alpha0", "alpha1", "alpha2"), ".9g"),
+    **dict.fromkeys(ALIGNMENT_COLUMNS, ".4f"),
     "rmse_px": ".6g",
-    "alpha0": ".9g",
-    "alpha1": ".9g",
-    "alpha2": ".9g",
-    "valid_fraction": ".6f",
-    "road_fraction": ".6f",
-    "right_lower_px": ".4f",
-    "right_clockwise_deg": ".4f",
-    "right_larger_percent": ".4f",
-    "right_twist_px": ".4f",
-    "image_roll_deg": ".6f",
     "elapsed_ms": ".3f",
 }
-
-
 _ROLLS = ("roll_deg", "image_roll_deg")
 
 

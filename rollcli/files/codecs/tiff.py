@@ -4,15 +4,15 @@ import io
 import logging
 import struct
 import zlib
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError
-from rollcli.files.codecs.extras import imagecodecs
 from rollcli.files.codecs.png import decoding
-from rollcli.files.codecs.raw_map import COLOUR_REMEDY, Stored, native, require_decoded_fits
+from rollcli.files.codecs.raw_map import COLOUR_REMEDY, Stored, imagecodecs, native, require_decoded_fits
 
 _CLEAR, _END, _FIRST = 256, 257, 258
 _TABLE = 4096
@@ -23,8 +23,8 @@ _WIDTHS = 9 + (_PLACES >= 254) + (_PLACES >= 766) + (_PLACES >= 1790)
 _OFFSETS = np.concatenate([[0], np.cumsum(_WIDTHS)])
 
 
-class LzwError(ValueError):
-    """The bytes are no LZW data."""
+class DamagedPartError(ValueError):
+    """The bytes of a strip or tile are not its pixels."""
 
 
 def decode_lzw(packed: bytes, most: int) -> bytes:
@@ -32,7 +32,7 @@ def decode_lzw(packed: bytes, most: int) -> bytes:
 
     Raises
     ------
-    LzwError
+    DamagedPartError
         A code that cannot occur.
     """
     codes, parents = _codes(packed)
@@ -58,11 +58,11 @@ def _codes(packed: bytes) -> tuple[NDArray[Any], NDArray[Any]]:
         codes = (window[starts >> 3] >> (24 - (starts & 7) - widths)) & ((1 << widths) - 1)
         stops = np.flatnonzero((codes == _CLEAR) | (codes == _END))
         if len(stops) == 0 and fits == len(_WIDTHS):
-            raise LzwError("table overflow")
+            raise DamagedPartError("table overflow")
         count = int(stops[0]) if len(stops) else fits
         block = codes[:count].astype(np.int32)
         if np.any(block >= _FIRST + _PLACES[:count]):
-            raise LzwError("code not in the table")
+            raise DamagedPartError("code not in the table")
         blocks.append(block)
         parents.append(block - _FIRST + done)
         done += count
@@ -70,9 +70,9 @@ def _codes(packed: bytes) -> tuple[NDArray[Any], NDArray[Any]]:
             break
         position = int(starts[count]) + int(widths[count])
         if len(blocks) > 64 + len(packed) // 128:
-            raise LzwError("too many tables")  # each costs the same time, however short it is
+            raise DamagedPartError("too many tables")  # each costs the same time, however short it is
     if done == 0:
-        raise LzwError("no data")
+        raise DamagedPartError("no data")
     return np.concatenate(blocks), np.concatenate(parents)
 
 
@@ -105,10 +105,6 @@ MAX_EXPANSION = {_NONE: 1, _LZW: 2732, _DEFLATE: 1032, _OLD_DEFLATE: 1032, _PACK
 _PADDING = 1  # bytes after uncompressed data: parts begin at even places
 
 
-class DamagedPartError(ValueError):
-    """The bytes of a strip or tile are not its pixels."""
-
-
 def unpacked(compression: int, packed: bytes, size: int, most: int) -> bytes:
     """Unpack a strip or tile.
 
@@ -132,7 +128,7 @@ def unpacked(compression: int, packed: bytes, size: int, most: int) -> bytes:
         return plain
     try:
         plain = _UNPACK[compression](packed, most + 1)
-    except (zlib.error, LzwError) as error:
+    except zlib.error as error:
         raise DamagedPartError(str(error)) from None
     if len(plain) < size:
         raise DamagedPartError(f"{len(plain)} of {size} bytes")
@@ -151,10 +147,6 @@ def _fast(compression: int, packed: bytes, most: int) -> bytes | None:
     except (RuntimeError, ValueError):  # its errors are RuntimeErrors
         return None
     return plain
-
-
-def _stored(packed: bytes, most: int) -> bytes:
-    return packed
 
 
 def _inflated(packed: bytes, most: int) -> bytes:
@@ -180,8 +172,8 @@ def _unpacked_bits(packed: bytes, most: int) -> bytes:
     return bytes(plain)
 
 
-_UNPACK = {
-    _NONE: _stored,
+_UNPACK: dict[int, Callable[[bytes, int], bytes]] = {
+    _NONE: lambda packed, _: packed,
     _LZW: decode_lzw,
     _DEFLATE: _inflated,
     _OLD_DEFLATE: _inflated,
