@@ -8,9 +8,8 @@ from rollcli.files.naming import listed
 from rollcli.files.results import Result, Row
 from rollcli.files.stores.locations import public_name
 from rollcli.report.chart import Chart
-from rollcli.report.charts import outside
+from rollcli.report.charts import frame_axis, outside
 from rollcli.report.figures import with_still
-from rollcli.report.frame_axis import frame_axis
 from rollcli.report.options import ReportOptions
 from rollcli.report.page import Rows, render_page
 from rollcli.report.pictures import Pictures

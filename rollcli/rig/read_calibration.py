@@ -65,14 +65,9 @@ def parse_calibration(
     fields = _read([_text(name, data) for name, data in files]) if files else Fields()
     source = " and ".join(name for name, _ in files)
     options = [
-        option
-        for option, value in (
-            ("--focal", given.focal),
-            ("--principal-point", given.principal_point),
-            ("--baseline", given.baseline),
-            ("--doffs", given.doffs),
-        )
-        if value is not None
+        f"--{name.replace('_', '-')}"
+        for name, value in given._asdict().items()
+        if value is not None and name != "calib"
     ]
     return _complete(_overridden(fields, given), ", ".join(filter(None, [source, *options])), source)
 
@@ -105,8 +100,7 @@ def _overridden(fields: Fields, given: CalibrationOptions) -> Fields:
     if given.focal is not None:
         fields = replace(fields, fx=given.focal, fy=given.focal)
     if given.principal_point is not None:
-        cx, cy = given.principal_point
-        fields = replace(fields, cx=cx, cy=cy)
+        fields = replace(fields, cx=given.principal_point[0], cy=given.principal_point[1])
     if given.baseline is not None:
         # what the file's notes say is about its own baseline
         fields = replace(fields, baseline=given.baseline, notes=())
@@ -125,19 +119,5 @@ def _complete(fields: Fields, source: str, file: str) -> Calibration:
     if missing:
         start = f"{file}: {fields.lacks or 'says too little'}" if file else "the calibration is not complete"
         raise UsageError(f"{start}; add {' and '.join(missing)}")
-    assert fields.fx is not None
-    assert fields.fy is not None
-    assert fields.cx is not None
-    assert fields.cy is not None
-    return Calibration(
-        fields.fx,
-        fields.fy,
-        fields.cx,
-        fields.cy,
-        fields.baseline,
-        fields.doffs or 0.0,
-        fields.width,
-        fields.height,
-        source,
-        fields.notes,
-    )
+    known = {name: value for name, value in vars(fields).items() if name != "lacks"}
+    return Calibration(**{**known, "doffs": fields.doffs or 0.0}, source=source)
