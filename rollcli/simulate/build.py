@@ -1,18 +1,18 @@
 """Build the scenes, each drawn from the seeds of a frame, and render their two views and true disparity."""
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.simulate import roadside
 from rollcli.simulate.camera import expose
 from rollcli.simulate.dips import add_dips, true_heights
 from rollcli.simulate.materials import Plain
 from rollcli.simulate.road import Carriageway, Piece, draw_asphalt, draw_carriageway
-from rollcli.simulate.scene import FAR, Light, Scene, draw, draw_light, draw_offset
+from rollcli.simulate.roadside import Site
+from rollcli.simulate.scene import FAR, Light, Scene, draw_light, draw_offset
 from rollcli.simulate.spec import FrameSpec, Stream
 from rollcli.simulate.surfaces import Ground
 from rollcli.simulate.views import depths, render_view
@@ -25,7 +25,7 @@ def build_scene(spec: FrameSpec) -> Scene:
     rng, light, carriageway = _begin(spec)
     scene = Scene(light, normal=carriageway.normal)
     scene.road = scene.material(draw_asphalt(rng, carriageway))
-    _KINDS[spec.scene](scene, rng, carriageway)
+    _KINDS[spec.scene](Site(scene, rng, carriageway))
     add_dips(scene, spec, carriageway)
     return scene
 
@@ -46,86 +46,76 @@ def _begin(spec: FrameSpec) -> tuple[np.random.Generator, Light, Carriageway]:
     return rng, draw_light(rng), draw_carriageway(rng, spec)
 
 
-def _bare(scene: Scene, rng: np.random.Generator, carriageway: Carriageway) -> None:
+def _bare(site: Site) -> None:
     """Add the road, and level grass from its edges to the horizon."""
-    grass = roadside.add_grass(scene, rng)
-    left, right = (
-        Piece(*ends, offset=carriageway.section.elevation(edge))
-        for ends, edge in (
-            ((-np.inf, carriageway.left), carriageway.left),
-            ((carriageway.right, np.inf), carriageway.right),
-        )
-    )
-    strips = [(left, grass), *_road_strips(scene, carriageway), (right, grass)]
-    scene.surfaces += _grounds(carriageway, strips, _HORIZON)
+    grass = site.add_grass()
+    edges, elevation = (site.road.left, site.road.right), site.road.section.elevation
+    left = Piece(-np.inf, edges[0], offset=elevation(edges[0]))
+    right = Piece(edges[1], np.inf, offset=elevation(edges[1]))
+    _lay_road(site, _HORIZON, [(left, grass)], [(right, grass)])
 
 
-def _open(scene: Scene, rng: np.random.Generator, carriageway: Carriageway) -> None:
+def _open(site: Site) -> None:
     """Add a road with kerbs, sidewalks, lawns, trees and cars."""
-    _lay_road(scene, carriageway)
-    grass = roadside.add_grass(scene, rng)
-    for side, edge in carriageway.sides:
-        level, outer = roadside.add_sidewalk(scene, rng, carriageway, side, edge)
-        roadside.add_slope(
-            scene, carriageway, side, outer, side * np.inf, level, draw(rng, -0.04, 0.06), grass
-        )
-        if rng.random() < 0.3:
-            roadside.add_hedge(scene, rng, carriageway, outer + side * draw(rng, 0.2, 1.0), level - 0.1)
-        roadside.add_posts(scene, rng, carriageway, outer - side * 0.3, level)
-        roadside.add_trees(scene, rng, carriageway, outer, outer + side * 25, level - 0.4)
-    roadside.add_cars(scene, rng, carriageway)
-    roadside.add_backdrop(scene, rng, carriageway)
+    _lay_road(site)
+    grass = site.add_grass()
+    for side, edge in site.road.sides:
+        level, outer = site.add_sidewalk(side, edge)
+        site.add_slope(side, outer, side * np.inf, level, site.draw(-0.04, 0.06), grass)
+        if site.rng.random() < 0.3:
+            site.add_hedge(outer + side * site.draw(0.2, 1.0), level - 0.1)
+        site.add_posts(outer - side * 0.3, level)
+        site.add_trees(outer, outer + side * 25, level - 0.4)
+    site.add_cars()
+    site.add_backdrop()
 
 
-def _street(scene: Scene, rng: np.random.Generator, carriageway: Carriageway) -> None:
+def _street(site: Site) -> None:
     """Add a street between house fronts."""
-    _lay_road(scene, carriageway)
-    yard = scene.material(Plain(0.3, tint=(0.9, 0.97, 1.0), offset=draw_offset(rng)))
-    for side, edge in carriageway.sides:
-        level, outer = roadside.add_sidewalk(scene, rng, carriageway, side, edge, beyond=yard)
-        garden = float(rng.choice([0.0, 1.0])) * draw(rng, 1, 6)
-        roadside.add_houses(scene, rng, carriageway.course, side, outer + side * garden, level)
-        roadside.add_posts(scene, rng, carriageway, edge + side * 0.5, level)
-        if rng.random() < 0.35:
-            roadside.add_trees(scene, rng, carriageway, edge + side * 0.8, edge + side * 0.9, level)
-    roadside.add_cars(scene, rng, carriageway)
-    roadside.add_backdrop(scene, rng, carriageway)
+    _lay_road(site)
+    yard = site.scene.material(Plain(0.3, tint=(0.9, 0.97, 1.0), offset=draw_offset(site.rng)))
+    for side, edge in site.road.sides:
+        level, outer = site.add_sidewalk(side, edge, beyond=yard)
+        garden = float(site.rng.choice([0.0, 1.0])) * site.draw(1, 6)
+        site.add_houses(side, outer + side * garden, level)
+        site.add_posts(edge + side * 0.5, level)
+        if site.rng.random() < 0.35:
+            site.add_trees(edge + side * 0.8, edge + side * 0.9, level)
+    site.add_cars()
+    site.add_backdrop()
 
 
-def _verge(scene: Scene, rng: np.random.Generator, carriageway: Carriageway) -> None:
+def _verge(site: Site) -> None:
     """Add a country road between grass slopes that are wider than the road."""
-    _lay_road(scene, carriageway)
-    grass = roadside.add_grass(scene, rng)
-    for side, edge in carriageway.sides:
-        level = carriageway.section.elevation(edge)
-        slope = float(rng.choice([-1.0, 1.0])) * draw(rng, 0.03, 0.3)
-        width = (carriageway.right - carriageway.left) * draw(rng, 1.2, 3)
+    _lay_road(site)
+    grass = site.add_grass()
+    for side, edge in site.road.sides:
+        level = site.road.section.elevation(edge)
+        slope = float(site.rng.choice([-1.0, 1.0])) * site.draw(0.03, 0.3)
+        width = (site.road.right - site.road.left) * site.draw(1.2, 3)
         foot = edge + side * width
-        roadside.add_slope(scene, carriageway, side, edge, foot, level, slope, grass)
-        roadside.add_slope(scene, carriageway, side, foot, side * np.inf, level + slope * width, 0.0, grass)
-        roadside.add_posts(
-            scene, rng, carriageway, edge + side * 0.6, level + 0.6 * slope, radius=0.05, height=1.0
-        )
+        site.add_slope(side, edge, foot, level, slope, grass)
+        site.add_slope(side, foot, side * np.inf, level + slope * width, 0.0, grass)
+        site.add_posts(edge + side * 0.6, level + 0.6 * slope, radius=0.05, height=1.0)
         if slope < 0.1:
-            roadside.add_trees(scene, rng, carriageway, foot, foot + side * 30, level + slope * width)
-    roadside.add_cars(scene, rng, carriageway)
-    roadside.add_backdrop(scene, rng, carriageway)
+            site.add_trees(foot, foot + side * 30, level + slope * width)
+    site.add_cars()
+    site.add_backdrop()
 
 
-def _lay_road(scene: Scene, carriageway: Carriageway) -> None:
-    scene.surfaces += _grounds(carriageway, _road_strips(scene, carriageway), FAR)
+Strips = Sequence[tuple[Piece, int]]
 
 
-def _road_strips(scene: Scene, carriageway: Carriageway) -> list[tuple[Piece, int]]:
-    return [(piece, scene.road) for piece in carriageway.section.pieces]
-
-
-def _grounds(carriageway: Carriageway, strips: list[tuple[Piece, int]], far: float) -> Iterator[Ground]:
-    """Make the ground of pieces side by side with their materials; join pieces of one parabola."""
+def _lay_road(site: Site, far: float = FAR, left: Strips = (), right: Strips = ()) -> None:
+    """Add the ground of the road's pieces, and of those beside it with their materials, up to `far` ahead."""
+    road = site.road
+    strips = [*left, *((piece, site.scene.road) for piece in road.section.pieces), *right]
+    # pieces of one parabola are one ground
     for (slope, camber, offset), group in groupby(strips, key=lambda strip: strip[0][2:]):
         pieces, materials = zip(*group, strict=True)
         edges = (*(piece.start for piece in pieces), pieces[-1].end)
-        yield Ground(carriageway.course, edges, materials, far, slope, offset, camber, carriageway.relief)
+        ground = Ground(road.course, edges, materials, far, slope, offset, camber, road.relief)
+        site.scene.surfaces.append(ground)
 
 
 _KINDS = {"bare": _bare, "open": _open, "street": _street, "verge": _verge}

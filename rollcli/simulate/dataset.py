@@ -124,18 +124,12 @@ class RenderTask:
     folder: Path
     stem: str
 
-    def image(self, part: str) -> Path:
-        """Name the file of "left", "right" or "disparity"."""
-        return self.folder / part / f"{self.stem}.png"
-
-    def images(self) -> list[Path]:
-        """Name the files of the frame."""
-        return [self.image(part) for part in _PARTS] + ([] if self.heights is None else [self.heights])
-
     @property
-    def heights(self) -> Path | None:
-        """Name the file of true heights; None where there is none."""
-        return None if self.spec.dips is None else self.folder / _HEIGHTS / f"{self.stem}.tif"
+    def files(self) -> dict[str, Path]:
+        """The files of the frame: "left", "right", "disparity" and, where it has true ones, "heights"."""
+        files = {part: self.folder / part / f"{self.stem}.png" for part in _PARTS}
+        heights = self.folder / _HEIGHTS / f"{self.stem}.tif"
+        return files if self.spec.dips is None else {**files, _HEIGHTS: heights}
 
 
 @dataclass(frozen=True)
@@ -180,7 +174,7 @@ class Dataset:
     def files(self) -> list[Path]:
         """List all files that are written, truth.csv last."""
         record = [] if self.record is None else [Path(run_path(self.folder / _TRUTH))]
-        images = (path for task in self.missing for path in task.images())
+        images = (path for task in self.missing for path in task.files.values())
         return [*record, *images, *self.calibrations(), self.folder / _TRUTH]
 
 
@@ -209,8 +203,8 @@ def write_dataset(dataset: Dataset, jobs: int | None = 1, stop: Stop | None = No
         text = json.dumps(dataset.record, indent=2).encode() + b"\n"
         write_atomic(run_path(dataset.folder / _TRUTH), text)
     tasks, written = dataset.missing, 0
-    remove_leftovers(path for task in tasks for path in task.images())
-    work = Work(_write_frame, _lost, lambda task: remove_leftovers(task.images()))
+    remove_leftovers(path for task in tasks for path in task.files.values())
+    work = Work(_write_frame, _lost, lambda task: remove_leftovers(task.files.values()))
     for stem in run_tasks(tasks, work, stop or Stop(), Workers(jobs)):
         written += 1
         yield stem
@@ -221,19 +215,20 @@ def write_dataset(dataset: Dataset, jobs: int | None = 1, stop: Stop | None = No
 
 
 def _write_frame(task: RenderTask) -> str:
-    frame = render_frame(task.spec)
-    write_atomic(task.image("left"), _png(frame.left))
-    write_atomic(task.image("right"), _png(frame.right))
+    frame, files = render_frame(task.spec), task.files
+    write_atomic(files["left"], _png(frame.left))
+    write_atomic(files["right"], _png(frame.right))
     near = frame.disparity > KITTI_TOP
     stored = from_disparity(np.where(near, 0, frame.disparity), "kitti", np.uint16)
-    write_atomic(task.image("disparity"), encode_stored(stored, "png"))
-    if task.heights is not None and frame.heights is not None:
-        write_atomic(task.heights, encode_tiff(frame.heights, description="height over the road, metres"))
+    write_atomic(files["disparity"], encode_stored(stored, "png"))
+    if frame.heights is not None:
+        heights = encode_tiff(frame.heights, description="height over the road, metres")
+        write_atomic(files[_HEIGHTS], heights)
     return task.stem
 
 
 def _lost(task: RenderTask, reason: str) -> str:
-    raise OutputError(f"{task.image('left')}: cannot be rendered: {reason}; try fewer --jobs")
+    raise OutputError(f"{task.files['left']}: cannot be rendered: {reason}; try fewer --jobs")
 
 
 def _nearest_disparity(spec: FrameSpec) -> float:
@@ -305,7 +300,7 @@ def plan_dataset(folder: str | Path, options: SimulateOptions, *, overwrite: boo
             "--overwrite begins anew"
         )
     _check_resumable(dataset)
-    whole = (task.stem for task in dataset.tasks if all(path.exists() for path in task.images()))
+    whole = (task.stem for task in dataset.tasks if all(path.exists() for path in task.files.values()))
     return replace(dataset, kept=frozenset(whole))
 
 

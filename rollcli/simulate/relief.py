@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rollcli.simulate.options import ROUGHNESS
 from rollcli.simulate.vectors import Array, Vectors
@@ -23,6 +24,8 @@ FAR_ENDS = (15.0, 20.0, 25.0)  # metres
 NEAR_END = 4.0  # metres
 _LANE_STEP = 0.1  # metres across
 _LANE_ROWS = 64  # points along
+_FLOOR = 0.5  # of a dip's radius: so far out it is as deep as in its middle
+_AROUND = 1.2  # radii: a dip ends at the first
 # of rough roads
 _REFERENCE = 0.1  # waves per metre: n0 of [ISO]
 _SMOOTHEST = 16e-6  # m^3: G(n0) of class A, the geometric mean of its bounds
@@ -33,6 +36,37 @@ _ACROSS, _ALONG = 512, 2048  # nodes: 64 by 256 metres
 _SUNKEN = 0.003  # metres: the deepest track, and the highest patch, of class A
 _TRACK = 0.22  # metres: standard deviation of a track's depth across
 _MOST_PATCHES = 4
+
+
+@dataclass(frozen=True)
+class Dip:
+    """An ellipse of the road that lies lower, or higher where `height` is positive; metres.
+
+    `lateral` and `z` are its middle in road coordinates, `across` and `along` its radii.
+    """
+
+    lateral: float
+    z: float
+    across: float
+    along: float
+    height: float
+
+    @property
+    def box(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Its middle, lateral and Z, and how far it reaches from there, metres."""
+        return (self.lateral, self.z), (_AROUND * self.across, _AROUND * self.along)
+
+    def relief(self, lateral: Vectors, z: Vectors) -> tuple[Vectors, Vectors, Vectors]:
+        """Return height over the road, metres, and its slopes by lateral and by z."""
+        x, y = (lateral - self.lateral) / self.across, (z - self.z) / self.along
+        out = np.hypot(x, y)
+        fall = np.clip((out - _FLOOR) / (1 - _FLOOR), 0, 1)
+        by_out = -np.pi / 2 / (1 - _FLOOR) * np.sin(np.pi * fall) * self.height / np.maximum(out, _FLOOR)
+        return (
+            self.height * (0.5 + 0.5 * np.cos(np.pi * fall)),
+            by_out * x / self.across,
+            by_out * y / self.along,
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,35 +81,57 @@ class Relief:
         Lateral position of the first column and Z of the first row, metres.
     step : float
         Distance of the nodes, metres.
+    dips : tuple of Dip
+        What lies lower or higher than that.
     """
 
     heights: Array
     left: float
     start: float
     step: float
+    dips: tuple[Dip, ...] = ()
 
     @property
     def lowest(self) -> float:
         """The lowest height, metres."""
-        return float(self.heights.min())
+        return float(self.heights.min()) + min(
+            (dip.height for dip in self.dips if dip.height < 0), default=0.0
+        )
 
     @property
     def highest(self) -> float:
         """The greatest height, metres."""
-        return float(self.heights.max())
+        return float(self.heights.max()) + max(
+            (dip.height for dip in self.dips if dip.height > 0), default=0.0
+        )
+
+    def is_between(self, first: tuple[Array, Array], last: tuple[Array, Array]) -> NDArray[np.bool_]:
+        """Tell where it may be uneven between two positions (lateral and Z, each (N,)), metres."""
+        found = np.full(first[0].shape, bool(self.heights.any()))
+        for dip in self.dips:
+            near = np.ones(found.shape, bool)
+            for one, other, middle, radius in zip(first, last, *dip.box, strict=True):
+                near &= (np.fmax(one, other) > middle - radius) & (np.fmin(one, other) < middle + radius)
+            found |= near
+        return found
 
     def height(self, lateral: Vectors, z: Vectors) -> Vectors:
         """Return the heights (N,) at positions (N,), metres."""
         (near, right_near), (far, right_far), across, along = self._corners(lateral, z)
         first, last = near + across * (right_near - near), far + across * (right_far - far)
-        return np.asarray(first + along * (last - first))
+        return np.asarray(
+            sum((dip.relief(lateral, z)[0] for dip in self.dips), first + along * (last - first))
+        )
 
     def slopes(self, lateral: Vectors, z: Vectors) -> tuple[Vectors, Vectors]:
         """Return the slopes (N,) to the right and ahead at positions (N,), metres per metre."""
         (near, right_near), (far, right_far), across, along = self._corners(lateral, z)
-        right = (right_near - near) * (1 - along) + (right_far - far) * along
-        ahead = (far - near) * (1 - across) + (right_far - right_near) * across
-        return right / self.step, ahead / self.step
+        right = ((right_near - near) * (1 - along) + (right_far - far) * along) / self.step
+        ahead = ((far - near) * (1 - across) + (right_far - right_near) * across) / self.step
+        for dip in self.dips:
+            _, by_lateral, by_z = dip.relief(lateral, z)
+            right, ahead = right + by_lateral, ahead + by_z
+        return right, ahead
 
     def _corners(
         self, lateral: Vectors, z: Vectors
@@ -89,6 +145,9 @@ class Relief:
         near = flat.take(node), flat.take(node + 1)
         far = flat.take(node + columns), flat.take(node + columns + 1)
         return near, far, across - column, along - row
+
+
+LEVEL = Relief(np.zeros((2, 2)), 0.0, 0.0, 1.0)
 
 
 class LanePoints(NamedTuple):
