@@ -96,13 +96,17 @@ def to_disparity(
         Unknown encoding, a scale of 0, a negative one for unsigned numbers, or a calibration of another view.
     """
     used = resolve_encoding(encoding, stored.values.dtype, scale)
-    factor = _factor(used, stored.values.dtype) if scale is None else scale
+    factor = scale
+    if factor is None:
+        factor = _METRES[stored.values.dtype.kind] if used is Encoding.DEPTH else _SCALE[used]
     if not math.isfinite(factor) or factor == 0:
         raise UsageError(f"scale {factor}: must be a number other than 0, pixels per stored unit")
     if factor < 0 and stored.values.dtype.kind == "u":
         raise UsageError(f"scale {factor}: the stored numbers have no sign ({stored.values.dtype})")
     with np.errstate(all="ignore"):  # numbers too large for float32 become inf, and inf no data
-        positive = stored.values if factor > 0 else _negated(stored.values)
+        positive = stored.values
+        if factor < 0:  # whole numbers get room for their lowest
+            positive = -(positive if positive.dtype.kind == "f" else positive.astype(np.float64))
         disparity = (
             _from_depth(positive, abs(factor), calibration)
             if used is Encoding.DEPTH
@@ -222,11 +226,6 @@ def resolve_encoding(encoding: str, dtype: np.dtype[Any], scale: float | None) -
         raise UsageError(f"encoding {encoding!r} is unknown: choose one of {names}") from None
 
 
-def _negated(values: NDArray[Any]) -> NDArray[Any]:
-    """Turn the sign of numbers; whole ones get room for their lowest."""
-    return -(values if values.dtype.kind == "f" else values.astype(np.float64))
-
-
 def _scaled(values: NDArray[Any], encoding: Encoding, scale: float) -> NDArray[Any]:
     """Pixels; whatever is not a positive finite number becomes 0."""
     real = np.float64 if values.dtype.kind == "f" and values.dtype.itemsize >= 8 else np.float32
@@ -240,11 +239,6 @@ def _scaled(values: NDArray[Any], encoding: Encoding, scale: float) -> NDArray[A
     if not np.isfinite(pixels.max()):
         pixels[np.isinf(pixels)] = 0
     return pixels
-
-
-def _factor(encoding: Encoding, dtype: np.dtype[Any]) -> float:
-    """Return the pixels, or of a depth the metres, that a stored unit stands for."""
-    return _METRES[dtype.kind] if encoding is Encoding.DEPTH else _SCALE[encoding]
 
 
 def _from_depth(values: NDArray[Any], metres: float, calibration: Calibration | None) -> NDArray[Any]:

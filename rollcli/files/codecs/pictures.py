@@ -5,6 +5,7 @@ Such maps have their numbers in three channels of a PNG, or are OpenEXR.
 
 import os
 import re
+import struct
 from typing import Any
 
 import cv2
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from rollcli.errors import InputError, OutputError
 from rollcli.files.codecs import png
 from rollcli.files.codecs.png import decoding
-from rollcli.files.codecs.raw_map import PICTURE_FLAGS, native, require_decoded_fits
+from rollcli.files.codecs.raw_map import PICTURE_FLAGS, native, require_decoded_fits, require_pixels
 
 LOSSLESS = (b"BM", b"P5", b"P6")
 SIGNATURES = (b"\xff\xd8\xff", *LOSSLESS)
@@ -82,34 +83,18 @@ def _pnm(data: bytes, name: str) -> NDArray[Any]:
         raise InputError(f"{name}: is a damaged PGM or PPM: its header cannot be read")
     width, height, channels = int(header[2]), int(header[3]), 3 if header[1] == b"6" else 1
     dtype = np.dtype("u1" if int(header[4]) < 256 else ">u2")
-    needed, there = width * height * channels * dtype.itemsize, len(data) - header.end()
-    if needed == 0:
-        raise InputError(f"{name}: has no pixels ({width} x {height})")
-    if there < needed:
-        raise InputError(
-            f"{name}: is truncated: {width} x {height} pixels need {needed} bytes, {there} are there"
-        )
+    numbers = width * height * channels
+    require_pixels(width, height, name, numbers * dtype.itemsize, len(data) - header.end())
     require_decoded_fits(width, height, channels * dtype.itemsize, len(data), name)
-    pixels = np.frombuffer(data, dtype, width * height * channels, header.end()).reshape(
-        height, width, channels
-    )
+    pixels = np.frombuffer(data, dtype, numbers, header.end()).reshape(height, width, channels)
     return native(pixels[..., ::-1] if channels == 3 else pixels[..., 0])
 
 
 def _require_whole_bmp(data: bytes, name: str) -> None:
     """Refuse a bitmap that is not whole, before OpenCV prints what is wrong with it."""
-    start, size, width, height, bits, packing = (
-        int.from_bytes(data[first : first + count], "little", signed=first in (18, 22))
-        for first, count in ((10, 4), (14, 4), (18, 4), (22, 4), (28, 2), (30, 4))
-    )
-    if (
-        len(data) < 54
-        or not 40 <= size < 200
-        or width <= 0
-        or height == 0
-        or packing != 0
-        or bits not in (8, 24, 32)
-    ):
+    header = struct.unpack_from("<IIii2xHI", data, 10) if len(data) >= 54 else (0,) * 6
+    start, size, width, height, bits, packing = header
+    if not (40 <= size < 200 and width > 0 and height != 0 and packing == 0 and bits in (8, 24, 32)):
         raise InputError(
             f"{name}: is a damaged or an unusual BMP; 8, 24 and 32 bits without compression are read"
         )

@@ -13,7 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError, OutputError
-from rollcli.files.codecs.raw_map import COLOUR_REMEDY, PICTURE_FLAGS, imagecodecs, require_decoded_fits
+from rollcli.files.codecs.raw_map import (
+    COLOUR_REMEDY,
+    PICTURE_FLAGS,
+    Stored,
+    imagecodecs,
+    require_decoded_fits,
+    require_pixels,
+)
 
 _MOST = 4000  # bytes of it that are looked at
 _sink: int | None = None
@@ -163,12 +170,16 @@ class _Header(NamedTuple):
 
 
 class _Whole(NamedTuple):
-    """What decides the pixels: the header, the bodies of palette and transparency, the chunks of the data."""
+    """What decides the pixels: the header, the bodies of palette and transparency, the chunks of the data.
+
+    `text` is what rollcli wrote beside them.
+    """
 
     header: _Header
     palette: bytes
     transparent: bytes
     image: list[memoryview]
+    text: str
 
     @property
     def packed_size(self) -> int:
@@ -190,12 +201,16 @@ class _Whole(NamedTuple):
         return b"".join([*start, *self.image, _chunk(b"IEND", b"")])
 
 
-def grey_values(data: bytes, name: str) -> NDArray[Any]:
-    """Return the values of a single-channel PNG as they are stored; shape (H, W), uint8 or uint16.
+def decode_png(data: bytes, name: str) -> Stored:
+    """Return the numbers of a single-channel PNG as they are stored, uint8 or uint16, and rollcli's text.
 
     A palette of greys stands for its greys; fully transparent pixels hold no data and become 0.
     """
     whole = _checked(data, name)
+    return Stored(_grey_values(whole, name), "png", text=whole.text)
+
+
+def _grey_values(whole: "_Whole", name: str) -> NDArray[Any]:
     header, transparent = whole.header, whole.transparent
     pixels = _decoded(whole, name, cv2.IMREAD_UNCHANGED)
     if header.colour == _GREY:
@@ -218,18 +233,6 @@ def grey_values(data: bytes, name: str) -> NDArray[Any]:
 def picture(data: bytes, name: str, *, mask: bool = False) -> NDArray[Any]:
     """Return the pixels of a camera image or mask: grey (H, W) or BGR (H, W, 3), uint8 or uint16."""
     return _decoded(_checked(data, name, mask), name, PICTURE_FLAGS)
-
-
-def text_of(data: bytes) -> str:
-    """Return what rollcli wrote into a whole PNG file beside the pixels; empty where that is nothing."""
-    position, kind = len(SIGNATURE), b""
-    while kind not in (b"IDAT", b"IEND"):
-        end = position + 12 + int.from_bytes(data[position : position + 4], "big")
-        kind, body = data[position + 4 : position + 8], data[position + 8 : end - 4]
-        if kind == b"tEXt" and body.startswith(_TEXT_KEY):
-            return body.removeprefix(_TEXT_KEY).decode("latin-1")
-        position = end
-    return ""
 
 
 def encode_png(values: NDArray[Any], text: str = "") -> bytes:
@@ -259,7 +262,7 @@ def _decoded(whole: _Whole, name: str, flags: int) -> NDArray[Any]:
 def _checked(data: bytes, name: str, mask: bool = False) -> _Whole:
     """Return what decides the pixels; InputError if the file is not whole."""
     view, position = memoryview(data), len(SIGNATURE)
-    header, palette, transparent, kind = None, b"", b"", b""
+    header, bodies, text, kind = None, dict[bytes, bytes](), "", b""
     image: list[memoryview] = []
     while kind != b"IEND":
         end = position + 12 + int.from_bytes(view[position : position + 4], "big")
@@ -267,22 +270,22 @@ def _checked(data: bytes, name: str, mask: bool = False) -> _Whole:
             raise InputError(f"{name}: is a truncated PNG: it ends after {len(data)} bytes")
         if zlib.crc32(view[position + 4 : end - 4]) != int.from_bytes(view[end - 4 : end], "big"):
             raise InputError(f"{name}: is a damaged PNG: wrong checksum {position} bytes in")
-        kind = data[position + 4 : position + 8]
+        kind, body = data[position + 4 : position + 8], view[position + 8 : end - 4]
         if (header is None) != (kind == b"IHDR"):
             raise InputError(f"{name}: is a damaged PNG: its header is not first, or not alone")
         if kind == b"IDAT":
             image.append(view[position:end])
         elif kind == b"IHDR":
-            header = _header(data[position + 8 : end - 4], name)
-        elif kind == b"PLTE":
-            palette = data[position + 8 : end - 4]
-        elif kind == b"tRNS":
-            transparent = data[position + 8 : end - 4]
+            header = _header(bytes(body), name)
+        elif kind in (b"PLTE", b"tRNS"):
+            bodies[kind] = bytes(body)
+        elif kind == b"tEXt" and not (image or text) and body[: len(_TEXT_KEY)] == _TEXT_KEY:
+            text = bytes(body[len(_TEXT_KEY) :]).decode("latin-1")
         elif kind != b"IEND" and kind[:1].isupper():
             raise InputError(f"{name}: is no standard PNG: chunk {kind.decode('latin-1')!r} is unknown")
         position = end
     assert header is not None
-    whole = _Whole(header, palette, transparent, image)
+    whole = _Whole(header, bodies.get(b"PLTE", b""), bodies.get(b"tRNS", b""), image, text)
     require_decoded_fits(*header[:2], header.pixel_bytes, whole.packed_size, name, mask=mask)
     _require_data(whole, name)
     return whole
@@ -295,8 +298,7 @@ def _header(body: bytes, name: str) -> _Header:
     sane = header.depth in _DEPTHS.get(header.colour, ()) and header.interlace <= 1
     if not sane or header.compression or header.filtering or max(header[:2]) > _MAX_SIDE:
         raise InputError(f"{name}: is a damaged PNG: its header makes no sense")
-    if header.width == 0 or header.height == 0:
-        raise InputError(f"{name}: has no pixels ({header.width} x {header.height})")
+    require_pixels(header.width, header.height, name)
     return header
 
 

@@ -60,6 +60,16 @@ def require_map_shape(shape: tuple[int, ...], name: str) -> None:
         raise InputError(f"{name}: has no pixels (shape {shape})")
 
 
+def require_pixels(width: int, height: int, name: str, needed: int = 0, there: int = 0) -> None:
+    """Refuse an image without pixels, and one of whose bytes fewer are there than are needed."""
+    if width == 0 or height == 0:
+        raise InputError(f"{name}: has no pixels ({width} x {height})")
+    if there < needed:
+        raise InputError(
+            f"{name}: is truncated: {width} x {height} pixels need {needed} bytes, {there} are there"
+        )
+
+
 def require_decoded_fits(
     width: int, height: int, pixel_bytes: int, stored: int, name: str, *, mask: bool = False
 ) -> None:

@@ -1,10 +1,11 @@
 """TIFF [TIFF 6.0]: tifffile reads the tags; the pixels are decoded strip by strip."""
 
+import contextlib
 import io
 import logging
 import struct
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,14 @@ from numpy.typing import NDArray
 
 from rollcli.errors import InputError
 from rollcli.files.codecs.png import decoding
-from rollcli.files.codecs.raw_map import COLOUR_REMEDY, Stored, imagecodecs, native, require_decoded_fits
+from rollcli.files.codecs.raw_map import (
+    COLOUR_REMEDY,
+    Stored,
+    imagecodecs,
+    native,
+    require_decoded_fits,
+    require_pixels,
+)
 
 _CLEAR, _END, _FIRST = 256, 257, 258
 _TABLE = 4096
@@ -304,22 +312,17 @@ logging.getLogger("tifffile").addHandler(logging.NullHandler())
 
 def decode_tiff(data: bytes, name: str) -> Stored:
     """Return the numbers of a single-channel TIFF file, as they are stored; of several pages the first."""
-
-    def decode(file: Any, page: Any) -> Stored:
+    with _first_page(data, name) as (file, page):
         if page.samplesperpixel != 1 or page.photometric == _PALETTE:
             what = "a palette" if page.photometric == _PALETTE else f"{page.samplesperpixel} channels"
             raise InputError(f"{name}: is a colour image ({what}); {COLOUR_REMEDY}")
-        values = _pixels(page, data, name)[..., 0]
-        return Stored(native(values), "tiff", nodata=_nodata(page), note=_note(file, name), text=_text(page))
-
-    decoded: Stored = _with_first_page(data, name, decode)
-    return decoded
+        values = native(_pixels(page, data, name)[..., 0])
+        return Stored(values, "tiff", nodata=_nodata(page), note=_note(file, name), text=_text(page))
 
 
 def picture(data: bytes, name: str) -> NDArray[Any]:
     """Return the pixels of a camera image: grey (H, W) or BGR (H, W, 3), uint8 or uint16."""
-
-    def decode(_: Any, page: Any) -> NDArray[Any]:
+    with _first_page(data, name) as (_, page):
         colour = page.photometric == _RGB and page.samplesperpixel >= 3
         if not (colour or page.samplesperpixel == 1) or page.photometric == _PALETTE:
             raise InputError(f"{name}: is neither a grey nor an RGB TIFF")
@@ -329,9 +332,6 @@ def picture(data: bytes, name: str) -> NDArray[Any]:
                 f"{name}: holds {pixels.dtype} numbers; a camera image has 8 or 16 bits a channel"
             )
         return native(pixels[..., 2::-1] if colour else pixels[..., 0])
-
-    pixels: NDArray[Any] = _with_first_page(data, name, decode)
-    return pixels
 
 
 def encode_tiff(values: NDArray[Any], nodata: tuple[float, ...] = (), description: str = "") -> bytes:
@@ -355,13 +355,14 @@ def encode_tiff(values: NDArray[Any], nodata: tuple[float, ...] = (), descriptio
     return buffer.getvalue()
 
 
-def _with_first_page(data: bytes, name: str, decode: Any) -> Any:
-    """decode(file, page) of the first page; whatever the tags make it stumble over becomes an InputError."""
+@contextlib.contextmanager
+def _first_page(data: bytes, name: str) -> Iterator[tuple[Any, Any]]:
+    """Yield the file and its first page; whatever the tags make one stumble over becomes an InputError."""
     import tifffile  # only those who have TIFF files wait for it
 
     try:
         with tifffile.TiffFile(io.BytesIO(data)) as file:
-            return decode(file, file.pages[0])
+            yield file, file.pages[0]
     except (tifffile.TiffFileError, *_DAMAGE):
         raise InputError(f"{name}: is a damaged or truncated TIFF") from None
 
@@ -369,8 +370,7 @@ def _with_first_page(data: bytes, name: str, decode: Any) -> Any:
 def _pixels(page: Any, data: bytes, name: str) -> NDArray[Any]:
     """Return the numbers of one page; shape (H, W, channels)."""
     width, height, samples = int(page.imagewidth), int(page.imagelength), int(page.samplesperpixel)
-    if width == 0 or height == 0:
-        raise InputError(f"{name}: has no pixels ({width} x {height})")
+    require_pixels(width, height, name)
     if int(page.imagedepth) != 1:
         raise InputError(f"{name}: is a volume of {page.imagedepth} slices, not a 2-D image")
     if page.dtype is None or page.dtype.kind not in "biuf":

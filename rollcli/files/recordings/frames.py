@@ -323,16 +323,11 @@ def _beside(topic: str) -> str:
 def _camera(found: _Found, topic: str, *, right: bool) -> CameraInfo | None:
     """Return the one left, or right, camera; of several the one whose namespace has most in common."""
     fitting = [
-        (_in_common(name, topic), name)
+        (len(os.path.commonprefix([name, topic])), name)  # noqa: RUF071 (letter by letter)
         for name, info in found.cameras.items()
         if info.usable and (info.p[3] != 0) is right
     ]
     return found.cameras[max(fitting)[1]] if fitting else None
-
-
-def _in_common(one: str, other: str) -> int:
-    """Count the first characters that two names share."""
-    return next((at for at, (a, b) in enumerate(zip(one, other, strict=False)) if a != b), len(one))
 
 
 def _calibration(

@@ -15,6 +15,7 @@ from rollcli.errors import InputError
 from rollcli.extras import require_extra
 from rollcli.files.bounded import MOST_BYTES
 from rollcli.files.codecs import arrays, pictures, png
+from rollcli.files.codecs.raw_map import require_pixels
 from rollcli.files.recordings.bags import Topic
 
 DISPARITY, IMAGE, COMPRESSED = (
@@ -206,8 +207,7 @@ def _pixels(image: Any, name: str) -> NDArray[Any]:
         raise InputError(f"{name}: has pixels of the encoding {encoding[:40]!r}, which is not read")
     dtype = np.dtype(kind).newbyteorder(">" if image.is_bigendian else "<")
     row = width * channels * dtype.itemsize
-    if width == 0 or height == 0:
-        raise InputError(f"{name}: has no pixels ({width} x {height})")
+    require_pixels(width, height, name)
     if step < row:
         raise InputError(
             f"{name}: its rows have {step} bytes, of {row} that {width} pixels of {encoding} need"
