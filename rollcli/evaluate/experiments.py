@@ -139,6 +139,15 @@ def examine(
     height, width = disparity.shape
     methods = _methods(max(map(abs, turns), default=0.0), chosen)
     rotated = [rotate_nearest(disparity, turn) for turn in turns]
+
+    def errors_of(method: Callable[[NDArray[Any]], float]) -> tuple[float | None, ...]:
+        base = _angle(method, disparity) if truth is None else truth
+        found = [_angle(method, each) for each in rotated]
+        return tuple(
+            None if base is None or angle is None else angle_between(angle, base + turn)
+            for angle, turn in zip(found, turns, strict=True)
+        )
+
     return Findings(
         file=file,
         width=width,
@@ -149,9 +158,7 @@ def examine(
         gd=tuple(gradient_descent(energy, SolverSettings(delta)).iterations for delta in DELTAS),
         sweep=_sweep(energy),
         solver_errors=_solver_errors(rotated, turns, theta if truth is None else truth),
-        method_errors={
-            name: _method_errors(method, disparity, rotated, turns, truth) for name, method in methods.items()
-        },
+        method_errors={name: errors_of(method) for name, method in methods.items()},
     )
 
 
@@ -200,21 +207,6 @@ def _methods(largest_turn: float, chosen: bool) -> dict[str, Callable[[NDArray[A
         "areas": partial(by_areas, "areas"),
         "auto": lambda disparity: estimate_roll(disparity, road="auto", max_roll=max_roll).theta,
     }
-
-
-def _method_errors(
-    method: Callable[[NDArray[Any]], float],
-    disparity: NDArray[Any],
-    rotated: Sequence[NDArray[Any]],
-    turns: Sequence[float],
-    truth: float | None,
-) -> tuple[float | None, ...]:
-    base = _angle(method, disparity) if truth is None else truth
-    found = [_angle(method, each) for each in rotated]
-    return tuple(
-        None if base is None or theta is None else angle_between(theta, base + turn)
-        for theta, turn in zip(found, turns, strict=True)
-    )
 
 
 def _angle(method: Callable[[NDArray[Any]], float], disparity: NDArray[Any]) -> float | None:

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from rollcli.files.results import Row
 from rollcli.pictures.round_step import round_step
-from rollcli.report.chart import ALIGNED, HISTOGRAM, Chart, chart_names
+from rollcli.report.options import ALIGNED, HISTOGRAM, chart_names
+from rollcli.report.page import Chart
 from rollcli.report.summary import degrees, with_interval
-from rollcli.rig.drive.assess import DriveAssessment, RigAssessment, seconds_of
-from rollcli.rig.drive.quantity import SequenceAssessment
+from rollcli.rig.drive.assess import RigAssessment, seconds_of
 from rollcli.rig.quantities import ALIGNMENT, HEIGHT, QUANTITIES, ROLL, Quantity
 from rollcli.rig.words import answer, decimals
 from rollcli.stereo.misalignment import Misalignment
@@ -59,22 +59,13 @@ class FrameAxis:
 
     def layout(self) -> dict[str, Any]:
         """Return the axis as plotly takes it."""
+        first, last = (1, self.count) if self.places is None else (self.places[0], self.places[-1])
+        margin = 0.01 * (last - first) if self.places is not None else max(0.5, 0.01 * self.count)
+        span = {"range": [first - margin, last + margin], "zeroline": False}
         if self.places is not None:
-            first, last = self.places[0], self.places[-1]
-            margin = 0.01 * (last - first)
-            return {
-                "title": {"text": f"time, {self.unit}"},
-                "range": [first - margin, last + margin],
-                "zeroline": False,
-            }
-        margin = max(0.5, 0.01 * self.count)
-        return {
-            "title": {"text": "frame"},
-            "range": [1 - margin, self.count + margin],
-            "zeroline": False,
-            "tickformat": ",d",
-            **({"dtick": 1} if self.count <= _FEW else {}),  # there are no half frames
-        }
+            return {"title": {"text": f"time, {self.unit}"}, **span}
+        few = {"dtick": 1} if self.count <= _FEW else {}  # there are no half frames
+        return {"title": {"text": "frame"}, **span, "tickformat": ",d", **few}
 
 
 def frame_axis(rows: Sequence[Row], rig: RigAssessment | None = None) -> FrameAxis:
@@ -130,9 +121,21 @@ def rig_traces(
     jumps["line"] = {"color": "@error", "width": 1.5, "dash": "dash"}
     for drive in rig.drives:
         found = drive.quantities.get(quantity.name)
-        if found is not None:
-            _add_segments(drive, quantity, found, band, means, axis)
-            _add_jumps(rig, drive, quantity, found, jumps, ends, axis)
+        for segment in found.segments if found is not None else ():
+            if segment.mean.value is None or segment.first == segment.last:  # a frame alone is its own mean
+                continue
+            first, last = (axis.at(int(drive.frames[place]) + 1) for place in (segment.first, segment.last))
+            said = f"mounting {quantity.name} {answer(segment.end, quantity)}, of {segment.used:,} frames"
+            level = [each.value or 0.0 for each in (segment.begin, segment.end)]
+            _add(means, [first, last], level, said)
+            if segment.begin.ci95 is not None and segment.end.ci95 is not None:
+                halves = segment.begin.ci95, segment.end.ci95
+                low, high = ([v + side * h for v, h in zip(level, halves, strict=True)] for side in (-1, 1))
+                _add(band, [first, last, last, first], [*high, *low[::-1]], "")
+        for jump in found.jumps if found is not None else ():
+            frame = int(drive.frames[jump.frame])
+            said = f"jump by {answer(jump.change, quantity, change=True)} at {rig.names[frame]}"
+            _add(jumps, [axis.at(frame + 0.5)] * 2, ends, said)
     return [trace for trace in (band, means, jumps) if trace["x"]]
 
 
@@ -146,42 +149,6 @@ def _add(trace: Trace, x: Sequence[float], y: Sequence[float], text: str) -> Non
     trace["x"] += [*x, None]
     trace["y"] += [*(round(each, 4) for each in y), None]
     trace["text"] += [*([html.escape(text)] * len(x)), None]
-
-
-def _add_segments(
-    drive: DriveAssessment,
-    quantity: Quantity,
-    found: SequenceAssessment,
-    band: Trace,
-    means: Trace,
-    axis: FrameAxis,
-) -> None:
-    for segment in found.segments:
-        if segment.mean.value is None or segment.first == segment.last:  # a frame alone is its own mean
-            continue
-        first, last = (axis.at(int(drive.frames[place]) + 1) for place in (segment.first, segment.last))
-        said = f"mounting {quantity.name} {answer(segment.end, quantity)}, of {segment.used:,} frames"
-        ends = [each.value or 0.0 for each in (segment.begin, segment.end)]
-        _add(means, [first, last], ends, said)
-        if segment.begin.ci95 is not None and segment.end.ci95 is not None:
-            halves = segment.begin.ci95, segment.end.ci95
-            low, high = ([v + side * h for v, h in zip(ends, halves, strict=True)] for side in (-1, 1))
-            _add(band, [first, last, last, first], [*high, *low[::-1]], "")
-
-
-def _add_jumps(
-    rig: RigAssessment,
-    drive: DriveAssessment,
-    quantity: Quantity,
-    found: SequenceAssessment,
-    jumps: Trace,
-    ends: tuple[float, float],
-    axis: FrameAxis,
-) -> None:
-    for jump in found.jumps:
-        frame = int(drive.frames[jump.frame])
-        said = f"jump by {answer(jump.change, quantity, change=True)} at {rig.names[frame]}"
-        _add(jumps, [axis.at(frame + 0.5)] * 2, ends, said)
 
 
 _LONGEST = 44  # characters in a line, so that a label fits a narrow screen
@@ -357,14 +324,8 @@ def alignment(rows: Sequence[Row], rig: RigAssessment | None = None) -> Chart:
         data.append(dots)
         if rig is not None and scale:
             line = _level_line(rig, quantity, float(np.median(scale)), axis)
-            data += [
-                {
-                    **line,
-                    "name": f"{words}, over the drive",
-                    "showlegend": False,
-                    "line": {"color": colour, "width": 2},
-                }
-            ]
+            line |= {"name": f"{words}, over the drive", "showlegend": False}
+            data.append({**line, "line": {"color": colour, "width": 2}})
     largest = max((abs(each) for trace in data for each in trace["y"] if each is not None), default=0.0)
     end = 1.1 * max(largest, 0.5)
     layout = {

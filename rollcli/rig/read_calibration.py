@@ -7,7 +7,7 @@ from typing import NamedTuple
 from rollcli.errors import InputError, UsageError
 from rollcli.rig.calibration import Calibration, CalibrationOptions
 from rollcli.rig.formats import datasets, opencv, robots
-from rollcli.rig.formats.fields import Fields, File
+from rollcli.rig.formats.fields import Fields, File, has_key
 
 MAX_BYTES = 1 << 20  # real ones have a few thousand
 
@@ -27,13 +27,13 @@ class Format(NamedTuple):
 # the first that recognises a file reads it: ORB-SLAM's settings can hold OpenCV's matrices
 FORMATS = (
     Format("KITTI", datasets.is_kitti, datasets.read_kitti),
-    Format("DrivingStereo", datasets.is_driving_stereo, datasets.read_driving_stereo),
-    Format("Middlebury or ETH3D", datasets.is_middlebury, datasets.read_middlebury),
-    Format("ORB-SLAM", robots.is_orb_slam, robots.read_orb_slam),
-    Format("ROS camera_info", robots.is_ros, robots.read_ros, files=2),
+    Format("DrivingStereo", has_key(":", *datasets.DRIVING_STEREO), datasets.read_driving_stereo),
+    Format("Middlebury or ETH3D", has_key("=", "cam0"), datasets.read_middlebury),
+    Format("ORB-SLAM", has_key(":", "Camera.bf", "Stereo.b"), robots.read_orb_slam),
+    Format("ROS camera_info", has_key(":", "projection_matrix"), robots.read_ros, files=2),
     Format("OpenCV stereoRectify", opencv.is_opencv, opencv.read_opencv),
     Format("Cityscapes", datasets.is_cityscapes, datasets.read_cityscapes),
-    Format("Kalibr", robots.is_kalibr, robots.read_kalibr),
+    Format("Kalibr", has_key(":", "T_cn_cnm1"), robots.read_kalibr),
     Format("ZED", robots.is_zed, robots.read_zed),
 )
 

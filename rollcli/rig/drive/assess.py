@@ -1,6 +1,7 @@
 """What drives say about the rig: each drive and each quantity, and what changed from drive to drive."""
 
 import math
+import os.path
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -334,11 +335,7 @@ def short_names(files: Sequence[str]) -> list[str]:
     """Return paths without the folders that all have in common."""
     folders = {file.rpartition("/")[0] for file in files}
     parts = [folder.split("/") for folder in folders]
-    common = 0
-    for column in zip(*parts, strict=False):
-        if len(set(column)) > 1:
-            break
-        common += 1
+    common = len(os.path.commonprefix(parts))  # noqa: RUF071 (of lists, part by part)
     if not common or folders == {""}:
         return list(files)
     skipped = sum(len(part) + 1 for part in parts[0][: common - (len(folders) == 1)])

@@ -29,7 +29,7 @@ from rollcli.rig.formats.fields import (
 
 _RAW = {f"P_rect_0{view}" for view in range(4)}
 _BENCHMARK = {f"P{view}" for view in range(4)}
-_DRIVING_STEREO = ("P_rect_101", "P_rect_103")
+DRIVING_STEREO = ("P_rect_101", "P_rect_103")
 _GREY, _COLOUR = ("0", "1"), ("2", "3")
 _MM = 1e-3
 _SAME_DOFFS = 0.5  # px
@@ -65,18 +65,13 @@ def read_kitti(file: File) -> Fields:
     return _kitti_fields(file, values, "S_rect_0" + pairs[0][0], fields[0], notes)
 
 
-def is_driving_stereo(text: str) -> bool:
-    """Tell whether a text is a calibration of DrivingStereo."""
-    return any(key in _DRIVING_STEREO for key, _ in keys_and_values(text, ":"))
-
-
 def read_driving_stereo(file: File) -> Fields:
     """Read views 101 (left) and 103 (right)."""
     values = _kitti_values(file)
-    missing = [key for key in _DRIVING_STEREO if key not in values]
+    missing = [key for key in DRIVING_STEREO if key not in values]
     if missing:
         raise InputError(f"{file.name}: has no {missing[0]}: the file is cut off")
-    return _kitti_fields(file, values, "S_rect_101", _kitti_pair(file, values, *_DRIVING_STEREO))
+    return _kitti_fields(file, values, "S_rect_101", _kitti_pair(file, values, *DRIVING_STEREO))
 
 
 def _kitti_values(file: File) -> dict[str, str]:
@@ -118,11 +113,6 @@ def _kitti_fields(
             )
         found = size_of(stated[0], stated[1], f"{file.name}: {size_key}")
     return Fields(view.fx, view.fy, view.cx, view.cy, baseline, doffs, *found, notes=notes)
-
-
-def is_middlebury(text: str) -> bool:
-    """Tell whether a text is a calibration of Middlebury or ETH3D."""
-    return any(key == "cam0" for key, _ in keys_and_values(text, "="))
 
 
 def read_middlebury(file: File) -> Fields:

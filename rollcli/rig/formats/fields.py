@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -76,6 +76,11 @@ def keys_and_values(text: str, sign: str) -> Iterator[tuple[str, str]]:
         key, found, value = line.partition(sign)
         if found:
             yield key.strip(), value.strip()
+
+
+def has_key(sign: str, *keys: str) -> Callable[[str], bool]:
+    """Return what tells whether a line of a text gives one of these keys a value."""
+    return lambda text: any(key in keys for key, _ in keys_and_values(text, sign))
 
 
 def json_values(file: File) -> dict[str, Value]:

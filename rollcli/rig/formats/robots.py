@@ -15,7 +15,6 @@ from rollcli.rig.formats.fields import (
     Fields,
     File,
     Projection,
-    keys_and_values,
     number,
     numbers,
     pair_of,
@@ -25,15 +24,6 @@ from rollcli.rig.formats.yaml import parse_yaml
 
 _MM = 1e-3
 _RAW = "is of the raw images, and gives the baseline alone"
-
-
-def _has_key(text: str, *keys: str) -> bool:
-    return any(key in keys for key, _ in keys_and_values(text, ":"))
-
-
-def is_ros(text: str) -> bool:
-    """Tell whether a text is a camera_info file."""
-    return _has_key(text, "projection_matrix")
 
 
 def read_ros(first: File, second: File | None = None) -> Fields:
@@ -77,11 +67,6 @@ def _view(file: File) -> tuple[Projection, int | None, int | None]:
     return view, *size(values, "image_width", "image_height", f"{file.name}: image size")
 
 
-def is_orb_slam(text: str) -> bool:
-    """Tell whether a text is a file of settings for stereo."""
-    return _has_key(text, "Camera.bf", "Stereo.b")
-
-
 def read_orb_slam(file: File) -> Fields:
     """Read the camera and the baseline."""
     values = parse_yaml(file.text, file.name)
@@ -98,11 +83,6 @@ def read_orb_slam(file: File) -> Fields:
     baseline = read("Camera.bf") / fx if "Camera.bf" in values else read("Stereo.b")
     found = size(values, "Camera.width", "Camera.height", f"{file.name}: Camera.width")
     return Fields(fx, fy, cx, cy, baseline, 0.0, *found)
-
-
-def is_kalibr(text: str) -> bool:
-    """Tell whether a text is a camchain of Kalibr."""
-    return _has_key(text, "T_cn_cnm1")
 
 
 def read_kalibr(file: File) -> Fields:
