@@ -180,20 +180,10 @@ def _accuracy(
     )
 
 
-@dataclass(frozen=True)
-class HeightFiles:
-    """The maps of a frame: heights, true heights and true disparity; and its focal length times baseline."""
-
-    heights: str
-    truth: str
-    disparity: str
-    scale: float
-
-
-def height_files(
+def assess_heights(
     rows: Sequence[Row], known: Mapping[str, KnownPose], heights: str, truth: str
-) -> list[HeightFiles]:
-    """Find the maps of the frames that have heights in metres and true ones, by stem.
+) -> tuple[HeightsAt, ...] | None:
+    """Compare the heights over the road with true ones at `DISTANCES_M`, matched by stem.
 
     Parameters
     ----------
@@ -205,36 +195,33 @@ def height_files(
     truth : str
         The folder with `heights/` and `disparity/`, as `simulate` writes it.
 
+    Returns
+    -------
+    tuple of HeightsAt, or None
+        A distance that no frame shows is left out. None where no frame has heights in metres and true ones.
+
     Raises
     ------
     UsageError
         A folder does not exist or holds no map.
+    InputError
+        A map cannot be read, or two of a frame differ in size.
     """
     folders = [_maps_of(folder) for folder in (heights, f"{truth}/heights", f"{truth}/disparity")]
-    found = []
+    errors: dict[int, list[NDArray[np.float64]]] = {distance: [] for distance in DISTANCES_M}
+    compared = False
     for row in rows:
         stem = stem_of(row.file)
         rig = known.get(stem)
         if row.height_m is None or rig is None or rig.focal_baseline is None:
             continue
         if all(stem in folder for folder in folders):
+            compared = True
             estimated, true, disparity = (folder[stem] for folder in folders)
-            found.append(HeightFiles(estimated, true, disparity, rig.focal_baseline))
-    return found
-
-
-def assess_heights(files: Sequence[HeightFiles]) -> tuple[HeightsAt, ...]:
-    """Compare heights with true ones at `DISTANCES_M`; a distance that no frame shows is left out.
-
-    Raises
-    ------
-    InputError
-        A map cannot be read, or two of a frame differ in size.
-    """
-    errors: dict[int, list[NDArray[np.float64]]] = {distance: [] for distance in DISTANCES_M}
-    for each in files:
-        for distance, found in _height_errors(each):
-            errors[distance].append(found)
+            for distance, found in _height_errors(estimated, true, disparity, rig.focal_baseline):
+                errors[distance].append(found)
+    if not compared:
+        return None
     return tuple(_heights_at(distance, parts) for distance, parts in errors.items() if parts)
 
 
@@ -244,16 +231,19 @@ def _heights_at(distance: int, parts: Sequence[NDArray[np.float64]]) -> HeightsA
     return HeightsAt(distance, len(parts), median, p95, float(off.mean()))
 
 
-def _height_errors(files: HeightFiles) -> Iterator[tuple[int, NDArray[np.float64]]]:
-    heights, truth = (read_stored(path).values.astype(np.float64) for path in (files.heights, files.truth))
-    disparity = read_disparity(files.disparity)
+def _height_errors(
+    estimated: str, true: str, disparities: str, scale: float
+) -> Iterator[tuple[int, NDArray[np.float64]]]:
+    """Yield the errors of a frame at each distance; `scale` is its focal length times its baseline, px m."""
+    heights, truth = (read_stored(path).values.astype(np.float64) for path in (estimated, true))
+    disparity = read_disparity(disparities)
     if not heights.shape == truth.shape == disparity.shape:
         shapes = (heights.shape, truth.shape, disparity.shape)
         sizes = ", ".join(f"{width}x{height}" for height, width in shapes)
-        raise InputError(f"{files.heights}: heights, true heights and true disparity differ in size: {sizes}")
+        raise InputError(f"{estimated}: heights, true heights and true disparity differ in size: {sizes}")
     off = heights - truth
     with np.errstate(divide="ignore"):
-        ahead = files.scale / disparity
+        ahead = scale / disparity
     for distance in DISTANCES_M:
         found = off[np.isfinite(off) & (np.abs(ahead / distance - 1) < _WITHIN)]
         if len(found):

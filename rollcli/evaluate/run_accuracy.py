@@ -14,7 +14,6 @@ from rollcli.evaluate.accuracy import (
     HeightsAt,
     assess,
     assess_heights,
-    height_files,
 )
 from rollcli.evaluate.truth import KnownPose, read_truth
 from rollcli.files.atomic import is_folder
@@ -176,13 +175,13 @@ def run_accuracy(
 def _heights(
     rows: Sequence[Row], known: Mapping[str, KnownPose], heights: str, beside: str, running: RunningOptions
 ) -> tuple[HeightsAt, ...]:
-    files = height_files(rows, known, heights, beside)
-    if not files and not running.quiet:
+    found = assess_heights(rows, known, heights, beside)
+    if found is None and not running.quiet:
         say(
             f"{heights}: no heights are compared: they need metres (estimate --calib), and the truth columns "
             "focal_px and baseline_m"
         )
-    return assess_heights(files)
+    return found or ()
 
 
 def _name_unmatched(found: Comparison, result: str, truth: str, running: RunningOptions) -> None:
