@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from rollcli.errors import UsageError
-from rollcli.simulate.build import build_scene, carriageway_of, render_frame, true_disparity
-from rollcli.simulate.dips import draw_dips
+from rollcli.simulate.build import build_scene, carriageway_of, draw_dips, render_frame, true_disparity
 from rollcli.simulate.spec import FrameSpec
 from rollcli.simulate.surfaces import Ground
 
