@@ -252,17 +252,14 @@ def _arguments(
         yield from ((line, True) for line in _stdin_lines(stdin))
     elif files_from is not None:
         try:
-            data = as_utf8(_list_behind(files_from), files_from)
+            read = read_bytes if is_url(files_from) else read_given
+            data = as_utf8(read(files_from, most=MOST_LISTED), files_from)
         except InputError as error:
             raise UsageError(str(error)) from None
         except OSError as error:
             reason = (error.strerror or str(error)).lower()
             raise UsageError(f"{files_from}: the list of files cannot be read: {reason}") from None
         yield from ((line, True) for line in _lines(data))
-
-
-def _list_behind(location: str) -> bytes:
-    return read_bytes(location, most=MOST_LISTED) if is_url(location) else read_given(location, MOST_LISTED)
 
 
 def _stdin_lines(stdin: Iterable[str] | None) -> Iterator[str]:
