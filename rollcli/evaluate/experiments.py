@@ -13,16 +13,15 @@ from numpy.typing import NDArray
 from rollcli.errors import EstimationError
 from rollcli.estimator.energy import Energy
 from rollcli.estimator.estimate import estimate_roll
-from rollcli.estimator.moments import CheckedMap, map_moments
+from rollcli.estimator.moments import CheckedMap, Floats, Grid, map_moments
 from rollcli.estimator.request import LAMBDA0, MAX_ROLL_DEG, MAX_ROLL_LIMIT_DEG, AreaSettings, SolverSettings
 from rollcli.estimator.road.pixels import load_area_method, load_solver
 from rollcli.estimator.solvers.areas import fit_plane
 from rollcli.estimator.solvers.exact import exact, minima
-from rollcli.estimator.solvers.golden_section import golden_section
+from rollcli.estimator.solvers.golden_section import golden_section, shrink_bracket
 from rollcli.estimator.solvers.gradient_descent import gradient_descent
-from rollcli.estimator.solvers.solution import Solution, Solver, angle_between
+from rollcli.estimator.solvers.solution import Solution, Solver, SolverStatus, angle_between, principal
 from rollcli.evaluate.options import PaperOptions
-from rollcli.evaluate.textbook import Textbook
 from rollcli.evaluate.truth import KnownPose
 from rollcli.files.matching import stem_of
 from rollcli.files.results import Row
@@ -214,6 +213,83 @@ def _angle(method: Callable[[NDArray[Any]], float], disparity: NDArray[Any]) -> 
         return method(disparity)
     except EstimationError:
         return None
+
+
+_MAX_ITERATIONS = 100  # of the unguarded descent
+
+
+@dataclass(frozen=True)
+class Textbook:
+    """The method as the paper writes it: n x 3 matrices over every pixel, built anew at each angle.
+
+    The solvers on moments are timed and checked against it; nothing else uses it. It holds the valid pixels
+    of a map as columns of numbers; make it with `Textbook.of`.
+    [GD]: Fan, Wang, Liu, Pitas, "A Robust Roll Angle Estimation Algorithm Based on Gradient Descent",
+    arXiv:1906.01894.
+
+    Attributes
+    ----------
+    u, v : ndarray, shape (n,)
+        Coordinates, moved to the centre of the map and divided by half its longer side.
+    d : ndarray, shape (n,)
+        Disparity, px.
+    """
+
+    u: Floats
+    v: Floats
+    d: Floats
+
+    @classmethod
+    def of(cls, disparity: NDArray[Any]) -> "Textbook":
+        """Take every valid pixel of a map (H, W)."""
+        grid = Grid.of_shape(*disparity.shape)
+        rows, columns = np.nonzero((disparity > 0) & (disparity < np.inf))
+        u, v = columns.astype(np.float64), rows.astype(np.float64)
+        return cls(
+            (u - grid.centre_u) / grid.scale,
+            (v - grid.centre_v) / grid.scale,
+            disparity[rows, columns].astype(np.float64),
+        )
+
+    def energy(self, theta: float) -> float:
+        """Return E_min at `theta` [GD eq. 9], px^2."""
+        Y = self._design(theta)
+        residual = self.d - Y @ self._alpha(Y)
+        return float(residual @ residual)
+
+    def gradient(self, theta: float) -> float:
+        """Return dE_min / dtheta [GD eq. 12-13], px^2/rad."""
+        Y = self._design(theta)
+        x, y = self.u * math.cos(theta) + self.v * math.sin(theta), Y[:, 1]
+        turned = np.stack([np.zeros_like(x), -x, -2 * x * y], axis=1)
+        alpha = self._alpha(Y)
+        return float(-2 * (self.d - Y @ alpha) @ (turned @ alpha))
+
+    def golden_section(self, tolerance: float) -> Solution:
+        """Shrink a bracket of one period until it is narrower than `tolerance`, radians."""
+        return shrink_bracket(self.energy, tolerance)
+
+    def gradient_descent(self, tolerance: float, lambda0: float) -> Solution:
+        """Descend from 0 by [GD eq. 11 and 14], unguarded, until a step is shorter than `tolerance`."""
+        unit = 1 / (2 * len(self.d) * float(self.d.max()) ** 2)
+        theta, rate, slope = 0.0, lambda0, unit * self.gradient(0.0)
+        for iteration in range(1, _MAX_ITERATIONS + 1):
+            step = -rate * slope
+            theta += step
+            if abs(step) < tolerance:
+                return Solution(principal(theta), iteration)
+            before, slope = slope, unit * self.gradient(theta)
+            rate = rate * before / (before - slope)
+        return Solution(principal(theta), _MAX_ITERATIONS, SolverStatus.STEP_LIMIT)
+
+    def _design(self, theta: float) -> Floats:
+        """Return Y(theta), shape (n, 3) [GD eq. 6]."""
+        y = self.v * math.cos(theta) - self.u * math.sin(theta)
+        return np.stack([np.ones_like(y), y, y * y], axis=1)
+
+    def _alpha(self, Y: Floats) -> Floats:
+        """Return J d = (Y'Y)^-1 Y'd [GD eq. 7]."""
+        return np.asarray(np.linalg.solve(Y.T @ Y, Y.T @ self.d), np.float64)
 
 
 FORMS = ("moments", "with_pass", "textbook")
