@@ -3,6 +3,8 @@
 Every message is one line and says what to do.
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from enum import IntEnum
 
 
@@ -60,3 +62,12 @@ class WorkerError(RollcliError):
 
 class OutputError(RollcliError):
     """A result cannot be written: the program cannot do its job (exit status 1)."""
+
+
+@contextmanager
+def as_usage() -> Iterator[None]:
+    """Take what cannot be read for a wrong request, as it is before a run begins."""
+    try:
+        yield
+    except InputError as error:
+        raise UsageError(str(error)) from None

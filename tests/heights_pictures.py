@@ -15,7 +15,7 @@ from rollcli.pictures.heights import METRES, steadied
 from rollcli.pictures.heights_preview import draw_heights
 from rollcli.pictures.overlay import as_bgr, draw_preview
 from rollcli.rig.calibration import Calibration
-from rollcli.simulate.render import RenderedFrame, render_frame
+from rollcli.simulate.build import RenderedFrame, render_frame
 from rollcli.simulate.spec import FrameSpec
 from tests.run_cli import ROOT
 

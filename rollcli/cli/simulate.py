@@ -15,15 +15,11 @@ from rollcli.simulate.options import (
     CROSSFALL,
     FOCAL_PER_WIDTH,
     GUTTER_WIDTH,
-    HEIGHT,
     KERB,
     MAX_DIPS,
     MIXED,
-    PITCH_DEG,
-    ROLL_DEG,
     ROUGHNESS,
     SCENES,
-    SIZE,
     SimulateOptions,
 )
 
@@ -36,8 +32,7 @@ simulate_options = record(
         "--scene",
         type=Choice(*SCENES, MIXED),
         help="bare: a road alone; open: with kerbs and cars; street: with house fronts too; verge: between "
-        "grass slopes; "
-        "mixed: each frame one of these.",
+        "grass slopes; mixed: each frame one of these.",
     ),
     option(
         "--roll",
@@ -45,7 +40,7 @@ simulate_options = record(
         show_default=False,
         help="Roll of the rig against the road, degrees, drawn evenly from A to B; positive: its right "
         "end is up.  "
-        f"[default: {ROLL_DEG[0]:g}:{ROLL_DEG[1]:g}]",
+        f"[default: {SimulateOptions.roll_deg[0]:g}:{SimulateOptions.roll_deg[1]:g}]",
     ),
     option(
         "--pitch",
@@ -53,7 +48,7 @@ simulate_options = record(
         show_default=False,
         help="Pitch of the rig against the road, degrees, drawn evenly from A to B; positive: it looks "
         "down.  "
-        f"[default: {PITCH_DEG[0]:g}:{PITCH_DEG[1]:g}]",
+        f"[default: {SimulateOptions.pitch_deg[0]:g}:{SimulateOptions.pitch_deg[1]:g}]",
     ),
     option(
         "--curvature",
@@ -110,7 +105,7 @@ simulate_options = record(
         "--size",
         type=IMAGE_SIZE,
         show_default=False,
-        help=f"Size of the images, pixels.  [default: {SIZE[0]}x{SIZE[1]}]",
+        help="Size of the images, pixels.  [default: {}x{}]".format(*SimulateOptions.size),
     ),
     option(
         "--focal",
@@ -136,7 +131,7 @@ simulate_options = record(
         type=SPAN,
         show_default=False,
         help="Height of the left camera above the road, metres, drawn evenly from A to B.  "
-        f"[default: {HEIGHT:g}]",
+        f"[default: {SimulateOptions.height[0]:g}]",
     ),
     option(
         "--noise",
@@ -180,7 +175,7 @@ def simulate(ctx: click.Context, /, folder: str, options: SimulateOptions, runni
     Writes DIR/left and DIR/right (8-bit PNG), DIR/disparity (the true disparity of the left view, 16-bit
     KITTI PNG), DIR/calib.txt (the calibration in KITTI's form) and DIR/truth.csv.
     """
-    from rollcli.simulate.run import run_simulate
+    from rollcli.simulate.dataset import run_simulate
 
     resume, overwrite = one_start(ctx, resume=options.resume, overwrite=running.overwrite)
     options, running = replace(options, resume=resume), running._replace(overwrite=overwrite)

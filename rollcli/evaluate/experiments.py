@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -13,15 +13,20 @@ from numpy.typing import NDArray
 from rollcli.errors import EstimationError
 from rollcli.estimator.energy import Energy
 from rollcli.estimator.estimate import estimate_roll
-from rollcli.estimator.moments import CheckedMap, map_moments
+from rollcli.estimator.moments import CheckedMap, Floats, Grid, map_moments
 from rollcli.estimator.request import LAMBDA0, MAX_ROLL_DEG, MAX_ROLL_LIMIT_DEG, AreaSettings, SolverSettings
 from rollcli.estimator.road.pixels import load_area_method, load_solver
 from rollcli.estimator.solvers.areas import fit_plane
 from rollcli.estimator.solvers.exact import exact, minima
-from rollcli.estimator.solvers.golden_section import golden_section
+from rollcli.estimator.solvers.golden_section import golden_section, shrink_bracket
 from rollcli.estimator.solvers.gradient_descent import gradient_descent
-from rollcli.estimator.solvers.solution import Solution, Solver, angle_between
-from rollcli.evaluate.textbook import Textbook
+from rollcli.estimator.solvers.solution import Solution, Solver, SolverStatus, angle_between, principal
+from rollcli.evaluate.options import PaperOptions
+from rollcli.evaluate.truth import KnownPose
+from rollcli.files.matching import stem_of
+from rollcli.files.results import Row
+from rollcli.run.frame import Frame, FrameResult, failed_frame
+from rollcli.run.read import FRAME_ERRORS, Source, frame_of_error, read_source
 
 
 def rotate_nearest(disparity: NDArray[Any], angle: float) -> NDArray[Any]:
@@ -132,6 +137,15 @@ def examine(
     height, width = disparity.shape
     methods = _methods(max(map(abs, turns), default=0.0), chosen)
     rotated = [rotate_nearest(disparity, turn) for turn in turns]
+
+    def errors_of(method: Callable[[NDArray[Any]], float]) -> tuple[float | None, ...]:
+        base = _angle(method, disparity) if truth is None else truth
+        found = [_angle(method, each) for each in rotated]
+        return tuple(
+            None if base is None or angle is None else angle_between(angle, base + turn)
+            for angle, turn in zip(found, turns, strict=True)
+        )
+
     return Findings(
         file=file,
         width=width,
@@ -142,9 +156,7 @@ def examine(
         gd=tuple(gradient_descent(energy, SolverSettings(delta)).iterations for delta in DELTAS),
         sweep=_sweep(energy),
         solver_errors=_solver_errors(rotated, turns, theta if truth is None else truth),
-        method_errors={
-            name: _method_errors(method, disparity, rotated, turns, truth) for name, method in methods.items()
-        },
+        method_errors={name: errors_of(method) for name, method in methods.items()},
     )
 
 
@@ -195,26 +207,88 @@ def _methods(largest_turn: float, chosen: bool) -> dict[str, Callable[[NDArray[A
     }
 
 
-def _method_errors(
-    method: Callable[[NDArray[Any]], float],
-    disparity: NDArray[Any],
-    rotated: Sequence[NDArray[Any]],
-    turns: Sequence[float],
-    truth: float | None,
-) -> tuple[float | None, ...]:
-    base = _angle(method, disparity) if truth is None else truth
-    found = [_angle(method, each) for each in rotated]
-    return tuple(
-        None if base is None or theta is None else angle_between(theta, base + turn)
-        for theta, turn in zip(found, turns, strict=True)
-    )
-
-
 def _angle(method: Callable[[NDArray[Any]], float], disparity: NDArray[Any]) -> float | None:
     try:
         return method(disparity)
     except EstimationError:
         return None
+
+
+_MAX_ITERATIONS = 100  # of the unguarded descent
+
+
+@dataclass(frozen=True)
+class Textbook:
+    """The method as the paper writes it: n x 3 matrices over every pixel, built anew at each angle.
+
+    The solvers on moments are timed and checked against it; nothing else uses it. It holds the valid pixels
+    of a map as columns of numbers; make it with `Textbook.of`.
+    [GD]: Fan, Wang, Liu, Pitas, "A Robust Roll Angle Estimation Algorithm Based on Gradient Descent",
+    arXiv:1906.01894.
+
+    Attributes
+    ----------
+    u, v : ndarray, shape (n,)
+        Coordinates, moved to the centre of the map and divided by half its longer side.
+    d : ndarray, shape (n,)
+        Disparity, px.
+    """
+
+    u: Floats
+    v: Floats
+    d: Floats
+
+    @classmethod
+    def of(cls, disparity: NDArray[Any]) -> "Textbook":
+        """Take every valid pixel of a map (H, W)."""
+        grid = Grid.of_shape(*disparity.shape)
+        rows, columns = np.nonzero((disparity > 0) & (disparity < np.inf))
+        u, v = columns.astype(np.float64), rows.astype(np.float64)
+        return cls(
+            (u - grid.centre_u) / grid.scale,
+            (v - grid.centre_v) / grid.scale,
+            disparity[rows, columns].astype(np.float64),
+        )
+
+    def energy(self, theta: float) -> float:
+        """Return E_min at `theta` [GD eq. 9], px^2."""
+        Y = self._design(theta)
+        residual = self.d - Y @ self._alpha(Y)
+        return float(residual @ residual)
+
+    def gradient(self, theta: float) -> float:
+        """Return dE_min / dtheta [GD eq. 12-13], px^2/rad."""
+        Y = self._design(theta)
+        x, y = self.u * math.cos(theta) + self.v * math.sin(theta), Y[:, 1]
+        turned = np.stack([np.zeros_like(x), -x, -2 * x * y], axis=1)
+        alpha = self._alpha(Y)
+        return float(-2 * (self.d - Y @ alpha) @ (turned @ alpha))
+
+    def golden_section(self, tolerance: float) -> Solution:
+        """Shrink a bracket of one period until it is narrower than `tolerance`, radians."""
+        return shrink_bracket(self.energy, tolerance)
+
+    def gradient_descent(self, tolerance: float, lambda0: float) -> Solution:
+        """Descend from 0 by [GD eq. 11 and 14], unguarded, until a step is shorter than `tolerance`."""
+        unit = 1 / (2 * len(self.d) * float(self.d.max()) ** 2)
+        theta, rate, slope = 0.0, lambda0, unit * self.gradient(0.0)
+        for iteration in range(1, _MAX_ITERATIONS + 1):
+            step = -rate * slope
+            theta += step
+            if abs(step) < tolerance:
+                return Solution(principal(theta), iteration)
+            before, slope = slope, unit * self.gradient(theta)
+            rate = rate * before / (before - slope)
+        return Solution(principal(theta), _MAX_ITERATIONS, SolverStatus.STEP_LIMIT)
+
+    def _design(self, theta: float) -> Floats:
+        """Return Y(theta), shape (n, 3) [GD eq. 6]."""
+        y = self.v * math.cos(theta) - self.u * math.sin(theta)
+        return np.stack([np.ones_like(y), y, y * y], axis=1)
+
+    def _alpha(self, Y: Floats) -> Floats:
+        """Return J d = (Y'Y)^-1 Y'd [GD eq. 7]."""
+        return np.asarray(np.linalg.solve(Y.T @ Y, Y.T @ self.d), np.float64)
 
 
 FORMS = ("moments", "with_pass", "textbook")
@@ -264,3 +338,36 @@ def _best(function: Callable[[], Any], times: int) -> float:
         function()
         best = min(best, time.perf_counter() - start)
     return best
+
+
+@dataclass(frozen=True)
+class Examined:
+    """What became of a map: findings, or a result that says why there are none."""
+
+    result: FrameResult
+    findings: Findings | None
+
+
+def examine_file(frame: Frame, options: PaperOptions, truth: Mapping[str, KnownPose]) -> Examined:
+    """Read a map and run the experiments on it; `truth` holds known angles by stem, or nothing."""
+    turns = [math.radians(turn) for turn in options.experiments.turns_deg]
+    try:
+        source = read_source(frame, options.frame)
+        known = truth.get(stem_of(frame.file))
+        theta = None if known is None else known.theta
+        findings = examine(frame.file, usable_pixels(source), turns, theta, chosen=options.has_region)
+    except FRAME_ERRORS as error:
+        return Examined(frame_of_error(frame, error), None)
+    return Examined(FrameResult(Row(frame.file, status="ok"), source.encoding, source.warnings), findings)
+
+
+def usable_pixels(source: Source) -> NDArray[Any]:
+    """Clear the pixels of a map, shape (H, W), that may not be used: 0 is no data."""
+    if source.allowed is None:
+        return source.disparity
+    return np.where(source.allowed, source.disparity, 0)
+
+
+def lost(frame: Frame, reason: str) -> Examined:
+    """Return what is known of a map that could not be examined."""
+    return Examined(failed_frame(frame, reason), None)

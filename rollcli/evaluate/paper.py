@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from rollcli.errors import ExitStatus, UsageError
 from rollcli.evaluate.options import PaperOptions
-from rollcli.evaluate.truth import read_truth
+from rollcli.evaluate.truth import KnownPose, read_truth
 from rollcli.extras import require_extra
 from rollcli.files.matching import stem_of
 from rollcli.files.stream import write_output
@@ -71,7 +71,7 @@ def run_paper(options: PaperOptions) -> ExitStatus:
     return _run(frames, truth, options)
 
 
-def _known_angles(frames: Sequence[Frame], options: PaperOptions) -> Mapping[str, float]:
+def _known_angles(frames: Sequence[Frame], options: PaperOptions) -> Mapping[str, KnownPose]:
     if options.experiments.truth is None:
         return {}
     truth = read_truth(options.experiments.truth)
@@ -81,8 +81,8 @@ def _known_angles(frames: Sequence[Frame], options: PaperOptions) -> Mapping[str
     return truth
 
 
-def _run(frames: Sequence[Frame], truth: Mapping[str, float], options: PaperOptions) -> ExitStatus:
-    from rollcli.evaluate.paper_job import examine_file, lost
+def _run(frames: Sequence[Frame], truth: Mapping[str, KnownPose], options: PaperOptions) -> ExitStatus:
+    from rollcli.evaluate.experiments import examine_file, lost
 
     work = Work(partial(examine_file, options=options, truth=truth), lost)
     progress = Progress(len(frames), options.running, options.encoding, statuses=("ok",))
@@ -116,8 +116,7 @@ def _time(
     frames: Sequence[Frame], found: "list[Findings]", options: PaperOptions, progress: Progress
 ) -> "list[Times]":
     """Take the run times on the first maps, in this process alone."""
-    from rollcli.evaluate.experiments import time_solvers
-    from rollcli.evaluate.paper_job import usable_pixels
+    from rollcli.evaluate.experiments import time_solvers, usable_pixels
     from rollcli.run.read import read_source
 
     good = {findings.file for findings in found}

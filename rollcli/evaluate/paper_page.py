@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -11,8 +12,7 @@ from rollcli.estimator.request import LAMBDA0
 from rollcli.evaluate.experiments import Findings, Times
 from rollcli.evaluate.options import PaperOptions
 from rollcli.evaluate.tables import DELTAS_DEG, METHOD_NAMES, SOLVER_NAMES, Table
-from rollcli.report.chart import Chart
-from rollcli.report.page import render_page
+from rollcli.report.page import Chart, render_page
 
 _COLOURS = {"gd": "@c1", "gss": "@c2", "exact": "@c3"}
 _DEGREES = [f"{delta:g}°" for delta in DELTAS_DEG]
@@ -49,29 +49,18 @@ def _line(name: str, x: Any, y: Any, colour: str, **more: Any) -> dict[str, Any]
     }
 
 
+def _mark(colour: str, size: int, symbol: str) -> dict[str, Any]:
+    return {"symbol": symbol, "size": size, "color": colour, "line": {"width": 2, "color": colour}}
+
+
 def _iterations_chart(table: Table) -> Chart:
     data = []
     for solver in ("gss", "gd"):
         rows, colour, name = table.where(solver=solver), _COLOURS[solver], SOLVER_NAMES[solver]
         ours, paper = rows.column("mean"), rows.column("paper")
         data.append(_line(name, _DEGREES, ours, colour, hovertemplate="%{y:.2f} iterations"))
-        circles = {
-            "symbol": "circle-open",
-            "size": 15,
-            "color": colour,
-            "line": {"width": 2, "color": colour},
-        }
-        data.append(
-            _line(
-                f"{name}, paper",
-                _DEGREES,
-                paper,
-                colour,
-                mode="markers",
-                marker=circles,
-                hovertemplate="%{y}",
-            )
-        )
+        circles = {"mode": "markers", "marker": _mark(colour, 15, "circle-open"), "hovertemplate": "%{y}"}
+        data.append(_line(f"{name}, paper", _DEGREES, paper, colour, **circles))
     layout = {"xaxis": _DELTA_AXIS, "yaxis": {"title": {"text": "iterations"}, "rangemode": "tozero"}}
     return Chart(
         "iterations", "Iterations of both solvers against the tolerance, beside the paper's", data, layout
@@ -92,12 +81,8 @@ def _runtime(table: Table) -> Chart:
             more = {"legendgroup": name, "showlegend": solver == "gss", "hovertemplate": "%{y:.3s}s"}
             data.append(_line(name, where, table.where(solver=solver).column(column), colour, **more))
     decades = {10.0**k: text for k, text in zip(range(-5, 2), _DECADES, strict=True)}
-    seconds = {
-        "title": {"text": "run time"},
-        "type": "log",
-        "tickvals": list(decades),
-        "ticktext": list(decades.values()),
-    }
+    ticks = {"tickvals": list(decades), "ticktext": list(decades.values())}
+    seconds = {"title": {"text": "run time"}, "type": "log", **ticks}
     label = "Run time of both solvers in three forms and in the paper, logarithmic"
     return Chart("runtime", label, data, {"yaxis": seconds})
 
@@ -109,25 +94,11 @@ def _sweep(table: Table) -> Chart:
         name = f"δ<sub>θ</sub> = {delta:g}°"
         more = {"mode": "lines", "hovertemplate": "λ(0) = %{x}: %{y:.2f} iterations"}
         data.append(_line(name, rows.column("lambda0"), rows.column("mean"), f"@c{k + 1}", **more))
-    papers = {
-        "type": "line",
-        "x0": LAMBDA0,
-        "x1": LAMBDA0,
-        "y0": 0,
-        "y1": 1,
-        "yref": "paper",
-        "line": {"color": "@muted", "width": 1, "dash": "dot"},
-    }
-    text = {
-        "x": LAMBDA0,
-        "y": 0,
-        "yref": "paper",
-        "text": "26",
-        "showarrow": False,
-        "xanchor": "left",
-        "yanchor": "bottom",
-        "font": {"color": "@muted"},
-    }
+    dots = {"color": "@muted", "width": 1, "dash": "dot"}
+    ends = {"x0": LAMBDA0, "x1": LAMBDA0, "y0": 0, "y1": 1, "yref": "paper"}
+    papers = {"type": "line", **ends, "line": dots}
+    place = {"x": LAMBDA0, "y": 0, "yref": "paper", "xanchor": "left", "yanchor": "bottom"}
+    text = {**place, "text": "26", "showarrow": False, "font": {"color": "@muted"}}
     layout = {
         "xaxis": {"title": {"text": "λ(0)"}, "range": [0, 101]},
         "yaxis": {"title": {"text": "iterations, mean over the maps"}, "rangemode": "tozero"},
@@ -165,7 +136,7 @@ def _methods_chart(table: Table) -> Chart:
             "name": name,
             "x": table.column(column),
             "y": names,
-            "marker": {"symbol": symbol, "size": 12, "color": colour, "line": {"width": 2, "color": colour}},
+            "marker": _mark(colour, 12, symbol),
             "hovertemplate": "%{x:.4f}°",
         }
         for column, (name, symbol, colour) in figures.items()
@@ -292,13 +263,9 @@ def _lowest(table: Table) -> list[tuple[str, str, str]]:
 
 def _spans(rates: Sequence[float]) -> str:
     """Return runs of whole numbers, such as "8–26, 30"."""
-    runs: list[list[int]] = []
-    for rate in map(int, rates):
-        if runs and rate == runs[-1][1] + 1:
-            runs[-1][1] = rate
-        else:
-            runs.append([rate, rate])
-    return ", ".join(f"{first}" if first == last else f"{first}–{last}" for first, last in runs)
+    runs = groupby(enumerate(map(int, rates)), key=lambda each: each[1] - each[0])
+    ends = [[each[0][1], each[-1][1]] for _, run in runs for each in [list(run)]]
+    return ", ".join(f"{first}" if first == last else f"{first}–{last}" for first, last in ends)
 
 
 def _map(found: Findings) -> dict[str, Any]:

@@ -1,27 +1,25 @@
 """`evaluate accuracy` from the command line: what is read and written, and the table to read."""
 
-import csv
-import io
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields, replace
 from typing import Any
 
 from rollcli.errors import ExitStatus
 from rollcli.evaluate.accuracy import (
+    DISTANCES_M,
     LARGE_ERROR_DEG,
     Accuracy,
-    PoseAccuracy,
+    Comparison,
+    HeightsAt,
     assess,
-    assess_height,
-    assess_pitch,
+    assess_heights,
 )
-from rollcli.evaluate.map_accuracy import DISTANCES_M, HeightsAt, assess_heights, height_files
-from rollcli.evaluate.truth import KnownPose, read_known_poses
+from rollcli.evaluate.truth import KnownPose, read_truth
 from rollcli.files.atomic import is_folder
 from rollcli.files.matching import stem_of
 from rollcli.files.naming import listed
-from rollcli.files.results import Row, read_result, run_path
+from rollcli.files.results import Row, csv_table, read_result, run_path
 from rollcli.files.stream import is_stream, write_output
 from rollcli.messages import say
 from rollcli.run.options import RunningOptions
@@ -30,34 +28,30 @@ from rollcli.run.record import recorded_options
 
 _NAMES = {"no_angle", "no_truth"}
 _DIGITS = 6
+_OF_POSE = ("count", "median", "p95", "worst", "bias", "coverage_95")
+_OF_HEIGHTS = ("frames", "median", "p95", "bias")
 _LENGTHS = {"median", "p95", "worst", "bias"}  # what has the unit of the quantity
 
 
-def as_table(accuracy: Accuracy) -> str:
+def as_table(found: Comparison) -> str:
     """Return one figure a line, for people."""
-    of = accuracy.count
+    roll = found.roll
     lines = [
-        ("frames compared", f"{of}" + (f" ({accuracy.suspect} suspect)" if accuracy.suspect else "")),
-        ("without an angle", str(len(accuracy.no_angle))),
-        ("without a known angle", str(len(accuracy.no_truth))),
-        ("median error", _degrees(accuracy.median_deg)),
-        ("95th percentile", _degrees(accuracy.p95_deg)),
-        ("worst", _degrees(accuracy.worst_deg) + (f"  {accuracy.worst_file}" if of else "")),
-        ("mean, signed", _degrees(accuracy.bias_deg)),
-        (f"above {LARGE_ERROR_DEG:g} degrees", _percent(accuracy.share_above_0_5_deg, of)),
-        ("inside the 95 % interval", _percent(accuracy.coverage_95, accuracy.intervals)),
+        ("frames compared", f"{roll.count}" + (f" ({found.suspect} suspect)" if found.suspect else "")),
+        ("without an angle", str(len(found.no_angle))),
+        ("without a known angle", str(len(found.no_truth))),
+        *_lines("", roll, "degrees", f"  {roll.worst_file}".rstrip()),
+        (f"above {LARGE_ERROR_DEG:g} degrees", _percent(roll.share_above_0_5_deg, roll.count)),
+        ("inside the 95 % interval", _percent(roll.coverage_95, roll.intervals)),
     ]
-    for name, part, unit in (("pitch", accuracy.pitch, "degrees"), ("height", accuracy.height, "m")):
+    for name, part, unit in (("pitch", found.pitch, "degrees"), ("height", found.height, "m")):
         if part is not None:
             lines += [
                 (f"{name}, frames compared", str(part.count)),
-                (f"{name}, median error", f"{part.median:.4f} {unit}"),
-                (f"{name}, 95th percentile", f"{part.p95:.4f} {unit}"),
-                (f"{name}, worst", f"{part.worst:.4f} {unit}"),
-                (f"{name}, mean, signed", f"{part.bias:.4f} {unit}"),
-                (f"{name}, in its interval", _percent(part.coverage_95, part.count)),
+                *_lines(f"{name}, ", part, unit),
+                (f"{name}, in its interval", _percent(part.coverage_95, part.intervals)),
             ]
-    for at in accuracy.heights:
+    for at in found.heights:
         name = f"heights, {at.distance} m"
         lines += [
             (f"{name}, frames", str(at.frames)),
@@ -68,46 +62,57 @@ def as_table(accuracy: Accuracy) -> str:
     return "".join(f"{name:26}{value}\n" for name, value in lines)
 
 
-def as_csv(accuracy: Accuracy) -> str:
+def _lines(name: str, part: Accuracy, unit: str, worst: str = "") -> list[tuple[str, str]]:
+    """Return the figures of a quantity in words; `worst` names the frame of the largest error."""
+    figures = (
+        ("median error", part.median, ""),
+        ("95th percentile", part.p95, ""),
+        ("worst", part.worst, worst),
+        ("mean, signed", part.bias, ""),
+    )
+    return [
+        (f"{name}{words}", "-" if value is None else f"{value:.4f} {unit}{more}")
+        for words, value, more in figures
+    ]
+
+
+def _percent(share: float | None, of: int) -> str:
+    return "-" if share is None else f"{100 * share:.1f} % ({round(share * of)} of {of})"
+
+
+def as_csv(found: Comparison) -> str:
     """Return a header and one line."""
-    buffer = io.StringIO()
-    values = _values(accuracy)
-    lines = csv.writer(buffer, lineterminator="\n")
-    lines.writerow(values)
-    lines.writerow(len(value) if name in _NAMES else value for name, value in values.items())
-    return buffer.getvalue()
+    values = _values(found)
+    line = [len(value) if name in _NAMES else value for name, value in values.items()]
+    return csv_table([values, line]).decode("utf-8", "surrogateescape")
 
 
-def as_json(accuracy: Accuracy) -> str:
+def as_json(found: Comparison) -> str:
     """Return one object; the frames without an angle or a known one by name."""
-    return json.dumps(_values(accuracy), indent=2) + "\n"
+    return json.dumps(_values(found), indent=2) + "\n"
 
 
 FORMATS = {"table": as_table, "csv": as_csv, "json": as_json}
 
 
-def _values(accuracy: Accuracy) -> dict[str, Any]:
-    values = {field.name: getattr(accuracy, field.name) for field in fields(accuracy)}
-    for name, unit in (("pitch", "deg"), ("height", "m")):
-        part = values.pop(name)
-        for field in fields(PoseAccuracy):
-            suffix = f"_{unit}" if field.name in _LENGTHS else ""
-            values[f"{name}_{field.name}{suffix}"] = getattr(part, field.name, None)
-    heights = {at.distance: at for at in values.pop("heights")}
+def _values(found: Comparison) -> dict[str, Any]:
+    """Return every figure by its column."""
+    heights = {at.distance: at for at in found.heights}
+    values = {
+        **_named(found.roll, [field.name for field in fields(Accuracy)], "", "deg"),
+        **{name: getattr(found, name) for name in ("ok", "suspect", "no_angle", "no_truth")},
+        **_named(found.pitch, _OF_POSE, "pitch_", "deg"),
+        **_named(found.height, _OF_POSE, "height_", "m"),
+    }
     for distance in DISTANCES_M:
-        for name in ("frames", "median", "p95", "bias"):
-            suffix = "_m" if name in _LENGTHS else ""
-            key = f"over_road_at_{distance}_m_{name}{suffix}"
-            values[key] = getattr(heights.get(distance), name, None)
+        values |= _named(heights.get(distance), _OF_HEIGHTS, f"over_road_at_{distance}_m_", "m")
     return {name: round(v, _DIGITS) if isinstance(v, float) else v for name, v in values.items()}
 
 
-def _degrees(value: float | None) -> str:
-    return "-" if value is None else f"{value:.4f} degrees"
-
-
-def _percent(share: float | None, of: int) -> str:
-    return "-" if share is None else f"{100 * share:.1f} % ({round(share * of)} of {of})"
+def _named(part: Accuracy | HeightsAt | None, names: Iterable[str], before: str, unit: str) -> dict[str, Any]:
+    return {
+        f"{before}{name}{f'_{unit}' if name in _LENGTHS else ''}": getattr(part, name, None) for name in names
+    }
 
 
 def run_accuracy(
@@ -150,43 +155,42 @@ def run_accuracy(
     if running.dry_run:
         list_files([((result, truth), writes)])
         return ExitStatus.DONE
-    found, known = read_result(result), read_known_poses(truth)
-    rows = found.rows
-    accuracy = assess(rows, {stem: pose.theta for stem, pose in known.items()}, result)
-    accuracy = replace(accuracy, pitch=assess_pitch(rows, known), height=assess_height(rows, known))
+    read, known = read_result(result), read_truth(truth)
+    rows = read.rows
+    found = assess(rows, known, result)
     beside = truth.rpartition("/")[0] or "."
     if heights is None:
-        recorded = recorded_options(found.run, run_path(result)).images.heights
+        recorded = recorded_options(read.run, run_path(result)).images.heights
         both = recorded is not None and is_folder(recorded) and is_folder(f"{beside}/heights")
         heights = recorded if both else None
     if heights is not None:
-        accuracy = replace(accuracy, heights=_heights(rows, known, heights, beside, running))
-    _name_unmatched(accuracy, result, truth, running)
+        found = replace(found, heights=_heights(rows, known, heights, beside, running))
+    _name_unmatched(found, result, truth, running)
     _count_bent(rows, known, truth, running)
-    data = FORMATS[form](accuracy).encode("utf-8", "surrogateescape")
+    data = FORMATS[form](found).encode("utf-8", "surrogateescape")
     write_output(output, data, overwrite=running.overwrite)
-    return ExitStatus.FRAMES_FAILED if accuracy.no_angle else ExitStatus.DONE
+    return ExitStatus.FRAMES_FAILED if found.no_angle else ExitStatus.DONE
 
 
 def _heights(
     rows: Sequence[Row], known: Mapping[str, KnownPose], heights: str, beside: str, running: RunningOptions
 ) -> tuple[HeightsAt, ...]:
-    files = height_files(rows, known, heights, beside)
-    if not files and not running.quiet:
+    found = assess_heights(rows, known, heights, beside)
+    if found is None and not running.quiet:
         say(
             f"{heights}: no heights are compared: they need metres (estimate --calib), and the truth columns "
             "focal_px and baseline_m"
         )
-    return assess_heights(files)
+    return found or ()
 
 
-def _name_unmatched(accuracy: Accuracy, result: str, truth: str, running: RunningOptions) -> None:
+def _name_unmatched(found: Comparison, result: str, truth: str, running: RunningOptions) -> None:
     """Say which frames could not be compared: the first few by name."""
     if running.quiet:
         return
     for names, where, what in (
-        (accuracy.no_angle, truth, f"no angle in {result}"),
-        (accuracy.no_truth, result, f"no known angle in {truth}"),
+        (found.no_angle, truth, f"no angle in {result}"),
+        (found.no_truth, result, f"no known angle in {truth}"),
     ):
         if names:
             frames = "1 frame has" if len(names) == 1 else f"{len(names)} frames have"

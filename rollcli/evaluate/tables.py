@@ -1,7 +1,5 @@
 """The paper's tables and figures as tables of numbers, over all maps; each is one CSV."""
 
-import csv
-import io
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -9,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rollcli.evaluate.experiments import DELTAS, FORMS, LAMBDAS, METHODS, SOLVERS, Findings, Times
+from rollcli.files.results import csv_table
 
 Value = str | int | float | None
 
@@ -45,15 +44,12 @@ class Table:
 
     def csv(self) -> bytes:
         """Return the table as CSV: whole names, floats with seven digits, nothing where there is no value."""
-        buffer = io.StringIO()
-        lines = csv.writer(buffer, lineterminator="\n")
-        lines.writerow(self.columns)
         names = [_WHOLE_NAMES.get(column, {}) for column in self.columns]
-        lines.writerows(
+        rows = (
             [each.get(text := _text(value), text) for each, value in zip(names, row, strict=True)]
             for row in self.rows
         )
-        return buffer.getvalue().encode("utf-8", "surrogateescape")
+        return csv_table([self.columns, *rows])
 
     def column(self, name: str) -> list[Value]:
         """Return one column, from top to bottom."""

@@ -53,18 +53,20 @@ def by_stem(names: Iterable[str], where: str) -> dict[str, int]:
     return places
 
 
-def read_truth(path: str | Path) -> dict[str, float]:
-    """Read known angles, as `rollcli simulate` writes them.
+def read_truth(path: str | Path) -> dict[str, KnownPose]:
+    """Read known angles, as `rollcli simulate` writes them, with what else is known of the rig.
 
     Parameters
     ----------
     path : str or Path
-        CSV with the columns `file` and `roll_deg`, degrees; further ones are left out.
+        CSV with the columns `file` and `roll_deg`, degrees; pitch and height are the optional columns
+        `pitch_deg` and `height_m`. These hold for the road below the camera, and are left out where
+        `curvature_per_m` says that the road ahead bends away from it.
 
     Returns
     -------
-    dict of str to float
-        Radians, by the frame's stem.
+    dict of str to KnownPose
+        By the frame's stem.
 
     Raises
     ------
@@ -72,15 +74,6 @@ def read_truth(path: str | Path) -> dict[str, float]:
         The file cannot be read, has not these columns, or a line holds no angle.
     UsageError
         Two frames have the same stem.
-    """
-    return {stem: known.theta for stem, known in read_known_poses(path).items()}
-
-
-def read_known_poses(path: str | Path) -> dict[str, KnownPose]:
-    """Read known angles with what else is known of the rig; see `read_truth`.
-
-    Pitch and height are the optional columns `pitch_deg` and `height_m`. They hold for the road below the
-    camera, and are left out where `curvature_per_m` says that the road ahead bends away from it.
     """
     try:
         data = read_bytes(path) if is_url(str(path)) else read_given(path)

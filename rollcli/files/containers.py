@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
 
-from rollcli.errors import InputError, UsageError
+from rollcli.errors import InputError, UsageError, as_usage
 from rollcli.files.atomic import is_file, is_folder
 from rollcli.files.bounded import most_unpacked, state_of, too_large
 from rollcli.files.naming import natural_key
@@ -119,12 +119,9 @@ def members(path: str) -> Iterator[tuple[str, str]]:
 
 
 def _zip_members(path: str) -> Iterator[tuple[str, str]]:
-    try:
-        for each in _zip(path).infolist():
-            if not each.is_dir():
-                yield each.filename, ""
-    except InputError as error:
-        raise UsageError(str(error)) from None
+    with as_usage():
+        archive = _zip(path)
+    yield from ((each.filename, "") for each in archive.infolist() if not each.is_dir())
 
 
 def _tar_members(path: str) -> Iterator[tuple[str, str]]:

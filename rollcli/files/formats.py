@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError, UsageError
-from rollcli.files.codecs import arrays, channels, pictures, png, tiff
+from rollcli.files.codecs import arrays, pictures, png, tiff
 from rollcli.files.codecs.raw_map import Stored as Stored
 from rollcli.files.codecs.raw_map import native
 from rollcli.files.storage import read_bytes
@@ -37,40 +37,30 @@ class MapFormat(NamedTuple):
     encode: Callable[[NDArray[Any], tuple[float, ...], str], bytes]
 
 
+def _array_format(
+    name: str,
+    signatures: tuple[bytes, ...],
+    decode: Callable[[bytes, str], NDArray[Any]],
+    encode: Callable[[NDArray[Any]], bytes],
+) -> MapFormat:
+    """Return a format that holds numbers and nothing else."""
+    return MapFormat(
+        signatures,
+        lambda data, file: Stored(native(decode(data, file)), name),
+        lambda values, *_: encode(values),
+    )
+
+
 # a new format: a file in `codecs`, a line here, and its ending in `inputs`, which loads no decoder
 MAP_FORMATS = {
-    "png": MapFormat(
-        (png.SIGNATURE,),
-        lambda data, name: Stored(png.grey_values(data, name), "png", text=png.text_of(data)),
-        lambda values, _, text: png.encode_png(values, text),
-    ),
+    "png": MapFormat((png.SIGNATURE,), png.decode_png, lambda values, _, text: png.encode_png(values, text)),
     "tiff": MapFormat(tiff.SIGNATURES, tiff.decode_tiff, tiff.encode_tiff),
-    "npy": MapFormat(
-        (arrays.MAGIC,),
-        lambda data, name: Stored(native(arrays.decode_npy(data, name)), "npy"),
-        lambda values, *_: arrays.encode_npy(values),
-    ),
-    "pfm": MapFormat(
-        arrays.MAGICS,
-        lambda data, name: Stored(native(arrays.decode_pfm(data, name)), "pfm"),
-        lambda values, *_: arrays.encode_pfm(values),
-    ),
-    "npz": MapFormat(
-        (arrays.MAGIC_NPZ,),
-        lambda data, name: Stored(native(arrays.decode_npz(data, name)), "npz"),
-        lambda values, *_: arrays.encode_npz(values),
-    ),
-    "exr": MapFormat(
-        (channels.MAGIC_EXR,),
-        lambda data, name: Stored(native(channels.decode_exr(data, name)), "exr"),
-        lambda values, *_: channels.encode_exr(values),
-    ),
+    "npy": _array_format("npy", (arrays.MAGIC,), arrays.decode_npy, arrays.encode_npy),
+    "pfm": _array_format("pfm", arrays.MAGICS, arrays.decode_pfm, arrays.encode_pfm),
+    "npz": _array_format("npz", (arrays.MAGIC_NPZ,), arrays.decode_npz, arrays.encode_npz),
+    "exr": _array_format("exr", (pictures.MAGIC_EXR,), pictures.decode_exr, pictures.encode_exr),
     # told by --encoding alone: to all others such a PNG is a photograph
-    "rgb": MapFormat(
-        (),
-        lambda data, name: Stored(channels.decode_rgb(data, name), "rgb"),
-        lambda values, *_: channels.encode_rgb(values),
-    ),
+    "rgb": _array_format("rgb", (), pictures.decode_rgb, pictures.encode_rgb),
 }
 _KNOWN = {
     b"\xff\xd8\xff": "a JPEG image",

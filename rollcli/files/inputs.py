@@ -4,6 +4,7 @@ import functools
 import os
 import re
 import sys
+from array import array
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -25,6 +26,7 @@ _NO_TEXT = (  # what images and archives begin with
     *(b"\xff\xd8\xff", b"PK\x03\x04", b"v/1\x01"),
 )
 _OTHER_SIDE = "name the images of the other camera"
+_BLOCK = 4096  # lines between two places that are known: 100,000,000 lines have 200 kB of places
 
 
 @dataclass(frozen=True, slots=True)
@@ -255,17 +257,14 @@ def _arguments(
         yield from ((line, True) for line in _stdin_lines(stdin))
     elif files_from is not None:
         try:
-            data = as_utf8(_list_behind(files_from), files_from)
+            read = read_bytes if is_url(files_from) else read_given
+            data = as_utf8(read(files_from, most=MOST_LISTED), files_from)
         except InputError as error:
             raise UsageError(str(error)) from None
         except OSError as error:
             reason = (error.strerror or str(error)).lower()
             raise UsageError(f"{files_from}: the list of files cannot be read: {reason}") from None
         yield from ((line, True) for line in _lines(data))
-
-
-def _list_behind(location: str) -> bytes:
-    return read_bytes(location, most=MOST_LISTED) if is_url(location) else read_given(location, MOST_LISTED)
 
 
 def _stdin_lines(stdin: Iterable[str] | None) -> Iterator[str]:
@@ -289,3 +288,69 @@ def _lines(data: bytes) -> Iterator[str]:
         return (os.fsdecode(line[0]) for line in re.finditer(rb"[^\0]+", data))
     lines = (line[0].removesuffix(b"\r") for line in re.finditer(rb"[^\n]+", data))
     return (os.fsdecode(line) for line in lines if line)
+
+
+class Manifest:
+    """The sorted names of a file, one a line, read when they are asked for: there may be a hundred million.
+
+    Parameters
+    ----------
+    path : str
+
+    Raises
+    ------
+    UsageError
+        It cannot be read, holds no name, or its names are not in natural order, each once.
+    """
+
+    def __init__(self, path: str) -> None:
+        self._path, self._places, self._count = path, array("Q"), 0
+        before, key_before = "", ""
+        for number, name in self._lines(0, self._places):
+            key = natural_key(name)
+            if self._count and key <= key_before:
+                how = "is there twice" if name == before else f"sorts before {before}"
+                raise UsageError(
+                    f"{path}: line {number}: {name} {how}; --sorted takes names in natural order "
+                    "(frame2 before frame10), each once: leave it out, and they are sorted"
+                )
+            before, key_before = name, key
+            self._count += 1
+        if not self._count:
+            raise UsageError(f"{path}: no input found: the list is empty")
+
+    def __len__(self) -> int:
+        return self._count
+
+    def names(self, places: range) -> Iterator[str]:
+        """Yield the names at these places, which increase."""
+        if not places:
+            return
+        first = places[0] // _BLOCK
+        at = first * _BLOCK
+        wanted = iter(places)
+        place = next(wanted)
+        for _, name in self._lines(self._places[first]):
+            if at == place:
+                yield name
+                place = next(wanted, -1)
+                if place < 0:
+                    return
+            at += 1
+
+    def _lines(self, offset: int, places: "array[int] | None" = None) -> Iterator[tuple[int, str]]:
+        """Yield each name from an offset on, and the number of its line there; note where blocks begin."""
+        count = 0
+        try:
+            with Path(self._path).open("rb") as file:
+                file.seek(offset)
+                for number, line in enumerate(file, 1):
+                    if name := line.rstrip(b"\r\n"):
+                        if places is not None and count % _BLOCK == 0:
+                            places.append(offset)
+                        count += 1
+                        yield number, os.fsdecode(name)
+                    offset += len(line)
+        except OSError as error:
+            reason = (error.strerror or str(error)).lower()
+            raise UsageError(f"{self._path}: the list of files cannot be read: {reason}") from error

@@ -1,5 +1,6 @@
 """Match the rows of a table with files by name, wherever the table was made."""
 
+import os.path
 import posixpath
 from bisect import bisect_left
 from collections.abc import Sequence
@@ -116,9 +117,4 @@ def _closest(wanted: list[str], by_end: Sequence[tuple[list[str], int]]) -> list
 
 
 def _common(one: Sequence[str], other: Sequence[str]) -> int:
-    count = 0
-    for mine, yours in zip(one, other, strict=False):
-        if mine != yours:
-            break
-        count += 1
-    return count
+    return len(os.path.commonprefix([list(one), list(other)]))  # noqa: RUF071 (of lists, part by part)

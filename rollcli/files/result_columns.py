@@ -1,15 +1,20 @@
 """Some columns of a result as arrays: a million rows without an object for each."""
 
-from collections.abc import Mapping, Sequence
+import contextlib
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rollcli.errors import InputError
 from rollcli.files.results import BOUNDS, STATUSES, STDIN, cells_of, is_text, pieces_of, read_run, value_of
 
+Made = TypeVar("Made")
+
+_PLACES = {status: place for place, status in enumerate(STATUSES)}
 _CHUNK = 300  # rows that are held as text: twenty thousand do not fit into a cache, and take a third longer
 
 
@@ -68,12 +73,13 @@ def read_columns(path: str, wanted: Sequence[str]) -> ResultColumns:
         while chunk := list(islice(rows, _CHUNK)):
             lines, *columns = zip(*chunk, strict=True)
             found = dict(zip(names, columns, strict=True))
-            files += _files(found["file"], lines, name_of_part)
-            statuses.append(_statuses(found["status"], lines, name_of_part))
+            files += _checked(_files, "file", found["file"], lines, name_of_part)
+            statuses.append(_checked(_statuses, "status", found["status"], lines, name_of_part))
             methods.update(map(str, filter(None, found.get("method", ()))))
             for name in wanted:
                 if name in found:
-                    parts.setdefault(name, []).append(_numbers(name, found[name], lines, name_of_part))
+                    numbers = _checked(_numbers, name, found[name], lines, name_of_part)
+                    parts.setdefault(name, []).append(numbers)
     return ResultColumns(
         path,
         files,
@@ -84,45 +90,39 @@ def read_columns(path: str, wanted: Sequence[str]) -> ResultColumns:
     )
 
 
-def _files(cells: Sequence[Any], lines: Sequence[str], path: str) -> list[str]:
-    names = list(map(str, cells))
-    if not all(cells) or not is_text("".join(names)):  # an empty name, or one that no file can have
-        _name_fault("file", cells, lines, path)
-    return names
-
-
-def _statuses(cells: Sequence[Any], lines: Sequence[str], path: str) -> NDArray[np.uint8]:
-    places = {status: place for place, status in enumerate(STATUSES)}
-    try:
-        return np.fromiter(map(places.__getitem__, cells), np.uint8, len(cells))
-    except (KeyError, TypeError):
-        _name_fault("status", cells, lines, path)
-        raise
-
-
-def _numbers(name: str, cells: Sequence[Any], lines: Sequence[str], path: str) -> NDArray[np.float64]:
-    low, high = BOUNDS.get(name, (-np.inf, np.inf))
-    if "_" in "".join(map(str, cells)) or bool in set(map(type, cells)):  # no notation of numbers
-        _name_fault(name, cells, lines, path)
-    try:
-        if all(cells):
-            empty, numbers = np.zeros(len(cells), bool), np.array(list(map(float, cells)))
-        elif not any(cells) and 0 not in cells:  # a million empty cells are told at once
-            return np.full(len(cells), np.nan)
-        else:
-            empty = np.array([cell is None or cell == "" for cell in cells])
-            pairs = zip(empty.tolist(), cells, strict=True)
-            numbers = np.array([np.nan if none else float(cell) for none, cell in pairs])
-    except (ValueError, TypeError, OverflowError):
-        _name_fault(name, cells, lines, path)
-        raise
-    fits = np.isfinite(numbers) & (numbers >= low) & (numbers <= high)
-    if not (fits | empty).all():
-        _name_fault(name, cells, lines, path)
-    return numbers
-
-
-def _name_fault(name: str, cells: Sequence[Any], lines: Sequence[str], path: str) -> None:
-    """Raise the error of the first cell that is no value."""
+def _checked(
+    make: Callable[[str, Sequence[Any]], Made | None],
+    name: str,
+    cells: Sequence[Any],
+    lines: Sequence[str],
+    path: str,
+) -> Made:
+    """Return what is made of a column's cells; where that fails, raise the error of the first bad cell."""
+    with contextlib.suppress(KeyError, ValueError, TypeError, OverflowError):
+        if (made := make(name, cells)) is not None:
+            return made
     for cell, line in zip(cells, lines, strict=True):
         value_of(name, cell, f"{path}: {line}")
+    raise InputError(f"{path}: its column {name} cannot be read")
+
+
+def _files(_: str, cells: Sequence[Any]) -> list[str] | None:
+    names = list(map(str, cells))
+    return names if all(cells) and is_text("".join(names)) else None  # a name that a file can have
+
+
+def _statuses(_: str, cells: Sequence[Any]) -> NDArray[np.uint8]:
+    return np.fromiter(map(_PLACES.__getitem__, cells), np.uint8, len(cells))
+
+
+def _numbers(name: str, cells: Sequence[Any]) -> NDArray[np.float64] | None:
+    if "_" in "".join(map(str, cells)) or bool in set(map(type, cells)):  # no notation of numbers
+        return None
+    low, high = BOUNDS.get(name, (-np.inf, np.inf))
+    if not any(cells) and 0 not in cells:  # a million empty cells are told at once
+        return np.full(len(cells), np.nan)
+    empty = np.array([cell is None or cell == "" for cell in cells])
+    pairs = zip(empty.tolist(), cells, strict=True)
+    numbers = np.array([np.nan if none else float(cell) for none, cell in pairs])
+    fits = np.isfinite(numbers) & (numbers >= low) & (numbers <= high)
+    return numbers if (fits | empty).all() else None

@@ -161,28 +161,12 @@ ALIGNMENT_COLUMNS = ("right_lower_px", "right_clockwise_deg", "right_larger_perc
 _SPECIAL = re.compile(r'[,"\r\n]')  # what a field of CSV holds in quotes only
 # a millionth of a degree is far below any map's noise; nine digits keep alpha2, which is small, whole
 _DIGITS = {
-    "roll_deg": ".6f",
-    "roll_ci95_deg": ".6f",
-    "pitch_deg": ".6f",
-    "pitch_ci95_deg": ".6f",
-    "height_m": ".6f",
-    "height_ci95_m": ".6f",
-    "camber": ".6f",
+    **{name: ".6f" for name, kind in get_type_hints(Row).items() if kind == float | None},
+    **dict.fromkeys(("alpha0", "alpha1", "alpha2"), ".9g"),
+    **dict.fromkeys(ALIGNMENT_COLUMNS, ".4f"),
     "rmse_px": ".6g",
-    "alpha0": ".9g",
-    "alpha1": ".9g",
-    "alpha2": ".9g",
-    "valid_fraction": ".6f",
-    "road_fraction": ".6f",
-    "right_lower_px": ".4f",
-    "right_clockwise_deg": ".4f",
-    "right_larger_percent": ".4f",
-    "right_twist_px": ".4f",
-    "image_roll_deg": ".6f",
     "elapsed_ms": ".3f",
 }
-
-
 _ROLLS = ("roll_deg", "image_roll_deg")
 
 
@@ -221,6 +205,13 @@ def format_row(row: Row, form: Format, further: Sequence[str] = ()) -> bytes:
 def plain_values(row: Row, further: Sequence[str] = ()) -> dict[str, Any]:
     """Return the values as the CSV shows them, so that every form says the same; None for an empty one."""
     return {name: _plain(name, getattr(row, name)) for name in columns(further)}
+
+
+def csv_table(rows: Iterable[Iterable[Any]]) -> bytes:
+    """Format a table of another kind as CSV, its header first."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue().encode(**TEXT)
 
 
 def _quoted(text: str) -> str:

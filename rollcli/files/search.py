@@ -63,22 +63,14 @@ def objects_behind(url: str, *, recursive: bool) -> Iterator[tuple[str, str]]:
     recursive : bool
         Whether to search the folders below a prefix, too.
     """
+    base, pattern = url.rstrip("/") + "/", list[str]()
     if glob.has_magic(url):
-        yield from _matching_objects(url)
-        return
-    base = url.rstrip("/") + "/"
+        base = url[: url.rindex("/", 0, _MAGIC.search(url).start()) + 1]  # type: ignore[union-attr]
+        pattern = url.removeprefix(base).split("/")
     for found, _ in list_objects(base):
         relative = found.removeprefix(base)
-        if found.startswith(base) and (recursive or "/" not in relative) and not _hidden(relative):
-            yield found, relative
-
-
-def _matching_objects(pattern: str) -> Iterator[tuple[str, str]]:
-    base = pattern[: pattern.rindex("/", 0, _MAGIC.search(pattern).start()) + 1]  # type: ignore[union-attr]
-    wanted = pattern.removeprefix(base).split("/")
-    for found, _ in list_objects(base):
-        relative = found.removeprefix(base)
-        if _fits(relative.split("/"), wanted) and not _hidden(relative):
+        fits = _fits(relative.split("/"), pattern) if pattern else recursive or "/" not in relative
+        if fits and found.startswith(base) and not _hidden(relative):
             yield found, relative
 
 

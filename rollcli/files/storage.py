@@ -16,23 +16,11 @@ from typing import NamedTuple
 
 from rollcli.errors import InputError, OutputError
 from rollcli.files import bounded
-from rollcli.files.atomic import NameTakenError, output_error, write_atomic
+from rollcli.files.atomic import NameTakenError, in_threads, output_error, write_atomic
 from rollcli.files.bounded import MOST_BYTES, too_large
 from rollcli.files.containers import file_of, read_member
+from rollcli.files.stores import objects
 from rollcli.files.stores.locations import WEB_SERVERS, is_url, public_name, scheme_of
-from rollcli.files.stores.objects import (
-    create_object,
-    folder_problem,
-    list_objects,
-    object_exists,
-    object_owner,
-    object_problem,
-    object_time_ns,
-    read_object,
-    remove_object,
-    write_object,
-)
-from rollcli.files.threads import in_threads
 
 Beginning = Callable[[bytes, int, str], None] | None
 _HEAD = 2**16  # bytes: the header of an array
@@ -135,7 +123,7 @@ def _read_url(location: str, most: int) -> tuple[bytes, str]:
         from rollcli.files.stores.web import read_web_file  # urllib takes longer to load than all of this
 
         return read_web_file(location, most), ""
-    return read_object(location, most)
+    return objects.read_object(location, most)
 
 
 def read_problem(url: str) -> str:
@@ -150,7 +138,7 @@ def read_problem(url: str) -> str:
         from rollcli.files.stores.web import web_problem
 
         return web_problem(url)
-    return object_problem(url)
+    return objects.object_problem(url)
 
 
 def write_problem(folder: str) -> str:
@@ -161,7 +149,7 @@ def write_problem(folder: str) -> str:
     UsageError
         The scheme is not supported, or an extra is missing.
     """
-    return _READ_ONLY if scheme_of(folder) in WEB_SERVERS else folder_problem(folder)
+    return _READ_ONLY if scheme_of(folder) in WEB_SERVERS else objects.folder_problem(folder)
 
 
 def write_bytes(location: str, data: bytes, *, durable: bool = False, owner: str = "") -> None:
@@ -186,12 +174,12 @@ def write_bytes(location: str, data: bytes, *, durable: bool = False, owner: str
         write_atomic(location, data, durable=durable)
         return
     _require_writable(location)
-    write_object(location, data, owner)
+    objects.write_object(location, data, owner)
 
 
 def owner_of(url: str) -> str:
     """Return who wrote an object; empty where it does not say, or where there is none."""
-    return object_owner(url)
+    return objects.object_owner(url)
 
 
 def write_new(location: str, data: bytes) -> None:
@@ -213,7 +201,7 @@ def write_new(location: str, data: bytes) -> None:
     """
     if is_url(location):
         _require_writable(location)
-        if not create_object(location, data, hashlib.sha256(data).hexdigest()):
+        if not objects.create_object(location, data, hashlib.sha256(data).hexdigest()):
             raise _taken(location)
         return
     try:
@@ -269,7 +257,7 @@ def create(location: str, data: bytes, owner: str) -> bool:
             return _beginning_of(location, len(data)) == data
         return True
     _require_writable(location)
-    return create_object(location, data, owner)
+    return objects.create_object(location, data, owner)
 
 
 def list_names(folder: str) -> list[str]:
@@ -278,7 +266,7 @@ def list_names(folder: str) -> list[str]:
         if scheme_of(folder) in WEB_SERVERS:
             return []  # a web server cannot be asked
         base = folder.rstrip("/") + "/"
-        return [url.removeprefix(base) for url, _ in list_objects(base)]
+        return [url.removeprefix(base) for url, _ in objects.list_objects(base)]
     try:
         return [path.name for path in Path(folder).iterdir()]
     except (FileNotFoundError, NotADirectoryError):
@@ -293,12 +281,12 @@ def exists(location: str) -> bool:
         return os.path.lexists(location)
     if scheme_of(location) in WEB_SERVERS:
         return True  # asking costs as much as reading; reading says what is wrong
-    return object_exists(location)
+    return objects.object_exists(location)
 
 
 def modified_ns(location: str) -> int:
     """Return when a file or an object that exists was written, ns since 1970, by the clock of its store."""
-    return object_time_ns(location) if is_url(location) else Path(location).stat().st_mtime_ns
+    return objects.object_time_ns(location) if is_url(location) else Path(location).stat().st_mtime_ns
 
 
 def remove(location: str) -> None:
@@ -311,7 +299,7 @@ def remove(location: str) -> None:
     """
     if is_url(location):
         _require_writable(location)
-        remove_object(location)
+        objects.remove_object(location)
         return
     try:
         Path(location).unlink(missing_ok=True)

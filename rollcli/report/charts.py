@@ -13,16 +13,79 @@ from numpy.typing import NDArray
 
 from rollcli.files.results import Row
 from rollcli.pictures.round_step import round_step
-from rollcli.report.chart import ALIGNED, HISTOGRAM, Chart, chart_names
-from rollcli.report.frame_axis import FrameAxis, frame_axis
+from rollcli.report.options import ALIGNED, HISTOGRAM, chart_names
+from rollcli.report.page import Chart
 from rollcli.report.summary import degrees, with_interval
-from rollcli.rig.drive.assess import DriveAssessment, RigAssessment
-from rollcli.rig.drive.quantity import SequenceAssessment
+from rollcli.rig.drive.assess import RigAssessment, seconds_of
 from rollcli.rig.quantities import ALIGNMENT, HEIGHT, QUANTITIES, ROLL, Quantity
 from rollcli.rig.words import answer, decimals
 from rollcli.stereo.misalignment import Misalignment
 
-RigTrace = dict[str, Any]
+Trace = dict[str, Any]
+
+_FEW = 10  # frames, each with a tick
+_UNITS = (
+    ("h", 3600.0, 2 * 3600.0),
+    ("min", 60.0, 120.0),
+    ("s", 1.0, 0.0),
+)  # name, seconds, from which time on
+_DECIMALS = 7  # of hours less than a thousandth of a second
+_LEAST_SHARE = 0.5  # of the time, that drives take: else the pauses between them would be all that is seen
+
+
+@dataclass(frozen=True)
+class FrameAxis:
+    """Where each frame stands along a chart.
+
+    Attributes
+    ----------
+    places : sequence of float, or None
+        Of each frame, in the unit; None: the numbers of frames, from 1.
+    unit : str
+        "s", "min" or "h" since the first frame; empty for numbers.
+    """
+
+    count: int
+    places: Sequence[float] | None = None
+    unit: str = ""
+
+    def at(self, number: float) -> float:
+        """Return the place of a frame, counted from 1; of half a number the middle between two."""
+        if self.places is None:
+            return number
+        lower = int(number)
+        upper = lower + (number > lower)
+        return (self.places[lower - 1] + self.places[upper - 1]) / 2
+
+    def layout(self) -> dict[str, Any]:
+        """Return the axis as plotly takes it."""
+        first, last = (1, self.count) if self.places is None else (self.places[0], self.places[-1])
+        margin = 0.01 * (last - first) if self.places is not None else max(0.5, 0.01 * self.count)
+        span = {"range": [first - margin, last + margin], "zeroline": False}
+        if self.places is not None:
+            return {"title": {"text": f"time, {self.unit}"}, **span}
+        few = {"dtick": 1} if self.count <= _FEW else {}  # there are no half frames
+        return {"title": {"text": "frame"}, **span, "tickformat": ",d", **few}
+
+
+def frame_axis(rows: Sequence[Row], rig: RigAssessment | None = None) -> FrameAxis:
+    """Return the axis of rows: time where all frames have stamps that ascend, and pauses do not fill it.
+
+    What stands for the broken end of a recording has no stamp, and stands where the frame before it does.
+    """
+    seconds = seconds_of([row.file for row in rows])
+    known = np.isfinite(seconds)
+    ends = np.array([row.file.endswith("#rest") for row in rows], bool)
+    if not (len(rows) and known[0] and (known | ends).all()):
+        return FrameAxis(len(rows))
+    seconds = seconds[np.maximum.accumulate(np.where(known, np.arange(len(rows)), 0))]
+    drives = [seconds[drive.frames] for drive in rig.drives] if rig is not None else [seconds]
+    taken = sum(float(np.ptp(each)) for each in drives if len(each))
+    whole = float(seconds[-1] - seconds[0])
+    if (np.diff(seconds) < 0).any() or not taken > _LEAST_SHARE * whole:
+        return FrameAxis(len(rows))
+    unit, size, _ = next(each for each in _UNITS if whole >= each[2])
+    return FrameAxis(len(rows), np.round(seconds / size, _DECIMALS).tolist(), unit)
 
 
 def drive_starts(rig: RigAssessment) -> set[int]:
@@ -36,7 +99,7 @@ def drive_starts(rig: RigAssessment) -> set[int]:
 
 def rig_traces(
     rig: RigAssessment, quantity: Quantity, ends: tuple[float, float], axis: FrameAxis
-) -> list[RigTrace]:
+) -> list[Trace]:
     """Return the traces of all drives.
 
     Parameters
@@ -58,58 +121,34 @@ def rig_traces(
     jumps["line"] = {"color": "@error", "width": 1.5, "dash": "dash"}
     for drive in rig.drives:
         found = drive.quantities.get(quantity.name)
-        if found is not None:
-            _add_segments(drive, quantity, found, band, means, axis)
-            _add_jumps(rig, drive, quantity, found, jumps, ends, axis)
+        for segment in found.segments if found is not None else ():
+            if segment.mean.value is None or segment.first == segment.last:  # a frame alone is its own mean
+                continue
+            first, last = (axis.at(int(drive.frames[place]) + 1) for place in (segment.first, segment.last))
+            said = f"mounting {quantity.name} {answer(segment.end, quantity)}, of {segment.used:,} frames"
+            level = [each.value or 0.0 for each in (segment.begin, segment.end)]
+            _add(means, [first, last], level, said)
+            if segment.begin.ci95 is not None and segment.end.ci95 is not None:
+                halves = segment.begin.ci95, segment.end.ci95
+                low, high = ([v + side * h for v, h in zip(level, halves, strict=True)] for side in (-1, 1))
+                _add(band, [first, last, last, first], [*high, *low[::-1]], "")
+        for jump in found.jumps if found is not None else ():
+            frame = int(drive.frames[jump.frame])
+            said = f"jump by {answer(jump.change, quantity, change=True)} at {rig.names[frame]}"
+            _add(jumps, [axis.at(frame + 0.5)] * 2, ends, said)
     return [trace for trace in (band, means, jumps) if trace["x"]]
 
 
-def _trace(name: str) -> RigTrace:
+def _trace(name: str) -> Trace:
     labels = {"text": [], "hovertemplate": "%{text}<extra></extra>"}
     return {"type": "scatter", "mode": "lines", "name": name, "x": [], "y": [], **labels}
 
 
-def _add(trace: RigTrace, x: Sequence[float], y: Sequence[float], text: str) -> None:
+def _add(trace: Trace, x: Sequence[float], y: Sequence[float], text: str) -> None:
     """Add a stretch; None parts it from the next."""
     trace["x"] += [*x, None]
     trace["y"] += [*(round(each, 4) for each in y), None]
     trace["text"] += [*([html.escape(text)] * len(x)), None]
-
-
-def _add_segments(
-    drive: DriveAssessment,
-    quantity: Quantity,
-    found: SequenceAssessment,
-    band: RigTrace,
-    means: RigTrace,
-    axis: FrameAxis,
-) -> None:
-    for segment in found.segments:
-        if segment.mean.value is None or segment.first == segment.last:  # a frame alone is its own mean
-            continue
-        first, last = (axis.at(int(drive.frames[place]) + 1) for place in (segment.first, segment.last))
-        said = f"mounting {quantity.name} {answer(segment.end, quantity)}, of {segment.used:,} frames"
-        ends = [each.value or 0.0 for each in (segment.begin, segment.end)]
-        _add(means, [first, last], ends, said)
-        if segment.begin.ci95 is not None and segment.end.ci95 is not None:
-            halves = segment.begin.ci95, segment.end.ci95
-            low, high = ([v + side * h for v, h in zip(ends, halves, strict=True)] for side in (-1, 1))
-            _add(band, [first, last, last, first], [*high, *low[::-1]], "")
-
-
-def _add_jumps(
-    rig: RigAssessment,
-    drive: DriveAssessment,
-    quantity: Quantity,
-    found: SequenceAssessment,
-    jumps: RigTrace,
-    ends: tuple[float, float],
-    axis: FrameAxis,
-) -> None:
-    for jump in found.jumps:
-        frame = int(drive.frames[jump.frame])
-        said = f"jump by {answer(jump.change, quantity, change=True)} at {rig.names[frame]}"
-        _add(jumps, [axis.at(frame + 0.5)] * 2, ends, said)
 
 
 _LONGEST = 44  # characters in a line, so that a label fits a narrow screen
@@ -229,7 +268,6 @@ _PARTS = (("lower", "@c1"), ("turned", "@c2"), ("larger", "@c3"), ("twisted", "@
 _VALUES = ("x", "y", "customdata")
 
 Values = Sequence[Value]
-Trace = dict[str, Any]
 
 
 def all_charts(rows: Sequence[Row], rig: RigAssessment | None = None) -> dict[str, Chart]:
@@ -286,14 +324,8 @@ def alignment(rows: Sequence[Row], rig: RigAssessment | None = None) -> Chart:
         data.append(dots)
         if rig is not None and scale:
             line = _level_line(rig, quantity, float(np.median(scale)), axis)
-            data += [
-                {
-                    **line,
-                    "name": f"{words}, over the drive",
-                    "showlegend": False,
-                    "line": {"color": colour, "width": 2},
-                }
-            ]
+            line |= {"name": f"{words}, over the drive", "showlegend": False}
+            data.append({**line, "line": {"color": colour, "width": 2}})
     largest = max((abs(each) for trace in data for each in trace["y"] if each is not None), default=0.0)
     end = 1.1 * max(largest, 0.5)
     layout = {
@@ -314,7 +346,7 @@ def _shift_of(place: int, row: Row) -> float:
     return Misalignment.of_values(unit, height, width).shifts(height, width)[place]
 
 
-def _level_line(rig: RigAssessment, quantity: Quantity, scale: float, axis: FrameAxis) -> RigTrace:
+def _level_line(rig: RigAssessment, quantity: Quantity, scale: float, axis: FrameAxis) -> Trace:
     """Return the level of each segment of each drive, from its first frame to its last."""
     trace = _trace(quantity.name)
     for drive in rig.drives:

@@ -7,12 +7,10 @@ from rollcli import __version__
 from rollcli.files.naming import listed
 from rollcli.files.results import Result, Row
 from rollcli.files.stores.locations import public_name
-from rollcli.report.chart import Chart
-from rollcli.report.charts import outside
+from rollcli.report.charts import frame_axis, outside
 from rollcli.report.figures import with_still
-from rollcli.report.frame_axis import frame_axis
 from rollcli.report.options import ReportOptions
-from rollcli.report.page import Rows, render_page
+from rollcli.report.page import Chart, Rows, render_page
 from rollcli.report.pictures import Pictures
 from rollcli.report.sources import JUMP, SPREAD, SUSPECT, WIDEST, Choice
 from rollcli.report.summary import (
@@ -142,6 +140,8 @@ def _chosen_text(rows: Sequence[Row], choices: Sequence[Choice]) -> str:
 def _card(rows: Sequence[Row], choice: Choice, pictures: Pictures) -> dict[str, Any]:
     row = rows[choice.place]
     roll = degrees(row.roll_deg, decimals(row.roll_ci95_deg))
+    turned, above = f"de-rotated by {roll}", "Heights over the road"
+    level = "v-disparity, de-rotated", "v-disparity once de-rotated"
     return {
         "number": choice.place + 1,
         "row": row,
@@ -155,30 +155,12 @@ def _card(rows: Sequence[Row], choice: Choice, pictures: Pictures) -> dict[str, 
             [
                 ("", "Left image, the found road tinted", "road on the left image", pictures.road, ""),
                 ("before", "Map", "map", pictures.map, pictures.missing),
-                (
-                    "after",
-                    f"Map, de-rotated by {roll}",
-                    f"map de-rotated by {roll}",
-                    pictures.level,
-                    "Map, de-rotated: not there",
-                ),
-                (
-                    "heights",
-                    "Heights over the road",
-                    "heights over the road",
-                    pictures.heights,
-                    "Heights over the road: not there",
-                ),
+                ("after", f"Map, {turned}", f"map {turned}", pictures.level, "Map, de-rotated: not there"),
+                ("heights", above, above.lower(), pictures.heights, f"{above}: not there"),
             ],
             [
                 ("before", "v-disparity", "v-disparity of the map", pictures.map_counts, ""),
-                (
-                    "after heights",
-                    "v-disparity, de-rotated",
-                    "v-disparity once de-rotated",
-                    pictures.level_counts,
-                    "v-disparity: not there",
-                ),
+                ("after heights", *level, pictures.level_counts, "v-disparity: not there"),
             ],
         ],
     }

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from rollcli.pictures.colours import LIGHT
 from rollcli.pictures.figures import SLIDE, Size, drawing_style, figure_file
-from rollcli.report.chart import Chart
+from rollcli.report.page import Chart
 
 _MOST_TO_KEEP = 2000  # points of a line or band; of more, those are kept that reach furthest in each column
 _COLUMNS = 1000  # of thinning: no figure shows finer ones

@@ -8,18 +8,63 @@ is made.
 
 import base64
 import hashlib
+import html
 import importlib.resources
+import json
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 from rollcli.pictures.colours import style_sheet
-from rollcli.report.chart import script_json
 
 # plotly adds a style sheet for geographic maps unless an element has its id; the policy would refuse it aloud
 _STYLE_OF_MAPS = re.compile(r'document\.getElementById\("([0-9a-f]{64})"\)')
 _PLOTLY_STYLES = ("",)  # plotly makes an empty style element, which it fills by rules
+
+
+@dataclass(frozen=True)
+class Chart:
+    """A chart as plotly's script takes it; prints itself in a template.
+
+    Attributes
+    ----------
+    name : str
+        Its id on the page, and the name of the picture that a reader saves.
+    label : str
+        What it shows, for those who cannot see it.
+    data : sequence of mapping
+        The traces. No NaN: None where there is no value. A colour may be "@" and a name of the page's own
+        colours, such as "@c1", "@ok" or "@muted": these follow light and dark mode.
+    layout : mapping
+        Titles, ranges, kinds of axes; fonts, margins and colours are the page's.
+    still : str
+        HTML that shows it until plotly has drawn it, or where no script runs.
+    """
+
+    name: str
+    label: str
+    data: Sequence[Mapping[str, Any]]
+    layout: Mapping[str, Any] = field(default_factory=dict)
+    still: str = ""
+
+    def __html__(self) -> str:
+        """Return the chart's place and its content."""
+        content = script_json({"data": self.data, "layout": self.layout})
+        name = html.escape(self.name)
+        label = html.escape(self.label)
+        return (
+            f'<div class="chart" id="{name}" role="img" aria-label="{label}">{self.still}</div>'
+            f'<script type="application/json" data-chart="{name}">{content}</script>'
+        )
+
+
+def script_json(value: Any) -> str:
+    """Return JSON for a script element, which file names in it cannot end."""
+    content = json.dumps(value, allow_nan=False)
+    for mark in "<>&\u2028\u2029":
+        content = content.replace(mark, f"\\u{ord(mark):04x}")
+    return content
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,7 @@ from rollcli.extras import require_extra
 from rollcli.files.naming import listed, natural_key
 from rollcli.files.results import Result, Row, read_result, run_path
 from rollcli.files.stream import is_stream, write_output
-from rollcli.report.chart import chart_names
-from rollcli.report.options import ReportOptions
+from rollcli.report.options import ReportOptions, chart_names
 from rollcli.report.sources import Choice, Subject, choose, subjects
 from rollcli.report.summary import common_run, frame_count
 from rollcli.rig.drive.assess import RigAssessment, assess_rig

@@ -116,13 +116,13 @@ def with_pose(estimate: RollEstimate, calibration: Calibration) -> RollEstimate:
     """
     calibration = calibration.for_size(estimate.width, estimate.height)
     tangent = estimate.tangent
+    why = ""
     if tangent.slope <= 0:
-        return replace(
-            estimate, message=_joined(estimate.message, "no pose: the disparity does not grow down")
-        )
-    if tangent.disparity + calibration.doffs <= 0:
-        behind = f"no pose: with doffs of {calibration.doffs:g} px the road lies behind the camera"
-        return replace(estimate, message=_joined(estimate.message, behind))
+        why = "no pose: the disparity does not grow down"
+    elif tangent.disparity + calibration.doffs <= 0:
+        why = f"no pose: with doffs of {calibration.doffs:g} px the road lies behind the camera"
+    if why:
+        return replace(estimate, message="; ".join(filter(None, [estimate.message, why])))
     pose = pose_of(tangent, calibration)
     pitch_ci95, height_ci95 = _half_widths(tangent, calibration)
     turns = float(pose_jacobian(tangent, calibration)[0, 2])  # 1 where fx = fy
@@ -166,10 +166,6 @@ def taken_as_exact(calibration: Calibration, pitch: float, height: float | None)
         said += ", 1 % of height per 1 % of baseline"
     edge = _AT_EDGE if calibration.at_edge else ""
     return f"{'pitch and height take' if calibration.baseline is not None else 'pitch takes'} {said}{edge}"
-
-
-def _joined(message: str, more: str) -> str:
-    return "; ".join(filter(None, [message, more]))
 
 
 def _half_widths(tangent: Tangent, calibration: Calibration) -> tuple[float | None, float | None]:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from rollcli.errors import InputError, UsageError
 from rollcli.rig.calibration import Calibration, CalibrationOptions
 from rollcli.rig.formats import datasets, opencv, robots
-from rollcli.rig.formats.fields import Fields, File
+from rollcli.rig.formats.fields import Fields, File, has_key
 
 MAX_BYTES = 1 << 20  # real ones have a few thousand
 
@@ -27,13 +27,13 @@ class Format(NamedTuple):
 # the first that recognises a file reads it: ORB-SLAM's settings can hold OpenCV's matrices
 FORMATS = (
     Format("KITTI", datasets.is_kitti, datasets.read_kitti),
-    Format("DrivingStereo", datasets.is_driving_stereo, datasets.read_driving_stereo),
-    Format("Middlebury or ETH3D", datasets.is_middlebury, datasets.read_middlebury),
-    Format("ORB-SLAM", robots.is_orb_slam, robots.read_orb_slam),
-    Format("ROS camera_info", robots.is_ros, robots.read_ros, files=2),
+    Format("DrivingStereo", has_key(":", *datasets.DRIVING_STEREO), datasets.read_driving_stereo),
+    Format("Middlebury or ETH3D", has_key("=", "cam0"), datasets.read_middlebury),
+    Format("ORB-SLAM", has_key(":", "Camera.bf", "Stereo.b"), robots.read_orb_slam),
+    Format("ROS camera_info", has_key(":", "projection_matrix"), robots.read_ros, files=2),
     Format("OpenCV stereoRectify", opencv.is_opencv, opencv.read_opencv),
     Format("Cityscapes", datasets.is_cityscapes, datasets.read_cityscapes),
-    Format("Kalibr", robots.is_kalibr, robots.read_kalibr),
+    Format("Kalibr", has_key(":", "T_cn_cnm1"), robots.read_kalibr),
     Format("ZED", robots.is_zed, robots.read_zed),
 )
 
@@ -65,14 +65,9 @@ def parse_calibration(
     fields = _read([_text(name, data) for name, data in files]) if files else Fields()
     source = " and ".join(name for name, _ in files)
     options = [
-        option
-        for option, value in (
-            ("--focal", given.focal),
-            ("--principal-point", given.principal_point),
-            ("--baseline", given.baseline),
-            ("--doffs", given.doffs),
-        )
-        if value is not None
+        f"--{name.replace('_', '-')}"
+        for name, value in given._asdict().items()
+        if value is not None and name != "calib"
     ]
     return _complete(_overridden(fields, given), ", ".join(filter(None, [source, *options])), source)
 
@@ -105,8 +100,7 @@ def _overridden(fields: Fields, given: CalibrationOptions) -> Fields:
     if given.focal is not None:
         fields = replace(fields, fx=given.focal, fy=given.focal)
     if given.principal_point is not None:
-        cx, cy = given.principal_point
-        fields = replace(fields, cx=cx, cy=cy)
+        fields = replace(fields, cx=given.principal_point[0], cy=given.principal_point[1])
     if given.baseline is not None:
         # what the file's notes say is about its own baseline
         fields = replace(fields, baseline=given.baseline, notes=())
@@ -125,19 +119,5 @@ def _complete(fields: Fields, source: str, file: str) -> Calibration:
     if missing:
         start = f"{file}: {fields.lacks or 'says too little'}" if file else "the calibration is not complete"
         raise UsageError(f"{start}; add {' and '.join(missing)}")
-    assert fields.fx is not None
-    assert fields.fy is not None
-    assert fields.cx is not None
-    assert fields.cy is not None
-    return Calibration(
-        fields.fx,
-        fields.fy,
-        fields.cx,
-        fields.cy,
-        fields.baseline,
-        fields.doffs or 0.0,
-        fields.width,
-        fields.height,
-        source,
-        fields.notes,
-    )
+    known = {name: value for name, value in vars(fields).items() if name != "lacks"}
+    return Calibration(**{**known, "doffs": fields.doffs or 0.0}, source=source)

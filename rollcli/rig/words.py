@@ -6,9 +6,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from rollcli.rig.drive.assess import DriveAssessment, RigAssessment
-from rollcli.rig.drive.posterior import Estimate
+from rollcli.rig.drive.posterior import TUNING, Estimate
 from rollcli.rig.drive.quantity import SequenceAssessment
-from rollcli.rig.drive.tuning import TUNING
 from rollcli.rig.quantities import HEIGHT, QUANTITIES, ROLL, Quantity
 
 # a thousandth of a degree or of a metre is below what any calibration is worth

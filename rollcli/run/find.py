@@ -11,8 +11,7 @@ from rollcli.errors import UsageError
 from rollcli.extras import require_extra
 from rollcli.files.atomic import is_file
 from rollcli.files.containers import BAGS, VIDEOS, bag_files, file_of, frame_name, is_video
-from rollcli.files.inputs import IMAGE_ENDINGS, Input, Pair, find_inputs, named_input, pair_inputs
-from rollcli.files.manifest import Manifest
+from rollcli.files.inputs import IMAGE_ENDINGS, Input, Manifest, Pair, find_inputs, named_input, pair_inputs
 from rollcli.files.search import is_place
 from rollcli.files.stores.locations import is_url, names_a_file, public_name
 from rollcli.messages import say

@@ -1,29 +1,35 @@
-"""Build the scenes, each drawn from the seeds of a frame."""
+"""Build the scenes, each drawn from the seeds of a frame, and render their two views and true disparity."""
 
-from collections.abc import Iterator
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from itertools import groupby
 
 import numpy as np
+from numpy.typing import NDArray
 
-from rollcli.simulate.dips import add_dips
+from rollcli.simulate.camera import Camera, PixelRays, expose
 from rollcli.simulate.materials import Plain
-from rollcli.simulate.road import Carriageway, Piece, draw_asphalt, draw_carriageway
-from rollcli.simulate.roadside import (
-    add_backdrop,
-    add_cars,
-    add_grass,
-    add_hedge,
-    add_houses,
-    add_posts,
-    add_sidewalk,
-    add_slope,
-    add_trees,
+from rollcli.simulate.relief import LEVEL, Dip
+from rollcli.simulate.road import (
+    Carriageway,
+    CrossSection,
+    Piece,
+    cross_section,
+    draw_asphalt,
+    draw_carriageway,
 )
+from rollcli.simulate.roadside import Site
 from rollcli.simulate.scene import FAR, Light, Scene, draw, draw_light, draw_offset
-from rollcli.simulate.spec import FrameSpec
-from rollcli.simulate.surfaces import Ground
+from rollcli.simulate.spec import FrameSpec, Stream
+from rollcli.simulate.surfaces import Course, Ground, Surface
+from rollcli.simulate.views import bands, depths, first_hits, render_view
 
 _HORIZON = 2000.0  # metres: the end of a bare world
+# of dips and bumps
+_DEPTH = (0.025, 0.07)  # metres, of dips as of bumps
+_RADIUS = (0.25, 0.5)  # metres
+_AHEAD = (4.5, 12.0)  # metres
+_TRIES = 50  # for a place beside those that are there
 
 
 def build_scene(spec: FrameSpec) -> Scene:
@@ -31,8 +37,9 @@ def build_scene(spec: FrameSpec) -> Scene:
     rng, light, carriageway = _begin(spec)
     scene = Scene(light, normal=carriageway.normal)
     scene.road = scene.material(draw_asphalt(rng, carriageway))
-    _KINDS[spec.scene](scene, rng, carriageway)
-    add_dips(scene, spec, carriageway)
+    _KINDS[spec.scene](Site(scene, rng, carriageway))
+    dips = draw_dips(spec, carriageway)
+    scene.surfaces = [_dipped(surface, dips) for surface in scene.surfaces]
     return scene
 
 
@@ -48,86 +55,217 @@ def carriageway_of(spec: FrameSpec) -> Carriageway:
 
 def _begin(spec: FrameSpec) -> tuple[np.random.Generator, Light, Carriageway]:
     """Draw the light and the carriageway; return them with the generator for the rest of the scene."""
-    rng = spec.scene_rng()
+    rng = spec.rng(Stream.SCENE)
     return rng, draw_light(rng), draw_carriageway(rng, spec)
 
 
-def _bare(scene: Scene, rng: np.random.Generator, carriageway: Carriageway) -> None:
+def _bare(site: Site) -> None:
     """Add the road, and level grass from its edges to the horizon."""
-    grass = add_grass(scene, rng)
-    left, right = (
-        Piece(*ends, offset=carriageway.section.elevation(edge))
-        for ends, edge in (
-            ((-np.inf, carriageway.left), carriageway.left),
-            ((carriageway.right, np.inf), carriageway.right),
-        )
-    )
-    strips = [(left, grass), *_road_strips(scene, carriageway), (right, grass)]
-    scene.surfaces += _grounds(carriageway, strips, _HORIZON)
+    grass = site.add_grass()
+    edges, elevation = (site.road.left, site.road.right), site.road.section.elevation
+    left = Piece(-np.inf, edges[0], offset=elevation(edges[0]))
+    right = Piece(edges[1], np.inf, offset=elevation(edges[1]))
+    _lay_road(site, _HORIZON, [(left, grass)], [(right, grass)])
 
 
-def _open(scene: Scene, rng: np.random.Generator, carriageway: Carriageway) -> None:
+def _open(site: Site) -> None:
     """Add a road with kerbs, sidewalks, lawns, trees and cars."""
-    _lay_road(scene, carriageway)
-    grass = add_grass(scene, rng)
-    for side, edge in carriageway.sides:
-        level, outer = add_sidewalk(scene, rng, carriageway, side, edge)
-        add_slope(scene, carriageway, side, outer, side * np.inf, level, draw(rng, -0.04, 0.06), grass)
-        if rng.random() < 0.3:
-            add_hedge(scene, rng, carriageway, outer + side * draw(rng, 0.2, 1.0), level - 0.1)
-        add_posts(scene, rng, carriageway, outer - side * 0.3, level)
-        add_trees(scene, rng, carriageway, outer, outer + side * 25, level - 0.4)
-    add_cars(scene, rng, carriageway)
-    add_backdrop(scene, rng, carriageway)
+    _lay_road(site)
+    grass = site.add_grass()
+    for side, edge in site.road.sides:
+        level, outer = site.add_sidewalk(side, edge)
+        site.add_slope(side, outer, side * np.inf, level, site.draw(-0.04, 0.06), grass)
+        if site.rng.random() < 0.3:
+            site.add_hedge(outer + side * site.draw(0.2, 1.0), level - 0.1)
+        site.add_posts(outer - side * 0.3, level)
+        site.add_trees(outer, outer + side * 25, level - 0.4)
+    site.add_cars()
+    site.add_backdrop()
 
 
-def _street(scene: Scene, rng: np.random.Generator, carriageway: Carriageway) -> None:
+def _street(site: Site) -> None:
     """Add a street between house fronts."""
-    _lay_road(scene, carriageway)
-    yard = scene.material(Plain(0.3, tint=(0.9, 0.97, 1.0), offset=draw_offset(rng)))
-    for side, edge in carriageway.sides:
-        level, outer = add_sidewalk(scene, rng, carriageway, side, edge, beyond=yard)
-        garden = float(rng.choice([0.0, 1.0])) * draw(rng, 1, 6)
-        add_houses(scene, rng, carriageway.course, side, outer + side * garden, level)
-        add_posts(scene, rng, carriageway, edge + side * 0.5, level)
-        if rng.random() < 0.35:
-            add_trees(scene, rng, carriageway, edge + side * 0.8, edge + side * 0.9, level)
-    add_cars(scene, rng, carriageway)
-    add_backdrop(scene, rng, carriageway)
+    _lay_road(site)
+    yard = site.scene.material(Plain(0.3, tint=(0.9, 0.97, 1.0), offset=draw_offset(site.rng)))
+    for side, edge in site.road.sides:
+        level, outer = site.add_sidewalk(side, edge, beyond=yard)
+        garden = float(site.rng.choice([0.0, 1.0])) * site.draw(1, 6)
+        site.add_houses(side, outer + side * garden, level)
+        site.add_posts(edge + side * 0.5, level)
+        if site.rng.random() < 0.35:
+            site.add_trees(edge + side * 0.8, edge + side * 0.9, level)
+    site.add_cars()
+    site.add_backdrop()
 
 
-def _verge(scene: Scene, rng: np.random.Generator, carriageway: Carriageway) -> None:
+def _verge(site: Site) -> None:
     """Add a country road between grass slopes that are wider than the road."""
-    _lay_road(scene, carriageway)
-    grass = add_grass(scene, rng)
-    for side, edge in carriageway.sides:
-        level = carriageway.section.elevation(edge)
-        slope = float(rng.choice([-1.0, 1.0])) * draw(rng, 0.03, 0.3)
-        width = (carriageway.right - carriageway.left) * draw(rng, 1.2, 3)
+    _lay_road(site)
+    grass = site.add_grass()
+    for side, edge in site.road.sides:
+        level = site.road.section.elevation(edge)
+        slope = float(site.rng.choice([-1.0, 1.0])) * site.draw(0.03, 0.3)
+        width = (site.road.right - site.road.left) * site.draw(1.2, 3)
         foot = edge + side * width
-        add_slope(scene, carriageway, side, edge, foot, level, slope, grass)
-        add_slope(scene, carriageway, side, foot, side * np.inf, level + slope * width, 0.0, grass)
-        add_posts(scene, rng, carriageway, edge + side * 0.6, level + 0.6 * slope, radius=0.05, height=1.0)
+        site.add_slope(side, edge, foot, level, slope, grass)
+        site.add_slope(side, foot, side * np.inf, level + slope * width, 0.0, grass)
+        site.add_posts(edge + side * 0.6, level + 0.6 * slope, radius=0.05, height=1.0)
         if slope < 0.1:
-            add_trees(scene, rng, carriageway, foot, foot + side * 30, level + slope * width)
-    add_cars(scene, rng, carriageway)
-    add_backdrop(scene, rng, carriageway)
+            site.add_trees(foot, foot + side * 30, level + slope * width)
+    site.add_cars()
+    site.add_backdrop()
 
 
-def _lay_road(scene: Scene, carriageway: Carriageway) -> None:
-    scene.surfaces += _grounds(carriageway, _road_strips(scene, carriageway), FAR)
+Strips = Sequence[tuple[Piece, int]]
 
 
-def _road_strips(scene: Scene, carriageway: Carriageway) -> list[tuple[Piece, int]]:
-    return [(piece, scene.road) for piece in carriageway.section.pieces]
-
-
-def _grounds(carriageway: Carriageway, strips: list[tuple[Piece, int]], far: float) -> Iterator[Ground]:
-    """Make the ground of pieces side by side with their materials; join pieces of one parabola."""
+def _lay_road(site: Site, far: float = FAR, left: Strips = (), right: Strips = ()) -> None:
+    """Add the ground of the road's pieces, and of those beside it with their materials, up to `far` ahead."""
+    road = site.road
+    strips = [*left, *((piece, site.scene.road) for piece in road.section.pieces), *right]
+    # pieces of one parabola are one ground
     for (slope, camber, offset), group in groupby(strips, key=lambda strip: strip[0][2:]):
         pieces, materials = zip(*group, strict=True)
         edges = (*(piece.start for piece in pieces), pieces[-1].end)
-        yield Ground(carriageway.course, edges, materials, far, slope, offset, camber, carriageway.relief)
+        ground = Ground(road.course, edges, materials, far, slope, offset, camber, road.relief)
+        site.scene.surfaces.append(ground)
 
 
 _KINDS = {"bare": _bare, "open": _open, "street": _street, "verge": _verge}
+
+
+def draw_dips(spec: FrameSpec, carriageway: Carriageway) -> tuple[Dip, ...]:
+    """Draw the dips and bumps of a frame: apart from each other, and each within one piece of the road.
+
+    Those for which there is no room are left out.
+    """
+    rng = spec.rng(Stream.DIPS)
+    found: list[Dip] = []
+    for _ in range(spec.dips or 0):
+        for _ in range(_TRIES):
+            across, along = draw(rng, *_RADIUS), draw(rng, *_RADIUS)
+            height = draw(rng, *_DEPTH) * float(rng.choice([-1.0, 1.0]))
+            middle = carriageway.shift + carriageway.lane * draw(rng, -0.5, 0.5)
+            dip = Dip(middle, draw(rng, *_AHEAD), across, along, height)
+            if _fits(dip, found, carriageway):
+                found.append(dip)
+                break
+    return tuple(found)
+
+
+def _fits(dip: Dip, others: Sequence[Dip], carriageway: Carriageway) -> bool:
+    ends = (dip.lateral - 1.3 * dip.across, dip.lateral + 1.3 * dip.across)
+    section = carriageway.section
+    one_piece = section.piece(ends[0]) is section.piece(ends[1])
+    inside = section.pieces[0].start < ends[0] and ends[1] < section.pieces[-1].end
+    apart = all(
+        abs(dip.lateral - each.lateral) > 1.2 * (dip.across + each.across)
+        or abs(dip.z - each.z) > dip.along + each.along + 1.0
+        for each in others
+    )
+    return one_piece and inside and apart
+
+
+def _dipped(surface: Surface, dips: Sequence[Dip]) -> Surface:
+    if not isinstance(surface, Ground):
+        return surface
+    mine = tuple(dip for dip in dips if surface.edges[0] <= dip.lateral < surface.edges[-1])
+    return replace(surface, relief=replace(surface.relief or LEVEL, dips=mine)) if mine else surface
+
+
+def true_heights(
+    scene: Scene, spec: FrameSpec, carriageway: Carriageway, camera: Camera
+) -> NDArray[np.float32]:
+    """Return how high the ground that a camera sees lies over the road, metres, (H, W); NaN for the rest.
+
+    The road is the carriageway without dips, bumps and gutters, which goes on beyond its edges as it is at
+    them.
+    """
+    section = cross_section(
+        spec.cross_section, spec.crossfall, 0.0, carriageway.left, carriageway.right, carriageway.course.bend
+    )
+    ground = np.array([isinstance(each, Ground) for each in scene.surfaces] + [False])
+    rows = [
+        _row_heights(scene, PixelRays.of_rows(camera, part), ground, carriageway.course, section)
+        for part in bands(camera)
+    ]
+    return np.concatenate(rows).reshape(camera.height, camera.width)
+
+
+def _row_heights(
+    scene: Scene, pixels: PixelRays, ground: NDArray[np.bool_], course: Course, section: CrossSection
+) -> NDArray[np.float32]:
+    depth, owner = first_hits(scene, pixels)
+    seen = ground[owner]
+    points = pixels.rays.origin + np.where(seen, depth, 0) * pixels.rays.direction
+    lateral = course.lateral(points)
+    over, slope = course.elevation(points), np.zeros_like(lateral)
+    for piece in section.pieces:
+        first, last = piece is section.pieces[0], piece is section.pieces[-1]
+        mine = (first | (lateral >= piece.start)) & (last | (lateral < piece.end))
+        over[mine] -= (piece.offset + (piece.slope + piece.camber / 2 * lateral) * lateral)[mine]
+        slope[mine] = (piece.slope + piece.camber * lateral)[mine]
+    normal = -slope * course.across(points[2])
+    normal[1] += 1.0
+    normal[2] -= course.curvature * points[2]
+    return np.where(seen, over / np.linalg.norm(normal, axis=0), np.nan).astype(np.float32)
+
+
+@dataclass(frozen=True)
+class RenderedFrame:
+    """A rendered stereo pair with its truth.
+
+    Attributes
+    ----------
+    left, right : numpy.ndarray
+        uint8, (H, W, 3) in BGR order, or (H, W) where the spec asks for grey images.
+    disparity : numpy.ndarray
+        float32 (H, W), pixels, of the left view; 0 where there is only sky.
+    road : numpy.ndarray
+        bool (H, W): True where the left view shows the carriageway.
+    spec : FrameSpec
+        What was rendered.
+    heights : numpy.ndarray or None
+        float32 (H, W), metres: how high the ground in the left view lies over the road without dips and
+        bumps; NaN where it shows no ground. None unless the spec has a number of dips.
+    """
+
+    left: NDArray[np.uint8]
+    right: NDArray[np.uint8]
+    disparity: NDArray[np.float32]
+    road: NDArray[np.bool_]
+    spec: FrameSpec
+    heights: NDArray[np.float32] | None = None
+
+    @property
+    def roll(self) -> float:
+        """theta, radians."""
+        return self.spec.roll
+
+    @property
+    def pitch(self) -> float:
+        """Radians, positive looking down."""
+        return self.spec.pitch
+
+
+def render_frame(spec: FrameSpec) -> RenderedFrame:
+    """Render both views, the true disparity of the left one, and which of its pixels are road."""
+    scene, rng = build_scene(spec), spec.rng(Stream.SENSOR)
+    cameras = spec.cameras(scene.normal)
+    views = [render_view(scene, camera) for camera in cameras]
+    left, right = (
+        expose(view.light, spec.noise, gain, spec.colour, rng)
+        for view, gain in zip(views, (1.0, spec.gain), strict=True)
+    )
+    disparity = (spec.focal * spec.baseline / views[0].depth).astype(np.float32)
+    heights = None
+    if spec.dips is not None:
+        heights = true_heights(scene, spec, carriageway_of(spec), cameras[0])
+    return RenderedFrame(left, right, disparity, views[0].material == scene.road, spec, heights)
+
+
+def true_disparity(spec: FrameSpec) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Return the disparity (H, W) of the left view in double precision, 0 in the sky, and its road pixels."""
+    scene = build_scene(spec)
+    depth, material = depths(scene, spec.cameras(scene.normal)[0])
+    return spec.focal * spec.baseline / depth, material == scene.road

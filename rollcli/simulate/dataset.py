@@ -1,12 +1,14 @@
-"""A folder of rendered frames with their truth and calibration, the same bytes whatever the workers."""
+"""`rollcli simulate`: a folder of rendered frames with their truth and calibration.
 
-import csv
-import io
+Its bytes are the same whatever the workers.
+"""
+
 import json
 import math
 import re
+import sys
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,60 +16,70 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.errors import OutputError
+from rollcli import __version__
+from rollcli.errors import ExitStatus, InputError, OutputError, UsageError
 from rollcli.files.atomic import output_error, remove_leftovers, write_atomic
 from rollcli.files.codecs.tiff import encode_tiff
 from rollcli.files.encodings import KITTI_TOP, from_disparity
 from rollcli.files.formats import encode_stored
-from rollcli.files.results import run_path
+from rollcli.files.locking import differences, not_resumable
+from rollcli.files.results import csv_table, read_run, run_path
+from rollcli.messages import say
+from rollcli.run.options import RunningOptions
+from rollcli.run.progress import TaskProgress
 from rollcli.run.workers.chunks import Work
 from rollcli.run.workers.in_order import Workers
-from rollcli.run.workers.interrupt import Stop
+from rollcli.run.workers.interrupt import Stop, stop_on_signals
 from rollcli.run.workers.tasks import run_tasks
-from rollcli.simulate.build import carriageway_of, road_camber
+from rollcli.simulate.build import carriageway_of, render_frame, road_camber
 from rollcli.simulate.camera import rig_axes
-from rollcli.simulate.lane import lane_points, lane_rolls
-from rollcli.simulate.render import render_frame
-from rollcli.simulate.spec import LEVEL, FrameSpec
+from rollcli.simulate.options import KERBED, MIXED, SimulateOptions
+from rollcli.simulate.relief import lane_points, lane_rolls
+from rollcli.simulate.spec import LEVEL, FrameSpec, draw_specs
 
-COLUMNS = (
-    "file",
-    "roll_deg",
-    "pitch_deg",
-    "scene",
-    "focal_px",
-    "cx_px",
-    "cy_px",
-    "baseline_m",
-    "height_m",
-    "curvature_per_m",
-    "seed",
-    "cross_section",
-    "crossfall_percent",
-    "gutter_percent",
-    "camber",
-    "bend_per_m",
-    "roughness",
-    "lane_lo_deg",
-    "lane_hi_deg",
-)
+_PARTS = ("left", "right", "disparity")
+_TRUTH = "truth.csv"
+_CALIBRATION, _HEIGHTS = "calib", "heights"
+_OURS = re.compile(r"frame_\d{4,}\.png")
 
 
 def truth_csv(frames: Iterable[tuple[str, FrameSpec]]) -> bytes:
     """Write the table of known values, one row for each stem and its frame."""
-    text = io.StringIO()
-    rows = csv.writer(text, lineterminator="\n")
-    rows.writerow(COLUMNS)
-    for stem, spec in frames:
-        angles = (f"{math.degrees(angle) + 0.0:.9f}" for angle in (spec.roll, spec.pitch))
-        rig = map(_number, (spec.focal, *spec.centre, spec.baseline, spec.height, spec.curvature))
-        slopes = (_number(100 * slope) for slope in (spec.crossfall, spec.gutter))
+    rows = [{"file": stem, **_truth_of(spec)} for stem, spec in frames]
+    return csv_table([[*rows[0]], *(row.values() for row in rows)])
+
+
+def _truth_of(spec: FrameSpec) -> dict[str, str | int]:
+    low, high = lane_rolls_of(spec)
+    return {
+        "roll_deg": _degrees(spec.roll, 9),
+        "pitch_deg": _degrees(spec.pitch, 9),
+        "scene": spec.scene,
+        "focal_px": _number(spec.focal),
+        "cx_px": _number(spec.centre[0]),
+        "cy_px": _number(spec.centre[1]),
+        "baseline_m": _number(spec.baseline),
+        "height_m": _number(spec.height),
+        "curvature_per_m": _number(spec.curvature),
+        "seed": spec.seed,
+        "cross_section": spec.cross_section,
+        "crossfall_percent": _number(100 * spec.crossfall),
+        "gutter_percent": _number(100 * spec.gutter),
         # a roof has a ridge instead of a curvature
-        camber = "" if spec.cross_section == "roof" else _number(road_camber(spec))
-        road = (spec.cross_section, *slopes, camber, _number(carriageway_of(spec).course.bend))
-        lane = (f"{math.degrees(angle) + 0.0:.6f}" for angle in lane_rolls_of(spec))
-        rows.writerow((stem, *angles, spec.scene, *rig, spec.seed, *road, spec.roughness or "", *lane))
-    return text.getvalue().encode()
+        "camber": "" if spec.cross_section == "roof" else _number(road_camber(spec)),
+        "bend_per_m": _number(carriageway_of(spec).course.bend),
+        "roughness": spec.roughness or "",
+        "lane_lo_deg": _degrees(low, 6),
+        "lane_hi_deg": _degrees(high, 6),
+    }
+
+
+def _number(value: float) -> str:
+    return f"{value + 0.0:.10g}"  # + 0.0 turns -0.0 into 0
+
+
+def _degrees(angle: float, digits: int) -> str:
+    return f"{math.degrees(angle) + 0.0:.{digits}f}"
 
 
 def lane_rolls_of(spec: FrameSpec) -> tuple[float, float]:
@@ -104,16 +116,6 @@ def calibration(spec: FrameSpec) -> bytes:
     return "".join(lines).encode()
 
 
-def _number(value: float) -> str:
-    return f"{value + 0.0:.10g}"  # + 0.0 turns -0.0 into 0
-
-
-_PARTS = ("left", "right", "disparity")
-TRUTH = "truth.csv"
-_CALIBRATION, _HEIGHTS = "calib", "heights"
-_OURS = re.compile(r"frame_\d{4,}\.png")
-
-
 @dataclass(frozen=True)
 class RenderTask:
     """A frame to render and the names of its files."""
@@ -122,18 +124,12 @@ class RenderTask:
     folder: Path
     stem: str
 
-    def image(self, part: str) -> Path:
-        """Name the file of "left", "right" or "disparity"."""
-        return self.folder / part / f"{self.stem}.png"
-
-    def images(self) -> list[Path]:
-        """Name the files of the frame."""
-        return [self.image(part) for part in _PARTS] + ([] if self.heights is None else [self.heights])
-
     @property
-    def heights(self) -> Path | None:
-        """Name the file of true heights; None where there is none."""
-        return None if self.spec.dips is None else self.folder / _HEIGHTS / f"{self.stem}.tif"
+    def files(self) -> dict[str, Path]:
+        """The files of the frame: "left", "right", "disparity" and, where it has true ones, "heights"."""
+        files = {part: self.folder / part / f"{self.stem}.png" for part in _PARTS}
+        heights = self.folder / _HEIGHTS / f"{self.stem}.tif"
+        return files if self.spec.dips is None else {**files, _HEIGHTS: heights}
 
 
 @dataclass(frozen=True)
@@ -177,9 +173,9 @@ class Dataset:
 
     def files(self) -> list[Path]:
         """List all files that are written, truth.csv last."""
-        record = [] if self.record is None else [Path(run_path(self.folder / TRUTH))]
-        images = (path for task in self.missing for path in task.images())
-        return [*record, *images, *self.calibrations(), self.folder / TRUTH]
+        record = [] if self.record is None else [Path(run_path(self.folder / _TRUTH))]
+        images = (path for task in self.missing for path in task.files.values())
+        return [*record, *images, *self.calibrations(), self.folder / _TRUTH]
 
 
 def write_dataset(dataset: Dataset, jobs: int | None = 1, stop: Stop | None = None) -> Iterator[str]:
@@ -205,33 +201,34 @@ def write_dataset(dataset: Dataset, jobs: int | None = 1, stop: Stop | None = No
         _clear(dataset)
     if dataset.record is not None:
         text = json.dumps(dataset.record, indent=2).encode() + b"\n"
-        write_atomic(run_path(dataset.folder / TRUTH), text)
+        write_atomic(run_path(dataset.folder / _TRUTH), text)
     tasks, written = dataset.missing, 0
-    remove_leftovers(path for task in tasks for path in task.images())
-    work = Work(_write_frame, _lost, lambda task: remove_leftovers(task.images()))
+    remove_leftovers(path for task in tasks for path in task.files.values())
+    work = Work(_write_frame, _lost, lambda task: remove_leftovers(task.files.values()))
     for stem in run_tasks(tasks, work, stop or Stop(), Workers(jobs)):
         written += 1
         yield stem
     if written == len(tasks):
         for path, text in dataset.calibrations().items():
             write_atomic(path, text)
-        write_atomic(dataset.folder / TRUTH, truth_csv((task.stem, task.spec) for task in dataset.tasks))
+        write_atomic(dataset.folder / _TRUTH, truth_csv((task.stem, task.spec) for task in dataset.tasks))
 
 
 def _write_frame(task: RenderTask) -> str:
-    frame = render_frame(task.spec)
-    write_atomic(task.image("left"), _png(frame.left))
-    write_atomic(task.image("right"), _png(frame.right))
+    frame, files = render_frame(task.spec), task.files
+    write_atomic(files["left"], _png(frame.left))
+    write_atomic(files["right"], _png(frame.right))
     near = frame.disparity > KITTI_TOP
     stored = from_disparity(np.where(near, 0, frame.disparity), "kitti", np.uint16)
-    write_atomic(task.image("disparity"), encode_stored(stored, "png"))
-    if task.heights is not None and frame.heights is not None:
-        write_atomic(task.heights, encode_tiff(frame.heights, description="height over the road, metres"))
+    write_atomic(files["disparity"], encode_stored(stored, "png"))
+    if frame.heights is not None:
+        heights = encode_tiff(frame.heights, description="height over the road, metres")
+        write_atomic(files[_HEIGHTS], heights)
     return task.stem
 
 
 def _lost(task: RenderTask, reason: str) -> str:
-    raise OutputError(f"{task.image('left')}: cannot be rendered: {reason}; try fewer --jobs")
+    raise OutputError(f"{task.files['left']}: cannot be rendered: {reason}; try fewer --jobs")
 
 
 def _nearest_disparity(spec: FrameSpec) -> float:
@@ -253,7 +250,7 @@ def _png(image: NDArray[np.uint8]) -> bytes:
 
 def _clear(dataset: Dataset) -> None:
     """Remove what an earlier simulation left: pairs without a row, and the calibration of another rig."""
-    single = [dataset.folder / name for name in (TRUTH, f"{_CALIBRATION}.txt")]
+    single = [dataset.folder / name for name in (_TRUTH, f"{_CALIBRATION}.txt")]
     try:
         for path in (*single, *_earlier_frames(dataset.folder)):
             path.unlink(missing_ok=True)
@@ -271,3 +268,134 @@ def _earlier_frames(folder: Path) -> list[Path]:
     calibrations = [(folder / _CALIBRATION / name).with_suffix(".txt") for name in ours]
     heights = [(folder / _HEIGHTS / name).with_suffix(".tif") for name in ours]
     return [each / name for name in ours for each in folders] + calibrations + heights
+
+
+def plan_dataset(folder: str | Path, options: SimulateOptions, *, overwrite: bool = False) -> Dataset:
+    """Draw the frames, and check that they can be written.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Where to write; made if it does not exist.
+    options : SimulateOptions
+        What to render.
+    overwrite : bool
+        Whether to begin anew in a folder with files in it.
+
+    Raises
+    ------
+    UsageError
+        Options contradict each other, or the folder has files in it that may not be replaced or continued.
+    """
+    if options.resume and overwrite:
+        raise UsageError("give either --resume or --overwrite")
+    _refuse_idle(options)
+    specs = draw_specs(options)
+    dataset = Dataset(Path(folder), tuple(specs), _record(options))
+    if _is_free(Path(folder)) or overwrite:
+        return dataset
+    if not options.resume:
+        raise UsageError(
+            f"{folder}: there are files in it; --resume continues an interrupted simulation, "
+            "--overwrite begins anew"
+        )
+    _check_resumable(dataset)
+    whole = (task.stem for task in dataset.tasks if all(path.exists() for path in task.files.values()))
+    return replace(dataset, kept=frozenset(whole))
+
+
+def _refuse_idle(options: SimulateOptions) -> None:
+    """Refuse options that change nothing in the frames that are asked for."""
+    if options.crossfall is not None and options.cross_section == "flat":
+        raise UsageError("--crossfall: a flat road has none; choose another --cross-section")
+    if options.kerb is not None and options.scene not in (*KERBED, MIXED):
+        raise UsageError(f"--kerb: the scene {options.scene} has no kerbs; {' and '.join(KERBED)} have")
+
+
+def _is_free(folder: Path) -> bool:
+    """Tell whether the folder is empty or does not exist."""
+    try:
+        if folder.exists() and not folder.is_dir():
+            raise UsageError(f"{folder}: is a file, not a folder to write to")
+        return not folder.is_dir() or not any(folder.iterdir())
+    except OSError as error:
+        raise output_error(folder, error) from error
+
+
+def _record(options: SimulateOptions) -> Mapping[str, Any]:
+    """Collect what decides the bytes of the frames: the version, and the options by their names."""
+    values = {key.removesuffix("_deg").replace("_", "-"): value for key, value in asdict(options).items()}
+    del values["resume"]
+    return {"rollcli": __version__, "options": values}
+
+
+def _check_resumable(dataset: Dataset) -> None:
+    """Refuse to continue a folder of another version, of other options or without a record.
+
+    Raises
+    ------
+    UsageError
+        Says what differs.
+    """
+    name, record = str(dataset.folder), run_path(_TRUTH)
+    try:
+        was = read_run(dataset.folder / _TRUTH)
+    except InputError as error:
+        raise not_resumable(name, f"{record} is damaged") from error
+    if was is None:
+        raise not_resumable(name, f"there is no {record}")
+    if not isinstance(was.get("rollcli"), str) or not isinstance(was.get("options"), dict):
+        raise not_resumable(name, f"{record} is damaged")
+    for difference in differences(was, dataset.record or {}):
+        raise not_resumable(name, difference)
+
+
+def run_simulate(
+    folder: str, options: SimulateOptions, running: RunningOptions, resume_command: str = ""
+) -> ExitStatus:
+    """Write the simulated frames.
+
+    Parameters
+    ----------
+    folder : str
+        Where to write.
+    options : SimulateOptions
+        What to render.
+    running : RunningOptions
+        How to run, and how much to say.
+    resume_command : str
+        The command that continues this simulation when it is interrupted.
+
+    Raises
+    ------
+    UsageError, OutputError
+        Exit statuses 2 and 1.
+    """
+    dataset = plan_dataset(folder, options, overwrite=running.overwrite)
+    if running.dry_run:
+        sys.stdout.writelines(f"write {path}\n" for path in dataset.files())
+        return ExitStatus.DONE
+    if dataset.nearest_disparity > KITTI_TOP and not running.quiet:
+        say(
+            f"the road reaches {dataset.nearest_disparity:.0f} px of disparity: what exceeds "
+            f"{KITTI_TOP:.0f} px does not fit a KITTI PNG and has no data in {dataset.folder}/disparity"
+        )
+    progress = TaskProgress(len(dataset.specs), quiet=running.quiet, verbose=running.verbose)
+    progress.kept = len(dataset.kept or ())
+    with stop_on_signals() as stop, progress:
+        for stem in write_dataset(dataset, running.jobs, stop):
+            progress.advance()
+            progress.detail(f"{stem} written")
+    if progress.done < progress.total:
+        say(f"interrupted after {progress.done} of {progress.total} frames; continue with: {resume_command}")
+        return ExitStatus.INTERRUPTED
+    progress.note(_summary(dataset, progress))
+    return ExitStatus.DONE
+
+
+def _summary(dataset: Dataset, progress: TaskProgress) -> str:
+    """Make the last line: how many frames, and what one cost."""
+    kept = f" ({progress.kept} kept)" if progress.kept else ""
+    rendered = progress.done - progress.kept
+    cost = f", {progress.seconds / rendered:.2f} s a frame" if rendered else ""
+    return f"{progress.done} frames{kept} in {dataset.folder}; {progress.seconds:.1f} s{cost}"

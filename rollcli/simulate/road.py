@@ -6,11 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rollcli.simulate.lane import lane_plane
 from rollcli.simulate.materials import Asphalt, Mark, Patch
 from rollcli.simulate.options import GUTTER_WIDTH
-from rollcli.simulate.relief import Relief
-from rollcli.simulate.roughness import draw_relief
+from rollcli.simulate.relief import Relief, draw_relief, lane_plane
 from rollcli.simulate.scene import FAR, draw, draw_offset
 from rollcli.simulate.spec import FrameSpec, Stream
 from rollcli.simulate.surfaces import Course
@@ -74,39 +72,22 @@ def cross_section(
         road falls to the right.
     """
     middle, half = (left + right) / 2, (right - left) / 2
-    inner = _SHAPES[shape](crossfall, middle, half, bend)
-    return CrossSection(_through_origin(_add_gutters(inner, gutter) if gutter else inner))
-
-
-def _flat(crossfall: float, middle: float, half: float, bend: float) -> tuple[Piece, ...]:
-    return (Piece(middle - half, middle + half),)
-
-
-def _crown(crossfall: float, middle: float, half: float, bend: float) -> tuple[Piece, ...]:
-    camber = -crossfall / half
-    return (Piece(middle - half, middle + half, -camber * middle, camber),)
-
-
-def _dish(crossfall: float, middle: float, half: float, bend: float) -> tuple[Piece, ...]:
-    return _crown(-crossfall, middle, half, bend)
-
-
-def _roof(crossfall: float, middle: float, half: float, bend: float) -> tuple[Piece, ...]:
-    rising = Piece(middle - half, middle, crossfall, offset=-2 * crossfall * middle)
-    return rising, Piece(middle, middle + half, -crossfall)
-
-
-def _superelevated(crossfall: float, middle: float, half: float, bend: float) -> tuple[Piece, ...]:
-    return (Piece(middle - half, middle + half, crossfall if bend < 0 else -crossfall),)
-
-
-_SHAPES = {
-    "flat": _flat,
-    "crown": _crown,
-    "roof": _roof,
-    "dish": _dish,
-    "superelevated": _superelevated,
-}
+    start, end = middle - half, middle + half
+    pieces: tuple[Piece, ...]
+    if shape == "roof":
+        rising = Piece(start, middle, crossfall, offset=-2 * crossfall * middle)
+        pieces = rising, Piece(middle, end, -crossfall)
+    elif shape in ("crown", "dish"):
+        camber = (crossfall if shape == "dish" else -crossfall) / half
+        pieces = (Piece(start, end, -camber * middle, camber),)
+    elif shape == "superelevated":
+        pieces = (Piece(start, end, crossfall if bend < 0 else -crossfall),)
+    else:
+        pieces = (Piece(start, end),)
+    if gutter:
+        pieces = _add_gutters(pieces, gutter)
+    below_rig = CrossSection(pieces).elevation(0.0)
+    return CrossSection(tuple(piece._replace(offset=piece.offset - below_rig) for piece in pieces))
 
 
 def _add_gutters(pieces: tuple[Piece, ...], gutter: float) -> tuple[Piece, ...]:
@@ -126,11 +107,6 @@ def _add_gutters(pieces: tuple[Piece, ...], gutter: float) -> tuple[Piece, ...]:
 def _straight(start: float, end: float, at: float, beside: Piece, steeper: float) -> Piece:
     slope = beside.slope_at(at) + steeper
     return Piece(start, end, slope, offset=beside.elevation(at) - slope * at)
-
-
-def _through_origin(pieces: tuple[Piece, ...]) -> tuple[Piece, ...]:
-    below_rig = CrossSection(pieces).elevation(0.0)
-    return tuple(piece._replace(offset=piece.offset - below_rig) for piece in pieces)
 
 
 @dataclass(frozen=True)

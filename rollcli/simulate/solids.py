@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from rollcli.simulate.materials import coarse, fine
 from rollcli.simulate.surfaces import NEAR, SurfaceSample
@@ -72,8 +72,7 @@ class Solid:
 
     def bounds(self, margin: float = 0.0) -> Array | None:
         """Return the corners as `Surface.bounds` does, with `margin` metres more on each side."""
-        extent = self.extent + np.array([-margin, margin])
-        grid = np.stack(np.meshgrid(*extent, indexing="ij")).reshape(3, -1)
+        grid = _corners(self.extent + np.array([-margin, margin]))
         return np.asarray(self.frame.T @ grid + self.place[:, None])
 
 
@@ -99,9 +98,8 @@ class Post:
         return SurfaceSample(normal, self.radius * np.arctan2(x, -z), y, around, _UP, self.material)
 
     def bounds(self) -> Array | None:
-        r = self.radius
-        corners = np.array([[x, y, z] for x in (-r, r) for y in (0.0, self.height) for z in (-r, r)])
-        return np.asarray(corners.T + self.foot[:, None])
+        across = (-self.radius, self.radius)
+        return _corners([across, (0.0, self.height), across]) + self.foot[:, None]
 
 
 @dataclass(frozen=True)
@@ -142,9 +140,13 @@ class TreeCrown:
         return SurfaceSample(normal, self.radius * np.arctan2(x, -z), y, around, _UP, self.material)
 
     def bounds(self) -> Array | None:
-        size = np.array([self.radius, self.half_height, self.radius])
-        signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
-        return np.asarray(self.centre[:, None] + (signs * size).T)
+        across, up = (-self.radius, self.radius), (-self.half_height, self.half_height)
+        return _corners([across, up, across]) + self.centre[:, None]
+
+
+def _corners(extent: ArrayLike) -> Array:
+    """Return the corners (3, 8) of a box from its ends along each axis, (3, 2)."""
+    return np.stack(np.meshgrid(*np.asarray(extent, np.float64), indexing="ij")).reshape(3, -1)
 
 
 def _sphere_roots(a: Array, half_b: Array, c: Array) -> tuple[Array, Array]:

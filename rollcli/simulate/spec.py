@@ -1,29 +1,28 @@
-"""What one simulated frame is: the rig, the scene and the seeds, on which all of its bytes depend."""
+"""What one simulated frame is, on which all of its bytes depend, and how frames are drawn from ranges."""
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 
 from rollcli.errors import UsageError
 from rollcli.simulate.camera import Camera, rig_axes
 from rollcli.simulate.options import (
-    BASELINE,
     CROSS_SECTIONS,
+    CROSSFALL,
     FOCAL_PER_WIDTH,
-    HEIGHT,
     KERB,
     MAX_DIPS,
-    NOISE,
+    MIXED,
     ROUGHNESS,
     SCENES,
-    SIZE,
+    SimulateOptions,
+    Span,
 )
 from rollcli.simulate.vectors import Array
-
-Span = tuple[float, float]
 
 MAX_PITCH = math.radians(60)
 MAX_CURVATURE = 0.01
@@ -31,6 +30,7 @@ MAX_BEND = 0.02
 MAX_CROSSFALL, MAX_GUTTER = 0.15, 0.5
 MAX_KERB = 0.5  # metres
 LEVEL = np.array([0.0, 1.0, 0.0])  # the normal of a level road
+_NONE = (0.0, 0.0)
 
 
 class Stream(IntEnum):
@@ -102,12 +102,12 @@ class FrameSpec:
     roughness: str | None = None
     bend: float | None = None
     dips: int | None = None
-    size: tuple[int, int] = SIZE
-    focal: float = FOCAL_PER_WIDTH * SIZE[0]
+    size: tuple[int, int] = SimulateOptions.size
+    focal: float = FOCAL_PER_WIDTH * SimulateOptions.size[0]
     principal_point: tuple[float, float] | None = None
-    baseline: float = BASELINE
-    height: float = HEIGHT
-    noise: float = NOISE
+    baseline: float = SimulateOptions.baseline
+    height: float = SimulateOptions.height[0]
+    noise: float = SimulateOptions.noise
     gain: float = 1.0
     colour: bool = True
     seed: int = 0
@@ -120,7 +120,7 @@ class FrameSpec:
     @property
     def centre(self) -> tuple[float, float]:
         """The principal point, pixels from the centre of the top-left pixel."""
-        return self.principal_point or image_centre(self.size)
+        return self.principal_point or ((self.size[0] - 1) / 2, (self.size[1] - 1) / 2)
 
     def cameras(self, normal: Array = LEVEL) -> tuple[Camera, Camera]:
         """Return the left and the right camera of a rig on the plane through the origin with this normal."""
@@ -134,21 +134,8 @@ class FrameSpec:
         """Return the generator of one part of the frame."""
         return np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(self.index, stream)))
 
-    def scene_rng(self) -> np.random.Generator:
-        """Return the generator of the scene's objects and materials."""
-        return self.rng(Stream.SCENE)
 
-    def sensor_rng(self) -> np.random.Generator:
-        """Return the generator of the noise of both views."""
-        return self.rng(Stream.SENSOR)
-
-
-def image_centre(size: tuple[int, int]) -> tuple[float, float]:
-    """Return the centre of an image of this width and height, pixels."""
-    return (size[0] - 1) / 2, (size[1] - 1) / 2
-
-
-def not_one_of(kind: str, name: str, names: Sequence[str]) -> str:
+def _not_one_of(kind: str, name: str, names: Sequence[str]) -> str:
     """Return the message that refuses a name."""
     return f"no such {kind}: {name}; choose one of {', '.join(names)}"
 
@@ -156,29 +143,15 @@ def not_one_of(kind: str, name: str, names: Sequence[str]) -> str:
 def _problems(spec: FrameSpec) -> Iterator[str]:
     """Yield a message for each value that is not possible."""
     width, height = spec.size
-    numbers = (
-        spec.roll,
-        spec.pitch,
-        spec.curvature,
-        spec.focal,
-        spec.baseline,
-        spec.height,
-        spec.noise,
-        spec.gain,
-        spec.crossfall,
-        spec.gutter,
-        spec.bend or 0.0,
-        *spec.kerb,
-        *spec.centre,
-    )
-    if not all(map(math.isfinite, numbers)):
+    numbers = (each for each in vars(spec).values() if isinstance(each, float))
+    if not all(map(math.isfinite, (*numbers, *spec.kerb, *spec.centre))):
         yield "every number of a simulated rig must be finite"
     if spec.scene not in SCENES:
-        yield not_one_of("scene", spec.scene, SCENES)
+        yield _not_one_of("scene", spec.scene, SCENES)
     if spec.cross_section not in CROSS_SECTIONS:
-        yield not_one_of("cross section", spec.cross_section, CROSS_SECTIONS)
+        yield _not_one_of("cross section", spec.cross_section, CROSS_SECTIONS)
     if spec.roughness is not None and spec.roughness not in ROUGHNESS:
-        yield not_one_of("roughness", spec.roughness, ROUGHNESS)
+        yield _not_one_of("roughness", spec.roughness, ROUGHNESS)
     if not 0 <= spec.crossfall <= MAX_CROSSFALL:
         yield f"a crossfall of {100 * spec.crossfall:g} % is not within 0 and {100 * MAX_CROSSFALL:g} %"
     if not 0 <= spec.gutter <= MAX_GUTTER:
@@ -215,3 +188,108 @@ def _problems(spec: FrameSpec) -> Iterator[str]:
             f"at a roll of {math.degrees(spec.roll):g} degrees the right camera is under the road: "
             f"mount the rig higher than {spec.height:g} m, or its cameras closer than {spec.baseline:g} m"
         )
+
+
+def draw_specs(options: SimulateOptions) -> list[FrameSpec]:
+    """Draw the specs of the frames that are asked for; the i-th does not depend on their number.
+
+    Raises
+    ------
+    UsageError
+        A value is not possible, or values contradict each other.
+    """
+    if options.frames < 1:
+        raise UsageError(f"at least one frame must be asked for, not {options.frames}")
+    for kind, name, names in (
+        ("scene", options.scene, SCENES),
+        ("cross section", options.cross_section, CROSS_SECTIONS),
+    ):
+        if name not in (*names, MIXED):
+            raise UsageError(_not_one_of(kind, name, (*names, MIXED)))
+    if options.seed < 0:
+        raise UsageError(f"the seed must be 0 or more, not {options.seed}")
+    rig = FrameSpec(
+        size=options.size,
+        focal=FOCAL_PER_WIDTH * options.size[0] if options.focal is None else options.focal,
+        principal_point=options.principal_point,
+        baseline=options.baseline,
+        noise=options.noise,
+        gain=options.gain,
+        colour=not options.grey,
+        kerb=options.kerb or KERB,
+        roughness=options.roughness,
+        dips=options.dips,
+        seed=options.seed,
+    )
+    spans = {
+        "roll": _both(math.radians, options.roll_deg),
+        "pitch": _both(math.radians, options.pitch_deg),
+        "curvature": options.curvature or _NONE,
+        "bend": options.bend or _NONE,
+        "crossfall": _both(_share, options.crossfall or CROSSFALL),
+        "gutter": _both(_share, options.gutter),
+        "height": options.height,
+        "principal offset": options.principal_offset,
+    }
+    _check_ends(rig, spans)
+    return [_drawn(replace(rig, index=index), options, spans) for index in range(options.frames)]
+
+
+def _both(change: Callable[[float], float], span: Span) -> Span:
+    return change(span[0]), change(span[1])
+
+
+def _share(percent: float) -> float:
+    return percent / 100
+
+
+def _check_ends(rig: FrameSpec, spans: dict[str, Span]) -> None:
+    """Refuse ranges with an end that is not possible, whatever would be drawn."""
+    for name, (low, high) in spans.items():
+        if not low <= high:
+            raise UsageError(f"the range of the {name} is empty: its lower end comes first")
+    for end in (0, 1):
+        values: dict[str, Any] = {name: span[end] for name, span in spans.items()}
+        offset = values.pop("principal offset")
+        _offset(replace(rig, **{**values, "height": spans["height"][0]}), offset, offset)
+
+
+def _drawn(spec: FrameSpec, options: SimulateOptions, spans: dict[str, Span]) -> FrameSpec:
+    """Return the frame with its pose, its road and the place of its camera, each from a stream of its own."""
+    rng = spec.rng(Stream.POSE)
+    roll, pitch = rng.uniform(*spans["roll"]), rng.uniform(*spans["pitch"])
+    scene = SCENES[rng.integers(len(SCENES))] if options.scene == MIXED else options.scene
+    curvature: float = rng.choice([0.0, 1.0]) * rng.uniform(-0.001, 0.001)
+    if options.curvature is not None:
+        curvature = rng.uniform(*options.curvature)
+    elif scene == "bare":
+        curvature = 0.0
+    rng = spec.rng(Stream.CROSS_SECTION)
+    crossfall, gutter = rng.uniform(*spans["crossfall"]), rng.uniform(*spans["gutter"])
+    shape = options.cross_section
+    if shape == MIXED:
+        shape = CROSS_SECTIONS[rng.integers(len(CROSS_SECTIONS))]
+    bend = None if options.bend is None else float(rng.uniform(*options.bend))
+    rng = spec.rng(Stream.RIG)
+    spec = replace(
+        spec,
+        scene=scene,
+        roll=float(roll),
+        pitch=float(pitch),
+        curvature=float(curvature),
+        cross_section=shape,
+        crossfall=0.0 if shape == "flat" else float(crossfall),
+        gutter=float(gutter),
+        bend=bend,
+        height=float(rng.uniform(*options.height)),
+    )
+    right, down = (float(rng.uniform(*options.principal_offset)) for _ in range(2))
+    return _offset(spec, right, down)
+
+
+def _offset(spec: FrameSpec, right: float, down: float) -> FrameSpec:
+    """Return the frame with its principal point moved."""
+    if not (right or down):
+        return spec
+    column, row = spec.centre
+    return replace(spec, principal_point=(column + right, row + down))

@@ -49,6 +49,7 @@ class Surface(Protocol):
 
     def bounds(self) -> Array | None:
         """Return the corners (3, 8) of a box around the surface; None for one without end."""
+        return None
 
 
 @dataclass(frozen=True)
@@ -92,7 +93,7 @@ class Course:
 
 
 @dataclass(frozen=True)
-class Ground:
+class Ground(Surface):
     """The sheet elevation = offset + slope * lateral + camber / 2 * lateral^2, in strips side by side.
 
     Strip i lies between edges[i] and edges[i + 1] (lateral, metres) and is of materials[i].
@@ -125,13 +126,15 @@ class Ground:
             for raised in (self.relief.highest, self.relief.lowest)
         )
         last = np.fmax(first, last)
-        sides = [self.course.lateral(origin + t * direction) for t in (first, last)]
+        ends = [origin + t * direction for t in (first, last)]
+        sides, ahead = [self.course.lateral(end) for end in ends], [end[2] for end in ends]
         inside = (np.fmax(*sides) >= self.edges[0]) & (np.fmin(*sides) < self.edges[-1])
-        reached = np.flatnonzero(inside & (origin[2] + first * direction[2] < self.far))  # nan is not
+        uneven = self.relief.is_between((sides[0], ahead[0]), (sides[1], ahead[1]))
+        reached = np.flatnonzero(inside & uneven & (ahead[0] < self.far))  # nan is not
         start = np.broadcast_to(origin, direction.shape)[:, reached]
-        ahead, near, far = direction[:, reached], first[reached], last[reached]
-        hits = np.full(first.shape, np.nan)
-        hits[reached] = _first_descent(lambda t: self._above(start + t * ahead), near, far)
+        onward, near, far = direction[:, reached], first[reached], last[reached]
+        hits = np.where(uneven, np.nan, self._first_smooth_hit(origin, direction))
+        hits[reached] = _first_descent(lambda t: self._above(start + t * onward), near, far)
         return hits
 
     def _above(self, points: Array) -> Array:
@@ -174,12 +177,9 @@ class Ground:
         strip = np.clip(np.searchsorted(self.edges, lateral, side="right") - 1, 0, len(self.materials) - 1)
         return SurfaceSample(normal, lateral, z, across, _AHEAD, np.array(self.materials)[strip])
 
-    def bounds(self) -> Array | None:
-        return None
-
 
 @dataclass(frozen=True)
-class Wall:
+class Wall(Surface):
     """The vertical face at `lateral`: from edges[i] to edges[i + 1] in Z it rises from `base` to tops[i]."""
 
     course: Course
@@ -209,12 +209,9 @@ class Wall:
         elevation = self.course.elevation(points)
         return SurfaceSample(self.course.across(z), z, elevation, _AHEAD, up, self.material)
 
-    def bounds(self) -> Array | None:
-        return None
-
 
 @dataclass(frozen=True)
-class Backdrop:
+class Backdrop(Surface):
     """A plane across the world at Z = `far`, from `base` to a skyline: metres over the course, each 2 m."""
 
     course: Course
@@ -235,9 +232,6 @@ class Backdrop:
     def sample(self, points: Array) -> SurfaceSample:
         elevation = self.course.elevation(points)
         return SurfaceSample(-_AHEAD, points[0], elevation, _RIGHT, _UP, self.material)
-
-    def bounds(self) -> Array | None:
-        return None
 
 
 def first_root(a: Array, b: Array, c: Array) -> Array:

@@ -1,6 +1,7 @@
 """The view of a camera: trace rays, shade what they hit, and expose the image."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -152,8 +153,7 @@ _BAND = 350_000  # pixels; an image of 640x480 is one band
 _SUBPIXELS = np.array([[-0.375, -0.125], [0.125, -0.375], [0.375, 0.125], [-0.125, 0.375]])
 
 
-@dataclass(frozen=True)
-class View:
+class View(NamedTuple):
     """A camera's image: depth (H, W) in metres, inf in the sky; material (H, W); light (H, W, 3)."""
 
     depth: Array
@@ -163,23 +163,20 @@ class View:
 
 def render_view(scene: Scene, camera: Camera) -> View:
     """Render the image of a camera; pixels at edges are the mean of four rays."""
-    bands = [_render_band(scene, camera, rows) for rows in _bands(camera)]
-    return View(
-        np.concatenate([band.depth for band in bands]),
-        np.concatenate([band.material for band in bands]),
-        np.concatenate([band.light for band in bands]),
-    )
+    found = [_render_band(scene, camera, rows) for rows in bands(camera)]
+    return View(*map(np.concatenate, zip(*found, strict=True)))
 
 
 def depths(scene: Scene, camera: Camera) -> tuple[Array, NDArray[np.int16]]:
     """Return depth and material (H, W) of a camera's image, as in `View`, without rendering its light."""
     shape = (camera.height, camera.width)
-    bands = [trace(scene, PixelRays.of_rows(camera, rows)) for rows in _bands(camera)]
-    depth = np.concatenate([band.depth for band in bands])
-    return depth.reshape(shape), np.concatenate([band.material for band in bands]).reshape(shape)
+    found = [trace(scene, PixelRays.of_rows(camera, rows)) for rows in bands(camera)]
+    depth = np.concatenate([band.depth for band in found])
+    return depth.reshape(shape), np.concatenate([band.material for band in found]).reshape(shape)
 
 
-def _bands(camera: Camera) -> list[range]:
+def bands(camera: Camera) -> list[range]:
+    """Return the rows of an image in parts of `_BAND` pixels."""
     step = max(1, _BAND // camera.width)
     return [range(top, min(top + step, camera.height)) for top in range(0, camera.height, step)]
 

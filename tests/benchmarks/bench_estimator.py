@@ -24,7 +24,7 @@ from rollcli.estimator.solvers.areas import iterative
 from rollcli.estimator.solvers.exact import exact
 from rollcli.estimator.solvers.golden_section import golden_section
 from rollcli.estimator.solvers.gradient_descent import gradient_descent
-from rollcli.evaluate.textbook import Textbook
+from rollcli.evaluate.experiments import Textbook
 
 SIZES = ((640, 480), (1242, 375), (1920, 1080), (1730, 1028))
 SETTINGS = SolverSettings()

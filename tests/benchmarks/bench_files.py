@@ -25,7 +25,7 @@ from rollcli.files.formats import decode_stored, encode_stored
 from rollcli.pictures.derotate import derotate
 from rollcli.pictures.overlay import draw_road
 from rollcli.pictures.vdisparity import draw_v_disparity, v_disparity
-from rollcli.simulate.render import render_frame
+from rollcli.simulate.build import render_frame
 from rollcli.simulate.spec import FrameSpec
 from rollcli.stereo.match import StereoOptions, match_pair
 from tests.binary_files import disparity_map, make_tiff

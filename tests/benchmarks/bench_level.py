@@ -26,8 +26,9 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from rollcli.errors import RollcliError
 from rollcli.estimator.estimate import RollEstimate, estimate_roll
 from rollcli.files.formats import read_image
-from rollcli.simulate.draw import draw_specs
-from rollcli.simulate.render import render_frame
+from rollcli.simulate.build import render_frame
+from rollcli.simulate.options import SimulateOptions
+from rollcli.simulate.spec import draw_specs
 from rollcli.stereo.match import StereoMatch
 from rollcli.stereo.misalignment import LEVEL
 
@@ -74,9 +75,8 @@ def main() -> None:
 
 
 def rendered(pairs: int, size: tuple[int, int], seed: int, **more: Any) -> Iterator[Views]:
-    """Render level pairs; `more` is for `draw_specs`."""
-    span = math.radians(10)
-    for spec in draw_specs(pairs, roll=(-span, span), size=size, seed=seed, colour=False, **more):
+    """Render level pairs; `more` is for `SimulateOptions`."""
+    for spec in draw_specs(SimulateOptions(frames=pairs, size=size, seed=seed, grey=True, **more)):
         frame = render_frame(spec)
         yield Views(frame.left, frame.right, spec.roll)
 

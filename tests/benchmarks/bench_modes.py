@@ -20,8 +20,9 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.estimate import estimate_roll
-from rollcli.simulate.draw import draw_specs
-from rollcli.simulate.render import RenderedFrame, render_frame
+from rollcli.simulate.build import RenderedFrame, render_frame
+from rollcli.simulate.options import SimulateOptions
+from rollcli.simulate.spec import draw_specs
 from rollcli.stereo.match import StereoOptions
 
 KINDS = [("3way", 1), ("sgbm", 1), ("hh", 1), ("3way", 1.5), ("3way", 2), ("hh", 2), ("3way", 3)]
@@ -35,8 +36,7 @@ def main() -> None:
     print("| mode | downscale | rolls | time | median | 95 % | worst | covered | suspect |")
     print("|---|---|---|---|---|---|---|---|---|")
     for span, count in ((10, pairs), (35, pairs // 2)):
-        limit = math.radians(span)
-        specs = draw_specs(count, roll=(-limit, limit), size=(640, 480), seed=SEEDS[span], colour=False)
+        specs = draw_specs(SimulateOptions(frames=count, roll_deg=(-span, span), seed=SEEDS[span], grey=True))
         frames = [render_frame(spec) for spec in specs]
         rolls = [math.degrees(spec.roll) for spec in specs]
         first = 0.0

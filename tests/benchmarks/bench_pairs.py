@@ -26,8 +26,9 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.files.formats import read_image
-from rollcli.simulate.draw import draw_specs
-from rollcli.simulate.render import render_frame
+from rollcli.simulate.build import render_frame
+from rollcli.simulate.options import SimulateOptions
+from rollcli.simulate.spec import draw_specs
 from rollcli.stereo.misalignment import LEVEL
 
 STREETS = Path(__file__).parents[3] / "shared" / "streets"
@@ -59,8 +60,8 @@ def main() -> None:
 
 def rendered(folder: Path, pairs: int, size: tuple[int, int], *, odd: bool) -> Iterator[Pair]:
     """Render pairs; odd: with a right camera that is out of place."""
-    span = math.radians(10)
-    for number, spec in enumerate(draw_specs(pairs, roll=(-span, span), size=size, seed=SEED, colour=False)):
+    asked = SimulateOptions(frames=pairs, size=size, seed=SEED, grey=True)
+    for number, spec in enumerate(draw_specs(asked)):
         frame = render_frame(spec)
         left, right = (folder / f"{side}{number}.png" for side in ("left", "right"))
         cv2.imwrite(str(left), frame.left)

@@ -63,10 +63,9 @@ def judged(frame: Matched):
 
 def rendered(frames: int, size: tuple[int, int], seed: int) -> None:
     """Print the errors on rendered pairs."""
-    pitch = math.radians(2), math.radians(7)
     rows = []
     for frame in matched(
-        frames, seed, 10, size, pitch=pitch, height=(1.3, 1.8), principal_offset=(-30.0, 30.0)
+        frames, seed, 10, size, pitch_deg=(2, 7), height=(1.3, 1.8), principal_offset=(-30.0, 30.0)
     ):
         try:
             rows.append(judged(frame))

@@ -27,7 +27,7 @@ from rosbags.typesys import Stores, get_typestore
 from rollcli.files.formats import read_image, read_stored
 from rollcli.files.recordings import frames as of_bags
 from rollcli.files.recordings import video
-from rollcli.simulate.render import render_frame
+from rollcli.simulate.build import render_frame
 from rollcli.simulate.spec import FrameSpec
 from tests.files.recordings.bag_files import compressed, disparity_image, image, write_bag
 from tests.run_cli import rollcli_process

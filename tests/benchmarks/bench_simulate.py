@@ -18,11 +18,10 @@ sys.path.insert(0, str(ROOT))
 
 from rollcli.files.encodings import read_disparity
 from rollcli.files.formats import read_image
-from rollcli.simulate.dataset import write_dataset
-from rollcli.simulate.draw import draw_specs
+from rollcli.simulate.build import render_frame
+from rollcli.simulate.dataset import plan_dataset, write_dataset
 from rollcli.simulate.options import SCENES, SimulateOptions
-from rollcli.simulate.render import render_frame
-from rollcli.simulate.run import plan_dataset
+from rollcli.simulate.spec import draw_specs
 from rollcli.stereo.match import compute_disparity
 
 MODES = ("3way", "sgbm", "hh")
@@ -61,7 +60,7 @@ def show_pairs(pairs: int) -> None:
     print("scene   mode  median |error|, px (range)  bias, px  beyond 1 px  found  CPU s a pair")
     for scene in SCENES:
         frames, seconds = [], []
-        for spec in draw_specs(pairs, scene=scene, seed=100):
+        for spec in draw_specs(SimulateOptions(frames=pairs, scene=scene, seed=100)):
             start = time.process_time()
             frames.append(render_frame(spec))
             seconds.append(time.process_time() - start)

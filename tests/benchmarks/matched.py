@@ -17,9 +17,9 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from rollcli.run.options import FrameOptions
 from rollcli.run.read import wanted_of
-from rollcli.simulate.draw import draw_specs
-from rollcli.simulate.render import render_frame
-from rollcli.simulate.spec import FrameSpec
+from rollcli.simulate.build import render_frame
+from rollcli.simulate.options import SimulateOptions
+from rollcli.simulate.spec import FrameSpec, draw_specs
 from rollcli.stereo.match import StereoMatch, StereoOptions, match_pair
 
 
@@ -40,9 +40,9 @@ def matched(
     mode: str = "3way",
     **rig: Any,
 ) -> Iterator[Matched]:
-    """Render and match mixed scenes, rolled within +-roll_deg, in parallel; `rig` is for `draw_specs`."""
-    span = math.radians(roll_deg)
-    specs = draw_specs(frames, roll=(-span, span), size=size, seed=seed, colour=False, **rig)
+    """Render and match mixed scenes, rolled within +-roll_deg, in parallel; `rig`: of `SimulateOptions`."""
+    ranges = {"roll_deg": (-roll_deg, roll_deg), **rig}
+    specs = draw_specs(SimulateOptions(frames=frames, size=size, seed=seed, grey=True, **ranges))
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(os.cpu_count(), context) as pool:
         yield from pool.map(_matched, specs, [mode] * frames)

@@ -11,9 +11,10 @@ import pytest
 
 from rollcli.rig.calibration import Calibration
 from rollcli.run import calibration as of_frames
+from rollcli.simulate.build import render_frame
 from rollcli.simulate.dataset import calibration
-from rollcli.simulate.draw import draw_specs
-from rollcli.simulate.render import render_frame
+from rollcli.simulate.options import SimulateOptions
+from rollcli.simulate.spec import draw_specs
 from tests.rig import calibration_files as samples
 from tests.rig.calibration_files import Rig
 from tests.rig.test_pose import cast
@@ -141,8 +142,8 @@ def test_a_map_at_half_the_size_uses_the_scaled_calibration(maps):
 
 
 def test_downscaled_pairs_have_the_pose_of_the_full_size(tmp_path):
-    rig = {"pitch": (0.08, 0.08), "height": (1.4, 1.4), "principal_offset": (-30.0, 30.0)}
-    (spec,) = draw_specs(1, scene="open", curvature=(0, 0), seed=6, colour=False, **rig)
+    rig = {"pitch_deg": (4.6, 4.6), "height": (1.4, 1.4), "principal_offset": (-30.0, 30.0)}
+    (spec,) = draw_specs(SimulateOptions(frames=1, scene="open", curvature=(0, 0), seed=6, grey=True, **rig))
     frame = render_frame(spec)
     for side, image in (("left", frame.left), ("right", frame.right)):
         (tmp_path / side).mkdir()

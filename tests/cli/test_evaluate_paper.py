@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from rollcli.cli.main import main
-from rollcli.evaluate import paper_job as job
+from rollcli.evaluate import experiments as job
 from rollcli.evaluate.paper import PAGE, TABLES
 from rollcli.evaluate.tables import METHOD_NAMES, SOLVER_NAMES
 from rollcli.run.workers import tasks as run_tasks

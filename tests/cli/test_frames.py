@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import pytest
 
-from rollcli.simulate.render import render_frame
+from rollcli.simulate.build import render_frame
 from rollcli.simulate.spec import FrameSpec
 from tests.run_cli import command, environment, road_map, rollcli, write_kitti, write_maps, write_pair
 

@@ -8,9 +8,8 @@ import pytest
 
 import rollcli as package
 from rollcli.errors import UsageError
-from rollcli.files.atomic import sync_files
+from rollcli.files.atomic import in_threads, sync_files
 from rollcli.files.storage import fetch_all
-from rollcli.files.threads import in_threads
 from tests.run_cli import rollcli
 
 ROW = {"file": "a.png", "status": "ok", "roll_deg": 1.0, "roll_ci95_deg": 0.1}

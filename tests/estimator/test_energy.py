@@ -11,7 +11,7 @@ from rollcli.errors import EstimationError
 from rollcli.estimator.energy import Energy
 from rollcli.estimator.moments import map_moments
 from rollcli.estimator.solvers.exact import exact
-from rollcli.evaluate.textbook import Textbook
+from rollcli.evaluate.experiments import Textbook
 from tests.estimator.synthetic_maps import (
     bent_road,
     degrees_apart,

@@ -15,8 +15,8 @@ from rollcli.estimator.request import DEFAULT_SOLVER, Request
 from rollcli.estimator.road.pixels import select_pixels
 from rollcli.estimator.solvers.exact import exact
 from rollcli.estimator.tuning import TUNING, IntervalTuning
+from rollcli.simulate.build import true_disparity
 from rollcli.simulate.dataset import lane_rolls_of
-from rollcli.simulate.render import true_disparity
 from rollcli.simulate.spec import FrameSpec
 from tests.estimator.synthetic_maps import flat_road
 

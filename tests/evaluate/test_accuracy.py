@@ -9,9 +9,9 @@ import math
 import pytest
 
 from rollcli.errors import InputError, UsageError
-from rollcli.evaluate.accuracy import assess, assess_height, assess_pitch
+from rollcli.evaluate.accuracy import assess
 from rollcli.evaluate.run_accuracy import as_csv, as_json, as_table
-from rollcli.evaluate.truth import KnownPose, read_known_poses, read_truth
+from rollcli.evaluate.truth import KnownPose, read_truth
 from rollcli.files.matching import stem_of
 from rollcli.files.results import Row
 
@@ -30,7 +30,7 @@ def rows(*angles, ci95=None, folder="maps/", ending=".png", status="ok"):
 
 
 def truth(*degrees):
-    return {f"frame{k}": math.radians(angle) for k, angle in enumerate(degrees, 1)}
+    return {f"frame{k}": KnownPose(math.radians(angle)) for k, angle in enumerate(degrees, 1)}
 
 
 def write_truth(path, text):
@@ -40,42 +40,42 @@ def write_truth(path, text):
 
 def test_the_figures_are_those_of_the_absolute_errors():
     found = assess(rows(1.1, 2.0, 2.4, 5.0), truth(1, 2, 3, 4))  # errors 0.1, 0, -0.6, 1
-    assert found.count == 4
-    assert found.median_deg == pytest.approx(0.35)
-    assert found.p95_deg == pytest.approx(0.6 + 0.85 * 0.4)
-    assert (found.worst_deg, found.worst_file) == (pytest.approx(1), "maps/frame4.png")
-    assert found.bias_deg == pytest.approx(0.125)
-    assert found.share_above_0_5_deg == 0.5
+    assert found.roll.count == 4
+    assert found.roll.median == pytest.approx(0.35)
+    assert found.roll.p95 == pytest.approx(0.6 + 0.85 * 0.4)
+    assert (found.roll.worst, found.roll.worst_file) == (pytest.approx(1), "maps/frame4.png")
+    assert found.roll.bias == pytest.approx(0.125)
+    assert found.roll.share_above_0_5_deg == 0.5
 
 
 def test_angles_half_a_turn_apart_are_the_same():
-    assert assess(rows(89.9), truth(-89.9)).worst_deg == pytest.approx(0.2)
+    assert assess(rows(89.9), truth(-89.9)).roll.worst == pytest.approx(0.2)
 
 
 def test_coverage_counts_the_truths_inside_their_interval():
     found = assess(rows(1.0, 2.0, 3.0, 4.0, ci95=0.25), truth(1.2, 2.3, 3.0, 3.76))
-    assert (found.coverage_95, found.intervals) == (0.75, 4)
+    assert (found.roll.coverage_95, found.roll.intervals) == (0.75, 4)
 
 
 def test_an_error_of_just_the_limit_is_not_above_it_and_just_of_the_interval_is_inside():
     found = assess(rows(0.5, -0.5, 0.25, ci95=0.5), truth(0, 0, 0))
-    assert (found.share_above_0_5_deg, found.coverage_95) == (0, 1)
-    assert (found.worst_deg, found.worst_file) == (0.5, "maps/frame1.png")
+    assert (found.roll.share_above_0_5_deg, found.roll.coverage_95) == (0, 1)
+    assert (found.roll.worst, found.roll.worst_file) == (0.5, "maps/frame1.png")
     given = dataclasses.replace(rows(0.0)[0], pitch_deg=0.5, pitch_ci95_deg=0.5)
-    assert assess_pitch([given], {"frame1": KnownPose(0.0, 0.0)}).coverage_95 == 1
+    assert assess([given], {"frame1": KnownPose(0.0, 0.0)}).pitch.coverage_95 == 1
     unsure = dataclasses.replace(given, pitch_ci95_deg=None)
-    assert assess_pitch([unsure], {"frame1": KnownPose(0.0, 0.0)}).coverage_95 is None
+    assert assess([unsure], {"frame1": KnownPose(0.0, 0.0)}).pitch.coverage_95 is None
 
 
 def test_without_intervals_there_is_no_coverage():
     found = assess(rows(1.0), truth(1))
-    assert (found.coverage_95, found.intervals) == (None, 0)
+    assert (found.roll.coverage_95, found.roll.intervals) == (None, 0)
 
 
 def test_frames_match_by_stem_whatever_their_folder_and_ending():
-    named = {"frame1": 0.0}
+    named = truth(0)
     for folder, ending in (("", ".npy"), ("a/b/", ".PNG"), ("c:\\maps\\", ".tiff"), ("left/", ".jpg")):
-        assert assess(rows(0.0, folder=folder, ending=ending), named).count == 1
+        assert assess(rows(0.0, folder=folder, ending=ending), named).roll.count == 1
 
 
 @pytest.mark.parametrize(
@@ -93,23 +93,23 @@ def test_a_stem_loses_only_the_ending_of_an_image(name, stem):
 
 
 def test_frames_without_an_angle_or_a_truth_are_named():
-    found = assess(rows(1.0, None, 3.0), {**truth(1, 2), "frame9": 0.0})
-    assert found.count == 1
+    found = assess(rows(1.0, None, 3.0), {**truth(1, 2), "frame9": KnownPose(0.0)})
+    assert found.roll.count == 1
     assert found.no_angle == ("frame2", "frame9")
     assert found.no_truth == ("maps/frame3.png",)
 
 
 def test_suspect_frames_are_compared_and_counted():
     given = rows(1.0, 1.5, status="suspect") + rows(2.0, folder="x", ending="b.png")
-    found = assess(given, {"frame1": 0, "frame2": 0, "xframe1b": 0})
-    assert (found.count, found.ok, found.suspect) == (3, 1, 2)
+    found = assess(given, dict.fromkeys(("frame1", "frame2", "xframe1b"), KnownPose(0.0)))
+    assert (found.roll.count, found.ok, found.suspect) == (3, 1, 2)
 
 
 def test_when_nothing_matches_the_error_says_what_was_looked_for():
     with pytest.raises(
         UsageError, match=r"r\.csv: no row has the stem .* holds maps/frame1\.png, the truth other"
     ):
-        assess(rows(1.0), {"other": 0.0}, "r.csv")
+        assess(rows(1.0), {"other": KnownPose(0.0)}, "r.csv")
 
 
 def test_two_rows_of_one_stem_are_refused_by_name():
@@ -119,7 +119,12 @@ def test_two_rows_of_one_stem_are_refused_by_name():
 
 def test_all_frames_in_error_leave_no_figures():
     found = assess(rows(None), truth(1))
-    assert (found.count, found.median_deg, found.worst_deg, found.worst_file) == (0, None, None, "")
+    assert (found.roll.count, found.roll.median, found.roll.worst, found.roll.worst_file) == (
+        0,
+        None,
+        None,
+        "",
+    )
     assert "-" in as_table(found)
     assert next(csv.DictReader(io.StringIO(as_csv(found))))["median_deg"] == ""
     assert json.loads(as_json(found))["median_deg"] is None
@@ -151,7 +156,11 @@ def test_truth_is_read_by_its_columns_whatever_else_is_there(tmp_path):
     path = write_truth(
         tmp_path / "t.csv", b"\xef\xbb\xbfpitch_deg,roll_deg,file\r\n0,-3.5,a/x.png\r\n1,2,y\r\n"
     )
-    assert read_truth(path) == {"x": math.radians(-3.5), "y": math.radians(2)}
+    known = read_truth(path)
+    assert {stem: pose.theta for stem, pose in known.items()} == {
+        "x": math.radians(-3.5),
+        "y": math.radians(2),
+    }
 
 
 @pytest.mark.parametrize(
@@ -198,8 +207,9 @@ def posed_rows():
 
 
 def test_pitch_and_height_are_compared_where_they_are_known_and_the_road_does_not_bend(tmp_path):
-    known = read_known_poses(write_truth(tmp_path / "t.csv", TRUTH_WITH_POSE))
-    pitch, height = assess_pitch(posed_rows(), known), assess_height(posed_rows(), known)
+    known = read_truth(write_truth(tmp_path / "t.csv", TRUTH_WITH_POSE))
+    found = assess(posed_rows(), known)
+    pitch, height = found.pitch, found.height
     # errors of the first two frames: 0.1 and -0.3 degrees, -0.01 and 0 m
     assert (pitch.count, pitch.median, pitch.worst) == (2, pytest.approx(0.2), pytest.approx(0.3))
     assert pitch.p95 == pytest.approx(0.1 + 0.95 * 0.2)
@@ -208,12 +218,8 @@ def test_pitch_and_height_are_compared_where_they_are_known_and_the_road_does_no
 
 
 def test_pitch_and_height_stand_in_every_format(tmp_path):
-    known = read_known_poses(write_truth(tmp_path / "t.csv", TRUTH_WITH_POSE))
-    found = dataclasses.replace(
-        assess(posed_rows(), truth(1, 2, 3, 4)),
-        pitch=assess_pitch(posed_rows(), known),
-        height=assess_height(posed_rows(), known),
-    )
+    known = read_truth(write_truth(tmp_path / "t.csv", TRUTH_WITH_POSE))
+    found = assess(posed_rows(), known)
     assert "pitch, median error       0.2000 degrees\n" in as_table(found)
     assert "height, worst             0.0100 m\n" in as_table(found)
     assert json.loads(as_json(found))["pitch_worst_deg"] == 0.3
@@ -222,8 +228,8 @@ def test_pitch_and_height_stand_in_every_format(tmp_path):
 
 
 def test_without_known_poses_nothing_is_said_of_them(tmp_path):
-    known = read_known_poses(write_truth(tmp_path / "t.csv", "file,roll_deg\nframe1,1\n"))
-    assert assess_pitch(posed_rows(), known) is None
+    known = read_truth(write_truth(tmp_path / "t.csv", "file,roll_deg\nframe1,1\n"))
+    assert assess(posed_rows(), known).pitch is None
     assert "pitch" not in as_table(assess(posed_rows(), truth(1, 2, 3, 4)))
 
 
@@ -234,4 +240,4 @@ def test_without_known_poses_nothing_is_said_of_them(tmp_path):
 def test_a_pose_that_is_no_number_is_named(tmp_path, name, kind):
     path = write_truth(tmp_path / "t.csv", f"file,roll_deg,{name}\nframe1,1,steep\n")
     with pytest.raises(InputError, match=f"line 2: {name} is 'steep', not {kind}$"):
-        read_known_poses(path)
+        read_truth(path)

@@ -17,13 +17,13 @@ from rollcli.evaluate.experiments import (
     LAMBDAS,
     METHODS,
     SOLVERS,
+    Textbook,
     Times,
     examine,
     rotate_nearest,
     time_solvers,
 )
 from rollcli.evaluate.tables import DELTAS_DEG, all_tables
-from rollcli.evaluate.textbook import Textbook
 from tests.estimator.synthetic_maps import bent_road, degrees_apart, energy_of
 
 TURNS = [math.radians(turn) for turn in (-10, 0, 15)]

@@ -6,8 +6,8 @@ import sys
 import pytest
 
 from rollcli.errors import UsageError
-from rollcli.files import manifest as manifests
-from rollcli.files.manifest import Manifest
+from rollcli.files import inputs as manifests
+from rollcli.files.inputs import Manifest
 from rollcli.files.naming import natural_key
 from tests.run_cli import environment, rollcli, write_maps
 

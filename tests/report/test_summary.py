@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from rollcli.report import content
-from rollcli.report.chart import Chart, chart_names, script_json
+from rollcli.report.options import chart_names
+from rollcli.report.page import Chart, script_json
 from rollcli.report.pictures import _encoded
 from rollcli.report.sources import SPREAD, SUSPECT, WIDEST, Choice
 from rollcli.report.summary import frame_count, input_folders, summarize, written_at

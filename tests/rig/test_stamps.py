@@ -8,8 +8,7 @@ import pytest
 
 from rollcli.files.results import Row
 from rollcli.report.charts import all_charts
-from rollcli.rig.drive.assess import assess_rig
-from rollcli.rig.stamps import drive_of
+from rollcli.rig.drive.assess import assess_rig, drive_of
 from tests.run_cli import rollcli
 
 START = 1_700_000_000_123_456_789

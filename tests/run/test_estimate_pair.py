@@ -12,7 +12,7 @@ from rollcli.errors import UsageError
 from rollcli.files.formats import decode_stored, encode_stored
 from rollcli.files.results import ALIGNMENT_COLUMNS
 from rollcli.run.read import Provenance
-from rollcli.simulate.render import render_frame
+from rollcli.simulate.build import render_frame
 from rollcli.simulate.spec import FrameSpec
 from tests.run_cli import rollcli
 

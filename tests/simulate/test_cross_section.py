@@ -6,13 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rollcli.simulate.build import build_scene, road_camber
-from rollcli.simulate.draw import draw_specs
-from rollcli.simulate.render import render_frame, true_disparity
+from rollcli.simulate.build import build_scene, render_frame, road_camber, true_disparity
+from rollcli.simulate.options import SimulateOptions
 from rollcli.simulate.road import Piece, draw_carriageway
 from rollcli.simulate.roadside import car_materials, vehicle
 from rollcli.simulate.scene import draw_light
-from rollcli.simulate.spec import FrameSpec
+from rollcli.simulate.spec import FrameSpec, Stream, draw_specs
 from rollcli.simulate.surfaces import Course, Ground
 from rollcli.simulate.vectors import first_crossing
 
@@ -23,7 +22,7 @@ BENT, STRAIGHT = 4, 2  # seeds of an open road
 
 def drawn_road(spec):
     """The carriageway that the frame's random numbers stand for."""
-    rng = spec.scene_rng()
+    rng = spec.rng(Stream.SCENE)
     draw_light(rng)
     return draw_carriageway(rng, spec)
 
@@ -200,8 +199,8 @@ def test_vehicles_stand_on_the_road_that_is_below_them():
 
 
 def test_cross_sections_are_drawn_without_changing_what_else_is_drawn():
-    flat = draw_specs(30, seed=5)
-    mixed = draw_specs(30, seed=5, cross_section="mixed", crossfall=(0.01, 0.04), gutter=(0.0, 0.1))
+    flat = draw_specs(SimulateOptions(frames=30, seed=5))
+    mixed = draw_specs(SimulateOptions(frames=30, seed=5, cross_section="mixed", gutter=(0.0, 10.0)))
     level = {"cross_section": "flat", "crossfall": 0.0, "gutter": 0.0}
     assert [replace(spec, **level) for spec in mixed] == flat
     assert {spec.cross_section for spec in mixed} == {"flat", *SHAPES}

@@ -13,11 +13,9 @@ from rollcli import __version__, read_calibration
 from rollcli.errors import OutputError, UsageError
 from rollcli.files.encodings import read_disparity
 from rollcli.simulate import dataset as module
-from rollcli.simulate.build import road_camber
-from rollcli.simulate.dataset import write_dataset
+from rollcli.simulate.build import render_frame, road_camber, true_disparity
+from rollcli.simulate.dataset import plan_dataset, write_dataset
 from rollcli.simulate.options import SimulateOptions
-from rollcli.simulate.render import render_frame, true_disparity
-from rollcli.simulate.run import plan_dataset
 from tests.run_cli import contents
 
 TINY = SimulateOptions(frames=3, size=(64, 48), seed=9)

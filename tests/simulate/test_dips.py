@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from rollcli.errors import UsageError
-from rollcli.simulate.build import build_scene, carriageway_of
-from rollcli.simulate.dips import DippedGround, draw_dips
-from rollcli.simulate.render import render_frame, true_disparity
+from rollcli.simulate.build import build_scene, carriageway_of, draw_dips, render_frame, true_disparity
 from rollcli.simulate.spec import FrameSpec
+from rollcli.simulate.surfaces import Ground
 
 SMALL = {"size": (320, 120), "focal": 186.0, "pitch": 0.08}
 
@@ -19,16 +18,23 @@ def spec_of(**values):
 
 
 @pytest.mark.parametrize(
-    "values", [{}, {"curvature": 0.003, "roll": 0.3}, {"cross_section": "crown", "crossfall": 0.03}]
+    "values",
+    [
+        {},
+        {"curvature": 0.003, "roll": 0.3},
+        {"cross_section": "crown", "crossfall": 0.03},
+        {"roughness": "C"},
+    ],
 )
 def test_rays_meet_the_relief_where_a_march_in_small_steps_does(values):
     spec = spec_of(**values)
     scene = build_scene(spec)
-    (ground,) = (each for each in scene.surfaces if isinstance(each, DippedGround))
+    grounds = (each for each in scene.surfaces if isinstance(each, Ground))
+    (ground,) = (each for each in grounds if each.relief is not None and each.relief.dips)
     camera = spec.cameras(scene.normal)[0]
     rng = np.random.default_rng(1)
     met = 0
-    for dip in ground.dips:
+    for dip in ground.relief.dips:
         x, z = rng.uniform(-1.1, 1.1, (2, 10))
         lateral, ahead = dip.lateral + x * dip.across, dip.z + z * dip.along
         targets = np.array([ground.course.point(a, b) for a, b in zip(lateral, ahead, strict=True)]).T
@@ -40,7 +46,7 @@ def test_rays_meet_the_relief_where_a_march_in_small_steps_does(values):
             points = rays.origin + t * rays.direction[:, i : i + 1]
             side = ground.course.lateral(points)
             sheet = ground.offset + (ground.slope + ground.camber / 2 * side) * side
-            relief = sum(each.relief(side, points[2])[0] for each in ground.dips)
+            relief = ground.relief.height(side, points[2])
             below = points[1] - ground.course.curvature / 2 * points[2] ** 2 <= sheet + relief
             assert t[below.argmax()] == pytest.approx(found[i], abs=6e-4)
             met += abs(relief[below.argmax()]) > 0.01

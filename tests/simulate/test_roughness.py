@@ -6,12 +6,9 @@ import math
 import numpy as np
 import pytest
 
-from rollcli.simulate.build import build_scene, carriageway_of
+from rollcli.simulate.build import build_scene, carriageway_of, true_disparity
 from rollcli.simulate.dataset import lane_rolls_of
-from rollcli.simulate.lane import lane_plane
-from rollcli.simulate.relief import Relief
-from rollcli.simulate.render import true_disparity
-from rollcli.simulate.roughness import draw_relief
+from rollcli.simulate.relief import Relief, draw_relief, lane_plane
 from rollcli.simulate.spec import FrameSpec
 
 NOWHERE = (-100.0, -100.0)  # tracks and patches: none on the grid

@@ -9,7 +9,7 @@ import pytest
 
 from rollcli.files.encodings import read_disparity
 from rollcli.files.formats import read_image
-from rollcli.simulate.render import true_disparity
+from rollcli.simulate.build import true_disparity
 from tests.make_sample_data import EXACT, SAMPLES, SPECS, make
 
 STEMS = [f"frame_{number:04d}" for number in range(1, len(SPECS) + 1)]

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
+from rollcli.simulate.build import render_frame, true_disparity
 from rollcli.simulate.dataset import calibration
-from rollcli.simulate.render import render_frame, true_disparity
 from rollcli.simulate.spec import FrameSpec
 
 SMALL = {"size": (320, 240), "focal": 186.0}

@@ -7,8 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
-from rollcli.simulate.build import build_scene
-from rollcli.simulate.render import render_frame
+from rollcli.simulate.build import build_scene, render_frame
 from rollcli.simulate.spec import FrameSpec
 from rollcli.simulate.views import render_view
 from rollcli.stereo.match import compute_disparity

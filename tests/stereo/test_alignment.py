@@ -11,9 +11,9 @@ from rollcli.errors import InputError, UsageError
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.files.formats import read_image
 from rollcli.files.inputs import pair_inputs
-from rollcli.simulate.draw import draw_specs
-from rollcli.simulate.render import render_frame
-from rollcli.simulate.spec import FrameSpec
+from rollcli.simulate.build import render_frame
+from rollcli.simulate.options import SimulateOptions
+from rollcli.simulate.spec import FrameSpec, draw_specs
 from rollcli.stereo.alignment import Approach, level
 from rollcli.stereo.match import StereoOptions, match_pair
 from rollcli.stereo.misalignment import LEVEL, Misalignment
@@ -125,9 +125,8 @@ def test_a_level_pair_is_left_as_it_is(frame, downscale):
 @pytest.fixture(scope="module", params=[1, 5, 14])
 def empty_road(request):
     """Grain and noise: of two of these, small views say that the right one is turned and skewed."""
-    span = math.radians(10)
     specs = draw_specs(
-        request.param + 1, scene="bare", roll=(-span, span), noise=4.0, seed=6101, colour=False
+        SimulateOptions(frames=request.param + 1, scene="bare", noise=4.0, seed=6101, grey=True)
     )
     return render_frame(specs[-1])
 

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from rollcli.estimator.estimate import estimate_roll
-from rollcli.simulate.draw import draw_specs
-from rollcli.simulate.render import render_frame
+from rollcli.simulate.build import render_frame
+from rollcli.simulate.options import SimulateOptions
+from rollcli.simulate.spec import draw_specs
 from rollcli.stereo import match as stereo
 from rollcli.stereo import refinement
 from rollcli.stereo.alignment import level
@@ -135,7 +136,7 @@ def test_matched_roads_lie_nearer_to_where_they_are_and_so_do_their_angles(monke
     """Rendered truth: the mean error of each road, whose part that changes across it tilts the plane."""
     errors = {"smoothed": [], "refined": []}
     offsets = {"smoothed": [], "refined": []}
-    specs = draw_specs(8, scene="bare", roll=(-0.5, 0.5), size=(640, 480), seed=71, colour=False)
+    specs = draw_specs(SimulateOptions(frames=8, scene="bare", roll_deg=(-28.6, 28.6), seed=71, grey=True))
     for spec in specs:
         frame = render_frame(spec)
         for name, step in (("smoothed", lambda disparity, *_: disparity), ("refined", refined)):

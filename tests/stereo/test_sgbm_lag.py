@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from rollcli.simulate.draw import draw_specs
-from rollcli.simulate.render import render_frame
+from rollcli.simulate.build import render_frame
+from rollcli.simulate.options import SimulateOptions
+from rollcli.simulate.spec import draw_specs
 from rollcli.stereo.match import StereoOptions, compute_disparity
 from rollcli.stereo.options import MODES
 from rollcli.stereo.sgbm import LAGS, without_lag
@@ -13,7 +14,8 @@ from rollcli.stereo.sgbm import LAGS, without_lag
 @pytest.mark.parametrize("mode", MODES)
 def test_matched_roads_lie_where_they_are(mode):
     off = []
-    for spec in draw_specs(3, scene="bare", roll=(-0.1, 0.1), pitch=(0.05, 0.1), seed=31, colour=False):
+    ranges = {"roll_deg": (-5.7, 5.7), "pitch_deg": (2.9, 5.7)}
+    for spec in draw_specs(SimulateOptions(frames=3, scene="bare", seed=31, grey=True, **ranges)):
         frame = render_frame(spec)
         found = compute_disparity(frame.left, frame.right, mode=mode)
         road = frame.road & (found > 0) & (abs(found - frame.disparity) < 1)

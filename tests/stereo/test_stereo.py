@@ -11,7 +11,7 @@ from rollcli.errors import InputError, UsageError
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.files.formats import read_image
 from rollcli.files.inputs import pair_inputs
-from rollcli.simulate.render import render_frame
+from rollcli.simulate.build import render_frame
 from rollcli.simulate.spec import FrameSpec
 from rollcli.stereo import match as stereo
 from rollcli.stereo import sgbm

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rollcli.errors import InputError, OutputError
 from rollcli.files.bounded import most_unpacked
-from rollcli.files.codecs.raw_map import require_decoded_fits, require_map_shape
+from rollcli.files.codecs.raw_map import require_decoded_fits, require_map_shape, require_pixels
 
 MAGIC = b"\x93NUMPY"
 MAGIC_NPZ = b"PK\x03\x04"
@@ -163,13 +163,7 @@ def check_pfm(data: bytes, size: int, name: str) -> tuple[str, int, int, int]:
     if header[1] == b"F":
         raise InputError(f"{name}: is a colour PFM (PF); a disparity map has one channel (Pf)")
     width, height = int(header[2]), int(header[3])
-    if width * height == 0:
-        raise InputError(f"{name}: has no pixels ({width} x {height})")
-    needed, there = 4 * width * height, size - header.end()
-    if there < needed:
-        raise InputError(
-            f"{name}: is truncated: {width} x {height} pixels need {needed} bytes, {there} are there"
-        )
+    require_pixels(width, height, name, 4 * width * height, size - header.end())
     require_decoded_fits(width, height, 4, size, name)
     return "<f4" if header[4].startswith(b"-") else ">f4", width, height, header.end()
 

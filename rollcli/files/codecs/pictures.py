@@ -1,15 +1,21 @@
-"""Camera images that are no maps: JPEG, BMP, PGM and PPM; and those that hold both views."""
+"""Pictures of other programs: JPEG, BMP, PGM and PPM, those that hold both views, and maps in them.
 
+Such maps have their numbers in three channels of a PNG, or are OpenEXR.
+"""
+
+import os
 import re
+import struct
 from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.errors import InputError
+from rollcli.errors import InputError, OutputError
+from rollcli.files.codecs import png
 from rollcli.files.codecs.png import decoding
-from rollcli.files.codecs.raw_map import PICTURE_FLAGS, native, require_decoded_fits
+from rollcli.files.codecs.raw_map import PICTURE_FLAGS, native, require_decoded_fits, require_pixels
 
 LOSSLESS = (b"BM", b"P5", b"P6")
 SIGNATURES = (b"\xff\xd8\xff", *LOSSLESS)
@@ -19,6 +25,9 @@ _WITHOUT_LENGTH = frozenset((0x00, 0x01, *range(0xD0, 0xDA)))
 _HARMLESS = re.compile("extraneous bytes before marker 0xd9")
 _GAP = rb"(?:\s|#[^\n]*\n)+"
 _PNM = re.compile(rb"P([56])" + 2 * (_GAP + rb"(\d{1,9})") + _GAP + rb"(\d{1,5})\s")
+_BASE = 255  # of FoundationStereo's digits: (R * 255^2 + G * 255 + B) / 1000 is the disparity in pixels
+MAGIC_EXR = b"\x76\x2f\x31\x01"
+_WINDOW = b"dataWindow\0box2i\0\x10\0\0\0"
 
 
 def decode_picture(data: bytes, name: str) -> NDArray[Any]:
@@ -74,34 +83,18 @@ def _pnm(data: bytes, name: str) -> NDArray[Any]:
         raise InputError(f"{name}: is a damaged PGM or PPM: its header cannot be read")
     width, height, channels = int(header[2]), int(header[3]), 3 if header[1] == b"6" else 1
     dtype = np.dtype("u1" if int(header[4]) < 256 else ">u2")
-    needed, there = width * height * channels * dtype.itemsize, len(data) - header.end()
-    if needed == 0:
-        raise InputError(f"{name}: has no pixels ({width} x {height})")
-    if there < needed:
-        raise InputError(
-            f"{name}: is truncated: {width} x {height} pixels need {needed} bytes, {there} are there"
-        )
+    numbers = width * height * channels
+    require_pixels(width, height, name, numbers * dtype.itemsize, len(data) - header.end())
     require_decoded_fits(width, height, channels * dtype.itemsize, len(data), name)
-    pixels = np.frombuffer(data, dtype, width * height * channels, header.end()).reshape(
-        height, width, channels
-    )
+    pixels = np.frombuffer(data, dtype, numbers, header.end()).reshape(height, width, channels)
     return native(pixels[..., ::-1] if channels == 3 else pixels[..., 0])
 
 
 def _require_whole_bmp(data: bytes, name: str) -> None:
     """Refuse a bitmap that is not whole, before OpenCV prints what is wrong with it."""
-    start, size, width, height, bits, packing = (
-        int.from_bytes(data[first : first + count], "little", signed=first in (18, 22))
-        for first, count in ((10, 4), (14, 4), (18, 4), (22, 4), (28, 2), (30, 4))
-    )
-    if (
-        len(data) < 54
-        or not 40 <= size < 200
-        or width <= 0
-        or height == 0
-        or packing != 0
-        or bits not in (8, 24, 32)
-    ):
+    header = struct.unpack_from("<IIii2xHI", data, 10) if len(data) >= 54 else (0,) * 6
+    start, size, width, height, bits, packing = header
+    if not (40 <= size < 200 and width > 0 and height != 0 and packing == 0 and bits in (8, 24, 32)):
         raise InputError(
             f"{name}: is a damaged or an unusual BMP; 8, 24 and 32 bits without compression are read"
         )
@@ -146,3 +139,71 @@ def views_of(image: NDArray[Any], layout: str, name: str) -> tuple[NDArray[Any],
     width, height = half_size(image.shape[1], image.shape[0], layout, name)
     one, other = image[:height, :width], image[-height:, -width:]
     return np.ascontiguousarray(one), np.ascontiguousarray(other)
+
+
+def decode_rgb(data: bytes, name: str) -> NDArray[np.uint32]:
+    """Return the whole numbers that FoundationStereo writes to the channels of an 8-bit PNG, shape (H, W).
+
+    Raises
+    ------
+    InputError
+        It is no such PNG.
+    """
+    pixels = png.picture(data, name) if data.startswith(png.SIGNATURE) else np.empty(0)
+    if pixels.ndim != 3 or pixels.dtype != np.uint8:
+        raise InputError(f"{name}: is no RGB PNG of 8 bits, which --encoding foundationstereo reads")
+    blue, green, red = (pixels[..., each].astype(np.uint32) for each in range(3))
+    numbers: NDArray[np.uint32] = (red * _BASE + green) * _BASE + blue
+    return numbers
+
+
+def encode_rgb(values: NDArray[Any]) -> bytes:
+    """Return a PNG of whole numbers in three channels, as `decode_rgb` reads it.
+
+    Raises
+    ------
+    OutputError
+        A number needs a fourth digit.
+    """
+    if values.max(initial=0) >= _BASE**3:
+        raise OutputError("disparities above 16581 px do not fit the channels of an RGB PNG")
+    digits = [values % _BASE, values // _BASE % _BASE, values // _BASE**2]
+    return bytes(cv2.imencode(".png", np.dstack(digits).astype(np.uint8))[1])
+
+
+def decode_exr(data: bytes, name: str) -> NDArray[Any]:
+    """Return the numbers of an OpenEXR file of one channel, where OpenCV was built to read it; shape (H, W).
+
+    Raises
+    ------
+    InputError
+        It is damaged or has several channels, or this OpenCV reads no EXR.
+    """
+    at = data.find(_WINDOW, 0, 2**16) + len(_WINDOW)
+    if at < len(_WINDOW) or at + 16 > len(data):
+        raise InputError(f"{name}: is a damaged EXR: its size cannot be read")
+    left, top, right, bottom = np.frombuffer(data, "<i4", 4, at).tolist()
+    if right < left or bottom < top:
+        raise InputError(f"{name}: has no pixels")
+    require_decoded_fits(right - left + 1, bottom - top + 1, 12, len(data), name)
+    os.environ.setdefault("OPENCV_IO_ENABLE_OPENEXR", "1")  # OpenCV looks at it when it reads the first EXR
+    try:
+        with decoding():
+            pixels = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    except cv2.error:
+        pixels = None
+    if pixels is None:
+        raise InputError(f"{name}: is damaged, or this OpenCV reads no EXR; save it as TIFF, float32")
+    if pixels.ndim == 3 and (pixels == pixels[..., :1]).all():
+        pixels = pixels[..., 0]
+    if pixels.ndim != 2:
+        raise InputError(f"{name}: is an EXR of {pixels.shape[2]} channels; a disparity map has one")
+    return pixels
+
+
+def encode_exr(values: NDArray[Any]) -> bytes:
+    """Return an OpenEXR file of float32 values, where OpenCV was built to write it."""
+    try:
+        return bytes(cv2.imencode(".exr", values.astype(np.float32, copy=False))[1])
+    except cv2.error:
+        raise OutputError("this OpenCV writes no EXR: write TIFF or NPY instead") from None

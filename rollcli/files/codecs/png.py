@@ -5,8 +5,7 @@ import os
 import struct
 import tempfile
 import zlib
-from collections.abc import Callable, Iterator
-from functools import partial
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import cv2
@@ -14,8 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError, OutputError
-from rollcli.files.codecs.extras import crc32, imagecodecs
-from rollcli.files.codecs.raw_map import COLOUR_REMEDY, PICTURE_FLAGS, require_decoded_fits
+from rollcli.files.codecs.raw_map import (
+    COLOUR_REMEDY,
+    PICTURE_FLAGS,
+    Stored,
+    imagecodecs,
+    require_decoded_fits,
+    require_pixels,
+)
 
 _MOST = 4000  # bytes of it that are looked at
 _sink: int | None = None
@@ -79,88 +84,50 @@ def _taken(sink: int) -> str:
     return text
 
 
-_SUB, _LAST_FILTER = 1, 4
+_SUB = 1
 _FULL_WINDOW = b"\x78"  # of less OpenCV's zlib minds references that go further back; other decoders do not
 # Bytes after a stream that are looked for; more would have to end in its checksum. To look through the whole
 # stream takes a fortieth of OpenCV's time
 _MOST_AFTER = 1 << 16
-_LONGEST_BLOCK = 0xFFFF  # bytes of a stored block of Deflate
-
-Rows = NDArray[np.uint8]
-"""Filtered rows, shape (H, 1 + 2 W): the filter, then high and low byte of each pixel."""
 
 
-def decode_grey16(
-    packed: bytes, width: int, height: int, file_of: Callable[[bytes], bytes]
-) -> NDArray[np.uint16] | None:
-    """Decode the pixel data of a 16-bit grey PNG that is not interlaced.
+def decode_grey16(packed: bytes, width: int, height: int) -> NDArray[np.uint16] | None:
+    """Decode the pixel data of a 16-bit grey PNG that is not interlaced, as OpenCV writes it.
 
     Parameters
     ----------
     packed : bytes
         The rows, as a zlib stream.
     width, height : int
-    file_of : callable
-        Makes the PNG file of this size that holds such a stream.
 
     Returns
     -------
     ndarray of uint16, shape (H, W), or None
-        None without imagecodecs, or where something is wrong: then the verdict of OpenCV counts.
+        None without imagecodecs, for rows of other filters than None and Sub, and where something is wrong:
+        then the verdict of OpenCV counts.
     """
-    if imagecodecs() is None or not packed.startswith(_FULL_WINDOW):
+    codecs = imagecodecs()
+    if codecs is None or not packed.startswith(_FULL_WINDOW):
         return None
-    rows = _inflated(packed, width, height)
-    return None if rows is None else _unfiltered(rows, packed[-4:], file_of)
-
-
-def _inflated(packed: bytes, width: int, height: int) -> Rows | None:
-    """Inflate by libdeflate; None unless the stream holds these rows, and nothing follows it."""
-    rows = np.empty((height, 1 + 2 * width), np.uint8)
+    rows = np.empty((height, 1 + 2 * width), np.uint8)  # the filter, then high and low byte of each pixel
     try:
-        plain = imagecodecs().deflate_decode(packed, out=rows.reshape(-1))
+        plain = codecs.deflate_decode(packed, out=rows.reshape(-1))
     except (RuntimeError, ValueError):  # its errors are RuntimeErrors
         return None
-    checksum = imagecodecs().deflate_adler32(plain).to_bytes(4, "big")
+    checksum = codecs.deflate_adler32(plain).to_bytes(4, "big")
     # libdeflate does not tell where the stream ends; its checksum does, if it is at the end and not before
     ends = packed.endswith(checksum) and packed.rfind(checksum, -_MOST_AFTER, -1) < 0
-    return rows if len(plain) == rows.size and ends else None
-
-
-def _unfiltered(rows: Rows, checksum: bytes, file_of: Callable[[bytes], bytes]) -> NDArray[np.uint16] | None:
-    """Undo the filters: by sums, or by a decoder that is given the rows as a stream of stored blocks."""
-    most = rows[:, 0].max()
-    if most <= _SUB:
-        return _summed(rows)
-    if most > _LAST_FILTER:
+    if not ends or len(plain) != rows.size or rows[:, 0].max() > _SUB:
         return None
-    file = file_of(_stored(rows, checksum))
-    pixels = cv2.imdecode(np.frombuffer(file, np.uint8), cv2.IMREAD_UNCHANGED)
-    return None if pixels is None else pixels.astype(np.uint16, copy=False)
-
-
-def _summed(rows: Rows) -> NDArray[np.uint16]:
-    """Undo the filters None and Sub: a pixel's bytes are the sums, modulo 256, of those up to it."""
-    height, stride = rows.shape
-    differences = rows[:, 1:].reshape(height, stride // 2, 2)
+    # a pixel's bytes are the sums, modulo 256, of those up to it
+    differences = rows[:, 1:].reshape(height, width, 2)
     sums = np.empty(differences.shape, np.uint8)
-    imagecodecs().delta_decode(differences[..., ::-1], axis=1, out=sums)
+    codecs.delta_decode(differences[..., ::-1], axis=1, out=sums)
     pixels: NDArray[np.uint16] = sums.view("<u2")[..., 0].astype(np.uint16, copy=False)
-    plain = rows[:, 0] != _SUB
-    if plain.any():
-        pixels[plain] = rows[plain, 1:].view(">u2")
+    unfiltered = rows[:, 0] != _SUB
+    if unfiltered.any():
+        pixels[unfiltered] = rows[unfiltered, 1:].view(">u2")
     return pixels
-
-
-def _stored(rows: Rows, checksum: bytes) -> bytes:
-    """Return a zlib stream [RFC 1950, 1951] of the rows as they are."""
-    plain = rows.reshape(-1).data
-    parts: list[bytes | memoryview] = [b"\x78\x01"]
-    for start in range(0, len(plain), _LONGEST_BLOCK):
-        block = plain[start : start + _LONGEST_BLOCK]
-        last = start + len(block) == len(plain)
-        parts += [struct.pack("<BHH", last, len(block), len(block) ^ 0xFFFF), block]
-    return b"".join([*parts, checksum])
 
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
@@ -203,12 +170,16 @@ class _Header(NamedTuple):
 
 
 class _Whole(NamedTuple):
-    """What decides the pixels: the header, the bodies of palette and transparency, the chunks of the data."""
+    """What decides the pixels: the header, the bodies of palette and transparency, the chunks of the data.
+
+    `text` is what rollcli wrote beside them.
+    """
 
     header: _Header
     palette: bytes
     transparent: bytes
     image: list[memoryview]
+    text: str
 
     @property
     def packed_size(self) -> int:
@@ -220,23 +191,26 @@ class _Whole(NamedTuple):
         """The pixel data: a zlib stream."""
         return b"".join(chunk[8:-4] for chunk in self.image)
 
-    def file(self, name: str, packed: bytes | None = None) -> bytes:
-        """Return a file of nothing else, of these pixel data where some are given."""
+    def file(self, name: str) -> bytes:
+        """Return a file of nothing else."""
         start: list[bytes | memoryview] = [SIGNATURE, _chunk(b"IHDR", struct.pack(">IIBBBBB", *self.header))]
         if self.header.colour == _PALETTE:
             start.append(_chunk(b"PLTE", _full_palette(self.header, self.palette, name)))
             if self.transparent:
                 start.append(_chunk(b"tRNS", self.transparent[: 2**self.header.depth]))
-        image = self.image if packed is None else [_chunk(b"IDAT", packed)]
-        return b"".join([*start, *image, _chunk(b"IEND", b"")])
+        return b"".join([*start, *self.image, _chunk(b"IEND", b"")])
 
 
-def grey_values(data: bytes, name: str) -> NDArray[Any]:
-    """Return the values of a single-channel PNG as they are stored; shape (H, W), uint8 or uint16.
+def decode_png(data: bytes, name: str) -> Stored:
+    """Return the numbers of a single-channel PNG as they are stored, uint8 or uint16, and rollcli's text.
 
     A palette of greys stands for its greys; fully transparent pixels hold no data and become 0.
     """
     whole = _checked(data, name)
+    return Stored(_grey_values(whole, name), "png", text=whole.text)
+
+
+def _grey_values(whole: "_Whole", name: str) -> NDArray[Any]:
     header, transparent = whole.header, whole.transparent
     pixels = _decoded(whole, name, cv2.IMREAD_UNCHANGED)
     if header.colour == _GREY:
@@ -261,18 +235,6 @@ def picture(data: bytes, name: str, *, mask: bool = False) -> NDArray[Any]:
     return _decoded(_checked(data, name, mask), name, PICTURE_FLAGS)
 
 
-def text_of(data: bytes) -> str:
-    """Return what rollcli wrote into a whole PNG file beside the pixels; empty where that is nothing."""
-    position, kind = len(SIGNATURE), b""
-    while kind not in (b"IDAT", b"IEND"):
-        end = position + 12 + int.from_bytes(data[position : position + 4], "big")
-        kind, body = data[position + 4 : position + 8], data[position + 8 : end - 4]
-        if kind == b"tEXt" and body.startswith(_TEXT_KEY):
-            return body.removeprefix(_TEXT_KEY).decode("latin-1")
-        position = end
-    return ""
-
-
 def encode_png(values: NDArray[Any], text: str = "") -> bytes:
     """Return a PNG file of (H, W) or BGR (H, W, 3) values, uint8 or uint16, and an ASCII text beside them."""
     if values.dtype not in (np.uint8, np.uint16):
@@ -287,7 +249,7 @@ def encode_png(values: NDArray[Any], text: str = "") -> bytes:
 def _decoded(whole: _Whole, name: str, flags: int) -> NDArray[Any]:
     header = whole.header
     if (header.colour, header.depth, header.interlace) == (_GREY, 16, 0):
-        fast = decode_grey16(whole.packed, header.width, header.height, partial(whole.file, name))
+        fast = decode_grey16(whole.packed, header.width, header.height)
         if fast is not None:
             return fast
     with decoding() as printed:
@@ -300,30 +262,30 @@ def _decoded(whole: _Whole, name: str, flags: int) -> NDArray[Any]:
 def _checked(data: bytes, name: str, mask: bool = False) -> _Whole:
     """Return what decides the pixels; InputError if the file is not whole."""
     view, position = memoryview(data), len(SIGNATURE)
-    header, palette, transparent, kind = None, b"", b"", b""
+    header, bodies, text, kind = None, dict[bytes, bytes](), "", b""
     image: list[memoryview] = []
     while kind != b"IEND":
         end = position + 12 + int.from_bytes(view[position : position + 4], "big")
         if end > len(data) or position + 12 > len(data):
             raise InputError(f"{name}: is a truncated PNG: it ends after {len(data)} bytes")
-        if crc32(view[position + 4 : end - 4]) != int.from_bytes(view[end - 4 : end], "big"):
+        if zlib.crc32(view[position + 4 : end - 4]) != int.from_bytes(view[end - 4 : end], "big"):
             raise InputError(f"{name}: is a damaged PNG: wrong checksum {position} bytes in")
-        kind = data[position + 4 : position + 8]
+        kind, body = data[position + 4 : position + 8], view[position + 8 : end - 4]
         if (header is None) != (kind == b"IHDR"):
             raise InputError(f"{name}: is a damaged PNG: its header is not first, or not alone")
         if kind == b"IDAT":
             image.append(view[position:end])
         elif kind == b"IHDR":
-            header = _header(data[position + 8 : end - 4], name)
-        elif kind == b"PLTE":
-            palette = data[position + 8 : end - 4]
-        elif kind == b"tRNS":
-            transparent = data[position + 8 : end - 4]
+            header = _header(bytes(body), name)
+        elif kind in (b"PLTE", b"tRNS"):
+            bodies[kind] = bytes(body)
+        elif kind == b"tEXt" and not (image or text) and body[: len(_TEXT_KEY)] == _TEXT_KEY:
+            text = bytes(body[len(_TEXT_KEY) :]).decode("latin-1")
         elif kind != b"IEND" and kind[:1].isupper():
             raise InputError(f"{name}: is no standard PNG: chunk {kind.decode('latin-1')!r} is unknown")
         position = end
     assert header is not None
-    whole = _Whole(header, palette, transparent, image)
+    whole = _Whole(header, bodies.get(b"PLTE", b""), bodies.get(b"tRNS", b""), image, text)
     require_decoded_fits(*header[:2], header.pixel_bytes, whole.packed_size, name, mask=mask)
     _require_data(whole, name)
     return whole
@@ -336,8 +298,7 @@ def _header(body: bytes, name: str) -> _Header:
     sane = header.depth in _DEPTHS.get(header.colour, ()) and header.interlace <= 1
     if not sane or header.compression or header.filtering or max(header[:2]) > _MAX_SIDE:
         raise InputError(f"{name}: is a damaged PNG: its header makes no sense")
-    if header.width == 0 or header.height == 0:
-        raise InputError(f"{name}: has no pixels ({header.width} x {header.height})")
+    require_pixels(header.width, header.height, name)
     return header
 
 
@@ -386,4 +347,4 @@ def _full_palette(header: _Header, palette: bytes, name: str) -> bytes:
 
 
 def _chunk(kind: bytes, body: bytes) -> bytes:
-    return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", crc32(kind + body))
+    return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))

@@ -1,6 +1,7 @@
 """What a map file holds, before its numbers are read as pixels."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import cv2
@@ -59,6 +60,16 @@ def require_map_shape(shape: tuple[int, ...], name: str) -> None:
         raise InputError(f"{name}: has no pixels (shape {shape})")
 
 
+def require_pixels(width: int, height: int, name: str, needed: int = 0, there: int = 0) -> None:
+    """Refuse an image without pixels, and one of whose bytes fewer are there than are needed."""
+    if width == 0 or height == 0:
+        raise InputError(f"{name}: has no pixels ({width} x {height})")
+    if there < needed:
+        raise InputError(
+            f"{name}: is truncated: {width} x {height} pixels need {needed} bytes, {there} are there"
+        )
+
+
 def require_decoded_fits(
     width: int, height: int, pixel_bytes: int, stored: int, name: str, *, mask: bool = False
 ) -> None:
@@ -90,3 +101,13 @@ def require_decoded_fits(
 def native(values: NDArray[Any]) -> NDArray[Any]:
     """Make C-contiguous, in this machine's byte order."""
     return np.ascontiguousarray(values, dtype=values.dtype.newbyteorder("="))
+
+
+@lru_cache(maxsize=1)
+def imagecodecs() -> Any:
+    """Return the package, of the extras `fast` and `tiff`, or None where it is not installed."""
+    try:
+        import imagecodecs as package
+    except ImportError:
+        return None
+    return package

@@ -1,18 +1,26 @@
 """TIFF [TIFF 6.0]: tifffile reads the tags; the pixels are decoded strip by strip."""
 
+import contextlib
 import io
 import logging
 import struct
 import zlib
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError
-from rollcli.files.codecs.extras import imagecodecs
 from rollcli.files.codecs.png import decoding
-from rollcli.files.codecs.raw_map import COLOUR_REMEDY, Stored, native, require_decoded_fits
+from rollcli.files.codecs.raw_map import (
+    COLOUR_REMEDY,
+    Stored,
+    imagecodecs,
+    native,
+    require_decoded_fits,
+    require_pixels,
+)
 
 _CLEAR, _END, _FIRST = 256, 257, 258
 _TABLE = 4096
@@ -23,8 +31,8 @@ _WIDTHS = 9 + (_PLACES >= 254) + (_PLACES >= 766) + (_PLACES >= 1790)
 _OFFSETS = np.concatenate([[0], np.cumsum(_WIDTHS)])
 
 
-class LzwError(ValueError):
-    """The bytes are no LZW data."""
+class DamagedPartError(ValueError):
+    """The bytes of a strip or tile are not its pixels."""
 
 
 def decode_lzw(packed: bytes, most: int) -> bytes:
@@ -32,7 +40,7 @@ def decode_lzw(packed: bytes, most: int) -> bytes:
 
     Raises
     ------
-    LzwError
+    DamagedPartError
         A code that cannot occur.
     """
     codes, parents = _codes(packed)
@@ -58,11 +66,11 @@ def _codes(packed: bytes) -> tuple[NDArray[Any], NDArray[Any]]:
         codes = (window[starts >> 3] >> (24 - (starts & 7) - widths)) & ((1 << widths) - 1)
         stops = np.flatnonzero((codes == _CLEAR) | (codes == _END))
         if len(stops) == 0 and fits == len(_WIDTHS):
-            raise LzwError("table overflow")
+            raise DamagedPartError("table overflow")
         count = int(stops[0]) if len(stops) else fits
         block = codes[:count].astype(np.int32)
         if np.any(block >= _FIRST + _PLACES[:count]):
-            raise LzwError("code not in the table")
+            raise DamagedPartError("code not in the table")
         blocks.append(block)
         parents.append(block - _FIRST + done)
         done += count
@@ -70,9 +78,9 @@ def _codes(packed: bytes) -> tuple[NDArray[Any], NDArray[Any]]:
             break
         position = int(starts[count]) + int(widths[count])
         if len(blocks) > 64 + len(packed) // 128:
-            raise LzwError("too many tables")  # each costs the same time, however short it is
+            raise DamagedPartError("too many tables")  # each costs the same time, however short it is
     if done == 0:
-        raise LzwError("no data")
+        raise DamagedPartError("no data")
     return np.concatenate(blocks), np.concatenate(parents)
 
 
@@ -105,10 +113,6 @@ MAX_EXPANSION = {_NONE: 1, _LZW: 2732, _DEFLATE: 1032, _OLD_DEFLATE: 1032, _PACK
 _PADDING = 1  # bytes after uncompressed data: parts begin at even places
 
 
-class DamagedPartError(ValueError):
-    """The bytes of a strip or tile are not its pixels."""
-
-
 def unpacked(compression: int, packed: bytes, size: int, most: int) -> bytes:
     """Unpack a strip or tile.
 
@@ -132,7 +136,7 @@ def unpacked(compression: int, packed: bytes, size: int, most: int) -> bytes:
         return plain
     try:
         plain = _UNPACK[compression](packed, most + 1)
-    except (zlib.error, LzwError) as error:
+    except zlib.error as error:
         raise DamagedPartError(str(error)) from None
     if len(plain) < size:
         raise DamagedPartError(f"{len(plain)} of {size} bytes")
@@ -151,10 +155,6 @@ def _fast(compression: int, packed: bytes, most: int) -> bytes | None:
     except (RuntimeError, ValueError):  # its errors are RuntimeErrors
         return None
     return plain
-
-
-def _stored(packed: bytes, most: int) -> bytes:
-    return packed
 
 
 def _inflated(packed: bytes, most: int) -> bytes:
@@ -180,8 +180,8 @@ def _unpacked_bits(packed: bytes, most: int) -> bytes:
     return bytes(plain)
 
 
-_UNPACK = {
-    _NONE: _stored,
+_UNPACK: dict[int, Callable[[bytes, int], bytes]] = {
+    _NONE: lambda packed, _: packed,
     _LZW: decode_lzw,
     _DEFLATE: _inflated,
     _OLD_DEFLATE: _inflated,
@@ -312,22 +312,17 @@ logging.getLogger("tifffile").addHandler(logging.NullHandler())
 
 def decode_tiff(data: bytes, name: str) -> Stored:
     """Return the numbers of a single-channel TIFF file, as they are stored; of several pages the first."""
-
-    def decode(file: Any, page: Any) -> Stored:
+    with _first_page(data, name) as (file, page):
         if page.samplesperpixel != 1 or page.photometric == _PALETTE:
             what = "a palette" if page.photometric == _PALETTE else f"{page.samplesperpixel} channels"
             raise InputError(f"{name}: is a colour image ({what}); {COLOUR_REMEDY}")
-        values = _pixels(page, data, name)[..., 0]
-        return Stored(native(values), "tiff", nodata=_nodata(page), note=_note(file, name), text=_text(page))
-
-    decoded: Stored = _with_first_page(data, name, decode)
-    return decoded
+        values = native(_pixels(page, data, name)[..., 0])
+        return Stored(values, "tiff", nodata=_nodata(page), note=_note(file, name), text=_text(page))
 
 
 def picture(data: bytes, name: str) -> NDArray[Any]:
     """Return the pixels of a camera image: grey (H, W) or BGR (H, W, 3), uint8 or uint16."""
-
-    def decode(_: Any, page: Any) -> NDArray[Any]:
+    with _first_page(data, name) as (_, page):
         colour = page.photometric == _RGB and page.samplesperpixel >= 3
         if not (colour or page.samplesperpixel == 1) or page.photometric == _PALETTE:
             raise InputError(f"{name}: is neither a grey nor an RGB TIFF")
@@ -337,9 +332,6 @@ def picture(data: bytes, name: str) -> NDArray[Any]:
                 f"{name}: holds {pixels.dtype} numbers; a camera image has 8 or 16 bits a channel"
             )
         return native(pixels[..., 2::-1] if colour else pixels[..., 0])
-
-    pixels: NDArray[Any] = _with_first_page(data, name, decode)
-    return pixels
 
 
 def encode_tiff(values: NDArray[Any], nodata: tuple[float, ...] = (), description: str = "") -> bytes:
@@ -363,13 +355,14 @@ def encode_tiff(values: NDArray[Any], nodata: tuple[float, ...] = (), descriptio
     return buffer.getvalue()
 
 
-def _with_first_page(data: bytes, name: str, decode: Any) -> Any:
-    """decode(file, page) of the first page; whatever the tags make it stumble over becomes an InputError."""
+@contextlib.contextmanager
+def _first_page(data: bytes, name: str) -> Iterator[tuple[Any, Any]]:
+    """Yield the file and its first page; whatever the tags make one stumble over becomes an InputError."""
     import tifffile  # only those who have TIFF files wait for it
 
     try:
         with tifffile.TiffFile(io.BytesIO(data)) as file:
-            return decode(file, file.pages[0])
+            yield file, file.pages[0]
     except (tifffile.TiffFileError, *_DAMAGE):
         raise InputError(f"{name}: is a damaged or truncated TIFF") from None
 
@@ -377,8 +370,7 @@ def _with_first_page(data: bytes, name: str, decode: Any) -> Any:
 def _pixels(page: Any, data: bytes, name: str) -> NDArray[Any]:
     """Return the numbers of one page; shape (H, W, channels)."""
     width, height, samples = int(page.imagewidth), int(page.imagelength), int(page.samplesperpixel)
-    if width == 0 or height == 0:
-        raise InputError(f"{name}: has no pixels ({width} x {height})")
+    require_pixels(width, height, name)
     if int(page.imagedepth) != 1:
         raise InputError(f"{name}: is a volume of {page.imagedepth} slices, not a 2-D image")
     if page.dtype is None or page.dtype.kind not in "biuf":

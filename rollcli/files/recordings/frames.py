@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import NamedTuple
 
-from rollcli.errors import InputError, UsageError
+from rollcli.errors import InputError, UsageError, as_usage
 from rollcli.files.bounded import state_of
 from rollcli.files.naming import listed
 from rollcli.files.recordings import messages
@@ -214,28 +214,21 @@ def _index(path: str, topic: str) -> dict[str, tuple[int, ...]]:
 def _topics(files: Iterable[str]) -> dict[str, Topic]:
     topics: dict[str, Topic] = {}
     for path in files:
-        try:
+        with as_usage():
             topics |= _known_topics(*state_of(path))
-        except InputError as error:
-            raise UsageError(str(error)) from None
     return topics
 
 
 def _known(topics: dict[str, Topic], topic: str, name: str) -> Topic:
     if topic not in topics:
         raise UsageError(f"{name}: has no topic {topic}; {_all(topics)}")
-    try:
+    with as_usage():
         messages.check_decoder(topics[topic], name)
-    except InputError as error:
-        raise UsageError(str(error)) from None
     return topics[topic]
 
 
-def _check_format(topic: Topic, data: memoryview, name: str) -> None:
-    try:
-        messages.check_format(topic, data, name)
-    except InputError as error:
-        raise UsageError(str(error)) from None
+def _decodable(topics: dict[str, Topic], kind: str) -> list[Topic]:
+    return [each for each in topics.values() if each.type == kind and each.encoding in ("cdr", "ros1")]
 
 
 def _all(topics: dict[str, Topic]) -> str:
@@ -248,15 +241,10 @@ def _all(topics: dict[str, Topic]) -> str:
 
 def _only_map_topic(files: Sequence[str], topics: dict[str, Topic], name: str) -> str:
     """Return the only topic of maps."""
-    images = {
-        each.name for each in topics.values() if each.type == IMAGE and each.encoding in ("cdr", "ros1")
-    }
+    images = {each.name for each in _decodable(topics, IMAGE)}
     fitting = [each.name for each in topics.values() if each.type == DISPARITY]
-    fitting += [
-        each
-        for each, pixels in _first_encodings(files, topics, images).items()
-        if pixels in messages.MAP_ENCODINGS
-    ]
+    encodings = _first_encodings(files, topics, images)
+    fitting += [each for each, pixels in encodings.items() if pixels in messages.MAP_ENCODINGS]
     if len(fitting) == 1:
         return fitting[0]
     options = " or ".join(f"--topic {each}" for each in sorted(fitting))
@@ -284,9 +272,7 @@ def _first_encodings(files: Sequence[str], topics: dict[str, Topic], images: set
 def _scan(files: Sequence[str], wanted: Sequence[Topic], topics: dict[str, Topic]) -> _Found:
     """Read through the files once: the stamps of the wanted topics, and a CameraInfo of each camera."""
     by_name = {each.name: each for each in wanted}
-    infos = {
-        each.name for each in topics.values() if each.type == CAMERA_INFO and each.encoding in ("cdr", "ros1")
-    }
+    infos = {each.name for each in _decodable(topics, CAMERA_INFO)}
     frames: dict[str, list[RecordingFrame]] = {each: [] for each in by_name}
     cameras: dict[str, CameraInfo] = {}
     places: dict[tuple[str, str], str] = {}
@@ -304,7 +290,8 @@ def _scan(files: Sequence[str], wanted: Sequence[Topic], topics: dict[str, Topic
                     places[path, message.topic] = place
                 continue
             if topic.type == COMPRESSED and not frames[topic.name]:
-                _check_format(topic, bag.read(message.place).data, path)
+                with as_usage():
+                    messages.check_format(topic, bag.read(message.place).data, path)
             stamp = messages.stamp_of(topic, message.data, message.log_time)
             name = f"{path}#{topic.name}@{stamp}"
             seen[name] = seen.get(name, -1) + 1
@@ -336,16 +323,11 @@ def _beside(topic: str) -> str:
 def _camera(found: _Found, topic: str, *, right: bool) -> CameraInfo | None:
     """Return the one left, or right, camera; of several the one whose namespace has most in common."""
     fitting = [
-        (_in_common(name, topic), name)
+        (len(os.path.commonprefix([name, topic])), name)  # noqa: RUF071 (letter by letter)
         for name, info in found.cameras.items()
         if info.usable and (info.p[3] != 0) is right
     ]
     return found.cameras[max(fitting)[1]] if fitting else None
-
-
-def _in_common(one: str, other: str) -> int:
-    """Count the first characters that two names share."""
-    return next((at for at, (a, b) in enumerate(zip(one, other, strict=False)) if a != b), len(one))
 
 
 def _calibration(

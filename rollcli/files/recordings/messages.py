@@ -15,6 +15,7 @@ from rollcli.errors import InputError
 from rollcli.extras import require_extra
 from rollcli.files.bounded import MOST_BYTES
 from rollcli.files.codecs import arrays, pictures, png
+from rollcli.files.codecs.raw_map import require_pixels
 from rollcli.files.recordings.bags import Topic
 
 DISPARITY, IMAGE, COMPRESSED = (
@@ -27,21 +28,14 @@ MAP_ENCODINGS = ("mono16", "16UC1", "16SC1", "32FC1")  # of images that hold dis
 _VIDEO = re.compile("h\\.?26[45]|hevc|avc|av1|vp[89]", re.IGNORECASE)
 # numpy's dtype, and the channels
 _PIXELS = {
-    "mono8": ("u1", 1),
-    "8UC1": ("u1", 1),
-    "mono16": ("u2", 1),
-    "16UC1": ("u2", 1),
+    **dict.fromkeys(("mono8", "8UC1"), ("u1", 1)),
+    **dict.fromkeys(("mono16", "16UC1"), ("u2", 1)),
     "16SC1": ("i2", 1),
     "32FC1": ("f4", 1),
     "64FC1": ("f8", 1),
-    "rgb8": ("u1", 3),
-    "bgr8": ("u1", 3),
-    "8UC3": ("u1", 3),
-    "rgba8": ("u1", 4),
-    "bgra8": ("u1", 4),
-    "8UC4": ("u1", 4),
-    "rgb16": ("u2", 3),
-    "bgr16": ("u2", 3),
+    **dict.fromkeys(("rgb8", "bgr8", "8UC3"), ("u1", 3)),
+    **dict.fromkeys(("rgba8", "bgra8", "8UC4"), ("u1", 4)),
+    **dict.fromkeys(("rgb16", "bgr16"), ("u2", 3)),
 }
 # ROS names the first two pixels of a row of the mosaic, OpenCV those of its second row from the second on
 _BAYER = {
@@ -213,8 +207,7 @@ def _pixels(image: Any, name: str) -> NDArray[Any]:
         raise InputError(f"{name}: has pixels of the encoding {encoding[:40]!r}, which is not read")
     dtype = np.dtype(kind).newbyteorder(">" if image.is_bigendian else "<")
     row = width * channels * dtype.itemsize
-    if width == 0 or height == 0:
-        raise InputError(f"{name}: has no pixels ({width} x {height})")
+    require_pixels(width, height, name)
     if step < row:
         raise InputError(
             f"{name}: its rows have {step} bytes, of {row} that {width} pixels of {encoding} need"

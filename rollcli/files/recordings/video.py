@@ -15,7 +15,7 @@ from typing import Any, BinaryIO, NamedTuple
 import cv2
 from numpy.typing import NDArray
 
-from rollcli.errors import InputError, UsageError
+from rollcli.errors import InputError, UsageError, as_usage
 from rollcli.files.bounded import state_of
 from rollcli.files.codecs.pictures import half_size
 from rollcli.files.codecs.raw_map import require_decoded_fits
@@ -46,10 +46,8 @@ def look_through(path: str, name: str) -> Video:
     UsageError
         It cannot be opened, or has no frame.
     """
-    try:
+    with as_usage():
         return _look_through(*state_of(path), name)
-    except InputError as error:
-        raise UsageError(str(error)) from None
 
 
 @lru_cache(maxsize=4)
@@ -74,10 +72,8 @@ def frames_of_video(path: str, name: str, relative: str, layout: str | None) -> 
     """
     video, stem = look_through(path, name), os.path.splitext(relative)[0]  # noqa: PTH122
     if layout is not None:
-        try:
+        with as_usage():
             half_size(video.width, video.height, layout, name)
-        except InputError as error:
-            raise UsageError(str(error)) from None
     numbers = [f"{number:06d}" for number in range(video.frames)] + (["rest"] if video.broken else [])
     return [RecordingFrame(f"{path}#{each}", f"{name}#{each}", f"{stem}_{each}.png", 0) for each in numbers]
 

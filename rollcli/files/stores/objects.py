@@ -1,5 +1,6 @@
 """Objects of s3, gs and az through obstore (extra `storage`), and why a store refused."""
 
+import contextlib
 import os
 import re
 import time
@@ -8,7 +9,7 @@ from datetime import timedelta
 from functools import lru_cache
 from typing import Any, TypeVar
 
-from rollcli.errors import InputError, OutputError, UsageError
+from rollcli.errors import InputError, OutputError, RollcliError, UsageError
 from rollcli.extras import require_extra
 from rollcli.files.bounded import MOST_BYTES, in_words, too_large
 from rollcli.files.stores.locations import public_name, split_url, wait_for_room, waiting_for_network
@@ -152,16 +153,9 @@ def read_object(url: str, most: int = MOST_BYTES) -> tuple[bytes, str]:
             counted = True
         return bytes(answer.bytes()), answer.meta["e_tag"] or ""
 
-    try:
-        with waiting_for_network():
-            return _repeated(fetch)
-    except FileNotFoundError as error:
-        missing = what_is_missing(error)
-        raise InputError(f"{public_name(url)}: {missing}", missing) from None
-    except _store_errors() as error:
-        reason = reason_of(error)
-        limits = f" ({request_seconds():g}), for up to {in_words(most)}" if reason == _TOO_LONG else ""
-        raise InputError(f"{public_name(url)}: cannot be read: {reason}{limits}", reason) from None
+    limits = f" ({request_seconds():g}), for up to {in_words(most)}"
+    with _telling(url, "read", InputError, limits), waiting_for_network():
+        return _repeated(fetch)
 
 
 def write_object(url: str, data: bytes, owner: str = "") -> None:
@@ -195,12 +189,9 @@ def object_owner(url: str) -> str:
         The store does not answer, or does not let us look.
     """
     store, key = _open(url)
-    try:
+    with _telling(url, "read", InputError), contextlib.suppress(FileNotFoundError):
         return str(_repeated(lambda: store.get(key).attributes.get(_OWNER, "")))
-    except FileNotFoundError:
-        return ""
-    except _store_errors() as error:
-        raise InputError(f"{public_name(url)}: cannot be read: {reason_of(error)}") from None
+    return ""
 
 
 def object_exists(url: str) -> bool:
@@ -219,13 +210,10 @@ def object_time_ns(url: str) -> int:
         The store does not answer, or does not let us look.
     """
     store, key = _open(url)
-    try:
+    with _telling(url, "read", InputError), contextlib.suppress(FileNotFoundError):
         found = _repeated(lambda: store.head(key))
-    except FileNotFoundError:
-        return 0
-    except _store_errors() as error:
-        raise InputError(f"{public_name(url)}: cannot be read: {reason_of(error)}") from None
-    return (int(found["last_modified"].timestamp()) + 1) * 1_000_000_000 - 1
+        return (int(found["last_modified"].timestamp()) + 1) * 1_000_000_000 - 1
+    return 0
 
 
 def object_problem(url: str) -> str:
@@ -256,11 +244,13 @@ def folder_problem(url: str) -> str:
 
 def _objection(ask: Callable[[], Any]) -> str:
     """Return what a store objects to; empty where it does not."""
+    from obstore.exceptions import BaseError
+
     try:
         ask()
     except FileNotFoundError as error:
         return what_is_missing(error)
-    except _store_errors() as error:
+    except (BaseError, OSError, RuntimeError) as error:
         return reason_of(error)
     return ""
 
@@ -274,13 +264,8 @@ def remove_object(url: str) -> None:
         The store does not let us.
     """
     store, key = _open(url)
-    try:
-        with waiting_for_network():
-            _repeated(lambda: store.delete(key))
-    except FileNotFoundError:
-        return
-    except _store_errors() as error:
-        raise OutputError(f"{public_name(url)}: cannot be removed: {reason_of(error)}") from None
+    with _telling(url, "removed", OutputError), contextlib.suppress(FileNotFoundError), waiting_for_network():
+        _repeated(lambda: store.delete(key))
 
 
 def list_objects(url: str) -> Iterator[tuple[str, int]]:
@@ -307,13 +292,9 @@ def list_tags(url: str) -> Iterator[tuple[str, str]]:
 def _list(url: str) -> Iterator[tuple[str, Any]]:
     store, prefix = _open(url)
     root = split_url(url)[0]
-    try:
+    with _telling(url, "listed", UsageError):
         for found in _listed(store, prefix.rstrip("/") or None):
             yield f"{root}/{found['path']}", found
-    except FileNotFoundError as error:
-        raise UsageError(f"{public_name(url)}: {what_is_missing(error)}") from None
-    except _store_errors() as error:
-        raise UsageError(f"{public_name(url)}: cannot be listed: {reason_of(error)}") from None
 
 
 def has_objects(url: str) -> bool:
@@ -345,18 +326,27 @@ def _listed(store: Any, prefix: str | None) -> Iterator[Any]:
 
 
 def _put(url: str, data: bytes, mode: str, attributes: dict[str, str] | None = None) -> None:
-    from obstore.exceptions import AlreadyExistsError
-
     store, key = _open(url)
+    with _telling(url, "written", OutputError), waiting_for_network():
+        _repeated(lambda: store.put(key, data, mode=mode, attributes=attributes))
+
+
+@contextlib.contextmanager
+def _telling(url: str, done: str, error: type[RollcliError], limits: str = "") -> Iterator[None]:
+    """Turn what a store objects to into an error of ours: what cannot be `done`, and why."""
+    from obstore.exceptions import AlreadyExistsError, BaseError
+
     try:
-        with waiting_for_network():
-            _repeated(lambda: store.put(key, data, mode=mode, attributes=attributes))
-    except AlreadyExistsError:
+        yield
+    except AlreadyExistsError:  # an answer, not a fault
         raise
-    except FileNotFoundError as error:
-        raise OutputError(f"{public_name(url)}: {what_is_missing(error)}") from None
-    except _store_errors() as error:
-        raise OutputError(f"{public_name(url)}: cannot be written: {reason_of(error)}") from None
+    except FileNotFoundError as missing:
+        reason = what_is_missing(missing)
+        raise error(f"{public_name(url)}: {reason}", reason) from None
+    except (BaseError, OSError, RuntimeError) as fault:
+        reason = reason_of(fault)
+        more = limits if reason == _TOO_LONG else ""
+        raise error(f"{public_name(url)}: cannot be {done}: {reason}{more}", reason) from None
 
 
 def _repeated(fetch: Callable[[], Value]) -> Value:
@@ -395,9 +385,3 @@ def _store(root: str, process: int) -> Any:
         return from_url(root, client_options=client, retry_config=retry)  # type: ignore[call-overload]
     except (BaseError, ValueError) as error:
         raise UsageError(f"{root}: cannot be opened: {reason_of(error)}") from None
-
-
-def _store_errors() -> tuple[type[Exception], ...]:
-    from obstore.exceptions import BaseError
-
-    return (BaseError, OSError, RuntimeError)

@@ -85,23 +85,19 @@ def _fetched(url: str, give_up: float, most: int, within: str) -> bytes:
 
 def _opened(request: urllib.request.Request, give_up: float) -> Any:
     """Open a URL; whatever is read of the answers to it, of those that redirect too, is read in time."""
-    opener = urllib.request.build_opener(_Http(give_up), _Https(give_up), _Redirects)
+    opener = urllib.request.build_opener(_Handler(give_up), _Redirects)
     return opener.open(request, timeout=max(give_up - time.monotonic(), 0.001))
 
 
-class _Http(urllib.request.HTTPHandler):
+class _Handler(urllib.request.HTTPHandler, urllib.request.HTTPSHandler):
+    """Takes the place of both handlers."""
+
     def __init__(self, give_up: float) -> None:
         super().__init__()
         self._give_up = give_up
 
     def http_open(self, req: urllib.request.Request) -> http.client.HTTPResponse:
         return self.do_open(partial(_connection, http.client.HTTPConnection, self._give_up), req)
-
-
-class _Https(urllib.request.HTTPSHandler):
-    def __init__(self, give_up: float) -> None:
-        super().__init__()
-        self._give_up = give_up
 
     def https_open(self, req: urllib.request.Request) -> http.client.HTTPResponse:
         return self.do_open(partial(_connection, http.client.HTTPSConnection, self._give_up), req)
@@ -117,29 +113,23 @@ class _Redirects(urllib.request.HTTPRedirectHandler):
 
 
 def _connection(kind: Any, give_up: float, host: str, **settings: Any) -> http.client.HTTPConnection:
+    def answer(sock: socket.socket, **more: Any) -> http.client.HTTPResponse:
+        return http.client.HTTPResponse(_InTime(sock, give_up), **more)  # type: ignore[arg-type]
+
     connection: http.client.HTTPConnection = kind(host, **settings)
-    connection.response_class = partial(_answer, give_up)  # type: ignore[assignment]
+    connection.response_class = answer  # type: ignore[assignment]
     return connection
 
 
-def _answer(give_up: float, sock: socket.socket, *args: Any, **settings: Any) -> http.client.HTTPResponse:
-    return http.client.HTTPResponse(_InTime(sock, give_up), *args, **settings)  # type: ignore[arg-type]
-
-
-class _InTime:
+class _InTime(io.RawIOBase):
     """Stands for a socket where an answer is read: Python bounds each read alone, and never their sum."""
 
     def __init__(self, sock: socket.socket, give_up: float) -> None:
         self._sock, self._give_up = sock, give_up
+        self._raw = sock.makefile("rb", buffering=0)
 
     def makefile(self, mode: str) -> io.BufferedReader:
-        return io.BufferedReader(_ReadInTime(self._sock, self._give_up))
-
-
-class _ReadInTime(io.RawIOBase):
-    def __init__(self, sock: socket.socket, give_up: float) -> None:
-        self._sock, self._give_up = sock, give_up
-        self._raw = sock.makefile("rb", buffering=0)
+        return io.BufferedReader(self)
 
     def readable(self) -> bool:
         return True

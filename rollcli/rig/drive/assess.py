@@ -1,6 +1,8 @@
 """What drives say about the rig: each drive and each quantity, and what changed from drive to drive."""
 
 import math
+import os.path
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
@@ -13,16 +15,52 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import UsageError
-from rollcli.rig.drive.outliers import Flags, Floats
-from rollcli.rig.drive.posterior import Estimate
+from rollcli.rig.drive.posterior import Estimate, Flags, Floats
 from rollcli.rig.drive.quantity import SequenceAssessment, assess_sequence
 from rollcli.rig.quantities import ALIGNMENT, COLUMNS, QUANTITIES, ROLL, SIZE, Quantity
-from rollcli.rig.stamps import drive_of, hours_between, seconds_of
 
 AUTO, NONE = "auto", "none"
 _FRAMES_OF_A_DRIVE = 8  # folders of fewer frames on average are not drives but single frames
 _APART = 4.0  # standard deviations within a group; medians of a hundred groups of one rig are 3.5 apart
 _LEAST_SPREAD = 0.05  # degrees
+# drive.mcap#/stereo/disparity@1700000000123456789, with .1 where a stamp is there twice; drive.mp4#000123
+_FRAME = re.compile(
+    r"(.*?\.(?:bag|db3|mcap|mp4|avi|mkv|mov))#(?:.*@([0-9]{1,20})(?:\.[0-9]+)?)?", re.IGNORECASE
+)
+_NS = 1e-9
+
+
+def drive_of(file: str) -> str:
+    """Return the recording that a frame is of, or its folder.
+
+    The files into which rosbag2 splits a recording, ``run/run_0.mcap`` and so on, are one, the folder.
+    """
+    found = _FRAME.match(file) if "#" in file else None
+    if found is None:
+        return file.rpartition("/")[0]
+    path = PurePosixPath(found[1])
+    split = re.fullmatch(r"(.+)_[0-9]+", path.stem)
+    return str(path.parent) if split is not None and split[1] == path.parent.name else found[1]
+
+
+def seconds_of(files: Sequence[str]) -> NDArray[np.float64]:
+    """Return when frames were taken, s since the first stamp, shape (N,); NaN for names without a stamp."""
+    stamps = [_stamp(file) for file in files]
+    first = next((each for each in stamps if each is not None), 0)
+    return np.array([np.nan if each is None else (each - first) * _NS for each in stamps])
+
+
+def _stamp(file: str) -> int | None:
+    found = _FRAME.match(file) if "#" in file else None
+    return None if found is None or found[2] is None else int(found[2])
+
+
+def hours_between(seconds: NDArray[np.float64]) -> float | None:
+    """Return how long frames took, hours; None where their names have no stamps, or these do not ascend."""
+    known = seconds[np.isfinite(seconds)]
+    if len(known) < 2 or known[-1] <= known[0]:
+        return None
+    return float(known[-1] - known[0]) / 3600
 
 
 def split_drives(
@@ -60,10 +98,13 @@ def split_drives(
         return [("", np.arange(len(files)))] if files else []
     pattern = "" if groups == AUTO else groups
     folders = list(map(drive_of, files))
-    names = {folder: _matching(folder, pattern) if pattern else folder for folder in dict.fromkeys(folders)}
-    if pattern and not any(_matches(folder, pattern) for folder in names):
-        raise UsageError(f"--groups {groups}: matches no folder of the frames, such as {next(iter(names))}")
-    keys = [(names[folder], kind) for folder, kind in zip(folders, kinds or [""] * len(files), strict=True)]
+    heads = {folder: _head(folder, pattern) if pattern else "" for folder in dict.fromkeys(folders)}
+    if pattern and not any(heads.values()):
+        raise UsageError(f"--groups {groups}: matches no folder of the frames, such as {next(iter(heads))}")
+    keys = [
+        (heads[folder] or folder, kind)
+        for folder, kind in zip(folders, kinds or [""] * len(files), strict=True)
+    ]
     drives = {key: number for number, key in enumerate(dict.fromkeys(keys))}
     numbers = np.fromiter(map(drives.__getitem__, keys), np.intp, len(files))
     order = np.argsort(numbers, kind="stable")
@@ -84,16 +125,10 @@ def _differ(groups: Sequence[NDArray[np.float64]]) -> bool:
     return float(np.ptp([np.median(each) for each in known])) > _APART * max(spread, _LEAST_SPREAD)
 
 
-def _matching(folder: str, pattern: str) -> str:
-    """Return the first folders of a path, as many as the pattern has, where they match; else all of them."""
-    depth = len(PurePosixPath(pattern).parts)
-    head = "/".join(PurePosixPath(folder).parts[:depth])
-    return head if fnmatchcase(head, pattern.rstrip("/")) else folder
-
-
-def _matches(folder: str, pattern: str) -> bool:
-    depth = len(PurePosixPath(pattern).parts)
-    return fnmatchcase("/".join(PurePosixPath(folder).parts[:depth]), pattern.rstrip("/"))
+def _head(folder: str, pattern: str) -> str:
+    """Return the first folders of a path, as many as the pattern has, where they match; else nothing."""
+    head = "/".join(PurePosixPath(folder).parts[: len(PurePosixPath(pattern).parts)])
+    return head if fnmatchcase(head, pattern.rstrip("/")) else ""
 
 
 _TO_SD = 1 / 1.959963984540054
@@ -300,11 +335,7 @@ def short_names(files: Sequence[str]) -> list[str]:
     """Return paths without the folders that all have in common."""
     folders = {file.rpartition("/")[0] for file in files}
     parts = [folder.split("/") for folder in folders]
-    common = 0
-    for column in zip(*parts, strict=False):
-        if len(set(column)) > 1:
-            break
-        common += 1
+    common = len(os.path.commonprefix(parts))  # noqa: RUF071 (of lists, part by part)
     if not common or folders == {""}:
         return list(files)
     skipped = sum(len(part) + 1 for part in parts[0][: common - (len(folders) == 1)])
@@ -355,7 +386,7 @@ def _compared(drives: Sequence[DriveAssessment]) -> tuple[DriveAssessment, ...]:
         change = difference(before, first)
         wide = sterner * (change.ci95 if change.ci95 is not None else math.hypot(reach, _spread(roll)))
         differs = change.value is not None and abs(change.value) > wide
-        result.append(DriveAssessment(drive.name, drive.frames, drive.quantities, change, differs))
+        result.append(replace(drive, change=change, differs=differs))
         if roll.used:
             before, reach = roll.now, _spread(roll)
     return tuple(result)

@@ -7,9 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from rollcli.rig.drive.outliers import Flags, Floats
-from rollcli.rig.drive.posterior import Cells, Fit, Likelihood, Series, make_cells
-from rollcli.rig.drive.tuning import TUNING
+from rollcli.rig.drive.posterior import TUNING, Cells, Fit, Flags, Floats, Likelihood, Series, make_cells
 
 _SIDE = 2.5  # cells on each side of a jump that are looked at again
 _FEWEST = 60  # frames on each side: what is beside a jump tells its levels

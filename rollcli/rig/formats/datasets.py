@@ -15,6 +15,7 @@ from rollcli.rig.formats.fields import (
     Fields,
     File,
     Projection,
+    Size,
     json_values,
     keys_and_values,
     number,
@@ -22,12 +23,13 @@ from rollcli.rig.formats.fields import (
     pair_of,
     require_one_pair,
     size,
+    size_of,
     swapped,
 )
 
 _RAW = {f"P_rect_0{view}" for view in range(4)}
 _BENCHMARK = {f"P{view}" for view in range(4)}
-_DRIVING_STEREO = ("P_rect_101", "P_rect_103")
+DRIVING_STEREO = ("P_rect_101", "P_rect_103")
 _GREY, _COLOUR = ("0", "1"), ("2", "3")
 _MM = 1e-3
 _SAME_DOFFS = 0.5  # px
@@ -60,22 +62,16 @@ def read_kitti(file: File) -> Fields:
             f"{file.name}: the baseline is that of the grey cameras 0 and 1, {fields[0][1]:.5f} m; "
             f"for images of the colour cameras 2 and 3 give --baseline {fields[1][1]:.5f}",
         )
-    return _kitti_fields("KITTI", file, values, "S_rect_0" + pairs[0][0], *fields[0], notes)
-
-
-def is_driving_stereo(text: str) -> bool:
-    """Tell whether a text is a calibration of DrivingStereo."""
-    return any(key in _DRIVING_STEREO for key, _ in keys_and_values(text, ":"))
+    return _kitti_fields(file, values, "S_rect_0" + pairs[0][0], fields[0], notes)
 
 
 def read_driving_stereo(file: File) -> Fields:
     """Read views 101 (left) and 103 (right)."""
     values = _kitti_values(file)
-    missing = [key for key in _DRIVING_STEREO if key not in values]
+    missing = [key for key in DRIVING_STEREO if key not in values]
     if missing:
         raise InputError(f"{file.name}: has no {missing[0]}: the file is cut off")
-    pair = _kitti_pair(file, values, *_DRIVING_STEREO)
-    return _kitti_fields("DrivingStereo", file, values, "S_rect_101", *pair)
+    return _kitti_fields(file, values, "S_rect_101", _kitti_pair(file, values, *DRIVING_STEREO))
 
 
 def _kitti_values(file: File) -> dict[str, str]:
@@ -102,28 +98,21 @@ def _kitti_pair(
 
 
 def _kitti_fields(
-    form: str,
     file: File,
     values: Mapping[str, str],
     size_key: str,
-    view: Projection,
-    baseline: float,
-    doffs: float,
+    pair: tuple[Projection, float, float],
     notes: tuple[str, ...] = (),
 ) -> Fields:
-    width = height = None
-    if stated := values.get(size_key, "").split():
+    view, baseline, doffs = pair
+    stated, found = values.get(size_key, "").split(), Size()
+    if stated:
         if len(stated) != 2:
             raise InputError(
                 f"{file.name}: {size_key} has {len(stated)} numbers: width and height are needed"
             )
-        width, height = size(stated[0], stated[1], f"{file.name}: {size_key}")
-    return Fields(form, view.fx, view.fy, view.cx, view.cy, baseline, doffs, width, height, notes=notes)
-
-
-def is_middlebury(text: str) -> bool:
-    """Tell whether a text is a calibration of Middlebury or ETH3D."""
-    return any(key == "cam0" for key, _ in keys_and_values(text, "="))
+        found = size_of(stated[0], stated[1], f"{file.name}: {size_key}")
+    return Fields(view.fx, view.fy, view.cx, view.cy, baseline, doffs, *found, notes=notes)
 
 
 def read_middlebury(file: File) -> Fields:
@@ -141,12 +130,10 @@ def read_middlebury(file: File) -> Fields:
             )
         doffs = between if doffs is None else doffs
     if "baseline" not in values:
-        return Fields("Middlebury", fx, fy, cx, cy, None, doffs, lacks="has no baseline: the file is cut off")
+        return Fields(fx, fy, cx, cy, None, doffs, lacks="has no baseline: the file is cut off")
     baseline = _MM * number(values["baseline"], f"{file.name}: baseline")
-    width = height = None
-    if "width" in values and "height" in values:
-        width, height = size(values["width"], values["height"], f"{file.name}: width and height")
-    return Fields("Middlebury", fx, fy, cx, cy, baseline, doffs or 0.0, width, height)
+    found = size(values, "width", "height", f"{file.name}: width and height")
+    return Fields(fx, fy, cx, cy, baseline, doffs or 0.0, *found)
 
 
 def _camera(text: str, what: str) -> tuple[float, float, float, float]:
@@ -173,4 +160,4 @@ def read_cityscapes(file: File) -> Fields:
                 raise InputError(f"{file.name}: has no {key}")
             found.append(number(table[key], f"{file.name}: {key}"))
     fx, fy, cx, cy, baseline = found
-    return Fields("Cityscapes", fx, fy, cx, cy, baseline, 0.0)
+    return Fields(fx, fy, cx, cy, baseline, 0.0)

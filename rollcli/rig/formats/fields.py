@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -27,15 +27,12 @@ class Fields:
 
     Attributes
     ----------
-    format : str
-        What the field calls such a file.
     lacks : str
         Why something is None: the end of the sentence "FILE ...".
     notes : tuple of str
         What a user should know about how the file was read.
     """
 
-    format: str = ""
     fx: float | None = None
     fy: float | None = None
     cx: float | None = None
@@ -81,6 +78,11 @@ def keys_and_values(text: str, sign: str) -> Iterator[tuple[str, str]]:
             yield key.strip(), value.strip()
 
 
+def has_key(sign: str, *keys: str) -> Callable[[str], bool]:
+    """Return what tells whether a line of a text gives one of these keys a value."""
+    return lambda text: any(key in keys for key, _ in keys_and_values(text, sign))
+
+
 def json_values(file: File) -> dict[str, Value]:
     """Return the values of a JSON object, numbers as text."""
     try:
@@ -113,12 +115,26 @@ def numbers(values: Value | Iterable[str], what: str) -> list[float]:
     return [number(value, what) for value in values]
 
 
-def size(width: Value, height: Value, what: str) -> tuple[int, int]:
+class Size(NamedTuple):
+    """Of the images that a calibration is for, pixels; None where it is not stated."""
+
+    width: int | None = None
+    height: int | None = None
+
+
+def size(values: Mapping[str, Value], width: str, height: str, what: str) -> Size:
+    """Return the image size that two values state, in whole pixels."""
+    if width not in values or height not in values:
+        return Size()
+    return size_of(values[width], values[height], what)
+
+
+def size_of(width: Value, height: Value, what: str) -> Size:
     """Return an image size in whole pixels."""
     found = number(width, what), number(height, what)
     if not all(1 <= side <= 1e6 and side == int(side) for side in found):
         raise InputError(f"{what} is {found[0]:g}x{found[1]:g} px: that is no image")
-    return int(found[0]), int(found[1])
+    return Size(int(found[0]), int(found[1]))
 
 
 def pair_of(left: Projection, right: Projection, where: str) -> tuple[float, float]:

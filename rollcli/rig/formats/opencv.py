@@ -64,9 +64,9 @@ def _with_unit(file: File, found: tuple[float, float, float, float, float, float
         lacks = (
             f"has a baseline of {length:g} in the unit of its chessboard's squares, which cannot be metres"
         )
-        return Fields("OpenCV", fx, fy, cx, cy, None, doffs, lacks=lacks)
+        return Fields(fx, fy, cx, cy, None, doffs, lacks=lacks)
     note = f"{file.name}: its baseline, {length:g}, is taken for metres; OpenCV's files do not say the unit"
-    return Fields("OpenCV", fx, fy, cx, cy, length, doffs, notes=(note,))
+    return Fields(fx, fy, cx, cy, length, doffs, notes=(note,))
 
 
 def _of_projections(

@@ -15,7 +15,6 @@ from rollcli.rig.formats.fields import (
     Fields,
     File,
     Projection,
-    keys_and_values,
     number,
     numbers,
     pair_of,
@@ -25,15 +24,6 @@ from rollcli.rig.formats.yaml import parse_yaml
 
 _MM = 1e-3
 _RAW = "is of the raw images, and gives the baseline alone"
-
-
-def _has_key(text: str, *keys: str) -> bool:
-    return any(key in keys for key, _ in keys_and_values(text, ":"))
-
-
-def is_ros(text: str) -> bool:
-    """Tell whether a text is a camera_info file."""
-    return _has_key(text, "projection_matrix")
 
 
 def read_ros(first: File, second: File | None = None) -> Fields:
@@ -47,7 +37,7 @@ def read_ros(first: File, second: File | None = None) -> Fields:
                 f"{first.name}: is one view of a pair, the right one: give both, --calib LEFT --calib RIGHT"
             )
         lacks = "is the left view alone, without the baseline: give both, --calib LEFT --calib RIGHT"
-        return Fields("ROS camera_info", *known, width=width, height=height, lacks=lacks)
+        return Fields(*known, width=width, height=height, lacks=lacks)
     right, *right_size = views[1]
     where = f"{first.name} and {second.name if second else ''}"
     if left.tx != 0 and right.tx == 0:
@@ -63,7 +53,7 @@ def read_ros(first: File, second: File | None = None) -> Fields:
             f"{where}: the right view's Tx is positive, against ROS's convention; its size is taken, "
             f"for a baseline of {-baseline:.5f} m",
         )
-    return Fields("ROS camera_info", *known, abs(baseline), doffs, width, height, notes=notes)
+    return Fields(*known, abs(baseline), doffs, width, height, notes=notes)
 
 
 def _view(file: File) -> tuple[Projection, int | None, int | None]:
@@ -74,14 +64,7 @@ def _view(file: File) -> tuple[Projection, int | None, int | None]:
     data = matrix.get("data", []) if isinstance(matrix, dict) else matrix
     what = f"{file.name}: projection_matrix"
     view = Projection.of(numbers(data, what), what)
-    if "image_width" not in values or "image_height" not in values:
-        return view, None, None
-    return view, *size(values["image_width"], values["image_height"], f"{file.name}: image size")
-
-
-def is_orb_slam(text: str) -> bool:
-    """Tell whether a text is a file of settings for stereo."""
-    return _has_key(text, "Camera.bf", "Stereo.b")
+    return view, *size(values, "image_width", "image_height", f"{file.name}: image size")
 
 
 def read_orb_slam(file: File) -> Fields:
@@ -98,15 +81,8 @@ def read_orb_slam(file: File) -> Fields:
     if fx == 0:
         raise InputError(f"{file.name}: Camera.fx is 0: a focal length is more")
     baseline = read("Camera.bf") / fx if "Camera.bf" in values else read("Stereo.b")
-    width = height = None
-    if "Camera.width" in values and "Camera.height" in values:
-        width, height = size(values["Camera.width"], values["Camera.height"], f"{file.name}: Camera.width")
-    return Fields("ORB-SLAM", fx, fy, cx, cy, baseline, 0.0, width, height)
-
-
-def is_kalibr(text: str) -> bool:
-    """Tell whether a text is a camchain of Kalibr."""
-    return _has_key(text, "T_cn_cnm1")
+    found = size(values, "Camera.width", "Camera.height", f"{file.name}: Camera.width")
+    return Fields(fx, fy, cx, cy, baseline, 0.0, *found)
 
 
 def read_kalibr(file: File) -> Fields:
@@ -122,7 +98,7 @@ def read_kalibr(file: File) -> Fields:
         raise InputError(
             f"{file.name} is a vertical rig, one camera above the other: only horizontal ones are read"
         )
-    return Fields("Kalibr", baseline=math.hypot(x, y, z), lacks=_RAW)
+    return Fields(baseline=math.hypot(x, y, z), lacks=_RAW)
 
 
 def is_zed(text: str) -> bool:
@@ -138,5 +114,5 @@ def read_zed(file: File) -> Fields:
             section = line.strip().lower()
         key, sign, value = line.partition("=")
         if section == "[stereo]" and sign and key.strip().lower() == "baseline":
-            return Fields("ZED", baseline=_MM * number(value.strip(), f"{file.name}: Baseline"), lacks=_RAW)
+            return Fields(baseline=_MM * number(value.strip(), f"{file.name}: Baseline"), lacks=_RAW)
     raise InputError(f"{file.name}: has no Baseline below [STEREO]: the file is cut off")

@@ -14,9 +14,9 @@ from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.road.find import first_row_of_road
 from rollcli.files.formats import read_image
 from rollcli.pictures.derotate import derotate
-from rollcli.simulate.draw import draw_specs
-from rollcli.simulate.render import render_frame, true_disparity
-from rollcli.simulate.spec import FrameSpec
+from rollcli.simulate.build import render_frame, true_disparity
+from rollcli.simulate.options import SimulateOptions
+from rollcli.simulate.spec import FrameSpec, draw_specs
 from rollcli.stereo.match import StereoOptions, match_pair
 
 STREETS = Path(__file__).parents[3].parent / "shared" / "streets"
@@ -50,9 +50,7 @@ def matched():
     specs = [
         spec
         for kind in ("bare", "open", "street", "verge")
-        for spec in draw_specs(
-            2, scene=kind, roll=(-math.radians(15), math.radians(15)), seed=71, colour=False
-        )
+        for spec in draw_specs(SimulateOptions(frames=2, scene=kind, roll_deg=(-15, 15), seed=71, grey=True))
     ]
     frames = [render_frame(spec) for spec in specs]
     maps = [match_pair(frame.left, frame.right, StereoOptions()).disparity for frame in frames]
@@ -186,7 +184,7 @@ def test_a_frame_without_a_road_is_refused_or_suspect_and_says_why(name):
 
 
 def test_a_plane_on_which_no_pixel_lies_is_no_road():
-    spec = draw_specs(9, roll=(-math.pi / 18, math.pi / 18), size=(640, 480), seed=7301, colour=False)[8]
+    spec = draw_specs(SimulateOptions(frames=9, seed=7301, grey=True))[8]
     frame = render_frame(spec)
     upside_down = match_pair(frame.left, frame.right, StereoOptions(mode="3way")).disparity[::-1]
 

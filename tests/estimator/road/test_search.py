@@ -12,7 +12,7 @@ from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.road.find import find_road
 from rollcli.estimator.road.sample import take_sample
 from rollcli.estimator.tuning import TUNING
-from rollcli.simulate.render import true_disparity
+from rollcli.simulate.build import true_disparity
 from rollcli.simulate.spec import FrameSpec
 from tests.estimator.road.test_surface import CAMERA_HEIGHT, disparity_of
 from tests.estimator.synthetic_maps import repeatable

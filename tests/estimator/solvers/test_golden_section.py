@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from rollcli.estimator.request import SolverSettings
 from rollcli.estimator.solvers.exact import exact, minima
 from rollcli.estimator.solvers.golden_section import golden_section
-from rollcli.evaluate.textbook import Textbook
+from rollcli.evaluate.experiments import Textbook
 from tests.estimator.synthetic_maps import bent_road, degrees_apart, energy_of, random_maps, repeatable
 
 TABLE_1 = {1.8e3: 16, 1.8e4: 21, 1.8e5: 26, 1.8e6: 30}  # [GD] Table I: pi / delta -> iterations

@@ -12,7 +12,7 @@ from rollcli.estimator.request import LAMBDA0, SolverSettings
 from rollcli.estimator.solvers.exact import exact, minima
 from rollcli.estimator.solvers.gradient_descent import gradient_descent
 from rollcli.estimator.solvers.solution import SolverStatus
-from rollcli.evaluate.textbook import Textbook
+from rollcli.evaluate.experiments import Textbook
 from tests.estimator.synthetic_maps import bent_road, degrees_apart, energy_of, random_maps, repeatable
 
 

@@ -1,7 +1,6 @@
 """With the extras `fast` and `tiff` files read the same, number for number and word for word, only faster."""
 
 import zlib
-from functools import partial
 from itertools import cycle
 from random import Random
 
@@ -10,10 +9,7 @@ import numpy as np
 import pytest
 
 from rollcli.errors import InputError
-from rollcli.files.codecs import png
-from rollcli.files.codecs import png as fast_png
-from rollcli.files.codecs import tiff as tiff_parts
-from rollcli.files.codecs import tiff as unpack
+from rollcli.files.codecs import png, tiff
 from rollcli.files.formats import decode_image, decode_mask, decode_stored
 from tests.binary_files import disparity_map, make_png, make_tiff, png_file, png_header, png_rows
 from tests.fuzz.corpus import corpus
@@ -44,8 +40,7 @@ def plain(monkeypatch):
     def read(data):
         with monkeypatch.context() as patch:
             patch.setattr(png, "decode_grey16", lambda *_: None)
-            for module in (unpack, tiff_parts):
-                patch.setattr(module, "imagecodecs", lambda: None)
+            patch.setattr(tiff, "imagecodecs", lambda: None)
             return outcome(data)
 
     return read
@@ -60,7 +55,7 @@ def imagecodecs():
 def installed(request, monkeypatch):
     """What of the extra `fast` is there, one after the other."""
     if request.param == "nothing":
-        monkeypatch.setattr(fast_png, "imagecodecs", lambda: None)
+        monkeypatch.setattr(png, "imagecodecs", lambda: None)
     else:
         pytest.importorskip("imagecodecs", reason="the extra fast is not installed")
     return request.param
@@ -70,7 +65,7 @@ def decoded(values, filters):
     """Decode a file whose rows have these filters, one after the other; the options do not reach OpenCV."""
     height, width = values.shape
     plain = filtered(values, filters)
-    return fast_png.decode_grey16(zlib.compress(plain), width, height, partial(grey_file, width, height))
+    return png.decode_grey16(zlib.compress(plain), width, height)
 
 
 def grey_file(width, height, packed):
@@ -103,7 +98,7 @@ def test_rows_of_every_filter_read_as_opencv_reads_them(installed, shape, filter
 
     found = decoded(values, filters)
 
-    assert (found is None) == (installed == "nothing")
+    assert (found is None) == (installed == "nothing" or max(filters[: shape[0]]) > 1)
     if found is not None:
         assert (found.dtype, found.flags.c_contiguous, found.flags.writeable) == (np.uint16, True, True)
         np.testing.assert_array_equal(found, values)
@@ -142,7 +137,7 @@ NO_SUCH_FILTER = zlib.compress(b"\5" + PLAIN[1:])
 )
 def test_data_that_are_not_just_the_rows_are_left_to_opencv(installed, plain, packed):
     height, width = DEEP.shape
-    assert fast_png.decode_grey16(packed, width, height, partial(grey_file, width, height)) is None
+    assert png.decode_grey16(packed, width, height) is None
     file = grey_file(width, height, packed)
     assert outcome(file) == plain(file)
 
@@ -162,7 +157,7 @@ def test_half_an_image_is_never_taken(installed, damage):
     packed = zlib.compress(png_rows(DEEP, 16))
     packed = packed[: len(packed) // 2] if damage == "cut" else packed[:-1] + bytes([packed[-1] ^ 1])
 
-    assert fast_png.decode_grey16(packed, 53, 37, partial(grey_file, 53, 37)) is None
+    assert png.decode_grey16(packed, 53, 37) is None
     with pytest.raises(InputError, match="damaged PNG"):
         decode_stored(grey_file(53, 37, packed), "x")
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rollcli.files.codecs.tiff import LzwError, decode_lzw
+from rollcli.files.codecs.tiff import DamagedPartError, decode_lzw
 from tests.binary_files import lzw_encode
 
 
@@ -30,7 +30,7 @@ def test_what_follows_the_end_is_left_out():
 
 
 def test_no_data_at_all_are_refused():
-    with pytest.raises(LzwError, match="no data"):
+    with pytest.raises(DamagedPartError, match="no data"):
         decode_lzw(b"", 1)
 
 
@@ -38,7 +38,7 @@ def test_no_data_at_all_are_refused():
 def test_any_bytes_are_unpacked_or_refused(packed):
     try:
         plain = decode_lzw(packed, 100)
-    except LzwError:
+    except DamagedPartError:
         return
     assert 0 < len(plain) <= 100
 
@@ -46,7 +46,7 @@ def test_any_bytes_are_unpacked_or_refused(packed):
 def test_a_code_before_its_time_is_refused():
     early = int("100000000" + "001100001" + "111111111" + "100000001", 2)  # clear, "a", 511, end
 
-    with pytest.raises(LzwError, match="not in the table"):
+    with pytest.raises(DamagedPartError, match="not in the table"):
         decode_lzw(early.to_bytes(5, "big"), 4)
 
 
@@ -71,9 +71,9 @@ def test_data_may_begin_without_a_clear_code_and_stop_without_an_end():
 def test_a_code_may_name_the_string_that_it_completes():
     # of TIFF 6.0, section 13: 258 is used while the table still lacks it
     assert decode_lzw(packed(CLEAR, LETTERS[0], (258, 9), (259, 9), END), 100) == b"a" + b"aa" + b"aaa"
-    with pytest.raises(LzwError, match="not in the table"):
+    with pytest.raises(DamagedPartError, match="not in the table"):
         decode_lzw(packed(CLEAR, LETTERS[0], (259, 9), END), 100)
-    with pytest.raises(LzwError, match="not in the table"):
+    with pytest.raises(DamagedPartError, match="not in the table"):
         decode_lzw(packed(CLEAR, (258, 9), END), 100)
 
 
@@ -95,17 +95,17 @@ def test_codes_grow_where_the_table_does(count):
 
 def test_a_table_that_overflows_is_refused():
     plain, codes = literals(5000)
-    with pytest.raises(LzwError, match="table overflow"):
+    with pytest.raises(DamagedPartError, match="table overflow"):
         decode_lzw(packed(CLEAR, *codes), len(plain))
 
 
 def test_tables_that_hold_next_to_nothing_are_refused():
     assert decode_lzw(packed(*[CLEAR] * 60, *LETTERS[:1], END), 10) == b"a"
-    with pytest.raises(LzwError, match="too many tables"):
+    with pytest.raises(DamagedPartError, match="too many tables"):
         decode_lzw(packed(*[CLEAR, LETTERS[0]] * 1000, END), 10_000)
 
 
 def test_clear_codes_alone_are_no_data():
     for codes in ([END], [CLEAR, END], [CLEAR, CLEAR]):
-        with pytest.raises(LzwError, match="no data"):
+        with pytest.raises(DamagedPartError, match="no data"):
             decode_lzw(packed(*codes), 10)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rollcli.rig.drive.outliers import gross_outliers
+from rollcli.rig.drive.quantity import gross_outliers
 from tests.rig.drive.series import drive
 
 

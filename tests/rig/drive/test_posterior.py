@@ -5,9 +5,8 @@ import pytest
 import statsmodels.api as sm
 from scipy.stats import multivariate_normal, norm
 
-from rollcli.rig.drive.posterior import Fit, Likelihood, Series, make_cells
+from rollcli.rig.drive.posterior import TUNING, Fit, Likelihood, Series, make_cells
 from rollcli.rig.drive.quantity import assess_sequence
-from rollcli.rig.drive.tuning import TUNING
 from tests.rig.drive.series import ar1
 
 FRAMES = 40
