@@ -70,9 +70,11 @@ def cpu_of(processes: list["subprocess.Popen[bytes]"]) -> float:
 
 
 def dask(folder: Path, kind: str, *arguments: object) -> "subprocess.Popen[bytes]":
-    """Start a Dask process, whose profiler does not look at all of its threads 100 times a second."""
+    """Start a Dask process with the settings that `rollcli/run/README.md` names: it rests while it waits."""
     line = [sys.executable, "-m", f"distributed.cli.dask_{kind}", *map(str, arguments)]
-    settings = environment(DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED="false")
+    settings = environment(
+        DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED="false", DASK_DISTRIBUTED__ADMIN__TICK__INTERVAL="1s"
+    )
     with (folder / f"{kind}.log").open("ab") as log:
         return subprocess.Popen(line, cwd=folder, env=settings, stdout=log, stderr=log)
 
