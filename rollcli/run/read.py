@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import EstimationError, InputError, UsageError
-from rollcli.estimator.road.find import first_row_of_road
+from rollcli.estimator.road.find import road_plane
 from rollcli.files.codecs.pictures import views_of
 from rollcli.files.encodings import Encoding, read_mask, to_disparity
 from rollcli.files.formats import Stored, read_image, read_stored
@@ -301,7 +301,7 @@ def wanted_of(allowed: NDArray[np.bool_] | None, options: FrameOptions) -> "Want
 
     return Wanted(
         rows=slice(None) if allowed is None else _used_rows(allowed),
-        first_row=partial(_first_row, allowed, options.method) if options.method.road == "auto" else None,
+        road=partial(_road, allowed, options.method) if options.method.road == "auto" else None,
         whole=bool(options.images.folders()),
     )
 
@@ -312,12 +312,14 @@ def _used_rows(allowed: NDArray[np.bool_]) -> slice:
     return slice(int(used[0]), int(used[-1]) + 1)
 
 
-def _first_row(allowed: NDArray[np.bool_] | None, method: MethodOptions, small: NDArray[Any]) -> float:
-    """Return the first row of a small map that the road in the region can reach."""
+def _road(
+    allowed: NDArray[np.bool_] | None, method: MethodOptions, small: NDArray[Any]
+) -> tuple[float, float, float] | None:
+    """Return the plane of the road that a small map shows in the region."""
     if allowed is not None:
         v, u = (np.arange(few) * many // few for few, many in zip(small.shape, allowed.shape, strict=True))
         allowed = allowed[v[:, None], u]
-    return first_row_of_road(small, allowed, math.radians(method.max_roll_deg), method.seed)
+    return road_plane(small, allowed, math.radians(method.max_roll_deg), method.seed)
 
 
 def _doubt_of_range(match: "StereoMatch") -> str:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import cv2
@@ -20,6 +20,7 @@ from rollcli.stereo.alignment import (
     seen_from_right,
     textured_share,
 )
+from rollcli.stereo.along_road import FindRoad, Levelled, Search, match_for_road
 from rollcli.stereo.columns import with_believed_columns
 from rollcli.stereo.correction import CONTRADICTS
 from rollcli.stereo.first_look import FirstLook, first_look, look_for_range
@@ -27,7 +28,7 @@ from rollcli.stereo.misalignment import LEVEL, NOTHING_KNOWN, Misalignment
 from rollcli.stereo.misalignment_words import NOT_LEVELLED, NOT_TOLD_BY_ROWS, TOO_LITTLE
 from rollcli.stereo.options import StereoOptions as StereoOptions
 from rollcli.stereo.refinement import refined
-from rollcli.stereo.sgbm import ALL_ROWS, NARROWEST, match_rows, usable_range, without_lag
+from rollcli.stereo.sgbm import ALL_ROWS, NARROWEST, usable_range
 from rollcli.stereo.views import Map, Views, prepare_views
 
 # Shares of the textured blocks that tell
@@ -78,9 +79,6 @@ def _share(measured: Measured | None) -> float:
 _MATCHES = 4  # until a pair counts as one that cannot be levelled
 _ROUNDS = 8  # of measuring; on empty roads with much noise each takes away a fifth of what is left
 _LEFT_IN_ROWS = 0.3  # px, where not all rows are matched
-# Of the height. Fewer rows at a third of the size would not save what finding them takes, and more would be a
-# mistake: of 248 pairs the road's first row was at 0.49 at most
-_LEAST_ABOVE, _MOST_ABOVE = 0.1, 0.6
 # A scale that no rig in use has, in blocks that do not agree. Of 468 warped pairs 12 had both: three angles
 # of them were wrong by 0.3 degrees. Of the others two were wrong, by 0.11
 _UNUSUAL_SCALE = 0.003
@@ -104,15 +102,15 @@ class Wanted(NamedTuple):
     ----------
     rows : slice
         Rows that are used, of the size matched at; the others may hold no data.
-    first_row : callable or None
-        Finds the first row, counted from 0, that is wanted at full size, in a small map of the pair: float32,
-        shape (h, w), pixels with 0 for no data. What lies above it is matched at a third of the size.
+    road : callable or None
+        Finds the road's plane in a small map of the pair. The road is then matched along it, and what lies
+        beside and above it at a third of the size.
     whole : bool
         Whether a map with all rows at full size is wanted beside that, to be looked at.
     """
 
     rows: slice = ALL_ROWS
-    first_row: Callable[[Map], float] | None = None
+    road: FindRoad | None = None
     whole: bool = False
 
 
@@ -247,7 +245,7 @@ def match_pair(
         See `compute_disparity`.
     """
     views = prepare_views(left, right, options.downscale)
-    (height, width), first = views[0].shape, options.min_disparity
+    width, first = views[0].shape[1], options.min_disparity
     if usable_range(1, first, width, options.block_size) < NARROWEST:
         raise InputError(f"images {width} px wide are too narrow to match from disparity {first} on")
     small = SmallViews(views) if options.measures_alignment else None
@@ -257,28 +255,29 @@ def match_pair(
         count = (width // 8 if look.range is None else look.range) - first
     count = usable_range(count, first, width, options.block_size)
 
-    near = None if look.disparity is None else seen_from_right(look.disparity)
+    search = Search(first, count, options)
 
     @lru_cache(maxsize=1)
-    def levelled(lies: Misalignment) -> Views:
-        return views[0], level(views[1], lies, near)
+    def near() -> Map | None:
+        return None if look.disparity is None else seen_from_right(look.disparity)
 
-    def match(lies: Misalignment, rows: slice, above: int = 0) -> Map:
-        found = match_rows(levelled(lies), first, count, options, rows, above)
-        return without_lag(found, options.mode)
+    @lru_cache(maxsize=1)
+    def levelled(lies: Misalignment) -> Levelled:
+        return Levelled(views, lies, near)
 
-    above = _rows_above(look, wanted, height) if first >= 0 else 0
-    of_these = partial(match, above=above)
+    def match(lies: Misalignment, rows: slice) -> Map:
+        return match_for_road(levelled(lies), search, rows, wanted.road)
+
     given = None
     if small is None:
         corrected, given = options.given_alignment(width)
         measured, doubt = None, ""
-        matched = of_these(corrected, wanted.rows)
+        matched = match(corrected, wanted.rows)
         if options.checks_alignment:
             measured = SmallViews(views).measure(matched, corrected)
             doubt = "" if measured is None or _agrees(measured, corrected, views[0].shape) else CONTRADICTS
     else:
-        matched, corrected, measured, doubt = _match_levelled(of_these, wanted.rows, small, look, first < 0)
+        matched, corrected, measured, doubt = _match_levelled(match, wanted.rows, small, look, first < 0)
     support = NOTHING_KNOWN if measured is None or corrected == LEVEL else given or measured.support
     if support.error > _OPEN_COLUMNS and not doubt:
         doubt = NOT_TOLD_BY_ROWS
@@ -288,10 +287,8 @@ def match_pair(
 
     valid = cv2.countNonZero(matched)
     whole = None
-    start, stop, _ = wanted.rows.indices(height)
-    full = slice(max(start, above), stop)
-    if wanted.whole and full != slice(0, height):
-        whole = finished(_completed(matched, full, partial(match, corrected)))
+    if wanted.whole and wanted != _EVERYTHING._replace(whole=True):
+        whole = finished(match_for_road(levelled(corrected), search, ALL_ROWS, None))
     return StereoMatch(
         disparity=finished(matched),
         whole=whole,
@@ -308,23 +305,6 @@ def match_pair(
 def _agrees(measured: Measured, corrected: Misalignment, shape: tuple[int, ...]) -> bool:
     """Tell whether views that were levelled as a file says are level, but for what refinement takes away."""
     return is_level(measured.misalignment - corrected, measured.errors, shape, replace(_KEPT, sure=4.0))
-
-
-def _rows_above(look: FirstLook, wanted: Wanted, height: int) -> int:
-    """Return how many rows need not be matched at full size."""
-    if wanted.first_row is None or look.disparity is None:
-        return 0
-    share = wanted.first_row(look.disparity) / len(look.disparity)
-    return 0 if share < _LEAST_ABOVE else int(min(share, _MOST_ABOVE) * height)
-
-
-def _completed(disparity: Map, full: slice, match: Callable[[slice], Map]) -> Map:
-    """Return the map with the rows that are not at full size matched apart."""
-    whole = disparity.copy()
-    for rows in (slice(0, full.start), slice(full.stop, len(disparity))):
-        if rows.start < rows.stop:
-            whole[rows] = match(rows)[rows]
-    return whole
 
 
 def _look_as_given(views: Views, options: StereoOptions) -> FirstLook:

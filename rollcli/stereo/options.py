@@ -1,6 +1,6 @@
 """How pairs are matched; without OpenCV, so that a command line can be read without it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from rollcli.errors import UsageError
 from rollcli.stereo.correction import read_correction
@@ -82,6 +82,16 @@ class StereoOptions:
         lies, columns, of_width = read_correction(self.align)
         factor = width / of_width
         return lies.resized(factor), columns and columns.resized(factor)
+
+    @property
+    def is_default(self) -> bool:
+        """Whether the match itself is left to the program."""
+        given = replace(self, downscale=1.0, align="auto", vertical_offset=None)
+        return given == StereoOptions()
+
+    def for_smaller(self, factor: int) -> "StereoOptions":
+        """Return these options for views `factor` times smaller."""
+        return replace(self, speckle_size=self.speckle_size // factor**2)
 
     @property
     def checks_alignment(self) -> bool:

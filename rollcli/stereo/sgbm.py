@@ -1,6 +1,6 @@
 """OpenCV's semi-global block matching [Hirschmüller 2008], with one set of costs, and its lag on slopes."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import cv2
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rollcli.errors import InputError
 from rollcli.stereo.options import StereoOptions
-from rollcli.stereo.views import Map, Views, resampled, shrink_both
+from rollcli.stereo.views import Map, Views
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ _MODES = {
 }
 # Half of what OpenCV's own samples take: on a slanted road less smoothing is less bias (tests/benchmarks)
 _SMALL_STEP_COST, _LARGE_STEP_COST = 4, 16
-_SUBPIXELS = 16  # OpenCV stores sixteenths of a pixel
+SUBPIXELS = 16  # OpenCV stores sixteenths of a pixel
 _STEP = 16  # px: widths that OpenCV takes
 NARROWEST = _STEP
 ALL_ROWS = slice(None)
@@ -90,8 +90,7 @@ _HH_BYTES = 4  # for each pixel and disparity: OpenCV keeps two costs of 16 bits
 _MOST_HH_BYTES = 2**32  # 1920x1080 pixels over 256 disparities take less than half
 # Rows beside those that are needed: what lies there smooths what is needed. The first 16 rows then differ by
 # 0.001 px from a match of all rows, with 8 by 0.004, with none by 0.07
-_MARGIN = 16
-_SMALLER = 3  # times: what need not be matched at full size takes a 27th of the time
+MARGIN = 16
 
 
 def usable_range(count: int, first: int, width: int, block_size: int) -> int:
@@ -135,15 +134,13 @@ def match_views(views: Views, first: int, count: int, options: StereoOptions) ->
         mode=_MODES[options.mode],
     )
     # what has no match is (first - 1) * 16 to OpenCV, which is a disparity where first > 1
-    _, sixteenths = cv2.threshold(matcher.compute(*views), _SUBPIXELS * max(first, 0), 0, cv2.THRESH_TOZERO)
-    disparity = cv2.addWeighted(sixteenths, 1 / _SUBPIXELS, sixteenths, 0, 0, dtype=cv2.CV_32F)
+    _, sixteenths = cv2.threshold(matcher.compute(*views), SUBPIXELS * max(first, 0), 0, cv2.THRESH_TOZERO)
+    disparity = cv2.addWeighted(sixteenths, 1 / SUBPIXELS, sixteenths, 0, 0, dtype=cv2.CV_32F)
     return disparity.astype(np.float32, copy=False)
 
 
-def match_rows(
-    views: Views, first: int, count: int, options: StereoOptions, rows: slice = ALL_ROWS, above: int = 0
-) -> Map:
-    """Match only what some rows need, and of these the ones above a row at a third of the size.
+def match_rows(views: Views, first: int, count: int, options: StereoOptions, rows: slice = ALL_ROWS) -> Map:
+    """Match only what some rows need.
 
     Parameters
     ----------
@@ -151,29 +148,13 @@ def match_rows(
         See `match_views`.
     rows : slice
         Rows that are needed; elsewhere the map may hold no data.
-    above : int
-        The first row at full size. A third of the size takes a 27th of the time.
     """
     height, width = views[0].shape
     start, stop, _ = rows.indices(height)
-    top, bottom = max(0, min(max(start, above), stop) - _MARGIN), min(height, stop + _MARGIN)
+    top, bottom = max(0, start - MARGIN), min(height, stop + MARGIN)
     if (top, bottom) == (0, height):
         return match_views(views, first, count, options)
     disparity = np.zeros((height, width), np.float32)
     left, right = (view[top:bottom] for view in views)
     disparity[top:bottom] = match_views((left, right), first, count, options)
-    if start < top:
-        left, right = (view[start : top + _MARGIN] for view in views)
-        disparity[start:top] = _match_coarsely((left, right), first, count, options)[: top - start]
     return disparity
-
-
-def _match_coarsely(views: Views, first: int, count: int, options: StereoOptions) -> Map:
-    """Match at a third of the size; the map has the size of the views."""
-    small = shrink_both(views, _SMALLER)
-    first //= _SMALLER
-    count = usable_range(-(-count // _SMALLER), first, small[0].shape[1], options.block_size)
-    if count < NARROWEST:
-        return np.zeros(views[0].shape, np.float32)
-    patches = replace(options, speckle_size=options.speckle_size // _SMALLER**2)
-    return resampled(match_views(small, first, count, patches), views[0].shape)

@@ -112,26 +112,24 @@ def blocks_at(pixels: NDArray[_Number], places: NDArray[np.bool_]) -> NDArray[_N
 _SMOOTH = np.array([1, 6, 1], np.float32) / 8  # what `cv2.pyrUp` does at a view's own pixels
 
 
-def smoothed_between(view: NDArray[np.float32]) -> NDArray[np.float32]:
+def smoothed_between(view: NDArray[_Number]) -> NDArray[_Number]:
     """Return a view twice as large and a little smoother, for `grey_between`.
 
     Grey levels that are interpolated between pixels lie off by where between them: linearly by up to 0.08 px,
     by OpenCV's cubic by 0.05. Between these by 0.003, at a tenth of what Lanczos' eight pixels cost.
     """
-    return cv2.pyrUp(view).astype(np.float32, copy=False)
+    return cv2.pyrUp(view).astype(view.dtype, copy=False)
 
 
-def smoothed_at_pixels(view: NDArray[np.float32]) -> NDArray[np.float32]:
+def smoothed_at_pixels(view: NDArray[_Number]) -> NDArray[_Number]:
     """Return a view as smooth as `smoothed_between` makes it."""
-    return cv2.sepFilter2D(view, cv2.CV_32F, _SMOOTH, _SMOOTH).astype(np.float32, copy=False)
+    return cv2.sepFilter2D(view, -1, _SMOOTH, _SMOOTH).astype(view.dtype, copy=False)
 
 
-def grey_between(
-    twice: NDArray[np.float32], u: NDArray[np.float32], v: NDArray[np.float32]
-) -> NDArray[np.float32]:
+def grey_between(twice: NDArray[_Number], u: NDArray[np.float32], v: NDArray[np.float32]) -> NDArray[_Number]:
     """Return the grey levels at points (u, v) of a view that is `smoothed_between`; the border repeats."""
     grey = cv2.remap(twice, 2 * u, 2 * v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    return grey.astype(np.float32, copy=False)
+    return grey.astype(twice.dtype, copy=False)
 
 
 def _plain(image: NDArray[Any], brightest: int, downscale: float) -> View:

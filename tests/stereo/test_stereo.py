@@ -9,11 +9,11 @@ import pytest
 
 from rollcli.errors import InputError, UsageError
 from rollcli.estimator.estimate import estimate_roll
+from rollcli.estimator.road.find import road_plane
 from rollcli.files.formats import read_image
 from rollcli.files.inputs import pair_inputs
 from rollcli.simulate.build import render_frame
 from rollcli.simulate.spec import FrameSpec
-from rollcli.stereo import match as stereo
 from rollcli.stereo import sgbm
 from rollcli.stereo.match import StereoOptions, Wanted, compute_disparity, match_pair
 from rollcli.stereo.views import matched_shape
@@ -30,6 +30,10 @@ def pair_at(disparity, shape=(120, 400), seed=0):
     shifts = np.broadcast_to(np.rint(disparity).astype(int), shape[0])
     right = np.stack([row[columns + shift] for row, shift in zip(texture, shifts, strict=True)])
     return texture[:, columns], right
+
+
+def find_road(small):
+    return road_plane(small, None, math.radians(45), 0)
 
 
 @pytest.fixture(scope="module")
@@ -151,59 +155,10 @@ def test_rows_that_are_needed_are_matched_as_in_the_whole(street, lower):
     assert part.doubt == ""
 
 
-def in_row(row):
-    """Find the first row of a small map of 240 rows' views."""
-    return lambda small: row * len(small) / 240
-
-
-@pytest.mark.parametrize("lower", [0, 3])
-def test_below_the_first_row_a_pair_is_matched_as_in_the_whole(street, lower):
-    right = np.roll(street.right, lower, axis=0)
-    whole = match_pair(street.left, right, StereoOptions())
-    part = match_pair(street.left, right, StereoOptions(), Wanted(first_row=in_row(100)))
-
-    both = (whole.disparity[100:] > 0) & (part.disparity[100:] > 0)
-    assert both.sum() > 0.97 * (whole.disparity[100:] > 0).sum()
-    assert (np.abs(whole.disparity - part.disparity)[100:][both] < 0.1).mean() > 0.97
-    above = (whole.disparity[:80] > 0) & (part.disparity[:80] > 0)
-    assert above.mean() > 0.5 * (whole.disparity[:80] > 0).mean()
-    assert np.median(np.abs(whole.disparity - part.disparity)[:80][above]) < 0.5
-    assert part.corrected.offset == pytest.approx(lower, abs=0.15)
-    assert (part.doubt, part.whole) == ("", None)
-
-
-@pytest.mark.parametrize(
-    ("row", "above"), [(-5.0, 0), (0.0, 0), (23.9, 0), (24.0, 24), (80.4, 80), (144.0, 144), (200.0, 144)]
-)
-def test_as_many_rows_are_matched_small_as_are_worth_it_and_may_be_none_of_a_road(row, above, monkeypatch):
-    asked = []
-    match = stereo.match_rows
-    monkeypatch.setattr(stereo, "match_rows", lambda *of: asked.append(of[5]) or match(*of))
-    match_pair(*pair_at(20, shape=(240, 400)), StereoOptions(), Wanted(first_row=in_row(row)))
-    assert asked == [above]
-
-
-@pytest.mark.parametrize(
-    ("options", "above"),
-    [
-        ({"align": "off"}, 100),
-        ({"align": "off", "num_disparities": 48}, 0),  # no small map to look at
-        ({"vertical_offset": 0.5}, 100),
-        ({"min_disparity": -16}, 0),  # what is behind the horizon of a road is no road's
-    ],
-)
-def test_without_a_look_at_small_views_all_rows_are_matched_at_full_size(street, options, above, monkeypatch):
-    asked = []
-    match = stereo.match_rows
-    monkeypatch.setattr(stereo, "match_rows", lambda *of: asked.append(of[5]) or match(*of))
-    match_pair(street.left, street.right, StereoOptions(**options), Wanted(first_row=in_row(100)))
-    assert asked[0] == above
-
-
 @pytest.mark.parametrize("rows", [slice(None), slice(60, 180), slice(150, 190)])
 def test_the_whole_map_beside_it_has_every_row_at_full_size(street, rows):
     at_once = match_pair(street.left, street.right, StereoOptions()).disparity
-    wanted = Wanted(rows, in_row(100))
+    wanted = Wanted(rows, find_road)
     alone = match_pair(street.left, street.right, StereoOptions(), wanted)
     shown = match_pair(street.left, street.right, StereoOptions(), wanted._replace(whole=True))
 

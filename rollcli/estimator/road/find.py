@@ -25,10 +25,6 @@ from rollcli.estimator.tuning import TUNING, SearchTuning, Tuning
 HARDLY_A_PIXEL = "no road: hardly a pixel lies on the best plane that was found"
 _FITS = 2  # of each plane that is judged again
 
-# Rows of a map of about 16,000 pixels, above the horizon of the plane. In 224 pairs that was too low by 1.05
-# rows (95 %), and by more than two in four of them, against the horizon of the map at full size
-_SPARE = 2
-
 
 @dataclass(frozen=True)
 class Road:
@@ -236,14 +232,14 @@ def _rolls(planes: Singles) -> Singles:
     return np.arctan2(-planes[:, 1], planes[:, 2])
 
 
-def first_row_of_road(
+def road_plane(
     disparity: NDArray[Any],
     usable: NDArray[np.bool_] | None,
     max_roll: float,
     seed: int,
     tuning: Tuning = TUNING,
-) -> float:
-    """Return the first row that the road's plane can reach, counted from 0.
+) -> tuple[float, float, float] | None:
+    """Return the plane of the road in a small map.
 
     Parameters
     ----------
@@ -257,16 +253,15 @@ def first_row_of_road(
 
     Returns
     -------
-    float
-        A few rows above the plane's horizon, at the side of the map where that is higher; 0 where no road is
-        found.
+    tuple of float, or None
+        Disparity at pixel (0, 0), px, and what a pixel to the right and one further down add; None where no
+        road is found.
     """
     try:
         sample = take_sample(disparity, usable, tuning.sample)
         c0, c1, c2 = find_road(sample, max_roll, seed, tuning).plane.tolist()
     except EstimationError:
-        return 0.0
+        return None
     grid = sample.grid
-    side = (disparity.shape[1] - 1) / 2 / grid.scale
-    highest: float = -(c0 + abs(c1) * side) / c2
-    return max(0.0, grid.centre_v + highest * grid.scale - _SPARE)
+    across, down = c1 / grid.scale, c2 / grid.scale
+    return c0 - across * grid.centre_u - down * grid.centre_v, across, down

@@ -11,7 +11,7 @@ import pytest
 
 from rollcli.errors import EstimationError, UsageError
 from rollcli.estimator.estimate import estimate_roll
-from rollcli.estimator.road.find import first_row_of_road
+from rollcli.estimator.road.find import road_plane
 from rollcli.files.formats import read_image
 from rollcli.pictures.derotate import derotate
 from rollcli.simulate.build import render_frame, true_disparity
@@ -329,26 +329,24 @@ def plane(roll_deg, horizon, shape=(110, 146), slope=0.2):
 
 
 @pytest.mark.parametrize("roll_deg", [-30, -8, 0, 3, 20])
-@pytest.mark.parametrize("horizon", [30, 40, 52.5])
-def test_it_is_two_rows_above_the_horizon_where_that_is_highest(roll_deg, horizon):
-    expected = horizon - math.tan(math.radians(abs(roll_deg))) * 145 / 2 - 2
-    found = first_row_of_road(plane(roll_deg, horizon), None, MAX_ROLL, 0)
-    assert found == pytest.approx(max(0, expected), abs=0.3)
-
-
-def test_where_the_horizon_is_above_the_map_it_is_the_first_row():
-    assert first_row_of_road(plane(0, -20), None, MAX_ROLL, 0) == 0
+@pytest.mark.parametrize("horizon", [-20, 30, 40, 52.5])
+def test_the_plane_of_a_small_map_is_that_of_its_road(roll_deg, horizon):
+    at_origin, across, down = road_plane(plane(roll_deg, horizon), None, MAX_ROLL, 0)
+    roll = math.radians(roll_deg)
+    assert (across, down) == pytest.approx((-0.2 * math.sin(roll), 0.2 * math.cos(roll)), abs=0.003)
+    assert -(at_origin + across * 145 / 2) / down == pytest.approx(horizon, abs=0.3)
 
 
 @pytest.mark.parametrize("disparity", [np.zeros((110, 146)), np.full((110, 146), 9.0), plane(0, 40)[::-1]])
-def test_where_no_road_is_found_it_is_the_first_row(disparity):
-    assert first_row_of_road(disparity.astype(np.float32), None, MAX_ROLL, 0) == 0
+def test_where_no_road_is_found_there_is_no_plane(disparity):
+    assert road_plane(disparity.astype(np.float32), None, MAX_ROLL, 0) is None
 
 
-def test_only_usable_pixels_tell():
+def test_only_usable_pixels_tell_the_plane():
     low, high = plane(0, 60), plane(0, 30)
     half = np.arange(146) < 73
     both = np.where(half, low, high)
     left = np.broadcast_to(half, both.shape)
-    assert first_row_of_road(both, left, MAX_ROLL, 0) == pytest.approx(58, abs=0.3)
-    assert first_row_of_road(both, ~left, MAX_ROLL, 0) == pytest.approx(28, abs=0.3)
+    for usable, horizon in ((left, 60), (~left, 30)):
+        at_origin, _, down = road_plane(both, usable, MAX_ROLL, 0)
+        assert -at_origin / down == pytest.approx(horizon, abs=0.3)

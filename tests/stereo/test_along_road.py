@@ -1,0 +1,179 @@
+"""Where only the angle is wanted, a pair's road is matched along its plane: as right as the whole match."""
+
+import math
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from rollcli.estimator.estimate import estimate_roll
+from rollcli.estimator.road.find import road_plane
+from rollcli.files.formats import read_image
+from rollcli.simulate.draw import draw_specs
+from rollcli.simulate.render import render_frame, true_disparity
+from rollcli.simulate.spec import FrameSpec
+from rollcli.stereo.match import StereoOptions, Wanted, match_pair
+
+LIDAR = Path(__file__).parents[2].parent / "shared" / "lidar"
+SPEC = FrameSpec(scene="street", roll=math.radians(4), size=(640, 480), seed=3)
+
+
+def find_road(small):
+    return road_plane(small, None, math.radians(45), 0)
+
+
+ROAD = Wanted(road=find_road)
+
+
+@pytest.fixture(scope="module")
+def street():
+    return render_frame(SPEC)
+
+
+@pytest.fixture(scope="module")
+def whole(street):
+    return match_pair(street.left, street.right, StereoOptions())
+
+
+@pytest.fixture(scope="module")
+def road(street):
+    return match_pair(street.left, street.right, StereoOptions(), ROAD)
+
+
+def test_the_road_is_as_near_to_the_truth_as_in_the_whole_map(whole, road):
+    truth, _ = true_disparity(SPEC)
+    below = np.s_[280:]
+    both = (whole.disparity[below] > 0) & (road.disparity[below] > 0) & (truth[below] > 0)
+    assert both.mean() > 0.6
+    off, off_whole = (np.abs(each.disparity - truth)[below][both] for each in (road, whole))
+    assert np.median(off) < 0.1
+    assert np.median(off) <= np.median(off_whole)
+    assert (off < 1).mean() >= (off_whole < 1).mean() - 0.01
+
+
+def test_what_lies_above_and_beside_the_road_is_known_at_a_third_of_the_size(whole, road):
+    above = np.s_[20:140]
+    both = (whole.disparity[above] > 0) & (road.disparity[above] > 0)
+    assert both.mean() > 0.5 * (whole.disparity[above] > 0).mean()
+    assert np.median(np.abs(whole.disparity - road.disparity)[above][both]) < 0.5
+
+
+def angles(left, right):
+    """Both estimates: along the road, and from the whole match."""
+    for wanted in (ROAD, Wanted()):
+        match = match_pair(left, right, StereoOptions(), wanted)
+        yield estimate_roll(match.disparity, slope_error=match.slope_error)
+
+
+def assert_agree(pairs):
+    both = [tuple(angles(left, right)) for left, right in pairs]
+    apart = np.array([abs(along.theta - whole.theta) for along, whole in both])
+    reach = np.array([math.hypot(along.ci95, whole.ci95) for along, whole in both])
+    assert np.median(apart) <= np.median(reach) / 2
+    assert (apart <= reach).all()
+
+
+def test_rendered_roads_get_the_angle_of_the_whole_match():
+    span = math.radians(10)
+    specs = draw_specs(6, roll=(-span, span), size=(640, 480), seed=17, colour=False)
+    frames = [render_frame(spec) for spec in specs]
+    assert_agree([(frame.left, frame.right) for frame in frames])
+
+
+@pytest.mark.skipif(not LIDAR.is_dir(), reason=f"{LIDAR} is not there")
+def test_real_roads_get_the_angle_of_the_whole_match():
+    named = sorted((LIDAR / "left").iterdir())[::6]
+    assert_agree([(read_image(str(left)), read_image(str(LIDAR / "right" / left.name))) for left in named])
+
+
+@pytest.mark.parametrize(("lower", "clockwise_deg"), [(3.0, 0.0), (0.0, 0.4), (-1.5, -0.3)])
+def test_a_right_view_that_is_out_of_place_is_levelled_on_the_way(street, road, lower, clockwise_deg):
+    height, width = street.right.shape[:2]
+    matrix = cv2.getRotationMatrix2D(((width - 1) / 2, (height - 1) / 2), -clockwise_deg, 1)
+    matrix[1, 2] += lower
+    how = {"flags": cv2.INTER_LANCZOS4, "borderMode": cv2.BORDER_REFLECT}
+    moved = cv2.warpAffine(street.right, matrix, (width, height), **how)
+
+    found = match_pair(street.left, moved, StereoOptions(), ROAD)
+
+    assert found.corrected.offset == pytest.approx(lower, abs=0.15)
+    assert found.corrected.rotation_deg == pytest.approx(clockwise_deg, abs=0.03)
+    both = (found.disparity > 0) & (road.disparity > 0)
+    assert both.sum() > 0.9 * (road.disparity > 0).sum()
+    assert np.median(np.abs(found.disparity - road.disparity)[both]) < 0.1
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        (60.0, 0.0, 0.01),  # nearer than anything
+        (-20.0, 0.2, 0.02),  # a wall that cuts through the scene
+        (0.0, 0.0, 0.3),  # too steep
+    ],
+)
+def test_along_a_plane_that_is_no_road_nothing_is_matched(street, whole, wrong):
+    found = match_pair(street.left, street.right, StereoOptions(), Wanted(road=lambda small: wrong))
+    below = np.s_[300:]
+    both = (found.disparity[below] > 0) & (whole.disparity[below] > 0)
+    assert both.sum() > 0.98 * (whole.disparity[below] > 0).sum()
+    assert (np.abs(found.disparity - whole.disparity)[below][both] < 0.1).mean() > 0.98
+
+
+def test_without_a_road_all_is_matched_as_a_whole(street, whole):
+    found = match_pair(street.left, street.right, StereoOptions(), Wanted(road=lambda small: None))
+    np.testing.assert_array_equal(found.disparity, whole.disparity)
+
+
+@pytest.mark.parametrize(
+    "given",
+    [{"mode": "sgbm"}, {"num_disparities": 96}, {"block_size": 7}, {"uniqueness": 5}, {"speckle_size": 50}],
+)
+def test_who_sets_how_to_match_gets_that_match_of_the_road(street, given):
+    options = StereoOptions(**given)
+    found, whole = (match_pair(street.left, street.right, options, wanted) for wanted in (ROAD, Wanted()))
+    below = np.s_[300:]
+    assert (np.abs(found.disparity - whole.disparity)[below] < 0.1).mean() > 0.98
+
+
+@pytest.mark.parametrize("given", [{"align": "off"}, {"vertical_offset": 0.0}])
+def test_a_given_alignment_changes_no_road_of_level_views(street, road, given):
+    found = match_pair(street.left, street.right, StereoOptions(**given), ROAD)
+    np.testing.assert_array_equal(found.disparity, road.disparity)
+
+
+def test_behind_the_horizon_all_is_matched_as_a_whole(street):
+    options = StereoOptions(min_disparity=-16)
+    found, whole = (match_pair(street.left, street.right, options, wanted) for wanted in (ROAD, Wanted()))
+    np.testing.assert_array_equal(found.disparity, whole.disparity)
+
+
+def test_rows_that_are_not_needed_hold_no_data(street, road):
+    found = match_pair(street.left, street.right, StereoOptions(), ROAD._replace(rows=slice(300, 420)))
+    assert not found.disparity[:300].any()
+    assert not found.disparity[420:].any()
+    both = (found.disparity > 0) & (road.disparity > 0)
+    assert both.sum() > 0.9 * (road.disparity[300:420] > 0).sum()
+    assert np.median(np.abs(found.disparity - road.disparity)[both]) < 0.05
+
+
+def test_a_wide_view_is_matched_over_a_wider_range():
+    """Its road bends by more pixels: 9 px at its middle are found at 1,920 px, and not at a third of that."""
+    height, width = 400, 1920
+    rng = np.random.default_rng(2)
+    texture = rng.integers(0, 256, (height, width + 400), dtype=np.uint8)
+    texture = cv2.GaussianBlur(texture, (0, 0), 1.2)
+    v = np.arange(height, dtype=np.float32)
+    truth = 20 + 0.3 * v + 9 * np.sin(np.pi * v / height)
+    u = np.arange(width, dtype=np.float32)
+    right = cv2.remap(
+        texture, u + truth[:, None], np.broadcast_to(v[:, None], (height, width)), cv2.INTER_LANCZOS4
+    )
+    plane = (20 / 3, 0.0, 0.3)
+    options = StereoOptions(align="off")
+
+    found = match_pair(texture[:, :width], right, options, Wanted(road=lambda small: plane)).disparity
+
+    bent = truth - 20 - 0.3 * v > 7
+    off = np.abs(found - truth[:, None])[bent]
+    assert (off < 0.1).mean() > 0.7
