@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from rollcli.rig.calibration import Calibration
-from rollcli.run import calibration as of_frames
 from rollcli.simulate.dataset import calibration
 from rollcli.simulate.draw import draw_specs
 from rollcli.simulate.render import render_frame
@@ -84,17 +83,6 @@ def test_numbers_on_the_command_line_are_a_calibration(maps):
     assert_posed(rows_of(rollcli("estimate", "maps", *numbers, "--baseline", "0.5", cwd=maps).out))
     without = rows_of(rollcli("estimate", "maps", *numbers, cwd=maps).out)
     assert all(row["pitch_deg"] and not row["height_m"] for row in without)
-
-
-def test_a_calibration_of_many_frames_is_parsed_once(maps, monkeypatch):
-    (maps / "calib").mkdir()
-    (maps / "calib" / "drive.txt").write_text(samples.kitti_benchmark(RIG))
-    for number, old in enumerate(sorted((maps / "maps").iterdir())):
-        old.rename(maps / "maps" / f"drive_{number}.png")
-    parsed, parse = [], of_frames.parse_calibration
-    monkeypatch.setattr(of_frames, "parse_calibration", lambda *of: parsed.append(1) or parse(*of))
-    assert rollcli("estimate", "maps", "--calib", "calib", cwd=maps).status == 0
-    assert len(parsed) == 1
 
 
 def test_a_folder_has_a_calibration_for_each_stem(maps):

@@ -1,7 +1,6 @@
 """The interval holds the truth as often as it says, and the jackknife is that of refitting."""
 
 import math
-from statistics import NormalDist
 
 import numpy as np
 import pytest
@@ -140,19 +139,6 @@ def test_groups_widen_it_as_students_t_does(freedom):
     inside = np.sum(density[1:] + density[:-1]) / 2 * t[1]
     assert inside == pytest.approx(0.475, abs=2e-5)
     assert columns / 2 == pytest.approx(bands / 0.005)
-
-
-def test_between_whole_degrees_of_freedom_t_is_interpolated_and_many_are_the_most_that_are_known():
-    spread = {
-        freedom: knife(bands=(1,), freedom=(freedom, 5)).spreads()[0] for freedom in (3, 3.5, 4, 12, 40)
-    }
-    assert spread[3.5] == pytest.approx((spread[3] + spread[4]) / 2)
-    assert spread[40] == spread[12]
-
-
-def test_the_textbooks_part_is_that_of_a_normal_distribution():
-    *_, white = knife(white=0.25).spreads()
-    assert white == pytest.approx(NormalDist().inv_cdf(0.975) * 0.5, rel=1e-4)
 
 
 def test_its_parts_add_as_independent_errors_do():

@@ -1,7 +1,6 @@
 """The jackknife is that of weighted least squares, solved group by group and part by part."""
 
 import dataclasses
-import itertools
 import math
 from typing import NamedTuple
 
@@ -114,44 +113,6 @@ def test_the_textbooks_covariance_is_that_of_as_many_pixels_as_could_be_independ
     white = jackknife(problem.surface, theta, TUNING.interval).white
     errors = np.sqrt(expected.diagonal()[:4])
     assert (np.abs(white - expected[:4, :4]) <= SINGLE * np.outer(errors, errors)).all()
-
-
-def test_pixels_without_any_error_have_no_textbook_error():
-    found = [
-        jackknife(problem.surface, theta, TUNING.interval).white
-        for problem, theta in (fitted(noise=0.0), fitted(noise=0.3))
-    ]
-    exact, noisy = (np.sqrt(each.diagonal()) for each in found)
-    assert (exact < 1e-3 * noisy).all()  # single precision leaves 1e-5 px of disparities of 100
-
-
-@pytest.mark.parametrize("case", CASES)
-@pytest.mark.parametrize("uneven", [0.0, 0.02])
-def test_unevenness_is_what_patches_are_off_the_road_by_beyond_their_noise(case, uneven):
-    problem, theta = fitted(**case)
-    surface = problem.surface
-    surface = dataclasses.replace(surface, d=surface.d * (1 + uneven * np.sin(20 * surface.x) ** 3))
-    road = RoadModel(theta, surface.model.alpha)
-    across, along = road.across(surface.x, surface.y), road.along(surface.x, surface.y)
-    plain = road.disparity_along(along)
-    height, leverage = surface.d / plain - 1, surface.weights * problem.design[:, 3] ** 2
-    quarters, patches = (
-        sum(
-            (leverage[inside] @ height[inside]) ** 2 / leverage[inside].sum()
-            for band, column in itertools.product(range(count), range(count))
-            if (inside := (bands == band) & (columns == column)).any()
-        )
-        for count, bands, columns in (
-            (each, equal_shares(along, np.ones_like(along), each), equal_shares(across, leverage, each))
-            for each in (12, 6)
-        )
-    )
-    square = (TUNING.interval.levelled * patches - quarters) / (TUNING.interval.levelled - 1)
-    grid = surface.grid
-    extent = 2 * (grid.centre_u * math.cos(theta) + grid.centre_v * abs(math.sin(theta))) / grid.scale
-    view = extent * surface.model.alpha[1] / plain.max()  # camera heights
-    found = jackknife(surface, theta, TUNING.interval).uneven
-    assert found == pytest.approx(math.sqrt(max(0.0, square) / leverage.sum()) / view, rel=1e-3, abs=1e-6)
 
 
 def test_the_unevenness_of_waves_is_theirs_and_that_of_noise_is_none():

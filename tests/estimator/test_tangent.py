@@ -34,24 +34,6 @@ def test_errors_have_the_covariance_that_those_of_the_parabola_imply(size):
     np.testing.assert_allclose(tangent.changes.T @ tangent.changes, expected, rtol=1e-9)
 
 
-def test_a_textbook_that_knows_some_parameter_exactly_adds_no_error_to_it():
-    white = np.diag([0.04, 0.01, 0.0, 0.0])  # of a line: there is no a2, and here no roll to err
-    nothing = np.zeros((2, 4))
-    tangent = touch((30.0, 0.3, 0.0), THETA, GRID, None, knife(nothing, nothing, white))
-    assert (tangent.changes[:, 2] == 0).all()
-    assert np.square(tangent.changes[:, 0]).sum() == pytest.approx(1.96**2 * 0.04)
-
-
-def test_without_pixels_it_touches_at_the_centre_of_the_map():
-    parabola = np.polynomial.Polynomial((30.0, 3.0, 0.05))
-    tangent = touch(tuple(parabola.coef), THETA, GRID, None, None)
-    row = 187 * math.cos(THETA) - 620.5 * math.sin(THETA)
-    assert tangent.row == pytest.approx(row)
-    assert tangent.disparity == pytest.approx(parabola(row), rel=1e-12)
-    assert tangent.slope == pytest.approx(parabola.deriv()(row), rel=1e-12)
-    assert tangent.changes is None
-
-
 def test_a_slope_along_the_rows_turns_a_road_by_its_part_across_and_a_constant_one_not_at_all():
     assert touch((30.0, 0.0, 0.0), THETA, GRID, None, None).turned_by(1e-3) == 0
     slope, theta = 0.3, 0.2
@@ -59,10 +41,6 @@ def test_a_slope_along_the_rows_turns_a_road_by_its_part_across_and_a_constant_o
     turned = [math.atan2(-(rolled[0] + change), rolled[1]) for change in (1e-6, -1e-6)]
     tangent = touch((30.0, slope, 0.0), theta, GRID, None, None)
     assert tangent.turned_by(1e-6) == pytest.approx(abs(turned[0] - turned[1]) / 2, rel=1e-6)
-
-
-def test_what_it_shows_has_no_array_in_it():
-    assert "changes" not in repr(touch((30.0, 0.3, 0.0), THETA, GRID, None, None))
 
 
 def touched(disparity, alpha=None):

@@ -14,7 +14,7 @@ from rollcli.files.inputs import pair_inputs
 from rollcli.simulate.draw import draw_specs
 from rollcli.simulate.render import render_frame
 from rollcli.simulate.spec import FrameSpec
-from rollcli.stereo.alignment import Approach, level
+from rollcli.stereo.alignment import level
 from rollcli.stereo.match import StereoOptions, match_pair
 from rollcli.stereo.misalignment import LEVEL, Misalignment
 
@@ -253,24 +253,10 @@ def test_levelling_is_the_inverse_of_what_the_camera_did():
     assert np.abs(again[inside].astype(int) - view[inside]).max() <= 2
 
 
-def test_what_a_map_hides_is_found_from_two_measurements():
-    """A rig 2 px low, of which each map hides two thirds."""
-    approach, at = Approach((200, 300)), LEVEL
-    for _ in range(3):
-        at = approach.next(at, at + (Misalignment(offset=2) - at).times(1 / 3))
-
-    assert at.offset == pytest.approx(2)
-
-
 @pytest.mark.parametrize("offset", [-101, 100.5, math.nan])
 def test_an_offset_that_cannot_be_is_refused(offset):
     with pytest.raises(UsageError, match="vertical-offset"):
         StereoOptions(vertical_offset=offset)
-
-
-def test_a_way_to_align_that_is_not_there_is_refused():
-    with pytest.raises(UsageError, match="align"):
-        StereoOptions(align="on")
 
 
 @pytest.mark.skipif(not (SHARED / "streets").is_dir(), reason="no real street pairs at ../shared/streets")

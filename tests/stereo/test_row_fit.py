@@ -48,17 +48,6 @@ def test_the_errors_of_a_fit_are_whites_for_weighted_least_squares():
     assert found.shifts(160, 300) == pytest.approx(Misalignment(*best).shifts(160, 300), abs=5e-3)
 
 
-@pytest.mark.parametrize("count", [1, 2, 3, 4, 7, 10])
-def test_the_median_is_numpys(count):
-    values = np.random.default_rng(count).normal(size=count)
-    assert row_fit._median(values) == pytest.approx(np.median(values))
-
-
-def test_far_blocks_count_a_quarter_and_less():
-    off = np.array([0, 1.5, -1.5, 15]) * 0.4
-    np.testing.assert_allclose(row_fit._believed(off, 0.4), [1, 0.25, 0.25, 1 / 101**2])
-
-
 def blocks_of(rng, field, *, below_horizon=False, noise=0.1, count=1500):
     """Blocks of a street: a road, and walls of any distance to both sides."""
     x, y = rng.uniform(-600, 600, count), rng.uniform(-20 if below_horizon else -180, 180, count)

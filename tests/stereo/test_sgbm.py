@@ -5,9 +5,8 @@ import numpy as np
 import pytest
 
 from rollcli.errors import UsageError
-from rollcli.stereo import sgbm
 from rollcli.stereo.options import StereoOptions
-from rollcli.stereo.sgbm import match_rows, match_views, usable_range
+from rollcli.stereo.sgbm import match_rows, match_views
 from rollcli.stereo.views import resampled
 
 
@@ -22,28 +21,6 @@ def views():
     right = np.clip(right + rng.normal(0, 6, right.shape), 0, 255).astype(np.uint8)
     right[30:50, 100:160] = 128
     return np.ascontiguousarray(left), right
-
-
-@pytest.mark.parametrize(
-    ("count", "first", "width", "block", "usable"),
-    [
-        (1, 0, 400, 5, 16),
-        (0, 0, 400, 5, 16),
-        (-7, 0, 400, 5, 16),
-        (16, 0, 400, 5, 16),
-        (17, 0, 400, 5, 32),
-        (1000, 0, 400, 5, 384),
-        (1000, 0, 405, 5, 400),
-        (1000, 0, 404, 5, 384),
-        (1000, 100, 405, 5, 288),
-        (1000, -100, 405, 5, 288),
-        (1000, 0, 405, 7, 384),
-        (64, 0, 20, 5, 0),
-        (64, 0, 21, 5, 16),
-    ],
-)
-def test_ranges_are_multiples_of_16_that_leave_columns_to_match(count, first, width, block, usable):
-    assert usable_range(count, first, width, block) == usable
 
 
 @pytest.mark.parametrize("mode", ["3way", "sgbm", "hh"])
@@ -118,14 +95,6 @@ def test_coarse_rows_show_what_fine_ones_do(views):
     assert np.median(np.abs(fine - coarse)[:100][both]) < 0.5
 
 
-def test_the_first_disparity_and_the_range_are_those_of_small_views(views, monkeypatch):
-    asked = []
-    match = sgbm.match_views
-    monkeypatch.setattr(sgbm, "match_views", lambda *of: asked.append(of[1:3]) or match(*of))
-    match_rows(views, 8, 64, StereoOptions(), above=100)
-    assert asked == [(8, 64), (2, 32)]
-
-
 def test_rows_above_those_that_are_needed_hold_no_data(views):
     options = StereoOptions()
 
@@ -172,13 +141,6 @@ def test_each_option_has_its_limits(name, low, high):
             UsageError, match=f"{name.replace('_', '-')} {value}: must be from {low} to {high}"
         ):
             StereoOptions(**{name: value})
-
-
-def test_views_are_measured_unless_the_user_says_how_they_lie():
-    assert StereoOptions().measures_alignment
-    assert not StereoOptions(align="off").measures_alignment
-    assert not StereoOptions(vertical_offset=0).measures_alignment
-    assert not StereoOptions(align="off", vertical_offset=1).measures_alignment
 
 
 @pytest.mark.parametrize("mode", ["3way", "sgbm", "hh"])

@@ -47,12 +47,6 @@ def test_pixels_beside_holes_are_raised_like_those_around(farthest):
     assert added == pytest.approx(LAGS["3way"].most * 0.3 / 0.52, abs=1e-3)
 
 
-def test_ceilings_which_shrink_downward_stay_as_they_are():
-    v = np.mgrid[:120, :160][0].astype(np.float32)
-    ceiling = 60 - 0.3 * v
-    assert np.array_equal(without_lag(ceiling, "3way"), ceiling)
-
-
 def test_a_small_map_stays_as_it_is():
     small = np.full((8, 8), 3, np.float32)
     assert without_lag(small, StereoOptions().mode) is small

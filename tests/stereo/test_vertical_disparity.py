@@ -1,13 +1,10 @@
 """Vertical disparities of synthetic views, against what these were warped by and plain least squares."""
 
-import math
-
 import cv2
 import numpy as np
 import pytest
 
-from rollcli.stereo import alignment as vertical
-from rollcli.stereo.alignment import Measured, Texture, measure_misalignment, textured_share
+from rollcli.stereo.alignment import Texture, measure_misalignment, textured_share
 from rollcli.stereo.misalignment import LEVEL, Misalignment
 
 SHAPE = (160, 240)
@@ -153,37 +150,6 @@ def test_a_block_needs_seven_tenths_of_its_disparities(pixels, tells):
         assert found.misalignment.offset == pytest.approx(0.3, abs=0.02)
 
 
-@pytest.mark.parametrize(
-    ("disparity", "first"), [(14.0, 2), (17.0, 3), (21.5, 3), (22.5, 3), (23.5, 3), (25.5, 4)]
-)  # the first block with 0.7 of its pixels more than a pixel inside of the right view
-def test_blocks_that_leave_the_right_view_do_not_count(disparity, first):
-    left = texture_of()
-    blocks = vertical._Blocks(Texture.of((left, left)), wall(disparity))
-
-    seen = blocks.vertical(LEVEL)
-
-    inside = np.arange(8 * first, 8 * first + 8) - disparity > 1
-    assert inside.mean() > 0.7
-    assert np.mean(np.arange(8 * first - 8, 8 * first) - disparity > 1) <= 0.7
-    middle = np.arange(8 * first, 8 * first + 8)[inside].mean() - disparity - (SHAPE[1] - 1) / 2
-    assert seen.x.min() == pytest.approx(middle, abs=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("offset", "rows"),
-    [(0.0, (2, 157)), (0.5, (1, 157)), (-0.5, (2, 158)), (2.0, (0, 155)), (-2.0, (4, 159))],
-)
-def test_rows_that_leave_the_right_view_do_not_count(offset, rows):
-    left = texture_of()
-    blocks = vertical._Blocks(Texture.of((left, left)), wall(20.0))
-
-    seen = blocks.vertical(Misalignment(offset))
-
-    inner = [[v for v in range(8 * k, 8 * k + 8) if rows[0] <= v <= rows[1]] for k in range(SHAPE[0] // 8)]
-    counted = [np.mean(each) - (SHAPE[0] - 1) / 2 for each in inner if len(each) > 0.7 * 8]
-    assert (seen.y.min(), seen.y.max()) == pytest.approx((counted[0], counted[-1]), abs=1e-3)
-
-
 @pytest.mark.parametrize("shape", [(7, 100), (100, 7)])
 def test_views_smaller_than_a_block_tell_nothing(shape):
     view = texture_of(shape)
@@ -208,53 +174,6 @@ def test_straight_edges_tell_only_where_they_lie_along_the_rows(slope, share):
     v, u = np.mgrid[:800, :800]
     edges = 127 + 100 * np.sin((v + slope * u) / 2.5)
     assert textured_share(edges.astype(np.uint8)) == pytest.approx(share, abs=0.05)
-
-
-def test_gradients_are_those_of_a_slope():
-    v, u = np.mgrid[:24, :32].astype(np.float32)
-    across, down = vertical._gradients(3 * u - 5 * v + 7)
-    assert across[1:-1, 1:-1] == pytest.approx(3)
-    assert down[1:-1, 1:-1] == pytest.approx(-5)
-
-
-def test_the_shift_of_a_block_is_that_of_least_squares():
-    """Grey differences = a across + b down + brightness, with a held back by a little: b is the shift."""
-    rng = np.random.default_rng(3)
-    across, down, off = (rng.normal(0, size, (50, 64)).astype(np.float32) for size in (3, 5, 4))
-    down += 0.5 * across + 2
-    across += 1
-    seen = (rng.random((50, 64)) < 0.9).astype(np.float32)
-    x, y = (rng.uniform(-90, 90, (50, 64)).astype(np.float32) for _ in range(2))
-
-    shares = vertical._Shares.of(across, down, seen, x, y)
-
-    for block in range(50):
-        known = seen[block] > 0
-        rows = np.stack([across[block], down[block], np.ones(64)], axis=1)[known].astype(np.float64)
-        held = np.vstack([rows, [math.sqrt(0.2 * known.sum()), 0, 0]])
-        values = np.linalg.lstsq(held, np.append(off[block][known], 0), rcond=None)[0]
-        assert (shares.share[block] @ off[block]) == pytest.approx(values[1], abs=1e-4)
-        weight = 1 / np.linalg.inv(held.T @ held)[1, 1] / known.sum()
-        assert shares.weight[block] == pytest.approx(min(weight, 50), rel=1e-3)
-        assert shares.x[block] == pytest.approx(x[block][known].mean(), abs=1e-3)
-        assert shares.y[block] == pytest.approx(y[block][known].mean(), abs=1e-3)
-
-
-@pytest.mark.parametrize("pixels", [45, 64])
-@pytest.mark.parametrize(("variance", "tells"), [(1.3, False), (2.02, True)])
-def test_no_block_that_could_tell_is_left_out_before_it_is_looked_at(pixels, variance, tells):
-    """Those of its pixels that have a disparity vary by so much, the others not at all."""
-    down = np.full((8, 8), 3, np.float32)
-    wave = np.resize([1.0, -1.0], pixels)
-    down.flat[:pixels] += wave * math.sqrt(variance) / wave.std() - wave.mean()
-    assert down.flat[:pixels].var() == pytest.approx(variance, rel=1e-4)
-    assert vertical._may_tell(down).item() == tells
-
-
-def test_a_measurement_of_larger_views_is_as_much_larger():
-    small = Measured(Misalignment(1, 0.2, 0.3, 0.4), Misalignment(0.1, 0.02, 0.03, 0.04), 0.7, 0.05)
-    large = Measured(Misalignment(2, 0.2, 0.3, 0.2), Misalignment(0.2, 0.02, 0.03, 0.02), 0.7, 0.1)
-    assert small.resized(2) == large
 
 
 def test_a_scale_between_pixels_is_measured_without_a_pull_to_whole_ones():

@@ -212,7 +212,7 @@ def test_only_pixels_of_the_mask_are_used():
     assert not (estimate.road_mask & ~road).any()
 
 
-@pytest.mark.parametrize("max_roll_deg", [0, -5, 89.5, float("nan")])
+@pytest.mark.parametrize("max_roll_deg", [0, -5, 89.001, float("nan")])
 def test_a_bound_that_cannot_be_is_refused(max_roll_deg):
     with pytest.raises(UsageError, match="largest roll"):
         estimate_roll(np.ones((50, 50)), max_roll=math.radians(max_roll_deg))
@@ -227,12 +227,19 @@ def test_a_bound_that_cannot_be_is_refused(max_roll_deg):
         ({"lambda0": 0.0}, "lambda0 0.0: give a positive number, or auto"),
         ({"lambda0": math.inf}, "lambda0 inf: give a positive number, or auto"),
         ({"tolerance": 0.0}, "a tolerance of 0 degrees: give a positive angle"),
+        ({"max_interval": 0.0}, "a widest interval of 0 degrees: give a positive angle"),
         ({"max_interval": math.nan}, "a widest interval of nan degrees: give a positive angle"),
     ],
 )
 def test_what_cannot_be_asked_is_refused(asked, words):
     with pytest.raises(UsageError, match=f"^{re.escape(words)}"):
         estimate_roll(np.ones((50, 50)), **asked)
+
+
+def test_what_is_hardly_within_its_range_is_taken():
+    disparity, _ = true_disparity(FrameSpec(scene="bare", roll=0.1, pitch=0.05, seed=3, size=(160, 120)))
+
+    estimate_roll(disparity, max_roll=math.radians(89), max_interval=1e-9, lambda0=1e-9, tolerance=1e-300)
 
 
 @pytest.mark.parametrize("disparity", [np.ones(50), np.ones((5, 5, 3)), np.full((50, 50), "1")])

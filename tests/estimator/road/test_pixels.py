@@ -6,10 +6,7 @@ import numpy as np
 import pytest
 
 from rollcli.estimator.estimate import estimate_roll
-from rollcli.estimator.road.sample import take_sample
-from rollcli.estimator.road.surface import whole_surface
-from rollcli.estimator.tuning import TUNING
-from tests.estimator.synthetic_maps import bent_road, energy_of, flat_road
+from tests.estimator.synthetic_maps import bent_road, flat_road
 
 
 def test_without_road_finding_every_valid_pixel_is_road():
@@ -47,14 +44,3 @@ def test_a_road_without_road_finding_is_beyond_doubt(model):
 
     assert (found.status, found.message) == ("ok", "")
     assert found.road_fraction == 1
-
-
-@pytest.mark.parametrize("parabolic", [True, False])
-def test_where_every_pixel_is_road_the_surface_is_their_least_squares_fit(parabolic):
-    disparity = bent_road(7, bend=0.002 * parabolic)
-    sample, energy = take_sample(disparity, None, TUNING.sample), energy_of(disparity, parabolic=parabolic)
-    found = whole_surface(sample, energy)
-
-    np.testing.assert_allclose(found.model.disparity(found.x, found.y), found.d, rtol=1e-5)
-    assert (found.weights == 1).all()
-    assert (found.moved, found.share) == (0, 1)
