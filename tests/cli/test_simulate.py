@@ -98,17 +98,6 @@ def test_what_cannot_be_is_one_line_and_status_2_and_nothing_is_written(
     assert not (tmp_path / "rig").exists()
 
 
-def test_a_folder_with_files_in_it_needs_overwrite(tmp_path):
-    (tmp_path / "rig").mkdir()
-    (tmp_path / "rig/notes.txt").write_text("mine")
-    refused = rollcli("simulate", "rig", *TINY, cwd=tmp_path)
-    assert (refused.status, refused.err.count("\n")) == (2, 1)
-    assert "--overwrite" in refused.err
-    done = rollcli("simulate", "rig", *TINY, "--overwrite", "-j1", cwd=tmp_path)
-    assert done.status == 0
-    assert (tmp_path / "rig/notes.txt").read_text() == "mine"
-
-
 def test_a_folder_that_cannot_be_written_is_status_1(tmp_path):
     (tmp_path / "file").write_text("")
     done = rollcli("simulate", "file/rig", *TINY, cwd=tmp_path)
@@ -150,10 +139,3 @@ def test_resume_continues_an_interrupted_simulation_and_says_what_it_kept(tmp_pa
     assert (tmp_path / "rig/right/frame_0002.png").exists()
     again = rollcli("simulate", "rig", *TINY, "--resume", "--dry-run", cwd=tmp_path)
     assert "frame_0001" not in again.out
-
-
-def test_other_options_are_not_resumed(tmp_path):
-    assert rollcli("simulate", "rig", *TINY, "-j1", cwd=tmp_path).status == 0
-    refused = rollcli("simulate", "rig", *TINY, "--seed", "8", "--resume", cwd=tmp_path)
-    assert (refused.status, refused.err.count("\n")) == (2, 1)
-    assert "rig: cannot be resumed: --seed was 0, is now 8" in refused.err

@@ -3,7 +3,6 @@
 import pytest
 
 from rollcli.errors import UsageError
-from rollcli.files import matching
 from rollcli.files.matching import is_elsewhere, match_paths
 
 
@@ -31,17 +30,6 @@ def test_rows_that_fit_equally_well_are_named():
 def test_one_row_for_two_files_is_refused():
     with pytest.raises(UsageError, match=r"the row of left/0.png fits a/0.png and b/0.png"):
         match_paths(["a/0.png", "b/0.png"], ["left/0.png"], "rolls.csv")
-
-
-def test_equal_stems_in_many_folders_are_told_apart_without_comparing_all_with_all(monkeypatch):
-    names = [f"data/{number}/disparity/0.png" for number in range(2000)]
-    rows = [f"/mnt/{number}/disparity/0.tif" for number in reversed(range(2000))]
-    compared = []
-    common = matching._common
-    monkeypatch.setattr(matching, "_common", lambda *both: compared.append(both) or common(*both))
-
-    assert match_paths(names, rows, "rolls.csv") == list(reversed(range(2000)))
-    assert len(compared) <= 2 * len(names)
 
 
 @pytest.mark.parametrize(

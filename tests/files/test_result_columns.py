@@ -57,12 +57,6 @@ def test_a_number_is_read_at_its_bound_and_refused_beyond_it(tmp_path, name, bou
             read_columns(result(tmp_path, *rows), NUMBERS)
 
 
-@pytest.mark.parametrize("cell", ["nan", "inf", "-inf", "1.5e", "one"])
-def test_what_is_no_finite_number_is_refused(tmp_path, cell):
-    with pytest.raises(InputError, match=rf"line 2: '{cell}' is no value for height_m"):
-        read_columns(result(tmp_path, WITHIN | {"height_m": cell}), NUMBERS)
-
-
 def test_empty_cells_are_not_numbers_and_leave_the_others_as_they_are(tmp_path):
     found = read_columns(result(tmp_path, WITHIN, dict.fromkeys(NUMBERS, "")), NUMBERS)
     for name in NUMBERS:
@@ -143,11 +137,6 @@ def test_a_result_without_rows_has_no_values(tmp_path):
     assert found.numbers == {}
 
 
-def test_a_missing_result_is_named(tmp_path):
-    with pytest.raises(InputError, match=r"none.csv: cannot be read: no such file or directory$"):
-        read_columns(str(tmp_path / "none.csv"), NUMBERS)
-
-
 def test_a_number_of_json_is_read_as_csv_has_it_and_a_wrong_one_is_named_with_its_line(tmp_path):
     good = {"file": "a", "status": "ok", "roll_deg": 1.5, "height_m": None}
     path = tmp_path / "rolls"
@@ -194,11 +183,3 @@ def test_a_row_names_a_file(tmp_path, line, said):
     for read in (lambda: read_columns(str(path), ["roll_deg"]), lambda: read_result(path)):
         with pytest.raises(InputError, match=rf"rolls: {said}$"):
             read()
-
-
-def test_empty_lines_before_json_are_no_other_format(tmp_path):
-    path = tmp_path / "rolls.jsonl"
-    rows = [Row(f"{place}.png", status="ok", roll_deg=float(place)) for place in range(3)]
-    path.write_bytes(b"\n \r\n\n" + b"".join(format_row(row, "jsonl") for row in rows))
-    assert read_columns(str(path), ["roll_deg"]).numbers["roll_deg"].tolist() == [0.0, 1.0, 2.0]
-    assert [row.file for row in read_result(path).rows] == ["0.png", "1.png", "2.png"]

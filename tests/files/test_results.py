@@ -89,13 +89,6 @@ def test_what_is_written_is_read_back(form, row):
     assert format_row(back, form) == format_row(row, form)
 
 
-def test_json_shows_the_numbers_that_csv_shows():
-    values = json.loads(format_row(ROW, "jsonl"))
-    assert values["roll_ci95_deg"] == 0.012346
-    assert values["iterations"] == 4
-    assert json.loads(format_row(FAILED, "jsonl"))["roll_deg"] is None
-
-
 @pytest.mark.parametrize(
     ("theta_deg", "text"),
     [(-1e-9, "0.000000"), (0.0, "0.000000"), (-89.9999999, "90.000000"), (90.0, "90.000000")],
@@ -212,28 +205,6 @@ def test_every_number_has_its_digits_in_every_form():
     assert {name: values[name] for name in numbers} == {name: float(text) for name, text in texts.items()}
 
 
-def test_columns_have_the_types_of_their_values():
-    types = column_types(FURTHER)
-    assert tuple(types) == columns(FURTHER)
-    assert types == {
-        "file": str,
-        "right_file": str,
-        "status": str,
-        **dict.fromkeys(("roll_deg", "roll_ci95_deg", "pitch_deg", "pitch_ci95_deg"), float),
-        **dict.fromkeys(("height_m", "height_ci95_m", "camber"), float),
-        "method": str,
-        "iterations": int,
-        **dict.fromkeys(("converged", "global_minimum"), bool),
-        **dict.fromkeys(("rmse_px", "alpha0", "alpha1", "alpha2", "valid_fraction", "road_fraction"), float),
-        **dict.fromkeys(("width", "height"), int),
-        **dict.fromkeys(ALIGNMENT_COLUMNS, float),
-        "message": str,
-        "image_roll_deg": float,
-        "elapsed_ms": float,
-    }
-    assert "elapsed_ms" not in column_types()
-
-
 @pytest.mark.parametrize(
     ("name", "text", "value"),
     [
@@ -281,16 +252,6 @@ def test_a_cell_that_its_column_cannot_have_is_refused(name, text):
     data = f"{','.join(values)}\n{','.join(values.values())}\n".encode()
     with pytest.raises(InputError, match=rf"^x: line 2: '{text}' is no value for {name}$"):
         list(parse_rows(data, "x"))
-
-
-def test_a_row_names_a_file_and_no_text_holds_a_nul():
-    for line, said in (
-        (b",ok,1", "'' is no value for file"),
-        # the latter by the csv module of Python 3.10
-        (b"a\0b,ok,1", r"('a\\x00b' is no value for file|is not CSV: line contains NUL)"),
-    ):
-        with pytest.raises(InputError, match=rf"^x: line 2: {said}$"):
-            list(parse_rows(b"file,status,roll_deg\n" + line + b"\n", "x"))
 
 
 @pytest.mark.parametrize("before", [b"", b"\xef\xbb\xbf", b" \n\n", b" " * 999, b"\xef\xbb\xbf  "])

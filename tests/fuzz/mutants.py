@@ -41,7 +41,6 @@ FURTHER = {
     "files": (
         "run/test_update.py",
         "run/test_resume.py",
-        "run/test_kept_rows.py",
         "run/test_retry_failed.py",
         "run/test_two_runs.py",
         "run/test_result_parts.py",

@@ -2,7 +2,7 @@
 
 import pytest
 
-from rollcli.report.sources import JUMP, SPREAD, SUSPECT, WIDEST, choose, spread
+from rollcli.report.sources import JUMP, SPREAD, SUSPECT, WIDEST, choose
 from tests.report.results import row
 
 
@@ -22,11 +22,6 @@ def test_the_widest_then_suspect_ones_then_evenly_spread_ones():
     rest = places(chosen, SPREAD)
     assert len(rest) == 3
     assert rest[0] < 80 < rest[1] < 180 < rest[2]
-
-
-def test_a_frame_without_an_interval_is_not_one_of_the_widest():
-    chosen = choose([row(f"{i}.png", width=None) for i in range(20)], 9)
-    assert [each.reason for each in chosen] == [SPREAD] * 9
 
 
 def test_the_frames_around_a_jump_come_first():
@@ -51,10 +46,3 @@ def test_as_many_as_asked_for_and_none_twice(count):
     ]
     chosen = [each.place for each in choose(rows, count)]
     assert len(chosen) == len(set(chosen)) == min(count, 20)
-
-
-@pytest.mark.parametrize(
-    ("count", "expected"), [(0, []), (1, [50]), (2, [25, 75]), (4, [12, 37, 62, 87]), (100, list(range(100)))]
-)
-def test_places_are_in_the_middle_of_their_stretches(count, expected):
-    assert spread(range(100), count) == expected

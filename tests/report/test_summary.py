@@ -5,14 +5,12 @@ import json
 import os
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from rollcli.report import content
 from rollcli.report.chart import Chart, chart_names, script_json
-from rollcli.report.pictures import _encoded
 from rollcli.report.sources import SPREAD, SUSPECT, WIDEST, Choice
-from rollcli.report.summary import frame_count, input_folders, summarize, written_at
+from rollcli.report.summary import summarize, written_at
 from tests.report.results import row
 
 
@@ -22,20 +20,6 @@ def test_the_middle_is_from_the_5th_to_the_95th_percentile():
     assert found.half_width is None
     nothing = summarize([row("a.png", None)])
     assert (nothing.middle, nothing.extremes, nothing.frames) == (None, None, 1)
-
-
-def test_counts_have_commas_and_one_frame_is_one():
-    assert [frame_count(count) for count in (0, 1, 2, 12_345)] == [
-        "0 frames",
-        "1 frame",
-        "2 frames",
-        "12,345 frames",
-    ]
-
-
-def test_folders_are_listed_once_in_their_order_with_those_of_right_images():
-    rows = [replace(row("b/1.png"), right_file="r/1.png"), row("a/x/1.png"), row("b/2.png"), row("3.png")]
-    assert input_folders(rows) == ["b", "r", "a/x", "."]
 
 
 def test_the_time_of_a_file_is_told_in_utc_and_that_of_a_stream_is_not(tmp_path):
@@ -78,16 +62,6 @@ def test_a_histogram_is_of_two_angles_or_more():
 def test_which_frames_are_shown_is_said_in_words(chosen, angled, words):
     rows = [row(f"{i}.png", 1.0 if i < angled else None) for i in range(angled + 3)]
     assert content._chosen_text(rows, [Choice(place, reason) for place, reason in enumerate(chosen)]) == words
-
-
-@pytest.mark.parametrize(
-    ("shape", "size"),
-    [((30, 40), (40, 30)), ((100, 1280), (1280, 100)), ((500, 2560), (1280, 250)), ((1, 6000), (1280, 1))],
-)
-def test_a_picture_is_at_most_1280_pixels_wide(shape, size):
-    made = _encoded(np.zeros((*shape, 3), np.uint8))
-    assert (made.width, made.height) == size
-    assert made.uri.startswith("data:image/webp;base64,UklGR")
 
 
 def test_json_in_a_script_cannot_end_it():

@@ -31,25 +31,11 @@ def shaded(material, rows):
     return shade(scene, AHEAD, np.zeros(1, np.int16), values)[0]
 
 
-@pytest.mark.parametrize(
-    ("sun", "air", "expected"),
-    [(1.0, 1.0, 1.4), (0.0, 1.0, 1.4 * 0.3), (1.0, 0.0, 1.4 * 0.7), (0.5, 0.2, 1.4 * 0.41), (0.0, 0.0, 0.0)],
-)
-def test_light_is_the_ambient_share_of_the_sky_and_the_rest_of_the_sun(sun, air, expected):
-    plain = Plain(0.5, 0.0, 0.0, tint=(0.4, 0.8, 1.0))
-    light = shaded(plain, {SUN: sun, AIR: air})
-    assert light == pytest.approx([0.5 * expected * share for share in (0.4, 0.8, 1.0)], rel=1e-5)
-
-
 @pytest.mark.parametrize("ratio", [8, 30])
 def test_albedo_is_averaged_over_the_length_of_the_footprint(ratio):
     reads = {Q: 3.0, LONG_Q: 2.0, LONG: 2.0, SHORT: 2.0 / ratio, P: 1.0, LONG_P: 0.0}
     # the mean of q^2 over a length of 2 around 3 is 9 + 2^2 / 12; eight points lose 1/64 of it
     assert shaded(Slope(), reads) / 1.4 == pytest.approx(9 + 4 / 12 * (1 - 1 / 64), rel=1e-5)
-
-
-def test_a_round_footprint_is_read_once():
-    assert shaded(Slope(), {Q: 3.0, LONG_Q: 2.0, LONG: 2.0, SHORT: 2.0}) / 1.4 == pytest.approx(9)
 
 
 def test_a_ray_that_hits_nothing_shows_the_sky_whatever_its_reads_are():

@@ -149,32 +149,11 @@ def test_a_spec_gives_the_same_frame_each_time():
     assert once.disparity.tobytes() == twice.disparity.tobytes()
 
 
-def test_angles_are_drawn_evenly_from_the_range():
-    rolls = np.degrees([spec.roll for spec in draw_specs(2000, roll=(-0.5, 0.25), seed=1)])
-    counts, _ = np.histogram(rolls, 5, (math.degrees(-0.5), math.degrees(0.25)))
-    assert counts.sum() == 2000
-    assert counts.min() > 330
-
-
 def test_mixed_draws_every_scene_and_only_a_bare_road_is_always_flat():
     specs = draw_specs(400, seed=2)
     flat = {kind: np.mean([s.curvature == 0 for s in specs if s.scene == kind]) for kind in SCENES}
     assert flat.pop("bare") == 1
     assert all(0.3 < share < 0.7 for share in flat.values())
-
-
-def test_heights_and_principal_points_are_drawn_evenly_and_change_nothing_else():
-    specs = draw_specs(1000, seed=1, size=(640, 480), height=(1.3, 1.8), principal_offset=(-30.0, 10.0))
-    plain = draw_specs(1000, seed=1, size=(640, 480))
-    assert [replace(spec, height=1.65, principal_point=None) for spec in specs] == plain
-    for values, low, high in (
-        ([spec.height for spec in specs], 1.3, 1.8),
-        ([spec.centre[0] for spec in specs], 289.5, 329.5),
-        ([spec.centre[1] for spec in specs], 209.5, 249.5),
-    ):
-        counts, _ = np.histogram(values, 5, (low, high))
-        assert counts.sum() == 1000
-        assert counts.min() > 150
 
 
 def test_offsets_are_from_the_principal_point_that_is_given():
@@ -184,7 +163,3 @@ def test_offsets_are_from_the_principal_point_that_is_given():
 
 def test_a_curvature_that_is_asked_for_holds_for_every_scene():
     assert all(0.001 <= spec.curvature <= 0.002 for spec in draw_specs(40, curvature=(0.001, 0.002)))
-
-
-def test_the_focal_length_follows_the_width():
-    assert draw_specs(1, size=(1000, 300))[0].focal == pytest.approx(580)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from rollcli.simulate.road import Piece
-from rollcli.simulate.roadside import box, vehicle
-from rollcli.simulate.solids import Post, Solid, TreeCrown
+from rollcli.simulate.roadside import vehicle
+from rollcli.simulate.solids import Post, TreeCrown
 from rollcli.simulate.surfaces import Backdrop, Course, Ground, Wall
 
 COURSE = Course(heading=0.03, bend=1 / 300, curvature=0.001)
@@ -78,13 +78,6 @@ def test_a_ray_meets_a_surface_where_marching_along_it_first_comes_inside(surfac
     assert agree.mean() > 0.97
 
 
-def test_a_point_on_the_line_between_two_strips_belongs_to_the_right_one():
-    x = np.array([-4.0, np.nextafter(1.0, 0), 1.0, 9.0])
-    ground = Ground(Course(), (-4.0, 1.0, 9.0), (5, 6), far=80.0)
-    points = np.array([x, np.zeros(4), np.full(4, 10.0)])
-    assert list(ground.sample(points).material) == [5, 5, 6, 6]
-
-
 @pytest.mark.parametrize(("distance", "met"), [(0.049, False), (0.051, True), (99.0, True), (101.0, False)])
 def test_a_surface_is_met_from_five_centimetres_to_its_far_end(distance, met):
     ground = Ground(Course(), (-np.inf, np.inf), (0,), far=100.0)
@@ -130,13 +123,3 @@ def test_normals_and_gradients_are_those_of_the_surface(surface, toward):
     for before, after, gradient in ((at.p, beside.p, at.grad_p), (at.q, beside.q, at.grad_q)):
         change = (gradient * moved).sum(axis=0)
         assert np.median(np.abs(after - before - change)[same_face]) < 0.01 * moves
-
-
-@pytest.mark.parametrize("mirror", [1.0, -1.0])
-def test_a_ray_along_the_faces_of_a_box_meets_its_front_where_it_does_not_pass_by(mirror):
-    extent = np.array([[-1.0, 1.0], [0.0, 2.0], [-3.0, 3.0]])
-    body = Solid(np.diag([mirror, 1, 1]), np.array([0.0, 0.0, 10.0]), (box(1.0, 2.0, 3.0, 0),), extent)
-    x, y = (each.ravel() for each in np.meshgrid([-1.5, -0.5, 0.5, 1.5], [-0.5, 0.5, 1.5, 2.5]))
-    origin = np.array([x, y, np.zeros(16)])
-    met = body.intersect(origin, np.tile([[0.0], [0.0], [1.0]], 16))
-    assert np.array_equal(met, np.where((np.abs(x) < 1) & (y > 0) & (y < 2), 7.0, np.inf))

@@ -113,27 +113,6 @@ def test_a_type_that_does_not_exist_is_refused():
         )
 
 
-def test_a_header_may_end_where_the_file_does():
-    header = npy_header("{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3), }\n")
-    for there in (0, 23):
-        with pytest.raises(InputError) as caught:
-            decode_stored(header + bytes(there), "x")
-        assert (
-            str(caught.value) == f"x: is truncated: shape (2, 3) of float32 needs 24 bytes, {there} are there"
-        )
-    assert decode_stored(header + bytes(24), "x").values.shape == (2, 3)
-    with pytest.raises(InputError, match=r"^x: is truncated within its NPY header$"):
-        decode_stored(header[:-1], "x")
-
-
-@pytest.mark.parametrize("version", [1, 2])
-def test_a_file_may_end_within_the_length_of_its_header(version):
-    header = npy_header("{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3), }\n", version)
-    for length in range(8, len(header)):
-        with pytest.raises(InputError, match=r"^x: is truncated within its NPY header$"):
-            decode_stored(header[:length], "x")
-
-
 @pytest.mark.parametrize(
     ("shape", "said"),
     [

@@ -78,30 +78,6 @@ def test_fill_bytes_before_a_marker_are_read_over():
     )
 
 
-FRAME = WHOLE.index(b"\xff\xc0")
-LYING = WHOLE[: FRAME + 5] + struct.pack(">HH", 65500, 65500) + WHOLE[FRAME + 9 :]
-
-
-# ITU-T T.81, table B.1: TEM and RST0 to RST7 stand alone, all others have a length
-@pytest.mark.parametrize("marker", [0x01, *range(0xD0, 0xD8)], ids=hex)
-def test_markers_that_stand_alone_hide_no_size(marker):
-    alone = bytes([0xFF, marker])
-    np.testing.assert_array_equal(
-        decode_picture(WHOLE[:FRAME] + alone + WHOLE[FRAME:], "x.jpg"), decode_picture(WHOLE, "x.jpg")
-    )
-    with pytest.raises(InputError, match="claims 65500 x 65500 pixels"):
-        decode_picture(LYING[:FRAME] + alone + LYING[FRAME:], "x.jpg")
-
-
-@pytest.mark.parametrize("marker", [0xC4, 0xC8, 0xCC, 0xDA, 0xDB, 0xDD, 0xE1, 0xFE], ids=hex)
-def test_a_size_in_other_segments_is_none(marker):
-    small = b"\xff\xc0" + struct.pack(">HBHHB", 11, 8, 16, 16, 1)
-    for body in (small[4:], small, bytes(300) + small):
-        segment = bytes([0xFF, marker]) + struct.pack(">H", 2 + len(body)) + body
-        with pytest.raises(InputError, match="claims 65500 x 65500 pixels"):
-            decode_picture(LYING[:FRAME] + segment + LYING[FRAME:], "x.jpg")
-
-
 @pytest.mark.parametrize("marker", sorted({*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC}), ids=hex)
 def test_every_kind_of_frame_says_its_size_and_that_is_counted(marker):
     shortest = b"\xff\xd8\xff" + bytes([marker]) + struct.pack(">HBHHB", 11, 8, 65500, 65400, 1)

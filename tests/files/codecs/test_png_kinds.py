@@ -8,7 +8,7 @@ import pytest
 
 from rollcli.errors import InputError
 from rollcli.files.codecs.png import picture
-from rollcli.files.formats import decode_mask, decode_stored
+from rollcli.files.formats import decode_stored
 from tests.binary_files import make_png, png_file, png_header, png_rows
 
 # its table 11.1: the bit depths of grey, colour, palette, grey with opacity, colour with opacity
@@ -158,12 +158,6 @@ def test_a_palette_of_greys_and_one_colour_is_no_map():
     values = np.arange(16, dtype=np.uint8).reshape(4, 4)
     with pytest.raises(InputError, match=r"^x: is a colour image \(a palette\)"):
         decode_stored(make_png(values, 8, 3, palette=bytes(palette)), "x")
-
-
-def test_a_mask_counts_every_colour():
-    colours = np.zeros((1, 4, 3), np.uint8)
-    colours[0, 1:, :] = np.eye(3)
-    assert decode_mask(make_png(colours, 8, 2), "x").tolist() == [[False, True, True, True]]
 
 
 def test_chunks_of_the_standard_are_read_over_and_unknown_ones_too_where_they_may_be():

@@ -45,12 +45,6 @@ def test_colours_lie_side_by_side_or_in_a_plane_each(kind, layout, planes):
     np.testing.assert_array_equal(found, rgb[..., ::-1])
 
 
-def test_of_colours_with_an_opacity_the_colours_are_read():
-    np.testing.assert_array_equal(
-        picture(written(COLOURS, photometric="rgb", extrasamples=["unassalpha"]), "x"), COLOURS[..., 2::-1]
-    )
-
-
 def test_what_is_neither_grey_nor_three_colours_is_no_camera_image():
     for pixels, photometric in ((COLOURS[..., :2], 1), (COLOURS[..., 0], 3), (COLOURS[..., :3], 6)):
         with pytest.raises(InputError, match="x: is neither a grey nor an RGB TIFF"):
@@ -72,19 +66,6 @@ def with_field(file, tag, kind, was, new):
     before, after = (struct.pack(form, tag, kind, 1, number, *fill) for number in (was, new))
     assert before in file
     return file.replace(before, after)
-
-
-def test_a_tile_may_hold_twice_the_image_and_four_million_pixels_more():
-    honest = make_tiff(np.zeros((16, 16), np.uint8), "deflate", tile=(16, 16))
-    most = 2 * 16 * 16 + 2**22
-    assert most % 16 == 0
-
-    for across, refusal in (
-        (most // 16, "its compressed data are wrong"),
-        (most // 16 + 1, f"tiles of {most // 16 + 1} x 16 for 16 x 16 pixels"),
-    ):
-        with pytest.raises(InputError, match=f"^x: is a damaged TIFF: {refusal}"):
-            decode_stored(with_field(honest, 322, 4, 16, across), "x")
 
 
 def test_a_page_has_as_many_parts_as_its_size_asks_for():

@@ -2,15 +2,14 @@
 
 import pytest
 
-from rollcli.errors import InputError, UsageError
-from rollcli.files.results import part_names, read_parts
-from rollcli.files.search import _fits, is_folder_url
+from rollcli.errors import UsageError
+from rollcli.files.results import part_names
+from rollcli.files.search import _fits
 from rollcli.files.stores.locations import (
     base_name,
     is_object_url,
     is_url,
     is_web_url,
-    located,
     scheme_of,
     split_url,
 )
@@ -60,30 +59,6 @@ def test_the_last_part_of_a_web_address_is_that_of_its_path():
     assert base_name("maps/a.png") == "a.png"
 
 
-def test_relative_paths_alone_start_at_the_root_of_the_run():
-    assert located("/run", "maps/a.png") == "/run/maps/a.png"
-    assert located("/run", "/maps/a.png") == "/maps/a.png"
-    assert located("", "maps/a.png") == "maps/a.png"
-    assert located("/run", "s3://bucket/a.png") == "s3://bucket/a.png"
-
-
-@pytest.mark.parametrize(
-    ("url", "is_folder"),
-    [
-        ("s3://bucket", True),
-        ("s3://bucket/", True),
-        ("s3://bucket//", True),
-        ("s3://bucket/maps", True),
-        ("s3://bucket/maps.d/", True),
-        ("s3://bucket/maps/a.png", False),
-        ("s3://bucket/maps.d/a", True),
-        ("https://host/maps/", False),
-    ],
-)
-def test_a_prefix_has_no_ending(url, is_folder):
-    assert is_folder_url(url) == is_folder
-
-
 @pytest.mark.parametrize(
     ("path", "pattern", "fits"),
     [
@@ -116,27 +91,3 @@ def test_parts_have_numbers_and_come_in_their_order():
     ]
     for ending in ("jsonl", "parquet"):
         assert part_names([f"part-00000.{ending}"]) == [f"part-00000.{ending}"]
-
-
-def test_later_parts_of_csv_get_the_header_of_the_first(tmp_path):
-    (tmp_path / "part-00000.csv").write_bytes(b"file,status\na,ok\n")
-    (tmp_path / "part-00001.csv").write_bytes(b"b,ok\n")
-    (tmp_path / "part-00002.csv").write_bytes(b"c,ok\n")
-    found = list(read_parts(str(tmp_path), ["part-00000.csv", "part-00001.csv", "part-00002.csv"]))
-    assert [name.removeprefix(f"{tmp_path}/") for name, _ in found] == [
-        f"part-0000{at}.csv" for at in range(3)
-    ]
-    assert [data for _, data in found] == [
-        b"file,status\na,ok\n",
-        b"file,status\nb,ok\n",
-        b"file,status\nc,ok\n",
-    ]
-
-
-def test_parts_of_json_have_no_header(tmp_path):
-    for at in range(2):
-        (tmp_path / f"part-0000{at}.jsonl").write_bytes(b'{"file": "a"}\n')
-    found = read_parts(str(tmp_path), ["part-00000.jsonl", "part-00001.jsonl"])
-    assert [data for _, data in found] == [b'{"file": "a"}\n'] * 2
-    with pytest.raises(InputError, match="no such file"):
-        list(read_parts(str(tmp_path), ["part-00002.jsonl"]))

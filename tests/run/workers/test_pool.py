@@ -15,7 +15,7 @@ from rollcli.run.workers import pool as pools
 from rollcli.run.workers.chunks import Work
 from rollcli.run.workers.in_order import Workers
 from rollcli.run.workers.interrupt import Stop, stop_signals
-from rollcli.run.workers.pool import PoolExecutor, WorkerDiedError
+from rollcli.run.workers.pool import PoolExecutor
 from rollcli.run.workers.tasks import run_tasks
 from tests.run.workers.tasks import lost, run
 
@@ -79,22 +79,6 @@ def test_one_task_of_a_large_chunk_that_kills_workers_is_found_and_named():
     assert [*done[:2000], *done[2001:]] == [*range(2000), *range(2001, 3000)]
 
 
-def test_what_kills_workers_is_done_alone_and_chunks_that_wait_meanwhile_are_done(tmp_path):
-    mark, busy, event = (tmp_path / name for name in ("mark", "busy", "event"))
-    with pool() as executor:
-        held = executor.submit([("hold", busy, event)])
-        dying = executor.submit([("die_then_look", mark, busy)])
-        others = [executor.submit([("give", number)]) for number in range(3)]
-        while not dying.done():
-            executor.wait(dying)
-        with pytest.raises(WorkerDiedError):
-            dying.result()
-        threading.Timer(0.3, event.touch).start()
-        assert executor.retry(dying.chunk).results == [False]
-        assert settled(executor, held) == ["held"]
-        assert [settled(executor, other) for other in others] == [[0], [1], [2]]
-
-
 def test_a_stop_ends_a_chunk_after_the_task_in_hand_and_begins_no_other(tmp_path):
     event = tmp_path / "event"
     with pool(jobs=1) as executor:
@@ -152,23 +136,6 @@ def test_what_a_dead_worker_left_is_cleared_before_its_chunk_is_known_to_be_lost
             executor.wait(dying)
         assert cleared[:3] == tasks
         assert settled(executor, spare) == [3]
-
-
-def test_the_chunks_after_one_that_killed_its_worker_keep_their_order(tmp_path):
-    with pool(jobs=1) as executor:
-        chunks = [executor.submit([("die_once", tmp_path / "mark")])]
-        chunks += [executor.submit([("append", tmp_path / "order", str(number))]) for number in range(8)]
-        for each in chunks:
-            while not each.done():
-                executor.wait(each)
-    assert (tmp_path / "order").read_text() == "01234567"
-
-
-def test_of_few_chunks_each_worker_gets_one(tmp_path):
-    event = tmp_path / "event"
-    with pool() as executor:  # the first one waits for what the second one does
-        futures = [executor.submit([("wait", event)]), executor.submit([("touch", event)])]
-        assert [settled(executor, future) for future in futures] == [["waited"], ["touched"]]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")

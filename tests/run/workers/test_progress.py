@@ -104,32 +104,6 @@ def test_a_terminal_shows_a_bar_which_makes_room_for_messages_and_vanishes(monke
     os.close(terminal.reader)
 
 
-def test_a_terminal_that_is_gone_has_a_bar_of_80_characters(monkeypatch):
-    def gone(descriptor):
-        raise OSError
-
-    terminal = Terminal(monkeypatch, 60)
-    monkeypatch.setattr(os, "get_terminal_size", gone)
-    with TaskProgress(10):
-        assert 78 <= len(terminal.read().rpartition("\r")[2]) <= 80
-    terminal.stream.close()
-    os.close(terminal.reader)
-
-
-def test_nothing_is_shown_on_a_terminal_when_quiet(monkeypatch):
-    terminal = Terminal(monkeypatch, 60)
-    with TaskProgress(10, quiet=True) as progress:
-        progress.advance()
-        assert (terminal.read(), progress.done) == ("", 1)
-    terminal.stream.close()
-    os.close(terminal.reader)
-
-
-def test_details_are_for_those_who_ask(capsys):
-    TaskProgress(3).detail("a detail")
-    assert capsys.readouterr().err == ""
-
-
 def test_quiet_progress_writes_no_lines(clock, capsys):
     with TaskProgress(3, quiet=True, verbose=True) as progress:
         clock.now += 40

@@ -1,8 +1,5 @@
 """Which executor the tasks get, and how it ends."""
 
-import os
-from types import SimpleNamespace
-
 import pytest
 
 from rollcli.errors import UsageError
@@ -38,34 +35,6 @@ def test_there_are_as_many_processes_as_tasks_and_jobs_allow(count, jobs, thread
         executor.close(at_once=True)
         assert isinstance(executor, PoolExecutor)
         assert len(executor._pool) == processes
-
-
-def test_without_a_number_of_jobs_there_is_one_for_each_usable_processor(monkeypatch):
-    monkeypatch.setattr(runs.os, "sched_getaffinity", lambda process: {0, 3, 5}, raising=False)
-    monkeypatch.setattr("rollcli.run.workers.pool.PoolExecutor", lambda jobs, *_: SimpleNamespace(jobs=jobs))
-    assert runs._executor(100, WORK, Workers()).jobs == 3
-    monkeypatch.delattr(runs.os, "sched_getaffinity")
-    monkeypatch.setattr(os, "cpu_count", lambda: 7)
-    assert runs._executor(100, WORK, Workers()).jobs == 7
-    monkeypatch.setattr(os, "cpu_count", lambda: None)
-    assert runs._executor(100, WORK, Workers()) is None
-
-
-@pytest.mark.parametrize("at_once", [False, True])
-def test_the_executor_is_closed_as_the_run_was_stopped(monkeypatch, at_once):
-    closed, close = [], PoolExecutor.close
-
-    def closing(self, *, at_once):
-        closed.append(at_once)
-        close(self, at_once=at_once)
-
-    monkeypatch.setattr(PoolExecutor, "close", closing)
-    stop = Stop()
-    results = run_tasks([("give", number) for number in range(9)], WORK, stop, Workers(2))
-    assert next(results) == 0
-    stop.asked, stop.at_once = True, at_once
-    list(results)
-    assert closed == [at_once]
 
 
 def test_no_scheduler_is_asked_for_unless_one_is_named():
