@@ -12,9 +12,13 @@ import zipfile
 import pytest
 import yaml
 
+from rollcli.errors import UsageError
+from rollcli.extras import require_extra
 from tests.run_cli import ROOT
 
 ACTION = yaml.safe_load((ROOT / ".github" / "action" / "action.yml").read_text("utf-8"))
+
+
 SAMPLES = ROOT / "sample_data"
 
 
@@ -126,6 +130,8 @@ def steps(names, given, programs, cwd, status=0):
 
 
 needs_bash = pytest.mark.skipif(shutil.which("bash") is None, reason="bash is not installed")
+
+
 PROGRAMS = os.path.dirname(sys.executable)  # noqa: PTH120
 
 
@@ -174,3 +180,52 @@ def test_the_container_copies_what_is_there_and_is_not_root():
         assert (ROOT / name).exists()
     (user,) = re.findall(r"^USER (\d+)", text, flags=re.M)
     assert int(user) > 0
+
+
+def test_only_the_packages_that_are_missing_are_to_be_installed(monkeypatch):
+    monkeypatch.setitem(sys.modules, "plotly", None)
+    with pytest.raises(UsageError) as caught:
+        require_extra("report", "the page")
+    assert str(caught.value) == (f"the page needs the extra report: {sys.executable} -m pip install plotly")
+
+
+def test_a_program_that_pipx_installed_is_extended_by_pipx(monkeypatch, tmp_path):
+    (tmp_path / "pipx_metadata.json").write_text("{}")
+    monkeypatch.setattr(sys, "prefix", str(tmp_path))
+    for name in ("dask", "distributed"):
+        monkeypatch.setitem(sys.modules, name, None)
+    with pytest.raises(UsageError, match=r"the extra cluster: pipx inject rollcli dask distributed$"):
+        require_extra("cluster", "--scheduler")
+
+
+def found(pattern, *parts):
+    """Every match in a file of the project; there is at least one."""
+    matches = re.findall(pattern, ROOT.joinpath(*parts).read_text("utf-8"))
+    assert matches, (pattern, parts)
+    return matches
+
+
+def test_hooks_check_with_the_oldest_ruff_that_developers_may_have():
+    (oldest,) = found(r'"ruff>=([\d.]+)"', "pyproject.toml")
+    (rev,) = found(r"ruff-pre-commit\n\s+rev: v([\d.]+)", ".pre-commit-config.yaml")
+    assert rev == oldest
+
+
+def test_ci_runs_on_every_python_that_the_package_names():
+    named = found(r"Python :: (3\.\d+)", "pyproject.toml")
+    (matrix,) = found(r"python: \[(.*)\]", ".github", "workflows", "ci.yml")
+    assert re.findall(r"[\d.]+", matrix) == named
+    assert ".ci/run" in found(r"run: (\S+)", ".github", "workflows", "ci.yml")
+
+
+def test_ci_runs_on_windows_and_macos_with_tests_that_are_there():
+    (systems,) = found(r"os: \[(.*)\]", ".github", "workflows", "ci.yml")
+    assert systems == "macos-latest, windows-latest"
+    named = found(r"(?<=[ :])tests(?:/[\w./]+)?(?=\s)", ".github", "workflows", "ci.yml")
+    assert "tests/test_other_systems.py" in named
+    assert [each for each in named if not (ROOT / each).exists()] == []
+
+
+def test_what_all_tests_share_limits_the_threads_of_numpy_before_numpy_loads():
+    line = [sys.executable, "-c", "import sys, tests.conftest; sys.exit('numpy' in sys.modules)"]
+    assert subprocess.run(line, cwd=ROOT, check=False).returncode == 0

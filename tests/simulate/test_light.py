@@ -4,12 +4,15 @@ import numpy as np
 import pytest
 
 from rollcli.simulate.build import build_scene
+from rollcli.simulate.camera import expose
+from rollcli.simulate.materials import Facade, NoiseTile, Plain, band, bars, coarse, fine
 from rollcli.simulate.road import Piece
 from rollcli.simulate.roadside import vehicle
-from rollcli.simulate.scene import air_below, draw_light, in_shadow, sky
+from rollcli.simulate.scene import Light, Scene, air_below, draw_light, in_shadow, sky
 from rollcli.simulate.solids import Post
 from rollcli.simulate.spec import FrameSpec
 from rollcli.simulate.surfaces import NEAR, Course
+from rollcli.simulate.views import AIR, LONG, LONG_P, LONG_Q, NONE, SHORT, SUN, P, Q, shade
 
 
 def on_ground(x, z):
@@ -66,3 +69,151 @@ def test_the_sky_is_bluer_above_and_pale_at_the_horizon():
     up, level = (sky(light, np.array([[0.1], [rise], [1.0]]))[0] for rise in (5.0, 0.0))
     assert up[2] / up[0] < level[2] / level[0], "red to blue"
     assert np.ptp(level) < 0.1
+
+
+AHEAD = np.array([[0.0], [0.0], [1.0]])
+
+
+class Slope:
+    """A material whose albedo is the square of its q coordinate."""
+
+    def albedo(self, p, q, w):
+        """The square of q."""
+        return np.asarray(q * q, np.float32)
+
+    def colour(self, p, q):
+        """White."""
+        return np.ones(3, np.float32)
+
+
+def shaded(material, rows):
+    values = np.zeros((8, 1), np.float32)
+    for row, value in ({AIR: 1.0, SUN: 1.0, LONG: 0.01, SHORT: 0.01} | rows).items():
+        values[row] = value
+    light = Light(np.array([0.0, 1.0, 0.0]), ambient=0.3, exposure=1.4, clouds=0.0)
+    scene = Scene(light, normal=np.array([0.0, 1.0, 0.0]), materials=[material])
+    return shade(scene, AHEAD, np.zeros(1, np.int16), values)[0]
+
+
+@pytest.mark.parametrize("ratio", [8, 30])
+def test_albedo_is_averaged_over_the_length_of_the_footprint(ratio):
+    reads = {Q: 3.0, LONG_Q: 2.0, LONG: 2.0, SHORT: 2.0 / ratio, P: 1.0, LONG_P: 0.0}
+    # the mean of q^2 over a length of 2 around 3 is 9 + 2^2 / 12; eight points lose 1/64 of it
+    assert shaded(Slope(), reads) / 1.4 == pytest.approx(9 + 4 / 12 * (1 - 1 / 64), rel=1e-5)
+
+
+def test_a_ray_that_hits_nothing_shows_the_sky_whatever_its_reads_are():
+    light = Light(np.array([0.0, 1.0, 0.0]), ambient=0.3, exposure=1.4, clouds=0.0)
+    scene = Scene(light, normal=np.array([0.0, 1.0, 0.0]), materials=[Plain(0.5)])
+    kinds = np.full(1, NONE, np.int16)
+    sky = [shade(scene, AHEAD, kinds, np.full((8, 1), value, np.float32)) for value in (0, 1)]
+    assert np.array_equal(*sky)
+    assert sky[0].min() > 0.5
+
+
+def exposed(level, gain=1.0, noise=0.0, colour=True):
+    light = np.full((101, 201, 3), level, np.float32)
+    return expose(light, noise, gain, colour, np.random.default_rng(0))
+
+
+@pytest.mark.parametrize(("level", "grey"), [(0.0, 0), (0.25, 128), (1.0, 255), (4.0, 255)])
+def test_the_grey_level_is_the_root_of_the_light_up_to_saturation(level, grey):
+    assert (exposed(level)[50, 100] == grey).all()
+
+
+def test_the_image_darkens_toward_its_corners_and_not_elsewhere():
+    image = exposed(0.64, colour=False).astype(float)
+    assert image[50, 100] == 204
+    assert image.argmin() == 0
+    # at a corner 24 % of the light are lost, in the middle of a side 12 %
+    assert image[0, 0] == image[-1, -1] == image[0, -1] == np.rint(204 * np.sqrt(0.76))
+    assert image[0, 100] == image[50, 0] == np.rint(204 * np.sqrt(0.88))
+
+
+def test_grey_is_the_weighted_mean_of_red_green_and_blue():
+    light = np.zeros((3, 3, 3), np.float32)
+    for channel, weight in enumerate((0.114, 0.587, 0.299)):  # BT.601, blue first
+        light[:] = 0
+        light[..., channel] = 1
+        image = expose(light, 0.0, 1.0, False, np.random.default_rng(0))
+        assert image[1, 1] == np.rint(255 * np.sqrt(weight))
+
+
+def test_noise_has_a_mean_of_zero():
+    errors = exposed(0.25, noise=6.0)[40:60, 90:110].astype(float) - 127.5
+    assert abs(errors.mean()) < 0.8
+
+
+def averaged(pattern, centre, width):
+    """The mean of a pattern of 0 and 1 over pixels, by brute force."""
+    offsets = (np.arange(4000) + 0.5) / 4000 - 0.5
+    return pattern(centre[:, None] + offsets * width).mean(axis=1)
+
+
+@pytest.mark.parametrize("width", [0.01, 0.3, 2.0, 25.0])
+def test_a_band_covers_its_share_of_a_pixel(width):
+    x = np.linspace(-3, 3, 101, dtype=np.float32)
+    expected = averaged(lambda t: (t > -0.4) & (t < 0.7), x, width)
+    assert np.allclose(band(x, -0.4, 0.7, np.full_like(x, width)), expected, atol=1e-3)
+
+
+@pytest.mark.parametrize("width", [0.01, 0.3, 2.0, 25.0])
+def test_bars_cover_their_share_of_a_pixel_however_many_it_holds(width):
+    x = np.linspace(-3, 3, 101, dtype=np.float32)
+    expected = averaged(lambda t: np.mod(t, 1.3) < 0.4, x, width)
+    assert np.allclose(bars(x, 1.3, 0.4, np.full_like(x, width)), expected, atol=2e-3)
+
+
+def test_a_level_of_a_noise_tile_holds_the_averages_of_the_finer_one():
+    tile = NoiseTile(seed=5, slope=0.7, longest=200.0)
+    rows, columns = np.mgrid[:64, :64]
+
+    def texels(level, rows, columns):
+        scale = 2.0**level
+        x, y = ((at.ravel() + 0.5) * scale for at in (columns, rows))
+        return tile.sample(x.astype(np.float32), y.astype(np.float32), np.full(x.size, level, np.int32))
+
+    fine_texels = texels(0, rows, columns).reshape(64, 64)
+    for level in (1, 3, 5):
+        side = 1 << level
+        coarser = texels(level, *np.mgrid[: 64 >> level, : 64 >> level]).reshape(64 >> level, -1)
+        assert np.allclose(
+            coarser, fine_texels.reshape(64 >> level, side, -1, side).mean(axis=(1, 3)), atol=1e-5
+        )
+
+
+@pytest.mark.parametrize("noise", [fine, coarse])
+def test_noise_has_unit_variance_up_close_and_fades_with_distance(noise):
+    p, q = np.random.default_rng(0).uniform(0, 500, (2, 20000)).astype(np.float32)
+    spreads = [noise(p, q, np.full_like(p, w)).std() for w in (0.001, 0.1, 1.0, 100.0)]
+    assert 0.7 < spreads[0] < 1.05
+    assert np.all(np.diff(spreads) < 0.02)
+    assert spreads[-1] < 0.1
+
+
+def test_a_window_pane_shows_nothing_of_the_plaster_around_it():
+    def house(level):
+        one = np.ones(1, np.float32)
+        facade = Facade(0.0, np.array([0, 90], np.float32), level * one, np.ones((1, 3)), 3 * one, 2 * one)
+        return facade.albedo(p, q, np.full_like(p, 1e-3))
+
+    # 30 bays of the upper storeys; inside of one half of each window, and between windows
+    bay, storey = np.meshgrid(np.arange(30), np.arange(1, 5))
+    q = (3 * (storey.ravel() + 0.55)).astype(np.float32)
+    p = (2 * (bay.ravel() + 0.4)).astype(np.float32)
+    np.testing.assert_allclose(house(0.3), house(0.6), atol=1e-4)  # edges are a little soft
+    assert house(0.3).std() > 0.02
+    p = (2 * (bay.ravel() + 0.1)).astype(np.float32)
+    assert (house(0.6) > 1.5 * house(0.3)).all()
+
+
+def test_each_house_has_its_own_colour_and_the_outermost_go_on():
+    edges, tints = np.array([0, 10, 25, 40], np.float32), np.eye(3, dtype=np.float32)
+    one = np.ones(3, np.float32)
+    row = Facade(0.0, edges, np.array([0.2, 0.4, 0.6], np.float32), tints, 3 * one, 2 * one)
+    p = np.array([-3, 0.01, 9.99, 10.01, 24.99, 25.01, 39.99, 50], np.float32)
+    assert row.colour(p, p).argmax(axis=1).tolist() == [0, 0, 0, 1, 1, 2, 2, 2]
+    # plaster between the windows of the first floor, far enough away to see no grain
+    middles = np.array([2.0, 12.0, 27.0], np.float32)
+    wall = row.albedo(middles, np.full(3, 5.8, np.float32), np.full(3, 0.05, np.float32))
+    assert (np.diff(wall) > 0.05).all()

@@ -15,28 +15,35 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from distributed import LocalCluster
 
+from rollcli import __version__
+from rollcli.errors import UsageError
+from rollcli.files.storage import list_names, read_bytes
+from rollcli.run.workers import cluster
+from rollcli.run.workers.chunks import Work
+from rollcli.run.workers.cluster import ClusterExecutor, _problems, check_scheduler, probe, scheduler_address
+from rollcli.run.workers.in_order import SharedPaths
 from tests.in_process import run_here
 from tests.object_store import joined, upload
+from tests.run.workers.tasks import lost, run
 from tests.run_cli import command, contents, environment, road_map, rollcli, write_maps, write_pair
 
 pytest.importorskip("distributed", reason="the extra cluster is not installed")
 
-from distributed import LocalCluster
-
-from rollcli import __version__
-from rollcli.files.storage import list_names, read_bytes
-from rollcli.run.workers import cluster
-from rollcli.run.workers.cluster import _problems, probe
-from rollcli.run.workers.in_order import SharedPaths
 
 pytestmark = pytest.mark.slow
 
+
 FRAMES = 40
+
+
 IMAGES = ("--derotated", "upright", "--vdisparity", "v")
 
 
 LOCAL = ("--host", "127.0.0.1", "--no-dashboard")
+
+
 ONE_PROCESS = ("--nthreads", "1", "--no-nanny")
 
 
@@ -376,3 +383,59 @@ def test_workers_that_share_only_a_bucket_give_the_bytes_of_a_local_run(
     assert joined(f"{bucket}/rolls.csv") == expected
     images = {name: read_bytes(f"{bucket}/upright/{name}") for name in list_names(f"{bucket}/upright")}
     assert images == contents(local / "upright")
+
+
+pytest.importorskip("distributed", reason="the extra cluster is not installed")
+
+
+WORK = Work(run, lost)
+
+
+HERE = {"host": "127.0.0.1", "protocol": "tcp", "dashboard_address": ":0", "threads_per_worker": 1}
+
+
+@pytest.fixture(scope="module")
+def workers_here():
+    """Two workers in this process."""
+    with LocalCluster(n_workers=2, processes=False, **HERE) as made:
+        yield made
+
+
+def test_a_scheduler_is_named_by_its_file_too(workers_here, tmp_path):
+    file = tmp_path / "scheduler.json"
+    file.write_text(json.dumps({"type": "Scheduler", "address": workers_here.scheduler_address}))
+    check_scheduler(str(file))
+    assert scheduler_address("tcp://far:8786") == "tcp://far:8786"
+    assert scheduler_address("far:8786") == "far:8786"
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (None, "the scheduler file cannot be read: no such file or directory"),
+        (b"", "is not a file that dask scheduler wrote"),
+        (b"[" * 100_000, "is not a file that dask scheduler wrote"),
+        (b'{"id": 1}', "is not a file that dask scheduler wrote"),
+        (b"[1]", "is not a file that dask scheduler wrote"),
+    ],
+)
+def test_a_scheduler_file_that_is_not_there_or_is_none_is_refused(tmp_path, content, said):
+    file = tmp_path / "scheduler.json"
+    if content is not None:
+        file.write_bytes(content)
+    with pytest.raises(UsageError) as caught:
+        check_scheduler(str(file))
+    assert str(caught.value) == f"--scheduler {file}: {said}"
+
+
+@pytest.mark.parametrize(
+    "use",
+    [lambda: check_scheduler("tcp://far:1"), lambda: ClusterExecutor("tcp://far:1", WORK, SharedPaths(), 1)],
+    ids=["check", "executor"],
+)
+def test_without_the_extra_it_is_named(monkeypatch, use):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(UsageError) as caught:
+        use()
+    assert str(caught.value).startswith("--scheduler needs the extra cluster: ")
+    assert str(caught.value).endswith(" -m pip install distributed")
