@@ -136,6 +136,7 @@ PROGRAMS = os.path.dirname(sys.executable)  # noqa: PTH120
 
 
 @needs_bash
+@pytest.mark.slow
 def test_the_action_estimates_makes_the_page_and_checks(tmp_path):
     pytest.importorskip("plotly", reason="plotly, of the extra report, is not here")
     given = {"maps": str(SAMPLES / "maps"), "calib": str(SAMPLES / "calib.txt"), "untold": "pass"}
@@ -146,12 +147,14 @@ def test_the_action_estimates_makes_the_page_and_checks(tmp_path):
 
 
 @needs_bash
+@pytest.mark.slow
 def test_the_actions_check_fails_a_rig_that_is_not_as_asked(tmp_path):
     given = {"maps": str(SAMPLES / "maps"), "estimate": "--roi=0,0,2,2"}
     steps(["estimate", "check"], given, PROGRAMS, tmp_path, status=4)
 
 
 @needs_bash
+@pytest.mark.slow
 def test_the_action_takes_pairs_and_options_with_spaces(tmp_path):
     views = tmp_path / "two views"
     for side in ("left", "right"):

@@ -63,16 +63,7 @@ def _editable(folder):
     others = [path for path in sys.path if "site-packages" in path]
     (site / "others.pth").write_text("\n".join(others) + "\n")
     python = str(folder / "bin" / "python")
-    line = [
-        python,
-        "-m",
-        "pip",
-        "install",
-        "--quiet",
-        "--no-deps",
-        "--editable",
-        str(ROOT),
-    ]
+    line = [python, "-m", "pip", "install", "--quiet", "--no-deps", "--editable", str(ROOT)]
     done = subprocess.run(line, capture_output=True, text=True, check=False)
     if done.returncode:
         pytest.skip(f"pip cannot build here: {done.stderr.strip()[-200:]}")

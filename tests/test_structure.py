@@ -38,9 +38,7 @@ DOORS = {
     "rollcli.run.workers.pool": "a worker's door",
     "rollcli.run.workers.tasks": "loads the executor that is used; the cluster is an extra",
 }
-DOOR_PACKAGES = {
-    "rollcli.cli": "the command line's doors: help and version load no command",
-}
+DOOR_PACKAGES = {"rollcli.cli": "the command line's doors: help and version load no command"}
 # what is filled in while it is made
 CHANGING = {
     "rollcli.files.recordings.frames.BagFrames",

@@ -87,13 +87,7 @@ except SystemExit as end:
 
 @pytest.mark.parametrize(
     "arguments",
-    [
-        ["--nothing"],
-        ["nothing"],
-        ["estimate", "--nothing"],
-        ["estimate", "--seed", "-1", "x"],
-        ["estimate"],
-    ],
+    [["--nothing"], ["nothing"], ["estimate", "--nothing"], ["estimate", "--seed", "-1", "x"], ["estimate"]],
 )
 def test_a_usage_error_is_one_line_and_status_2(tmp_path, arguments):
     done = rollcli(*arguments, cwd=tmp_path)
@@ -161,33 +155,20 @@ def test_choices_ignore_case(tmp_path):
     assert ",exact," in upper.out
 
 
-def test_an_interrupt_while_an_attribute_learns_its_name_is_status_130(tmp_path):
-    code = """
-import rollcli.cli.main
-
+ATTRIBUTE = """
 class Interrupted:
     def __set_name__(self, owner, name):
         raise KeyboardInterrupt
 
 rollcli.cli.main.main = lambda **_: type("Owner", (), {"name": Interrupted()})
-from rollcli.__main__ import main
-main()
 """
-    line = [sys.executable, "-c", code]
-    done = subprocess.run(line, cwd=tmp_path, env=environment(), capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stderr) == (130, "rollcli: interrupted\n")
+MODULE = 'rollcli.cli.main.main = lambda **_: exec("raise KeyboardInterrupt")\n'
 
 
-@pytest.mark.parametrize("stdout", ["open", "closed"])
-def test_an_interrupt_while_a_module_loads_is_status_130(tmp_path, stdout):
-    code = """
-import rollcli.cli.main
-rollcli.cli.main.main = lambda **_: exec("raise KeyboardInterrupt")
-from rollcli.__main__ import main
-main()
-"""
-    if stdout == "closed":  # Python has none then
-        code = f"import sys; sys.stdout = None{code}"
+# without a standard output Python has none
+@pytest.mark.parametrize("code", [ATTRIBUTE, MODULE, f"import sys; sys.stdout = None\n{MODULE}"])
+def test_an_interrupt_while_a_module_loads_or_an_attribute_learns_its_name_is_status_130(tmp_path, code):
+    code = f"import rollcli.cli.main\n{code}\nfrom rollcli.__main__ import main\nmain()"
     line = [sys.executable, "-c", code]
     done = subprocess.run(line, cwd=tmp_path, env=environment(), capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (130, "rollcli: interrupted\n")

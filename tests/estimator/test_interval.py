@@ -8,15 +8,11 @@ import numpy as np
 import pytest
 
 from rollcli.errors import UsageError
-from rollcli.estimator.energy import Energy
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.interval import Interval, Jackknife, interval_of, jackknife
-from rollcli.estimator.moments import CheckedMap, Floats, Grid, point_moments
-from rollcli.estimator.request import DEFAULT_SOLVER, Request
+from rollcli.estimator.moments import Floats, Grid
 from rollcli.estimator.road.model import RoadModel
-from rollcli.estimator.road.pixels import select_pixels
 from rollcli.estimator.road.surface import Surface
-from rollcli.estimator.solvers.exact import exact
 from rollcli.estimator.tuning import TUNING, IntervalTuning
 from rollcli.simulate.dataset import lane_rolls_of
 from rollcli.simulate.render import true_disparity
@@ -99,33 +95,6 @@ def test_a_slope_that_all_disparities_may_have_widens_it_by_what_it_would_turn(r
 def test_a_slope_error_that_is_none_is_refused(slope_error):
     with pytest.raises(UsageError, match=r"slope error of .*: give 0 or more px per px"):
         estimate_roll(flat_road(3, **SIZE), slope_error=slope_error)
-
-
-@pytest.mark.parametrize("roll_deg", [-50, 0, 30])
-def test_the_jackknife_is_what_refitting_without_each_band_gives(roll_deg):
-    request = Request("exact", "parabola", "all", DEFAULT_SOLVER, math.radians(70), 0.01, 0.0, 0, TUNING)
-    disparity = noisy_road(np.random.default_rng(3), roll_deg)
-    pixels = select_pixels(CheckedMap.of(disparity, None), request)
-    surface, theta = pixels.surface, exact(pixels.energy).theta
-
-    def refitted(kept):
-        x, y, d, weights = (each[kept] for each in (surface.x, surface.y, surface.d, surface.weights))
-        moments = point_moments(x, y, d, weights, surface.grid, (0.0, 0.0, 0.0))
-        return exact(Energy.of(moments, float(d.max()))).theta
-
-    along = surface.y * math.cos(theta) - surface.x * math.sin(theta)
-    bands = np.array_split(np.argsort(along), TUNING.interval.groups)
-    everything = np.ones(len(along), bool)
-    whole = refitted(everything)
-    changes = []
-    for band in bands:
-        kept = everything.copy()
-        kept[band] = False
-        changes.append(refitted(kept) - whole)
-
-    found = -jackknife(surface, theta, TUNING.interval).bands[:, 3]
-
-    np.testing.assert_allclose(found, changes, rtol=0.1, atol=0.05 * np.abs(changes).max())
 
 
 def knife(bands=(0.0,), columns=(0.0,), white=0.0, freedom=(5.0, 5.0), **parts):
@@ -275,14 +244,6 @@ def test_the_unevenness_of_waves_is_theirs_and_that_of_noise_is_none():
     view = 400 * 0.2 / plane.max()
     assert 0.4 < rough * view / np.sqrt(np.mean(waves**2)) < 1.2
     assert smooth < 0.15 * rough
-
-
-def test_the_part_of_the_camber_is_what_a_fit_without_it_turns_by():
-    problem, theta = fitted()
-    root = np.sqrt(problem.surface.weights)[:, None]
-    bulge = 0.01 * problem.design[:, 4:]
-    turned = np.linalg.lstsq(problem.design[:, :4] * root, bulge * root, rcond=None)[0][3, 0]
-    assert jackknife(problem.surface, theta, TUNING.interval).bend == pytest.approx(abs(turned), rel=1e-5)
 
 
 def test_the_camber_is_that_which_the_pixels_ask_for_without_the_prior():

@@ -92,26 +92,6 @@ def test_a_stem_loses_only_the_ending_of_an_image(name, stem):
     assert stem_of(name) == stem
 
 
-def test_frames_without_an_angle_or_a_truth_are_named():
-    found = assess(rows(1.0, None, 3.0), {**truth(1, 2), "frame9": 0.0})
-    assert found.count == 1
-    assert found.no_angle == ("frame2", "frame9")
-    assert found.no_truth == ("maps/frame3.png",)
-
-
-def test_suspect_frames_are_compared_and_counted():
-    given = rows(1.0, 1.5, status="suspect") + rows(2.0, folder="x", ending="b.png")
-    found = assess(given, {"frame1": 0, "frame2": 0, "xframe1b": 0})
-    assert (found.count, found.ok, found.suspect) == (3, 1, 2)
-
-
-def test_when_nothing_matches_the_error_says_what_was_looked_for():
-    with pytest.raises(
-        UsageError, match=r"r\.csv: no row has the stem .* holds maps/frame1\.png, the truth other"
-    ):
-        assess(rows(1.0), {"other": 0.0}, "r.csv")
-
-
 def test_two_rows_of_one_stem_are_refused_by_name():
     with pytest.raises(UsageError, match=r"a/frame1\.png and b/frame1\.png have the same stem"):
         assess(rows(1.0, folder="a/") + rows(1.0, folder="b/"), truth(1))
@@ -171,16 +151,6 @@ def test_truth_is_read_by_its_columns_whatever_else_is_there(tmp_path):
 def test_a_truth_that_holds_no_angles_is_refused_with_the_line(tmp_path, text, reason):
     with pytest.raises(InputError, match=reason):
         read_truth(write_truth(tmp_path / "t.csv", text))
-
-
-def test_a_truth_that_is_not_there_is_refused(tmp_path):
-    with pytest.raises(InputError, match=r"t\.csv: cannot be read: no such file or directory$"):
-        read_truth(tmp_path / "t.csv")
-
-
-def test_a_truth_with_two_frames_of_one_stem_is_refused(tmp_path):
-    with pytest.raises(UsageError, match=r"a\.png and b/a have the same stem"):
-        read_truth(write_truth(tmp_path / "t.csv", "file,roll_deg\na.png,1\nb/a,2\n"))
 
 
 TRUTH_WITH_POSE = (

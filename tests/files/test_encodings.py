@@ -9,8 +9,8 @@ import pytest
 
 from rollcli.errors import InputError, UsageError
 from rollcli.estimator.estimate import estimate_roll
-from rollcli.files.encodings import Encoding, from_disparity, read_disparity, read_mask, to_disparity
-from rollcli.files.formats import Stored, encode_stored, read_stored
+from rollcli.files.encodings import Encoding, from_disparity, read_mask, to_disparity
+from rollcli.files.formats import Stored, read_stored
 from rollcli.rig.calibration import Calibration
 from tests.binary_files import disparity_map, make_png, make_tiff
 from tests.run_cli import rollcli
@@ -160,11 +160,6 @@ def test_no_data_is_stored_as_each_encoding_has_it():
     assert from_disparity(empty, "cityscapes").tolist() == [[0, 0, 0, 0, 513]]
 
 
-def test_a_small_disparity_is_not_rounded_to_no_data():
-    assert from_disparity(np.array([[1e-4]]), "kitti").tolist() == [[1]]
-    assert from_disparity(np.array([[1e-4]]), "cityscapes").tolist() == [[2]]
-
-
 def test_disparities_beyond_the_numbers_are_refused_and_a_few_are_dropped():
     disparity = np.full((20, 20), 100.0)
     disparity[0, 0] = 300
@@ -173,15 +168,6 @@ def test_disparities_beyond_the_numbers_are_refused_and_a_few_are_dropped():
     disparity[0] = 300
     with pytest.raises(InputError, match="disparities up to 300 px do not fit numbers that end at 256 px"):
         from_disparity(disparity, "kitti")
-
-
-def test_a_file_is_read_in_one_call(tmp_path):
-    path = tmp_path / "map.png"
-    path.write_bytes(encode_stored(np.array([[0, 512, 768]], np.uint16), "png"))
-
-    assert read_disparity(path).tolist() == [[0, 2, 3]]
-    assert read_disparity(str(path), invalid=768).tolist() == [[0, 2, 0]]
-    assert read_disparity(path, encoding="px").tolist() == [[0, 512, 768]]
 
 
 def test_masks_of_maps_and_images_are_read(tmp_path):
@@ -219,10 +205,6 @@ def test_stored_distances_are_metres_or_whole_millimetres():
     assert pixels([1e-45, 2], "f4", encoding="depth") == [0, 0.5]  # 1/z is too large for a float32
     assert to_disparity(stored([2], "f8"), encoding="depth").disparity.dtype == np.float64
     assert to_disparity(stored([2], "f4"), encoding="depth").disparity.dtype == np.float32
-
-
-def test_a_further_value_below_a_pixel_is_no_data_either():
-    assert pixels([0.5, 1.5], "f4", invalid=(0.5,)) == [0, 1.5]
 
 
 def test_the_doubt_says_what_was_read_and_what_it_may_be():

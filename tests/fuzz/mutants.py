@@ -53,12 +53,7 @@ FURTHER = {
         "cli/test_bad_stores.py",
     ),
     "pictures": ("run/test_derotate.py", "run/test_vdisparity.py", "cli/test_heights.py"),
-    "rig": (
-        "cli/test_calibration.py",
-        "cli/test_horizon.py",
-        "cli/test_rig.py",
-        "run/test_diagnosis.py",
-    ),
+    "rig": ("cli/test_calibration.py", "cli/test_horizon.py", "cli/test_rig.py", "run/test_diagnosis.py"),
     "run": (
         "files/stores/test_turns.py",
         "cli/test_outputs.py",

@@ -12,7 +12,7 @@ from rollcli.report import content
 from rollcli.report.chart import Chart, chart_names, script_json
 from rollcli.report.charts import all_charts, chart_over_frames, histogram, outside, view
 from rollcli.report.sources import SPREAD, SUSPECT, WIDEST, Choice
-from rollcli.report.summary import degrees, option_lines, summarize, with_interval, written_at
+from rollcli.report.summary import degrees, summarize, with_interval, written_at
 from rollcli.rig.drive.assess import assess_rig
 from tests.report.results import row
 
@@ -86,18 +86,6 @@ def test_an_angle_has_as_many_decimals_as_its_interval_is_worth(half, words):
     assert with_interval(2.3456, half) == words
 
 
-def test_every_angle_within_the_view_is_in_the_histogram():
-    rng = np.random.default_rng(0)
-    rows = [
-        row(f"{i}.png", roll, 0.1, "ok" if i % 7 else "suspect")
-        for i, roll in enumerate(rng.normal(2, 1, 500))
-    ]
-    bars = {trace["name"]: trace for trace in histogram(rows).data}
-    assert sum(bars["ok"]["y"]) == sum(i % 7 > 0 for i in range(500))
-    assert sum(bars["ok"]["y"] + bars["suspect"]["y"]) == 500 - outside(rows)
-    assert 20 <= len(bars["ok"]["y"]) <= 50
-
-
 @pytest.mark.parametrize("count", [1, 2, 18, 40])
 def test_few_frames_have_few_bars_and_single_ones_are_no_walls(count):
     chart = histogram([row(f"{i}.png", 3 + i / 100) for i in range(count)])
@@ -115,13 +103,6 @@ def test_an_angle_far_off_does_not_flatten_the_others():
     assert 0.5 < low < 1 < 2 < high < 2.5
     assert outside(rows) == 1
     assert outside(rows[:-1]) == 0
-
-
-@pytest.mark.parametrize("rows", [[row("a.png", 3.0, None)], [row("a.png", None)], [row("a.png", 3.0, 40.0)]])
-def test_a_single_row_of_any_kind_has_a_chart(rows):
-    low, high = view(rows)
-    assert low < high
-    assert sum(len(trace["x"]) for trace in chart_over_frames(rows).data) >= 1
 
 
 @pytest.mark.parametrize(("frames", "bars"), [(400, True), (402, False)])
@@ -152,13 +133,6 @@ def test_the_legend_names_what_is_there_even_if_it_is_one_thing(rows, named):
 )
 def test_angles_are_printed_with_a_sign_unless_they_are_nothing(angle, text):
     assert degrees(angle) == text
-
-
-def test_options_are_listed_as_they_are_typed():
-    options = {"lambda0": 26.0, "mask": None, "roi": [0, 1, 2, 3], "polygon": [[0, 1.5], [2, 3]]}
-    shown = option_lines({"options": {**options, "timing": False, "invalid": [], "seed": 0}})
-    assert shown == [("--lambda0", "26"), ("--roi", "0,1,2,3"), ("--polygon", "0,1.5 2,3"), ("--seed", "0")]
-    assert option_lines(None) == []
 
 
 def drive_rows(folder, level, frames=400, jump=0.0):
@@ -211,11 +185,6 @@ def test_a_pitch_without_a_height_is_one_chart():
     both = pose_charts([posed("a.png", 3.0, 0.1, 1.6)])
     assert [chart.name for chart in both] == ["pitch", "height"]
     assert both[1].layout["yaxis"]["title"]["text"] == "height, m"
-
-
-def test_a_height_is_told_in_metres_with_as_many_decimals_as_its_interval_is_worth():
-    each = replace(row("a.png"), height_m=1.6543, height_ci95_m=0.004)
-    assert traces_of(pose_charts([each])[0])["height"]["customdata"][0] == "a.png<br>1.654 ± 0.004 m"
 
 
 def test_a_height_has_jumps_and_segments_and_no_line_leads_to_another_drive():

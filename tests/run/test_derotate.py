@@ -274,17 +274,6 @@ def test_an_interrupted_run_says_that_what_is_written_is_whole(folder, monkeypat
     assert contents(folder / "out") == {"frame0.png": contents(folder / "whole")["frame0.png"]}
 
 
-def test_a_run_that_is_interrupted_at_its_last_map_has_done_all(folder, monkeypatch):
-    def interrupted(*arguments):
-        signal.raise_signal(signal.SIGINT)
-        return derotate_map(*arguments)
-
-    monkeypatch.setattr(work, "derotate_map", interrupted)
-    done = rollcli("derotate", "maps/frame1.png", "--roll", "2", "-o", "out", cwd=folder)
-    assert (done.status, "interrupted" in done.err) == (0, False)
-    assert list(contents(folder / "out")) == ["frame1.png"]
-
-
 def make_suspect(folder, *names):
     lines = (folder / "rolls.csv").read_text().splitlines(keepends=True)
     doubted = [line.replace(",ok,", ",suspect,") if line.startswith(names) else line for line in lines]
@@ -305,12 +294,6 @@ def test_suspect_angles_are_used_and_counted_or_their_maps_are_left_out(folder):
 
     quiet = rollcli(*line, "-o", "quiet", "-q", cwd=folder)
     assert (quiet.status, quiet.err) == (0, "")
-
-
-def test_one_suspect_angle_is_told_as_one(folder):
-    make_suspect(folder, "maps/frame1")
-    used = rollcli("derotate", "maps", "--from", "rolls.csv", "-o", "all", cwd=folder)
-    assert "rolls.csv: 1 of 4 angles is suspect and used; " in used.err
 
 
 def test_leaving_out_every_map_or_none_that_is_doubted_is_refused(folder):

@@ -9,13 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from rollcli.errors import OutputError, UsageError
+from rollcli.errors import OutputError
 from rollcli.files.results import read_result
 from rollcli.files.storage import list_names, modified_ns, read_bytes, remove, write_bytes
 from rollcli.run import estimate as batch_run
-from rollcli.run import result_file as durable_rows
 from rollcli.run.estimate import estimate_frame
-from rollcli.run.result_file import ResultFile, open_result
 from tests.object_store import upload
 from tests.run_cli import command, contents, environment, road_map, rollcli, write_kitti, write_maps
 
@@ -113,27 +111,6 @@ def test_a_retry_that_is_interrupted_keeps_what_it_has_done_and_is_taken_up_agai
     assert kept == fresh
 
 
-def test_images_of_retried_frames_are_on_the_disk_before_their_rows(folder, maps, monkeypatch):
-    line = ("estimate", "maps", "-o", "rolls.csv", "--derotated", "up")
-    assert rollcli(*line, cwd=folder).status == 3
-    mend(folder, maps, *BROKEN)
-    events, sync_files, replace = [], durable_rows.sync_files, ResultFile.replace
-
-    def sync(images, folders):
-        events.extend(Path(each).name for each in images)
-        sync_files(images, folders)
-
-    def write(file, rows, form):
-        if form == "csv":  # and not what they were read from
-            events.append(sorted(rows))
-        replace(file, rows, form)
-
-    monkeypatch.setattr(durable_rows, "sync_files", sync)
-    monkeypatch.setattr(ResultFile, "replace", write)
-    assert rollcli(*line, *RETRY, cwd=folder).status == 0
-    assert events == [*(f"frame{index}.png" for index in BROKEN), list(BROKEN)]
-
-
 def test_a_retry_that_may_not_fail_stops_at_the_first_failure(folder, maps):
     line = ("estimate", "maps", "-o", "rolls.csv")
     assert rollcli(*line, cwd=folder).status == 3
@@ -157,6 +134,7 @@ def test_rows_whose_names_hold_newlines_and_quotes_keep_their_places(maps, tmp_p
     assert (tmp_path / "rolls.csv").read_bytes() == retried
 
 
+@pytest.mark.slow
 def test_a_retry_killed_at_any_time_loses_no_row_and_is_taken_up_again(tmp_path):
     for index in range(COUNT):
         (tmp_path / "maps").mkdir(exist_ok=True)
@@ -229,20 +207,6 @@ def test_retry_failed_alone_says_what_it_goes_with(folder):
     assert (done.status, done.err.count("\n")) == (2, 1)
     assert "give --resume with it" in done.err
     assert not (folder / "rolls.csv").exists()
-
-
-def test_a_result_whose_rows_were_replaced_is_still_locked_and_grows(tmp_path, monkeypatch):
-    monkeypatch.setattr("rollcli.files.locking._PATIENCE_S", 0.0)
-    name = str(tmp_path / "rows.jsonl")
-    with open_result(name) as file:
-        for row in (b"one\n", b"two\n", b"three\n"):
-            file.append(row)
-        file.replace({1: b"2\n"}, "jsonl")
-        with pytest.raises(UsageError, match="another run is writing this result"), open_result(name):
-            pass
-        file.append(b"four\n")
-    with open_result(name) as file:
-        assert file.read() == b"one\n2\nthree\nfour\n"
 
 
 @pytest.mark.parametrize("ending", ["csv", "parquet"])

@@ -8,11 +8,10 @@ import pytest
 
 from rollcli.simulate.build import build_scene, road_camber
 from rollcli.simulate.render import render_frame, true_disparity
-from rollcli.simulate.road import Piece, draw_carriageway
-from rollcli.simulate.roadside import vehicle
+from rollcli.simulate.road import draw_carriageway
 from rollcli.simulate.scene import draw_light
 from rollcli.simulate.spec import FrameSpec
-from rollcli.simulate.surfaces import Course, Ground
+from rollcli.simulate.surfaces import Ground
 
 SMALL = {"size": (320, 240), "focal": 186.0, "crossfall": 0.04}
 SHAPES = ("crown", "roof", "dish", "superelevated")
@@ -202,43 +201,6 @@ def test_no_ray_slips_between_two_pieces_of_the_ground(shape):
     spec = FrameSpec("bare", 0.0, 0.3, 0.0, shape, gutter=0.05, seed=4, size=(321, 241), focal=186.0)
     frame = render_frame(replace(spec, crossfall=0.04))
     assert frame.disparity[120:].min() > 0
-
-
-@pytest.mark.parametrize("scene", ["bare", "open", "street", "verge"])
-def test_lanes_are_as_wide_as_real_ones_and_only_country_roads_have_a_single_lane(scene):
-    roads = [drawn_road(FrameSpec(scene, seed=seed)) for seed in range(120)]
-    assert all(2.8 <= road.lane <= 3.7 for road in roads)
-    country = scene in ("bare", "verge")
-    assert any(road.single for road in roads) == country
-    assert any(road.parking for road in roads) == (not country)
-    assert any(road.course.bend > 0 for road in roads) == (scene != "bare")
-    assert any(road.course.bend < 0 for road in roads) == (scene != "bare")
-    for road in roads:
-        # beyond the edge of the right lane, in which the rig drives, lies a shoulder
-        shoulder = road.right - road.shift - 0.5 * road.lane
-        assert shoulder == pytest.approx(2.2) if road.parking else 0.1 <= shoulder <= 0.6
-        lanes = 1 if road.single else 2
-        assert road.right - road.left == pytest.approx(lanes * road.lane + 2 * shoulder)
-
-
-def test_kerbs_are_drawn_from_their_range():
-    heights = []
-    for seed in range(30):
-        spec = FrameSpec("open", seed=seed)
-        road, scene = drawn_road(spec), build_scene(spec)
-        sidewalks = [s for s in scene.surfaces if isinstance(s, Ground) and s.offset and not s.slope]
-        heights += [s.offset for s in sidewalks if {road.left, road.right} & set(s.edges)]
-    assert 0.1 <= min(heights) < 0.11
-    assert 0.19 < max(heights) <= 0.2
-
-
-@pytest.mark.parametrize("oncoming", [False, True])
-def test_a_vehicle_ahead_shows_its_rear_and_an_oncoming_one_its_front(oncoming):
-    course = Course(heading=0.02, bend=0.003)
-    car = vehicle(np.random.default_rng(3), course, Piece(-5, 5), 1.0, 12.0, 0, oncoming)
-    assert (car.frame[2, 2] > 0) == (not oncoming)
-    assert car.frame[1] @ [0, 1, 0] > 0.99
-    assert np.linalg.det(car.frame) == pytest.approx(1)
 
 
 def test_a_positive_bend_turns_to_the_right_and_zero_is_straight():

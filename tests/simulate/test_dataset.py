@@ -185,10 +185,6 @@ def test_a_folder_with_files_in_it_is_refused(tmp_path):
         plan_dataset(tmp_path, TINY)
 
 
-def test_an_empty_folder_is_taken(tmp_path):
-    assert plan_dataset(tmp_path, TINY).folder == tmp_path
-
-
 def test_a_file_in_place_of_the_folder_is_refused(tmp_path):
     (tmp_path / "rig").write_text("")
     with pytest.raises(UsageError, match="not a folder"):
@@ -239,10 +235,6 @@ def test_a_resumed_simulation_keeps_whole_frames_and_ends_with_the_same_bytes(ri
     assert simulate(rig, replace(TINY, resume=True)) == ["frame_0002", "frame_0003"]
     assert (rig / "left" / kept).stat().st_mtime_ns == before
     assert contents(rig) == contents(rendered)
-
-
-def test_resuming_a_complete_folder_renders_nothing(rig):
-    assert simulate(rig, replace(TINY, resume=True)) == []
 
 
 def test_resuming_what_was_never_begun_begins_it(tmp_path):

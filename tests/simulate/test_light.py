@@ -5,7 +5,7 @@ import pytest
 
 from rollcli.simulate.build import build_scene
 from rollcli.simulate.camera import expose
-from rollcli.simulate.materials import Facade, NoiseTile, Plain, band, bars, coarse, fine
+from rollcli.simulate.materials import NoiseTile, Plain, band, bars, coarse, fine
 from rollcli.simulate.road import Piece
 from rollcli.simulate.roadside import vehicle
 from rollcli.simulate.scene import Light, Scene, air_below, draw_light, in_shadow, sky
@@ -189,31 +189,3 @@ def test_noise_has_unit_variance_up_close_and_fades_with_distance(noise):
     assert 0.7 < spreads[0] < 1.05
     assert np.all(np.diff(spreads) < 0.02)
     assert spreads[-1] < 0.1
-
-
-def test_a_window_pane_shows_nothing_of_the_plaster_around_it():
-    def house(level):
-        one = np.ones(1, np.float32)
-        facade = Facade(0.0, np.array([0, 90], np.float32), level * one, np.ones((1, 3)), 3 * one, 2 * one)
-        return facade.albedo(p, q, np.full_like(p, 1e-3))
-
-    # 30 bays of the upper storeys; inside of one half of each window, and between windows
-    bay, storey = np.meshgrid(np.arange(30), np.arange(1, 5))
-    q = (3 * (storey.ravel() + 0.55)).astype(np.float32)
-    p = (2 * (bay.ravel() + 0.4)).astype(np.float32)
-    np.testing.assert_allclose(house(0.3), house(0.6), atol=1e-4)  # edges are a little soft
-    assert house(0.3).std() > 0.02
-    p = (2 * (bay.ravel() + 0.1)).astype(np.float32)
-    assert (house(0.6) > 1.5 * house(0.3)).all()
-
-
-def test_each_house_has_its_own_colour_and_the_outermost_go_on():
-    edges, tints = np.array([0, 10, 25, 40], np.float32), np.eye(3, dtype=np.float32)
-    one = np.ones(3, np.float32)
-    row = Facade(0.0, edges, np.array([0.2, 0.4, 0.6], np.float32), tints, 3 * one, 2 * one)
-    p = np.array([-3, 0.01, 9.99, 10.01, 24.99, 25.01, 39.99, 50], np.float32)
-    assert row.colour(p, p).argmax(axis=1).tolist() == [0, 0, 0, 1, 1, 2, 2, 2]
-    # plaster between the windows of the first floor, far enough away to see no grain
-    middles = np.array([2.0, 12.0, 27.0], np.float32)
-    wall = row.albedo(middles, np.full(3, 5.8, np.float32), np.full(3, 0.05, np.float32))
-    assert (np.diff(wall) > 0.05).all()

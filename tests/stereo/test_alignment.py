@@ -14,8 +14,7 @@ from rollcli.files.inputs import pair_inputs
 from rollcli.simulate.draw import draw_specs
 from rollcli.simulate.render import render_frame
 from rollcli.simulate.spec import FrameSpec
-from rollcli.stereo import alignment
-from rollcli.stereo.alignment import Approach, SmallViews, Tolerance, is_level, level, resampled, size_factor
+from rollcli.stereo.alignment import Approach, level, resampled
 from rollcli.stereo.match import StereoOptions, match_pair
 from rollcli.stereo.misalignment import LEVEL, Misalignment
 
@@ -77,6 +76,7 @@ def test_uncorrected_they_would_turn_the_road(frame):
     assert abs(roll_deg(frame.left, right, align="off") - roll_deg(frame.left, right)) > 0.2
 
 
+@pytest.mark.slow
 def test_the_interval_knows_that_levelling_errs():
     """Enlarged views of six empty roads: without what levelling leaves, it misses two of the twelve rolls."""
     rolls = np.radians(np.linspace(-8, 8, 6))
@@ -291,23 +291,6 @@ def parts(offset=0.0, rotation=0.0, scale=0.0, corners=0.0, shape=SHAPE):
     return Misalignment(offset, rotation, scale, corners / (shape[0] * shape[1] / 4))
 
 
-@pytest.mark.parametrize("sign", [-1, 1])
-@pytest.mark.parametrize("place", range(4))
-@pytest.mark.parametrize("sure", [0.0, 2.0, 4.0])
-def test_views_are_level_within_the_tolerance_and_some_standard_errors(place, sign, sure):
-    limits, errors = (0.2, 0.003, 0.004, 0.5), (0.1, 0.001, 0.002, 0.05)
-    tolerance = Tolerance(*limits, sure=sure)
-
-    def one(value):
-        return parts(*(sign * value if each == place else 0.0 for each in range(4)))
-
-    assert is_level(one(0.99 * limits[place]), LEVEL, SHAPE, tolerance)
-    assert not is_level(one(1.01 * limits[place]), LEVEL, SHAPE, tolerance)
-    wider = limits[place] + sure * errors[place]
-    assert is_level(one(0.99 * wider), parts(*errors), SHAPE, tolerance)
-    assert not is_level(one(1.01 * wider), parts(*errors), SHAPE, tolerance)
-
-
 @pytest.mark.parametrize(
     "lies",
     [
@@ -352,26 +335,6 @@ def test_two_measurements_tell_what_a_map_hides(hidden):
     assert at.shifts(*SHAPE) == pytest.approx(rig.shifts(*SHAPE), abs=1e-4)
 
 
-@pytest.mark.parametrize("left", [0.95, 0.6, 0.5, 1.25, 3, 1])
-def test_the_next_start_is_not_further_than_twice_the_last_change(left):
-    """Level measures 1 px; from 1 px `left` more are measured: the line through both, or twice the change."""
-    approach = Approach(SHAPE)
-    assert approach.next(LEVEL, Misalignment(1.0)) == Misalignment(1.0)
-
-    second = approach.next(Misalignment(1.0), Misalignment(1.0 + left))
-
-    line = left / (left - 1) if left != 1 else 0.0
-    bounded = max(-2, min(2, line))
-    assert second.offset == pytest.approx(1 + left - left * bounded, abs=1e-4)
-
-
-@pytest.mark.parametrize(
-    ("shape", "pixels", "factor"), [((300, 400), 30_000, 2), ((100, 300), 30_000, 1), ((10, 10), 30_000, 1)]
-)
-def test_a_view_is_shrunk_to_so_many_pixels_and_never_enlarged(shape, pixels, factor):
-    assert size_factor(shape, pixels) == pytest.approx(factor)
-
-
 def test_a_map_of_another_size_is_in_its_pixels():
     v, u = np.mgrid[:40, :60].astype(np.float32)
     slope = 10 + 0.5 * u + 0.25 * v
@@ -401,33 +364,3 @@ def test_an_enlarged_map_has_no_number_that_a_hole_is_part_of(factor):
     v, u = np.mgrid[: 20 * factor, : 30 * factor]
     touched = (np.abs((v + 0.5) / factor - 10.5) < 0.99) & (np.abs((u + 0.5) / factor - 12.5) < 0.99)
     assert not large[touched].any()
-
-
-def test_small_views_measure_in_pixels_of_the_whole(monkeypatch):
-    whole = (np.zeros((600, 800), np.uint8), np.ones((600, 800), np.uint8))
-    small = SmallViews(whole)
-
-    assert small.shape == (600, 800)
-    assert small.factor == pytest.approx(2)
-    assert [view.shape for view in small.views] == [(300, 400)] * 2
-    assert [int(view.max()) for view in small.views] == [0, 1]
-    assert [int(view.max()) for view in small.swapped().views] == [1, 0]
-    assert small.closer.views[0] is whole[0]
-    asked = []
-
-    def measure(texture, disparity, start, rounds, every):
-        asked.append((float(disparity.max()), disparity.shape, start, rounds, every))
-        seen = Misalignment(1, 0.01, 0.02, 0.0004)
-        return alignment.Measured(seen, seen, 0.5, 0.1)
-
-    monkeypatch.setattr(alignment, "measure_misalignment", measure)
-    found = small.measure(np.full((600, 800), 12, np.float32), Misalignment(3, 0.01, 0.02, 0.0001), 4)
-
-    assert asked == [(6, (300, 400), Misalignment(1.5, 0.01, 0.02, 0.0002), 4, 1)]
-    small.closer.measure(np.full((600, 800), 12, np.float32), LEVEL, 4)
-    assert asked[1] == (12, (600, 800), LEVEL, 4, 4)  # as many pixels
-    assert found.misalignment == found.errors == Misalignment(2, 0.01, 0.02, 0.0002)
-    assert (found.share, found.spread) == (0.5, 0.2)
-    monkeypatch.setattr(alignment, "measure_misalignment", lambda *_: None)
-    assert small.measure(np.zeros((600, 800), np.float32), LEVEL) is None
-    assert math.isclose(SmallViews((whole[0][:, :50], whole[1][:, :50])).factor, 1)

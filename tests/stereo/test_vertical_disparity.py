@@ -74,18 +74,6 @@ def test_a_view_that_is_levelled_in_part_is_measured_as_a_whole():
     assert found.misalignment.shifts(*SHAPE) == pytest.approx(lies.shifts(*SHAPE), abs=0.02)
 
 
-def test_one_round_goes_no_further_than_may_be_believed():
-    left = cv2.GaussianBlur(texture_of(), (0, 0), 3)
-    left = cv2.normalize(left, None, 0, 255, cv2.NORM_MINMAX)
-    views = Texture.of((left, warped(left, Misalignment(5.0), 10)))
-
-    first = measure_misalignment(views, wall(), rounds=1).misalignment
-    many = measure_misalignment(views, wall(), rounds=12).misalignment
-
-    assert first.reach(*SHAPE) == pytest.approx(1.5)
-    assert many.offset == pytest.approx(5, abs=0.05)
-
-
 @pytest.mark.parametrize("noise", [0.0, 10.0, 15.0])
 def test_a_disparity_that_hides_the_offset_is_taken_back(noise):
     """Slanted stripes 0.4 px lower look like ones 0.4 px further along the row, and are matched there."""
@@ -113,43 +101,6 @@ def test_a_part_of_the_blocks_says_the_same_and_is_their_share(every):
     assert some.misalignment.shifts(*SHAPE) == pytest.approx(lies.shifts(*SHAPE), abs=0.03)
     assert some.share == pytest.approx(all_blocks.share, abs=0.03)
     assert some.errors.offset > 1.2 * all_blocks.errors.offset
-
-
-@pytest.mark.parametrize("known", [39, 40, 77])
-def test_the_blocks_that_tell_are_counted(known):
-    left = texture_of()
-    disparity = wall()
-    rows, columns = SHAPE[0] // 8, SHAPE[1] // 8
-    inner = [(row, column) for row in range(2, rows - 2) for column in range(4, columns - 2)]
-    chosen = set(inner[:: len(inner) // 80][:known])
-    for row in range(rows):
-        for column in range(columns):
-            if (row, column) not in chosen:
-                disparity[8 * row : 8 * row + 8, 8 * column : 8 * column + 8] = 0
-
-    found = measure_misalignment(Texture.of((left, warped(left, LEVEL, 10))), disparity)
-
-    assert len(chosen) == known
-    if known < 40:
-        assert found is None
-    else:
-        assert found.share == pytest.approx(known / (rows * columns))
-
-
-@pytest.mark.parametrize(("pixels", "tells"), [(44, False), (45, True)])
-def test_a_block_needs_seven_tenths_of_its_disparities(pixels, tells):
-    left = texture_of()
-    disparity = wall(0)
-    for row in range(16, 136, 8):
-        for column in range(40, 216, 8):
-            known = np.arange(64).reshape(8, 8) < pixels
-            disparity[row : row + 8, column : column + 8][known] = 10
-
-    found = measure_misalignment(Texture.of((left, warped(left, Misalignment(0.3), 10))), disparity)
-
-    assert (found is not None) == tells
-    if tells:
-        assert found.misalignment.offset == pytest.approx(0.3, abs=0.02)
 
 
 @pytest.mark.parametrize("shape", [(7, 100), (100, 7)])

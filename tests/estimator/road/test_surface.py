@@ -106,15 +106,6 @@ def test_on_a_roof_the_angle_is_that_of_the_side_the_rig_drives_on(fall):
     assert math.degrees(found.model.theta) == pytest.approx(0, abs=0.15)
 
 
-def test_whole_pixels_leave_no_stripes():
-    disparity = disparity_of(lambda x: 0 * x, roll_deg=0.2)
-
-    estimate = estimate_roll(np.rint(disparity))
-
-    assert abs(math.degrees(estimate.theta) - 0.2) < 0.05
-    assert estimate.road_fraction > 0.3
-
-
 def road_and_sides(sigma=0.1):
     """A road of -3 degrees with noise of sigma px, and how far to the right each pixel is, camera heights."""
     road = flat_road(-3, width=WIDTH, height=HEIGHT, focal=560.0, pitch_deg=0)

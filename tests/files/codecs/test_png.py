@@ -1,8 +1,6 @@
 """PNG files of every kind are read, and damaged ones never reach libpng."""
 
 import struct
-import subprocess
-import sys
 import zlib
 
 import cv2
@@ -121,59 +119,23 @@ WRONG = {
 }
 
 
-PRINTS = """
-import sys
-from rollcli.errors import InputError
-from rollcli.files.formats import decode_stored
-data = sys.stdin.buffer.read()
-try:
-    print(decode_stored(data, "map.png").values.sum())
-except InputError as error:
-    print(error)
-"""
-
-
 @pytest.mark.parametrize("what", WRONG)
 def test_a_file_that_is_wrong_behind_right_checksums_is_refused(what):
     with pytest.raises(InputError, match=r"^map.png: "):
         decode_stored(png_file(*WRONG[what]), "map.png")
 
 
-def prints_nothing(files):
-    """Decode the files in a process of its own, and see what reaches its terminal."""
-    script = PRINTS.replace("sys.stdin.buffer.read()", "None").replace(
-        "data = None", "files = eval(sys.stdin.read())"
-    )
-    script = script.replace("try:", "for data in files:\n  try:").replace("    print", "      print")
-    script = script.replace("except", "  except")
-    done = subprocess.run(
-        [sys.executable, "-c", script], input=repr(files), capture_output=True, text=True, check=True
-    )
-    assert len(done.stdout.splitlines()) == len(files)
-    return done.stderr == ""
-
-
-def test_neither_opencv_nor_libpng_prints_about_damaged_files():
-    whole = kitti_png()
-    noisy = [
-        (b"iCCP", b"x\0\0" + zlib.compress(b"abc")),
-        (b"gAMA", bytes(4)),
-        (b"tIME", bytes(3)),
-        (b"PLTE", b"ab"),
-        (b"cHRM", b"1"),
-    ]
-    palette = png_file(
-        png_header(2, 1, 8, 3), (b"PLTE", bytes(3)), (b"IDAT", zlib.compress(b"\0\7\7")), END
-    )  # index 7 of 1
-
-    assert prints_nothing(
-        [
-            *[png_file(*chunks) for chunks in WRONG.values()],
-            *[whole[:length] for length in range(8, len(whole), 211)],
-            make_png(values_of(16), extra=noisy),
-            palette,
-        ]
-    )
+# what libpng complains of: broken notes beside the pixels, and an index beyond the palette
+NOISY = [
+    make_png(
+        values_of(16),
+        extra=[
+            (b"iCCP", b"x\0\0" + zlib.compress(b"abc")),
+            *((b"gAMA", bytes(4)), (b"tIME", bytes(3)), (b"PLTE", b"ab"), (b"cHRM", b"1")),
+        ],
+    ),
+    png_file(png_header(2, 1, 8, 3), (b"PLTE", bytes(3)), (b"IDAT", zlib.compress(b"\0\7\7")), END),
+]
 
 
 def test_a_large_frame_is_what_opencv_decodes():

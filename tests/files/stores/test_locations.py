@@ -5,14 +5,7 @@ import pytest
 from rollcli.errors import UsageError
 from rollcli.files.results import part_names
 from rollcli.files.search import _fits
-from rollcli.files.stores.locations import (
-    base_name,
-    is_object_url,
-    is_url,
-    is_web_url,
-    scheme_of,
-    split_url,
-)
+from rollcli.files.stores.locations import base_name, is_object_url, is_url, is_web_url, scheme_of, split_url
 from rollcli.files.stores.objects import holds_for_all, is_final, reason_of, what_is_missing
 from tests.object_store import upload
 from tests.run_cli import rollcli, write_maps
@@ -140,82 +133,57 @@ def test_names_of_objects_say_nothing_of_what_is_wrong(name):
     assert what_is_missing(Exception(NAMED.format(name, "404 Not Found"))) == "there is no such object"
 
 
+NO_ANSWER = "the store does not answer; check the network and the endpoint"
+SLOW = "the store takes too long; ROLLCLI_STORE_TIMEOUT sets the seconds it may take"
+NO_KEYS = "no keys are given; set AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, or the store's own"
+SENDING = "HTTP error: error sending request"
+# status and code of an answer, what is said, whether it holds for all objects, and whether for good;
 # the codes are those of the lists of errors of Amazon S3 and of Azure Blob Storage
+ANSWERS = [
+    ("404 Not Found", "NoSuchBucket", NO_BUCKET, True, True),
+    ("404 Not Found", "ContainerNotFound", NO_BUCKET, True, True),
+    ("403 Forbidden", "AccessDenied", DENIED, False, True),
+    ("403 Forbidden", "", DENIED, False, True),
+    ("401 Unauthorized", "", "the keys are not accepted; check them", True, True),
+    ("403 Forbidden", "InvalidAccessKeyId", "the access key is unknown; check AWS_ACCESS_KEY_ID", True, True),
+    (
+        *("403 Forbidden", "SignatureDoesNotMatch"),
+        *("the secret key is wrong; check AWS_SECRET_ACCESS_KEY", True, True),
+    ),
+    ("400 Bad Request", "ExpiredToken", "the keys have expired; fetch new ones", True, True),
+    (
+        *("403 Forbidden", "RequestTimeTooSkewed"),
+        *("this machine's clock differs from the store's; set it", True, True),
+    ),
+    ("301 Moved Permanently", "PermanentRedirect", REGION, True, True),
+    ("400 Bad Request", "AuthorizationHeaderMalformed", REGION, True, True),
+    ("400 Bad Request", "RequestTimeout", "the store answered 400", False, False),
+    *(
+        (f"{code} x", "", f"the store answered {code}", False, code == 418)
+        for code in (408, 429, 500, 503, 418)
+    ),
+]
+ERRORS = [
+    ("Received redirect without LOCATION", REGION, True, True),
+    ("Error performing PUT http://169.254.169.254/latest/api/token", NO_KEYS, True, True),
+    (
+        "Generic MicrosoftAzure error: MissingAccount",
+        *("no account is given; set AZURE_STORAGE_ACCOUNT_NAME", True, False),
+    ),
+    (f"{SENDING} (kind: Timeout)", SLOW, True, False),
+    *(
+        (text, NO_ANSWER, True, False)
+        for text in (SENDING, "Connection refused", "reading a body from connection")
+    ),
+    ("error decoding response body", "the answer of the store was cut short", False, False),
+    ("something else", "the store refused the request", False, False),
+]
+
+
 @pytest.mark.parametrize(
     ("error", "said", "of_all", "final"),
-    [
-        (answer("404 Not Found", "NoSuchBucket"), NO_BUCKET, True, True),
-        (answer("404 Not Found", "ContainerNotFound"), NO_BUCKET, True, True),
-        (answer("403 Forbidden", "AccessDenied"), DENIED, False, True),
-        (answer("403 Forbidden"), DENIED, False, True),
-        (answer("401 Unauthorized"), "the keys are not accepted; check them", True, True),
-        (
-            answer("403 Forbidden", "InvalidAccessKeyId"),
-            "the access key is unknown; check AWS_ACCESS_KEY_ID",
-            True,
-            True,
-        ),
-        (
-            answer("403 Forbidden", "SignatureDoesNotMatch"),
-            "the secret key is wrong; check AWS_SECRET_ACCESS_KEY",
-            True,
-            True,
-        ),
-        (answer("400 Bad Request", "ExpiredToken"), "the keys have expired; fetch new ones", True, True),
-        (
-            answer("403 Forbidden", "RequestTimeTooSkewed"),
-            "this machine's clock differs from the store's; set it",
-            True,
-            True,
-        ),
-        (answer("301 Moved Permanently", "PermanentRedirect"), REGION, True, True),
-        (Exception("Received redirect without LOCATION"), REGION, True, True),
-        (answer("400 Bad Request", "AuthorizationHeaderMalformed"), REGION, True, True),
-        (answer("400 Bad Request", "RequestTimeout"), "the store answered 400", False, False),
-        (answer("408 Request Timeout"), "the store answered 408", False, False),
-        (answer("429 Too Many Requests"), "the store answered 429", False, False),
-        (answer("500 Internal Server Error"), "the store answered 500", False, False),
-        (answer("503 Slow Down"), "the store answered 503", False, False),
-        (answer("418 I'm a teapot"), "the store answered 418", False, True),
-        (
-            Exception("Error performing PUT http://169.254.169.254/latest/api/token"),
-            "no keys are given; set AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, or the store's own",
-            True,
-            True,
-        ),
-        (
-            Exception("Generic MicrosoftAzure error: MissingAccount"),
-            "no account is given; set AZURE_STORAGE_ACCOUNT_NAME",
-            True,
-            False,
-        ),
-        (
-            Exception("HTTP error: error sending request (kind: Timeout)"),
-            "the store takes too long; ROLLCLI_STORE_TIMEOUT sets the seconds it may take",
-            True,
-            False,
-        ),
-        (
-            Exception("HTTP error: error sending request"),
-            "the store does not answer; check the network and the endpoint",
-            True,
-            False,
-        ),
-        (
-            Exception("Connection refused"),
-            "the store does not answer; check the network and the endpoint",
-            True,
-            False,
-        ),
-        (
-            Exception("error reading a body from connection"),
-            "the store does not answer; check the network and the endpoint",
-            True,
-            False,
-        ),
-        (Exception("error decoding response body"), "the answer of the store was cut short", False, False),
-        (Exception("something else"), "the store refused the request", False, False),
-    ],
+    [(answer(*each[:2]), *each[2:]) for each in ANSWERS]
+    + [(Exception(each[0]), *each[1:]) for each in ERRORS],
     ids=lambda each: str(each)[:60] if isinstance(each, Exception) else None,
 )
 def test_an_objection_is_said_and_weighed(error, said, of_all, final):

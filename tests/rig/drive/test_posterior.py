@@ -46,14 +46,6 @@ def test_each_noise_has_the_fit_of_statsmodels_and_the_likelihood_of_scipy(cells
     assert fit.log_evidence[place, noise] == pytest.approx(expected + constant, rel=1e-6)
 
 
-def test_the_scan_is_the_evidence_of_each_design_with_one_more_step(cells):
-    likelihood, level = Likelihood(cells), np.ones((len(cells.first), 1))
-    scanned = likelihood.scan(level, likelihood.fit(level))
-    for at in (5, 17, 30):
-        step = (np.arange(len(level)) >= at).astype(float)
-        assert scanned[at] == pytest.approx(likelihood.fit(np.column_stack([level, step])).evidence, rel=1e-6)
-
-
 def test_a_pair_of_steps_gains_what_its_fit_gains(cells):
     likelihood, level = Likelihood(cells), np.ones((len(cells.first), 1))
     fit = likelihood.fit(level)

@@ -213,29 +213,6 @@ def test_a_worker_that_cannot_be_set_up_answers_with_the_reason(error):
     assert pools._error_of(lambda: None) is None
 
 
-@pytest.mark.parametrize(
-    ("count", "jobs", "threads", "processes"),
-    [
-        (5, 1, 1, 0),
-        (5, 2, 1, 2),
-        (2, 3, 1, 2),
-        (1, 3, 1, 0),
-        (0, 3, 1, 0),
-        (1, 1, 2, 1),
-        (0, 1, 4, 0),
-        (3, 2, 4, 2),
-    ],
-)
-def test_there_are_as_many_processes_as_tasks_and_jobs_allow(count, jobs, threads, processes):
-    executor = runs._executor(count, WORK, Workers(jobs, threads=threads))
-    if processes == 0:
-        assert executor is None
-    else:
-        executor.close(at_once=True)
-        assert isinstance(executor, PoolExecutor)
-        assert len(executor._pool) == processes
-
-
 def test_no_scheduler_is_asked_for_unless_one_is_named():
     require_scheduler(None)
     with pytest.raises(UsageError, match=r"^--scheduler"):
