@@ -17,8 +17,6 @@ from rollcli.extras import require_extra
 from tests.run_cli import ROOT
 
 ACTION = yaml.safe_load((ROOT / ".github" / "action" / "action.yml").read_text("utf-8"))
-
-
 SAMPLES = ROOT / "sample_data"
 
 
@@ -130,8 +128,6 @@ def steps(names, given, programs, cwd, status=0):
 
 
 needs_bash = pytest.mark.skipif(shutil.which("bash") is None, reason="bash is not installed")
-
-
 PROGRAMS = os.path.dirname(sys.executable)  # noqa: PTH120
 
 

@@ -24,8 +24,6 @@ from tests.run_cli import ROOT
 from tests.run_cli import rollcli as run
 
 MAP = ROOT / "sample_data" / "maps" / "frame_0001.png"
-
-
 CALIB = ROOT / "sample_data" / "calib.txt"
 
 
@@ -231,8 +229,6 @@ def test_the_page_of_reference_is_what_the_docstrings_say():
 
 
 FUNCTIONS = [name for name in rollcli.__all__ if isinstance(getattr(rollcli, name), types.FunctionType)]
-
-
 README = (ROOT / "README.md").read_text("utf-8")
 
 

@@ -60,15 +60,6 @@ def test_every_method_fills_the_columns(maps, method, road):
     assert done.err.count("px of cy") == 1  # what holds for all frames is said once
 
 
-def test_json_lines_hold_the_same_numbers(maps):
-    text = rollcli("estimate", "maps", "--calib", "calib.txt", cwd=maps).out
-    lines = rollcli(
-        "estimate", "maps", "--calib", "calib.txt", "--format", "jsonl", cwd=maps
-    ).out.splitlines()
-    for row, line in zip(rows_of(text), map(json.loads, lines), strict=True):
-        assert [line[name] for name in POSE] == [float(row[name]) for name in POSE]
-
-
 def test_without_a_calibration_the_columns_are_empty_and_the_roll_is_the_same(maps):
     plain, posed = (
         rows_of(rollcli("estimate", "maps", *options, cwd=maps).out)
@@ -113,13 +104,6 @@ def test_two_calibrations_of_one_stem_and_a_large_one_are_refused(maps):
     large = rollcli("estimate", "maps", "--calib", "large.txt", cwd=maps)
     assert (large.status, large.out) == (2, "")
     assert large.err == "rollcli: large.txt: has 1048577 bytes; up to 1 MB are read\n"
-
-
-def test_a_pair_of_ros_files_is_given_left_and_right(maps):
-    (maps / "left.yaml").write_text(samples.ros(RIG, right=False))
-    (maps / "right.yaml").write_text(samples.ros(RIG, right=True))
-    done = rollcli("estimate", "maps", "--calib", "left.yaml", "--calib", "right.yaml", cwd=maps)
-    assert_posed(rows_of(done.out))
 
 
 def test_a_map_at_half_the_size_uses_the_scaled_calibration(maps):
@@ -225,11 +209,6 @@ def test_a_result_never_replaces_the_calibration(maps):
     done = rollcli("estimate", "maps", "--calib", "calib.txt", "-o", "calib.txt", "--overwrite", cwd=maps)
     assert done.status == 2
     assert (maps / "calib.txt").read_text() == before
-
-
-def test_a_dry_run_lists_the_calibration(maps):
-    done = rollcli("estimate", "maps", "--calib", "calib.txt", "--dry-run", cwd=maps)
-    assert "read  calib.txt\n" in done.out
 
 
 def test_depth_maps_become_the_disparities_of_their_calibration(maps):

@@ -1,13 +1,11 @@
 """--config and the environment."""
 
 import json
-import subprocess
-import sys
 
 import cv2
 import pytest
 
-from tests.run_cli import environment, rollcli, write_maps
+from tests.run_cli import python, rollcli, write_maps
 
 
 @pytest.fixture
@@ -134,11 +132,6 @@ def test_what_is_wrong_with_a_config_file_is_said_with_its_name(maps, text, reas
     assert done.err.count("\n") == 1
 
 
-def test_a_missing_config_file_is_an_error(maps):
-    done = rollcli("estimate", "maps", "--config", "none.toml", cwd=maps)
-    assert (done.status, "none.toml: cannot be read" in done.err) == (2, True)
-
-
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
@@ -212,8 +205,7 @@ sys.argv = ["rollcli", "estimate", ".", *{arguments}]
 from rollcli.__main__ import main
 main()
 """
-    line = [sys.executable, "-c", code]
-    done = subprocess.run(line, cwd=tmp_path, env=environment(), capture_output=True, text=True, check=False)
+    done = python(code, cwd=tmp_path)
     assert done.returncode == 1
     first, *rest = done.stderr.splitlines()
     assert first.startswith("rollcli: internal error, please report it: KeyError: 'key'")

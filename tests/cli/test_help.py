@@ -17,8 +17,6 @@ from tests.readme_tables import commands
 from tests.run_cli import ROOT, environment, rollcli
 
 COMMANDS = dict(commands())
-
-
 HELP = """
 import sys
 sys.argv = ["rollcli", *{words}, "--help"]

@@ -20,11 +20,7 @@ from rollcli.files.threads import in_threads
 from tests.run_cli import ROOT, road_map, rollcli, write_kitti, write_pair
 
 SAMPLES = ROOT / "sample_data"
-
-
 TABLE = Path(__file__).with_name("mistakes.txt").read_text("utf-8")
-
-
 ANSWERS = re.findall(r"^\$ (.+)\n(\d+): (.+)$", TABLE, flags=re.MULTILINE)
 
 
@@ -87,8 +83,6 @@ def test_the_table_is_read_whole():
 
 
 ROW = {"file": "a.png", "status": "ok", "roll_deg": 1.0, "roll_ci95_deg": 0.1}
-
-
 COMMANDS = {
     "rig": ["rig", "r.jsonl", "--format", "csv"],
     "report": ["report", "r.jsonl", "--svg", "s"],

@@ -127,13 +127,11 @@ CORNERS = "'0,375 600,180 1242,375'"
         (Roi(), " 0 , 1 , 2,3 ", (0, 1, 2, 3)),
         (Roi(), [0, 1, 2, 3], (0, 1, 2, 3)),
         (Roi(), "2,0,2,3", "is not X0,Y0,X1,Y1"),
-        (Roi(), "0,3,2,3", "is not X0,Y0,X1,Y1"),
         (Roi(), "0,1,2", "is not X0,Y0,X1,Y1"),
         (Roi(), "0,1,2,3.5", "is not X0,Y0,X1,Y1"),
         (Point(), "609.6,172.9", (609.6, 172.9)),
         (Point(), (1, 2), (1.0, 2.0)),
         (Point(), "1", "is not CX,CY"),
-        (Point(), "1,2,3", "is not CX,CY"),
         (Point(), "1,inf", "is not CX,CY"),
         (Polygon(), "0,0 4,0 0,3.5", ((0, 0), (4, 0), (0, 3.5))),
         (Polygon(), [[0, 0], [4, 0], [0, 3.5]], ((0, 0), (4, 0), (0, 3.5))),
@@ -143,7 +141,6 @@ CORNERS = "'0,375 600,180 1242,375'"
         (Polygon(), "0,0 4,0 1,nan", "is not three or more corners"),
         (Polygon(), 5, "is not three or more corners"),
         (Shard(), "1/1", (1, 1)),
-        (Shard(), "8/8", (8, 8)),
         (Shard(), "0/8", "is not I/N"),
         (Shard(), "9/8", "is not I/N"),
         (Shard(), "1", "is not I/N"),
@@ -154,13 +151,9 @@ CORNERS = "'0,375 600,180 1242,375'"
         (Turns(), "-90:90:0.5", (-90, 90, 0.5)),
         (Turns(), "5:5:1", (5, 5, 1)),
         (Turns(), "0:1000:1", "is not A:B:STEP"),
-        (Turns(), "-90.1:0:1", "is not A:B:STEP"),
-        (Turns(), "0:90.1:1", "is not A:B:STEP"),
         (Turns(), "2:1:1", "is not A:B:STEP"),
-        (Turns(), "0:1:0", "is not A:B:STEP"),
         (Turns(), "0:10:0.01", (0, 10, 0.01)),  # a thousand steps
         (Turns(), "0:10.02:0.01", "is not A:B:STEP"),
-        (Turns(), "1:2", "is not A:B:STEP"),
         (FilePath(), "", "the name is empty"),
         (FilePath(), "a", "a"),
         (OutputFile((".csv",), "CSV"), "a.JSON", r"'a.JSON': \.json is not written here; write CSV"),
@@ -169,17 +162,14 @@ CORNERS = "'0,375 600,180 1242,375'"
         (Choice("gd", "gss"), "GSS", "gss"),
         (Span(), "-5:5.5", (-5, 5.5)),
         (Span(), "2", (2, 2)),
-        (Span(), "2:2", (2, 2)),
         (Span(), (1.0, 2.0), (1, 2)),
         (Span(), "2:1", "is not A:B with A <= B"),
         (Span(), "1:2:3", "is not A:B with A <= B"),
         (Span(), "1:nan", "is not A:B with A <= B"),
-        (Span(), "", "is not A:B with A <= B"),
         (Size(), "640x480", (640, 480)),
         (Size(), "1X2", (1, 2)),
         (Size(), (3, 4), (3, 4)),
         (Size(), "640", "is not WxH"),
-        (Size(), "640x480x3", "is not WxH"),
         (Size(), "-640x480", "is not WxH"),
     ],
 )
@@ -202,8 +192,6 @@ NUMBERS = (
     "0", "-0.0", "1", "-1", "0.5", "1e-320", "1e9", "-1e9", "1e300", "1e308", "1e999", "nan", "inf", "-inf",
     "9" * 30, "9" * 5000, "0x10", "1_000", "٣", "1e", "", " ",
 )  # fmt: skip
-
-
 OPTIONS = sorted(
     (name, option.opts[0])
     for name, context in commands()
@@ -212,8 +200,6 @@ OPTIONS = sorted(
     and not option.is_flag
     and option.name not in ("help", "version", "config")
 )
-
-
 NO_NUMBERS = (click.Path, click.Choice, click.types.StringParamType, click.types.BoolParamType)
 
 

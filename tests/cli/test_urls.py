@@ -14,8 +14,6 @@ from rollcli.files.stores.locations import names_a_file
 from tests.run_cli import contents, road_map, rollcli, rollcli_process, write_maps, write_pair
 
 CALIBRATION = "P0: 200 0 80 0 0 200 60 0 0 0 1 0\nP1: 200 0 80 -100 0 200 60 0 0 0 1 0\n"
-
-
 MAPS = 3
 
 

@@ -20,8 +20,6 @@ from rollcli.simulate.spec import FrameSpec
 from tests.estimator.synthetic_maps import flat_road
 
 SIZE = {"width": 320, "height": 240, "focal": 280.0}
-
-
 MAPS = 100
 
 
@@ -188,8 +186,6 @@ def equal_shares(position, share, count=6):
 # of a parameter's largest change, or of its textbook error: the sums are in single precision (6e-8), and the
 # normal equations have condition numbers of up to 260, more where a group is left out
 SINGLE = 1e-4
-
-
 CASES = [{}, {"prior": math.inf}, {"parabolic": False}, {"heavy": 0.3}, {"prior": 5e4}]
 
 

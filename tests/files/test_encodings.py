@@ -160,16 +160,6 @@ def test_no_data_is_stored_as_each_encoding_has_it():
     assert from_disparity(empty, "cityscapes").tolist() == [[0, 0, 0, 0, 513]]
 
 
-def test_disparities_beyond_the_numbers_are_refused_and_a_few_are_dropped():
-    disparity = np.full((20, 20), 100.0)
-    disparity[0, 0] = 300
-    assert from_disparity(disparity, "kitti")[0, :2].tolist() == [0, 25600]
-
-    disparity[0] = 300
-    with pytest.raises(InputError, match="disparities up to 300 px do not fit numbers that end at 256 px"):
-        from_disparity(disparity, "kitti")
-
-
 def test_masks_of_maps_and_images_are_read(tmp_path):
     mask = np.eye(4, dtype=np.uint8)
     (tmp_path / "a.png").write_bytes(make_png(mask, 8))
@@ -207,14 +197,6 @@ def test_stored_distances_are_metres_or_whole_millimetres():
     assert to_disparity(stored([2], "f4"), encoding="depth").disparity.dtype == np.float32
 
 
-def test_the_doubt_says_what_was_read_and_what_it_may_be():
-    assert to_disparity(stored([0, 511], "u2", note="two pages")).warning == (
-        "two pages; uint16 numbers up to 511, read as kitti (/256), are disparities up to 2.00 px: "
-        "they look like whole pixels (--encoding px)"
-    )
-    assert "--encoding px" in to_disparity(stored([0, 1], "u2")).warning
-
-
 def test_one_pixel_of_a_hundred_may_be_too_large_and_no_more():
     disparity = np.full((10, 10), 100.0)
     disparity[0, 0] = 65535 / 256
@@ -243,8 +225,6 @@ def test_disparities_are_rounded_to_the_nearest_number():
 
 
 REALMAPS = Path(__file__).parents[2].parent / "shared" / "realmaps"
-
-
 TRUTHS = {"frame_0001": -8.0, "frame_0003": 12.0, "frame_0004": -4.0}
 
 

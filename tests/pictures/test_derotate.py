@@ -75,18 +75,6 @@ def test_every_type_keeps_its_type_and_its_numbers(dtype, expand):
     np.testing.assert_allclose(level.astype(float), exact, atol=0.5 if "f" not in dtype else 0.05)
 
 
-@pytest.mark.parametrize("share", [0.05, 0.75])
-@pytest.mark.parametrize("roll_deg", [1, 7, -20, 45, 90])
-def test_there_and_back_makes_no_invalid_pixel_valid(roll_deg, share):
-    theta = math.radians(roll_deg)
-    values = with_holes(road(theta), share)
-
-    back = derotate(derotate(values, theta), -theta)
-
-    assert not (back > 0)[values == 0].any()
-    assert (back > 0).sum() > 0.3 * (values > 0).sum()
-
-
 @pytest.mark.parametrize("hole", [0.0, -1.0, np.nan, np.inf, -3.4e38])
 def test_no_data_bleeds_into_no_value(hole):
     values = np.full(SHAPE, 50.0, np.float32)

@@ -14,8 +14,6 @@ from rollcli.pictures.heights_preview import BAR_WIDTH, draw_heights
 from rollcli.rig.calibration import Calibration
 
 WIDTH, HEIGHT = 640, 240
-
-
 CENTRE = (WIDTH - 1) / 2, (HEIGHT - 1) / 2
 
 

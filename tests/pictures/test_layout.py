@@ -4,7 +4,6 @@ import cv2
 import numpy as np
 import pytest
 
-from rollcli.pictures import overlay
 from rollcli.pictures.overlay import BAR_WIDTH, draw_disparity, draw_preview, draw_road, draw_road_on_photo
 from rollcli.pictures.vdisparity import BOTTOM_MARGIN, LEFT_MARGIN, VDisparity, draw_v_disparity, v_disparity
 
@@ -268,43 +267,10 @@ def road_map(height=100, width=80, near=60.0):
     return np.repeat(np.linspace(10, near, height)[:, None], width, axis=1)
 
 
-def chart(picture):
-    """The part of a picture whose rows are those of the map."""
-    return picture[:-BOTTOM_MARGIN, LEFT_MARGIN:]
-
-
-def test_a_few_outliers_do_not_change_the_range():
-    values = road_map(100, 400)
-    with_outliers = values.copy()
-    with_outliers[0, :20] = 900.0
-
-    kept = chart(draw_v_disparity(v_disparity(with_outliers, bins=1000, max_disparity=1000)))
-    plain = chart(draw_v_disparity(v_disparity(values, bins=1000, max_disparity=1000)))
-
-    assert kept.shape == plain.shape
-    np.testing.assert_array_equal(kept[1:], plain[1:])
-
-
-@pytest.mark.parametrize(("bins", "near"), [(61, 60.0), (256, 60.0), (319, 90.0), (330, 90.0), (1024, 200.0)])
-def test_maps_of_one_size_have_pictures_of_one_size(bins, near):
-    histogram = v_disparity(road_map(near=near), bins=bins, max_disparity=near + 1)
-    assert draw_v_disparity(histogram).shape == (100 + BOTTOM_MARGIN, LEFT_MARGIN + 320, 3)
-
-
 @pytest.mark.parametrize("horizon", [-5.0, 99.5, 1e9])
 def test_a_horizon_outside_of_the_map_is_not_drawn(horizon):
     histogram = v_disparity(road_map())
     np.testing.assert_array_equal(draw_v_disparity(histogram), draw_v_disparity(histogram, horizon=horizon))
-
-
-def test_a_road_that_turns_back_within_a_dash_is_a_line_and_no_loop():
-    histogram = v_disparity(road_map())
-    there_and_back = (42.25, -7.0, 1.0)  # 30 px in the middle of the first eight rows, 42 px at their ends
-    plain, drawn = (chart(draw_v_disparity(histogram, road)) for road in (None, there_and_back))
-    changed = (plain != drawn).any(axis=2)
-    ends = 42.25 * changed.shape[1] / 61
-    assert np.flatnonzero(changed[0]).max() == pytest.approx(ends, abs=3)
-    assert np.flatnonzero(changed[3]).max() < ends - 20
 
 
 def test_no_data_is_black_and_data_never_is():
@@ -321,10 +287,3 @@ def test_no_data_is_black_and_data_never_is():
 def test_empty_maps_and_empty_masks_are_drawn():
     assert not draw_disparity(np.zeros((3, 4))).any()
     assert draw_road(np.ones((3, 4)), np.zeros((3, 4))).shape == (3, 4, 3)
-
-
-def test_a_map_is_drawn_the_same_a_few_rows_at_a_time(monkeypatch):
-    disparity = np.random.default_rng(0).uniform(-5, 60, (50, 40)).astype(np.float32)
-    whole = draw_disparity(disparity)
-    monkeypatch.setattr(overlay, "_BLOCK", 3 * 40)
-    assert np.array_equal(draw_disparity(disparity), whole)

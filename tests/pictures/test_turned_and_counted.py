@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from rollcli.errors import UsageError
-from rollcli.pictures import derotate as derotate_module
 from rollcli.pictures import vdisparity as vdisparity_module
 from rollcli.pictures.derotate import derotate
 from rollcli.pictures.vdisparity import middle_row, row_offset, v_disparity
@@ -73,13 +72,6 @@ def test_each_pixel_of_a_turned_map_is_that_of_its_definition(shape, roll_deg, e
     else:
         assert level.shape == shape
     np.testing.assert_allclose(level, turned(values, roll, level.shape), atol=1e-9)
-
-
-def test_maps_are_turned_the_same_a_few_rows_at_a_time(monkeypatch):
-    values = np.random.default_rng(1).uniform(-5, 60, (40, 30))
-    whole = derotate(values, 0.2, expand=True)
-    monkeypatch.setattr(derotate_module, "_BLOCK", 100)
-    np.testing.assert_array_equal(derotate(values, 0.2, expand=True), whole)
 
 
 @pytest.mark.parametrize(

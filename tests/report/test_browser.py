@@ -28,8 +28,6 @@ PLACE = """name => {
                                 box.y + chart._fullLayout[axis].d2p(trace.y[place])];
     }
 }"""
-
-
 NEVER_IDLE = "window.requestIdleCallback = () => {}"  # charts wait until the browser is idle
 
 

@@ -8,10 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rollcli.report import content
 from rollcli.report.chart import Chart, chart_names, script_json
 from rollcli.report.charts import all_charts, chart_over_frames, histogram, outside, view
-from rollcli.report.sources import SPREAD, SUSPECT, WIDEST, Choice
 from rollcli.report.summary import degrees, summarize, with_interval, written_at
 from rollcli.rig.drive.assess import assess_rig
 from tests.report.results import row
@@ -229,31 +227,6 @@ def test_a_histogram_is_of_two_angles_or_more():
     pairs = [replace(row(f"{name}.png", None), right_lower_px=0.1) for name in "ab"]
     assert chart_names(pairs) == ["roll", "alignment"]
     assert chart_names(pairs[:1]) == ["roll"]
-
-
-@pytest.mark.parametrize(
-    ("chosen", "angled", "words"),
-    [
-        ([], 5, "Every frame that has an angle."),
-        ([SPREAD] * 5, 5, "Every frame that has an angle."),
-        ([SPREAD] * 2, 5, "2 of 5 frames that have an angle: 2 evenly spread."),
-        (
-            [SUSPECT, SPREAD],
-            5,
-            "2 of 5 frames that have an angle: 1 of the suspect ones and 1 evenly spread over the rest.",
-        ),
-        (
-            [WIDEST, WIDEST, SUSPECT, SPREAD],
-            1000,
-            "4 of 1,000 frames that have an angle: the 2 with the widest interval, 1 of the other suspect "
-            "ones and 1 evenly spread over the rest.",
-        ),
-        ([WIDEST], 2, "1 of 2 frames that have an angle: the 1 with the widest interval."),
-    ],
-)
-def test_which_frames_are_shown_is_said_in_words(chosen, angled, words):
-    rows = [row(f"{i}.png", 1.0 if i < angled else None) for i in range(angled + 3)]
-    assert content._chosen_text(rows, [Choice(place, reason) for place, reason in enumerate(chosen)]) == words
 
 
 def test_json_in_a_script_cannot_end_it():

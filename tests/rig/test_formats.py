@@ -400,19 +400,6 @@ def test_a_rig_whose_images_have_no_size_is_one_of_any_size(form):
     assert (found.width, found.height) == (None, None)
 
 
-@pytest.mark.parametrize("side", ["width", "height"])
-def test_half_of_a_size_is_none(side):
-    text = re.sub(rf"Camera.{side}: .*", "", samples.orb_slam(RIG))
-    assert (parse(text).width, parse(text).height) == (None, None)
-
-
-def test_a_pair_of_ros_files_without_a_size_is_one_of_any_size():
-    left, right = (without_size(samples.ros(RIG, right=side)) for side in (False, True))
-    found = parse(left, right)
-    assert numbers(found) == pytest.approx(truth(RIG), rel=1e-12, abs=1e-9)
-    assert (found.width, found.height) == (None, None)
-
-
 def test_a_calibration_without_a_size_has_no_edge_that_its_centre_could_be_near():
     for width, height in ((None, None), (640, None), (None, 480)):
         assert not Calibration(700.0, 700.0, 639.0, 479.0, width=width, height=height).at_edge

@@ -88,8 +88,6 @@ def test_a_verbose_run_names_every_failure(lines):
 
 
 PAIR = Frame("left/a.png", "right/a.png", "left/a.png", "right/a.png", "a.png", None)
-
-
 MAP = Frame("a.png", "", "a.png", "", "a.png", None)
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from rollcli.files.results import parse_rows
 from rollcli.run.result_file import whole_rows
-from tests.run_cli import command, contents, environment, road_map, rollcli, write_kitti, write_maps
+from tests.run_cli import command, contents, environment, road_map, rollcli, started, write_kitti, write_maps
 
 FRAMES = 40
 IMAGES = ("--derotated", "upright", "--vdisparity", "v")
@@ -42,13 +42,8 @@ def results(folder):
 
 def start(folder, *arguments):
     """A run in a process group of its own, as a shell would start it."""
-    return subprocess.Popen(
-        command("estimate", "maps", "-o", "rolls.csv", *IMAGES, *arguments),
-        cwd=folder,
-        env=environment(),
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
+    return started(
+        "estimate", "maps", "-o", "rolls.csv", *IMAGES, *arguments, cwd=folder, start_new_session=True
     )
 
 
@@ -122,12 +117,16 @@ def test_the_command_that_resumes_can_be_pasted_whatever_its_words_are(undisturb
     (tmp_path / "a b.toml").write_text("overwrite = true\nseed = 3\n")
     path = os.pathsep.join([str(program.parent), os.environ["PATH"]])
     settings = {"ROLLCLI_ESTIMATE_INVALID": "5 6", "ROLLCLI_ESTIMATE_TIMING": "0"}
-    run = subprocess.Popen(
-        command("estimate", "-o", "my rolls.csv", "--config", "a b.toml", "--", folder),
+    run = started(
+        "estimate",
+        "-o",
+        "my rolls.csv",
+        "--config",
+        "a b.toml",
+        "--",
+        folder,
         cwd=tmp_path,
         env=environment(PATH=path, ROLLCLI_ESTIMATE_ROAD="all", **settings),
-        stderr=subprocess.PIPE,
-        text=True,
     )
     wait_for_rows(tmp_path, 4, run, "my rolls.csv")
     run.send_signal(signal.SIGINT)
@@ -152,14 +151,7 @@ def test_the_command_that_resumes_a_list_says_that_it_is_needed_again(undisturbe
     with (tmp_path / "list").open("w") as names:
         names.write("\n".join(maps))
     with (tmp_path / "list").open() as names:
-        run = subprocess.Popen(
-            command("estimate", "-", "-o", "rolls.csv"),
-            cwd=tmp_path,
-            env=environment(),
-            stdin=names,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
+        run = started("estimate", "-", "-o", "rolls.csv", cwd=tmp_path, stdin=names)
     wait_for_rows(tmp_path, 4, run)
     run.send_signal(signal.SIGINT)
     _, err = run.communicate(timeout=60)

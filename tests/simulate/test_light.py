@@ -5,7 +5,7 @@ import pytest
 
 from rollcli.simulate.build import build_scene
 from rollcli.simulate.camera import expose
-from rollcli.simulate.materials import NoiseTile, Plain, band, bars, coarse, fine
+from rollcli.simulate.materials import Plain, band, bars, coarse, fine
 from rollcli.simulate.road import Piece
 from rollcli.simulate.roadside import vehicle
 from rollcli.simulate.scene import Light, Scene, air_below, draw_light, in_shadow, sky
@@ -162,24 +162,6 @@ def test_bars_cover_their_share_of_a_pixel_however_many_it_holds(width):
     x = np.linspace(-3, 3, 101, dtype=np.float32)
     expected = averaged(lambda t: np.mod(t, 1.3) < 0.4, x, width)
     assert np.allclose(bars(x, 1.3, 0.4, np.full_like(x, width)), expected, atol=2e-3)
-
-
-def test_a_level_of_a_noise_tile_holds_the_averages_of_the_finer_one():
-    tile = NoiseTile(seed=5, slope=0.7, longest=200.0)
-    rows, columns = np.mgrid[:64, :64]
-
-    def texels(level, rows, columns):
-        scale = 2.0**level
-        x, y = ((at.ravel() + 0.5) * scale for at in (columns, rows))
-        return tile.sample(x.astype(np.float32), y.astype(np.float32), np.full(x.size, level, np.int32))
-
-    fine_texels = texels(0, rows, columns).reshape(64, 64)
-    for level in (1, 3, 5):
-        side = 1 << level
-        coarser = texels(level, *np.mgrid[: 64 >> level, : 64 >> level]).reshape(64 >> level, -1)
-        assert np.allclose(
-            coarser, fine_texels.reshape(64 >> level, side, -1, side).mean(axis=(1, 3)), atol=1e-5
-        )
 
 
 @pytest.mark.parametrize("noise", [fine, coarse])

@@ -19,11 +19,7 @@ from rollcli.stereo.match import StereoOptions, match_pair
 from rollcli.stereo.misalignment import LEVEL, Misalignment
 
 SHARED = Path(__file__).parents[2].parent / "shared"
-
-
 ROLL = math.radians(-3)
-
-
 ODD_RIGS = [  # degrees clockwise, percent larger, pixels lower
     (0.3, 0.0, 0.0),
     (-0.8, 0.0, 0.0),

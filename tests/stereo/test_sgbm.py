@@ -69,13 +69,6 @@ def test_rows_that_are_needed_are_matched_with_16_beside_them(views, rows, seen)
     assert not disparity.any()
 
 
-@pytest.mark.parametrize("rows", [slice(None), slice(16, 124), slice(5, 130), slice(0, 200)])
-def test_rows_that_need_all_are_matched_as_a_whole(views, rows):
-    options = StereoOptions()
-    whole = match_views(views, 0, 48, options)
-    np.testing.assert_array_equal(match_rows(views, 0, 48, options, rows), whole)
-
-
 @pytest.mark.parametrize(("above", "top"), [(60, 44), (17, 1), (150, 124)])
 def test_rows_above_are_matched_at_a_third_of_the_size(views, above, top):
     disparity = match_rows(views, 0, 40, StereoOptions(speckle_size=90), above=above)
@@ -86,30 +79,6 @@ def test_rows_above_are_matched_at_a_third_of_the_size(views, above, top):
     left, right = (cv2.resize(view[: top + 16], size, interpolation=cv2.INTER_AREA) for view in views)
     small = match_views((left, right), 0, 16, StereoOptions(speckle_size=10))
     np.testing.assert_array_equal(disparity[:top], resampled(small, (top + 16, 200))[:top])
-
-
-def test_coarse_rows_show_what_fine_ones_do(views):
-    fine, coarse = (match_rows(views, 0, 48, StereoOptions(), above=above) for above in (0, 120))
-    both = (fine[:100] > 0) & (coarse[:100] > 0)
-    assert both.mean() > 0.5
-    assert np.median(np.abs(fine - coarse)[:100][both]) < 0.5
-
-
-def test_rows_above_those_that_are_needed_hold_no_data(views):
-    options = StereoOptions()
-
-    disparity = match_rows(views, 0, 48, options, slice(20, 130), 80)
-
-    assert not disparity[:20].any()
-    assert disparity[20:64].any()
-    np.testing.assert_array_equal(disparity[64:], match_rows(views, 0, 48, options, slice(80, 130))[64:])
-
-
-def test_above_the_first_needed_row_nothing_is_left_to_match_small(views):
-    options = StereoOptions()
-    rows = slice(60, 100)
-    expected = match_rows(views, 0, 48, options, rows)
-    np.testing.assert_array_equal(match_rows(views, 0, 48, options, rows, 40), expected)
 
 
 def test_views_that_are_too_narrow_at_a_third_hold_no_data_above(views):

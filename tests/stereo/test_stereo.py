@@ -13,7 +13,6 @@ from rollcli.files.formats import read_image
 from rollcli.files.inputs import pair_inputs
 from rollcli.simulate.render import render_frame
 from rollcli.simulate.spec import FrameSpec
-from rollcli.stereo import match as stereo
 from rollcli.stereo import sgbm
 from rollcli.stereo.match import StereoOptions, Wanted, compute_disparity, match_pair
 
@@ -163,17 +162,6 @@ def test_below_the_first_row_a_pair_is_matched_as_in_the_whole(street, lower):
     assert np.median(np.abs(whole.disparity - part.disparity)[:80][above]) < 0.5
     assert part.corrected.offset == pytest.approx(lower, abs=0.15)
     assert (part.doubt, part.whole) == ("", None)
-
-
-@pytest.mark.parametrize(
-    ("row", "above"), [(-5.0, 0), (0.0, 0), (23.9, 0), (24.0, 24), (80.4, 80), (144.0, 144), (200.0, 144)]
-)
-def test_as_many_rows_are_matched_small_as_are_worth_it_and_may_be_none_of_a_road(row, above, monkeypatch):
-    asked = []
-    match = stereo.match_rows
-    monkeypatch.setattr(stereo, "match_rows", lambda *of: asked.append(of[5]) or match(*of))
-    match_pair(*pair_at(20, shape=(240, 400)), StereoOptions(), Wanted(first_row=in_row(row)))
-    assert asked == [above]
 
 
 @pytest.mark.parametrize("rows", [slice(None), slice(60, 180), slice(150, 190)])

@@ -54,13 +54,6 @@ def test_walls_beside_a_road_are_no_candidates():
     assert math.degrees(found.theta) == pytest.approx(2, abs=0.01)
 
 
-@pytest.mark.parametrize("factor", [0.01, 3.0, 1000.0])
-def test_a_constant_factor_gives_the_same_angle(factor):
-    disparity = road_with_obstacles(5)
-    (scaled, _), (found, _) = areas(disparity * factor), areas(disparity)
-    assert scaled.theta == pytest.approx(found.theta, abs=1e-9)
-
-
 def test_whole_pixels_still_agree():
     found, _ = areas(np.rint(flat_road(4, **SIZE)).astype(np.uint8))
     assert math.degrees(found.theta) == pytest.approx(4, abs=0.1)

@@ -16,8 +16,6 @@ from rollcli.estimator.solvers.solution import Solution
 from tests.estimator.synthetic_maps import bent_road, degrees_apart, energy_of, random_maps, repeatable
 
 STEP = math.pi / 2048
-
-
 DENSE = np.arange(2048) * STEP - math.pi / 2 + STEP
 
 
@@ -161,8 +159,6 @@ def test_in_a_narrow_strip_every_minimum_is_polished_too(slope):
 
 
 ENERGY = energy_of(np.random.default_rng(3).uniform(1, 9, (40, 60)))
-
-
 LOWEST, HIGHER = (minimum.theta for minimum in minima(ENERGY)[:2])
 
 

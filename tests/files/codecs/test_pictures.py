@@ -14,14 +14,8 @@ from rollcli.files.codecs.png import decoding
 from tests.run_cli import road_map, rollcli, write_pair
 
 IMAGE = cv2.GaussianBlur(np.random.default_rng(0).integers(0, 256, (120, 160), dtype=np.uint8), (0, 0), 2)
-
-
 WHOLE = cv2.imencode(".jpg", IMAGE)[1].tobytes()
-
-
 END = b"\xff\xd9"
-
-
 READ = (
     "import sys\n"
     "from rollcli.errors import InputError\n"

@@ -86,17 +86,9 @@ def test_what_follows_the_end_does_not_matter():
 
 # files that are wrong although each checksum is right: what libpng would print about
 ROWS = png_rows(values_of(16), 16)
-
-
 DATA = zlib.compress(ROWS)
-
-
 END = (b"IEND", b"")
-
-
 HEADER = png_header(53, 37)
-
-
 WRONG = {
     "no data": [HEADER, END],
     "empty data": [HEADER, (b"IDAT", b""), END],
@@ -188,11 +180,7 @@ def test_every_flipped_bit_is_refused_or_changes_nothing(layout):
 
 # its table 11.1: the bit depths of grey, colour, palette, grey with opacity, colour with opacity
 DEPTHS = {0: (1, 2, 4, 8, 16), 2: (8, 16), 3: (1, 2, 4, 8), 4: (8, 16), 6: (8, 16)}
-
-
 CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}
-
-
 GREYS = bytes(np.repeat(np.arange(256, dtype=np.uint8), 3))
 
 

@@ -261,8 +261,6 @@ def test_every_flipped_bit_of_deflated_pixels_is_refused_or_changes_nothing(kind
 
 
 COLOURS = np.random.default_rng(0).integers(0, 256, (20, 30, 4), dtype=np.uint8)
-
-
 VALUES = disparity_map().astype(np.uint16)
 
 
@@ -364,8 +362,6 @@ PACKBITS, DEFLATE, DEFLATE_OF_BEFORE = 32773, 8, 32946  # of libtiff's tiff.h
 
 # of Apple's Technical Note TN1023
 PACKED = bytes.fromhex("FE AA 02 80 00 2A FD AA 03 80 00 2A 22 F7 AA")
-
-
 PLAIN = bytes.fromhex("AA AA AA 80 00 2A AA AA AA AA 80 00 2A 22") + 10 * b"\xaa"
 
 
@@ -421,8 +417,6 @@ def packed(*codes):
 
 
 CLEAR, END = (256, 9), (257, 9)
-
-
 LETTERS = [(ord(letter), 9) for letter in "abcdefg"]
 
 

@@ -4,7 +4,6 @@ import pytest
 
 from rollcli.errors import UsageError
 from rollcli.files.results import part_names
-from rollcli.files.search import _fits
 from rollcli.files.stores.locations import base_name, is_object_url, is_url, is_web_url, scheme_of, split_url
 from rollcli.files.stores.objects import holds_for_all, is_final, reason_of, what_is_missing
 from tests.object_store import upload
@@ -55,27 +54,6 @@ def test_the_last_part_of_a_web_address_is_that_of_its_path():
     assert base_name("maps/a.png") == "a.png"
 
 
-@pytest.mark.parametrize(
-    ("path", "pattern", "fits"),
-    [
-        ("a.png", "*.png", True),
-        ("b/a.png", "*.png", False),
-        ("b/a.png", "*/*.png", True),
-        ("b/a.png", "**/*.png", True),
-        ("a.png", "**/*.png", True),
-        ("c/b/a.png", "**/*.png", True),
-        ("c/b/a.png", "c/**/a.png", True),
-        ("c/a.png", "c/**/a.png", True),
-        ("c/b/a.png", "c/**", True),
-        ("c/b/a.png", "**/c/a.png", False),
-        ("A.png", "a.png", False),
-        ("c", "c/*", False),
-    ],
-)
-def test_a_pattern_is_held_against_a_path_folder_by_folder(path, pattern, fits):
-    assert _fits(path.split("/"), pattern.split("/")) == fits
-
-
 def test_parts_have_numbers_and_come_in_their_order():
     names = ["part-00010.csv", "part-00009.csv", "part-100000.csv", "part-00000.csv"]
     others = ["part-0001.csv", "part-00001.txt", "xpart-00001.csv", "part-00001.csv.gz", "part-00001"]
@@ -100,11 +78,7 @@ def test_a_prefix_with_a_dot_is_a_folder_where_objects_lie_below_it(tmp_path, bu
 
 
 NO_BUCKET = "there is no such bucket"
-
-
 DENIED = "access is denied; check the rights of these keys"
-
-
 REGION = "the bucket is in another region; set AWS_REGION"
 
 

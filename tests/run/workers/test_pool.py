@@ -105,13 +105,6 @@ def test_a_worker_that_died_with_nothing_to_do_is_replaced_before_its_next_chunk
         assert settled(executor, executor.submit([("give", 2)])) == [2]
 
 
-def test_workers_end_with_their_executor():
-    with pool() as executor:
-        assert settled(executor, executor.submit([("give", 1)])) == [1]
-        processes = [worker._process for worker in executor._pool]
-    assert [process.is_alive() for process in processes] == [False, False]
-
-
 def test_a_file_stays_open_in_the_workers(tmp_path):
     fcntl = pytest.importorskip("fcntl", reason="this system has no flock")
     path = tmp_path / "locked"
@@ -163,14 +156,6 @@ def test_workers_end_after_their_task_or_at_once(tmp_path):
         assert worker._process.exitcode == status
         assert busy.exists() == at_once  # it was let go once it was held
     assert not (tmp_path / "late").exists()
-
-
-def test_results_that_nobody_asks_for_do_not_keep_workers_from_ending():
-    with pool() as executor:
-        for _ in range(6):
-            executor.submit([("give", "x" * 1_000_000)])
-        time.sleep(0.5)
-        executor.close(at_once=False)
 
 
 def test_when_a_further_worker_cannot_start_the_others_end(monkeypatch):
