@@ -72,6 +72,8 @@ def _imports(node, *, in_function, wanted):
     for child in ast.iter_child_nodes(node):
         if isinstance(child, ast.If) and ast.unparse(child.test) == "TYPE_CHECKING":
             continue  # never loaded
+        if not isinstance(child, ast.stmt | ast.excepthandler | ast.match_case):
+            continue  # an expression imports nothing
         if in_function is wanted and isinstance(child, ast.ImportFrom):
             full = [f"{child.module}.{alias.name}" for alias in child.names]
             yield from (each if each in MODULES else child.module for each in full if ours(each))
