@@ -1,4 +1,4 @@
-"""--config and the environment."""
+"""--config and the environment, and what is said of a variable with a typo."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""Each command's manual page."""
+"""Each command's manual page, and what is documented of options."""
 
 import inspect
 import math

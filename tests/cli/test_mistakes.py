@@ -1,4 +1,4 @@
-"""Typical mistakes of a new user, and the program's answer to each: the exact line, and the exit status."""
+"""Mistakes, typical and unexpected, and the answer to each: the exact line, and the exit status."""
 
 import json
 import re

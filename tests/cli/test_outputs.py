@@ -1,4 +1,4 @@
-"""The images that `estimate` writes: their names, and what they never replace."""
+"""The images that `estimate` writes: their names, what they never replace, and the later of two runs."""
 
 import os
 from importlib import import_module

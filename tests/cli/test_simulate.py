@@ -1,4 +1,4 @@
-"""`rollcli simulate` as a user runs it."""
+"""`rollcli simulate` as a user runs it, and a rendered drive that `estimate` and `rig` read."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""Which values each kind of option takes, at its bounds and just beyond them."""
+"""Which values each kind of option takes, at its bounds and beyond them; any number ends in one line."""
 
 import contextlib
 import math

@@ -1,4 +1,4 @@
-"""A URL works wherever a path does: every command gives the same from a bucket and into it."""
+"""A URL works wherever a path does, and one that names no file is refused."""
 
 import csv
 import re

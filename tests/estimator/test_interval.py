@@ -1,4 +1,4 @@
-"""The interval holds the truth as often as it says, and the jackknife is that of refitting."""
+"""The interval holds the truth as often as it says; jackknife and tangent are those of least squares."""
 
 import dataclasses
 import math

@@ -1,4 +1,4 @@
-"""Stored numbers become pixels, and no data becomes 0, whatever a file calls it."""
+"""Stored numbers become pixels, and no data becomes 0, whatever a file calls it and a plateau shows."""
 
 import csv
 from pathlib import Path

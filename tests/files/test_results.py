@@ -1,4 +1,4 @@
-"""Rows to text and back."""
+"""Rows to text and back, columns of a result, and which row belongs to which file."""
 
 import io
 import json

@@ -1,4 +1,4 @@
-"""What the charts hold."""
+"""What the charts and the summary hold."""
 
 import html
 import json

@@ -1,4 +1,4 @@
-"""Where the files of a row are looked for."""
+"""Where the files of a row are looked for, and which frames are shown in pictures."""
 
 import math
 import threading

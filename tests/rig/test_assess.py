@@ -1,4 +1,4 @@
-"""The rig from rows, as a user of Python calls it."""
+"""The rig from rows, as a user of Python calls it, and which frames are one drive."""
 
 import re
 from dataclasses import make_dataclass

@@ -1,4 +1,4 @@
-"""Counts, lines and the exit status of a run."""
+"""Counts, lines, the bar and the exit status of a run."""
 
 import os
 import struct

@@ -1,4 +1,4 @@
-"""FILE.run.json: what it holds, what is read back from it, and which inputs it tells apart."""
+"""FILE.run.json: what it holds and what is read back; the roll of the rig that ends a run."""
 
 import json
 import math

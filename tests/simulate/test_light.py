@@ -1,4 +1,4 @@
-"""Shadows fall where the sun is hidden, and it is dim below cars."""
+"""The light of what rays hit: shadows, sun, sky, textures, and what a sensor makes of it."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Rays meet surfaces where a slow march along the ray says so, and textures do not stretch."""
+"""Rays meet the nearest surface where a slow march along the ray says so."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The road is found on whole frames: rendered ones with known roll, degraded ones, real ones."""
+"""The road is found on whole frames, rendered, degraded and real; without finding, all pixels count."""
 
 import functools
 import itertools

@@ -1,4 +1,4 @@
-"""The exact solver: no other angle has a lower energy."""
+"""The exact solver: no other angle has a lower energy, and which minimum is meant."""
 
 import math
 

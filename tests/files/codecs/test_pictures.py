@@ -1,4 +1,4 @@
-"""JPEG images that are cut, damaged or too large are refused; whole ones are read."""
+"""JPEG images that are cut, damaged or too large are refused without a word; whole ones are read."""
 
 import struct
 import subprocess

@@ -1,4 +1,4 @@
-"""TIFF files of every usual kind are read, with or without imagecodecs."""
+"""TIFF files of every usual kind, layout and compression are read, with or without imagecodecs."""
 
 import io
 import struct

@@ -1,4 +1,4 @@
-"""Names of places: which are URLs, and what their parts are; names of parts, and their order."""
+"""Names of places and of parts, and what a store objects to: its error codes become one line."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""The posterior: its parts against statsmodels and scipy, its interval against simulated truth."""
+"""The posterior against statsmodels and scipy, its interval against simulated truth, and outliers."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Real worker processes: order, deaths, retries, errors and how they end."""
+"""Real worker processes: how many, order, deaths, retries, errors and how they end."""
 
 import contextlib
 import os

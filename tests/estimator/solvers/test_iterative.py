@@ -1,4 +1,4 @@
-"""Gradient descent with the paper's learning rate."""
+"""Gradient descent with the paper's learning rate, and golden section search."""
 
 import math
 

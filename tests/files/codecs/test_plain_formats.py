@@ -1,4 +1,4 @@
-"""NPY files are read without their pickles, and without belief in their headers."""
+"""NPY, PFM, BMP and Netpbm files are read without their pickles, and without belief in their headers."""
 
 import struct
 
