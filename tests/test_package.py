@@ -1,4 +1,4 @@
-"""The wheel and the source distribution are whole, install into a fresh environment, and run there."""
+"""The wheel and the source distribution install and run; what keeps the project in order agrees."""
 
 import email
 import os

@@ -1,4 +1,4 @@
-"""What a programmer meets: every public name typed, and each mistake one clear error."""
+"""What a programmer meets: every public name typed, examples that hold, each mistake one clear error."""
 
 import dataclasses
 import doctest

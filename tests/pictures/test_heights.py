@@ -1,4 +1,4 @@
-"""Heights over the road against a search for the nearest point of the surface in space."""
+"""Heights over the road against a search for the nearest point in space, and their colours."""
 
 import math
 

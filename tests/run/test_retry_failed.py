@@ -1,4 +1,4 @@
-"""What failed is done again, and the result is the one of a run in which nothing failed."""
+"""What failed is done again, on Windows too, and the result is that of a run without failures."""
 
 import json
 import os

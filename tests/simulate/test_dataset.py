@@ -1,4 +1,4 @@
-"""The folder that `rollcli simulate` writes."""
+"""The folder that `rollcli simulate` writes, and the samples of the project."""
 
 import csv
 import math

@@ -1,4 +1,4 @@
-"""What OpenCV is asked to match, against OpenCV itself."""
+"""What OpenCV is asked to match, against OpenCV itself, and what its paths lag behind."""
 
 import cv2
 import numpy as np

@@ -1,4 +1,4 @@
-"""Vertical disparities of synthetic views, against what these were warped by and plain least squares."""
+"""Vertical disparities, their fit and the first look, against what synthetic views were warped by."""
 
 import cv2
 import numpy as np
