@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
+from rollcli.stereo import first_look as first_looks
 from rollcli.stereo import row_fit
 from rollcli.stereo.alignment import SmallViews, Texture, measure_misalignment, textured_share
 from rollcli.stereo.first_look import FirstLook, first_look, look_for_range
@@ -294,3 +295,10 @@ def test_a_look_finds_how_far_the_right_view_lies_off(lower):
     assert look.measured.misalignment.scale == pytest.approx(0, abs=0.002)
     assert (look.measured.misalignment == LEVEL) == (lower == 0)
     assert 49 <= look.range <= 56
+
+
+def test_views_too_narrow_to_search_have_no_disparities():
+    narrow = texture_of((40, 20))
+    assert not first_looks._match((narrow, narrow), 8).any()
+    wide = pair_of(8, shape=(40, 120))
+    assert np.median(first_looks._match(wide, 8.2)[:, 40:100]) == pytest.approx(8, abs=0.1)

@@ -146,3 +146,26 @@ def test_imagecodecs_undoes_the_predictor_of_every_float(imagecodecs, plain, kin
     file = make_tiff(disparity_map().astype(kind), "deflate", order, 3, rows_per_strip=10)
 
     assert outcome(file) == plain(file)
+
+
+def decoded(values, filters):
+    """Decode a file whose rows have these filters, one after the other; the options do not reach OpenCV."""
+    height, width = values.shape
+    plain = filtered(values, filters)
+    return fast_png.decode_grey16(zlib.compress(plain), width, height, partial(grey_file, width, height))
+
+
+@pytest.mark.parametrize("filters", [[0], [1], [2], [3], [4], [0, 1], [1, 4, 0, 3, 2], [1] * 30 + [4]])
+@pytest.mark.parametrize("shape", [(37, 53), (1, 1), (1, 200), (200, 1), (60, 700)])
+def test_rows_of_every_filter_read_as_opencv_reads_them(installed, shape, filters):
+    values = np.random.default_rng(1).integers(0, 2**16, shape, dtype=np.uint16)
+    file = grey_file(*shape[::-1], zlib.compress(filtered(values, filters)))
+    np.testing.assert_array_equal(cv2.imdecode(np.frombuffer(file, np.uint8), cv2.IMREAD_UNCHANGED), values)
+
+    found = decoded(values, filters)
+
+    assert (found is None) == (installed == "nothing")
+    if found is not None:
+        assert (found.dtype, found.flags.c_contiguous, found.flags.writeable) == (np.uint16, True, True)
+        np.testing.assert_array_equal(found, values)
+    np.testing.assert_array_equal(decode_stored(file, "x").values, values)

@@ -1,14 +1,18 @@
 """The order of results, the sizes of chunks, halving and stops, with an executor in this process."""
 
+import threading
 from collections import Counter
 
 import pytest
 
-from rollcli.run.workers.chunks import Done, Work
+from rollcli.run.workers import chunks as chunk_sizes
+from rollcli.run.workers.chunks import Chunk, Done, Work
 from rollcli.run.workers.in_order import Workers
 from rollcli.run.workers.interrupt import Stop
 from rollcli.run.workers.tasks import run_tasks
 from tests.run.workers.tasks import in_order
+
+WORK = Work(str, str)
 
 
 class DiedError(Exception):
@@ -132,3 +136,38 @@ def test_this_process_begins_no_task_after_a_stop():
     stop.asked = True
     assert list(results) == []
     assert begun == ["a"]
+
+
+def chunk_of(do, tasks, stopped=None):
+    return Chunk(do, WORK.join, tasks, stopped or threading.Event(), WORK.longest_s)
+
+
+def test_a_chunk_ends_between_tasks_when_it_is_stopped():
+    stopped = threading.Event()
+
+    def do(task):
+        if task == 3:
+            stopped.set()
+        return task
+
+    assert chunk_of(do, range(10), stopped).done().results == [0, 1, 2, 3]
+    assert chunk_of(do, range(10), stopped).done().results == []
+
+
+def test_a_chunk_gives_back_what_it_has_not_begun_in_time(monkeypatch):
+    times = iter([0.0, 0.0, 0.5, 1.5, 2.5, 3.5, 4.0, 5.0])
+    monkeypatch.setattr(chunk_sizes.time, "monotonic", lambda: next(times))
+    done = chunk_of(lambda task: task, range(5)).done()
+    assert (done.results, done.error) == ([0, 1, 2], None)
+
+
+def test_an_error_ends_a_chunk_after_the_results_before_it():
+    def fail(task):
+        if task == 2:
+            raise ValueError(task)
+        return task
+
+    done = chunk_of(fail, range(5)).done()
+    assert done.results == [0, 1]
+    assert isinstance(done.error, RuntimeError)
+    assert "ValueError in " in str(done.error)
