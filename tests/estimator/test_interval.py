@@ -216,22 +216,6 @@ def test_without_each_group_all_parameters_are_those_of_a_least_squares_fit(case
         assert freedom == pytest.approx(1 / np.sum(leverage**2) - 1, rel=1e-6)
 
 
-@pytest.mark.parametrize("case", CASES)
-def test_the_textbooks_covariance_is_that_of_as_many_pixels_as_could_be_independent(case):
-    problem, theta = fitted(**case)
-    weights = problem.surface.weights
-    known = np.flatnonzero(problem.design.any(axis=0))
-    normal = (problem.design.T * weights) @ problem.design + np.diag([0, 0, 0, 0, problem.prior])
-    _, squares = problem.solve(weights)
-    independent = max(1, weights.sum() / TUNING.interval.independent_pixels)
-    expected = np.zeros((5, 5))
-    inverse = np.linalg.inv(normal[np.ix_(known, known)])
-    expected[np.ix_(known, known)] = inverse * squares / weights.sum() * independent
-    white = jackknife(problem.surface, theta, TUNING.interval).white
-    errors = np.sqrt(expected.diagonal()[:4])
-    assert (np.abs(white - expected[:4, :4]) <= SINGLE * np.outer(errors, errors)).all()
-
-
 def test_the_unevenness_of_waves_is_theirs_and_that_of_noise_is_none():
     rng = np.random.default_rng(3)
     rows, columns = np.mgrid[:300, :400].astype(float)

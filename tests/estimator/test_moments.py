@@ -89,14 +89,6 @@ def test_any_real_dtype_gives_the_same_sums(dtype):
     assert_same(map_moments(whole.astype(dtype), plane=plane), map_moments(whole, plane=plane))
 
 
-def test_what_is_subtracted_leaves_nothing_of_a_plane_wherever_its_pixels_lie():
-    v, u = np.mgrid[:90, :160]
-    plane = 40 + 0.11 * u + 0.23 * v
-    slanted = map_moments(np.where(np.abs(u - 1.5 * v) < 25, plane, 0))  # where p and q go together
-    assert slanted.rr < 0.01**2 * slanted.weight  # the plane is rounded
-    assert (slanted.plane[1], slanted.plane[2]) == pytest.approx((0.11 * 80, 0.23 * 80), abs=0.01)
-
-
 @pytest.mark.parametrize("size", [(9, 14000), (50, 2500), (300, 40)])
 def test_wide_and_tall_maps_are_summed_in_other_blocks(size):
     disparity = np.random.default_rng(4).uniform(-1, 9, size)

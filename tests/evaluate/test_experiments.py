@@ -66,16 +66,6 @@ def test_every_method_follows_the_rotations(found):
         assert max(math.degrees(error) for error in errors) < 0.5, name
 
 
-def test_methods_follow_far_and_whatever_the_scale_of_the_map_is():
-    disparity = bent_road(3, width=120, height=90, noise=0.1)
-    far, small = examine("a", disparity, [math.radians(60)]), examine("a", disparity / 200, TURNS[:1])
-    assert disparity.max() < 200
-    for name in METHODS:
-        for found in (far, small):
-            (error,) = found.method_errors[name]
-            assert math.degrees(error) < 0.5, name
-
-
 def test_pixels_without_data_count_for_no_method():
     disparity = bent_road(3, width=120, height=90, noise=0.1)
     disparity[:, :40] = 0

@@ -10,7 +10,7 @@ from rollcli.evaluate import paper_page
 from rollcli.evaluate.experiments import DELTAS, FORMS, LAMBDAS, METHODS, SOLVERS, Findings, Times
 from rollcli.evaluate.options import ExperimentOptions, PaperOptions
 from rollcli.evaluate.paper_page import charts
-from rollcli.evaluate.tables import METHOD_NAMES, SOLVER_NAMES, all_tables
+from rollcli.evaluate.tables import SOLVER_NAMES, all_tables
 from rollcli.run.options import EncodingOptions, InputOptions, RegionOptions, RunningOptions
 
 TOLERANCES = ["0.1°", "0.01°", "0.001°", "0.0001°"]
@@ -141,11 +141,3 @@ def test_mean_errors_of_the_solvers_are_drawn_in_degrees(tables):
         assert is_open == (solver == "exact")  # it lies around the others
     axis = charts(tables)["accuracy"].layout["yaxis"]
     assert (axis["type"], axis["dtick"], axis["ticksuffix"]) == ("log", 1, "°")  # a label at each decade
-
-
-def test_median_and_worst_of_each_method_are_drawn_in_degrees(tables):
-    drawn = traces(charts(tables)["methods"])
-    assert list(drawn) == ["median", "95th percentile", "worst"]
-    for name, radians in (("median", 0.002), ("worst", 0.003)):
-        assert drawn[name]["y"] == [METHOD_NAMES[method] for method in METHODS]
-        assert drawn[name]["x"] == pytest.approx([math.degrees(radians * (1 + k)) for k in range(5)])

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from rollcli.run.rig_gates import Check
-from rollcli.run.rig_text import Findings, as_csv, as_json, as_table, moved
-from tests.run.rigs import UNKNOWN, known, rig, sequence, short
+from rollcli.run.rig_text import Findings, as_csv, as_json, as_table
+from tests.run.rigs import UNKNOWN, known, rig, sequence
 
 
 def assessed():
@@ -153,18 +153,3 @@ def test_of_many_segments_the_table_shows_forty(drives, more):
     assert sum(line.endswith("/2") for line in lines) == 40
     said = [line for line in lines if "more segments" in line]
     assert said == ([] if more is None else [f"and {more:,} more segments; --format csv lists all"])
-
-
-@pytest.mark.parametrize(
-    ("change", "expected"),
-    [
-        (known(0.5, 0.25), True),
-        (known(-0.5, 0.25), True),
-        (known(0.25, 0.25), False),
-        (known(0.0, 0.25), False),
-        (short(9.0), None),
-        (UNKNOWN, None),
-    ],
-)
-def test_a_move_is_a_change_of_more_than_its_interval(change, expected):
-    assert moved(change) is expected

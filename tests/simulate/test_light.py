@@ -130,20 +130,6 @@ def test_the_image_darkens_toward_its_corners_and_not_elsewhere():
     assert image[0, 100] == image[50, 0] == np.rint(204 * np.sqrt(0.88))
 
 
-def test_grey_is_the_weighted_mean_of_red_green_and_blue():
-    light = np.zeros((3, 3, 3), np.float32)
-    for channel, weight in enumerate((0.114, 0.587, 0.299)):  # BT.601, blue first
-        light[:] = 0
-        light[..., channel] = 1
-        image = expose(light, 0.0, 1.0, False, np.random.default_rng(0))
-        assert image[1, 1] == np.rint(255 * np.sqrt(weight))
-
-
-def test_noise_has_a_mean_of_zero():
-    errors = exposed(0.25, noise=6.0)[40:60, 90:110].astype(float) - 127.5
-    assert abs(errors.mean()) < 0.8
-
-
 def averaged(pattern, centre, width):
     """The mean of a pattern of 0 and 1 over pixels, by brute force."""
     offsets = (np.arange(4000) + 0.5) / 4000 - 0.5

@@ -142,24 +142,6 @@ def test_a_ray_that_meets_nothing_sees_the_sky():
     assert hits.depth.min() > NEAR
 
 
-def test_a_footprint_is_the_area_that_neighbouring_rays_enclose_on_the_road():
-    spec = FrameSpec("bare", math.radians(20), math.radians(5), seed=4, size=(160, 120), focal=93.0)
-    scene, pixels = every_pixel(spec)
-    hits = trace(scene, pixels)
-    depth = np.minimum(hits.depth, 1000.0)
-    points = (pixels.rays.origin + depth * pixels.rays.direction).reshape(3, 120, 160)
-    near = (hits.depth < 12).reshape(120, 160)[1:-1, 1:-1]
-    # central differences on the ground, which is level: x and z span it
-    across = (points[:, 1:-1, 2:] - points[:, 1:-1, :-2])[[0, 2]] / 2
-    down = (points[:, 2:, 1:-1] - points[:, :-2, 1:-1])[[0, 2]] / 2
-    area = np.abs(across[0] * down[1] - across[1] * down[0])[near]
-    longest = np.linalg.svd(np.stack([across, down], axis=-1)[:, near].transpose(1, 0, 2), compute_uv=False)
-    long, short = hits.reads[4:6].reshape(2, 120, 160)[:, 1:-1, 1:-1][:, near]
-    assert near.sum() > 2000
-    assert np.allclose(long, longest[:, 0], rtol=0.01)
-    assert np.allclose(long * short, area, rtol=0.01)
-
-
 def box(low, high):
     """The corners of a box in the world, (3, 8)."""
     return np.stack(np.meshgrid(*np.stack([low, high], axis=1), indexing="ij")).reshape(3, -1)

@@ -175,25 +175,6 @@ def test_a_fit_without_noise_is_exact_and_outliers_do_not_move_it():
     assert robust.shifts(160, 300) == pytest.approx(lies.shifts(160, 300), abs=1e-2)
 
 
-def test_the_errors_of_a_fit_are_whites_for_weighted_least_squares():
-    seen = seen_at(Misalignment(0.5, -0.004, 0.006, 5e-5), noise=0.2)
-    found, errors, spread = row_fit.fit_rows(seen)
-
-    x, y = seen.x.astype(float), seen.y.astype(float)
-    columns = np.stack([np.ones_like(x), x, y, x * y], axis=1)
-    off = seen.shift - columns @ [found.offset, found.rotation, found.scale, found.twist]
-    weight = seen.weight / (1 + (off / (1.5 * spread)) ** 2) ** 2
-    inverse = np.linalg.inv(columns.T @ (columns * weight[:, None]))
-    middle = columns.T @ (columns * ((weight * off) ** 2)[:, None])
-    expected = np.sqrt(np.diag(inverse @ middle @ inverse))
-    np.testing.assert_allclose(
-        [errors.offset, errors.rotation, errors.scale, errors.twist], expected, rtol=0.01
-    )
-    assert spread == pytest.approx(0.2, rel=0.1)
-    best = inverse @ (columns.T @ (weight * seen.shift))
-    assert found.shifts(160, 300) == pytest.approx(Misalignment(*best).shifts(160, 300), abs=5e-3)
-
-
 def blocks_of(rng, field, *, below_horizon=False, noise=0.1, count=1500):
     """Blocks of a street: a road, and walls of any distance to both sides."""
     x, y = rng.uniform(-600, 600, count), rng.uniform(-20 if below_horizon else -180, 180, count)

@@ -148,13 +148,6 @@ def test_the_angle_is_within_half_the_tolerance(roll_deg, delta_deg):
 
 
 @repeatable
-@given(st.floats(-90, 90))
-def test_the_angle_stays_in_its_range(roll_deg):
-    theta = golden_section(energy_of(bent_road(roll_deg, width=40, height=30))).theta
-    assert -math.pi / 2 < theta <= math.pi / 2
-
-
-@repeatable
 @given(random_maps())
 def test_it_ends_near_a_minimum_or_at_the_end_of_its_bracket(disparity):
     energy = energy_of(disparity)

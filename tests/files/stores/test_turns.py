@@ -31,27 +31,6 @@ def test_tasks_of_one_worker_wait_for_the_network_together_and_answer_in_order()
     assert list(results) == [number**2 for number in tasks]
 
 
-def test_one_computes_at_a_time():
-    computes, most = 0, 0
-
-    def compute():
-        nonlocal computes, most
-        for _ in range(200):
-            with computing():
-                computes += 1
-                most = max(most, computes)
-                computes -= 1
-                with waiting_for_network():
-                    pass
-
-    threads = [threading.Thread(target=compute) for _ in range(4)]
-    for each in threads:
-        each.start()
-    for each in threads:
-        each.join()
-    assert most == 1
-
-
 def test_what_tasks_have_read_ahead_is_bounded_and_no_task_waits_for_ever(monkeypatch):
     monkeypatch.setattr(turns, "_BYTES_IN_HAND", 100)
     most, parts = 0, (30, 40)  # a task reads two files: with all eight at once, 560
