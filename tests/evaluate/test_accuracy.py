@@ -205,3 +205,8 @@ def test_a_pose_that_is_no_number_is_named(tmp_path, name, kind):
     path = write_truth(tmp_path / "t.csv", f"file,roll_deg,{name}\nframe1,1,steep\n")
     with pytest.raises(InputError, match=f"line 2: {name} is 'steep', not {kind}$"):
         read_known_poses(path)
+
+
+def test_a_truth_that_is_not_there_is_refused(tmp_path):
+    with pytest.raises(InputError, match=r"t\.csv: cannot be read: no such file or directory$"):
+        read_truth(tmp_path / "t.csv")
