@@ -92,19 +92,6 @@ def test_a_disparity_that_hides_the_offset_is_taken_back(noise):
     assert found.misalignment.offset == pytest.approx(0.4, abs=0.03)
 
 
-@pytest.mark.parametrize("every", [2, 3, 4])
-def test_a_part_of_the_blocks_says_the_same_and_is_their_share(every):
-    left, lies = texture_of(), Misalignment(0.5, 0.004, -0.003, 4e-5)
-    views = Texture.of((left, warped(left, lies, 10)))
-
-    all_blocks = measure_misalignment(views, wall(), rounds=8)
-    some = measure_misalignment(views, wall(), rounds=8, every=every)
-
-    assert some.misalignment.shifts(*SHAPE) == pytest.approx(lies.shifts(*SHAPE), abs=0.03)
-    assert some.share == pytest.approx(all_blocks.share, abs=0.03)
-    assert some.errors.offset > 1.2 * all_blocks.errors.offset
-
-
 @pytest.mark.parametrize("shape", [(7, 100), (100, 7)])
 def test_views_smaller_than_a_block_tell_nothing(shape):
     view = texture_of(shape)

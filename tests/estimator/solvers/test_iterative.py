@@ -156,11 +156,6 @@ def test_it_ends_near_a_minimum_or_at_the_end_of_its_bracket(disparity):
     assert min(degrees_apart(theta, end) for end in ends) < 0.01
 
 
-def test_a_tolerance_below_rounding_ends_too():
-    energy = energy_of(bent_road(5, noise=0.1))
-    assert golden_section(energy, SolverSettings(1e-300)).iterations < 100
-
-
 def test_it_takes_the_path_of_the_textbook_form():
     disparity = bent_road(-7, noise=0.5)
     found, textbook = golden_section(energy_of(disparity)), Textbook.of(disparity).golden_section(1.7e-6)
