@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -63,6 +64,20 @@ def rollcli_process(*arguments: str | Path, cwd: Path, stdin: str = "", **variab
     )
     assert "Traceback" not in done.stderr, done.stderr
     return Finished(done.returncode, done.stdout, done.stderr)
+
+
+def python(
+    code: str, *arguments: str | Path, cwd: Path, check: bool = False
+) -> subprocess.CompletedProcess[str]:
+    """Run some Python in a process of its own."""
+    line = [sys.executable, "-c", code, *map(str, arguments)]
+    return subprocess.run(line, cwd=cwd, env=environment(), capture_output=True, text=True, check=check)
+
+
+def started(*arguments: str | Path, cwd: Path, **how: Any) -> "subprocess.Popen[str]":
+    """Start the program and go on; what it says on standard error can be read."""
+    how = {"env": environment(), "stderr": subprocess.PIPE, "text": True} | how
+    return subprocess.Popen(command(*arguments), cwd=cwd, **how)
 
 
 # a worker that reads a certain map says so, and comes back from it when it may

@@ -1,4 +1,4 @@
-"""The wheel and the source distribution are whole, install into a fresh environment, and run there."""
+"""The wheel and the source distribution install and run; what keeps the project in order agrees."""
 
 import email
 import os
@@ -12,6 +12,8 @@ import zipfile
 import pytest
 import yaml
 
+from rollcli.errors import UsageError
+from rollcli.extras import require_extra
 from tests.run_cli import ROOT
 
 ACTION = yaml.safe_load((ROOT / ".github" / "action" / "action.yml").read_text("utf-8"))
@@ -130,6 +132,7 @@ PROGRAMS = os.path.dirname(sys.executable)  # noqa: PTH120
 
 
 @needs_bash
+@pytest.mark.slow
 def test_the_action_estimates_makes_the_page_and_checks(tmp_path):
     pytest.importorskip("plotly", reason="plotly, of the extra report, is not here")
     given = {"maps": str(SAMPLES / "maps"), "calib": str(SAMPLES / "calib.txt"), "untold": "pass"}
@@ -140,12 +143,14 @@ def test_the_action_estimates_makes_the_page_and_checks(tmp_path):
 
 
 @needs_bash
+@pytest.mark.slow
 def test_the_actions_check_fails_a_rig_that_is_not_as_asked(tmp_path):
     given = {"maps": str(SAMPLES / "maps"), "estimate": "--roi=0,0,2,2"}
     steps(["estimate", "check"], given, PROGRAMS, tmp_path, status=4)
 
 
 @needs_bash
+@pytest.mark.slow
 def test_the_action_takes_pairs_and_options_with_spaces(tmp_path):
     views = tmp_path / "two views"
     for side in ("left", "right"):
@@ -174,3 +179,52 @@ def test_the_container_copies_what_is_there_and_is_not_root():
         assert (ROOT / name).exists()
     (user,) = re.findall(r"^USER (\d+)", text, flags=re.M)
     assert int(user) > 0
+
+
+def test_only_the_packages_that_are_missing_are_to_be_installed(monkeypatch):
+    monkeypatch.setitem(sys.modules, "plotly", None)
+    with pytest.raises(UsageError) as caught:
+        require_extra("report", "the page")
+    assert str(caught.value) == (f"the page needs the extra report: {sys.executable} -m pip install plotly")
+
+
+def test_a_program_that_pipx_installed_is_extended_by_pipx(monkeypatch, tmp_path):
+    (tmp_path / "pipx_metadata.json").write_text("{}")
+    monkeypatch.setattr(sys, "prefix", str(tmp_path))
+    for name in ("dask", "distributed"):
+        monkeypatch.setitem(sys.modules, name, None)
+    with pytest.raises(UsageError, match=r"the extra cluster: pipx inject rollcli dask distributed$"):
+        require_extra("cluster", "--scheduler")
+
+
+def found(pattern, *parts):
+    """Every match in a file of the project; there is at least one."""
+    matches = re.findall(pattern, ROOT.joinpath(*parts).read_text("utf-8"))
+    assert matches, (pattern, parts)
+    return matches
+
+
+def test_hooks_check_with_the_oldest_ruff_that_developers_may_have():
+    (oldest,) = found(r'"ruff>=([\d.]+)"', "pyproject.toml")
+    (rev,) = found(r"ruff-pre-commit\n\s+rev: v([\d.]+)", ".pre-commit-config.yaml")
+    assert rev == oldest
+
+
+def test_ci_runs_on_every_python_that_the_package_names():
+    named = found(r"Python :: (3\.\d+)", "pyproject.toml")
+    (matrix,) = found(r"python: \[(.*)\]", ".github", "workflows", "ci.yml")
+    assert re.findall(r"[\d.]+", matrix) == named
+    assert ".ci/run" in found(r"run: (\S+)", ".github", "workflows", "ci.yml")
+
+
+def test_ci_runs_on_windows_and_macos_with_tests_that_are_there():
+    (systems,) = found(r"os: \[(.*)\]", ".github", "workflows", "ci.yml")
+    assert systems == "macos-latest, windows-latest"
+    named = found(r"(?<=[ :])tests(?:/[\w./]+)?(?=\s)", ".github", "workflows", "ci.yml")
+    assert "tests/test_other_systems.py" in named
+    assert [each for each in named if not (ROOT / each).exists()] == []
+
+
+def test_what_all_tests_share_limits_the_threads_of_numpy_before_numpy_loads():
+    line = [sys.executable, "-c", "import sys, tests.conftest; sys.exit('numpy' in sys.modules)"]
+    assert subprocess.run(line, cwd=ROOT, check=False).returncode == 0

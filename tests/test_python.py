@@ -1,12 +1,15 @@
-"""What a programmer meets: every public name typed, and each mistake one clear error."""
+"""What a programmer meets: every public name typed, examples that hold, each mistake one clear error."""
 
 import dataclasses
+import doctest
+import importlib
 import inspect
 import json
 import math
 import re
 import subprocess
 import sys
+import types
 from concurrent.futures import ThreadPoolExecutor
 
 import cv2
@@ -58,16 +61,7 @@ def _editable(folder):
     others = [path for path in sys.path if "site-packages" in path]
     (site / "others.pth").write_text("\n".join(others) + "\n")
     python = str(folder / "bin" / "python")
-    line = [
-        python,
-        "-m",
-        "pip",
-        "install",
-        "--quiet",
-        "--no-deps",
-        "--editable",
-        str(ROOT),
-    ]
+    line = [python, "-m", "pip", "install", "--quiet", "--no-deps", "--editable", str(ROOT)]
     done = subprocess.run(line, capture_output=True, text=True, check=False)
     if done.returncode:
         pytest.skip(f"pip cannot build here: {done.stderr.strip()[-200:]}")
@@ -232,3 +226,32 @@ def test_the_page_of_reference_is_what_the_docstrings_say():
     for name in rollcli.__all__:
         if not name.startswith("_"):
             assert f"\n### {name}\n" in page()
+
+
+FUNCTIONS = [name for name in rollcli.__all__ if isinstance(getattr(rollcli, name), types.FunctionType)]
+README = (ROOT / "README.md").read_text("utf-8")
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_the_examples_of_a_public_function_hold(name):
+    function = getattr(rollcli, name)
+    module = importlib.import_module(function.__module__)
+    found = doctest.DocTestFinder(recurse=False).find(function, name, globs=vars(module).copy())
+    runner = doctest.DocTestRunner()
+    with np.printoptions(legacy=False):
+        for test in found:
+            runner.run(test)
+    assert runner.tries > 0
+    assert runner.failures == 0
+
+
+def test_the_readmes_session_in_python_holds(tmp_path, monkeypatch):
+    (tmp_path / "sample_data").symlink_to(ROOT / "sample_data")
+    monkeypatch.chdir(tmp_path)
+    (session,) = re.findall(r"```python\n(.*?)```", README, flags=re.S)
+    test = doctest.DocTestParser().get_doctest(session, {}, "README.md", "README.md", 0)
+    runner = doctest.DocTestRunner()
+    runner.run(test)
+    assert runner.tries == 10
+    assert runner.failures == 0
+    assert (tmp_path / "v.png").stat().st_size > 1000

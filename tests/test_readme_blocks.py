@@ -24,7 +24,7 @@ ELSEWHERE = {
     "rollcli: sample_data/maps/frame_0001.png": "test_readme: the first run prints what it shows",
     "file,right_file,status": "test_readme: the first run prints what it shows",
     "LEFT := $(wildcard left/*.png)": "test_readme: its makefile makes a page from pairs",
-    ">>> import math": "test_examples: the README's session in Python holds",
+    ">>> import math": "test_python: the README's session in Python holds",
 }
 NOT_RUN = {
     "pipx install": "needs the package index; CI's build installs the program, and `make run` is run by hand",

@@ -37,9 +37,7 @@ DOORS = {
     "rollcli.run.workers.pool": "a worker's door",
     "rollcli.run.workers.tasks": "loads the executor that is used; the cluster is an extra",
 }
-DOOR_PACKAGES = {
-    "rollcli.cli": "the command line's doors: help and version load no command",
-}
+DOOR_PACKAGES = {"rollcli.cli": "the command line's doors: help and version load no command"}
 # what is filled in while it is made
 CHANGING = {
     "rollcli.files.recordings.frames.BagFrames",
@@ -73,6 +71,8 @@ def _imports(node, *, in_function, wanted):
     for child in ast.iter_child_nodes(node):
         if isinstance(child, ast.If) and ast.unparse(child.test) == "TYPE_CHECKING":
             continue  # never loaded
+        if not isinstance(child, ast.stmt | ast.excepthandler | ast.match_case):
+            continue  # an expression imports nothing
         if in_function is wanted and isinstance(child, ast.ImportFrom):
             full = [f"{child.module}.{alias.name}" for alias in child.names]
             yield from (each if each in MODULES else child.module for each in full if ours(each))

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from rollcli.rig.calibration import Calibration
-from rollcli.run import calibration as of_frames
 from rollcli.simulate.build import render_frame
 from rollcli.simulate.dataset import calibration
 from rollcli.simulate.options import SimulateOptions
@@ -62,15 +61,6 @@ def test_every_method_fills_the_columns(maps, method, road):
     assert done.err.count("px of cy") == 1  # what holds for all frames is said once
 
 
-def test_json_lines_hold_the_same_numbers(maps):
-    text = rollcli("estimate", "maps", "--calib", "calib.txt", cwd=maps).out
-    lines = rollcli(
-        "estimate", "maps", "--calib", "calib.txt", "--format", "jsonl", cwd=maps
-    ).out.splitlines()
-    for row, line in zip(rows_of(text), map(json.loads, lines), strict=True):
-        assert [line[name] for name in POSE] == [float(row[name]) for name in POSE]
-
-
 def test_without_a_calibration_the_columns_are_empty_and_the_roll_is_the_same(maps):
     plain, posed = (
         rows_of(rollcli("estimate", "maps", *options, cwd=maps).out)
@@ -85,17 +75,6 @@ def test_numbers_on_the_command_line_are_a_calibration(maps):
     assert_posed(rows_of(rollcli("estimate", "maps", *numbers, "--baseline", "0.5", cwd=maps).out))
     without = rows_of(rollcli("estimate", "maps", *numbers, cwd=maps).out)
     assert all(row["pitch_deg"] and not row["height_m"] for row in without)
-
-
-def test_a_calibration_of_many_frames_is_parsed_once(maps, monkeypatch):
-    (maps / "calib").mkdir()
-    (maps / "calib" / "drive.txt").write_text(samples.kitti_benchmark(RIG))
-    for number, old in enumerate(sorted((maps / "maps").iterdir())):
-        old.rename(maps / "maps" / f"drive_{number}.png")
-    parsed, parse = [], of_frames.parse_calibration
-    monkeypatch.setattr(of_frames, "parse_calibration", lambda *of: parsed.append(1) or parse(*of))
-    assert rollcli("estimate", "maps", "--calib", "calib", cwd=maps).status == 0
-    assert len(parsed) == 1
 
 
 def test_a_folder_has_a_calibration_for_each_stem(maps):
@@ -126,13 +105,6 @@ def test_two_calibrations_of_one_stem_and_a_large_one_are_refused(maps):
     large = rollcli("estimate", "maps", "--calib", "large.txt", cwd=maps)
     assert (large.status, large.out) == (2, "")
     assert large.err == "rollcli: large.txt: has 1048577 bytes; up to 1 MB are read\n"
-
-
-def test_a_pair_of_ros_files_is_given_left_and_right(maps):
-    (maps / "left.yaml").write_text(samples.ros(RIG, right=False))
-    (maps / "right.yaml").write_text(samples.ros(RIG, right=True))
-    done = rollcli("estimate", "maps", "--calib", "left.yaml", "--calib", "right.yaml", cwd=maps)
-    assert_posed(rows_of(done.out))
 
 
 def test_a_map_at_half_the_size_uses_the_scaled_calibration(maps):
@@ -238,11 +210,6 @@ def test_a_result_never_replaces_the_calibration(maps):
     done = rollcli("estimate", "maps", "--calib", "calib.txt", "-o", "calib.txt", "--overwrite", cwd=maps)
     assert done.status == 2
     assert (maps / "calib.txt").read_text() == before
-
-
-def test_a_dry_run_lists_the_calibration(maps):
-    done = rollcli("estimate", "maps", "--calib", "calib.txt", "--dry-run", cwd=maps)
-    assert "read  calib.txt\n" in done.out
 
 
 def test_depth_maps_become_the_disparities_of_their_calibration(maps):

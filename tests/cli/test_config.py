@@ -1,11 +1,11 @@
-"""--config and the environment."""
+"""--config and the environment, and what is said of a variable with a typo."""
 
 import json
 
 import cv2
 import pytest
 
-from tests.run_cli import rollcli, write_maps
+from tests.run_cli import python, rollcli, write_maps
 
 
 @pytest.fixture
@@ -132,11 +132,6 @@ def test_what_is_wrong_with_a_config_file_is_said_with_its_name(maps, text, reas
     assert done.err.count("\n") == 1
 
 
-def test_a_missing_config_file_is_an_error(maps):
-    done = rollcli("estimate", "maps", "--config", "none.toml", cwd=maps)
-    assert (done.status, "none.toml: cannot be read" in done.err) == (2, True)
-
-
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
@@ -166,3 +161,53 @@ def test_lists_of_numbers_and_names_with_dots_are_no_long_keys(maps):
     done = rollcli("estimate", "maps", "--config", "rollcli.toml", cwd=maps)
 
     assert "a.b.c.d.e.f.g.h.i.png: no such mask" in done.err
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        (
+            "ROLLCLI_ESTIMATE_MAX_ROL",
+            "there is no such option of rollcli estimate; did you mean ROLLCLI_ESTIMATE_MAX_ROLL?",
+        ),
+        ("ROLLCLI_ESTIMTE_JOBS", "there is no such command or setting; did you mean ROLLCLI_ESTIMATE_JOBS?"),
+        ("ROLLCLI_STORE_TIMOUT", "there is no such command or setting; did you mean ROLLCLI_STORE_TIMEOUT?"),
+        ("ROLLCLI_ESTIMATE_XYZZYPLUGH", "there is no such option of rollcli estimate"),
+    ],
+)
+def test_a_variable_with_a_typo_is_said(tmp_path, name, said):
+    write_maps(tmp_path / "maps", 1)
+    done = rollcli("estimate", "maps", cwd=tmp_path, **{name: "4"})
+    assert done.status == 0
+    assert f"rollcli: {name}: {said}\n" in done.err
+    assert name not in rollcli("estimate", "maps", "-q", cwd=tmp_path, **{name: "4"}).err
+
+
+def test_variables_of_this_and_other_commands_are_not_said(tmp_path):
+    write_maps(tmp_path / "maps", 1)
+    known = {
+        "ROLLCLI_ESTIMATE_MAX_ROLL": "30",
+        "ROLLCLI_DEROTATE_ROL": "3",
+        "ROLLCLI_EVALUATE_PAPER_TIMED": "2",
+        "ROLLCLI_STORE_TIMEOUT": "5",
+        "ROLLCLI_RIG_X": "1",
+    }
+    assert "ROLLCLI_" not in rollcli("estimate", "maps", cwd=tmp_path, **known).err
+
+
+@pytest.mark.parametrize("arguments", [["-v"], ["--verbose"], []])
+def test_verbose_shows_where_an_unexpected_error_is_from(tmp_path, arguments):
+    code = f"""
+import sys
+import rollcli.run.estimate
+rollcli.run.estimate.make_plan = lambda options: {{}}["key"]
+sys.argv = ["rollcli", "estimate", ".", *{arguments}]
+from rollcli.__main__ import main
+main()
+"""
+    done = python(code, cwd=tmp_path)
+    assert done.returncode == 1
+    first, *rest = done.stderr.splitlines()
+    assert first.startswith("rollcli: internal error, please report it: KeyError: 'key'")
+    assert ("Traceback" in done.stderr) == bool(arguments)
+    assert not rest or any("run_estimate" in each for each in rest)

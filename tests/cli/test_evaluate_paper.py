@@ -13,7 +13,6 @@ import pytest
 from rollcli.cli.main import main
 from rollcli.evaluate import experiments as job
 from rollcli.evaluate.paper import PAGE, TABLES
-from rollcli.evaluate.tables import METHOD_NAMES, SOLVER_NAMES
 from rollcli.run.workers import tasks as run_tasks
 from tests.estimator.synthetic_maps import bent_road
 from tests.run_cli import contents, rollcli
@@ -66,25 +65,6 @@ def test_a_map_that_cannot_be_read_is_named_and_ends_it_with_3(done):
     assert "maps/empty.npy" in run.err
     assert read(folder / "out/maps.csv")[-1]["message"] == "is empty"
     assert "maps/empty.npy: " in (folder / "out" / PAGE).read_text()
-
-
-@needs_extra
-def test_golden_section_takes_the_papers_iterations(done):
-    rows = read(done[0] / "out/table1_iterations.csv")
-    ours = [
-        (row["paper"], row["mean"], row["min"], row["max"])
-        for row in rows
-        if row["solver"] == "golden section"
-    ]
-    assert ours == [(count,) * 4 for count in ("16", "21", "26", "30")]
-
-
-@needs_extra
-def test_tables_have_whole_names(done):
-    folder = done[0] / "out"
-    assert {row["solver"] for row in read(folder / "fig6_accuracy.csv")} == set(SOLVER_NAMES.values())
-    assert [row["method"] for row in read(folder / "methods_accuracy.csv")] == list(METHOD_NAMES.values())
-    assert "golden_section_0.001" in read(folder / "maps.csv")[0]
 
 
 @needs_extra
@@ -209,15 +189,6 @@ def test_maps_that_give_no_angle_leave_nothing_and_end_with_3(tmp_path):
     assert "the same everywhere" in run.err
     assert "no map gave an angle" in run.err
     assert not (tmp_path / "out").exists()
-
-
-@needs_extra
-@pytest.mark.parametrize("turns", ["-20", "5:-5:1", "-5:5:0", "-100:100:1", "a:b:c", "0:90:0.01", "0:5:nan"])
-def test_rotations_that_make_no_sense_are_refused_with_an_example(tmp_path, turns):
-    write_maps(tmp_path / "maps", "a.npy")
-    run = rollcli("evaluate", "paper", "maps", "-o", "out", "--turns", turns, cwd=tmp_path)
-    assert run.status == 2
-    assert "such as -20:20:2" in run.err
 
 
 @pytest.mark.parametrize("missing", ["plotly", "jinja2", "matplotlib"])

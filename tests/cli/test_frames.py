@@ -39,12 +39,6 @@ def test_shards_joined_with_standard_tools_are_the_whole(maps):
     assert joined.stdout == whole
 
 
-@pytest.mark.parametrize("shard", ["0/3", "4/3", "1", "a/b"])
-def test_a_shard_that_makes_no_sense_is_refused(maps, shard):
-    done = rollcli("estimate", "maps", "--shard", shard, cwd=maps)
-    assert (done.status, "is not I/N" in done.err) == (2, True)
-
-
 def test_paths_come_on_standard_input_and_from_lists(maps):
     listed = "maps/frame2.png\nmaps/frame0.png\n"
     (maps / "list.txt").write_text(listed)

@@ -26,11 +26,7 @@ def write_map(path, rig):
 
 def horizon_on(column, rig):
     """The row of a column whose ray is level: n K^-1 (u, v, 1) = 0, n the normal of the road."""
-    n = (
-        -math.sin(ROLL) * math.cos(PITCH),
-        math.cos(ROLL) * math.cos(PITCH),
-        math.sin(PITCH),
-    )
+    n = (-math.sin(ROLL) * math.cos(PITCH), math.cos(ROLL) * math.cos(PITCH), math.sin(PITCH))
     return rig.cy - rig.fy * (n[0] * (column - rig.cx) / rig.fx + n[2]) / n[1]
 
 

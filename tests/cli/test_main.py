@@ -10,7 +10,7 @@ import pytest
 
 import rollcli as package
 from rollcli.cli import main as versions
-from tests.run_cli import ROOT, environment, rollcli, rollcli_process, write_maps
+from tests.run_cli import ROOT, environment, python, rollcli, rollcli_process, write_maps
 
 
 def test_version_is_the_packages(tmp_path):
@@ -63,8 +63,7 @@ except SystemExit:
     pass
 print([name for name in ("numpy", "cv2", "tqdm", "tifffile", "multiprocessing") if name in sys.modules])
 """
-    line = [sys.executable, "-c", code]
-    done = subprocess.run(line, cwd=tmp_path, env=environment(), capture_output=True, text=True, check=True)
+    done = python(code, cwd=tmp_path, check=True)
     assert done.stdout.splitlines()[-1] == "[]"
 
 
@@ -80,20 +79,13 @@ try:
 except SystemExit as end:
     print(end.code, [name for name in ("numpy", "cv2") if name in sys.modules])
 """
-    line = [sys.executable, "-c", code]
-    done = subprocess.run(line, cwd=tmp_path, env=environment(), capture_output=True, text=True, check=True)
+    done = python(code, cwd=tmp_path, check=True)
     assert done.stdout.splitlines()[-1] == "0 []"
 
 
 @pytest.mark.parametrize(
     "arguments",
-    [
-        ["--nothing"],
-        ["nothing"],
-        ["estimate", "--nothing"],
-        ["estimate", "--seed", "-1", "x"],
-        ["estimate"],
-    ],
+    [["--nothing"], ["nothing"], ["estimate", "--nothing"], ["estimate", "--seed", "-1", "x"], ["estimate"]],
 )
 def test_a_usage_error_is_one_line_and_status_2(tmp_path, arguments):
     done = rollcli(*arguments, cwd=tmp_path)
@@ -124,8 +116,7 @@ sys.argv = ["rollcli", "estimate", "."]
 from rollcli.__main__ import main
 main()
 """
-    line = [sys.executable, "-c", code]
-    done = subprocess.run(line, cwd=tmp_path, env=environment(), capture_output=True, text=True, check=False)
+    done = python(code, cwd=tmp_path)
     assert done.returncode == 1
     assert done.stderr.startswith("rollcli: internal error, please report it: ")
     assert said in done.stderr
@@ -161,35 +152,21 @@ def test_choices_ignore_case(tmp_path):
     assert ",exact," in upper.out
 
 
-def test_an_interrupt_while_an_attribute_learns_its_name_is_status_130(tmp_path):
-    code = """
-import rollcli.cli.main
-
+ATTRIBUTE = """
 class Interrupted:
     def __set_name__(self, owner, name):
         raise KeyboardInterrupt
 
 rollcli.cli.main.main = lambda **_: type("Owner", (), {"name": Interrupted()})
-from rollcli.__main__ import main
-main()
 """
-    line = [sys.executable, "-c", code]
-    done = subprocess.run(line, cwd=tmp_path, env=environment(), capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stderr) == (130, "rollcli: interrupted\n")
+MODULE = 'rollcli.cli.main.main = lambda **_: exec("raise KeyboardInterrupt")\n'
 
 
-@pytest.mark.parametrize("stdout", ["open", "closed"])
-def test_an_interrupt_while_a_module_loads_is_status_130(tmp_path, stdout):
-    code = """
-import rollcli.cli.main
-rollcli.cli.main.main = lambda **_: exec("raise KeyboardInterrupt")
-from rollcli.__main__ import main
-main()
-"""
-    if stdout == "closed":  # Python has none then
-        code = f"import sys; sys.stdout = None{code}"
-    line = [sys.executable, "-c", code]
-    done = subprocess.run(line, cwd=tmp_path, env=environment(), capture_output=True, text=True, check=False)
+# without a standard output Python has none
+@pytest.mark.parametrize("code", [ATTRIBUTE, MODULE, f"import sys; sys.stdout = None\n{MODULE}"])
+def test_an_interrupt_while_a_module_loads_or_an_attribute_learns_its_name_is_status_130(tmp_path, code):
+    code = f"import rollcli.cli.main\n{code}\nfrom rollcli.__main__ import main\nmain()"
+    done = python(code, cwd=tmp_path)
     assert (done.returncode, done.stderr) == (130, "rollcli: interrupted\n")
 
 
@@ -200,8 +177,7 @@ before = set(sys.modules)
 import rollcli.__main__
 print(sorted(set(sys.modules) - before))
 """
-    line = [sys.executable, "-c", code]
-    done = subprocess.run(line, cwd=tmp_path, env=environment(), capture_output=True, text=True, check=True)
+    done = python(code, cwd=tmp_path, check=True)
     assert done.stdout == "['rollcli', 'rollcli.__main__']\n"
 
 
@@ -228,8 +204,7 @@ sys.argv = ["rollcli", "--version"]
 from rollcli.__main__ import main
 main()
 """
-    line = [sys.executable, "-c", code]
-    done = subprocess.run(line, cwd=tmp_path, env=environment(), capture_output=True, text=True, check=False)
+    done = python(code, cwd=tmp_path)
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "rollcli: interrupted\n")
 
 

@@ -1,14 +1,22 @@
-"""A URL works wherever a path does: every command gives the same from a bucket and into it."""
+"""A URL works wherever a path does, and one that names no file is refused."""
 
+import csv
 import re
+import threading
 from functools import partial
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
 
 import pytest
 
+from rollcli.files.stores import locations
+from rollcli.files.stores.locations import names_a_file
 from tests.run_cli import contents, road_map, rollcli, rollcli_process, write_maps, write_pair
 
 CALIBRATION = "P0: 200 0 80 0 0 200 60 0 0 0 1 0\nP1: 200 0 80 -100 0 200 60 0 0 0 1 0\n"
 MAPS = 3
+
+
 # what each command reads and writes: "@/" stands for a folder on disk, or for a prefix of a bucket
 LINES = {
     "a list and a calibration": "estimate --files-from @/list.txt --calib @/calib.txt -o @/listed.jsonl",
@@ -87,3 +95,127 @@ def test_a_url_works_as_a_path_does(places, store, what):
         elif name.endswith(".html"):
             counted = [data.count(b"data:image/webp") for data in (found[name](), written[name])]
             assert counted[0] == counted[1] > 0
+
+
+@pytest.fixture
+def server(tmp_path):
+    """Gives the same map under every name."""
+    write_maps(tmp_path / "map", 1)
+    data = (tmp_path / "map" / "frame0.png").read_bytes()
+
+    class Handler(BaseHTTPRequestHandler):
+        def do_GET(self):
+            self.send_response(200)
+            self.send_header("Content-Length", str(len(data)))
+            self.end_headers()
+            self.wfile.write(data)
+
+        def log_message(self, *_):
+            pass
+
+    with ThreadingHTTPServer(("127.0.0.1", 0), Handler) as server:
+        threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01}, daemon=True).start()
+        yield f"http://127.0.0.1:{server.server_port}"
+        server.shutdown()
+
+
+BAD = [
+    "..%5C..%5CStartup%5Cevil.png",
+    "C:%5CStartup%5Cevil.png",
+    "c:evil.png",
+    "a%00.png",
+    "a/",
+    "",
+    "%2e%2e",
+    "a/%2e%2e",
+    "%2E",
+    "%2F",
+    "..%2f..%2f",
+]
+
+
+def rows_of(path):
+    return csv.DictReader(path.read_text().splitlines())
+
+
+def keys_of(store):
+    return {name.lower(): store[name] for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY")}
+
+
+def written(folder):
+    return sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file())
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_a_url_that_names_no_file_is_that_frames_error_and_writes_nothing(tmp_path, server, name):
+    cwd = tmp_path / "cwd"
+    cwd.mkdir()
+    maps = [f"{server}/{name}", f"{server}/good.png"]
+    done = rollcli("estimate", *maps, "-o", "rolls.csv", "--derotated", "up", "--vdisparity", "v", cwd=cwd)
+    assert done.status == 3, done.err
+    rows = {each["file"]: each for each in rows_of(cwd / "rolls.csv")}
+    assert "names no file below a folder" in rows[maps[0]]["message"]
+    assert rows[maps[1]]["status"] == "ok"
+    results = ["rolls.csv", "rolls.csv.inputs", "rolls.csv.run.json"]
+    assert written(cwd) == [*results, "up/good.png", "v/good.png"]
+    assert written(tmp_path / "map") == ["frame0.png"]
+
+
+def test_a_url_that_is_no_address_is_that_frames_error(tmp_path):
+    done = rollcli("estimate", "http://[/a.png", "http://[::1]:x/b.png", cwd=tmp_path)
+    assert done.status == 3
+    assert "http://[/a.png: its name in the store or archive names no file" in done.err
+
+
+@pytest.mark.parametrize("name", ["..%5Cevil.png", "a%00.png", "%2e%2e"])
+@pytest.mark.parametrize("command", [("vdisparity",), ("derotate", "--roll", "3"), ("evaluate", "paper")])
+def test_other_commands_refuse_such_a_url_too(tmp_path, server, name, command):
+    cwd = tmp_path / "cwd"
+    cwd.mkdir()
+    done = rollcli(*command, f"{server}/{name}", "-o", "out", cwd=cwd)
+    assert done.status in (2, 3), done.err
+    assert "names no file below a folder" in done.err
+    assert written(tmp_path) == ["map/frame0.png"]
+
+
+def test_names_of_objects_are_checked_likewise(tmp_path, bucket, store):
+    import boto3
+
+    write_maps(tmp_path / "map", 1)
+    data = (tmp_path / "map" / "frame0.png").read_bytes()
+    names = ["a\\..\\..\\evil.png", "C:\\evil.png", "a:b.png", "2024-05-01T12:00:00.png"]
+    client = boto3.client("s3", "us-east-1", endpoint_url=store["AWS_ENDPOINT_URL"], **keys_of(store))
+    for name in names:
+        client.put_object(Bucket="maps", Key=f"{tmp_path.name}/{name}", Body=data)
+    done = rollcli("estimate", f"{bucket}/", "-o", "r.csv", "--derotated", "up", cwd=tmp_path, **store)
+    assert done.status == 3, done.err
+    rows = {
+        each["file"].rsplit("/")[-1]: each
+        for each in csv.DictReader((tmp_path / "r.csv").read_text().splitlines())
+    }
+    assert {name: row["status"] for name, row in rows.items()} == {
+        "a\\..\\..\\evil.png": "error",
+        "C:\\evil.png": "error",
+        "a:b.png": "error",
+        "2024-05-01T12:00:00.png": "ok",
+    }
+    assert written(tmp_path / "up") == ["2024-05-01T12:00:00.png"]
+
+
+def test_names_that_windows_gives_to_devices_and_streams_are_no_files_there(monkeypatch):
+    names = [
+        "NUL",
+        "con.png",
+        "COM1.tif",
+        "a.png:stream",
+        "a?.png",
+        "a.png.",
+        "a.png ",
+        "x/aux/a.png",
+        "a\x1f",
+    ]
+    assert all(map(names_a_file, names))
+    monkeypatch.setattr(locations, "_ON_WINDOWS", True)
+    assert not any(map(names_a_file, names))
+    assert names_a_file("run 7/frame (2).png")
+    assert Path("run 7/frame (2).png").name

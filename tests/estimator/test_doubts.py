@@ -1,18 +1,12 @@
 """Each reason to doubt an angle, on a map that gives it; a map that gives none."""
 
 import math
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from rollcli.estimator.doubts import REASONS, Evidence, doubts_of
+from rollcli.estimator.doubts import REASONS
 from rollcli.estimator.estimate import estimate_roll
-from rollcli.estimator.interval import Interval
-from rollcli.estimator.road.find import Road
-from rollcli.estimator.solvers.exact import CertifiedSolution, Minimum
-from rollcli.estimator.solvers.solution import Solution
-from rollcli.estimator.tuning import DoubtTuning
 from tests.estimator.synthetic_maps import bent_road, flat_road
 
 V, U = np.mgrid[:480, :640].astype(float)
@@ -120,87 +114,3 @@ def test_a_table_is_no_road(roll_deg):
 
     assert estimate.status == "suspect"
     assert "little of what lies ahead looks like a road" in estimate.message
-
-
-BOUNDS = DoubtTuning(
-    near_minimum=1.5,
-    other_angle=0.25,
-    least_score=0.25,
-    least_steep_score=0.375,
-    steep=0.5,
-    rival_share=0.75,
-    longest_move=0.125,
-    bound_share=0.5,
-    noise_share=0.25,
-)
-
-
-def just_within_every_bound():
-    """What each reason looks at, exactly where an angle is still ok; all of it is exact in binary."""
-    return {
-        "energy": 1.5 * 64,  # of another minimum
-        "elsewhere": 1.0,  # its angle
-        "slope": 0.0,  # of the disparity down the road
-        "score": 0.375,
-        "horizon": 0.5,  # as far as a road with few pixels may not have it
-        "rival": 0.75 * 0.375,
-        "moved": 0.125,
-        "theta": 0.5,
-        "noise": 0.25,
-        "half_width": 1.0,
-    }
-
-
-def doubts_about(energy, elsewhere, slope, score, horizon, rival, moved, theta, noise, half_width):
-    found = [Minimum(0.0, 64.0), Minimum(elsewhere, energy)]
-    surface = SimpleNamespace(moved=moved, model=SimpleNamespace(theta=theta))
-    evidence = Evidence(
-        energy=SimpleNamespace(plane=(9.0, 0.0, slope)),
-        certified=CertifiedSolution(Solution(0.0, 1), found[0].energy, found, is_global=True),
-        road=Road(np.array([2 * horizon, 0.0, 2.0]), score, rival),
-        surface=surface,
-        max_roll=1.0,
-        max_interval=1.0,
-        interval=Interval(noise, half_width),
-    )
-    return doubts_of(evidence, BOUNDS)
-
-
-def test_what_is_just_within_every_bound_is_ok():
-    assert doubts_about(**just_within_every_bound()) == []
-    assert doubts_about(**just_within_every_bound() | {"energy": 64.0, "elsewhere": 0.25}) == []
-    assert doubts_about(**just_within_every_bound() | {"horizon": 0.49, "score": 0.25, "rival": 0.18}) == []
-
-
-@pytest.mark.parametrize(
-    ("beyond", "says"),
-    [
-        ({"energy": 95.99}, "nearly as low"),
-        ({"energy": 64.0, "elsewhere": 0.2501}, "nearly as low"),
-        ({"energy": 64.0, "elsewhere": -0.2501}, "nearly as low"),
-        ({"slope": -1e-9}, "grows upward"),
-        ({"score": 0.3749}, "little of what lies ahead"),
-        ({"score": 0.2499, "horizon": 0.49}, "little of what lies ahead"),
-        ({"rival": 0.2813}, "another plane"),
-        ({"moved": 0.1251}, "moved the roll by 7.2 degrees"),
-        ({"theta": 0.5001}, "at its bound"),
-        ({"theta": -0.5001}, "at its bound"),
-        ({"noise": 0.2501}, "leave the angle open"),
-        ({"half_width": 1.0001}, "the interval is wide"),
-    ],
-)
-def test_what_is_just_beyond_a_bound_is_doubted_for_that_alone(beyond, says):
-    (doubt,) = doubts_about(**just_within_every_bound() | beyond)
-    assert says in doubt
-
-
-@pytest.mark.parametrize(("sign", "grows_upward"), [(1, False), (-1, True)])
-def test_which_way_is_down_is_told_along_the_rolled_road(sign, grows_upward):
-    roll = 1.2
-    plane = (9.0, -sign * 0.2 * math.sin(roll), sign * 0.2 * math.cos(roll))
-    certified = CertifiedSolution(Solution(roll, 1), 64.0, [Minimum(roll, 64.0)], is_global=True)
-    evidence = Evidence(SimpleNamespace(plane=plane), certified, None, None, 1.5, 1.0, None)
-    assert (
-        doubts_of(evidence, BOUNDS)
-        == ["the disparity grows upward, as it does in a depth map"] * grows_upward
-    )

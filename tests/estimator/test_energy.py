@@ -8,8 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rollcli.errors import EstimationError
-from rollcli.estimator.energy import Energy
-from rollcli.estimator.moments import map_moments
 from rollcli.estimator.solvers.exact import exact
 from rollcli.evaluate.experiments import Textbook
 from tests.estimator.synthetic_maps import (
@@ -44,20 +42,12 @@ def central(function, theta, step=2e-3):
 
 
 @repeatable
-@given(random_maps(), angles)
-def test_energy_is_that_of_a_least_squares_fit(disparity, theta):
-    energy = energy_of(disparity)
-    scale = energy.rest + energy.slope_energy
-    expected, _ = least_squares(disparity, theta)
+@given(random_maps(), angles, st.booleans())
+def test_energy_is_that_of_a_least_squares_fit(disparity, theta, parabolic):
+    energy = energy_of(disparity, parabolic=parabolic)
+    scale = energy.rest + parabolic * energy.slope_energy
+    expected, _ = least_squares(disparity, theta, degree=1 + parabolic)
     assert energy.at(theta).value == pytest.approx(expected, rel=1e-9, abs=1e-9 * scale)
-
-
-@repeatable
-@given(random_maps(), angles)
-def test_energy_of_the_line_model_is_that_of_a_straight_fit(disparity, theta):
-    energy = energy_of(disparity, parabolic=False)
-    expected, _ = least_squares(disparity, theta, degree=1)
-    assert energy.at(theta).value == pytest.approx(expected, rel=1e-9, abs=1e-9 * energy.rest)
 
 
 @repeatable
@@ -79,23 +69,6 @@ def test_energy_and_gradient_are_those_of_the_textbook_form(disparity, theta):
     assert energy.at(theta).value == pytest.approx(textbook.energy(theta), rel=1e-8, abs=1e-8 * scale)
     largest = np.abs(energy.at(ANGLES).gradient).max()
     assert energy.at(theta).gradient == pytest.approx(textbook.gradient(theta), rel=1e-8, abs=1e-8 * largest)
-
-
-@repeatable
-@given(random_maps(), angles)
-def test_energy_has_period_pi(disparity, theta):
-    energy = energy_of(disparity)
-    assert energy.at(theta + math.pi).value == pytest.approx(energy.at(theta).value, rel=1e-9)
-
-
-def test_an_array_of_angles_gives_what_each_angle_gives():
-    energy = energy_of(bent_road(12, noise=0.5))
-    together = energy.at(ANGLES)
-    for k in (0, 40, 90, 180):
-        alone = energy.at(float(ANGLES[k]))
-        for name in ("value", "gradient", "curvature"):
-            expected = pytest.approx(getattr(alone, name), rel=1e-12, abs=1e-6)
-            assert getattr(together, name)[k] == expected
 
 
 @repeatable
@@ -146,8 +119,6 @@ V, U = np.mgrid[:60, :60]
 @pytest.mark.parametrize(
     ("disparity", "reason"),
     [
-        (np.zeros((60, 60)), "no valid pixel"),
-        (np.full((60, 60), 7.3), "the same everywhere"),
         (np.full((600, 600), 7.3, np.float32), "the same everywhere"),
         (kept(U == 9), LINE),
         (kept(V == 9), LINE),
@@ -172,30 +143,6 @@ def test_a_parabola_through_two_lines_of_pixels_is_refused():
     two = kept((U == V) | (U == V + 5))
     with pytest.raises(EstimationError, match="two lines"):
         energy_of(two).parabola(math.radians(45))
-
-
-def test_all_weight_masked_out_is_no_valid_pixel():
-    disparity = bent_road(5)
-    with pytest.raises(EstimationError, match="no valid pixel"):
-        Energy.of(map_moments(disparity, np.zeros(disparity.shape, bool)), 90.0)
-
-
-@repeatable
-@given(random_maps(), angles, st.floats(0.5, 2))
-def test_the_energy_is_a_quotient_over_the_determinant_of_the_normal_equations(disparity, theta, factor):
-    energy = energy_of(disparity)
-    grid = energy.grid
-    v, u = np.nonzero(disparity > 0)
-    y = ((v - grid.centre_v) * math.cos(theta) - (u - grid.centre_u) * math.sin(theta)) / grid.scale
-    powers = np.vander(y, 3)
-    expected = factor**6 * np.linalg.det(powers.T @ powers) / len(y)
-    c, s = np.array([[math.cos(theta)], [math.sin(theta)]]) * factor
-    (numerator,), (determinant,) = energy.as_quotient(c, s)
-    scale = factor**6 * np.sum(y**2) * np.sum(y**4)
-    assert determinant == pytest.approx(expected, rel=1e-6, abs=1e-12 * scale)
-    value = energy.at(theta).value - energy.rest
-    size = energy.rest + energy.slope_energy
-    assert numerator == pytest.approx(value * determinant, rel=1e-6, abs=1e-10 * size * scale)
 
 
 @pytest.mark.parametrize(("times", "enough"), [(0.9, False), (1.1, True)])

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.estimate import estimate_roll
-from rollcli.estimator.moments import CheckedMap, Grid, map_moments, point_moments, require_pixels
+from rollcli.estimator.moments import CheckedMap, map_moments, point_moments, require_pixels
 from rollcli.estimator.request import METHODS
 from tests.estimator.synthetic_maps import bent_road, random_maps, repeatable
 
@@ -65,12 +65,6 @@ def test_moments_add_over_tiles(disparity, row, column):
     assert_same(sum(tiles[1:], tiles[0]), whole)
 
 
-def test_moments_on_different_grids_do_not_add():
-    disparity = bent_road(3)
-    with pytest.raises(ValueError, match="one grid"):
-        map_moments(disparity) + map_moments(disparity[:50])
-
-
 def test_weights_count_as_often_as_they_say():
     disparity = bent_road(5, noise=0.1)
     weights = np.random.default_rng(1).integers(0, 3, disparity.shape).astype(np.float32)
@@ -93,29 +87,6 @@ def test_any_real_dtype_gives_the_same_sums(dtype):
     whole = np.rint(bent_road(5, width=32, height=32))
     plane = (80.25, 0.5, -0.25)  # no whole numbers; at every pixel of this size exact in single precision
     assert_same(map_moments(whole.astype(dtype), plane=plane), map_moments(whole, plane=plane))
-
-
-def test_memory_order_makes_no_difference():
-    disparity = bent_road(5, noise=0.1)
-    assert_same(map_moments(np.asfortranarray(disparity)), map_moments(disparity))
-
-
-def test_an_empty_map_weighs_nothing():
-    assert map_moments(np.zeros((40, 50))).weight == 0
-
-
-def test_the_grid_is_centred_and_reaches_one_along_the_longer_side():
-    grid = Grid.of_shape(height=101, width=201)
-    assert (grid.centre_u, grid.centre_v) == (100, 50)
-    assert (0 - grid.centre_u) / grid.scale == pytest.approx(-1, abs=0.01)
-
-
-def test_what_is_subtracted_leaves_nothing_of_a_plane_wherever_its_pixels_lie():
-    v, u = np.mgrid[:90, :160]
-    plane = 40 + 0.11 * u + 0.23 * v
-    slanted = map_moments(np.where(np.abs(u - 1.5 * v) < 25, plane, 0))  # where p and q go together
-    assert slanted.rr < 0.01**2 * slanted.weight  # the plane is rounded
-    assert (slanted.plane[1], slanted.plane[2]) == pytest.approx((0.11 * 80, 0.23 * 80), abs=0.01)
 
 
 @pytest.mark.parametrize("size", [(9, 14000), (50, 2500), (300, 40)])

@@ -22,20 +22,6 @@ def names_in(folder):
     return sorted(path.name for path in folder.iterdir())
 
 
-def test_a_file_is_written_with_its_folders(tmp_path):
-    write_atomic(tmp_path / "a" / "b" / "map.png", b"data")
-
-    assert (tmp_path / "a" / "b" / "map.png").read_bytes() == b"data"
-
-
-def test_an_existing_file_is_replaced(tmp_path):
-    (tmp_path / "map.png").write_bytes(b"old and longer")
-
-    write_atomic(tmp_path / "map.png", b"new")
-
-    assert (tmp_path / "map.png").read_bytes() == b"new"
-
-
 def refuses_links(error):
     """`os.link` on a disk that has none, as FAT's says it."""
 
@@ -129,16 +115,6 @@ def test_a_file_that_is_being_written_is_no_leftover(tmp_path):
     assert (tmp_path / "map.png").read_bytes() == b"data"
 
 
-def test_leftovers_are_looked_for_once_a_folder(tmp_path, monkeypatch):
-    listed = []
-    scandir = os.scandir
-    monkeypatch.setattr(os, "scandir", lambda folder: listed.append(folder) or scandir(folder))
-
-    remove_leftovers(tmp_path / f"{number}.png" for number in range(1000))
-
-    assert listed == [str(tmp_path)]
-
-
 def planted(folder, name, kind):
     """A link or a pipe where an attacker expects a temporary file."""
     victim = folder.parent / "victim"
@@ -226,14 +202,6 @@ def test_permissions_are_those_of_any_new_file(tmp_path, mask):
     assert stat.S_IMODE((tmp_path / "map.png").stat().st_mode) == 0o666 & ~mask
 
 
-def test_a_name_as_long_as_the_system_allows_is_written(tmp_path):
-    name = "é" * 120 + ".png"
-
-    write_atomic(tmp_path / name, b"data")
-
-    assert names_in(tmp_path) == [name]
-
-
 def test_what_cannot_be_written_is_named_in_one_line(tmp_path):
     (tmp_path / "folder").mkdir()
     (tmp_path / "file").write_bytes(b"")
@@ -307,10 +275,3 @@ def test_nothing_stays_open(tmp_path):
         write_atomic(tmp_path, b"data")
     assert open_descriptors() == before
     assert names_in(tmp_path) == ["a.png", "b.png"]
-
-
-def test_leftovers_beside_relative_names_are_removed(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    leave_half(tmp_path / "map.png")
-    remove_leftovers(["map.png"])
-    assert names_in(tmp_path) == []

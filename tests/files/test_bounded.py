@@ -216,10 +216,7 @@ def test_a_redirect_leads_to_the_web_alone():
     def answer(client):
         client.sendall(b"HTTP/1.1 302 Found\r\nLocation: ftp://127.0.0.1:9/x\r\nContent-Length: 0\r\n\r\n")
 
-    with (
-        served(answer) as (url, _),
-        pytest.raises(InputError, match="as one of the web"),
-    ):
+    with served(answer) as (url, _), pytest.raises(InputError, match="as one of the web"):
         read_bytes(url)
 
 

@@ -1,14 +1,19 @@
-"""Stored numbers become pixels, and no data becomes 0, whatever a file calls it."""
+"""Stored numbers become pixels, and no data becomes 0, whatever a file calls it and a plateau shows."""
+
+import csv
+from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
 from rollcli.errors import InputError, UsageError
-from rollcli.files.encodings import Encoding, from_disparity, read_disparity, read_mask, to_disparity
-from rollcli.files.formats import Stored, encode_stored
+from rollcli.estimator.estimate import estimate_roll
+from rollcli.files.encodings import Encoding, from_disparity, read_mask, to_disparity
+from rollcli.files.formats import Stored, read_stored
 from rollcli.rig.calibration import Calibration
 from tests.binary_files import disparity_map, make_png, make_tiff
+from tests.run_cli import rollcli
 
 
 def stored(values, dtype, **more):
@@ -155,30 +160,6 @@ def test_no_data_is_stored_as_each_encoding_has_it():
     assert from_disparity(empty, "cityscapes").tolist() == [[0, 0, 0, 0, 513]]
 
 
-def test_a_small_disparity_is_not_rounded_to_no_data():
-    assert from_disparity(np.array([[1e-4]]), "kitti").tolist() == [[1]]
-    assert from_disparity(np.array([[1e-4]]), "cityscapes").tolist() == [[2]]
-
-
-def test_disparities_beyond_the_numbers_are_refused_and_a_few_are_dropped():
-    disparity = np.full((20, 20), 100.0)
-    disparity[0, 0] = 300
-    assert from_disparity(disparity, "kitti")[0, :2].tolist() == [0, 25600]
-
-    disparity[0] = 300
-    with pytest.raises(InputError, match="disparities up to 300 px do not fit numbers that end at 256 px"):
-        from_disparity(disparity, "kitti")
-
-
-def test_a_file_is_read_in_one_call(tmp_path):
-    path = tmp_path / "map.png"
-    path.write_bytes(encode_stored(np.array([[0, 512, 768]], np.uint16), "png"))
-
-    assert read_disparity(path).tolist() == [[0, 2, 3]]
-    assert read_disparity(str(path), invalid=768).tolist() == [[0, 2, 0]]
-    assert read_disparity(path, encoding="px").tolist() == [[0, 512, 768]]
-
-
 def test_masks_of_maps_and_images_are_read(tmp_path):
     mask = np.eye(4, dtype=np.uint8)
     (tmp_path / "a.png").write_bytes(make_png(mask, 8))
@@ -216,18 +197,6 @@ def test_stored_distances_are_metres_or_whole_millimetres():
     assert to_disparity(stored([2], "f4"), encoding="depth").disparity.dtype == np.float32
 
 
-def test_a_further_value_below_a_pixel_is_no_data_either():
-    assert pixels([0.5, 1.5], "f4", invalid=(0.5,)) == [0, 1.5]
-
-
-def test_the_doubt_says_what_was_read_and_what_it_may_be():
-    assert to_disparity(stored([0, 511], "u2", note="two pages")).warning == (
-        "two pages; uint16 numbers up to 511, read as kitti (/256), are disparities up to 2.00 px: "
-        "they look like whole pixels (--encoding px)"
-    )
-    assert "--encoding px" in to_disparity(stored([0, 1], "u2")).warning
-
-
 def test_one_pixel_of_a_hundred_may_be_too_large_and_no_more():
     disparity = np.full((10, 10), 100.0)
     disparity[0, 0] = 65535 / 256
@@ -253,3 +222,66 @@ def test_no_data_is_negative_in_signed_numbers_of_sgbm_alone():
 def test_disparities_are_rounded_to_the_nearest_number():
     assert from_disparity(np.array([[2.0019, 2.002]]), "kitti").tolist() == [[512, 513]]
     assert from_disparity(np.array([[2.5]]), "px", "f4").tolist() == [[2.5]]
+
+
+REALMAPS = Path(__file__).parents[2].parent / "shared" / "realmaps"
+TRUTHS = {"frame_0001": -8.0, "frame_0003": 12.0, "frame_0004": -4.0}
+
+
+def opencvs_own(name, first):
+    left, right = (cv2.imread(f"sample_data/{side}/{name}.png", 0) for side in ("left", "right"))
+    return cv2.StereoSGBM.create(first, 64, 5, 100, 400, 1, uniquenessRatio=10).compute(left, right)
+
+
+@pytest.mark.parametrize(("name", "truth"), TRUTHS.items())
+@pytest.mark.parametrize("first", [10, 20])
+@pytest.mark.parametrize("form", ["int16", "float32", "uint16"])
+def test_the_mark_of_opencv_is_no_data_whatever_its_range_begins_with(tmp_path, name, truth, first, form):
+    values = opencvs_own(name, first)
+    known = values > 16 * first  # where it begins, the best match may lie beyond
+    assert (np.unique(values[~known]) == [16 * (first - 1), 16 * first]).all()
+    assert (~known).mean() > 0.2
+    values = {"int16": values, "float32": values / np.float32(16), "uint16": values.astype(np.uint16) * 16}[
+        form
+    ]
+
+    found = to_disparity(Stored(values, "npy"))
+
+    assert not found.disparity[~known].any()
+    assert found.warning is not None
+    assert f"the smallest, {first - 1} px: they are taken as no data" in found.warning
+    np.save(tmp_path / "map.npy", values)
+    done = rollcli("estimate", "map.npy", cwd=tmp_path)
+    assert done.status == 0
+    assert float(next(csv.DictReader(done.out.splitlines()))["roll_deg"]) == pytest.approx(truth, abs=0.2)
+    assert "taken as no data" in done.err
+
+
+def test_a_largest_number_that_stands_for_all_beyond_it_is_no_data():
+    rows = np.arange(200, dtype=np.float32)[:, None]
+    values = np.minimum(rows * 2.0 + 3 + np.linspace(0, 1, 300, dtype=np.float32), 255).astype(np.float32)
+
+    found = to_disparity(Stored(values, "npy"))
+
+    assert (found.disparity[:125] > 0).all()
+    assert not found.disparity[127:].any()
+    assert abs(np.degrees(estimate_roll(found.disparity).theta)) < 0.2
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.float32])
+def test_steps_of_a_road_and_a_map_of_one_number_stay(kind):
+    rows = np.arange(200)[:, None] // 12 + 3
+    steps = np.broadcast_to(rows, (200, 300)).astype(kind)
+    for values in (steps, np.full((200, 300), 7, kind)):
+        found = to_disparity(Stored(values, "npy"))
+        np.testing.assert_array_equal(found.disparity, values)
+        assert found.warning is None
+
+
+@pytest.mark.skipif(not REALMAPS.is_dir(), reason="needs the real maps beside the project")
+@pytest.mark.parametrize("kind", ["network", "post", "raw", "refined", "sgm"])
+def test_no_real_map_has_such_a_plateau(kind):
+    files = sorted((REALMAPS / kind).glob("*.png"))
+    assert files
+    for file in files:
+        assert "taken as no data" not in (to_disparity(read_stored(file), scale=1.0).warning or ""), file

@@ -11,7 +11,8 @@ import pytest
 from rollcli.errors import InputError, OutputError, UsageError
 from rollcli.files.formats import decode_stored, encode_stored, read_image, read_stored
 from rollcli.files.storage import read_bytes
-from tests.binary_files import disparity_map, make_npy, make_png, make_tiff
+from tests.binary_files import disparity_map, make_npy, make_png, make_tiff, png_file
+from tests.files.codecs.test_png import NOISY, WRONG
 
 WRITTEN = [
     *[("png", kind) for kind in ("u1", "u2")],
@@ -187,7 +188,7 @@ def test_what_is_no_camera_image_is_named(tmp_path, content, reason):
 
 
 def test_nothing_is_printed_about_damaged_files(tmp_path):
-    """Beside what test_png.py has: OpenCV, tifffile and NumPy are silent too."""
+    """OpenCV, libpng, tifffile and NumPy are silent."""
     values = disparity_map().astype(np.float32)
     tiff = make_tiff(values, "lzw", rows_per_strip=5, pages=2)
     wholes = {
@@ -195,7 +196,10 @@ def test_nothing_is_printed_about_damaged_files(tmp_path):
         "b.npy": make_npy(values),
         "c.bmp": cv2.imencode(".bmp", IMAGE)[1].tobytes(),
         "d.ppm": cv2.imencode(".ppm", IMAGE)[1].tobytes(),
+        "e.png": make_png((values * 256).astype(np.uint16)),
     }
+    for number, data in enumerate([*NOISY, *(png_file(*chunks) for chunks in WRONG.values())]):
+        (tmp_path / f"{number}.png").write_bytes(data)
     for name, whole in wholes.items():
         for length in range(5, len(whole), len(whole) // 20):
             (tmp_path / f"{length}{name}").write_bytes(whole[:length])

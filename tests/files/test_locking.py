@@ -185,49 +185,12 @@ def test_a_lock_is_waited_for_as_long_as_the_workers_of_a_killed_run_take_to_end
         os.close(other)
 
 
-def test_a_folder_is_made_and_locked_and_its_descriptor_is_closed_again(tmp_path, impatient):
-    name = str(tmp_path / "a" / "parts")
-    refused = pytest.raises(UsageError, match="another run is writing this result")
-    with locking.locked_folder(name) as descriptor:
-        assert os.path.samestat(os.fstat(descriptor), Path(name).stat())
-        with refused, locking.locked_folder(name):
-            pass
-    with pytest.raises(OSError, match="Bad file descriptor"):
-        os.fstat(descriptor)
-    with locking.locked_folder(name):
-        pass
-
-    (tmp_path / "file").write_bytes(b"")
-    with (
-        pytest.raises(OutputError, match=r"file: cannot be written: file exists$"),
-        locking.locked_folder(str(tmp_path / "file")),
-    ):
-        pass
-
-
 def test_a_lock_file_that_cannot_be_made_is_named(tmp_path, without_locks, result):
     descriptor, _ = result
     name = str(tmp_path / "none" / "rolls.csv")
     with pytest.raises(OutputError) as caught, locking.locked(descriptor, name):
         pass
     assert str(caught.value) == f"{name}.lock: cannot be written: no such file or directory"
-
-
-def test_other_errors_of_the_lock_are_those_of_a_run_that_holds_it(result, impatient, monkeypatch):
-    descriptor, name = result
-
-    def fail(number, operation):
-        raise OSError(errno.EIO, os.strerror(errno.EIO))
-
-    monkeypatch.setattr(fcntl, "flock", fail)
-    with pytest.raises(UsageError, match="another run"), locking.locked(descriptor, name):
-        pass
-    for number in (errno.ENOLCK, errno.ENOTSUP, errno.EINVAL, errno.ENOSYS):
-        monkeypatch.setattr(
-            fcntl, "flock", lambda *_, number=number: (_ for _ in ()).throw(OSError(number, "x"))
-        )
-        with locking.locked(descriptor, name):
-            assert Path(f"{name}.lock").exists()
 
 
 def test_only_a_regular_file_that_nobody_writes_is_abandoned(tmp_path):

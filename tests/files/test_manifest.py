@@ -45,10 +45,7 @@ def test_any_run_of_names_is_read_from_its_place(names, part):
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        (
-            b"frame1.png\n\nframe10.png\nframe2.png\n",
-            "line 4: frame2.png sorts before frame10.png",
-        ),
+        (b"frame1.png\n\nframe10.png\nframe2.png\n", "line 4: frame2.png sorts before frame10.png"),
         (b"a.png\na.png\n", "line 2: a.png is there twice"),
         (b"\n\n", "no input found: the list is empty"),
         (None, "the list of files cannot be read: no such file or directory"),

@@ -1,15 +1,23 @@
-"""Rows to text and back."""
+"""Rows to text and back, columns of a result, and which row belongs to which file."""
 
+import io
 import json
 import math
+import sys
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
-from rollcli.errors import InputError
+from rollcli.errors import InputError, UsageError
+from rollcli.files.codecs.parquet import encode_parquet
+from rollcli.files.matching import is_elsewhere, match_paths
+from rollcli.files.result_columns import read_columns
 from rollcli.files.results import (
     ALIGNMENT_COLUMNS,
     COLUMNS,
     FURTHER,
+    STATUSES,
     TIMING,
     Row,
     column_types,
@@ -17,6 +25,7 @@ from rollcli.files.results import (
     format_header,
     format_row,
     parse_rows,
+    plain_values,
     read_result,
 )
 
@@ -87,13 +96,6 @@ def test_what_is_written_is_read_back(form, row):
         row.converged,
     )
     assert format_row(back, form) == format_row(row, form)
-
-
-def test_json_shows_the_numbers_that_csv_shows():
-    values = json.loads(format_row(ROW, "jsonl"))
-    assert values["roll_ci95_deg"] == 0.012346
-    assert values["iterations"] == 4
-    assert json.loads(format_row(FAILED, "jsonl"))["roll_deg"] is None
 
 
 @pytest.mark.parametrize(
@@ -212,28 +214,6 @@ def test_every_number_has_its_digits_in_every_form():
     assert {name: values[name] for name in numbers} == {name: float(text) for name, text in texts.items()}
 
 
-def test_columns_have_the_types_of_their_values():
-    types = column_types(FURTHER)
-    assert tuple(types) == columns(FURTHER)
-    assert types == {
-        "file": str,
-        "right_file": str,
-        "status": str,
-        **dict.fromkeys(("roll_deg", "roll_ci95_deg", "pitch_deg", "pitch_ci95_deg"), float),
-        **dict.fromkeys(("height_m", "height_ci95_m", "camber"), float),
-        "method": str,
-        "iterations": int,
-        **dict.fromkeys(("converged", "global_minimum"), bool),
-        **dict.fromkeys(("rmse_px", "alpha0", "alpha1", "alpha2", "valid_fraction", "road_fraction"), float),
-        **dict.fromkeys(("width", "height"), int),
-        **dict.fromkeys(ALIGNMENT_COLUMNS, float),
-        "message": str,
-        "image_roll_deg": float,
-        "elapsed_ms": float,
-    }
-    assert "elapsed_ms" not in column_types()
-
-
 @pytest.mark.parametrize(
     ("name", "text", "value"),
     [
@@ -283,16 +263,6 @@ def test_a_cell_that_its_column_cannot_have_is_refused(name, text):
         list(parse_rows(data, "x"))
 
 
-def test_a_row_names_a_file_and_no_text_holds_a_nul():
-    for line, said in (
-        (b",ok,1", "'' is no value for file"),
-        # the latter by the csv module of Python 3.10
-        (b"a\0b,ok,1", r"('a\\x00b' is no value for file|is not CSV: line contains NUL)"),
-    ):
-        with pytest.raises(InputError, match=rf"^x: line 2: {said}$"):
-            list(parse_rows(b"file,status,roll_deg\n" + line + b"\n", "x"))
-
-
 @pytest.mark.parametrize("before", [b"", b"\xef\xbb\xbf", b" \n\n", b" " * 999, b"\xef\xbb\xbf  "])
 def test_white_space_may_stand_before_the_first_line_of_json(before):
     line = b'{"file": "a", "status": "ok", "roll_deg": 1}\n'
@@ -317,3 +287,195 @@ def test_a_record_that_is_no_table_is_refused(tmp_path):
     (tmp_path / "rolls.csv.run.json").write_text("[1]")
     with pytest.raises(InputError, match=r"run.json: is not the record of a run$"):
         read_result(path)
+
+
+HEADER = "file,right_file,status,roll_deg,roll_ci95_deg,pitch_deg,height_m"
+NUMBERS = ("roll_deg", "roll_ci95_deg", "pitch_deg", "height_m")
+WITHIN = {"roll_deg": "1.5", "roll_ci95_deg": "0.1", "pitch_deg": "-2", "height_m": "1.65"}
+
+
+def result(folder, *rows):
+    path = folder / "rolls.csv"
+    lines = [f"{place}.png,,ok,{','.join(row[name] for name in NUMBERS)}" for place, row in enumerate(rows)]
+    path.write_text("\n".join([HEADER, *lines, ""]))
+    return str(path)
+
+
+def test_empty_cells_are_not_numbers_and_leave_the_others_as_they_are(tmp_path):
+    found = read_columns(result(tmp_path, WITHIN, dict.fromkeys(NUMBERS, "")), NUMBERS)
+    for name in NUMBERS:
+        one, other = found.numbers[name].tolist()
+        assert one == float(WITHIN[name])
+        assert math.isnan(other)
+
+
+ROWS = [
+    Row(f"{place}.png", status=STATUSES[place % 3], roll_deg=place / 8, method=("gd", "", "gss")[place % 3])
+    for place in range(700)  # more than are held as text at once
+]
+LAST = Row("last.png", status="ok", roll_deg=0.0)  # a 0 is no empty cell
+
+
+def bytes_of(form):
+    rows = [*ROWS, LAST]
+    if form == "parquet":
+        pytest.importorskip("pyarrow", reason="pyarrow, of the extra parquet, is not here")
+        return encode_parquet(column_types(), [plain_values(row) for row in rows], {})
+    return format_header(form) + b"".join(format_row(row, form) for row in rows)
+
+
+def check(found):
+    rows = [*ROWS, LAST]
+    assert found.files == [row.file for row in rows]
+    assert [STATUSES[status] for status in found.status] == [row.status for row in rows]
+    assert found.numbers["roll_deg"].tolist() == [float(f"{row.roll_deg:.6f}") for row in rows]
+    assert np.isnan(found.numbers["pitch_deg"]).all()
+    assert found.methods == {"gd", "gss"}
+
+
+@pytest.mark.parametrize("before", [b"", b"\xef\xbb\xbf"])
+@pytest.mark.parametrize("form", ["csv", "jsonl"])
+def test_columns_of_text_are_those_of_the_rows(tmp_path, form, before):
+    (tmp_path / "rolls").write_bytes(before + bytes_of(form))
+    (tmp_path / "rolls.run.json").write_text('{"rollcli": "1"}')
+
+    found = read_columns(str(tmp_path / "rolls"), ["roll_deg", "pitch_deg"])
+
+    check(found)
+    assert found.run == {"rollcli": "1"}
+
+
+@pytest.mark.parametrize("form", ["csv", "jsonl"])
+def test_columns_come_from_stdin_too(monkeypatch, tmp_path, form):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "-.run.json").write_text('{"rollcli": "1"}')
+    monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=io.BufferedReader(io.BytesIO(bytes_of(form)))))
+
+    found = read_columns("-", ["roll_deg", "pitch_deg"])
+
+    check(found)
+    assert found.run is None
+
+
+def test_columns_of_parquet_are_those_of_the_rows(tmp_path):
+    (tmp_path / "rolls").write_bytes(bytes_of("parquet"))
+    check(read_columns(str(tmp_path / "rolls"), ["roll_deg", "pitch_deg"]))
+
+
+def test_columns_of_parts_follow_each_other(tmp_path):
+    lines = bytes_of("csv").splitlines(keepends=True)
+    (tmp_path / "part-00000.csv").write_bytes(b"".join(lines[:401]))
+    (tmp_path / "part-00001.csv").write_bytes(b"".join(lines[401:]))
+    check(read_columns(str(tmp_path), ["roll_deg", "pitch_deg"]))
+
+
+def test_a_column_that_the_file_does_not_have_is_not_there(tmp_path):
+    (tmp_path / "rolls").write_text("file,status,roll_deg\na,ok,1\n")
+    assert set(read_columns(str(tmp_path / "rolls"), NUMBERS).numbers) == {"roll_deg"}
+
+
+def test_a_result_without_rows_has_no_values(tmp_path):
+    (tmp_path / "rolls").write_text("file,status,roll_deg\n")
+    found = read_columns(str(tmp_path / "rolls"), NUMBERS)
+    assert (found.files, found.status.tolist(), found.status.dtype) == ([], [], np.uint8)
+    assert found.numbers == {}
+
+
+def test_a_number_of_json_is_read_as_csv_has_it_and_a_wrong_one_is_named_with_its_line(tmp_path):
+    good = {"file": "a", "status": "ok", "roll_deg": 1.5, "height_m": None}
+    path = tmp_path / "rolls"
+    path.write_text("\n".join(json.dumps(good | {"roll_deg": roll}) for roll in (0, 1.5, 0.0)) + "\n")
+    assert read_columns(str(path), ["roll_deg"]).numbers["roll_deg"].tolist() == [0, 1.5, 0]
+
+    for wrong, said in (
+        ({"roll_deg": "x"}, "'x' is no value for roll_deg"),
+        ({"status": 5}, "5 is no status"),
+    ):
+        path.write_text("\n".join([json.dumps(good), "", json.dumps(good), json.dumps(good | wrong), ""]))
+        with pytest.raises(InputError, match=rf"rolls: line 4: {said}"):
+            read_columns(str(path), NUMBERS)
+
+
+def test_carriage_returns_end_no_line_of_json(tmp_path):
+    path = tmp_path / "rolls"
+    good = b'{"file": "a",\r "status": "ok", "roll_deg": 1}\r\n'
+    path.write_bytes(3 * good + good.replace(b"1}", b"x}"))
+    with pytest.raises(InputError, match=r"rolls: line 4: is not JSON"):
+        read_columns(str(path), ["roll_deg"])
+    path.write_bytes(3 * good)
+    assert read_columns(str(path), ["roll_deg"]).numbers["roll_deg"].tolist() == [1, 1, 1]
+    assert len(read_result(path).rows) == 3
+    path.write_bytes(2 * good + good.rstrip(b"\r\n"))
+    assert read_columns(str(path), ["roll_deg"]).numbers["roll_deg"].tolist() == [1, 1, 1]
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        (",ok,1", "line 3: '' is no value for file"),
+        ("a\0b,ok,1", r"line 3: 'a\\x00b' is no value for file"),
+        ('{"file": null, "status": "ok", "roll_deg": 1}', "line 2: '' is no value for file"),
+        ('{"file": "", "status": "ok", "roll_deg": 1}', "line 2: '' is no value for file"),
+    ],
+)
+def test_a_row_names_a_file(tmp_path, line, said):
+    path = tmp_path / "rolls"
+    good = (
+        '{"file": "a", "status": "ok", "roll_deg": 1}' if line[0] == "{" else "file,status,roll_deg\na,ok,1"
+    )
+    path.write_text(f"{good}\n{line}\n")
+    for read in (lambda: read_columns(str(path), ["roll_deg"]), lambda: read_result(path)):
+        with pytest.raises(InputError, match=rf"rolls: {said}$"):
+            read()
+
+
+@pytest.mark.parametrize(
+    ("names", "rows", "expected"),
+    [
+        (["a.png", "b.png"], ["b.tif", "a.tif"], [1, 0]),
+        (["../maps/a.png"], ["/data/maps/a.png"], [0]),
+        (["maps/a.png", "maps/c.png"], ["left/a.png"], [0, None]),
+        (["out/x/0.png", "out/y/0.png"], ["left/y/0.png", "left/x/0.png"], [1, 0]),
+        (["a.b.png"], ["a.png", "a.b.png"], [1]),
+        ([".hidden"], [".hidden"], [0]),
+        ([], ["a.png"], []),
+    ],
+)
+def test_the_same_stem_is_a_match_and_folders_decide_between_several(names, rows, expected):
+    assert match_paths(names, rows, "rolls.csv") == expected
+
+
+def test_rows_that_fit_equally_well_are_named():
+    with pytest.raises(UsageError, match=r"rolls.csv: more than one row fits maps/0.png: a/0.png, b/0.png"):
+        match_paths(["maps/0.png"], ["a/0.png", "b/0.png", "c/1.png"], "rolls.csv")
+
+
+def test_one_row_for_two_files_is_refused():
+    with pytest.raises(UsageError, match=r"the row of left/0.png fits a/0.png and b/0.png"):
+        match_paths(["a/0.png", "b/0.png"], ["left/0.png"], "rolls.csv")
+
+
+@pytest.mark.parametrize(
+    ("name", "row", "of_pair", "elsewhere"),
+    [
+        ("b/0.png", "a/0.png", False, True),
+        ("day2/maps/0.png", "day1/maps/0.png", False, True),
+        ("/data/day2/maps/0.png", "/data/day1/maps/0.png", False, True),
+        ("day2/maps/0.png", "day1/left/0.png", True, True),
+        ("maps/0.png", "left/0.png", True, False),
+        ("floats/0.tif", "maps/0.png", False, False),
+        ("day2/floats/0.tif", "day1/maps/0.png", False, True),
+        ("day1/maps/0.png", "day1/left/0.png", True, False),
+        ("out/x/0.png", "left/x/0.png", True, False),
+        ("out/maps/0.png", "day1/out/maps/0.png", False, False),
+        ("0.png", "day1/maps/0.png", False, False),
+        ("../maps/0.png", "maps/0.png", False, False),
+        ("./maps/0.png", "maps/0.tif", False, False),
+        ("/mnt/run7/maps/0.png", "/data/run7/maps/0.png", False, False),
+        ("run7/maps/0.png", "/data/drives/run7/maps/0.png", False, False),
+        ("s3://mine/run7/0.png", "run7/0.png", False, False),
+        ("s3://mine/run8/0.png", "s3://mine/run7/0.png", False, True),
+    ],
+)
+def test_a_row_of_another_drive_is_told_by_the_folders_that_differ(name, row, of_pair, elsewhere):
+    assert is_elsewhere(name, row, of_pair=of_pair) is elsewhere

@@ -231,13 +231,6 @@ def test_a_link_to_nothing_exists_and_of_a_web_server_nothing_is_known(tmp_path)
     assert storage.exists("https://host/any.png")
 
 
-def test_a_file_of_more_than_4_gib_is_refused_unread(tmp_path):
-    with (tmp_path / "map.npy").open("wb") as file:
-        file.truncate(2**32 + 1)
-    with pytest.raises(InputError, match=r"map.npy: has 4294967297 bytes; up to 1 GB are read$"):
-        storage.read_bytes(tmp_path / "map.npy")
-
-
 @pytest.mark.parametrize(
     ("path", "reason"),
     [("x" * 300, "cannot be read: file name too long"), ("a\0b.png", "cannot be read: .*embedded null .*")],

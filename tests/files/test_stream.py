@@ -24,15 +24,6 @@ def pipe():
             os.close(each)
 
 
-def test_streams_are_told_from_what_a_file_can_replace(tmp_path):
-    os.mkfifo(tmp_path / "pipe")
-    (tmp_path / "file").write_bytes(b"")
-    for name in ("-", str(tmp_path / "pipe"), "/dev/null"):
-        assert stream.is_stream(name)
-    for name in ("file", "none", "."):
-        assert not stream.is_stream(str(tmp_path / name))
-
-
 def test_a_pipe_gets_all_of_the_bytes_and_stays_a_pipe(tmp_path):
     path, data, found = tmp_path / "pipe", os.urandom(300_000), []  # more than a pipe holds
     os.mkfifo(path)

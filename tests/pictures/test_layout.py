@@ -261,3 +261,29 @@ def test_maps_without_data_have_a_preview_of_one_pixel():
     assert not preview[:, :20].any()
     assert find_text(preview[:, 20 + 24 :], "1")
     assert v_disparity(np.zeros((3, 4))).max_disparity == 1
+
+
+def road_map(height=100, width=80, near=60.0):
+    return np.repeat(np.linspace(10, near, height)[:, None], width, axis=1)
+
+
+@pytest.mark.parametrize("horizon", [-5.0, 99.5, 1e9])
+def test_a_horizon_outside_of_the_map_is_not_drawn(horizon):
+    histogram = v_disparity(road_map())
+    np.testing.assert_array_equal(draw_v_disparity(histogram), draw_v_disparity(histogram, horizon=horizon))
+
+
+def test_no_data_is_black_and_data_never_is():
+    values = np.array([[0, np.nan, -1, np.inf], [0.001, 1, 50, 100]])
+
+    picture = draw_disparity(values)
+
+    assert picture.shape == (2, 4, 3)
+    assert picture.dtype == np.uint8
+    assert not picture[0].any()
+    assert picture[1].any(axis=1).all()
+
+
+def test_empty_maps_and_empty_masks_are_drawn():
+    assert not draw_disparity(np.zeros((3, 4))).any()
+    assert draw_road(np.ones((3, 4)), np.zeros((3, 4))).shape == (3, 4, 3)

@@ -28,8 +28,6 @@ PLACE = """name => {
                                 box.y + chart._fullLayout[axis].d2p(trace.y[place])];
     }
 }"""
-
-
 NEVER_IDLE = "window.requestIdleCallback = () => {}"  # charts wait until the browser is idle
 
 
@@ -171,9 +169,7 @@ def test_a_switch_shows_a_frame_before_and_after_and_the_table_shows_its_picture
     assert page.locator("dialog p").inner_text().startswith(NAME)
 
 
-def test_one_switch_turns_all_frames_on_a_narrow_screen_with_its_captions(
-    opened,
-):
+def test_one_switch_turns_all_frames_on_a_narrow_screen_with_its_captions(opened):
     page = opened(width=400, drawn=False)
     for name, kind, caption in (
         ("all before", "before", "Map"),
@@ -392,28 +388,6 @@ def test_a_table_of_ten_thousand_frames_holds_the_rows_in_view_alone_and_is_sort
     assert len(shown_rows(page)) < 50
 
 
-def test_a_table_of_few_frames_has_no_empty_space_and_the_chart_a_picture_until_it_is_drawn(
-    opened, browser, tmp_path
-):
-    write_result(tmp_path / "rolls.csv", [row("a.png"), row("b.png", 2.0)])
-    assert rollcli("report", "rolls.csv", "-o", "page.html", "--gallery", "0", cwd=tmp_path).status == 0
-    page = opened(url=(tmp_path / "page.html").as_uri())
-    box, last = (page.locator(each).bounding_box() for each in (".rows", ".rows .row:last-child"))
-    assert last["y"] + last["height"] == pytest.approx(box["y"] + box["height"], abs=3)
-    page.wait_for_selector("#histogram .main-svg")
-    assert page.locator(".still:visible").count() == 0
-
-    for width, shown in ((1280, ".wide-screen"), (400, ".narrow-screen")):
-        still = browser.new_page(viewport={"width": width, "height": 900}, java_script_enabled=False)
-        still.goto((tmp_path / "page.html").as_uri())
-        place = still.locator("#roll").bounding_box()
-        picture = still.locator(f"#roll {shown}").bounding_box()
-        assert picture == place
-        assert still.locator("#roll .still:visible").count() == 1
-        assert still.locator(f"#roll {shown}").get_by_text("roll, degrees").is_visible()
-        still.close()
-
-
 def test_an_address_leads_to_a_frame_whatever_it_is_called(opened, url, long_url):
     page = opened(url=long_url + "#frame=maps/f07750.png", drawn=False)
     assert page.locator(".detail h3").inner_text() == "maps/f07750.png"
@@ -441,19 +415,6 @@ def test_a_click_on_a_point_of_the_chart_leads_to_its_row_and_pictures(opened):
         assert (page.locator(".detail img").count() == 5) == (name == "maps/frame3.png")
         assert page.locator(".rows [aria-current]").is_visible()
     assert "is empty" in page.locator(".detail").inner_text()
-
-
-def test_a_click_on_a_point_leads_to_its_row_where_charts_are_over_time(opened, tmp_path):
-    names = [f"d.mcap#/d@{17 * 10**17 + place * 10**9}" for place in range(20)]
-    write_result(tmp_path / "rolls.csv", [row(name, 0.1 * (place % 5)) for place, name in enumerate(names)])
-    done = rollcli("report", "rolls.csv", "-o", "page.html", "--gallery", "0", cwd=tmp_path)
-    assert done.status == 0, done.err
-    page = opened(url=(tmp_path / "page.html").as_uri())
-    page.locator("#roll").scroll_into_view_if_needed()
-    x, y = page.evaluate(PLACE, names[13])
-    page.mouse.move(x + 1, y + 1)
-    page.mouse.click(x + 1, y + 1)
-    page.locator(".detail h3", has_text=names[13]).wait_for()
 
 
 def test_the_readmes_picture_of_the_page_is_of_the_parts_it_names(browser, url):

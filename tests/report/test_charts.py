@@ -1,13 +1,17 @@
-"""What the charts hold."""
+"""What the charts and the summary hold."""
 
 import html
+import json
+import os
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from rollcli.report.charts import all_charts, chart_over_frames, histogram, outside, view
-from rollcli.report.summary import degrees, option_lines, with_interval
+from rollcli.report.options import chart_names
+from rollcli.report.page import Chart, script_json
+from rollcli.report.summary import degrees, summarize, with_interval, written_at
 from rollcli.rig.drive.assess import assess_rig
 from tests.report.results import row
 
@@ -81,18 +85,6 @@ def test_an_angle_has_as_many_decimals_as_its_interval_is_worth(half, words):
     assert with_interval(2.3456, half) == words
 
 
-def test_every_angle_within_the_view_is_in_the_histogram():
-    rng = np.random.default_rng(0)
-    rows = [
-        row(f"{i}.png", roll, 0.1, "ok" if i % 7 else "suspect")
-        for i, roll in enumerate(rng.normal(2, 1, 500))
-    ]
-    bars = {trace["name"]: trace for trace in histogram(rows).data}
-    assert sum(bars["ok"]["y"]) == sum(i % 7 > 0 for i in range(500))
-    assert sum(bars["ok"]["y"] + bars["suspect"]["y"]) == 500 - outside(rows)
-    assert 20 <= len(bars["ok"]["y"]) <= 50
-
-
 @pytest.mark.parametrize("count", [1, 2, 18, 40])
 def test_few_frames_have_few_bars_and_single_ones_are_no_walls(count):
     chart = histogram([row(f"{i}.png", 3 + i / 100) for i in range(count)])
@@ -110,13 +102,6 @@ def test_an_angle_far_off_does_not_flatten_the_others():
     assert 0.5 < low < 1 < 2 < high < 2.5
     assert outside(rows) == 1
     assert outside(rows[:-1]) == 0
-
-
-@pytest.mark.parametrize("rows", [[row("a.png", 3.0, None)], [row("a.png", None)], [row("a.png", 3.0, 40.0)]])
-def test_a_single_row_of_any_kind_has_a_chart(rows):
-    low, high = view(rows)
-    assert low < high
-    assert sum(len(trace["x"]) for trace in chart_over_frames(rows).data) >= 1
 
 
 @pytest.mark.parametrize(("frames", "bars"), [(400, True), (402, False)])
@@ -147,13 +132,6 @@ def test_the_legend_names_what_is_there_even_if_it_is_one_thing(rows, named):
 )
 def test_angles_are_printed_with_a_sign_unless_they_are_nothing(angle, text):
     assert degrees(angle) == text
-
-
-def test_options_are_listed_as_they_are_typed():
-    options = {"lambda0": 26.0, "mask": None, "roi": [0, 1, 2, 3], "polygon": [[0, 1.5], [2, 3]]}
-    shown = option_lines({"options": {**options, "timing": False, "invalid": [], "seed": 0}})
-    assert shown == [("--lambda0", "26"), ("--roi", "0,1,2,3"), ("--polygon", "0,1.5 2,3"), ("--seed", "0")]
-    assert option_lines(None) == []
 
 
 def drive_rows(folder, level, frames=400, jump=0.0):
@@ -208,11 +186,6 @@ def test_a_pitch_without_a_height_is_one_chart():
     assert both[1].layout["yaxis"]["title"]["text"] == "height, m"
 
 
-def test_a_height_is_told_in_metres_with_as_many_decimals_as_its_interval_is_worth():
-    each = replace(row("a.png"), height_m=1.6543, height_ci95_m=0.004)
-    assert traces_of(pose_charts([each])[0])["height"]["customdata"][0] == "a.png<br>1.654 ± 0.004 m"
-
-
 def test_a_height_has_jumps_and_segments_and_no_line_leads_to_another_drive():
     rng = np.random.default_rng(4)
     rows = [
@@ -230,3 +203,42 @@ def test_a_height_has_jumps_and_segments_and_no_line_leads_to_another_drive():
     assert shown["jump"]["x"] == [300.5, 300.5, None]
     assert shown["height"]["x"][199:202] == [200, None, 201]
     assert "jump" not in traces_of(pitch)
+
+
+def test_the_middle_is_from_the_5th_to_the_95th_percentile():
+    found = summarize([row(f"{i}.png", float(i), None) for i in range(101)])
+    assert (found.middle, found.extremes) == ((5, 95), (0, 100))
+    assert found.half_width is None
+    nothing = summarize([row("a.png", None)])
+    assert (nothing.middle, nothing.extremes, nothing.frames) == (None, None, 1)
+
+
+def test_the_time_of_a_file_is_told_in_utc_and_that_of_a_stream_is_not(tmp_path):
+    (tmp_path / "rolls.csv").touch()
+    os.utime(tmp_path / "rolls.csv", (86_400 * 365 + 3_720, 86_400 * 365 + 3_720))
+    assert written_at(str(tmp_path / "rolls.csv")) == "1971-01-01 01:02 UTC"
+    assert written_at("-") == written_at("s3://maps/rolls.csv") == written_at("a\0b") == ""
+
+
+def test_a_histogram_is_of_two_angles_or_more():
+    assert chart_names([row("a.png"), row("b.png")]) == ["roll", "histogram"]
+    assert chart_names([row("a.png"), row("b.png", None)]) == ["roll"]
+    posed = replace(row("a.png", None), pitch_deg=0.0, height_m=1.5)
+    assert chart_names([row("b.png", None), posed]) == ["roll", "pitch", "height"]
+    pairs = [replace(row(f"{name}.png", None), right_lower_px=0.1) for name in "ab"]
+    assert chart_names(pairs) == ["roll", "alignment"]
+    assert chart_names(pairs[:1]) == ["roll"]
+
+
+def test_json_in_a_script_cannot_end_it():
+    value = {"a": "</script><!--&\u2028\u2029"}
+    text = script_json(value)
+    assert not set(text) & set("<>&\u2028\u2029")
+    assert json.loads(text) == value
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        script_json([float("nan")])
+    page = Chart('"a"', "<b>", [], still="<svg/>").__html__()
+    assert page.startswith(
+        '<div class="chart" id="&quot;a&quot;" role="img" aria-label="&lt;b&gt;"><svg/></div>'
+    )
+    assert html.unescape(page).endswith('data-chart=""a"">{"data": [], "layout": {}}</script>')

@@ -1,16 +1,20 @@
-"""Where the files of a row are looked for."""
+"""Where the files of a row are looked for, and which frames are shown in pictures."""
 
 import math
+import threading
 from dataclasses import replace
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import pytest
 
 from rollcli.errors import UsageError
 from rollcli.report import sources
-from rollcli.report.sources import subjects
+from rollcli.report.sources import JUMP, SPREAD, SUSPECT, WIDEST, choose, subjects
 from rollcli.run.options import ImageOptions
-from tests.report.results import row
+from tests.report.results import row, write_result
+from tests.run_cli import rollcli, write_maps
 
 NONE = ImageOptions()
 
@@ -138,3 +142,118 @@ def test_a_subject_has_the_angle_and_the_whole_parabola_of_its_row(folder):
     assert (whole.theta, whole.alpha) == (math.radians(3), (20.0, 0.3, 0.0))
     assert (part.theta, part.alpha) == (math.radians(-2), None)
     assert nothing.theta == 0
+
+
+def places(choices, reason):
+    return [each.place for each in choices if each.reason == reason]
+
+
+def test_the_widest_then_suspect_ones_then_evenly_spread_ones():
+    rows = [row(f"{i}.png", width=0.05) for i in range(300)]
+    for place in (17, 100, 250):
+        rows[place] = row(f"{place}.png", width=1 + place / 1000)
+    for place in range(30, 60):
+        rows[place] = row(f"{place}.png", width=0.3, status="suspect")
+    chosen = choose(rows, 9)
+    assert places(chosen, WIDEST) == [250, 100, 17]
+    assert places(chosen, SUSPECT) == [35, 45, 55]
+    rest = places(chosen, SPREAD)
+    assert len(rest) == 3
+    assert rest[0] < 80 < rest[1] < 180 < rest[2]
+
+
+def test_the_frames_around_a_jump_come_first():
+    rows = [row(f"{i}.png", None if i in (49, 51) else 1.0) for i in range(100)]
+    chosen = choose(rows, 12, [10, 50])
+    assert places(chosen, JUMP) == [9, 10, 48, 50]
+    assert len(chosen) == len({each.place for each in chosen}) == 12
+    assert places(choose(rows, 12, [0, 99]), JUMP) == [0, 98, 99]  # a drive may begin with one
+    assert places(choose(rows, 4, range(10, 90, 10)), JUMP) == [79, 80]  # others find room, too
+    assert places(choose(rows, 3, [50]), JUMP) == []
+
+
+def test_frames_without_an_angle_are_never_chosen():
+    rows = [row(f"{i}.png", None if i % 2 else 1.0) for i in range(20)]
+    assert sorted(each.place for each in choose(rows, 12)) == list(range(0, 20, 2))
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 5, 12, 100])
+def test_as_many_as_asked_for_and_none_twice(count):
+    rows = [
+        row(f"{i}.png", width=None if i < 5 else 0.1, status="suspect" if i < 3 else "ok") for i in range(20)
+    ]
+    chosen = [each.place for each in choose(rows, count)]
+    assert len(chosen) == len(set(chosen)) == min(count, 20)
+
+
+class Handler(SimpleHTTPRequestHandler):
+    """Serves a folder, and notes who is asked for."""
+
+    def do_GET(self):
+        self.server.asked.append(self.path)
+        super().do_GET()
+
+    def log_message(self, *_):
+        pass
+
+
+@pytest.fixture
+def server(tmp_path):
+    folder = tmp_path / "served"
+    write_maps(folder, 1)
+    with ThreadingHTTPServer(("127.0.0.1", 0), partial(Handler, directory=folder)) as server:
+        server.asked, server.folder = [], folder
+        server.address = f"http://127.0.0.1:{server.server_port}"
+        threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01}, daemon=True).start()
+        yield server
+        server.shutdown()
+
+
+def report(folder, result, server, *arguments):
+    keys = {"AWS_ENDPOINT_URL": server.address, "AWS_ACCESS_KEY_ID": "a", "AWS_SECRET_ACCESS_KEY": "b"}
+    return rollcli("report", result, "-o", "page.html", *arguments, cwd=folder, **keys)
+
+
+@pytest.mark.parametrize(
+    "name", ["{}/frame0.png", "s3://private/frame0.png", "HTTP{}/frame0.png", "az://private/frame0.png"]
+)
+def test_a_remote_row_of_a_local_result_is_asked_for_by_nobody(tmp_path, server, name):
+    name = name.format(server.address if name.startswith("{") else server.address.removeprefix("http"))
+    write_result(tmp_path / "rolls.csv", [row(name)])
+
+    done = report(tmp_path, "rolls.csv", server)
+
+    assert server.asked == []
+    assert done.status == 3
+    assert "is remote, and the result does not lie there; --fetch follows it" in done.err
+
+
+def test_both_images_of_a_pair_must_lie_with_the_result(tmp_path, server):
+    pair = replace(row("frame0.png"), right_file=f"{server.address}/frame0.png")
+    write_result(tmp_path / "rolls.csv", [pair])
+    assert report(tmp_path, "rolls.csv", server).status == 3
+    assert server.asked == []
+
+
+def test_pictures_from_images_ask_for_nothing(tmp_path, server):
+    write_result(tmp_path / "rolls.csv", [row(f"{server.address}/frame0.png")])
+    write_maps(tmp_path / "out" / "derotated", 1)
+    report(tmp_path, "rolls.csv", server, "--images", "out")
+    assert server.asked == []
+
+
+def test_fetch_follows_a_remote_row(tmp_path, server):
+    write_result(tmp_path / "rolls.csv", [row(f"{server.address}/frame0.png")])
+    assert report(tmp_path, "rolls.csv", server, "--fetch").status == 0
+    assert "/frame0.png" in server.asked
+
+
+def test_rows_of_a_result_in_the_same_store_are_followed_and_no_others(tmp_path, server):
+    other = server.address.replace("127.0.0.1", "localhost")
+    rows = [row(f"{server.address}/frame0.png"), row(f"{other}/other.png")]
+    write_result(server.folder / "rolls.csv", rows)
+
+    done = report(tmp_path, f"{server.address}/rolls.csv", server)
+
+    assert done.status == 3
+    assert set(server.asked) == {"/rolls.csv", "/frame0.png"}

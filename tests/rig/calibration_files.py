@@ -2,6 +2,8 @@
 
 from typing import NamedTuple
 
+import numpy as np
+
 
 class Rig(NamedTuple):
     """A rectified pair: pixels, metres."""
@@ -65,25 +67,11 @@ def _matrix_yaml(name, rows, columns, values):
 
 def opencv_yaml(rig):
     left, right = _projections(rig)
-    q = (
-        1,
-        0,
-        0,
-        -rig.cx,
-        0,
-        1,
-        0,
-        -rig.cy,
-        0,
-        0,
-        0,
-        rig.fx,
-        0,
-        0,
-        1 / rig.baseline,
-        rig.doffs / rig.baseline,
-    )
-    matrices = (("P1", 3, 4, left), ("P2", 3, 4, right), ("Q", 4, 4, q))
+    q = np.zeros((4, 4))
+    q[0, 0] = q[1, 1] = 1
+    q[:3, 3] = -rig.cx, -rig.cy, rig.fx
+    q[3, 2:] = 1 / rig.baseline, rig.doffs / rig.baseline
+    matrices = (("P1", 3, 4, left), ("P2", 3, 4, right), ("Q", 4, 4, q.ravel()))
     return "%YAML:1.0\n---\n" + "".join(_matrix_yaml(*matrix) for matrix in matrices)
 
 

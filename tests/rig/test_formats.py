@@ -196,6 +196,8 @@ def test_focal_length_and_principal_point_alone_are_a_calibration_without_a_base
         (samples.opencv_yaml(RIG._replace(baseline=-0.5)).partition("Q:")[0], "swapped"),
         ("%YAML:1.0\nQ: {data: [1, 2, 3]}\n", "its Q is no matrix of a horizontal rig"),
         ('{"intrinsic": ["fx", "u0"]}', "calib0"),
+        ('["intrinsic", "u0"]', "is no JSON object"),
+        ("P0: 500 0 320 0 0 500 240 0 0 0 1 0\nP1: 500 0 320 0 0 500 240 -100 0 0 1 0\n", "vertical"),
     ],
 )
 def test_a_bad_file_is_refused_in_one_line_that_names_it(text, words):
@@ -245,19 +247,12 @@ def test_yaml_that_calibrations_have_no_use_for_is_refused_by_its_line(text, wor
         ("a:\t1\t\nb: \t[1,\t2]\n\t\n", {"a": "1", "b": ["1", "2"]}),
         ("a: !!opencv-matrix\n   data: [ 1., 2. ]\n", {"a": {"data": ["1.", "2."]}}),
         ("a:\n- - x\n  - y\n- b: c\n", {"a": [["x", "y"], {"b": "c"}]}),
+        ("%YAML:1.0\n---\na: 1\n...\n]\n", {"a": "1"}),
+        ("a:\nb: 1\n", {"a": "", "b": "1"}),
     ],
 )
 def test_yaml_is_read_as_text_and_so_are_the_dialects_of_robots(text, values):
     assert parse_yaml(text, "f") == values
-
-
-def test_what_follows_the_end_of_a_document_is_left_alone():
-    assert parse_yaml("%YAML:1.0\n---\na: 1\n...\n]\n", "f") == {"a": "1"}
-
-
-def test_a_vertical_rig_is_refused():
-    lower = "P0: 500 0 320 0 0 500 240 0 0 0 1 0\nP1: 500 0 320 0 0 500 240 -100 0 0 1 0\n"
-    assert "vertical" in refusal(lower)
 
 
 def test_two_files_are_one_calibration_for_ros_only():
@@ -403,27 +398,6 @@ def test_a_rig_whose_images_have_no_size_is_one_of_any_size(form):
     found = parse(without_size(samples.WHOLE[form](RIG)))
     assert numbers(found) == pytest.approx(truth(RIG), rel=1e-12, abs=1e-9)
     assert (found.width, found.height) == (None, None)
-
-
-@pytest.mark.parametrize("side", ["width", "height"])
-def test_half_of_a_size_is_none(side):
-    text = re.sub(rf"Camera.{side}: .*", "", samples.orb_slam(RIG))
-    assert (parse(text).width, parse(text).height) == (None, None)
-
-
-def test_a_pair_of_ros_files_without_a_size_is_one_of_any_size():
-    left, right = (without_size(samples.ros(RIG, right=side)) for side in (False, True))
-    found = parse(left, right)
-    assert numbers(found) == pytest.approx(truth(RIG), rel=1e-12, abs=1e-9)
-    assert (found.width, found.height) == (None, None)
-
-
-def test_a_key_without_a_value_is_an_empty_one():
-    assert parse_yaml("a:\nb: 1\n", "f") == {"a": "", "b": "1"}
-
-
-def test_json_that_is_no_object_is_refused():
-    assert refusal('["intrinsic", "u0"]') == "calib0: is no JSON object"
 
 
 def test_a_calibration_without_a_size_has_no_edge_that_its_centre_could_be_near():

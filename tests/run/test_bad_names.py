@@ -4,11 +4,10 @@ import csv
 import os
 import shutil
 import subprocess
-import sys
 
 import pytest
 
-from tests.run_cli import command, environment, rollcli, write_maps
+from tests.run_cli import command, environment, python, rollcli, write_maps
 
 LONG = "x" * 300 + ".png"
 # calls that name this file fail, as those of a dying disk or a lost server do
@@ -42,8 +41,7 @@ def statuses(folder, name="rolls.csv"):
 def run_failing(folder, calls, *arguments):
     """Run the program where some system calls fail for one of the maps."""
     code = FAILING.format(calls=calls, arguments=list(arguments))
-    line = [sys.executable, "-c", code]
-    done = subprocess.run(line, cwd=folder, env=environment(), capture_output=True, text=True, check=False)
+    done = python(code, cwd=folder)
     assert "internal error" not in done.stderr
     return done
 

@@ -5,7 +5,6 @@ import sys
 
 import pytest
 
-from rollcli.run import result_file as durable_rows
 from rollcli.run.result_file import DurableRows, open_result
 from tests.run_cli import contents, rollcli, write_maps
 
@@ -65,49 +64,6 @@ def test_a_row_without_images_is_written_at_once_and_after_those_that_wait(tmp_p
         rows.append([b"%d " % number], [b"read"], [str(image(tmp_path, number))] if number % 2 else [])
     rows.commit()
     assert list(file.rows) == [b"%d" % number for number in range(5)]
-
-
-class Clock:
-    """Time that passes when it is told to, and while images are forced to the disk."""
-
-    def __init__(self, sync_s):
-        self.now, self.sync_s = 100.0, sync_s
-
-    def monotonic(self):
-        return self.now
-
-    def sync(self, images, folders):
-        self.now += self.sync_s
-
-
-@pytest.mark.parametrize(
-    ("sync_s", "wait_s"),
-    [(10.0, 1.0), (0.005, 0.5)],
-    ids=["a second at most", "100 times what the sync took"],
-)
-def test_a_row_waits_so_long_for_the_others_of_its_group(monkeypatch, file, sync_s, wait_s):
-    clock = Clock(sync_s)
-    monkeypatch.setattr(durable_rows, "time", clock)
-    monkeypatch.setattr(durable_rows, "sync_files", clock.sync)
-    rows = DurableRows(file, WatchedFile([]))
-    rows.append([b"0 "], [b"read"], ["0.png"])
-    assert list(file.rows) == [b"0"]
-    start = clock.now
-    for share, written in ((0.0, 1), (0.98, 1), (1.02, 4)):
-        clock.now = start + share * wait_s
-        rows.append([b"%g " % (share + 1)], [b"read"], ["1.png"])
-        assert len(file.rows) == written
-
-
-def test_a_group_ends_early_when_it_has_many_images(monkeypatch, file):
-    clock = Clock(10.0)
-    monkeypatch.setattr(durable_rows, "time", clock)
-    monkeypatch.setattr(durable_rows, "sync_files", clock.sync)
-    rows = DurableRows(file, WatchedFile([]))
-    for number in range(1 + 512):
-        assert len(file.rows) == min(number, 1)
-        rows.append([b"%d " % number], [b"read"], ["image.png"])
-    assert len(file.rows) == 513
 
 
 @pytest.fixture

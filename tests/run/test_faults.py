@@ -6,14 +6,24 @@ import resource
 import shutil
 import signal
 import subprocess
-import sys
 from functools import partial
 from pathlib import Path
 
 import pytest
 
 from rollcli.files.results import parse_rows
-from tests.run_cli import ROOT, command, contents, environment, holding, rollcli, wait_until, write_maps
+from tests.run_cli import (
+    ROOT,
+    command,
+    contents,
+    environment,
+    holding,
+    python,
+    rollcli,
+    started,
+    wait_until,
+    write_maps,
+)
 
 FRAMES = 12
 
@@ -117,13 +127,7 @@ def test_an_output_that_is_a_folder_ends_the_run_with_status_1(maps):
 @pytest.mark.parametrize(("jobs", "moved"), [("1", True), ("2", False)])
 def test_a_result_that_is_moved_or_removed_while_running_ends_the_run_with_status_1(maps, jobs, moved):
     write_maps(maps / "maps", 300)
-    run = subprocess.Popen(
-        command("estimate", "maps", "-o", "rolls.csv", "-q", "-j", jobs),
-        cwd=maps,
-        env=environment(),
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    run = started("estimate", "maps", "-o", "rolls.csv", "-q", "-j", jobs, cwd=maps)
     result = maps / "rolls.csv"
     wait_for_bytes(result, 2000)
     if moved:
@@ -151,8 +155,7 @@ sys.argv = ["rollcli", "estimate", "maps", "-j1"]
 from rollcli.__main__ import main
 main()
 """
-    line = [sys.executable, "-c", code]
-    done = subprocess.run(line, cwd=maps, env=environment(), capture_output=True, text=True, check=False)
+    done = python(code, cwd=maps)
     assert done.returncode == 3
     assert done.stdout.splitlines()[-1].endswith(",no such file")
     assert done.stdout.count(",ok,") == FRAMES - 1
@@ -198,8 +201,6 @@ if "spawn_main" in " ".join(sys.orig_argv):
         return read(path, name, **how)
     formats.read_stored = read_stored
 """
-
-
 ESTIMATE = ("estimate", "maps", "-j2", "-o", "rolls.csv", "-q")
 
 

@@ -203,18 +203,3 @@ def test_one_frame_is_named_once():
 def test_an_expectation_without_a_tolerance_is_refused_and_the_other_way_round(asked, needs):
     with pytest.raises(UsageError, match=needs):
         check_options(GateOptions(**asked))
-
-
-@pytest.mark.parametrize(
-    "asked",
-    [
-        {},
-        {"expect_roll": 0.0, "within": 1.0},
-        {"expect_pitch": 0.0, "within": 1.0},
-        {"expect_height": 1.0, "within": 1.0},
-        {"expect_height": 1.0, "within_height": 1.0},
-        {"expect_height": 1.0, "expect_roll": 0.0, "within": 1.0, "within_height": 1.0},
-    ],
-)
-def test_an_expectation_with_its_tolerance_is_taken(asked):
-    check_options(GateOptions(**asked))

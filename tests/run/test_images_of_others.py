@@ -4,9 +4,6 @@ import json
 
 import pytest
 
-from rollcli.run.estimate_frame import run_frame
-from rollcli.run.frame import Frame
-from rollcli.run.options import FrameOptions, ImageOptions
 from tests.run_cli import contents, road_map, rollcli, write_kitti, write_maps
 
 FRAMES = 4
@@ -119,21 +116,3 @@ def test_a_resume_in_parts_starts_only_where_no_image_is(maps):
     assert contents(maps) == before
     assert rollcli(*arguments, "first.parquet", cwd=maps).status == 0
     assert contents(maps) == before
-
-
-def the_frame(folder):
-    path = str(folder / "maps" / "frame0.png")
-    return Frame("frame0.png", "", path, "", "frame0.png", None)
-
-
-def test_a_worker_leaves_what_is_there_when_its_frame_fails(maps):
-    images = ImageOptions(derotated=str(maps / "up"), vdisparity=str(maps / "v"))
-    for folder in ("up", "v"):
-        (maps / folder).mkdir()
-        (maps / folder / "frame0.png").write_bytes(b"precious")
-    (maps / "maps" / "frame0.png").write_bytes(b"no map")
-    before = contents(maps)
-    assert run_frame(the_frame(maps), FrameOptions(images=images)).row.status == "error"
-    assert contents(maps) == before
-    assert run_frame(the_frame(maps), FrameOptions(images=images, replaces=True)).row.status == "error"
-    assert sorted(contents(maps)) == sorted(name for name in before if name.startswith("maps/"))

@@ -1,5 +1,9 @@
-"""Counts, lines and the exit status of a run."""
+"""Counts, lines, the bar and the exit status of a run."""
 
+import os
+import struct
+import sys
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +13,7 @@ from rollcli.errors import ExitStatus
 from rollcli.files.results import Row
 from rollcli.run.frame import Frame, FrameResult, failed_frame
 from rollcli.run.options import EncodingOptions, RunningOptions
-from rollcli.run.progress import Progress
+from rollcli.run.progress import Progress, TaskProgress
 from rollcli.run.summary import RunSummary
 from tests.run_cli import rollcli
 
@@ -169,3 +173,125 @@ def test_frames_that_failed_for_one_cause_are_counted_together_whatever_they_nam
         "2 frames, such as maps/few.npy: only 3 valid pixels: at least 100 are needed",
         "2 frames: is empty",
     ]
+
+
+class Clock:
+    """A monotonic clock that a test moves."""
+
+    def __init__(self):
+        self.now = 100.0
+
+    def __call__(self):
+        return self.now
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    clock = Clock()
+    monkeypatch.setattr(time, "monotonic", clock)
+    return clock
+
+
+def test_a_line_is_written_every_half_minute_off_a_terminal(clock, capsys):
+    with TaskProgress(100) as progress:
+        progress.kept = 10
+        for _ in range(8):
+            clock.now += 10
+            progress.advance()
+    assert capsys.readouterr().err == (
+        "rollcli: 13 of 100 frames, 0.1 frames/s, about 14 min left\n"
+        "rollcli: 16 of 100 frames, 0.1 frames/s, about 14 min left\n"
+    )
+    assert (progress.done, progress.seconds) == (18, 80)
+
+
+@pytest.mark.parametrize(
+    ("total", "left"),
+    [(31, ""), (32, ", about 2 s left"), (91, ", about 2 min left"), (30_031, ", about 12 h left")],
+)
+def test_the_time_that_is_left_is_told_in_a_unit_that_fits(clock, capsys, total, left):
+    with TaskProgress(total) as progress:
+        progress.kept = 11
+        for _ in range(20):
+            clock.now += 1.5
+            progress.advance()
+    assert capsys.readouterr().err == f"rollcli: 31 of {total} frames, 0.7 frames/s{left}\n"
+
+
+class Terminal:
+    """A terminal so many characters wide, which shows what this process says; 0 if it tells no size."""
+
+    def __init__(self, monkeypatch, columns):
+        fcntl = pytest.importorskip("fcntl", reason="this system has no terminals of POSIX")
+        import termios
+
+        self.reader, end = os.openpty()
+        fcntl.ioctl(end, termios.TIOCSWINSZ, struct.pack("HHHH", 24 if columns else 0, columns, 0, 0))
+        self.stream = os.fdopen(end, "w")
+        monkeypatch.setattr(sys, "stderr", self.stream)
+
+    def read(self):
+        """What was written since it was read."""
+        self.stream.write("\0")  # what was written before it has arrived when this has
+        self.stream.flush()
+        data = b""
+        while not data.endswith(b"\0"):
+            data += os.read(self.reader, 100_000)
+        return data[:-1].decode()
+
+
+class WithFailures(TaskProgress):
+    def counted(self):
+        return {"failed": 2}
+
+
+@pytest.mark.parametrize(("columns", "longest"), [(60, 60), (0, 80)])
+def test_a_terminal_shows_a_bar_which_makes_room_for_messages_and_vanishes(monkeypatch, columns, longest):
+    terminal = Terminal(monkeypatch, columns)
+    progress = WithFailures(10)
+    progress.kept = 4
+    with progress:
+        shown = terminal.read().rpartition("\r")[2]
+        assert " 4/10 " in shown
+        assert longest - 2 <= len(shown) <= longest
+        for _ in range(3):
+            progress.advance()
+        terminal.read()
+        progress.say("a message")
+        cleared, said, after = terminal.read().partition("rollcli: a message\r\n")
+        assert (cleared.strip(), said != "") == ("", True)
+        assert len(cleared) > longest - 5
+        assert " 7/10 " in after
+        assert "failed=2" in after
+    erased = terminal.read()
+    assert (erased.strip(), erased[-1:]) == ("", "\r")
+    terminal.stream.close()
+    os.close(terminal.reader)
+
+
+def test_quiet_progress_writes_no_lines(clock, capsys):
+    with TaskProgress(3, quiet=True, verbose=True) as progress:
+        clock.now += 40
+        progress.advance()
+        progress.note("a note")
+        progress.detail("a detail")
+    assert capsys.readouterr().err == ""
+
+
+def test_a_note_is_written_once_and_a_detail_only_when_verbose(capsys):
+    for verbose, expected in ((False, "rollcli: a note\n"), (True, "rollcli: a note\nrollcli: a detail\n")):
+        with TaskProgress(3, verbose=verbose) as progress:
+            progress.note("a note")
+            progress.note("a note")
+            progress.note("the same topic", topic="a note")
+            progress.detail("a detail")
+        assert capsys.readouterr().err == expected
+
+
+def test_the_speed_leaves_out_what_an_interrupted_run_has_left(clock):
+    progress = TaskProgress(100)
+    progress.kept = 50
+    for _ in range(6):
+        clock.now += 0.5
+        progress.advance()
+    assert progress.speed() == "2.0 frames/s"

@@ -1,12 +1,14 @@
-"""FILE.run.json: what it holds, what is read back from it, and which inputs it tells apart."""
+"""FILE.run.json: what it holds and what is read back; the roll of the rig that ends a run."""
 
 import json
+import math
 import os
 
 import pytest
 
 from rollcli.errors import InputError
 from rollcli.files.results import Row, read_run
+from rollcli.run import summary
 from rollcli.run.frame import ReadAs
 from rollcli.run.options import (
     EncodingOptions,
@@ -19,9 +21,9 @@ from rollcli.run.options import (
 )
 from rollcli.run.plan import make_plan
 from rollcli.run.record import RunRecord, recorded_options, states_of
-from rollcli.run.summary import RunSummary
+from rollcli.run.summary import Figures, RunSummary
 from tests.run.estimate_options import estimate_options
-from tests.run_cli import write_maps
+from tests.run_cli import road_map, rollcli, write_kitti, write_maps
 
 
 @pytest.fixture
@@ -95,3 +97,45 @@ def test_a_digest_of_states_tells_changed_inputs(options):
     assert states_of(frames) == before
     os.utime(frames[0].path, ns=(0, 2**62))
     assert states_of(frames) != before
+
+
+def test_a_run_ends_with_the_roll_of_the_rig_and_its_interval(tmp_path):
+    for place in range(40):
+        write_kitti(tmp_path / "maps" / f"{place}.png", road_map(math.radians(2), noise=0.3, seed=place))
+    (tmp_path / "maps" / "z.png").write_bytes(b"no map")
+    done = rollcli("estimate", "maps", "-o", "rolls.csv", cwd=tmp_path)
+    assert done.status == 3
+    rig = json.loads(rollcli("rig", "rolls.csv", "--format", "json", "-q", cwd=tmp_path).out)
+    last = done.err.splitlines()[-1]
+    told = float(last.removeprefix("rollcli: roll ").partition(" ")[0])
+    assert abs(told - rig["roll_deg"]) < 0.001
+    assert " ± " in last
+    assert last.endswith("°, 40 ok, 0 suspect, 1 failed")
+    assert abs(rig["roll_deg"] - 2) < 0.1
+
+
+def test_a_resumed_run_answers_for_all_frames_and_a_quiet_one_does_not(tmp_path):
+    for place in range(4):
+        write_kitti(tmp_path / "maps" / f"{place}.png", road_map(0.1, seed=place))
+    rollcli("estimate", "maps", "-o", "rolls.csv", "-q", cwd=tmp_path)
+    lines = (tmp_path / "rolls.csv").read_bytes().splitlines(keepends=True)
+    (tmp_path / "rolls.csv").write_bytes(b"".join(lines[:3]))
+    assert rollcli("estimate", "maps", "-o", "rolls.csv", "-q", "--resume", cwd=tmp_path).err == ""
+    (tmp_path / "rolls.csv").write_bytes(b"".join(lines[:3]))
+    done = rollcli("estimate", "maps", "-o", "rolls.csv", "--resume", cwd=tmp_path)
+    assert done.err.splitlines()[-1].endswith(", 4 ok, 0 suspect, 0 failed")
+
+
+def test_frames_without_an_angle_leave_the_roll_unknown():
+    found = RunSummary()
+    found.add_row(Row("a.png", message="a.png: is empty"))
+    assert found.rig_roll() == "roll unknown, 0 ok, 0 suspect, 1 failed"
+
+
+def test_of_more_frames_than_memory_is_meant_for_the_answer_names_who_has_it(monkeypatch):
+    monkeypatch.setattr(summary, "_MOST_FRAMES", 3)
+    found = RunSummary()
+    for number in range(5):
+        found.add_row(Row(f"{number}.png", status="ok", roll_deg=1.0, roll_ci95_deg=0.1))
+        found.replace([number], Figures.of([Row(f"{number}.png")]))
+    assert found.rig_roll() == "more than 3 frames: rollcli rig RESULT says what they say of the rig"

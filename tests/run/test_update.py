@@ -79,13 +79,6 @@ def test_a_resume_takes_what_changes_before_its_frame_is_done(folder, tmp_path_f
     assert written(folder) == anew(folder, tmp_path_factory, *IMAGES)
 
 
-def test_times_are_looked_at_anew_once_the_bytes_are_known(folder, monkeypatch):
-    touch(folder)
-    estimate(folder, *IMAGES, "--update", status=3)
-    monkeypatch.setattr("rollcli.run.inputs._read", lambda paths: pytest.fail("it was read again"))
-    estimate(folder, *IMAGES, "--resume", status=3)
-
-
 @pytest.mark.parametrize("result", ["rolls.csv", "rolls.jsonl"])
 @pytest.mark.parametrize("jobs", ["1", "2"])
 def test_an_update_does_what_has_changed_and_nothing_else(folder, tmp_path_factory, result, jobs):

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from rollcli.run.rig_gates import Check
-from rollcli.run.rig_text import Findings, as_csv, as_json, as_table, moved
-from tests.run.rigs import UNKNOWN, known, rig, sequence, short
+from rollcli.run.rig_text import Findings, as_csv, as_json, as_table
+from tests.run.rigs import UNKNOWN, known, rig, sequence
 
 
 def assessed():
@@ -102,13 +102,6 @@ def test_json_is_every_number_of_the_assessment():
     }
 
 
-def test_json_is_readable_and_says_nothing_of_another_result_where_there_is_none():
-    text = as_json(Findings(assessed(), [], None, {}))
-    assert text.startswith('{\n  "frames": 50,\n')
-    assert text.endswith("}\n")
-    assert "against" not in json.loads(text)
-
-
 def test_csv_is_a_line_for_each_segment_with_what_came_before_it():
     first, after, second = csv.DictReader(io.StringIO(as_csv(Findings(assessed(), [], None, {}))))
     assert (first["first_file"], first["last_file"], first["status"]) == ("a/0", "a/9", "jump")
@@ -153,20 +146,6 @@ def test_one_drive_without_findings_is_told_in_three_lines():
     ]
 
 
-def test_too_few_frames_are_told_instead_of_a_drift_and_of_jumps():
-    few = rig(
-        ("a", {"roll": sequence(7, short(1.0))}), include_suspect=True, suspect=[True] * 7, ok=[False] * 7
-    )
-    assert as_table(Findings(few, [], None, {"roll": short(0.5)})).splitlines() == [
-        "roll    +1.00°  (7 of 7 frames, 7 suspect, counted)",
-        "jumps   too few frames to tell",
-        "roll against the other result: +0.50°, too few frames for an interval",
-        "",
-        "no interval for the roll: 7 frames, which spread over 0.00; an interval takes 8",
-    ]
-    assert as_table(Findings(rig(), [], None, {})) == "roll    unknown  (0 of 0 frames)\n"
-
-
 @pytest.mark.parametrize(("drives", "more"), [(40, None), (41, 1), (1043, 1003)])
 def test_of_many_segments_the_table_shows_forty(drives, more):
     many = rig(*((f"d{place}", {"roll": sequence(3, known(1.0, 0.1))}) for place in range(drives)))
@@ -174,18 +153,3 @@ def test_of_many_segments_the_table_shows_forty(drives, more):
     assert sum(line.endswith("/2") for line in lines) == 40
     said = [line for line in lines if "more segments" in line]
     assert said == ([] if more is None else [f"and {more:,} more segments; --format csv lists all"])
-
-
-@pytest.mark.parametrize(
-    ("change", "expected"),
-    [
-        (known(0.5, 0.25), True),
-        (known(-0.5, 0.25), True),
-        (known(0.25, 0.25), False),
-        (known(0.0, 0.25), False),
-        (short(9.0), None),
-        (UNKNOWN, None),
-    ],
-)
-def test_a_move_is_a_change_of_more_than_its_interval(change, expected):
-    assert moved(change) is expected

@@ -31,16 +31,6 @@ def maps(tmp_path):
     return tmp_path
 
 
-@pytest.mark.parametrize("options", [[], ["--bins", "40"], ["--max-disparity", "32.5"]])
-def test_the_counts_of_each_row_sum_to_its_valid_pixels(maps, options):
-    assert rollcli("vdisparity", "maps", "--counts", *options, "-o", "v", cwd=maps).status == 0
-    for index in range(3):
-        counts = read_stored(maps / "v" / f"frame{index}.tif").values
-        disparity = read_disparity(maps / "maps" / f"frame{index}.png")
-        assert counts.dtype == np.int32
-        np.testing.assert_array_equal(counts.sum(axis=1), (disparity > 0).sum(axis=1))
-
-
 def test_bins_and_max_disparity_are_the_histograms(maps):
     line = ["vdisparity", "maps/frame0.png", "--counts", "--bins", "50", "--max-disparity", "100", "-o", "v"]
     assert rollcli(*line, cwd=maps).status == 0

@@ -61,24 +61,6 @@ def test_a_worker_writes_the_parts_that_it_has_whole_and_hands_back_other_rows(t
     assert len(batch) == end - first
 
 
-def test_parts_that_were_missing_have_their_own_numbers(tmp_path):
-    join(tmp_path, 0, 6, numbers=(4, 7))
-    assert sorted(contents(tmp_path)) == ["part-00004.csv", "part-00007.csv"]
-
-
-@pytest.mark.parametrize("known", [ReadAs(), ReadAs(frozenset(["px"])), ReadAs(searched=(0, 63))])
-def test_rows_come_back_of_which_the_record_does_not_say_how_they_were_read(tmp_path, known):
-    batch = join(tmp_path, 0, 3, known=known)
-    assert (batch.in_parts, batch.lines, contents(tmp_path)) == (0, lines(0, 3), {})
-
-
-def test_rows_that_end_the_run_come_back_up_to_the_frame_that_failed(tmp_path):
-    rows = [*ROWS[:4], Row("4.png", message="broken"), *ROWS[5:]]
-    batch = join(tmp_path, 3, 9, rows=rows, fail_fast=True)
-    assert (batch.in_parts, len(batch), len(batch.lines), contents(tmp_path)) == (0, 2, 2, {})
-    assert join(tmp_path, 3, 9, rows=rows).in_parts == 6
-
-
 def test_a_part_that_a_dying_worker_had_written_counts_and_another_runs_does_not(tmp_path, bucket):
     for folder in (tmp_path, f"{bucket}/rolls.csv"):
         assert join(folder, 0, 3).in_parts == 3
@@ -86,13 +68,6 @@ def test_a_part_that_a_dying_worker_had_written_counts_and_another_runs_does_not
     other = [Row(row.file, status="ok", roll_deg=5.0) for row in ROWS]
     with pytest.raises(UsageError, match="another run has written this part"):
         join(tmp_path, 0, 3, rows=other)
-
-
-def test_the_numbers_of_a_batch_are_few_bytes_and_those_that_the_summary_takes(tmp_path):
-    batch = join(tmp_path, 0, 9)
-    assert list(batch.figures.numbers) == ["roll_deg"]
-    assert batch.figures.numbers["roll_deg"].tolist() == [float(n) for n in range(9)]
-    assert [result.row.file for result in batch.told] == ["0.png"]  # names the encoding
 
 
 @pytest.mark.parametrize(

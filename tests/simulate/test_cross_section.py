@@ -7,13 +7,10 @@ import numpy as np
 import pytest
 
 from rollcli.simulate.build import build_scene, render_frame, road_camber, true_disparity
-from rollcli.simulate.options import SimulateOptions
-from rollcli.simulate.road import Piece, draw_carriageway
-from rollcli.simulate.roadside import car_materials, vehicle
+from rollcli.simulate.road import draw_carriageway
 from rollcli.simulate.scene import draw_light
-from rollcli.simulate.spec import FrameSpec, Stream, draw_specs
-from rollcli.simulate.surfaces import Course, Ground
-from rollcli.simulate.vectors import first_crossing
+from rollcli.simulate.spec import FrameSpec
+from rollcli.simulate.surfaces import Ground
 
 SMALL = {"size": (320, 240), "focal": 186.0, "crossfall": 0.04}
 SHAPES = ("crown", "roof", "dish", "superelevated")
@@ -22,7 +19,7 @@ BENT, STRAIGHT = 4, 2  # seeds of an open road
 
 def drawn_road(spec):
     """The carriageway that the frame's random numbers stand for."""
-    rng = spec.rng(Stream.SCENE)
+    rng = spec.scene_rng()
     draw_light(rng)
     return draw_carriageway(rng, spec)
 
@@ -198,104 +195,11 @@ def test_vehicles_stand_on_the_road_that_is_below_them():
         assert np.abs(height_over_road(spec, road, car.place + side)[0]).max() < 2e-3
 
 
-def test_cross_sections_are_drawn_without_changing_what_else_is_drawn():
-    flat = draw_specs(SimulateOptions(frames=30, seed=5))
-    mixed = draw_specs(SimulateOptions(frames=30, seed=5, cross_section="mixed", gutter=(0.0, 10.0)))
-    level = {"cross_section": "flat", "crossfall": 0.0, "gutter": 0.0}
-    assert [replace(spec, **level) for spec in mixed] == flat
-    assert {spec.cross_section for spec in mixed} == {"flat", *SHAPES}
-    assert all(
-        spec.crossfall == 0 if spec.cross_section == "flat" else 0.01 <= spec.crossfall <= 0.04
-        for spec in mixed
-    )
-
-
 @pytest.mark.parametrize("shape", SHAPES)
 def test_no_ray_slips_between_two_pieces_of_the_ground(shape):
     spec = FrameSpec("bare", 0.0, 0.3, 0.0, shape, gutter=0.05, seed=4, size=(321, 241), focal=186.0)
     frame = render_frame(replace(spec, crossfall=0.04))
     assert frame.disparity[120:].min() > 0
-
-
-def test_the_first_of_several_roots_is_found():
-    rng = np.random.default_rng(1)
-    roots = np.sort(rng.uniform(-1, 2, (400, 4)), axis=1)
-    coefficients = np.array([np.poly(each)[::-1] for each in roots]).T
-    coefficients *= np.sign(coefficients[0])
-    expected = [min((r for r in each if 0 < r < 1), default=np.nan) for each in roots]
-    found = first_crossing(coefficients, np.ones(400))
-    assert np.array_equal(np.isnan(found), np.isnan(expected))
-    assert np.nanmax(np.abs(found - expected)) < 1e-6
-
-
-@pytest.mark.parametrize("scene", ["bare", "open", "street", "verge"])
-def test_lanes_are_as_wide_as_real_ones_and_only_country_roads_have_a_single_lane(scene):
-    roads = [drawn_road(FrameSpec(scene, seed=seed)) for seed in range(120)]
-    assert all(2.8 <= road.lane <= 3.7 for road in roads)
-    country = scene in ("bare", "verge")
-    assert any(road.single for road in roads) == country
-    assert any(road.parking for road in roads) == (not country)
-    assert any(road.course.bend > 0 for road in roads) == (scene != "bare")
-    assert any(road.course.bend < 0 for road in roads) == (scene != "bare")
-    for road in roads:
-        # beyond the edge of the right lane, in which the rig drives, lies a shoulder
-        shoulder = road.right - road.shift - 0.5 * road.lane
-        assert shoulder == pytest.approx(2.2) if road.parking else 0.1 <= shoulder <= 0.6
-        lanes = 1 if road.single else 2
-        assert road.right - road.left == pytest.approx(lanes * road.lane + 2 * shoulder)
-
-
-def test_a_roof_has_two_lanes_and_its_ridge_between_them():
-    for seed in range(40):
-        road = drawn_road(FrameSpec("verge", cross_section="roof", crossfall=0.03, seed=seed))
-        assert not road.single
-        left, right = road.section.pieces
-        assert left.end == right.start == pytest.approx(road.shift - road.lane / 2)
-        assert (left.slope, right.slope) == (0.03, -0.03)
-
-
-def test_kerbs_are_drawn_from_their_range():
-    heights = []
-    for seed in range(30):
-        spec = FrameSpec("open", seed=seed)
-        road, scene = drawn_road(spec), build_scene(spec)
-        sidewalks = [s for s in scene.surfaces if isinstance(s, Ground) and s.offset and not s.slope]
-        heights += [s.offset for s in sidewalks if {road.left, road.right} & set(s.edges)]
-    assert 0.1 <= min(heights) < 0.11
-    assert 0.19 < max(heights) <= 0.2
-
-
-@pytest.mark.parametrize("oncoming", [False, True])
-def test_a_vehicle_ahead_shows_its_rear_and_an_oncoming_one_its_front(oncoming):
-    course = Course(heading=0.02, bend=0.003)
-    car = vehicle(np.random.default_rng(3), course, Piece(-5, 5), 1.0, 12.0, 0, oncoming)
-    assert (car.frame[2, 2] > 0) == (not oncoming)
-    assert car.frame[1] @ [0, 1, 0] > 0.99
-    assert np.linalg.det(car.frame) == pytest.approx(1)
-
-
-@pytest.mark.parametrize("seed", range(9))  # cars and trucks
-def test_no_part_of_a_vehicle_covers_a_light_or_a_number_plate(seed):
-    *_, red, white, _ = range(len(car_materials(0.0)))  # in the order that its docstring gives
-    car = vehicle(np.random.default_rng(seed), Course(0.0, 0.0), Piece(-5, 5), 1.0, 12.0, 0, False)
-    lights = [part for part in car.parts if part.material in (red, white)]
-    assert len(lights) >= 4
-    for light in lights:
-        bounds = np.array(
-            [
-                [side * light.offsets[np.argmax(side * light.normals @ axis)] for side in (-1, 1)]
-                for axis in np.eye(3)
-            ]
-        )
-        outward = np.sign(bounds[2].mean())
-        shares = np.linspace(0.01, 0.99, 30)
-        right, up = (low + shares * (high - low) for low, high in bounds[:2])
-        face = np.stack(
-            [*map(np.ravel, np.meshgrid(right, up)), np.full(900, outward * np.abs(bounds[2]).max())]
-        )
-        face[2] += outward * 1e-3  # just before it
-        for part in car.parts:
-            assert not (part.normals @ face <= part.offsets[:, None]).all(axis=0).any()
 
 
 def test_a_positive_bend_turns_to_the_right_and_zero_is_straight():

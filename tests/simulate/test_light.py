@@ -1,15 +1,18 @@
-"""Shadows fall where the sun is hidden, and it is dim below cars."""
+"""The light of what rays hit: shadows, sun, sky, textures, and what a sensor makes of it."""
 
 import numpy as np
 import pytest
 
 from rollcli.simulate.build import build_scene
+from rollcli.simulate.camera import expose
+from rollcli.simulate.materials import Plain, band, bars, coarse, fine
 from rollcli.simulate.road import Piece
 from rollcli.simulate.roadside import vehicle
-from rollcli.simulate.scene import air_below, draw_light, in_shadow, sky
+from rollcli.simulate.scene import Light, Scene, air_below, draw_light, in_shadow, sky
 from rollcli.simulate.solids import Post
 from rollcli.simulate.spec import FrameSpec
 from rollcli.simulate.surfaces import NEAR, Course
+from rollcli.simulate.views import AIR, LONG, LONG_P, LONG_Q, NONE, SHORT, SUN, P, Q, shade
 
 
 def on_ground(x, z):
@@ -66,3 +69,91 @@ def test_the_sky_is_bluer_above_and_pale_at_the_horizon():
     up, level = (sky(light, np.array([[0.1], [rise], [1.0]]))[0] for rise in (5.0, 0.0))
     assert up[2] / up[0] < level[2] / level[0], "red to blue"
     assert np.ptp(level) < 0.1
+
+
+AHEAD = np.array([[0.0], [0.0], [1.0]])
+
+
+class Slope:
+    """A material whose albedo is the square of its q coordinate."""
+
+    def albedo(self, p, q, w):
+        """The square of q."""
+        return np.asarray(q * q, np.float32)
+
+    def colour(self, p, q):
+        """White."""
+        return np.ones(3, np.float32)
+
+
+def shaded(material, rows):
+    values = np.zeros((8, 1), np.float32)
+    for row, value in ({AIR: 1.0, SUN: 1.0, LONG: 0.01, SHORT: 0.01} | rows).items():
+        values[row] = value
+    light = Light(np.array([0.0, 1.0, 0.0]), ambient=0.3, exposure=1.4, clouds=0.0)
+    scene = Scene(light, normal=np.array([0.0, 1.0, 0.0]), materials=[material])
+    return shade(scene, AHEAD, np.zeros(1, np.int16), values)[0]
+
+
+@pytest.mark.parametrize("ratio", [8, 30])
+def test_albedo_is_averaged_over_the_length_of_the_footprint(ratio):
+    reads = {Q: 3.0, LONG_Q: 2.0, LONG: 2.0, SHORT: 2.0 / ratio, P: 1.0, LONG_P: 0.0}
+    # the mean of q^2 over a length of 2 around 3 is 9 + 2^2 / 12; eight points lose 1/64 of it
+    assert shaded(Slope(), reads) / 1.4 == pytest.approx(9 + 4 / 12 * (1 - 1 / 64), rel=1e-5)
+
+
+def test_a_ray_that_hits_nothing_shows_the_sky_whatever_its_reads_are():
+    light = Light(np.array([0.0, 1.0, 0.0]), ambient=0.3, exposure=1.4, clouds=0.0)
+    scene = Scene(light, normal=np.array([0.0, 1.0, 0.0]), materials=[Plain(0.5)])
+    kinds = np.full(1, NONE, np.int16)
+    sky = [shade(scene, AHEAD, kinds, np.full((8, 1), value, np.float32)) for value in (0, 1)]
+    assert np.array_equal(*sky)
+    assert sky[0].min() > 0.5
+
+
+def exposed(level, gain=1.0, noise=0.0, colour=True):
+    light = np.full((101, 201, 3), level, np.float32)
+    return expose(light, noise, gain, colour, np.random.default_rng(0))
+
+
+@pytest.mark.parametrize(("level", "grey"), [(0.0, 0), (0.25, 128), (1.0, 255), (4.0, 255)])
+def test_the_grey_level_is_the_root_of_the_light_up_to_saturation(level, grey):
+    assert (exposed(level)[50, 100] == grey).all()
+
+
+def test_the_image_darkens_toward_its_corners_and_not_elsewhere():
+    image = exposed(0.64, colour=False).astype(float)
+    assert image[50, 100] == 204
+    assert image.argmin() == 0
+    # at a corner 24 % of the light are lost, in the middle of a side 12 %
+    assert image[0, 0] == image[-1, -1] == image[0, -1] == np.rint(204 * np.sqrt(0.76))
+    assert image[0, 100] == image[50, 0] == np.rint(204 * np.sqrt(0.88))
+
+
+def averaged(pattern, centre, width):
+    """The mean of a pattern of 0 and 1 over pixels, by brute force."""
+    offsets = (np.arange(4000) + 0.5) / 4000 - 0.5
+    return pattern(centre[:, None] + offsets * width).mean(axis=1)
+
+
+@pytest.mark.parametrize("width", [0.01, 0.3, 2.0, 25.0])
+def test_a_band_covers_its_share_of_a_pixel(width):
+    x = np.linspace(-3, 3, 101, dtype=np.float32)
+    expected = averaged(lambda t: (t > -0.4) & (t < 0.7), x, width)
+    assert np.allclose(band(x, -0.4, 0.7, np.full_like(x, width)), expected, atol=1e-3)
+
+
+@pytest.mark.parametrize("width", [0.01, 0.3, 2.0, 25.0])
+def test_bars_cover_their_share_of_a_pixel_however_many_it_holds(width):
+    x = np.linspace(-3, 3, 101, dtype=np.float32)
+    expected = averaged(lambda t: np.mod(t, 1.3) < 0.4, x, width)
+    assert np.allclose(bars(x, 1.3, 0.4, np.full_like(x, width)), expected, atol=2e-3)
+
+
+@pytest.mark.parametrize("noise", [fine, coarse])
+def test_noise_has_unit_variance_up_close_and_fades_with_distance(noise):
+    p, q = np.random.default_rng(0).uniform(0, 500, (2, 20000)).astype(np.float32)
+    spreads = [noise(p, q, np.full_like(p, w)).std() for w in (0.001, 0.1, 1.0, 100.0)]
+    assert 0.7 < spreads[0] < 1.05
+    assert np.all(np.diff(spreads) < 0.02)
+    assert spreads[-1] < 0.1

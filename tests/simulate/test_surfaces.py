@@ -1,12 +1,18 @@
-"""Rays meet surfaces where a slow march along the ray says so, and textures do not stretch."""
+"""Rays meet the nearest surface where a slow march along the ray says so."""
+
+import math
 
 import numpy as np
 import pytest
 
+from rollcli.simulate.build import build_scene
+from rollcli.simulate.camera import PixelRays
 from rollcli.simulate.road import Piece
-from rollcli.simulate.roadside import box, vehicle
-from rollcli.simulate.solids import Post, Solid, TreeCrown
-from rollcli.simulate.surfaces import Backdrop, Course, Ground, Wall
+from rollcli.simulate.roadside import vehicle
+from rollcli.simulate.solids import Post, TreeCrown
+from rollcli.simulate.spec import FrameSpec
+from rollcli.simulate.surfaces import NEAR, Backdrop, Course, Ground, Wall
+from rollcli.simulate.views import NONE, first_hits, trace
 
 COURSE = Course(heading=0.03, bend=1 / 300, curvature=0.001)
 ORIGIN = np.array([[0.3], [1.6], [0.1]])
@@ -78,13 +84,6 @@ def test_a_ray_meets_a_surface_where_marching_along_it_first_comes_inside(surfac
     assert agree.mean() > 0.97
 
 
-def test_a_point_on_the_line_between_two_strips_belongs_to_the_right_one():
-    x = np.array([-4.0, np.nextafter(1.0, 0), 1.0, 9.0])
-    ground = Ground(Course(), (-4.0, 1.0, 9.0), (5, 6), far=80.0)
-    points = np.array([x, np.zeros(4), np.full(4, 10.0)])
-    assert list(ground.sample(points).material) == [5, 5, 6, 6]
-
-
 @pytest.mark.parametrize(("distance", "met"), [(0.049, False), (0.051, True), (99.0, True), (101.0, False)])
 def test_a_surface_is_met_from_five_centimetres_to_its_far_end(distance, met):
     ground = Ground(Course(), (-np.inf, np.inf), (0,), far=100.0)
@@ -103,40 +102,56 @@ def test_a_crown_of_a_tree_is_met_on_its_ellipsoid_and_seen_through():
     assert np.any(z > 0)
 
 
-@pytest.mark.parametrize(
-    ("surface", "toward"),
-    [
-        (GROUND, (0, 0, 12)),
-        (WALL, (-6, 3, 18)),
-        (BACKDROP, (0, 5, 60)),
-        (CAR, (1.3, 0.7, 9)),
-        (POST, (2.4, 2, 8)),
-        (TREE_CROWN, (-0.4, 2.5, 12)),
-    ],
-)
-def test_normals_and_gradients_are_those_of_the_surface(surface, toward):
-    direction = rays(400, toward, 2.0)
-    neighbour = direction + np.array([[1e-5], [1e-5], [0.0]])
-    first, second = surface.intersect(ORIGIN, direction), surface.intersect(ORIGIN, neighbour)
-    both = np.isfinite(first) & np.isfinite(second)
-    here, there = ORIGIN + first[both] * direction[:, both], ORIGIN + second[both] * neighbour[:, both]
-    at, beside = surface.sample(here), surface.sample(there)
-    moved = there - here
-    same_face = np.linalg.norm(moved, axis=0) < 1e-2
-    along_normal = (at.normal * moved).sum(axis=0) / np.linalg.norm(moved, axis=0)
-    assert same_face.sum() > 30
-    assert np.median(np.abs(along_normal[same_face])) < 1e-3
-    moves = np.median(np.linalg.norm(moved, axis=0))
-    for before, after, gradient in ((at.p, beside.p, at.grad_p), (at.q, beside.q, at.grad_q)):
-        change = (gradient * moved).sum(axis=0)
-        assert np.median(np.abs(after - before - change)[same_face]) < 0.01 * moves
+SPEC = FrameSpec("street", math.radians(8), math.radians(3), seed=11, size=(160, 120), focal=93.0)
 
 
-@pytest.mark.parametrize("mirror", [1.0, -1.0])
-def test_a_ray_along_the_faces_of_a_box_meets_its_front_where_it_does_not_pass_by(mirror):
-    extent = np.array([[-1.0, 1.0], [0.0, 2.0], [-3.0, 3.0]])
-    body = Solid(np.diag([mirror, 1, 1]), np.array([0.0, 0.0, 10.0]), (box(1.0, 2.0, 3.0, 0),), extent)
-    x, y = (each.ravel() for each in np.meshgrid([-1.5, -0.5, 0.5, 1.5], [-0.5, 0.5, 1.5, 2.5]))
-    origin = np.array([x, y, np.zeros(16)])
-    met = body.intersect(origin, np.tile([[0.0], [0.0], [1.0]], 16))
-    assert np.array_equal(met, np.where((np.abs(x) < 1) & (y > 0) & (y < 2), 7.0, np.inf))
+def every_pixel(spec):
+    scene = build_scene(spec)
+    camera = spec.cameras(scene.normal)[0]
+    return scene, PixelRays.of_rows(camera, range(spec.size[1]))
+
+
+@pytest.mark.parametrize("seed", [3, 11, 19])
+@pytest.mark.parametrize("scene", ["open", "street", "verge"])
+def test_each_ray_meets_the_nearest_of_all_surfaces(scene, seed):
+    scene, pixels = every_pixel(FrameSpec(scene, 0.14, 0.05, seed=seed, size=(160, 120), focal=93.0))
+    depth, surface = first_hits(scene, pixels)
+    # without the boxes around objects, which spare rays that pass by
+    every = np.array([s.intersect(pixels.rays.origin, pixels.rays.direction) for s in scene.surfaces])
+    nearest = every.min(axis=0)
+    assert np.array_equal(depth, nearest)
+    assert np.array_equal(surface, np.where(np.isfinite(nearest), every.argmin(axis=0), -1))
+
+
+def test_positions_between_pixels_are_traced_as_whole_rows_are():
+    scene, rows = every_pixel(SPEC)
+    depth, surface = first_hits(scene, rows)
+    anywhere = PixelRays.at(rows.camera, rows.u, rows.v)
+    assert np.array_equal(first_hits(scene, anywhere)[0], depth)
+    part = PixelRays.of_rows(rows.camera, range(37, 90))
+    assert np.array_equal(first_hits(scene, part)[1], surface.reshape(120, 160)[37:90].ravel())
+
+
+def test_a_ray_that_meets_nothing_sees_the_sky():
+    scene, pixels = every_pixel(SPEC)
+    hits = trace(scene, pixels)
+    sky = np.isinf(hits.depth)
+    assert 0.05 < sky.mean() < 0.6
+    assert np.array_equal(sky, hits.surface == -1)
+    assert np.array_equal(sky, hits.material == NONE)
+    assert hits.depth.min() > NEAR
+
+
+def box(low, high):
+    """The corners of a box in the world, (3, 8)."""
+    return np.stack(np.meshgrid(*np.stack([low, high], axis=1), indexing="ij")).reshape(3, -1)
+
+
+def test_a_box_around_the_camera_may_be_met_by_any_ray_and_one_behind_it_by_none():
+    _, pixels = every_pixel(SPEC)
+    assert pixels.window(None) is None
+    assert pixels.window(box((-1, 0, -2), (1, 3, 2))) is None
+    assert pixels.window(box((-1, 0, 0.05), (1, 3, 9))) is None
+    assert len(pixels.window(box((-1, 0, -9), (1, 3, -4)))) == 0
+    ahead = pixels.window(box((-1, 0, 4), (1, 2, 9)))
+    assert 0 < len(ahead) < len(pixels.u)

@@ -10,9 +10,8 @@ import pytest
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.road.find import road_plane
 from rollcli.files.formats import read_image
-from rollcli.simulate.draw import draw_specs
-from rollcli.simulate.render import render_frame, true_disparity
-from rollcli.simulate.spec import FrameSpec
+from rollcli.simulate.build import render_frame, true_disparity
+from rollcli.simulate.spec import FrameSpec, draw_specs
 from rollcli.stereo.match import StereoOptions, Wanted, match_pair
 
 LIDAR = Path(__file__).parents[2].parent / "shared" / "lidar"

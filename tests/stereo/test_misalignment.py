@@ -1,21 +1,15 @@
-"""How views lie, added, resized and said, against numbers worked out by hand."""
+"""How views lie, resized and said, and what a run says of it, against numbers worked out by hand."""
 
+import itertools
 import math
 
+import numpy as np
 import pytest
 
+from rollcli.files.results import Row
+from rollcli.run.summary import RunSummary
 from rollcli.stereo.misalignment import Misalignment
 from rollcli.stereo.misalignment_words import advice_of
-
-
-def test_parts_are_added_taken_away_and_multiplied():
-    one, other = Misalignment(1, 0.2, 0.03, 0.004), Misalignment(0.5, -0.1, 0.01, 0.001)
-    for found, expected in (
-        (one + other, (1.5, 0.1, 0.04, 0.005)),
-        (one - other, (0.5, 0.3, 0.02, 0.003)),
-        (one.times(-2), (-2, -0.4, -0.06, -0.008)),
-    ):
-        assert (found.offset, found.rotation, found.scale, found.twist) == pytest.approx(expected)
 
 
 def test_views_twice_as_large_shift_twice_as_far_everywhere():
@@ -67,3 +61,77 @@ def test_no_advice_is_given_for_what_turns_a_road_by_less_than_a_tenth_of_a_degr
     ):
         assert advice_of(*part(0.99 * sign * limit).values(200, 1000)) == ""
         assert advice_of(*part(1.01 * sign * limit).values(200, 1000))
+
+
+def row(lower=None, clockwise=0.0, **more):
+    """A pair that was measured, unless `lower` is None."""
+    if lower is None:
+        return Row("l.png", "r.png", "ok", **more)
+    lies = {"right_lower_px": lower, "right_clockwise_deg": clockwise}
+    return Row("l.png", "r.png", "ok", **lies, right_larger_percent=0.0, right_twist_px=0.0)
+
+
+def test_a_run_says_the_median_over_its_pairs_and_what_to_do():
+    rig = RunSummary()
+    for turned in (0.3, 0.31, 0.5):
+        rig.add_row(row(0.0, turned))
+
+    assert rig.alignment()["right_clockwise_deg"] == 0.31
+    assert rig.alignment()["frames"] == 3
+    assert rig.advice == (
+        "the right camera is rolled by 0.31 degrees against the left, counter-clockwise seen from behind: "
+        "recalibrate"
+    )
+
+
+def test_a_run_of_mostly_level_pairs_asks_for_nothing():
+    rig = RunSummary()
+    for lower in (0.01, -0.02, 1.0):
+        rig.add_row(row(lower))
+
+    assert rig.advice == ""
+    assert rig.alignment()["right_lower_px"] == 0.01
+
+
+def test_a_run_of_maps_or_of_pairs_that_could_not_be_measured_has_nothing_to_say():
+    rig = RunSummary()
+    rig.add_row(Row("l.png", status="ok"))
+    rig.add_row(row(message="the views are not level, and could not be levelled"))
+    rig.add_row(Row("l.png", "r.png", "error", message="l.png: cannot be read"))
+
+    assert rig.alignment() is None
+    assert rig.advice == ""
+
+
+def test_every_part_has_its_advice():
+    assert advice_of(0.6, -0.2, 0.3, 1.5).split(", ") == [
+        "the right camera is rolled by 0.20 degrees against the left",
+        "clockwise seen from behind",
+        "the right image lies 0.60 px lower",
+        "the right image is 0.30 % larger",
+        "its rows are skewed by 1.5 px in the corners: recalibrate",
+    ]
+
+
+@pytest.mark.parametrize("signs", list(itertools.product((-1, 1), repeat=4)))
+def test_the_reach_is_the_largest_shift_of_the_four_corners(signs):
+    offset, rotation, scale, twist = (
+        sign * size for sign, size in zip(signs, (0.7, 2e-3, 5e-3, 4e-5), strict=True)
+    )
+    corners = itertools.product((-320, 320), (-100, 100))  # of a view of 640 x 200 pixels
+    shifts = [offset + rotation * x + scale * y + twist * x * y for x, y in corners]
+    assert Misalignment(offset, rotation, scale, twist).reach(200, 640) == pytest.approx(
+        max(map(abs, shifts))
+    )
+
+
+@pytest.mark.parametrize("signs", list(itertools.product((-1, 1), repeat=4)))
+@pytest.mark.parametrize("rows", [(0, 200), (0, 60), (120, 200)])
+def test_the_reach_in_rows_is_the_largest_shift_in_their_middle_half(rows, signs):
+    offset, rotation, scale, twist = (
+        sign * size for sign, size in zip(signs, (0.7, 2e-3, 5e-3, 4e-5), strict=True)
+    )
+    x, y = np.meshgrid(np.arange(-160, 161), np.arange(rows[0], rows[1] + 1) - 100)
+    shifts = offset + rotation * x + scale * y + twist * x * y
+    found = Misalignment(offset, rotation, scale, twist).reach_in_rows(200, 640, *rows)
+    assert found == pytest.approx(np.abs(shifts).max())

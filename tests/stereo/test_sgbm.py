@@ -1,12 +1,15 @@
-"""What OpenCV is asked to match, against OpenCV itself."""
+"""What OpenCV is asked to match, against OpenCV itself, and what its paths lag behind."""
 
 import cv2
 import numpy as np
 import pytest
 
 from rollcli.errors import UsageError
-from rollcli.stereo.options import StereoOptions
-from rollcli.stereo.sgbm import match_rows, match_views, usable_range
+from rollcli.simulate.build import render_frame
+from rollcli.simulate.spec import draw_specs
+from rollcli.stereo.match import compute_disparity
+from rollcli.stereo.options import MODES, StereoOptions
+from rollcli.stereo.sgbm import LAGS, match_rows, match_views, without_lag
 
 
 @pytest.fixture(scope="module")
@@ -20,28 +23,6 @@ def views():
     right = np.clip(right + rng.normal(0, 6, right.shape), 0, 255).astype(np.uint8)
     right[30:50, 100:160] = 128
     return np.ascontiguousarray(left), right
-
-
-@pytest.mark.parametrize(
-    ("count", "first", "width", "block", "usable"),
-    [
-        (1, 0, 400, 5, 16),
-        (0, 0, 400, 5, 16),
-        (-7, 0, 400, 5, 16),
-        (16, 0, 400, 5, 16),
-        (17, 0, 400, 5, 32),
-        (1000, 0, 400, 5, 384),
-        (1000, 0, 405, 5, 400),
-        (1000, 0, 404, 5, 384),
-        (1000, 100, 405, 5, 288),
-        (1000, -100, 405, 5, 288),
-        (1000, 0, 405, 7, 384),
-        (64, 0, 20, 5, 0),
-        (64, 0, 21, 5, 16),
-    ],
-)
-def test_ranges_are_multiples_of_16_that_leave_columns_to_match(count, first, width, block, usable):
-    assert usable_range(count, first, width, block) == usable
 
 
 @pytest.mark.parametrize("mode", ["3way", "sgbm", "hh"])
@@ -121,13 +102,6 @@ def test_each_option_has_its_limits(name, low, high):
             StereoOptions(**{name: value})
 
 
-def test_views_are_measured_unless_the_user_says_how_they_lie():
-    assert StereoOptions().measures_alignment
-    assert not StereoOptions(align="off").measures_alignment
-    assert not StereoOptions(vertical_offset=0).measures_alignment
-    assert not StereoOptions(align="off", vertical_offset=1).measures_alignment
-
-
 @pytest.mark.parametrize("mode", ["3way", "sgbm", "hh"])
 @pytest.mark.parametrize("first", [4, 12])
 def test_below_the_first_disparity_searched_there_is_no_data(views, mode, first):
@@ -142,3 +116,45 @@ def test_below_the_first_disparity_searched_there_is_no_data(views, mode, first)
     both = (disparity > 0) & (wide > 0)
     assert both.mean() > 0.5
     assert np.median(np.abs(disparity - wide)[both]) == 0
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_matched_roads_lie_where_they_are(mode):
+    off = []
+    for spec in draw_specs(3, scene="bare", roll=(-0.1, 0.1), pitch=(0.05, 0.1), seed=31, colour=False):
+        frame = render_frame(spec)
+        found = compute_disparity(frame.left, frame.right, mode=mode)
+        road = frame.road & (found > 0) & (abs(found - frame.disparity) < 1)
+        off.append(float(np.median((found - frame.disparity)[road])))
+    assert abs(np.mean(off)) < 0.06
+
+
+@pytest.mark.parametrize("mode", LAGS)
+def test_a_plane_is_raised_by_one_amount_and_keeps_its_shape(mode):
+    v, u = np.mgrid[:120, :160].astype(np.float32)
+    plane = 10 + 0.3 * v + 0.02 * u
+    added = without_lag(plane, mode) - plane
+    assert added.min() == pytest.approx(LAGS[mode].most * 0.3 / (0.3 + LAGS[mode].half_at), abs=1e-4)
+    assert np.ptp(added) < 1e-4
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_walls_and_what_has_no_data_stay_as_they_are(mode):
+    wall = np.full((80, 100), 12.5, np.float32)
+    wall[:, 60:] = 30
+    wall[20:40, 20:40] = 0
+    assert np.array_equal(without_lag(wall, mode), wall)
+
+
+@pytest.mark.parametrize("farthest", [1, 10])  # px; a hole below 1 px is no step too steep for a road
+def test_pixels_beside_holes_are_raised_like_those_around(farthest):
+    v = np.mgrid[:120, :160][0].astype(np.float32)
+    road = farthest + 0.3 * v
+    road[::7, :] = 0
+    added = (without_lag(road, "3way") - road)[road > 0]
+    assert added == pytest.approx(LAGS["3way"].most * 0.3 / 0.52, abs=1e-3)
+
+
+def test_a_small_map_stays_as_it_is():
+    small = np.full((8, 8), 3, np.float32)
+    assert without_lag(small, StereoOptions().mode) is small

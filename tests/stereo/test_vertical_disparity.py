@@ -1,14 +1,15 @@
-"""Vertical disparities of synthetic views, against what these were warped by and plain least squares."""
-
-import math
+"""Vertical disparities, their fit and the first look, against what synthetic views were warped by."""
 
 import cv2
 import numpy as np
 import pytest
 
-from rollcli.stereo import alignment as vertical
-from rollcli.stereo.alignment import Measured, Texture, measure_misalignment, textured_share
+from rollcli.stereo import first_look as first_looks
+from rollcli.stereo import row_fit
+from rollcli.stereo.alignment import Measured, SmallViews, Texture, measure_misalignment, textured_share
+from rollcli.stereo.first_look import FirstLook, first_look, look_for_range
 from rollcli.stereo.misalignment import LEVEL, Misalignment
+from rollcli.stereo.row_fit import SeenBlocks
 
 SHAPE = (160, 240)
 
@@ -75,18 +76,6 @@ def test_a_view_that_is_levelled_in_part_is_measured_as_a_whole():
     assert found.misalignment.shifts(*SHAPE) == pytest.approx(lies.shifts(*SHAPE), abs=0.02)
 
 
-def test_one_round_goes_no_further_than_may_be_believed():
-    left = cv2.GaussianBlur(texture_of(), (0, 0), 3)
-    left = cv2.normalize(left, None, 0, 255, cv2.NORM_MINMAX)
-    views = Texture.of((left, warped(left, Misalignment(5.0), 10)))
-
-    first = measure_misalignment(views, wall(), rounds=1).misalignment
-    many = measure_misalignment(views, wall(), rounds=12).misalignment
-
-    assert first.reach(*SHAPE) == pytest.approx(1.5)
-    assert many.offset == pytest.approx(5, abs=0.05)
-
-
 @pytest.mark.parametrize("noise", [0.0, 10.0, 15.0])
 def test_a_disparity_that_hides_the_offset_is_taken_back(noise):
     """Slanted stripes 0.4 px lower look like ones 0.4 px further along the row, and are matched there."""
@@ -101,87 +90,6 @@ def test_a_disparity_that_hides_the_offset_is_taken_back(noise):
     found = measure_misalignment(Texture.of((left, right)), wall(10.4), rounds=30)
 
     assert found.misalignment.offset == pytest.approx(0.4, abs=0.03)
-
-
-@pytest.mark.parametrize("every", [2, 3, 4])
-def test_a_part_of_the_blocks_says_the_same_and_is_their_share(every):
-    left, lies = texture_of(), Misalignment(0.5, 0.004, -0.003, 4e-5)
-    views = Texture.of((left, warped(left, lies, 10)))
-
-    all_blocks = measure_misalignment(views, wall(), rounds=8)
-    some = measure_misalignment(views, wall(), rounds=8, every=every)
-
-    assert some.misalignment.shifts(*SHAPE) == pytest.approx(lies.shifts(*SHAPE), abs=0.03)
-    assert some.share == pytest.approx(all_blocks.share, abs=0.03)
-    assert some.errors.offset > 1.2 * all_blocks.errors.offset
-
-
-@pytest.mark.parametrize("known", [39, 40, 77])
-def test_the_blocks_that_tell_are_counted(known):
-    left = texture_of()
-    disparity = wall()
-    rows, columns = SHAPE[0] // 8, SHAPE[1] // 8
-    inner = [(row, column) for row in range(2, rows - 2) for column in range(4, columns - 2)]
-    chosen = set(inner[:: len(inner) // 80][:known])
-    for row in range(rows):
-        for column in range(columns):
-            if (row, column) not in chosen:
-                disparity[8 * row : 8 * row + 8, 8 * column : 8 * column + 8] = 0
-
-    found = measure_misalignment(Texture.of((left, warped(left, LEVEL, 10))), disparity)
-
-    assert len(chosen) == known
-    if known < 40:
-        assert found is None
-    else:
-        assert found.share == pytest.approx(known / (rows * columns))
-
-
-@pytest.mark.parametrize(("pixels", "tells"), [(44, False), (45, True)])
-def test_a_block_needs_seven_tenths_of_its_disparities(pixels, tells):
-    left = texture_of()
-    disparity = wall(0)
-    for row in range(16, 136, 8):
-        for column in range(40, 216, 8):
-            known = np.arange(64).reshape(8, 8) < pixels
-            disparity[row : row + 8, column : column + 8][known] = 10
-
-    found = measure_misalignment(Texture.of((left, warped(left, Misalignment(0.3), 10))), disparity)
-
-    assert (found is not None) == tells
-    if tells:
-        assert found.misalignment.offset == pytest.approx(0.3, abs=0.02)
-
-
-@pytest.mark.parametrize(
-    ("disparity", "first"), [(14.0, 2), (17.0, 3), (21.5, 3), (22.5, 3), (23.5, 3), (25.5, 4)]
-)  # the first block with 0.7 of its pixels more than a pixel inside of the right view
-def test_blocks_that_leave_the_right_view_do_not_count(disparity, first):
-    left = texture_of()
-    blocks = vertical._Blocks(Texture.of((left, left)), wall(disparity))
-
-    seen = blocks.vertical(LEVEL)
-
-    inside = np.arange(8 * first, 8 * first + 8) - disparity > 1
-    assert inside.mean() > 0.7
-    assert np.mean(np.arange(8 * first - 8, 8 * first) - disparity > 1) <= 0.7
-    middle = np.arange(8 * first, 8 * first + 8)[inside].mean() - disparity - (SHAPE[1] - 1) / 2
-    assert seen.x.min() == pytest.approx(middle, abs=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("offset", "rows"),
-    [(0.0, (2, 157)), (0.5, (1, 157)), (-0.5, (2, 158)), (2.0, (0, 155)), (-2.0, (4, 159))],
-)
-def test_rows_that_leave_the_right_view_do_not_count(offset, rows):
-    left = texture_of()
-    blocks = vertical._Blocks(Texture.of((left, left)), wall(20.0))
-
-    seen = blocks.vertical(Misalignment(offset))
-
-    inner = [[v for v in range(8 * k, 8 * k + 8) if rows[0] <= v <= rows[1]] for k in range(SHAPE[0] // 8)]
-    counted = [np.mean(each) - (SHAPE[0] - 1) / 2 for each in inner if len(each) > 0.7 * 8]
-    assert (seen.y.min(), seen.y.max()) == pytest.approx((counted[0], counted[-1]), abs=1e-3)
 
 
 @pytest.mark.parametrize("shape", [(7, 100), (100, 7)])
@@ -210,53 +118,6 @@ def test_straight_edges_tell_only_where_they_lie_along_the_rows(slope, share):
     assert textured_share(edges.astype(np.uint8)) == pytest.approx(share, abs=0.05)
 
 
-def test_gradients_are_those_of_a_slope():
-    v, u = np.mgrid[:24, :32].astype(np.float32)
-    across, down = vertical._gradients(3 * u - 5 * v + 7)
-    assert across[1:-1, 1:-1] == pytest.approx(3)
-    assert down[1:-1, 1:-1] == pytest.approx(-5)
-
-
-def test_the_shift_of_a_block_is_that_of_least_squares():
-    """Grey differences = a across + b down + brightness, with a held back by a little: b is the shift."""
-    rng = np.random.default_rng(3)
-    across, down, off = (rng.normal(0, size, (50, 64)).astype(np.float32) for size in (3, 5, 4))
-    down += 0.5 * across + 2
-    across += 1
-    seen = (rng.random((50, 64)) < 0.9).astype(np.float32)
-    x, y = (rng.uniform(-90, 90, (50, 64)).astype(np.float32) for _ in range(2))
-
-    shares = vertical._Shares.of(across, down, seen, x, y)
-
-    for block in range(50):
-        known = seen[block] > 0
-        rows = np.stack([across[block], down[block], np.ones(64)], axis=1)[known].astype(np.float64)
-        held = np.vstack([rows, [math.sqrt(0.2 * known.sum()), 0, 0]])
-        values = np.linalg.lstsq(held, np.append(off[block][known], 0), rcond=None)[0]
-        assert (shares.share[block] @ off[block]) == pytest.approx(values[1], abs=1e-4)
-        weight = 1 / np.linalg.inv(held.T @ held)[1, 1] / known.sum()
-        assert shares.weight[block] == pytest.approx(min(weight, 50), rel=1e-3)
-        assert shares.x[block] == pytest.approx(x[block][known].mean(), abs=1e-3)
-        assert shares.y[block] == pytest.approx(y[block][known].mean(), abs=1e-3)
-
-
-@pytest.mark.parametrize("pixels", [45, 64])
-@pytest.mark.parametrize(("variance", "tells"), [(1.3, False), (2.02, True)])
-def test_no_block_that_could_tell_is_left_out_before_it_is_looked_at(pixels, variance, tells):
-    """Those of its pixels that have a disparity vary by so much, the others not at all."""
-    down = np.full((8, 8), 3, np.float32)
-    wave = np.resize([1.0, -1.0], pixels)
-    down.flat[:pixels] += wave * math.sqrt(variance) / wave.std() - wave.mean()
-    assert down.flat[:pixels].var() == pytest.approx(variance, rel=1e-4)
-    assert vertical._may_tell(down).item() == tells
-
-
-def test_a_measurement_of_larger_views_is_as_much_larger():
-    small = Measured(Misalignment(1, 0.2, 0.3, 0.4), Misalignment(0.1, 0.02, 0.03, 0.04), 0.7, 0.05)
-    large = Measured(Misalignment(2, 0.2, 0.3, 0.2), Misalignment(0.2, 0.02, 0.03, 0.02), 0.7, 0.1)
-    assert small.resized(2) == large
-
-
 def test_a_scale_between_pixels_is_measured_without_a_pull_to_whole_ones():
     rng = np.random.default_rng(3)
     waves = rng.uniform(-1.6, 1.6, (60, 2))  # rad/px: as fine as cameras resolve
@@ -278,3 +139,156 @@ def test_a_scale_between_pixels_is_measured_without_a_pull_to_whole_ones():
     assert found.misalignment.scale == pytest.approx(scale, abs=5e-5)
     assert found.misalignment.offset == pytest.approx(offset, abs=0.004)
     assert found.misalignment.twist * 160 * 120 == pytest.approx(0, abs=0.006)
+
+
+def seen_at(lies, noise=0.0, count=400, seed=0):
+    rng = np.random.default_rng(seed)
+    x, y = rng.uniform(-150, 150, count), rng.uniform(-80, 80, count)
+    shift = lies.offset + lies.rotation * x + lies.scale * y + lies.twist * x * y
+    shift += rng.normal(0, 1, count) * noise
+    weight, near = rng.uniform(2, 50, count), rng.uniform(0, 60, count)
+    parts = x, y, near, shift, weight
+    return SeenBlocks(*(part.astype(np.float32) for part in parts))
+
+
+def test_a_fit_without_noise_is_exact_and_outliers_do_not_move_it():
+    lies = Misalignment(0.5, -0.004, 0.006, 5e-5)
+    seen = seen_at(lies)
+    exact, _, spread = row_fit.fit_rows(seen)
+    assert exact.shifts(160, 300) == pytest.approx(lies.shifts(160, 300), abs=1e-4)
+    assert spread == pytest.approx(0.001, abs=2e-4)
+    seen.shift[::6] += 5
+    robust, _, _ = row_fit.fit_rows(seen)
+    assert robust.shifts(160, 300) == pytest.approx(lies.shifts(160, 300), abs=1e-2)
+
+
+def blocks_of(rng, field, *, below_horizon=False, noise=0.1, count=1500):
+    """Blocks of a street: a road, and walls of any distance to both sides."""
+    x, y = rng.uniform(-600, 600, count), rng.uniform(-20 if below_horizon else -180, 180, count)
+    road = 0.32 * np.maximum(y + 10, 3)
+    wall = np.abs(x) * rng.uniform(0.03, 0.15, count)
+    near = np.where(rng.random(count) < (1.0 if below_horizon else 0.4), road, np.maximum(road, wall))
+    shift = field(x, y, near) + noise * rng.normal(size=count)
+    parts = x, y, near, shift, np.full(count, 20.0)
+    return SeenBlocks(*(part.astype(np.float32) for part in parts))
+
+
+def support_of(field, **street):
+    seen = blocks_of(np.random.default_rng(5), field, **street)
+    return row_fit.column_support(
+        row_fit.column_evidence(row_fit.MeasuredRows(seen, LEVEL, (375, 1242)), 0.1)
+    )
+
+
+@pytest.mark.parametrize("scale", [-0.005, -0.002, 0.001, 0.002, 0.005])
+def test_a_scale_that_near_and_far_and_both_halves_show_is_in_the_columns(scale):
+    found = support_of(lambda x, y, near: scale * y)
+    assert found.scale == pytest.approx(scale, abs=0.0002)
+    assert found.error < 0.001
+
+
+@pytest.mark.parametrize(
+    "field",
+    [lambda x, y, near: 0.005 * near, lambda x, y, near: 0.0015 * np.maximum(y, 0)],
+    ids=["tilt", "bend"],
+)
+def test_a_tilt_and_a_bend_are_in_no_column(field):
+    assert abs(support_of(field).scale) < 0.0002
+
+
+def test_what_a_plain_road_cannot_tell_apart_is_doubted():
+    told, plain = (support_of(lambda x, y, near: 0.001 * y, below_horizon=each) for each in (False, True))
+    assert plain.error > 2 * told.error
+
+
+@pytest.mark.parametrize("pitch_deg", [-0.2, 0.2])
+def test_an_offset_is_a_pitch_where_its_rows_curve_as_those_of_one(pitch_deg):
+    focal, turn = 0.6 * 1242, np.radians(pitch_deg)
+    curve = turn / focal
+    found = support_of(lambda x, y, near: turn * focal + curve * y**2)
+    assert found.pitch == pytest.approx(curve, rel=0.2)
+    assert abs(support_of(lambda x, y, near: turn * focal + 0 * y).pitch) < 0.1 * abs(curve)
+
+
+@pytest.mark.parametrize("bend", [-0.002, 0.002])
+def test_a_bend_that_a_plain_road_cannot_tell_from_a_scale_is_in_the_error(bend):
+    found = support_of(lambda x, y, near: bend * np.maximum(y, 0), below_horizon=True)
+    assert 1.96 * found.error > abs(found.scale) > 0.5 * abs(bend)
+
+
+def test_rows_that_are_skewed_alone_are_in_the_error():
+    skew = 1.4 / (600 * 180)
+    found = support_of(lambda x, y, near: skew * x * y)
+    assert 1.96 * found.error > found.twist * 0.15 * 375  # twice an eighth of the height: a lane's middle
+    level = support_of(lambda x, y, near: 0 * x)
+    assert found.error > 2 * level.error
+
+
+def test_an_even_twist_is_a_yaw_and_an_uneven_one_mostly_a_lens():
+    yaw = np.radians(0.2) / 720
+    even = support_of(lambda x, y, near: yaw * x * y)
+    assert even.twist == pytest.approx(yaw, rel=0.1)
+    lens = support_of(lambda x, y, near: yaw * x * y + 0.2 * (x / 600) ** 2 - 0.2 * (y / 180) ** 3)
+    assert abs(lens.twist) < 0.5 * yaw
+    assert lens.error > even.error
+
+
+def pair_of(disparity, lower=0, shape=(240, 640)):
+    texture = texture_of((shape[0] + 40, shape[1] + 400), seed=9)
+    rows = slice(20, 20 + shape[0])
+    left = texture[rows, 200 : 200 + shape[1]]
+    right = texture[20 - lower : 20 - lower + shape[0], 200 + disparity : 200 + disparity + shape[1]]
+    return np.ascontiguousarray(left), np.ascontiguousarray(right)
+
+
+@pytest.mark.parametrize("disparity", [8, 30, 60, 120, 200])
+def test_the_range_holds_what_is_there_and_a_tenth_more(disparity):
+    assert 1.1 * disparity + 5 <= look_for_range(pair_of(disparity)).range <= 1.1 * disparity + 12
+
+
+def test_where_nothing_is_matched_no_range_is_found():
+    flat = np.full((240, 640), 90, np.uint8)
+    assert look_for_range((flat, flat)) == FirstLook(None, None)
+    look = first_look(SmallViews((flat, flat)))
+    assert look.range is None
+    assert look.measured is None
+
+
+@pytest.mark.parametrize("lower", [-6, -3, 0, 3, 6])
+def test_a_look_finds_how_far_the_right_view_lies_off(lower):
+    look = first_look(SmallViews(pair_of(40, lower)))
+
+    assert look.measured.misalignment.offset == pytest.approx(lower, abs=0.12)
+    assert look.measured.misalignment.rotation == pytest.approx(0, abs=0.0006)
+    assert look.measured.misalignment.scale == pytest.approx(0, abs=0.002)
+    assert (look.measured.misalignment == LEVEL) == (lower == 0)
+    assert 49 <= look.range <= 56
+
+
+def test_views_too_narrow_to_search_have_no_disparities():
+    narrow = texture_of((40, 20))
+    assert not first_looks._match((narrow, narrow), 8).any()
+    wide = pair_of(8, shape=(40, 120))
+    assert np.median(first_looks._match(wide, 8.2)[:, 40:100]) == pytest.approx(8, abs=0.1)
+
+
+def measured(offset=0.0, scale=0.0, error=0.01, spread=0.1, rotation=0.0):
+    return Measured(Misalignment(offset, rotation, scale), Misalignment(error), 0.5, spread)
+
+
+@pytest.mark.parametrize(
+    ("coarse", "fine", "sure"),
+    [
+        (measured(), measured(), True),
+        (measured(), None, False),
+        (measured(), measured(scale=0.0029, error=1.0), True),
+        (measured(9), measured(scale=0.0029), True),
+        (measured(scale=0.0031), measured(scale=0.0031), True),
+        (measured(scale=-0.0031), measured(scale=-0.0031, error=0.015), False),
+        (measured(scale=0.0031), measured(scale=0.0031, error=0.0135), True),
+        (measured(1.1, scale=0.0031), measured(0.0, scale=0.0031), True),
+        (measured(1.3, scale=0.0031), measured(0.0, scale=0.0031), False),
+    ],
+)
+def test_an_unusual_scale_is_sure_where_blocks_and_views_agree(coarse, fine, sure):
+    assert first_looks._is_sure(coarse, fine, SHAPE) == sure

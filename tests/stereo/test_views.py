@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rollcli.errors import InputError
-from rollcli.stereo.views import block_means, blocks_at, prepare_views, shrink, shrink_both
+from rollcli.stereo.views import prepare_views, shrink, shrink_both
 
 
 def test_colours_are_weighted_as_the_eye_does():
@@ -68,14 +68,3 @@ def test_other_kinds_are_named_and_refused(shape, kind):
 def test_views_of_two_sizes_are_refused(other):
     with pytest.raises(InputError, match=f"5x4 and {other[1]}x{other[0]}"):
         prepare_views(np.ones((4, 5), np.uint8), np.ones((*other, 3), np.uint8), 1)
-
-
-def test_blocks_are_those_that_fit_into_an_image_row_by_row():
-    pixels = np.random.default_rng(0).uniform(0, 9, (29, 37)).astype(np.float32)
-    expected = [pixels[8 * i : 8 * i + 8, 8 * j : 8 * j + 8] for i in range(3) for j in range(4)]
-    means = np.array([block.mean() for block in expected]).reshape(3, 4)
-    np.testing.assert_allclose(block_means(pixels), means, rtol=1e-5)
-    places = means > np.median(means)
-    found = blocks_at(pixels, places)
-    taken = [block.ravel() for block, wanted in zip(expected, places.ravel(), strict=True) if wanted]
-    np.testing.assert_array_equal(found, taken)

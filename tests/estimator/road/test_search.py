@@ -9,9 +9,6 @@ from hypothesis import strategies as st
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.estimate import estimate_roll
-from rollcli.estimator.road.find import find_road
-from rollcli.estimator.road.sample import take_sample
-from rollcli.estimator.tuning import TUNING
 from rollcli.simulate.build import true_disparity
 from rollcli.simulate.spec import FrameSpec
 from tests.estimator.road.test_surface import CAMERA_HEIGHT, disparity_of
@@ -40,23 +37,6 @@ def test_a_share_of_noise_moves_the_angle_by_so_much_at_most(scene, share, most_
     for roll_deg in (-20, -3, 0, 9):
         off = angle_deg(replaced(street(roll_deg, scene=scene), share)) - roll_deg
         assert abs(off) < most_deg, roll_deg
-
-
-@pytest.mark.parametrize(("share", "most"), [(0.0, 0.005), (0.5, 0.01), (0.67, 0.02)])
-def test_the_plane_that_is_found_is_near_that_of_the_road(share, most):
-    v, u = np.mgrid[:480, :640]
-    for slope, across in ((0.3, 0.02), (0.2, -0.1), (0.35, 0.2)):
-        road = np.maximum(slope * (v - 200) + across * (u - 320), 0)
-        sample = take_sample(replaced(road, share), None, TUNING.sample)
-        found = find_road(sample, math.radians(45), 0, TUNING).plane
-        grid = sample.grid
-        plane = (
-            slope * (grid.centre_v - 200) + across * (grid.centre_u - 320),
-            across * grid.scale,
-            slope * grid.scale,
-        )
-        # of the largest disparity
-        assert np.abs(found - plane).sum() < most * road.max()
 
 
 @repeatable
@@ -136,10 +116,3 @@ def test_neighbours_outside_a_mask_do_not_count():
     road[260:, 200:440] = True
     beside = np.where(road, disparity, disparity + 1)  # within the tolerance: it would move the means
     assert angle_deg(beside, mask=road) == pytest.approx(4, abs=0.01)
-
-
-def test_the_score_of_a_road_is_high_and_that_of_a_rival_is_not():
-    sample = take_sample(street(), None, TUNING.sample)
-    road = find_road(sample, math.radians(45), 0, TUNING)
-    assert 0.5 < road.score <= 1
-    assert road.rival < 0.5 * road.score

@@ -4,15 +4,12 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.estimate import estimate_roll
-from rollcli.estimator.moments import map_moments
-from rollcli.estimator.solvers.areas import fit_plane, iterative, lower_centre, lower_centre_slices, tile_sums
+from rollcli.estimator.solvers.areas import fit_plane, iterative, lower_centre, lower_centre_slices
 from rollcli.estimator.solvers.solution import SolverStatus
-from tests.estimator.synthetic_maps import bent_road, flat_road, random_maps, repeatable
+from tests.estimator.synthetic_maps import bent_road, flat_road
 
 SIZE = {"width": 320, "height": 240, "focal": 280.0}
 
@@ -55,13 +52,6 @@ def test_walls_beside_a_road_are_no_candidates():
     wall = np.broadcast_to(30 - 0.25 * u, road.shape)
     found, _ = areas(np.where(u < 110, wall, road))
     assert math.degrees(found.theta) == pytest.approx(2, abs=0.01)
-
-
-@pytest.mark.parametrize("factor", [0.01, 3.0, 1000.0])
-def test_a_constant_factor_gives_the_same_angle(factor):
-    disparity = road_with_obstacles(5)
-    (scaled, _), (found, _) = areas(disparity * factor), areas(disparity)
-    assert scaled.theta == pytest.approx(found.theta, abs=1e-9)
 
 
 def test_whole_pixels_still_agree():
@@ -187,49 +177,3 @@ def test_an_area_without_pixels_is_refused_with_the_reason():
     disparity[rows, columns] = 0
     with pytest.raises(EstimationError, match="no valid pixel"):
         plane_of(disparity)
-
-
-def gram_of(moments):
-    """sum x x', x = (1, p, q, d), from moments about the plane 0."""
-    s, t = moments.s, moments.t
-    return np.array(
-        [
-            [s[0, 0], s[1, 0], s[0, 1], t[0, 0]],
-            [s[1, 0], s[2, 0], s[1, 1], t[1, 0]],
-            [s[0, 1], s[1, 1], s[0, 2], t[0, 1]],
-            [t[0, 0], t[1, 0], t[0, 1], moments.rr],
-        ]
-    )
-
-
-@repeatable
-@given(random_maps(), st.integers(2, 20))
-def test_tiles_add_to_the_moments_of_the_map(disparity, side):
-    total = tile_sums(disparity, None, side).gram.sum(axis=(0, 1))
-    expected = gram_of(map_moments(disparity, plane=(0.0, 0.0, 0.0)))
-    np.testing.assert_allclose(total, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
-
-
-def test_weights_and_no_data_are_those_of_the_moments():
-    disparity = bent_road(5, noise=0.2)
-    disparity[::9, ::4] = np.nan
-    disparity[5] = np.inf
-    weights = np.random.default_rng(3).uniform(0, 1, disparity.shape)
-    total = tile_sums(disparity, weights, 16).gram.sum(axis=(0, 1))
-    np.testing.assert_allclose(
-        total, gram_of(map_moments(disparity, weights, plane=(0.0, 0.0, 0.0))), rtol=1e-9
-    )
-
-
-@pytest.mark.parametrize(("size", "step"), [(1, 1), (4, 2), (3, 1)])
-def test_an_area_is_the_sum_of_its_tiles(size, step):
-    tiles = tile_sums(bent_road(5, noise=0.2), None, 10)  # 12 x 16 tiles
-    areas = tiles.areas(size, step)
-    assert areas.shape[:2] == ((12 - size) // step + 1, (16 - size) // step + 1)
-    for i, j in ((0, 0), (2, 3), (areas.shape[0] - 1, areas.shape[1] - 1)):
-        inside = tiles.gram[i * step : i * step + size, j * step : j * step + size]
-        np.testing.assert_allclose(areas[i, j], inside.sum(axis=(0, 1)), rtol=1e-9)
-
-
-def test_a_map_smaller_than_an_area_has_none():
-    assert tile_sums(bent_road(5, width=20, height=20), None, 10).areas(4, 2).size == 0

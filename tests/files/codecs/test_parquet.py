@@ -60,10 +60,7 @@ def test_text_that_is_not_utf8_is_refused():
 
 @pytest.mark.parametrize(
     "column",
-    [
-        lambda: pyarrow.array(["x" * 20_000] * 5_000),
-        lambda: pyarrow.nulls(500_000, pyarrow.float64()),
-    ],
+    [lambda: pyarrow.array(["x" * 20_000] * 5_000), lambda: pyarrow.nulls(500_000, pyarrow.float64())],
     ids=["long texts", "rows of nothing"],
 )
 def test_few_bytes_that_hold_many_values_are_refused(column):

@@ -1,15 +1,21 @@
-"""TIFF files of every usual kind are read, with or without imagecodecs."""
+"""TIFF files of every usual kind, layout and compression are read, with or without imagecodecs."""
 
+import io
 import struct
+import zlib
 from importlib.util import find_spec
 
 import numpy as np
 import pytest
+import tifffile
+from hypothesis import given
+from hypothesis import strategies as st
 
 from rollcli.errors import InputError
-from rollcli.files.codecs.tiff import picture
+from rollcli.files.codecs import tiff as unpack
+from rollcli.files.codecs.tiff import DamagedPartError, decode_lzw, picture, unpacked
 from rollcli.files.formats import decode_mask, decode_stored, encode_stored
-from tests.binary_files import disparity_map, make_tiff
+from tests.binary_files import disparity_map, lzw_encode, make_tiff
 
 KINDS = ("u1", "u2", "i2", "f2", "f4", "f8")
 
@@ -51,14 +57,6 @@ def test_tiles_strips_and_bigtiff_are_read(layout, compression):
     values = values_of("f4")
 
     stored = decode_stored(make_tiff(values, compression, ">", **layout), "map.tif")
-
-    np.testing.assert_array_equal(stored.values, values)
-
-
-def test_tiles_with_a_predictor_are_read():
-    values = values_of("u2")
-
-    stored = decode_stored(make_tiff(values, "lzw", "<", predictor=2, tile=(16, 32)), "map.tif")
 
     np.testing.assert_array_equal(stored.values, values)
 
@@ -164,19 +162,6 @@ def test_camera_images_are_read_in_grey_and_in_colour():
         picture(make_tiff(values_of("f4")), "x")
 
 
-@pytest.mark.parametrize("compression", ["lzw", "deflate", "packbits"])
-def test_a_colour_image_of_fewer_rows_than_its_header_says_is_refused(compression):
-    rgb = np.random.default_rng(0).integers(0, 255, (20, 30, 3), dtype=np.uint8)
-    file = make_tiff(rgb, compression, photometric=2)
-    for tag in (257, 278):
-        file = file.replace(struct.pack("<HHII", tag, 4, 1, 20), struct.pack("<HHII", tag, 4, 1, 37))
-
-    with pytest.raises(
-        InputError, match=r"x: is a damaged TIFF: its compressed data are wrong \(1800 of 3330 bytes"
-    ):
-        picture(file, "x")
-
-
 @pytest.mark.skipif(bool(find_spec("imagecodecs")), reason="imagecodecs is installed here")
 def test_compressions_of_another_package_name_it():
     field = struct.pack("<HHIHH", 259, 3, 1, 8, 0)
@@ -187,13 +172,6 @@ def test_compressions_of_another_package_name_it():
         match=r"cannot be decoded \(compression 50000, 16 bits a number\): pip install imagecodecs",
     ):
         decode_stored(file, "map.tif")
-
-
-@pytest.mark.parametrize("kind", ["i1", "u4", "i4"])
-def test_whole_numbers_of_any_size_are_read(kind):
-    values = disparity_map().astype(kind)
-
-    np.testing.assert_array_equal(decode_stored(make_tiff(values, "lzw", ">", 2), "map.tif").values, values)
 
 
 @pytest.mark.parametrize("compression", ["none", "lzw", "deflate", "packbits"])
@@ -235,22 +213,6 @@ def tiff_of_bits(rows, compression):
     return whole.replace(struct.pack("<HHIHH", 258, 3, 1, 8, 0), struct.pack("<HHIHH", 258, 3, 1, 1, 0))
 
 
-NEEDS_EXTRA = pytest.mark.skipif(
-    not find_spec("imagecodecs"), reason="imagecodecs, of the extra tiff, is not here"
-)
-
-
-@pytest.mark.parametrize("compression", [pytest.param("lzw", marks=NEEDS_EXTRA), "deflate", "packbits"])
-def test_fewer_rows_of_bits_than_the_header_says_are_refused(compression):
-    file = tiff_of_bits(20, compression)
-    assert decode_mask(file, "x").shape == (20, 56)
-    for tag in (257, 278):
-        file = file.replace(struct.pack("<HHII", tag, 4, 1, 20), struct.pack("<HHII", tag, 4, 1, 37))
-
-    with pytest.raises(InputError, match=r"its compressed data are wrong \(140 of 259 bytes"):
-        decode_mask(file, "x")
-
-
 def test_deflated_bits_are_held_against_their_checksum_too():
     whole = tiff_of_bits(37, "deflate")
     expected = picture_or_mask(whole)
@@ -284,7 +246,7 @@ def flipped(data, bit):
 
 @pytest.mark.parametrize(("kind", "predictor"), [("u2", 1), ("u2", 2), ("f4", 3)])
 def test_every_flipped_bit_of_deflated_pixels_is_refused_or_changes_nothing(kind, predictor):
-    whole = make_tiff(values_of(kind)[:11, :17], "deflate", predictor=predictor)
+    whole = make_tiff(values_of(kind)[:6, :9], "deflate", predictor=predictor)
     expected = decode_stored(whole, "x").values.tobytes()
     start, end = data_of(whole)
     refused = 0
@@ -298,7 +260,198 @@ def test_every_flipped_bit_of_deflated_pixels_is_refused_or_changes_nothing(kind
     assert refused > (end - start) * 7
 
 
-def test_a_large_map_in_one_tile_that_is_a_little_larger_is_read():
-    values = np.arange(2100 * 2050, dtype=np.uint32).astype(np.uint8).reshape(2100, 2050)
-    file = make_tiff(values, "none", tile=(2112, 2064))
-    np.testing.assert_array_equal(decode_stored(file, "x").values, values)
+COLOURS = np.random.default_rng(0).integers(0, 256, (20, 30, 4), dtype=np.uint8)
+VALUES = disparity_map().astype(np.uint16)
+
+
+def written(values, **options):
+    file = io.BytesIO()
+    tifffile.imwrite(file, values, metadata=None, **options)
+    return file.getvalue()
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16])
+@pytest.mark.parametrize(
+    "layout",
+    [
+        {},
+        {"compression": "zlib"},
+        {"compression": "zlib", "predictor": 2},
+        {"tile": (16, 16)},
+        {"rowsperstrip": 7},
+    ],
+    ids=str,
+)
+@pytest.mark.parametrize("planes", ["contig", "separate"])
+def test_colours_lie_side_by_side_or_in_a_plane_each(kind, layout, planes):
+    rgb = COLOURS[..., :3].astype(kind) * np.array(np.iinfo(kind).max // 255, kind)
+    stored = rgb if planes == "contig" else np.moveaxis(rgb, -1, 0)
+
+    found = picture(written(stored, photometric="rgb", planarconfig=planes, **layout), "x")
+
+    assert found.dtype == kind
+    np.testing.assert_array_equal(found, rgb[..., ::-1])
+
+
+def test_what_is_neither_grey_nor_three_colours_is_no_camera_image():
+    for pixels, photometric in ((COLOURS[..., :2], 1), (COLOURS[..., 0], 3), (COLOURS[..., :3], 6)):
+        with pytest.raises(InputError, match="x: is neither a grey nor an RGB TIFF"):
+            picture(make_tiff(pixels, photometric=photometric), "x")
+
+
+# TIFF 6.0, NewSubfileType: bit 0 is a reduced copy, bit 1 a page of many, bit 2 a mask of another image
+@pytest.mark.parametrize(("kind", "is_said"), [(0, True), (1, False), (2, True), (4, False), (5, False)])
+def test_a_second_page_is_said_unless_it_belongs_to_the_first(kind, is_said):
+    stored = decode_stored(make_tiff(VALUES, pages=2, page_kind=kind), "map.tif")
+
+    assert stored.note == ("map.tif holds several pages; the first is read" if is_said else "")
+
+
+def with_field(file, tag, kind, was, new):
+    """Replace a number of the only page."""
+    form = {3: "<HHIHH", 4: "<HHII"}[kind]
+    fill = (0,) if kind == 3 else ()
+    before, after = (struct.pack(form, tag, kind, 1, number, *fill) for number in (was, new))
+    assert before in file
+    return file.replace(before, after)
+
+
+def test_a_page_has_as_many_parts_as_its_size_asks_for():
+    strips = make_tiff(VALUES, rows_per_strip=10)
+    with pytest.raises(InputError, match="x: is a damaged TIFF: 4 parts, not 8"):
+        decode_stored(with_field(strips, 278, 4, 10, 5), "x")
+    tiles = make_tiff(VALUES, tile=(16, 32))
+    with pytest.raises(InputError, match="x: is a damaged TIFF: 6 parts, not 12"):
+        decode_stored(with_field(tiles, 322, 4, 32, 16), "x")
+
+
+def test_a_volume_is_no_map():
+    slices = with_field(make_tiff(VALUES), 254, 4, 0, 0).replace(
+        struct.pack("<HHIHH", 317, 3, 1, 1, 0), struct.pack("<HHII", 32997, 4, 1, 3)
+    )
+    with pytest.raises(InputError, match="x: is a volume of 3 slices, not a 2-D image"):
+        decode_stored(slices, "x")
+
+
+def test_pixels_end_where_the_file_ends_or_the_end_is_named():
+    whole = written(VALUES)  # its pixels come last
+    np.testing.assert_array_equal(decode_stored(whole, "x").values, VALUES)
+    with pytest.raises(
+        InputError, match=f"x: is truncated: its pixels end at byte {len(whole)} of {len(whole) - 1}$"
+    ):
+        decode_stored(whole[:-1], "x")
+
+
+# the most that one byte can stand for: in LZW 12 bits name at most 4,098 letters, in PackBits two bytes 128;
+# of Deflate zlib's documentation says it
+@pytest.mark.parametrize(("compression", "fold"), [("lzw", 2732), ("deflate", 1032), ("packbits", 64)])
+def test_a_header_claims_at_most_what_its_bytes_can_stand_for(compression, fold):
+    honest = make_tiff(np.zeros((1, 8), np.uint8), compression)
+    place = honest.index(struct.pack("<HHI", 279, 4, 1)) + 8
+    packed = int.from_bytes(honest[place : place + 4], "little")
+    for width, refusal in (
+        (fold * packed, "its compressed data are wrong"),
+        (fold * packed + 1, f"claims {fold * packed + 1} x 1 pixels, more than {packed} bytes can hold"),
+    ):
+        with pytest.raises(InputError, match=refusal):
+            decode_stored(with_field(honest, 256, 4, 8, width), "x")
+
+
+PACKBITS, DEFLATE, DEFLATE_OF_BEFORE = 32773, 8, 32946  # of libtiff's tiff.h
+
+
+# of Apple's Technical Note TN1023
+PACKED = bytes.fromhex("FE AA 02 80 00 2A FD AA 03 80 00 2A 22 F7 AA")
+PLAIN = bytes.fromhex("AA AA AA 80 00 2A AA AA AA AA 80 00 2A 22") + 10 * b"\xaa"
+
+
+@pytest.mark.parametrize("installed", [True, False], ids=["as installed", "in Python"])
+@pytest.mark.parametrize("idle", [b"", b"\x80", b"\x80\x80\x80"], ids=len)
+def test_packbits_are_those_of_its_maker_and_a_head_of_128_stands_for_nothing(monkeypatch, installed, idle):
+    if not installed:
+        monkeypatch.setattr(unpack, "imagecodecs", lambda: None)
+    packed = idle + PACKED[:6] + idle + PACKED[6:] + idle
+    assert unpacked(PACKBITS, packed, len(PLAIN), len(PLAIN)) == PLAIN
+
+
+@pytest.mark.parametrize("installed", [True, False], ids=["as installed", "in Python"])
+@pytest.mark.parametrize("compression", [DEFLATE, DEFLATE_OF_BEFORE])
+def test_deflate_has_two_numbers(monkeypatch, installed, compression):
+    if not installed:
+        monkeypatch.setattr(unpack, "imagecodecs", lambda: None)
+    assert unpacked(compression, zlib.compress(PLAIN), len(PLAIN), len(PLAIN)) == PLAIN
+
+
+@given(st.binary(min_size=1, max_size=3000), st.integers(1, 40))
+def test_what_is_packed_is_unpacked(data, times):
+    assert decode_lzw(lzw_encode(data * times), len(data) * times) == data * times
+
+
+@pytest.mark.parametrize("spread", [1, 3, 17, 256])
+def test_data_longer_than_many_tables_are_unpacked(spread):
+    data = np.random.default_rng(0).integers(0, spread, 100_000, dtype=np.uint8).tobytes()
+
+    assert decode_lzw(lzw_encode(data), len(data)) == data
+
+
+@given(st.binary(min_size=1, max_size=300))
+def test_any_bytes_are_unpacked_or_refused(packed):
+    try:
+        plain = decode_lzw(packed, 100)
+    except DamagedPartError:
+        return
+    assert 0 < len(plain) <= 100
+
+
+def test_a_code_before_its_time_is_refused():
+    early = int("100000000" + "001100001" + "111111111" + "100000001", 2)  # clear, "a", 511, end
+
+    with pytest.raises(DamagedPartError, match="not in the table"):
+        decode_lzw(early.to_bytes(5, "big"), 4)
+
+
+def packed(*codes):
+    """Codes one after the other, each with its bits; the last byte filled up with zeros."""
+    bits = "".join(f"{code:0{width}b}" for code, width in codes)
+    return int(bits.ljust(-(-len(bits) // 8) * 8, "0"), 2).to_bytes(-(-len(bits) // 8), "big")
+
+
+CLEAR, END = (256, 9), (257, 9)
+LETTERS = [(ord(letter), 9) for letter in "abcdefg"]
+
+
+def test_a_code_may_name_the_string_that_it_completes():
+    # of TIFF 6.0, section 13: 258 is used while the table still lacks it
+    assert decode_lzw(packed(CLEAR, LETTERS[0], (258, 9), (259, 9), END), 100) == b"a" + b"aa" + b"aaa"
+    with pytest.raises(DamagedPartError, match="not in the table"):
+        decode_lzw(packed(CLEAR, LETTERS[0], (259, 9), END), 100)
+    with pytest.raises(DamagedPartError, match="not in the table"):
+        decode_lzw(packed(CLEAR, (258, 9), END), 100)
+
+
+def literals(count):
+    """Letters alone: the codes grow by a bit where the table does, one early, as TIFF 6.0 has it."""
+    numbers = [(7 * place) % 251 for place in range(count)]
+    widths = [
+        9 if place < 254 else 10 if place < 766 else 11 if place < 1790 else 12 for place in range(count)
+    ]
+    return bytes(numbers), list(zip(numbers, widths, strict=True))
+
+
+@pytest.mark.parametrize("count", [253, 254, 255, 765, 766, 767, 1789, 1790, 1791, 3837, 3838])
+def test_codes_grow_where_the_table_does(count):
+    plain, codes = literals(count)
+    width = 9 if count < 254 else 10 if count < 766 else 11 if count < 1790 else 12
+    assert decode_lzw(packed(CLEAR, *codes, (257, width)), count + 1) == plain
+
+
+def test_a_table_that_overflows_is_refused():
+    plain, codes = literals(5000)
+    with pytest.raises(DamagedPartError, match="table overflow"):
+        decode_lzw(packed(CLEAR, *codes), len(plain))
+
+
+def test_tables_that_hold_next_to_nothing_are_refused():
+    assert decode_lzw(packed(*[CLEAR] * 60, *LETTERS[:1], END), 10) == b"a"
+    with pytest.raises(DamagedPartError, match="too many tables"):
+        decode_lzw(packed(*[CLEAR, LETTERS[0]] * 1000, END), 10_000)

@@ -6,13 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.files.recordings.bag_files import (
-    camera_info,
-    compressed,
-    disparity_image,
-    image,
-    write_bag,
-)
+from tests.files.recordings.bag_files import camera_info, compressed, disparity_image, image, write_bag
 from tests.files.recordings.test_bags import START, STEP, P, drive, maps, rows
 from tests.run_cli import rollcli, write_pair
 

@@ -11,14 +11,7 @@ import pytest
 
 import rollcli as package
 from rollcli.errors import InputError
-from tests.files.recordings.bag_files import (
-    KINDS,
-    camera_info,
-    compressed,
-    disparity_image,
-    image,
-    write_bag,
-)
+from tests.files.recordings.bag_files import KINDS, camera_info, compressed, disparity_image, image, write_bag
 from tests.run_cli import road_map, rollcli, write_pair
 
 START = 1_700_000_000_123_456_789

@@ -4,7 +4,7 @@ import threading
 
 from rollcli.files import storage
 from rollcli.files.stores import locations as turns
-from rollcli.files.stores.locations import computing, tasks_in_hand, wait_for_room, waiting_for_network
+from rollcli.files.stores.locations import computing, wait_for_room, waiting_for_network
 from rollcli.run.workers.chunks import Work
 from rollcli.run.workers.in_order import Workers
 from rollcli.run.workers.interrupt import Stop
@@ -31,27 +31,6 @@ def test_tasks_of_one_worker_wait_for_the_network_together_and_answer_in_order()
     assert list(results) == [number**2 for number in tasks]
 
 
-def test_one_computes_at_a_time():
-    computes, most = 0, 0
-
-    def compute():
-        nonlocal computes, most
-        for _ in range(200):
-            with computing():
-                computes += 1
-                most = max(most, computes)
-                computes -= 1
-                with waiting_for_network():
-                    pass
-
-    threads = [threading.Thread(target=compute) for _ in range(4)]
-    for each in threads:
-        each.start()
-    for each in threads:
-        each.join()
-    assert most == 1
-
-
 def test_what_tasks_have_read_ahead_is_bounded_and_no_task_waits_for_ever(monkeypatch):
     monkeypatch.setattr(turns, "_BYTES_IN_HAND", 100)
     most, parts = 0, (30, 40)  # a task reads two files: with all eight at once, 560
@@ -75,37 +54,6 @@ def test_what_tasks_have_read_ahead_is_bounded_and_no_task_waits_for_ever(monkey
     assert not turns._held_bytes
 
 
-def test_only_the_oldest_task_goes_beyond_the_bound(monkeypatch):
-    monkeypatch.setattr(turns, "_BYTES_IN_HAND", 100)
-    go_on = threading.Event()
-
-    def task():
-        with computing(), waiting_for_network():
-            wait_for_room(30)
-            go_on.wait(timeout=60)
-
-    threads = [threading.Thread(target=task) for _ in range(5)]
-    for each in threads:
-        each.start()
-    with turns._room:
-        assert turns._room.wait_for(lambda: sum(turns._held_bytes.values()) == 90, timeout=60)
-        oldest, *others = turns._held_bytes
-        assert len(others) == 2
-        assert turns._has_room(oldest, 1000)
-        assert not any(turns._has_room(each, 40) for each in (*others, 0))
-    go_on.set()
-    for each in threads:
-        each.join(timeout=60)
-    assert not turns._held_bytes
-
-
-def test_a_file_that_is_larger_than_the_bound_is_read(monkeypatch):
-    monkeypatch.setattr(turns, "_BYTES_IN_HAND", 10)
-    with computing(), waiting_for_network():
-        wait_for_room(1000)
-        assert sum(turns._held_bytes.values()) == 1000
-
-
 def test_objects_that_tasks_read_count_as_read_ahead(store, monkeypatch):
     for name, value in store.items():
         monkeypatch.setenv(name, value)
@@ -113,15 +61,3 @@ def test_objects_that_tasks_read_count_as_read_ahead(store, monkeypatch):
     with computing():
         assert storage.read_bytes("s3://maps/turns/x") == b"123"
         assert list(turns._held_bytes.values()) == [3]
-
-
-def test_waiting_without_a_turn_changes_nothing():
-    with waiting_for_network(), computing():
-        pass
-    wait_for_room(10**12)
-    assert not turns._held_bytes
-
-
-def test_only_urls_need_several_tasks_in_hand():
-    assert tasks_in_hand(["maps/a.png", "out"]) == 1
-    assert tasks_in_hand(["maps/a.png", "s3://bucket/out"]) > 1

@@ -156,19 +156,6 @@ def test_a_drift_beside_a_jump_is_that_of_the_line_between_levels():
     assert jump.change.value == pytest.approx(2.0, abs=jump.change.ci95)
 
 
-def test_of_what_is_assessed_only_what_is_used_has_a_value_and_weight():
-    values, errors = white(200), np.full(200, 0.05)
-    values[20:30], values[100] = np.nan, 40.0
-    errors[50:60], errors[60:70] = np.nan, -1.0  # neither is an error
-    found = assess_sequence(values, errors)
-    left_out = np.isin(np.arange(200), [*range(20, 30), 100])
-    assert (found.frames, found.used, found.outliers) == (200, 189, 1)
-    assert np.array_equal(found.series.used, ~left_out)
-    assert np.array_equal(found.series.values == 0, left_out)
-    errors[50:70] = 0.05
-    assert assess_sequence(values, errors).now == found.now
-
-
 def test_the_spread_between_frames_is_what_their_errors_do_not_explain():
     rng = np.random.default_rng(3)
     values = rng.normal(0, 0.3, 4000) + rng.normal(0, 0.1, 4000)

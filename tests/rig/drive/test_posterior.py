@@ -1,4 +1,4 @@
-"""The posterior: its parts against statsmodels and scipy, its interval against simulated truth."""
+"""The posterior against statsmodels and scipy, its interval against simulated truth, and outliers."""
 
 import numpy as np
 import pytest
@@ -6,8 +6,8 @@ import statsmodels.api as sm
 from scipy.stats import multivariate_normal, norm
 
 from rollcli.rig.drive.posterior import TUNING, Fit, Likelihood, Series, make_cells
-from rollcli.rig.drive.quantity import assess_sequence
-from tests.rig.drive.series import ar1
+from rollcli.rig.drive.quantity import assess_sequence, gross_outliers
+from tests.rig.drive.series import ar1, drive
 
 FRAMES = 40
 
@@ -42,14 +42,6 @@ def test_each_noise_has_the_fit_of_statsmodels_and_the_likelihood_of_scipy(cells
     expected = left - level / 2 + np.log(TUNING.error_factors[noise % 5][1])
     constant = len(cells.values) / 2 * np.log(2 * np.pi) + np.log(cells.variances).sum() / 2
     assert fit.log_evidence[place, noise] == pytest.approx(expected + constant, rel=1e-6)
-
-
-def test_the_scan_is_the_evidence_of_each_design_with_one_more_step(cells):
-    likelihood, level = Likelihood(cells), np.ones((len(cells.first), 1))
-    scanned = likelihood.scan(level, likelihood.fit(level))
-    for at in (5, 17, 30):
-        step = (np.arange(len(level)) >= at).astype(float)
-        assert scanned[at] == pytest.approx(likelihood.fit(np.column_stack([level, step])).evidence, rel=1e-6)
 
 
 def test_a_pair_of_steps_gains_what_its_fit_gains(cells):
@@ -120,3 +112,44 @@ def test_errors_that_are_said_too_small_do_not_make_the_interval_too_narrow():
         now = assess_sequence(values, np.full(120, 0.05)).now
         inside += abs(now.value) <= now.ci95
     assert inside >= 26
+
+
+@pytest.mark.parametrize("frames", [1, 2, 9, 200, 2000, 20_000])
+@pytest.mark.parametrize("count", [1, 2, 7, 8, 9, 16, 17, 40])
+@pytest.mark.parametrize("where", ["first", "middle", "last", "spread"])
+def test_whatever_counts_gives_a_mean_among_its_frames(frames, count, where):
+    count = min(count, frames)
+    start = {"first": 0, "middle": (frames - count) // 2, "last": frames - count, "spread": 0}[where]
+    places = np.linspace(0, frames - 1, count).astype(int) if where == "spread" else start + np.arange(count)
+    values = np.full(frames, np.nan)
+    values[places] = np.random.default_rng(count).normal(1.0, 0.1, count)
+
+    found = assess_sequence(values, np.full(frames, 0.05))
+
+    assert found.used == count
+    mean = found.segments[-1].mean.value
+    assert np.nanmin(values) - 1e-9 <= mean <= np.nanmax(values) + 1e-9
+    assert (found.now.ci95 is None) == (count < 8)
+    assert (found.drift.value is None) or count >= 8
+
+
+@pytest.mark.parametrize(("phi", "sd"), [(0.9, 0.4), (0.97, 0.1), (0.94, 0.3)])
+def test_gross_outliers_are_found_and_good_frames_are_not_called_so(phi, sd):
+    values, errors = drive(5, 3000, phi=phi, sd=sd)
+    assert gross_outliers(values, errors**2).sum() <= 3
+    rng = np.random.default_rng(6)
+    bad = rng.random(3000) < 0.05
+    values[bad] += rng.choice([-1, 1], bad.sum()) * rng.uniform(5, 30, bad.sum())
+    found = gross_outliers(values, errors**2)
+    assert found[bad].all()
+    assert found[~bad].mean() < 0.01
+
+
+def test_a_jump_is_no_gross_outlier():
+    values = np.repeat([0.0, 5.0], 100) + np.random.default_rng(0).normal(0, 0.1, 200)
+    assert not gross_outliers(values, np.full(200, 0.01)).any()
+
+
+@pytest.mark.parametrize("values", [[], [1.0], [1.0, 1.0, 1.0], [0.0] * 50])
+def test_few_or_equal_values_have_no_outliers(values):
+    assert not gross_outliers(np.array(values), np.full(len(values), 0.01)).any()

@@ -1,9 +1,7 @@
 """A real Dask scheduler and two real workers, on this machine."""
 
 import json
-import logging
 import os
-import re
 import shutil
 import socket
 import subprocess
@@ -11,31 +9,28 @@ import sys
 import threading
 import time
 from itertools import count
-from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
-
-from tests.in_process import run_here
-from tests.object_store import joined, upload
-from tests.run_cli import command, contents, environment, road_map, rollcli, write_maps, write_pair
 
 pytest.importorskip("distributed", reason="the extra cluster is not installed")
 
 from distributed import LocalCluster
 
 from rollcli import __version__
+from rollcli.errors import UsageError
 from rollcli.files.storage import list_names, read_bytes
 from rollcli.run.workers import cluster
-from rollcli.run.workers.cluster import _problems, probe
+from rollcli.run.workers.chunks import Work
+from rollcli.run.workers.cluster import ClusterExecutor, check_scheduler, probe, scheduler_address
 from rollcli.run.workers.in_order import SharedPaths
+from tests.in_process import run_here
+from tests.object_store import joined, upload
+from tests.run.workers.tasks import lost, run
+from tests.run_cli import command, contents, environment, road_map, rollcli, write_maps, write_pair
 
 pytestmark = pytest.mark.slow
-
 FRAMES = 40
 IMAGES = ("--derotated", "upright", "--vdisparity", "v")
-
-
 LOCAL = ("--host", "127.0.0.1", "--no-dashboard")
 ONE_PROCESS = ("--nthreads", "1", "--no-nanny")
 
@@ -251,26 +246,6 @@ def test_a_worker_of_another_version_that_joins_later_gets_no_work_and_a_line_sa
     assert len((far / "rolls.csv").read_text().splitlines()) == 1 + FRAMES + 400
 
 
-@pytest.mark.parametrize(
-    ("answer", "said"),
-    [
-        ("does not see a.png", "worker tcp://second:1: does not see a.png"),
-        (ImportError("no module"), "worker tcp://second:1: cannot run rollcli .*: no module"),
-    ],
-)
-def test_a_worker_that_cannot_take_part_is_known_and_no_mark_is_left(tmp_path, answer, said):
-    def ask(function, version, sizes, marks, workers, on_error):
-        assert [Path(mark).exists() for mark in marks] == [True]
-        return dict(zip(workers, ("", answer), strict=True))
-
-    shared = SharedPaths((), (str(tmp_path / "up"),))
-    problems, silent = _problems(SimpleNamespace(run=ask), shared, ["tcp://first:1", "tcp://second:1"])
-    assert silent == set()
-    assert problems.keys() == {"tcp://second:1"}
-    assert re.match(said, f"worker tcp://second:1: {problems['tcp://second:1']}")
-    assert list((tmp_path / "up").iterdir()) == []
-
-
 def test_a_worker_that_has_no_such_program_or_files_is_named(tmp_path):
     there = tmp_path / "a.png"
     there.write_bytes(b"123")
@@ -279,13 +254,6 @@ def test_a_worker_that_has_no_such_program_or_files_is_named(tmp_path):
     assert f"does not see {tmp_path / 'b.png'}" in probe(__version__, {str(tmp_path / "b.png"): 3}, [])
     assert "does not see" in probe(__version__, {str(there): 4}, [])
     assert "what they write must lie on storage" in probe(__version__, {}, [str(tmp_path / "v" / "mark")])
-
-
-def test_dask_may_log_again_once_the_cluster_is_left():
-    before = logging.root.manager.disable
-    with cluster._silenced_logging():
-        assert not logging.getLogger("distributed").isEnabledFor(logging.CRITICAL)
-    assert logging.root.manager.disable == before
 
 
 def test_a_worker_that_may_not_write_is_named(tmp_path, monkeypatch):
@@ -376,3 +344,54 @@ def test_workers_that_share_only_a_bucket_give_the_bytes_of_a_local_run(
     assert joined(f"{bucket}/rolls.csv") == expected
     images = {name: read_bytes(f"{bucket}/upright/{name}") for name in list_names(f"{bucket}/upright")}
     assert images == contents(local / "upright")
+
+
+WORK = Work(run, lost)
+HERE = {"host": "127.0.0.1", "protocol": "tcp", "dashboard_address": ":0", "threads_per_worker": 1}
+
+
+@pytest.fixture(scope="module")
+def workers_here():
+    """Two workers in this process."""
+    with LocalCluster(n_workers=2, processes=False, **HERE) as made:
+        yield made
+
+
+def test_a_scheduler_is_named_by_its_file_too(workers_here, tmp_path):
+    file = tmp_path / "scheduler.json"
+    file.write_text(json.dumps({"type": "Scheduler", "address": workers_here.scheduler_address}))
+    check_scheduler(str(file))
+    assert scheduler_address("tcp://far:8786") == "tcp://far:8786"
+    assert scheduler_address("far:8786") == "far:8786"
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (None, "the scheduler file cannot be read: no such file or directory"),
+        (b"", "is not a file that dask scheduler wrote"),
+        (b"[" * 100_000, "is not a file that dask scheduler wrote"),
+        (b'{"id": 1}', "is not a file that dask scheduler wrote"),
+        (b"[1]", "is not a file that dask scheduler wrote"),
+    ],
+)
+def test_a_scheduler_file_that_is_not_there_or_is_none_is_refused(tmp_path, content, said):
+    file = tmp_path / "scheduler.json"
+    if content is not None:
+        file.write_bytes(content)
+    with pytest.raises(UsageError) as caught:
+        check_scheduler(str(file))
+    assert str(caught.value) == f"--scheduler {file}: {said}"
+
+
+@pytest.mark.parametrize(
+    "use",
+    [lambda: check_scheduler("tcp://far:1"), lambda: ClusterExecutor("tcp://far:1", WORK, SharedPaths(), 1)],
+    ids=["check", "executor"],
+)
+def test_without_the_extra_it_is_named(monkeypatch, use):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(UsageError) as caught:
+        use()
+    assert str(caught.value).startswith("--scheduler needs the extra cluster: ")
+    assert str(caught.value).endswith(" -m pip install distributed")

@@ -6,7 +6,7 @@ from collections import Counter
 import pytest
 
 from rollcli.run.workers import chunks as chunk_sizes
-from rollcli.run.workers.chunks import Chunk, Chunks, Done, Work
+from rollcli.run.workers.chunks import Chunk, Done, Work
 from rollcli.run.workers.in_order import Workers
 from rollcli.run.workers.interrupt import Stop
 from rollcli.run.workers.tasks import run_tasks
@@ -85,32 +85,6 @@ def test_a_chunk_is_worth_about_a_second(seconds, size):
     assert {len(chunk) for chunk in executor.submitted[-8:-1]} <= {size, size - 1}
 
 
-def test_chunks_get_smaller_towards_the_end_so_that_all_workers_end_together():
-    executor = FakeExecutor(4, seconds=0.005)
-    list(in_order(range(2000), executor, Stop()))
-    left = 2000
-    for chunk in executor.submitted:
-        assert len(chunk) <= max(10, left // 8)  # 10 are 50 ms
-        left -= len(chunk)
-    assert {len(chunk) for chunk in executor.submitted[-8:-1]} <= {9, 10}
-
-
-def test_many_workers_get_chunks_so_long_that_those_who_hand_them_over_keep_up():
-    executor = FakeExecutor(800, seconds=0.005)
-    list(in_order(iter(range(2_000_000)), executor, Stop()))
-    assert {len(chunk) for chunk in executor.submitted[-100:-1]} <= {1599, 1600}  # 8 s
-
-
-def test_tasks_that_get_slower_make_smaller_chunks():
-    chunks = Chunks(iter(range(10**6)))
-    for _ in range(20):
-        chunks.measure(Done([0] * 100, 0.5))
-    assert len(chunks.take(1)) in (199, 200)
-    for _ in range(10):
-        chunks.measure(Done([0], 5.0))
-    assert len(chunks.take(1)) == 1
-
-
 @pytest.mark.parametrize("deadly", [{0}, {517}, {999}, {300, 301, 640}])
 def test_what_kills_workers_is_alone_in_the_end_and_costs_no_other_task(deadly):
     executor = FakeExecutor(2, deadly, seconds=0.005)
@@ -123,23 +97,6 @@ def test_what_kills_workers_is_alone_in_the_end_and_costs_no_other_task(deadly):
 def test_the_rest_of_a_chunk_that_took_too_long_comes_before_all_others():
     executor = FakeExecutor(2, seconds=0.01, most=7)
     assert list(in_order(range(500), executor, Stop())) == [f"did {task}" for task in range(500)]
-
-
-@pytest.mark.parametrize("fast", [1e-6, 1e-4])
-def test_what_fast_tasks_made_too_large_a_chunk_of_is_done_by_all_workers(fast):
-    executor = FakeExecutor(4, most=200)
-    executor.seconds = fast
-    executor.do = lambda chunk: do_and_slow_down(executor, chunk)
-    assert list(in_order(iter(range(5000)), executor, Stop())) == [f"did {task}" for task in range(5000)]
-    sizes = [len(chunk) for chunk in executor.submitted]
-    assert max(sizes) > 1000
-    assert len([size for size in sizes if 50 <= size <= 700]) >= 8
-
-
-def do_and_slow_down(executor, chunk):
-    """After four fast tasks all are slow, and no worker does more than 200 of a chunk."""
-    done = chunk[: executor.most]
-    return Done([f"did {task}" for task in done], (executor.seconds if chunk[0] < 4 else 0.01) * len(done))
 
 
 def test_a_stop_ends_the_results_before_the_first_task_that_was_not_begun():
@@ -160,6 +117,25 @@ def test_a_worker_that_dies_after_a_stop_is_not_retried():
     stop.asked = True
     assert list(results) == []
     assert executor.retried == []
+
+
+def test_an_error_of_a_task_reaches_the_caller_after_the_results_before_it():
+    executor = FakeExecutor()
+    executor.do = lambda chunk: Done([], 0.0, ValueError(chunk[0])) if chunk[0] else Done(["did"], 0.1)
+    results = in_order(range(100), executor, Stop())
+    assert next(results) == "did"
+    with pytest.raises(ValueError, match="1"):
+        next(results)
+
+
+def test_this_process_begins_no_task_after_a_stop():
+    stop, begun = Stop(), []
+    work = Work(lambda task: begun.append(task) or task, None)
+    results = run_tasks("abc", work, stop, Workers(1))
+    assert next(results) == "a"
+    stop.asked = True
+    assert list(results) == []
+    assert begun == ["a"]
 
 
 def chunk_of(do, tasks, stopped=None):
@@ -195,22 +171,3 @@ def test_an_error_ends_a_chunk_after_the_results_before_it():
     assert done.results == [0, 1]
     assert isinstance(done.error, RuntimeError)
     assert "ValueError in " in str(done.error)
-
-
-def test_an_error_of_a_task_reaches_the_caller_after_the_results_before_it():
-    executor = FakeExecutor()
-    executor.do = lambda chunk: Done([], 0.0, ValueError(chunk[0])) if chunk[0] else Done(["did"], 0.1)
-    results = in_order(range(100), executor, Stop())
-    assert next(results) == "did"
-    with pytest.raises(ValueError, match="1"):
-        next(results)
-
-
-def test_this_process_begins_no_task_after_a_stop():
-    stop, begun = Stop(), []
-    work = Work(lambda task: begun.append(task) or task, None)
-    results = run_tasks("abc", work, stop, Workers(1))
-    assert next(results) == "a"
-    stop.asked = True
-    assert list(results) == []
-    assert begun == ["a"]

@@ -1,4 +1,4 @@
-"""Real worker processes: order, deaths, retries, errors and how they end."""
+"""Real worker processes: how many, order, deaths, retries, errors and how they end."""
 
 import contextlib
 import os
@@ -10,13 +10,14 @@ from types import SimpleNamespace
 
 import pytest
 
-from rollcli.errors import InputError, WorkerError
+from rollcli.errors import InputError, UsageError, WorkerError
 from rollcli.run.workers import pool as pools
+from rollcli.run.workers import tasks as runs
 from rollcli.run.workers.chunks import Work
 from rollcli.run.workers.in_order import Workers
 from rollcli.run.workers.interrupt import Stop, stop_signals
-from rollcli.run.workers.pool import PoolExecutor, WorkerDiedError
-from rollcli.run.workers.tasks import run_tasks
+from rollcli.run.workers.pool import PoolExecutor, prepare_worker
+from rollcli.run.workers.tasks import require_scheduler, run_tasks
 from tests.run.workers.tasks import lost, run
 
 WORK = Work(run, lost)
@@ -79,22 +80,6 @@ def test_one_task_of_a_large_chunk_that_kills_workers_is_found_and_named():
     assert [*done[:2000], *done[2001:]] == [*range(2000), *range(2001, 3000)]
 
 
-def test_what_kills_workers_is_done_alone_and_chunks_that_wait_meanwhile_are_done(tmp_path):
-    mark, busy, event = (tmp_path / name for name in ("mark", "busy", "event"))
-    with pool() as executor:
-        held = executor.submit([("hold", busy, event)])
-        dying = executor.submit([("die_then_look", mark, busy)])
-        others = [executor.submit([("give", number)]) for number in range(3)]
-        while not dying.done():
-            executor.wait(dying)
-        with pytest.raises(WorkerDiedError):
-            dying.result()
-        threading.Timer(0.3, event.touch).start()
-        assert executor.retry(dying.chunk).results == [False]
-        assert settled(executor, held) == ["held"]
-        assert [settled(executor, other) for other in others] == [[0], [1], [2]]
-
-
 def test_a_stop_ends_a_chunk_after_the_task_in_hand_and_begins_no_other(tmp_path):
     event = tmp_path / "event"
     with pool(jobs=1) as executor:
@@ -118,13 +103,6 @@ def test_a_worker_that_died_with_nothing_to_do_is_replaced_before_its_next_chunk
             worker.kill()
             worker._process.join()
         assert settled(executor, executor.submit([("give", 2)])) == [2]
-
-
-def test_workers_end_with_their_executor():
-    with pool() as executor:
-        assert settled(executor, executor.submit([("give", 1)])) == [1]
-        processes = [worker._process for worker in executor._pool]
-    assert [process.is_alive() for process in processes] == [False, False]
 
 
 def test_a_file_stays_open_in_the_workers(tmp_path):
@@ -154,23 +132,6 @@ def test_what_a_dead_worker_left_is_cleared_before_its_chunk_is_known_to_be_lost
         assert settled(executor, spare) == [3]
 
 
-def test_the_chunks_after_one_that_killed_its_worker_keep_their_order(tmp_path):
-    with pool(jobs=1) as executor:
-        chunks = [executor.submit([("die_once", tmp_path / "mark")])]
-        chunks += [executor.submit([("append", tmp_path / "order", str(number))]) for number in range(8)]
-        for each in chunks:
-            while not each.done():
-                executor.wait(each)
-    assert (tmp_path / "order").read_text() == "01234567"
-
-
-def test_of_few_chunks_each_worker_gets_one(tmp_path):
-    event = tmp_path / "event"
-    with pool() as executor:  # the first one waits for what the second one does
-        futures = [executor.submit([("wait", event)]), executor.submit([("touch", event)])]
-        assert [settled(executor, future) for future in futures] == [["waited"], ["touched"]]
-
-
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 def test_workers_leave_the_signals_to_their_parent():
     with pool(jobs=1) as executor:
@@ -195,14 +156,6 @@ def test_workers_end_after_their_task_or_at_once(tmp_path):
         assert worker._process.exitcode == status
         assert busy.exists() == at_once  # it was let go once it was held
     assert not (tmp_path / "late").exists()
-
-
-def test_results_that_nobody_asks_for_do_not_keep_workers_from_ending():
-    with pool() as executor:
-        for _ in range(6):
-            executor.submit([("give", "x" * 1_000_000)])
-        time.sleep(0.5)
-        executor.close(at_once=False)
 
 
 def test_when_a_further_worker_cannot_start_the_others_end(monkeypatch):
@@ -243,3 +196,22 @@ def test_a_worker_that_cannot_be_set_up_answers_with_the_reason(error):
     assert isinstance(found, WorkerError)
     assert str(found) == f"a worker process cannot start: {error}; try fewer of them, with --jobs"
     assert pools._error_of(lambda: None) is None
+
+
+def test_no_scheduler_is_asked_for_unless_one_is_named():
+    require_scheduler(None)
+    with pytest.raises(UsageError, match=r"^--scheduler"):
+        require_scheduler("")
+
+
+def test_workers_that_were_started_early_do_the_tasks_and_those_too_many_end():
+    with runs.started_early(3, prepare_worker) as started:
+        processes = {worker._process.pid: worker._process for worker in started}
+        assert len(processes) == 3
+        tasks = [("signals",) for _ in range(20)]
+        used = {pid for pid, _, _ in run_tasks(tasks, WORK, Stop(), Workers(2, started=started))}
+        assert used <= processes.keys()
+        assert len(started) == 1
+    assert not any(process.is_alive() for process in processes.values())
+    with runs.started_early(1, prepare_worker) as none:
+        assert none == []
