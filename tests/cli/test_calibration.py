@@ -115,21 +115,24 @@ def test_a_map_at_half_the_size_uses_the_scaled_calibration(maps):
 
 def test_downscaled_pairs_have_the_pose_of_the_full_size(tmp_path):
     rig = {"pitch_deg": (4.6, 4.6), "height": (1.4, 1.4), "principal_offset": (-30.0, 30.0)}
-    (spec,) = draw_specs(SimulateOptions(frames=1, scene="open", curvature=(0, 0), seed=6, grey=True, **rig))
-    frame = render_frame(spec)
-    for side, image in (("left", frame.left), ("right", frame.right)):
-        (tmp_path / side).mkdir()
-        cv2.imwrite(str(tmp_path / side / "a.png"), image)
-    (tmp_path / "calib.txt").write_bytes(calibration(spec))
-    poses = []
-    for factor in ("1", "2"):
-        pair = ("--left", "left", "--right", "right", "--calib", "calib.txt", "--downscale", factor)
-        (row,) = rows_of(rollcli("estimate", *pair, cwd=tmp_path).out)
-        poses.append([float(row[name]) for name in POSE])
-    (pitch, pitch_ci, height, height_ci), (half_pitch, half_pitch_ci, half_height, half_height_ci) = poses
-    assert abs(pitch - half_pitch) <= math.hypot(pitch_ci, half_pitch_ci)
-    assert abs(height - half_height) <= math.hypot(height_ci, half_height_ci)
-    assert (pitch, height) == pytest.approx((math.degrees(0.08), 1.4), rel=0.02)
+    asked, agree = SimulateOptions(frames=5, scene="open", curvature=(0, 0), seed=6, grey=True, **rig), []
+    for number, spec in enumerate(draw_specs(asked)):
+        folder, frame = tmp_path / str(number), render_frame(spec)
+        for side, image in (("left", frame.left), ("right", frame.right)):
+            (folder / side).mkdir(parents=True)
+            cv2.imwrite(str(folder / side / "a.png"), image)
+        (folder / "calib.txt").write_bytes(calibration(spec))
+        poses = []
+        for factor in ("1", "2"):
+            pair = ("--left", "left", "--right", "right", "--calib", "calib.txt", "--downscale", factor)
+            (row,) = rows_of(rollcli("estimate", *pair, cwd=folder).out)
+            poses.append([float(row[name]) for name in POSE])
+        (pitch, pitch_ci, height, height_ci), (half_pitch, half_pitch_ci, half_height, half_height_ci) = poses
+        agree.append(abs(pitch - half_pitch) <= math.hypot(pitch_ci, half_pitch_ci))
+        agree.append(abs(height - half_height) <= math.hypot(height_ci, half_height_ci))
+        assert (pitch, height) == pytest.approx((4.6, 1.4), rel=0.02)
+        assert (half_pitch, half_height) == pytest.approx((4.6, 1.4), rel=0.02)
+    assert sum(agree) >= 0.9 * len(agree)  # of 95 % intervals
 
 
 BAD = {

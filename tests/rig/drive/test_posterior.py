@@ -10,6 +10,7 @@ from rollcli.rig.drive.quantity import assess_sequence, gross_outliers
 from tests.rig.drive.series import ar1, drive
 
 FRAMES = 40
+FACTORS = len(TUNING.error_factors)
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +25,7 @@ def cells():
 def covariance_of(cells, place, noise):
     """The covariance of one noise of the grid, written out."""
     spreads = np.geomspace(*TUNING.spreads, TUNING.spread_steps)
-    spread, (factor, _) = spreads[noise // 5], TUNING.error_factors[noise % 5]
+    spread, (factor, _) = spreads[noise // FACTORS], TUNING.error_factors[noise % FACTORS]
     distance = np.abs(cells.centres[:, None] - cells.centres)
     return spread**2 * TUNING.correlations[place] ** distance + factor * np.diag(cells.variances)
 
@@ -39,7 +40,9 @@ def test_each_noise_has_the_fit_of_statsmodels_and_the_likelihood_of_scipy(cells
     assert fit.covariance[place, noise] == pytest.approx(oracle.normalized_cov_params, rel=1e-6)
     left = multivariate_normal(oracle.fittedvalues, covariance).logpdf(cells.values)
     level = np.linalg.slogdet(np.linalg.inv(oracle.normalized_cov_params))[1]
-    expected = left - level / 2 + np.log(TUNING.error_factors[noise % 5][1])
+    spread = np.geomspace(*TUNING.spreads, TUNING.spread_steps)[noise // FACTORS]
+    prior = np.log(TUNING.error_factors[noise % FACTORS][1]) + TUNING.spread_power * np.log(spread)
+    expected = left - level / 2 + prior
     constant = len(cells.values) / 2 * np.log(2 * np.pi) + np.log(cells.variances).sum() / 2
     assert fit.log_evidence[place, noise] == pytest.approx(expected + constant, rel=1e-6)
 
