@@ -9,7 +9,7 @@ import pytest
 from rollcli.simulate.build import build_scene, render_frame, road_camber, true_disparity
 from rollcli.simulate.road import draw_carriageway
 from rollcli.simulate.scene import draw_light
-from rollcli.simulate.spec import FrameSpec
+from rollcli.simulate.spec import FrameSpec, Stream
 from rollcli.simulate.surfaces import Ground
 
 SMALL = {"size": (320, 240), "focal": 186.0, "crossfall": 0.04}
@@ -19,7 +19,7 @@ BENT, STRAIGHT = 4, 2  # seeds of an open road
 
 def drawn_road(spec):
     """The carriageway that the frame's random numbers stand for."""
-    rng = spec.scene_rng()
+    rng = spec.rng(Stream.SCENE)
     draw_light(rng)
     return draw_carriageway(rng, spec)
 

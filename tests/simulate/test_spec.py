@@ -8,7 +8,7 @@ import pytest
 
 from rollcli.errors import UsageError
 from rollcli.simulate.build import render_frame
-from rollcli.simulate.options import SCENES
+from rollcli.simulate.options import SCENES, SimulateOptions
 from rollcli.simulate.spec import FrameSpec, draw_specs
 
 TINY = {"size": (64, 48), "focal": 37.0}
@@ -90,7 +90,7 @@ def test_the_right_camera_is_above_the_road_just_when_the_baseline_leaves_room(p
 
 
 def test_without_ranges_the_documented_ones_are_drawn():
-    specs = draw_specs(3000, seed=8, cross_section="crown")
+    specs = draw_specs(SimulateOptions(frames=3000, seed=8, cross_section="crown"))
     for values, low, high in (
         (np.degrees([spec.roll for spec in specs]), -10, 10),
         (np.degrees([spec.pitch for spec in specs]), -2, 6),
@@ -107,35 +107,41 @@ def test_without_ranges_the_documented_ones_are_drawn():
 @pytest.mark.parametrize(
     "wrong",
     [
-        {"n": 0},
+        {"frames": 0},
+        {"scene": "beach"},
         {"seed": -1},
-        {"roll": (0.2, 0.1)},
-        {"height": (0.3, 0.3), "roll": (-1.0, 1.0)},
+        {"roll_deg": (2.0, 1.0)},
+        {"roll_deg": (-91.0, 1.0)},
+        {"pitch_deg": (0.0, 61.0)},
+        {"height": (0.3, 0.3), "roll_deg": (-57.0, 57.0)},
+        {"height": (0.0, 1.6)},
         {"height": (1.7, 1.6)},
         {"principal_offset": (-400.0, 0.0)},
         {"principal_offset": (0.0, 400.0)},
-        {"gutter": (0.1, 0.0)},
+        {"crossfall": (2.0, 20.0)},
+        {"gutter": (10.0, 0.0)},
+        {"cross_section": "ridge"},
     ],
 )
 def test_draws_that_cannot_be_are_refused_before_anything_is_drawn(wrong):
     with pytest.raises(UsageError):
-        draw_specs(**{"n": 3, **wrong})
+        draw_specs(SimulateOptions(**{"frames": 3, **wrong}))
 
 
 def test_a_frame_is_the_same_however_many_are_drawn():
-    assert draw_specs(3, seed=5) == draw_specs(30, seed=5)[:3]
+    assert draw_specs(SimulateOptions(frames=3, seed=5)) == draw_specs(SimulateOptions(frames=30, seed=5))[:3]
 
 
 def test_other_seeds_and_other_frames_are_other_scenes():
-    first, second = draw_specs(2, scene="street", seed=5, **TINY)
-    third = draw_specs(1, scene="street", seed=6, **TINY)[0]
+    first, second = draw_specs(SimulateOptions(frames=2, scene="street", seed=5, **TINY))
+    third = draw_specs(SimulateOptions(frames=1, scene="street", seed=6, **TINY))[0]
     pictures = [render_frame(replace(each, roll=0.0, pitch=0.05)).left for each in (first, second, third)]
     assert not np.array_equal(pictures[0], pictures[1])
     assert not np.array_equal(pictures[0], pictures[2])
 
 
 def test_a_spec_gives_the_same_frame_each_time():
-    spec = draw_specs(1, scene="open", seed=3, **TINY)[0]
+    spec = draw_specs(SimulateOptions(frames=1, scene="open", seed=3, **TINY))[0]
     once, twice = render_frame(spec), render_frame(spec)
     assert once.left.tobytes() == twice.left.tobytes()
     assert once.right.tobytes() == twice.right.tobytes()
@@ -143,16 +149,25 @@ def test_a_spec_gives_the_same_frame_each_time():
 
 
 def test_mixed_draws_every_scene_and_only_a_bare_road_is_always_flat():
-    specs = draw_specs(400, seed=2)
+    specs = draw_specs(SimulateOptions(frames=400, seed=2))
     flat = {kind: np.mean([s.curvature == 0 for s in specs if s.scene == kind]) for kind in SCENES}
     assert flat.pop("bare") == 1
     assert all(0.3 < share < 0.7 for share in flat.values())
 
 
 def test_offsets_are_from_the_principal_point_that_is_given():
-    (spec,) = draw_specs(1, principal_point=(300.0, 200.0), principal_offset=(5.0, 5.0))
+    (spec,) = draw_specs(
+        SimulateOptions(frames=1, principal_point=(300.0, 200.0), principal_offset=(5.0, 5.0))
+    )
     assert spec.principal_point == (305.0, 205.0)
 
 
 def test_a_curvature_that_is_asked_for_holds_for_every_scene():
-    assert all(0.001 <= spec.curvature <= 0.002 for spec in draw_specs(40, curvature=(0.001, 0.002)))
+    assert all(
+        0.001 <= spec.curvature <= 0.002
+        for spec in draw_specs(SimulateOptions(frames=40, curvature=(0.001, 0.002)))
+    )
+
+
+def test_the_focal_length_follows_the_width():
+    assert draw_specs(SimulateOptions(frames=1, size=(1000, 300)))[0].focal == pytest.approx(580)

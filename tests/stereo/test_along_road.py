@@ -11,6 +11,7 @@ from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.road.find import road_plane
 from rollcli.files.formats import read_image
 from rollcli.simulate.build import render_frame, true_disparity
+from rollcli.simulate.options import SimulateOptions
 from rollcli.simulate.spec import FrameSpec, draw_specs
 from rollcli.stereo.match import StereoOptions, Wanted, match_pair
 
@@ -74,9 +75,8 @@ def assert_agree(pairs):
 
 
 def test_rendered_roads_get_the_angle_of_the_whole_match():
-    span = math.radians(10)
-    specs = draw_specs(6, roll=(-span, span), size=(640, 480), seed=17, colour=False)
-    frames = [render_frame(spec) for spec in specs]
+    asked = SimulateOptions(frames=6, size=(640, 480), seed=17, grey=True)
+    frames = [render_frame(spec) for spec in draw_specs(asked)]
     assert_agree([(frame.left, frame.right) for frame in frames])
 
 

@@ -6,6 +6,7 @@ import pytest
 
 from rollcli.errors import UsageError
 from rollcli.simulate.build import render_frame
+from rollcli.simulate.options import SimulateOptions
 from rollcli.simulate.spec import draw_specs
 from rollcli.stereo.match import compute_disparity
 from rollcli.stereo.options import MODES, StereoOptions
@@ -121,7 +122,10 @@ def test_below_the_first_disparity_searched_there_is_no_data(views, mode, first)
 @pytest.mark.parametrize("mode", MODES)
 def test_matched_roads_lie_where_they_are(mode):
     off = []
-    for spec in draw_specs(3, scene="bare", roll=(-0.1, 0.1), pitch=(0.05, 0.1), seed=31, colour=False):
+    asked = SimulateOptions(
+        frames=3, scene="bare", roll_deg=(-5.7, 5.7), pitch_deg=(2.9, 5.7), seed=31, grey=True
+    )
+    for spec in draw_specs(asked):
         frame = render_frame(spec)
         found = compute_disparity(frame.left, frame.right, mode=mode)
         road = frame.road & (found > 0) & (abs(found - frame.disparity) < 1)

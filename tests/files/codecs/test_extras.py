@@ -1,7 +1,6 @@
 """With the extras `fast` and `tiff` files read the same, number for number and word for word, only faster."""
 
 import zlib
-from functools import partial
 from itertools import cycle
 from random import Random
 
@@ -10,12 +9,9 @@ import numpy as np
 import pytest
 
 from rollcli.errors import InputError
-from rollcli.files.codecs import png
-from rollcli.files.codecs import png as fast_png
-from rollcli.files.codecs import tiff as tiff_parts
-from rollcli.files.codecs import tiff as unpack
+from rollcli.files.codecs import png, tiff
 from rollcli.files.formats import decode_image, decode_mask, decode_stored
-from tests.binary_files import disparity_map, make_tiff, png_file, png_header
+from tests.binary_files import disparity_map, make_png, make_tiff, png_file, png_header, png_rows
 from tests.fuzz.corpus import corpus
 from tests.fuzz.mutations import at_random, every_region, with_repairs
 
@@ -44,8 +40,7 @@ def plain(monkeypatch):
     def read(data):
         with monkeypatch.context() as patch:
             patch.setattr(png, "decode_grey16", lambda *_: None)
-            for module in (unpack, tiff_parts):
-                patch.setattr(module, "imagecodecs", lambda: None)
+            patch.setattr(tiff, "imagecodecs", lambda: None)
             return outcome(data)
 
     return read
@@ -60,10 +55,17 @@ def imagecodecs():
 def installed(request, monkeypatch):
     """What of the extra `fast` is there, one after the other."""
     if request.param == "nothing":
-        monkeypatch.setattr(fast_png, "imagecodecs", lambda: None)
+        monkeypatch.setattr(png, "imagecodecs", lambda: None)
     else:
         pytest.importorskip("imagecodecs", reason="the extra fast is not installed")
     return request.param
+
+
+def decoded(values, filters):
+    """Decode a file whose rows have these filters, one after the other; the options do not reach OpenCV."""
+    height, width = values.shape
+    plain = filtered(values, filters)
+    return png.decode_grey16(zlib.compress(plain), width, height)
 
 
 def grey_file(width, height, packed):
@@ -85,6 +87,22 @@ def filtered(values, filters):
         rows.append(bytes([kind]) + ((row - predicted) % 256).astype(np.uint8).tobytes())
         before = row
     return b"".join(rows)
+
+
+@pytest.mark.parametrize("filters", [[0], [1], [2], [3], [4], [0, 1], [1, 4, 0, 3, 2], [1] * 30 + [4]])
+@pytest.mark.parametrize("shape", [(37, 53), (1, 1), (1, 200), (200, 1), (60, 700)])
+def test_rows_of_every_filter_read_as_opencv_reads_them(installed, shape, filters):
+    values = np.random.default_rng(1).integers(0, 2**16, shape, dtype=np.uint16)
+    file = grey_file(*shape[::-1], zlib.compress(filtered(values, filters)))
+    np.testing.assert_array_equal(cv2.imdecode(np.frombuffer(file, np.uint8), cv2.IMREAD_UNCHANGED), values)
+
+    found = decoded(values, filters)
+
+    assert (found is None) == (installed == "nothing" or max(filters[: shape[0]]) > 1)
+    if found is not None:
+        assert (found.dtype, found.flags.c_contiguous, found.flags.writeable) == (np.uint16, True, True)
+        np.testing.assert_array_equal(found, values)
+    np.testing.assert_array_equal(decode_stored(file, "x").values, values)
 
 
 def test_what_opencv_writes_needs_no_opencv_to_be_read(imagecodecs, monkeypatch):
@@ -119,9 +137,29 @@ NO_SUCH_FILTER = zlib.compress(b"\5" + PLAIN[1:])
 )
 def test_data_that_are_not_just_the_rows_are_left_to_opencv(installed, plain, packed):
     height, width = DEEP.shape
-    assert fast_png.decode_grey16(packed, width, height, partial(grey_file, width, height)) is None
+    assert png.decode_grey16(packed, width, height) is None
     file = grey_file(width, height, packed)
     assert outcome(file) == plain(file)
+
+
+def test_only_16_bits_of_grey_are_read_so(monkeypatch):
+    asked = []
+    monkeypatch.setattr(png, "decode_grey16", lambda *_: asked.append(1))
+
+    for file in (make_png(DEEP), make_png(DEEP, interlace=True), make_png(DEEP % 256, 8)):
+        decode_stored(file, "x")
+
+    assert len(asked) == 1
+
+
+@pytest.mark.parametrize("damage", ["cut", "checksum"])
+def test_half_an_image_is_never_taken(installed, damage):
+    packed = zlib.compress(png_rows(DEEP, 16))
+    packed = packed[: len(packed) // 2] if damage == "cut" else packed[:-1] + bytes([packed[-1] ^ 1])
+
+    assert png.decode_grey16(packed, 53, 37) is None
+    with pytest.raises(InputError, match="damaged PNG"):
+        decode_stored(grey_file(53, 37, packed), "x")
 
 
 @pytest.mark.parametrize("name", FILES)
@@ -146,26 +184,3 @@ def test_imagecodecs_undoes_the_predictor_of_every_float(imagecodecs, plain, kin
     file = make_tiff(disparity_map().astype(kind), "deflate", order, 3, rows_per_strip=10)
 
     assert outcome(file) == plain(file)
-
-
-def decoded(values, filters):
-    """Decode a file whose rows have these filters, one after the other; the options do not reach OpenCV."""
-    height, width = values.shape
-    plain = filtered(values, filters)
-    return fast_png.decode_grey16(zlib.compress(plain), width, height, partial(grey_file, width, height))
-
-
-@pytest.mark.parametrize("filters", [[0], [1], [2], [3], [4], [0, 1], [1, 4, 0, 3, 2], [1] * 30 + [4]])
-@pytest.mark.parametrize("shape", [(37, 53), (1, 1), (1, 200), (200, 1), (60, 700)])
-def test_rows_of_every_filter_read_as_opencv_reads_them(installed, shape, filters):
-    values = np.random.default_rng(1).integers(0, 2**16, shape, dtype=np.uint16)
-    file = grey_file(*shape[::-1], zlib.compress(filtered(values, filters)))
-    np.testing.assert_array_equal(cv2.imdecode(np.frombuffer(file, np.uint8), cv2.IMREAD_UNCHANGED), values)
-
-    found = decoded(values, filters)
-
-    assert (found is None) == (installed == "nothing")
-    if found is not None:
-        assert (found.dtype, found.flags.c_contiguous, found.flags.writeable) == (np.uint16, True, True)
-        np.testing.assert_array_equal(found, values)
-    np.testing.assert_array_equal(decode_stored(file, "x").values, values)
