@@ -42,6 +42,11 @@ def say_unexpected(error: BaseException) -> None:
             sys.stderr.write(f"{printable(without_secrets(line))}\n")
 
 
+def one_line(text: str) -> str:
+    """Return a text in one line, with single spaces."""
+    return " ".join(text.split())
+
+
 def without_secrets(text: str) -> str:
     """Leave out the passwords and the queries of web addresses, and signatures wherever they are."""
     return _SIGNATURE.sub(r"\1", _ADDRESS.sub(r"\1\2", text))

@@ -13,7 +13,7 @@ import click
 
 from rollcli import __version__
 from rollcli.errors import ExitStatus, InputError, RollcliError, UsageError
-from rollcli.messages import say
+from rollcli.messages import one_line, say
 
 OPENCV = (
     "opencv-python-headless",
@@ -129,13 +129,13 @@ def exit_status(program: Callable[[], Any]) -> int:
     try:
         status = program()
     except click.ClickException as error:
-        say(" ".join(_with_hint(error).split()))
+        say(one_line(_with_hint(error)))
         return error.exit_code
     except (click.Abort, KeyboardInterrupt):
         say("interrupted")
         return ExitStatus.INTERRUPTED
     except RollcliError as error:
-        say(" ".join(str(error).split()))
+        say(one_line(str(error)))
         return ExitStatus.USAGE if isinstance(error, UsageError | InputError) else ExitStatus.FAILED
     except MemoryError:
         say("out of memory")

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from rollcli.files.results import Row
-from rollcli.messages import without_secrets
+from rollcli.messages import one_line, without_secrets
 from rollcli.rig.calibration import Calibration
 
 
@@ -119,15 +119,14 @@ def failed_frame(frame: Frame, reason: str, cause: str = "") -> FrameResult:
 
     `cause` is its code; by default, the reason names no frame and is the code itself.
     """
-    message, left, right = (
-        " ".join(text.split()) for text in (without_secrets(reason), frame.file, frame.right_file)
-    )
-    about, view = frame.file, ""
+    message, about, view = one_line(without_secrets(reason)), frame.file, ""
     # one image may hold both views
-    views = {left: ""} if right in ("", left) else {right: "right image: ", left: "left image: "}
-    for name in views:
-        if message.startswith(f"{name}: "):
-            about, view, message = name, views[name], message.removeprefix(f"{name}: ")
+    names = {frame.file: ""}
+    if frame.right_file not in ("", frame.file):
+        names = {frame.right_file: "right image: ", frame.file: "left image: "}
+    for name, called in names.items():
+        if message.startswith(f"{one_line(name)}: "):
+            about, view, message = name, called, message.removeprefix(f"{one_line(name)}: ")
             break
     row = Row(frame.file, frame.right_file, "error", message=view + message)
     return FrameResult(row, cause=cause or reason, said=f"{about}: {message}")

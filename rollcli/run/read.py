@@ -20,6 +20,7 @@ from rollcli.files.encodings import Encoding, read_mask, to_disparity
 from rollcli.files.formats import Stored, read_image, read_stored
 from rollcli.files.results import ALIGNMENT_COLUMNS
 from rollcli.files.storage import state_of
+from rollcli.messages import one_line
 from rollcli.run.diagnosis import require_positive, too_large
 from rollcli.run.frame import Frame, FrameResult, failed_frame
 from rollcli.run.options import FrameOptions, MethodOptions, RegionOptions
@@ -64,7 +65,7 @@ class Provenance:
             0 <= error < math.inf and isinstance(doubt, str) and all(map(math.isfinite, alignment.values()))
         ):
             return Provenance()
-        return Provenance(error, " ".join(doubt.split()), alignment)
+        return Provenance(error, one_line(doubt), alignment)
 
 
 Corner = tuple[float, float]

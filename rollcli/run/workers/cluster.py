@@ -21,7 +21,7 @@ from rollcli.extras import require_extra
 from rollcli.files.atomic import is_file, is_there, write_atomic
 from rollcli.files.storage import remove
 from rollcli.files.stores.locations import is_url
-from rollcli.messages import say
+from rollcli.messages import one_line, say
 from rollcli.run.workers.chunks import LONGEST_ON_CLUSTER_S, Chunk, Done, Result, Task, Work
 from rollcli.run.workers.in_order import SharedPaths
 from rollcli.run.workers.pool import prepare_worker
@@ -395,7 +395,7 @@ def _problems(client: Any, shared: SharedPaths, workers: Collection[str]) -> tup
     unable = f"cannot run rollcli {__version__}: "
     silent = {worker for worker, answer in answers.items() if isinstance(answer, OSError)}
     problems = {
-        worker: answer if isinstance(answer, str) else unable + " ".join(str(answer).split())
+        worker: answer if isinstance(answer, str) else unable + one_line(str(answer))
         for worker, answer in answers.items()
         if answer and worker not in silent
     }
