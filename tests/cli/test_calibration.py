@@ -115,7 +115,7 @@ def test_a_map_at_half_the_size_uses_the_scaled_calibration(maps):
 
 def test_downscaled_pairs_have_the_pose_of_the_full_size(tmp_path):
     rig = {"pitch_deg": (4.6, 4.6), "height": (1.4, 1.4), "principal_offset": (-30.0, 30.0)}
-    asked, agree = SimulateOptions(frames=5, scene="open", curvature=(0, 0), seed=6, grey=True, **rig), []
+    asked, agree = SimulateOptions(frames=10, scene="open", curvature=(0, 0), seed=6, grey=True, **rig), []
     for number, spec in enumerate(draw_specs(asked)):
         folder, frame = tmp_path / str(number), render_frame(spec)
         for side, image in (("left", frame.left), ("right", frame.right)):
@@ -132,7 +132,7 @@ def test_downscaled_pairs_have_the_pose_of_the_full_size(tmp_path):
         agree.append(abs(height - half_height) <= math.hypot(height_ci, half_height_ci))
         assert (pitch, height) == pytest.approx((4.6, 1.4), rel=0.02)
         assert (half_pitch, half_height) == pytest.approx((4.6, 1.4), rel=0.02)
-    assert sum(agree) >= 0.9 * len(agree)  # of 95 % intervals
+    assert sum(agree) >= 17  # of twenty, where 95 % agree, 98 % have as many
 
 
 BAD = {
