@@ -108,7 +108,9 @@ class Levelled:
         return smoothed_at_pixels(left[rows]), warped
 
 
-def match_for_road(pair: Levelled, search: Search, rows: slice, find_road: FindRoad | None) -> Map:
+def match_for_road(
+    pair: Levelled, search: Search, rows: slice, find_road: FindRoad | None, *, whole: bool = False
+) -> Map:
     """Match what an estimate needs: the road, and what lies beside and above it at a part of the size.
 
     Parameters
@@ -119,6 +121,8 @@ def match_for_road(pair: Levelled, search: Search, rows: slice, find_road: FindR
         Rows that are needed; elsewhere the map may hold no data.
     find_road : callable or None
         Finds the road in a small map of the pair; None: everything is matched at full size.
+    whole : bool
+        Whether what lies beside and above the road is matched at full size, too.
 
     Returns
     -------
@@ -128,21 +132,30 @@ def match_for_road(pair: Levelled, search: Search, rows: slice, find_road: FindR
     first, count, options = search
     small = None if find_road is None or first < 0 else _match_coarsely(pair, search)
     plane = None if small is None or find_road is None else find_road(small)
-    if small is None or plane is None:
+
+    def match_all(rows: slice) -> Map:
         return without_lag(match_rows(pair.whole, first, count, options, rows), options.mode)
+
+    if small is None or plane is None:
+        return match_all(rows)
     start, stop, _ = rows.indices(pair.shape[0])
     plane = _resized(plane, small.shape, pair.shape)
     top = min(max(start, _first_row(plane, pair.shape)), stop)
     coarse = resampled(small, pair.shape)
     narrow = options.is_default and pair.shape[0] >= _LEAST_HEIGHT
     near = _match_along(pair, plane, slice(top, stop), coarse) if narrow else None
+    if whole:
+        disparity = match_all(rows)
+        if near is not None:
+            np.copyto(disparity[top:stop], near.disparity, where=near.found & near.lies_on)
+        return disparity
     disparity = np.zeros_like(coarse)
     disparity[start:top] = coarse[start:top]
-    if near is not None:
-        disparity[top:stop] = near
-        return disparity
-    disparity[top:stop] = match_rows(pair.whole, first, count, options, slice(top, stop))[top:stop]
-    return without_lag(disparity, options.mode)
+    if near is None:
+        disparity[top:stop] = match_rows(pair.whole, first, count, options, slice(top, stop))[top:stop]
+        return without_lag(disparity, options.mode)
+    disparity[top:stop] = near.beside(coarse[top:stop])
+    return disparity
 
 
 def _match_coarsely(pair: Levelled, search: Search) -> Map | None:
@@ -170,7 +183,29 @@ def _first_row(plane: Plane, shape: tuple[int, ...]) -> int:
     return int(max(0.0, min(horizon - _SPARE, _MOST_ABOVE * shape[0])))
 
 
-def _match_along(pair: Levelled, plane: Plane, rows: slice, coarse: Map) -> Map | None:
+class _Near(NamedTuple):
+    """Rows that were matched along a plane; arrays of their shape.
+
+    Attributes
+    ----------
+    disparity : ndarray of float32
+        Pixels.
+    found : ndarray of bool
+        Where there is one.
+    lies_on : ndarray of bool
+        Where the small map is near the plane.
+    """
+
+    disparity: Map
+    found: NDArray[np.bool_]
+    lies_on: NDArray[np.bool_]
+
+    def beside(self, coarse: Map) -> Map:
+        """Return these rows, off the plane with the disparities of the small map."""
+        return np.where(self.lies_on | (coarse <= 0), self.disparity * self.found, coarse)
+
+
+def _match_along(pair: Levelled, plane: Plane, rows: slice, coarse: Map) -> _Near | None:
     """Match some rows along a plane; None where too little of the `coarse` map is found there again."""
     height, width = pair.shape
     top, bottom = max(0, rows.start - MARGIN), min(height, rows.stop + MARGIN)
@@ -197,8 +232,7 @@ def _match_along(pair: Levelled, plane: Plane, rows: slice, coarse: Map) -> Map 
     found = np.count_nonzero(lies_on & known & (np.abs(seen - disparity) < np.float32(_AS_FAR)))
     if on < max(1, _FEWEST_ON * np.count_nonzero(seen)) or found < _FEWEST_FOUND * on:
         return None
-    disparity *= known
-    return np.where(lies_on | (seen <= 0), disparity, seen)
+    return _Near(disparity, known, lies_on)
 
 
 def _match_blocks(views: Views, count: int) -> NDArray[np.int16]:

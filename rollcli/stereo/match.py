@@ -1,5 +1,6 @@
 """Disparity maps from stereo pairs: views levelled, range found, then one semi-global match."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -10,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError
+from rollcli.estimator.request import MAX_ROLL_DEG
+from rollcli.estimator.road.find import road_plane
 from rollcli.stereo.alignment import (
     Approach,
     Measured,
@@ -20,7 +23,7 @@ from rollcli.stereo.alignment import (
     seen_from_right,
     textured_share,
 )
-from rollcli.stereo.along_road import FindRoad, Levelled, Search, match_for_road
+from rollcli.stereo.along_road import FindRoad, Levelled, Plane, Search, match_for_road
 from rollcli.stereo.columns import with_believed_columns
 from rollcli.stereo.correction import CONTRADICTS
 from rollcli.stereo.first_look import FirstLook, first_look, look_for_range
@@ -224,7 +227,12 @@ def compute_disparity(
         align,
         vertical_offset,
     )
-    return match_pair(left, right, options).disparity
+    match = match_pair(left, right, options, Wanted(road=_plane_of_road, whole=True))
+    return match.disparity if match.whole is None else match.whole
+
+
+def _plane_of_road(small: Map) -> Plane | None:
+    return road_plane(small, None, math.radians(MAX_ROLL_DEG), 0)
 
 
 def match_pair(
@@ -288,7 +296,7 @@ def match_pair(
     valid = cv2.countNonZero(matched)
     whole = None
     if wanted.whole and wanted != _EVERYTHING._replace(whole=True):
-        whole = finished(match_for_road(levelled(corrected), search, ALL_ROWS, None))
+        whole = finished(match_for_road(levelled(corrected), search, ALL_ROWS, wanted.road, whole=True))
     return StereoMatch(
         disparity=finished(matched),
         whole=whole,

@@ -13,7 +13,7 @@ from rollcli.files.formats import read_image
 from rollcli.simulate.build import render_frame, true_disparity
 from rollcli.simulate.options import SimulateOptions
 from rollcli.simulate.spec import FrameSpec, draw_specs
-from rollcli.stereo.match import StereoOptions, Wanted, match_pair
+from rollcli.stereo.match import StereoOptions, Wanted, compute_disparity, match_pair
 
 LIDAR = Path(__file__).parents[2].parent / "shared" / "lidar"
 SPEC = FrameSpec(scene="street", roll=math.radians(4), size=(640, 480), seed=3)
@@ -84,6 +84,18 @@ def test_rendered_roads_get_the_angle_of_the_whole_match():
 def test_real_roads_get_the_angle_of_the_whole_match():
     named = sorted((LIDAR / "left").iterdir())[::6]
     assert_agree([(read_image(str(left)), read_image(str(LIDAR / "right" / left.name))) for left in named])
+
+
+def test_a_map_of_everything_gives_the_angle_of_the_pair():
+    """Its road is matched along the plane, too; what is beside it differs, and where nothing was found."""
+    asked = SimulateOptions(frames=8, size=(640, 480), seed=18, grey=True)
+    agree = []
+    for frame in map(render_frame, draw_specs(asked)):
+        match = match_pair(frame.left, frame.right, StereoOptions(), ROAD)
+        along = estimate_roll(match.disparity, slope_error=match.slope_error)
+        whole = estimate_roll(compute_disparity(frame.left, frame.right), slope_error=match.slope_error)
+        agree.append(abs(along.theta - whole.theta) <= along.ci95 / 2)
+    assert sum(agree) >= 7
 
 
 @pytest.mark.parametrize(("lower", "clockwise_deg"), [(3.0, 0.0), (0.0, 0.4), (-1.5, -0.3)])
