@@ -161,7 +161,8 @@ def steadied(heights: NDArray[np.float32]) -> NDArray[np.float32]:
 
     For heights of matched pairs: semi-global matching draws disparities towards whole pixels, on a road in
     bands of a few rows. Over the road their median is level where that of disparities would not be, and the
-    edge of a kerb stays where it is. On rendered pairs it turns 6.2 mm at 10 m into 3.9 mm.
+    edge of a kerb stays where it is. On rendered pairs it turns 3.6 mm at 10 m into 3.3 mm,
+    where most of the road is matched along its plane and has no bands.
     """
     known = np.isfinite(heights)
     medians = cv2.medianBlur(np.where(known, heights, np.float32(0)), _STEADIED)

@@ -1,4 +1,4 @@
-"""Disparity maps from stereo pairs: views levelled, range found, then one semi-global match."""
+"""Disparity maps from stereo pairs: range found, views levelled, then one match."""
 
 import math
 from collections.abc import Callable
@@ -206,6 +206,11 @@ def compute_disparity(
         The images differ in size, are too small to match, are swapped, or do not show the same scene.
     UsageError
         An option makes no sense.
+
+    Notes
+    -----
+    Everything is matched by OpenCV's SGBM. Where a road is found and no option says how to match, its
+    disparities are those of a match along its plane, as in `rollcli.estimate_pair`.
 
     Examples
     --------
