@@ -79,9 +79,11 @@ class Search(NamedTuple):
 class Levelled:
     """A pair whose right view is levelled when it is resampled: whole, smaller, or along a plane."""
 
-    def __init__(self, views: Views, lies: Misalignment, near: Callable[[], Map | None]) -> None:
-        """Take views as they were given, how the right one lies, and how to get its disparities."""
-        self.shape = views[0].shape
+    def __init__(
+        self, views: Views, lies: Misalignment, near: Callable[[], Map | None], search: Search
+    ) -> None:
+        """Take views as given, how the right one lies, how to get its disparities, and the search."""
+        self.shape, self.search = views[0].shape, search
         self._views, self._lies, self._near = views, lies, near if lies.tilt else lambda: None
 
     @cached_property
@@ -89,10 +91,17 @@ class Levelled:
         """Both views at their size."""
         return self._views[0], level(self._views[1], self._lies, self._near())
 
-    def smaller(self, factor: float) -> Views:
-        """Return both views, `factor` times smaller."""
-        left, right = shrink_both(self._views, factor)
-        return left, level(right, self._lies.resized(1 / factor), self._near())
+    @cached_property
+    def coarse(self) -> Map | None:
+        """The map at a third of the size; None where it would be too narrow."""
+        left, right = shrink_both(self._views, _SMALLER)
+        views = left, level(right, self._lies.resized(1 / _SMALLER), self._near())
+        first, options = self.search.first // _SMALLER, self.search.options
+        width = -(-self.search.width // _SMALLER)
+        count = usable_range(width, first, left.shape[1], options.block_size)
+        if count < NARROWEST:
+            return None
+        return match_views(views, first, count, options.for_smaller(_SMALLER))
 
     def along(self, plane: Map, middle: int, rows: slice) -> Views:
         """Return some rows of both views, the right one warped so that a plane lies at a disparity `middle`.
@@ -108,15 +117,12 @@ class Levelled:
         return smoothed_at_pixels(left[rows]), warped
 
 
-def match_for_road(
-    pair: Levelled, search: Search, rows: slice, find_road: FindRoad | None, *, whole: bool = False
-) -> Map:
+def match_for_road(pair: Levelled, rows: slice, find_road: FindRoad | None, *, whole: bool = False) -> Map:
     """Match what an estimate needs: the road, and what lies beside and above it at a part of the size.
 
     Parameters
     ----------
     pair : Levelled
-    search : Search
     rows : slice
         Rows that are needed; elsewhere the map may hold no data.
     find_road : callable or None
@@ -129,8 +135,8 @@ def match_for_road(
     ndarray of float32, shape (H, W)
         Pixels; no data is 0.
     """
-    first, count, options = search
-    small = None if find_road is None or first < 0 else _match_coarsely(pair, search)
+    first, count, options = pair.search
+    small = None if find_road is None or first < 0 else pair.coarse
     plane = None if small is None or find_road is None else find_road(small)
 
     def match_all(rows: slice) -> Map:
@@ -156,16 +162,6 @@ def match_for_road(
         return without_lag(disparity, options.mode)
     disparity[top:stop] = near.beside(coarse[top:stop])
     return disparity
-
-
-def _match_coarsely(pair: Levelled, search: Search) -> Map | None:
-    """Match at a third of the size."""
-    views = pair.smaller(_SMALLER)
-    first, options = search.first // _SMALLER, search.options
-    count = usable_range(-(-search.width // _SMALLER), first, views[0].shape[1], options.block_size)
-    if count < NARROWEST:
-        return None
-    return match_views(views, first, count, options.for_smaller(_SMALLER))
 
 
 def _resized(plane: Plane, shape: tuple[int, ...], to: tuple[int, ...]) -> Plane:
