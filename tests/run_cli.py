@@ -82,26 +82,31 @@ def started(*arguments: str | Path, cwd: Path, **how: Any) -> "subprocess.Popen[
 
 # a worker that reads a certain map says so, and comes back from it when it may
 _HELD = """
-import pathlib, sys, time
-if "spawn_main" in " ".join(sys.orig_argv):
-    import rollcli.files.formats as formats
-    read = formats.read_stored
-    def read_stored(path, name=None, **how):
-        if pathlib.Path(path).stem == "STEM":
-            pathlib.Path("has-begun").touch()
-            while not pathlib.Path("may-go-on").exists():
-                time.sleep(0.01)
-        return read(path, name, **how)
-    formats.read_stored = read_stored
+import multiprocessing, pathlib, time
+import rollcli.files.formats as formats
+read = formats.read_stored
+def read_stored(path, name=None, **how):
+    if pathlib.Path(path).stem == "STEM" and multiprocessing.parent_process():
+        pathlib.Path("has-begun").touch()
+        while not pathlib.Path("may-go-on").exists():
+            time.sleep(0.01)
+    return read(path, name, **how)
+formats.read_stored = read_stored
 """
 
 
 def holding(folder: Path, stem: str) -> dict[str, str]:
     """The environment in which workers hold the map of this stem, from `has-begun` to `may-go-on`."""
+    return hooked(folder, _HELD.replace("STEM", stem))
+
+
+def hooked(folder: Path, code: str) -> dict[str, str]:
+    """The environment in which every process runs some code as it starts, as Python's `sitecustomize`."""
     hook = folder / "hook"
     hook.mkdir()
-    (hook / "sitecustomize.py").write_text(_HELD.replace("STEM", stem))
-    return environment(PYTHONPATH=os.pathsep.join([str(hook), str(ROOT)]))
+    (hook / "sitecustomize.py").write_text(code)
+    # NumPy loads before the program can limit its threads
+    return environment(PYTHONPATH=os.pathsep.join([str(hook), str(ROOT)]), OPENBLAS_NUM_THREADS="1")
 
 
 _HALF = """

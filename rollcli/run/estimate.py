@@ -28,9 +28,6 @@ from rollcli.run.workers.tasks import require_scheduler, run_joined, started_ear
 
 def load_estimator() -> None:
     """Load what a worker needs for frames, before it gets one."""
-    from rollcli.run.workers.pool import prepare_worker
-
-    prepare_worker()
     import rollcli.run.estimate_frame  # noqa: F401 (to have loaded it)
 
 

@@ -115,7 +115,7 @@ class Run:
             lines = {int(pid): Path(f"/proc/{pid}/cmdline").read_bytes() for pid in children.split()}
         except OSError:
             return []
-        return [pid for pid, line in lines.items() if b"spawn_main" in line]
+        return [pid for pid, line in lines.items() if b"resource_tracker" not in line]
 
     def has_begun(self) -> bool:
         """Whether it handles the signals by now: what comes before that, Python or the system answers."""

@@ -13,11 +13,11 @@ import pytest
 
 from rollcli.files.results import parse_rows
 from tests.run_cli import (
-    ROOT,
     command,
     contents,
     environment,
     holding,
+    hooked,
     python,
     rollcli,
     started,
@@ -187,30 +187,27 @@ def test_a_closed_standard_output_is_an_error_in_one_line(maps):
     assert done.stderr == "rollcli: standard output: is closed\n"
 
 
-# Python imports sitecustomize as it starts: in a worker, reading certain maps then kills it
-SITECUSTOMIZE = """
-import os, pathlib, signal, sys
-if "spawn_main" in " ".join(sys.orig_argv):
-    import rollcli.files.formats as formats
-    read = formats.read_stored
-    def read_stored(path, name=None, **how):
-        deaths = list(pathlib.Path(".").glob(f"died-of-{pathlib.Path(path).stem}-*"))
-        if pathlib.Path(path).stem in DEADLY and len(deaths) < TIMES:
-            pathlib.Path(f"died-of-{pathlib.Path(path).stem}-{os.getpid()}").touch()
-            os.kill(os.getpid(), signal.SIGKILL)
-        return read(path, name, **how)
-    formats.read_stored = read_stored
+# in a worker, reading certain maps kills it
+DEADLY_MAPS = """
+import multiprocessing, os, pathlib, signal
+import rollcli.files.formats as formats
+read = formats.read_stored
+def read_stored(path, name=None, **how):
+    stem = pathlib.Path(path).stem
+    deaths = list(pathlib.Path(".").glob(f"died-of-{stem}-*"))
+    if stem in DEADLY and len(deaths) < TIMES and multiprocessing.parent_process():
+        pathlib.Path(f"died-of-{stem}-{os.getpid()}").touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return read(path, name, **how)
+formats.read_stored = read_stored
 """
 ESTIMATE = ("estimate", "maps", "-j2", "-o", "rolls.csv", "-q")
 
 
 def run_with_deaths(maps, deadly, times, arguments=ESTIMATE):
     """A run in which reading certain frames kills the worker, so many times each."""
-    (maps / "hook").mkdir()
-    settings = f"DEADLY, TIMES = {deadly!r}, {times}\n"
-    (maps / "hook" / "sitecustomize.py").write_text(settings + SITECUSTOMIZE)
-    path = os.pathsep.join([str(maps / "hook"), str(ROOT)])
-    return rollcli(*arguments, cwd=maps, PYTHONPATH=path)
+    hook = f"DEADLY, TIMES = {deadly!r}, {times}\n{DEADLY_MAPS}"
+    return rollcli(*arguments, cwd=maps, **hooked(maps, hook))
 
 
 def test_a_worker_that_dies_once_costs_nothing(maps):
@@ -245,19 +242,19 @@ def test_a_map_that_kills_its_worker_twice_is_not_derotated_and_the_others_are(m
 
 # the first worker that gives an image of a certain frame its name dies just before or after it
 DEADLY_NAMES = """
-import os, pathlib, signal, sys
-if "spawn_main" in " ".join(sys.orig_argv):
-    def deadly(give_name):
-        def give(source, target, **options):
-            first = FRAME in str(target) and not pathlib.Path("died").exists()
-            if first:
-                pathlib.Path("died").touch()
-            if not first or AFTER:
-                give_name(source, target, **options)
-            if first:
-                os.kill(os.getpid(), signal.SIGKILL)
-        return give
-    os.link, os.replace, os.rename = map(deadly, (os.link, os.replace, os.rename))
+import multiprocessing, os, pathlib, signal
+def deadly(give_name):
+    def give(source, target, **options):
+        in_worker = FRAME in str(target) and multiprocessing.parent_process()
+        first = in_worker and not pathlib.Path("died").exists()
+        if first:
+            pathlib.Path("died").touch()
+        if not first or AFTER:
+            give_name(source, target, **options)
+        if first:
+            os.kill(os.getpid(), signal.SIGKILL)
+    return give
+os.link, os.replace, os.rename = map(deadly, (os.link, os.replace, os.rename))
 """
 WRITE_IMAGES = {
     "estimate": ("frame3", "estimate maps -o out/rolls.csv --derotated out/up --vdisparity out/v"),
@@ -274,11 +271,9 @@ def test_a_worker_that_dies_while_it_writes_an_image_leaves_nothing_behind(maps,
     expected = contents(maps / "out")
     shutil.rmtree(maps / "out")
     (maps / "out").mkdir()
-    (maps / "hook").mkdir()
-    (maps / "hook" / "sitecustomize.py").write_text(f"FRAME, AFTER = {frame!r}, {after}\n{DEADLY_NAMES}")
-    path = os.pathsep.join([str(maps / "hook"), str(ROOT)])
+    hook = f"FRAME, AFTER = {frame!r}, {after}\n{DEADLY_NAMES}"
 
-    done = rollcli(*line.split(), "-j2", cwd=maps, PYTHONPATH=path)
+    done = rollcli(*line.split(), "-j2", cwd=maps, **hooked(maps, hook))
 
     assert (maps / "died").exists()
     assert done.status == 0, done.err
@@ -299,16 +294,12 @@ def cannot_start(maps, **how):
 
 
 def test_too_few_open_files_for_workers_end_the_run_in_one_line(maps):
-    limit = partial(resource.setrlimit, resource.RLIMIT_NOFILE, (14, 14))
+    limit = partial(resource.setrlimit, resource.RLIMIT_NOFILE, (10, 10))
     assert "Too many open files" in cannot_start(maps, env=environment(), preexec_fn=limit)
 
 
 def test_a_worker_that_cannot_load_its_libraries_ends_the_run_in_one_line(maps):
-    hook = "import sys\nif 'spawn_main' in ' '.join(sys.orig_argv): sys.modules['cv2'] = None\n"
-    (maps / "hook").mkdir()
-    (maps / "hook" / "sitecustomize.py").write_text(hook)
-    path = os.pathsep.join([str(maps / "hook"), str(ROOT)])
-    assert "cv2" in cannot_start(maps, env=environment(PYTHONPATH=path))
+    assert "cv2" in cannot_start(maps, env=hooked(maps, "import sys\nsys.modules['cv2'] = None\n"))
 
 
 def test_workers_end_with_a_run_that_is_killed_also_in_the_middle_of_a_frame(maps):

@@ -195,7 +195,8 @@ def workers_of(run):
         ["ps", "-A", "-ww", "-o", "ppid=,pid=,args="], capture_output=True, text=True, check=True
     ).stdout.splitlines()
     found = [line.split(None, 2) for line in listed]
-    return [int(pid) for parent, pid, args in found if int(parent) == run.pid and "spawn_main" in args]
+    children = {int(pid): args for parent, pid, args in found if int(parent) == run.pid}
+    return [pid for pid, args in children.items() if "resource_tracker" not in args]
 
 
 def test_sigterm_stops_a_run_as_ctrl_c_does(undisturbed, folder):

@@ -3,9 +3,11 @@
 import contextlib
 import os
 import signal
+import subprocess
 import sys
 import threading
 import time
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -19,6 +21,7 @@ from rollcli.run.workers.interrupt import Stop, stop_signals
 from rollcli.run.workers.pool import PoolExecutor, prepare_worker
 from rollcli.run.workers.tasks import require_scheduler, run_tasks
 from tests.run.workers.tasks import lost, run
+from tests.run_cli import environment
 
 WORK = Work(run, lost)
 
@@ -178,8 +181,7 @@ def test_a_system_that_starts_no_process_is_said_with_a_remedy(monkeypatch):
     def fail():
         raise OSError(24, "Too many open files")
 
-    spawn = SimpleNamespace(Pipe=fail)
-    monkeypatch.setattr(pools.multiprocessing, "get_context", lambda kind: {"spawn": spawn}[kind])
+    monkeypatch.setattr(pools.multiprocessing, "get_context", lambda kind: SimpleNamespace(Pipe=fail))
     with pytest.raises(
         WorkerError,
         match=r"^a worker process cannot start: .*Too many open files; try fewer of them, with --jobs$",
@@ -215,3 +217,30 @@ def test_workers_that_were_started_early_do_the_tasks_and_those_too_many_end():
     assert not any(process.is_alive() for process in processes.values())
     with runs.started_early(1, prepare_worker) as none:
         assert none == []
+
+
+HOW_IT_STARTS = """
+import sys, threading
+from pathlib import Path
+from rollcli.run.workers.pool import Worker
+if __name__ == "__main__":
+    if "threads" in sys.argv:
+        threading.Thread(target=threading.Event().wait, daemon=True).start()
+    worker = Worker()
+    print(b"spawn_main" in Path(f"/proc/{worker._process.pid}/cmdline").read_bytes())
+    worker.kill()
+    worker.join()
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="only Linux tells its threads")
+def test_a_process_with_one_thread_is_forked_and_one_with_more_is_not(tmp_path):
+    (tmp_path / "start.py").write_text(HOW_IT_STARTS)
+
+    def spawned(*arguments):
+        line = [sys.executable, "start.py", *arguments]
+        how = {"capture_output": True, "text": True, "check": True}
+        return subprocess.run(line, cwd=tmp_path, env=environment(OPENBLAS_NUM_THREADS="1"), **how).stdout
+
+    assert spawned() == "False\n"
+    assert spawned("threads") == "True\n"
