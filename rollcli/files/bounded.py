@@ -28,8 +28,10 @@ def too_large(name: str, size: int | None, most: int, within: str = "") -> Input
     return InputError(f"{name}: has {has} bytes; up to {in_words(most)} are read{within}")
 
 
-def state_of(path: str) -> tuple[str, int, int]:
-    """Return the path, size and time of change, ns, of a file that stays open: it may be replaced.
+def state_of(path: str) -> tuple[str, int, int, int]:
+    """Return path, size, time of change (ns) and process: what tells whether a file that is open is still it.
+
+    A fork shares the place that its parent's files are read at, and needs its own.
 
     Raises
     ------
@@ -40,7 +42,7 @@ def state_of(path: str) -> tuple[str, int, int]:
         found = os.stat(path)  # noqa: PTH116
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from None
-    return path, found.st_size, found.st_mtime_ns
+    return path, found.st_size, found.st_mtime_ns, os.getpid()
 
 
 def read_given(path: str | Path, most: int = MOST_BYTES) -> bytes:

@@ -224,6 +224,6 @@ def _zip(path: str) -> zipfile.ZipFile:
         raise InputError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from None
 
 
-@lru_cache(maxsize=4)  # its directory is read once by each worker; it changes with size and time
-def _opened_zip(path: str, size: int, modified_ns: int) -> zipfile.ZipFile:
+@lru_cache(maxsize=4)  # its directory is read once by each worker
+def _opened_zip(path: str, size: int, modified_ns: int, process: int) -> zipfile.ZipFile:
     return zipfile.ZipFile(path)

@@ -61,7 +61,7 @@ def state_of(location: str) -> str:
     if is_url(location):
         return ""
     try:
-        _, size, time_ns = bounded.state_of(file_of(location))
+        _, size, time_ns, _ = bounded.state_of(file_of(location))
     except (InputError, ValueError):
         return ""
     return f"{size} {time_ns}"

@@ -13,7 +13,7 @@ from rollcli.errors import InputError, UsageError
 from rollcli.files.containers import file_of, members, shown
 from rollcli.files.search import Search
 from rollcli.files.storage import read_bytes
-from tests.run_cli import road_map, rollcli, write_maps, write_pair
+from tests.run_cli import contents, road_map, rollcli, write_kitti, write_maps, write_pair
 
 
 def packed(folder, archive):
@@ -48,6 +48,17 @@ def test_an_archive_gives_the_rows_of_its_folder(tmp_path, name):
     assert listed[0] == f"read  {name}#maps/frame0.png"
     again = rollcli("estimate", f"{name}#maps/frame1.png", cwd=tmp_path)
     assert rows(again.out)[0]["roll_deg"] == whole[1]["roll_deg"]
+
+
+def test_workers_that_were_forked_from_one_process_read_an_archive_each_for_itself(tmp_path):
+    for number in range(24):
+        write_kitti(tmp_path / "all" / f"{number}.png", road_map(width=640, height=480, seed=number))
+    packed(tmp_path / "all", tmp_path / "run.zip")
+    line = ("derotate", "run.zip", "--roll", "2", "-q")
+    assert rollcli(*line, "-j", "1", "-o", "one", cwd=tmp_path).status == 0
+    done = rollcli(*line, "-j", "6", "-o", "six", cwd=tmp_path)
+    assert (done.status, done.err) == (0, "")
+    assert contents(tmp_path / "six") == contents(tmp_path / "one")
 
 
 def test_a_run_over_an_archive_is_resumed_until_the_archive_changes(tmp_path):

@@ -394,7 +394,7 @@ class _Sqlite:
         return Message(self._names.get(row[0], ""), int(row[1]), place, memoryview(row[2]))
 
 
-@lru_cache(maxsize=4)  # a process opens a bag once; it changes with size and time
-def opened(path: str, size: int, modified_ns: int) -> Bag:
-    """Open a bag, or return the one that is open; `size` and `modified_ns` tell whether it is the same."""
+@lru_cache(maxsize=4)  # a process opens a bag once
+def opened(path: str, size: int, modified_ns: int, process: int) -> Bag:
+    """Open a bag, or return the one that is open; see `bounded.state_of`."""
     return open_bag(path)

@@ -201,8 +201,8 @@ def _opened(path: str) -> Bag:
 
 
 @lru_cache(maxsize=4)  # for a bag without an index they are known once it is read
-def _known_topics(path: str, size: int, modified_ns: int) -> dict[str, Topic]:
-    return opened(path, size, modified_ns).topics()
+def _known_topics(path: str, size: int, modified_ns: int, process: int) -> dict[str, Topic]:
+    return opened(path, size, modified_ns, process).topics()
 
 
 @lru_cache(maxsize=2)  # for names without a place, such as those of a result that is drawn

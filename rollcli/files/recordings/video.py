@@ -51,7 +51,7 @@ def look_through(path: str, name: str) -> Video:
 
 
 @lru_cache(maxsize=4)
-def _look_through(path: str, size: int, modified_ns: int, name: str) -> Video:
+def _look_through(path: str, size: int, modified_ns: int, process: int, name: str) -> Video:
     decoder = _Decoder(path, name, threads=os.cpu_count() or 1)
     count = 0
     while decoder.grab():
@@ -115,7 +115,7 @@ def read_video_frame(path: str, frame: str, name: str) -> bytes:
 
 
 @lru_cache(maxsize=4)  # both of a pair, and those of another drive
-def _decoder(path: str, size: int, modified_ns: int) -> "_Decoder":
+def _decoder(path: str, size: int, modified_ns: int, process: int) -> "_Decoder":
     return _Decoder(path, path, threads=1)
 
 
