@@ -85,6 +85,7 @@ class Levelled:
         """Take views as given, how the right one lies, how to get its disparities, and the search."""
         self.shape, self.search = views[0].shape, search
         self._views, self._lies, self._near = views, lies, near if lies.tilt else lambda: None
+        self._roads: dict[tuple[int, int], _Near | None] = {}
 
     @cached_property
     def whole(self) -> Views:
@@ -102,6 +103,13 @@ class Levelled:
         if count < NARROWEST:
             return None
         return match_views(views, first, count, options.for_smaller(_SMALLER))
+
+    def road(self, plane: Plane, rows: slice, coarse: Map) -> "_Near | None":
+        """Match some rows along the road's plane, once: a map of everything takes the same ones."""
+        key = rows.start, rows.stop
+        if key not in self._roads:
+            self._roads[key] = _match_along(self, plane, rows, coarse)
+        return self._roads[key]
 
     def along(self, plane: Map, middle: int, rows: slice) -> Views:
         """Return some rows of both views, the right one warped so that a plane lies at a disparity `middle`.
@@ -149,7 +157,7 @@ def match_for_road(pair: Levelled, rows: slice, find_road: FindRoad | None, *, w
     top = min(max(start, _first_row(plane, pair.shape)), stop)
     coarse = resampled(small, pair.shape)
     narrow = options.is_default and pair.shape[0] >= _LEAST_HEIGHT
-    near = _match_along(pair, plane, slice(top, stop), coarse) if narrow else None
+    near = pair.road(plane, slice(top, stop), coarse) if narrow else None
     if whole:
         disparity = match_all(rows)
         if near is not None:
