@@ -40,9 +40,9 @@ class TaskProgress:
         if not self._quiet and sys.stderr.isatty():
             from tqdm import tqdm  # loaded only where a person reads it
 
-            self._bar = tqdm(
-                total=self.total, initial=self.kept, unit=" frames", leave=False, **_terminal_size()
-            )
+            tqdm.monitor_interval = 0  # its thread would keep workers from being forked
+            how: dict[str, Any] = {"unit": " frames", "leave": False, "miniters": 1, **_terminal_size()}
+            self._bar = tqdm(total=self.total, initial=self.kept, **how)
         return self
 
     def __exit__(
