@@ -64,7 +64,17 @@ def read_stream(file: BinaryIO, name: str, most: int = MOST_BYTES) -> bytes:
     most, size = _limit_of(file, most)
     if size > most:
         raise too_large(name, size, most)
-    data = file.read(most + 1)
+    return read_rest(file, name, size, most)
+
+
+def read_rest(file: BinaryIO, name: str, size: int, most: int) -> bytes:
+    """Return the bytes of a file that says that it has `size`, or 0 where it does not: see `read_given`.
+
+    Asked for `most`, Python takes memory for that many first, which costs four times the reading.
+    """
+    data = file.read(size + 1)
+    if len(data) > size:  # it has grown, or says no size
+        data += file.read(most + 1 - len(data))
     if len(data) > most:
         raise too_large(name, None, most)
     return data

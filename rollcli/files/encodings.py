@@ -370,11 +370,11 @@ def _plateau(values: NDArray[Any], end: Callable[[NDArray[Any]], Any]) -> list[A
     least, ends, counts = _PLATEAU.share * values.size, list[Any](), list[int]()
     while len(ends) < 3 and values.size:
         ends.append(end(values))
-        rest = values[values != ends[-1]]
-        counts.append(values.size - rest.size)
+        beyond = values != ends[-1]
+        counts.append(values.size - int(np.count_nonzero(beyond)))
         if counts[0] < least:
             return []
-        values = rest
+        values = values[beyond]
     if len(ends) < 3:  # of a map of a few numbers, shares tell nothing
         return []
     of_one, of_two = (counts[place] > _PLATEAU.times * counts[place + 1] for place in (0, 1))

@@ -17,7 +17,7 @@ from typing import NamedTuple
 from rollcli.errors import InputError, OutputError
 from rollcli.files import bounded
 from rollcli.files.atomic import NameTakenError, in_threads, output_error, write_atomic
-from rollcli.files.bounded import MOST_BYTES, too_large
+from rollcli.files.bounded import MOST_BYTES, read_rest, too_large
 from rollcli.files.containers import file_of, read_member
 from rollcli.files.stores import objects
 from rollcli.files.stores.locations import WEB_SERVERS, is_url, public_name, scheme_of
@@ -326,9 +326,7 @@ def _read_file(path: str, name: str, most: int = MOST_BYTES, begins: Beginning =
             if begins is not None and status.st_size > _HEAD:
                 begins(file.read(_HEAD), status.st_size, name)
                 file.seek(0)
-            data = file.read(most + 1)
-            if len(data) > most:  # it has grown, or lies in a file system that says no sizes
-                raise too_large(name, None, most)
+            data = read_rest(file, name, status.st_size, most)
     except IsADirectoryError:
         raise InputError(f"{name}: is a folder, not a file") from None
     except FileNotFoundError:
