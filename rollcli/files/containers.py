@@ -14,12 +14,16 @@ import zlib
 from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from rollcli.errors import InputError, UsageError, as_usage
 from rollcli.files.atomic import is_file, is_folder
 from rollcli.files.bounded import most_unpacked, state_of, too_large
 from rollcli.files.naming import natural_key
 from rollcli.files.stores.locations import is_url
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 ARCHIVES = (".zip", ".tar")
 BAGS = (".bag", ".db3", ".mcap")
@@ -137,8 +141,10 @@ def _tar_members(path: str) -> Iterator[tuple[str, str]]:
         raise UsageError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from None
 
 
-def read_member(location: str, name: str, most: int) -> bytes | None:
-    """Return the bytes of an archive's member; None where the location is a file of its own.
+def read_member(location: str, name: str, most: int) -> "bytes | NDArray[Any] | None":
+    """Return the bytes of an archive's member, the pixels of a recording's frame (see `recordings`).
+
+    None: the location is a file of its own.
 
     Raises
     ------
@@ -163,7 +169,7 @@ def read_member(location: str, name: str, most: int) -> bytes | None:
         raise InputError(f"{name}: cannot be read: {(error.strerror or str(error)).lower()}") from None
 
 
-def _read_bag(path: str, member: str, name: str) -> bytes:
+def _read_bag(path: str, member: str, name: str) -> "bytes | NDArray[Any]":
     from rollcli.files.recordings.frames import broken_part, read_frame
 
     if member == "rest":

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from rollcli.errors import InputError, UsageError
 from rollcli.files.codecs import arrays, pictures, png, tiff
 from rollcli.files.codecs.raw_map import Stored as Stored
-from rollcli.files.codecs.raw_map import native
-from rollcli.files.storage import read_bytes
+from rollcli.files.codecs.raw_map import native, require_map_shape
+from rollcli.files.storage import read_frame
 
 
 class MapFormat(NamedTuple):
@@ -79,9 +79,14 @@ def read_stored(path: str | Path, name: str | None = None, *, rgb: bool = False)
 
     `rgb`: they are in the three channels of a PNG, as FoundationStereo writes them.
     """
+    name = name or str(path)
+    data = read_frame(path, name, begins=None if rgb else _check_beginning)
     if rgb:
-        return MAP_FORMATS["rgb"].decode(read_bytes(path, name), name or str(path))
-    return decode_stored(read_bytes(path, name, begins=_check_beginning), name or str(path))
+        return MAP_FORMATS["rgb"].decode(data if isinstance(data, bytes) else b"", name)
+    if isinstance(data, bytes):
+        return decode_stored(data, name)
+    require_map_shape(data.shape, name)  # of a recording
+    return Stored(data, "npy")
 
 
 def decode_stored(data: bytes, name: str) -> Stored:
@@ -143,7 +148,13 @@ def encode_stored(
 
 def read_image(path: str | Path, name: str | None = None) -> NDArray[Any]:
     """Read a camera image; errors call it `name`, by default its path. See `decode_image`."""
-    return decode_image(read_bytes(path, name), name or str(path))
+    name = name or str(path)
+    data = read_frame(path, name)
+    if isinstance(data, bytes):
+        return decode_image(data, name)
+    if data.dtype not in (np.uint8, np.uint16):  # of a recording
+        raise InputError(f"{name}: holds {data.dtype}; a camera image is uint8 or uint16")
+    return data
 
 
 def decode_image(data: bytes, name: str) -> NDArray[Any]:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextvars import ContextVar
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rollcli.errors import InputError, OutputError
 from rollcli.files import bounded
@@ -21,6 +21,9 @@ from rollcli.files.bounded import MOST_BYTES, read_rest, too_large
 from rollcli.files.containers import file_of, read_member
 from rollcli.files.stores import objects
 from rollcli.files.stores.locations import WEB_SERVERS, is_url, public_name, scheme_of
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 Beginning = Callable[[bytes, int, str], None] | None
 _HEAD = 2**16  # bytes: the header of an array
@@ -44,7 +47,7 @@ _notes: ContextVar[dict[str, Note] | None] = ContextVar("notes", default=None)
 
 @contextlib.contextmanager
 def noting() -> Iterator[dict[str, Note]]:
-    """Take a note of each location that this thread reads in the block by `read_bytes`."""
+    """Take a note of each location that this thread reads in the block by `read_frame`."""
     notes: dict[str, Note] = {}
     token = _notes.set(notes)
     try:
@@ -56,7 +59,7 @@ def noting() -> Iterator[dict[str, Note]]:
 def state_of(location: str) -> str:
     """Return size and time of a file, or of the file that a frame lies in; empty where nothing tells them.
 
-    Of an object, `read_bytes` notes the entity tag, which listings have too (`objects.list_tags`).
+    Of an object, `read_frame` notes the entity tag, which listings have too (`objects.list_tags`).
     """
     if is_url(location):
         return ""
@@ -67,10 +70,24 @@ def state_of(location: str) -> str:
     return f"{size} {time_ns}"
 
 
-def read_bytes(
+def read_bytes(location: str | Path, name: str | None = None, *, most: int = MOST_BYTES) -> bytes:
+    """Return the bytes of a file or an object; see `read_frame`.
+
+    Raises
+    ------
+    InputError
+        Also where it is a frame of a recording, which is in no file.
+    """
+    data = read_frame(location, name, most=most)
+    if not isinstance(data, bytes):
+        raise InputError(f"{name or public_name(str(location))}: is a frame of a recording, and no file")
+    return data
+
+
+def read_frame(
     location: str | Path, name: str | None = None, *, most: int = MOST_BYTES, begins: Beginning = None
-) -> bytes:
-    """Return the bytes of a file or an object.
+) -> "bytes | NDArray[Any]":
+    """Return the bytes of a file or an object, or the pixels of a recording's frame.
 
     Parameters
     ----------
@@ -93,15 +110,17 @@ def read_bytes(
     name = name or public_name(location)
     notes = _notes.get()
     state = "" if notes is None else state_of(location)  # before the bytes: a change amid them shows
+    data: bytes | NDArray[Any]
     if is_url(location):
         data, state = _read_url(location, most)
     else:
         inside = read_member(location, name, most) if "#" in location else None
-        data = _read_file(location, name, most, begins) if inside is None else inside
-    if not data:
+        data = inside if inside is not None else _read_file(location, name, most, begins)
+    if len(data) == 0:
         raise InputError(f"{name}: is empty")
     if notes is not None:
-        notes[location] = Note(state, len(data), zlib.crc32(data))
+        content: Any = data
+        notes[location] = Note(state, memoryview(content).nbytes, zlib.crc32(content))
     return data
 
 

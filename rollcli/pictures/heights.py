@@ -12,10 +12,13 @@ so that the point's distance from it is (1 - (g + doffs) / (d + doffs)) / |q| = 
 with the plane's rise per pixel along the road. For a flat road this is H (1 - g / d), exactly. On a road of
 curvature k the foot lies h tan(pitch) from where the plane touches, which leaves k (h tan(pitch))^2 / 2: at a
 curvature of 0.01 1/m and a pitch of 10 degrees 0.4 mm for a point 1.5 m above the road.
+
+A road of constant curvature k is no parabola of disparities: its row is c0 + c1 d + c2 / d, with c2 = -k fx
+fy B / 2. So the lane's profile is fitted once more, by how far its rows are off the parabola.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import cv2
@@ -34,6 +37,22 @@ Singles = NDArray[np.float32]
 _BLOCK = 1 << 16  # pixels at a time: what they need stays in the processor's cache
 _FLATTEST = 0.2  # of the rise near ahead: a parabola that is flatter is no road, which then goes on straight
 _STEADIED = 5  # pixels: the side of what a median is of, that of the default block of matching
+# of the lane's profile
+_HALF_LANE = 0.8  # camera heights to each side: of a lane's width dips and cars leave most
+_FAR = 8.0  # times as far as at the bottom: beyond, what the parabola leaves is kept as it is there
+_OVER = 0.14  # of that range, nearer than the bottom's middle: the corners of rolled maps
+_BINS, _LEAST_BINS, _LEAST_PIXELS = (
+    32,
+    12,
+    12,
+)  # in equal steps of log d; those that are needed, and pixels in one
+_SAMPLED = 125, 125  # rows and columns: twice as many move no height by 0.1 mm
+# how far off the profile the road may be, camera heights at twice the bottom's distance and before, beyond it
+# in proportion: at first what a parabola leaves on the steepest hills, then half of a kerb
+_TOLERANCES = 0.12, 0.02
+_LEAST_SPREAD = 0.02  # px along the road
+_ROUNDS = 6  # of a fit
+_PER_PX = 32  # steps of the table of a profile
 METRES, CAMERA_HEIGHTS = "metres", "camera heights"
 
 
@@ -103,7 +122,8 @@ def height_map(
     Returns
     -------
     ndarray of float32, shape (H, W)
-        Along the road's normal, over the fitted parabola with roll and camber; positive: above it. Metres,
+        Along the road's normal, over the fitted road with roll and camber; positive: above it. Along the lane
+        the parabola is fitted once more to this map, for hills that are none. Metres,
         or without a calibration that has a baseline, camera heights: of the camera over the road at twice
         the distance of the nearest road that the map's middle shows. NaN where there is no disparity, and
         everywhere where the estimate's disparity does not grow downward: that is no road.
@@ -149,10 +169,12 @@ def heights_over(
     if profile is None:
         return heights
     measured = calibration if unit_of(calibration) == METRES else None
-    over = _Heights(road, profile, measured)
+    over = _Heights(road, profile.along(disparity, road), measured)
+    columns = np.arange(road.width, dtype=np.float32)
     step = max(1, _BLOCK // road.width)
     for top in range(0, road.height, step):
-        over.fill(disparity[top : top + step], top, heights[top : top + step])
+        rows = np.arange(top, min(top + step, road.height), dtype=np.float32)
+        over.fill(disparity[top : top + step], rows, columns, heights[top : top + step])
     return heights
 
 
@@ -172,12 +194,16 @@ def steadied(heights: NDArray[np.float32]) -> NDArray[np.float32]:
 
 @dataclass(frozen=True)
 class _Profile:
-    """The road along its middle, about a row near ahead: d = disparity + rise y + bend y^2, px."""
+    """The road along its middle, about a row near ahead: d = disparity + rise y + bend y^2, px.
+
+    `further` is how many px further down the road has each disparity than that, in steps of 1 / `_PER_PX` px.
+    """
 
     row: float
     disparity: float
     rise: float
     bend: float
+    further: Singles | None = None
 
     @classmethod
     def of(cls, road: FittedRoad) -> "_Profile | None":
@@ -198,17 +224,69 @@ class _Profile:
         row = centre + (2 * (half - c0) / (c1 + rise) if c1 > 0 else (rise - c1) / (2 * a2))
         return cls(row, half, rise, a2)
 
+    def along(self, disparity: NDArray[Any], road: FittedRoad) -> "_Profile":
+        """Fit what the parabola leaves of the lane's profile in a map.
+
+        In bins of distance it is the median across the lane, which dips, kerbs and cars do not move. Through
+        these goes 1, d, 1/d, d^2 with Tukey's weights: that is a hill, and too stiff for a dip.
+        """
+        d, side, gap = self._sampled(disparity, road)
+        bottom = 2 * self.disparity
+        share = 1 - np.log(bottom / d) / math.log(_FAR)
+        near = (np.abs(side) < _HALF_LANE) & (share > 0) & (share < 1 + _OVER)
+        d, gap = d[near], gap[near]
+        place = (share[near] * (_BINS / (1 + _OVER))).astype(np.intp)
+        middles = bottom * _FAR ** ((np.arange(_BINS) + 0.5) * ((1 + _OVER) / _BINS) - 1)
+        scaled = np.maximum(1, bottom / (2 * middles)) * middles / self.rise
+        design, weights = _profile_basis(middles / bottom), np.zeros(_BINS)
+        fitted, left = np.zeros(4), gap
+        for tolerance in _TOLERANCES:
+            close = np.abs(left) < (tolerance * scaled)[place]
+            medians, found = _medians(place[close], left[close])
+            if np.count_nonzero(found) < _LEAST_BINS:
+                return self
+            more, weights = _steady_fit(design, medians, found)
+            fitted = fitted + more
+            left = gap - (design @ fitted)[place]
+        (used,) = np.nonzero(weights > 0)
+        steps = np.arange(math.ceil(middles[used[-1]] * _PER_PX) + 1) + 0.5
+        kept = np.clip(steps / _PER_PX, middles[used[0]], middles[used[-1]])
+        return replace(self, further=(_profile_basis(kept / bottom) @ -fitted).astype(np.float32))
+
+    def _sampled(self, disparity: NDArray[Any], road: FittedRoad) -> tuple[Singles, Singles, Singles]:
+        """Return disparity, place across in camera heights and px above the parabola of some pixels."""
+        down, right = (max(1, side // few) for side, few in zip(disparity.shape, _SAMPLED, strict=True))
+        some = disparity[::down, ::right]
+        rows = np.arange(0, road.height, down, dtype=np.float32)
+        columns = np.arange(0, road.width, right, dtype=np.float32)
+        heights = np.empty(some.shape, np.float32)
+        over = _Heights(road, self, None)
+        over.fill(some, rows, columns, heights)
+        known = np.isfinite(heights)
+        d = some[known].astype(np.float32)
+        side = over.across(columns, rows[:, None])[known] * np.float32(_centre_rise(road)) / d
+        return d, side, heights[known] * d / np.float32(self.rise)
+
     def at(self, disparity: Singles) -> tuple[Singles, Singles]:
         """Return the rows, px from this one, where the road has these disparities, and its rise there."""
+        foot, rise = self._on_parabola(disparity)
+        if self.further is not None:
+            last = len(self.further) - 1
+            steps = disparity * np.float32(_PER_PX)
+            foot += self.further.take(np.minimum(steps, np.float32(last), out=steps).astype(np.intp))
+        return foot, rise
+
+    def _on_parabola(self, disparity: Singles) -> tuple[Singles, Singles]:
         rise = disparity - np.float32(self.disparity)
         if not self.bend:
             foot = rise / np.float32(self.rise)
             rise.fill(self.rise)
             return foot, rise
         end = np.float32((_FLATTEST**2 - 1) * self.rise**2 / (4 * self.bend))
-        bent = np.maximum(rise, end) if self.bend > 0 else np.minimum(rise, end)
-        rise -= bent
-        straight = rise if rise.any() else None
+        bent, straight = rise, None
+        if rise.min() < end if self.bend > 0 else rise.max() > end:
+            bent = np.maximum(rise, end) if self.bend > 0 else np.minimum(rise, end)
+            straight = rise - bent
         rise = bent * np.float32(4 * self.bend)
         rise += np.float32(self.rise**2)
         np.sqrt(rise, out=rise)
@@ -216,6 +294,43 @@ class _Profile:
         if straight is not None:
             bent += straight / rise
         return bent, rise
+
+
+def _profile_basis(x: NDArray[Any]) -> NDArray[Any]:
+    """Return 1, x, 1/x, x^2 of disparities, shape (N, 4)."""
+    return np.stack([np.ones_like(x), x, 1 / x, x * x], axis=1)
+
+
+def _medians(place: NDArray[np.intp], values: Singles) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Return the medians of values in bins, and which bins have enough of them."""
+    spread = 2 * float(np.abs(values).max(initial=0)) + 1
+    ordered = np.sort(place * spread + values)  # one sort of all
+    bounds = np.searchsorted(place := np.sort(place), np.arange(_BINS + 1))
+    found = np.diff(bounds) >= _LEAST_PIXELS
+    medians = np.zeros(_BINS)
+    (some,) = np.nonzero(found)
+    medians[some] = ordered[(bounds[some] + bounds[some + 1]) // 2] - some * spread
+    return medians, found
+
+
+def _steady_fit(
+    design: NDArray[np.float64], values: NDArray[np.float64], found: NDArray[np.bool_]
+) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Fit values by least absolute deviations, then by Tukey's weights, six spreads wide; return those, too.
+
+    Least squares would first follow a few bins at an end that lie on a kerb, and keep them.
+    """
+    weights, middle = found.astype(np.float64), np.count_nonzero(found) // 2
+    for round_ in range(_ROUNDS):
+        normal = (design * weights[:, None]).T
+        fitted = np.linalg.solve(normal @ design, normal @ values)
+        off = np.abs(values - design @ fitted)
+        if round_ < _ROUNDS // 2:
+            weights = found / np.maximum(off, _LEAST_SPREAD)
+            continue
+        spread = max(1.4826 * float(np.sort(off[found])[middle]), _LEAST_SPREAD)
+        weights = found * np.square(np.maximum(1 - np.square(off / (6 * spread)), 0))
+    return fitted, weights
 
 
 def _centre_along(road: FittedRoad) -> float:
@@ -241,8 +356,8 @@ class _Heights:
     profile: _Profile
     calibration: Calibration | None
 
-    def fill(self, stored: NDArray[Any], top: int, heights: Singles) -> None:
-        """Write the heights of some rows, from row `top` on."""
+    def fill(self, stored: NDArray[Any], rows: Singles, columns: Singles, heights: Singles) -> None:
+        """Write the heights of the pixels of some rows and columns."""
         d = stored.astype(np.float32)
         doffs = 0.0 if self.calibration is None else self.calibration.doffs
         known = d > max(0.0, -doffs)
@@ -250,9 +365,8 @@ class _Heights:
         unknown = ~known
         np.copyto(d, np.float32(self.profile.disparity), where=unknown)
         shifted = d + np.float32(doffs) if doffs else d
-        columns, rows = (np.arange(side, dtype=np.float32) for side in stored.shape[::-1])
-        rows = (rows + np.float32(top))[:, None]
-        camber = self._camber(d, self._across(columns, rows)) if self.road.camber else None
+        rows = rows[:, None]
+        camber = self._camber(d, self.across(columns, rows)) if self.road.camber else None
         foot, rise = self.profile.at(d if camber is None else d * camber.rest)
         if camber is not None:
             rise *= camber.root
@@ -267,7 +381,8 @@ class _Heights:
             np.divide(gap, length, out=heights)
         np.copyto(heights, np.float32(np.nan), where=unknown)
 
-    def _across(self, columns: Singles, rows: Singles) -> Singles:
+    def across(self, columns: Singles, rows: Singles) -> Singles:
+        """Return the place across the road of pixels, px from the map's middle."""
         centre = Grid.of_shape(self.road.height, self.road.width)
         cosine, sine = math.cos(self.road.theta), math.sin(self.road.theta)
         across: Singles = (columns - np.float32(centre.centre_u)) * np.float32(cosine) + (
@@ -318,7 +433,7 @@ class _Heights:
         if camber is not None:
             tilt = camber.side / rise
             tilt *= np.float32(self.road.camber * _centre_rise(self.road))
-            ahead += tilt * (self._across(*at) - camber.across)
+            ahead += tilt * (self.across(*at) - camber.across)
             leant = tilt * np.float32(cosine**2 + (aspect * sine) ** 2)
             if aspect != 1:
                 leant += np.float32(2 * (aspect**2 - 1) * cosine * sine)

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from rollcli.errors import InputError, RollcliError
-from rollcli.files.storage import Note, noting, read_bytes, state_of
+from rollcli.files.storage import Note, noting, read_frame, state_of
 from rollcli.files.stores.locations import is_object_url, is_url
 from rollcli.files.stores.objects import list_tags
 from rollcli.run.frame import Frame
@@ -84,7 +84,7 @@ def _read(paths: Iterable[str]) -> dict[str, Note]:
     with noting() as notes:
         for path in paths:
             try:
-                read_bytes(path)
+                read_frame(path)
             except InputError:
                 break
     return notes

@@ -80,13 +80,13 @@ def rendered(count: int, seed: int, *options: str) -> Iterator[tuple[Frame, roll
 
 
 def depths_off(truth: NDArray[np.float32], off: NDArray[np.float32]) -> Iterator[float]:
-    """Yield by how much the depth of each dip or bump is wrong, m."""
-    relief = (np.abs(truth) > 0.02) & (np.abs(truth) < KERB - 0.01) & np.isfinite(off)
+    """Yield by how much the depth of each dip or bump is wrong, m; not of verges that slope, beside kerbs."""
+    relief = (np.abs(truth) > 0.02) & np.isfinite(off)
     count, labels = cv2.connectedComponents(relief.astype(np.uint8))
     for label in range(1, count):
         of = labels == label
         deep = of & (np.abs(truth) > 0.9 * np.abs(truth[of]).max())
-        if np.abs(truth[of]).max() > 0.025 and deep.sum() >= 30:
+        if 0.025 < np.abs(truth[of]).max() < KERB - 0.01 and deep.sum() >= 30:
             yield float(abs(np.median(off[deep])))
 
 

@@ -125,6 +125,40 @@ def test_a_flattening_road_goes_on_straight():
     assert (np.diff(heights, axis=0) < 0).all()
 
 
+def road_over_a_hill(theta):
+    """Disparities and distances of a road that falls by 0.0015 z^2 m, and the rig: no parabola fits it."""
+    rig = Calibration(fx=400, fy=400, cx=CENTRE[0], cy=CENTRE[1], baseline=0.5)
+    v, u = np.mgrid[:HEIGHT, :WIDTH].astype(float)
+    along = (v - CENTRE[1]) * math.cos(theta) - (u - CENTRE[0]) * math.sin(theta)
+    sight = along / rig.fy + 0.1  # a pitch of 0.1, as a shift
+    root = np.sqrt(np.maximum(sight**2 - 0.009, 0))
+    depth = np.where(sight > 0.11, 3 / (sight + root), np.inf)  # the road is 1.5 m below the camera
+    return rig.fx * rig.baseline / depth, depth, rig
+
+
+@pytest.mark.parametrize("theta", [0, 0.1, -0.3])
+def test_a_hill_that_no_parabola_fits_is_level_and_a_dip_in_it_as_deep_as_it_is(theta):
+    d, depth, rig = road_over_a_hill(theta)
+    rng = np.random.default_rng(1)
+    seen = np.where(d > 0, d + rng.normal(0, 0.05, d.shape), 0)
+    estimate = rollcli.estimate_roll(seen, calibration=rig)
+    flat = rollcli.height_map(seen, estimate, rig)
+    v, u = np.mgrid[:HEIGHT, :WIDTH].astype(float)
+    across = (u - CENTRE[0]) * math.cos(theta) + (v - CENTRE[1]) * math.sin(theta)
+    with np.errstate(invalid="ignore"):
+        across *= depth / rig.fx
+    for near, far in ((5, 8), (8, 12), (12, 18)):  # the parabola alone leaves 0.5, 2 and 45 mm
+        lane = (depth > near) & (depth < far) & (np.abs(across) < 1.5)
+        assert abs(np.median(flat[lane])) < 0.001
+    dip = (depth > 7) & (depth < 8) & (np.abs(across - 0.5) < 0.3)
+    seen[dip] /= 1.03  # on the same rays, below the road at its distance
+    z = 1.03 * depth[dip]
+    below = 1.03 * (1.5 + 0.0015 * depth[dip] ** 2) - (1.5 + 0.0015 * z**2)
+    below *= np.cos(np.arctan(0.003 * z - 0.1))
+    lower = rollcli.height_map(seen, rollcli.estimate_roll(seen, calibration=rig), rig)
+    assert np.median(lower[dip] + below) == pytest.approx(0, abs=0.002)
+
+
 def test_a_row_of_a_result_has_the_road_of_its_estimate():
     v, u = np.mgrid[:120, :160]
     rig = Calibration(fx=200, fy=190, cx=79.5, cy=29.5, baseline=0.5)

@@ -7,9 +7,11 @@ number.
 """
 
 import bz2
+import contextlib
+import os
 import sqlite3
 import struct
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -19,6 +21,7 @@ from rollcli.errors import InputError
 from rollcli.files.bounded import MOST_BYTES, most_unpacked
 
 _BEGINNING = 64  # bytes: a header's time and more
+_PIECE = 2**16  # bytes that are unpacked at a time where the next header is looked for
 _MCAP, _BAG, _SQLITE = b"\x89MCAP0\r\n", b"#ROSBAG V2.0\n", b"SQLite format 3\0"
 
 
@@ -98,30 +101,140 @@ def _exactly(file: BinaryIO, count: int) -> bytes:
     return data
 
 
-def _unpacked(compression: str, data: memoryview, size: int) -> memoryview:
-    """Unpack a chunk, or what is there of it, to no more than it claims and its bytes may stand for."""
-    if compression in ("", "none"):
+class _Source:
+    """The bytes of a record, or of what a chunk holds, taken from their start to their end.
+
+    Attributes
+    ----------
+    size, left : int
+        How many bytes there are, and are left.
+    """
+
+    def __init__(self, size: int) -> None:
+        self.size = self.left = size
+
+    def take(self, count: int) -> memoryview:
+        """Return the next bytes."""
+        self._use(count)
+        data = self._next(count)
+        if len(data) != count:
+            raise _BrokenError
         return data
-    if not 0 <= size <= most_unpacked(len(data)):
+
+    def skip(self, count: int) -> None:
+        """Pass over the next bytes."""
+        self._use(count)
+        self._pass(count)
+
+    def _use(self, count: int) -> None:
+        if not 0 <= count <= self.left:
+            raise _BrokenError
+        self.left -= count
+
+    def _next(self, count: int) -> memoryview:
+        raise NotImplementedError
+
+    def _pass(self, count: int) -> None:
+        raise NotImplementedError
+
+
+class _InFile(_Source):
+    """What lies in the file as it is, from where the file stands; what is passed over is not read."""
+
+    def __init__(self, file: BinaryIO, size: int) -> None:
+        super().__init__(size)
+        self._file = file
+
+    def _next(self, count: int) -> memoryview:
+        return memoryview(self._file.read(count) if count <= MOST_BYTES else b"")
+
+    def _pass(self, count: int) -> None:
+        self._file.seek(count, os.SEEK_CUR)
+
+    def read(self, count: int) -> bytes:
+        """Return the next bytes as a file does: less where less is left."""
+        return bytes(self.take(min(count, self.left)))
+
+
+def _unpacker(compression: str, packed: Any, piece: int) -> Callable[[int], bytes]:
+    """Return what unpacks the next bytes of a chunk, so many at most, of a file's next pieces."""
+    decoder: Any
+    if compression == "bz2":
+        decoder = bz2.BZ2Decompressor()
+    elif compression == "lz4":
+        from lz4.frame import LZ4FrameDecompressor
+
+        decoder = LZ4FrameDecompressor()
+    elif compression == "zstd":
+        import zstandard
+
+        read: Callable[[int], bytes] = (
+            zstandard.ZstdDecompressor().stream_reader(packed, read_size=piece).read
+        )
+        return read
+    else:
         raise _BrokenError
-    found: bytes | bytearray = b""
-    try:
-        if compression == "bz2":
-            found = bz2.BZ2Decompressor().decompress(data, size)
-        elif compression == "lz4":
-            from lz4.frame import LZ4FrameDecompressor
 
-            found = LZ4FrameDecompressor().decompress(data, size)
-        elif compression == "zstd":
-            import zstandard
+    def unpack(most: int) -> bytes:
+        found = b""
+        while not found:
+            # what a decoder is given and does not need yet it would copy each time
+            data = packed.read(piece) if decoder.needs_input else b""
+            if not data and decoder.needs_input:
+                break
+            found = decoder.decompress(data, most)
+        return found
 
-            found = zstandard.ZstdDecompressor().stream_reader(data).read(size)
-    except Exception as error:  # each library has errors of its own
-        raise _BrokenError from error
-    return memoryview(found)
+    return unpack
+
+
+class _InMemory(_Source):
+    """What is unpacked as a whole; nothing of it is copied."""
+
+    def __init__(self, data: memoryview) -> None:
+        super().__init__(len(data))
+        self._data = data
+
+    def _next(self, count: int) -> memoryview:
+        end = self.size - self.left
+        return self._data[end - count : end]
+
+    def _pass(self, count: int) -> None:
+        pass
+
+
+class _Unpacked(_Source):
+    """A chunk that is unpacked as far as it is taken: what lies behind its last header is not."""
+
+    def __init__(self, unpack: Callable[[int], bytes], size: int) -> None:
+        super().__init__(size)
+        self._unpack, self._piece, self._ahead = unpack, memoryview(b""), 0
+
+    def _next(self, count: int) -> memoryview:
+        while self._ahead or len(self._piece) < count:
+            passed = min(self._ahead, len(self._piece))
+            self._ahead -= passed
+            kept = self._piece[passed:]
+            if not self._ahead and len(kept) >= count:
+                self._piece = kept
+                break
+            try:
+                more = self._unpack(max(_PIECE, count))
+            except Exception as error:  # each library has errors of its own
+                raise _BrokenError from error
+            if not more:
+                raise _BrokenError
+            self._piece = memoryview(bytes(kept) + more if kept else more)
+        data, self._piece = self._piece[:count], self._piece[count:]
+        return data
+
+    def _pass(self, count: int) -> None:
+        self._ahead += count
 
 
 _DAMAGED = (_BrokenError, struct.error, ValueError, KeyError, IndexError)
+_Wanted = Callable[[int, int], int]  # of a channel and a message's number: how many of its bytes to read
+_ALL = MOST_BYTES
 
 
 class _Records(NamedTuple):
@@ -140,7 +253,7 @@ class _Chunked:
         self._file = Path(path).open("rb")  # noqa: SIM115 (open as long as the process reads from it)
         self._size = Path(path).stat().st_size
         self._topics: dict[int, Topic] = {}
-        self._chunk = -1, _Records([], 0)
+        self._chunk = -1, memoryview(b"")
 
     def __del__(self) -> None:
         if hasattr(self, "_file"):
@@ -151,7 +264,7 @@ class _Chunked:
         try:
             index = self._index()
             while 0 < index < self._size:
-                found = self._record(index)
+                found = self._record(index, lambda *_: 0)
                 index = found.after if found.whole else 0
         except _DAMAGED:
             index = 0
@@ -161,35 +274,80 @@ class _Chunked:
         return {each.name: each for each in self._topics.values()}
 
     def messages(self, topics: set[str], begins: Collection[str] = ()) -> Iterator[Message]:
-        """Yield every whole message of some topics, in the order of the file."""
-        offset = self._start()
+        """Yield every whole message of some topics, in the file's order; of some the beginning will do."""
+
+        def wanted(channel: int, number: int) -> int:
+            topic = self._topics.get(channel)
+            if topic is None or topic.name not in topics:
+                return 0
+            return _BEGINNING if topic.name in begins else _ALL
+
+        offset, damaged = self._start(), -1
         try:
             while offset < self._size:
-                found = self._record(offset)
+                found = self._record(offset, wanted)
                 for number, (channel, time, data) in enumerate(found.messages):
-                    topic = self._topics.get(channel)
-                    if topic is not None and topic.name in topics:
-                        yield Message(topic.name, time, (offset, number), data)
+                    if wanted(channel, number):
+                        yield Message(self._topics[channel].name, time, (offset, number), data)
                 if not found.whole:
-                    raise _BrokenError
+                    if found.after > self._size:
+                        raise _BrokenError
+                    damaged = offset if damaged < 0 else damaged  # what follows the chunk may be whole
                 if found.after <= offset:  # the end of the messages
-                    return
+                    break
                 offset = found.after
         except _DAMAGED:
-            share = offset / max(self._size, 1)
+            damaged = offset if damaged < 0 else damaged
+        if damaged >= 0:
+            share = damaged / max(self._size, 1)
             self.broken = f"is damaged or cut off at {share:.0%} of its {self._size} bytes"
 
     def read(self, place: tuple[int, int]) -> Message:
         """Read one message."""
         offset, number = place
         try:
-            if self._chunk[0] != offset:
-                self._chunk = offset, self._record(offset)
-            channel, time, data = self._chunk[1].messages[number]
+            found = self._record(offset, lambda _, each: _ALL if each == number else 0, at_once=True)
+            channel, time, data = found.messages[number]
         except _DAMAGED:
             raise InputError(f"{self.path}: there is no whole message at byte {offset}") from None
         topic = self._topics.get(channel)
         return Message(topic.name if topic else "", time, place, data)
+
+    def _content(self, compression: str, offset: int, packed: int, size: int, *, at_once: bool) -> _Source:
+        """Return what the chunk of a record at an offset holds: the file stands at its packed bytes.
+
+        It is unpacked to no more than it claims and its bytes may stand for; `at_once` for messages that are
+        read one after the other, and where it is cut off, for what is there of it.
+        """
+        there = min(packed, self._size - self._file.tell())
+        if compression in ("", "none"):
+            return _InFile(self._file, there)
+        if at_once and self._chunk[0] == offset:
+            return _InMemory(self._chunk[1])
+        if there > MOST_BYTES or not 0 <= size <= most_unpacked(there):
+            raise _BrokenError
+        at_once = at_once or there < packed
+        unpack = _unpacker(compression, _InFile(self._file, there), there if at_once else _PIECE)
+        if not at_once:
+            return _Unpacked(unpack, size)
+        try:
+            self._chunk = offset, memoryview(unpack(size))
+        except Exception as error:  # each library has errors of its own
+            raise _BrokenError from error
+        return _InMemory(self._chunk[1])
+
+    def _walked(self, source: _Source, wanted: _Wanted) -> list[tuple[int, int, memoryview]]:
+        """Return the messages that are whole in it, each with as many bytes as are wanted."""
+        found: list[tuple[int, int, memoryview]] = []
+        with contextlib.suppress(*_DAMAGED):
+            while source.left:
+                if (head := self._message(source)) is not None:
+                    channel, time, length = head
+                    taken = min(wanted(channel, len(found)), length)
+                    data = source.take(taken)
+                    source.skip(length - taken)
+                    found.append((channel, time, data))
+        return found
 
     def _start(self) -> int:
         raise NotImplementedError
@@ -198,8 +356,12 @@ class _Chunked:
         """Return where topics are listed behind the messages; 0 where they are not."""
         raise NotImplementedError
 
-    def _record(self, offset: int) -> _Records:
+    def _record(self, offset: int, wanted: _Wanted, *, at_once: bool = False) -> _Records:
         """Read the record at an offset, and of one that is cut off what is whole in it."""
+        raise NotImplementedError
+
+    def _message(self, source: _Source) -> tuple[int, int, int] | None:
+        """Take a record up to a message's bytes: its channel, log time and length; None: another record."""
         raise NotImplementedError
 
 
@@ -218,7 +380,7 @@ class _Mcap(_Chunked):
         opcode, start = struct.unpack_from("<B8xQ", _exactly(self._file, 17))
         return int(start) if opcode == 0x02 else 0
 
-    def _record(self, offset: int) -> _Records:
+    def _record(self, offset: int, wanted: _Wanted, *, at_once: bool = False) -> _Records:
         self._file.seek(offset)
         opcode, length = struct.unpack("<BQ", _exactly(self._file, 9))
         after = offset + 9 + length
@@ -227,36 +389,36 @@ class _Mcap(_Chunked):
         if opcode not in (0x03, 0x04, 0x05, 0x06):
             return _Records([], after, after <= self._size)
         if opcode != 0x06:
-            return _Records(self._inner(opcode, memoryview(_exactly(self._file, length))), after)
-        if length > MOST_BYTES:
-            raise _BrokenError
-        content = memoryview(self._file.read(length))
-        size, name_length = struct.unpack_from("<Q4xI", content, 16)
-        start = 32 + name_length + 8
-        data = _unpacked(bytes(content[32 : 32 + name_length]).decode(), content[start:], size)
-        found, at = list[tuple[int, int, memoryview]](), 0
-        while at + 9 <= len(data):
-            opcode, length = struct.unpack_from("<BQ", data, at)
-            if at + 9 + length > len(data):
-                break
-            found += self._inner(opcode, data[at + 9 : at + 9 + length])
-            at += 9 + length
-        return _Records(found, after, at == len(data) == size)
+            self._file.seek(offset)
+            size = after - offset
+            content: _Source = _InFile(self._file, min(size, self._size - offset))
+        else:
+            size, name_length = struct.unpack("<16xQ4xI", _exactly(self._file, 32))
+            compression = _exactly(self._file, name_length + 8)[:-8].decode()
+            packed = after - self._file.tell()
+            content = self._content(compression, offset, packed, size, at_once=at_once)
+        found = self._walked(content, wanted)
+        return _Records(found, after, content.left == 0 and content.size == size)
 
-    def _inner(self, opcode: int, content: memoryview) -> list[tuple[int, int, memoryview]]:
+    def _message(self, source: _Source) -> tuple[int, int, int] | None:
+        opcode, length = struct.unpack("<BQ", source.take(9))
         if opcode == 0x05:
-            channel, time = struct.unpack_from("<H4xQ", content)
-            return [(channel, time, content[22:])]
+            channel, time = struct.unpack("<H4xQ8x", source.take(22))
+            return channel, time, length - 22
         if opcode == 0x03:
+            content = source.take(length)
             (number,) = struct.unpack_from("<H", content)
             self._schemas[number] = _text(content, 2)[0]
         elif opcode == 0x04:
+            content = source.take(length)
             number, schema = struct.unpack_from("<HH", content)
             name, at = _text(content, 4)
             encoding = _text(content, at)[0]
             kind = self._schemas.get(schema, "").replace("/msg/", "/")
             self._topics[number] = Topic(name, kind, encoding)
-        return []
+        else:
+            source.skip(length)
+        return None
 
 
 def _text(content: memoryview, at: int) -> tuple[str, int]:
@@ -275,7 +437,7 @@ class _Ros1(_Chunked):
         (length,) = struct.unpack("<I", _exactly(self._file, 4))
         return int(struct.unpack("<Q", _fields(_exactly(self._file, length))["index_pos"])[0])
 
-    def _record(self, offset: int) -> _Records:
+    def _record(self, offset: int, wanted: _Wanted, *, at_once: bool = False) -> _Records:
         self._file.seek(offset)
         (length,) = struct.unpack("<I", _exactly(self._file, 4))
         fields = _fields(_exactly(self._file, length))
@@ -286,36 +448,29 @@ class _Ros1(_Chunked):
         if op not in (0x02, 0x05, 0x07):
             return _Records([], after, after <= self._size)
         if op != 0x05:
-            return _Records(self._inner(op, fields, memoryview(_exactly(self._file, length))), after)
-        if length > MOST_BYTES:
-            raise _BrokenError
-        (size,) = struct.unpack("<I", fields["size"])
-        data = _unpacked(fields["compression"].decode(), memoryview(self._file.read(length)), size)
-        found, at = list[tuple[int, int, memoryview]](), 0
-        while at + 4 <= len(data):
-            (length,) = struct.unpack_from("<I", data, at)
-            start = at + 4 + length
-            if start + 4 > len(data):
-                break
-            inner = _fields(bytes(data[at + 4 : start]))
-            (length,) = struct.unpack_from("<I", data, start)
-            if start + 4 + length > len(data):
-                break
-            found += self._inner(inner["op"][0], inner, data[start + 4 : start + 4 + length])
-            at = start + 4 + length
-        return _Records(found, after, at == len(data) == size)
+            self._file.seek(offset)
+            size = after - offset
+            content: _Source = _InFile(self._file, min(size, self._size - offset))
+        else:
+            (size,) = struct.unpack("<I", fields["size"])
+            compression = fields["compression"].decode()
+            content = self._content(compression, offset, length, size, at_once=at_once)
+        found = self._walked(content, wanted)
+        return _Records(found, after, content.left == 0 and content.size == size)
 
-    def _inner(
-        self, op: int, fields: dict[str, bytes], data: memoryview
-    ) -> list[tuple[int, int, memoryview]]:
-        if op == 0x02:
+    def _message(self, source: _Source) -> tuple[int, int, int] | None:
+        fields = _fields(bytes(source.take(*struct.unpack("<I", source.take(4)))))
+        (length,) = struct.unpack("<I", source.take(4))
+        if fields["op"][0] == 0x02:
             seconds, nanoseconds = struct.unpack("<II", fields["time"])
-            return [(struct.unpack("<I", fields["conn"])[0], seconds * 10**9 + nanoseconds, data)]
-        if op == 0x07:
-            kind = _fields(bytes(data)).get("type", b"").decode("utf-8", "replace")
+            return struct.unpack("<I", fields["conn"])[0], seconds * 10**9 + nanoseconds, length
+        if fields["op"][0] == 0x07:
+            kind = _fields(bytes(source.take(length))).get("type", b"").decode("utf-8", "replace")
             name = fields["topic"].decode("utf-8", "replace")
             self._topics[struct.unpack("<I", fields["conn"])[0]] = Topic(name, kind, "ros1")
-        return []
+        else:
+            source.skip(length)
+        return None
 
 
 def _fields(header: bytes) -> dict[str, bytes]:

@@ -5,7 +5,9 @@ from bisect import bisect_left
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+from numpy.typing import NDArray
 
 from rollcli.errors import InputError, UsageError, as_usage
 from rollcli.files.bounded import state_of
@@ -158,8 +160,8 @@ def nearest(lefts: Sequence[int], rights: Sequence[int], tolerance: int) -> list
     return partners
 
 
-def read_frame(path: str, member: str, place: Sequence[int], name: str) -> bytes:
-    """Read one frame of a bag as a whole file; see `messages.as_file`.
+def read_frame(path: str, member: str, place: Sequence[int], name: str) -> bytes | NDArray[Any]:
+    """Read one frame of a bag; see `messages.content_of`.
 
     Parameters
     ----------
@@ -185,7 +187,7 @@ def read_frame(path: str, member: str, place: Sequence[int], name: str) -> bytes
     if len(place) == 4:
         message = bag.read((place[2], place[3]))
         raw_of = messages.camera_info(Topic(message.topic, CAMERA_INFO, topic.encoding), message.data, name)
-    return messages.as_file(topic, bag.read((place[0], place[1])).data, name, raw_of)
+    return messages.content_of(topic, bag.read((place[0], place[1])).data, name, raw_of)
 
 
 def broken_part(path: str) -> str:
@@ -193,7 +195,7 @@ def broken_part(path: str) -> str:
     bag = _opened(path)
     for _ in bag.messages(set()):
         pass
-    return f"{bag.broken or 'is whole'}; the whole messages before are used"
+    return f"{bag.broken or 'is whole'}; its whole messages are used"
 
 
 def _opened(path: str) -> Bag:

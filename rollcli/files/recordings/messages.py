@@ -1,4 +1,4 @@
-"""Messages of ROS to files that every reader of images knows: numbers to NPY, colours to BMP or PPM."""
+"""Messages of ROS to pixels, or to the file that a CompressedImage holds."""
 
 import math
 import re
@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from rollcli.errors import InputError
 from rollcli.extras import require_extra
 from rollcli.files.bounded import MOST_BYTES
-from rollcli.files.codecs import arrays, pictures, png
-from rollcli.files.codecs.raw_map import require_pixels
+from rollcli.files.codecs import pictures, png
+from rollcli.files.codecs.raw_map import require_decoded_fits, require_pixels
 from rollcli.files.recordings.bags import Topic
 
 DISPARITY, IMAGE, COMPRESSED = (
@@ -137,8 +137,10 @@ def baseline_of(topic: Topic, data: memoryview, name: str) -> tuple[float, float
     return values if all(map(math.isfinite, values)) else (0.0, 0.0)
 
 
-def as_file(topic: Topic, data: memoryview, name: str, raw_of: CameraInfo | None = None) -> bytes:
-    """Make a whole file of a message: NPY of one channel, BMP or PPM of colours; CompressedImage has its own.
+def content_of(
+    topic: Topic, data: memoryview, name: str, raw_of: CameraInfo | None = None
+) -> bytes | NDArray[Any]:
+    """Return the pixels of a message, (H, W) or BGR (H, W, 3), or the file that a CompressedImage holds.
 
     Parameters
     ----------
@@ -164,16 +166,16 @@ def as_file(topic: Topic, data: memoryview, name: str, raw_of: CameraInfo | None
         if raw_of is None:
             return packed
         decode = png.picture if packed.startswith(png.SIGNATURE) else pictures.decode_picture
-        return image_file(_rectified(decode(packed, name), raw_of))
+        return _rectified(decode(packed, name), raw_of)
     if topic.type == DISPARITY:
         values = _pixels(found.image, name)
         least = float(found.min_disparity)
         below = values < least
         if values.ndim == 2 and values.dtype.kind == "f" and below.any() and not below.all():
             values = np.where(below, np.nan, values).astype(values.dtype)
-        return image_file(values)
+        return values
     values = _pixels(found, name)
-    return image_file(values if raw_of is None else _rectified(values, raw_of))
+    return values if raw_of is None else _rectified(values, raw_of)
 
 
 def _decoded(topic: Topic, data: memoryview, name: str) -> Any:
@@ -216,20 +218,14 @@ def _pixels(image: Any, name: str) -> NDArray[Any]:
     needed = step * (height - 1) + row
     if needed > min(data.size, MOST_BYTES):
         raise InputError(f"{name}: is truncated: {needed} bytes are needed, {data.size} are there")
+    require_decoded_fits(width, height, channels * dtype.itemsize, data.size, name)
     rows = np.lib.stride_tricks.as_strided(data, (height, row), (step, 1), writeable=False)
     values = np.ascontiguousarray(rows).view(dtype).astype(dtype.newbyteorder("="), copy=False)
+    values = np.require(values, requirements="A")  # a message lies anywhere in its chunk
     if channels > 1:
         values = values.reshape(height, width, channels)[..., :3]
-        return values[..., ::-1] if encoding.startswith("rgb") else values
+        return np.ascontiguousarray(values[..., ::-1] if encoding.startswith("rgb") else values)
     return cv2.cvtColor(values, _BAYER[bayer]) if encoding.startswith("bayer_") else values
-
-
-def image_file(values: NDArray[Any]) -> bytes:
-    """Make a whole file of an image, BGR where it has colours: of those that lose nothing the quickest."""
-    if values.ndim == 2:
-        return arrays.encode_npy(values)
-    ending = ".bmp" if values.dtype == np.uint8 else ".ppm"
-    return cv2.imencode(ending, np.ascontiguousarray(values))[1].tobytes()
 
 
 def _rectified(values: NDArray[Any], info: CameraInfo) -> NDArray[Any]:

@@ -1,5 +1,9 @@
 """Videos: their frames, decoded in order.
 
+How many there are is told by the packets of the file, which costs nothing; where its edit list leaves some
+out, and of two videos that pair up by number, by decoding them once. A packet that is damaged inside may give
+no frame: then the last ones that were counted are errors.
+
 A video cannot be sought exactly: where rates vary, or frames refer to later ones, another frame comes.
 So each worker opens the video itself, decodes from its start, and passes over what others do. That gives
 the same frames for any workers, on a cluster too, and keeps one frame in memory. It costs each worker the
@@ -20,13 +24,17 @@ from rollcli.files.bounded import state_of
 from rollcli.files.codecs.pictures import half_size
 from rollcli.files.codecs.raw_map import require_decoded_fits
 from rollcli.files.recordings.frames import RecordingFrame
-from rollcli.files.recordings.messages import image_file
 
 _BOXES = (b"ftyp", b"moov", b"mdat", b"wide", b"free", b"skip", b"styp")  # that MP4 and MOV begin with
 _EBML, _SEGMENT = 0x1A45DFA3, 0x18538067  # Matroska's
+_MOST_EDITS = 1000
 _SILENT = 0  # OpenCV's level
 # a packet that is cut off makes no frame, and what a file names elsewhere is not followed
 _OPTIONS = "fflags;discardcorrupt|protocol_whitelist;file"
+
+
+_PACKETS = [cv2.CAP_PROP_FORMAT, -1]  # OpenCV hands them out as they are
+_ALL_THREADS, _ONE_THREAD = ([cv2.CAP_PROP_N_THREADS, each] for each in (os.cpu_count() or 1, 1))
 
 
 class Video(NamedTuple):
@@ -38,8 +46,8 @@ class Video(NamedTuple):
     broken: str
 
 
-def look_through(path: str, name: str) -> Video:
-    """Count the frames of a video by decoding it: the number that its container states is a guess.
+def look_through(path: str, name: str, *, decode: bool = False) -> Video:
+    """Count the frames of a video: the number that its container states is a guess.
 
     Raises
     ------
@@ -47,12 +55,12 @@ def look_through(path: str, name: str) -> Video:
         It cannot be opened, or has no frame.
     """
     with as_usage():
-        return _look_through(*state_of(path), name)
+        return _look_through(*state_of(path), name, decode or _leaves_out(path))
 
 
 @lru_cache(maxsize=4)
-def _look_through(path: str, size: int, modified_ns: int, process: int, name: str) -> Video:
-    decoder = _Decoder(path, name, threads=os.cpu_count() or 1)
+def _look_through(path: str, size: int, modified_ns: int, process: int, name: str, decode: bool) -> Video:
+    decoder = _Decoder(path, name, _ALL_THREADS if decode else _PACKETS)
     count = 0
     while decoder.grab():
         count += 1
@@ -70,7 +78,11 @@ def frames_of_video(path: str, name: str, relative: str, layout: str | None) -> 
     UsageError
         See `look_through`; or its frames cannot be halved as `layout` says.
     """
-    video, stem = look_through(path, name), os.path.splitext(relative)[0]  # noqa: PTH122
+    return _frames_of(look_through(path, name), path, name, relative, layout)
+
+
+def _frames_of(video: Video, path: str, name: str, relative: str, layout: str | None) -> list[RecordingFrame]:
+    stem = os.path.splitext(relative)[0]  # noqa: PTH122
     if layout is not None:
         with as_usage():
             half_size(video.width, video.height, layout, name)
@@ -88,7 +100,7 @@ def frames_of_pair(
     UsageError
         They differ in size; or in length, and neither is cut off.
     """
-    one, other = (look_through(*each[:2]) for each in (left, right))
+    one, other = (look_through(*each[:2], decode=True) for each in (left, right))
     if (one.width, one.height) != (other.width, other.height):
         raise UsageError(
             f"{left[1]} has {one.width}x{one.height} px, {right[1]} {other.width}x{other.height}: give two "
@@ -99,31 +111,31 @@ def frames_of_pair(
             f"{left[1]} has {one.frames} frames, {right[1]} {other.frames}: they pair up by number, and "
             "behind a frame that one camera dropped all pairs are wrong: cut both to the same moments"
         )
-    both = [frames_of_video(*each, None) for each in (left, right)]
+    both = [_frames_of(video, *each, None) for video, each in ((one, left), (other, right))]
     few = min(one.frames, other.frames)
     ends = [frames[-1] for frames, video in zip(both, (one, other), strict=True) if video.broken]
     return [*zip(both[0][:few], both[1][:few], strict=True), *((end, end) for end in ends)]
 
 
-def read_video_frame(path: str, frame: str, name: str) -> bytes:
-    """Decode one frame of a video as a whole file; frames that follow each other are read in one pass."""
+def read_video_frame(path: str, frame: str, name: str) -> NDArray[Any]:
+    """Decode one frame of a video, BGR (H, W, 3); frames that follow each other are read in one pass."""
     if frame == "rest":
         raise InputError(f"{name}: {broken_end(path) or 'is whole'}; the whole frames before are used")
     if not frame.isdecimal():
         raise InputError(f"{name}: no such frame in {path}")
-    return image_file(_decoder(*state_of(path)).read(int(frame), name))
+    return _decoder(*state_of(path)).read(int(frame), name)
 
 
 @lru_cache(maxsize=4)  # both of a pair, and those of another drive
 def _decoder(path: str, size: int, modified_ns: int, process: int) -> "_Decoder":
-    return _Decoder(path, path, threads=1)
+    return _Decoder(path, path, _ONE_THREAD)
 
 
 class _Decoder:
     """A video that is open."""
 
-    def __init__(self, path: str, name: str, threads: int) -> None:
-        self._path, self._name, self._threads = path, name, threads
+    def __init__(self, path: str, name: str, settings: list[int]) -> None:
+        self._path, self._name, self._settings = path, name, settings
         self._open()
 
     def _open(self) -> None:
@@ -133,8 +145,8 @@ class _Decoder:
         os.environ["OPENCV_FFMPEG_CAPTURE_OPTIONS"] = _OPTIONS
         os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # its errors are ours to tell
         level = _set_log_level(_SILENT)
-        settings = [cv2.CAP_PROP_N_THREADS, self._threads]
-        self._capture = cv2.VideoCapture(os.path.abspath(self._path), cv2.CAP_FFMPEG, settings)  # noqa: PTH100
+        path = os.path.abspath(self._path)  # noqa: PTH100
+        self._capture = cv2.VideoCapture(path, cv2.CAP_FFMPEG, self._settings)
         _set_log_level(level)
         self._capture.set(cv2.CAP_PROP_ORIENTATION_AUTO, 0)  # turned views would not be rectified any more
         self._next = 0
@@ -216,6 +228,61 @@ def _end_of_mp4(file: BinaryIO, size: int) -> int:
             break
         at += length
     return at
+
+
+def _leaves_out(path: str) -> bool:
+    """Tell whether an MP4 shows less by its edit list than it holds, as one that was cut without encoding.
+
+    [ISO/IEC 14496-12, 8.6.6]
+    """
+    with Path(path).open("rb") as file:
+        file_size = file.seek(0, os.SEEK_END)
+        try:
+            for movie in _boxes(file, 0, file_size).get(b"moov", ()):
+                inside = _boxes(file, *movie)
+                scale, _ = _time_of(file, inside[b"mvhd"][0])
+                for track in inside.get(b"trak", ()):
+                    parts = _boxes(file, *track)
+                    for edits in parts.get(b"edts", ()):
+                        shown = _shown_by(file, _boxes(file, *edits)[b"elst"][0])
+                        per_s, whole = _time_of(file, _boxes(file, *parts[b"mdia"][0])[b"mdhd"][0])
+                        if (shown + 1) * per_s < whole * scale:
+                            return True
+        except (struct.error, KeyError):
+            return True
+    return False
+
+
+def _boxes(file: BinaryIO, at: int, end: int) -> dict[bytes, list[tuple[int, int]]]:
+    """Return where the contents of the boxes in a part of an MP4 begin and end, by their kind."""
+    found: dict[bytes, list[tuple[int, int]]] = {}
+    while at + 8 <= end:
+        file.seek(at)
+        (length, kind), head = struct.unpack(">I4s", file.read(8)), 8
+        if length == 1:
+            (length,), head = struct.unpack(">Q", file.read(8)), 16
+        if length < head:  # 0: up to the end of the file
+            length = end - at
+        found.setdefault(kind, []).append((at + head, at + length))
+        at += length
+    return found
+
+
+def _time_of(file: BinaryIO, box: tuple[int, int]) -> tuple[int, int]:
+    """Return ticks a second, and how many of them a movie or a track takes."""
+    file.seek(box[0])
+    head = file.read(32)
+    scale, ticks = struct.unpack_from(">16xIQ" if head[:1] == b"\1" else ">8xII", head, 4)
+    return scale, ticks
+
+
+def _shown_by(file: BinaryIO, box: tuple[int, int]) -> int:
+    """Return how long an edit list shows its track, in ticks of the movie."""
+    file.seek(box[0])
+    long, count = struct.unpack(">B3xI", file.read(8))
+    entry = struct.Struct(">Qq4x" if long else ">Ii4x")
+    entries = entry.iter_unpack(file.read(min(count, _MOST_EDITS) * entry.size))
+    return sum(ticks for ticks, start in entries if start >= 0)
 
 
 def _end_of_matroska(file: BinaryIO, size: int) -> int:

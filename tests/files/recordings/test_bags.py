@@ -221,6 +221,24 @@ def test_a_bag_that_is_cut_gives_every_whole_message_and_a_line(tmp_path, kind):
     assert counts[-1] >= 4
 
 
+@pytest.mark.parametrize("compression", ["LZ4", "BZ2"])
+def test_what_follows_a_damaged_chunk_of_a_bag_is_used(tmp_path, compression):
+    noise = np.random.default_rng(1)  # of a chunk for each frame
+    frames = [4 * cv2.resize(each, (640, 480)) + noise.random((480, 640)) / 1000 for each in maps(4)]
+    path = write_bag(tmp_path, "drive", "bag", drive(4, frames), compression)
+    whole = rows(rollcli("estimate", path.name, cwd=tmp_path).out)
+    data = bytearray(path.read_bytes())
+    second = data.index(b"op=\x05", data.index(b"op=\x05") + 1)
+    data[second + 200 : second + 20_000] = bytes(19_800)
+    path.write_bytes(data)
+    done = rollcli("estimate", path.name, cwd=tmp_path)
+    found = rows(done.out)
+    assert done.status == 3
+    assert [row for row in found if row["status"] != "error"] == [whole[0], *whole[2:]]
+    assert found[-1]["file"] == "drive.bag#rest"
+    assert "is damaged or cut off at 2" in found[-1]["message"]
+
+
 def test_an_interrupted_run_over_a_bag_is_resumed_to_the_same_bytes(tmp_path):
     path = write_bag(tmp_path, "drive", "mcap", drive(3)).name
     rollcli("estimate", path, "-o", "rolls.csv", cwd=tmp_path)

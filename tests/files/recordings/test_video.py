@@ -180,6 +180,22 @@ def test_a_video_whose_index_is_cut_off_is_refused_with_a_line(tmp_path, drive, 
         assert f"{name}: cannot be opened: it is cut off" in done.err
 
 
+def test_a_video_that_was_cut_by_its_edit_list_has_the_frames_that_it_shows(tmp_path, drive):
+    path = write_video(tmp_path / "drive.mp4", beside(drive[2]), "mp4v")
+    whole = rows(rollcli("estimate", "drive.mp4", "--side-by-side", cwd=tmp_path).out)
+    data = bytearray(path.read_bytes())
+    at = data.index(b"elst") + 12  # behind version, flags and the number of entries
+    (duration,) = struct.unpack_from(">I", data, at)
+    struct.pack_into(">I", data, at, duration * 3 // COUNT)
+    path.write_bytes(data)
+    done = rollcli("estimate", "drive.mp4", "--side-by-side", cwd=tmp_path)
+    assert (done.status, rows(done.out)) == (0, whole[: len(rows(done.out))]), done.err
+    capture, shown = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG), 0
+    while capture.read()[0]:
+        shown += 1
+    assert (len(rows(done.out)), shown < COUNT) == (shown, True)
+
+
 def test_a_pair_of_videos_of_which_one_is_cut_off_uses_what_both_have(tmp_path, drive):
     _, _, views = drive
     for side, name in enumerate(("a.avi", "b.avi")):
