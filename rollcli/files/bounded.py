@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from rollcli.errors import InputError
+from rollcli.files.atomic import look_at
 
 # The largest map or picture that is decoded takes 512 MB (codecs/raw_map); a result of a million rows 200 MB
 MOST_BYTES = 2**30
@@ -37,7 +38,7 @@ def state_of(path: str) -> tuple[str, int, int]:
         It cannot be read.
     """
     try:
-        found = os.stat(path)  # noqa: PTH116
+        found = look_at(path)
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from None
     return path, found.st_size, found.st_mtime_ns
