@@ -17,6 +17,7 @@ UTF16_MARKS = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 MOST_SMALL = 2**25  # bytes that a small compressed file may stand for: an empty map compresses well
 MOST_EXPANSION = 48  # bytes that each byte of a larger file may stand for; real maps reach 20
 _TOLD_BY = 64  # bytes at the start of a text, by which its encoding is told
+_PIECE = 2**24  # bytes of a file that does not say its size
 _OF_DEVICES = 2**20  # /dev/null has an end, /dev/zero has none
 
 
@@ -63,10 +64,27 @@ def read_stream(file: BinaryIO, name: str, most: int = MOST_BYTES) -> bytes:
     most, size = _limit_of(file, most)
     if size > most:
         raise too_large(name, size, most)
-    data = file.read(most + 1)
-    if len(data) > most:
-        raise too_large(name, None, most)
-    return data
+    return read_up_to(file, name, size, most)
+
+
+def read_up_to(file: BinaryIO, name: str, size: int, most: int) -> bytes:
+    """Return the bytes of an open file, which says that it has `size` of them.
+
+    Not by one read of `most`: Python sets aside a gigabyte of addresses before it, which a limit may forbid.
+
+    Raises
+    ------
+    InputError
+        It has more than `most`: it has grown, or does not say its size.
+    """
+    pieces, left, wanted = list[bytes](), most + 1, min(size, most) + 1
+    while left:
+        pieces.append(file.read(wanted))
+        if len(pieces[-1]) < wanted:
+            return b"".join(pieces)
+        left -= wanted
+        wanted = min(_PIECE, left)
+    raise too_large(name, None, most)
 
 
 def most_unpacked(packed: int) -> int:

@@ -326,9 +326,7 @@ def _read_file(path: str, name: str, most: int = MOST_BYTES, begins: Beginning =
             if begins is not None and status.st_size > _HEAD:
                 begins(file.read(_HEAD), status.st_size, name)
                 file.seek(0)
-            data = file.read(most + 1)
-            if len(data) > most:  # it has grown, or lies in a file system that says no sizes
-                raise too_large(name, None, most)
+            return bounded.read_up_to(file, name, status.st_size, most)
     except IsADirectoryError:
         raise InputError(f"{name}: is a folder, not a file") from None
     except FileNotFoundError:
@@ -337,7 +335,6 @@ def _read_file(path: str, name: str, most: int = MOST_BYTES, begins: Beginning =
     except (OSError, ValueError) as error:
         reason = str(getattr(error, "strerror", None) or error).lower()
         raise InputError(f"{name}: cannot be read: {reason}", reason) from None
-    return data
 
 
 def _require_writable(url: str) -> None:

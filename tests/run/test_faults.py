@@ -12,6 +12,8 @@ from pathlib import Path
 import pytest
 
 from rollcli.files.results import parse_rows
+from rollcli.run.frame import Frame
+from rollcli.run.read import guarded
 from tests.run_cli import (
     ROOT,
     command,
@@ -334,3 +336,11 @@ def alive_in_group(group):
     except ProcessLookupError:
         return False
     return True
+
+
+def test_the_row_of_a_frame_without_memory_says_so():
+    def exhausted():
+        raise MemoryError
+
+    row = guarded(Frame("a.png", "", "a.png", "", "a.png", None), exhausted).row
+    assert (row.status, row.message) == ("error", "out of memory")
