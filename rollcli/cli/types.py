@@ -29,6 +29,10 @@ class Choice(_Choice):
     def __init__(self, *words: str) -> None:
         super().__init__(words, case_sensitive=False)
 
+    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
+        """Show the words as they are given: versions of click differ in that."""
+        return f"[{'|'.join(self.choices)}]"
+
 
 class FilePath(click.Path):
     """The name of a file or folder; an empty one, which would mean the current folder, is refused.

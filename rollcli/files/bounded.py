@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from rollcli.errors import InputError
+from rollcli.files.atomic import look_at
 
 # The largest map or picture that is decoded takes 512 MB (codecs/raw_map); a result of a million rows 200 MB
 MOST_BYTES = 2**30
@@ -16,6 +17,7 @@ UTF16_MARKS = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 MOST_SMALL = 2**25  # bytes that a small compressed file may stand for: an empty map compresses well
 MOST_EXPANSION = 48  # bytes that each byte of a larger file may stand for; real maps reach 20
 _TOLD_BY = 64  # bytes at the start of a text, by which its encoding is told
+_PIECE = 2**24  # bytes of a file that does not say its size
 _OF_DEVICES = 2**20  # /dev/null has an end, /dev/zero has none
 
 
@@ -39,7 +41,7 @@ def state_of(path: str) -> tuple[str, int, int, int]:
         It cannot be read.
     """
     try:
-        found = os.stat(path)  # noqa: PTH116
+        found = look_at(path)
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from None
     return path, found.st_size, found.st_mtime_ns, os.getpid()
@@ -64,20 +66,27 @@ def read_stream(file: BinaryIO, name: str, most: int = MOST_BYTES) -> bytes:
     most, size = _limit_of(file, most)
     if size > most:
         raise too_large(name, size, most)
-    return read_rest(file, name, size, most)
+    return read_up_to(file, name, size, most)
 
 
-def read_rest(file: BinaryIO, name: str, size: int, most: int) -> bytes:
-    """Return the bytes of a file that says that it has `size`, or 0 where it does not: see `read_given`.
+def read_up_to(file: BinaryIO, name: str, size: int, most: int) -> bytes:
+    """Return the bytes of an open file, which says that it has `size` of them.
 
-    Asked for `most`, Python takes memory for that many first, which costs four times the reading.
+    Not by one read of `most`: Python sets aside a gigabyte of addresses before it, which a limit may forbid.
+
+    Raises
+    ------
+    InputError
+        It has more than `most`: it has grown, or does not say its size.
     """
-    data = file.read(size + 1)
-    if len(data) > size:  # it has grown, or says no size
-        data += file.read(most + 1 - len(data))
-    if len(data) > most:
-        raise too_large(name, None, most)
-    return data
+    pieces, left, wanted = list[bytes](), most + 1, min(size, most) + 1
+    while left:
+        pieces.append(file.read(wanted))
+        if len(pieces[-1]) < wanted:
+            return b"".join(pieces)
+        left -= wanted
+        wanted = min(_PIECE, left)
+    raise too_large(name, None, most)
 
 
 def most_unpacked(packed: int) -> int:

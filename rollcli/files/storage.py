@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from rollcli.errors import InputError, OutputError
 from rollcli.files import bounded
 from rollcli.files.atomic import NameTakenError, in_threads, output_error, write_atomic
-from rollcli.files.bounded import MOST_BYTES, read_rest, too_large
+from rollcli.files.bounded import MOST_BYTES, too_large
 from rollcli.files.containers import file_of, read_member
 from rollcli.files.stores import objects
 from rollcli.files.stores.locations import WEB_SERVERS, is_url, public_name, scheme_of
@@ -345,7 +345,7 @@ def _read_file(path: str, name: str, most: int = MOST_BYTES, begins: Beginning =
             if begins is not None and status.st_size > _HEAD:
                 begins(file.read(_HEAD), status.st_size, name)
                 file.seek(0)
-            data = read_rest(file, name, status.st_size, most)
+            return bounded.read_up_to(file, name, status.st_size, most)
     except IsADirectoryError:
         raise InputError(f"{name}: is a folder, not a file") from None
     except FileNotFoundError:
@@ -354,7 +354,6 @@ def _read_file(path: str, name: str, most: int = MOST_BYTES, begins: Beginning =
     except (OSError, ValueError) as error:
         reason = str(getattr(error, "strerror", None) or error).lower()
         raise InputError(f"{name}: cannot be read: {reason}", reason) from None
-    return data
 
 
 def _require_writable(url: str) -> None:

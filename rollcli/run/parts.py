@@ -9,11 +9,10 @@ writes.
 import contextlib
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from rollcli.errors import InputError, UsageError
-from rollcli.files.atomic import remove_leftovers, sync_files
+from rollcli.files.atomic import is_folder, is_there, remove_leftovers, sync_files
 from rollcli.files.codecs.parquet import require_parquet
 from rollcli.files.locking import locked_folder, not_resumable
 from rollcli.files.results import (
@@ -225,7 +224,7 @@ def check_parts(plan: Plan, *, resume: bool, overwrite: bool) -> list[str]:
     UsageError
         Parts exist and neither --resume nor --overwrite is given; or a file is in the folder's place.
     """
-    if not is_url(plan.output) and Path(plan.output).exists() and not Path(plan.output).is_dir():
+    if not is_url(plan.output) and is_there(plan.output) and not is_folder(plan.output):
         raise UsageError(f"{plan.output}: is a file; a result of parts is a folder, give another --output")
     parts = part_names(list_names(plan.output))
     if parts and not (resume or overwrite):

@@ -353,7 +353,8 @@ def guarded(frame: Frame, work: Callable[[], FrameResult]) -> FrameResult:
 
 def frame_of_error(frame: Frame, error: Exception) -> FrameResult:
     """Make the row of a frame that an error has cost."""
-    return failed_frame(frame, str(error) or type(error).__name__, _cause_of(error))
+    unsaid = "out of memory" if isinstance(error, MemoryError) else type(error).__name__
+    return failed_frame(frame, str(error) or unsaid, _cause_of(error))
 
 
 def _cause_of(error: BaseException | None) -> str:

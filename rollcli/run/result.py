@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Protocol
 
 from rollcli.errors import InputError, UsageError
-from rollcli.files.atomic import remove_leftovers
+from rollcli.files.atomic import is_there, remove_leftovers
 from rollcli.files.locking import not_resumable
 from rollcli.files.results import format_header, parse_rows, read_run, run_path
 from rollcli.files.stores.locations import base_name
@@ -312,7 +312,7 @@ def _check_permitted(name: str, options: EstimateOptions) -> None:
             raise UsageError(
                 f"{name}: exists already; give --resume to continue it or --overwrite to replace it"
             )
-        if not Path(inputs_path(name)).exists():
+        if not is_there(inputs_path(name)):
             raise not_resumable(name, f"there is no {base_name(inputs_path(name))}")
     elif not is_inputs(inputs_path(name)):
         raise UsageError(

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from rollcli import __version__
 from rollcli.errors import ExitStatus, InputError, OutputError, UsageError
-from rollcli.files.atomic import output_error, remove_leftovers, write_atomic
+from rollcli.files.atomic import is_there, output_error, remove_leftovers, write_atomic
 from rollcli.files.codecs.tiff import encode_tiff
 from rollcli.files.encodings import KITTI_TOP, from_disparity
 from rollcli.files.formats import encode_stored
@@ -300,7 +300,7 @@ def plan_dataset(folder: str | Path, options: SimulateOptions, *, overwrite: boo
             "--overwrite begins anew"
         )
     _check_resumable(dataset)
-    whole = (task.stem for task in dataset.tasks if all(path.exists() for path in task.files.values()))
+    whole = (task.stem for task in dataset.tasks if all(map(is_there, task.files.values())))
     return replace(dataset, kept=frozenset(whole))
 
 

@@ -76,7 +76,7 @@ from rollcli.__main__ import main
 try:
     main()
 except SystemExit as end:
-    print(end.code, [name for name in ("numpy", "cv2") if name in sys.modules])
+    print(int(end.code), [name for name in ("numpy", "cv2") if name in sys.modules])
 """
     done = python(code, cwd=tmp_path, check=True)
     assert done.stdout.splitlines()[-1] == "0 []"

@@ -1,6 +1,7 @@
 """What is read is bounded before it is read: in bytes, and in time where a server gives it."""
 
 import contextlib
+import io
 import os
 import socket
 import subprocess
@@ -225,3 +226,24 @@ def test_a_list_of_line_ends_takes_no_memory_of_their_number(tmp_path):
     done = limited("estimate", "--files-from", "list", cwd=tmp_path)
     assert done.returncode == 2
     assert "the list is empty" in done.stderr
+
+
+@pytest.mark.parametrize("inputs", ["maps", "-"])
+def test_small_files_need_no_room_for_the_largest_ones(tmp_path, inputs):
+    write_maps(tmp_path / "maps", 2)
+    (tmp_path / "list").write_text("maps/frame0.png\nmaps/frame1.png\n")
+    with (tmp_path / "list").open("rb") as stdin:
+        done = limited(
+            "estimate", inputs, "-j", "1", "-o", "r.csv", cwd=tmp_path, memory=800 * 2**20, stdin=stdin
+        )
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_file_that_says_no_size_is_read_to_its_end_or_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(bounded, "_PIECE", 7)
+    data = bytes(range(100))
+    assert bounded.read_up_to(io.BytesIO(data), "f", 0, 100) == data
+    assert bounded.read_up_to(io.BytesIO(data), "f", 100, 100) == data
+    assert bounded.read_up_to(io.BytesIO(b""), "f", 0, 100) == b""
+    with pytest.raises(InputError, match="f: has more than 99 bytes"):
+        bounded.read_up_to(io.BytesIO(data), "f", 0, 99)

@@ -1,7 +1,8 @@
 """Let every system call of a run fail once, and look at how the run ends and what a resume makes of it.
 
 Whatever fails, the run ends with a documented status and without an internal error, and `--resume` ends with
-the bytes of a run that nothing disturbed; only a frame that could not be read stays an error.
+the bytes of a run that nothing disturbed; only a frame that could not be read stays an error. Runs write one
+file, or parts.
 """
 
 import contextlib
@@ -14,6 +15,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+from rollcli.files.results import Row, read_result
 from tests.fuzz.faulty import FAULTS, Fault, FaultyCalls
 from tests.run_cli import contents, write_maps
 
@@ -23,13 +25,12 @@ ARGUMENTS = (
     "-q",
     "-j",
     "1",
-    "-o",
-    "out/rolls.csv",
     "--derotated",
     "out/up",
     "--vdisparity",
     "out/v",
 )
+RESULTS = {"rolls.csv": (), "rolls.parquet": ("--part-rows", "3")}
 STATUSES = (0, 1, 2, 3)
 FRAMES = 4
 
@@ -43,14 +44,15 @@ class Ended(NamedTuple):
 
 
 class Bench:
-    """A folder with maps, and what a run without faults makes of it."""
+    """A folder with maps, and what a run without faults makes of it; `result` is one of `RESULTS`."""
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder.resolve()
+    def __init__(self, folder: Path, result: str) -> None:
+        self.folder, self.result = folder.resolve(), result
+        self._arguments = (*ARGUMENTS, "-o", f"out/{result}", *RESULTS[result])
         write_maps(self.folder / "maps", FRAMES, width=64, height=48)
         self.whole = self.run(None)
         assert self.whole.status == 0, self.whole.said
-        self.expected = contents(self.folder / "out")
+        self.expected, self._whole_rows = contents(self.folder / "out"), self._rows()
 
     def faults(self, step: int = 1) -> Iterator[Fault]:
         """Every `step`-th call of each kind with one error, or with `step` 1 each call with every error."""
@@ -74,7 +76,7 @@ class Bench:
         found = contents(self.folder / "out")
         if found == self.expected:
             return ""
-        if ended.status == resumed.status == 3 and _only_errors_differ(found, self.expected):
+        if ended.status == resumed.status == 3 and self._only_errors_differ(found):
             return ""
         if ended.status == 3 and resumed.status == 2 and "the inputs differ" in resumed.said:
             return ""  # the folder of the maps could not be looked at: its row says so
@@ -91,13 +93,27 @@ class Bench:
         child = os.fork()
         if child == 0:
             os.close(ends)
-            _be_the_program(self.folder, fault, (*ARGUMENTS, *more), starts)
+            _be_the_program(self.folder, fault, (*self._arguments, *more), starts)
         os.close(starts)
         with open(ends, "rb") as file:  # noqa: PTH123 (a descriptor)
             said, _, counts = file.read().decode(errors="replace").rpartition("\0")
         status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
         pairs = (each.split("=") for each in counts.split())
         return Ended(status, said.strip(), Counter({name: int(count) for name, count in pairs}))
+
+    def _rows(self) -> tuple[Row, ...]:
+        return read_result(self.folder / "out" / self.result).rows
+
+    def _only_errors_differ(self, found: dict[str, bytes]) -> bool:
+        """Whether rows differ only where a frame could not be read, and images only by being absent."""
+        rows = self._rows()
+        differ = [row for row, other in zip(rows, self._whole_rows, strict=False) if row != other]
+        images = [name for name in found if name.endswith(".png")]
+        return (
+            len(rows) == len(self._whole_rows)
+            and all(row.status == "error" for row in differ)
+            and all(found[name] == self.expected.get(name) for name in images)
+        )
 
 
 def _be_the_program(folder: Path, fault: Fault | None, arguments: tuple[str, ...], answers: int) -> None:
@@ -127,29 +143,18 @@ def _be_the_program(folder: Path, fault: Fault | None, arguments: tuple[str, ...
     os._exit(status)
 
 
-def _only_errors_differ(found: dict[str, bytes], expected: dict[str, bytes]) -> bool:
-    """Whether rows differ only where a frame could not be read, and images only by being absent."""
-    rows, whole = (each["rolls.csv"].splitlines() for each in (found, expected))
-    differ = [row for row, other in zip(rows, whole, strict=False) if row != other]
-    images = [name for name in found if name.endswith(".png")]
-    return (
-        len(rows) == len(whole)
-        and all(b",error," in row for row in differ)
-        and all(found[name] == expected.get(name) for name in images)
-    )
-
-
 def main(step: int = 1) -> int:
     """Try every `step`-th fault; 1 when something was found."""
-    with tempfile.TemporaryDirectory() as name:
-        bench = Bench(Path(name))
-        print("calls:", *sorted(bench.whole.counts))
-        tried, finds = 0, 0
-        for fault in bench.faults(step):
-            tried += 1
-            if problem := bench.problem(fault):
-                finds += 1
-                print(f"{fault.call} {fault.number} {fault.error}: {problem}")
+    tried, finds = 0, 0
+    for result in RESULTS:
+        with tempfile.TemporaryDirectory() as name:
+            bench = Bench(Path(name), result)
+            print(f"{result}: calls:", *sorted(bench.whole.counts))
+            for fault in bench.faults(step):
+                tried += 1
+                if problem := bench.problem(fault):
+                    finds += 1
+                    print(f"{result}: {fault.call} {fault.number} {fault.error}: {problem}", flush=True)
     print(f"{tried} faults, {finds} finds")
     return 1 if finds else 0
 

@@ -42,7 +42,7 @@ def test_a_single_row_is_a_frame_whatever_its_kind():
     only = {name: cells[0] for name, cells in columns([1.5], [0.1]).items()}
     for rows in ([only], [SCHEMA(**only)], {name: [cell] for name, cell in only.items()}):
         rig = rollcli.assess_rig(rows)
-        assert (rig.count, rig.frames.files, rig.now().value) == (1, ["run/0.png"], 1.5)
+        assert (rig.count, rig.frames.files, rig.now().value) == (1, ["run/0.png"], pytest.approx(1.5))
 
 
 def test_suspect_frames_are_counted_and_left_out_unless_asked_for():

@@ -12,7 +12,7 @@ from tests.run_cli import command, environment, python, rollcli, write_maps
 LONG = "x" * 300 + ".png"
 # calls that name this file fail, as those of a dying disk or a lost server do
 FAILING = """
-import errno, os, sys
+import errno, os, pathlib, sys  # Python 3.10 keeps what pathlib finds there
 def failing(call):
     def wrapper(path, *args, **options):
         if not isinstance(path, int) and os.fspath(path).endswith("frame1.png"):

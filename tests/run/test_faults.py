@@ -12,6 +12,8 @@ from pathlib import Path
 import pytest
 
 from rollcli.files.results import parse_rows
+from rollcli.run.frame import Frame
+from rollcli.run.read import guarded
 from tests.run_cli import (
     command,
     contents,
@@ -255,6 +257,8 @@ def deadly(give_name):
             os.kill(os.getpid(), signal.SIGKILL)
     return give
 os.link, os.replace, os.rename = map(deadly, (os.link, os.replace, os.rename))
+if hasattr(pathlib, "_NormalAccessor"):  # Python 3.10 keeps what pathlib finds there
+    pathlib._NormalAccessor.replace = staticmethod(os.replace)
 """
 WRITE_IMAGES = {
     "estimate": ("frame3", "estimate maps -o out/rolls.csv --derotated out/up --vdisparity out/v"),
@@ -325,3 +329,11 @@ def alive_in_group(group):
     except ProcessLookupError:
         return False
     return True
+
+
+def test_the_row_of_a_frame_without_memory_says_so():
+    def exhausted():
+        raise MemoryError
+
+    row = guarded(Frame("a.png", "", "a.png", "", "a.png", None), exhausted).row
+    assert (row.status, row.message) == ("error", "out of memory")

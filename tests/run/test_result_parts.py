@@ -1,5 +1,8 @@
 """A result of parts in a folder: what is in the way, damaged, or left by a run that was killed."""
 
+import errno
+import os
+
 import pytest
 
 from rollcli.errors import OutputError
@@ -85,5 +88,32 @@ def test_a_full_disk_keeps_the_parts_before_it_and_says_how_to_go_on(parts, monk
         "rollcli: rolls.parquet/part-00001.parquet: cannot be written: no space left on device; "
         "2 rows are kept, continue with --resume\n"
     )
+    assert rollcli(*line, "--resume", cwd=folder).status == 0
+    assert contents(folder) == whole
+
+
+@pytest.mark.parametrize(("path", "fails"), [("maps/frame3.png", "odd"), ("rolls.parquet", "all")])
+@pytest.mark.parametrize("flag", ["--overwrite", "--resume"])
+def test_a_momentary_fault_of_the_disk_does_not_keep_a_run_from_resume(parts, path, fails, flag, monkeypatch):
+    folder, line = parts
+    whole = contents(folder)
+    (folder / "rolls.parquet" / "part-00001.parquet").unlink()
+    look, asked = os.stat, []
+
+    def failing(target, **named):
+        if str(target).endswith(path):
+            asked.append(target)
+            if fails == "all" or len(asked) % 2:
+                raise OSError(errno.EIO, os.strerror(errno.EIO), str(target))
+        return look(target, **named)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "stat", failing)
+        done = rollcli(*line, flag, cwd=folder)
+    assert asked
+    if done.status:
+        assert fails == "all"
+        assert done.err == "rollcli: rolls.parquet: cannot be written: input/output error\n"
+
     assert rollcli(*line, "--resume", cwd=folder).status == 0
     assert contents(folder) == whole

@@ -146,12 +146,13 @@ def read_object(url: str, most: int = MOST_BYTES) -> tuple[bytes, str]:
     def fetch() -> tuple[bytes, str]:
         nonlocal counted
         answer = store.get(key)
-        if answer.meta["size"] > most:
-            raise too_large(public_name(url), answer.meta["size"], most, within_seconds(request_seconds()))
+        meta = answer.meta  # which some versions no longer tell once the bytes are taken
+        if meta["size"] > most:
+            raise too_large(public_name(url), meta["size"], most, within_seconds(request_seconds()))
         if not counted:
-            wait_for_room(answer.meta["size"])
+            wait_for_room(meta["size"])
             counted = True
-        return bytes(answer.bytes()), answer.meta["e_tag"] or ""
+        return bytes(answer.bytes()), meta["e_tag"] or ""
 
     limits = f" ({request_seconds():g}), for up to {in_words(most)}"
     with _telling(url, "read", InputError, limits), waiting_for_network():
