@@ -117,6 +117,7 @@ def test_failed_frames_are_marked_along_the_lower_edge_and_the_line_of_zero_stan
     assert len(zero) >= 3
 
 
+@pytest.mark.slow
 def test_of_many_frames_those_are_drawn_that_make_the_same_picture(monkeypatch):
     rng = np.random.default_rng(6)
     rows = [row(f"{i}.png", float(v), 0.2) for i, v in enumerate(rng.normal(0, 1, 20_000))]
@@ -127,6 +128,7 @@ def test_of_many_frames_those_are_drawn_that_make_the_same_picture(monkeypatch):
     assert len(file) < 0.5 * len(chart_file(all_charts(rows)["roll"], "svg"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["roll", "histogram"])
 def test_a_browser_shows_the_svg_as_the_png_is(browser, tmp_path, charts, name):
     (tmp_path / "chart.svg").write_bytes(chart_file(charts[name], "svg"))
