@@ -4,8 +4,9 @@ import cv2
 import numpy as np
 import pytest
 
+from rollcli.stereo import first_look as first_looks
 from rollcli.stereo import row_fit
-from rollcli.stereo.alignment import SmallViews, Texture, measure_misalignment, textured_share
+from rollcli.stereo.alignment import Measured, SmallViews, Texture, measure_misalignment, textured_share
 from rollcli.stereo.first_look import FirstLook, first_look, look_for_range
 from rollcli.stereo.misalignment import LEVEL, Misalignment
 from rollcli.stereo.row_fit import SeenBlocks
@@ -262,3 +263,32 @@ def test_a_look_finds_how_far_the_right_view_lies_off(lower):
     assert look.measured.misalignment.scale == pytest.approx(0, abs=0.002)
     assert (look.measured.misalignment == LEVEL) == (lower == 0)
     assert 49 <= look.range <= 56
+
+
+def test_views_too_narrow_to_search_have_no_disparities():
+    narrow = texture_of((40, 20))
+    assert not first_looks._match((narrow, narrow), 8).any()
+    wide = pair_of(8, shape=(40, 120))
+    assert np.median(first_looks._match(wide, 8.2)[:, 40:100]) == pytest.approx(8, abs=0.1)
+
+
+def measured(offset=0.0, scale=0.0, error=0.01, spread=0.1, rotation=0.0):
+    return Measured(Misalignment(offset, rotation, scale), Misalignment(error), 0.5, spread)
+
+
+@pytest.mark.parametrize(
+    ("coarse", "fine", "sure"),
+    [
+        (measured(), measured(), True),
+        (measured(), None, False),
+        (measured(), measured(scale=0.0029, error=1.0), True),
+        (measured(9), measured(scale=0.0029), True),
+        (measured(scale=0.0031), measured(scale=0.0031), True),
+        (measured(scale=-0.0031), measured(scale=-0.0031, error=0.015), False),
+        (measured(scale=0.0031), measured(scale=0.0031, error=0.0135), True),
+        (measured(1.1, scale=0.0031), measured(0.0, scale=0.0031), True),
+        (measured(1.3, scale=0.0031), measured(0.0, scale=0.0031), False),
+    ],
+)
+def test_an_unusual_scale_is_sure_where_blocks_and_views_agree(coarse, fine, sure):
+    assert first_looks._is_sure(coarse, fine, SHAPE) == sure
