@@ -11,7 +11,6 @@ import pytest
 
 from rollcli.cli.main import main
 from tests.run_cli import command, contents, environment, rollcli
-from tests.slow import mostly_slow
 
 TINY = ("--frames", "2", "--size", "64x48")
 
@@ -98,7 +97,8 @@ def test_disparities_too_large_for_the_file_are_told(tmp_path):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
-@pytest.mark.parametrize("jobs", mostly_slow(["1", "2"], "2"))
+@pytest.mark.slow
+@pytest.mark.parametrize("jobs", ["1", "2"])
 def test_ctrl_c_ends_it_with_status_130_and_without_truth(tmp_path, jobs):
     line = command("simulate", "rig", "--frames", "700", "--size", "64x48", "-j", jobs)
     with subprocess.Popen(line, cwd=tmp_path, env=environment(), stderr=subprocess.PIPE, text=True) as run:

@@ -369,6 +369,7 @@ def test_the_record_holds_version_options_encoding_conventions_and_counts(undist
     assert "counter-clockwise" in record["conventions"]["roll_deg"]
 
 
+@pytest.mark.slow
 def test_fail_fast_stops_at_the_first_failure_and_can_be_resumed(undisturbed, folder):
     done = rollcli("estimate", "maps", "-o", "rolls.csv", *IMAGES, "--fail-fast", "-j2", cwd=folder)
     rows = (folder / "rolls.csv").read_text().splitlines()

@@ -74,6 +74,7 @@ def assert_agree(pairs):
     assert (apart <= reach).all()
 
 
+@pytest.mark.slow
 def test_rendered_roads_get_the_angle_of_the_whole_match():
     asked = SimulateOptions(frames=6, size=(640, 480), seed=17, grey=True)
     frames = [render_frame(spec) for spec in draw_specs(asked)]
