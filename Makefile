@@ -14,7 +14,7 @@ REMOVE := $(PYTHON) -c "import glob, os, shutil, sys; [shutil.rmtree(p) if os.pa
 help:
 	@echo "make run     install into .venv, and estimate the roll of sample_data into out/"
 	@echo "make test    run the tests that every change runs"
-	@echo "make test-all  and the slow ones: clusters, TLS, browsers, injected faults, long kills"
+	@echo "make test-all  and the slow ones: clusters, TLS, browsers, injected faults, long kills, further cases"
 	@echo "make lint    ruff: style and format"
 	@echo "make types   mypy, strict"
 	@echo "make format  let ruff rewrite the code"

@@ -6,6 +6,7 @@ Every message is one line and says what to do.
 from collections.abc import Iterator
 from contextlib import contextmanager
 from enum import IntEnum
+from types import TracebackType
 
 
 class ExitStatus(IntEnum):
@@ -62,6 +63,14 @@ class WorkerError(RollcliError):
 
 class OutputError(RollcliError):
     """A result cannot be written: the program cannot do its job (exit status 1)."""
+
+
+def raised_at(error: BaseException) -> TracebackType | None:
+    """Return the innermost step of an error's traceback; None where it was never raised."""
+    last = error.__traceback__
+    while last is not None and last.tb_next is not None:
+        last = last.tb_next
+    return last
 
 
 @contextmanager

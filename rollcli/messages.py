@@ -8,6 +8,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from rollcli.errors import raised_at
+
 _shows_tracebacks = False
 _ADDRESS = re.compile(r"(https?://)(?:[^\s/?#@]*@)?([^\s?#'\"]*)(?:[?#][^\s'\"]*)?", re.IGNORECASE)
 _NAMES = "x-amz-[a-z-]+|x-goog-[a-z-]+|sig|signature|awsaccesskeyid|googleaccessid|key-pair-id|policy|token"
@@ -32,9 +34,7 @@ def say_unexpected(error: BaseException) -> None:
     """Write an error that nobody expected as one line; with --verbose, its traceback below."""
     import traceback  # only here: it takes a while to load
 
-    last = error.__traceback__
-    while last is not None and last.tb_next is not None:
-        last = last.tb_next
+    last = raised_at(error)
     where = f"{last.tb_frame.f_code.co_filename}:{last.tb_lineno}" if last else "nowhere"
     say(f"internal error, please report it: {type(error).__name__}: {error} ({where})")
     if _shows_tracebacks:

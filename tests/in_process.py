@@ -5,7 +5,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import _lru_cache_wrapper
+from functools import _lru_cache_wrapper, cache
 from pathlib import Path
 from threading import Thread
 from typing import NamedTuple, TextIO
@@ -25,6 +25,11 @@ class Finished(NamedTuple):
     status: int
     out: str
     err: str
+
+    def refused(self) -> str:
+        """The one line of a run that a usage error ended before it wrote anything."""
+        assert (self.status, self.out, self.err.count("\n")) == (2, "", 1), self
+        return self.err
 
 
 def run_here(arguments: Sequence[str], cwd: Path, stdin: str, environment: Mapping[str, str]) -> Finished:
@@ -75,9 +80,13 @@ def _set_environment(variables: Mapping[str, str]) -> None:
 def _forget() -> None:
     """Empty the program's caches: a relative path means another file in another folder."""
     for name in [each for each in sys.modules if each.startswith("rollcli.")]:
-        for value in vars(sys.modules[name]).values():
-            if isinstance(value, _lru_cache_wrapper):
-                value.cache_clear()
+        for cached in _cached_functions(name):
+            cached.cache_clear()
+
+
+@cache
+def _cached_functions(module: str) -> list[_lru_cache_wrapper]:
+    return [each for each in vars(sys.modules[module]).values() if isinstance(each, _lru_cache_wrapper)]
 
 
 @contextlib.contextmanager

@@ -18,6 +18,7 @@ from rollcli.rig.calibration import CalibrationOptions
 from rollcli.rig.read_calibration import parse_calibration
 from tests.rig import calibration_files
 from tests.run_cli import contents, environment, rollcli, write_maps
+from tests.slow import mostly_slow
 
 # a process like one of Windows: no fork, no flock, no signals but two, no flags of open that POSIX alone has
 WITHOUT_POSIX = """
@@ -47,7 +48,7 @@ def without_posix(*arguments, cwd):
     return subprocess.run(line, check=False, **settings)
 
 
-@pytest.mark.parametrize("jobs", ["1", "2"])
+@pytest.mark.parametrize("jobs", mostly_slow(["1", "2"], "1"))
 def test_a_run_needs_neither_fork_nor_flock_nor_signals_of_posix(tmp_path, jobs):
     write_maps(tmp_path / "maps", 3)
     line = ["estimate", "maps", "--derotated", "level", "-j", jobs]

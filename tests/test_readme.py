@@ -125,6 +125,7 @@ def touch(path):
     path.write_bytes(path.read_bytes())
 
 
+@pytest.mark.slow
 @needs_make
 def test_its_makefile_makes_a_page_from_pairs_and_then_has_nothing_to_do(pairs):
     assert (pairs / "rolls.html").read_text("utf-8").count("maps/frame_0003.png") >= 1
@@ -133,6 +134,7 @@ def test_its_makefile_makes_a_page_from_pairs_and_then_has_nothing_to_do(pairs):
     assert "up to date" in again.stdout
 
 
+@pytest.mark.slow
 @needs_make
 def test_its_makefile_does_anew_what_a_changed_pair_asks_for(pairs):
     touch(pairs / "right" / "frame_0002.png")
@@ -140,6 +142,7 @@ def test_its_makefile_does_anew_what_a_changed_pair_asks_for(pairs):
     assert ran == [["rollcli", "disparity"], ["rollcli", "estimate"], ["rollcli", "report"]]
 
 
+@pytest.mark.slow
 @needs_make
 def test_its_makefile_stops_at_a_pair_that_cannot_be_matched(pairs):
     (pairs / "right" / "frame_0002.png").write_bytes(b"no image")
@@ -152,6 +155,7 @@ def test_its_makefile_stops_at_a_pair_that_cannot_be_matched(pairs):
     assert make(pairs).returncode != 0
 
 
+@pytest.mark.slow
 @needs_make
 def test_its_makefile_stops_at_a_map_without_an_angle(pairs):
     (pairs / "maps" / "frame_0001.png").write_bytes(b"no map")
@@ -163,6 +167,7 @@ def test_its_makefile_stops_at_a_map_without_an_angle(pairs):
         assert not (pairs / "rolls.csv").exists()
 
 
+@pytest.mark.slow
 @needs_make
 def test_its_makefile_leaves_out_the_map_of_a_pair_that_is_gone(pairs):
     for side in ("left", "right"):

@@ -76,6 +76,7 @@ def estimated(folder, name="rolls.csv"):
     assert rollcli("estimate", "maps", "-o", name, "-q", cwd=folder).status == 0
 
 
+@pytest.mark.slow
 def test_the_page_is_made_from_a_result_and_from_what_make_run_wrote(tmp_path):
     pytest.importorskip("plotly", reason="plotly, of the extra report, is not here")
     maps(tmp_path / "sample_data" / "maps")
@@ -120,6 +121,7 @@ def test_npy_maps_with_a_mask(tmp_path):
     assert (tmp_path / "rolls.csv").read_text().count("run7/morning/frame_0004.npy,,ok,-3.9") == 1
 
 
+@pytest.mark.slow
 def test_derotation_by_a_result_and_by_one_angle_and_then_v_disparity(tmp_path):
     estimated(tmp_path)
     run_block("rollcli derotate maps --from", tmp_path)
@@ -140,6 +142,7 @@ def test_pitch_and_height(tmp_path):
     assert all(row[header.index(name)] for row in rows for name in ("pitch_deg", "height_m"))
 
 
+@pytest.mark.slow
 def test_heights_of_pairs_and_of_the_maps_of_a_result(tmp_path):
     shutil.copytree(SAMPLES, tmp_path, dirs_exist_ok=True)
     run_block("rollcli estimate --left left --right right --calib calib.txt -o pairs.csv", tmp_path)
@@ -157,6 +160,7 @@ def test_the_check_in_ci_passes_a_rig_that_holds_and_fails_one_that_does_not(tmp
     assert loose.status == 4
 
 
+@pytest.mark.slow
 def test_how_wide_the_interval_of_120_frames_is():
     at_random, slowly = map(float, re.findall(r"±(0\.\d+)° where", README))
     for correlation, said in ((0.0, at_random), (0.94, slowly)):
@@ -202,6 +206,7 @@ def test_a_long_run_continues_to_the_same_bytes(tmp_path):
     assert contents(tmp_path) == whole
 
 
+@pytest.mark.slow
 def test_a_bucket(tmp_path, store, monkeypatch):
     for name, value in store.items():
         monkeypatch.setenv(name, value)
@@ -217,6 +222,7 @@ def test_a_bucket(tmp_path, store, monkeypatch):
     assert [name for name in list_names(f"{there}/run7.parquet") if name.endswith(".parquet")]
 
 
+@pytest.mark.slow
 def test_a_simulation_of_the_rig_of_fewer_and_smaller_frames(tmp_path):
     smaller = {
         "--frames 200": "--frames 2",

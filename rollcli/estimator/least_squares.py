@@ -52,12 +52,6 @@ def regular(normal: Floats, like: Floats) -> Floats:
 
 
 @cache
-def _ridge(size: int) -> tuple[Floats, Floats]:
-    """Return what a normal matrix is multiplied by, and what is added to it."""
-    return 1 + _RIDGE * unit(size), _LEAST * unit(size)
-
-
-@cache
 def unit(size: int) -> Floats:
     """Return the unit matrix of this size."""
     return np.eye(size)

@@ -17,7 +17,7 @@ from rollcli.files.storage import create, owner_of
 from rollcli.files.stores.locations import is_url, public_name
 from rollcli.run.frame import Frame, FrameResult, ReadAs
 from rollcli.run.inputs import inputs_line
-from rollcli.run.options import ImageOptions
+from rollcli.run.options import FrameOptions
 from rollcli.run.outputs import local_images
 from rollcli.run.summary import Figures
 from rollcli.run.workers.chunks import Span
@@ -159,26 +159,21 @@ class BatchOptions(NamedTuple):
         Of their lines; those of Parquet are JSON.
     further : tuple of str
         Columns beside those of every result.
-    images : ImageOptions
-    root : str
-        Where relative paths start, for workers on other machines.
+    frame : FrameOptions
+        What it is told of the frames.
     verbose : bool
         Whether the user is told of every frame.
     fail_fast : bool
         Whether the first frame without an angle ends the run.
-    notes : bool
-        Whether the result keeps what each row was made from.
     parts : Parts or None
         Where whole parts go; None: all rows come back.
     """
 
     form: Literal["csv", "jsonl"]
     further: tuple[str, ...]
-    images: ImageOptions
-    root: str
+    frame: FrameOptions
     verbose: bool
     fail_fast: bool
-    notes: bool = False
     parts: Parts | None = None
 
 
@@ -208,19 +203,20 @@ def join_results(frames: Span[Frame], results: Sequence[FrameResult], options: B
         in_parts = _write_parts(frames, figures.status, lines, options)
     told = list(results) if options.verbose else list(_told(results))
     made = zip(frames, results, strict=False)
-    notes = [result.inputs or inputs_line(frame, {}) for frame, result in made] if options.notes else []
+    keeps = options.frame.notes
+    notes = [result.inputs or inputs_line(frame, {}) for frame, result in made] if keeps else []
     return Batch(figures, in_parts, lines[in_parts:], notes, read_as, told)
 
 
 def _write_parts(frames: Span[Frame], status: bytes, lines: Sequence[bytes], options: BatchOptions) -> int:
     """Write the parts that the lines fill, if they begin with one; return how many lines that were."""
-    parts, written = options.parts, 0
+    parts, written, images, root = options.parts, 0, options.frame.images, options.frame.root
     while parts and frames.first % parts.rows == 0 and written < len(lines):
         first = frames.first + written
         end = written + min(parts.rows, parts.frames - first)
         if end > len(lines):
             break
-        sync_files(local_images(frames[written:end], status[written:end], options.images, options.root))
+        sync_files(local_images(frames[written:end], status[written:end], images, root))
         parts.write(parts.numbers[first // parts.rows], lines[written:end])
         written = end
     return written

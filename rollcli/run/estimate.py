@@ -200,11 +200,9 @@ def _results(step: _Step, run: _Run) -> Iterator[Iterator[Batch]]:
     rows = BatchOptions(
         line_form(options.result.form),
         run.plan.further,
-        options.images,
-        told.root,
+        told,
         verbose=options.running.verbose,
         fail_fast=options.result.fail_fast,
-        notes=output.notes,
         parts=parts,
     )
     work = Work(

@@ -2,7 +2,6 @@
 
 import json
 import math
-import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from fractions import Fraction
@@ -13,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.errors import EstimationError, InputError, UsageError
+from rollcli.errors import EstimationError, InputError, UsageError, raised_at
 from rollcli.estimator.road.find import road_plane
 from rollcli.files.codecs.pictures import views_of
 from rollcli.files.encodings import Encoding, read_mask, to_disparity
@@ -361,8 +360,9 @@ def _cause_of(error: BaseException | None) -> str:
     """Return what errors of one cause share: where they, and what led to them, were raised, and why."""
     places = []
     while error is not None:
-        way = [f"{at.f_globals['__name__']}:{line}" for at, line in traceback.walk_tb(error.__traceback__)]
+        last = raised_at(error)
+        where = f"{last.tb_frame.f_globals['__name__']}:{last.tb_lineno}" if last else ""
         why = getattr(error, "code", "") or getattr(error, "errno", "")
-        places.append(f"{type(error).__name__} {why} {''.join(way[-1:])}")
+        places.append(f"{type(error).__name__} {why} {where}")
         error = error.__cause__
     return " of ".join(places)

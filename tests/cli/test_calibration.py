@@ -88,23 +88,20 @@ def test_a_folder_has_a_calibration_for_each_stem(maps):
     assert record["different"] == 2
     assert [each["source"] for each in record["first"]] == ["calib/000000.txt", "calib/000001_10.json"]
     (maps / "calib" / "000001_10.json").unlink()
-    refused = rollcli("estimate", "maps", "--calib", "calib", cwd=maps)
-    assert (refused.status, refused.out) == (2, "")
-    assert "maps/000001_10.png: has no calibration of its name" in refused.err
+    refusal = rollcli("estimate", "maps", "--calib", "calib", cwd=maps).refused()
+    assert "maps/000001_10.png: has no calibration of its name" in refusal
 
 
 def test_two_calibrations_of_one_stem_and_a_large_one_are_refused(maps):
     (maps / "calib").mkdir()
     for name in ("000000.txt", "000000.json", "000001.txt"):
         (maps / "calib" / name).write_text(samples.kitti_benchmark(RIG))
-    twice = rollcli("estimate", "maps", "--calib", "calib", cwd=maps)
-    assert (twice.status, twice.out) == (2, "")
-    assert "maps/000000_10.png: has more than one calibration of its name: " in twice.err
+    refusal = rollcli("estimate", "maps", "--calib", "calib", cwd=maps).refused()
+    assert "maps/000000_10.png: has more than one calibration of its name: " in refusal
     with (maps / "large.txt").open("wb") as file:
         file.truncate((1 << 20) + 1)
-    large = rollcli("estimate", "maps", "--calib", "large.txt", cwd=maps)
-    assert (large.status, large.out) == (2, "")
-    assert large.err == "rollcli: large.txt: has 1048577 bytes; up to 1 MB are read\n"
+    told = rollcli("estimate", "maps", "--calib", "large.txt", cwd=maps).refused()
+    assert told == "rollcli: large.txt: has 1048577 bytes; up to 1 MB are read\n"
 
 
 def test_a_map_at_half_the_size_uses_the_scaled_calibration(maps):
@@ -113,6 +110,7 @@ def test_a_map_at_half_the_size_uses_the_scaled_calibration(maps):
     assert_posed(rows_of(rollcli("estimate", "half", "--calib", "calib.txt", cwd=maps).out))
 
 
+@pytest.mark.slow
 def test_downscaled_pairs_have_the_pose_of_the_full_size(tmp_path):
     rig = {"pitch_deg": (4.6, 4.6), "height": (1.4, 1.4), "principal_offset": (-30.0, 30.0)}
     asked, agree = SimulateOptions(frames=10, scene="open", curvature=(0, 0), seed=6, grey=True, **rig), []
@@ -151,11 +149,9 @@ def test_a_bad_calibration_ends_it_in_one_line_before_anything_runs(maps, name):
     text, words = BAD[name]
     if text != ():
         (maps / name).write_text(text)
-    done = rollcli("estimate", "maps", "--calib", name, "-o", "pose.csv", cwd=maps)
-    assert done.status == 2
-    assert words in done.err
-    assert name in done.err
-    assert done.err.count("\n") == 1
+    said = rollcli("estimate", "maps", "--calib", name, "-o", "pose.csv", cwd=maps).refused()
+    assert words in said
+    assert name in said
     assert not (maps / "pose.csv").exists()
 
 
@@ -174,9 +170,7 @@ def test_a_bad_calibration_ends_it_in_one_line_before_anything_runs(maps, name):
     ],
 )
 def test_numbers_that_cannot_be_are_refused_before_anything_runs(maps, options):
-    done = rollcli("estimate", "maps", *options, cwd=maps)
-    assert (done.status, done.out) == (2, "")
-    assert done.err.count("\n") == 1
+    rollcli("estimate", "maps", *options, cwd=maps).refused()
 
 
 def test_a_changed_calibration_is_no_resume(maps):
@@ -184,9 +178,10 @@ def test_a_changed_calibration_is_no_resume(maps):
     again = rollcli("estimate", "maps", "--calib", "calib.txt", "-o", "pose.csv", "--resume", cwd=maps)
     assert again.status == 0
     (maps / "calib.txt").write_text(samples.kitti_raw(RIG._replace(cy=91.0)))
-    other = rollcli("estimate", "maps", "--calib", "calib.txt", "-o", "pose.csv", "--resume", cwd=maps)
-    assert other.status == 2
-    assert "the calibration differs" in other.err
+    refusal = rollcli(
+        "estimate", "maps", "--calib", "calib.txt", "-o", "pose.csv", "--resume", cwd=maps
+    ).refused()
+    assert "the calibration differs" in refusal
 
 
 def test_python_reads_a_calibration_and_gives_radians_and_metres(maps):
@@ -210,8 +205,7 @@ def test_what_was_read_against_a_convention_is_said_once(maps):
 
 def test_a_result_never_replaces_the_calibration(maps):
     before = (maps / "calib.txt").read_text()
-    done = rollcli("estimate", "maps", "--calib", "calib.txt", "-o", "calib.txt", "--overwrite", cwd=maps)
-    assert done.status == 2
+    rollcli("estimate", "maps", "--calib", "calib.txt", "-o", "calib.txt", "--overwrite", cwd=maps).refused()
     assert (maps / "calib.txt").read_text() == before
 
 
@@ -238,7 +232,5 @@ def test_depth_maps_become_the_disparities_of_their_calibration(maps):
 @pytest.mark.parametrize("command", [("estimate",), ("vdisparity", "-o", "v")])
 @pytest.mark.parametrize("rig", [(), ("--focal", "250", "--principal-point", "150,90")])
 def test_depth_maps_without_a_baseline_are_refused_before_anything_runs(maps, command, rig):
-    done = rollcli(*command, "maps", "--encoding", "depth", *rig, cwd=maps)
-    assert (done.status, done.out) == (2, "")
-    assert "needs a focal length and a baseline" in done.err
-    assert done.err.count("\n") == 1
+    refusal = rollcli(*command, "maps", "--encoding", "depth", *rig, cwd=maps).refused()
+    assert "needs a focal length and a baseline" in refusal

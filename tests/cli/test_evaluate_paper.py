@@ -68,6 +68,7 @@ def test_a_map_that_cannot_be_read_is_named_and_ends_it_with_3(done):
 
 
 @needs_extra
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["svg", "pdf"])
 def test_each_chart_is_a_figure_as_wide_as_a_column_too(tmp_path, kind):
     write_maps(tmp_path / "maps", "a.npy")
@@ -87,6 +88,7 @@ def test_the_page_needs_no_network_and_shows_file_names_as_text(done):
     assert page.count("data-chart=") == 5
 
 
+@pytest.mark.slow
 @needs_extra
 def test_the_tables_do_not_depend_on_the_workers(done, tmp_path):
     folder, _ = done
@@ -96,6 +98,7 @@ def test_the_tables_do_not_depend_on_the_workers(done, tmp_path):
         assert (tmp_path / f"out/{name}.csv").read_bytes() == (folder / f"out/{name}.csv").read_bytes()
 
 
+@pytest.mark.slow
 @needs_extra
 def test_every_chart_is_drawn_in_a_browser_without_an_error(done, open_page):
     page = open_page((done[0] / "out" / PAGE).as_uri())
@@ -108,9 +111,7 @@ def test_every_chart_is_drawn_in_a_browser_without_an_error(done, open_page):
 def test_what_is_there_is_kept_unless_overwrite_is_given(done):
     folder, _ = done
     before = contents(folder / "out")
-    again = paper(folder)
-    assert again.status == 2
-    assert "exists already; give --overwrite" in again.err
+    assert "exists already; give --overwrite" in paper(folder).refused()
     assert contents(folder / "out") == before
 
 
@@ -145,9 +146,8 @@ def test_maps_without_a_known_angle_are_refused_by_name(tmp_path):
 @needs_extra
 def test_depth_maps_are_refused(tmp_path):
     write_maps(tmp_path / "maps", "a.npy")
-    run = paper(tmp_path, "--encoding", "depth")
-    assert run.status == 2
-    assert "--encoding depth: the experiments are made on disparity maps, not on depth maps" in run.err
+    refusal = paper(tmp_path, "--encoding", "depth").refused()
+    assert "--encoding depth: the experiments are made on disparity maps, not on depth maps" in refusal
 
 
 @needs_extra

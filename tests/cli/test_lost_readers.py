@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.run_cli import command, environment, holding, wait_until, write_maps
+from tests.slow import mostly_slow
 
 FRAMES = 8
 
@@ -33,7 +34,7 @@ def start(folder, arguments, **streams):
     return subprocess.Popen(command(*arguments), cwd=folder, env=environment(), **streams)
 
 
-@pytest.mark.parametrize("name", WORK)
+@pytest.mark.parametrize("name", mostly_slow(WORK, "estimate"))
 def test_a_reader_of_messages_who_leaves_neither_ends_nor_hides_the_work(maps, name):
     arguments, written = WORK[name]
     run = start(maps, arguments, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
@@ -46,7 +47,7 @@ def test_a_reader_of_messages_who_leaves_neither_ends_nor_hides_the_work(maps, n
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
-@pytest.mark.parametrize("name", WORK)
+@pytest.mark.parametrize("name", mostly_slow(WORK, "estimate"))
 def test_messages_that_do_not_fit_on_their_disk_do_not_end_the_work(maps, name):
     arguments, written = WORK[name]
     with Path("/dev/full").open("wb") as full:
@@ -54,7 +55,7 @@ def test_messages_that_do_not_fit_on_their_disk_do_not_end_the_work(maps, name):
     assert len(list(maps.glob(written))) == FRAMES
 
 
-@pytest.mark.parametrize("name", WORK)
+@pytest.mark.parametrize("name", mostly_slow(WORK, "estimate"))
 def test_a_terminal_that_is_gone_does_not_end_the_work(maps, name):
     arguments, written = WORK[name]
     main, other = pty.openpty()
@@ -74,6 +75,7 @@ def test_an_error_keeps_its_status_when_nobody_reads_its_message(maps):
     assert run.wait(60) == 2
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="this system has no SIGHUP")
 def test_a_hangup_stops_a_run_as_sigterm_does_unless_it_is_ignored(maps):
     write_maps(maps / "maps", 60)

@@ -106,9 +106,7 @@ def test_half_a_character_is_no_text(tmp_path, command, name):
 def test_a_number_of_401_digits_is_no_angle(tmp_path, command):
     (tmp_path / "r.jsonl").write_text(json.dumps({**ROW, "roll_deg": 10**400}) + "\n")
     (tmp_path / "truth.csv").write_text("file,roll_deg\na.png,1\n")
-    done = rollcli(*COMMANDS[command], cwd=tmp_path)
-    assert done.status == 2
-    assert "is no value for roll_deg" in done.err
+    assert "is no value for roll_deg" in rollcli(*COMMANDS[command], cwd=tmp_path).refused()
 
 
 @pytest.mark.parametrize("command", ["rig", "report"])
@@ -125,17 +123,16 @@ def test_times_of_parquet_are_no_angles(tmp_path, command, kind, value):
     parquet.write_table(
         pyarrow.table({"file": ["a.png"], "status": ["ok"], "roll_deg": angles}), tmp_path / "r.parquet"
     )
-    done = rollcli(command, "r.parquet", *(["--svg", "s"] if command == "report" else []), cwd=tmp_path)
-    assert done.status == 2
-    assert "rollcli: r.parquet: " in done.err
+    refusal = rollcli(
+        command, "r.parquet", *(["--svg", "s"] if command == "report" else []), cwd=tmp_path
+    ).refused()
+    assert "rollcli: r.parquet: " in refusal
 
 
 def test_a_part_without_a_whole_line_is_damaged(tmp_path):
     (tmp_path / "r").mkdir()
     (tmp_path / "r" / "part-00000.csv").write_text("file,status,roll_deg")
-    done = rollcli("rig", "r", cwd=tmp_path)
-    assert done.status == 2
-    assert "r/part-00000.csv: is damaged: it has no whole line" in done.err
+    assert "r/part-00000.csv: is damaged: it has no whole line" in rollcli("rig", "r", cwd=tmp_path).refused()
 
 
 @pytest.mark.parametrize("wrong", [{"seed": -1}, {"tolerance": float("inf")}, {"tolerance": float("nan")}])

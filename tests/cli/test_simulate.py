@@ -97,6 +97,7 @@ def test_disparities_too_large_for_the_file_are_told(tmp_path):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
+@pytest.mark.slow
 @pytest.mark.parametrize("jobs", ["1", "2"])
 def test_ctrl_c_ends_it_with_status_130_and_without_truth(tmp_path, jobs):
     line = command("simulate", "rig", "--frames", "700", "--size", "64x48", "-j", jobs)

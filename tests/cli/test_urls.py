@@ -12,6 +12,7 @@ import pytest
 from rollcli.files.stores import locations
 from rollcli.files.stores.locations import names_a_file
 from tests.run_cli import contents, road_map, rollcli, rollcli_process, write_maps, write_pair
+from tests.slow import mostly_slow
 
 CALIBRATION = "P0: 200 0 80 0 0 200 60 0 0 0 1 0\nP1: 200 0 80 -100 0 200 60 0 0 0 1 0\n"
 MAPS = 3
@@ -76,7 +77,7 @@ def below(bucket):
     return {name: partial(read_bytes, url) for name, url in zip(names, urls, strict=True)}
 
 
-@pytest.mark.parametrize("what", LINES)
+@pytest.mark.parametrize("what", mostly_slow(LINES, "folders", "derotate", "rig", "report"))
 def test_a_url_works_as_a_path_does(places, store, what):
     folder, bucket = places
     if "report" in what:

@@ -58,6 +58,7 @@ def test_95_percent_of_the_intervals_hold_the_true_roll():
     assert np.median(half_width) < 6 * np.median(error)
 
 
+@pytest.mark.slow
 def test_on_rough_roads_they_hold_the_roll_of_the_lane_that_a_lidar_would_say():
     """Roads of ISO 8608's classes A to D, at half the size of the cameras of KITTI."""
     rig = {"size": (620, 188), "focal": 360.0, "height": 1.65, "cross_section": "flat"}

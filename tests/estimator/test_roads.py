@@ -9,12 +9,10 @@ from rollcli.estimator.energy import Energy
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.moments import map_moments
 from rollcli.estimator.request import SolverSettings
-from rollcli.estimator.solvers.exact import minima
-from rollcli.estimator.solvers.golden_section import golden_section
 from rollcli.estimator.solvers.gradient_descent import gradient_descent
 from rollcli.files.formats import read_image
 from rollcli.stereo.match import StereoOptions, match_pair
-from tests.estimator.synthetic_maps import ROADS, degrees_apart
+from tests.estimator.synthetic_maps import ROADS
 
 ROLL_DEG = {"m1_L1": -3.47, "m1_L5": -1.62, "m2_L9": -2.54, "m2_L18": -4.30, "m3_L3": 2.36}
 HALF_SIZE = StereoOptions(num_disparities=256, block_size=5, mode="3way", downscale=2)
@@ -52,16 +50,6 @@ def test_gradient_descent_converges_within_6_iterations_to_the_known_angle(stem)
 def test_gradient_descents_iterations_are_within_one_of_the_papers(stem):
     counts = [gradient_descent(energy_of(stem), SolverSettings(delta)).iterations for delta in DELTAS]
     assert all(abs(count - paper) <= 1 for count, paper in zip(counts, PAPER, strict=True)), counts
-
-
-def test_golden_sections_iterations_are_the_papers(stem):
-    counts = [golden_section(energy_of(stem), SolverSettings(delta)).iterations for delta in DELTAS]
-    assert counts == [16, 21, 26, 30]
-
-
-def test_exact_agrees_with_gradient_descent(stem):
-    best, *_ = minima(energy_of(stem))
-    assert degrees_apart(best.theta, gradient_descent(energy_of(stem)).theta) < 1e-6
 
 
 def test_agreeing_areas_give_the_angle_of_a_robust_fit(stem):

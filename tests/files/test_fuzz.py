@@ -12,6 +12,7 @@ from tests.fuzz.child import read_all_ways
 from tests.fuzz.corpus import READERS, corpus
 from tests.fuzz.mutations import at_random, every_region, with_repairs
 from tests.fuzz.texts import READ_BY, read_text, texts
+from tests.slow import mostly_slow
 
 FILES = {name: data for name, data in corpus().items() if name != "large.png"}
 
@@ -23,15 +24,10 @@ def test_whole_files_are_read(name):
 
 # of TIFF's many layouts and compressions one of each is enough for every change
 OFTEN = {"predictor2.tif", "lzw.tif", "deflate-tiles.tif", "pages.tif"}
+QUICK = [name for name in FILES if name in OFTEN or not name.endswith(".tif")]
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(name, marks=pytest.mark.slow) if name.endswith(".tif") and name not in OFTEN else name
-        for name in FILES
-    ],
-)
+@pytest.mark.parametrize("name", mostly_slow(FILES, *QUICK))
 def test_a_file_broken_anywhere_is_read_or_refused_in_one_line(name):
     answers = [read_all_ways(each) for broken in every_region(FILES[name]) for each in with_repairs(broken)]
 
@@ -63,7 +59,7 @@ def test_what_was_found_before_stays_fixed(case):
     assert read_all_ways(CASES[case]) == "refused"
 
 
-@pytest.mark.parametrize("reader", READ_BY)
+@pytest.mark.parametrize("reader", mostly_slow(READ_BY, "lists", "settings", "urls"))
 def test_whole_texts_are_read_and_broken_ones_are_read_or_refused(reader):
     random = Random(1)
     for name, whole in texts([reader]).items():

@@ -81,6 +81,7 @@ def test_what_a_small_file_claims_to_hold_is_counted_before_memory_is_taken(name
             decode(data, "x")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="peak memory is counted in other units elsewhere")
 def test_small_files_at_the_limit_take_less_than_a_gigabyte(tmp_path):
     maps = tmp_path / "maps"

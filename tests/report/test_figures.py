@@ -15,6 +15,7 @@ from rollcli.report.charts import all_charts
 from rollcli.report.figures import chart_file, with_still
 from rollcli.rig.drive.assess import assess_rig
 from tests.report.results import row
+from tests.slow import mostly_slow
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -117,6 +118,7 @@ def test_failed_frames_are_marked_along_the_lower_edge_and_the_line_of_zero_stan
     assert len(zero) >= 3
 
 
+@pytest.mark.slow
 def test_of_many_frames_those_are_drawn_that_make_the_same_picture(monkeypatch):
     rng = np.random.default_rng(6)
     rows = [row(f"{i}.png", float(v), 0.2) for i, v in enumerate(rng.normal(0, 1, 20_000))]
@@ -127,6 +129,7 @@ def test_of_many_frames_those_are_drawn_that_make_the_same_picture(monkeypatch):
     assert len(file) < 0.5 * len(chart_file(all_charts(rows)["roll"], "svg"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["roll", "histogram"])
 def test_a_browser_shows_the_svg_as_the_png_is(browser, tmp_path, charts, name):
     (tmp_path / "chart.svg").write_bytes(chart_file(charts[name], "svg"))
@@ -151,16 +154,16 @@ def test_files_are_the_same_each_time_whatever_a_user_has_set_and_leave_that_alo
         assert dict(mpl.rcParams) == before
 
 
-@pytest.mark.parametrize(
-    "rows",
-    [
-        [row("a.png", 1.0, 0.1)],
-        [row("a.png", 0.0, 0.0)] * 500,
-        [row("a.png", None)] * 3,
-        [row("a.png", 3.0, None, "suspect")],
-        [row("a.png", 1.0, 0.1), row("b.png", -80.0, 20.0, "suspect"), row("c.png", 1.1, 0.1)],
-    ],
+MIXED = [row("a.png", 1.0, 0.1), row("b.png", -80.0, 20.0, "suspect"), row("c.png", 1.1, 0.1)]
+OF_ONE_KIND = (
+    [row("a.png", 1.0, 0.1)],
+    [row("a.png", 0.0, 0.0)] * 500,
+    [row("a.png", None)] * 3,
+    [row("a.png", 3.0, None, "suspect")],
 )
+
+
+@pytest.mark.parametrize("rows", mostly_slow([MIXED, *OF_ONE_KIND], MIXED))
 def test_every_kind_of_result_has_charts(rows):
     for chart in all_charts(rows, assess_rig(rows)).values():
         for kind in ("svg", "pdf", "png"):

@@ -31,21 +31,6 @@ def touch(*names):
         Path(name).touch()
 
 
-@pytest.mark.parametrize(
-    ("file", "tails"),
-    [
-        ("a/b/c.png", ["a/b/c", "b/c", "c"]),
-        ("/a/b.v2.npy", ["a/b.v2", "b.v2"]),
-        ("../a/b.png", ["a/b", "b"]),
-        ("a/../b.png", ["b"]),
-        ("/", []),
-        (".", []),
-    ],
-)
-def test_an_image_is_looked_for_by_the_end_of_its_frames_path(file, tails):
-    assert list(sources._tails(file)) == tails
-
-
 def test_images_are_found_by_kind_in_their_folders_and_by_the_ending_of_a_map(folder):
     touch("out/derotated/a.tif", "out/vdisparity/a.tif", "out/road_mask/a.npy", "out/disparity/run/a.npy")
     (found,) = subjects([row("run/a.png")], "rolls.csv", "out/", NONE)

@@ -16,7 +16,10 @@ STREETS = ROOT.parent / "shared" / "streets"
 CALIBRATION = Calibration(707.0912, 707.0912, 601.8873, 183.1104, 0.5372)
 RUNS = {"000074": (9, 10, 11), "000151": (7, 8), "000174": (10, 11)}
 
-pytestmark = pytest.mark.skipif(not STREETS.is_dir(), reason=f"{STREETS}, the real streets, are not here")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not STREETS.is_dir(), reason=f"{STREETS}, the real streets, are not here"),
+]
 
 
 def posed(name, downscale=1.0):

@@ -7,6 +7,7 @@ import pytest
 
 from rollcli.run.result_file import DurableRows, open_result
 from tests.run_cli import contents, rollcli, write_maps
+from tests.slow import mostly_slow
 
 IMAGES = ("--derotated", "up", "--vdisparity", "v")
 
@@ -78,7 +79,7 @@ def resume(folder, *arguments):
     return rollcli("estimate", "maps", "-o", "rolls.csv", *IMAGES, "--resume", *arguments, cwd=folder)
 
 
-@pytest.mark.parametrize("jobs", ["-j1", "-j2"])
+@pytest.mark.parametrize("jobs", mostly_slow(["-j1", "-j2"], "-j1"))
 @pytest.mark.parametrize("rows", [6, 4])
 def test_a_resume_makes_missing_and_empty_images_of_kept_rows_again(finished, rows, jobs):
     before = contents(finished)

@@ -26,6 +26,7 @@ from tests.run_cli import (
     wait_until,
     write_maps,
 )
+from tests.slow import mostly_slow
 
 FRAMES = 12
 
@@ -43,7 +44,7 @@ def one_line(done):
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
-@pytest.mark.parametrize("jobs", ["1", "2"])
+@pytest.mark.parametrize("jobs", mostly_slow(["1", "2"], "1"))
 def test_a_full_device_ends_the_run_with_status_1(maps, jobs):
     done = rollcli("estimate", "maps", "-o", "/dev/full", "-q", "-j", jobs, cwd=maps)
     assert done.status == 1
@@ -61,7 +62,7 @@ def test_a_full_standard_output_ends_the_run_with_status_1(maps):
     assert done.stderr.decode() == "rollcli: standard output: cannot be written: no space left on device\n"
 
 
-@pytest.mark.parametrize("jobs", ["1", "2"])
+@pytest.mark.parametrize("jobs", mostly_slow(["1", "2"], "1"))
 def test_a_result_that_may_not_grow_keeps_its_whole_rows_and_is_resumed_later(maps, jobs):
     write_maps(maps / "maps", 40)
     arguments = ("estimate", "maps", "-o", "rolls.csv", "-q", "-j", jobs)
@@ -86,7 +87,7 @@ def test_a_result_that_may_not_grow_keeps_its_whole_rows_and_is_resumed_later(ma
     assert (maps / "rolls.csv").read_bytes() == whole
 
 
-@pytest.mark.parametrize("jobs", ["1", "2"])
+@pytest.mark.parametrize("jobs", mostly_slow(["1", "2"], "1"))
 def test_a_full_disk_of_images_keeps_the_rows_before_it(maps, jobs):
     disk = maps / "disk"
     disk.mkdir()
@@ -126,6 +127,7 @@ def test_an_output_that_is_a_folder_ends_the_run_with_status_1(maps):
     assert (done.status, "out: cannot be written: is a directory" in one_line(done)) == (1, True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("jobs", "moved"), [("1", True), ("2", False)])
 def test_a_result_that_is_moved_or_removed_while_running_ends_the_run_with_status_1(maps, jobs, moved):
     write_maps(maps / "maps", 300)
@@ -163,7 +165,7 @@ main()
     assert done.stdout.count(",ok,") == FRAMES - 1
 
 
-@pytest.mark.parametrize("jobs", ["1", "2"])
+@pytest.mark.parametrize("jobs", mostly_slow(["1", "2"], "1"))
 def test_a_closed_pipe_ends_the_run_quietly(maps, jobs):
     run = subprocess.Popen(
         command("estimate", "maps", "-j", jobs, "-q"),
@@ -212,6 +214,7 @@ def run_with_deaths(maps, deadly, times, arguments=ESTIMATE):
     return rollcli(*arguments, cwd=maps, **hooked(maps, hook))
 
 
+@pytest.mark.slow
 def test_a_worker_that_dies_once_costs_nothing(maps):
     rollcli("estimate", "maps", "-o", "undisturbed.csv", "-q", cwd=maps)
     done = run_with_deaths(maps, ["frame3", "frame8"], 1)
@@ -232,6 +235,7 @@ def test_a_frame_that_kills_its_worker_twice_is_an_error_row_and_the_batch_goes_
     ]
 
 
+@pytest.mark.slow
 def test_a_map_that_kills_its_worker_twice_is_not_derotated_and_the_others_are(maps):
     (maps / "out").mkdir()
     (maps / "out" / "frame3.png").write_text("of an earlier run")
@@ -267,6 +271,7 @@ WRITE_IMAGES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "after"), [*((each, False) for each in WRITE_IMAGES), ("estimate", True)])
 def test_a_worker_that_dies_while_it_writes_an_image_leaves_nothing_behind(maps, name, after):
     frame, line = WRITE_IMAGES[name]
@@ -306,6 +311,7 @@ def test_a_worker_that_cannot_load_its_libraries_ends_the_run_in_one_line(maps):
     assert "cv2" in cannot_start(maps, env=hooked(maps, "import sys\nsys.modules['cv2'] = None\n"))
 
 
+@pytest.mark.slow
 def test_workers_end_with_a_run_that_is_killed_also_in_the_middle_of_a_frame(maps):
     run = subprocess.Popen(
         command("estimate", "maps", "-j2", "-o", "rolls.csv", "-q"),

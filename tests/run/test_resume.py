@@ -13,6 +13,7 @@ import pytest
 from rollcli.files.results import parse_rows
 from rollcli.run.result_file import whole_rows
 from tests.run_cli import command, contents, environment, road_map, rollcli, started, write_kitti, write_maps
+from tests.slow import mostly_slow
 
 FRAMES = 40
 IMAGES = ("--derotated", "upright", "--vdisparity", "v")
@@ -92,7 +93,7 @@ def test_resume_does_not_do_again_what_is_done(undisturbed, folder):
         assert line.split(",")[2] == "error" or path.stat().st_mtime_ns == before[path]
 
 
-@pytest.mark.parametrize("jobs", [1, 2])
+@pytest.mark.parametrize("jobs", mostly_slow([1, 2], 2))
 def test_ctrl_c_keeps_what_is_done_and_prints_the_command_that_resumes(undisturbed, folder, jobs):
     run = start(folder, "-j", str(jobs))
     wait_for_images(folder, 4, run)
@@ -158,6 +159,7 @@ def test_the_command_that_resumes_a_list_says_that_it_is_needed_again(undisturbe
     assert err.endswith("--resume  # with the same list on stdin\n")
 
 
+@pytest.mark.slow
 def test_ctrl_c_again_and_again_ends_at_once_in_one_piece(undisturbed, folder):
     run = start(folder, "-j2")
     wait_for_images(folder, 4, run)
@@ -168,6 +170,7 @@ def test_ctrl_c_again_and_again_ends_at_once_in_one_piece(undisturbed, folder):
     assert results(folder) == results(undisturbed)
 
 
+@pytest.mark.slow
 def test_ctrl_c_twice_ends_a_run_whose_worker_has_been_stopped(folder):
     run = start(folder, "-j2")
     wait_for_images(folder, 4, run)
@@ -199,6 +202,7 @@ def workers_of(run):
     return [pid for pid, args in children.items() if "resource_tracker" not in args]
 
 
+@pytest.mark.slow
 def test_sigterm_stops_a_run_as_ctrl_c_does(undisturbed, folder):
     run = start(folder, "-j2")
     wait_for_images(folder, 4, run)
@@ -349,6 +353,7 @@ def test_a_result_cut_anywhere_is_resumed_to_the_same_bytes(tmp_path, ending):
         assert result.read_bytes() == whole
 
 
+@pytest.mark.slow
 def test_other_ways_to_run_do_not_hinder_a_resume(interrupted):
     done = rollcli(
         "estimate", "maps", "-o", "rolls.csv", "--resume", "-j2", "-v", "--fail-fast", cwd=interrupted
@@ -365,6 +370,7 @@ def test_the_record_holds_version_options_encoding_conventions_and_counts(undist
     assert "counter-clockwise" in record["conventions"]["roll_deg"]
 
 
+@pytest.mark.slow
 def test_fail_fast_stops_at_the_first_failure_and_can_be_resumed(undisturbed, folder):
     done = rollcli("estimate", "maps", "-o", "rolls.csv", *IMAGES, "--fail-fast", "-j2", cwd=folder)
     rows = (folder / "rolls.csv").read_text().splitlines()

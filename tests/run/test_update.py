@@ -10,6 +10,7 @@ from rollcli.files.storage import write_bytes
 from rollcli.run import inputs
 from tests.object_store import upload
 from tests.run_cli import contents, road_map, rollcli, write_kitti, write_maps, write_pair
+from tests.slow import mostly_slow
 
 FRAMES = 8
 IMAGES = ("--derotated", "up")
@@ -80,7 +81,7 @@ def test_a_resume_takes_what_changes_before_its_frame_is_done(folder, tmp_path_f
 
 
 @pytest.mark.parametrize("result", ["rolls.csv", "rolls.jsonl"])
-@pytest.mark.parametrize("jobs", ["1", "2"])
+@pytest.mark.parametrize("jobs", mostly_slow(["1", "2"], "1"))
 def test_an_update_does_what_has_changed_and_nothing_else(folder, tmp_path_factory, result, jobs):
     arguments = (*IMAGES, "-j", jobs)
     if result != "rolls.csv":

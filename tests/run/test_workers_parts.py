@@ -13,10 +13,11 @@ from rollcli.files.results import Row, format_header, format_row
 from rollcli.files.storage import list_names, remove
 from rollcli.run.batch import BatchOptions, Parts, join_results
 from rollcli.run.frame import Frame, FrameResult, ReadAs
-from rollcli.run.options import ImageOptions
+from rollcli.run.options import FrameOptions
 from rollcli.run.workers.chunks import Chunks, Done, Span
 from tests.object_store import joined
 from tests.run_cli import command, contents, environment, rollcli, write_maps
+from tests.slow import mostly_slow
 
 KITTI = ReadAs(frozenset(["kitti"]))
 FRAMES = [Frame(f"{n}.png", "", f"{n}.png", "", f"{n}.png", None) for n in range(11)]
@@ -31,7 +32,7 @@ def lines(first, end):
 def join(folder, first, end, *, known=KITTI, fail_fast=False, rows=ROWS, numbers=range(4)):
     """What a worker hands back of frames that a run of eleven has, in parts of three rows."""
     parts = Parts(str(folder), "csv", (), 3, numbers, len(FRAMES), "run", {})
-    told = BatchOptions("csv", (), ImageOptions(), "", verbose=False, fail_fast=fail_fast, parts=parts)
+    told = BatchOptions("csv", (), FrameOptions(), verbose=False, fail_fast=fail_fast, parts=parts)
     results = [FrameResult(row, "kitti") for row in rows[first:end]]
     return join_results(Span(FRAMES[first:end], first, known), results, told)
 
@@ -97,7 +98,7 @@ def maps(tmp_path):
     return tmp_path
 
 
-@pytest.mark.parametrize("rows", ["1", "2", "7", "23", "1000"])
+@pytest.mark.parametrize("rows", mostly_slow(["1", "2", "7", "23", "1000"], "7"))
 def test_parts_of_several_workers_are_the_file_of_one_process(maps, bucket, rows):
     line = ("estimate", "maps", "-o", f"{bucket}/{rows}.csv", "--part-rows", rows, "-j", "2", "-q")
     assert rollcli(*line, cwd=maps).status == 3
@@ -106,7 +107,7 @@ def test_parts_of_several_workers_are_the_file_of_one_process(maps, bucket, rows
 
 
 @pytest.mark.parametrize("missing", [[0], [1, 2, 5], [0, 11], range(12)])
-@pytest.mark.parametrize("jobs", ["1", "2"])
+@pytest.mark.parametrize("jobs", mostly_slow(["1", "2"], "1"))
 def test_a_resume_does_the_parts_that_are_missing_wherever_they_are_and_no_others(maps, missing, jobs):
     pytest.importorskip("pyarrow", reason="pyarrow, of the extra parquet, is not here")
     line = ("estimate", "maps", "-o", "rolls.parquet", "--part-rows", "2", "-j", jobs)

@@ -295,11 +295,13 @@ def made(tmp_path_factory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_the_script_makes_the_same_files_and_the_same_truth(made):
     assert files(SAMPLES) == files(made)
     assert (SAMPLES / "truth.csv").read_text() == (made / "truth.csv").read_text()
 
 
+@pytest.mark.slow
 def test_the_script_makes_the_same_pictures(made):
     # other versions compress in other ways, and other processors may round a grey level to its neighbour
     for name in (f"{side}/{stem}.png" for side in ("left", "right") for stem in STEMS):

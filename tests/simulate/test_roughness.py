@@ -1,6 +1,7 @@
 """Rough roads against ISO 8608 and isotropy, on what is drawn; their truth on what is rendered."""
 
 import functools
+import itertools
 import math
 
 import numpy as np
@@ -10,7 +11,9 @@ from rollcli.simulate.build import build_scene, carriageway_of, true_disparity
 from rollcli.simulate.dataset import lane_rolls_of
 from rollcli.simulate.relief import draw_relief
 from rollcli.simulate.spec import FrameSpec
+from tests.slow import mostly_slow
 
+FLAT, CROWNED = {}, {"cross_section": "crown", "crossfall": 0.03, "bend": 0.003}
 NOWHERE = (-100.0, -100.0)  # tracks and patches: none on the grid
 
 
@@ -66,8 +69,10 @@ def scanned_depth(spec, u, v):
     return t[np.argmax(carriageway.course.elevation(points) < ground)]
 
 
-@pytest.mark.parametrize("roughness", ["A", "E"])
-@pytest.mark.parametrize("section", [{}, {"cross_section": "crown", "crossfall": 0.03, "bend": 0.003}])
+@pytest.mark.parametrize(
+    ("roughness", "section"),
+    mostly_slow(itertools.product("AE", (FLAT, CROWNED)), ("E", CROWNED)),
+)
 def test_rays_end_where_a_fine_scan_meets_the_uneven_road(roughness, section):
     spec = FrameSpec(
         "bare", 0.05, 0.03, 0.0005, size=(160, 120), focal=93, roughness=roughness, seed=3, **section

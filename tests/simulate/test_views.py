@@ -1,5 +1,6 @@
 """The two views differ by parallax and noise alone, and hold no detail finer than their pixels."""
 
+import functools
 import math
 from dataclasses import replace
 
@@ -11,9 +12,11 @@ from rollcli.simulate.build import build_scene, render_frame
 from rollcli.simulate.spec import FrameSpec
 from rollcli.simulate.views import render_view
 from rollcli.stereo.match import compute_disparity
+from tests.slow import mostly_slow
 
 CLEAN = {"noise": 0.0, "colour": False}
 STREET = FrameSpec("street", math.radians(6), math.radians(2), seed=12, size=(320, 240), focal=186.0, **CLEAN)
+rendered = functools.cache(render_frame)
 
 
 def warped(image, disparity):
@@ -42,13 +45,13 @@ def test_the_right_view_moved_by_the_true_disparity_is_the_left_view(scene):
 
 
 def test_without_noise_and_gain_the_views_have_the_same_brightness():
-    frame = render_frame(STREET)
+    frame = rendered(STREET)
     v, u = np.nonzero(frame.road[150:])
     assert abs(float(frame.left[150:][v, u].mean()) - float(frame.right[150:][v, u].mean())) < 3
 
 
 def test_gain_makes_the_right_view_brighter_and_leaves_the_left_one_alone():
-    plain, bright = render_frame(STREET), render_frame(replace(STREET, gain=1.3))
+    plain, bright = rendered(STREET), render_frame(replace(STREET, gain=1.3))
     assert np.array_equal(plain.left, bright.left)
     dark = (plain.right > 40) & (plain.right < 200)
     ratio = (bright.right[dark] / plain.right[dark].astype(float)) ** 2
@@ -56,7 +59,7 @@ def test_gain_makes_the_right_view_brighter_and_leaves_the_left_one_alone():
 
 
 def test_noise_has_the_strength_asked_for_and_differs_between_the_views():
-    clean, noisy = render_frame(STREET), render_frame(replace(STREET, noise=4.0))
+    clean, noisy = rendered(STREET), render_frame(replace(STREET, noise=4.0))
     errors = []
     for before, after in ((clean.left, noisy.left), (clean.right, noisy.right)):
         errors.append(after.astype(float) - before)
@@ -66,7 +69,7 @@ def test_noise_has_the_strength_asked_for_and_differs_between_the_views():
     assert np.array_equal(clean.disparity, noisy.disparity)
 
 
-@pytest.mark.parametrize("scene", ["bare", "street"])
+@pytest.mark.parametrize("scene", mostly_slow(["bare", "street"], "bare"))
 def test_no_pixel_shows_detail_finer_than_itself(scene):
     spec = FrameSpec(scene, pitch=math.radians(2), size=(160, 120), focal=93, seed=5, **CLEAN)
     frame = render_frame(spec)
@@ -104,7 +107,7 @@ def test_a_stereo_matcher_finds_the_road_as_well_as_on_real_pairs(scene):
 
 
 def test_a_picture_is_the_same_rendered_in_one_band_of_rows_or_in_many(monkeypatch):
-    whole = render_frame(STREET)
+    whole = rendered(STREET)
     monkeypatch.setattr("rollcli.simulate.views._BAND", 17 * 320)
     banded = render_frame(STREET)
     assert np.array_equal(whole.left, banded.left)
@@ -114,7 +117,7 @@ def test_a_picture_is_the_same_rendered_in_one_band_of_rows_or_in_many(monkeypat
 
 
 def test_colour_and_grey_show_the_same_picture():
-    grey, colour = render_frame(STREET).left, render_frame(replace(STREET, colour=True)).left
+    grey, colour = rendered(STREET).left, render_frame(replace(STREET, colour=True)).left
     assert grey.shape == (240, 320)
     assert colour.shape == (240, 320, 3)
     assert np.abs(cv2.cvtColor(colour, cv2.COLOR_BGR2GRAY).astype(float) - grey).mean() < 3

@@ -18,6 +18,7 @@ from rollcli.stereo.alignment import Approach, level
 from rollcli.stereo.match import StereoOptions, match_pair
 from rollcli.stereo.misalignment import LEVEL, Misalignment
 from rollcli.stereo.views import resampled
+from tests.slow import mostly_slow
 
 SHARED = Path(__file__).parents[2].parent / "shared"
 ROLL = math.radians(-3)
@@ -33,7 +34,7 @@ ODD_RIGS = [  # degrees clockwise, percent larger, pixels lower
 ]
 
 
-@pytest.fixture(scope="module", params=["open", "street"])
+@pytest.fixture(scope="module", params=mostly_slow(["open", "street"], "street"))
 def frame(request):
     return render_frame(FrameSpec(scene=request.param, roll=ROLL, seed=31, colour=False))
 
@@ -124,7 +125,7 @@ def test_a_level_pair_is_left_as_it_is(frame, downscale):
     np.testing.assert_array_equal(match.disparity, off.disparity)
 
 
-@pytest.fixture(scope="module", params=[1, 5, 14])
+@pytest.fixture(scope="module", params=mostly_slow([1, 5, 14], 5))
 def empty_road(request):
     """Grain and noise: of two of these, small views say that the right one is turned and skewed."""
     specs = draw_specs(
@@ -261,7 +262,10 @@ def test_an_offset_that_cannot_be_is_refused(offset):
 
 
 @pytest.mark.skipif(not (SHARED / "streets").is_dir(), reason="no real street pairs at ../shared/streets")
-@pytest.mark.parametrize(("clockwise_deg", "larger_percent", "lower"), [(0.5, 0.0, -2.0), (-0.8, 0.8, 4.0)])
+@pytest.mark.parametrize(
+    ("clockwise_deg", "larger_percent", "lower"),
+    mostly_slow([(0.5, 0.0, -2.0), (-0.8, 0.8, 4.0)], (0.5, 0.0, -2.0)),
+)
 def test_real_street_pairs_are_levelled_by_what_was_added(clockwise_deg, larger_percent, lower):
     odd = {"clockwise_deg": clockwise_deg, "larger_percent": larger_percent, "lower": lower}
     compared = 0

@@ -74,18 +74,21 @@ def assert_agree(pairs):
     assert (apart <= reach).all()
 
 
+@pytest.mark.slow
 def test_rendered_roads_get_the_angle_of_the_whole_match():
     asked = SimulateOptions(frames=6, size=(640, 480), seed=17, grey=True)
     frames = [render_frame(spec) for spec in draw_specs(asked)]
     assert_agree([(frame.left, frame.right) for frame in frames])
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not LIDAR.is_dir(), reason=f"{LIDAR} is not there")
 def test_real_roads_get_the_angle_of_the_whole_match():
     named = sorted((LIDAR / "left").iterdir())[::6]
     assert_agree([(read_image(str(left)), read_image(str(LIDAR / "right" / left.name))) for left in named])
 
 
+@pytest.mark.slow
 def test_a_map_of_everything_gives_the_angle_of_the_pair():
     """Its road is matched along the plane, too; what is beside it differs, and where nothing was found."""
     asked = SimulateOptions(frames=8, size=(640, 480), seed=18, grey=True)

@@ -54,21 +54,6 @@ class Rig:
         return round(corrected.offset, 3), doubt
 
 
-@pytest.mark.parametrize("any_scene", [False, True])
-def test_a_level_pair_is_matched_once(monkeypatch, any_scene):
-    rig = Rig(0.05)
-    assert rig.run(monkeypatch, lies(0.0), any_scene=any_scene) == (0, "")
-    assert rig.matched == [(0, ALL_ROWS)]
-    assert rig.measured == [(1, 8)]
-    assert rig.checked == (not any_scene)
-
-
-def test_what_each_map_hides_is_found_in_three_matches(monkeypatch):
-    rig = Rig(3.0, hidden=0.5)
-    assert rig.run(monkeypatch, lies(0.0)) == (3.0, "")
-    assert [at for at, _ in rig.matched] == [0, 1.5, 3.0]
-
-
 def test_a_pair_that_runs_away_is_given_up_after_four_matches(monkeypatch):
     rig = Rig(lambda at: at + 1.0)
     corrected, doubt = rig.run(monkeypatch, lies(0.0))

@@ -132,6 +132,7 @@ def test_the_map_given_is_not_changed_and_parts_give_the_same(monkeypatch):
     np.testing.assert_allclose(refined(given, views), whole, atol=1e-5)
 
 
+@pytest.mark.slow
 def test_matched_roads_lie_nearer_to_where_they_are_and_so_do_their_angles(monkeypatch):
     """Rendered truth: the mean error of each road, whose part that changes across it tilts the plane."""
     errors = {"smoothed": [], "refined": []}

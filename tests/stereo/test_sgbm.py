@@ -11,6 +11,7 @@ from rollcli.simulate.spec import draw_specs
 from rollcli.stereo.match import compute_disparity
 from rollcli.stereo.options import MODES, StereoOptions
 from rollcli.stereo.sgbm import LAGS, match_rows, match_views, without_lag
+from tests.slow import mostly_slow
 
 
 @pytest.fixture(scope="module")
@@ -119,14 +120,18 @@ def test_below_the_first_disparity_searched_there_is_no_data(views, mode, first)
     assert np.median(np.abs(disparity - wide)[both]) == 0
 
 
-@pytest.mark.parametrize("mode", MODES)
-def test_matched_roads_lie_where_they_are(mode):
-    off = []
+@pytest.fixture(scope="module")
+def roads():
     asked = SimulateOptions(
         frames=3, scene="bare", roll_deg=(-5.7, 5.7), pitch_deg=(2.9, 5.7), seed=31, grey=True
     )
-    for spec in draw_specs(asked):
-        frame = render_frame(spec)
+    return [render_frame(spec) for spec in draw_specs(asked)]
+
+
+@pytest.mark.parametrize("mode", mostly_slow(MODES, "3way"))
+def test_matched_roads_lie_where_they_are(roads, mode):
+    off = []
+    for frame in roads:
         found = compute_disparity(frame.left, frame.right, mode=mode)
         road = frame.road & (found > 0) & (abs(found - frame.disparity) < 1)
         off.append(float(np.median((found - frame.disparity)[road])))

@@ -235,6 +235,7 @@ def test_real_road_pairs_need_and_get_a_wide_range():
         assert roll_deg == pytest.approx(ROADS[pair.left.path.stem], abs=0.15)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not (SHARED / "streets").is_dir(), reason="no real street pairs at ../shared/streets")
 def test_real_street_pairs_get_a_range_that_fits():
     for pair in pair_inputs(str(SHARED / "streets" / "left"), str(SHARED / "streets" / "right")):

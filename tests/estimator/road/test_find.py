@@ -249,25 +249,30 @@ def test_a_mask_that_leaves_hardly_a_pixel_is_refused():
         estimate_roll(disparity, mask=mask)
 
 
-@pytest.fixture(scope="module")
-def streets():
-    if not STREETS.is_dir():
-        pytest.skip("the real street pairs (../shared/streets) are not here")
-    maps = {}
-    for left in sorted((STREETS / "left").glob("*.png")):
-        pair = read_image(left), read_image(STREETS / "right" / left.name)
-        maps[left.stem] = match_pair(*pair, StereoOptions()).disparity
-    return maps
+needs_streets = pytest.mark.skipif(
+    not STREETS.is_dir(), reason="the real street pairs (../shared/streets) are not here"
+)
 
 
-def test_real_streets_agree_with_lidar(streets):
+@functools.cache
+def street(name):
+    """The disparity map of a real street."""
+    pair = (read_image(STREETS / side / f"{name}.png") for side in ("left", "right"))
+    return match_pair(*pair, StereoOptions()).disparity
+
+
+@needs_streets
+def test_real_streets_agree_with_lidar():
     for name, (lowest, highest) in LIDAR_DEG.items():
-        assert lowest - 0.15 < math.degrees(estimate_roll(streets[name]).theta) < highest + 0.15
-    assert estimate_roll(streets["000027_10"]).status == "suspect"  # a road of two planes
+        assert lowest - 0.15 < math.degrees(estimate_roll(street(name)).theta) < highest + 0.15
+    assert estimate_roll(street("000027_10")).status == "suspect"  # a road of two planes
 
 
-def test_real_streets_do_not_jump_from_frame_to_frame_unless_they_are_doubted(streets):
-    found = {name: estimate_roll(disparity) for name, disparity in streets.items()}
+@pytest.mark.slow
+@needs_streets
+def test_real_streets_do_not_jump_from_frame_to_frame_unless_they_are_doubted():
+    names = sorted(path.stem for path in (STREETS / "left").glob("*.png"))
+    found = {name: estimate_roll(street(name)) for name in names}
 
     for (name, before), (following, after) in itertools.pairwise(found.items()):
         if name[:6] == following[:6] and "suspect" not in (before.status, after.status):
@@ -275,9 +280,10 @@ def test_real_streets_do_not_jump_from_frame_to_frame_unless_they_are_doubted(st
     assert sum(estimate.status == "suspect" for estimate in found.values()) <= 6
 
 
+@needs_streets
 @pytest.mark.parametrize("name", ["000174_10", "000027_07"])  # the second has a verge beside a narrow lane
-def test_a_real_street_that_is_rotated_moves_the_angle_as_much(streets, name):
-    disparity = streets[name]
+def test_a_real_street_that_is_rotated_moves_the_angle_as_much(name):
+    disparity = street(name)
     start = estimate_roll(disparity).theta
 
     for turn_deg in (-6, -2, 3, 8):

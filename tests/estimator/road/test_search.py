@@ -39,6 +39,7 @@ def test_a_share_of_noise_moves_the_angle_by_so_much_at_most(scene, share, most_
         assert abs(off) < most_deg, roll_deg
 
 
+@pytest.mark.slow
 @repeatable
 @given(st.floats(-40, 40), st.floats(0.1, 0.6), st.floats(100, 300))
 def test_any_plane_with_noise_of_a_tenth_of_a_pixel_is_found(roll_deg, slope, horizon):
@@ -94,6 +95,7 @@ def test_a_wall_over_a_third_of_the_map_is_not_the_road(side, tilt):
     assert angle_deg(disparity) == pytest.approx(2, abs=0.1)
 
 
+@pytest.mark.slow
 def test_a_kerb_that_grows_turns_the_angle_little_by_little():
     heights = np.linspace(0, 0.04, 17)  # m
     angles = [

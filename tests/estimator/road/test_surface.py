@@ -7,7 +7,6 @@ import pytest
 
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.road.find import find_road
-from rollcli.estimator.road.model import RoadModel
 from rollcli.estimator.road.sample import take_sample
 from rollcli.estimator.road.surface import fit_surface
 from rollcli.estimator.tuning import TUNING
@@ -177,33 +176,3 @@ def test_pixels_that_do_not_lie_on_the_road_have_no_part_in_its_share():
         shares[others] = surface_of(disparity * (1 + 0.06 * above)).share  # three tolerances
 
     assert shares[0.3] == pytest.approx(0.7 * shares[0.0], rel=0.05)
-
-
-@pytest.mark.parametrize("roll_deg", [-20, 0, 35])
-def test_the_side_of_a_pixel_is_its_way_to_the_right_in_camera_heights(roll_deg):
-    """Against the geometry: pixels of a level road seen from 1.4 m, 0.3 m baseline, f = 140 px."""
-    focal, baseline, height = 140.0, 0.3, 1.4
-    disparity = flat_road(roll_deg, focal=focal, pitch_deg=0)
-    v, u = np.nonzero(disparity > 1)
-    x, y, d = u - 79.5, v - 59.5, disparity[v, u]
-    roll = math.radians(roll_deg)
-    depth = focal * baseline / d
-    metres = (x * math.cos(roll) + y * math.sin(roll)) * depth / focal
-    model = RoadModel(roll, (0.0, baseline / height, 0.0))
-
-    np.testing.assert_allclose(
-        model.side(model.across(x, y), model.disparity(x, y)), metres / height, rtol=1e-9, atol=1e-9
-    )
-
-
-def test_camber_lifts_the_road_by_half_the_side_squared():
-    """Against the geometry: ground that is higher by h camera heights is nearer by the factor 1 - h."""
-    camber, side = 0.02, np.linspace(-2, 2, 9)
-    model = RoadModel(0.0, (0.0, 200.0, 0.0), camber)
-    y = np.full(9, 0.3)
-    x = side * y  # across * slope / disparity = x / y
-
-    lifted = model.disparity(x, y)
-
-    height = camber / 2 * side**2
-    np.testing.assert_allclose(lifted, 200 * y / (1 - height), rtol=2 * np.square(height.max()))

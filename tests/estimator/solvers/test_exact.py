@@ -4,14 +4,11 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rollcli.errors import EstimationError
-from rollcli.estimator.request import SolverSettings
 from rollcli.estimator.solvers.exact import certify, certify_near, exact, minima
-from rollcli.estimator.solvers.golden_section import golden_section
-from rollcli.estimator.solvers.gradient_descent import gradient_descent
 from rollcli.estimator.solvers.solution import Solution
 from tests.estimator.synthetic_maps import bent_road, degrees_apart, energy_of, random_maps, repeatable
 
@@ -103,27 +100,6 @@ def test_the_line_model_gives_the_angle_of_the_best_plane(disparity):
     theta = exact(energy).theta
     assert degrees_apart(theta, math.atan2(-c1, c2)) < 1e-6
     assert energy.at(theta).value <= energy.at(DENSE).value.min() * (1 + 1e-12)
-
-
-@repeatable
-@given(random_maps())
-def test_it_is_never_above_another_solver(disparity):
-    energy = energy_of(disparity)
-    best = energy.at(exact(energy).theta).value
-    slack = 1e-12 * (energy.rest + energy.slope_energy)
-    assert best <= energy.at(gradient_descent(energy).theta).value + slack
-    assert best <= energy.at(golden_section(energy).theta).value + slack
-
-
-@repeatable
-@given(random_maps())
-def test_it_agrees_with_gradient_descent_where_that_is_global(disparity):
-    energy = energy_of(disparity)
-    best, *others = minima(energy)
-    descent = gradient_descent(energy, SolverSettings(math.radians(1e-6)))
-    nearest = min([best, *others], key=lambda m: degrees_apart(m.theta, descent.theta))
-    assume(descent.status.converged and nearest is best and energy.at(descent.theta).curvature > 0)
-    assert degrees_apart(descent.theta, best.theta) < 1e-6
 
 
 @pytest.mark.parametrize("columns", [(3, 40), (3, 4), (0, 59)])

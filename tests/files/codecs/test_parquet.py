@@ -33,6 +33,7 @@ def test_rows_come_back_with_their_numbers():
     assert list(decode_parquet(data, "x")) == list(enumerate(ROWS, 1))
 
 
+@pytest.mark.slow
 def test_values_damaged_anywhere_are_refused_or_read_the_same():
     whole = encode_parquet(column_types(), ROWS[:20], {})
     footer = whole[-8 - int.from_bytes(whole[-8:-4], "little") :]  # has no checksum

@@ -17,10 +17,6 @@ def values_of(depth, height=37, width=53):
     return (disparity_map(height, width) % 2**depth).astype(np.uint16 if depth == 16 else np.uint8)
 
 
-def kitti_png(height=37, width=53):
-    return encode_stored((disparity_map(height, width) * 256).astype(np.uint16), "png")
-
-
 @pytest.mark.parametrize("interlace", [False, True])
 @pytest.mark.parametrize("depth", [1, 2, 4, 8, 16])
 def test_every_bit_depth_is_read_as_it_is_stored(depth, interlace):

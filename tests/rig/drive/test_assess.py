@@ -9,6 +9,7 @@ from tests.rig.drive.series import drive
 SEEDS = range(4)
 
 
+@pytest.mark.slow
 def test_a_stable_drive_has_an_interval_that_holds_and_neither_jumps_nor_drift():
     inside, jumps = 0, 0
     for seed in range(20):
@@ -46,6 +47,7 @@ def test_up_and_down_again_are_two_jumps():
     assert found.jumps[0].change.value > 0.5 > -0.5 > found.jumps[1].change.value
 
 
+@pytest.mark.slow
 def test_gross_outliers_called_ok_hardly_move_the_mean():
     clean, soiled = [], []
     for seed in range(6):

@@ -1,13 +1,14 @@
 """The posterior against statsmodels and scipy, its interval against simulated truth, and outliers."""
 
+from statistics import NormalDist
+
 import numpy as np
 import pytest
-import statsmodels.api as sm
-from scipy.stats import multivariate_normal, norm
 
 from rollcli.rig.drive.posterior import TUNING, Fit, Likelihood, Series, make_cells
 from rollcli.rig.drive.quantity import assess_sequence, gross_outliers
 from tests.rig.drive.series import ar1, drive
+from tests.slow import mostly_slow
 
 FRAMES = 40
 FACTORS = len(TUNING.error_factors)
@@ -30,8 +31,12 @@ def covariance_of(cells, place, noise):
     return spread**2 * TUNING.correlations[place] ** distance + factor * np.diag(cells.variances)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("place", "noise"), [(0, 2), (4, 30), (12, 69), (8, 41)])
 def test_each_noise_has_the_fit_of_statsmodels_and_the_likelihood_of_scipy(cells, place, noise):
+    import statsmodels.api as sm
+    from scipy.stats import multivariate_normal
+
     design = np.column_stack([np.ones(len(cells.first)), cells.centres / FRAMES])
     fit = Likelihood(cells).fit(design)
     covariance = covariance_of(cells, place, noise)
@@ -47,7 +52,10 @@ def test_each_noise_has_the_fit_of_statsmodels_and_the_likelihood_of_scipy(cells
     assert fit.log_evidence[place, noise] == pytest.approx(expected + constant, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_a_pair_of_steps_gains_what_its_fit_gains(cells):
+    import statsmodels.api as sm
+
     likelihood, level = Likelihood(cells), np.ones((len(cells.first), 1))
     fit = likelihood.fit(level)
     gains = likelihood.pairs(level, fit)
@@ -64,7 +72,8 @@ def test_the_interval_of_a_mixture_holds_95_per_cent_of_it():
     fit = Fit(means[None, :, None], (deviations**2)[None, :, None, None], np.log(shares)[None])
     found = fit.estimate([1.0])
     ends = [found.value - found.ci95, found.value + found.ci95]
-    low, high = (shares @ norm.cdf(end, means, deviations) for end in ends)
+    parts = [NormalDist(*each) for each in zip(means, deviations, strict=True)]
+    low, high = (shares @ [part.cdf(end) for part in parts] for end in ends)
     assert found.value == pytest.approx(0.15)
     assert high - low == pytest.approx(0.95, abs=1e-6)
 
@@ -89,9 +98,9 @@ def test_cells_are_weighted_means_that_do_not_reach_across_a_jump():
     [
         (8, 0.0, 0.1, 1.1),
         (20, 0.9, 0.1, 0.5),
-        (60, 0.7, 0.15, 0.38),
-        (120, 0.5, 0.2, 0.11),
-        (240, 0.94, 0.3, 0.5),
+        pytest.param(60, 0.7, 0.15, 0.38, marks=pytest.mark.slow),
+        pytest.param(120, 0.5, 0.2, 0.11, marks=pytest.mark.slow),
+        pytest.param(240, 0.94, 0.3, 0.5, marks=pytest.mark.slow),
     ],
 )
 def test_the_interval_holds_from_eight_frames_on_and_is_not_too_wide(frames, phi, sd, widest):
@@ -107,6 +116,7 @@ def test_the_interval_holds_from_eight_frames_on_and_is_not_too_wide(frames, phi
     assert np.median(halves) <= widest
 
 
+@pytest.mark.slow
 def test_errors_that_are_said_too_small_do_not_make_the_interval_too_narrow():
     inside = 0
     for seed in range(30):
@@ -117,7 +127,7 @@ def test_errors_that_are_said_too_small_do_not_make_the_interval_too_narrow():
     assert inside >= 26
 
 
-@pytest.mark.parametrize("frames", [1, 2, 9, 200, 2000, 20_000])
+@pytest.mark.parametrize("frames", mostly_slow([1, 2, 9, 200, 2000, 20_000], 1, 9, 200))
 @pytest.mark.parametrize("count", [1, 2, 7, 8, 9, 16, 17, 40])
 @pytest.mark.parametrize("where", ["first", "middle", "last", "spread"])
 def test_whatever_counts_gives_a_mean_among_its_frames(frames, count, where):

@@ -8,13 +8,10 @@ import subprocess
 import sys
 import threading
 import time
+from importlib.util import find_spec
 from itertools import count
 
 import pytest
-
-pytest.importorskip("distributed", reason="the extra cluster is not installed")
-
-from distributed import LocalCluster
 
 from rollcli import __version__
 from rollcli.errors import UsageError
@@ -28,7 +25,11 @@ from tests.object_store import joined, upload
 from tests.run.workers.tasks import lost, run
 from tests.run_cli import command, contents, environment, road_map, rollcli, write_maps, write_pair
 
-pytestmark = pytest.mark.slow
+# Dask loads in the tests that use it: it takes a second
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(find_spec("distributed") is None, reason="the extra cluster is not installed"),
+]
 FRAMES = 40
 IMAGES = ("--derotated", "upright", "--vdisparity", "v")
 LOCAL = ("--host", "127.0.0.1", "--no-dashboard")
@@ -316,6 +317,8 @@ def test_a_scheduler_without_workers_ends_the_run(tmp_path, monkeypatch):
     monkeypatch.setattr(cluster, "_FIRST_WORKER_S", 0.5)
     write_maps(tmp_path / "maps", 2)
     here = {"host": "127.0.0.1", "protocol": "tcp", "dashboard_address": ":0"}
+    from distributed import LocalCluster
+
     with LocalCluster(n_workers=0, processes=False, **here) as empty:
         done = estimate_here(empty.scheduler_address, tmp_path)
     assert done.status == 1
@@ -353,6 +356,8 @@ HERE = {"host": "127.0.0.1", "protocol": "tcp", "dashboard_address": ":0", "thre
 @pytest.fixture(scope="module")
 def workers_here():
     """Two workers in this process."""
+    from distributed import LocalCluster
+
     with LocalCluster(n_workers=2, processes=False, **HERE) as made:
         yield made
 

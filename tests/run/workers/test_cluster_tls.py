@@ -5,14 +5,15 @@ import shutil
 import subprocess
 import sys
 import time
+from importlib.util import find_spec
 
 import pytest
 
 from tests.run_cli import environment, rollcli, write_maps
 
-pytest.importorskip("distributed", reason="the extra cluster is not installed")
 pytestmark = [
     pytest.mark.slow,
+    pytest.mark.skipif(find_spec("distributed") is None, reason="the extra cluster is not installed"),
     pytest.mark.skipif(shutil.which("openssl") is None, reason="no openssl to make certificates with"),
 ]
 

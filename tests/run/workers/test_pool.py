@@ -75,6 +75,7 @@ def test_a_worker_computes_in_one_thread():
     assert results(("threads",), ("threads",)) == [1, 1]
 
 
+@pytest.mark.slow
 def test_one_task_of_a_large_chunk_that_kills_workers_is_found_and_named():
     tasks = [("give", number) for number in range(3000)]
     tasks[2000] = ("die",)
