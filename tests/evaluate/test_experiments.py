@@ -122,6 +122,8 @@ def test_tables_hold_the_papers_numbers_beside_the_mean_of_ours(found):
     assert first.where(solver="gss").column("paper") == first.where(solver="gss").column("mean")
     assert first.where(solver="gd").column("paper") == [3, 4, 4, 4]
     assert first.where(solver="gd").column("mean") == [count + 0.5 for count in found.gd]
+    assert first.where(solver="gd").column("min") == list(found.gd)
+    assert first.where(solver="gd").column("max") == list(other.gd)
     second = tables["table2_runtime"].where(solver="gss")
     assert second.column("paper_s") == [1.551, 1.986, 2.457, 2.810]
     assert second.column("moments_s") == [2.0] * 4
