@@ -252,18 +252,15 @@ class Worker(Generic[Task, Result]):
     """
 
     def __init__(self, load: Callable[[], None] = _load_decoders) -> None:
-        fork = (
-            _has_one_thread() and _error_of(load) is None and _has_one_thread()
-        )  # libraries start some, too
+        # libraries may start threads when they load
+        fork = hasattr(os, "fork") and _has_one_thread() and _error_of(load) is None and _has_one_thread()
         start: Any = multiprocessing.get_context("fork" if fork else "spawn")
         self.in_hand: deque[PoolFuture[Task, Result]] = deque()
         try:
             self.pipe, far_end = start.Pipe()
             ends = (far_end, self.pipe if fork else None)
             self._process = start.Process(target=_serve, args=(*ends, load), daemon=True)
-            with _stop_signals_blocked(
-                fork
-            ):  # the child inherits this: only the parent decides when work ends
+            with _stop_signals_blocked(fork):  # in the child, too: only the parent decides when work ends
                 self._process.start()
         except OSError as error:
             raise _cannot_start(error) from error
