@@ -27,6 +27,7 @@ from rollcli.stereo.views import (
     blocks_at,
     grey_between,
     resampled,
+    sampled,
     seen_at,
     shrink_both,
     smoothed_at_pixels,
@@ -358,8 +359,7 @@ def level(right: View, misalignment: Misalignment, near: Map | None = None) -> V
         far = cv2.resize(near, (width, height), interpolation=cv2.INTER_LINEAR).astype(np.float32, copy=False)
         far *= np.float32(width / near.shape[1])
     at_u, at_v = seen_at(misalignment, u, v, right.shape, far)
-    levelled = cv2.remap(right, at_u, at_v, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
-    return levelled.astype(np.uint8, copy=False)
+    return sampled(right, at_u, at_v, cv2.INTER_CUBIC)
 
 
 def seen_from_right(disparity: Map) -> Map:
