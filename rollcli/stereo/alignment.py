@@ -45,8 +45,8 @@ _ROUNDING = 0.99  # of a sum of 64 float32
 _MOST = 50.0  # and one with more counts no more than with this
 _FEWEST = 40  # blocks
 _LONGEST_STEP = 1.5  # px, anywhere; along the rows, shorter ones take twice as many rounds
-# px: a round that moves less is the last. With 0.05, OpenCV 4.7 and 5 gave angles up to 0.3 degrees apart to
-# 41 real pairs, 6 of them more than 0.01; with 0.01 it is 0.03, and 4, for a twentieth of a pair's time
+# px: a round that moves less is the last. With 0.05, angles of 6 of 41 real pairs moved by more than 0.01
+# degrees with the last digits of grey levels
 _SMALL_STEP = 0.01
 
 
