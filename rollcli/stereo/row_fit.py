@@ -58,7 +58,7 @@ class BeliefTuning:
         that a lens has skewed alone (KITTI's grey cameras: 0.11 along x²), and of others (rendered: 0.02).
     may_scale, may_tilt, may_bend, may_skew : float
         The same as the interval has it. Where the rows cannot tell two causes apart, it reaches both of them;
-        a quarter makes twice the standard deviation of a scale all of it.
+        0.35 makes twice the standard deviation of a scale all of it, where a tilt is as likely as a bend.
     least : float
         What no pair tells of a scale or, in px at the border, of a twist: blocks share a part of their error.
     tiles : float
@@ -83,7 +83,7 @@ class BeliefTuning:
     no_shape: float = 0.02
     may_scale: float = 0.5
     may_tilt: float = 0.1
-    may_bend: float = 0.25
+    may_bend: float = 0.35
     may_skew: float = 0.3
     least: float = 0.0001
     tiles: float = 2.0
