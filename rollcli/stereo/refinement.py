@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rollcli.stereo.misalignment import LEVEL, Misalignment
 from rollcli.stereo.sgbm import STEEPEST
-from rollcli.stereo.views import BLOCK, View, Views, block_means, blocks_at, seen_at
+from rollcli.stereo.views import BLOCK, View, Views, block_means, blocks_at, sampled, seen_at
 
 Floats = NDArray[np.float32]
 
@@ -132,7 +132,7 @@ def _found(
     shift: Floats = none
     rounds, between = (_ROUNDS, cv2.INTER_LINEAR) if lies == LEVEL else (_ROUNDS_LEVELLED, cv2.INTER_CUBIC)
     for _ in range(rounds):
-        off = cv2.remap(right, u, v, between, borderMode=cv2.BORDER_REPLICATE) - grey
+        off = sampled(right, u, v, between) - grey
         step = np.clip(np.einsum("ij,ij->i", weight, off), -_LONGEST_STEP, _LONGEST_STEP)
         u -= step[:, None]
         shift += step

@@ -162,6 +162,22 @@ def test_a_fit_without_noise_is_exact_and_outliers_do_not_move_it():
     assert robust.shifts(160, 300) == pytest.approx(lies.shifts(160, 300), abs=1e-2)
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_a_fit_has_settled(seed):
+    """Weighed by how far off they are from it, the blocks give it again: it depends on no way there."""
+    seen = seen_at(Misalignment(0.1, 0.001, 0.001), count=900)
+    seen = seen._replace(
+        shift=seen.shift + 0.2 * np.random.default_rng(seed).standard_t(1.5, 900).astype(np.float32)
+    )
+    lies = row_fit.fit_rows(seen)[0]
+
+    off = (seen.shift - lies.down(seen.x, seen.y)).astype(np.float64)
+    weight = seen.weight / np.square(1 + np.square(off / (1.5 * 1.4826 * np.median(np.abs(off)))))
+    parts = np.stack([np.ones(900), seen.x / 150, seen.y / 80, seen.x * seen.y / 12000])
+    step = np.linalg.solve((parts * weight) @ parts.T, parts @ (weight * off))
+    assert np.abs(step).max() < 0.004
+
+
 def blocks_of(rng, field, *, below_horizon=False, noise=0.1, count=1500):
     """Blocks of a street: a road, and walls of any distance to both sides."""
     x, y = rng.uniform(-600, 600, count), rng.uniform(-20 if below_horizon else -180, 180, count)

@@ -1,10 +1,11 @@
 """Views are made grey, 8 bits deep and small, as their numbers say."""
 
+import cv2
 import numpy as np
 import pytest
 
 from rollcli.errors import InputError
-from rollcli.stereo.views import prepare_views, shrink, shrink_both
+from rollcli.stereo.views import prepare_views, sampled, shrink, shrink_both, smoothed_at_pixels
 
 
 def test_colours_are_weighted_as_the_eye_does():
@@ -68,3 +69,37 @@ def test_other_kinds_are_named_and_refused(shape, kind):
 def test_views_of_two_sizes_are_refused(other):
     with pytest.raises(InputError, match=f"5x4 and {other[1]}x{other[0]}"):
         prepare_views(np.ones((4, 5), np.uint8), np.ones((*other, 3), np.uint8), 1)
+
+
+def bilinear(view, u, v):
+    """Grey levels between four pixels, in float64."""
+    column, row = np.floor(u).astype(int), np.floor(v).astype(int)
+    across, down = u - column, v - row
+    upper = (1 - across) * view[row, column] + across * view[row, column + 1]
+    lower = (1 - across) * view[row + 1, column] + across * view[row + 1, column + 1]
+    return (1 - down) * upper + down * lower
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.float32])
+def test_grey_levels_are_those_at_32nds_of_a_pixel_on_every_opencv(kind):
+    rng = np.random.default_rng(4)
+    view = rng.integers(0, 256, (30, 40)).astype(kind)
+    u, v = rng.uniform(0, 38.9, (50, 64)), rng.uniform(0, 28.9, (50, 64))
+
+    grey = sampled(view, u.astype(np.float32), v.astype(np.float32), cv2.INTER_LINEAR)
+
+    exact = bilinear(view.astype(float), *(np.rint(32 * each.astype(np.float32)) / 32 for each in (u, v)))
+    assert grey.dtype == kind
+    if kind == np.uint8:
+        np.testing.assert_array_equal(grey, np.floor(exact + 0.5))
+    else:
+        np.testing.assert_allclose(grey, exact, atol=1e-3)
+
+
+def test_what_is_halfway_between_two_grey_levels_is_rounded_up_in_every_column():
+    view = np.random.default_rng(5).integers(0, 256, (40, 75), dtype=np.uint8)
+    wider = np.pad(view.astype(float), 1, mode="reflect")
+    down = (wider[:-2] + 6 * wider[1:-1] + wider[2:]) / 8
+    smooth = (down[:, :-2] + 6 * down[:, 1:-1] + down[:, 2:]) / 8
+
+    np.testing.assert_array_equal(smoothed_at_pixels(view), np.floor(smooth + 0.5))
