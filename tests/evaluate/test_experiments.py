@@ -39,6 +39,12 @@ def test_rotating_a_map_adds_the_angle_to_its_roll(turn_deg):
     assert degrees_apart(exact(energy_of(rotated)).theta, math.radians(3 + turn_deg)) < 0.01
 
 
+@pytest.mark.parametrize("quarters", [1, 2, 3])
+def test_turns_by_right_angles_move_every_pixel_to_one_place(quarters):
+    disparity = np.arange(1, 36, dtype=np.float32).reshape(5, 7)
+    assert np.array_equal(rotate_nearest(disparity, quarters * math.pi / 2), np.rot90(disparity, -quarters))
+
+
 def test_iterations_and_angle_are_those_of_the_map(found):
     assert found.gss == (16, 21, 26, 30)
     assert all(2 <= count <= 8 for count in found.gd)
