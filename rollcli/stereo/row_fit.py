@@ -20,8 +20,9 @@ from rollcli.stereo.misalignment import LEVEL, ColumnSupport, Misalignment
 Doubles = NDArray[np.float64]
 
 _FIT_ROUNDS = 60
-# px, of each part anywhere: a fit that changes by less has settled. One that stopped where its spread changed
-# by 0.5 % was up to 0.1 px off in the corners, by its way there; the next round of measuring took that back
+_SAME_SPREAD = 0.005  # of it: a fit that changes its spread by less keeps it from then on
+# px, of each part anywhere: a fit that changes by less has settled. One that stopped with its spread was up
+# to 0.1 px off in the corners, by its way there; the next round of measuring took that back
 _SAME = 0.001
 _TUNING = 1.5  # standard deviations off, a block counts a quarter
 _TILE = 64.0  # px of the size measured at: blocks within it err together
@@ -429,12 +430,21 @@ def _least_squares(design: Doubles, shift: Doubles, weight: Doubles, held: Doubl
 
 
 def _robust(design: Doubles, shift: Doubles, fixed: Doubles, held: Doubles | float = 0.0) -> _Fit:
-    """Fit in rounds, each block weighed by how far off it was in the last."""
-    fit = _least_squares(design, shift, fixed, held)
+    """Fit in rounds, each block weighed by how far off it was in the last.
+
+    Once the spread stays, it is held until the values do: it would go on to the few blocks that agree best.
+    """
+    off, spread = np.zeros_like(fixed), 1.0
     for _ in range(_FIT_ROUNDS):
-        before, spread = fit.values, 1.4826 * _median(np.abs(fit.off)) + 1e-3
+        fit = _least_squares(design, shift, fixed * _believed(off, spread), held)
+        off = fit.off
+        before, spread = spread, 1.4826 * _median(np.abs(off)) + 1e-3
+        if abs(spread - before) < _SAME_SPREAD * spread:
+            break
+    for _ in range(_FIT_ROUNDS):
+        values = fit.values
         fit = _least_squares(design, shift, fixed * _believed(fit.off, spread), held)
-        if np.abs(fit.values - before).max() < _SAME:
+        if np.abs(fit.values - values).max() < _SAME:
             break
     return fit._replace(spread=spread)
 
