@@ -32,6 +32,7 @@ import rollcli
 from rollcli.files.atomic import write_atomic
 from rollcli.pictures.heights import steadied
 from rollcli.run.images import encode_heights
+from rollcli.run.workers.pool import prepare_worker
 
 SIZE, FOCAL, BASELINE, NOISE_PX = "1242x375", 721, 0.54, 0.06
 NEAR, FAR = 4.0, 12.0  # m
@@ -132,8 +133,8 @@ def pairs(count: int, seed: int) -> None:
 
 
 def cost(seed: int) -> None:
-    """Print the CPU time of the heights of a map, ms."""
-    cv2.setNumThreads(1)
+    """Print the CPU time of the heights of a map, ms, in a process that is set up as a worker is."""
+    prepare_worker()
     frame, calibration = next(rendered(1, seed))
     estimate = rollcli.estimate_roll(frame.disparity, calibration=calibration)
     taken = []
