@@ -58,7 +58,7 @@ SETTINGS = [
 
 def assess_many(what: str, frames: int, phi: float, sd: float, series: int, first: int) -> dict[str, str]:
     """One line of the table: shares of the series, from 0 to 1."""
-    truth = LEVEL + 0.5 * (what == "jump 0.5")
+    truth = LEVEL + 0.5 * (what in ("jump 0.5", "drift 1"))  # at the end
     found = []
     for seed in range(first, first + series):
         at = int(np.random.default_rng(seed + 1).uniform(0.25, 0.75) * frames)
