@@ -77,13 +77,21 @@ class Search(NamedTuple):
 
 
 class Levelled:
-    """A pair whose right view is levelled when it is resampled: whole, smaller, or along a plane."""
+    """A pair whose right view is levelled when it is resampled: whole, smaller, or along a plane.
+
+    Each match is made once, when it is first asked for.
+    """
 
     def __init__(
-        self, views: Views, lies: Misalignment, near: Callable[[], Map | None], search: Search
+        self,
+        views: Views,
+        lies: Misalignment,
+        near: Callable[[], Map | None],
+        search: Search,
+        find_road: FindRoad | None,
     ) -> None:
-        """Take views as given, how the right one lies, how to get its disparities, and the search."""
-        self.shape, self.search = views[0].shape, search
+        """Take views as given, how the right one lies, how to get its disparities, and what is looked for."""
+        self.shape, self.search, self._find_road = views[0].shape, search, find_road
         self._views, self._lies, self._near = views, lies, near if lies.tilt else lambda: None
         self._roads: dict[tuple[int, int], _Near | None] = {}
 
@@ -93,7 +101,7 @@ class Levelled:
         return self._views[0], level(self._views[1], self._lies, self._near())
 
     @cached_property
-    def coarse(self) -> Map | None:
+    def _small(self) -> Map | None:
         """The map at a third of the size; None where it would be too narrow."""
         left, right = shrink_both(self._views, _SMALLER)
         views = left, level(right, self._lies.resized(1 / _SMALLER), self._near())
@@ -104,11 +112,25 @@ class Levelled:
             return None
         return match_views(views, first, count, options.for_smaller(_SMALLER))
 
-    def road(self, plane: Plane, rows: slice, coarse: Map) -> "_Near | None":
-        """Match some rows along the road's plane, once: a map of everything takes the same ones."""
+    @cached_property
+    def plane(self) -> Plane | None:
+        """The road's; None where there is none, or nothing finds it."""
+        if self._find_road is None or self.search.first < 0 or self._small is None:
+            return None
+        found = self._find_road(self._small)
+        return None if found is None else _resized(found, self._small.shape, self.shape)
+
+    @cached_property
+    def coarse(self) -> Map:
+        """The map at a third of the size, enlarged, where a plane was found in it."""
+        assert self._small is not None
+        return resampled(self._small, self.shape)
+
+    def road(self, plane: Plane, rows: slice) -> "_Near | None":
+        """Match some rows along the road's plane; None where too little of it is found."""
         key = rows.start, rows.stop
         if key not in self._roads:
-            self._roads[key] = _match_along(self, plane, rows, coarse)
+            self._roads[key] = _match_along(self, plane, rows, self.coarse)
         return self._roads[key]
 
     def along(self, plane: Map, middle: int, rows: slice) -> Views:
@@ -125,7 +147,7 @@ class Levelled:
         return smoothed_at_pixels(left[rows]), warped
 
 
-def match_for_road(pair: Levelled, rows: slice, find_road: FindRoad | None, *, whole: bool = False) -> Map:
+def match_for_road(pair: Levelled, rows: slice, *, whole: bool = False) -> Map:
     """Match what an estimate needs: the road, and what lies beside and above it at a part of the size.
 
     Parameters
@@ -133,8 +155,6 @@ def match_for_road(pair: Levelled, rows: slice, find_road: FindRoad | None, *, w
     pair : Levelled
     rows : slice
         Rows that are needed; elsewhere the map may hold no data.
-    find_road : callable or None
-        Finds the road in a small map of the pair; None: everything is matched at full size.
     whole : bool
         Whether what lies beside and above the road is matched at full size, too.
 
@@ -144,31 +164,28 @@ def match_for_road(pair: Levelled, rows: slice, find_road: FindRoad | None, *, w
         Pixels; no data is 0.
     """
     first, count, options = pair.search
-    small = None if find_road is None or first < 0 else pair.coarse
-    plane = None if small is None or find_road is None else find_road(small)
+    plane = pair.plane
 
     def match_all(rows: slice) -> Map:
         return without_lag(match_rows(pair.whole, first, count, options, rows), options.mode)
 
-    if small is None or plane is None:
+    if plane is None:
         return match_all(rows)
     start, stop, _ = rows.indices(pair.shape[0])
-    plane = _resized(plane, small.shape, pair.shape)
     top = min(max(start, _first_row(plane, pair.shape)), stop)
-    coarse = resampled(small, pair.shape)
     narrow = options.is_default and pair.shape[0] >= _LEAST_HEIGHT
-    near = pair.road(plane, slice(top, stop), coarse) if narrow else None
+    near = pair.road(plane, slice(top, stop)) if narrow else None
     if whole:
         disparity = match_all(rows)
         if near is not None:
             np.copyto(disparity[top:stop], near.disparity, where=near.found & near.lies_on)
         return disparity
-    disparity = np.zeros_like(coarse)
-    disparity[start:top] = coarse[start:top]
+    disparity = np.zeros_like(pair.coarse)
+    disparity[start:top] = pair.coarse[start:top]
     if near is None:
         disparity[top:stop] = match_rows(pair.whole, first, count, options, slice(top, stop))[top:stop]
         return without_lag(disparity, options.mode)
-    disparity[top:stop] = near.beside(coarse[top:stop])
+    disparity[top:stop] = near.beside(pair.coarse[top:stop])
     return disparity
 
 

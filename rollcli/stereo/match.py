@@ -276,10 +276,10 @@ def match_pair(
 
     @lru_cache(maxsize=1)
     def levelled(lies: Misalignment) -> Levelled:
-        return Levelled(views, lies, near, search)
+        return Levelled(views, lies, near, search, wanted.road)
 
     def match(lies: Misalignment, rows: slice) -> Map:
-        return match_for_road(levelled(lies), rows, wanted.road)
+        return match_for_road(levelled(lies), rows)
 
     given = None
     if small is None:
@@ -301,7 +301,7 @@ def match_pair(
     valid = cv2.countNonZero(matched)
     whole = None
     if wanted.whole and wanted != _EVERYTHING._replace(whole=True):
-        whole = finished(match_for_road(levelled(corrected), ALL_ROWS, wanted.road, whole=True))
+        whole = finished(match_for_road(levelled(corrected), ALL_ROWS, whole=True))
     return StereoMatch(
         disparity=finished(matched),
         whole=whole,
