@@ -41,11 +41,8 @@ _STEADIED = 5  # pixels: the side of what a median is of, that of the default bl
 _HALF_LANE = 0.8  # camera heights to each side: of a lane's width dips and cars leave most
 _FAR = 8.0  # times as far as at the bottom: beyond, what the parabola leaves is kept as it is there
 _OVER = 0.14  # of that range, nearer than the bottom's middle: the corners of rolled maps
-_BINS, _LEAST_BINS, _LEAST_PIXELS = (
-    32,
-    12,
-    12,
-)  # in equal steps of log d; those that are needed, and pixels in one
+_BINS = 32  # in equal steps of log d
+_LEAST_BINS, _LEAST_PIXELS = 12, 12  # bins that are needed, and pixels in each
 _SAMPLED = 125, 125  # rows and columns: twice as many move no height by 0.1 mm
 # how far off the profile the road may be, camera heights at twice the bottom's distance and before, beyond it
 # in proportion: at first what a parabola leaves on the steepest hills, then half of a kerb
@@ -305,11 +302,11 @@ def _medians(place: NDArray[np.intp], values: Singles) -> tuple[NDArray[np.float
     """Return the medians of values in bins, and which bins have enough of them."""
     spread = 2 * float(np.abs(values).max(initial=0)) + 1
     ordered = np.sort(place * spread + values)  # one sort of all
-    bounds = np.searchsorted(place := np.sort(place), np.arange(_BINS + 1))
-    found = np.diff(bounds) >= _LEAST_PIXELS
+    counts = np.bincount(place, minlength=_BINS)
+    found = counts >= _LEAST_PIXELS
     medians = np.zeros(_BINS)
     (some,) = np.nonzero(found)
-    medians[some] = ordered[(bounds[some] + bounds[some + 1]) // 2] - some * spread
+    medians[some] = ordered[(np.cumsum(counts) - counts + counts // 2)[some]] - some * spread
     return medians, found
 
 
