@@ -16,7 +16,7 @@ from rollcli.errors import InputError, UsageError
 from rollcli.files.codecs import arrays, pictures, png, tiff
 from rollcli.files.codecs.raw_map import Stored as Stored
 from rollcli.files.codecs.raw_map import native, require_map_shape
-from rollcli.files.storage import read_frame
+from rollcli.files.storage import read_bytes, read_frame
 
 
 class MapFormat(NamedTuple):
@@ -80,9 +80,9 @@ def read_stored(path: str | Path, name: str | None = None, *, rgb: bool = False)
     `rgb`: they are in the three channels of a PNG, as FoundationStereo writes them.
     """
     name = name or str(path)
-    data = read_frame(path, name, begins=None if rgb else _check_beginning)
     if rgb:
-        return MAP_FORMATS["rgb"].decode(data if isinstance(data, bytes) else b"", name)
+        return MAP_FORMATS["rgb"].decode(read_bytes(path, name), name)
+    data = read_frame(path, name, begins=_check_beginning)
     if isinstance(data, bytes):
         return decode_stored(data, name)
     require_map_shape(data.shape, name)  # of a recording

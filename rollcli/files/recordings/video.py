@@ -12,6 +12,7 @@ decoding of all frames: some ms each of what cameras write, where matching takes
 
 import os
 import struct
+from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
@@ -31,8 +32,6 @@ _MOST_EDITS = 1000
 _SILENT = 0  # OpenCV's level
 # a packet that is cut off makes no frame, and what a file names elsewhere is not followed
 _OPTIONS = "fflags;discardcorrupt|protocol_whitelist;file"
-
-
 _PACKETS = [cv2.CAP_PROP_FORMAT, -1]  # OpenCV hands them out as they are
 _ALL_THREADS, _ONE_THREAD = ([cv2.CAP_PROP_N_THREADS, each] for each in (os.cpu_count() or 1, 1))
 
@@ -218,16 +217,7 @@ def _end_of_avi(file: BinaryIO, size: int) -> int:
 
 
 def _end_of_mp4(file: BinaryIO, size: int) -> int:
-    at = 0
-    while at + 8 <= size:
-        file.seek(at)
-        (length,) = struct.unpack(">I4x", file.read(8))
-        if length == 1:
-            (length,) = struct.unpack(">Q", file.read(8))
-        if length < 8:  # 0: up to the end of the file
-            break
-        at += length
-    return at
+    return max((end for _, _, end in _walk(file, 0, size)), default=0)
 
 
 def _leaves_out(path: str) -> bool:
@@ -256,6 +246,13 @@ def _leaves_out(path: str) -> bool:
 def _boxes(file: BinaryIO, at: int, end: int) -> dict[bytes, list[tuple[int, int]]]:
     """Return where the contents of the boxes in a part of an MP4 begin and end, by their kind."""
     found: dict[bytes, list[tuple[int, int]]] = {}
+    for kind, first, last in _walk(file, at, end):
+        found.setdefault(kind, []).append((first, last))
+    return found
+
+
+def _walk(file: BinaryIO, at: int, end: int) -> Iterator[tuple[bytes, int, int]]:
+    """Yield the kind of each box in a part of an MP4, and where its content begins and ends."""
     while at + 8 <= end:
         file.seek(at)
         (length, kind), head = struct.unpack(">I4s", file.read(8)), 8
@@ -263,9 +260,8 @@ def _boxes(file: BinaryIO, at: int, end: int) -> dict[bytes, list[tuple[int, int
             (length,), head = struct.unpack(">Q", file.read(8)), 16
         if length < head:  # 0: up to the end of the file
             length = end - at
-        found.setdefault(kind, []).append((at + head, at + length))
+        yield kind, at + head, at + length
         at += length
-    return found
 
 
 def _time_of(file: BinaryIO, box: tuple[int, int]) -> tuple[int, int]:

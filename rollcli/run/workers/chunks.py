@@ -8,12 +8,11 @@ tasks: in their order, and the same for any chunks.
 import itertools
 import threading
 import time
-import traceback
 from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar, overload
 
-from rollcli.errors import RollcliError
+from rollcli.errors import RollcliError, raised_at
 from rollcli.files.stores.locations import computing
 
 if TYPE_CHECKING:
@@ -281,5 +280,6 @@ def _portable(error: Exception) -> Exception:
     """Make of an error one that another process can raise: ours as it is, others with their place."""
     if isinstance(error, RollcliError):
         return error
-    place = traceback.extract_tb(error.__traceback__)[-1]
-    return RuntimeError(f"{type(error).__name__} in {place.filename}:{place.lineno}: {error}")
+    last = raised_at(error)
+    where = f" in {last.tb_frame.f_code.co_filename}:{last.tb_lineno}" if last else ""
+    return RuntimeError(f"{type(error).__name__}{where}: {error}")
