@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import click
 from click.core import ParameterSource
 
+from rollcli.cli.types import FLAG, ParamType, Parsed
 from rollcli.errors import ExitStatus
 from rollcli.messages import say, show_tracebacks
 
@@ -144,9 +145,24 @@ class Command(click.Command):
             formatter.write_dl([(str(int(status)), meaning) for status, meaning in self.statuses.items()])
 
 
-def option(*names: str, **attributes: Any) -> Declaration:
-    """Declare an option; takes what `click.option` and `Option` take."""
-    return click.option(*names, cls=Option, **attributes)
+def option(names: str, kind: ParamType, text: str, *needs: Needs, **attributes: Any) -> Declaration:
+    """Declare an option.
+
+    Parameters
+    ----------
+    names : str
+        Such as "-q, --quiet".
+    kind : ParamType
+        What it takes; `FLAG`: nothing.
+    text : str
+        Its help.
+    *needs : Needs
+        What it needs to have an effect.
+    **attributes
+        What else `click.option` and `Option` take.
+    """
+    given: dict[str, Any] = {"is_flag": True} if kind is FLAG else {"type": kind}
+    return click.option(*names.split(", "), cls=Option, help=text, only_with=needs, **given, **attributes)
 
 
 def section(title: str, *declarations: Declaration, only_with: Sequence[Needs] = ()) -> Declaration:
@@ -199,6 +215,8 @@ def record(
             default = defaults.get(field_of(str(param.name)))
             own = not isinstance(param, Option) or param.has_own_default
             if not own and not (default is None or default is False or default == ()):
+                if isinstance(param.type, Parsed) and param.type.between:
+                    default = param.type.shown(default)
                 param.default = default
 
         @functools.wraps(function)  # its parameters, too

@@ -121,9 +121,9 @@ def _key(declared: click.Option) -> str:
 
 config_option = option(
     "--config",
-    type=FILE,
+    FILE,
+    "TOML file with option names as keys; flags and the environment win over it.",
     is_eager=True,
     expose_value=False,
     callback=_use,
-    help="TOML file with option names as keys; flags and the environment win over it.",
 )

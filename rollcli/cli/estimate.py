@@ -23,7 +23,7 @@ from rollcli.cli.options import (
     stereo_options,
     topic_options,
 )
-from rollcli.cli.types import SHARD, Choice, Number, OutputFile
+from rollcli.cli.types import FLAG, SHARD, Choice, Number, OutputFile
 from rollcli.messages import without_secrets
 from rollcli.run.options import EstimateOptions, ResultOptions
 
@@ -102,52 +102,46 @@ result_options = record(
     "Result",
     ResultOptions,
     option(
-        "-o",
-        "--output",
-        type=OutputFile(
+        "-o, --output",
+        OutputFile(
             (".csv", ".jsonl", ".ndjson", ".parquet"),
             "CSV (.csv), JSON Lines (.jsonl) or Parquet (.parquet)",
         ),
-        help="Where the rows go (-: stdout).",
+        "Where the rows go (-: stdout).",
     ),
     option(
         "--format",
-        type=Choice("csv", "jsonl", "parquet"),
-        help="CSV, JSON Lines, or Parquet (a folder of parts).  [default: by FILE's ending, else csv]",
+        Choice("csv", "jsonl", "parquet"),
+        "CSV, JSON Lines, or Parquet (a folder of parts).  [default: by FILE's ending, else csv]",
     ),
     option(
         "--part-rows",
-        type=Number("N", at_least=1, whole=True),
-        only_with=[Needs(_has_parts, "only Parquet and results in an object store have parts")],
-        help="Rows of each part, of Parquet and of results in an object store.",
+        Number("N", at_least=1, whole=True),
+        "Rows of each part, of Parquet and of results in an object store.",
+        Needs(_has_parts, "only Parquet and results in an object store have parts"),
     ),
-    option("--resume", is_flag=True, help="Keep the rows of an interrupted run and do the rest."),
+    option("--resume", FLAG, "Keep the rows of an interrupted run and do the rest."),
     option(
         "--update",
-        is_flag=True,
-        help="As --resume, also of a whole result: do the frames again whose content has changed, add new "
+        FLAG,
+        "As --resume, also of a whole result: do the frames again whose content has changed, add new "
         "ones, and leave out those that are gone.",
     ),
     option(
         "--retry-failed",
-        is_flag=True,
-        help="With --resume or --update: do the frames again whose rows are error, such as those of files "
+        FLAG,
+        "With --resume or --update: do the frames again whose rows are error, such as those of files "
         "mended since.",
     ),
-    option(
-        "--shard",
-        type=SHARD,
-        show_default=False,
-        help="Take every N-th frame from the I-th.  [default: 1/1]",
-    ),
+    option("--shard", SHARD, "Take every N-th frame from the I-th."),
     option(
         "--shard-by",
-        type=Choice("every", "range"),
-        only_with=[Needs(lambda ctx: ctx.params["shard"] != (1, 1), "there is one shard")],
-        help="every: --shard takes every N-th frame; range: the I-th of N runs of consecutive frames.",
+        Choice("every", "range"),
+        "every: --shard takes every N-th frame; range: the I-th of N runs of consecutive frames.",
+        Needs(lambda ctx: ctx.params["shard"] != (1, 1), "there is one shard"),
     ),
-    option("--fail-fast", is_flag=True, help="Stop at the first frame that fails."),
-    option("--timing", is_flag=True, help="Add the column elapsed_ms: milliseconds spent on the frame."),
+    option("--fail-fast", FLAG, "Stop at the first frame that fails."),
+    option("--timing", FLAG, "Add the column elapsed_ms: milliseconds spent on the frame."),
 )
 
 

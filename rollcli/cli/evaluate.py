@@ -24,32 +24,25 @@ from rollcli.run.options import RunningOptions
 @click.argument("result", type=PATH)
 @option(
     "--truth",
-    type=FILE,
+    FILE,
+    "The known angles: CSV with the columns file and roll_deg, degrees.",
     required=True,
     section="Figures",
-    help="The known angles: CSV with the columns file and roll_deg, degrees.",
 )
 @option(
     "--heights",
-    type=DIR,
-    section="Figures",
-    help="Heights over the road that estimate wrote, compared with heights/ beside the known angles at 5, 10 "
+    DIR,
+    "Heights over the road that estimate wrote, compared with heights/ beside the known angles at 5, 10 "
     "and 20 m.  [default: where the run of RESULT wrote them, if both exist]",
-)
-@option(
-    "-o",
-    "--output",
-    type=TABLE_FILE,
-    default="-",
     section="Figures",
-    help="Where the figures go (-: stdout).",
 )
+@option("-o, --output", TABLE_FILE, "Where the figures go (-: stdout).", default="-", section="Figures")
 @option(
     "--format",
-    type=Choice(*TABLE_FORMATS),
-    section="Figures",
-    help="A table to read, or degrees and shares from 0 to 1 for programs.  "
+    Choice(*TABLE_FORMATS),
+    "A table to read, or degrees and shares from 0 to 1 for programs.  "
     "[default: by FILE's ending, else table]",
+    section="Figures",
 )
 @running_options
 @config_option
@@ -79,27 +72,22 @@ experiment_options = record(
     "experiments",
     "Experiments",
     ExperimentOptions,
-    option("-o", "--output", type=DIR, required=True, help="Where paper.html and its CSVs go."),
-    option(
-        "--turns",
-        type=TURNS,
-        show_default=False,
-        help="Rotate each map by these angles, degrees.  [default: -20:20:2]",
-    ),
+    option("-o, --output", DIR, "Where paper.html and its CSVs go.", required=True),
+    option("--turns", TURNS, "Rotate each map by these angles, degrees."),
     option(
         "--timed",
-        type=Number("N", at_least=1, whole=True),
-        help="Take the run times on the first N maps; the paper's n x 3 form is slow.",
+        Number("N", at_least=1, whole=True),
+        "Take the run times on the first N maps; the paper's n x 3 form is slow.",
     ),
     option(
         "--truth",
-        type=FILE,
-        help="Known angles of the maps: CSV with file and roll_deg.  [default: each map's own estimate]",
+        FILE,
+        "Known angles of the maps: CSV with file and roll_deg.  [default: each map's own estimate]",
     ),
     option(
         "--figure",
-        type=click.Choice(["svg", "pdf", "png"]),
-        help="Write each chart of the page as a figure, too, as wide as a journal's column (3.5 inches).",
+        click.Choice(["svg", "pdf", "png"]),
+        "Write each chart of the page as a figure, too, as wide as a journal's column (3.5 inches).",
     ),
 )
 

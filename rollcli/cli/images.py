@@ -19,7 +19,7 @@ from rollcli.cli.options import (
     stereo_options,
     topic_options,
 )
-from rollcli.cli.types import DIR, RESULT, Choice, Number
+from rollcli.cli.types import DIR, FLAG, RESULT, Choice, Number
 from rollcli.run.options import (
     ConvertOptions,
     DerotateOptions,
@@ -39,20 +39,16 @@ rotation_options = section(
     "Angle",
     option(
         "--roll",
-        type=Number("DEG", at_least=-180, at_most=180),
-        help="Of the rig, for every map, degrees; positive: its right end is up.",
+        Number("DEG", at_least=-180, at_most=180),
+        "Of the rig, for every map, degrees; positive: its right end is up.",
     ),
-    option(
-        "--from",
-        type=RESULT,
-        help="The angle of each map, from what `rollcli estimate` wrote; matched by stem.",
-    ),
-    option("--skip-suspect", is_flag=True, help="With --from, leave out the maps whose angle is suspect."),
-    option("--expand", is_flag=True, help="Enlarge the maps so that their corners are kept."),
+    option("--from", RESULT, "The angle of each map, from what `rollcli estimate` wrote; matched by stem."),
+    option("--skip-suspect", FLAG, "With --from, leave out the maps whose angle is suspect."),
+    option("--expand", FLAG, "Enlarge the maps so that their corners are kept."),
     option(
         "--save-matrix",
-        is_flag=True,
-        help="Beside each map write NAME.txt: the 3x3 matrix that takes its pixels to the new ones.",
+        FLAG,
+        "Beside each map write NAME.txt: the 3x3 matrix that takes its pixels to the new ones.",
     ),
 )
 
@@ -103,9 +99,9 @@ def derotate(ctx: click.Context, /, **options: Any) -> None:
 @save_as_option
 @option(
     "--preview",
-    type=DIR,
+    DIR,
+    "Also write each map as a picture to look at, in colour with a scale in pixels, PNG.",
     section="Output",
-    help="Also write each map as a picture to look at, in colour with a scale in pixels, PNG.",
 )
 @stereo_options
 @cluster_options
@@ -125,31 +121,31 @@ count_options = section(
     "Counting",
     option(
         "--bins",
-        type=Number("N", at_least=1, at_most=65535, whole=True),
-        help="Columns of the histogram.  [default: one a pixel of disparity for maps of whole pixels, else "
+        Number("N", at_least=1, at_most=65535, whole=True),
+        "Columns of the histogram.  [default: one a pixel of disparity for maps of whole pixels, else "
         "four; 256 to 1024]",
     ),
     option(
         "--max-disparity",
-        type=Number("PX", above=0),
-        help="Right end of the histogram, pixels; its last bin also holds what lies beyond.  "
+        Number("PX", above=0),
+        "Right end of the histogram, pixels; its last bin also holds what lies beyond.  "
         "[default: just above the map's largest]",
     ),
     option(
         "--counts",
-        is_flag=True,
-        help="Write the counts too, as a 32-bit TIFF beside the picture; a row sums to its valid pixels.",
+        FLAG,
+        "Write the counts too, as a 32-bit TIFF beside the picture; a row sums to its valid pixels.",
     ),
     option(
         "--figure",
-        type=click.Choice(["svg", "pdf", "png"]),
-        help="Write a figure for a paper in place of the picture: map and v-disparity, as they are and "
+        click.Choice(["svg", "pdf", "png"]),
+        "Write a figure for a paper in place of the picture: map and v-disparity, as they are and "
         "de-rotated, with the road's curve, as wide as a journal's column (3.5 inches).",
     ),
     option(
         "--from",
-        type=RESULT,
-        help="The angles and curves of --figure, from what `rollcli estimate` wrote; matched by stem.  "
+        RESULT,
+        "The angles and curves of --figure, from what `rollcli estimate` wrote; matched by stem.  "
         "[default: estimate them]",
     ),
 )
@@ -200,26 +196,26 @@ def vdisparity(ctx: click.Context, /, **options: Any) -> None:
 @input_options
 @option(
     "--from",
-    type=RESULT,
+    RESULT,
+    "The road of each map, from what `rollcli estimate` wrote; matched by stem.",
     required=True,
     section="Road",
-    help="The road of each map, from what `rollcli estimate` wrote; matched by stem.",
 )
-@option("--skip-suspect", is_flag=True, section="Road", help="Leave out the maps whose angle is suspect.")
+@option("--skip-suspect", FLAG, "Leave out the maps whose angle is suspect.", section="Road")
 @output_folder_option
 @option(
     "--preview",
-    type=DIR,
+    DIR,
+    "Also write pictures of the heights, PNG, every frame in the same colours.",
     section="Output",
-    help="Also write pictures of the heights, PNG, every frame in the same colours.",
 )
 @heights_range_option("preview")
 @option(
     "--save-as",
-    type=Choice("tiff", "npy"),
+    Choice("tiff", "npy"),
+    "float32 TIFF, whose description names the unit, or float32 NPY.",
     default="tiff",
     section="Output",
-    help="float32 TIFF, whose description names the unit, or float32 NPY.",
 )
 @encoding_options
 @calibration_options

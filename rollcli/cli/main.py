@@ -2,11 +2,12 @@
 
 import os
 import platform
+import re
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from importlib import import_module
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import PackageNotFoundError, requires, version
 from typing import Any
 
 import click
@@ -15,40 +16,25 @@ from rollcli import __version__
 from rollcli.errors import ExitStatus, InputError, RollcliError, UsageError
 from rollcli.messages import one_line, say
 
-OPENCV = (
-    "opencv-python-headless",
-    "opencv-python",
-    "opencv-contrib-python-headless",
-    "opencv-contrib-python",
-)
-REQUIRED = ("numpy", OPENCV, "click", "tqdm", "tifffile", "PyYAML")
-OPTIONAL = (
-    "dask",
-    "distributed",
-    "imagecodecs",
-    "jinja2",
-    "lz4",
-    "matplotlib",
-    "obstore",
-    "plotly",
-    "pyarrow",
-    "rosbags",
-    "zstandard",
-)
+_OPENCV = tuple(f"opencv-{name}python{kind}" for name in ("", "contrib-") for kind in ("-headless", ""))
 
 
 def versions() -> Iterator[tuple[str, str]]:
     """Yield (name, version) of rollcli, Python and each package it uses; of extras, those installed."""
     yield "rollcli", __version__
     yield "Python", f"{platform.python_version()} ({platform.python_implementation()}, {platform.platform()})"
-    for names in REQUIRED:
-        yield _installed(names) or (names if isinstance(names, str) else names[0], "not installed")
-    yield from filter(None, map(_installed, OPTIONAL))
+    seen = set()
+    for requirement in requires("rollcli") or ():
+        name = re.split(r"[^\w.-]", requirement, maxsplit=1)[0]
+        found = _installed(_OPENCV if name in _OPENCV else (name,))
+        if name not in seen and (found or ";" not in requirement):
+            yield found or (name, "not installed")
+        seen.add(name)
 
 
-def _installed(names: str | tuple[str, ...]) -> tuple[str, str] | None:
+def _installed(names: Sequence[str]) -> tuple[str, str] | None:
     """Find the first installed one of several packages that contain the same module."""
-    for name in (names,) if isinstance(names, str) else names:
+    for name in names:
         try:
             return name, version(name)
         except PackageNotFoundError:

@@ -7,7 +7,7 @@ import click
 from rollcli.cli.command import command, option
 from rollcli.cli.config import config_option
 from rollcli.cli.options import running_options
-from rollcli.cli.types import DIR, PATH, Number, OutputFile
+from rollcli.cli.types import DIR, FLAG, PATH, Number, OutputFile, Text
 from rollcli.errors import ExitStatus
 from rollcli.report.options import GALLERY, ReportOptions
 
@@ -33,44 +33,43 @@ from rollcli.report.options import GALLERY, ReportOptions
 )
 @click.argument("results", nargs=-1, required=True, type=PATH)
 @option(
-    "-o",
-    "--output",
-    type=OutputFile((".html", ".htm"), "a page (.html)"),
-    metavar="FILE.html",
+    "-o, --output",
+    OutputFile((".html", ".htm"), "a page (.html)"),
+    "Where the page goes (-: stdout).",
     section="Page",
-    help="Where the page goes (-: stdout).",
+    metavar="FILE.html",
 )
-@option("--title", metavar="TEXT", section="Page", help="Its heading.  [default: Roll of N frames]")
+@option("--title", Text("TEXT"), "Its heading.  [default: Roll of N frames]", section="Page")
 @option(
     "--images",
-    type=DIR,
-    section="Page",
-    help="A folder that estimate wrote images to, or the folder above: show these.  [default: make them "
+    DIR,
+    "A folder that estimate wrote images to, or the folder above: show these.  [default: make them "
     "from the inputs]",
+    section="Page",
 )
 @option(
     "--gallery",
-    type=Number("N", at_least=0, whole=True),
+    Number("N", at_least=0, whole=True),
+    "How many frames to show in pictures: those around jumps, the widest intervals, suspect ones, and "
+    "some evenly spread.",
     default=GALLERY,
     section="Page",
-    help="How many frames to show in pictures: those around jumps, the widest intervals, suspect ones, and "
-    "some evenly spread.",
 )
 @option(
     "--fetch",
-    is_flag=True,
+    FLAG,
+    "Read inputs from whichever server or bucket the result names; else only from the one it lies in.",
     section="Page",
-    help="Read inputs from whichever server or bucket the result names; else only from the one it lies in.",
 )
 @option(
     "--svg",
-    type=DIR,
-    section="Charts for slides",
-    help="Write each chart of the page as an SVG: roll, histogram, and where there are any, pitch, height "
+    DIR,
+    "Write each chart of the page as an SVG: roll, histogram, and where there are any, pitch, height "
     "and how the right view lies.",
+    section="Charts for slides",
 )
-@option("--pdf", type=DIR, section="Charts for slides", help="The same as PDFs.")
-@option("--png", type=DIR, section="Charts for slides", help="The same as PNGs, 1920 pixels wide.")
+@option("--pdf", DIR, "The same as PDFs.", section="Charts for slides")
+@option("--png", DIR, "The same as PNGs, 1920 pixels wide.", section="Charts for slides")
 @running_options
 @config_option
 @click.pass_context

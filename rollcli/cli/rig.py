@@ -7,7 +7,7 @@ import click
 from rollcli.cli.command import command, option, record
 from rollcli.cli.config import config_option
 from rollcli.cli.options import calibration_options, running_options
-from rollcli.cli.types import FILE, PATH, TABLE_FILE, TABLE_FORMATS, Choice, Number, table_format
+from rollcli.cli.types import FILE, FLAG, PATH, TABLE_FILE, TABLE_FORMATS, Choice, Number, Text, table_format
 from rollcli.errors import ExitStatus
 from rollcli.run.options import GateOptions, RigOptions
 
@@ -15,32 +15,28 @@ gate_options = record(
     "gates",
     "Checks: exit status 4 when one fails, 5 when none fails and one cannot be told",
     GateOptions,
-    option("--expect-roll", type=Number("DEG"), help="The roll must be this, degrees; with --within."),
-    option("--expect-pitch", type=Number("DEG"), help="The pitch must be this, degrees; with --within."),
-    option("--expect-height", type=Number("M"), help="The height must be this, metres."),
+    option("--expect-roll", Number("DEG"), "The roll must be this, degrees; with --within."),
+    option("--expect-pitch", Number("DEG"), "The pitch must be this, degrees; with --within."),
+    option("--expect-height", Number("M"), "The height must be this, metres."),
     option(
         "--within",
-        type=Number("DEG", at_least=0),
-        help="How far from what is expected it may be, degrees; of a height metres.",
+        Number("DEG", at_least=0),
+        "How far from what is expected it may be, degrees; of a height metres.",
     ),
     option(
         "--within-height",
-        type=Number("M", at_least=0),
-        help="How far the height may be from what is expected, metres; else as --within.",
+        Number("M", at_least=0),
+        "How far the height may be from what is expected, metres; else as --within.",
     ),
-    option(
-        "--max-drift", type=Number("DEG", at_least=0), help="Largest drift of the roll over a drive, degrees."
-    ),
-    option("--max-jump", type=Number("DEG", at_least=0), help="Largest jump of the roll, degrees."),
+    option("--max-drift", Number("DEG", at_least=0), "Largest drift of the roll over a drive, degrees."),
+    option("--max-jump", Number("DEG", at_least=0), "Largest jump of the roll, degrees."),
     option(
         "--max-misalignment",
-        type=Number("PX", at_least=0),
-        help="Largest vertical shift between the views of a pair anywhere in the image, pixels.",
+        Number("PX", at_least=0),
+        "Largest vertical shift between the views of a pair anywhere in the image, pixels.",
     ),
     option(
-        "--min-ok",
-        type=Number("SHARE", at_least=0, at_most=1),
-        help="Least share of the frames that are ok, 0 to 1.",
+        "--min-ok", Number("SHARE", at_least=0, at_most=1), "Least share of the frames that are ok, 0 to 1."
     ),
 )
 
@@ -62,43 +58,31 @@ gate_options = record(
     },
 )
 @click.argument("results", nargs=-1, required=True, type=PATH)
-@option(
-    "--against",
-    type=FILE,
-    section="Assessment",
-    help="A later result: say how far the rig has moved until then.",
-)
-@option("--include-suspect", is_flag=True, section="Assessment", help="Let suspect frames count too.")
+@option("--against", FILE, "A later result: say how far the rig has moved until then.", section="Assessment")
+@option("--include-suspect", FLAG, "Let suspect frames count too.", section="Assessment")
 @option(
     "--groups",
-    metavar="GLOB|none",
+    Text("GLOB|none"),
+    "Folders that are one drive each, such as 'data/run*'; none: all frames are one drive; auto: each "
+    "folder is a drive, unless folders hold hardly a frame.",
     default="auto",
     section="Assessment",
-    help="Folders that are one drive each, such as 'data/run*'; none: all frames are one drive; auto: each "
-    "folder is a drive, unless folders hold hardly a frame.",
 )
-@option(
-    "-o",
-    "--output",
-    type=TABLE_FILE,
-    default="-",
-    section="Assessment",
-    help="Where it goes (-: stdout).",
-)
+@option("-o, --output", TABLE_FILE, "Where it goes (-: stdout).", default="-", section="Assessment")
 @option(
     "--format",
-    type=Choice(*TABLE_FORMATS),
-    section="Assessment",
-    help="A table to read, or for programs; csv has a line for each segment, from one jump to the next.  "
+    Choice(*TABLE_FORMATS),
+    "A table to read, or for programs; csv has a line for each segment, from one jump to the next.  "
     "[default: by FILE's ending, else table]",
+    section="Assessment",
 )
 @option(
     "--correction",
-    type=FILE,
-    section="Assessment",
-    help="Also write how the right view of the pairs has to be corrected: JSON with the numbers, a 3x3 "
+    FILE,
+    "Also write how the right view of the pairs has to be corrected: JSON with the numbers, a 3x3 "
     "matrix and the OpenCV call, for `estimate --align FILE`. Up to 24 of the pairs are matched again, to "
     "tell what of a scale is in the columns.",
+    section="Assessment",
 )
 @calibration_options
 @gate_options

@@ -8,7 +8,7 @@ from rollcli.cli.command import command, option, record
 from rollcli.cli.config import config_option
 from rollcli.cli.estimate import one_start, resume_command
 from rollcli.cli.options import running_options
-from rollcli.cli.types import DIR, IMAGE_SIZE, POINT, SPAN, Choice, Number
+from rollcli.cli.types import DIR, FLAG, IMAGE_SIZE, POINT, SPAN, Choice, Number
 from rollcli.run.options import RunningOptions
 from rollcli.simulate.options import (
     CROSS_SECTIONS,
@@ -27,130 +27,114 @@ simulate_options = record(
     "options",
     "What to render",
     SimulateOptions,
-    option("--frames", type=Number("N", at_least=1, whole=True), help="Number of pairs."),
+    option("--frames", Number("N", at_least=1, whole=True), "Number of pairs."),
     option(
         "--scene",
-        type=Choice(*SCENES, MIXED),
-        help="bare: a road alone; open: with kerbs and cars; street: with house fronts too; verge: between "
+        Choice(*SCENES, MIXED),
+        "bare: a road alone; open: with kerbs and cars; street: with house fronts too; verge: between "
         "grass slopes; mixed: each frame one of these.",
     ),
     option(
         "--roll",
-        type=SPAN,
-        show_default=False,
-        help="Roll of the rig against the road, degrees, drawn evenly from A to B; positive: its right "
-        "end is up.  "
-        f"[default: {SimulateOptions.roll_deg[0]:g}:{SimulateOptions.roll_deg[1]:g}]",
+        SPAN,
+        "Roll of the rig against the road, degrees, drawn evenly from A to B; positive: its right end is up.",
     ),
     option(
         "--pitch",
-        type=SPAN,
-        show_default=False,
-        help="Pitch of the rig against the road, degrees, drawn evenly from A to B; positive: it looks "
-        "down.  "
-        f"[default: {SimulateOptions.pitch_deg[0]:g}:{SimulateOptions.pitch_deg[1]:g}]",
+        SPAN,
+        "Pitch of the rig against the road, degrees, drawn evenly from A to B; positive: it looks down.",
     ),
     option(
         "--curvature",
-        type=SPAN,
-        help="Curvature along the road, 1/m, drawn evenly from A to B; positive: a sag; negative: a crest.  "
+        SPAN,
+        "Curvature along the road, 1/m, drawn evenly from A to B; positive: a sag; negative: a crest.  "
         "[default: half of the frames flat, half within +-0.001; bare is flat]",
     ),
     option(
         "--bend",
-        type=SPAN,
-        help="Horizontal curvature of the road, 1/m, drawn evenly from A to B; positive: to the right; 0: a "
+        SPAN,
+        "Horizontal curvature of the road, 1/m, drawn evenly from A to B; positive: to the right; 0: a "
         "straight road.  [default: half of the roads straight, half within +-0.004; bare is straight]",
     ),
     option(
         "--cross-section",
-        type=Choice(*CROSS_SECTIONS, MIXED),
-        help="Shape of the road across. crown, dish: a parabola, highest or lowest in the middle; roof: two "
+        Choice(*CROSS_SECTIONS, MIXED),
+        "Shape of the road across. crown, dish: a parabola, highest or lowest in the middle; roof: two "
         "planes that meet in the middle; superelevated: one plane, its outer side up in a bend; mixed: each "
         "frame one of these. Roll and pitch are against the plane tangent to the road below the left camera.",
     ),
     option(
         "--crossfall",
-        type=SPAN,
-        help="Slope of a cross section that is not flat, per cent, drawn evenly from A to B; of a crown or "
+        SPAN,
+        "Slope of a cross section that is not flat, per cent, drawn evenly from A to B; of a crown or "
         f"dish at its edges.  [default: {CROSSFALL[0]:g}:{CROSSFALL[1]:g}]",
     ),
     option(
         "--gutter",
-        type=SPAN,
-        show_default=False,
-        help=f"How much more the outer {100 * GUTTER_WIDTH:g} cm on each side fall outward, per cent, drawn "
-        "evenly from A to B.  [default: 0]",
+        SPAN,
+        f"How much more the outer {100 * GUTTER_WIDTH:g} cm on each side fall outward, per cent, drawn "
+        "evenly from A to B.",
     ),
     option(
         "--kerb",
-        type=SPAN,
-        help="Height of kerbs and pavements (open, street) above the road's edge, metres, drawn evenly from "
+        SPAN,
+        "Height of kerbs and pavements (open, street) above the road's edge, metres, drawn evenly from "
         f"A to B.  [default: {KERB[0]:g}:{KERB[1]:g}]",
     ),
     option(
         "--dips",
-        type=Number("N", at_least=0, at_most=MAX_DIPS, whole=True),
-        help="Dips and bumps of 2.5 to 7 cm in the lane ahead of each road, and DIR/heights: how high the "
+        Number("N", at_least=0, at_most=MAX_DIPS, whole=True),
+        "Dips and bumps of 2.5 to 7 cm in the lane ahead of each road, and DIR/heights: how high the "
         "ground lies over the road, metres, float32 TIFF; 0: kerbs and pavements alone.  [default: neither]",
     ),
     option(
         "--roughness",
-        type=Choice(*ROUGHNESS),
-        help="Class of the road's unevenness by ISO 8608, along and across, with mended patches and "
+        Choice(*ROUGHNESS),
+        "Class of the road's unevenness by ISO 8608, along and across, with mended patches and "
         "sunken tracks; A: new asphalt, C: an old road, E: gravel. Roll, pitch and height are against the "
         "plane that fits the lane ahead.  [default: a smooth road]",
     ),
     option(
         "--size",
-        type=IMAGE_SIZE,
-        show_default=False,
-        help="Size of the images, pixels.  [default: {}x{}]".format(*SimulateOptions.size),
+        IMAGE_SIZE,
+        "Size of the images, pixels.",
     ),
     option(
         "--focal",
-        type=Number("PX", above=0),
-        help=f"Focal length, pixels.  [default: {FOCAL_PER_WIDTH:g} times the width]",
+        Number("PX", above=0),
+        f"Focal length, pixels.  [default: {FOCAL_PER_WIDTH:g} times the width]",
     ),
     option(
         "--principal-point",
-        type=POINT,
-        help="Column and row of the principal point, pixels from the centre of the top-left pixel.  "
+        POINT,
+        "Column and row of the principal point, pixels from the centre of the top-left pixel.  "
         "[default: the image's centre]",
     ),
     option(
         "--principal-offset",
-        type=SPAN,
-        show_default=False,
-        help="Offset of the principal point in each direction, pixels, drawn evenly from A to B.  "
-        "[default: 0]",
+        SPAN,
+        "Offset of the principal point in each direction, pixels, drawn evenly from A to B.",
     ),
-    option("--baseline", type=Number("M", above=0), help="Distance of the cameras, metres."),
+    option("--baseline", Number("M", above=0), "Distance of the cameras, metres."),
     option(
         "--height",
-        type=SPAN,
-        show_default=False,
-        help="Height of the left camera above the road, metres, drawn evenly from A to B.  "
-        f"[default: {SimulateOptions.height[0]:g}]",
+        SPAN,
+        "Height of the left camera above the road, metres, drawn evenly from A to B.",
     ),
     option(
         "--noise",
-        type=Number("SIGMA", at_least=0),
-        help="Noise of the sensor: standard deviation in grey levels of 255.",
+        Number("SIGMA", at_least=0),
+        "Noise of the sensor: standard deviation in grey levels of 255.",
     ),
-    option(
-        "--gain",
-        type=Number("F", above=0),
-        help="Brightness of the right view relative to the left one.",
-    ),
-    option("--grey", is_flag=True, help="Write grey images.  [default: colour]"),
+    option("--gain", Number("F", above=0), "Brightness of the right view relative to the left one."),
+    option("--grey", FLAG, "Write grey images.  [default: colour]"),
     option(
         "--seed",
-        type=Number("INT", at_least=0, whole=True),
+        Number("INT", at_least=0, whole=True),
+        "Seed of the random numbers; the same seed gives the same files.",
         default=0,
-        help="Seed of the random numbers; the same seed gives the same files.",
     ),
-    option("--resume", is_flag=True, help="Keep the frames of an interrupted simulation and do the rest."),
+    option("--resume", FLAG, "Keep the frames of an interrupted simulation and do the rest."),
 )
 
 

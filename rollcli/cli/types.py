@@ -34,6 +34,20 @@ class Choice(_Choice):
         return f"[{'|'.join(self.choices)}]"
 
 
+FLAG = click.BOOL  # of options that are given alone
+
+
+class Text(click.types.StringParamType):
+    """Any text; `metavar` is its placeholder in the help."""
+
+    def __init__(self, metavar: str) -> None:
+        super().__init__()
+        self.metavar = metavar
+
+    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
+        return self.metavar
+
+
 class FilePath(click.Path):
     """The name of a file or folder; an empty one, which would mean the current folder, is refused.
 
@@ -151,10 +165,17 @@ class Parsed(ParamType):
     parse : callable
     what : str
         What is accepted, in words.
+    between : str
+        What stands between the numbers of a default in the help.
     """
 
-    def __init__(self, metavar: str, parse: Callable[[Any], Any], what: str) -> None:
-        self.name, self.parse, self.what = metavar, parse, what
+    def __init__(self, metavar: str, parse: Callable[[Any], Any], what: str, between: str = "") -> None:
+        self.name, self.parse, self.what, self.between = metavar, parse, what, between
+
+    def shown(self, value: Any) -> str:
+        """Return a default as it would be given; of a range of one number that number."""
+        one = self.between == ":" and len(set(value)) == 1
+        return self.between.join(f"{each:g}" for each in (value[:1] if one else value))
 
     def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
         return self.name  # click would turn it into capitals
@@ -240,14 +261,14 @@ def _size(value: Any) -> tuple[int, int]:
     return width, height
 
 
-SPAN = Parsed("A:B", _span, "A:B with A <= B, such as -5:5, nor a single number")
+SPAN = Parsed("A:B", _span, "A:B with A <= B, such as -5:5, nor a single number", ":")
 WIDE_SPAN = Parsed("A:B", _wide_span, "A:B with A < B, such as -0.1:0.1")
 ANY_NUMBER = Parsed("VALUE", _any_number, "a number")  # that a pixel may hold: also nan and inf
 ROI = Parsed("X0,Y0,X1,Y1", _roi, "X0,Y0,X1,Y1 in whole pixels with X0 < X1 and Y0 < Y1")
 POINT = Parsed("CX,CY", _point, "CX,CY in pixels, such as 609.6,172.9")
 POLYGON = Parsed("'X,Y X,Y X,Y …'", _polygon, "three or more corners such as '0,375 600,180 1242,375'")
-SHARD = Parsed("I/N", _shard, "I/N with I from 1 to N, such as 2/8")
-TURNS = Parsed(
-    "A:B:STEP", _turns, "A:B:STEP in degrees with -90 <= A <= B <= 90, such as -20:20:2"
-)  # at most 1000 angles
-IMAGE_SIZE = Parsed("WxH", _size, "WxH in whole pixels, such as 640x480")
+SHARD = Parsed("I/N", _shard, "I/N with I from 1 to N, such as 2/8", "/")
+TURNS = Parsed(  # at most 1000 angles
+    "A:B:STEP", _turns, "A:B:STEP in degrees with -90 <= A <= B <= 90, such as -20:20:2", ":"
+)
+IMAGE_SIZE = Parsed("WxH", _size, "WxH in whole pixels, such as 640x480", "x")
