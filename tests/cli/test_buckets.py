@@ -15,25 +15,6 @@ def bucket(bucket, tmp_path):
     return bucket
 
 
-def test_maps_and_images_and_rows_in_a_bucket_are_those_on_disk(bucket, tmp_path):
-    images = ("--derotated", "level", "--heights", "h", "--heights-preview", "seen")
-    local = rollcli("estimate", "maps", "-o", "rolls.csv", *images, cwd=tmp_path)
-    assert local.status == 0
-    there = rollcli(
-        *("estimate", f"{bucket}/maps", "-o", f"{bucket}/rolls.csv", "--derotated", f"{bucket}/level"),
-        *("--heights", f"{bucket}/h", "--heights-preview", f"{bucket}/seen"),
-        *("--part-rows", "2", "-j", "2"),
-        cwd=tmp_path,
-    )
-    assert (there.status, contents(tmp_path).keys()) == (0, contents(tmp_path).keys())
-    expected = (tmp_path / "rolls.csv").read_bytes().replace(b"maps/", f"{bucket}/maps/".encode())
-    assert joined(f"{bucket}/rolls.csv") == expected
-    for folder in ("level", "h", "seen"):
-        assert len(contents(tmp_path / folder)) == 5
-        for name, data in contents(tmp_path / folder).items():
-            assert read_bytes(f"{bucket}/{folder}/{name}") == data
-
-
 def test_a_result_in_a_bucket_is_kept_resumed_and_replaced_as_asked(bucket, tmp_path):
     line = ("estimate", f"{bucket}/maps", "-o", f"{bucket}/rolls.csv", "--part-rows", "2", "-q")
     assert rollcli(*line, cwd=tmp_path).status == 0
@@ -88,22 +69,6 @@ def test_parquet_parts_are_one_typed_table(tmp_path):
     assert read_result(tmp_path / "rolls.parquet").rows == read_result(tmp_path / "rolls.csv").rows
     outs = [rollcli("rig", name, cwd=tmp_path).out for name in ("rolls.parquet", "rolls.csv")]
     assert outs[0] == outs[1] != ""
-
-
-def test_other_commands_read_a_result_of_parts(bucket, tmp_path):
-    assert (
-        rollcli("estimate", "maps", "-o", f"{bucket}/rolls.csv", "--part-rows", "2", cwd=tmp_path).status == 0
-    )
-    turned = rollcli(
-        "derotate", "maps", "--from", f"{bucket}/rolls.csv", "-o", f"{bucket}/level", cwd=tmp_path
-    )
-    assert (turned.status, len(joined(f"{bucket}/level", "png")) > 1000) == (0, True)
-    (tmp_path / "truth.csv").write_text("file,roll_deg\n" + "".join(f"frame{i},0\n" for i in range(5)))
-    figures = rollcli("evaluate", "accuracy", f"{bucket}/rolls.csv", "--truth", "truth.csv", cwd=tmp_path)
-    assert figures.status == 0, figures.err
-    assert "frames compared           5" in figures.out
-    seen = rollcli("rig", f"{bucket}/rolls.csv", cwd=tmp_path)
-    assert "(5 of 5 frames)" in seen.out
 
 
 @pytest.mark.parametrize(

@@ -44,17 +44,6 @@ def test_whole_pixels_in_16_bits_are_warned_of_once(tmp_path):
     assert "rollcli: 2 frames: warning: uint16 numbers up to" in err
 
 
-def test_failures_of_one_cause_are_said_once_with_their_number(tmp_path):
-    for index in range(8):
-        (tmp_path / f"{index}.png").write_bytes(b"this is no map")
-    short = rollcli("estimate", ".", "-o", "rolls.csv", cwd=tmp_path)
-    assert short.status == 3
-    assert short.err.count(".png: is text") == 1
-    assert "rollcli: 8 frames: is text" in short.err
-    everything = rollcli("estimate", ".", "-o", "rolls.csv", "--overwrite", "-v", cwd=tmp_path)
-    assert everything.err.count(".png: is text") == 8
-
-
 def test_a_terminal_sees_a_progress_bar(maps):
     main, other = pty.openpty()
     line = command("estimate", "maps", "-o", "rolls.csv")

@@ -21,7 +21,8 @@ MAPS = 3
 # what each command reads and writes: "@/" stands for a folder on disk, or for a prefix of a bucket
 LINES = {
     "a list and a calibration": "estimate --files-from @/list.txt --calib @/calib.txt -o @/listed.jsonl",
-    "folders": "estimate @/maps/ --calib @/calib/ --mask @/mask.png -o @/each.csv --derotated @/up",
+    "folders": "estimate @/maps/ --calib @/calib/ --mask @/mask.png -o @/each.csv --derotated @/up "
+    "--heights @/h --heights-preview @/seen",
     "pairs": "estimate --left @/left --right @/right --num-disparities 32 -o @/pairs.csv --road-mask @/road",
     "derotate": "derotate @/maps/*.png --from @/rolls.csv -o @/level",
     "vdisparity": "vdisparity @/maps --calib @/calib.txt -o @/counts --counts",

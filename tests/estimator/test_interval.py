@@ -279,15 +279,6 @@ def test_errors_have_the_covariance_that_those_of_the_parabola_imply(size):
     np.testing.assert_allclose(tangent.changes.T @ tangent.changes, expected, rtol=1e-9)
 
 
-def test_a_slope_along_the_rows_turns_a_road_by_its_part_across_and_a_constant_one_not_at_all():
-    assert touch((30.0, 0.0, 0.0), THETA, GRID, None, None).turned_by(1e-3) == 0
-    slope, theta = 0.3, 0.2
-    rolled = np.array([-slope * math.sin(theta), slope * math.cos(theta)])  # along the columns, the rows
-    turned = [math.atan2(-(rolled[0] + change), rolled[1]) for change in (1e-6, -1e-6)]
-    tangent = touch((30.0, slope, 0.0), theta, GRID, None, None)
-    assert tangent.turned_by(1e-6) == pytest.approx(abs(turned[0] - turned[1]) / 2, rel=1e-6)
-
-
 def touched(disparity, alpha=None):
     """The tangent of a map's parabola, or of another, amid all of its pixels, and the mean of their rows."""
     surface = whole_surface(take_sample(disparity, None, TUNING.sample), energy := energy_of(disparity))

@@ -11,7 +11,7 @@ from hypothesis.extra import numpy as arrays
 from rollcli.errors import UsageError
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.pictures.derotate import derotate
-from rollcli.pictures.vdisparity import BOTTOM_MARGIN, draw_v_disparity, profile, row_offset, v_disparity
+from rollcli.pictures.vdisparity import profile, row_offset, v_disparity
 
 MAPS = arrays.arrays(
     st.sampled_from([np.uint8, np.uint16, np.int16, np.float32, np.float64]),
@@ -28,19 +28,6 @@ def test_counts_sum_to_the_valid_pixels_of_each_row(values, bins, top):
 
     assert histogram.counts.shape == (len(values), bins)
     np.testing.assert_array_equal(histogram.counts.sum(axis=1), valid.sum(axis=1))
-
-
-@given(MAPS)
-def test_defaults_count_every_valid_pixel_too(values):
-    if np.abs(values[np.isfinite(values)]).max(initial=0) > 1e6:
-        values = np.zeros((1, 1))
-
-    histogram = v_disparity(values)
-
-    np.testing.assert_array_equal(
-        histogram.counts.sum(axis=1), (np.isfinite(values) & (values > 0)).sum(axis=1)
-    )
-    assert draw_v_disparity(histogram).shape[0] == len(values) + BOTTOM_MARGIN
 
 
 def test_whole_pixel_maps_get_a_bin_a_pixel_and_others_finer_ones():

@@ -48,14 +48,6 @@ def test_the_band_is_the_interval_and_breaks_where_there_is_none():
     assert band["y"] == [1.1, 2.2, 1.8, 0.9, None, -0.9, -1.1, None, 0.3, -0.3, None]
 
 
-@pytest.mark.parametrize(("suspects", "broken"), [(0, False), (1, True), (4, True)])
-def test_no_line_is_drawn_across_a_suspect_frame(suspects, broken):
-    between = [row(f"s{i}.png", 9.0, 1.0, "suspect") for i in range(suspects)]
-    shown = traces([row("a.png"), row("b.png"), *between, row("c.png"), row("d.png")])
-    for name in ("roll", "95 % interval"):
-        assert (None in shown[name]["x"][:-1]) == broken
-
-
 def test_hover_labels_show_names_as_they_are():
     labels = traces(ROWS)["roll"]["customdata"]
     assert labels[0] == "a.png<br>+1.00° ± 0.10°"

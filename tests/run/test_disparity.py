@@ -156,10 +156,6 @@ def test_what_has_no_partner_is_named_before_anything_is_written(pairs, left, ri
     assert not (pairs / "never").exists()
 
 
-def test_one_side_alone_is_refused(pairs):
-    assert "--right" in rollcli("disparity", "--left", "rig/left", "-o", "never", cwd=pairs).refused()
-
-
 @pytest.mark.slow
 @pytest.mark.skipif(not ROADS.is_dir(), reason="the real road pairs (../shared/roads) are not here")
 def test_on_real_roads_most_pixels_of_the_matched_region_are_valid(tmp_path):

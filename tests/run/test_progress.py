@@ -116,14 +116,6 @@ def test_a_row_does_not_repeat_its_file_and_stderr_names_it(frame, reason, messa
     assert (failed.row.message, failed.said) == (message, said)
 
 
-def test_how_numbers_were_read_is_said_once_unless_it_was_given(lines):
-    found, given = progress(), progress(encoding=EncodingOptions(encoding="kitti"))
-    for _ in range(2):
-        found.add(result(encoding="kitti"))
-        given.add(result(encoding="kitti"))
-    assert lines() == ["rollcli: a.png: read as kitti (stored / 256)"]
-
-
 def test_a_quiet_run_says_errors_alone(lines):
     counted = progress(quiet=True, verbose=True)
     counted.add(
@@ -140,16 +132,6 @@ def test_doubts_are_said_when_verbose(lines):
     counted = progress(verbose=True)
     counted.add(result("suspect", "is doubtful"))
     assert lines() == ["rollcli: a.png: suspect: is doubtful"]
-
-
-def test_the_last_line_is_the_summary_and_a_quiet_run_has_none(lines):
-    for quiet in (False, True):
-        counted = progress(2, quiet=quiet)
-        counted.add(result())
-        counted.tell_end()
-        assert [line.partition("; ")[0] for line in lines()] == [
-            "rollcli: 1 frame: 1 ok, 0 suspect, 0 failed"
-        ] * (not quiet)
 
 
 def test_frames_that_failed_for_one_cause_are_counted_together_whatever_they_name(tmp_path):

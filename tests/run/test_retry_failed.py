@@ -12,12 +12,11 @@ import pytest
 
 from rollcli.errors import OutputError, UsageError
 from rollcli.files.results import format_header, read_result
-from rollcli.files.storage import list_names, modified_ns, read_bytes, remove, write_bytes
+from rollcli.files.storage import list_names, read_bytes, remove, write_bytes
 from rollcli.run import estimate as batch_run
 from rollcli.run import result_file
 from rollcli.run.estimate import estimate_frame
 from rollcli.run.result_file import open_result
-from tests.object_store import upload
 from tests.run_cli import command, contents, environment, road_map, rollcli, write_kitti, write_maps
 
 FRAMES = 12
@@ -129,20 +128,6 @@ def test_a_retry_that_may_not_fail_stops_at_the_first_failure(folder, maps):
     assert [statuses[index] for index in BROKEN] == ["ok", "error", "error"]
 
 
-def test_rows_whose_names_hold_newlines_and_quotes_keep_their_places(maps, tmp_path):
-    names = ['a "1".png', "b\n2.png", 'c,\n"3".png', "d.png"]
-    (tmp_path / "maps").mkdir()
-    for name in names:
-        (tmp_path / "maps" / name).write_bytes(b"no map")
-    line = ("estimate", "maps", "-o", "rolls.csv")
-    assert rollcli(*line, cwd=tmp_path).status == 3
-    shutil.copyfile(maps / "frame1.png", tmp_path / "maps" / names[2])
-    assert rollcli(*line, *RETRY, cwd=tmp_path).status == 3
-    retried = (tmp_path / "rolls.csv").read_bytes()
-    assert rollcli(*line, "--overwrite", cwd=tmp_path).status == 3
-    assert (tmp_path / "rolls.csv").read_bytes() == retried
-
-
 @pytest.mark.slow
 def test_a_retry_killed_at_any_time_loses_no_row_and_is_taken_up_again(tmp_path):
     for index in range(COUNT):
@@ -199,46 +184,10 @@ def test_a_link_to_a_result_stays_one_and_its_file_keeps_its_rights(folder, maps
     assert b"error" not in (folder / "rolls.csv").read_bytes()
 
 
-def test_a_retry_refuses_when_the_file_of_a_kept_row_has_changed(folder, maps):
-    line = ("estimate", "maps", "-o", "rolls.csv")
-    assert rollcli(*line, cwd=folder).status == 3
-    before = (folder / "rolls.csv").read_bytes()
-    mend(folder, maps, 2)
-    write_kitti(folder / "maps" / "frame5.png", road_map(0.3))
-    assert "maps/frame5.png has changed since" in rollcli(*line, *RETRY, cwd=folder).refused()
-    assert (folder / "rolls.csv").read_bytes() == before
-
-
 def test_retry_failed_alone_says_what_it_goes_with(folder):
     refusal = rollcli("estimate", "maps", "-o", "rolls.csv", "--retry-failed", cwd=folder).refused()
     assert "give --resume with it" in refusal
     assert not (folder / "rolls.csv").exists()
-
-
-@pytest.mark.parametrize("ending", ["csv", "parquet"])
-def test_failed_frames_of_a_bucket_are_done_again_and_other_parts_stay(bucket, folder, maps, ending):
-    if ending == "parquet":
-        pytest.importorskip("pyarrow", reason="pyarrow, of the extra parquet, is not here")
-    upload(folder / "maps", f"{bucket}/maps")
-
-    def line(result):
-        return ("estimate", f"{bucket}/maps", "-o", f"{bucket}/{result}.{ending}", "--part-rows", "4")
-
-    def parts(result):
-        names = list_names(f"{bucket}/{result}.{ending}")
-        return {name: read_bytes(f"{bucket}/{result}.{ending}/{name}") for name in names}
-
-    assert rollcli(*line("rolls"), cwd=folder).status == 3
-    middle = f"{bucket}/rolls.{ending}/part-00001.{ending}"
-    before = modified_ns(middle)
-    for index in BROKEN:
-        write_bytes(f"{bucket}/maps/frame{index}.png", (maps / f"frame{index}.png").read_bytes())
-    assert rollcli(*line("rolls"), *RETRY, cwd=folder).status == 0
-    assert modified_ns(middle) == before
-    assert rollcli(*line("anew"), cwd=folder).status == 0
-    assert parts("rolls") == parts("anew")
-    records = [read_bytes(f"{bucket}/{name}.{ending}.run.json") for name in ("rolls", "anew")]
-    assert records[0] == records[1]
 
 
 @pytest.fixture(params=["rolls.csv", "rolls.parquet", "bucket"])

@@ -71,13 +71,6 @@ def test_two_maps_of_one_name_are_refused(maps):
     assert "would both write v/frame0.png" in rollcli("vdisparity", "maps", "-o", "v", cwd=maps).refused()
 
 
-def test_its_own_pictures_never_become_inputs(maps):
-    for _ in range(2):
-        line = ("vdisparity", "maps", "--recursive", "-o", "maps/v", "--overwrite")
-        assert rollcli(*line, cwd=maps).status == 0
-    assert sorted(contents(maps / "maps" / "v")) == [f"frame{index}.png" for index in range(3)]
-
-
 def test_the_last_line_counts_what_was_drawn(maps):
     (maps / "maps" / "frame1.png").write_bytes(b"no map")
     done = rollcli("vdisparity", "maps", "-o", "v", cwd=maps)

@@ -165,12 +165,6 @@ def test_the_files_are_the_same_whatever_the_jobs_are(tmp_path, rendered):
     assert contents(rendered) == contents(tmp_path / "two")
 
 
-def test_grey_images_have_one_channel(tmp_path):
-    simulate(tmp_path, SimulateOptions(frames=1, size=(64, 48), grey=True))
-    data = np.frombuffer((tmp_path / "left" / "frame_0001.png").read_bytes(), np.uint8)
-    assert cv2.imdecode(data, cv2.IMREAD_UNCHANGED).shape == (48, 64)
-
-
 def test_overwriting_leaves_no_frame_of_an_earlier_simulation_and_no_other_file_is_touched(rig):
     for name in ("mine.png", "frame_0099.png"):
         (rig / "left" / name).write_bytes(b"mine")

@@ -85,12 +85,6 @@ def test_rays_end_where_a_fine_scan_meets_the_uneven_road(roughness, section):
         assert depth[rows[k], columns[k]] == pytest.approx(found, abs=0.005)
 
 
-def test_a_flat_and_smooth_lane_has_the_roll_of_the_rig():
-    for roll_deg in (-20.0, 0.0, 7.0):
-        spec = FrameSpec("street", math.radians(roll_deg), 0.02, seed=5)
-        assert np.degrees(lane_rolls_of(spec)) == pytest.approx([roll_deg] * 2, abs=1e-9)
-
-
 @pytest.mark.parametrize("seed", range(3))
 def test_the_lane_of_a_rough_road_has_the_rolls_that_its_pixels_have_in_metres(seed):
     spec = FrameSpec("bare", math.radians(3), 0.04, size=(800, 600), focal=464, roughness="C", seed=seed)

@@ -17,25 +17,16 @@ TINY = {"size": (64, 48), "focal": 37.0}
 @pytest.mark.parametrize(
     ("wrong", "named"),
     [
-        ({"roll": math.radians(90.5)}, "roll of 90.5 degrees is beyond"),
-        ({"pitch": math.radians(-61)}, "pitch of -61 degrees"),
         ({"height": 0.0}, "under the road"),
         ({"height": -1.65}, "under the road"),
         ({"height": 0.3, "roll": math.radians(-60)}, "right camera is under the road"),
-        ({"size": (8, 480)}, "8x480"),
         ({"size": (0, 0)}, "0x0"),
         ({"focal": 0.0}, "focal length"),
-        ({"baseline": -0.1}, "baseline"),
-        ({"noise": -1.0}, "noise"),
+        ({"baseline": 0.0}, "baseline"),
         ({"gain": 0.0}, "gain"),
-        ({"curvature": 0.02}, "curvature of 0.02"),
         ({"scene": "beach"}, "no such scene: beach"),
         ({"focal": math.nan}, "finite"),
-        ({"crossfall": 0.2}, "crossfall of 20 %"),
-        ({"gutter": -0.1}, "gutter of -10 %"),
         ({"kerb": (0.2, 0.1)}, "kerbs of 0.2 to 0.1 m"),
-        ({"principal_point": (640.0, 100.0)}, "principal point 640,100 lies outside"),
-        ({"principal_point": (100.0, -1.0)}, "principal point 100,-1 lies outside"),
         ({"cross_section": "ridge"}, "no such cross section: ridge"),
     ],
 )
@@ -45,37 +36,37 @@ def test_a_rig_that_cannot_be_is_refused_and_the_reason_named(wrong, named):
 
 
 @pytest.mark.parametrize(
-    ("name", "last", "beyond"),
+    ("name", "last", "beyond", "named"),
     [
-        ("roll", math.pi / 2, 1.571),
-        ("roll", -math.pi / 2, -1.571),
-        ("pitch", math.radians(60), 1.048),
-        ("pitch", -math.radians(60), -1.048),
-        ("curvature", 0.01, 0.0101),
-        ("bend", 0.02, 0.0201),
-        ("bend", -0.02, -0.0201),
-        ("curvature", -0.01, -0.0101),
-        ("crossfall", 0.15, 0.151),
-        ("crossfall", 0.0, -0.001),
-        ("gutter", 0.5, 0.501),
-        ("gutter", 0.0, -0.001),
-        ("kerb", (0.0, 0.5), (0.0, 0.501)),
-        ("kerb", (0.0, 0.0), (-0.001, 0.0)),
-        ("size", (16, 480), (15, 480)),
-        ("size", (640, 16), (640, 15)),
-        ("size", (16384, 16), (16385, 16)),
-        ("size", (16, 16384), (16, 16385)),
-        ("principal_point", (0.0, 479.0), (-0.1, 479.0)),
-        ("principal_point", (639.0, 0.0), (639.1, 0.0)),
-        ("principal_point", (0.0, 0.0), (0.0, -0.1)),
-        ("principal_point", (639.0, 479.0), (639.0, 479.1)),
-        ("noise", 0.0, -0.001),
+        ("roll", math.pi / 2, 1.571, "roll of 90.01.* degrees is beyond"),
+        ("roll", -math.pi / 2, -1.571, "roll of -90.01"),
+        ("pitch", math.radians(60), 1.048, "pitch of 60.0"),
+        ("pitch", -math.radians(60), -1.048, "pitch of -60.0"),
+        ("curvature", 0.01, 0.0101, "curvature of 0.0101"),
+        ("curvature", -0.01, -0.0101, "curvature of -0.0101"),
+        ("bend", 0.02, 0.0201, "bend of 0.0201"),
+        ("bend", -0.02, -0.0201, "bend of -0.0201"),
+        ("crossfall", 0.15, 0.151, "crossfall of 15.1 %"),
+        ("crossfall", 0.0, -0.001, "crossfall of -0.1 %"),
+        ("gutter", 0.5, 0.501, "gutter of 50.1 %"),
+        ("gutter", 0.0, -0.001, "gutter of -0.1 %"),
+        ("kerb", (0.0, 0.5), (0.0, 0.501), "kerbs of 0 to 0.501 m"),
+        ("kerb", (0.0, 0.0), (-0.001, 0.0), "kerbs of -0.001 to 0 m"),
+        ("size", (16, 480), (15, 480), "15x480"),
+        ("size", (640, 16), (640, 15), "640x15"),
+        ("size", (16384, 16), (16385, 16), "16385x16"),
+        ("size", (16, 16384), (16, 16385), "16x16385"),
+        ("principal_point", (0.0, 479.0), (-0.1, 479.0), "principal point -0.1,479 lies outside"),
+        ("principal_point", (639.0, 0.0), (639.1, 0.0), "principal point 639.1,0 lies outside"),
+        ("principal_point", (0.0, 0.0), (0.0, -0.1), "principal point 0,-0.1 lies outside"),
+        ("principal_point", (639.0, 479.0), (639.0, 479.1), "principal point 639,479.1 lies outside"),
+        ("noise", 0.0, -0.001, "noise"),
     ],
 )
-def test_a_value_at_its_limit_is_taken_and_one_beyond_it_is_refused(name, last, beyond):
+def test_a_value_at_its_limit_is_taken_and_one_beyond_it_is_refused(name, last, beyond, named):
     others = {"principal_point": (1.0, 1.0)} if name == "size" else {"height": 3.0}
     assert getattr(FrameSpec(**{**others, name: last}), name) == last
-    with pytest.raises(UsageError):
+    with pytest.raises(UsageError, match=named):
         FrameSpec(**{**others, name: beyond})
 
 
@@ -140,14 +131,6 @@ def test_other_seeds_and_other_frames_are_other_scenes():
     assert not np.array_equal(pictures[0], pictures[2])
 
 
-def test_a_spec_gives_the_same_frame_each_time():
-    spec = draw_specs(SimulateOptions(frames=1, scene="open", seed=3, **TINY))[0]
-    once, twice = render_frame(spec), render_frame(spec)
-    assert once.left.tobytes() == twice.left.tobytes()
-    assert once.right.tobytes() == twice.right.tobytes()
-    assert once.disparity.tobytes() == twice.disparity.tobytes()
-
-
 def test_mixed_draws_every_scene_and_only_a_bare_road_is_always_flat():
     specs = draw_specs(SimulateOptions(frames=400, seed=2))
     flat = {kind: np.mean([s.curvature == 0 for s in specs if s.scene == kind]) for kind in SCENES}
@@ -167,7 +150,3 @@ def test_a_curvature_that_is_asked_for_holds_for_every_scene():
         0.001 <= spec.curvature <= 0.002
         for spec in draw_specs(SimulateOptions(frames=40, curvature=(0.001, 0.002)))
     )
-
-
-def test_the_focal_length_follows_the_width():
-    assert draw_specs(SimulateOptions(frames=1, size=(1000, 300)))[0].focal == pytest.approx(580)

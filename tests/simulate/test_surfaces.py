@@ -11,8 +11,8 @@ from rollcli.simulate.road import Piece
 from rollcli.simulate.roadside import vehicle
 from rollcli.simulate.solids import Post, TreeCrown
 from rollcli.simulate.spec import FrameSpec
-from rollcli.simulate.surfaces import NEAR, Backdrop, Course, Ground, Wall
-from rollcli.simulate.views import NONE, first_hits, trace
+from rollcli.simulate.surfaces import Backdrop, Course, Ground, Wall
+from rollcli.simulate.views import first_hits
 
 COURSE = Course(heading=0.03, bend=1 / 300, curvature=0.001)
 ORIGIN = np.array([[0.3], [1.6], [0.1]])
@@ -130,16 +130,6 @@ def test_positions_between_pixels_are_traced_as_whole_rows_are():
     assert np.array_equal(first_hits(scene, anywhere)[0], depth)
     part = PixelRays.of_rows(rows.camera, range(37, 90))
     assert np.array_equal(first_hits(scene, part)[1], surface.reshape(120, 160)[37:90].ravel())
-
-
-def test_a_ray_that_meets_nothing_sees_the_sky():
-    scene, pixels = every_pixel(SPEC)
-    hits = trace(scene, pixels)
-    sky = np.isinf(hits.depth)
-    assert 0.05 < sky.mean() < 0.6
-    assert np.array_equal(sky, hits.surface == -1)
-    assert np.array_equal(sky, hits.material == NONE)
-    assert hits.depth.min() > NEAR
 
 
 def box(low, high):

@@ -122,13 +122,6 @@ def plane_of(disparity):
     return fit_plane(disparity, lower_centre(disparity, disparity > 0)).solution
 
 
-@pytest.mark.parametrize("roll_deg", [-45, -12, 0, 3, 44])
-def test_one_plane_of_a_flat_road_gives_its_roll(roll_deg):
-    assert math.degrees(plane_of(flat_road(roll_deg, pitch_deg=25)).theta) == pytest.approx(
-        roll_deg, abs=1e-6
-    )
-
-
 def test_by_default_the_area_is_the_lower_centre():
     disparity = flat_road(6)
     rows, columns = lower_centre_slices(*disparity.shape)

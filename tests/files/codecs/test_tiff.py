@@ -78,18 +78,6 @@ def test_writing_a_tiff_twice_gives_the_same_bytes():
     assert encode_stored(values_of("f4"), "tiff") == encode_stored(values_of("f4"), "tiff")
 
 
-def test_of_several_pages_the_first_is_read_and_that_is_said():
-    stored = decode_stored(make_tiff(values_of("f4"), pages=3), "map.tif")
-
-    np.testing.assert_array_equal(stored.values, values_of("f4"))
-    assert "map.tif" in stored.note
-    assert "several pages" in stored.note
-
-
-def test_overviews_are_no_pages_of_their_own():
-    assert decode_stored(make_tiff(values_of("f4"), pages=3, page_kind=1), "map.tif").note == ""
-
-
 def test_colour_complex_and_palette_images_are_no_maps():
     colour = np.zeros((5, 7, 3), np.uint8)
 
@@ -385,13 +373,6 @@ def test_deflate_has_two_numbers(monkeypatch, installed, compression):
 @given(st.binary(min_size=1, max_size=3000), st.integers(1, 40))
 def test_what_is_packed_is_unpacked(data, times):
     assert decode_lzw(lzw_encode(data * times), len(data) * times) == data * times
-
-
-@pytest.mark.parametrize("spread", [1, 3, 17, 256])
-def test_data_longer_than_many_tables_are_unpacked(spread):
-    data = np.random.default_rng(0).integers(0, spread, 100_000, dtype=np.uint8).tobytes()
-
-    assert decode_lzw(lzw_encode(data), len(data)) == data
 
 
 @given(st.binary(min_size=1, max_size=300))
