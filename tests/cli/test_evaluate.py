@@ -93,22 +93,6 @@ def test_accuracy_dry_run_lists_files_and_does_nothing(folder):
     assert not (folder / "figures.csv").exists()
 
 
-@pytest.mark.parametrize(
-    ("result", "truth", "reason"),
-    [
-        ("file,angle\na,1\n", TRUTH, "is not a result of rollcli estimate"),
-        (None, TRUTH, "rolls.csv: cannot be read: no such file"),
-    ],
-)
-def test_accuracy_of_what_is_no_result_is_one_line_and_status_2(folder, result, truth, reason):
-    (folder / "truth.csv").write_text(truth)
-    if result is None:
-        (folder / "rolls.csv").unlink()
-    else:
-        (folder / "rolls.csv").write_text(result)
-    assert reason in accuracy(folder).refused()
-
-
 def test_evaluate_alone_shows_its_commands(tmp_path):
     done = rollcli("evaluate", cwd=tmp_path)
     assert done.status == 0

@@ -169,12 +169,3 @@ def test_a_result_of_other_maps_is_refused_in_a_line(tmp_path):
     refusal = rollcli("heights", "other", "--from", "rolls.csv", "-o", "o", cwd=tmp_path).refused()
     assert "has no row for other/frame2.png" in refusal
     assert not (tmp_path / "o").exists()
-
-
-@pytest.mark.parametrize("given", ["0.1", "0.1:-0.1", "0:0", "a:b", "-inf:1"])
-def test_a_range_of_colours_has_two_ends(tmp_path, given):
-    write_maps(tmp_path / "maps", 1)
-    refusal = rollcli(
-        "estimate", "maps", "--heights-preview", "p", "--heights-range", given, cwd=tmp_path
-    ).refused()
-    assert "is not A:B with A < B" in refusal

@@ -116,24 +116,6 @@ main()
     assert done.stderr.count("\n") == 1
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["estimates", "maps"], "there is no command 'estimates'; did you mean 'estimate'?"),
-        (["Report"], "there is no command 'Report'; did you mean 'report'?"),
-        (["xyzzy"], "there is no command 'xyzzy'; commands: estimate, disparity,"),
-        (["estimate", "maps", "-o", "a.json"], "'a.json': .json is not written here; write CSV"),
-        (["estimate", "maps", "-o", "A.XLSX"], "'A.XLSX': .xlsx is not written here; write CSV"),
-        (
-            ["report", "rolls.csv", "-o", "page.pdf"],
-            "'page.pdf': .pdf is not written here; write a page (.html)",
-        ),
-    ],
-)
-def test_a_slip_of_the_pen_is_answered_with_what_is_possible(tmp_path, arguments, said):
-    assert said in rollcli(*arguments, cwd=tmp_path).refused()
-
-
 def test_choices_ignore_case(tmp_path):
     write_maps(tmp_path / "maps", 1)
     upper = rollcli("estimate", "maps", "--method", "EXACT", "--road", "All", cwd=tmp_path)

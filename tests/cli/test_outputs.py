@@ -90,12 +90,6 @@ def test_image_folders_inside_the_input_are_no_input(maps):
     assert first.out.count("\n") == 3
 
 
-def test_computed_maps_are_asked_of_pairs_only(maps):
-    assert "--disparity writes maps computed from --left and --right" in refused(
-        maps, "maps", "--disparity", "d"
-    )
-
-
 def test_a_dry_run_lists_what_is_read_and_written_and_does_nothing(maps):
     before = contents(maps)
     done = rollcli("estimate", "maps", "-o", "rolls.csv", "--vdisparity", "v", "--dry-run", cwd=maps)

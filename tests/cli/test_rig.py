@@ -185,22 +185,6 @@ def test_all_suspect_frames_say_so_and_can_be_counted(tmp_path):
     assert rig(tmp_path, "s.csv", "--include-suspect").out.startswith("roll    +0.3")
 
 
-@pytest.mark.parametrize(
-    ("arguments", "reason"),
-    [
-        (["--expect-roll", "0"], "need --within"),
-        (["--within", "1"], "--within needs"),
-        (["--expect-height", "1"], "--expect-height needs --within-height"),
-        (["--within-height", "1"], "needs --expect-height"),
-        (["stable.csv"], "stable.csv: is named twice"),
-        (["--groups", "nothing*"], "matches no folder"),
-        (["--against", "none.csv"], "none.csv: cannot be read"),
-    ],
-)
-def test_a_question_that_makes_no_sense_is_refused(folder, arguments, reason):
-    assert reason in rig(folder, "stable.csv", *arguments).refused()
-
-
 HEADER = format_header("csv").decode()
 
 

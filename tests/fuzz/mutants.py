@@ -33,6 +33,7 @@ FURTHER = {
     "cli": ("run/test_resume.py", "test_messages.py", "test_readme.py"),
     "estimator": ("rig/test_pose.py",),
     "evaluate": (
+        "cli/test_mistakes.py",
         "cli/test_evaluate.py",
         "cli/test_evaluate_paper.py",
         "estimator/test_energy.py",
@@ -56,6 +57,7 @@ FURTHER = {
     "rig": ("cli/test_calibration.py", "cli/test_horizon.py", "cli/test_rig.py", "run/test_diagnosis.py"),
     "run": (
         "files/stores/test_turns.py",
+        "cli/test_mistakes.py",
         "cli/test_outputs.py",
         "cli/test_idle_options.py",
         "cli/test_help.py",
@@ -71,11 +73,13 @@ FURTHER = {
         "cli/test_buckets.py",
     ),
     "simulate": (
+        "cli/test_mistakes.py",
         "cli/test_simulate.py",
         "cli/test_lost_readers.py",
         "stereo/test_alignment.py",
         "stereo/test_stereo.py",
     ),
+    "report": ("cli/test_mistakes.py",),
     "stereo": ("run/test_estimate_pair.py",),
 }
 _QUICKLY = ("-x", "-q", "-p", "no:cacheprovider")

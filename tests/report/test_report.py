@@ -328,20 +328,6 @@ def test_a_damaged_record_of_the_run_is_refused_in_one_line(folder, record):
     assert "out/rolls.csv.run.json: is not" in report(folder, "out/rolls.csv").refused()
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["nothing.csv"], "nothing.csv: cannot be read"),
-        (["out/rolls.csv", "--images", "nothing"], "nothing: no such folder of images"),
-        (["out/rolls.csv", "--images", "maps"], "maps: has no image of maps/frame"),
-        (["out/rolls.csv", "--gallery", "-1"], "'-1' is not a whole number"),
-    ],
-)
-def test_what_is_missing_is_named_before_anything_is_written(folder, arguments, words):
-    assert words in report(folder, *arguments).refused()
-    assert not (folder / "page.html").exists()
-
-
 def test_a_page_that_is_there_is_kept_and_inputs_are_never_replaced(folder):
     (folder / "page.html").write_text("mine")
     assert report(folder, "out/rolls.csv").status == 2
@@ -403,18 +389,6 @@ def test_a_dry_run_names_the_charts(folder):
     done = rollcli("report", "out/rolls.csv", "--png", "slides", "--dry-run", cwd=folder)
     assert done.out.splitlines()[1:] == ["write slides/roll.png", "write slides/histogram.png"]
     assert not (folder / "slides").exists()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ([], "nothing to write: name a page with -o"),
-        (["--png", "slides", "--title", "x"], "--title is for a page"),
-        (["--pdf", "slides", "--images", "out"], "--images is for a page"),
-    ],
-)
-def test_what_would_do_nothing_is_refused(folder, arguments, words):
-    assert words in rollcli("report", "out/rolls.csv", *arguments, cwd=folder).refused()
 
 
 def test_a_result_from_a_pipe_and_a_page_to_one(folder):

@@ -184,12 +184,6 @@ def test_a_link_to_a_result_stays_one_and_its_file_keeps_its_rights(folder, maps
     assert b"error" not in (folder / "rolls.csv").read_bytes()
 
 
-def test_retry_failed_alone_says_what_it_goes_with(folder):
-    refusal = rollcli("estimate", "maps", "-o", "rolls.csv", "--retry-failed", cwd=folder).refused()
-    assert "give --resume with it" in refusal
-    assert not (folder / "rolls.csv").exists()
-
-
 @pytest.fixture(params=["rolls.csv", "rolls.parquet", "bucket"])
 def stopped(request, folder, maps, monkeypatch):
     """A folder, and the line of a run whose retry made images and could not write their rows."""

@@ -66,11 +66,6 @@ def test_a_map_without_a_road_is_drawn_without_one(tmp_path):
         assert not road_pixels(picture).any()
 
 
-def test_two_maps_of_one_name_are_refused(maps):
-    np.save(maps / "maps" / "frame0.npy", road_map())
-    assert "would both write v/frame0.png" in rollcli("vdisparity", "maps", "-o", "v", cwd=maps).refused()
-
-
 def test_the_last_line_counts_what_was_drawn(maps):
     (maps / "maps" / "frame1.png").write_bytes(b"no map")
     done = rollcli("vdisparity", "maps", "-o", "v", cwd=maps)
@@ -143,20 +138,6 @@ def test_a_figure_is_the_same_each_time_and_needs_no_result(maps, kind):
     assert rollcli(*line, "two", "-j2", cwd=maps).status == 0
     assert sorted(contents(maps / "one")) == [f"frame{i}.{kind}" for i in range(3)]
     assert contents(maps / "one") == contents(maps / "two")
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (["--from", "rolls.csv"], "--from is for --figure"),
-        (["--figure", "pdf", "--counts"], "--counts goes with the picture"),
-        (["--figure", "pdf", "--from", "rolls.csv"], "rolls.csv: has no row for maps/frame1.png"),
-    ],
-)
-def test_what_a_figure_cannot_be_is_refused_before_anything_is_written(maps, options, words):
-    assert rollcli("estimate", "maps/frame0.png", "-o", "rolls.csv", cwd=maps).status == 0
-    assert words in rollcli("vdisparity", "maps", *options, "-o", "v", cwd=maps).refused()
-    assert not (maps / "v").exists()
 
 
 def test_a_figure_without_the_extra_is_refused_in_one_line_that_says_how_to_install_it(maps, monkeypatch):
