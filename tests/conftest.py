@@ -42,6 +42,15 @@ def bucket(store, tmp_path, monkeypatch):
     return f"s3://maps/{tmp_path.name}"
 
 
+@pytest.fixture
+def maps(tmp_path, request):
+    """A folder with as many maps in `maps` as the module's FRAMES says."""
+    from tests.run_cli import write_maps  # here: it loads NumPy
+
+    write_maps(tmp_path / "maps", request.module.FRAMES)
+    return tmp_path
+
+
 @pytest.fixture(scope="module")
 def browser():
     """A headless Chromium with a profile of its own."""

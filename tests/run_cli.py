@@ -1,5 +1,7 @@
 """The program as a user runs it, and maps for it to read."""
 
+import csv
+import io
 import os
 import re
 import subprocess
@@ -136,6 +138,11 @@ def contents(folder: Path) -> dict[str, bytes]:
     """Every file below a folder, by its relative path."""
     files = (path for path in folder.rglob("*") if path.is_file())
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
+
+
+def rows_of(text: str) -> list[dict[str, str]]:
+    """The rows of a CSV, by its header."""
+    return list(csv.DictReader(io.StringIO(text)))
 
 
 def road_map(roll: float = 0.0, *, width: int = 160, height: int = 120, noise: float = 0.05, seed: int = 0):

@@ -1,7 +1,5 @@
 """`rollcli estimate --calib`: pitch and height in the rows, and what is refused before anything runs."""
 
-import csv
-import io
 import json
 import math
 
@@ -17,7 +15,7 @@ from rollcli.simulate.spec import draw_specs
 from tests.rig import calibration_files as samples
 from tests.rig.calibration_files import Rig
 from tests.rig.test_pose import cast
-from tests.run_cli import rollcli
+from tests.run_cli import rollcli, rows_of
 
 RIG = Rig(fx=250.0, fy=250.0, cx=150.0, cy=90.0, baseline=0.5, width=320, height=200)
 CALIBRATION = Calibration(RIG.fx, RIG.fy, RIG.cx, RIG.cy, RIG.baseline)
@@ -36,10 +34,6 @@ def maps(tmp_path):
         write_map(tmp_path / "maps" / f"{stem}.png", cast(CALIBRATION, ROLL, PITCH, HEIGHT))
     (tmp_path / "calib.txt").write_text(samples.kitti_raw(RIG))
     return tmp_path
-
-
-def rows_of(text):
-    return list(csv.DictReader(io.StringIO(text)))
 
 
 def assert_posed(rows):

@@ -7,11 +7,7 @@ import pytest
 
 from tests.run_cli import python, rollcli, write_maps
 
-
-@pytest.fixture
-def maps(tmp_path):
-    write_maps(tmp_path / "maps", 1)
-    return tmp_path
+FRAMES = 1
 
 
 def options_of(folder, *arguments, **variables):

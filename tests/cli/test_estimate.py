@@ -1,13 +1,11 @@
 """`rollcli estimate` from the outside: the contract of names, columns, statuses and streams."""
 
-import csv
-import io
 import json
 import math
 
 import pytest
 
-from tests.run_cli import contents, rollcli, write_maps
+from tests.run_cli import contents, rollcli, rows_of
 from tests.slow import mostly_slow
 
 COLUMNS = (
@@ -18,14 +16,7 @@ COLUMNS = (
 )
 
 
-def rows_of(text):
-    return list(csv.DictReader(io.StringIO(text)))
-
-
-@pytest.fixture
-def maps(tmp_path):
-    write_maps(tmp_path / "maps", 12)
-    return tmp_path
+FRAMES = 12
 
 
 def test_the_columns_are_those_of_the_contract(maps):

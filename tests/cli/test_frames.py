@@ -1,7 +1,5 @@
 """Which frames and which pixels `estimate` takes."""
 
-import csv
-import io
 import json
 import math
 import re
@@ -13,17 +11,14 @@ import pytest
 
 from rollcli.simulate.build import render_frame
 from rollcli.simulate.spec import FrameSpec
-from tests.run_cli import command, environment, road_map, rollcli, write_kitti, write_maps, write_pair
+from tests.run_cli import command, environment, road_map, rollcli, rows_of, write_kitti, write_pair
 
 
 def column(text, name):
-    return [row[name] for row in csv.DictReader(io.StringIO(text))]
+    return [row[name] for row in rows_of(text)]
 
 
-@pytest.fixture
-def maps(tmp_path):
-    write_maps(tmp_path / "maps", 7)
-    return tmp_path
+FRAMES = 7
 
 
 def test_shards_joined_with_standard_tools_are_the_whole(maps):

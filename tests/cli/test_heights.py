@@ -1,14 +1,12 @@
 """Heights over the road from the command line, against rendered truth and against the contract."""
 
-import csv
-
 import numpy as np
 import pytest
 import tifffile
 
 from rollcli.simulate.dataset import Dataset, write_dataset
 from rollcli.simulate.spec import FrameSpec
-from tests.run_cli import contents, road_map, rollcli, write_kitti, write_maps, write_pair
+from tests.run_cli import contents, road_map, rollcli, rows_of, write_kitti, write_maps, write_pair
 
 RIG = ("--focal", "300", "--principal-point", "79.5,20", "--baseline", "0.5")
 
@@ -42,7 +40,7 @@ def test_accuracy_compares_heights_where_truth_has_them(rendered):
     arguments = ("evaluate", "accuracy", "rolls.csv", "--truth", "truth.csv", "--format", "csv")
     done = rollcli(*arguments, cwd=rendered)
     assert done.status == 0, done.err
-    (figures,) = csv.DictReader(done.out.splitlines())
+    (figures,) = rows_of(done.out)
     assert figures["over_road_at_5_m_frames"] == figures["over_road_at_10_m_frames"] == "2"
     depth_at = {}
     for name in ("frame_0001", "frame_0002"):

@@ -1,7 +1,5 @@
 """With a calibration, v-disparity images mark the horizon; images are turned by the angle of the pixels."""
 
-import csv
-import io
 import math
 
 import cv2
@@ -11,7 +9,7 @@ import pytest
 from rollcli.rig.calibration import Calibration
 from tests.rig.calibration_files import Rig, kitti_raw, middlebury
 from tests.rig.test_pose import cast
-from tests.run_cli import rollcli
+from tests.run_cli import rollcli, rows_of
 
 RIG = Rig(fx=250.0, fy=250.0, cx=150.0, cy=90.0, baseline=0.5, width=320, height=200)
 ROLL, PITCH, HEIGHT = math.radians(9), math.radians(6), 1.5
@@ -64,6 +62,6 @@ def test_images_are_turned_by_the_angle_of_the_pixels_where_these_are_not_square
     (tmp_path / "calib.txt").write_text(middlebury(rig))
     posed = rollcli("estimate", "maps", "--calib", "calib.txt", "--derotated", "upright", cwd=tmp_path)
     level = rollcli("estimate", "upright", cwd=tmp_path)
-    (before,), (after,) = (csv.DictReader(io.StringIO(done.out)) for done in (posed, level))
+    (before,), (after,) = (rows_of(done.out) for done in (posed, level))
     assert float(before["roll_deg"]) == pytest.approx(math.degrees(ROLL), abs=0.01)
     assert float(after["roll_deg"]) == pytest.approx(0.0, abs=0.05)

@@ -14,12 +14,6 @@ from tests.slow import mostly_slow
 FRAMES = 8
 
 
-@pytest.fixture
-def maps(tmp_path):
-    write_maps(tmp_path / "maps", FRAMES)
-    return tmp_path
-
-
 WORK = {
     "estimate": (["estimate", "maps", "-v", "-o", "rolls.csv", "--derotated", "out"], "out/*.png"),
     "derotate": (["derotate", "maps", "-v", "--roll", "1", "-o", "out"], "out/*.png"),

@@ -10,11 +10,7 @@ import pytest
 from tests.report.results import row, write_result
 from tests.run_cli import contents, road_map, rollcli, write_kitti, write_maps, write_pair
 
-
-@pytest.fixture
-def maps(tmp_path):
-    write_maps(tmp_path / "maps", 2)
-    return tmp_path
+FRAMES = 2
 
 
 def names(folder):

@@ -1,6 +1,5 @@
 """The health of a pair, from rendered views that are turned, lowered and enlarged, to its correction."""
 
-import csv
 import json
 import math
 
@@ -8,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.run_cli import rollcli
+from tests.run_cli import rollcli, rows_of
 
 TRUTH = {"right_lower_px": 1.2, "right_clockwise_deg": 0.15, "right_larger_percent": 0.3}
 NEAR = {"right_lower_px": 0.1, "right_clockwise_deg": 0.02, "right_larger_percent": 0.05}
@@ -27,7 +26,7 @@ def put_off(path, target):
 
 
 def rolls(path):
-    return np.array([float(row["roll_deg"]) for row in csv.DictReader(path.read_text().splitlines())])
+    return np.array([float(row["roll_deg"]) for row in rows_of(path.read_text())])
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +78,7 @@ def test_the_matrix_brings_the_right_view_back(pairs):
 def test_a_pair_that_contradicts_the_correction_is_suspect(pairs):
     first = ("--left", "left/frame_000[12].png", "--right", "right/frame_000[12].png")
     done = rollcli("estimate", *first, "--align", "use.json", cwd=pairs)
-    rows = list(csv.DictReader(done.out.splitlines()))
+    rows = rows_of(done.out)
     assert len(rows) == 2
     assert {row["status"] for row in rows} == {"suspect"}
     assert all("do not lie as the correction says" in row["message"] for row in rows)

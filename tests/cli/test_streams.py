@@ -5,15 +5,10 @@ import pty
 import subprocess
 
 import numpy as np
-import pytest
 
-from tests.run_cli import command, environment, road_map, rollcli, write_kitti, write_maps
+from tests.run_cli import command, environment, road_map, rollcli, write_kitti
 
-
-@pytest.fixture
-def maps(tmp_path):
-    write_maps(tmp_path / "maps", 3)
-    return tmp_path
+FRAMES = 3
 
 
 def test_results_alone_go_to_standard_output(maps):

@@ -1,7 +1,5 @@
 """Archives are read as folders; what is in them can neither fill memory nor name a file elsewhere."""
 
-import csv
-import io
 import tarfile
 import zipfile
 
@@ -13,7 +11,7 @@ from rollcli.errors import InputError, UsageError
 from rollcli.files.containers import file_of, members, shown
 from rollcli.files.search import Search
 from rollcli.files.storage import read_bytes
-from tests.run_cli import contents, road_map, rollcli, write_kitti, write_maps, write_pair
+from tests.run_cli import contents, road_map, rollcli, rows_of, write_kitti, write_maps, write_pair
 
 
 def packed(folder, archive):
@@ -28,17 +26,13 @@ def packed(folder, archive):
     return archive
 
 
-def rows(text):
-    return list(csv.DictReader(io.StringIO(text)))
-
-
 @pytest.mark.parametrize("name", ["run.zip", "run.tar"])
 def test_an_archive_gives_the_rows_of_its_folder(tmp_path, name):
     write_maps(tmp_path / "all" / "maps", 3)
     packed(tmp_path / "all", tmp_path / name)
-    whole = rows(rollcli("estimate", "all/maps", cwd=tmp_path).out)
+    whole = rows_of(rollcli("estimate", "all/maps", cwd=tmp_path).out)
     done = rollcli("estimate", name, "-j", "2", "--derotated", "upright", cwd=tmp_path)
-    found = rows(done.out)
+    found = rows_of(done.out)
     assert [row["file"] for row in found] == [f"{name}#maps/frame{each}.png" for each in range(3)]
     assert [row["roll_deg"] for row in found] == [row["roll_deg"] for row in whole]
     assert sorted(path.name for path in (tmp_path / "upright/maps").iterdir()) == [
@@ -47,7 +41,7 @@ def test_an_archive_gives_the_rows_of_its_folder(tmp_path, name):
     listed = rollcli("estimate", name, "--dry-run", cwd=tmp_path).out.splitlines()
     assert listed[0] == f"read  {name}#maps/frame0.png"
     again = rollcli("estimate", f"{name}#maps/frame1.png", cwd=tmp_path)
-    assert rows(again.out)[0]["roll_deg"] == whole[1]["roll_deg"]
+    assert rows_of(again.out)[0]["roll_deg"] == whole[1]["roll_deg"]
 
 
 def test_workers_that_were_forked_from_one_process_read_an_archive_each_for_itself(tmp_path):
@@ -82,7 +76,7 @@ def test_the_views_of_a_shard_pair_up_and_are_never_taken_for_maps(tmp_path):
         file.add(left, "000002.left.png")
         file.add(right, "000002.right.png")
     pairs = rollcli("estimate", "--left", "shard.tar", "--right", "shard.tar", cwd=tmp_path)
-    assert [(row["file"], row["right_file"]) for row in rows(pairs.out)] == [
+    assert [(row["file"], row["right_file"]) for row in rows_of(pairs.out)] == [
         (f"shard.tar#00000{each}.left.png", f"shard.tar#00000{each}.right.png") for each in (1, 2)
     ]
     assert "--left shard.tar --right shard.tar" in rollcli("estimate", "shard.tar", cwd=tmp_path).refused()
@@ -115,7 +109,7 @@ def test_a_member_cannot_name_a_file_elsewhere(tmp_path):
     with zipfile.ZipFile(tmp_path / "bad.zip", "w") as file:
         file.write(tmp_path / "maps/frame0.png", "../../outside.png")
     done = rollcli("estimate", "bad.zip", "--derotated", "in/side", cwd=tmp_path)
-    assert (done.status, rows(done.out)[0]["status"]) == (3, "error")
+    assert (done.status, rows_of(done.out)[0]["status"]) == (3, "error")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["bad.zip", "maps"]
 
 

@@ -1,6 +1,5 @@
 """Stored numbers become pixels, and no data becomes 0, whatever a file calls it and a plateau shows."""
 
-import csv
 from pathlib import Path
 
 import cv2
@@ -13,7 +12,7 @@ from rollcli.files.encodings import Encoding, from_disparity, read_mask, to_disp
 from rollcli.files.formats import Stored, read_stored
 from rollcli.rig.calibration import Calibration
 from tests.binary_files import disparity_map, make_png, make_tiff
-from tests.run_cli import rollcli
+from tests.run_cli import rollcli, rows_of
 
 
 def stored(values, dtype, **more):
@@ -253,7 +252,7 @@ def test_the_mark_of_opencv_is_no_data_whatever_its_range_begins_with(tmp_path, 
     np.save(tmp_path / "map.npy", values)
     done = rollcli("estimate", "map.npy", cwd=tmp_path)
     assert done.status == 0
-    assert float(next(csv.DictReader(done.out.splitlines()))["roll_deg"]) == pytest.approx(truth, abs=0.2)
+    assert float(rows_of(done.out)[0]["roll_deg"]) == pytest.approx(truth, abs=0.2)
     assert "taken as no data" in done.err
 
 

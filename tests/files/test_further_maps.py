@@ -1,6 +1,5 @@
 """Maps in the files that other programs write: NPZ, one axis more, RGB numbers, the other sign, EXR."""
 
-import csv
 import io
 import zipfile
 
@@ -12,7 +11,7 @@ from rollcli import read_disparity
 from rollcli.errors import InputError, UsageError
 from rollcli.files.formats import decode_stored, encode_stored
 from tests.binary_files import disparity_map
-from tests.run_cli import road_map, rollcli
+from tests.run_cli import road_map, rollcli, rows_of
 
 
 def npz(**arrays):
@@ -85,7 +84,7 @@ def test_maps_stored_negative_are_read_with_a_negative_scale(tmp_path):
     np.save(tmp_path / "a.npy", disparity)
     np.save(tmp_path / "negative.npy", -disparity)
     rolls = [
-        next(iter(csv.DictReader(io.StringIO(rollcli("estimate", *given, cwd=tmp_path).out))))["roll_deg"]
+        rows_of(rollcli("estimate", *given, cwd=tmp_path).out)[0]["roll_deg"]
         for given in (["a.npy"], ["negative.npy", "--scale", "-1"])
     ]
     assert rolls[0] == rolls[1] != ""

@@ -27,10 +27,7 @@ main()
 """
 
 
-@pytest.fixture
-def maps(tmp_path):
-    write_maps(tmp_path / "maps", 3)
-    return tmp_path
+FRAMES = 3
 
 
 def statuses(folder, name="rolls.csv"):

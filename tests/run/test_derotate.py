@@ -15,12 +15,7 @@ from rollcli.files.formats import encode_stored, read_stored
 from rollcli.run import convert_frame as work
 from rollcli.run.convert import run_conversion
 from rollcli.run.convert_frame import convert_frame
-from rollcli.run.options import (
-    DerotateOptions,
-    EncodingOptions,
-    InputOptions,
-    RunningOptions,
-)
+from rollcli.run.options import DerotateOptions, EncodingOptions, InputOptions, RunningOptions
 from tests.run_cli import contents, road_map, rollcli, write_kitti, write_maps
 
 TYPES = {

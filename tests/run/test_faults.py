@@ -31,12 +31,6 @@ from tests.slow import mostly_slow
 FRAMES = 12
 
 
-@pytest.fixture
-def maps(tmp_path):
-    write_maps(tmp_path / "maps", FRAMES)
-    return tmp_path
-
-
 def one_line(done):
     """The only line of an error."""
     assert done.err.count("\n") == 1

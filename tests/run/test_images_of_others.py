@@ -4,15 +4,9 @@ import json
 
 import pytest
 
-from tests.run_cli import contents, road_map, rollcli, write_kitti, write_maps
+from tests.run_cli import contents, road_map, rollcli, write_kitti
 
 FRAMES = 4
-
-
-@pytest.fixture
-def maps(tmp_path):
-    write_maps(tmp_path / "maps", FRAMES)
-    return tmp_path
 
 
 def estimate(folder, *arguments, images="up"):

@@ -1,7 +1,5 @@
 """An assessment as programs and people read it: every number where the interface says."""
 
-import csv
-import io
 import json
 
 import numpy as np
@@ -10,6 +8,7 @@ import pytest
 from rollcli.run.rig_gates import Check
 from rollcli.run.rig_text import Findings, as_csv, as_json, as_table
 from tests.run.rigs import UNKNOWN, known, rig, sequence
+from tests.run_cli import rows_of
 
 
 def assessed():
@@ -103,7 +102,7 @@ def test_json_is_every_number_of_the_assessment():
 
 
 def test_csv_is_a_line_for_each_segment_with_what_came_before_it():
-    first, after, second = csv.DictReader(io.StringIO(as_csv(Findings(assessed(), [], None, {}))))
+    first, after, second = rows_of(as_csv(Findings(assessed(), [], None, {})))
     assert (first["first_file"], first["last_file"], first["status"]) == ("a/0", "a/9", "jump")
     assert (after["first_file"], after["last_file"], second["last_file"]) == ("a/10", "a/29", "b/19")
     assert [each["change_deg"] for each in (first, after, second)] == ["", "0.5", "-3.0"]
