@@ -5,7 +5,7 @@ combination of ``sum w u^i v^j`` (i + j <= 4), ``sum w d u^i v^j`` (i + j <= 2) 
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -171,7 +171,7 @@ class Grid:
 
 @dataclass(frozen=True)
 class Moments:
-    """Sums over weighted pixels; they add, so a map is the sum of its tiles.
+    """Sums over weighted pixels.
 
     Attributes
     ----------
@@ -199,21 +199,14 @@ class Moments:
         """The sum of the weights: with weights 0 and 1, the number of pixels."""
         return float(self.s[0, 0])
 
-    def __add__(self, other: "Moments") -> "Moments":
-        if (self.grid, self.plane) != (other.grid, other.plane):
-            raise ValueError("moments add on one grid and one plane only")
-        return replace(self, s=self.s + other.s, t=self.t + other.t, rr=self.rr + other.rr)
-
 
 def map_moments(
     disparity: NDArray[Any],
     weights: NDArray[Any] | None = None,
     *,
-    grid: Grid | None = None,
-    origin: tuple[int, int] = (0, 0),
     plane: tuple[float, float, float] | None = None,
 ) -> Moments:
-    """Sum a map, or a tile of one.
+    """Sum a map.
 
     Parameters
     ----------
@@ -221,10 +214,6 @@ def map_moments(
         Real numbers, px; values <= 0, NaN and inf are no data and weigh nothing.
     weights : ndarray, shape (H, W), optional
         Finite and not negative (or bool); all ones by default.
-    grid : Grid, optional
-        The coordinates; by default those of this map's shape.
-    origin : tuple of int
-        (row, column) of `disparity[0, 0]` on the grid, for tiles.
     plane : tuple of float, optional
         What to subtract (see `Moments.plane`); by default a fit to a coarse sample of the pixels.
 
@@ -233,9 +222,9 @@ def map_moments(
     Moments
     """
     height, width = disparity.shape
-    grid = grid or Grid.of_shape(height, width)
-    p = (np.arange(origin[1], origin[1] + width, dtype=np.float64) - grid.centre_u) / grid.scale
-    q = (np.arange(origin[0], origin[0] + height, dtype=np.float64) - grid.centre_v) / grid.scale
+    grid = Grid.of_shape(height, width)
+    p = (np.arange(width, dtype=np.float64) - grid.centre_u) / grid.scale
+    q = (np.arange(height, dtype=np.float64) - grid.centre_v) / grid.scale
     if disparity.dtype.kind != "f" or disparity.dtype.itemsize < 4:
         disparity = disparity.astype(np.float32 if disparity.dtype.itemsize <= 2 else np.float64)
     with np.errstate(invalid="ignore", over="ignore"):

@@ -67,16 +67,6 @@ def test_json_lines_say_the_same_as_csv(maps):
     assert lines[0]["converged"] is True
 
 
-def test_an_existing_result_is_refused(maps):
-    assert rollcli("estimate", "maps", "-o", "rolls.csv", cwd=maps).status == 0
-    before = (maps / "rolls.csv").read_bytes()
-    said = rollcli("estimate", "maps", "-o", "rolls.csv", cwd=maps).refused()
-    assert "--resume" in said
-    assert "--overwrite" in said
-    assert (maps / "rolls.csv").read_bytes() == before
-    assert rollcli("estimate", "maps", "-o", "rolls.csv", "--overwrite", cwd=maps).status == 0
-
-
 @pytest.mark.parametrize(("most", "doubted"), [("0.000001", True), ("90", False)])
 def test_max_interval_says_which_angles_are_doubted(maps, most, doubted):
     rows = rows_of(rollcli("estimate", "maps/frame1.png", "--max-interval", most, cwd=maps).out)

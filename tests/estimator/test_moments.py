@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 from hypothesis import given
-from hypothesis import strategies as st
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.estimate import estimate_roll
@@ -48,21 +47,6 @@ def test_single_precision_of_large_maps_costs_nothing_that_matters():
     exact = pixel_by_pixel(disparity, moments)
     np.testing.assert_allclose(np.tril(moments.s[:, ::-1]), np.tril(exact.s[:, ::-1]), rtol=1e-9, atol=1e-6)
     assert_same(moments, exact, rtol=1e-6)
-
-
-@repeatable
-@given(random_maps(), st.integers(1, 49), st.integers(1, 49))
-def test_moments_add_over_tiles(disparity, row, column):
-    whole = map_moments(disparity)
-    row, column = min(row, disparity.shape[0] - 1), min(column, disparity.shape[1] - 1)
-    tiles = [
-        map_moments(
-            disparity[rows, columns], grid=whole.grid, origin=(rows.start, columns.start), plane=whole.plane
-        )
-        for rows in (slice(0, row), slice(row, disparity.shape[0]))
-        for columns in (slice(0, column), slice(column, disparity.shape[1]))
-    ]
-    assert_same(sum(tiles[1:], tiles[0]), whole)
 
 
 def test_weights_count_as_often_as_they_say():

@@ -14,7 +14,6 @@ from rollcli.files.results import Row
 from rollcli.run.frame import Frame, FrameResult, failed_frame
 from rollcli.run.options import EncodingOptions, RunningOptions
 from rollcli.run.progress import Progress, TaskProgress
-from rollcli.run.summary import RunSummary
 from tests.run_cli import rollcli
 
 GUESSED = EncodingOptions()
@@ -38,19 +37,6 @@ def failed(name, message, cause):
 @pytest.fixture
 def lines(capsys):
     return lambda: capsys.readouterr().err.splitlines()
-
-
-def test_it_counts_kept_and_new_rows_by_status(lines):
-    kept = RunSummary()
-    for status in ("ok", "suspect"):
-        kept.add_row(Row("kept.png", status=status))
-    counted = Progress(4, RunningOptions(), GUESSED, summary=kept)
-    counted.add(result())
-    counted.add(result("suspect"))
-    assert counted.done == 4
-    assert counted.summary.totals == {"frames": 4, "ok": 2, "suspect": 2, "error": 0}
-    assert counted.last_line().startswith("4 frames (2 kept): 2 ok, 2 suspect, 0 failed; ")
-    assert lines() == []
 
 
 def test_the_exit_status_says_whether_a_frame_failed(lines):

@@ -202,16 +202,6 @@ def workers_of(run):
     return [pid for pid, args in children.items() if "resource_tracker" not in args]
 
 
-@pytest.mark.slow
-def test_sigterm_stops_a_run_as_ctrl_c_does(undisturbed, folder):
-    run = start(folder, "-j2")
-    wait_for_images(folder, 4, run)
-    run.terminate()
-    assert (run.communicate(timeout=60), run.returncode)[1] == 130
-    assert rollcli("estimate", "maps", "-o", "rolls.csv", *IMAGES, "--resume", cwd=folder).status == 3
-    assert results(folder) == results(undisturbed)
-
-
 def test_a_second_run_on_the_same_result_is_refused(folder, monkeypatch):
     monkeypatch.setattr("rollcli.files.locking._PATIENCE_S", 0.1)
     first = start(folder, "-j1")
