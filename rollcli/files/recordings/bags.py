@@ -153,7 +153,9 @@ class _InFile(_Source):
 
     def read(self, count: int) -> bytes:
         """Return the next bytes as a file does: less where less is left."""
-        return bytes(self.take(min(count, self.left)))
+        count = min(count, self.left)
+        self.left -= count
+        return self._file.read(count)
 
 
 def _unpacker(compression: str, packed: Any, piece: int) -> Callable[[int], bytes]:
