@@ -21,7 +21,7 @@ from rollcli.errors import InputError
 from rollcli.files.bounded import MOST_BYTES, most_unpacked
 
 _BEGINNING = 64  # bytes: a header's time and more
-_PIECE = 2**16  # bytes that are unpacked at a time where the next header is looked for
+_PIECE = 2**17  # bytes that are unpacked at a time where the next header is looked for
 _MCAP, _BAG, _SQLITE = b"\x89MCAP0\r\n", b"#ROSBAG V2.0\n", b"SQLite format 3\0"
 
 

@@ -24,7 +24,7 @@ DISPARITY, IMAGE, COMPRESSED = (
     "sensor_msgs/CompressedImage",
 )
 CAMERA_INFO = "sensor_msgs/CameraInfo"
-# ROS's definitions of what is decoded: the library's stores of all its types take a tenth of a second to load.
+# ROS's definitions of what is decoded: the library's stores of all types take a tenth of a second to load.
 # ROS 1 differs in the header, and in names that are capitals there.
 _HEADERS = {
     "cdr": "builtin_interfaces/Time stamp\nstring frame_id",
