@@ -81,7 +81,7 @@ def test_chunks_are_whole_parts_or_pieces_of_one(rows, seconds):
         pieces = {task // rows for task in chunk}
         assert len(pieces) == 1 or len(chunk) % rows == chunk[0] % rows == 0 or chunk[-1] == 39_999
         sizes.append(len(chunk))
-        chunks.measure(Done(range(len(chunk)), seconds * len(chunk)))
+        chunks.measure(Done(range(len(chunk)), seconds * len(chunk)), 16)
     assert sum(sizes) == 40_000
     if rows * seconds <= 8:
         assert all(size % rows == 0 for size in sizes[-20:-1])

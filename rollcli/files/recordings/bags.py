@@ -21,7 +21,7 @@ from rollcli.errors import InputError
 from rollcli.files.bounded import MOST_BYTES, most_unpacked
 
 _BEGINNING = 64  # bytes: a header's time and more
-_PIECE = 2**16  # bytes that are unpacked at a time where the next header is looked for
+_PIECE = 2**17  # bytes that are unpacked at a time where the next header is looked for
 _MCAP, _BAG, _SQLITE = b"\x89MCAP0\r\n", b"#ROSBAG V2.0\n", b"SQLite format 3\0"
 
 
@@ -153,7 +153,9 @@ class _InFile(_Source):
 
     def read(self, count: int) -> bytes:
         """Return the next bytes as a file does: less where less is left."""
-        return bytes(self.take(min(count, self.left)))
+        count = min(count, self.left)
+        self.left -= count
+        return self._file.read(count)
 
 
 def _unpacker(compression: str, packed: Any, piece: int) -> Callable[[int], bytes]:

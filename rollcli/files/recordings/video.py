@@ -7,7 +7,8 @@ no frame: then the last ones that were counted are errors.
 A video cannot be sought exactly: where rates vary, or frames refer to later ones, another frame comes.
 So each worker opens the video itself, decodes from its start, and passes over what others do. That gives
 the same frames for any workers, on a cluster too, and keeps one frame in memory. It costs each worker the
-decoding of all frames: some ms each of what cameras write, where matching takes 100.
+decoding of all frames. Of 1280x480 px, passing over one takes 0.5 ms of MPEG-4, 2.2 of MJPEG and 46 of FFV1,
+matching it 50; one process that decodes for all of them and hands frames over takes 1.7, 3.4 and 49 ms.
 """
 
 import os

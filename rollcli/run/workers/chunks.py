@@ -32,6 +32,7 @@ _LONGEST_S = 2.0
 LONGEST_ON_CLUSTER_S = 2 * _MOST_S
 _SHARES = 2  # a chunk is at most this part of what each worker still has to do, so that all end together,
 _LEAST_S = 0.05  # unless that is less than this, or than half of what _CHUNKS_A_SECOND allows
+_DOUBT_S = 0.02  # added to what the first tasks took: one that fails at once says nothing of the others
 
 
 def _leave(task: object) -> None:
@@ -151,8 +152,8 @@ class Chunks(Generic[Task]):
     def __init__(self, tasks: Iterable[Task], first: int = 1, unit: int = 1) -> None:
         self._left = len(tasks) if isinstance(tasks, Sized) else None
         self._tasks = iter(tasks)
-        self._first, self._unit, self._task_s = first, unit, 0.0
-        self._taken = 0
+        self._first, self._unit = first, unit
+        self._seconds, self._done, self._taken = _DOUBT_S, 0.0, 0
 
     def take(self, workers: int, told: Any = None) -> Span[Task]:
         """Take the next chunk, for one of so many workers; empty when there are no more tasks."""
@@ -174,7 +175,7 @@ class Chunks(Generic[Task]):
     def _size(self, first: int, left: int | None, workers: int) -> int:
         """Choose the size of a chunk from the position of its first task and the number of tasks to come."""
         size, most = self._first, self._unit
-        worth = 1 / self._task_s if self.measured else 0.0  # tasks that a second is worth
+        worth = self._done / self._seconds if self.measured else 0.0  # tasks that a second is worth
         if self.measured:
             size = int(worth * min(max(_CHUNK_S, workers / _CHUNKS_A_SECOND), _MOST_S))
         if left is not None:
@@ -191,13 +192,18 @@ class Chunks(Generic[Task]):
     @property
     def measured(self) -> bool:
         """Whether a chunk was measured."""
-        return self._task_s > 0
+        return self._done > 0
 
-    def measure(self, done: Done[Any]) -> None:
-        """Learn from a chunk what a task takes: half from it, half from those before."""
+    def measure(self, done: Done[Any], workers: int) -> None:
+        """Learn from a chunk what a task takes: the mean over tasks, of each worker's last chunks.
+
+        Each task counts once: if each chunk did, a few tasks that fail at once would make the next chunks a
+        hundred times as long, and the results of all others wait for those.
+        """
         if done.results:
-            found = max(done.seconds, 1e-6) / len(done.results)
-            self._task_s = (self._task_s + found) / 2 if self.measured else found
+            kept = 1 - 1 / (2 * workers)
+            self._seconds = kept * self._seconds + max(done.seconds, 1e-6)
+            self._done = kept * self._done + len(done.results)
 
 
 class _Attempt(NamedTuple):

@@ -56,8 +56,10 @@ class Workers:
 
 
 _Task = TypeVar("_Task", contravariant=True)
-# a worker's own, one that waits there, and one that lets it go on while a slow one holds back the results
+# chunks that are not done: a worker's own, one that waits there, and one for whichever worker is fast
 _IN_FLIGHT = 3
+# and with those that are done, a few rows each, while the oldest is not: its worker may be slow, or its tasks
+_AHEAD = 12
 
 
 class Future(Protocol[Result]):
@@ -116,18 +118,25 @@ def in_order(
     """
     chunks = Chunks(tasks, executor.threads, work.unit)
     in_flight = deque[tuple[Span[Task], Future[Result]]]()
+    undone: list[Future[Result]] = []
+
+    def submit(chunk: Span[Task], *, first: bool = False) -> tuple[Span[Task], Future[Result]]:
+        undone.append(executor.submit(chunk, first=first))
+        return chunk, undone[-1]
 
     def submit_first(*some: Span[Task]) -> None:
         for each in reversed(some):
-            in_flight.appendleft((each, executor.submit(each, first=True)))
+            in_flight.appendleft(submit(each, first=True))
 
     while True:
-        most = executor.workers * (_IN_FLIGHT if chunks.measured else 1)
-        while not stop.asked and len(in_flight) < most:
-            chunk = chunks.take(executor.workers, work.tell())
+        undone[:] = [each for each in undone if not each.done()]
+        workers = executor.workers
+        most = workers * (_IN_FLIGHT if chunks.measured else 1)
+        while not stop.asked and len(undone) < most and len(in_flight) < _AHEAD * workers:
+            chunk = chunks.take(workers, work.tell())
             if not chunk:
                 break
-            in_flight.append((chunk, executor.submit(chunk)))
+            in_flight.append(submit(chunk))
         if not in_flight:
             return
         if stop.asked:
@@ -148,7 +157,7 @@ def in_order(
                 submit_first(chunk[: len(chunk) // 2], chunk[len(chunk) // 2 :])
                 continue
             done = executor.retry(chunk)
-        chunks.measure(done)
+        chunks.measure(done, executor.workers)
         if done.results:
             yield done.results
         if done.error is not None:
@@ -166,5 +175,5 @@ def _measure_any(
     for future in futures:
         if future.done():
             with contextlib.suppress(*executor.worker_died):
-                chunks.measure(future.result())
+                chunks.measure(future.result(), executor.workers)
                 return

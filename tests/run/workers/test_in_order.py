@@ -1,5 +1,6 @@
 """The order of results, the sizes of chunks, halving and stops, with an executor in this process."""
 
+import random
 import threading
 from collections import Counter
 
@@ -83,6 +84,35 @@ def test_a_chunk_is_worth_about_a_second(seconds, size):
     executor = FakeExecutor(2, seconds=seconds)
     list(in_order(iter(range(4000)), executor, Stop()))
     assert {len(chunk) for chunk in executor.submitted[-8:-1]} <= {size, size - 1}
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_tasks_that_end_at_once_make_no_later_chunk_too_long(seed):
+    rng, executor = random.Random(seed), FakeExecutor(64)
+    costs = [rng.choice([1e-5, 0.01]) for _ in range(200_000)]  # files that are not there end at once
+    executor.do = lambda chunk: Done(list(chunk), sum(costs[task] for task in chunk))
+    assert list(in_order(iter(range(len(costs))), executor, Stop())) == list(range(len(costs)))
+    assert max(sum(costs[task] for task in chunk) for chunk in executor.submitted) < 2.0
+
+
+def test_a_slow_chunk_keeps_no_other_worker_waiting_and_not_everything_in_memory():
+    class SlowFirst(FakeExecutor):
+        def wait(self, future):
+            others = [each for each in self.futures if each is not self.futures[0] and not each.polled]
+            for each in others or [self.futures[0]]:
+                super().wait(each)
+
+        def submit(self, chunk, *, first=False):
+            self.futures.append(super().submit(chunk, first=first))
+            return self.futures[-1]
+
+    executor = SlowFirst(4)
+    executor.futures = []
+    results = in_order(iter(range(10_000)), executor, Stop())
+    assert next(results) == "did 0"
+    assert 8 * 4 < len(executor.submitted) <= 12 * 4
+    assert executor.most_in_hand <= 3 * 4 + 1
+    assert sum(1 for _ in results) == 9_999
 
 
 @pytest.mark.parametrize("deadly", [{0}, {517}, {999}, {300, 301, 640}])

@@ -48,8 +48,8 @@ def settled(executor, future):
 
 def test_a_slow_task_keeps_its_place_before_quick_ones(tmp_path):
     event = tmp_path / "event"
-    tasks = [("wait", event), *(("give", number) for number in range(4)), ("touch", event)]
-    assert results(*tasks) == ["waited", 0, 1, 2, 3, "touched"]
+    tasks = [("wait", event), ("touch", event), *(("give", number) for number in range(4))]
+    assert results(*tasks) == ["waited", "touched", 0, 1, 2, 3]
 
 
 def test_a_task_that_kills_its_worker_once_is_done_by_another(tmp_path):
