@@ -54,7 +54,8 @@ class RollEstimate:
         Of the map, px.
     camber : float or None
         Curvature across the road, 1/(camera height): x camera heights to the side, the surface is higher by
-        camber/2 x^2 camera heights. Negative: crowned. None where the map does not determine it.
+        camber/2 x^2 camera heights. Negative: crowned. 0 where it may be noise; None where the map does not
+        determine it.
     tangent : Tangent
         The line that touches the road's parabola amid the pixels used.
     pitch, pitch_ci95 : float or None

@@ -42,14 +42,18 @@ class SequenceTuning:
         Smallest own standard error of a frame, in units of the quantity: an interval of nothing must not take
         all the weight.
     correlations : tuple of float
-        What of the car's and the road's own movement is left in the next cell: even in log correlation time.
+        What of the car's and the road's own movement is left in the next cell: 0, and even in log correlation
+        time.
+    independent : float
+        Prior probability of the first of them, as of single frames; the others are alike. With all alike (and
+        a power of 0.25) the half-width of 20 frames that differ by 0.1 degrees, independently, was 0.26.
     spreads : tuple of float
         Least and most standard deviation of that movement, in units of the quantity; even in log between.
     spread_steps : int
-        How many there are: at 14 neighbours differ by a factor of 1.5.
+        How many there are: at 13 neighbours differ by a factor of 1.5.
     spread_power : float
         The prior of a spread grows with this power of it, so that few frames do not hide a slow movement:
-        intervals of 20 frames with a correlation of 0.97 cover 0.93 in place of 0.90, and are a tenth wider.
+        intervals of 20 frames with a correlation of 0.97 cover 0.01 more than with half of it.
     error_factors : tuple of (float, float)
         What the frames' own variances may have to be multiplied by, and the prior probability of it. Where
         they are right, doubting them widens intervals by nothing from 20 frames on. Steps of 4 above 1 would
@@ -77,9 +81,10 @@ class SequenceTuning:
         *(0.0, 0.3, 0.5, 0.65, 0.75, 0.82, 0.87),
         *(0.91, 0.94, 0.96, 0.975, 0.985, 0.993),
     )
-    spreads: tuple[float, float] = (0.01, 1.5)
-    spread_steps: int = 14
-    spread_power: float = 0.25
+    independent: float = 1 / 3
+    spreads: tuple[float, float] = (0.01, 1.0)
+    spread_steps: int = 13
+    spread_power: float = 0.5
     error_factors: tuple[tuple[float, float], ...] = (
         (1 / 16, 0.1),
         (1 / 4, 0.2),
@@ -247,7 +252,9 @@ class Likelihood:
         slow, own = (each.ravel()[:, None] for each in np.broadcast_arrays(squares, factors))
         self._weights = 1 / (slow * np.maximum(values, 0)[:, None, :] + own)  # (P, G, C)
         priors = TUNING.spread_power / 2 * np.log(squares) + np.log(prior)
-        self._base = priors.ravel() + np.log(self._weights).sum(-1) / 2
+        others = (1 - TUNING.independent) / (len(correlations) - 1)
+        alike = np.where(np.array(TUNING.correlations) == 0, TUNING.independent, others)
+        self._base = np.log(alike)[:, None] + priors.ravel() + np.log(self._weights).sum(-1) / 2
         self._unit = unit
         self._values = self.rotated(cells.values[:, None])
 

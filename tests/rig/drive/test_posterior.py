@@ -46,7 +46,9 @@ def test_each_noise_has_the_fit_of_statsmodels_and_the_likelihood_of_scipy(cells
     left = multivariate_normal(oracle.fittedvalues, covariance).logpdf(cells.values)
     level = np.linalg.slogdet(np.linalg.inv(oracle.normalized_cov_params))[1]
     spread = np.geomspace(*TUNING.spreads, TUNING.spread_steps)[noise // FACTORS]
+    others = (1 - TUNING.independent) / (len(TUNING.correlations) - 1)
     prior = np.log(TUNING.error_factors[noise % FACTORS][1]) + TUNING.spread_power * np.log(spread)
+    prior += np.log(others if place else TUNING.independent)
     expected = left - level / 2 + prior
     constant = len(cells.values) / 2 * np.log(2 * np.pi) + np.log(cells.variances).sum() / 2
     assert fit.log_evidence[place, noise] == pytest.approx(expected + constant, rel=1e-6)
@@ -97,6 +99,7 @@ def test_cells_are_weighted_means_that_do_not_reach_across_a_jump():
     ("frames", "phi", "sd", "widest"),
     [
         (8, 0.0, 0.1, 1.1),
+        (20, 0.0, 0.1, 0.25),
         (20, 0.9, 0.1, 0.5),
         pytest.param(60, 0.7, 0.15, 0.38, marks=pytest.mark.slow),
         pytest.param(120, 0.5, 0.2, 0.11, marks=pytest.mark.slow),
