@@ -16,7 +16,7 @@ from rollcli.files.stores.locations import base_name
 from rollcli.files.stream import STDOUT, STDOUT_NAME, is_stream, open_stream, stdout_descriptor, write_stream
 from rollcli.run.batch import Batch, Pass
 from rollcli.run.frame import Frame, ReadAs
-from rollcli.run.inputs import Inputs, inputs_path, is_inputs
+from rollcli.run.inputs import Inputs, inputs_data, inputs_path, is_inputs
 from rollcli.run.options import EstimateOptions, ImageOptions
 from rollcli.run.outputs import local_images, remove_image_leftovers, remove_marks
 from rollcli.run.parts import kept_in_parts, open_parts
@@ -257,7 +257,7 @@ def _parsed(data: bytes, plan: Plan, options: EstimateOptions) -> tuple[bytes, K
     if not data:
         return b"", KeptRows(plan, options)
     update, gone = options.result.update, 0
-    inputs = Inputs(plan.output, updates=update)
+    inputs = Inputs(inputs_data(inputs_path(plan.output)), updates=update)
     if update:
         data, gone = arranged(data, plan)
     kept = KeptRows(plan, options, parse_rows(data, plan.output), inputs)

@@ -12,7 +12,7 @@ import pytest
 
 from rollcli.errors import OutputError, UsageError
 from rollcli.files.results import format_header, read_result
-from rollcli.files.storage import list_names, modified_ns, read_bytes, remove, write_bytes
+from rollcli.files.storage import list_names, owner_of, read_bytes, remove, write_bytes
 from rollcli.run import estimate as batch_run
 from rollcli.run import result_file
 from rollcli.run.estimate import estimate_frame
@@ -230,11 +230,11 @@ def test_failed_frames_of_a_bucket_are_done_again_and_other_parts_stay(bucket, f
 
     assert rollcli(*line("rolls"), cwd=folder).status == 3
     middle = f"{bucket}/rolls.{ending}/part-00001.{ending}"
-    before = modified_ns(middle)
+    assert (written_by := owner_of(middle))
     for index in BROKEN:
         write_bytes(f"{bucket}/maps/frame{index}.png", (maps / f"frame{index}.png").read_bytes())
     assert rollcli(*line("rolls"), *RETRY, cwd=folder).status == 0
-    assert modified_ns(middle) == before
+    assert owner_of(middle) == written_by
     assert rollcli(*line("anew"), cwd=folder).status == 0
     assert parts("rolls") == parts("anew")
     records = [read_bytes(f"{bucket}/{name}.{ending}.run.json") for name in ("rolls", "anew")]
