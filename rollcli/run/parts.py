@@ -210,14 +210,16 @@ def _begin(plan: Plan, options: EstimateOptions, keep_open: int | None) -> Parts
     _remove_leftovers(plan, options, parts)
     if options.result.resume or options.running.overwrite:
         remove_image_leftovers(kept.not_failed(), options.images)
+    stay = {path for paths in _kept_paths(plan, options, kept) for path in paths}
     inputs = [f"{inputs_path(plan.output)}/{name}" for name in list_names(inputs_path(plan.output))]
-    there = {*(f"{plan.output}/{name}" for name in parts), *filter(is_part_inputs, inputs)}
-    for path in sorted(there.difference(*_kept_paths(plan, options, kept))):
-        remove(path)
+    # in this order, no part is ever without its inputs
+    for path in (*(f"{plan.output}/{name}" for name in parts), *filter(is_part_inputs, inputs)):
+        if path not in stay:
+            remove(path)
     record.write()
+    record.check_owned()  # another run may have begun in this very second
     for path, lines in renewed.items():
         write_bytes(path, lines, durable=True)
-    record.check_owned()  # another run may have begun in this very second
     return PartsOutput(plan, record, kept, options, keep_open)
 
 
