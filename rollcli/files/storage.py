@@ -303,11 +303,6 @@ def exists(location: str) -> bool:
     return objects.object_exists(location)
 
 
-def modified_ns(location: str) -> int:
-    """Return when a file or an object that exists was written, ns since 1970, by the clock of its store."""
-    return objects.object_time_ns(location) if is_url(location) else Path(location).stat().st_mtime_ns
-
-
 def remove(location: str) -> None:
     """Remove a file or an object; none of this name is no error.
 

@@ -13,10 +13,10 @@ from rollcli.errors import UsageError
 from rollcli.files.atomic import sync_files
 from rollcli.files.codecs.parquet import encode_parquet
 from rollcli.files.results import Format, column_types, format_header, format_row, run_path
-from rollcli.files.storage import create, owner_of
+from rollcli.files.storage import create, owner_of, write_bytes
 from rollcli.files.stores.locations import is_url, public_name
 from rollcli.run.frame import Frame, FrameResult, ReadAs
-from rollcli.run.inputs import inputs_line
+from rollcli.run.inputs import inputs_line, part_inputs_path
 from rollcli.run.options import FrameOptions
 from rollcli.run.outputs import local_images
 from rollcli.run.summary import Figures
@@ -35,7 +35,7 @@ class Batch:
     lines : list of bytes
         The other rows as they stand in the result.
     notes : list of bytes
-        What frames were read from, where the result keeps it; see `inputs.inputs_line`.
+        What the frames of these were read from, where the result keeps it; see `inputs.inputs_line`.
     read_as : ReadAs
     told : list of FrameResult
         Those of which the user is told.
@@ -83,8 +83,8 @@ class Parts(NamedTuple):
     run: str
     of_rows: Mapping[str, Any]
 
-    def write(self, number: int, lines: Sequence[bytes]) -> None:
-        """Write a part, whole, unless there is one.
+    def write(self, number: int, lines: Sequence[bytes], notes: Sequence[bytes]) -> None:
+        """Write what a part was made from, then the part, whole, unless there is one.
 
         Raises
         ------
@@ -95,6 +95,7 @@ class Parts(NamedTuple):
         """
         location = part_location(self.output, self.form, number)
         check_owned(self.output, self.run)
+        write_bytes(part_inputs_path(self.output, number), b"".join(notes), durable=True)
         if not create(location, self.encoded(number, lines), self.run):
             raise UsageError(
                 f"{location}: another run has written this part; give each an --output of its own"
@@ -198,17 +199,23 @@ def join_results(frames: Span[Frame], results: Sequence[FrameResult], options: B
         read_as = read_as.joined(ReadAs(frozenset(filter(None, [encoding])), searched))
     lines = [format_row(result.row, options.form, options.further) for result in results]
     known: ReadAs = frames.told
-    in_parts = 0
-    if options.parts is not None and not ends and known.joined(read_as) == known:
-        in_parts = _write_parts(frames, figures.status, lines, options)
-    told = list(results) if options.verbose else list(_told(results))
     made = zip(frames, results, strict=False)
     keeps = options.frame.notes
     notes = [result.inputs or inputs_line(frame, {}) for frame, result in made] if keeps else []
-    return Batch(figures, in_parts, lines[in_parts:], notes, read_as, told)
+    in_parts = 0
+    if options.parts is not None and not ends and known.joined(read_as) == known:
+        in_parts = _write_parts(frames, figures.status, lines, notes, options)
+    told = list(results) if options.verbose else list(_told(results))
+    return Batch(figures, in_parts, lines[in_parts:], notes[in_parts:], read_as, told)
 
 
-def _write_parts(frames: Span[Frame], status: bytes, lines: Sequence[bytes], options: BatchOptions) -> int:
+def _write_parts(
+    frames: Span[Frame],
+    status: bytes,
+    lines: Sequence[bytes],
+    notes: Sequence[bytes],
+    options: BatchOptions,
+) -> int:
     """Write the parts that the lines fill, if they begin with one; return how many lines that were."""
     parts, written, images, root = options.parts, 0, options.frame.images, options.frame.root
     while parts and frames.first % parts.rows == 0 and written < len(lines):
@@ -217,7 +224,7 @@ def _write_parts(frames: Span[Frame], status: bytes, lines: Sequence[bytes], opt
         if end > len(lines):
             break
         sync_files(local_images(frames[written:end], status[written:end], images, root))
-        parts.write(parts.numbers[first // parts.rows], lines[written:end])
+        parts.write(parts.numbers[first // parts.rows], lines[written:end], notes[written:end])
         written = end
     return written
 

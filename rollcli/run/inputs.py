@@ -1,8 +1,8 @@
 """FILE.inputs: what each row of a result was made from, so that a later run knows what has changed since.
 
-A line of fixed length stands for each row, in their order: hashes of the frame's name, of the state of its
-files (size and time; the entity tag of an object), and of what they hold; its calibration counts as both.
-Import-light.
+Of a result in parts it is a folder, with a file for each part. A line of fixed length stands for each row, in
+their order: hashes of the frame's name, of the state of its files (size and time; the entity tag of an
+object), and of what they hold; its calibration counts as both. Import-light.
 """
 
 import re
@@ -18,6 +18,7 @@ from rollcli.files.stores.locations import is_object_url, is_url
 from rollcli.files.stores.objects import list_tags
 from rollcli.run.frame import Frame
 
+_PART_ENDING = ".inputs"
 _HEX = 16
 _WIDTH = 3 * (_HEX + 1)
 _UNKNOWN = b"-" * _HEX
@@ -29,9 +30,19 @@ def inputs_path(result: str) -> str:
     return f"{result}.inputs"
 
 
+def part_inputs_path(result: str, number: int) -> str:
+    """Return where the lines of a part lie."""
+    return f"{inputs_path(result)}/part-{number:05d}{_PART_ENDING}"
+
+
+def is_part_inputs(path: str) -> bool:
+    """Tell whether a file is named like one with the lines of a part."""
+    return path.endswith(_PART_ENDING)
+
+
 def is_inputs(path: str) -> bool:
     """Tell whether a new run may write its lines here: there is no file, an empty one, or one of a run."""
-    data = _data(path, _WIDTH)
+    data = inputs_data(path, _WIDTH)
     return _LINE.match(data) is not None if data else True
 
 
@@ -104,13 +115,19 @@ def _hash(texts: Iterable[str]) -> bytes:
     return blake2b(data, digest_size=_HEX // 2).hexdigest().encode()
 
 
+def split_lines(data: bytes) -> list[bytes]:
+    """Return the lines of rows."""
+    return [data[at : at + _WIDTH] for at in range(0, len(data), _WIDTH)]
+
+
 class Inputs:
     """The lines of an interrupted or earlier run, and those of the rows that are kept of it.
 
     Parameters
     ----------
-    result : str
-    updates : bool
+    data : bytes
+        Those of the run.
+    updates : bool, optional
         Whether objects are looked at too, and what could not be read counts as changed.
 
     Attributes
@@ -119,10 +136,10 @@ class Inputs:
         Those that were taken, with the state that the files have now where they hold the same.
     """
 
-    def __init__(self, result: str, *, updates: bool) -> None:
+    def __init__(self, data: bytes, *, updates: bool = False) -> None:
         self.lines = bytearray()
         self._updates = updates
-        self._data = _data(inputs_path(result))
+        self._data = data
         self._places: dict[bytes, int] = {}
         self._tags: dict[str, dict[str, str]] = {}
 
@@ -180,7 +197,8 @@ class Inputs:
         return self._tags[folder].get(path, "")
 
 
-def _data(path: str, most: int = -1) -> bytes:
+def inputs_data(path: str, most: int = -1) -> bytes:
+    """Read the lines of a result in one file; none where there is no file."""
     try:
         with Path(path).open("rb") as file:
             return file.read(most)

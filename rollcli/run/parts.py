@@ -25,10 +25,11 @@ from rollcli.files.results import (
     read_run,
     run_path,
 )
-from rollcli.files.storage import list_names, remove, write_bytes
-from rollcli.files.stores.locations import base_name, is_url, located
+from rollcli.files.storage import list_names, read_bytes, remove, write_bytes
+from rollcli.files.stores.locations import base_name, is_url, located, public_name
 from rollcli.run.batch import Batch, Parts, Pass, line_form, part_location
 from rollcli.run.frame import Frame, ReadAs
+from rollcli.run.inputs import Inputs, inputs_path, is_part_inputs, part_inputs_path, split_lines
 from rollcli.run.options import EstimateOptions
 from rollcli.run.outputs import local_images, remove_image_leftovers, remove_marks
 from rollcli.run.plan import Plan
@@ -40,12 +41,12 @@ _CHECK_S = 10.0  # a request of 50 ms now and then
 
 
 class PartsOutput:
-    """Rows to a folder of parts, and FILE.run.json beside it.
+    """Rows to a folder of parts, FILE.inputs and FILE.run.json beside it.
 
     Workers write the parts of which they have all rows. This process writes the others.
     """
 
-    resumable, notes = True, False
+    resumable = notes = True
 
     def __init__(
         self,
@@ -60,8 +61,9 @@ class PartsOutput:
         self._part_rows = options.result.part_rows
         self._parts = _parts(plan, record, options)
         self._numbers: Iterator[int] = iter(())  # of the parts to come
-        self._replaced_part, self._replacing = 0, dict[int, bytes]()  # lines by their positions in the result
-        self._waiting: list[bytes] = []
+        # rows and the lines of their inputs, by their positions in the result
+        self._replaced_part, self._replacing = 0, dict[int, tuple[bytes, bytes]]()
+        self._waiting: list[tuple[bytes, bytes]] = []
         self.replaces = record.replaces
         self._image_options = options.images
         self._images: list[str] = []  # those of the part that is being filled
@@ -96,7 +98,7 @@ class PartsOutput:
         for _ in range(_whole_parts(batch.in_parts, self._part_rows)):
             next(self._numbers)
         self._written += batch.in_parts
-        self._waiting += batch.lines
+        self._waiting += zip(batch.lines, batch.notes, strict=True)
         self._images += local_images(
             frames[batch.in_parts :], batch.figures.status[batch.in_parts :], self._image_options
         )
@@ -124,11 +126,11 @@ class PartsOutput:
     def replace(self, positions: Sequence[int], frames: Sequence[Frame], batch: Batch) -> None:
         """Take rows; a part is written anew once its last such row is known."""
         self._record.saw(batch.read_as)
-        for at, (position, line) in enumerate(zip(positions, batch.lines, strict=True)):
+        for at, position in enumerate(positions):
             if position // self._part_rows != self._replaced_part:
                 self.commit()
             self._replaced_part = position // self._part_rows
-            self._replacing[position] = line
+            self._replacing[position] = batch.lines[at], batch.notes[at]
             status = batch.figures.status[at : at + 1]
             self._images += local_images(frames[at : at + 1], status, self._image_options)
 
@@ -141,8 +143,15 @@ class PartsOutput:
         number, first = self._replaced_part, self._replaced_part * self._part_rows
         form = line_form(self._plan.format)
         old = [format_row(row, form, self._plan.further) for row in _rows_of_part(self._plan, number)]
-        lines = [self._replacing.get(position, line) for position, line in enumerate(old, first)]
-        if lines != old:
+        path = part_inputs_path(self._plan.output, number)
+        inputs = read_bytes(path)
+        both = zip(old, split_lines(inputs), strict=True)
+        lines, notes = zip(*(self._replacing.get(*each) for each in enumerate(both, first)), strict=True)
+        if b"".join(notes) != inputs:
+            self._check_owned()
+            # in this order: of a run that is killed in between, the rows still are errors, and are done again
+            write_bytes(path, b"".join(notes), durable=True)
+        if lines != tuple(old):
             self._check_owned()
             write_bytes(_location(self._plan, number), self._parts.encoded(number, lines), durable=True)
         remove_marks([self._plan.frames[position] for position in self._replacing], self._image_options)
@@ -159,8 +168,8 @@ class PartsOutput:
     def _write(self) -> None:
         sync_files(self._images)
         self._images.clear()
-        lines = self._waiting[: self._part_rows]
-        self._parts.write(next(self._numbers), lines)
+        lines, notes = zip(*self._waiting[: self._part_rows], strict=True)
+        self._parts.write(next(self._numbers), lines, notes)
         self._checked = time.monotonic()
         self._written += len(lines)
         self._waiting = self._waiting[self._part_rows :]
@@ -196,15 +205,21 @@ def _parts(plan: Plan, record: RunRecord, options: EstimateOptions) -> Parts:
 def _begin(plan: Plan, options: EstimateOptions, keep_open: int | None) -> PartsOutput:
     # again, now that no other run can write it
     parts = check_parts(plan, resume=options.result.resume, overwrite=options.running.overwrite)
-    kept = _kept(plan, options, parts)
+    kept, renewed = _kept(plan, options, parts)
     record = new_record(plan, options, kept, _earlier(plan) if kept.count else None)
     _remove_leftovers(plan, options, parts)
     if options.result.resume or options.running.overwrite:
         remove_image_leftovers(kept.not_failed(), options.images)
-    for name in set(parts).difference(_kept_names(plan, options, kept)):
-        remove(f"{plan.output}/{name}")
+    stay = {path for paths in _kept_paths(plan, options, kept) for path in paths}
+    inputs = [f"{inputs_path(plan.output)}/{name}" for name in list_names(inputs_path(plan.output))]
+    # in this order, no part is ever without its inputs
+    for path in (*(f"{plan.output}/{name}" for name in parts), *filter(is_part_inputs, inputs)):
+        if path not in stay:
+            remove(path)
     record.write()
     record.check_owned()  # another run may have begun in this very second
+    for path, lines in renewed.items():
+        write_bytes(path, lines, durable=True)
     return PartsOutput(plan, record, kept, options, keep_open)
 
 
@@ -212,7 +227,7 @@ def _remove_leftovers(plan: Plan, options: EstimateOptions, parts: Sequence[str]
     """Remove what killed processes left beside the parts of this run, and these of an earlier one."""
     if not is_url(plan.output):
         every = range(_whole_parts(len(plan.frames), options.result.part_rows))
-        to_write = [_location(plan, number) for number in every]
+        to_write = [path for number in every for path in _part_paths(plan, number)]
         remove_leftovers([run_path(plan.output), *to_write, *(f"{plan.output}/{name}" for name in parts)])
 
 
@@ -224,8 +239,9 @@ def check_parts(plan: Plan, *, resume: bool, overwrite: bool) -> list[str]:
     UsageError
         Parts exist and neither --resume nor --overwrite is given; or a file is in the folder's place.
     """
-    if not is_url(plan.output) and is_there(plan.output) and not is_folder(plan.output):
-        raise UsageError(f"{plan.output}: is a file; a result of parts is a folder, give another --output")
+    for path in () if is_url(plan.output) else (plan.output, inputs_path(plan.output)):
+        if is_there(path) and not is_folder(path):
+            raise UsageError(f"{path}: is a file; a result of parts is a folder, give another --output")
     parts = part_names(list_names(plan.output))
     if parts and not (resume or overwrite):
         raise UsageError(
@@ -240,17 +256,18 @@ def check_parts(plan: Plan, *, resume: bool, overwrite: bool) -> list[str]:
 def kept_in_parts(plan: Plan, options: EstimateOptions) -> KeptRows:
     """Take in the rows that a resume would keep."""
     parts = check_parts(plan, resume=options.result.resume, overwrite=options.running.overwrite)
-    return _kept(plan, options, parts)
+    return _kept(plan, options, parts)[0]
 
 
-def _kept(plan: Plan, options: EstimateOptions, parts: list[str]) -> KeptRows:
+def _kept(plan: Plan, options: EstimateOptions, parts: list[str]) -> tuple[KeptRows, dict[str, bytes]]:
     """Take in the rows of the parts that are not short, wherever others are missing.
 
-    A part is short that was the last one of fewer frames.
+    A part is short that was the last one of fewer frames. Files of inputs come back with their lines where
+    states differ and contents do not.
     """
-    kept = KeptRows(plan, options)
+    kept, renewed = KeptRows(plan, options), dict[str, bytes]()
     if not options.result.resume:
-        return kept
+        return kept, renewed
     rows, numbered = options.result.part_rows, dict(_numbered(plan, parts))
     header = b"" if 0 in numbered.values() else format_header(plan.format, plan.further)
     try:
@@ -259,11 +276,16 @@ def _kept(plan: Plan, options: EstimateOptions, parts: list[str]) -> KeptRows:
             if len(found) < rows and first + len(found) != len(plan.frames):
                 continue
             kept.skip_to(first)
-            for row in found:
-                kept.add(row)
+            path = part_inputs_path(plan.output, numbered[base_name(name)])
+            inputs = read_bytes(path)
+            kept.inputs = Inputs(inputs)
+            if not all(map(kept.add, found)):
+                raise InputError(f"{public_name(path)}: is damaged: it does not say what a row was made from")
+            if kept.inputs.lines != inputs:
+                renewed[path] = bytes(kept.inputs.lines)
     except InputError as error:
         raise not_resumable(plan.output, str(error)) from error
-    return kept
+    return kept, renewed
 
 
 def _numbered(plan: Plan, names: Iterable[str]) -> Iterator[tuple[str, int]]:
@@ -274,11 +296,11 @@ def _numbered(plan: Plan, names: Iterable[str]) -> Iterator[tuple[str, int]]:
             yield name, number
 
 
-def _kept_names(plan: Plan, options: EstimateOptions, kept: KeptRows) -> Iterator[str]:
-    """Yield the names of the parts whose rows are kept."""
+def _kept_paths(plan: Plan, options: EstimateOptions, kept: KeptRows) -> Iterator[tuple[str, str]]:
+    """Yield where the parts lie whose rows are kept, and their inputs."""
     for number, first in enumerate(range(0, kept.count, options.result.part_rows)):
         if not any(first in hole for hole in kept.holes):
-            yield base_name(_location(plan, number))
+            yield _part_paths(plan, number)
 
 
 def _rows_of_part(plan: Plan, number: int) -> tuple[Row, ...]:
@@ -301,3 +323,7 @@ def _earlier(plan: Plan) -> Mapping[str, Any] | None:
 
 def _location(plan: Plan, number: int) -> str:
     return part_location(plan.output, plan.format, number)
+
+
+def _part_paths(plan: Plan, number: int) -> tuple[str, str]:
+    return _location(plan, number), part_inputs_path(plan.output, number)

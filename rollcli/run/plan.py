@@ -43,8 +43,7 @@ class Plan:
         """The result, what its rows were made from, and the record of its run; none of these of a stream."""
         if is_stream(self.output):
             return []
-        inputs = [] if self.in_parts else [inputs_path(self.output)]
-        return [self.output, *inputs, run_path(self.output)]
+        return [self.output, inputs_path(self.output), run_path(self.output)]
 
 
 def make_plan(options: EstimateOptions) -> Plan:
@@ -64,8 +63,8 @@ def make_plan(options: EstimateOptions) -> Plan:
     plan = Plan(frames, options.result.output, options.result.form)
     if options.result.update and plan.in_parts:
         raise UsageError(
-            f"{plan.output}: a result in parts (Parquet, or below a URL) does not say what its rows were "
-            "made from: --update takes a result in one file of CSV or JSON Lines"
+            f"{plan.output}: rows of a result in parts (Parquet, or below a URL) keep their places: "
+            "--update takes a result in one file of CSV or JSON Lines"
         )
     if options.images.folders():
         check_one_owner(((frame, _images([frame], options)) for frame in frames), plan.files)

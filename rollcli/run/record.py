@@ -6,7 +6,6 @@ import os
 import uuid
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from functools import lru_cache
 from itertools import islice
 from pathlib import Path
 from typing import Any, TypeVar
@@ -14,7 +13,7 @@ from typing import Any, TypeVar
 from rollcli import __version__
 from rollcli.errors import InputError
 from rollcli.files.results import run_path
-from rollcli.files.storage import state_of, write_bytes
+from rollcli.files.storage import write_bytes
 from rollcli.files.stores.locations import public_name
 from rollcli.run.batch import check_owned
 from rollcli.run.frame import Frame, ReadAs
@@ -38,16 +37,6 @@ def names_of(frames: Sequence[Frame]) -> dict[str, Any]:
     for frame in frames:
         names.update(os.fsencode(f"{frame.file}\0{frame.right_file}\0"))
     return {"frames": len(frames), "names": names.hexdigest()}
-
-
-def states_of(frames: Sequence[Frame]) -> str:
-    """Return a digest of size and time of every local file that frames need."""
-    states = hashlib.sha256()
-    look = lru_cache(maxsize=8)(state_of)  # at a mask for all frames, and an archive of many, once
-    for frame in frames:
-        for path in frame.reads():
-            states.update(f"{look(path)}\0".encode())
-    return states.hexdigest()
 
 
 CONVENTIONS = {
@@ -86,13 +75,10 @@ class RunRecord:
         self._begun = False
         # older images, now and after a resume
         self.replaces = options.running.overwrite or options.result.update
-        inputs = names_of(plan.frames)
-        if plan.in_parts:  # which have no FILE.inputs
-            inputs["files"] = states_of(plan.frames)
         self.fixed = {
             "rollcli": __version__,
             "options": _effective(plan, options),
-            "inputs": inputs,
+            "inputs": names_of(plan.frames),
         }
         if options.calibration.given:
             self.fixed["calibration"] = _calibrations(plan.frames)

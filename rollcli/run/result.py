@@ -16,8 +16,8 @@ from rollcli.files.stores.locations import base_name
 from rollcli.files.stream import STDOUT, STDOUT_NAME, is_stream, open_stream, stdout_descriptor, write_stream
 from rollcli.run.batch import Batch, Pass
 from rollcli.run.frame import Frame, ReadAs
-from rollcli.run.inputs import Inputs, inputs_path, is_inputs
-from rollcli.run.options import EstimateOptions, ImageOptions
+from rollcli.run.inputs import Inputs, inputs_data, inputs_path, is_inputs
+from rollcli.run.options import EstimateOptions
 from rollcli.run.outputs import local_images, remove_image_leftovers, remove_marks
 from rollcli.run.parts import kept_in_parts, open_parts
 from rollcli.run.plan import Plan
@@ -131,12 +131,13 @@ class FileOutput:
         record: RunRecord,
         plan: Plan,
         kept: KeptRows,
-        images: ImageOptions,
+        options: EstimateOptions,
     ) -> None:
         self.kept = kept
         self.keep_open: int | None = file.descriptor
         self.replaces = record.replaces
-        self._file, self._record, self._plan, self._images = file, record, plan, images
+        self._file, self._record, self._plan, self._images = file, record, plan, options.images
+        self._updates = options.result.update
         self._inputs, self._rows = inputs, DurableRows(file, inputs)
         self._replacing: dict[int, tuple[bytes, bytes]] = {}  # rows, and the lines of their inputs
 
@@ -170,9 +171,16 @@ class FileOutput:
         """Force the images and rows that were added to the disk."""
         self._rows.commit()
         if self._replacing:
-            # in this order: of a run that is killed in between, the rows are made again
-            self._file.replace({at: row for at, (row, _) in self._replacing.items()}, self._plan.format)
-            self._inputs.replace({at: line for at, (_, line) in self._replacing.items()}, "jsonl")
+            rows = {at: row for at, (row, _) in self._replacing.items()}
+            lines = {at: line for at, (_, line) in self._replacing.items()}
+            # a run that is killed in between leaves rows that the same command makes again: where it updates,
+            # those whose lines tell of other contents, and else those that still are errors
+            if self._updates:
+                self._file.replace(rows, self._plan.format)
+                self._inputs.replace(lines, "jsonl")
+            else:
+                self._inputs.replace(lines, "jsonl")
+                self._file.replace(rows, self._plan.format)
             remove_marks([self._plan.frames[position] for position in self._replacing], self._images)
             self._replacing.clear()
 
@@ -257,7 +265,7 @@ def _parsed(data: bytes, plan: Plan, options: EstimateOptions) -> tuple[bytes, K
     if not data:
         return b"", KeptRows(plan, options)
     update, gone = options.result.update, 0
-    inputs = Inputs(plan.output, updates=update)
+    inputs = Inputs(inputs_data(inputs_path(plan.output)), updates=update)
     if update:
         data, gone = arranged(data, plan)
     kept = KeptRows(plan, options, parse_rows(data, plan.output), inputs)
@@ -292,7 +300,7 @@ def _begin(file: ResultFile, inputs: ResultFile, plan: Plan, options: EstimateOp
     record.write()
     if not kept.count:
         file.append(format_header(plan.format, plan.further))
-    return FileOutput(file, inputs, record, plan, kept, options.images)
+    return FileOutput(file, inputs, record, plan, kept, options)
 
 
 def _check_permitted(name: str, options: EstimateOptions) -> None:

@@ -39,10 +39,19 @@ class ResultFile:
         self.descriptor, self._name = descriptor, name
 
     def read(self) -> bytes:
-        """Read the whole file."""
-        os.lseek(self.descriptor, 0, os.SEEK_SET)  # locking moves the position on Windows
-        with open(self.descriptor, "rb", closefd=False) as file:
-            return file.read()
+        """Read the whole file.
+
+        Raises
+        ------
+        OutputError
+            The disk does not give it.
+        """
+        try:
+            os.lseek(self.descriptor, 0, os.SEEK_SET)  # locking moves the position on Windows
+            with open(self.descriptor, "rb", closefd=False) as file:
+                return file.read()
+        except OSError as error:
+            raise output_error(self._name, error) from error
 
     def truncate(self, size: int) -> None:
         """Keep the first `size` bytes, and continue after them.

@@ -2,17 +2,14 @@
 
 import io
 import json
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 from rollcli.errors import InputError, OutputError
-from rollcli.files.atomic import look_at
-from rollcli.files.containers import file_of
 from rollcli.files.locking import differences, not_resumable
 from rollcli.files.results import Row, format_row, parse_rows, read_run, run_path
-from rollcli.files.storage import modified_ns
-from rollcli.files.stores.locations import base_name, is_url
+from rollcli.files.stores.locations import base_name
 from rollcli.run.batch import Batch
 from rollcli.run.frame import Frame
 from rollcli.run.inputs import Inputs
@@ -298,24 +295,8 @@ def _differences(
     if inputs_was.get("names") != inputs_now["names"]:
         yield "the names of the inputs differ"
     if kept.first_changed:
-        yield f"{kept.first_changed} has changed since; --update does again what has changed"
-    if inputs_was != inputs_now:
-        changed = _changed_input(plan, set(kept.again))
-        if changed or not kept.again:
-            yield f"{changed or 'an input'} has changed since"
-
-
-def _changed_input(plan: Plan, retried: Collection[int]) -> str | None:
-    """Find an input that is newer than the record, or missing, apart from those of frames done again."""
-    since_ns = modified_ns(run_path(plan.output))
-    frames = (frame for position, frame in enumerate(plan.frames) if position not in retried)
-    for path in dict.fromkeys(file_of(path) for frame in frames for path in frame.reads()):
-        try:
-            if not is_url(path) and look_at(path).st_mtime_ns > since_ns:
-                return path
-        except (OSError, ValueError):
-            return path
-    return None
+        how = "" if plan.in_parts else "; --update does again what has changed"
+        yield f"{kept.first_changed} has changed since{how}"
 
 
 def _is_whole(run: Mapping[str, Any]) -> bool:

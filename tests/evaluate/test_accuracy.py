@@ -6,10 +6,11 @@ import io
 import json
 import math
 
+import numpy as np
 import pytest
 
 from rollcli.errors import InputError, UsageError
-from rollcli.evaluate.accuracy import assess
+from rollcli.evaluate.accuracy import assess, assess_heights
 from rollcli.evaluate.run_accuracy import as_csv, as_json, as_table
 from rollcli.evaluate.truth import KnownPose, read_truth
 from rollcli.files.results import Row
@@ -35,6 +36,26 @@ def truth(*degrees):
 def write_truth(path, text):
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
     return path
+
+
+def test_heights_are_compared_at_their_distances_where_all_that_takes_is_there(tmp_path):
+    disparity = np.array([[20, 10, 10, 1, 0]] * 2, np.float32)  # 5, 10, 10 and 100 m ahead, and no road
+    off = np.array([[0.25, -0.5, np.nan, 9, 9], [0.75, -0.5, -0.5, 9, 9]], np.float32)
+    for name, values in (("made", off), ("truth/heights", 0 * disparity), ("truth/disparity", disparity)):
+        (tmp_path / name).mkdir(parents=True)
+        for frame in ("frame1", "frame2", "frame3")[: 2 if name == "truth/heights" else 3]:
+            np.save(tmp_path / name / f"{frame}.npy", values)
+    places = str(tmp_path / "made"), str(tmp_path / "truth")
+    known = {f"frame{k}": KnownPose(0.0, focal_baseline=100.0) for k in (1, 2, 3)}
+    first, second, third = rows(1, 1, 1, ending=".npy")  # the second has no metres, the third no truth
+    of_metres = [dataclasses.replace(first, height_m=1.5), second, dataclasses.replace(third, height_m=1.5)]
+    near, far = assess_heights(of_metres, known, *places)
+    assert dataclasses.astuple(near) == pytest.approx((5, 1, 0.5, 0.725, 0.5))
+    assert dataclasses.astuple(far) == pytest.approx((10, 1, 0.5, 0.5, -0.5))
+    assert assess_heights(of_metres[1:], known, *places) is None
+    np.save(tmp_path / "made" / "frame1.npy", off[:1])
+    with pytest.raises(InputError, match="differ in size: 5x1, 5x2, 5x2"):
+        assess_heights(of_metres, known, *places)
 
 
 def test_the_figures_are_those_of_the_absolute_errors():

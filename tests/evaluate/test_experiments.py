@@ -17,6 +17,7 @@ from rollcli.evaluate.experiments import (
     METHODS,
     SOLVERS,
     Times,
+    _best,
     examine,
     rotate_nearest,
     time_solvers,
@@ -140,12 +141,22 @@ def test_tables_hold_the_papers_numbers_beside_the_mean_of_ours(found):
 
 def test_runs_that_stopped_short_are_left_out_of_the_mean_and_counted(found):
     short = replace(found, sweep=tuple((None, *counts[1:]) for counts in found.sweep))
+    slower = replace(found, sweep=tuple(tuple(count and count + 4 for count in each) for each in found.sweep))
+    table = all_tables([found, slower], [], [made_times(1)])["fig3_lambda0"].where(lambda0=26.0)
+    for name, more in (("mean", 2), ("min", 0), ("max", 4)):
+        assert table.column(name) == [counts[25] + more for counts in found.sweep]
     table = all_tables([found, short], [], [made_times(1)])["fig3_lambda0"]
     rates = table.where(delta_deg=DELTAS_DEG[0]).column("lambda0")
     assert rates == list(range(1, 101))  # the whole numbers that the command's help names
     row = table.where(lambda0=1.0, delta_deg=0.0001)
     assert row.column("short") == [1 + (found.sweep[-1][0] is None)]
     assert row.column("mean") == [found.sweep[-1][0]]
+
+
+def test_a_time_is_that_of_the_fastest_run(monkeypatch):
+    clock = iter([10.0, 12.0, 20.0, 20.5, 30.0, 33.0])
+    monkeypatch.setattr("time.perf_counter", lambda: next(clock))
+    assert _best(lambda: None, 3) == 0.5
 
 
 def test_a_table_is_csv_that_reads_back(found):

@@ -5,7 +5,8 @@ import sys
 
 import pytest
 
-from rollcli.run.result_file import DurableRows, open_result
+from rollcli.errors import OutputError
+from rollcli.run.result_file import DurableRows, ResultFile, open_result
 from tests.run_cli import contents, rollcli, write_maps
 from tests.slow import mostly_slow
 
@@ -133,6 +134,15 @@ def interrupted_at(step, work):
     finally:
         sys.settrace(None)
     return False
+
+
+def test_a_result_that_the_disk_does_not_give_is_named(tmp_path):
+    descriptor = os.open(tmp_path, os.O_RDONLY)  # a folder cannot be read like a file
+    try:
+        with pytest.raises(OutputError, match=r"rolls\.csv: cannot be written: is a directory"):
+            ResultFile(descriptor, "rolls.csv").read()
+    finally:
+        os.close(descriptor)
 
 
 def test_a_second_interrupt_at_any_line_writes_no_row_twice_and_leaves_none_out(tmp_path):

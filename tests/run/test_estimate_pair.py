@@ -92,7 +92,8 @@ def test_what_a_file_carries_is_read_back_and_what_others_wrote_is_not():
     assert Provenance.of_text(carried.text) == carried
     assert Provenance().text == ""
     assert carried.text.isascii()
-    for other in ("", "{}", "[1]", "null", '{"slope_error": -1, "doubt": "", "alignment": {}}', "nonsense"):
+    lies = '{"slope_error": 0, "doubt": "", "alignment": {"right_lower_px": NaN, "right_twist_px": 1}}'
+    for other in ("", "{}", "[1]", "null", '{"slope_error": -1, "doubt": "", "alignment": {}}', "no", lies):
         assert Provenance.of_text(other) == Provenance()
 
 

@@ -20,13 +20,16 @@ def parts(tmp_path):
     return tmp_path, line
 
 
-@pytest.mark.parametrize("half_written", ["part-00001.parquet", "part-00002.parquet"])
+@pytest.mark.parametrize(
+    "half_written",
+    ["parquet/part-00001.parquet", "parquet/part-00002.parquet", "parquet.inputs/part-00002.inputs"],
+)
 @pytest.mark.parametrize("flag", ["--resume", "--overwrite"])
 def test_half_a_part_of_a_killed_run_is_removed(parts, half_written, flag):
     folder, line = parts
     whole = contents(folder)
     (folder / "rolls.parquet" / "part-00002.parquet").unlink()
-    leave_half(folder / "rolls.parquet" / half_written)
+    leave_half(folder / f"rolls.{half_written}")
     assert len(contents(folder)) == len(whole)
 
     assert rollcli(*line, flag, cwd=folder).status == 0
@@ -45,12 +48,24 @@ def test_parts_that_exist_are_kept_unless_told_otherwise(parts, flags):
     assert contents(folder) == whole
 
 
-def test_a_file_in_the_place_of_the_folder_is_refused(parts):
+def test_nothing_stays_of_parts_that_an_overwriting_run_of_fewer_frames_does_not_have(parts):
     folder, line = parts
-    (folder / "other.parquet").write_bytes(b"mine")
+    for number in (3, 4, 5):
+        (folder / "maps" / f"frame{number}.png").unlink()
+    assert rollcli(*line, "--overwrite", cwd=folder).status == 0
+    assert sorted(name for name in contents(folder) if "part-" in name) == [
+        *(f"rolls.parquet.inputs/part-0000{number}.inputs" for number in range(2)),
+        *(f"rolls.parquet/part-0000{number}.parquet" for number in range(2)),
+    ]
+
+
+@pytest.mark.parametrize("name", ["other.parquet", "other.parquet.inputs"])
+def test_a_file_in_the_place_of_a_folder_is_refused(parts, name):
+    folder, line = parts
+    (folder / name).write_bytes(b"mine")
     done = rollcli(*line, "-o", "other.parquet", "--overwrite", cwd=folder)
-    assert (done.status, (folder / "other.parquet").read_bytes()) == (2, b"mine")
-    assert "other.parquet: is a file; a result of parts is a folder" in done.err
+    assert (done.status, (folder / name).read_bytes()) == (2, b"mine")
+    assert f"{name}: is a file; a result of parts is a folder" in done.err
 
 
 @pytest.mark.parametrize(

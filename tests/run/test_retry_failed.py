@@ -14,7 +14,7 @@ from rollcli.errors import OutputError, UsageError
 from rollcli.files.results import format_header, read_result
 from rollcli.files.storage import list_names, read_bytes, remove, write_bytes
 from rollcli.run import estimate as batch_run
-from rollcli.run import result_file
+from rollcli.run import parts, result_file
 from rollcli.run.estimate import estimate_frame
 from rollcli.run.result_file import open_result
 from tests.run_cli import command, contents, environment, road_map, rollcli, write_kitti, write_maps
@@ -150,6 +150,35 @@ def test_a_retry_killed_at_any_time_loses_no_row_and_is_taken_up_again(tmp_path)
         assert [row.split(",")[0] for row in rows] == [f"maps/frame{index:02}.png" for index in range(COUNT)]
     assert rollcli(*line, *RETRY, cwd=tmp_path).status == 0
     fresh, kept = anew(tmp_path, line)
+    assert kept == fresh
+
+
+@pytest.mark.parametrize(
+    ("result", "flags"), [("rolls.csv", RETRY), ("rolls.csv", ("--update",)), ("rolls.parquet", RETRY)]
+)
+def test_a_run_that_ends_between_rows_and_what_says_of_their_files_is_taken_up_again(
+    folder, maps, monkeypatch, result, flags
+):
+    if result.endswith("parquet"):
+        pytest.importorskip("pyarrow", reason="pyarrow, of the extra parquet, is not here")
+    line = ("estimate", "maps", "-o", result, "--derotated", "up")
+    assert rollcli(*line, cwd=folder).status == 3
+    mend(folder, maps, *BROKEN)
+    for module, name in ((result_file.ResultFile, "replace"), (parts, "write_bytes")):
+        done, really = [], getattr(module, name)
+
+        def once(*arguments, done=done, really=really, **words):
+            if done:
+                raise OutputError("the power is cut")
+            done.append(arguments)
+            return really(*arguments, **words)
+
+        monkeypatch.setattr(module, name, once)
+    assert "the power is cut" in rollcli(*line, *flags, cwd=folder).err
+    monkeypatch.undo()
+    done = rollcli(*line, *flags, cwd=folder)
+    assert done.status == 0, done.err
+    fresh, kept = anew(folder, line)
     assert kept == fresh
 
 

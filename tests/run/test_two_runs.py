@@ -25,7 +25,7 @@ def options(maps, output):
 
 def append(output, frames):
     """The rows of frames, as workers would return them."""
-    told = BatchOptions("csv", (), FrameOptions(), verbose=False, fail_fast=False)
+    told = BatchOptions("csv", (), FrameOptions(notes=True), verbose=False, fail_fast=False)
     next(output.passes())
     for frame in frames:
         result = FrameResult(Row(frame.file, status="ok", roll_deg=1.0))

@@ -6,7 +6,7 @@ import tarfile
 
 import pytest
 
-from rollcli.files.storage import write_bytes
+from rollcli.files.storage import list_names, read_bytes, remove, write_bytes
 from rollcli.run import inputs
 from tests.object_store import upload
 from tests.run_cli import contents, road_map, rollcli, write_kitti, write_maps, write_pair
@@ -69,6 +69,44 @@ def test_a_resume_takes_identical_bytes_with_other_times(folder, tmp_path_factor
     estimate(folder, *IMAGES, "--resume", status=3)
     assert written(folder) == anew(folder, tmp_path_factory, *IMAGES)
     assert (folder / "rolls.csv").read_bytes() == whole
+
+
+@pytest.mark.parametrize("form", ["csv", "parquet"])
+def test_a_resume_of_parts_takes_identical_bytes_with_other_times_and_no_others(folder, request, form):
+    if form == "parquet":
+        pytest.importorskip("pyarrow", reason="pyarrow, of the extra parquet, is not here")
+        place = str(folder / "parts")
+    else:
+        place = request.getfixturevalue("bucket")
+
+    def everything(name, less=""):
+        return {
+            each: read_bytes(f"{place}/{name}.{form}{less}/{each}")
+            for each in list_names(f"{place}/{name}.{form}{less}")
+        }
+
+    line = {"result": f"{place}/rolls.{form}", "status": 3}
+    estimate(folder, "--part-rows", "3", **line)
+    whole = everything("rolls")
+    remove(f"{place}/rolls.{form}/part-00001.{form}")
+    touch(folder)
+    done = estimate(folder, "--part-rows", "3", "--resume", **line)
+    assert "(5 kept)" in done.err
+    assert everything("rolls") == whole
+    estimate(folder, "--part-rows", "3", result=f"{place}/anew.{form}", status=3)
+    assert everything("rolls", ".inputs") == everything("anew", ".inputs")
+    remove(f"{place}/rolls.{form}/part-00001.{form}")
+    put(folder, "frame4", roll=0.3)  # has no row
+    estimate(folder, "--part-rows", "3", "--resume", **line)
+    put(folder, "frame1", roll=0.3)
+    line["status"] = 2
+    said = estimate(folder, "--part-rows", "3", "--resume", **line).err
+    assert "maps/frame1.png has changed since; --overwrite starts anew" in said
+    lines = f"{place}/rolls.{form}.inputs/part-00001.inputs"
+    write_bytes(lines, read_bytes(lines)[:-60])
+    assert "part-00001.inputs: is damaged" in estimate(folder, "--part-rows", "3", "--resume", **line).err
+    remove(lines)
+    assert "part-00001.inputs: " in estimate(folder, "--part-rows", "3", "--resume", **line).err
 
 
 def test_a_resume_takes_what_changes_before_its_frame_is_done(folder, tmp_path_factory):

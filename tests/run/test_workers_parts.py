@@ -13,6 +13,7 @@ from rollcli.files.results import Row, format_header, format_row
 from rollcli.files.storage import list_names, remove
 from rollcli.run.batch import BatchOptions, Parts, join_results
 from rollcli.run.frame import Frame, FrameResult, ReadAs
+from rollcli.run.inputs import inputs_line
 from rollcli.run.options import FrameOptions
 from rollcli.run.workers.chunks import Chunks, Done, Span
 from tests.object_store import joined
@@ -29,10 +30,15 @@ def lines(first, end):
     return [format_row(row, "csv") for row in ROWS[first:end]]
 
 
+def noted(first, end):
+    """What says that nothing is known of their files, which were not read."""
+    return [inputs_line(frame, {}) for frame in FRAMES[first:end]]
+
+
 def join(folder, first, end, *, known=KITTI, fail_fast=False, rows=ROWS, numbers=range(4)):
     """What a worker hands back of frames that a run of eleven has, in parts of three rows."""
     parts = Parts(str(folder), "csv", (), 3, numbers, len(FRAMES), "run", {})
-    told = BatchOptions("csv", (), FrameOptions(), verbose=False, fail_fast=fail_fast, parts=parts)
+    told = BatchOptions("csv", (), FrameOptions(notes=True), verbose=False, fail_fast=fail_fast, parts=parts)
     results = [FrameResult(row, "kitti") for row in rows[first:end]]
     return join_results(Span(FRAMES[first:end], first, known), results, told)
 
@@ -51,24 +57,27 @@ def join(folder, first, end, *, known=KITTI, fail_fast=False, rows=ROWS, numbers
     ],
 )
 def test_a_worker_writes_the_parts_that_it_has_whole_and_hands_back_other_rows(tmp_path, first, end, parts):
-    batch = join(tmp_path, first, end)
+    batch = join(tmp_path / "rolls.csv", first, end)
     expected = {}
     for number in parts:
         data = b"".join(lines(3 * number, 3 * number + 3))
-        expected[f"part-0000{number}.csv"] = data if number else format_header("csv") + data
+        expected[f"rolls.csv/part-0000{number}.csv"] = data if number else format_header("csv") + data
+        expected[f"rolls.csv.inputs/part-0000{number}.inputs"] = b"".join(noted(3 * number, 3 * number + 3))
     assert contents(tmp_path) == expected
     assert batch.in_parts == sum(min(3, 11 - 3 * number) for number in parts)
     assert batch.lines == lines(first + batch.in_parts, end)
+    assert batch.notes == noted(first + batch.in_parts, end)
     assert len(batch) == end - first
 
 
 def test_a_part_that_a_dying_worker_had_written_counts_and_another_runs_does_not(tmp_path, bucket):
-    for folder in (tmp_path, f"{bucket}/rolls.csv"):
+    here = tmp_path / "rolls.csv"
+    for folder in (here, f"{bucket}/rolls.csv"):
         assert join(folder, 0, 3).in_parts == 3
         assert join(folder, 0, 3).in_parts == 3
     other = [Row(row.file, status="ok", roll_deg=5.0) for row in ROWS]
     with pytest.raises(UsageError, match="another run has written this part"):
-        join(tmp_path, 0, 3, rows=other)
+        join(here, 0, 3, rows=other)
 
 
 @pytest.mark.parametrize(

@@ -196,14 +196,7 @@ def object_owner(url: str) -> str:
 
 
 def object_exists(url: str) -> bool:
-    """Return whether there is an object of this name."""
-    return object_time_ns(url) > 0
-
-
-def object_time_ns(url: str) -> int:
-    """Return the end of the second when an object was written, ns since 1970, by the store's clock.
-
-    0 where there is none.
+    """Return whether there is an object of this name.
 
     Raises
     ------
@@ -212,9 +205,9 @@ def object_time_ns(url: str) -> int:
     """
     store, key = _open(url)
     with _telling(url, "read", InputError), contextlib.suppress(FileNotFoundError):
-        found = _repeated(lambda: store.head(key))
-        return (int(found["last_modified"].timestamp()) + 1) * 1_000_000_000 - 1
-    return 0
+        _repeated(lambda: store.head(key))
+        return True
+    return False
 
 
 def object_problem(url: str) -> str:
