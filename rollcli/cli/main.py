@@ -24,12 +24,19 @@ def versions() -> Iterator[tuple[str, str]]:
     yield "rollcli", __version__
     yield "Python", f"{platform.python_version()} ({platform.python_implementation()}, {platform.platform()})"
     seen = set()
-    for requirement in requires("rollcli") or ():
+    for requirement in _requirements():
         name = re.split(r"[^\w.-]", requirement, maxsplit=1)[0]
         found = _installed(_OPENCV if name in _OPENCV else (name,))
         if name not in seen and (found or ";" not in requirement):
             yield found or (name, "not installed")
         seen.add(name)
+
+
+def _requirements() -> list[str]:
+    try:
+        return requires("rollcli") or []
+    except PackageNotFoundError:  # it runs from its folder, and was not installed
+        return []
 
 
 def _installed(names: Sequence[str]) -> tuple[str, str] | None:

@@ -41,6 +41,15 @@ def test_a_package_that_is_missing_is_named_as_such(tmp_path, monkeypatch):
     assert not any(line.startswith("plotly") for line in lines)
 
 
+def test_versions_ends_with_pythons_where_rollcli_was_not_installed(tmp_path, monkeypatch):
+    def requires(name):
+        raise PackageNotFoundError(name)
+
+    monkeypatch.setattr(versions, "requires", requires)
+    names = [line.split()[0] for line in rollcli("--versions", cwd=tmp_path).out.splitlines()]
+    assert names == ["rollcli", "Python"]
+
+
 def test_help_leaves_two_of_a_hundred_columns_free_on_a_wide_screen(tmp_path):
     lines = rollcli("simulate", "--help", cwd=tmp_path, COLUMNS="200").out.splitlines()
     assert 90 < max(map(len, lines)) <= 98
