@@ -16,6 +16,7 @@ from rollcli.cli.types import (
     ROI,
     WIDE_SPAN,
     Choice,
+    FilePath,
     Number,
     Text,
 )
@@ -203,7 +204,7 @@ stereo_options = record(
     ),
     option(
         "--align",
-        PATH,
+        FilePath("auto|off|FILE"),
         "auto: measure how much lower, larger and how far turned the right image is against the left, "
         "correct that before matching, and say so in the row; off: match the images as they are; FILE: "
         "correct all pairs as `rollcli rig --correction FILE` says.",
@@ -211,7 +212,6 @@ stereo_options = record(
             lambda ctx: ctx.params["vertical_offset"] == "auto",
             "--vertical-offset says how the right image lies",
         ),
-        metavar="auto|off|FILE",
     ),
     option(
         "--vertical-offset",

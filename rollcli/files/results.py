@@ -72,6 +72,11 @@ def json_rows(lines: Iterable[str], path: str | Path) -> Iterator[tuple[int, dic
 _PART = re.compile(r"part-(\d{5,})\.(csv|jsonl|parquet)")
 
 
+def part_name(number: int, ending: str) -> str:
+    """Return the name of a file that belongs to a part."""
+    return f"part-{number:05d}.{ending}"
+
+
 def part_names(names: Iterable[str]) -> list[str]:
     """Return those of the names that are parts, in the order of their rows."""
     numbered = sorted((int(match[1]), name) for name in names if (match := _PART.fullmatch(name)))

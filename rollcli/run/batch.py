@@ -12,7 +12,7 @@ from typing import Any, Literal, NamedTuple
 from rollcli.errors import UsageError
 from rollcli.files.atomic import sync_files
 from rollcli.files.codecs.parquet import encode_parquet
-from rollcli.files.results import Format, column_types, format_header, format_row, run_path
+from rollcli.files.results import Format, column_types, format_header, format_row, part_name, run_path
 from rollcli.files.storage import create, owner_of, write_bytes
 from rollcli.files.stores.locations import is_url, public_name
 from rollcli.run.frame import Frame, FrameResult, ReadAs
@@ -131,7 +131,7 @@ def line_form(form: Format) -> Literal["csv", "jsonl"]:
 
 def part_location(output: str, form: Format, number: int) -> str:
     """Return where a part lies."""
-    return f"{output}/part-{number:05d}.{form}"
+    return f"{output}/{part_name(number, form)}"
 
 
 def check_owned(output: str, run: str) -> None:

@@ -13,12 +13,13 @@ from pathlib import Path
 from typing import NamedTuple
 
 from rollcli.errors import InputError, RollcliError
+from rollcli.files.results import part_name
 from rollcli.files.storage import Note, noting, read_frame, state_of
 from rollcli.files.stores.locations import is_object_url, is_url
 from rollcli.files.stores.objects import list_tags
 from rollcli.run.frame import Frame
 
-_PART_ENDING = ".inputs"
+_PART_ENDING = "inputs"
 _HEX = 16
 _WIDTH = 3 * (_HEX + 1)
 _UNKNOWN = b"-" * _HEX
@@ -32,12 +33,12 @@ def inputs_path(result: str) -> str:
 
 def part_inputs_path(result: str, number: int) -> str:
     """Return where the lines of a part lie."""
-    return f"{inputs_path(result)}/part-{number:05d}{_PART_ENDING}"
+    return f"{inputs_path(result)}/{part_name(number, _PART_ENDING)}"
 
 
 def is_part_inputs(path: str) -> bool:
     """Tell whether a file is named like one with the lines of a part."""
-    return path.endswith(_PART_ENDING)
+    return path.endswith(f".{_PART_ENDING}")
 
 
 def is_inputs(path: str) -> bool:
