@@ -240,11 +240,15 @@ _ALL = MOST_BYTES
 
 
 class _Records(NamedTuple):
-    """Messages of a record (channel, log time, bytes); where the next one begins; whether it is whole."""
+    """Messages of a record (channel, log time, bytes); where the next one begins; whether it is whole.
+
+    `unpacked`: the messages have all their bytes, whichever were wanted.
+    """
 
     messages: list[tuple[int, int, memoryview]]
     after: int
     whole: bool = True
+    unpacked: bool = False
 
 
 class _Chunked:
@@ -255,7 +259,7 @@ class _Chunked:
         self._file = Path(path).open("rb")  # noqa: SIM115 (open as long as the process reads from it)
         self._size = Path(path).stat().st_size
         self._topics: dict[int, Topic] = {}
-        self._chunk = -1, memoryview(b"")
+        self._last = -1, _Records([], -1)  # what was unpacked last, for the next of its messages
 
     def __del__(self) -> None:
         if hasattr(self, "_file"):
@@ -308,15 +312,18 @@ class _Chunked:
         """Read one message."""
         offset, number = place
         try:
-            found = self._record(offset, lambda _, each: _ALL if each == number else 0, at_once=True)
+            at, found = self._last
+            if at != offset:
+                found = self._record(offset, lambda _, each: _ALL if each == number else 0, at_once=True)
+                self._last = (offset, found) if found.unpacked else self._last
             channel, time, data = found.messages[number]
         except _DAMAGED:
             raise InputError(f"{self.path}: there is no whole message at byte {offset}") from None
         topic = self._topics.get(channel)
         return Message(topic.name if topic else "", time, place, data)
 
-    def _content(self, compression: str, offset: int, packed: int, size: int, *, at_once: bool) -> _Source:
-        """Return what the chunk of a record at an offset holds: the file stands at its packed bytes.
+    def _content(self, compression: str, packed: int, size: int, *, at_once: bool) -> _Source:
+        """Return what a chunk holds: the file stands at its packed bytes.
 
         It is unpacked to no more than it claims and its bytes may stand for; `at_once` for messages that are
         read one after the other, and where it is cut off, for what is there of it.
@@ -324,8 +331,6 @@ class _Chunked:
         there = min(packed, self._size - self._file.tell())
         if compression in ("", "none"):
             return _InFile(self._file, there)
-        if at_once and self._chunk[0] == offset:
-            return _InMemory(self._chunk[1])
         if there > MOST_BYTES or not 0 <= size <= most_unpacked(there):
             raise _BrokenError
         at_once = at_once or there < packed
@@ -333,23 +338,23 @@ class _Chunked:
         if not at_once:
             return _Unpacked(unpack, size)
         try:
-            self._chunk = offset, memoryview(unpack(size))
+            return _InMemory(memoryview(unpack(size)))
         except Exception as error:  # each library has errors of its own
             raise _BrokenError from error
-        return _InMemory(self._chunk[1])
 
-    def _walked(self, source: _Source, wanted: _Wanted) -> list[tuple[int, int, memoryview]]:
-        """Return the messages that are whole in it, each with as many bytes as are wanted."""
+    def _walked(self, source: _Source, wanted: _Wanted, size: int, after: int) -> _Records:
+        """Return the messages that are whole in a record of a size, each with as many bytes as are wanted."""
         found: list[tuple[int, int, memoryview]] = []
+        unpacked = isinstance(source, _InMemory)
         with contextlib.suppress(*_DAMAGED):
             while source.left:
                 if (head := self._message(source)) is not None:
                     channel, time, length = head
-                    taken = min(wanted(channel, len(found)), length)
+                    taken = length if unpacked else min(wanted(channel, len(found)), length)
                     data = source.take(taken)
                     source.skip(length - taken)
                     found.append((channel, time, data))
-        return found
+        return _Records(found, after, source.left == 0 and source.size == size, unpacked)
 
     def _start(self) -> int:
         raise NotImplementedError
@@ -398,9 +403,8 @@ class _Mcap(_Chunked):
             size, name_length = struct.unpack("<16xQ4xI", _exactly(self._file, 32))
             compression = _exactly(self._file, name_length + 8)[:-8].decode()
             packed = after - self._file.tell()
-            content = self._content(compression, offset, packed, size, at_once=at_once)
-        found = self._walked(content, wanted)
-        return _Records(found, after, content.left == 0 and content.size == size)
+            content = self._content(compression, packed, size, at_once=at_once)
+        return self._walked(content, wanted, size, after)
 
     def _message(self, source: _Source) -> tuple[int, int, int] | None:
         opcode, length = struct.unpack("<BQ", source.take(9))
@@ -456,9 +460,8 @@ class _Ros1(_Chunked):
         else:
             (size,) = struct.unpack("<I", fields["size"])
             compression = fields["compression"].decode()
-            content = self._content(compression, offset, length, size, at_once=at_once)
-        found = self._walked(content, wanted)
-        return _Records(found, after, content.left == 0 and content.size == size)
+            content = self._content(compression, length, size, at_once=at_once)
+        return self._walked(content, wanted, size, after)
 
     def _message(self, source: _Source) -> tuple[int, int, int] | None:
         fields = _fields(bytes(source.take(*struct.unpack("<I", source.take(4)))))

@@ -257,9 +257,9 @@ def _pixels(image: Any, name: str) -> NDArray[Any]:
     if needed > min(data.size, MOST_BYTES):
         raise InputError(f"{name}: is truncated: {needed} bytes are needed, {data.size} are there")
     require_decoded_fits(width, height, channels * dtype.itemsize, data.size, name)
-    rows = np.lib.stride_tricks.as_strided(data, (height, row), (step, 1), writeable=False)
-    values = np.ascontiguousarray(rows).view(dtype).astype(dtype.newbyteorder("="), copy=False)
-    values = np.require(values, requirements="A")  # a message lies anywhere in its chunk
+    values = np.ndarray((height, width * channels), dtype, data, strides=(step, dtype.itemsize))
+    values = values.astype(dtype.newbyteorder("="), copy=False)
+    values = np.require(values, requirements=["C", "A"])  # a message lies anywhere in its chunk
     if channels > 1:
         values = values.reshape(height, width, channels)[..., :3]
         return np.ascontiguousarray(values[..., ::-1] if encoding.startswith("rgb") else values)
