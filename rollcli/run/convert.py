@@ -142,6 +142,9 @@ def _results(
         partial(_convert, options=told, read=options.frame),  # made here, where relative paths start
         partial(_lost, replaces=running.overwrite),
         lambda each: remove_leftovers(each.writes),
+        prepare=partial(_decode, read=options.frame)
+        if any(each.frame.of_videos for each in conversions)
+        else None,
     )
     try:
         yield from run_tasks(conversions, work, stop, workers)
@@ -154,6 +157,12 @@ def _convert(conversion: Conversion, options: ConvertOptions, read: FrameOptions
     from rollcli.run.convert_frame import convert_frame  # loads NumPy: only on a worker
 
     return convert_frame(conversion, options, read)
+
+
+def _decode(conversion: Conversion, read: FrameOptions) -> Conversion:
+    from rollcli.run.read import decoded
+
+    return conversion._replace(frame=decoded(conversion.frame, read))
 
 
 def _lost(conversion: Conversion, reason: str, replaces: bool) -> FrameResult:

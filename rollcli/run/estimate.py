@@ -38,6 +38,13 @@ def estimate_frame(frame: Frame, options: FrameOptions) -> FrameResult:
     return run_frame(frame, options)
 
 
+def decode_frame(frame: Frame, options: FrameOptions) -> Frame:
+    """Read the views of a frame of videos, for a worker of this machine."""
+    from rollcli.run.read import decoded
+
+    return decoded(frame, options)
+
+
 def lost_frame(frame: Frame, reason: str, options: FrameOptions) -> FrameResult:
     """Make the row of a frame whose worker died, and remove its images of an earlier run."""
     paths = every_path(frame, options.images)
@@ -212,6 +219,7 @@ def _results(step: _Step, run: _Run) -> Iterator[Iterator[Batch]]:
         partial(join_results, options=rows),
         lambda: output.read_as,
         parts.rows if parts else 1,
+        partial(decode_frame, options=told) if any(frame.of_videos for frame in frames) else None,
     )
     sample = (*frames[:1], *frames[-1:])
     shared = SharedPaths(

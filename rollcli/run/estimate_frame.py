@@ -35,7 +35,8 @@ def run_frame(frame: Frame, options: FrameOptions) -> FrameResult:
     paths = every_path(frame, options.images, options.root)
     write_outputs(images, paths, replaces=options.replaces, retry_of=options.retry_of)
     elapsed = 1000 * (time.perf_counter() - start)
-    inputs = inputs_line(frame, notes, options.at) if options.notes else b""
+    noted = {**notes, **(frame.decoded.notes if frame.decoded else {})}
+    inputs = inputs_line(frame, noted, options.at) if options.notes else b""
     return replace(result, row=replace(result.row, elapsed_ms=elapsed), inputs=inputs)
 
 

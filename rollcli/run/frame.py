@@ -2,11 +2,16 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+from rollcli.files.containers import file_of, is_video
 from rollcli.files.results import Row
+from rollcli.files.storage import Note
 from rollcli.messages import one_line, without_secrets
 from rollcli.rig.calibration import Calibration
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +31,8 @@ class Frame:
         The mask file of this frame.
     calibration : Calibration or None
         Of the images as they are in the files; None: without pitch and height.
+    decoded : Decoded or None
+        Its views, where they were read before it was handed out.
     """
 
     file: str
@@ -35,6 +42,7 @@ class Frame:
     relative: str
     mask: str | None
     calibration: Calibration | None = None
+    decoded: "Decoded | None" = field(default=None, compare=False)
 
     def reads(self) -> Iterator[str]:
         """Yield every file that this frame needs."""
@@ -44,9 +52,21 @@ class Frame:
         if self.mask is not None:
             yield self.mask
 
+    @property
+    def of_videos(self) -> bool:
+        """Whether its views are frames of videos, which are decoded in order."""
+        return all(is_video(file_of(path)) for path in (self.path, self.right_path))
+
     def __reduce__(self) -> tuple[type["Frame"], tuple[object, ...]]:
         """Pickle the values alone: what a dataclass with slots does takes five times as long."""
         return Frame, tuple(getattr(self, name) for name in self.__slots__)
+
+
+class Decoded(NamedTuple):
+    """The left and the right view of a frame, and a note of what each location held that was read."""
+
+    views: "tuple[NDArray[Any], NDArray[Any]]"
+    notes: Mapping[str, Note]
 
 
 class Conversion(NamedTuple):

@@ -1,5 +1,6 @@
 """Read a frame: its disparity, from a map or matched from a pair, and the pixels that may be used."""
 
+import contextlib
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -18,10 +19,10 @@ from rollcli.files.codecs.pictures import views_of
 from rollcli.files.encodings import Encoding, read_mask, to_disparity
 from rollcli.files.formats import Stored, read_image, read_stored
 from rollcli.files.results import ALIGNMENT_COLUMNS
-from rollcli.files.storage import state_of
+from rollcli.files.storage import noting, state_of
 from rollcli.messages import one_line
 from rollcli.run.diagnosis import require_positive, too_large
-from rollcli.run.frame import Frame, FrameResult, failed_frame
+from rollcli.run.frame import Decoded, Frame, FrameResult, failed_frame
 from rollcli.run.options import FrameOptions, MethodOptions, RegionOptions
 
 if TYPE_CHECKING:
@@ -260,10 +261,25 @@ def _match(frame: Frame, options: FrameOptions) -> Source:
 
 def read_views(frame: Frame, options: FrameOptions) -> tuple[NDArray[Any], NDArray[Any]]:
     """Read the left and the right view of a pair: of two images, or of one that holds both."""
+    if frame.decoded is not None:
+        return frame.decoded.views
     left = read_image(options.at(frame.path), frame.file)
     if options.side_by_side is not None:
         return views_of(left, options.side_by_side, frame.file)
     return left, read_image(options.at(frame.right_path), frame.right_file)
+
+
+def decoded(frame: Frame, options: FrameOptions) -> Frame:
+    """Read the views of a frame of videos before it is handed out; see `Work.prepare`.
+
+    One that cannot be read stays as it is: the worker that gets it says why.
+    """
+    with contextlib.ExitStack() as reading:
+        reading.enter_context(contextlib.suppress(*FRAME_ERRORS))
+        if frame.of_videos:
+            notes = reading.enter_context(noting()) if options.notes else {}
+            return replace(frame, decoded=Decoded(read_views(frame, options), notes))
+    return frame
 
 
 def matched_source(

@@ -98,6 +98,10 @@ class Work(Generic[Task, Result]):
     unit : int
         Tasks that belong together, counted from the first of all. A chunk is some whole units, or a piece of
         one where that is worth too much time.
+    prepare : callable or None
+        Reads for a task what must be read in the tasks' order, just before another process of this machine
+        gets it. Such a task is large: a chunk is one of them, and few wait. The workers of a cluster read for
+        themselves, for all that they are handed passes through its scheduler.
     """
 
     do: Callable[[Task], Result]
@@ -106,6 +110,7 @@ class Work(Generic[Task, Result]):
     join: Callable[[Any, list[Result]], Sized] = _as_they_are
     tell: Callable[[], Any] = _nothing
     unit: int = 1
+    prepare: Callable[[Task], Task] | None = None
 
     @property
     def longest_s(self) -> float:
@@ -147,12 +152,20 @@ class Chunks(Generic[Task]):
         The size of the first ones.
     unit : int
         See `Work`.
+    prepare : callable, optional
+        See `Work`.
     """
 
-    def __init__(self, tasks: Iterable[Task], first: int = 1, unit: int = 1) -> None:
+    def __init__(
+        self,
+        tasks: Iterable[Task],
+        first: int = 1,
+        unit: int = 1,
+        prepare: Callable[[Task], Task] | None = None,
+    ) -> None:
         self._left = len(tasks) if isinstance(tasks, Sized) else None
-        self._tasks = iter(tasks)
-        self._first, self._unit = first, unit
+        self._tasks = iter(tasks) if prepare is None else map(prepare, tasks)
+        self._first, self._unit, self._one_by_one = first, unit, prepare is not None
         self._seconds, self._done, self._taken = _DOUBT_S, 0.0, 0
 
     def take(self, workers: int, told: Any = None) -> Span[Task]:
@@ -174,6 +187,8 @@ class Chunks(Generic[Task]):
 
     def _size(self, first: int, left: int | None, workers: int) -> int:
         """Choose the size of a chunk from the position of its first task and the number of tasks to come."""
+        if self._one_by_one:
+            return 1
         size, most = self._first, self._unit
         worth = self._done / self._seconds if self.measured else 0.0  # tasks that a second is worth
         if self.measured:

@@ -116,7 +116,8 @@ def in_order(
     A chunk whose worker died is done again in halves: what kills workers is alone in the end. Once `stop` is
     requested, no further task begins; results are yielded up to the first task that was not begun.
     """
-    chunks = Chunks(tasks, executor.threads, work.unit)
+    chunks = Chunks(tasks, executor.threads, work.unit, work.prepare)
+    ahead = _AHEAD if work.prepare is None else _IN_FLIGHT
     in_flight = deque[tuple[Span[Task], Future[Result]]]()
     undone: list[Future[Result]] = []
 
@@ -132,7 +133,7 @@ def in_order(
         undone[:] = [each for each in undone if not each.done()]
         workers = executor.workers
         most = workers * (_IN_FLIGHT if chunks.measured else 1)
-        while not stop.asked and len(undone) < most and len(in_flight) < _AHEAD * workers:
+        while not stop.asked and len(undone) < most and len(in_flight) < ahead * workers:
             chunk = chunks.take(workers, work.tell())
             if not chunk:
                 break

@@ -3,6 +3,7 @@
 import contextlib
 import os
 from collections.abc import Callable, Generator, Iterable, Iterator, Sized
+from dataclasses import replace
 from typing import Any
 
 from rollcli.run.workers.chunks import Result, Span, Task, Work
@@ -35,6 +36,8 @@ def run_joined(
         The cluster cannot do the work, or its scheduler is lost.
     """
     count = len(tasks) if isinstance(tasks, Sized) else None
+    if workers.scheduler is not None:
+        work = replace(work, prepare=None)
     executor = _executor(count, work, workers)
     if executor is None:
         yield from _run_here(tasks, work, stop)

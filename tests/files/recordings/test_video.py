@@ -217,15 +217,16 @@ def test_a_pair_of_videos_of_which_one_is_cut_off_uses_what_both_have(tmp_path, 
 def test_an_interrupted_run_over_a_video_is_resumed_to_the_same_bytes(tmp_path, drive):
     write_video(tmp_path / "drive.mkv", beside(drive[2]))
     given = ["estimate", "drive.mkv", "--side-by-side", "-o", "rolls.csv"]
-    assert rollcli(*given, cwd=tmp_path).status == 0
-    whole = (tmp_path / "rolls.csv").read_bytes()
+    assert rollcli(*given, "-j", "1", cwd=tmp_path).status == 0
+    whole, inputs = ((tmp_path / f"rolls.csv{each}").read_bytes() for each in ("", ".inputs"))
     (tmp_path / "rolls.csv").write_bytes(b"".join(whole.splitlines(keepends=True)[:3]))
     refusal = rollcli(
         "estimate", "drive.mkv", "--side-by-side", "top-bottom", *given[3:], "--resume", cwd=tmp_path
     ).refused()
     assert "side-by-side" in refusal
-    assert rollcli(*given, "--resume", cwd=tmp_path).status == 0
+    assert rollcli(*given, "--resume", "-j", "3", cwd=tmp_path).status == 0
     assert (tmp_path / "rolls.csv").read_bytes() == whole
+    assert (tmp_path / "rolls.csv.inputs").read_bytes() == inputs
 
 
 @pytest.mark.slow

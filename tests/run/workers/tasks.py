@@ -31,9 +31,9 @@ def run(task):
     }[kind](*arguments)
 
 
-def in_order(tasks, executor, stop):
+def in_order(tasks, executor, stop, **of_work):
     """The results one by one."""
-    return chain.from_iterable(ordered.in_order(tasks, Work(run, lost), executor, stop))
+    return chain.from_iterable(ordered.in_order(tasks, Work(run, lost, **of_work), executor, stop))
 
 
 def lost(task, reason):

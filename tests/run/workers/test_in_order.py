@@ -115,6 +115,16 @@ def test_a_slow_chunk_keeps_no_other_worker_waiting_and_not_everything_in_memory
     assert sum(1 for _ in results) == 9_999
 
 
+def test_what_must_be_read_in_order_is_read_here_just_before_a_worker_gets_it():
+    executor, read = FakeExecutor(4, deadly={5}, seconds=1e-3), []
+    results = in_order(range(100), executor, Stop(), prepare=lambda task: read.append(task) or task)
+    for number, result in enumerate(results):
+        assert result == ("lost 5" if number == 5 else f"did {number}")
+        assert len(read) <= number + 3 * 4 + 1  # these are held in memory
+    assert read == list(range(100))
+    assert {len(chunk) for chunk in executor.submitted} == {1}
+
+
 @pytest.mark.parametrize("deadly", [{0}, {517}, {999}, {300, 301, 640}])
 def test_what_kills_workers_is_alone_in_the_end_and_costs_no_other_task(deadly):
     executor = FakeExecutor(2, deadly, seconds=0.005)
