@@ -2,19 +2,7 @@
 
 from dataclasses import dataclass
 
-from rollcli.run.options import (
-    EncodingOptions,
-    FrameOptions,
-    ImageOptions,
-    InputOptions,
-    MethodOptions,
-    RegionOptions,
-    RunningOptions,
-)
-from rollcli.stereo.options import StereoOptions
-
-TURNS_DEG = (-20.0, 20.0, 2.0)
-TIMED = 3
+from rollcli.run.options import EncodingOptions, FrameOptions, InputOptions, RegionOptions, RunningOptions
 
 
 @dataclass(frozen=True)
@@ -36,8 +24,8 @@ class ExperimentOptions:
     """
 
     output: str
-    turns: tuple[float, float, float] = TURNS_DEG
-    timed: int = TIMED
+    turns: tuple[float, float, float] = (-20.0, 20.0, 2.0)
+    timed: int = 3
     truth: str | None = None
     figure: str | None = None
 
@@ -61,7 +49,7 @@ class PaperOptions:
     @property
     def frame(self) -> FrameOptions:
         """How a map is read."""
-        return FrameOptions(self.encoding, StereoOptions(), self.region, MethodOptions(), ImageOptions())
+        return FrameOptions(encoding=self.encoding, region=self.region)
 
     @property
     def has_region(self) -> bool:

@@ -53,13 +53,6 @@ CONVENTIONS = {
     "y": "v cos(theta) - u sin(theta), px; u right, v down, from the centre of the top-left pixel",
 }
 
-# fields whose option has another name
-_OPTION_NAMES = {
-    "tolerance_deg": "tolerance",
-    "max_roll_deg": "max-roll",
-    "max_interval_deg": "max-interval",
-    "mode": "sgbm-mode",
-}
 _REPLACES = "replaces_images"  # while a run with --overwrite is not over
 _NUMBERS = ("scale", "num_disparities", "vertical_offset")  # options that are None by default
 Options = TypeVar("Options", EncodingOptions, ImageOptions, MethodOptions, RegionOptions, StereoOptions)
@@ -150,7 +143,7 @@ def _effective(plan: Plan, options: EstimateOptions) -> dict[str, Any]:
 
 
 def _option_name(field: str) -> str:
-    return _OPTION_NAMES.get(field, field).replace("_", "-")
+    return "sgbm-mode" if field == "mode" else field.removesuffix("_deg").replace("_", "-")
 
 
 def _by_name(options: Options) -> dict[str, Any]:
