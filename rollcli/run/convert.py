@@ -29,7 +29,7 @@ from rollcli.run.progress import Progress
 from rollcli.run.reads_and_writes import check_one_owner, check_places, check_writes, list_files
 from rollcli.run.result_rows import rows_of
 from rollcli.run.workers.chunks import Work
-from rollcli.run.workers.in_order import SharedPaths, Workers
+from rollcli.run.workers.in_order import Workers
 from rollcli.run.workers.interrupt import Stop, stop_on_signals
 from rollcli.run.workers.tasks import require_scheduler, run_tasks
 
@@ -135,8 +135,8 @@ def _results(
     running, folder = options.running, options.output
     sample = (*conversions[:1], *conversions[-1:])
     files = tuple(file_of(path) for each in sample for path in each.frame.reads())
-    shared = SharedPaths(files, (folder,))
-    workers = Workers(running.jobs, running.scheduler, shared, threads=tasks_in_hand((*files, folder)))
+    threads = tasks_in_hand((*files, folder))
+    workers = Workers(running.jobs, running.scheduler, files, (folder,), threads=threads)
     told = replace(options, inputs=InputOptions())  # which may be long
     work = Work(
         partial(_convert, options=told, read=options.frame),  # made here, where relative paths start

@@ -27,7 +27,7 @@ from rollcli.files.results import (
 )
 from rollcli.files.storage import list_names, read_bytes, remove, write_bytes
 from rollcli.files.stores.locations import base_name, is_url, located, public_name
-from rollcli.run.batch import Batch, Parts, Pass, line_form, part_location
+from rollcli.run.batch import Batch, Parts, Step, line_form, part_location
 from rollcli.run.frame import Frame, ReadAs
 from rollcli.run.inputs import Inputs, inputs_path, is_part_inputs, part_inputs_path, split_lines
 from rollcli.run.options import EstimateOptions
@@ -75,20 +75,20 @@ class PartsOutput:
         """How frames were read, as the record says."""
         return self._record.read_as
 
-    def passes(self) -> Iterator[Pass]:
+    def passes(self) -> Iterator[Step]:
         """Yield the frames of parts that are missing before others, then those after all of them."""
-        rows, end = self._part_rows, len(self._plan.frames)
+        rows, every, done = self._part_rows, self._plan.frames, self.kept.count
         holes = [position for hole in self.kept.holes for position in hole]
         missing = [position // rows for position in holes[::rows]]
-        rest = range(self.kept.count, end)
-        for positions, numbers in (
-            (holes, missing),
-            (rest, range(_whole_parts(self.kept.count, rows), _whole_parts(end, rows))),
+        rest = range(done, len(every))
+        for frames, positions, numbers in (
+            ([every[position] for position in holes], holes, missing),
+            (every[done:], rest, range(_whole_parts(done, rows), _whole_parts(len(every), rows))),
         ):
             if positions:
                 self._numbers = iter(numbers)
                 parts = self._parts._replace(numbers=tuple(numbers), frames=len(positions))
-                yield Pass(positions, parts)
+                yield Step(frames, positions, parts)
 
     def append(self, frames: Sequence[Frame], batch: Batch) -> None:
         """Take the rows; every full part is written."""

@@ -6,7 +6,6 @@ import os
 from collections.abc import Iterator, Sequence
 from itertools import chain, islice
 from pathlib import Path
-from typing import Protocol
 
 from rollcli.errors import InputError, UsageError
 from rollcli.files.atomic import is_there, remove_leftovers
@@ -14,68 +13,17 @@ from rollcli.files.locking import not_resumable
 from rollcli.files.results import format_header, parse_rows, read_run, run_path
 from rollcli.files.stores.locations import base_name
 from rollcli.files.stream import STDOUT, STDOUT_NAME, is_stream, open_stream, stdout_descriptor, write_stream
-from rollcli.run.batch import Batch, Pass
+from rollcli.run.batch import Batch, Step
 from rollcli.run.frame import Frame, ReadAs
 from rollcli.run.inputs import Inputs, inputs_data, inputs_path, is_inputs
 from rollcli.run.options import EstimateOptions
 from rollcli.run.outputs import local_images, remove_image_leftovers, remove_marks
-from rollcli.run.parts import kept_in_parts, open_parts
+from rollcli.run.parts import PartsOutput, kept_in_parts, open_parts
 from rollcli.run.plan import Plan
 from rollcli.run.record import RunRecord, is_replaceable_record
 from rollcli.run.result_file import DurableRows, ResultFile, has_rows, kept_rows, open_result, row_lines
 from rollcli.run.resume import KeptRows, arranged, check_restored, new_record
 from rollcli.run.summary import RunSummary
-
-
-class Output(Protocol):
-    """Takes the results of frames in their order.
-
-    Attributes
-    ----------
-    kept : KeptRows
-        What is known of the rows of an interrupted run, which is resumed.
-    keep_open : int or None
-        A descriptor for workers to inherit.
-    resumable : bool
-        Whether an interrupted run can be resumed.
-    notes : bool
-        Whether it keeps what each row was made from.
-    replaces : bool
-        Whether images are replaced that were there before the run: it was begun with --overwrite.
-    read_as : ReadAs
-        How frames were read, as far as the record of the run says so.
-    """
-
-    kept: KeptRows
-    keep_open: int | None
-    resumable: bool
-    notes: bool
-    replaces: bool
-
-    @property
-    def read_as(self) -> ReadAs:
-        """The record knows more with every batch."""
-
-    def passes(self) -> Iterator[Pass]:
-        """Yield the frames to do; each pass begins when the one before has ended."""
-
-    def append(self, frames: Sequence[Frame], batch: Batch) -> None:
-        """Write the next rows, at once or with others after them."""
-
-    def restore(self, frames: Sequence[Frame], batch: Batch) -> None:
-        """Take the images of incomplete frames, which were made again."""
-
-    def replace(self, positions: Sequence[int], frames: Sequence[Frame], batch: Batch) -> None:
-        """Write rows in the place of kept ones, at once or with others after them; positions increase."""
-
-    def commit(self) -> None:
-        """Write every row that was appended or replaces another."""
-
-    def finish(self, summary: RunSummary) -> None:
-        """Say that all rows are written, and what they come to."""
-
-    def hint(self) -> str:
-        """Say how to continue after an error; empty when nothing can be continued."""
 
 
 class StreamOutput:
@@ -91,9 +39,9 @@ class StreamOutput:
         self._descriptor, self._name, self._plan = descriptor, name, plan
         self._write(format_header(plan.format, plan.further))
 
-    def passes(self) -> Iterator[Pass]:
+    def passes(self) -> Iterator[Step]:
         """Yield all frames."""
-        yield Pass(range(len(self._plan.frames)))
+        yield Step(self._plan.frames, range(len(self._plan.frames)))
 
     def append(self, frames: Sequence[Frame], batch: Batch) -> None:
         """Write the rows; they have left this process when this returns."""
@@ -120,7 +68,21 @@ class StreamOutput:
 
 
 class FileOutput:
-    """Rows to a locked file, FILE.inputs and FILE.run.json beside it; images are durable before their row."""
+    """Rows to a locked file, FILE.inputs and FILE.run.json beside it; images are durable before their row.
+
+    Attributes
+    ----------
+    kept : KeptRows
+        What is known of the rows of an interrupted run, which is resumed.
+    keep_open : int or None
+        A descriptor for workers to inherit.
+    resumable : bool
+        Whether an interrupted run can be resumed.
+    notes : bool
+        Whether it keeps what each row was made from.
+    replaces : bool
+        Whether images are replaced that were there before the run: it was begun with --overwrite.
+    """
 
     resumable = notes = True
 
@@ -141,12 +103,13 @@ class FileOutput:
         self._inputs, self._rows = inputs, DurableRows(file, inputs)
         self._replacing: dict[int, tuple[bytes, bytes]] = {}  # rows, and the lines of their inputs
 
-    def passes(self) -> Iterator[Pass]:
+    def passes(self) -> Iterator[Step]:
         """Yield the frames after the rows that are kept."""
-        yield Pass(range(self.kept.count, len(self._plan.frames)))
+        frames = self._plan.frames
+        yield Step(frames[self.kept.count :], range(self.kept.count, len(frames)))
 
     def append(self, frames: Sequence[Frame], batch: Batch) -> None:
-        """Add the rows, after the record knows how their frames were read."""
+        """Add the rows, after the record knows how their frames were read; they may wait for others."""
         self._record.saw(batch.read_as)
         self._rows.append(batch.lines, batch.notes, local_images(frames, batch.figures.status, self._images))
 
@@ -162,7 +125,10 @@ class FileOutput:
         self._rows.restore(local_images(frames, batch.figures.status, self._images))
 
     def replace(self, positions: Sequence[int], frames: Sequence[Frame], batch: Batch) -> None:
-        """Take rows and their images; the file gets them all at once, in `commit`."""
+        """Take rows in the place of kept ones, and their images; positions increase.
+
+        The file gets them all at once, in `commit`.
+        """
         self._record.saw(batch.read_as)
         self._replacing.update(zip(positions, zip(batch.lines, batch.notes, strict=True), strict=True))
         self._rows.restore(local_images(frames, batch.figures.status, self._images))
@@ -186,7 +152,7 @@ class FileOutput:
 
     @property
     def read_as(self) -> ReadAs:
-        """How frames were read, as the record says."""
+        """How frames were read, as the record says; it knows more with every batch."""
         return self._record.read_as
 
     def finish(self, summary: RunSummary) -> None:
@@ -197,6 +163,9 @@ class FileOutput:
         """Say that --resume continues, if rows were written and their file still is there."""
         rows = self.kept.count + self._rows.written
         return f"; {rows} rows are kept, continue with --resume" if rows and self._file.is_there() else ""
+
+
+Output = StreamOutput | FileOutput | PartsOutput
 
 
 @contextlib.contextmanager
