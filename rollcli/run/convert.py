@@ -151,7 +151,7 @@ def _results(
 
 
 def _convert(conversion: Conversion, options: ConvertOptions, read: FrameOptions) -> FrameResult:
-    from rollcli.run.convert_frame import convert_frame  # loads NumPy: only on a worker
+    from rollcli.run.images import convert_frame  # loads NumPy: only on a worker
 
     return convert_frame(conversion, options, read)
 
