@@ -8,8 +8,7 @@ writes.
 
 import contextlib
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterable, Iterator, Sequence
 
 from rollcli.errors import InputError, UsageError
 from rollcli.files.atomic import is_folder, is_there, remove_leftovers, sync_files
@@ -22,7 +21,6 @@ from rollcli.files.results import (
     parse_rows,
     part_names,
     read_parts,
-    read_run,
     run_path,
 )
 from rollcli.files.storage import list_names, read_bytes, remove, write_bytes
@@ -206,7 +204,7 @@ def _begin(plan: Plan, options: EstimateOptions, keep_open: int | None) -> Parts
     # again, now that no other run can write it
     parts = check_parts(plan, resume=options.result.resume, overwrite=options.running.overwrite)
     kept, renewed = _kept(plan, options, parts)
-    record = new_record(plan, options, kept, _earlier(plan) if kept.count else None)
+    record = new_record(plan, options, kept)
     _remove_leftovers(plan, options, parts)
     if options.result.resume or options.running.overwrite:
         remove_image_leftovers(kept.not_failed(), options.images)
@@ -312,13 +310,6 @@ def _rows_of_part(plan: Plan, number: int) -> tuple[Row, ...]:
 
 def _whole_parts(rows: int, part_rows: int) -> int:
     return -(-rows // part_rows)
-
-
-def _earlier(plan: Plan) -> Mapping[str, Any] | None:
-    try:
-        return read_run(plan.output)
-    except InputError as error:
-        raise not_resumable(plan.output, str(error)) from error
 
 
 def _location(plan: Plan, number: int) -> str:

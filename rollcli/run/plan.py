@@ -67,18 +67,18 @@ def make_plan(options: EstimateOptions) -> Plan:
             "--update takes a result in one file of CSV or JSON Lines"
         )
     if options.images.folders():
-        check_one_owner(((frame, _images([frame], options)) for frame in frames), plan.files)
+        check_one_owner(((frame, images_of([frame], options)) for frame in frames), plan.files)
     calibrations = calibration_files(options.calibration)
     check_inputs_are_kept(
         lambda: chain(calibrations, (path for frame in plan.frames for path in frame.reads())),
-        chain(plan.files, _images(plan.frames, options)),
+        chain(plan.files, images_of(plan.frames, options)),
     )
     frames = _shard(frames, options.result)
     check_places(frames, [folder for _, folder in options.images.folders()])
     checked = options.calibration.given or options.pairs.side_by_side is not None
     notes = check_first_size(frames, options.frame) if checked else []
     if not (options.running.overwrite or options.result.resume):
-        check_images_are_new(frames, options)
+        check_nothing_is_there(images_of(frames, options))
     if plan.format == "parquet" and is_stream(plan.output):
         raise UsageError("Parquet is a folder of parts: name it with --output")
     further = further_columns(frames, options.result)
@@ -102,18 +102,7 @@ def _shard(frames: Sequence[Frame], options: ResultOptions) -> Sequence[Frame]:
     return frames[part - 1 :: parts]
 
 
-def check_images_are_new(frames: Iterable[Frame], options: EstimateOptions) -> None:
-    """Check that no image of these frames exists.
-
-    Raises
-    ------
-    UsageError
-        Names the first that does.
-    """
-    check_nothing_is_there(_images(frames, options))
-
-
-def _images(frames: Iterable[Frame], options: EstimateOptions) -> Iterator[str]:
+def images_of(frames: Iterable[Frame], options: EstimateOptions) -> Iterator[str]:
     """Yield every image that may be written; a list of them would take most of our memory."""
     if not options.images.folders():
         return iter(())

@@ -7,8 +7,7 @@ import uuid
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from itertools import islice
-from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 from rollcli import __version__
 from rollcli.errors import InputError
@@ -27,6 +26,7 @@ from rollcli.run.options import (
     RegionOptions,
 )
 from rollcli.run.plan import Plan
+from rollcli.run.result_file import data_of
 from rollcli.run.summary import RunSummary
 from rollcli.stereo.options import StereoOptions
 
@@ -166,11 +166,9 @@ _CALIBRATIONS_LISTED = 3
 
 def is_replaceable_record(path: str) -> bool:
     """Tell whether a new run may write its record here: there is none, or one of an earlier run."""
+    data = data_of(path)
     try:
-        data = Path(path).read_bytes()
         return not data or isinstance(json.loads(data)["rollcli"], str)
-    except OSError:
-        return True  # it does not exist, or writing it will say what is wrong
     except (ValueError, RecursionError, KeyError, TypeError):
         return False
 
@@ -193,23 +191,19 @@ def recorded_options(run: Mapping[str, Any] | None, name: str) -> FrameOptions:
     given = (run or {}).get("options", {})
     if not isinstance(given, Mapping):
         raise InputError(f"{name}: is not the record of a run: its options are no table")
+    layout = given.get("side-by-side")
     try:
+        if layout not in (None, *get_args(Layout)):
+            raise TypeError(f"side-by-side is {layout!r}")
         return FrameOptions(
             encoding=_filled(EncodingOptions(), given),
             method=_filled(MethodOptions(), given),
             stereo=_filled(StereoOptions(), given),
             images=_filled(ImageOptions(), given),
-            side_by_side=_layout(given.get("side-by-side")),
+            side_by_side=layout,
         )
     except (TypeError, ValueError) as error:
         raise InputError(f"{name}: is not the record of a run: {error}") from error
-
-
-def _layout(given: Any) -> Layout | None:
-    layouts: dict[Any, Layout] = {"left-right": "left-right", "top-bottom": "top-bottom"}
-    if given is not None and given not in layouts:
-        raise TypeError(f"side-by-side is {given!r}")
-    return layouts.get(given)
 
 
 def _filled(defaults: Options, given: Mapping[str, Any]) -> Options:

@@ -5,23 +5,30 @@ import io
 import os
 from collections.abc import Iterator, Sequence
 from itertools import chain, islice
-from pathlib import Path
 
 from rollcli.errors import InputError, UsageError
 from rollcli.files.atomic import is_there, remove_leftovers
 from rollcli.files.locking import not_resumable
-from rollcli.files.results import format_header, parse_rows, read_run, run_path
+from rollcli.files.results import format_header, parse_rows, run_path
 from rollcli.files.stores.locations import base_name
 from rollcli.files.stream import STDOUT, STDOUT_NAME, is_stream, open_stream, stdout_descriptor, write_stream
 from rollcli.run.batch import Batch, Step
 from rollcli.run.frame import Frame, ReadAs
-from rollcli.run.inputs import Inputs, inputs_data, inputs_path, is_inputs
+from rollcli.run.inputs import Inputs, inputs_path, is_inputs
 from rollcli.run.options import EstimateOptions
 from rollcli.run.outputs import local_images, remove_image_leftovers, remove_marks
 from rollcli.run.parts import PartsOutput, kept_in_parts, open_parts
 from rollcli.run.plan import Plan
 from rollcli.run.record import RunRecord, is_replaceable_record
-from rollcli.run.result_file import DurableRows, ResultFile, has_rows, kept_rows, open_result, row_lines
+from rollcli.run.result_file import (
+    DurableRows,
+    ResultFile,
+    data_of,
+    has_rows,
+    kept_rows,
+    open_result,
+    row_lines,
+)
 from rollcli.run.resume import KeptRows, arranged, check_restored, new_record
 from rollcli.run.summary import RunSummary
 
@@ -212,20 +219,10 @@ def frames_to_do(plan: Plan, options: EstimateOptions) -> Iterator[Frame]:
         kept = kept_in_parts(plan, options)
     else:
         _check_permitted(plan.output, options)
-        kept = _kept_in_file(plan, options)
+        kept = _parsed(data_of(plan.output) if options.result.resume else b"", plan, options)[1]
     again = (plan.frames[position] for position in kept.again)
     holes = (frame for hole in kept.holes for frame in plan.frames[hole.start : hole.stop])
     return chain(kept.incomplete, again, holes, plan.frames[kept.count :])
-
-
-def _kept_in_file(plan: Plan, options: EstimateOptions) -> KeptRows:
-    if not options.result.resume:
-        return KeptRows(plan, options)
-    try:
-        data = Path(plan.output).read_bytes()
-    except OSError:
-        return KeptRows(plan, options)
-    return _parsed(data, plan, options)[1]
 
 
 def _parsed(data: bytes, plan: Plan, options: EstimateOptions) -> tuple[bytes, KeptRows]:
@@ -234,7 +231,7 @@ def _parsed(data: bytes, plan: Plan, options: EstimateOptions) -> tuple[bytes, K
     if not data:
         return b"", KeptRows(plan, options)
     update, gone = options.result.update, 0
-    inputs = Inputs(inputs_data(inputs_path(plan.output)), updates=update)
+    inputs = Inputs(data_of(inputs_path(plan.output)), updates=update)
     if update:
         data, gone = arranged(data, plan)
     kept = KeptRows(plan, options, parse_rows(data, plan.output), inputs)
@@ -244,15 +241,12 @@ def _parsed(data: bytes, plan: Plan, options: EstimateOptions) -> tuple[bytes, K
 
 
 def _begin(file: ResultFile, inputs: ResultFile, plan: Plan, options: EstimateOptions) -> FileOutput:
-    data, kept = b"", KeptRows(plan, options)
     before = file.read() if options.result.resume else b""
     try:
-        if before:
-            data, kept = _parsed(before, plan, options)
-        earlier = read_run(plan.output) if kept.count else None
+        data, kept = _parsed(before, plan, options)
     except InputError as error:
         raise not_resumable(plan.output, str(error)) from error
-    record = new_record(plan, options, kept, earlier)
+    record = new_record(plan, options, kept)
     if options.result.resume or options.running.overwrite:
         first = 0 if options.result.retry_failed else kept.count
         remove_image_leftovers(kept.not_failed(first), options.images)
