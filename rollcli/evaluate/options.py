@@ -6,6 +6,32 @@ from rollcli.run.options import EncodingOptions, FrameOptions, InputOptions, Reg
 
 
 @dataclass(frozen=True)
+class AccuracyOptions:
+    """Everything that `rollcli evaluate accuracy` was asked.
+
+    Attributes
+    ----------
+    result, truth : str
+        Files: what `rollcli estimate` wrote, and a CSV with `file`, `roll_deg` and, where known, `pitch_deg`
+        and `height_m`.
+    heights : str or None
+        The folder of heights over the road that the run wrote; None: the one that its record names, if it and
+        `heights/` beside the truth exist.
+    output : str
+        A file, or "-" for stdout.
+    format : {"table", "csv", "json"}
+    running : RunningOptions
+    """
+
+    result: str
+    truth: str
+    heights: str | None
+    output: str
+    format: str
+    running: RunningOptions
+
+
+@dataclass(frozen=True)
 class ExperimentOptions:
     """Where the figures go, and what is varied.
 

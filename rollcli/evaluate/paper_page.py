@@ -121,15 +121,9 @@ def _methods_chart(table: Table) -> Chart:
         "p95_deg": ("95th percentile", "diamond", "@c2"),
         "worst_deg": ("worst", "circle-open", "@c5"),
     }
+    hover = {"hovertemplate": "%{x:.4f}°"}
     data = [
-        scatter(
-            name,
-            "markers",
-            table.column(column),
-            names,
-            marker=_mark(colour, 12, symbol),
-            hovertemplate="%{x:.4f}°",
-        )
+        scatter(name, "markers", table.column(column), names, marker=_mark(colour, 12, symbol), **hover)
         for column, (name, symbol, colour) in figures.items()
     ]
     layout = {"xaxis": _error_axis("|Δθ|"), "yaxis": {"autorange": "reversed"}}
