@@ -46,24 +46,16 @@ class PartsOutput:
 
     resumable = notes = True
 
-    def __init__(
-        self,
-        plan: Plan,
-        record: RunRecord,
-        kept: KeptRows,
-        options: EstimateOptions,
-        keep_open: int | None = None,
-    ) -> None:
-        self.kept, self.keep_open = kept, keep_open
-        self._plan, self._record, self._options = plan, record, options
-        self._part_rows = options.result.part_rows
-        self._parts = _parts(plan, record, options)
+    def __init__(self, record: RunRecord, kept: KeptRows, keep_open: int | None) -> None:
+        self.kept, self.keep_open, self.replaces = kept, keep_open, record.replaces
+        self._record, self._plan, self._options = record, record.plan, record.options
+        self._part_rows = record.options.result.part_rows
+        self._parts = _parts(record)
         self._numbers: Iterator[int] = iter(())  # of the parts to come
         # rows and the lines of their inputs, by their positions in the result
         self._replaced_part, self._replacing = 0, dict[int, tuple[bytes, bytes]]()
         self._waiting: list[tuple[bytes, bytes]] = []
-        self.replaces = record.replaces
-        self._image_options = options.images
+        self._image_options = record.options.images
         self._images: list[str] = []  # those of the part that is being filled
         self._checked = time.monotonic()
         self._written = kept.count - sum(map(len, kept.holes))
@@ -194,9 +186,9 @@ def open_parts(plan: Plan, options: EstimateOptions) -> Iterator[PartsOutput]:
             yield _begin(plan, options, descriptor)
 
 
-def _parts(plan: Plan, record: RunRecord, options: EstimateOptions) -> Parts:
-    output = located(options.running.root, plan.output)
-    rows = options.result.part_rows
+def _parts(record: RunRecord) -> Parts:
+    plan, options = record.plan, record.options
+    output, rows = located(options.running.root, plan.output), options.result.part_rows
     return Parts(output, plan.format, plan.further, rows, (), 0, record.run, record.of_rows)
 
 
@@ -218,7 +210,7 @@ def _begin(plan: Plan, options: EstimateOptions, keep_open: int | None) -> Parts
     record.check_owned()  # another run may have begun in this very second
     for path, lines in renewed.items():
         write_bytes(path, lines, durable=True)
-    return PartsOutput(plan, record, kept, options, keep_open)
+    return PartsOutput(record, kept, keep_open)
 
 
 def _remove_leftovers(plan: Plan, options: EstimateOptions, parts: Sequence[str] = ()) -> None:

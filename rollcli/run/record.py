@@ -62,7 +62,7 @@ class RunRecord:
     """The record of one run; the same run gives the same bytes, whether it was interrupted or not."""
 
     def __init__(self, plan: Plan, options: EstimateOptions) -> None:
-        self._output = plan.output
+        self.plan, self.options = plan, options
         self.read_as = ReadAs()
         self.run = uuid.uuid4().hex  # tells our objects from those of another run
         self._begun = False
@@ -79,7 +79,7 @@ class RunRecord:
     def check_owned(self) -> None:
         """Check that no other run has begun since; see `batch.check_owned`."""
         if self._begun:
-            check_owned(self._output, self.run)
+            check_owned(self.plan.output, self.run)
 
     @property
     def of_rows(self) -> dict[str, Any]:
@@ -119,7 +119,7 @@ class RunRecord:
             **({_REPLACES: True} if self.replaces and not summary else {}),
         }
         data = json.dumps(record, indent=2).encode() + b"\n"
-        write_bytes(run_path(self._output), data, durable=True, owner=self.run)
+        write_bytes(run_path(self.plan.output), data, durable=True, owner=self.run)
         self._begun = True
 
 

@@ -93,20 +93,10 @@ class FileOutput:
 
     resumable = notes = True
 
-    def __init__(
-        self,
-        file: ResultFile,
-        inputs: ResultFile,
-        record: RunRecord,
-        plan: Plan,
-        kept: KeptRows,
-        options: EstimateOptions,
-    ) -> None:
-        self.kept = kept
-        self.keep_open: int | None = file.descriptor
-        self.replaces = record.replaces
-        self._file, self._record, self._plan, self._images = file, record, plan, options.images
-        self._updates = options.result.update
+    def __init__(self, file: ResultFile, inputs: ResultFile, record: RunRecord, kept: KeptRows) -> None:
+        self.kept, self.keep_open, self.replaces = kept, file.descriptor, record.replaces
+        self._file, self._record, self._plan = file, record, record.plan
+        self._images, self._updates = record.options.images, record.options.result.update
         self._inputs, self._rows = inputs, DurableRows(file, inputs)
         self._replacing: dict[int, tuple[bytes, bytes]] = {}  # rows, and the lines of their inputs
 
@@ -263,7 +253,7 @@ def _begin(file: ResultFile, inputs: ResultFile, plan: Plan, options: EstimateOp
     record.write()
     if not kept.count:
         file.append(format_header(plan.format, plan.further))
-    return FileOutput(file, inputs, record, plan, kept, options)
+    return FileOutput(file, inputs, record, kept)
 
 
 def _check_permitted(name: str, options: EstimateOptions) -> None:
