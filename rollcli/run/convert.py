@@ -13,7 +13,7 @@ from rollcli.files.results import Row
 from rollcli.files.stores.locations import tasks_in_hand
 from rollcli.messages import say
 from rollcli.run.calibration import check_depth, check_first_size
-from rollcli.run.find import map_frames, pair_frames
+from rollcli.run.find import Named, map_frames, pair_frames
 from rollcli.run.frame import Conversion, Frame, FrameResult, failed_frame
 from rollcli.run.options import (
     ConvertOptions,
@@ -105,9 +105,10 @@ def _check_options(options: ConvertOptions) -> None:
 
 def _find_frames(options: ConvertOptions) -> Sequence[Frame]:
     skip, quiet = [folder for folder, _ in options.writes], options.running.quiet
+    named = Named(options.inputs, calibration=options.calibration, skip=skip, quiet=quiet)
     if isinstance(options, DisparityOptions):
-        return pair_frames(options.inputs, options.pairs, options.topics, skip=skip, quiet=quiet)
-    frames = map_frames(options.inputs, calibration=options.calibration, skip=skip, quiet=quiet)
+        return pair_frames(named._replace(pairs=options.pairs, topics=options.topics))
+    frames = map_frames(named)
     if not isinstance(options, DerotateOptions):
         check_depth(frames, options.encoding)
     return frames

@@ -3,14 +3,13 @@
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
-from typing import Any
 
 from rollcli.errors import UsageError
 from rollcli.files.results import IMAGE_ROLL, TIMING, Format, run_path
 from rollcli.files.stores.locations import is_url
 from rollcli.files.stream import is_stream
 from rollcli.run.calibration import calibration_files, check_depth, check_first_size
-from rollcli.run.find import map_frames, pair_frames
+from rollcli.run.find import Named, map_frames, pair_frames
 from rollcli.run.frame import Frame
 from rollcli.run.inputs import inputs_path
 from rollcli.run.options import EstimateOptions, ResultOptions
@@ -110,7 +109,7 @@ def images_of(frames: Iterable[Frame], options: EstimateOptions) -> Iterator[str
 
 
 def _find_frames(options: EstimateOptions) -> Sequence[Frame]:
-    given, pairs, quiet = options.inputs, options.pairs, options.running.quiet
+    given, quiet = options.inputs, options.running.quiet
     skip = [folder for _, folder in options.images.folders()]
     if not (options.paired or given.inputs or given.files_from):
         raise UsageError(
@@ -118,9 +117,9 @@ def _find_frames(options: EstimateOptions) -> Sequence[Frame]:
         )
     if options.paired and given.sorted:
         raise UsageError("--sorted takes a list of maps, not of pairs")
-    chosen: dict[str, Any] = {"region": options.region, "calibration": options.calibration, "skip": skip}
+    named = Named(given, options.pairs, options.topics, options.region, options.calibration, skip, quiet)
     if options.paired:
-        return pair_frames(given, pairs, options.topics, quiet=quiet, **chosen)
+        return pair_frames(named)
     if options.images.disparity is not None:
         raise UsageError("--disparity writes maps computed from --left and --right; here maps are the input")
-    return map_frames(given, quiet=quiet, **chosen)
+    return map_frames(named)
