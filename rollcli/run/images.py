@@ -209,21 +209,15 @@ def _matrix_text(shape: tuple[int, ...], roll: float, expand: bool) -> bytes:
 
 def _counted(source: Source, of: Conversion, options: VDisparityOptions, paths: Sequence[str]) -> _Made:
     """Draw the v-disparity image of the map, and count for it; or draw the figure of both."""
+    counting: dict[str, Any] = {"bins": options.bins, "max_disparity": options.max_disparity}
     if options.figure is not None:
         from rollcli.pictures.vdisparity_figure import v_disparity_figure  # loads matplotlib, an extra
 
         road: Row | RollEstimate = of.row or estimate_roll(source.disparity)
         theta = math.radians(road.roll_deg or 0.0) if isinstance(road, Row) else road.theta
-        figure = v_disparity_figure(
-            source.disparity,
-            theta,
-            road.alpha,
-            options.figure,
-            bins=options.bins,
-            max_disparity=options.max_disparity,
-        )
+        figure = v_disparity_figure(source.disparity, theta, road.alpha, options.figure, **counting)
         return {paths[0]: figure}, dict(source.warnings)
-    histogram = v_disparity(source.disparity, bins=options.bins, max_disparity=options.max_disparity)
+    histogram = v_disparity(source.disparity, **counting)
     estimate = _sure_estimate(source)
     curve, horizon, likeness = None, None, ""
     if estimate is None:

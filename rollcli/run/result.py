@@ -259,11 +259,11 @@ def _begin(file: ResultFile, inputs: ResultFile, plan: Plan, options: EstimateOp
 def _check_permitted(name: str, options: EstimateOptions) -> None:
     """Refuse to touch a result that exists, unless --resume or --overwrite is given."""
     resume, overwrite = options.result.resume, options.running.overwrite
+    flag = "--update" if options.result.update else "--resume"
     if resume and overwrite:
-        raise UsageError(f"give either {'--update' if options.result.update else '--resume'} or --overwrite")
+        raise UsageError(f"give either {flag} or --overwrite")
     if is_stream(name):
         if resume:
-            flag = "--update" if options.result.update else "--resume"
             raise UsageError(f"{flag} needs a result file: name it with --output")
         return
     if overwrite:
