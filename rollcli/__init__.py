@@ -53,29 +53,7 @@ _HOMES = {
     "read_disparity": "rollcli.files.encodings",
     "v_disparity": "rollcli.pictures.vdisparity",
 }
-__all__ = [
-    "Calibration",
-    "EstimationError",
-    "InputError",
-    "RigAssessment",
-    "RollEstimate",
-    "RollcliError",
-    "StereoOptions",
-    "Tangent",
-    "UsageError",
-    "VDisparity",
-    "__version__",
-    "assess_rig",
-    "compute_disparity",
-    "derotate",
-    "estimate_pair",
-    "estimate_roll",
-    "height_map",
-    "open_recording",
-    "read_calibration",
-    "read_disparity",
-    "v_disparity",
-]
+__all__ = ["__version__", *_HOMES]
 
 
 def __getattr__(name: str) -> "Any":

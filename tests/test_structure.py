@@ -28,7 +28,7 @@ DOORS = {
     "rollcli.report.run": "loads NumPy and the charts once the request is checked",
     "rollcli.run.calibration": "decodes an image, which loads NumPy, only for its size",
     "rollcli.run.convert": "a worker's door",
-    "rollcli.run.convert_frame": "matplotlib, an extra, loads only for figures",
+    "rollcli.run.images": "matplotlib, an extra, loads only for figures",
     "rollcli.run.estimate": "a worker's door",
     "rollcli.run.options": "the command line's help needs no URLs",
     "rollcli.run.read": "loads OpenCV's matcher only for pairs",

@@ -8,8 +8,7 @@ from rollcli.cli.command import command, option, record
 from rollcli.cli.config import config_option
 from rollcli.cli.options import encoding_options, input_options, region_options, running_options
 from rollcli.cli.types import DIR, FILE, PATH, TABLE_FILE, TABLE_FORMATS, TURNS, Choice, Number, table_format
-from rollcli.evaluate.options import ExperimentOptions, PaperOptions
-from rollcli.run.options import RunningOptions
+from rollcli.evaluate.options import AccuracyOptions, ExperimentOptions, PaperOptions
 
 
 @command(
@@ -47,16 +46,7 @@ from rollcli.run.options import RunningOptions
 @running_options
 @config_option
 @click.pass_context
-def accuracy(
-    ctx: click.Context,
-    /,
-    result: str,
-    truth: str,
-    heights: str | None,
-    output: str,
-    running: RunningOptions,
-    **options: Any,
-) -> None:
+def accuracy(ctx: click.Context, /, **options: Any) -> None:
     """Compare the angles of RESULT, which estimate wrote, with known ones; its heights over the road, too.
 
     Frames are matched by the names of their files, without folder and ending. Those without a partner are
@@ -64,8 +54,8 @@ def accuracy(
     """
     from rollcli.evaluate.run_accuracy import run_accuracy
 
-    form = table_format(options["format"], output)
-    ctx.exit(run_accuracy(result, truth, form, output, running, heights))
+    form = table_format(options.pop("format"), options["output"])
+    ctx.exit(run_accuracy(AccuracyOptions(**options, format=form)))
 
 
 experiment_options = record(

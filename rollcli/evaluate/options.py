@@ -2,19 +2,33 @@
 
 from dataclasses import dataclass
 
-from rollcli.run.options import (
-    EncodingOptions,
-    FrameOptions,
-    ImageOptions,
-    InputOptions,
-    MethodOptions,
-    RegionOptions,
-    RunningOptions,
-)
-from rollcli.stereo.options import StereoOptions
+from rollcli.run.options import EncodingOptions, FrameOptions, InputOptions, RegionOptions, RunningOptions
 
-TURNS_DEG = (-20.0, 20.0, 2.0)
-TIMED = 3
+
+@dataclass(frozen=True)
+class AccuracyOptions:
+    """Everything that `rollcli evaluate accuracy` was asked.
+
+    Attributes
+    ----------
+    result, truth : str
+        Files: what `rollcli estimate` wrote, and a CSV with `file`, `roll_deg` and, where known, `pitch_deg`
+        and `height_m`.
+    heights : str or None
+        The folder of heights over the road that the run wrote; None: the one that its record names, if it and
+        `heights/` beside the truth exist.
+    output : str
+        A file, or "-" for stdout.
+    format : {"table", "csv", "json"}
+    running : RunningOptions
+    """
+
+    result: str
+    truth: str
+    heights: str | None
+    output: str
+    format: str
+    running: RunningOptions
 
 
 @dataclass(frozen=True)
@@ -36,8 +50,8 @@ class ExperimentOptions:
     """
 
     output: str
-    turns: tuple[float, float, float] = TURNS_DEG
-    timed: int = TIMED
+    turns: tuple[float, float, float] = (-20.0, 20.0, 2.0)
+    timed: int = 3
     truth: str | None = None
     figure: str | None = None
 
@@ -61,7 +75,7 @@ class PaperOptions:
     @property
     def frame(self) -> FrameOptions:
         """How a map is read."""
-        return FrameOptions(self.encoding, StereoOptions(), self.region, MethodOptions(), ImageOptions())
+        return FrameOptions(encoding=self.encoding, region=self.region)
 
     @property
     def has_region(self) -> bool:

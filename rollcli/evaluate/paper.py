@@ -12,7 +12,7 @@ from rollcli.evaluate.truth import KnownPose, read_truth
 from rollcli.extras import require_extra
 from rollcli.files.matching import stem_of
 from rollcli.files.stream import write_output
-from rollcli.run.find import map_frames
+from rollcli.run.find import Named, map_frames
 from rollcli.run.frame import Frame
 from rollcli.run.progress import Progress
 from rollcli.run.reads_and_writes import check_writes, list_files
@@ -58,7 +58,7 @@ def run_paper(options: PaperOptions) -> ExitStatus:
     if options.encoding.encoding == "depth":
         raise UsageError("--encoding depth: the experiments are made on disparity maps, not on depth maps")
     folder, running = options.experiments.output, options.running
-    frames = map_frames(options.inputs, region=options.region, skip=[folder])
+    frames = map_frames(Named(options.inputs, region=options.region, skip=[folder]))
     truth = _known_angles(frames, options)
     kind = options.experiments.figure
     names = [f"{name}.{kind}" for name in FIGURES.values()] if kind is not None else []

@@ -12,7 +12,7 @@ from rollcli.estimator.request import LAMBDA0
 from rollcli.evaluate.experiments import Findings, Times
 from rollcli.evaluate.options import PaperOptions
 from rollcli.evaluate.tables import DELTAS_DEG, METHOD_NAMES, SOLVER_NAMES, Table
-from rollcli.report.page import Chart, render_page
+from rollcli.report.page import Chart, render_page, scatter
 
 _COLOURS = {"gd": "@c1", "gss": "@c2", "exact": "@c3"}
 _DEGREES = [f"{delta:g}°" for delta in DELTAS_DEG]
@@ -37,16 +37,8 @@ def _error_axis(title: str) -> dict[str, Any]:
 
 
 def _line(name: str, x: Any, y: Any, colour: str, **more: Any) -> dict[str, Any]:
-    return {
-        "type": "scatter",
-        "mode": "lines+markers",
-        "name": name,
-        "x": x,
-        "y": y,
-        "line": {"color": colour, "width": 2},
-        "marker": {"color": colour, "size": 8},
-        **more,
-    }
+    look = {"line": {"color": colour, "width": 2}, "marker": {"color": colour, "size": 8}}
+    return scatter(name, "lines+markers", x, y, **look) | more
 
 
 def _mark(colour: str, size: int, symbol: str) -> dict[str, Any]:
@@ -129,24 +121,14 @@ def _methods_chart(table: Table) -> Chart:
         "p95_deg": ("95th percentile", "diamond", "@c2"),
         "worst_deg": ("worst", "circle-open", "@c5"),
     }
+    hover = {"hovertemplate": "%{x:.4f}°"}
     data = [
-        {
-            "type": "scatter",
-            "mode": "markers",
-            "name": name,
-            "x": table.column(column),
-            "y": names,
-            "marker": _mark(colour, 12, symbol),
-            "hovertemplate": "%{x:.4f}°",
-        }
+        scatter(name, "markers", table.column(column), names, marker=_mark(colour, 12, symbol), **hover)
         for column, (name, symbol, colour) in figures.items()
     ]
-    return Chart(
-        "methods",
-        "Median, 95th percentile and worst error of five methods after known rotations",
-        data,
-        {"xaxis": _error_axis("|Δθ|"), "yaxis": {"autorange": "reversed"}},
-    )
+    layout = {"xaxis": _error_axis("|Δθ|"), "yaxis": {"autorange": "reversed"}}
+    label = "Median, 95th percentile and worst error of five methods after known rotations"
+    return Chart("methods", label, data, layout)
 
 
 _SHOWN = 50  # maps in the page's own list; the CSV has all

@@ -15,14 +15,14 @@ from rollcli.evaluate.accuracy import (
     assess,
     assess_heights,
 )
+from rollcli.evaluate.options import AccuracyOptions
 from rollcli.evaluate.truth import KnownPose, read_truth
 from rollcli.files.atomic import is_folder
 from rollcli.files.matching import stem_of
 from rollcli.files.naming import listed
-from rollcli.files.results import Row, csv_table, read_result, run_path
+from rollcli.files.results import Result, Row, csv_table, read_result, run_path
 from rollcli.files.stream import is_stream, write_output
 from rollcli.messages import say
-from rollcli.run.options import RunningOptions
 from rollcli.run.reads_and_writes import check_writes, list_files
 from rollcli.run.record import recorded_options
 
@@ -115,28 +115,12 @@ def _named(part: Accuracy | HeightsAt | None, names: Iterable[str], before: str,
     }
 
 
-def run_accuracy(
-    result: str,
-    truth: str,
-    form: str,
-    output: str,
-    running: RunningOptions,
-    heights: str | None = None,
-) -> ExitStatus:
+def run_accuracy(options: AccuracyOptions) -> ExitStatus:
     """Compare a result with known angles.
 
     Parameters
     ----------
-    result, truth : str
-        Files: what `rollcli estimate` wrote, and a CSV with `file`, `roll_deg` and, where known, `pitch_deg`
-        and `height_m`.
-    form : {"table", "csv", "json"}
-    output : str
-        A file, or "-" for stdout.
-    running : RunningOptions
-    heights : str, optional
-        The folder of heights over the road that the run wrote; by default the one that its record names, if
-        it and `heights/` beside the truth exist.
+    options : AccuracyOptions
 
     Returns
     -------
@@ -150,33 +134,32 @@ def run_accuracy(
     OutputError
         Exit status 1.
     """
-    writes = [] if is_stream(output) else [output]
+    result, truth, running = options.result, options.truth, options.running
+    writes = [] if is_stream(options.output) else [options.output]
     check_writes([result, truth], writes, overwrite=running.overwrite)
     if running.dry_run:
         list_files([((result, truth), writes)])
         return ExitStatus.DONE
     read, known = read_result(result), read_truth(truth)
-    rows = read.rows
-    found = assess(rows, known, result)
-    beside = truth.rpartition("/")[0] or "."
-    if heights is None:
-        recorded = recorded_options(read.run, run_path(result)).images.heights
-        both = recorded is not None and is_folder(recorded) and is_folder(f"{beside}/heights")
-        heights = recorded if both else None
-    if heights is not None:
-        found = replace(found, heights=_heights(rows, known, heights, beside, running))
-    _name_unmatched(found, result, truth, running)
-    _count_bent(rows, known, truth, running)
-    data = FORMATS[form](found).encode("utf-8", "surrogateescape")
-    write_output(output, data, overwrite=running.overwrite)
+    found = assess(read.rows, known, result)
+    found = replace(found, heights=_heights(read, known, options))
+    if not running.quiet:
+        _name_unmatched(found, options)
+        _count_bent(read.rows, known, truth)
+    data = FORMATS[options.format](found).encode("utf-8", "surrogateescape")
+    write_output(options.output, data, overwrite=running.overwrite)
     return ExitStatus.FRAMES_FAILED if found.no_angle else ExitStatus.DONE
 
 
-def _heights(
-    rows: Sequence[Row], known: Mapping[str, KnownPose], heights: str, beside: str, running: RunningOptions
-) -> tuple[HeightsAt, ...]:
-    found = assess_heights(rows, known, heights, beside)
-    if found is None and not running.quiet:
+def _heights(read: Result, known: Mapping[str, KnownPose], options: AccuracyOptions) -> tuple[HeightsAt, ...]:
+    """Compare the heights over the road of a folder that was named, or of that of the run."""
+    heights, beside = options.heights, options.truth.rpartition("/")[0] or "."
+    if heights is None:
+        heights = recorded_options(read.run, run_path(options.result)).images.heights
+        if heights is None or not (is_folder(heights) and is_folder(f"{beside}/heights")):
+            return ()
+    found = assess_heights(read.rows, known, heights, beside)
+    if found is None and not options.running.quiet:
         say(
             f"{heights}: no heights are compared: they need metres (estimate --calib), and the truth columns "
             "focal_px and baseline_m"
@@ -184,25 +167,21 @@ def _heights(
     return found or ()
 
 
-def _name_unmatched(found: Comparison, result: str, truth: str, running: RunningOptions) -> None:
+def _name_unmatched(found: Comparison, options: AccuracyOptions) -> None:
     """Say which frames could not be compared: the first few by name."""
-    if running.quiet:
-        return
     for names, where, what in (
-        (found.no_angle, truth, f"no angle in {result}"),
-        (found.no_truth, result, f"no known angle in {truth}"),
+        (found.no_angle, options.truth, f"no angle in {options.result}"),
+        (found.no_truth, options.result, f"no known angle in {options.truth}"),
     ):
         if names:
             frames = "1 frame has" if len(names) == 1 else f"{len(names)} frames have"
             say(f"{where}: {frames} {what}: {listed(names)}")
 
 
-def _count_bent(
-    rows: Sequence[Row], known: Mapping[str, KnownPose], truth: str, running: RunningOptions
-) -> None:
+def _count_bent(rows: Sequence[Row], known: Mapping[str, KnownPose], truth: str) -> None:
     """Say how many poses are not compared because the road bends away from that below the camera."""
     posed = (known.get(stem_of(row.file)) for row in rows if row.pitch_deg is not None)
     bent = sum(pose is not None and pose.bends for pose in posed)
-    if bent and not running.quiet:
+    if bent:
         frames = "1 frame, whose road bends" if bent == 1 else f"{bent} frames, whose roads bend"
         say(f"{truth}: pitch and height are not compared on {frames} (curvature_per_m)")

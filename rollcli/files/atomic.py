@@ -173,6 +173,15 @@ def output_error(path: str | Path, error: OSError) -> OutputError:
 
 
 @contextlib.contextmanager
+def writing(path: str | Path) -> Iterator[None]:
+    """Take what the system refuses within the block for a failed write of this file."""
+    try:
+        yield
+    except OSError as error:
+        raise output_error(path, error) from error
+
+
+@contextlib.contextmanager
 def atomic_file(path: str | Path, *, durable: bool = False, replaces: bool = True) -> Iterator[BinaryIO]:
     """Open a binary file that takes its name when the block ends, and vanishes when the block fails.
 
@@ -198,7 +207,7 @@ def atomic_file(path: str | Path, *, durable: bool = False, replaces: bool = Tru
         There is something of this name, at the moment when the block ends, and `replaces` is false.
     """
     target = Path(path)
-    try:
+    with writing(path):
         target.parent.mkdir(parents=True, exist_ok=True)
         if target.is_dir():
             raise OutputError(f"{path}: cannot be written: is a folder")
@@ -220,8 +229,6 @@ def atomic_file(path: str | Path, *, durable: bool = False, replaces: bool = Tru
                 raise
         if durable:
             sync_names([target])
-    except OSError as error:
-        raise output_error(path, error) from error
 
 
 def write_atomic(path: str | Path, data: bytes, *, durable: bool = False, replaces: bool = True) -> None:

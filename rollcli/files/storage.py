@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rollcli.errors import InputError, OutputError
 from rollcli.files import bounded
-from rollcli.files.atomic import NameTakenError, in_threads, output_error, write_atomic
+from rollcli.files.atomic import NameTakenError, in_threads, write_atomic, writing
 from rollcli.files.bounded import MOST_BYTES, too_large
 from rollcli.files.containers import file_of, read_member
 from rollcli.files.stores import objects
@@ -315,10 +315,8 @@ def remove(location: str) -> None:
         _require_writable(location)
         objects.remove_object(location)
         return
-    try:
+    with writing(location):
         Path(location).unlink(missing_ok=True)
-    except OSError as error:
-        raise output_error(location, error) from error
 
 
 def remove_all(locations: Iterable[str]) -> None:

@@ -7,7 +7,7 @@ import uuid
 from pathlib import Path
 
 from rollcli.errors import OutputError, UsageError
-from rollcli.files.atomic import output_error, remove_leftovers
+from rollcli.files.atomic import output_error, remove_leftovers, writing
 from rollcli.files.storage import create, write_bytes
 
 STDOUT = "-"  # how the command line names it
@@ -70,10 +70,8 @@ def open_stream(name: str) -> int:
     OutputError
         It cannot be written.
     """
-    try:
+    with writing(name):
         return os.open(name, os.O_WRONLY)
-    except OSError as error:
-        raise output_error(name, error) from error
 
 
 def write_stdout(data: bytes) -> None:

@@ -31,7 +31,8 @@ def draw_disparity(disparity: NDArray[Any]) -> NDArray[np.uint8]:
     ndarray of uint8, shape (H, W, 3)
         BGR.
     """
-    return _coloured(_levels(disparity), _colours())
+    colours = _colours().reshape(256, 1, 3)
+    return cv2.applyColorMap(_levels(disparity), colours).astype(np.uint8, copy=False)
 
 
 def draw_road(disparity: NDArray[Any], mask: NDArray[Any]) -> NDArray[np.uint8]:
@@ -49,13 +50,7 @@ def draw_road(disparity: NDArray[Any], mask: NDArray[Any]) -> NDArray[np.uint8]:
     ndarray of uint8, shape (H, W, 3)
         BGR.
     """
-    levels = _levels(disparity)
-    road = (np.asarray(mask) != 0).astype(np.uint8)
-    colours = _colours()
-    tinted = (colours * (1 - _TINT) + np.array(_ROAD) * _TINT).astype(np.uint8)
-    picture = _coloured(levels, colours)
-    cv2.copyTo(_coloured(levels, tinted), road, picture)
-    return _outlined(picture, road)
+    return _with_road(draw_disparity(disparity), mask)
 
 
 def draw_road_on_photo(photo: NDArray[Any], mask: NDArray[Any]) -> NDArray[np.uint8]:
@@ -73,10 +68,8 @@ def draw_road_on_photo(photo: NDArray[Any], mask: NDArray[Any]) -> NDArray[np.ui
     ndarray of uint8, shape (H', W', 3)
         BGR.
     """
-    road = (np.asarray(mask) != 0).astype(np.uint8)
-    picture = as_bgr(photo, (road.shape[1], road.shape[0]))
-    tinted = (picture * (1 - _TINT) + np.array(_ROAD) * _TINT).astype(np.uint8)
-    return _outlined(cv2.copyTo(tinted, road, picture).astype(np.uint8, copy=False), road)
+    height, width = np.shape(mask)
+    return _with_road(as_bgr(photo, (width, height)), mask)
 
 
 def draw_preview(disparity: NDArray[Any]) -> NDArray[np.uint8]:
@@ -138,7 +131,11 @@ def with_bar(
     return np.hstack([picture, bar])
 
 
-def _outlined(picture: NDArray[np.uint8], road: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def _with_road(picture: NDArray[np.uint8], mask: NDArray[Any]) -> NDArray[np.uint8]:
+    """Tint and outline the road in a picture, BGR."""
+    road = (np.asarray(mask) != 0).astype(np.uint8)
+    tint = np.arange(256)[:, None] * (1 - _TINT) + np.array(_ROAD) * _TINT
+    cv2.copyTo(cv2.LUT(picture, tint.astype(np.uint8).reshape(256, 1, 3)), road, picture)
     outlines, _ = cv2.findContours(road, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     return cv2.drawContours(picture, outlines, -1, _ROAD, 1).astype(np.uint8, copy=False)
 
@@ -161,10 +158,6 @@ def _levels(disparity: NDArray[Any]) -> NDArray[np.uint8]:
             valid, np.clip(np.where(valid, some, 0) * (255 / top), 1, 255), 0
         )
     return levels
-
-
-def _coloured(levels: NDArray[np.uint8], colours: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    return cv2.applyColorMap(levels, colours.reshape(256, 1, 3)).astype(np.uint8, copy=False)
 
 
 def _colours() -> NDArray[np.uint8]:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from rollcli.files.results import Row
 from rollcli.pictures.round_step import round_step
 from rollcli.report.options import ALIGNED, HISTOGRAM, chart_names
-from rollcli.report.page import Chart
+from rollcli.report.page import Chart, scatter
 from rollcli.report.summary import degrees, with_interval
 from rollcli.rig.drive.assess import RigAssessment, seconds_of
 from rollcli.rig.quantities import ALIGNMENT, HEIGHT, QUANTITIES, ROLL, Quantity
@@ -140,8 +140,7 @@ def rig_traces(
 
 
 def _trace(name: str) -> Trace:
-    labels = {"text": [], "hovertemplate": "%{text}<extra></extra>"}
-    return {"type": "scatter", "mode": "lines", "name": name, "x": [], "y": [], **labels}
+    return scatter(name, "lines", [], [], text=[], hovertemplate="%{text}<extra></extra>")
 
 
 def _add(trace: Trace, x: Sequence[float], y: Sequence[float], text: str) -> None:
@@ -482,17 +481,9 @@ def _band(values: Values, starts: Set[int]) -> Trace:
         x += [*along, *reversed(along), None]
         y += [round(value + half, 4) for value, half in ends]
         y += [*(round(value - half, 4) for value, half in reversed(ends)), None]
-    return {
-        "type": "scatter",
-        "mode": "lines",
-        "name": "95 % interval",
-        "x": x,
-        "y": y,
-        "fill": "toself",
-        "fillcolor": "@band",
-        "line": {"color": "@band", "width": 1},  # a frame alone is seen too
-        "hoverinfo": "skip",
-    }
+    line = {"color": "@band", "width": 1}  # a frame alone is seen too
+    look = {"fill": "toself", "fillcolor": "@band", "line": line, "hoverinfo": "skip"}
+    return scatter("95 % interval", "lines", x, y, **look)
 
 
 def _stretches(values: Values, starts: Set[int]) -> list[Values]:

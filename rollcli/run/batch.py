@@ -53,7 +53,7 @@ class Batch:
 
 
 class Parts(NamedTuple):
-    """Where the rows of a pass over frames go that are written in parts.
+    """Where the rows of a step go that are written in parts.
 
     Attributes
     ----------
@@ -65,9 +65,9 @@ class Parts(NamedTuple):
     rows : int
         Of each part but the last one of a result.
     numbers : sequence of int
-        The parts of the pass, in order.
+        The parts of the step, in order.
     frames : int
-        How many frames the pass has.
+        How many frames the step has.
     run : str
         The run's own name, which objects carry.
     of_rows : mapping
@@ -109,19 +109,24 @@ class Parts(NamedTuple):
         return header + b"".join(lines)
 
 
-class Pass(NamedTuple):
+class Step(NamedTuple):
     """Frames that workers do in one go.
 
     Attributes
     ----------
+    frames : sequence of Frame
     positions : sequence of int
-        Of their rows in the result, increasing.
+        Of their rows in the result, increasing; none where the images of kept rows are made again.
     parts : Parts or None
         Where their rows go, in parts.
+    retry_of : str
+        See `FrameOptions`; empty unless the rows take the place of kept ones.
     """
 
-    positions: Sequence[int]
+    frames: Sequence[Frame]
+    positions: Sequence[int] = ()
     parts: Parts | None = None
+    retry_of: str = ""
 
 
 def line_form(form: Format) -> Literal["csv", "jsonl"]:

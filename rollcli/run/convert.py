@@ -13,7 +13,7 @@ from rollcli.files.results import Row
 from rollcli.files.stores.locations import tasks_in_hand
 from rollcli.messages import say
 from rollcli.run.calibration import check_depth, check_first_size
-from rollcli.run.find import map_frames, pair_frames
+from rollcli.run.find import Named, map_frames, pair_frames
 from rollcli.run.frame import Conversion, Frame, FrameResult, failed_frame
 from rollcli.run.options import (
     ConvertOptions,
@@ -29,7 +29,7 @@ from rollcli.run.progress import Progress
 from rollcli.run.reads_and_writes import check_one_owner, check_places, check_writes, list_files
 from rollcli.run.result_rows import rows_of
 from rollcli.run.workers.chunks import Work
-from rollcli.run.workers.in_order import SharedPaths, Workers
+from rollcli.run.workers.in_order import Workers
 from rollcli.run.workers.interrupt import Stop, stop_on_signals
 from rollcli.run.workers.tasks import require_scheduler, run_tasks
 
@@ -105,9 +105,10 @@ def _check_options(options: ConvertOptions) -> None:
 
 def _find_frames(options: ConvertOptions) -> Sequence[Frame]:
     skip, quiet = [folder for folder, _ in options.writes], options.running.quiet
+    named = Named(options.inputs, calibration=options.calibration, skip=skip, quiet=quiet)
     if isinstance(options, DisparityOptions):
-        return pair_frames(options.inputs, options.pairs, options.topics, skip=skip, quiet=quiet)
-    frames = map_frames(options.inputs, calibration=options.calibration, skip=skip, quiet=quiet)
+        return pair_frames(named._replace(pairs=options.pairs, topics=options.topics))
+    frames = map_frames(named)
     if not isinstance(options, DerotateOptions):
         check_depth(frames, options.encoding)
     return frames
@@ -135,8 +136,8 @@ def _results(
     running, folder = options.running, options.output
     sample = (*conversions[:1], *conversions[-1:])
     files = tuple(file_of(path) for each in sample for path in each.frame.reads())
-    shared = SharedPaths(files, (folder,))
-    workers = Workers(running.jobs, running.scheduler, shared, threads=tasks_in_hand((*files, folder)))
+    threads = tasks_in_hand((*files, folder))
+    workers = Workers(running.jobs, running.scheduler, files, (folder,), threads=threads)
     told = replace(options, inputs=InputOptions())  # which may be long
     work = Work(
         partial(_convert, options=told, read=options.frame),  # made here, where relative paths start
@@ -154,7 +155,7 @@ def _results(
 
 
 def _convert(conversion: Conversion, options: ConvertOptions, read: FrameOptions) -> FrameResult:
-    from rollcli.run.convert_frame import convert_frame  # loads NumPy: only on a worker
+    from rollcli.run.images import convert_frame  # loads NumPy: only on a worker
 
     return convert_frame(conversion, options, read)
 

@@ -2,7 +2,7 @@
 
 import contextlib
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from functools import partial
 from itertools import islice
 from typing import Any, NamedTuple
@@ -11,7 +11,7 @@ from rollcli.errors import ClusterError, ExitStatus, OutputError, WorkerError
 from rollcli.files.atomic import is_file
 from rollcli.files.containers import file_of
 from rollcli.files.stores.locations import is_url, tasks_in_hand
-from rollcli.run.batch import Batch, BatchOptions, Parts, join_results, line_form
+from rollcli.run.batch import Batch, BatchOptions, Step, join_results, line_form
 from rollcli.run.calibration import calibration_files, calibration_notes
 from rollcli.run.frame import Frame, FrameResult, failed_frame
 from rollcli.run.options import EstimateOptions, FrameOptions
@@ -21,7 +21,7 @@ from rollcli.run.progress import Progress
 from rollcli.run.reads_and_writes import list_files
 from rollcli.run.result import Output, frames_to_do, open_output
 from rollcli.run.workers.chunks import Work
-from rollcli.run.workers.in_order import SharedPaths, Workers
+from rollcli.run.workers.in_order import Workers
 from rollcli.run.workers.interrupt import Stop, stop_on_signals
 from rollcli.run.workers.tasks import require_scheduler, run_joined, started_early
 
@@ -129,27 +129,7 @@ class _Run(NamedTuple):
     started: list[Any]
 
 
-class _Step(NamedTuple):
-    """Frames that workers do in one go.
-
-    Attributes
-    ----------
-    frames : sequence of Frame
-    positions : sequence of int
-        Of their rows in the result; none where the images of kept rows are made again.
-    parts : Parts or None
-        See `Pass`.
-    retry_of : str
-        See `FrameOptions`; empty unless the rows take the place of kept ones.
-    """
-
-    frames: Sequence[Frame]
-    positions: Sequence[int] = ()
-    parts: Parts | None = None
-    retry_of: str = ""
-
-
-def _steps(run: _Run) -> Iterator[_Step]:
+def _steps(run: _Run) -> Iterator[Step]:
     """Yield what is to do: images that kept rows should have, rows that are done again, then all others.
 
     A result takes rows in the place of others once the workers have ended, which hold the lock of the file
@@ -159,16 +139,12 @@ def _steps(run: _Run) -> Iterator[_Step]:
     if kept.incomplete:
         missing = len(kept.incomplete)
         run.progress.note(f"images are missing or empty for {missing} of the kept rows: they are made again")
-        yield _Step(kept.incomplete)
+        yield Step(kept.incomplete)
     name = result if is_url(result) else os.path.realpath(result)  # whichever folder it is resumed from
     for first in range(0, len(kept.again), _RETRIED_AT_ONCE):
         again = kept.again[first : first + _RETRIED_AT_ONCE]
-        yield _Step([every[position] for position in again], again, retry_of=name)
-    for positions, parts in run.output.passes():
-        if isinstance(positions, range):
-            yield _Step(every[positions.start : positions.stop], positions, parts)
-        else:
-            yield _Step([every[position] for position in positions], positions, parts)
+        yield Step([every[position] for position in again], again, retry_of=name)
+    yield from run.output.passes()
 
 
 def _run_steps(run: _Run) -> None:
@@ -200,7 +176,7 @@ def _run_steps(run: _Run) -> None:
 
 
 @contextlib.contextmanager
-def _results(step: _Step, run: _Run) -> Iterator[Iterator[Batch]]:
+def _results(step: Step, run: _Run) -> Iterator[Iterator[Batch]]:
     """Open the results of a step from whichever workers were asked for; the output is complete afterwards."""
     options, output, frames, parts = run.options, run.output, step.frames, step.parts
     told = options.frame._replace(replaces=output.replaces, retry_of=step.retry_of, notes=output.notes)
@@ -222,13 +198,16 @@ def _results(step: _Step, run: _Run) -> Iterator[Iterator[Batch]]:
         partial(decode_frame, options=told) if any(frame.of_videos for frame in frames) else None,
     )
     sample = (*frames[:1], *frames[-1:])
-    shared = SharedPaths(
-        files=tuple(file_of(path) for frame in sample for path in frame.reads()),
-        folders=tuple(folder for _, folder in options.images.folders()) + ((parts.output,) if parts else ()),
-    )
-    threads = tasks_in_hand((*shared.files, *(folder for _, folder in options.images.folders())))
+    files = tuple(file_of(path) for frame in sample for path in frame.reads())
+    folders = tuple(folder for _, folder in options.images.folders())
     workers = Workers(
-        options.running.jobs, options.running.scheduler, shared, output.keep_open, threads, run.started
+        options.running.jobs,
+        options.running.scheduler,
+        files,
+        (*folders, parts.output) if parts else folders,
+        output.keep_open,
+        tasks_in_hand((*files, *folders)),
+        run.started,
     )
     try:
         with contextlib.closing(run_joined(frames, work, run.stop, workers)) as results:

@@ -5,7 +5,7 @@ import os
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path, PurePath
-from typing import TYPE_CHECKING, TypedDict, overload
+from typing import TYPE_CHECKING, NamedTuple, TypedDict, overload
 
 from rollcli.errors import UsageError
 from rollcli.extras import require_extra
@@ -24,36 +24,50 @@ if TYPE_CHECKING:
     from rollcli.files.recordings.frames import BagFrames, RecordingFrame
 
 
-def map_frames(
-    given: InputOptions,
-    *,
-    region: RegionOptions | None = None,
-    calibration: CalibrationOptions | None = None,
-    skip: Sequence[str] = (),
-    quiet: bool = True,
-) -> Sequence[Frame]:
-    """Make a frame of each map; `skip` holds the output folders, which are not searched.
+class Named(NamedTuple):
+    """What a user named: where frames are, and what belongs to them.
 
-    Unless `quiet`, a line says what the folders hold beside what is read.
+    Attributes
+    ----------
+    inputs, pairs, topics, region, calibration
+        See `EstimateOptions`.
+    skip : sequence of str
+        The output folders, which are not searched.
+    quiet : bool
+        Whether no line says what the folders hold beside what is read.
+    """
+
+    inputs: InputOptions
+    pairs: PairOptions = PairOptions()
+    topics: TopicOptions = TopicOptions()
+    region: RegionOptions = RegionOptions()
+    calibration: CalibrationOptions = CalibrationOptions()
+    skip: Sequence[str] = ()
+    quiet: bool = True
+
+
+def map_frames(named: Named) -> Sequence[Frame]:
+    """Make a frame of each map.
 
     Raises
     ------
     UsageError
         Nothing is named or found, a mask or a calibration is missing, or names are not sorted that should be.
     """
+    given = named.inputs
     if given.sorted:
-        return _sorted_frames(given, region, calibration)
+        return _sorted_frames(named)
     if not (given.inputs or given.files_from):
         raise UsageError("no input: name maps (files, folders, patterns, or - for a list on stdin)")
-    make = _FrameMaker(region, calibration)
+    make = _FrameMaker(named)
     if bags := _bags(given):
         from rollcli.files.recordings.frames import maps_of_bag
 
         found_maps = [maps_of_bag(files, name, given.topic) for name, files in bags]
-        return _bag_frames(found_maps, make, quiet=quiet)[:: given.every]
+        return _bag_frames(found_maps, make)[:: given.every]
     if given.topic is not None:
         raise UsageError("--topic is of a bag (.bag, .db3, .mcap or a rosbag2 folder), and none is given")
-    with _searched(given, skip, quiet=quiet) as searched:
+    with _searched(named) as searched:
         found = find_inputs(given.inputs, files_from=given.files_from, maps=True, **searched)
     if video := next((each.name for each in found if is_video(each.location)), None):
         raise UsageError(
@@ -74,13 +88,13 @@ class _Searched(TypedDict):
 
 
 @contextlib.contextmanager
-def _searched(given: InputOptions, skip: Sequence[str], *, quiet: bool) -> Iterator[_Searched]:
+def _searched(named: Named) -> Iterator[_Searched]:
     """Say, once the search is over, what it has noted."""
-    searched = _Searched(
-        recursive=given.recursive, include=given.include, exclude=given.exclude, skip=skip, notes=[]
+    given, notes = named.inputs, list[str]()
+    yield _Searched(
+        recursive=given.recursive, include=given.include, exclude=given.exclude, skip=named.skip, notes=notes
     )
-    yield searched
-    _say(searched["notes"], quiet=quiet)
+    _say(notes, quiet=named.quiet)
 
 
 def _say(notes: Iterable[str], *, quiet: bool) -> None:
@@ -88,14 +102,13 @@ def _say(notes: Iterable[str], *, quiet: bool) -> None:
         say(note)
 
 
-def _sorted_frames(
-    given: InputOptions, region: RegionOptions | None, calibration: CalibrationOptions | None
-) -> "SortedFrames":
+def _sorted_frames(named: Named) -> "SortedFrames":
+    given = named.inputs
     if given.inputs or given.files_from is None or given.files_from == "-" or is_url(given.files_from):
         raise UsageError("--sorted takes the names of one file on disk: give --files-from FILE and no input")
     manifest = Manifest(given.files_from)
     places = range(0, len(manifest), given.every)
-    return SortedFrames(manifest, _FrameMaker(region, calibration), places)
+    return SortedFrames(manifest, _FrameMaker(named), places)
 
 
 class SortedFrames(Sequence[Frame]):
@@ -123,19 +136,8 @@ class SortedFrames(Sequence[Frame]):
         return SortedFrames(self._manifest, self._make, self._places[index])
 
 
-def pair_frames(
-    given: InputOptions,
-    pairs: PairOptions,
-    topics: TopicOptions,
-    *,
-    region: RegionOptions | None = None,
-    calibration: CalibrationOptions | None = None,
-    skip: Sequence[str] = (),
-    quiet: bool = True,
-) -> list[Frame]:
+def pair_frames(named: Named) -> list[Frame]:
     """Make a frame of each stereo pair: of two places, of topics of bags, or of images that hold both views.
-
-    `skip` holds the output folders, which are not searched.
 
     Raises
     ------
@@ -143,25 +145,26 @@ def pair_frames(
         Pairs are named in no way, or in several; a side is missing, an image has no partner, or a mask or a
         calibration is missing.
     """
-    named = bool(given.inputs or given.files_from)
+    given, pairs, topics = named.inputs, named.pairs, named.topics
+    has_inputs = bool(given.inputs or given.files_from)
     sides, views = (pairs.left, pairs.right), (topics.left_topic, topics.right_topic)
     ways = [any(sides), any(views), pairs.side_by_side is not None]
-    if named and ways == [True, False, False]:
+    if has_inputs and ways == [True, False, False]:
         raise UsageError("give either maps, or pairs by --left and --right")
-    if named and not any(ways):
+    if has_inputs and not any(ways):
         raise UsageError(
             f"{' '.join(given.inputs[:2])}: images are given by --left and --right; with --side-by-side, or "
             "--left-topic and --right-topic, INPUTS are images, videos or bags"
         )
-    if sum(ways) != 1 or named is any(sides):
+    if sum(ways) != 1 or has_inputs is any(sides):
         raise UsageError(
             "name pairs in one way: --left and --right alone; or INPUTS, with --left-topic and --right-topic "
             "for bags, or --side-by-side for images and videos that hold both views"
         )
-    make = _FrameMaker(region, calibration)
+    make = _FrameMaker(named)
     if any(views):
-        return _bag_pairs(given, topics, make, quiet=quiet)[:: given.every]
-    with _searched(given, skip, quiet=quiet) as searched:
+        return _bag_pairs(named, make)[:: given.every]
+    with _searched(named) as searched:
         if pairs.side_by_side is not None:
             endings = (*IMAGE_ENDINGS, *VIDEOS)
             found = find_inputs(given.inputs, files_from=given.files_from, endings=endings, **searched)
@@ -208,20 +211,20 @@ def _require_local(location: str) -> None:
         raise UsageError(f"{public_name(location)}: recordings are read from local disk: download it first")
 
 
-def _bag_pairs(given: InputOptions, topics: TopicOptions, make: "_FrameMaker", *, quiet: bool) -> list[Frame]:
-    left, right = topics.left_topic, topics.right_topic
+def _bag_pairs(named: Named, make: "_FrameMaker") -> list[Frame]:
+    left, right = named.topics.left_topic, named.topics.right_topic
     if left is None or right is None:
         raise UsageError("--left-topic and --right-topic are given together")
-    bags = _bags(given)
+    bags = _bags(named.inputs)
     if not bags:
         raise UsageError(
             "--left-topic and --right-topic are of a bag: name a .bag, .db3, .mcap or rosbag2 folder"
         )
     from rollcli.files.recordings.frames import pairs_of_bag
 
-    tolerance = round(topics.sync_tolerance * 1e6)
+    tolerance = round(named.topics.sync_tolerance * 1e6)
     found = [pairs_of_bag(files, name, left, right, tolerance) for name, files in bags]
-    return _bag_frames(found, make, quiet=quiet)
+    return _bag_frames(found, make)
 
 
 def _bags(given: InputOptions) -> list[tuple[str, list[str]]]:
@@ -245,10 +248,10 @@ def _bags(given: InputOptions) -> list[tuple[str, list[str]]]:
     return bags
 
 
-def _bag_frames(bags: "Iterable[BagFrames]", make: "_FrameMaker", *, quiet: bool) -> list[Frame]:
+def _bag_frames(bags: "Iterable[BagFrames]", make: "_FrameMaker") -> list[Frame]:
     frames = []
     for bag in bags:
-        _say(bag.notes, quiet=quiet)
+        _say(bag.notes, quiet=make.quiet)
         for pair in bag.frames:
             left, right = (each and _recorded(each) for each in pair)
             if left is not None:
@@ -261,9 +264,9 @@ def _bag_frames(bags: "Iterable[BagFrames]", make: "_FrameMaker", *, quiet: bool
 class _FrameMaker:
     """Makes frames, with the masks and calibrations that were named: one for all, or one of each stem."""
 
-    def __init__(self, region: RegionOptions | None, calibration: CalibrationOptions | None) -> None:
-        self.calibrations = Calibrations(calibration or CalibrationOptions())
-        self._mask = region.mask if region else None
+    def __init__(self, named: Named) -> None:
+        self.calibrations, self.quiet = Calibrations(named.calibration), named.quiet
+        self._mask = named.region.mask
         self._masks: dict[str, str] | None = None
         if self._mask is not None and is_place(self._mask):
             found = find_inputs([self._mask], recursive=True)

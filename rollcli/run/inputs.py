@@ -9,7 +9,6 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from functools import lru_cache
 from hashlib import blake2b
-from pathlib import Path
 from typing import NamedTuple
 
 from rollcli.errors import InputError, RollcliError
@@ -18,6 +17,7 @@ from rollcli.files.storage import Note, noting, read_frame, state_of
 from rollcli.files.stores.locations import is_object_url, is_url
 from rollcli.files.stores.objects import list_tags
 from rollcli.run.frame import Frame
+from rollcli.run.result_file import data_of
 
 _PART_ENDING = "inputs"
 _HEX = 16
@@ -43,7 +43,7 @@ def is_part_inputs(path: str) -> bool:
 
 def is_inputs(path: str) -> bool:
     """Tell whether a new run may write its lines here: there is no file, an empty one, or one of a run."""
-    data = inputs_data(path, _WIDTH)
+    data = data_of(path, _WIDTH)
     return _LINE.match(data) is not None if data else True
 
 
@@ -196,12 +196,3 @@ class Inputs:
             except RollcliError:  # it may not be listed: then its objects are read
                 self._tags = {folder: {}}
         return self._tags[folder].get(path, "")
-
-
-def inputs_data(path: str, most: int = -1) -> bytes:
-    """Read the lines of a result in one file; none where there is no file."""
-    try:
-        with Path(path).open("rb") as file:
-            return file.read(most)
-    except OSError:  # it does not exist, or opening it for writing will say what is wrong
-        return b""

@@ -131,16 +131,10 @@ class MethodOptions(NamedTuple):
     seed: int = 0
 
     def arguments(self) -> dict[str, Any]:
-        """Return the arguments that `estimate_roll` takes."""
+        """Return the arguments that `estimate_roll` takes: what is in degrees here is in radians there."""
         return {
-            "method": self.method,
-            "model": self.model,
-            "road": self.road,
-            "lambda0": self.lambda0,
-            "tolerance": math.radians(self.tolerance_deg),
-            "max_roll": math.radians(self.max_roll_deg),
-            "max_interval": math.radians(self.max_interval_deg),
-            "seed": self.seed,
+            name.removesuffix("_deg"): math.radians(value) if name.endswith("_deg") else value
+            for name, value in self._asdict().items()
         }
 
 

@@ -8,8 +8,7 @@ writes.
 
 import contextlib
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterable, Iterator, Sequence
 
 from rollcli.errors import InputError, UsageError
 from rollcli.files.atomic import is_folder, is_there, remove_leftovers, sync_files
@@ -22,12 +21,11 @@ from rollcli.files.results import (
     parse_rows,
     part_names,
     read_parts,
-    read_run,
     run_path,
 )
 from rollcli.files.storage import list_names, read_bytes, remove, write_bytes
 from rollcli.files.stores.locations import base_name, is_url, located, public_name
-from rollcli.run.batch import Batch, Parts, Pass, line_form, part_location
+from rollcli.run.batch import Batch, Parts, Step, line_form, part_location
 from rollcli.run.frame import Frame, ReadAs
 from rollcli.run.inputs import Inputs, inputs_path, is_part_inputs, part_inputs_path, split_lines
 from rollcli.run.options import EstimateOptions
@@ -48,24 +46,16 @@ class PartsOutput:
 
     resumable = notes = True
 
-    def __init__(
-        self,
-        plan: Plan,
-        record: RunRecord,
-        kept: KeptRows,
-        options: EstimateOptions,
-        keep_open: int | None = None,
-    ) -> None:
-        self.kept, self.keep_open = kept, keep_open
-        self._plan, self._record, self._options = plan, record, options
-        self._part_rows = options.result.part_rows
-        self._parts = _parts(plan, record, options)
+    def __init__(self, record: RunRecord, kept: KeptRows, keep_open: int | None) -> None:
+        self.kept, self.keep_open, self.replaces = kept, keep_open, record.replaces
+        self._record, self._plan, self._options = record, record.plan, record.options
+        self._part_rows = record.options.result.part_rows
+        self._parts = _parts(record)
         self._numbers: Iterator[int] = iter(())  # of the parts to come
         # rows and the lines of their inputs, by their positions in the result
         self._replaced_part, self._replacing = 0, dict[int, tuple[bytes, bytes]]()
         self._waiting: list[tuple[bytes, bytes]] = []
-        self.replaces = record.replaces
-        self._image_options = options.images
+        self._image_options = record.options.images
         self._images: list[str] = []  # those of the part that is being filled
         self._checked = time.monotonic()
         self._written = kept.count - sum(map(len, kept.holes))
@@ -75,20 +65,20 @@ class PartsOutput:
         """How frames were read, as the record says."""
         return self._record.read_as
 
-    def passes(self) -> Iterator[Pass]:
+    def passes(self) -> Iterator[Step]:
         """Yield the frames of parts that are missing before others, then those after all of them."""
-        rows, end = self._part_rows, len(self._plan.frames)
+        rows, every, done = self._part_rows, self._plan.frames, self.kept.count
         holes = [position for hole in self.kept.holes for position in hole]
         missing = [position // rows for position in holes[::rows]]
-        rest = range(self.kept.count, end)
-        for positions, numbers in (
-            (holes, missing),
-            (rest, range(_whole_parts(self.kept.count, rows), _whole_parts(end, rows))),
+        rest = range(done, len(every))
+        for frames, positions, numbers in (
+            ([every[position] for position in holes], holes, missing),
+            (every[done:], rest, range(_whole_parts(done, rows), _whole_parts(len(every), rows))),
         ):
             if positions:
                 self._numbers = iter(numbers)
                 parts = self._parts._replace(numbers=tuple(numbers), frames=len(positions))
-                yield Pass(positions, parts)
+                yield Step(frames, positions, parts)
 
     def append(self, frames: Sequence[Frame], batch: Batch) -> None:
         """Take the rows; every full part is written."""
@@ -196,9 +186,9 @@ def open_parts(plan: Plan, options: EstimateOptions) -> Iterator[PartsOutput]:
             yield _begin(plan, options, descriptor)
 
 
-def _parts(plan: Plan, record: RunRecord, options: EstimateOptions) -> Parts:
-    output = located(options.running.root, plan.output)
-    rows = options.result.part_rows
+def _parts(record: RunRecord) -> Parts:
+    plan, options = record.plan, record.options
+    output, rows = located(options.running.root, plan.output), options.result.part_rows
     return Parts(output, plan.format, plan.further, rows, (), 0, record.run, record.of_rows)
 
 
@@ -206,7 +196,7 @@ def _begin(plan: Plan, options: EstimateOptions, keep_open: int | None) -> Parts
     # again, now that no other run can write it
     parts = check_parts(plan, resume=options.result.resume, overwrite=options.running.overwrite)
     kept, renewed = _kept(plan, options, parts)
-    record = new_record(plan, options, kept, _earlier(plan) if kept.count else None)
+    record = new_record(plan, options, kept)
     _remove_leftovers(plan, options, parts)
     if options.result.resume or options.running.overwrite:
         remove_image_leftovers(kept.not_failed(), options.images)
@@ -220,7 +210,7 @@ def _begin(plan: Plan, options: EstimateOptions, keep_open: int | None) -> Parts
     record.check_owned()  # another run may have begun in this very second
     for path, lines in renewed.items():
         write_bytes(path, lines, durable=True)
-    return PartsOutput(plan, record, kept, options, keep_open)
+    return PartsOutput(record, kept, keep_open)
 
 
 def _remove_leftovers(plan: Plan, options: EstimateOptions, parts: Sequence[str] = ()) -> None:
@@ -312,13 +302,6 @@ def _rows_of_part(plan: Plan, number: int) -> tuple[Row, ...]:
 
 def _whole_parts(rows: int, part_rows: int) -> int:
     return -(-rows // part_rows)
-
-
-def _earlier(plan: Plan) -> Mapping[str, Any] | None:
-    try:
-        return read_run(plan.output)
-    except InputError as error:
-        raise not_resumable(plan.output, str(error)) from error
 
 
 def _location(plan: Plan, number: int) -> str:

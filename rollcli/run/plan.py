@@ -3,14 +3,13 @@
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
-from typing import Any
 
 from rollcli.errors import UsageError
 from rollcli.files.results import IMAGE_ROLL, TIMING, Format, run_path
 from rollcli.files.stores.locations import is_url
 from rollcli.files.stream import is_stream
 from rollcli.run.calibration import calibration_files, check_depth, check_first_size
-from rollcli.run.find import map_frames, pair_frames
+from rollcli.run.find import Named, map_frames, pair_frames
 from rollcli.run.frame import Frame
 from rollcli.run.inputs import inputs_path
 from rollcli.run.options import EstimateOptions, ResultOptions
@@ -67,18 +66,18 @@ def make_plan(options: EstimateOptions) -> Plan:
             "--update takes a result in one file of CSV or JSON Lines"
         )
     if options.images.folders():
-        check_one_owner(((frame, _images([frame], options)) for frame in frames), plan.files)
+        check_one_owner(((frame, images_of([frame], options)) for frame in frames), plan.files)
     calibrations = calibration_files(options.calibration)
     check_inputs_are_kept(
         lambda: chain(calibrations, (path for frame in plan.frames for path in frame.reads())),
-        chain(plan.files, _images(plan.frames, options)),
+        chain(plan.files, images_of(plan.frames, options)),
     )
     frames = _shard(frames, options.result)
     check_places(frames, [folder for _, folder in options.images.folders()])
     checked = options.calibration.given or options.pairs.side_by_side is not None
     notes = check_first_size(frames, options.frame) if checked else []
     if not (options.running.overwrite or options.result.resume):
-        check_images_are_new(frames, options)
+        check_nothing_is_there(images_of(frames, options))
     if plan.format == "parquet" and is_stream(plan.output):
         raise UsageError("Parquet is a folder of parts: name it with --output")
     further = further_columns(frames, options.result)
@@ -102,18 +101,7 @@ def _shard(frames: Sequence[Frame], options: ResultOptions) -> Sequence[Frame]:
     return frames[part - 1 :: parts]
 
 
-def check_images_are_new(frames: Iterable[Frame], options: EstimateOptions) -> None:
-    """Check that no image of these frames exists.
-
-    Raises
-    ------
-    UsageError
-        Names the first that does.
-    """
-    check_nothing_is_there(_images(frames, options))
-
-
-def _images(frames: Iterable[Frame], options: EstimateOptions) -> Iterator[str]:
+def images_of(frames: Iterable[Frame], options: EstimateOptions) -> Iterator[str]:
     """Yield every image that may be written; a list of them would take most of our memory."""
     if not options.images.folders():
         return iter(())
@@ -121,7 +109,7 @@ def _images(frames: Iterable[Frame], options: EstimateOptions) -> Iterator[str]:
 
 
 def _find_frames(options: EstimateOptions) -> Sequence[Frame]:
-    given, pairs, quiet = options.inputs, options.pairs, options.running.quiet
+    given, quiet = options.inputs, options.running.quiet
     skip = [folder for _, folder in options.images.folders()]
     if not (options.paired or given.inputs or given.files_from):
         raise UsageError(
@@ -129,9 +117,9 @@ def _find_frames(options: EstimateOptions) -> Sequence[Frame]:
         )
     if options.paired and given.sorted:
         raise UsageError("--sorted takes a list of maps, not of pairs")
-    chosen: dict[str, Any] = {"region": options.region, "calibration": options.calibration, "skip": skip}
+    named = Named(given, options.pairs, options.topics, options.region, options.calibration, skip, quiet)
     if options.paired:
-        return pair_frames(given, pairs, options.topics, quiet=quiet, **chosen)
+        return pair_frames(named)
     if options.images.disparity is not None:
         raise UsageError("--disparity writes maps computed from --left and --right; here maps are the input")
-    return map_frames(given, quiet=quiet, **chosen)
+    return map_frames(named)

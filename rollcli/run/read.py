@@ -227,13 +227,7 @@ def _read(frame: Frame, options: FrameOptions) -> Source:
     stored = read_stored(options.at(frame.path), frame.file, rgb=given.encoding == Encoding.FOUNDATIONSTEREO)
     if given.scale is None or given.scale > 0:
         require_positive(stored, frame.file)
-    found = to_disparity(
-        stored,
-        encoding=given.encoding,
-        scale=given.scale,
-        invalid=given.invalid,
-        calibration=frame.calibration,
-    )
+    found = to_disparity(stored, **given._asdict(), calibration=frame.calibration)
     encoding = found.encoding.value
     beyond = {"beyond": too_large(found.disparity, stored, encoding)}
     carried = Provenance.of_text(stored.text)

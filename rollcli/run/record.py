@@ -7,8 +7,7 @@ import uuid
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from itertools import islice
-from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 from rollcli import __version__
 from rollcli.errors import InputError
@@ -27,6 +26,7 @@ from rollcli.run.options import (
     RegionOptions,
 )
 from rollcli.run.plan import Plan
+from rollcli.run.result_file import data_of
 from rollcli.run.summary import RunSummary
 from rollcli.stereo.options import StereoOptions
 
@@ -53,13 +53,6 @@ CONVENTIONS = {
     "y": "v cos(theta) - u sin(theta), px; u right, v down, from the centre of the top-left pixel",
 }
 
-# fields whose option has another name
-_OPTION_NAMES = {
-    "tolerance_deg": "tolerance",
-    "max_roll_deg": "max-roll",
-    "max_interval_deg": "max-interval",
-    "mode": "sgbm-mode",
-}
 _REPLACES = "replaces_images"  # while a run with --overwrite is not over
 _NUMBERS = ("scale", "num_disparities", "vertical_offset")  # options that are None by default
 Options = TypeVar("Options", EncodingOptions, ImageOptions, MethodOptions, RegionOptions, StereoOptions)
@@ -69,7 +62,7 @@ class RunRecord:
     """The record of one run; the same run gives the same bytes, whether it was interrupted or not."""
 
     def __init__(self, plan: Plan, options: EstimateOptions) -> None:
-        self._output = plan.output
+        self.plan, self.options = plan, options
         self.read_as = ReadAs()
         self.run = uuid.uuid4().hex  # tells our objects from those of another run
         self._begun = False
@@ -86,7 +79,7 @@ class RunRecord:
     def check_owned(self) -> None:
         """Check that no other run has begun since; see `batch.check_owned`."""
         if self._begun:
-            check_owned(self._output, self.run)
+            check_owned(self.plan.output, self.run)
 
     @property
     def of_rows(self) -> dict[str, Any]:
@@ -126,7 +119,7 @@ class RunRecord:
             **({_REPLACES: True} if self.replaces and not summary else {}),
         }
         data = json.dumps(record, indent=2).encode() + b"\n"
-        write_bytes(run_path(self._output), data, durable=True, owner=self.run)
+        write_bytes(run_path(self.plan.output), data, durable=True, owner=self.run)
         self._begun = True
 
 
@@ -150,7 +143,7 @@ def _effective(plan: Plan, options: EstimateOptions) -> dict[str, Any]:
 
 
 def _option_name(field: str) -> str:
-    return _OPTION_NAMES.get(field, field).replace("_", "-")
+    return "sgbm-mode" if field == "mode" else field.removesuffix("_deg").replace("_", "-")
 
 
 def _by_name(options: Options) -> dict[str, Any]:
@@ -173,11 +166,9 @@ _CALIBRATIONS_LISTED = 3
 
 def is_replaceable_record(path: str) -> bool:
     """Tell whether a new run may write its record here: there is none, or one of an earlier run."""
+    data = data_of(path)
     try:
-        data = Path(path).read_bytes()
         return not data or isinstance(json.loads(data)["rollcli"], str)
-    except OSError:
-        return True  # it does not exist, or writing it will say what is wrong
     except (ValueError, RecursionError, KeyError, TypeError):
         return False
 
@@ -200,23 +191,19 @@ def recorded_options(run: Mapping[str, Any] | None, name: str) -> FrameOptions:
     given = (run or {}).get("options", {})
     if not isinstance(given, Mapping):
         raise InputError(f"{name}: is not the record of a run: its options are no table")
+    layout = given.get("side-by-side")
     try:
+        if layout not in (None, *get_args(Layout)):
+            raise TypeError(f"side-by-side is {layout!r}")
         return FrameOptions(
             encoding=_filled(EncodingOptions(), given),
             method=_filled(MethodOptions(), given),
             stereo=_filled(StereoOptions(), given),
             images=_filled(ImageOptions(), given),
-            side_by_side=_layout(given.get("side-by-side")),
+            side_by_side=layout,
         )
     except (TypeError, ValueError) as error:
         raise InputError(f"{name}: is not the record of a run: {error}") from error
-
-
-def _layout(given: Any) -> Layout | None:
-    layouts: dict[Any, Layout] = {"left-right": "left-right", "top-bottom": "top-bottom"}
-    if given is not None and given not in layouts:
-        raise TypeError(f"side-by-side is {given!r}")
-    return layouts.get(given)
 
 
 def _filled(defaults: Options, given: Mapping[str, Any]) -> Options:

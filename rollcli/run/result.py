@@ -5,77 +5,32 @@ import io
 import os
 from collections.abc import Iterator, Sequence
 from itertools import chain, islice
-from pathlib import Path
-from typing import Protocol
 
 from rollcli.errors import InputError, UsageError
 from rollcli.files.atomic import is_there, remove_leftovers
 from rollcli.files.locking import not_resumable
-from rollcli.files.results import format_header, parse_rows, read_run, run_path
+from rollcli.files.results import format_header, parse_rows, run_path
 from rollcli.files.stores.locations import base_name
 from rollcli.files.stream import STDOUT, STDOUT_NAME, is_stream, open_stream, stdout_descriptor, write_stream
-from rollcli.run.batch import Batch, Pass
+from rollcli.run.batch import Batch, Step
 from rollcli.run.frame import Frame, ReadAs
-from rollcli.run.inputs import Inputs, inputs_data, inputs_path, is_inputs
+from rollcli.run.inputs import Inputs, inputs_path, is_inputs
 from rollcli.run.options import EstimateOptions
 from rollcli.run.outputs import local_images, remove_image_leftovers, remove_marks
-from rollcli.run.parts import kept_in_parts, open_parts
+from rollcli.run.parts import PartsOutput, kept_in_parts, open_parts
 from rollcli.run.plan import Plan
 from rollcli.run.record import RunRecord, is_replaceable_record
-from rollcli.run.result_file import DurableRows, ResultFile, has_rows, kept_rows, open_result, row_lines
+from rollcli.run.result_file import (
+    DurableRows,
+    ResultFile,
+    data_of,
+    has_rows,
+    kept_rows,
+    open_result,
+    row_lines,
+)
 from rollcli.run.resume import KeptRows, arranged, check_restored, new_record
 from rollcli.run.summary import RunSummary
-
-
-class Output(Protocol):
-    """Takes the results of frames in their order.
-
-    Attributes
-    ----------
-    kept : KeptRows
-        What is known of the rows of an interrupted run, which is resumed.
-    keep_open : int or None
-        A descriptor for workers to inherit.
-    resumable : bool
-        Whether an interrupted run can be resumed.
-    notes : bool
-        Whether it keeps what each row was made from.
-    replaces : bool
-        Whether images are replaced that were there before the run: it was begun with --overwrite.
-    read_as : ReadAs
-        How frames were read, as far as the record of the run says so.
-    """
-
-    kept: KeptRows
-    keep_open: int | None
-    resumable: bool
-    notes: bool
-    replaces: bool
-
-    @property
-    def read_as(self) -> ReadAs:
-        """The record knows more with every batch."""
-
-    def passes(self) -> Iterator[Pass]:
-        """Yield the frames to do; each pass begins when the one before has ended."""
-
-    def append(self, frames: Sequence[Frame], batch: Batch) -> None:
-        """Write the next rows, at once or with others after them."""
-
-    def restore(self, frames: Sequence[Frame], batch: Batch) -> None:
-        """Take the images of incomplete frames, which were made again."""
-
-    def replace(self, positions: Sequence[int], frames: Sequence[Frame], batch: Batch) -> None:
-        """Write rows in the place of kept ones, at once or with others after them; positions increase."""
-
-    def commit(self) -> None:
-        """Write every row that was appended or replaces another."""
-
-    def finish(self, summary: RunSummary) -> None:
-        """Say that all rows are written, and what they come to."""
-
-    def hint(self) -> str:
-        """Say how to continue after an error; empty when nothing can be continued."""
 
 
 class StreamOutput:
@@ -91,9 +46,9 @@ class StreamOutput:
         self._descriptor, self._name, self._plan = descriptor, name, plan
         self._write(format_header(plan.format, plan.further))
 
-    def passes(self) -> Iterator[Pass]:
+    def passes(self) -> Iterator[Step]:
         """Yield all frames."""
-        yield Pass(range(len(self._plan.frames)))
+        yield Step(self._plan.frames, range(len(self._plan.frames)))
 
     def append(self, frames: Sequence[Frame], batch: Batch) -> None:
         """Write the rows; they have left this process when this returns."""
@@ -120,33 +75,38 @@ class StreamOutput:
 
 
 class FileOutput:
-    """Rows to a locked file, FILE.inputs and FILE.run.json beside it; images are durable before their row."""
+    """Rows to a locked file, FILE.inputs and FILE.run.json beside it; images are durable before their row.
+
+    Attributes
+    ----------
+    kept : KeptRows
+        What is known of the rows of an interrupted run, which is resumed.
+    keep_open : int or None
+        A descriptor for workers to inherit.
+    resumable : bool
+        Whether an interrupted run can be resumed.
+    notes : bool
+        Whether it keeps what each row was made from.
+    replaces : bool
+        Whether images are replaced that were there before the run: it was begun with --overwrite.
+    """
 
     resumable = notes = True
 
-    def __init__(
-        self,
-        file: ResultFile,
-        inputs: ResultFile,
-        record: RunRecord,
-        plan: Plan,
-        kept: KeptRows,
-        options: EstimateOptions,
-    ) -> None:
-        self.kept = kept
-        self.keep_open: int | None = file.descriptor
-        self.replaces = record.replaces
-        self._file, self._record, self._plan, self._images = file, record, plan, options.images
-        self._updates = options.result.update
+    def __init__(self, file: ResultFile, inputs: ResultFile, record: RunRecord, kept: KeptRows) -> None:
+        self.kept, self.keep_open, self.replaces = kept, file.descriptor, record.replaces
+        self._file, self._record, self._plan = file, record, record.plan
+        self._images, self._updates = record.options.images, record.options.result.update
         self._inputs, self._rows = inputs, DurableRows(file, inputs)
         self._replacing: dict[int, tuple[bytes, bytes]] = {}  # rows, and the lines of their inputs
 
-    def passes(self) -> Iterator[Pass]:
+    def passes(self) -> Iterator[Step]:
         """Yield the frames after the rows that are kept."""
-        yield Pass(range(self.kept.count, len(self._plan.frames)))
+        frames = self._plan.frames
+        yield Step(frames[self.kept.count :], range(self.kept.count, len(frames)))
 
     def append(self, frames: Sequence[Frame], batch: Batch) -> None:
-        """Add the rows, after the record knows how their frames were read."""
+        """Add the rows, after the record knows how their frames were read; they may wait for others."""
         self._record.saw(batch.read_as)
         self._rows.append(batch.lines, batch.notes, local_images(frames, batch.figures.status, self._images))
 
@@ -162,7 +122,10 @@ class FileOutput:
         self._rows.restore(local_images(frames, batch.figures.status, self._images))
 
     def replace(self, positions: Sequence[int], frames: Sequence[Frame], batch: Batch) -> None:
-        """Take rows and their images; the file gets them all at once, in `commit`."""
+        """Take rows in the place of kept ones, and their images; positions increase.
+
+        The file gets them all at once, in `commit`.
+        """
         self._record.saw(batch.read_as)
         self._replacing.update(zip(positions, zip(batch.lines, batch.notes, strict=True), strict=True))
         self._rows.restore(local_images(frames, batch.figures.status, self._images))
@@ -186,7 +149,7 @@ class FileOutput:
 
     @property
     def read_as(self) -> ReadAs:
-        """How frames were read, as the record says."""
+        """How frames were read, as the record says; it knows more with every batch."""
         return self._record.read_as
 
     def finish(self, summary: RunSummary) -> None:
@@ -197,6 +160,9 @@ class FileOutput:
         """Say that --resume continues, if rows were written and their file still is there."""
         rows = self.kept.count + self._rows.written
         return f"; {rows} rows are kept, continue with --resume" if rows and self._file.is_there() else ""
+
+
+Output = StreamOutput | FileOutput | PartsOutput
 
 
 @contextlib.contextmanager
@@ -243,20 +209,10 @@ def frames_to_do(plan: Plan, options: EstimateOptions) -> Iterator[Frame]:
         kept = kept_in_parts(plan, options)
     else:
         _check_permitted(plan.output, options)
-        kept = _kept_in_file(plan, options)
+        kept = _parsed(data_of(plan.output) if options.result.resume else b"", plan, options)[1]
     again = (plan.frames[position] for position in kept.again)
     holes = (frame for hole in kept.holes for frame in plan.frames[hole.start : hole.stop])
     return chain(kept.incomplete, again, holes, plan.frames[kept.count :])
-
-
-def _kept_in_file(plan: Plan, options: EstimateOptions) -> KeptRows:
-    if not options.result.resume:
-        return KeptRows(plan, options)
-    try:
-        data = Path(plan.output).read_bytes()
-    except OSError:
-        return KeptRows(plan, options)
-    return _parsed(data, plan, options)[1]
 
 
 def _parsed(data: bytes, plan: Plan, options: EstimateOptions) -> tuple[bytes, KeptRows]:
@@ -265,7 +221,7 @@ def _parsed(data: bytes, plan: Plan, options: EstimateOptions) -> tuple[bytes, K
     if not data:
         return b"", KeptRows(plan, options)
     update, gone = options.result.update, 0
-    inputs = Inputs(inputs_data(inputs_path(plan.output)), updates=update)
+    inputs = Inputs(data_of(inputs_path(plan.output)), updates=update)
     if update:
         data, gone = arranged(data, plan)
     kept = KeptRows(plan, options, parse_rows(data, plan.output), inputs)
@@ -275,15 +231,12 @@ def _parsed(data: bytes, plan: Plan, options: EstimateOptions) -> tuple[bytes, K
 
 
 def _begin(file: ResultFile, inputs: ResultFile, plan: Plan, options: EstimateOptions) -> FileOutput:
-    data, kept = b"", KeptRows(plan, options)
     before = file.read() if options.result.resume else b""
     try:
-        if before:
-            data, kept = _parsed(before, plan, options)
-        earlier = read_run(plan.output) if kept.count else None
+        data, kept = _parsed(before, plan, options)
     except InputError as error:
         raise not_resumable(plan.output, str(error)) from error
-    record = new_record(plan, options, kept, earlier)
+    record = new_record(plan, options, kept)
     if options.result.resume or options.running.overwrite:
         first = 0 if options.result.retry_failed else kept.count
         remove_image_leftovers(kept.not_failed(first), options.images)
@@ -300,17 +253,17 @@ def _begin(file: ResultFile, inputs: ResultFile, plan: Plan, options: EstimateOp
     record.write()
     if not kept.count:
         file.append(format_header(plan.format, plan.further))
-    return FileOutput(file, inputs, record, plan, kept, options)
+    return FileOutput(file, inputs, record, kept)
 
 
 def _check_permitted(name: str, options: EstimateOptions) -> None:
     """Refuse to touch a result that exists, unless --resume or --overwrite is given."""
     resume, overwrite = options.result.resume, options.running.overwrite
+    flag = "--update" if options.result.update else "--resume"
     if resume and overwrite:
-        raise UsageError(f"give either {'--update' if options.result.update else '--resume'} or --overwrite")
+        raise UsageError(f"give either {flag} or --overwrite")
     if is_stream(name):
         if resume:
-            flag = "--update" if options.result.update else "--resume"
             raise UsageError(f"{flag} needs a result file: name it with --output")
         return
     if overwrite:

@@ -11,7 +11,7 @@ from itertools import combinations
 from pathlib import Path
 
 from rollcli.errors import OutputError, UsageError
-from rollcli.files.atomic import atomic_file, look_at, output_error, sync_files, write_atomic
+from rollcli.files.atomic import atomic_file, look_at, output_error, sync_files, write_atomic, writing
 from rollcli.files.locking import locked, take_lock
 from rollcli.files.results import FURTHER, Format, format_header
 
@@ -46,12 +46,10 @@ class ResultFile:
         OutputError
             The disk does not give it.
         """
-        try:
+        with writing(self._name):
             os.lseek(self.descriptor, 0, os.SEEK_SET)  # locking moves the position on Windows
             with open(self.descriptor, "rb", closefd=False) as file:
                 return file.read()
-        except OSError as error:
-            raise output_error(self._name, error) from error
 
     def truncate(self, size: int) -> None:
         """Keep the first `size` bytes, and continue after them.
@@ -61,11 +59,9 @@ class ResultFile:
         OutputError
             The file system refuses.
         """
-        try:
+        with writing(self._name):
             os.ftruncate(self.descriptor, size)
             os.lseek(self.descriptor, 0, os.SEEK_END)
-        except OSError as error:
-            raise output_error(self._name, error) from error
 
     def append(self, lines: bytes) -> None:
         """Write lines, all of them or none.
@@ -106,17 +102,14 @@ class ResultFile:
         if _ON_WINDOWS:
             self._replace_closed(target, b"".join(lines))
             return
-        with contextlib.ExitStack() as held:
-            try:
-                with atomic_file(target, durable=True) as new:
-                    if hasattr(os, "fchmod"):
-                        os.fchmod(new.fileno(), stat.S_IMODE(os.fstat(self.descriptor).st_mode))
-                    new.writelines(lines)
-                    locked_file = os.dup(new.fileno())  # the lock is the open file's, and stays with it
-                    held.callback(os.close, locked_file)
-                os.dup2(locked_file, self.descriptor, inheritable=False)
-            except OSError as error:
-                raise output_error(self._name, error) from error
+        with contextlib.ExitStack() as held, writing(self._name):
+            with atomic_file(target, durable=True) as new:
+                if hasattr(os, "fchmod"):
+                    os.fchmod(new.fileno(), stat.S_IMODE(os.fstat(self.descriptor).st_mode))
+                new.writelines(lines)
+                locked_file = os.dup(new.fileno())  # the lock is the open file's, and stays with it
+                held.callback(os.close, locked_file)
+            os.dup2(locked_file, self.descriptor, inheritable=False)
 
     def _old_lines(self) -> Iterator[bytes]:
         if _ON_WINDOWS:  # it renames onto no open file
@@ -130,14 +123,12 @@ class ResultFile:
 
         Another run may take it in this moment; then this one ends, and has lost nothing.
         """
-        try:
+        with writing(self._name):
             _reopen(self.descriptor, os.devnull, os.O_RDONLY)
             try:
                 write_atomic(target, data, durable=True)
             finally:
                 _reopen(self.descriptor, target, _FLAGS)
-        except OSError as error:
-            raise output_error(self._name, error) from error
         take_lock(self.descriptor, self._name)
         os.lseek(self.descriptor, 0, os.SEEK_END)
 
@@ -175,11 +166,9 @@ def open_result(name: str) -> Iterator[ResultFile]:
         It cannot be written.
     """
     while True:
-        try:
+        with writing(name):
             Path(name).parent.mkdir(parents=True, exist_ok=True)
             descriptor = os.open(name, _FLAGS, 0o666)
-        except OSError as error:
-            raise output_error(name, error) from error
         try:
             with locked(descriptor, name):
                 file = ResultFile(descriptor, name)
@@ -193,12 +182,16 @@ def open_result(name: str) -> Iterator[ResultFile]:
 
 def has_rows(name: str) -> bool:
     """Tell whether a file holds more than the header of a run that wrote no row."""
+    return data_of(name, _MORE_THAN_A_HEADER) not in (b"", *_HEADERS)
+
+
+def data_of(path: str, most: int = -1) -> bytes:
+    """Read a file of a result, or its beginning; empty where there is none."""
     try:
-        with Path(name).open("rb") as file:
-            start = file.read(_MORE_THAN_A_HEADER)
-    except OSError:
-        return False  # it does not exist, or opening it for writing will say what is wrong
-    return start not in (b"", *_HEADERS)
+        with Path(path).open("rb") as file:
+            return file.read(most)
+    except OSError:  # it does not exist, or opening it for writing will say what is wrong
+        return b""
 
 
 def kept_rows(data: bytes, name: str, form: Format) -> bytes:

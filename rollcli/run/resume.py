@@ -15,8 +15,8 @@ from rollcli.run.frame import Frame
 from rollcli.run.inputs import Inputs
 from rollcli.run.options import EstimateOptions
 from rollcli.run.outputs import possible_paths
-from rollcli.run.plan import Plan, check_images_are_new
-from rollcli.run.reads_and_writes import Existing
+from rollcli.run.plan import Plan, images_of
+from rollcli.run.reads_and_writes import Existing, check_nothing_is_there
 from rollcli.run.record import RunRecord
 from rollcli.run.result_file import row_lines
 from rollcli.run.summary import RunSummary
@@ -209,18 +209,8 @@ def check_restored(batch: Batch) -> None:
             raise OutputError(f"the images of {row.file} cannot be made again: {row.message}")
 
 
-def new_record(
-    plan: Plan, options: EstimateOptions, kept: KeptRows, earlier: Mapping[str, Any] | None
-) -> RunRecord:
+def new_record(plan: Plan, options: EstimateOptions, kept: KeptRows) -> RunRecord:
     """Make the record of a run, which continues that of an interrupted run where rows are kept.
-
-    Parameters
-    ----------
-    plan : Plan
-    options : EstimateOptions
-    kept : KeptRows
-    earlier : mapping or None
-        Its record.
 
     Raises
     ------
@@ -232,6 +222,10 @@ def new_record(
         if options.result.resume:
             _start_or_continue(record, plan, options, kept)
         return record
+    try:
+        earlier = read_run(plan.output)
+    except InputError as error:
+        raise not_resumable(plan.output, str(error)) from error
     if earlier is None:
         raise not_resumable(plan.output, f"there is no {base_name(run_path(plan.output))}")
     if not _is_whole(earlier):
@@ -272,7 +266,7 @@ def _start_or_continue(record: RunRecord, plan: Plan, options: EstimateOptions, 
     if run is not None and _is_whole(run) and not any(_differences(kept, run, record.fixed, plan, 0)):
         record.continue_from(run)
     else:
-        check_images_are_new(plan.frames, options)
+        check_nothing_is_there(images_of(plan.frames, options))
 
 
 def _differences(

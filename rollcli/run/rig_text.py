@@ -1,13 +1,12 @@
 """An assessment of the rig as a table to read, as CSV and as JSON."""
 
-import csv
-import io
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
 from rollcli.errors import UsageError
+from rollcli.files.results import csv_table
 from rollcli.rig.drive.assess import DriveAssessment, RigAssessment
 from rollcli.rig.drive.posterior import Estimate
 from rollcli.rig.drive.quantity import Segment
@@ -184,12 +183,9 @@ def as_table(found: Findings) -> str:
 
 def as_csv(found: Findings) -> str:
     """Return a header, and a line for each segment."""
-    buffer = io.StringIO()
     rows = segment_rows(found.rig)
-    lines = csv.DictWriter(buffer, list(rows[0]) if rows else ["drive"], lineterminator="\n")
-    lines.writeheader()
-    lines.writerows(rows)
-    return buffer.getvalue()
+    lines = csv_table([rows[0] if rows else ["drive"], *(row.values() for row in rows)])
+    return lines.decode("utf-8", "surrogateescape")
 
 
 def as_json(found: Findings) -> str:

@@ -22,7 +22,7 @@ from rollcli.simulate.roadside import Site
 from rollcli.simulate.scene import FAR, Light, Scene, draw, draw_light, draw_offset
 from rollcli.simulate.spec import FrameSpec, Stream
 from rollcli.simulate.surfaces import Course, Ground, Surface
-from rollcli.simulate.views import bands, depths, first_hits, render_view
+from rollcli.simulate.views import bands, first_hits, render_view
 
 _HORIZON = 2000.0  # metres: the end of a bare world
 # of dips and bumps
@@ -237,16 +237,6 @@ class RenderedFrame:
     spec: FrameSpec
     heights: NDArray[np.float32] | None = None
 
-    @property
-    def roll(self) -> float:
-        """theta, radians."""
-        return self.spec.roll
-
-    @property
-    def pitch(self) -> float:
-        """Radians, positive looking down."""
-        return self.spec.pitch
-
 
 def render_frame(spec: FrameSpec) -> RenderedFrame:
     """Render both views, the true disparity of the left one, and which of its pixels are road."""
@@ -262,10 +252,3 @@ def render_frame(spec: FrameSpec) -> RenderedFrame:
     if spec.dips is not None:
         heights = true_heights(scene, spec, carriageway_of(spec), cameras[0])
     return RenderedFrame(left, right, disparity, views[0].material == scene.road, spec, heights)
-
-
-def true_disparity(spec: FrameSpec) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Return the disparity (H, W) of the left view in double precision, 0 in the sky, and its road pixels."""
-    scene = build_scene(spec)
-    depth, material = depths(scene, spec.cameras(scene.normal)[0])
-    return spec.focal * spec.baseline / depth, material == scene.road

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from rollcli import __version__
 from rollcli.errors import ExitStatus, InputError, OutputError, UsageError
-from rollcli.files.atomic import is_there, output_error, remove_leftovers, write_atomic
+from rollcli.files.atomic import is_there, remove_leftovers, write_atomic, writing
 from rollcli.files.codecs.tiff import encode_tiff
 from rollcli.files.encodings import KITTI_TOP, from_disparity
 from rollcli.files.formats import encode_stored
@@ -251,11 +251,9 @@ def _png(image: NDArray[np.uint8]) -> bytes:
 def _clear(dataset: Dataset) -> None:
     """Remove what an earlier simulation left: pairs without a row, and the calibration of another rig."""
     single = [dataset.folder / name for name in (_TRUTH, f"{_CALIBRATION}.txt")]
-    try:
+    with writing(dataset.folder):
         for path in (*single, *_earlier_frames(dataset.folder)):
             path.unlink(missing_ok=True)
-    except OSError as error:
-        raise output_error(dataset.folder, error) from error
 
 
 def _earlier_frames(folder: Path) -> list[Path]:
@@ -314,12 +312,10 @@ def _refuse_idle(options: SimulateOptions) -> None:
 
 def _is_free(folder: Path) -> bool:
     """Tell whether the folder is empty or does not exist."""
-    try:
+    with writing(folder):
         if folder.exists() and not folder.is_dir():
             raise UsageError(f"{folder}: is a file, not a folder to write to")
         return not folder.is_dir() or not any(folder.iterdir())
-    except OSError as error:
-        raise output_error(folder, error) from error
 
 
 def _record(options: SimulateOptions) -> Mapping[str, Any]:

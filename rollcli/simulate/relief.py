@@ -94,16 +94,12 @@ class Relief:
     @property
     def lowest(self) -> float:
         """The lowest height, metres."""
-        return float(self.heights.min()) + min(
-            (dip.height for dip in self.dips if dip.height < 0), default=0.0
-        )
+        return float(self.heights.min()) + min([0.0, *(dip.height for dip in self.dips)])
 
     @property
     def highest(self) -> float:
         """The greatest height, metres."""
-        return float(self.heights.max()) + max(
-            (dip.height for dip in self.dips if dip.height > 0), default=0.0
-        )
+        return float(self.heights.max()) + max([0.0, *(dip.height for dip in self.dips)])
 
     def is_between(self, first: tuple[Array, Array], last: tuple[Array, Array]) -> NDArray[np.bool_]:
         """Tell where it may be uneven between two positions (lateral and Z, each (N,)), metres."""

@@ -167,14 +167,6 @@ def render_view(scene: Scene, camera: Camera) -> View:
     return View(*map(np.concatenate, zip(*found, strict=True)))
 
 
-def depths(scene: Scene, camera: Camera) -> tuple[Array, NDArray[np.int16]]:
-    """Return depth and material (H, W) of a camera's image, as in `View`, without rendering its light."""
-    shape = (camera.height, camera.width)
-    found = [trace(scene, PixelRays.of_rows(camera, rows)) for rows in bands(camera)]
-    depth = np.concatenate([band.depth for band in found])
-    return depth.reshape(shape), np.concatenate([band.material for band in found]).reshape(shape)
-
-
 def bands(camera: Camera) -> list[range]:
     """Return the rows of an image in parts of `_BAND` pixels."""
     step = max(1, _BAND // camera.width)

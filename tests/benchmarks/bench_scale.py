@@ -170,13 +170,13 @@ def chunk_costs(scheduler: str, processes: list["subprocess.Popen[bytes]"]) -> d
     """CPU that a chunk costs, ms, and a second in which nothing happens."""
     from rollcli.run.workers.chunks import Work
     from rollcli.run.workers.cluster import ClusterExecutor
-    from rollcli.run.workers.in_order import SharedPaths
+    from rollcli.run.workers.in_order import Workers
     from tests.benchmarks import bench_scale  # workers find the tasks there, not in __main__
 
     def used() -> tuple[float, float, float]:
         return time.monotonic(), time.process_time(), cpu_of(processes[:1])
 
-    executor = ClusterExecutor(scheduler, Work(bench_scale.sleep_for, bench_scale.lost), SharedPaths(), 1)
+    executor = ClusterExecutor(scheduler, Work(bench_scale.sleep_for, bench_scale.lost), Workers())
     try:
         before = used()
         time.sleep(10)

@@ -15,10 +15,10 @@ from rollcli.estimator.road.model import RoadModel
 from rollcli.estimator.road.sample import take_sample
 from rollcli.estimator.road.surface import Surface, whole_surface
 from rollcli.estimator.tuning import TUNING, IntervalTuning
-from rollcli.simulate.build import true_disparity
 from rollcli.simulate.dataset import lane_rolls_of
 from rollcli.simulate.spec import FrameSpec
 from tests.estimator.synthetic_maps import bent_road, energy_of, flat_road
+from tests.true_disparity import true_disparity
 
 SIZE = {"width": 320, "height": 240, "focal": 280.0}
 

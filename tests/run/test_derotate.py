@@ -12,9 +12,9 @@ import pytest
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.files.encodings import from_disparity, read_disparity
 from rollcli.files.formats import encode_stored, read_stored
-from rollcli.run import convert_frame as work
+from rollcli.run import images as work
 from rollcli.run.convert import run_conversion
-from rollcli.run.convert_frame import convert_frame
+from rollcli.run.images import convert_frame
 from rollcli.run.options import DerotateOptions, EncodingOptions, InputOptions, RunningOptions
 from tests.run_cli import contents, road_map, rollcli, write_kitti, write_maps
 

@@ -6,11 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rollcli.simulate.build import build_scene, render_frame, road_camber, true_disparity
+from rollcli.simulate.build import build_scene, render_frame, road_camber
 from rollcli.simulate.road import draw_carriageway
 from rollcli.simulate.scene import draw_light
 from rollcli.simulate.spec import FrameSpec, Stream
 from rollcli.simulate.surfaces import Ground
+from tests.true_disparity import true_disparity
 
 SMALL = {"size": (320, 240), "focal": 186.0, "crossfall": 0.04}
 SHAPES = ("crown", "roof", "dish", "superelevated")

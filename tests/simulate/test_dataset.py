@@ -15,11 +15,12 @@ from rollcli.errors import OutputError, UsageError
 from rollcli.files.encodings import read_disparity
 from rollcli.files.formats import read_image
 from rollcli.simulate import dataset as module
-from rollcli.simulate.build import render_frame, road_camber, true_disparity
+from rollcli.simulate.build import render_frame, road_camber
 from rollcli.simulate.dataset import plan_dataset, write_dataset
 from rollcli.simulate.options import SimulateOptions
 from tests.make_sample_data import EXACT, SAMPLES, SPECS, make
 from tests.run_cli import contents
+from tests.true_disparity import true_disparity
 
 TINY = SimulateOptions(frames=3, size=(64, 48), seed=9)
 

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from rollcli.errors import UsageError
-from rollcli.simulate.build import carriageway_of, draw_dips, render_frame, true_disparity
+from rollcli.simulate.build import carriageway_of, draw_dips, render_frame
 from rollcli.simulate.spec import FrameSpec
+from tests.true_disparity import true_disparity
 
 SMALL = {"size": (320, 120), "focal": 186.0, "pitch": 0.08}
 
@@ -50,8 +50,3 @@ def test_dips_change_nothing_else():
     same = plain.road & dipped.road & level
     assert np.allclose(plain.disparity[same], dipped.disparity[same], atol=1e-4)
     assert (plain.left[~plain.road & ~dipped.road] == dipped.left[~plain.road & ~dipped.road]).mean() > 0.98
-
-
-def test_too_many_dips_are_refused():
-    with pytest.raises(UsageError, match="13 dips are not within 0 and 12"):
-        spec_of(dips=13)

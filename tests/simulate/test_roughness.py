@@ -7,11 +7,12 @@ import math
 import numpy as np
 import pytest
 
-from rollcli.simulate.build import build_scene, carriageway_of, true_disparity
+from rollcli.simulate.build import build_scene, carriageway_of
 from rollcli.simulate.dataset import lane_rolls_of
 from rollcli.simulate.relief import draw_relief
 from rollcli.simulate.spec import FrameSpec
 from tests.slow import mostly_slow
+from tests.true_disparity import true_disparity
 
 FLAT, CROWNED = {}, {"cross_section": "crown", "crossfall": 0.03, "bend": 0.003}
 NOWHERE = (-100.0, -100.0)  # tracks and patches: none on the grid

@@ -21,13 +21,7 @@ TINY = {"size": (64, 48), "focal": 37.0}
         ({"height": -1.65}, "under the road"),
         ({"height": 0.3, "roll": math.radians(-60)}, "right camera is under the road"),
         ({"size": (0, 0)}, "0x0"),
-        ({"focal": 0.0}, "focal length"),
-        ({"baseline": 0.0}, "baseline"),
-        ({"gain": 0.0}, "gain"),
-        ({"scene": "beach"}, "no such scene: beach"),
-        ({"focal": math.nan}, "finite"),
         ({"kerb": (0.2, 0.1)}, "kerbs of 0.2 to 0.1 m"),
-        ({"cross_section": "ridge"}, "no such cross section: ridge"),
     ],
 )
 def test_a_rig_that_cannot_be_is_refused_and_the_reason_named(wrong, named):
@@ -60,7 +54,6 @@ def test_a_rig_that_cannot_be_is_refused_and_the_reason_named(wrong, named):
         ("principal_point", (639.0, 0.0), (639.1, 0.0), "principal point 639.1,0 lies outside"),
         ("principal_point", (0.0, 0.0), (0.0, -0.1), "principal point 0,-0.1 lies outside"),
         ("principal_point", (639.0, 479.0), (639.0, 479.1), "principal point 639,479.1 lies outside"),
-        ("noise", 0.0, -0.001, "noise"),
     ],
 )
 def test_a_value_at_its_limit_is_taken_and_one_beyond_it_is_refused(name, last, beyond, named):
@@ -98,20 +91,13 @@ def test_without_ranges_the_documented_ones_are_drawn():
 @pytest.mark.parametrize(
     "wrong",
     [
-        {"frames": 0},
-        {"scene": "beach"},
-        {"seed": -1},
-        {"roll_deg": (2.0, 1.0)},
         {"roll_deg": (-91.0, 1.0)},
         {"pitch_deg": (0.0, 61.0)},
         {"height": (0.3, 0.3), "roll_deg": (-57.0, 57.0)},
         {"height": (0.0, 1.6)},
-        {"height": (1.7, 1.6)},
         {"principal_offset": (-400.0, 0.0)},
         {"principal_offset": (0.0, 400.0)},
         {"crossfall": (2.0, 20.0)},
-        {"gutter": (10.0, 0.0)},
-        {"cross_section": "ridge"},
     ],
 )
 def test_draws_that_cannot_be_are_refused_before_anything_is_drawn(wrong):

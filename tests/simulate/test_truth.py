@@ -5,9 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from rollcli.simulate.build import render_frame, true_disparity
+from rollcli.simulate.build import render_frame
 from rollcli.simulate.dataset import calibration
 from rollcli.simulate.spec import FrameSpec
+from tests.true_disparity import true_disparity
 
 SMALL = {"size": (320, 240), "focal": 186.0}
 
@@ -101,7 +102,7 @@ def test_the_plane_of_a_flat_road_and_the_written_calibration_give_pitch_and_hei
 
 def test_the_sky_has_no_disparity_and_everything_else_has():
     frame = render_frame(FrameSpec("bare", roll=math.radians(20), **SMALL))
-    y = rotated_rows((240, 320), frame.roll)
+    y = rotated_rows((240, 320), frame.spec.roll)
     below_horizon = y - y[119:121, 159:161].mean()
     assert np.all(frame.disparity[below_horizon > 0.5] > 0)
     assert not np.any(frame.disparity[below_horizon < 0])

@@ -10,10 +10,11 @@ import pytest
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.road.find import road_plane
 from rollcli.files.formats import read_image
-from rollcli.simulate.build import render_frame, true_disparity
+from rollcli.simulate.build import render_frame
 from rollcli.simulate.options import SimulateOptions
 from rollcli.simulate.spec import FrameSpec, draw_specs
 from rollcli.stereo.match import StereoOptions, Wanted, compute_disparity, match_pair
+from tests.true_disparity import true_disparity
 
 LIDAR = Path(__file__).parents[2].parent / "shared" / "lidar"
 SPEC = FrameSpec(scene="street", roll=math.radians(4), size=(640, 480), seed=3)

@@ -35,10 +35,6 @@ _LEAST_S = 0.05  # unless that is less than this, or than half of what _CHUNKS_A
 _DOUBT_S = 0.02  # added to what the first tasks took: one that fails at once says nothing of the others
 
 
-def _leave(task: object) -> None:
-    """Leave everything as it is: the tasks write no files."""
-
-
 class Span(Sequence[Task]):
     """Consecutive tasks that a worker gets at once.
 
@@ -73,10 +69,6 @@ def _as_they_are(chunk: Sequence[Task], results: list[Result]) -> Sequence[Resul
     return results
 
 
-def _nothing() -> None:
-    return None
-
-
 @dataclass(frozen=True)
 class Work(Generic[Task, Result]):
     """What to do with each task.
@@ -106,9 +98,9 @@ class Work(Generic[Task, Result]):
 
     do: Callable[[Task], Result]
     lost: Callable[[Task, str], Result]
-    clear: Callable[[Task], None] = _leave
+    clear: Callable[[Task], None] = lambda task: None  # the tasks write no files
     join: Callable[[Any, list[Result]], Sized] = _as_they_are
-    tell: Callable[[], Any] = _nothing
+    tell: Callable[[], Any] = lambda: None
     unit: int = 1
     prepare: Callable[[Task], Task] | None = None
 

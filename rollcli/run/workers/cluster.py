@@ -23,7 +23,7 @@ from rollcli.files.storage import remove
 from rollcli.files.stores.locations import is_url
 from rollcli.messages import one_line, say
 from rollcli.run.workers.chunks import LONGEST_ON_CLUSTER_S, Chunk, Done, Result, Task, Work
-from rollcli.run.workers.in_order import SharedPaths
+from rollcli.run.workers.in_order import Workers
 from rollcli.run.workers.pool import prepare_worker
 
 _CONNECT_S, _GREETING_S, _FIRST_WORKER_S = 6, 2, 5
@@ -77,10 +77,8 @@ class ClusterExecutor(Generic[Task, Result]):
         The address of the scheduler, or its file.
     work : Work
         What the workers do.
-    shared : SharedPaths
-        What each of them must see.
-    threads : int
-        Tasks that each thread of a worker has in hand at once; see `files.stores.turns`.
+    asked : Workers
+        What each of them must see, and how many tasks each of its threads has in hand.
 
     Raises
     ------
@@ -88,13 +86,13 @@ class ClusterExecutor(Generic[Task, Result]):
         No scheduler or no worker answers, a worker has another rollcli, or does not see the files.
     """
 
-    def __init__(self, given: str, work: Work[Task, Result], shared: SharedPaths, threads: int) -> None:
+    def __init__(self, given: str, work: Work[Task, Result], asked: Workers) -> None:
         require_extra("cluster", "--scheduler")
         from distributed import KilledWorker
 
         self.worker_died: tuple[type[BaseException], ...] = (KilledWorker,)
-        self.threads, self.address = threads, scheduler_address(given)
-        self._work, self._shared, self._stopped = work, shared, False
+        self.threads, self.address = asked.threads, scheduler_address(given)
+        self._work, self._asked, self._stopped = work, asked, False
         self._run = uuid.uuid4().hex
         self._threads_of: dict[str, int] = {}  # by the addresses of the workers that take part
         self._refused: set[str] = set()
@@ -187,7 +185,7 @@ class ClusterExecutor(Generic[Task, Result]):
         """Take in workers that have joined, and leave out those that have gone; return problems by worker."""
         there = self._client.nthreads()
         new = [worker for worker in there if worker not in self._threads_of and worker not in self._refused]
-        problems, silent = _problems(self._client, self._shared, new) if new else ({}, set())
+        problems, silent = _problems(self._client, self._asked, new) if new else ({}, set())
         self._refused.update(problems)
         left_out = self._refused | silent  # those that did not answer are asked again
         self._threads_of = {worker: n for worker, n in there.items() if worker not in left_out}
@@ -367,7 +365,7 @@ def _worker_plugin() -> Any:
     return PrepareWorker()
 
 
-def _problems(client: Any, shared: SharedPaths, workers: Collection[str]) -> tuple[dict[str, str], set[str]]:
+def _problems(client: Any, asked: Workers, workers: Collection[str]) -> tuple[dict[str, str], set[str]]:
     """Ask workers whether they have this rollcli and see the files and folders that this process sees.
 
     Returns
@@ -377,10 +375,10 @@ def _problems(client: Any, shared: SharedPaths, workers: Collection[str]) -> tup
     silent : set of str
         Those that did not answer: they may have died.
     """
-    files = {path.absolute() for path in map(Path, shared.files) if is_file(path)}
+    files = {path.absolute() for path in map(Path, asked.files) if is_file(path)}
     sizes = {str(path): path.stat().st_size for path in files}
     name = f".rollcli-check-{uuid.uuid4().hex}"  # of this run's own: another one may be asking now
-    marks = [Path(folder).absolute() / name for folder in shared.folders if not is_url(folder)]
+    marks = [Path(folder).absolute() / name for folder in asked.folders if not is_url(folder)]
     made: list[Path] = []
     try:
         for mark in marks:

@@ -11,22 +11,6 @@ from rollcli.run.workers.interrupt import Stop
 
 
 @dataclass(frozen=True)
-class SharedPaths:
-    """What workers on other machines must see as this process sees it.
-
-    Attributes
-    ----------
-    files : tuple of str
-        A sample of the files that the tasks read; those that do not exist are ignored.
-    folders : tuple of str
-        Where the tasks write.
-    """
-
-    files: tuple[str, ...] = ()
-    folders: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
 class Workers:
     """Which workers run the tasks.
 
@@ -36,8 +20,11 @@ class Workers:
         Processes on this machine; None: one for each usable processor.
     scheduler : str or None
         The address of a Dask scheduler, whose workers are used instead.
-    shared : SharedPaths
-        What the workers of a cluster must see.
+    files : tuple of str
+        A sample of the files that the tasks read, which the workers of a cluster must see as this process
+        does; those that do not exist are ignored.
+    folders : tuple of str
+        Where the tasks write; the same holds for them.
     keep_open : int or None
         A file descriptor that processes on this machine inherit and keep open until they end.
     threads : int
@@ -49,7 +36,8 @@ class Workers:
 
     jobs: int | None = None
     scheduler: str | None = None
-    shared: SharedPaths = SharedPaths()
+    files: tuple[str, ...] = ()
+    folders: tuple[str, ...] = ()
     keep_open: int | None = None
     threads: int = 1
     started: list[Any] = field(default_factory=list)

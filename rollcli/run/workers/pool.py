@@ -17,6 +17,7 @@ from typing import Any, Generic
 
 from rollcli.errors import WorkerError
 from rollcli.run.workers.chunks import Chunk, Done, Result, Task, Work
+from rollcli.run.workers.in_order import Workers
 from rollcli.run.workers.interrupt import ignore_signals, stop_signals
 
 _BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
@@ -74,12 +75,8 @@ class PoolExecutor(Generic[Task, Result]):
         The number of processes.
     work : Work
         What they do.
-    keep_open : int or None
-        A file descriptor that they inherit and keep open until they end.
-    threads : int
-        Tasks that each has in hand at once; see `files.stores.turns`.
-    started : list of Worker, optional
-        Processes to begin with; they are taken out of the list.
+    asked : Workers
+        What else was asked of them.
 
     Raises
     ------
@@ -89,21 +86,14 @@ class PoolExecutor(Generic[Task, Result]):
 
     worker_died: tuple[type[BaseException], ...] = (WorkerDiedError,)
 
-    def __init__(
-        self,
-        workers: int,
-        work: Work[Task, Result],
-        keep_open: int | None = None,
-        threads: int = 1,
-        started: "list[Worker[Task, Result]] | None" = None,
-    ) -> None:
-        self.workers, self.threads = workers, threads
-        self._work, self._keep_open, self._stopped = work, keep_open, False
+    def __init__(self, workers: int, work: Work[Task, Result], asked: Workers) -> None:
+        self.workers, self.threads = workers, asked.threads
+        self._work, self._keep_open, self._stopped = work, asked.keep_open, False
         self._pool: list[Worker[Task, Result]] = []
         self._queue: deque[PoolFuture[Task, Result]] = deque()
         try:
             for _ in range(workers):
-                self._pool.append(self._begun(started.pop() if started else Worker()))
+                self._pool.append(self._begun(asked.started.pop() if asked.started else Worker()))
         except BaseException:
             self.close(at_once=True)
             raise

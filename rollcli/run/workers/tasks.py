@@ -112,14 +112,14 @@ def _executor(count: int | None, work: Work[Any, Any], workers: Workers) -> Any:
     if workers.scheduler is not None:
         from rollcli.run.workers.cluster import ClusterExecutor
 
-        return ClusterExecutor(workers.scheduler, work, workers.shared, workers.threads)
+        return ClusterExecutor(workers.scheduler, work, workers)
     jobs = workers.jobs or _usable_processors()
     if count is not None:
         jobs = min(jobs, count)
     if jobs > 1 or (jobs and workers.threads > 1):
         from rollcli.run.workers.pool import PoolExecutor
 
-        return PoolExecutor(jobs, work, workers.keep_open, workers.threads, workers.started)
+        return PoolExecutor(jobs, work, workers)
     return None
 
 

@@ -14,11 +14,12 @@ from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.road.find import road_plane
 from rollcli.files.formats import read_image
 from rollcli.pictures.derotate import derotate
-from rollcli.simulate.build import render_frame, true_disparity
+from rollcli.simulate.build import render_frame
 from rollcli.simulate.options import SimulateOptions
 from rollcli.simulate.spec import FrameSpec, draw_specs
 from rollcli.stereo.match import StereoOptions, match_pair
 from tests.estimator.synthetic_maps import bent_road, flat_road
+from tests.true_disparity import true_disparity
 
 STREETS = Path(__file__).parents[3].parent / "shared" / "streets"
 

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.estimate import estimate_roll
-from rollcli.simulate.build import true_disparity
 from rollcli.simulate.spec import FrameSpec
 from tests.estimator.road.test_surface import CAMERA_HEIGHT, disparity_of
 from tests.estimator.synthetic_maps import repeatable
+from tests.true_disparity import true_disparity
 
 
 def street(roll_deg=4.0, seed=8, scene="street"):

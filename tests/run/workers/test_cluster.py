@@ -19,7 +19,7 @@ from rollcli.files.storage import list_names, read_bytes
 from rollcli.run.workers import cluster
 from rollcli.run.workers.chunks import Work
 from rollcli.run.workers.cluster import ClusterExecutor, check_scheduler, probe, scheduler_address
-from rollcli.run.workers.in_order import SharedPaths
+from rollcli.run.workers.in_order import Workers
 from tests.in_process import run_here
 from tests.object_store import joined, upload
 from tests.run.workers.tasks import lost, run
@@ -391,7 +391,7 @@ def test_a_scheduler_file_that_is_not_there_or_is_none_is_refused(tmp_path, cont
 
 @pytest.mark.parametrize(
     "use",
-    [lambda: check_scheduler("tcp://far:1"), lambda: ClusterExecutor("tcp://far:1", WORK, SharedPaths(), 1)],
+    [lambda: check_scheduler("tcp://far:1"), lambda: ClusterExecutor("tcp://far:1", WORK, Workers())],
     ids=["check", "executor"],
 )
 def test_without_the_extra_it_is_named(monkeypatch, use):

@@ -32,7 +32,7 @@ def results(*tasks, jobs=2):
 
 @contextlib.contextmanager
 def pool(jobs=2, work=WORK):
-    executor = PoolExecutor(jobs, work)
+    executor = PoolExecutor(jobs, work, Workers())
     try:
         yield executor
     finally:
@@ -114,7 +114,7 @@ def test_a_file_stays_open_in_the_workers(tmp_path):
     path = tmp_path / "locked"
     descriptor = os.open(path, os.O_RDWR | os.O_CREAT)
     fcntl.flock(descriptor, fcntl.LOCK_EX)
-    executor = PoolExecutor(1, WORK, keep_open=descriptor)
+    executor = PoolExecutor(1, WORK, Workers(keep_open=descriptor))
     try:
         assert settled(executor, executor.submit([("give", 1)])) == [1]
         os.close(descriptor)  # the lock stays, since the worker holds the same open file
@@ -150,7 +150,7 @@ def test_workers_leave_the_signals_to_their_parent():
 def test_workers_end_after_their_task_or_at_once(tmp_path):
     for at_once, status in ((False, 0), (True, -signal.SIGKILL)):
         busy, event = tmp_path / f"busy{at_once}", tmp_path / f"event{at_once}"
-        executor = PoolExecutor(1, WORK)
+        executor = PoolExecutor(1, WORK, Workers())
         executor.submit([("hold", busy, event), ("append", tmp_path / "late", "x")])
         while not busy.exists():
             time.sleep(0.01)
@@ -174,7 +174,7 @@ def test_when_a_further_worker_cannot_start_the_others_end(monkeypatch):
 
     monkeypatch.setattr(pools, "Worker", Limited)
     with pytest.raises(WorkerError, match="no more"):
-        PoolExecutor(3, WORK)
+        PoolExecutor(3, WORK, Workers())
     assert [worker._process.is_alive() for worker in started] == [False, False]
 
 
@@ -187,7 +187,7 @@ def test_a_system_that_starts_no_process_is_said_with_a_remedy(monkeypatch):
         WorkerError,
         match=r"^a worker process cannot start: .*Too many open files; try fewer of them, with --jobs$",
     ):
-        PoolExecutor(2, WORK)
+        PoolExecutor(2, WORK, Workers())
 
 
 @pytest.mark.parametrize("error", [ImportError("no NumPy"), OSError("no library"), MemoryError("no memory")])
