@@ -5,8 +5,6 @@ in CR LF, and paths may be long. Several workers are spawned everywhere.
 """
 
 import os
-import subprocess
-import sys
 from pathlib import PureWindowsPath
 
 import pytest
@@ -17,7 +15,7 @@ from rollcli.files.stores.locations import is_url, public_name
 from rollcli.rig.calibration import CalibrationOptions
 from rollcli.rig.read_calibration import parse_calibration
 from tests.rig import calibration_files
-from tests.run_cli import contents, environment, rollcli, write_maps
+from tests.run_cli import contents, python, rollcli, write_maps
 from tests.slow import mostly_slow
 
 # a process like one of Windows: no fork, no flock, no signals but two, no flags of open that POSIX alone has
@@ -43,9 +41,7 @@ main(prog_name="rollcli")
 
 
 def without_posix(*arguments, cwd):
-    line = [sys.executable, "-c", WITHOUT_POSIX, *arguments]
-    settings = {"cwd": cwd, "env": environment(), "capture_output": True, "text": True, "timeout": 120}
-    return subprocess.run(line, check=False, **settings)
+    return python(WITHOUT_POSIX, *arguments, cwd=cwd, timeout=120)
 
 
 @pytest.mark.parametrize("jobs", mostly_slow(["1", "2"], "1"))

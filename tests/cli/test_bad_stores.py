@@ -137,17 +137,8 @@ def test_a_signed_address_works_and_is_shown_nowhere(web, tmp_path):
     write_kitti(tmp_path / "web" / "mask.png", road_map())
     (tmp_path / "web" / "broken.png").write_bytes(b"no map")
     maps = [f"{web}/{name}.png{SIGNED}" for name in ("map%201", "broken", "none")]
-    line = (
-        "estimate",
-        *maps,
-        "--mask",
-        f"{web}/mask.png{SIGNED}",
-        "-o",
-        "rolls.csv",
-        "--derotated",
-        "up",
-        "-v",
-    )
+    line = ("estimate", *maps, "--mask", f"{web}/mask.png{SIGNED}")
+    line = (*line, "-o", "rolls.csv", "--derotated", "up", "-v")
     listed = rollcli(*line, "--dry-run", cwd=tmp_path)
     done = rollcli(*line, cwd=tmp_path)
     assert done.status == 3

@@ -4,11 +4,12 @@ import os
 import pty
 import signal
 import subprocess
+from functools import partial
 from pathlib import Path
 
 import pytest
 
-from tests.run_cli import command, environment, holding, wait_until, write_maps
+from tests.run_cli import command, environment, holding, started, wait_until, write_maps
 from tests.slow import mostly_slow
 
 FRAMES = 8
@@ -74,26 +75,16 @@ def test_an_error_keeps_its_status_when_nobody_reads_its_message(maps):
 def test_a_hangup_stops_a_run_as_sigterm_does_unless_it_is_ignored(maps):
     write_maps(maps / "maps", 60)
     line = ["estimate", "maps", "-o", "rolls.csv", "-v", "-j2"]
-    run = subprocess.Popen(
-        command(*line),
-        cwd=maps,
-        env=holding(maps, "frame2"),
-        stderr=subprocess.PIPE,
-        preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_DFL),  # the tests may run under nohup
-    )
+    default = partial(signal.signal, signal.SIGHUP, signal.SIG_DFL)  # the tests may run under nohup
+    run = started(*line, cwd=maps, env=holding(maps, "frame2"), preexec_fn=default)
     wait_until((maps / "has-begun").exists)
     run.send_signal(signal.SIGHUP)
     (maps / "may-go-on").touch()
     _, err = run.communicate(timeout=60)
     assert run.returncode == 130
-    assert b"interrupted; continue with: rollcli estimate maps" in err
-    ignored = subprocess.Popen(
-        command(*line, "--resume"),
-        cwd=maps,
-        env=environment(),
-        stderr=subprocess.PIPE,
-        preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN),
-    )
+    assert "interrupted; continue with: rollcli estimate maps" in err
+    ignore = partial(signal.signal, signal.SIGHUP, signal.SIG_IGN)
+    ignored = started(*line, "--resume", cwd=maps, preexec_fn=ignore)
     ignored.send_signal(signal.SIGHUP)
     ignored.communicate(timeout=60)
     assert ignored.returncode == 0

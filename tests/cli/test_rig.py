@@ -113,18 +113,8 @@ def test_json_lines_and_standard_input_are_read_as_csv_is(folder):
 
 
 def test_a_gate_that_is_kept_ends_with_0_and_one_that_is_not_with_4(folder):
-    kept = [
-        "--expect-roll",
-        "-0.4",
-        "--within",
-        "0.5",
-        "--max-drift",
-        "1",
-        "--max-jump",
-        "0.2",
-        "--min-ok",
-        "1",
-    ]
+    kept = ["--expect-roll", "-0.4", "--within", "0.5"]
+    kept += ["--max-drift", "1", "--max-jump", "0.2", "--min-ok", "1"]
     assert rig(folder, "stable.csv", *kept).status == 0
     done = rig(folder, "jump.csv", *kept)
     assert done.status == 4

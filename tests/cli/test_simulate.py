@@ -3,13 +3,11 @@
 import json
 import re
 import signal
-import subprocess
 import sys
-import time
 
 import pytest
 
-from tests.run_cli import command, environment, rollcli
+from tests.run_cli import command, rollcli, started, wait_until
 
 TINY = ("--frames", "2", "--size", "64x48")
 
@@ -57,13 +55,10 @@ def test_disparities_too_large_for_the_file_are_told(tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("jobs", ["1", "2"])
 def test_ctrl_c_ends_it_with_status_130_and_without_truth(tmp_path, jobs):
-    line = command("simulate", "rig", "--frames", "700", "--size", "64x48", "-j", jobs)
-    with subprocess.Popen(line, cwd=tmp_path, env=environment(), stderr=subprocess.PIPE, text=True) as run:
-        while not (tmp_path / "rig/disparity/frame_0003.png").exists():
-            time.sleep(0.02)
-            assert run.poll() is None
-        run.send_signal(signal.SIGINT)
-        _, err = run.communicate(timeout=30)
+    run = started("simulate", "rig", "--frames", "700", "--size", "64x48", "-j", jobs, cwd=tmp_path)
+    wait_until((tmp_path / "rig/disparity/frame_0003.png").exists, run)
+    run.send_signal(signal.SIGINT)
+    _, err = run.communicate(timeout=30)
     assert run.returncode == 130
     assert err.count("\n") == 1
     assert "of 700 frames; continue with: rollcli simulate rig --frames 700" in err.replace(

@@ -11,7 +11,7 @@ import pytest
 
 from rollcli.errors import OutputError
 from rollcli.files.atomic import NameTakenError, atomic_file, mark_path, remove_leftovers, write_atomic
-from tests.run_cli import leave_half
+from tests.run_cli import leave_half, python
 
 
 def open_descriptors():
@@ -238,7 +238,7 @@ def test_a_full_disk_leaves_nothing_behind(tmp_path):
     )
     target = tmp_path / "map.png"
 
-    done = subprocess.run([sys.executable, "-c", script, target], capture_output=True, text=True, check=True)
+    done = python(script, target, check=True)
 
     assert done.stdout == f"{target}: cannot be written: file too large\n"
     assert done.stderr == ""

@@ -4,7 +4,6 @@ import contextlib
 import io
 import os
 import socket
-import subprocess
 import sys
 import threading
 import time
@@ -16,26 +15,23 @@ from rollcli.errors import InputError
 from rollcli.files import bounded
 from rollcli.files.bounded import read_given
 from rollcli.files.storage import read_bytes
-from tests.run_cli import command, environment, write_maps
+from tests.run_cli import command, ended, environment, write_maps
 
 pytestmark = pytest.mark.slow
 
 GIB = 2**30
 
 
-def limited(*arguments, cwd, memory=2 * GIB, stdin=None, **variables):
+def limited(*arguments, cwd, memory=2 * GIB, stdin=None):
     """Run the program with so much memory, and at most 20 s."""
     import resource
 
-    return subprocess.run(
+    return ended(
         command(*arguments),
-        cwd=cwd,
-        env={**environment(**variables), "OPENBLAS_NUM_THREADS": "1"},
+        cwd,
+        env=environment(OPENBLAS_NUM_THREADS="1"),
         stdin=stdin,
-        capture_output=True,
-        text=True,
         timeout=20,
-        check=False,
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (memory, memory)),
     )
 

@@ -1,8 +1,6 @@
 """Map files are read as they are stored, whatever they are called; what cannot be read is named."""
 
 import os
-import subprocess
-import sys
 
 import cv2
 import numpy as np
@@ -13,6 +11,7 @@ from rollcli.files.formats import decode_stored, encode_stored, read_image, read
 from rollcli.files.storage import read_bytes
 from tests.binary_files import disparity_map, make_npy, make_png, make_tiff, png_file
 from tests.files.codecs.test_png import NOISY, WRONG
+from tests.run_cli import python
 
 WRITTEN = [
     *[("png", kind) for kind in ("u1", "u2")],
@@ -216,9 +215,7 @@ def test_nothing_is_printed_about_damaged_files(tmp_path):
         "            print('refused')\n"
     )
 
-    done = subprocess.run(
-        [sys.executable, "-c", script, tmp_path], capture_output=True, text=True, check=True
-    )
+    done = python(script, tmp_path, check=True)
 
     assert done.stderr == ""
     assert done.stdout.count("refused") > 80

@@ -206,18 +206,8 @@ def test_only_the_pages_own_scripts_and_styles_are_active_and_nothing_is_request
 @pytest.mark.slow
 def test_pairs_are_shown_from_their_computed_maps_or_matched_anew(tmp_path):
     rollcli("simulate", "rig", "--frames", "2", "--size", "200x120", "-q", cwd=tmp_path)
-    line = [
-        "estimate",
-        "--left",
-        "rig/left",
-        "--right",
-        "rig/right",
-        "-o",
-        "rolls.csv",
-        "--disparity",
-        "maps",
-    ]
-    rollcli(*line, "--save-as", "npy", "--num-disparities", "32", cwd=tmp_path)
+    pair = ["--left", "rig/left", "--right", "rig/right", "--num-disparities", "32"]
+    rollcli("estimate", *pair, "-o", "rolls.csv", "--disparity", "maps", "--save-as", "npy", cwd=tmp_path)
     assert report(tmp_path, "rolls.csv", "--images", "maps").status == 0
     from_maps = PICTURES.findall(page_of(tmp_path))
     shutil.rmtree(tmp_path / "maps")

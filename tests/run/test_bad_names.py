@@ -1,13 +1,11 @@
 """Inputs that the system refuses to look at: each costs its row, never the batch."""
 
-import csv
 import os
 import shutil
-import subprocess
 
 import pytest
 
-from tests.run_cli import command, environment, python, rollcli, write_maps
+from tests.run_cli import command, ended, python, rollcli, rollcli_process, rows_of, write_maps
 
 LONG = "x" * 300 + ".png"
 # calls that name this file fail, as those of a dying disk or a lost server do
@@ -30,9 +28,8 @@ main()
 FRAMES = 3
 
 
-def statuses(folder, name="rolls.csv"):
-    with (folder / name).open(newline="") as file:
-        return [row["status"] for row in csv.DictReader(file)]
+def statuses(folder):
+    return [row["status"] for row in rows_of((folder / "rolls.csv").read_text())]
 
 
 def run_failing(folder, calls, *arguments):
@@ -72,14 +69,7 @@ def test_a_file_in_a_folder_that_may_not_be_entered_costs_its_row(maps):
     write_maps(maps / "locked", 1)
     (maps / "locked").chmod(0)
     line = command("estimate", "maps/frame0.png", "locked/frame0.png", "-o", "rolls.csv")
-    done = subprocess.run(
-        [*without_privilege(), *line],
-        cwd=maps,
-        env=environment(),
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = ended([*without_privilege(), *line], maps)
     (maps / "locked").chmod(0o700)
     assert done.returncode == 3, done.stderr
     assert statuses(maps) == ["error", "ok"]
@@ -109,14 +99,6 @@ def test_a_passing_fault_while_inputs_are_looked_at_does_not_hinder_a_resume(map
 @pytest.mark.parametrize("length", [248, 253, 255])
 def test_a_result_whose_name_is_too_long_for_its_record_is_one_line(maps, length):
     name = "r" * (length - 4) + ".csv"
-    done = subprocess.run(
-        command("estimate", "maps", "-o", name),
-        cwd=maps,
-        env=environment(),
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 1
-    assert done.stderr.count("\n") == 1
-    assert "file name too long" in done.stderr
+    done = rollcli_process("estimate", "maps", "-o", name, cwd=maps)
+    assert (done.status, done.err.count("\n")) == (1, 1)
+    assert "file name too long" in done.err
