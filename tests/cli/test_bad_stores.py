@@ -1,15 +1,13 @@
 """What is wrong with a store, its keys or an address is one line before any work, and shows no secret."""
 
-import functools
-import http.server
 import json
-import threading
 
 import pytest
 
 from tests.object_store import upload
 from tests.run_cli import ROOT, contents, road_map, rollcli, write_kitti, write_maps
 from tests.store_proxy import PASS, answer, proxied
+from tests.web_server import file_below, response, web_server
 
 SECRET = "c0ffee5ec2e7"
 SIGNED = f"?X-Amz-Credential={SECRET}&X-Amz-Signature={SECRET}"
@@ -110,26 +108,11 @@ def web(tmp_path):
     """The address of a web server over a folder; what is called `expired` it refuses, as a store does."""
     (tmp_path / "web").mkdir()
 
-    class Handler(http.server.SimpleHTTPRequestHandler):
-        """Takes signed addresses, and says nothing of them."""
+    def answer(asked):
+        return response(403) if "expired" in asked else file_below(tmp_path / "web", asked)
 
-        def do_GET(self):
-            """Answer."""
-            if "expired" in self.path:
-                self.send_error(403)
-            else:
-                super().do_GET()
-
-        def log_message(self, *_):
-            """Keep quiet."""
-
-    handler = functools.partial(Handler, directory=str(tmp_path / "web"))
-    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
-        thread = threading.Thread(target=server.serve_forever, args=(0.01,))  # s until it sees its end
-        thread.start()
-        yield f"http://127.0.0.1:{server.server_port}"
-        server.shutdown()
-        thread.join()
+    with web_server(answer) as (address, _):
+        yield address
 
 
 def test_a_signed_address_works_and_is_shown_nowhere(web, tmp_path):
