@@ -20,6 +20,13 @@ def disparity_map(height=37, width=53, seed=0):
     return values
 
 
+def flipped(data, bit):
+    """The same bytes but for one bit."""
+    broken = bytearray(data)
+    broken[bit // 8] ^= 1 << bit % 8
+    return bytes(broken)
+
+
 # -- PNG
 
 

@@ -15,7 +15,7 @@ from rollcli.errors import InputError
 from rollcli.files.codecs import tiff as unpack
 from rollcli.files.codecs.tiff import DamagedPartError, decode_lzw, picture, unpacked
 from rollcli.files.formats import decode_mask, decode_stored, encode_stored
-from tests.binary_files import disparity_map, lzw_encode, make_tiff
+from tests.binary_files import disparity_map, flipped, lzw_encode, make_tiff
 
 KINDS = ("u1", "u2", "i2", "f2", "f4", "f8")
 
@@ -224,12 +224,6 @@ def data_of(tiff):
     count = tiff.index(struct.pack("<HHI", 279, 4, 1)) + 8
     first = int.from_bytes(tiff[start : start + 4], "little")
     return first, first + int.from_bytes(tiff[count : count + 4], "little")
-
-
-def flipped(data, bit):
-    broken = bytearray(data)
-    broken[bit // 8] ^= 1 << bit % 8
-    return bytes(broken)
 
 
 @pytest.mark.parametrize(("kind", "predictor"), [("u2", 1), ("u2", 2), ("f4", 3)])
