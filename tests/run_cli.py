@@ -131,6 +131,14 @@ def wait_until(condition: Callable[[], object], run: "subprocess.Popen[Any] | No
         time.sleep(0.002)
 
 
+def keep_rows(path: Path, count: int, further: int = 0) -> bytes:
+    """Cut a result behind its header and some rows, or bytes of a further one; return what it was."""
+    whole = path.read_bytes()
+    lines = whole.splitlines(keepends=True)
+    path.write_bytes(b"".join(lines[: count + 1]) + b"".join(lines[count + 1 :])[:further])
+    return whole
+
+
 def contents(folder: Path) -> dict[str, bytes]:
     """Every file below a folder, by its relative path."""
     files = (path for path in folder.rglob("*") if path.is_file())

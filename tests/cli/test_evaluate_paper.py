@@ -108,25 +108,6 @@ def test_every_chart_is_drawn_in_a_browser_without_an_error(done, open_page):
 
 
 @needs_extra
-def test_what_is_there_is_kept_unless_overwrite_is_given(done):
-    folder, _ = done
-    before = contents(folder / "out")
-    assert "exists already; give --overwrite" in paper(folder).refused()
-    assert contents(folder / "out") == before
-
-
-@needs_extra
-def test_a_dry_run_lists_the_files_and_writes_none(tmp_path):
-    write_maps(tmp_path / "maps", "a.npy")
-    run = paper(tmp_path, "--dry-run")
-    assert run.status == 0
-    lines = run.out.replace("\\", "/").splitlines()
-    assert lines[0] == "read  maps/a.npy"
-    assert {line.removeprefix("write out/") for line in lines[1:]} == FILES
-    assert not (tmp_path / "out").exists()
-
-
-@needs_extra
 def test_known_angles_are_what_estimates_are_held_against(tmp_path):
     write_maps(tmp_path / "maps", "a.npy")  # rolled by -3 degrees
     (tmp_path / "truth.csv").write_text("file,roll_deg\na,-2.5\n")

@@ -92,17 +92,8 @@ def test_json_has_the_names_of_the_interface(folder):
     assert values["checks"] == []
 
 
-def test_a_result_is_not_replaced_unless_asked(folder):
-    assert rig(folder, "stable.csv", "-o", "out.txt").status == 0
-    assert "exists already; give --overwrite" in rig(folder, "stable.csv", "-o", "out.txt").refused()
+def test_a_result_that_is_read_is_never_replaced(folder):
     assert rig(folder, "stable.csv", "-o", "stable.csv", "--overwrite").status == 2
-    assert rig(folder, "stable.csv", "-o", "out.txt", "--overwrite").status == 0
-
-
-def test_dry_run_lists_files_and_does_nothing(folder):
-    done = rig(folder, "stable.csv", "--against", "jump.csv", "--dry-run", "-o", "out.txt")
-    assert done.out.splitlines() == ["read  stable.csv", "read  jump.csv", "write out.txt"]
-    assert not (folder / "out.txt").exists()
 
 
 def test_json_lines_and_standard_input_are_read_as_csv_is(folder):

@@ -27,17 +27,6 @@ def test_one_number_is_a_range_of_its_own(tmp_path):
     assert b"frame_0002,-12.500000000,3.000000000," in (tmp_path / "rig/truth.csv").read_bytes()
 
 
-def test_a_dry_run_lists_the_files_and_writes_none(tmp_path):
-    done = rollcli("simulate", "rig", *TINY, "--dry-run", cwd=tmp_path)
-    assert done.status == 0
-    lines = [line.replace("\\", "/") for line in done.out.splitlines()]
-    assert lines[:2] == ["write rig/truth.csv.run.json", "write rig/left/frame_0001.png"]
-    assert lines[-1] == "write rig/truth.csv"
-    assert lines[-2] == "write rig/calib.txt"
-    assert len(lines) == 9
-    assert not (tmp_path / "rig").exists()
-
-
 def test_a_folder_that_cannot_be_written_is_status_1(tmp_path):
     (tmp_path / "file").write_text("")
     done = rollcli("simulate", "file/rig", *TINY, cwd=tmp_path)

@@ -15,6 +15,7 @@ from tests.run_cli import (
     command,
     contents,
     ended,
+    keep_rows,
     road_map,
     rollcli,
     rows_of,
@@ -69,8 +70,7 @@ def test_a_run_over_an_archive_is_resumed_until_the_archive_changes(tmp_path):
     write_maps(tmp_path / "maps", 3)
     packed(tmp_path / "maps", tmp_path / "run.tar")
     rollcli("estimate", "run.tar", "-o", "rolls.csv", cwd=tmp_path)
-    whole = (tmp_path / "rolls.csv").read_bytes()
-    (tmp_path / "rolls.csv").write_bytes(b"".join(whole.splitlines(keepends=True)[:2]))
+    whole = keep_rows(tmp_path / "rolls.csv", 1)
     assert rollcli("estimate", "run.tar", "-o", "rolls.csv", "--resume", cwd=tmp_path).status == 0
     assert (tmp_path / "rolls.csv").read_bytes() == whole
     packed(tmp_path, tmp_path / "run.tar")

@@ -321,23 +321,13 @@ def test_a_damaged_record_of_the_run_is_refused_in_one_line(folder, record):
     assert "out/rolls.csv.run.json: is not" in report(folder, "out/rolls.csv").refused()
 
 
-def test_a_page_that_is_there_is_kept_and_inputs_are_never_replaced(folder):
-    (folder / "page.html").write_text("mine")
-    assert report(folder, "out/rolls.csv").status == 2
-    assert page_of(folder) == "mine"
+def test_inputs_are_never_replaced(folder):
     before = contents(folder / "maps")
     shutil.copy(folder / "out" / "rolls.csv", folder / "rolls")
     for target in ("rolls", "maps/frame0.png"):
         refusal = rollcli("report", "rolls", "-o", target, "--overwrite", cwd=folder).refused()
         assert "would be replaced" in refusal
     assert contents(folder / "maps") == before
-
-
-def test_a_dry_run_lists_and_writes_nothing(folder):
-    done = report(folder, "out/rolls.csv", "--dry-run")
-    assert done.out.splitlines()[0] == "read  out/rolls.csv"
-    assert done.out.splitlines()[-1] == "write page.html"
-    assert not (folder / "page.html").exists()
 
 
 def test_the_page_of_one_frame_describes_what_it_shows_and_no_more(folder):
@@ -376,12 +366,6 @@ def test_charts_are_written_for_slides_with_or_without_a_page(folder):
 
     (folder / "nothing").write_text("")
     assert rollcli("report", "out/rolls.csv", "--png", "nothing", cwd=folder).status == 1
-
-
-def test_a_dry_run_names_the_charts(folder):
-    done = rollcli("report", "out/rolls.csv", "--png", "slides", "--dry-run", cwd=folder)
-    assert done.out.splitlines()[1:] == ["write slides/roll.png", "write slides/histogram.png"]
-    assert not (folder / "slides").exists()
 
 
 def test_a_result_from_a_pipe_and_a_page_to_one(folder):

@@ -16,6 +16,7 @@ from tests.run_cli import (
     contents,
     ended,
     environment,
+    keep_rows,
     road_map,
     rollcli,
     started,
@@ -219,8 +220,7 @@ def interrupted(tmp_path):
     """A result of 5 of 10 frames."""
     write_maps(tmp_path / "maps", 10)
     rollcli("estimate", "maps", "-o", "rolls.csv", cwd=tmp_path)
-    lines = (tmp_path / "rolls.csv").read_text().splitlines(keepends=True)
-    (tmp_path / "rolls.csv").write_text("".join(lines[:6]))
+    keep_rows(tmp_path / "rolls.csv", 5)
     return tmp_path
 
 
