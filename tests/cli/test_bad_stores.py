@@ -61,6 +61,9 @@ def test_what_a_store_objects_to_is_said_before_any_work(bucket, store, tmp_path
     ("words", "status", "said"),
     [
         (["estimate", "s3://nowhere/a.png"], 2, "there is no such bucket"),
+        (["estimate", "s3://nowhere/maps/"], 2, "nowhere/maps/: cannot be listed: there is no such bucket"),
+        (["estimate", "s3://maps/empty/"], 2, "no input found in this folder"),
+        (["estimate", "maps", "-o", "s3://nowhere/rolls.csv"], 2, "there is no such bucket"),
         (["estimate", "maps", "--derotated", "s3://nowhere/up", "--overwrite"], 2, "there is no such bucket"),
         (["derotate", "maps", "--roll", "1", "-o", "s3://nowhere/up"], 2, "there is no such bucket"),
         (["estimate", "maps", "--derotated", "https://host/up"], 2, "web servers are read from"),
@@ -70,6 +73,7 @@ def test_what_a_store_objects_to_is_said_before_any_work(bucket, store, tmp_path
         (["estimate", "maps", "--calib", "hdfs://host/calib.txt"], 2, "hdfs:// is not supported"),
         (["estimate", f"s3://me:{SECRET}@maps/a.png"], 2, "keys go into the environment"),
         (["rig", "s3://maps/none.csv"], 2, "there is no such object"),
+        (["estimate", "maps", "--format", "parquet"], 2, "is a folder of parts: name it with --output"),
     ],
 )
 def test_a_wrong_address_is_one_line_before_any_work(bucket, tmp_path, words, status, said):

@@ -160,17 +160,6 @@ def test_a_changed_calibration_is_no_resume(maps):
     assert "the calibration differs" in refusal
 
 
-def test_python_reads_a_calibration_and_gives_radians_and_metres(maps):
-    import rollcli as library
-
-    calibration = library.read_calibration(maps / "calib.txt")
-    disparity = cast(calibration, ROLL, PITCH, HEIGHT)
-    found = library.estimate_roll(disparity, calibration=calibration, road="all")
-    assert (found.theta, found.pitch, found.height_m) == pytest.approx((ROLL, PITCH, HEIGHT), abs=1e-4)
-    plain = library.estimate_roll(disparity)
-    assert (plain.pitch, plain.pitch_ci95, plain.height_m, plain.height_ci95_m) == (None,) * 4
-
-
 def test_what_was_read_against_a_convention_is_said_once(maps):
     (maps / "left.yaml").write_text(samples.ros(RIG, right=False))
     (maps / "right.yaml").write_text(samples.ros(RIG, right=True, positive=True))

@@ -2,10 +2,11 @@
 
 import json
 import re
+import sys
 
 import pytest
 
-from tests.run_cli import rollcli
+from tests.run_cli import rollcli, write_maps
 
 RESULT = """file,status,roll_deg,roll_ci95_deg
 maps/a.png,ok,1.100000,0.200000
@@ -91,3 +92,12 @@ def test_evaluate_alone_shows_its_commands(tmp_path):
     assert done.status == 0
     assert "accuracy" in done.out
     assert "paper" in done.out
+
+
+@pytest.mark.parametrize("missing", ["plotly", "jinja2", "matplotlib"])
+def test_without_the_extra_paper_says_what_to_install_before_any_work(tmp_path, monkeypatch, missing):
+    monkeypatch.setitem(sys.modules, missing, None)
+    write_maps(tmp_path / "maps", 1)
+    refusal = rollcli("evaluate", "paper", "maps", "-o", "out", cwd=tmp_path).refused()
+    assert f"needs the extra report: {sys.executable} -m pip install {missing}\n" in refusal
+    assert not (tmp_path / "out").exists()

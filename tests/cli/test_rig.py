@@ -74,24 +74,6 @@ def test_the_table_begins_with_the_answer_and_names_the_frame_of_a_jump(folder):
     assert done.err == ""
 
 
-def test_json_has_the_names_of_the_interface(folder):
-    values = json.loads(rig(folder, "jump.csv", "--format", "json", "-q").out)
-    assert (values["frames"], values["suspect"], values["failed"]) == (3000, 2, 1)
-    assert values["used"] + values["outliers"] == 2997
-    (jump,) = values["jumps"]
-    assert set(jump) == {"frame", "file", "change_deg", "change_ci95_deg"}
-    assert jump["file"] == f"maps/frame_{jump['frame']}.png"
-    before, after = values["segments"]
-    assert (before["first"], before["last"] + 1, after["last"]) == (0, jump["frame"], 2999)
-    assert (values["roll_deg"], values["roll_ci95_deg"]) == (after["roll_deg"], after["roll_ci95_deg"])
-    assert abs(before["roll_deg"] + 0.44) < 0.15
-    for name in ("pitch_deg", "pitch_ci95_deg", "height_m", "height_ci95_m"):
-        assert values[name] is before[name] is None
-    assert values["between_frames_sd_deg"] == pytest.approx(0.1, rel=0.4)
-    assert abs(values["drift_deg"]) < 2 * values["drift_ci95_deg"]
-    assert values["checks"] == []
-
-
 def test_a_result_that_is_read_is_never_replaced(folder):
     assert rig(folder, "stable.csv", "-o", "stable.csv", "--overwrite").status == 2
 
