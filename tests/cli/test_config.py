@@ -5,7 +5,7 @@ import json
 import cv2
 import pytest
 
-from tests.run_cli import rollcli, write_maps
+from tests.run_cli import rollcli
 
 FRAMES = 1
 
@@ -152,16 +152,14 @@ def test_lists_of_numbers_and_names_with_dots_are_no_long_keys(maps):
         ("ROLLCLI_ESTIMATE_XYZZYPLUGH", "there is no such option of rollcli estimate"),
     ],
 )
-def test_a_variable_with_a_typo_is_said(tmp_path, name, said):
-    write_maps(tmp_path / "maps", 1)
-    done = rollcli("estimate", "maps", cwd=tmp_path, **{name: "4"})
+def test_a_variable_with_a_typo_is_said(maps, name, said):
+    done = rollcli("estimate", "maps", cwd=maps, **{name: "4"})
     assert done.status == 0
     assert f"rollcli: {name}: {said}\n" in done.err
-    assert name not in rollcli("estimate", "maps", "-q", cwd=tmp_path, **{name: "4"}).err
+    assert name not in rollcli("estimate", "maps", "-q", cwd=maps, **{name: "4"}).err
 
 
-def test_variables_of_this_and_other_commands_are_not_said(tmp_path):
-    write_maps(tmp_path / "maps", 1)
+def test_variables_of_this_and_other_commands_are_not_said(maps):
     known = {
         "ROLLCLI_ESTIMATE_MAX_ROLL": "30",
         "ROLLCLI_DEROTATE_ROL": "3",
@@ -169,4 +167,4 @@ def test_variables_of_this_and_other_commands_are_not_said(tmp_path):
         "ROLLCLI_STORE_TIMEOUT": "5",
         "ROLLCLI_RIG_X": "1",
     }
-    assert "ROLLCLI_" not in rollcli("estimate", "maps", cwd=tmp_path, **known).err
+    assert "ROLLCLI_" not in rollcli("estimate", "maps", cwd=maps, **known).err

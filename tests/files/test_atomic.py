@@ -10,7 +10,14 @@ from pathlib import Path
 import pytest
 
 from rollcli.errors import OutputError
-from rollcli.files.atomic import NameTakenError, atomic_file, mark_path, remove_leftovers, write_atomic
+from rollcli.files.atomic import (
+    NameTakenError,
+    atomic_file,
+    mark_path,
+    remove_leftovers,
+    sync_files,
+    write_atomic,
+)
 from tests.run_cli import leave_half, python
 
 
@@ -273,5 +280,10 @@ def test_nothing_stays_open(tmp_path):
     remove_leftovers([tmp_path / "a.png"])
     with pytest.raises(OutputError):
         write_atomic(tmp_path, b"data")
+    folders = [tmp_path / str(number) for number in range(40)]
+    for folder in folders:
+        write_atomic(folder / "map.png", b"data")
+    sync_files([folder / "map.png" for folder in folders])
+    write_atomic(tmp_path / "c.png", b"data", durable=True)
     assert open_descriptors() == before
-    assert names_in(tmp_path) == ["a.png", "b.png"]
+    assert names_in(tmp_path) == sorted([*map(str, range(40)), "a.png", "b.png", "c.png"])

@@ -1,6 +1,7 @@
 """Rows to text and back, columns of a result, and which row belongs to which file."""
 
 import io
+import itertools
 import json
 import math
 import sys
@@ -322,9 +323,11 @@ def check(found):
     assert found.methods == {"gd", "gss"}
 
 
-@pytest.mark.parametrize("before", [b"", b"\xef\xbb\xbf"])
-@pytest.mark.parametrize("form", ["csv", "jsonl"])
-def test_columns_of_text_are_those_of_the_rows(tmp_path, form, before):
+@pytest.mark.parametrize(
+    ("form", "before"),
+    [*itertools.product(("csv", "jsonl"), (b"", b"\xef\xbb\xbf")), ("parquet", b"")],
+)
+def test_columns_are_those_of_the_rows(tmp_path, form, before):
     (tmp_path / "rolls").write_bytes(before + bytes_of(form))
     (tmp_path / "rolls.run.json").write_text('{"rollcli": "1"}')
 
@@ -344,11 +347,6 @@ def test_columns_come_from_stdin_too(monkeypatch, tmp_path, form):
 
     check(found)
     assert found.run is None
-
-
-def test_columns_of_parquet_are_those_of_the_rows(tmp_path):
-    (tmp_path / "rolls").write_bytes(bytes_of("parquet"))
-    check(read_columns(str(tmp_path / "rolls"), ["roll_deg", "pitch_deg"]))
 
 
 def test_columns_of_parts_follow_each_other(tmp_path):
