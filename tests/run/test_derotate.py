@@ -1,6 +1,5 @@
 """`rollcli derotate`: maps keep what they are, and every map gets its own angle."""
 
-import csv
 import math
 import shutil
 import signal
@@ -16,7 +15,7 @@ from rollcli.run import convert_frame as work
 from rollcli.run.convert import run_conversion
 from rollcli.run.convert_frame import convert_frame
 from rollcli.run.options import DerotateOptions, EncodingOptions, InputOptions, RunningOptions
-from tests.run_cli import contents, road_map, rollcli, write_kitti, write_maps
+from tests.run_cli import contents, road_map, rollcli, rows_of, write_kitti, write_maps
 
 TYPES = {
     "png": ["u1", "u2"],
@@ -285,7 +284,7 @@ def test_a_map_whose_pixels_are_not_square_is_turned_by_the_images_angle(tmp_pat
     (tmp_path / "calib.txt").write_text(camera.format(0, 0) + camera.format(1, -100))
     done = rollcli("estimate", "maps", "--calib", "calib.txt", "-o", "rolls.csv", cwd=tmp_path)
     assert done.status == 0
-    row = next(csv.DictReader((tmp_path / "rolls.csv").read_text().splitlines()))
+    (row,) = rows_of((tmp_path / "rolls.csv").read_text())
     assert float(row["image_roll_deg"]) == pytest.approx(4, abs=0.02)
     rig_deg = math.degrees(math.atan(2 * math.tan(roll)))
     assert float(row["roll_deg"]) == pytest.approx(rig_deg, abs=0.05)

@@ -13,6 +13,7 @@ import pytest
 
 from rollcli.files.results import parse_rows
 from rollcli.run.frame import Frame
+from rollcli.run.plan import make_plan
 from rollcli.run.read import guarded
 from tests.run_cli import (
     command,
@@ -21,7 +22,6 @@ from tests.run_cli import (
     environment,
     holding,
     hooked,
-    python,
     rollcli,
     started,
     wait_until,
@@ -131,25 +131,17 @@ def test_a_result_that_is_moved_or_removed_while_running_ends_the_run_with_statu
     assert not result.exists()
 
 
-def test_a_map_that_vanishes_while_running_costs_its_row(maps):
-    gone = maps / "maps" / "frame11.png"
-    code = f"""
-import pathlib, sys
-import rollcli.run.estimate as run
-plan = run.make_plan
-def planned(options):
-    made = plan(options)
-    pathlib.Path({str(gone)!r}).unlink()
-    return made
-run.make_plan = planned
-sys.argv = ["rollcli", "estimate", "maps", "-j1"]
-from rollcli.__main__ import main
-main()
-"""
-    done = python(code, cwd=maps)
-    assert done.returncode == 3
-    assert done.stdout.splitlines()[-1].endswith(",no such file")
-    assert done.stdout.count(",ok,") == FRAMES - 1
+def test_a_map_that_vanishes_while_running_costs_its_row(maps, monkeypatch):
+    def planned(options):
+        plan = make_plan(options)
+        (maps / "maps" / "frame11.png").unlink()
+        return plan
+
+    monkeypatch.setattr("rollcli.run.estimate.make_plan", planned)
+    done = rollcli("estimate", "maps", cwd=maps)
+    assert done.status == 3
+    assert done.out.splitlines()[-1].endswith(",no such file")
+    assert done.out.count(",ok,") == FRAMES - 1
 
 
 @pytest.mark.parametrize("jobs", mostly_slow(["1", "2"], "1"))
