@@ -172,18 +172,14 @@ def shards(folder, given, count, **options):
     return [f"part{index}.csv" for index in range(1, count + 1)]
 
 
-def test_shards_in_any_order_are_the_whole_run(folder):
+def test_shards_in_any_order_are_the_whole_run_with_and_without_their_records(folder):
     names = shards(folder, rows(*drive(**JUMP), suspect={3, 4}, failed={10}), 3)
     expected = rig(folder, "jump.csv").out
     assert rig(folder, *names).out == expected
     assert rig(folder, *reversed(names)).out == expected
-
-
-def test_shards_without_records_are_put_together_by_name(folder):
-    names = shards(folder, rows(*drive(**JUMP), suspect={3, 4}, failed={10}), 3)
-    for name in names:
+    for name in names:  # which are put together by their frames, then
         (folder / f"{name}.run.json").unlink()
-    assert rig(folder, *reversed(names)).out == rig(folder, "jump.csv").out
+    assert rig(folder, *reversed(names)).out == expected
 
 
 @pytest.mark.parametrize(
