@@ -12,9 +12,6 @@ import pytest
 from rollcli.files import atomic, inputs
 from rollcli.files.inputs import find_inputs
 from rollcli.files.stores.locations import is_url, public_name
-from rollcli.rig.calibration import CalibrationOptions
-from rollcli.rig.read_calibration import parse_calibration
-from tests.rig import calibration_files
 from tests.run_cli import contents, keep_rows, python, rollcli, write_maps
 from tests.slow import mostly_slow
 
@@ -90,16 +87,6 @@ def test_lists_may_end_their_lines_in_cr_lf(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     found = find_inputs([], files_from="list.txt")
     assert [each.name for each in found] == ["maps/frame0.png", "maps/frame1.png"]
-
-
-@pytest.mark.parametrize("form", calibration_files.WHOLE)
-def test_calibrations_may_end_their_lines_in_cr_lf(form):
-    text = calibration_files.WHOLE[form](calibration_files.Rig())
-    found = [
-        parse_calibration([("calib", each.encode())], CalibrationOptions())
-        for each in (text, text.replace("\n", "\r\n"))
-    ]
-    assert found[0] == found[1]
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows takes no such path unless long paths are on")

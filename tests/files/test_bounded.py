@@ -15,6 +15,7 @@ from rollcli.errors import InputError
 from rollcli.files import bounded
 from rollcli.files.bounded import read_given
 from rollcli.files.storage import read_bytes
+from tests.binary_files import npy_header
 from tests.run_cli import command, ended, environment, write_maps
 
 pytestmark = pytest.mark.slow
@@ -40,11 +41,6 @@ def sparse(path, size, start=b""):
     path.write_bytes(start)
     os.truncate(path, size)
     return path
-
-
-def npy_header(shape, descr="<f4"):
-    text = f"{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}".encode()
-    return b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text
 
 
 needs_devices = pytest.mark.skipif(not Path("/dev/zero").exists(), reason="needs /dev/zero")
@@ -104,7 +100,8 @@ def test_an_array_is_refused_by_its_header(tmp_path):
         (800 * 2**20, (14000, 14000), "its header claims 14000 x 14000 pixels"),
         (800 * 2**20, (30000, 30000), "is truncated"),
     ]:
-        sparse(tmp_path / "a.npy", size, npy_header(shape))
+        header = f"{{'descr': '<f4', 'fortran_order': False, 'shape': {shape}, }}"
+        sparse(tmp_path / "a.npy", size, npy_header(header))
         done = limited("estimate", "a.npy", cwd=tmp_path)
         assert done.returncode == 3, done.stderr
         assert reason in done.stderr
