@@ -297,25 +297,13 @@ def test_ten_thousand_frames_stay_under_30_mb(tmp_path, monkeypatch):
     assert (tmp_path / "page.html").stat().st_size < 30e6
 
 
-@pytest.mark.parametrize(
-    ("content", "words"),
-    [
-        ("frame,angle\n1,2\n", "no column file, status, roll_deg"),
-        ("file,status,roll_deg\n", "has no rows"),
-    ],
-)
-def test_what_is_no_result_is_refused_in_one_line(tmp_path, content, words):
-    (tmp_path / "rolls.csv").write_text(content, newline="")
-    refusal = report(tmp_path, "rolls.csv").refused()
-    assert refusal.startswith("rollcli: rolls.csv: ")
-    assert words in refusal
+def test_a_result_without_rows_is_refused_in_one_line(tmp_path):
+    (tmp_path / "rolls.csv").write_text("file,status,roll_deg\n", newline="")
+    assert report(tmp_path, "rolls.csv").refused().startswith("rollcli: rolls.csv: has no rows")
     assert not (tmp_path / "page.html").exists()
 
 
-@pytest.mark.parametrize(
-    "record",
-    ["no JSON", "[]", '{"options": 3}', '{"options": {"scale": "big"}}', '{"options": {"invalid": ["x"]}}'],
-)
+@pytest.mark.parametrize("record", ["no JSON", '{"options": {"scale": "big"}}'])
 def test_a_damaged_record_of_the_run_is_refused_in_one_line(folder, record):
     (folder / "out" / "rolls.csv.run.json").write_text(record)
     assert "out/rolls.csv.run.json: is not" in report(folder, "out/rolls.csv").refused()

@@ -64,7 +64,9 @@ def test_options_are_read_back_as_they_were_given(options):
     assert run["options"]["roi"] == [0, 0, 9, 9]
 
 
-@pytest.mark.parametrize("given", [[], "x", {"scale": "much"}, {"scale": True}, {"derotated": 5}])
+@pytest.mark.parametrize(
+    "given", [[], 3, "x", {"scale": "much"}, {"scale": True}, {"derotated": 5}, {"invalid": ["x"]}]
+)
 def test_what_is_no_record_of_options_is_refused(given):
     with pytest.raises(InputError, match="is not the record of a run"):
         recorded_options({"options": given}, "rolls.csv.run.json")
