@@ -20,6 +20,13 @@ def disparity_map(height=37, width=53, seed=0):
     return values
 
 
+def flipped(data, bit):
+    """The same bytes but for one bit."""
+    broken = bytearray(data)
+    broken[bit // 8] ^= 1 << bit % 8
+    return bytes(broken)
+
+
 # -- PNG
 
 
@@ -212,6 +219,26 @@ def _tiff_file(tags, segments, order, big, tiled, pages, page_kind):
         link = file.tell()
         file.write(struct.pack(order + offset, 0))
     return file.getvalue()
+
+
+_SHORTS = (258, 259, 262, 277, 317, 339)
+
+
+def with_fields(tiff, changes):
+    """The same little-endian TIFF with other numbers in some tags: {tag: (what stands there, the other)}."""
+    for tag, numbers in changes.items():
+        kind, fill = (3, "H2x") if tag in _SHORTS else (4, "I")
+        was, new = (struct.pack(f"<HHI{fill}", tag, kind, 1, number) for number in numbers)
+        assert was in tiff
+        tiff = tiff.replace(was, new)
+    return tiff
+
+
+def tiff_of_bits(packed, compression, bits=1, **layout):
+    """A TIFF of numbers of less than a byte, from the bytes that hold them, shape (H, W * bits / 8)."""
+    width = packed.shape[1]
+    whole = make_tiff(packed, compression, **layout)
+    return with_fields(whole, {256: (width, width * 8 // bits), 258: (8, bits)})
 
 
 # -- NPY and PFM

@@ -53,27 +53,24 @@ def rollcli(*arguments: str | Path, cwd: Path, stdin: str = "", **variables: str
 
 def rollcli_process(*arguments: str | Path, cwd: Path, stdin: str = "", **variables: str) -> Finished:
     """Run the program to its end in a process of its own; a traceback is always a failure."""
-    done = subprocess.run(
-        command(*arguments),
-        cwd=cwd,
-        input=stdin,
-        env=environment(**variables),
-        capture_output=True,
-        text=True,
-        errors="surrogateescape",
-        timeout=120,
-        check=False,
-    )
+    how = {"input": stdin, "env": environment(**variables), "errors": "surrogateescape", "timeout": 120}
+    done = ended(command(*arguments), cwd, **how)
     assert "Traceback" not in done.stderr, done.stderr
     return Finished(done.returncode, done.stdout, done.stderr)
 
 
+def ended(line: list[str | Path], cwd: Path, **how: Any) -> subprocess.CompletedProcess[Any]:
+    """Run a command line to its end, whatever its status; what it says can be read."""
+    pipe = subprocess.PIPE
+    how = {"env": environment(), "stdout": pipe, "stderr": pipe, "text": True, "check": False} | how
+    return subprocess.run(line, cwd=cwd, **how)
+
+
 def python(
-    code: str, *arguments: str | Path, cwd: Path, check: bool = False
-) -> subprocess.CompletedProcess[str]:
+    code: str, *arguments: str | Path, cwd: Path | None = None, **how: Any
+) -> subprocess.CompletedProcess[Any]:
     """Run some Python in a process of its own."""
-    line = [sys.executable, "-c", code, *map(str, arguments)]
-    return subprocess.run(line, cwd=cwd, env=environment(), capture_output=True, text=True, check=check)
+    return ended([sys.executable, "-c", code, *map(str, arguments)], cwd, **how)
 
 
 def started(*arguments: str | Path, cwd: Path, **how: Any) -> "subprocess.Popen[str]":
@@ -126,12 +123,20 @@ def leave_half(path: Path) -> None:
     subprocess.run([sys.executable, "-c", _HALF, path], check=False)
 
 
-def wait_until(condition: Callable[[], bool]) -> None:
-    """Wait for what another process brings about; fail after a minute."""
+def wait_until(condition: Callable[[], object], run: "subprocess.Popen[Any] | None" = None) -> None:
+    """Wait for what another process brings about, or for the end of a run; fail after a minute."""
     give_up = time.monotonic() + 60
-    while not condition():
+    while not condition() and (run is None or run.poll() is None):
         assert time.monotonic() < give_up
-        time.sleep(0.01)
+        time.sleep(0.002)
+
+
+def keep_rows(path: Path, count: int, further: int = 0) -> bytes:
+    """Cut a result behind its header and some rows, or bytes of a further one; return what it was."""
+    whole = path.read_bytes()
+    lines = whole.splitlines(keepends=True)
+    path.write_bytes(b"".join(lines[: count + 1]) + b"".join(lines[count + 1 :])[:further])
+    return whole
 
 
 def contents(folder: Path) -> dict[str, bytes]:

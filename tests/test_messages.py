@@ -1,14 +1,11 @@
 """Lines on standard error: one a message, whatever it holds, and never an error of their own."""
 
-import io
 import os
-import subprocess
-import sys
 
 import pytest
 
 from rollcli.messages import printable, say
-from tests.run_cli import environment
+from tests.run_cli import environment, python
 
 
 @pytest.mark.parametrize(
@@ -48,13 +45,10 @@ def test_messages_that_cannot_be_written_raise_nothing_and_leave_the_status(brok
     before = {"closed pipe": None, "closed": lambda: os.close(2), "read only": lambda: reopen_read_only()}[
         broken
     ]
-    line = [sys.executable, "-c", LOST]
-    done = subprocess.run(
-        line, env=environment(), stdout=subprocess.PIPE, stderr=write, preexec_fn=before, check=False
-    )
+    done = python(LOST, stderr=write, preexec_fn=before)
     os.close(write)
     assert done.returncode == 0
-    assert done.stdout.startswith(b"done")
+    assert done.stdout.startswith("done")
 
 
 def reopen_read_only():
@@ -62,7 +56,6 @@ def reopen_read_only():
 
 
 def test_text_of_any_encoding_can_be_said():
-    line = [sys.executable, "-c", LOST.replace("str(number)", "'ü \\udcff 日'")]
-    done = subprocess.run(line, env=environment(PYTHONIOENCODING="ascii"), capture_output=True, check=True)
-    assert done.stderr.count(b"\n") == 3
-    assert io.BytesIO(done.stderr).readline().startswith(b"rollcli: \\xfc ")
+    done = python(LOST.replace("str(number)", "'ü \\udcff 日'"), env=environment(PYTHONIOENCODING="ascii"))
+    assert (done.returncode, done.stderr.count("\n")) == (0, 3)
+    assert done.stderr.startswith("rollcli: \\xfc ")

@@ -5,8 +5,6 @@ in CR LF, and paths may be long. Several workers are spawned everywhere.
 """
 
 import os
-import subprocess
-import sys
 from pathlib import PureWindowsPath
 
 import pytest
@@ -14,10 +12,7 @@ import pytest
 from rollcli.files import atomic, inputs
 from rollcli.files.inputs import find_inputs
 from rollcli.files.stores.locations import is_url, public_name
-from rollcli.rig.calibration import CalibrationOptions
-from rollcli.rig.read_calibration import parse_calibration
-from tests.rig import calibration_files
-from tests.run_cli import contents, environment, rollcli, write_maps
+from tests.run_cli import contents, keep_rows, python, rollcli, write_maps
 from tests.slow import mostly_slow
 
 # a process like one of Windows: no fork, no flock, no signals but two, no flags of open that POSIX alone has
@@ -43,9 +38,7 @@ main(prog_name="rollcli")
 
 
 def without_posix(*arguments, cwd):
-    line = [sys.executable, "-c", WITHOUT_POSIX, *arguments]
-    settings = {"cwd": cwd, "env": environment(), "capture_output": True, "text": True, "timeout": 120}
-    return subprocess.run(line, check=False, **settings)
+    return python(WITHOUT_POSIX, *arguments, cwd=cwd, timeout=120)
 
 
 @pytest.mark.parametrize("jobs", mostly_slow(["1", "2"], "1"))
@@ -56,8 +49,7 @@ def test_a_run_needs_neither_fork_nor_flock_nor_signals_of_posix(tmp_path, jobs)
     assert (done.returncode, "Traceback" in done.stderr) == (0, False), done.stderr
     found = contents(tmp_path / "level"), (tmp_path / "rolls.csv").read_bytes()
 
-    lines = found[1].splitlines(keepends=True)
-    (tmp_path / "rolls.csv").write_bytes(b"".join(lines[:2]))
+    keep_rows(tmp_path / "rolls.csv", 1)
     done = without_posix(*line, "-o", "rolls.csv", "--resume", cwd=tmp_path)
     assert (done.returncode, "Traceback" in done.stderr) == (0, False), done.stderr
     assert (contents(tmp_path / "level"), (tmp_path / "rolls.csv").read_bytes()) == found
@@ -95,16 +87,6 @@ def test_lists_may_end_their_lines_in_cr_lf(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     found = find_inputs([], files_from="list.txt")
     assert [each.name for each in found] == ["maps/frame0.png", "maps/frame1.png"]
-
-
-@pytest.mark.parametrize("form", calibration_files.WHOLE)
-def test_calibrations_may_end_their_lines_in_cr_lf(form):
-    text = calibration_files.WHOLE[form](calibration_files.Rig())
-    found = [
-        parse_calibration([("calib", each.encode())], CalibrationOptions())
-        for each in (text, text.replace("\n", "\r\n"))
-    ]
-    assert found[0] == found[1]
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows takes no such path unless long paths are on")

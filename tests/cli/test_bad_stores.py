@@ -1,15 +1,13 @@
 """What is wrong with a store, its keys or an address is one line before any work, and shows no secret."""
 
-import functools
-import http.server
 import json
-import threading
 
 import pytest
 
 from tests.object_store import upload
 from tests.run_cli import ROOT, contents, road_map, rollcli, write_kitti, write_maps
 from tests.store_proxy import PASS, answer, proxied
+from tests.web_server import file_below, response, web_server
 
 SECRET = "c0ffee5ec2e7"
 SIGNED = f"?X-Amz-Credential={SECRET}&X-Amz-Signature={SECRET}"
@@ -63,6 +61,9 @@ def test_what_a_store_objects_to_is_said_before_any_work(bucket, store, tmp_path
     ("words", "status", "said"),
     [
         (["estimate", "s3://nowhere/a.png"], 2, "there is no such bucket"),
+        (["estimate", "s3://nowhere/maps/"], 2, "nowhere/maps/: cannot be listed: there is no such bucket"),
+        (["estimate", "s3://maps/empty/"], 2, "no input found in this folder"),
+        (["estimate", "maps", "-o", "s3://nowhere/rolls.csv"], 2, "there is no such bucket"),
         (["estimate", "maps", "--derotated", "s3://nowhere/up", "--overwrite"], 2, "there is no such bucket"),
         (["derotate", "maps", "--roll", "1", "-o", "s3://nowhere/up"], 2, "there is no such bucket"),
         (["estimate", "maps", "--derotated", "https://host/up"], 2, "web servers are read from"),
@@ -72,6 +73,7 @@ def test_what_a_store_objects_to_is_said_before_any_work(bucket, store, tmp_path
         (["estimate", "maps", "--calib", "hdfs://host/calib.txt"], 2, "hdfs:// is not supported"),
         (["estimate", f"s3://me:{SECRET}@maps/a.png"], 2, "keys go into the environment"),
         (["rig", "s3://maps/none.csv"], 2, "there is no such object"),
+        (["estimate", "maps", "--format", "parquet"], 2, "is a folder of parts: name it with --output"),
     ],
 )
 def test_a_wrong_address_is_one_line_before_any_work(bucket, tmp_path, words, status, said):
@@ -110,26 +112,11 @@ def web(tmp_path):
     """The address of a web server over a folder; what is called `expired` it refuses, as a store does."""
     (tmp_path / "web").mkdir()
 
-    class Handler(http.server.SimpleHTTPRequestHandler):
-        """Takes signed addresses, and says nothing of them."""
+    def answer(asked):
+        return response(403) if "expired" in asked else file_below(tmp_path / "web", asked)
 
-        def do_GET(self):
-            """Answer."""
-            if "expired" in self.path:
-                self.send_error(403)
-            else:
-                super().do_GET()
-
-        def log_message(self, *_):
-            """Keep quiet."""
-
-    handler = functools.partial(Handler, directory=str(tmp_path / "web"))
-    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
-        thread = threading.Thread(target=server.serve_forever, args=(0.01,))  # s until it sees its end
-        thread.start()
-        yield f"http://127.0.0.1:{server.server_port}"
-        server.shutdown()
-        thread.join()
+    with web_server(answer) as (address, _):
+        yield address
 
 
 def test_a_signed_address_works_and_is_shown_nowhere(web, tmp_path):
@@ -137,17 +124,8 @@ def test_a_signed_address_works_and_is_shown_nowhere(web, tmp_path):
     write_kitti(tmp_path / "web" / "mask.png", road_map())
     (tmp_path / "web" / "broken.png").write_bytes(b"no map")
     maps = [f"{web}/{name}.png{SIGNED}" for name in ("map%201", "broken", "none")]
-    line = (
-        "estimate",
-        *maps,
-        "--mask",
-        f"{web}/mask.png{SIGNED}",
-        "-o",
-        "rolls.csv",
-        "--derotated",
-        "up",
-        "-v",
-    )
+    line = ("estimate", *maps, "--mask", f"{web}/mask.png{SIGNED}")
+    line = (*line, "-o", "rolls.csv", "--derotated", "up", "-v")
     listed = rollcli(*line, "--dry-run", cwd=tmp_path)
     done = rollcli(*line, cwd=tmp_path)
     assert done.status == 3

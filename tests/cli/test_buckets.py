@@ -69,17 +69,3 @@ def test_parquet_parts_are_one_typed_table(tmp_path):
     assert read_result(tmp_path / "rolls.parquet").rows == read_result(tmp_path / "rolls.csv").rows
     outs = [rollcli("rig", name, cwd=tmp_path).out for name in ("rolls.parquet", "rolls.csv")]
     assert outs[0] == outs[1] != ""
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["estimate", "s3://nowhere/maps/"], "s3://nowhere/maps/: cannot be listed: there is no such bucket"),
-        (["estimate", "s3://maps/empty/"], "no input found in this folder"),
-        (["estimate", "ftp://host/maps/"], "ftp:// is not supported"),
-        (["estimate", "maps", "--format", "parquet"], "Parquet is a folder of parts: name it with --output"),
-        (["estimate", "maps", "-o", "s3://nowhere/rolls.csv"], "there is no such bucket"),
-    ],
-)
-def test_what_is_wrong_with_a_bucket_is_one_line(bucket, tmp_path, arguments, said):
-    assert said in rollcli(*arguments, cwd=tmp_path).refused()

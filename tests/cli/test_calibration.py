@@ -15,7 +15,7 @@ from rollcli.simulate.spec import draw_specs
 from tests.rig import calibration_files as samples
 from tests.rig.calibration_files import Rig
 from tests.rig.test_pose import cast
-from tests.run_cli import rollcli, rows_of
+from tests.run_cli import rollcli, rows_of, write_kitti
 
 RIG = Rig(fx=250.0, fy=250.0, cx=150.0, cy=90.0, baseline=0.5, width=320, height=200)
 CALIBRATION = Calibration(RIG.fx, RIG.fy, RIG.cx, RIG.cy, RIG.baseline)
@@ -23,15 +23,10 @@ ROLL, PITCH, HEIGHT = math.radians(2), math.radians(6), 1.5
 POSE = ("pitch_deg", "pitch_ci95_deg", "height_m", "height_ci95_m")
 
 
-def write_map(path, disparity):
-    path.parent.mkdir(exist_ok=True)
-    cv2.imwrite(str(path), np.rint(disparity * 256).astype(np.uint16))
-
-
 @pytest.fixture
 def maps(tmp_path):
     for stem in ("000000_10", "000001_10"):
-        write_map(tmp_path / "maps" / f"{stem}.png", cast(CALIBRATION, ROLL, PITCH, HEIGHT))
+        write_kitti(tmp_path / "maps" / f"{stem}.png", cast(CALIBRATION, ROLL, PITCH, HEIGHT))
     (tmp_path / "calib.txt").write_text(samples.kitti_raw(RIG))
     return tmp_path
 
@@ -100,7 +95,7 @@ def test_two_calibrations_of_one_stem_and_a_large_one_are_refused(maps):
 
 def test_a_map_at_half_the_size_uses_the_scaled_calibration(maps):
     half = CALIBRATION.for_size(320, 200).for_size(160, 100)
-    write_map(maps / "half" / "a.png", cast(half, ROLL, PITCH, HEIGHT, (100, 160)))
+    write_kitti(maps / "half" / "a.png", cast(half, ROLL, PITCH, HEIGHT, (100, 160)))
     assert_posed(rows_of(rollcli("estimate", "half", "--calib", "calib.txt", cwd=maps).out))
 
 
@@ -158,17 +153,6 @@ def test_a_changed_calibration_is_no_resume(maps):
         "estimate", "maps", "--calib", "calib.txt", "-o", "pose.csv", "--resume", cwd=maps
     ).refused()
     assert "the calibration differs" in refusal
-
-
-def test_python_reads_a_calibration_and_gives_radians_and_metres(maps):
-    import rollcli as library
-
-    calibration = library.read_calibration(maps / "calib.txt")
-    disparity = cast(calibration, ROLL, PITCH, HEIGHT)
-    found = library.estimate_roll(disparity, calibration=calibration, road="all")
-    assert (found.theta, found.pitch, found.height_m) == pytest.approx((ROLL, PITCH, HEIGHT), abs=1e-4)
-    plain = library.estimate_roll(disparity)
-    assert (plain.pitch, plain.pitch_ci95, plain.height_m, plain.height_ci95_m) == (None,) * 4
 
 
 def test_what_was_read_against_a_convention_is_said_once(maps):

@@ -5,7 +5,7 @@ import json
 import cv2
 import pytest
 
-from tests.run_cli import rollcli, write_maps
+from tests.run_cli import rollcli
 
 FRAMES = 1
 
@@ -22,14 +22,11 @@ def test_a_config_file_sets_options_of_every_kind(maps):
         'method = "exact"\nmax-roll = 30\ntolerance = 0.01\nlambda0 = "auto"\nroi = [0, 0, 100, 100]\n'
         'invalid = [1, 2.5]\npolygon = "0,0 150,0 150,110"\ntiming = true\nsave_as = "npy"\nseed = 3\n'
     )
+    expected = {"method": "exact", "max-roll": 30, "lambda0": "auto", "roi": [0, 0, 100, 100]}
+    expected |= {"invalid": [1, 2.5], "polygon": [[0, 0], [150, 0], [150, 110]]}
+    expected |= {"timing": True, "save-as": "npy", "seed": 3}
     options = options_of(maps, "--config", "rollcli.toml")
-    assert options["method"] == "exact"
-    assert options["max-roll"] == 30
-    assert options["lambda0"] == "auto"
-    assert options["roi"] == [0, 0, 100, 100]
-    assert options["invalid"] == [1, 2.5]
-    assert options["polygon"] == [[0, 0], [150, 0], [150, 110]]
-    assert (options["timing"], options["save-as"], options["seed"]) == (True, "npy", 3)
+    assert {name: options[name] for name in expected} == expected
 
 
 def test_flags_win_over_the_environment_and_the_environment_over_the_config(maps):
@@ -56,18 +53,11 @@ def test_the_config_file_itself_may_come_from_the_environment(maps):
     assert options_of(maps, ROLLCLI_ESTIMATE_CONFIG="rollcli.toml")["road"] == "all"
 
 
-@pytest.mark.parametrize(
-    ("name", "value", "key"),
-    [
-        ("ENCODING", "px", "encoding"),
-        ("TIMING", "1", "timing"),
-        ("INVALID", "5 6", "invalid"),
-        ("ROI", "0,0,90,90", "roi"),
-    ],
-)
-def test_every_kind_of_option_reads_the_environment(maps, name, value, key):
-    expected = {"encoding": "px", "timing": True, "invalid": [5, 6], "roi": [0, 0, 90, 90]}[key]
-    assert options_of(maps, **{f"ROLLCLI_ESTIMATE_{name}": value})[key] == expected
+def test_every_kind_of_option_reads_the_environment(maps):
+    given = {"ENCODING": "px", "TIMING": "1", "INVALID": "5 6", "ROI": "0,0,90,90"}
+    options = options_of(maps, **{f"ROLLCLI_ESTIMATE_{name}": value for name, value in given.items()})
+    assert (options["encoding"], options["timing"], options["invalid"]) == ("px", True, [5, 6])
+    assert options["roi"] == [0, 0, 90, 90]
 
 
 @pytest.mark.parametrize(
@@ -152,16 +142,14 @@ def test_lists_of_numbers_and_names_with_dots_are_no_long_keys(maps):
         ("ROLLCLI_ESTIMATE_XYZZYPLUGH", "there is no such option of rollcli estimate"),
     ],
 )
-def test_a_variable_with_a_typo_is_said(tmp_path, name, said):
-    write_maps(tmp_path / "maps", 1)
-    done = rollcli("estimate", "maps", cwd=tmp_path, **{name: "4"})
+def test_a_variable_with_a_typo_is_said(maps, name, said):
+    done = rollcli("estimate", "maps", cwd=maps, **{name: "4"})
     assert done.status == 0
     assert f"rollcli: {name}: {said}\n" in done.err
-    assert name not in rollcli("estimate", "maps", "-q", cwd=tmp_path, **{name: "4"}).err
+    assert name not in rollcli("estimate", "maps", "-q", cwd=maps, **{name: "4"}).err
 
 
-def test_variables_of_this_and_other_commands_are_not_said(tmp_path):
-    write_maps(tmp_path / "maps", 1)
+def test_variables_of_this_and_other_commands_are_not_said(maps):
     known = {
         "ROLLCLI_ESTIMATE_MAX_ROLL": "30",
         "ROLLCLI_DEROTATE_ROL": "3",
@@ -169,4 +157,4 @@ def test_variables_of_this_and_other_commands_are_not_said(tmp_path):
         "ROLLCLI_STORE_TIMEOUT": "5",
         "ROLLCLI_RIG_X": "1",
     }
-    assert "ROLLCLI_" not in rollcli("estimate", "maps", cwd=tmp_path, **known).err
+    assert "ROLLCLI_" not in rollcli("estimate", "maps", cwd=maps, **known).err

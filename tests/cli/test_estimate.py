@@ -51,13 +51,6 @@ def test_a_frame_that_fails_has_a_row_that_says_why_and_the_others_still_come(ma
     assert (rows[3]["roll_deg"], rows[3]["message"]) == ("", "is empty")
 
 
-def test_the_row_of_a_frame_that_fails_names_it_once_whatever_its_name_is(tmp_path):
-    (tmp_path / "two  blanks.png").write_bytes(b"x")
-    done = rollcli("estimate", "two  blanks.png", "-q", cwd=tmp_path)
-    assert done.out.splitlines()[1].startswith("two  blanks.png,,error,")
-    assert done.err.startswith("rollcli: two  blanks.png: is only 1 bytes long")
-
-
 def test_json_lines_say_the_same_as_csv(maps):
     rows = rows_of(rollcli("estimate", "maps", cwd=maps).out)
     done = rollcli("estimate", "maps", "--format", "jsonl", cwd=maps)

@@ -1,26 +1,23 @@
 """`rollcli evaluate paper` as a user runs it."""
 
-import csv
 import importlib.util
 import re
 import shutil
 import signal
-import sys
 
 import numpy as np
 import pytest
 
-from rollcli.cli.main import main
 from rollcli.evaluate import experiments as job
 from rollcli.evaluate.paper import PAGE, TABLES
 from rollcli.run.workers import tasks as run_tasks
 from tests.estimator.synthetic_maps import bent_road
-from tests.run_cli import contents, rollcli
+from tests.run_cli import contents, rollcli, rows_of
 
 FAST = ("--turns", "-8:8:8", "--timed", "1")
 FILES = {PAGE, *(f"{name}.csv" for name in TABLES)}
 
-needs_extra = pytest.mark.skipif(
+pytestmark = pytest.mark.skipif(
     not all(map(importlib.util.find_spec, ("plotly", "jinja2", "matplotlib"))),
     reason="the extra `report` is not installed",
 )
@@ -37,7 +34,7 @@ def paper(folder, *arguments):
 
 
 def read(path):
-    return list(csv.DictReader(path.read_text().splitlines()))
+    return rows_of(path.read_text())
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +45,6 @@ def done(tmp_path_factory):
     return folder, paper(folder, "-j1")
 
 
-@needs_extra
 def test_it_writes_one_page_and_a_csv_for_each_table(done):
     folder, run = done
     assert set(contents(folder / "out")) == FILES
@@ -58,7 +54,6 @@ def test_it_writes_one_page_and_a_csv_for_each_table(done):
     assert f"rollcli: out/{PAGE} and 6 tables are written\n" in run.err
 
 
-@needs_extra
 def test_a_map_that_cannot_be_read_is_named_and_ends_it_with_3(done):
     folder, run = done
     assert run.status == 3
@@ -67,7 +62,6 @@ def test_a_map_that_cannot_be_read_is_named_and_ends_it_with_3(done):
     assert "maps/empty.npy: " in (folder / "out" / PAGE).read_text()
 
 
-@needs_extra
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["svg", "pdf"])
 def test_each_chart_is_a_figure_as_wide_as_a_column_too(tmp_path, kind):
@@ -79,7 +73,6 @@ def test_each_chart_is_a_figure_as_wide_as_a_column_too(tmp_path, kind):
     assert all(width in data for data in figures.values())
 
 
-@needs_extra
 def test_the_page_needs_no_network_and_shows_file_names_as_text(done):
     page = (done[0] / "out" / PAGE).read_text()
     assert not re.search(r'<(script|link|img|iframe)[^>]+(src|href)="?(https?:)?//', page)
@@ -89,7 +82,6 @@ def test_the_page_needs_no_network_and_shows_file_names_as_text(done):
 
 
 @pytest.mark.slow
-@needs_extra
 def test_the_tables_do_not_depend_on_the_workers(done, tmp_path):
     folder, _ = done
     shutil.copytree(folder / "maps", tmp_path / "maps")
@@ -99,7 +91,6 @@ def test_the_tables_do_not_depend_on_the_workers(done, tmp_path):
 
 
 @pytest.mark.slow
-@needs_extra
 def test_every_chart_is_drawn_in_a_browser_without_an_error(done, open_page):
     page = open_page((done[0] / "out" / PAGE).as_uri())
     for each in range(5):
@@ -107,26 +98,6 @@ def test_every_chart_is_drawn_in_a_browser_without_an_error(done, open_page):
     assert page.locator(".chart").count() == 5
 
 
-@needs_extra
-def test_what_is_there_is_kept_unless_overwrite_is_given(done):
-    folder, _ = done
-    before = contents(folder / "out")
-    assert "exists already; give --overwrite" in paper(folder).refused()
-    assert contents(folder / "out") == before
-
-
-@needs_extra
-def test_a_dry_run_lists_the_files_and_writes_none(tmp_path):
-    write_maps(tmp_path / "maps", "a.npy")
-    run = paper(tmp_path, "--dry-run")
-    assert run.status == 0
-    lines = run.out.replace("\\", "/").splitlines()
-    assert lines[0] == "read  maps/a.npy"
-    assert {line.removeprefix("write out/") for line in lines[1:]} == FILES
-    assert not (tmp_path / "out").exists()
-
-
-@needs_extra
 def test_known_angles_are_what_estimates_are_held_against(tmp_path):
     write_maps(tmp_path / "maps", "a.npy")  # rolled by -3 degrees
     (tmp_path / "truth.csv").write_text("file,roll_deg\na,-2.5\n")
@@ -135,7 +106,6 @@ def test_known_angles_are_what_estimates_are_held_against(tmp_path):
     assert float(exact[0]["mean_deg"]) == pytest.approx(0.5, abs=0.05)
 
 
-@needs_extra
 def test_maps_without_a_known_angle_are_refused_by_name(tmp_path):
     write_maps(tmp_path / "maps", "a.npy", "b.npy")
     (tmp_path / "truth.csv").write_text("file,roll_deg\na,-2.5\n")
@@ -143,14 +113,12 @@ def test_maps_without_a_known_angle_are_refused_by_name(tmp_path):
     assert (run.status, run.err) == (2, "rollcli: maps/b.npy: has no known angle in truth.csv\n")
 
 
-@needs_extra
 def test_depth_maps_are_refused(tmp_path):
     write_maps(tmp_path / "maps", "a.npy")
     refusal = paper(tmp_path, "--encoding", "depth").refused()
     assert "--encoding depth: the experiments are made on disparity maps, not on depth maps" in refusal
 
 
-@needs_extra
 def test_pixels_outside_of_the_region_count_for_nothing(tmp_path):
     write_maps(tmp_path / "maps", "a.npy")
     values = np.load(tmp_path / "maps/a.npy")
@@ -163,7 +131,6 @@ def test_pixels_outside_of_the_region_count_for_nothing(tmp_path):
     assert float(exact[0]["mean_deg"]) == pytest.approx(0, abs=0.05)
 
 
-@needs_extra
 def test_an_interrupted_evaluation_writes_nothing(tmp_path, monkeypatch):
     write_maps(tmp_path / "maps", "a.npy", "b.npy")
     examine_one = job.examine_file
@@ -180,7 +147,6 @@ def test_an_interrupted_evaluation_writes_nothing(tmp_path, monkeypatch):
     assert not (tmp_path / "out").exists()
 
 
-@needs_extra
 def test_maps_that_give_no_angle_leave_nothing_and_end_with_3(tmp_path):
     (tmp_path / "maps").mkdir()
     np.save(tmp_path / "maps/flat.npy", np.full((60, 80), 7, np.float32))
@@ -188,17 +154,4 @@ def test_maps_that_give_no_angle_leave_nothing_and_end_with_3(tmp_path):
     assert run.status == 3
     assert "the same everywhere" in run.err
     assert "no map gave an angle" in run.err
-    assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.parametrize("missing", ["plotly", "jinja2", "matplotlib"])
-def test_without_the_extra_it_says_what_to_install_before_any_work(tmp_path, monkeypatch, capsys, missing):
-    monkeypatch.setitem(sys.modules, missing, None)
-    monkeypatch.chdir(tmp_path)
-    write_maps(tmp_path / "maps", "a.npy")
-    with pytest.raises(SystemExit) as exit_:
-        main(["evaluate", "paper", "maps", "-o", "out"])
-    assert exit_.value.code == 2
-    said = capsys.readouterr().err
-    assert f"needs the extra report: {sys.executable} -m pip install {missing}\n" in said
     assert not (tmp_path / "out").exists()

@@ -3,7 +3,6 @@
 import json
 import math
 import re
-import subprocess
 
 import cv2
 import numpy as np
@@ -11,7 +10,7 @@ import pytest
 
 from rollcli.simulate.build import render_frame
 from rollcli.simulate.spec import FrameSpec
-from tests.run_cli import command, environment, road_map, rollcli, rows_of, write_kitti, write_pair
+from tests.run_cli import command, ended, road_map, rollcli, rows_of, write_kitti, write_pair
 
 
 def column(text, name):
@@ -30,8 +29,7 @@ def test_shards_joined_with_standard_tools_are_the_whole(maps):
         "head -n 1 part1.csv; for part in 1 2 3; do tail -n +2 part$part.csv > body$part; done; "
         "paste -d '\\n' body1 body2 body3 | sed '/^$/d'"
     )
-    joined = subprocess.run(["sh", "-c", join], cwd=maps, capture_output=True, text=True, check=True)
-    assert joined.stdout == whole
+    assert ended(["sh", "-c", join], maps).stdout == whole
 
 
 def test_paths_come_on_standard_input_and_from_lists(maps):
@@ -47,9 +45,7 @@ def test_a_file_name_that_is_no_text_comes_back_as_it_is(tmp_path):
     name = b"fr\xe4me,\xff.png"
     write_kitti(tmp_path / "a.png", road_map())
     (tmp_path / "a.png").rename(tmp_path / name.decode("utf-8", "surrogateescape"))
-    done = subprocess.run(
-        command("estimate", "."), cwd=tmp_path, env=environment(), capture_output=True, check=True
-    )
+    done = ended(command("estimate", "."), tmp_path, text=False)
     assert done.stdout.splitlines()[1].startswith(b'"' + name + b'",,ok,')
 
 

@@ -134,26 +134,6 @@ def test_a_failed_row_has_no_heights_and_resume_makes_what_is_missing(tmp_path):
     assert sorted(contents(tmp_path / "again")) == sorted(before)
 
 
-def with_statuses(folder, *statuses):
-    """Give the rows of a result these statuses."""
-    rows = (folder / "rolls.csv").read_text().splitlines()
-    for place, status in enumerate(statuses, 1):
-        rows[place] = rows[place].replace(",ok,", f",{status},")
-    (folder / "rolls.csv").write_text("\n".join(rows) + "\n")
-
-
-def test_suspect_angles_are_used_and_counted_or_left_out(tmp_path):
-    write_maps(tmp_path / "maps", 2)
-    assert rollcli("estimate", "maps", "-o", "rolls.csv", cwd=tmp_path).status == 0
-    with_statuses(tmp_path, "suspect", "ok")
-    run = ("heights", "maps", "--from", "rolls.csv", "-o")
-    done = rollcli(*run, "all", cwd=tmp_path)
-    assert (done.status, len(contents(tmp_path / "all"))) == (0, 2)
-    assert "1 of 2 angles is suspect and used" in done.err
-    done = rollcli(*run, "sure", "--skip-suspect", cwd=tmp_path)
-    assert (done.status, sorted(contents(tmp_path / "sure"))) == (0, ["frame1.tif"])
-
-
 def test_a_result_of_other_maps_is_refused_in_a_line(tmp_path):
     write_maps(tmp_path / "maps", 2)
     assert rollcli("estimate", "maps", "-o", "rolls.csv", cwd=tmp_path).status == 0

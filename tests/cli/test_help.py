@@ -4,8 +4,6 @@ import inspect
 import math
 import re
 import shlex
-import subprocess
-import sys
 
 import click
 import pytest
@@ -14,7 +12,7 @@ from rollcli.estimator.estimate import estimate_roll
 from rollcli.files.results import FURTHER, columns
 from rollcli.run.options import MethodOptions
 from tests.readme_tables import commands
-from tests.run_cli import ROOT, environment, rollcli
+from tests.run_cli import ROOT, python, rollcli
 
 COMMANDS = dict(commands())
 HELP = """
@@ -31,8 +29,7 @@ print([name for name in "numpy cv2 tqdm tifffile plotly jinja2 dask".split() if 
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_it_has_examples_and_statuses_and_loads_nothing_heavy(tmp_path, name):
-    line = [sys.executable, "-c", HELP.format(words=name.split())]
-    done = subprocess.run(line, cwd=tmp_path, env=environment(), capture_output=True, text=True, check=True)
+    done = python(HELP.format(words=name.split()), cwd=tmp_path, check=True)
     *page, loaded = done.stdout.splitlines()
     assert loaded == "[]"
     for heading in ("Running:", "Examples:", "Environment:", "Exit status:"):

@@ -3,13 +3,12 @@
 import math
 
 import cv2
-import numpy as np
 import pytest
 
 from rollcli.rig.calibration import Calibration
 from tests.rig.calibration_files import Rig, kitti_raw, middlebury
 from tests.rig.test_pose import cast
-from tests.run_cli import rollcli, rows_of
+from tests.run_cli import rollcli, rows_of, write_kitti
 
 RIG = Rig(fx=250.0, fy=250.0, cx=150.0, cy=90.0, baseline=0.5, width=320, height=200)
 ROLL, PITCH, HEIGHT = math.radians(9), math.radians(6), 1.5
@@ -17,9 +16,8 @@ GREEN = (120, 220, 120)
 
 
 def write_map(path, rig):
-    path.parent.mkdir(exist_ok=True)
-    disparity = cast(Calibration(rig.fx, rig.fy, rig.cx, rig.cy, rig.baseline), ROLL, PITCH, HEIGHT)
-    cv2.imwrite(str(path), np.rint(disparity * 256).astype(np.uint16))
+    camera = Calibration(rig.fx, rig.fy, rig.cx, rig.cy, rig.baseline)
+    write_kitti(path, cast(camera, ROLL, PITCH, HEIGHT))
 
 
 def horizon_on(column, rig):

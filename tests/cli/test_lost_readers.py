@@ -4,11 +4,12 @@ import os
 import pty
 import signal
 import subprocess
+from functools import partial
 from pathlib import Path
 
 import pytest
 
-from tests.run_cli import command, environment, holding, wait_until, write_maps
+from tests.run_cli import command, environment, holding, started, wait_until, write_maps
 from tests.slow import mostly_slow
 
 FRAMES = 8
@@ -28,37 +29,26 @@ def start(folder, arguments, **streams):
     return subprocess.Popen(command(*arguments), cwd=folder, env=environment(), **streams)
 
 
+NO_DISK = pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
+
+
+@pytest.mark.parametrize("reader", ["pipe", "terminal", pytest.param("full disk", marks=NO_DISK)])
 @pytest.mark.parametrize("name", mostly_slow(WORK, "estimate"))
-def test_a_reader_of_messages_who_leaves_neither_ends_nor_hides_the_work(maps, name):
+def test_a_reader_of_messages_who_is_lost_neither_ends_nor_hides_the_work(maps, name, reader):
     arguments, written = WORK[name]
-    run = start(maps, arguments, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
-    run.stdout.readline()
-    run.stdout.close()
+    if reader == "full disk":
+        with Path("/dev/full").open("wb") as full:
+            run = start(maps, arguments, stderr=full)
+    else:
+        reads, writes = os.pipe() if reader == "pipe" else pty.openpty()
+        run = start(maps, arguments, stdout=writes if reader == "pipe" else None, stderr=writes)
+        os.close(writes)
+        os.read(reads, 1)
+        os.close(reads)
     assert run.wait(60) == 0
     assert len(list(maps.glob(written))) == FRAMES
     if name == "estimate":
         assert (maps / "rolls.csv").read_bytes().count(b"\n") == FRAMES + 1
-
-
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
-@pytest.mark.parametrize("name", mostly_slow(WORK, "estimate"))
-def test_messages_that_do_not_fit_on_their_disk_do_not_end_the_work(maps, name):
-    arguments, written = WORK[name]
-    with Path("/dev/full").open("wb") as full:
-        assert start(maps, arguments, stderr=full).wait(60) == 0
-    assert len(list(maps.glob(written))) == FRAMES
-
-
-@pytest.mark.parametrize("name", mostly_slow(WORK, "estimate"))
-def test_a_terminal_that_is_gone_does_not_end_the_work(maps, name):
-    arguments, written = WORK[name]
-    main, other = pty.openpty()
-    run = start(maps, arguments, stderr=other)
-    os.close(other)
-    os.read(main, 1)
-    os.close(main)
-    assert run.wait(60) == 0
-    assert len(list(maps.glob(written))) == FRAMES
 
 
 def test_an_error_keeps_its_status_when_nobody_reads_its_message(maps):
@@ -74,26 +64,16 @@ def test_an_error_keeps_its_status_when_nobody_reads_its_message(maps):
 def test_a_hangup_stops_a_run_as_sigterm_does_unless_it_is_ignored(maps):
     write_maps(maps / "maps", 60)
     line = ["estimate", "maps", "-o", "rolls.csv", "-v", "-j2"]
-    run = subprocess.Popen(
-        command(*line),
-        cwd=maps,
-        env=holding(maps, "frame2"),
-        stderr=subprocess.PIPE,
-        preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_DFL),  # the tests may run under nohup
-    )
+    default = partial(signal.signal, signal.SIGHUP, signal.SIG_DFL)  # the tests may run under nohup
+    run = started(*line, cwd=maps, env=holding(maps, "frame2"), preexec_fn=default)
     wait_until((maps / "has-begun").exists)
     run.send_signal(signal.SIGHUP)
     (maps / "may-go-on").touch()
     _, err = run.communicate(timeout=60)
     assert run.returncode == 130
-    assert b"interrupted; continue with: rollcli estimate maps" in err
-    ignored = subprocess.Popen(
-        command(*line, "--resume"),
-        cwd=maps,
-        env=environment(),
-        stderr=subprocess.PIPE,
-        preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN),
-    )
+    assert "interrupted; continue with: rollcli estimate maps" in err
+    ignore = partial(signal.signal, signal.SIGHUP, signal.SIG_IGN)
+    ignored = started(*line, "--resume", cwd=maps, preexec_fn=ignore)
     ignored.send_signal(signal.SIGHUP)
     ignored.communicate(timeout=60)
     assert ignored.returncode == 0

@@ -2,8 +2,6 @@
 
 import itertools
 import re
-import subprocess
-import sys
 from importlib.metadata import PackageNotFoundError
 
 import pytest
@@ -217,6 +215,5 @@ main()
 def test_linear_algebra_has_one_thread_when_numpy_is_loaded(tmp_path, arguments):
     write_maps(tmp_path / "maps", 1)
     variables = {name: text for name, text in environment().items() if not name.endswith("_NUM_THREADS")}
-    line = [sys.executable, "-c", WATCH_NUMPY, *arguments]
-    done = subprocess.run(line, cwd=tmp_path, env=variables, capture_output=True, text=True, check=False)
+    done = python(WATCH_NUMPY, *arguments, cwd=tmp_path, env=variables)
     assert done.stdout.startswith("threads: 1\n"), done.stderr

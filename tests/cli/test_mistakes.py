@@ -91,23 +91,17 @@ COMMANDS = {
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-@pytest.mark.parametrize("name", ["file", "message"])
-def test_half_a_character_is_no_text(tmp_path, command, name):
-    (tmp_path / "r.jsonl").write_text(json.dumps({**ROW, name: "\ud800.png"}) + "\n")
+@pytest.mark.parametrize(
+    ("name", "value"), [("file", "\ud800.png"), ("message", "\ud800.png"), ("roll_deg", 10**400)]
+)
+def test_half_a_character_is_no_text_and_a_number_of_401_digits_no_angle(tmp_path, command, name, value):
+    (tmp_path / "r.jsonl").write_text(json.dumps({**ROW, name: value}) + "\n")
     (tmp_path / "truth.csv").write_text("file,roll_deg\na.png,1\n")
     done = rollcli(*COMMANDS[command], cwd=tmp_path)
-    if name == "file" or command != "rig":
-        assert done.status == 2
-        assert f"r.jsonl: line 1: '\\ud800.png' is no value for {name}" in done.err
-    else:
+    if (name, command) == ("message", "rig"):  # which it does not read
         assert done.status == 0
-
-
-@pytest.mark.parametrize("command", COMMANDS)
-def test_a_number_of_401_digits_is_no_angle(tmp_path, command):
-    (tmp_path / "r.jsonl").write_text(json.dumps({**ROW, "roll_deg": 10**400}) + "\n")
-    (tmp_path / "truth.csv").write_text("file,roll_deg\na.png,1\n")
-    assert "is no value for roll_deg" in rollcli(*COMMANDS[command], cwd=tmp_path).refused()
+    else:
+        assert re.search(rf"r\.jsonl: line 1: ('\\ud800\.png'|10+.*) is no value for {name}", done.refused())
 
 
 @pytest.mark.parametrize("command", ["rig", "report"])

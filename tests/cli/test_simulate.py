@@ -3,13 +3,11 @@
 import json
 import re
 import signal
-import subprocess
 import sys
-import time
 
 import pytest
 
-from tests.run_cli import command, environment, rollcli
+from tests.run_cli import command, rollcli, started, wait_until
 
 TINY = ("--frames", "2", "--size", "64x48")
 
@@ -29,17 +27,6 @@ def test_one_number_is_a_range_of_its_own(tmp_path):
     assert b"frame_0002,-12.500000000,3.000000000," in (tmp_path / "rig/truth.csv").read_bytes()
 
 
-def test_a_dry_run_lists_the_files_and_writes_none(tmp_path):
-    done = rollcli("simulate", "rig", *TINY, "--dry-run", cwd=tmp_path)
-    assert done.status == 0
-    lines = [line.replace("\\", "/") for line in done.out.splitlines()]
-    assert lines[:2] == ["write rig/truth.csv.run.json", "write rig/left/frame_0001.png"]
-    assert lines[-1] == "write rig/truth.csv"
-    assert lines[-2] == "write rig/calib.txt"
-    assert len(lines) == 9
-    assert not (tmp_path / "rig").exists()
-
-
 def test_a_folder_that_cannot_be_written_is_status_1(tmp_path):
     (tmp_path / "file").write_text("")
     done = rollcli("simulate", "file/rig", *TINY, cwd=tmp_path)
@@ -57,13 +44,10 @@ def test_disparities_too_large_for_the_file_are_told(tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("jobs", ["1", "2"])
 def test_ctrl_c_ends_it_with_status_130_and_without_truth(tmp_path, jobs):
-    line = command("simulate", "rig", "--frames", "700", "--size", "64x48", "-j", jobs)
-    with subprocess.Popen(line, cwd=tmp_path, env=environment(), stderr=subprocess.PIPE, text=True) as run:
-        while not (tmp_path / "rig/disparity/frame_0003.png").exists():
-            time.sleep(0.02)
-            assert run.poll() is None
-        run.send_signal(signal.SIGINT)
-        _, err = run.communicate(timeout=30)
+    run = started("simulate", "rig", "--frames", "700", "--size", "64x48", "-j", jobs, cwd=tmp_path)
+    wait_until((tmp_path / "rig/disparity/frame_0003.png").exists, run)
+    run.send_signal(signal.SIGINT)
+    _, err = run.communicate(timeout=30)
     assert run.returncode == 130
     assert err.count("\n") == 1
     assert "of 700 frames; continue with: rollcli simulate rig --frames 700" in err.replace(

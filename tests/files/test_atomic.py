@@ -10,8 +10,15 @@ from pathlib import Path
 import pytest
 
 from rollcli.errors import OutputError
-from rollcli.files.atomic import NameTakenError, atomic_file, mark_path, remove_leftovers, write_atomic
-from tests.run_cli import leave_half
+from rollcli.files.atomic import (
+    NameTakenError,
+    atomic_file,
+    mark_path,
+    remove_leftovers,
+    sync_files,
+    write_atomic,
+)
+from tests.run_cli import leave_half, python
 
 
 def open_descriptors():
@@ -238,7 +245,7 @@ def test_a_full_disk_leaves_nothing_behind(tmp_path):
     )
     target = tmp_path / "map.png"
 
-    done = subprocess.run([sys.executable, "-c", script, target], capture_output=True, text=True, check=True)
+    done = python(script, target, check=True)
 
     assert done.stdout == f"{target}: cannot be written: file too large\n"
     assert done.stderr == ""
@@ -273,5 +280,10 @@ def test_nothing_stays_open(tmp_path):
     remove_leftovers([tmp_path / "a.png"])
     with pytest.raises(OutputError):
         write_atomic(tmp_path, b"data")
+    folders = [tmp_path / str(number) for number in range(40)]
+    for folder in folders:
+        write_atomic(folder / "map.png", b"data")
+    sync_files([folder / "map.png" for folder in folders])
+    write_atomic(tmp_path / "c.png", b"data", durable=True)
     assert open_descriptors() == before
-    assert names_in(tmp_path) == ["a.png", "b.png"]
+    assert names_in(tmp_path) == sorted([*map(str, range(40)), "a.png", "b.png", "c.png"])

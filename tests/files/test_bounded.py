@@ -4,7 +4,6 @@ import contextlib
 import io
 import os
 import socket
-import subprocess
 import sys
 import threading
 import time
@@ -16,26 +15,24 @@ from rollcli.errors import InputError
 from rollcli.files import bounded
 from rollcli.files.bounded import read_given
 from rollcli.files.storage import read_bytes
-from tests.run_cli import command, environment, write_maps
+from tests.binary_files import npy_header
+from tests.run_cli import command, ended, environment, write_maps
 
 pytestmark = pytest.mark.slow
 
 GIB = 2**30
 
 
-def limited(*arguments, cwd, memory=2 * GIB, stdin=None, **variables):
+def limited(*arguments, cwd, memory=2 * GIB, stdin=None):
     """Run the program with so much memory, and at most 20 s."""
     import resource
 
-    return subprocess.run(
+    return ended(
         command(*arguments),
-        cwd=cwd,
-        env={**environment(**variables), "OPENBLAS_NUM_THREADS": "1"},
+        cwd,
+        env=environment(OPENBLAS_NUM_THREADS="1"),
         stdin=stdin,
-        capture_output=True,
-        text=True,
         timeout=20,
-        check=False,
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (memory, memory)),
     )
 
@@ -44,11 +41,6 @@ def sparse(path, size, start=b""):
     path.write_bytes(start)
     os.truncate(path, size)
     return path
-
-
-def npy_header(shape, descr="<f4"):
-    text = f"{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}".encode()
-    return b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text
 
 
 needs_devices = pytest.mark.skipif(not Path("/dev/zero").exists(), reason="needs /dev/zero")
@@ -108,7 +100,8 @@ def test_an_array_is_refused_by_its_header(tmp_path):
         (800 * 2**20, (14000, 14000), "its header claims 14000 x 14000 pixels"),
         (800 * 2**20, (30000, 30000), "is truncated"),
     ]:
-        sparse(tmp_path / "a.npy", size, npy_header(shape))
+        header = f"{{'descr': '<f4', 'fortran_order': False, 'shape': {shape}, }}"
+        sparse(tmp_path / "a.npy", size, npy_header(header))
         done = limited("estimate", "a.npy", cwd=tmp_path)
         assert done.returncode == 3, done.stderr
         assert reason in done.stderr

@@ -11,7 +11,18 @@ from rollcli.errors import InputError, UsageError
 from rollcli.files.containers import file_of, members, shown
 from rollcli.files.search import Search
 from rollcli.files.storage import read_bytes
-from tests.run_cli import contents, road_map, rollcli, rows_of, write_kitti, write_maps, write_pair
+from tests.run_cli import (
+    command,
+    contents,
+    ended,
+    keep_rows,
+    road_map,
+    rollcli,
+    rows_of,
+    write_kitti,
+    write_maps,
+    write_pair,
+)
 
 
 def packed(folder, archive):
@@ -59,8 +70,7 @@ def test_a_run_over_an_archive_is_resumed_until_the_archive_changes(tmp_path):
     write_maps(tmp_path / "maps", 3)
     packed(tmp_path / "maps", tmp_path / "run.tar")
     rollcli("estimate", "run.tar", "-o", "rolls.csv", cwd=tmp_path)
-    whole = (tmp_path / "rolls.csv").read_bytes()
-    (tmp_path / "rolls.csv").write_bytes(b"".join(whole.splitlines(keepends=True)[:2]))
+    whole = keep_rows(tmp_path / "rolls.csv", 1)
     assert rollcli("estimate", "run.tar", "-o", "rolls.csv", "--resume", cwd=tmp_path).status == 0
     assert (tmp_path / "rolls.csv").read_bytes() == whole
     packed(tmp_path, tmp_path / "run.tar")
@@ -150,18 +160,7 @@ def test_hidden_members_are_left_out(tmp_path):
 
 def test_an_image_on_stdin_is_told_what_a_dash_means(tmp_path):
     write_maps(tmp_path / "maps", 1)
-    import subprocess
-
-    from tests.run_cli import command, environment
-
     data = (tmp_path / "maps/frame0.png").read_bytes()
-    done = subprocess.run(
-        command("estimate", "-"),
-        input=data,
-        capture_output=True,
-        env=environment(),
-        cwd=tmp_path,
-        check=False,
-    )
+    done = ended(command("estimate", "-"), tmp_path, input=data, text=False)
     assert done.returncode == 2
     assert b"-: stands for a list of files on stdin" in done.stderr

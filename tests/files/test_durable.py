@@ -92,20 +92,6 @@ def test_folders_whose_names_are_on_the_disk_are_not_named_again(tmp_path, synce
     assert {each for each, _ in synced} == {inode(second), inode(second.parent)}
 
 
-def open_descriptors():
-    return sum(1 for _ in Path("/dev/fd").iterdir())
-
-
-def test_nothing_that_was_forced_stays_open(tmp_path):
-    paths = [tmp_path / str(folder) / "map.png" for folder in range(40)]
-    for path in paths:
-        write_atomic(path, b"data")
-    before = open_descriptors()
-    sync_files(paths)
-    write_atomic(tmp_path / "map.png", b"data", durable=True)
-    assert open_descriptors() == before
-
-
 @pytest.mark.parametrize("number", [errno.EINVAL, errno.ENOTSUP, errno.EBADF, errno.EACCES, errno.EPERM])
 def test_a_file_system_that_forces_no_folders_is_no_error_and_a_disk_that_fails_is(
     tmp_path, monkeypatch, number

@@ -191,6 +191,8 @@ def test_stored_distances_are_metres_or_whole_millimetres():
     for kind in ("u2", "i2", "u4", "i4"):
         assert pixels([2000, 4000, 0], kind, encoding="depth") == [0.5, 0.25, 0]
     assert pixels([512, 0], "u2", encoding="depth", scale=1 / 256) == [0.5, 0]
+    assert pixels([500, 60000, 65535], "u2", encoding="depth", invalid=(60000,)) == [2, 0, 0]
+    assert to_disparity(stored([500], "u2"), encoding="depth").scale == 1e-3
     assert pixels([1e-45, 2], "f4", encoding="depth") == [0, 0.5]  # 1/z is too large for a float32
     assert to_disparity(stored([2], "f8"), encoding="depth").disparity.dtype == np.float64
     assert to_disparity(stored([2], "f4"), encoding="depth").disparity.dtype == np.float32

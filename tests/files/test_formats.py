@@ -1,8 +1,6 @@
 """Map files are read as they are stored, whatever they are called; what cannot be read is named."""
 
 import os
-import subprocess
-import sys
 
 import cv2
 import numpy as np
@@ -13,6 +11,7 @@ from rollcli.files.formats import decode_stored, encode_stored, read_image, read
 from rollcli.files.storage import read_bytes
 from tests.binary_files import disparity_map, make_npy, make_png, make_tiff, png_file
 from tests.files.codecs.test_png import NOISY, WRONG
+from tests.run_cli import python
 
 WRITTEN = [
     *[("png", kind) for kind in ("u1", "u2")],
@@ -133,29 +132,23 @@ def test_a_file_too_large_for_any_map_is_refused_unread(tmp_path):
 IMAGE = np.random.default_rng(0).integers(0, 256, (20, 30, 3), dtype=np.uint8)
 
 
-@pytest.mark.parametrize("ending", [".png", ".bmp", ".tif"])
-def test_camera_images_of_lossless_formats_are_read(tmp_path, ending):
-    (tmp_path / f"a{ending}").write_bytes(cv2.imencode(ending, IMAGE)[1].tobytes())
-    (tmp_path / f"b{ending}").write_bytes(cv2.imencode(ending, IMAGE[..., 0])[1].tobytes())
-
-    np.testing.assert_array_equal(read_image(tmp_path / f"a{ending}"), IMAGE)
-    grey = read_image(tmp_path / f"b{ending}")
-    np.testing.assert_array_equal(grey if grey.ndim == 2 else grey[..., 0], IMAGE[..., 0])
+GREY = IMAGE[..., 0]
+WIDE = GREY.astype(np.uint16) * 257
 
 
-@pytest.mark.parametrize(("ending", "image"), [(".ppm", IMAGE), (".pgm", IMAGE[..., 0])])
-def test_portable_pixmaps_are_read(tmp_path, ending, image):
+@pytest.mark.parametrize(
+    ("ending", "image"),
+    [
+        *((ending, IMAGE) for ending in (".png", ".bmp", ".tif", ".ppm")),
+        *((ending, GREY) for ending in (".png", ".bmp", ".tif", ".pgm")),
+        *((ending, WIDE) for ending in (".png", ".tif", ".pgm")),
+    ],
+)
+def test_camera_images_of_lossless_formats_are_read(tmp_path, ending, image):
     (tmp_path / f"a{ending}").write_bytes(cv2.imencode(ending, image)[1].tobytes())
 
-    np.testing.assert_array_equal(read_image(tmp_path / f"a{ending}"), image)
-
-
-@pytest.mark.parametrize("ending", [".png", ".pgm", ".tif"])
-def test_camera_images_of_16_bits_are_read(tmp_path, ending):
-    image = IMAGE[..., 0].astype(np.uint16) * 257
-    (tmp_path / f"a{ending}").write_bytes(cv2.imencode(ending, image)[1].tobytes())
-
-    np.testing.assert_array_equal(read_image(tmp_path / f"a{ending}"), image)
+    found = read_image(tmp_path / f"a{ending}")
+    np.testing.assert_array_equal(found if found.ndim == image.ndim else found[..., 0], image)
 
 
 def test_jpegs_are_read_upright_or_not_as_they_are_stored(tmp_path):
@@ -168,13 +161,6 @@ def test_jpegs_are_read_upright_or_not_as_they_are_stored(tmp_path):
     ("content", "reason"),
     [
         (cv2.imencode(".jpg", IMAGE)[1].tobytes()[:-200], "is a truncated JPEG"),
-        (cv2.imencode(".bmp", IMAGE)[1].tobytes()[:-200], "is truncated: 30 x 20 pixels"),
-        (cv2.imencode(".bmp", IMAGE)[1].tobytes()[:30], "is a damaged or an unusual BMP"),
-        (cv2.imencode(".ppm", IMAGE)[1].tobytes()[:-1], "is truncated: 30 x 20 pixels need 1800 bytes, 1799"),
-        (b"P5\n1000000 1000000\n255\n" + bytes(100), "is truncated"),
-        (b"P5\n" + b"# " * 5000, "its header cannot be read"),
-        (b"P5\n0 3\n255\n", "has no pixels"),
-        (b"P5\n3 3\n65536\n" + bytes(99), "its header cannot be read"),
         (make_npy(np.ones((3, 3))), "a camera image is a PNG, JPEG, TIFF"),
         (b"hello world", "is text; a camera image is"),
     ],
@@ -216,9 +202,7 @@ def test_nothing_is_printed_about_damaged_files(tmp_path):
         "            print('refused')\n"
     )
 
-    done = subprocess.run(
-        [sys.executable, "-c", script, tmp_path], capture_output=True, text=True, check=True
-    )
+    done = python(script, tmp_path, check=True)
 
     assert done.stderr == ""
     assert done.stdout.count("refused") > 80

@@ -301,33 +301,25 @@ def test_numbered_frames_in_marked_folders_are_not_taken_for_sides(here):
     assert found == [(f"run/left/frame_{n}.png", f"run/right/frame_{n}.png") for n in range(6)]
 
 
-def test_what_has_no_partner_is_named_and_counted(here):
-    here("l/a.png", *[f"l/{n}.png" for n in range(8)], "r/a.png")
-
-    with pytest.raises(UsageError, match=r"no partner found for l/0.png, l/1.png, l/2.png and 5 more"):
-        pair_inputs("l", "r")
+@pytest.mark.parametrize(
+    ("files", "sides", "reason"),
+    [
+        ("l/a l/0 l/1 l/2 l/3 r/a", "l r", "no partner found for l/0.png, l/1.png, l/2.png and 1 more"),
+        ("one/a one/b", "one one/../one", "the same images.*: one/a.png, one/b.png; name the images of the"),
+        ("one/a two/a", "one/a.png two/../one", "one/a.png: is given by --left and by --right"),
+        ("l/a", "l r", "no input found: r: no such file"),
+    ],
+)
+def test_what_cannot_be_paired_is_named_and_counted(here, files, sides, reason):
+    here(*(f"{name}.png" for name in files.split()))
+    with pytest.raises(UsageError, match=reason):
+        pair_inputs(*sides.split())
 
 
 def test_more_than_one_partner_is_an_error_that_names_them(here):
     here("l/a.png", "l/a.jpg", "r/a.png")
-
     with pytest.raises(UsageError, match=r"l/a.jpg, l/a.png, r/a.png: more than one partner"):
         pair_inputs("l", "r")
-
-
-def test_one_folder_without_marks_has_no_pairs(here):
-    here("one/a.png", "one/b.png")
-
-    with pytest.raises(UsageError, match=r"the same images.*: one/a.png, one/b.png; name the images of the"):
-        pair_inputs("one", "one/../one")
-
-
-@pytest.mark.parametrize("match", ["name", "order"])
-def test_an_image_is_no_pair_with_itself(here, match):
-    here("one/a.png", "two/a.png")
-
-    with pytest.raises(UsageError, match=r"one/a.png: is given by --left and by --right"):
-        pair_inputs("one/a.png", "two/../one", match=match)
 
 
 def test_names_that_pair_by_order_alone_are_told_so(here):
@@ -336,6 +328,8 @@ def test_names_that_pair_by_order_alone_are_told_so(here):
     with pytest.raises(UsageError, match=r"and 1 more; --match order pairs the first with the first"):
         pair_inputs("l", "r")
     assert pairs(pair_inputs("l", "r", match="order"))[1] == ("l/0003.png", "r/0004.png")
+    with pytest.raises(UsageError, match=r"l/0001.png: is given by --left and by --right"):
+        pair_inputs("l", "l/../l", match="order")
 
 
 def test_pairs_by_order_need_as_many_of_each(here):
@@ -349,13 +343,6 @@ def test_pairs_by_order_need_as_many_of_each(here):
     here("l/a3.png")
     with pytest.raises(UsageError, match="4 left and 3 right images"):
         pair_inputs("l", "r", match="order")
-
-
-def test_a_missing_side_is_named(here):
-    here("l/a.png")
-
-    with pytest.raises(UsageError, match="no input found: r: no such file"):
-        pair_inputs("l", "r")
 
 
 def test_a_list_may_be_separated_as_find_print0_does(tmp_path, monkeypatch):

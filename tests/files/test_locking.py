@@ -14,6 +14,7 @@ import pytest
 
 from rollcli.errors import OutputError, UsageError
 from rollcli.files import locking
+from tests.run_cli import python
 
 fcntl = pytest.importorskip("fcntl", reason="this system has no flock")
 
@@ -213,8 +214,7 @@ def test_only_a_regular_file_that_nobody_writes_is_abandoned(tmp_path):
 
 
 def test_of_many_that_find_the_lock_file_of_an_ended_run_one_wins(tmp_path, monkeypatch):
-    line = [sys.executable, "-c", "import os; print(os.getpid())"]
-    ended = subprocess.run(line, capture_output=True, check=True)
+    ended = python("import os; print(os.getpid())")
     stale = f"{int(ended.stdout)} {platform.node()}\nx\n"
     monkeypatch.setattr(locking, "_POLL_S", 0)
     before = sys.getswitchinterval()

@@ -1,6 +1,5 @@
 """Names of a sorted list, read as they are needed, are those of a list that is read and sorted at once."""
 
-import subprocess
 import sys
 
 import pytest
@@ -9,7 +8,7 @@ from rollcli.errors import UsageError
 from rollcli.files import inputs as manifests
 from rollcli.files.inputs import Manifest
 from rollcli.files.naming import natural_key
-from tests.run_cli import environment, rollcli, write_maps
+from tests.run_cli import keep_rows, python, rollcli, write_maps
 
 
 @pytest.fixture
@@ -76,7 +75,7 @@ def test_a_sorted_list_gives_the_bytes_of_one_that_is_read_at_once_also_after_a_
     assert (maps / "rolls.csv").read_bytes() == whole
     records = [(maps / f"{name}.csv.run.json").read_bytes() for name in ("rolls", "whole")]
     assert records[0] == records[1]
-    (maps / "rolls.csv").write_bytes(b"".join(whole.splitlines(keepends=True)[:6]))
+    keep_rows(maps / "rolls.csv", 5)
     assert rollcli(*line, "--sorted", "-o", "rolls.csv", "--resume", cwd=maps).status == 3
     assert (maps / "rolls.csv").read_bytes() == whole
 
@@ -120,11 +119,9 @@ def test_a_long_list_takes_no_memory(tmp_path):
     peaks, listed = [], tmp_path / "listed"
     for count in (1000, 200_000):
         (tmp_path / "list.txt").write_text("".join(f"/none/frame{i:09}.png\n" for i in range(count)))
-        line = [sys.executable, "-c", PEAK, "estimate", "--files-from", "list.txt", "--sorted", "--dry-run"]
+        line = ("estimate", "--files-from", "list.txt", "--sorted", "--dry-run")
         with listed.open("wb") as out:
-            done = subprocess.run(
-                line, cwd=tmp_path, env=environment(), stdout=out, stderr=subprocess.PIPE, check=False
-            )
+            done = python(PEAK, *line, cwd=tmp_path, stdout=out)
         assert listed.read_bytes().count(b"\n") == count, done.stderr
         peaks.append(int(done.stderr.split()[-1]))
     assert peaks[1] - peaks[0] < 8_000  # a list of the names alone would take 14 MB

@@ -1,6 +1,7 @@
 """Rows to text and back, columns of a result, and which row belongs to which file."""
 
 import io
+import itertools
 import json
 import math
 import sys
@@ -173,13 +174,21 @@ def test_results_made_to_harm_are_refused_in_one_short_line(tmp_path, what):
     assert len(str(caught.value)) < 400
 
 
-@pytest.mark.parametrize("record", [b"[" * 100_000, b'{"options": {"derotated": "a\\u0000b"}}', b"1" * 5000])
-def test_a_record_made_to_harm_is_refused_in_one_line(tmp_path, record):
+@pytest.mark.parametrize(
+    ("record", "said"),
+    [
+        (b"[" * 100_000, "is not JSON"),
+        (b'{"options": {"derotated": "a\\u0000b"}}', "is not JSON"),
+        (b"1" * 5000, "is not JSON"),
+        (b"[1]", "is not the record of a run$"),
+    ],
+)
+def test_a_record_that_is_none_or_made_to_harm_is_refused_in_one_line(tmp_path, record, said):
     path = tmp_path / "rolls.csv"
     path.write_bytes(format_header("csv") + format_row(ROW, "csv"))
     (tmp_path / "rolls.csv.run.json").write_bytes(record)
 
-    with pytest.raises(InputError, match=r"^[^\n]*run.json: is not JSON[^\n]*$"):
+    with pytest.raises(InputError, match=rf"^[^\n]*run.json: {said}[^\n]*$"):
         read_result(path)
 
 
@@ -270,14 +279,6 @@ def test_lines_are_numbered_in_every_form():
         list(parse_rows(b'file,status,roll_deg\n"a\nb",ok,1\na,ok,1\na,bad,1\n', "x"))
 
 
-def test_a_record_that_is_no_table_is_refused(tmp_path):
-    path = tmp_path / "rolls.csv"
-    path.write_bytes(format_header("csv"))
-    (tmp_path / "rolls.csv.run.json").write_text("[1]")
-    with pytest.raises(InputError, match=r"run.json: is not the record of a run$"):
-        read_result(path)
-
-
 HEADER = "file,right_file,status,roll_deg,roll_ci95_deg,pitch_deg,height_m"
 NUMBERS = ("roll_deg", "roll_ci95_deg", "pitch_deg", "height_m")
 WITHIN = {"roll_deg": "1.5", "roll_ci95_deg": "0.1", "pitch_deg": "-2", "height_m": "1.65"}
@@ -322,9 +323,11 @@ def check(found):
     assert found.methods == {"gd", "gss"}
 
 
-@pytest.mark.parametrize("before", [b"", b"\xef\xbb\xbf"])
-@pytest.mark.parametrize("form", ["csv", "jsonl"])
-def test_columns_of_text_are_those_of_the_rows(tmp_path, form, before):
+@pytest.mark.parametrize(
+    ("form", "before"),
+    [*itertools.product(("csv", "jsonl"), (b"", b"\xef\xbb\xbf")), ("parquet", b"")],
+)
+def test_columns_are_those_of_the_rows(tmp_path, form, before):
     (tmp_path / "rolls").write_bytes(before + bytes_of(form))
     (tmp_path / "rolls.run.json").write_text('{"rollcli": "1"}')
 
@@ -344,11 +347,6 @@ def test_columns_come_from_stdin_too(monkeypatch, tmp_path, form):
 
     check(found)
     assert found.run is None
-
-
-def test_columns_of_parquet_are_those_of_the_rows(tmp_path):
-    (tmp_path / "rolls").write_bytes(bytes_of("parquet"))
-    check(read_columns(str(tmp_path / "rolls"), ["roll_deg", "pitch_deg"]))
 
 
 def test_columns_of_parts_follow_each_other(tmp_path):

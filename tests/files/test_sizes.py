@@ -1,7 +1,6 @@
 """A small file never takes much memory, whatever it claims, and large maps are read up to a stated size."""
 
 import os
-import struct
 import subprocess
 import sys
 import zlib
@@ -13,7 +12,7 @@ import pytest
 from rollcli.errors import InputError
 from rollcli.files.codecs import raw_map
 from rollcli.files.formats import decode_image, decode_mask, decode_stored
-from tests.binary_files import make_npy, make_pfm, make_png, make_tiff, png_chunk, png_header
+from tests.binary_files import make_npy, make_pfm, make_png, make_tiff, png_chunk, png_header, tiff_of_bits
 from tests.run_cli import command, environment
 
 GIB = 2**30
@@ -34,30 +33,9 @@ def png_of(width, height, depth, colour=0, palette=b""):
     )
 
 
-def tiff_of(width, height, bits, rows=64):
-    """A Deflate TIFF of few bits a pixel, by the same trick."""
-    strip = zlib.compress(bytes((width * bits + 7) // 8 * rows), 9)
-    file = make_tiff(np.zeros((1, 8), np.uint8), "deflate")
-    strips = height // rows
-    starts, data = [], b""
-    for _ in range(strips):
-        starts.append(len(file) + len(data))
-        data += strip
-    places = len(file) + len(data)
-    fields = {
-        (256, 4, 8): struct.pack("<HHII", 256, 4, 1, width),
-        (257, 4, 1): struct.pack("<HHII", 257, 4, 1, rows * strips),
-        (278, 4, 1): struct.pack("<HHII", 278, 4, 1, rows),
-    }
-    for (tag, kind, value), new in fields.items():
-        file = file.replace(struct.pack("<HHII", tag, kind, 1, value), new)
-    file = file.replace(struct.pack("<HHIHH", 258, 3, 1, 8, 0), struct.pack("<HHIHH", 258, 3, 1, bits, 0))
-    for tag, place in ((273, places), (279, places + 4 * strips)):
-        at = file.index(struct.pack("<HHI", tag, 4, 1))
-        file = file[:at] + struct.pack("<HHII", tag, 4, strips, place) + file[at + 12 :]
-    return (
-        file + data + struct.pack(f"<{strips}I", *starts) + struct.pack(f"<{strips}I", *[len(strip)] * strips)
-    )
+def tiff_of(width, height, bits):
+    """A Deflate TIFF of few bits a pixel, which are all 0."""
+    return tiff_of_bits(np.zeros((height, width * bits // 8), np.uint8), "deflate", bits, rows_per_strip=64)
 
 
 BOMBS = {

@@ -75,11 +75,6 @@ def test_what_is_no_file_is_not_replaced_and_not_waited_for(tmp_path, kind):
     assert [each.name for each in tmp_path.iterdir()] == ["map.png"]
 
 
-def test_what_is_not_there_is_an_input_error(folder):
-    with pytest.raises(InputError, match="no such"):
-        storage.read_bytes(f"{folder}/none.png")
-
-
 def test_what_was_removed_is_gone_and_may_be_removed_again(folder):
     storage.write_bytes(f"{folder}/x", b"x")
     storage.remove(f"{folder}/x")
@@ -92,20 +87,6 @@ def test_objects_are_listed_with_their_sizes_below_their_folder_only(bucket):
         storage.write_bytes(f"{bucket}/{name}", b"12345")
     found = sorted(list_objects(f"{bucket}/listed/"))
     assert found == [(f"{bucket}/listed/a.png", 5), (f"{bucket}/listed/b/c.png", 5)]
-
-
-@pytest.mark.parametrize(
-    ("url", "said"),
-    [
-        ("s3://no-such-bucket/x", "there is no such bucket"),
-        ("s3:///x", "names no bucket"),
-        ("ftp://host/x.png", "ftp:// is not supported; use s3://"),
-    ],
-)
-def test_a_wrong_address_is_one_line(bucket, url, said):
-    with pytest.raises((InputError, UsageError), match=said) as raised:
-        storage.read_bytes(url)
-    assert "\n" not in str(raised.value)
 
 
 def test_a_store_that_does_not_answer_is_one_line_without_keys(monkeypatch):

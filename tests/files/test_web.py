@@ -2,46 +2,28 @@
 
 import contextlib
 import socket
-import threading
-from http.server import BaseHTTPRequestHandler, HTTPServer
 
 import pytest
 
 from rollcli.errors import InputError
 from rollcli.files.stores import web
+from tests.web_server import response, web_server
 
 DATA = b"a map" * 1000
 
 
-class Handler(BaseHTTPRequestHandler):
-    """Answers as its server's `answers` say, one after the other; the last one for ever."""
-
-    def do_GET(self):
-        answers = self.server.answers
-        status = answers.pop(0) if len(answers) > 1 else answers[0]
-        if status == "no web server":
-            self.wfile.write(b"220 mail.example.org\r\n")
-            return
-        self.send_response(200 if status == "cut" else status)
-        self.send_header("Content-Length", str(len(DATA)))
-        self.end_headers()
-        self.wfile.write(DATA[:100] if status == "cut" else DATA)
-
-    def log_message(self, *_):
-        pass
+ANSWERS = {"no web server": b"220 mail.example.org\r\n", "cut": response(200, DATA[:100], len(DATA))}
 
 
 @pytest.fixture
 def serve():
-    """Starts a server that gives these answers; returns the URL of a file, which has a signature."""
+    """Starts a server that gives these answers, the last for ever; returns the URL of a file, signed."""
     with contextlib.ExitStack() as stack:
 
         def start(*answers):
-            server = stack.enter_context(HTTPServer(("127.0.0.1", 0), Handler))
-            server.answers = list(answers)
-            stack.callback(server.shutdown)
-            threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01}, daemon=True).start()
-            return f"http://127.0.0.1:{server.server_port}/map.png?signature=secret"
+            left = [ANSWERS.get(each) or response(each, DATA) for each in answers]
+            served = web_server(lambda _: left.pop(0) if len(left) > 1 else left[0])
+            return f"{stack.enter_context(served)[0]}/map.png?signature=secret"
 
         yield start
 

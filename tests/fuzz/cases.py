@@ -4,25 +4,19 @@ import struct
 
 import numpy as np
 
-from tests.binary_files import make_tiff, npy_header
+from tests.binary_files import make_tiff, npy_header, with_fields
 
 
 def _one_bit_tiff() -> bytes:
     """Pixels of one bit, which tifffile decodes, in Deflate data that are wrong."""
     file = make_tiff(np.zeros((11, 17), np.uint8), "deflate")
-    bits = struct.pack("<HHIHH", 258, 3, 1, 8, 0)
-    assert bits in file
-    return file[:8] + bytes(4) + file[12:].replace(bits, struct.pack("<HHIHH", 258, 3, 1, 1, 0))
+    return with_fields(file[:8] + bytes(4) + file[12:], {258: (8, 1)})
 
 
 def _many_strips() -> bytes:
     """Millions of strips, by an unknown compression, of which three are there."""
     file = make_tiff(np.zeros((12, 17), np.uint16), "deflate", rows_per_strip=4)
-    for tag, kind, value, other in ((257, 4, 12, 7_233_902), (259, 3, 8, 65285)):
-        field = struct.pack("<HHII", tag, kind, 1, value)
-        assert field in file
-        file = file.replace(field, struct.pack("<HHII", tag, kind, 1, other))
-    return file
+    return with_fields(file, {257: (12, 7_233_902), 259: (8, 65285)})
 
 
 def _npy(descr: str) -> bytes:

@@ -19,17 +19,7 @@ from rollcli.files.results import Row, read_result
 from tests.fuzz.faulty import FAULTS, Fault, FaultyCalls
 from tests.run_cli import contents, write_maps
 
-ARGUMENTS = (
-    "estimate",
-    "maps",
-    "-q",
-    "-j",
-    "1",
-    "--derotated",
-    "out/up",
-    "--vdisparity",
-    "out/v",
-)
+ARGUMENTS = ("estimate", "maps", "-q", "-j1", "--derotated", "out/up", "--vdisparity", "out/v")
 RESULTS = {"rolls.csv": (), "rolls.parquet": ("--part-rows", "3")}
 STATUSES = (0, 1, 2, 3)
 FRAMES = 4

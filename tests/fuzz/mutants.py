@@ -36,6 +36,7 @@ FURTHER = {
         "cli/test_mistakes.py",
         "cli/test_evaluate.py",
         "cli/test_evaluate_paper.py",
+        "cli/test_outputs.py",
         "estimator/test_energy.py",
         "estimator/solvers",
     ),
@@ -75,11 +76,12 @@ FURTHER = {
     "simulate": (
         "cli/test_mistakes.py",
         "cli/test_simulate.py",
+        "cli/test_outputs.py",
         "cli/test_lost_readers.py",
         "stereo/test_alignment.py",
         "stereo/test_stereo.py",
     ),
-    "report": ("cli/test_mistakes.py",),
+    "report": ("cli/test_mistakes.py", "cli/test_outputs.py"),
     "stereo": ("run/test_estimate_pair.py",),
 }
 _QUICKLY = ("-x", "-q", "-p", "no:cacheprovider")

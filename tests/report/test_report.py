@@ -206,18 +206,8 @@ def test_only_the_pages_own_scripts_and_styles_are_active_and_nothing_is_request
 @pytest.mark.slow
 def test_pairs_are_shown_from_their_computed_maps_or_matched_anew(tmp_path):
     rollcli("simulate", "rig", "--frames", "2", "--size", "200x120", "-q", cwd=tmp_path)
-    line = [
-        "estimate",
-        "--left",
-        "rig/left",
-        "--right",
-        "rig/right",
-        "-o",
-        "rolls.csv",
-        "--disparity",
-        "maps",
-    ]
-    rollcli(*line, "--save-as", "npy", "--num-disparities", "32", cwd=tmp_path)
+    pair = ["--left", "rig/left", "--right", "rig/right", "--num-disparities", "32"]
+    rollcli("estimate", *pair, "-o", "rolls.csv", "--disparity", "maps", "--save-as", "npy", cwd=tmp_path)
     assert report(tmp_path, "rolls.csv", "--images", "maps").status == 0
     from_maps = PICTURES.findall(page_of(tmp_path))
     shutil.rmtree(tmp_path / "maps")
@@ -307,47 +297,25 @@ def test_ten_thousand_frames_stay_under_30_mb(tmp_path, monkeypatch):
     assert (tmp_path / "page.html").stat().st_size < 30e6
 
 
-@pytest.mark.parametrize(
-    ("content", "words"),
-    [
-        ("frame,angle\n1,2\n", "no column file, status, roll_deg"),
-        ("file,status,roll_deg\n", "has no rows"),
-    ],
-)
-def test_what_is_no_result_is_refused_in_one_line(tmp_path, content, words):
-    (tmp_path / "rolls.csv").write_text(content, newline="")
-    refusal = report(tmp_path, "rolls.csv").refused()
-    assert refusal.startswith("rollcli: rolls.csv: ")
-    assert words in refusal
+def test_a_result_without_rows_is_refused_in_one_line(tmp_path):
+    (tmp_path / "rolls.csv").write_text("file,status,roll_deg\n", newline="")
+    assert report(tmp_path, "rolls.csv").refused().startswith("rollcli: rolls.csv: has no rows")
     assert not (tmp_path / "page.html").exists()
 
 
-@pytest.mark.parametrize(
-    "record",
-    ["no JSON", "[]", '{"options": 3}', '{"options": {"scale": "big"}}', '{"options": {"invalid": ["x"]}}'],
-)
+@pytest.mark.parametrize("record", ["no JSON", '{"options": {"scale": "big"}}'])
 def test_a_damaged_record_of_the_run_is_refused_in_one_line(folder, record):
     (folder / "out" / "rolls.csv.run.json").write_text(record)
     assert "out/rolls.csv.run.json: is not" in report(folder, "out/rolls.csv").refused()
 
 
-def test_a_page_that_is_there_is_kept_and_inputs_are_never_replaced(folder):
-    (folder / "page.html").write_text("mine")
-    assert report(folder, "out/rolls.csv").status == 2
-    assert page_of(folder) == "mine"
+def test_inputs_are_never_replaced(folder):
     before = contents(folder / "maps")
     shutil.copy(folder / "out" / "rolls.csv", folder / "rolls")
     for target in ("rolls", "maps/frame0.png"):
         refusal = rollcli("report", "rolls", "-o", target, "--overwrite", cwd=folder).refused()
         assert "would be replaced" in refusal
     assert contents(folder / "maps") == before
-
-
-def test_a_dry_run_lists_and_writes_nothing(folder):
-    done = report(folder, "out/rolls.csv", "--dry-run")
-    assert done.out.splitlines()[0] == "read  out/rolls.csv"
-    assert done.out.splitlines()[-1] == "write page.html"
-    assert not (folder / "page.html").exists()
 
 
 def test_the_page_of_one_frame_describes_what_it_shows_and_no_more(folder):
@@ -386,12 +354,6 @@ def test_charts_are_written_for_slides_with_or_without_a_page(folder):
 
     (folder / "nothing").write_text("")
     assert rollcli("report", "out/rolls.csv", "--png", "nothing", cwd=folder).status == 1
-
-
-def test_a_dry_run_names_the_charts(folder):
-    done = rollcli("report", "out/rolls.csv", "--png", "slides", "--dry-run", cwd=folder)
-    assert done.out.splitlines()[1:] == ["write slides/roll.png", "write slides/histogram.png"]
-    assert not (folder / "slides").exists()
 
 
 def test_a_result_from_a_pipe_and_a_page_to_one(folder):

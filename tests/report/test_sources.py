@@ -1,11 +1,10 @@
 """Where the files of a row are looked for, and which frames are shown in pictures."""
 
 import math
-import threading
 from dataclasses import replace
 from functools import partial
-from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -15,6 +14,7 @@ from rollcli.report.sources import JUMP, SPREAD, SUSPECT, WIDEST, choose, subjec
 from rollcli.run.options import ImageOptions
 from tests.report.results import row, write_result
 from tests.run_cli import rollcli, write_maps
+from tests.web_server import file_below, web_server
 
 NONE = ImageOptions()
 
@@ -171,27 +171,12 @@ def test_as_many_as_asked_for_and_none_twice(count):
     assert len(chosen) == len(set(chosen)) == min(count, 20)
 
 
-class Handler(SimpleHTTPRequestHandler):
-    """Serves a folder, and notes who is asked for."""
-
-    def do_GET(self):
-        self.server.asked.append(self.path)
-        super().do_GET()
-
-    def log_message(self, *_):
-        pass
-
-
 @pytest.fixture
 def server(tmp_path):
-    folder = tmp_path / "served"
-    write_maps(folder, 1)
-    with ThreadingHTTPServer(("127.0.0.1", 0), partial(Handler, directory=folder)) as server:
-        server.asked, server.folder = [], folder
-        server.address = f"http://127.0.0.1:{server.server_port}"
-        threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01}, daemon=True).start()
-        yield server
-        server.shutdown()
+    """A server over the folder `served`: its address, what it was asked for, and the folder."""
+    write_maps(tmp_path / "served", 1)
+    with web_server(partial(file_below, tmp_path / "served")) as (address, asked):
+        yield SimpleNamespace(address=address, asked=asked, folder=tmp_path / "served")
 
 
 def report(folder, result, server, *arguments):

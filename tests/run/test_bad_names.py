@@ -1,46 +1,36 @@
 """Inputs that the system refuses to look at: each costs its row, never the batch."""
 
-import csv
+import errno
 import os
 import shutil
-import subprocess
+from functools import partial
 
 import pytest
 
-from tests.run_cli import command, environment, python, rollcli, write_maps
+from tests.run_cli import command, ended, rollcli, rollcli_process, rows_of, write_maps
 
 LONG = "x" * 300 + ".png"
-# calls that name this file fail, as those of a dying disk or a lost server do
-FAILING = """
-import errno, os, pathlib, sys  # Python 3.10 keeps what pathlib finds there
-def failing(call):
-    def wrapper(path, *args, **options):
-        if not isinstance(path, int) and os.fspath(path).endswith("frame1.png"):
-            raise OSError(errno.EIO, os.strerror(errno.EIO), path)
-        return call(path, *args, **options)
-    return wrapper
-for name in {calls}:
-    setattr(os, name, failing(getattr(os, name)))
-sys.argv = ["rollcli", *{arguments}]
-from rollcli.__main__ import main
-main()
-"""
 
 
 FRAMES = 3
 
 
-def statuses(folder, name="rolls.csv"):
-    with (folder / name).open(newline="") as file:
-        return [row["status"] for row in csv.DictReader(file)]
+def statuses(folder):
+    return [row["status"] for row in rows_of((folder / "rolls.csv").read_text())]
 
 
-def run_failing(folder, calls, *arguments):
-    """Run the program where some system calls fail for one of the maps."""
-    code = FAILING.format(calls=calls, arguments=list(arguments))
-    done = python(code, cwd=folder)
-    assert "internal error" not in done.stderr
-    return done
+def run_failing(folder, monkeypatch, calls, *arguments):
+    """Run the program where some calls fail for one of the maps, as of a dying disk or a lost server."""
+
+    def failing(call, path, *args, **options):
+        if not isinstance(path, int) and os.fspath(path).endswith("frame1.png"):
+            raise OSError(errno.EIO, os.strerror(errno.EIO), path)
+        return call(path, *args, **options)
+
+    with monkeypatch.context() as patch:
+        for name in calls:
+            patch.setattr(os, name, partial(failing, getattr(os, name)))
+        return rollcli(*arguments, cwd=folder)
 
 
 @pytest.mark.parametrize("name", [LONG, f"{LONG}/{LONG}", f"maps/{LONG}"])
@@ -72,31 +62,24 @@ def test_a_file_in_a_folder_that_may_not_be_entered_costs_its_row(maps):
     write_maps(maps / "locked", 1)
     (maps / "locked").chmod(0)
     line = command("estimate", "maps/frame0.png", "locked/frame0.png", "-o", "rolls.csv")
-    done = subprocess.run(
-        [*without_privilege(), *line],
-        cwd=maps,
-        env=environment(),
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = ended([*without_privilege(), *line], maps)
     (maps / "locked").chmod(0o700)
     assert done.returncode == 3, done.stderr
     assert statuses(maps) == ["error", "ok"]
     assert "locked/frame0.png: cannot be read: permission denied" in done.stderr
 
 
-def test_a_file_that_cannot_be_read_for_a_dying_disk_costs_its_row(maps):
+def test_a_file_that_cannot_be_read_for_a_dying_disk_costs_its_row(maps, monkeypatch):
     arguments = ("estimate", "maps", "-o", "rolls.csv", "-j1")
-    done = run_failing(maps, ["stat", "lstat", "open"], *arguments)
-    assert done.returncode == 3, done.stderr
+    done = run_failing(maps, monkeypatch, ["stat", "lstat", "open"], *arguments)
+    assert done.status == 3, done.err
     assert statuses(maps) == ["ok", "error", "ok"]
-    assert "frame1.png: cannot be read: input/output error" in done.stderr
+    assert "frame1.png: cannot be read: input/output error" in done.err
 
 
-def test_a_passing_fault_while_inputs_are_looked_at_does_not_hinder_a_resume(maps):
+def test_a_passing_fault_while_inputs_are_looked_at_does_not_hinder_a_resume(maps, monkeypatch):
     arguments = ("estimate", "maps", "-o", "rolls.csv", "-j1")
-    assert run_failing(maps, ["stat"], *arguments).returncode == 0
+    assert run_failing(maps, monkeypatch, ["stat"], *arguments).status == 0
     whole = (maps / "rolls.csv").read_bytes()
     (maps / "rolls.csv").write_bytes(whole[: whole.index(b"maps/frame1")])
     done = rollcli(*arguments, "--resume", cwd=maps)
@@ -109,14 +92,6 @@ def test_a_passing_fault_while_inputs_are_looked_at_does_not_hinder_a_resume(map
 @pytest.mark.parametrize("length", [248, 253, 255])
 def test_a_result_whose_name_is_too_long_for_its_record_is_one_line(maps, length):
     name = "r" * (length - 4) + ".csv"
-    done = subprocess.run(
-        command("estimate", "maps", "-o", name),
-        cwd=maps,
-        env=environment(),
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 1
-    assert done.stderr.count("\n") == 1
-    assert "file name too long" in done.stderr
+    done = rollcli_process("estimate", "maps", "-o", name, cwd=maps)
+    assert (done.status, done.err.count("\n")) == (1, 1)
+    assert "file name too long" in done.err

@@ -1,6 +1,5 @@
 """`rollcli derotate`: maps keep what they are, and every map gets its own angle."""
 
-import csv
 import math
 import shutil
 import signal
@@ -16,7 +15,7 @@ from rollcli.run import images as work
 from rollcli.run.convert import run_conversion
 from rollcli.run.images import convert_frame
 from rollcli.run.options import DerotateOptions, EncodingOptions, InputOptions, RunningOptions
-from tests.run_cli import contents, road_map, rollcli, write_kitti, write_maps
+from tests.run_cli import contents, road_map, rollcli, rows_of, write_kitti, write_maps
 
 TYPES = {
     "png": ["u1", "u2"],
@@ -200,23 +199,6 @@ def test_its_own_results_never_become_inputs(folder):
     assert "maps/frame1.png: would be replaced" in refusal
 
 
-def test_what_is_there_is_kept_unless_it_may_be_overwritten(folder):
-    (folder / "out").mkdir()
-    (folder / "out" / "frame2.png").write_text("mine")
-    line = ["derotate", "maps", "--roll", "2", "-o", "out"]
-
-    assert rollcli(*line, cwd=folder).status == 2
-    assert contents(folder / "out") == {"frame2.png": b"mine"}
-    assert rollcli(*line, "--overwrite", cwd=folder).status == 0
-    assert len(contents(folder / "out")) == 4
-
-
-def test_a_dry_run_lists_and_writes_nothing(folder):
-    done = rollcli("derotate", "maps", "--roll", "2", "-o", "out", "--dry-run", cwd=folder)
-    assert done.out.splitlines()[:2] == ["read  maps/frame0.png", "write out/frame0.png"]
-    assert (done.status, (folder / "out").exists()) == (0, False)
-
-
 def test_a_broken_map_costs_itself_alone(folder):
     (folder / "maps" / "frame2.png").write_bytes(b"")
     (folder / "out").mkdir()
@@ -247,9 +229,10 @@ def make_suspect(folder, *names):
     (folder / "rolls.csv").write_text("".join(doubted))
 
 
-def test_suspect_angles_are_used_and_counted_or_their_maps_are_left_out(folder):
+@pytest.mark.parametrize(("command", "ending"), [("derotate", "png"), ("heights", "tif")])
+def test_suspect_angles_are_used_and_counted_or_their_maps_are_left_out(folder, command, ending):
     make_suspect(folder, "maps/frame1", "maps/frame3")
-    line = ("derotate", "maps", "--from", "rolls.csv")
+    line = (command, "maps", "--from", "rolls.csv")
 
     used = rollcli(*line, "-o", "all", cwd=folder)
     assert "rolls.csv: 2 of 4 angles are suspect and used; --skip-suspect leaves such maps out" in used.err
@@ -257,7 +240,8 @@ def test_suspect_angles_are_used_and_counted_or_their_maps_are_left_out(folder):
 
     left_out = rollcli(*line, "-o", "sure", "--skip-suspect", cwd=folder)
     assert "rolls.csv: 2 of 4 angles are suspect; such maps are left out" in left_out.err
-    assert (left_out.status, sorted(contents(folder / "sure"))) == (0, ["frame0.png", "frame2.png"])
+    kept = [f"frame{number}.{ending}" for number in (0, 2)]
+    assert (left_out.status, sorted(contents(folder / "sure"))) == (0, kept)
 
     quiet = rollcli(*line, "-o", "quiet", "-q", cwd=folder)
     assert (quiet.status, quiet.err) == (0, "")
@@ -300,7 +284,7 @@ def test_a_map_whose_pixels_are_not_square_is_turned_by_the_images_angle(tmp_pat
     (tmp_path / "calib.txt").write_text(camera.format(0, 0) + camera.format(1, -100))
     done = rollcli("estimate", "maps", "--calib", "calib.txt", "-o", "rolls.csv", cwd=tmp_path)
     assert done.status == 0
-    row = next(csv.DictReader((tmp_path / "rolls.csv").read_text().splitlines()))
+    (row,) = rows_of((tmp_path / "rolls.csv").read_text())
     assert float(row["image_roll_deg"]) == pytest.approx(4, abs=0.02)
     rig_deg = math.degrees(math.atan(2 * math.tan(roll)))
     assert float(row["roll_deg"]) == pytest.approx(rig_deg, abs=0.05)

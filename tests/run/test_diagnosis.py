@@ -1,7 +1,5 @@
 """What is no disparity map in pixels is told what it looks like, and nothing else is."""
 
-import math
-
 import cv2
 import numpy as np
 import pytest
@@ -9,7 +7,6 @@ import pytest
 from rollcli.errors import InputError
 from rollcli.files.encodings import read_disparity, to_disparity
 from rollcli.files.formats import Stored, read_stored
-from rollcli.rig.calibration import Calibration
 from rollcli.run.diagnosis import looks_like, require_positive, too_large
 from rollcli.run.options import FrameOptions
 from tests.run_cli import ROOT, road_map
@@ -111,17 +108,3 @@ def test_a_map_of_negative_numbers_is_asked_for_its_sign(empty):
 )
 def test_a_map_without_disparities_is_not_asked_for_its_sign(values):
     require_positive(Stored(values, "npy"), "a.npy")
-
-
-def test_a_depth_becomes_the_disparity_of_its_calibration():
-    depth = np.array([[0.5, 2.0, np.inf], [0.0, -1.0, np.nan]], np.float32)
-    rig = Calibration(fx=100, fy=100, cx=1, cy=0.5, baseline=0.2, doffs=3.0, width=3, height=2)
-    # 100 px * 0.2 m / z, less 3 px
-    found = to_disparity(Stored(depth, "npy"), encoding="depth", calibration=rig)
-    assert found.disparity.ravel() == pytest.approx([37.0, 7.0, 0.0, 0.0, 0.0, 0.0])
-    millimetres = np.array([[500, 2000, 65535], [0, 60000, 0]], np.uint16)
-    found = to_disparity(Stored(millimetres, "png"), encoding="depth", calibration=rig, invalid=[60000])
-    assert found.disparity.ravel() == pytest.approx([37.0, 7.0, 0.0, 0.0, 0.0, 0.0])
-    kitti = to_disparity(Stored(np.array([[512]], np.uint16), "png"), encoding="depth", scale=1 / 256)
-    assert found.scale == 1e-3
-    assert math.isclose(kitti.disparity[0, 0], 0.5)  # 1/z of 2 m, where there is no calibration

@@ -125,18 +125,8 @@ def test_a_preview_is_a_colour_picture_beside_the_map(tmp_path):
 
 def test_the_road_of_a_pair_is_drawn_on_its_photo(tmp_path):
     write_pair(tmp_path, "a.png", road_map(0.02, width=900) / 2)
-    line = [
-        "estimate",
-        "--left",
-        "left",
-        "--right",
-        "right",
-        "--num-disparities",
-        "64",
-        "--road-mask",
-        "road",
-    ]
-    assert rollcli(*line, cwd=tmp_path).status == 0
+    pair = ("--left", "left", "--right", "right", "--num-disparities", "64")
+    assert rollcli("estimate", *pair, "--road-mask", "road", cwd=tmp_path).status == 0
     drawn = cv2.imread(str(tmp_path / "road" / "a.png")).astype(int)
     photo = cv2.imread(str(tmp_path / "left" / "a.png")).astype(int)
     assert drawn.shape == photo.shape

@@ -7,7 +7,7 @@ import pytest
 
 from rollcli.errors import OutputError
 from rollcli.run.result_file import DurableRows, ResultFile, open_result
-from tests.run_cli import contents, rollcli, write_maps
+from tests.run_cli import contents, keep_rows, rollcli, write_maps
 from tests.slow import mostly_slow
 
 IMAGES = ("--derotated", "up", "--vdisparity", "v")
@@ -84,8 +84,7 @@ def resume(folder, *arguments):
 @pytest.mark.parametrize("rows", [6, 4])
 def test_a_resume_makes_missing_and_empty_images_of_kept_rows_again(finished, rows, jobs):
     before = contents(finished)
-    lines = (finished / "rolls.csv").read_bytes().splitlines(keepends=True)
-    (finished / "rolls.csv").write_bytes(b"".join(lines[: rows + 1]))
+    keep_rows(finished / "rolls.csv", rows)
     (finished / "up" / "frame0.png").unlink()
     (finished / "v" / "frame1.png").write_bytes(b"")
     kept = (finished / "up" / "frame2.png").stat().st_mtime_ns

@@ -1,6 +1,5 @@
 """A pair, its map and the call in Python say the same."""
 
-import csv
 import math
 
 import cv2
@@ -14,7 +13,7 @@ from rollcli.files.results import ALIGNMENT_COLUMNS
 from rollcli.run.read import Provenance
 from rollcli.simulate.build import render_frame
 from rollcli.simulate.spec import FrameSpec
-from tests.run_cli import rollcli
+from tests.run_cli import rollcli, rows_of
 
 CAMERA = "P{}: {f} 0 {x} {} 0 {f} {y} 0 0 0 1 0\n"
 
@@ -40,7 +39,7 @@ def pair(tmp_path_factory):
 def row_of(folder, *inputs):
     done = rollcli("estimate", *inputs, "--calib", "calib.txt", "-o", "rolls.csv", "--overwrite", cwd=folder)
     assert done.status == 0
-    return next(csv.DictReader((folder / "rolls.csv").read_text().splitlines()))
+    return rows_of((folder / "rolls.csv").read_text())[0]
 
 
 @pytest.mark.parametrize("form", ["png", "tiff"])

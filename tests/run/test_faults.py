@@ -13,14 +13,15 @@ import pytest
 
 from rollcli.files.results import parse_rows
 from rollcli.run.frame import Frame
+from rollcli.run.plan import make_plan
 from rollcli.run.read import guarded
 from tests.run_cli import (
     command,
     contents,
+    ended,
     environment,
     holding,
     hooked,
-    python,
     rollcli,
     started,
     wait_until,
@@ -47,13 +48,10 @@ def test_a_full_device_ends_the_run_with_status_1(maps, jobs):
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
 def test_a_full_standard_output_ends_the_run_with_status_1(maps):
-    line = command("estimate", "maps", "-q")
     with Path("/dev/full").open("wb") as full:
-        done = subprocess.run(
-            line, cwd=maps, env=environment(), stdout=full, stderr=subprocess.PIPE, check=False
-        )
+        done = ended(command("estimate", "maps", "-q"), maps, stdout=full)
     assert done.returncode == 1
-    assert done.stderr.decode() == "rollcli: standard output: cannot be written: no space left on device\n"
+    assert done.stderr == "rollcli: standard output: cannot be written: no space left on device\n"
 
 
 @pytest.mark.parametrize("jobs", mostly_slow(["1", "2"], "1"))
@@ -62,13 +60,10 @@ def test_a_result_that_may_not_grow_keeps_its_whole_rows_and_is_resumed_later(ma
     arguments = ("estimate", "maps", "-o", "rolls.csv", "-q", "-j", jobs)
     rollcli("estimate", "maps", "-o", "whole.csv", "-q", cwd=maps)
     whole = (maps / "whole.csv").read_bytes()
-    limited = subprocess.run(
+    limited = ended(
         command(*arguments),
-        cwd=maps,
+        maps,
         env=environment(PYTHONDONTWRITEBYTECODE="1"),  # it would keep the first 4,000 bytes of each module
-        capture_output=True,
-        text=True,
-        check=False,
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (4000, 4000)),
     )
     assert limited.returncode == 1
@@ -86,9 +81,7 @@ def test_a_full_disk_of_images_keeps_the_rows_before_it(maps, jobs):
     disk = maps / "disk"
     disk.mkdir()
     # room for more than the eight images that two workers may be ahead of the first row with
-    mount = ["mount", "-t", "tmpfs", "-o", "size=200k", "tmpfs", disk]
-    mounted = subprocess.run(mount, capture_output=True, check=False)
-    if mounted.returncode:
+    if ended(["mount", "-t", "tmpfs", "-o", "size=200k", "tmpfs", disk], maps).returncode:
         pytest.skip("a small file system cannot be mounted here")
     try:
         arguments = ("estimate", "maps", "-o", "rolls.csv", "-q", "-j", jobs, "--derotated", "disk/upright")
@@ -127,7 +120,7 @@ def test_a_result_that_is_moved_or_removed_while_running_ends_the_run_with_statu
     write_maps(maps / "maps", 300)
     run = started("estimate", "maps", "-o", "rolls.csv", "-q", "-j", jobs, cwd=maps)
     result = maps / "rolls.csv"
-    wait_for_bytes(result, 2000)
+    wait_until(lambda: result.exists() and result.stat().st_size > 2000)
     if moved:
         result.rename(maps / "moved.csv")
     else:
@@ -138,49 +131,33 @@ def test_a_result_that_is_moved_or_removed_while_running_ends_the_run_with_statu
     assert not result.exists()
 
 
-def test_a_map_that_vanishes_while_running_costs_its_row(maps):
-    gone = maps / "maps" / "frame11.png"
-    code = f"""
-import pathlib, sys
-import rollcli.run.estimate as run
-plan = run.make_plan
-def planned(options):
-    made = plan(options)
-    pathlib.Path({str(gone)!r}).unlink()
-    return made
-run.make_plan = planned
-sys.argv = ["rollcli", "estimate", "maps", "-j1"]
-from rollcli.__main__ import main
-main()
-"""
-    done = python(code, cwd=maps)
-    assert done.returncode == 3
-    assert done.stdout.splitlines()[-1].endswith(",no such file")
-    assert done.stdout.count(",ok,") == FRAMES - 1
+def test_a_map_that_vanishes_while_running_costs_its_row(maps, monkeypatch):
+    def planned(options):
+        plan = make_plan(options)
+        (maps / "maps" / "frame11.png").unlink()
+        return plan
+
+    monkeypatch.setattr("rollcli.run.estimate.make_plan", planned)
+    done = rollcli("estimate", "maps", cwd=maps)
+    assert done.status == 3
+    assert done.out.splitlines()[-1].endswith(",no such file")
+    assert done.out.count(",ok,") == FRAMES - 1
 
 
 @pytest.mark.parametrize("jobs", mostly_slow(["1", "2"], "1"))
 def test_a_closed_pipe_ends_the_run_quietly(maps, jobs):
-    run = subprocess.Popen(
-        command("estimate", "maps", "-j", jobs, "-q"),
-        cwd=maps,
-        env=environment(),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-    )
+    run = started("estimate", "maps", "-j", jobs, "-q", cwd=maps, stdout=subprocess.PIPE)
     run.stdout.readline()
     run.stdout.close()
     err = run.stderr.read()
     run.stderr.close()
     assert run.wait(60) == 0
-    assert err == b""
+    assert err == ""
 
 
 def test_a_closed_standard_output_is_an_error_in_one_line(maps):
     line = " ".join(command("estimate", "maps", "-q")) + " >&-"
-    done = subprocess.run(
-        ["sh", "-c", line], cwd=maps, env=environment(), capture_output=True, text=True, check=False
-    )
+    done = ended(["sh", "-c", line], maps)
     assert done.returncode == 1
     assert done.stderr == "rollcli: standard output: is closed\n"
 
@@ -285,8 +262,7 @@ def test_a_worker_that_dies_while_it_writes_an_image_leaves_nothing_behind(maps,
 
 def cannot_start(maps, **how):
     """The one line of a run whose two workers cannot start."""
-    line = command("estimate", "maps", "-j2", "-o", "rolls.csv", "-q")
-    done = subprocess.run(line, cwd=maps, capture_output=True, text=True, check=False, **how)
+    done = ended(command(*ESTIMATE), maps, **how)
     assert done.returncode == 1
     assert done.stderr.startswith("rollcli: a worker process cannot start: ")
     assert done.stderr.endswith("; try fewer of them, with --jobs\n")
@@ -298,7 +274,7 @@ def cannot_start(maps, **how):
 
 def test_too_few_open_files_for_workers_end_the_run_in_one_line(maps):
     limit = partial(resource.setrlimit, resource.RLIMIT_NOFILE, (10, 10))
-    assert "Too many open files" in cannot_start(maps, env=environment(), preexec_fn=limit)
+    assert "Too many open files" in cannot_start(maps, preexec_fn=limit)
 
 
 def test_a_worker_that_cannot_load_its_libraries_ends_the_run_in_one_line(maps):
@@ -307,20 +283,12 @@ def test_a_worker_that_cannot_load_its_libraries_ends_the_run_in_one_line(maps):
 
 @pytest.mark.slow
 def test_workers_end_with_a_run_that_is_killed_also_in_the_middle_of_a_frame(maps):
-    run = subprocess.Popen(
-        command("estimate", "maps", "-j2", "-o", "rolls.csv", "-q"),
-        cwd=maps,
-        env=holding(maps, "frame8"),
-        start_new_session=True,
-    )
+    how = {"env": holding(maps, "frame8"), "stderr": None, "start_new_session": True}
+    run = started(*ESTIMATE, cwd=maps, **how)
     wait_until((maps / "has-begun").exists)
     run.kill()
     run.wait()
     wait_until(lambda: not alive_in_group(run.pid))
-
-
-def wait_for_bytes(result, size):
-    wait_until(lambda: result.exists() and result.stat().st_size > size)
 
 
 def alive_in_group(group):

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from tests.run_cli import contents, road_map, rollcli, write_kitti
+from tests.run_cli import contents, keep_rows, road_map, rollcli, write_kitti
 
 FRAMES = 4
 
@@ -34,8 +34,7 @@ def test_a_resume_without_a_result_starts_only_where_no_image_is(maps):
 def test_a_resume_in_the_folder_of_another_result_starts_only_where_no_image_is(maps):
     assert rollcli("estimate", "maps", "-o", "first.csv", "--derotated", "other", cwd=maps).status == 0
     stop_after_two_frames(maps)
-    lines = (maps / "rolls.csv").read_bytes().splitlines(keepends=True)
-    (maps / "rolls.csv").write_bytes(lines[0])  # killed before its first row
+    keep_rows(maps / "rolls.csv", 0)  # killed before its first row
     before = contents(maps / "other")
     done = estimate(maps, "--resume", images="other")
     assert done.status == 2
@@ -46,8 +45,7 @@ def test_a_resume_in_the_folder_of_another_result_starts_only_where_no_image_is(
 def test_a_run_that_was_killed_before_its_first_row_goes_on(maps):
     assert estimate(maps).status == 0
     before = contents(maps)
-    lines = (maps / "rolls.csv").read_bytes().splitlines(keepends=True)
-    (maps / "rolls.csv").write_bytes(lines[0])
+    keep_rows(maps / "rolls.csv", 0)
     assert estimate(maps, "--resume").status == 0
     assert contents(maps) == before
 

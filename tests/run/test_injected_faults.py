@@ -2,12 +2,11 @@
 
 import os
 import re
-import subprocess
 import sys
 
 import pytest
 
-from tests.run_cli import ROOT, environment
+from tests.run_cli import ROOT, ended
 
 pytestmark = pytest.mark.slow
 
@@ -18,9 +17,7 @@ if not hasattr(os, "fork"):
 def test_a_run_with_a_call_that_fails_is_resumed_to_the_same_bytes():
     # in a process of its own: a fork of this one would lack the threads that OpenCV may have started here
     line = [sys.executable, "-m", "tests.fuzz.faults", "40"]
-    done = subprocess.run(
-        line, cwd=ROOT, env=environment(), capture_output=True, text=True, timeout=600, check=False
-    )
+    done = ended(line, ROOT, timeout=600)
     assert done.returncode == 0, done.stdout + done.stderr
     (tried,) = re.findall(r"^(\d+) faults, 0 finds$", done.stdout, flags=re.M)
     assert int(tried) >= 5

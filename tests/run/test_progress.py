@@ -48,22 +48,6 @@ def test_the_exit_status_says_whether_a_frame_failed(lines):
     assert lines() == ["rollcli: a.png: is no map"]
 
 
-def test_a_cause_is_said_once_and_at_the_end_for_how_many_frames(lines):
-    counted = progress(quiet=True)
-    for name, cause, message in [
-        ("a", "empty", "is empty"),
-        ("b", "few", "only 37 valid pixels"),
-        ("c", "empty", "is empty"),
-        ("d", "few", "only 5 valid pixels"),
-        ("e", "text", "is text"),
-        ("f", "empty", "is empty"),
-    ]:
-        counted.add(failed(name, message, cause))
-    assert lines() == ["rollcli: a: is empty", "rollcli: b: only 37 valid pixels", "rollcli: e: is text"]
-    counted.tell_end()
-    assert lines() == ["rollcli: 3 frames: is empty", "rollcli: 2 frames, such as b: only 37 valid pixels"]
-
-
 def test_of_many_causes_the_first_five_are_said(lines):
     counted = progress(quiet=True)
     for cause in "abcdefg":

@@ -4,7 +4,6 @@ import json
 import os
 import shlex
 import signal
-import subprocess
 import time
 from pathlib import Path
 
@@ -12,7 +11,19 @@ import pytest
 
 from rollcli.files.results import parse_rows
 from rollcli.run.result_file import whole_rows
-from tests.run_cli import command, contents, environment, road_map, rollcli, started, write_kitti, write_maps
+from tests.run_cli import (
+    command,
+    contents,
+    ended,
+    environment,
+    keep_rows,
+    road_map,
+    rollcli,
+    started,
+    wait_until,
+    write_kitti,
+    write_maps,
+)
 from tests.slow import mostly_slow
 
 FRAMES = 40
@@ -50,18 +61,18 @@ def start(folder, *arguments):
 
 def wait_for_rows(folder, count, run, name="rolls.csv"):
     """Until so many rows are there."""
-    result, give_up = folder / name, time.monotonic() + 60
-    while run.poll() is None and not (result.exists() and result.read_bytes().count(b"\n") > count):
-        assert time.monotonic() < give_up
-        time.sleep(0.002)
+    result = folder / name
+    wait_until(lambda: lines_of(result) > count, run)
+
+
+def lines_of(result):
+    """How many lines the file has."""
+    return result.read_bytes().count(b"\n") if result.exists() else 0
 
 
 def wait_for_images(folder, count, run):
     """Until so many frames are done: rows with images follow theirs in groups, up to a second later."""
-    images, give_up = folder / "upright", time.monotonic() + 60
-    while run.poll() is None and not (images.exists() and len(list(images.glob("*.png"))) >= count):
-        assert time.monotonic() < give_up
-        time.sleep(0.002)
+    wait_until(lambda: len(list(folder.glob("upright/*.png"))) >= count, run)
 
 
 def kill(run):
@@ -119,13 +130,7 @@ def test_the_command_that_resumes_can_be_pasted_whatever_its_words_are(undisturb
     path = os.pathsep.join([str(program.parent), os.environ["PATH"]])
     settings = {"ROLLCLI_ESTIMATE_INVALID": "5 6", "ROLLCLI_ESTIMATE_TIMING": "0"}
     run = started(
-        "estimate",
-        "-o",
-        "my rolls.csv",
-        "--config",
-        "a b.toml",
-        "--",
-        folder,
+        *("estimate", "-o", "my rolls.csv", "--config", "a b.toml", "--", folder),
         cwd=tmp_path,
         env=environment(PATH=path, ROLLCLI_ESTIMATE_ROAD="all", **settings),
     )
@@ -134,14 +139,8 @@ def test_the_command_that_resumes_can_be_pasted_whatever_its_words_are(undisturb
     _, err = run.communicate(timeout=60)
     assert run.returncode == 130
     line = err.splitlines()[-1].partition("continue with: ")[2]
-    pasted = subprocess.run(
-        ["sh", "-c", line],
-        cwd=tmp_path,
-        env=environment(PATH=path),  # what was set for one command is no longer there
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    # what was set for one command is no longer there
+    pasted = ended(["sh", "-c", line], tmp_path, env=environment(PATH=path))
     assert pasted.returncode == 3, pasted.stderr
     assert "kept" in pasted.stderr
     assert (tmp_path / "my rolls.csv").read_bytes().count(b"\n") == FRAMES + 1
@@ -194,10 +193,8 @@ def interrupt_until_it_ends(run):
 
 def workers_of(run):
     """The worker processes of a run, oldest first."""
-    listed = subprocess.run(
-        ["ps", "-A", "-ww", "-o", "ppid=,pid=,args="], capture_output=True, text=True, check=True
-    ).stdout.splitlines()
-    found = [line.split(None, 2) for line in listed]
+    listed = ended(["ps", "-A", "-ww", "-o", "ppid=,pid=,args="], Path.cwd()).stdout
+    found = [line.split(None, 2) for line in listed.splitlines()]
     children = {int(pid): args for parent, pid, args in found if int(parent) == run.pid}
     return [pid for pid, args in children.items() if "resource_tracker" not in args]
 
@@ -223,8 +220,7 @@ def interrupted(tmp_path):
     """A result of 5 of 10 frames."""
     write_maps(tmp_path / "maps", 10)
     rollcli("estimate", "maps", "-o", "rolls.csv", cwd=tmp_path)
-    lines = (tmp_path / "rolls.csv").read_text().splitlines(keepends=True)
-    (tmp_path / "rolls.csv").write_text("".join(lines[:6]))
+    keep_rows(tmp_path / "rolls.csv", 5)
     return tmp_path
 
 

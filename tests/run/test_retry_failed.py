@@ -4,8 +4,7 @@ import json
 import os
 import shutil
 import signal
-import subprocess
-import time
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -17,7 +16,7 @@ from rollcli.run import estimate as batch_run
 from rollcli.run import parts, result_file
 from rollcli.run.estimate import estimate_frame
 from rollcli.run.result_file import open_result
-from tests.run_cli import command, contents, environment, road_map, rollcli, write_kitti, write_maps
+from tests.run_cli import contents, keep_rows, road_map, rollcli, started, wait_until, write_kitti, write_maps
 
 FRAMES = 12
 
@@ -128,6 +127,10 @@ def test_a_retry_that_may_not_fail_stops_at_the_first_failure(folder, maps):
     assert [statuses[index] for index in BROKEN] == ["ok", "error", "error"]
 
 
+def made_at_least(folder, count):
+    return len(list(folder.glob("up/[!.]*.png"))) >= count
+
+
 @pytest.mark.slow
 def test_a_retry_killed_at_any_time_loses_no_row_and_is_taken_up_again(tmp_path):
     for index in range(COUNT):
@@ -139,11 +142,8 @@ def test_a_retry_killed_at_any_time_loses_no_row_and_is_taken_up_again(tmp_path)
         for index in range(COUNT):
             disparity = road_map(0.01 * index, width=300, height=200, seed=seed)
             write_kitti(tmp_path / "maps" / f"frame{index:02}.png", disparity)
-        run = subprocess.Popen(command(*line, *RETRY, "-j", "2"), cwd=tmp_path, env=environment())
-        give_up = time.monotonic() + 60
-        while run.poll() is None and len(list(tmp_path.glob("up/[!.]*.png"))) < count:
-            assert time.monotonic() < give_up
-            time.sleep(0.002)
+        run = started(*line, *RETRY, "-j", "2", cwd=tmp_path, stderr=None)
+        wait_until(partial(made_at_least, tmp_path, count), run)
         run.kill()
         run.wait()
         rows = (tmp_path / "rolls.csv").read_text().splitlines()[1:]
@@ -185,8 +185,7 @@ def test_a_run_that_ends_between_rows_and_what_says_of_their_files_is_taken_up_a
 def test_an_interrupted_run_with_failures_is_mended_and_finished_in_one_go(folder, maps):
     line = ("estimate", "maps", "-o", "rolls.csv")
     rollcli(*line, cwd=folder)
-    lines = (folder / "rolls.csv").read_bytes().splitlines(keepends=True)
-    (folder / "rolls.csv").write_bytes(b"".join(lines[:7]) + lines[7][:9])
+    keep_rows(folder / "rolls.csv", 6, 9)
     record = folder / "rolls.csv.run.json"
     record.write_text(json.dumps({**json.loads(record.read_text()), "counts": {}}))
     mend(folder, maps, 2, 3)

@@ -9,7 +9,7 @@ import pytest
 from rollcli.files.storage import list_names, read_bytes, remove, write_bytes
 from rollcli.run import inputs
 from tests.object_store import upload
-from tests.run_cli import contents, road_map, rollcli, write_kitti, write_maps, write_pair
+from tests.run_cli import contents, keep_rows, road_map, rollcli, write_kitti, write_maps, write_pair
 from tests.slow import mostly_slow
 
 FRAMES = 8
@@ -63,8 +63,7 @@ def anew(folder, tmp_path_factory, *arguments, status=3, result="rolls.csv", inp
 
 @pytest.mark.parametrize("older", [True, False])
 def test_a_resume_takes_identical_bytes_with_other_times(folder, tmp_path_factory, older):
-    whole = (folder / "rolls.csv").read_bytes()
-    (folder / "rolls.csv").write_bytes(b"".join(whole.splitlines(keepends=True)[:5]))
+    whole = keep_rows(folder / "rolls.csv", 4)
     touch(folder, older)
     estimate(folder, *IMAGES, "--resume", status=3)
     assert written(folder) == anew(folder, tmp_path_factory, *IMAGES)
@@ -110,8 +109,7 @@ def test_a_resume_of_parts_takes_identical_bytes_with_other_times_and_no_others(
 
 
 def test_a_resume_takes_what_changes_before_its_frame_is_done(folder, tmp_path_factory):
-    whole = (folder / "rolls.csv").read_bytes()
-    (folder / "rolls.csv").write_bytes(b"".join(whole.splitlines(keepends=True)[:5]))
+    keep_rows(folder / "rolls.csv", 4)
     (folder / "up" / "frame6.png").unlink()
     put(folder, "frame6")
     estimate(folder, *IMAGES, "--resume", status=3)
@@ -228,7 +226,7 @@ def test_an_update_begins_a_result_that_is_not_there_and_continues_one_that_is_c
     write_maps(tmp_path / "maps", FRAMES)
     estimate(tmp_path, "--update")
     whole = written(tmp_path)
-    (tmp_path / "rolls.csv").write_bytes(b"".join(whole["rolls.csv"].splitlines(keepends=True)[:4]))
+    keep_rows(tmp_path / "rolls.csv", 3)
     estimate(tmp_path, "--update")
     assert written(tmp_path) == whole
 

@@ -2,7 +2,6 @@
 
 import math
 import re
-import subprocess
 import sys
 import xml.etree.ElementTree as ET
 
@@ -13,7 +12,7 @@ import pytest
 from rollcli.files.encodings import read_disparity
 from rollcli.files.formats import read_stored
 from rollcli.pictures.vdisparity import BOTTOM_MARGIN, LEFT_MARGIN
-from tests.run_cli import command, contents, environment, road_map, rollcli, write_kitti
+from tests.run_cli import contents, road_map, rollcli, rollcli_process, write_kitti
 
 
 def road_pixels(picture):
@@ -150,8 +149,5 @@ def test_a_figure_without_the_extra_is_refused_in_one_line_that_says_how_to_inst
 @pytest.mark.slow
 def test_nothing_of_matplotlibs_own_files_is_told(maps):
     nowhere = dict.fromkeys(("HOME", "MPLCONFIGDIR", "XDG_CACHE_HOME", "XDG_CONFIG_HOME"), "/dev/null/no")
-    line = command("vdisparity", "maps/frame0.png", "--figure", "svg", "-o", "v", "-q")
-    done = subprocess.run(
-        line, cwd=maps, env=environment(**nowhere), capture_output=True, text=True, check=False
-    )
-    assert (done.returncode, done.stderr) == (0, "")
+    line = ("vdisparity", "maps/frame0.png", "--figure", "svg", "-o", "v", "-q")
+    assert rollcli_process(*line, cwd=maps, **nowhere)[::2] == (0, "")

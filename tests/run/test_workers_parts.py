@@ -2,8 +2,7 @@
 
 import random
 import signal
-import subprocess
-import time
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -17,7 +16,7 @@ from rollcli.run.inputs import inputs_line
 from rollcli.run.options import FrameOptions
 from rollcli.run.workers.chunks import Chunks, Done, Span
 from tests.object_store import joined
-from tests.run_cli import command, contents, environment, rollcli, write_maps
+from tests.run_cli import contents, rollcli, started, wait_until, write_maps
 from tests.slow import mostly_slow
 
 KITTI = ReadAs(frozenset(["kitti"]))
@@ -172,19 +171,12 @@ def test_runs_that_are_stopped_and_killed_end_in_the_parts_of_an_undisturbed_one
     assert rollcli(*line, cwd=tmp_path / "whole").status == 0
     chance, parts, status = random.Random(seed), tmp_path / "disturbed" / "rolls.parquet", 1
     while status != 0:
-        run = subprocess.Popen(
-            command(*line, "--resume", "-q"),
-            cwd=tmp_path / "disturbed",
-            env=environment(),
-            stderr=subprocess.PIPE,
-        )
-        before = len(list(parts.glob("part-*")))
-        end = before + chance.randint(5, 30)
-        while run.poll() is None and len(list(parts.glob("part-*"))) < end:
-            time.sleep(0.005)
+        run = started(*line, "--resume", "-q", cwd=tmp_path / "disturbed")
+        end = len(list(parts.glob("part-*"))) + chance.randint(5, 30)
+        wait_until(partial(lambda end: len(list(parts.glob("part-*"))) >= end, end), run)
         run.send_signal(chance.choice([signal.SIGKILL, signal.SIGTERM, signal.SIGINT]))
         _, said = run.communicate(timeout=60)
         status = run.returncode
         assert status in (0, 130, -signal.SIGKILL), said
-        assert b"Traceback" not in said
+        assert "Traceback" not in said
     assert contents(tmp_path / "disturbed") == contents(tmp_path / "whole")

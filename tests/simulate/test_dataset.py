@@ -1,6 +1,5 @@
 """The folder that `rollcli simulate` writes, and the samples of the project."""
 
-import csv
 import math
 import shutil
 from dataclasses import replace
@@ -19,7 +18,7 @@ from rollcli.simulate.build import render_frame, road_camber
 from rollcli.simulate.dataset import plan_dataset, write_dataset
 from rollcli.simulate.options import SimulateOptions
 from tests.make_sample_data import EXACT, SAMPLES, SPECS, make
-from tests.run_cli import contents
+from tests.run_cli import contents, rows_of
 from tests.true_disparity import true_disparity
 
 TINY = SimulateOptions(frames=3, size=(64, 48), seed=9)
@@ -44,7 +43,7 @@ def rig(tmp_path, rendered):
 
 
 def rows(folder):
-    return list(csv.DictReader((folder / "truth.csv").read_text().splitlines()))
+    return rows_of((folder / "truth.csv").read_text())
 
 
 def test_the_folder_holds_left_right_disparity_and_truth(tmp_path):
@@ -306,8 +305,8 @@ def test_the_script_makes_the_same_pictures(made):
 
 @pytest.mark.parametrize(("stem", "spec"), list(zip(STEMS, SPECS, strict=True)))
 def test_each_map_shows_its_scene_with_the_roll_that_truth_says(stem, spec):
-    rows = {row["file"]: row for row in csv.DictReader((SAMPLES / "truth.csv").read_text().splitlines())}
-    assert float(rows[stem]["roll_deg"]) == pytest.approx(math.degrees(spec.roll))
+    found = {row["file"]: row for row in rows(SAMPLES)}
+    assert float(found[stem]["roll_deg"]) == pytest.approx(math.degrees(spec.roll))
     (path,) = (SAMPLES / "maps").glob(f"{stem}.*")
     found, (disparity, road) = read_disparity(path), true_disparity(spec)
     both = road & (found > 0)

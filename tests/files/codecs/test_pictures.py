@@ -1,8 +1,6 @@
 """JPEG images that are cut, damaged or too large are refused without a word; whole ones are read."""
 
 import struct
-import subprocess
-import sys
 
 import cv2
 import numpy as np
@@ -11,7 +9,7 @@ import pytest
 from rollcli.errors import InputError
 from rollcli.files.codecs.pictures import decode_picture
 from rollcli.files.codecs.png import decoding
-from tests.run_cli import road_map, rollcli, write_pair
+from tests.run_cli import python, road_map, rollcli, write_pair
 
 IMAGE = cv2.GaussianBlur(np.random.default_rng(0).integers(0, 256, (120, 160), dtype=np.uint8), (0, 0), 2)
 WHOLE = cv2.imencode(".jpg", IMAGE)[1].tobytes()
@@ -31,7 +29,7 @@ READ = (
 
 def in_a_worker(data):
     """What a process says that works on frames, where what libjpeg prints is heard."""
-    done = subprocess.run([sys.executable, "-c", READ], input=data, capture_output=True, check=True)
+    done = python(READ, input=data, text=False, check=True)
     assert done.stderr == b""
     return done.stdout.decode().strip()
 
@@ -113,10 +111,7 @@ print("b", file=sys.stderr, flush=True)
 
 
 def heard(before):
-    done = subprocess.run(
-        [sys.executable, "-c", TALK.format(before=before)], capture_output=True, text=True, check=True
-    )
-    return done.stderr
+    return python(TALK.format(before=before), check=True).stderr
 
 
 def test_nothing_is_touched_before_it_is_asked_for():

@@ -53,14 +53,8 @@ def test_truth_values_are_a_mask_and_no_map():
 @pytest.mark.parametrize(
     ("values", "reason"),
     [
-        (np.ones((2, 3), complex), "complex numbers"),
         (np.array([[None, {}]], dtype=object), "never loaded"),
-        (np.zeros((2, 3), [("a", "f4"), ("b", "i2")]), "records"),
-        (np.array([["a", "b"]]), "data of type"),
         (np.zeros((2, 3), "M8[s]"), "data of type"),
-        (np.ones((2, 3, 4)), r"3-D array of shape \(2, 3, 4\)"),
-        (np.ones(5), "1-D array"),
-        (np.float64(3), "0-D array"),
         (np.ones((0, 5)), "no pixels"),
         (np.ones((5, 0)), "no pixels"),
     ],
@@ -109,13 +103,6 @@ def test_a_header_without_sense_is_refused(header):
         decode_stored(npy_header(header) + bytes(100), "map.npy")
 
 
-def test_a_type_that_does_not_exist_is_refused():
-    with pytest.raises(InputError, match="data of type <f3"):
-        decode_stored(
-            npy_header("{'descr': '<f3', 'fortran_order': False, 'shape': (1, 1)}") + bytes(9), "map.npy"
-        )
-
-
 @pytest.mark.parametrize(
     ("shape", "said"),
     [
@@ -125,6 +112,7 @@ def test_a_type_that_does_not_exist_is_refused():
         ((2, 3, 5), ""),
         ((2, 3, 4, 3), ""),
         ((3,), ""),
+        ((), ""),
     ],
 )
 def test_an_array_of_colours_is_told_where_photographs_go(shape, said):
@@ -142,6 +130,7 @@ def test_an_array_of_colours_is_told_where_photographs_go(shape, said):
         ("'<c16'", "complex numbers"),
         ("[('a', '<f4')]", "records"),
         ("'<U3'", "data of type <U3"),
+        ("'<f3'", "data of type <f3"),  # which does not exist
         ('"|S5"', "data of type |S5"),
         ("'" + "x" * 60 + "'", "data of type " + "x" * 40),
     ],
@@ -333,7 +322,10 @@ def test_a_map_of_netpbm_that_ends_early_is_refused(head, needed):
 
 @pytest.mark.parametrize(
     "head",
-    [b"P5\n3 2\n0\n", b"P5\n3 2\n65536\n", b"P5\n3 2\n255", b"P5\n3 x\n255\n", b"P6", b"P5\n3 2\n-1\n"],
+    [
+        *(b"P5\n3 2\n0\n", b"P5\n3 2\n65536\n", b"P5\n3 2\n255", b"P5\n3 x\n255\n", b"P6", b"P5\n3 2\n-1\n"),
+        b"P5\n" + b"# " * 5000,
+    ],
 )
 def test_a_header_of_netpbm_that_makes_no_sense_is_refused(head):
     data = head if head.endswith(b"255") else head + bytes(99)

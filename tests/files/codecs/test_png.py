@@ -3,14 +3,13 @@
 import struct
 import zlib
 
-import cv2
 import numpy as np
 import pytest
 
 from rollcli.errors import InputError, OutputError
 from rollcli.files.codecs.png import picture
 from rollcli.files.formats import decode_mask, decode_stored, encode_stored
-from tests.binary_files import disparity_map, make_png, png_file, png_header, png_rows
+from tests.binary_files import disparity_map, flipped, make_png, png_file, png_header, png_rows
 
 
 def values_of(depth, height=37, width=53):
@@ -126,14 +125,6 @@ NOISY = [
 ]
 
 
-def test_a_large_frame_is_what_opencv_decodes():
-    values = (disparity_map(375, 1242) * 256).astype(np.uint16)
-    file = cv2.imencode(".png", values)[1].tobytes()
-
-    assert struct.unpack(">II", file[16:24]) == (1242, 375)
-    np.testing.assert_array_equal(decode_stored(file, "x").values, values)
-
-
 @pytest.mark.parametrize("depth", [1, 2, 4, 8, 16])
 def test_the_grey_that_stands_for_transparent_is_no_data(depth):
     values = np.arange(40).reshape(5, 8) % 2**depth
@@ -164,10 +155,8 @@ def test_every_flipped_bit_is_refused_or_changes_nothing(layout):
     refused = 0
 
     for bit in range(8 * len(whole)):
-        broken = bytearray(whole)
-        broken[bit // 8] ^= 1 << bit % 8
         try:
-            assert decode_stored(bytes(broken), "x").values.tobytes() == expected
+            assert decode_stored(flipped(whole, bit), "x").values.tobytes() == expected
         except InputError:
             refused += 1
 

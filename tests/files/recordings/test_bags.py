@@ -1,7 +1,5 @@
 """Bags in all kinds give the rolls of the same frames from files; what is broken in them is told."""
 
-import csv
-import io
 import math
 from pathlib import Path
 
@@ -12,7 +10,8 @@ import pytest
 import rollcli as package
 from rollcli.errors import InputError
 from tests.files.recordings.bag_files import KINDS, camera_info, compressed, disparity_image, image, write_bag
-from tests.run_cli import road_map, rollcli, write_pair
+from tests.run_cli import keep_rows, road_map, rollcli, write_pair
+from tests.run_cli import rows_of as rows
 from tests.slow import mostly_slow
 
 START = 1_700_000_000_123_456_789
@@ -21,10 +20,6 @@ SIZE = (320, 240)
 P = (350.0, 0, 80, 0, 0, 350, 60, 0, 0, 0, 1, 0)
 P_RIGHT = (350.0, 0, 80, -175, 0, 350, 60, 0, 0, 0, 1, 0)
 SHARED = Path(__file__).parents[3].parent / "shared" / "bags"
-
-
-def rows(text):
-    return list(csv.DictReader(io.StringIO(text)))
 
 
 def maps(count):
@@ -240,8 +235,7 @@ def test_what_follows_a_damaged_chunk_of_a_bag_is_used(tmp_path, compression):
 def test_an_interrupted_run_over_a_bag_is_resumed_to_the_same_bytes(tmp_path):
     path = write_bag(tmp_path, "drive", "mcap", drive(3)).name
     rollcli("estimate", path, "-o", "rolls.csv", cwd=tmp_path)
-    whole = (tmp_path / "rolls.csv").read_bytes()
-    (tmp_path / "rolls.csv").write_bytes(b"".join(whole.splitlines(keepends=True)[:2]))
+    whole = keep_rows(tmp_path / "rolls.csv", 1)
     assert rollcli("estimate", path, "-o", "rolls.csv", "--resume", cwd=tmp_path).status == 0
     assert (tmp_path / "rolls.csv").read_bytes() == whole
 

@@ -2,8 +2,7 @@
 
 import os
 import signal
-import subprocess
-import time
+from functools import partial
 
 import cv2
 import numpy as np
@@ -12,7 +11,7 @@ import pytest
 from tests.files.recordings.bag_files import image, write_bag
 from tests.files.recordings.test_bags import START, STEP, maps
 from tests.files.recordings.test_video import write_video
-from tests.run_cli import command, environment, road_map, rollcli, write_pair
+from tests.run_cli import road_map, rollcli, started, wait_until, write_pair
 
 COUNT = 240
 pytestmark = [
@@ -44,22 +43,19 @@ def write_views(folder):
     return ["drive.avi", "--side-by-side"]
 
 
+def has_rows(result, least):
+    return result.exists() and result.read_bytes().count(b"\n") > least
+
+
 @pytest.mark.parametrize(("write", "rows"), [(write_maps, COUNT), (write_views, COUNT // 4)])
 def test_a_run_over_a_recording_killed_again_and_again_ends_in_the_same_bytes(tmp_path, write, rows):
     given = [*write(tmp_path), "-j", "2"]
     assert rollcli("estimate", *given, "-o", "whole.csv", cwd=tmp_path).status == 0
     result = tmp_path / "rolls.csv"
     for least in (1, rows // 3, rows * 2 // 3):
-        run = subprocess.Popen(
-            command("estimate", *given, "-q", "-o", "rolls.csv", *(["--resume"] if least > 1 else [])),
-            cwd=tmp_path,
-            env=environment(),
-            start_new_session=True,
-        )
-        give_up = time.monotonic() + 120
-        while run.poll() is None and not (result.exists() and result.read_bytes().count(b"\n") > least):
-            assert time.monotonic() < give_up
-            time.sleep(0.005)
+        line = ("estimate", *given, "-q", "-o", "rolls.csv", *(["--resume"] if least > 1 else []))
+        run = started(*line, cwd=tmp_path, stderr=None, start_new_session=True)
+        wait_until(partial(has_rows, result, least), run)
         os.killpg(run.pid, signal.SIGKILL)
         run.wait()
     done = rollcli("estimate", *given, "-o", "rolls.csv", "--resume", cwd=tmp_path)

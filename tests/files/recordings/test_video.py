@@ -1,7 +1,5 @@
 """Videos, and images that hold both views, give the rolls of the same frames from files."""
 
-import csv
-import io
 import json
 import math
 import os
@@ -15,7 +13,8 @@ import pytest
 
 import rollcli as package
 from rollcli.errors import InputError, UsageError
-from tests.run_cli import road_map, rollcli, write_pair
+from tests.run_cli import keep_rows, road_map, rollcli, write_pair
+from tests.run_cli import rows_of as rows
 from tests.slow import mostly_slow
 
 # FFmpeg asks for this once in a process, here for the videos that are written
@@ -51,10 +50,6 @@ def drive(tmp_path_factory):
         for each in range(COUNT)
     ]
     return folder, rows(done.out), views
-
-
-def rows(text):
-    return list(csv.DictReader(io.StringIO(text)))
 
 
 def without_names(found):
@@ -218,8 +213,8 @@ def test_an_interrupted_run_over_a_video_is_resumed_to_the_same_bytes(tmp_path, 
     write_video(tmp_path / "drive.mkv", beside(drive[2]))
     given = ["estimate", "drive.mkv", "--side-by-side", "-o", "rolls.csv"]
     assert rollcli(*given, "-j", "1", cwd=tmp_path).status == 0
-    whole, inputs = ((tmp_path / f"rolls.csv{each}").read_bytes() for each in ("", ".inputs"))
-    (tmp_path / "rolls.csv").write_bytes(b"".join(whole.splitlines(keepends=True)[:3]))
+    inputs = (tmp_path / "rolls.csv.inputs").read_bytes()
+    whole = keep_rows(tmp_path / "rolls.csv", 2)
     refusal = rollcli(
         "estimate", "drive.mkv", "--side-by-side", "top-bottom", *given[3:], "--resume", cwd=tmp_path
     ).refused()

@@ -2,7 +2,6 @@
 
 import os
 import signal
-import time
 from itertools import chain
 from pathlib import Path
 
@@ -11,6 +10,7 @@ import cv2
 from rollcli.errors import InputError
 from rollcli.run.workers import in_order as ordered
 from rollcli.run.workers.chunks import Work
+from tests.run_cli import wait_until
 
 
 def run(task):
@@ -46,11 +46,7 @@ def _give(value):
 
 
 def _wait(path):
-    give_up = time.monotonic() + 60
-    while not Path(path).exists():
-        if time.monotonic() > give_up:
-            raise TimeoutError(path)
-        time.sleep(0.002)
+    wait_until(Path(path).exists)
     return "waited"
 
 

@@ -7,7 +7,6 @@ import socket
 import subprocess
 import sys
 import threading
-import time
 from importlib.util import find_spec
 from itertools import count
 
@@ -23,7 +22,16 @@ from rollcli.run.workers.in_order import Workers
 from tests.in_process import run_here
 from tests.object_store import joined, upload
 from tests.run.workers.tasks import lost, run
-from tests.run_cli import command, contents, environment, road_map, rollcli, write_maps, write_pair
+from tests.run_cli import (
+    contents,
+    environment,
+    road_map,
+    rollcli,
+    started,
+    wait_until,
+    write_maps,
+    write_pair,
+)
 
 # Dask loads in the tests that use it: it takes a second
 pytestmark = [
@@ -39,8 +47,8 @@ ONE_PROCESS = ("--nthreads", "1", "--no-nanny")
 class Cluster:
     """A scheduler and workers that several tests use; what a test kills is started anew for the next one."""
 
-    def __init__(self, folder):
-        self.folder, self.starts = folder, count()
+    def __init__(self, folder, *network, **variables):
+        self.folder, self.network, self.variables, self.starts = folder, network, variables, count()
         self.process, self.address, self.processes, self.store = None, "", [], {}
 
     def scheduler(self):
@@ -48,8 +56,8 @@ class Cluster:
         if self.process is None or self.process.poll() is not None:
             self.end()
             state = self.folder / f"scheduler{next(self.starts)}.json"
-            self.process = dask("scheduler", self.folder, *LOCAL, "--port", "0", "--scheduler-file", state)
-            wait_for(lambda: state.exists() and state.read_text().endswith("}"))
+            self.process = self.dask("scheduler", self.folder, "--port", "0", "--scheduler-file", state)
+            wait_until(lambda: state.exists() and state.read_text().endswith("}"))
             self.address = json.loads(state.read_text())["address"]
         return self.address
 
@@ -64,8 +72,15 @@ class Cluster:
         while len(self.processes) < 2:
             folder = self.folder / f"worker{next(self.starts)}"
             folder.mkdir()
-            self.processes.append(dask("worker", folder, address, *LOCAL, *ONE_PROCESS))
+            self.processes.append(self.dask("worker", folder, address, *ONE_PROCESS))
         return self.processes
+
+    def dask(self, kind, folder, *arguments):
+        """A Dask process that works in a folder of its own, as on another machine."""
+        line = [sys.executable, "-m", f"distributed.cli.dask_{kind}", *arguments, *LOCAL, *self.network]
+        how = {"env": environment(**self.variables), "stderr": subprocess.STDOUT}
+        with (folder / f"{kind}.log").open("wb") as log:
+            return subprocess.Popen(list(map(str, line)), cwd=folder, stdout=log, **how)
 
     def end_workers(self):
         while self.processes:
@@ -100,26 +115,6 @@ def workers(cluster_here):
 def end(process):
     process.kill()
     process.wait()
-
-
-def dask(kind, folder, *arguments):
-    """A Dask process that works in a folder of its own, as on another machine."""
-    with (folder / f"{kind}.log").open("wb") as log:
-        return subprocess.Popen(
-            [sys.executable, "-m", f"distributed.cli.dask_{kind}", *map(str, arguments)],
-            cwd=folder,
-            env=environment(),
-            stdout=log,
-            stderr=subprocess.STDOUT,
-        )
-
-
-def wait_for(condition):
-    give_up = time.monotonic() + 60
-    while not (found := condition()):
-        assert time.monotonic() < give_up
-        time.sleep(0.02)
-    return found
 
 
 @pytest.fixture(scope="module")
@@ -166,7 +161,7 @@ def start(far, scheduler):
 
 def wait_for_images(far, run):
     """Until some frames are done."""
-    wait_for(lambda: run.poll() is not None or len(list(far.glob("v/[!.]*.png"))) > 8)
+    wait_until(lambda: len(list(far.glob("v/[!.]*.png"))) > 8, run)
 
 
 def test_a_cluster_that_loses_a_worker_gives_the_bytes_of_a_local_run(local, far, scheduler, workers):
@@ -234,7 +229,7 @@ def test_a_worker_of_another_version_that_joins_later_gets_no_work_and_a_line_sa
         shutil.copy(local / "maps" / "frame0.png", far / "maps" / f"more{number:03}.png")
     run = start(far, scheduler)
     wait_for_images(far, run)
-    joined_late = dask("worker", odd, scheduler, *LOCAL, *ONE_PROCESS, "--preload", "preload.py")
+    joined_late = cluster_here.dask("worker", odd, scheduler, *ONE_PROCESS, "--preload", "preload.py")
     try:
         _, err = run.communicate(timeout=300)
     finally:
@@ -334,12 +329,12 @@ def test_workers_that_share_only_a_bucket_give_the_bytes_of_a_local_run(
     line = ("estimate", f"{bucket}/maps/", "-o", f"{bucket}/rolls.csv", "--derotated", f"{bucket}/upright")
     line = (*line, "--part-rows", "8", "--scheduler", scheduler)
     (tmp_path / "driver").mkdir()
-    run = subprocess.Popen(command(*line), cwd=tmp_path / "driver", env=environment())
-    wait_for(lambda: run.poll() is not None or len(list_names(f"{bucket}/rolls.csv")) > 1)
+    run = started(*line, cwd=tmp_path / "driver", stderr=None)
+    wait_until(lambda: len(list_names(f"{bucket}/rolls.csv")) > 1, run)
     run.kill()
     assert run.wait() != 0
-    resumed = subprocess.Popen(command(*line, "--resume", "-q"), cwd=tmp_path / "driver", env=environment())
-    wait_for(lambda: resumed.poll() is not None or len(list_names(f"{bucket}/rolls.csv")) > 3)
+    resumed = started(*line, "--resume", "-q", cwd=tmp_path / "driver", stderr=None)
+    wait_until(lambda: len(list_names(f"{bucket}/rolls.csv")) > 3, resumed)
     workers[0].kill()
     assert resumed.wait(timeout=120) == 3
 

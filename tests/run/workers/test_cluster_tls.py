@@ -1,15 +1,14 @@
 """A cluster whose connections are encrypted, by Dask's own settings."""
 
-import json
+import shlex
 import shutil
 import subprocess
-import sys
-import time
 from importlib.util import find_spec
 
 import pytest
 
-from tests.run_cli import environment, rollcli, write_maps
+from tests.run.workers.test_cluster import Cluster
+from tests.run_cli import rollcli, write_maps
 
 pytestmark = [
     pytest.mark.slow,
@@ -17,24 +16,11 @@ pytestmark = [
     pytest.mark.skipif(shutil.which("openssl") is None, reason="no openssl to make certificates with"),
 ]
 
-LOCAL = ("--host", "127.0.0.1", "--no-dashboard", "--protocol", "tls")
-
 
 def certificate(folder, name):
     """A certificate that vouches for itself, and its key."""
     cert, key = folder / f"{name}.pem", folder / f"{name}.key"
-    line = [
-        "openssl",
-        "req",
-        "-x509",
-        "-newkey",
-        "rsa:2048",
-        "-nodes",
-        "-days",
-        "1",
-        "-subj",
-        "/CN=localhost",
-    ]
+    line = shlex.split("openssl req -x509 -newkey rsa:2048 -nodes -days 1 -subj /CN=localhost")
     subprocess.run([*line, "-out", cert, "-keyout", key], check=True, capture_output=True)
     return cert, key
 
@@ -53,29 +39,14 @@ def settings(cert, key, trusted):
 
 @pytest.fixture
 def cluster(tmp_path):
-    """The address of a scheduler with one worker, and the settings of who may take part."""
+    """The address of a scheduler with workers, and the settings of who may take part."""
     variables = settings(*certificate(tmp_path, "node"), tmp_path / "node.pem")
-    state = tmp_path / "scheduler.json"
-    processes = []
-
-    def start(*words):
-        line = [sys.executable, "-m", "distributed.cli.dask_" + words[0], *map(str, words[1:])]
-        quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-        processes.append(subprocess.Popen(line, cwd=tmp_path, env=environment(**variables), **quiet))
-
+    encrypted = Cluster(tmp_path, "--protocol", "tls", **variables)
     try:
-        start("scheduler", *LOCAL, "--port", "0", "--scheduler-file", state)
-        end = time.monotonic() + 60
-        while not (state.exists() and state.read_text().endswith("}")):
-            assert time.monotonic() < end, "the scheduler does not start"
-            time.sleep(0.1)
-        address = json.loads(state.read_text())["address"]
-        start("worker", address, *LOCAL, "--nthreads", "1", "--no-nanny")
-        yield address, variables
+        encrypted.workers()
+        yield encrypted.address, variables
     finally:
-        for process in reversed(processes):
-            process.kill()
-            process.wait()
+        encrypted.end()
 
 
 def test_a_run_on_an_encrypted_cluster_gives_the_same_rows_and_a_stranger_is_refused(tmp_path, cluster):

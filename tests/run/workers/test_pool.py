@@ -3,7 +3,6 @@
 import contextlib
 import os
 import signal
-import subprocess
 import sys
 import threading
 import time
@@ -21,7 +20,7 @@ from rollcli.run.workers.interrupt import Stop, stop_signals
 from rollcli.run.workers.pool import PoolExecutor, prepare_worker
 from rollcli.run.workers.tasks import require_scheduler, run_tasks
 from tests.run.workers.tasks import lost, run
-from tests.run_cli import environment
+from tests.run_cli import ended, environment, wait_until
 
 WORK = Work(run, lost)
 
@@ -89,8 +88,7 @@ def test_a_stop_ends_a_chunk_after_the_task_in_hand_and_begins_no_other(tmp_path
     with pool(jobs=1) as executor:
         tasks = [("hold", tmp_path / "busy", event), *(("append", tmp_path / "late", "x") for _ in range(5))]
         running, spare, queued = (executor.submit(tasks) for _ in range(3))
-        while not (tmp_path / "busy").exists():
-            time.sleep(0.01)
+        wait_until((tmp_path / "busy").exists)
         executor.stop()
         executor.stop()
         assert queued.done()
@@ -152,8 +150,7 @@ def test_workers_end_after_their_task_or_at_once(tmp_path):
         busy, event = tmp_path / f"busy{at_once}", tmp_path / f"event{at_once}"
         executor = PoolExecutor(1, WORK, Workers())
         executor.submit([("hold", busy, event), ("append", tmp_path / "late", "x")])
-        while not busy.exists():
-            time.sleep(0.01)
+        wait_until(busy.exists)
         threading.Timer(0.3, event.touch).start()
         (worker,) = executor._pool
         executor.close(at_once=at_once)
@@ -239,8 +236,7 @@ def test_a_process_with_one_thread_is_forked_and_one_with_more_is_not(tmp_path):
 
     def kind(*arguments):
         line = [sys.executable, "start.py", *arguments]
-        how = {"capture_output": True, "text": True, "check": True}
-        return subprocess.run(line, cwd=tmp_path, env=environment(OPENBLAS_NUM_THREADS="1"), **how).stdout
+        return ended(line, tmp_path, env=environment(OPENBLAS_NUM_THREADS="1")).stdout
 
     assert kind() == "ForkProcess\n"
     assert kind("threads") == "SpawnProcess\n"
