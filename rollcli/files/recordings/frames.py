@@ -1,5 +1,6 @@
 """The frames of a bag: which topics fit, what belongs together, and one frame by its place."""
 
+import contextlib
 import os
 from bisect import bisect_left
 from collections.abc import Iterable, Sequence
@@ -13,7 +14,7 @@ from rollcli.errors import InputError, UsageError, as_usage
 from rollcli.files.bounded import state_of
 from rollcli.files.naming import listed
 from rollcli.files.recordings import messages
-from rollcli.files.recordings.bags import Bag, Topic, opened
+from rollcli.files.recordings.bags import Bag, Message, Topic, opened
 from rollcli.files.recordings.messages import CAMERA_INFO, COMPRESSED, DISPARITY, IMAGE, CameraInfo
 from rollcli.rig.calibration import Calibration
 
@@ -84,11 +85,12 @@ def maps_of_bag(files: Sequence[str], name: str, topic: str | None) -> BagFrames
     bag = BagFrames([(each, None) for each in found.frames[chosen]])
     left = _camera(found, chosen, right=False)
     right = _camera(found, chosen, right=True)
-    stated = (0.0, 0.0)
-    if topics[chosen].type == DISPARITY and bag.frames:
-        opened_bag, place = _placed(bag.frames[0][0].location)
-        stated = messages.baseline_of(topics[chosen], opened_bag.read(place).data, chosen)
-    bag.calibration = _calibration(left, right, stated[1], f"CameraInfo of {name}")
+    stated = 0.0
+    for each in found.frames[chosen] if topics[chosen].type == DISPARITY else ():
+        with contextlib.suppress(InputError):  # a damaged one says so in its row
+            stated = messages.baseline_of(topics[chosen], _message(each.location).data, chosen)
+            break
+    bag.calibration = _calibration(left, right, stated, f"CameraInfo of {name}")
     if bag.calibration is None and (found.cameras or topics[chosen].type == DISPARITY):
         bag.notes.append(f"{name}: {_NO_P}")
     _finish(bag, found, name, chosen)
@@ -193,8 +195,7 @@ def read_frame(path: str, member: str, place: Sequence[int], name: str) -> bytes
 def broken_part(path: str) -> str:
     """Say what is wrong behind the whole messages of a bag."""
     bag = _opened(path)
-    for _ in bag.messages(set()):
-        pass
+    list(bag.messages(set()))
     return f"{bag.broken or 'is whole'}; its whole messages are used"
 
 
@@ -287,12 +288,13 @@ def _scan(files: Sequence[str], wanted: Sequence[Topic], topics: dict[str, Topic
             place = "{}+{}".format(*message.place)
             if (topic := by_name.get(message.topic)) is None:
                 if (path, message.topic) not in places:
-                    info = messages.camera_info(topics[message.topic], message.data, message.topic)
-                    cameras.setdefault(message.topic, info)
-                    places[path, message.topic] = place
+                    with contextlib.suppress(InputError):  # the next one says the same
+                        info = messages.camera_info(topics[message.topic], message.data, message.topic)
+                        cameras.setdefault(message.topic, info)
+                        places[path, message.topic] = place
                 continue
             if topic.type == COMPRESSED and not frames[topic.name]:
-                with as_usage():
+                with contextlib.suppress(InputError):  # a damaged one says so in its row
                     messages.check_format(topic, bag.read(message.place).data, path)
             stamp = messages.stamp_of(topic, message.data, message.log_time)
             name = f"{path}#{topic.name}@{stamp}"
@@ -366,6 +368,6 @@ def _place(location: str) -> tuple[int, ...]:
     return tuple(map(int, location.rpartition("#@")[2].split("+")))
 
 
-def _placed(location: str) -> tuple[Bag, tuple[int, int]]:
+def _message(location: str) -> Message:
     place = _place(location)
-    return _opened(location.partition("#")[0]), (place[0], place[1])
+    return _opened(location.partition("#")[0]).read((place[0], place[1]))
