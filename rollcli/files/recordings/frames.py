@@ -114,6 +114,11 @@ def pairs_of_bag(files: Sequence[str], name: str, left: str, right: str, toleran
         if _is_raw(found, topic):
             bag.notes.append(f"{topic}: raw views are rectified by D, K, R and P of {_beside(topic)}")
             found.frames[topic][:] = [_rectified(found, topic, each) for each in found.frames[topic]]
+            bag.notes += [
+                f"{path}: has no {_beside(topic)}: its raw views are taken as they are"
+                for path in files
+                if (path, _beside(topic)) not in found.places
+            ]
         elif _RAW in topic and not _usable(found, topic):
             bag.notes.append(f"{topic}: raw views are taken as they are: no CameraInfo with P rectifies them")
     bag.frames = [(each, rights[at]) for each, at in zip(lefts, partners, strict=True) if at is not None]
@@ -320,8 +325,11 @@ def _finish(bag: BagFrames, found: _Found, name: str, topic: str) -> None:
 
 
 def _beside(topic: str) -> str:
-    """Name the CameraInfo of an image topic: it lies in the same namespace."""
-    return f"{topic.rpartition('/')[0]}/camera_info"
+    """Name the CameraInfo of an image topic: it lies in the same namespace.
+
+    A compressed image is named below the image that it is of [http://wiki.ros.org/image_transport].
+    """
+    return f"{topic.removesuffix('/compressed').rpartition('/')[0]}/camera_info"
 
 
 def _camera(found: _Found, topic: str, *, right: bool) -> CameraInfo | None:
