@@ -350,7 +350,7 @@ SEGMENT, CLUSTER = b"\x18\x53\x80\x67", b"\x1f\x43\xb6\x75"
     [
         ("drive.mp4", "mp4v", longer, False),
         ("drive.mp4", "mp4v", to_the_end, False),
-        ("drive.mp4", "mp4v", lambda data: data.replace(b"mdhd", b"free"), False),
+        ("drive.mp4", "mp4v", lambda data: data.replace(b"elst", b"skip"), False),
         ("drive.avi", "MJPG", lambda data: data + b"what a recorder notes behind it", False),
         ("drive.mkv", "MJPG", of_no_length, False),
         ("drive.mkv", "MJPG", of_no_lengths, True),
