@@ -175,9 +175,9 @@ class Inputs:
         return False
 
     def _line_at(self, place: int, name: bytes) -> bytes:
-        """Return the line of this name at a place; empty where another one or none is there."""
+        """Return the line of this name at a place; empty where another, a damaged one or none is there."""
         line = self._data[place : place + _WIDTH]
-        return line if line.startswith(name) and line.endswith(b"\n") else b""
+        return line if line.startswith(name) and _LINE.fullmatch(line) else b""
 
     def _place_of(self, name: bytes) -> int:
         """Find the line of a name, where frames were added or have gone since."""

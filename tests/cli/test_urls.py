@@ -188,3 +188,14 @@ def test_names_that_windows_gives_to_devices_and_streams_are_no_files_there(monk
     monkeypatch.setattr(locations, "_ON_WINDOWS", True)
     assert not any(map(names_a_file, names))
     assert names_a_file("run 7/frame (2).png")
+
+
+@pytest.mark.parametrize("kind", mostly_slow(["db3", "mcap", "bag"], "db3"))
+def test_the_threads_of_a_worker_that_wait_for_a_url_read_one_bag(tmp_path, server, kind):
+    from tests.files.recordings.bag_files import write_bag
+    from tests.files.recordings.test_bags import drive
+
+    path = write_bag(tmp_path, "drive", kind, drive(6)).name
+    expected = rollcli("estimate", path, cwd=tmp_path)
+    done = rollcli("estimate", path, "--mask", f"{server}/mask.png", "-j", "2", cwd=tmp_path)
+    assert (done.status, done.out) == (0, expected.out)

@@ -191,6 +191,16 @@ def test_a_row_counts_for_nothing_without_what_it_was_made_from(folder, line):
     assert written(folder) == before
 
 
+def test_a_damaged_line_of_inputs_is_as_none(folder):
+    before = written(folder)
+    path = folder / "rolls.csv.inputs"
+    data = bytearray(path.read_bytes())
+    data[len(data) // FRAMES * 3 - 5] = ord(" ")
+    path.write_bytes(data)
+    assert "(2 kept)" in estimate(folder, *IMAGES, "--update", status=3).err
+    assert written(folder) == before
+
+
 def test_a_result_without_its_inputs_is_not_continued(folder):
     (folder / "rolls.csv.inputs").unlink()
     for flag in ("--resume", "--update"):

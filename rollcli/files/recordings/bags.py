@@ -11,6 +11,7 @@ import contextlib
 import os
 import sqlite3
 import struct
+import weakref
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
@@ -116,10 +117,7 @@ class _Source:
     def take(self, count: int) -> memoryview:
         """Return the next bytes."""
         self._use(count)
-        data = self._next(count)
-        if len(data) != count:
-            raise _BrokenError
-        return data
+        return self._next(count)
 
     def skip(self, count: int) -> None:
         """Pass over the next bytes."""
@@ -146,7 +144,7 @@ class _InFile(_Source):
         self._file = file
 
     def _next(self, count: int) -> memoryview:
-        return memoryview(self._file.read(count) if count <= MOST_BYTES else b"")
+        return memoryview(_exactly(self._file, count))
 
     def _pass(self, count: int) -> None:
         self._file.seek(count, os.SEEK_CUR)
@@ -260,10 +258,7 @@ class _Chunked:
         self._size = Path(path).stat().st_size
         self._topics: dict[int, Topic] = {}
         self._last = -1, _Records([], -1)  # what was unpacked last, for the next of its messages
-
-    def __del__(self) -> None:
-        if hasattr(self, "_file"):
-            self._file.close()
+        weakref.finalize(self, self._file.close)
 
     def topics(self) -> dict[str, Topic]:
         """Return the topics by name: as the index says, or what a whole look through the file finds."""
@@ -275,8 +270,7 @@ class _Chunked:
         except _DAMAGED:
             index = 0
         if not (index and self._topics and all(each.type for each in self._topics.values())):
-            for _ in self.messages(set()):
-                pass
+            list(self.messages(set()))
         return {each.name: each for each in self._topics.values()}
 
     def messages(self, topics: set[str], begins: Collection[str] = ()) -> Iterator[Message]:
@@ -469,12 +463,10 @@ class _Ros1(_Chunked):
         if fields["op"][0] == 0x02:
             seconds, nanoseconds = struct.unpack("<II", fields["time"])
             return struct.unpack("<I", fields["conn"])[0], seconds * 10**9 + nanoseconds, length
-        if fields["op"][0] == 0x07:
-            kind = _fields(bytes(source.take(length))).get("type", b"").decode("utf-8", "replace")
-            name = fields["topic"].decode("utf-8", "replace")
-            self._topics[struct.unpack("<I", fields["conn"])[0]] = Topic(name, kind, "ros1")
-        else:
-            source.skip(length)
+        # else a connection: no other record lies among messages
+        kind = _fields(bytes(source.take(length))).get("type", b"").decode("utf-8", "replace")
+        name = fields["topic"].decode("utf-8", "replace")
+        self._topics[struct.unpack("<I", fields["conn"])[0]] = Topic(name, kind, "ros1")
         return None
 
 
@@ -490,24 +482,28 @@ def _fields(header: bytes) -> dict[str, bytes]:
     return found
 
 
+# SQLite keeps a value of any type in any column
+_TEXTS = ", ".join(f"printf('%s', {each})" for each in ("name", "type", "serialization_format"))
+_TIME = "CAST(ifnull(timestamp, 0) AS INTEGER)"
+
+
 class _Sqlite:
     """rosbag2's `.db3`: a table of topics and one of messages."""
 
     def __init__(self, path: str) -> None:
         self.path, self.broken = path, ""
-        self._base: Any = sqlite3.connect(f"{Path(path).resolve().as_uri()}?mode=ro&immutable=1", uri=True)
+        # the threads of a worker, which wait for the network, take turns at reading
+        where = f"{Path(path).resolve().as_uri()}?mode=ro&immutable=1"
+        self._base: Any = sqlite3.connect(where, uri=True, check_same_thread=False)
+        weakref.finalize(self, self._base.close)
         # reads what is there of a file that is shorter than it says
         self._base.execute("PRAGMA writable_schema=ON")
         self._names: dict[int, str] = {}
 
-    def __del__(self) -> None:
-        if hasattr(self, "_base"):
-            self._base.close()
-
     def topics(self) -> dict[str, Topic]:
         """Return the topics by name."""
         try:
-            rows = self._base.execute("SELECT id, name, type, serialization_format FROM topics").fetchall()
+            rows = self._base.execute(f"SELECT id, {_TEXTS} FROM topics").fetchall()
         except sqlite3.Error as error:
             raise InputError(f"{self.path}: its table of topics cannot be read: {error}") from None
         self._names = {number: name for number, name, *_ in rows}
@@ -519,7 +515,7 @@ class _Sqlite:
         count, whole = 0, self._is_whole() and hasattr(self._base, "blobopen")  # from Python 3.11 on
         try:
             for number, topic, time in self._base.execute(
-                "SELECT id, topic_id, timestamp FROM messages ORDER BY id"
+                f"SELECT id, topic_id, {_TIME} FROM messages ORDER BY id"
             ):
                 name = str(self._names.get(topic))
                 if whole and name in begins:
@@ -531,7 +527,7 @@ class _Sqlite:
                     data = self.read((number, 0)).data
                 count += 1
                 if name in topics:
-                    yield Message(name, int(time), (number, 0), memoryview(data))
+                    yield Message(name, time, (number, 0), memoryview(data))
         except (sqlite3.Error, InputError):
             self.broken = f"is damaged or cut off behind {count} messages"
 
@@ -545,13 +541,13 @@ class _Sqlite:
     def read(self, place: tuple[int, int]) -> Message:
         """Read one message."""
         try:
-            asked = "SELECT topic_id, timestamp, data FROM messages WHERE id = ?"
+            asked = f"SELECT topic_id, {_TIME}, data FROM messages WHERE id = ?"
             row = self._base.execute(asked, place[:1]).fetchone()
         except sqlite3.Error:
             row = None
         if row is None or not isinstance(row[2], bytes):
             raise InputError(f"{self.path}: there is no whole message {place[0]}")
-        return Message(self._names.get(row[0], ""), int(row[1]), place, memoryview(row[2]))
+        return Message(self._names.get(row[0], ""), row[1], place, memoryview(row[2]))
 
 
 @lru_cache(maxsize=4)  # a process opens a bag once

@@ -1,5 +1,6 @@
 """The frames of a bag: which topics fit, what belongs together, and one frame by its place."""
 
+import contextlib
 import os
 from bisect import bisect_left
 from collections.abc import Iterable, Sequence
@@ -13,7 +14,7 @@ from rollcli.errors import InputError, UsageError, as_usage
 from rollcli.files.bounded import state_of
 from rollcli.files.naming import listed
 from rollcli.files.recordings import messages
-from rollcli.files.recordings.bags import Bag, Topic, opened
+from rollcli.files.recordings.bags import Bag, Message, Topic, opened
 from rollcli.files.recordings.messages import CAMERA_INFO, COMPRESSED, DISPARITY, IMAGE, CameraInfo
 from rollcli.rig.calibration import Calibration
 
@@ -84,11 +85,12 @@ def maps_of_bag(files: Sequence[str], name: str, topic: str | None) -> BagFrames
     bag = BagFrames([(each, None) for each in found.frames[chosen]])
     left = _camera(found, chosen, right=False)
     right = _camera(found, chosen, right=True)
-    stated = (0.0, 0.0)
-    if topics[chosen].type == DISPARITY and bag.frames:
-        opened_bag, place = _placed(bag.frames[0][0].location)
-        stated = messages.baseline_of(topics[chosen], opened_bag.read(place).data, chosen)
-    bag.calibration = _calibration(left, right, stated[1], f"CameraInfo of {name}")
+    stated = 0.0
+    for each in found.frames[chosen] if topics[chosen].type == DISPARITY else ():
+        with contextlib.suppress(InputError):  # a damaged one says so in its row
+            stated = messages.baseline_of(topics[chosen], _message(each.location).data, chosen)
+            break
+    bag.calibration = _calibration(left, right, stated, f"CameraInfo of {name}")
     if bag.calibration is None and (found.cameras or topics[chosen].type == DISPARITY):
         bag.notes.append(f"{name}: {_NO_P}")
     _finish(bag, found, name, chosen)
@@ -112,6 +114,11 @@ def pairs_of_bag(files: Sequence[str], name: str, left: str, right: str, toleran
         if _is_raw(found, topic):
             bag.notes.append(f"{topic}: raw views are rectified by D, K, R and P of {_beside(topic)}")
             found.frames[topic][:] = [_rectified(found, topic, each) for each in found.frames[topic]]
+            bag.notes += [
+                f"{path}: has no {_beside(topic)}: its raw views are taken as they are"
+                for path in files
+                if (path, _beside(topic)) not in found.places
+            ]
         elif _RAW in topic and not _usable(found, topic):
             bag.notes.append(f"{topic}: raw views are taken as they are: no CameraInfo with P rectifies them")
     bag.frames = [(each, rights[at]) for each, at in zip(lefts, partners, strict=True) if at is not None]
@@ -193,8 +200,7 @@ def read_frame(path: str, member: str, place: Sequence[int], name: str) -> bytes
 def broken_part(path: str) -> str:
     """Say what is wrong behind the whole messages of a bag."""
     bag = _opened(path)
-    for _ in bag.messages(set()):
-        pass
+    list(bag.messages(set()))
     return f"{bag.broken or 'is whole'}; its whole messages are used"
 
 
@@ -287,12 +293,13 @@ def _scan(files: Sequence[str], wanted: Sequence[Topic], topics: dict[str, Topic
             place = "{}+{}".format(*message.place)
             if (topic := by_name.get(message.topic)) is None:
                 if (path, message.topic) not in places:
-                    info = messages.camera_info(topics[message.topic], message.data, message.topic)
-                    cameras.setdefault(message.topic, info)
-                    places[path, message.topic] = place
+                    with contextlib.suppress(InputError):  # the next one says the same
+                        info = messages.camera_info(topics[message.topic], message.data, message.topic)
+                        cameras.setdefault(message.topic, info)
+                        places[path, message.topic] = place
                 continue
             if topic.type == COMPRESSED and not frames[topic.name]:
-                with as_usage():
+                with contextlib.suppress(InputError):  # a damaged one says so in its row
                     messages.check_format(topic, bag.read(message.place).data, path)
             stamp = messages.stamp_of(topic, message.data, message.log_time)
             name = f"{path}#{topic.name}@{stamp}"
@@ -318,8 +325,11 @@ def _finish(bag: BagFrames, found: _Found, name: str, topic: str) -> None:
 
 
 def _beside(topic: str) -> str:
-    """Name the CameraInfo of an image topic: it lies in the same namespace."""
-    return f"{topic.rpartition('/')[0]}/camera_info"
+    """Name the CameraInfo of an image topic: it lies in the same namespace.
+
+    A compressed image is named below the image that it is of [http://wiki.ros.org/image_transport].
+    """
+    return f"{topic.removesuffix('/compressed').rpartition('/')[0]}/camera_info"
 
 
 def _camera(found: _Found, topic: str, *, right: bool) -> CameraInfo | None:
@@ -366,6 +376,6 @@ def _place(location: str) -> tuple[int, ...]:
     return tuple(map(int, location.rpartition("#@")[2].split("+")))
 
 
-def _placed(location: str) -> tuple[Bag, tuple[int, int]]:
+def _message(location: str) -> Message:
     place = _place(location)
-    return _opened(location.partition("#")[0]), (place[0], place[1])
+    return _opened(location.partition("#")[0]).read((place[0], place[1]))

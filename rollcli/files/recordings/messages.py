@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.errors import InputError
+from rollcli.errors import InputError, UsageError
 from rollcli.extras import require_extra
 from rollcli.files.bounded import MOST_BYTES
 from rollcli.files.codecs import pictures, png
@@ -153,11 +153,14 @@ def check_format(topic: Topic, data: memoryview, name: str) -> None:
 
     Raises
     ------
+    UsageError
+        It is.
     InputError
+        It is damaged.
     """
     form = str(_decoded(topic, data, name).format)
     if _VIDEO.search(form):
-        raise InputError(
+        raise UsageError(
             f"{name}: {topic.name} holds video ({form[:20]}), which must be decoded in order: record images, "
             "or export it as .mp4"
         )
@@ -168,11 +171,10 @@ def image_encoding(topic: Topic, data: memoryview, name: str) -> str:
     return str(_decoded(topic, data, name).encoding) if topic.type == IMAGE else ""
 
 
-def baseline_of(topic: Topic, data: memoryview, name: str) -> tuple[float, float]:
-    """Return f in px and |T| in m of a DisparityImage; 0 where they are not stated."""
-    found = _decoded(topic, data, name)
-    values = float(found.f), abs(float(found.t))
-    return values if all(map(math.isfinite, values)) else (0.0, 0.0)
+def baseline_of(topic: Topic, data: memoryview, name: str) -> float:
+    """Return |T| of a DisparityImage, m; 0 where it is not stated."""
+    length = abs(float(_decoded(topic, data, name).t))
+    return length if math.isfinite(length) else 0.0
 
 
 def content_of(
@@ -204,7 +206,7 @@ def content_of(
         if raw_of is None:
             return packed
         decode = png.picture if packed.startswith(png.SIGNATURE) else pictures.decode_picture
-        return _rectified(decode(packed, name), raw_of)
+        return _rectified(decode(packed, name), raw_of, name)
     if topic.type == DISPARITY:
         values = _pixels(found.image, name)
         least = float(found.min_disparity)
@@ -213,7 +215,7 @@ def content_of(
             values = np.where(below, np.nan, values).astype(values.dtype)
         return values
     values = _pixels(found, name)
-    return values if raw_of is None else _rectified(values, raw_of)
+    return values if raw_of is None else _rectified(values, raw_of, name)
 
 
 def _decoded(topic: Topic, data: memoryview, name: str) -> Any:
@@ -266,11 +268,17 @@ def _pixels(image: Any, name: str) -> NDArray[Any]:
     return cv2.cvtColor(values, _BAYER[bayer]) if encoding.startswith("bayer_") else values
 
 
-def _rectified(values: NDArray[Any], info: CameraInfo) -> NDArray[Any]:
+def _rectified(values: NDArray[Any], info: CameraInfo, name: str) -> NDArray[Any]:
     if values.shape[:2] != (info.height, info.width):
         seen = f"{values.shape[1]}x{values.shape[0]}"
-        raise InputError(f"the raw view is {seen}, and its CameraInfo is of {info.width}x{info.height}")
-    columns, rows = _rectification(info)
+        raise InputError(
+            f"{name}: is a raw view of {seen}, and its CameraInfo is of {info.width}x{info.height}"
+        )
+    try:
+        columns, rows = _rectification(info)
+    except cv2.error:
+        what = f"{len(info.d)} numbers of distortion, which are no {info.model:.40}"
+        raise InputError(f"{name}: is a raw view whose CameraInfo has {what}") from None
     return cv2.remap(values, columns, rows, cv2.INTER_LINEAR)
 
 

@@ -1,15 +1,21 @@
 """What is wrong with a bag, a topic or a message is one line, and costs no more than it must."""
 
+import contextlib
+import os
+import sqlite3
 import struct
 
 import cv2
 import numpy as np
 import pytest
 
+from rollcli import open_recording
+from rollcli.errors import InputError
 from tests.files.recordings.bag_files import camera_info, compressed, disparity_image, image, write_bag
 from tests.files.recordings.test_bags import START, STEP, P, drive, maps, rows
 from tests.run_cli import rollcli, write_pair
 
+MAGIC = b"\x89MCAP0\r\n"
 NO_P = [0.0] * 12
 
 
@@ -102,18 +108,18 @@ def text(words):
     return struct.pack("<I", len(words)) + words.encode()
 
 
-def foreign_mcap(path, kind, encoding):
+def foreign_mcap(path, kind, encoding, count=3):
     """An MCAP of another profile than ROS's, with a topic /camera [https://mcap.dev/spec]."""
     records = [
         record(1, text("") + text("")),
         record(3, struct.pack("<H", 1) + text(kind) + text(encoding) + text("")),
         record(4, struct.pack("<HH", 1, 1) + text("/camera") + text(encoding) + text("")),
-        *(record(5, struct.pack("<HIQQ", 1, place, START, START) + bytes(100)) for place in range(3)),
+        *(record(5, struct.pack("<HIQQ", 1, place, START, START) + bytes(100)) for place in range(count)),
         record(0x0F, bytes(4)),
         record(2, bytes(20)),
     ]
-    magic = b"\x89MCAP0\r\n"
-    path.write_bytes(magic + b"".join(records) + magic)
+
+    path.write_bytes(MAGIC + b"".join(records) + MAGIC)
 
 
 @pytest.mark.parametrize(
@@ -171,3 +177,127 @@ def test_without_the_extra_a_line_says_what_to_install(tmp_path):
     said = rollcli("estimate", path, cwd=tmp_path, PYTHONPATH=str(tmp_path / "hidden")).refused()
     assert f"{path} needs the extra bags: " in said
     assert "pip install rosbags" in said
+
+
+def repacked(data, compression, packed, claimed):
+    """An MCAP of rosbags' as others write it: topics before its chunk, which is packed, and no index."""
+    records, at = [], len(MAGIC)
+    while at < len(data) - len(MAGIC):
+        opcode, length = struct.unpack_from("<BQ", data, at)
+        records.append((opcode, data[at + 9 : at + 9 + length]))
+        at += 9 + length
+    (chunk,) = (content for opcode, content in records if opcode == 6)
+    plain = chunk[40:]
+    (size,) = struct.unpack_from("<Q", chunk, 16)
+    inside = packed(plain)
+    chunk = chunk[:16] + struct.pack("<QI", claimed(size), 0) + text(compression)
+    chunk += struct.pack("<Q", len(inside)) + inside
+    topics = b"".join(record(opcode, content) for opcode, content in records if opcode in (3, 4))
+    ends = record(0x0F, bytes(4)) + record(2, bytes(20))
+    return MAGIC + record(1, bytes(8)) + topics + record(6, chunk) + ends + MAGIC
+
+
+def zstd(plain):
+    return pytest.importorskip("zstandard").compress(plain)
+
+
+def lz4(plain):
+    return pytest.importorskip("lz4.frame").compress(plain)
+
+
+@pytest.mark.parametrize(
+    ("compression", "packed", "claimed", "whole", "broken"),
+    [
+        ("zstd", zstd, int, 3, False),
+        ("lz4", lz4, int, 3, False),
+        ("zstd", lambda plain: zstd(plain)[:-80_000], int, 1, True),
+        ("lz4", lambda plain: lz4(plain)[:-80_000], int, 1, True),
+        ("lz4", lz4, lambda size: size + 100, 3, True),
+        ("lz4", lz4, lambda size: 2**40, 0, True),
+        ("snappy", bytes, int, 0, True),
+    ],
+)
+def test_what_is_whole_of_a_packed_chunk_is_used(tmp_path, compression, packed, claimed, whole, broken):
+    noise = np.random.default_rng(0).random((120, 160), np.float32) / 1000
+    path = write_bag(tmp_path, "drive", "mcap", drive(3, [each + noise for each in maps(3)]))
+    expected = rows(rollcli("estimate", path.name, cwd=tmp_path).out)
+    path.write_bytes(repacked(path.read_bytes(), compression, packed, claimed))
+    done = rollcli("estimate", path.name, cwd=tmp_path)
+    found = rows(done.out)
+    assert done.status == (3 if broken else 0)
+    if broken:
+        rest = found.pop()
+        assert (rest["file"], "is damaged or cut off" in rest["message"]) == ("drive.mcap#rest", True)
+    # of the one that is not whole, its header may be
+    assert [row for row in found if row["status"] != "error"] == expected[:whole]
+    assert len(found) <= whole + broken
+
+
+def test_frames_that_a_bag_does_not_have_are_an_error_of_theirs(tmp_path):
+    path = write_bag(tmp_path, "drive", "mcap", drive(1)).name
+    done = rollcli("estimate", f"{path}#/nothing@5", f"{path}#/stereo/disparity@5", cwd=tmp_path)
+    assert (done.status, [row["message"] for row in rows(done.out)]) == (
+        3,
+        [f"no such topic in {path}", f"no such frame in {path}"],
+    )
+    done = rollcli("estimate", path, "--encoding", "foundationstereo", cwd=tmp_path)
+    assert (done.status, rows(done.out)[0]["message"]) == (3, "is a frame of a recording, and no file")
+
+
+def test_a_topic_without_messages_is_refused_with_a_line(tmp_path):
+    foreign_mcap(tmp_path / "drive.mcap", "stereo_msgs/msg/DisparityImage", "cdr", count=0)
+    assert "drive.mcap: has no messages of /camera" in refused(tmp_path, "drive.mcap")
+
+
+def test_the_first_messages_may_be_damaged(tmp_path):
+    """A map, a calibration and an image of which nothing can be decoded cost no other frame."""
+    path = write_bag(tmp_path, "drive", "db3", drive(3))
+    whole = rows(rollcli("estimate", path.name, cwd=tmp_path).out)
+    with contextlib.closing(sqlite3.connect(path)) as base, base:
+        base.execute("UPDATE messages SET data = substr(data, 1, 20) WHERE id <= 3")
+    done = rollcli("estimate", path.name, cwd=tmp_path)
+    found = rows(done.out)
+    assert (done.status, found[1:]) == (3, whole[1:])
+    assert found[0]["message"].startswith("is a damaged message of stereo_msgs/DisparityImage")
+    assert all(float(row["height_m"]) > 0 for row in found[1:])
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        "UPDATE messages SET timestamp = 'soon'",
+        "UPDATE messages SET timestamp = 9e999",
+        "UPDATE topics SET type = CAST(type AS BLOB), name = CAST(name AS BLOB)",
+    ],
+)
+def test_values_of_another_type_in_the_tables_of_a_bag_are_no_matter(tmp_path, change):
+    path = write_bag(tmp_path, "drive", "db3", drive(2))
+    whole = rollcli("estimate", path.name, cwd=tmp_path).out
+    with contextlib.closing(sqlite3.connect(path)) as base, base:
+        base.execute(change)
+    os.utime(path, (0, 0))  # another file
+    done = rollcli("estimate", path.name, cwd=tmp_path)
+    assert (done.status, done.out) == (0, whole)
+
+
+@pytest.mark.parametrize(
+    ("d", "model", "size", "expected"),
+    [
+        ((0.1, 0.2, 0.3), "plumb_bob", (160, 120), "has 3 numbers of distortion, which are no plumb_bob"),
+        ((0.1, 0.2, 0.3), "equidistant", (160, 120), "has 3 numbers of distortion, which are no equidistant"),
+        ((0.1,) * 5, "plumb_bob", (100, 90), "is a raw view of 160x120, and its CameraInfo is of 100x90"),
+    ],
+)
+def test_a_camera_info_that_rectifies_nothing_is_told(tmp_path, views, d, model, size, expected):
+    def make(store):
+        for side, view in zip(("left", "right"), views, strict=True):
+            info = camera_info(store, START, size, P, d, np.diag([350.0, 350, 1]).ravel())
+            yield f"/{side}/camera_info", START, changed(info, distortion_model=model)
+            yield f"/{side}/image_raw", START, image(store, view, "mono8", START)
+
+    path = write_bag(tmp_path, "drive", "mcap", make)
+    given = {f"{side}_topic": f"/{side}/image_raw" for side in ("left", "right")}
+    with pytest.raises(InputError) as caught:
+        list(open_recording(path, **given))
+    assert str(caught.value).startswith(f"{path}#/left/image_raw@{START}: ")
+    assert expected in str(caught.value)

@@ -1,6 +1,8 @@
 """Bags in all kinds give the rolls of the same frames from files; what is broken in them is told."""
 
+import contextlib
 import math
+import sqlite3
 from pathlib import Path
 
 import cv2
@@ -8,7 +10,7 @@ import numpy as np
 import pytest
 
 import rollcli as package
-from rollcli.errors import InputError
+from rollcli.errors import InputError, UsageError
 from tests.files.recordings.bag_files import KINDS, camera_info, compressed, disparity_image, image, write_bag
 from tests.run_cli import keep_rows, road_map, rollcli, write_pair
 from tests.run_cli import rows_of as rows
@@ -118,7 +120,8 @@ def test_views_are_paired_by_their_stamps_never_by_order(tmp_path, kind):
     assert "within 0.01 ms" in refusal
 
 
-def test_raw_views_are_rectified_and_a_line_says_so(tmp_path):
+@pytest.mark.parametrize("transport", ["", "/compressed"])
+def test_raw_views_are_rectified_and_a_line_says_so(tmp_path, transport):
     write_pair(tmp_path / "pairs", "0.png", road_map(math.radians(3)))
     views = {side: cv2.imread(str(tmp_path / "pairs" / side / "0.png"), 0) for side in ("left", "right")}
     height, width = views["left"].shape
@@ -136,7 +139,11 @@ def test_raw_views_are_rectified_and_a_line_says_so(tmp_path):
         for side, p in (("left", P), ("right", P_RIGHT)):
             info = camera_info(store, START, (width, height), p, d, k.ravel())
             yield f"/{side}/camera_info", START, info
-            yield f"/{side}/image_raw", START, image(store, raw[side], "mono8", START)
+            if transport:
+                png = cv2.imencode(".png", raw[side])[1].tobytes()
+                yield f"/{side}/image_raw/compressed", START, compressed(store, png, "mono8; png", START)
+            else:
+                yield f"/{side}/image_raw", START, image(store, raw[side], "mono8", START)
 
     path = write_bag(tmp_path, "drive", "mcap", make).name
     for side, each in raw.items():
@@ -147,9 +154,8 @@ def test_raw_views_are_rectified_and_a_line_says_so(tmp_path):
         assert np.abs(upright.astype(int) - rounded).mean() < 0.5  # levels of 256
         cv2.imwrite(str(tmp_path / "pairs" / side / "0.png"), upright)
     files = rows(rollcli("estimate", "--left", "pairs/left", "--right", "pairs/right", cwd=tmp_path).out)
-    done = rollcli(
-        "estimate", path, "--left-topic", "/left/image_raw", "--right-topic", "/right/image_raw", cwd=tmp_path
-    )
+    given = [f"--{side}-topic=/{side}/image_raw{transport}" for side in ("left", "right")]
+    done = rollcli("estimate", path, *given, cwd=tmp_path)
     assert "raw views are rectified by D, K, R and P of /left/camera_info" in done.err
     found = rows(done.out)[0]
     assert float(found["roll_deg"]) == pytest.approx(float(files[0]["roll_deg"]), abs=0.005)
@@ -260,3 +266,144 @@ def test_python_iterates_the_frames_of_a_bag(tmp_path):
     path.write_bytes(path.read_bytes()[:-90_000])
     with pytest.raises(InputError, match="cut off at"):
         list(package.open_recording(path))
+
+
+def mosaic(bgr, pattern):
+    """What a sensor sees behind such a filter, whose first two rows begin as its name says [REP 118]."""
+    places = [[slice(row, None, 2), slice(column, None, 2)] for row in range(2) for column in range(2)]
+    seen = np.zeros(bgr.shape[:2], bgr.dtype)
+    for place, colour in zip(map(tuple, places), pattern, strict=True):
+        seen[place] = bgr[..., "bgr".index(colour)][place]
+    return seen
+
+
+COLOURS = np.broadcast_to(np.array([30, 90, 200], np.uint8), (24, 32, 3))
+ENCODED = {
+    "mono8": COLOURS[..., 0],
+    "mono16": COLOURS[..., 0].astype(np.uint16) * 257,
+    "bgr8": COLOURS,
+    "rgb8": COLOURS[..., ::-1],
+    "bgra8": np.dstack([COLOURS, COLOURS[..., :1]]),
+    "rgba8": np.dstack([COLOURS[..., ::-1], COLOURS[..., :1]]),
+    "bgr16": COLOURS.astype(np.uint16) * 257,
+    "rgb16": COLOURS[..., ::-1].astype(">u2") * 257,
+    **{f"bayer_{each}8": mosaic(COLOURS, each) for each in ("rggb", "bggr", "gbrg", "grbg")},
+    "bayer_rggb16": mosaic(COLOURS.astype(np.uint16) * 257, "rggb"),
+}
+
+
+def test_views_of_every_encoding_are_read(tmp_path):
+    def make(store):
+        yield "/grey", START, image(store, COLOURS[..., 0], "mono8", START)
+        for encoding, values in ENCODED.items():
+            yield (
+                f"/{encoding}",
+                START,
+                image(store, np.ascontiguousarray(values), encoding, START, padding=3),
+            )
+        jpeg = cv2.imencode(".jpg", COLOURS, [cv2.IMWRITE_JPEG_QUALITY, 100])[1].tobytes()
+        yield "/jpeg/compressed", START, compressed(store, jpeg, "bgr8; jpeg", START)
+        yield "/32FC1", START, image(store, np.ones((24, 32), np.float32), "32FC1", START)
+
+    path = write_bag(tmp_path, "drive", "mcap", make)
+
+    def view(topic):
+        (frame,) = package.open_recording(path, left_topic=topic, right_topic="/grey")
+        np.testing.assert_array_equal(frame.right, COLOURS[..., 0])
+        assert (frame.stamp, frame.disparity) == (START, None)
+        return frame.left
+
+    for encoding in ENCODED:
+        expected = COLOURS[..., 0] if encoding.startswith("mono") else COLOURS
+        expected = expected if encoding.endswith("8") else expected.astype(np.uint16) * 257
+        found = view(f"/{encoding}")
+        inside = (slice(2, -2), slice(2, -2)) if encoding.startswith("bayer") else ()
+        np.testing.assert_array_equal(found[inside], expected[inside], encoding)
+    assert np.abs(view("/jpeg/compressed").astype(int) - COLOURS).max() <= 2
+    with pytest.raises(InputError, match=r"/32FC1@\d+: holds float32; a camera image is uint8 or uint16"):
+        view("/32FC1")
+    with pytest.raises(UsageError, match="left_topic and right_topic are given together"):
+        list(package.open_recording(path, left_topic="/grey"))
+
+
+def test_maps_of_every_encoding_are_read(tmp_path):
+    whole = np.rint(maps(1)[0] * 16)
+    deep = cv2.imencode(".png", whole.astype(np.uint16))[1].tobytes()
+
+    def make(store):
+        yield "/16SC1", START, image(store, whole.astype(np.int16), "16SC1", START)
+        yield "/64FC1", START, image(store, whole.astype(np.float64), "64FC1", START)
+        # its header: the format, and how depths were made numbers
+        yield "/compressedDepth", START, compressed(store, bytes(12) + deep, "16UC1; compressedDepth", START)
+
+    path = write_bag(tmp_path, "drive", "bag", make)
+    for topic in ("/16SC1", "/64FC1", "/compressedDepth"):
+        (frame,) = package.open_recording(path, topic=topic, scale=1 / 16)
+        np.testing.assert_allclose(frame.disparity, whole / 16, err_msg=topic)
+
+
+def test_the_only_topic_of_maps_is_found_among_others_and_behind_damage(tmp_path):
+    values = maps(2)
+
+    def make(store):
+        damaged = image(store, values[0], "32FC1", START)
+        for number in range(3):
+            stamp = START + number * STEP
+            yield "/photo", stamp, image(store, np.zeros((120, 160, 3), np.uint8), "bgr8", stamp)
+            yield "/photo", stamp + 1, image(store, np.zeros((120, 160, 3), np.uint8), "bgr8", stamp + 1)
+            one = image(store, values[1], "32FC1", stamp)
+            yield "/maps", stamp, damaged if number == 0 else one
+
+    path = write_bag(tmp_path, "drive", "db3", make)
+    with contextlib.closing(sqlite3.connect(path)) as base, base:
+        base.execute("UPDATE messages SET data = substr(data, 1, 20) WHERE id = 3")
+    done = rollcli("estimate", path.name, cwd=tmp_path)
+    assert [row["status"] for row in rows(done.out)] == ["error", "ok", "ok"]
+
+
+def test_one_camera_gives_the_calibration_of_maps_that_state_their_baseline(tmp_path):
+    def make(store):
+        yield "/stereo/left/camera_info", START, camera_info(store, START, (160, 120), P)
+        yield "/stereo/disparity", START, disparity_image(store, maps(1)[0], START, baseline=-0.25)
+
+    path = write_bag(tmp_path, "drive", "mcap", make)
+    (frame,) = package.open_recording(path)
+    assert (frame.calibration.fx, frame.calibration.baseline, frame.calibration.doffs) == (350, 0.25, 0)
+
+
+def test_a_bag_of_several_files_is_one_drive(tmp_path):
+    """Each has its own messages; raw views of one without a CameraInfo stay raw, which is said."""
+    folder = tmp_path / "split"
+    folder.mkdir()
+    (folder / "metadata.yaml").touch()
+    values = maps(2)
+
+    def part(number):
+        def make(store):
+            stamp = START + number * STEP
+            yield "/disparity", stamp, disparity_image(store, values[number], stamp)
+            for side, p in (("left", P), ("right", P_RIGHT)):
+                view = np.full((120, 160), 40 + number, np.uint8)
+                yield f"/{side}/image_raw", stamp, image(store, view, "mono8", stamp)
+                if number == 0:
+                    k = np.diag([350.0, 350, 1]).ravel()
+                    yield (
+                        f"/{side}/camera_info",
+                        stamp,
+                        camera_info(store, stamp, (160, 120), p, [0.1] * 5, k),
+                    )
+
+        write_bag(tmp_path, f"split_{number}", "mcap", make).rename(folder / f"split_{number}.mcap")
+
+    part(1)
+    part(0)
+    found = rollcli("estimate", "split", "--topic", "/disparity", cwd=tmp_path)
+    names = [f"split/split_{each}.mcap#/disparity@{START + each * STEP}" for each in range(2)]
+    assert [row["file"] for row in rows(found.out)] == names
+    given = ["--left-topic", "/left/image_raw", "--right-topic", "/right/image_raw"]
+    said = rollcli("disparity", "split", *given, "-o", "maps", cwd=tmp_path).err
+    assert "split/split_1.mcap: has no /left/camera_info: its raw views are taken as they are" in said
+    assert "split_0.mcap: has no" not in said
+    (folder / "split_1.mcap").rename(folder / "split_1.mcap.zstd")
+    refusal = rollcli("estimate", "split", cwd=tmp_path).refused()
+    assert "split: its file split_1.mcap.zstd is compressed as a whole; unpack it by zstd -d" in refusal

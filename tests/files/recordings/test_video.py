@@ -13,6 +13,7 @@ import pytest
 
 import rollcli as package
 from rollcli.errors import InputError, UsageError
+from rollcli.files.formats import read_image
 from tests.run_cli import keep_rows, road_map, rollcli, write_pair
 from tests.run_cli import rows_of as rows
 from tests.slow import mostly_slow
@@ -308,3 +309,78 @@ def test_python_iterates_the_frames_of_a_video(tmp_path, drive):
     path.write_bytes(path.read_bytes()[:-20_000])
     with pytest.raises(InputError, match="is cut off"):
         list(package.open_recording(path, side_by_side="left-right"))
+
+
+def longer(data):
+    """An MP4 whose largest box says its length in 64 bits, where FFmpeg leaves eight bytes for them."""
+    at = data.index(b"\0\0\0\x08free")
+    (length,) = struct.unpack_from(">I", data, at + 8)
+    return data[:at] + struct.pack(">I4sQ", 1, b"mdat", length + 8) + data[at + 16 :]
+
+
+def to_the_end(data):
+    """An MP4 whose last box reaches to the end of the file, however long that is."""
+    at = data.index(b"moov") - 4
+    return data[:at] + bytes(4) + data[at + 4 :]
+
+
+def of_no_length(data):
+    """A Matroska file as one writes it that cannot go back to the beginning: its segment has no length."""
+    at = data.index(SEGMENT) + 4
+    return data[:at] + b"\x01" + b"\xff" * 7 + data[at + 8 :]
+
+
+def of_no_lengths(data):
+    """The same, and its frames, too."""
+    at = data.index(CLUSTER) + 4
+    (length,) = struct.unpack_from(">H", data, at)  # two bytes, of which the first bits say so
+    assert length >> 14 == 1
+    return of_no_length(data[:at] + b"\x7f\xff" + data[at + 2 :])
+
+
+SEGMENT, CLUSTER = b"\x18\x53\x80\x67", b"\x1f\x43\xb6\x75"
+
+
+@pytest.mark.parametrize(
+    ("name", "codec", "change", "broken"),
+    [
+        ("drive.mp4", "mp4v", longer, False),
+        ("drive.mp4", "mp4v", to_the_end, False),
+        ("drive.mp4", "mp4v", lambda data: data.replace(b"elst", b"skip"), False),
+        ("drive.avi", "MJPG", lambda data: data + b"what a recorder notes behind it", False),
+        ("drive.mkv", "MJPG", of_no_length, False),
+        ("drive.mkv", "MJPG", of_no_lengths, True),
+        ("drive.mkv", "MJPG", lambda data: data + SEGMENT, True),
+    ],
+)
+def test_lengths_that_a_video_says_in_other_ways_say_the_same(tmp_path, name, codec, change, broken):
+    frames = [np.full((48, 128, 3), 40 * each, np.uint8) for each in range(3)]
+    path = write_video(tmp_path / name, frames, codec)
+    found = list(package.open_recording(path, side_by_side="left-right"))
+    path.write_bytes(change(path.read_bytes()))
+    again = package.open_recording(path, side_by_side="left-right")
+    for one in found:
+        np.testing.assert_array_equal(next(again).left, one.left)
+    if broken:
+        with pytest.raises(InputError, match=r"drive.mkv#rest: is cut off"):
+            next(again)
+    assert (len(found), next(again, None)) == (3, None)
+
+
+def test_frames_of_a_video_are_read_in_any_order_and_others_are_errors(tmp_path, drive):
+    _, _, views = drive
+    write_video(tmp_path / "drive.mkv", beside(views))
+    for number in (3, 0, 0, 4):
+        image = read_image(tmp_path / f"drive.mkv#{number:06d}")
+        np.testing.assert_array_equal(image, beside(views)[number])
+    names = [f"drive.mkv#{each}" for each in ("000001", "000099", "one", "rest")]
+    done = rollcli("estimate", *names, "--side-by-side", cwd=tmp_path)
+    assert (done.status, {row["file"]: row["message"] for row in rows(done.out)}) == (
+        3,
+        {
+            "drive.mkv#000001": "",
+            "drive.mkv#000099": "no such frame: drive.mkv has 5 that can be decoded",
+            "drive.mkv#one": "no such frame in drive.mkv",
+            "drive.mkv#rest": "is whole; the whole frames before are used",
+        },
+    )
