@@ -142,6 +142,12 @@ def test_the_chart_shows_segments_and_jumps():
     assert shown["mounting"]["x"] == [1, 200, None, 201, 400, None]
     assert shown["mounting"]["y"][0] == pytest.approx(0.2, abs=0.03)
     assert shown["mounting"]["y"][3] == pytest.approx(1.0, abs=0.03)
+    assert shown["mounting, 95 %"]["x"] == [1, 200, 200, 1, None, 201, 400, 400, 201, None]
+    (drive,) = assess_rig(rows).drives
+    for place, segment in enumerate(drive.quantities["roll"].segments):
+        mean, half = segment.mean.value, segment.mean.ci95
+        high, _, _, low = shown["mounting, 95 %"]["y"][5 * place : 5 * place + 4]
+        assert (high, low) == pytest.approx((mean + half, mean - half), abs=1e-4)
 
 
 def test_a_long_run_has_a_line_without_dots_and_a_dot_for_each_frame_that_stands_alone():

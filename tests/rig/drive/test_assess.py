@@ -134,6 +134,16 @@ def test_a_wider_interval_counts_less():
     assert found.now.value > 0.5
 
 
+@pytest.mark.parametrize("seed", SEEDS)
+def test_frames_whose_own_errors_explain_how_far_off_they_are_are_no_outliers(seed):
+    rng = np.random.default_rng(seed)
+    errors = np.where(rng.random(400) < 0.1, 0.5, 0.01)
+    values = rng.normal(0, 1, 400) * errors
+    values[200] = 3.0
+    errors[200] = 0.01
+    assert assess_sequence(values, errors).outliers == 1
+
+
 def test_a_frame_without_an_error_has_the_usual_one_of_the_frames_that_are_used():
     values, _ = drive(3, 400, sd=0.1)
     values[:40] = np.nan
