@@ -228,6 +228,14 @@ def test_a_histogram_is_of_two_angles_or_more():
     assert chart_names(pairs[:1]) == ["roll"]
 
 
+def test_pairs_of_unknown_size_are_not_in_the_chart_of_shifts():
+    pair = replace(row("a.png"), right_lower_px=0.5, right_clockwise_deg=0.2)
+    rows = [pair, replace(pair, width=None, height=None), pair]
+    shown = traces_of(all_charts(rows)["alignment"])
+    assert (shown["lower"]["x"], shown["lower"]["y"]) == ([1, 3], [0.5, 0.5])
+    assert shown["turned"]["y"] == pytest.approx([np.radians(0.2) * 80] * 2, abs=2e-3)
+
+
 def test_json_in_a_script_cannot_end_it():
     value = {"a": "</script><!--&\u2028\u2029"}
     text = script_json(value)
