@@ -19,18 +19,18 @@ _SETTINGS = threading.Lock()  # matplotlib has one set of them for all threads
 COLUMN = 3.5 * 72  # pt: the width of a column in journals of two columns
 _STYLE: dict[Any, Any] = {
     "axes.axisbelow": True,
-    "axes.edgecolor": f"#{LIGHT['line'][0]}",
+    "axes.edgecolor": f"#{LIGHT['line']}",
     "axes.grid": True,
-    "axes.labelcolor": f"#{LIGHT['text'][0]}",
-    "grid.color": f"#{LIGHT['grid'][0]}",
+    "axes.labelcolor": f"#{LIGHT['text']}",
+    "grid.color": f"#{LIGHT['grid']}",
     "legend.frameon": False,
     "pdf.fonttype": 42,  # letters stay letters
     "svg.fonttype": "none",
-    "text.color": f"#{LIGHT['text'][0]}",
-    "xtick.color": f"#{LIGHT['line'][0]}",
-    "xtick.labelcolor": f"#{LIGHT['text'][0]}",
-    "ytick.color": f"#{LIGHT['line'][0]}",
-    "ytick.labelcolor": f"#{LIGHT['text'][0]}",
+    "text.color": f"#{LIGHT['text']}",
+    "xtick.color": f"#{LIGHT['line']}",
+    "xtick.labelcolor": f"#{LIGHT['text']}",
+    "ytick.color": f"#{LIGHT['line']}",
+    "ytick.labelcolor": f"#{LIGHT['text']}",
 }
 
 
@@ -83,5 +83,5 @@ def figure_file(figure: Figure, kind: str, title: str) -> bytes:
         metadata |= {"Software": None}
     buffer = io.BytesIO()
     dots = 600 if figure.get_figwidth() * 72 <= 2 * COLUMN else 144
-    figure.savefig(buffer, format=kind, dpi=dots, metadata=metadata, facecolor=f"#{LIGHT['card'][0]}")
+    figure.savefig(buffer, format=kind, dpi=dots, metadata=metadata, facecolor=f"#{LIGHT['card']}")
     return buffer.getvalue()

@@ -304,7 +304,7 @@ def alignment(rows: Sequence[Row], rig: RigAssessment | None = None) -> Chart:
         known = [
             (number, row, float(getattr(row, quantity.column)))
             for number, row in enumerate(rows, 1)
-            if getattr(row, quantity.column) is not None
+            if getattr(row, quantity.column) is not None and row.height and row.width
         ]
         scale = [_shift_of(place, row) for _, row, _ in known]
         dots = {
@@ -340,8 +340,6 @@ def _shift_of(place: int, row: Row) -> float:
     """Return by how many pixels a unit of a part of the alignment shifts rows where it does most."""
     unit = [float(each == place) for each in range(len(ALIGNMENT))]
     height, width = row.height or 0, row.width or 0
-    if not height or not width:
-        return 1.0
     return Misalignment.of_values(unit, height, width).shifts(height, width)[place]
 
 

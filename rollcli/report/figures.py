@@ -30,7 +30,7 @@ _GREEK_INDEX = re.compile(r"(\w)<sub>(\w+)</sub>")
 _LINES = {"dot": (0, (1.5, 1.5)), "dash": (0, (4.0, 3.0))}  # of a line's width
 _MARKS = {"diamond": "D", "x-thin": "x", "circle-open": "o"}
 _COLOUR = re.compile("#[0-9a-f]{6}")
-_VARIABLES = {f"#{digits}": f"var(--{name})" for name, (digits, _) in reversed([*LIGHT.items()])}
+_VARIABLES = {f"#{digits}": f"var(--{name})" for name, digits in reversed([*LIGHT.items()])}
 # places of a chart on the page; its styles show one of them
 _WIDE, _NARROW = Size(1000.0, 368.0, 13.0), Size(350.0, 352.0, 11.0)
 
@@ -78,17 +78,17 @@ def _drawn(chart: Chart, size: Size) -> Figure:
     for order, trace in enumerate(chart.data, 2):
         if trace["type"] == "bar":
             counts = np.asarray(trace["y"], float)
-            look = {"color": _colour(trace["marker"]["color"])[0], "edgecolor": _colour("@card")[0]}
+            look = {"color": _colour(trace["marker"]["color"]), "edgecolor": _colour("@card")}
             axes.bar(trace["x"], counts, trace["width"], base, align="edge", linewidth=scale, **look)
             base = base + counts
         else:
             _draw_scatter(axes, trace, across, up, scale, order)
     for shape, words in zip(chart.layout.get("shapes", ()), chart.layout.get("annotations", ()), strict=True):
         style = _LINES[shape["line"]["dash"]]
-        axes.axvline(shape["x0"], color=_colour(shape["line"]["color"])[0], linewidth=scale, linestyle=style)
+        axes.axvline(shape["x0"], color=_colour(shape["line"]["color"]), linewidth=scale, linestyle=style)
         place, anchor = (words["x"], words["y"]), axes.get_xaxis_transform()
         axes.annotate(
-            f" {words['text']}", place, xycoords=anchor, va=words["yanchor"], color=_colour("@muted")[0]
+            f" {words['text']}", place, xycoords=anchor, va=words["yanchor"], color=_colour("@muted")
         )
     across.set(axes)
     up.set(axes)
@@ -96,7 +96,7 @@ def _drawn(chart: Chart, size: Size) -> Figure:
         side.set_visible(False)
     axes.tick_params(length=0, which="both")
     if chart.layout.get("yaxis", {}).get("zeroline"):
-        axes.axhline(0, color=_colour("@line")[0], linewidth=2 * scale, zorder=1)
+        axes.axhline(0, color=_colour("@line"), linewidth=2 * scale, zorder=1)
     _add_legend(figure, chart, size, scale)
     return figure
 
@@ -161,14 +161,13 @@ def _flat(values: Sequence[Any]) -> list[str]:
 def _draw_scatter(axes: Axes, trace: Trace, across: _Scale, up: _Scale, scale: float, order: int) -> None:
     x, y = across.places(trace["x"]), up.places(trace["y"])
     if trace.get("fill"):
-        colour, opacity = _colour(trace["fillcolor"])
         width = trace["line"].get("width", 0) * scale
         for run in _runs(x, y):
-            axes.fill(*run.T, color=colour, alpha=opacity, linewidth=width, zorder=order)
+            axes.fill(*run.T, color=_colour(trace["fillcolor"]), linewidth=width, zorder=order)
         return
     if "error_y" in trace:
         bars = trace["error_y"]
-        pen = {"ecolor": _colour(bars["color"])[0], "elinewidth": bars["thickness"] * scale}
+        pen = {"ecolor": _colour(bars["color"]), "elinewidth": bars["thickness"] * scale}
         axes.errorbar(x, y, bars["array"], fmt="none", zorder=order, **pen)
     if trace["mode"] == "lines":
         gap = [[np.nan, np.nan]]
@@ -196,7 +195,7 @@ def _runs(x: NDArray[Any], y: NDArray[Any]) -> Iterator[NDArray[Any]]:
 def _look(trace: Trace, scale: float) -> dict[str, Any]:
     """Return what a trace looks like, in the words of matplotlib's lines."""
     line, marker = trace.get("line", {}), trace.get("marker", {})
-    colour = _colour(line.get("color") or marker["color"])[0]
+    colour = _colour(line.get("color") or marker["color"])
     lines, marks = "lines" in trace["mode"], "markers" in trace["mode"]
     symbol = marker.get("symbol", "circle")
     is_open = symbol in ("circle-open", "x-thin")
@@ -229,15 +228,13 @@ def _add_legend(figure: Figure, chart: Chart, size: Size, scale: float) -> None:
 
 def _sample(trace: Trace, scale: float) -> Any:
     if trace["type"] == "bar" or trace.get("fill"):
-        colour, opacity = _colour(trace.get("fillcolor") or trace["marker"]["color"])
-        return Patch(facecolor=colour, alpha=opacity)
+        return Patch(facecolor=_colour(trace.get("fillcolor") or trace["marker"]["color"]))
     return Line2D([], [], **_look(trace, scale))
 
 
-def _colour(name: str) -> tuple[str, float]:
-    """Return one of the page's colours and its opacity: "@c1" is that of "c1"."""
-    digits, opacity = LIGHT[name.removeprefix("@")]
-    return f"#{digits}", opacity
+def _colour(name: str) -> str:
+    """Return one of the page's colours: "@c1" is that of "c1"."""
+    return f"#{LIGHT[name.removeprefix('@')]}"
 
 
 def _words(text: str) -> str:

@@ -252,12 +252,10 @@ def _bag_frames(bags: "Iterable[BagFrames]", make: "_FrameMaker") -> list[Frame]
     frames = []
     for bag in bags:
         _say(bag.notes, quiet=make.quiet)
-        for pair in bag.frames:
-            left, right = (each and _recorded(each) for each in pair)
-            if left is not None:
-                frame = make.frame(left, right)
-                own = make.calibrations.given
-                frames.append(frame if own else replace(frame, calibration=bag.calibration))
+        for left, right in bag.frames:
+            frame = make.frame(_recorded(left), right and _recorded(right))
+            own = make.calibrations.given
+            frames.append(frame if own else replace(frame, calibration=bag.calibration))
     return frames
 
 

@@ -98,3 +98,7 @@ def test_a_result_that_fits_exactly_is_not_enlarged(shape, quarters):
     level = derotate(np.full(shape, 7.0), quarters * math.pi / 2, expand=True)
     # as many more pixels on either side: one more where the sides differ by an odd number
     assert level.shape == tuple(a + (b - a) + (b - a) % 2 for a, b in zip(shape, turned, strict=True))
+
+
+def test_small_disparities_are_data():
+    np.testing.assert_array_equal(derotate(np.full((8, 9), 0.25), 0.0), np.full((8, 9), 0.25))

@@ -109,7 +109,7 @@ def test_without_a_disparity_there_is_no_height():
     assert np.isnan(behind[0, 5])
 
 
-@pytest.mark.parametrize("alpha", [(60, -0.3, 0), (-60, 0.3, 0), (10, 0, 0)])
+@pytest.mark.parametrize("alpha", [(60, -0.3, 0), (-60, 0.3, 0), (10, 0, 0), (-23.5, 0.5, 0)])
 def test_no_road_no_heights(alpha):
     """Its disparity does not grow downward, or all of the map is above its horizon."""
     road = FittedRoad(0.0, alpha, 0.0, 64, 48)
@@ -221,6 +221,19 @@ def test_a_height_has_the_same_colour_in_every_picture():
     assert (colour(0.1) == colour(5)).all()
     assert (colour(0.05, span=(-0.1, 0.1)) != colour(0.05, span=(-0.1, 0.4))).any()
     assert (colour(0, span=(-0.1, 0.4)) == colour(0)).all()
+
+
+def test_the_colours_are_those_of_colorbrewer():
+    red_to_blue = ("b2182b", "d6604d", "f4a582", "f7f7f7", "92c5de", "4393c3", "2166ac")  # its RdBu
+    for height, digits in zip(np.linspace(0.3, -0.3, 7), red_to_blue, strict=True):
+        found = colour(height, span=(-0.3, 0.3))[::-1]
+        assert np.abs(found - [*bytes.fromhex(digits)]).max() <= 1
+
+
+def test_heights_of_one_side_have_all_the_colours():
+    for low, high in ((0.0, 0.3), (0.1, 0.3), (-0.3, 0.0)):
+        for height, same in ((low, -0.1), ((low + high) / 2, 0.0), (high, 0.1)):
+            assert (colour(height, span=(low, high)) == colour(same)).all()
 
 
 def test_no_data_is_dark_and_shows_the_photo_where_there_is_one():

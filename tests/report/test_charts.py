@@ -142,6 +142,12 @@ def test_the_chart_shows_segments_and_jumps():
     assert shown["mounting"]["x"] == [1, 200, None, 201, 400, None]
     assert shown["mounting"]["y"][0] == pytest.approx(0.2, abs=0.03)
     assert shown["mounting"]["y"][3] == pytest.approx(1.0, abs=0.03)
+    assert shown["mounting, 95 %"]["x"] == [1, 200, 200, 1, None, 201, 400, 400, 201, None]
+    (drive,) = assess_rig(rows).drives
+    for place, segment in enumerate(drive.quantities["roll"].segments):
+        mean, half = segment.mean.value, segment.mean.ci95
+        high, _, _, low = shown["mounting, 95 %"]["y"][5 * place : 5 * place + 4]
+        assert (high, low) == pytest.approx((mean + half, mean - half), abs=1e-4)
 
 
 def test_a_long_run_has_a_line_without_dots_and_a_dot_for_each_frame_that_stands_alone():
@@ -220,6 +226,14 @@ def test_a_histogram_is_of_two_angles_or_more():
     pairs = [replace(row(f"{name}.png", None), right_lower_px=0.1) for name in "ab"]
     assert chart_names(pairs) == ["roll", "alignment"]
     assert chart_names(pairs[:1]) == ["roll"]
+
+
+def test_pairs_of_unknown_size_are_not_in_the_chart_of_shifts():
+    pair = replace(row("a.png"), right_lower_px=0.5, right_clockwise_deg=0.2)
+    rows = [pair, replace(pair, width=None, height=None), pair]
+    shown = traces_of(all_charts(rows)["alignment"])
+    assert (shown["lower"]["x"], shown["lower"]["y"]) == ([1, 3], [0.5, 0.5])
+    assert shown["turned"]["y"] == pytest.approx([np.radians(0.2) * 80] * 2, abs=2e-3)
 
 
 def test_json_in_a_script_cannot_end_it():

@@ -8,8 +8,8 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
-from rollcli.pictures.colours import DARK, LIGHT, rgb, style_sheet
-from rollcli.pictures.figures import SLIDE
+from rollcli.pictures.colours import DARK, LIGHT, style_sheet
+from rollcli.pictures.figures import SLIDE, Size
 from rollcli.report import figures
 from rollcli.report.charts import all_charts
 from rollcli.report.figures import chart_file, with_still
@@ -42,7 +42,7 @@ def decoded(data):
 
 def of_colour(shown, name):
     """Where a picture has a colour, give or take what blending leaves."""
-    return np.abs(shown.astype(int) - rgb(name)).max(axis=2) < 12
+    return np.abs(shown.astype(int) - [*bytes.fromhex(LIGHT[name])]).max(axis=2) < 12
 
 
 def drawn(rows, name="roll"):
@@ -65,6 +65,15 @@ def test_an_svg_has_the_size_of_a_slide_a_title_axes_with_units_and_a_legend(cha
         "histogram": ["frames", "roll, degrees", "ok", "suspect"],
     }[name]
     assert [each for each in expected if each not in texts(svg)] == []
+
+
+def test_lines_grow_with_the_letters(charts):
+    widths = {}
+    for times in (2, 4):  # a width of 1 is not written
+        svg = chart_file(charts["roll"], "svg", Size(960.0 * times, 420.0 * times, 13.0 * times)).decode()
+        widths[times] = [float(each) for each in re.findall(r"stroke-width: ([\d.]+)", svg)]
+    assert set(widths[2]) == {2, 3, 4}  # axes, curves, and the line of zero
+    assert widths[4] == [2 * each for each in widths[2]]
 
 
 def test_a_pdf_has_the_same_size_and_its_letters_are_letters(charts):
@@ -185,9 +194,9 @@ def test_on_a_page_a_chart_has_two_pictures_in_the_pages_colours_and_font(charts
 def test_the_style_sheet_holds_every_colour_of_both_modes():
     light, dark = style_sheet().split("@media screen and (prefers-color-scheme: dark)")
     for sheet, colours in ((light, LIGHT), (dark, DARK)):
-        found = dict(re.findall(r"--([\w-]+): rgba(\([^)]+\));", sheet))
-        assert found == {name: str((*rgb(name, colours), colours[name][1])) for name in colours}
+        found = dict(re.findall(r"--([\w-]+): #(\w+);", sheet))
+        assert found == colours
     assert LIGHT.keys() == DARK.keys()
     # a picture tells colours by their digits: those of one kind are one colour in dark mode too
-    pairs = {(LIGHT[name][0], DARK[name][0]) for name in LIGHT if name not in ("suspect-text", "card")}
+    pairs = {(LIGHT[name], DARK[name]) for name in LIGHT if name not in ("suspect-text", "card")}
     assert len(pairs) == len({light for light, _ in pairs})

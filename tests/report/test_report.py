@@ -18,6 +18,8 @@ import pytest
 
 from rollcli.files.results import read_result
 from rollcli.report import pictures
+from rollcli.report.sources import subjects
+from rollcli.run.options import EncodingOptions, FrameOptions, ImageOptions
 from tests.report.results import row, write_result
 from tests.run_cli import contents, road_map, rollcli, write_kitti, write_maps
 
@@ -395,6 +397,26 @@ def test_heights_are_shown_as_estimate_drew_them_or_made_in_the_same_colours(tmp
         assert np.abs(shown.astype(float) - drawn).mean() < 4  # WebP loses a little
 
 
+def heights_picture(tmp_path, camera, span):
+    """The picture of heights of a map with a kerb, whose row says how high the camera is."""
+    v = np.mgrid[:120, :160][0]
+    road = np.maximum(0.4 * (v - 20), 0).astype(np.float32)
+    road[80:90, 60:100] += 3.0
+    np.save(tmp_path / "a.npy", road)
+    given = replace(row("a.npy", 0.0), alpha0=-8.0, alpha1=0.4, height_m=camera)
+    (subject,) = subjects([given], str(tmp_path / "rolls.csv"), None, ImageOptions())
+    options = FrameOptions(encoding=EncodingOptions("px"), images=ImageOptions(heights_range=span))
+    taken = pictures.take_pictures(subject, options)
+    shown = cv2.imdecode(np.frombuffer(taken.heights.data, np.uint8), cv2.IMREAD_COLOR)
+    return shown[:, :144].astype(int)  # without the bar
+
+
+def test_heights_are_in_metres_where_the_row_says_how_high_the_camera_is(tmp_path):
+    in_heights = heights_picture(tmp_path, None, (-0.25, 0.25))
+    assert np.abs(heights_picture(tmp_path, 2.0, (-0.5, 0.5)) - in_heights).max() < 4
+    assert np.abs(heights_picture(tmp_path, 2.0, (-0.25, 0.25)) - in_heights).max() > 40
+
+
 @pytest.mark.slow
 def test_results_of_several_runs_are_drives_and_shards_are_one(tmp_path):
     for name, roll in (("a", 1.0), ("b", -2.0)):
@@ -450,3 +472,5 @@ def test_the_page_says_how_the_right_view_lies_and_shows_it_over_the_drive(tmp_p
     traces = {trace["name"]: trace["y"] for trace in chart["data"]}
     assert traces["turned"] == pytest.approx([-np.radians(0.2) * 80] * 60, abs=1e-3)
     assert traces["lower"] == pytest.approx(1.5 + noise, abs=1e-3)
+    (level,) = [each for each in chart["data"] if each["name"] == "lower, over the drive"]
+    assert (level["x"], level["y"]) == ([1, 60, None], [pytest.approx(1.5, abs=0.02)] * 2 + [None])

@@ -386,8 +386,9 @@ def test_a_cropped_image_is_refused_by_naming_both_sizes(size):
 def test_a_calibration_without_a_size_is_refused_where_its_centre_lies_outside_of_the_image():
     unsized = Calibration(700.0, 700.0, 320.0, 200.0, source="calib.txt")
     assert unsized.for_size(640, 480).width == 640
-    with pytest.raises(UsageError, match="320,200 lies outside of the 300x480"):
-        unsized.for_size(300, 480)
+    for size in ((300, 480), (320, 480), (640, 200)):
+        with pytest.raises(UsageError, match=f"320,200 lies outside of the {size[0]}x{size[1]}"):
+            unsized.for_size(*size)
 
 
 def without_size(text):

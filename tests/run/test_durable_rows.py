@@ -125,13 +125,14 @@ def interrupted_at(step, work):
                 raise KeyboardInterrupt
         return trace
 
+    before = sys.gettrace()  # of a debugger, or of what measures coverage
     sys.settrace(trace)
     try:
         work()
     except KeyboardInterrupt:
         return True
     finally:
-        sys.settrace(None)
+        sys.settrace(before)
     return False
 
 

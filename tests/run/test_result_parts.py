@@ -83,10 +83,11 @@ def test_damaged_parts_are_not_resumed(parts, damaged, words):
     assert contents(folder) == before
 
 
-def test_a_full_disk_keeps_the_parts_before_it_and_says_how_to_go_on(parts, monkeypatch):
+@pytest.mark.parametrize(("gone", "kept"), [((1, 2), 2), ((0,), 4), ((0, 1), 2)])
+def test_a_full_disk_keeps_the_other_parts_and_says_how_to_go_on(parts, gone, kept, monkeypatch):
     folder, line = parts
     whole = contents(folder)
-    for number in (1, 2):
+    for number in gone:
         (folder / "rolls.parquet" / f"part-0000{number}.parquet").unlink()
 
     def no_room(location, data, run):
@@ -97,8 +98,8 @@ def test_a_full_disk_keeps_the_parts_before_it_and_says_how_to_go_on(parts, monk
         done = rollcli(*line, "--resume", "-j", "1", cwd=folder)
     assert done.status == 1
     assert done.err.endswith(
-        "rollcli: rolls.parquet/part-00001.parquet: cannot be written: no space left on device; "
-        "2 rows are kept, continue with --resume\n"
+        f"rollcli: rolls.parquet/part-0000{gone[0]}.parquet: cannot be written: no space left on device; "
+        f"{kept} rows are kept, continue with --resume\n"
     )
     assert rollcli(*line, "--resume", cwd=folder).status == 0
     assert contents(folder) == whole

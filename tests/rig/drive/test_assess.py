@@ -86,6 +86,16 @@ def test_with_a_drift_the_rig_is_as_it_is_at_the_end():
         assert abs(end.value - truth) <= min(end.ci95, 0.15)
 
 
+@pytest.mark.parametrize("frames", [20, 60])
+def test_a_steady_drift_begins_and_ends_where_its_line_does(frames):
+    noise = np.random.default_rng(1).normal(0, 0.001, frames)
+    found = assess_sequence(np.linspace(0, 2, frames) + noise, np.full(frames, 0.001))
+    (segment,) = found.segments
+    values = [each.value for each in (segment.begin, segment.mean, segment.end, found.drift)]
+    assert values == pytest.approx([0, 1, 2, 2], abs=0.005)
+    assert found.between_sd < 0.005
+
+
 def test_frames_that_are_left_out_keep_their_time():
     values, errors = drive(5, 3000, jump=0.8, at=1800, sd=0.1)
     values[np.random.default_rng(0).random(3000) < 0.3] = np.nan
@@ -132,6 +142,16 @@ def test_a_wider_interval_counts_less():
     values = np.tile([1.0, 0.0], 200) + np.random.default_rng(0).normal(0, 0.01, 400)
     found = assess_sequence(values, np.tile([0.01, 0.5], 200))
     assert found.now.value > 0.5
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_frames_whose_own_errors_explain_how_far_off_they_are_are_no_outliers(seed):
+    rng = np.random.default_rng(seed)
+    errors = np.where(rng.random(400) < 0.1, 0.5, 0.01)
+    values = rng.normal(0, 1, 400) * errors
+    values[200] = 3.0
+    errors[200] = 0.01
+    assert assess_sequence(values, errors).outliers == 1
 
 
 def test_a_frame_without_an_error_has_the_usual_one_of_the_frames_that_are_used():

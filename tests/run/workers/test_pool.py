@@ -240,3 +240,14 @@ def test_a_process_with_one_thread_is_forked_and_one_with_more_is_not(tmp_path):
 
     assert kind() == "ForkProcess\n"
     assert kind("threads") == "SpawnProcess\n"
+
+
+@pytest.mark.parametrize("name", ["scheduler.json", "folder/scheduler"])
+def test_a_scheduler_is_named_by_a_json_file_or_by_a_path(tmp_path, monkeypatch, name):
+    pytest.importorskip("distributed", reason="distributed, of the extra cluster, is not here")
+    from rollcli.run.workers.cluster import scheduler_address
+
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "folder").mkdir()
+    (tmp_path / name).write_text('{"address": "tcp://far:8786"}')
+    assert scheduler_address(name) == "tcp://far:8786"
