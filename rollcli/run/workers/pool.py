@@ -333,7 +333,9 @@ def _serve(
 
     threading.Thread(target=receive, daemon=True).start()
     while (chunk := chunks.get()) is not None:
-        pipe.send(chunk.done() if start_error is None else Done([], 0.0, start_error))
+        done = chunk.done() if start_error is None else Done([], 0.0, start_error)
+        with contextlib.suppress(OSError):  # the parent has died, and `receive` ends this process
+            pipe.send(done)
     os._exit(0)  # there is nothing to clean up, and unloading NumPy and OpenCV takes longer than two frames
 
 
