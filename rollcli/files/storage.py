@@ -46,10 +46,10 @@ _notes: ContextVar[dict[str, Note] | None] = ContextVar("notes", default=None)
 
 
 @contextlib.contextmanager
-def noting() -> Iterator[dict[str, Note]]:
-    """Take a note of each location that this thread reads in the block by `read_frame`."""
+def noting(wanted: bool = True) -> Iterator[dict[str, Note]]:
+    """Take a note, if wanted, of each location that this thread reads in the block by `read_frame`."""
     notes: dict[str, Note] = {}
-    token = _notes.set(notes)
+    token = _notes.set(notes if wanted else None)
     try:
         yield notes
     finally:

@@ -1,6 +1,5 @@
 """One frame in, one row out."""
 
-import contextlib
 import time
 from dataclasses import replace
 
@@ -29,8 +28,7 @@ def run_frame(frame: Frame, options: FrameOptions) -> FrameResult:
     """
     start = time.perf_counter()
     images: dict[str, bytes] = {}
-    with contextlib.ExitStack() as reading:
-        notes = reading.enter_context(noting()) if options.notes else {}
+    with noting(options.notes) as notes:
         result = guarded(frame, lambda: _estimate(frame, options, images))
     paths = every_path(frame, options.images, options.root)
     write_outputs(images, paths, replaces=options.replaces, retry_of=options.retry_of)

@@ -268,10 +268,8 @@ def decoded(frame: Frame, options: FrameOptions) -> Frame:
 
     One that cannot be read stays as it is: the worker that gets it says why.
     """
-    with contextlib.ExitStack() as reading:
-        reading.enter_context(contextlib.suppress(*FRAME_ERRORS))
-        if frame.of_videos:
-            notes = reading.enter_context(noting()) if options.notes else {}
+    if frame.of_videos:
+        with contextlib.suppress(*FRAME_ERRORS), noting(options.notes) as notes:
             return replace(frame, decoded=Decoded(read_views(frame, options), notes))
     return frame
 
