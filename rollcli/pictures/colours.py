@@ -2,9 +2,8 @@
 
 from collections.abc import Mapping
 
-Colours = Mapping[
-    str, str
-]  # by name: as hexadecimal digits of red, green, blue and, where not whole, opacity
+# by name: as hexadecimal digits of red, green, blue and, where not whole, opacity
+Colours = Mapping[str, str]
 
 LIGHT: Colours = {
     "page": "f6f7f9",
