@@ -22,7 +22,8 @@ from rollcli.errors import InputError
 from rollcli.files.bounded import MOST_BYTES, most_unpacked
 
 _BEGINNING = 64  # bytes: a header's time and more
-_PIECE = 2**17  # bytes that are unpacked at a time where the next header is looked for
+_PIECE = 2**17  # packed bytes that are read at a time where the next header is looked for
+_AHEAD, _AT_ONCE = 2**14, 2**22  # bytes unpacked: beyond what is passed over, and at most
 _MCAP, _BAG, _SQLITE = b"\x89MCAP0\r\n", b"#ROSBAG V2.0\n", b"SQLite format 3\0"
 
 
@@ -219,7 +220,7 @@ class _Unpacked(_Source):
                 self._piece = kept
                 break
             try:
-                more = self._unpack(max(_PIECE, count))
+                more = self._unpack(min(self._ahead + max(_AHEAD, count), _AT_ONCE))
             except Exception as error:  # each library has errors of its own
                 raise _BrokenError from error
             if not more:
@@ -435,15 +436,15 @@ class _Ros1(_Chunked):
     def _index(self) -> int:
         self._file.seek(len(_BAG))
         (length,) = struct.unpack("<I", _exactly(self._file, 4))
-        return int(struct.unpack("<Q", _fields(_exactly(self._file, length))["index_pos"])[0])
+        return int(struct.unpack("<Q", _fields(_exactly(self._file, length))[b"index_pos"])[0])
 
     def _record(self, offset: int, wanted: _Wanted, *, at_once: bool = False) -> _Records:
         self._file.seek(offset)
         (length,) = struct.unpack("<I", _exactly(self._file, 4))
         fields = _fields(_exactly(self._file, length))
         (length,) = struct.unpack("<I", _exactly(self._file, 4))
-        after, op = self._file.tell() + length, fields["op"][0]
-        if fields.get("encryptor"):
+        after, op = self._file.tell() + length, fields[b"op"][0]
+        if fields.get(b"encryptor"):
             raise InputError(f"{self.path}: is encrypted: decrypt it first (rosbag decrypt)")
         if op not in (0x02, 0x05, 0x07):
             return _Records([], after, after <= self._size)
@@ -452,33 +453,32 @@ class _Ros1(_Chunked):
             size = after - offset
             content: _Source = _InFile(self._file, min(size, self._size - offset))
         else:
-            (size,) = struct.unpack("<I", fields["size"])
-            compression = fields["compression"].decode()
+            (size,) = struct.unpack("<I", fields[b"size"])
+            compression = fields[b"compression"].decode()
             content = self._content(compression, length, size, at_once=at_once)
         return self._walked(content, wanted, size, after)
 
     def _message(self, source: _Source) -> tuple[int, int, int] | None:
         fields = _fields(bytes(source.take(*struct.unpack("<I", source.take(4)))))
         (length,) = struct.unpack("<I", source.take(4))
-        if fields["op"][0] == 0x02:
-            seconds, nanoseconds = struct.unpack("<II", fields["time"])
-            return struct.unpack("<I", fields["conn"])[0], seconds * 10**9 + nanoseconds, length
+        if fields[b"op"][0] == 0x02:
+            seconds, nanoseconds = struct.unpack("<II", fields[b"time"])
+            return struct.unpack("<I", fields[b"conn"])[0], seconds * 10**9 + nanoseconds, length
         # else a connection: no other record lies among messages
-        kind = _fields(bytes(source.take(length))).get("type", b"").decode("utf-8", "replace")
-        name = fields["topic"].decode("utf-8", "replace")
-        self._topics[struct.unpack("<I", fields["conn"])[0]] = Topic(name, kind, "ros1")
+        kind = _fields(bytes(source.take(length))).get(b"type", b"").decode("utf-8", "replace")
+        name = fields[b"topic"].decode("utf-8", "replace")
+        self._topics[struct.unpack("<I", fields[b"conn"])[0]] = Topic(name, kind, "ros1")
         return None
 
 
-def _fields(header: bytes) -> dict[str, bytes]:
+def _fields(header: bytes) -> dict[bytes, bytes]:
     found, at = {}, 0
     while at < len(header):
-        (length,) = struct.unpack_from("<I", header, at)
-        key, equals, value = header[at + 4 : at + 4 + length].partition(b"=")
-        if not equals or at + 4 + length > len(header):
+        end = at + 4 + struct.unpack_from("<I", header, at)[0]
+        key, equals, value = header[at + 4 : end].partition(b"=")
+        if not equals or end > len(header):
             raise _BrokenError
-        found[key.decode("utf-8", "replace")] = value
-        at += 4 + length
+        found[key], at = value, end
     return found
 
 

@@ -181,9 +181,10 @@ def read_frame(path: str, member: str, place: Sequence[int], name: str) -> bytes
     name : str
         What errors call it.
     """
-    bag = _opened(path)
+    state = state_of(path)
+    bag = opened(*state)
     topic_name, _, stamp = member.rpartition("@")
-    topic = _known_topics(*state_of(path)).get(topic_name)
+    topic = _known_topics(*state).get(topic_name)
     if topic is None:
         raise InputError(f"{name}: no such topic in {path}")
     if not place:

@@ -261,7 +261,7 @@ def _pixels(image: Any, name: str) -> NDArray[Any]:
     require_decoded_fits(width, height, channels * dtype.itemsize, data.size, name)
     values = np.ndarray((height, width * channels), dtype, data, strides=(step, dtype.itemsize))
     values = values.astype(dtype.newbyteorder("="), copy=False)
-    values = np.require(values, requirements=["C", "A"])  # a message lies anywhere in its chunk
+    values = np.ascontiguousarray(values)  # of any alignment: a message lies anywhere in its chunk
     if channels > 1:
         values = values.reshape(height, width, channels)[..., :3]
         return np.ascontiguousarray(values[..., ::-1] if encoding.startswith("rgb") else values)
