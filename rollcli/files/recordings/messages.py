@@ -77,6 +77,8 @@ _PIXELS = {
     **dict.fromkeys(("rgba8", "bgra8", "8UC4"), ("u1", 4)),
     **dict.fromkeys(("rgb16", "bgr16"), ("u2", 3)),
 }
+_FISHEYE = ("equidistant", "fisheye")
+_MODELS = ("plumb_bob", "rational_polynomial", *_FISHEYE)  # that OpenCV undoes
 # ROS names the first two pixels of a row of the mosaic, OpenCV those of its second row from the second on
 _BAYER = {
     "rggb": cv2.COLOR_BayerBG2BGR,
@@ -106,10 +108,10 @@ class CameraInfo:
     @property
     def changes_raw_views(self) -> bool:
         """Whether a raw view is not the rectified one."""
-        turned = any(
-            abs(each - one) > 1e-9 for each, one in zip(self.r, (1, 0, 0, 0, 1, 0, 0, 0, 1), strict=True)
+        upright = all(
+            abs(each - one) <= 1e-9 for each, one in zip(self.r, (1, 0, 0, 0, 1, 0, 0, 0, 1), strict=True)
         )
-        return self.usable and self.k[0] > 0 and (any(self.d) or (turned and any(self.r)))
+        return self.usable and self.k[0] > 0 and (any(self.d) or (not upright and any(self.r)))
 
 
 def stamp_of(topic: Topic, data: memoryview, log_time: int) -> int:
@@ -274,11 +276,18 @@ def _rectified(values: NDArray[Any], info: CameraInfo, name: str) -> NDArray[Any
         raise InputError(
             f"{name}: is a raw view of {seen}, and its CameraInfo is of {info.width}x{info.height}"
         )
-    try:
-        columns, rows = _rectification(info)
-    except cv2.error:
-        what = f"{len(info.d)} numbers of distortion, which are no {info.model:.40}"
-        raise InputError(f"{name}: is a raw view whose CameraInfo has {what}") from None
+    wrong = ""
+    if any(info.d) and info.model not in ("", *_MODELS):
+        wrong = f"the distortion model {info.model[:40]!r}; known are {', '.join(_MODELS)}"
+    elif not all(map(math.isfinite, (*info.d, *info.k, *info.r))):
+        wrong = "numbers in D, K or R that are not finite"
+    else:
+        try:
+            columns, rows = _rectification(info)
+        except cv2.error:
+            wrong = f"{len(info.d)} numbers of distortion, which are no {info.model:.40}"
+    if wrong:
+        raise InputError(f"{name}: is a raw view whose CameraInfo has {wrong}")
     return cv2.remap(values, columns, rows, cv2.INTER_LINEAR)
 
 
@@ -287,7 +296,7 @@ def _rectification(info: CameraInfo) -> tuple[NDArray[Any], NDArray[Any]]:
     size = (info.width, info.height)
     k, r, p = (np.array(each).reshape(3, -1) for each in (info.k, info.r, info.p))
     r = r if r.any() else np.eye(3)
-    if info.model in ("equidistant", "fisheye"):
+    if info.model in _FISHEYE:
         found = cv2.fisheye.initUndistortRectifyMap(k, np.array(info.d[:4]), r, p[:, :3], size, cv2.CV_32FC1)
     else:
         found = cv2.initUndistortRectifyMap(k, np.array(info.d), r, p[:, :3], size, cv2.CV_32FC1)

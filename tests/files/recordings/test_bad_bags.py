@@ -1,6 +1,7 @@
 """What is wrong with a bag, a topic or a message is one line, and costs no more than it must."""
 
 import contextlib
+import math
 import os
 import sqlite3
 import struct
@@ -285,6 +286,8 @@ def test_values_of_another_type_in_the_tables_of_a_bag_are_no_matter(tmp_path, c
     [
         ((0.1, 0.2, 0.3), "plumb_bob", (160, 120), "has 3 numbers of distortion, which are no plumb_bob"),
         ((0.1, 0.2, 0.3), "equidistant", (160, 120), "has 3 numbers of distortion, which are no equidistant"),
+        ((0.1,) * 5, "brown", (160, 120), "has the distortion model 'brown'; known are plumb_bob, rational_"),
+        ((math.nan,) * 5, "plumb_bob", (160, 120), "has numbers in D, K or R that are not finite"),
         ((0.1,) * 5, "plumb_bob", (100, 90), "is a raw view of 160x120, and its CameraInfo is of 100x90"),
     ],
 )
