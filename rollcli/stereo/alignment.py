@@ -27,6 +27,7 @@ from rollcli.stereo.views import (
     blocks_at,
     grey_between,
     resampled,
+    rounded,
     sampled,
     seen_at,
     shrink_both,
@@ -239,7 +240,10 @@ class _Blocks:
         u, v = seen_at(at, self._u, self._v, self._shape, self._near[:, None])
         if not len(u):
             return SeenBlocks(*(x[:, 0],) * 5)
-        off = self._left - grey_between(self._right, u, v)
+        read_u, read_v = rounded(u, 64), rounded(v, 64)
+        off = self._left - grey_between(self._right, read_u, read_v)
+        # else steps of less than a 64th of a pixel are none, or one, and measuring does not settle
+        off -= self._across * (u - read_u) + self._down * (v - read_v)
         shift = np.einsum("ij,ij->i", self._shares.share, off)
         self._along = np.einsum("ij,ij->i", self._shares.along, off)
         weight, mean_x, mean_y = (each.copy() for each in self._shares[3:])

@@ -131,10 +131,16 @@ def grey_between(twice: NDArray[_Number], u: NDArray[np.float32], v: NDArray[np.
     return sampled(twice, 2 * u, 2 * v, cv2.INTER_LINEAR)
 
 
-_TO_32NDS = np.float32(1.5 * 2**18)  # a float32 of this size has steps of 1/32, and so has a sum with it
+_TO_WHOLE = 1.5 * 2**23  # a float32 of this size has steps of 1, and so has a sum with it
 # Grey levels: a sum of 64ths or 1024ths is often halfway between two, and goes up. OpenCV rounds it either
 # way, by its version and by whether a pixel is one of the last in its row
 _HALF_UP = 2.0**-11
+
+
+def rounded(points: NDArray[np.float32], parts: int) -> NDArray[np.float32]:
+    """Return coordinates rounded to parts of a pixel, a power of two of them."""
+    to_parts = np.float32(_TO_WHOLE / parts)
+    return points + to_parts - to_parts
 
 
 def sampled(
@@ -145,7 +151,7 @@ def sampled(
     OpenCV 4 rounds points to 1/32 px, and OpenCV 5 does not: angles of 41 real pairs differed by up to 0.07
     degrees. Of points that are rounded here, all versions see the same.
     """
-    u, v = (each + _TO_32NDS - _TO_32NDS for each in (u, v))
+    u, v = rounded(u, 32), rounded(v, 32)
     grey = view.astype(np.float32, copy=False)
     return _as_stored(cv2.remap(grey, u, v, between, borderMode=cv2.BORDER_REPLICATE), view)
 
