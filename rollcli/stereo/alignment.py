@@ -27,6 +27,7 @@ from rollcli.stereo.views import (
     blocks_at,
     grey_between,
     resampled,
+    rounded,
     sampled,
     seen_at,
     shrink_both,
@@ -213,11 +214,12 @@ class _Blocks:
 
     def __init__(self, texture: Texture, disparity: Floats, every: int = 1) -> None:
         self._right, self._shape = texture.right, texture.left.shape
-        known = (disparity > 0).astype(np.float32)
+        known = cv2.threshold(disparity, 0, 1, cv2.THRESH_BINARY)[1].astype(np.float32, copy=False)
         row, column = (np.arange(side // BLOCK) for side in known.shape)
         looked_at = (row[:, None] + 2 * column) % every == 0
         self.count = int(np.count_nonzero(looked_at))
-        places = looked_at & (block_means(known) > _KNOWN) & _may_tell(texture.down)
+        places = looked_at & (block_means(known) > _KNOWN)
+        places[places] = _may_tell(blocks_at(texture.down, places))
 
         self._left, self._seen = blocks_at(texture.left, places), blocks_at(known, places)
         self._across, self._down = blocks_at(texture.across, places), blocks_at(texture.down, places)
@@ -239,7 +241,10 @@ class _Blocks:
         u, v = seen_at(at, self._u, self._v, self._shape, self._near[:, None])
         if not len(u):
             return SeenBlocks(*(x[:, 0],) * 5)
-        off = self._left - grey_between(self._right, u, v)
+        read_u, read_v = rounded(u, 64), rounded(v, 64)
+        off = self._left - grey_between(self._right, read_u, read_v)
+        # else steps of less than a 64th of a pixel are none, or one, and measuring does not settle
+        off -= self._across * (u - read_u) + self._down * (v - read_v)
         shift = np.einsum("ij,ij->i", self._shares.share, off)
         self._along = np.einsum("ij,ij->i", self._shares.along, off)
         weight, mean_x, mean_y = (each.copy() for each in self._shares[3:])
@@ -269,14 +274,14 @@ def _may_tell(down: Floats) -> NDArray[np.bool_]:
 
     What is left of a block's squares is no more than all of them, over a count of `_KNOWN` of it or more.
     """
-    varies = block_means(down * down) - np.square(block_means(down))
+    varies = np.einsum("ij,ij->i", down, down) / BLOCK**2 - np.square(down.mean(axis=1))
     enough: NDArray[np.bool_] = varies > np.float32(_LEAST * _KNOWN * _ROUNDING)
     return enough
 
 
 def _smooth(view: View) -> Floats:
-    smooth = cv2.GaussianBlur(view.astype(np.float32), (0, 0), _SMOOTHING)
-    return smooth.astype(np.float32, copy=False)
+    kernel = cv2.getGaussianKernel(5, _SMOOTHING)
+    return cv2.sepFilter2D(view, cv2.CV_32F, kernel, kernel).astype(np.float32, copy=False)
 
 
 def _gradients(view: Floats) -> tuple[Floats, Floats]:
@@ -416,7 +421,7 @@ class SmallViews:
     ----------
     shape : tuple of int
         Of the whole views.
-    views : pair of ndarray of uint8, shape (h, w)
+    whole : pair of ndarray of uint8, shape (H, W)
         Left and right.
     factor : float
         How many times smaller they are than the whole ones.
@@ -425,14 +430,17 @@ class SmallViews:
     def __init__(self, whole: Views, pixels: int = _MEASURED_AT) -> None:
         self.shape = whole[0].shape
         self.factor = size_factor(self.shape, pixels)
-        self.views = shrink_both(whole, self.factor)
-        self._every = max(1, round(self.views[0].size / _MEASURED_AT))
-        self._whole = whole
+        self.whole = whole
+
+    @cached_property
+    def views(self) -> Views:
+        """Both views at that size; a pair that is level at the first look needs none."""
+        return shrink_both(self.whole, self.factor)
 
     @cached_property
     def closer(self) -> "SmallViews":
         """The same pair at four times as many pixels, as far as it has them."""
-        return SmallViews(self._whole, _CLOSER)
+        return SmallViews(self.whole, _CLOSER)
 
     @cached_property
     def _texture(self) -> Texture:
@@ -460,5 +468,6 @@ class SmallViews:
             Pixels of the whole views.
         """
         seen = resampled(disparity, self.views[0].shape)
-        found = measure_misalignment(self._texture, seen, start.resized(1 / self.factor), rounds, self._every)
+        every = max(1, round(seen.size / _MEASURED_AT))
+        found = measure_misalignment(self._texture, seen, start.resized(1 / self.factor), rounds, every)
         return None if found is None else found.resized(self.factor)

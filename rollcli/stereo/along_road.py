@@ -18,7 +18,6 @@ from rollcli.stereo.alignment import level
 from rollcli.stereo.misalignment import Misalignment
 from rollcli.stereo.options import StereoOptions
 from rollcli.stereo.sgbm import (
-    MARGIN,
     NARROWEST,
     SUBPIXELS,
     match_rows,
@@ -29,12 +28,11 @@ from rollcli.stereo.sgbm import (
 from rollcli.stereo.views import (
     Map,
     Views,
-    grey_between,
+    grey_along,
     resampled,
     seen_at,
     shrink_both,
     smoothed_at_pixels,
-    smoothed_between,
 )
 
 Plane = tuple[float, float, float]
@@ -143,8 +141,7 @@ class Levelled:
         u = np.arange(self.shape[1], dtype=np.float32) + np.float32(middle) - plane
         v = np.arange(self.shape[0], dtype=np.float32)[rows, None]
         u, v = seen_at(self._lies, u, v, self.shape, plane)
-        warped = grey_between(smoothed_between(right), u, np.broadcast_to(v, u.shape))
-        return smoothed_at_pixels(left[rows]), warped
+        return smoothed_at_pixels(left[rows]), grey_along(right, u, np.broadcast_to(v, u.shape))
 
 
 def match_for_road(pair: Levelled, rows: slice, *, whole: bool = False) -> Map:
@@ -229,7 +226,8 @@ class _Near(NamedTuple):
 def _match_along(pair: Levelled, plane: Plane, rows: slice, coarse: Map) -> _Near | None:
     """Match some rows along a plane; None where too little of the `coarse` map is found there again."""
     height, width = pair.shape
-    top, bottom = max(0, rows.start - MARGIN), min(height, rows.stop + MARGIN)
+    beside = _BLOCK // 2 + 1
+    top, bottom = max(0, rows.start - beside), min(height, rows.stop + beside)
     count = NARROWEST * math.ceil(width / _WIDTH)
     if bottom - top <= _BLOCK or width <= count + _BLOCK:
         return None

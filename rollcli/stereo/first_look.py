@@ -162,9 +162,8 @@ def look_for_range(views: Views) -> FirstLook:
 
 def first_look(small: SmallViews) -> FirstLook:
     """Find the range of a pair, and how its right view lies, coarse to fine."""
-    factor = size_factor(small.views[0].shape, _PIXELS)
-    pair = _Pair.of(small.views, factor)
-    factor *= small.factor
+    factor = size_factor(small.shape, _PIXELS)
+    pair = _Pair.of(small.whole, factor)
     first = _look(pair, LEVEL)
     plain = _plainly_level(first, factor, small.shape)
     if plain is not None:

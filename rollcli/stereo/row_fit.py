@@ -215,7 +215,7 @@ def fit_rows(seen: SeenBlocks, at: Misalignment = LEVEL) -> RowFit:
     held[4:] = variance / np.square([BELIEF.tilt * frame.near, BELIEF.bend * frame.half_height])
     wide = _least_squares(design[:6], shift, fit.weight, held)
     told = np.square(wide.values) > _SURE**2 * variance * np.diag(wide.inverse)
-    told &= frame.tile.max() + 1 >= _FEWEST_TILES
+    told &= np.count_nonzero(np.bincount(frame.tile)) >= _FEWEST_TILES
     used += [each for each in (4, 5) if told[each] or at.parts[each]]
     if len(used) > len(_LINEAR):
         fit = _robust(design[used], shift, fixed, held[used])
@@ -389,9 +389,9 @@ class _Frame(NamedTuple):
     @staticmethod
     def of(seen: SeenBlocks) -> "_Frame":
         x, y, near = (max(1.0, float(np.abs(each).max())) for each in seen[:3])
-        column, row = np.floor(seen.x / _TILE), np.floor(seen.y / _TILE)
-        _, tile = np.unique(column * 4096 + row, return_inverse=True)
-        return _Frame(x, y, near, tile.reshape(-1))
+        column, row = (np.floor(each / _TILE).astype(np.intp) for each in seen[:2])
+        row -= row.min()
+        return _Frame(x, y, near, (column - column.min()) * (row.max() + 1) + row)
 
     @property
     def units(self) -> Doubles:
@@ -422,9 +422,8 @@ def _least_squares(design: Doubles, shift: Doubles, weight: Doubles, held: Doubl
     """Fit; `held` is what is added to the normal equations' diagonal, to hold values near 0."""
     weighted = design * weight
     normal = weighted @ design.T
-    inverse = np.linalg.inv(
-        normal + np.diag(np.broadcast_to(held, len(normal))) + 1e-6 * np.trace(normal) * np.eye(len(normal))
-    )
+    normal.ravel()[:: len(normal) + 1] += held + 1e-6 * normal.trace()
+    inverse = np.asarray(np.linalg.inv(normal), np.float64)
     values = inverse @ (weighted @ shift)
     return _Fit(values, inverse, shift - values @ design, weight, 0.0)
 

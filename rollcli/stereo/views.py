@@ -49,11 +49,16 @@ def matched_shape(shape: tuple[int, ...], downscale: float) -> tuple[int, int]:
     return height, width
 
 
+_HALVED_FROM = 4  # times smaller: views are halved first; means of four pixels take a thirtieth of the time
+
+
 def shrink(view: NDArray[Any], factor: float) -> View:
     """Shrink the view by `factor`; 1 leaves it as it is."""
     if factor == 1:
         return view
     height, width = matched_shape(view.shape, factor)
+    if factor >= _HALVED_FROM and not (view.shape[0] % 2 or view.shape[1] % 2):
+        view = shrink(view, 2)
     return cv2.resize(view, (width, height), interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
 
 
@@ -71,9 +76,12 @@ def resampled(disparity: Map, shape: tuple[int, ...]) -> Map:
     if scale < 1:  # one pixel of a few says the same, and edges stay edges
         fewer: Map = cv2.resize(disparity, size, interpolation=cv2.INTER_NEAREST) * scale
         return fewer
-    known = cv2.resize((disparity > 0).astype(np.float32), size, interpolation=cv2.INTER_LINEAR)
-    larger = cv2.resize(disparity, size, interpolation=cv2.INTER_LINEAR) * scale
-    return np.where(known > np.float32(0.999), larger, np.float32(0))
+    known = cv2.resize((disparity > 0) * np.uint8(255), size, interpolation=cv2.INTER_LINEAR)
+    larger: Map = cv2.resize(disparity * scale, size, interpolation=cv2.INTER_LINEAR).astype(
+        np.float32, copy=False
+    )
+    larger *= known == 255
+    return larger
 
 
 def seen_at(
@@ -131,10 +139,33 @@ def grey_between(twice: NDArray[_Number], u: NDArray[np.float32], v: NDArray[np.
     return sampled(twice, 2 * u, 2 * v, cv2.INTER_LINEAR)
 
 
-_TO_32NDS = np.float32(1.5 * 2**18)  # a float32 of this size has steps of 1/32, and so has a sum with it
+_STRIP = 24  # rows: what they need of a view twice as large stays in the processor's cache
+
+
+def grey_along(view: View, u: NDArray[np.float32], v: NDArray[np.float32]) -> View:
+    """Return what `grey_between` does of the view `smoothed_between`, for points in rows that change little.
+
+    A few rows at a time take half the time of all at once.
+    """
+    grey = np.empty(u.shape, np.uint8)
+    for start in range(0, len(u), _STRIP):
+        rows = slice(start, start + _STRIP)
+        top = max(0, min(int(v[rows].min()), len(view)) - 3)  # smoothing sees a row beside each of a point's
+        bottom = max(top, int(v[rows].max())) + 4
+        grey[rows] = grey_between(smoothed_between(view[top:bottom]), u[rows], v[rows] - np.float32(top))
+    return grey
+
+
+_TO_WHOLE = 1.5 * 2**23  # a float32 of this size has steps of 1, and so has a sum with it
 # Grey levels: a sum of 64ths or 1024ths is often halfway between two, and goes up. OpenCV rounds it either
 # way, by its version and by whether a pixel is one of the last in its row
 _HALF_UP = 2.0**-11
+
+
+def rounded(points: NDArray[np.float32], parts: int) -> NDArray[np.float32]:
+    """Return coordinates rounded to parts of a pixel, a power of two of them."""
+    to_parts = np.float32(_TO_WHOLE / parts)
+    return points + to_parts - to_parts
 
 
 def sampled(
@@ -145,7 +176,7 @@ def sampled(
     OpenCV 4 rounds points to 1/32 px, and OpenCV 5 does not: angles of 41 real pairs differed by up to 0.07
     degrees. Of points that are rounded here, all versions see the same.
     """
-    u, v = (each + _TO_32NDS - _TO_32NDS for each in (u, v))
+    u, v = rounded(u, 32), rounded(v, 32)
     grey = view.astype(np.float32, copy=False)
     return _as_stored(cv2.remap(grey, u, v, between, borderMode=cv2.BORDER_REPLICATE), view)
 

@@ -118,7 +118,8 @@ def test_straight_edges_tell_only_where_they_lie_along_the_rows(slope, share):
     assert textured_share(edges.astype(np.uint8)) == pytest.approx(share, abs=0.05)
 
 
-def test_a_scale_between_pixels_is_measured_without_a_pull_to_whole_ones():
+@pytest.mark.parametrize(("scale", "offset"), [(0.002, 0.3), (0.0, 0.04)])
+def test_what_lies_between_pixels_is_measured_without_a_pull_to_whole_ones(scale, offset):
     rng = np.random.default_rng(3)
     waves = rng.uniform(-1.6, 1.6, (60, 2))  # rad/px: as fine as cameras resolve
     phases, heights = rng.uniform(0, 2 * np.pi, 60), rng.uniform(2, 8, 60)
@@ -130,7 +131,7 @@ def test_a_scale_between_pixels_is_measured_without_a_pull_to_whole_ones():
             grey += height * np.sin(across * u + down * v + phase)
         return np.clip(np.rint(grey), 0, 255).astype(np.uint8)
 
-    scale, offset, shift = 0.002, 0.3, 12.0
+    shift = 12.0
     x, y = u - 159.5, v - 119.5
     # where the right camera sees a pixel of its own: its point of the level view
     level_x, level_y = x / (1 + scale), (y - offset) / (1 + scale)
