@@ -106,7 +106,8 @@ def rotation_matrix(shape: tuple[int, ...], roll: float, *, expand: bool = False
         principal point at matrix (cx, cy, 1).
     """
     turn = _Turn.of(shape, roll, expand)
-    matrix = np.array([[turn.cosine, turn.sine, 0.0], [-turn.sine, turn.cosine, 0.0], [0.0, 0.0, 1.0]])
+    matrix = np.eye(3)
+    matrix[:2, :2] = [[turn.cosine, turn.sine], [-turn.sine, turn.cosine]]
     before, after = ((np.array(each[::-1]) - 1) / 2 for each in (turn.shape, turn.size))
     matrix[:2, 2] = after - matrix[:2, :2] @ before
     return matrix

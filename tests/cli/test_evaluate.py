@@ -47,17 +47,21 @@ def test_accuracy_ends_with_3_when_a_known_frame_has_no_angle(folder):
     assert "rollcli: truth.csv: 2 frames have no angle in rolls.csv: c, e\n" in done.err
 
 
-def test_poses_over_bent_roads_are_counted_because_they_are_not_compared(tmp_path):
+@pytest.mark.parametrize(
+    ("compared", "bend", "words"),
+    [(1, -1e-3, "2 frames, whose roads bend"), (2, 0, "1 frame, whose road bends")],
+)
+def test_poses_over_bent_roads_are_counted_because_they_are_not_compared(tmp_path, compared, bend, words):
     pose = {"status": "ok", "roll_deg": 1.0, "pitch_deg": 3.0, "height_m": 1.5}
     lines = [json.dumps({"file": f"{name}.png", **pose}) for name in "abc"]
     (tmp_path / "rolls.jsonl").write_text("".join(f"{line}\n" for line in lines))
     (tmp_path / "truth.csv").write_text(
-        "file,roll_deg,pitch_deg,height_m,curvature_per_m\na,1,3,1.5,0\nb,1,3,1.5,1e-3\nc,1,3,1.5,-1e-3\n"
+        f"file,roll_deg,pitch_deg,height_m,curvature_per_m\na,1,3,1.5,0\nb,1,3,1.5,1e-3\nc,1,3,1.5,{bend}\n"
     )
     line = ("evaluate", "accuracy", "rolls.jsonl", "--truth", "truth.csv")
     done = rollcli(*line, cwd=tmp_path)
-    assert re.search(r"^pitch, frames compared +1$", done.out, re.MULTILINE)
-    said = "rollcli: truth.csv: pitch and height are not compared on 2 frames, whose roads bend"
+    assert re.search(rf"^pitch, frames compared +{compared}$", done.out, re.MULTILINE)
+    said = f"rollcli: truth.csv: pitch and height are not compared on {words}"
     assert done.err == f"{said} (curvature_per_m)\n"
     assert rollcli(*line, "-q", cwd=tmp_path).err == ""
 

@@ -141,3 +141,36 @@ def test_mean_errors_of_the_solvers_are_drawn_in_degrees(tables):
         assert is_open == (solver == "exact")  # it lies around the others
     axis = charts(tables)["accuracy"].layout["yaxis"]
     assert (axis["type"], axis["dtick"], axis["ticksuffix"]) == ("log", 1, "°")  # a label at each decade
+
+
+def test_run_times_and_errors_lie_where_the_axes_say(tables):
+    table = tables["table2_runtime"]
+    forms = {"paper (Matlab)": "paper_s", "n × 3 form": "textbook_s", "moments": "moments_s"}
+    runtime = charts(tables)["runtime"]
+    for name, column in forms.items():
+        drawn = [trace for trace in runtime.data if trace["name"] == name]
+        assert [trace["showlegend"] for trace in drawn] == [True, False]
+        for trace, solver in zip(drawn, ("gss", "gd"), strict=True):
+            assert trace["x"] == [[SOLVER_NAMES[solver]] * 4, TOLERANCES]
+            assert trace["y"] == table.where(solver=solver).column(column)
+    axis = runtime.layout["yaxis"]
+    unit = {"µs": 1e-6, "ms": 1e-3, "s": 1.0}
+    named = [float(text.split()[0]) * unit[text.split()[1]] for text in axis["ticktext"]]
+    assert axis["tickvals"] == pytest.approx(named)
+    drawn, table = traces(charts(tables)["methods"]), tables["methods_accuracy"]
+    for name, column in (("median", "median_deg"), ("95th percentile", "p95_deg"), ("worst", "worst_deg")):
+        assert (drawn[name]["x"], len(drawn[name]["y"])) == (table.column(column), len(METHODS))
+
+
+def test_learning_rates_are_all_in_view_and_a_line_from_end_to_end_marks_the_papers(tables):
+    chart = charts(tables)["lambda0"]
+    low, high = chart.layout["xaxis"]["range"]
+    assert low == 0
+    assert max(LAMBDAS) < high <= max(LAMBDAS) + 1
+    (line,), (text,) = chart.layout["shapes"], chart.layout["annotations"]
+    assert [line[end] for end in ("x0", "x1", "y0", "y1", "yref")] == [26, 26, 0, 1, "paper"]
+    assert (text["x"], text["y"], text["text"], text["showarrow"]) == (26, 0, "26", False)
+    assert len({trace["line"]["color"] for trace in chart.data}) == len(DELTAS)
+    for delta, trace in enumerate(chart.data):
+        assert trace["x"] == list(LAMBDAS)
+        assert trace["y"] == [8 + delta + (rate > 26) for rate in LAMBDAS]

@@ -81,6 +81,21 @@ def test_maps_of_any_size_are_turned(shape):
     assert derotate(np.full(shape, 9, np.uint16), 0.001).shape == shape
 
 
+@pytest.mark.parametrize("roll_deg", [0.0, 7.0, -180.0, 500.0])
+def test_an_angle_may_be_in_degrees(roll_deg):
+    values = with_holes(road(0.1))
+    turn = math.remainder(math.radians(roll_deg), 2 * math.pi)
+    np.testing.assert_allclose(derotate(values, roll_deg=roll_deg), derotate(values, turn), atol=1e-9)
+
+
+def test_an_angle_is_given_once_and_in_radians_up_to_half_a_turn():
+    for angles in ({}, {"roll": 0.0, "roll_deg": 0.0}, {"roll": 3.15}, {"roll": -3.15}, {"roll_deg": np.inf}):
+        with pytest.raises(UsageError):
+            derotate(road(0), **angles)
+    for half in (math.pi, -math.pi):
+        np.testing.assert_allclose(derotate(road(0), half), road(0)[::-1, ::-1], atol=1e-9)
+
+
 def test_what_is_no_map_is_refused():
     for values, roll in (
         (np.ones((2, 2, 2)), 0.1),

@@ -9,7 +9,7 @@ import rollcli
 from rollcli.errors import UsageError
 from rollcli.estimator.road.model import RoadModel
 from rollcli.files.results import Row
-from rollcli.pictures.heights import FittedRoad, heights_over, unit_of
+from rollcli.pictures.heights import FittedRoad, heights_over, steadied, unit_of
 from rollcli.pictures.heights_preview import BAR_WIDTH, draw_heights
 from rollcli.rig.calibration import Calibration
 
@@ -190,6 +190,16 @@ def test_a_map_of_another_size_is_refused():
     estimate = rollcli.estimate_roll(20 + 0.3 * v)
     with pytest.raises(UsageError, match=r"80x60 px is not one of the 160x120 px"):
         rollcli.height_map(np.ones((60, 80)), estimate)
+
+
+def test_a_steadied_height_is_the_median_around_it_where_all_have_one():
+    heights = np.random.default_rng(0).normal(0, 0.1, (16, 19)).astype(np.float32)
+    heights[7, 9] = np.nan
+    found = steadied(heights)
+    for v, u in np.ndindex(*heights.shape):
+        around = np.pad(heights, 2, "edge")[v : v + 5, u : u + 5]
+        expected = heights[v, u] if np.isnan(around).any() else np.median(around)
+        np.testing.assert_equal(found[v, u], expected)
 
 
 def test_the_unit_is_metres_with_a_baseline_alone():

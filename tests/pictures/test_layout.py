@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
+from rollcli.pictures.heights_preview import draw_heights
 from rollcli.pictures.overlay import BAR_WIDTH, draw_disparity, draw_preview, draw_road, draw_road_on_photo
 from rollcli.pictures.vdisparity import BOTTOM_MARGIN, LEFT_MARGIN, VDisparity, draw_v_disparity, v_disparity
 
@@ -264,3 +265,10 @@ def test_no_data_is_black_and_data_never_is():
 def test_empty_maps_and_empty_masks_are_drawn():
     assert not draw_disparity(np.zeros((3, 4))).any()
     assert draw_road(np.ones((3, 4)), np.zeros((3, 4))).shape == (3, 4, 3)
+
+
+@pytest.mark.parametrize(("unit", "zero"), [("metres", "0 m"), ("camera heights", "0 H")])
+def test_the_bar_of_heights_names_its_ends_and_its_unit_where_the_road_is(unit, zero):
+    bar = draw_heights(np.zeros((200, 40), np.float32), (-0.1, 0.1), unit)[:, 40:]
+    for text, row in (("+0.1", 5), (zero, 100), ("-0.1", 195)):
+        assert any(abs((box[0] + box[1]) / 2 - row) <= 5 for box in find_text(bar, text))

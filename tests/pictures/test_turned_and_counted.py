@@ -169,3 +169,12 @@ def test_what_rises_like_a_road_is_raised_and_an_edge_is_not(rise, raised):
 def test_six_rows_above_and_below_tell_the_rise(height, raised):
     v = np.mgrid[:height, :40][0].astype(np.float32)
     assert ((without_lag(5 + 0.4 * v, "3way") > 5 + 0.4 * v).all()) == raised
+
+
+def test_beside_a_hole_as_much_is_added_as_elsewhere_and_the_hole_stays():
+    surface = 40 + 0.4 * np.mgrid[:80, :90][0].astype(np.float32)
+    surface[30:37, 40:52] = 0
+    added = without_lag(surface, "sgbm") - surface
+    lag = LAGS["sgbm"]
+    np.testing.assert_allclose(added[surface > 0], lag.most * 0.4 / (0.4 + lag.half_at), atol=1e-4)
+    assert (added[surface == 0] == 0).all()

@@ -11,8 +11,9 @@ import pytest
 from rollcli.report.charts import all_charts, chart_over_frames, histogram, outside, view
 from rollcli.report.options import chart_names
 from rollcli.report.page import Chart, script_json
-from rollcli.report.summary import degrees, summarize, with_interval, written_at
+from rollcli.report.summary import common_run, degrees, summarize, with_interval, written_at
 from rollcli.rig.drive.assess import assess_rig
+from rollcli.rig.quantities import HEIGHT, ROLL
 from tests.report.results import row
 
 ROWS = [
@@ -96,6 +97,26 @@ def test_an_angle_far_off_does_not_flatten_the_others():
     assert outside(rows[:-1]) == 0
 
 
+@pytest.mark.parametrize(("quantity", "unit"), [(ROLL, 1.0), (HEIGHT, 0.1)])
+def test_suspect_values_and_intervals_widen_the_view_up_to_a_limit(quantity, unit):
+    def ends(*further):
+        rows = []
+        for value, half, status in ((0.0, None, "ok"), (10.0, 0.0, "ok"), *further):
+            now = {quantity.column: value * unit, quantity.ci_column: None if half is None else half * unit}
+            rows.append(replace(row("a.png", None), status=status, **now))
+        return [end / unit for end in view(rows, quantity)]
+
+    def seen(low, high):  # a 16th of the range and a 20th of a degree are left beyond it
+        return pytest.approx([low - 0.06 * (high - low) - 0.05, high + 0.06 * (high - low) + 0.05], abs=0.006)
+
+    assert ends((5.0, 9.0, "suspect")) == seen(0, 10)
+    assert ends((-3.99, None, "suspect"), (13.99, None, "suspect")) == seen(-3.99, 13.99)
+    assert ends((-4.01, None, "suspect"), (14.01, None, "suspect")) == seen(0, 10)
+    assert ends((9.5, 0.9, "ok"), (0.5, 0.9, "ok")) == seen(-0.4, 10.4)
+    assert ends((9.5, 7.0, "ok"), (0.5, 7.0, "ok")) == seen(-0.5, 10.5)
+    assert view([row("a.png", None)], quantity) == (-unit, unit)
+
+
 @pytest.mark.parametrize(("frames", "bars"), [(400, True), (402, False)])
 def test_suspect_marks_lie_below_the_line_and_have_no_bars_in_long_runs(frames, bars):
     shown = traces([row("a.png"), row("b.png", 9.0, 1.0, "suspect")] * (frames // 2))
@@ -148,6 +169,30 @@ def test_the_chart_shows_segments_and_jumps():
         mean, half = segment.mean.value, segment.mean.ci95
         high, _, _, low = shown["mounting, 95 %"]["y"][5 * place : 5 * place + 4]
         assert (high, low) == pytest.approx((mean + half, mean - half), abs=1e-4)
+
+
+def test_a_rig_that_lies_level_is_drawn_at_nothing():
+    rows = [row(f"{place}.png", 0.0, 0.05) for place in range(30)]
+    shown = {trace["name"]: trace for trace in chart_over_frames(rows, rig=assess_rig(rows)).data}
+    assert shown["mounting"]["y"] == [0, 0, None]
+    top, _, _, bottom, _ = shown["mounting, 95 %"]["y"]
+    assert top == -bottom > 0
+
+
+def test_the_page_has_no_more_than_four_decimals():
+    rows = [posed(each.file, 3.0 + k / 7, 0.05, 1.5) for k, each in enumerate(drive_rows("run", 0.2, 30))]
+    for chart in all_charts(rows, assess_rig(rows)).values():
+        for each in (value for trace in chart.data for value in trace["y"] if isinstance(value, float)):
+            assert round(each, 4) == each or each in [r.pitch_deg for r in rows]
+
+
+def test_records_of_several_runs_tell_what_all_of_them_have():
+    one = {"version": "1", "options": {"road": "auto", "jobs": 2}, "encoding": ["kitti"], "hours": 1}
+    other = {"version": "1", "options": {"road": "auto", "jobs": 3}, "encoding": ["kitti", "npy"], "hours": 2}
+    both = {"version": "1", "options": {"road": "auto"}, "encoding": ["kitti", "npy"]}
+    assert common_run([one, other]) == both
+    assert common_run([one]) == one
+    assert common_run([None]) is common_run([one, None]) is common_run([None, one]) is None
 
 
 def test_a_long_run_has_a_line_without_dots_and_a_dot_for_each_frame_that_stands_alone():

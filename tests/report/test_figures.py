@@ -97,6 +97,23 @@ def test_a_value_lies_where_the_axes_say():
     assert top == pytest.approx(lines[len(lines) // 2], abs=2)
 
 
+@pytest.mark.parametrize(("status", "colour"), [("ok", "c1"), ("suspect", "suspect")])
+@pytest.mark.parametrize(("count", "dot"), [(3, 8), (402, 5)])
+def test_a_mark_of_a_frame_is_as_large_as_on_the_page(status, colour, count, dot):
+    rows = [row(f"{i}.png", None) for i in range(count)]
+    rows[1] = row("b.png", 1.0, None, status)
+    shown = of_colour(drawn(rows), colour)[100:]
+    dot = 2.5 if (status, count) == ("ok", 402) else dot
+    for axis in (0, 1):
+        assert shown.any(axis=axis).sum() == pytest.approx(dot * SLIDE.font / 13 * 2, abs=3)
+
+
+def test_the_legend_names_the_line_before_what_is_suspect_and_what_has_failed(charts):
+    found = texts(chart_file(charts["roll"], "svg"))
+    order = [found.index(each) for each in ("95 % interval", "roll", "jump", "suspect", "failed")]
+    assert order == sorted(order)
+
+
 def test_axes_have_round_numbers_with_a_true_minus_and_thousands():
     rows = [row(f"{i}.png", -1 + 2 * i / 2500, 0.05) for i in range(2500)]
     found = texts(chart_file(all_charts(rows)["roll"], "svg"))

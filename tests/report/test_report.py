@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 
 from rollcli.files.results import read_result
+from rollcli.pictures.overlay import draw_disparity
 from rollcli.report import pictures
 from rollcli.report.sources import subjects
 from rollcli.run.options import EncodingOptions, FrameOptions, ImageOptions
@@ -395,6 +396,21 @@ def test_heights_are_shown_as_estimate_drew_them_or_made_in_the_same_colours(tmp
         data = base64.b64decode(PICTURES.findall(page_of(tmp_path))[0 if images else 2])
         shown = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
         assert np.abs(shown.astype(float) - drawn).mean() < 4  # WebP loses a little
+
+
+@pytest.mark.parametrize(("width", "shown"), [(1280, (1280, 400)), (1600, (1280, 320))])
+def test_pictures_of_large_maps_are_smaller_and_show_all_of_them(tmp_path, width, shown):
+    np.save(tmp_path / "a.npy", road_map(0.02, width=width, height=400))
+    (subject,) = subjects([row("a.npy", 0.0)], str(tmp_path / "rolls.csv"), None, ImageOptions())
+    taken = pictures.take_pictures(subject, FrameOptions(encoding=EncodingOptions("px")))
+    whole = draw_disparity(np.load(tmp_path / "a.npy"))
+    for picture in (taken.map, taken.level):
+        found = cv2.imdecode(np.frombuffer(picture.data, np.uint8), cv2.IMREAD_COLOR)
+        assert (picture.width, picture.height) == found.shape[1::-1] == shown
+        expected = cv2.resize(whole, shown, interpolation=cv2.INTER_AREA)
+        assert np.abs(found.astype(float) - expected).mean() < 4  # WebP loses a little
+    assert taken.map_counts.height == taken.level_counts.height > 400
+    assert taken.road is taken.heights is None
 
 
 def heights_picture(tmp_path, camera, span):

@@ -60,9 +60,12 @@ def test_rig_says_the_drift_an_hour_in_words_and_in_json(tmp_path):
     assert "an hour" in (tmp_path / "page.html").read_text("utf-8")
 
 
-@pytest.mark.parametrize(("every_s", "unit", "size"), [(0.1, "s", 1), (1.0, "min", 60), (30.0, "h", 3600)])
-def test_the_axis_of_charts_is_time_where_names_have_stamps(every_s, unit, size):
-    times, given = rows(every_s=every_s)
+@pytest.mark.parametrize(
+    ("whole_s", "unit", "size"),
+    [(0.01, "s", 1), (119, "s", 1), (121, "min", 60), (7190, "min", 60), (7210, "h", 3600), (1e5, "h", 3600)],
+)
+def test_the_axis_of_charts_is_time_where_names_have_stamps(whole_s, unit, size):
+    times, given = rows(every_s=whole_s / 598)
     given = [replace(each, right_lower_px=0.1, width=640, height=480) for each in given]
     given.append(Row("runs/drive.mcap#rest", "", "error", message="is cut off"))
     charts = all_charts(given, assess_rig(given))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rollcli.run.options import FrameOptions, RegionOptions
-from rollcli.run.read import region_mask
+from rollcli.run.read import region_mask, wanted_of
 
 SHAPE = (120, 160)
 
@@ -37,3 +37,17 @@ def test_a_slanted_side_that_reaches_far_keeps_its_place(far):
 def test_a_polygon_that_lies_elsewhere_is_said_to_leave_nothing():
     with pytest.raises(Exception, match="no pixel of this 160x120 map lies inside"):
         allowed((1e9, 1e9), (2e9, 1e9), (2e9, 2e9))
+
+
+def test_of_a_pair_the_rows_of_the_region_are_matched_and_the_road_is_found_in_it():
+    options = FrameOptions(region=RegionOptions(roi=(81, 30, 160, 100)))
+    wanted = wanted_of(region_mask(None, options, SHAPE), options)
+    assert (wanted.rows.start, wanted.rows.stop, wanted.whole) == (30, 100, False)
+    v, u = np.mgrid[:60, :80]
+    left, right = 10 + 0.5 * v - 0.1 * u, 12 + 0.4 * v + 0.05 * u
+    small = np.where(u < 41, left, right)
+    assert wanted.road(small) == pytest.approx((12, 0.05, 0.4), abs=1e-3)
+    small[v < 15] = small[v >= 50] = 0  # nothing in the region is no data
+    assert wanted.road(small) == pytest.approx((12, 0.05, 0.4), abs=1e-3)
+    assert wanted.road(np.where(u < 41, left, 0)) is None
+    assert wanted_of(None, options).rows == slice(None)

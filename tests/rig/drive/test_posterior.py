@@ -54,6 +54,17 @@ def test_each_noise_has_the_fit_of_statsmodels_and_the_likelihood_of_scipy(cells
     assert fit.log_evidence[place, noise] == pytest.approx(expected + constant, rel=1e-6)
 
 
+@pytest.mark.parametrize("unit", [1.0, 0.02])
+def test_a_step_has_the_evidence_of_the_fit_with_it(cells, unit):
+    likelihood, places = Likelihood(cells, unit), np.arange(len(cells.first))
+    for design in (np.ones((len(places), 1)), np.column_stack([np.ones(len(places)), places >= 20])):
+        found = likelihood.scan(design, likelihood.fit(design))
+        for place in (1, 7, 21, len(places) - 1):
+            further = likelihood.fit(np.column_stack([design, places >= place]))
+            assert found[place] == pytest.approx(further.evidence, abs=1e-6)
+        assert found[0] < found[1:20].min() - 100  # what the design has already is no step
+
+
 @pytest.mark.slow
 def test_a_pair_of_steps_gains_what_its_fit_gains(cells):
     import statsmodels.api as sm
