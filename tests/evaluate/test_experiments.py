@@ -40,6 +40,18 @@ def test_rotating_a_map_adds_the_angle_to_its_roll(turn_deg):
     assert degrees_apart(exact(energy_of(rotated)).theta, math.radians(3 + turn_deg)) < 0.01
 
 
+@pytest.mark.parametrize("turn_deg", [-70, -20, 8, 33, 160])
+def test_a_turned_map_is_as_large_as_its_corners_need(turn_deg):
+    disparity = np.ones((60, 90), np.float32)
+    for value, corner in enumerate(np.ndindex(2, 2), 2):
+        rows, columns = (slice(-3, None) if end else slice(3) for end in corner)
+        disparity[rows, columns] = value
+    rotated = rotate_nearest(disparity, math.radians(turn_deg))
+    assert set(np.unique(rotated)) == {0, 1, 2, 3, 4, 5}
+    for border in (rotated[:2], rotated[-2:], rotated[:, :2], rotated[:, -2:]):
+        assert 0 < np.count_nonzero(border) < 20  # the tip of a corner
+
+
 @pytest.mark.parametrize("quarters", [1, 2, 3])
 def test_turns_by_right_angles_move_every_pixel_to_one_place(quarters):
     disparity = np.arange(1, 36, dtype=np.float32).reshape(5, 7)

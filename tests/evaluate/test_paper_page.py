@@ -162,6 +162,11 @@ def test_run_times_and_errors_lie_where_the_axes_say(tables):
         assert (drawn[name]["x"], len(drawn[name]["y"])) == (table.column(column), len(METHODS))
 
 
+@pytest.mark.parametrize(("first", "shown"), [(2e-6, "2 µs4 µs6 µs8 µs"), (0.5, "500 ms1 s1.5 s2 s")])
+def test_run_times_are_in_the_unit_that_suits(first, shown):
+    assert shown in page_text([findings()], [times(first)])
+
+
 def test_learning_rates_are_all_in_view_and_a_line_from_end_to_end_marks_the_papers(tables):
     chart = charts(tables)["lambda0"]
     low, high = chart.layout["xaxis"]["range"]
