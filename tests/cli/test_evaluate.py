@@ -4,6 +4,7 @@ import json
 import re
 import sys
 
+import numpy as np
 import pytest
 
 from tests.run_cli import rollcli, write_maps
@@ -37,6 +38,15 @@ def test_accuracy_prints_a_table_and_names_what_has_no_known_angle(folder):
     assert done.err.splitlines() == [
         "rollcli: rolls.csv: 2 frames have no known angle in truth.csv: maps/c.png, maps/d.png"
     ]
+
+
+def test_accuracy_says_why_heights_that_are_asked_for_are_not_compared(folder):
+    for name in ("out", "heights", "disparity"):
+        (folder / name).mkdir()
+        np.save(folder / name / "a.npy", np.ones((2, 3), np.float32))
+    unasked, asked = accuracy(folder).err, accuracy(folder, "--heights", "out").err
+    assert asked.startswith("rollcli: out: no heights are compared: they need metres (estimate --calib), and")
+    assert asked.partition("\n")[2] == unasked
 
 
 def test_accuracy_ends_with_3_when_a_known_frame_has_no_angle(folder):
