@@ -6,6 +6,7 @@ Add a reason: a function that yields it, and its name in `REASONS`.
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from rollcli.estimator.solvers.solution import angle_between
 from rollcli.estimator.tuning import DoubtTuning
 
 _COLUMNS = 160  # of a view that are looked at; shares need no more
+_AHEAD = 0.05  # units to the horizon of a camera that looks ahead: every road fills enough of its view
 _ON_ROAD = 0.03  # of the road's disparity, within which a pixel is on it
 
 
@@ -55,6 +57,7 @@ class View:
         nearest = model.disparity_along(bottom)
         return width / grid.scale * abs(slope + 2 * bend * bottom) / nearest if nearest > 0 else math.inf
 
+    @cached_property
     def seen(self) -> tuple[float, float]:
         """Return which share of the lane is seen, and which of all that has data is on the road, 0 to 1.
 
@@ -147,13 +150,8 @@ def _grows_upward(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
 
 def _little_road(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
     road = evidence.road
-    if road and road.score < _least_score(road, tuning):
+    if road and road.score < tuning.least_score:
         yield "little of what lies ahead looks like a road"
-
-
-def _least_score(road: Road, tuning: DoubtTuning) -> float:
-    """Return the least score of a road: more where the horizon is not in the image, as with tables."""
-    return tuning.least_score if road.horizon < tuning.steep else tuning.least_steep_score
 
 
 def _narrow_view(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
@@ -163,16 +161,26 @@ def _narrow_view(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
     width = view.width
     doubted = width < tuning.narrowest
     if not doubted and width < tuning.narrow:
-        seen, filled = view.seen()
-        hidden = road.horizon < tuning.steep and filled > tuning.least_filled  # by a car, and not a table's
+        seen, filled = view.seen
+        hidden = filled > tuning.least_filled + tuning.filled_by_horizon * road.horizon  # by a car
         doubted = seen < tuning.least_seen and not hidden
     if doubted:
         yield f"the view is as narrow as that of a table or a room: {width:.1f} camera heights"
 
 
+def _little_filled(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
+    view, road = evidence.view, evidence.road
+    if view is None or road is None or road.horizon < _AHEAD:
+        return
+    _, filled = view.seen
+    if filled < min(tuning.filled_by_horizon * road.horizon, tuning.most_filled):
+        share = f"{100 * filled:.0f} % of the pixels"
+        yield f"a camera that looks down so far sees more of a road than {share}"
+
+
 def _rival_plane(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
     road = evidence.road
-    if not road or road.score < _least_score(road, tuning):
+    if not road or road.score < tuning.least_score:
         return  # of a poor road any plane is a rival
     if road.rival > tuning.rival_share * road.score:
         yield "another plane, with another roll, explains the map nearly as well"
@@ -210,6 +218,7 @@ REASONS: tuple[Reason, ...] = (
     _grows_upward,
     _little_road,
     _narrow_view,
+    _little_filled,
     _rival_plane,
     _fit_moved,
     _at_bound,

@@ -35,8 +35,7 @@ class Road:
     plane : ndarray, shape (3,)
         d = c0 + c1 x + c2 y on the sample's grid.
     score : float
-        The share of the road-like pixels ahead that lie on the plane, less those below it; at most 1. A plane
-        whose horizon is far outside of the image, as that of a wall, scores less.
+        The share of the road-like pixels ahead that lie on the plane, less those below it; at most 1.
     rival : float
         The best score of another plane, one whose roll differs by `DoubtTuning.other_angle` or more.
     """
@@ -178,10 +177,7 @@ class Judge:
         total, lost = slope.dot(near), place.dot(near)
         slope *= np.minimum(cost, 0, out=cost)
         lost += slope.dot(near)
-        scores: Singles = -lost / np.maximum(total, np.float32(1e-30))
-        c0, c1, c2 = planes.T
-        steep = c0 * c0 / np.maximum(c1 * c1 + c2 * c2, np.float32(1e-30))
-        return np.where(scores > 0, scores / (1 + steep / np.float32(self._tuning.horizon**2)), scores)
+        return -lost / np.maximum(total, np.float32(1e-30))
 
     def refined(self, planes: Singles) -> Singles:
         """Fit each plane (K, 3) to the pixels on it, a few times, by the places and slopes of the first."""

@@ -43,8 +43,9 @@ def verdict(disparity):
 
 
 def says_no_road(found):
+    reasons = ("little of what lies ahead looks like a road", "the view is as narrow as that of a table")
     return found.startswith("no road: ") or (
-        found.startswith("suspect: ") and "little of what lies ahead looks like a road" in found
+        found.startswith("suspect: ") and any(reason in found for reason in reasons)
     )
 
 
