@@ -193,7 +193,7 @@ def _setter(items: list[ast.cmpop], place: int, value: ast.cmpop) -> Callable[[]
 
 
 def tests_of(tree: Path, path: Path) -> list[str]:
-    """List the test files to try, those first that are named after the module or import it."""
+    """List the test files to try, first the record, then those named after the module, or that import it."""
     package, name = path.parts[1], path.with_suffix("").as_posix().replace("/", ".")
     places = [tree / TESTS / each for each in (package, *FURTHER.get(package, ()), "test_structure.py")]
     files = [
@@ -201,6 +201,8 @@ def tests_of(tree: Path, path: Path) -> list[str]:
     ]
 
     def distance(file: Path) -> int:
+        if file.stem == "test_recorded":
+            return -1
         if file.stem == f"test_{path.stem}":
             return 0
         return 1 if name in file.read_text("utf-8") else 2
