@@ -177,7 +177,8 @@ class Judge:
         total, lost = slope.dot(near), place.dot(near)
         slope *= np.minimum(cost, 0, out=cost)
         lost += slope.dot(near)
-        return -lost / np.maximum(total, np.float32(1e-30))
+        scores: Singles = -lost / np.maximum(total, np.float32(1e-30))
+        return scores
 
     def refined(self, planes: Singles) -> Singles:
         """Fit each plane (K, 3) to the pixels on it, a few times, by the places and slopes of the first."""
