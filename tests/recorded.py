@@ -1,61 +1,94 @@
-"""What this version finds on fixed inputs, kept beside the tests of each package as ``recorded.json``.
+"""What this version answers, recorded: no other version answers otherwise unless its commit says why.
 
-    python -m tests.recorded [PACKAGE ...]
-
-writes the records anew. A change of the program that moves them says why.
+``python -m tests.recorded [PACKAGE ...]`` makes the records anew. Each package has its cases in
+``tests/PACKAGE/test_recorded.py`` and its answers in ``tests/PACKAGE/recorded.json``, a line a case.
 """
 
+import dataclasses
+import functools
 import importlib
 import json
-import math
 import sys
+from collections.abc import Mapping
+from enum import Enum
 from pathlib import Path
 
-TESTS = Path(__file__).resolve().parent
+import numpy as np
+import pytest
+
+PACKAGES = ("estimator", "rig", "simulate")
+_GRID = 5  # rows and columns of an image whose values are recorded
+_ROUNDING = 1e-5  # what is smaller may be nothing, rounded
+_DIGITS = 8
 
 
-def written(value):
-    """The value as JSON has it: arrays as lists, floats with the digits that count, no infinities."""
-    if isinstance(value, dict):
-        return {str(key): written(each) for key, each in value.items()}
-    if hasattr(value, "tolist"):
-        return written(value.tolist())
+def check(package, case, answer, *, rel=1e-6, least=1e-6):
+    """Fail where the answer, of numbers, texts, arrays and records, is not the recorded one."""
+    known, found = (dict(_leaves(each)) for each in (_record(package)[case], _plain(answer)))
+    expected = {
+        name: pytest.approx(value, rel=rel, abs=least) if isinstance(value, float) else value
+        for name, value in known.items()
+    }
+    assert found == expected
+
+
+@functools.cache
+def _record(package):
+    return json.loads(_path(package).read_text("utf-8"))
+
+
+def _path(package):
+    return Path(__file__).parent / package / "recorded.json"
+
+
+def _plain(value):
+    """The value as JSON holds it; of an image its size, sums and some of its pixels."""
+    if dataclasses.is_dataclass(value) or hasattr(value, "_asdict"):
+        names = [each.name for each in dataclasses.fields(value)] if dataclasses.is_dataclass(value) else None
+        return _plain({name: getattr(value, name) for name in names or value._fields})
+    if isinstance(value, Enum):
+        return value.value
+    if isinstance(value, Mapping):
+        return {str(key): _plain(each) for key, each in value.items()}
+    if isinstance(value, np.ndarray):
+        return _plain(_image(value) if value.ndim > 1 and value.size > 64 else value.tolist())
     if isinstance(value, list | tuple):
-        return [written(each) for each in value]
-    if isinstance(value, float):
-        return float(f"{value:.7g}") if math.isfinite(value) else str(value)
-    return value
+        return [_plain(each) for each in value]
+    if isinstance(value, float | np.floating):
+        return float(f"{value:.{_DIGITS}g}") if np.isfinite(value) else str(value)
+    return value.item() if isinstance(value, np.generic) else value
 
 
-def differences(found, recorded, tolerance, place=""):
-    """Where two values differ by more than the tolerance, relative to 1 or to what was recorded."""
-    if isinstance(found, dict) and isinstance(recorded, dict) and found.keys() == recorded.keys():
-        pairs = [(f"{place}/{key}", found[key], recorded[key]) for key in found]
-    elif isinstance(found, list) and isinstance(recorded, list) and len(found) == len(recorded):
-        pairs = [
-            (f"{place}/{number}", *pair) for number, pair in enumerate(zip(found, recorded, strict=True))
-        ]
+def _image(values):
+    whole = values.astype(float)
+    known = np.isfinite(whole)
+    places = np.ix_(*(np.linspace(0, size - 1, _GRID + 2).astype(int)[1:-1] for size in whole.shape[:2]))
+    return {
+        "shape": values.shape,
+        "known": float(known.mean()),
+        "valid": float((known & (np.abs(whole) > _ROUNDING)).mean()),
+        "mean": float(whole[known].mean()) if known.any() else None,
+        "rms": float(np.sqrt(np.square(whole[known]).mean())) if known.any() else None,
+        "pixels": whole[places].ravel().tolist(),
+    }
+
+
+def _leaves(value, name=""):
+    """Yield each single value of a nested one with where it stands."""
+    if isinstance(value, dict | list):
+        yield f"{name}:", len(value)
+        for key, each in value.items() if isinstance(value, dict) else enumerate(value):
+            yield from _leaves(each, f"{name}/{key}")
     else:
-        numbers = all(isinstance(each, float) for each in (found, recorded))
-        if found == recorded or (numbers and abs(found - recorded) <= tolerance * max(1, abs(recorded))):
-            return []
-        return [f"{place}: {found} and not {recorded}"]
-    return [each for at, one, other in pairs for each in differences(one, other, tolerance, at)]
-
-
-def unlike_record(package, found, tolerance):
-    """Where the results of a package differ from its record."""
-    recorded = json.loads((TESTS / package / "recorded.json").read_text("utf-8"))
-    return differences(written(found), recorded, tolerance)
+        yield name, value
 
 
 def main(packages):
-    """Write the records of the packages."""
-    for package in packages or sorted(path.parent.name for path in TESTS.glob("*/test_recorded.py")):
-        found = importlib.import_module(f"tests.{package}.test_recorded").results()
-        lines = [f"{json.dumps(name)}: {json.dumps(written(value))}" for name, value in found.items()]
-        text = "{\n" + ",\n".join(lines) + "\n}\n"
-        (TESTS / package / "recorded.json").write_text(text, "utf-8")
+    """Write the records."""
+    for package in packages or PACKAGES:
+        cases = importlib.import_module(f"tests.{package}.test_recorded").CASES
+        lines = [f"{json.dumps(name)}: {json.dumps(_plain(make()))}" for name, make in cases.items()]
+        _path(package).write_text("{\n" + ",\n".join(lines) + "\n}\n", "utf-8", newline="\n")
 
 
 if __name__ == "__main__":

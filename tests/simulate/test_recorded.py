@@ -1,80 +1,129 @@
-"""Frames are those that this version is known to render; see `tests.recorded`."""
+"""What frames of every kind look like, to the grey level and the millimetre; see `tests.recorded`."""
 
-import csv
-import io
+import math
+from dataclasses import replace
+from functools import partial
 
-import numpy as np
 import pytest
 
-from rollcli.simulate.build import render_frame
-from rollcli.simulate.dataset import calibration, truth_csv
-from rollcli.simulate.options import CROSS_SECTIONS, ROUGHNESS, SCENES, SimulateOptions
+from rollcli.errors import UsageError
+from rollcli.simulate.build import build_scene, carriageway_of, draw_dips, render_frame, road_camber
+from rollcli.simulate.dataset import calibration, lane_rolls_of, truth_csv
+from rollcli.simulate.options import SimulateOptions
 from rollcli.simulate.spec import FrameSpec, draw_specs
-from tests.recorded import unlike_record
+from rollcli.simulate.views import render_view
+from tests.recorded import check
 
-SMALL = {"size": (96, 64), "grey": True}
-DRAWN = {
-    **{scene: {"scene": scene, "frames": 3, "seed": 7} for scene in SCENES},
-    **{shape: {"cross_section": shape, "gutter": (0, 8), "seed": 8} for shape in CROSS_SECTIONS},
-    **{f"roughness {grade}": {"roughness": grade, "scene": "street", "seed": 9} for grade in ROUGHNESS},
-    "dips": {"dips": 9, "scene": "open", "frames": 3, "seed": 10},
-    "mixed": {
-        "cross_section": "mixed",
-        "frames": 3,
-        "height": (1, 3),
-        "principal_offset": (-5, 5),
-        "seed": 11,
-    },
-    "bent": {
-        "bend": (-0.02, 0.02),
-        "curvature": (-0.01, 0.01),
-        "frames": 3,
-        "roll_deg": (-80, 80),
-        "seed": 12,
-    },
-    "kerb": {"kerb": (0.3, 0.5), "scene": "street", "gain": 0.7, "noise": 4.0, "focal": 60.0, "seed": 13},
-    "colour": {
-        "grey": False,
-        "scene": "street",
-        "principal_point": (50.0, 60.0),
-        "baseline": 0.2,
-        "seed": 14,
-    },
-    "from above": {"pitch_deg": (20, 60), "scene": "mixed", "frames": 3, "seed": 15},
+SMALL = {"size": (96, 72), "focal": 60.0}
+_frame = partial(FrameSpec, **SMALL)
+FRAMES = {
+    "bare": _frame("bare", math.radians(-6), 0.03, seed=1),
+    "bare sag": _frame("bare", 0.05, 0.02, curvature=0.002, seed=2, colour=False),
+    "open": _frame("open", math.radians(4), 0.05, seed=3),
+    "open crest": _frame("open", -0.1, 0.08, curvature=-0.0008, bend=-0.003, seed=4),
+    "street": _frame("street", 0.08, 0.0, seed=5, gain=1.2),
+    "street to the right": _frame("street", -0.02, 0.04, bend=0.006, seed=6, height=1.2, noise=0.0),
+    "street of another seed": _frame("street", 0.0, 0.1, seed=17, index=3, baseline=0.2),
+    "verge": _frame("verge", 0.03, 0.06, seed=7),
+    "verge to the left": _frame("verge", -0.12, 0.02, bend=-0.008, curvature=0.0005, seed=8, index=2),
+    "crown": _frame("street", 0.02, 0.1, cross_section="crown", crossfall=0.03, gutter=0.04, seed=9, dips=2),
+    "roof": _frame("open", 0.0, 0.1, cross_section="roof", crossfall=0.025, roughness="C", seed=10, dips=5),
+    "dish": _frame(
+        "verge", -0.04, 0.1, cross_section="dish", crossfall=0.04, roughness="E", seed=11, dips=12
+    ),
+    "superelevated": _frame(
+        "open", 0.04, 0.12, cross_section="superelevated", crossfall=0.03, bend=0.005, seed=12, dips=0
+    ),
+    "rough and bare": _frame("bare", 0.0, 0.15, roughness="A", dips=4, seed=13),
+    "high kerbs": _frame("street", 0.0, 0.2, kerb=(0.25, 0.3), height=2.5, seed=14, roughness="D"),
+    "off the centre": _frame("open", 0.3, -0.05, principal_point=(40.0, 30.5), seed=15),
+    "looking down": _frame("street", -0.5, 0.6, seed=16),
+    "upright": _frame("street", math.pi / 2, 0.1, seed=18),
 }
 
 
-def blocks(image):
-    """The means of blocks of 16 x 16 pixels, rows from the top."""
-    height, width = (side // 16 for side in image.shape[:2])
-    return image[: 16 * height, : 16 * width].reshape(height, 16, width, -1).mean((1, 3))
-
-
-def found(spec):
-    """What is told of a frame: its known values, the means of its images, and single disparities."""
-    frame = render_frame(spec)
-    truth = next(csv.DictReader(io.StringIO(truth_csv([("a", spec)]).decode())))
+def _rendered(spec):
+    frame, scene = render_frame(spec), build_scene(spec)
+    carriageway = carriageway_of(spec)
+    view = render_view(scene, spec.cameras(scene.normal)[1])
     return {
-        **{name: float(text) if text and text[-1].isdigit() else text for name, text in truth.items()},
-        "calibration": [float(word) for word in calibration(spec).decode().split() if word[-1] != ":"],
-        "left": blocks(frame.left),
-        "right": blocks(frame.right),
-        "disparity": frame.disparity[3::8, 5::12],
-        "road": blocks(frame.road),
-        **({} if frame.heights is None else {"heights": np.nan_to_num(frame.heights[3::6, 5::8], nan=-9)}),
+        "left": frame.left,
+        "right": frame.right,
+        "disparity": frame.disparity,
+        "road": frame.road,
+        "heights": frame.heights,
+        "light": view.light,
+        "materials": view.material,
+        "camber": road_camber(spec),
+        "lanes": lane_rolls_of(spec),
+        "edges": [carriageway.left, carriageway.right],
+        "dips": draw_dips(spec, carriageway) if spec.dips else None,
     }
 
 
-def results():
-    """Frames by the name of what they show."""
-    here = {}
-    for name, options in DRAWN.items():
-        specs = draw_specs(SimulateOptions(**{"frames": 1, **SMALL, **options}))
-        here |= {f"{name} {number}": found(spec) for number, spec in enumerate(specs)}
-    here["as it is"] = found(FrameSpec(size=(96, 80)))
-    return here
+def _table(**options):
+    """The true values of frames that are drawn, and the calibration of the last."""
+    try:
+        specs = draw_specs(SimulateOptions(frames=6, size=(96, 72), seed=3, **options))
+    except UsageError as error:
+        return str(error)
+    names = [f"frame{place}" for place in range(len(specs))]
+    return [truth_csv(zip(names, specs, strict=True)).decode(), calibration(specs[-1]).decode()]
 
 
-@pytest.mark.slow
-def test_frames_are_those_on_record():
-    assert unlike_record("simulate", results(), 2e-4) == []
+def _refused(**values):
+    try:
+        return replace(FRAMES["street"], **values) and "is possible"
+    except UsageError as error:
+        return str(error)
+
+
+CASES = {
+    **{name: partial(_rendered, spec) for name, spec in FRAMES.items()},
+    "drawn": _table,
+    "drawn of a scene": partial(_table, scene="bare", grey=True, principal_offset=(-5.0, 5.0)),
+    "drawn with sections": partial(
+        _table,
+        scene="verge",
+        cross_section="mixed",
+        crossfall=(2.0, 3.0),
+        gutter=(0.0, 4.0),
+        bend=(-0.01, 0.01),
+        curvature=(-0.002, 0.002),
+        height=(1.2, 1.9),
+        roughness="B",
+    ),
+    "drawn with kerbs": partial(_table, scene="street", kerb=(0.0, 0.2), roll_deg=(3.0, 3.0), focal=80.0),
+    "drawn beyond": partial(_table, principal_offset=(-60.0, 0.0)),
+    "possible": lambda: (
+        [
+            _refused(**{name: value})
+            for name, values in {
+                "crossfall": (0.0, -0.01, 0.1, 0.11, 0.16, 0.5),
+                "gutter": (0.0, -0.01, 0.1, 0.11, 0.16, 0.5),
+                "kerb": ((0.0, 0.0), (0.2, 0.1), (0.1, 0.3), (0.0, 0.31), (0.0, 0.6), (-0.1, 0.1)),
+                "size": ((16, 16), (15, 16), (16, 15), (16385, 20), (16, 16384), (20, 16385)),
+                "principal_point": (
+                    (0.0, 0.0),
+                    (95.0, 71.0),
+                    (95.5, 3.0),
+                    (3.0, 71.5),
+                    (-0.5, 3.0),
+                    (3.0, -1.0),
+                ),
+                "roll": (math.pi / 2, -1.6, 1.6),
+                "pitch": (math.pi / 3, -1.05, 1.05),
+                "curvature": (0.01, -0.01, 0.0101, -0.02),
+                "bend": (0.02, -0.02, 0.0201, -0.03),
+                "height": (0.0, -1.0, 0.01),
+            }.items()
+            for value in values
+        ]
+        + [_refused(roll=-1.2, height=0.5), _refused(roll=-1.2, pitch=0.5, height=0.4)]
+    ),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_answers_are_those_recorded(case):
+    check("simulate", case, CASES[case](), rel=2e-5, least=2e-5)
