@@ -1,0 +1,123 @@
+"""What matching finds in pairs of every kind; see `tests.recorded`."""
+
+import math
+from functools import cache, partial
+
+import cv2
+import numpy as np
+import pytest
+
+from rollcli.errors import RollcliError
+from rollcli.estimator.road.find import road_plane
+from rollcli.simulate.build import render_frame
+from rollcli.simulate.spec import FrameSpec
+from rollcli.stereo.alignment import level
+from rollcli.stereo.match import StereoOptions, Wanted, match_pair
+from rollcli.stereo.misalignment import Misalignment
+from tests.recorded import check
+
+SIZE = (224, 160)
+
+
+@cache
+def _scene(scene="street", seed=3):
+    frame = render_frame(FrameSpec(scene, math.radians(4), 0.06, size=SIZE, focal=150.0, seed=seed))
+    return frame.left, frame.right
+
+
+def _moved(view, clockwise_deg=0.0, larger_percent=0.0, lower=0.0):
+    width, height = view.shape[1::-1]
+    matrix = cv2.getRotationMatrix2D(
+        ((width - 1) / 2, (height - 1) / 2), -clockwise_deg, 1 + larger_percent / 100
+    )
+    matrix[1, 2] += lower
+    return cv2.warpAffine(
+        view, matrix, (width, height), flags=cv2.INTER_LANCZOS4, borderMode=cv2.BORDER_REFLECT
+    )
+
+
+def _texture(disparity=14.0, slope=0.0):
+    """Random dots whose disparity grows by `slope` px from row to row."""
+    wide = np.random.default_rng(5).integers(0, 256, (120, 480), dtype=np.uint8)
+    wide = cv2.GaussianBlur(wide, (3, 3), 0)
+    columns = np.arange(240) + 100
+    shifts = np.rint(disparity + slope * np.arange(120)).astype(int)
+    return wide[:, columns], np.stack([row[columns + shift] for row, shift in zip(wide, shifts, strict=True)])
+
+
+def _road(small):
+    return road_plane(small, None, math.radians(45), 0)
+
+
+def _match(views, odd=None, wanted=None, **options):
+    left, right = views()
+    try:
+        found = match_pair(left, _moved(right, **(odd or {})), StereoOptions(**options), wanted or Wanted())
+    except RollcliError as error:
+        return str(error)
+    disparity, measured = found.disparity[found.disparity > 0], found.measured
+    shape = found.disparity.shape
+    return {
+        "range": [found.min_disparity, found.num_disparities],
+        "shape": shape,
+        "valid": len(disparity) / found.disparity.size,
+        "quartiles": np.percentile(disparity, (25, 50, 75)).tolist(),
+        "whole": None if found.whole is None else float((found.whole > 0).mean()),
+        # px: how far each part moves a corner
+        "corrected": found.corrected.shifts(*shape),
+        "measured": measured
+        and [measured.misalignment.shifts(*shape), measured.errors.shifts(*shape), measured.spread],
+        "share": measured and measured.share,
+        "slope_error_px": found.slope_error * shape[1],
+        "doubt": found.doubt,
+        "end": found.end_fraction,
+    }
+
+
+def _swapped():
+    left, right = _scene()
+    return right, left
+
+
+def _other():
+    return _scene()[0], _scene("open", 9)[1]
+
+
+ODD = {"clockwise_deg": 0.6, "larger_percent": 0.8, "lower": -3.0}
+LIES = Misalignment(1.5, 0.01, -0.004, 2e-5)
+CASES = {
+    "level": partial(_match, _scene),
+    "verge": partial(_match, partial(_scene, "verge", 6)),
+    "turned": partial(_match, _scene, {"clockwise_deg": 0.8}),
+    "lower": partial(_match, _scene, {"lower": 2.5}),
+    "larger": partial(_match, _scene, {"larger_percent": 0.7}),
+    "odd": partial(_match, _scene, ODD),
+    "far off": partial(_match, _scene, {"clockwise_deg": 2.5, "lower": 14.0}),
+    "as it is": partial(_match, _scene, ODD, align="off"),
+    "given": partial(_match, _scene, {"lower": 2.0}, vertical_offset=2.0),
+    "along the road": partial(_match, _scene, None, Wanted(road=_road)),
+    "some rows": partial(_match, _scene, None, Wanted(slice(70, 150), _road, whole=True)),
+    "smaller": partial(_match, _scene, None, downscale=1.5),
+    "five ways": partial(_match, _scene, None, mode="sgbm", num_disparities=48, block_size=7),
+    "eight ways": partial(_match, _scene, None, mode="hh", speckle_size=0, uniqueness=2),
+    "from four on": partial(_match, _scene, None, min_disparity=4, num_disparities=48),
+    "texture": partial(_match, _texture),
+    "texture of a slope": partial(_match, partial(_texture, 4.0, 0.3), {"lower": 1.0}),
+    "swapped": partial(_match, _swapped),
+    "two scenes": partial(_match, _other),
+    "one image": partial(_match, lambda: (_scene()[0],) * 2),
+    "levelled": lambda: level(cv2.cvtColor(_scene()[1], cv2.COLOR_BGR2GRAY), LIES).astype(float),
+    "lies": lambda: [
+        LIES.resized(0.5),
+        LIES.times(2.0),
+        LIES.shifts(100, 300),
+        LIES.reach_in_rows(100, 300, 20, 70),
+        LIES.rotation_deg,
+    ],
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_answers_are_those_recorded(case):
+    # px: as much as OpenCV 4.7 and 5.0 differ by
+    check("stereo", case, CASES[case](), rel=1e-4, least=1e-3)
