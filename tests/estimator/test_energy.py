@@ -131,3 +131,12 @@ def test_a_map_is_the_same_everywhere_when_it_bends_by_less_than_rounding(times,
     else:
         with pytest.raises(EstimationError, match="the same everywhere"):
             energy_of(100 + times * least * bend)
+
+
+@pytest.mark.parametrize("theta", [-1.2, -0.3, 0.0, 0.4, 1.5])
+def test_the_quotient_whose_roots_are_minima_is_the_energy(theta):
+    disparity = bent_road(7, width=60, height=40, noise=0.5)
+    disparity[:17, :33] = 0  # what is not symmetric has sums of odd powers
+    energy = energy_of(disparity)
+    over, under = energy.as_quotient(np.array([3 * math.cos(theta)]), np.array([3 * math.sin(theta)]))
+    assert (over / under + energy.rest).item() == pytest.approx(energy.at(theta).value, rel=1e-9)
