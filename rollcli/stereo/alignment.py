@@ -13,6 +13,7 @@ from rollcli.stereo.misalignment import LEVEL, NOTHING_KNOWN, ColumnSupport, Mis
 from rollcli.stereo.row_fit import (
     ColumnEvidence,
     MeasuredRows,
+    RowFit,
     SeenBlocks,
     column_evidence,
     column_support,
@@ -49,6 +50,7 @@ _LONGEST_STEP = 1.5  # px, anywhere; along the rows, shorter ones take twice as 
 # px: a round that moves less is the last. With 0.05, angles of 6 of 41 real pairs moved by more than 0.01
 # degrees with the last digits of grey levels
 _SMALL_STEP = 0.01
+_HIDDEN = 5.0  # times: on empty roads with much noise a round finds a fifth of what there is
 
 
 @dataclass(frozen=True)
@@ -143,17 +145,17 @@ def measure_misalignment(
     if min(disparity.shape) < BLOCK:
         return None
     blocks = _Blocks(texture, disparity, every)
-    before = found = start
+    before, found, fit = start, start, None
     for _ in range(rounds):
         seen = blocks.vertical(found)
         if len(seen.shift) < _FEWEST:
             return None
-        fit = fit_rows(seen, found)
+        fit = fit_rows(seen, found, fit)
         reach = fit.lies.reach(*disparity.shape)
         step = fit.lies.times(_LONGEST_STEP / max(reach, _LONGEST_STEP))
         before, found = found, found + step
         blocks.follow(step)
-        if reach < _SMALL_STEP:
+        if reach < _SMALL_STEP or _is_plainly_level(found, fit, disparity.shape):
             break
     height, width = disparity.shape
     rows = MeasuredRows(seen, before, (height, width))
@@ -291,6 +293,11 @@ def _gradients(view: Floats) -> tuple[Floats, Floats]:
         for order in ((1, 0), (0, 1))
     )
     return across, down
+
+
+def _is_plainly_level(found: Misalignment, fit: RowFit, shape: tuple[int, ...]) -> bool:
+    """Tell whether views would be level even if most of how they lie were still hidden."""
+    return is_level(found.times(_HIDDEN), fit.errors, shape)
 
 
 @dataclass(frozen=True)

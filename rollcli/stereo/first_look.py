@@ -28,6 +28,8 @@ Matcher = Callable[[float], NDArray[Any]]
 """The disparity map, in pixels with 0 for no data, of a search as wide as given, pixels."""
 
 _RANGE_ROUNDS = 4
+# How far beyond the largest disparity is searched, times it; and the share of this that it has to lie within
+_BEYOND, _WITHIN = 1.4, 0.85
 _MIN_SHARE = 0.01  # of the pixels, to say anything
 
 
@@ -67,12 +69,12 @@ def largest_disparity(match: Matcher, width: int, start: float | None = None) ->
     for _ in range(_RANGE_ROUNDS):
         if top is None:
             return None
-        searched = 1.4 * top + 4
+        searched = _BEYOND * top + 4
         narrow, wide = match(searched), match(min(2 * searched, width / 2))
         believed = np.where(np.abs(narrow - wide) < 1, narrow, 0)
         top = _top(believed, 99)
         found = None if top is None else Range(top, np.where(wide > 0, believed, narrow))
-        if top is not None and top < 0.85 * searched:
+        if top is not None and top < _WITHIN * searched:
             break
     return found
 
@@ -218,7 +220,7 @@ def _climb(pair: _Pair, start: Misalignment, first: _Small | None = None) -> _Sm
     shape = pair.views[0].shape
     found, at, approach = None, start, Approach(shape)
     for _ in range(_ROUNDS):
-        seen, first = first or _look(pair, at), None
+        seen, first = first or _look(pair, at, found), None
         if seen is None:
             return found
         found = seen
@@ -231,14 +233,25 @@ def _climb(pair: _Pair, start: Misalignment, first: _Small | None = None) -> _Sm
     return found
 
 
-def _look(pair: _Pair, at: Misalignment) -> _Small | None:
-    """Level, match and measure once."""
+def _look(pair: _Pair, at: Misalignment, before: _Small | None = None) -> _Small | None:
+    """Level, match and measure once; `before` knows how far to search."""
     left, right = pair.views
-    matched = _match_small((left, level(right, at)))
+    levelled = left, level(right, at)
+    matched = None if before is None else _match_again(levelled, before.top)
+    if matched is None:
+        matched = _match_small(levelled)
     if matched is None:
         return None
     measured = measure_misalignment(pair.texture, matched.disparity, at)
     return _Small(matched.top, matched.disparity, measured)
+
+
+def _match_again(pair: Views, top: float) -> _Small | None:
+    """Match over the range that was enough before the views lay otherwise; None where it is not now."""
+    searched = _BEYOND * top + 4
+    disparity = _match(pair, searched)
+    found = _top(disparity, 99)
+    return None if found is None or found > _WITHIN * searched else _Small(found, disparity, None)
 
 
 def _match_small(pair: Views) -> _Small | None:

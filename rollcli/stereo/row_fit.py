@@ -24,6 +24,7 @@ _SAME_SPREAD = 0.005  # of it: a fit that changes its spread by less keeps it fr
 # px, of each part anywhere: a fit that changes by less has settled. One that stopped with its spread was up
 # to 0.1 px off in the corners, by its way there; the next round of measuring took that back
 _SAME = 0.001
+_SAME_SHARE = 0.02  # of what is found: the next round of measuring takes away more
 _TUNING = 1.5  # standard deviations off, a block counts a quarter
 _TILE = 64.0  # px of the size measured at: blocks within it err together
 _LINEAR = (0, 1, 2, 3)  # offset, rotation, scale, twist
@@ -188,14 +189,25 @@ class MeasuredRows(NamedTuple):
 
 
 class RowFit(NamedTuple):
-    """The misalignment that explains most blocks, its standard errors, and the spread of the rest (px)."""
+    """The misalignment that explains most blocks.
+
+    Attributes
+    ----------
+    lies, errors : Misalignment
+        And the standard error of each part.
+    spread : float
+        Standard deviation of the blocks from it, outliers aside, px.
+    off : ndarray, shape (N,)
+        How far each block is from it, px.
+    """
 
     lies: Misalignment
     errors: Misalignment
     spread: float
+    off: Doubles
 
 
-def fit_rows(seen: SeenBlocks, at: Misalignment = LEVEL) -> RowFit:
+def fit_rows(seen: SeenBlocks, at: Misalignment = LEVEL, before: RowFit | None = None) -> RowFit:
     """Fit offset, rotation, scale and twist, and a tilt and a curve where they are sure or begun with.
 
     Parameters
@@ -203,27 +215,30 @@ def fit_rows(seen: SeenBlocks, at: Misalignment = LEVEL) -> RowFit:
     seen : SeenBlocks
         40 of them or more; what is left of the right view that was levelled by `at`.
     at : Misalignment
+    before : RowFit, optional
+        Of the same blocks in the round before: those that were far off then count little from the start.
     """
     frame = _Frame.of(seen)
     design = frame.design(seen)
     shift, fixed = seen.shift.astype(np.float64), seen.weight.astype(np.float64)
     used = list(_LINEAR)
-    fit = _robust(design[used], shift, fixed)
+    known = before is not None and before.off.size == shift.size
+    fit = _robust(design[used], shift, fixed, start=(before.off, before.spread) if before and known else None)
     variance = _variance(design[used], fit, frame.tile)
     held = np.zeros(6)
     # a plain road's tilt or curve and its scale could cancel each other
     held[4:] = variance / np.square([BELIEF.tilt * frame.near, BELIEF.bend * frame.half_height])
-    wide = _least_squares(design[:6], shift, fit.weight, held)
+    wide = _least_squares(design, shift, fit.weight, held)
     told = np.square(wide.values) > _SURE**2 * variance * np.diag(wide.inverse)
     told &= np.count_nonzero(np.bincount(frame.tile)) >= _FEWEST_TILES
     used += [each for each in (4, 5) if told[each] or at.parts[each]]
     if len(used) > len(_LINEAR):
-        fit = _robust(design[used], shift, fixed, held[used])
+        fit = _robust(design[used], shift, fixed, held[used], (fit.off, fit.spread))
     errors = np.sqrt(np.square(fit.inverse @ (design[used] * fit.weight * fit.off)).sum(axis=1))
     parts = np.zeros((2, 6))
     parts[:, used] = (fit.values, errors)
     lies, errors_of = (Misalignment(*part.tolist()) for part in parts / frame.units)
-    return RowFit(lies, errors_of, fit.spread)
+    return RowFit(lies, errors_of, fit.spread, fit.off)
 
 
 def column_evidence(rows: MeasuredRows, spread: float) -> ColumnEvidence:
@@ -240,7 +255,7 @@ def column_evidence(rows: MeasuredRows, spread: float) -> ColumnEvidence:
     """
     seen, at, shape, factor = rows
     frame = _Frame.of(seen)
-    design = frame.design(seen)
+    design = frame.shapes(frame.design(seen))
     shift = seen.shift + np.float64(1) * at.down(seen.x, seen.y, seen.near)
     start = _least_squares(design[:7], shift, seen.weight.astype(np.float64))
     weight = seen.weight * _believed(start.off, spread / factor)
@@ -400,12 +415,14 @@ class _Frame(NamedTuple):
         return np.array([1, x, y, x * y, self.near, y * y])
 
     def design(self, seen: SeenBlocks) -> Doubles:
-        """Return the columns: a misalignment's six, a bend of the lower half, and four shapes."""
+        """Return the columns of a misalignment: its six parts."""
         x, y = seen.x / np.float64(self.half_width), seen.y / np.float64(self.half_height)
-        near = seen.near / np.float64(self.near)
-        ones = np.ones_like(x)
-        rest = (y * y, np.maximum(y, 0), x * x, x * x * y, x * y * y, y**3)
-        return np.stack([ones, x, y, x * y, near, *rest])
+        return np.stack([np.ones_like(x), x, y, x * y, seen.near / np.float64(self.near), y * y])
+
+    def shapes(self, design: Doubles) -> Doubles:
+        """Return those columns, and what else the rows may show: a bend of the lower half, and four shapes."""
+        x, y = design[1:3]
+        return np.stack([*design, np.maximum(y, 0), x * x, x * x * y, x * y * y, y**3])
 
 
 class _Fit(NamedTuple):
@@ -428,12 +445,18 @@ def _least_squares(design: Doubles, shift: Doubles, weight: Doubles, held: Doubl
     return _Fit(values, inverse, shift - values @ design, weight, 0.0)
 
 
-def _robust(design: Doubles, shift: Doubles, fixed: Doubles, held: Doubles | float = 0.0) -> _Fit:
-    """Fit in rounds, each block weighed by how far off it was in the last.
+def _robust(
+    design: Doubles,
+    shift: Doubles,
+    fixed: Doubles,
+    held: Doubles | float = 0.0,
+    start: tuple[Doubles, float] | None = None,
+) -> _Fit:
+    """Fit in rounds, each block weighed by how far off it was in the last; `start`: before the first.
 
     Once the spread stays, it is held until the values do: it would go on to the few blocks that agree best.
     """
-    off, spread = np.zeros_like(fixed), 1.0
+    off, spread = start or (np.zeros_like(fixed), 1.0)
     for _ in range(_FIT_ROUNDS):
         fit = _least_squares(design, shift, fixed * _believed(off, spread), held)
         off = fit.off
@@ -443,7 +466,7 @@ def _robust(design: Doubles, shift: Doubles, fixed: Doubles, held: Doubles | flo
     for _ in range(_FIT_ROUNDS):
         values = fit.values
         fit = _least_squares(design, shift, fixed * _believed(fit.off, spread), held)
-        if np.abs(fit.values - values).max() < _SAME:
+        if np.abs(fit.values - values).max() < max(_SAME, _SAME_SHARE * np.abs(fit.values).max()):
             break
     return fit._replace(spread=spread)
 
@@ -468,7 +491,8 @@ def _variance(design: Doubles, fit: _Fit, tile: NDArray[np.intp]) -> float:
 def _median(values: Doubles) -> float:
     """Return the median, in a fifth of the time that `numpy.median` takes for a few hundred values."""
     middle = (values.size - 1) // 2, values.size // 2
-    return float(np.partition(values, middle)[list(middle)].mean())
+    ordered = np.partition(values, middle)
+    return float(ordered[middle[0]] + ordered[middle[1]]) / 2
 
 
 def _believed(off: Doubles, spread: float) -> Doubles:

@@ -1,4 +1,4 @@
-"""PNG [ISO/IEC 15948]: one fast path for 16-bit grey, OpenCV for the rest; only whole files are decoded."""
+"""PNG [ISO/IEC 15948]: one fast path for grey of 8 and 16 bits, OpenCV for the rest; only whole files are decoded."""
 
 import contextlib
 import os
@@ -91,25 +91,27 @@ _FULL_WINDOW = b"\x78"  # of less OpenCV's zlib minds references that go further
 _MOST_AFTER = 1 << 16
 
 
-def decode_grey16(packed: bytes, width: int, height: int) -> NDArray[np.uint16] | None:
-    """Decode the pixel data of a 16-bit grey PNG that is not interlaced, as OpenCV writes it.
+def decode_grey(packed: bytes, width: int, height: int, depth: int) -> NDArray[Any] | None:
+    """Decode the pixel data of a grey PNG of 8 or 16 bits that is not interlaced, as OpenCV writes it.
 
     Parameters
     ----------
     packed : bytes
         The rows, as a zlib stream.
-    width, height : int
+    width, height, depth : int
+        Pixels, and bits of each.
 
     Returns
     -------
-    ndarray of uint16, shape (H, W), or None
+    ndarray of uint8 or uint16, shape (H, W), or None
         None without imagecodecs, for rows of other filters than None and Sub, and where something is wrong:
         then the verdict of OpenCV counts.
     """
     codecs = imagecodecs()
     if codecs is None or not packed.startswith(_FULL_WINDOW):
         return None
-    rows = np.empty((height, 1 + 2 * width), np.uint8)  # the filter, then high and low byte of each pixel
+    size = depth // 8
+    rows = np.empty((height, 1 + size * width), np.uint8)  # the filter, then the bytes of each pixel
     try:
         plain = codecs.deflate_decode(packed, out=rows.reshape(-1))
     except (RuntimeError, ValueError):  # its errors are RuntimeErrors
@@ -119,14 +121,14 @@ def decode_grey16(packed: bytes, width: int, height: int) -> NDArray[np.uint16] 
     ends = packed.endswith(checksum) and packed.rfind(checksum, -_MOST_AFTER, -1) < 0
     if not ends or len(plain) != rows.size or rows[:, 0].max() > _SUB:
         return None
-    # a pixel's bytes are the sums, modulo 256, of those up to it
-    differences = rows[:, 1:].reshape(height, width, 2)
+    # a pixel's bytes are the sums, modulo 256, of those up to it; the high one comes first
+    differences = rows[:, 1:].reshape(height, width, size)[..., ::-1]
     sums = np.empty(differences.shape, np.uint8)
-    codecs.delta_decode(differences[..., ::-1], axis=1, out=sums)
-    pixels: NDArray[np.uint16] = sums.view("<u2")[..., 0].astype(np.uint16, copy=False)
+    codecs.delta_decode(differences, axis=1, out=sums)
     unfiltered = rows[:, 0] != _SUB
     if unfiltered.any():
-        pixels[unfiltered] = rows[unfiltered, 1:].view(">u2")
+        sums[unfiltered] = differences[unfiltered]
+    pixels: NDArray[Any] = sums.view(f"<u{size}")[..., 0].astype(f"u{size}", copy=False)
     return pixels
 
 
@@ -248,8 +250,8 @@ def encode_png(values: NDArray[Any], text: str = "") -> bytes:
 
 def _decoded(whole: _Whole, name: str, flags: int) -> NDArray[Any]:
     header = whole.header
-    if (header.colour, header.depth, header.interlace) == (_GREY, 16, 0):
-        fast = decode_grey16(whole.packed, header.width, header.height)
+    if header.colour == _GREY and header.depth >= 8 and not header.interlace:
+        fast = decode_grey(whole.packed, header.width, header.height, header.depth)
         if fast is not None:
             return fast
     with decoding() as printed:

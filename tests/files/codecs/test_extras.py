@@ -39,7 +39,7 @@ def plain(monkeypatch):
 
     def read(data):
         with monkeypatch.context() as patch:
-            patch.setattr(png, "decode_grey16", lambda *_: None)
+            patch.setattr(png, "decode_grey", lambda *_: None)
             patch.setattr(tiff, "imagecodecs", lambda: None)
             return outcome(data)
 
@@ -65,20 +65,21 @@ def decoded(values, filters):
     """Decode a file whose rows have these filters, one after the other; the options do not reach OpenCV."""
     height, width = values.shape
     plain = filtered(values, filters)
-    return png.decode_grey16(zlib.compress(plain), width, height)
+    return png.decode_grey(zlib.compress(plain), width, height, 8 * values.itemsize)
 
 
-def grey_file(width, height, packed):
-    return png_file(png_header(width, height), (b"IDAT", packed), (b"IEND", b""))
+def grey_file(width, height, packed, depth=16):
+    return png_file(png_header(width, height, depth), (b"IDAT", packed), (b"IEND", b""))
 
 
 def filtered(values, filters):
-    """Filter rows of 16 bits as PNG does [ISO/IEC 15948, 9.2], byte by byte."""
-    pixels = values.astype(">u2").view(np.uint8).astype(int)
+    """Filter rows as PNG does [ISO/IEC 15948, 9.2], byte by byte."""
+    size = values.itemsize
+    pixels = values.astype(f">u{size}").view(np.uint8).astype(int)
     before = np.zeros_like(pixels[0])
     rows = []
     for row, kind in zip(pixels, cycle(filters)):
-        left, corner = (np.concatenate([[0, 0], each[:-2]]) for each in (row, before))
+        left, corner = (np.concatenate([[0] * size, each[:-size]]) for each in (row, before))
         nearest = [
             min((a, b, c), key=lambda each, p=a + b - c: abs(p - each))
             for a, b, c in zip(left, before, corner, strict=True)
@@ -91,22 +92,24 @@ def filtered(values, filters):
 
 @pytest.mark.parametrize("filters", [[0], [1], [2], [3], [4], [0, 1], [1, 4, 0, 3, 2], [1] * 30 + [4]])
 @pytest.mark.parametrize("shape", [(37, 53), (1, 1), (1, 200), (200, 1), (60, 700)])
-def test_rows_of_every_filter_read_as_opencv_reads_them(installed, shape, filters):
-    values = np.random.default_rng(1).integers(0, 2**16, shape, dtype=np.uint16)
-    file = grey_file(*shape[::-1], zlib.compress(filtered(values, filters)))
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16])
+def test_rows_of_every_filter_read_as_opencv_reads_them(installed, kind, shape, filters):
+    values = np.random.default_rng(1).integers(0, np.iinfo(kind).max, shape, dtype=kind, endpoint=True)
+    file = grey_file(*shape[::-1], zlib.compress(filtered(values, filters)), 8 * values.itemsize)
     np.testing.assert_array_equal(cv2.imdecode(np.frombuffer(file, np.uint8), cv2.IMREAD_UNCHANGED), values)
 
     found = decoded(values, filters)
 
     assert (found is None) == (installed == "nothing" or max(filters[: shape[0]]) > 1)
     if found is not None:
-        assert (found.dtype, found.flags.c_contiguous, found.flags.writeable) == (np.uint16, True, True)
+        assert (found.dtype, found.flags.c_contiguous, found.flags.writeable) == (kind, True, True)
         np.testing.assert_array_equal(found, values)
     np.testing.assert_array_equal(decode_stored(file, "x").values, values)
 
 
-def test_what_opencv_writes_needs_no_opencv_to_be_read(imagecodecs, monkeypatch):
-    values = np.tile(DEEP, (5, 5))
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16])
+def test_what_opencv_writes_needs_no_opencv_to_be_read(imagecodecs, monkeypatch, kind):
+    values = np.tile(DEEP, (5, 5)).astype(kind)
     file = cv2.imencode(".png", values)[1].tobytes()
     monkeypatch.setattr(png.cv2, "imdecode", None)
     np.testing.assert_array_equal(decode_stored(file, "x").values, values)
@@ -137,19 +140,20 @@ NO_SUCH_FILTER = zlib.compress(b"\5" + PLAIN[1:])
 )
 def test_data_that_are_not_just_the_rows_are_left_to_opencv(installed, plain, packed):
     height, width = DEEP.shape
-    assert png.decode_grey16(packed, width, height) is None
+    assert png.decode_grey(packed, width, height, 16) is None
     file = grey_file(width, height, packed)
     assert outcome(file) == plain(file)
 
 
-def test_only_16_bits_of_grey_are_read_so(monkeypatch):
+def test_only_whole_bytes_of_grey_in_order_are_read_so(monkeypatch):
     asked = []
-    monkeypatch.setattr(png, "decode_grey16", lambda *_: asked.append(1))
+    monkeypatch.setattr(png, "decode_grey", lambda *read: asked.append(read[3]))
 
-    for file in (make_png(DEEP), make_png(DEEP, interlace=True), make_png(DEEP % 256, 8)):
+    plain = make_png(DEEP), make_png(DEEP % 256, 8)
+    for file in (*plain, make_png(DEEP, interlace=True), make_png(DEEP % 16, 4)):
         decode_stored(file, "x")
 
-    assert len(asked) == 1
+    assert asked == [16, 8]
 
 
 @pytest.mark.parametrize("name", FILES)
