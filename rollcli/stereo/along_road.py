@@ -257,7 +257,7 @@ def _match_along(pair: Levelled, plane: Plane, rows: slice, coarse: Map) -> _Nea
 def _match_blocks(views: Views, count: int) -> NDArray[np.int16]:
     """Match blocks of views that show a road at one disparity; sixteenths of a pixel, below 0 for no data."""
     matcher = cv2.StereoBM.create(count, _BLOCK)
-    matcher.setUniquenessRatio(StereoOptions.uniqueness)
+    matcher.setUniquenessRatio(0)
     matcher.setDisp12MaxDiff(1)
     matcher.setSpeckleWindowSize(_SPECKLE[0])
     matcher.setSpeckleRange(_SPECKLE[1])
