@@ -28,7 +28,6 @@ from rollcli.stereo.views import (
     blocks_at,
     grey_between,
     resampled,
-    rounded,
     sampled,
     seen_at,
     shrink_both,
@@ -50,6 +49,9 @@ _LONGEST_STEP = 1.5  # px, anywhere; along the rows, shorter ones take twice as 
 # px: a round that moves less is the last. With 0.05, angles of 6 of 41 real pairs moved by more than 0.01
 # degrees with the last digits of grey levels
 _SMALL_STEP = 0.01
+# px: the same from the fourth round on. Where noise hides much of what is left, each round takes away a part;
+# elsewhere further ones go to and fro by less than what they find is sure to
+_UNSURE_STEP, _UNSURE_FROM = 0.05, 4
 _HIDDEN = 5.0  # times: on empty roads with much noise a round finds a fifth of what there is
 
 
@@ -145,17 +147,18 @@ def measure_misalignment(
     if min(disparity.shape) < BLOCK:
         return None
     blocks = _Blocks(texture, disparity, every)
-    before, found, fit = start, start, None
-    for _ in range(rounds):
+    found, last = start, None
+    for done in range(1, rounds + 1):
         seen = blocks.vertical(found)
         if len(seen.shift) < _FEWEST:
             return None
-        fit = fit_rows(seen, found, fit)
+        last = fit = fit_rows(seen, found, last)
         reach = fit.lies.reach(*disparity.shape)
         step = fit.lies.times(_LONGEST_STEP / max(reach, _LONGEST_STEP))
         before, found = found, found + step
         blocks.follow(step)
-        if reach < _SMALL_STEP or _is_plainly_level(found, fit, disparity.shape):
+        enough = _SMALL_STEP if done < _UNSURE_FROM else _UNSURE_STEP
+        if reach < enough or _is_plainly_level(found, fit, disparity.shape):
             break
     height, width = disparity.shape
     rows = MeasuredRows(seen, before, (height, width))
@@ -243,8 +246,8 @@ class _Blocks:
         u, v = seen_at(at, self._u, self._v, self._shape, self._near[:, None])
         if not len(u):
             return SeenBlocks(*(x[:, 0],) * 5)
-        read_u, read_v = rounded(u, 64), rounded(v, 64)
-        off = self._left - grey_between(self._right, read_u, read_v)
+        read_u, read_v, grey = grey_between(self._right, u, v)
+        off = self._left - grey
         # else steps of less than a 64th of a pixel are none, or one, and measuring does not settle
         off -= self._across * (u - read_u) + self._down * (v - read_v)
         shift = np.einsum("ij,ij->i", self._shares.share, off)
@@ -326,6 +329,7 @@ class Tolerance:
 
 TOLERANCE = Tolerance()
 _MEASURED_AT = 120_000  # px: larger views are measured at this size, which keeps a fifth of the tolerance
+_WHOLE_FROM = 1.5  # times smaller: from here on a whole number, since means of whole pixels are quick
 # px, before a pair is matched again: the whole of most views. A level road of fine grain seems 0.06 % larger
 # at 120,000 and 0.02 % at its 307,000. More would take 25 bytes for each pixel of a large photo
 _CLOSER = 480_000
@@ -436,7 +440,8 @@ class SmallViews:
 
     def __init__(self, whole: Views, pixels: int = _MEASURED_AT) -> None:
         self.shape = whole[0].shape
-        self.factor = size_factor(self.shape, pixels)
+        factor = size_factor(self.shape, pixels)
+        self.factor = round(factor) if factor > _WHOLE_FROM else factor
         self.whole = whole
 
     @cached_property

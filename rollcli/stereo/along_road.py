@@ -260,9 +260,7 @@ def _match_blocks(views: Views, count: int) -> NDArray[np.int16]:
     Blocks of half the rows are about twice as high as wide, and take half the time.
     """
     height, width = views[0].shape
-    left, right = (
-        cv2.resize(each, (width, -(-height // 2)), interpolation=cv2.INTER_AREA) for each in views
-    )
+    left, right = (cv2.resize(each, (width, -(-height // 2)), interpolation=cv2.INTER_AREA) for each in views)
     matcher = cv2.StereoBM.create(count, _BLOCK)
     matcher.setUniquenessRatio(0)
     matcher.setDisp12MaxDiff(1)

@@ -29,6 +29,10 @@ def with_believed_columns(disparity: Map, matched: Misalignment, support: Column
     height, width = disparity.shape
     x = np.arange(width, dtype=np.float32) - np.float32((width - 1) / 2) - disparity
     y = np.arange(height, dtype=np.float32)[:, None] - np.float32((height - 1) / 2)
-    slope = np.float32(support.twist) * x + np.float32(support.pitch) * y
-    slope += np.float32(support.scale - matched.scale)
-    return np.where(disparity > 0, np.maximum(disparity + slope * x, np.float32(1e-3)), np.float32(0))
+    moved = np.float32(support.twist) * x
+    moved += np.float32(support.pitch) * y + np.float32(support.scale - matched.scale)
+    moved *= x
+    moved += disparity
+    np.maximum(moved, np.float32(1e-3), out=moved)
+    np.copyto(moved, 0, where=disparity <= 0)
+    return moved

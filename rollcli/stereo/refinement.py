@@ -28,11 +28,13 @@ _LEAST_RISE = 0.01
 # Squared grey levels per pixel: what a noise of one grey level adds to a squared gradient. Blocks with less
 # texture keep most of what SGBM says. From 0.2 to 1 the errors of angles are the same
 _RIDGE = 0.5
-_ROUNDS = 2  # a weak block goes about half of the way in one; a third changes no angle any more
+# How grey levels are interpolated in each round. A weak block goes about half of the way in one; a third
+# changes no angle any more
+_ROUNDS = (cv2.INTER_LINEAR,) * 2
 # Where the right view is not quite as it was levelled for the match: roads matched with 0.1 degrees left are
 # then 0.010 degrees wrong (95 %: 0.043), after two rounds 0.021 (0.063)
 # Between rows, linear interpolation turned enlarged and turned views by 0.013 degrees, cubic by 0.003
-_ROUNDS_LEVELLED = 4
+_ROUNDS_LEVELLED = (*_ROUNDS, cv2.INTER_CUBIC, cv2.INTER_CUBIC)
 _LONGEST_STEP = 0.5  # px
 _TOGETHER = 1 << 17  # pixels shifted at a time: what they need stays in the processor's cache
 
@@ -130,8 +132,7 @@ def _found(
     weight /= (np.einsum("ij,ij->i", weight, weight) + np.float32(_RIDGE * BLOCK**2))[:, None]
     weight *= (1 - across)[:, None]  # the right view is that much less stretched than the left one
     shift: Floats = none
-    rounds, between = (_ROUNDS, cv2.INTER_LINEAR) if lies == LEVEL else (_ROUNDS_LEVELLED, cv2.INTER_CUBIC)
-    for _ in range(rounds):
+    for between in _ROUNDS if lies == LEVEL else _ROUNDS_LEVELLED:
         off = sampled(right, u, v, between) - grey
         step = np.clip(np.einsum("ij,ij->i", weight, off), -_LONGEST_STEP, _LONGEST_STEP)
         u -= step[:, None]

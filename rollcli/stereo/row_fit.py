@@ -362,35 +362,33 @@ def _mean_over_causes(
     pitches : ndarray
         Curves that the offset would have, were it a pitch, 1/px.
     """
-    often = np.array([BELIEF.has_scale, BELIEF.has_tilt, BELIEF.has_bend])
-    often_doubted = np.array([BELIEF.may_scale, BELIEF.may_tilt, BELIEF.may_bend])
-    size = np.array([BELIEF.scale, BELIEF.tilt, BELIEF.bend])
-    curves = [(1 - BELIEF.pitch, 0.0), *((BELIEF.pitch / len(pitches), curve) for curve in pitches)]
-    likely, scales, variances, pitched = [], [], [], []
-    for causes in product((False, True), repeat=3):
-        prior = np.append(np.where(causes, np.square(size), 0), 0)
-        own = prior[0] / (prior[0] + lens[0])  # what of the rows' scale is one of the columns
-        prior += lens
-        spread = np.eye(4) + information * prior
-        covariance = prior[:, None] * np.linalg.inv(spread)
-        chances = [np.log(np.where(causes, each, 1 - each)).sum() for each in (often, often_doubted)]
-        chances -= np.linalg.slogdet(spread)[1] / 2
-        for how_often, curve in curves:
-            rest = told - information[:, 3] * curve
-            values = covariance @ rest
-            known = told[3] * curve - information[3, 3] * curve**2 / 2
-            likely.append(chances + np.log(how_often) + known + rest @ values / 2)
-            scales.append(own * values[0])
-            variances.append(own**2 * covariance[0, 0] + own * lens[0])
-            pitched.append(curve)
-    shares = np.exp(np.array(likely) - np.max(likely, axis=0))
-    believed, doubted = (shares / shares.sum(axis=0)).T
+    has = np.array([BELIEF.has_scale, BELIEF.has_tilt, BELIEF.has_bend])
+    may = np.array([BELIEF.may_scale, BELIEF.may_tilt, BELIEF.may_bend])
+    causes = np.array(list(product((False, True), repeat=3)))
+    prior = np.zeros((len(causes), 4))
+    prior[:, :3] = causes * np.square([BELIEF.scale, BELIEF.tilt, BELIEF.bend])
+    own = prior[:, 0] / (prior[:, 0] + lens[0])  # what of the rows' scale is one of the columns
+    prior += lens
+    spread = np.eye(4) + information * prior[:, None, :]
+    covariance = prior[:, :, None] * np.linalg.inv(spread)
+    chances = np.stack([np.log(np.where(causes, often, 1 - often)).sum(axis=1) for often in (has, may)])
+    chances -= np.linalg.slogdet(spread)[1] / 2
+
+    curves = np.append(0.0, pitches)
+    how_often = np.append(1 - BELIEF.pitch, np.full(len(pitches), BELIEF.pitch / len(pitches)))
+    rest = told - np.outer(curves, information[:, 3])
+    values = np.einsum("cij,pj->cpi", covariance, rest)
+    fits = np.log(how_often) + told[3] * curves - information[3, 3] * np.square(curves) / 2
+    likely = chances[:, :, None] + fits + np.einsum("pi,cpi->cp", rest, values) / 2
+    shares = np.exp(likely - likely.max(axis=(1, 2), keepdims=True))
+    believed, doubted = shares / shares.sum(axis=(1, 2), keepdims=True)
 
     def summed(values: Doubles, variance: Doubles | float) -> tuple[float, float]:
-        mean = float(believed @ values)
-        return mean, float(np.sqrt(doubted @ (np.square(values - mean) + variance)))
+        mean = float((believed * values).sum())
+        return mean, float(np.sqrt((doubted * (np.square(values - mean) + variance)).sum()))
 
-    return summed(np.array(scales), np.array(variances)), summed(np.array(pitched), 0.0)
+    scale_variances = np.square(own) * covariance[:, 0, 0] + own * lens[0]
+    return summed(own[:, None] * values[..., 0], scale_variances[:, None]), summed(curves, 0.0)
 
 
 class _Frame(NamedTuple):
@@ -420,7 +418,7 @@ class _Frame(NamedTuple):
         return np.stack([np.ones_like(x), x, y, x * y, seen.near / np.float64(self.near), y * y])
 
     def shapes(self, design: Doubles) -> Doubles:
-        """Return those columns, and what else the rows may show: a bend of the lower half, and four shapes."""
+        """Return those columns, and what else rows may show: a bend of the lower half, and four shapes."""
         x, y = design[1:3]
         return np.stack([*design, np.maximum(y, 0), x * x, x * x * y, x * y * y, y**3])
 

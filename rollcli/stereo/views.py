@@ -134,9 +134,15 @@ def smoothed_at_pixels(view: NDArray[_Number]) -> NDArray[_Number]:
     return _as_stored(cv2.sepFilter2D(view, cv2.CV_32F, _SMOOTH, _SMOOTH), view)
 
 
-def grey_between(twice: NDArray[_Number], u: NDArray[np.float32], v: NDArray[np.float32]) -> NDArray[_Number]:
-    """Return the grey levels at points (u, v) of a view that is `smoothed_between`; the border repeats."""
-    return sampled(twice, 2 * u, 2 * v, cv2.INTER_LINEAR)
+def grey_between(
+    twice: NDArray[_Number], u: NDArray[np.float32], v: NDArray[np.float32]
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[_Number]]:
+    """Return points (u, v) to 1/64 px, and the grey levels there of a view that is `smoothed_between`.
+
+    The border repeats.
+    """
+    read_u, read_v = rounded(u, 64), rounded(v, 64)
+    return read_u, read_v, _remapped(twice, 2 * read_u, 2 * read_v, cv2.INTER_LINEAR)
 
 
 _STRIP = 24  # rows: what they need of a view twice as large stays in the processor's cache
@@ -152,7 +158,7 @@ def grey_along(view: View, u: NDArray[np.float32], v: NDArray[np.float32]) -> Vi
         rows = slice(start, start + _STRIP)
         top = max(0, min(int(v[rows].min()), len(view)) - 3)  # smoothing sees a row beside each of a point's
         bottom = max(top, int(v[rows].max())) + 4
-        grey[rows] = grey_between(smoothed_between(view[top:bottom]), u[rows], v[rows] - np.float32(top))
+        grey[rows] = grey_between(smoothed_between(view[top:bottom]), u[rows], v[rows] - np.float32(top))[2]
     return grey
 
 
@@ -176,7 +182,12 @@ def sampled(
     OpenCV 4 rounds points to 1/32 px, and OpenCV 5 does not: angles of 41 real pairs differed by up to 0.07
     degrees. Of points that are rounded here, all versions see the same.
     """
-    u, v = rounded(u, 32), rounded(v, 32)
+    return _remapped(view, rounded(u, 32), rounded(v, 32), between)
+
+
+def _remapped(
+    view: NDArray[_Number], u: NDArray[np.float32], v: NDArray[np.float32], between: int
+) -> NDArray[_Number]:
     grey = view.astype(np.float32, copy=False)
     return _as_stored(cv2.remap(grey, u, v, between, borderMode=cv2.BORDER_REPLICATE), view)
 

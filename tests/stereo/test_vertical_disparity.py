@@ -155,11 +155,11 @@ def seen_at(lies, noise=0.0, count=400, seed=0):
 def test_a_fit_without_noise_is_exact_and_outliers_do_not_move_it():
     lies = Misalignment(0.5, -0.004, 0.006, 5e-5)
     seen = seen_at(lies)
-    exact, _, spread = row_fit.fit_rows(seen)
+    exact, _, spread, _ = row_fit.fit_rows(seen)
     assert exact.shifts(160, 300) == pytest.approx(lies.shifts(160, 300), abs=1e-4)
     assert spread == pytest.approx(0.001, abs=2e-4)
     seen.shift[::6] += 5
-    robust, _, _ = row_fit.fit_rows(seen)
+    robust = row_fit.fit_rows(seen).lies
     assert robust.shifts(160, 300) == pytest.approx(lies.shifts(160, 300), abs=1e-2)
 
 
@@ -170,7 +170,7 @@ def test_a_fit_has_settled(seed):
     seen = seen._replace(
         shift=seen.shift + 0.2 * np.random.default_rng(seed).standard_t(1.5, 900).astype(np.float32)
     )
-    lies = row_fit.fit_rows(seen)[0]
+    lies = row_fit.fit_rows(seen).lies
 
     off = (seen.shift - lies.down(seen.x, seen.y)).astype(np.float64)
     weight = seen.weight / np.square(1 + np.square(off / (1.5 * 1.4826 * np.median(np.abs(off)))))

@@ -1,4 +1,4 @@
-"""PNG [ISO/IEC 15948]: one fast path for grey of 8 and 16 bits, OpenCV for the rest; only whole files are decoded."""
+"""PNG [ISO/IEC 15948]: a fast path for grey of 8 and 16 bits, OpenCV for the rest; files must be whole."""
 
 import contextlib
 import os
