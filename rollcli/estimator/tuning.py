@@ -36,7 +36,7 @@ class SearchTuning:
     """Of a triple, units. Smaller: planes are noise; larger: triples leave the road."""
     first_pixels: int = 240
     """Pixels on which all planes are judged."""
-    refined: int = 4
+    refined: int = 8
     """Planes that go on, each the best of its roll: they are fitted, and judged on more pixels."""
     corridor: float = 1.0
     """Half-width of the corridor ahead, and of the lane in it, camera heights."""

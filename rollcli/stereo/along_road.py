@@ -257,14 +257,19 @@ def _match_along(pair: Levelled, plane: Plane, rows: slice, coarse: Map) -> _Nea
 def _match_blocks(views: Views, count: int) -> NDArray[np.int16]:
     """Match blocks of views that show a road at one disparity; sixteenths of a pixel, below 0 for no data.
 
-    Blocks of half the rows are about twice as high as wide, and take half the time.
+    Blocks of half the rows are about twice as high as wide, and take half the time. Beyond the first and the
+    last row the road goes on as it is: else none of it would be found where a block reaches beyond them.
     """
     height, width = views[0].shape
-    left, right = (cv2.resize(each, (width, -(-height // 2)), interpolation=cv2.INTER_AREA) for each in views)
+    half, beside = -(-height // 2), _BLOCK // 2
+    halved = (cv2.resize(each, (width, half), interpolation=cv2.INTER_AREA) for each in views)
     matcher = cv2.StereoBM.create(count, _BLOCK)
     matcher.setUniquenessRatio(0)
     matcher.setDisp12MaxDiff(1)
     matcher.setSpeckleWindowSize(_SPECKLE[0])
     matcher.setSpeckleRange(_SPECKLE[1])
-    found = cv2.resize(matcher.compute(left, right), (width, height), interpolation=cv2.INTER_NEAREST)
-    return found.astype(np.int16, copy=False)
+    found = matcher.compute(
+        *(cv2.copyMakeBorder(each, beside, beside, 0, 0, cv2.BORDER_REFLECT_101) for each in halved)
+    )
+    rows = cv2.resize(found[beside : beside + half], (width, height), interpolation=cv2.INTER_NEAREST)
+    return rows.astype(np.int16, copy=False)
