@@ -13,7 +13,7 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any, Literal, get_args, get_type_hints
 
-from rollcli.errors import InputError
+from rollcli.errors import InputError, cause_of
 from rollcli.files.bounded import as_utf8, read_given, read_stream
 from rollcli.files.codecs.parquet import MAGIC, decode_parquet
 from rollcli.files.storage import exists, list_names, read_bytes
@@ -367,7 +367,7 @@ def _read(path: str | Path) -> bytes:
     try:
         return read_stream(sys.stdin.buffer, STDIN) if str(path) == STDIN else read_given(path)
     except OSError as error:
-        raise InputError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from error
+        raise InputError(f"{path}: cannot be read: {cause_of(error)}") from error
 
 
 # what lies outside is another program's idea of a roll

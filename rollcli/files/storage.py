@@ -14,7 +14,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rollcli.errors import InputError, OutputError
+from rollcli.errors import InputError, OutputError, cause_of
 from rollcli.files import bounded
 from rollcli.files.atomic import NameTakenError, in_threads, write_atomic, writing
 from rollcli.files.bounded import MOST_BYTES, too_large
@@ -287,7 +287,7 @@ def list_names(folder: str) -> list[str]:
     except (FileNotFoundError, NotADirectoryError):
         return []
     except OSError as error:
-        raise InputError(f"{folder}: cannot be read: {(error.strerror or str(error)).lower()}") from error
+        raise InputError(f"{folder}: cannot be read: {cause_of(error)}") from error
 
 
 def exists(location: str) -> bool:

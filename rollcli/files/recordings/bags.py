@@ -19,7 +19,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple, Protocol
 
-from rollcli.errors import InputError
+from rollcli.errors import InputError, cause_of
 from rollcli.files.bounded import MOST_BYTES, most_unpacked
 
 _BEGINNING = 64  # bytes: a header's time and more
@@ -88,7 +88,7 @@ def open_bag(path: str) -> Bag:
         if head == _SQLITE:
             return _Sqlite(path)
     except OSError as error:
-        raise InputError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from None
+        raise InputError(f"{path}: cannot be read: {cause_of(error)}") from None
     what = "is empty" if not head else "is no ROS 1 bag, MCAP file or sqlite3 bag"
     raise InputError(f"{path}: {what}")
 
