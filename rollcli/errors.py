@@ -65,6 +65,11 @@ class OutputError(RollcliError):
     """A result cannot be written: the program cannot do its job (exit status 1)."""
 
 
+def cause_of(error: OSError) -> str:
+    """Return what the system says of an error, as the end of a sentence."""
+    return (error.strerror or str(error)).lower()
+
+
 def raised_at(error: BaseException) -> TracebackType | None:
     """Return the innermost step of an error's traceback; None where it was never raised."""
     last = error.__traceback__

@@ -104,8 +104,7 @@ result_options = record(
     option(
         "-o, --output",
         OutputFile(
-            (".csv", ".jsonl", ".ndjson", ".parquet"),
-            "CSV (.csv), JSON Lines (.jsonl) or Parquet (.parquet)",
+            (".csv", ".jsonl", ".ndjson", ".parquet"), "CSV (.csv), JSON Lines (.jsonl) or Parquet (.parquet)"
         ),
         "Where the rows go (-: stdout).",
     ),

@@ -90,7 +90,7 @@ def derotate(ctx: click.Context, /, **options: Any) -> None:
             "rollcli disparity --left 'im0*.png' --right 'im1*.png' --downscale 2 --save-as tiff -o maps/",
         ),
         ("A video that holds both views", "rollcli disparity drive.mp4 --side-by-side -o maps/"),
-    ],
+    ]
 )
 @pair_input_options
 @pair_options
@@ -155,10 +155,7 @@ count_options = section(
     examples=[
         ("Pictures to look at", "rollcli vdisparity maps/ -o vdisparity/"),
         ("Counts to compute with", "rollcli vdisparity maps/ --counts --max-disparity 128 -o vdisparity/"),
-        (
-            "A figure for a paper",
-            "rollcli vdisparity maps/7.png --figure pdf --from rolls.csv -o figures/",
-        ),
+        ("A figure for a paper", "rollcli vdisparity maps/7.png --figure pdf --from rolls.csv -o figures/"),
     ]
 )
 @input_options

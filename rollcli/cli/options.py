@@ -75,8 +75,7 @@ _PAIRS = Needs(_has_pairs, "the inputs are maps, which are not matched")
 _MAPS = Needs(lambda ctx: not _has_pairs(ctx), "pairs are matched, and no stored disparities are read")
 _FOLDERS = Needs(_has_more_than_files, "they choose among the files of folders, and none is named")
 _HORIZON = Needs(
-    lambda ctx: not ctx.params.get("figure") or ctx.params["encoding"] == "depth",
-    "a figure shows no horizon",
+    lambda ctx: not ctx.params.get("figure") or ctx.params["encoding"] == "depth", "a figure shows no horizon"
 )
 _BASELINE = Needs(
     lambda ctx: ctx.command.name != "vdisparity" or ctx.params["encoding"] == "depth",
@@ -306,8 +305,7 @@ method_options = record(
         Number("DEG", above=0, at_most=90),
         "Stop when the angle moves by less than this, degrees.",
         Needs(
-            lambda ctx: ctx.params["method"] not in AREAS,
-            "--method {method} does not iterate on the angle",
+            lambda ctx: ctx.params["method"] not in AREAS, "--method {method} does not iterate on the angle"
         ),
     ),
     option(
@@ -353,10 +351,7 @@ save_as_option = option(
     "Format of maps computed from pairs: 16-bit KITTI PNG (TIFF for a map beyond its 256 px), float32 "
     "TIFF or float32 NPY; of heights: TIFF, or NPY. Maps as PNG and TIFF carry what levelling left "
     "uncertain, for `estimate`; NPY cannot.",
-    Needs(
-        lambda ctx: _has_pairs(ctx) or ctx.params["heights"],
-        "a map keeps the format of its input",
-    ),
+    Needs(lambda ctx: _has_pairs(ctx) or ctx.params["heights"], "a map keeps the format of its input"),
     Needs(
         lambda ctx: (
             ctx.command.name == "disparity"

@@ -94,11 +94,7 @@ simulate_options = record(
         "sunken tracks; A: new asphalt, C: an old road, E: gravel. Roll, pitch and height are against the "
         "plane that fits the lane ahead.  [default: a smooth road]",
     ),
-    option(
-        "--size",
-        IMAGE_SIZE,
-        "Size of the images, pixels.",
-    ),
+    option("--size", IMAGE_SIZE, "Size of the images, pixels."),
     option(
         "--focal",
         Number("PX", above=0),
@@ -116,11 +112,7 @@ simulate_options = record(
         "Offset of the principal point in each direction, pixels, drawn evenly from A to B.",
     ),
     option("--baseline", Number("M", above=0), "Distance of the cameras, metres."),
-    option(
-        "--height",
-        SPAN,
-        "Height of the left camera above the road, metres, drawn evenly from A to B.",
-    ),
+    option("--height", SPAN, "Height of the left camera above the road, metres, drawn evenly from A to B."),
     option(
         "--noise",
         Number("SIGMA", at_least=0),
@@ -145,7 +137,7 @@ simulate_options = record(
             "rollcli simulate rig/ --frames 200 --size 1280x720 --focal 700 --baseline 0.3 --height 1.4\n"
             "rollcli estimate --left rig/left --right rig/right -o rig/rolls.csv\n"
             "rollcli evaluate accuracy rig/rolls.csv --truth rig/truth.csv",
-        ),
+        )
     ]
 )
 @click.argument("folder", type=DIR)

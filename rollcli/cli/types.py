@@ -37,29 +37,28 @@ class Choice(_Choice):
 FLAG = click.BOOL  # of options that are given alone
 
 
-class Text(click.types.StringParamType):
-    """Any text; `metavar` is its placeholder in the help."""
+class _Named:
+    """A type with a placeholder of its own in the help, which click would turn into capitals."""
 
-    def __init__(self, metavar: str) -> None:
-        super().__init__()
-        self.metavar = metavar
+    metavar: str | None = None
 
-    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
+    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str | None:
         return self.metavar
 
 
-class FilePath(click.Path):
-    """The name of a file or folder; an empty one, which would mean the current folder, is refused.
+class Text(_Named, click.types.StringParamType):
+    """Any text."""
 
-    `metavar` is its placeholder in the help.
-    """
+    def __init__(self, metavar: str) -> None:
+        self.metavar = metavar
+
+
+class FilePath(_Named, click.Path):
+    """The name of a file or folder; an empty one, which would mean the current folder, is refused."""
 
     def __init__(self, metavar: str | None = None) -> None:
         super().__init__()
         self.metavar = metavar
-
-    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str | None:
-        return self.metavar
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         if value == "":
@@ -103,7 +102,7 @@ def table_format(given: str | None, output: str) -> str:
     return given or (ending if ending in TABLE_FORMATS[1:] else TABLE_FORMATS[0])
 
 
-class Number(ParamType):
+class Number(_Named, ParamType):
     """A finite number within bounds, with its unit as the placeholder; "auto" where that is allowed."""
 
     def __init__(
@@ -117,12 +116,9 @@ class Number(ParamType):
         whole: bool = False,
         but: float | None = None,
     ) -> None:
-        self.name, self.but = unit, but
+        self.name, self.metavar, self.but = unit, f"{unit}|auto" if auto else unit, but
         self.above, self.at_least, self.at_most = above, at_least, at_most
         self.auto, self.whole = auto, whole
-
-    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
-        return f"{self.name}|auto" if self.auto else self.name
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float | str:
         if self.auto and value == "auto":
@@ -155,7 +151,7 @@ class Number(ParamType):
         )
 
 
-class Parsed(ParamType):
+class Parsed(_Named, ParamType):
     """What a function makes of a text, or of a value of TOML; its ValueError or TypeError refuses the value.
 
     Parameters
@@ -170,15 +166,13 @@ class Parsed(ParamType):
     """
 
     def __init__(self, metavar: str, parse: Callable[[Any], Any], what: str, between: str = "") -> None:
-        self.name, self.parse, self.what, self.between = metavar, parse, what, between
+        self.name = self.metavar = metavar
+        self.parse, self.what, self.between = parse, what, between
 
     def shown(self, value: Any) -> str:
         """Return a default as it would be given; of a range of one number that number."""
         one = self.between == ":" and len(set(value)) == 1
         return self.between.join(f"{each:g}" for each in (value[:1] if one else value))
-
-    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
-        return self.name  # click would turn it into capitals
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         try:

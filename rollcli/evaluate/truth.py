@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from rollcli.errors import InputError, UsageError
+from rollcli.errors import InputError, UsageError, cause_of
 from rollcli.files.bounded import as_utf8, read_given
 from rollcli.files.matching import stem_of
 from rollcli.files.results import TEXT
@@ -78,7 +78,7 @@ def read_truth(path: str | Path) -> dict[str, KnownPose]:
     try:
         data = read_bytes(path) if is_url(str(path)) else read_given(path)
     except OSError as error:
-        raise InputError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from error
+        raise InputError(f"{path}: cannot be read: {cause_of(error)}") from error
     rows = list(_rows(as_utf8(data, str(path)).decode(**TEXT), path))
     if not rows:
         raise InputError(f"{path}: holds no angle")

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import BinaryIO, TypeVar
 
-from rollcli.errors import OutputError
+from rollcli.errors import OutputError, cause_of
 from rollcli.files.locking import being_written, nobody_writes
 from rollcli.files.stores.locations import is_url
 
@@ -143,8 +143,7 @@ def _forced(path: Path, harmless: Sequence[int] = ()) -> Iterator[None]:
         yield
     except OSError as error:
         if error.errno not in harmless:
-            reason = (error.strerror or str(error)).lower()
-            raise OutputError(f"{path}: cannot be forced to the disk: {reason}") from error
+            raise OutputError(f"{path}: cannot be forced to the disk: {cause_of(error)}") from error
 
 
 def sync_file(file: BinaryIO) -> None:
@@ -166,7 +165,7 @@ class NameTakenError(OutputError):
 
 def output_error(path: str | Path, error: OSError) -> OutputError:
     """Make the error of a failed write: one line that names the target, not the temporary file."""
-    reason = (error.strerror or str(error)).lower()
+    reason = cause_of(error)
     if _ON_WINDOWS and len(str(Path(path).absolute())) > _WINDOWS_PATH:
         reason += f" (Windows takes {_WINDOWS_PATH} characters unless its long paths are switched on)"
     return OutputError(f"{path}: cannot be written: {reason}")

@@ -6,7 +6,7 @@ import stat
 from pathlib import Path
 from typing import BinaryIO
 
-from rollcli.errors import InputError
+from rollcli.errors import InputError, cause_of
 from rollcli.files.atomic import look_at
 
 # The largest map or picture that is decoded takes 512 MB (codecs/raw_map); a result of a million rows 200 MB
@@ -43,7 +43,7 @@ def state_of(path: str) -> tuple[str, int, int, int]:
     try:
         found = look_at(path)
     except OSError as error:
-        raise InputError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from None
+        raise InputError(f"{path}: cannot be read: {cause_of(error)}") from None
     return path, found.st_size, found.st_mtime_ns, os.getpid()
 
 

@@ -16,7 +16,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rollcli.errors import InputError, UsageError, as_usage
+from rollcli.errors import InputError, UsageError, as_usage, cause_of
 from rollcli.files.atomic import is_file, is_folder
 from rollcli.files.bounded import most_unpacked, state_of, too_large
 from rollcli.files.naming import natural_key
@@ -138,7 +138,7 @@ def _tar_members(path: str) -> Iterator[tuple[str, str]]:
     except (tarfile.TarError, ValueError, EOFError) as error:
         raise UsageError(f"{path}: is a damaged archive: {str(error) or 'it ends too early'}") from None
     except OSError as error:
-        raise UsageError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from None
+        raise UsageError(f"{path}: cannot be read: {cause_of(error)}") from None
 
 
 def read_member(location: str, name: str, most: int) -> "bytes | NDArray[Any] | None":
@@ -166,7 +166,7 @@ def read_member(location: str, name: str, most: int) -> "bytes | NDArray[Any] | 
             return read_video_frame(path, member, name)
         return _read_zip(path, member, name, most)
     except OSError as error:
-        raise InputError(f"{name}: cannot be read: {(error.strerror or str(error)).lower()}") from None
+        raise InputError(f"{name}: cannot be read: {cause_of(error)}") from None
 
 
 def _read_bag(path: str, member: str, name: str) -> "bytes | NDArray[Any]":
@@ -227,7 +227,7 @@ def _zip(path: str) -> zipfile.ZipFile:
     except (zipfile.BadZipFile, ValueError, NotImplementedError):
         raise InputError(f"{path}: is no ZIP archive, or a damaged one") from None
     except OSError as error:
-        raise InputError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from None
+        raise InputError(f"{path}: cannot be read: {cause_of(error)}") from None
 
 
 @lru_cache(maxsize=4)  # its directory is read once by each worker

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from rollcli.errors import InputError, UsageError
+from rollcli.errors import InputError, UsageError, cause_of
 from rollcli.files.bounded import MOST_LISTED, as_utf8, read_given, read_stream
 from rollcli.files.containers import file_of, shown
 from rollcli.files.naming import listed, match_names, natural_key
@@ -262,8 +262,7 @@ def _arguments(
         except InputError as error:
             raise UsageError(str(error)) from None
         except OSError as error:
-            reason = (error.strerror or str(error)).lower()
-            raise UsageError(f"{files_from}: the list of files cannot be read: {reason}") from None
+            raise UsageError(f"{files_from}: the list of files cannot be read: {cause_of(error)}") from None
         yield from ((line, True) for line in _lines(data))
 
 
@@ -352,5 +351,4 @@ class Manifest:
                         yield number, os.fsdecode(name)
                     offset += len(line)
         except OSError as error:
-            reason = (error.strerror or str(error)).lower()
-            raise UsageError(f"{self._path}: the list of files cannot be read: {reason}") from error
+            raise UsageError(f"{self._path}: the list of files cannot be read: {cause_of(error)}") from error

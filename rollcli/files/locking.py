@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from rollcli.errors import OutputError, UsageError
+from rollcli.errors import OutputError, UsageError, cause_of
 from rollcli.messages import say
 
 # a killed run's workers end a moment after it; a lock held longer than this belongs to a run that lives
@@ -133,7 +133,7 @@ def locked_folder(name: str) -> Iterator[int | None]:
         Path(name).mkdir(parents=True, exist_ok=True)
         descriptor = None if sys.platform == "win32" else os.open(name, os.O_RDONLY | os.O_CLOEXEC)
     except OSError as error:
-        raise OutputError(f"{name}: cannot be written: {(error.strerror or str(error)).lower()}") from error
+        raise OutputError(f"{name}: cannot be written: {cause_of(error)}") from error
     if descriptor is None:
         yield None
         return
@@ -161,8 +161,7 @@ def _lock_file(name: str) -> Iterator[None]:
                 f"{name}: another run is writing this result; if none is, one was killed: remove {path}*"
             )
     except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise OutputError(f"{path}: cannot be written: {reason}") from error
+        raise OutputError(f"{path}: cannot be written: {cause_of(error)}") from error
     try:
         yield
     finally:

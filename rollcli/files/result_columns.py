@@ -1,20 +1,17 @@
 """Some columns of a result as arrays: a million rows without an object for each."""
 
-import contextlib
-from collections.abc import Callable, Mapping, Sequence
+import math
+from array import array
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.errors import InputError
-from rollcli.files.results import BOUNDS, STATUSES, STDIN, cells_of, is_text, pieces_of, read_run, value_of
+from rollcli.files.results import READERS, STATUSES, STDIN, cells_of, pieces_of, read_run, value_of
 
-Made = TypeVar("Made")
-
-_PLACES = {status: place for place, status in enumerate(STATUSES)}
 _CHUNK = 300  # rows that are held as text: twenty thousand do not fit into a cache, and take a third longer
 
 
@@ -64,65 +61,34 @@ def read_columns(path: str, wanted: Sequence[str]) -> ResultColumns:
     InputError
         The file cannot be read, or is not a result of `rollcli estimate`; the line is named.
     """
-    files: list[str] = []
-    statuses: list[NDArray[np.uint8]] = []
-    parts: dict[str, list[NDArray[np.float64]]] = {}
-    methods: set[str] = set()
-    for name_of_part, data in pieces_of(path):
-        names, rows = cells_of(data, name_of_part, ["file", "status", "method", *wanted])
+    files, status, methods = list[str](), array("B"), set[str]()
+    numbers: dict[str, array[float]] = {}
+    for part, data in pieces_of(path):
+        names, rows = cells_of(data, part, ["file", "status", "method", *wanted])
         while chunk := list(islice(rows, _CHUNK)):
             lines, *columns = zip(*chunk, strict=True)
-            found = dict(zip(names, columns, strict=True))
-            files += _checked(_files, "file", found["file"], lines, name_of_part)
-            statuses.append(_checked(_statuses, "status", found["status"], lines, name_of_part))
-            methods.update(map(str, filter(None, found.get("method", ()))))
-            for name in wanted:
-                if name in found:
-                    numbers = _checked(_numbers, name, found[name], lines, name_of_part)
-                    parts.setdefault(name, []).append(numbers)
+            found = {
+                name: _values(name, cells, lines, part) for name, cells in zip(names, columns, strict=True)
+            }
+            files += found["file"]
+            status.extend(map(STATUSES.index, found["status"]))
+            methods.update(filter(None, found.get("method", ())))
+            for name in found.keys() & set(wanted):
+                known = (math.nan if value is None else value for value in found[name])
+                numbers.setdefault(name, array("d")).extend(known)
     return ResultColumns(
         path,
         files,
-        np.concatenate(statuses) if statuses else np.empty(0, np.uint8),
-        {name: np.concatenate(part) for name, part in parts.items()},
+        np.array(status),
+        {name: np.array(column) for name, column in numbers.items()},
         frozenset(methods),
         None if path == STDIN else read_run(path),
     )
 
 
-def _checked(
-    make: Callable[[str, Sequence[Any]], Made | None],
-    name: str,
-    cells: Sequence[Any],
-    lines: Sequence[str],
-    path: str,
-) -> Made:
-    """Return what is made of a column's cells; where that fails, raise the error of the first bad cell."""
-    with contextlib.suppress(KeyError, ValueError, TypeError, OverflowError):
-        if (made := make(name, cells)) is not None:
-            return made
-    for cell, line in zip(cells, lines, strict=True):
-        value_of(name, cell, f"{path}: {line}")
-    raise InputError(f"{path}: its column {name} cannot be read")
-
-
-def _files(_: str, cells: Sequence[Any]) -> list[str] | None:
-    names = list(map(str, cells))
-    return names if all(cells) and is_text("".join(names)) else None  # a name that a file can have
-
-
-def _statuses(_: str, cells: Sequence[Any]) -> NDArray[np.uint8]:
-    return np.fromiter(map(_PLACES.__getitem__, cells), np.uint8, len(cells))
-
-
-def _numbers(name: str, cells: Sequence[Any]) -> NDArray[np.float64] | None:
-    if "_" in "".join(map(str, cells)) or bool in set(map(type, cells)):  # no notation of numbers
-        return None
-    low, high = BOUNDS.get(name, (-np.inf, np.inf))
-    if not any(cells) and 0 not in cells:  # a million empty cells are told at once
-        return np.full(len(cells), np.nan)
-    empty = np.array([cell is None or cell == "" for cell in cells])
-    pairs = zip(empty.tolist(), cells, strict=True)
-    numbers = np.array([np.nan if none else float(cell) for none, cell in pairs])
-    fits = np.isfinite(numbers) & (numbers >= low) & (numbers <= high)
-    return numbers if (fits | empty).all() else None
+def _values(name: str, cells: Sequence[Any], lines: Sequence[str], path: str) -> list[Any]:
+    """Return the values of a column's cells; where one has none, raise the error of the first."""
+    try:
+        return list(map(READERS[name], cells))
+    except (KeyError, ValueError, TypeError, OverflowError):
+        return [value_of(name, cell, f"{path}: {line}") for cell, line in zip(cells, lines, strict=True)]

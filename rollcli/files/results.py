@@ -6,13 +6,14 @@ import json
 import math
 import re
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
+from functools import partial
 from operator import itemgetter
 from pathlib import Path
 from typing import Any, Literal, get_args, get_type_hints
 
-from rollcli.errors import InputError
+from rollcli.errors import InputError, cause_of
 from rollcli.files.bounded import as_utf8, read_given, read_stream
 from rollcli.files.codecs.parquet import MAGIC, decode_parquet
 from rollcli.files.storage import exists, list_names, read_bytes
@@ -366,14 +367,11 @@ def _read(path: str | Path) -> bytes:
     try:
         return read_stream(sys.stdin.buffer, STDIN) if str(path) == STDIN else read_given(path)
     except OSError as error:
-        raise InputError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from error
+        raise InputError(f"{path}: cannot be read: {cause_of(error)}") from error
 
 
-_FLAGS = {"converged", "global_minimum"}
-_COUNTS = {"iterations", "width", "height"}
 # what lies outside is another program's idea of a roll
-_ANY = (-math.inf, math.inf)
-BOUNDS = {
+_BOUNDS = {
     "roll_deg": (-90.0, 90.0),
     "image_roll_deg": (-90.0, 90.0),
     "roll_ci95_deg": (0.0, math.inf),
@@ -382,41 +380,63 @@ BOUNDS = {
 }
 
 
-def is_text(text: str) -> bool:
-    """Tell whether a file can have this name and hold this text: no NUL, and no half of a character.
-
-    JSON may hold such halves. Those that stand for bytes of names which are no UTF-8 are none.
-    """
-    try:
-        return b"\0" not in text.encode(**TEXT)
-    except UnicodeEncodeError:
-        return False
-
-
 def value_of(name: str, value: Any, where: str) -> Any:
     """Convert the text (CSV) or JSON value of a column."""
-    if name == "status" and value not in STATUSES:
-        raise InputError(f"{where}: {value!r:.80} is no status: {', '.join(STATUSES)}")
-    if name not in _DIGITS and name not in _FLAGS and name not in _COUNTS:
-        text = "" if value is None else str(value)
-        if not is_text(text) or (name == "file" and not text):  # names no file anywhere
-            raise InputError(f"{where}: {text!r:.80} is no value for {name}")
-        return text
+    try:
+        return READERS[name](value)
+    except (KeyError, ValueError, TypeError, OverflowError) as error:
+        what = f"status: {', '.join(STATUSES)}" if name == "status" else f"value for {name}"
+        shown = "" if value is None else value
+        raise InputError(f"{where}: {shown!r:.80} is no {what}") from error
+
+
+def _status(value: Any) -> str:
+    if value not in STATUSES:
+        raise ValueError(value)
+    return str(value)
+
+
+def _words(value: Any) -> str:
+    """Take a text that a file can hold: no NUL, and no half of a character, as JSON may have it.
+
+    Halves that stand for bytes of names which are no UTF-8 are none.
+    """
+    text = "" if value is None else str(value)
+    if b"\0" in text.encode(**TEXT):
+        raise ValueError(value)
+    return text
+
+
+def _file(value: Any) -> str:
+    if not (name := _words(value)):  # it names no file anywhere
+        raise ValueError(value)
+    return name
+
+
+def _flag(value: Any) -> bool | None:
     if value is None or value == "":
         return None
-    try:
-        if isinstance(value, bool) is not (name in _FLAGS) and not isinstance(value, str):
-            raise ValueError(value)  # a flag is no number
-        if name in _FLAGS:
-            return {"true": True, "false": False}[str(value).lower()]
-        if "_" in str(value):
-            raise ValueError(value)  # Python's notation
-        return int(value) if name in _COUNTS else _within(float(value), *BOUNDS.get(name, _ANY))
-    except (KeyError, ValueError, TypeError, OverflowError) as error:
-        raise InputError(f"{where}: {value!r:.80} is no value for {name}") from error
+    if not isinstance(value, bool | str):
+        raise ValueError(value)
+    return {"true": True, "false": False}[str(value).lower()]
 
 
-def _within(number: float, low: float, high: float) -> float:
-    if not (math.isfinite(number) and low <= number <= high):
-        raise ValueError(number)
+def _number(kind: type, low: float, high: float, value: Any) -> Any:
+    if value is None or value == "":
+        return None
+    number = kind(value)
+    # `1_0` is Python's notation, and a flag is no number
+    is_one = "_" not in value if isinstance(value, str) else not isinstance(value, bool)
+    if not (is_one and low <= number <= high and abs(number) < math.inf):
+        raise ValueError(value)
     return number
+
+
+def _reader(name: str, kind: type) -> Callable[[Any], Any]:
+    if kind in (int, float):
+        return partial(_number, kind, *_BOUNDS.get(name, (-math.inf, math.inf)))
+    return {"file": _file, "status": _status}.get(name, _flag if kind is bool else _words)
+
+
+# what makes values of cells, by column
+READERS = {name: _reader(name, kind) for name, kind in column_types(FURTHER).items()}

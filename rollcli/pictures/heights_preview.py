@@ -28,10 +28,7 @@ _LABELS = 8  # at most, but for the ends
 
 
 def draw_heights(
-    heights: NDArray[np.float32],
-    span: tuple[float, float],
-    unit: str,
-    photo: NDArray[Any] | None = None,
+    heights: NDArray[np.float32], span: tuple[float, float], unit: str, photo: NDArray[Any] | None = None
 ) -> NDArray[np.uint8]:
     """Draw heights over the road: blue below it, white on it, red above it, with a colour bar.
 

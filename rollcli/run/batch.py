@@ -215,11 +215,7 @@ def join_results(frames: Span[Frame], results: Sequence[FrameResult], options: B
 
 
 def _write_parts(
-    frames: Span[Frame],
-    status: bytes,
-    lines: Sequence[bytes],
-    notes: Sequence[bytes],
-    options: BatchOptions,
+    frames: Span[Frame], status: bytes, lines: Sequence[bytes], notes: Sequence[bytes], options: BatchOptions
 ) -> int:
     """Write the parts that the lines fill, if they begin with one; return how many lines that were."""
     parts, written, images, root = options.parts, 0, options.frame.images, options.frame.root

@@ -14,15 +14,7 @@ from rollcli.errors import InputError, UsageError
 from rollcli.files.atomic import is_folder, is_there, remove_leftovers, sync_files
 from rollcli.files.codecs.parquet import require_parquet
 from rollcli.files.locking import locked_folder, not_resumable
-from rollcli.files.results import (
-    Row,
-    format_header,
-    format_row,
-    parse_rows,
-    part_names,
-    read_parts,
-    run_path,
-)
+from rollcli.files.results import Row, format_header, format_row, parse_rows, part_names, read_parts, run_path
 from rollcli.files.storage import list_names, read_bytes, remove, write_bytes
 from rollcli.files.stores.locations import base_name, is_url, located, public_name
 from rollcli.run.batch import Batch, Parts, Step, line_form, part_location

@@ -338,15 +338,7 @@ def _doubt_of_range(match: "StereoMatch") -> str:
 
 
 _NUMERIC_ERRORS = (ArithmeticError, ValueError)  # from numbers that some step cannot deal with
-FRAME_ERRORS = (
-    InputError,
-    EstimationError,
-    UsageError,
-    OSError,
-    MemoryError,
-    cv2.error,
-    *_NUMERIC_ERRORS,
-)
+FRAME_ERRORS = (InputError, EstimationError, UsageError, OSError, MemoryError, cv2.error, *_NUMERIC_ERRORS)
 
 
 def guarded(frame: Frame, work: Callable[[], FrameResult]) -> FrameResult:

@@ -56,11 +56,7 @@ class KeptRows:
     """
 
     def __init__(
-        self,
-        plan: Plan,
-        options: EstimateOptions,
-        rows: Iterable[Row] = (),
-        inputs: Inputs | None = None,
+        self, plan: Plan, options: EstimateOptions, rows: Iterable[Row] = (), inputs: Inputs | None = None
     ) -> None:
         self.count, self.changed, self.first_changed, self.gone = 0, 0, "", 0
         self.holes: list[range] = []

@@ -22,10 +22,7 @@ _DIGITS = 6
 
 def named(prefix: str, estimate: Estimate, suffix: str = "deg") -> dict[str, float | None]:
     """Return a value and its interval under the names of the interface."""
-    return {
-        f"{prefix}_{suffix}": rounded(estimate.value),
-        f"{prefix}_ci95_{suffix}": rounded(estimate.ci95),
-    }
+    return {f"{prefix}_{suffix}": rounded(estimate.value), f"{prefix}_ci95_{suffix}": rounded(estimate.ci95)}
 
 
 def rounded(value: float | None) -> float | None:

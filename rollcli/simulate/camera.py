@@ -83,11 +83,7 @@ def rig_axes(roll: float, pitch: float, normal: Array) -> Array:
     cos_r, sin_r = np.cos(roll), np.sin(roll)
     cos_p, sin_p = np.cos(pitch), np.sin(pitch)
     on_plane = np.array(
-        [
-            [cos_r, sin_r * cos_p, sin_r * sin_p],
-            [sin_r, -cos_r * cos_p, -cos_r * sin_p],
-            [0.0, -sin_p, cos_p],
-        ]
+        [[cos_r, sin_r * cos_p, sin_r * sin_p], [sin_r, -cos_r * cos_p, -cos_r * sin_p], [0.0, -sin_p, cos_p]]
     )
     ahead = np.array([0.0, 0.0, 1.0]) - normal[2] * normal
     ahead /= np.linalg.norm(ahead)

@@ -3,18 +3,14 @@
 E_min = d'd - N/D, where N and D = det(Y'Y) are homogeneous of degree 6 in cos(theta) and sin(theta). Its
 derivative is (N D' - N' D) / D^2, and this numerator is a trigonometric polynomial of degree 5 in 2 theta:
 a polynomial of degree 10 in tan(theta), but well conditioned at every angle, 90 degrees included. Samples of
-N and D give it without error, and its zeros are all the angles at which E_min can have a minimum. Most have
-few zeros, far apart: values on a fine grid bracket them, and a bound on the derivatives proves that none
-hides between. Else they are the roots of an ordinary polynomial, which takes several times as long.
+N and D give it without error, and its zeros, the roots of an ordinary polynomial, are all the angles at which
+E_min can have a minimum.
 
 [TITS]: Fan, Liu, "Road Damage Detection Based on Unsupervised Disparity Map Segmentation", IEEE T-ITS (2019).
 """
 
-import cmath
 import math
 from dataclasses import dataclass, replace
-from functools import cache
-from typing import NamedTuple
 
 import numpy as np
 
@@ -25,42 +21,13 @@ from rollcli.estimator.solvers.solution import Solution, angle_between, principa
 
 DEGREE = 5
 SAMPLES = 16  # more than 2 DEGREE + 1
-_FINE = 256  # places of the grid; with 128 the bound proves it for 95 % of the roads instead of 99
-_STEPS = 3  # of Newton's method
 _SAME_BASIN = math.radians(0.01)  # a solver that converged ends far nearer to its minimum
-_FOLLOWING = (np.arange(_FINE) + 1) % _FINE
-
-
-def rising_zeros(samples: Floats) -> list[float] | None:
-    """Return where the polynomial rises through 0, radians; None where the bound does not prove that.
-
-    Parameters
-    ----------
-    samples : ndarray, shape (SAMPLES,)
-        Values of a polynomial of degree `DEGREE` at angles that divide the circle evenly, from 0 on.
-
-    Returns
-    -------
-    list of float, or None
-
-    Notes
-    -----
-    Between neighbours of the grid, h apart, a function is within h^2/8 times the largest second derivative of
-    the straight line through its values. Where both values are farther from 0 than that, on the same side, it
-    has no zero. Where that holds for its derivative, it has one if its sign changes, else none.
-    """
-    matrices = _matrices()
-    waves = matrices.to_waves.dot(samples)
-    curves = matrices.to_curves.dot(samples).reshape(2, _FINE)
-    following = curves.take(_FOLLOWING, 1)
-    most = matrices.bends.dot(np.abs(waves))[:, None]
-    sure = (np.minimum(curves, following) > most) | (np.maximum(curves, following) < -most)
-    if not (sure[0] | sure[1]).all():
-        return None
-    before = ((curves[0] < 0) & (following[0] >= 0)).nonzero()[0]
-    mean, *parts = waves.tolist()
-    series = [mean, *(complex(a, -b) for a, b in zip(parts[:DEGREE], parts[DEGREE:], strict=True))]
-    return [_newton(series, (place + 0.5) * (2 * math.pi / _FINE)) for place in before.tolist()]
+# of the polynomial: twice those of a frame
+_ANGLES: Floats = np.linspace(0, 2 * np.pi, SAMPLES, endpoint=False, dtype=np.float64)
+_CIRCLE = np.stack([np.cos(_ANGLES / 2), np.sin(_ANGLES / 2)])
+_ORDERS = np.fft.fftfreq(SAMPLES, 1 / SAMPLES) * (np.abs(np.fft.fftfreq(SAMPLES, 1 / SAMPLES)) <= DEGREE)
+_TO_DERIVATIVE = np.fft.ifft(1j * _ORDERS[:, None] * np.fft.fft(np.eye(SAMPLES), axis=0), axis=0).real.copy()
+_POLISH = 8
 
 
 def zeros(samples: Floats) -> list[float]:
@@ -69,7 +36,7 @@ def zeros(samples: Floats) -> list[float]:
     Parameters
     ----------
     samples : ndarray, shape (SAMPLES,)
-        As in `rising_zeros`.
+        Values of a polynomial of degree `DEGREE` at angles that divide the circle evenly, from 0 on.
     """
     spectrum = np.fft.fft(samples)
     # z^5 times the series is a polynomial in z; numpy wants the highest power first
@@ -84,62 +51,8 @@ def zeros(samples: Floats) -> list[float]:
 
 def derivative(samples: Floats) -> Floats:
     """Return samples of the derivative of a polynomial of degree `DEGREE` at most."""
-    slopes: Floats = _matrices().to_derivative.dot(samples)
+    slopes: Floats = _TO_DERIVATIVE.dot(samples)
     return slopes
-
-
-def _newton(series: list[complex], angle: float) -> float:
-    """Take Newton steps on the real part of a power series in exp(i angle)."""
-    for _ in range(_STEPS):
-        z = cmath.rect(1, angle)
-        value = slope = 0j
-        for coefficient in reversed(series):
-            slope = slope * z + value
-            value = value * z + coefficient
-        angle += value.real / (z * slope).imag
-    return angle
-
-
-class _Matrices(NamedTuple):
-    """What takes samples to their waves, to derivatives, and to values and slopes on the fine grid.
-
-    `bends` takes sizes of waves to bounds on how far values and slopes are
-    off a straight line between two of its places.
-    """
-
-    to_waves: Floats
-    to_derivative: Floats
-    to_curves: Floats
-    bends: Floats
-
-
-@cache
-def _matrices() -> _Matrices:
-    orders = np.arange(1, DEGREE + 1)
-
-    def waves(count: int) -> tuple[Floats, Floats]:
-        angles = (np.arange(count) * (2 * np.pi / count))[:, None] * orders
-        return np.cos(angles), np.sin(angles)
-
-    def values(count: int) -> Floats:
-        cosines, sines = waves(count)
-        return np.concatenate([np.ones((count, 1)), cosines, sines], 1)
-
-    def slopes(count: int) -> Floats:
-        cosines, sines = waves(count)
-        return np.concatenate([np.zeros((count, 1)), -orders * sines, orders * cosines], 1)
-
-    to_waves = np.asarray(np.linalg.pinv(values(SAMPLES)), np.float64)
-    to_curves = np.concatenate([values(_FINE), slopes(_FINE)]) @ to_waves
-    bends = np.stack([[0, *orders**power, *orders**power] for power in (2, 3)])
-    cell = 2 * np.pi / _FINE
-    return _Matrices(to_waves, slopes(SAMPLES) @ to_waves, to_curves, bends * (cell**2 / 8))
-
-
-# of the polynomial: twice those of a frame
-_ANGLES: Floats = np.linspace(0, 2 * np.pi, SAMPLES, endpoint=False, dtype=np.float64)
-_CIRCLE = np.stack([np.cos(_ANGLES / 2), np.sin(_ANGLES / 2)])
-_POLISH = 8
 
 
 @dataclass(frozen=True)
@@ -173,12 +86,13 @@ def minima(energy: Energy) -> list[Minimum]:
     if not energy.parabolic:
         return [_line_minimum(energy)]
     frame = _even_frame(energy)
-    numerator = _numerator(energy, frame)
-    rising = rising_zeros(numerator)
-    found = _settled(energy, _thetas(frame, rising or []))
-    if not rising or len(found) < len(rising):
-        found = _searched(energy, frame, numerator)
-    same = 1e-12 * (energy.rest + energy.slope_energy)
+    starts = zeros(_numerator(energy, frame))
+    found, same = _settled(energy, _thetas(frame, starts)), 1e-12 * (energy.rest + energy.slope_energy)
+    if 2 * len(found) != len(starts):  # else there is a maximum between two minima
+        coarse = [Minimum(theta, energy.at(theta).value) for theta in _thetas(frame, _ANGLES.tolist())]
+        low = min(coarse, key=lambda m: m.energy)
+        if min((m.energy for m in found), default=math.inf) > low.energy + same:  # no root led to it
+            found += _settled(energy, [low.theta]) or [low]
     lowest = min(found, key=lambda m: m.energy)
     return sorted(found, key=lambda m: (m.energy if m.energy > lowest.energy + same else -1.0, abs(m.theta)))
 
@@ -217,17 +131,6 @@ def _thetas(frame: Floats, doubled: list[float]) -> list[float]:
         math.atan2(b * math.cos(each) + c * math.sin(each), a * math.cos(each) + b * math.sin(each))
         for each in half
     ]
-
-
-def _searched(energy: Energy, frame: Floats, numerator: Floats) -> list[Minimum]:
-    """Return the minima near all zeros of the derivative: a degenerate one may hide some."""
-    found = _settled(energy, _thetas(frame, zeros(numerator)))
-    coarse = [Minimum(theta, energy.at(theta).value) for theta in _thetas(frame, _ANGLES.tolist())]
-    low = min(coarse, key=lambda m: m.energy)
-    same = 1e-12 * (energy.rest + energy.slope_energy)
-    if min((minimum.energy for minimum in found), default=math.inf) > low.energy + same:  # no root led to it
-        found += _settled(energy, [low.theta]) or [low]
-    return found
 
 
 def _settled(energy: Energy, starts: list[float]) -> list[Minimum]:

@@ -8,6 +8,7 @@ number.
 
 import bz2
 import contextlib
+import io
 import os
 import sqlite3
 import struct
@@ -18,12 +19,12 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple, Protocol
 
-from rollcli.errors import InputError
+from rollcli.errors import InputError, cause_of
 from rollcli.files.bounded import MOST_BYTES, most_unpacked
 
 _BEGINNING = 64  # bytes: a header's time and more
 _PIECE = 2**17  # packed bytes that are read at a time where the next header is looked for
-_AHEAD, _AT_ONCE = 2**14, 2**22  # bytes unpacked: beyond what is passed over, and at most
+_AHEAD = 2**14  # bytes unpacked beyond what is passed over
 _MCAP, _BAG, _SQLITE = b"\x89MCAP0\r\n", b"#ROSBAG V2.0\n", b"SQLite format 3\0"
 
 
@@ -87,7 +88,7 @@ def open_bag(path: str) -> Bag:
         if head == _SQLITE:
             return _Sqlite(path)
     except OSError as error:
-        raise InputError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from None
+        raise InputError(f"{path}: cannot be read: {cause_of(error)}") from None
     what = "is empty" if not head else "is no ROS 1 bag, MCAP file or sqlite3 bag"
     raise InputError(f"{path}: {what}")
 
@@ -110,127 +111,64 @@ class _Source:
     ----------
     size, left : int
         How many bytes there are, and are left.
+    at_once : bool
+        Whether all of it is taken.
     """
 
-    def __init__(self, size: int) -> None:
+    def __init__(self, file: BinaryIO, size: int, *, at_once: bool = False) -> None:
         self.size = self.left = size
+        self.at_once = at_once
+        self._file, self._passed = file, 0
 
     def take(self, count: int) -> memoryview:
         """Return the next bytes."""
-        self._use(count)
-        return self._next(count)
+        passed = self._passed
+        self.skip(count)
+        self._passed = 0
+        try:
+            if passed and self._file.seekable():
+                self._file.seek(passed, os.SEEK_CUR)
+            elif passed:
+                _exactly(self._file, passed)
+            return memoryview(_exactly(self._file, count))
+        except Exception as error:  # each library that unpacks has errors of its own
+            raise _BrokenError from error
 
     def skip(self, count: int) -> None:
-        """Pass over the next bytes."""
-        self._use(count)
-        self._pass(count)
-
-    def _use(self, count: int) -> None:
+        """Pass over the next bytes; what lies behind the last that are taken is not read, nor unpacked."""
         if not 0 <= count <= self.left:
             raise _BrokenError
         self.left -= count
-
-    def _next(self, count: int) -> memoryview:
-        raise NotImplementedError
-
-    def _pass(self, count: int) -> None:
-        raise NotImplementedError
+        self._passed += count
 
 
-class _InFile(_Source):
-    """What lies in the file as it is, from where the file stands; what is passed over is not read."""
+class _Unpacking(io.RawIOBase):
+    """Some bytes of a file from where it stands, unpacked as far as they are read."""
 
-    def __init__(self, file: BinaryIO, size: int) -> None:
-        super().__init__(size)
-        self._file = file
+    def __init__(self, compression: str, file: BinaryIO, size: int, piece: int) -> None:
+        self._file, self._left, self._piece = file, size, piece
+        self._decoder: Any
+        if compression == "bz2":
+            self._decoder = bz2.BZ2Decompressor()
+        elif compression == "lz4":
+            from lz4.frame import LZ4FrameDecompressor
 
-    def _next(self, count: int) -> memoryview:
-        return memoryview(_exactly(self._file, count))
+            self._decoder = LZ4FrameDecompressor()
+        else:
+            raise _BrokenError
 
-    def _pass(self, count: int) -> None:
-        self._file.seek(count, os.SEEK_CUR)
+    def readable(self) -> bool:
+        return True
 
-    def read(self, count: int) -> bytes:
-        """Return the next bytes as a file does: less where less is left."""
-        count = min(count, self.left)
-        self.left -= count
-        return self._file.read(count)
-
-
-def _unpacker(compression: str, packed: Any, piece: int) -> Callable[[int], bytes]:
-    """Return what unpacks the next bytes of a chunk, so many at most, of a file's next pieces."""
-    decoder: Any
-    if compression == "bz2":
-        decoder = bz2.BZ2Decompressor()
-    elif compression == "lz4":
-        from lz4.frame import LZ4FrameDecompressor
-
-        decoder = LZ4FrameDecompressor()
-    elif compression == "zstd":
-        import zstandard
-
-        read: Callable[[int], bytes] = (
-            zstandard.ZstdDecompressor().stream_reader(packed, read_size=piece).read
-        )
-        return read
-    else:
-        raise _BrokenError
-
-    def unpack(most: int) -> bytes:
-        found = b""
-        while not found:
+    def readinto(self, buffer: Any) -> int:
+        data = b""
+        while not data and (self._left or not self._decoder.needs_input):
             # what a decoder is given and does not need yet it would copy each time
-            data = packed.read(piece) if decoder.needs_input else b""
-            if not data and decoder.needs_input:
-                break
-            found = decoder.decompress(data, most)
-        return found
-
-    return unpack
-
-
-class _InMemory(_Source):
-    """What is unpacked as a whole; nothing of it is copied."""
-
-    def __init__(self, data: memoryview) -> None:
-        super().__init__(len(data))
-        self._data = data
-
-    def _next(self, count: int) -> memoryview:
-        end = self.size - self.left
-        return self._data[end - count : end]
-
-    def _pass(self, count: int) -> None:
-        pass
-
-
-class _Unpacked(_Source):
-    """A chunk that is unpacked as far as it is taken: what lies behind its last header is not."""
-
-    def __init__(self, unpack: Callable[[int], bytes], size: int) -> None:
-        super().__init__(size)
-        self._unpack, self._piece, self._ahead = unpack, memoryview(b""), 0
-
-    def _next(self, count: int) -> memoryview:
-        while self._ahead or len(self._piece) < count:
-            passed = min(self._ahead, len(self._piece))
-            self._ahead -= passed
-            kept = self._piece[passed:]
-            if not self._ahead and len(kept) >= count:
-                self._piece = kept
-                break
-            try:
-                more = self._unpack(min(self._ahead + max(_AHEAD, count), _AT_ONCE))
-            except Exception as error:  # each library has errors of its own
-                raise _BrokenError from error
-            if not more:
-                raise _BrokenError
-            self._piece = memoryview(bytes(kept) + more if kept else more)
-        data, self._piece = self._piece[:count], self._piece[count:]
-        return data
-
-    def _pass(self, count: int) -> None:
-        self._ahead += count
+            packed = self._file.read(min(self._piece, self._left)) if self._decoder.needs_input else b""
+            self._left -= len(packed)
+            data = self._decoder.decompress(packed, len(buffer))
+        buffer[: len(data)] = data
+        return len(data)
 
 
 _DAMAGED = (_BrokenError, struct.error, ValueError, KeyError, IndexError)
@@ -325,31 +263,31 @@ class _Chunked:
         """
         there = min(packed, self._size - self._file.tell())
         if compression in ("", "none"):
-            return _InFile(self._file, there)
+            return _Source(self._file, there)
         if there > MOST_BYTES or not 0 <= size <= most_unpacked(there):
             raise _BrokenError
         at_once = at_once or there < packed
-        unpack = _unpacker(compression, _InFile(self._file, there), there if at_once else _PIECE)
-        if not at_once:
-            return _Unpacked(unpack, size)
-        try:
-            return _InMemory(memoryview(unpack(size)))
-        except Exception as error:  # each library has errors of its own
-            raise _BrokenError from error
+        if compression != "zstd":
+            unpacking = _Unpacking(compression, self._file, there, there if at_once else _PIECE)
+            return _Source(io.BufferedReader(unpacking, _AHEAD), size, at_once=at_once)
+        import zstandard
+
+        source = self._file.read(there) if at_once else self._file
+        unpacked = zstandard.ZstdDecompressor().stream_reader(source, read_size=_PIECE)
+        return _Source(unpacked, size, at_once=at_once)
 
     def _walked(self, source: _Source, wanted: _Wanted, size: int, after: int) -> _Records:
         """Return the messages that are whole in a record of a size, each with as many bytes as are wanted."""
         found: list[tuple[int, int, memoryview]] = []
-        unpacked = isinstance(source, _InMemory)
         with contextlib.suppress(*_DAMAGED):
             while source.left:
                 if (head := self._message(source)) is not None:
                     channel, time, length = head
-                    taken = length if unpacked else min(wanted(channel, len(found)), length)
+                    taken = length if source.at_once else min(wanted(channel, len(found)), length)
                     data = source.take(taken)
                     source.skip(length - taken)
                     found.append((channel, time, data))
-        return _Records(found, after, source.left == 0 and source.size == size, unpacked)
+        return _Records(found, after, source.left == 0 and source.size == size, source.at_once)
 
     def _start(self) -> int:
         raise NotImplementedError
@@ -393,7 +331,7 @@ class _Mcap(_Chunked):
         if opcode != 0x06:
             self._file.seek(offset)
             size = after - offset
-            content: _Source = _InFile(self._file, min(size, self._size - offset))
+            content: _Source = _Source(self._file, min(size, self._size - offset))
         else:
             size, name_length = struct.unpack("<16xQ4xI", _exactly(self._file, 32))
             compression = _exactly(self._file, name_length + 8)[:-8].decode()
@@ -451,7 +389,7 @@ class _Ros1(_Chunked):
         if op != 0x05:
             self._file.seek(offset)
             size = after - offset
-            content: _Source = _InFile(self._file, min(size, self._size - offset))
+            content: _Source = _Source(self._file, min(size, self._size - offset))
         else:
             (size,) = struct.unpack("<I", fields[b"size"])
             compression = fields[b"compression"].decode()

@@ -24,46 +24,6 @@ DISPARITY, IMAGE, COMPRESSED = (
     "sensor_msgs/CompressedImage",
 )
 CAMERA_INFO = "sensor_msgs/CameraInfo"
-# ROS's definitions of what is decoded: the library's stores of all types take a tenth of a second to load.
-# ROS 1 differs in the header, and in names that are capitals there.
-_HEADERS = {
-    "cdr": "builtin_interfaces/Time stamp\nstring frame_id",
-    "ros1": "uint32 seq\nbuiltin_interfaces/Time stamp\nstring frame_id",
-}
-_DEFINITIONS = {
-    IMAGE: """std_msgs/Header header
-uint32 height
-uint32 width
-string encoding
-uint8 is_bigendian
-uint32 step
-uint8[] data""",
-    COMPRESSED: "std_msgs/Header header\nstring format\nuint8[] data",
-    "sensor_msgs/RegionOfInterest": """uint32 x_offset
-uint32 y_offset
-uint32 height
-uint32 width
-bool do_rectify""",
-    CAMERA_INFO: """std_msgs/Header header
-uint32 height
-uint32 width
-string distortion_model
-float64[] d
-float64[9] k
-float64[9] r
-float64[12] p
-uint32 binning_x
-uint32 binning_y
-sensor_msgs/RegionOfInterest roi""",
-    DISPARITY: """std_msgs/Header header
-sensor_msgs/Image image
-float32 f
-float32 t
-sensor_msgs/RegionOfInterest valid_window
-float32 min_disparity
-float32 max_disparity
-float32 delta_d""",
-}
 MAP_ENCODINGS = ("mono16", "16UC1", "16SC1", "32FC1")  # of images that hold disparities or depths
 _VIDEO = re.compile("h\\.?26[45]|hevc|avc|av1|vp[89]", re.IGNORECASE)
 # numpy's dtype, and the channels
@@ -146,7 +106,8 @@ def check_decoder(topic: Topic, name: str) -> None:
 def camera_info(topic: Topic, data: memoryview, name: str) -> CameraInfo:
     """Decode a CameraInfo."""
     found = _decoded(topic, data, name)
-    fields = {key: tuple(map(float, getattr(found, key))) for key in "dkrp"}
+    keys = "DKRP" if topic.encoding == "ros1" else "dkrp"  # ROS 1 calls them by capitals
+    fields = {key.lower(): tuple(map(float, getattr(found, key))) for key in keys}
     return CameraInfo(int(found.width), int(found.height), str(found.distortion_model), **fields)
 
 
@@ -175,7 +136,8 @@ def image_encoding(topic: Topic, data: memoryview, name: str) -> str:
 
 def baseline_of(topic: Topic, data: memoryview, name: str) -> float:
     """Return |T| of a DisparityImage, m; 0 where it is not stated."""
-    length = abs(float(_decoded(topic, data, name).t))
+    found = _decoded(topic, data, name)
+    length = abs(float(found.T if topic.encoding == "ros1" else found.t))
     return length if math.isfinite(length) else 0.0
 
 
@@ -221,7 +183,7 @@ def content_of(
 
 
 def _decoded(topic: Topic, data: memoryview, name: str) -> Any:
-    decode = _decoder("ros1" if topic.encoding == "ros1" else "cdr")
+    decode = _decoder(topic.encoding == "ros1")
     try:
         return decode(data, topic.type.replace("/", "/msg/"))
     except Exception as error:  # noqa: BLE001 (a damaged message fails anywhere in the decoder)
@@ -229,14 +191,13 @@ def _decoded(topic: Topic, data: memoryview, name: str) -> Any:
 
 
 @lru_cache(maxsize=2)
-def _decoder(encoding: str) -> Any:
+def _decoder(ros1: bool) -> Any:
     require_extra("bags", "reading a bag")
-    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+    from rosbags.typesys import Stores, get_typestore
 
-    store = get_typestore(Stores.EMPTY)
-    for name, text in {"std_msgs/Header": _HEADERS[encoding], **_DEFINITIONS}.items():
-        store.register(get_types_from_msg(text, name.replace("/", "/msg/")))
-    return store.deserialize_ros1 if encoding == "ros1" else store.deserialize_cdr
+    if ros1:
+        return get_typestore(Stores.ROS1_NOETIC).deserialize_ros1
+    return get_typestore(Stores.ROS2_HUMBLE).deserialize_cdr
 
 
 def _pixels(image: Any, name: str) -> NDArray[Any]:

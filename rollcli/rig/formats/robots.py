@@ -11,15 +11,7 @@ alone: rectification chooses focal length and principal point anew, and neither 
 import math
 
 from rollcli.errors import InputError
-from rollcli.rig.formats.fields import (
-    Fields,
-    File,
-    Projection,
-    number,
-    numbers,
-    pair_of,
-    size,
-)
+from rollcli.rig.formats.fields import Fields, File, Projection, number, numbers, pair_of, size
 from rollcli.rig.formats.yaml import parse_yaml
 
 _MM = 1e-3

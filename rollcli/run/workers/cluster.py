@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, Generic
 
 from rollcli import __version__
-from rollcli.errors import ClusterError, OutputError, UsageError, WorkerError
+from rollcli.errors import ClusterError, OutputError, UsageError, WorkerError, cause_of
 from rollcli.extras import require_extra
 from rollcli.files.atomic import is_file, is_there, write_atomic
 from rollcli.files.storage import remove
@@ -309,8 +309,9 @@ def scheduler_address(given: str) -> str:
     try:
         return str(json.loads(Path(given).read_bytes())["address"])
     except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise UsageError(f"--scheduler {given}: the scheduler file cannot be read: {reason}") from error
+        raise UsageError(
+            f"--scheduler {given}: the scheduler file cannot be read: {cause_of(error)}"
+        ) from error
     except (ValueError, RecursionError, KeyError, TypeError) as error:
         raise UsageError(f"--scheduler {given}: is not a file that dask scheduler wrote") from error
 
