@@ -82,7 +82,7 @@ def read_stored(path: str | Path, name: str | None = None, *, rgb: bool = False)
     name = name or str(path)
     if rgb:
         return MAP_FORMATS["rgb"].decode(read_bytes(path, name), name)
-    data = read_frame(path, name)
+    data = read_frame(path, name, begins=_check_beginning)
     if isinstance(data, bytes):
         return decode_stored(data, name)
     require_map_shape(data.shape, name)  # of a recording
@@ -190,6 +190,16 @@ def decode_mask(data: bytes, name: str) -> NDArray[np.bool_]:
         pixels = _decoded(data, name).values
     mask: NDArray[np.bool_] = (pixels if pixels.ndim == 2 else pixels.max(axis=2)) != 0
     return mask
+
+
+def _check_beginning(head: bytes, size: int, name: str) -> None:
+    """Refuse a file that is no map by its first bytes: the rest of it need not be read."""
+    if head.startswith(arrays.MAGIC):
+        arrays.check_npy(head, size, name)
+    elif head.startswith(arrays.MAGICS):
+        arrays.check_pfm(head, size, name)
+    elif not any(head.startswith(each.signatures) for each in MAP_FORMATS.values()):
+        _decoded(head, name)  # which says what it is instead
 
 
 def _decoded(data: bytes, name: str) -> Stored:

@@ -8,7 +8,7 @@ import hashlib
 import os
 import stat
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextvars import ContextVar
 from functools import partial
 from pathlib import Path
@@ -25,6 +25,8 @@ from rollcli.files.stores.locations import WEB_SERVERS, is_url, public_name, sch
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+Beginning = Callable[[bytes, int, str], None] | None
+_HEAD = 2**16  # bytes: the header of an array
 _READ_ONLY = "web servers are read from, not written to"
 _AT_ONCE = 16  # requests, of 50 ms each: 10,000 small objects take half a minute
 
@@ -83,7 +85,7 @@ def read_bytes(location: str | Path, name: str | None = None, *, most: int = MOS
 
 
 def read_frame(
-    location: str | Path, name: str | None = None, *, most: int = MOST_BYTES
+    location: str | Path, name: str | None = None, *, most: int = MOST_BYTES, begins: Beginning = None
 ) -> "bytes | NDArray[Any]":
     """Return the bytes of a file or an object, or the pixels of a recording's frame.
 
@@ -95,6 +97,8 @@ def read_frame(
         What errors call it; by default the location, without secrets.
     most : int
         Bytes that are read; a larger file is refused before it is read.
+    begins : callable, optional
+        Refuses a file on disk by its first bytes, its size and its name, before the rest is read.
 
     Raises
     ------
@@ -111,7 +115,7 @@ def read_frame(
         data, state = _read_url(location, most)
     else:
         inside = read_member(location, name, most) if "#" in location else None
-        data = inside if inside is not None else _read_file(location, name, most)
+        data = inside if inside is not None else _read_file(location, name, most, begins)
     if len(data) == 0:
         raise InputError(f"{name}: is empty")
     if notes is not None:
@@ -320,7 +324,7 @@ def remove_all(locations: Iterable[str]) -> None:
     in_threads(remove, list(locations), _AT_ONCE)
 
 
-def _read_file(path: str, name: str, most: int = MOST_BYTES) -> bytes:
+def _read_file(path: str, name: str, most: int = MOST_BYTES, begins: Beginning = None) -> bytes:
     """Return the bytes of a regular file; pipes and devices could be read for ever."""
     try:
         # not blocking: a named pipe would otherwise wait for its writer for ever
@@ -331,6 +335,9 @@ def _read_file(path: str, name: str, most: int = MOST_BYTES) -> bytes:
                 raise InputError(f"{name}: is not a regular file")
             if status.st_size > most:
                 raise too_large(name, status.st_size, most)
+            if begins is not None and status.st_size > _HEAD:
+                begins(file.read(_HEAD), status.st_size, name)
+                file.seek(0)
             return bounded.read_up_to(file, name, status.st_size, most)
     except IsADirectoryError:
         raise InputError(f"{name}: is a folder, not a file") from None

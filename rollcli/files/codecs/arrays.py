@@ -37,17 +37,29 @@ def decode_npy(data: bytes, name: str) -> NDArray[Any]:
 
     (1, H, W) and (H, W, 1), as networks write them, are (H, W).
     """
-    dtype, fortran, shape, start = _header(data, name)
+    dtype, fortran, shape, start = check_npy(data, len(data), name)
+    values = np.frombuffer(data, dtype, count=math.prod(shape), offset=start)
+    return values.reshape(shape, order="F" if fortran else "C")
+
+
+def check_npy(head: bytes, size: int, name: str) -> tuple[np.dtype[Any], bool, tuple[int, ...], int]:
+    """Refuse an array that is no map by its header, of a file of so many bytes.
+
+    Returns
+    -------
+    tuple
+        dtype, Fortran order, shape (H, W), and where the numbers start.
+    """
+    dtype, fortran, shape, start = _header(head, name)
     shape = _without_single_axis(shape)
     require_map_shape(shape, name)
-    needed, there = math.prod(shape) * dtype.itemsize, len(data) - start
+    needed, there = math.prod(shape) * dtype.itemsize, size - start
     if there < needed:
         raise InputError(
             f"{name}: is truncated: shape {shape} of {dtype} needs {needed} bytes, {there} are there"
         )
-    require_decoded_fits(shape[1], shape[0], dtype.itemsize, len(data), name)
-    values = np.frombuffer(data, dtype, count=math.prod(shape), offset=start)
-    return values.reshape(shape, order="F" if fortran else "C")
+    require_decoded_fits(shape[1], shape[0], dtype.itemsize, size, name)
+    return dtype, fortran, shape, start
 
 
 def encode_npy(values: NDArray[Any]) -> bytes:
@@ -132,17 +144,28 @@ _HEADER = re.compile(rb"P([fF])" + 2 * (_GAP + rb"(\d{1,9})") + _GAP + _FLOAT + 
 
 def decode_pfm(data: bytes, name: str) -> NDArray[Any]:
     """Return the float32 values of a single-channel PFM file, top row first."""
+    order, width, height, start = check_pfm(data, len(data), name)
+    rows = np.frombuffer(data, order, count=width * height, offset=start).reshape(height, width)
+    return rows[::-1]  # PFM stores the bottom row first
+
+
+def check_pfm(data: bytes, size: int, name: str) -> tuple[str, int, int, int]:
+    """Refuse what is no map by its header, of a file of so many bytes.
+
+    Returns
+    -------
+    tuple
+        The dtype of the numbers, width, height, and where the numbers start.
+    """
     header = _HEADER.match(data, 0, min(len(data), 1000))
     if header is None or float(header[4]) == 0:
         raise InputError(f"{name}: its PFM header cannot be read (expected: Pf, width height, scale)")
     if header[1] == b"F":
         raise InputError(f"{name}: is a colour PFM (PF); a disparity map has one channel (Pf)")
     width, height = int(header[2]), int(header[3])
-    require_pixels(width, height, name, 4 * width * height, len(data) - header.end())
-    require_decoded_fits(width, height, 4, len(data), name)
-    order = "<f4" if header[4].startswith(b"-") else ">f4"
-    rows = np.frombuffer(data, order, count=width * height, offset=header.end()).reshape(height, width)
-    return rows[::-1]  # PFM stores the bottom row first
+    require_pixels(width, height, name, 4 * width * height, size - header.end())
+    require_decoded_fits(width, height, 4, size, name)
+    return "<f4" if header[4].startswith(b"-") else ">f4", width, height, header.end()
 
 
 def encode_pfm(values: NDArray[Any]) -> bytes:
