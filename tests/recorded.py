@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-PACKAGES = ("estimator", "evaluate", "rig", "simulate", "stereo")
+PACKAGES = ("estimator", "evaluate", "pictures", "rig", "simulate", "stereo")
 _GRID = 5  # rows and columns of an image whose values are recorded
 _ROUNDING = 1e-5  # what is smaller may be nothing, rounded
 _DIGITS = 8
