@@ -17,7 +17,7 @@ from rollcli.estimator.solvers.golden_section import golden_section
 from rollcli.estimator.solvers.gradient_descent import gradient_descent
 from rollcli.estimator.tuning import TUNING
 from tests.estimator.synthetic_maps import bent_road, energy_of, flat_road
-from tests.recorded import check
+from tests.recorded import check, made
 
 WIDTH, HEIGHT = 240, 160
 _road = partial(flat_road, width=WIDTH, height=HEIGHT)
@@ -184,7 +184,27 @@ def _solved(name):
     }
 
 
+ASKED = (
+    *({"max_roll": math.radians(roll_deg)} for roll_deg in (0, -5, 89.001, math.nan)),
+    *({name: "magic"} for name in ("method", "model", "road")),
+    *({"lambda0": step} for step in (0.0, math.inf)),
+    *({name: angle} for name in ("tolerance", "max_interval") for angle in (0.0, math.inf, math.nan)),
+    {"seed": -1},
+    {"mask": np.ones((4, 5))},
+    {"max_roll": math.radians(89), "max_interval": 1e-9, "lambda0": 1e-9, "tolerance": 1e-300},
+)
+NO_MAPS = (np.ones(50), np.ones((5, 5, 3)), np.full((50, 50), "1"))
+
+
+def _asked():
+    """Which options are taken, and why others and what is no map are not."""
+    found = [made(estimate_roll, _road(5), **options) for options in ASKED]
+    found += [made(estimate_roll, each) for each in NO_MAPS]
+    return [each if isinstance(each, str) else math.degrees(each.theta) for each in found]
+
+
 CASES = {
+    "asked": _asked,
     **{name: partial(_estimate, name) for name in MAPS},
     **{name: partial(_estimate, given, **options) for name, (given, options) in OTHER.items()},
     **{

@@ -1,8 +1,11 @@
 """What the experiments and comparisons with known angles give, to the digit; see `tests.recorded`."""
 
 import dataclasses
+import json
 import math
+import tempfile
 from functools import cache, partial
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,11 +16,12 @@ from rollcli.evaluate.options import ExperimentOptions
 from rollcli.evaluate.paper_page import charts
 from rollcli.evaluate.run_accuracy import as_csv, as_json, as_table
 from rollcli.evaluate.tables import all_tables
-from rollcli.evaluate.truth import KnownPose
+from rollcli.evaluate.truth import KnownPose, read_truth
 from rollcli.files.results import Row
 from tests.estimator.synthetic_maps import bent_road
-from tests.recorded import check
+from tests.recorded import check, made
 
+ANGLES = ((-1.0, 1.0, 0.3), (0.0, 5.0, 2.0), (0.0, 0.3, 0.1), (1.0, 2.95, 1.0), (-8.0, -8.0, 3.0))
 TURNS = [math.radians(turn) for turn in (-20, -3.5, 12)]
 
 
@@ -77,15 +81,52 @@ def _compared(form):
     return found if form is None else form(found)
 
 
+TRUTHS = (
+    "",
+    "file,roll\na,1\n",
+    "file,roll_deg\n",
+    "file,roll_deg\na,\n",
+    "file,roll_deg\na,1\nb,x\n",
+    "file,roll_deg\na,nan\n",
+    "file,roll_deg\na\n",
+    'file,roll_deg\n"a,1\n',
+    "\x89PNG\r\n\x1a\n\x00\xff",
+    "file,roll_deg\na.png,1\nb/a,2\n",
+    *(f"file,roll_deg,{name}\na,1,steep\n" for name in ("pitch_deg", "height_m", "curvature_per_m")),
+    "\ufefffile,roll_deg,pitch_deg,height_m,curvature_per_m\r\na,1,2,1.5,0\r\nc/b.png,-1,3,1.6,0.001\r\n",
+    "file,roll_deg,pitch_deg,height_m,focal_px,baseline_m\na,1,,,\nb,2,3,,300,0.5\nc,3,,2,300,\n",
+)
+
+
+def _known():
+    """What files of known angles hold, and why some are refused."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "truth.csv")
+        found = [made(read_truth, path)]
+        for text in TRUTHS:
+            path.write_bytes(text.encode())
+            found.append(made(read_truth, path))
+    return json.loads(json.dumps(found, default=str).replace(folder, "."))
+
+
+def _unlike(form):
+    """Results without an angle, without intervals, of other frames, or of one frame twice."""
+    known = {"a": KnownPose(0.01)}
+    error, whole = Row("maps/a.png", status="error"), Row("maps/a.png", status="ok", roll_deg=1 / 3)
+    given = [[error], [whole], [whole, error], [Row("maps/b.png", status="ok", roll_deg=1.0)]]
+    found = [made(assess, rows, known, "r.csv") for rows in given]
+    return [each if isinstance(each, str) else form(each) for each in found]
+
+
 CASES = {
     "findings": _found,
     "tables": lambda: {name: table.rows for name, table in _tables().items()},
     "charts": lambda: {name: dataclasses.asdict(chart) for name, chart in charts(_tables()).items()},
     "textbook": _textbook,
     "turned": lambda: [rotate_nearest(np.arange(1.0, 71).reshape(7, 10), turn) for turn in TURNS],
-    "angles": lambda: [
-        ExperimentOptions("out", turns).turns_deg for turns in ((-1.0, 1.0, 0.3), (0.0, 5.0, 2.0))
-    ],
+    "angles": lambda: [ExperimentOptions("out", turns).turns_deg for turns in ANGLES],
+    "known": _known,
+    **{f"unlike {form.__name__}": partial(_unlike, form) for form in (as_table, as_csv, as_json)},
     "compared": partial(_compared, None),
     "as a table": partial(_compared, as_table),
     "as csv": partial(_compared, as_csv),
