@@ -12,8 +12,6 @@ from rollcli.evaluate.options import ExperimentOptions, PaperOptions
 from rollcli.evaluate.tables import all_tables
 from rollcli.run.options import EncodingOptions, InputOptions, RegionOptions, RunningOptions
 
-TOLERANCES = ["0.1°", "0.01°", "0.001°", "0.0001°"]
-
 
 def findings(name="a.png", gd=(3, 4, 5, 6), sweep=7):
     """A map whose numbers are all different."""
@@ -42,11 +40,6 @@ def times(seconds):
         for form in FORMS
     }
     return Times(9, made)
-
-
-@pytest.fixture(scope="module")
-def tables():
-    return all_tables([findings(), findings("b.png", (4, 4, 5, 8), 9)], [], [times(2e-3)])
 
 
 def page_text(found, timed, region=None, **experiments):
