@@ -11,6 +11,7 @@ from rollcli.rig.calibration import Calibration, CalibrationOptions
 from rollcli.rig.drive.assess import assess_rig, split_drives
 from rollcli.rig.drive.posterior import Estimate
 from rollcli.rig.drive.quantity import assess_sequence
+from rollcli.rig.formats.yaml import parse_yaml
 from rollcli.rig.pose import horizon_row, pose_jacobian, taken_as_exact, with_pose
 from rollcli.rig.quantities import ALIGNMENT, HEIGHT, PITCH, ROLL
 from rollcli.rig.read_calibration import parse_calibration
@@ -129,7 +130,9 @@ def _rig(name, **options):
 
 def _read(*texts, **given):
     named = [(f"calib{place}.txt", text.encode()) for place, text in enumerate(texts)]
-    return made(parse_calibration, named, CalibrationOptions(**given))
+    found = made(parse_calibration, named, CalibrationOptions(**given))
+    assert "\n" not in str(found)
+    return found
 
 
 RIG = files.Rig(doffs=3.25)
@@ -155,6 +158,87 @@ FILES = {
     "no file": [],
 }
 
+
+PLAIN = files.Rig()
+DAMAGED = (
+    "",
+    "just text\n",
+    files.KITTI_RAW[:-60],
+    files.KITTI_RAW.replace("-3.875744e+02", "nan"),
+    files.KITTI_RAW.replace("-3.875744e+02", "9" * 5000),
+    files.KITTI_RAW.replace("-3.875744e+02", "3.875744e+02"),
+    files.KITTI_RAW.replace("-3.875744e+02", "0"),
+    files.KITTI_RAW.replace("P_rect_01: 7.215377e+02", "P_rect_01: 8.215377e+02"),
+    files.KITTI_RAW.replace("P_rect_01", "P_rect_00"),
+    files.KITTI_RAW.replace("6.095593e+02", "1.300000e+03"),
+    files.KITTI_RAW.splitlines()[1],
+    files.MIDDLEBURY.replace("baseline=193.001", ""),
+    files.MIDDLEBURY.replace("baseline=193.001", "baseline=-193"),
+    files.MIDDLEBURY.replace("doffs=131.111", "doffs=12"),
+    files.MIDDLEBURY.replace("cam1=[3997.684", "cam1=[3897.684"),
+    files.MIDDLEBURY.replace("1011.728; 0 0 1]\ndoffs", "1021.728; 0 0 1]\ndoffs"),
+    files.MIDDLEBURY[:30],
+    files.MIDDLEBURY.replace("cam0=[3997.684", "cam0=[-3997.684").replace("cam1", "cam2"),
+    files.OPENCV[:-30],
+    files.OPENCV.replace("0.12697712", "0.5"),
+    files.OPENCV.replace("-234.58003", "-243.58003"),
+    files.OPENCV.replace("-314.71402", "-413.71402"),
+    files.OPENCV.replace("P1", "M1").replace("P2", "M2").replace("Q", "D"),
+    files.ROS_RIGHT,
+    files.ROS_LEFT,
+    files.cityscapes(PLAIN)[:-5],
+    files.cityscapes(PLAIN).replace("fx", "gx"),
+    files.cityscapes(PLAIN).replace("0.5372", "NaN"),
+    files.orb_slam(PLAIN).replace("Camera.cx", "Camera.xx"),
+    files.orb_slam(PLAIN).replace("707.0912\nCamera.fy", "-707.0912\nCamera.fy"),
+    files.KALIBR[:-60],
+    files.kalibr(PLAIN).replace("[0.0, 1.0, 0.0, 0.0]", "[0.0, 1.0, 0.0]"),
+    files.kalibr(PLAIN).replace("[0.0, 1.0, 0.0, 0.0]", "[0.0, 1.0, 0.0, 0.9]"),
+    files.zed(PLAIN).partition("Baseline")[0],
+    files.zed(PLAIN).replace("Baseline=", "Baseline=about "),
+    "left:\n" + files.ros(PLAIN, right=False).replace("\n", "\n  ").join(("  ", "")),
+    files.ros(PLAIN, right=False).replace("[707.0912", "[0.0"),
+    files.ros(PLAIN, right=False).replace("width: 1226", "width: 12.5"),
+    files.kitti_raw(PLAIN).replace("S_rect_00: 1226 370", "S_rect_00: 1226"),
+    files.driving_stereo(PLAIN).replace("P_rect_103", "P_rect_104"),
+    files.orb_slam(PLAIN).replace("fx: 707.0912", "fx: 0"),
+    "projection_matrix:\n  data: 5\n",
+    files.opencv_yaml(PLAIN._replace(baseline=-0.5)).partition("Q:")[0],
+    "%YAML:1.0\nQ: {data: [1, 2, 3]}\n",
+    '{"intrinsic": ["fx", "u0"]}',
+    '["intrinsic", "u0"]',
+    "P0: 500 0 320 0 0 500 240 0 0 0 1 0\nP1: 500 0 320 0 0 500 240 -100 0 0 1 0\n",
+)
+YAMLS = (
+    "# nothing but a comment\n",
+    "- 1\n- 2\n",
+    "a: 1\n b: 2\n",
+    "a: 1\n\tb: 2\n",
+    "a: 1\nb: 2\na: 3\n",
+    "a: {b: 1, b: 2}\n",
+    "a: [1] 2\n",
+    "a: [1, {b: 2]}\n",
+    "a: {]:\n",
+    "P1: {]:",
+    'a: [1, "]"\n',
+    "a: [1,\n2",
+    "a: 'b",
+    "a: [&x, 2]\n",
+    "a: {b: *x}\n",
+    "a: 1\nb: !!binary |\n  YQ==\n",
+    "a: !thing {b: 1}\n",
+    "? [a]\n: b\n",
+    "a: \0\n",
+    "a: [" + "1," * 60_000 + "]",
+    'a: "b # c"  # d\n',
+    "%YAML:1.0\n---\na:1\nb.c: {d: 2}\n",
+    "%YAML 1.0\na: 1\n",
+    "a:\t1\t\nb: \t[1,\t2]\n\t\n",
+    "a: !!opencv-matrix\n   data: [ 1., 2. ]\n",
+    "a:\n- - x\n  - y\n- b: c\n",
+    "%YAML:1.0\n---\na: 1\n...\n]\n",
+    "a:\nb: 1\n",
+)
 
 POSED = {
     "noisy": lambda: bent_road(4, width=240, height=160, noise=0.3, seed=2),
@@ -244,6 +328,8 @@ CASES = {
         for name, values in UNSOUND.items()
         for value in values
     ],
+    "files: damaged": lambda: [_read(text) for text in DAMAGED],
+    "files: YAML": lambda: [made(parse_yaml, text, "f") for text in YAMLS],
     "no rows": lambda: [made(assess_rig, rows) for rows in NO_ROWS],
     **{
         f"drives: {groups}": partial(_split, groups)
