@@ -1,8 +1,10 @@
 """What the experiments and comparisons with known angles give, to the digit; see `tests.recorded`."""
 
 import dataclasses
+import html
 import json
 import math
+import re
 import tempfile
 from functools import cache, partial
 from pathlib import Path
@@ -10,14 +12,27 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rollcli import __version__
 from rollcli.evaluate.accuracy import assess
-from rollcli.evaluate.experiments import FORMS, Textbook, Times, examine, rotate_nearest
-from rollcli.evaluate.options import ExperimentOptions
-from rollcli.evaluate.paper_page import charts
+from rollcli.evaluate.experiments import (
+    DELTAS,
+    FORMS,
+    LAMBDAS,
+    METHODS,
+    SOLVERS,
+    Findings,
+    Textbook,
+    Times,
+    examine,
+    rotate_nearest,
+)
+from rollcli.evaluate.options import ExperimentOptions, PaperOptions
+from rollcli.evaluate.paper_page import charts, paper_page
 from rollcli.evaluate.run_accuracy import as_csv, as_json, as_table
 from rollcli.evaluate.tables import all_tables
 from rollcli.evaluate.truth import KnownPose, read_truth
 from rollcli.files.results import Row
+from rollcli.run.options import EncodingOptions, InputOptions, RegionOptions, RunningOptions
 from tests.estimator.synthetic_maps import bent_road
 from tests.recorded import check, made
 
@@ -81,6 +96,53 @@ def _compared(form):
     return found if form is None else form(found)
 
 
+def _map_of(name="a.png", gd=(3, 4, 5, 6), sweep=7):
+    """A map whose numbers are all different."""
+    turned = [0.001 * (1 + k) for k in range(3)]
+    return Findings(
+        name,
+        40,
+        20,
+        600,
+        -math.radians(2.5),
+        (16, 21, 26, 30),
+        gd,
+        tuple(tuple(sweep + delta + (rate > 26) for rate in LAMBDAS) for delta in range(len(DELTAS))),
+        {
+            solver: tuple(tuple(error * (1 + at) / (1 + k) for k in range(4)) for error in turned)
+            for at, solver in enumerate(SOLVERS)
+        },
+        {method: tuple(error * (1 + at) for error in turned) for at, method in enumerate(METHODS)},
+    )
+
+
+def _times(seconds):
+    of_each = {
+        (solver, form): tuple(seconds * (1 + k + 4 * at) * (1 + 399 * (form == "textbook")) for k in range(4))
+        for at, solver in enumerate(("gss", "gd"))
+        for form in FORMS
+    }
+    return Times(9, of_each)
+
+
+def _page(count=1, seconds=(1.0,), region=None, **experiments):
+    """What the page of these maps says."""
+    pytest.importorskip("plotly", reason="plotly, of the extra report, is not here")
+    pytest.importorskip("jinja2", reason="jinja2, of the extra report, is not here")
+    found, timed = [_map_of(f"map{place}.png") for place in range(count)], [_times(each) for each in seconds]
+    options = PaperOptions(
+        InputOptions(("maps",)),
+        EncodingOptions(),
+        region or RegionOptions(),
+        ExperimentOptions("out", **experiments),
+        RunningOptions(),
+    )
+    page = paper_page(all_tables(found, [], timed), found, [], timed, options).decode()
+    page = page.replace(f"rollcli {__version__}", "rollcli")
+    shown = re.sub(r"<(script|style|svg).*?</\1>", "", page, flags=re.S)
+    return " ".join(html.unescape(re.sub("<[^>]+>", "", shown)).split())
+
+
 TRUTHS = (
     "",
     "file,roll\na,1\n",
@@ -125,6 +187,12 @@ CASES = {
     "textbook": _textbook,
     "turned": lambda: [rotate_nearest(np.arange(1.0, 71).reshape(7, 10), turn) for turn in TURNS],
     "angles": lambda: [ExperimentOptions("out", turns).turns_deg for turns in ANGLES],
+    "page": _page,
+    "page of two": partial(_page, 2, (2e-6, 3e-6)),
+    "page of fifty": partial(_page, 50),
+    "page of more, with what was asked": partial(
+        _page, 52, (0.5,), RegionOptions(roi=(0, 0, 9, 9)), turns=(5.0, 5.0, 1.0), truth="known.csv"
+    ),
     "known": _known,
     **{f"unlike {form.__name__}": partial(_unlike, form) for form in (as_table, as_csv, as_json)},
     "compared": partial(_compared, None),
