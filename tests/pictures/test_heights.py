@@ -9,7 +9,7 @@ import rollcli
 from rollcli.errors import UsageError
 from rollcli.estimator.road.model import RoadModel
 from rollcli.files.results import Row
-from rollcli.pictures.heights import FittedRoad, heights_over, steadied, unit_of
+from rollcli.pictures.heights import FittedRoad, heights_over, steadied
 from rollcli.pictures.heights_preview import draw_heights
 from rollcli.rig.calibration import Calibration
 
@@ -109,13 +109,6 @@ def test_without_a_disparity_there_is_no_height():
     assert np.isnan(behind[0, 5])
 
 
-@pytest.mark.parametrize("alpha", [(60, -0.3, 0), (-60, 0.3, 0), (10, 0, 0), (-23.5, 0.5, 0)])
-def test_no_road_no_heights(alpha):
-    """Its disparity does not grow downward, or all of the map is above its horizon."""
-    road = FittedRoad(0.0, alpha, 0.0, 64, 48)
-    assert np.isnan(heights_over(np.full((48, 64), 9.0), road, None)).all()
-
-
 def test_a_flattening_road_goes_on_straight():
     """Beyond the vertex of its parabola there is no row of such a disparity."""
     road, _ = road_of(0, 20, 0.4, -8e-4, 0)
@@ -200,11 +193,6 @@ def test_a_steadied_height_is_the_median_around_it_where_all_have_one():
         around = np.pad(heights, 2, "edge")[v : v + 5, u : u + 5]
         expected = heights[v, u] if np.isnan(around).any() else np.median(around)
         np.testing.assert_equal(found[v, u], expected)
-
-
-def test_the_unit_is_metres_with_a_baseline_alone():
-    assert unit_of(None) == unit_of(Calibration(400, 400, 1, 1)) == "camera heights"
-    assert unit_of(Calibration(400, 400, 1, 1, 0.5)) == "metres"
 
 
 SPAN = (-0.1, 0.1)

@@ -16,7 +16,7 @@ from rollcli.estimator.estimate import estimate_roll
 from rollcli.files.results import Row
 from rollcli.pictures.colours import style_sheet
 from rollcli.pictures.derotate import derotate, rotation_matrix
-from rollcli.pictures.heights import FittedRoad, heights_over, steadied
+from rollcli.pictures.heights import FittedRoad, heights_over, steadied, unit_of
 from rollcli.pictures.heights_preview import draw_heights
 from rollcli.pictures.overlay import draw_disparity, draw_preview, draw_road, draw_road_on_photo
 from rollcli.pictures.round_step import round_step
@@ -49,6 +49,8 @@ ROADS = {
     "strongly crowned": (0.02, (-40.0, 0.5, 0.0), 0.6),
     "falling": (0.1, (40.0, -0.2, 0.0), 0.0),
     "below the horizon": (0.0, (-90.0, 0.4, 0.0), 0.0),
+    "level": (0.0, (10.0, 0.0, 0.0), 0.0),
+    "rising from nothing": (0.0, (-99.5, 0.5, 0.0), 0.0),
     "over its vertex": (0.0, (-2.0, -0.1, 2e-3), 0.0),
 }
 
@@ -227,6 +229,7 @@ CASES = {
             made(derotate, np.ones(shape, kind), 0.1)
             for shape, kind in ((4, "f8"), ((2, 2, 2), "f8"), ((2, 2), "c8"))
         ),
+        *(made(v_disparity, np.ones(shape)) for shape in ((4,), (2, 2, 2))),
         *(
             made(v_disparity, np.ones((2, 2)), bins=bins, max_disparity=end)
             for bins, end in ((0, 1.0), (-1, None), (1, 0.0), (None, -1.0), (3, math.inf))
@@ -252,6 +255,7 @@ CASES = {
     "round steps": lambda: [
         round_step(least) for least in (0.013, 0.2, 0.21, 0.5, 0.51, 1.0, 1.99, 6, 10, 4e3)
     ],
+    "units": lambda: [unit_of(rig) for rig in RIGS.values()],
     "colours": style_sheet,
     "picture of heights": partial(_height_picture, (-0.3, 0.3), "metres"),
     "picture of heights, uneven": partial(_height_picture, (-0.05, 0.4), "camera heights"),
