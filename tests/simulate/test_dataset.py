@@ -130,18 +130,6 @@ def test_overwriting_leaves_no_frame_of_an_earlier_simulation_and_no_other_file_
     assert len(rows(rig)) == 1
 
 
-def test_a_folder_with_files_in_it_is_refused(tmp_path):
-    (tmp_path / "notes.txt").write_text("mine")
-    with pytest.raises(UsageError, match="--overwrite"):
-        plan_dataset(tmp_path, TINY)
-
-
-def test_a_file_in_place_of_the_folder_is_refused(tmp_path):
-    (tmp_path / "rig").write_text("")
-    with pytest.raises(UsageError, match="not a folder"):
-        plan_dataset(tmp_path / "rig", TINY, overwrite=True)
-
-
 def test_disparities_beyond_what_the_file_can_hold_are_no_data(tmp_path):
     # the road gains half a pixel of disparity a row, and passes the largest that fits
     options = SimulateOptions(
@@ -220,15 +208,20 @@ def test_a_damaged_record_is_not_resumed(rig, record):
         plan_dataset(rig, replace(TINY, resume=True))
 
 
-def test_a_folder_without_a_record_is_not_resumed(tmp_path):
-    (tmp_path / "notes.txt").write_text("mine")
-    with pytest.raises(UsageError, match=r"there is no truth\.csv\.run\.json"):
-        plan_dataset(tmp_path, replace(TINY, resume=True))
-
-
-def test_resume_and_overwrite_together_are_refused(tmp_path):
-    with pytest.raises(UsageError, match="either --resume or --overwrite"):
-        plan_dataset(tmp_path, replace(TINY, resume=True), overwrite=True)
+@pytest.mark.parametrize(
+    ("there", "resume", "overwrite", "said"),
+    [
+        ("rig/notes.txt", False, False, "--overwrite"),
+        ("rig/notes.txt", True, False, r"there is no truth\.csv\.run\.json"),
+        ("rig/notes.txt", True, True, "either --resume or --overwrite"),
+        ("rig", False, True, "not a folder"),
+    ],
+)
+def test_what_is_in_the_folders_place_is_not_written_over(tmp_path, there, resume, overwrite, said):
+    (tmp_path / there).parent.mkdir(exist_ok=True)
+    (tmp_path / there).write_text("mine")
+    with pytest.raises(UsageError, match=said):
+        plan_dataset(tmp_path / "rig", replace(TINY, resume=resume), overwrite=overwrite)
 
 
 STEMS = [f"frame_{number:04d}" for number in range(1, len(SPECS) + 1)]
