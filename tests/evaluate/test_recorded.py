@@ -143,6 +143,15 @@ def _page(count=1, seconds=(1.0,), region=None, **experiments):
     return " ".join(html.unescape(re.sub("<[^>]+>", "", shown)).split())
 
 
+def _tables_without_angles():
+    """The tables, as CSV, of a map of which no method gives an angle, and half of the runs stop short."""
+    found = _map_of()
+    stopped = tuple(tuple(count if k % 2 else None for k, count in enumerate(each)) for each in found.sweep)
+    errors = dict.fromkeys(METHODS, (None,) * 3)
+    found = dataclasses.replace(found, sweep=stopped, method_errors=errors)
+    return {name: table.csv().decode() for name, table in all_tables([found], [], [_times(0.1)]).items()}
+
+
 TRUTHS = (
     "",
     "file,roll\na,1\n",
@@ -187,6 +196,7 @@ CASES = {
     "textbook": _textbook,
     "turned": lambda: [rotate_nearest(np.arange(1.0, 71).reshape(7, 10), turn) for turn in TURNS],
     "angles": lambda: [ExperimentOptions("out", turns).turns_deg for turns in ANGLES],
+    "tables without angles": _tables_without_angles,
     "page": _page,
     "page of two": partial(_page, 2, (2e-6, 3e-6)),
     "page of fifty": partial(_page, 50),
