@@ -207,6 +207,13 @@ DAMAGED = (
     "%YAML:1.0\nQ: {data: [1, 2, 3]}\n",
     '{"intrinsic": ["fx", "u0"]}',
     '["intrinsic", "u0"]',
+    '{"intrinsic": {"fx": 1}}',
+    '{"u0": 1}',
+    "cam0=[1 0 1; 0 1 1; 0 0 1]\n",
+    "doffs=3\n",
+    "cam1:\n  intrinsics: [1, 1, 1, 1]\n",
+    "[STEREO]\nBaseline=120\n",
+    "P1: 1 0 1 0 0 1 1 0 0 0 1 0\n",
     "P0: 500 0 320 0 0 500 240 0 0 0 1 0\nP1: 500 0 320 0 0 500 240 -100 0 0 1 0\n",
 )
 YAMLS = (
