@@ -16,7 +16,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-PACKAGES = ("estimator", "evaluate", "rig", "simulate", "stereo")
+from rollcli.errors import RollcliError
+
+PACKAGES = ("estimator", "evaluate", "pictures", "rig", "simulate", "stereo")
 _GRID = 5  # rows and columns of an image whose values are recorded
 _ROUNDING = 1e-5  # what is smaller may be nothing, rounded
 _DIGITS = 8
@@ -30,6 +32,14 @@ def check(package, case, answer, *, rel=1e-6, least=1e-6):
         for name, value in known.items()
     }
     assert found == expected
+
+
+def made(make, *arguments, **options):
+    """What is made, or the sentence that says why not."""
+    try:
+        return make(*arguments, **options)
+    except RollcliError as error:
+        return str(error)
 
 
 @functools.cache

@@ -86,27 +86,6 @@ def test_every_parameter_and_result_of_a_public_function_has_a_type():
             assert not any(each.kind is each.VAR_KEYWORD for each in signature.parameters.values()), name
 
 
-@pytest.mark.parametrize("roll", [-8, 8, 3.2, math.inf, math.nan])
-def test_degrees_given_as_radians_are_refused(disparity, roll):
-    with pytest.raises(
-        rollcli.UsageError, match="roll_deg=" if math.isfinite(roll) else "cannot rotate|beyond"
-    ):
-        rollcli.derotate(disparity, roll)
-
-
-def test_an_angle_is_given_in_radians_or_in_degrees_and_once(disparity):
-    turned = rollcli.derotate(disparity, roll_deg=-8)
-    assert np.array_equal(turned, rollcli.derotate(disparity, math.radians(-8)))
-    assert not np.array_equal(turned, disparity)
-    for arguments in ({}, {"roll": 0.1, "roll_deg": 5.7}):
-        with pytest.raises(rollcli.UsageError, match="once"):
-            rollcli.derotate(disparity, **arguments)
-
-
-def test_half_a_turn_is_allowed(disparity):
-    assert rollcli.derotate(disparity, math.pi).shape == disparity.shape
-
-
 def test_a_calibration_may_be_the_path_of_its_file(disparity):
     read = rollcli.estimate_roll(disparity, calibration=rollcli.read_calibration(CALIB))
     assert read.pitch is not None

@@ -17,7 +17,7 @@ from rollcli.estimator.solvers.golden_section import golden_section
 from rollcli.estimator.solvers.gradient_descent import gradient_descent
 from rollcli.estimator.tuning import TUNING
 from tests.estimator.synthetic_maps import bent_road, energy_of, flat_road
-from tests.recorded import check
+from tests.recorded import check, made
 
 WIDTH, HEIGHT = 240, 160
 _road = partial(flat_road, width=WIDTH, height=HEIGHT)
@@ -106,6 +106,7 @@ MAPS = {
     "room": lambda: _noisy(3, 0.1, pitch_deg=30, focal=330.0),
     "whole pixels": lambda: _road(-6).round().astype(np.uint16),
     "scaled": lambda: 16.0 * _noisy(7, 0.1),
+    "faint": lambda: 0.01 * _noisy(7, 0.1),
     "wall": lambda: 20 + _noise(0.2),
     "depth": lambda: 30 - _noisy(5, 0.2),
     "nothing but noise": lambda: np.random.default_rng(8).uniform(1, 30, (HEIGHT, WIDTH)),
@@ -126,6 +127,7 @@ OTHER = {  # a map, and how it is estimated
     "plane": ("walls", {"method": "plane"}),
     "areas": ("traffic", {"method": "areas"}),
     "areas of holes": ("holes", {"method": "areas", "max_roll": 0.2}),
+    "areas of faint": ("faint", {"method": "areas"}),
     "chosen plane": ("holes", {"method": "plane", "road": "all"}),
     "chosen areas": ("noisy", {"method": "areas", "road": "all"}),
     "at the bound": ("large roll", {"max_roll": math.radians(30)}),
@@ -184,7 +186,27 @@ def _solved(name):
     }
 
 
+ASKED = (
+    *({"max_roll": math.radians(roll_deg)} for roll_deg in (0, -5, 89.001, math.nan)),
+    *({name: "magic"} for name in ("method", "model", "road")),
+    *({"lambda0": step} for step in (0.0, math.inf)),
+    *({name: angle} for name in ("tolerance", "max_interval") for angle in (0.0, math.inf, math.nan)),
+    {"seed": -1},
+    {"mask": np.ones((4, 5))},
+    {"max_roll": math.radians(89), "max_interval": 1e-9, "lambda0": 1e-9, "tolerance": 1e-300},
+)
+NO_MAPS = (np.ones(50), np.ones((5, 5, 3)), np.full((50, 50), "1"))
+
+
+def _asked():
+    """Which options are taken, and why others and what is no map are not."""
+    found = [made(estimate_roll, _road(5), **options) for options in ASKED]
+    found += [made(estimate_roll, each) for each in NO_MAPS]
+    return [each if isinstance(each, str) else math.degrees(each.theta) for each in found]
+
+
 CASES = {
+    "asked": _asked,
     **{name: partial(_estimate, name) for name in MAPS},
     **{name: partial(_estimate, given, **options) for name, (given, options) in OTHER.items()},
     **{

@@ -132,25 +132,6 @@ def made_times(seconds):
     return Times(9, {(solver, form): (seconds,) * 4 for solver in ("gss", "gd") for form in FORMS})
 
 
-def test_tables_hold_the_papers_numbers_beside_the_mean_of_ours(found):
-    other = replace(found, gd=tuple(count + 1 for count in found.gd))
-    tables = all_tables(
-        [found, other], [("bad.png", "bad.png: no valid pixel")], [made_times(1), made_times(3)]
-    )
-    first = tables["table1_iterations"]
-    assert first.where(solver="gss").column("paper") == first.where(solver="gss").column("mean")
-    assert first.where(solver="gd").column("paper") == [3, 4, 4, 4]
-    assert first.where(solver="gd").column("mean") == [count + 0.5 for count in found.gd]
-    assert first.where(solver="gd").column("min") == list(found.gd)
-    assert first.where(solver="gd").column("max") == list(other.gd)
-    second = tables["table2_runtime"].where(solver="gss")
-    assert second.column("paper_s") == [1.551, 1.986, 2.457, 2.810]
-    assert second.column("moments_s") == [2.0] * 4
-    assert second.column("textbook_over_moments") == [1.0] * 4
-    assert tables["maps"].column("message") == ["", "", "bad.png: no valid pixel"]
-    assert tables["fig6_accuracy"].column("estimates") == [2 * len(TURNS)] * (len(SOLVERS) * len(DELTAS_DEG))
-
-
 def test_runs_that_stopped_short_are_left_out_of_the_mean_and_counted(found):
     short = replace(found, sweep=tuple((None, *counts[1:]) for counts in found.sweep))
     slower = replace(found, sweep=tuple(tuple(count and count + 4 for count in each) for each in found.sweep))

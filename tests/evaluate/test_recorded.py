@@ -1,23 +1,42 @@
 """What the experiments and comparisons with known angles give, to the digit; see `tests.recorded`."""
 
 import dataclasses
+import html
+import json
 import math
+import re
+import tempfile
 from functools import cache, partial
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from rollcli import __version__
 from rollcli.evaluate.accuracy import assess
-from rollcli.evaluate.experiments import FORMS, Textbook, Times, examine, rotate_nearest
-from rollcli.evaluate.options import ExperimentOptions
-from rollcli.evaluate.paper_page import charts
+from rollcli.evaluate.experiments import (
+    DELTAS,
+    FORMS,
+    LAMBDAS,
+    METHODS,
+    SOLVERS,
+    Findings,
+    Textbook,
+    Times,
+    examine,
+    rotate_nearest,
+)
+from rollcli.evaluate.options import ExperimentOptions, PaperOptions
+from rollcli.evaluate.paper_page import charts, paper_page
 from rollcli.evaluate.run_accuracy import as_csv, as_json, as_table
 from rollcli.evaluate.tables import all_tables
-from rollcli.evaluate.truth import KnownPose
+from rollcli.evaluate.truth import KnownPose, read_truth
 from rollcli.files.results import Row
+from rollcli.run.options import EncodingOptions, InputOptions, RegionOptions, RunningOptions
 from tests.estimator.synthetic_maps import bent_road
-from tests.recorded import check
+from tests.recorded import check, made
 
+ANGLES = ((-1.0, 1.0, 0.3), (0.0, 5.0, 2.0), (0.0, 0.3, 0.1), (1.0, 2.95, 1.0), (-8.0, -8.0, 3.0))
 TURNS = [math.radians(turn) for turn in (-20, -3.5, 12)]
 
 
@@ -77,15 +96,115 @@ def _compared(form):
     return found if form is None else form(found)
 
 
+def _map_of(name="a.png", gd=(3, 4, 5, 6), sweep=7):
+    """A map whose numbers are all different."""
+    turned = [0.001 * (1 + k) for k in range(3)]
+    return Findings(
+        name,
+        40,
+        20,
+        600,
+        -math.radians(2.5),
+        (16, 21, 26, 30),
+        gd,
+        tuple(tuple(sweep + delta + (rate > 26) for rate in LAMBDAS) for delta in range(len(DELTAS))),
+        {
+            solver: tuple(tuple(error * (1 + at) / (1 + k) for k in range(4)) for error in turned)
+            for at, solver in enumerate(SOLVERS)
+        },
+        {method: tuple(error * (1 + at) for error in turned) for at, method in enumerate(METHODS)},
+    )
+
+
+def _times(seconds):
+    of_each = {
+        (solver, form): tuple(seconds * (1 + k + 4 * at) * (1 + 399 * (form == "textbook")) for k in range(4))
+        for at, solver in enumerate(("gss", "gd"))
+        for form in FORMS
+    }
+    return Times(9, of_each)
+
+
+def _page(count=1, seconds=(1.0,), region=None, **experiments):
+    """What the page of these maps says."""
+    pytest.importorskip("plotly", reason="plotly, of the extra report, is not here")
+    pytest.importorskip("jinja2", reason="jinja2, of the extra report, is not here")
+    found, timed = [_map_of(f"map{place}.png") for place in range(count)], [_times(each) for each in seconds]
+    options = PaperOptions(
+        InputOptions(("maps",)),
+        EncodingOptions(),
+        region or RegionOptions(),
+        ExperimentOptions("out", **experiments),
+        RunningOptions(),
+    )
+    page = paper_page(all_tables(found, [], timed), found, [], timed, options).decode()
+    page = page.replace(f"rollcli {__version__}", "rollcli")
+    shown = re.sub(r"<(script|style|svg).*?</\1>", "", page, flags=re.S)
+    return " ".join(html.unescape(re.sub("<[^>]+>", "", shown)).split())
+
+
+def _tables_without_angles():
+    """The tables, as CSV, of a map of which no method gives an angle, and half of the runs stop short."""
+    found = _map_of()
+    stopped = tuple(tuple(count if k % 2 else None for k, count in enumerate(each)) for each in found.sweep)
+    errors = dict.fromkeys(METHODS, (None,) * 3)
+    found = dataclasses.replace(found, sweep=stopped, method_errors=errors)
+    return {name: table.csv().decode() for name, table in all_tables([found], [], [_times(0.1)]).items()}
+
+
+TRUTHS = (
+    "",
+    "file,roll\na,1\n",
+    "file,roll_deg\n",
+    "file,roll_deg\na,\n",
+    "file,roll_deg\na,1\nb,x\n",
+    "file,roll_deg\na,nan\n",
+    "file,roll_deg\na\n",
+    'file,roll_deg\n"a,1\n',
+    "\x89PNG\r\n\x1a\n\x00\xff",
+    "file,roll_deg\na.png,1\nb/a,2\n",
+    *(f"file,roll_deg,{name}\na,1,steep\n" for name in ("pitch_deg", "height_m", "curvature_per_m")),
+    "\ufefffile,roll_deg,pitch_deg,height_m,curvature_per_m\r\na,1,2,1.5,0\r\nc/b.png,-1,3,1.6,0.001\r\n",
+    "file,roll_deg,pitch_deg,height_m,focal_px,baseline_m\na,1,,,\nb,2,3,,300,0.5\nc,3,,2,300,\n",
+)
+
+
+def _known():
+    """What files of known angles hold, and why some are refused."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "truth.csv")
+        found = [made(read_truth, path)]
+        for text in TRUTHS:
+            path.write_bytes(text.encode())
+            found.append(made(read_truth, path))
+    return json.loads(json.dumps(found, default=str).replace(folder, "."))
+
+
+def _unlike(form):
+    """Results without an angle, without intervals, of other frames, or of one frame twice."""
+    known = {"a": KnownPose(0.01)}
+    error, whole = Row("maps/a.png", status="error"), Row("maps/a.png", status="ok", roll_deg=1 / 3)
+    given = [[error], [whole], [whole, error], [Row("maps/b.png", status="ok", roll_deg=1.0)]]
+    found = [made(assess, rows, known, "r.csv") for rows in given]
+    return [each if isinstance(each, str) else form(each) for each in found]
+
+
 CASES = {
     "findings": _found,
     "tables": lambda: {name: table.rows for name, table in _tables().items()},
     "charts": lambda: {name: dataclasses.asdict(chart) for name, chart in charts(_tables()).items()},
     "textbook": _textbook,
     "turned": lambda: [rotate_nearest(np.arange(1.0, 71).reshape(7, 10), turn) for turn in TURNS],
-    "angles": lambda: [
-        ExperimentOptions("out", turns).turns_deg for turns in ((-1.0, 1.0, 0.3), (0.0, 5.0, 2.0))
-    ],
+    "angles": lambda: [ExperimentOptions("out", turns).turns_deg for turns in ANGLES],
+    "tables without angles": _tables_without_angles,
+    "page": _page,
+    "page of two": partial(_page, 2, (2e-6, 3e-6)),
+    "page of fifty": partial(_page, 50),
+    "page of more, with what was asked": partial(
+        _page, 52, (0.5,), RegionOptions(roi=(0, 0, 9, 9)), turns=(5.0, 5.0, 1.0), truth="known.csv"
+    ),
+    "known": _known,
+    **{f"unlike {form.__name__}": partial(_unlike, form) for form in (as_table, as_csv, as_json)},
     "compared": partial(_compared, None),
     "as a table": partial(_compared, as_table),
     "as csv": partial(_compared, as_csv),

@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from rollcli.errors import UsageError
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.pictures.derotate import derotate
 from rollcli.pictures.vdisparity import profile, row_offset, v_disparity
@@ -35,17 +34,6 @@ def test_whole_pixel_maps_get_a_bin_a_pixel_and_others_finer_ones():
     assert v_disparity(np.array([[1.0, 63.25]])).counts.shape == (1, 256)
     assert v_disparity(np.array([[1.0, 163.25]])).counts.shape == (1, 656)
     assert v_disparity(np.array([[1.0, 5163.25]])).counts.shape == (1, 1024)
-
-
-@pytest.mark.parametrize("options", [{"bins": 0}, {"max_disparity": 0}, {"max_disparity": math.inf}])
-def test_options_without_sense_are_refused(options):
-    with pytest.raises(UsageError, match="must be positive"):
-        v_disparity(np.ones((2, 2)), **options)
-
-
-def test_more_than_two_dimensions_are_refused():
-    with pytest.raises(UsageError, match="is 2-D"):
-        v_disparity(np.ones((2, 2, 2)))
 
 
 @pytest.mark.parametrize("roll_deg", [-20, 0, 3, 15])

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 import rollcli
-from rollcli.errors import UsageError
-from rollcli.rig.drive.assess import difference, split_drives
+from rollcli.rig.drive.assess import difference
 from rollcli.rig.drive.posterior import Estimate
-from rollcli.rig.words import answer, findings, one_line
+from rollcli.rig.words import findings, one_line
 from tests.rig.drive.series import drive
 
 SCHEMA = make_dataclass("Row", ["file", "status", "roll_deg", "roll_ci95_deg"])
@@ -136,97 +135,6 @@ def test_rolls_on_both_sides_of_a_right_angle_are_close_together():
     assert abs(rig.now().value - 89.8) < 0.2
 
 
-def test_the_answer_in_one_line_counts_every_frame():
-    given = columns(*drive(1, 1000, sd=0.1), status=["ok"] * 990 + ["suspect"] * 8 + ["error"] * 2)
-    given["roll_deg"][-2:] = [None, None]
-    line = one_line(rollcli.assess_rig(given))
-    assert line.startswith("roll -0.")
-    assert line.endswith("°, 990 ok, 8 suspect, 2 failed")
-    assert "±" in line
-
-
-def test_the_answer_in_one_line_says_why_it_has_no_interval():
-    few = one_line(rollcli.assess_rig(columns(np.full(5, 1.5), np.full(5, 0.1))))
-    assert few == (
-        "roll +1.50° (5 frames, which spread over 0.00; an interval takes 8), 5 ok, 0 suspect, 0 failed"
-    )
-    failed = {**columns(np.full(5, 1.5), np.full(5, 0.1)), "status": ["error"] * 5}
-    assert "spread" not in one_line(rollcli.assess_rig(failed))
-
-
-def test_too_few_frames_have_a_value_without_an_interval_and_say_how_far_they_spread():
-    rig = rollcli.assess_rig(columns([0.1, 0.2, 0.3], [0.05] * 3))
-    assert answer(rig.now()) == "+0.20°"
-    (sentence,) = findings(rig)
-    assert sentence == "no interval for the roll: 3 frames, which spread over 0.20; an interval takes 8"
-
-
-@pytest.mark.parametrize(
-    ("rows", "reason"),
-    [
-        ({"roll_deg": [1.0]}, "no column status"),
-        ({"status": ["ok"]}, "no column roll_deg"),
-        ({"roll_deg": [1.0], "status": ["ok", "ok"]}, "differ in length"),
-        ({"roll_deg": ["far"], "status": ["ok"]}, "no number"),
-        ({"roll_deg": [1.0], "status": ["fine"]}, "'fine' is no status"),
-    ],
-)
-def test_what_are_no_rows_is_refused(rows, reason):
-    with pytest.raises(rollcli.RollcliError, match=reason):
-        rollcli.assess_rig(rows)
-
-
 def test_no_rows_are_no_frames():
     rig = rollcli.assess_rig([])
     assert (rig.count, rig.used, rig.now().value) == (0, 0, None)
-
-
-def folders(*counts):
-    return [f"f{number}/{place}.png" for number, count in enumerate(counts) for place in range(count)]
-
-
-def as_lists(drives):
-    return [(name, places.tolist()) for name, places in drives]
-
-
-def test_no_frames_are_no_drives():
-    assert split_drives([]) == split_drives([], "none") == split_drives([], "a*") == []
-
-
-@pytest.mark.parametrize(
-    ("counts", "drives"),
-    [((8, 8), ["f0", "f1"]), ((7, 8), [""]), ((1, 15), ["f0", "f1"]), ((8,), ["f0"]), ((7,), [""])],
-)
-def test_folders_are_drives_where_they_hold_eight_frames_on_average(counts, drives):
-    found = split_drives(folders(*counts))
-    assert [name for name, _ in found] == drives
-    assert np.array_equal(np.concatenate([places for _, places in found]), np.arange(sum(counts)))
-
-
-def test_frames_of_a_drive_that_others_interrupt_stay_together_and_in_order():
-    files = [f"{name}/{place}.png" for place in range(8) for name in ("b", "a")]
-    assert as_lists(split_drives(files)) == [("b", [*range(0, 16, 2)]), ("a", [*range(1, 16, 2)])]
-
-
-@pytest.mark.parametrize("pattern", ["data/run*", "data/run*/"])
-def test_a_pattern_names_the_first_folders_of_a_path_and_leaves_the_others_as_they_are(pattern):
-    files = ["data/run1/x/0.png", "data/run2/0.png", "data/run1/1.png", "other/run3/0.png", "0.png"]
-    assert as_lists(split_drives(files, pattern)) == [
-        ("data/run1", [0, 2]),
-        ("data/run2", [1]),
-        ("other/run3", [3]),
-        ("", [4]),
-    ]
-
-
-def test_a_pattern_that_matches_no_folder_is_refused_with_one_that_is_there():
-    with pytest.raises(
-        UsageError, match=r"--groups run\*: matches no folder of the frames, such as data/run1$"
-    ):
-        split_drives(["data/run1/0.png"], "run*")
-
-
-def test_all_frames_are_one_drive_where_none_are_told_apart():
-    ((name, places),) = split_drives(folders(9, 9), "none")
-    assert name == ""
-    assert np.array_equal(places, np.arange(18))

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import rollcli
-from rollcli.errors import UsageError
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.interval import Tangent
 from rollcli.rig.calibration import Calibration
@@ -149,15 +148,6 @@ def test_the_horizon_is_where_the_road_is_infinitely_far_away():
     assert horizon_row(tangent, calibration) == pytest.approx(row, abs=1e-7)
 
 
-def test_without_a_baseline_there_is_a_pitch_and_no_height():
-    calibration = Calibration(250.0, 250.0, 160.0, 90.0)
-    disparity = cast(replace(calibration, baseline=0.5), 0.02, 0.2, 1.5)
-    posed = with_pose(estimate_roll(disparity), calibration)
-    assert posed.pitch == pytest.approx(0.2, abs=1e-4)
-    assert (posed.height_m, posed.height_ci95_m) == (None, None)
-    assert "baseline" not in posed.message
-
-
 def test_the_message_says_what_the_calibrations_errors_do():
     calibration = Calibration(721.5377, 721.5377, 609.5593, 172.854, 0.53715)
     tangent = Tangent(0.0, 280.0, 35.0, 0.53715 / 1.65, None)
@@ -192,46 +182,6 @@ def test_on_a_bent_road_the_pose_is_that_over_the_road_where_the_tangent_touches
     assert posed.pitch == pytest.approx(pitch + bend, abs=math.radians(0.03))
     over = (height + curvature * far**2 / 2) * math.cos(bend)
     assert posed.height_m == pytest.approx(over, rel=3e-3)
-
-
-def test_a_map_of_another_size_is_refused():
-    sized = Calibration(250.0, 250.0, 160.0, 90.0, 0.5, 0.0, 300, 200)
-    estimate = estimate_roll(cast(sized, 0.02, 0.2, 1.5))
-    with pytest.raises(UsageError, match="300x200"):
-        with_pose(estimate, sized)
-
-
-def test_a_surface_whose_disparity_shrinks_downward_has_no_pose():
-    calibration = Calibration(250.0, 250.0, 160.0, 90.0, 0.5)
-    ceiling = cast(calibration, 0.0, 0.4, 1.5)[::-1]
-    posed = with_pose(estimate_roll(ceiling, road="all"), calibration)
-    assert posed.pitch is None
-    assert "no pose" in posed.message
-
-
-def test_a_doffs_that_puts_the_road_behind_the_camera_gives_no_pose():
-    calibration = Calibration(250.0, 250.0, 160.0, 90.0, 0.5)
-    estimate = estimate_roll(cast(calibration, 0.02, 0.2, 1.5))
-    posed = with_pose(estimate, replace(calibration, doffs=-500.0))
-    assert (posed.pitch, posed.height_m, posed.theta) == (None, None, estimate.theta)
-    assert "no pose: with doffs of -500 px the road lies behind the camera" in posed.message
-
-
-def test_the_calibration_of_twice_the_size_is_doubted_where_the_file_states_no_size():
-    calibration = Calibration(250.0, 250.0, WIDTH / 2 + 4.0, HEIGHT / 2 - 3.0, 0.5)
-    twice = Calibration(500.0, 500.0, WIDTH - 2.0, HEIGHT - 6.0, 0.5)
-    asked = [
-        "lies near the edge: is it of images of this size?"
-        in taken_as_exact(each.for_size(WIDTH, HEIGHT), 0.2, 1.5)
-        for each in (calibration, twice)
-    ]
-    assert asked == [False, True]
-
-
-@pytest.mark.parametrize("slope", [0.0, -0.3])
-def test_a_plane_whose_disparity_does_not_grow_downward_has_no_horizon(slope):
-    calibration = Calibration(250.0, 250.0, 160.0, 90.0, 0.5)
-    assert horizon_row(Tangent(0.0, 100.0, 20.0, slope, None), calibration) is None
 
 
 def test_the_public_function_names_every_setting_of_the_estimator_with_its_default():

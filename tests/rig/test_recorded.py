@@ -1,22 +1,23 @@
 """What drives and calibrations of every kind say of a rig, to the digit; see `tests.recorded`."""
 
+import math
 from functools import partial
 
 import numpy as np
 import pytest
 
-from rollcli.errors import RollcliError
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.rig.calibration import Calibration, CalibrationOptions
-from rollcli.rig.drive.assess import assess_rig
+from rollcli.rig.drive.assess import assess_rig, split_drives
 from rollcli.rig.drive.posterior import Estimate
 from rollcli.rig.drive.quantity import assess_sequence
-from rollcli.rig.pose import horizon_row, pose_jacobian, with_pose
+from rollcli.rig.formats.yaml import parse_yaml
+from rollcli.rig.pose import horizon_row, pose_jacobian, taken_as_exact, with_pose
 from rollcli.rig.quantities import ALIGNMENT, HEIGHT, PITCH, ROLL
 from rollcli.rig.read_calibration import parse_calibration
 from rollcli.rig.words import answer, counts, findings, now_in_words, one_line
 from tests.estimator.synthetic_maps import bent_road
-from tests.recorded import check
+from tests.recorded import check, made
 from tests.rig import calibration_files as files
 from tests.rig.drive.series import drive
 
@@ -75,7 +76,35 @@ RIGS = {
         *({key: each[k : k + 9] for key, each in _columns("white", f"{k}/").items()} for k in range(0, 90, 9))
     ),
     "nothing": lambda: _columns("nothing"),
+    "alike": lambda: {key: each[:5] for key, each in _columns("all alike").items()},
+    "failed": lambda: _columns("all alike") | {"status": ["error"] * 60},
 }
+NO_ROWS = (
+    {"roll_deg": [1.0]},
+    {"status": ["ok"]},
+    {"roll_deg": [1.0], "status": ["ok", "ok"]},
+    {"roll_deg": ["far"], "status": ["ok"]},
+    {"roll_deg": [1.0], "status": ["fine"]},
+)
+FOLDERS = {  # of frames, and how many are in each
+    "a": {"a": 8},
+    "few": {"a": 7},
+    "two": {"a": 8, "b": 8},
+    "few on average": {"a": 7, "b": 8},
+    "uneven": {"a": 1, "b": 15},
+    "deep": {"data/run1/x": 9, "data/run2": 9, "data/run1": 3, "other/run3": 4, ".": 2},
+    "none": {},
+}
+
+
+def _split(groups):
+    """Which frames are one drive, where those of the folders take turns."""
+    found = {}
+    for name, counts_of in FOLDERS.items():
+        frames = sorted((place, folder) for folder, count in counts_of.items() for place in range(count))
+        files = [f"{folder}/{place}.png".removeprefix("./") for place, folder in frames]
+        found[name] = made(split_drives, files, groups)
+    return found
 
 
 def _joined(*parts):
@@ -99,16 +128,11 @@ def _rig(name, **options):
     }
 
 
-def _read(text, *more, **given):
-    texts = [text, *more]
-    try:
-        found = parse_calibration(
-            [(f"calib{place}.txt", each.encode()) for place, each in enumerate(texts)],
-            CalibrationOptions(**given) if given else None,
-        )
-    except RollcliError as error:
-        return str(error)
-    return [found, str(found)]
+def _read(*texts, **given):
+    named = [(f"calib{place}.txt", text.encode()) for place, text in enumerate(texts)]
+    found = made(parse_calibration, named, CalibrationOptions(**given))
+    assert "\n" not in str(found)
+    return found
 
 
 RIG = files.Rig(doffs=3.25)
@@ -120,40 +144,160 @@ FILES = {
     "ros positive": [files.ros(RIG, right=False), files.ros(RIG, right=True, positive=True)],
     "kalibr": [files.kalibr(RIG)],
     "zed": [files.zed(RIG)],
-    "kitti object": [files.KITTI_OBJECT],
     "real kitti raw": [files.KITTI_RAW],
     "real middlebury": [files.MIDDLEBURY],
     "real opencv": [files.OPENCV],
+    "real kitti object": [files.KITTI_OBJECT],
+    "four cameras": [files.kitti_benchmark(RIG) + files.KITTI_OBJECT],
     "real ros": [files.ROS_LEFT, files.ROS_RIGHT],
+    "real ros alone": [files.ROS_LEFT],
     "real kalibr": [files.KALIBR],
     "nothing known": ["a: b\n"],
+    "two of one": [files.KITTI_RAW, files.KITTI_RAW],
+    "ros of two sizes": [files.ros(RIG, right=False), files.ros(RIG._replace(width=1280), right=True)],
+    "no file": [],
+}
+
+
+PLAIN = files.Rig()
+DAMAGED = (
+    "",
+    "just text\n",
+    files.KITTI_RAW[:-60],
+    files.KITTI_RAW.replace("-3.875744e+02", "nan"),
+    files.KITTI_RAW.replace("-3.875744e+02", "9" * 5000),
+    files.KITTI_RAW.replace("-3.875744e+02", "3.875744e+02"),
+    files.KITTI_RAW.replace("-3.875744e+02", "0"),
+    files.KITTI_RAW.replace("P_rect_01: 7.215377e+02", "P_rect_01: 8.215377e+02"),
+    files.KITTI_RAW.replace("P_rect_01", "P_rect_00"),
+    files.KITTI_RAW.replace("6.095593e+02", "1.300000e+03"),
+    files.KITTI_RAW.splitlines()[1],
+    files.MIDDLEBURY.replace("baseline=193.001", ""),
+    files.MIDDLEBURY.replace("baseline=193.001", "baseline=-193"),
+    files.MIDDLEBURY.replace("doffs=131.111", "doffs=12"),
+    files.MIDDLEBURY.replace("cam1=[3997.684", "cam1=[3897.684"),
+    files.MIDDLEBURY.replace("1011.728; 0 0 1]\ndoffs", "1021.728; 0 0 1]\ndoffs"),
+    files.MIDDLEBURY[:30],
+    files.MIDDLEBURY.replace("cam0=[3997.684", "cam0=[-3997.684").replace("cam1", "cam2"),
+    files.OPENCV[:-30],
+    files.OPENCV.replace("0.12697712", "0.5"),
+    files.OPENCV.replace("-234.58003", "-243.58003"),
+    files.OPENCV.replace("-314.71402", "-413.71402"),
+    files.OPENCV.replace("P1", "M1").replace("P2", "M2").replace("Q", "D"),
+    files.ROS_RIGHT,
+    files.ROS_LEFT,
+    files.cityscapes(PLAIN)[:-5],
+    files.cityscapes(PLAIN).replace("fx", "gx"),
+    files.cityscapes(PLAIN).replace("0.5372", "NaN"),
+    files.orb_slam(PLAIN).replace("Camera.cx", "Camera.xx"),
+    files.orb_slam(PLAIN).replace("707.0912\nCamera.fy", "-707.0912\nCamera.fy"),
+    files.KALIBR[:-60],
+    files.kalibr(PLAIN).replace("[0.0, 1.0, 0.0, 0.0]", "[0.0, 1.0, 0.0]"),
+    files.kalibr(PLAIN).replace("[0.0, 1.0, 0.0, 0.0]", "[0.0, 1.0, 0.0, 0.9]"),
+    files.zed(PLAIN).partition("Baseline")[0],
+    files.zed(PLAIN).replace("Baseline=", "Baseline=about "),
+    "left:\n" + files.ros(PLAIN, right=False).replace("\n", "\n  ").join(("  ", "")),
+    files.ros(PLAIN, right=False).replace("[707.0912", "[0.0"),
+    files.ros(PLAIN, right=False).replace("width: 1226", "width: 12.5"),
+    files.kitti_raw(PLAIN).replace("S_rect_00: 1226 370", "S_rect_00: 1226"),
+    files.driving_stereo(PLAIN).replace("P_rect_103", "P_rect_104"),
+    files.orb_slam(PLAIN).replace("fx: 707.0912", "fx: 0"),
+    "projection_matrix:\n  data: 5\n",
+    files.opencv_yaml(PLAIN._replace(baseline=-0.5)).partition("Q:")[0],
+    "%YAML:1.0\nQ: {data: [1, 2, 3]}\n",
+    '{"intrinsic": ["fx", "u0"]}',
+    '["intrinsic", "u0"]',
+    '{"intrinsic": {"fx": 1}}',
+    '{"u0": 1}',
+    "cam0=[1 0 1; 0 1 1; 0 0 1]\n",
+    "doffs=3\n",
+    "cam1:\n  intrinsics: [1, 1, 1, 1]\n",
+    "[STEREO]\nBaseline=120\n",
+    "P1: 1 0 1 0 0 1 1 0 0 0 1 0\n",
+    "P0: 500 0 320 0 0 500 240 0 0 0 1 0\nP1: 500 0 320 0 0 500 240 -100 0 0 1 0\n",
+)
+YAMLS = (
+    "# nothing but a comment\n",
+    "- 1\n- 2\n",
+    "a: 1\n b: 2\n",
+    "a: 1\n\tb: 2\n",
+    "a: 1\nb: 2\na: 3\n",
+    "a: {b: 1, b: 2}\n",
+    "a: [1] 2\n",
+    "a: [1, {b: 2]}\n",
+    "a: {]:\n",
+    "P1: {]:",
+    'a: [1, "]"\n',
+    "a: [1,\n2",
+    "a: 'b",
+    "a: [&x, 2]\n",
+    "a: {b: *x}\n",
+    "a: 1\nb: !!binary |\n  YQ==\n",
+    "a: !thing {b: 1}\n",
+    "? [a]\n: b\n",
+    "a: \0\n",
+    "a: [" + "1," * 60_000 + "]",
+    'a: "b # c"  # d\n',
+    "%YAML:1.0\n---\na:1\nb.c: {d: 2}\n",
+    "%YAML 1.0\na: 1\n",
+    "a:\t1\t\nb: \t[1,\t2]\n\t\n",
+    "a: !!opencv-matrix\n   data: [ 1., 2. ]\n",
+    "a:\n- - x\n  - y\n- b: c\n",
+    "%YAML:1.0\n---\na: 1\n...\n]\n",
+    "a:\nb: 1\n",
+)
+
+POSED = {
+    "noisy": lambda: bent_road(4, width=240, height=160, noise=0.3, seed=2),
+    "bent": lambda: bent_road(-9, width=240, height=160, bend=0.001, noise=0.1, seed=3),
+    "ceiling": lambda: bent_road(4, width=240, height=160, noise=0.3, seed=2)[::-1],
 }
 
 
 def _posed(name, calibration):
-    given = {
-        "noisy": lambda: bent_road(4, width=240, height=160, noise=0.3, seed=2),
-        "bent": lambda: bent_road(-9, width=240, height=160, bend=0.001, noise=0.1, seed=3),
-    }[name]()
-    found = estimate_roll(given)
-    try:
-        found = with_pose(found, calibration)
-    except RollcliError as error:
-        return str(error)
+    estimate = estimate_roll(POSED[name](), road="all" if name == "ceiling" else "auto")
+    found = made(with_pose, estimate, calibration)
+    if isinstance(found, str):
+        return found
     numbers = found.to_dict()
+    shown = ("status", "roll", "pitch", "height", "mess")
     return {
-        **{
-            key: numbers[key]
-            for key in numbers
-            if key.startswith(("status", "roll", "pitch", "height", "mess"))
-        },
+        **{key: value for key, value in numbers.items() if key.startswith(shown)},
         "horizon": horizon_row(found.tangent, calibration),
         "jacobian": pose_jacobian(found.tangent, calibration).ravel(),
+        "exact": taken_as_exact(calibration.for_size(240, 160), found.pitch or 0.1, found.height_m),
     }
 
 
-def _calibration(**values):
-    return Calibration(**{"fx": 200.0, "fy": 200.0, "cx": 119.5, "cy": 79.5, "baseline": 0.5, **values})
+POSES = {
+    "square": Calibration(200.0, 200.0, 119.5, 79.5, 0.5),
+    "no baseline": Calibration(200.0, 200.0, 119.5, 79.5),
+    "not square": Calibration(190.0, 215.0, 100.0, 90.0, 0.2, doffs=2.0),
+    "at the edge": Calibration(200.0, 205.0, 12.0, 8.0, 0.5),
+    "at the other edge": Calibration(200.0, 205.0, 225.0, 150.0, 0.5),
+    "of another size": Calibration(200.0, 200.0, 119.5, 79.5, 0.5, 0.0, 240, 150),
+    "behind": Calibration(200.0, 200.0, 119.5, 79.5, 0.5, doffs=-500.0),
+}
+SIZES = ((640, 480), (320, 240), (1280, 960), (600, 480), (640, 479), (641, 481), (1280, 959), (321, 241))
+SIZES = (*SIZES, (300, 480), (320, 480), (640, 200), (621, 400), (2484, 750))
+SOUND = {"fx": 700.0, "fy": 705.0, "cx": 320.0, "cy": 200.0, "baseline": 0.5, "doffs": 12.0}
+UNSOUND = {
+    "fx": (0.0, math.nan, 1e308, 0.99, 1.0, 1e6),
+    "fy": (-1.0, 1e-300, 1.01e6),
+    "cx": (math.inf, -1e300, 0.0, 639.0, 640.0),
+    "cy": (480.0, -1.0),
+    "baseline": (-0.5, 0.0, 1e-300, 1e300, 1e-4, 1e4, 1.01e4),
+    "doffs": (math.nan, 1e300, -1e6),
+    "width": (0, -3),
+}
+
+
+def _sizes(calibration):
+    """What images of every size have for a calibration, and what is said of it."""
+    return [
+        [made(calibration.for_size, *size), calibration.seems_of_another_size(*size), calibration.at_edge]
+        for size in SIZES
+    ]
 
 
 CASES = {
@@ -164,22 +308,39 @@ CASES = {
     "rig: as one": partial(_rig, "two drives", groups="none"),
     "rig: by pattern": partial(_rig, "two drives", groups="*/1"),
     **{f"file: {name}": partial(_read, *texts) for name, texts in FILES.items()},
+    "file: kalibr, and a camera": partial(_read, files.KALIBR, focal=500.0, principal_point=(320.0, 200.0)),
+    "file: opencv, and a baseline": partial(_read, files.OPENCV, baseline=0.5),
+    "file: no file, and a part": lambda: [
+        _read(**given) for given in ({"focal": 500.0}, {"baseline": 0.5}, {"principal_point": (3.0, 4.0)})
+    ],
     **{
         f"file: {name}, and numbers": partial(
-            _read, *texts, baseline=0.3, focal=500.0, principal_point=(320.0, 200.0)
+            _read, *texts, baseline=0.3, focal=500.0, principal_point=(320.0, 200.0), doffs=2.0
         )
         for name, texts in FILES.items()
-        if name in ("zed", "kalibr", "middlebury")
+        if name in ("zed", "kalibr", "middlebury", "no file")
     },
     **{
         f"pose: {name}, {key}": partial(_posed, name, calibration)
-        for name in ("noisy", "bent")
-        for key, calibration in {
-            "square": Calibration(200.0, 200.0, 119.5, 79.5, 0.5),
-            "no baseline": Calibration(200.0, 200.0, 119.5, 79.5),
-            "not square": Calibration(190.0, 215.0, 100.0, 90.0, 0.2, doffs=2.0),
-            "at the edge": Calibration(200.0, 205.0, 12.0, 8.0, 0.5),
-        }.items()
+        for name in POSED
+        for key, calibration in POSES.items()
+    },
+    "sizes": lambda: [
+        _sizes(Calibration(**SOUND | {"cx": cx}, **size))
+        for cx in (320.0, 575.5, 576.0)
+        for size in ({}, {"width": 640}, {"height": 480}, {"width": 640, "height": 480})
+    ],
+    "unsound": lambda: [
+        made(Calibration, **{**SOUND, "width": 640, "height": 480, name: value})
+        for name, values in UNSOUND.items()
+        for value in values
+    ],
+    "files: damaged": lambda: [_read(text) for text in DAMAGED],
+    "files: YAML": lambda: [made(parse_yaml, text, "f") for text in YAMLS],
+    "no rows": lambda: [made(assess_rig, rows) for rows in NO_ROWS],
+    **{
+        f"drives: {groups}": partial(_split, groups)
+        for groups in ("auto", "none", "data/run*", "data/run*/", "a")
     },
     "answers": lambda: [
         answer(Estimate(value, half), quantity, change=change)

@@ -14,8 +14,8 @@ from rollcli.errors import OutputError, UsageError
 from rollcli.files.encodings import read_disparity
 from rollcli.files.formats import read_image
 from rollcli.simulate import dataset as module
-from rollcli.simulate.build import render_frame, road_camber
-from rollcli.simulate.dataset import plan_dataset, write_dataset
+from rollcli.simulate.build import render_frame
+from rollcli.simulate.dataset import plan_dataset, truth_csv, write_dataset
 from rollcli.simulate.options import SimulateOptions
 from tests.make_sample_data import EXACT, SAMPLES, SPECS, make
 from tests.run_cli import contents, rows_of
@@ -52,52 +52,8 @@ def test_the_folder_holds_left_right_disparity_and_truth(tmp_path):
     assert done == stems
     expected = {f"{part}/{stem}.png" for part in ("left", "right", "disparity") for stem in stems}
     assert set(contents(tmp_path / "rig")) == {*expected, "calib.txt", "truth.csv", "truth.csv.run.json"}
-
-
-def test_truth_has_the_documented_columns_and_each_frames_values(rig):
-    first = (rig / "truth.csv").read_text().splitlines()[0]
-    assert first == (
-        "file,roll_deg,pitch_deg,scene,focal_px,cx_px,cy_px,baseline_m,height_m,curvature_per_m,seed,"
-        "cross_section,crossfall_percent,gutter_percent,camber,bend_per_m,roughness,lane_lo_deg,lane_hi_deg"
-    )
-    specs = plan_dataset(rig, TINY, overwrite=True).specs
-    for number, (row, spec) in enumerate(zip(rows(rig), specs, strict=True), 1):
-        assert row["file"] == f"frame_{number:04d}"
-        assert float(row["roll_deg"]) == pytest.approx(math.degrees(spec.roll), abs=1e-9)
-        assert float(row["pitch_deg"]) == pytest.approx(math.degrees(spec.pitch), abs=1e-9)
-        assert float(row["curvature_per_m"]) == pytest.approx(spec.curvature)
-        assert (row["scene"], float(row["focal_px"]), row["seed"]) == (spec.scene, 37.12, "9")
-        assert (float(row["baseline_m"]), float(row["height_m"])) == (0.54, 1.65)
-        assert (row["cx_px"], row["cy_px"]) == ("31.5", "23.5")
-        assert [row[name] for name in first.split(",")[-8:-4]] == ["flat", "0", "0", "0"]
-        assert row["roughness"] == ""
-        for end in ("lane_lo_deg", "lane_hi_deg"):
-            assert float(row[end]) == pytest.approx(math.degrees(spec.roll), abs=1e-5)
-
-
-def test_truth_says_what_the_road_is_like_across(tmp_path):
-    asked = SimulateOptions(
-        frames=24, size=(32, 24), cross_section="mixed", crossfall=(2, 3), gutter=(5, 5), kerb=(0.02, 0.05)
-    )
-    specs = plan_dataset(tmp_path, asked).specs
-    simulate(tmp_path, asked)
-    assert {spec.cross_section for spec in specs} == {"flat", "crown", "roof", "dish", "superelevated"}
-    for row, spec in zip(rows(tmp_path), specs, strict=True):
-        assert spec.kerb == (0.02, 0.05)
-        assert row["cross_section"] == spec.cross_section
-        assert float(row["gutter_percent"]) == 5
-        assert float(row["crossfall_percent"]) == pytest.approx(100 * spec.crossfall)
-        assert spec.crossfall == 0 if spec.cross_section == "flat" else 0.02 <= spec.crossfall <= 0.03
-        expected = "" if spec.cross_section == "roof" else f"{road_camber(spec) + 0.0:.10g}"
-        assert row["camber"] == expected
-
-
-def test_bends_are_as_asked_for_in_every_scene_and_stand_in_the_truth(tmp_path):
-    simulate(tmp_path, SimulateOptions(frames=12, size=(32, 24), bend=(0.002, 0.005), seed=4))
-    assert {row["scene"] for row in rows(tmp_path)} == {"bare", "open", "street", "verge"}
-    bends = [float(row["bend_per_m"]) for row in rows(tmp_path)]
-    assert len(set(bends)) == 12
-    assert all(0.002 <= bend <= 0.005 for bend in bends)
+    specs = plan_dataset(tmp_path / "rig", TINY, overwrite=True).specs
+    assert (tmp_path / "rig" / "truth.csv").read_bytes() == truth_csv(zip(stems, specs, strict=True))
 
 
 def projections(path):
@@ -172,18 +128,6 @@ def test_overwriting_leaves_no_frame_of_an_earlier_simulation_and_no_other_file_
     left = sorted(path.name for path in (rig / "left").iterdir())
     assert left == ["frame_0001.png", "frame_0099.png", "mine.png"]
     assert len(rows(rig)) == 1
-
-
-def test_a_folder_with_files_in_it_is_refused(tmp_path):
-    (tmp_path / "notes.txt").write_text("mine")
-    with pytest.raises(UsageError, match="--overwrite"):
-        plan_dataset(tmp_path, TINY)
-
-
-def test_a_file_in_place_of_the_folder_is_refused(tmp_path):
-    (tmp_path / "rig").write_text("")
-    with pytest.raises(UsageError, match="not a folder"):
-        plan_dataset(tmp_path / "rig", TINY, overwrite=True)
 
 
 def test_disparities_beyond_what_the_file_can_hold_are_no_data(tmp_path):
@@ -264,15 +208,20 @@ def test_a_damaged_record_is_not_resumed(rig, record):
         plan_dataset(rig, replace(TINY, resume=True))
 
 
-def test_a_folder_without_a_record_is_not_resumed(tmp_path):
-    (tmp_path / "notes.txt").write_text("mine")
-    with pytest.raises(UsageError, match=r"there is no truth\.csv\.run\.json"):
-        plan_dataset(tmp_path, replace(TINY, resume=True))
-
-
-def test_resume_and_overwrite_together_are_refused(tmp_path):
-    with pytest.raises(UsageError, match="either --resume or --overwrite"):
-        plan_dataset(tmp_path, replace(TINY, resume=True), overwrite=True)
+@pytest.mark.parametrize(
+    ("there", "resume", "overwrite", "said"),
+    [
+        ("rig/notes.txt", False, False, "--overwrite"),
+        ("rig/notes.txt", True, False, r"there is no truth\.csv\.run\.json"),
+        ("rig/notes.txt", True, True, "either --resume or --overwrite"),
+        ("rig", False, True, "not a folder"),
+    ],
+)
+def test_what_is_in_the_folders_place_is_not_written_over(tmp_path, there, resume, overwrite, said):
+    (tmp_path / there).parent.mkdir(exist_ok=True)
+    (tmp_path / there).write_text("mine")
+    with pytest.raises(UsageError, match=said):
+        plan_dataset(tmp_path / "rig", replace(TINY, resume=resume), overwrite=overwrite)
 
 
 STEMS = [f"frame_{number:04d}" for number in range(1, len(SPECS) + 1)]

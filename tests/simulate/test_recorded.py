@@ -6,13 +6,12 @@ from functools import partial
 
 import pytest
 
-from rollcli.errors import UsageError
 from rollcli.simulate.build import build_scene, carriageway_of, draw_dips, render_frame, road_camber
 from rollcli.simulate.dataset import calibration, lane_rolls_of, truth_csv
 from rollcli.simulate.options import SimulateOptions
 from rollcli.simulate.spec import FrameSpec, draw_specs
 from rollcli.simulate.views import render_view
-from tests.recorded import check
+from tests.recorded import check, made
 
 SMALL = {"size": (96, 72), "focal": 60.0}
 _frame = partial(FrameSpec, **SMALL)
@@ -63,19 +62,31 @@ def _rendered(spec):
 
 def _table(**options):
     """The true values of frames that are drawn, and the calibration of the last."""
-    try:
-        specs = draw_specs(SimulateOptions(frames=6, size=(96, 72), seed=3, **options))
-    except UsageError as error:
-        return str(error)
+    specs = made(draw_specs, SimulateOptions(frames=6, size=(96, 72), seed=3, **options))
+    if isinstance(specs, str):
+        return specs
     names = [f"frame{place}" for place in range(len(specs))]
     return [truth_csv(zip(names, specs, strict=True)).decode(), calibration(specs[-1]).decode()]
 
 
-def _refused(**values):
-    try:
-        return replace(FRAMES["street"], **values) and "is possible"
-    except UsageError as error:
-        return str(error)
+# at a limit of each kind and hardly beyond it
+LIMITS = {
+    "crossfall": (0.0, -0.001, 0.15, 0.151),
+    "gutter": (0.0, -0.001, 0.5, 0.501),
+    "kerb": ((0.0, 0.0), (0.2, 0.1), (0.0, 0.5), (0.0, 0.501), (-0.001, 0.0)),
+    "size": ((16, 16), (15, 16), (16, 15), (16384, 16), (16385, 16), (16, 16384), (16, 16385), (0, 0)),
+    "principal_point": ((0.0, 0.0), (95.0, 71.0), (95.1, 3.0), (3.0, 71.1), (-0.1, 3.0), (3.0, -0.1)),
+    "roll": (math.pi / 2, -math.pi / 2, -1.571, 1.571),
+    "pitch": (math.radians(60), -math.radians(60), -1.048, 1.048),
+    "curvature": (0.01, -0.01, 0.0101, -0.0101),
+    "bend": (0.02, -0.02, 0.0201, -0.0201),
+    "height": (0.0, -1.65, 0.01),
+}
+
+
+def _possible(**values):
+    found = made(replace, FrameSpec(**SMALL, height=3.0), **values)
+    return found if isinstance(found, str) else "is possible"
 
 
 CASES = {
@@ -95,32 +106,24 @@ CASES = {
     ),
     "drawn with kerbs": partial(_table, scene="street", kerb=(0.0, 0.2), roll_deg=(3.0, 3.0), focal=80.0),
     "drawn beyond": partial(_table, principal_offset=(-60.0, 0.0)),
-    "possible": lambda: (
-        [
-            _refused(**{name: value})
-            for name, values in {
-                "crossfall": (0.0, -0.01, 0.1, 0.11, 0.16, 0.5),
-                "gutter": (0.0, -0.01, 0.1, 0.11, 0.16, 0.5),
-                "kerb": ((0.0, 0.0), (0.2, 0.1), (0.1, 0.3), (0.0, 0.31), (0.0, 0.6), (-0.1, 0.1)),
-                "size": ((16, 16), (15, 16), (16, 15), (16385, 20), (16, 16384), (20, 16385)),
-                "principal_point": (
-                    (0.0, 0.0),
-                    (95.0, 71.0),
-                    (95.5, 3.0),
-                    (3.0, 71.5),
-                    (-0.5, 3.0),
-                    (3.0, -1.0),
-                ),
-                "roll": (math.pi / 2, -1.6, 1.6),
-                "pitch": (math.pi / 3, -1.05, 1.05),
-                "curvature": (0.01, -0.01, 0.0101, -0.02),
-                "bend": (0.02, -0.02, 0.0201, -0.03),
-                "height": (0.0, -1.0, 0.01),
-            }.items()
-            for value in values
-        ]
-        + [_refused(roll=-1.2, height=0.5), _refused(roll=-1.2, pitch=0.5, height=0.4)]
-    ),
+    "drawn beside": partial(_table, principal_point=(50.0, 30.0), principal_offset=(5.0, 5.0)),
+    "drawn bent": partial(_table, curvature=(0.001, 0.002), bend=(0.002, 0.005), cross_section="mixed"),
+    "drawn beyond too": lambda: [
+        _table(**options)
+        for options in (
+            {"roll_deg": (-91.0, 1.0)},
+            {"pitch_deg": (0.0, 61.0)},
+            {"height": (0.3, 0.3), "roll_deg": (-57.0, 57.0)},
+            {"height": (0.0, 1.6)},
+            {"principal_offset": (0.0, 400.0)},
+            {"crossfall": (2.0, 20.0)},
+        )
+    ],
+    "possible": lambda: [
+        *(_possible(**{name: value}) for name, values in LIMITS.items() for value in values),
+        _possible(roll=-1.2, height=0.5),
+        _possible(roll=-1.2, pitch=0.5, height=0.4),
+    ],
 }
 
 

@@ -3,13 +3,12 @@
 import functools
 import itertools
 import math
-import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from rollcli.errors import EstimationError, UsageError
+from rollcli.errors import EstimationError
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.road.find import road_plane
 from rollcli.files.formats import read_image
@@ -199,50 +198,6 @@ def test_only_pixels_of_the_mask_are_used():
 
     assert math.degrees(estimate.theta) == pytest.approx(math.degrees(0.1), abs=0.02)
     assert not (estimate.road_mask & ~road).any()
-
-
-@pytest.mark.parametrize("max_roll_deg", [0, -5, 89.001, float("nan")])
-def test_a_bound_that_cannot_be_is_refused(max_roll_deg):
-    with pytest.raises(UsageError, match="largest roll"):
-        estimate_roll(np.ones((50, 50)), max_roll=math.radians(max_roll_deg))
-
-
-@pytest.mark.parametrize(
-    ("asked", "words"),
-    [
-        ({"method": "magic"}, "method 'magic': choose one of gd, gss, exact"),
-        ({"model": "cubic"}, "model 'cubic': choose one of parabola, line"),
-        ({"road": "none"}, "road 'none': choose one of auto, all"),
-        ({"lambda0": 0.0}, "lambda0 0.0: give a positive number, or auto"),
-        ({"lambda0": math.inf}, "lambda0 inf: give a positive number, or auto"),
-        ({"tolerance": 0.0}, "a tolerance of 0 degrees: give a positive angle"),
-        ({"tolerance": math.inf}, "a tolerance of inf degrees: give a positive angle"),
-        ({"tolerance": math.nan}, "a tolerance of nan degrees: give a positive angle"),
-        ({"seed": -1}, "seed"),
-        ({"max_interval": 0.0}, "a widest interval of 0 degrees: give a positive angle"),
-        ({"max_interval": math.nan}, "a widest interval of nan degrees: give a positive angle"),
-    ],
-)
-def test_what_cannot_be_asked_is_refused(asked, words):
-    with pytest.raises(UsageError, match=f"^{re.escape(words)}"):
-        estimate_roll(np.ones((50, 50)), **asked)
-
-
-def test_what_is_hardly_within_its_range_is_taken():
-    disparity, _ = true_disparity(FrameSpec(scene="bare", roll=0.1, pitch=0.05, seed=3, size=(160, 120)))
-
-    estimate_roll(disparity, max_roll=math.radians(89), max_interval=1e-9, lambda0=1e-9, tolerance=1e-300)
-
-
-@pytest.mark.parametrize("disparity", [np.ones(50), np.ones((5, 5, 3)), np.full((50, 50), "1")])
-def test_what_is_no_map_is_refused(disparity):
-    with pytest.raises(UsageError):
-        estimate_roll(disparity)
-
-
-def test_a_mask_of_another_size_is_refused():
-    with pytest.raises(UsageError, match="the mask is 5x4, the map 50x40"):
-        estimate_roll(np.ones((40, 50)), mask=np.ones((4, 5)))
 
 
 needs_streets = pytest.mark.skipif(

@@ -69,14 +69,6 @@ def test_frames_without_an_order_need_no_long_blocks():
     assert 2 * 0.1 / np.sqrt(60) < found.now.ci95 < 0.06
 
 
-@pytest.mark.parametrize("frames", [2, 7, 8, 60])
-def test_there_is_an_interval_from_eight_frames_on(frames):
-    values, errors = drive(4, frames, phi=0.95, sd=0.3, errors=(0.02, 0.05))
-    found = assess_sequence(values, errors)
-    assert (found.now.ci95 is not None) == (found.drift.ci95 is not None) == (frames >= 8)
-    assert (found.status == "few") == (frames < 8)
-
-
 def test_with_a_drift_the_rig_is_as_it_is_at_the_end():
     rng = np.random.default_rng(0)
     found = assess_sequence(np.linspace(0.78, -0.01, 120) + rng.normal(0, 0.1, 120), np.full(120, 0.1))
