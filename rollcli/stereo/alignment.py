@@ -36,9 +36,6 @@ from rollcli.stereo.views import (
 )
 
 Floats = NDArray[np.float32]
-# px, and `smoothed_at_pixels` smooths as much again: more takes away the grain that tells on an empty road,
-# less leaves the noise
-_SMOOTHING = 0.5
 _KNOWN = 0.7  # share of a block that has to have a disparity
 _RIDGE = 0.2  # squared grey levels per pixel: gradients along the rows below this are noise
 _LEAST = 2.0  # the same, across the rows: a block with less says nothing
@@ -155,7 +152,7 @@ def measure_misalignment(
         last = fit = fit_rows(seen, found, last)
         reach = fit.lies.reach(*disparity.shape)
         step = fit.lies.times(_LONGEST_STEP / max(reach, _LONGEST_STEP))
-        before, found = found, found + step
+        before, found = found, (found + step).rounded(*disparity.shape)
         blocks.follow(step)
         enough = _SMALL_STEP if done < _UNSURE_FROM else _UNSURE_STEP
         if reach < enough or _is_plainly_level(found, fit, disparity.shape):
@@ -285,8 +282,11 @@ def _may_tell(down: Floats) -> NDArray[np.bool_]:
 
 
 def _smooth(view: View) -> Floats:
-    kernel = cv2.getGaussianKernel(5, _SMOOTHING)
-    return cv2.sepFilter2D(view, cv2.CV_32F, kernel, kernel).astype(np.float32, copy=False)
+    """Smooth a view by half a pixel, beside what is smoothed for grey levels between pixels.
+
+    More takes away the grain that tells on an empty road, less leaves the noise.
+    """
+    return smoothed_at_pixels(view.astype(np.float32))
 
 
 def _gradients(view: Floats) -> tuple[Floats, Floats]:

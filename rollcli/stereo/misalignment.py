@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+_SAME = 2.0**-10  # px: two misalignments that differ by less anywhere are one
 _NEAR = 1 / 16  # of the width of a view: the disparity of what is near, where a shift by a tilt is told
 
 
@@ -60,6 +61,16 @@ class Misalignment:
         """Return this misalignment, of views `factor` times as large."""
         twist, curve = self.twist / factor, self.curve / factor
         return Misalignment(self.offset * factor, self.rotation, self.scale, twist, self.tilt, curve)
+
+    def rounded(self, height: int, width: int) -> "Misalignment":
+        """Return the same, each part to `_SAME` in a view of this size.
+
+        Versions of OpenCV and NumPy differ in the last digits of sums. Here they are dropped: of points that
+        differ by a billionth, some are rounded up and some down where a view is read.
+        """
+        units = Misalignment(1, 1, 1, 1, 1, 1).shifts(height, width)
+        parts = zip(self.parts, units, strict=True)
+        return Misalignment(*(round(part * unit / _SAME) * _SAME / unit for part, unit in parts))
 
     def down(self, x: Any, y: Any, near: Any = 0.0) -> Any:
         """Return how far down points (x, y) from the centre are seen, pixels; numbers, or arrays alike.

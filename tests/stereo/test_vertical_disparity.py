@@ -309,3 +309,23 @@ def measured(offset=0.0, scale=0.0, error=0.01, spread=0.1, rotation=0.0):
 )
 def test_an_unusual_scale_is_sure_where_blocks_and_views_agree(coarse, fine, sure):
     assert first_looks._is_sure(coarse, fine, SHAPE) == sure
+
+
+def test_smoothed_views_and_their_gradients_are_exact_so_every_opencv_has_the_same():
+    views = tuple(np.random.default_rng(seed).integers(0, 256, (40, 56), dtype=np.uint8) for seed in (1, 2))
+
+    found = Texture.of(views)
+
+    def filtered(image, across, down):
+        """Whole numbers in float64, which lose nothing."""
+        wide = np.apply_along_axis(np.convolve, 1, image, across[::-1], "valid")
+        return np.apply_along_axis(np.convolve, 0, wide, down[::-1], "valid")
+
+    smooth, odd = np.array([1, 6, 1]), np.array([4, 4])
+    left, right = (filtered(filtered(view.astype(float), smooth, smooth), smooth, smooth) for view in views)
+    np.testing.assert_array_equal(found.left[2:-2, 2:-2] * 8.0**4, left)
+    np.testing.assert_array_equal(found.right[4:-4:2, 4:-4:2] * 8.0**4, right)
+    once = filtered(views[1].astype(float), smooth, smooth)
+    np.testing.assert_array_equal(found.right[3:-3:2, 3:-3:2] * 8.0**4, filtered(once, odd, odd))
+    np.testing.assert_array_equal(found.across[3:-3, 3:-3] * 8.0**5, filtered(left, [-1, 0, 1], [1, 2, 1]))
+    np.testing.assert_array_equal(found.down[3:-3, 3:-3] * 8.0**5, filtered(left, [1, 2, 1], [-1, 0, 1]))
