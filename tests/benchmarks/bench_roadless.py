@@ -1,4 +1,4 @@
-"""How many scenes without a road are called ok: rooms, tables, boards, shelves, flying boxes.
+"""How many scenes without a road are called ok: rooms, tables, boards, shelves, stairs, roofs, flying boxes.
 
     python tests/benchmarks/bench_roadless.py [FRAMES [SEED]]
 
@@ -23,7 +23,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from rollcli.errors import EstimationError
 from rollcli.estimator.estimate import estimate_roll
 
-KINDS = ("room", "table", "board", "boxes", "shelf", "desk")
+# a scene depends on its kind's place here
+KINDS = ("room", "table", "board", "boxes", "shelf", "desk", "stairs", "books", "robot", "roofs", "wall")
 
 Array = NDArray[np.float64]
 Rectangle = tuple[Array, Array, Array]  # a corner and two edges, camera coordinates: right, down, ahead
@@ -187,7 +188,89 @@ def _shelf(rng: np.random.Generator) -> Iterator[Rectangle]:
     yield from _box(rotation, np.array([-4.0, -3, -3]), np.array([4.0, 3, ahead[2] + deep]))
 
 
-_SCENES = {"room": _room, "table": _table, "board": _board, "boxes": _boxes, "shelf": _shelf, "desk": _desk}
+def _stairs(rng: np.random.Generator) -> Iterator[Rectangle]:
+    """Yield stairs that go up or down ahead, from where the camera stands, between two walls."""
+    rotation, eye = _tilt(rng, (-5, 45), 8), rng.uniform(1.0, 1.7)
+    start, tread, rise = (
+        rng.uniform(0.3, 2),
+        rng.uniform(0.25, 0.35),
+        rng.choice([-1, 1]) * rng.uniform(0.14, 0.2),
+    )
+    half, steps = rng.uniform(0.6, 1.5), rng.integers(6, 20)
+    yield from _box(rotation, np.array([-half, eye, -2.0]), np.array([half, eye + 4, start]))
+    for step in range(1, steps + 1):
+        front, top = start + (step - 1) * tread, eye - step * rise
+        yield from _box(rotation, np.array([-half, top, front]), np.array([half, eye + 4, front + tread]))
+    far = start + steps * tread
+    yield from _box(
+        rotation, np.array([-half, -6.0, -2.0]), np.array([half, eye + 5, far + rng.uniform(0, 2)])
+    )
+
+
+def _books(rng: np.random.Generator) -> Iterator[Rectangle]:
+    """Yield a row of books in a shelf: their backs and, from above, their tops are nearly planes."""
+    rotation, distance = _tilt(rng, (-10, 60), 15), rng.uniform(0.3, 0.9)
+    ahead, height = distance * rotation[2], rng.uniform(0.18, 0.3)
+    left = ahead[0] - rng.uniform(0.4, 1)
+    yield from _box(
+        rotation,
+        np.array([left, ahead[1] + height, ahead[2]]),
+        np.array([left + 2, ahead[1] + height + 0.02, ahead[2] + 0.3]),
+    )
+    while left < ahead[0] + 1:
+        thick, tall, deep = rng.uniform((0.01, 0.8 * height, 0), (0.06, height, 0.03))
+        low = np.array([left, ahead[1] + height - tall, ahead[2] + deep])
+        yield from _box(rotation, low, np.array([left + thick, ahead[1] + height, ahead[2] + 0.25]))
+        left += thick
+    yield from _box(rotation, np.array([-3.0, -2, -3]), np.array([3.0, 2, ahead[2] + 0.3]))
+
+
+def _robot(rng: np.random.Generator) -> Iterator[Rectangle]:
+    """Yield a robot's table seen from above, with links of its arm that hang over it at all angles."""
+    yield from (table := list(_table(rng)))
+    middle = table[1][0] + (table[1][1] + table[1][2]) / 2  # of the table
+    for _ in range(rng.integers(1, 5)):
+        turned, half = np.linalg.qr(rng.normal(0, 1, (3, 3)))[0], rng.uniform(0.03, 0.08)
+        place = middle * rng.uniform(0.5, 0.95) + rng.normal(0, 0.15, 3)
+        for corner, one, other in _box(turned, -np.array([half, half, 0.25]), np.array([half, half, 0.25])):
+            yield corner + place, one, other
+
+
+def _roofs(rng: np.random.Generator) -> Iterator[Rectangle]:
+    """Yield flat roofs of several heights below a drone, and the ground between them."""
+    rotation, over = _tilt(rng, (20, 75), 8), rng.uniform(3, 15)
+    ahead = rotation[2] * over / rotation[2][1]
+    for _ in range(rng.integers(2, 9)):
+        x, z = ahead[[0, 2]] + rng.normal(0, over / 2, 2)
+        wide, deep = rng.uniform(4, 12, 2)
+        top = over + rng.uniform(-2, 6)
+        yield from _box(rotation, np.array([x, top, z]), np.array([x + wide, over + 12, z + deep]))
+    yield from _box(rotation, np.array([-200.0, over + 10, -200]), np.array([200.0, over + 12, 200]))
+
+
+def _wall(rng: np.random.Generator) -> Iterator[Rectangle]:
+    """Yield walls beside a camera that is held on its side: they lie below it as a road would."""
+    rotation = _tilt(rng, (-10, 10), 5)
+    turn = math.radians(rng.choice([-1, 1]) * rng.uniform(50, 110))
+    rolled = np.array([[math.cos(turn), math.sin(turn), 0], [-math.sin(turn), math.cos(turn), 0], [0, 0, 1]])
+    eye, beside, far = rng.uniform(1, 1.7), rng.uniform(0.4, 1.5, 2), rng.uniform(2, 8)
+    room = np.array([-beside[0], eye - 2.6, -2.0]), np.array([beside[1], eye, far])
+    yield from _box(rolled @ rotation, *room)
+
+
+_SCENES = {
+    "room": _room,
+    "table": _table,
+    "board": _board,
+    "boxes": _boxes,
+    "shelf": _shelf,
+    "desk": _desk,
+    "stairs": _stairs,
+    "books": _books,
+    "robot": _robot,
+    "roofs": _roofs,
+    "wall": _wall,
+}
 
 
 def main() -> None:
