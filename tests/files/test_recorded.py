@@ -110,7 +110,22 @@ def _read(line):
     return READ[kind](text.encode().decode("unicode_escape").encode("latin-1"))
 
 
-VALUES = (-1.0, 0.0, 1.0, 2.0, 7.5, 16.0, 300.0, 32767.0, 65534.0, 65535.0)
+VALUES = (
+    -math.inf,
+    -1.0,
+    -0.0,
+    1.0,
+    2.0,
+    7.5,
+    16.0,
+    255.0,
+    300.0,
+    32767.0,
+    65534.0,
+    65535.0,
+    math.inf,
+    math.nan,
+)
 
 
 def _to_pixels(kind, **options):
@@ -152,7 +167,6 @@ CALIBRATIONS = {
     "no baseline": Calibration(fx=100, fy=100, cx=1, cy=0.5),
     "whole": Calibration(fx=100, fy=100, cx=1, cy=0.5, baseline=0.5, doffs=12.5),
 }
-ROW = Row("a,b.png", "", "ok", *(1.23456789012 + place for place in range(7)), method="gd", iterations=3)
 ROWS = {
     "numbers": Row(
         "a", **{name: 1.23456789012 for name, kind in column_types(FURTHER).items() if kind is float}
@@ -220,6 +234,7 @@ CASES = {
                 ("sgbm", None),
                 ("px", 0.5),
                 ("depth", None),
+                ("middlebury", None),
             ),
         )
     },
