@@ -1,7 +1,8 @@
 """What this version answers, recorded: no other version answers otherwise unless its commit says why.
 
-``python -m tests.recorded [PACKAGE ...]`` makes the records anew. Each package has its cases in
-``tests/PACKAGE/test_recorded.py`` and its answers in ``tests/PACKAGE/recorded.json``, a line a case.
+``python -m tests.recorded [PACKAGE ...]`` makes the records anew. A package has its cases in
+``tests/PACKAGE/test_recorded.py`` and its answers in ``tests/PACKAGE/recorded.json``, a line a case, or
+sessions at a prompt in ``tests/PACKAGE/sessions.txt``; see `tests.sessions`.
 """
 
 import dataclasses
@@ -9,16 +10,22 @@ import functools
 import importlib
 import json
 import sys
+import tempfile
 from collections.abc import Mapping
 from enum import Enum
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from rollcli.errors import RollcliError
+from rollcli.run.workers.pool import limit_blas_threads
 
-PACKAGES = ("estimator", "evaluate", "pictures", "rig", "simulate", "stereo")
+limit_blas_threads()  # before NumPy is loaded, as every command does
+import numpy as np  # noqa: E402
+
+from tests import sessions  # noqa: E402
+
+PACKAGES = ("cli", "estimator", "evaluate", "files", "pictures", "rig", "run", "simulate", "stereo")
 _GRID = 5  # rows and columns of an image whose values are recorded
 _ROUNDING = 1e-5  # what is smaller may be nothing, rounded
 _DIGITS = 8
@@ -96,9 +103,13 @@ def _leaves(value, name=""):
 def main(packages):
     """Write the records."""
     for package in packages or PACKAGES:
-        cases = importlib.import_module(f"tests.{package}.test_recorded").CASES
+        if sessions.path_of(package).exists():
+            with tempfile.TemporaryDirectory() as folder:
+                sessions.record(package, Path(folder))
+        cases = getattr(importlib.import_module(f"tests.{package}.test_recorded"), "CASES", {})
         lines = [f"{json.dumps(name)}: {json.dumps(_plain(make()))}" for name, make in cases.items()]
-        _path(package).write_text("{\n" + ",\n".join(lines) + "\n}\n", "utf-8", newline="\n")
+        if lines:
+            _path(package).write_text("{\n" + ",\n".join(lines) + "\n}\n", "utf-8", newline="\n")
 
 
 if __name__ == "__main__":

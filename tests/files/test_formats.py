@@ -54,36 +54,6 @@ def test_names_of_any_alphabet_are_read(tmp_path):
     assert read_stored(path).values.shape == (2, 3)
 
 
-@pytest.mark.parametrize(
-    ("content", "reason"),
-    [
-        (b"", "is empty"),
-        (b"frame,roll\n1,2\n", r"is text; a disparity map is a PNG, TIFF, NPY, NPZ, PFM or EXR file"),
-        (b"\x89PN", "is only 3 bytes long; "),
-        (b"abcdefg", "is only 7 bytes long; "),
-        (b"abcdefgh", "is text; a disparity map is a PNG, TIFF, NPY, NPZ, PFM or EXR file$"),
-        (
-            b"abcdefg\0",
-            "is no file of a known format; a disparity map is a PNG, TIFF, NPY, NPZ, PFM or EXR file$",
-        ),
-        (bytes(1000), "is no file of a known format"),
-        (
-            b"\xff\xd8\xff\xe0" + bytes(100),
-            "is a JPEG image; .*; photographs are given by --left and --right$",
-        ),
-        (b"BM" + bytes(100), "is a BMP image; .*; photographs are given by --left and --right$"),
-        (b"PK\x03\x04" + bytes(100), "is a damaged ZIP or NPZ archive"),
-        (b"GIF89a" + bytes(100), "is a GIF image"),
-    ],
-)
-def test_what_is_no_map_is_named(tmp_path, content, reason):
-    path = tmp_path / "map.png"
-    path.write_bytes(content)
-
-    with pytest.raises(InputError, match=rf"map.png: {reason}"):
-        read_stored(path)
-
-
 def test_paths_that_are_no_files_are_named(tmp_path):
     dangling = tmp_path / "dangling.png"
     dangling.symlink_to(tmp_path / "gone.png")

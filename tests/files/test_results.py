@@ -10,19 +10,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rollcli.errors import InputError, UsageError
+from rollcli.errors import InputError
 from rollcli.files.codecs.parquet import encode_parquet
-from rollcli.files.matching import is_elsewhere, match_paths
 from rollcli.files.result_columns import read_columns
 from rollcli.files.results import (
-    ALIGNMENT_COLUMNS,
-    COLUMNS,
-    FURTHER,
     STATUSES,
-    TIMING,
     Row,
     column_types,
-    columns,
     format_header,
     format_row,
     parse_rows,
@@ -58,7 +52,6 @@ ROW = Row(
     right_twist_px=-0.00001,
     message='one, "two"',
 )
-FAILED = Row(file="maps/b.png", status="error", message="maps/b.png: is empty")
 
 
 def test_a_row_of_csv_has_fixed_digits_and_rfc_4180_quotes():
@@ -69,48 +62,6 @@ def test_a_row_of_csv_has_fixed_digits_and_rfc_4180_quotes():
     )
 
 
-@pytest.mark.parametrize("text", ["a,b", 'a"b', "a\nb", "a\rb", "\r"])
-def test_what_csv_gives_a_meaning_is_quoted(text):
-    line = format_row(Row(file=text), "csv")
-    assert line.startswith(b'"' + text.replace('"', '""').encode() + b'",')
-    assert tuple(parse_rows(format_header("csv") + line, "x")) == (Row(file=text),)
-
-
-def test_an_error_row_holds_no_numbers():
-    assert format_row(FAILED, "csv") == b"maps/b.png,,error" + b"," * 24 + b"maps/b.png: is empty\n"
-
-
-def test_timing_is_a_column_of_its_own_at_the_end():
-    assert columns([TIMING]) == (*COLUMNS, "elapsed_ms")
-    assert format_row(Row("a", elapsed_ms=1.23456), "csv", [TIMING]).endswith(b",1.235\n")
-
-
-@pytest.mark.parametrize("form", ["csv", "jsonl"])
-@pytest.mark.parametrize("row", [ROW, FAILED, Row("new\nline,\udcff.png", message="a"), Row("=ü/雨.png")])
-def test_what_is_written_is_read_back(form, row):
-    data = format_header(form) + format_row(row, form)
-    (back,) = parse_rows(data, "rolls")
-    assert (back.file, back.status, back.message, back.converged) == (
-        row.file,
-        row.status,
-        row.message,
-        row.converged,
-    )
-    assert format_row(back, form) == format_row(row, form)
-
-
-@pytest.mark.parametrize(
-    ("theta_deg", "text"),
-    [(-1e-9, "0.000000"), (0.0, "0.000000"), (-89.9999999, "90.000000"), (90.0, "90.000000")],
-)
-def test_rounding_makes_no_negative_zero_and_stays_within_the_half_open_range(theta_deg, text):
-    assert format_row(Row("a", roll_deg=theta_deg), "csv").split(b",")[3].decode() == text
-
-
-def test_numbers_that_are_not_finite_are_left_empty():
-    assert format_row(Row("a", rmse_px=math.nan, alpha0=math.inf), "csv") == b"a,,error" + b"," * 24 + b"\n"
-
-
 def test_a_result_is_read_with_the_record_of_its_run(tmp_path):
     path = tmp_path / "rolls.csv"
     path.write_bytes(format_header("csv") + format_row(ROW, "csv"))
@@ -119,34 +70,6 @@ def test_a_result_is_read_with_the_record_of_its_run(tmp_path):
     result = read_result(path)
     assert result.run == {"rollcli": "1"}
     assert result.rows[0].roll_deg == -1.25
-
-
-def test_further_columns_and_a_byte_order_mark_do_no_harm(tmp_path):
-    path = tmp_path / "edited.csv"
-    path.write_bytes(b"\xef\xbb\xbfroll_deg,note,file,status\r\n1.5,mine,a.png,ok\r\n\r\n")
-    (row,) = read_result(path).rows
-    assert (row.file, row.roll_deg, row.method, row.width) == ("a.png", 1.5, "", None)
-
-
-@pytest.mark.parametrize(
-    ("data", "reason"),
-    [
-        (b"", "no column file, status, roll_deg"),
-        (b"frame,roll\n1,2\n", "not a result of rollcli estimate: it has no column file"),
-        (b"file,status,roll_deg\na,ok,much\n", "line 2: 'much' is no value for roll_deg"),
-        (b"file,status,roll_deg\na,ok\n", "line 2: 2 values for 3 columns"),
-        (b'file,status,roll_deg\n"a,ok,1\n', "is not CSV"),
-        (b"\x89PNG\r\n\x1a\n\x00", "not a result"),
-        (b'{"a": 1}\n', "line 1: is no row of rollcli estimate: no file"),
-        (b'{"a": \n', "line 1: is not JSON"),
-    ],
-)
-def test_what_is_no_result_is_refused_with_its_line(tmp_path, data, reason):
-    path = tmp_path / "rolls"
-    path.write_bytes(data)
-    with pytest.raises(InputError, match=reason) as caught:
-        read_result(path)
-    assert str(caught.value).startswith(str(path))
 
 
 def test_a_missing_result_is_an_input_error(tmp_path):
@@ -199,84 +122,11 @@ def test_a_name_that_leaves_no_room_for_its_record_has_none(tmp_path):
     assert read_result(path).run is None
 
 
-def test_every_number_has_its_digits_in_every_form():
-    numbers = {name: 1.23456789012 for name, kind in column_types(FURTHER).items() if kind is float}
-    digits = {"rmse_px": "1.23457", **dict.fromkeys(("alpha0", "alpha1", "alpha2"), "1.23456789")}
-    texts = {name: digits.get(name, "1.234568") for name in numbers} | {"elapsed_ms": "1.235"}
-    texts |= dict.fromkeys(ALIGNMENT_COLUMNS, "1.2346")
-
-    line = format_row(Row("a", **numbers), "csv", FURTHER).decode().rstrip("\n").split(",")
-    values = json.loads(format_row(Row("a", **numbers), "jsonl", FURTHER))
-
-    assert {name: line[columns(FURTHER).index(name)] for name in numbers} == texts
-    assert {name: values[name] for name in numbers} == {name: float(text) for name, text in texts.items()}
-
-
-@pytest.mark.parametrize(
-    ("name", "text", "value"),
-    [
-        ("converged", "true", True),
-        ("converged", "False", False),
-        ("global_minimum", "FALSE", False),
-        ("iterations", "12", 12),
-        ("width", "1242", 1242),
-        ("roll_deg", "-90", -90.0),
-        ("roll_deg", "90", 90.0),
-        ("roll_ci95_deg", "0", 0.0),
-        ("pitch_deg", "-90", -90.0),
-        ("height_m", "0", 0.0),
-        ("rmse_px", "-1e300", -1e300),
-        ("method", "gd", "gd"),
-    ],
-)
-def test_a_cell_is_read_as_its_column_has_it(name, text, value):
-    values = {"file": "a", "status": "ok", "roll_deg": "1", name: text}
-    data = f"{','.join(values)}\n{','.join(values.values())}\n".encode()
-    (row,) = parse_rows(data, "x")
-    assert getattr(row, name) == value
-    assert type(getattr(row, name)) is type(value)
-
-
-@pytest.mark.parametrize(
-    ("name", "text"),
-    [
-        ("converged", "yes"),
-        ("global_minimum", "1"),
-        ("iterations", "1.5"),
-        ("width", "wide"),
-        ("roll_deg", "-90.1"),
-        ("roll_deg", "90.1"),
-        ("roll_deg", "nan"),
-        ("roll_ci95_deg", "-0.1"),
-        ("pitch_deg", "inf"),
-        ("height_m", "-1"),
-        ("alpha0", "nan"),
-        ("alpha0", "-inf"),
-    ],
-)
-def test_a_cell_that_its_column_cannot_have_is_refused(name, text):
-    values = {"file": "a", "status": "ok", "roll_deg": "1", name: text}
-    data = f"{','.join(values)}\n{','.join(values.values())}\n".encode()
-    with pytest.raises(InputError, match=rf"^x: line 2: '{text}' is no value for {name}$"):
-        list(parse_rows(data, "x"))
-
-
 @pytest.mark.parametrize("before", [b"", b"\xef\xbb\xbf", b" \n\n", b" " * 999, b"\xef\xbb\xbf  "])
 def test_white_space_may_stand_before_the_first_line_of_json(before):
     line = b'{"file": "a", "status": "ok", "roll_deg": 1}\n'
     (row,) = parse_rows(before + line, "x")
     assert (row.file, row.roll_deg) == ("a", 1.0)
-
-
-def test_lines_are_numbered_in_every_form():
-    good, bad = (
-        '{"file": "a", "status": "ok", "roll_deg": 1}',
-        '{"file": "a", "status": "bad", "roll_deg": 1}',
-    )
-    with pytest.raises(InputError, match=r"^x: line 4: 'bad' is no status: ok, suspect, error$"):
-        list(parse_rows(f"{good}\n\n{good}\n{bad}\n".encode(), "x"))
-    with pytest.raises(InputError, match=r"^x: line 5: 'bad' is no status"):  # the quoted one takes two lines
-        list(parse_rows(b'file,status,roll_deg\n"a\nb",ok,1\na,ok,1\na,bad,1\n', "x"))
 
 
 HEADER = "file,right_file,status,roll_deg,roll_ci95_deg,pitch_deg,height_m"
@@ -414,55 +264,3 @@ def test_a_row_names_a_file(tmp_path, line, said):
     for read in (lambda: read_columns(str(path), ["roll_deg"]), lambda: read_result(path)):
         with pytest.raises(InputError, match=rf"rolls: {said}$"):
             read()
-
-
-@pytest.mark.parametrize(
-    ("names", "rows", "expected"),
-    [
-        (["a.png", "b.png"], ["b.tif", "a.tif"], [1, 0]),
-        (["../maps/a.png"], ["/data/maps/a.png"], [0]),
-        (["maps/a.png", "maps/c.png"], ["left/a.png"], [0, None]),
-        (["out/x/0.png", "out/y/0.png"], ["left/y/0.png", "left/x/0.png"], [1, 0]),
-        (["a.b.png"], ["a.png", "a.b.png"], [1]),
-        ([".hidden", "img.0001"], ["img.0001.png", ".hidden"], [1, 0]),
-        ([], ["a.png"], []),
-    ],
-)
-def test_the_same_stem_is_a_match_and_folders_decide_between_several(names, rows, expected):
-    assert match_paths(names, rows, "rolls.csv") == expected
-
-
-def test_rows_that_fit_equally_well_are_named():
-    with pytest.raises(UsageError, match=r"rolls.csv: more than one row fits maps/0.png: a/0.png, b/0.png"):
-        match_paths(["maps/0.png"], ["a/0.png", "b/0.png", "c/1.png"], "rolls.csv")
-
-
-def test_one_row_for_two_files_is_refused():
-    with pytest.raises(UsageError, match=r"the row of left/0.png fits a/0.png and b/0.png"):
-        match_paths(["a/0.png", "b/0.png"], ["left/0.png"], "rolls.csv")
-
-
-@pytest.mark.parametrize(
-    ("name", "row", "of_pair", "elsewhere"),
-    [
-        ("b/0.png", "a/0.png", False, True),
-        ("day2/maps/0.png", "day1/maps/0.png", False, True),
-        ("/data/day2/maps/0.png", "/data/day1/maps/0.png", False, True),
-        ("day2/maps/0.png", "day1/left/0.png", True, True),
-        ("maps/0.png", "left/0.png", True, False),
-        ("floats/0.tif", "maps/0.png", False, False),
-        ("day2/floats/0.tif", "day1/maps/0.png", False, True),
-        ("day1/maps/0.png", "day1/left/0.png", True, False),
-        ("out/x/0.png", "left/x/0.png", True, False),
-        ("out/maps/0.png", "day1/out/maps/0.png", False, False),
-        ("0.png", "day1/maps/0.png", False, False),
-        ("../maps/0.png", "maps/0.png", False, False),
-        ("./maps/0.png", "maps/0.tif", False, False),
-        ("/mnt/run7/maps/0.png", "/data/run7/maps/0.png", False, False),
-        ("run7/maps/0.png", "/data/drives/run7/maps/0.png", False, False),
-        ("s3://mine/run7/0.png", "run7/0.png", False, False),
-        ("s3://mine/run8/0.png", "s3://mine/run7/0.png", False, True),
-    ],
-)
-def test_a_row_of_another_drive_is_told_by_the_folders_that_differ(name, row, of_pair, elsewhere):
-    assert is_elsewhere(name, row, of_pair=of_pair) is elsewhere

@@ -30,7 +30,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PROGRAM, TESTS = "rollcli", "tests"
 # the tests of a package beyond the folder of its name, the quickest first
 FURTHER = {
-    "cli": ("run/test_resume.py", "test_messages.py", "test_readme.py"),
+    "cli": ("run/test_recorded.py", "run/test_resume.py", "test_messages.py", "test_readme.py"),
     "estimator": ("rig/test_pose.py",),
     "evaluate": (
         "cli/test_mistakes.py",
@@ -41,6 +41,8 @@ FURTHER = {
         "estimator/solvers",
     ),
     "files": (
+        "run/test_recorded.py",
+        "cli/test_recorded.py",
         "run/test_update.py",
         "run/test_resume.py",
         "run/test_retry_failed.py",
@@ -57,6 +59,7 @@ FURTHER = {
     "pictures": ("run/test_derotate.py", "run/test_vdisparity.py", "cli/test_heights.py"),
     "rig": ("cli/test_calibration.py", "cli/test_horizon.py", "cli/test_rig.py", "run/test_diagnosis.py"),
     "run": (
+        "cli/test_recorded.py",
         "files/stores/test_turns.py",
         "cli/test_mistakes.py",
         "cli/test_outputs.py",
@@ -81,7 +84,7 @@ FURTHER = {
         "stereo/test_alignment.py",
         "stereo/test_stereo.py",
     ),
-    "report": ("cli/test_mistakes.py", "cli/test_outputs.py"),
+    "report": ("cli/test_recorded.py", "cli/test_mistakes.py", "cli/test_outputs.py"),
     "stereo": ("run/test_estimate_pair.py",),
 }
 _QUICKLY = ("-x", "-q", "-p", "no:cacheprovider")

@@ -1,0 +1,271 @@
+"""What readers and writers make of small inputs, recorded; see `tests.recorded`."""
+
+import io
+import itertools
+import math
+import os
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tifffile
+
+from rollcli.errors import RollcliError
+from rollcli.files import bounded, containers, encodings, locking, naming
+from rollcli.files.codecs import pictures
+from rollcli.files.formats import decode_image, decode_mask, decode_stored, encode_stored
+from rollcli.files.matching import is_elsewhere, match_paths
+from rollcli.files.results import FURTHER, Row, column_types, format_header, format_row, parse_rows
+from rollcli.files.stores import locations
+from rollcli.rig.calibration import Calibration
+from tests.binary_files import disparity_map, npy_header
+from tests.fuzz.corpus import corpus
+from tests.recorded import check
+
+INPUTS = Path(__file__).with_name("inputs.txt").read_text("utf-8").partition("\n\n")[2]
+FILES = {name: data for name, data in corpus().items() if name != "large.png"}
+
+
+def _answer(function, *arguments, **options):
+    """What a function returns, or the line of its error."""
+    try:
+        found = function(*arguments, **options)
+        return list(found) if isinstance(found, Iterator) else found
+    except RollcliError as error:
+        return f"{type(error).__name__}: {error}"
+
+
+def _map(data):
+    found = _answer(decode_stored, data, "x")
+    if isinstance(found, str):
+        return found
+    numbers = [str(found.values.dtype), found.values.astype(float)]
+    return [found.format, *numbers, found.nodata, found.note, found.text]
+
+
+def _cut(data):
+    return [_answer(decode, data, "x") for decode in (lambda *given: _map(given[0]), decode_image)]
+
+
+def _result(data):
+    rows = _answer(lambda: list(parse_rows(data, "x")))
+    if isinstance(rows, str):
+        return rows
+    shown = [
+        {name: value for name in row.__slots__ if (value := getattr(row, name)) is not None} for row in rows
+    ]
+    return [shown, [format_row(row, form).decode() for form in ("csv", "jsonl") for row in rows]]
+
+
+def _url(name):
+    return {
+        "kinds": [
+            _answer(function, name)
+            for function in (
+                locations.is_url,
+                locations.is_object_url,
+                locations.is_web_url,
+                locations.is_remote,
+            )
+        ],
+        "names a file": locations.names_a_file(name),
+        "shown": locations.public_name(name),
+        "parts": _answer(lambda: locations.is_object_url(name) and locations.split_url(name)),
+        "last": _answer(locations.base_name, name),
+        "below": _answer(locations.located, "s3://root/", name),
+        "container": [
+            containers.split_member(name),
+            containers.frame_name(name),
+            containers.is_archive(name),
+        ],
+    }
+
+
+def _matched(lefts, rights):
+    found = naming.match_names(lefts, rights), naming.match_names(lefts, rights, marked=True)
+    return [[each.pairs, each.ambiguous] for each in found]
+
+
+READ = {
+    "elsewhere": lambda one, other: [is_elsewhere(one[0], other[0], of_pair=pair) for pair in (False, True)],
+    "image": lambda data: [_answer(decode, data, "x") for decode in (decode_image, decode_mask)],
+    "map": _map,
+    "match": lambda names, rows: _answer(match_paths, names, rows, "rolls.csv"),
+    "npy": lambda header: _map(npy_header(header.decode("latin-1")) + bytes(100)),
+    "order": lambda names: sorted(names, key=naming.natural_key),
+    "pairs": _matched,
+    "result": _result,
+    "text": lambda data: _answer(lambda: bounded.as_utf8(data, "x").decode("latin-1")),
+    "url": lambda name: _url(name.decode()),
+}
+OF_NAMES = ("elsewhere", "match", "order", "pairs")
+
+
+def _read(line):
+    kind, _, text = line.partition(" ")
+    if kind in OF_NAMES:
+        return READ[kind](*(part.split() for part in text.split("|")))
+    return READ[kind](text.encode().decode("unicode_escape").encode("latin-1"))
+
+
+VALUES = (
+    -math.inf,
+    -1.0,
+    -0.0,
+    1.0,
+    2.0,
+    7.5,
+    16.0,
+    255.0,
+    300.0,
+    32767.0,
+    65534.0,
+    65535.0,
+    math.inf,
+    math.nan,
+)
+
+
+def _to_pixels(kind, **options):
+    with np.errstate(invalid="ignore", over="ignore"):
+        kept = [each for each in VALUES if kind[0] == "f" or np.iinfo(kind).min <= each <= np.iinfo(kind).max]
+        values = np.array([kept, kept[::-1]]).astype(kind)
+    stored = decode_stored(encode_stored(values, "npy"), "x")
+    found = _answer(encodings.to_disparity, stored, **options)
+    if isinstance(found, str):
+        return found
+    return [found.encoding, found.scale, str(found.disparity.dtype), found.disparity.ravel(), found.warning]
+
+
+def _from_pixels(kind, **options):
+    disparity = np.array([[0, -1, np.nan, np.inf, 0.001, 0.5, 1.25, 2.5019, 90, 120]])
+    return _answer(encodings.from_disparity, disparity, dtype=kind, **options)
+
+
+def _plateau(make):
+    found = encodings.to_disparity(decode_stored(encode_stored(make().astype(np.float32), "npy"), "x"))
+    return [found.warning, (found.disparity > 0).sum(axis=1)[::20]]
+
+
+ROAD = np.arange(200.0)[:, None] * 0.5 + 3 + np.linspace(0, 1, 300)
+PLATEAUS = {
+    "none": lambda: ROAD,
+    "largest": lambda: np.minimum(ROAD, 80.0),
+    "few": lambda: np.minimum(ROAD, 102.0),
+    "smallest": lambda: np.where((np.indices(ROAD.shape).sum(axis=0) % 3) == 0, 2.0, ROAD),
+    "mark and edge": lambda: np.where(
+        (np.indices(ROAD.shape).sum(axis=0) % 3) == 0, 2.0, np.where(ROAD < 8, 3.0, ROAD)
+    ),
+    "steps": lambda: np.broadcast_to(np.arange(200)[:, None] // 12 + 3.0, (200, 300)),
+    "one number": lambda: np.full((200, 300), 7.0),
+    "small": lambda: np.minimum(ROAD, 60.0)[::11, ::17],
+}
+CALIBRATIONS = {
+    "none": None,
+    "no baseline": Calibration(fx=100, fy=100, cx=1, cy=0.5),
+    "whole": Calibration(fx=100, fy=100, cx=1, cy=0.5, baseline=0.5, doffs=12.5),
+}
+ROWS = {
+    "numbers": Row(
+        "a", **{name: 1.23456789012 for name, kind in column_types(FURTHER).items() if kind is float}
+    ),
+    "small": Row(
+        'a"b.png', roll_deg=-1e-9, alpha2=-3.83765039123e-09, right_twist_px=-0.00001, converged=True
+    ),
+    "edge": Row("a\nb\r.png", roll_deg=-89.9999999, image_roll_deg=-89.9999999, message="one, two"),
+    "no numbers": Row("\udcff=ü/雨.png", rmse_px=math.nan, alpha0=math.inf, global_minimum=False),
+}
+
+
+def _written(row):
+    texts = [format_row(row, form, FURTHER) for form in ("csv", "jsonl")]
+    whole = [format_header(form, FURTHER) + text for form, text in zip(("csv", "jsonl"), texts, strict=True)]
+    assert [format_row(next(iter(parse_rows(each, "x"))), "csv", FURTHER) for each in whole] == texts[:1] * 2
+    return [text.decode("latin-1") for text in texts]
+
+
+def _tiff(**layout):
+    file = io.BytesIO()
+    tifffile.imwrite(file, disparity_map().astype(np.float32), metadata=None, **layout)
+    return _map(file.getvalue())
+
+
+CASES = {
+    **{line: partial(_read, line) for line in filter(None, INPUTS.split("\n"))},
+    **{f"file: {name}": partial(_map, data) for name, data in FILES.items()},
+    **{
+        f"image: {name}": partial(READ["image"], data)
+        for name, data in FILES.items()
+        if name != "picture.jpg"  # libjpeg rounds in more than one way
+    },
+    # a compressed file is as long as this zlib makes it
+    **{
+        f"cut: {name}": partial(lambda data: [_cut(data[:end]) for end in (9, -1)], data)
+        for name, data in FILES.items()
+        if name.endswith((".npy", ".pfm", ".ppm", ".pgm", ".bmp"))
+    },
+    **{
+        f"pixels: {kind}, {encoding}": partial(_to_pixels, kind, encoding=encoding)
+        for kind in ("u1", "u2", "i2", "i4", "f2", "f4", "f8")
+        for encoding in ("auto", "px", "kitti", "cityscapes", "sgbm", "depth")
+    },
+    **{
+        f"pixels: {kind}, scale {scale}": partial(
+            _to_pixels, kind, scale=scale, invalid=(7.5, 16.0, math.nan)
+        )
+        for kind in ("u2", "i2", "f4")
+        for scale in (0.25, -0.5, 0.0, math.inf)
+    },
+    **{
+        f"depth: {name}": partial(_to_pixels, "f4", encoding="depth", calibration=each, invalid=(2.0,))
+        for name, each in CALIBRATIONS.items()
+    },
+    "pixels: unknown": partial(_to_pixels, "f4", encoding="middlebury"),
+    **{
+        f"stored: {kind}, {encoding}, {scale}": partial(_from_pixels, kind, encoding=encoding, scale=scale)
+        for kind, (encoding, scale) in itertools.product(
+            ("u1", "u2", "i2", "f4"),
+            (
+                ("auto", None),
+                ("kitti", None),
+                ("cityscapes", None),
+                ("sgbm", None),
+                ("px", 0.5),
+                ("depth", None),
+                ("middlebury", None),
+            ),
+        )
+    },
+    **{f"plateau: {name}": partial(_plateau, make) for name, make in PLATEAUS.items()},
+    **{f"row: {name}": partial(_written, row) for name, row in ROWS.items()},
+    "tiff: deflate": partial(_tiff, compression="zlib", predictor=True, rowsperstrip=9),
+    "tiff: described": partial(_tiff, description="height over the road", software="by hand"),
+    "differences": lambda: [
+        list(locking.differences({"rollcli": one, "options": was}, {"rollcli": "1", "options": now}))
+        for one in "12"
+        for was, now in (
+            ({"a": 1, "b": None, "c": [1, 2], "d": True}, {"a": 2, "b": "y", "c": None, "d": False}),
+            ({"a": 1}, {"a": 1}),
+        )
+    ],
+    "sizes": lambda: [bounded.in_words(size) for size in (0, 999, 1 << 20, 3 << 19, 1 << 30, 5 << 40)],
+    "halves": lambda: [
+        _answer(
+            lambda shape=shape, layout=layout: [
+                half.shape for half in pictures.views_of(np.zeros(shape), layout, "x")
+            ]
+        )
+        for shape in ((4, 6), (5, 7), (4, 6, 3), (1, 1))
+        for layout in ("left-right", "top-bottom")
+    ],
+    "listed": lambda: [naming.listed("abcdefg"[:count]) for count in range(6)],
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_answers_are_those_recorded(case):
+    if case.startswith("url ") and os.name == "nt":
+        pytest.skip("fewer names are those of files")
+    check("files", case, CASES[case]())

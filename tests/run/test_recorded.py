@@ -1,0 +1,173 @@
+"""What a rig's checks and texts are, and how sessions at a prompt go; see `tests.sessions`."""
+
+from dataclasses import asdict, replace
+from functools import partial
+
+import numpy as np
+import pytest
+
+from rollcli.errors import RollcliError
+from rollcli.run.options import GateOptions
+from rollcli.run.rig_gates import Check, check_options, run_checks, status_of
+from rollcli.run.rig_text import Findings, as_csv, as_json, as_table
+from tests import sessions
+from tests.recorded import check
+from tests.run.rigs import UNKNOWN, known, rig, sequence, short
+
+
+@sessions.parametrize("run")
+def test_a_session_goes_as_it_is_written_down(tmp_path, heading):
+    sessions.check("run", heading, tmp_path)
+
+
+def _rolled(*means, **options):
+    return rig(("a", {"roll": sequence(100, *means, **options)}))
+
+
+def _drives():
+    """Two drives: the first jumps, the second differs from it and has pitch and height."""
+    jump, drift = [(10, known(0.5, 0.05))], {"drift": known(-0.25, 0.03), "drifts": True}
+    first = {"roll": sequence(30, known(1.0, 0.1), known(1.5, 0.2), jumps=jump, drift=known(0.01, 0.03))}
+    pitches = {"jumps": [(5, known(1.0, 0.1))], "values": np.repeat([3.0, 4.0], [5, 15])}
+    second = {
+        "roll": sequence(20, known(-2.0, 0.1), used=18, outliers=2, **drift),
+        "pitch": sequence(20, known(3.0, 0.1), known(4.0, 0.1), drift=known(0.02, 0.05), **pitches),
+        "height": sequence(20, known(1.65, 0.01), values=np.full(20, 1.65)),
+    }
+    suspect = np.isin(np.arange(50), [3, 12, 13])
+    ok = ~suspect & (np.arange(50) != 49)
+    return rig(("a", first), ("b", second), changes={"b": (known(-3.0, 0.1), True)}, ok=ok, suspect=suspect)
+
+
+def _drifted():
+    roll = sequence(100, known(0.5, 0.1), drift=known(1.0, 0.1), drifts=True)
+    ends = replace(roll.segments[0], begin=known(0.0, 0.1), end=known(1.0, 0.1))
+    return rig(("a", {"roll": replace(roll, segments=(ends,))}))
+
+
+def _posed():
+    pitch, height = sequence(100, known(2.0, 0.1)), sequence(100, known(1.5, 0.01))
+    return rig(("a", {"roll": sequence(100, known(0.0, 0.1)), "pitch": pitch, "height": height}))
+
+
+def _doubted():
+    fine = np.arange(100) % 4 > 0
+    return rig(("a", {"roll": sequence(100, known(0.0, 0.1))}), ok=fine, suspect=~fine)
+
+
+def _of_drives(*values):
+    return rig(
+        *((f"d{place}", {"roll": sequence(50, known(each, 0.1))}) for place, each in enumerate(values))
+    )
+
+
+JUMPS = [(20, known(0.5, 0.1)), (40, known(-1.5, 0.1)), (60, known(1.0, 0.1))]
+JUMPED = partial(_rolled, *[known(0.0, 0.1)] * 4, jumps=JUMPS)
+STILL = partial(_rolled, known(0.0, 0.1), drift=known(0.0, 0.1))
+CHECKS = [Check("min-ok", True, "fine"), Check("max-jump", False, "far")]
+CHANGES = {"roll": known(0.5, 0.25), "pitch": known(0.125, 0.25), "height": UNKNOWN}
+# halves and quarters: what is on a limit is exactly there
+GATES = {
+    **{
+        f"{value} ± 0.25, {within} from 1": (
+            partial(_rolled, known(value, 0.25)),
+            {"expect_roll": 1.0, "within": within},
+        )
+        for value, within in (
+            *(
+                (1.5, 0.5),
+                (0.5, 0.5),
+                (1.75, 0.5),
+                (1.875, 0.5),
+                (1.25, 0.5),
+                (0.75, 0.5),
+                (1.0, 0.0),
+                (-1.0, 0.5),
+            ),
+        )
+    },
+    **{f"drifted, {end}": (_drifted, {"expect_roll": end, "within": 0.5}) for end in (0.0, 1.0)},
+    "drives": (partial(_of_drives, 1.0, 3.0, 1.45, -3.0), {"expect_roll": 1.0, "within": 0.5}),
+    "drives that may": (partial(_of_drives, 1.0, 1.45), {"expect_roll": 1.0, "within": 0.5}),
+    "drives that are": (partial(_of_drives, 1.0, 1.45), {"expect_roll": 1.0, "within": 5.0}),
+    "pose": (_posed, {"expect_roll": 0.0, "expect_pitch": 1.0, "expect_height": 1.0, "within": 0.75}),
+    "height": (_posed, {"expect_height": 1.0, "within_height": 0.25}),
+    "no pitch": (STILL, {"expect_pitch": 0.0, "within": 9.0}),
+    "no interval": (partial(_rolled, short(1.0), values=np.arange(100)), {"expect_roll": 1.0, "within": 5.0}),
+    "no frames": (rig, {"expect_roll": 1.0, "within": 5.0, "min_ok": 0.0}),
+    "one frame": (
+        lambda: rig(("a", {"roll": sequence(1, known(0.001, 0.1))})),
+        {"expect_roll": 0.0, "within": 1.0, "max_jump": 1.0},
+    ),
+    **{
+        f"drift {drift}": (partial(_rolled, known(0.0, 0.1), drift=known(drift, 0.125)), {"max_drift": 0.5})
+        for drift in (0.5, -0.5, 0.25, -1.0)
+    },
+    "no drift known": (_rolled, {"max_drift": 90.0, "max_jump": 1.0}),
+    **{f"jumps, {most}": (JUMPED, {"max_jump": most}) for most in (1.0, 1.75)},
+    "too few for jumps": (partial(_rolled, short(0.0)), {"max_jump": 1.0}),
+    **{f"share {least}": (_doubted, {"min_ok": least}) for least in (0.75, 0.7501, 0.0, 1.0)},
+    "all": (STILL, {"expect_roll": 0.0, "within": 1.0, "max_drift": 1.0, "max_jump": 1.0, "min_ok": 1.0}),
+    "pairs": (STILL, {"max_misalignment": 1.0}),
+}
+WRONG = (
+    *({"expect_roll": 0.0}, {"expect_pitch": 0.0}, {"expect_pitch": 0.0, "within_height": 1.0}),
+    *({"expect_height": 1.0}, {"within": 1.0}, {"within_height": 1.0}),
+    {"within_height": 1.0, "within": 1.0, "expect_roll": 0.0},
+)
+
+
+def _gate(make, asked, missing="", change=None):
+    checks = run_checks(make(), GateOptions(**asked), missing, change)
+    return [[asdict(each) for each in checks], int(status_of(checks))]
+
+
+def _refusal(asked):
+    with pytest.raises(RollcliError) as caught:
+        check_options(GateOptions(**asked))
+    return str(caught.value)
+
+
+def _told(write):
+    """A rig's assessment as a text; of many drives, one with nothing to say, and none."""
+    made = Findings(_drives(), CHECKS, rig(("c", {"roll": sequence(7, known(0.0, 0.1), used=6)})), CHANGES)
+    quiet = Findings(rig(("a", {"roll": sequence(9, known(1.0, 0.1), drift=known(0.0, 0.1))})), [], None, {})
+    many = [
+        Findings(
+            rig(*((f"d{place}", {"roll": sequence(3, known(1.0, 0.1))}) for place in range(count))),
+            [],
+            None,
+            {},
+        )
+        for count in (0, 40, 41, 1043)
+    ]
+    texts = [write(each) for each in (made, quiet, *many)]
+    return [text.splitlines()[:60] for text in texts[:-1]] + [texts[-1].splitlines()[-3:]]
+
+
+CASES = {
+    **{f"gate: {name}": partial(_gate, make, asked) for name, (make, asked) in GATES.items()},
+    **{
+        f"change: {name}": partial(_gate, STILL, {"max_jump": 1.0}, change=change)
+        for name, change in {
+            "far": known(1.5, 0.1),
+            "near": known(0.25, 0.1),
+            "unsure": short(0.0),
+            "unknown": UNKNOWN,
+        }.items()
+    },
+    **{
+        f"half, {asked}": partial(_gate, STILL, asked, missing="half is missing")
+        for asked in ({}, {"min_ok": 1.0})
+    },
+    **{f"refused: {each}": partial(_refusal, each) for each in WRONG},
+    **{
+        f"as {name}": partial(_told, write)
+        for name, write in (("csv", as_csv), ("json", as_json), ("table", as_table))
+    },
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_answers_are_those_recorded(case):
+    check("run", case, CASES[case]())
