@@ -1,4 +1,4 @@
-"""What is asked and told of a rig, and how sessions at a prompt go; see `tests.recorded` and `tests.sessions`."""
+"""What is asked and told of a rig is recorded, and sessions at a prompt go as they are written down."""
 
 import json
 from dataclasses import asdict, replace
