@@ -1,4 +1,4 @@
-"""What is asked and told of a rig is recorded, and sessions at a prompt go as they are written down."""
+"""What a rig's checks and texts are, and how sessions at a prompt go; see `tests.sessions`."""
 
 import json
 from dataclasses import asdict, replace
