@@ -50,22 +50,6 @@ def test_every_method_fills_the_columns(maps, method, road):
     assert done.err.count("px of cy") == 1  # what holds for all frames is said once
 
 
-def test_without_a_calibration_the_columns_are_empty_and_the_roll_is_the_same(maps):
-    plain, posed = (
-        rows_of(rollcli("estimate", "maps", *options, cwd=maps).out)
-        for options in ((), ("--calib", "calib.txt"))
-    )
-    assert [[row[name] for name in POSE] for row in plain] == [[""] * 4] * 2
-    assert [row["roll_deg"] for row in plain] == [row["roll_deg"] for row in posed]
-
-
-def test_numbers_on_the_command_line_are_a_calibration(maps):
-    numbers = ("--focal", "250", "--principal-point", "150,90")
-    assert_posed(rows_of(rollcli("estimate", "maps", *numbers, "--baseline", "0.5", cwd=maps).out))
-    without = rows_of(rollcli("estimate", "maps", *numbers, cwd=maps).out)
-    assert all(row["pitch_deg"] and not row["height_m"] for row in without)
-
-
 def test_a_folder_has_a_calibration_for_each_stem(maps):
     (maps / "calib").mkdir()
     (maps / "calib" / "000000.txt").write_text(samples.kitti_benchmark(RIG))
@@ -144,29 +128,12 @@ def test_a_bad_calibration_ends_it_in_one_line_before_anything_runs(maps, name):
     assert not (maps / "pose.csv").exists()
 
 
-def test_a_changed_calibration_is_no_resume(maps):
-    rollcli("estimate", "maps", "--calib", "calib.txt", "-o", "pose.csv", cwd=maps)
-    again = rollcli("estimate", "maps", "--calib", "calib.txt", "-o", "pose.csv", "--resume", cwd=maps)
-    assert again.status == 0
-    (maps / "calib.txt").write_text(samples.kitti_raw(RIG._replace(cy=91.0)))
-    refusal = rollcli(
-        "estimate", "maps", "--calib", "calib.txt", "-o", "pose.csv", "--resume", cwd=maps
-    ).refused()
-    assert "the calibration differs" in refusal
-
-
 def test_what_was_read_against_a_convention_is_said_once(maps):
     (maps / "left.yaml").write_text(samples.ros(RIG, right=False))
     (maps / "right.yaml").write_text(samples.ros(RIG, right=True, positive=True))
     pair = ("--calib", "left.yaml", "--calib", "right.yaml")
     assert rollcli("estimate", "maps", *pair, cwd=maps).err.count("Tx is positive") == 1
     assert "Tx" not in rollcli("estimate", "maps", *pair, "-q", cwd=maps).err
-
-
-def test_a_result_never_replaces_the_calibration(maps):
-    before = (maps / "calib.txt").read_text()
-    rollcli("estimate", "maps", "--calib", "calib.txt", "-o", "calib.txt", "--overwrite", cwd=maps).refused()
-    assert (maps / "calib.txt").read_text() == before
 
 
 def test_depth_maps_become_the_disparities_of_their_calibration(maps):

@@ -20,27 +20,6 @@ def column(text, name):
 FRAMES = 7
 
 
-def test_shards_joined_with_standard_tools_are_the_whole(maps):
-    whole = rollcli("estimate", "maps", cwd=maps).out
-    for part in (1, 2, 3):
-        rollcli("estimate", "maps", "--shard", f"{part}/3", "-o", f"part{part}.csv", cwd=maps)
-    assert column((maps / "part2.csv").read_text(), "file") == ["maps/frame1.png", "maps/frame4.png"]
-    join = (
-        "head -n 1 part1.csv; for part in 1 2 3; do tail -n +2 part$part.csv > body$part; done; "
-        "paste -d '\\n' body1 body2 body3 | sed '/^$/d'"
-    )
-    assert ended(["sh", "-c", join], maps).stdout == whole
-
-
-def test_paths_come_on_standard_input_and_from_lists(maps):
-    listed = "maps/frame2.png\nmaps/frame0.png\n"
-    (maps / "list.txt").write_text(listed)
-    expected = ["maps/frame0.png", "maps/frame2.png"]
-    assert column(rollcli("estimate", "-", cwd=maps, stdin=listed).out, "file") == expected
-    assert column(rollcli("estimate", "--files-from", "list.txt", cwd=maps).out, "file") == expected
-    assert column(rollcli("estimate", "maps/*[02].png", cwd=maps).out, "file") == expected
-
-
 def test_a_file_name_that_is_no_text_comes_back_as_it_is(tmp_path):
     name = b"fr\xe4me,\xff.png"
     write_kitti(tmp_path / "a.png", road_map())
@@ -76,27 +55,12 @@ def test_a_region_decides_which_pixels_are_used(two_roads, arguments, roll):
     assert float(column(done.out, "roll_deg")[0]) == pytest.approx(np.degrees(roll), abs=0.1)
 
 
-def test_a_frame_without_its_mask_is_named_before_anything_runs(two_roads):
-    write_kitti(two_roads / "other.png", road_map())
-    refusal = rollcli("estimate", "map.png", "other.png", "--mask", "masks", cwd=two_roads).refused()
-    assert "other.png: has no mask of its name in masks" in refusal
-    assert rollcli("estimate", "map.png", "--mask", "none.png", cwd=two_roads).status == 2
-
-
 def test_pairs_say_which_disparities_were_searched(tmp_path):
     write_pair(tmp_path, "a.png", road_map(0.05, width=320, height=160) / 2)
     done = rollcli("estimate", "--left", "left", "--right", "right", cwd=tmp_path)
     assert column(done.out, "right_file") == ["right/a.png"]
     assert float(column(done.out, "roll_deg")[0]) == pytest.approx(np.degrees(0.05), abs=0.3)
     assert "left/a.png: searched disparities from 0 to" in done.err
-
-
-def test_a_range_that_is_too_short_makes_the_row_suspect(tmp_path):
-    write_pair(tmp_path, "a.png", road_map(0.05, width=320, height=160) / 2)
-    short = ("--num-disparities", "32", "--road", "all")
-    done = rollcli("estimate", "--left", "left", "--right", "right", *short, cwd=tmp_path)
-    assert column(done.out, "status") == ["suspect"]
-    assert "end of the searched range" in done.out
 
 
 def test_a_pair_whose_views_are_not_level_is_corrected_and_says_so(tmp_path):

@@ -6,7 +6,7 @@ import tifffile
 
 from rollcli.simulate.dataset import Dataset, write_dataset
 from rollcli.simulate.spec import FrameSpec
-from tests.run_cli import contents, road_map, rollcli, rows_of, write_kitti, write_maps, write_pair
+from tests.run_cli import contents, road_map, rollcli, rows_of, write_kitti, write_pair
 
 RIG = ("--focal", "300", "--principal-point", "79.5,20", "--baseline", "0.5")
 
@@ -116,34 +116,3 @@ def test_pairs_have_heights_and_pictures_over_their_left_image(tmp_path):
     assert heights.shape == (160, 320)
     assert abs(np.nanmedian(heights[100:])) < 0.01
     assert sorted(contents(tmp_path / "p")) == ["a.png"]
-
-
-def test_a_failed_row_has_no_heights_and_resume_makes_what_is_missing(tmp_path):
-    write_maps(tmp_path / "maps", 2)
-    (tmp_path / "maps" / "frame9.png").write_bytes(b"no map")
-    run = ("estimate", "maps", "-o", "rolls.csv", "--heights", "h")
-    assert rollcli(*run, cwd=tmp_path).status == 3
-    before = contents(tmp_path / "h")
-    assert sorted(before) == ["frame0.tif", "frame1.tif"]
-    (tmp_path / "h" / "frame1.tif").unlink()
-    assert rollcli(*run, "--resume", cwd=tmp_path).status == 3
-    assert contents(tmp_path / "h") == before
-    done = rollcli("heights", "maps", "--from", "rolls.csv", "-o", "again", cwd=tmp_path)
-    assert done.status == 3
-    assert "frame9.png: has no angle in rolls.csv" in done.err
-    assert sorted(contents(tmp_path / "again")) == sorted(before)
-
-
-def test_a_result_of_other_maps_is_refused_in_a_line(tmp_path):
-    write_maps(tmp_path / "maps", 2)
-    assert rollcli("estimate", "maps", "-o", "rolls.csv", cwd=tmp_path).status == 0
-    write_kitti(tmp_path / "maps" / "frame1.png", road_map(0.1, width=200, height=100))
-    done = rollcli("heights", "maps", "--from", "rolls.csv", "-o", "h", cwd=tmp_path)
-    assert done.status == 3
-    (line,) = (line for line in done.err.splitlines() if "frame1.png: " in line)
-    assert "has 200x100 px, its row in rolls.csv 160x120: name the result of these maps" in line
-    assert sorted(contents(tmp_path / "h")) == ["frame0.tif"]
-    write_maps(tmp_path / "other", 3)
-    refusal = rollcli("heights", "other", "--from", "rolls.csv", "-o", "o", cwd=tmp_path).refused()
-    assert "has no row for other/frame2.png" in refusal
-    assert not (tmp_path / "o").exists()

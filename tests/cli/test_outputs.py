@@ -4,7 +4,6 @@ import os
 import re
 from importlib import import_module
 
-import cv2
 import numpy as np
 import pytest
 
@@ -16,19 +15,6 @@ FRAMES = 2
 
 def names(folder):
     return sorted(contents(folder))
-
-
-def test_images_keep_the_folders_and_the_format_of_their_input(tmp_path):
-    write_kitti(tmp_path / "maps" / "day" / "a.png", road_map(0.1))
-    np.save(tmp_path / "maps" / "b.npy", road_map(0.1))
-    images = ("--derotated", "up", "--vdisparity", "v", "--road-mask", "road")
-    assert rollcli("estimate", "maps", "--recursive", *images, cwd=tmp_path).status == 0
-    assert names(tmp_path / "up") == ["b.npy", "day/a.png"]
-    assert names(tmp_path / "v") == names(tmp_path / "road") == ["b.png", "day/a.png"]
-    data = np.frombuffer((tmp_path / "up" / "day" / "a.png").read_bytes(), np.uint8)
-    upright = cv2.imdecode(data, cv2.IMREAD_UNCHANGED)
-    assert (upright.dtype, upright.shape) == (np.uint16, (120, 160))
-    assert np.load(tmp_path / "up" / "b.npy").dtype == np.float32
 
 
 @pytest.mark.parametrize(("kind", "ending"), [("png", ".png"), ("tiff", ".tif"), ("npy", ".npy")])
@@ -52,51 +38,10 @@ def refused(folder, *words):
     return refusal
 
 
-def test_two_frames_with_one_image_are_refused_before_anything_runs(tmp_path):
-    write_maps(tmp_path / "maps", 1)
-    np.save(tmp_path / "maps" / "frame0.npy", road_map())
-    line = refused(tmp_path, "estimate", "maps", "--vdisparity", "v")
-    assert "maps/frame0.npy and maps/frame0.png would both write v/frame0.png" in line
-    assert rollcli("estimate", "maps", "--derotated", "up", cwd=tmp_path).status == 0
-    write_maps(tmp_path / "more", 1)
-    line = refused(tmp_path, "estimate", "maps/frame0.png", "more/frame0.png", "--derotated", "down")
-    assert "name their common folder with --recursive" in line
-
-
-def test_no_output_replaces_an_input(maps):
-    for output in (("--derotated", "maps/../maps"), ("-o", "maps/frame0.png")):
-        line = ("estimate", "maps/*.png", *output, "--overwrite")
-        assert "would be replaced" in refused(maps, *line)
-    (maps / "mask.png").write_bytes((maps / "maps" / "frame0.png").read_bytes())
-    assert "would be replaced" in refused(
-        maps, "estimate", "maps", "--mask", "mask.png", "-o", "./mask.png", "--overwrite"
-    )
-
-
-def test_image_folders_inside_the_input_are_no_input(maps):
-    arguments = ("estimate", "maps", "--recursive", "--derotated", "maps/up", "--overwrite")
-    first = rollcli(*arguments, cwd=maps)
-    assert rollcli(*arguments, cwd=maps).out == first.out
-    assert first.out.count("\n") == 3
-
-
-def test_the_format_follows_the_ending_of_the_result(maps):
-    rollcli("estimate", "maps", "-o", "new/rolls.jsonl", cwd=maps)
-    assert (maps / "new" / "rolls.jsonl").read_text().startswith('{"file": "maps/frame0.png"')
-
-
 def test_a_named_pipe_takes_rows_as_they_come(maps):
     done = rollcli("estimate", "maps", "-q", "-o", "/dev/stdout", cwd=maps)
     assert done.out.count("\n") == 3
     assert not list(maps.glob("*.run.json"))
-
-
-def test_a_frame_that_fails_leaves_no_image_of_an_earlier_run(maps):
-    arguments = ("estimate", "maps", "--derotated", "up", "--overwrite")
-    rollcli(*arguments, cwd=maps)
-    (maps / "maps" / "frame0.png").write_bytes(b"")
-    assert rollcli(*arguments, cwd=maps).status == 3
-    assert names(maps / "up") == ["frame1.png"]
 
 
 @pytest.mark.parametrize("command", ["estimate", "derotate"])

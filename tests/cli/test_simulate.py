@@ -21,25 +21,6 @@ def test_off_a_terminal_lines_tell_how_far_it_is_and_how_long_it_takes(tmp_path,
     assert re.fullmatch(r"rollcli: 2 frames in rig; [\d.]+ s, [\d.]+ s a frame", summary)
 
 
-def test_one_number_is_a_range_of_its_own(tmp_path):
-    done = rollcli("simulate", "rig", *TINY, "--roll", "-12.5", "--pitch", "3", "-q", "-j1", cwd=tmp_path)
-    assert (done.status, done.err) == (0, "")
-    assert b"frame_0002,-12.500000000,3.000000000," in (tmp_path / "rig/truth.csv").read_bytes()
-
-
-def test_a_folder_that_cannot_be_written_is_status_1(tmp_path):
-    (tmp_path / "file").write_text("")
-    done = rollcli("simulate", "file/rig", *TINY, cwd=tmp_path)
-    assert (done.status, done.err.count("\n")) == (1, 1)
-
-
-def test_disparities_too_large_for_the_file_are_told(tmp_path):
-    near = ("--height", "0.2", "--baseline", "2", "--roll", "0", "--frames", "1", "--size", "64x48")
-    done = rollcli("simulate", "rig", *near, "-j1", cwd=tmp_path)
-    assert done.status == 0
-    assert "does not fit a KITTI PNG and has no data in rig/disparity" in done.err
-
-
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
 @pytest.mark.slow
 @pytest.mark.parametrize("jobs", ["1", "2"])
@@ -55,17 +36,6 @@ def test_ctrl_c_ends_it_with_status_130_and_without_truth(tmp_path, jobs):
     )
     assert err.rstrip().endswith("--resume")
     assert not (tmp_path / "rig/truth.csv").exists()
-
-
-def test_resume_continues_an_interrupted_simulation_and_says_what_it_kept(tmp_path):
-    assert rollcli("simulate", "rig", *TINY, "-j1", cwd=tmp_path).status == 0
-    (tmp_path / "rig/right/frame_0002.png").unlink()
-    done = rollcli("simulate", "rig", *TINY, "-j1", "--resume", cwd=tmp_path)
-    assert (done.status, done.out) == (0, "")
-    assert "2 frames (1 kept) in rig" in done.err
-    assert (tmp_path / "rig/right/frame_0002.png").exists()
-    again = rollcli("simulate", "rig", *TINY, "--resume", "--dry-run", cwd=tmp_path)
-    assert "frame_0001" not in again.out
 
 
 @pytest.fixture(scope="module")

@@ -63,7 +63,6 @@ FURTHER = {
         "files/stores/test_turns.py",
         "cli/test_mistakes.py",
         "cli/test_outputs.py",
-        "cli/test_idle_options.py",
         "cli/test_help.py",
         "cli/test_estimate.py",
         "cli/test_frames.py",

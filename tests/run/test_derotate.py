@@ -157,58 +157,6 @@ def test_the_matrix_says_where_each_pixel_has_gone(tmp_path, more):
     assert "about its centre, (80, 60)" in (tmp_path / "out" / "a.txt").read_text()
 
 
-def test_a_copy_in_another_folder_is_taken_and_another_drive_is_refused(folder):
-    shutil.copytree(folder / "maps", folder / "day1" / "copied")
-    for index in range(4):
-        write_kitti(folder / "day2" / f"frame{index}.png", road_map(0.3, seed=index))
-    for command in ("derotate", "heights"):
-        line = (command, "--from", "rolls.csv", "-o")
-        assert rollcli(*line, f"{command}-a", "maps", cwd=folder).status == 0
-        assert rollcli(*line, f"{command}-b", "day1/copied", cwd=folder).status == 0
-        assert contents(folder / f"{command}-a") == contents(folder / f"{command}-b")
-
-        refusal = rollcli(*line, "out", "day2", cwd=folder).refused()
-        assert "rolls.csv: its row is of maps/frame0.png, and not of day2/frame0.png" in refusal
-        assert not (folder / "out").exists()
-
-
-def test_a_map_whose_row_has_no_angle_fails_and_the_others_are_done(folder):
-    lines = (folder / "rolls.csv").read_text().splitlines()
-    lines[2] = "maps/frame1.png,,error" + "," * (lines[0].count(",") - 2)
-    (folder / "rolls.csv").write_text("\n".join(lines) + "\n")
-
-    done = rollcli("derotate", "maps", "--from", "rolls.csv", "-o", "out", cwd=folder)
-
-    assert done.status == 3
-    assert "maps/frame1.png: has no angle in rolls.csv" in done.err
-    assert sorted(contents(folder / "out")) == ["frame0.png", "frame2.png", "frame3.png"]
-
-
-def test_its_own_results_never_become_inputs(folder):
-    for _ in range(2):
-        done = rollcli(
-            "derotate", "maps", "--recursive", "--roll", "2", "-o", "maps/out", "--overwrite", cwd=folder
-        )
-        assert done.status == 0
-    assert sorted(contents(folder / "maps" / "out")) == [f"frame{i}.png" for i in range(4)]
-    refusal = rollcli("derotate", "maps", "--roll", "2", "-o", "maps", "--overwrite", cwd=folder).refused()
-    assert "write the results elsewhere" in refusal
-    refusal = rollcli(
-        "derotate", "maps/frame1.png", "--roll", "2", "-o", "maps", "--overwrite", cwd=folder
-    ).refused()
-    assert "maps/frame1.png: would be replaced" in refusal
-
-
-def test_a_broken_map_costs_itself_alone(folder):
-    (folder / "maps" / "frame2.png").write_bytes(b"")
-    (folder / "out").mkdir()
-    (folder / "out" / "frame2.png").write_text("of an earlier run")
-    done = rollcli("derotate", "maps", "--roll", "2", "-o", "out", "--overwrite", cwd=folder)
-    assert done.status == 3
-    assert "maps/frame2.png: is empty" in done.err
-    assert len(contents(folder / "out")) == 3
-
-
 def test_an_interrupted_run_says_that_what_is_written_is_whole(folder, monkeypatch):
     assert rollcli("derotate", "maps", "--roll", "2", "-o", "whole", cwd=folder).status == 0
 
@@ -221,46 +169,6 @@ def test_an_interrupted_run_says_that_what_is_written_is_whole(folder, monkeypat
     assert done.status == 130
     assert "interrupted; what is written is whole, and --overwrite starts anew" in done.err
     assert contents(folder / "out") == {"frame0.png": contents(folder / "whole")["frame0.png"]}
-
-
-def make_suspect(folder, *names):
-    lines = (folder / "rolls.csv").read_text().splitlines(keepends=True)
-    doubted = [line.replace(",ok,", ",suspect,") if line.startswith(names) else line for line in lines]
-    (folder / "rolls.csv").write_text("".join(doubted))
-
-
-@pytest.mark.parametrize(("command", "ending"), [("derotate", "png"), ("heights", "tif")])
-def test_suspect_angles_are_used_and_counted_or_their_maps_are_left_out(folder, command, ending):
-    make_suspect(folder, "maps/frame1", "maps/frame3")
-    line = (command, "maps", "--from", "rolls.csv")
-
-    used = rollcli(*line, "-o", "all", cwd=folder)
-    assert "rolls.csv: 2 of 4 angles are suspect and used; --skip-suspect leaves such maps out" in used.err
-    assert len(contents(folder / "all")) == 4
-
-    left_out = rollcli(*line, "-o", "sure", "--skip-suspect", cwd=folder)
-    assert "rolls.csv: 2 of 4 angles are suspect; such maps are left out" in left_out.err
-    kept = [f"frame{number}.{ending}" for number in (0, 2)]
-    assert (left_out.status, sorted(contents(folder / "sure"))) == (0, kept)
-
-    quiet = rollcli(*line, "-o", "quiet", "-q", cwd=folder)
-    assert (quiet.status, quiet.err) == (0, "")
-
-
-def test_leaving_out_every_map_is_refused(folder):
-    make_suspect(folder, "maps/")
-    refusal = rollcli(
-        "derotate", "maps", "--from", "rolls.csv", "--skip-suspect", "-o", "out", cwd=folder
-    ).refused()
-    assert "every angle is suspect" in refusal
-    assert not (folder / "out").exists()
-
-
-def test_numbers_that_are_kept_are_not_warned_of(tmp_path):
-    np.save(tmp_path / "x256.npy", 256 * road_map())
-    assert "256 times too large" in rollcli("vdisparity", "x256.npy", "-o", "v", cwd=tmp_path).err
-    done = rollcli("derotate", "x256.npy", "--roll", "2", "-o", "out", cwd=tmp_path)
-    assert (done.status, "too large" in done.err) == (0, False)
 
 
 def test_a_cityscapes_map_is_turned_with_its_ones_left_out(tmp_path):

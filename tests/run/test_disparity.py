@@ -68,20 +68,6 @@ def test_stereo_options_reach_the_matcher(pairs):
     np.testing.assert_array_equal(np.load(path), expected)
 
 
-def test_a_pair_that_cannot_be_matched_costs_itself_alone(pairs, tmp_path):
-    for side in ("left", "right"):
-        (tmp_path / side).mkdir()
-        for path in (pairs / "rig" / side).iterdir():
-            (tmp_path / side / path.name).write_bytes(path.read_bytes())
-    first, second, _ = sorted((tmp_path / "left").iterdir())
-    first.write_bytes(first.read_bytes()[:200])
-    second.write_bytes((pairs / "rig" / "disparity" / second.name).read_bytes())
-    done = match(tmp_path, "-o", "maps", left="left", right="right")
-    assert done.status == 3
-    assert f"left/{first.name}: " in done.err
-    assert len(contents(tmp_path / "maps")) in (1, 2)  # the second is an image, if no left one
-
-
 @pytest.mark.parametrize("program", [["disparity", "-o"], ["estimate", "-o", "rolls.csv", "--disparity"]])
 def test_a_map_that_a_16_bit_png_cannot_hold_is_written_as_tiff_and_that_is_said(tmp_path, program):
     for name, near in (("a.png", 0), ("b.png", 280), ("c.png", 0)):
@@ -113,16 +99,6 @@ def test_a_resume_finds_the_tiff_that_stands_for_a_png(tmp_path):
     assert sorted(contents(tmp_path / "maps")) == ["a.png", "b.tif"]
 
 
-def test_a_preview_is_a_colour_picture_beside_the_map(tmp_path):
-    write_pair(tmp_path, "a.png", road_map(0.02, width=900) / 2)
-    line = ["disparity", "--left", "left", "--right", "right", "-o", "maps", "--preview", "look"]
-    done = rollcli(*line, cwd=tmp_path)
-    assert (done.status, sorted(contents(tmp_path / "maps"))) == (0, ["a.png"])
-    picture = cv2.imread(str(tmp_path / "look" / "a.png"), cv2.IMREAD_UNCHANGED)
-    assert (picture.dtype, picture.shape[2]) == (np.uint8, 3)
-    assert rollcli(*line, cwd=tmp_path).status == 2  # both are there already
-
-
 def test_the_road_of_a_pair_is_drawn_on_its_photo(tmp_path):
     write_pair(tmp_path, "a.png", road_map(0.02, width=900) / 2)
     pair = ("--left", "left", "--right", "right", "--num-disparities", "64")
@@ -132,18 +108,6 @@ def test_the_road_of_a_pair_is_drawn_on_its_photo(tmp_path):
     assert drawn.shape == photo.shape
     unchanged = (drawn == photo).all(axis=2)
     assert 0.02 < unchanged.mean() < 0.98
-
-
-@pytest.mark.parametrize(
-    ("left", "right", "words"),
-    [
-        ("rig/left", "rig/nothing", "rig/nothing"),
-        ("rig/left", "rig/right/frame_0001.png", "no partner found for rig/left/frame_0002.png"),
-    ],
-)
-def test_what_has_no_partner_is_named_before_anything_is_written(pairs, left, right, words):
-    assert words in match(pairs, "-o", "never", left=left, right=right).refused()
-    assert not (pairs / "never").exists()
 
 
 @pytest.mark.slow
@@ -164,16 +128,6 @@ def matched_share(path: Path) -> float:
     disparity = read_disparity(path)
     seen_by_both = disparity[:, int(disparity.max()) + 1 :]
     return float((seen_by_both > 0).mean())
-
-
-def test_its_own_maps_and_previews_never_become_inputs(tmp_path):
-    write_pair(tmp_path, "a.png", road_map(width=160, height=80) / 2)
-    outputs = ("-o", "left/maps", "--preview", "right/previews", "--overwrite")
-    for _ in range(2):
-        done = match(tmp_path, "--recursive", *outputs, left="left", right="right")
-        assert done.status == 0, done.err
-    assert sorted(contents(tmp_path / "left")) == ["a.png", "maps/a.png"]
-    assert sorted(contents(tmp_path / "right")) == ["a.png", "previews/a.png"]
 
 
 def test_views_without_a_pixel_that_matches_have_no_map(tmp_path):

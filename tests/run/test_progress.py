@@ -6,7 +6,6 @@ import sys
 import time
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from rollcli.errors import ExitStatus
@@ -14,7 +13,6 @@ from rollcli.files.results import Row
 from rollcli.run.frame import Frame, FrameResult, failed_frame
 from rollcli.run.options import EncodingOptions, RunningOptions
 from rollcli.run.progress import Progress, TaskProgress
-from tests.run_cli import rollcli
 
 GUESSED = EncodingOptions()
 
@@ -102,29 +100,6 @@ def test_doubts_are_said_when_verbose(lines):
     counted = progress(verbose=True)
     counted.add(result("suspect", "is doubtful"))
     assert lines() == ["rollcli: a.png: suspect: is doubtful"]
-
-
-def test_frames_that_failed_for_one_cause_are_counted_together_whatever_they_name(tmp_path):
-    maps = tmp_path / "maps"
-    maps.mkdir()
-    for name, valid in (("few", 3), ("fewer", 2)):
-        np.save(maps / f"{name}.npy", np.where(np.arange(80 * 60).reshape(60, 80) < valid, 7.0, 0.0))
-    for name in ("one", "two"):
-        (maps / f"{name}.png").write_bytes(b"")
-    (maps / "text.png").write_text("text")
-    done = rollcli("estimate", "maps", "maps/", cwd=tmp_path)
-    assert done.status == 3
-    said = [line.removeprefix("rollcli: ") for line in done.err.splitlines()]
-    assert said[:4] == [
-        "maps/: is named more than once; each of its files is taken once",
-        "maps/few.npy: only 3 valid pixels: at least 100 are needed",
-        "maps/one.png: is empty",
-        "maps/text.png: is only 4 bytes long; a disparity map is a PNG, TIFF, NPY, NPZ, PFM or EXR file",
-    ]
-    assert said[4:6] == [
-        "2 frames, such as maps/few.npy: only 3 valid pixels: at least 100 are needed",
-        "2 frames: is empty",
-    ]
 
 
 class Clock:

@@ -1,5 +1,6 @@
 """What a rig's checks and texts are, and how sessions at a prompt go; see `tests.sessions`."""
 
+import json
 from dataclasses import asdict, replace
 from functools import partial
 
@@ -139,12 +140,32 @@ def _told(write):
             None,
             {},
         )
-        for count in (0, 40, 41, 1043)
+        for count in (0, 40, 41)
     ]
-    texts = [write(each) for each in (made, quiet, *many)]
-    return [text.splitlines()[:60] for text in texts[:-1]] + [texts[-1].splitlines()[-3:]]
+    return [_cut(write(each)) for each in (made, quiet, *many)]
 
 
+def _cut(told):
+    """Of a long list its first and its last ones, whose numbers stay numbers."""
+    return told if isinstance(told, dict) or len(told) < 60 else [*told[:3], len(told), *told[-3:]]
+
+
+def _cells(findings):
+    return [[_number(cell) for cell in line.split(",")] for line in as_csv(findings).splitlines()]
+
+
+def _number(text):
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+TOLD = {
+    "csv": _cells,
+    "json": lambda findings: json.loads(as_json(findings)),
+    "table": lambda findings: as_table(findings).splitlines(),
+}
 CASES = {
     **{f"gate: {name}": partial(_gate, make, asked) for name, (make, asked) in GATES.items()},
     **{
@@ -161,10 +182,7 @@ CASES = {
         for asked in ({}, {"min_ok": 1.0})
     },
     **{f"refused: {each}": partial(_refusal, each) for each in WRONG},
-    **{
-        f"as {name}": partial(_told, write)
-        for name, write in (("csv", as_csv), ("json", as_json), ("table", as_table))
-    },
+    **{f"as {name}": partial(_told, write) for name, write in TOLD.items()},
 }
 
 

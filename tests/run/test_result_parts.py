@@ -59,15 +59,6 @@ def test_nothing_stays_of_parts_that_an_overwriting_run_of_fewer_frames_does_not
     ]
 
 
-@pytest.mark.parametrize("name", ["other.parquet", "other.parquet.inputs"])
-def test_a_file_in_the_place_of_a_folder_is_refused(parts, name):
-    folder, line = parts
-    (folder / name).write_bytes(b"mine")
-    done = rollcli(*line, "-o", "other.parquet", "--overwrite", cwd=folder)
-    assert (done.status, (folder / name).read_bytes()) == (2, b"mine")
-    assert f"{name}: is a file; a result of parts is a folder" in done.err
-
-
 @pytest.mark.parametrize(
     ("damaged", "words"),
     [

@@ -234,31 +234,6 @@ def refused(folder, *arguments):
     return done.err
 
 
-def test_a_resume_with_other_options_says_which(interrupted):
-    assert "--tolerance was 0.0001, is now 0.01" in refused(interrupted, "--tolerance", "0.01")
-    assert "--derotated was not given, is now upright" in refused(interrupted, "--derotated", "upright")
-
-
-def test_a_resume_by_another_version_says_which(interrupted):
-    record = interrupted / "rolls.csv.run.json"
-    record.write_text(record.read_text().replace('"rollcli": "', '"rollcli": "0.0.'))
-    assert "begun by rollcli 0.0." in refused(interrupted)
-
-
-def test_a_resume_with_changed_inputs_is_refused(interrupted):
-    write_kitti(interrupted / "maps" / "frame2.png", road_map(0.3))
-    assert "maps/frame2.png has changed since" in refused(interrupted)
-
-
-def test_a_resume_with_fewer_or_other_inputs_is_refused(interrupted):
-    (interrupted / "maps" / "frame9.png").unlink()
-    assert "10 frames, now there are 9" in refused(interrupted)
-    write_kitti(interrupted / "maps" / "frame10.png", road_map())
-    assert "the names of the inputs differ" in refused(interrupted)
-    (interrupted / "maps" / "frame3.png").unlink()
-    assert "maps/frame3.png, where now maps/frame4.png" in refused(interrupted)
-
-
 @pytest.mark.parametrize(("count", "shard"), [(7, []), (7, ["--shard", "2/2"]), (1, [])])
 def test_a_folder_that_has_grown_at_its_end_is_resumed_to_the_bytes_of_one_run(tmp_path, count, shard):
     write_maps(tmp_path / "maps", count)
@@ -273,20 +248,6 @@ def test_a_folder_that_has_grown_at_its_end_is_resumed_to_the_bytes_of_one_run(t
     assert (tmp_path / "rolls.csv").read_bytes() == (tmp_path / "anew.csv").read_bytes()
     record = "rolls.csv.run.json"
     assert (tmp_path / record).read_bytes() == (tmp_path / "anew.csv.run.json").read_bytes()
-
-
-def test_a_folder_that_has_grown_elsewhere_is_refused_and_says_what_to_do(interrupted):
-    write_kitti(interrupted / "maps" / "frame7a.png", road_map())
-    said = refused(interrupted)
-    assert "frames have been added that sort before others" in said
-    assert "new frames must sort last, or be added by --update" in said
-    write_kitti(interrupted / "maps" / "frame1a.png", road_map())
-    assert "maps/frame1a.png has been added and sorts before maps/frame2.png" in refused(interrupted)
-
-
-def test_a_resume_without_the_record_of_the_run_is_refused(interrupted):
-    (interrupted / "rolls.csv.run.json").unlink()
-    assert "rolls.csv.run.json" in refused(interrupted)
 
 
 @pytest.mark.parametrize(
@@ -346,14 +307,6 @@ def test_other_ways_to_run_do_not_hinder_a_resume(interrupted):
     )
     assert done.status == 0
     assert (interrupted / "rolls.csv").read_text().count("\n") == 11
-
-
-def test_the_record_holds_version_options_encoding_conventions_and_counts(undisturbed):
-    record = json.loads((undisturbed / "rolls.csv.run.json").read_text())
-    assert record["counts"] == {"frames": FRAMES, "ok": FRAMES - 1, "suspect": 0, "error": 1}
-    assert record["encoding"] == ["kitti"]
-    assert record["options"]["method"] == "gd"
-    assert "counter-clockwise" in record["conventions"]["roll_deg"]
 
 
 @pytest.mark.slow

@@ -89,14 +89,6 @@ def test_frames_whose_files_were_mended_end_in_the_bytes_of_a_run_without_failur
     assert kept == fresh
 
 
-def test_what_fails_again_stays_as_it_was(folder):
-    line = ("estimate", "maps", "-o", "rolls.csv")
-    assert rollcli(*line, cwd=folder).status == 3
-    before = made(folder)
-    assert rollcli(*line, *RETRY, cwd=folder).status == 3
-    assert made(folder) == before
-
-
 def test_a_retry_that_is_interrupted_keeps_what_it_has_done_and_is_taken_up_again(folder, maps, monkeypatch):
     line = ("estimate", "maps", "-o", "rolls.csv", "--derotated", "up")
     assert rollcli(*line, cwd=folder).status == 3

@@ -138,12 +138,6 @@ def test_an_update_does_what_has_changed_and_nothing_else(folder, tmp_path_facto
     assert sum(old != new for old, new in zip(rows, after, strict=True)) == 2
 
 
-def test_an_update_of_what_is_up_to_date_changes_nothing(folder):
-    before, images = contents(folder), inodes(folder)
-    estimate(folder, *IMAGES, "--update", status=3)
-    assert (contents(folder), inodes(folder)) == (before, images)
-
-
 @pytest.mark.parametrize("result", ["rolls.csv", "rolls.jsonl"])
 def test_new_frames_sort_anywhere_and_those_that_are_gone_leave_the_result(folder, tmp_path_factory, result):
     if result != "rolls.csv":
@@ -201,37 +195,6 @@ def test_a_damaged_line_of_inputs_is_as_none(folder):
     assert written(folder) == before
 
 
-def test_a_result_without_its_inputs_is_not_continued(folder):
-    (folder / "rolls.csv.inputs").unlink()
-    for flag in ("--resume", "--update"):
-        said = estimate(folder, *IMAGES, flag, status=2).err
-        assert "there is no rolls.csv.inputs; --overwrite starts anew" in said
-
-
-def test_a_file_of_another_program_is_not_replaced(tmp_path):
-    write_maps(tmp_path / "maps", 2)
-    (tmp_path / "rolls.csv.inputs").write_bytes(b"my notes\n")
-    assert "rolls.csv.inputs: exists already" in estimate(tmp_path, status=2).err
-    assert (tmp_path / "rolls.csv.inputs").read_bytes() == b"my notes\n"
-    estimate(tmp_path, "--overwrite")
-
-
-def test_what_could_not_be_read_is_done_again(folder):
-    write_maps(folder / "maps", 4)
-    done = estimate(folder, *IMAGES, "--update")
-    assert "8 ok, 0 suspect, 0 failed" in done.err
-
-
-def test_a_failed_frame_is_done_again_once_it_changes_or_with_retry_failed(tmp_path):
-    write_maps(tmp_path / "maps", 2)
-    write_kitti(tmp_path / "maps" / "frame1.png", road_map() * 0)
-    estimate(tmp_path, status=3)
-    assert "(2 kept)" in estimate(tmp_path, "--update", status=3).err
-    assert "(1 kept)" in estimate(tmp_path, "--update", "--retry-failed", status=3).err
-    write_maps(tmp_path / "maps", 2)
-    assert "(1 kept): 2 ok" in estimate(tmp_path, "--update").err
-
-
 def test_an_update_begins_a_result_that_is_not_there_and_continues_one_that_is_cut(tmp_path):
     write_maps(tmp_path / "maps", FRAMES)
     estimate(tmp_path, "--update")
@@ -257,15 +220,6 @@ def test_what_cannot_be_updated_is_refused_in_one_line(folder, arguments, said):
     assert said in done.err
     assert done.err.count("\n") == 1
     assert contents(folder) == before
-
-
-def test_a_dry_run_names_what_an_update_would_do(folder):
-    touch(folder)
-    put(folder, "frame1a", "frame6")
-    done = estimate(folder, *IMAGES, "--update", "--dry-run")
-    read = [line for line in done.out.splitlines() if line.startswith("read")]
-    assert read == ["read  maps/frame1a.png", "read  maps/frame6.png"]
-    assert "write rolls.csv.inputs" in done.out
 
 
 def test_masks_and_calibrations_count_as_inputs(tmp_path):
