@@ -1,6 +1,5 @@
 """Some columns of a result as arrays: a million rows without an object for each."""
 
-import math
 from array import array
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 
 from rollcli.files.results import READERS, STATUSES, STDIN, cells_of, pieces_of, read_run, value_of
 
+_EMPTY = frozenset({"", None})
 _CHUNK = 300  # rows that are held as text: twenty thousand do not fit into a cache, and take a third longer
 
 
@@ -62,7 +62,7 @@ def read_columns(path: str, wanted: Sequence[str]) -> ResultColumns:
         The file cannot be read, or is not a result of `rollcli estimate`; the line is named.
     """
     files, status, methods = list[str](), array("B"), set[str]()
-    numbers: dict[str, array[float]] = {}
+    numbers: dict[str, list[NDArray[np.float64]]] = {}
     for part, data in pieces_of(path):
         names, rows = cells_of(data, part, ["file", "status", "method", *wanted])
         while chunk := list(islice(rows, _CHUNK)):
@@ -74,13 +74,12 @@ def read_columns(path: str, wanted: Sequence[str]) -> ResultColumns:
             status.extend(map(STATUSES.index, found["status"]))
             methods.update(filter(None, found.get("method", ())))
             for name in found.keys() & set(wanted):
-                known = (math.nan if value is None else value for value in found[name])
-                numbers.setdefault(name, array("d")).extend(known)
+                numbers.setdefault(name, []).append(np.array(found[name], np.float64))  # None becomes NaN
     return ResultColumns(
         path,
         files,
         np.array(status),
-        {name: np.array(column) for name, column in numbers.items()},
+        {name: np.concatenate(column) for name, column in numbers.items()},
         frozenset(methods),
         None if path == STDIN else read_run(path),
     )
@@ -89,6 +88,8 @@ def read_columns(path: str, wanted: Sequence[str]) -> ResultColumns:
 def _values(name: str, cells: Sequence[Any], lines: Sequence[str], path: str) -> list[Any]:
     """Return the values of a column's cells; where one has none, raise the error of the first."""
     try:
+        if _EMPTY.issuperset(cells):  # most columns of many results
+            return [READERS[name](None)] * len(cells)
         return list(map(READERS[name], cells))
     except (KeyError, ValueError, TypeError, OverflowError):
         return [value_of(name, cell, f"{path}: {line}") for cell, line in zip(cells, lines, strict=True)]
