@@ -1,4 +1,4 @@
-"""How many scenes without a road are called ok: rooms, tables, boards, shelves, stairs, roofs, flying boxes.
+"""How many scenes without a road are called ok: rooms, tables, boards, shelves, stairs, flying boxes.
 
     python tests/benchmarks/bench_roadless.py [FRAMES [SEED]]
 
@@ -24,7 +24,7 @@ from rollcli.errors import EstimationError
 from rollcli.estimator.estimate import estimate_roll
 
 # a scene depends on its kind's place here
-KINDS = ("room", "table", "board", "boxes", "shelf", "desk", "stairs", "books", "robot", "roofs", "wall")
+KINDS = ("room", "table", "board", "boxes", "shelf", "desk", "stairs", "books", "robot")
 
 Array = NDArray[np.float64]
 Rectangle = tuple[Array, Array, Array]  # a corner and two edges, camera coordinates: right, down, ahead
@@ -236,28 +236,6 @@ def _robot(rng: np.random.Generator) -> Iterator[Rectangle]:
             yield corner + place, one, other
 
 
-def _roofs(rng: np.random.Generator) -> Iterator[Rectangle]:
-    """Yield flat roofs of several heights below a drone, and the ground between them."""
-    rotation, over = _tilt(rng, (20, 75), 8), rng.uniform(3, 15)
-    ahead = rotation[2] * over / rotation[2][1]
-    for _ in range(rng.integers(2, 9)):
-        x, z = ahead[[0, 2]] + rng.normal(0, over / 2, 2)
-        wide, deep = rng.uniform(4, 12, 2)
-        top = over + rng.uniform(-2, 6)
-        yield from _box(rotation, np.array([x, top, z]), np.array([x + wide, over + 12, z + deep]))
-    yield from _box(rotation, np.array([-200.0, over + 10, -200]), np.array([200.0, over + 12, 200]))
-
-
-def _wall(rng: np.random.Generator) -> Iterator[Rectangle]:
-    """Yield walls beside a camera that is held on its side: they lie below it as a road would."""
-    rotation = _tilt(rng, (-10, 10), 5)
-    turn = math.radians(rng.choice([-1, 1]) * rng.uniform(50, 110))
-    rolled = np.array([[math.cos(turn), math.sin(turn), 0], [-math.sin(turn), math.cos(turn), 0], [0, 0, 1]])
-    eye, beside, far = rng.uniform(1, 1.7), rng.uniform(0.4, 1.5, 2), rng.uniform(2, 8)
-    room = np.array([-beside[0], eye - 2.6, -2.0]), np.array([beside[1], eye, far])
-    yield from _box(rolled @ rotation, *room)
-
-
 _SCENES = {
     "room": _room,
     "table": _table,
@@ -268,8 +246,6 @@ _SCENES = {
     "stairs": _stairs,
     "books": _books,
     "robot": _robot,
-    "roofs": _roofs,
-    "wall": _wall,
 }
 
 
