@@ -37,7 +37,8 @@ class SearchTuning:
     first_pixels: int = 240
     """Pixels on which all planes are judged."""
     refined: int = 8
-    """Planes that go on, each the best of its roll: they are fitted, and judged on more pixels."""
+    """Planes that go on, each the best of its roll: they are fitted, and judged on more pixels. Of 41 maps of
+    real pairs and twelve seeds one had no angle with 4: the road's was the sixth. 8 cost 3 % of a map."""
     corridor: float = 1.0
     """Half-width of the corridor ahead, and of the lane in it, camera heights."""
     off_slope_weight: float = 0.2

@@ -222,8 +222,10 @@ def fit_rows(seen: SeenBlocks, at: Misalignment = LEVEL, before: RowFit | None =
     design = frame.design(seen)
     shift, fixed = seen.shift.astype(np.float64), seen.weight.astype(np.float64)
     used = list(_LINEAR)
-    known = before is not None and before.off.size == shift.size
-    fit = _robust(design[used], shift, fixed, start=(before.off, before.spread) if before and known else None)
+    start = None
+    if before is not None and before.off.size == shift.size:
+        start = before.off, before.spread
+    fit = _robust(design[used], shift, fixed, start=start)
     variance = _variance(design[used], fit, frame.tile)
     held = np.zeros(6)
     # a plain road's tilt or curve and its scale could cancel each other

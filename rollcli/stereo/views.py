@@ -188,6 +188,7 @@ def sampled(
 def _remapped(
     view: NDArray[_Number], u: NDArray[np.float32], v: NDArray[np.float32], between: int
 ) -> NDArray[_Number]:
+    """Return the grey levels at points that are rounded, see `sampled`."""
     grey = view.astype(np.float32, copy=False)
     return _as_stored(cv2.remap(grey, u, v, between, borderMode=cv2.BORDER_REPLICATE), view)
 

@@ -74,7 +74,7 @@ def _url(name):
         "shown": locations.public_name(name),
         "parts": _answer(lambda: locations.is_object_url(name) and locations.split_url(name)),
         "last": _answer(locations.base_name, name),
-        "below": _answer(locations.located, "s3://root/", name),
+        "below": _answer(locations.located, "s3://bucket/", name),
         "container": [
             containers.split_member(name),
             containers.frame_name(name),
