@@ -57,6 +57,8 @@ OFF = {
     "doubts.near_minimum": 0.0,
     "doubts.least_score": -1.0,
     "doubts.filled_by_horizon": -1.0,
+    "doubts.most_below": 1e6,
+    "doubts.least_beyond": -1.0,
     "doubts.rival_share": 1e6,
     "doubts.longest_move": 1e6,
     "doubts.bound_share": 1e6,
