@@ -7,7 +7,7 @@ from importlib.metadata import PackageNotFoundError
 import pytest
 
 import rollcli as package
-from rollcli.cli import main as versions
+from rollcli.cli import versions
 from tests.run_cli import ROOT, environment, python, rollcli, rollcli_process, write_maps
 
 
