@@ -86,7 +86,7 @@ def _taken(sink: int) -> str:
 
 _SUB = 1
 _FILTERS = b"\0\1"  # None and Sub
-_FIRST_ROWS = 16  # tell of most files that have others; to unpack the whole takes a fifth of OpenCV's time
+_FIRST_ROWS = 4  # tell of most files that have others; to unpack the whole takes a fifth of OpenCV's time
 _FULL_WINDOW = b"\x78"  # of less OpenCV's zlib minds references that go further back; other decoders do not
 # Bytes after a stream that are looked for; more would have to end in its checksum. To look through the whole
 # stream takes a fortieth of OpenCV's time
