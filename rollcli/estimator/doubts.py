@@ -187,12 +187,6 @@ def _grows_upward(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
         yield "the disparity grows upward, as it does in a depth map"
 
 
-def _little_road(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
-    road = evidence.road
-    if road and road.score < tuning.least_score:
-        yield "little of what lies ahead looks like a road"
-
-
 def _narrow_view(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
     view = evidence.view
     if view and view.width < tuning.narrowest:
@@ -222,9 +216,7 @@ def _closed_off(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
 
 def _rival_plane(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
     road = evidence.road
-    if not road or road.score < tuning.least_score:
-        return  # of a poor road any plane is a rival
-    if road.rival > tuning.rival_share * road.score:
+    if road and road.rival > tuning.rival_share * road.score:
         yield "another plane, with another roll, explains the map nearly as well"
 
 
@@ -258,7 +250,6 @@ REASONS: tuple[Reason, ...] = (
     _not_global,
     _near_minimum,
     _grows_upward,
-    _little_road,
     _narrow_view,
     _little_filled,
     _plane_ends,

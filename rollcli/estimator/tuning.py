@@ -106,9 +106,6 @@ class DoubtTuning:
     """Times the lowest energy up to which another minimum is nearly as low."""
     other_angle: float = math.radians(2)
     """Radians by which another minimum is another answer."""
-    least_score: float = 0.03
-    """`Road.score` below which little of what lies ahead looks like a road. Behind a car, and with noise on
-    four fifths of the pixels, right angles have 0.04 and more; wrong ones, with more noise still, 0.02."""
     narrowest: float = 0.8
     """Camera heights that a view is wide at its bottom at the least: cameras that look down at the road see
     1.06, those at a table 0.6. Without it 26 of 1080 scenes without a road are ok in place of 2."""

@@ -55,7 +55,6 @@ OFF = {
     "interval.white": 0.0,
     "interval.slant": 0.0,
     "doubts.near_minimum": 0.0,
-    "doubts.least_score": -1.0,
     "doubts.filled_by_horizon": -1.0,
     "doubts.most_below": 1e6,
     "doubts.least_beyond": -1.0,

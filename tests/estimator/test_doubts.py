@@ -70,7 +70,6 @@ MAPS = {
     "a lower minimum of the energy lies at 90.0000 degrees": (lambda: bent_road(90), {"road": "all"}),
     "the energy is nearly as low at -30.96 degrees": (saddle, {"road": "all", "method": "exact"}),
     "the disparity grows upward": (lambda: road(4)[::-1], {"road": "all"}),
-    "little of what lies ahead looks like a road": (lambda: np.minimum(road(-10), road(10)), {}),
     "the view is as narrow as that of a table": (lambda: with_noise(50 + 0.06 * (V - 240), 0.05), {}),
     "a camera that looks down so far sees more of a road": (close_table, {}),
     "the plane ends near ahead": (lambda: with_noise(np.where(V > 270, road(4), 5)), {}),
