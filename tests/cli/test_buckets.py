@@ -4,7 +4,7 @@ import pytest
 
 from rollcli.files.storage import list_names, read_bytes, remove
 from tests.object_store import joined, upload
-from tests.run_cli import contents, rollcli, write_maps
+from tests.run_cli import rollcli, write_maps
 
 
 @pytest.fixture
@@ -49,23 +49,3 @@ def test_images_of_kept_rows_that_are_missing_are_made_again(bucket, tmp_path, p
     )
     assert joined(f"{bucket}/rolls.csv") == rows
     assert {name: read_bytes(f"{level}/{name}") for name in list_names(level)} == images
-
-
-def test_parquet_parts_are_one_typed_table(tmp_path):
-    parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow, of the extra parquet, is not here")
-    write_maps(tmp_path / "maps", 5)
-    (tmp_path / "maps" / "frame9.png").write_bytes(b"no map")
-    assert rollcli("estimate", "maps", "-o", "rolls.csv", cwd=tmp_path).status == 3
-    assert rollcli("estimate", "maps", "-o", "rolls.parquet", "--part-rows", "4", cwd=tmp_path).status == 3
-    assert sorted(contents(tmp_path / "rolls.parquet")) == ["part-00000.parquet", "part-00001.parquet"]
-    table = parquet.read_table(tmp_path / "rolls.parquet")
-    assert table.num_rows == 6
-    types = {name: str(table.schema.field(name).type) for name in ("file", "roll_deg", "iterations")}
-    assert types == {"file": "string", "roll_deg": "double", "iterations": "int64"}
-    assert table.column("roll_deg")[5].as_py() is None
-    assert b"rollcli" in table.schema.metadata
-    from rollcli.files.results import read_result
-
-    assert read_result(tmp_path / "rolls.parquet").rows == read_result(tmp_path / "rolls.csv").rows
-    outs = [rollcli("rig", name, cwd=tmp_path).out for name in ("rolls.parquet", "rolls.csv")]
-    assert outs[0] == outs[1] != ""

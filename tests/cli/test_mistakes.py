@@ -124,12 +124,6 @@ def test_times_of_parquet_are_no_angles(tmp_path, command, kind, value):
     assert "rollcli: r.parquet: " in refusal
 
 
-def test_a_part_without_a_whole_line_is_damaged(tmp_path):
-    (tmp_path / "r").mkdir()
-    (tmp_path / "r" / "part-00000.csv").write_text("file,status,roll_deg")
-    assert "r/part-00000.csv: is damaged: it has no whole line" in rollcli("rig", "r", cwd=tmp_path).refused()
-
-
 @pytest.mark.parametrize("threads", [0, 1])
 def test_where_the_system_starts_no_more_threads_the_others_do_it_all(tmp_path, monkeypatch, threads):
     start, started = threading.Thread.start, []

@@ -4,20 +4,9 @@ import os
 import pty
 import subprocess
 
-import numpy as np
-
-from tests.run_cli import command, environment, road_map, rollcli, write_kitti
+from tests.run_cli import command, environment
 
 FRAMES = 3
-
-
-def test_whole_pixels_in_16_bits_are_warned_of_once(tmp_path):
-    for name in ("a.png", "b.png"):
-        write_kitti(tmp_path / name, np.rint(road_map()) / 256)
-    err = rollcli("estimate", "a.png", "b.png", cwd=tmp_path).err
-    assert err.count("a.png: warning: ") == 1
-    assert err.count("--encoding px") == 2
-    assert "rollcli: 2 frames: warning: uint16 numbers up to" in err
 
 
 def test_a_terminal_sees_a_progress_bar(maps):

@@ -1,9 +1,11 @@
 """What readers and writers make of small inputs, recorded; see `tests.recorded`."""
 
+import contextlib
 import io
 import itertools
 import math
 import os
+import tempfile
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -16,7 +18,9 @@ from rollcli.errors import RollcliError
 from rollcli.files import bounded, containers, encodings, locking, naming
 from rollcli.files.codecs import pictures
 from rollcli.files.formats import decode_image, decode_mask, decode_stored, encode_stored
+from rollcli.files.inputs import find_inputs, pair_inputs
 from rollcli.files.matching import is_elsewhere, match_paths
+from rollcli.files.result_columns import read_columns
 from rollcli.files.results import FURTHER, Row, column_types, format_header, format_row, parse_rows
 from rollcli.files.stores import locations
 from rollcli.rig.calibration import Calibration
@@ -83,24 +87,75 @@ def _url(name):
     }
 
 
+@contextlib.contextmanager
+def _folder_of(files):
+    """Work in a folder that has these files, and no others."""
+    before = Path.cwd()
+    with tempfile.TemporaryDirectory() as folder:
+        os.chdir(folder)
+        try:
+            for path in map(Path, files):
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_bytes(b"x")
+            yield
+        finally:
+            os.chdir(before)
+
+
+def _asked(words):
+    """The inputs among the words, and what is asked for by name: `recursive`, `include=PATTERN`, ..."""
+    named = [word.partition("=") for word in words if word == "recursive" or "=" in word]
+    options = {
+        name: [value] if name in ("include", "exclude", "skip") else value or True for name, _, value in named
+    }
+    return [word for word in words if word != "recursive" and "=" not in word], options
+
+
+def _found(files, words):
+    inputs, options = _asked(words)
+    with _folder_of(files):
+        found = _answer(find_inputs, inputs, stdin=[], **options)
+    return found if isinstance(found, str) else [[each.name, each.relative] for each in found]
+
+
+def _paired(files, words):
+    sides, options = _asked(words)
+    with _folder_of(files):
+        found = _answer(pair_inputs, *sides, **options)
+    return found if isinstance(found, str) else [[each.left.name, each.right.name] for each in found]
+
+
+def _columns(data):
+    """What the columns of a result hold that numbers are asked of."""
+    with _folder_of([]):
+        Path("x").write_bytes(data)
+        found = _answer(read_columns, "x", ["roll_deg", "height_m"])
+    return (
+        found if isinstance(found, str) else [found.files, found.status, found.numbers, sorted(found.methods)]
+    )
+
+
 def _matched(lefts, rights):
     found = naming.match_names(lefts, rights), naming.match_names(lefts, rights, marked=True)
     return [[each.pairs, each.ambiguous] for each in found]
 
 
 READ = {
+    "columns": _columns,
     "elsewhere": lambda one, other: [is_elsewhere(one[0], other[0], of_pair=pair) for pair in (False, True)],
+    "found": _found,
     "image": lambda data: [_answer(decode, data, "x") for decode in (decode_image, decode_mask)],
     "map": _map,
     "match": lambda names, rows: _answer(match_paths, names, rows, "rolls.csv"),
     "npy": lambda header: _map(npy_header(header.decode("latin-1")) + bytes(100)),
     "order": lambda names: sorted(names, key=naming.natural_key),
+    "paired": _paired,
     "pairs": _matched,
     "result": _result,
     "text": lambda data: _answer(lambda: bounded.as_utf8(data, "x").decode("latin-1")),
     "url": lambda name: _url(name.decode()),
 }
-OF_NAMES = ("elsewhere", "match", "order", "pairs")
+OF_NAMES = ("elsewhere", "found", "match", "order", "paired", "pairs")
 
 
 def _read(line):
@@ -266,6 +321,6 @@ CASES = {
 
 @pytest.mark.parametrize("case", CASES)
 def test_answers_are_those_recorded(case):
-    if case.startswith("url ") and os.name == "nt":
-        pytest.skip("fewer names are those of files")
+    if case.startswith(("found ", "url ")) and os.name == "nt":
+        pytest.skip("fewer names are those of files, and folders are not to be read otherwise")
     check("files", case, CASES[case]())

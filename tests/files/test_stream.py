@@ -63,13 +63,3 @@ def test_a_reader_that_has_gone_is_told_from_an_error(pipe, monkeypatch):
     monkeypatch.setattr(os, "write", fail)
     with pytest.raises(OutputError, match=r"^/dev/x: cannot be written: no space left on device$"):
         stream.write_stream(writes, b"data", "/dev/x")
-
-
-def test_what_cannot_be_opened_is_named(tmp_path):
-    with pytest.raises(OutputError, match=r"none: cannot be written: no such file or directory$"):
-        stream.open_stream(str(tmp_path / "none"))
-
-
-def test_a_device_that_takes_nothing_is_named():
-    with pytest.raises(OutputError, match=r"^/dev/full: cannot be written: no space left on device$"):
-        stream.write_output("/dev/full", b"data", overwrite=True)

@@ -57,7 +57,7 @@ FURTHER = {
         "cli/test_bad_stores.py",
     ),
     "pictures": ("run/test_derotate.py", "run/test_vdisparity.py", "cli/test_heights.py"),
-    "rig": ("cli/test_calibration.py", "cli/test_horizon.py", "cli/test_rig.py", "run/test_diagnosis.py"),
+    "rig": ("cli/test_calibration.py", "cli/test_horizon.py", "run/test_diagnosis.py"),
     "run": (
         "cli/test_recorded.py",
         "files/stores/test_turns.py",
@@ -69,7 +69,6 @@ FURTHER = {
         "cli/test_streams.py",
         "cli/test_calibration.py",
         "cli/test_horizon.py",
-        "cli/test_rig.py",
         "cli/test_lost_readers.py",
         "cli/test_bad_stores.py",
         "cli/test_urls.py",

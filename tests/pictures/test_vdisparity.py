@@ -10,7 +10,7 @@ from hypothesis.extra import numpy as arrays
 
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.pictures.derotate import derotate
-from rollcli.pictures.vdisparity import profile, row_offset, v_disparity
+from rollcli.pictures.vdisparity import row_offset, v_disparity
 
 MAPS = arrays.arrays(
     st.sampled_from([np.uint8, np.uint16, np.int16, np.float32, np.float64]),
@@ -29,13 +29,6 @@ def test_counts_sum_to_the_valid_pixels_of_each_row(values, bins, top):
     np.testing.assert_array_equal(histogram.counts.sum(axis=1), valid.sum(axis=1))
 
 
-def test_whole_pixel_maps_get_a_bin_a_pixel_and_others_finer_ones():
-    assert v_disparity(np.array([[1, 63]], np.uint8)).counts.shape == (1, 64)
-    assert v_disparity(np.array([[1.0, 63.25]])).counts.shape == (1, 256)
-    assert v_disparity(np.array([[1.0, 163.25]])).counts.shape == (1, 656)
-    assert v_disparity(np.array([[1.0, 5163.25]])).counts.shape == (1, 1024)
-
-
 @pytest.mark.parametrize("roll_deg", [-20, 0, 3, 15])
 def test_the_parabola_lies_on_the_road_of_the_derotated_map(roll_deg):
     theta = math.radians(roll_deg)
@@ -49,13 +42,3 @@ def test_the_parabola_lies_on_the_road_of_the_derotated_map(roll_deg):
     road = estimate.alpha[0] + estimate.alpha[1] * y + estimate.alpha[2] * y**2
 
     np.testing.assert_allclose(level[:, 150], road, atol=0.01)
-
-
-@pytest.mark.parametrize("width", [1, 2, 141])
-@pytest.mark.parametrize("roll_deg", [-12, 0, 25])
-def test_the_profile_is_the_road_along_the_middle_column(width, roll_deg):
-    theta, alpha = math.radians(roll_deg), (20.0, 0.4, 0.003)
-    rows = np.arange(97)
-    y = rows * math.cos(theta) - (width - 1) / 2 * math.sin(theta)
-    road = np.polynomial.Polynomial(alpha)(y)
-    np.testing.assert_allclose(np.polynomial.Polynomial(profile(alpha, theta, width))(rows), road)

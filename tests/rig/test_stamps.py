@@ -27,18 +27,6 @@ def rows(count=600, rate=RATE, name=NAME, start=START, every_s=1.0):
     ]
 
 
-def test_a_drift_is_told_an_hour_where_names_have_stamps():
-    times, given = rows()
-    rig = assess_rig(given)
-    (drive,) = rig.drives
-    hourly, whole = rig.drift_per_hour(drive), drive.quantities["roll"].drift
-    hours = (times[-1] - times[0]) / 3600
-    assert hourly.value == pytest.approx(whole.value / hours)
-    assert abs(hourly.value - RATE) < hourly.ci95 < 0.6
-    without = assess_rig([replace(each, file=f"{place}.png") for place, each in enumerate(given)])
-    assert without.drift_per_hour(without.drives[0]).value is None
-
-
 def test_rig_says_the_drift_an_hour_in_words_and_in_json(tmp_path):
     from rollcli.files.results import format_row
 

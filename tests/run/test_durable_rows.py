@@ -95,12 +95,6 @@ def test_a_resume_makes_missing_and_empty_images_of_kept_rows_again(finished, ro
     assert (finished / "up" / "frame2.png").stat().st_mtime_ns == kept
 
 
-def test_a_dry_run_of_a_resume_lists_images_that_are_missing(finished):
-    assert [line for line in resume(finished, "--dry-run").out.splitlines() if "frame" in line] == []
-    (finished / "up" / "frame4.png").unlink()
-    assert "write up/frame4.png" in resume(finished, "--dry-run").out.splitlines()
-
-
 def test_images_that_cannot_be_made_again_end_the_resume_with_one_line(finished):
     state = (finished / "maps" / "frame0.png").stat()
     size = (finished / "maps" / "frame0.png").stat().st_size

@@ -102,20 +102,6 @@ def test_a_full_disk_of_images_keeps_the_rows_before_it(maps, jobs):
         subprocess.run(["umount", disk], check=True)
 
 
-def test_an_output_folder_that_cannot_be_made_ends_the_run_with_status_1(maps):
-    (maps / "file").touch()
-    done = rollcli("estimate", "maps", "-o", "file/rolls.csv", cwd=maps)
-    assert (done.status, "file/rolls.csv: cannot be written" in one_line(done)) == (1, True)
-    done = rollcli("estimate", "maps", "-q", "--derotated", "file/upright", cwd=maps)
-    assert (done.status, "cannot be written" in one_line(done)) == (1, True)
-
-
-def test_an_output_that_is_a_folder_ends_the_run_with_status_1(maps):
-    (maps / "out").mkdir()
-    done = rollcli("estimate", "maps", "-o", "out", cwd=maps)
-    assert (done.status, "out: cannot be written: is a directory" in one_line(done)) == (1, True)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(("jobs", "moved"), [("1", True), ("2", False)])
 def test_a_result_that_is_moved_or_removed_while_running_ends_the_run_with_status_1(maps, jobs, moved):

@@ -8,9 +8,7 @@ from dataclasses import replace
 
 import pytest
 
-from rollcli.errors import ExitStatus
-from rollcli.files.results import Row
-from rollcli.run.frame import Frame, FrameResult, failed_frame
+from rollcli.run.frame import Frame, failed_frame
 from rollcli.run.options import EncodingOptions, RunningOptions
 from rollcli.run.progress import Progress, TaskProgress
 
@@ -24,10 +22,6 @@ def progress(total=3, encoding=GUESSED, **running):
 MAP = Frame("a.png", "", "a.png", "", "a.png", None)
 
 
-def result(status="ok", message="", **values):
-    return FrameResult(Row("a.png", status=status, message=message), **values)
-
-
 def failed(name, message, cause):
     return failed_frame(replace(MAP, file=name), message, cause)
 
@@ -35,15 +29,6 @@ def failed(name, message, cause):
 @pytest.fixture
 def lines(capsys):
     return lambda: capsys.readouterr().err.splitlines()
-
-
-def test_the_exit_status_says_whether_a_frame_failed(lines):
-    counted = progress()
-    counted.add(result("suspect"))
-    assert counted.summary.status is ExitStatus.DONE
-    counted.add(failed("a.png", "is no map", "no map"))
-    assert counted.summary.status is ExitStatus.FRAMES_FAILED
-    assert lines() == ["rollcli: a.png: is no map"]
 
 
 def test_of_many_causes_the_first_five_are_said(lines):
@@ -55,14 +40,6 @@ def test_of_many_causes_the_first_five_are_said(lines):
         *(f"rollcli: x: {cause}" for cause in "abcde"),
         "rollcli: 2 further frames: other causes, which -v names",
     ]
-
-
-def test_a_verbose_run_names_every_failure(lines):
-    counted = progress(verbose=True)
-    for number in range(8):
-        counted.add(failed("a.png", f"{number}", "number"))
-    counted.tell_end()
-    assert [line for line in lines() if "a.png" in line] == [f"rollcli: a.png: {n}" for n in range(8)]
 
 
 PAIR = Frame("left/a.png", "right/a.png", "left/a.png", "right/a.png", "a.png", None)
@@ -82,24 +59,6 @@ PAIR = Frame("left/a.png", "right/a.png", "left/a.png", "right/a.png", "a.png", 
 def test_a_row_does_not_repeat_its_file_and_stderr_names_it(frame, reason, message, said):
     failed = failed_frame(frame, reason)
     assert (failed.row.message, failed.said) == (message, said)
-
-
-def test_a_quiet_run_says_errors_alone(lines):
-    counted = progress(quiet=True, verbose=True)
-    counted.add(
-        result("suspect", "is doubtful", encoding="px", warnings={"doubt": "may be wrong"}, searched=(0, 63))
-    )
-    counted.note(counted.last_line())
-    counted.detail("a detail")
-    assert lines() == []
-    counted.say("an error")
-    assert lines() == ["rollcli: an error"]
-
-
-def test_doubts_are_said_when_verbose(lines):
-    counted = progress(verbose=True)
-    counted.add(result("suspect", "is doubtful"))
-    assert lines() == ["rollcli: a.png: suspect: is doubtful"]
 
 
 class Clock:
@@ -194,15 +153,6 @@ def test_a_terminal_shows_a_bar_which_makes_room_for_messages_and_vanishes(monke
     assert (erased.strip(), erased[-1:]) == ("", "\r")
     terminal.stream.close()
     os.close(terminal.reader)
-
-
-def test_quiet_progress_writes_no_lines(clock, capsys):
-    with TaskProgress(3, quiet=True, verbose=True) as progress:
-        clock.now += 40
-        progress.advance()
-        progress.note("a note")
-        progress.detail("a detail")
-    assert capsys.readouterr().err == ""
 
 
 def test_a_note_is_written_once_and_a_detail_only_when_verbose(capsys):

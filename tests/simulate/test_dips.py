@@ -31,22 +31,3 @@ def test_true_heights_are_distances_from_the_plain_road():
     assert np.nanmin(frame.heights[frame.road]) == pytest.approx(min(dip.height for dip in dips), abs=1e-4)
     assert {np.sign(dip.height) for dip in dips} == {-1, 1}
     assert all(0.025 <= abs(dip.height) <= 0.07 for dip in dips)
-
-
-def test_kerbs_are_as_high_as_they_were_built_and_walls_have_no_height():
-    frame = render_frame(spec_of(scene="street", kerb=(0.1, 0.1), dips=0, roll=0.1))
-    pavement = frame.heights[np.isfinite(frame.heights) & ~frame.road]
-    assert len(pavement) > 500
-    assert np.allclose(pavement, 0.1, atol=1e-5)
-    assert np.allclose(frame.heights[frame.road], 0, atol=1e-5)
-    assert np.isnan(frame.heights[:20]).any()
-
-
-def test_dips_change_nothing_else():
-    plain, dipped = (render_frame(spec_of(dips=n)) for n in (None, 2))
-    assert plain.heights is None
-    level = np.abs(dipped.heights) < 1e-7
-    assert 0.5 < level[dipped.road].mean() < 1
-    same = plain.road & dipped.road & level
-    assert np.allclose(plain.disparity[same], dipped.disparity[same], atol=1e-4)
-    assert (plain.left[~plain.road & ~dipped.road] == dipped.left[~plain.road & ~dipped.road]).mean() > 0.98
