@@ -16,9 +16,6 @@ def column(text, name):
     return [row[name] for row in rows_of(text)]
 
 
-FRAMES = 7
-
-
 def test_a_file_name_that_is_no_text_comes_back_as_it_is(tmp_path):
     name = b"fr\xe4me,\xff.png"
     write_kitti(tmp_path / "a.png", road_map())

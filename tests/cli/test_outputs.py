@@ -5,7 +5,8 @@ from importlib import import_module
 import pytest
 
 from tests.report.results import row, write_result
-from tests.run_cli import contents, road_map, rollcli, write_kitti
+from tests.run_cli import contents, road_map, rollcli, write_kitti, write_maps
+from tests.slow import mostly_slow
 
 FRAMES = 2
 
@@ -96,3 +97,14 @@ def test_the_later_of_two_does_not_replace_what_the_first_wrote(inputs, monkeypa
     assert written.read_bytes() == b"another's"
     assert rollcli(*line.split(), "--overwrite", cwd=inputs).status == 0
     assert written.read_bytes() != b"another's"
+
+
+@pytest.mark.parametrize("several", mostly_slow([2, 3], 2))
+def test_any_number_of_workers_gives_the_same_bytes(tmp_path, several):
+    write_maps(tmp_path / "maps", 12)
+    for jobs in (1, several):
+        images = ["--derotated", f"d{jobs}", "--vdisparity", f"v{jobs}", "--road-mask", f"r{jobs}"]
+        rollcli("estimate", "maps", "-j", str(jobs), "-o", f"{jobs}.csv", *images, cwd=tmp_path)
+    assert (tmp_path / f"{several}.csv").read_bytes() == (tmp_path / "1.csv").read_bytes()
+    for kind in "dvr":
+        assert contents(tmp_path / f"{kind}{several}") == contents(tmp_path / f"{kind}1")

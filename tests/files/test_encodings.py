@@ -11,14 +11,6 @@ from rollcli.files.formats import Stored, read_stored
 from tests.run_cli import rollcli, rows_of
 
 
-def stored(values, dtype, **more):
-    return Stored(np.array([values], dtype), "npy", **more)
-
-
-def pixels(values, dtype, **options):
-    return to_disparity(stored(values, dtype), **options).disparity[0].tolist()
-
-
 def test_the_stored_numbers_are_left_alone():
     values = np.array([[65535, -1, 5]], np.float32)
     values.flags.writeable = False

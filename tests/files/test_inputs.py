@@ -31,28 +31,6 @@ def names(found):
     return [each.name for each in found]
 
 
-def test_each_file_comes_once_however_it_is_spelt(here):
-    root = here("maps/f1.png", "maps/f2.png")
-    (root / "link").symlink_to("maps")
-
-    spellings = [
-        "maps/f1.png",
-        "./maps/f1.png",
-        "maps/../maps/f1.png",
-        str(root / "maps" / "f1.png"),
-        "link/f1.png",
-    ]
-
-    assert names(find_inputs([*spellings, "maps", "maps/*.png"])) == ["maps/f1.png", "maps/f2.png"]
-
-
-def test_links_to_one_file_are_frames_of_their_own(here):
-    root = here("maps/f1.png")
-    (root / "maps" / "f2.png").symlink_to("f1.png")
-
-    assert names(find_inputs(["maps"])) == ["maps/f1.png", "maps/f2.png"]
-
-
 def test_stdin_is_read_when_no_lines_are_given(here, monkeypatch):
     here("ä.png")
     monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO("ä.png\n".encode())))
@@ -69,21 +47,6 @@ def test_names_that_are_no_text_are_found(here):
 
     assert names(find_inputs([], files_from="list.txt")) == [name]
     assert name in names(find_inputs(["."]))
-
-
-def test_links_in_a_circle_end(here):
-    root = here("maps/f1.png")
-    (root / "maps" / "self").symlink_to(root / "maps")
-
-    assert names(find_inputs(["maps"], recursive=True)) == ["maps/f1.png"]
-
-
-def test_a_link_to_nothing_is_an_input_that_its_row_will_explain(here):
-    root = here("maps/f1.png")
-    (root / "maps" / "f2.png").symlink_to("gone.png")
-
-    assert names(find_inputs(["maps"])) == ["maps/f1.png", "maps/f2.png"]
-    assert names(find_inputs(["maps/f2.png"])) == ["maps/f2.png"]
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes on this system")
@@ -112,10 +75,6 @@ def test_a_folder_without_permission_is_named(here):
 
 
 # -- pairs
-
-
-def pairs(found):
-    return [(each.left.name, each.right.name) for each in found]
 
 
 @pytest.fixture

@@ -89,14 +89,14 @@ def _url(name):
 
 @contextlib.contextmanager
 def _folder_of(files):
-    """Work in a folder that has these files, and no others."""
+    """Work in a folder that has these files, some of them links to others, and nothing else."""
     before = Path.cwd()
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
         try:
-            for path in map(Path, files):
-                path.parent.mkdir(parents=True, exist_ok=True)
-                path.write_bytes(b"x")
+            for name, _, target in (each.partition("->") for each in files):
+                Path(name).parent.mkdir(parents=True, exist_ok=True)
+                Path(name).symlink_to(target) if target else Path(name).write_bytes(b"x")
             yield
         finally:
             os.chdir(before)

@@ -1,9 +1,6 @@
 """Rows to text and back, columns of a result, and which row belongs to which file."""
 
-import io
 import itertools
-import sys
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -96,17 +93,6 @@ def test_a_name_that_leaves_no_room_for_its_record_has_none(tmp_path):
     assert read_result(path).run is None
 
 
-HEADER = "file,right_file,status,roll_deg,roll_ci95_deg,pitch_deg,height_m"
-NUMBERS = ("roll_deg", "roll_ci95_deg", "pitch_deg", "height_m")
-
-
-def result(folder, *rows):
-    path = folder / "rolls.csv"
-    lines = [f"{place}.png,,ok,{','.join(row[name] for name in NUMBERS)}" for place, row in enumerate(rows)]
-    path.write_text("\n".join([HEADER, *lines, ""]))
-    return str(path)
-
-
 ROWS = [
     Row(f"{place}.png", status=STATUSES[place % 3], roll_deg=place / 8, method=("gd", "", "gss")[place % 3])
     for place in range(700)  # more than are held as text at once
@@ -143,15 +129,3 @@ def test_columns_are_those_of_the_rows(tmp_path, form, before):
 
     check(found)
     assert found.run == {"rollcli": "1"}
-
-
-@pytest.mark.parametrize("form", ["csv", "jsonl"])
-def test_columns_come_from_stdin_too(monkeypatch, tmp_path, form):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "-.run.json").write_text('{"rollcli": "1"}')
-    monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=io.BufferedReader(io.BytesIO(bytes_of(form)))))
-
-    found = read_columns("-", ["roll_deg", "pitch_deg"])
-
-    check(found)
-    assert found.run is None

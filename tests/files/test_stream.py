@@ -35,15 +35,6 @@ def test_a_pipe_gets_all_of_the_bytes_and_stays_a_pipe(tmp_path):
     assert path.is_fifo()
 
 
-def test_a_file_is_replaced_and_what_a_killed_run_left_of_it_is_removed(tmp_path):
-    path = tmp_path / "page.html"
-    path.write_bytes(b"old")
-    (tmp_path / ".page.html.0123456789abcdef.part").write_bytes(b"half")
-    stream.write_output(str(path), b"new", overwrite=True)
-    assert path.read_bytes() == b"new"
-    assert [each.name for each in tmp_path.iterdir()] == ["page.html"]
-
-
 def test_standard_output_is_descriptor_1_unless_python_calls_it_closed(monkeypatch):
     assert stream.stdout_descriptor() == 1
     monkeypatch.setattr(sys, "stdout", None)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import rollcli
-from rollcli.errors import UsageError
 from rollcli.estimator.road.model import RoadModel
 from rollcli.pictures.heights import FittedRoad, heights_over
 from rollcli.rig.calibration import Calibration
@@ -137,10 +136,3 @@ def test_a_hill_that_no_parabola_fits_is_level_and_a_dip_in_it_as_deep_as_it_is(
     below *= np.cos(np.arctan(0.003 * z - 0.1))
     lower = rollcli.height_map(seen, rollcli.estimate_roll(seen, calibration=rig), rig)
     assert np.median(lower[dip] + below) == pytest.approx(0, abs=0.002)
-
-
-def test_a_map_of_another_size_is_refused():
-    v = np.mgrid[:120, :160][0]
-    estimate = rollcli.estimate_roll(20 + 0.3 * v)
-    with pytest.raises(UsageError, match=r"80x60 px is not one of the 160x120 px"):
-        rollcli.height_map(np.ones((60, 80)), estimate)

@@ -1,13 +1,15 @@
-"""De-rotation, v-disparity and SGBM's lag, pixel by pixel against loops that are slow and plain."""
+"""De-rotation and v-disparity, pixel by pixel against loops that are slow and plain, and on roads."""
 
 import math
 
 import numpy as np
 import pytest
 
+from rollcli.estimator.estimate import estimate_roll
 from rollcli.pictures import vdisparity as vdisparity_module
 from rollcli.pictures.derotate import derotate
-from rollcli.pictures.vdisparity import v_disparity
+from rollcli.pictures.vdisparity import row_offset, v_disparity
+from tests.run_cli import road_map
 
 
 def nearest(value):
@@ -87,3 +89,52 @@ def test_disparities_are_counted_in_the_bins_that_hold_them(monkeypatch, block):
     assert v_disparity(values).max_disparity == 71
     assert v_disparity(values).counts.shape == (23, 4 * 71)
     assert v_disparity(np.rint(values)).counts.shape == (23, 71)
+
+
+SHAPE = (97, 141)
+
+
+def with_holes(values, share=0.1, seed=0):
+    return np.where(np.random.default_rng(seed).random(values.shape) < share, 0, values)
+
+
+@pytest.mark.parametrize("roll_deg", [-30, -3, 3, 30])
+def test_the_estimate_on_the_result_is_zero(roll_deg):
+    theta = math.radians(roll_deg)
+    disparity = with_holes(road_map(theta, width=141, height=97, noise=0))
+
+    found = estimate_roll(disparity, road="all").theta
+
+    assert found == pytest.approx(theta, abs=1e-6)
+    # an interpolation between valid neighbours alone leans by a fraction of a pixel: evenly, over many holes
+    assert estimate_roll(derotate(disparity, found), road="all").theta == pytest.approx(
+        0, abs=math.radians(0.02)
+    )
+
+
+@pytest.mark.parametrize("hole", [0.0, -1.0, np.nan, np.inf, -3.4e38])
+def test_no_data_bleeds_into_no_value(hole):
+    values = np.full(SHAPE, 50.0, np.float32)
+    values[np.random.default_rng(0).random(SHAPE) < 0.3] = hole
+
+    level = derotate(values, math.radians(20))
+
+    with np.errstate(invalid="ignore"):
+        valid = np.isfinite(level) & (level > 0)
+    np.testing.assert_allclose(level[valid], 50, rtol=1e-6)
+    assert 0.4 < valid.mean() < 0.6
+
+
+@pytest.mark.parametrize("roll_deg", [-20, 0, 3, 15])
+def test_the_parabola_lies_on_the_road_of_the_derotated_map(roll_deg):
+    theta = math.radians(roll_deg)
+    v, u = np.mgrid[:200, :300]
+    y = v * math.cos(theta) - u * math.sin(theta)
+    disparity = 30 + 0.2 * y + 2e-4 * y**2
+    estimate = estimate_roll(disparity, road="all")
+
+    level = derotate(disparity, estimate.theta)
+    y = np.arange(200) + row_offset(estimate.theta, 300, 200)
+    road = estimate.alpha[0] + estimate.alpha[1] * y + estimate.alpha[2] * y**2
+
+    np.testing.assert_allclose(level[:, 150], road, atol=0.01)

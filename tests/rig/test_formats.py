@@ -1,6 +1,5 @@
 """Calibration files of every format, real and hostile."""
 
-import math
 import time
 import tracemalloc
 
@@ -9,7 +8,7 @@ import numpy as np
 import pytest
 
 from rollcli.errors import InputError, RollcliError
-from rollcli.rig.calibration import Calibration, CalibrationOptions
+from rollcli.rig.calibration import CalibrationOptions
 from rollcli.rig.read_calibration import parse_calibration
 from tests.rig import calibration_files as samples
 from tests.rig.calibration_files import Rig
@@ -142,12 +141,3 @@ def test_white_space_and_repeated_keys_take_a_time_in_proportion_to_their_number
     before = time.process_time()
     refusal(text)
     assert time.process_time() - before < 3
-
-
-SIZED = Calibration(700.0, 705.0, 320.0, 200.0, 0.5, 12.0, 640, 480, "calib.txt")
-
-
-@pytest.mark.parametrize("rounded", [round, math.floor, math.ceil])
-def test_an_image_scaled_by_any_factor_is_one_however_its_sides_are_rounded(rounded):
-    for factor in np.random.default_rng(3).uniform(0.1, 4, 200):
-        SIZED.for_size(rounded(640 * factor), rounded(480 * factor))

@@ -8,7 +8,7 @@ import pytest
 
 from rollcli.files.results import Row
 from rollcli.report.charts import all_charts
-from rollcli.rig.drive.assess import assess_rig, drive_of
+from rollcli.rig.drive.assess import assess_rig
 from tests.run_cli import rollcli
 
 START = 1_700_000_000_123_456_789
@@ -81,21 +81,3 @@ def test_the_axis_stays_that_of_frames_where_time_would_mislead():
     ):
         chart = all_charts(some, assess_rig(some))["roll"]
         assert chart.layout["xaxis"]["title"]["text"] == "frame"
-
-
-def test_frames_of_one_recording_are_one_drive():
-    for file, drive in {
-        "maps/a.png": "maps",
-        "a.png": "",
-        "run.zip#maps/a.png": "run.zip#maps",
-        NAME.format(START): "runs/drive.mcap",
-        "runs/drive.mcap#rest": "runs/drive.mcap",
-        "drive.mp4#000123": "drive.mp4",
-        "runs/night/night_0.mcap#/l@5": "runs/night",  # rosbag2 has split it
-        "runs/night/night_1.mcap#/l@9.1": "runs/night",
-        "runs/night_0.mcap#/l@5": "runs/night_0.mcap",
-    }.items():
-        assert drive_of(file) == drive
-    names = [f"{video}.mp4#{frame:06d}" for video in "ab" for frame in range(20)]
-    rig = assess_rig({"file": names, "roll_deg": np.repeat([0.1, 2.0], 20), "status": ["ok"] * 40})
-    assert [drive.name for drive in rig.drives] == ["a.mp4", "b.mp4"]

@@ -5,8 +5,7 @@ import sys
 
 import pytest
 
-from rollcli.errors import OutputError
-from rollcli.run.result_file import DurableRows, ResultFile, open_result
+from rollcli.run.result_file import DurableRows, open_result
 from tests.run_cli import contents, keep_rows, rollcli, write_maps
 from tests.slow import mostly_slow
 
@@ -56,16 +55,6 @@ def test_a_row_is_written_after_its_images_and_their_folder_are_on_the_disk(tmp_
     for path, forced in zip(paths, file.rows.values(), strict=True):
         assert {path.stat().st_ino, tmp_path.stat().st_ino} <= forced
     assert file.synced == rows.written == 40
-
-
-def test_a_row_without_images_is_written_at_once_and_after_those_that_wait(tmp_path, file):
-    rows = DurableRows(file, WatchedFile([]))
-    rows.append([b"0 "], [b"read"], [])
-    assert list(file.rows) == [b"0"]
-    for number in range(1, 5):
-        rows.append([b"%d " % number], [b"read"], [str(image(tmp_path, number))] if number % 2 else [])
-    rows.commit()
-    assert list(file.rows) == [b"%d" % number for number in range(5)]
 
 
 @pytest.fixture
@@ -128,15 +117,6 @@ def interrupted_at(step, work):
     finally:
         sys.settrace(before)
     return False
-
-
-def test_a_result_that_the_disk_does_not_give_is_named(tmp_path):
-    descriptor = os.open(tmp_path, os.O_RDONLY)  # a folder cannot be read like a file
-    try:
-        with pytest.raises(OutputError, match=r"rolls\.csv: cannot be written: is a directory"):
-            ResultFile(descriptor, "rolls.csv").read()
-    finally:
-        os.close(descriptor)
 
 
 def test_a_second_interrupt_at_any_line_writes_no_row_twice_and_leaves_none_out(tmp_path):

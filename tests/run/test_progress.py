@@ -8,9 +8,15 @@ from dataclasses import replace
 
 import pytest
 
+from rollcli.files.results import Row
+from rollcli.run import summary
 from rollcli.run.frame import Frame, failed_frame
-from rollcli.run.options import EncodingOptions, RunningOptions
+from rollcli.run.options import (
+    EncodingOptions,
+    RunningOptions,
+)
 from rollcli.run.progress import Progress, TaskProgress
+from rollcli.run.summary import Figures, RunSummary
 
 GUESSED = EncodingOptions()
 
@@ -40,25 +46,6 @@ def test_of_many_causes_the_first_five_are_said(lines):
         *(f"rollcli: x: {cause}" for cause in "abcde"),
         "rollcli: 2 further frames: other causes, which -v names",
     ]
-
-
-PAIR = Frame("left/a.png", "right/a.png", "left/a.png", "right/a.png", "a.png", None)
-
-
-@pytest.mark.parametrize(
-    ("frame", "reason", "message", "said"),
-    [
-        (MAP, "a.png: is empty", "is empty", "a.png: is empty"),
-        (MAP, "no road", "no road", "a.png: no road"),
-        (MAP, "a.png.tif: is empty", "a.png.tif: is empty", "a.png: a.png.tif: is empty"),
-        (PAIR, "left/a.png: is empty", "left image: is empty", "left/a.png: is empty"),
-        (PAIR, "right/a.png: is empty", "right image: is empty", "right/a.png: is empty"),
-        (PAIR, "no road", "no road", "left/a.png: no road"),
-    ],
-)
-def test_a_row_does_not_repeat_its_file_and_stderr_names_it(frame, reason, message, said):
-    failed = failed_frame(frame, reason)
-    assert (failed.row.message, failed.said) == (message, said)
 
 
 class Clock:
@@ -155,16 +142,6 @@ def test_a_terminal_shows_a_bar_which_makes_room_for_messages_and_vanishes(monke
     os.close(terminal.reader)
 
 
-def test_a_note_is_written_once_and_a_detail_only_when_verbose(capsys):
-    for verbose, expected in ((False, "rollcli: a note\n"), (True, "rollcli: a note\nrollcli: a detail\n")):
-        with TaskProgress(3, verbose=verbose) as progress:
-            progress.note("a note")
-            progress.note("a note")
-            progress.note("the same topic", topic="a note")
-            progress.detail("a detail")
-        assert capsys.readouterr().err == expected
-
-
 def test_the_speed_leaves_out_what_an_interrupted_run_has_left(clock):
     progress = TaskProgress(100)
     progress.kept = 50
@@ -172,3 +149,12 @@ def test_the_speed_leaves_out_what_an_interrupted_run_has_left(clock):
         clock.now += 0.5
         progress.advance()
     assert progress.speed() == "2.0 frames/s"
+
+
+def test_of_more_frames_than_memory_is_meant_for_the_answer_names_who_has_it(monkeypatch):
+    monkeypatch.setattr(summary, "_MOST_FRAMES", 3)
+    found = RunSummary()
+    for number in range(5):
+        found.add_row(Row(f"{number}.png", status="ok", roll_deg=1.0, roll_ci95_deg=0.1))
+        found.replace([number], Figures.of([Row(f"{number}.png")]))
+    assert found.rig_roll() == "more than 3 frames: rollcli rig RESULT says what they say of the rig"

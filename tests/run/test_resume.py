@@ -89,18 +89,6 @@ def test_a_run_killed_again_and_again_ends_in_the_same_bytes_and_leaves_nothing_
     assert results(folder) == results(undisturbed)
 
 
-def test_resume_does_not_do_again_what_is_done(undisturbed, folder):
-    run = start(folder, "-j1")
-    wait_for_rows(folder, 10, run)
-    kill(run)
-    before = {path: path.stat().st_mtime_ns for path in (folder / "upright").iterdir()}
-    done = (folder / "rolls.csv").read_text().splitlines()[1:-1]
-    rollcli("estimate", "maps", "-o", "rolls.csv", *IMAGES, "--resume", cwd=folder)
-    for line in done:
-        path = folder / "upright" / line.split(",")[0].removeprefix("maps/")
-        assert line.split(",")[2] == "error" or path.stat().st_mtime_ns == before[path]
-
-
 @pytest.mark.parametrize("jobs", mostly_slow([1, 2], 2))
 def test_ctrl_c_keeps_what_is_done_and_prints_the_command_that_resumes(undisturbed, folder, jobs):
     run = start(folder, "-j", str(jobs))

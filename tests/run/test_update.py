@@ -7,7 +7,7 @@ import pytest
 from rollcli.files.storage import list_names, read_bytes, remove, write_bytes
 from rollcli.run import inputs
 from tests.object_store import upload
-from tests.run_cli import contents, keep_rows, road_map, rollcli, write_kitti, write_maps
+from tests.run_cli import contents, road_map, rollcli, write_kitti, write_maps
 from tests.slow import mostly_slow
 
 FRAMES = 8
@@ -95,14 +95,6 @@ def test_a_resume_of_parts_takes_identical_bytes_with_other_times_and_no_others(
     assert "part-00001.inputs: is damaged" in estimate(folder, "--part-rows", "3", "--resume", **line).err
     remove(lines)
     assert "part-00001.inputs: " in estimate(folder, "--part-rows", "3", "--resume", **line).err
-
-
-def test_a_resume_takes_what_changes_before_its_frame_is_done(folder, tmp_path_factory):
-    keep_rows(folder / "rolls.csv", 4)
-    (folder / "up" / "frame6.png").unlink()
-    put(folder, "frame6")
-    estimate(folder, *IMAGES, "--resume", status=3)
-    assert written(folder) == anew(folder, tmp_path_factory, *IMAGES)
 
 
 @pytest.mark.parametrize("result", ["rolls.csv", "rolls.jsonl"])

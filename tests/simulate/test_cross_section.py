@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from rollcli.simulate.build import build_scene, road_camber
+from rollcli.simulate.build import build_scene
 from rollcli.simulate.road import draw_carriageway
 from rollcli.simulate.scene import draw_light
 from rollcli.simulate.spec import FrameSpec, Stream
@@ -113,28 +113,6 @@ def test_every_road_pixel_shows_the_first_point_that_a_march_along_its_ray_finds
     # a march can step over the outermost centimetres of the road beside a kerb
     assert np.mean(np.isnan(marched)) < 0.01
     assert np.nanmax(np.abs(marched - disparity[v, u])) < 1e-6
-
-
-@pytest.mark.parametrize(("shape", "sign"), [("crown", -1), ("dish", 1)])
-def test_camber_is_the_curvature_across_in_camera_heights_negative_on_a_crown(shape, sign):
-    spec = FrameSpec("bare", pitch=0.1, cross_section=shape, seed=4, **SMALL)
-    road = drawn_road(spec)
-    steps = road_height(spec, road, np.array([-0.01, 0.0, 0.01]) * spec.height) / spec.height
-    slope = (steps[2] - steps[0]) / 0.02
-    second = (steps[0] - 2 * steps[1] + steps[2]) / 0.01**2
-    assert road_camber(spec) == pytest.approx(second / (1 + slope**2) ** 1.5, rel=1e-6)
-    assert np.sign(road_camber(spec)) == sign
-
-
-def test_vehicles_stand_on_the_road_that_is_below_them():
-    spec = FrameSpec("street", 0.0, 0.05, 0.0, "roof", seed=11, **SMALL)
-    road, scene = drawn_road(spec), build_scene(spec)
-    assert scene.cars
-    for car in scene.cars:
-        over, lateral = height_over_road(spec, road, car.place)
-        assert abs(over[0]) < 1e-9
-        side = np.array([[-0.5], [0.5]]) * np.sign(lateral) * car.frame[0]
-        assert np.abs(height_over_road(spec, road, car.place + side)[0]).max() < 2e-3
 
 
 @pytest.mark.parametrize("shape", ["flat", *SHAPES])

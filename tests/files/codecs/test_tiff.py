@@ -40,18 +40,6 @@ def test_predictors_are_undone(kind, predictor, order, compression):
     np.testing.assert_array_equal(stored.values, values)
 
 
-@pytest.mark.parametrize("compression", ["none", "lzw"])
-@pytest.mark.parametrize(
-    "layout", [{"tile": (16, 16)}, {"tile": (64, 64)}, {"rows_per_strip": 1}, {"big": True}]
-)
-def test_tiles_strips_and_bigtiff_are_read(layout, compression):
-    values = values_of("f4")
-
-    stored = decode_stored(make_tiff(values, compression, ">", **layout), "map.tif")
-
-    np.testing.assert_array_equal(stored.values, values)
-
-
 def test_colour_complex_and_palette_images_are_no_maps():
     colour = np.zeros((5, 7, 3), np.uint8)
 
@@ -83,18 +71,6 @@ def test_a_size_that_is_not_that_of_the_parts_is_refused(compression, layout, li
         decode_stored(lying, "map.tif")
 
 
-def test_camera_images_are_read_in_grey_and_in_colour():
-    grey = values_of("u2")
-    rgb = np.random.default_rng(0).integers(0, 255, (20, 30, 3), dtype=np.uint8)
-
-    np.testing.assert_array_equal(picture(make_tiff(grey, "lzw"), "x"), grey)
-    np.testing.assert_array_equal(
-        picture(make_tiff(rgb, "lzw", predictor=2, photometric=2), "x"), rgb[..., ::-1]
-    )
-    with pytest.raises(InputError, match="holds float32 numbers"):
-        picture(make_tiff(values_of("f4")), "x")
-
-
 @pytest.mark.skipif(bool(find_spec("imagecodecs")), reason="imagecodecs is installed here")
 def test_compressions_of_another_package_name_it():
     file = with_fields(make_tiff(values_of("u2"), "deflate"), {259: (8, 50000)})
@@ -115,14 +91,6 @@ def test_parts_that_a_sparse_file_leaves_out_hold_no_data(compression, nodata, e
     values[:16, 32:] = expected
     values[16:32, :32] = expected
     np.testing.assert_array_equal(stored.values, values)
-
-
-def test_the_last_strip_may_be_filled_up():
-    values = values_of("u2")
-    filled = make_tiff(np.vstack([values, values[:3]]), "deflate", rows_per_strip=10)
-    shorter = with_fields(filled, {257: (40, 37)})
-
-    np.testing.assert_array_equal(decode_stored(shorter, "x").values, values)
 
 
 def test_deflated_bits_are_held_against_their_checksum_too():
