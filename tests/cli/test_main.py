@@ -11,8 +11,9 @@ from rollcli.cli import main as versions
 from tests.run_cli import ROOT, environment, python, rollcli, rollcli_process, write_maps
 
 
-def test_version_is_the_packages(tmp_path):
+def test_the_process_calls_itself_rollcli_and_its_version_is_the_packages(tmp_path):
     assert rollcli_process("--version", cwd=tmp_path).out == f"rollcli {package.__version__}\n"
+    assert rollcli_process("--help", cwd=tmp_path).out.startswith("Usage: rollcli ")
 
 
 def test_versions_names_python_and_every_dependency(tmp_path):
@@ -74,10 +75,6 @@ except SystemExit as end:
 """
     done = python(code, cwd=tmp_path, check=True)
     assert done.stdout.splitlines()[-1] == "0 []"
-
-
-def test_help_calls_the_program_rollcli(tmp_path):
-    assert rollcli_process("--help", cwd=tmp_path).out.startswith("Usage: rollcli ")
 
 
 @pytest.mark.parametrize(

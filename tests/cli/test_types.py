@@ -7,10 +7,7 @@ import pytest
 from click.testing import CliRunner
 
 from rollcli.cli.main import main
-from rollcli.cli.types import (
-    Number,
-    table_format,
-)
+from rollcli.cli.types import Number, table_format
 from rollcli.errors import ExitStatus, RollcliError
 from rollcli.files.codecs import png as mute_stderr
 from tests.readme_tables import commands
@@ -26,9 +23,8 @@ def test_a_whole_number_is_one_also_where_it_is_written_as_a_float():
 
 
 def test_a_table_has_the_format_given_else_that_of_its_ending():
-    assert [table_format(None, name) for name in ("a.csv", "A.JSON", "a.txt", "-", "table")] == [
-        *("csv", "json", "table", "table", "table")
-    ]
+    names = ("a.csv", "A.JSON", "a.txt", "-", "table")
+    assert [table_format(None, name) for name in names] == ["csv", "json", "table", "table", "table"]
     assert table_format("json", "a.csv") == "json"
 
 

@@ -11,10 +11,7 @@ import pytest
 from rollcli.files.results import Row
 from rollcli.run import summary
 from rollcli.run.frame import Frame, failed_frame
-from rollcli.run.options import (
-    EncodingOptions,
-    RunningOptions,
-)
+from rollcli.run.options import EncodingOptions, RunningOptions
 from rollcli.run.progress import Progress, TaskProgress
 from rollcli.run.summary import Figures, RunSummary
 
