@@ -10,6 +10,7 @@ import pytest
 
 from rollcli.errors import UsageError
 from rollcli.files.inputs import find_inputs
+from rollcli.files.search import Search
 
 
 @pytest.fixture
@@ -95,7 +96,7 @@ def deep(here):
 
 @pytest.mark.skipif(os.name == "nt", reason="folders are made from open folders")
 def test_a_thousand_nested_folders_are_searched(deep):
-    found = find_inputs([deep], recursive=True)
+    found = find_inputs([deep], Search(recursive=True))
 
     assert [each.relative for each in found] == ["d/" * 1000 + "map.png", "map.png"]
     with pytest.raises(UsageError, match="too deep for a pattern; name the folder, with --recursive"):

@@ -9,6 +9,7 @@ import tempfile
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ from rollcli.files.inputs import find_inputs, pair_inputs
 from rollcli.files.matching import is_elsewhere, match_paths
 from rollcli.files.result_columns import read_columns
 from rollcli.files.results import FURTHER, Row, column_types, format_header, format_row, parse_rows
+from rollcli.files.search import IMAGE_ENDINGS, Search
 from rollcli.files.stores import locations
 from rollcli.rig.calibration import Calibration
 from tests.binary_files import disparity_map, npy_header
@@ -113,15 +115,17 @@ def _asked(words):
 
 def _found(files, words):
     inputs, options = _asked(words)
-    with _folder_of(files):
-        found = _answer(find_inputs, inputs, stdin=[], **options)
+    files_from = options.pop("files_from", None)
+    with _folder_of(files), patch("sys.stdin", io.TextIOWrapper(io.BytesIO())):
+        found = _answer(lambda: find_inputs(inputs, Search(**options), files_from=files_from))
     return found if isinstance(found, str) else [[each.name, each.relative] for each in found]
 
 
 def _paired(files, words):
     sides, options = _asked(words)
     with _folder_of(files):
-        found = _answer(pair_inputs, *sides, **options)
+        match = options.pop("match", "name")
+        found = _answer(lambda: pair_inputs(*sides, Search(IMAGE_ENDINGS, **options), match=match))
     return found if isinstance(found, str) else [[each.left.name, each.right.name] for each in found]
 
 
