@@ -3,7 +3,7 @@
 import contextlib
 import io
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import chain, islice
 
 from rollcli.errors import InputError, UsageError
@@ -11,7 +11,7 @@ from rollcli.files.atomic import is_there, remove_leftovers
 from rollcli.files.locking import not_resumable
 from rollcli.files.results import format_header, parse_rows, run_path
 from rollcli.files.stores.locations import base_name
-from rollcli.files.stream import STDOUT, STDOUT_NAME, is_stream, open_stream, stdout_descriptor, write_stream
+from rollcli.files.stream import STDOUT, is_stream, open_stream
 from rollcli.run.batch import Batch, Step
 from rollcli.run.frame import Frame, ReadAs
 from rollcli.run.inputs import Inputs, inputs_path, is_inputs
@@ -40,10 +40,10 @@ class StreamOutput:
     resumable = notes = False
     read_as = ReadAs()
 
-    def __init__(self, descriptor: int, name: str, plan: Plan, options: EstimateOptions) -> None:
+    def __init__(self, write: Callable[[bytes], None], plan: Plan, options: EstimateOptions) -> None:
         self.kept = KeptRows(plan, options)
         self.replaces = options.running.overwrite
-        self._descriptor, self._name, self._plan = descriptor, name, plan
+        self._write, self._plan = write, plan
         self._write(format_header(plan.format, plan.further))
 
     def passes(self) -> Iterator[Step]:
@@ -69,9 +69,6 @@ class StreamOutput:
     def hint(self) -> str:
         """Return nothing: a stream cannot be resumed."""
         return ""
-
-    def _write(self, data: bytes) -> None:
-        write_stream(self._descriptor, data, self._name)
 
 
 class FileOutput:
@@ -182,14 +179,9 @@ def open_output(plan: Plan, options: EstimateOptions) -> Iterator[Output]:
             yield parts
         return
     _check_permitted(plan.output, options)
-    if plan.output == STDOUT:
-        yield StreamOutput(stdout_descriptor(), STDOUT_NAME, plan, options)
-    elif is_stream(plan.output):
-        descriptor = open_stream(plan.output)
-        try:
-            yield StreamOutput(descriptor, plan.output, plan, options)
-        finally:
-            os.close(descriptor)
+    if is_stream(plan.output):
+        with open_stream(plan.output) as write:
+            yield StreamOutput(write, plan, options)
     else:
         with open_result(plan.output) as file:
             _check_permitted(plan.output, options)  # again, now that no other run can write it

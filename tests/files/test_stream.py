@@ -36,17 +36,18 @@ def test_a_pipe_gets_all_of_the_bytes_and_stays_a_pipe(tmp_path):
 
 
 def test_standard_output_is_descriptor_1_unless_python_calls_it_closed(monkeypatch):
-    assert stream.stdout_descriptor() == 1
+    with stream.open_stream("-") as write:
+        assert write.args == (1,)
     monkeypatch.setattr(sys, "stdout", None)
-    with pytest.raises(OutputError, match=r"^standard output: is closed$"):
-        stream.stdout_descriptor()
+    with pytest.raises(OutputError, match=r"^standard output: is closed$"), stream.open_stream("-"):
+        pass
 
 
 def test_a_reader_that_has_gone_is_told_from_an_error(pipe, monkeypatch):
     reads, writes = pipe
     os.close(reads)
     with pytest.raises(BrokenPipeError):
-        stream.write_stream(writes, b"data")
+        stream.write_stream(writes, b"data", "/dev/x")
 
     def fail(descriptor, data):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
