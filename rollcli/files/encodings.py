@@ -50,24 +50,13 @@ class DisparityMap:
         Pixels; float32, or float64 where the file holds float64. No data is exactly 0; no NaN, no inf.
     encoding : Encoding
         The one used.
-    scale : float
-        Pixels per stored unit; of a depth map, metres per stored unit.
-    stored : Stored
-        What the file holds.
     warnings : dict of str to str
         Why the encoding taken by "auto" cannot be right, and what else a user should know; by their codes.
     """
 
     disparity: NDArray[Any]
     encoding: Encoding
-    scale: float
-    stored: Stored
     warnings: dict[str, str]
-
-    @property
-    def warning(self) -> str | None:
-        """All of them."""
-        return "; ".join(self.warnings.values()) or None
 
 
 def to_disparity(
@@ -122,7 +111,7 @@ def to_disparity(
     doubt = _doubt(stored.values, used) if encoding == "auto" and scale is None else ""
     warnings = {"pages": stored.note, "encoding": doubt, "plateau": plateau}
     told = {code: warning for code, warning in warnings.items() if warning}
-    return DisparityMap(disparity, used, factor, stored, told)
+    return DisparityMap(disparity, used, told)
 
 
 def read_disparity(

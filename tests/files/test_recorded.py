@@ -195,7 +195,7 @@ def _to_pixels(kind, **options):
     found = _answer(encodings.to_disparity, stored, **options)
     if isinstance(found, str):
         return found
-    return [found.encoding, found.scale, str(found.disparity.dtype), found.disparity.ravel(), found.warning]
+    return [found.encoding, str(found.disparity.dtype), found.disparity.ravel(), found.warnings]
 
 
 def _from_pixels(kind, **options):
@@ -205,7 +205,7 @@ def _from_pixels(kind, **options):
 
 def _plateau(make):
     found = encodings.to_disparity(decode_stored(encode_stored(make().astype(np.float32), "npy"), "x"))
-    return [found.warning, (found.disparity > 0).sum(axis=1)[::20]]
+    return [found.warnings, (found.disparity > 0).sum(axis=1)[::20]]
 
 
 ROAD = np.arange(200.0)[:, None] * 0.5 + 3 + np.linspace(0, 1, 300)
