@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from rollcli.errors import InputError, UsageError, cause_of
+from rollcli.errors import UsageError, as_usage, cause_of
 from rollcli.files.bounded import MOST_LISTED, as_utf8, read_given, read_stream
 from rollcli.files.containers import file_of, shown
 from rollcli.files.naming import listed, match_names, natural_key
@@ -212,11 +212,10 @@ def _arguments(inputs: Iterable[str], files_from: str | None) -> Iterator[tuple[
     if files_from == "-":
         yield from ((line, True) for line in _stdin_lines())
     elif files_from is not None:
+        read = read_bytes if is_url(files_from) else read_given
         try:
-            read = read_bytes if is_url(files_from) else read_given
-            data = as_utf8(read(files_from, most=MOST_LISTED), files_from)
-        except InputError as error:
-            raise UsageError(str(error)) from None
+            with as_usage():
+                data = as_utf8(read(files_from, most=MOST_LISTED), files_from)
         except OSError as error:
             raise UsageError(f"{files_from}: the list of files cannot be read: {cause_of(error)}") from None
         yield from ((line, True) for line in _lines(data))

@@ -7,7 +7,7 @@ from functools import partial
 from itertools import islice
 from typing import Any, NamedTuple
 
-from rollcli.errors import ClusterError, ExitStatus, OutputError, WorkerError
+from rollcli.errors import ExitStatus, OutputError, WorkerError
 from rollcli.files.atomic import is_file
 from rollcli.files.containers import file_of
 from rollcli.files.stores.locations import is_url, tasks_in_hand
@@ -73,7 +73,7 @@ def run_estimate(options: EstimateOptions, resume_command: str = "") -> ExitStat
 
     Raises
     ------
-    UsageError, OutputError, ClusterError, WorkerError
+    UsageError, OutputError, WorkerError
         The run cannot start or cannot go on.
     """
     if options.running.dry_run:
@@ -107,7 +107,7 @@ def _run(plan: Plan, options: EstimateOptions, resume_command: str, started: lis
                 _run_steps(_Run(plan, options, output, progress, stop, started))
         except KeyboardInterrupt:  # the second Ctrl-C: without waiting for the frames that have begun
             progress.stopped_early = True
-        except (OutputError, ClusterError, WorkerError) as error:
+        except (OutputError, WorkerError) as error:
             raise type(error)(f"{error}{output.hint()}") from error
         status = _end(output, progress, stop, resume_command)
         if not (progress.stopped_early or options.running.quiet):
