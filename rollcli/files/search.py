@@ -28,6 +28,7 @@ from rollcli.files.stores.objects import has_objects, list_objects
 MAP_ENDINGS = (".png", ".tif", ".tiff", ".npy", ".npz", ".pfm", ".exr")
 IMAGE_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm")
 _OTHER_ENDINGS = (".csv", ".jsonl", ".parquet", ".txt", ".json", ".yaml", ".yml", ".xml", ".toml")
+_OF_FILES = {*MAP_ENDINGS, *IMAGE_ENDINGS, *_OTHER_ENDINGS}
 _MAGIC = re.compile(r"[*?[]")
 
 
@@ -43,8 +44,7 @@ def is_folder_url(url: str) -> bool:
     ending = posixpath.splitext(key)[1].lower()
     if key in ("", "/") or key.endswith("/") or ending == "":
         return True
-    of_files = (*MAP_ENDINGS, *IMAGE_ENDINGS, *_OTHER_ENDINGS)
-    return not (ending in of_files or glob.has_magic(url)) and has_objects(f"{url}/")
+    return not (ending in _OF_FILES or glob.has_magic(url)) and has_objects(f"{url}/")
 
 
 def is_place(location: str) -> bool:
