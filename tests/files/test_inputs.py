@@ -1,4 +1,4 @@
-"""Inputs are found once each, in natural order, and paired or named."""
+"""Inputs are found, or it is said what keeps them from being found."""
 
 import errno
 import io
@@ -73,9 +73,6 @@ def test_a_folder_without_permission_is_named(here):
 
     with pytest.raises(UsageError, match="maps: this folder cannot be read: permission denied"):
         find_inputs(["maps"])
-
-
-# -- pairs
 
 
 @pytest.fixture
