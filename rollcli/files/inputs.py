@@ -15,7 +15,6 @@ from rollcli.files.bounded import MOST_LISTED, as_utf8, read_given, read_stream
 from rollcli.files.containers import file_of, shown
 from rollcli.files.naming import listed, match_names, natural_key
 from rollcli.files.search import IMAGE_ENDINGS, Search
-from rollcli.files.search import MAP_ENDINGS as MAP_ENDINGS
 from rollcli.files.storage import read_bytes
 from rollcli.files.stores.locations import base_name, is_url, public_name
 

@@ -43,10 +43,6 @@ def verdict(disparity):
 
 def says_no_road(found):
     reasons = ("the plane ends near ahead", "the plane is closed off", "the view is as narrow")
-        "the plane ends near ahead",
-        "the plane is closed off",
-        "the view is as narrow as that of a table",
-    )
     return found.startswith("no road: ") or (
         found.startswith("suspect: ") and any(reason in found for reason in reasons)
     )
