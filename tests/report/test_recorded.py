@@ -1,0 +1,557 @@
+"""What charts of hand-made results hold, how they are drawn, and what pages say; see `tests.recorded`."""
+
+import html
+import json
+import re
+import tempfile
+from dataclasses import asdict, replace
+from functools import partial
+from pathlib import Path
+from unittest import mock
+
+import cv2
+import numpy as np
+import pytest
+
+from rollcli import __version__
+from rollcli.files.results import Result
+from rollcli.pictures.figures import SLIDE, Size
+from rollcli.report import pictures
+from rollcli.report.charts import all_charts, frame_axis, histogram
+from rollcli.report.options import ReportOptions
+from rollcli.report.page import Chart, scatter
+from rollcli.report.pictures import Picture, Pictures
+from rollcli.report.sources import choose, subjects
+from rollcli.report.summary import common_run, option_lines
+from rollcli.rig.quantities import ALIGNMENT, SIZE
+from rollcli.run.options import EncodingOptions, FrameOptions, ImageOptions
+from tests.recorded import check
+from tests.report.results import row
+from tests.run.rigs import known, rig, sequence, short
+from tests.run_cli import road_map
+
+_MANY = 40  # values of a list, of which some are recorded
+
+
+def _posed(each, pitch, height, half=0.1):
+    return replace(each, pitch_deg=pitch, pitch_ci95_deg=half, height_m=height, height_ci95_m=half / 10)
+
+
+def _assessed(rows, *drives, **options):
+    """Rows, and what is said of the rig that they are of; drives are the quantities of so many frames."""
+    found = rig(*((f"{'ab'[place]}", each) for place, each in enumerate(drives)), **options)
+    states = [np.array([each.status == status for each in rows]) for status in ("ok", "suspect")]
+    numbers = {name: np.array([getattr(each, name) or np.nan for each in rows], float) for name in SIZE}
+    frames = replace(found.frames, ok=states[0], suspect=states[1], numbers=numbers)
+    return rows, replace(found, frames=frames)
+
+
+def _one():
+    return _assessed([row("a/0", 3.0, 0.1)], {"roll": sequence(1, known(3.0, 0.1))})
+
+
+def _level():
+    """A rig that lies level; of the first frame the pitch is known, of none the height."""
+    rows = [row(f"a/{place}.png", 0.0, 0.0) for place in range(3)]
+    rows[0] = replace(rows[0], pitch_deg=0.0)
+    return _assessed(rows, {"roll": sequence(3, known(0.0, 0.0)), "pitch": sequence(3, short(0.0))})
+
+
+def _failed():
+    rows = [row("a/0", None), row("a/1", None, message="<b>no</b> pixel & no road " * 9)]
+    return _assessed(rows, {"roll": sequence(2)})
+
+
+def _mixed():
+    """Frames of every kind, few enough that each has a tick."""
+    rows = [
+        row("maps/a.png", 1.0, 0.1),
+        row("maps/b.png", 2.0, 0.2),
+        row("other/c.png", 1.5, 0.9, "suspect", "the interval is wide; " * 15),
+        row("other/d.png", None),
+        row("e.png", -1.0004, 0.0042),
+        row("e\udcff.png", 0.5, None),
+        row("folder/" * 9 + "<b>g</b>&amp;.png", 0.0, 0.3),
+        row("off.png", -80.0, 20.0, "suspect", "one line"),
+    ]
+    return _assessed(rows, {"roll": sequence(8, short(0.625), outliers=1)})
+
+
+def _drives():
+    """Two drives: the first jumps twice, the second drifts, differs, and has pitch and height."""
+    first = {
+        "roll": sequence(
+            12,
+            *(known(each, 0.125) for each in (1.0, 1.5, 0.75)),
+            jumps=[(4, known(0.5, 0.05)), (8, known(-0.75, 0.25))],
+        )
+    }
+    roll = sequence(9, known(-2.0, 0.1), drift=known(-0.25, 0.03), drifts=True, outliers=2)
+    ends = replace(roll.segments[0], begin=known(-1.75, 0.125), end=known(-2.25, 0.25))
+    second = {
+        "roll": replace(roll, segments=(ends,)),
+        "pitch": sequence(9, known(3.0, 0.1), known(4.0, 0.1), jumps=[(5, known(1.0, 0.1))]),
+        "height": sequence(9, known(1.65, 0.01)),
+    }
+    rows = [row(f"run/a/{place}", (1.0, 1.5, 0.75)[place // 4] + place / 64, 0.125) for place in range(12)]
+    rows[2:5] = [row(f"run/a/{place}", 2.0, 0.5, "suspect", "wide") for place in range(2, 5)]
+    for place in range(9):
+        posed = _posed(row(f"run/b/{place}", -1.75 - place / 16, 0.25), 3.0 + (place > 4), 1.65 + place / 100)
+        rows.append(replace(posed, status="suspect", message="steep") if place == 7 else posed)
+    rows[14] = replace(rows[14], pitch_ci95_deg=None, height_ci95_m=None)
+    rows[15] = row("run/b/3", None)
+    return _assessed(rows, first, second, changes={"b": (known(-2.75, 0.1), True)})
+
+
+def _long():
+    """More frames than have dots, with some that stand alone."""
+    rows = [row(f"{place // 60}/{place}.png", place % 7 / 8, 0.0625) for place in range(450)]
+    for place in (20, 22, 24, *range(300, 324)):
+        rows[place] = row(f"5/{place}.png", 1.5, 0.5, "suspect", "wide")
+    rows[324] = row("5/324.png", None)
+    return _assessed(rows, {"roll": sequence(450, known(0.375, 0.0625))})
+
+
+def _pairs():
+    """Pairs, one of them without a size, whose right view lies lower and then, after a jump, less so."""
+    values = (1.5, -0.25, 0.125, 0.5)
+    parts = {
+        each.name: sequence(16, known(value, 0.05), known(value / 2, 0.0625), jumps=[(10, known(-0.75, 0.1))])
+        for each, value in zip(ALIGNMENT, values, strict=True)
+    }
+    rows = []
+    for place in range(16):
+        now = [value / (1 + (place > 9)) + place % 3 / 32 for value in values]
+        lies = dict(zip((each.column for each in ALIGNMENT), now, strict=True))
+        rows.append(replace(row(f"a/{place}", 1.0 + place / 64), right_file=f"right/{place}", **lies))
+    rows[3] = replace(rows[3], width=None, height=None)
+    rows[4] = replace(rows[4], **dict.fromkeys(each.column for each in ALIGNMENT))
+    return _assessed(rows, {"roll": sequence(16, known(1.125, 0.0625))} | parts)
+
+
+RESULTS = {
+    "one": _one,
+    "level": _level,
+    "failed": _failed,
+    "mixed": _mixed,
+    "drives": _drives,
+    "long": _long,
+    "pairs": _pairs,
+}
+
+
+def _shortened(value):
+    """Nested values, of long lists how long they are, their sum, and some of them."""
+    if isinstance(value, dict):
+        return {name: _shortened(each) for name, each in value.items()}
+    if not isinstance(value, list | tuple):
+        return value
+    if len(value) <= _MANY:
+        return [_shortened(each) for each in value]
+    numbers = [each for each in value if isinstance(each, int | float)]
+    some = value[:: len(value) // 9]
+    return {"length": len(value), "numbers": len(numbers), "sum": float(sum(numbers)), "some": some}
+
+
+def _charts(name, *, assessed=True):
+    rows, found = RESULTS[name]()
+    return {
+        name: _shortened(asdict(chart))
+        for name, chart in all_charts(rows, found if assessed else None).items()
+    }
+
+
+NS = 10**9
+
+
+def _axis(*seconds, name="m.mcap#/left@{}", first=1_700_000_000 * NS, pause=None):
+    """Where frames stand that have such stamps; those from `pause` on are another drive."""
+    files = [each if isinstance(each, str) else name.format(first + round(each * NS)) for each in seconds]
+    rows = [row(each) for each in files]
+    counts = [len(rows)] if pause is None else [pause, len(rows) - pause]
+    _, found = _assessed(rows, *({"roll": sequence(each)} for each in counts))
+    axes = [frame_axis(rows), frame_axis(rows, found)]
+    return [[each.places, each.unit, each.layout(), *map(each.at, (1, 1.5, len(rows)))] for each in axes]
+
+
+REST = "m.mcap#rest"
+AXES = {
+    "seconds": partial(_axis, 0, 0.25, 119.5),
+    "minutes": partial(_axis, 0, 60, 120),
+    "hours": partial(_axis, 0, 3600, 7200, 7201),
+    "almost hours": partial(_axis, 0, 7199),
+    "broken end": partial(_axis, 0, 1, 2, REST),
+    "broken in between": partial(_axis, 0, 1, REST, 3),
+    "nothing but broken": partial(_axis, REST),
+    "broken at first": partial(_axis, REST, 1, 2),
+    "descending": partial(_axis, 0, 2, 1),
+    "twice": partial(_axis, 0, 1, 1, 2),
+    "at once": partial(_axis, 5, 5),
+    "one": partial(_axis, 5),
+    "no stamps": partial(_axis, 0, 1, name="maps/{}.png"),
+    "some without": partial(_axis, 0, "a.png", 2),
+    "pause": partial(_axis, 0, 4, 5, 9, pause=2),
+    "long pause": partial(_axis, 0, 1, 9, 10, pause=2),
+    "pause of a half": partial(_axis, 0, 1, 3, 4, pause=2),
+    "ten": partial(_axis, *range(10), name="{}.png"),
+    "eleven": partial(_axis, *range(11), name="{}.png"),
+    "two hundred": partial(_axis, *range(200), name="{}.png"),
+}
+
+
+def _bars(*rolls, suspect=()):
+    rows = [row(f"{place}", each) for place, each in enumerate(rolls)]
+    chart = histogram(rows + [row("s", each, status="suspect") for each in suspect])
+    return [[(each["name"], each["x"], each["y"], each["width"]) for each in chart.data], chart.layout]
+
+
+BARS = {
+    "few": partial(_bars, 1.0, 1.25, 2.0),
+    "equal": partial(_bars, 1.0, 1.0, 1.0),
+    "seven of one": partial(_bars, *[0.25] * 7),
+    "close": partial(_bars, 0.5, 0.501, 0.502),
+    "many": partial(_bars, *(place / 64 for place in range(150))),
+    "too many": partial(_bars, *(place / 64 for place in range(500))),
+    "some suspect": partial(_bars, 1.0, 1.5, suspect=(1.25, 4.0, 80.0)),
+    "all suspect": partial(_bars, suspect=(-1.25, 4.0)),
+}
+
+
+def _drawn(chart, size=SLIDE):
+    """What stands in a figure, as matplotlib has it before it lays the figure out."""
+    figures = pytest.importorskip("rollcli.report.figures", reason="matplotlib is not here")
+    with mock.patch.object(figures, "figure_file", lambda figure, kind, title: (figure, kind, title)):
+        figure, kind, title = figures.chart_file(chart, "svg", size)
+    (axes,) = figure.axes
+    return _shortened(
+        {
+            "kind": [kind, title, *figure.get_size_inches()],
+            "limits": [*axes.get_xlim(), *axes.get_ylim()],
+            "names": [axes.get_xlabel(), axes.get_ylabel(), axes.get_xscale(), axes.get_yscale()],
+            "ticks": [_ticks(axis) for axis in (axes.xaxis, axes.yaxis)],
+            "sides": [side.get_visible() for side in axes.spines.values()],
+            "lines": [
+                [each.get_xydata().tolist(), *_pen(each), each.get_transform() == axes.transData]
+                for each in axes.lines
+            ],
+            "areas": [
+                [
+                    each.get_xy() if hasattr(each, "get_width") else each.get_xy().tolist(),
+                    [each.get_width(), each.get_height()] if hasattr(each, "get_width") else None,
+                    _hex(each.get_facecolor()),
+                    _hex(each.get_edgecolor()),
+                    each.get_linewidth(),
+                    each.get_zorder(),
+                ]
+                for each in axes.patches
+            ],
+            "bars of error": [
+                [
+                    [part.tolist() for part in each.get_segments()],
+                    [_hex(part) for part in each.get_colors()],
+                    each.get_linewidths().tolist(),
+                    each.get_zorder(),
+                ]
+                for each in axes.collections
+            ],
+            "texts": [
+                [each.get_text(), each.get_position(), each.get_va(), each.get_ha(), each.get_color()]
+                for each in axes.texts
+            ],
+            "legend": [
+                [
+                    [each.get_text() for each in legend.texts],
+                    legend._ncols,
+                    [
+                        _hex(each.get_facecolor()) if hasattr(each, "get_facecolor") else _pen(each)
+                        for each in legend.legend_handles
+                    ],
+                ]
+                for legend in figure.legends
+            ],
+        }
+    )
+
+
+def _hex(colour):
+    return "#" + "".join(f"{round(255 * each):02x}" for each in colour[:3])
+
+
+def _pen(line):
+    return [
+        line.get_color(),
+        line.get_linestyle(),
+        line.get_linewidth(),
+        line.get_marker(),
+        line.get_markersize(),
+        line.get_markerfacecolor(),
+        line.get_markeredgewidth(),
+        line.get_zorder(),
+    ]
+
+
+def _ticks(axis):
+    low, high = sorted(axis.get_view_interval())
+    places = [each for each in axis.get_majorticklocs() if low <= each <= high]
+    return [places, axis.get_major_formatter().format_ticks(places), len(axis.get_minorticklocs())]
+
+
+LEVELS = [["far", "far", "near"], ["a", "b", "a"]]
+HAND_MADE = {
+    "logarithmic": Chart(
+        "log",
+        "Errors &amp; more",
+        [
+            scatter("e<sub>1</sub> of &alpha;", "lines+markers", [1, 10, 100], [0.01, None, 10.0]),
+            scatter("dotted", "lines", [1, 2, 9], [1.0, 2.0, 3.0]),
+        ],
+        {
+            "xaxis": {"type": "log", "title": {"text": "&lambda;<sub>0</sub>"}},
+            "yaxis": {"type": "log", "ticksuffix": "°"},
+        },
+    ),
+    "names": Chart(
+        "names",
+        "Names of two levels",
+        [scatter(name, "markers", LEVELS, [3, 1, each]) for each, name in enumerate(("one", "two"))],
+        {"yaxis": {"rangemode": "tozero", "dtick": 2}, "showlegend": False},
+    ),
+    "plain names": Chart(
+        "plain",
+        "Names",
+        [scatter("one", "markers", ["a", "b<sub>2</sub>", "c"], [3, 1, 2])],
+        {"yaxis": {"autorange": "reversed", "tickvals": [1, 3], "ticktext": ["low", "high"]}},
+    ),
+    "marked": Chart(
+        "marked",
+        "With lines across",
+        [
+            scatter("hidden", "lines", [0, 9], [1, 2], showlegend=False),
+            scatter("a rather long name of a trace", "lines", [0, 9], [1, 2]),
+            scatter("another long name of a trace", "lines", [0, 9], [2, 3]),
+        ],
+        {
+            "shapes": [
+                {"x0": place, "line": {"dash": dash, "color": "@c2"}}
+                for place, dash in ((2, "dot"), (5, "dash"))
+            ],
+            "annotations": [
+                {"x": place, "y": y, "text": f"at {place}", "yanchor": anchor}
+                for place, y, anchor in ((2, 1, "top"), (5, 0, "bottom"))
+            ],
+            "xaxis": {"range": [0, 9], "tickformat": ",d"},
+            "yaxis": {"range": [0, 4000], "tickformat": ",d"},
+        },
+    ),
+}
+for _chart in HAND_MADE.values():
+    for _place, _trace in enumerate(_chart.data):
+        _trace |= {
+            "line": {"color": f"@c{_place + 1}", "width": 1.5, "dash": ("dash", "dot")[_place % 2]},
+            "marker": {"color": "@c3", "size": 7, "symbol": ("circle-open", "diamond", "x-thin")[_place]},
+        }
+
+
+def _drawn_result(name, size=SLIDE):
+    return {name: _drawn(chart, size) for name, chart in all_charts(*RESULTS[name]()).items()}
+
+
+def _thinned():
+    """A line and a band of more points than any picture shows."""
+    rows = [row(f"{place}.png", (place * 7919 % 2503) / 1024, 0.25) for place in range(2501)]
+    return {each: _drawn(chart) for each, chart in all_charts(rows).items()}
+
+
+_LOOK = re.compile(r' ((?:fill|stroke|font|text|class|view|aria)[\w-]*="[^"#]*")')
+
+
+def _still(chart):
+    """The pictures of a page but for their shapes: how lines and letters look, and what is written."""
+    figures = pytest.importorskip("rollcli.report.figures", reason="matplotlib is not here")
+    still = figures.with_still(chart).still
+    written = [html.unescape(each) for each in re.findall(r"<text[^>]*>(.*?)</text>", still)]
+    return [sorted(set(_LOOK.findall(still))), written]
+
+
+RUN = {
+    "rollcli": "9.8.7",
+    "encoding": ["kitti", "px"],
+    "options": {"road": "auto", "max-roll": 45.0, "jobs": None, "fast": False, "invalid": [], "true": True},
+    "calibration": {"first": [{"fx": 100.0, "fy": 100.0, "cx": 80.0, "cy": 60.0, "baseline": 0.5}]},
+}
+RUN["options"] |= {"roi": [[0, 1.5], [2, 3]], "scale": 256.0, "ids": [1, 2]}
+_SCRIPTS = re.compile(r"<(script|style)( |>).*?</\1>", re.DOTALL)
+_ROWS = re.compile(r'id="rows">(.*?)</script>')
+_STILL = re.compile(r'<svg class="still.*?</svg>', re.DOTALL)
+
+
+NO_PICTURES = Pictures(missing="it is gone")
+
+
+def _page(name, *, run=None, count=0, taken=NO_PICTURES, **options):
+    """The lines of a page but for its styles, scripts and drawings."""
+    pytest.importorskip("plotly", reason="plotly, of the extra report, is not here")
+    content = pytest.importorskip("rollcli.report.content", reason="jinja2, of the extra report, is not here")
+    rows, found = RESULTS[name]()
+    shown = [(each, taken) for each in choose(rows, count, [4, 8])]
+    given = ReportOptions(("no/rolls.csv", "s3://key@maps/b.csv?x=1"), "page.html", **options)
+    page = content.report_page(Result(rows, run), given, shown, found, all_charts(rows, found)).decode()
+    text = _STILL.sub("", _SCRIPTS.sub("", page)).replace(__version__, "VERSION")
+    text = re.sub(r"&#39;sha256-[^&]+&#39;", "SUM", text)
+    (table,) = _ROWS.findall(page)
+    return {"lines": [each for each in map(str.strip, text.split("\n")) if each], "rows": _rows(table)}
+
+
+def _rows(table):
+    """The rows that a script shows, of many some."""
+    found = json.loads(table)
+    rows, places = found["rows"], found["places"]
+    return [*rows[:_MANY], *rows[_MANY :: _MANY // 2], places]
+
+
+WHOLE = Pictures(*(Picture(bytes([each]), 20 + each, 10) for each in range(6)))
+PAGES = {
+    "one": partial(_page, "one", count=3, taken=WHOLE, title="Rig <7>"),
+    "failed": partial(_page, "failed", count=3, run={"encoding": "px", "options": {}}),
+    "mixed": partial(_page, "mixed", count=4, run=RUN, taken=replace(WHOLE, map=None, missing="no map")),
+    "drives": partial(_page, "drives", count=9, taken=replace(WHOLE, heights=None, road=None)),
+    "long": partial(_page, "long", count=12),
+    "pairs": partial(_page, "pairs", run=RUN, count=16),
+    "pairs without a calibration": partial(_page, "pairs", run={"calibration": {"first": []}}),
+}
+
+
+def _chosen(count, jumps=(), rows=None):
+    rows = rows or _long()[0]
+    return [[each.place, each.reason] for each in choose(rows, count, jumps)]
+
+
+def _subjects():
+    """Which files are those of rows."""
+    with tempfile.TemporaryDirectory() as folder:
+        names = (
+            "up/run/a.png",
+            "heights/a.tif",
+            "vdisparity/a.png",
+            "vdisparity/b.c.png",
+            "disparity/a.npy",
+            "road_mask/b.png",
+            "road_mask/m_000002.png",
+        )
+        for name in names:
+            path = Path(folder, "out", name)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.touch()
+        rows = [row("/run/a.png"), row("b.c.png", -3.0), row("x/../b.png", None), row("m.mp4#000002")]
+        rows[0] = replace(rows[0], alpha2=None)
+        found = subjects(rows, "rolls.csv", f"{folder}/out/", ImageOptions(derotated="a/up"))
+        return [
+            [each.theta, each.alpha, each.images_only, each.refused, sorted(each.images.items())]
+            for each in (replace(one, images=_below(one.images, folder)) for one in found)
+        ]
+
+
+def _below(images, folder):
+    return {kind: path.replace(folder, "") for kind, path in images.items()}
+
+
+REMOTE = (
+    ("a.png", "", "rolls.csv"),
+    ("s3://maps/a.png", "", "rolls.csv"),
+    ("s3://maps/a.png", "", "s3://maps/rolls.csv"),
+    ("s3://maps/a.png", "s3://other/a.png", "s3://maps/rolls.csv"),
+    ("a.png", "http://x/a.png", "rolls.csv"),
+    ("a.png", "", "s3://maps/rolls.csv"),
+    ("http://x/a.png", "", "http://x/rolls.csv"),
+    ("http://x/a.png", "", "http://y/rolls.csv"),
+)
+
+
+def _refused():
+    rows = [(replace(row(one), right_file=other), result) for one, other, result in REMOTE]
+    return [
+        [subjects([each], result, None, ImageOptions(), fetch=fetch)[0].refused for fetch in (False, True)]
+        for each, result in rows
+    ]
+
+
+def _taken(images=(), camera=None, photo=False, **options):
+    """The pictures of a map, coarsely: letters are left out, and their files lose a little."""
+    with tempfile.TemporaryDirectory() as folder:
+        disparity = road_map(0.1)
+        disparity[60:70, 60:100] += 4
+        for name in ("a", "up", "mm"):
+            np.save(f"{folder}/{name}.npy", disparity / (1 if name == "a" else 20))
+        cv2.imwrite(f"{folder}/photo.png", np.random.default_rng(1).integers(0, 256, (60, 80, 3), np.uint8))
+        given = replace(row(f"{folder}/a.npy", 5.75), alpha0=-8.0, alpha1=0.4, height_m=camera)
+        (subject,) = subjects([given], f"{folder}/rolls.csv", None, ImageOptions())
+        subject = replace(subject, images={kind: f"{folder}/{name}" for kind, name in images}, **options)
+        drawn = ImageOptions(heights_range=(-0.3, 0.3))
+        settings = FrameOptions(encoding=EncodingOptions("px"), images=drawn)
+        with mock.patch.object(cv2, "putText", lambda picture, *_: picture):
+            found = pictures.take_pictures(subject, settings)
+    shown = {name: each and _seen(each) for name, each in vars(found).items() if name != "missing"}
+    return {**shown, "missing": found.missing.replace(folder, ""), "empty": found.empty}
+
+
+def _seen(picture):
+    """The size of a picture, and its colours in an eighth of its width and height."""
+    values = cv2.imdecode(np.frombuffer(picture.data, np.uint8), cv2.IMREAD_COLOR)
+    coarse = cv2.resize(values, (4, 4), interpolation=cv2.INTER_AREA).astype(float)
+    return {"size": [picture.width, picture.height, *values.shape], "colours": coarse.ravel().tolist()}
+
+
+TAKEN = {
+    "of a map": _taken,
+    "of a map and a height": partial(_taken, camera=2.0),
+    "of images": partial(
+        _taken,
+        [
+            ("derotated", "up.npy"),
+            ("heights", "mm.npy"),
+            ("road_mask", "photo.png"),
+            ("vdisparity", "photo.png"),
+        ],
+        images_only=True,
+    ),
+    "of a preview": partial(_taken, [("heights_preview", "photo.png")], images_only=True),
+    "of nothing": partial(_taken, refused="it is far away"),
+    "of a map among images": partial(_taken, [("disparity", "a.npy")], camera=1.5, images_only=True),
+    "of no parabola": partial(_taken, alpha=None),
+    "turned back": partial(_taken, theta=-0.5),
+}
+RUNS = (
+    {"a": 1, "options": {"b": 2, "c": [1]}, "encoding": ["px"]},
+    {"a": 1, "options": {"b": 3, "c": [1], "d": 4}, "encoding": ["kitti", "px"]},
+    {"a": 2, "options": {}},
+)
+CASES = {
+    **{f"charts: {name}": partial(_charts, name) for name in RESULTS},
+    "charts: pairs, alone": partial(_charts, "pairs", assessed=False),
+    **{f"axis: {name}": make for name, make in AXES.items()},
+    **{f"bars: {name}": make for name, make in BARS.items()},
+    **{f"drawn: {name}": partial(_drawn_result, name) for name in RESULTS},
+    "drawn: small": partial(_drawn_result, "mixed", Size(240.0, 160.0, 26.0)),
+    "drawn: thinned": _thinned,
+    **{f"drawn: {name}": partial(_drawn, chart) for name, chart in HAND_MADE.items()},
+    "still": lambda: {name: _still(chart) for name, chart in all_charts(*_mixed()).items()},
+    "still: marked": lambda: _still(HAND_MADE["marked"]),
+    **{f"page: {name}": make for name, make in PAGES.items()},
+    "chosen": lambda: [
+        _chosen(count, jumps) for count in (0, 1, 3, 8, 12) for jumps in ((), (20, 60), range(30, 450, 60))
+    ],
+    "chosen of few": lambda: [_chosen(count, (2, 5), _mixed()[0]) for count in (2, 4, 6, 12)],
+    "subjects": _subjects,
+    "refused": _refused,
+    **{f"taken {name}": make for name, make in TAKEN.items()},
+    "runs": lambda: [
+        *(common_run(each) for each in (RUNS, RUNS[:2], RUNS[1:], RUNS[:1], [None], [RUNS[0], None])),
+        option_lines(RUN),
+        option_lines(None),
+    ],
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_answers_are_those_recorded(case):
+    check("report", case, CASES[case](), least=3.0 if case.startswith("taken") else 1e-6)
