@@ -351,7 +351,7 @@ def _level_line(rig: RigAssessment, quantity: Quantity, scale: float, axis: Fram
         for segment in found.segments if found is not None else ():
             if segment.begin.value is not None and segment.end.value is not None:
                 ends = [axis.at(int(drive.frames[place]) + 1) for place in (segment.first, segment.last)]
-                said = f"{quantity.name.replace('_', ' ')} {answer(segment.end, quantity, change=True)}"
+                said = f"{quantity.name.replace('_', ' ')} {answer(segment.end, quantity)}"
                 _add(trace, ends, [scale * segment.begin.value, scale * segment.end.value], said)
     return trace
 

@@ -21,6 +21,8 @@ from rollcli.files.results import FURTHER, Row, column_types, format_header, for
 from rollcli.files.stores import locations
 from rollcli.rig.calibration import Calibration
 from tests.binary_files import disparity_map, npy_header
+from tests.files.recordings import small_bags
+from tests.files.stores import answers
 from tests.fuzz.corpus import corpus
 from tests.recorded import check
 
@@ -260,6 +262,8 @@ CASES = {
         for shape in ((4, 6), (5, 7), (4, 6, 3), (1, 1))
         for layout in ("left-right", "top-bottom")
     ],
+    **answers.CASES,
+    **small_bags.CASES,
     "listed": lambda: [naming.listed("abcdefg"[:count]) for count in range(6)],
 }
 

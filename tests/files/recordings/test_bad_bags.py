@@ -1,7 +1,6 @@
 """What is wrong with a bag, a topic or a message is one line, and costs no more than it must."""
 
 import contextlib
-import math
 import os
 import sqlite3
 import struct
@@ -10,8 +9,6 @@ import cv2
 import numpy as np
 import pytest
 
-from rollcli import open_recording
-from rollcli.errors import InputError
 from tests.files.recordings.bag_files import camera_info, compressed, disparity_image, image, write_bag
 from tests.files.recordings.test_bags import START, STEP, P, drive, maps, rows
 from tests.run_cli import rollcli, write_pair
@@ -279,28 +276,3 @@ def test_values_of_another_type_in_the_tables_of_a_bag_are_no_matter(tmp_path, c
     os.utime(path, (0, 0))  # another file
     done = rollcli("estimate", path.name, cwd=tmp_path)
     assert (done.status, done.out) == (0, whole)
-
-
-@pytest.mark.parametrize(
-    ("d", "model", "size", "expected"),
-    [
-        ((0.1, 0.2, 0.3), "plumb_bob", (160, 120), "has 3 numbers of distortion, which are no plumb_bob"),
-        ((0.1, 0.2, 0.3), "equidistant", (160, 120), "has 3 numbers of distortion, which are no equidistant"),
-        ((0.1,) * 5, "brown", (160, 120), "has the distortion model 'brown'; known are plumb_bob, rational_"),
-        ((math.nan,) * 5, "plumb_bob", (160, 120), "has numbers in D, K or R that are not finite"),
-        ((0.1,) * 5, "plumb_bob", (100, 90), "is a raw view of 160x120, and its CameraInfo is of 100x90"),
-    ],
-)
-def test_a_camera_info_that_rectifies_nothing_is_told(tmp_path, views, d, model, size, expected):
-    def make(store):
-        for side, view in zip(("left", "right"), views, strict=True):
-            info = camera_info(store, START, size, P, d, np.diag([350.0, 350, 1]).ravel())
-            yield f"/{side}/camera_info", START, changed(info, distortion_model=model)
-            yield f"/{side}/image_raw", START, image(store, view, "mono8", START)
-
-    path = write_bag(tmp_path, "drive", "mcap", make)
-    given = {f"{side}_topic": f"/{side}/image_raw" for side in ("left", "right")}
-    with pytest.raises(InputError) as caught:
-        list(open_recording(path, **given))
-    assert str(caught.value).startswith(f"{path}#/left/image_raw@{START}: ")
-    assert expected in str(caught.value)
