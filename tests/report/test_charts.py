@@ -5,26 +5,14 @@ import json
 import os
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
-from rollcli.report.charts import all_charts, chart_over_frames, histogram, outside, view
+from rollcli.report.charts import chart_over_frames, view
 from rollcli.report.options import chart_names
 from rollcli.report.page import Chart, script_json
 from rollcli.report.summary import degrees, with_interval, written_at
-from rollcli.rig.drive.assess import assess_rig
 from rollcli.rig.quantities import HEIGHT, ROLL
 from tests.report.results import row
-
-ROWS = [
-    row("a.png", 1.0, 0.1),
-    row("b.png", 2.0, 0.2),
-    row("c.png", 1.5, 0.9, "suspect"),
-    row("d.png", None),
-    row("e.png", -1.0, 0.1),
-    row("f.png", 0.5, None),
-    row("<b>g</b>&amp;.png", 0.0, 0.3),
-]
 
 
 def traces_of(chart):
@@ -35,40 +23,12 @@ def traces(rows):
     return traces_of(chart_over_frames(rows))
 
 
-def test_hover_labels_show_names_as_they_are():
-    labels = traces(ROWS)["roll"]["customdata"]
-    assert labels[0] == "a.png<br>+1.00° ± 0.10°"
-    assert labels[-2].startswith("&lt;b&gt;g&lt;/b&gt;&amp;amp;.png<br>0.00°")
-    long = traces([row("folder/" * 20 + "frame.png")])["roll"]["customdata"][0].partition("<br>")[0]
-    assert len(long) == 44
-    assert long.endswith("folder/frame.png")
-
-
 @pytest.mark.parametrize(
     ("half", "words"),
     [(None, "+2.35°"), (0.5, "+2.35° ± 0.50°"), (0.012, "+2.35° ± 0.01°"), (0.0042, "+2.346° ± 0.004°")],
 )
 def test_an_angle_has_as_many_decimals_as_its_interval_is_worth(half, words):
     assert with_interval(2.3456, half) == words
-
-
-@pytest.mark.parametrize("count", [1, 2, 18, 40])
-def test_few_frames_have_few_bars_and_single_ones_are_no_walls(count):
-    chart = histogram([row(f"{i}.png", 3 + i / 100) for i in range(count)])
-    (bars,) = chart.data
-    low, high = chart.layout["xaxis"]["range"]
-    assert sum(bars["y"]) == count
-    assert len(bars["y"]) <= 2 * np.sqrt(count) + 4
-    assert bars["width"] >= 0.01
-    assert bars["width"] < (high - low) / 4
-
-
-def test_an_angle_far_off_does_not_flatten_the_others():
-    rows = [row(f"{i}.png", 1 + i / 100) for i in range(100)] + [row("off.png", -80.0, 0.1, "suspect")]
-    low, high = view(rows)
-    assert 0.5 < low < 1 < 2 < high < 2.5
-    assert outside(rows) == 1
-    assert outside(rows[:-1]) == 0
 
 
 @pytest.mark.parametrize(("quantity", "unit"), [(ROLL, 1.0), (HEIGHT, 0.1)])
@@ -103,24 +63,6 @@ def test_suspect_marks_lie_below_the_line_and_have_no_bars_in_long_runs(frames, 
 )
 def test_angles_are_printed_with_a_sign_unless_they_are_nothing(angle, text):
     assert degrees(angle) == text
-
-
-def drive_rows(folder, level, frames=400, jump=0.0):
-    rng = np.random.default_rng(3)
-    rolls = level + rng.normal(0, 0.05, frames)
-    rolls[frames // 2 :] += jump
-    return [row(f"{folder}/{place}.png", float(roll), 0.05) for place, roll in enumerate(rolls)]
-
-
-def test_the_page_has_no_more_than_four_decimals():
-    rows = [posed(each.file, 3.0 + k / 7, 0.05, 1.5) for k, each in enumerate(drive_rows("run", 0.2, 30))]
-    for chart in all_charts(rows, assess_rig(rows)).values():
-        for each in (value for trace in chart.data for value in trace["y"] if isinstance(value, float)):
-            assert round(each, 4) == each or each in [r.pitch_deg for r in rows]
-
-
-def posed(name, pitch, half_width, height=None, status="ok"):
-    return replace(row(name, 1.0, 0.1, status), pitch_deg=pitch, pitch_ci95_deg=half_width, height_m=height)
 
 
 def test_the_time_of_a_file_is_told_in_utc_and_that_of_a_stream_is_not(tmp_path):

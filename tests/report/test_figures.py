@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rollcli.pictures.colours import DARK, LIGHT, style_sheet
-from rollcli.pictures.figures import SLIDE, Size
+from rollcli.pictures.figures import SLIDE
 from rollcli.report import figures
 from rollcli.report.charts import all_charts
 from rollcli.report.figures import chart_file, with_still
@@ -65,15 +65,6 @@ def test_an_svg_has_the_size_of_a_slide_a_title_axes_with_units_and_a_legend(cha
         "histogram": ["frames", "roll, degrees", "ok", "suspect"],
     }[name]
     assert [each for each in expected if each not in texts(svg)] == []
-
-
-def test_lines_grow_with_the_letters(charts):
-    widths = {}
-    for times in (2, 4):  # a width of 1 is not written
-        svg = chart_file(charts["roll"], "svg", Size(960.0 * times, 420.0 * times, 13.0 * times)).decode()
-        widths[times] = [float(each) for each in re.findall(r"stroke-width: ([\d.]+)", svg)]
-    assert set(widths[2]) == {2, 3, 4}  # axes, curves, and the line of zero
-    assert widths[4] == [2 * each for each in widths[2]]
 
 
 def test_a_pdf_has_the_same_size_and_its_letters_are_letters(charts):
