@@ -202,6 +202,7 @@ CASES = {
         for name, data in FILES.items()
         if name != "picture.jpg"  # libjpeg rounds in more than one way
     },
+    "image: a header without end": partial(READ["image"], b"P5\n#%s\n2 2\n255\n1234" % (b"x" * 3000)),
     # a compressed file is as long as this zlib makes it
     **{
         f"cut: {name}": partial(lambda data: [_cut(data[:end]) for end in (9, -1)], data)
