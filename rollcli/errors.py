@@ -53,12 +53,8 @@ class EstimationError(RollcliError):
     """The pixels do not determine a roll angle; costs that frame, not the batch."""
 
 
-class ClusterError(RollcliError):
-    """The cluster cannot do the work (exit status 1)."""
-
-
 class WorkerError(RollcliError):
-    """Worker processes cannot be started (exit status 1)."""
+    """Workers cannot start, or a cluster's cannot do the work (exit status 1)."""
 
 
 class OutputError(RollcliError):

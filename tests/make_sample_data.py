@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from rollcli.files.atomic import write_atomic
-from rollcli.files.encodings import from_disparity
+from rollcli.files.encodings import to_kitti
 from rollcli.files.formats import encode_stored, read_image
 from rollcli.simulate.dataset import Dataset, write_dataset
 from rollcli.simulate.spec import FrameSpec
@@ -52,8 +52,9 @@ def _stored(stem: str, disparity: np.ndarray) -> tuple[np.ndarray, str]:
     if stem == "frame_0003":
         return disparity, "tiff"  # float32, pixels
     if stem == "frame_0004":
-        return from_disparity(disparity, "sgbm", np.int16), "npy"  # as OpenCV's matcher gives it
-    return from_disparity(disparity, "kitti", np.uint16), "png"
+        sixteenths = np.where(disparity > 0, np.rint(disparity * 16), -16)  # as OpenCV's matcher gives it
+        return sixteenths.astype(np.int16), "npy"
+    return to_kitti(disparity), "png"
 
 
 if __name__ == "__main__":

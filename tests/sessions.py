@@ -172,6 +172,11 @@ def _copy(folder, one, other):
     copy(folder / one, folder / other)
 
 
+def _link(folder, name, target):
+    (folder / name).parent.mkdir(parents=True, exist_ok=True)
+    (folder / name).symlink_to(target)
+
+
 def _edit(folder, name, old, new):
     text = (folder / name).read_text("utf-8")
     assert old in text
@@ -230,6 +235,7 @@ def _values(value, place=""):
 _TOOLS = {
     "cp": _copy,
     "edit": _edit,
+    "link": _link,
     "map": _map,
     "rm": _remove,
     "rows": _rows,

@@ -10,7 +10,6 @@ from pathlib import PureWindowsPath
 import pytest
 
 from rollcli.files import atomic, inputs
-from rollcli.files.inputs import find_inputs
 from rollcli.files.stores.locations import is_url, public_name
 from tests.run_cli import contents, keep_rows, python, rollcli, write_maps
 from tests.slow import mostly_slow
@@ -70,23 +69,6 @@ def test_a_drive_letter_is_no_scheme(path):
 def test_rows_name_files_with_slashes_where_the_system_has_backslashes(monkeypatch):
     monkeypatch.setattr(inputs.os, "sep", "\\")
     assert inputs._shown(str(PureWindowsPath("C:/maps/run7/a.png"))) == "C:/maps/run7/a.png"
-
-
-def test_lists_may_end_their_lines_in_cr_lf(tmp_path, monkeypatch):
-    write_maps(tmp_path / "maps", 2)
-    names = "maps/frame1.png\r\nmaps/frame0.png\r\n"
-    (tmp_path / "list.txt").write_bytes(names.encode())
-    (tmp_path / "rollcli.toml").write_bytes(b"[estimate]\r\nmethod = 'gss'\r\n")
-    done = rollcli("estimate", "-", "--config", "rollcli.toml", "-q", cwd=tmp_path, stdin=names)
-    assert done.status == 0
-    assert [line.split(",")[0] for line in done.out.splitlines()[1:]] == [
-        "maps/frame0.png",
-        "maps/frame1.png",
-    ]
-    assert ",gss," in done.out
-    monkeypatch.chdir(tmp_path)
-    found = find_inputs([], files_from="list.txt")
-    assert [each.name for each in found] == ["maps/frame0.png", "maps/frame1.png"]
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows takes no such path unless long paths are on")

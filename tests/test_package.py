@@ -14,7 +14,7 @@ import yaml
 
 from rollcli.errors import UsageError
 from rollcli.extras import require_extra
-from tests.run_cli import ROOT
+from tests.run_cli import ROOT, rollcli, write_maps
 
 ACTION = yaml.safe_load((ROOT / ".github" / "action" / "action.yml").read_text("utf-8"))
 SAMPLES = ROOT / "sample_data"
@@ -228,3 +228,12 @@ def test_ci_runs_on_windows_and_macos_with_tests_that_are_there():
 def test_what_all_tests_share_limits_the_threads_of_numpy_before_numpy_loads():
     line = [sys.executable, "-c", "import sys, tests.conftest; sys.exit('numpy' in sys.modules)"]
     assert subprocess.run(line, cwd=ROOT, check=False).returncode == 0
+
+
+@pytest.mark.parametrize("missing", ["plotly", "jinja2", "matplotlib"])
+def test_without_the_extra_paper_says_what_to_install_before_any_work(tmp_path, monkeypatch, missing):
+    monkeypatch.setitem(sys.modules, missing, None)
+    write_maps(tmp_path / "maps", 1)
+    refusal = rollcli("evaluate", "paper", "maps", "-o", "out", cwd=tmp_path).refused()
+    assert f"needs the extra report: {sys.executable} -m pip install {missing}\n" in refusal
+    assert not (tmp_path / "out").exists()

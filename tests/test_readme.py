@@ -73,14 +73,6 @@ def test_the_first_run_prints_what_it_shows(tmp_path):
         )
 
 
-def test_every_command_it_shows_exists():
-    blocks = "".join(re.findall(r"```(?:sh|make)\n(.*?)```", README, flags=re.S))
-    shown = set(re.findall(r"^\s*rollcli ([a-z]+)", blocks, flags=re.M))
-    assert shown >= {"estimate", "report", "derotate", "vdisparity", "disparity", "simulate", "evaluate"}
-    listed = rollcli("--help", cwd=ROOT).out
-    assert [name for name in shown if f"\n  {name} " not in listed] == []
-
-
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
     """A folder with stereo pairs and the README's Makefile, which has been run."""

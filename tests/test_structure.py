@@ -41,6 +41,7 @@ DOOR_PACKAGES = {"rollcli.cli": "the command line's doors: help and version load
 # what is filled in while it is made
 CHANGING = {
     "rollcli.files.recordings.frames.BagFrames",
+    "rollcli.files.search.Search",
     "rollcli.run.progress._Cause",
     "rollcli.simulate.scene.Scene",
 }

@@ -1,13 +1,10 @@
 """The `rollcli` group: it imports a command when it is called, and ends every error as one line."""
 
 import os
-import platform
-import re
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 from functools import partial
 from importlib import import_module
-from importlib.metadata import PackageNotFoundError, requires, version
 from typing import Any
 
 import click
@@ -15,39 +12,6 @@ import click
 from rollcli import __version__
 from rollcli.errors import ExitStatus, InputError, RollcliError, UsageError
 from rollcli.messages import one_line, say
-
-_OPENCV = tuple(f"opencv-{name}python{kind}" for name in ("", "contrib-") for kind in ("-headless", ""))
-
-
-def versions() -> Iterator[tuple[str, str]]:
-    """Yield (name, version) of rollcli, Python and each package it uses; of extras, those installed."""
-    yield "rollcli", __version__
-    yield "Python", f"{platform.python_version()} ({platform.python_implementation()}, {platform.platform()})"
-    seen = set()
-    for requirement in _requirements():
-        name = re.split(r"[^\w.-]", requirement, maxsplit=1)[0]
-        found = _installed(_OPENCV if name in _OPENCV else (name,))
-        if name not in seen and (found or ";" not in requirement):
-            yield found or (name, "not installed")
-        seen.add(name)
-
-
-def _requirements() -> list[str]:
-    try:
-        return requires("rollcli") or []
-    except PackageNotFoundError:  # it runs from its folder, and was not installed
-        return []
-
-
-def _installed(names: Sequence[str]) -> tuple[str, str] | None:
-    """Find the first installed one of several packages that contain the same module."""
-    for name in names:
-        try:
-            return name, version(name)
-        except PackageNotFoundError:
-            continue
-    return None
-
 
 # name -> (module, one-line help): `rollcli --help` needs no command's module
 COMMANDS = {
@@ -161,6 +125,8 @@ def _discard_stdout() -> None:
 
 def _print_versions(ctx: click.Context, param: click.Parameter, asked: bool) -> None:
     if asked and not ctx.resilient_parsing:
+        from rollcli.cli.versions import versions
+
         click.echo("\n".join(f"{name} {version}" for name, version in versions()))
         ctx.exit()
 

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +20,30 @@ from rollcli.estimator.solvers.exact import CertifiedSolution
 from rollcli.estimator.solvers.solution import angle_between
 from rollcli.estimator.tuning import DoubtTuning
 
-_COLUMNS = 160  # of a view that are looked at; shares need no more
-_AHEAD = 0.05  # units to the horizon of a camera that looks ahead: every road fills enough of its view
+_COLUMNS = 80  # of a view that are looked at; shares need no more
+_BANDS = 20  # from the horizon to the lower border, of equal steps of the road's disparity
 _ON_ROAD = 0.03  # of the road's disparity, within which a pixel is on it
+_BELOW = 0.15  # of the road's disparity, by which a pixel is below it
+_FEW = 8  # pixels of the lane in a band: fewer tell nothing
+_ENOUGH = 0.1  # of the pixels ahead that have data: fewer tell nothing
+
+
+class Ground(NamedTuple):
+    """What is seen of the road's plane, shares from 0 to 1.
+
+    Attributes
+    ----------
+    filled : float
+        Of all pixels with data, those on the plane.
+    below : float
+        Of the lane's pixels those below the plane: the most in any band within twice the reach.
+    beyond : float
+        Of the pixels with data from the reach to twice as far, those on the plane; 1 where few have data.
+    """
+
+    filled: float
+    below: float
+    beyond: float
 
 
 @dataclass(frozen=True)
@@ -30,7 +51,9 @@ class View:
     """A map as seen from the place of the camera over a road.
 
     Tables, shelves and the floors of rooms are as even as roads. But a camera that stands on a road sees
-    several of its own heights to the sides, and most of the lane ahead; a road seen from close by fills it.
+    about its own height to the sides at least, its road fills the view the more the further down it looks,
+    and the road goes on ahead: nothing lies below it there, and nothing closes it off. How far away a place
+    is, is said by how wide the view is there, in camera heights, which needs no focal length.
 
     Attributes
     ----------
@@ -41,46 +64,62 @@ class View:
         The road.
     rmse : float
         Of its pixels, px.
+    reach : float
+        How far a road goes on at least: to where the view is so many camera heights wide.
     """
 
     disparity: NDArray[Any]
     valid: NDArray[np.bool_]
     surface: Surface
     rmse: float
+    reach: float
+
+    def _in_the_middle(self, row: int) -> tuple[float, float]:
+        """Return the road's disparity, px, in the middle of a row, and its slope there, px per unit."""
+        grid, model = self.surface.grid, self.surface.model
+        along = model.along(0.0, (row - grid.centre_v) / grid.scale)
+        _, slope, bend = model.alpha
+        return model.disparity_along(along), abs(slope + 2 * bend * along)
 
     @property
     def width(self) -> float:
         """How wide the view is at its bottom, camera heights."""
-        (height, width), grid, model = self.disparity.shape, self.surface.grid, self.surface.model
-        _, slope, bend = model.alpha
-        bottom = model.along(0.0, (height - 1 - grid.centre_v) / grid.scale)
-        nearest = model.disparity_along(bottom)
-        return width / grid.scale * abs(slope + 2 * bend * bottom) / nearest if nearest > 0 else math.inf
+        height, width = self.disparity.shape
+        nearest, slope = self._in_the_middle(height - 1)
+        return width / self.surface.grid.scale * slope / nearest if nearest > 0 else math.inf
 
     @cached_property
-    def seen(self) -> tuple[float, float]:
-        """Return which share of the lane is seen, and which of all that has data is on the road, 0 to 1.
+    def ground(self) -> Ground:
+        """What is seen of the road's plane.
 
-        The first is the mean of the shares in the middle and in the far third of the ground.
+        Where the upper border lets it be seen less than twice as far as the reach, what is beyond half as
+        far as that counts for what is beyond the reach.
         """
         height, width = self.disparity.shape
         step = -(-width // _COLUMNS)
         model, grid = self.surface.model, self.surface.grid
-        level, slope, _ = model.alpha
         x = (np.arange(0, width, step) - grid.centre_u) / grid.scale
         y = ((np.arange(0, height, step) - grid.centre_v) / grid.scale)[:, None]
-        along = model.along(x, y)
-        road = model.disparity_along(along)
-        d, usable = self.disparity[::step, ::step], self.valid[::step, ::step]
-        lane = usable & (road > 0) & (np.abs(model.side(model.across(x, y), road)) < 1)
-        on_road = usable & (np.abs(d - road) < _ON_ROAD * road + 3 * self.rmse)
-        horizon = max(float(along.min()), -level / slope if slope else -np.inf)
-        thirds = 3 * (along - horizon) / max(float(along.max()) - horizon, 1e-9)
-        shares: list[float] = []
-        for first in (0, 1):
-            there = lane & (thirds >= first) & (thirds < first + 1)
-            shares.append(float((on_road & there).sum()) / max(1.0, float(there.sum())))
-        return float(np.mean(shares)), float(on_road.sum()) / max(1.0, float(usable.sum()))
+        road = model.disparity_along(model.along(x, y))
+        d, valid = self.disparity[::step, ::step], self.valid[::step, ::step]
+        lane = (road > 0) & (np.abs(model.side(model.across(x, y), road)) < 1)
+        on_road = valid & (np.abs(d - road) < _ON_ROAD * road + 3 * self.rmse)
+        below = valid & (d < (1 - _BELOW) * road - 3 * self.rmse)
+        nearest, farthest = (self._in_the_middle(row)[0] for row in (height - 1, 0))
+        nearest = max(nearest, 1e-9)  # a road may end above the border: then nothing is said of what is ahead
+        near = road * (1 / nearest)  # 1 at the lower border, 0 at the horizon
+        reached = self.width / self.reach
+        bands = np.clip(near * _BANDS, 0, _BANDS - 1).astype(np.intp)
+        in_lane, lower = (np.bincount(bands[those], minlength=_BANDS) for those in (lane, lane & below))
+        some = (in_lane >= _FEW) & (np.arange(_BANDS) + 0.5 >= _BANDS / 2 * reached)
+        reached = max(reached, 2 * farthest / nearest)
+        ahead = (near < reached) & (near > reached / 2)
+        seen = valid & ahead
+        return Ground(
+            filled=float(on_road.sum()) / max(1.0, float(valid.sum())),
+            below=float(np.max(lower[some] / in_lane[some], initial=0)),
+            beyond=float(on_road[seen].mean()) if seen.sum() > _ENOUGH * ahead.sum() else 1.0,
+        )
 
 
 @dataclass(frozen=True)
@@ -148,41 +187,36 @@ def _grows_upward(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
         yield "the disparity grows upward, as it does in a depth map"
 
 
-def _little_road(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
-    road = evidence.road
-    if road and road.score < tuning.least_score:
-        yield "little of what lies ahead looks like a road"
-
-
 def _narrow_view(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
-    view, road = evidence.view, evidence.road
-    if view is None or road is None:
-        return
-    width = view.width
-    doubted = width < tuning.narrowest
-    if not doubted and width < tuning.narrow:
-        seen, filled = view.seen
-        hidden = filled > tuning.least_filled + tuning.filled_by_horizon * road.horizon  # by a car
-        doubted = seen < tuning.least_seen and not hidden
-    if doubted:
-        yield f"the view is as narrow as that of a table or a room: {width:.1f} camera heights"
+    view = evidence.view
+    if view and view.width < tuning.narrowest:
+        yield f"the view is as narrow as that of a table: {view.width:.1f} camera heights"
 
 
 def _little_filled(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
     view, road = evidence.view, evidence.road
-    if view is None or road is None or road.horizon < _AHEAD:
+    if view is None or road is None:
         return
-    _, filled = view.seen
-    if filled < min(tuning.filled_by_horizon * road.horizon, tuning.most_filled):
-        share = f"{100 * filled:.0f} % of the pixels"
+    if view.ground.filled < min(tuning.filled_by_horizon * road.horizon, tuning.most_filled):
+        share = f"{100 * view.ground.filled:.0f} % of the pixels"
         yield f"a camera that looks down so far sees more of a road than {share}"
+
+
+def _plane_ends(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
+    view = evidence.view
+    if view and view.ground.below > tuning.most_below:
+        yield "the plane ends near ahead, as a table does: what is seen there lies below it"
+
+
+def _closed_off(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
+    view = evidence.view
+    if view and view.ground.beyond < tuning.least_beyond:
+        yield "the plane is closed off near ahead, as the floor of a room is"
 
 
 def _rival_plane(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
     road = evidence.road
-    if not road or road.score < tuning.least_score:
-        return  # of a poor road any plane is a rival
-    if road.rival > tuning.rival_share * road.score:
+    if road and road.rival > tuning.rival_share * road.score:
         yield "another plane, with another roll, explains the map nearly as well"
 
 
@@ -216,9 +250,10 @@ REASONS: tuple[Reason, ...] = (
     _not_global,
     _near_minimum,
     _grows_upward,
-    _little_road,
     _narrow_view,
     _little_filled,
+    _plane_ends,
+    _closed_off,
     _rival_plane,
     _fit_moved,
     _at_bound,

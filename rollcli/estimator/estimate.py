@@ -235,7 +235,9 @@ def estimate_roll(
     turned = tangent.turned_by(slope_error)
     interval = None if knife is None else interval_of(knife, theta, turned, tuning.interval)
     rmse = pixels.energy.rmse(certified.energy)
-    view = View(checked.values, checked.valid, surface, rmse) if pixels.road and surface else None
+    view = None
+    if pixels.road and surface:
+        view = View(checked.values, checked.valid, surface, rmse, tuning.doubts.reach)
     evidence = Evidence(
         pixels.energy, certified, pixels.road, surface, max_roll, max_interval, interval, view
     )

@@ -14,6 +14,7 @@ from rollcli.files.formats import read_stored
 from rollcli.files.inputs import find_inputs
 from rollcli.files.matching import stem_of
 from rollcli.files.results import Row
+from rollcli.files.search import Search
 
 LARGE_ERROR_DEG = 0.5
 DISTANCES_M = (5, 10, 20)
@@ -251,4 +252,4 @@ def _height_errors(
 
 
 def _maps_of(folder: str) -> dict[str, str]:
-    return {stem_of(each.name): each.location for each in find_inputs([folder], recursive=True)}
+    return {stem_of(each.name): each.location for each in find_inputs([folder], Search(recursive=True))}

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.errors import InputError, UsageError
+from rollcli.errors import UsageError
 from rollcli.files.formats import Stored, decode_mask, read_stored
 from rollcli.files.storage import read_bytes
 from rollcli.rig.calibration import Calibration, require_calibration
@@ -50,24 +50,13 @@ class DisparityMap:
         Pixels; float32, or float64 where the file holds float64. No data is exactly 0; no NaN, no inf.
     encoding : Encoding
         The one used.
-    scale : float
-        Pixels per stored unit; of a depth map, metres per stored unit.
-    stored : Stored
-        What the file holds.
     warnings : dict of str to str
         Why the encoding taken by "auto" cannot be right, and what else a user should know; by their codes.
     """
 
     disparity: NDArray[Any]
     encoding: Encoding
-    scale: float
-    stored: Stored
     warnings: dict[str, str]
-
-    @property
-    def warning(self) -> str | None:
-        """All of them."""
-        return "; ".join(self.warnings.values()) or None
 
 
 def to_disparity(
@@ -122,7 +111,7 @@ def to_disparity(
     doubt = _doubt(stored.values, used) if encoding == "auto" and scale is None else ""
     warnings = {"pages": stored.note, "encoding": doubt, "plateau": plateau}
     told = {code: warning for code, warning in warnings.items() if warning}
-    return DisparityMap(disparity, used, factor, stored, told)
+    return DisparityMap(disparity, used, told)
 
 
 def read_disparity(
@@ -176,43 +165,17 @@ def read_disparity(
     return found.disparity
 
 
-def from_disparity(
-    disparity: NDArray[Any], encoding: str, dtype: Any = np.uint16, *, scale: float | None = None
-) -> NDArray[Any]:
-    """Turn pixels of disparity back into numbers to store.
+def to_kitti(disparity: NDArray[Any]) -> NDArray[np.uint16]:
+    """Turn pixels of disparity into the numbers of a KITTI PNG; no data and what exceeds `KITTI_TOP` is 0.
 
     Parameters
     ----------
     disparity : ndarray, shape (H, W)
-        Pixels; NaN, inf and <= 0 are no data, stored as 0 (-16 in sgbm, as OpenCV does).
-    encoding : {"auto", "px", "kitti", "cityscapes", "sgbm", "foundationstereo"}
-        How a number stands for a disparity; auto goes by the dtype.
-    dtype : dtype
-        Of the result; whole-number types are rounded, but never down to no data.
-    scale : float, optional
-        Pixels per stored unit, in place of the encoding's own.
-
-    Raises
-    ------
-    UsageError
-        Unknown encoding, or depth, which is only read.
-    InputError
-        More than one in a hundred disparities is too large for the dtype. Fewer become no data.
+        Pixels; NaN, inf and <= 0 are no data. The smallest are rounded up: none of them becomes no data.
     """
-    kind = np.dtype(dtype)
-    used = resolve_encoding(encoding, kind, scale)
-    if used is Encoding.DEPTH:
-        raise UsageError("a disparity is not written as a depth")
-    factor = _SCALE[used] if scale is None else scale
-    valid = np.isfinite(disparity) & (disparity > 0)
-    first = int(used is Encoding.CITYSCAPES)
-    numbers = np.where(valid, disparity, 0).astype(np.float64) / factor + first
-    if kind.kind in "iu":
-        numbers = np.maximum(np.rint(numbers), first + 1)
-        top = np.iinfo(kind).max - 1  # the last number means no data
-        valid = _without_overflow(numbers, valid, top, top * factor)
-    empty = -16 if used is Encoding.SGBM and kind.kind == "i" else 0
-    stored: NDArray[Any] = np.where(valid, numbers, empty).astype(kind)
+    fits = (disparity > 0) & (disparity <= KITTI_TOP)
+    numbers = np.rint(np.where(fits, disparity, 0).astype(np.float64) / _SCALE[Encoding.KITTI])
+    stored: NDArray[np.uint16] = np.where(fits, np.maximum(numbers, 1), 0).astype(np.uint16)
     return stored
 
 
@@ -283,20 +246,6 @@ def _doubt(values: NDArray[Any], encoding: Encoding) -> str:
             "they look like whole pixels (--encoding px)"
         )
     return ""
-
-
-def _without_overflow(
-    numbers: NDArray[Any], valid: NDArray[np.bool_], top: int, top_px: float
-) -> NDArray[np.bool_]:
-    """Drop the valid pixels that cannot be stored."""
-    fits: NDArray[np.bool_] = valid & (numbers <= top)
-    lost = np.count_nonzero(valid) - np.count_nonzero(fits)
-    if lost > 0.01 * np.count_nonzero(valid):
-        raise InputError(
-            f"disparities up to {top_px * float(numbers[valid].max()) / top:.0f} px do not fit numbers "
-            f"that end at {top_px:.0f} px: give --save-as tiff or npy"
-        )
-    return fits
 
 
 @dataclass(frozen=True)

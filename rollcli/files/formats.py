@@ -51,7 +51,7 @@ def _array_format(
     )
 
 
-# a new format: a file in `codecs`, a line here, and its ending in `inputs`, which loads no decoder
+# a new format: a file in `codecs`, a line here, and its ending in `search`, which loads no decoder
 MAP_FORMATS = {
     "png": MapFormat((png.SIGNATURE,), png.decode_png, lambda values, _, text: png.encode_png(values, text)),
     "tiff": MapFormat(tiff.SIGNATURES, tiff.decode_tiff, tiff.encode_tiff),

@@ -6,20 +6,18 @@ import re
 import sys
 from array import array
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from rollcli.errors import InputError, UsageError, cause_of
+from rollcli.errors import UsageError, as_usage, cause_of
 from rollcli.files.bounded import MOST_LISTED, as_utf8, read_given, read_stream
 from rollcli.files.containers import file_of, shown
 from rollcli.files.naming import listed, match_names, natural_key
-from rollcli.files.search import Search
+from rollcli.files.search import IMAGE_ENDINGS, Search
 from rollcli.files.storage import read_bytes
 from rollcli.files.stores.locations import base_name, is_url, public_name
 
-MAP_ENDINGS = (".png", ".tif", ".tiff", ".npy", ".npz", ".pfm", ".exr")
-IMAGE_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm")
 _KINDS_NAMED = 5  # endings of what is not read
 _NO_TEXT = (  # what images and archives begin with
     *(b"\x89PNG", b"II*\0", b"MM\0*", b"\x93NUMPY", b"Pf\n", b"PF\n"),
@@ -62,17 +60,7 @@ class Pair:
 
 
 def find_inputs(
-    inputs: Iterable[str],
-    *,
-    files_from: str | None = None,
-    stdin: Iterable[str] | None = None,
-    recursive: bool = False,
-    include: Sequence[str] = (),
-    exclude: Sequence[str] = (),
-    skip: Sequence[str | Path] = (),
-    endings: Sequence[str] = MAP_ENDINGS,
-    maps: bool = False,
-    notes: list[str] | None = None,
+    inputs: Iterable[str], search: Search | None = None, *, files_from: str | None = None
 ) -> list[Input]:
     """Find every file that the arguments name, sorted naturally, each once.
 
@@ -80,22 +68,10 @@ def find_inputs(
     ----------
     inputs : iterable of str
         Files, folders, glob patterns (``**`` too), or "-" for paths on stdin, one a line.
+    search : Search, optional
+        How they are searched; by default for maps, each folder by itself.
     files_from : str, optional
         A file that holds paths, one a line; "-" is stdin.
-    stdin : iterable of str, optional
-        The lines behind "-"; sys.stdin by default.
-    recursive : bool
-        Search folders recursively.
-    include, exclude : sequence of str
-        Globs on the names or relative paths of what folders and patterns hold.
-    skip : sequence of path
-        Folders that are never searched: this run's results go there.
-    endings : sequence of str
-        What counts as readable in a folder.
-    maps : bool
-        They are disparity maps: the views of pairs are refused.
-    notes : list of str, optional
-        Gets lines on what is named twice, and on what the folders hold beside what is read.
 
     Returns
     -------
@@ -108,11 +84,11 @@ def find_inputs(
     UsageError
         Nothing is found at all, or a folder or pattern holds nothing, or a list cannot be read.
     """
-    search = Search(endings, recursive, include, exclude, skip, maps)
+    search = search or Search()
     found: list[Input] = []
     seen: dict[str, set[str]] = {}  # names by their folders, whose texts they share
     real = functools.cache(os.path.realpath)  # one folder holds thousands of files
-    for argument, literal in _arguments(inputs, files_from, stdin):
+    for argument, literal in _arguments(inputs, files_from):
         before, repeats = len(found), False
         for path, relative in search.files(argument, literal=literal):
             # links to files stay themselves: each may be a frame
@@ -127,10 +103,11 @@ def find_inputs(
                 found.append(Input(path, _shown(path), relative))
             else:
                 repeats = True
-        if repeats and len(found) == before and not literal and notes is not None:
-            notes.append(f"{argument}: is named more than once; each of its files is taken once")
-    if search.left_out and notes is not None:
-        notes.append(_left_out(search.left_out))
+        if repeats and len(found) == before and not literal:
+            search.notes.append(f"{argument}: is named more than once; each of its files is taken once")
+    if search.left_out:
+        search.notes.append(_left_out(search.left_out))
+        search.left_out.clear()
     del seen  # before the keys of the sort take its place
     if not any(is_url(each.location) or os.path.lexists(file_of(each.location)) for each in found):
         named = listed(each.name for each in found)
@@ -157,29 +134,19 @@ def _shown(location: str) -> str:
     return public_name(location) if is_url(location) else shown(location).replace(os.sep, "/")
 
 
-def pair_inputs(
-    left: str,
-    right: str,
-    *,
-    match: str = "name",
-    recursive: bool = False,
-    include: Sequence[str] = (),
-    exclude: Sequence[str] = (),
-    skip: Sequence[str | Path] = (),
-    notes: list[str] | None = None,
-) -> list[Pair]:
+def pair_inputs(left: str, right: str, search: Search | None = None, *, match: str = "name") -> list[Pair]:
     """Pair the images of two files, folders or patterns.
 
     Parameters
     ----------
     left, right : str
         Two files are a pair whatever their names are. Both may be one folder that holds both sides.
+    search : Search, optional
+        How they are searched; by default for images, each folder by itself.
     match : {"name", "order"}
         name: the same name, or the same once left and right marks are taken away (left/right, l/r, L1/R1,
         im0/im1, image_2/image_3, ...), in folder names too.
         order: the first with the first, in natural order.
-    recursive, include, exclude, skip, notes
-        As in `find_inputs`.
 
     Returns
     -------
@@ -191,18 +158,8 @@ def pair_inputs(
     UsageError
         An image without a partner, or with more than one, or that is given as both; it is named.
     """
-    lefts, rights = (
-        find_inputs(
-            [side],
-            recursive=recursive,
-            include=include,
-            exclude=exclude,
-            skip=skip,
-            endings=IMAGE_ENDINGS,
-            notes=notes,
-        )
-        for side in (left, right)
-    )
+    search = search or Search(IMAGE_ENDINGS)
+    lefts, rights = find_inputs([left], search), find_inputs([right], search)
     if match == "order":
         if len(lefts) != len(rights):
             raise UsageError(f"{len(lefts)} left and {len(rights)} right images cannot be matched by order")
@@ -244,40 +201,35 @@ def _place(each: Input) -> Path:
     return Path(os.path.realpath(each.path.parent), each.path.name)
 
 
-def _arguments(
-    inputs: Iterable[str], files_from: str | None, stdin: Iterable[str] | None
-) -> Iterator[tuple[str, bool]]:
+def _arguments(inputs: Iterable[str], files_from: str | None) -> Iterator[tuple[str, bool]]:
     """Yield each argument, and whether it is literal: lists are, the command line may hold patterns."""
     for argument in inputs:
         if argument == "-":
-            yield from ((line, True) for line in _stdin_lines(stdin))
+            yield from ((line, True) for line in _stdin_lines())
         else:
             yield argument, False
     if files_from == "-":
-        yield from ((line, True) for line in _stdin_lines(stdin))
+        yield from ((line, True) for line in _stdin_lines())
     elif files_from is not None:
+        read = read_bytes if is_url(files_from) else read_given
         try:
-            read = read_bytes if is_url(files_from) else read_given
-            data = as_utf8(read(files_from, most=MOST_LISTED), files_from)
-        except InputError as error:
-            raise UsageError(str(error)) from None
+            with as_usage():
+                data = as_utf8(read(files_from, most=MOST_LISTED), files_from)
         except OSError as error:
             raise UsageError(f"{files_from}: the list of files cannot be read: {cause_of(error)}") from None
         yield from ((line, True) for line in _lines(data))
 
 
-def _stdin_lines(stdin: Iterable[str] | None) -> Iterator[str]:
-    if stdin is None:
-        if sys.stdin is None:
-            raise UsageError("-: stdin is closed; nothing can be read from it")
-        data = read_stream(sys.stdin.buffer, "-", MOST_LISTED)
-        if data.startswith(_NO_TEXT):
-            raise UsageError(
-                "-: stands for a list of files on stdin, one a line; what came is an image or an archive: "
-                "name its file in place of -"
-            )
-        return _lines(as_utf8(data, "-"))
-    return (name for line in stdin if (name := line.rstrip("\r\n")))
+def _stdin_lines() -> Iterator[str]:
+    if sys.stdin is None:
+        raise UsageError("-: stdin is closed; nothing can be read from it")
+    data = read_stream(sys.stdin.buffer, "-", MOST_LISTED)
+    if data.startswith(_NO_TEXT):
+        raise UsageError(
+            "-: stands for a list of files on stdin, one a line; what came is an image or an archive: "
+            "name its file in place of -"
+        )
+    return _lines(as_utf8(data, "-"))
 
 
 def _lines(data: bytes) -> Iterator[str]:

@@ -8,8 +8,8 @@ from pathlib import PurePosixPath
 
 from rollcli.errors import UsageError
 from rollcli.files.containers import frame_name
-from rollcli.files.inputs import IMAGE_ENDINGS, MAP_ENDINGS
 from rollcli.files.naming import listed
+from rollcli.files.search import IMAGE_ENDINGS, MAP_ENDINGS
 
 _ENDINGS = {*MAP_ENDINGS, *IMAGE_ENDINGS}
 

@@ -73,7 +73,7 @@ def read_columns(path: str, wanted: Sequence[str]) -> ResultColumns:
             files += found["file"]
             status.extend(map(STATUSES.index, found["status"]))
             methods.update(filter(None, found.get("method", ())))
-            for name in found.keys() & set(wanted):
+            for name in filter(found.__contains__, wanted):
                 numbers.setdefault(name, []).append(np.array(found[name], np.float64))  # None becomes NaN
     return ResultColumns(
         path,

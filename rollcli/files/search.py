@@ -9,6 +9,7 @@ import shlex
 import stat
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from rollcli.errors import UsageError
@@ -24,10 +25,10 @@ from rollcli.files.stores.locations import (
 )
 from rollcli.files.stores.objects import has_objects, list_objects
 
-_OF_FILES = (
-    *(".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm", ".npy", ".npz", ".pfm", ".exr"),
-    *(".csv", ".jsonl", ".parquet", ".txt", ".json", ".yaml", ".yml", ".xml", ".toml"),
-)
+MAP_ENDINGS = (".png", ".tif", ".tiff", ".npy", ".npz", ".pfm", ".exr")
+IMAGE_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm")
+_OTHER_ENDINGS = (".csv", ".jsonl", ".parquet", ".txt", ".json", ".yaml", ".yml", ".xml", ".toml")
+_OF_FILES = {*MAP_ENDINGS, *IMAGE_ENDINGS, *_OTHER_ENDINGS}
 _MAGIC = re.compile(r"[*?[]")
 
 
@@ -96,44 +97,40 @@ _SIDES = (
 _PHOTOGRAPHS = (".png", ".tif", ".tiff")  # of what is read as maps, what may be photographs, too
 
 
+@dataclass
 class Search:
-    """Finds files, and knows which ones are taken from folders and patterns.
-
-    Parameters
-    ----------
-    endings : sequence of str
-        What counts as readable, lower case.
-    recursive : bool
-        Search folders recursively.
-    include, exclude : sequence of str
-        Globs on names and relative paths.
-    skip : sequence of path
-        Folders that are never searched: results go there.
-    maps : bool
-        Maps are looked for: what are the two views of pairs is never taken for such.
+    """How folders, patterns and stores are searched, and what was noticed on the way.
 
     Attributes
     ----------
+    endings : tuple of str
+        What counts as readable in a folder, lower case.
+    recursive : bool
+        Search folders recursively.
+    include, exclude : sequence of str
+        Globs on the names or relative paths of what folders and patterns hold.
+    skip : sequence of path
+        Folders that are never searched: results go there.
+    maps : bool
+        Disparity maps are looked for: what are the two views of pairs is never taken for such.
     left_out : Counter of str
         How many files the folders hold that are not read, by their endings.
+    notes : list of str
+        Lines on what is named twice, and on what the folders hold beside what is read.
     """
 
-    def __init__(
-        self,
-        endings: Sequence[str],
-        recursive: bool = False,
-        include: Sequence[str] = (),
-        exclude: Sequence[str] = (),
-        skip: Sequence[str | Path] = (),
-        maps: bool = False,
-    ) -> None:
-        self.left_out: Counter[str] = Counter()
-        self._maps = maps
-        self._endings = tuple(endings)
-        self._recursive = recursive
-        self._include, self._exclude = tuple(include), tuple(exclude)
-        self._skip = {os.path.realpath(folder) for folder in skip if not is_url(str(folder))}
-        self._skipped_urls = [str(folder).rstrip("/") for folder in skip if is_url(str(folder))]
+    endings: tuple[str, ...] = MAP_ENDINGS
+    recursive: bool = False
+    include: Sequence[str] = ()
+    exclude: Sequence[str] = ()
+    skip: Sequence[str] = ()
+    maps: bool = False
+    left_out: Counter[str] = field(default_factory=Counter)
+    notes: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self._skip = {os.path.realpath(folder) for folder in self.skip if not is_url(folder)}
+        self._skipped_urls = [folder.rstrip("/") for folder in self.skip if is_url(folder)]
 
     def files(self, argument: str, *, literal: bool = False) -> Iterator[tuple[str, str]]:
         """Yield each file of `argument`, and its path below the folder or pattern.
@@ -168,31 +165,31 @@ class Search:
         self, argument: str, files: Iterator[tuple[str, str]], kind: str
     ) -> Iterator[tuple[str, str]]:
         """Yield the files that --include and --exclude allow; finding none is an error."""
-        none, views = True, _Views(argument) if self._maps and kind != "pattern" else None
+        none, views = True, _Views(argument) if self.maps and kind != "pattern" else None
         for path, relative in files:
             names = (relative, posixpath.basename(relative))
-            if (not self._include or _match(names, self._include)) and not _match(names, self._exclude):
+            if (not self.include or _match(names, self.include)) and not _match(names, self.exclude):
                 none = False
                 if views is not None:
                     views.refuse(relative)
                 yield path, relative
         if none:
             hint = "" if kind == "pattern" else self._in_place_of_inputs(argument)
-            raise UsageError(f"{argument}: no input found in this {kind} ({' '.join(self._endings)}){hint}")
+            raise UsageError(f"{argument}: no input found in this {kind} ({' '.join(self.endings)}){hint}")
 
     def _in_place_of_inputs(self, folder: str) -> str:
         """Say what a folder without inputs holds instead."""
         if is_url(folder):
-            return "" if self._recursive else "; --recursive searches its folders"
+            return "" if self.recursive else "; --recursive searches its folders"
         names = [entry.name for entry in _entries(folder) if not entry.name.startswith(".")]
-        endings = {Path(name).suffix.lower() for name in names[:_LOOKED_AT]} - {"", *self._endings}
+        endings = {Path(name).suffix.lower() for name in names[:_LOOKED_AT]} - {"", *self.endings}
         hint = f"; it holds {' '.join(sorted(endings)[:3])} files" if endings else ""
         inner = any(is_folder(Path(folder, name)) for name in names[:_LOOKED_AT])
         lower = {name.lower(): name for name in names}
         left, right = (next((lower[name] for name in sorted(side) if name in lower), "") for side in _SIDES)
         if left and right:
             return hint + f"; {_as_pairs(f'{folder}/{left}', f'{folder}/{right}')}"
-        return hint + ("; --recursive searches its folders" if inner and not self._recursive else "")
+        return hint + ("; --recursive searches its folders" if inner and not self.recursive else "")
 
     def _in_folder(self, folder: Path) -> Iterator[tuple[str, str]]:
         """Yield readable files, except hidden ones."""
@@ -218,12 +215,12 @@ class Search:
                     relative = path[cut:].replace(os.sep, "/")
                     if self._reads(entry.name):
                         yield path, relative
-                    elif self._recursive and is_archive(path):
+                    elif self.recursive and is_archive(path):
                         yield from ((each, f"{relative}/{below}") for each, below in self._in_archive(path))
                     else:
                         self.left_out[Path(entry.name).suffix.lower()] += 1
             opened = []
-            for each in sorted(inner) if self._recursive else ():
+            for each in sorted(inner) if self.recursive else ():
                 if (identity := _identity(each)) not in closed:
                     closed.add(identity)
                     opened.append(each)
@@ -259,7 +256,7 @@ class Search:
         pattern = not literal and is_object_url(url) and glob.has_magic(url)
         if not pattern and (literal or not is_folder_url(url)):
             return iter([(url, base_name(url))])
-        found = objects_behind(url, recursive=self._recursive)
+        found = objects_behind(url, recursive=self.recursive)
         readable = ((each, below) for each, below in found if self._reads(each) and not self._skips(each))
         return self._wanted(url, readable, "pattern" if pattern else "folder")
 
@@ -267,7 +264,7 @@ class Search:
         return any(url.startswith(f"{folder}/") for folder in self._skipped_urls)
 
     def _reads(self, name: str) -> bool:
-        return name.lower().endswith(self._endings)
+        return name.lower().endswith(self.endings)
 
 
 class _Views:
@@ -312,7 +309,7 @@ def _as_pairs(left: str, right: str) -> str:
     return f"it holds the left and right views of pairs: give {command}; or name its maps alone"
 
 
-def _match(names: tuple[str, str], patterns: tuple[str, ...]) -> bool:
+def _match(names: tuple[str, str], patterns: Sequence[str]) -> bool:
     return any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns for name in names)
 
 

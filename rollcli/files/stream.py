@@ -1,9 +1,12 @@
 """Write bytes to standard output, pipes and devices."""
 
+import contextlib
 import os
 import stat
 import sys
 import uuid
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 from rollcli.errors import OutputError, UsageError
@@ -11,7 +14,7 @@ from rollcli.files.atomic import output_error, remove_leftovers, writing
 from rollcli.files.storage import create, write_bytes
 
 STDOUT = "-"  # how the command line names it
-STDOUT_NAME = "standard output"
+_STDOUT_NAME = "standard output"
 
 
 def is_stream(name: str) -> bool:
@@ -46,14 +49,9 @@ def write_output(name: str, data: bytes, *, overwrite: bool) -> None:
     BrokenPipeError
         The reader has closed its end.
     """
-    if name == STDOUT:
-        write_stdout(data)
-    elif is_stream(name):
-        descriptor = open_stream(name)
-        try:
-            write_stream(descriptor, data, name)
-        finally:
-            os.close(descriptor)
+    if is_stream(name):
+        with open_stream(name) as write:
+            write(data)
     else:
         remove_leftovers([name])
         if overwrite:
@@ -62,37 +60,31 @@ def write_output(name: str, data: bytes, *, overwrite: bool) -> None:
             raise UsageError(f"{name}: exists already; give --overwrite to replace it")
 
 
-def open_stream(name: str) -> int:
-    """Open a device or pipe to write to.
+@contextlib.contextmanager
+def open_stream(name: str) -> Iterator[Callable[[bytes], None]]:
+    """Open standard output, a device or a pipe; yield what writes all of some bytes to it.
 
     Raises
     ------
     OutputError
-        It cannot be written.
+        It cannot be written, or standard output is closed.
+    BrokenPipeError
+        The reader has closed its end.
     """
+    if name == STDOUT:
+        if sys.stdout is None:  # Python's word for a closed one; its number may be another file's by now
+            raise OutputError(f"{_STDOUT_NAME}: is closed")
+        yield partial(write_stream, 1, name=_STDOUT_NAME)
+        return
     with writing(name):
-        return os.open(name, os.O_WRONLY)
+        descriptor = os.open(name, os.O_WRONLY)
+    try:
+        yield partial(write_stream, descriptor, name=name)
+    finally:
+        os.close(descriptor)
 
 
-def write_stdout(data: bytes) -> None:
-    """Write to standard output; see `write_stream`."""
-    write_stream(stdout_descriptor(), data, STDOUT_NAME)
-
-
-def stdout_descriptor() -> int:
-    """Find the descriptor of standard output.
-
-    Raises
-    ------
-    OutputError
-        It is closed.
-    """
-    if sys.stdout is None:  # Python's word for a closed one; its number may be another file's by now
-        raise OutputError(f"{STDOUT_NAME}: is closed")
-    return 1
-
-
-def write_stream(descriptor: int, data: bytes, name: str = STDOUT_NAME) -> None:
+def write_stream(descriptor: int, data: bytes, name: str) -> None:
     """Write all of the data; errors call the stream `name`.
 
     Raises

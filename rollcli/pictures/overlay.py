@@ -86,7 +86,7 @@ def draw_preview(disparity: NDArray[Any]) -> NDArray[np.uint8]:
         BGR.
     """
     picture = draw_disparity(disparity)
-    height, top = len(picture), _top(np.asarray(disparity))
+    height, top = len(picture), brightest(np.asarray(disparity))
     step = round_step(top * _LABEL_EVERY / height) if height > _LABEL_EVERY else top
     labels = (number * step for number in range(int(top / step * (1 + 1e-9)) + 1))
     ticks = [(label / top, f"{label:g}" if label else "0 px") for label in labels]
@@ -140,7 +140,7 @@ def _with_road(picture: NDArray[np.uint8], mask: NDArray[Any]) -> NDArray[np.uin
     return cv2.drawContours(picture, outlines, -1, _ROAD, 1).astype(np.uint8, copy=False)
 
 
-def _top(values: NDArray[Any]) -> float:
+def brightest(values: NDArray[Any]) -> float:
     """Return the disparity that gets the brightest colour, px: a few outliers must not darken the rest."""
     valid = np.isfinite(values) & (values > 0)
     return float(np.percentile(values[valid], 99)) if valid.any() else 1.0
@@ -149,7 +149,7 @@ def _top(values: NDArray[Any]) -> float:
 def _levels(disparity: NDArray[Any]) -> NDArray[np.uint8]:
     """Return 0 for no data, 1..255 for small to large disparities."""
     values = np.asarray(disparity)
-    top, levels = _top(values), np.empty(values.shape, np.uint8)
+    top, levels = brightest(values), np.empty(values.shape, np.uint8)
     step = max(1, _BLOCK // max(1, values.shape[1]))  # a few rows at a time, for the memory of large maps
     for first in range(0, len(values), step):
         some = values[first : first + step]

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from rollcli.pictures.derotate import derotate
 from rollcli.pictures.figures import COLUMN, PRINT, drawing_style, figure_file
+from rollcli.pictures.overlay import brightest
 from rollcli.pictures.vdisparity import VDisparity, profile, row_offset, shown_counts, v_disparity
 
 _MAP_SHARE = 1.8  # the width of a map, of that of its v-disparity
 _MAP_WIDTH = 0.5 * COLUMN  # pt, about; the rest are v-disparity, numbers and names
 _AROUND = 92.0  # pt of the height that are names, numbers and the bar of colours
 _COLUMNS = 320  # of a v-disparity
-_BRIGHTEST = 99.0  # percentile of the disparities: a few outliers must not darken the rest
 _COLOURS, _ROAD = "inferno", "#00e5ff"  # the road in a colour that those of the counts do not have
 
 
@@ -80,12 +80,13 @@ def v_disparity_figure(
 
 def _draw_map(axes: Axes, disparity: NDArray[Any], title: str) -> Any:
     known = np.isfinite(disparity) & (disparity > 0)
-    top = float(np.percentile(disparity[known], _BRIGHTEST)) if known.any() else 1.0
     shown = np.ma.masked_where(~known, disparity)
     axes.set_title(title, loc="left")
     axes.set_ylabel("row v, px")
     axes.grid(visible=False)
-    return axes.imshow(shown, cmap=_COLOURS, vmin=0, vmax=top, interpolation="none", aspect="auto")
+    return axes.imshow(
+        shown, cmap=_COLOURS, vmin=0, vmax=brightest(disparity), interpolation="none", aspect="auto"
+    )
 
 
 def _draw_counts(

@@ -9,7 +9,7 @@ from pathlib import Path, PurePosixPath
 from rollcli.errors import UsageError
 from rollcli.files.atomic import is_file, is_folder
 from rollcli.files.containers import frame_name
-from rollcli.files.inputs import MAP_ENDINGS
+from rollcli.files.search import MAP_ENDINGS
 from rollcli.files.naming import listed
 from rollcli.files.results import Row
 from rollcli.files.search import objects_behind

@@ -39,7 +39,7 @@ def run_conversion(options: ConvertOptions) -> ExitStatus:
 
     Raises
     ------
-    UsageError, OutputError, ClusterError, WorkerError
+    UsageError, OutputError, WorkerError
         The run cannot start or cannot go on.
     """
     running = options.running

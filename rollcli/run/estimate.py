@@ -7,7 +7,7 @@ from functools import partial
 from itertools import islice
 from typing import Any, NamedTuple
 
-from rollcli.errors import ClusterError, ExitStatus, OutputError, WorkerError
+from rollcli.errors import ExitStatus, OutputError, WorkerError
 from rollcli.files.atomic import is_file
 from rollcli.files.containers import file_of
 from rollcli.files.stores.locations import is_url, tasks_in_hand
@@ -73,17 +73,17 @@ def run_estimate(options: EstimateOptions, resume_command: str = "") -> ExitStat
 
     Raises
     ------
-    UsageError, OutputError, ClusterError, WorkerError
+    UsageError, OutputError, WorkerError
         The run cannot start or cannot go on.
     """
     if options.running.dry_run:
-        _list(make_plan(options), options)
+        _list(make_plan(options))
         return ExitStatus.DONE
     with contextlib.ExitStack() as early:
         started: list[Any] = []
         if _is_batch(options):
             started = early.enter_context(started_early(options.running.jobs, load_estimator))
-        return _run(make_plan(options), options, resume_command, started)
+        return _run(make_plan(options), resume_command, started)
 
 
 def _is_batch(options: EstimateOptions) -> bool:
@@ -94,9 +94,10 @@ def _is_batch(options: EstimateOptions) -> bool:
     return running.scheduler is None and running.jobs != 1 and not one_by_one
 
 
-def _run(plan: Plan, options: EstimateOptions, resume_command: str, started: list[Any]) -> ExitStatus:
+def _run(plan: Plan, resume_command: str, started: list[Any]) -> ExitStatus:
+    options = plan.options
     require_scheduler(options.running.scheduler)
-    with open_output(plan, options) as output:
+    with open_output(plan) as output:
         kept = output.kept
         progress = Progress(len(plan.frames), options.running, options.encoding, summary=kept.summary)
         notes = [*plan.notes, *(calibration_notes(plan.frames) if options.calibration.given else [])]
@@ -104,10 +105,10 @@ def _run(plan: Plan, options: EstimateOptions, resume_command: str, started: lis
             progress.note(note)
         try:
             with stop_on_signals() as stop, progress:
-                _run_steps(_Run(plan, options, output, progress, stop, started))
+                _run_steps(_Run(plan, output, progress, stop, started))
         except KeyboardInterrupt:  # the second Ctrl-C: without waiting for the frames that have begun
             progress.stopped_early = True
-        except (OutputError, ClusterError, WorkerError) as error:
+        except (OutputError, WorkerError) as error:
             raise type(error)(f"{error}{output.hint()}") from error
         status = _end(output, progress, stop, resume_command)
         if not (progress.stopped_early or options.running.quiet):
@@ -122,7 +123,6 @@ class _Run(NamedTuple):
     """What every part of a run works with; `started` are workers that wait for it."""
 
     plan: Plan
-    options: EstimateOptions
     output: Output
     progress: Progress
     stop: Stop
@@ -168,7 +168,7 @@ def _run_steps(run: _Run) -> None:
                     output.append(frames, batch)
                 left = positions if positions[0] < output.kept.count else None  # places left to these rows
                 progress.add_rows([frame.file for frame in frames], batch.figures, batch.told, left)
-                if run.options.result.fail_fast and batch.figures.first_error >= 0:
+                if run.plan.options.result.fail_fast and batch.figures.first_error >= 0:
                     return
         progress.stopped_early = done < len(step.frames)
         if progress.stopped_early:
@@ -178,7 +178,7 @@ def _run_steps(run: _Run) -> None:
 @contextlib.contextmanager
 def _results(step: Step, run: _Run) -> Iterator[Iterator[Batch]]:
     """Open the results of a step from whichever workers were asked for; the output is complete afterwards."""
-    options, output, frames, parts = run.options, run.output, step.frames, step.parts
+    options, output, frames, parts = run.plan.options, run.output, step.frames, step.parts
     told = options.frame._replace(replaces=output.replaces, retry_of=step.retry_of, notes=output.notes)
     rows = BatchOptions(
         line_form(options.result.form),
@@ -230,9 +230,9 @@ def _end(output: Output, progress: Progress, stop: Stop, resume_command: str) ->
     return progress.summary.status
 
 
-def _list(plan: Plan, options: EstimateOptions) -> None:
+def _list(plan: Plan) -> None:
     """Print what would be read and written, a line each."""
-    frames = frames_to_do(plan, options)
-    list_files([(calibration_files(options.calibration), ())])
-    list_files((frame.reads(), (path for _, path in image_paths(frame, options.images))) for frame in frames)
+    frames, images = frames_to_do(plan), plan.options.images
+    list_files([(calibration_files(plan.options.calibration), ())])
+    list_files((frame.reads(), (path for _, path in image_paths(frame, images))) for frame in frames)
     list_files([((), plan.files)])

@@ -5,14 +5,14 @@ import os
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path, PurePath
-from typing import TYPE_CHECKING, NamedTuple, TypedDict, overload
+from typing import TYPE_CHECKING, NamedTuple, overload
 
 from rollcli.errors import UsageError
 from rollcli.extras import require_extra
 from rollcli.files.atomic import is_file
 from rollcli.files.containers import BAGS, VIDEOS, bag_files, file_of, frame_name, is_video
-from rollcli.files.inputs import IMAGE_ENDINGS, Input, Manifest, Pair, find_inputs, named_input, pair_inputs
-from rollcli.files.search import is_place
+from rollcli.files.inputs import Input, Manifest, Pair, find_inputs, named_input, pair_inputs
+from rollcli.files.search import IMAGE_ENDINGS, MAP_ENDINGS, Search, is_place
 from rollcli.files.stores.locations import is_url, names_a_file, public_name
 from rollcli.messages import say
 from rollcli.rig.calibration import CalibrationOptions
@@ -67,8 +67,8 @@ def map_frames(named: Named) -> Sequence[Frame]:
         return _bag_frames(found_maps, make)[:: given.every]
     if given.topic is not None:
         raise UsageError("--topic is of a bag (.bag, .db3, .mcap or a rosbag2 folder), and none is given")
-    with _searched(named) as searched:
-        found = find_inputs(given.inputs, files_from=given.files_from, maps=True, **searched)
+    with _search(named, MAP_ENDINGS, maps=True) as search:
+        found = find_inputs(given.inputs, search, files_from=given.files_from)
     if video := next((each.name for each in found if is_video(each.location)), None):
         raise UsageError(
             f"{video}: is a video, of views and not of maps: give --side-by-side (estimate, disparity) "
@@ -77,24 +77,13 @@ def map_frames(named: Named) -> Sequence[Frame]:
     return [make.frame(each) for each in found[:: given.every]]
 
 
-class _Searched(TypedDict):
-    """How places are searched, as `find_inputs` and `pair_inputs` take it."""
-
-    recursive: bool
-    include: Sequence[str]
-    exclude: Sequence[str]
-    skip: Sequence[str]
-    notes: list[str]
-
-
 @contextlib.contextmanager
-def _searched(named: Named) -> Iterator[_Searched]:
+def _search(named: Named, endings: tuple[str, ...], *, maps: bool = False) -> Iterator[Search]:
     """Say, once the search is over, what it has noted."""
-    given, notes = named.inputs, list[str]()
-    yield _Searched(
-        recursive=given.recursive, include=given.include, exclude=given.exclude, skip=named.skip, notes=notes
-    )
-    _say(notes, quiet=named.quiet)
+    given = named.inputs
+    search = Search(endings, given.recursive, given.include, given.exclude, named.skip, maps)
+    yield search
+    _say(search.notes, quiet=named.quiet)
 
 
 def _say(notes: Iterable[str], *, quiet: bool) -> None:
@@ -164,15 +153,15 @@ def pair_frames(named: Named) -> list[Frame]:
     make = _FrameMaker(named)
     if any(views):
         return _bag_pairs(named, make)[:: given.every]
-    with _searched(named) as searched:
+    videos = VIDEOS if pairs.side_by_side is not None else ()
+    with _search(named, (*IMAGE_ENDINGS, *videos)) as search:
         if pairs.side_by_side is not None:
-            endings = (*IMAGE_ENDINGS, *VIDEOS)
-            found = find_inputs(given.inputs, files_from=given.files_from, endings=endings, **searched)
+            found = find_inputs(given.inputs, search, files_from=given.files_from)
             both = [views for each in found for views in _halved(each, pairs.side_by_side)]
         elif pairs.left is None or pairs.right is None:
             raise UsageError("--left and --right are given together")
         else:
-            matched = pair_inputs(pairs.left, pairs.right, match=pairs.match, **searched)
+            matched = pair_inputs(pairs.left, pairs.right, search, match=pairs.match)
             both = [views for pair in matched for views in _paired(pair)]
     return [make.frame(left, right) for left, right in both[:: given.every]]
 
@@ -267,7 +256,7 @@ class _FrameMaker:
         self._mask = named.region.mask
         self._masks: dict[str, str] | None = None
         if self._mask is not None and is_place(self._mask):
-            found = find_inputs([self._mask], recursive=True)
+            found = find_inputs([self._mask], Search(recursive=True))
             self._masks = {Path(frame_name(each.name)).stem: each.location for each in found}
         elif self._mask is not None and not (is_url(self._mask) or is_file(self._mask)):
             raise UsageError(f"{self._mask}: no such mask file or folder")

@@ -13,7 +13,7 @@ from rollcli.errors import EstimationError, InputError
 from rollcli.estimator.estimate import RollEstimate, estimate_roll
 from rollcli.files.codecs.png import encode_png
 from rollcli.files.codecs.tiff import encode_tiff
-from rollcli.files.encodings import KITTI_TOP, Encoding, from_disparity
+from rollcli.files.encodings import KITTI_TOP, Encoding, to_kitti
 from rollcli.files.formats import Stored, encode_stored
 from rollcli.files.results import Row
 from rollcli.pictures.derotate import derotate, rotation_matrix
@@ -100,7 +100,7 @@ def encode_computed(path: str, disparity: NDArray[Any], save_as: str, text: str 
     A map that reaches further than such a PNG holds becomes a TIFF of the same stem. Both carry `text`.
     """
     if save_as == "png" and np.max(disparity, initial=0) <= KITTI_TOP:
-        return path, encode_stored(from_disparity(disparity, "kitti", np.uint16), "png", text=text)
+        return path, encode_stored(to_kitti(disparity), "png", text=text)
     form = "tiff" if save_as == "png" else save_as
     data = encode_stored(disparity.astype(np.float32, copy=False), form, text=text)
     return (roomy_path(path) if save_as == "png" else path), data

@@ -20,7 +20,6 @@ from rollcli.files.stores.locations import base_name, is_url, located, public_na
 from rollcli.run.batch import Batch, Parts, Step, line_form, part_location
 from rollcli.run.frame import Frame, ReadAs
 from rollcli.run.inputs import Inputs, inputs_path, is_part_inputs, part_inputs_path, split_lines
-from rollcli.run.options import EstimateOptions
 from rollcli.run.outputs import local_images, remove_image_leftovers, remove_marks
 from rollcli.run.plan import Plan
 from rollcli.run.record import RunRecord
@@ -40,14 +39,13 @@ class PartsOutput:
 
     def __init__(self, record: RunRecord, kept: KeptRows, keep_open: int | None) -> None:
         self.kept, self.keep_open, self.replaces = kept, keep_open, record.replaces
-        self._record, self._plan, self._options = record, record.plan, record.options
-        self._part_rows = record.options.result.part_rows
+        self._record, self._plan = record, record.plan
+        self._part_rows = record.plan.options.result.part_rows
         self._parts = _parts(record)
         self._numbers: Iterator[int] = iter(())  # of the parts to come
         # rows and the lines of their inputs, by their positions in the result
         self._replaced_part, self._replacing = 0, dict[int, tuple[bytes, bytes]]()
         self._waiting: list[tuple[bytes, bytes]] = []
-        self._image_options = record.options.images
         self._images: list[str] = []  # those of the part that is being filled
         self._checked = time.monotonic()
         self._written = kept.count - sum(map(len, kept.holes))
@@ -82,7 +80,7 @@ class PartsOutput:
         self._written += batch.in_parts
         self._waiting += zip(batch.lines, batch.notes, strict=True)
         self._images += local_images(
-            frames[batch.in_parts :], batch.figures.status[batch.in_parts :], self._image_options
+            frames[batch.in_parts :], batch.figures.status[batch.in_parts :], self._plan.options.images
         )
         while len(self._waiting) >= self._part_rows:
             self._write()
@@ -92,7 +90,7 @@ class PartsOutput:
         if self._waiting:
             self._write()
         self._record.write(summary)
-        _remove_leftovers(self._plan, self._options)  # of workers that have died
+        _remove_leftovers(self._plan)  # of workers that have died
 
     def restore(self, frames: Sequence[Frame], batch: Batch) -> None:
         """Take the images of incomplete frames, which were made again.
@@ -103,7 +101,7 @@ class PartsOutput:
             They could not be made: a row no longer holds.
         """
         check_restored(batch)
-        self._images += local_images(frames, batch.figures.status, self._image_options)
+        self._images += local_images(frames, batch.figures.status, self._plan.options.images)
 
     def replace(self, positions: Sequence[int], frames: Sequence[Frame], batch: Batch) -> None:
         """Take rows; a part is written anew once its last such row is known."""
@@ -114,7 +112,7 @@ class PartsOutput:
             self._replaced_part = position // self._part_rows
             self._replacing[position] = batch.lines[at], batch.notes[at]
             status = batch.figures.status[at : at + 1]
-            self._images += local_images(frames[at : at + 1], status, self._image_options)
+            self._images += local_images(frames[at : at + 1], status, self._plan.options.images)
 
     def commit(self) -> None:
         """Write the part anew whose rows are replaced, if they differ; a new part waits until it is full."""
@@ -136,7 +134,7 @@ class PartsOutput:
         if lines != tuple(old):
             self._check_owned()
             write_bytes(_location(self._plan, number), self._parts.encoded(number, lines), durable=True)
-        remove_marks([self._plan.frames[position] for position in self._replacing], self._image_options)
+        remove_marks([self._plan.frames[position] for position in self._replacing], self._plan.options.images)
         self._replacing.clear()
 
     def hint(self) -> str:
@@ -158,7 +156,7 @@ class PartsOutput:
 
 
 @contextlib.contextmanager
-def open_parts(plan: Plan, options: EstimateOptions) -> Iterator[PartsOutput]:
+def open_parts(plan: Plan) -> Iterator[PartsOutput]:
     """Begin a folder of parts, or continue that of an interrupted run.
 
     Raises
@@ -170,29 +168,30 @@ def open_parts(plan: Plan, options: EstimateOptions) -> Iterator[PartsOutput]:
     """
     if plan.format == "parquet":
         require_parquet()
-    check_parts(plan, resume=options.result.resume, overwrite=options.running.overwrite)
+    check_parts(plan)
     if is_url(plan.output):
-        yield _begin(plan, options, None)
+        yield _begin(plan, None)
     else:
         with locked_folder(plan.output) as descriptor:
-            yield _begin(plan, options, descriptor)
+            yield _begin(plan, descriptor)
 
 
 def _parts(record: RunRecord) -> Parts:
-    plan, options = record.plan, record.options
+    plan, options = record.plan, record.plan.options
     output, rows = located(options.running.root, plan.output), options.result.part_rows
     return Parts(output, plan.format, plan.further, rows, (), 0, record.run, record.of_rows)
 
 
-def _begin(plan: Plan, options: EstimateOptions, keep_open: int | None) -> PartsOutput:
+def _begin(plan: Plan, keep_open: int | None) -> PartsOutput:
+    options = plan.options
     # again, now that no other run can write it
-    parts = check_parts(plan, resume=options.result.resume, overwrite=options.running.overwrite)
-    kept, renewed = _kept(plan, options, parts)
-    record = new_record(plan, options, kept)
-    _remove_leftovers(plan, options, parts)
+    parts = check_parts(plan)
+    kept, renewed = _kept(plan, parts)
+    record = new_record(plan, kept)
+    _remove_leftovers(plan, parts)
     if options.result.resume or options.running.overwrite:
         remove_image_leftovers(kept.not_failed(), options.images)
-    stay = {path for paths in _kept_paths(plan, options, kept) for path in paths}
+    stay = {path for paths in _kept_paths(plan, kept) for path in paths}
     inputs = [f"{inputs_path(plan.output)}/{name}" for name in list_names(inputs_path(plan.output))]
     # in this order, no part is ever without its inputs
     for path in (*(f"{plan.output}/{name}" for name in parts), *filter(is_part_inputs, inputs)):
@@ -205,15 +204,15 @@ def _begin(plan: Plan, options: EstimateOptions, keep_open: int | None) -> Parts
     return PartsOutput(record, kept, keep_open)
 
 
-def _remove_leftovers(plan: Plan, options: EstimateOptions, parts: Sequence[str] = ()) -> None:
+def _remove_leftovers(plan: Plan, parts: Sequence[str] = ()) -> None:
     """Remove what killed processes left beside the parts of this run, and these of an earlier one."""
     if not is_url(plan.output):
-        every = range(_whole_parts(len(plan.frames), options.result.part_rows))
+        every = range(_whole_parts(len(plan.frames), plan.options.result.part_rows))
         to_write = [path for number in every for path in _part_paths(plan, number)]
         remove_leftovers([run_path(plan.output), *to_write, *(f"{plan.output}/{name}" for name in parts)])
 
 
-def check_parts(plan: Plan, *, resume: bool, overwrite: bool) -> list[str]:
+def check_parts(plan: Plan) -> list[str]:
     """Return the names of the parts that exist, in order; refuse to touch them unless told how.
 
     Raises
@@ -224,6 +223,7 @@ def check_parts(plan: Plan, *, resume: bool, overwrite: bool) -> list[str]:
     for path in () if is_url(plan.output) else (plan.output, inputs_path(plan.output)):
         if is_there(path) and not is_folder(path):
             raise UsageError(f"{path}: is a file; a result of parts is a folder, give another --output")
+    resume, overwrite = plan.options.result.resume, plan.options.running.overwrite
     parts = part_names(list_names(plan.output))
     if parts and not (resume or overwrite):
         raise UsageError(
@@ -235,22 +235,22 @@ def check_parts(plan: Plan, *, resume: bool, overwrite: bool) -> list[str]:
     return parts
 
 
-def kept_in_parts(plan: Plan, options: EstimateOptions) -> KeptRows:
+def kept_in_parts(plan: Plan) -> KeptRows:
     """Take in the rows that a resume would keep."""
-    parts = check_parts(plan, resume=options.result.resume, overwrite=options.running.overwrite)
-    return _kept(plan, options, parts)[0]
+    parts = check_parts(plan)
+    return _kept(plan, parts)[0]
 
 
-def _kept(plan: Plan, options: EstimateOptions, parts: list[str]) -> tuple[KeptRows, dict[str, bytes]]:
+def _kept(plan: Plan, parts: list[str]) -> tuple[KeptRows, dict[str, bytes]]:
     """Take in the rows of the parts that are not short, wherever others are missing.
 
     A part is short that was the last one of fewer frames. Files of inputs come back with their lines where
     states differ and contents do not.
     """
-    kept, renewed = KeptRows(plan, options), dict[str, bytes]()
-    if not options.result.resume:
+    kept, renewed = KeptRows(plan), dict[str, bytes]()
+    if not plan.options.result.resume:
         return kept, renewed
-    rows, numbered = options.result.part_rows, dict(_numbered(plan, parts))
+    rows, numbered = plan.options.result.part_rows, dict(_numbered(plan, parts))
     header = b"" if 0 in numbered.values() else format_header(plan.format, plan.further)
     try:
         for name, data in read_parts(plan.output, numbered, header):
@@ -278,9 +278,9 @@ def _numbered(plan: Plan, names: Iterable[str]) -> Iterator[tuple[str, int]]:
             yield name, number
 
 
-def _kept_paths(plan: Plan, options: EstimateOptions, kept: KeptRows) -> Iterator[tuple[str, str]]:
+def _kept_paths(plan: Plan, kept: KeptRows) -> Iterator[tuple[str, str]]:
     """Yield where the parts lie whose rows are kept, and their inputs."""
-    for number, first in enumerate(range(0, kept.count, options.result.part_rows)):
+    for number, first in enumerate(range(0, kept.count, plan.options.result.part_rows)):
         if not any(first in hole for hole in kept.holes):
             yield _part_paths(plan, number)
 

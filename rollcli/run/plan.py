@@ -24,13 +24,22 @@ from rollcli.run.reads_and_writes import (
 
 @dataclass(frozen=True)
 class Plan:
-    """The frames of a run, in the order of their rows; where the rows go, and how; what to say before."""
+    """What a run is asked, its frames in the order of their rows, further columns, and what to say before."""
 
+    options: EstimateOptions
     frames: Sequence[Frame]
-    output: str
-    format: Format
     further: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+
+    @property
+    def output(self) -> str:
+        """Where the rows go."""
+        return self.options.result.output
+
+    @property
+    def format(self) -> Format:
+        """How the rows are written."""
+        return self.options.result.form
 
     @property
     def in_parts(self) -> bool:
@@ -59,7 +68,7 @@ def make_plan(options: EstimateOptions) -> Plan:
     frames = _find_frames(options)
     if not options.paired:
         check_depth(frames, options.encoding)
-    plan = Plan(frames, options.result.output, options.result.form)
+    plan = Plan(options, frames)
     if options.result.update and plan.in_parts:
         raise UsageError(
             f"{plan.output}: rows of a result in parts (Parquet, or below a URL) keep their places: "

@@ -14,7 +14,7 @@ from rollcli.files.atomic import is_folder
 from rollcli.files.containers import file_of, shown
 from rollcli.files.stores.locations import is_object_url, is_url, public_name, split_url
 from rollcli.files.stores.objects import list_objects
-from rollcli.files.stream import write_stdout
+from rollcli.files.stream import STDOUT, open_stream
 from rollcli.run.frame import Frame
 
 _LISTED_AT_ONCE = 10_000
@@ -162,8 +162,9 @@ def list_files(frames: Iterable[tuple[Iterable[str], Iterable[str]]]) -> None:
         for does, paths in (("read ", reads), ("write", writes))
         for path in paths
     )
-    while some := "".join(islice(lines, _LISTED_AT_ONCE)):
-        write_stdout(some.encode("utf-8", "surrogateescape"))
+    with open_stream(STDOUT) as write:
+        while some := "".join(islice(lines, _LISTED_AT_ONCE)):
+            write(some.encode("utf-8", "surrogateescape"))
 
 
 def _place(path: str) -> str:

@@ -18,7 +18,6 @@ from rollcli.run.batch import check_owned
 from rollcli.run.frame import Frame, ReadAs
 from rollcli.run.options import (
     EncodingOptions,
-    EstimateOptions,
     FrameOptions,
     ImageOptions,
     Layout,
@@ -61,8 +60,8 @@ Options = TypeVar("Options", EncodingOptions, ImageOptions, MethodOptions, Regio
 class RunRecord:
     """The record of one run; the same run gives the same bytes, whether it was interrupted or not."""
 
-    def __init__(self, plan: Plan, options: EstimateOptions) -> None:
-        self.plan, self.options = plan, options
+    def __init__(self, plan: Plan) -> None:
+        self.plan, options = plan, plan.options
         self.read_as = ReadAs()
         self.run = uuid.uuid4().hex  # tells our objects from those of another run
         self._begun = False
@@ -70,7 +69,7 @@ class RunRecord:
         self.replaces = options.running.overwrite or options.result.update
         self.fixed = {
             "rollcli": __version__,
-            "options": _effective(plan, options),
+            "options": _effective(plan),
             "inputs": names_of(plan.frames),
         }
         if options.calibration.given:
@@ -123,8 +122,9 @@ class RunRecord:
         self._begun = True
 
 
-def _effective(plan: Plan, options: EstimateOptions) -> dict[str, Any]:
+def _effective(plan: Plan) -> dict[str, Any]:
     """Collect the options that decide the bytes of rows and images, by their names on the command line."""
+    options = plan.options
     read = _by_name(options.stereo) if options.paired else _by_name(options.encoding)
     layout = options.pairs.side_by_side
     values = {**_by_name(options.method), **_by_name(options.region), **_by_name(options.images), **read}

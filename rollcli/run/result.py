@@ -3,7 +3,7 @@
 import contextlib
 import io
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import chain, islice
 
 from rollcli.errors import InputError, UsageError
@@ -11,11 +11,10 @@ from rollcli.files.atomic import is_there, remove_leftovers
 from rollcli.files.locking import not_resumable
 from rollcli.files.results import format_header, parse_rows, run_path
 from rollcli.files.stores.locations import base_name
-from rollcli.files.stream import STDOUT, STDOUT_NAME, is_stream, open_stream, stdout_descriptor, write_stream
+from rollcli.files.stream import STDOUT, is_stream, open_stream
 from rollcli.run.batch import Batch, Step
 from rollcli.run.frame import Frame, ReadAs
 from rollcli.run.inputs import Inputs, inputs_path, is_inputs
-from rollcli.run.options import EstimateOptions
 from rollcli.run.outputs import local_images, remove_image_leftovers, remove_marks
 from rollcli.run.parts import PartsOutput, kept_in_parts, open_parts
 from rollcli.run.plan import Plan
@@ -40,10 +39,10 @@ class StreamOutput:
     resumable = notes = False
     read_as = ReadAs()
 
-    def __init__(self, descriptor: int, name: str, plan: Plan, options: EstimateOptions) -> None:
-        self.kept = KeptRows(plan, options)
-        self.replaces = options.running.overwrite
-        self._descriptor, self._name, self._plan = descriptor, name, plan
+    def __init__(self, write: Callable[[bytes], None], plan: Plan) -> None:
+        self.kept = KeptRows(plan)
+        self.replaces = plan.options.running.overwrite
+        self._write, self._plan = write, plan
         self._write(format_header(plan.format, plan.further))
 
     def passes(self) -> Iterator[Step]:
@@ -70,9 +69,6 @@ class StreamOutput:
         """Return nothing: a stream cannot be resumed."""
         return ""
 
-    def _write(self, data: bytes) -> None:
-        write_stream(self._descriptor, data, self._name)
-
 
 class FileOutput:
     """Rows to a locked file, FILE.inputs and FILE.run.json beside it; images are durable before their row.
@@ -96,7 +92,7 @@ class FileOutput:
     def __init__(self, file: ResultFile, inputs: ResultFile, record: RunRecord, kept: KeptRows) -> None:
         self.kept, self.keep_open, self.replaces = kept, file.descriptor, record.replaces
         self._file, self._record, self._plan = file, record, record.plan
-        self._images, self._updates = record.options.images, record.options.result.update
+        self._images = record.plan.options.images
         self._inputs, self._rows = inputs, DurableRows(file, inputs)
         self._replacing: dict[int, tuple[bytes, bytes]] = {}  # rows, and the lines of their inputs
 
@@ -138,7 +134,7 @@ class FileOutput:
             lines = {at: line for at, (_, line) in self._replacing.items()}
             # a run that is killed in between leaves rows that the same command makes again: where it updates,
             # those whose lines tell of other contents, and else those that still are errors
-            if self._updates:
+            if self._plan.options.result.update:
                 self._file.replace(rows, self._plan.format)
                 self._inputs.replace(lines, "jsonl")
             else:
@@ -166,7 +162,7 @@ Output = StreamOutput | FileOutput | PartsOutput
 
 
 @contextlib.contextmanager
-def open_output(plan: Plan, options: EstimateOptions) -> Iterator[Output]:
+def open_output(plan: Plan) -> Iterator[Output]:
     """Begin a result, or continue that of an interrupted run.
 
     Raises
@@ -178,26 +174,21 @@ def open_output(plan: Plan, options: EstimateOptions) -> Iterator[Output]:
         It cannot be written.
     """
     if plan.in_parts and plan.output != STDOUT:
-        with open_parts(plan, options) as parts:
+        with open_parts(plan) as parts:
             yield parts
         return
-    _check_permitted(plan.output, options)
-    if plan.output == STDOUT:
-        yield StreamOutput(stdout_descriptor(), STDOUT_NAME, plan, options)
-    elif is_stream(plan.output):
-        descriptor = open_stream(plan.output)
-        try:
-            yield StreamOutput(descriptor, plan.output, plan, options)
-        finally:
-            os.close(descriptor)
+    _check_permitted(plan)
+    if is_stream(plan.output):
+        with open_stream(plan.output) as write:
+            yield StreamOutput(write, plan)
     else:
         with open_result(plan.output) as file:
-            _check_permitted(plan.output, options)  # again, now that no other run can write it
+            _check_permitted(plan)  # again, now that no other run can write it
             with open_result(inputs_path(plan.output)) as inputs:
-                yield _begin(file, inputs, plan, options)
+                yield _begin(file, inputs, plan)
 
 
-def frames_to_do(plan: Plan, options: EstimateOptions) -> Iterator[Frame]:
+def frames_to_do(plan: Plan) -> Iterator[Frame]:
     """Yield the frames that a run would work on, without opening the result for writing.
 
     Raises
@@ -206,37 +197,38 @@ def frames_to_do(plan: Plan, options: EstimateOptions) -> Iterator[Frame]:
         As `open_output`.
     """
     if plan.in_parts:
-        kept = kept_in_parts(plan, options)
+        kept = kept_in_parts(plan)
     else:
-        _check_permitted(plan.output, options)
-        kept = _parsed(data_of(plan.output) if options.result.resume else b"", plan, options)[1]
+        _check_permitted(plan)
+        kept = _parsed(data_of(plan.output) if plan.options.result.resume else b"", plan)[1]
     again = (plan.frames[position] for position in kept.again)
     holes = (frame for hole in kept.holes for frame in plan.frames[hole.start : hole.stop])
     return chain(kept.incomplete, again, holes, plan.frames[kept.count :])
 
 
-def _parsed(data: bytes, plan: Plan, options: EstimateOptions) -> tuple[bytes, KeptRows]:
+def _parsed(data: bytes, plan: Plan) -> tuple[bytes, KeptRows]:
     """Take in the rows of a file as far as they count, in the order of the frames; return their bytes too."""
     data = kept_rows(data, plan.output, plan.format)
     if not data:
-        return b"", KeptRows(plan, options)
-    update, gone = options.result.update, 0
+        return b"", KeptRows(plan)
+    update, gone = plan.options.result.update, 0
     inputs = Inputs(data_of(inputs_path(plan.output)), updates=update)
     if update:
         data, gone = arranged(data, plan)
-    kept = KeptRows(plan, options, parse_rows(data, plan.output), inputs)
+    kept = KeptRows(plan, parse_rows(data, plan.output), inputs)
     kept.gone = gone
     lines = row_lines(io.BytesIO(data), plan.format)
     return b"".join(islice(lines, kept.count + (plan.format == "csv"))), kept
 
 
-def _begin(file: ResultFile, inputs: ResultFile, plan: Plan, options: EstimateOptions) -> FileOutput:
+def _begin(file: ResultFile, inputs: ResultFile, plan: Plan) -> FileOutput:
+    options = plan.options
     before = file.read() if options.result.resume else b""
     try:
-        data, kept = _parsed(before, plan, options)
+        data, kept = _parsed(before, plan)
     except InputError as error:
         raise not_resumable(plan.output, str(error)) from error
-    record = new_record(plan, options, kept)
+    record = new_record(plan, kept)
     if options.result.resume or options.running.overwrite:
         first = 0 if options.result.retry_failed else kept.count
         remove_image_leftovers(kept.not_failed(first), options.images)
@@ -256,10 +248,10 @@ def _begin(file: ResultFile, inputs: ResultFile, plan: Plan, options: EstimateOp
     return FileOutput(file, inputs, record, kept)
 
 
-def _check_permitted(name: str, options: EstimateOptions) -> None:
+def _check_permitted(plan: Plan) -> None:
     """Refuse to touch a result that exists, unless --resume or --overwrite is given."""
-    resume, overwrite = options.result.resume, options.running.overwrite
-    flag = "--update" if options.result.update else "--resume"
+    name, asked, overwrite = plan.output, plan.options.result, plan.options.running.overwrite
+    resume, flag = asked.resume, "--update" if asked.update else "--resume"
     if resume and overwrite:
         raise UsageError(f"give either {flag} or --overwrite")
     if is_stream(name):

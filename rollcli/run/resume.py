@@ -13,7 +13,6 @@ from rollcli.files.stores.locations import base_name
 from rollcli.run.batch import Batch
 from rollcli.run.frame import Frame
 from rollcli.run.inputs import Inputs
-from rollcli.run.options import EstimateOptions
 from rollcli.run.outputs import possible_paths
 from rollcli.run.plan import Plan, images_of
 from rollcli.run.reads_and_writes import Existing, check_nothing_is_there
@@ -55,9 +54,7 @@ class KeptRows:
     mismatch : Mismatch or None
     """
 
-    def __init__(
-        self, plan: Plan, options: EstimateOptions, rows: Iterable[Row] = (), inputs: Inputs | None = None
-    ) -> None:
+    def __init__(self, plan: Plan, rows: Iterable[Row] = (), inputs: Inputs | None = None) -> None:
         self.count, self.changed, self.first_changed, self.gone = 0, 0, "", 0
         self.holes: list[range] = []
         self.errors: list[int] = []
@@ -65,9 +62,9 @@ class KeptRows:
         self.incomplete: list[Frame] = []
         self.summary = RunSummary()
         self.mismatch: Mismatch | None = None
-        self._frames, self._images = plan.frames, options.images
+        self._frames, self._images = plan.frames, plan.options.images
         self._following, self._at = iter(plan.frames), 0
-        self._retries = options.result.retry_failed
+        self._retries = plan.options.result.retry_failed
         self._made = Existing(filled=True)
         self.inputs = inputs
         for row in rows:
@@ -205,7 +202,7 @@ def check_restored(batch: Batch) -> None:
             raise OutputError(f"the images of {row.file} cannot be made again: {row.message}")
 
 
-def new_record(plan: Plan, options: EstimateOptions, kept: KeptRows) -> RunRecord:
+def new_record(plan: Plan, kept: KeptRows) -> RunRecord:
     """Make the record of a run, which continues that of an interrupted run where rows are kept.
 
     Raises
@@ -213,10 +210,10 @@ def new_record(plan: Plan, options: EstimateOptions, kept: KeptRows) -> RunRecor
     UsageError
         It cannot be continued; says what differs. Or it is a first start, and there are images already.
     """
-    record = RunRecord(plan, options)
+    record = RunRecord(plan)
     if not kept.count:
-        if options.result.resume:
-            _start_or_continue(record, plan, options, kept)
+        if plan.options.result.resume:
+            _start_or_continue(record, plan, kept)
         return record
     try:
         earlier = read_run(plan.output)
@@ -226,11 +223,11 @@ def new_record(plan: Plan, options: EstimateOptions, kept: KeptRows) -> RunRecor
         raise not_resumable(plan.output, f"there is no {base_name(run_path(plan.output))}")
     if not _is_whole(earlier):
         raise not_resumable(plan.output, f"{base_name(run_path(plan.output))} is damaged")
-    if options.result.update:
+    if plan.options.result.update:
         found = differences(earlier, record.fixed)
     else:
         begun = begun_plan(plan, earlier)
-        same = record if begun is plan else RunRecord(begun, options)
+        same = record if begun is plan else RunRecord(begun)
         found = _differences(kept, earlier, same.fixed, begun, len(plan.frames) - len(begun.frames))
     for difference in found:
         raise not_resumable(plan.output, difference)
@@ -247,7 +244,7 @@ def begun_plan(plan: Plan, run: Mapping[str, Any] | None) -> Plan:
     return replace(plan, frames=plan.frames[:count])
 
 
-def _start_or_continue(record: RunRecord, plan: Plan, options: EstimateOptions, kept: KeptRows) -> None:
+def _start_or_continue(record: RunRecord, plan: Plan, kept: KeptRows) -> None:
     """Find out what a resume without rows is: a first start, or the same run, which had got no further.
 
     Raises
@@ -262,7 +259,7 @@ def _start_or_continue(record: RunRecord, plan: Plan, options: EstimateOptions, 
     if run is not None and _is_whole(run) and not any(_differences(kept, run, record.fixed, plan, 0)):
         record.continue_from(run)
     else:
-        check_nothing_is_there(images_of(plan.frames, options))
+        check_nothing_is_there(images_of(plan.frames, plan.options))
 
 
 def _differences(

@@ -20,7 +20,7 @@ from rollcli import __version__
 from rollcli.errors import ExitStatus, InputError, OutputError, UsageError
 from rollcli.files.atomic import is_there, remove_leftovers, write_atomic, writing
 from rollcli.files.codecs.tiff import encode_tiff
-from rollcli.files.encodings import KITTI_TOP, from_disparity
+from rollcli.files.encodings import KITTI_TOP, to_kitti
 from rollcli.files.formats import encode_stored
 from rollcli.files.locking import differences, not_resumable
 from rollcli.files.results import csv_table, read_run, run_path
@@ -218,9 +218,7 @@ def _write_frame(task: RenderTask) -> str:
     frame, files = render_frame(task.spec), task.files
     write_atomic(files["left"], _png(frame.left))
     write_atomic(files["right"], _png(frame.right))
-    near = frame.disparity > KITTI_TOP
-    stored = from_disparity(np.where(near, 0, frame.disparity), "kitti", np.uint16)
-    write_atomic(files["disparity"], encode_stored(stored, "png"))
+    write_atomic(files["disparity"], encode_stored(to_kitti(frame.disparity), "png"))
     if frame.heights is not None:
         heights = encode_tiff(frame.heights, description="height over the road, metres")
         write_atomic(files[_HEIGHTS], heights)

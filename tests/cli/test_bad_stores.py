@@ -140,11 +140,3 @@ def test_a_signed_address_works_and_is_shown_nowhere(web, tmp_path):
     assert SECRET not in "".join([*said, *written])
     assert f"read  {web}/broken.png\n" in listed.out
     assert json.loads((tmp_path / "rolls.csv.run.json").read_bytes())["options"]["mask"] == f"{web}/mask.png"
-
-
-def test_a_signature_that_has_expired_is_said_before_any_work(web, tmp_path):
-    refusal = rollcli("estimate", f"{web}/expired.png{SIGNED}", "-o", "rolls.csv", cwd=tmp_path).refused()
-    assert "the server answered 403" in refusal
-    assert "may have expired" in refusal
-    assert SECRET not in refusal
-    assert not (tmp_path / "rolls.csv").exists()

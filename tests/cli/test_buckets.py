@@ -5,6 +5,7 @@ import pytest
 from rollcli.files.storage import list_names, read_bytes, remove
 from tests.object_store import joined, upload
 from tests.run_cli import contents, rollcli, write_maps
+from tests.store_proxy import Faults, proxied
 
 
 @pytest.fixture
@@ -51,21 +52,29 @@ def test_images_of_kept_rows_that_are_missing_are_made_again(bucket, tmp_path, p
     assert {name: read_bytes(f"{level}/{name}") for name in list_names(level)} == images
 
 
-def test_parquet_parts_are_one_typed_table(tmp_path):
-    parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow, of the extra parquet, is not here")
-    write_maps(tmp_path / "maps", 5)
-    (tmp_path / "maps" / "frame9.png").write_bytes(b"no map")
-    assert rollcli("estimate", "maps", "-o", "rolls.csv", cwd=tmp_path).status == 3
-    assert rollcli("estimate", "maps", "-o", "rolls.parquet", "--part-rows", "4", cwd=tmp_path).status == 3
-    assert sorted(contents(tmp_path / "rolls.parquet")) == ["part-00000.parquet", "part-00001.parquet"]
-    table = parquet.read_table(tmp_path / "rolls.parquet")
-    assert table.num_rows == 6
-    types = {name: str(table.schema.field(name).type) for name in ("file", "roll_deg", "iterations")}
-    assert types == {"file": "string", "roll_deg": "double", "iterations": "int64"}
-    assert table.column("roll_deg")[5].as_py() is None
-    assert b"rollcli" in table.schema.metadata
-    from rollcli.files.results import read_result
+MAPS = 80
 
-    assert read_result(tmp_path / "rolls.parquet").rows == read_result(tmp_path / "rolls.csv").rows
-    outs = [rollcli("rig", name, cwd=tmp_path).out for name in ("rolls.parquet", "rolls.csv")]
-    assert outs[0] == outs[1] != ""
+
+@pytest.fixture(scope="module")
+def local(tmp_path_factory):
+    """Maps on disk, with their rows and de-rotated images."""
+    folder = tmp_path_factory.mktemp("local")
+    write_maps(folder / "maps", MAPS, width=80, height=60)
+    assert rollcli("estimate", "maps", "-o", "rolls.csv", "--derotated", "level", cwd=folder).status == 0
+    return folder
+
+
+@pytest.mark.slow
+def test_requests_that_fail_change_no_byte_of_a_result(store, bucket, local):
+    upload(local / "maps", f"{bucket}/maps")
+    faults = Faults(0.05, seed=1)
+    line = ("estimate", f"{bucket}/maps", "-o", f"{bucket}/rolls.csv", "--derotated", f"{bucket}/level")
+    with proxied(store["AWS_ENDPOINT_URL"], faults) as address:
+        variables = {**store, "AWS_ENDPOINT_URL": address, "ROLLCLI_STORE_TIMEOUT": "1"}
+        done = rollcli(*line, "--part-rows", "20", "-j", "2", cwd=local, **variables)
+    assert done.status == 0, done.err
+    assert min(faults.counts[kind] for kind in ("500", "503", "cut", "never")) > 0, faults.counts
+    rows = (local / "rolls.csv").read_bytes().replace(b"maps/", f"{bucket}/maps/".encode())
+    assert joined(f"{bucket}/rolls.csv") == rows
+    for name, data in contents(local / "level").items():
+        assert read_bytes(f"{bucket}/level/{name}") == data

@@ -1,6 +1,5 @@
 """`rollcli estimate --calib`: pitch and height in the rows, and what is refused before anything runs."""
 
-import json
 import math
 
 import cv2
@@ -50,39 +49,6 @@ def test_every_method_fills_the_columns(maps, method, road):
     assert done.err.count("px of cy") == 1  # what holds for all frames is said once
 
 
-def test_a_folder_has_a_calibration_for_each_stem(maps):
-    (maps / "calib").mkdir()
-    (maps / "calib" / "000000.txt").write_text(samples.kitti_benchmark(RIG))
-    (maps / "calib" / "000001_10.json").write_text(samples.cityscapes(RIG))
-    done = rollcli("estimate", "maps", "--calib", "calib", "-o", "pose.csv", cwd=maps)
-    assert done.status == 0
-    assert_posed(rows_of((maps / "pose.csv").read_text()))
-    record = json.loads((maps / "pose.csv.run.json").read_text())["calibration"]
-    assert record["different"] == 2
-    assert [each["source"] for each in record["first"]] == ["calib/000000.txt", "calib/000001_10.json"]
-    (maps / "calib" / "000001_10.json").unlink()
-    refusal = rollcli("estimate", "maps", "--calib", "calib", cwd=maps).refused()
-    assert "maps/000001_10.png: has no calibration of its name" in refusal
-
-
-def test_two_calibrations_of_one_stem_and_a_large_one_are_refused(maps):
-    (maps / "calib").mkdir()
-    for name in ("000000.txt", "000000.json", "000001.txt"):
-        (maps / "calib" / name).write_text(samples.kitti_benchmark(RIG))
-    refusal = rollcli("estimate", "maps", "--calib", "calib", cwd=maps).refused()
-    assert "maps/000000_10.png: has more than one calibration of its name: " in refusal
-    with (maps / "large.txt").open("wb") as file:
-        file.truncate((1 << 20) + 1)
-    told = rollcli("estimate", "maps", "--calib", "large.txt", cwd=maps).refused()
-    assert told == "rollcli: large.txt: has 1048577 bytes; up to 1 MB are read\n"
-
-
-def test_a_map_at_half_the_size_uses_the_scaled_calibration(maps):
-    half = CALIBRATION.for_size(320, 200).for_size(160, 100)
-    write_kitti(maps / "half" / "a.png", cast(half, ROLL, PITCH, HEIGHT, (100, 160)))
-    assert_posed(rows_of(rollcli("estimate", "half", "--calib", "calib.txt", cwd=maps).out))
-
-
 @pytest.mark.slow
 def test_downscaled_pairs_have_the_pose_of_the_full_size(tmp_path):
     rig = {"pitch_deg": (4.6, 4.6), "height": (1.4, 1.4), "principal_offset": (-30.0, 30.0)}
@@ -104,36 +70,6 @@ def test_downscaled_pairs_have_the_pose_of_the_full_size(tmp_path):
         assert (pitch, height) == pytest.approx((4.6, 1.4), rel=0.02)
         assert (half_pitch, half_height) == pytest.approx((4.6, 1.4), rel=0.02)
     assert sum(agree) >= 17  # of twenty, where 95 % agree, 98 % have as many
-
-
-BAD = {
-    "missing": ((), "no such file"),
-    "empty.txt": ("", "empty"),
-    "unknown.txt": ("hello\n", "known format"),
-    "cut.txt": (samples.kitti_raw(RIG)[:-30], "12"),
-    "crop.txt": (samples.kitti_raw(RIG._replace(width=320, height=240)), "320x240"),
-    "centre.txt": (samples.kitti_benchmark(RIG._replace(cx=400.0)), "320x200"),
-    "kalibr.yaml": (samples.kalibr(RIG), "--focal"),
-}
-
-
-@pytest.mark.parametrize("name", BAD)
-def test_a_bad_calibration_ends_it_in_one_line_before_anything_runs(maps, name):
-    text, words = BAD[name]
-    if text != ():
-        (maps / name).write_text(text)
-    said = rollcli("estimate", "maps", "--calib", name, "-o", "pose.csv", cwd=maps).refused()
-    assert words in said
-    assert name in said
-    assert not (maps / "pose.csv").exists()
-
-
-def test_what_was_read_against_a_convention_is_said_once(maps):
-    (maps / "left.yaml").write_text(samples.ros(RIG, right=False))
-    (maps / "right.yaml").write_text(samples.ros(RIG, right=True, positive=True))
-    pair = ("--calib", "left.yaml", "--calib", "right.yaml")
-    assert rollcli("estimate", "maps", *pair, cwd=maps).err.count("Tx is positive") == 1
-    assert "Tx" not in rollcli("estimate", "maps", *pair, "-q", cwd=maps).err
 
 
 def test_depth_maps_become_the_disparities_of_their_calibration(maps):

@@ -15,7 +15,6 @@ from tests.estimator.synthetic_maps import bent_road
 from tests.run_cli import contents, rollcli, rows_of
 
 FAST = ("--turns", "-8:8:8", "--timed", "1")
-FILES = {PAGE, *(f"{name}.csv" for name in TABLES)}
 
 pytestmark = pytest.mark.skipif(
     not all(map(importlib.util.find_spec, ("plotly", "jinja2", "matplotlib"))),
@@ -43,15 +42,6 @@ def done(tmp_path_factory):
     write_maps(folder / "maps", "a.npy", "b.npy", "<script>alert(1)<script>.npy")
     (folder / "maps/empty.npy").write_bytes(b"")
     return folder, paper(folder, "-j1")
-
-
-def test_it_writes_one_page_and_a_csv_for_each_table(done):
-    folder, run = done
-    assert set(contents(folder / "out")) == FILES
-    assert run.out == ""
-    assert "4 frames: 3 ok, 1 failed" in run.err
-    assert "rollcli: run times, on 1 of the maps\n" in run.err
-    assert f"rollcli: out/{PAGE} and 6 tables are written\n" in run.err
 
 
 def test_a_map_that_cannot_be_read_is_named_and_ends_it_with_3(done):
@@ -98,27 +88,6 @@ def test_every_chart_is_drawn_in_a_browser_without_an_error(done, open_page):
     assert page.locator(".chart").count() == 5
 
 
-def test_known_angles_are_what_estimates_are_held_against(tmp_path):
-    write_maps(tmp_path / "maps", "a.npy")  # rolled by -3 degrees
-    (tmp_path / "truth.csv").write_text("file,roll_deg\na,-2.5\n")
-    assert paper(tmp_path, "--truth", "truth.csv", "-q", "-j1").status == 0
-    exact = [row for row in read(tmp_path / "out/fig6_accuracy.csv") if row["solver"] == "exact"]
-    assert float(exact[0]["mean_deg"]) == pytest.approx(0.5, abs=0.05)
-
-
-def test_maps_without_a_known_angle_are_refused_by_name(tmp_path):
-    write_maps(tmp_path / "maps", "a.npy", "b.npy")
-    (tmp_path / "truth.csv").write_text("file,roll_deg\na,-2.5\n")
-    run = paper(tmp_path, "--truth", "truth.csv")
-    assert (run.status, run.err) == (2, "rollcli: maps/b.npy: has no known angle in truth.csv\n")
-
-
-def test_depth_maps_are_refused(tmp_path):
-    write_maps(tmp_path / "maps", "a.npy")
-    refusal = paper(tmp_path, "--encoding", "depth").refused()
-    assert "--encoding depth: the experiments are made on disparity maps, not on depth maps" in refusal
-
-
 def test_pixels_outside_of_the_region_count_for_nothing(tmp_path):
     write_maps(tmp_path / "maps", "a.npy")
     values = np.load(tmp_path / "maps/a.npy")
@@ -144,14 +113,4 @@ def test_an_interrupted_evaluation_writes_nothing(tmp_path, monkeypatch):
     run = paper(tmp_path)
     assert run.status == 130
     assert "interrupted after 1 of 2 maps; nothing is written" in run.err
-    assert not (tmp_path / "out").exists()
-
-
-def test_maps_that_give_no_angle_leave_nothing_and_end_with_3(tmp_path):
-    (tmp_path / "maps").mkdir()
-    np.save(tmp_path / "maps/flat.npy", np.full((60, 80), 7, np.float32))
-    run = paper(tmp_path, "-j1")
-    assert run.status == 3
-    assert "the same everywhere" in run.err
-    assert "no map gave an angle" in run.err
     assert not (tmp_path / "out").exists()

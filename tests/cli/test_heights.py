@@ -6,7 +6,7 @@ import tifffile
 
 from rollcli.simulate.dataset import Dataset, write_dataset
 from rollcli.simulate.spec import FrameSpec
-from tests.run_cli import contents, road_map, rollcli, rows_of, write_kitti, write_pair
+from tests.run_cli import contents, road_map, rollcli, rows_of, write_kitti
 
 RIG = ("--focal", "300", "--principal-point", "79.5,20", "--baseline", "0.5")
 
@@ -105,14 +105,3 @@ def test_the_unit_stands_in_the_file_and_npy_is_written_if_asked_for(tmp_path):
     assert np.array_equal(heights, tifffile.imread(tmp_path / "h" / "day" / "a.tif"), equal_nan=True)
     done = rollcli("heights", "maps/day", "--from", "2.csv", "-o", "again", cwd=tmp_path)
     assert "was made with a calibration: give it with --calib" in done.err
-
-
-def test_pairs_have_heights_and_pictures_over_their_left_image(tmp_path):
-    write_pair(tmp_path, "a.png", road_map(0.05, width=320, height=160) / 2)
-    pair = ("--left", "left", "--right", "right", "--num-disparities", "48")
-    done = rollcli("estimate", *pair, "--heights", "h", "--heights-preview", "p", cwd=tmp_path)
-    assert done.status == 0, done.err
-    heights = tifffile.imread(tmp_path / "h" / "a.tif")
-    assert heights.shape == (160, 320)
-    assert abs(np.nanmedian(heights[100:])) < 0.01
-    assert sorted(contents(tmp_path / "p")) == ["a.png"]

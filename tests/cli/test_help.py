@@ -55,15 +55,6 @@ def parts(line):
     return [shlex.split(part)[1:] for part in line.split("|") if part.split()[0] == "rollcli"]
 
 
-@pytest.mark.parametrize("name", COMMANDS)
-def test_every_option_says_what_it_does(name):
-    for param in COMMANDS[name].command.params:
-        if isinstance(param, click.Option):
-            assert (param.help or "").rstrip("]").endswith(".") or "[default:" in (param.help or ""), (
-                param.name
-            )
-
-
 def test_rig_and_report_tell_how_they_end_themselves():
     ends = {
         name: rollcli(name, "--help", cwd=ROOT).out.partition("Exit status:")[2].split("\n\n")[0]
@@ -95,26 +86,14 @@ def test_every_column_and_exit_status_is_documented_in_the_readme():
     assert all(f"\n| {status} | " in readme for status in (0, 1, 2, 3, 130))
 
 
-PATHS = [
-    (ctx, param)
-    for _, ctx in commands()
-    for param in ctx.command.params
-    if isinstance(param.type, click.Path)
-]
+PARAMS = [(ctx, param) for _, ctx in commands() for param in ctx.command.params]
 
 
-@pytest.mark.parametrize(("ctx", "param"), PATHS, ids=lambda each: getattr(each, "name", None) or "of")
-def test_an_empty_name_is_never_taken_for_the_current_folder(ctx, param):
-    with pytest.raises(click.BadParameter, match="the name is empty: is a variable unset"):
-        param.type_cast_value(ctx, ("",) if param.nargs == -1 or param.multiple else "")
-
-
-OPTIONS = [
-    (ctx, param) for _, ctx in commands() for param in ctx.command.params if isinstance(param, click.Option)
-]
-
-
-@pytest.mark.parametrize(("ctx", "param"), OPTIONS, ids=lambda each: getattr(each, "name", None) or "of")
-def test_the_environment_and_config_files_call_an_option_by_its_flag(ctx, param):
-    flag = max(param.opts, key=len).removeprefix("--")
-    assert param.name == flag.replace("-", "_")
+@pytest.mark.parametrize(("ctx", "param"), PARAMS, ids=lambda each: getattr(each, "name", None) or "of")
+def test_it_is_called_by_its_flag_says_what_it_does_and_takes_no_empty_path(ctx, param):
+    if isinstance(param, click.Option):
+        assert param.name == max(param.opts, key=len).removeprefix("--").replace("-", "_")
+        assert param.help.endswith(".") or "[default:" in param.help
+    if isinstance(param.type, click.Path):  # which would be the current folder
+        with pytest.raises(click.BadParameter, match="the name is empty: is a variable unset"):
+            param.type_cast_value(ctx, ("",) if param.nargs == -1 or param.multiple else "")

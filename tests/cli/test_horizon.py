@@ -6,9 +6,9 @@ import cv2
 import pytest
 
 from rollcli.rig.calibration import Calibration
-from tests.rig.calibration_files import Rig, kitti_raw, middlebury
+from tests.rig.calibration_files import Rig, kitti_raw
 from tests.rig.test_pose import cast
-from tests.run_cli import rollcli, rows_of, write_kitti
+from tests.run_cli import rollcli, write_kitti
 
 RIG = Rig(fx=250.0, fy=250.0, cx=150.0, cy=90.0, baseline=0.5, width=320, height=200)
 ROLL, PITCH, HEIGHT = math.radians(9), math.radians(6), 1.5
@@ -44,22 +44,3 @@ def test_the_horizon_is_marked_where_the_road_is_infinitely_far_away(tmp_path):
     # the upright map is turned about its centre, and its horizon is level
     above = (99.5 - middle) * math.cos(ROLL)
     assert marked_row(tmp_path / "upright" / "a.png") == pytest.approx(99.5 - above, abs=0.6)
-
-
-def test_a_calibration_of_another_size_is_refused_before_pictures_are_drawn(tmp_path):
-    write_map(tmp_path / "maps" / "a.png", RIG)
-    (tmp_path / "calib.txt").write_text(kitti_raw(RIG._replace(height=240)))
-    refusal = rollcli("vdisparity", "maps", "--calib", "calib.txt", "-o", "v", cwd=tmp_path).refused()
-    assert "320x240" in refusal
-    assert not (tmp_path / "v").exists()
-
-
-def test_images_are_turned_by_the_angle_of_the_pixels_where_these_are_not_square(tmp_path):
-    rig = RIG._replace(fy=200.0)
-    write_map(tmp_path / "maps" / "a.png", rig)
-    (tmp_path / "calib.txt").write_text(middlebury(rig))
-    posed = rollcli("estimate", "maps", "--calib", "calib.txt", "--derotated", "upright", cwd=tmp_path)
-    level = rollcli("estimate", "upright", cwd=tmp_path)
-    (before,), (after,) = (rows_of(done.out) for done in (posed, level))
-    assert float(before["roll_deg"]) == pytest.approx(math.degrees(ROLL), abs=0.01)
-    assert float(after["roll_deg"]) == pytest.approx(0.0, abs=0.05)

@@ -109,3 +109,24 @@ def test_file_names_neither_forge_lines_nor_command_the_terminal(tmp_path):
     _, err = refused.communicate(timeout=60)
     assert err.count(b"\n") == 1
     assert b"\x1b" not in err
+
+
+def test_a_terminal_sees_a_progress_bar(maps):
+    main, other = pty.openpty()
+    line = command("estimate", "maps", "-o", "rolls.csv")
+    with subprocess.Popen(line, cwd=maps, env=environment(), stdout=other, stderr=other) as run:
+        os.close(other)
+        shown = b""
+        while chunk := read(main):
+            shown += chunk
+    os.close(main)
+    assert run.returncode == 0
+    assert b"/8 [" in shown
+    assert b"8 frames: 8 ok" in shown
+
+
+def read(terminal):
+    try:
+        return os.read(terminal, 4096)
+    except OSError:  # Linux's way to say that the other end is closed
+        return b""

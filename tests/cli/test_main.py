@@ -7,12 +7,13 @@ from importlib.metadata import PackageNotFoundError
 import pytest
 
 import rollcli as package
-from rollcli.cli import main as versions
+from rollcli.cli import versions
 from tests.run_cli import ROOT, environment, python, rollcli, rollcli_process, write_maps
 
 
-def test_version_is_the_packages(tmp_path):
+def test_the_process_calls_itself_rollcli_and_its_version_is_the_packages(tmp_path):
     assert rollcli_process("--version", cwd=tmp_path).out == f"rollcli {package.__version__}\n"
+    assert rollcli_process("--help", cwd=tmp_path).out.startswith("Usage: rollcli ")
 
 
 def test_versions_names_python_and_every_dependency(tmp_path):
@@ -77,25 +78,6 @@ except SystemExit as end:
 
 
 @pytest.mark.parametrize(
-    "arguments",
-    [["--nothing"], ["nothing"], ["estimate", "--nothing"], ["estimate", "--seed", "-1", "x"], ["estimate"]],
-)
-def test_a_usage_error_is_one_line_and_status_2(tmp_path, arguments):
-    refusal = rollcli(*arguments, cwd=tmp_path).refused()
-    assert refusal.startswith("rollcli: ")
-
-
-def test_the_program_alone_shows_its_commands(tmp_path):
-    done = rollcli(cwd=tmp_path)
-    assert done.status == 0
-    assert "estimate" in done.out
-
-
-def test_help_calls_the_program_rollcli(tmp_path):
-    assert rollcli_process("--help", cwd=tmp_path).out.startswith("Usage: rollcli ")
-
-
-@pytest.mark.parametrize(
     ("work", "said", "verbose"),
     [
         ('{}["key"]', "KeyError: 'key'", []),
@@ -121,13 +103,6 @@ main()
     assert "<string>:4)" in first
     assert ("Traceback" in done.stderr) == bool(rest) == bool(verbose)
     assert not rest or any("run_estimate" in each for each in rest)
-
-
-def test_choices_ignore_case(tmp_path):
-    write_maps(tmp_path / "maps", 1)
-    upper = rollcli("estimate", "maps", "--method", "EXACT", "--road", "All", cwd=tmp_path)
-    assert upper.out == rollcli("estimate", "maps", "--method", "exact", "--road", "all", cwd=tmp_path).out
-    assert ",exact," in upper.out
 
 
 ATTRIBUTE = """

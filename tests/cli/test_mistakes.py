@@ -1,6 +1,5 @@
 """Mistakes, typical and unexpected, and the answer to each: the exact line, and the exit status."""
 
-import json
 import re
 import shlex
 import threading
@@ -82,28 +81,6 @@ def test_the_table_is_read_whole():
     assert len(ANSWERS) == TABLE.count("\n$ ") >= 25
 
 
-ROW = {"file": "a.png", "status": "ok", "roll_deg": 1.0, "roll_ci95_deg": 0.1}
-COMMANDS = {
-    "rig": ["rig", "r.jsonl", "--format", "csv"],
-    "report": ["report", "r.jsonl", "--svg", "s"],
-    "accuracy": ["evaluate", "accuracy", "r.jsonl", "--truth", "truth.csv"],
-}
-
-
-@pytest.mark.parametrize("command", COMMANDS)
-@pytest.mark.parametrize(
-    ("name", "value"), [("file", "\ud800.png"), ("message", "\ud800.png"), ("roll_deg", 10**400)]
-)
-def test_half_a_character_is_no_text_and_a_number_of_401_digits_no_angle(tmp_path, command, name, value):
-    (tmp_path / "r.jsonl").write_text(json.dumps({**ROW, name: value}) + "\n")
-    (tmp_path / "truth.csv").write_text("file,roll_deg\na.png,1\n")
-    done = rollcli(*COMMANDS[command], cwd=tmp_path)
-    if (name, command) == ("message", "rig"):  # which it does not read
-        assert done.status == 0
-    else:
-        assert re.search(rf"r\.jsonl: line 1: ('\\ud800\.png'|10+.*) is no value for {name}", done.refused())
-
-
 @pytest.mark.parametrize("command", ["rig", "report"])
 @pytest.mark.parametrize(
     ("kind", "value"),
@@ -122,12 +99,6 @@ def test_times_of_parquet_are_no_angles(tmp_path, command, kind, value):
         command, "r.parquet", *(["--svg", "s"] if command == "report" else []), cwd=tmp_path
     ).refused()
     assert "rollcli: r.parquet: " in refusal
-
-
-def test_a_part_without_a_whole_line_is_damaged(tmp_path):
-    (tmp_path / "r").mkdir()
-    (tmp_path / "r" / "part-00000.csv").write_text("file,status,roll_deg")
-    assert "r/part-00000.csv: is damaged: it has no whole line" in rollcli("rig", "r", cwd=tmp_path).refused()
 
 
 @pytest.mark.parametrize("threads", [0, 1])

@@ -82,22 +82,3 @@ def test_a_pair_that_contradicts_the_correction_is_suspect(pairs):
     assert len(rows) == 2
     assert {row["status"] for row in rows} == {"suspect"}
     assert all("do not lie as the correction says" in row["message"] for row in rows)
-
-
-def test_a_correction_of_pairs_that_are_elsewhere_says_so_and_leaves_the_columns_to_each_pair(
-    pairs, tmp_path
-):
-    (tmp_path / "off.csv").write_bytes((pairs / "off.csv").read_bytes())
-    done = rollcli("rig", "off.csv", "--correction", "far.json", cwd=tmp_path)
-    assert done.status == 0
-    assert "far.json: its pairs cannot be read here" in done.err
-    assert "columns" not in json.loads((tmp_path / "far.json").read_text())
-
-
-@pytest.mark.parametrize(("text", "reason"), [(None, "cannot be read"), ("{}", "is no correction")])
-def test_what_is_no_correction_is_refused(pairs, text, reason):
-    if text is not None:
-        (pairs / "bad.json").write_text(text)
-    name = "none.json" if text is None else "bad.json"
-    refusal = rollcli("estimate", "--left", "left", "--right", "off", "--align", name, cwd=pairs).refused()
-    assert reason in refusal

@@ -1,24 +1,12 @@
 """`rollcli simulate` as a user runs it, and a rendered drive that `estimate` and `rig` read."""
 
 import json
-import re
 import signal
 import sys
 
 import pytest
 
 from tests.run_cli import command, rollcli, started, wait_until
-
-TINY = ("--frames", "2", "--size", "64x48")
-
-
-def test_off_a_terminal_lines_tell_how_far_it_is_and_how_long_it_takes(tmp_path, monkeypatch):
-    monkeypatch.setattr("rollcli.run.progress._LINE_EVERY_S", 0.0)
-    done = rollcli("simulate", "rig", *TINY, cwd=tmp_path)
-    first, second, summary = done.err.splitlines()
-    assert re.fullmatch(r"rollcli: 1 of 2 frames, [\d.]+ frames/s, about \d+ s left", first)
-    assert re.fullmatch(r"rollcli: 2 of 2 frames, [\d.]+ frames/s", second)
-    assert re.fullmatch(r"rollcli: 2 frames in rig; [\d.]+ s, [\d.]+ s a frame", summary)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")

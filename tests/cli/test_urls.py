@@ -149,17 +149,6 @@ def test_a_url_that_is_no_address_is_that_frames_error(tmp_path):
     assert "http://[/a.png: its name in the store or archive names no file" in done.err
 
 
-@pytest.mark.parametrize("name", ["..%5Cevil.png", "a%00.png", "%2e%2e"])
-@pytest.mark.parametrize("command", [("vdisparity",), ("derotate", "--roll", "3"), ("evaluate", "paper")])
-def test_other_commands_refuse_such_a_url_too(tmp_path, server, name, command):
-    cwd = tmp_path / "cwd"
-    cwd.mkdir()
-    done = rollcli(*command, f"{server}/{name}", "-o", "out", cwd=cwd)
-    assert done.status in (2, 3), done.err
-    assert "names no file below a folder" in done.err
-    assert written(tmp_path) == ["map/frame0.png"]
-
-
 def test_names_of_objects_are_checked_likewise(tmp_path, bucket, store):
     import boto3
 

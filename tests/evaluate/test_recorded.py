@@ -194,7 +194,9 @@ CASES = {
     "tables": lambda: {name: table.rows for name, table in _tables().items()},
     "charts": lambda: {name: dataclasses.asdict(chart) for name, chart in charts(_tables()).items()},
     "textbook": _textbook,
-    "turned": lambda: [rotate_nearest(np.arange(1.0, 71).reshape(7, 10), turn) for turn in TURNS],
+    "turned": lambda: [
+        rotate_nearest(np.arange(1.0, 71).reshape(7, 10), turn) for turn in (*TURNS, 0.0, math.pi / 2)
+    ],
     "angles": lambda: [ExperimentOptions("out", turns).turns_deg for turns in ANGLES],
     "tables without angles": _tables_without_angles,
     "page": _page,

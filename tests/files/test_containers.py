@@ -3,8 +3,6 @@
 import tarfile
 import zipfile
 
-import cv2
-import numpy as np
 import pytest
 
 from rollcli.errors import InputError, UsageError
@@ -90,28 +88,6 @@ def test_the_views_of_a_shard_pair_up_and_are_never_taken_for_maps(tmp_path):
         (f"shard.tar#00000{each}.left.png", f"shard.tar#00000{each}.right.png") for each in (1, 2)
     ]
     assert "--left shard.tar --right shard.tar" in rollcli("estimate", "shard.tar", cwd=tmp_path).refused()
-
-
-@pytest.mark.parametrize(("left", "right"), [("left", "right"), ("image_2", "image_3")])
-def test_a_folder_of_views_is_told_with_what_to_type(tmp_path, left, right):
-    for side in (left, right):
-        (tmp_path / "drive" / side).mkdir(parents=True)
-        cv2.imwrite(str(tmp_path / "drive" / side / "0.png"), np.zeros((20, 20), np.uint8))
-    for more in ([], ["--recursive"]):
-        refusal = rollcli("estimate", "drive", *more, cwd=tmp_path).refused()
-        assert f"give --left drive/{left} --right drive/{right}" in refusal
-    cv2.imwrite(str(tmp_path / "im0.png"), np.zeros((20, 20), np.uint8))
-    cv2.imwrite(str(tmp_path / "im1.png"), np.zeros((20, 20), np.uint8))
-    assert "--left . --right ." in rollcli("estimate", ".", cwd=tmp_path).err
-
-
-def test_what_a_folder_holds_beside_maps_is_counted_by_ending(tmp_path):
-    write_maps(tmp_path / "maps", 1)
-    for name in ("a.mat", "b.mat", "readme"):
-        (tmp_path / "maps" / name).write_text("x")
-    done = rollcli("estimate", "maps", cwd=tmp_path)
-    assert "files in the folders that are not read: 2 .mat, 1 without an ending" in done.err
-    assert "not read" not in rollcli("estimate", "maps", "-q", cwd=tmp_path).err
 
 
 def test_a_member_cannot_name_a_file_elsewhere(tmp_path):

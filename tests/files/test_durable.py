@@ -60,12 +60,6 @@ def test_a_durable_file_has_its_bytes_on_the_disk_before_it_has_its_name(tmp_pat
     assert inode(tmp_path) in {each for each, _ in synced[1:]}
 
 
-def test_a_file_that_is_gone_by_now_is_left_out(tmp_path, synced):
-    sync_files([tmp_path / "gone.png"])
-
-    assert inode(tmp_path) in [each for each, _ in synced]
-
-
 def test_a_disk_that_fails_is_said_in_one_line(tmp_path, monkeypatch):
     write_atomic(tmp_path / "map.png", b"data")
 
@@ -112,9 +106,3 @@ def test_a_file_system_that_forces_no_folders_is_no_error_and_a_disk_that_fails_
     monkeypatch.setattr(os, "fsync", fail(errno.EIO))
     with pytest.raises(OutputError, match=r"cannot be forced to the disk: input/output error$"):
         sync_files([tmp_path / "map.png"])
-
-
-def test_a_durable_file_that_replaces_nothing_is_forced_too(tmp_path, synced):
-    write_atomic(tmp_path / "part", b"data", durable=True, replaces=False)
-    assert synced[0] == (inode(tmp_path / "part"), 4)
-    assert inode(tmp_path) in {each for each, _ in synced[1:]}

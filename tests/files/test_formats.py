@@ -7,29 +7,11 @@ import numpy as np
 import pytest
 
 from rollcli.errors import InputError, OutputError, UsageError
-from rollcli.files.formats import decode_stored, encode_stored, read_image, read_stored
+from rollcli.files.formats import encode_stored
 from rollcli.files.storage import read_bytes
 from tests.binary_files import disparity_map, make_npy, make_png, make_tiff, png_file
 from tests.files.codecs.test_png import NOISY, WRONG
 from tests.run_cli import python
-
-WRITTEN = [
-    *[("png", kind) for kind in ("u1", "u2")],
-    *[("tiff", kind) for kind in ("u1", "u2", "i2", "i4", "f2", "f4", "f8")],
-    *[("npy", kind) for kind in ("u1", "u2", "i2", "i8", "f2", "f4", "f8")],
-    ("pfm", "f4"),
-]
-
-
-@pytest.mark.parametrize(("form", "kind"), WRITTEN)
-def test_what_is_written_is_read_back_unchanged(form, kind):
-    values = np.random.default_rng(1).uniform(1, 200, (37, 53)).astype(kind)
-
-    stored = decode_stored(encode_stored(values, form), "map")
-
-    assert stored.format == form
-    assert stored.values.dtype == values.dtype
-    np.testing.assert_array_equal(stored.values, values)
 
 
 def test_numbers_that_a_format_cannot_hold_are_refused():
@@ -38,20 +20,6 @@ def test_numbers_that_a_format_cannot_hold_are_refused():
             encode_stored(np.ones((2, 2), kind), form)
     with pytest.raises(UsageError, match="jpg: unknown map format"):
         encode_stored(np.ones((2, 2)), "jpg")
-
-
-def test_the_content_decides_and_not_the_ending(tmp_path):
-    path = tmp_path / "map.pfm"
-    path.write_bytes(make_npy(disparity_map()))
-
-    assert read_stored(path).format == "npy"
-
-
-def test_names_of_any_alphabet_are_read(tmp_path):
-    path = tmp_path / "Straße 道路 🛣.png"
-    path.write_bytes(make_png(np.ones((2, 3), np.uint16)))
-
-    assert read_stored(path).values.shape == (2, 3)
 
 
 def test_paths_that_are_no_files_are_named(tmp_path):
@@ -90,57 +58,7 @@ def test_a_file_without_permission_is_named(tmp_path):
         read_bytes(path)
 
 
-def test_a_file_too_large_for_any_map_is_refused_unread(tmp_path):
-    path = tmp_path / "map.npy"
-    with path.open("wb") as file:
-        file.truncate(2**40)
-
-    with pytest.raises(InputError, match=r"map.npy: has 1099511627776 bytes"):
-        read_bytes(path)
-
-
 IMAGE = np.random.default_rng(0).integers(0, 256, (20, 30, 3), dtype=np.uint8)
-
-
-GREY = IMAGE[..., 0]
-WIDE = GREY.astype(np.uint16) * 257
-
-
-@pytest.mark.parametrize(
-    ("ending", "image"),
-    [
-        *((ending, IMAGE) for ending in (".png", ".bmp", ".tif", ".ppm")),
-        *((ending, GREY) for ending in (".png", ".bmp", ".tif", ".pgm")),
-        *((ending, WIDE) for ending in (".png", ".tif", ".pgm")),
-    ],
-)
-def test_camera_images_of_lossless_formats_are_read(tmp_path, ending, image):
-    (tmp_path / f"a{ending}").write_bytes(cv2.imencode(ending, image)[1].tobytes())
-
-    found = read_image(tmp_path / f"a{ending}")
-    np.testing.assert_array_equal(found if found.ndim == image.ndim else found[..., 0], image)
-
-
-def test_jpegs_are_read_upright_or_not_as_they_are_stored(tmp_path):
-    (tmp_path / "a.jpg").write_bytes(cv2.imencode(".jpg", IMAGE)[1].tobytes())
-
-    assert read_image(tmp_path / "a.jpg").shape == IMAGE.shape
-
-
-@pytest.mark.parametrize(
-    ("content", "reason"),
-    [
-        (cv2.imencode(".jpg", IMAGE)[1].tobytes()[:-200], "is a truncated JPEG"),
-        (make_npy(np.ones((3, 3))), "a camera image is a PNG, JPEG, TIFF"),
-        (b"hello world", "is text; a camera image is"),
-    ],
-)
-def test_what_is_no_camera_image_is_named(tmp_path, content, reason):
-    path = tmp_path / "left.png"
-    path.write_bytes(content)
-
-    with pytest.raises(InputError, match=rf"left.png: .*{reason}"):
-        read_image(path)
 
 
 def test_nothing_is_printed_about_damaged_files(tmp_path):

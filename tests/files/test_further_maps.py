@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from rollcli import read_disparity
-from rollcli.errors import InputError, UsageError
+from rollcli.errors import InputError
 from rollcli.files.formats import decode_stored, encode_stored
 from tests.binary_files import disparity_map
-from tests.run_cli import road_map, rollcli, rows_of
+from tests.run_cli import road_map, rollcli
 
 
 def npz(**arrays):
@@ -47,15 +47,6 @@ def test_broken_and_hostile_npz_files_are_refused():
         decode_stored(buffer.getvalue(), "map")
 
 
-@pytest.mark.parametrize("order", ["C", "F"])
-def test_an_axis_of_length_one_before_or_behind_is_left_out(order):
-    values = disparity_map().astype(np.float32)
-    for shaped in (values[None], values[..., None]):
-        buffer = io.BytesIO()
-        np.save(buffer, np.asarray(shaped, order=order))
-        np.testing.assert_array_equal(decode_stored(buffer.getvalue(), "map").values, values)
-
-
 def foundation_stereo(disparity):
     """Encode as FoundationStereo's depth_uint8_encoding does, channel by channel."""
     numbers = np.rint(disparity * 1000).astype(np.int64)
@@ -77,31 +68,6 @@ def test_numbers_in_three_channels_are_read_and_written_back(tmp_path):
     assert "photographs" in rollcli("estimate", "a.png", cwd=tmp_path).err
     cv2.imwrite(str(tmp_path / "grey.png"), np.ones((9, 9), np.uint8))
     assert "is no RGB PNG" in rollcli("estimate", "grey.png", *given, cwd=tmp_path).out
-
-
-def test_maps_stored_negative_are_read_with_a_negative_scale(tmp_path):
-    disparity = road_map().astype(np.float32)
-    np.save(tmp_path / "a.npy", disparity)
-    np.save(tmp_path / "negative.npy", -disparity)
-    rolls = [
-        rows_of(rollcli("estimate", *given, cwd=tmp_path).out)[0]["roll_deg"]
-        for given in (["a.npy"], ["negative.npy", "--scale", "-1"])
-    ]
-    assert rolls[0] == rolls[1] != ""
-    assert "Give --scale -1" in rollcli("estimate", "negative.npy", cwd=tmp_path).out
-    turned = [
-        rollcli("derotate", name, *given, "--roll", "3", "-o", "out", cwd=tmp_path).status
-        for name, given in (("a.npy", []), ("negative.npy", ["--scale", "-1"]))
-    ]
-    assert turned == [0, 0]
-    upright, negative = (np.load(tmp_path / "out" / name) for name in ("a.npy", "negative.npy"))
-    np.testing.assert_array_equal(np.where(upright > 0, upright, 0), np.where(negative < 0, -negative, 0))
-    np.save(tmp_path / "whole.npy", -np.rint(16 * disparity).astype(np.int16))
-    found = read_disparity(tmp_path / "whole.npy", scale=-1 / 16)
-    np.testing.assert_allclose(found, np.where(disparity > 0, np.rint(16 * disparity) / 16, 0), atol=1e-6)
-    np.save(tmp_path / "unsigned.npy", np.ones((9, 9), np.uint8))
-    with pytest.raises(UsageError, match="have no sign"):
-        read_disparity(tmp_path / "unsigned.npy", scale=-1)
 
 
 def test_an_exr_is_read_where_opencv_reads_it_and_else_a_line_says_what_to_do():

@@ -17,11 +17,6 @@ from tests.slow import mostly_slow
 FILES = {name: data for name, data in corpus().items() if name != "large.png"}
 
 
-@pytest.mark.parametrize("name", FILES)
-def test_whole_files_are_read(name):
-    assert read_all_ways(FILES[name]) == "read"
-
-
 # of TIFF's many layouts and compressions one of each is enough for every change
 OFTEN = {"predictor2.tif", "lzw.tif", "deflate-tiles.tif", "pages.tif"}
 QUICK = [name for name in FILES if name in OFTEN or not name.endswith(".tif")]

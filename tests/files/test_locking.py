@@ -43,26 +43,6 @@ def without_locks(monkeypatch):
     monkeypatch.setattr(fcntl, "flock", fail)
 
 
-def test_a_second_run_is_refused(result, impatient):
-    descriptor, name = result
-    other = os.open(name, os.O_RDWR)
-    refused = pytest.raises(UsageError, match="another run is writing this result")
-    try:
-        with locking.locked(descriptor, name), refused, locking.locked(other, name):
-            pass
-    finally:
-        os.close(other)
-
-
-def test_where_locks_are_there_is_no_lock_file_and_nothing_is_said(result, capsys):
-    descriptor, name = result
-
-    with locking.locked(descriptor, name):
-        assert [path.name for path in Path(name).parent.iterdir()] == ["rolls.csv"]
-
-    assert capsys.readouterr().err == ""
-
-
 def test_without_locks_a_lock_file_keeps_a_second_run_away_and_that_is_said(result, without_locks, capsys):
     descriptor, name = result
 

@@ -4,7 +4,6 @@ import sys
 
 import pytest
 
-from rollcli.errors import UsageError
 from rollcli.files import inputs as manifests
 from rollcli.files.inputs import Manifest
 from rollcli.files.naming import natural_key
@@ -41,24 +40,6 @@ def test_any_run_of_names_is_read_from_its_place(names, part):
     assert list(manifest.names(range(1000)[part])) == every[part]
 
 
-@pytest.mark.parametrize(
-    ("content", "said"),
-    [
-        (b"frame1.png\n\nframe10.png\nframe2.png\n", "line 4: frame2.png sorts before frame10.png"),
-        (b"a.png\na.png\n", "line 2: a.png is there twice"),
-        (b"\n\n", "no input found: the list is empty"),
-        (None, "the list of files cannot be read: no such file or directory"),
-    ],
-)
-def test_a_list_that_is_not_sorted_is_refused_and_the_line_is_named(tmp_path, content, said):
-    path = tmp_path / "list.txt"
-    if content is not None:
-        path.write_bytes(content)
-    with pytest.raises(UsageError) as caught:
-        Manifest(str(path))
-    assert str(caught.value).startswith(f"{path}: {said}")
-
-
 @pytest.fixture
 def maps(tmp_path):
     write_maps(tmp_path / "maps", 12)
@@ -78,27 +59,6 @@ def test_a_sorted_list_gives_the_bytes_of_one_that_is_read_at_once_also_after_a_
     keep_rows(maps / "rolls.csv", 5)
     assert rollcli(*line, "--sorted", "-o", "rolls.csv", "--resume", cwd=maps).status == 3
     assert (maps / "rolls.csv").read_bytes() == whole
-
-
-def test_shards_by_range_are_the_whole_one_after_the_other(maps):
-    line = ("estimate", "--files-from", "list.txt", "--sorted", "-q")
-    rollcli(*line, "-o", "whole.csv", cwd=maps)
-    rows = []
-    for part in range(1, 6):
-        name = f"part{part}.csv"
-        rollcli(*line, "--shard", f"{part}/5", "--shard-by", "range", "-o", name, cwd=maps)
-        rows += (maps / name).read_bytes().splitlines(keepends=True)[1:]
-    assert b"".join(rows) == (maps / "whole.csv").read_bytes().partition(b"\n")[2]
-    told = rollcli("rig", *(f"part{part}.csv" for part in (3, 1, 5, 2, 4)), cwd=maps)
-    assert told.out == rollcli("rig", "whole.csv", cwd=maps).out != ""
-
-
-@pytest.mark.parametrize(
-    "given",
-    [("maps",), ("--files-from", "-"), ("maps", "--files-from", "list.txt"), ("--left", "a", "--right", "b")],
-)
-def test_sorted_takes_the_names_of_one_file_alone(maps, given):
-    assert "--sorted takes" in rollcli("estimate", *given, "--sorted", cwd=maps).refused()
 
 
 # a program that says how much memory it has taken, kB

@@ -8,9 +8,8 @@ import pytest
 from rollcli.errors import InputError, OutputError, UsageError
 from rollcli.files import storage
 from rollcli.files.search import objects_behind
-from rollcli.files.stores.locations import is_url, public_name
+from rollcli.files.stores.locations import is_url
 from rollcli.files.stores.objects import list_objects
-from rollcli.messages import without_secrets
 
 
 @pytest.fixture(params=["local", "s3"])
@@ -75,13 +74,6 @@ def test_what_is_no_file_is_not_replaced_and_not_waited_for(tmp_path, kind):
     assert [each.name for each in tmp_path.iterdir()] == ["map.png"]
 
 
-def test_what_was_removed_is_gone_and_may_be_removed_again(folder):
-    storage.write_bytes(f"{folder}/x", b"x")
-    storage.remove(f"{folder}/x")
-    storage.remove(f"{folder}/x")
-    assert not storage.exists(f"{folder}/x")
-
-
 def test_objects_are_listed_with_their_sizes_below_their_folder_only(bucket):
     for name in ("listed/a.png", "listed/b/c.png", "listed2/d.png"):
         storage.write_bytes(f"{bucket}/{name}", b"12345")
@@ -117,17 +109,6 @@ def test_web_servers_are_read_only(change):
         change("https://host/x.png")
 
 
-def test_signatures_and_passwords_are_not_shown():
-    assert public_name("https://me:pw@host:8/a b.png?X-Amz-Signature=1#2") == "https://host:8/a b.png"
-    assert public_name("https://host?a=1/b") == "https://host"
-    assert public_name("https://[x?sig=1") == "https://[x"
-    assert public_name("s3://bucket/what?.png") == "s3://bucket/what?.png"
-    assert public_name("s3://key:secret@bucket/a@b.png") == "s3://bucket/a@b.png"
-    line = "--mask='https://me:pw@h/a b.png?X-Amz-Signature=1&x=2' https://h/c.png?sig=3: is no image"
-    assert without_secrets(line) == "--mask='https://h/a b.png&x=2' https://h/c.png is no image"
-    assert public_name("C:/maps/x.png") == "C:/maps/x.png"
-
-
 @pytest.mark.parametrize("pattern", ["maps", "maps/**/*.png", "maps/*/*.png"])
 def test_hidden_objects_and_those_in_hidden_folders_are_left_out(bucket, pattern):
     for name in ("day/a.png", "day/.b.png", ".day/c.png", "day/.e/d.png"):
@@ -144,18 +125,6 @@ def test_prefixes_are_searched_below_when_asked_for(bucket):
             found = sorted(objects_behind(url, recursive=recursive))
             assert found == [(f"{bucket}/maps/{name}", name) for name in expected]
     assert list(objects_behind(f"{bucket}/map", recursive=True)) == []
-
-
-def test_names_are_those_of_a_folder_or_a_prefix(folder, tmp_path):
-    assert storage.list_names(f"{folder}/day") == []
-    for name in ("a.png", "b.png"):
-        storage.write_bytes(f"{folder}/day/{name}", b"map")
-    assert sorted(storage.list_names(f"{folder}/day")) == ["a.png", "b.png"]
-    assert storage.list_names("https://host/day") == []
-    (tmp_path / "file").write_bytes(b"")
-    assert storage.list_names(str(tmp_path / "file")) == []
-    with pytest.raises(InputError, match=r"cannot be read: file name too long$"):
-        storage.list_names("x" * 300)
 
 
 def test_many_are_fetched_and_removed_at_once(folder):
@@ -175,14 +144,6 @@ def test_a_file_that_cannot_be_removed_is_named(tmp_path):
     for remove in (storage.remove, lambda name: storage.remove_all([name])):
         with pytest.raises(OutputError, match=r"folder: cannot be written: "):
             remove(str(tmp_path / "folder"))
-
-
-def test_an_owner_is_who_wrote_an_object(bucket):
-    storage.write_bytes(f"{bucket}/x", b"x", owner="me")
-    assert storage.owner_of(f"{bucket}/x") == "me"
-    storage.write_bytes(f"{bucket}/x", b"x")
-    assert storage.owner_of(f"{bucket}/x") == ""
-    assert storage.owner_of(f"{bucket}/none") == ""
 
 
 def test_what_keeps_a_place_from_being_written_or_read_is_said_beforehand(bucket, tmp_path):

@@ -35,27 +35,19 @@ def test_a_pipe_gets_all_of_the_bytes_and_stays_a_pipe(tmp_path):
     assert path.is_fifo()
 
 
-def test_a_file_is_replaced_and_what_a_killed_run_left_of_it_is_removed(tmp_path):
-    path = tmp_path / "page.html"
-    path.write_bytes(b"old")
-    (tmp_path / ".page.html.0123456789abcdef.part").write_bytes(b"half")
-    stream.write_output(str(path), b"new", overwrite=True)
-    assert path.read_bytes() == b"new"
-    assert [each.name for each in tmp_path.iterdir()] == ["page.html"]
-
-
 def test_standard_output_is_descriptor_1_unless_python_calls_it_closed(monkeypatch):
-    assert stream.stdout_descriptor() == 1
+    with stream.open_stream("-") as write:
+        assert write.args == (1,)
     monkeypatch.setattr(sys, "stdout", None)
-    with pytest.raises(OutputError, match=r"^standard output: is closed$"):
-        stream.stdout_descriptor()
+    with pytest.raises(OutputError, match=r"^standard output: is closed$"), stream.open_stream("-"):
+        pass
 
 
 def test_a_reader_that_has_gone_is_told_from_an_error(pipe, monkeypatch):
     reads, writes = pipe
     os.close(reads)
     with pytest.raises(BrokenPipeError):
-        stream.write_stream(writes, b"data")
+        stream.write_stream(writes, b"data", "/dev/x")
 
     def fail(descriptor, data):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
@@ -63,13 +55,3 @@ def test_a_reader_that_has_gone_is_told_from_an_error(pipe, monkeypatch):
     monkeypatch.setattr(os, "write", fail)
     with pytest.raises(OutputError, match=r"^/dev/x: cannot be written: no space left on device$"):
         stream.write_stream(writes, b"data", "/dev/x")
-
-
-def test_what_cannot_be_opened_is_named(tmp_path):
-    with pytest.raises(OutputError, match=r"none: cannot be written: no such file or directory$"):
-        stream.open_stream(str(tmp_path / "none"))
-
-
-def test_a_device_that_takes_nothing_is_named():
-    with pytest.raises(OutputError, match=r"^/dev/full: cannot be written: no space left on device$"):
-        stream.write_output("/dev/full", b"data", overwrite=True)

@@ -30,61 +30,30 @@ ROOT = Path(__file__).resolve().parents[2]
 PROGRAM, TESTS = "rollcli", "tests"
 # the tests of a package beyond the folder of its name, the quickest first
 FURTHER = {
-    "cli": ("run/test_recorded.py", "run/test_resume.py", "test_messages.py", "test_readme.py"),
-    "estimator": ("rig/test_pose.py",),
+    "cli": "run/test_recorded run/test_resume test_messages test_readme",
+    "estimator": "rig/test_pose",
     "evaluate": (
-        "cli/test_mistakes.py",
-        "cli/test_evaluate.py",
-        "cli/test_evaluate_paper.py",
-        "cli/test_outputs.py",
-        "estimator/test_energy.py",
-        "estimator/solvers",
+        "cli/test_mistakes cli/test_evaluate_paper cli/test_outputs estimator/test_energy "
+        "estimator/solvers test_package"
     ),
     "files": (
-        "run/test_recorded.py",
-        "cli/test_recorded.py",
-        "run/test_update.py",
-        "run/test_resume.py",
-        "run/test_retry_failed.py",
-        "run/test_two_runs.py",
-        "run/test_result_parts.py",
-        "cli/test_frames.py",
-        "cli/test_outputs.py",
-        "cli/test_help.py",
-        "cli/test_urls.py",
-        "cli/test_buckets.py",
-        "cli/test_faulty_store.py",
-        "cli/test_bad_stores.py",
+        "run/test_recorded cli/test_recorded run/test_update run/test_resume run/test_retry_failed "
+        "run/test_two_runs run/test_result_parts cli/test_frames cli/test_outputs cli/test_help "
+        "cli/test_urls cli/test_buckets cli/test_bad_stores"
     ),
-    "pictures": ("run/test_derotate.py", "run/test_vdisparity.py", "cli/test_heights.py"),
-    "rig": ("cli/test_calibration.py", "cli/test_horizon.py", "cli/test_rig.py", "run/test_diagnosis.py"),
+    "pictures": "run/test_derotate run/test_vdisparity cli/test_heights",
+    "rig": "cli/test_calibration cli/test_horizon run/test_diagnosis",
     "run": (
-        "cli/test_recorded.py",
-        "files/stores/test_turns.py",
-        "cli/test_mistakes.py",
-        "cli/test_outputs.py",
-        "cli/test_help.py",
-        "cli/test_estimate.py",
-        "cli/test_frames.py",
-        "cli/test_streams.py",
-        "cli/test_calibration.py",
-        "cli/test_horizon.py",
-        "cli/test_rig.py",
-        "cli/test_lost_readers.py",
-        "cli/test_bad_stores.py",
-        "cli/test_urls.py",
-        "cli/test_buckets.py",
+        "cli/test_recorded files/stores/test_turns cli/test_mistakes cli/test_outputs cli/test_help "
+        "cli/test_frames cli/test_calibration cli/test_horizon cli/test_lost_readers "
+        "cli/test_bad_stores cli/test_urls cli/test_buckets"
     ),
     "simulate": (
-        "cli/test_mistakes.py",
-        "cli/test_simulate.py",
-        "cli/test_outputs.py",
-        "cli/test_lost_readers.py",
-        "stereo/test_alignment.py",
-        "stereo/test_stereo.py",
+        "cli/test_mistakes cli/test_simulate cli/test_outputs cli/test_lost_readers "
+        "stereo/test_alignment stereo/test_stereo"
     ),
-    "report": ("cli/test_recorded.py", "cli/test_mistakes.py", "cli/test_outputs.py"),
-    "stereo": ("run/test_estimate_pair.py",),
+    "report": "cli/test_recorded cli/test_mistakes cli/test_outputs",
+    "stereo": "run/test_estimate_pair",
 }
 _QUICKLY = ("-x", "-q", "-p", "no:cacheprovider")
 _NOTICED = (pytest.ExitCode.TESTS_FAILED, pytest.ExitCode.INTERRUPTED, pytest.ExitCode.USAGE_ERROR)
@@ -194,10 +163,16 @@ def _setter(items: list[ast.cmpop], place: int, value: ast.cmpop) -> Callable[[]
     return lambda: items.__setitem__(place, value)
 
 
+def further(tree: Path, package: str) -> list[Path]:
+    """List the files and folders of tests of a package beyond the folder of its name."""
+    named = [tree / TESTS / each for each in FURTHER.get(package, "").split()]
+    return [each if each.is_dir() else each.with_suffix(".py") for each in named]
+
+
 def tests_of(tree: Path, path: Path) -> list[str]:
     """List the test files to try, first the record, then those named after the module, or that import it."""
     package, name = path.parts[1], path.with_suffix("").as_posix().replace("/", ".")
-    places = [tree / TESTS / each for each in (package, *FURTHER.get(package, ()), "test_structure.py")]
+    places = [tree / TESTS / package, *further(tree, package), tree / TESTS / "test_structure.py"]
     files = [
         file for place in places for file in ([place] if place.suffix else sorted(place.rglob("test_*.py")))
     ]
@@ -272,9 +247,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         every = sorted(path.parent.name for path in (tree / PROGRAM).glob("*/__init__.py"))
         for unknown in set(given.packages) - set(every):
             parser.error(f"no package of {PROGRAM}: {unknown}")
-        for lost in (
-            each for files in FURTHER.values() for each in files if not (tree / TESTS / each).exists()
-        ):
+        for lost in (each for package in FURTHER for each in further(tree, package) if not each.exists()):
             parser.error(f"FURTHER names tests that are not there: {lost}")
         for package in given.packages or every:
             modules = sorted(path.relative_to(tree) for path in (tree / PROGRAM / package).rglob("*.py"))

@@ -6,11 +6,8 @@ import numpy as np
 import pytest
 
 import rollcli
-from rollcli.errors import UsageError
 from rollcli.estimator.road.model import RoadModel
-from rollcli.files.results import Row
-from rollcli.pictures.heights import FittedRoad, heights_over, steadied
-from rollcli.pictures.heights_preview import draw_heights
+from rollcli.pictures.heights import FittedRoad, heights_over
 from rollcli.rig.calibration import Calibration
 
 WIDTH, HEIGHT = 640, 240
@@ -98,17 +95,6 @@ def test_far_above_a_plane_heights_are_exact_and_need_no_calibration():
     assert np.isnan(in_heights[d == 0]).all()
 
 
-def test_without_a_disparity_there_is_no_height():
-    road, _ = road_of(0, 30, 0.4, 0, 0.01)
-    d = np.full((HEIGHT, WIDTH), 60.0)
-    d[0, :6] = 0, -3, np.nan, np.inf, 2e15, 7
-    heights = heights_over(d, road, Calibration(400, 400, *CENTRE, 0.5))
-    assert np.isnan(heights[0, :6]).tolist() == [True] * 5 + [False]
-    assert np.isfinite(heights[1:]).all()
-    behind = heights_over(d, road, Calibration(400, 400, *CENTRE, 0.5, doffs=-30))
-    assert np.isnan(behind[0, 5])
-
-
 def test_a_flattening_road_goes_on_straight():
     """Beyond the vertex of its parabola there is no row of such a disparity."""
     road, _ = road_of(0, 20, 0.4, -8e-4, 0)
@@ -150,80 +136,3 @@ def test_a_hill_that_no_parabola_fits_is_level_and_a_dip_in_it_as_deep_as_it_is(
     below *= np.cos(np.arctan(0.003 * z - 0.1))
     lower = rollcli.height_map(seen, rollcli.estimate_roll(seen, calibration=rig), rig)
     assert np.median(lower[dip] + below) == pytest.approx(0, abs=0.002)
-
-
-def test_a_row_of_a_result_has_the_road_of_its_estimate():
-    v, u = np.mgrid[:120, :160]
-    rig = Calibration(fx=200, fy=190, cx=79.5, cy=29.5, baseline=0.5)
-    disparity = np.maximum(0.3 * (v - 20) - 0.03 * u + 5, 0).astype(np.float32)
-    estimate = rollcli.estimate_roll(disparity, calibration=rig)
-    a0, a1, a2 = estimate.alpha
-    row = Row(
-        file="a.png",
-        status="ok",
-        roll_deg=math.degrees(estimate.theta),
-        pitch_deg=1.0,
-        camber=estimate.camber,
-        alpha0=a0,
-        alpha1=a1,
-        alpha2=a2,
-        width=160,
-        height=120,
-    )
-    road = FittedRoad.of_row(row, rig)
-    assert road is not None
-    assert road.theta == pytest.approx(FittedRoad.of_estimate(estimate).theta, abs=1e-9)
-    expected = rollcli.height_map(disparity, estimate, rig)
-    assert np.allclose(heights_over(disparity, road, rig), expected, atol=1e-6, equal_nan=True)
-    assert FittedRoad.of_row(Row(file="a.png"), rig) is None
-
-
-def test_a_map_of_another_size_is_refused():
-    v = np.mgrid[:120, :160][0]
-    estimate = rollcli.estimate_roll(20 + 0.3 * v)
-    with pytest.raises(UsageError, match=r"80x60 px is not one of the 160x120 px"):
-        rollcli.height_map(np.ones((60, 80)), estimate)
-
-
-def test_a_steadied_height_is_the_median_around_it_where_all_have_one():
-    heights = np.random.default_rng(0).normal(0, 0.1, (16, 19)).astype(np.float32)
-    heights[7, 9] = np.nan
-    found = steadied(heights)
-    for v, u in np.ndindex(*heights.shape):
-        around = np.pad(heights, 2, "edge")[v : v + 5, u : u + 5]
-        expected = heights[v, u] if np.isnan(around).any() else np.median(around)
-        np.testing.assert_equal(found[v, u], expected)
-
-
-SPAN = (-0.1, 0.1)
-
-
-def colour(height, **options):
-    heights = np.full((60, 40), height, np.float32)
-    return draw_heights(heights, options.pop("span", SPAN), "metres", **options)[30, 20].astype(int)
-
-
-def test_a_height_has_the_same_colour_in_every_picture():
-    heights = np.linspace(-0.3, 0.3, 60 * 40, dtype=np.float32).reshape(60, 40)
-    heights[30, 20] = 0.03
-    assert (draw_heights(heights, SPAN, "metres")[30, 20] == colour(0.03)).all()
-    assert (colour(0.1) == colour(5)).all()
-    assert (colour(0.05, span=(-0.1, 0.1)) != colour(0.05, span=(-0.1, 0.4))).any()
-    assert (colour(0, span=(-0.1, 0.4)) == colour(0)).all()
-
-
-def test_the_colours_are_those_of_colorbrewer():
-    red_to_blue = ("b2182b", "d6604d", "f4a582", "f7f7f7", "92c5de", "4393c3", "2166ac")  # its RdBu
-    for height, digits in zip(np.linspace(0.3, -0.3, 7), red_to_blue, strict=True):
-        found = colour(height, span=(-0.3, 0.3))[::-1]
-        assert np.abs(found - [*bytes.fromhex(digits)]).max() <= 1
-
-
-def test_no_data_is_dark_and_shows_the_photo_where_there_is_one():
-    assert colour(np.nan).max() < 80
-    photo = np.full((120, 80, 3), 200, np.uint8)
-    assert colour(np.nan, photo=photo).tolist() == [200, 200, 200]
-    light = colour(0.05, photo=photo)
-    dark = np.full((120, 80), 200 << 8, np.uint16)
-    dark[:80] = 20 << 8
-    assert (colour(0.05, photo=dark) < light).all()

@@ -1,15 +1,15 @@
-"""De-rotation, v-disparity and SGBM's lag, pixel by pixel against loops that are slow and plain."""
+"""De-rotation and v-disparity, pixel by pixel against loops that are slow and plain, and on roads."""
 
 import math
 
 import numpy as np
 import pytest
 
-from rollcli.errors import UsageError
+from rollcli.estimator.estimate import estimate_roll
 from rollcli.pictures import vdisparity as vdisparity_module
 from rollcli.pictures.derotate import derotate
-from rollcli.pictures.vdisparity import middle_row, row_offset, v_disparity
-from rollcli.stereo.sgbm import LAGS, without_lag
+from rollcli.pictures.vdisparity import row_offset, v_disparity
+from tests.run_cli import road_map
 
 
 def nearest(value):
@@ -74,47 +74,6 @@ def test_each_pixel_of_a_turned_map_is_that_of_its_definition(shape, roll_deg, e
     np.testing.assert_allclose(level, turned(values, roll, level.shape), atol=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("kind", "largest", "valid"),
-    [
-        ("u2", 65535, False),
-        ("i2", 32767, False),
-        ("u2", 65534, True),
-        ("u1", 255, True),
-        ("i4", 65535, True),
-        ("f4", 65535, True),
-    ],
-)
-def test_only_the_largest_number_of_16_bits_is_no_data(kind, largest, valid):
-    values = np.full((21, 21), largest, kind)
-    assert bool(derotate(values, 0.1)[10, 10]) == valid
-
-
-@pytest.mark.parametrize(
-    ("kind", "holes", "written"),
-    [
-        ("f8", [-5, -2], -5),
-        ("f8", [-5, np.inf], np.inf),
-        ("f8", [-np.inf, np.inf], np.inf),
-        ("f8", [-5, np.nan, np.inf], np.nan),
-        ("i2", [-16, -3], -16),
-        ("i2", [32767, -3], -3),
-        ("u1", [0], 0),
-        ("f4", [], 0),
-    ],
-)
-def test_no_data_beside_the_map_is_the_least_that_it_has(kind, holes, written):
-    values = np.full((21, 21), 9, kind)
-    values[10, 5 : 5 + len(holes)] = holes
-    np.testing.assert_array_equal(derotate(values, 0.7)[0, 0], np.array(written, kind))
-
-
-def test_numbers_of_32_bits_keep_all_of_their_digits():
-    large = np.full((9, 9), 2**30 + 1, np.int32)
-    assert derotate(large, 0.1)[4, 4] == 2**30 + 1
-    assert derotate(large.astype(np.float64) + 0.125, 0.1)[4, 4] == 2**30 + 1.125
-
-
 @pytest.mark.parametrize("block", [1, 30, 1 << 22])
 def test_disparities_are_counted_in_the_bins_that_hold_them(monkeypatch, block):
     monkeypatch.setattr(vdisparity_module, "_BLOCK", block)
@@ -132,49 +91,50 @@ def test_disparities_are_counted_in_the_bins_that_hold_them(monkeypatch, block):
     assert v_disparity(np.rint(values)).counts.shape == (23, 71)
 
 
-@pytest.mark.parametrize("largest", [0.25, 1.0, 1.5, 255.5])
-def test_the_last_bin_ends_above_the_largest_disparity(largest):
-    histogram = v_disparity(np.array([[largest, 0.1]]))
-    assert histogram.max_disparity == math.floor(largest) + 1
-    assert histogram.counts.shape[1] == max(256, 4 * histogram.max_disparity)
-    with pytest.raises(UsageError):
-        v_disparity(np.ones((2, 2)), max_disparity=-1.0)
-    assert v_disparity(np.ones((2, 2)), bins=1).counts.tolist() == [[2], [2]]
+SHAPE = (97, 141)
 
 
-@pytest.mark.parametrize("theta", [-0.3, 0.0, 0.2])
-@pytest.mark.parametrize("size", [(1, 1), (31, 20), (30, 21)])
-def test_rows_of_the_method_and_of_the_map_are_those_of_its_middle(theta, size):
-    width, height = size
-    u, v = (width - 1) / 2, (height - 1) / 2
-    for row in (0.0, 7.5):
-        y = row * math.cos(theta) - u * math.sin(theta)
-        assert middle_row(y, theta, width) == pytest.approx(row)
-    # the centre stays where it is: its row and y of the method name one place
-    assert v + row_offset(theta, width, height) == pytest.approx(v * math.cos(theta) - u * math.sin(theta))
+def with_holes(values, share=0.1, seed=0):
+    return np.where(np.random.default_rng(seed).random(values.shape) < share, 0, values)
 
 
-@pytest.mark.parametrize(
-    ("rise", "raised"), [(0.05, True), (0.99, True), (1.01, False), (0.0, False), (-0.5, False)]
-)
-def test_what_rises_like_a_road_is_raised_and_an_edge_is_not(rise, raised):
-    v = np.mgrid[:60, :40][0].astype(np.float32)
-    surface = 40 + rise * v
-    added = without_lag(surface, "sgbm") - surface
-    expected = LAGS["sgbm"].most * rise / (rise + LAGS["sgbm"].half_at) if raised else 0
-    assert added == pytest.approx(expected, abs=1e-4)
+@pytest.mark.parametrize("roll_deg", [-30, -3, 3, 30])
+def test_the_estimate_on_the_result_is_zero(roll_deg):
+    theta = math.radians(roll_deg)
+    disparity = with_holes(road_map(theta, width=141, height=97, noise=0))
+
+    found = estimate_roll(disparity, road="all").theta
+
+    assert found == pytest.approx(theta, abs=1e-6)
+    # an interpolation between valid neighbours alone leans by a fraction of a pixel: evenly, over many holes
+    assert estimate_roll(derotate(disparity, found), road="all").theta == pytest.approx(
+        0, abs=math.radians(0.02)
+    )
 
 
-@pytest.mark.parametrize(("height", "raised"), [(12, False), (13, True)])
-def test_six_rows_above_and_below_tell_the_rise(height, raised):
-    v = np.mgrid[:height, :40][0].astype(np.float32)
-    assert ((without_lag(5 + 0.4 * v, "3way") > 5 + 0.4 * v).all()) == raised
+@pytest.mark.parametrize("hole", [0.0, -1.0, np.nan, np.inf, -3.4e38])
+def test_no_data_bleeds_into_no_value(hole):
+    values = np.full(SHAPE, 50.0, np.float32)
+    values[np.random.default_rng(0).random(SHAPE) < 0.3] = hole
+
+    level = derotate(values, math.radians(20))
+
+    with np.errstate(invalid="ignore"):
+        valid = np.isfinite(level) & (level > 0)
+    np.testing.assert_allclose(level[valid], 50, rtol=1e-6)
+    assert 0.4 < valid.mean() < 0.6
 
 
-def test_beside_a_hole_as_much_is_added_as_elsewhere_and_the_hole_stays():
-    surface = 40 + 0.4 * np.mgrid[:80, :90][0].astype(np.float32)
-    surface[30:37, 40:52] = 0
-    added = without_lag(surface, "sgbm") - surface
-    lag = LAGS["sgbm"]
-    np.testing.assert_allclose(added[surface > 0], lag.most * 0.4 / (0.4 + lag.half_at), atol=1e-4)
-    assert (added[surface == 0] == 0).all()
+@pytest.mark.parametrize("roll_deg", [-20, 0, 3, 15])
+def test_the_parabola_lies_on_the_road_of_the_derotated_map(roll_deg):
+    theta = math.radians(roll_deg)
+    v, u = np.mgrid[:200, :300]
+    y = v * math.cos(theta) - u * math.sin(theta)
+    disparity = 30 + 0.2 * y + 2e-4 * y**2
+    estimate = estimate_roll(disparity, road="all")
+
+    level = derotate(disparity, estimate.theta)
+    y = np.arange(200) + row_offset(estimate.theta, 300, 200)
+    road = estimate.alpha[0] + estimate.alpha[1] * y + estimate.alpha[2] * y**2
+
+    np.testing.assert_allclose(level[:, 150], road, atol=0.01)

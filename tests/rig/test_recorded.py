@@ -2,6 +2,7 @@
 
 import math
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -160,9 +161,17 @@ FILES = {
 
 
 PLAIN = files.Rig()
+INPUTS = Path(__file__).with_name("inputs.txt").read_text("utf-8")
+
+
+def _texts(kind):
+    """The texts of a kind among the inputs."""
+    lines = [line.partition(" ")[2] for line in INPUTS.split("\n") if line.startswith(f"{kind} ")]
+    return [line.encode().decode("unicode_escape") for line in lines]
+
+
 DAMAGED = (
-    "",
-    "just text\n",
+    *_texts("calibration"),
     files.KITTI_RAW[:-60],
     files.KITTI_RAW.replace("-3.875744e+02", "nan"),
     files.KITTI_RAW.replace("-3.875744e+02", "9" * 5000),
@@ -202,50 +211,9 @@ DAMAGED = (
     files.kitti_raw(PLAIN).replace("S_rect_00: 1226 370", "S_rect_00: 1226"),
     files.driving_stereo(PLAIN).replace("P_rect_103", "P_rect_104"),
     files.orb_slam(PLAIN).replace("fx: 707.0912", "fx: 0"),
-    "projection_matrix:\n  data: 5\n",
     files.opencv_yaml(PLAIN._replace(baseline=-0.5)).partition("Q:")[0],
-    "%YAML:1.0\nQ: {data: [1, 2, 3]}\n",
-    '{"intrinsic": ["fx", "u0"]}',
-    '["intrinsic", "u0"]',
-    '{"intrinsic": {"fx": 1}}',
-    '{"u0": 1}',
-    "cam0=[1 0 1; 0 1 1; 0 0 1]\n",
-    "doffs=3\n",
-    "cam1:\n  intrinsics: [1, 1, 1, 1]\n",
-    "[STEREO]\nBaseline=120\n",
-    "P1: 1 0 1 0 0 1 1 0 0 0 1 0\n",
-    "P0: 500 0 320 0 0 500 240 0 0 0 1 0\nP1: 500 0 320 0 0 500 240 -100 0 0 1 0\n",
 )
-YAMLS = (
-    "# nothing but a comment\n",
-    "- 1\n- 2\n",
-    "a: 1\n b: 2\n",
-    "a: 1\n\tb: 2\n",
-    "a: 1\nb: 2\na: 3\n",
-    "a: {b: 1, b: 2}\n",
-    "a: [1] 2\n",
-    "a: [1, {b: 2]}\n",
-    "a: {]:\n",
-    "P1: {]:",
-    'a: [1, "]"\n',
-    "a: [1,\n2",
-    "a: 'b",
-    "a: [&x, 2]\n",
-    "a: {b: *x}\n",
-    "a: 1\nb: !!binary |\n  YQ==\n",
-    "a: !thing {b: 1}\n",
-    "? [a]\n: b\n",
-    "a: \0\n",
-    "a: [" + "1," * 60_000 + "]",
-    'a: "b # c"  # d\n',
-    "%YAML:1.0\n---\na:1\nb.c: {d: 2}\n",
-    "%YAML 1.0\na: 1\n",
-    "a:\t1\t\nb: \t[1,\t2]\n\t\n",
-    "a: !!opencv-matrix\n   data: [ 1., 2. ]\n",
-    "a:\n- - x\n  - y\n- b: c\n",
-    "%YAML:1.0\n---\na: 1\n...\n]\n",
-    "a:\nb: 1\n",
-)
+YAMLS = [*_texts("yaml"), "a: [" + "1," * 60_000 + "]"]
 
 POSED = {
     "noisy": lambda: bent_road(4, width=240, height=160, noise=0.3, seed=2),

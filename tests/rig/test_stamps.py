@@ -8,7 +8,7 @@ import pytest
 
 from rollcli.files.results import Row
 from rollcli.report.charts import all_charts
-from rollcli.rig.drive.assess import assess_rig, drive_of
+from rollcli.rig.drive.assess import assess_rig
 from tests.run_cli import rollcli
 
 START = 1_700_000_000_123_456_789
@@ -25,18 +25,6 @@ def rows(count=600, rate=RATE, name=NAME, start=START, every_s=1.0):
         Row(name.format(start + round(time * 1e9)), "", "ok", roll_deg=float(roll), roll_ci95_deg=0.05)
         for time, roll in zip(times, rolls, strict=True)
     ]
-
-
-def test_a_drift_is_told_an_hour_where_names_have_stamps():
-    times, given = rows()
-    rig = assess_rig(given)
-    (drive,) = rig.drives
-    hourly, whole = rig.drift_per_hour(drive), drive.quantities["roll"].drift
-    hours = (times[-1] - times[0]) / 3600
-    assert hourly.value == pytest.approx(whole.value / hours)
-    assert abs(hourly.value - RATE) < hourly.ci95 < 0.6
-    without = assess_rig([replace(each, file=f"{place}.png") for place, each in enumerate(given)])
-    assert without.drift_per_hour(without.drives[0]).value is None
 
 
 def test_rig_says_the_drift_an_hour_in_words_and_in_json(tmp_path):
@@ -93,21 +81,3 @@ def test_the_axis_stays_that_of_frames_where_time_would_mislead():
     ):
         chart = all_charts(some, assess_rig(some))["roll"]
         assert chart.layout["xaxis"]["title"]["text"] == "frame"
-
-
-def test_frames_of_one_recording_are_one_drive():
-    for file, drive in {
-        "maps/a.png": "maps",
-        "a.png": "",
-        "run.zip#maps/a.png": "run.zip#maps",
-        NAME.format(START): "runs/drive.mcap",
-        "runs/drive.mcap#rest": "runs/drive.mcap",
-        "drive.mp4#000123": "drive.mp4",
-        "runs/night/night_0.mcap#/l@5": "runs/night",  # rosbag2 has split it
-        "runs/night/night_1.mcap#/l@9.1": "runs/night",
-        "runs/night_0.mcap#/l@5": "runs/night_0.mcap",
-    }.items():
-        assert drive_of(file) == drive
-    names = [f"{video}.mp4#{frame:06d}" for video in "ab" for frame in range(20)]
-    rig = assess_rig({"file": names, "roll_deg": np.repeat([0.1, 2.0], 20), "status": ["ok"] * 40})
-    assert [drive.name for drive in rig.drives] == ["a.mp4", "b.mp4"]

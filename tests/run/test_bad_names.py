@@ -43,12 +43,6 @@ def test_a_name_that_no_file_system_takes_costs_its_row(maps, name):
     assert len(list((maps / "turned").iterdir())) == 3
 
 
-@pytest.mark.parametrize("option", ["--mask", "--left", "--calib"])
-def test_a_name_that_no_file_system_takes_is_refused_as_an_option(maps, option):
-    other = ["--right", "maps/frame0.png"] if option == "--left" else ["maps"]
-    rollcli("estimate", *other, option, LONG, cwd=maps).refused()
-
-
 def without_privilege():
     """What stands before a command so that permissions count, for root too."""
     if not hasattr(os, "geteuid") or os.geteuid() != 0:

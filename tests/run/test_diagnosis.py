@@ -4,10 +4,9 @@ import cv2
 import numpy as np
 import pytest
 
-from rollcli.errors import InputError
 from rollcli.files.encodings import read_disparity, to_disparity
 from rollcli.files.formats import Stored, read_stored
-from rollcli.run.diagnosis import looks_like, require_positive, too_large
+from rollcli.run.diagnosis import looks_like, require_positive
 from rollcli.run.options import FrameOptions
 from tests.run_cli import ROOT, road_map
 
@@ -66,32 +65,6 @@ def test_real_maps_and_photographs_are_told_apart():
         pytest.skip(f"the real maps and photographs are not there: {SHARED}")
     assert [path for path in maps if verdict(cv2.imread(path, cv2.IMREAD_UNCHANGED))] == []
     assert all(PHOTOGRAPH in verdict(cv2.imread(path, cv2.IMREAD_GRAYSCALE)) for path in photographs)
-
-
-@pytest.mark.parametrize(
-    ("times", "dtype", "remedy"),
-    [
-        (16, np.float32, "16 or 256 times too large; give --encoding sgbm (stored / 16) or --encoding kitti"),
-        (256, np.float32, "look 256 times too large; give --encoding kitti (stored / 256)"),
-        (256, np.uint32, "look 256 times too large; give --encoding kitti (stored / 256)"),
-        (65536, np.float32, "give --scale, the pixels that a stored number of 1 stands for"),
-    ],
-)
-def test_disparities_beyond_the_width_are_told_what_divides_them(times, dtype, remedy):
-    stored = Stored((road_map() * times).astype(dtype), "npy")
-    said = too_large(to_disparity(stored).disparity, stored, "px")
-    assert remedy in said
-    assert "larger than the map is wide, 160 px" in said
-
-
-@pytest.mark.parametrize("empty", [0, np.nan, -np.inf])
-def test_a_map_of_negative_numbers_is_asked_for_its_sign(empty):
-    values = -road_map()
-    values[:10] = empty
-    with pytest.raises(
-        InputError, match=r"a.npy: every number is negative, -5\d.* other sign\? Give --scale -1"
-    ):
-        require_positive(Stored(values, "npy"), "a.npy")
 
 
 @pytest.mark.parametrize(

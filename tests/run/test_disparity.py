@@ -2,24 +2,14 @@
 
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
 
 from rollcli.files.encodings import read_disparity
-from rollcli.files.formats import read_image, read_stored
-from rollcli.run.options import FrameOptions, ImageOptions
-from rollcli.run.read import matched_source
-from rollcli.stereo.match import StereoOptions
+from rollcli.files.formats import read_stored
 from tests.run_cli import ROOT, contents, road_map, rollcli, write_pair
 
 ROADS = ROOT.parent / "shared" / "roads"
-
-
-def as_estimated(left, right, **options):
-    """The map of a pair that is levelled as `estimate` levels it, all rows at full size."""
-    wanted = FrameOptions(stereo=StereoOptions(**options), images=ImageOptions(disparity="x"))
-    return matched_source(left, right, None, wanted).shown
 
 
 @pytest.fixture(scope="module")
@@ -46,26 +36,6 @@ def test_each_pair_gives_a_kitti_map_named_after_its_left_image(pairs):
         both = (found > 0) & (truth > 0)
         assert both.sum() > 0.6 * (truth > 0).sum()  # the left margin has no partner in the right image
         assert np.median(np.abs(found - truth)[both]) < 0.5
-
-
-@pytest.mark.parametrize(("save_as", "ending"), [("tiff", ".tif"), ("npy", ".npy")])
-def test_other_formats_hold_pixels_as_they_are(pairs, save_as, ending):
-    assert match(pairs, "-o", save_as, "--save-as", save_as).status == 0
-    for path in (pairs / save_as).iterdir():
-        assert path.suffix == ending
-        stored = read_stored(path)
-        assert (stored.format, stored.values.dtype) == (save_as, np.float32)
-        left, right = (read_image(pairs / "rig" / side / f"{path.stem}.png") for side in ("left", "right"))
-        np.testing.assert_array_equal(stored.values, as_estimated(left, right))
-
-
-def test_stereo_options_reach_the_matcher(pairs):
-    options = ["--num-disparities", "32", "--block-size", "7", "--downscale", "2", "--save-as", "npy"]
-    assert match(pairs, "-o", "small", *options).status == 0
-    path = next((pairs / "small").iterdir())
-    left, right = (read_image(pairs / "rig" / side / f"{path.stem}.png") for side in ("left", "right"))
-    expected = as_estimated(left, right, num_disparities=32, block_size=7, downscale=2)
-    np.testing.assert_array_equal(np.load(path), expected)
 
 
 @pytest.mark.parametrize("program", [["disparity", "-o"], ["estimate", "-o", "rolls.csv", "--disparity"]])
@@ -99,17 +69,6 @@ def test_a_resume_finds_the_tiff_that_stands_for_a_png(tmp_path):
     assert sorted(contents(tmp_path / "maps")) == ["a.png", "b.tif"]
 
 
-def test_the_road_of_a_pair_is_drawn_on_its_photo(tmp_path):
-    write_pair(tmp_path, "a.png", road_map(0.02, width=900) / 2)
-    pair = ("--left", "left", "--right", "right", "--num-disparities", "64")
-    assert rollcli("estimate", *pair, "--road-mask", "road", cwd=tmp_path).status == 0
-    drawn = cv2.imread(str(tmp_path / "road" / "a.png")).astype(int)
-    photo = cv2.imread(str(tmp_path / "left" / "a.png")).astype(int)
-    assert drawn.shape == photo.shape
-    unchanged = (drawn == photo).all(axis=2)
-    assert 0.02 < unchanged.mean() < 0.98
-
-
 @pytest.mark.slow
 @pytest.mark.skipif(not ROADS.is_dir(), reason="the real road pairs (../shared/roads) are not here")
 def test_on_real_roads_most_pixels_of_the_matched_region_are_valid(tmp_path):
@@ -128,13 +87,3 @@ def matched_share(path: Path) -> float:
     disparity = read_disparity(path)
     seen_by_both = disparity[:, int(disparity.max()) + 1 :]
     return float((seen_by_both > 0).mean())
-
-
-def test_views_without_a_pixel_that_matches_have_no_map(tmp_path):
-    for side in ("left", "right"):
-        (tmp_path / side).mkdir()
-        cv2.imwrite(str(tmp_path / side / "a.png"), np.full((120, 320), 128, np.uint8))
-    run = rollcli("disparity", "--left", "left", "--right", "right", "-o", "maps", cwd=tmp_path)
-    assert run.status == 3
-    assert "left/a.png: no pixel could be matched with the right image" in run.err
-    assert not list((tmp_path / "maps").glob("*"))

@@ -5,8 +5,7 @@ import sys
 
 import pytest
 
-from rollcli.errors import OutputError
-from rollcli.run.result_file import DurableRows, ResultFile, open_result
+from rollcli.run.result_file import DurableRows, open_result
 from tests.run_cli import contents, keep_rows, rollcli, write_maps
 from tests.slow import mostly_slow
 
@@ -58,16 +57,6 @@ def test_a_row_is_written_after_its_images_and_their_folder_are_on_the_disk(tmp_
     assert file.synced == rows.written == 40
 
 
-def test_a_row_without_images_is_written_at_once_and_after_those_that_wait(tmp_path, file):
-    rows = DurableRows(file, WatchedFile([]))
-    rows.append([b"0 "], [b"read"], [])
-    assert list(file.rows) == [b"0"]
-    for number in range(1, 5):
-        rows.append([b"%d " % number], [b"read"], [str(image(tmp_path, number))] if number % 2 else [])
-    rows.commit()
-    assert list(file.rows) == [b"%d" % number for number in range(5)]
-
-
 @pytest.fixture
 def finished(tmp_path):
     write_maps(tmp_path / "maps", 6)
@@ -93,12 +82,6 @@ def test_a_resume_makes_missing_and_empty_images_of_kept_rows_again(finished, ro
     assert "images are missing or empty for 2 of the kept rows" in done.err
     assert contents(finished) == before
     assert (finished / "up" / "frame2.png").stat().st_mtime_ns == kept
-
-
-def test_a_dry_run_of_a_resume_lists_images_that_are_missing(finished):
-    assert [line for line in resume(finished, "--dry-run").out.splitlines() if "frame" in line] == []
-    (finished / "up" / "frame4.png").unlink()
-    assert "write up/frame4.png" in resume(finished, "--dry-run").out.splitlines()
 
 
 def test_images_that_cannot_be_made_again_end_the_resume_with_one_line(finished):
@@ -134,15 +117,6 @@ def interrupted_at(step, work):
     finally:
         sys.settrace(before)
     return False
-
-
-def test_a_result_that_the_disk_does_not_give_is_named(tmp_path):
-    descriptor = os.open(tmp_path, os.O_RDONLY)  # a folder cannot be read like a file
-    try:
-        with pytest.raises(OutputError, match=r"rolls\.csv: cannot be written: is a directory"):
-            ResultFile(descriptor, "rolls.csv").read()
-    finally:
-        os.close(descriptor)
 
 
 def test_a_second_interrupt_at_any_line_writes_no_row_twice_and_leaves_none_out(tmp_path):

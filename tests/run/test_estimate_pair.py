@@ -3,12 +3,9 @@
 import math
 
 import cv2
-import numpy as np
 import pytest
 
 import rollcli as package
-from rollcli.errors import UsageError
-from rollcli.files.formats import decode_stored, encode_stored
 from rollcli.files.results import ALIGNMENT_COLUMNS
 from rollcli.run.read import Provenance
 from rollcli.simulate.build import render_frame
@@ -80,12 +77,6 @@ def test_the_call_says_what_the_command_does(pair):
     assert (found.status, found.message) == (row["status"], row["message"])
 
 
-def test_a_largest_roll_that_is_none_is_refused_before_the_match(pair):
-    _, left, right = pair
-    with pytest.raises(UsageError, match="largest roll"):
-        package.estimate_pair(left, right, max_roll=0)
-
-
 def test_what_a_file_carries_is_read_back_and_what_others_wrote_is_not():
     carried = Provenance(0.00125, 'a "doubt"', {"right_lower_px": 1.25})
     assert Provenance.of_text(carried.text) == carried
@@ -94,15 +85,3 @@ def test_what_a_file_carries_is_read_back_and_what_others_wrote_is_not():
     lies = '{"slope_error": 0, "doubt": "", "alignment": {"right_lower_px": NaN, "right_twist_px": 1}}'
     for other in ("", "{}", "[1]", "null", '{"slope_error": -1, "doubt": "", "alignment": {}}', "no", lies):
         assert Provenance.of_text(other) == Provenance()
-
-
-def test_maps_with_and_without_a_text_hold_the_same_numbers():
-    values = np.arange(12, dtype=np.uint16).reshape(3, 4)
-    for form in ("png", "tiff"):
-        plain, said = encode_stored(values, form), encode_stored(values, form, text="one line")
-        assert (decode_stored(plain, "x").text, decode_stored(said, "x").text) == ("", "one line")
-        np.testing.assert_array_equal(decode_stored(said, "x").values, values)
-        np.testing.assert_array_equal(
-            cv2.imdecode(np.frombuffer(said, np.uint8), cv2.IMREAD_UNCHANGED), values
-        )
-    assert decode_stored(encode_stored(values, "npy", text="one line"), "x").text == ""

@@ -8,11 +8,12 @@ from dataclasses import replace
 
 import pytest
 
-from rollcli.errors import ExitStatus
 from rollcli.files.results import Row
-from rollcli.run.frame import Frame, FrameResult, failed_frame
+from rollcli.run import summary
+from rollcli.run.frame import Frame, failed_frame
 from rollcli.run.options import EncodingOptions, RunningOptions
 from rollcli.run.progress import Progress, TaskProgress
+from rollcli.run.summary import Figures, RunSummary
 
 GUESSED = EncodingOptions()
 
@@ -24,10 +25,6 @@ def progress(total=3, encoding=GUESSED, **running):
 MAP = Frame("a.png", "", "a.png", "", "a.png", None)
 
 
-def result(status="ok", message="", **values):
-    return FrameResult(Row("a.png", status=status, message=message), **values)
-
-
 def failed(name, message, cause):
     return failed_frame(replace(MAP, file=name), message, cause)
 
@@ -35,15 +32,6 @@ def failed(name, message, cause):
 @pytest.fixture
 def lines(capsys):
     return lambda: capsys.readouterr().err.splitlines()
-
-
-def test_the_exit_status_says_whether_a_frame_failed(lines):
-    counted = progress()
-    counted.add(result("suspect"))
-    assert counted.summary.status is ExitStatus.DONE
-    counted.add(failed("a.png", "is no map", "no map"))
-    assert counted.summary.status is ExitStatus.FRAMES_FAILED
-    assert lines() == ["rollcli: a.png: is no map"]
 
 
 def test_of_many_causes_the_first_five_are_said(lines):
@@ -55,51 +43,6 @@ def test_of_many_causes_the_first_five_are_said(lines):
         *(f"rollcli: x: {cause}" for cause in "abcde"),
         "rollcli: 2 further frames: other causes, which -v names",
     ]
-
-
-def test_a_verbose_run_names_every_failure(lines):
-    counted = progress(verbose=True)
-    for number in range(8):
-        counted.add(failed("a.png", f"{number}", "number"))
-    counted.tell_end()
-    assert [line for line in lines() if "a.png" in line] == [f"rollcli: a.png: {n}" for n in range(8)]
-
-
-PAIR = Frame("left/a.png", "right/a.png", "left/a.png", "right/a.png", "a.png", None)
-
-
-@pytest.mark.parametrize(
-    ("frame", "reason", "message", "said"),
-    [
-        (MAP, "a.png: is empty", "is empty", "a.png: is empty"),
-        (MAP, "no road", "no road", "a.png: no road"),
-        (MAP, "a.png.tif: is empty", "a.png.tif: is empty", "a.png: a.png.tif: is empty"),
-        (PAIR, "left/a.png: is empty", "left image: is empty", "left/a.png: is empty"),
-        (PAIR, "right/a.png: is empty", "right image: is empty", "right/a.png: is empty"),
-        (PAIR, "no road", "no road", "left/a.png: no road"),
-    ],
-)
-def test_a_row_does_not_repeat_its_file_and_stderr_names_it(frame, reason, message, said):
-    failed = failed_frame(frame, reason)
-    assert (failed.row.message, failed.said) == (message, said)
-
-
-def test_a_quiet_run_says_errors_alone(lines):
-    counted = progress(quiet=True, verbose=True)
-    counted.add(
-        result("suspect", "is doubtful", encoding="px", warnings={"doubt": "may be wrong"}, searched=(0, 63))
-    )
-    counted.note(counted.last_line())
-    counted.detail("a detail")
-    assert lines() == []
-    counted.say("an error")
-    assert lines() == ["rollcli: an error"]
-
-
-def test_doubts_are_said_when_verbose(lines):
-    counted = progress(verbose=True)
-    counted.add(result("suspect", "is doubtful"))
-    assert lines() == ["rollcli: a.png: suspect: is doubtful"]
 
 
 class Clock:
@@ -196,25 +139,6 @@ def test_a_terminal_shows_a_bar_which_makes_room_for_messages_and_vanishes(monke
     os.close(terminal.reader)
 
 
-def test_quiet_progress_writes_no_lines(clock, capsys):
-    with TaskProgress(3, quiet=True, verbose=True) as progress:
-        clock.now += 40
-        progress.advance()
-        progress.note("a note")
-        progress.detail("a detail")
-    assert capsys.readouterr().err == ""
-
-
-def test_a_note_is_written_once_and_a_detail_only_when_verbose(capsys):
-    for verbose, expected in ((False, "rollcli: a note\n"), (True, "rollcli: a note\nrollcli: a detail\n")):
-        with TaskProgress(3, verbose=verbose) as progress:
-            progress.note("a note")
-            progress.note("a note")
-            progress.note("the same topic", topic="a note")
-            progress.detail("a detail")
-        assert capsys.readouterr().err == expected
-
-
 def test_the_speed_leaves_out_what_an_interrupted_run_has_left(clock):
     progress = TaskProgress(100)
     progress.kept = 50
@@ -222,3 +146,12 @@ def test_the_speed_leaves_out_what_an_interrupted_run_has_left(clock):
         clock.now += 0.5
         progress.advance()
     assert progress.speed() == "2.0 frames/s"
+
+
+def test_of_more_frames_than_memory_is_meant_for_the_answer_names_who_has_it(monkeypatch):
+    monkeypatch.setattr(summary, "_MOST_FRAMES", 3)
+    found = RunSummary()
+    for number in range(5):
+        found.add_row(Row(f"{number}.png", status="ok", roll_deg=1.0, roll_ci95_deg=0.1))
+        found.replace([number], Figures.of([Row(f"{number}.png")]))
+    assert found.rig_roll() == "more than 3 frames: rollcli rig RESULT says what they say of the rig"

@@ -37,43 +37,6 @@ def test_half_a_part_of_a_killed_run_is_removed(parts, half_written, flag):
     assert contents(folder) == whole
 
 
-@pytest.mark.parametrize("flags", [(), ("--dry-run",)])
-def test_parts_that_exist_are_kept_unless_told_otherwise(parts, flags):
-    folder, line = parts
-    whole = contents(folder)
-    refusal = rollcli(*line, *flags, cwd=folder).refused()
-    assert refusal == (
-        "rollcli: rolls.parquet: exists already; give --resume to continue it or --overwrite to replace it\n"
-    )
-    assert contents(folder) == whole
-
-
-def test_nothing_stays_of_parts_that_an_overwriting_run_of_fewer_frames_does_not_have(parts):
-    folder, line = parts
-    for number in (3, 4, 5):
-        (folder / "maps" / f"frame{number}.png").unlink()
-    assert rollcli(*line, "--overwrite", cwd=folder).status == 0
-    assert sorted(name for name in contents(folder) if "part-" in name) == [
-        *(f"rolls.parquet.inputs/part-0000{number}.inputs" for number in range(2)),
-        *(f"rolls.parquet/part-0000{number}.parquet" for number in range(2)),
-    ]
-
-
-@pytest.mark.parametrize(
-    ("damaged", "words"),
-    [
-        ("rolls.parquet/part-00001.parquet", "rolls.parquet/part-00001.parquet: is damaged"),
-        ("rolls.parquet.run.json", "rolls.parquet.run.json"),
-    ],
-)
-def test_damaged_parts_are_not_resumed(parts, damaged, words):
-    folder, line = parts
-    (folder / damaged).write_bytes((folder / damaged).read_bytes()[:-20])
-    before = contents(folder)
-    assert words in rollcli(*line, "--resume", cwd=folder).refused()
-    assert contents(folder) == before
-
-
 @pytest.mark.parametrize(("gone", "kept"), [((1, 2), 2), ((0,), 4), ((0, 1), 2)])
 def test_a_full_disk_keeps_the_other_parts_and_says_how_to_go_on(parts, gone, kept, monkeypatch):
     folder, line = parts

@@ -1,6 +1,5 @@
 """What survives when a run is killed, interrupted or started twice."""
 
-import json
 import os
 import shlex
 import signal
@@ -17,11 +16,9 @@ from tests.run_cli import (
     ended,
     environment,
     keep_rows,
-    road_map,
     rollcli,
     started,
     wait_until,
-    write_kitti,
     write_maps,
 )
 from tests.slow import mostly_slow
@@ -90,18 +87,6 @@ def test_a_run_killed_again_and_again_ends_in_the_same_bytes_and_leaves_nothing_
     done = rollcli("estimate", "maps", "-o", "rolls.csv", *IMAGES, "--resume", cwd=folder)
     assert done.status == 3
     assert results(folder) == results(undisturbed)
-
-
-def test_resume_does_not_do_again_what_is_done(undisturbed, folder):
-    run = start(folder, "-j1")
-    wait_for_rows(folder, 10, run)
-    kill(run)
-    before = {path: path.stat().st_mtime_ns for path in (folder / "upright").iterdir()}
-    done = (folder / "rolls.csv").read_text().splitlines()[1:-1]
-    rollcli("estimate", "maps", "-o", "rolls.csv", *IMAGES, "--resume", cwd=folder)
-    for line in done:
-        path = folder / "upright" / line.split(",")[0].removeprefix("maps/")
-        assert line.split(",")[2] == "error" or path.stat().st_mtime_ns == before[path]
 
 
 @pytest.mark.parametrize("jobs", mostly_slow([1, 2], 2))
@@ -224,62 +209,6 @@ def interrupted(tmp_path):
     return tmp_path
 
 
-def refused(folder, *arguments):
-    """The one line that refuses to resume; the result stays as it was."""
-    before = (folder / "rolls.csv").read_bytes()
-    done = rollcli("estimate", "maps", "-o", "rolls.csv", "--resume", *arguments, cwd=folder)
-    assert done.status == 2
-    assert done.err.count("\n") == 1
-    assert (folder / "rolls.csv").read_bytes() == before
-    return done.err
-
-
-@pytest.mark.parametrize(("count", "shard"), [(7, []), (7, ["--shard", "2/2"]), (1, [])])
-def test_a_folder_that_has_grown_at_its_end_is_resumed_to_the_bytes_of_one_run(tmp_path, count, shard):
-    write_maps(tmp_path / "maps", count)
-    rollcli("estimate", "maps", "-o", "rolls.csv", *shard, cwd=tmp_path)
-    before = (tmp_path / "rolls.csv").read_bytes()
-    for index in (7, 8, 10):
-        write_kitti(tmp_path / "maps" / f"frame{index}.png", road_map(0.1, seed=index))
-    done = rollcli("estimate", "maps", "-o", "rolls.csv", "--resume", *shard, cwd=tmp_path)
-    assert done.status == 0
-    assert f"({len(before.splitlines()) - 1} kept)" in done.err
-    rollcli("estimate", "maps", "-o", "anew.csv", *shard, cwd=tmp_path)
-    assert (tmp_path / "rolls.csv").read_bytes() == (tmp_path / "anew.csv").read_bytes()
-    record = "rolls.csv.run.json"
-    assert (tmp_path / record).read_bytes() == (tmp_path / "anew.csv.run.json").read_bytes()
-
-
-@pytest.mark.parametrize(
-    ("key", "value"),
-    [("rollcli", None), ("options", [1]), ("inputs", "x"), ("encoding", [1]), ("disparities_searched_px", 5)],
-)
-def test_a_resume_with_a_damaged_record_is_refused(interrupted, key, value):
-    record = interrupted / "rolls.csv.run.json"
-    record.write_text(json.dumps({**json.loads(record.read_text()), key: value}))
-    assert "rolls.csv.run.json is damaged; --overwrite starts anew" in refused(interrupted)
-
-
-@pytest.mark.parametrize("data", [b"a,b\n1,2\n", b"my notes", b"\x89PNG", b"[1]"])
-def test_a_file_of_another_program_is_not_resumed(interrupted, data):
-    (interrupted / "rolls.csv").write_bytes(data)
-    assert "is not a result as rollcli estimate writes it" in refused(interrupted)
-
-
-@pytest.mark.parametrize("edit", [("file,", "\ufefffile,"), ("\n", "\r\n"), ("roll_deg", "Roll")])
-def test_a_result_that_an_editor_has_changed_is_not_resumed(interrupted, edit):
-    result = interrupted / "rolls.csv"
-    result.write_bytes(result.read_text().replace(*edit).encode())
-    assert "is not a result as rollcli estimate writes it" in refused(interrupted)
-
-
-def test_a_result_with_more_rows_than_frames_is_not_resumed(interrupted):
-    rollcli("estimate", "maps", "-o", "rolls.csv", "--resume", cwd=interrupted)
-    whole = (interrupted / "rolls.csv").read_text()
-    (interrupted / "rolls.csv").write_text(whole + whole.partition("\n")[2])
-    assert "it has 20 rows, and there are 10 frames" in refused(interrupted)
-
-
 @pytest.mark.parametrize("ending", ["csv", "jsonl"])
 def test_a_result_cut_anywhere_is_resumed_to_the_same_bytes(tmp_path, ending):
     names = ['comma, "quote".png', "new\nline.png", "return\rhere.png", "umlaut ü.png", b"no text \xff.png"]
@@ -316,24 +245,3 @@ def test_fail_fast_stops_at_the_first_failure_and_can_be_resumed(undisturbed, fo
     assert (done.status, len(rows)) == (3, 9)
     rollcli("estimate", "maps", "-o", "rolls.csv", *IMAGES, "--resume", cwd=folder)
     assert results(folder) == results(undisturbed)
-
-
-@pytest.mark.parametrize("flag", [[], ["--resume"], ["--overwrite"]])
-def test_an_empty_file_is_no_result(tmp_path, flag):
-    write_maps(tmp_path / "maps", 2)
-    (tmp_path / "rolls.csv").touch()
-    assert rollcli("estimate", "maps", "-o", "rolls.csv", *flag, cwd=tmp_path).status == 0
-
-
-def test_a_record_of_another_program_is_replaced_only_when_told_so(tmp_path):
-    write_maps(tmp_path / "maps", 1)
-    record = tmp_path / "rolls.csv.run.json"
-    for foreign in ("my notes", "[1]", '{"rollcli": 1}', "{}"):
-        record.write_text(foreign)
-        done = rollcli("estimate", "maps", "-o", "rolls.csv", cwd=tmp_path)
-        assert (done.status, record.read_text()) == (2, foreign)
-        assert "rolls.csv.run.json: exists already and is not the record of a run" in done.err
-        assert not (tmp_path / "rolls.csv").exists()
-    assert rollcli("estimate", "maps", "-o", "rolls.csv", "--overwrite", cwd=tmp_path).status == 0
-    (tmp_path / "rolls.csv").unlink()  # a record of an earlier run is ours
-    assert rollcli("estimate", "maps", "-o", "rolls.csv", cwd=tmp_path).status == 0

@@ -1,6 +1,5 @@
 """What failed is done again, on Windows too, and the result is that of a run without failures."""
 
-import json
 import os
 import shutil
 import signal
@@ -16,7 +15,7 @@ from rollcli.run import estimate as batch_run
 from rollcli.run import parts, result_file
 from rollcli.run.estimate import estimate_frame
 from rollcli.run.result_file import open_result
-from tests.run_cli import contents, keep_rows, road_map, rollcli, started, wait_until, write_kitti, write_maps
+from tests.run_cli import contents, road_map, rollcli, started, wait_until, write_kitti, write_maps
 
 FRAMES = 12
 
@@ -110,15 +109,6 @@ def test_a_retry_that_is_interrupted_keeps_what_it_has_done_and_is_taken_up_agai
     assert kept == fresh
 
 
-def test_a_retry_that_may_not_fail_stops_at_the_first_failure(folder, maps):
-    line = ("estimate", "maps", "-o", "rolls.csv")
-    assert rollcli(*line, cwd=folder).status == 3
-    mend(folder, maps, 2, 9)
-    assert rollcli(*line, *RETRY, "--fail-fast", cwd=folder).status == 3
-    statuses = [row.status for row in read_result(folder / "rolls.csv").rows]
-    assert [statuses[index] for index in BROKEN] == ["ok", "error", "error"]
-
-
 def made_at_least(folder, count):
     return len(list(folder.glob("up/[!.]*.png"))) >= count
 
@@ -170,23 +160,6 @@ def test_a_run_that_ends_between_rows_and_what_says_of_their_files_is_taken_up_a
     monkeypatch.undo()
     done = rollcli(*line, *flags, cwd=folder)
     assert done.status == 0, done.err
-    fresh, kept = anew(folder, line)
-    assert kept == fresh
-
-
-def test_an_interrupted_run_with_failures_is_mended_and_finished_in_one_go(folder, maps):
-    line = ("estimate", "maps", "-o", "rolls.csv")
-    rollcli(*line, cwd=folder)
-    keep_rows(folder / "rolls.csv", 6, 9)
-    record = folder / "rolls.csv.run.json"
-    record.write_text(json.dumps({**json.loads(record.read_text()), "counts": {}}))
-    mend(folder, maps, 2, 3)
-    listed = rollcli(*line, *RETRY, "--dry-run", cwd=folder).out
-    reads = [each.split("/")[-1] for each in listed.splitlines() if each.startswith("read")]
-    assert reads == [f"frame{index}.png" for index in (2, 3, 6, 7, 8, 9, 10, 11)]
-    assert rollcli(*line, *RETRY, cwd=folder).status == 3
-    mend(folder, maps, 9)
-    assert rollcli(*line, *RETRY, cwd=folder).status == 0
     fresh, kept = anew(folder, line)
     assert kept == fresh
 

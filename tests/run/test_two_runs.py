@@ -42,7 +42,7 @@ def maps(tmp_path):
 def test_of_two_runs_in_a_bucket_the_last_to_begin_goes_on_and_the_other_ends(bucket, maps):
     given = options(maps, f"{bucket}/rolls.csv")
     plan = make_plan(given)
-    with open_output(plan, given) as first, open_output(plan, given) as last:
+    with open_output(plan) as first, open_output(plan) as last:
         append(first, plan.frames[:1])
         with pytest.raises(UsageError, match="another run has begun to write this result"):
             append(first, plan.frames[1:])
@@ -58,7 +58,7 @@ def test_of_two_runs_in_a_bucket_the_last_to_begin_goes_on_and_the_other_ends(bu
     result = read_result(f"{bucket}/rolls.csv")
     assert [row.file for row in result.rows] == [frame.file for frame in plan.frames]
     assert result.run["counts"] == {"frames": 4, "ok": 4, "suspect": 0, "error": 0}
-    with pytest.raises(UsageError, match="exists already"), open_output(plan, given):
+    with pytest.raises(UsageError, match="exists already"), open_output(plan):
         pass
 
 
@@ -66,10 +66,10 @@ def test_a_run_whose_rows_come_slowly_looks_now_and_then(bucket, maps, monkeypat
     monkeypatch.setattr("rollcli.run.parts._CHECK_S", 0.0)
     given = options(maps, f"{bucket}/rolls.csv")
     plan = make_plan(given)
-    with open_output(plan, given) as first:
+    with open_output(plan) as first:
         append(first, plan.frames[:1])
         with (
-            open_output(plan, given),
+            open_output(plan),
             pytest.raises(UsageError, match="another run has begun to write this result"),
         ):
             append(first, plan.frames[1:2])  # the part is not full
@@ -85,11 +85,11 @@ def test_two_runs_that_begin_in_the_same_second_are_told_apart_at_once(bucket, m
         """The other one writes right after the first."""
         written(record, *arguments, **words)
         if not others:
-            others.append(open_output(plan, given))
+            others.append(open_output(plan))
             others.append(others[0].__enter__())
 
     monkeypatch.setattr(RunRecord, "write", write)
-    with pytest.raises(UsageError, match="another run has begun"), open_output(plan, given):
+    with pytest.raises(UsageError, match="another run has begun"), open_output(plan):
         pass
     append(others[1], plan.frames)
     others[0].__exit__(None, None, None)

@@ -1,15 +1,13 @@
 """A result is updated to the bytes of a run on the inputs as they are; identical bytes count as unchanged."""
 
 import os
-import shutil
-import tarfile
 
 import pytest
 
 from rollcli.files.storage import list_names, read_bytes, remove, write_bytes
 from rollcli.run import inputs
 from tests.object_store import upload
-from tests.run_cli import contents, keep_rows, road_map, rollcli, write_kitti, write_maps, write_pair
+from tests.run_cli import contents, road_map, rollcli, write_kitti, write_maps
 from tests.slow import mostly_slow
 
 FRAMES = 8
@@ -61,15 +59,6 @@ def anew(folder, tmp_path_factory, *arguments, status=3, result="rolls.csv", inp
     return {name: data for name, data in written(other).items() if name not in ("masks", "calib")}
 
 
-@pytest.mark.parametrize("older", [True, False])
-def test_a_resume_takes_identical_bytes_with_other_times(folder, tmp_path_factory, older):
-    whole = keep_rows(folder / "rolls.csv", 4)
-    touch(folder, older)
-    estimate(folder, *IMAGES, "--resume", status=3)
-    assert written(folder) == anew(folder, tmp_path_factory, *IMAGES)
-    assert (folder / "rolls.csv").read_bytes() == whole
-
-
 @pytest.mark.parametrize("form", ["csv", "parquet"])
 def test_a_resume_of_parts_takes_identical_bytes_with_other_times_and_no_others(folder, request, form):
     if form == "parquet":
@@ -108,14 +97,6 @@ def test_a_resume_of_parts_takes_identical_bytes_with_other_times_and_no_others(
     assert "part-00001.inputs: " in estimate(folder, "--part-rows", "3", "--resume", **line).err
 
 
-def test_a_resume_takes_what_changes_before_its_frame_is_done(folder, tmp_path_factory):
-    keep_rows(folder / "rolls.csv", 4)
-    (folder / "up" / "frame6.png").unlink()
-    put(folder, "frame6")
-    estimate(folder, *IMAGES, "--resume", status=3)
-    assert written(folder) == anew(folder, tmp_path_factory, *IMAGES)
-
-
 @pytest.mark.parametrize("result", ["rolls.csv", "rolls.jsonl"])
 @pytest.mark.parametrize("jobs", mostly_slow(["1", "2"], "1"))
 def test_an_update_does_what_has_changed_and_nothing_else(folder, tmp_path_factory, result, jobs):
@@ -138,21 +119,6 @@ def test_an_update_does_what_has_changed_and_nothing_else(folder, tmp_path_facto
     assert sum(old != new for old, new in zip(rows, after, strict=True)) == 2
 
 
-@pytest.mark.parametrize("result", ["rolls.csv", "rolls.jsonl"])
-def test_new_frames_sort_anywhere_and_those_that_are_gone_leave_the_result(folder, tmp_path_factory, result):
-    if result != "rolls.csv":
-        estimate(folder, *IMAGES, "--overwrite", status=3, result=result)
-    put(folder, "frame0a", 'a,\n"b', "frame4a", "frame99")
-    put(folder, "frame6", roll=0.3)
-    for name in ("frame2.png", "frame7.png"):
-        (folder / "maps" / name).unlink()
-    done = estimate(folder, *IMAGES, "--update", status=3, result=result)
-    assert "gone, whose rows leave the result and whose images stay: 2" in done.err
-    assert (folder / "up" / "frame2.png").exists()
-    fresh = anew(folder, tmp_path_factory, *IMAGES, result=result)
-    assert {name: data for name, data in written(folder).items() if name in fresh} == fresh
-
-
 def test_a_frame_without_a_row_of_its_own_stands_as_an_error_until_it_is_done(folder, monkeypatch):
     put(folder, "frame0a")
     put(folder, "frame1", roll=0.3)
@@ -172,105 +138,6 @@ def test_a_frame_without_a_row_of_its_own_stands_as_an_error_until_it_is_done(fo
     write_maps(folder / "maps", 2)
     estimate(folder, *IMAGES, "--resume", status=3)
     assert "not estimated yet" not in (folder / "rolls.csv").read_text()
-
-
-@pytest.mark.parametrize("line", [0, 3, 7])
-def test_a_row_counts_for_nothing_without_what_it_was_made_from(folder, line):
-    before = written(folder)
-    path = folder / "rolls.csv.inputs"
-    width = len(path.read_bytes()) // FRAMES
-    path.write_bytes(path.read_bytes()[: line * width + 7])
-    done = estimate(folder, *IMAGES, "--resume", status=3)
-    assert f"({line} kept)" in done.err or line == 0
-    assert written(folder) == before
-
-
-def test_a_damaged_line_of_inputs_is_as_none(folder):
-    before = written(folder)
-    path = folder / "rolls.csv.inputs"
-    data = bytearray(path.read_bytes())
-    data[len(data) // FRAMES * 3 - 5] = ord(" ")
-    path.write_bytes(data)
-    assert "(2 kept)" in estimate(folder, *IMAGES, "--update", status=3).err
-    assert written(folder) == before
-
-
-def test_an_update_begins_a_result_that_is_not_there_and_continues_one_that_is_cut(tmp_path):
-    write_maps(tmp_path / "maps", FRAMES)
-    estimate(tmp_path, "--update")
-    whole = written(tmp_path)
-    keep_rows(tmp_path / "rolls.csv", 3)
-    estimate(tmp_path, "--update")
-    assert written(tmp_path) == whole
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (("--seed", "4"), "--seed was 0, is now 4"),
-        (("--overwrite",), "give either --update or --overwrite"),
-        (("-o", "-"), "--update needs a result file"),
-        (("-o", "rolls.parquet"), "--update takes a result in one file"),
-        (("-o", "s3://bucket/rolls.csv"), "--update takes a result in one file"),
-    ],
-)
-def test_what_cannot_be_updated_is_refused_in_one_line(folder, arguments, said):
-    before = contents(folder)
-    done = estimate(folder, *IMAGES, "--update", *arguments, status=2)
-    assert said in done.err
-    assert done.err.count("\n") == 1
-    assert contents(folder) == before
-
-
-def test_masks_and_calibrations_count_as_inputs(tmp_path):
-    write_maps(tmp_path / "maps", 3)
-    write_maps(tmp_path / "masks", 3)
-    (tmp_path / "calib").mkdir()
-    camera = "P0: 500 0 150 0 0 500 90 0 0 0 1 0\nP1: 500 0 150 {} 0 500 90 0 0 0 1 0\n"
-    for number in range(3):
-        (tmp_path / "calib" / f"frame{number}.txt").write_text(camera.format(-250))
-    arguments = ("--mask", "masks", "--calib", "calib")
-    estimate(tmp_path, *arguments)
-    mask = road_map()
-    mask[:70] = 0
-    write_kitti(tmp_path / "masks" / "frame1.png", mask)
-    assert "(2 kept)" in estimate(tmp_path, *arguments, "--update").err
-    (tmp_path / "calib" / "frame2.txt").write_text(camera.format(-300))
-    assert "(2 kept)" in estimate(tmp_path, *arguments, "--update").err
-    (tmp_path / "masks" / "all.png").write_bytes((tmp_path / "masks" / "frame1.png").read_bytes())
-    arguments = ("--mask", "masks/all.png", "--calib", "calib")
-    estimate(tmp_path, *arguments, "--overwrite")
-    assert "(3 kept)" in estimate(tmp_path, *arguments, "--update").err
-    shutil.copyfile(tmp_path / "masks" / "frame0.png", tmp_path / "masks" / "all.png")
-    assert "has changed: 3" in estimate(tmp_path, *arguments, "--update").err
-
-
-def test_the_right_view_counts_as_an_input(tmp_path):
-    for number in range(3):
-        write_pair(tmp_path, f"{number}.png", road_map(), seed=number)
-    inputs = ("--left", "left", "--right", "right", "--num-disparities", "64")
-    estimate(tmp_path, inputs=inputs)
-    views = sorted((tmp_path / "right").iterdir())
-    shutil.copyfile(views[0], views[1])
-    assert "(2 kept)" in estimate(tmp_path, "--update", status=3, inputs=inputs).err
-
-
-def test_only_those_frames_of_an_archive_are_done_again_that_differ(folder, tmp_path_factory):
-    def pack():
-        with tarfile.open(folder / "maps.tar", "w") as archive:
-            archive.add(folder / "maps", "maps")
-
-    pack()
-    line = {"inputs": ("maps.tar",), "result": "packed.csv"}
-    estimate(folder, status=3, **line)
-    put(folder, "frame5", "frame1b")
-    pack()
-    done = estimate(folder, "--update", status=3, **line)
-    assert "has changed: 1" in done.err
-    assert "(7 kept)" in done.err
-    fresh = anew(folder, tmp_path_factory, **line)
-    assert (folder / "packed.csv").read_bytes() == fresh["packed.csv"]
-    assert (folder / "packed.csv.inputs").read_bytes() == fresh["packed.csv.inputs"]
 
 
 def _noted(paths, read):

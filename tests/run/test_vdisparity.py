@@ -5,20 +5,10 @@ import re
 import sys
 import xml.etree.ElementTree as ET
 
-import cv2
 import numpy as np
 import pytest
 
-from rollcli.files.encodings import read_disparity
-from rollcli.files.formats import read_stored
-from rollcli.pictures.vdisparity import BOTTOM_MARGIN, LEFT_MARGIN
 from tests.run_cli import contents, road_map, rollcli, rollcli_process, write_kitti
-
-
-def road_pixels(picture):
-    """Where the curve is: cyan, which the colours of the counts do not have."""
-    blue, green, red = np.moveaxis(picture.astype(int), -1, 0)
-    return (np.minimum(blue, green) > 150) & (red < 100)
 
 
 @pytest.fixture
@@ -28,58 +18,6 @@ def maps(tmp_path):
         disparity[:30, 10 * index :] = 0
         write_kitti(tmp_path / "maps" / f"frame{index}.png", disparity)
     return tmp_path
-
-
-def test_bins_and_max_disparity_are_the_histograms(maps):
-    line = ["vdisparity", "maps/frame0.png", "--counts", "--bins", "50", "--max-disparity", "100", "-o", "v"]
-    assert rollcli(*line, cwd=maps).status == 0
-    counts = read_stored(maps / "v" / "frame0.tif").values
-    assert counts.shape == (120, 50)
-    disparity = read_disparity(maps / "maps" / "frame0.png")[119]
-    assert counts[119].argmax() == int(np.median(disparity) / 2)
-
-
-def test_the_picture_has_a_row_for_each_row_of_the_map_and_shows_the_road(maps):
-    assert rollcli("vdisparity", "maps", "-o", "v", "-j2", cwd=maps).status == 0
-    assert sorted(contents(maps / "v")) == [f"frame{i}.png" for i in range(3)]
-    whole = cv2.imread(str(maps / "v" / "frame1.png"), cv2.IMREAD_UNCHANGED)
-    picture = whole[:-BOTTOM_MARGIN, LEFT_MARGIN:]
-    assert (picture.dtype, picture.shape[0], picture.shape[2]) == (np.uint8, 120, 3)
-    rows, columns = np.nonzero(road_pixels(picture))
-    assert len(rows) > 20
-    # the road along the middle column, in pixels of the picture
-    disparity = read_disparity(maps / "maps" / "frame1.png")
-    middle = disparity[rows, disparity.shape[1] // 2]
-    scale = picture.shape[1] / (math.floor(disparity.max()) + 1)
-    seen = middle > 0
-    assert np.abs(columns - middle * scale)[seen].max() < 2 + 0.3 * scale
-
-
-def test_a_map_without_a_road_is_drawn_without_one(tmp_path):
-    noise = np.random.default_rng(0).uniform(1, 60, (80, 100)).astype(np.float32)
-    np.save(tmp_path / "noise.npy", noise)
-    np.save(tmp_path / "nothing.npy", np.zeros_like(noise))
-    assert rollcli("vdisparity", "noise.npy", "nothing.npy", "-o", "v", cwd=tmp_path).status == 0
-    for name in ("noise", "nothing"):
-        picture = cv2.imread(str(tmp_path / "v" / f"{name}.png"))
-        assert not road_pixels(picture).any()
-
-
-def test_depth_maps_are_counted_as_the_disparities_of_their_calibration(maps):
-    (maps / "depth").mkdir()
-    for path in (maps / "maps").glob("*.png"):
-        disparity = read_disparity(path)
-        depth = np.where(disparity > 0, 280 * 0.3 / np.where(disparity > 0, disparity, 1), 0)
-        np.save(maps / "depth" / f"{path.stem}.npy", depth)
-    rig = ("--encoding", "depth", "--focal", "280", "--principal-point", "80,60", "--baseline", "0.3")
-    run = rollcli("vdisparity", "depth", "--counts", *rig, "-o", "of-depth", cwd=maps)
-    assert (run.status, "no effect" in run.err) == (0, False)
-    assert rollcli("vdisparity", "maps", "--counts", "-o", "of-maps", cwd=maps).status == 0
-    for index in range(3):
-        one, other = (read_stored(maps / out / f"frame{index}.tif").values for out in ("of-depth", "of-maps"))
-        moved = np.abs(np.cumsum(one - other, axis=1)).sum()  # by rounding, into the next bin
-        assert one.sum() == other.sum() > 0
-        assert moved < 0.01 * one.sum()
 
 
 SVG = "{http://www.w3.org/2000/svg}"

@@ -1,12 +1,11 @@
 """Roads with a cross section: each pixel shows the point that an independent march along its ray finds."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from rollcli.simulate.build import build_scene, render_frame, road_camber
+from rollcli.simulate.build import build_scene
 from rollcli.simulate.road import draw_carriageway
 from rollcli.simulate.scene import draw_light
 from rollcli.simulate.spec import FrameSpec, Stream
@@ -114,59 +113,6 @@ def test_every_road_pixel_shows_the_first_point_that_a_march_along_its_ray_finds
     # a march can step over the outermost centimetres of the road beside a kerb
     assert np.mean(np.isnan(marched)) < 0.01
     assert np.nanmax(np.abs(marched - disparity[v, u])) < 1e-6
-
-
-@pytest.mark.parametrize(("shape", "sign"), [("crown", -1), ("dish", 1)])
-def test_camber_is_the_curvature_across_in_camera_heights_negative_on_a_crown(shape, sign):
-    spec = FrameSpec("bare", pitch=0.1, cross_section=shape, seed=4, **SMALL)
-    road = drawn_road(spec)
-    steps = road_height(spec, road, np.array([-0.01, 0.0, 0.01]) * spec.height) / spec.height
-    slope = (steps[2] - steps[0]) / 0.02
-    second = (steps[0] - 2 * steps[1] + steps[2]) / 0.01**2
-    assert road_camber(spec) == pytest.approx(second / (1 + slope**2) ** 1.5, rel=1e-6)
-    assert np.sign(road_camber(spec)) == sign
-
-
-@pytest.mark.parametrize("shape", ["flat", "superelevated"])
-def test_a_plane_has_no_camber(shape):
-    assert road_camber(FrameSpec("open", cross_section=shape, seed=BENT, **SMALL)) == 0
-
-
-def test_kerbs_have_the_height_asked_for_above_the_gutter():
-    spec = FrameSpec("street", 0.0, 0.15, 0.0, "crown", gutter=0.1, kerb=(0.03, 0.03), seed=3, **SMALL)
-    road, scene = drawn_road(spec), build_scene(spec)
-    for side, edge in road.sides:
-        outside = np.array([[edge + side * 1.0], [5.0], [4.0]])
-        outside[0] += road.course.point(0.0, 4.0)[0]
-        down = np.array([[0.0], [-1.0], [0.0]])
-        met = min(float(s.intersect(outside, down)[0]) for s in scene.surfaces if isinstance(s, Ground))
-        height = 5.0 - met - spec.curvature / 2 * 16
-        inner = road_height(spec, road, np.array([edge - side * 1e-9]))[0]
-        assert height == pytest.approx(inner + 0.03, abs=1e-6)
-
-
-def test_vehicles_stand_on_the_road_that_is_below_them():
-    spec = FrameSpec("street", 0.0, 0.05, 0.0, "roof", seed=11, **SMALL)
-    road, scene = drawn_road(spec), build_scene(spec)
-    assert scene.cars
-    for car in scene.cars:
-        over, lateral = height_over_road(spec, road, car.place)
-        assert abs(over[0]) < 1e-9
-        side = np.array([[-0.5], [0.5]]) * np.sign(lateral) * car.frame[0]
-        assert np.abs(height_over_road(spec, road, car.place + side)[0]).max() < 2e-3
-
-
-@pytest.mark.parametrize("shape", SHAPES)
-def test_no_ray_slips_between_two_pieces_of_the_ground(shape):
-    spec = FrameSpec("bare", 0.0, 0.3, 0.0, shape, gutter=0.05, seed=4, size=(321, 241), focal=186.0)
-    frame = render_frame(replace(spec, crossfall=0.04))
-    assert frame.disparity[120:].min() > 0
-
-
-def test_a_positive_bend_turns_to_the_right_and_zero_is_straight():
-    right, straight = (drawn_road(FrameSpec("bare", bend=bend, seed=4)).course for bend in (0.01, 0.0))
-    assert right.point(0.0, 20.0)[0] - straight.point(0.0, 20.0)[0] == pytest.approx(0.01 / 2 * 20**2)
-    assert straight.bend == 0
 
 
 @pytest.mark.parametrize("shape", ["flat", *SHAPES])

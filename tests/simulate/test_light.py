@@ -4,15 +4,12 @@ import numpy as np
 import pytest
 
 from rollcli.simulate.build import build_scene
-from rollcli.simulate.camera import expose
-from rollcli.simulate.materials import Plain, band, bars, coarse, fine
-from rollcli.simulate.road import Piece
-from rollcli.simulate.roadside import vehicle
-from rollcli.simulate.scene import Light, Scene, air_below, draw_light, in_shadow, sky
+from rollcli.simulate.materials import band, bars
+from rollcli.simulate.scene import Light, Scene, in_shadow
 from rollcli.simulate.solids import Post
 from rollcli.simulate.spec import FrameSpec
-from rollcli.simulate.surfaces import NEAR, Course
-from rollcli.simulate.views import AIR, LONG, LONG_P, LONG_Q, NONE, SHORT, SUN, P, Q, shade
+from rollcli.simulate.surfaces import NEAR
+from rollcli.simulate.views import AIR, LONG, LONG_P, LONG_Q, SHORT, SUN, P, Q, shade
 
 
 def on_ground(x, z):
@@ -42,33 +39,6 @@ def test_shadows_do_not_depend_on_the_outlines_that_spare_work(seed):
     hidden = np.any([np.isfinite(s.intersect(points, toward)) for s in casters], axis=0)
     assert 0.01 < hidden.mean() < 0.9
     assert np.array_equal(in_shadow(points, sun, casters), hidden)
-
-
-@pytest.mark.parametrize("oncoming", [False, True])
-def test_below_a_car_the_sky_is_hidden_and_two_metres_beside_it_is_not(oncoming):
-    course = Course()
-    car = vehicle(np.random.default_rng(3), course, Piece(-5, 5), 1.0, 12.0, 0, oncoming)
-    below, beside = air_below(on_ground(1.0, 12.0), car), air_below(on_ground([-2.0, 4.0], 12.0), car)
-    assert below[0] < 0.2
-    assert beside.min() > 0.99
-    outward = air_below(on_ground(np.linspace(1.0, 3.0, 40), 12.0), car)
-    assert np.all(np.diff(outward) >= -1e-6)
-    along = air_below(on_ground(1.0, [12.0 - 3.5, 12.0 + 3.5]), car)
-    assert along.min() > 0.9
-
-
-def test_half_of_the_scenes_have_sun_and_it_is_above_the_horizon():
-    lights = [draw_light(np.random.default_rng(seed)) for seed in range(400)]
-    assert 0.4 < np.mean([light.sunny for light in lights]) < 0.6
-    assert min(light.sun[1] for light in lights) > np.sin(0.44)
-    assert np.allclose([np.linalg.norm(light.sun) for light in lights], 1)
-
-
-def test_the_sky_is_bluer_above_and_pale_at_the_horizon():
-    light = draw_light(np.random.default_rng(1))
-    up, level = (sky(light, np.array([[0.1], [rise], [1.0]]))[0] for rise in (5.0, 0.0))
-    assert up[2] / up[0] < level[2] / level[0], "red to blue"
-    assert np.ptp(level) < 0.1
 
 
 AHEAD = np.array([[0.0], [0.0], [1.0]])
@@ -102,34 +72,6 @@ def test_albedo_is_averaged_over_the_length_of_the_footprint(ratio):
     assert shaded(Slope(), reads) / 1.4 == pytest.approx(9 + 4 / 12 * (1 - 1 / 64), rel=1e-5)
 
 
-def test_a_ray_that_hits_nothing_shows_the_sky_whatever_its_reads_are():
-    light = Light(np.array([0.0, 1.0, 0.0]), ambient=0.3, exposure=1.4, clouds=0.0)
-    scene = Scene(light, normal=np.array([0.0, 1.0, 0.0]), materials=[Plain(0.5)])
-    kinds = np.full(1, NONE, np.int16)
-    sky = [shade(scene, AHEAD, kinds, np.full((8, 1), value, np.float32)) for value in (0, 1)]
-    assert np.array_equal(*sky)
-    assert sky[0].min() > 0.5
-
-
-def exposed(level, gain=1.0, noise=0.0, colour=True):
-    light = np.full((101, 201, 3), level, np.float32)
-    return expose(light, noise, gain, colour, np.random.default_rng(0))
-
-
-@pytest.mark.parametrize(("level", "grey"), [(0.0, 0), (0.25, 128), (1.0, 255), (4.0, 255)])
-def test_the_grey_level_is_the_root_of_the_light_up_to_saturation(level, grey):
-    assert (exposed(level)[50, 100] == grey).all()
-
-
-def test_the_image_darkens_toward_its_corners_and_not_elsewhere():
-    image = exposed(0.64, colour=False).astype(float)
-    assert image[50, 100] == 204
-    assert image.argmin() == 0
-    # at a corner 24 % of the light are lost, in the middle of a side 12 %
-    assert image[0, 0] == image[-1, -1] == image[0, -1] == np.rint(204 * np.sqrt(0.76))
-    assert image[0, 100] == image[50, 0] == np.rint(204 * np.sqrt(0.88))
-
-
 def averaged(pattern, centre, width):
     """The mean of a pattern of 0 and 1 over pixels, by brute force."""
     offsets = (np.arange(4000) + 0.5) / 4000 - 0.5
@@ -148,12 +90,3 @@ def test_bars_cover_their_share_of_a_pixel_however_many_it_holds(width):
     x = np.linspace(-3, 3, 101, dtype=np.float32)
     expected = averaged(lambda t: np.mod(t, 1.3) < 0.4, x, width)
     assert np.allclose(bars(x, 1.3, 0.4, np.full_like(x, width)), expected, atol=2e-3)
-
-
-@pytest.mark.parametrize("noise", [fine, coarse])
-def test_noise_has_unit_variance_up_close_and_fades_with_distance(noise):
-    p, q = np.random.default_rng(0).uniform(0, 500, (2, 20000)).astype(np.float32)
-    spreads = [noise(p, q, np.full_like(p, w)).std() for w in (0.001, 0.1, 1.0, 100.0)]
-    assert 0.7 < spreads[0] < 1.05
-    assert np.all(np.diff(spreads) < 0.02)
-    assert spreads[-1] < 0.1

@@ -9,7 +9,7 @@ from rollcli.simulate.build import build_scene
 from rollcli.simulate.camera import PixelRays
 from rollcli.simulate.road import Piece
 from rollcli.simulate.roadside import vehicle
-from rollcli.simulate.solids import Post, TreeCrown
+from rollcli.simulate.solids import Post
 from rollcli.simulate.spec import FrameSpec
 from rollcli.simulate.surfaces import Backdrop, Course, Ground, Wall
 from rollcli.simulate.views import first_hits
@@ -21,7 +21,6 @@ WALL = Wall(COURSE, -6.0, 0.0, np.array([-5.0, 20.0, 50.0]), np.array([9.0, 4.0]
 BACKDROP = Backdrop(COURSE, 60.0, -5.0, np.full(200, 7.0), 0)
 CAR = vehicle(np.random.default_rng(3), COURSE, Piece(-5, 5), 1.0, 9.0, 0, oncoming=True)
 POST = Post(COURSE.point(2.0, 8.0), 0.3, 4.0, 0)
-TREE_CROWN = TreeCrown(COURSE.point(-1.0, 12.0, 2.5), 1.8, 2.2, 0)
 
 
 def inside_car(points):
@@ -84,24 +83,6 @@ def test_a_ray_meets_a_surface_where_marching_along_it_first_comes_inside(surfac
     assert agree.mean() > 0.97
 
 
-@pytest.mark.parametrize(("distance", "met"), [(0.049, False), (0.051, True), (99.0, True), (101.0, False)])
-def test_a_surface_is_met_from_five_centimetres_to_its_far_end(distance, met):
-    ground = Ground(Course(), (-np.inf, np.inf), (0,), far=100.0)
-    origin = np.array([[0.0], [distance / 10], [0.0]])
-    t = ground.intersect(origin, np.array([[0.0], [-0.1], [1.0]]))
-    assert np.isfinite(t[0]) == met
-
-
-def test_a_crown_of_a_tree_is_met_on_its_ellipsoid_and_seen_through():
-    direction = rays(2000, TREE_CROWN.centre, 1.5)
-    met = TREE_CROWN.intersect(ORIGIN, direction)
-    hits = np.isfinite(met)
-    x, y, z = (ORIGIN + met[hits] * direction[:, hits]) - TREE_CROWN.centre[:, None]
-    assert np.allclose((x / 1.8) ** 2 + (y / 2.2) ** 2 + (z / 1.8) ** 2, 1)
-    assert np.any(z < 0)
-    assert np.any(z > 0)
-
-
 SPEC = FrameSpec("street", math.radians(8), math.radians(3), seed=11, size=(160, 120), focal=93.0)
 
 
@@ -121,15 +102,6 @@ def test_each_ray_meets_the_nearest_of_all_surfaces(scene, seed):
     nearest = every.min(axis=0)
     assert np.array_equal(depth, nearest)
     assert np.array_equal(surface, np.where(np.isfinite(nearest), every.argmin(axis=0), -1))
-
-
-def test_positions_between_pixels_are_traced_as_whole_rows_are():
-    scene, rows = every_pixel(SPEC)
-    depth, surface = first_hits(scene, rows)
-    anywhere = PixelRays.at(rows.camera, rows.u, rows.v)
-    assert np.array_equal(first_hits(scene, anywhere)[0], depth)
-    part = PixelRays.of_rows(rows.camera, range(37, 90))
-    assert np.array_equal(first_hits(scene, part)[1], surface.reshape(120, 160)[37:90].ravel())
 
 
 def box(low, high):

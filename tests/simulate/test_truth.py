@@ -5,8 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from rollcli.simulate.build import render_frame
-from rollcli.simulate.dataset import calibration
+from rollcli.simulate.build import carriageway_of, draw_dips, render_frame
 from rollcli.simulate.spec import FrameSpec
 from tests.true_disparity import true_disparity
 
@@ -19,12 +18,6 @@ def plane_roll(disparity, used):
     design = np.stack([np.ones(len(u)), u - u.mean(), v - v.mean()], axis=1)
     _, c1, c2 = np.linalg.lstsq(design, disparity[used], rcond=None)[0]
     return math.degrees(math.atan(-c1 / c2))
-
-
-def rotated_rows(shape, roll):
-    """y of METHOD.md at each pixel: v cos(theta) - u sin(theta)."""
-    v, u = np.indices(shape)
-    return v * math.cos(roll) - u * math.sin(roll)
 
 
 @pytest.mark.parametrize("roll_deg", [-80, -45, -7.3, 0, 1e-3, 12, 45, 80])
@@ -72,45 +65,18 @@ def test_points_from_the_disparity_lie_on_the_road(curvature, roll_deg, pitch_de
     assert np.allclose(spec.focal * seen[1] / seen[2] + cy, v, atol=1e-9)
 
 
-@pytest.mark.parametrize("roll_deg", [-35, -2, 0, 11])
-@pytest.mark.parametrize("pitch_deg", [-2, 0, 6])
-def test_the_plane_of_a_flat_road_and_the_written_calibration_give_pitch_and_height(roll_deg, pitch_deg):
-    spec = FrameSpec(
-        "open",
-        math.radians(roll_deg),
-        math.radians(pitch_deg),
-        height=1.37,
-        baseline=0.31,
-        principal_point=(141.5, 132.0),
-        seed=4,
-        **SMALL,
-    )
-    lines = dict(line.split(": ") for line in calibration(spec).decode().splitlines())
-    left, right = (np.array(lines[name].split(), float).reshape(3, 4) for name in ("P0", "P1"))
-    camera = left[:, :3]
-    baseline = (np.linalg.solve(camera, left[:, 3]) - np.linalg.solve(camera, right[:, 3]))[0]
-    disparity, road = true_disparity(spec)
-    v, u = np.nonzero(road)
-    design = np.stack([np.ones(len(u)), u, v], axis=1)
-    c0, c1, c2 = np.linalg.lstsq(design, disparity[road], rcond=None)[0]
-    # the plane of the road is q . P = 1 in camera coordinates, with its normal q pointing down
-    q = camera.T @ [c1, c2, c0] / (camera[0, 0] * baseline)
-    assert 1 / np.linalg.norm(q) == pytest.approx(1.37, abs=1e-6)
-    assert math.degrees(math.asin(q[2] / np.linalg.norm(q))) == pytest.approx(pitch_deg, abs=1e-6)
-    assert math.degrees(math.atan2(-q[0], q[1])) == pytest.approx(roll_deg, abs=1e-6)
-
-
-def test_the_sky_has_no_disparity_and_everything_else_has():
-    frame = render_frame(FrameSpec("bare", roll=math.radians(20), **SMALL))
-    y = rotated_rows((240, 320), frame.spec.roll)
-    below_horizon = y - y[119:121, 159:161].mean()
-    assert np.all(frame.disparity[below_horizon > 0.5] > 0)
-    assert not np.any(frame.disparity[below_horizon < 0])
-
-
-def test_a_frames_disparity_is_the_true_one_in_single_precision():
-    spec = FrameSpec("street", seed=3, **SMALL)
-    frame, (disparity, road) = render_frame(spec), true_disparity(spec)
-    assert frame.disparity.dtype == np.float32
-    assert np.array_equal(frame.disparity, disparity.astype(np.float32))
-    assert np.array_equal(frame.road, road)
+def test_true_heights_are_distances_from_the_plain_road():
+    """Of a flat road under a rig: the distance of each pixel's point from the plane, by the pose alone."""
+    spec = FrameSpec("bare", 0.2, 0.08, dips=4, seed=3, size=(320, 120), focal=186.0)
+    frame, (disparity, _) = render_frame(spec), true_disparity(spec)
+    depth = spec.focal * spec.baseline / np.where(disparity > 0, disparity, np.nan)
+    v, u = np.indices(disparity.shape)
+    x, y = ((each - at) / spec.focal for each, at in ((u, spec.centre[0]), (v, spec.centre[1])))
+    normal = (-math.sin(0.2) * math.cos(0.08), math.cos(0.2) * math.cos(0.08), math.sin(0.08))
+    heights = spec.height - depth * (normal[0] * x + normal[1] * y + normal[2])
+    assert np.allclose(frame.heights[frame.road], heights[frame.road], atol=1e-5)
+    dips = draw_dips(spec, carriageway_of(spec))
+    assert len(dips) == 4
+    assert np.nanmin(frame.heights[frame.road]) == pytest.approx(min(dip.height for dip in dips), abs=1e-4)
+    assert {np.sign(dip.height) for dip in dips} == {-1, 1}
+    assert all(0.025 <= abs(dip.height) <= 0.07 for dip in dips)

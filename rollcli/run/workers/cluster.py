@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, Generic
 
 from rollcli import __version__
-from rollcli.errors import ClusterError, OutputError, UsageError, WorkerError, cause_of
+from rollcli.errors import OutputError, UsageError, WorkerError, cause_of
 from rollcli.extras import require_extra
 from rollcli.files.atomic import is_file, is_there, write_atomic
 from rollcli.files.storage import remove
@@ -41,7 +41,7 @@ def check_scheduler(given: str) -> None:
     ------
     UsageError
         That is no address and no scheduler's file, or the extra `cluster` is not installed.
-    ClusterError
+    WorkerError
         No scheduler answers there.
     """
     require_extra("cluster", "--scheduler")
@@ -82,7 +82,7 @@ class ClusterExecutor(Generic[Task, Result]):
 
     Raises
     ------
-    ClusterError
+    WorkerError
         No scheduler or no worker answers, a worker has another rollcli, or does not see the files.
     """
 
@@ -103,7 +103,7 @@ class ClusterExecutor(Generic[Task, Result]):
             self._client = _connect(self.address)
             self._resources.callback(self._client.close, timeout=2)
             for worker, problem in self._look_for_workers().items():
-                raise ClusterError(f"worker {worker}: {problem}")
+                raise WorkerError(f"worker {worker}: {problem}")
             self._client.register_plugin(_worker_plugin())
         except BaseException:
             self._resources.close()
@@ -147,7 +147,7 @@ class ClusterExecutor(Generic[Task, Result]):
         return sent, chosen
 
     def check_connection(self) -> None:
-        """Raise ClusterError where the scheduler is lost."""
+        """Raise WorkerError where the scheduler is lost."""
         if self._client.status == "closed":
             raise _connection_lost(self.address)
 
@@ -237,7 +237,7 @@ class ClusterFuture(Generic[Task, Result]):
         ------
         KilledWorker
             Workers have died.
-        ClusterError
+        WorkerError
             The scheduler is lost, or workers cannot do the work.
         """
         try:
@@ -250,7 +250,7 @@ class ClusterFuture(Generic[Task, Result]):
             raise _connection_lost(self._executor.address) from lost
         if isinstance(error, self._executor.worker_died):
             raise error
-        raise ClusterError(f"{self._executor.address}: workers cannot do the work: {error}")
+        raise WorkerError(f"{self._executor.address}: workers cannot do the work: {error}")
 
 
 class _RunHere:
@@ -316,12 +316,12 @@ def scheduler_address(given: str) -> str:
         raise UsageError(f"--scheduler {given}: is not a file that dask scheduler wrote") from error
 
 
-def _connection_lost(address: str) -> ClusterError:
-    return ClusterError(f"{address}: the connection to the scheduler is lost")
+def _connection_lost(address: str) -> WorkerError:
+    return WorkerError(f"{address}: the connection to the scheduler is lost")
 
 
-def _no_scheduler(address: str) -> ClusterError:
-    return ClusterError(f"{address}: no Dask scheduler answers there")
+def _no_scheduler(address: str) -> WorkerError:
+    return WorkerError(f"{address}: no Dask scheduler answers there")
 
 
 @contextlib.contextmanager
@@ -347,7 +347,7 @@ def _connect(address: str) -> Any:
         client.wait_for_workers(1, timeout=_FIRST_WORKER_S)
     except DaskTimeoutError as error:
         client.close(timeout=1)
-        raise ClusterError(f"{address}: has no workers; start some: dask worker {address}") from error
+        raise WorkerError(f"{address}: has no workers; start some: dask worker {address}") from error
     return client
 
 

@@ -31,9 +31,7 @@ def run_joined(
     Raises
     ------
     WorkerError
-        This machine starts no further process.
-    ClusterError
-        The cluster cannot do the work, or its scheduler is lost.
+        This machine starts no further process; or the cluster cannot do the work, or its scheduler is lost.
     """
     count = len(tasks) if isinstance(tasks, Sized) else None
     if workers.scheduler is not None:
@@ -89,7 +87,7 @@ def require_scheduler(address: str | None) -> None:
     ------
     UsageError
         That is no address, or the extra `cluster` is not installed.
-    ClusterError
+    WorkerError
         No scheduler answers there.
     """
     if address is not None:

@@ -42,7 +42,7 @@ def verdict(disparity):
 
 
 def says_no_road(found):
-    reasons = ("little of what lies ahead looks like a road", "the view is as narrow as that of a table")
+    reasons = ("the plane ends near ahead", "the plane is closed off", "the view is as narrow")
     return found.startswith("no road: ") or (
         found.startswith("suspect: ") and any(reason in found for reason in reasons)
     )

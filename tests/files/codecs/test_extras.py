@@ -11,7 +11,7 @@ import pytest
 from rollcli.errors import InputError
 from rollcli.files.codecs import png, tiff
 from rollcli.files.formats import decode_image, decode_mask, decode_stored
-from tests.binary_files import disparity_map, make_png, make_tiff, png_file, png_header
+from tests.binary_files import disparity_map, make_tiff, png_file, png_header
 from tests.fuzz.corpus import corpus
 from tests.fuzz.mutations import at_random, every_region, with_repairs
 
@@ -143,17 +143,6 @@ def test_data_that_are_not_just_the_rows_are_left_to_opencv(installed, plain, pa
     assert png.decode_grey(packed, width, height, 16) is None
     file = grey_file(width, height, packed)
     assert outcome(file) == plain(file)
-
-
-def test_only_whole_bytes_of_grey_in_order_are_read_so(monkeypatch):
-    asked = []
-    monkeypatch.setattr(png, "decode_grey", lambda *read: asked.append(read[3]))
-
-    plain = make_png(DEEP), make_png(DEEP % 256, 8)
-    for file in (*plain, make_png(DEEP, interlace=True), make_png(DEEP % 16, 4)):
-        decode_stored(file, "x")
-
-    assert asked == [16, 8]
 
 
 @pytest.mark.parametrize("name", FILES)

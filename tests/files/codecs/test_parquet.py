@@ -27,12 +27,6 @@ def refusal(data):
     return str(caught.value)
 
 
-def test_rows_come_back_with_their_numbers():
-    data = encode_parquet(column_types(), ROWS, {"rollcli": "0"})
-
-    assert list(decode_parquet(data, "x")) == list(enumerate(ROWS, 1))
-
-
 @pytest.mark.slow
 def test_values_damaged_anywhere_are_refused_or_read_the_same():
     whole = encode_parquet(column_types(), ROWS[:20], {})
@@ -83,12 +77,6 @@ def test_many_equal_rows_take_few_bytes_and_are_read():
 
     assert len(data) * 200 < 100_000 * 200  # less than the share that the bytes of a large file allow
     assert sum(1 for _ in decode_parquet(data, "x")) == 100_000
-
-
-def test_the_record_stands_in_the_metadata():
-    data = encode_parquet(column_types(), ROWS[:1], {"rollcli": "1.0"})
-
-    assert parquet.read_schema(io.BytesIO(data)).metadata[b"rollcli"] == b'{"rollcli": "1.0"}'
 
 
 def test_a_name_that_is_not_utf8_is_refused_with_what_to_do():

@@ -18,7 +18,6 @@ from tests.slow import mostly_slow
 
 START = 1_700_000_000_123_456_789
 STEP = 100_000_000
-SIZE = (320, 240)
 P = (350.0, 0, 80, 0, 0, 350, 60, 0, 0, 0, 1, 0)
 P_RIGHT = (350.0, 0, 80, -175, 0, 350, 60, 0, 0, 0, 1, 0)
 SHARED = Path(__file__).parents[3].parent / "shared" / "bags"

@@ -91,21 +91,6 @@ def test_the_interval_of_a_mixture_holds_95_per_cent_of_it():
     assert high - low == pytest.approx(0.95, abs=1e-6)
 
 
-def test_cells_are_weighted_means_that_do_not_reach_across_a_jump():
-    rng = np.random.default_rng(0)
-    used = rng.random(1000) < 0.7
-    used[20:30] = False
-    given = Series(np.where(used, rng.normal(1, 0.2, 1000), 0), rng.uniform(0.01, 0.1, 1000), used)
-    found = make_cells(given, [503], most=100)
-    assert found.width == 10
-    assert 503 in found.first
-    assert 20 not in found.first
-    weights = np.where(used, 1 / (given.variances + np.var(given.values[used])), 0)
-    part = slice(500, 503)
-    at = found.first.tolist().index(500)
-    assert found.values[at] == pytest.approx(np.average(given.values[part], weights=weights[part]))
-
-
 @pytest.mark.parametrize(
     ("frames", "phi", "sd", "widest"),
     [
@@ -170,13 +155,3 @@ def test_gross_outliers_are_found_and_good_frames_are_not_called_so(phi, sd):
     found = gross_outliers(values, errors**2)
     assert found[bad].all()
     assert found[~bad].mean() < 0.01
-
-
-def test_a_jump_is_no_gross_outlier():
-    values = np.repeat([0.0, 5.0], 100) + np.random.default_rng(0).normal(0, 0.1, 200)
-    assert not gross_outliers(values, np.full(200, 0.01)).any()
-
-
-@pytest.mark.parametrize("values", [[], [1.0], [1.0, 1.0, 1.0], [0.0] * 50])
-def test_few_or_equal_values_have_no_outliers(values):
-    assert not gross_outliers(np.array(values), np.full(len(values), 0.01)).any()
