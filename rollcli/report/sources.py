@@ -9,10 +9,9 @@ from pathlib import Path, PurePosixPath
 from rollcli.errors import UsageError
 from rollcli.files.atomic import is_file, is_folder
 from rollcli.files.containers import frame_name
-from rollcli.files.search import MAP_ENDINGS
 from rollcli.files.naming import listed
 from rollcli.files.results import Row
-from rollcli.files.search import objects_behind
+from rollcli.files.search import MAP_ENDINGS, objects_behind
 from rollcli.files.stores.locations import base_name, is_remote, is_url, store_of
 from rollcli.run.frame import Frame
 from rollcli.run.options import KINDS, ImageKind, ImageOptions
