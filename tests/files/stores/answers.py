@@ -1,17 +1,21 @@
-"""What is asked of an object store that answers as it is told to, and what is made of its answers."""
+"""What is asked of stores and web servers that answer as they are told to, and what is made of it."""
 
 import itertools
 import os
+import socket
 from functools import partial
+from pathlib import Path
 from unittest import mock
 from urllib.parse import parse_qsl, unquote, urlsplit
 
 import pytest
 
 from rollcli.errors import RollcliError
-from rollcli.files.stores import objects
+from rollcli.files.stores import objects, web
 from tests.object_store import KEYS
+from tests.recorded import made
 from tests.store_proxy import answer, proxied
+from tests.web_server import response, web_server
 
 URL = "s3://maps/p/a.png"
 _DATED = ("Last-Modified: Mon, 02 Jan 2023 03:04:05 GMT", 'ETag: "tag"')
@@ -66,40 +70,32 @@ ANSWERS = {
     "slow": answer("503 Slow Down", "SlowDown"),
 }
 REFUSALS = (*list(ANSWERS)[list(ANSWERS).index("no bucket") :], "broken")
+# what is done, and the answers that are given one after the other, the last for ever
 DOINGS = {
-    "read": lambda: objects.read_object(URL),
-    "read small": lambda: objects.read_object(URL, 4),
-    "owner": lambda: objects.object_owner(URL),
-    "exists": lambda: objects.object_exists(URL),
-    "problem": lambda: objects.object_problem(URL),
-    "problem of a folder": lambda: objects.folder_problem("s3://maps/p/"),
-    "write": lambda: objects.write_object(URL, b"5", "me"),
-    "create": lambda: objects.create_object(URL, b"5", "me"),
-    "remove": lambda: objects.remove_object(URL),
-    "list": lambda: list(objects.list_objects("s3://maps/p/")),
-    "list all": lambda: list(objects.list_objects("s3://maps/")),
-    "tags": lambda: list(objects.list_tags("s3://maps/p/")),
-    "has": lambda: objects.has_objects("s3://maps/p/"),
-}
-ASKED = {
-    "read": ("yes", "untagged"),
-    "read small": ("yes", "untagged"),
-    "owner": ("owned", "yes"),
-    "exists": ("yes",),
-    "problem": ("part",),
-    "problem of a folder": ("empty", "last"),
-    "write": ("yes",),
-    "create": ("yes", "there owned", "there yes", "there not-there", "there denied"),
-    "remove": ("gone",),
-    "list": ("page last", "page later last", "page denied", "empty"),
-    "list all": ("last",),
-    "tags": ("page last",),
-    "has": ("last", "empty"),
+    "read": (lambda: objects.read_object(URL), "yes", "untagged"),
+    "read small": (lambda: objects.read_object(URL, 4), "yes", "untagged"),
+    "owner": (lambda: objects.object_owner(URL), "owned", "yes"),
+    "exists": (lambda: objects.object_exists(URL), "yes"),
+    "problem": (lambda: objects.object_problem(URL), "part"),
+    "problem of a folder": (lambda: objects.folder_problem("s3://maps/p/"), "empty", "last"),
+    "write": (lambda: objects.write_object(URL, b"5", "me"), "yes"),
+    "create": (
+        lambda: objects.create_object(URL, b"5", "me"),
+        *("yes", "there owned", "there yes", "there not-there", "there denied"),
+    ),
+    "remove": (lambda: objects.remove_object(URL), "gone"),
+    "list": (
+        lambda: list(objects.list_objects("s3://maps/p/")),
+        *("page last", "page later last", "page denied", "empty"),
+    ),
+    "list all": (lambda: list(objects.list_objects("s3://maps/")), "last"),
+    "tags": (lambda: list(objects.list_tags("s3://maps/p/")), "page last"),
+    "has": (lambda: objects.has_objects("s3://maps/p/"), "last", "empty"),
 }
 
 
 def _done(doing, kinds):
-    """What a store that gives such answers, the last for ever, is asked, what comes of it, and the pauses."""
+    """What a store that gives such answers is asked, what comes of it, and the pauses."""
     pytest.importorskip("obstore", reason="obstore, of the extra storage, is not here")
     left, asked, pauses = [ANSWERS[each.replace("-", " ")] for each in kinds], [], []
 
@@ -117,7 +113,7 @@ def _done(doing, kinds):
     ):
         objects._store.cache_clear()
         try:
-            found = DOINGS[doing]()
+            found = DOINGS[doing][0]()
         except RollcliError as error:
             found = [type(error).__name__, str(error), error.code]
         finally:
@@ -146,31 +142,9 @@ def _opened(root, **variables):
     return [*found, retry.pop("retry_timeout").total_seconds()]
 
 
-# as obstore and its stores have them
-ERRORS = (
-    "Generic S3 error: error sending request for url (http://169.254.169.254/latest/api/token)",
-    "error performing token request: http://metadata.google.internal/computeMetadata after 10 retries",
-    "Generic MicrosoftAzure error: MissingAccount",
-    "Generic S3 error: Received redirect without LOCATION, this normally indicates a wrong region",
-    "Server returned non-2xx status code: 301 Moved Permanently: ",
-    "Server returned non-2xx status code: 401 Unauthorized: ",
-    "Server returned non-2xx status code: 403 Forbidden: <Error><Code>Other</Code></Error>",
-    "Server returned non-2xx status code: 403 Forbidden: <Code>AccessDenied</Code>",
-    "Server returned non-2xx status code: 400 Bad Request: <Code>RequestTimeout</Code>",
-    "Server returned non-2xx status code: 408 Request Timeout: ",
-    "Server returned non-2xx status code: 409 Conflict: <Key>401</Key><Code>Busy</Code>",
-    "Server returned non-2xx status code: 429 Too Many Requests: ",
-    "Server returned non-2xx status code: 503 Service Unavailable: <Code>SlowDown</Code>",
-    "HTTP error: request or response body error for url (https://host/maps/a.png)",
-    'Error { url: "http://host/<Code>AccessDenied</Code>", kind: Timeout }',
-    "HTTP error: error sending request",
-    "HTTP error: tcp Connect error",
-    "HTTP error: client not connected",
-    "Generic S3 error: no idea: http://host/body/connect",
-    "<Code>NoSuchBucket</Code> <Message>no AccessDenied</Message>",
-    "<Code>ContainerNotFound</Code>",
-    "<Code>NoSuchKey</Code>",
-)
+def _errors():
+    texts = Path(__file__).with_name("errors.txt").read_text("utf-8").partition("\n\n")[2].splitlines()
+    return {each: _judged(each.replace("\\n", "\n")) for each in texts}
 
 
 def _judged(text):
@@ -182,16 +156,41 @@ def _judged(text):
 
 def _seconds(text):
     with mock.patch.dict(os.environ, {objects.TIMEOUT_VARIABLE: text}):
-        try:
-            return [objects.request_seconds(), objects.within_seconds(objects.request_seconds())]
-        except RollcliError as error:
-            return str(error)
+        return made(lambda: [objects.request_seconds(), objects.within_seconds(objects.request_seconds())])
+
+
+MAP = b"a map" * 1000
+PAGES = {"broken": b"220 mail.example.org\r\n", "cut": response(200, MAP[:100], len(MAP))}
+SIGNED = "map.png?signature=secret"
+
+
+def _of_web(ask, kinds, *given):
+    """What a web server that gives such answers, the last for ever, is told to say, and the pauses."""
+    left = [PAGES.get(each) or response(int(each), MAP) for each in kinds.split()]
+    pauses = []
+    with (
+        web_server(lambda _: left.pop(0) if len(left) > 1 else left[0]) as (address, asked),
+        mock.patch.object(web.time, "sleep", pauses.append),
+    ):
+        found = made(ask, f"{address}/{SIGNED}", *given)
+    said = found.replace(address, "ADDRESS") if isinstance(found, str) else len(found)
+    return [said, pauses, len(asked)]
+
+
+def _of_silence():
+    """What is said of a server that is silent, of one that is not there, and of no address."""
+    with mock.patch.object(web.time, "sleep"), socket.create_server(("127.0.0.1", 0)) as silent:
+        url = f"http://127.0.0.1:{silent.getsockname()[1]}"
+        with mock.patch.dict(os.environ, {objects.TIMEOUT_VARIABLE: "0.05"}):
+            said = [made(web.read_web_file, f"{url}/{SIGNED}")]
+    said += [made(web.read_web_file, f"{each}/{SIGNED}") for each in (url, "http://user:secret@[")]
+    return [each.replace(url, "ADDRESS") for each in said]
 
 
 CASES = {
     **{
         f"store: {doing}": partial(
-            lambda doing: {each: _done(doing, each.split()) for each in ASKED[doing]}, doing
+            lambda doing: {each: _done(doing, each.split()) for each in DOINGS[doing][1:]}, doing
         )
         for doing in DOINGS
     },
@@ -202,8 +201,20 @@ CASES = {
         _opened("s3://maps", AWS_ENDPOINT="http://x", ROLLCLI_STORE_TIMEOUT="100"),
         _opened("s3://maps", AWS_ENDPOINT_URL="https://x", ROLLCLI_STORE_TIMEOUT="soon"),
     ],
-    "store: errors": lambda: {each: _judged(each) for each in ERRORS},
+    "store: errors": _errors,
     "store: seconds": lambda: [
         _seconds(each) for each in ("", "0", "0.25", "60", "1e6", "999999", "-1", "x", "nan")
     ],
+    "web: read": lambda: {
+        each: _of_web(web.read_web_file, each)
+        for each in (
+            *(f"{first} {first} {first} 200" for first in ("500", "503", "cut", "broken")),
+            *("500", "cut", "broken", "400 200", "401 200", "403 200", "404 200", "410 200"),
+        )
+    },
+    "web: too large": lambda: _of_web(web.read_web_file, "200", len(MAP) - 1),
+    "web: problem": lambda: {
+        each: _of_web(web.web_problem, each) for each in ["200", "404", "500", "400", "401", "403", "broken"]
+    },
+    "web: silence": _of_silence,
 }
