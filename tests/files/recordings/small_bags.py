@@ -1,6 +1,7 @@
 """Small bags, byte by byte, whole and with damages, and what is read of them."""
 
 import bz2
+import json
 import os
 import re
 import struct
@@ -16,6 +17,7 @@ import pytest
 from rollcli.errors import RollcliError
 from rollcli.files.recordings import messages
 from rollcli.files.recordings.bags import Topic, open_bag
+from tests.recorded import made
 
 _MAGIC = b"\x89MCAP0\r\n"
 _DATA = [bytes(range(size)) for size in (100, 70, 3)]  # of messages; the beginning is 64 bytes
@@ -38,14 +40,13 @@ def _topics_of_mcap():
     ]
 
 
-def _messages_of_mcap():
-    given = zip((1, 2, 1), _TIMES, _DATA, strict=True)
-    return [_record(5, struct.pack("<HIQQ", each, 0, time, 9) + data) for each, time, data in given]
-
-
-def _mcap(compression=None, pack=bytes, *, more=0, indexed=True):
+def mcap(compression=None, pack=bytes, *, more=0, indexed=True, data=_DATA):
     """Messages, bare or in a chunk that claims `more` bytes than it has, then their topics again."""
-    topics, inside = _topics_of_mcap(), b"".join(_messages_of_mcap())
+    topics = _topics_of_mcap()
+    inside = b"".join(
+        _record(5, struct.pack("<HIQQ", each, 0, time, 9) + content)
+        for each, time, content in zip((1, 2, 1), _TIMES, data, strict=False)
+    )
     if compression is not None:
         packed = pack(inside)
         head = struct.pack("<QQQI", 0, 9, len(inside) + more, 0) + _text(compression)
@@ -63,7 +64,7 @@ def _fields(**fields):
     return struct.pack("<I", len(found)) + found
 
 
-def _ros1(compression=None, pack=bytes, *, more=0, indexed=True):
+def _ros1(compression=None, pack=bytes, *, more=0, indexed=True, **further):
     number = partial(struct.pack, "<I")
     topics = [
         _fields(op=b"\x07", conn=number(each), topic=name) + _sized(_fields(type=kind)[4:])
@@ -81,7 +82,7 @@ def _ros1(compression=None, pack=bytes, *, more=0, indexed=True):
     start = b"#ROSBAG V2.0\n"
 
     def opening(index):
-        return _fields(op=b"\x03", index_pos=struct.pack("<Q", index)) + _sized(b" " * 9)
+        return _fields(op=b"\x03", index_pos=struct.pack("<Q", index), **further) + _sized(b" " * 9)
 
     index = len(start) + len(opening(0)) + len(inside) if indexed else 0
     other = _fields(op=b"\x06", ver=number(1)) + _sized(bytes(5))
@@ -104,7 +105,7 @@ def _read(data):
         except RollcliError as error:
             return str(error).replace(f"{folder}{os.sep}", "")
         some = [[each.topic, each.log_time, *each.place, _seen(each.data)] for each in found]
-        alone = [_seen(bag.read(each.place).data) for each in (*found[::-1], *found)]
+        alone = [_alone(bag, each.place) for each in (*found[::-1], *found)]
         only = [each.place[1] for each in bag.messages({"/b"})]
         return {
             "topics": [f"{each.name} {each.type} {each.encoding}" for each in topics.values()],
@@ -112,7 +113,7 @@ def _read(data):
             "alone": alone,
             "only b": only,
             "broken": bag.broken,
-            "nothing": [_none(bag, each) for each in ((0, 0), (found[0].place[0], 9) if found else (9, 9))],
+            "nothing": [_alone(bag, each) for each in ((0, 0), (found[0].place[0], 9) if found else (9, 9))],
         }
 
 
@@ -120,9 +121,9 @@ def _seen(data):
     return f"{len(data)}: {sum(data)}"
 
 
-def _none(bag, place):
+def _alone(bag, place):
     try:
-        return bag.read(place).topic
+        return _seen(bag.read(place).data)
     except RollcliError as error:
         return type(error).__name__
 
@@ -159,7 +160,7 @@ PACKED = {
     "bag": {"none": bytes, "bz2": bz2.compress, "lz4": _lz4},
 }
 _SHARE = re.compile(" at .*")
-MADE = {"mcap": _mcap, "bag": _ros1}
+MADE = {"mcap": mcap, "bag": _ros1}
 
 
 def _packed(kind, compression, pack):
@@ -171,38 +172,28 @@ def _packed(kind, compression, pack):
     return [whole, *(_SHARE.sub("", each) for each in others)]
 
 
-INFO = {
-    "width": 4,
-    "height": 3,
-    "model": "",
-    "d": (0.0,) * 5,
-    "k": (2.0, 0, 2, 0, 2, 1, 0, 0, 1),
-    "r": (1.0, 0, 0, 0, 1, 0, 0, 0, 1),
-    "p": (2.0, 0, 2, 0, 0, 2, 1, 0, 0, 0, 1, 0),
-}
+def _cut_in_a_pack(compression, pack):
+    """What is read of messages of noise whose chunk has lost its end."""
+    noise = [np.random.default_rng(each).bytes(100_000) for each in range(3)]
+    found = _read(mcap(compression, lambda plain: pack(plain)[:-150_000], data=noise))
+    return [found["messages"], found["alone"], _SHARE.sub("", found["broken"])]
 
 
-def _info(**changes):
-    info = messages.CameraInfo(**INFO | changes)
+INPUTS = json.loads(Path(__file__).with_name("inputs.json").read_text("utf-8"))
+
+
+def _camera(changes):
+    fields = {**INPUTS["camera"], **changes}
+    return messages.CameraInfo(
+        **{name: tuple(each) if isinstance(each, list) else each for name, each in fields.items()}
+    )
+
+
+def _info(changes):
+    info = _camera(changes)
     return [info.usable, info.changes_raw_views]
 
 
-def _turned(by):
-    return tuple(1.0 + by if each in (0, 4, 8) else 0.0 for each in range(9))
-
-
-INFOS = {
-    "plain": {},
-    "distorted": {"d": (0.0, 0.0, 1e-9)},
-    "turned": {"r": _turned(2e-9)},
-    "hardly turned": {"r": _turned(1e-9 / 2)},
-    "no R": {"r": (0.0,) * 9},
-    "no K": {"k": (0.0,) * 9, "d": (1.0,)},
-    "no fx": {"p": (0.0, 0, 2, 0, 0, 2, 1, 0, 0, 0, 1, 0), "d": (1.0,)},
-    "no fy": {"p": (2.0, 0, 2, 0, 0, 0, 1, 0, 0, 0, 1, 0)},
-    "negative": {"p": (-2.0, 0, 2, 0, 0, 2, 1, 0, 0, 0, 1, 0)},
-    "no number": {"p": (2.0, 0, 2, 0, 0, 2, 1, 0, 0, 0, 1, float("nan"))},
-}
 STAMPS = {
     "ros1": [struct.pack("<III", 9, 3, 4), struct.pack("<III", 9, 0, 0), bytes(11), b""],
     "cdr": [
@@ -222,53 +213,23 @@ def _stamps():
     }
 
 
-def _checked():
-    kinds = ((messages.IMAGE, "cdr"), (messages.IMAGE, ""), (messages.COMPRESSED, "json"), ("", "cdr"))
-    kinds = (*kinds, ("x/CompressedVideo", "cdr"), ("x/Image", "ros1"))
-    said = []
-    for kind, encoding in kinds:
-        try:
-            said.append(messages.check_decoder(Topic("/a", kind, encoding), "x.mcap"))
-        except RollcliError as error:
-            said.append(str(error))
-    return said
+def _checked(kind, encoding):
+    return made(messages.check_decoder, Topic("/a", kind, encoding), "x.mcap")
 
 
-def _image(encoding, width, height, step, *, big=False, size=None):
+def _image(encoding, width, height, step, size=None, big=False):
     """An Image as a decoder gives it."""
     data = (np.arange(step * height if size is None else size) * 37 % 251).astype(np.uint8)
     shape = {"width": width, "height": height, "step": step}
     return SimpleNamespace(encoding=encoding, is_bigendian=big, data=data, **shape)
 
 
-IMAGES = (
-    *(("mono8", 4, 3, step) for step in (3, 4, 5)),
-    ("8UC3", 4, 3, 13),
-    ("rgb8", 4, 3, 12),
-    ("rgba8", 2, 2, 8),
-    ("bgra8", 2, 2, 8),
-    ("rgb16", 2, 2, 12),
-    ("bgr16", 2, 2, 13),
-    ("mono16", 3, 2, 7),
-    ("16SC1", 3, 2, 6),
-    ("32FC1", 2, 2, 9),
-    ("64FC1", 2, 2, 16),
-    *((f"bayer_{each}8", 4, 4, 4) for each in ("rggb", "bggr", "gbrg", "grbg")),
-    ("bayer_rggb16", 4, 4, 8),
-    ("bayer_rggb32", 4, 4, 16),
-    ("bayer_xxxx8", 4, 4, 4),
-    ("yuv422", 4, 4, 8),
-    ("mono8", 0, 4, 8),
-)
-
-
 def _content(message, kind=messages.IMAGE, raw_of=None):
     """What a message holds that is decoded already."""
     with mock.patch.object(messages, "_decoded", return_value=message):
-        try:
-            found = messages.content_of(Topic("/a", kind, "cdr"), memoryview(b""), "x", raw_of)
-        except RollcliError as error:
-            return str(error)
+        found = made(messages.content_of, Topic("/a", kind, "cdr"), memoryview(b""), "x", raw_of)
+    if isinstance(found, str):
+        return found
     if isinstance(found, bytes):
         return found.decode("latin-1")
     values = found.astype(float) if found.dtype.kind == "f" else found.view(np.uint8)
@@ -288,10 +249,9 @@ def _compressed(form, data):
     return _content(given, messages.COMPRESSED)
 
 
-def _raw(**changes):
+def _raw(changes):
     """What becomes of a raw view: what is between pixels differs from version to version of OpenCV."""
-    info = messages.CameraInfo(**INFO | changes)
-    found = _content(_image("mono8", 4, 3, 4), raw_of=info)
+    found = _content(_image("mono8", 4, 3, 4), raw_of=_camera(changes))
     return found if isinstance(found, str) or "d" not in changes else found[:2]
 
 
@@ -299,8 +259,8 @@ CASES = {
     **{
         f"bag: {kind}, {what}": partial(lambda kind, make, data: make(data()), kind, make, data)
         for kind, data in (
-            ("mcap", _mcap),
-            ("mcap in a chunk", partial(_mcap, "")),
+            ("mcap", mcap),
+            ("mcap in a chunk", partial(mcap, "")),
             ("ros1", _ros1),
             ("ros1 in a chunk", partial(_ros1, "none")),
         )
@@ -311,15 +271,17 @@ CASES = {
         for kind, packs in PACKED.items()
         for compression, pack in packs.items()
     },
-    "bag: no bag": lambda: [_read(each) for each in (b"", b"MCAP", b"SQLite format 3", _MAGIC)],
-    "camera infos": lambda: {name: _info(**changes) for name, changes in INFOS.items()},
-    "stamps": _stamps,
-    "decoders": _checked,
-    "pixels of messages": lambda: [_content(_image(*each)) for each in IMAGES],
-    "pixels of others": lambda: [
-        _content(_image("mono16", 3, 2, 7, big=True)),
-        *(_content(_image("mono8", 4, 3, 5, size=size)) for size in (13, 14, 15)),
+    **{
+        f"bag: mcap cut in {each}": partial(_cut_in_a_pack, each, PACKED["mcap"][each])
+        for each in ("zstd", "lz4")
+    },
+    "bag: no bag": lambda: [
+        _read(each) for each in (b"", b"MCAP", b"SQLite format 3", _MAGIC, _ros1(encryptor=b"rosbag/Aes"))
     ],
+    "camera infos": lambda: {name: _info(changes) for name, changes in INPUTS["cameras"].items()},
+    "stamps": _stamps,
+    "decoders": lambda: [_checked(*each) for each in INPUTS["topics"]],
+    "pixels of messages": lambda: [_content(_image(*each)) for each in INPUTS["images"]],
     "disparities of messages": lambda: (
         [_disparities(each) for each in (-1.0, 0.0, 1.0, 3.5, 9.0)] + [_disparities(9.0, "mono8")]
     ),
@@ -328,16 +290,5 @@ CASES = {
         _compressed("16UC1; compressedDepth", b"head"),
         _compressed("jpeg", b"head\x89PNG\r\n\x1a\nrest"),
     ],
-    "raw views": lambda: [
-        _raw(),
-        _raw(r=(0.0,) * 9),
-        _raw(r=(0.0, -1, 0, 1, 0, 0, 0, 0, 1)),
-        _raw(p=(2.0, 0, 1, 0, 0, 2, 0, 0, 0, 0, 1, 0)),
-        *(_raw(model=each) for each in ("fisheye", "brown")),
-        *(_raw(d=(0.1,) * 5, model=each) for each in ("", "plumb_bob", "equidistant", "brown")),
-        *(_raw(d=(0.1,) * 3, model=each) for each in ("", "plumb_bob", "equidistant")),
-        _raw(k=(float("nan"),) * 9),
-        _raw(width=5),
-        _raw(height=4),
-    ],
+    "raw views": lambda: [_raw(each) for each in INPUTS["raw views"]],
 }
