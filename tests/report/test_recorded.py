@@ -1,7 +1,9 @@
 """What charts of hand-made results hold, how they are drawn, and what pages say; see `tests.recorded`."""
 
+import contextlib
 import html
 import json
+import os
 import re
 import tempfile
 from dataclasses import asdict, replace
@@ -16,20 +18,22 @@ import pytest
 from rollcli import __version__
 from rollcli.files.results import Result
 from rollcli.pictures.figures import SLIDE, Size
-from rollcli.report import pictures
-from rollcli.report.charts import all_charts, frame_axis, histogram
-from rollcli.report.options import ReportOptions
-from rollcli.report.page import Chart, scatter
+from rollcli.report import pictures, sources
+from rollcli.report.charts import all_charts, frame_axis, histogram, view
+from rollcli.report.options import ReportOptions, chart_names
+from rollcli.report.page import Chart
 from rollcli.report.pictures import Picture, Pictures
 from rollcli.report.sources import choose, subjects
-from rollcli.report.summary import common_run, option_lines
-from rollcli.rig.quantities import ALIGNMENT, SIZE
+from rollcli.report.summary import common_run, degrees, option_lines, with_interval
+from rollcli.rig.quantities import ALIGNMENT, HEIGHT, ROLL, SIZE
 from rollcli.run.options import EncodingOptions, FrameOptions, ImageOptions
-from tests.recorded import check
+from tests.recorded import check, made
 from tests.report.results import row
 from tests.run.rigs import known, rig, sequence, short
 from tests.run_cli import road_map
 
+INPUTS = json.loads(Path(__file__).with_name("inputs.json").read_text("utf-8"))
+RUN, RUNS = INPUTS["run"], INPUTS["runs"]
 _MANY = 40  # values of a list, of which some are recorded
 
 
@@ -164,7 +168,7 @@ def _charts(name, *, assessed=True):
 NS = 10**9
 
 
-def _axis(*seconds, name="m.mcap#/left@{}", first=1_700_000_000 * NS, pause=None):
+def _axis(seconds, *, name="m.mcap#/left@{}", first=1_700_000_000 * NS, pause=None):
     """Where frames stand that have such stamps; those from `pause` on are another drive."""
     files = [each if isinstance(each, str) else name.format(first + round(each * NS)) for each in seconds]
     rows = [row(each) for each in files]
@@ -174,46 +178,27 @@ def _axis(*seconds, name="m.mcap#/left@{}", first=1_700_000_000 * NS, pause=None
     return [[each.places, each.unit, each.layout(), *map(each.at, (1, 1.5, len(rows)))] for each in axes]
 
 
-REST = "m.mcap#rest"
 AXES = {
-    "seconds": partial(_axis, 0, 0.25, 119.5),
-    "minutes": partial(_axis, 0, 60, 120),
-    "hours": partial(_axis, 0, 3600, 7200, 7201),
-    "almost hours": partial(_axis, 0, 7199),
-    "broken end": partial(_axis, 0, 1, 2, REST),
-    "broken in between": partial(_axis, 0, 1, REST, 3),
-    "nothing but broken": partial(_axis, REST),
-    "broken at first": partial(_axis, REST, 1, 2),
-    "descending": partial(_axis, 0, 2, 1),
-    "twice": partial(_axis, 0, 1, 1, 2),
-    "at once": partial(_axis, 5, 5),
-    "one": partial(_axis, 5),
-    "no stamps": partial(_axis, 0, 1, name="maps/{}.png"),
-    "some without": partial(_axis, 0, "a.png", 2),
-    "pause": partial(_axis, 0, 4, 5, 9, pause=2),
-    "long pause": partial(_axis, 0, 1, 9, 10, pause=2),
-    "pause of a half": partial(_axis, 0, 1, 3, 4, pause=2),
-    "ten": partial(_axis, *range(10), name="{}.png"),
-    "eleven": partial(_axis, *range(11), name="{}.png"),
-    "two hundred": partial(_axis, *range(200), name="{}.png"),
+    **{name: partial(_axis, **given) for name, given in INPUTS["axes"].items()},
+    **{
+        name: partial(_axis, range(count), name="{}.png")
+        for name, count in (("ten", 10), ("eleven", 11), ("two hundred", 200))
+    },
 }
 
 
-def _bars(*rolls, suspect=()):
+def _bars(rolls=(), suspect=()):
     rows = [row(f"{place}", each) for place, each in enumerate(rolls)]
     chart = histogram(rows + [row("s", each, status="suspect") for each in suspect])
     return [[(each["name"], each["x"], each["y"], each["width"]) for each in chart.data], chart.layout]
 
 
 BARS = {
-    "few": partial(_bars, 1.0, 1.25, 2.0),
-    "equal": partial(_bars, 1.0, 1.0, 1.0),
-    "seven of one": partial(_bars, *[0.25] * 7),
-    "close": partial(_bars, 0.5, 0.501, 0.502),
-    "many": partial(_bars, *(place / 64 for place in range(150))),
-    "too many": partial(_bars, *(place / 64 for place in range(500))),
-    "some suspect": partial(_bars, 1.0, 1.5, suspect=(1.25, 4.0, 80.0)),
-    "all suspect": partial(_bars, suspect=(-1.25, 4.0)),
+    **{name: partial(_bars, **given) for name, given in INPUTS["bars"].items()},
+    **{
+        name: partial(_bars, [place / 64 for place in range(count)])
+        for name, count in (("many", 150), ("too many", 500))
+    },
 }
 
 
@@ -296,60 +281,7 @@ def _ticks(axis):
     return [places, axis.get_major_formatter().format_ticks(places), len(axis.get_minorticklocs())]
 
 
-LEVELS = [["far", "far", "near"], ["a", "b", "a"]]
-HAND_MADE = {
-    "logarithmic": Chart(
-        "log",
-        "Errors &amp; more",
-        [
-            scatter("e<sub>1</sub> of &alpha;", "lines+markers", [1, 10, 100], [0.01, None, 10.0]),
-            scatter("dotted", "lines", [1, 2, 9], [1.0, 2.0, 3.0]),
-        ],
-        {
-            "xaxis": {"type": "log", "title": {"text": "&lambda;<sub>0</sub>"}},
-            "yaxis": {"type": "log", "ticksuffix": "°"},
-        },
-    ),
-    "names": Chart(
-        "names",
-        "Names of two levels",
-        [scatter(name, "markers", LEVELS, [3, 1, each]) for each, name in enumerate(("one", "two"))],
-        {"yaxis": {"rangemode": "tozero", "dtick": 2}, "showlegend": False},
-    ),
-    "plain names": Chart(
-        "plain",
-        "Names",
-        [scatter("one", "markers", ["a", "b<sub>2</sub>", "c"], [3, 1, 2])],
-        {"yaxis": {"autorange": "reversed", "tickvals": [1, 3], "ticktext": ["low", "high"]}},
-    ),
-    "marked": Chart(
-        "marked",
-        "With lines across",
-        [
-            scatter("hidden", "lines", [0, 9], [1, 2], showlegend=False),
-            scatter("a rather long name of a trace", "lines", [0, 9], [1, 2]),
-            scatter("another long name of a trace", "lines", [0, 9], [2, 3]),
-        ],
-        {
-            "shapes": [
-                {"x0": place, "line": {"dash": dash, "color": "@c2"}}
-                for place, dash in ((2, "dot"), (5, "dash"))
-            ],
-            "annotations": [
-                {"x": place, "y": y, "text": f"at {place}", "yanchor": anchor}
-                for place, y, anchor in ((2, 1, "top"), (5, 0, "bottom"))
-            ],
-            "xaxis": {"range": [0, 9], "tickformat": ",d"},
-            "yaxis": {"range": [0, 4000], "tickformat": ",d"},
-        },
-    ),
-}
-for _chart in HAND_MADE.values():
-    for _place, _trace in enumerate(_chart.data):
-        _trace |= {
-            "line": {"color": f"@c{_place + 1}", "width": 1.5, "dash": ("dash", "dot")[_place % 2]},
-            "marker": {"color": "@c3", "size": 7, "symbol": ("circle-open", "diamond", "x-thin")[_place]},
-        }
+HAND_MADE = {name: Chart(**given) for name, given in INPUTS["charts"].items()}
 
 
 def _drawn_result(name, size=SLIDE):
@@ -373,13 +305,6 @@ def _still(chart):
     return [sorted(set(_LOOK.findall(still))), written]
 
 
-RUN = {
-    "rollcli": "9.8.7",
-    "encoding": ["kitti", "px"],
-    "options": {"road": "auto", "max-roll": 45.0, "jobs": None, "fast": False, "invalid": [], "true": True},
-    "calibration": {"first": [{"fx": 100.0, "fy": 100.0, "cx": 80.0, "cy": 60.0, "baseline": 0.5}]},
-}
-RUN["options"] |= {"roi": [[0, 1.5], [2, 3]], "scale": 256.0, "ids": [1, 2]}
 _SCRIPTS = re.compile(r"<(script|style)( |>).*?</\1>", re.DOTALL)
 _ROWS = re.compile(r'id="rows">(.*?)</script>')
 _STILL = re.compile(r'<svg class="still.*?</svg>', re.DOTALL)
@@ -426,64 +351,100 @@ def _chosen(count, jumps=(), rows=None):
     return [[each.place, each.reason] for each in choose(rows, count, jumps)]
 
 
-def _subjects():
-    """Which files are those of rows."""
+@contextlib.contextmanager
+def _folder_of(names):
+    """A folder with such files, some of them links, to work in."""
+    before = Path.cwd()
     with tempfile.TemporaryDirectory() as folder:
-        names = (
-            "up/run/a.png",
-            "heights/a.tif",
-            "vdisparity/a.png",
-            "vdisparity/b.c.png",
-            "disparity/a.npy",
-            "road_mask/b.png",
-            "road_mask/m_000002.png",
-        )
-        for name in names:
-            path = Path(folder, "out", name)
+        for name, _, target in (each.partition("->") for each in names):
+            path = Path(folder, name)
             path.parent.mkdir(parents=True, exist_ok=True)
-            path.touch()
-        rows = [row("/run/a.png"), row("b.c.png", -3.0), row("x/../b.png", None), row("m.mp4#000002")]
-        rows[0] = replace(rows[0], alpha2=None)
-        found = subjects(rows, "rolls.csv", f"{folder}/out/", ImageOptions(derotated="a/up"))
+            path.symlink_to(target) if target else path.touch()
+        os.chdir(folder)
+        try:
+            yield
+        finally:
+            os.chdir(before)
+
+
+def _looked_for(rows, there="", images=None, derotated=None, result="rolls.csv", inside="."):
+    """Which files are those of rows, where such files and objects are there."""
+    objects = [(each, 9) for each in there.split() if "://" in each]
+    pairs = [each.partition("|") for each in rows.split()]
+    given = [replace(row(left), right_file=right) for left, _, right in pairs]
+    with (
+        mock.patch.object(sources, "objects_behind", lambda url, recursive: objects if recursive else []),
+        _folder_of(each for each in there.split() if "://" not in each),
+    ):
+        os.chdir(inside)
+        found = made(subjects, given, result, images, ImageOptions(derotated=derotated or None))
+    if isinstance(found, str):
+        return found
+    paths = [[each.frame.path, each.frame.right_path.replace(os.sep, "/")] for each in found]
+    return [[*two, one.images, one.images_only] for two, one in zip(paths, found, strict=True)]
+
+
+def _subjects():
+    """What is taken of rows."""
+    rows = [row("/run/a.png"), row("b.c.png", -3.0), row("x/../b.png", None), row("m.mp4#000002")]
+    rows[0] = replace(rows[0], alpha2=None)
+    there = "up/run/a.png heights/a.tif vdisparity/a.png vdisparity/b.c.png disparity/a.npy road_mask/b.png"
+    with _folder_of(f"out/{each}" for each in f"{there} road_mask/m_000002.png".split()):
         return [
             [each.theta, each.alpha, each.images_only, each.refused, sorted(each.images.items())]
-            for each in (replace(one, images=_below(one.images, folder)) for one in found)
+            for each in subjects(rows, "rolls.csv", "out/", ImageOptions(derotated="a/up"))
         ]
 
 
-def _below(images, folder):
-    return {kind: path.replace(folder, "") for kind, path in images.items()}
+def _words():
+    """How numbers are put into words, and which charts there are of rows."""
+    posed = replace(row("a.png", None), pitch_deg=0.0, height_m=1.5)
+    pairs = [replace(row(f"{name}.png", None), right_lower_px=0.1) for name in "ab"]
+    results = ([row("a.png"), row("b.png")], [row("a.png"), row("b.png", None)], [row("b.png", None), posed])
+    return [
+        [with_interval(2.3456, half) for half in (None, 0.5, 0.012, 0.0042)],
+        [degrees(angle) for angle in (1.234, -1.235, -0.001, 0.0, None)],
+        [chart_names(each) for each in (*results, pairs, pairs[:1])],
+    ]
 
 
-REMOTE = (
-    ("a.png", "", "rolls.csv"),
-    ("s3://maps/a.png", "", "rolls.csv"),
-    ("s3://maps/a.png", "", "s3://maps/rolls.csv"),
-    ("s3://maps/a.png", "s3://other/a.png", "s3://maps/rolls.csv"),
-    ("a.png", "http://x/a.png", "rolls.csv"),
-    ("a.png", "", "s3://maps/rolls.csv"),
-    ("http://x/a.png", "", "http://x/rolls.csv"),
-    ("http://x/a.png", "", "http://y/rolls.csv"),
-)
+def _ends(quantity, *further):
+    """The ends of the axis of values 0 and 10 and further ones; of heights a tenth of them."""
+    unit = 0.1 if quantity is HEIGHT else 1.0
+    rows = []
+    for value, half, status in ((0.0, None, "ok"), (10.0, 0.0, "ok"), *further):
+        now = {quantity.column: value * unit, quantity.ci_column: None if half is None else half * unit}
+        rows.append(replace(row("a.png", None), status=status, **now))
+    return view(rows, quantity)
+
+
+def _views(quantity):
+    suspect = [_ends(quantity, *((each, None, "suspect") for each in two)) for two in INPUTS["suspect"]]
+    wide = [_ends(quantity, (9.5, half, "ok"), (0.5, half, "ok")) for half in (0.9, 7.0)]
+    return [*suspect, *wide, _ends(quantity, (5.0, 9.0, "suspect")), view([row("a.png", None)], quantity)]
 
 
 def _refused():
-    rows = [(replace(row(one), right_file=other), result) for one, other, result in REMOTE]
+    rows = [(replace(row(one), right_file=other), result) for one, other, result in INPUTS["remote"]]
     return [
         [subjects([each], result, None, ImageOptions(), fetch=fetch)[0].refused for fetch in (False, True)]
         for each, result in rows
     ]
 
 
-def _taken(images=(), camera=None, photo=False, **options):
+ROAD = road_map(0.1)
+ROAD[60:70, 60:100] += 4
+KERB = np.maximum(0.4 * (np.mgrid[:120, :160][0] - 20), 0)
+KERB[70:110, 20:140] += 3
+
+
+def _taken(images=(), disparity=ROAD, roll=5.75, camera=None, **options):
     """The pictures of a map, coarsely: letters are left out, and their files lose a little."""
     with tempfile.TemporaryDirectory() as folder:
-        disparity = road_map(0.1)
-        disparity[60:70, 60:100] += 4
         for name in ("a", "up", "mm"):
             np.save(f"{folder}/{name}.npy", disparity / (1 if name == "a" else 20))
         cv2.imwrite(f"{folder}/photo.png", np.random.default_rng(1).integers(0, 256, (60, 80, 3), np.uint8))
-        given = replace(row(f"{folder}/a.npy", 5.75), alpha0=-8.0, alpha1=0.4, height_m=camera)
+        given = replace(row(f"{folder}/a.npy", roll), alpha0=-8.0, alpha1=0.4, height_m=camera)
         (subject,) = subjects([given], f"{folder}/rolls.csv", None, ImageOptions())
         subject = replace(subject, images={kind: f"{folder}/{name}" for kind, name in images}, **options)
         drawn = ImageOptions(heights_range=(-0.3, 0.3))
@@ -519,12 +480,11 @@ TAKEN = {
     "of a map among images": partial(_taken, [("disparity", "a.npy")], camera=1.5, images_only=True),
     "of no parabola": partial(_taken, alpha=None),
     "turned back": partial(_taken, theta=-0.5),
+    "of a kerb": partial(_taken, disparity=KERB, roll=0.0),
+    "of a kerb and a height": partial(_taken, disparity=KERB, roll=0.0, camera=2.0),
+    "of a large map": partial(_taken, disparity=road_map(0.02, width=1280, height=400), alpha=None),
+    "of a larger map": partial(_taken, disparity=road_map(0.02, width=1600, height=400), alpha=None),
 }
-RUNS = (
-    {"a": 1, "options": {"b": 2, "c": [1]}, "encoding": ["px"]},
-    {"a": 1, "options": {"b": 3, "c": [1], "d": 4}, "encoding": ["kitti", "px"]},
-    {"a": 2, "options": {}},
-)
 CASES = {
     **{f"charts: {name}": partial(_charts, name) for name in RESULTS},
     "charts: pairs, alone": partial(_charts, "pairs", assessed=False),
@@ -540,8 +500,15 @@ CASES = {
     "chosen": lambda: [
         _chosen(count, jumps) for count in (0, 1, 3, 8, 12) for jumps in ((), (20, 60), range(30, 450, 60))
     ],
+    "chosen around gaps": lambda: [
+        _chosen(count, jumps, [row(f"{i}.png", None if i in (49, 51) else 1.0) for i in range(100)])
+        for count, jumps in ((12, [10, 50]), (12, [0, 99]), (4, range(10, 90, 10)), (3, [50]))
+    ],
     "chosen of few": lambda: [_chosen(count, (2, 5), _mixed()[0]) for count in (2, 4, 6, 12)],
     "subjects": _subjects,
+    **{f"looked for {name}": partial(_looked_for, **given) for name, given in INPUTS["looked for"].items()},
+    "words": _words,
+    **{f"views: {each.column}": partial(_views, each) for each in (ROLL, HEIGHT)},
     "refused": _refused,
     **{f"taken {name}": make for name, make in TAKEN.items()},
     "runs": lambda: [

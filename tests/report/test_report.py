@@ -17,12 +17,9 @@ import numpy as np
 import pytest
 
 from rollcli.files.results import read_result
-from rollcli.pictures.overlay import draw_disparity
 from rollcli.report import pictures
-from rollcli.report.sources import subjects
-from rollcli.run.options import EncodingOptions, FrameOptions, ImageOptions
 from tests.report.results import row, write_result
-from tests.run_cli import contents, road_map, rollcli, write_kitti, write_maps
+from tests.run_cli import rollcli, write_kitti, write_maps
 
 pytest.importorskip("plotly", reason="plotly, of the extra report, is not here")
 pytest.importorskip("jinja2", reason="jinja2, of the extra report, is not here")
@@ -92,12 +89,6 @@ def test_any_number_of_workers_gives_the_same_page(folder):
     assert pages[0] == pages[1]
 
 
-def test_json_lines_and_a_title(folder):
-    rollcli("estimate", "maps", "-o", "rolls.jsonl", cwd=folder)
-    assert report(folder, "rolls.jsonl", "--title", "Rig <7> & co").status == 0
-    assert "<title>Rig &lt;7&gt; &amp; co</title>" in page_of(folder)
-
-
 @pytest.mark.parametrize("images", ["out", "out/upright", "out/v"])
 def test_pictures_come_from_the_images_that_estimate_wrote(folder, images):
     shutil.rmtree(folder / "maps")
@@ -106,32 +97,6 @@ def test_pictures_come_from_the_images_that_estimate_wrote(folder, images):
     # of the map itself nothing is left; the level map gives its v-disparity too
     assert len(PICTURES.findall(page_of(folder))) == (3 if images == "out/v" else 6)
     assert page_of(folder).count("maps/frame0.png: there is no map of it among the images") == 1
-
-
-@pytest.mark.parametrize(
-    "name", ["../secret.png", "maps/../../secret.png", "derotated/../../secret.png", "/", "//", ".", "a/.."]
-)
-def test_no_picture_comes_from_outside_of_the_folder_of_images(tmp_path, name):
-    write_kitti(tmp_path / "secret.png", road_map(0.1))
-    (tmp_path / "images" / "derotated").mkdir(parents=True)
-    write_result(tmp_path / "rolls.csv", [row(name)])
-
-    refusal = rollcli("report", "rolls.csv", "--images", "images", "-o", "page.html", cwd=tmp_path).refused()
-    assert "images: has no image of" in refusal
-
-
-def test_with_a_folder_of_images_neither_a_link_nor_an_input_is_shown(folder):
-    write_kitti(folder / "secret.png", road_map(0.1, width=300, height=200))
-    (folder / "out" / "upright" / "secret.png").symlink_to(folder / "secret.png")
-    write_kitti(folder / "out" / "v" / "secret.png", road_map(0.1))
-    write_result(folder / "rolls.csv", [row("secret.png")])
-
-    assert "has no image of secret.png" in report(folder, "rolls.csv", "--images", "out/upright").refused()
-
-    (folder / "out" / "vdisparity").mkdir()
-    write_kitti(folder / "out" / "vdisparity" / "secret.png", road_map(0.1))
-    assert report(folder, "rolls.csv", "--images", "out").status == 0
-    assert len(PICTURES.findall(page_of(folder))) == 1
 
 
 def test_only_the_pages_own_scripts_and_styles_are_active_and_nothing_is_requested(folder):
@@ -190,19 +155,6 @@ def test_a_road_that_the_result_was_not_made_from_is_not_shown(tmp_path):
     assert len(PICTURES.findall(page_of(tmp_path))) == 5
 
 
-def test_maps_that_are_gone_leave_a_page_that_says_so_and_status_3(folder):
-    (folder / "maps" / "frame1.png").unlink()
-    done = report(folder, "out/rolls.csv")
-    assert done.status == 3
-    assert "maps/frame1.png: no such file" in done.err
-    assert "1 of 3 frames without pictures" in done.err
-    assert len(PICTURES.findall(page_of(folder))) == 10
-    assert page_of(folder).count("maps/frame1.png: no such file") == 1
-    assert "page.html: pictures of 2 frames, " in done.err
-    assert report(folder, "out/rolls.csv", "--gallery", "0", "--overwrite").status == 0
-    assert not PICTURES.search(page_of(folder))
-
-
 def test_an_interrupted_report_writes_nothing(folder, monkeypatch):
     take_one = pictures.take_pictures
 
@@ -214,16 +166,6 @@ def test_an_interrupted_report_writes_nothing(folder, monkeypatch):
     done = report(folder, "out/rolls.csv")
     assert (done.status, done.err) == (130, "rollcli: interrupted; nothing is written\n")
     assert not (folder / "page.html").exists()
-
-
-def test_names_of_frames_are_text_wherever_they_stand(tmp_path):
-    name = "maps/<script>alert(1)</script>.png"
-    write_kitti(tmp_path / name, road_map(0.02))
-    rollcli("estimate", "maps", "--recursive", "-o", "rolls.csv", cwd=tmp_path)
-    assert report(tmp_path, "rolls.csv").status == 0
-    text = page_of(tmp_path)
-    assert "<script>alert(1)" not in text
-    assert "maps/&lt;script&gt;alert(1)&lt;/script&gt;.png" in text
 
 
 @pytest.mark.slow
@@ -243,48 +185,6 @@ def test_ten_thousand_frames_stay_under_30_mb(tmp_path, monkeypatch):
     monkeypatch.setattr(pictures, "_encoded", encode_once)
     assert report(tmp_path, "rolls.csv").status == 0
     assert (tmp_path / "page.html").stat().st_size < 30e6
-
-
-def test_a_result_without_rows_is_refused_in_one_line(tmp_path):
-    (tmp_path / "rolls.csv").write_text("file,status,roll_deg\n", newline="")
-    assert report(tmp_path, "rolls.csv").refused().startswith("rollcli: rolls.csv: has no rows")
-    assert not (tmp_path / "page.html").exists()
-
-
-@pytest.mark.parametrize("record", ["no JSON", '{"options": {"scale": "big"}}'])
-def test_a_damaged_record_of_the_run_is_refused_in_one_line(folder, record):
-    (folder / "out" / "rolls.csv.run.json").write_text(record)
-    assert "out/rolls.csv.run.json: is not" in report(folder, "out/rolls.csv").refused()
-
-
-def test_inputs_are_never_replaced(folder):
-    before = contents(folder / "maps")
-    shutil.copy(folder / "out" / "rolls.csv", folder / "rolls")
-    for target in ("rolls", "maps/frame0.png"):
-        refusal = rollcli("report", "rolls", "-o", target, "--overwrite", cwd=folder).refused()
-        assert "would be replaced" in refusal
-    assert contents(folder / "maps") == before
-
-
-@pytest.mark.slow
-def test_charts_are_written_for_slides_with_or_without_a_page(folder):
-    kinds = ("pdf", "png", "svg")
-    folders = [word for kind in kinds for word in (f"--{kind}", "slides")]
-    alone = rollcli("report", "out/rolls.csv", *folders, cwd=folder)
-    assert (alone.status, alone.out) == (0, "")
-    written = contents(folder / "slides")
-    assert sorted(written) == [f"{name}.{kind}" for name in ("histogram", "roll") for kind in kinds]
-    starts = {"pdf": b"%PDF", "png": b"\x89PNG", "svg": b"<?xml"}
-    assert all(data.startswith(starts[name[-3:]]) for name, data in written.items())
-
-    refusal = rollcli("report", "out/rolls.csv", "--svg", "slides", cwd=folder).refused()
-    assert "slides/roll.svg: exists already" in refusal
-    assert report(folder, "out/rolls.csv", "--svg", "slides", "--overwrite").status == 0
-    assert contents(folder / "slides") == written
-    assert (folder / "page.html").exists()
-
-    (folder / "nothing").write_text("")
-    assert rollcli("report", "out/rolls.csv", "--png", "nothing", cwd=folder).status == 1
 
 
 def test_a_result_from_a_pipe_and_a_page_to_one(folder):
@@ -324,41 +224,6 @@ def test_heights_are_shown_as_estimate_drew_them_or_made_in_the_same_colours(tmp
         data = base64.b64decode(PICTURES.findall(page_of(tmp_path))[0 if images else 2])
         shown = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
         assert np.abs(shown.astype(float) - drawn).mean() < 4  # WebP loses a little
-
-
-@pytest.mark.parametrize(("width", "shown"), [(1280, (1280, 400)), (1600, (1280, 320))])
-def test_pictures_of_large_maps_are_smaller_and_show_all_of_them(tmp_path, width, shown):
-    np.save(tmp_path / "a.npy", road_map(0.02, width=width, height=400))
-    (subject,) = subjects([row("a.npy", 0.0)], str(tmp_path / "rolls.csv"), None, ImageOptions())
-    taken = pictures.take_pictures(subject, FrameOptions(encoding=EncodingOptions("px")))
-    whole = draw_disparity(np.load(tmp_path / "a.npy"))
-    for picture in (taken.map, taken.level):
-        found = cv2.imdecode(np.frombuffer(picture.data, np.uint8), cv2.IMREAD_COLOR)
-        assert (picture.width, picture.height) == found.shape[1::-1] == shown
-        expected = cv2.resize(whole, shown, interpolation=cv2.INTER_AREA)
-        assert np.abs(found.astype(float) - expected).mean() < 4  # WebP loses a little
-    assert taken.map_counts.height == taken.level_counts.height > 400
-    assert taken.road is taken.heights is None
-
-
-def heights_picture(tmp_path, camera, span):
-    """The picture of heights of a map with a kerb, whose row says how high the camera is."""
-    v = np.mgrid[:120, :160][0]
-    road = np.maximum(0.4 * (v - 20), 0).astype(np.float32)
-    road[80:90, 60:100] += 3.0
-    np.save(tmp_path / "a.npy", road)
-    given = replace(row("a.npy", 0.0), alpha0=-8.0, alpha1=0.4, height_m=camera)
-    (subject,) = subjects([given], str(tmp_path / "rolls.csv"), None, ImageOptions())
-    options = FrameOptions(encoding=EncodingOptions("px"), images=ImageOptions(heights_range=span))
-    taken = pictures.take_pictures(subject, options)
-    shown = cv2.imdecode(np.frombuffer(taken.heights.data, np.uint8), cv2.IMREAD_COLOR)
-    return shown[:, :144].astype(int)  # without the bar
-
-
-def test_heights_are_in_metres_where_the_row_says_how_high_the_camera_is(tmp_path):
-    in_heights = heights_picture(tmp_path, None, (-0.25, 0.25))
-    assert np.abs(heights_picture(tmp_path, 2.0, (-0.5, 0.5)) - in_heights).max() < 4
-    assert np.abs(heights_picture(tmp_path, 2.0, (-0.25, 0.25)) - in_heights).max() > 40
 
 
 @pytest.mark.slow
