@@ -25,7 +25,7 @@ import numpy as np  # noqa: E402
 
 from tests import sessions  # noqa: E402
 
-PACKAGES = ("cli", "estimator", "evaluate", "files", "pictures", "rig", "run", "simulate", "stereo")
+PACKAGES = ("cli", "estimator", "evaluate", "files", "pictures", "report", "rig", "run", "simulate", "stereo")
 _GRID = 5  # rows and columns of an image whose values are recorded
 _ROUNDING = 1e-5  # what is smaller may be nothing, rounded
 _DIGITS = 8

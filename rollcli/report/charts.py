@@ -59,13 +59,14 @@ class FrameAxis:
 
     def layout(self) -> dict[str, Any]:
         """Return the axis as plotly takes it."""
-        first, last = (1, self.count) if self.places is None else (self.places[0], self.places[-1])
-        margin = 0.01 * (last - first) if self.places is not None else max(0.5, 0.01 * self.count)
-        span = {"range": [first - margin, last + margin], "zeroline": False}
         if self.places is not None:
-            return {"title": {"text": f"time, {self.unit}"}, **span}
+            last = self.places[-1]  # the first stands at 0
+            span = [-0.01 * last, last + 0.01 * last]
+            return {"title": {"text": f"time, {self.unit}"}, "range": span, "zeroline": False}
+        margin = max(0.5, 0.01 * self.count)
+        span = [1 - margin, self.count + margin]
         few = {"dtick": 1} if self.count <= _FEW else {}  # there are no half frames
-        return {"title": {"text": "frame"}, **span, "tickformat": ",d", **few}
+        return {"title": {"text": "frame"}, "range": span, "zeroline": False, "tickformat": ",d", **few}
 
 
 def frame_axis(rows: Sequence[Row], rig: RigAssessment | None = None) -> FrameAxis:
@@ -351,7 +352,7 @@ def _level_line(rig: RigAssessment, quantity: Quantity, scale: float, axis: Fram
         for segment in found.segments if found is not None else ():
             if segment.begin.value is not None and segment.end.value is not None:
                 ends = [axis.at(int(drive.frames[place]) + 1) for place in (segment.first, segment.last)]
-                said = f"{quantity.name.replace('_', ' ')} {answer(segment.end, quantity, change=True)}"
+                said = f"{quantity.name.replace('_', ' ')} {answer(segment.end, quantity)}"
                 _add(trace, ends, [scale * segment.begin.value, scale * segment.end.value], said)
     return trace
 

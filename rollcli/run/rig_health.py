@@ -111,7 +111,7 @@ class Health:
     def table(self) -> list[tuple[str, str]]:
         """Return what each part is called, and its value with its interval."""
         words = ("px lower", "degrees clockwise", "% larger", "px twisted in the corners")
-        values = (answer(each, PIXELS, change=True).removesuffix(" px") for each in self.parts)
+        values = (answer(each, PIXELS).removesuffix(" px") for each in self.parts)
         return list(zip(words, values, strict=True))
 
     def lines(self) -> list[str]:

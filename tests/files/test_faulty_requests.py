@@ -8,7 +8,7 @@ import pytest
 from rollcli.errors import InputError
 from rollcli.files import storage
 from rollcli.files.stores.objects import _listed, _store, list_objects
-from tests.store_proxy import CUT, NEVER, PASS, Faults, answer, proxied
+from tests.store_proxy import CUT, NEVER, PASS, Faults, proxied
 
 pytestmark = pytest.mark.slow
 
@@ -92,35 +92,6 @@ def test_a_store_that_takes_too_long_is_told_from_one_that_is_not_there(monkeypa
         monkeypatch.setattr("rollcli.files.stores.objects._TRIES", 1)
         with pytest.raises(InputError, match=r"TIMEOUT sets the seconds it may take \(0.1\), for up to 1 GB"):
             storage.read_bytes("s3://silent/x.png")
-
-
-@pytest.mark.parametrize(
-    ("status", "code", "said"),
-    [
-        ("404 Not Found", "ContainerNotFound", "there is no such bucket"),
-        ("404 Not Found", "BlobNotFound", "there is no such object"),
-        ("403 Forbidden", "AuthenticationFailed", "are wrong or have expired"),
-        ("403 Forbidden", "AuthorizationPermissionMismatch", "access is denied"),
-        ("400 Bad Request", "InvalidAuthenticationInfo", "the keys have expired"),
-    ],
-)
-def test_what_azure_objects_to_is_said_in_the_same_words_and_asked_once(monkeypatch, status, code, said):
-    store = pytest.importorskip("obstore.store", reason="the extra storage is not here")
-    monkeypatch.setenv("AZURE_STORAGE_ACCOUNT_NAME", "test")
-    monkeypatch.setenv("AZURE_STORAGE_ACCOUNT_KEY", "c2VjcmV0")
-    asked = []
-
-    def treat(method, target):
-        asked.append(target)
-        return answer(status, code)
-
-    with proxied("http://127.0.0.1:9", treat) as address:
-        monkeypatch.setenv("AZURE_STORAGE_ENDPOINT", f"{address}/test")
-        opened = store.from_url("az://maps", client_options={"allow_http": "true"})
-        monkeypatch.setattr("rollcli.files.stores.objects._store", lambda root, process: opened)
-        with pytest.raises(InputError, match=said):
-            storage.read_bytes("az://maps/a.png")
-    assert len(asked) == 1
 
 
 class FirstFails:

@@ -26,6 +26,8 @@ from rollcli.files.search import IMAGE_ENDINGS, Search
 from rollcli.files.stores import locations
 from rollcli.rig.calibration import Calibration
 from tests.binary_files import disparity_map, npy_header
+from tests.files.recordings import small_bags
+from tests.files.stores import answers
 from tests.fuzz.corpus import corpus
 from tests.recorded import check
 
@@ -258,6 +260,7 @@ CASES = {
         for name, data in FILES.items()
         if name != "picture.jpg"  # libjpeg rounds in more than one way
     },
+    "image: a header without end": partial(READ["image"], b"P5\n#%s\n2 2\n255\n1234" % (b"x" * 3000)),
     # a compressed file is as long as this zlib makes it
     **{
         f"cut: {name}": partial(lambda data: [_cut(data[:end]) for end in (9, -1)], data)
@@ -304,6 +307,8 @@ CASES = {
         for shape in ((4, 6), (5, 7), (4, 6, 3), (1, 1))
         for layout in ("left-right", "top-bottom")
     ],
+    **answers.CASES,
+    **small_bags.CASES,
     "listed": lambda: [naming.listed("abcdefg"[:count]) for count in range(6)],
 }
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rollcli.pictures.colours import DARK, LIGHT, style_sheet
-from rollcli.pictures.figures import SLIDE, Size
+from rollcli.pictures.figures import SLIDE
 from rollcli.report import figures
 from rollcli.report.charts import all_charts
 from rollcli.report.figures import chart_file, with_still
@@ -67,15 +67,6 @@ def test_an_svg_has_the_size_of_a_slide_a_title_axes_with_units_and_a_legend(cha
     assert [each for each in expected if each not in texts(svg)] == []
 
 
-def test_lines_grow_with_the_letters(charts):
-    widths = {}
-    for times in (2, 4):  # a width of 1 is not written
-        svg = chart_file(charts["roll"], "svg", Size(960.0 * times, 420.0 * times, 13.0 * times)).decode()
-        widths[times] = [float(each) for each in re.findall(r"stroke-width: ([\d.]+)", svg)]
-    assert set(widths[2]) == {2, 3, 4}  # axes, curves, and the line of zero
-    assert widths[4] == [2 * each for each in widths[2]]
-
-
 def test_a_pdf_has_the_same_size_and_its_letters_are_letters(charts):
     pdf = chart_file(charts["roll"], "pdf")
     assert pdf.startswith(b"%PDF")
@@ -97,51 +88,12 @@ def test_a_value_lies_where_the_axes_say():
     assert top == pytest.approx(lines[len(lines) // 2], abs=2)
 
 
-@pytest.mark.parametrize(("status", "colour"), [("ok", "c1"), ("suspect", "suspect")])
-@pytest.mark.parametrize(("count", "dot"), [(3, 8), (402, 5)])
-def test_a_mark_of_a_frame_is_as_large_as_on_the_page(status, colour, count, dot):
-    rows = [row(f"{i}.png", None) for i in range(count)]
-    rows[1] = row("b.png", 1.0, None, status)
-    shown = of_colour(drawn(rows), colour)[100:]
-    dot = 2.5 if (status, count) == ("ok", 402) else dot
-    for axis in (0, 1):
-        assert shown.any(axis=axis).sum() == pytest.approx(dot * SLIDE.font / 13 * 2, abs=3)
-
-
-def test_the_legend_names_the_line_before_what_is_suspect_and_what_has_failed(charts):
-    found = texts(chart_file(charts["roll"], "svg"))
-    order = [found.index(each) for each in ("95 % interval", "roll", "jump", "suspect", "failed")]
-    assert order == sorted(order)
-
-
-def test_axes_have_round_numbers_with_a_true_minus_and_thousands():
-    rows = [row(f"{i}.png", -1 + 2 * i / 2500, 0.05) for i in range(2500)]
-    found = texts(chart_file(all_charts(rows)["roll"], "svg"))
-    assert {"−1.0", "0.0", "1.0", "1,000", "2,000"} <= set(found)
-
-
 def test_nothing_of_a_files_name_is_in_a_chart():
     rows = [row("]]><script>alert(1)</script>.png", 1.0), row("b.png", None, message="<img onerror=1>")]
     for chart in all_charts(rows, assess_rig(rows)).values():
         for text in (chart_file(chart, "svg").decode(), with_still(chart).still):
             assert "alert" not in text
             assert "onerror" not in text
-
-
-def test_no_line_is_drawn_across_suspect_frames():
-    rows = [row(f"{i}.png", 1.0, None) for i in range(30)]
-    rows[10:20] = [row(f"{i}.png", 3.0, None, "suspect") for i in range(10, 20)]
-    columns = np.flatnonzero(of_colour(drawn(rows), "c1")[100:].any(axis=0))
-    (gap,) = np.diff(columns)[np.diff(columns) > 120]
-    assert gap == pytest.approx(11 / 30 * 1920, rel=0.1)
-
-
-def test_failed_frames_are_marked_along_the_lower_edge_and_the_line_of_zero_stands_out():
-    shown = drawn([row("a.png", -1.0, None), row("b.png", None), row("c.png", 1.0, None)])
-    places, _ = np.nonzero(of_colour(shown, "error")[200:])
-    zero = np.flatnonzero(of_colour(shown, "line")[:, 300:1700].mean(axis=1) > 0.9)
-    assert 200 + places.mean() > 1.6 * zero.mean()
-    assert len(zero) >= 3
 
 
 @pytest.mark.slow

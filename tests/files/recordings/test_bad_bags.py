@@ -1,22 +1,17 @@
 """What is wrong with a bag, a topic or a message is one line, and costs no more than it must."""
 
 import contextlib
-import math
 import os
 import sqlite3
-import struct
 
 import cv2
-import numpy as np
 import pytest
 
-from rollcli import open_recording
-from rollcli.errors import InputError
 from tests.files.recordings.bag_files import camera_info, compressed, disparity_image, image, write_bag
+from tests.files.recordings.small_bags import mcap
 from tests.files.recordings.test_bags import START, STEP, P, drive, maps, rows
 from tests.run_cli import rollcli, write_pair
 
-MAGIC = b"\x89MCAP0\r\n"
 NO_P = [0.0] * 12
 
 
@@ -26,39 +21,8 @@ def views(tmp_path):
     return [cv2.imread(str(tmp_path / side / "0.png"), 0) for side in ("left", "right")]
 
 
-def changed(message, **values):
-    return type(message)(**{**message.__dict__, **values})
-
-
 def refused(tmp_path, *given):
     return rollcli("estimate", *given, cwd=tmp_path).refused()
-
-
-@pytest.mark.parametrize("kind", ["mcap", "bag", "db3"])
-def test_images_that_are_not_what_they_say_are_an_error_of_their_frame(tmp_path, kind):
-    values = maps(1)[0]
-    nothing = np.zeros(0, np.uint8)
-    wrong = {
-        "is truncated: 76800 bytes are needed, 0 are there": {"data": nothing},
-        "has no pixels (0 x 0)": {"data": nothing, "width": 0, "height": 0, "step": 0},
-        "its rows have 100 bytes, of 640 that 160 pixels of 32FC1 need": {"step": 100},
-        "its rows have 640 bytes, of 8000000000 that": {"width": 2 * 10**9, "height": 2 * 10**9},
-        "is truncated: 2560000000000 bytes are needed": {"height": 4 * 10**9},
-        "has pixels of the encoding 'yuv422'": {"encoding": "yuv422"},
-    }
-
-    def make(store):
-        for place, given in enumerate([{}, *wrong.values(), {}]):
-            stamp = START + place * STEP
-            yield "/depth", stamp, changed(image(store, values, "32FC1", stamp), **given)
-
-    path = write_bag(tmp_path, "drive", kind, make).name
-    done = rollcli("estimate", path, cwd=tmp_path)
-    found = rows(done.out)
-    assert [row["status"] for row in found] == ["ok", *["error"] * len(wrong), "ok"]
-    assert done.status == 3
-    for row, expected in zip(found[1:-1], wrong, strict=True):
-        assert row["message"].startswith(expected), row["message"]
 
 
 def test_sizes_that_change_within_a_drive_are_told(tmp_path, views):
@@ -101,44 +65,18 @@ def test_a_camera_info_without_p_is_told(tmp_path, views):
     assert len(list((tmp_path / "maps").iterdir())) == 2
 
 
-def record(opcode, content):
-    return struct.pack("<BQ", opcode, len(content)) + content
+def test_topics_that_no_decoder_is_for_are_refused_with_a_line(tmp_path):
+    def make(store):
+        yield "/camera", START, camera_info(store, START, (160, 120), P)
 
-
-def text(words):
-    return struct.pack("<I", len(words)) + words.encode()
-
-
-def foreign_mcap(path, kind, encoding, count=3):
-    """An MCAP of another profile than ROS's, with a topic /camera [https://mcap.dev/spec]."""
-    records = [
-        record(1, text("") + text("")),
-        record(3, struct.pack("<H", 1) + text(kind) + text(encoding) + text("")),
-        record(4, struct.pack("<HH", 1, 1) + text("/camera") + text(encoding) + text("")),
-        *(record(5, struct.pack("<HIQQ", 1, place, START, START) + bytes(100)) for place in range(count)),
-        record(0x0F, bytes(4)),
-        record(2, bytes(20)),
-    ]
-
-    path.write_bytes(MAGIC + b"".join(records) + MAGIC)
-
-
-@pytest.mark.parametrize(
-    ("kind", "encoding", "expected"),
-    [
-        ("foxglove.RawImage", "protobuf", "messages of the type foxglove.RawImage, not images of ROS"),
-        ("foxglove_msgs/msg/CompressedVideo", "cdr", "such video must be decoded in order"),
-        ("sensor_msgs/msg/Image", "json", "/camera is serialized as json; cdr and ros1 are read"),
-        ("sensor_msgs/msg/PointCloud2", "cdr", "messages of the type sensor_msgs/PointCloud2, not images"),
-    ],
-)
-def test_topics_that_no_decoder_is_for_are_refused_with_a_line(tmp_path, kind, encoding, expected):
-    foreign_mcap(tmp_path / "drive.mcap", kind, encoding)
-    assert "its topics: /camera" in refused(tmp_path, "drive.mcap")
-    assert expected in refused(tmp_path, "drive.mcap", "--topic", "/camera")
-    both = ["--left-topic", "/camera", "--right-topic", "/camera"]
-    assert expected in refused(tmp_path, "drive.mcap", *both)
-    assert "has no topic /other; its topics: /camera" in refused(tmp_path, "drive.mcap", "--topic", "/other")
+    path = write_bag(tmp_path, "drive", "mcap", make).name
+    for given, expected in (
+        ([], "its topics: /camera"),
+        (["--topic", "/camera"], "messages of the type sensor_msgs/CameraInfo, not images of ROS"),
+        (["--left-topic", "/camera", "--right-topic", "/camera"], "/camera has messages of the type"),
+        (["--topic", "/other"], "has no topic /other; its topics: /camera"),
+    ):
+        assert expected in refused(tmp_path, path, *given)
 
 
 def test_video_in_compressed_images_is_refused_with_a_line(tmp_path):
@@ -149,21 +87,6 @@ def test_video_in_compressed_images_is_refused_with_a_line(tmp_path):
     path = write_bag(tmp_path, "drive", "mcap", make).name
     err = refused(tmp_path, path, "--left-topic", "/l", "--right-topic", "/r")
     assert "/l holds video (h264), which must be decoded in order" in err
-
-
-def test_an_encrypted_bag_is_refused_with_a_line(tmp_path):
-    path = write_bag(tmp_path, "drive", "bag", drive(2))
-    data = path.read_bytes()
-    start = len(b"#ROSBAG V2.0\n")
-    (length,) = struct.unpack_from("<I", data, start)
-    header, after = data[start + 4 : start + 4 + length], start + 4 + length
-    field = text("encryptor=rosbag/AesCbcEncryptor")
-    (padding,) = struct.unpack_from("<I", data, after)
-    header, padding = header + field, padding - len(field)
-    head = struct.pack("<I", len(header)) + header + struct.pack("<I", padding) + b" " * padding
-    rest = np.random.default_rng(0).bytes(len(data) - start - len(head))
-    path.write_bytes(data[:start] + head + rest)
-    assert "drive.bag: is encrypted: decrypt it first" in refused(tmp_path, "drive.bag")
 
 
 @pytest.mark.parametrize("url", ["s3://bucket/drive.mcap", "http://127.0.0.1:9/drive.bag", "gs://b/d.db3"])
@@ -180,60 +103,6 @@ def test_without_the_extra_a_line_says_what_to_install(tmp_path):
     assert "pip install rosbags" in said
 
 
-def repacked(data, compression, packed, claimed):
-    """An MCAP of rosbags' as others write it: topics before its chunk, which is packed, and no index."""
-    records, at = [], len(MAGIC)
-    while at < len(data) - len(MAGIC):
-        opcode, length = struct.unpack_from("<BQ", data, at)
-        records.append((opcode, data[at + 9 : at + 9 + length]))
-        at += 9 + length
-    (chunk,) = (content for opcode, content in records if opcode == 6)
-    plain = chunk[40:]
-    (size,) = struct.unpack_from("<Q", chunk, 16)
-    inside = packed(plain)
-    chunk = chunk[:16] + struct.pack("<QI", claimed(size), 0) + text(compression)
-    chunk += struct.pack("<Q", len(inside)) + inside
-    topics = b"".join(record(opcode, content) for opcode, content in records if opcode in (3, 4))
-    ends = record(0x0F, bytes(4)) + record(2, bytes(20))
-    return MAGIC + record(1, bytes(8)) + topics + record(6, chunk) + ends + MAGIC
-
-
-def zstd(plain):
-    return pytest.importorskip("zstandard").compress(plain)
-
-
-def lz4(plain):
-    return pytest.importorskip("lz4.frame").compress(plain)
-
-
-@pytest.mark.parametrize(
-    ("compression", "packed", "claimed", "whole", "broken"),
-    [
-        ("zstd", zstd, int, 3, False),
-        ("lz4", lz4, int, 3, False),
-        ("zstd", lambda plain: zstd(plain)[:-80_000], int, 1, True),
-        ("lz4", lambda plain: lz4(plain)[:-80_000], int, 1, True),
-        ("lz4", lz4, lambda size: size + 100, 3, True),
-        ("lz4", lz4, lambda size: 2**40, 0, True),
-        ("snappy", bytes, int, 0, True),
-    ],
-)
-def test_what_is_whole_of_a_packed_chunk_is_used(tmp_path, compression, packed, claimed, whole, broken):
-    noise = np.random.default_rng(0).random((120, 160), np.float32) / 1000
-    path = write_bag(tmp_path, "drive", "mcap", drive(3, [each + noise for each in maps(3)]))
-    expected = rows(rollcli("estimate", path.name, cwd=tmp_path).out)
-    path.write_bytes(repacked(path.read_bytes(), compression, packed, claimed))
-    done = rollcli("estimate", path.name, cwd=tmp_path)
-    found = rows(done.out)
-    assert done.status == (3 if broken else 0)
-    if broken:
-        rest = found.pop()
-        assert (rest["file"], "is damaged or cut off" in rest["message"]) == ("drive.mcap#rest", True)
-    # of the one that is not whole, its header may be
-    assert [row for row in found if row["status"] != "error"] == expected[:whole]
-    assert len(found) <= whole + broken
-
-
 def test_frames_that_a_bag_does_not_have_are_an_error_of_theirs(tmp_path):
     path = write_bag(tmp_path, "drive", "mcap", drive(1)).name
     done = rollcli("estimate", f"{path}#/nothing@5", f"{path}#/stereo/disparity@5", cwd=tmp_path)
@@ -246,8 +115,8 @@ def test_frames_that_a_bag_does_not_have_are_an_error_of_theirs(tmp_path):
 
 
 def test_a_topic_without_messages_is_refused_with_a_line(tmp_path):
-    foreign_mcap(tmp_path / "drive.mcap", "stereo_msgs/msg/DisparityImage", "cdr", count=0)
-    assert "drive.mcap: has no messages of /camera" in refused(tmp_path, "drive.mcap")
+    (tmp_path / "drive.mcap").write_bytes(mcap(data=()))
+    assert "drive.mcap: has no messages of /a" in refused(tmp_path, "drive.mcap", "--topic", "/a")
 
 
 def test_the_first_messages_may_be_damaged(tmp_path):
@@ -279,28 +148,3 @@ def test_values_of_another_type_in_the_tables_of_a_bag_are_no_matter(tmp_path, c
     os.utime(path, (0, 0))  # another file
     done = rollcli("estimate", path.name, cwd=tmp_path)
     assert (done.status, done.out) == (0, whole)
-
-
-@pytest.mark.parametrize(
-    ("d", "model", "size", "expected"),
-    [
-        ((0.1, 0.2, 0.3), "plumb_bob", (160, 120), "has 3 numbers of distortion, which are no plumb_bob"),
-        ((0.1, 0.2, 0.3), "equidistant", (160, 120), "has 3 numbers of distortion, which are no equidistant"),
-        ((0.1,) * 5, "brown", (160, 120), "has the distortion model 'brown'; known are plumb_bob, rational_"),
-        ((math.nan,) * 5, "plumb_bob", (160, 120), "has numbers in D, K or R that are not finite"),
-        ((0.1,) * 5, "plumb_bob", (100, 90), "is a raw view of 160x120, and its CameraInfo is of 100x90"),
-    ],
-)
-def test_a_camera_info_that_rectifies_nothing_is_told(tmp_path, views, d, model, size, expected):
-    def make(store):
-        for side, view in zip(("left", "right"), views, strict=True):
-            info = camera_info(store, START, size, P, d, np.diag([350.0, 350, 1]).ravel())
-            yield f"/{side}/camera_info", START, changed(info, distortion_model=model)
-            yield f"/{side}/image_raw", START, image(store, view, "mono8", START)
-
-    path = write_bag(tmp_path, "drive", "mcap", make)
-    given = {f"{side}_topic": f"/{side}/image_raw" for side in ("left", "right")}
-    with pytest.raises(InputError) as caught:
-        list(open_recording(path, **given))
-    assert str(caught.value).startswith(f"{path}#/left/image_raw@{START}: ")
-    assert expected in str(caught.value)
