@@ -279,6 +279,7 @@ class _Chunked:
     def _walked(self, source: _Source, wanted: _Wanted, size: int, after: int) -> _Records:
         """Return the messages that are whole in a record of a size, each with as many bytes as are wanted."""
         found: list[tuple[int, int, memoryview]] = []
+        whole = False
         with contextlib.suppress(*_DAMAGED):
             while source.left:
                 if (head := self._message(source)) is not None:
@@ -287,7 +288,8 @@ class _Chunked:
                     data = source.take(taken)
                     source.skip(length - taken)
                     found.append((channel, time, data))
-        return _Records(found, after, source.left == 0 and source.size == size, source.at_once)
+            whole = source.size == size
+        return _Records(found, after, whole, source.at_once)
 
     def _start(self) -> int:
         raise NotImplementedError

@@ -172,10 +172,10 @@ def _packed(kind, compression, pack):
     return [whole, *(_SHARE.sub("", each) for each in others)]
 
 
-def _cut_in_a_pack(compression, pack):
-    """What is read of messages of noise whose chunk has lost its end."""
+def _cut_in_a_pack(compression, pack, lost):
+    """What is read of messages of noise whose chunk has lost so many bytes of its end."""
     noise = [np.random.default_rng(each).bytes(100_000) for each in range(3)]
-    found = _read(mcap(compression, lambda plain: pack(plain)[:-150_000], data=noise))
+    found = _read(mcap(compression, lambda plain: pack(plain)[:-lost], data=noise))
     return [found["messages"], found["alone"], _SHARE.sub("", found["broken"])]
 
 
@@ -272,8 +272,9 @@ CASES = {
         for compression, pack in packs.items()
     },
     **{
-        f"bag: mcap cut in {each}": partial(_cut_in_a_pack, each, PACKED["mcap"][each])
+        f"bag: mcap cut in {each} by {lost}": partial(_cut_in_a_pack, each, PACKED["mcap"][each], lost)
         for each in ("zstd", "lz4")
+        for lost in (150_000, 1_000)
     },
     "bag: no bag": lambda: [
         _read(each) for each in (b"", b"MCAP", b"SQLite format 3", _MAGIC, _ros1(encryptor=b"rosbag/Aes"))
