@@ -1,8 +1,9 @@
 """The `rollcli` group: it imports a command when it is called, and ends every error as one line."""
 
+import contextlib
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from importlib import import_module
 from typing import Any
@@ -60,13 +61,16 @@ class LazyGroup(click.Group):
         with formatter.section("Commands"):
             formatter.write_dl([(name, text) for name, (_, text) in COMMANDS.items()])
 
+    def make_context(self, *args: Any, **extra: Any) -> click.Context:
+        """Parse, which answers --help."""
+        with _ended_by_its_reader():
+            return super().make_context(*args, **extra)
+
     def invoke(self, ctx: click.Context) -> Any:
-        """Call the command; a closed stdout ends it quietly."""
+        """Call the command."""
         try:
-            return super().invoke(ctx)
-        except BrokenPipeError:  # caught here, since click would call it a failure
-            _discard_stdout()
-            return ctx.exit(ExitStatus.DONE)
+            with _ended_by_its_reader():
+                return super().invoke(ctx)
         except KeyboardInterrupt:  # click would write a line of its own
             say("interrupted")
             return ctx.exit(ExitStatus.INTERRUPTED)
@@ -116,11 +120,16 @@ def _from_environment(error: click.ClickException) -> str:
     return f"{error.ctx.auto_envvar_prefix}_{name.upper()}: {error.message}"
 
 
-def _discard_stdout() -> None:
-    """Let the interpreter flush the rest to nowhere: the reader of stdout has left."""
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, 1)
-    os.close(nowhere)
+@contextlib.contextmanager
+def _ended_by_its_reader() -> Iterator[None]:
+    """End quietly where the reader of stdout has left, which click would call a failure."""
+    try:
+        yield
+    except BrokenPipeError:
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, 1)  # the interpreter flushes the rest
+        os.close(nowhere)
+        raise click.exceptions.Exit(ExitStatus.DONE) from None
 
 
 def _print_versions(ctx: click.Context, param: click.Parameter, asked: bool) -> None:

@@ -51,6 +51,18 @@ def test_a_reader_of_messages_who_is_lost_neither_ends_nor_hides_the_work(maps, 
         assert (maps / "rolls.csv").read_bytes().count(b"\n") == FRAMES + 1
 
 
+@pytest.mark.parametrize(
+    "arguments", [["--help"], ["--versions"], ["estimate", "--help"], ["estimate", "maps", "-q"]]
+)
+def test_a_reader_of_answers_who_has_left_ends_the_program_quietly(maps, arguments):
+    read, write = os.pipe()
+    os.close(read)
+    run = start(maps, arguments, stdout=write, stderr=subprocess.PIPE)
+    os.close(write)
+    _, err = run.communicate(timeout=60)
+    assert (run.returncode, err) == (0, b"")
+
+
 def test_an_error_keeps_its_status_when_nobody_reads_its_message(maps):
     read, write = os.pipe()
     os.close(read)
