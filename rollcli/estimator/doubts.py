@@ -108,12 +108,12 @@ class View:
         nearest, farthest = (self._in_the_middle(row)[0] for row in (height - 1, 0))
         nearest = max(nearest, 1e-9)  # a road may end above the border: then nothing is said of what is ahead
         near = road * (1 / nearest)  # 1 at the lower border, 0 at the horizon
-        reached = self.width / self.reach
+        at_reach = self.width / self.reach
         bands = np.clip(near * _BANDS, 0, _BANDS - 1).astype(np.intp)
         in_lane, lower = (np.bincount(bands[those], minlength=_BANDS) for those in (lane, lane & below))
-        some = (in_lane >= _FEW) & (np.arange(_BANDS) + 0.5 >= _BANDS / 2 * reached)
-        reached = max(reached, 2 * farthest / nearest)
-        ahead = (near < reached) & (near > reached / 2)
+        some = (in_lane >= _FEW) & (np.arange(_BANDS) + 0.5 >= _BANDS / 2 * at_reach)
+        begins = max(at_reach, 2 * farthest / nearest)
+        ahead = (near < begins) & (near > begins / 2)
         seen = valid & ahead
         return Ground(
             filled=float(on_road.sum()) / max(1.0, float(valid.sum())),
