@@ -85,7 +85,6 @@ def _taken(sink: int) -> str:
 
 
 _SUB = 1
-_FILTERS = b"\0\1"  # None and Sub
 _FIRST_ROWS = 4  # tell of most files that have others; to unpack the whole takes a fifth of OpenCV's time
 _FULL_WINDOW = b"\x78"  # of less OpenCV's zlib minds references that go further back; other decoders do not
 # Bytes after a stream that are looked for; more would have to end in its checksum. To look through the whole
@@ -116,13 +115,10 @@ def decode_grey(packed: bytes, width: int, height: int, depth: int) -> NDArray[A
     rows = np.empty((height, 1 + size * width), np.uint8)  # the filter, then the bytes of each pixel
     try:
         first = zlib.decompressobj().decompress(packed, _FIRST_ROWS * rows.shape[1])
-    except zlib.error:
-        return None
-    if first[:: rows.shape[1]].translate(None, _FILTERS):
-        return None
-    try:
+        if max(first[:: rows.shape[1]], default=0) > _SUB:
+            return None
         plain = codecs.deflate_decode(packed, out=rows.reshape(-1))
-    except (RuntimeError, ValueError):  # its errors are RuntimeErrors
+    except (zlib.error, RuntimeError, ValueError):  # those of imagecodecs are RuntimeErrors
         return None
     checksum = codecs.deflate_adler32(plain).to_bytes(4, "big")
     # libdeflate does not tell where the stream ends; its checksum does, if it is at the end and not before
