@@ -3,7 +3,7 @@
     python tests/benchmarks/bench_roadless.py [FRAMES [SEED]]
 
 FRAMES (40) disparity maps of each kind, made by casting rays at rectangles. To reach: none is ok. Numbers
-were fitted with seed 1.
+were fitted with seeds 1 to 10; SEED is 701.
 
 The planes in them are as even as a road: what tells them from one is how much of the view they fill, and how
 wide the view is from where the camera stands.
@@ -252,7 +252,7 @@ _SCENES = {
 def main() -> None:
     """Print how many maps of each kind are ok, suspect, or without an angle."""
     frames = int(sys.argv[1]) if len(sys.argv) > 1 else 40
-    seed = int(sys.argv[2]) if len(sys.argv) > 2 else 2
+    seed = int(sys.argv[2]) if len(sys.argv) > 2 else 701
     total: Counter[str] = Counter()
     for number, kind in enumerate(KINDS):
         found: Counter[str] = Counter()
