@@ -33,6 +33,7 @@ from rollcli.stereo.views import (
     seen_at,
     shrink_both,
     smoothed_at_pixels,
+    strips,
 )
 
 Plane = tuple[float, float, float]
@@ -140,10 +141,14 @@ class Levelled:
         large, see `views.smoothed_between`; the left view is as smooth.
         """
         left, right = self._views
-        u = np.arange(self.shape[1], dtype=np.float32) + np.float32(middle) - plane
-        v = np.arange(self.shape[0], dtype=np.float32)[rows, None]
-        u, v = seen_at(self._lies, u, v, self.shape, plane)
-        return smoothed_at_pixels(left[rows]), grey_along(right, u, np.broadcast_to(v, u.shape))
+        across = np.arange(self.shape[1], dtype=np.float32) + np.float32(middle)
+        down = np.arange(self.shape[0], dtype=np.float32)[rows, None]
+        warped = np.empty(plane.shape, np.uint8)
+        for strip in strips(len(plane)):
+            near = plane[strip]
+            u, v = seen_at(self._lies, across - near, down[strip], self.shape, near)
+            warped[strip] = grey_along(right, u, np.broadcast_to(v, u.shape))
+        return smoothed_at_pixels(left[rows]), warped
 
 
 def match_for_road(pair: Levelled, rows: slice, *, whole: bool = False) -> Map:

@@ -17,12 +17,15 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
+sys.path.insert(0, str(Path(__file__).parents[2]))
+from rollcli.run.workers.pool import limit_blas_threads
+
+limit_blas_threads()  # as the program does: else some milliseconds are threads that wait for each other
+
 import cv2
 import numpy as np
 from matched import match_as_estimated
 from numpy.typing import NDArray
-
-sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.files.formats import read_image
