@@ -259,9 +259,10 @@ def column_evidence(rows: MeasuredRows, spread: float) -> ColumnEvidence:
     frame = _Frame.of(seen)
     design = frame.shapes(frame.design(seen))
     shift = seen.shift + np.float64(1) * at.down(seen.x, seen.y, seen.near)
-    start = _least_squares(design[:7], shift, seen.weight.astype(np.float64))
-    weight = seen.weight * _believed(start.off, spread / factor)
-    fit, whole = (_least_squares(design[:count], shift, weight) for count in (7, len(design)))
+    fixed = seen.weight.astype(np.float64)
+    fit = _settled(_least_squares(design[:7], shift, fixed), design[:7], shift, fixed, spread / factor)
+    weight = fit.weight
+    whole = _least_squares(design, shift, weight)
     variance = _variance(
         design[list(_LINEAR)], _least_squares(design[list(_LINEAR)], shift, weight), frame.tile
     )
@@ -463,6 +464,18 @@ def _robust(
         before, spread = spread, 1.4826 * _median(np.abs(off)) + 1e-3
         if abs(spread - before) < _SAME_SPREAD * spread:
             break
+    return _settled(fit, design, shift, fixed, spread, held)
+
+
+def _settled(
+    fit: _Fit,
+    design: Doubles,
+    shift: Doubles,
+    fixed: Doubles,
+    spread: float,
+    held: Doubles | float = 0.0,
+) -> _Fit:
+    """Go on from a fit, each block weighed by how far off it was, until its values stay; `spread` is held."""
     for _ in range(_FIT_ROUNDS):
         values = fit.values
         fit = _least_squares(design, shift, fixed * _believed(fit.off, spread), held)
