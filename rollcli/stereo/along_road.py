@@ -182,7 +182,7 @@ def match_for_road(pair: Levelled, rows: slice, *, whole: bool = False) -> Map:
     if whole:
         disparity = match_all(rows)
         if near is not None:
-            np.copyto(disparity[top:stop], near.disparity, where=near.found & near.lies_on)
+            np.copyto(disparity[top:stop], near.disparity, where=(near.disparity > 0) & near.lies_on)
         return disparity
     disparity = np.zeros_like(pair.coarse)
     disparity[start:top] = pair.coarse[start:top]
@@ -214,20 +214,17 @@ class _Near(NamedTuple):
     Attributes
     ----------
     disparity : ndarray of float32
-        Pixels.
-    found : ndarray of bool
-        Where there is one.
+        Pixels; no data is 0.
     lies_on : ndarray of bool
         Where the small map is near the plane.
     """
 
     disparity: Map
-    found: NDArray[np.bool_]
     lies_on: NDArray[np.bool_]
 
     def beside(self, coarse: Map) -> Map:
         """Return these rows, off the plane with the disparities of the small map."""
-        return np.where(self.lies_on | (coarse <= 0), self.disparity * self.found, coarse)
+        return np.where(self.lies_on | (coarse <= 0), self.disparity, coarse)
 
 
 def _match_along(pair: Levelled, plane: Plane, rows: slice, coarse: Map) -> _Near | None:
@@ -245,20 +242,23 @@ def _match_along(pair: Levelled, plane: Plane, rows: slice, coarse: Map) -> _Nea
     sixteenths = _match_blocks(views, count)[rows.start - top : rows.stop - top]
     straight = straight[rows.start - top : rows.stop - top]
 
-    end = round(_END * count * SUBPIXELS)
-    known = (sixteenths > end) & (sixteenths < (count - 1) * SUBPIXELS - end)
-    shift = sixteenths.astype(np.float32) * np.float32(1 / SUBPIXELS)
-    # the plane is that of the pixel which the right view shows there
-    disparity = np.maximum(straight - across * shift, 0) + (shift - np.float32(count // 2))
-    known &= (disparity > 0) & (disparity <= u)
+    end, last = round(_END * count * SUBPIXELS), (count - 1) * SUBPIXELS
     seen = coarse[rows]
-    lies_on = np.abs(seen - straight) < np.float32(_NEAR * count)
-    lies_on &= seen > 0
-    on = np.count_nonzero(lies_on)
-    found = np.count_nonzero(lies_on & known & (np.abs(seen - disparity) < np.float32(_AS_FAR)))
+    disparity, lies_on = np.empty(straight.shape, np.float32), np.empty(straight.shape, np.bool_)
+    on = found = 0
+    for strip in strips(len(straight)):
+        steps, on_plane, small = sixteenths[strip], straight[strip], seen[strip]
+        shift = steps.astype(np.float32) * np.float32(1 / SUBPIXELS)
+        # the plane is that of the pixel which the right view shows there
+        there = np.maximum(on_plane - across * shift, 0) + (shift - np.float32(count // 2))
+        known = (steps > end) & (steps < last - end) & (there > 0) & (there <= u)
+        near = (np.abs(small - on_plane) < np.float32(_NEAR * count)) & (small > 0)
+        on += int(np.count_nonzero(near))
+        found += int(np.count_nonzero(near & known & (np.abs(small - there) < np.float32(_AS_FAR))))
+        disparity[strip], lies_on[strip] = there * known, near
     if on < max(1, _FEWEST_ON * np.count_nonzero(seen)) or found < _FEWEST_FOUND * on:
         return None
-    return _Near(disparity, known, lies_on)
+    return _Near(disparity, lies_on)
 
 
 def _match_blocks(views: Views, count: int) -> NDArray[np.int16]:
