@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from rollcli.rig.calibration import Calibration as Calibration
     from rollcli.rig.drive.assess import RigAssessment as RigAssessment
     from rollcli.rig.drive.assess import assess_rig as assess_rig
-    from rollcli.run.calibration import read_calibration as read_calibration
+    from rollcli.run.find import read_calibration as read_calibration
     from rollcli.run.library import estimate_pair as estimate_pair
     from rollcli.run.library import estimate_roll as estimate_roll
     from rollcli.stereo.match import compute_disparity as compute_disparity
@@ -49,7 +49,7 @@ _HOMES = {
     "estimate_roll": "rollcli.run.library",
     "height_map": "rollcli.pictures.heights",
     "open_recording": "rollcli.files.recordings.open",
-    "read_calibration": "rollcli.run.calibration",
+    "read_calibration": "rollcli.run.find",
     "read_disparity": "rollcli.files.encodings",
     "v_disparity": "rollcli.pictures.vdisparity",
 }

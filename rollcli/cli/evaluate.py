@@ -52,7 +52,7 @@ def accuracy(ctx: click.Context, /, **options: Any) -> None:
     Frames are matched by the names of their files, without folder and ending. Those without a partner are
     counted on stderr; exit status 3 when a frame of the truth has no angle.
     """
-    from rollcli.evaluate.run_accuracy import run_accuracy
+    from rollcli.evaluate.accuracy import run_accuracy
 
     form = table_format(options.pop("format"), options["output"])
     ctx.exit(run_accuracy(AccuracyOptions(**options, format=form)))

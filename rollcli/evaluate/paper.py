@@ -14,10 +14,9 @@ from rollcli.files.matching import stem_of
 from rollcli.files.stream import write_output
 from rollcli.run.find import Named, map_frames
 from rollcli.run.frame import Frame
+from rollcli.run.outputs import check_writes, list_files
 from rollcli.run.progress import Progress
-from rollcli.run.reads_and_writes import check_writes, list_files
-from rollcli.run.workers.chunks import Work
-from rollcli.run.workers.in_order import Workers
+from rollcli.run.workers.chunks import Work, Workers
 from rollcli.run.workers.interrupt import stop_on_signals
 from rollcli.run.workers.tasks import run_tasks
 
@@ -128,8 +127,7 @@ def _time(
 def _write(
     found: "list[Findings]", failed: list[tuple[str, str]], times: "list[Times]", options: PaperOptions
 ) -> None:
-    from rollcli.evaluate.paper_page import charts, paper_page
-    from rollcli.evaluate.tables import all_tables
+    from rollcli.evaluate.paper_page import all_tables, charts, paper_page
     from rollcli.pictures.figures import PRINT
     from rollcli.report.figures import chart_file
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rollcli.errors import UsageError
 from rollcli.estimator.moments import map_of
-from rollcli.pictures.round_step import round_step
+from rollcli.pictures.overlay import round_step
 
 _MAX_BINS = 1024
 _BLOCK = 1 << 22  # pixels counted at a time: a large map would take 40 bytes a pixel

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.files.results import Row
-from rollcli.pictures.round_step import round_step
+from rollcli.pictures.overlay import round_step
 from rollcli.report.options import ALIGNED, HISTOGRAM, chart_names
 from rollcli.report.page import Chart, scatter
 from rollcli.report.summary import degrees, with_interval

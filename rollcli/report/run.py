@@ -16,12 +16,11 @@ from rollcli.report.sources import Choice, Subject, choose, subjects
 from rollcli.report.summary import common_run, frame_count
 from rollcli.rig.drive.assess import RigAssessment, assess_rig
 from rollcli.run.options import EncodingOptions, FrameOptions
+from rollcli.run.outputs import check_writes, list_files
 from rollcli.run.progress import Progress
-from rollcli.run.reads_and_writes import check_writes, list_files
-from rollcli.run.record import recorded_options
+from rollcli.run.resume import recorded_options
 from rollcli.run.rig import order_of, origins_of
-from rollcli.run.workers.chunks import Work
-from rollcli.run.workers.in_order import Workers
+from rollcli.run.workers.chunks import Work, Workers
 from rollcli.run.workers.interrupt import stop_on_signals
 from rollcli.run.workers.tasks import run_tasks
 

@@ -19,7 +19,7 @@ from rollcli.run.frame import Frame, FrameResult, ReadAs
 from rollcli.run.inputs import inputs_line, part_inputs_path
 from rollcli.run.options import FrameOptions
 from rollcli.run.outputs import local_images
-from rollcli.run.summary import Figures
+from rollcli.run.progress import Figures
 from rollcli.run.workers.chunks import Span
 
 

@@ -12,16 +12,14 @@ from rollcli.files.atomic import is_file
 from rollcli.files.containers import file_of
 from rollcli.files.stores.locations import is_url, tasks_in_hand
 from rollcli.run.batch import Batch, BatchOptions, Step, join_results, line_form
-from rollcli.run.calibration import calibration_files, calibration_notes
+from rollcli.run.find import calibration_files, calibration_notes
 from rollcli.run.frame import Frame, FrameResult, failed_frame
 from rollcli.run.options import EstimateOptions, FrameOptions
-from rollcli.run.outputs import every_path, image_paths, remove_image_leftovers, write_outputs
+from rollcli.run.outputs import every_path, image_paths, list_files, remove_image_leftovers, write_outputs
 from rollcli.run.plan import Plan, make_plan
 from rollcli.run.progress import Progress
-from rollcli.run.reads_and_writes import list_files
 from rollcli.run.result import Output, frames_to_do, open_output
-from rollcli.run.workers.chunks import Work
-from rollcli.run.workers.in_order import Workers
+from rollcli.run.workers.chunks import Work, Workers
 from rollcli.run.workers.interrupt import Stop, stop_on_signals
 from rollcli.run.workers.tasks import require_scheduler, run_joined, started_early
 

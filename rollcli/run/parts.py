@@ -22,9 +22,8 @@ from rollcli.run.frame import Frame, ReadAs
 from rollcli.run.inputs import Inputs, inputs_path, is_part_inputs, part_inputs_path, split_lines
 from rollcli.run.outputs import local_images, remove_image_leftovers, remove_marks
 from rollcli.run.plan import Plan
-from rollcli.run.record import RunRecord
-from rollcli.run.resume import KeptRows, check_restored, new_record
-from rollcli.run.summary import RunSummary
+from rollcli.run.progress import RunSummary
+from rollcli.run.resume import KeptRows, RunRecord, check_restored, new_record
 
 _CHECK_S = 10.0  # a request of 50 ms now and then
 

@@ -18,7 +18,7 @@ from rollcli.run.inputs import Inputs, inputs_path, is_inputs
 from rollcli.run.outputs import local_images, remove_image_leftovers, remove_marks
 from rollcli.run.parts import PartsOutput, kept_in_parts, open_parts
 from rollcli.run.plan import Plan
-from rollcli.run.record import RunRecord, is_replaceable_record
+from rollcli.run.progress import RunSummary
 from rollcli.run.result_file import (
     DurableRows,
     ResultFile,
@@ -28,8 +28,14 @@ from rollcli.run.result_file import (
     open_result,
     row_lines,
 )
-from rollcli.run.resume import KeptRows, arranged, check_restored, new_record
-from rollcli.run.summary import RunSummary
+from rollcli.run.resume import (
+    KeptRows,
+    RunRecord,
+    arranged,
+    check_restored,
+    is_replaceable_record,
+    new_record,
+)
 
 
 class StreamOutput:

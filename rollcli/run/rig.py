@@ -20,15 +20,14 @@ from rollcli.rig.drive.posterior import Estimate
 from rollcli.rig.quantities import ALIGNMENT, QUANTITIES, ROLL, SIZE
 from rollcli.rig.quantities import COLUMNS as QUANTITY_COLUMNS
 from rollcli.rig.words import findings
-from rollcli.run.calibration import Calibrations
+from rollcli.run.find import Calibrations
 from rollcli.run.frame import Frame
 from rollcli.run.options import FrameOptions, RigOptions
+from rollcli.run.outputs import check_writes, list_files
 from rollcli.run.read import FRAME_ERRORS, read_views, wanted_of
-from rollcli.run.reads_and_writes import check_writes, list_files
-from rollcli.run.record import recorded_options
 from rollcli.run.result_rows import frame_of_row
-from rollcli.run.rig_gates import check_options, run_checks, status_of
-from rollcli.run.rig_health import health_of
+from rollcli.run.resume import recorded_options
+from rollcli.run.rig_gates import check_options, health_of, run_checks, status_of
 from rollcli.run.rig_text import FORMATS, NO_COLUMNS, Findings, correction_text
 from rollcli.stereo.match import match_pair
 from rollcli.stereo.misalignment import ColumnSupport

@@ -14,11 +14,11 @@ from rollcli.simulate.road import (
     Carriageway,
     CrossSection,
     Piece,
+    Site,
     cross_section,
     draw_asphalt,
     draw_carriageway,
 )
-from rollcli.simulate.roadside import Site
 from rollcli.simulate.scene import FAR, Light, Scene, draw, draw_light, draw_offset
 from rollcli.simulate.spec import FrameSpec, Stream
 from rollcli.simulate.surfaces import Course, Ground, Surface

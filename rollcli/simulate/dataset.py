@@ -27,8 +27,7 @@ from rollcli.files.results import csv_table, read_run, run_path
 from rollcli.messages import say
 from rollcli.run.options import RunningOptions
 from rollcli.run.progress import TaskProgress
-from rollcli.run.workers.chunks import Work
-from rollcli.run.workers.in_order import Workers
+from rollcli.run.workers.chunks import Work, Workers
 from rollcli.run.workers.interrupt import Stop, stop_on_signals
 from rollcli.run.workers.tasks import run_tasks
 from rollcli.simulate.build import carriageway_of, render_frame, road_camber

@@ -65,7 +65,7 @@ COMMANDS = {
 LATE = {
     "rig": "rollcli.run.rig",
     "report": "rollcli.report.run",
-    "evaluate accuracy": "rollcli.evaluate.run_accuracy",
+    "evaluate accuracy": "rollcli.evaluate.accuracy",
     "evaluate paper": "rollcli.evaluate.paper",
 }
 

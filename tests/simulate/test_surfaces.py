@@ -7,8 +7,7 @@ import pytest
 
 from rollcli.simulate.build import build_scene
 from rollcli.simulate.camera import PixelRays
-from rollcli.simulate.road import Piece
-from rollcli.simulate.roadside import vehicle
+from rollcli.simulate.road import Piece, vehicle
 from rollcli.simulate.solids import Post
 from rollcli.simulate.spec import FrameSpec
 from rollcli.simulate.surfaces import Backdrop, Course, Ground, Wall
