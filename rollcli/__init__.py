@@ -31,29 +31,24 @@ if TYPE_CHECKING:
     from rollcli.stereo.match import compute_disparity as compute_disparity
     from rollcli.stereo.options import StereoOptions as StereoOptions
 
-_HOMES = {
-    "Calibration": "rollcli.rig.calibration",
-    "EstimationError": "rollcli.errors",
-    "InputError": "rollcli.errors",
-    "RigAssessment": "rollcli.rig.drive.assess",
-    "RollEstimate": "rollcli.estimator.estimate",
-    "RollcliError": "rollcli.errors",
-    "StereoOptions": "rollcli.stereo.options",
-    "Tangent": "rollcli.estimator.interval",
-    "UsageError": "rollcli.errors",
-    "VDisparity": "rollcli.pictures.vdisparity",
-    "assess_rig": "rollcli.rig.drive.assess",
-    "compute_disparity": "rollcli.stereo.match",
-    "derotate": "rollcli.pictures.derotate",
-    "estimate_pair": "rollcli.run.library",
-    "estimate_roll": "rollcli.run.library",
-    "height_map": "rollcli.pictures.heights",
-    "open_recording": "rollcli.files.recordings.open",
-    "read_calibration": "rollcli.run.find",
-    "read_disparity": "rollcli.files.encodings",
-    "v_disparity": "rollcli.pictures.vdisparity",
+_NAMES = {
+    "rollcli.errors": "EstimationError InputError RollcliError UsageError",
+    "rollcli.estimator.estimate": "RollEstimate",
+    "rollcli.estimator.interval": "Tangent",
+    "rollcli.files.encodings": "read_disparity",
+    "rollcli.files.recordings.open": "open_recording",
+    "rollcli.pictures.derotate": "derotate",
+    "rollcli.pictures.heights": "height_map",
+    "rollcli.pictures.vdisparity": "VDisparity v_disparity",
+    "rollcli.rig.calibration": "Calibration",
+    "rollcli.rig.drive.assess": "RigAssessment assess_rig",
+    "rollcli.run.find": "read_calibration",
+    "rollcli.run.library": "estimate_pair estimate_roll",
+    "rollcli.stereo.match": "compute_disparity",
+    "rollcli.stereo.options": "StereoOptions",
 }
-__all__ = ["__version__", *_HOMES]
+_HOMES = {name: module for module, names in _NAMES.items() for name in names.split()}
+__all__ = ["__version__", *sorted(_HOMES)]
 
 
 def __getattr__(name: str) -> "Any":

@@ -14,7 +14,7 @@ from rollcli.files.matching import stem_of
 from rollcli.files.stream import write_output
 from rollcli.run.find import Named, map_frames
 from rollcli.run.frame import Frame
-from rollcli.run.outputs import check_writes, list_files
+from rollcli.run.outputs import is_dry_run
 from rollcli.run.progress import Progress
 from rollcli.run.workers.chunks import Work, Workers
 from rollcli.run.workers.interrupt import stop_on_signals
@@ -56,16 +56,14 @@ def run_paper(options: PaperOptions) -> ExitStatus:
     require_extra("report", "the page of charts")
     if options.encoding.encoding == "depth":
         raise UsageError("--encoding depth: the experiments are made on disparity maps, not on depth maps")
-    folder, running = options.experiments.output, options.running
+    folder = options.experiments.output
     frames = map_frames(Named(options.inputs, region=options.region, skip=[folder]))
     truth = _known_angles(frames, options)
     kind = options.experiments.figure
     names = [f"{name}.{kind}" for name in FIGURES.values()] if kind is not None else []
     writes = [str(Path(folder, name)) for name in (*(f"{name}.csv" for name in TABLES), *names, PAGE)]
     reads = [path for frame in frames for path in frame.reads()]
-    check_writes(reads, writes, overwrite=running.overwrite)
-    if running.dry_run:
-        list_files([(reads, writes)])
+    if is_dry_run(reads, writes, options.running):
         return ExitStatus.DONE
     return _run(frames, truth, options)
 

@@ -282,7 +282,7 @@ def pieces_of(path: str) -> Iterator[tuple[str, bytes]]:
     if parts:
         yield from read_parts(path, parts)
     else:
-        yield path, _read(path)
+        yield path, read_named(path)
 
 
 def cells_of(data: bytes, name: str, wanted: Sequence[str]) -> tuple[list[str], Iterator[tuple[Any, ...]]]:
@@ -350,7 +350,7 @@ def read_run(path: str | Path) -> Mapping[str, Any] | None:
     if is_web_url(record) or not exists(record):
         return None
     try:
-        data = _read(record)
+        data = read_named(record)
         if b"\\u0000" in data:  # no option holds one
             raise ValueError("it holds a NUL character")
         run = json.loads(as_utf8(data, record))
@@ -361,7 +361,14 @@ def read_run(path: str | Path) -> Mapping[str, Any] | None:
     return run
 
 
-def _read(path: str | Path) -> bytes:
+def read_named(path: str | Path) -> bytes:
+    """Return the bytes of a file, a pipe, a URL or standard input ("-") that a user named.
+
+    Raises
+    ------
+    InputError
+        It cannot be read, or is larger than any result.
+    """
     if is_url(str(path)):
         return read_bytes(path)
     try:

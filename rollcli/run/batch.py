@@ -13,8 +13,9 @@ from rollcli.errors import UsageError
 from rollcli.files.atomic import sync_files
 from rollcli.files.codecs.parquet import encode_parquet
 from rollcli.files.results import Format, column_types, format_header, format_row, part_name, run_path
-from rollcli.files.storage import create, owner_of, write_bytes
+from rollcli.files.storage import create, write_bytes
 from rollcli.files.stores.locations import is_url, public_name
+from rollcli.files.stores.objects import object_owner
 from rollcli.run.frame import Frame, FrameResult, ReadAs
 from rollcli.run.inputs import inputs_line, part_inputs_path
 from rollcli.run.options import FrameOptions
@@ -149,7 +150,7 @@ def check_owned(output: str, run: str) -> None:
     UsageError
         Another one has.
     """
-    if is_url(output) and owner_of(run_path(output)) not in (run, ""):
+    if is_url(output) and object_owner(run_path(output)) not in (run, ""):
         raise UsageError(
             f"{public_name(output)}: another run has begun to write this result, so this one ends; "
             "give each an --output of its own"

@@ -73,8 +73,7 @@ def _plan(options: ConvertOptions) -> list[Conversion]:
     _check_options(options)
     frames = _find_frames(options)
     rows = _find_rows(frames, options)
-    for note in check_first_size(frames, options.frame):
-        say(note)
+    say(*check_first_size(frames, options.frame))
     conversions = []
     for frame, row in zip(frames, rows, strict=True):
         if row is None or row.status != "suspect" or not options.skip_suspect:

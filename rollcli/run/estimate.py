@@ -108,13 +108,19 @@ def _run(plan: Plan, resume_command: str, started: list[Any]) -> ExitStatus:
             progress.stopped_early = True
         except (OutputError, WorkerError) as error:
             raise type(error)(f"{error}{output.hint()}") from error
-        status = _end(output, progress, stop, resume_command)
+        if not progress.stopped_early:
+            output.finish(progress.summary)
+        progress.tell_end()
+        if stop.asked and progress.stopped_early:
+            how = f"; continue with: {resume_command}" if output.resumable else ""
+            progress.say(f"interrupted{how}")
+            return ExitStatus.INTERRUPTED
         if not (progress.stopped_early or options.running.quiet):
             calibrated = (frame.calibration for frame in plan.frames if frame.calibration is not None)
             if note := progress.summary.pose_note(next(calibrated, None)):
                 progress.say(note)
             progress.say(progress.summary.rig_roll())
-        return status
+        return progress.summary.status
 
 
 class _Run(NamedTuple):
@@ -215,17 +221,6 @@ def _results(step: Step, run: _Run) -> Iterator[Iterator[Batch]]:
         # a worker that died elsewhere cannot be waited for; a retry has removed what is not needed any more
         if workers.scheduler is not None and not step.retry_of:
             remove_image_leftovers(frames, options.images)
-
-
-def _end(output: Output, progress: Progress, stop: Stop, resume_command: str) -> ExitStatus:
-    if not progress.stopped_early:
-        output.finish(progress.summary)
-    progress.tell_end()
-    if stop.asked and progress.stopped_early:
-        how = f"; continue with: {resume_command}" if output.resumable else ""
-        progress.say(f"interrupted{how}")
-        return ExitStatus.INTERRUPTED
-    return progress.summary.status
 
 
 def _list(plan: Plan) -> None:

@@ -100,7 +100,9 @@ class Calibrations:
         self._of_path: dict[str, Calibration] = {}  # one may be for a thousand frames
         if len(given.calib) == 1 and is_place(given.calib[0]):
             files = _files(given.calib[0])
-            self._by_stem = _stems(files)
+            self._by_stem = {}
+            for path in files:
+                self._by_stem.setdefault(PurePosixPath(path).stem.removesuffix(_MARK), []).append(path)
             self._fetched = fetch_all(filter(is_url, files), MAX_BYTES)
         elif given.given:
             self._one = _read(given.calib, given)
@@ -189,13 +191,6 @@ def check_depth(frames: Sequence[Frame], encoding: EncodingOptions) -> None:
             )
 
 
-def _stems(files: Sequence[str]) -> dict[str, list[str]]:
-    found: dict[str, list[str]] = {}
-    for path in files:
-        found.setdefault(PurePosixPath(path).stem.removesuffix(_MARK), []).append(path)
-    return found
-
-
 def _files(folder: str) -> list[str]:
     if is_url(folder):
         return sorted(path for path, _ in objects_behind(folder, recursive=True))
@@ -272,12 +267,8 @@ def _search(named: Named, endings: tuple[str, ...], *, maps: bool = False) -> It
     given = named.inputs
     search = Search(endings, given.recursive, given.include, given.exclude, named.skip, maps)
     yield search
-    _say(search.notes, quiet=named.quiet)
-
-
-def _say(notes: Iterable[str], *, quiet: bool) -> None:
-    for note in () if quiet else dict.fromkeys(notes):
-        say(note)
+    if not named.quiet:
+        say(*dict.fromkeys(search.notes))
 
 
 def _sorted_frames(named: Named) -> "SortedFrames":
@@ -429,7 +420,8 @@ def _bags(given: InputOptions) -> list[tuple[str, list[str]]]:
 def _bag_frames(bags: "Iterable[BagFrames]", make: "_FrameMaker") -> list[Frame]:
     frames = []
     for bag in bags:
-        _say(bag.notes, quiet=make.quiet)
+        if not make.quiet:
+            say(*dict.fromkeys(bag.notes))
         for left, right in bag.frames:
             frame = make.frame(_recorded(left), right and _recorded(right))
             own = make.calibrations.given

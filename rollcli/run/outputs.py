@@ -21,7 +21,7 @@ from rollcli.files.stores.locations import is_object_url, is_url, located, publi
 from rollcli.files.stores.objects import list_objects
 from rollcli.files.stream import STDOUT, open_stream
 from rollcli.run.frame import Frame
-from rollcli.run.options import ENDING_OF_FORMAT, ImageKind, ImageOptions
+from rollcli.run.options import ENDING_OF_FORMAT, ImageKind, ImageOptions, RunningOptions
 
 
 def image_paths(frame: Frame, images: ImageOptions) -> Iterator[tuple[ImageKind, str]]:
@@ -111,8 +111,10 @@ def write_outputs(
 
 
 def _write_marked(files: Mapping[str, bytes], paths: Collection[str], result: str) -> None:
-    for path in paths:
-        _take_back(path, result)
+    for path in paths:  # what a retry of this result made, unless somebody has changed it since
+        with contextlib.suppress(InputError):  # it was not marked, or is gone
+            if read_bytes(mark_path(path)) == _mark(read_bytes(path), result):
+                remove(path)
     for path, data in files.items():
         write_bytes(mark_path(path), _mark(data, result))
         try:
@@ -120,13 +122,6 @@ def _write_marked(files: Mapping[str, bytes], paths: Collection[str], result: st
         except OutputError:
             remove(mark_path(path))
             raise
-
-
-def _take_back(path: str, result: str) -> None:
-    """Remove a file that a retry of this result made, unless somebody has changed it since."""
-    with contextlib.suppress(InputError):  # it was not marked, or is gone
-        if read_bytes(mark_path(path)) == _mark(read_bytes(path), result):
-            remove(path)
 
 
 def _mark(data: bytes, result: str) -> bytes:
@@ -218,6 +213,14 @@ def check_writes(reads: Sequence[str], writes: Sequence[str], *, overwrite: bool
         check_nothing_is_there(writes)
 
 
+def is_dry_run(reads: Sequence[str], writes: Sequence[str], running: RunningOptions) -> bool:
+    """Check what would be read and written (see `check_writes`); list it where that is all that was asked."""
+    check_writes(reads, writes, overwrite=running.overwrite)
+    if running.dry_run:
+        list_files([(reads, writes)])
+    return running.dry_run
+
+
 def check_inputs_are_kept(reads: Callable[[], Iterable[str]], writes: Iterable[str]) -> None:
     """Check that no input is written, however differently its path is spelled.
 
@@ -299,9 +302,8 @@ def list_files(frames: Iterable[tuple[Iterable[str], Iterable[str]]]) -> None:
 def _place(path: str) -> str:
     """Make one text of every spelling of a path."""
     folder, name = _split(path)
-    real, ignores_case = _real_place(folder)
-    place = f"{real}/{os.path.normcase(name)}"
-    return normalize("NFC", place).casefold() if ignores_case else place
+    place = f"{_real_folder(folder)}/{os.path.normcase(name)}"
+    return normalize("NFC", place).casefold() if _ignores_case(folder) else place
 
 
 def _split(path: str) -> tuple[str, str]:
@@ -313,11 +315,6 @@ def _split(path: str) -> tuple[str, str]:
 
 
 # cached: resolving links costs a system call for each part of a path, and files share folders
-@lru_cache(maxsize=1024)
-def _real_place(folder: str) -> tuple[str, bool]:
-    return _real_folder(folder), _ignores_case(folder)
-
-
 @lru_cache(maxsize=1024)
 def _real_folder(folder: str) -> str:
     return os.path.realpath(folder)

@@ -504,15 +504,12 @@ def _differences(
         yield f"{kept.first_changed} has changed since{how}"
 
 
+_LISTS = {"encoding": str, "disparities_searched_px": int}
+_RECORDED = {"rollcli": str, "options": dict, "inputs": dict, **dict.fromkeys(_LISTS, list)}
+
+
 def _is_whole(run: Mapping[str, Any]) -> bool:
     """Tell whether a record holds all that a run writes, each of its type."""
-    encodings, searched = run.get("encoding"), run.get("disparities_searched_px")
-    return (
-        isinstance(run.get("rollcli"), str)
-        and isinstance(run.get("options"), dict)
-        and isinstance(run.get("inputs"), dict)
-        and isinstance(encodings, list)
-        and all(isinstance(each, str) for each in encodings)
-        and isinstance(searched, list)
-        and all(isinstance(each, int) for each in searched)
-    )
+    if not all(isinstance(run.get(name), kind) for name, kind in _RECORDED.items()):
+        return False
+    return all(isinstance(each, kind) for name, kind in _LISTS.items() for each in run[name])

@@ -382,13 +382,7 @@ def run_simulate(
     if progress.done < progress.total:
         say(f"interrupted after {progress.done} of {progress.total} frames; continue with: {resume_command}")
         return ExitStatus.INTERRUPTED
-    progress.note(_summary(dataset, progress))
-    return ExitStatus.DONE
-
-
-def _summary(dataset: Dataset, progress: TaskProgress) -> str:
-    """Make the last line: how many frames, and what one cost."""
-    kept = f" ({progress.kept} kept)" if progress.kept else ""
-    rendered = progress.done - progress.kept
+    kept, rendered = f" ({progress.kept} kept)" if progress.kept else "", progress.done - progress.kept
     cost = f", {progress.seconds / rendered:.2f} s a frame" if rendered else ""
-    return f"{progress.done} frames{kept} in {dataset.folder}; {progress.seconds:.1f} s{cost}"
+    progress.note(f"{progress.done} frames{kept} in {dataset.folder}; {progress.seconds:.1f} s{cost}")
+    return ExitStatus.DONE
