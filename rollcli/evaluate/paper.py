@@ -90,12 +90,12 @@ def _run(frames: Sequence[Frame], truth: Mapping[str, KnownPose], options: Paper
         progress,
         contextlib.closing(run_tasks(frames, work, stop, Workers(options.running.jobs))) as all_examined,
     ):
-        for examined in all_examined:
-            progress.add(examined.result)
-            if examined.findings is None:
-                failed.append((examined.result.row.file, examined.result.row.message))
+        for result, findings in all_examined:
+            progress.add(result)
+            if findings is None:
+                failed.append((result.row.file, result.row.message))
             else:
-                found.append(examined.findings)
+                found.append(findings)
     if stop.asked:
         progress.say(f"interrupted after {progress.done} of {progress.total} maps; nothing is written")
         return ExitStatus.INTERRUPTED

@@ -178,10 +178,16 @@ _ROLLS = ("roll_deg", "image_roll_deg")
 
 @dataclass(frozen=True)
 class Result:
-    """A result file: its rows in order, and the run that made them (FILE.run.json), if that is there."""
+    """A result file: its rows in order, its path, and the run (FILE.run.json) where that is there."""
 
     rows: tuple[Row, ...]
     run: Mapping[str, Any] | None
+    path: str = ""
+
+    @property
+    def files(self) -> list[str]:
+        """The column `file`."""
+        return [row.file for row in self.rows]
 
 
 def columns(further: Sequence[str] = ()) -> tuple[str, ...]:
@@ -267,7 +273,7 @@ def read_result(path: str | Path) -> Result:
     """
     path = str(path)
     rows = tuple(row for name, data in pieces_of(path) for row in parse_rows(data, name))
-    return Result(rows, read_run(path))
+    return Result(rows, read_run(path), path)
 
 
 def pieces_of(path: str) -> Iterator[tuple[str, bytes]]:

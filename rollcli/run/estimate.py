@@ -75,7 +75,11 @@ def run_estimate(options: EstimateOptions, resume_command: str = "") -> ExitStat
         The run cannot start or cannot go on.
     """
     if options.running.dry_run:
-        _list(make_plan(options))
+        plan = make_plan(options)
+        list_files([(calibration_files(options.calibration), ())])
+        frames, images = frames_to_do(plan), options.images
+        list_files((frame.reads(), (path for _, path in image_paths(frame, images))) for frame in frames)
+        list_files([((), plan.files)])
         return ExitStatus.DONE
     with contextlib.ExitStack() as early:
         started: list[Any] = []
@@ -221,11 +225,3 @@ def _results(step: Step, run: _Run) -> Iterator[Iterator[Batch]]:
         # a worker that died elsewhere cannot be waited for; a retry has removed what is not needed any more
         if workers.scheduler is not None and not step.retry_of:
             remove_image_leftovers(frames, options.images)
-
-
-def _list(plan: Plan) -> None:
-    """Print what would be read and written, a line each."""
-    frames, images = frames_to_do(plan), plan.options.images
-    list_files([(calibration_files(plan.options.calibration), ())])
-    list_files((frame.reads(), (path for _, path in image_paths(frame, images))) for frame in frames)
-    list_files([((), plan.files)])

@@ -359,14 +359,13 @@ def _halved(each: Input, layout: Layout) -> list[tuple[Input, Input]]:
 
 def _paired(pair: Pair) -> list[tuple[Input, Input]]:
     """Pair the frames of two videos; images are a pair themselves."""
-    both = pair.left, pair.right
-    if not any(is_video(each.location) for each in both):
-        return [both]
-    for each in both:
+    if not any(is_video(each.location) for each in pair):
+        return [pair]
+    for each in pair:
         _require_local(each.location)
     from rollcli.files.recordings.video import frames_of_pair
 
-    found = frames_of_pair(*((each.location, each.name, each.relative) for each in both))
+    found = frames_of_pair(*((each.location, each.name, each.relative) for each in pair))
     return [(_recorded(one), _recorded(other)) for one, other in found]
 
 

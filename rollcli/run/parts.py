@@ -40,7 +40,10 @@ class PartsOutput:
         self.kept, self.keep_open, self.replaces = kept, keep_open, record.replaces
         self._record, self._plan = record, record.plan
         self._part_rows = record.plan.options.result.part_rows
-        self._parts = _parts(record)
+        output = located(record.plan.options.running.root, record.plan.output)
+        self._parts = Parts(
+            output, self._plan.format, self._plan.further, self._part_rows, (), 0, record.run, record.of_rows
+        )
         self._numbers: Iterator[int] = iter(())  # of the parts to come
         # rows and the lines of their inputs, by their positions in the result
         self._replaced_part, self._replacing = 0, dict[int, tuple[bytes, bytes]]()
@@ -175,12 +178,6 @@ def open_parts(plan: Plan) -> Iterator[PartsOutput]:
             yield _begin(plan, descriptor)
 
 
-def _parts(record: RunRecord) -> Parts:
-    plan, options = record.plan, record.plan.options
-    output, rows = located(options.running.root, plan.output), options.result.part_rows
-    return Parts(output, plan.format, plan.further, rows, (), 0, record.run, record.of_rows)
-
-
 def _begin(plan: Plan, keep_open: int | None) -> PartsOutput:
     options = plan.options
     # again, now that no other run can write it
@@ -190,7 +187,9 @@ def _begin(plan: Plan, keep_open: int | None) -> PartsOutput:
     _remove_leftovers(plan, parts)
     if options.result.resume or options.running.overwrite:
         remove_image_leftovers(kept.not_failed(), options.images)
-    stay = {path for paths in _kept_paths(plan, kept) for path in paths}
+    firsts = enumerate(range(0, kept.count, options.result.part_rows))
+    whole = [number for number, first in firsts if not any(first in hole for hole in kept.holes)]
+    stay = {path for number in whole for path in _part_paths(plan, number)}
     inputs = [f"{inputs_path(plan.output)}/{name}" for name in list_names(inputs_path(plan.output))]
     # in this order, no part is ever without its inputs
     for path in (*(f"{plan.output}/{name}" for name in parts), *filter(is_part_inputs, inputs)):
@@ -275,13 +274,6 @@ def _numbered(plan: Plan, names: Iterable[str]) -> Iterator[tuple[str, int]]:
         number = int(name.removeprefix("part-").partition(".")[0])
         if name == base_name(_location(plan, number)):
             yield name, number
-
-
-def _kept_paths(plan: Plan, kept: KeptRows) -> Iterator[tuple[str, str]]:
-    """Yield where the parts lie whose rows are kept, and their inputs."""
-    for number, first in enumerate(range(0, kept.count, plan.options.result.part_rows)):
-        if not any(first in hole for hole in kept.holes):
-            yield _part_paths(plan, number)
 
 
 def _rows_of_part(plan: Plan, number: int) -> tuple[Row, ...]:

@@ -75,7 +75,8 @@ class ResultFile:
             raise OutputError(f"{self._name}: was moved or removed while this run was writing it")
         try:
             before = os.lseek(self.descriptor, 0, os.SEEK_CUR)
-            _write_all(self.descriptor, lines)
+            while lines:  # a full disk takes a part of it, and reports the error at the next call
+                lines = lines[os.write(self.descriptor, lines) :]
         except OSError as error:
             with contextlib.suppress(OSError):
                 os.ftruncate(self.descriptor, before)
@@ -243,11 +244,6 @@ def _reopen(descriptor: int, path: str, flags: int) -> None:
         os.dup2(opened, descriptor, inheritable=False)
     finally:
         os.close(opened)
-
-
-def _write_all(descriptor: int, data: bytes) -> None:
-    while data:  # a full disk takes a part of it, and reports the error at the next call
-        data = data[os.write(descriptor, data) :]
 
 
 _MOST_IMAGES = 512

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rollcli.errors import InputError, UsageError
 from rollcli.files.naming import listed, natural_key
 from rollcli.files.result_columns import ResultColumns, read_columns
-from rollcli.files.results import STATUSES, parse_rows, pieces_of, read_run, run_path
+from rollcli.files.results import STATUSES, Result, parse_rows, pieces_of, read_run, run_path
 from rollcli.files.stores.locations import base_name, is_remote
 from rollcli.files.stream import is_stream, write_output
 from rollcli.messages import say
@@ -101,20 +101,7 @@ def _joined(parts: Sequence[ResultColumns], name: str) -> NDArray[np.float64]:
     return np.concatenate([part.numbers.get(name, np.full(len(part.files), np.nan)) for part in parts])
 
 
-class Part(Protocol):
-    """A result, or one of several that are put together: what their order depends on."""
-
-    @property
-    def path(self) -> str:
-        """Where it is."""
-
-    @property
-    def files(self) -> Sequence[str]:
-        """The column `file`."""
-
-    @property
-    def run(self) -> Mapping[str, Any] | None:
-        """The content of FILE.run.json."""
+Part = Result | ResultColumns  # one of several that are put together
 
 
 def are_whole(parts: Sequence[Part]) -> bool:

@@ -284,7 +284,10 @@ def plan_dataset(folder: str | Path, options: SimulateOptions, *, overwrite: boo
     """
     if options.resume and overwrite:
         raise UsageError("give either --resume or --overwrite")
-    _refuse_idle(options)
+    if options.crossfall is not None and options.cross_section == "flat":
+        raise UsageError("--crossfall: a flat road has none; choose another --cross-section")
+    if options.kerb is not None and options.scene not in (*KERBED, MIXED):
+        raise UsageError(f"--kerb: the scene {options.scene} has no kerbs; {' and '.join(KERBED)} have")
     specs = draw_specs(options)
     dataset = Dataset(Path(folder), tuple(specs), _record(options))
     if _is_free(Path(folder)) or overwrite:
@@ -297,14 +300,6 @@ def plan_dataset(folder: str | Path, options: SimulateOptions, *, overwrite: boo
     _check_resumable(dataset)
     whole = (task.stem for task in dataset.tasks if all(map(is_there, task.files.values())))
     return replace(dataset, kept=frozenset(whole))
-
-
-def _refuse_idle(options: SimulateOptions) -> None:
-    """Refuse options that change nothing in the frames that are asked for."""
-    if options.crossfall is not None and options.cross_section == "flat":
-        raise UsageError("--crossfall: a flat road has none; choose another --cross-section")
-    if options.kerb is not None and options.scene not in (*KERBED, MIXED):
-        raise UsageError(f"--kerb: the scene {options.scene} has no kerbs; {' and '.join(KERBED)} have")
 
 
 def _is_free(folder: Path) -> bool:

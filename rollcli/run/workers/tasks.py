@@ -102,7 +102,9 @@ def in_order(
         if not future.done():
             executor.wait(future)
             if not chunks.measured:  # one slow first task must not keep the other workers waiting
-                _measure_any(chunks, [each for _, each in in_flight], executor)
+                with contextlib.suppress(*executor.worker_died):
+                    for early in [each for _, each in in_flight if each.done()][:1]:
+                        chunks.measure(early.result(), workers)
             continue
         in_flight.popleft()
         try:
@@ -123,17 +125,6 @@ def in_order(
             if stop.asked:
                 return
             submit_first(*chunks.cut(rest, executor.workers))
-
-
-def _measure_any(
-    chunks: Chunks[Task], futures: Iterable[Future[Result]], executor: Executor[Task, Result]
-) -> None:
-    """Learn what a task costs from the first chunk that is done, whichever it is."""
-    for future in futures:
-        if future.done():
-            with contextlib.suppress(*executor.worker_died):
-                chunks.measure(future.result(), executor.workers)
-                return
 
 
 _MOST_EARLY = 4  # of the workers: there may be fewer tasks, and those of a longer run need not hurry
