@@ -4,7 +4,6 @@ Keys at the top are for every command that has such an option. Keys in a table, 
 ``[evaluate.accuracy]``, are for that command alone.
 """
 
-import re
 import sys
 from collections.abc import Iterator
 from typing import Any
@@ -15,11 +14,6 @@ from rollcli.cli.command import option
 from rollcli.cli.types import FILE
 from rollcli.errors import InputError
 from rollcli.files.bounded import MOST_SETTINGS, as_utf8, read_given
-
-_PARTS = 8  # of a dotted key; no command has more than two words, and no option more than one
-_MANY_PARTS = re.compile(
-    rf"""(?:^|[\[{{,])[ \t]*(?:(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){{{_PARTS}}}""", re.MULTILINE
-)
 
 
 def _use(ctx: click.Context, param: click.Parameter, path: str | None) -> None:
@@ -79,10 +73,7 @@ def _load(path: str) -> dict[str, Any]:
         import tomli as tomllib
 
     try:
-        text = as_utf8(read_given(path, MOST_SETTINGS), path).decode()
-        if _MANY_PARTS.search(text):  # which takes time that grows with the square of their number
-            raise click.UsageError(f"{path}: is no file of options: it has a key of more than {_PARTS} parts")
-        return tomllib.loads(text)
+        return tomllib.loads(as_utf8(read_given(path, MOST_SETTINGS), path).decode())
     except OSError as error:
         raise click.UsageError(f"{path}: cannot be read: {error.strerror}") from error
     except InputError as error:

@@ -26,18 +26,8 @@ from rollcli.run.options import ENDING_OF_FORMAT, ImageKind, ImageOptions, Runni
 
 def image_paths(frame: Frame, images: ImageOptions) -> Iterator[tuple[ImageKind, str]]:
     """Yield (kind, path) of each image that is written for a frame."""
-    if not frame.relative:
-        return
-    for kind, folder, ending in _kinds(images, computed=bool(frame.right_file)):
-        yield kind, output_path(frame, folder, ending)
-
-
-@lru_cache(maxsize=16)  # the same for each of a million frames
-def _kinds(images: ImageOptions, *, computed: bool) -> tuple[tuple[ImageKind, str, str | None], ...]:
-    """List (kind, folder, ending) of the images; None is the ending of the frame's own file."""
-    return tuple(
-        (kind, folder, kind.ending(images.save_as, computed=computed)) for kind, folder in images.folders()
-    )
+    for kind, folder in images.folders() if frame.relative else ():
+        yield kind, output_path(frame, folder, kind.ending(images.save_as, computed=bool(frame.right_file)))
 
 
 def roomy_path(path: str) -> str:
