@@ -82,7 +82,8 @@ def derotate(
         rows = slice(top, top + step)
         turned, known = _interpolated(padded, turn.sources(rows))
         known &= kept[rows]
-        np.copyto(result[rows], _as_stored(turned, values.dtype), where=known, casting="unsafe")
+        turned = np.rint(turned) if values.dtype.kind in "iu" else turned
+        np.copyto(result[rows], turned, where=known, casting="unsafe")
     return result
 
 
@@ -209,11 +210,6 @@ def _interpolated(
     nearest = flat[corner + (down >= 0.5) * width + (right >= 0.5)]
     known = nearest > 0
     return np.divide(total, weight, out=total, where=known), known
-
-
-def _as_stored(values: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:
-    """Round where the dtype holds whole numbers."""
-    return np.rint(values) if dtype.kind in "iu" else values
 
 
 def _no_data(values: NDArray[Any], valid: NDArray[np.bool_]) -> float:

@@ -216,7 +216,9 @@ def draw_heights(
         BGR.
     """
     colours = _height_colours()
-    picture = cv2.applyColorMap(_height_levels(heights, span), colours.reshape(256, 1, 3))
+    # level 1 is the lowest height, 128 the road, 255 the highest
+    levels = np.rint(np.interp(np.nan_to_num(heights), _knots(*span), (1.0, 128.0, 255.0))).astype(np.uint8)
+    picture = cv2.applyColorMap(levels, colours.reshape(256, 1, 3))
     known = np.isfinite(heights)
     if photo is None:
         picture[~known] = _NO_DATA
@@ -228,14 +230,6 @@ def draw_heights(
         picture = (picture * light[..., None]).astype(np.uint8)
         picture[~known] = cv2.cvtColor(grey, cv2.COLOR_GRAY2BGR)[~known]
     return with_bar(picture.astype(np.uint8, copy=False), colours[:0:-1], _ticks(span, unit))
-
-
-def _height_levels(heights: NDArray[np.float32], span: tuple[float, float]) -> NDArray[np.uint8]:
-    """Return 1 for the lowest height, 128 for the road, 255 for the highest."""
-    levels: NDArray[np.uint8] = np.rint(
-        np.interp(np.nan_to_num(heights), _knots(*span), (1.0, 128.0, 255.0))
-    ).astype(np.uint8)
-    return levels
 
 
 def _knots(low: float, high: float) -> tuple[float, float, float]:

@@ -429,15 +429,11 @@ class Progress(TaskProgress):
                 self.note(line)
             for line in self._failures.repeated():
                 self.say(line)
-        self.note(self.last_line())
-        if advice := self.summary.advice:
-            self.note(f"median over the pairs: {advice}")
-
-    def last_line(self) -> str:
-        """Say how many frames came to what, and how fast."""
         counts = self.summary.counts
         kept = f" ({self.kept} kept)" if self.kept else ""
         by_status = [f"{counts[status]} {status}" for status in self._statuses]
         by_status.append(f"{counts['error']} failed")
         frames = f"{self.done} frame{'' if self.done == 1 else 's'}{kept}"
-        return f"{frames}: {', '.join(by_status)}; {self.seconds:.1f} s, {self.speed()}"
+        self.note(f"{frames}: {', '.join(by_status)}; {self.seconds:.1f} s, {self.speed()}")
+        if advice := self.summary.advice:
+            self.note(f"median over the pairs: {advice}")

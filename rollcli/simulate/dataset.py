@@ -196,8 +196,11 @@ def write_dataset(dataset: Dataset, jobs: int | None = 1, stop: Stop | None = No
     OutputError
         A file cannot be written, or a worker died.
     """
-    if dataset.kept is None:
-        _clear(dataset)
+    if dataset.kept is None:  # pairs without a row, another rig's calibration
+        single = [dataset.folder / name for name in (_TRUTH, f"{_CALIBRATION}.txt")]
+        with writing(dataset.folder):
+            for path in (*single, *_earlier_frames(dataset.folder)):
+                path.unlink(missing_ok=True)
     if dataset.record is not None:
         text = json.dumps(dataset.record, indent=2).encode() + b"\n"
         write_atomic(run_path(dataset.folder / _TRUTH), text)
@@ -243,14 +246,6 @@ def _png(image: NDArray[np.uint8]) -> bytes:
     # noise hardly compresses: more effort than 1 only takes time
     _, data = cv2.imencode(".png", image, [cv2.IMWRITE_PNG_COMPRESSION, 1])
     return data.tobytes()
-
-
-def _clear(dataset: Dataset) -> None:
-    """Remove what an earlier simulation left: pairs without a row, and the calibration of another rig."""
-    single = [dataset.folder / name for name in (_TRUTH, f"{_CALIBRATION}.txt")]
-    with writing(dataset.folder):
-        for path in (*single, *_earlier_frames(dataset.folder)):
-            path.unlink(missing_ok=True)
 
 
 def _earlier_frames(folder: Path) -> list[Path]:

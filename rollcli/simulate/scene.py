@@ -11,23 +11,20 @@ from rollcli.simulate.solids import Solid
 from rollcli.simulate.surfaces import Surface
 from rollcli.simulate.vectors import Array, dots
 
+OVERCAST = 0.6
+
 
 @dataclass(frozen=True)
 class Light:
     """The direction to the sun (3,), the share of ambient light, the exposure, and an offset of the clouds.
 
-    Under an overcast sky (`ambient` above 0.6) nothing casts a shadow.
+    Under an overcast sky (`ambient` of `OVERCAST` or more) nothing casts a shadow.
     """
 
     sun: Array
     ambient: float
     exposure: float
     clouds: float
-
-    @property
-    def sunny(self) -> bool:
-        """Whether objects cast shadows."""
-        return self.ambient < 0.6
 
 
 def draw_light(rng: np.random.Generator) -> Light:

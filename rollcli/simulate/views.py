@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from rollcli.simulate.camera import Camera, PixelRays, Rays
 from rollcli.simulate.materials import Material, Values
-from rollcli.simulate.scene import Scene, air_below, in_shadow, sky
+from rollcli.simulate.scene import OVERCAST, Scene, air_below, in_shadow, sky
 from rollcli.simulate.surfaces import Ground, Indices, Surface, SurfaceSample, Wall
 from rollcli.simulate.vectors import Array, Vectors, dot, groups
 
@@ -72,7 +72,7 @@ def _read(scene: Scene, surface: Surface, rays: Rays, direction: Values, at: Ind
     facing = -np.sign(dot(sample.normal, direction))
     lambert = facing * dot(sample.normal, scene.light.sun.astype(np.float32))
     sun = np.maximum(lambert / np.sqrt(dot(sample.normal, sample.normal)), 0)
-    if scene.light.sunny and isinstance(surface, Ground | Wall):
+    if scene.light.ambient < OVERCAST and isinstance(surface, Ground | Wall):
         casters = [s for s in scene.surfaces if not isinstance(s, Ground)]
         lit = np.flatnonzero(sun)
         sun[lit[in_shadow(points[:, lit], scene.light.sun, casters)]] = 0
