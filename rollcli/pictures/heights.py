@@ -33,6 +33,8 @@ from rollcli.files.results import Row
 from rollcli.rig.calibration import Calibration, require_calibration
 
 Singles = NDArray[np.float32]
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 _BLOCK = 1 << 16  # pixels at a time: what they need stays in the processor's cache
 _FLATTEST = 0.2  # of the rise near ahead: a parabola that is flatter is no road, which then goes on straight
@@ -104,7 +106,7 @@ def unit_of(calibration: Calibration | None) -> str:
 
 def height_map(
     disparity: ArrayLike, estimate: RollEstimate, calibration: Calibration | None = None
-) -> NDArray[np.float32]:
+) -> Singles:
     """Return how high each pixel of a map lies over the road that was fitted to it.
 
     Parameters
@@ -149,9 +151,7 @@ def height_map(
     return heights_over(values, FittedRoad.of_estimate(estimate), calibration)
 
 
-def heights_over(
-    disparity: NDArray[Any], road: FittedRoad, calibration: Calibration | None
-) -> NDArray[np.float32]:
+def heights_over(disparity: NDArray[Any], road: FittedRoad, calibration: Calibration | None) -> Singles:
     """Return the heights of a map over a road; see `height_map`."""
     if disparity.shape != (road.height, road.width) or disparity.dtype.kind not in "fiu":
         size = "x".join(map(str, disparity.shape[::-1]))
@@ -175,7 +175,7 @@ def heights_over(
     return heights
 
 
-def steadied(heights: NDArray[np.float32]) -> NDArray[np.float32]:
+def steadied(heights: Singles) -> Singles:
     """Return the medians of 5x5 pixels of a map of heights, where all of them have one.
 
     For heights of matched pairs: semi-global matching draws disparities towards whole pixels, on a road in
@@ -289,7 +289,7 @@ def _profile_basis(x: NDArray[Any]) -> NDArray[Any]:
     return np.stack([np.ones_like(x), x, 1 / x, x * x], axis=1)
 
 
-def _medians(place: NDArray[np.intp], values: Singles) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def _medians(place: NDArray[np.intp], values: Singles) -> tuple[Floats, Flags]:
     """Return the medians of values in bins, and which bins have enough of them."""
     spread = 2 * float(np.abs(values).max(initial=0)) + 1
     ordered = np.sort(place * spread + values)  # one sort of all
@@ -301,9 +301,7 @@ def _medians(place: NDArray[np.intp], values: Singles) -> tuple[NDArray[np.float
     return medians, found
 
 
-def _steady_fit(
-    design: NDArray[np.float64], values: NDArray[np.float64], found: NDArray[np.bool_]
-) -> tuple[NDArray[Any], NDArray[Any]]:
+def _steady_fit(design: Floats, values: Floats, found: Flags) -> tuple[NDArray[Any], NDArray[Any]]:
     """Fit values by least absolute deviations, then by Tukey's weights, six spreads wide; return those, too.
 
     Least squares would first follow a few bins at an end that lie on a kerb, and keep them.

@@ -8,7 +8,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.pictures.heights import METRES
+from rollcli.pictures.heights import METRES, Singles
+
+Pixels = NDArray[np.uint8]
 
 
 def round_step(least: float) -> float:
@@ -26,7 +28,7 @@ _INK = (60, 60, 60)
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
 
 
-def draw_disparity(disparity: NDArray[Any]) -> NDArray[np.uint8]:
+def draw_disparity(disparity: NDArray[Any]) -> Pixels:
     """Draw a map in colour: dark is far, bright is near, black is no data.
 
     Parameters
@@ -43,7 +45,7 @@ def draw_disparity(disparity: NDArray[Any]) -> NDArray[np.uint8]:
     return cv2.applyColorMap(_levels(disparity), colours).astype(np.uint8, copy=False)
 
 
-def draw_road(disparity: NDArray[Any], mask: NDArray[Any]) -> NDArray[np.uint8]:
+def draw_road(disparity: NDArray[Any], mask: NDArray[Any]) -> Pixels:
     """Draw a map in colour, as `draw_disparity` has it, with the road tinted and outlined.
 
     Parameters
@@ -61,7 +63,7 @@ def draw_road(disparity: NDArray[Any], mask: NDArray[Any]) -> NDArray[np.uint8]:
     return _with_road(draw_disparity(disparity), mask)
 
 
-def draw_road_on_photo(photo: NDArray[Any], mask: NDArray[Any]) -> NDArray[np.uint8]:
+def draw_road_on_photo(photo: NDArray[Any], mask: NDArray[Any]) -> Pixels:
     """Draw a camera image with the road tinted and outlined.
 
     Parameters
@@ -80,7 +82,7 @@ def draw_road_on_photo(photo: NDArray[Any], mask: NDArray[Any]) -> NDArray[np.ui
     return _with_road(as_bgr(photo, (width, height)), mask)
 
 
-def draw_preview(disparity: NDArray[Any]) -> NDArray[np.uint8]:
+def draw_preview(disparity: NDArray[Any]) -> Pixels:
     """Draw a map in colour, as `draw_disparity` has it, with a colour bar that names disparities in pixels.
 
     Parameters
@@ -101,7 +103,7 @@ def draw_preview(disparity: NDArray[Any]) -> NDArray[np.uint8]:
     return with_bar(picture, _colours()[:0:-1], ticks)
 
 
-def as_bgr(photo: NDArray[Any], size: tuple[int, int]) -> NDArray[np.uint8]:
+def as_bgr(photo: NDArray[Any], size: tuple[int, int]) -> Pixels:
     """Return a new BGR image, uint8, of a camera image, grey or BGR, uint8 or uint16, at (width, height)."""
     pixels = photo if photo.dtype == np.uint8 else (photo >> 8).astype(np.uint8)
     if pixels.shape[1::-1] != size:
@@ -110,9 +112,7 @@ def as_bgr(photo: NDArray[Any], size: tuple[int, int]) -> NDArray[np.uint8]:
     return picture.astype(np.uint8, copy=False)
 
 
-def with_bar(
-    picture: NDArray[np.uint8], colours: NDArray[np.uint8], ticks: Iterable[tuple[float, str]]
-) -> NDArray[np.uint8]:
+def with_bar(picture: Pixels, colours: Pixels, ticks: Iterable[tuple[float, str]]) -> Pixels:
     """Put a colour bar on the right of a picture.
 
     Parameters
@@ -139,7 +139,7 @@ def with_bar(
     return np.hstack([picture, bar])
 
 
-def _with_road(picture: NDArray[np.uint8], mask: NDArray[Any]) -> NDArray[np.uint8]:
+def _with_road(picture: Pixels, mask: NDArray[Any]) -> Pixels:
     """Tint and outline the road in a picture, BGR."""
     road = (np.asarray(mask) != 0).astype(np.uint8)
     tint = np.arange(256)[:, None] * (1 - _TINT) + np.array(_ROAD) * _TINT
@@ -154,7 +154,7 @@ def brightest(values: NDArray[Any]) -> float:
     return float(np.percentile(values[valid], 99)) if valid.any() else 1.0
 
 
-def _levels(disparity: NDArray[Any]) -> NDArray[np.uint8]:
+def _levels(disparity: NDArray[Any]) -> Pixels:
     """Return 0 for no data, 1..255 for small to large disparities."""
     values = np.asarray(disparity)
     top, levels = brightest(values), np.empty(values.shape, np.uint8)
@@ -168,7 +168,7 @@ def _levels(disparity: NDArray[Any]) -> NDArray[np.uint8]:
     return levels
 
 
-def _colours() -> NDArray[np.uint8]:
+def _colours() -> Pixels:
     """Return the BGR of each level, shape (256, 3); even the smallest disparity differs from no data."""
     ramp = np.linspace(40, 255, 256).astype(np.uint8)
     colours = cv2.applyColorMap(ramp, cv2.COLORMAP_INFERNO).reshape(256, 3).astype(np.uint8, copy=False)
@@ -193,8 +193,8 @@ _LABELS = 8  # at most, but for the ends
 
 
 def draw_heights(
-    heights: NDArray[np.float32], span: tuple[float, float], unit: str, photo: NDArray[Any] | None = None
-) -> NDArray[np.uint8]:
+    heights: Singles, span: tuple[float, float], unit: str, photo: NDArray[Any] | None = None
+) -> Pixels:
     """Draw heights over the road: blue below it, white on it, red above it, with a colour bar.
 
     Parameters
@@ -250,9 +250,9 @@ def _ticks(span: tuple[float, float], unit: str) -> list[tuple[float, str]]:
     ]
 
 
-def _height_colours() -> NDArray[np.uint8]:
+def _height_colours() -> Pixels:
     """Return the BGR of each level, shape (256, 3); level 0 is not used."""
     places = np.linspace(1, 255, len(_BELOW_TO_ABOVE))
     ramps = [np.interp(np.arange(256), places, ramp) for ramp in zip(*_BELOW_TO_ABOVE, strict=True)]
-    colours: NDArray[np.uint8] = np.rint(np.column_stack(ramps)).astype(np.uint8)
+    colours: Pixels = np.rint(np.column_stack(ramps)).astype(np.uint8)
     return colours
