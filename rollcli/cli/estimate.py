@@ -9,8 +9,7 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from rollcli.cli.command import Needs, command, option, record
-from rollcli.cli.config import config_option
+from rollcli.cli.command import Needs, command, config_option, option, record
 from rollcli.cli.options import (
     calibration_options,
     cluster_options,

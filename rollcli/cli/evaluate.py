@@ -4,8 +4,7 @@ from typing import Any
 
 import click
 
-from rollcli.cli.command import command, option, record
-from rollcli.cli.config import config_option
+from rollcli.cli.command import command, config_option, option, record
 from rollcli.cli.options import encoding_options, input_options, region_options, running_options
 from rollcli.cli.types import DIR, FILE, PATH, TABLE_FILE, TABLE_FORMATS, TURNS, Choice, Number, table_format
 from rollcli.evaluate.options import AccuracyOptions, ExperimentOptions, PaperOptions

@@ -12,17 +12,25 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from rollcli.errors import InputError, UsageError
 from rollcli.files.atomic import is_folder, is_there, remove_leftovers, sync_files
-from rollcli.files.codecs.parquet import require_parquet
 from rollcli.files.locking import locked_folder, not_resumable
-from rollcli.files.results import Row, format_header, format_row, parse_rows, part_names, read_parts, run_path
+from rollcli.files.results import (
+    Row,
+    format_header,
+    format_row,
+    parse_rows,
+    part_names,
+    read_parts,
+    require_parquet,
+    run_path,
+)
 from rollcli.files.storage import list_names, read_bytes, remove, write_bytes
 from rollcli.files.stores.locations import base_name, is_url, located, public_name
 from rollcli.run.batch import Batch, Parts, Step, line_form, part_location
 from rollcli.run.frame import Frame, ReadAs
-from rollcli.run.inputs import Inputs, inputs_path, is_part_inputs, part_inputs_path, split_lines
 from rollcli.run.outputs import local_images, remove_image_leftovers, remove_marks
 from rollcli.run.plan import Plan
 from rollcli.run.progress import RunSummary
+from rollcli.run.result_file import Inputs, inputs_path, is_part_inputs, part_inputs_path, split_lines
 from rollcli.run.resume import KeptRows, RunRecord, check_restored, new_record
 
 _CHECK_S = 10.0  # a request of 50 ms now and then

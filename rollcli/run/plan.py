@@ -10,7 +10,6 @@ from rollcli.files.stores.locations import is_url
 from rollcli.files.stream import is_stream
 from rollcli.run.find import Named, calibration_files, check_depth, check_first_size, map_frames, pair_frames
 from rollcli.run.frame import Frame
-from rollcli.run.inputs import inputs_path
 from rollcli.run.options import EstimateOptions, ResultOptions
 from rollcli.run.outputs import (
     check_inputs_are_kept,
@@ -19,6 +18,7 @@ from rollcli.run.outputs import (
     check_places,
     every_path,
 )
+from rollcli.run.result_file import inputs_path
 
 
 @dataclass(frozen=True)

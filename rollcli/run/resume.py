@@ -22,7 +22,6 @@ from rollcli.files.storage import write_bytes
 from rollcli.files.stores.locations import base_name, public_name
 from rollcli.run.batch import Batch, check_owned
 from rollcli.run.frame import Frame, ReadAs
-from rollcli.run.inputs import Inputs
 from rollcli.run.options import (
     EncodingOptions,
     FrameOptions,
@@ -34,7 +33,7 @@ from rollcli.run.options import (
 from rollcli.run.outputs import Existing, check_nothing_is_there, possible_paths
 from rollcli.run.plan import Plan, images_of
 from rollcli.run.progress import RunSummary
-from rollcli.run.result_file import data_of, row_lines
+from rollcli.run.result_file import Inputs, data_of, row_lines
 from rollcli.stereo.options import StereoOptions
 
 

@@ -7,7 +7,6 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.simulate.camera import Camera, PixelRays, expose
 from rollcli.simulate.materials import Plain, Values
 from rollcli.simulate.relief import LEVEL, Dip
 from rollcli.simulate.road import (
@@ -22,7 +21,7 @@ from rollcli.simulate.road import (
 from rollcli.simulate.scene import FAR, Light, Scene, draw, draw_light, draw_offset
 from rollcli.simulate.spec import FrameSpec, Stream
 from rollcli.simulate.surfaces import Course, Ground, Surface
-from rollcli.simulate.views import bands, first_hits, render_view
+from rollcli.simulate.views import Camera, PixelRays, bands, expose, first_hits, render_view
 
 _HORIZON = 2000.0  # metres: the end of a bare world
 # of dips and bumps

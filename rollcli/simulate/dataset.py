@@ -31,10 +31,10 @@ from rollcli.run.workers.chunks import Work, Workers
 from rollcli.run.workers.interrupt import Stop, stop_on_signals
 from rollcli.run.workers.tasks import run_tasks
 from rollcli.simulate.build import carriageway_of, render_frame, road_camber
-from rollcli.simulate.camera import rig_axes
 from rollcli.simulate.options import KERBED, MIXED, SimulateOptions
 from rollcli.simulate.relief import lane_points, lane_rolls
 from rollcli.simulate.spec import LEVEL, FrameSpec, draw_specs
+from rollcli.simulate.views import rig_axes
 
 _PARTS = ("left", "right", "disparity")
 _TRUTH = "truth.csv"

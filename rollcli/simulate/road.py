@@ -23,8 +23,7 @@ from rollcli.simulate.materials import (
 )
 from rollcli.simulate.options import GUTTER_WIDTH
 from rollcli.simulate.relief import Relief, draw_relief, lane_plane
-from rollcli.simulate.scene import FAR, Scene, draw, draw_offset
-from rollcli.simulate.solids import ConvexPart, Post, Solid, TreeCrown
+from rollcli.simulate.scene import FAR, ConvexPart, Post, Scene, Solid, TreeCrown, draw, draw_offset
 from rollcli.simulate.spec import FrameSpec, Stream
 from rollcli.simulate.surfaces import Backdrop, Course, Ground, Wall
 from rollcli.simulate.vectors import Array

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from rollcli.errors import UsageError
-from rollcli.simulate.camera import Camera, rig_axes
 from rollcli.simulate.options import (
     CROSS_SECTIONS,
     CROSSFALL,
@@ -21,6 +20,7 @@ from rollcli.simulate.options import (
     Span,
 )
 from rollcli.simulate.vectors import Array
+from rollcli.simulate.views import Camera, rig_axes
 
 MAX_PITCH = math.radians(60)
 MAX_CURVATURE = 0.01
