@@ -25,35 +25,30 @@ if TYPE_CHECKING:
     from rollcli.rig.calibration import Calibration as Calibration
     from rollcli.rig.drive.assess import RigAssessment as RigAssessment
     from rollcli.rig.drive.assess import assess_rig as assess_rig
-    from rollcli.run.calibration import read_calibration as read_calibration
+    from rollcli.run.find import read_calibration as read_calibration
     from rollcli.run.library import estimate_pair as estimate_pair
     from rollcli.run.library import estimate_roll as estimate_roll
     from rollcli.stereo.match import compute_disparity as compute_disparity
     from rollcli.stereo.options import StereoOptions as StereoOptions
 
-_HOMES = {
-    "Calibration": "rollcli.rig.calibration",
-    "EstimationError": "rollcli.errors",
-    "InputError": "rollcli.errors",
-    "RigAssessment": "rollcli.rig.drive.assess",
-    "RollEstimate": "rollcli.estimator.estimate",
-    "RollcliError": "rollcli.errors",
-    "StereoOptions": "rollcli.stereo.options",
-    "Tangent": "rollcli.estimator.interval",
-    "UsageError": "rollcli.errors",
-    "VDisparity": "rollcli.pictures.vdisparity",
-    "assess_rig": "rollcli.rig.drive.assess",
-    "compute_disparity": "rollcli.stereo.match",
-    "derotate": "rollcli.pictures.derotate",
-    "estimate_pair": "rollcli.run.library",
-    "estimate_roll": "rollcli.run.library",
-    "height_map": "rollcli.pictures.heights",
-    "open_recording": "rollcli.files.recordings.open",
-    "read_calibration": "rollcli.run.calibration",
-    "read_disparity": "rollcli.files.encodings",
-    "v_disparity": "rollcli.pictures.vdisparity",
+_NAMES = {
+    "rollcli.errors": "EstimationError InputError RollcliError UsageError",
+    "rollcli.estimator.estimate": "RollEstimate",
+    "rollcli.estimator.interval": "Tangent",
+    "rollcli.files.encodings": "read_disparity",
+    "rollcli.files.recordings.open": "open_recording",
+    "rollcli.pictures.derotate": "derotate",
+    "rollcli.pictures.heights": "height_map",
+    "rollcli.pictures.vdisparity": "VDisparity v_disparity",
+    "rollcli.rig.calibration": "Calibration",
+    "rollcli.rig.drive.assess": "RigAssessment assess_rig",
+    "rollcli.run.find": "read_calibration",
+    "rollcli.run.library": "estimate_pair estimate_roll",
+    "rollcli.stereo.match": "compute_disparity",
+    "rollcli.stereo.options": "StereoOptions",
 }
-__all__ = ["__version__", *_HOMES]
+_HOMES = {name: module for module, names in _NAMES.items() for name in names.split()}
+__all__ = ["__version__", *sorted(_HOMES)]
 
 
 def __getattr__(name: str) -> "Any":

@@ -16,12 +16,13 @@ _NAMES = "x-amz-[a-z-]+|x-goog-[a-z-]+|sig|signature|awsaccesskeyid|googleaccess
 _SIGNATURE = re.compile(rf"[?&](?:{_NAMES})=[^\s&'\"]*()", re.IGNORECASE)  # of a URL with a space before it
 
 
-def say(message: str) -> None:
-    """Write one line to standard error, after the program's name.
+def say(*messages: str) -> None:
+    """Write a line for each message to standard error, after the program's name.
 
     Control characters are escaped: a file name must neither forge a line nor command the terminal.
     """
-    sys.stderr.write(f"rollcli: {printable(without_secrets(message))}\n")
+    for message in messages:
+        sys.stderr.write(f"rollcli: {printable(without_secrets(message))}\n")
 
 
 def show_tracebacks() -> None:

@@ -12,8 +12,7 @@ import numpy as np
 import rollcli
 from rollcli.files.atomic import write_atomic
 from rollcli.pictures.heights import METRES, steadied
-from rollcli.pictures.heights_preview import draw_heights
-from rollcli.pictures.overlay import as_bgr, draw_preview
+from rollcli.pictures.overlay import as_bgr, draw_heights, draw_preview
 from rollcli.rig.calibration import Calibration
 from rollcli.simulate.build import RenderedFrame, render_frame
 from rollcli.simulate.spec import FrameSpec

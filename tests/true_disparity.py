@@ -1,8 +1,7 @@
 """The true disparity of a simulated frame in double precision, which its files do not hold."""
 
 from rollcli.simulate.build import build_scene
-from rollcli.simulate.camera import PixelRays
-from rollcli.simulate.views import trace
+from rollcli.simulate.views import PixelRays, trace
 
 
 def true_disparity(spec):

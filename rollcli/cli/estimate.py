@@ -9,8 +9,7 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from rollcli.cli.command import Needs, command, option, record
-from rollcli.cli.config import config_option
+from rollcli.cli.command import Needs, command, config_option, option, record
 from rollcli.cli.options import (
     calibration_options,
     cluster_options,
@@ -59,22 +58,14 @@ def resume_command(ctx: click.Context) -> str:
     end = words.index("--") if "--" in words else len(words)
     options = [word for word in words[:end] if word not in _STARTS]
     start = "--update" if ctx.params.get("update") else "--resume"
-    line = [_program(), *options, *_from_environment(ctx), start, *words[end:]]
+    called = sys.argv[0]  # by its path where the shell would not find it
+    program = called if Path(called).name == "rollcli" and not shutil.which("rollcli") else "rollcli"
+    line = [program, *options, *_from_environment(ctx), start, *words[end:]]
     shown = [without_secrets(word) for word in line]
-    hints = ["with the same list on stdin"] if _reads_stdin(ctx) else []
+    reads_stdin = "-" in (*(ctx.params.get("inputs") or ()), ctx.params.get("files_from"))
+    hints = ["with the same list on stdin"] if reads_stdin else []
     hints += ["with the signed addresses"] if shown != line else []
     return shlex.join(shown) + ("  # " + " and ".join(hints) if hints else "")
-
-
-def _program() -> str:
-    """Name the program, or its path when the shell would not find it."""
-    called = sys.argv[0]
-    return called if Path(called).name == "rollcli" and not shutil.which("rollcli") else "rollcli"
-
-
-def _reads_stdin(ctx: click.Context) -> bool:
-    given = ctx.params.get("inputs") or ()
-    return "-" in given or ctx.params.get("files_from") == "-"
 
 
 def _from_environment(ctx: click.Context) -> Iterator[str]:

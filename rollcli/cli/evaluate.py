@@ -4,8 +4,7 @@ from typing import Any
 
 import click
 
-from rollcli.cli.command import command, option, record
-from rollcli.cli.config import config_option
+from rollcli.cli.command import command, config_option, option, record
 from rollcli.cli.options import encoding_options, input_options, region_options, running_options
 from rollcli.cli.types import DIR, FILE, PATH, TABLE_FILE, TABLE_FORMATS, TURNS, Choice, Number, table_format
 from rollcli.evaluate.options import AccuracyOptions, ExperimentOptions, PaperOptions
@@ -52,7 +51,7 @@ def accuracy(ctx: click.Context, /, **options: Any) -> None:
     Frames are matched by the names of their files, without folder and ending. Those without a partner are
     counted on stderr; exit status 3 when a frame of the truth has no angle.
     """
-    from rollcli.evaluate.run_accuracy import run_accuracy
+    from rollcli.evaluate.accuracy import run_accuracy
 
     form = table_format(options.pop("format"), options["output"])
     ctx.exit(run_accuracy(AccuracyOptions(**options, format=form)))

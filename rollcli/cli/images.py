@@ -4,8 +4,7 @@ from typing import Any
 
 import click
 
-from rollcli.cli.command import command, option, section
-from rollcli.cli.config import config_option
+from rollcli.cli.command import command, config_option, option, section
 from rollcli.cli.options import (
     calibration_options,
     cluster_options,

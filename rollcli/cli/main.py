@@ -132,12 +132,35 @@ def _ended_by_its_reader() -> Iterator[None]:
         raise click.exceptions.Exit(ExitStatus.DONE) from None
 
 
+_OPENCV = tuple(f"opencv-{name}python{kind}" for name in ("", "contrib-") for kind in ("-headless", ""))
+
+
 def _print_versions(ctx: click.Context, param: click.Parameter, asked: bool) -> None:
     if asked and not ctx.resilient_parsing:
-        from rollcli.cli.versions import versions
-
-        click.echo("\n".join(f"{name} {version}" for name, version in versions()))
+        click.echo("\n".join(f"{name} {version}" for name, version in _versions()))
         ctx.exit()
+
+
+def _versions() -> Iterator[tuple[str, str]]:
+    """Yield (name, version) of rollcli, Python and each package it uses; of extras, those installed."""
+    import platform  # nothing else needs these at each start
+    import re
+    from importlib import metadata
+
+    yield "rollcli", __version__
+    yield "Python", f"{platform.python_version()} ({platform.python_implementation()}, {platform.platform()})"
+    requirements, seen = list[str](), set[str]()
+    with contextlib.suppress(metadata.PackageNotFoundError):  # it may run from its folder, not installed
+        requirements = metadata.requires("rollcli") or []
+    for requirement in requirements:
+        name = re.split(r"[^\w.-]", requirement, maxsplit=1)[0]
+        found: tuple[str, str] | None = None
+        for package in _OPENCV[::-1] if name in _OPENCV else (name,):  # several that hold the same module
+            with contextlib.suppress(metadata.PackageNotFoundError):
+                found = package, metadata.version(package)
+        if name not in seen and (found or ";" not in requirement):
+            yield found or (name, "not installed")
+        seen.add(name)
 
 
 @click.group(

@@ -4,8 +4,7 @@ from typing import Any
 
 import click
 
-from rollcli.cli.command import command, option
-from rollcli.cli.config import config_option
+from rollcli.cli.command import command, config_option, option
 from rollcli.cli.options import running_options
 from rollcli.cli.types import DIR, FLAG, PATH, Number, OutputFile, Text
 from rollcli.errors import ExitStatus

@@ -4,8 +4,7 @@ from typing import Any
 
 import click
 
-from rollcli.cli.command import command, option, record
-from rollcli.cli.config import config_option
+from rollcli.cli.command import command, config_option, option, record
 from rollcli.cli.options import calibration_options, running_options
 from rollcli.cli.types import FILE, FLAG, PATH, TABLE_FILE, TABLE_FORMATS, Choice, Number, Text, table_format
 from rollcli.errors import ExitStatus

@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import click
 
-from rollcli.cli.command import command, option, record
-from rollcli.cli.config import config_option
+from rollcli.cli.command import command, config_option, option, record
 from rollcli.cli.estimate import one_start, resume_command
 from rollcli.cli.options import running_options
 from rollcli.cli.types import DIR, FLAG, IMAGE_SIZE, POINT, SPAN, Choice, Number

@@ -340,12 +340,7 @@ def _best(function: Callable[[], Any], times: int) -> float:
     return best
 
 
-@dataclass(frozen=True)
-class Examined:
-    """What became of a map: findings, or a result that says why there are none."""
-
-    result: FrameResult
-    findings: Findings | None
+Examined = tuple[FrameResult, Findings | None]  # of a map; the result says why there are no findings
 
 
 def examine_file(frame: Frame, options: PaperOptions, truth: Mapping[str, KnownPose]) -> Examined:
@@ -357,8 +352,8 @@ def examine_file(frame: Frame, options: PaperOptions, truth: Mapping[str, KnownP
         theta = None if known is None else known.theta
         findings = examine(frame.file, usable_pixels(source), turns, theta, chosen=options.has_region)
     except FRAME_ERRORS as error:
-        return Examined(frame_of_error(frame, error), None)
-    return Examined(FrameResult(Row(frame.file, status="ok"), source.encoding, source.warnings), findings)
+        return frame_of_error(frame, error), None
+    return FrameResult(Row(frame.file, status="ok"), source.encoding, source.warnings), findings
 
 
 def usable_pixels(source: Source) -> NDArray[Any]:
@@ -370,4 +365,4 @@ def usable_pixels(source: Source) -> NDArray[Any]:
 
 def lost(frame: Frame, reason: str) -> Examined:
     """Return what is known of a map that could not be examined."""
-    return Examined(failed_frame(frame, reason), None)
+    return failed_frame(frame, reason), None

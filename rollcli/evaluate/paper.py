@@ -14,10 +14,9 @@ from rollcli.files.matching import stem_of
 from rollcli.files.stream import write_output
 from rollcli.run.find import Named, map_frames
 from rollcli.run.frame import Frame
+from rollcli.run.outputs import is_dry_run
 from rollcli.run.progress import Progress
-from rollcli.run.reads_and_writes import check_writes, list_files
-from rollcli.run.workers.chunks import Work
-from rollcli.run.workers.in_order import Workers
+from rollcli.run.workers.chunks import Work, Workers
 from rollcli.run.workers.interrupt import stop_on_signals
 from rollcli.run.workers.tasks import run_tasks
 
@@ -57,16 +56,14 @@ def run_paper(options: PaperOptions) -> ExitStatus:
     require_extra("report", "the page of charts")
     if options.encoding.encoding == "depth":
         raise UsageError("--encoding depth: the experiments are made on disparity maps, not on depth maps")
-    folder, running = options.experiments.output, options.running
+    folder = options.experiments.output
     frames = map_frames(Named(options.inputs, region=options.region, skip=[folder]))
     truth = _known_angles(frames, options)
     kind = options.experiments.figure
     names = [f"{name}.{kind}" for name in FIGURES.values()] if kind is not None else []
     writes = [str(Path(folder, name)) for name in (*(f"{name}.csv" for name in TABLES), *names, PAGE)]
     reads = [path for frame in frames for path in frame.reads()]
-    check_writes(reads, writes, overwrite=running.overwrite)
-    if running.dry_run:
-        list_files([(reads, writes)])
+    if is_dry_run(reads, writes, options.running):
         return ExitStatus.DONE
     return _run(frames, truth, options)
 
@@ -93,12 +90,12 @@ def _run(frames: Sequence[Frame], truth: Mapping[str, KnownPose], options: Paper
         progress,
         contextlib.closing(run_tasks(frames, work, stop, Workers(options.running.jobs))) as all_examined,
     ):
-        for examined in all_examined:
-            progress.add(examined.result)
-            if examined.findings is None:
-                failed.append((examined.result.row.file, examined.result.row.message))
+        for result, findings in all_examined:
+            progress.add(result)
+            if findings is None:
+                failed.append((result.row.file, result.row.message))
             else:
-                found.append(examined.findings)
+                found.append(findings)
     if stop.asked:
         progress.say(f"interrupted after {progress.done} of {progress.total} maps; nothing is written")
         return ExitStatus.INTERRUPTED
@@ -128,8 +125,7 @@ def _time(
 def _write(
     found: "list[Findings]", failed: list[tuple[str, str]], times: "list[Times]", options: PaperOptions
 ) -> None:
-    from rollcli.evaluate.paper_page import charts, paper_page
-    from rollcli.evaluate.tables import all_tables
+    from rollcli.evaluate.paper_page import all_tables, charts, paper_page
     from rollcli.pictures.figures import PRINT
     from rollcli.report.figures import chart_file
 

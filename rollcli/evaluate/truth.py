@@ -7,12 +7,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from rollcli.errors import InputError, UsageError, cause_of
-from rollcli.files.bounded import as_utf8, read_given
+from rollcli.errors import InputError, UsageError
+from rollcli.files.bounded import as_utf8
 from rollcli.files.matching import stem_of
-from rollcli.files.results import TEXT
-from rollcli.files.storage import read_bytes
-from rollcli.files.stores.locations import is_url
+from rollcli.files.results import TEXT, read_named
 
 _NEEDED = ("file", "roll_deg")
 
@@ -75,11 +73,7 @@ def read_truth(path: str | Path) -> dict[str, KnownPose]:
     UsageError
         Two frames have the same stem.
     """
-    try:
-        data = read_bytes(path) if is_url(str(path)) else read_given(path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {cause_of(error)}") from error
-    rows = list(_rows(as_utf8(data, str(path)).decode(**TEXT), path))
+    rows = list(_rows(as_utf8(read_named(path), str(path)).decode(**TEXT), path))
     if not rows:
         raise InputError(f"{path}: holds no angle")
     places = by_stem((name for name, _ in rows), str(path))

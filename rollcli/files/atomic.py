@@ -34,11 +34,6 @@ def is_there(path: str | Path) -> bool:
     return _mode(path) != 0
 
 
-def is_mount(path: str | Path) -> bool:
-    """Tell whether another file system begins at this folder."""
-    return os.path.ismount(path)  # Path.is_mount raises where the system fails to look
-
-
 def look_at(path: str | Path) -> os.stat_result:
     """Ask the system for size, kind and time of a file; an error of the disk may pass, so it is asked twice.
 
@@ -100,7 +95,7 @@ def sync_names(paths: Iterable[Path], named: set[Path] | None = None) -> None:
             if folder in folders:
                 break
             folders[folder] = None
-            if folder in named or is_mount(folder):
+            if folder in named or os.path.ismount(folder):  # Path.is_mount raises where looking fails
                 break
     in_threads(_sync_folder, list(folders))
     named.update(folders)
@@ -144,12 +139,6 @@ def _forced(path: Path, harmless: Sequence[int] = ()) -> Iterator[None]:
     except OSError as error:
         if error.errno not in harmless:
             raise OutputError(f"{path}: cannot be forced to the disk: {cause_of(error)}") from error
-
-
-def sync_file(file: BinaryIO) -> None:
-    """Force what was written to an open file to the disk."""
-    file.flush()
-    os.fsync(file.fileno())
 
 
 _LONGEST_NAME = 225  # bytes; file systems allow 255 with what is added
@@ -214,7 +203,8 @@ def atomic_file(path: str | Path, *, durable: bool = False, replaces: bool = Tru
             try:
                 yield file
                 if durable:
-                    sync_file(file)
+                    file.flush()
+                    os.fsync(file.fileno())
                 file.close()
                 if replaces:
                     temporary.replace(target)
@@ -279,7 +269,9 @@ def remove_leftovers(paths: Iterable[str | Path]) -> None:
             listed[folder] = _parts_in(folder)
         if listed[folder]:
             for part in listed[folder].pop(_marker(name), ()):
-                _remove_abandoned(part)
+                with contextlib.suppress(OSError), nobody_writes(part) as abandoned:
+                    if abandoned:
+                        Path(part).unlink()
 
 
 @contextlib.contextmanager
@@ -313,10 +305,3 @@ def _parts_in(folder: str) -> dict[str, list[str]]:
             if match := _PART.fullmatch(entry.name):
                 found.setdefault(match[1], []).append(entry.path)
     return found
-
-
-def _remove_abandoned(path: str) -> None:
-    """Remove a temporary file, unless a process is writing it or it is no regular file."""
-    with contextlib.suppress(OSError), nobody_writes(path) as abandoned:
-        if abandoned:
-            Path(path).unlink()

@@ -106,7 +106,9 @@ def to_disparity(
             if used is Encoding.DEPTH
             else _scaled(positive, used, abs(factor))
         )
-        _blank(disparity, stored.values, (*invalid, *stored.nodata, *_saturated(stored.values)))
+        for value in (*invalid, *stored.nodata, *_saturated(stored.values)):
+            if math.isfinite(value):  # the others are no data already
+                disparity[stored.values == value] = 0
     plateau = _without_plateaus(disparity)
     doubt = _doubt(stored.values, used) if encoding == "auto" and scale is None else ""
     warnings = {"pages": stored.note, "encoding": doubt, "plateau": plateau}
@@ -222,13 +224,6 @@ def _from_depth(values: NDArray[Any], metres: float, calibration: Calibration | 
     found: NDArray[Any] = np.where(np.isfinite(depth) & (depth > 0) & (pixels > 0), pixels, real(0))
     found[np.isinf(found)] = 0
     return found
-
-
-def _blank(disparity: NDArray[Any], values: NDArray[Any], invalid: tuple[float, ...]) -> None:
-    """Set to 0 the pixels whose stored value means no data."""
-    for value in invalid:
-        if math.isfinite(value):  # the others are no data already
-            disparity[values == value] = 0
 
 
 def _saturated(values: NDArray[Any]) -> tuple[float, ...]:

@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from rollcli.errors import UsageError, as_usage, cause_of
 from rollcli.files.bounded import MOST_LISTED, as_utf8, read_given, read_stream
@@ -51,8 +52,7 @@ class Input:
         return Path(self.location)
 
 
-@dataclass(frozen=True, slots=True)
-class Pair:
+class Pair(NamedTuple):
     """A left and a right image that belong together."""
 
     left: Input
@@ -165,25 +165,23 @@ def pair_inputs(left: str, right: str, search: Search | None = None, *, match: s
             raise UsageError(f"{len(lefts)} left and {len(rights)} right images cannot be matched by order")
     elif not len(lefts) == len(rights) == 1:
         return _by_name(lefts, rights)
-    pairs = [Pair(*both) for both in zip(lefts, rights, strict=True)]
-    for pair in pairs:
-        if pair.left.path.name == pair.right.path.name and _place(pair.left) == _place(pair.right):
-            raise UsageError(f"{pair.left.name}: is given by --left and by --right; {_OTHER_SIDE}")
+    pairs = list(map(Pair, lefts, rights))
+    for one, other in pairs:
+        if one.path.name == other.path.name and _place(one) == _place(other):
+            raise UsageError(f"{one.name}: is given by --left and by --right; {_OTHER_SIDE}")
     return pairs
 
 
 def _by_name(lefts: list[Input], rights: list[Input]) -> list[Pair]:
     same_files = {_place(each) for each in lefts} & {_place(each) for each in rights}
-    matching = match_names(
+    matched, ambiguous = match_names(
         [each.relative for each in lefts], [each.relative for each in rights], marked=bool(same_files)
     )
-    if matching.ambiguous is not None:
-        rivals = [lefts[i].name for i in matching.ambiguous[0]] + [
-            rights[i].name for i in matching.ambiguous[1]
-        ]
+    if ambiguous is not None:
+        rivals = [side[i].name for side, some in zip((lefts, rights), ambiguous, strict=True) for i in some]
         raise UsageError(f"{', '.join(rivals)}: more than one partner; rename them, or use --match order")
-    pairs = [Pair(lefts[i], rights[j]) for i, j in matching.pairs]
-    paired = {_place(each) for pair in pairs for each in (pair.left, pair.right)}
+    pairs = [Pair(lefts[i], rights[j]) for i, j in matched]
+    paired = {_place(each) for pair in pairs for each in pair}
     alone = list(dict.fromkeys(each.name for each in (*lefts, *rights) if _place(each) not in paired))
     if not pairs and set(map(_place, lefts)) == same_files:
         raise UsageError(

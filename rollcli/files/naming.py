@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 
 # the marks of a left and of a right image: a word or letter of its own, leftImg8bit, m1_L1, 000123r
@@ -56,20 +55,9 @@ def _run_key(run: str) -> str:
     return _TEXT + run
 
 
-@dataclass(frozen=True)
-class Matching:
-    """The names that belong together; all numbers are positions in the given lists.
-
-    Attributes
-    ----------
-    pairs : list of (int, int)
-        Left and right.
-    ambiguous : tuple of lists of int, or None
-        Left and right names that share one key, when they are more than two.
-    """
-
-    pairs: list[tuple[int, int]]
-    ambiguous: tuple[list[int], list[int]] | None
+# pairs of left and right names; and those that share one key, when they are more than two. All numbers are
+# positions in the given lists
+Matching = tuple[list[tuple[int, int]], tuple[list[int], list[int]] | None]
 
 
 def match_names(lefts: Sequence[str], rights: Sequence[str], *, marked: bool = False) -> Matching:
@@ -89,7 +77,7 @@ def match_names(lefts: Sequence[str], rights: Sequence[str], *, marked: bool = F
     """
     if not marked:
         equal = _matching(_grouped(map(_stem, lefts)), _grouped(map(_stem, rights)))
-        if equal.pairs:
+        if equal[0]:
             return equal
     attempts = [
         _matching(
@@ -98,7 +86,7 @@ def match_names(lefts: Sequence[str], rights: Sequence[str], *, marked: bool = F
         )
         for left_mark, right_mark in _NUMBERS
     ]
-    return max(attempts, key=lambda each: len(each.pairs))
+    return max(attempts, key=lambda each: len(each[0]))
 
 
 def _matching(left_of: dict[str, list[int]], right_of: dict[str, list[int]]) -> Matching:
@@ -106,10 +94,7 @@ def _matching(left_of: dict[str, list[int]], right_of: dict[str, list[int]]) -> 
     ambiguous = [
         (left_of[key], right_of[key]) for key in shared if len(left_of[key]) + len(right_of[key]) > 2
     ]
-    return Matching(
-        pairs=[(left_of[key][0], right_of[key][0]) for key in shared],
-        ambiguous=ambiguous[0] if ambiguous else None,
-    )
+    return [(left_of[key][0], right_of[key][0]) for key in shared], next(iter(ambiguous), None)
 
 
 def _grouped(keys: Iterable[str | None]) -> dict[str, list[int]]:

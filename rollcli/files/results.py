@@ -1,4 +1,4 @@
-"""Read the rows of a result: CSV, JSON Lines, Parquet, and folders of parts."""
+"""Read and write the rows of a result: CSV, JSON Lines, Parquet (extra `parquet`), and folders of parts."""
 
 import csv
 import io
@@ -13,11 +13,103 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any, Literal, get_args, get_type_hints
 
-from rollcli.errors import InputError, cause_of
+from rollcli.errors import InputError, UsageError, cause_of
+from rollcli.extras import require_extra
 from rollcli.files.bounded import as_utf8, read_given, read_stream
-from rollcli.files.codecs.parquet import MAGIC, decode_parquet
 from rollcli.files.storage import exists, list_names, read_bytes
 from rollcli.files.stores.locations import is_url, is_web_url, public_name
+
+MAGIC = b"PAR1"
+_ROWS_AT_ONCE = 1000
+_ROW_BYTES = 200  # of memory that a row takes, even an empty one
+# real results have up to 100 bytes of values for each of the file's, and most files are small
+_MOST_BYTES, _MOST_FOLD = 64 << 20, 200
+_RECORD = b"rollcli"
+_ARROW_TYPES = {str: "string", float: "float64", int: "int64", bool: "bool"}
+
+
+def require_parquet() -> None:
+    """Refuse, before any work, what cannot be done without pyarrow.
+
+    Raises
+    ------
+    UsageError
+        The extra `parquet` is not installed.
+    """
+    require_extra("parquet", "Parquet")
+
+
+def encode_parquet(
+    types: Mapping[str, type], rows: Sequence[Mapping[str, Any]], record: Mapping[str, Any]
+) -> bytes:
+    """Encode a table.
+
+    Parameters
+    ----------
+    types : mapping of str to type
+        The columns in their order: str, float, int or bool. Any of them may hold None.
+    rows : sequence of mapping
+        The values by the names of their columns.
+    record : mapping
+        It stands as JSON under the key `rollcli` of the schema's metadata.
+
+    Raises
+    ------
+    UsageError
+        A text is not UTF-8, as a file name need not be; Parquet cannot hold it.
+    """
+    import pyarrow
+    import pyarrow.parquet
+
+    columns = [(name, _ARROW_TYPES[kind]) for name, kind in types.items()]
+    schema = pyarrow.schema(columns, metadata={_RECORD: json.dumps(record).encode()})
+    try:
+        table = pyarrow.Table.from_pylist(list(rows), schema=schema)
+    except UnicodeEncodeError as error:
+        name = error.object.encode("utf-8", "backslashreplace").decode()
+        raise UsageError(f"{name}: this name is not UTF-8, which Parquet cannot hold; use CSV") from error
+    target = io.BytesIO()
+    pyarrow.parquet.write_table(table, target, compression="zstd", version="2.6", write_page_checksum=True)
+    return target.getvalue()
+
+
+def decode_parquet(data: bytes, name: str) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Yield the number (from 1) and the values of each row.
+
+    Raises
+    ------
+    InputError
+        It is damaged, or made to fill the memory.
+    UsageError
+        The extra `parquet` is not installed.
+    """
+    require_parquet()
+    import pyarrow
+    import pyarrow.parquet
+
+    number, allowed = 0, max(_MOST_BYTES, _MOST_FOLD * len(data))
+    try:
+        file = pyarrow.parquet.ParquetFile(io.BytesIO(data), page_checksum_verification=True)
+        claimed = sum(file.metadata.row_group(group).total_byte_size for group in range(file.num_row_groups))
+        if claimed > allowed:
+            raise InputError(
+                f"{name}: claims {claimed} bytes of values in {len(data)}; no result has so many"
+            )
+        for column in file.schema_arrow:
+            if pyarrow.types.is_dictionary(column.type):  # a few bytes of it can stand for gigabytes
+                raise InputError(f"{name}: its column {column.name} is a dictionary; write plain values")
+        for batch in file.iter_batches(_ROWS_AT_ONCE):
+            allowed -= max(batch.nbytes, _ROW_BYTES * batch.num_rows)
+            if allowed < 0:
+                raise InputError(f"{name}: its {len(data)} bytes hold more values than any result")
+            for values in batch.to_pylist():
+                number += 1
+                yield number, values
+        if number != file.metadata.num_rows:
+            raise InputError(f"{name}: is damaged: it has {number} of {file.metadata.num_rows} rows")
+    except (pyarrow.ArrowException, OSError, ValueError, OverflowError) as error:
+        raise InputError(f"{name}: is damaged: {' '.join(str(error).split())[:200]}") from error
+
 
 REQUIRED = ("file", "status", "roll_deg")  # columns that every result has
 
@@ -178,10 +270,16 @@ _ROLLS = ("roll_deg", "image_roll_deg")
 
 @dataclass(frozen=True)
 class Result:
-    """A result file: its rows in order, and the run that made them (FILE.run.json), if that is there."""
+    """A result file: its rows in order, its path, and the run (FILE.run.json) where that is there."""
 
     rows: tuple[Row, ...]
     run: Mapping[str, Any] | None
+    path: str = ""
+
+    @property
+    def files(self) -> list[str]:
+        """The column `file`."""
+        return [row.file for row in self.rows]
 
 
 def columns(further: Sequence[str] = ()) -> tuple[str, ...]:
@@ -267,7 +365,7 @@ def read_result(path: str | Path) -> Result:
     """
     path = str(path)
     rows = tuple(row for name, data in pieces_of(path) for row in parse_rows(data, name))
-    return Result(rows, read_run(path))
+    return Result(rows, read_run(path), path)
 
 
 def pieces_of(path: str) -> Iterator[tuple[str, bytes]]:
@@ -282,7 +380,7 @@ def pieces_of(path: str) -> Iterator[tuple[str, bytes]]:
     if parts:
         yield from read_parts(path, parts)
     else:
-        yield path, _read(path)
+        yield path, read_named(path)
 
 
 def cells_of(data: bytes, name: str, wanted: Sequence[str]) -> tuple[list[str], Iterator[tuple[Any, ...]]]:
@@ -350,7 +448,7 @@ def read_run(path: str | Path) -> Mapping[str, Any] | None:
     if is_web_url(record) or not exists(record):
         return None
     try:
-        data = _read(record)
+        data = read_named(record)
         if b"\\u0000" in data:  # no option holds one
             raise ValueError("it holds a NUL character")
         run = json.loads(as_utf8(data, record))
@@ -361,7 +459,14 @@ def read_run(path: str | Path) -> Mapping[str, Any] | None:
     return run
 
 
-def _read(path: str | Path) -> bytes:
+def read_named(path: str | Path) -> bytes:
+    """Return the bytes of a file, a pipe, a URL or standard input ("-") that a user named.
+
+    Raises
+    ------
+    InputError
+        It cannot be read, or is larger than any result.
+    """
     if is_url(str(path)):
         return read_bytes(path)
     try:

@@ -71,7 +71,8 @@ def objects_behind(url: str, *, recursive: bool) -> Iterator[tuple[str, str]]:
     for found, _ in list_objects(base):
         relative = found.removeprefix(base)
         fits = _fits(relative.split("/"), pattern) if pattern else recursive or "/" not in relative
-        if fits and found.startswith(base) and not _hidden(relative):
+        hidden = any(part.startswith(".") for part in relative.split("/"))
+        if fits and found.startswith(base) and not hidden:
             yield found, relative
 
 
@@ -82,10 +83,6 @@ def _fits(names: Sequence[str], patterns: Sequence[str]) -> bool:
     if patterns[0] == "**":
         return any(_fits(names[start:], patterns[1:]) for start in range(len(names) + 1))
     return bool(names) and fnmatch.fnmatchcase(names[0], patterns[0]) and _fits(names[1:], patterns[1:])
-
-
-def _hidden(relative: str) -> bool:
-    return any(part.startswith(".") for part in relative.split("/"))
 
 
 _NOWHERE = (0, 0)
@@ -245,7 +242,7 @@ class Search:
             inside = {os.path.realpath(base / parent) for parent in relative.parents[:-1]}
             wanted = at_its_word or self._reads(match)
             if wanted and self._skip.isdisjoint(inside) and stat.S_ISREG(_mode(match)):
-                below = _below(relative).as_posix()
+                below = "/".join(part for part in relative.parts if part != "..")  # outputs stay below
                 if is_archive(match):
                     yield from ((each, f"{below}/{name}") for each, name in self._in_archive(str(path)))
                 else:
@@ -344,11 +341,6 @@ def _mode(path: str) -> int:
         return os.stat(path).st_mode  # noqa: PTH116 (many paths)
     except OSError:
         return stat.S_IFREG
-
-
-def _below(relative: Path) -> Path:
-    """Cut the steps upwards off a path: outputs keep the rest, and stay below their folder."""
-    return Path(*(part for part in relative.parts if part != ".."))
 
 
 def _fixed_part(pattern: str) -> Path:

@@ -182,7 +182,7 @@ def write_bytes(location: str, data: bytes, *, durable: bool = False, owner: str
     durable : bool
         Whether a file survives a power cut once this returns, as an object always does.
     owner : str
-        Names who writes an object; `owner_of` returns it. A file has a lock instead.
+        Names who writes an object; `objects.object_owner` returns it. A file has a lock instead.
 
     Raises
     ------
@@ -194,11 +194,6 @@ def write_bytes(location: str, data: bytes, *, durable: bool = False, owner: str
         return
     _require_writable(location)
     objects.write_object(location, data, owner)
-
-
-def owner_of(url: str) -> str:
-    """Return who wrote an object; empty where it does not say, or where there is none."""
-    return objects.object_owner(url)
 
 
 def write_new(location: str, data: bytes) -> None:

@@ -2,47 +2,27 @@
 
 from collections.abc import Mapping
 
-# by name: as hexadecimal digits of red, green, blue and, where not whole, opacity
-Colours = Mapping[str, str]
-
-LIGHT: Colours = {
-    "page": "f6f7f9",
-    "card": "ffffff",
-    "text": "1c2430",
-    "muted": "5d6878",
-    "line": "dde2e9",
-    "grid": "e8ecf1",
-    "c1": "2563c9",
-    "c2": "d9730d",
-    "c3": "12856b",
-    "c4": "8a4fc7",
-    "c5": "c43a5b",
-    "c6": "6b7684",
-    "ok": "12856b",
-    "suspect": "d9730d",
-    "suspect-text": "a85400",
-    "error": "c43a5b",
-    "band": "2563c929",
+# by name, in light and in dark mode: as hexadecimal digits of red, green, blue and, where not whole, opacity
+_COLOURS = {
+    "page": ("f6f7f9", "12161c"),
+    "card": ("ffffff", "1a2029"),
+    "text": ("1c2430", "e4e9f0"),
+    "muted": ("5d6878", "98a4b5"),
+    "line": ("dde2e9", "2c3542"),
+    "grid": ("e8ecf1", "28313d"),
+    "c1": ("2563c9", "6ea3f7"),
+    "c2": ("d9730d", "f0a152"),
+    "c3": ("12856b", "4cc3a2"),
+    "c4": ("8a4fc7", "bd93ee"),
+    "c5": ("c43a5b", "ee7d98"),
+    "c6": ("6b7684", "9aa6b5"),
+    "ok": ("12856b", "4cc3a2"),
+    "suspect": ("d9730d", "f0a152"),
+    "suspect-text": ("a85400", "f0a152"),
+    "error": ("c43a5b", "ee7d98"),
+    "band": ("2563c929", "6ea3f733"),
 }
-DARK: Colours = {
-    "page": "12161c",
-    "card": "1a2029",
-    "text": "e4e9f0",
-    "muted": "98a4b5",
-    "line": "2c3542",
-    "grid": "28313d",
-    "c1": "6ea3f7",
-    "c2": "f0a152",
-    "c3": "4cc3a2",
-    "c4": "bd93ee",
-    "c5": "ee7d98",
-    "c6": "9aa6b5",
-    "ok": "4cc3a2",
-    "suspect": "f0a152",
-    "suspect-text": "f0a152",
-    "error": "ee7d98",
-    "band": "6ea3f733",
-}
+LIGHT, DARK = ({name: modes[place] for name, modes in _COLOURS.items()} for place in (0, 1))
 
 
 def style_sheet() -> str:
@@ -51,5 +31,5 @@ def style_sheet() -> str:
     return f":root {{ {_properties(LIGHT)} }}\n{dark}\n"
 
 
-def _properties(colours: Colours) -> str:
+def _properties(colours: Mapping[str, str]) -> str:
     return " ".join(f"--{name}: #{digits};" for name, digits in colours.items())

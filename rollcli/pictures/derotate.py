@@ -11,6 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from rollcli.errors import UsageError
 from rollcli.estimator.moments import map_of
 
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
 _BLOCK = 1 << 16  # pixels turned at a time: what they need stays in the processor's cache
 
 
@@ -82,11 +85,12 @@ def derotate(
         rows = slice(top, top + step)
         turned, known = _interpolated(padded, turn.sources(rows))
         known &= kept[rows]
-        np.copyto(result[rows], _as_stored(turned, values.dtype), where=known, casting="unsafe")
+        turned = np.rint(turned) if values.dtype.kind in "iu" else turned
+        np.copyto(result[rows], turned, where=known, casting="unsafe")
     return result
 
 
-def rotation_matrix(shape: tuple[int, ...], roll: float, *, expand: bool = False) -> NDArray[np.float64]:
+def rotation_matrix(shape: tuple[int, ...], roll: float, *, expand: bool = False) -> Floats:
     """Return the matrix that takes pixels of a map to those of `derotate`'s result.
 
     Parameters
@@ -146,30 +150,30 @@ class _Turn:
             )
         return cls((height, width), size, cosine, sine)
 
-    def sources(self, rows: slice) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def sources(self, rows: slice) -> tuple[Floats, Floats]:
         """Return where in the map (v, u) the pixels of some rows of the result come from."""
         y, x = _centred(self.size)
-        u: NDArray[np.float64] = self.cosine * x - self.sine * y[rows, None] + (self.shape[1] - 1) / 2
-        v: NDArray[np.float64] = self.sine * x + self.cosine * y[rows, None] + (self.shape[0] - 1) / 2
+        u: Floats = self.cosine * x - self.sine * y[rows, None] + (self.shape[1] - 1) / 2
+        v: Floats = self.sine * x + self.cosine * y[rows, None] + (self.shape[0] - 1) / 2
         return v, u
 
-    def targets(self, pixels: NDArray[np.bool_]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def targets(self, pixels: Flags) -> tuple[Floats, Floats]:
         """Return where in the result (y, x) some pixels of the map go."""
         rows, columns = np.nonzero(pixels)
         v, u = _centred(self.shape)
-        x: NDArray[np.float64] = self.cosine * u[columns] + self.sine * v[rows] + (self.size[1] - 1) / 2
-        y: NDArray[np.float64] = self.cosine * v[rows] - self.sine * u[columns] + (self.size[0] - 1) / 2
+        x: Floats = self.cosine * u[columns] + self.sine * v[rows] + (self.size[1] - 1) / 2
+        y: Floats = self.cosine * v[rows] - self.sine * u[columns] + (self.size[0] - 1) / 2
         return y, x
 
 
-def _centred(shape: tuple[int, int]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _centred(shape: tuple[int, int]) -> tuple[Floats, Floats]:
     """Row and column coordinates, measured from the centre."""
     rows, columns = (np.arange(side, dtype=np.float64) - (side - 1) / 2 for side in shape)
     return rows, columns
 
 
-def _validity(values: NDArray[Any], invalid: Iterable[float]) -> NDArray[np.bool_]:
-    valid: NDArray[np.bool_] = np.isfinite(values) & (values > 0)
+def _validity(values: NDArray[Any], invalid: Iterable[float]) -> Flags:
+    valid: Flags = np.isfinite(values) & (values > 0)
     saturated = [np.iinfo(values.dtype).max] if values.dtype in (np.uint16, np.int16) else []
     with np.errstate(over="ignore"):  # a value may lie beyond what the dtype holds
         for value in (*invalid, *saturated):
@@ -177,7 +181,7 @@ def _validity(values: NDArray[Any], invalid: Iterable[float]) -> NDArray[np.bool
     return valid
 
 
-def _not_nearest_to_invalid(valid: NDArray[np.bool_], turn: _Turn) -> NDArray[np.bool_]:
+def _not_nearest_to_invalid(valid: Flags, turn: _Turn) -> Flags:
     """Return the pixels of the result that no invalid pixel of the map falls on."""
     kept = np.ones(turn.size, bool)
     y, x = (np.floor(each + 0.5).astype(np.intp) for each in turn.targets(~valid))
@@ -186,9 +190,7 @@ def _not_nearest_to_invalid(valid: NDArray[np.bool_], turn: _Turn) -> NDArray[np
     return kept
 
 
-def _interpolated(
-    padded: NDArray[Any], sources: tuple[NDArray[np.float64], NDArray[np.float64]]
-) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+def _interpolated(padded: NDArray[Any], sources: tuple[Floats, Floats]) -> tuple[NDArray[Any], Flags]:
     """Values between the valid (positive) pixels of a map padded by 2, and where the nearest one is valid."""
     width = padded.shape[1]
     v, u = (np.clip(each, -1.5, side - 3.5) for each, side in zip(sources, padded.shape, strict=True))
@@ -211,12 +213,7 @@ def _interpolated(
     return np.divide(total, weight, out=total, where=known), known
 
 
-def _as_stored(values: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:
-    """Round where the dtype holds whole numbers."""
-    return np.rint(values) if dtype.kind in "iu" else values
-
-
-def _no_data(values: NDArray[Any], valid: NDArray[np.bool_]) -> float:
+def _no_data(values: NDArray[Any], valid: Flags) -> float:
     """Return how this map writes "no data"."""
     if values.dtype.kind == "u" or valid.all():
         return 0

@@ -1,19 +1,27 @@
-"""Figures that matplotlib draws: their sizes, their look, and their files; the same bytes each time.
+"""Figures that matplotlib draws: their sizes, look and files, and the figure of a frame for a paper.
 
-matplotlib is part of the extra `report` and takes a second to load: this module is imported once something is
-to be drawn.
+They are the same bytes each time. matplotlib is part of the extra `report` and takes a second to load: this
+module is imported once something is to be drawn.
 """
 
 import io
+import math
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
 
 from rollcli.pictures.colours import LIGHT
+from rollcli.pictures.derotate import derotate
+from rollcli.pictures.overlay import brightest
+from rollcli.pictures.vdisparity import VDisparity, profile, row_offset, shown_counts, v_disparity
 
 _SETTINGS = threading.Lock()  # matplotlib has one set of them for all threads
 COLUMN = 3.5 * 72  # pt: the width of a column in journals of two columns
@@ -85,3 +93,94 @@ def figure_file(figure: Figure, kind: str, title: str) -> bytes:
     dots = 600 if figure.get_figwidth() * 72 <= 2 * COLUMN else 144
     figure.savefig(buffer, format=kind, dpi=dots, metadata=metadata, facecolor=f"#{LIGHT['card']}")
     return buffer.getvalue()
+
+
+_MAP_SHARE = 1.8  # the width of a map, of that of its v-disparity
+_MAP_WIDTH = 0.5 * COLUMN  # pt, about; the rest are v-disparity, numbers and names
+_AROUND = 92.0  # pt of the height that are names, numbers and the bar of colours
+_COLUMNS = 320  # of a v-disparity
+_COLOURS, _ROAD = "inferno", "#00e5ff"  # the road in a colour that those of the counts do not have
+
+
+def v_disparity_figure(
+    disparity: NDArray[Any],
+    theta: float,
+    alpha: tuple[float, float, float] | None,
+    kind: str,
+    *,
+    bins: int | None = None,
+    max_disparity: float | None = None,
+) -> bytes:
+    """Draw a map and its v-disparity, before and after de-rotation, as wide as a journal's column.
+
+    Parameters
+    ----------
+    disparity : ndarray, shape (H, W)
+        Pixels; NaN, inf and <= 0 are no data.
+    theta : float
+        Roll, radians.
+    alpha : tuple of float, or None
+        The road: d = a0 + a1 y + a2 y^2, px, y measured as the method does. None: no curve is drawn.
+    kind : {"svg", "pdf", "png"}
+    bins, max_disparity
+        See `v_disparity`.
+
+    Returns
+    -------
+    bytes
+        The file, the same each time; maps and counts in it are pictures, the rest is lines and letters.
+    """
+    height, width = disparity.shape
+    maps = (disparity, derotate(disparity, theta))
+    titles = ("as it is", "de-rotated by " + f"{math.degrees(theta):.2f}°".replace("-", "−"))
+    curves: list[tuple[float, float, float] | None] = [None, None]
+    if alpha is not None:
+        start = row_offset(theta, width, height)
+        a0, a1, a2 = alpha
+        curves = [profile(alpha, theta, width), (a0 + a1 * start + a2 * start**2, a1 + 2 * a2 * start, a2)]
+    counted = [v_disparity(each, bins=bins, max_disparity=max_disparity) for each in maps]
+    with drawing_style(PRINT):
+        size = (COLUMN, 2 * _MAP_WIDTH * height / width + _AROUND)
+        figure = Figure((size[0] / 72, size[1] / 72), layout="constrained")
+        axes = figure.subplots(2, 2, width_ratios=(_MAP_SHARE, 1.0), sharey=True, squeeze=False)
+        for row, (left, right) in enumerate(axes):
+            picture = _draw_map(left, maps[row], titles[row])
+            _draw_counts(right, counted[row], curves[row], height)
+            left.set_box_aspect(height / width)
+            right.set_box_aspect(height / width * _MAP_SHARE)
+        axes[0, 0].tick_params(labelbottom=False)
+        axes[0, 1].tick_params(labelbottom=False)
+        axes[1, 0].set_xlabel("column u, px")
+        axes[1, 1].set_xlabel("disparity, px")
+        figure.colorbar(
+            picture, ax=axes[1, 0], location="bottom", label="disparity, px", aspect=30, extend="max"
+        ).outline.set_visible(False)
+        what = "Disparity map and v-disparity, as they are and de-rotated"
+        return figure_file(figure, kind, what)
+
+
+def _draw_map(axes: Axes, disparity: NDArray[Any], title: str) -> Any:
+    known = np.isfinite(disparity) & (disparity > 0)
+    shown = np.ma.masked_where(~known, disparity)
+    axes.set_title(title, loc="left")
+    axes.set_ylabel("row v, px")
+    axes.grid(visible=False)
+    return axes.imshow(
+        shown, cmap=_COLOURS, vmin=0, vmax=brightest(disparity), interpolation="none", aspect="auto"
+    )
+
+
+def _draw_counts(
+    axes: Axes, histogram: VDisparity, curve: tuple[float, float, float] | None, height: int
+) -> None:
+    counts, end = shown_counts(histogram, _COLUMNS)
+    edges = (0.0, end, height - 0.5, -0.5)
+    axes.imshow(np.log1p(counts), cmap=_COLOURS, extent=edges, interpolation="none", aspect="auto")
+    if curve is not None:
+        rows = np.arange(height, dtype=float)
+        axes.plot(np.polynomial.Polynomial(curve)(rows), rows, color=_ROAD, linewidth=0.8, linestyle="--")
+    axes.set_xlim(0, end)
+    axes.set_ylim(height - 0.5, -0.5)
+    axes.grid(visible=False)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))

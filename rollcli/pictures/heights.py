@@ -33,6 +33,8 @@ from rollcli.files.results import Row
 from rollcli.rig.calibration import Calibration, require_calibration
 
 Singles = NDArray[np.float32]
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 _BLOCK = 1 << 16  # pixels at a time: what they need stays in the processor's cache
 _FLATTEST = 0.2  # of the rise near ahead: a parabola that is flatter is no road, which then goes on straight
@@ -104,7 +106,7 @@ def unit_of(calibration: Calibration | None) -> str:
 
 def height_map(
     disparity: ArrayLike, estimate: RollEstimate, calibration: Calibration | None = None
-) -> NDArray[np.float32]:
+) -> Singles:
     """Return how high each pixel of a map lies over the road that was fitted to it.
 
     Parameters
@@ -149,9 +151,7 @@ def height_map(
     return heights_over(values, FittedRoad.of_estimate(estimate), calibration)
 
 
-def heights_over(
-    disparity: NDArray[Any], road: FittedRoad, calibration: Calibration | None
-) -> NDArray[np.float32]:
+def heights_over(disparity: NDArray[Any], road: FittedRoad, calibration: Calibration | None) -> Singles:
     """Return the heights of a map over a road; see `height_map`."""
     if disparity.shape != (road.height, road.width) or disparity.dtype.kind not in "fiu":
         size = "x".join(map(str, disparity.shape[::-1]))
@@ -175,7 +175,7 @@ def heights_over(
     return heights
 
 
-def steadied(heights: NDArray[np.float32]) -> NDArray[np.float32]:
+def steadied(heights: Singles) -> Singles:
     """Return the medians of 5x5 pixels of a map of heights, where all of them have one.
 
     For heights of matched pairs: semi-global matching draws disparities towards whole pixels, on a road in
@@ -274,23 +274,14 @@ class _Profile:
         return foot, rise
 
     def _on_parabola(self, disparity: Singles) -> tuple[Singles, Singles]:
-        rise = disparity - np.float32(self.disparity)
+        above = disparity - np.float32(self.disparity)
         if not self.bend:
-            foot = rise / np.float32(self.rise)
-            rise.fill(self.rise)
-            return foot, rise
+            return above / np.float32(self.rise), np.full_like(above, self.rise)
         end = np.float32((_FLATTEST**2 - 1) * self.rise**2 / (4 * self.bend))
-        bent, straight = rise, None
-        if rise.min() < end if self.bend > 0 else rise.max() > end:
-            bent = np.maximum(rise, end) if self.bend > 0 else np.minimum(rise, end)
-            straight = rise - bent
-        rise = bent * np.float32(4 * self.bend)
-        rise += np.float32(self.rise**2)
-        np.sqrt(rise, out=rise)
-        bent /= (rise + np.float32(self.rise)) * np.float32(0.5)
-        if straight is not None:
-            bent += straight / rise
-        return bent, rise
+        bent = np.maximum(above, end) if self.bend > 0 else np.minimum(above, end)
+        rise = np.sqrt(bent * np.float32(4 * self.bend) + np.float32(self.rise**2))
+        foot = bent / ((rise + np.float32(self.rise)) * np.float32(0.5)) + (above - bent) / rise
+        return foot, rise
 
 
 def _profile_basis(x: NDArray[Any]) -> NDArray[Any]:
@@ -298,7 +289,7 @@ def _profile_basis(x: NDArray[Any]) -> NDArray[Any]:
     return np.stack([np.ones_like(x), x, 1 / x, x * x], axis=1)
 
 
-def _medians(place: NDArray[np.intp], values: Singles) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def _medians(place: NDArray[np.intp], values: Singles) -> tuple[Floats, Flags]:
     """Return the medians of values in bins, and which bins have enough of them."""
     spread = 2 * float(np.abs(values).max(initial=0)) + 1
     ordered = np.sort(place * spread + values)  # one sort of all
@@ -310,9 +301,7 @@ def _medians(place: NDArray[np.intp], values: Singles) -> tuple[NDArray[np.float
     return medians, found
 
 
-def _steady_fit(
-    design: NDArray[np.float64], values: NDArray[np.float64], found: NDArray[np.bool_]
-) -> tuple[NDArray[Any], NDArray[Any]]:
+def _steady_fit(design: Floats, values: Floats, found: Flags) -> tuple[NDArray[Any], NDArray[Any]]:
     """Fit values by least absolute deviations, then by Tukey's weights, six spreads wide; return those, too.
 
     Least squares would first follow a few bins at an end that lie on a kerb, and keep them.
@@ -357,9 +346,7 @@ class _Heights:
         """Write the heights of the pixels of some rows and columns."""
         d = stored.astype(np.float32)
         doffs = 0.0 if self.calibration is None else self.calibration.doffs
-        known = d > max(0.0, -doffs)
-        known &= d <= LARGEST
-        unknown = ~known
+        unknown = ~((d > max(0.0, -doffs)) & (d <= LARGEST))
         np.copyto(d, np.float32(self.profile.disparity), where=unknown)
         shifted = d + np.float32(doffs) if doffs else d
         rows = rows[:, None]
@@ -370,12 +357,10 @@ class _Heights:
         gap = foot - columns * np.float32(-math.sin(self.road.theta))
         gap -= rows * np.float32(math.cos(self.road.theta)) - np.float32(self.profile.row)
         if self.calibration is None:
-            gap *= np.float32(self.profile.rise)
-            np.divide(gap, d, out=heights)
+            np.divide(gap * np.float32(self.profile.rise), d, out=heights)
         else:
             length = self._length(self.calibration, shifted, foot, rise, camber)
-            length *= shifted
-            np.divide(gap, length, out=heights)
+            np.divide(gap, length * shifted, out=heights)
         np.copyto(heights, np.float32(np.nan), where=unknown)
 
     def across(self, columns: Singles, rows: Singles) -> Singles:
@@ -390,23 +375,15 @@ class _Heights:
     def _camber(self, d: Singles, across: Singles) -> "_Camber":
         """Take from disparities what camber adds, which is of the disparity without it [RoadModel]."""
         camber = self.road.camber
-        side = across * np.float32(_centre_rise(self.road))
-        side /= d
+        side = across * np.float32(_centre_rise(self.road)) / d
         # camber is not extrapolated beyond `FARTHEST_SIDE`, which is of the disparity without it
         most = np.float32(FARTHEST_SIDE / max(1 + camber / 2 * FARTHEST_SIDE**2, _FLATTEST))
-        beyond = np.abs(side) > most if max(side.max(), -side.min()) > most else None
-        if beyond is not None:
-            np.clip(side, -most, most, out=side)
-        root = side * side
-        root *= np.float32(-2 * camber)
-        root += 1
-        np.maximum(root, np.float32(_FLATTEST**2), out=root)
-        np.sqrt(root, out=root)
-        rest = root * np.float32(0.5)
-        rest += np.float32(0.5)
-        if beyond is not None:
-            np.copyto(side, 0, where=beyond)
-            np.copyto(root, 1, where=beyond)
+        beyond = np.abs(side) > most
+        side = np.clip(side, -most, most)
+        square = side * side * np.float32(-2 * camber) + np.float32(1)
+        root = np.sqrt(np.maximum(square, np.float32(_FLATTEST**2)))
+        rest = root * np.float32(0.5) + np.float32(0.5)
+        side[beyond], root[beyond] = 0, 1
         return _Camber(across, side, rest, root)
 
     def _length(
@@ -422,27 +399,15 @@ class _Heights:
         aspect = calibration.fy / calibration.fx
         at = np.array([[calibration.cx]], np.float32), np.array([[calibration.cy]], np.float32)
         along = calibration.cy * cosine - calibration.cx * sine - self.profile.row
-        ahead = (shifted if camber is None else shifted * camber.rest) / rise
-        ahead -= foot
-        ahead += np.float32(along)
-        square = np.float32(sine**2 + (aspect * cosine) ** 2)
-        lean: Singles | np.float32 = square
+        ahead = (shifted if camber is None else shifted * camber.rest) / rise - foot + np.float32(along)
+        lean: Singles | np.float32 = np.float32(sine**2 + (aspect * cosine) ** 2)
         if camber is not None:
-            tilt = camber.side / rise
-            tilt *= np.float32(self.road.camber * _centre_rise(self.road))
+            tilt = camber.side / rise * np.float32(self.road.camber * _centre_rise(self.road))
             ahead += tilt * (self.across(*at) - camber.across)
-            leant = tilt * np.float32(cosine**2 + (aspect * sine) ** 2)
-            if aspect != 1:
-                leant += np.float32(2 * (aspect**2 - 1) * cosine * sine)
-            leant *= tilt
-            leant += square
-            lean = leant
+            skew = np.float32(2 * (aspect**2 - 1) * cosine * sine)
+            lean = (tilt * np.float32(cosine**2 + (aspect * sine) ** 2) + skew) * tilt + lean
         ahead *= np.float32(1 / calibration.fx)
-        ahead *= ahead
-        ahead += lean
-        length: Singles = np.sqrt(ahead, out=ahead)
-        length *= np.float32(1 / (calibration.baseline or 1.0))
-        return length
+        return np.asarray(np.sqrt(ahead * ahead + lean) * np.float32(1 / (calibration.baseline or 1.0)))
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
-"""Pictures of disparity maps, and of the road found in them."""
+"""Pictures of disparity maps, of the road found in them, and of heights over it."""
 
+import math
 from collections.abc import Iterable
 from typing import Any
 
@@ -7,7 +8,16 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.pictures.round_step import round_step
+from rollcli.pictures.heights import METRES, Singles
+
+Pixels = NDArray[np.uint8]
+
+
+def round_step(least: float) -> float:
+    """Return the next round number: 1, 2 or 5 times a power of ten."""
+    power = 10.0 ** math.floor(math.log10(least))
+    return next(each * power for each in (1, 2, 5, 10) if each * power >= least * (1 - 1e-9))
+
 
 _ROAD = (220, 230, 40)  # BGR
 _TINT = 0.5
@@ -18,7 +28,7 @@ _INK = (60, 60, 60)
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
 
 
-def draw_disparity(disparity: NDArray[Any]) -> NDArray[np.uint8]:
+def draw_disparity(disparity: NDArray[Any]) -> Pixels:
     """Draw a map in colour: dark is far, bright is near, black is no data.
 
     Parameters
@@ -35,7 +45,7 @@ def draw_disparity(disparity: NDArray[Any]) -> NDArray[np.uint8]:
     return cv2.applyColorMap(_levels(disparity), colours).astype(np.uint8, copy=False)
 
 
-def draw_road(disparity: NDArray[Any], mask: NDArray[Any]) -> NDArray[np.uint8]:
+def draw_road(disparity: NDArray[Any], mask: NDArray[Any]) -> Pixels:
     """Draw a map in colour, as `draw_disparity` has it, with the road tinted and outlined.
 
     Parameters
@@ -53,7 +63,7 @@ def draw_road(disparity: NDArray[Any], mask: NDArray[Any]) -> NDArray[np.uint8]:
     return _with_road(draw_disparity(disparity), mask)
 
 
-def draw_road_on_photo(photo: NDArray[Any], mask: NDArray[Any]) -> NDArray[np.uint8]:
+def draw_road_on_photo(photo: NDArray[Any], mask: NDArray[Any]) -> Pixels:
     """Draw a camera image with the road tinted and outlined.
 
     Parameters
@@ -72,7 +82,7 @@ def draw_road_on_photo(photo: NDArray[Any], mask: NDArray[Any]) -> NDArray[np.ui
     return _with_road(as_bgr(photo, (width, height)), mask)
 
 
-def draw_preview(disparity: NDArray[Any]) -> NDArray[np.uint8]:
+def draw_preview(disparity: NDArray[Any]) -> Pixels:
     """Draw a map in colour, as `draw_disparity` has it, with a colour bar that names disparities in pixels.
 
     Parameters
@@ -93,7 +103,7 @@ def draw_preview(disparity: NDArray[Any]) -> NDArray[np.uint8]:
     return with_bar(picture, _colours()[:0:-1], ticks)
 
 
-def as_bgr(photo: NDArray[Any], size: tuple[int, int]) -> NDArray[np.uint8]:
+def as_bgr(photo: NDArray[Any], size: tuple[int, int]) -> Pixels:
     """Return a new BGR image, uint8, of a camera image, grey or BGR, uint8 or uint16, at (width, height)."""
     pixels = photo if photo.dtype == np.uint8 else (photo >> 8).astype(np.uint8)
     if pixels.shape[1::-1] != size:
@@ -102,9 +112,7 @@ def as_bgr(photo: NDArray[Any], size: tuple[int, int]) -> NDArray[np.uint8]:
     return picture.astype(np.uint8, copy=False)
 
 
-def with_bar(
-    picture: NDArray[np.uint8], colours: NDArray[np.uint8], ticks: Iterable[tuple[float, str]]
-) -> NDArray[np.uint8]:
+def with_bar(picture: Pixels, colours: Pixels, ticks: Iterable[tuple[float, str]]) -> Pixels:
     """Put a colour bar on the right of a picture.
 
     Parameters
@@ -131,7 +139,7 @@ def with_bar(
     return np.hstack([picture, bar])
 
 
-def _with_road(picture: NDArray[np.uint8], mask: NDArray[Any]) -> NDArray[np.uint8]:
+def _with_road(picture: Pixels, mask: NDArray[Any]) -> Pixels:
     """Tint and outline the road in a picture, BGR."""
     road = (np.asarray(mask) != 0).astype(np.uint8)
     tint = np.arange(256)[:, None] * (1 - _TINT) + np.array(_ROAD) * _TINT
@@ -146,7 +154,7 @@ def brightest(values: NDArray[Any]) -> float:
     return float(np.percentile(values[valid], 99)) if valid.any() else 1.0
 
 
-def _levels(disparity: NDArray[Any]) -> NDArray[np.uint8]:
+def _levels(disparity: NDArray[Any]) -> Pixels:
     """Return 0 for no data, 1..255 for small to large disparities."""
     values = np.asarray(disparity)
     top, levels = brightest(values), np.empty(values.shape, np.uint8)
@@ -160,9 +168,91 @@ def _levels(disparity: NDArray[Any]) -> NDArray[np.uint8]:
     return levels
 
 
-def _colours() -> NDArray[np.uint8]:
+def _colours() -> Pixels:
     """Return the BGR of each level, shape (256, 3); even the smallest disparity differs from no data."""
     ramp = np.linspace(40, 255, 256).astype(np.uint8)
     colours = cv2.applyColorMap(ramp, cv2.COLORMAP_INFERNO).reshape(256, 3).astype(np.uint8, copy=False)
     colours[0] = 0
+    return colours
+
+
+# BGR from below the road to above it, evenly spaced, after ColorBrewer's RdBu: its middle, the road, is white
+_BELOW_TO_ABOVE = (
+    (172, 102, 33),
+    (195, 147, 67),
+    (222, 197, 146),
+    (247, 247, 247),
+    (130, 165, 244),
+    (77, 96, 214),
+    (43, 24, 178),
+)
+_NO_DATA = (60, 60, 60)
+_DARKEST = 0.35  # of a colour, where the photo under it is black
+_BRIGHT = 98  # per cent of a photo's pixels are darker than what counts as white
+_LABELS = 8  # at most, but for the ends
+
+
+def draw_heights(
+    heights: Singles, span: tuple[float, float], unit: str, photo: NDArray[Any] | None = None
+) -> Pixels:
+    """Draw heights over the road: blue below it, white on it, red above it, with a colour bar.
+
+    Parameters
+    ----------
+    heights : ndarray of float32, shape (H, W)
+        NaN is no data.
+    span : tuple of float
+        The heights with the outermost colours, lowest first; what lies beyond has them, too. The colours of
+        either side of 0 are spread over that side.
+    unit : str
+        Of heights and span, for the colour bar.
+    photo : ndarray, shape (H', W') or (H', W', 3), optional
+        Grey or BGR, uint8 or uint16; its light and dark show through the colours, and it is seen in grey
+        where there is no data.
+
+    Returns
+    -------
+    ndarray of uint8, shape (H, W + BAR_WIDTH, 3)
+        BGR.
+    """
+    colours = _height_colours()
+    # level 1 is the lowest height, 128 the road, 255 the highest
+    levels = np.rint(np.interp(np.nan_to_num(heights), _knots(*span), (1.0, 128.0, 255.0))).astype(np.uint8)
+    picture = cv2.applyColorMap(levels, colours.reshape(256, 1, 3))
+    known = np.isfinite(heights)
+    if photo is None:
+        picture[~known] = _NO_DATA
+    else:
+        height, width = heights.shape
+        grey = cv2.cvtColor(as_bgr(photo, (width, height)), cv2.COLOR_BGR2GRAY)
+        white = max(float(np.percentile(grey, _BRIGHT)), 1.0)
+        light = np.minimum(grey * np.float32((1 - _DARKEST) / white) + np.float32(_DARKEST), 1)
+        picture = (picture * light[..., None]).astype(np.uint8)
+        picture[~known] = cv2.cvtColor(grey, cv2.COLOR_GRAY2BGR)[~known]
+    return with_bar(picture.astype(np.uint8, copy=False), colours[:0:-1], _ticks(span, unit))
+
+
+def _knots(low: float, high: float) -> tuple[float, float, float]:
+    """Return the heights of the first, the middle and the last colour; the road has the middle one."""
+    return low, 0.0 if low < 0 < high else (low + high) / 2, high
+
+
+def _ticks(span: tuple[float, float], unit: str) -> list[tuple[float, str]]:
+    """Return places on the bar, 0 at its bottom and 1 at its top, and what is written there."""
+    knots = _knots(*span)
+    step = round_step((span[1] - span[0]) / _LABELS)
+    inner = [round(number * step, 9) for number in range(int(span[0] / step), int(span[1] / step) + 1)]
+    values = [value for value in inner if span[0] + step / 2 < value < span[1] - step / 2]
+    zero = "0 m" if unit == METRES else "0 H"
+    return [
+        (float(np.interp(value, knots, (0.0, 0.5, 1.0))), f"{value:+.4g}" if value else zero)
+        for value in (span[0], *values, span[1])
+    ]
+
+
+def _height_colours() -> Pixels:
+    """Return the BGR of each level, shape (256, 3); level 0 is not used."""
+    places = np.linspace(1, 255, len(_BELOW_TO_ABOVE))
+    ramps = [np.interp(np.arange(256), places, ramp) for ramp in zip(*_BELOW_TO_ABOVE, strict=True)]
+    colours: Pixels = np.rint(np.column_stack(ramps)).astype(np.uint8)
     return colours

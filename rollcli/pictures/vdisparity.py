@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rollcli.errors import UsageError
 from rollcli.estimator.moments import map_of
-from rollcli.pictures.round_step import round_step
+from rollcli.pictures.overlay import Pixels, round_step
 
 _MAX_BINS = 1024
 _BLOCK = 1 << 22  # pixels counted at a time: a large map would take 40 bytes a pixel
@@ -146,7 +146,7 @@ def draw_v_disparity(
     alpha: tuple[float, float, float] | None = None,
     offset: float = 0.0,
     horizon: float | None = None,
-) -> NDArray[np.uint8]:
+) -> Pixels:
     """Draw counts: log scale, bright where many, with the road's parabola and the horizon over them.
 
     Parameters
@@ -192,9 +192,7 @@ def shown_counts(histogram: VDisparity, width: int) -> tuple[NDArray[np.float32]
     return shown.astype(np.float32, copy=False), bins * per_bin
 
 
-def _draw_road(
-    chart: NDArray[np.uint8], road: "np.polynomial.Polynomial", offset: float, top: float, unit: int
-) -> None:
+def _draw_road(chart: Pixels, road: "np.polynomial.Polynomial", offset: float, top: float, unit: int) -> None:
     """Draw the road's curve, dashed so that what it lies on can be seen."""
     height, width = chart.shape[:2]
     for start in range(0, height, 2 * _DASH * unit):
@@ -206,7 +204,7 @@ def _draw_road(
         cv2.polylines(chart, fixed, False, _ROAD, unit, cv2.LINE_AA, _SHIFT)
 
 
-def _draw_horizon(chart: NDArray[np.uint8], row: int, unit: int) -> None:
+def _draw_horizon(chart: Pixels, row: int, unit: int) -> None:
     dash = _DASH * unit
     for start in range(0, chart.shape[1], 2 * dash):
         cv2.line(chart, (start, row), (start + dash - 1, row), _HORIZON, unit)
@@ -214,7 +212,7 @@ def _draw_horizon(chart: NDArray[np.uint8], row: int, unit: int) -> None:
     cv2.putText(chart, "horizon", place, _FONT, _SIZE * unit, _HORIZON, unit, cv2.LINE_AA)
 
 
-def _with_margins(chart: NDArray[np.uint8], top: float, unit: int) -> NDArray[np.uint8]:
+def _with_margins(chart: Pixels, top: float, unit: int) -> Pixels:
     """Return the chart with rows named on its left and disparities below it."""
     height, width = chart.shape[:2]
     left, tick = LEFT_MARGIN * unit, 4 * unit
@@ -238,7 +236,7 @@ def _ticks(end: float, least_step: float) -> Iterator[float]:
     yield from (number * step for number in range(int(end / step) + 1) if number * step < end)
 
 
-def _write(picture: NDArray[np.uint8], text: str, column: int, row: int, unit: int, *, align: float) -> None:
+def _write(picture: Pixels, text: str, column: int, row: int, unit: int, *, align: float) -> None:
     """Write a line; `align` 0 starts at the column, 0.5 is centred there, 1 ends there."""
     (width, _), _ = cv2.getTextSize(text, _FONT, _SIZE * unit, unit)
     left = min(max(column - round(align * width), 0), picture.shape[1] - width)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.files.results import Row
-from rollcli.pictures.round_step import round_step
+from rollcli.pictures.overlay import round_step
 from rollcli.report.options import ALIGNED, HISTOGRAM, chart_names
 from rollcli.report.page import Chart, scatter
 from rollcli.report.summary import degrees, with_interval
@@ -500,7 +500,8 @@ def histogram(rows: Sequence[Row]) -> Chart:
     low, high = view(rows)
     shown = [row.roll_deg for row in rows if row.roll_deg is not None and low <= row.roll_deg <= high]
     low, high = min(shown, default=low), max(shown, default=high)
-    step = round_step(max((high - low) / _bins(len(shown)), _NARROWEST))
+    bins = min(_MOST_BINS, max(5, math.ceil(2 * math.sqrt(len(shown)))))  # fewer of fewer, higher than one
+    step = round_step(max((high - low) / bins, _NARROWEST))
     edges = np.arange(math.floor(low / step), math.floor(high / step) + 2) * step
     spans = [f"{degrees(start, 3)} to {degrees(end, 3)}" for start, end in pairwise(edges.tolist())]
     data = []
@@ -525,11 +526,6 @@ def histogram(rows: Sequence[Row]) -> Chart:
         "yaxis": {"title": {"text": "frames"}, **_counted(int(np.histogram(shown, edges)[0].max()))},
     }
     return Chart(HISTOGRAM, "How many frames have which roll", data, layout)
-
-
-def _bins(count: int) -> int:
-    """Return fewer bins for fewer frames, so that bars are higher than one."""
-    return min(_MOST_BINS, max(5, math.ceil(2 * math.sqrt(count))))
 
 
 def _counted(highest: int) -> dict[str, Any]:

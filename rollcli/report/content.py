@@ -26,7 +26,7 @@ from rollcli.rig.calibration import Calibration
 from rollcli.rig.drive.assess import RigAssessment
 from rollcli.rig.quantities import QUANTITIES
 from rollcli.rig.words import answer, counts, decimals, findings, now_in_words
-from rollcli.run.rig_health import NOT_SEEN, health_of
+from rollcli.run.rig_gates import NOT_SEEN, health_of
 
 _FOLDERS = 6  # of inputs that the summary names
 _LISTED = 20  # doubtful frames in a list of their own; the table has all

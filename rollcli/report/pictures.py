@@ -16,8 +16,7 @@ from rollcli.files.encodings import read_disparity, to_disparity
 from rollcli.files.formats import read_image, read_stored
 from rollcli.pictures.derotate import derotate
 from rollcli.pictures.heights import CAMERA_HEIGHTS, METRES, FittedRoad, heights_over, steadied
-from rollcli.pictures.heights_preview import draw_heights
-from rollcli.pictures.overlay import draw_disparity, draw_road_on_photo
+from rollcli.pictures.overlay import draw_disparity, draw_heights, draw_road_on_photo
 from rollcli.pictures.vdisparity import draw_v_disparity, row_offset, v_disparity
 from rollcli.report.sources import Subject
 from rollcli.run.options import FrameOptions

@@ -16,12 +16,11 @@ from rollcli.report.sources import Choice, Subject, choose, subjects
 from rollcli.report.summary import common_run, frame_count
 from rollcli.rig.drive.assess import RigAssessment, assess_rig
 from rollcli.run.options import EncodingOptions, FrameOptions
+from rollcli.run.outputs import is_dry_run
 from rollcli.run.progress import Progress
-from rollcli.run.reads_and_writes import check_writes, list_files
-from rollcli.run.record import recorded_options
+from rollcli.run.resume import recorded_options
 from rollcli.run.rig import order_of, origins_of
-from rollcli.run.workers.chunks import Work
-from rollcli.run.workers.in_order import Workers
+from rollcli.run.workers.chunks import Work, Workers
 from rollcli.run.workers.interrupt import stop_on_signals
 from rollcli.run.workers.tasks import run_tasks
 
@@ -55,7 +54,7 @@ def run_report(options: ReportOptions) -> ExitStatus:
     require_extra("report", "the page")
     if len(set(options.results)) < len(options.results):
         raise UsageError(f"{listed(options.results)}: a result is named twice")
-    joined = _joined([_read(path) for path in options.results])
+    joined = _joined(options.results)
     rig = assess_rig(joined.rows, origins=joined.origins)
     jumps = [
         int(drive.frames[jump.frame])
@@ -72,9 +71,7 @@ def run_report(options: ReportOptions) -> ExitStatus:
     page = [] if options.output is None or is_stream(options.output) else [options.output]
     charts = [path for name in chart_names(joined.rows) for path in options.chart_paths(name).values()]
     writes = [*charts, *page]
-    check_writes(reads, writes, overwrite=options.running.overwrite)
-    if options.running.dry_run:
-        list_files([(reads, writes)])
+    if is_dry_run(reads, writes, options.running):
         return ExitStatus.DONE
     return _write(options, joined, chosen, found, rig)
 
@@ -102,7 +99,7 @@ def _write(
     from rollcli.report.figures import chart_file
 
     progress = Progress(len(found), options.running, EncodingOptions())
-    recorded = [joined.parts[joined.owners[each.place]].recorded for each in chosen]
+    recorded = [joined.recorded[joined.owners[each.place]] for each in chosen]
     pictures = _take(found, recorded, options.running.jobs)
     if len(pictures) < len(found):
         progress.say("interrupted; nothing is written")
@@ -153,44 +150,33 @@ def _take(found: Sequence[Subject], recorded: Sequence[FrameOptions], jobs: int 
 
 
 @dataclass(frozen=True, slots=True)
-class _Part:
-    """One of the results that are told."""
-
-    path: str
-    rows: tuple[Row, ...]
-    run: Mapping[str, Any] | None
-    recorded: FrameOptions
-
-    @property
-    def files(self) -> list[str]:
-        """The column `file`."""
-        return [row.file for row in self.rows]
-
-
-@dataclass(frozen=True, slots=True)
 class _Joined:
-    """All rows in the order of the run, or one result after the other; `owners` are the parts they are of."""
+    """All rows in the order of the run, or one result after the other.
 
-    parts: Sequence[_Part]
+    `recorded` is how each part was made; `owners` are the parts that the rows are of.
+    """
+
+    parts: Sequence[Result]
+    recorded: Sequence[FrameOptions]
     rows: tuple[Row, ...]
     owners: Sequence[int]
     origins: Sequence[str]
     run: Mapping[str, Any] | None
 
 
-def _read(path: str) -> _Part:
-    result = read_result(path)
-    if not result.rows:
-        raise InputError(f"{path}: has no rows: there is nothing to report")
-    return _Part(path, result.rows, result.run, recorded_options(result.run, run_path(path)))
-
-
-def _joined(parts: Sequence[_Part]) -> _Joined:
+def _joined(paths: Sequence[str]) -> _Joined:
+    parts, recorded = list[Result](), list[FrameOptions]()
+    for path in paths:
+        parts.append(read_result(path))
+        if not parts[-1].rows:
+            raise InputError(f"{path}: has no rows: there is nothing to report")
+        recorded.append(recorded_options(parts[-1].run, run_path(path)))
     rows = [row for part in parts for row in part.rows]
     owners = [number for number, part in enumerate(parts) for _ in part.rows]
     order = order_of(parts).tolist() if len(parts) > 1 else range(len(rows))  # a shard alone may be shown
     return _Joined(
         parts,
+        recorded,
         tuple(rows[place] for place in order),
         [owners[place] for place in order],
         origins_of(parts),
@@ -205,7 +191,7 @@ def _subjects(joined: _Joined, chosen: Sequence[Choice], options: ReportOptions)
         places = [each.place for each in chosen if joined.owners[each.place] == number]
         rows = [joined.rows[place] for place in places]
         if rows or len(joined.parts) == 1:
-            images = part.recorded.images
+            images = joined.recorded[number].images
             of_part = subjects(rows, part.path, options.images, images, fetch=options.fetch)
             found |= dict(zip(places, of_part, strict=True))
     return [found[each.place] for each in chosen]

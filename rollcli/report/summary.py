@@ -3,7 +3,6 @@
 import posixpath
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
@@ -14,32 +13,18 @@ from rollcli.files.results import STATUSES, Row
 from rollcli.rig.words import decimals
 
 
-@dataclass(frozen=True)
-class Summary:
-    """Figures of the frames that have an angle; degrees, None where there is nothing to take them of."""
-
-    counts: Mapping[str, int]
-    middle: tuple[float, float] | None  # 5th and 95th percentile
-    extremes: tuple[float, float] | None
-    half_width: float | None  # median
-
-    @property
-    def frames(self) -> int:
-        """All of them."""
-        return sum(self.counts.values())
-
-
-def summarize(rows: Sequence[Row]) -> Summary:
-    """Take the figures of a result."""
+def summarize(rows: Sequence[Row]) -> dict[str, Any]:
+    """Take the figures of a result, degrees, by their names in the template; None of what is not there."""
     found = Counter(row.status for row in rows)
     rolls = [row.roll_deg for row in rows if row.roll_deg is not None]
     widths = [row.roll_ci95_deg for row in rows if row.roll_ci95_deg is not None]
-    return Summary(
-        counts={status: found[status] for status in STATUSES},
-        middle=(float(np.percentile(rolls, 5)), float(np.percentile(rolls, 95))) if rolls else None,
-        extremes=(min(rolls), max(rolls)) if rolls else None,
-        half_width=float(np.median(widths)) if widths else None,
-    )
+    return {
+        "frames": len(rows),
+        "counts": {status: found[status] for status in STATUSES},
+        "middle": np.percentile(rolls, (5, 95)).tolist() if rolls else None,
+        "extremes": (min(rolls), max(rolls)) if rolls else None,
+        "half_width": float(np.median(widths)) if widths else None,
+    }
 
 
 def degrees(angle: float | None, digits: int = 2, *, sign: bool = True) -> str:

@@ -11,15 +11,23 @@ from typing import Any, Literal, NamedTuple
 
 from rollcli.errors import UsageError
 from rollcli.files.atomic import sync_files
-from rollcli.files.codecs.parquet import encode_parquet
-from rollcli.files.results import Format, column_types, format_header, format_row, part_name, run_path
-from rollcli.files.storage import create, owner_of, write_bytes
+from rollcli.files.results import (
+    Format,
+    column_types,
+    encode_parquet,
+    format_header,
+    format_row,
+    part_name,
+    run_path,
+)
+from rollcli.files.storage import create, write_bytes
 from rollcli.files.stores.locations import is_url, public_name
+from rollcli.files.stores.objects import object_owner
 from rollcli.run.frame import Frame, FrameResult, ReadAs
-from rollcli.run.inputs import inputs_line, part_inputs_path
 from rollcli.run.options import FrameOptions
 from rollcli.run.outputs import local_images
-from rollcli.run.summary import Figures
+from rollcli.run.progress import Figures
+from rollcli.run.result_file import inputs_line, part_inputs_path
 from rollcli.run.workers.chunks import Span
 
 
@@ -149,7 +157,7 @@ def check_owned(output: str, run: str) -> None:
     UsageError
         Another one has.
     """
-    if is_url(output) and owner_of(run_path(output)) not in (run, ""):
+    if is_url(output) and object_owner(run_path(output)) not in (run, ""):
         raise UsageError(
             f"{public_name(output)}: another run has begun to write this result, so this one ends; "
             "give each an --output of its own"

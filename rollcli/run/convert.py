@@ -12,8 +12,7 @@ from rollcli.files.containers import file_of
 from rollcli.files.results import Row
 from rollcli.files.stores.locations import tasks_in_hand
 from rollcli.messages import say
-from rollcli.run.calibration import check_depth, check_first_size
-from rollcli.run.find import Named, map_frames, pair_frames
+from rollcli.run.find import Named, check_depth, check_first_size, map_frames, pair_frames
 from rollcli.run.frame import Conversion, Frame, FrameResult, failed_frame
 from rollcli.run.options import (
     ConvertOptions,
@@ -24,12 +23,17 @@ from rollcli.run.options import (
     InputOptions,
     VDisparityOptions,
 )
-from rollcli.run.outputs import output_path, write_outputs
+from rollcli.run.outputs import (
+    check_one_owner,
+    check_places,
+    check_writes,
+    list_files,
+    output_path,
+    write_outputs,
+)
 from rollcli.run.progress import Progress
-from rollcli.run.reads_and_writes import check_one_owner, check_places, check_writes, list_files
 from rollcli.run.result_rows import rows_of
-from rollcli.run.workers.chunks import Work
-from rollcli.run.workers.in_order import Workers
+from rollcli.run.workers.chunks import Work, Workers
 from rollcli.run.workers.interrupt import Stop, stop_on_signals
 from rollcli.run.workers.tasks import require_scheduler, run_tasks
 
@@ -69,8 +73,7 @@ def _plan(options: ConvertOptions) -> list[Conversion]:
     _check_options(options)
     frames = _find_frames(options)
     rows = _find_rows(frames, options)
-    for note in check_first_size(frames, options.frame):
-        say(note)
+    say(*check_first_size(frames, options.frame))
     conversions = []
     for frame, row in zip(frames, rows, strict=True):
         if row is None or row.status != "suspect" or not options.skip_suspect:

@@ -12,16 +12,14 @@ from rollcli.files.atomic import is_file
 from rollcli.files.containers import file_of
 from rollcli.files.stores.locations import is_url, tasks_in_hand
 from rollcli.run.batch import Batch, BatchOptions, Step, join_results, line_form
-from rollcli.run.calibration import calibration_files, calibration_notes
+from rollcli.run.find import calibration_files, calibration_notes
 from rollcli.run.frame import Frame, FrameResult, failed_frame
 from rollcli.run.options import EstimateOptions, FrameOptions
-from rollcli.run.outputs import every_path, image_paths, remove_image_leftovers, write_outputs
+from rollcli.run.outputs import every_path, image_paths, list_files, remove_image_leftovers, write_outputs
 from rollcli.run.plan import Plan, make_plan
 from rollcli.run.progress import Progress
-from rollcli.run.reads_and_writes import list_files
 from rollcli.run.result import Output, frames_to_do, open_output
-from rollcli.run.workers.chunks import Work
-from rollcli.run.workers.in_order import Workers
+from rollcli.run.workers.chunks import Work, Workers
 from rollcli.run.workers.interrupt import Stop, stop_on_signals
 from rollcli.run.workers.tasks import require_scheduler, run_joined, started_early
 
@@ -77,7 +75,11 @@ def run_estimate(options: EstimateOptions, resume_command: str = "") -> ExitStat
         The run cannot start or cannot go on.
     """
     if options.running.dry_run:
-        _list(make_plan(options))
+        plan = make_plan(options)
+        list_files([(calibration_files(options.calibration), ())])
+        frames, images = frames_to_do(plan), options.images
+        list_files((frame.reads(), (path for _, path in image_paths(frame, images))) for frame in frames)
+        list_files([((), plan.files)])
         return ExitStatus.DONE
     with contextlib.ExitStack() as early:
         started: list[Any] = []
@@ -110,13 +112,19 @@ def _run(plan: Plan, resume_command: str, started: list[Any]) -> ExitStatus:
             progress.stopped_early = True
         except (OutputError, WorkerError) as error:
             raise type(error)(f"{error}{output.hint()}") from error
-        status = _end(output, progress, stop, resume_command)
+        if not progress.stopped_early:
+            output.finish(progress.summary)
+        progress.tell_end()
+        if stop.asked and progress.stopped_early:
+            how = f"; continue with: {resume_command}" if output.resumable else ""
+            progress.say(f"interrupted{how}")
+            return ExitStatus.INTERRUPTED
         if not (progress.stopped_early or options.running.quiet):
             calibrated = (frame.calibration for frame in plan.frames if frame.calibration is not None)
             if note := progress.summary.pose_note(next(calibrated, None)):
                 progress.say(note)
             progress.say(progress.summary.rig_roll())
-        return status
+        return progress.summary.status
 
 
 class _Run(NamedTuple):
@@ -217,22 +225,3 @@ def _results(step: Step, run: _Run) -> Iterator[Iterator[Batch]]:
         # a worker that died elsewhere cannot be waited for; a retry has removed what is not needed any more
         if workers.scheduler is not None and not step.retry_of:
             remove_image_leftovers(frames, options.images)
-
-
-def _end(output: Output, progress: Progress, stop: Stop, resume_command: str) -> ExitStatus:
-    if not progress.stopped_early:
-        output.finish(progress.summary)
-    progress.tell_end()
-    if stop.asked and progress.stopped_early:
-        how = f"; continue with: {resume_command}" if output.resumable else ""
-        progress.say(f"interrupted{how}")
-        return ExitStatus.INTERRUPTED
-    return progress.summary.status
-
-
-def _list(plan: Plan) -> None:
-    """Print what would be read and written, a line each."""
-    frames, images = frames_to_do(plan), plan.options.images
-    list_files([(calibration_files(plan.options.calibration), ())])
-    list_files((frame.reads(), (path for _, path in image_paths(frame, images))) for frame in frames)
-    list_files([((), plan.files)])

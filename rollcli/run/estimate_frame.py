@@ -12,10 +12,10 @@ from rollcli.rig.pose import with_pose
 from rollcli.run.diagnosis import looks_like
 from rollcli.run.frame import Frame, FrameResult
 from rollcli.run.images import Pictured, encode_images
-from rollcli.run.inputs import inputs_line
 from rollcli.run.options import FrameOptions
 from rollcli.run.outputs import every_path, write_outputs
 from rollcli.run.read import Source, guarded, read_source
+from rollcli.run.result_file import inputs_line
 
 
 def run_frame(frame: Frame, options: FrameOptions) -> FrameResult:

@@ -18,8 +18,7 @@ from rollcli.files.formats import Stored, encode_stored
 from rollcli.files.results import Row
 from rollcli.pictures.derotate import derotate, rotation_matrix
 from rollcli.pictures.heights import FittedRoad, heights_over, steadied, unit_of
-from rollcli.pictures.heights_preview import draw_heights
-from rollcli.pictures.overlay import draw_preview, draw_road, draw_road_on_photo
+from rollcli.pictures.overlay import draw_heights, draw_preview, draw_road, draw_road_on_photo
 from rollcli.pictures.vdisparity import draw_v_disparity, middle_row, profile, row_offset, v_disparity
 from rollcli.rig.calibration import Calibration
 from rollcli.rig.pose import horizon_row
@@ -211,7 +210,7 @@ def _counted(source: Source, of: Conversion, options: VDisparityOptions, paths: 
     """Draw the v-disparity image of the map, and count for it; or draw the figure of both."""
     counting: dict[str, Any] = {"bins": options.bins, "max_disparity": options.max_disparity}
     if options.figure is not None:
-        from rollcli.pictures.vdisparity_figure import v_disparity_figure  # loads matplotlib, an extra
+        from rollcli.pictures.figures import v_disparity_figure  # loads matplotlib, an extra
 
         road: Row | RollEstimate = of.row or estimate_roll(source.disparity)
         theta = math.radians(road.roll_deg or 0.0) if isinstance(road, Row) else road.theta

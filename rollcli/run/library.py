@@ -23,8 +23,8 @@ from rollcli.files.encodings import to_disparity
 from rollcli.files.formats import Stored
 from rollcli.rig.calibration import Calibration
 from rollcli.rig.pose import with_pose
-from rollcli.run.calibration import given_calibration
 from rollcli.run.diagnosis import PYTHON, looks_like
+from rollcli.run.find import given_calibration
 from rollcli.run.options import FrameOptions, MethodOptions
 from rollcli.run.read import matched_source
 from rollcli.stereo.options import StereoOptions

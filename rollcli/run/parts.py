@@ -12,19 +12,26 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from rollcli.errors import InputError, UsageError
 from rollcli.files.atomic import is_folder, is_there, remove_leftovers, sync_files
-from rollcli.files.codecs.parquet import require_parquet
 from rollcli.files.locking import locked_folder, not_resumable
-from rollcli.files.results import Row, format_header, format_row, parse_rows, part_names, read_parts, run_path
+from rollcli.files.results import (
+    Row,
+    format_header,
+    format_row,
+    parse_rows,
+    part_names,
+    read_parts,
+    require_parquet,
+    run_path,
+)
 from rollcli.files.storage import list_names, read_bytes, remove, write_bytes
 from rollcli.files.stores.locations import base_name, is_url, located, public_name
 from rollcli.run.batch import Batch, Parts, Step, line_form, part_location
 from rollcli.run.frame import Frame, ReadAs
-from rollcli.run.inputs import Inputs, inputs_path, is_part_inputs, part_inputs_path, split_lines
 from rollcli.run.outputs import local_images, remove_image_leftovers, remove_marks
 from rollcli.run.plan import Plan
-from rollcli.run.record import RunRecord
-from rollcli.run.resume import KeptRows, check_restored, new_record
-from rollcli.run.summary import RunSummary
+from rollcli.run.progress import RunSummary
+from rollcli.run.result_file import Inputs, inputs_path, is_part_inputs, part_inputs_path, split_lines
+from rollcli.run.resume import KeptRows, RunRecord, check_restored, new_record
 
 _CHECK_S = 10.0  # a request of 50 ms now and then
 
@@ -41,7 +48,10 @@ class PartsOutput:
         self.kept, self.keep_open, self.replaces = kept, keep_open, record.replaces
         self._record, self._plan = record, record.plan
         self._part_rows = record.plan.options.result.part_rows
-        self._parts = _parts(record)
+        output = located(record.plan.options.running.root, record.plan.output)
+        self._parts = Parts(
+            output, self._plan.format, self._plan.further, self._part_rows, (), 0, record.run, record.of_rows
+        )
         self._numbers: Iterator[int] = iter(())  # of the parts to come
         # rows and the lines of their inputs, by their positions in the result
         self._replaced_part, self._replacing = 0, dict[int, tuple[bytes, bytes]]()
@@ -176,12 +186,6 @@ def open_parts(plan: Plan) -> Iterator[PartsOutput]:
             yield _begin(plan, descriptor)
 
 
-def _parts(record: RunRecord) -> Parts:
-    plan, options = record.plan, record.plan.options
-    output, rows = located(options.running.root, plan.output), options.result.part_rows
-    return Parts(output, plan.format, plan.further, rows, (), 0, record.run, record.of_rows)
-
-
 def _begin(plan: Plan, keep_open: int | None) -> PartsOutput:
     options = plan.options
     # again, now that no other run can write it
@@ -191,7 +195,9 @@ def _begin(plan: Plan, keep_open: int | None) -> PartsOutput:
     _remove_leftovers(plan, parts)
     if options.result.resume or options.running.overwrite:
         remove_image_leftovers(kept.not_failed(), options.images)
-    stay = {path for paths in _kept_paths(plan, kept) for path in paths}
+    firsts = enumerate(range(0, kept.count, options.result.part_rows))
+    whole = [number for number, first in firsts if not any(first in hole for hole in kept.holes)]
+    stay = {path for number in whole for path in _part_paths(plan, number)}
     inputs = [f"{inputs_path(plan.output)}/{name}" for name in list_names(inputs_path(plan.output))]
     # in this order, no part is ever without its inputs
     for path in (*(f"{plan.output}/{name}" for name in parts), *filter(is_part_inputs, inputs)):
@@ -276,13 +282,6 @@ def _numbered(plan: Plan, names: Iterable[str]) -> Iterator[tuple[str, int]]:
         number = int(name.removeprefix("part-").partition(".")[0])
         if name == base_name(_location(plan, number)):
             yield name, number
-
-
-def _kept_paths(plan: Plan, kept: KeptRows) -> Iterator[tuple[str, str]]:
-    """Yield where the parts lie whose rows are kept, and their inputs."""
-    for number, first in enumerate(range(0, kept.count, plan.options.result.part_rows)):
-        if not any(first in hole for hole in kept.holes):
-            yield _part_paths(plan, number)
 
 
 def _rows_of_part(plan: Plan, number: int) -> tuple[Row, ...]:

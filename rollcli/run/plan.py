@@ -8,18 +8,17 @@ from rollcli.errors import UsageError
 from rollcli.files.results import IMAGE_ROLL, TIMING, Format, run_path
 from rollcli.files.stores.locations import is_url
 from rollcli.files.stream import is_stream
-from rollcli.run.calibration import calibration_files, check_depth, check_first_size
-from rollcli.run.find import Named, map_frames, pair_frames
+from rollcli.run.find import Named, calibration_files, check_depth, check_first_size, map_frames, pair_frames
 from rollcli.run.frame import Frame
-from rollcli.run.inputs import inputs_path
 from rollcli.run.options import EstimateOptions, ResultOptions
-from rollcli.run.outputs import every_path
-from rollcli.run.reads_and_writes import (
+from rollcli.run.outputs import (
     check_inputs_are_kept,
     check_nothing_is_there,
     check_one_owner,
     check_places,
+    every_path,
 )
+from rollcli.run.result_file import inputs_path
 
 
 @dataclass(frozen=True)

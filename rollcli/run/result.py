@@ -14,22 +14,30 @@ from rollcli.files.stores.locations import base_name
 from rollcli.files.stream import STDOUT, is_stream, open_stream
 from rollcli.run.batch import Batch, Step
 from rollcli.run.frame import Frame, ReadAs
-from rollcli.run.inputs import Inputs, inputs_path, is_inputs
 from rollcli.run.outputs import local_images, remove_image_leftovers, remove_marks
 from rollcli.run.parts import PartsOutput, kept_in_parts, open_parts
 from rollcli.run.plan import Plan
-from rollcli.run.record import RunRecord, is_replaceable_record
+from rollcli.run.progress import RunSummary
 from rollcli.run.result_file import (
     DurableRows,
+    Inputs,
     ResultFile,
     data_of,
     has_rows,
+    inputs_path,
+    is_inputs,
     kept_rows,
     open_result,
     row_lines,
 )
-from rollcli.run.resume import KeptRows, arranged, check_restored, new_record
-from rollcli.run.summary import RunSummary
+from rollcli.run.resume import (
+    KeptRows,
+    RunRecord,
+    arranged,
+    check_restored,
+    is_replaceable_record,
+    new_record,
+)
 
 
 class StreamOutput:

@@ -14,7 +14,7 @@ from rollcli.files.stores.locations import is_remote, is_url
 from rollcli.messages import say
 from rollcli.run.frame import Frame
 from rollcli.run.options import FrameOptions
-from rollcli.run.record import recorded_options
+from rollcli.run.resume import recorded_options
 
 _COMPARED = 3  # maps in other folders than their rows': the first, the last and one between
 _SAME_DEG = 1e-4  # a result holds angles to a millionth of a degree

@@ -1,9 +1,9 @@
 """`rollcli rig` from the command line: what is read and written, and the exit status."""
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rollcli.errors import InputError, UsageError
 from rollcli.files.naming import listed, natural_key
 from rollcli.files.result_columns import ResultColumns, read_columns
-from rollcli.files.results import STATUSES, parse_rows, pieces_of, read_run, run_path
+from rollcli.files.results import STATUSES, Result, parse_rows, pieces_of, read_run, run_path
 from rollcli.files.stores.locations import base_name, is_remote
 from rollcli.files.stream import is_stream, write_output
 from rollcli.messages import say
@@ -20,15 +20,14 @@ from rollcli.rig.drive.posterior import Estimate
 from rollcli.rig.quantities import ALIGNMENT, QUANTITIES, ROLL, SIZE
 from rollcli.rig.quantities import COLUMNS as QUANTITY_COLUMNS
 from rollcli.rig.words import findings
-from rollcli.run.calibration import Calibrations
+from rollcli.run.find import Calibrations
 from rollcli.run.frame import Frame
 from rollcli.run.options import FrameOptions, RigOptions
+from rollcli.run.outputs import is_dry_run
 from rollcli.run.read import FRAME_ERRORS, read_views, wanted_of
-from rollcli.run.reads_and_writes import check_writes, list_files
-from rollcli.run.record import recorded_options
 from rollcli.run.result_rows import frame_of_row
-from rollcli.run.rig_gates import check_options, run_checks, status_of
-from rollcli.run.rig_health import health_of
+from rollcli.run.resume import recorded_options
+from rollcli.run.rig_gates import check_options, health_of, run_checks, status_of
 from rollcli.run.rig_text import FORMATS, NO_COLUMNS, Findings, correction_text
 from rollcli.stereo.match import match_pair
 from rollcli.stereo.misalignment import ColumnSupport
@@ -78,7 +77,10 @@ def read_source(paths: Sequence[str]) -> Source:
     for part in parts:
         if not part.files:
             raise InputError(f"{part.path}: has no rows: there is nothing to assess")
-    _check_one_method(parts)
+    methods = sorted(set().union(*(part.methods for part in parts)))
+    if len(methods) > 1:
+        names = listed(part.path for part in parts)
+        raise UsageError(f"{names}: rows of the methods {', '.join(methods)}: assess each method by itself")
     order = order_of(parts)
     joined = [file for part in parts for file in part.files]
     status = np.concatenate([part.status for part in parts])[order]
@@ -99,27 +101,7 @@ def _joined(parts: Sequence[ResultColumns], name: str) -> NDArray[np.float64]:
     return np.concatenate([part.numbers.get(name, np.full(len(part.files), np.nan)) for part in parts])
 
 
-def _check_one_method(parts: Sequence[ResultColumns]) -> None:
-    methods = sorted(set().union(*(part.methods for part in parts)))
-    if len(methods) > 1:
-        names = listed(part.path for part in parts)
-        raise UsageError(f"{names}: rows of the methods {', '.join(methods)}: assess each method by itself")
-
-
-class Part(Protocol):
-    """A result, or one of several that are put together: what their order depends on."""
-
-    @property
-    def path(self) -> str:
-        """Where it is."""
-
-    @property
-    def files(self) -> Sequence[str]:
-        """The column `file`."""
-
-    @property
-    def run(self) -> Mapping[str, Any] | None:
-        """The content of FILE.run.json."""
+Part = Result | ResultColumns  # one of several that are put together
 
 
 def are_whole(parts: Sequence[Part]) -> bool:
@@ -273,9 +255,7 @@ def run_rig(options: RigOptions) -> int:
     if len(set(reads)) < len(reads):
         raise UsageError(f"{next(each for each in reads if reads.count(each) > 1)}: is named twice")
     check_options(options.gates)
-    check_writes(reads, writes, overwrite=options.running.overwrite)
-    if options.running.dry_run:
-        list_files([(reads, writes)])
+    if is_dry_run(reads, writes, options.running):
         return 0
     source = read_source(options.results)
     rig, missing, after, changes = _assessed(source, options), source.missing, None, dict[str, Estimate]()
@@ -300,22 +280,16 @@ def run_rig(options: RigOptions) -> int:
         write_output(options.correction, correction, overwrite=overwrite)
     if not options.running.quiet:
         for each in sources:
-            _say(filter(None, [*each.notes, each.missing]))
+            say(*filter(None, [*each.notes, each.missing]))
         if options.format != "table" or not is_stream(options.output):
-            _say(findings(rig))
+            say(*findings(rig))
     said = {False: "FAILED", None: "cannot tell"}
-    _say(f"{said[check.ok]}: {check.message}" for check in checks if not check.ok)
+    say(*(f"{said[check.ok]}: {check.message}" for check in checks if not check.ok))
     return status_of(checks)
 
 
 def _assessed(source: Source, options: RigOptions) -> RigAssessment:
     return assess_frames(source.frames, include_suspect=options.include_suspect, groups=options.groups)
-
-
-def _say(lines: Iterable[str]) -> None:
-    """One line each on stderr."""
-    for line in lines:
-        say(line)
 
 
 _PAIRS = 24  # matched again, a few seconds: 8 of rendered roads tell a scale to 0.02 %, one to 0.1

@@ -12,8 +12,7 @@ from rollcli.rig.drive.posterior import Estimate
 from rollcli.rig.drive.quantity import Segment
 from rollcli.rig.quantities import ALIGNMENT, QUANTITIES, ROLL, Quantity
 from rollcli.rig.words import answer, counts, drift_in_words, findings, frame_name, now_in_words
-from rollcli.run.rig_gates import Check
-from rollcli.run.rig_health import DISTANCES, NOT_SEEN, Health
+from rollcli.run.rig_gates import DISTANCES, NOT_SEEN, Check, Health
 from rollcli.stereo.correction import columns_as_text
 from rollcli.stereo.misalignment import ColumnSupport
 

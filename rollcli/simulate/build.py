@@ -7,22 +7,21 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.simulate.camera import Camera, PixelRays, expose
-from rollcli.simulate.materials import Plain
+from rollcli.simulate.materials import Plain, Values
 from rollcli.simulate.relief import LEVEL, Dip
 from rollcli.simulate.road import (
     Carriageway,
     CrossSection,
     Piece,
+    Site,
     cross_section,
     draw_asphalt,
     draw_carriageway,
 )
-from rollcli.simulate.roadside import Site
 from rollcli.simulate.scene import FAR, Light, Scene, draw, draw_light, draw_offset
 from rollcli.simulate.spec import FrameSpec, Stream
 from rollcli.simulate.surfaces import Course, Ground, Surface
-from rollcli.simulate.views import bands, first_hits, render_view
+from rollcli.simulate.views import Camera, PixelRays, bands, expose, first_hits, render_view
 
 _HORIZON = 2000.0  # metres: the end of a bare world
 # of dips and bumps
@@ -173,9 +172,7 @@ def _dipped(surface: Surface, dips: Sequence[Dip]) -> Surface:
     return replace(surface, relief=replace(surface.relief or LEVEL, dips=mine)) if mine else surface
 
 
-def true_heights(
-    scene: Scene, spec: FrameSpec, carriageway: Carriageway, camera: Camera
-) -> NDArray[np.float32]:
+def true_heights(scene: Scene, spec: FrameSpec, carriageway: Carriageway, camera: Camera) -> Values:
     """Return how high the ground that a camera sees lies over the road, metres, (H, W); NaN for the rest.
 
     The road is the carriageway without dips, bumps and gutters, which goes on beyond its edges as it is at
@@ -194,7 +191,7 @@ def true_heights(
 
 def _row_heights(
     scene: Scene, pixels: PixelRays, ground: NDArray[np.bool_], course: Course, section: CrossSection
-) -> NDArray[np.float32]:
+) -> Values:
     depth, owner = first_hits(scene, pixels)
     seen = ground[owner]
     points = pixels.rays.origin + np.where(seen, depth, 0) * pixels.rays.direction
@@ -232,10 +229,10 @@ class RenderedFrame:
 
     left: NDArray[np.uint8]
     right: NDArray[np.uint8]
-    disparity: NDArray[np.float32]
+    disparity: Values
     road: NDArray[np.bool_]
     spec: FrameSpec
-    heights: NDArray[np.float32] | None = None
+    heights: Values | None = None
 
 
 def render_frame(spec: FrameSpec) -> RenderedFrame:

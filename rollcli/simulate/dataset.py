@@ -27,15 +27,14 @@ from rollcli.files.results import csv_table, read_run, run_path
 from rollcli.messages import say
 from rollcli.run.options import RunningOptions
 from rollcli.run.progress import TaskProgress
-from rollcli.run.workers.chunks import Work
-from rollcli.run.workers.in_order import Workers
+from rollcli.run.workers.chunks import Work, Workers
 from rollcli.run.workers.interrupt import Stop, stop_on_signals
 from rollcli.run.workers.tasks import run_tasks
 from rollcli.simulate.build import carriageway_of, render_frame, road_camber
-from rollcli.simulate.camera import rig_axes
 from rollcli.simulate.options import KERBED, MIXED, SimulateOptions
 from rollcli.simulate.relief import lane_points, lane_rolls
 from rollcli.simulate.spec import LEVEL, FrameSpec, draw_specs
+from rollcli.simulate.views import rig_axes
 
 _PARTS = ("left", "right", "disparity")
 _TRUTH = "truth.csv"
@@ -197,8 +196,11 @@ def write_dataset(dataset: Dataset, jobs: int | None = 1, stop: Stop | None = No
     OutputError
         A file cannot be written, or a worker died.
     """
-    if dataset.kept is None:
-        _clear(dataset)
+    if dataset.kept is None:  # pairs without a row, another rig's calibration
+        single = [dataset.folder / name for name in (_TRUTH, f"{_CALIBRATION}.txt")]
+        with writing(dataset.folder):
+            for path in (*single, *_earlier_frames(dataset.folder)):
+                path.unlink(missing_ok=True)
     if dataset.record is not None:
         text = json.dumps(dataset.record, indent=2).encode() + b"\n"
         write_atomic(run_path(dataset.folder / _TRUTH), text)
@@ -246,14 +248,6 @@ def _png(image: NDArray[np.uint8]) -> bytes:
     return data.tobytes()
 
 
-def _clear(dataset: Dataset) -> None:
-    """Remove what an earlier simulation left: pairs without a row, and the calibration of another rig."""
-    single = [dataset.folder / name for name in (_TRUTH, f"{_CALIBRATION}.txt")]
-    with writing(dataset.folder):
-        for path in (*single, *_earlier_frames(dataset.folder)):
-            path.unlink(missing_ok=True)
-
-
 def _earlier_frames(folder: Path) -> list[Path]:
     """List the files of frame_0001 and so on, where left, right and disparity all have it."""
     folders = [folder / part for part in _PARTS]
@@ -285,7 +279,10 @@ def plan_dataset(folder: str | Path, options: SimulateOptions, *, overwrite: boo
     """
     if options.resume and overwrite:
         raise UsageError("give either --resume or --overwrite")
-    _refuse_idle(options)
+    if options.crossfall is not None and options.cross_section == "flat":
+        raise UsageError("--crossfall: a flat road has none; choose another --cross-section")
+    if options.kerb is not None and options.scene not in (*KERBED, MIXED):
+        raise UsageError(f"--kerb: the scene {options.scene} has no kerbs; {' and '.join(KERBED)} have")
     specs = draw_specs(options)
     dataset = Dataset(Path(folder), tuple(specs), _record(options))
     if _is_free(Path(folder)) or overwrite:
@@ -298,14 +295,6 @@ def plan_dataset(folder: str | Path, options: SimulateOptions, *, overwrite: boo
     _check_resumable(dataset)
     whole = (task.stem for task in dataset.tasks if all(map(is_there, task.files.values())))
     return replace(dataset, kept=frozenset(whole))
-
-
-def _refuse_idle(options: SimulateOptions) -> None:
-    """Refuse options that change nothing in the frames that are asked for."""
-    if options.crossfall is not None and options.cross_section == "flat":
-        raise UsageError("--crossfall: a flat road has none; choose another --cross-section")
-    if options.kerb is not None and options.scene not in (*KERBED, MIXED):
-        raise UsageError(f"--kerb: the scene {options.scene} has no kerbs; {' and '.join(KERBED)} have")
 
 
 def _is_free(folder: Path) -> bool:
@@ -383,13 +372,7 @@ def run_simulate(
     if progress.done < progress.total:
         say(f"interrupted after {progress.done} of {progress.total} frames; continue with: {resume_command}")
         return ExitStatus.INTERRUPTED
-    progress.note(_summary(dataset, progress))
-    return ExitStatus.DONE
-
-
-def _summary(dataset: Dataset, progress: TaskProgress) -> str:
-    """Make the last line: how many frames, and what one cost."""
-    kept = f" ({progress.kept} kept)" if progress.kept else ""
-    rendered = progress.done - progress.kept
+    kept, rendered = f" ({progress.kept} kept)" if progress.kept else "", progress.done - progress.kept
     cost = f", {progress.seconds / rendered:.2f} s a frame" if rendered else ""
-    return f"{progress.done} frames{kept} in {dataset.folder}; {progress.seconds:.1f} s{cost}"
+    progress.note(f"{progress.done} frames{kept} in {dataset.folder}; {progress.seconds:.1f} s{cost}")
+    return ExitStatus.DONE

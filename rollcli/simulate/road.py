@@ -1,17 +1,31 @@
-"""The carriageway: its course, its cross-section and its surface."""
+"""The carriageway, with its course, cross-section and surface, and the objects beside it and on it."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
-from rollcli.simulate.materials import Asphalt, Mark, Patch
+from rollcli.simulate.materials import (
+    GREY,
+    WARM,
+    Asphalt,
+    CarPaint,
+    Facade,
+    Glass,
+    Leaves,
+    Mark,
+    Material,
+    Patch,
+    Paving,
+    Plain,
+    Tint,
+)
 from rollcli.simulate.options import GUTTER_WIDTH
 from rollcli.simulate.relief import Relief, draw_relief, lane_plane
-from rollcli.simulate.scene import FAR, draw, draw_offset
+from rollcli.simulate.scene import FAR, ConvexPart, Post, Scene, Solid, TreeCrown, draw, draw_offset
 from rollcli.simulate.spec import FrameSpec, Stream
-from rollcli.simulate.surfaces import Course
+from rollcli.simulate.surfaces import Backdrop, Course, Ground, Wall
 from rollcli.simulate.vectors import Array
 
 
@@ -198,3 +212,298 @@ def draw_asphalt(rng: np.random.Generator, carriageway: Carriageway) -> Asphalt:
         seams=tuple(draw(rng, carriageway.left, carriageway.right) for _ in range(rng.integers(1, 4))),
         offset=draw_offset(rng),
     )
+
+
+Outline = tuple[tuple[float, float], ...]
+
+
+class _Shape(NamedTuple):
+    """A convex outline seen from the right, (ahead, up) in metres, clockwise, extruded to both sides.
+
+    `taper` is the inward slope of the sides, `centre` the offset to the right of the middle, metres.
+    """
+
+    outline: Outline
+    material: int
+    half_width: float
+    taper: float = 0.0
+    centre: float = 0.0
+
+
+def _rectangle(back: float, front: float, low: float, high: float) -> Outline:
+    return ((back, low), (back, high), (front, high), (front, low))
+
+
+def _wheel(ahead: float, radius: float) -> Outline:
+    angles = np.arange(10) * -np.pi / 5
+    return tuple((ahead + radius * float(np.cos(a)), radius + radius * float(np.sin(a))) for a in angles)
+
+
+_FAR = 40.0  # metres: vehicles farther away are drawn without their small parts
+_SILHOUETTE = 5
+
+_PAINTS: tuple[tuple[float, Tint], ...] = (
+    (0.70, GREY),
+    (0.35, GREY),
+    (0.06, GREY),
+    (0.25, (0.35, 0.35, 1.3)),
+    (0.22, (1.3, 0.7, 0.4)),
+    (0.20, (0.6, 1.0, 0.6)),
+)
+_GLASS, _BLACK, _RED, _WHITE, _CARGO = range(len(_PAINTS), len(_PAINTS) + 5)
+
+
+def car_materials(offset: float) -> list[Material]:
+    """Return the materials of `vehicle` in order: paints, glass, tyres, red and white lights, cargo box."""
+    paints: list[Material] = [CarPaint(level, tint=tint, offset=offset) for level, tint in _PAINTS]
+    return [
+        *paints,
+        Glass(tint=(1.05, 1.0, 0.95), offset=offset),
+        Plain(0.03, 0.3, 0.1),
+        Plain(0.45, 0.05, 0.05, tint=(0.15, 0.15, 1.0)),
+        Plain(0.7, 0.1, 0.1),
+        Plain(0.55, 0.04, 0.08, joint=1.1, tint=(0.97, 0.99, 1.0), offset=offset),
+    ]
+
+
+def vehicle(
+    rng: np.random.Generator,
+    course: Course,
+    ground: Piece,
+    lateral: float,
+    z: float,
+    first_material: int,
+    oncoming: bool,
+) -> Solid:
+    """Draw a car, or with a probability of 1/6 a truck, at (lateral, z) on the ground.
+
+    An oncoming one faces the camera. `first_material` is the index of the first of `car_materials`.
+    """
+    paint, tall = int(rng.integers(len(_PAINTS))), float(rng.uniform(0.95, 1.25))
+    shapes = _truck(paint) if rng.random() < 1 / 6 else _car(paint)
+    if z > _FAR:
+        shapes = shapes[:_SILHOUETTE]
+    parts = tuple(_extrude(shape, tall, first_material + shape.material) for shape in shapes)
+    corners = np.array([point for shape in shapes for point in shape.outline])
+    half_width = max(shape.half_width + abs(shape.centre) for shape in shapes)
+    extent = np.array(
+        [
+            [-half_width, half_width],
+            [0.0, tall * corners[:, 1].max()],
+            [corners[:, 0].min(), corners[:, 0].max()],
+        ]
+    )
+    about = np.array([[-1.0], [1.0], [-1.0]]) if oncoming else 1.0
+    frame = about * course.frame(z, ground.slope_at(lateral))
+    return Solid(frame, course.point(lateral, z, ground.elevation(lateral)), parts, extent)
+
+
+def _car(paint: int) -> tuple[_Shape, ...]:
+    hood, tail = (0.95, 0.95), (-2.12, 0.95)
+    body = ((-2.10, 0.28), (-2.20, 0.55), tail, hood, (2.02, 0.80), (2.15, 0.50), (2.08, 0.26))
+    cabin = ((-1.95, 0.93), (-1.45, 1.42), (0.25, 1.42), (1.10, 0.93))
+    roof = ((-1.50, 1.39), (-1.42, 1.46), (0.22, 1.46), (0.30, 1.39))
+    rear, front = _rectangle(-2.23, -2.0, 0.68, 0.85), _rectangle(1.95, 2.16, 0.58, 0.72)
+    return (
+        _Shape(body, paint, 0.90, taper=0.10),
+        _Shape(cabin, _GLASS, 0.86, taper=0.35),
+        _Shape(roof, paint, 0.72, taper=0.35),
+        _Shape(_wheel(1.35, 0.32), _BLACK, 0.89),
+        _Shape(_wheel(-1.35, 0.32), _BLACK, 0.89),
+        _Shape(rear, _RED, 0.13, centre=0.62),
+        _Shape(rear, _RED, 0.13, centre=-0.62),
+        _Shape(front, _WHITE, 0.15, centre=0.62),
+        _Shape(front, _WHITE, 0.15, centre=-0.62),
+        _Shape(_rectangle(1.95, 2.17, 0.45, 0.62), _BLACK, 0.40),
+        _Shape(_rectangle(-2.22, -2.0, 0.50, 0.61), _WHITE, 0.26),
+    )
+
+
+def _truck(paint: int) -> tuple[_Shape, ...]:
+    cab = ((2.0, 0.5), (2.0, 2.45), (3.2, 2.45), (3.7, 1.5), (3.7, 0.5))
+    rear = _rectangle(-3.93, -3.7, 0.70, 0.88)
+    return (
+        _Shape(_rectangle(-3.9, 1.8, 0.95, 3.0), _CARGO, 1.22),
+        _Shape(cab, paint, 1.15),
+        _Shape(_rectangle(-3.85, 3.5, 0.55, 0.95), _BLACK, 0.9),
+        _Shape(_wheel(2.7, 0.42), _BLACK, 1.12),
+        _Shape(_wheel(-2.4, 0.42), _BLACK, 1.18),
+        _Shape(((2.5, 1.55), (2.5, 2.3), (3.31, 2.3), (3.72, 1.55)), _GLASS, 1.17),
+        _Shape(rear, _RED, 0.15, centre=0.95),
+        _Shape(rear, _RED, 0.15, centre=-0.95),
+        _Shape(_rectangle(-3.92, -3.7, 0.70, 0.82), _WHITE, 0.26),
+        _Shape(_rectangle(3.5, 3.73, 0.70, 0.85), _WHITE, 1.05),
+    )
+
+
+def _extrude(shape: _Shape, tall: float, material: int) -> ConvexPart:
+    """Return the solid of a shape whose heights are multiplied by `tall`."""
+    outline: Array = np.array(shape.outline) * [1.0, tall]
+    edges = np.roll(outline, -1, axis=0) - outline
+    out = np.stack([np.zeros(len(edges)), edges[:, 0], -edges[:, 1]], axis=1)
+    normals = np.concatenate([out, [[1.0, shape.taper, 0.0], [-1.0, shape.taper, 0.0]]])
+    reach = shape.half_width + shape.taper * outline[:, 1].min()
+    heights = out[:, 2] * outline[:, 0] + out[:, 1] * outline[:, 1]
+    offsets = np.concatenate([heights, [reach + shape.centre, reach - shape.centre]])
+    length = np.linalg.norm(normals, axis=1)
+    return ConvexPart(normals / length[:, None], offsets / length, material)
+
+
+def box(half_width: float, height: float, half_length: float, material: int) -> ConvexPart:
+    """Return a box that stands on the origin of its frame."""
+    normals = np.concatenate([np.eye(3), -np.eye(3)])
+    return ConvexPart(
+        normals, np.array([half_width, height, half_length, half_width, 0.0, half_length]), material
+    )
+
+
+_GRASS: Tint = (0.45, 1.0, 0.72)
+_FOREST: Tint = (0.55, 1.0, 0.75)
+
+
+@dataclass(frozen=True)
+class Site:
+    """A scene that is built along a carriageway: each method adds objects, drawn from `rng`."""
+
+    scene: Scene
+    rng: np.random.Generator
+    road: Carriageway
+
+    def draw(self, low: float, high: float) -> float:
+        """Draw a number evenly from `low` to `high`."""
+        return draw(self.rng, low, high)
+
+    def add_grass(self) -> int:
+        """Add the material of lawns and verges; return its index."""
+        look = Leaves(self.draw(0.14, 0.24), self.draw(0.15, 0.3), tint=_GRASS, offset=draw_offset(self.rng))
+        return self.scene.material(look)
+
+    def add_slope(
+        self, side: int, start: float, end: float, level: float, slope: float, material: int
+    ) -> None:
+        """Add ground from `start` outward to `end`: from elevation `level` on with an outward `slope`."""
+        signed = side * slope
+        edges = (start, end) if side > 0 else (end, start)
+        ground = Ground(self.road.course, edges, (material,), FAR, signed, level - signed * start)
+        self.scene.surfaces.append(replace(ground, relief=self.road.relief))
+
+    def add_sidewalk(self, side: int, edge: float, beyond: int | None = None) -> tuple[float, float]:
+        """Add a kerb, a sidewalk and, of the material `beyond`, level ground behind it.
+
+        Returns the sidewalk's elevation and the lateral position of its outer edge.
+        """
+        height, width = self.draw(*self.road.kerb), self.draw(1.5, 3.5)
+        base = self.road.section.elevation(edge)
+        level = base + height
+        stone = self.scene.material(Plain(self.draw(0.35, 0.5), joint=1.0, offset=draw_offset(self.rng)))
+        look = Paving(self.draw(0.28, 0.42), self.draw(0.3, 0.6), tint=WARM, offset=draw_offset(self.rng))
+        ends = [edge, edge + side * 0.15, edge + side * width]
+        materials = [stone, self.scene.material(look)]
+        if beyond is not None:
+            ends.append(side * np.inf)
+            materials.append(beyond)
+        foot = base + (self.road.relief.lowest if self.road.relief else 0.0)
+        kerb = Wall(self.road.course, edge, foot, np.array([-50.0, FAR]), np.array([level]), stone)
+        strips = Ground(self.road.course, tuple(ends[::side]), tuple(materials[::side]), FAR, offset=level)
+        strips = replace(strips, relief=self.road.relief)
+        self.scene.surfaces += [kerb, strips]
+        return level, edge + side * width
+
+    def add_houses(self, side: int, front: float, base: float) -> None:
+        """Add a row of house fronts with gaps, and the bodies of the houses behind them."""
+        n, course = 24, self.road.course
+        widths, storeys = self.rng.uniform(7, 16, n), self.rng.uniform(2.8, 3.4, n)
+        edges = -20 + np.concatenate([[0.0], np.cumsum(widths)])
+        heights = storeys * self.rng.integers(2, 5, n) + self.rng.uniform(0.3, 0.8, n)
+        heights[self.rng.random(n) < 0.1] = 0.0
+        levels, bays = self.rng.uniform(0.25, 0.65, n), self.rng.uniform(2.2, 3.6, n)
+        tints = np.stack([self.rng.uniform(0.6, 1.0, n), self.rng.uniform(0.85, 1.0, n), np.ones(n)], axis=1)
+        looks = (x.astype(np.float32) for x in (edges, levels, tints, storeys, bays))
+        look = Facade(draw_offset(self.rng), *looks)
+        self.scene.surfaces.append(
+            Wall(course, front, base, edges, base + heights, self.scene.material(look))
+        )
+        before = np.concatenate([[0.0], heights[:-1]])
+        # the only part of a body that is visible from the street is the gable above the house before it
+        for i in np.flatnonzero((heights > before + 0.3) & (edges[:-1] > 3) & (edges[:-1] < 120)):
+            tint = tuple(float(x) for x in tints[i])
+            plaster = self.scene.material(Plain(float(0.9 * levels[i]), tint=(tint[0], tint[1], tint[2])))
+            height, half, depth = float(heights[i]), float(widths[i] / 2), 5.0
+            extent = np.array([[-depth, depth], [0.0, height], [-half, half]])
+            middle = float(edges[i] + half)
+            # set back: the body is straight, and must stay behind a front that follows the bend
+            place = course.point(front + side * (depth + 0.25), middle, base)
+            body = box(depth, height, half, plaster)
+            self.scene.surfaces.append(Solid(course.frame(middle), place, (body,), extent))
+
+    def add_hedge(self, lateral: float, base: float) -> None:
+        """Add a clipped hedge along the road."""
+        tint = (0.42, 1.0, 0.62)
+        material = self.scene.material(
+            Leaves(self.draw(0.08, 0.16), 0.4, tint=tint, offset=draw_offset(self.rng))
+        )
+        edges = np.arange(-20.0, 120.0, 1.0, dtype=np.float64)
+        tops = base + self.draw(0.9, 1.8) + self.rng.uniform(-0.08, 0.08, len(edges) - 1)
+        self.scene.surfaces.append(Wall(self.road.course, lateral, base, edges, tops, material))
+
+    def add_posts(self, lateral: float, level: float, radius: float = 0.07, height: float = 6.0) -> None:
+        """Add lamp posts or delineators, evenly spaced."""
+        metal = self.scene.material(Plain(self.draw(0.2, 0.6), 0.05, 0.05))
+        gap = self.draw(18, 35)
+        for z in np.arange(self.draw(6, gap), 90, gap):
+            self.scene.surfaces.append(
+                Post(self.road.course.point(lateral, float(z), level), radius, height, metal)
+            )
+
+    def add_trees(self, near: float, outer: float, level: float) -> None:
+        """Add trees between two lateral positions, each a trunk and two crowns that overlap."""
+        bark = self.scene.material(Plain(0.12, 0.3, 0.2, tint=(0.75, 0.9, 1.0)))
+        tint = (0.42, 1.0, self.draw(0.55, 0.8))
+        leaves = self.scene.material(
+            Leaves(self.draw(0.10, 0.2), 0.4, tint=tint, offset=draw_offset(self.rng))
+        )
+        z = self.draw(10, 25)
+        while z < 90:
+            lateral = near + (outer - near) * float(self.rng.random())
+            stem, radius = self.draw(2.2, 3.2), self.draw(1.2, 2.2)
+            half = radius * self.draw(0.9, 1.4)
+            foot, top = (self.road.course.point(lateral, z, level + rise) for rise in (0.0, stem + half))
+            lower = top + np.array([self.draw(-0.8, 0.8), -0.3 * half, self.draw(-0.8, 0.8)])
+            self.scene.surfaces += [
+                Post(foot, self.draw(0.1, 0.2), stem + half, bark),
+                TreeCrown(top, radius, half, leaves),
+                TreeCrown(lower, 1.1 * radius, 0.6 * half, leaves),
+            ]
+            z += self.draw(7, 25)
+
+    def add_cars(self) -> None:
+        """Add vehicles: one ahead, one oncoming and parked ones, each with a probability."""
+        places: list[tuple[float, float]] = []
+        if self.rng.random() < 0.5:
+            places.append((self.road.shift + self.rng.normal(0, 0.2), self.rng.uniform(9, 40)))
+        if self.rng.random() < 0.5 and not self.road.single:
+            places.append(
+                (self.road.shift - self.road.lane + self.rng.normal(0, 0.2), self.rng.uniform(9, 60))
+            )
+        if self.road.parking:
+            for edge in (self.road.left + 1.15, self.road.right - 1.15):
+                z = self.rng.uniform(6, 12)
+                while z < 70:
+                    if self.rng.random() < 0.6:
+                        places.append((edge + self.rng.normal(0, 0.05), z))
+                    z += self.rng.uniform(8.2, 10)
+        first, middle = len(self.scene.materials), self.road.shift - self.road.lane / 2
+        self.scene.materials += car_materials(draw_offset(self.rng))
+        course, section = self.road.course, self.road.section
+        self.scene.cars += [
+            vehicle(self.rng, course, section.piece(x), float(x), float(z), first, x < middle)
+            for x, z in places
+        ]
+        self.scene.surfaces += self.scene.cars
+
+    def add_backdrop(self) -> None:
+        """Add a line of trees where the ground ends."""
+        look = Leaves(self.draw(0.10, 0.2), scale=0.15, tint=_FOREST, offset=draw_offset(self.rng))
+        steps = self.rng.normal(0, 1.2, 400)
+        skyline = 9 + np.convolve(steps, np.ones(9) / 3, mode="same") + self.rng.uniform(-1, 1, 400)
+        self.scene.surfaces.append(Backdrop(self.road.course, FAR, -30.0, skyline, self.scene.material(look)))

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from rollcli.errors import UsageError
-from rollcli.simulate.camera import Camera, rig_axes
 from rollcli.simulate.options import (
     CROSS_SECTIONS,
     CROSSFALL,
@@ -21,6 +20,7 @@ from rollcli.simulate.options import (
     Span,
 )
 from rollcli.simulate.vectors import Array
+from rollcli.simulate.views import Camera, rig_axes
 
 MAX_PITCH = math.radians(60)
 MAX_CURVATURE = 0.01
@@ -195,7 +195,10 @@ def draw_specs(options: SimulateOptions) -> list[FrameSpec]:
         "height": options.height,
         "principal offset": options.principal_offset,
     }
-    _check_ends(rig, spans)
+    for end in (0, 1):  # what is not possible is refused, whatever would be drawn
+        values: dict[str, Any] = {name: span[end] for name, span in spans.items()}
+        offset = values.pop("principal offset")
+        _offset(replace(rig, **{**values, "height": spans["height"][0]}), offset, offset)
     return [_drawn(replace(rig, index=index), options, spans) for index in range(options.frames)]
 
 
@@ -205,14 +208,6 @@ def _both(change: Callable[[float], float], span: Span) -> Span:
 
 def _share(percent: float) -> float:
     return percent / 100
-
-
-def _check_ends(rig: FrameSpec, spans: dict[str, Span]) -> None:
-    """Refuse ranges with an end that is not possible, whatever would be drawn."""
-    for end in (0, 1):
-        values: dict[str, Any] = {name: span[end] for name, span in spans.items()}
-        offset = values.pop("principal offset")
-        _offset(replace(rig, **{**values, "height": spans["height"][0]}), offset, offset)
 
 
 def _drawn(spec: FrameSpec, options: SimulateOptions, spans: dict[str, Span]) -> FrameSpec:

@@ -168,9 +168,8 @@ def costs(frames: int) -> dict[str, float]:
 
 def chunk_costs(scheduler: str, processes: list["subprocess.Popen[bytes]"]) -> dict[str, float]:
     """CPU that a chunk costs, ms, and a second in which nothing happens."""
-    from rollcli.run.workers.chunks import Work
+    from rollcli.run.workers.chunks import Work, Workers
     from rollcli.run.workers.cluster import ClusterExecutor
-    from rollcli.run.workers.in_order import Workers
     from tests.benchmarks import bench_scale  # workers find the tasks there, not in __main__
 
     def used() -> tuple[float, float, float]:
@@ -230,8 +229,7 @@ def busy(workers: int, frame_s: float, seconds: float) -> tuple[float, list[floa
 
     Busy is the share of the time from the first chunk to the last result that they sleep for frames.
     """
-    from rollcli.run.workers.chunks import Work
-    from rollcli.run.workers.in_order import Workers
+    from rollcli.run.workers.chunks import Work, Workers
     from rollcli.run.workers.interrupt import Stop
     from rollcli.run.workers.tasks import run_tasks
     from tests.benchmarks import bench_scale  # workers find the tasks there, not in __main__

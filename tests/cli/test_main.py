@@ -1,5 +1,6 @@
 """The group: what it says of itself, and how errors end."""
 
+import importlib.metadata as metadata
 import itertools
 import re
 from importlib.metadata import PackageNotFoundError
@@ -7,7 +8,6 @@ from importlib.metadata import PackageNotFoundError
 import pytest
 
 import rollcli as package
-from rollcli.cli import versions
 from tests.run_cli import ROOT, environment, python, rollcli, rollcli_process, write_maps
 
 
@@ -33,7 +33,7 @@ def test_a_package_that_is_missing_is_named_as_such(tmp_path, monkeypatch):
             raise PackageNotFoundError
         return "1.0"
 
-    monkeypatch.setattr(versions, "version", version)
+    monkeypatch.setattr(metadata, "version", version)
     lines = rollcli("--versions", cwd=tmp_path).out.splitlines()
     assert "tqdm not installed" in lines
     assert "opencv-python 1.0" in lines
@@ -44,7 +44,7 @@ def test_versions_ends_with_pythons_where_rollcli_was_not_installed(tmp_path, mo
     def requires(name):
         raise PackageNotFoundError(name)
 
-    monkeypatch.setattr(versions, "requires", requires)
+    monkeypatch.setattr(metadata, "requires", requires)
     names = [line.split()[0] for line in rollcli("--versions", cwd=tmp_path).out.splitlines()]
     assert names == ["rollcli", "Python"]
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from rollcli import __version__
-from rollcli.evaluate.accuracy import assess
+from rollcli.evaluate.accuracy import as_csv, as_json, as_table, assess
 from rollcli.evaluate.experiments import (
     DELTAS,
     FORMS,
@@ -27,9 +27,7 @@ from rollcli.evaluate.experiments import (
     rotate_nearest,
 )
 from rollcli.evaluate.options import ExperimentOptions, PaperOptions
-from rollcli.evaluate.paper_page import charts, paper_page
-from rollcli.evaluate.run_accuracy import as_csv, as_json, as_table
-from rollcli.evaluate.tables import all_tables
+from rollcli.evaluate.paper_page import all_tables, charts, paper_page
 from rollcli.evaluate.truth import KnownPose, read_truth
 from rollcli.files.results import Row
 from rollcli.run.options import EncodingOptions, InputOptions, RegionOptions, RunningOptions

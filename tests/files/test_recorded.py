@@ -142,7 +142,7 @@ def _columns(data):
 
 def _matched(lefts, rights):
     found = naming.match_names(lefts, rights), naming.match_names(lefts, rights, marked=True)
-    return [[each.pairs, each.ambiguous] for each in found]
+    return [list(each) for each in found]
 
 
 READ = {

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from rollcli.errors import InputError
-from rollcli.files.codecs.parquet import encode_parquet
 from rollcli.files.result_columns import read_columns
 from rollcli.files.results import (
     STATUSES,
     Row,
     column_types,
+    encode_parquet,
     format_header,
     format_row,
     plain_values,

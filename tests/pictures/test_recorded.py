@@ -17,9 +17,14 @@ from rollcli.files.results import Row
 from rollcli.pictures.colours import style_sheet
 from rollcli.pictures.derotate import derotate, rotation_matrix
 from rollcli.pictures.heights import FittedRoad, heights_over, steadied, unit_of
-from rollcli.pictures.heights_preview import draw_heights
-from rollcli.pictures.overlay import draw_disparity, draw_preview, draw_road, draw_road_on_photo
-from rollcli.pictures.round_step import round_step
+from rollcli.pictures.overlay import (
+    draw_disparity,
+    draw_heights,
+    draw_preview,
+    draw_road,
+    draw_road_on_photo,
+    round_step,
+)
 from rollcli.pictures.vdisparity import (
     VDisparity,
     draw_v_disparity,
@@ -150,7 +155,7 @@ def _disc(shape=(60, 80), hole=True):
 
 def _figure(disparity, theta, alpha, **options):
     """What stands in the figure of a frame, as matplotlib has it before it lays the figure out."""
-    module = pytest.importorskip("rollcli.pictures.vdisparity_figure", reason="matplotlib is not here")
+    module = pytest.importorskip("rollcli.pictures.figures", reason="matplotlib is not here")
     with mock.patch.object(module, "figure_file", lambda figure, kind, title: (figure, kind, title)):
         figure, kind, title = module.v_disparity_figure(disparity, theta, alpha, "svg", **options)
     return {"kind": kind, "title": title, "inches": figure.get_size_inches(), "axes": _axes_of(figure)}

@@ -9,11 +9,9 @@ from dataclasses import replace
 import pytest
 
 from rollcli.files.results import Row
-from rollcli.run import summary
 from rollcli.run.frame import Frame, failed_frame
 from rollcli.run.options import EncodingOptions, RunningOptions
-from rollcli.run.progress import Progress, TaskProgress
-from rollcli.run.summary import Figures, RunSummary
+from rollcli.run.progress import Figures, Progress, RunSummary, TaskProgress
 
 GUESSED = EncodingOptions()
 
@@ -149,7 +147,7 @@ def test_the_speed_leaves_out_what_an_interrupted_run_has_left(clock):
 
 
 def test_of_more_frames_than_memory_is_meant_for_the_answer_names_who_has_it(monkeypatch):
-    monkeypatch.setattr(summary, "_MOST_FRAMES", 3)
+    monkeypatch.setattr("rollcli.run.progress._MOST_FRAMES", 3)
     found = RunSummary()
     for number in range(5):
         found.add_row(Row(f"{number}.png", status="ok", roll_deg=1.0, roll_ci95_deg=0.1))

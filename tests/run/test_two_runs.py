@@ -9,9 +9,9 @@ from rollcli.run.batch import BatchOptions, join_results
 from rollcli.run.frame import FrameResult
 from rollcli.run.options import FrameOptions, InputOptions, ResultOptions
 from rollcli.run.plan import make_plan
-from rollcli.run.record import RunRecord
+from rollcli.run.progress import RunSummary
 from rollcli.run.result import open_output
-from rollcli.run.summary import RunSummary
+from rollcli.run.resume import RunRecord
 from rollcli.run.workers.chunks import Span
 from tests.run.estimate_options import estimate_options
 from tests.run_cli import contents, rollcli, write_maps

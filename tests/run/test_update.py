@@ -5,7 +5,7 @@ import os
 import pytest
 
 from rollcli.files.storage import list_names, read_bytes, remove, write_bytes
-from rollcli.run import inputs
+from rollcli.run import result_file
 from tests.object_store import upload
 from tests.run_cli import contents, road_map, rollcli, write_kitti, write_maps
 from tests.slow import mostly_slow
@@ -155,7 +155,7 @@ def test_objects_are_compared_by_their_tags(tmp_path, bucket, monkeypatch):
     put(tmp_path, "frame2")
     write_bytes(f"{folder}/frame2.png", (tmp_path / "maps" / "frame2.png").read_bytes())
     read = []
-    really = inputs._read
-    monkeypatch.setattr(inputs, "_read", lambda paths: really(_noted(paths, read)))
+    really = result_file._read
+    monkeypatch.setattr(result_file, "_read", lambda paths: really(_noted(paths, read)))
     assert "(3 kept)" in estimate(tmp_path, "--update", **line).err
     assert read == [f"{folder}/frame2.png"]

@@ -12,8 +12,8 @@ from rollcli.files.results import Row, format_header, format_row
 from rollcli.files.storage import list_names, remove
 from rollcli.run.batch import BatchOptions, Parts, join_results
 from rollcli.run.frame import Frame, FrameResult, ReadAs
-from rollcli.run.inputs import inputs_line
 from rollcli.run.options import FrameOptions
+from rollcli.run.result_file import inputs_line
 from rollcli.run.workers.chunks import Chunks, Done, Span
 from tests.object_store import joined
 from tests.run_cli import contents, rollcli, started, wait_until, write_maps

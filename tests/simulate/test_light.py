@@ -5,8 +5,7 @@ import pytest
 
 from rollcli.simulate.build import build_scene
 from rollcli.simulate.materials import band, bars
-from rollcli.simulate.scene import Light, Scene, in_shadow
-from rollcli.simulate.solids import Post
+from rollcli.simulate.scene import Light, Post, Scene, in_shadow
 from rollcli.simulate.spec import FrameSpec
 from rollcli.simulate.surfaces import NEAR
 from rollcli.simulate.views import AIR, LONG, LONG_P, LONG_Q, SHORT, SUN, P, Q, shade

@@ -6,13 +6,11 @@ import numpy as np
 import pytest
 
 from rollcli.simulate.build import build_scene
-from rollcli.simulate.camera import PixelRays
-from rollcli.simulate.road import Piece
-from rollcli.simulate.roadside import vehicle
-from rollcli.simulate.solids import Post
+from rollcli.simulate.road import Piece, vehicle
+from rollcli.simulate.scene import Post
 from rollcli.simulate.spec import FrameSpec
 from rollcli.simulate.surfaces import Backdrop, Course, Ground, Wall
-from rollcli.simulate.views import first_hits
+from rollcli.simulate.views import PixelRays, first_hits
 
 COURSE = Course(heading=0.03, bend=1 / 300, curvature=0.001)
 ORIGIN = np.array([[0.3], [1.6], [0.1]])

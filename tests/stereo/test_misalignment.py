@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rollcli.files.results import Row
-from rollcli.run.summary import RunSummary
+from rollcli.run.progress import RunSummary
 from rollcli.stereo.misalignment import Misalignment
 from rollcli.stereo.misalignment_words import advice_of
 

@@ -189,7 +189,9 @@ class _Records(NamedTuple):
 
 
 class _Chunked:
-    """A file of chunks that hold messages; subclasses know how records look."""
+    """A file of chunks that hold messages; subclasses know how records look, and at which byte they start."""
+
+    start: int
 
     def __init__(self, path: str) -> None:
         self.path, self.broken = path, ""
@@ -221,7 +223,7 @@ class _Chunked:
                 return 0
             return _BEGINNING if topic.name in begins else _ALL
 
-        offset, damaged = self._start(), -1
+        offset, damaged = self.start, -1
         try:
             while offset < self._size:
                 found = self._record(offset, wanted)
@@ -291,9 +293,6 @@ class _Chunked:
             whole = source.size == size
         return _Records(found, after, whole, source.at_once)
 
-    def _start(self) -> int:
-        raise NotImplementedError
-
     def _index(self) -> int:
         """Return where topics are listed behind the messages; 0 where they are not."""
         raise NotImplementedError
@@ -310,12 +309,11 @@ class _Chunked:
 class _Mcap(_Chunked):
     """[https://mcap.dev/spec]: records of an opcode, a length and content; messages lie in chunks or bare."""
 
+    start = len(_MCAP)
+
     def __init__(self, path: str) -> None:
         super().__init__(path)
         self._schemas: dict[int, str] = {}
-
-    def _start(self) -> int:
-        return len(_MCAP)
 
     def _index(self) -> int:
         self._file.seek(max(self._size - 37, 0))  # the footer: opcode, length, where the summary starts, …
@@ -370,8 +368,7 @@ def _text(content: memoryview, at: int) -> tuple[str, int]:
 class _Ros1(_Chunked):
     """[http://wiki.ros.org/Bags/Format/2.0]: records of fields and data; messages lie in chunks or bare."""
 
-    def _start(self) -> int:
-        return len(_BAG)
+    start = len(_BAG)
 
     def _index(self) -> int:
         self._file.seek(len(_BAG))

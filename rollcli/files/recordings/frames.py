@@ -111,7 +111,8 @@ def pairs_of_bag(files: Sequence[str], name: str, left: str, right: str, toleran
     bag = BagFrames()
     partners = nearest([each.stamp for each in lefts], [each.stamp for each in rights], tolerance_ns)
     for topic in (left, right):
-        if _is_raw(found, topic):
+        info, is_raw = found.cameras.get(_beside(topic)), _RAW in topic
+        if is_raw and info is not None and info.changes_raw_views:
             bag.notes.append(f"{topic}: raw views are rectified by D, K, R and P of {_beside(topic)}")
             found.frames[topic][:] = [_rectified(found, topic, each) for each in found.frames[topic]]
             bag.notes += [
@@ -119,7 +120,7 @@ def pairs_of_bag(files: Sequence[str], name: str, left: str, right: str, toleran
                 for path in files
                 if (path, _beside(topic)) not in found.places
             ]
-        elif _RAW in topic and not _usable(found, topic):
+        elif is_raw and not (info is not None and info.usable):
             bag.notes.append(f"{topic}: raw views are taken as they are: no CameraInfo with P rectifies them")
     bag.frames = [(each, rights[at]) for each, at in zip(lefts, partners, strict=True) if at is not None]
     paired = {at for at in partners if at is not None}
@@ -354,17 +355,6 @@ def _calibration(
         baseline, doffs = abs(right.p[3] / right.p[0]), right.p[2] - p[2]
     size = (left.width or None, left.height or None)
     return Calibration(p[0], p[5], p[2], p[6], baseline or None, doffs, *size, source=source)
-
-
-def _is_raw(found: _Found, topic: str) -> bool:
-    """Tell whether the views of a topic must be rectified."""
-    info = found.cameras.get(_beside(topic))
-    return _RAW in topic and info is not None and info.changes_raw_views
-
-
-def _usable(found: _Found, topic: str) -> bool:
-    info = found.cameras.get(_beside(topic))
-    return info is not None and info.usable
 
 
 def _rectified(found: _Found, topic: str, frame: RecordingFrame) -> RecordingFrame:

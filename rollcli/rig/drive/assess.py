@@ -55,14 +55,6 @@ def _stamp(file: str) -> int | None:
     return None if found is None or found[2] is None else int(found[2])
 
 
-def hours_between(seconds: NDArray[np.float64]) -> float | None:
-    """Return how long frames took, hours; None where their names have no stamps, or these do not ascend."""
-    known = seconds[np.isfinite(seconds)]
-    if len(known) < 2 or known[-1] <= known[0]:
-        return None
-    return float(known[-1] - known[0]) / 3600
-
-
 def split_drives(
     files: Sequence[str],
     groups: str = AUTO,
@@ -225,9 +217,11 @@ class RigAssessment:
     def drift_per_hour(self, drive: DriveAssessment | None, quantity: Quantity = ROLL) -> Estimate:
         """Return the drift of a drive over the time between its ends; unknown where names have no stamps."""
         found = None if drive is None else drive.quantities.get(quantity.name)
-        hours = None if drive is None else hours_between(self.seconds[drive.frames])
-        if found is None or found.drift.value is None or hours is None:
+        seconds = self.seconds[drive.frames] if drive is not None else np.empty(0)
+        known = seconds[np.isfinite(seconds)]  # none where names have no stamps
+        if found is None or found.drift.value is None or len(known) < 2 or known[-1] <= known[0]:
             return Estimate()
+        hours = float(known[-1] - known[0]) / 3600
         half = found.drift.ci95
         return Estimate(found.drift.value / hours, None if half is None else half / hours)
 

@@ -7,7 +7,7 @@ whose parser is not made for files of strangers and prints what it dislikes.
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from xml.etree import ElementTree
 
 from rollcli.errors import InputError
@@ -35,7 +35,8 @@ def read_opencv(file: File) -> Fields:
     """Read P1 and P2, or Q."""
     matrices = _matrices(file)
     if "P1" in matrices and "P2" in matrices:
-        found = _of_projections(file, matrices)
+        left, right = (Projection.of(matrices[key], f"{file.name}: {key}") for key in ("P1", "P2"))
+        found = (left.fx, left.fy, left.cx, left.cy, *pair_of(left, right, file.name))
     elif "Q" in matrices:
         found = _of_q(file, matrices["Q"])
     else:
@@ -67,14 +68,6 @@ def _with_unit(file: File, found: tuple[float, float, float, float, float, float
         return Fields(fx, fy, cx, cy, None, doffs, lacks=lacks)
     note = f"{file.name}: its baseline, {length:g}, is taken for metres; OpenCV's files do not say the unit"
     return Fields(fx, fy, cx, cy, length, doffs, notes=(note,))
-
-
-def _of_projections(
-    file: File, matrices: Mapping[str, list[float]]
-) -> tuple[float, float, float, float, float, float]:
-    left, right = (Projection.of(matrices[key], f"{file.name}: {key}") for key in ("P1", "P2"))
-    baseline, doffs = pair_of(left, right, file.name)
-    return left.fx, left.fy, left.cx, left.cy, baseline, doffs
 
 
 def _of_q(file: File, q: Sequence[float]) -> tuple[float, float, float, float, float, float]:

@@ -53,7 +53,10 @@ def parse_yaml(text: str, name: str) -> dict[str, Value]:
             if isinstance(event, yaml.DocumentEndEvent):
                 break
             if isinstance(event, yaml.NodeEvent):
-                _require_plain(name, line, event.anchor, getattr(event, "tag", None))
+                tag = getattr(event, "tag", None)
+                what = f"anchor or alias {event.anchor}" if event.anchor is not None else f"tag {tag}"
+                if event.anchor is not None or (tag is not None and not tag.startswith(_MATRIX)):
+                    raise _unreadable(name, line, f"has the {what}, which calibrations have no use for")
             if isinstance(event, yaml.ScalarEvent):
                 values.append(event.value)
             elif isinstance(event, yaml.CollectionStartEvent):
@@ -87,13 +90,6 @@ def _without_inner_tabs(text: str) -> str:
     return "\n".join(
         line[: len(line) - len(line.lstrip())] + line.lstrip().replace("\t", " ") for line in lines
     )
-
-
-def _require_plain(name: str, line: int, anchor: str | None, tag: str | None) -> None:
-    if anchor is not None:
-        raise _unreadable(name, line, f"has the anchor or alias {anchor}, which calibrations have no use for")
-    if tag is not None and not tag.startswith(_MATRIX):
-        raise _unreadable(name, line, f"has the tag {tag}, which calibrations have no use for")
 
 
 def _mapping(name: str, line: int, flat: list[Value]) -> dict[str, Value]:

@@ -9,7 +9,7 @@ import itertools
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar, overload
 
 from rollcli.errors import RollcliError, raised_at
@@ -211,6 +211,39 @@ class Chunks(Generic[Task]):
             kept = 1 - 1 / (2 * workers)
             self._seconds = kept * self._seconds + max(done.seconds, 1e-6)
             self._done = kept * self._done + len(done.results)
+
+
+@dataclass(frozen=True)
+class Workers:
+    """Which workers run the tasks.
+
+    Attributes
+    ----------
+    jobs : int or None
+        Processes on this machine; None: one for each usable processor.
+    scheduler : str or None
+        The address of a Dask scheduler, whose workers are used instead.
+    files : tuple of str
+        A sample of the files that the tasks read, which the workers of a cluster must see as this process
+        does; those that do not exist are ignored.
+    folders : tuple of str
+        Where the tasks write; the same holds for them.
+    keep_open : int or None
+        A file descriptor that processes on this machine inherit and keep open until they end.
+    threads : int
+        Tasks that each worker has in hand at once: more than one where they wait for the network. One of
+        them computes at a time.
+    started : list of pool.Worker
+        Processes that were started before the tasks were known; those that are used are taken out.
+    """
+
+    jobs: int | None = None
+    scheduler: str | None = None
+    files: tuple[str, ...] = ()
+    folders: tuple[str, ...] = ()
+    keep_open: int | None = None
+    threads: int = 1
+    started: list[Any] = field(default_factory=list)
 
 
 class _Attempt(NamedTuple):

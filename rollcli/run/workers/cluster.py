@@ -22,8 +22,7 @@ from rollcli.files.atomic import is_file, is_there, write_atomic
 from rollcli.files.storage import remove
 from rollcli.files.stores.locations import is_url
 from rollcli.messages import one_line, say
-from rollcli.run.workers.chunks import LONGEST_ON_CLUSTER_S, Chunk, Done, Result, Task, Work
-from rollcli.run.workers.in_order import Workers
+from rollcli.run.workers.chunks import LONGEST_ON_CLUSTER_S, Chunk, Done, Result, Task, Work, Workers
 from rollcli.run.workers.pool import prepare_worker
 
 _CONNECT_S, _GREETING_S, _FIRST_WORKER_S = 6, 2, 5

@@ -35,7 +35,7 @@ def raise_on_signals() -> None:
 
     def interrupt(number: int, frame: FrameType | None) -> None:
         for each in stop_signals():  # not SIG_IGN: of one that came together with this, Python would complain
-            signal.signal(each, _leave_unheard)
+            signal.signal(each, lambda number, frame: None)
         raise KeyboardInterrupt
 
     def listen() -> None:
@@ -44,10 +44,6 @@ def raise_on_signals() -> None:
 
     listen()
     _where_swallowed(listen)
-
-
-def _leave_unheard(number: int, frame: FrameType | None) -> None:
-    pass
 
 
 def _where_swallowed(listen: Callable[[], None]) -> None:

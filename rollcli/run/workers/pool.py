@@ -16,8 +16,7 @@ from pathlib import Path
 from typing import Any, Generic
 
 from rollcli.errors import WorkerError
-from rollcli.run.workers.chunks import Chunk, Done, Result, Task, Work
-from rollcli.run.workers.in_order import Workers
+from rollcli.run.workers.chunks import Chunk, Done, Result, Task, Work, Workers
 from rollcli.run.workers.interrupt import ignore_signals, stop_signals
 
 _BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")

@@ -5,8 +5,7 @@ import io
 import pytest
 
 from rollcli.errors import InputError, UsageError
-from rollcli.files.codecs.parquet import decode_parquet, encode_parquet
-from rollcli.files.results import Row, column_types, plain_values
+from rollcli.files.results import Row, column_types, decode_parquet, encode_parquet, plain_values
 from tests.fuzz.mutations import every_region
 
 pyarrow = pytest.importorskip("pyarrow", reason="pyarrow, of the extra parquet, is not here")

@@ -5,8 +5,7 @@ import threading
 from rollcli.files import storage
 from rollcli.files.stores import locations as turns
 from rollcli.files.stores.locations import computing, wait_for_room, waiting_for_network
-from rollcli.run.workers.chunks import Work
-from rollcli.run.workers.in_order import Workers
+from rollcli.run.workers.chunks import Work, Workers
 from rollcli.run.workers.interrupt import Stop
 from rollcli.run.workers.tasks import run_tasks
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import cv2
 
 from rollcli.errors import InputError
-from rollcli.run.workers import in_order as ordered
+from rollcli.run.workers import tasks as ordered
 from rollcli.run.workers.chunks import Work
 from tests.run_cli import wait_until
 

@@ -16,9 +16,8 @@ from rollcli import __version__
 from rollcli.errors import UsageError
 from rollcli.files.storage import list_names, read_bytes
 from rollcli.run.workers import cluster
-from rollcli.run.workers.chunks import Work
+from rollcli.run.workers.chunks import Work, Workers
 from rollcli.run.workers.cluster import ClusterExecutor, check_scheduler, probe, scheduler_address
-from rollcli.run.workers.in_order import Workers
 from tests.in_process import run_here
 from tests.object_store import joined, upload
 from tests.run.workers.tasks import lost, run

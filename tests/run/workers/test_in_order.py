@@ -7,8 +7,7 @@ from collections import Counter
 import pytest
 
 from rollcli.run.workers import chunks as chunk_sizes
-from rollcli.run.workers.chunks import Chunk, Done, Work
-from rollcli.run.workers.in_order import Workers
+from rollcli.run.workers.chunks import Chunk, Done, Work, Workers
 from rollcli.run.workers.interrupt import Stop
 from rollcli.run.workers.tasks import run_tasks
 from tests.run.workers.tasks import in_order

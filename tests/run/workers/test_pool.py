@@ -14,8 +14,7 @@ import pytest
 from rollcli.errors import InputError, UsageError, WorkerError
 from rollcli.run.workers import pool as pools
 from rollcli.run.workers import tasks as runs
-from rollcli.run.workers.chunks import Work
-from rollcli.run.workers.in_order import Workers
+from rollcli.run.workers.chunks import Work, Workers
 from rollcli.run.workers.interrupt import Stop, stop_signals
 from rollcli.run.workers.pool import PoolExecutor, prepare_worker
 from rollcli.run.workers.tasks import require_scheduler, run_tasks
