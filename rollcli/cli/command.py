@@ -8,6 +8,7 @@ that command alone.
 import dataclasses
 import functools
 import os
+import re
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -360,6 +361,12 @@ def _commands(ctx: click.Context) -> dict[str, click.Command]:
     return found
 
 
+_PARTS = 8  # of a dotted key; no command has more than two words, and no option more than one
+_MANY_PARTS = re.compile(
+    rf"""(?:^|[\[{{,])[ \t]*(?:(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){{{_PARTS}}}""", re.MULTILINE
+)
+
+
 def _load(path: str) -> dict[str, Any]:
     if sys.version_info >= (3, 11):  # here: every --help imports this module
         import tomllib
@@ -367,7 +374,10 @@ def _load(path: str) -> dict[str, Any]:
         import tomli as tomllib
 
     try:
-        return tomllib.loads(as_utf8(read_given(path, MOST_SETTINGS), path).decode())
+        text = as_utf8(read_given(path, MOST_SETTINGS), path).decode()
+        if _MANY_PARTS.search(text):  # which takes time and memory that grow with the square of their number
+            raise click.UsageError(f"{path}: is no file of options: it has a key of more than {_PARTS} parts")
+        return tomllib.loads(text)
     except OSError as error:
         raise click.UsageError(f"{path}: cannot be read: {error.strerror}") from error
     except InputError as error:

@@ -274,14 +274,23 @@ class _Profile:
         return foot, rise
 
     def _on_parabola(self, disparity: Singles) -> tuple[Singles, Singles]:
-        above = disparity - np.float32(self.disparity)
+        rise = disparity - np.float32(self.disparity)
         if not self.bend:
-            return above / np.float32(self.rise), np.full_like(above, self.rise)
+            foot = rise / np.float32(self.rise)
+            rise.fill(self.rise)
+            return foot, rise
         end = np.float32((_FLATTEST**2 - 1) * self.rise**2 / (4 * self.bend))
-        bent = np.maximum(above, end) if self.bend > 0 else np.minimum(above, end)
-        rise = np.sqrt(bent * np.float32(4 * self.bend) + np.float32(self.rise**2))
-        foot = bent / ((rise + np.float32(self.rise)) * np.float32(0.5)) + (above - bent) / rise
-        return foot, rise
+        bent, straight = rise, None
+        if rise.min() < end if self.bend > 0 else rise.max() > end:
+            bent = np.maximum(rise, end) if self.bend > 0 else np.minimum(rise, end)
+            straight = rise - bent
+        rise = bent * np.float32(4 * self.bend)
+        rise += np.float32(self.rise**2)
+        np.sqrt(rise, out=rise)
+        bent /= (rise + np.float32(self.rise)) * np.float32(0.5)
+        if straight is not None:
+            bent += straight / rise
+        return bent, rise
 
 
 def _profile_basis(x: NDArray[Any]) -> NDArray[Any]:
@@ -346,7 +355,9 @@ class _Heights:
         """Write the heights of the pixels of some rows and columns."""
         d = stored.astype(np.float32)
         doffs = 0.0 if self.calibration is None else self.calibration.doffs
-        unknown = ~((d > max(0.0, -doffs)) & (d <= LARGEST))
+        known = d > max(0.0, -doffs)
+        known &= d <= LARGEST
+        unknown = ~known
         np.copyto(d, np.float32(self.profile.disparity), where=unknown)
         shifted = d + np.float32(doffs) if doffs else d
         rows = rows[:, None]
@@ -357,10 +368,12 @@ class _Heights:
         gap = foot - columns * np.float32(-math.sin(self.road.theta))
         gap -= rows * np.float32(math.cos(self.road.theta)) - np.float32(self.profile.row)
         if self.calibration is None:
-            np.divide(gap * np.float32(self.profile.rise), d, out=heights)
+            gap *= np.float32(self.profile.rise)
+            np.divide(gap, d, out=heights)
         else:
             length = self._length(self.calibration, shifted, foot, rise, camber)
-            np.divide(gap, length * shifted, out=heights)
+            length *= shifted
+            np.divide(gap, length, out=heights)
         np.copyto(heights, np.float32(np.nan), where=unknown)
 
     def across(self, columns: Singles, rows: Singles) -> Singles:
@@ -375,15 +388,23 @@ class _Heights:
     def _camber(self, d: Singles, across: Singles) -> "_Camber":
         """Take from disparities what camber adds, which is of the disparity without it [RoadModel]."""
         camber = self.road.camber
-        side = across * np.float32(_centre_rise(self.road)) / d
+        side = across * np.float32(_centre_rise(self.road))
+        side /= d
         # camber is not extrapolated beyond `FARTHEST_SIDE`, which is of the disparity without it
         most = np.float32(FARTHEST_SIDE / max(1 + camber / 2 * FARTHEST_SIDE**2, _FLATTEST))
-        beyond = np.abs(side) > most
-        side = np.clip(side, -most, most)
-        square = side * side * np.float32(-2 * camber) + np.float32(1)
-        root = np.sqrt(np.maximum(square, np.float32(_FLATTEST**2)))
-        rest = root * np.float32(0.5) + np.float32(0.5)
-        side[beyond], root[beyond] = 0, 1
+        beyond = np.abs(side) > most if max(side.max(), -side.min()) > most else None
+        if beyond is not None:
+            np.clip(side, -most, most, out=side)
+        root = side * side
+        root *= np.float32(-2 * camber)
+        root += 1
+        np.maximum(root, np.float32(_FLATTEST**2), out=root)
+        np.sqrt(root, out=root)
+        rest = root * np.float32(0.5)
+        rest += np.float32(0.5)
+        if beyond is not None:
+            np.copyto(side, 0, where=beyond)
+            np.copyto(root, 1, where=beyond)
         return _Camber(across, side, rest, root)
 
     def _length(
@@ -399,15 +420,27 @@ class _Heights:
         aspect = calibration.fy / calibration.fx
         at = np.array([[calibration.cx]], np.float32), np.array([[calibration.cy]], np.float32)
         along = calibration.cy * cosine - calibration.cx * sine - self.profile.row
-        ahead = (shifted if camber is None else shifted * camber.rest) / rise - foot + np.float32(along)
-        lean: Singles | np.float32 = np.float32(sine**2 + (aspect * cosine) ** 2)
+        ahead = (shifted if camber is None else shifted * camber.rest) / rise
+        ahead -= foot
+        ahead += np.float32(along)
+        square = np.float32(sine**2 + (aspect * cosine) ** 2)
+        lean: Singles | np.float32 = square
         if camber is not None:
-            tilt = camber.side / rise * np.float32(self.road.camber * _centre_rise(self.road))
+            tilt = camber.side / rise
+            tilt *= np.float32(self.road.camber * _centre_rise(self.road))
             ahead += tilt * (self.across(*at) - camber.across)
-            skew = np.float32(2 * (aspect**2 - 1) * cosine * sine)
-            lean = (tilt * np.float32(cosine**2 + (aspect * sine) ** 2) + skew) * tilt + lean
+            leant = tilt * np.float32(cosine**2 + (aspect * sine) ** 2)
+            if aspect != 1:
+                leant += np.float32(2 * (aspect**2 - 1) * cosine * sine)
+            leant *= tilt
+            leant += square
+            lean = leant
         ahead *= np.float32(1 / calibration.fx)
-        return np.asarray(np.sqrt(ahead * ahead + lean) * np.float32(1 / (calibration.baseline or 1.0)))
+        ahead *= ahead
+        ahead += lean
+        length: Singles = np.sqrt(ahead, out=ahead)
+        length *= np.float32(1 / (calibration.baseline or 1.0))
+        return length
 
 
 @dataclass(frozen=True)

@@ -3,8 +3,9 @@
 import contextlib
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
+from fractions import Fraction
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
 
@@ -67,7 +68,8 @@ class Provenance:
         return Provenance(error, one_line(doubt), alignment)
 
 
-_FAR = 2**17  # pixels: corners that lie further off are taken to lie here
+Corner = tuple[float, float]
+_FAR = 2**17  # pixels; a side that leaves the map there is still straight to a hundredth of a pixel
 
 
 def region_mask(mask: str | None, options: FrameOptions, shape: tuple[int, ...]) -> NDArray[np.bool_] | None:
@@ -99,10 +101,31 @@ def _drawn(options: RegionOptions, shape: tuple[int, ...]) -> NDArray[np.bool_]:
     inside[y0:y1, x0:x1] = 1
     if options.polygon is not None:
         area: NDArray[Any] = np.zeros(shape, np.uint8)
-        corners = np.clip(options.polygon, -_FAR, _FAR)  # OpenCV fills what lies further off, too
-        cv2.fillPoly(area, [np.rint(corners).astype(np.int32)], 1)
+        if corners := _near(options.polygon):
+            cv2.fillPoly(area, [np.rint(corners).astype(np.int32)], 1)
         inside &= area
     return inside.astype(np.bool_)
+
+
+def _near(corners: Sequence[Corner]) -> Sequence[Corner]:
+    """Cut off what lies far outside of any map [Sutherland, Hodgman 1974]: OpenCV would fill that, too.
+
+    In fractions, for of a step between 1e300 and a pixel a float keeps nothing.
+    """
+    exact = [(Fraction(u), Fraction(v)) for u, v in corners]
+    for axis in (0, 1):
+        for bound, side in ((-_FAR, 1), (_FAR, -1)):
+            kept: list[tuple[Fraction, Fraction]] = []
+            for one, other in zip(exact, (*exact[1:], *exact[:1]), strict=True):
+                first, second = side * (one[axis] - bound), side * (other[axis] - bound)
+                if first >= 0:
+                    kept.append(one)
+                if (first >= 0) != (second >= 0):
+                    share = first / (first - second)
+                    cut = [a + share * (b - a) for a, b in zip(one, other, strict=True)]
+                    kept.append((cut[0], cut[1]))
+            exact = kept
+    return [(float(u), float(v)) for u, v in exact]
 
 
 @lru_cache(maxsize=1)  # a mask for all frames is read once, unless it changes: workers outlive runs
