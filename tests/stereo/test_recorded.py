@@ -20,8 +20,9 @@ SIZE = (224, 160)
 
 
 @cache
-def _scene(scene="street", seed=3):
-    frame = render_frame(FrameSpec(scene, math.radians(4), 0.06, size=SIZE, focal=150.0, seed=seed))
+def _scene(scene="street", seed=3, times=1):
+    size, focal = (SIZE[0] * times, SIZE[1] * times), 150.0 * times
+    frame = render_frame(FrameSpec(scene, math.radians(4), 0.06, size=size, focal=focal, seed=seed))
     return frame.left, frame.right
 
 
@@ -62,6 +63,8 @@ def _match(views, odd=None, wanted=None, **options):
         "shape": shape,
         "valid": len(disparity) / found.disparity.size,
         "quartiles": np.percentile(disparity, (25, 50, 75)).tolist(),
+        "mean": float(disparity.mean()),
+        "valid in rows": [float((rows > 0).mean()) for rows in np.array_split(found.disparity, 8)],
         "whole": None if found.whole is None else float((found.whole > 0).mean()),
         # px: how far each part moves a corner
         "corrected": found.corrected.shifts(*shape),
@@ -96,6 +99,10 @@ CASES = {
     "as it is": partial(_match, _scene, ODD, align="off"),
     "given": partial(_match, _scene, {"lower": 2.0}, vertical_offset=2.0),
     "along the road": partial(_match, _scene, None, Wanted(road=_road)),
+    "along a road of full size": partial(_match, partial(_scene, times=2), None, Wanted(road=_road)),
+    "some rows of full size": partial(
+        _match, partial(_scene, times=2), ODD, Wanted(slice(140, 300), _road, whole=True)
+    ),
     "some rows": partial(_match, _scene, None, Wanted(slice(70, 150), _road, whole=True)),
     "smaller": partial(_match, _scene, None, downscale=1.5),
     "five ways": partial(_match, _scene, None, mode="sgbm", num_disparities=48, block_size=7),
