@@ -1,7 +1,10 @@
 """What matching finds in pairs of every kind; see `tests.recorded`."""
 
+import json
 import math
+import tempfile
 from functools import cache, partial
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -68,6 +71,7 @@ def _match(views, odd=None, wanted=None, **options):
         "whole": None if found.whole is None else float((found.whole > 0).mean()),
         # px: how far each part moves a corner
         "corrected": found.corrected.shifts(*shape),
+        "lies": found.lies and found.lies.shifts(*shape),
         "measured": measured
         and [measured.misalignment.shifts(*shape), measured.errors.shifts(*shape), measured.spread],
         "share": measured and measured.share,
@@ -75,6 +79,20 @@ def _match(views, odd=None, wanted=None, **options):
         "doubt": found.doubt,
         "end": found.end_fraction,
     }
+
+
+def _corrected(odd, columns=None, **options):
+    """A pair that is levelled as a file says: 3 px lower, at twice the size."""
+    lies = {
+        "right_lower_px": 6.0,
+        "right_clockwise_deg": 0.0,
+        "right_larger_percent": 0.5,
+        "right_twist_px": 0.4,
+    }
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "correction.json")
+        path.write_text(json.dumps({**lies, "width": 448, "height": 320, "columns": columns}), "utf-8")
+        return _match(_scene, odd, align=str(path), **options)
 
 
 def _swapped():
@@ -97,6 +115,15 @@ CASES = {
     "odd": partial(_match, _scene, ODD),
     "far off": partial(_match, _scene, {"clockwise_deg": 2.5, "lower": 14.0}),
     "as it is": partial(_match, _scene, ODD, align="off"),
+    "corrected": partial(_corrected, {"lower": 3.0, "larger_percent": 0.5}),
+    "corrected, of known columns": partial(
+        _corrected,
+        {"lower": 3.0},
+        {"scale": 0.004, "twist": 2e-5, "pitch": 1e-5, "slope_error": 1e-3},
+        downscale=1.2,
+        num_disparities=64,
+    ),
+    "corrected otherwise": partial(_corrected, {"lower": -3.0}),
     "given": partial(_match, _scene, {"lower": 2.0}, vertical_offset=2.0),
     "along the road": partial(_match, _scene, None, Wanted(road=_road)),
     "along a road of full size": partial(_match, partial(_scene, times=2), None, Wanted(road=_road)),
