@@ -4,7 +4,9 @@ import contextlib
 import io
 import math
 import os
+import tarfile
 import tempfile
+import zipfile
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -246,6 +248,47 @@ def _written(row):
     return [text.decode("latin-1") for text in texts]
 
 
+def _members():
+    """What is read of archives: of a member, of one as large as may be and a byte larger, and of damaged ones."""
+    noise, zeros = np.random.default_rng(1).bytes(500), bytes(5000)
+    with _folder_of([]):
+        for name, packing in (("a.zip", zipfile.ZIP_STORED), ("b.zip", zipfile.ZIP_DEFLATED)):
+            with zipfile.ZipFile(name, "w", packing) as file:
+                file.writestr("noise", noise)
+                file.writestr("d/zeros", zeros)
+        with tarfile.open("c.tar", "w") as file:
+            for name, data in (("./noise", noise), ("d/zeros", zeros)):
+                each = tarfile.TarInfo(name)
+                each.size = len(data)
+                file.addfile(each, io.BytesIO(data))
+        for name in ("a.zip", "b.zip", "c.tar"):
+            whole = bytearray(Path(name).read_bytes())
+            Path(f"cut {name}").write_bytes(whole[:700])
+            at = whole.find(noise[:9]) + 99 if name != "b.zip" else 60
+            Path(f"bad {name}").write_bytes(whole[:at] + b"other" + whole[at + 5 :])
+            Path(f"locked {name}").write_bytes(whole.replace(b"\x14\0\0\0", b"\x14\0\1\0"))
+        found = {}
+        for name in ("a.zip", "b.zip", "c.tar"):
+            for archive in (name, f"cut {name}", f"bad {name}", f"locked {name}", f"no {name}"):
+                listed = _answer(lambda archive=archive: list(containers.members(archive)))
+                places = ["noise", "d/zeros", "other"]
+                places += [each[0].partition("#")[2] for each in listed if "#@" in each[0]]
+                found[archive] = [
+                    listed,
+                    {
+                        f"{place}, {most}": _member(f"{archive}#{place}", most)
+                        for place in places
+                        for most in (499, 500, 4999, 5000)
+                    },
+                ]
+    return found
+
+
+def _member(location, most):
+    found = _answer(containers.read_member, location, "name", most)
+    return found if isinstance(found, str) else [len(found), sum(found)]
+
+
 def _tiff(**layout):
     file = io.BytesIO()
     tifffile.imwrite(file, disparity_map().astype(np.float32), metadata=None, **layout)
@@ -307,6 +350,7 @@ CASES = {
         for shape in ((4, 6), (5, 7), (4, 6, 3), (1, 1))
         for layout in ("left-right", "top-bottom")
     ],
+    "members": _members,
     **answers.CASES,
     **small_bags.CASES,
     "listed": lambda: [naming.listed("abcdefg"[:count]) for count in range(6)],
