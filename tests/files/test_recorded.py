@@ -249,38 +249,31 @@ def _written(row):
 
 
 def _members():
-    """What is read of archives: of a member, of one as large as may be and a byte larger, and of damaged ones."""
-    noise, zeros = np.random.default_rng(1).bytes(500), bytes(5000)
+    """What is read of archives, whole and damaged: of members as large as may be and a byte larger."""
+    files = {"noise": np.random.default_rng(1).bytes(500), "d/zeros": bytes(5000)}
+    files |= dict.fromkeys((".b", "__MACOSX/c", "d/.e/f"), b"x")
+    made, found = {}, {}
     with _folder_of([]):
         for name, packing in (("a.zip", zipfile.ZIP_STORED), ("b.zip", zipfile.ZIP_DEFLATED)):
             with zipfile.ZipFile(name, "w", packing) as file:
-                file.writestr("noise", noise)
-                file.writestr("d/zeros", zeros)
-        with tarfile.open("c.tar", "w") as file:
-            for name, data in (("./noise", noise), ("d/zeros", zeros)):
-                each = tarfile.TarInfo(name)
-                each.size = len(data)
-                file.addfile(each, io.BytesIO(data))
+                for each, data in files.items():
+                    file.writestr(each, data)
+        with tarfile.open("c.tar", "w", format=tarfile.USTAR_FORMAT) as file:
+            for each, data in files.items():
+                Path("file").write_bytes(data)
+                file.add("file", f"./{each}" if each == "noise" else each)
         for name in ("a.zip", "b.zip", "c.tar"):
-            whole = bytearray(Path(name).read_bytes())
-            Path(f"cut {name}").write_bytes(whole[:700])
-            at = whole.find(noise[:9]) + 99 if name != "b.zip" else 60
-            Path(f"bad {name}").write_bytes(whole[:at] + b"other" + whole[at + 5 :])
-            Path(f"locked {name}").write_bytes(whole.replace(b"\x14\0\0\0", b"\x14\0\1\0"))
-        found = {}
-        for name in ("a.zip", "b.zip", "c.tar"):
-            for archive in (name, f"cut {name}", f"bad {name}", f"locked {name}", f"no {name}"):
-                listed = _answer(lambda archive=archive: list(containers.members(archive)))
-                places = ["noise", "d/zeros", "other"]
-                places += [each[0].partition("#")[2] for each in listed if "#@" in each[0]]
-                found[archive] = [
-                    listed,
-                    {
-                        f"{place}, {most}": _member(f"{archive}#{place}", most)
-                        for place in places
-                        for most in (499, 500, 4999, 5000)
-                    },
-                ]
+            whole = made[name] = Path(name).read_bytes()
+            made[f"cut {name}"], made[f"bad {name}"] = whole[:700], whole[:99] + b"other" + whole[104:]
+            made[f"locked {name}"] = whole.replace(b"\x14\0\0\0", b"\x14\0\1\0")
+        for name, data in made.items():
+            Path(name).write_bytes(data)
+        for name in (*made, "no.zip", "no.tar"):
+            listed = _answer(lambda name=name: list(containers.members(name)))
+            places = [f"{name}#{each}" for each in ("noise", "d/zeros", "x")]
+            places += [place for place, _ in (() if isinstance(listed, str) else listed) if "#@" in place]
+            read = {each: [_member(each, most) for most in (499, 500, 4999, 5000)] for each in places}
+            found[name] = [listed, read]
     return found
 
 
