@@ -14,7 +14,7 @@ from rollcli.errors import RollcliError
 from rollcli.estimator.road.find import road_plane
 from rollcli.simulate.build import render_frame
 from rollcli.simulate.spec import FrameSpec
-from rollcli.stereo.alignment import level
+from rollcli.stereo.alignment import level, seen_from_right
 from rollcli.stereo.match import StereoOptions, Wanted, match_pair
 from rollcli.stereo.misalignment import Misalignment
 from tests.recorded import check
@@ -105,7 +105,16 @@ def _other():
 
 
 ODD = {"clockwise_deg": 0.6, "larger_percent": 0.8, "lower": -3.0}
-LIES = Misalignment(1.5, 0.01, -0.004, 2e-5)
+LIES = Misalignment(1.5, 0.01, -0.004, 2e-5, 0.02, 1e-5)
+# a third of the size, with a gap and a box that hides a part of the rest
+_NEAR = np.tile(np.arange(54, dtype=np.float32)[:, None] / 4, (1, 75))
+_NEAR[20:30, 40:50], _NEAR[40:44] = 12, 0
+
+
+def _levelled(near):
+    return level(cv2.cvtColor(_scene()[1], cv2.COLOR_BGR2GRAY), LIES, near).astype(float)
+
+
 CASES = {
     "level": partial(_match, _scene),
     "verge": partial(_match, partial(_scene, "verge", 6)),
@@ -140,7 +149,8 @@ CASES = {
     "swapped": partial(_match, _swapped),
     "two scenes": partial(_match, _other),
     "one image": partial(_match, lambda: (_scene()[0],) * 2),
-    "levelled": lambda: level(cv2.cvtColor(_scene()[1], cv2.COLOR_BGR2GRAY), LIES).astype(float),
+    "levelled": lambda: [_levelled(None), _levelled(seen_from_right(_NEAR))],
+    "seen from the right": lambda: seen_from_right(_NEAR),
     "lies": lambda: [
         LIES.resized(0.5),
         LIES.times(2.0),
