@@ -123,6 +123,7 @@ def _marked(mark, text):
 
 
 def _anonymous(line, folder):
+    line = line.replace("[COMMAND]", "COMMAND")  # as click calls it before 8.2
     return _TIMES.sub("… ", line.replace(str(folder), "FOLDER").replace(__version__, "VERSION"))
 
 
