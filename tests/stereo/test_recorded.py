@@ -23,8 +23,7 @@ SIZE = (224, 160)
 
 
 @cache
-def _scene(scene="street", seed=3, times=1):
-    size, focal = (SIZE[0] * times, SIZE[1] * times), 150.0 * times
+def _scene(scene="street", seed=3, size=SIZE, focal=150.0):
     frame = render_frame(FrameSpec(scene, math.radians(4), 0.06, size=size, focal=focal, seed=seed))
     return frame.left, frame.right
 
@@ -104,6 +103,7 @@ def _other():
     return _scene()[0], _scene("open", 9)[1]
 
 
+FULL, HIGH = partial(_scene, size=(448, 320), focal=300.0), partial(_scene, size=(192, 304), focal=160.0)
 ODD = {"clockwise_deg": 0.6, "larger_percent": 0.8, "lower": -3.0}
 LIES = Misalignment(1.5, 0.01, -0.004, 2e-5, 0.02, 1e-5)
 # a third of the size, with a gap and a box that hides a part of the rest
@@ -135,10 +135,10 @@ CASES = {
     "corrected otherwise": partial(_corrected, {"lower": -3.0}),
     "given": partial(_match, _scene, {"lower": 2.0}, vertical_offset=2.0),
     "along the road": partial(_match, _scene, None, Wanted(road=_road)),
-    "along a road of full size": partial(_match, partial(_scene, times=2), None, Wanted(road=_road)),
-    "some rows of full size": partial(
-        _match, partial(_scene, times=2), ODD, Wanted(slice(140, 300), _road, whole=True)
-    ),
+    "along a road of full size": partial(_match, FULL, None, Wanted(road=_road)),
+    "along a road in a high view": partial(_match, HIGH, ODD, Wanted(road=_road)),
+    "a high view, whole": partial(_match, HIGH, ODD, Wanted(slice(40, 290), _road, whole=True)),
+    "some rows of full size": partial(_match, FULL, ODD, Wanted(slice(140, 300), _road, whole=True)),
     "some rows": partial(_match, _scene, None, Wanted(slice(70, 150), _road, whole=True)),
     "smaller": partial(_match, _scene, None, downscale=1.5),
     "five ways": partial(_match, _scene, None, mode="sgbm", num_disparities=48, block_size=7),
