@@ -239,7 +239,7 @@ def _bag(folder, name, *topics):
         if kind == "disparity":
             return bag_files.disparity_image(store, values, stamp, number)
         if kind in ("info", "raw", "none"):
-            p = (*k[:3], -175.0 if right else 0.0, *k[3:6], 0, *k[6:], 0)
+            p = (*k[:2], k[2] + right, -175.0 * right, *k[3:6], 0, *k[6:], 0)
             d = (-0.1, 0.02, 0, 0, 0) if kind == "raw" else ()
             return bag_files.camera_info(
                 store, stamp, (width, height), p if kind != "none" else [0.0] * 12, d, k

@@ -3,6 +3,7 @@
 import bz2
 import contextlib
 import json
+import math
 import os
 import re
 import sqlite3
@@ -280,6 +281,12 @@ def _raw(changes):
     return found if isinstance(found, str) or not changes.keys() & {"d", "model"} else found[:2]
 
 
+def _of_decoded(function, form="cdr", **fields):
+    """What a function makes of a message that is decoded already."""
+    with mock.patch.object(messages, "_decoded", return_value=SimpleNamespace(**fields)):
+        return made(function, Topic("/a", messages.IMAGE, form), memoryview(b""), "x")
+
+
 CASES = {
     **{
         f"bag: {kind}, {what}": partial(lambda kind, make, data: make(data()), kind, make, data)
@@ -325,6 +332,14 @@ CASES = {
         _compressed("16UC1; compressedDepth", b"head\x89PNG\r\n\x1a\nrest"),
         _compressed("16UC1; compressedDepth", b"head"),
         _compressed("jpeg", b"head\x89PNG\r\n\x1a\nrest"),
+    ],
+    "baselines": lambda: [
+        [_of_decoded(messages.baseline_of, t=each), _of_decoded(messages.baseline_of, "ros1", T=each)]
+        for each in (0.5, -0.25, math.nan, -math.inf)
+    ],
+    "videos in messages": lambda: [
+        _of_decoded(messages.check_format, format=each)
+        for each in ("jpeg", "h264", "H.265 of a long name, main", "hevc", "a vp9", "av1", "bgr8; png")
     ],
     "raw views": lambda: [_raw(each) for each in INPUTS["raw views"]],
 }
