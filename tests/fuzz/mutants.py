@@ -33,7 +33,7 @@ FURTHER = {
     "cli": "run/test_recorded run/test_resume test_messages test_readme",
     "estimator": "rig/test_pose",
     "evaluate": (
-        "cli/test_mistakes cli/test_evaluate_paper cli/test_outputs estimator/test_energy "
+        "cli/test_recorded cli/test_mistakes cli/test_evaluate_paper cli/test_outputs estimator/test_energy "
         "estimator/solvers test_package"
     ),
     "files": (
@@ -41,19 +41,19 @@ FURTHER = {
         "run/test_two_runs run/test_result_parts cli/test_frames cli/test_outputs cli/test_help "
         "cli/test_urls cli/test_buckets cli/test_bad_stores"
     ),
-    "pictures": "run/test_derotate run/test_vdisparity cli/test_heights",
-    "rig": "cli/test_calibration cli/test_horizon run/test_diagnosis",
+    "pictures": "run/test_recorded run/test_derotate run/test_vdisparity cli/test_heights",
+    "rig": "cli/test_recorded cli/test_calibration cli/test_horizon run/test_diagnosis",
     "run": (
         "cli/test_recorded files/stores/test_turns cli/test_mistakes cli/test_outputs cli/test_help "
         "cli/test_frames cli/test_calibration cli/test_horizon cli/test_lost_readers "
         "cli/test_bad_stores cli/test_urls cli/test_buckets"
     ),
     "simulate": (
-        "cli/test_mistakes cli/test_simulate cli/test_outputs cli/test_lost_readers "
+        "cli/test_recorded cli/test_mistakes cli/test_simulate cli/test_outputs cli/test_lost_readers "
         "stereo/test_alignment stereo/test_stereo"
     ),
     "report": "cli/test_recorded cli/test_mistakes cli/test_outputs",
-    "stereo": "run/test_estimate_pair",
+    "stereo": "run/test_recorded run/test_estimate_pair",
 }
 _QUICKLY = ("-x", "-q", "-p", "no:cacheprovider")
 _NOTICED = (pytest.ExitCode.TESTS_FAILED, pytest.ExitCode.INTERRUPTED, pytest.ExitCode.USAGE_ERROR)
