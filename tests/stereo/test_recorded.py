@@ -157,6 +157,8 @@ CASES = {
         LIES.shifts(100, 300),
         LIES.reach_in_rows(100, 300, 20, 70),
         LIES.rotation_deg,
+        LIES.matrix(100, 300),
+        Misalignment.of_values((1.5, -0.5, 0.4, 2.0), 100, 300),
     ],
 }
 
