@@ -175,8 +175,13 @@ def write_pair(folder: Path, name: str, disparity, seed: int = 0) -> None:
     height, width = disparity.shape
     texture = np.random.default_rng(seed).uniform(0, 255, (height, width + 64)).astype(np.float32)
     texture = cv2.GaussianBlur(texture, (0, 0), 1.0)
-    v, u = np.mgrid[:height, :width].astype(np.float32)
-    seen = cv2.remap(texture, u - disparity + 32, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT)
+    at = np.arange(32, 32 + width, dtype=np.float32) - disparity.astype(np.float32)
+    first = np.floor(at).astype(int)
+    # versions of OpenCV differ in what is between pixels; beyond the border the texture is mirrored
+    one, other = (
+        np.take_along_axis(texture, np.where(each < 0, -1 - each, each), 1) for each in (first, first + 1)
+    )
+    seen = one + (at - first) * (other - one)
     for side, image in (("left", seen), ("right", texture[:, 32 : 32 + width])):
         path = folder / side / name
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -123,6 +123,7 @@ def _marked(mark, text):
 
 
 def _anonymous(line, folder):
+    line = line.replace("[COMMAND]", "COMMAND")  # as click calls it before 8.2
     return _TIMES.sub("… ", line.replace(str(folder), "FOLDER").replace(__version__, "VERSION"))
 
 
@@ -142,7 +143,7 @@ def _changes(before, after):
 
 def _described(name, data):
     """Of a map its numbers, of a picture its size, of a text how many lines it has."""
-    if name.endswith((".svg", ".pdf", ".html", ".parquet")):
+    if name.endswith((".svg", ".pdf", ".html", ".parquet", ".bag", ".db3", ".mcap", ".yaml")):
         return "a file"
     if not name.endswith((".png", ".tif", ".npy")):
         return f"{data.count(10)} lines"
@@ -218,6 +219,53 @@ def _rig(folder, name, *settings):
     (folder / name).write_bytes(b"".join([format_header(form), *(format_row(row, form) for row in rows)]))
 
 
+def _bag(folder, name, *topics):
+    """Write a bag of two moments of topics NAME=KIND[*COUNT][+NS]: so many of them, and so much later.
+
+    Kinds are maps (disparity, depth, mono16, png), views (view, packed, h264), a photograph of a map's size,
+    and CameraInfo: `info`, of a raw view (`raw`), or without a P (`none`).
+    """
+    from tests.files.recordings import bag_files
+
+    given = [re.fullmatch(r"(.*)=(\w+)(?:\*(\d))?(?:\+(\d+))?", each).groups() for each in topics]
+    width, height = (320, 160) if any(each[1] in ("view", "packed") for each in given) else (160, 120)
+    k = (350.0, 0, width / 2, 0, 350, height / 2, 0, 0, 1)
+
+    def message(store, number, stamp, topic, kind):
+        right = "right" in topic
+        values = road_map(0.05 * number, seed=number).astype(np.float32)
+        view = cv2.imread(str(folder / ("right" if right else "left") / f"{number}.png"), 0)
+        whole = np.rint(values * 256).astype(np.uint16)
+        if kind == "disparity":
+            return bag_files.disparity_image(store, values, stamp, number)
+        if kind in ("info", "raw", "none"):
+            p = (*k[:2], k[2] + right, -175.0 * right, *k[3:6], 0, *k[6:], 0)
+            d = (-0.1, 0.02, 0, 0, 0) if kind == "raw" else ()
+            return bag_files.camera_info(
+                store, stamp, (width, height), p if kind != "none" else [0.0] * 12, d, k
+            )
+        if kind in ("png", "packed", "h264"):
+            data = cv2.imencode(".png", whole if kind == "png" else view)[1].tobytes()
+            return bag_files.compressed(store, data, kind, stamp)
+        values, encoding = {
+            "depth": (350 * 0.5 / np.maximum(values, 0.1), "32FC1"),
+            "mono16": (whole, "mono16"),
+            "photo": ((whole % 251).astype(np.uint8), "mono8"),
+            "view": (view, "mono8"),
+        }[kind]
+        return bag_files.image(store, values, encoding, stamp, number)
+
+    def messages(store):
+        for number in range(2):
+            for topic, kind, count, later in given:
+                stamp = 1_700_000_000_123_456_789 + number * 100_000_000 + int(later or 0)
+                if number < int(count or 2):
+                    yield topic, stamp, message(store, number, stamp, topic, kind)
+
+    stem, _, form = name.rpartition(".")
+    bag_files.write_bag(folder, stem, form, messages)
+
+
 def _show(folder, name):
     """Show a text; of JSON each value with where it stands."""
     text = (folder / name).read_text("utf-8")
@@ -233,6 +281,7 @@ def _values(value, place=""):
 
 
 _TOOLS = {
+    "bag": _bag,
     "cp": _copy,
     "edit": _edit,
     "link": _link,

@@ -56,8 +56,8 @@ def run_paper(options: PaperOptions) -> ExitStatus:
     require_extra("report", "the page of charts")
     if options.encoding.encoding == "depth":
         raise UsageError("--encoding depth: the experiments are made on disparity maps, not on depth maps")
-    folder = options.experiments.output
-    frames = map_frames(Named(options.inputs, region=options.region, skip=[folder]))
+    folder, running = options.experiments.output, options.running
+    frames = map_frames(Named(options.inputs, running.quiet, region=options.region, skip=[folder]))
     truth = _known_angles(frames, options)
     kind = options.experiments.figure
     names = [f"{name}.{kind}" for name in FIGURES.values()] if kind is not None else []

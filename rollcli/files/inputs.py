@@ -276,16 +276,11 @@ class Manifest:
         if not places:
             return
         first = places[0] // _BLOCK
-        at = first * _BLOCK
-        wanted = iter(places)
-        place = next(wanted)
-        for _, name in self._lines(self._places[first]):
-            if at == place:
+        for place, (_, name) in enumerate(self._lines(self._places[first]), first * _BLOCK):
+            if place in places:
                 yield name
-                place = next(wanted, -1)
-                if place < 0:
-                    return
-            at += 1
+            if place == places[-1]:
+                return
 
     def _lines(self, offset: int, places: "array[int] | None" = None) -> Iterator[tuple[int, str]]:
         """Yield each name from an offset on, and the number of its line there; note where blocks begin."""

@@ -108,7 +108,7 @@ def _table(rows: Sequence[Row], rig: RigAssessment | None = None) -> Rows:
                 number,
                 row.file.encode("utf-8", "replace").decode(),
                 "failed" if row.status == "error" else row.status,
-                None if row.roll_deg is None else round(row.roll_deg, 6),
+                row.roll_deg,
                 with_interval(row.roll_deg, row.roll_ci95_deg),
                 row.message,
             )

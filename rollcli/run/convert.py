@@ -108,7 +108,7 @@ def _check_options(options: ConvertOptions) -> None:
 
 def _find_frames(options: ConvertOptions) -> Sequence[Frame]:
     skip, quiet = [folder for folder, _ in options.writes], options.running.quiet
-    named = Named(options.inputs, calibration=options.calibration, skip=skip, quiet=quiet)
+    named = Named(options.inputs, quiet, calibration=options.calibration, skip=skip)
     if isinstance(options, DisparityOptions):
         return pair_frames(named._replace(pairs=options.pairs, topics=options.topics))
     frames = map_frames(named)

@@ -205,8 +205,8 @@ def _grows_downward(disparity: NDArray[Any]) -> bool:
 
 
 def _inverse(values: NDArray[Any]) -> NDArray[Any]:
-    valid = values > 0
-    return np.where(valid, 1 / np.where(valid, values, 1), 0)
+    inverse: NDArray[Any] = np.divide(1, values, out=np.zeros_like(values), where=values > 0)
+    return inverse
 
 
 def _has_road(disparity: NDArray[Any], options: FrameOptions) -> bool:

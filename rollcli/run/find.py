@@ -215,19 +215,19 @@ class Named(NamedTuple):
     ----------
     inputs, pairs, topics, region, calibration
         See `EstimateOptions`.
-    skip : sequence of str
-        The output folders, which are not searched.
     quiet : bool
         Whether no line says what the folders hold beside what is read.
+    skip : sequence of str
+        The output folders, which are not searched.
     """
 
     inputs: InputOptions
+    quiet: bool
     pairs: PairOptions = PairOptions()
     topics: TopicOptions = TopicOptions()
     region: RegionOptions = RegionOptions()
     calibration: CalibrationOptions = CalibrationOptions()
     skip: Sequence[str] = ()
-    quiet: bool = True
 
 
 def map_frames(named: Named) -> Sequence[Frame]:

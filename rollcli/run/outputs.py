@@ -300,8 +300,8 @@ def _split(path: str) -> tuple[str, str]:
     """Split a path into its folder and its name; os.path.split takes four times as long."""
     if os.sep != "/":
         return os.path.split(path)
-    cut = path.rfind("/") + 1
-    return path[:cut], path[cut:]
+    folder, slash, name = path.rpartition("/")
+    return folder + slash, name
 
 
 # cached: resolving links costs a system call for each part of a path, and files share folders

@@ -125,7 +125,7 @@ def _find_frames(options: EstimateOptions) -> Sequence[Frame]:
         )
     if options.paired and given.sorted:
         raise UsageError("--sorted takes a list of maps, not of pairs")
-    named = Named(given, options.pairs, options.topics, options.region, options.calibration, skip, quiet)
+    named = Named(given, quiet, options.pairs, options.topics, options.region, options.calibration, skip)
     if options.paired:
         return pair_frames(named)
     if options.images.disparity is not None:

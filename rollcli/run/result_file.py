@@ -294,10 +294,9 @@ class DurableRows:
         OutputError
             The disk does not take an image or a row.
         """
-        before = len(self._images)
         self._inputs.append(b"".join(inputs))
         self._images.extend(images)
-        if self._rows or len(self._images) > before:
+        if self._rows or self._images:
             self._rows.extend(rows)
         else:
             self._write(rows)

@@ -116,7 +116,9 @@ def _map_of(name="a.png", gd=(3, 4, 5, 6), sweep=7):
 
 def _times(seconds):
     of_each = {
-        (solver, form): tuple(seconds * (1 + k + 4 * at) * (1 + 399 * (form == "textbook")) for k in range(4))
+        (solver, form): tuple(
+            seconds * (1 + k + 4 * at) * (1 + (399 + k) * (form == "textbook")) for k in range(4)
+        )
         for at, solver in enumerate(("gss", "gd"))
         for form in FORMS
     }

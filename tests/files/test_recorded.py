@@ -4,7 +4,9 @@ import contextlib
 import io
 import math
 import os
+import tarfile
 import tempfile
+import zipfile
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -246,6 +248,40 @@ def _written(row):
     return [text.decode("latin-1") for text in texts]
 
 
+def _members():
+    """What is read of archives, whole and damaged: of members as large as may be and a byte larger."""
+    files = {"noise": np.random.default_rng(1).bytes(500), "d/zeros": bytes(5000)}
+    files |= dict.fromkeys((".b", "__MACOSX/c", "d/.e/f"), b"x")
+    made, found = {}, {}
+    with _folder_of([]):
+        for name, packing in (("a.zip", zipfile.ZIP_STORED), ("b.zip", zipfile.ZIP_DEFLATED)):
+            with zipfile.ZipFile(name, "w", packing) as file:
+                for each, data in files.items():
+                    file.writestr(each, data)
+        with tarfile.open("c.tar", "w", format=tarfile.USTAR_FORMAT) as file:
+            for each, data in files.items():
+                Path("file").write_bytes(data)
+                file.add("file", f"./{each}" if each == "noise" else each)
+        for name in ("a.zip", "b.zip", "c.tar"):
+            whole = made[name] = Path(name).read_bytes()
+            made[f"cut {name}"], made[f"bad {name}"] = whole[:700], whole[:99] + b"other" + whole[104:]
+            made[f"locked {name}"] = whole.replace(b"\x14\0\0\0", b"\x14\0\1\0")
+        for name, data in made.items():
+            Path(name).write_bytes(data)
+        for name in (*made, "no.zip", "no.tar"):
+            listed = _answer(lambda name=name: list(containers.members(name)))
+            places = [f"{name}#{each}" for each in ("noise", "d/zeros", "x")]
+            places += [place for place, _ in (() if isinstance(listed, str) else listed) if "#@" in place]
+            read = {each: [_member(each, most) for most in (499, 500, 4999, 5000)] for each in places}
+            found[name] = [listed, read]
+    return found
+
+
+def _member(location, most):
+    found = _answer(containers.read_member, location, "name", most)
+    return found if isinstance(found, str) else [len(found), sum(found)]
+
+
 def _tiff(**layout):
     file = io.BytesIO()
     tifffile.imwrite(file, disparity_map().astype(np.float32), metadata=None, **layout)
@@ -307,6 +343,7 @@ CASES = {
         for shape in ((4, 6), (5, 7), (4, 6, 3), (1, 1))
         for layout in ("left-right", "top-bottom")
     ],
+    "members": _members,
     **answers.CASES,
     **small_bags.CASES,
     "listed": lambda: [naming.listed("abcdefg"[:count]) for count in range(6)],

@@ -297,6 +297,9 @@ CASES = {
         for disparity, horizon in ((0.0, -5.0), (0.2, 39.0), (-0.2, 39.5), (95.8, 0.0), (96.0, 1e9))
     },
     "v-disparity alone": lambda: _picture(draw_v_disparity, _histogram(beyond=12)),
+    "v-disparity with one count beyond all": lambda: _picture(
+        draw_v_disparity, _histogram(1200, beyond=10**6)
+    ),
     "v-disparity with few beyond": lambda: _picture(draw_v_disparity, _histogram(beyond=15), horizon=119.0),
     "v-disparity in many bins": lambda: _picture(
         draw_v_disparity, _histogram(bins=800, top=200.0), (-40, 2, 0), horizon=-1.0

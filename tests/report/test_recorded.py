@@ -73,7 +73,7 @@ def _mixed():
         row("maps/b.png", 2.0, 0.2),
         row("other/c.png", 1.5, 0.9, "suspect", "the interval is wide; " * 15),
         row("other/d.png", None),
-        row("e.png", -1.0004, 0.0042),
+        row(f"{'e' * 40}.png", -1.0004123456, 0.0042),
         row("e\udcff.png", 0.5, None),
         row("folder/" * 9 + "<b>g</b>&amp;.png", 0.0, 0.3),
         row("off.png", -80.0, 20.0, "suspect", "one line"),

@@ -94,6 +94,8 @@ def test_pictures_come_from_the_images_that_estimate_wrote(folder, images):
     shutil.rmtree(folder / "maps")
     done = report(folder, "out/rolls.csv", "--images", images)
     assert done.status == 0, done.err
+    (page,) = folder.glob("*.html")
+    assert f", {page.stat().st_size / 1e6:.1f} MB" in done.err
     # of the map itself nothing is left; the level map gives its v-disparity too
     assert len(PICTURES.findall(page_of(folder))) == (3 if images == "out/v" else 6)
     assert page_of(folder).count("maps/frame0.png: there is no map of it among the images") == 1

@@ -16,7 +16,7 @@ from rollcli.rig.formats.yaml import parse_yaml
 from rollcli.rig.pose import horizon_row, pose_jacobian, taken_as_exact, with_pose
 from rollcli.rig.quantities import ALIGNMENT, HEIGHT, PITCH, ROLL
 from rollcli.rig.read_calibration import parse_calibration
-from rollcli.rig.words import answer, counts, findings, now_in_words, one_line
+from rollcli.rig.words import answer, counts, drift_in_words, findings, now_in_words, one_line
 from tests.estimator.synthetic_maps import bent_road
 from tests.recorded import check, made
 from tests.rig import calibration_files as files
@@ -71,6 +71,9 @@ def _columns(name, folder="run/", stamps=None, **others):
 RIGS = {
     "one": lambda: _columns("brief", right_lower_px=0.2, right_twist_px=0.1),
     "drifting": lambda: _columns("a drift", stamps=lambda place: 1403636579763555584 + place * 50_000_000),
+    "recorded": lambda: _columns(
+        "a drift", "m.mcap#/left@", lambda place: 1403636579763555584 + place * 10**10
+    ),
     "few": lambda: _columns("seven"),
     "two drives": lambda: _joined(_columns("brief", "a/1/"), _columns("brief and other", "b/2/")),
     "many small": lambda: _joined(
@@ -121,6 +124,7 @@ def _rig(name, **options):
         "now": [rig.now(each) for each in quantities],
         "drift": [rig.drift_per_hour(last, each) for each in quantities],
         "words": [one_line(rig), counts(rig), *(now_in_words(rig, each) for each in quantities)],
+        "drift in words": drift_in_words(rig, last) if last else None,
         "findings": [findings(rig), findings(rig, roll=False)],
         "drives": [
             [each.name, len(each.frames), each.change, each.differs, rig.name_of(each)] for each in rig.drives

@@ -1,7 +1,10 @@
 """What matching finds in pairs of every kind; see `tests.recorded`."""
 
+import json
 import math
+import tempfile
 from functools import cache, partial
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -11,7 +14,7 @@ from rollcli.errors import RollcliError
 from rollcli.estimator.road.find import road_plane
 from rollcli.simulate.build import render_frame
 from rollcli.simulate.spec import FrameSpec
-from rollcli.stereo.alignment import level
+from rollcli.stereo.alignment import level, seen_from_right
 from rollcli.stereo.match import StereoOptions, Wanted, match_pair
 from rollcli.stereo.misalignment import Misalignment
 from tests.recorded import check
@@ -20,8 +23,8 @@ SIZE = (224, 160)
 
 
 @cache
-def _scene(scene="street", seed=3):
-    frame = render_frame(FrameSpec(scene, math.radians(4), 0.06, size=SIZE, focal=150.0, seed=seed))
+def _scene(scene="street", seed=3, size=SIZE, focal=150.0):
+    frame = render_frame(FrameSpec(scene, math.radians(4), 0.06, size=size, focal=focal, seed=seed))
     return frame.left, frame.right
 
 
@@ -62,9 +65,12 @@ def _match(views, odd=None, wanted=None, **options):
         "shape": shape,
         "valid": len(disparity) / found.disparity.size,
         "quartiles": np.percentile(disparity, (25, 50, 75)).tolist(),
+        "mean": float(disparity.mean()),
+        "valid in rows": [float((rows > 0).mean()) for rows in np.array_split(found.disparity, 8)],
         "whole": None if found.whole is None else float((found.whole > 0).mean()),
         # px: how far each part moves a corner
         "corrected": found.corrected.shifts(*shape),
+        "lies": found.lies and found.lies.shifts(*shape),
         "measured": measured
         and [measured.misalignment.shifts(*shape), measured.errors.shifts(*shape), measured.spread],
         "share": measured and measured.share,
@@ -72,6 +78,20 @@ def _match(views, odd=None, wanted=None, **options):
         "doubt": found.doubt,
         "end": found.end_fraction,
     }
+
+
+def _corrected(odd, columns=None, **options):
+    """A pair that is levelled as a file says: 3 px lower, at twice the size."""
+    lies = {
+        "right_lower_px": 6.0,
+        "right_clockwise_deg": 0.0,
+        "right_larger_percent": 0.5,
+        "right_twist_px": 0.4,
+    }
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "correction.json")
+        path.write_text(json.dumps({**lies, "width": 448, "height": 320, "columns": columns}), "utf-8")
+        return _match(_scene, odd, align=str(path), **options)
 
 
 def _swapped():
@@ -83,8 +103,18 @@ def _other():
     return _scene()[0], _scene("open", 9)[1]
 
 
+FULL, HIGH = partial(_scene, size=(448, 320), focal=300.0), partial(_scene, size=(192, 304), focal=160.0)
 ODD = {"clockwise_deg": 0.6, "larger_percent": 0.8, "lower": -3.0}
-LIES = Misalignment(1.5, 0.01, -0.004, 2e-5)
+LIES = Misalignment(1.5, 0.01, -0.004, 2e-5, 0.02, 1e-5)
+# a third of the size, with a gap and a box that hides a part of the rest
+_NEAR = np.tile(np.arange(54, dtype=np.float32)[:, None] / 4, (1, 75))
+_NEAR[20:30, 40:50], _NEAR[40:44] = 12, 0
+
+
+def _levelled(near):
+    return level(cv2.cvtColor(_scene()[1], cv2.COLOR_BGR2GRAY), LIES, near).astype(float)
+
+
 CASES = {
     "level": partial(_match, _scene),
     "verge": partial(_match, partial(_scene, "verge", 6)),
@@ -94,8 +124,21 @@ CASES = {
     "odd": partial(_match, _scene, ODD),
     "far off": partial(_match, _scene, {"clockwise_deg": 2.5, "lower": 14.0}),
     "as it is": partial(_match, _scene, ODD, align="off"),
+    "corrected": partial(_corrected, {"lower": 3.0, "larger_percent": 0.5}),
+    "corrected, of known columns": partial(
+        _corrected,
+        {"lower": 3.0},
+        {"scale": 0.004, "twist": 2e-5, "pitch": 1e-5, "slope_error": 1e-3},
+        downscale=1.2,
+        num_disparities=64,
+    ),
+    "corrected otherwise": partial(_corrected, {"lower": -3.0}),
     "given": partial(_match, _scene, {"lower": 2.0}, vertical_offset=2.0),
     "along the road": partial(_match, _scene, None, Wanted(road=_road)),
+    "along a road of full size": partial(_match, FULL, None, Wanted(road=_road)),
+    "along a road in a high view": partial(_match, HIGH, ODD, Wanted(road=_road)),
+    "a high view, whole": partial(_match, HIGH, ODD, Wanted(slice(40, 290), _road, whole=True)),
+    "some rows of full size": partial(_match, FULL, ODD, Wanted(slice(140, 300), _road, whole=True)),
     "some rows": partial(_match, _scene, None, Wanted(slice(70, 150), _road, whole=True)),
     "smaller": partial(_match, _scene, None, downscale=1.5),
     "five ways": partial(_match, _scene, None, mode="sgbm", num_disparities=48, block_size=7),
@@ -106,13 +149,16 @@ CASES = {
     "swapped": partial(_match, _swapped),
     "two scenes": partial(_match, _other),
     "one image": partial(_match, lambda: (_scene()[0],) * 2),
-    "levelled": lambda: level(cv2.cvtColor(_scene()[1], cv2.COLOR_BGR2GRAY), LIES).astype(float),
+    "levelled": lambda: [_levelled(None), _levelled(seen_from_right(_NEAR))],
+    "seen from the right": lambda: seen_from_right(_NEAR),
     "lies": lambda: [
         LIES.resized(0.5),
         LIES.times(2.0),
         LIES.shifts(100, 300),
         LIES.reach_in_rows(100, 300, 20, 70),
         LIES.rotation_deg,
+        LIES.matrix(100, 300),
+        Misalignment.of_values((1.5, -0.5, 0.4, 2.0), 100, 300),
     ],
 }
 

@@ -1,9 +1,12 @@
 """Small bags, byte by byte, whole and with damages, and what is read of them."""
 
 import bz2
+import contextlib
 import json
+import math
 import os
 import re
+import sqlite3
 import struct
 import tempfile
 from functools import partial
@@ -87,6 +90,29 @@ def _ros1(compression=None, pack=bytes, *, more=0, indexed=True, **further):
     index = len(start) + len(opening(0)) + len(inside) if indexed else 0
     other = _fields(op=b"\x06", ver=number(1)) + _sized(bytes(5))
     return start + opening(index) + inside + (b"".join(topics) if indexed else b"") + other
+
+
+_TABLES = """
+CREATE TABLE topics (id INTEGER PRIMARY KEY, name, type, serialization_format);
+CREATE TABLE messages (id INTEGER PRIMARY KEY, topic_id, timestamp, data);
+INSERT INTO topics VALUES (1, '/a', 'sensor_msgs/msg/Image', 'cdr'), (3, '/b', 'x/y', 'json');
+INSERT INTO topics VALUES (4, 'none', 'x/msg/z', '');
+"""
+
+
+def _db3(*changes, page=512, lost=0):
+    """A base of pages of a size, changed, whose end may be lost."""
+    if not hasattr(sqlite3.Connection, "blobopen"):
+        pytest.skip("before Python 3.11 the beginning of a message is all of it")
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "x")
+        with contextlib.closing(sqlite3.connect(path)) as base:
+            base.executescript(f"PRAGMA page_size={page};{_TABLES}")
+            long = [each * 40 for each in _DATA]
+            found = zip((1, 3, 4, 1, 9, 3), (*_TIMES, 2, 3, None), (*_DATA, *long), strict=True)
+            base.executemany("INSERT INTO messages VALUES (NULL, ?, ?, ?)", found)
+            base.executescript(";".join(changes))
+        return path.read_bytes()[: -lost or None]
 
 
 def _sized(data):
@@ -252,7 +278,13 @@ def _compressed(form, data):
 def _raw(changes):
     """What becomes of a raw view: what is between pixels differs from version to version of OpenCV."""
     found = _content(_image("mono8", 4, 3, 4), raw_of=_camera(changes))
-    return found if isinstance(found, str) or "d" not in changes else found[:2]
+    return found if isinstance(found, str) or not changes.keys() & {"d", "model"} else found[:2]
+
+
+def _of_decoded(function, form="cdr", **fields):
+    """What a function makes of a message that is decoded already."""
+    with mock.patch.object(messages, "_decoded", return_value=SimpleNamespace(**fields)):
+        return made(function, Topic("/a", messages.IMAGE, form), memoryview(b""), "x")
 
 
 CASES = {
@@ -276,6 +308,16 @@ CASES = {
         for each in ("zstd", "lz4")
         for lost in (150_000, 1_000)
     },
+    "bag: db3": lambda: [
+        _read(_db3()),
+        _read(_db3("UPDATE messages SET data = 'text' WHERE id = 2")),
+        _read(_db3("UPDATE messages SET data = NULL, timestamp = 'soon' WHERE id = 3")),
+        _read(_db3("DROP TABLE topics")),
+        _read(_db3("DROP TABLE messages")),
+        _read(_db3("DELETE FROM topics WHERE id > 1")),
+        *(_shortly(_db3(lost=pages * 512)) for pages in range(18)),
+        *(_shortly(_db3(page=65536, lost=each)) for each in (0, 1, 65000, 70000)),
+    ],
     "bag: no bag": lambda: [
         _read(each) for each in (b"", b"MCAP", b"SQLite format 3", _MAGIC, _ros1(encryptor=b"rosbag/Aes"))
     ],
@@ -290,6 +332,14 @@ CASES = {
         _compressed("16UC1; compressedDepth", b"head\x89PNG\r\n\x1a\nrest"),
         _compressed("16UC1; compressedDepth", b"head"),
         _compressed("jpeg", b"head\x89PNG\r\n\x1a\nrest"),
+    ],
+    "baselines": lambda: [
+        [_of_decoded(messages.baseline_of, t=each), _of_decoded(messages.baseline_of, "ros1", T=each)]
+        for each in (0.5, -0.25, math.nan, -math.inf)
+    ],
+    "videos in messages": lambda: [
+        _of_decoded(messages.check_format, format=each)
+        for each in ("jpeg", "h264", "H.265 of a long name, main", "hevc", "a vp9", "av1", "bgr8; png")
     ],
     "raw views": lambda: [_raw(each) for each in INPUTS["raw views"]],
 }

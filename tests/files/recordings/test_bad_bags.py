@@ -7,7 +7,7 @@ import sqlite3
 import cv2
 import pytest
 
-from tests.files.recordings.bag_files import camera_info, compressed, disparity_image, image, write_bag
+from tests.files.recordings.bag_files import camera_info, image, write_bag
 from tests.files.recordings.small_bags import mcap
 from tests.files.recordings.test_bags import START, STEP, P, drive, maps, rows
 from tests.run_cli import rollcli, write_pair
@@ -44,56 +44,6 @@ def test_sizes_that_change_within_a_drive_are_told(tmp_path, views):
     assert [row["height"] for row in found] == ["120", "", "100"]
 
 
-def test_a_camera_info_without_p_is_told(tmp_path, views):
-    def make(store):
-        for place in range(2):
-            stamp = START + place * STEP
-            for side, view in zip(("left", "right"), views, strict=True):
-                yield f"/{side}/camera_info", stamp, camera_info(store, stamp, (160, 120), NO_P)
-                yield f"/{side}/image_raw", stamp, image(store, view, "mono8", stamp)
-            yield "/disparity", stamp, disparity_image(store, maps(1)[0], stamp)
-
-    path = write_bag(tmp_path, "drive", "mcap", make).name
-    line = "no CameraInfo with a principal point (P): no pitch and no height without --calib"
-    found = rollcli("estimate", path, "--topic", "/disparity", cwd=tmp_path)
-    assert (found.status, f"{path}: {line}" in found.err) == (0, True)
-    given = ["--left-topic", "/left/image_raw", "--right-topic", "/right/image_raw"]
-    for command in (["estimate"], ["disparity", "-o", "maps"]):
-        done = rollcli(*command, path, *given, cwd=tmp_path)
-        assert (done.status, f"{path}: {line}" in done.err) == (0, True), done.err
-        assert "/left/image_raw: raw views are taken as they are" in done.err
-    assert len(list((tmp_path / "maps").iterdir())) == 2
-
-
-def test_topics_that_no_decoder_is_for_are_refused_with_a_line(tmp_path):
-    def make(store):
-        yield "/camera", START, camera_info(store, START, (160, 120), P)
-
-    path = write_bag(tmp_path, "drive", "mcap", make).name
-    for given, expected in (
-        ([], "its topics: /camera"),
-        (["--topic", "/camera"], "messages of the type sensor_msgs/CameraInfo, not images of ROS"),
-        (["--left-topic", "/camera", "--right-topic", "/camera"], "/camera has messages of the type"),
-        (["--topic", "/other"], "has no topic /other; its topics: /camera"),
-    ):
-        assert expected in refused(tmp_path, path, *given)
-
-
-def test_video_in_compressed_images_is_refused_with_a_line(tmp_path):
-    def make(store):
-        for topic in ("/l", "/r"):
-            yield topic, START, compressed(store, b"\0\0\0\1\x67" + bytes(500), "h264", START)
-
-    path = write_bag(tmp_path, "drive", "mcap", make).name
-    err = refused(tmp_path, path, "--left-topic", "/l", "--right-topic", "/r")
-    assert "/l holds video (h264), which must be decoded in order" in err
-
-
-@pytest.mark.parametrize("url", ["s3://bucket/drive.mcap", "http://127.0.0.1:9/drive.bag", "gs://b/d.db3"])
-def test_bags_in_buckets_are_refused_with_a_line(tmp_path, url):
-    assert f"{url}: recordings are read from local disk: download it first" in refused(tmp_path, url)
-
-
 def test_without_the_extra_a_line_says_what_to_install(tmp_path):
     path = write_bag(tmp_path, "drive", "mcap", drive(1)).name
     (tmp_path / "hidden" / "rosbags").mkdir(parents=True)
@@ -101,17 +51,6 @@ def test_without_the_extra_a_line_says_what_to_install(tmp_path):
     said = rollcli("estimate", path, cwd=tmp_path, PYTHONPATH=str(tmp_path / "hidden")).refused()
     assert f"{path} needs the extra bags: " in said
     assert "pip install rosbags" in said
-
-
-def test_frames_that_a_bag_does_not_have_are_an_error_of_theirs(tmp_path):
-    path = write_bag(tmp_path, "drive", "mcap", drive(1)).name
-    done = rollcli("estimate", f"{path}#/nothing@5", f"{path}#/stereo/disparity@5", cwd=tmp_path)
-    assert (done.status, [row["message"] for row in rows(done.out)]) == (
-        3,
-        [f"no such topic in {path}", f"no such frame in {path}"],
-    )
-    done = rollcli("estimate", path, "--encoding", "foundationstereo", cwd=tmp_path)
-    assert (done.status, rows(done.out)[0]["message"]) == (3, "is a frame of a recording, and no file")
 
 
 def test_a_topic_without_messages_is_refused_with_a_line(tmp_path):

@@ -161,38 +161,6 @@ def test_raw_views_are_rectified_and_a_line_says_so(tmp_path, transport):
     assert found["height_m"] != ""
 
 
-def test_numbers_of_images_and_compressed_ones_are_read(tmp_path):
-    values = maps(1)[0]
-    whole = np.rint(values * 256).astype(np.uint16)
-    depth = np.where(values > 0, 350 * 0.5 / np.maximum(values, 1e-3), 0).astype(np.float32)
-
-    def make(store):
-        yield "/disparity16", START, image(store, whole.astype(">u2"), "mono16", START)
-        yield "/depth", START, image(store, depth, "32FC1", START)
-        yield (
-            "/png/compressed",
-            START,
-            compressed(store, cv2.imencode(".png", whole)[1].tobytes(), "png", START),
-        )
-        yield "/photo", START, image(store, np.zeros((*whole.shape, 3), np.uint8), "bgr8", START)
-        yield "/short", START, image(store, whole, "mono8", START)
-
-    path = write_bag(tmp_path, "drive", "db3", make).name
-    np.save(tmp_path / "whole.npy", whole)
-    expected = rows(rollcli("estimate", "whole.npy", cwd=tmp_path).out)[0]["roll_deg"]
-    refusal = rollcli("estimate", path, cwd=tmp_path).refused()
-    assert "give one of --topic /depth or --topic /disparity16" in refusal
-    for topic in ("/disparity16", "/png/compressed"):
-        assert rows(rollcli("estimate", path, "--topic", topic, cwd=tmp_path).out)[0]["roll_deg"] == expected
-    numbers = ["--encoding", "depth", "--focal", "350", "--principal-point", "80,60", "--baseline", "0.5"]
-    found = rows(rollcli("estimate", path, "--topic", "/depth", *numbers, cwd=tmp_path).out)[0]
-    assert float(found["roll_deg"]) == pytest.approx(float(expected), abs=0.02)
-    refusal = rollcli("estimate", path, "--topic", "/nothing", cwd=tmp_path).refused()
-    assert "has no topic /nothing; its topics: /depth (sensor_msgs/Image)" in refusal
-    photo = rollcli("estimate", path, "--topic", "/photo", cwd=tmp_path)
-    assert (photo.status, rows(photo.out)[0]["status"]) == (3, "error")
-
-
 @pytest.mark.parametrize("kind", mostly_slow(["bag", "db3", "mcap"], "bag"))
 def test_a_bag_that_is_cut_gives_every_whole_message_and_a_line(tmp_path, kind):
     frames = [

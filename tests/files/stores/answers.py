@@ -102,7 +102,9 @@ def _done(doing, kinds):
     def treat(method, target):
         parts = urlsplit(target)
         query = " ".join(f"{name}={value}" for name, value in sorted(parse_qsl(parts.query)))
-        asked.append(f"{method} {unquote(parts.path)} {query}".strip())
+        # an older obstore asks for each object to be removed, a newer one for all of a list
+        removes = doing == "remove" and method in ("DELETE", "POST")
+        asked.append("DELETE" if removes else f"{method} {unquote(parts.path)} {query}".strip())
         return left.pop(0) if len(left) > 1 else left[0]
 
     with (
