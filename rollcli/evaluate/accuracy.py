@@ -22,7 +22,7 @@ from rollcli.files.results import Result, Row, csv_table, read_result, run_path
 from rollcli.files.search import Search
 from rollcli.files.stream import is_stream, write_output
 from rollcli.messages import say
-from rollcli.run.outputs import is_dry_run
+from rollcli.run.outputs import listed_only
 from rollcli.run.resume import recorded_options
 
 LARGE_ERROR_DEG = 0.5
@@ -374,7 +374,7 @@ def run_accuracy(options: AccuracyOptions) -> ExitStatus:
     """
     result, truth, running = options.result, options.truth, options.running
     writes = [] if is_stream(options.output) else [options.output]
-    if is_dry_run([result, truth], writes, running):
+    if listed_only([result, truth], writes, running):
         return ExitStatus.DONE
     read, known = read_result(result), read_truth(truth)
     found = assess(read.rows, known, result)

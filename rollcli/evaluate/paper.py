@@ -14,7 +14,7 @@ from rollcli.files.matching import stem_of
 from rollcli.files.stream import write_output
 from rollcli.run.find import Named, map_frames
 from rollcli.run.frame import Frame
-from rollcli.run.outputs import is_dry_run
+from rollcli.run.outputs import listed_only
 from rollcli.run.progress import Progress
 from rollcli.run.workers.chunks import Work, Workers
 from rollcli.run.workers.interrupt import stop_on_signals
@@ -63,7 +63,7 @@ def run_paper(options: PaperOptions) -> ExitStatus:
     names = [f"{name}.{kind}" for name in FIGURES.values()] if kind is not None else []
     writes = [str(Path(folder, name)) for name in (*(f"{name}.csv" for name in TABLES), *names, PAGE)]
     reads = [path for frame in frames for path in frame.reads()]
-    if is_dry_run(reads, writes, options.running):
+    if listed_only(reads, writes, options.running):
         return ExitStatus.DONE
     return _run(frames, truth, options)
 

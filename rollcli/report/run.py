@@ -16,7 +16,7 @@ from rollcli.report.sources import Choice, Subject, choose, subjects
 from rollcli.report.summary import common_run, frame_count
 from rollcli.rig.drive.assess import RigAssessment, assess_rig
 from rollcli.run.options import EncodingOptions, FrameOptions
-from rollcli.run.outputs import is_dry_run
+from rollcli.run.outputs import listed_only
 from rollcli.run.progress import Progress
 from rollcli.run.resume import recorded_options
 from rollcli.run.rig import order_of, origins_of
@@ -71,7 +71,7 @@ def run_report(options: ReportOptions) -> ExitStatus:
     page = [] if options.output is None or is_stream(options.output) else [options.output]
     charts = [path for name in chart_names(joined.rows) for path in options.chart_paths(name).values()]
     writes = [*charts, *page]
-    if is_dry_run(reads, writes, options.running):
+    if listed_only(reads, writes, options.running):
         return ExitStatus.DONE
     return _write(options, joined, chosen, found, rig)
 

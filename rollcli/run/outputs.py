@@ -203,7 +203,7 @@ def check_writes(reads: Sequence[str], writes: Sequence[str], *, overwrite: bool
         check_nothing_is_there(writes)
 
 
-def is_dry_run(reads: Sequence[str], writes: Sequence[str], running: RunningOptions) -> bool:
+def listed_only(reads: Sequence[str], writes: Sequence[str], running: RunningOptions) -> bool:
     """Check what would be read and written (see `check_writes`); list it where that is all that was asked."""
     check_writes(reads, writes, overwrite=running.overwrite)
     if running.dry_run:

@@ -23,7 +23,7 @@ from rollcli.rig.words import findings
 from rollcli.run.find import Calibrations
 from rollcli.run.frame import Frame
 from rollcli.run.options import FrameOptions, RigOptions
-from rollcli.run.outputs import is_dry_run
+from rollcli.run.outputs import listed_only
 from rollcli.run.read import FRAME_ERRORS, read_views, wanted_of
 from rollcli.run.result_rows import frame_of_row
 from rollcli.run.resume import recorded_options
@@ -255,7 +255,7 @@ def run_rig(options: RigOptions) -> int:
     if len(set(reads)) < len(reads):
         raise UsageError(f"{next(each for each in reads if reads.count(each) > 1)}: is named twice")
     check_options(options.gates)
-    if is_dry_run(reads, writes, options.running):
+    if listed_only(reads, writes, options.running):
         return 0
     source = read_source(options.results)
     rig, missing, after, changes = _assessed(source, options), source.missing, None, dict[str, Estimate]()
