@@ -17,6 +17,7 @@ from rollcli.simulate.spec import FrameSpec
 from rollcli.stereo.alignment import level, seen_from_right
 from rollcli.stereo.match import StereoOptions, Wanted, match_pair
 from rollcli.stereo.misalignment import Misalignment
+from rollcli.stereo.row_fit import ColumnEvidence, column_support
 from tests.recorded import check
 
 SIZE = (224, 160)
@@ -94,6 +95,15 @@ def _corrected(odd, columns=None, **options):
         return _match(_scene, odd, align=str(path), **options)
 
 
+def _drive():
+    """What pairs of one rig say together of its columns, px in the corners."""
+    views = _scene(), _scene(seed=4), _scene("open", 9)
+    found = [match_pair(left, _moved(right, **ODD), StereoOptions()).measured for left, right in views]
+    told = column_support(ColumnEvidence.of_drive([each.evidence for each in found]))
+    parts = Misalignment(scale=told.scale, twist=told.twist, curve=told.pitch)
+    return {"columns": parts.shifts(*SIZE[::-1]), "slope_error_px": told.error * SIZE[0]}
+
+
 def _swapped():
     left, right = _scene()
     return right, left
@@ -146,6 +156,7 @@ CASES = {
     "from four on": partial(_match, _scene, None, min_disparity=4, num_disparities=48),
     "texture": partial(_match, _texture),
     "texture of a slope": partial(_match, partial(_texture, 4.0, 0.3), {"lower": 1.0}),
+    "a drive": _drive,
     "swapped": partial(_match, _swapped),
     "two scenes": partial(_match, _other),
     "one image": partial(_match, lambda: (_scene()[0],) * 2),
