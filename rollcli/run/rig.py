@@ -314,7 +314,7 @@ def columns_of_drive(rig: RigAssessment, results: Sequence[str]) -> ColumnSuppor
             measured = match_pair(left, right, options.stereo, wanted_of(None, options)).measured
         except FRAME_ERRORS:  # the pairs that are left may be enough
             continue
-        if measured is not None and measured.evidence is not None:
+        if measured is not None:
             found.append(measured.evidence)
     same = [each for each in found if (each.shape, each.factor) == (found[-1].shape, found[-1].factor)]
     return column_support(ColumnEvidence.of_drive(same)) if len(same) >= _FEWEST else None

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.stereo.misalignment import LEVEL, NOTHING_KNOWN, ColumnSupport, Misalignment
+from rollcli.stereo.misalignment import LEVEL, ColumnSupport, Misalignment
 from rollcli.stereo.row_fit import (
     ColumnEvidence,
     MeasuredRows,
@@ -66,7 +66,7 @@ class Measured:
         Standard error of each part.
     spread : float
         Standard deviation of their vertical disparities from what is explained, outliers aside, pixels.
-    rows : MeasuredRows or None
+    rows : MeasuredRows
         The vertical disparities of the blocks.
     """
 
@@ -74,23 +74,22 @@ class Measured:
     errors: Misalignment
     share: float
     spread: float
-    rows: MeasuredRows | None = None
+    rows: MeasuredRows
 
     @property
-    def evidence(self) -> ColumnEvidence | None:
+    def evidence(self) -> ColumnEvidence:
         """What the rows say of the columns; worked out when it is asked for: most measurements need none."""
-        return None if self.rows is None else column_evidence(self.rows, self.spread)
+        return column_evidence(self.rows, self.spread)
 
     @cached_property
     def support(self) -> ColumnSupport:
         """What of it is believed to be in the columns, too."""
-        evidence = self.evidence
-        return NOTHING_KNOWN if evidence is None else column_support(evidence)
+        return column_support(self.evidence)
 
     def resized(self, factor: float) -> "Measured":
         """Return this measurement, of views `factor` times as large."""
         there, errors = self.misalignment.resized(factor), self.errors.resized(factor)
-        rows = self.rows and self.rows._replace(factor=factor * self.rows.factor)
+        rows = self.rows._replace(factor=factor * self.rows.factor)
         return Measured(there, errors, self.share, factor * self.spread, rows)
 
 

@@ -17,7 +17,7 @@ SURE = Misalignment(0.001, 1e-6, 1e-6, 1e-9)
 
 
 def lies(*values, error=0.0):
-    return Measured(Misalignment(*values), Misalignment(error) if error else SURE, 0.5, 0.1)
+    return Measured(Misalignment(*values), Misalignment(error) if error else SURE, 0.5, 0.1, None)
 
 
 class Rig:

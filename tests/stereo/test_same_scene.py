@@ -16,7 +16,7 @@ SAME, SWAPPED, TWO = "image are the same", "the views seem swapped", "do not sho
 
 
 def says(share):
-    return None if share is None else Measured(LEVEL, LEVEL, share, 0.1)
+    return None if share is None else Measured(LEVEL, LEVEL, share, 0.1, None)
 
 
 def refusal(monkeypatch, *, textured=(1.0, 1.0), before=0.0, after=0.0, swapped=0.0, views=(ONE, OTHER)):

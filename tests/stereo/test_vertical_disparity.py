@@ -290,7 +290,7 @@ def test_views_too_narrow_to_search_have_no_disparities():
 
 
 def measured(offset=0.0, scale=0.0, error=0.01, spread=0.1, rotation=0.0):
-    return Measured(Misalignment(offset, rotation, scale), Misalignment(error), 0.5, spread)
+    return Measured(Misalignment(offset, rotation, scale), Misalignment(error), 0.5, spread, None)
 
 
 @pytest.mark.parametrize(
