@@ -35,7 +35,7 @@ from tests.estimator.synthetic_maps import bent_road
 from tests.recorded import check, made
 
 ANGLES = ((-1.0, 1.0, 0.3), (0.0, 5.0, 2.0), (0.0, 0.3, 0.1), (1.0, 2.95, 1.0), (-8.0, -8.0, 3.0))
-TURNS = [math.radians(turn) for turn in (-20, -3.5, 12)]
+TURNS = [math.radians(turn) for turn in (-38, -3.5, 12)]
 
 
 @cache
