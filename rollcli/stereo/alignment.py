@@ -275,7 +275,7 @@ def _may_tell(down: Floats) -> NDArray[np.bool_]:
 
     What is left of a block's squares is no more than all of them, over a count of `_KNOWN` of it or more.
     """
-    varies = np.einsum("ij,ij->i", down, down) / BLOCK**2 - np.square(np.einsum("ij->i", down) / BLOCK**2)
+    varies = np.einsum("ij,ij->i", down, down) / BLOCK**2 - np.square(down.mean(axis=1))
     enough: NDArray[np.bool_] = varies > np.float32(_LEAST * _KNOWN * _ROUNDING)
     return enough
 

@@ -33,7 +33,6 @@ from rollcli.stereo.views import (
     seen_at,
     shrink_both,
     smoothed_at_pixels,
-    strips,
 )
 
 Plane = tuple[float, float, float]
@@ -141,14 +140,10 @@ class Levelled:
         large, see `views.smoothed_between`; the left view is as smooth.
         """
         left, right = self._views
-        across = np.arange(self.shape[1], dtype=np.float32) + np.float32(middle)
-        down = np.arange(self.shape[0], dtype=np.float32)[rows, None]
-        warped = np.empty(plane.shape, np.uint8)
-        for strip in strips(len(plane)):
-            near = plane[strip]
-            u, v = seen_at(self._lies, across - near, down[strip], self.shape, near)
-            warped[strip] = grey_along(right, u, np.broadcast_to(v, u.shape))
-        return smoothed_at_pixels(left[rows]), warped
+        u = np.arange(self.shape[1], dtype=np.float32) + np.float32(middle) - plane
+        v = np.arange(self.shape[0], dtype=np.float32)[rows, None]
+        u, v = seen_at(self._lies, u, v, self.shape, plane)
+        return smoothed_at_pixels(left[rows]), grey_along(right, u, np.broadcast_to(v, u.shape))
 
 
 def match_for_road(pair: Levelled, rows: slice, *, whole: bool = False) -> Map:
@@ -182,7 +177,7 @@ def match_for_road(pair: Levelled, rows: slice, *, whole: bool = False) -> Map:
     if whole:
         disparity = match_all(rows)
         if near is not None:
-            np.copyto(disparity[top:stop], near.disparity, where=(near.disparity > 0) & near.lies_on)
+            np.copyto(disparity[top:stop], near.disparity, where=near.found & near.lies_on)
         return disparity
     disparity = np.zeros_like(pair.coarse)
     disparity[start:top] = pair.coarse[start:top]
@@ -214,17 +209,20 @@ class _Near(NamedTuple):
     Attributes
     ----------
     disparity : ndarray of float32
-        Pixels; no data is 0.
+        Pixels.
+    found : ndarray of bool
+        Where there is one.
     lies_on : ndarray of bool
         Where the small map is near the plane.
     """
 
     disparity: Map
+    found: NDArray[np.bool_]
     lies_on: NDArray[np.bool_]
 
     def beside(self, coarse: Map) -> Map:
         """Return these rows, off the plane with the disparities of the small map."""
-        return np.where(self.lies_on | (coarse <= 0), self.disparity, coarse)
+        return np.where(self.lies_on | (coarse <= 0), self.disparity * self.found, coarse)
 
 
 def _match_along(pair: Levelled, plane: Plane, rows: slice, coarse: Map) -> _Near | None:
@@ -242,23 +240,20 @@ def _match_along(pair: Levelled, plane: Plane, rows: slice, coarse: Map) -> _Nea
     sixteenths = _match_blocks(views, count)[rows.start - top : rows.stop - top]
     straight = straight[rows.start - top : rows.stop - top]
 
-    end, last = round(_END * count * SUBPIXELS), (count - 1) * SUBPIXELS
+    end = round(_END * count * SUBPIXELS)
+    known = (sixteenths > end) & (sixteenths < (count - 1) * SUBPIXELS - end)
+    shift = sixteenths.astype(np.float32) * np.float32(1 / SUBPIXELS)
+    # the plane is that of the pixel which the right view shows there
+    disparity = np.maximum(straight - across * shift, 0) + (shift - np.float32(count // 2))
+    known &= (disparity > 0) & (disparity <= u)
     seen = coarse[rows]
-    disparity, lies_on = np.empty(straight.shape, np.float32), np.empty(straight.shape, np.bool_)
-    on = found = 0
-    for strip in strips(len(straight)):
-        steps, on_plane, small = sixteenths[strip], straight[strip], seen[strip]
-        shift = steps.astype(np.float32) * np.float32(1 / SUBPIXELS)
-        # the plane is that of the pixel which the right view shows there
-        there = np.maximum(on_plane - across * shift, 0) + (shift - np.float32(count // 2))
-        known = (steps > end) & (steps < last - end) & (there > 0) & (there <= u)
-        near = (np.abs(small - on_plane) < np.float32(_NEAR * count)) & (small > 0)
-        on += int(np.count_nonzero(near))
-        found += int(np.count_nonzero(near & known & (np.abs(small - there) < np.float32(_AS_FAR))))
-        disparity[strip], lies_on[strip] = there * known, near
+    lies_on = np.abs(seen - straight) < np.float32(_NEAR * count)
+    lies_on &= seen > 0
+    on = np.count_nonzero(lies_on)
+    found = np.count_nonzero(lies_on & known & (np.abs(seen - disparity) < np.float32(_AS_FAR)))
     if on < max(1, _FEWEST_ON * np.count_nonzero(seen)) or found < _FEWEST_FOUND * on:
         return None
-    return _Near(disparity, lies_on)
+    return _Near(disparity, known, lies_on)
 
 
 def _match_blocks(views: Views, count: int) -> NDArray[np.int16]:

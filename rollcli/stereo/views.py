@@ -150,16 +150,19 @@ _STRIP = 24  # rows: what they need of a view twice as large stays in the proces
 
 
 def strips(rows: int) -> Iterator[slice]:
-    """Cut rows into strips: what is done to a few rows at a time takes half the time of all at once."""
+    """Cut rows into strips: arithmetic on a few rows at a time can take a third of the time."""
     for start in range(0, rows, _STRIP):
         yield slice(start, min(start + _STRIP, rows))
 
 
 def grey_along(view: View, u: NDArray[np.float32], v: NDArray[np.float32]) -> View:
-    """Return what `grey_between` does of the view `smoothed_between`, where the points are in a few rows."""
-    top = max(0, min(int(v.min()), len(view)) - 3)  # smoothing sees a row beside each of a point's
-    bottom = max(top, int(v.max())) + 4
-    return grey_between(smoothed_between(view[top:bottom]), u, v - np.float32(top))[2]
+    """Return what `grey_between` does of the view `smoothed_between`, in rows that change little."""
+    grey = np.empty(u.shape, np.uint8)
+    for rows in strips(len(u)):
+        top = max(0, min(int(v[rows].min()), len(view)) - 3)  # smoothing sees a row beside each of a point's
+        bottom = max(top, int(v[rows].max())) + 4
+        grey[rows] = grey_between(smoothed_between(view[top:bottom]), u[rows], v[rows] - np.float32(top))[2]
+    return grey
 
 
 _TO_WHOLE = 1.5 * 2**23  # a float32 of this size has steps of 1, and so has a sum with it
