@@ -216,7 +216,7 @@ def _has_ended(path: Path) -> bool:
 
 
 def take_lock(descriptor: int, name: str) -> None:
-    """Take the lock on an open file, which lasts until the file is closed, or say who has it.
+    """Take the lock on an open file, which lasts until the file is closed.
 
     Raises
     ------
@@ -227,26 +227,9 @@ def take_lock(descriptor: int, name: str) -> None:
     while not _try_lock(descriptor):
         if time.monotonic() > give_up:
             raise UsageError(
-                f"{name}: another run is writing this result{_holders(descriptor)}; wait for it, or give "
-                "another --output"
+                f"{name}: another run is writing this result; wait for it, or give another --output"
             )
         time.sleep(_POLL_S)
-
-
-def _holders(descriptor: int) -> str:
-    """Name the other processes that have a file open, where /proc tells.
-
-    A worker holds the lock as well: one that was stopped keeps it when its run has ended.
-    """
-    wanted, holders = os.fstat(descriptor), []
-    for link in Path("/proc").glob("[0-9]*/fd/*"):
-        with contextlib.suppress(OSError):  # it has ended, or belongs to someone else
-            if os.path.samestat(link.stat(), wanted):
-                holders.append(int(link.parts[2]))
-    others = sorted(set(holders) - {os.getpid()})
-    if not others:
-        return ""
-    return f" (process{'es' if len(others) > 1 else ''} {', '.join(map(str, others))})"
 
 
 def not_resumable(name: str, reason: str) -> UsageError:

@@ -4,7 +4,6 @@ import errno
 import importlib.util
 import os
 import platform
-import subprocess
 import sys
 import threading
 from pathlib import Path
@@ -26,11 +25,6 @@ def result(tmp_path):
     descriptor = os.open(path, os.O_RDWR | os.O_CREAT)
     yield descriptor, str(path)
     os.close(descriptor)
-
-
-@pytest.fixture
-def impatient(monkeypatch):
-    monkeypatch.setattr(locking, "_PATIENCE_S", 0.0)
 
 
 @pytest.fixture
@@ -103,39 +97,6 @@ def test_on_windows_a_result_is_read_from_its_start_once_it_is_locked(result, mo
         assert os.read(descriptor, 4) == b"file"
 
     assert places == [2**30]
-
-
-def holder(*descriptors):
-    """A process that holds open files until its stdin ends."""
-    return subprocess.Popen(
-        [sys.executable, "-c", "import sys; sys.stdin.read()"], stdin=subprocess.PIPE, pass_fds=descriptors
-    )
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="/proc is Linux's")
-def test_who_holds_the_lock_is_named(result, impatient):
-    descriptor, name = result
-    own = os.open(name, os.O_RDWR)
-    held = os.open(name, os.O_RDWR)
-    fcntl.flock(held, fcntl.LOCK_EX)
-    processes = [holder(held) for _ in range(2)]
-    os.close(held)
-    try:
-        for count in (2, 1):
-            numbers = sorted(process.pid for process in processes[:count])
-            who = f" (process{'es' if count > 1 else ''} {', '.join(map(str, numbers))})"
-            with pytest.raises(UsageError) as caught, locking.locked(descriptor, name):
-                pass
-            assert str(caught.value) == (
-                f"{name}: another run is writing this result{who}; wait for it, or give another --output"
-            )
-            processes[count - 1].communicate()
-    finally:
-        for process in processes:
-            process.communicate()
-        os.close(own)
-    with locking.locked(descriptor, name):
-        pass
 
 
 def test_a_lock_is_waited_for_as_long_as_the_workers_of_a_killed_run_take_to_end(result, monkeypatch):
