@@ -4,11 +4,9 @@ import contextlib
 import errno
 import json
 import os
-import platform
 import stat
 import sys
 import time
-import uuid
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -20,7 +18,7 @@ from rollcli.messages import say
 _PATIENCE_S = 2.0
 _POLL_S = 0.05
 
-_LOCK, _BREAK = ".lock", ".break"
+_LOCK = ".lock"
 
 
 class _NoLocksError(Exception):
@@ -146,73 +144,23 @@ def locked_folder(name: str) -> Iterator[int | None]:
 
 @contextlib.contextmanager
 def _lock_file(name: str) -> Iterator[None]:
-    """Make a file that says who writes a result; that of a run on this machine that has ended is replaced.
+    """Make a file, which such file systems do in one step if there is none, and remove it at the end.
 
-    Such file systems make a file that is not there in one step, and rename in one step, but compare nothing.
-    Of those that find the lock of an ended run, the one that makes the file `.lock.break` may look again
-    and rename its own onto it: removing the old one first let two of them both win. (Refusing such file
-    systems would keep their users from working at all.)
+    A run that is killed leaves it: whether it was another machine's, only the user can tell.
     """
     path = Path(f"{name}{_LOCK}")
-    owner = f"{os.getpid()} {platform.node()}\n{uuid.uuid4().hex}\n"
     try:
-        if not _made(path, owner) and not (_has_ended(path) and _replaced(path, owner)):
-            raise UsageError(
-                f"{name}: another run is writing this result; if none is, one was killed: remove {path}*"
-            )
+        path.touch(exist_ok=False)
+    except FileExistsError:
+        raise UsageError(
+            f"{name}: another run is writing this result; if none is, one was killed: remove {path}"
+        ) from None
     except OSError as error:
         raise OutputError(f"{path}: cannot be written: {cause_of(error)}") from error
     try:
         yield
     finally:
-        if _owner_in(path) == owner:
-            path.unlink(missing_ok=True)
-
-
-def _made(path: Path, owner: str) -> bool:
-    """Make a file unless there is one; tell whether it was made."""
-    try:
-        with path.open("x", encoding="utf-8") as file:
-            file.write(owner)
-    except FileExistsError:
-        return False
-    return True
-
-
-def _replaced(path: Path, owner: str) -> bool:
-    """Rename a file of ours onto the lock file of an ended run; tell whether that was done."""
-    ours = path.with_name(f"{path.name}{_BREAK}")
-    if not _made(ours, owner):
-        return False
-    try:
-        if not _has_ended(path):  # another one was here before
-            return False
-        ours.replace(path)
-    finally:
-        if _owner_in(ours) == owner:
-            ours.unlink(missing_ok=True)
-    return True
-
-
-def _owner_in(path: Path) -> str:
-    try:
-        return path.read_text("utf-8")
-    except (OSError, ValueError):
-        return ""
-
-
-def _has_ended(path: Path) -> bool:
-    """Tell whether the run that made a lock file was on this machine and has ended."""
-    try:
-        process, _, machine = _owner_in(path).partition("\n")[0].partition(" ")
-        if machine != platform.node() or sys.platform == "win32":
-            return False
-        os.kill(int(process), 0)
-    except ProcessLookupError:
-        return True
-    except (OSError, ValueError, OverflowError):
-        return False
-    return False
+        path.unlink(missing_ok=True)
 
 
 def take_lock(descriptor: int, name: str) -> None:
