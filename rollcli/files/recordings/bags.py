@@ -17,7 +17,7 @@ from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple, Protocol
+from typing import Any, BinaryIO, NamedTuple
 
 from rollcli.errors import InputError, cause_of
 from rollcli.files.bounded import MOST_BYTES, most_unpacked
@@ -53,44 +53,6 @@ class Message(NamedTuple):
     log_time: int
     place: tuple[int, int]
     data: memoryview
-
-
-class Bag(Protocol):
-    """A bag that is open. `broken` says what was found wrong behind the whole messages; else it is empty."""
-
-    broken: str
-
-    def topics(self) -> dict[str, Topic]:
-        """Return the topics by name."""
-
-    def messages(self, topics: set[str], begins: Collection[str] = ()) -> Iterator[Message]:
-        """Yield every whole message of some topics, in the file's order; of some the beginning will do."""
-
-    def read(self, place: tuple[int, int]) -> Message:
-        """Read one message."""
-
-
-def open_bag(path: str) -> Bag:
-    """Open a bag by its first bytes.
-
-    Raises
-    ------
-    InputError
-        It is none, or cannot be read.
-    """
-    try:
-        with Path(path).open("rb") as file:
-            head = file.read(16)
-        if head.startswith(_MCAP):
-            return _Mcap(path)
-        if head.startswith(_BAG):
-            return _Ros1(path)
-        if head == _SQLITE:
-            return _Sqlite(path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {cause_of(error)}") from None
-    what = "is empty" if not head else "is no ROS 1 bag, MCAP file or sqlite3 bag"
-    raise InputError(f"{path}: {what}")
 
 
 class _BrokenError(Exception):
@@ -485,6 +447,32 @@ class _Sqlite:
         if row is None or not isinstance(row[2], bytes):
             raise InputError(f"{self.path}: there is no whole message {place[0]}")
         return Message(self._names.get(row[0], ""), row[1], place, memoryview(row[2]))
+
+
+Bag = _Mcap | _Ros1 | _Sqlite
+
+
+def open_bag(path: str) -> Bag:
+    """Open a bag by its first bytes; `broken` says what is wrong behind its whole messages, or nothing.
+
+    Raises
+    ------
+    InputError
+        It is none, or cannot be read.
+    """
+    try:
+        with Path(path).open("rb") as file:
+            head = file.read(16)
+        if head.startswith(_MCAP):
+            return _Mcap(path)
+        if head.startswith(_BAG):
+            return _Ros1(path)
+        if head == _SQLITE:
+            return _Sqlite(path)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {cause_of(error)}") from None
+    what = "is empty" if not head else "is no ROS 1 bag, MCAP file or sqlite3 bag"
+    raise InputError(f"{path}: {what}")
 
 
 @lru_cache(maxsize=4)  # a process opens a bag once
