@@ -222,7 +222,7 @@ def _rig(folder, name, *settings):
 def _bag(folder, name, *topics):
     """Write a bag of two moments of topics NAME=KIND[*COUNT][+NS]: so many of them, and so much later.
 
-    Kinds are maps (disparity, depth, mono16, png), views (view, packed, h264), a photograph of a map's size,
+    Kinds are maps (disparity, depth, mono16, png), views (view, packed), a photograph of a map's size,
     and CameraInfo: `info`, of a raw view (`raw`), or without a P (`none`).
     """
     from tests.files.recordings import bag_files
@@ -244,7 +244,7 @@ def _bag(folder, name, *topics):
             return bag_files.camera_info(
                 store, stamp, (width, height), p if kind != "none" else [0.0] * 12, d, k
             )
-        if kind in ("png", "packed", "h264"):
+        if kind in ("png", "packed"):
             data = cv2.imencode(".png", whole if kind == "png" else view)[1].tobytes()
             return bag_files.compressed(store, data, kind, stamp)
         values, encoding = {

@@ -300,9 +300,6 @@ def _scan(files: Sequence[str], wanted: Sequence[Topic], topics: dict[str, Topic
                         cameras.setdefault(message.topic, info)
                         places[path, message.topic] = place
                 continue
-            if topic.type == COMPRESSED and not frames[topic.name]:
-                with contextlib.suppress(InputError):  # a damaged one says so in its row
-                    messages.check_format(topic, bag.read(message.place).data, path)
             stamp = messages.stamp_of(topic, message.data, message.log_time)
             name = f"{path}#{topic.name}@{stamp}"
             seen[name] = seen.get(name, -1) + 1

@@ -1,7 +1,6 @@
 """Messages of ROS to pixels, or to the file that a CompressedImage holds."""
 
 import math
-import re
 import struct
 from dataclasses import dataclass
 from functools import lru_cache
@@ -11,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.errors import InputError, UsageError
+from rollcli.errors import InputError
 from rollcli.extras import require_extra
 from rollcli.files.bounded import MOST_BYTES
 from rollcli.files.codecs import pictures, png
@@ -25,7 +24,6 @@ DISPARITY, IMAGE, COMPRESSED = (
 )
 CAMERA_INFO = "sensor_msgs/CameraInfo"
 MAP_ENCODINGS = ("mono16", "16UC1", "16SC1", "32FC1")  # of images that hold disparities or depths
-_VIDEO = re.compile("h\\.?26[45]|hevc|avc|av1|vp[89]", re.IGNORECASE)
 # numpy's dtype, and the channels
 _PIXELS = {
     **dict.fromkeys(("mono8", "8UC1"), ("u1", 1)),
@@ -109,24 +107,6 @@ def camera_info(topic: Topic, data: memoryview, name: str) -> CameraInfo:
     keys = "DKRP" if topic.encoding == "ros1" else "dkrp"  # ROS 1 calls them by capitals
     fields = {key.lower(): tuple(map(float, getattr(found, key))) for key in keys}
     return CameraInfo(int(found.width), int(found.height), str(found.distortion_model), **fields)
-
-
-def check_format(topic: Topic, data: memoryview, name: str) -> None:
-    """Refuse a CompressedImage that is a part of a video, by what it says of its format.
-
-    Raises
-    ------
-    UsageError
-        It is.
-    InputError
-        It is damaged.
-    """
-    form = str(_decoded(topic, data, name).format)
-    if _VIDEO.search(form):
-        raise UsageError(
-            f"{name}: {topic.name} holds video ({form[:20]}), which must be decoded in order: record images, "
-            "or export it as .mp4"
-        )
 
 
 def image_encoding(topic: Topic, data: memoryview, name: str) -> str:

@@ -337,9 +337,5 @@ CASES = {
         [_of_decoded(messages.baseline_of, t=each), _of_decoded(messages.baseline_of, "ros1", T=each)]
         for each in (0.5, -0.25, math.nan, -math.inf)
     ],
-    "videos in messages": lambda: [
-        _of_decoded(messages.check_format, format=each)
-        for each in ("jpeg", "h264", "H.265 of a long name, main", "hevc", "a vp9", "av1", "bgr8; png")
-    ],
     "raw views": lambda: [_raw(each) for each in INPUTS["raw views"]],
 }
