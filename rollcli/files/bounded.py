@@ -13,10 +13,8 @@ from rollcli.files.atomic import look_at
 MOST_BYTES = 2**30
 MOST_LISTED = 2**28  # of a list of files: two million paths
 MOST_SETTINGS = 2**20  # of a TOML file
-UTF16_MARKS = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 MOST_SMALL = 2**25  # bytes that a small compressed file may stand for: an empty map compresses well
 MOST_EXPANSION = 48  # bytes that each byte of a larger file may stand for; real maps reach 20
-_TOLD_BY = 64  # bytes at the start of a text, by which its encoding is told
 _PIECE = 2**24  # bytes of a file that does not say its size
 _OF_DEVICES = 2**20  # /dev/null has an end, /dev/zero has none
 
@@ -95,30 +93,21 @@ def most_unpacked(packed: int) -> int:
 
 
 def as_utf8(data: bytes, name: str) -> bytes:
-    """Return text as UTF-8 without a mark at its start; Windows writes such marks, and UTF-16.
+    """Return text as UTF-8 without a mark at its start; Windows writes such marks, and UTF-16 behind one.
 
     Raises
     ------
     InputError
-        It is UTF-16 or UTF-32 that cannot be read.
+        It is damaged UTF-16, or UTF-32.
     """
-    if data.startswith(UTF16_MARKS) and not data.startswith(codecs.BOM_UTF32_LE):
-        encoding = "utf-16"
-    elif data[1:2] == b"\0" and b"\n\0" in data and not any(data[1:_TOLD_BY:2]):
-        encoding = "utf-16-le"
-    else:
-        if data.startswith((codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE)) or _is_spread(data[:_TOLD_BY]):
-            raise InputError(f"{name}: is not UTF-8, but UTF-16 or UTF-32; save it as UTF-8")
+    if data.startswith((codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE)):
+        raise InputError(f"{name}: is UTF-32; save it as UTF-8")
+    if not data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return data.removeprefix(codecs.BOM_UTF8)
     try:
-        return data.decode(encoding).encode()
+        return data.decode("utf-16").encode()
     except UnicodeError as error:
         raise InputError(f"{name}: is damaged UTF-16; save it as UTF-8") from error
-
-
-def _is_spread(start: bytes) -> bool:
-    """Tell whether every second byte is 0, as of letters in UTF-16."""
-    return len(start) >= 8 and not (any(start[1::2]) and any(start[::2]))
 
 
 def _limit_of(file: BinaryIO, most: int) -> tuple[int, int]:
