@@ -171,7 +171,7 @@ class Search:
                     views.refuse(relative)
                 yield path, relative
         if none:
-            hint = "" if kind == "pattern" else self._in_place_of_inputs(argument)
+            hint = self._in_place_of_inputs(argument) if kind == "folder" else ""
             raise UsageError(f"{argument}: no input found in this {kind} ({' '.join(self.endings)}){hint}")
 
     def _in_place_of_inputs(self, folder: str) -> str:

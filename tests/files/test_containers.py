@@ -106,6 +106,8 @@ def test_members_that_would_fill_memory_and_packed_archives_are_refused(tmp_path
     with pytest.raises(InputError, match=r"bomb\.zip#a\.npy: has 41943040 bytes; up to 32 MB"):
         read_bytes(tmp_path / "bomb.zip#a.npy")
     assert read_bytes(tmp_path / "bomb.zip#b.npy") == b"fine"
+    with pytest.raises(UsageError, match="no input found in this archive"):
+        list(Search((".png",)).files(str(tmp_path / "bomb.zip")))
     with pytest.raises(UsageError, match=r"unpack it, or pack it as \.zip or \.tar"):
         Search((".png",)).files("run.tar.gz")
 
