@@ -15,14 +15,13 @@ _NUMBERS = ((_NEVER, _NEVER), ("0", "1"), ("2", "3"), ("1", "2"), ("1", "5"), ("
 _NUMBERED = (
     r"((?<![A-Za-z])(?:im|img|image|cam|camera|view)[_-]?|(?<=[A-Za-z0-9])[_-](?=0*{0}$))0*{0}(?![0-9])"
 )
-_LISTED = 3  # how many files a message names
 
 
-def listed(names: Iterable[str]) -> str:
+def listed(names: Iterable[str], most: int = 3) -> str:
     """Join the first few names, and say how many more there are."""
     every = list(names)
-    more = f" and {len(every) - _LISTED} more" if len(every) > _LISTED else ""
-    return ", ".join(every[:_LISTED]) + more
+    more = f" and {len(every) - most} more" if len(every) > most else ""
+    return ", ".join(every[:most]) + more
 
 
 def natural_key(name: str) -> str:

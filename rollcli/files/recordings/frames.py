@@ -19,7 +19,6 @@ from rollcli.files.recordings.messages import CAMERA_INFO, COMPRESSED, DISPARITY
 from rollcli.rig.calibration import Calibration
 
 _VIEWS = (IMAGE, COMPRESSED)
-_LISTED = 20  # topics that an error names
 _RAW = "image_raw"
 _NO_P = "no CameraInfo with a principal point (P): no pitch and no height without --calib"
 
@@ -244,9 +243,8 @@ def _decodable(topics: dict[str, Topic], kind: str) -> list[Topic]:
 def _all(topics: dict[str, Topic]) -> str:
     if not topics:
         return "it has no topics"
-    some = [f"{each.name} ({each.type})" for each in sorted(topics.values(), key=lambda each: each.name)]
-    more = f" and {len(some) - _LISTED} more" if len(some) > _LISTED else ""
-    return f"its topics: {', '.join(some[:_LISTED])}{more}"
+    some = sorted(f"{each.name} ({each.type})" for each in topics.values())
+    return f"its topics: {listed(some, most=20)}"
 
 
 def _only_map_topic(files: Sequence[str], topics: dict[str, Topic], name: str) -> str:
