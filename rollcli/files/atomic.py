@@ -21,17 +21,17 @@ Done = TypeVar("Done")
 
 def is_folder(path: str | Path) -> bool:
     """Tell whether this is a folder, or a link to one."""
-    return stat.S_ISDIR(_mode(path))
+    return stat.S_ISDIR(mode_of(path))
 
 
 def is_file(path: str | Path) -> bool:
     """Tell whether this is a regular file, or a link to one."""
-    return stat.S_ISREG(_mode(path))
+    return stat.S_ISREG(mode_of(path))
 
 
 def is_there(path: str | Path) -> bool:
     """Tell whether this is anything at all; a link to nothing is not."""
-    return _mode(path) != 0
+    return mode_of(path) != 0
 
 
 def look_at(path: str | Path) -> os.stat_result:
@@ -52,12 +52,12 @@ def look_at(path: str | Path) -> os.stat_result:
     return os.stat(path)  # noqa: PTH116
 
 
-def _mode(path: str | Path) -> int:
-    """Return kind and rights of what is there; 0 where nothing is."""
+def mode_of(path: str | Path, unseen: int = 0) -> int:
+    """Return kind and rights of what is there; `unseen` of nothing, and of what cannot be looked at."""
     try:
         return look_at(path).st_mode
     except (OSError, ValueError):
-        return 0
+        return unseen
 
 
 _ON_WINDOWS = os.name == "nt"

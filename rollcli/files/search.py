@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from rollcli.errors import UsageError
-from rollcli.files.atomic import is_file, is_folder
+from rollcli.files.atomic import is_file, is_folder, mode_of
 from rollcli.files.containers import frame_name, is_archive, members, refuse_packed
 from rollcli.files.stores.locations import (
     OBJECT_STORES,
@@ -86,6 +86,7 @@ def _fits(names: Sequence[str], patterns: Sequence[str]) -> bool:
 
 
 _NOWHERE = (0, 0)
+_UNSEEN = stat.S_IFREG  # what cannot be looked at counts as a file, and gets an error row
 _LOOKED_AT = 1000  # names of a folder without inputs, to say what it holds
 _SIDES = (
     {"left", "im0", "image_2", "image_02", "image_0", "image_00"},
@@ -204,7 +205,7 @@ class Search:
                 if entry.name.startswith("."):
                     continue
                 # the folder tells what most entries are; asking for each takes as long as all the rest
-                mode = stat.S_IFREG if entry.is_file(follow_symlinks=False) else _mode(entry.path)
+                mode = stat.S_IFREG if entry.is_file(follow_symlinks=False) else mode_of(entry.path, _UNSEEN)
                 if stat.S_ISDIR(mode):
                     inner.append(entry.path)
                 elif stat.S_ISREG(mode):
@@ -241,7 +242,7 @@ class Search:
             relative = Path(os.path.relpath(path, base))
             inside = {os.path.realpath(base / parent) for parent in relative.parents[:-1]}
             wanted = at_its_word or self._reads(match)
-            if wanted and self._skip.isdisjoint(inside) and stat.S_ISREG(_mode(match)):
+            if wanted and self._skip.isdisjoint(inside) and stat.S_ISREG(mode_of(match, _UNSEEN)):
                 below = "/".join(part for part in relative.parts if part != "..")  # outputs stay below
                 if is_archive(match):
                     yield from ((each, f"{below}/{name}") for each, name in self._in_archive(str(path)))
@@ -333,14 +334,6 @@ def _identity(folder: str | Path) -> tuple[int, int]:
     except OSError:
         return _NOWHERE
     return found.st_dev, found.st_ino
-
-
-def _mode(path: str) -> int:
-    """Ask once what a path is; what cannot be looked at counts as a file, and gets an error row."""
-    try:
-        return os.stat(path).st_mode  # noqa: PTH116 (many paths)
-    except OSError:
-        return stat.S_IFREG
 
 
 def _fixed_part(pattern: str) -> Path:
