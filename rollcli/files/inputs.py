@@ -19,7 +19,6 @@ from rollcli.files.search import IMAGE_ENDINGS, Search
 from rollcli.files.storage import read_bytes
 from rollcli.files.stores.locations import base_name, is_url, public_name
 
-_KINDS_NAMED = 5  # endings of what is not read
 _NO_TEXT = (  # what images and archives begin with
     *(b"\x89PNG", b"II*\0", b"MM\0*", b"\x93NUMPY", b"Pf\n", b"PF\n"),
     *(b"\xff\xd8\xff", b"PK\x03\x04", b"v/1\x01"),
@@ -117,11 +116,8 @@ def find_inputs(
 
 
 def _left_out(counts: Counter[str]) -> str:
-    named = counts.most_common(_KINDS_NAMED)
-    more = sum(counts.values()) - sum(count for _, count in named)
-    kinds = [f"{count} {ending or 'without an ending'}" for ending, count in named]
-    kinds += [f"{more} others"] if more else []
-    return f"files in the folders that are not read: {', '.join(kinds)}"
+    kinds = (f"{count} {ending or 'without an ending'}" for ending, count in counts.most_common())
+    return f"files in the folders that are not read: {listed(kinds, most=5)}"
 
 
 def named_input(location: str) -> Input:
