@@ -7,10 +7,9 @@ import sys
 import uuid
 from collections.abc import Callable, Iterator
 from functools import partial
-from pathlib import Path
 
 from rollcli.errors import OutputError, UsageError
-from rollcli.files.atomic import output_error, remove_leftovers, writing
+from rollcli.files.atomic import mode_of, output_error, remove_leftovers, writing
 from rollcli.files.storage import create, write_bytes
 
 STDOUT = "-"  # how the command line names it
@@ -19,13 +18,8 @@ _STDOUT_NAME = "standard output"
 
 def is_stream(name: str) -> bool:
     """Tell whether a name is standard output, a device or a pipe, which no file can replace."""
-    if name == STDOUT:
-        return True
-    try:
-        mode = Path(name).stat().st_mode
-    except OSError:
-        return False
-    return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
+    mode = mode_of(name)
+    return name == STDOUT or not (mode == 0 or stat.S_ISREG(mode) or stat.S_ISDIR(mode))
 
 
 def write_output(name: str, data: bytes, *, overwrite: bool) -> None:
