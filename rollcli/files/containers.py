@@ -116,16 +116,14 @@ def members(path: str) -> Iterator[tuple[str, str]]:
     UsageError
         It is damaged, or cannot be read.
     """
-    found = _tar_members(path) if path.lower().endswith(".tar") else _zip_members(path)
-    for name, position in found:
-        if not any(part.startswith((".", "__MACOSX")) and part != ".." for part in name.split("/")):
-            yield f"{path}#{name}{position}", name
-
-
-def _zip_members(path: str) -> Iterator[tuple[str, str]]:
     with as_usage():
-        archive = _zip(path)
-    yield from ((each.filename, "") for each in archive.infolist() if not each.is_dir())
+        if path.lower().endswith(".tar"):
+            found = _tar_members(path)
+        else:
+            found = ((each.filename, "") for each in _zip(path).infolist() if not each.is_dir())
+        for name, position in found:
+            if not any(part.startswith((".", "__MACOSX")) and part != ".." for part in name.split("/")):
+                yield f"{path}#{name}{position}", name
 
 
 def _tar_members(path: str) -> Iterator[tuple[str, str]]:
@@ -136,9 +134,9 @@ def _tar_members(path: str) -> Iterator[tuple[str, str]]:
                 if each.isreg() and not each.issparse():
                     yield each.name.removeprefix("./"), f"#@{each.offset_data}+{each.size}"
     except (tarfile.TarError, ValueError, EOFError) as error:
-        raise UsageError(f"{path}: is a damaged archive: {str(error) or 'it ends too early'}") from None
+        raise InputError(f"{path}: is a damaged archive: {str(error) or 'it ends too early'}") from None
     except OSError as error:
-        raise UsageError(f"{path}: cannot be read: {cause_of(error)}") from None
+        raise InputError(f"{path}: cannot be read: {cause_of(error)}") from None
 
 
 def read_member(location: str, name: str, most: int) -> "bytes | NDArray[Any] | None":
@@ -181,11 +179,7 @@ def _read_bag(path: str, member: str, name: str) -> "bytes | NDArray[Any]":
 def _read_tar(path: str, member: str, name: str, most: int) -> bytes:
     found = _POSITION.search(member)
     if found is None:
-        try:
-            positions = dict(_tar_members(path))
-        except UsageError as error:
-            raise InputError(str(error)) from None
-        found = _POSITION.search(positions.get(member, ""))
+        found = _POSITION.search(dict(_tar_members(path)).get(member, ""))
     if found is None:
         raise InputError(f"{name}: no such file in {path}")
     start, size = map(int, found[1].split("+"))
