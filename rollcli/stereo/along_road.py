@@ -29,6 +29,7 @@ from rollcli.stereo.views import (
     Map,
     Views,
     grey_along,
+    half_the_rows,
     resampled,
     seen_at,
     shrink_both,
@@ -262,16 +263,17 @@ def _match_blocks(views: Views, count: int) -> NDArray[np.int16]:
     Blocks of half the rows are about twice as high as wide, and take half the time. Beyond the first and the
     last row the road goes on as it is: else none of it would be found where a block reaches beyond them.
     """
-    height, width = views[0].shape
-    half, beside = -(-height // 2), _BLOCK // 2
-    halved = (cv2.resize(each, (width, half), interpolation=cv2.INTER_AREA) for each in views)
+    beside = _BLOCK // 2
     matcher = cv2.StereoBM.create(count, _BLOCK)
     matcher.setUniquenessRatio(0)  # a seventh of the match, and no angle changes
     matcher.setDisp12MaxDiff(1)
     matcher.setSpeckleWindowSize(_SPECKLE[0])
     matcher.setSpeckleRange(_SPECKLE[1])
     found = matcher.compute(
-        *(cv2.copyMakeBorder(each, beside, beside, 0, 0, cv2.BORDER_REFLECT_101) for each in halved)
+        *(
+            cv2.copyMakeBorder(half_the_rows(each), beside, beside, 0, 0, cv2.BORDER_REFLECT_101)
+            for each in views
+        )
     )
-    rows = cv2.resize(found[beside : beside + half], (width, height), interpolation=cv2.INTER_NEAREST)
-    return rows.astype(np.int16, copy=False)
+    rows = np.repeat(found[beside:-beside].astype(np.int16, copy=False), 2, axis=0)
+    return rows[: len(views[0])]

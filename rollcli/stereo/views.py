@@ -60,12 +60,21 @@ def shrink(view: NDArray[Any], factor: float) -> View:
     height, width = matched_shape(view.shape, factor)
     if factor >= _HALVED_FROM and not (view.shape[0] % 2 or view.shape[1] % 2):
         view = shrink(view, 2)
-    return cv2.resize(view, (width, height), interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
+    between = cv2.INTER_AREA
+    if round(factor) == 3:  # means of nine pixels about each point take a tenth of the time of areas
+        view, between = cv2.blur(view, (3, 3)), cv2.INTER_LINEAR_EXACT
+    return cv2.resize(view, (width, height), interpolation=between).astype(np.uint8, copy=False)
 
 
 def shrink_both(views: Views, factor: float) -> Views:
     """Both views, `factor` times smaller."""
     return shrink(views[0], factor), shrink(views[1], factor)
+
+
+def half_the_rows(view: View) -> View:
+    """Return the means of every two rows; the last row counts twice where it is alone."""
+    following = view[np.minimum(np.arange(1, len(view) + 1, 2), len(view) - 1)]
+    return cv2.addWeighted(view[::2], 0.5, following, 0.5, _HALF_UP).astype(np.uint8, copy=False)
 
 
 def resampled(disparity: Map, shape: tuple[int, ...]) -> Map:
