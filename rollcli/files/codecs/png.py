@@ -6,6 +6,7 @@ import struct
 import tempfile
 import zlib
 from collections.abc import Iterator
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import cv2
@@ -17,7 +18,6 @@ from rollcli.files.codecs.raw_map import (
     COLOUR_REMEDY,
     PICTURE_FLAGS,
     Stored,
-    imagecodecs,
     require_decoded_fits,
     require_pixels,
 )
@@ -90,6 +90,16 @@ _FULL_WINDOW = b"\x78"  # of less OpenCV's zlib minds references that go further
 # Bytes after a stream that are looked for; more would have to end in its checksum. To look through the whole
 # stream takes a fortieth of OpenCV's time
 _MOST_AFTER = 1 << 16
+
+
+@lru_cache(maxsize=1)
+def imagecodecs() -> Any:
+    """Return the package, of the extra `fast`, or None where it is not installed."""
+    try:
+        import imagecodecs as package
+    except ImportError:
+        return None
+    return package
 
 
 def decode_grey(packed: bytes, width: int, height: int, depth: int) -> NDArray[Any] | None:
