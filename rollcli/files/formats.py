@@ -4,7 +4,6 @@ Bytes, because OpenCV's own file functions fail on non-ASCII names on Windows an
 What a file is, its first bytes say; its name's ending decides nothing.
 """
 
-import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -62,16 +61,6 @@ MAP_FORMATS = {
     # told by --encoding alone: to all others such a PNG is a photograph
     "rgb": _array_format("rgb", (), pictures.decode_rgb, pictures.encode_rgb),
 }
-_KNOWN = {
-    b"\xff\xd8\xff": "a JPEG image",
-    b"BM": "a BMP image",
-    b"GIF8": "a GIF image",
-    b"%PDF": "a PDF document",
-    b"\x1f\x8b": "a gzip file",
-    b"\x89HDF": "an HDF5 file",
-    **dict.fromkeys((b"\x80\x02", b"\x80\x03", b"\x80\x04", b"\x80\x05"), "a pickle, which is never loaded"),
-}
-_TEXT = re.compile(rb"[\t\n\r\f\x20-\x7e]{8}")  # no format begins with eight printable characters
 
 
 def read_stored(path: str | Path, name: str | None = None, *, rgb: bool = False) -> Stored:
@@ -176,8 +165,7 @@ def decode_image(data: bytes, name: str) -> NDArray[Any]:
         return tiff.picture(data, name)
     if data.startswith(pictures.SIGNATURES):
         return pictures.decode_picture(data, name)
-    is_a, what = _what(data), "a PNG, JPEG, TIFF, BMP, PGM or PPM file"
-    raise InputError(f"{name}: is {is_a}; a camera image is {what}", is_a)
+    raise InputError(f"{name}: is no PNG, JPEG, TIFF, BMP, PGM or PPM file, as camera images are")
 
 
 def decode_mask(data: bytes, name: str) -> NDArray[np.bool_]:
@@ -207,16 +195,4 @@ def _decoded(data: bytes, name: str) -> Stored:
         if data.startswith(each.signatures):
             return each.decode(data, name)
     hint = "; photographs are given by --left and --right" if data.startswith(pictures.SIGNATURES) else ""
-    raise InputError(
-        f"{name}: is {_what(data)}; a disparity map is a PNG, TIFF, NPY, NPZ, PFM or EXR file{hint}"
-    )
-
-
-def _what(data: bytes) -> str:
-    """Say what a file that cannot be read seems to be."""
-    for signature, what in _KNOWN.items():
-        if data.startswith(signature):
-            return what
-    if len(data) < 8:
-        return f"only {len(data)} bytes long"
-    return "text" if _TEXT.match(data) else "no file of a known format"
+    raise InputError(f"{name}: is no PNG, TIFF, NPY, NPZ, PFM or EXR file, as disparity maps are{hint}")

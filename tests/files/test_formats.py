@@ -62,7 +62,7 @@ IMAGE = np.random.default_rng(0).integers(0, 256, (20, 30, 3), dtype=np.uint8)
 
 
 def test_nothing_is_printed_about_damaged_files(tmp_path):
-    """OpenCV, libpng, tifffile and NumPy are silent."""
+    """OpenCV, libpng, tifffile and NumPy are silent in a worker."""
     values = disparity_map().astype(np.float32)
     tiff = make_tiff(values, "lzw", rows_per_strip=5, pages=2)
     wholes = {
@@ -81,7 +81,9 @@ def test_nothing_is_printed_about_damaged_files(tmp_path):
     script = (
         "import sys, pathlib\n"
         "from rollcli.errors import InputError\n"
+        "from rollcli.files.codecs.png import silence_decoders\n"
         "from rollcli.files.formats import read_image, read_stored\n"
+        "silence_decoders()\n"
         "for path in pathlib.Path(sys.argv[1]).iterdir():\n"
         "    for read in (read_image, read_stored):\n"
         "        try:\n"

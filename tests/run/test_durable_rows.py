@@ -92,7 +92,7 @@ def test_images_that_cannot_be_made_again_end_the_resume_with_one_line(finished)
     (finished / "up" / "frame0.png").unlink()
     done = resume(finished)
     assert done.status == 1
-    assert "the images of maps/frame0.png cannot be made again: is text; " in done.err
+    assert "the images of maps/frame0.png cannot be made again: is no PNG, TIFF, " in done.err
 
 
 def interrupted_at(step, work):

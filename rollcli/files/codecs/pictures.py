@@ -5,7 +5,6 @@ Such maps have their numbers in three channels of a PNG, or are OpenEXR.
 
 import os
 import re
-import struct
 from typing import Any
 
 import cv2
@@ -15,16 +14,15 @@ from numpy.typing import NDArray
 from rollcli.errors import InputError, OutputError
 from rollcli.files.codecs import png
 from rollcli.files.codecs.png import decoding
-from rollcli.files.codecs.raw_map import PICTURE_FLAGS, native, require_decoded_fits, require_pixels
+from rollcli.files.codecs.raw_map import PICTURE_FLAGS, require_decoded_fits
 
-LOSSLESS = (b"BM", b"P5", b"P6")
+_BMP = b"BM"
+LOSSLESS = (_BMP, b"P5", b"P6")
 SIGNATURES = (b"\xff\xd8\xff", *LOSSLESS)
 _FRAME_HEADERS = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 _WITHOUT_LENGTH = frozenset((0x00, 0x01, *range(0xD0, 0xDA)))
 # many webcams write a few bytes more between the last row and the end of the image
 _HARMLESS = re.compile("extraneous bytes before marker 0xd9")
-_GAP = rb"(?:\s|#[^\n]*\n)+"
-_PNM = re.compile(rb"P([56])" + 2 * (_GAP + rb"(\d{1,9})") + _GAP + rb"(\d{1,5})\s")
 _BASE = 255  # of FoundationStereo's digits: (R * 255^2 + G * 255 + B) / 1000 is the disparity in pixels
 MAGIC_EXR = b"\x76\x2f\x31\x01"
 _WINDOW = b"dataWindow\0box2i\0\x10\0\0\0"
@@ -32,11 +30,9 @@ _WINDOW = b"dataWindow\0box2i\0\x10\0\0\0"
 
 def decode_picture(data: bytes, name: str) -> NDArray[Any]:
     """Return the pixels of a camera image: grey (H, W) or BGR (H, W, 3), uint8 or uint16."""
-    if data.startswith((b"P5", b"P6")):
-        return _pnm(data, name)
-    if data.startswith(b"BM"):
-        _require_whole_bmp(data, name)
-    else:
+    if data.startswith(_BMP) and any(data[30:34]):  # its run lengths may claim any size
+        raise InputError(f"{name}: is an unusual BMP; those without compression are read")
+    if not data.startswith(LOSSLESS):
         _require_whole_jpeg(data, name)
     try:
         with decoding() as printed:
@@ -44,7 +40,7 @@ def decode_picture(data: bytes, name: str) -> NDArray[Any]:
     except cv2.error:  # a size beyond OpenCV's limits
         pixels = None
     if pixels is None:
-        raise InputError(f"{name}: is a damaged image")
+        raise InputError(f"{name}: is a damaged or truncated image")
     if complaint := _complaint(printed.text):
         raise InputError(f"{name}: is a damaged JPEG: {complaint}")
     return pixels
@@ -74,34 +70,6 @@ def _complaint(printed: str) -> str:
         if line.strip() and not line.startswith("[") and not _HARMLESS.search(line):
             return " ".join(line.removeprefix("Corrupt JPEG data:").split())
     return ""
-
-
-def _pnm(data: bytes, name: str) -> NDArray[Any]:
-    """Binary PGM and PPM [netpbm]; OpenCV would print what is wrong with one."""
-    header = _PNM.match(data, 0, min(len(data), 2000))
-    if header is None or not 0 < int(header[4]) < 65536:
-        raise InputError(f"{name}: is a damaged PGM or PPM: its header cannot be read")
-    width, height, channels = int(header[2]), int(header[3]), 3 if header[1] == b"6" else 1
-    dtype = np.dtype("u1" if int(header[4]) < 256 else ">u2")
-    numbers = width * height * channels
-    require_pixels(width, height, name, numbers * dtype.itemsize, len(data) - header.end())
-    require_decoded_fits(width, height, channels * dtype.itemsize, len(data), name)
-    pixels = np.frombuffer(data, dtype, numbers, header.end()).reshape(height, width, channels)
-    return native(pixels[..., ::-1] if channels == 3 else pixels[..., 0])
-
-
-def _require_whole_bmp(data: bytes, name: str) -> None:
-    """Refuse a bitmap that is not whole, before OpenCV prints what is wrong with it."""
-    header = struct.unpack_from("<IIii2xHI", data, 10) if len(data) >= 54 else (0,) * 6
-    start, size, width, height, bits, packing = header
-    if not (40 <= size < 200 and width > 0 and height != 0 and packing == 0 and bits in (8, 24, 32)):
-        raise InputError(
-            f"{name}: is a damaged or an unusual BMP; 8, 24 and 32 bits without compression are read"
-        )
-    needed = (width * bits + 31) // 32 * 4 * abs(height)
-    require_decoded_fits(width, abs(height), bits // 8, len(data), name)
-    if start + needed > len(data):
-        raise InputError(f"{name}: is truncated: {width} x {abs(height)} pixels end at byte {start + needed}")
 
 
 def half_size(width: int, height: int, layout: str, name: str) -> tuple[int, int]:

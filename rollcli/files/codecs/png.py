@@ -6,6 +6,7 @@ import struct
 import tempfile
 import zlib
 from collections.abc import Iterator
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import cv2
@@ -17,7 +18,6 @@ from rollcli.files.codecs.raw_map import (
     COLOUR_REMEDY,
     PICTURE_FLAGS,
     Stored,
-    imagecodecs,
     require_decoded_fits,
     require_pixels,
 )
@@ -92,6 +92,16 @@ _FULL_WINDOW = b"\x78"  # of less OpenCV's zlib minds references that go further
 _MOST_AFTER = 1 << 16
 
 
+@lru_cache(maxsize=1)
+def imagecodecs() -> Any:
+    """Return the package, of the extra `fast`, or None where it is not installed."""
+    try:
+        import imagecodecs as package
+    except ImportError:
+        return None
+    return package
+
+
 def decode_grey(packed: bytes, width: int, height: int, depth: int) -> NDArray[Any] | None:
     """Decode the pixel data of a grey PNG of 8 or 16 bits that is not interlaced, as OpenCV writes it.
 
@@ -149,11 +159,6 @@ _DEPTHS = {
 _TEXT_KEY = b"rollcli\0"
 _MAX_SIDE = 1_000_000  # libpng's own limit
 _MAX_EXPANSION = 1032  # of Deflate
-# Checksums can be right over wrong data. Inflating all of it twice would cost 70 % more time: only the start
-# of small files is, which is where headers lie
-_SMALL, _FOREHAND = 1 << 14, 1 << 16
-# of the seven passes of an interlaced image: first column, first row, column step, row step
-_ADAM7 = ((0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (1, 0, 2, 2), (0, 1, 1, 2))
 
 
 class _Header(NamedTuple):
@@ -170,9 +175,10 @@ class _Header(NamedTuple):
         """What OpenCV takes for a pixel; a palette's colours are spelled out, with their opacity."""
         return 4 if self.colour == _PALETTE else _CHANNELS[self.colour] * (2 if self.depth == 16 else 1)
 
-    def row_bytes(self, width: int) -> int:
-        """Return the bytes of a row of `width` pixels, after its filter byte."""
-        return (width * self.depth * _CHANNELS[self.colour] + 7) // 8
+    @property
+    def row_bytes(self) -> int:
+        """The bytes of a row, after its filter byte."""
+        return (self.width * self.depth * _CHANNELS[self.colour] + 7) // 8
 
 
 class _Whole(NamedTuple):
@@ -311,38 +317,9 @@ def _header(body: bytes, name: str) -> _Header:
 def _require_data(whole: _Whole, name: str) -> None:
     """Refuse a header that claims more than the compressed data hold."""
     header, compressed = whole.header, whole.packed_size
-    claim = f"its header claims {header.width} x {header.height} pixels"
-    if header.height * header.row_bytes(header.width) > _MAX_EXPANSION * compressed:
+    if header.height * header.row_bytes > _MAX_EXPANSION * compressed:
+        claim = f"its header claims {header.width} x {header.height} pixels"
         raise InputError(f"{name}: {claim}, more than {compressed} bytes can hold")
-    if compressed <= _SMALL and not _begins_well(header, whole.packed):
-        raise InputError(f"{name}: is a damaged PNG: its pixel data do not match {claim}")
-
-
-def _begins_well(header: _Header, compressed: bytes) -> bool:
-    """Tell whether the data hold what the header says, in rows with filters that exist; see _FOREHAND."""
-    starts, size = _row_starts(header)
-    inflater = zlib.decompressobj()
-    try:
-        plain = inflater.decompress(compressed, min(size + 1, _FOREHAND))
-    except zlib.error:
-        return False
-    if size < _FOREHAND and (len(plain) != size or not inflater.eof or inflater.unused_data):
-        return False
-    return len(plain) >= min(size, _FOREHAND) and all(
-        not plain[each.start : each.stop : each.step].translate(None, b"\0\1\2\3\4") for each in starts
-    )
-
-
-def _row_starts(header: _Header) -> tuple[list[range], int]:
-    """Return where the rows of each pass start in the inflated data, and how many bytes these are."""
-    starts, size = [], 0
-    for column, row, across, down in _ADAM7 if header.interlace else ((0, 0, 1, 1),):
-        width, height = -(-(header.width - column) // across), -(-(header.height - row) // down)
-        if width > 0 and height > 0:
-            stride = 1 + header.row_bytes(width)
-            starts.append(range(size, size + height * stride, stride))
-            size += height * stride
-    return starts, size
 
 
 def _full_palette(header: _Header, palette: bytes, name: str) -> bytes:

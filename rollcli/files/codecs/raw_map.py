@@ -1,7 +1,6 @@
 """What a map file holds, before its numbers are read as pixels."""
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import cv2
@@ -101,13 +100,3 @@ def require_decoded_fits(
 def native(values: NDArray[Any]) -> NDArray[Any]:
     """Make C-contiguous, in this machine's byte order."""
     return np.ascontiguousarray(values, dtype=values.dtype.newbyteorder("="))
-
-
-@lru_cache(maxsize=1)
-def imagecodecs() -> Any:
-    """Return the package, of the extras `fast` and `tiff`, or None where it is not installed."""
-    try:
-        import imagecodecs as package
-    except ImportError:
-        return None
-    return package

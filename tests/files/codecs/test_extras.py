@@ -1,4 +1,4 @@
-"""With the extras `fast` and `tiff` files read the same, number for number and word for word, only faster."""
+"""With the extra `fast` files read the same, number for number and word for word, only faster."""
 
 import zlib
 from itertools import cycle
@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from rollcli.errors import InputError
-from rollcli.files.codecs import png, tiff
+from rollcli.files.codecs import png
 from rollcli.files.formats import decode_image, decode_mask, decode_stored
-from tests.binary_files import disparity_map, make_tiff, png_file, png_header
+from tests.binary_files import disparity_map, png_file, png_header
 from tests.fuzz.corpus import corpus
 from tests.fuzz.mutations import at_random, every_region, with_repairs
 
-FILES = {name: data for name, data in corpus().items() if name != "large.png"}
+FILES = {name: data for name, data in corpus().items() if name.endswith(".png") and name != "large.png"}
 DEEP = (disparity_map(37, 53) * 256).astype(np.uint16)
 
 
@@ -40,7 +40,6 @@ def plain(monkeypatch):
     def read(data):
         with monkeypatch.context() as patch:
             patch.setattr(png, "decode_grey", lambda *_: None)
-            patch.setattr(tiff, "imagecodecs", lambda: None)
             return outcome(data)
 
     return read
@@ -48,7 +47,7 @@ def plain(monkeypatch):
 
 @pytest.fixture
 def imagecodecs():
-    pytest.importorskip("imagecodecs", reason="the extra tiff is not installed")
+    pytest.importorskip("imagecodecs", reason="the extra fast is not installed")
 
 
 @pytest.fixture(params=["imagecodecs", "nothing"])
@@ -150,20 +149,10 @@ def test_every_file_of_the_fuzzer_reads_the_same_without_extras(installed, plain
     assert outcome(FILES[name]) == plain(FILES[name])
 
 
-@pytest.mark.parametrize("name", ["8.png", "16.png", *(name for name in FILES if name.endswith(".tif"))])
+@pytest.mark.parametrize("name", ["8.png", "16.png"])
 def test_broken_files_read_the_same_without_extras(installed, plain, name):
-    if not name.endswith(".png") and installed != "imagecodecs":
-        return  # `plain` reads them without imagecodecs
     random = Random(0)
     broken = [*list(every_region(FILES[name]))[::7], *(at_random(FILES[name], random) for _ in range(40))]
 
     for data in (each for file in broken for each in with_repairs(file)):
         assert outcome(data) == plain(data)
-
-
-@pytest.mark.parametrize("order", ["<", ">"])
-@pytest.mark.parametrize("kind", ["f2", "f4", "f8"])
-def test_imagecodecs_undoes_the_predictor_of_every_float(imagecodecs, plain, kind, order):
-    file = make_tiff(disparity_map().astype(kind), "deflate", order, 3, rows_per_strip=10)
-
-    assert outcome(file) == plain(file)
