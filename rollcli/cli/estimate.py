@@ -9,7 +9,7 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from rollcli.cli.command import Needs, command, config_option, option, record
+from rollcli.cli.command import command, config_option, option, record
 from rollcli.cli.options import (
     calibration_options,
     cluster_options,
@@ -81,13 +81,6 @@ def _from_environment(ctx: click.Context) -> Iterator[str]:
                 yield from (flag, str(text))
 
 
-def _has_parts(ctx: click.Context) -> bool:
-    from rollcli.files.stores.locations import is_url
-
-    given = ResultOptions(ctx.params["output"], ctx.params["format"])
-    return given.form == "parquet" or is_url(given.output)
-
-
 result_options = record(
     "result",
     "Result",
@@ -108,7 +101,6 @@ result_options = record(
         "--part-rows",
         Number("N", at_least=1, whole=True),
         "Rows of each part, of Parquet and of results in an object store.",
-        Needs(_has_parts, "only Parquet and results in an object store have parts"),
     ),
     option("--resume", FLAG, "Keep the rows of an interrupted run and do the rest."),
     option(
@@ -128,7 +120,6 @@ result_options = record(
         "--shard-by",
         Choice("every", "range"),
         "every: --shard takes every N-th frame; range: the I-th of N runs of consecutive frames.",
-        Needs(lambda ctx: ctx.params["shard"] != (1, 1), "there is one shard"),
     ),
     option("--fail-fast", FLAG, "Stop at the first frame that fails."),
     option("--timing", FLAG, "Add the column elapsed_ms: milliseconds spent on the frame."),

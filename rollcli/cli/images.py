@@ -205,7 +205,7 @@ def vdisparity(ctx: click.Context, /, **options: Any) -> None:
     "Also write pictures of the heights, PNG, every frame in the same colours.",
     section="Output",
 )
-@heights_range_option("preview")
+@heights_range_option
 @option(
     "--save-as",
     Choice("tiff", "npy"),

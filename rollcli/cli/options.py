@@ -4,7 +4,7 @@ from typing import Any, get_args
 
 import click
 
-from rollcli.cli.command import Declaration, Needs, option, record
+from rollcli.cli.command import Needs, option, record
 from rollcli.cli.types import (
     ANY_NUMBER,
     DIR,
@@ -44,36 +44,8 @@ def _has_pairs(ctx: click.Context) -> bool:
     return ctx.command.name == "disparity" or any(ctx.params.get(name) for name in named)
 
 
-def _keeps_numbers(ctx: click.Context) -> bool:
-    return ctx.command.name == "derotate"
-
-
-def _places(ctx: click.Context) -> list[str] | None:
-    """List what is named to be read; None where lists or URLs may name any files."""
-    from rollcli.files.stores.locations import is_url
-
-    given = ctx.params
-    named = [*given["inputs"], *filter(None, (given.get("left"), given.get("right")))]
-    return None if given["files_from"] or any(name == "-" or is_url(name) for name in named) else named
-
-
-def _has_folder(ctx: click.Context) -> bool:
-    from rollcli.files.atomic import is_folder
-
-    named = _places(ctx)
-    return named is None or any(map(is_folder, named))
-
-
-def _has_more_than_files(ctx: click.Context) -> bool:
-    from rollcli.files.atomic import is_file
-
-    named = _places(ctx)
-    return named is None or not all(map(is_file, named))
-
-
 _PAIRS = Needs(_has_pairs, "the inputs are maps, which are not matched")
 _MAPS = Needs(lambda ctx: not _has_pairs(ctx), "pairs are matched, and no stored disparities are read")
-_FOLDERS = Needs(_has_more_than_files, "they choose among the files of folders, and none is named")
 _HORIZON = Needs(
     lambda ctx: not ctx.params.get("figure") or ctx.params["encoding"] == "depth", "a figure shows no horizon"
 )
@@ -92,15 +64,9 @@ def _stereo(
 
 
 _folders = (
-    option("--recursive", FLAG, "Search folders recursively.", Needs(_has_folder, "no folder is named")),
-    option(
-        "--include",
-        Text("GLOB"),
-        "Of folders, take only files that match. Repeatable.",
-        _FOLDERS,
-        multiple=True,
-    ),
-    option("--exclude", Text("GLOB"), "Leave out files that match. Repeatable.", _FOLDERS, multiple=True),
+    option("--recursive", FLAG, "Search folders recursively."),
+    option("--include", Text("GLOB"), "Of folders, take only files that match. Repeatable.", multiple=True),
+    option("--exclude", Text("GLOB"), "Leave out files that match. Repeatable.", multiple=True),
     option("--every", Number("N", at_least=1, whole=True), "Take every N-th frame of what is found."),
 )
 
@@ -194,7 +160,6 @@ stereo_options = record(
         "--speckle-range",
         Number("PX", at_least=0, whole=True),
         "Disparity step within a patch, pixels.",
-        Needs(lambda ctx: ctx.params["speckle_size"] != 0, "--speckle-size 0 keeps every patch"),
     ),
     option(
         "--downscale",
@@ -234,22 +199,12 @@ encoding_options = record(
         "depth: metres (whole numbers: millimetres), which a calibration turns into disparities; "
         "foundationstereo: (R*255*255 + G*255 + B)/1000 of an RGB PNG; "
         "auto: float and uint8 are px, uint16 is kitti, int16 is sgbm.",
-        Needs(  # there a stored 1 is no data
-            lambda ctx: (
-                not _keeps_numbers(ctx) or ctx.params["encoding"] in ("cityscapes", "foundationstereo")
-            ),
-            "rotated maps keep their stored numbers",
-        ),
     ),
     option(
         "--scale",
         Number("F", but=0),
         "Pixels = stored number * F (depth: metres = stored number * F); F replaces the factor of an "
         "encoding, and is negative where maps are stored negative.",
-        Needs(
-            lambda ctx: not _keeps_numbers(ctx) or ctx.params["scale"] < 0,
-            "rotated maps keep their stored numbers",
-        ),
     ),
     option(
         "--invalid",
@@ -327,22 +282,17 @@ method_options = record(
         "--seed",
         Number("INT", at_least=0, whole=True),
         "Seed of road finding's samples.",
-        Needs(lambda ctx: ctx.params["road"] != "all", "--road all draws no samples"),
     ),
 )
 
 
-def heights_range_option(preview: str) -> Declaration:
-    """Declare the colours of a preview, which goes with the option of that name."""
-    has_preview = Needs(lambda ctx: ctx.params[preview.replace("-", "_")], f"only --{preview} has colours")
-    return option(
-        "--heights-range",
-        WIDE_SPAN,
-        "Heights with the outermost colours of a preview, A:B, metres or camera heights.",
-        has_preview,
-        section="Output",
-        default="{:.2f}:{:.2f}".format(*HEIGHTS_RANGE),
-    )
+heights_range_option = option(
+    "--heights-range",
+    WIDE_SPAN,
+    "Heights with the outermost colours of a preview, A:B, metres or camera heights.",
+    section="Output",
+    default="{:.2f}:{:.2f}".format(*HEIGHTS_RANGE),
+)
 
 
 save_as_option = option(
@@ -376,7 +326,7 @@ image_options = record(
     "Images to write, named after their input",
     ImageOptions,
     *(option(f"--{kind.name.replace('_', '-')}", DIR, kind.help) for kind in KINDS),
-    heights_range_option("heights-preview"),
+    heights_range_option,
     save_as_option,
 )
 
@@ -385,7 +335,6 @@ _running = (
         "-j, --jobs",
         Number("N", at_least=1, whole=True),
         "Worker processes.  [default: the usable processors]",
-        Needs(lambda ctx: not ctx.params.get("scheduler"), "--scheduler has workers of its own"),
     ),
     option("--overwrite", FLAG, "Replace results and images that are there."),
     option("--dry-run", FLAG, "List what would be read and written, and do nothing."),

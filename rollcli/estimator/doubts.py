@@ -12,9 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.estimator.energy import Energy
 from rollcli.estimator.interval import Interval
-from rollcli.estimator.road.find import Road
+from rollcli.estimator.request import Request
+from rollcli.estimator.road.pixels import PixelSet
 from rollcli.estimator.road.surface import Surface
 from rollcli.estimator.solvers.exact import CertifiedSolution
 from rollcli.estimator.solvers.solution import angle_between
@@ -128,30 +128,20 @@ class Evidence:
 
     Attributes
     ----------
-    energy : Energy
-        Of the pixels used.
+    pixels : PixelSet
+        What the angle rests on.
+    request : Request
     certified : CertifiedSolution
-    road : Road or None
-        None where every valid pixel is taken for road.
-    surface : Surface or None
-        The road's pixels, or a sample of those used; None where the map is too small for one.
-    max_roll : float
-        The largest abs(roll) considered, radians.
-    max_interval : float
-        The half-width from which an interval is too wide to be ok, radians.
     interval : Interval or None
     view : View or None
         Of a road that was looked for.
     """
 
-    energy: Energy
+    pixels: PixelSet
+    request: Request
     certified: CertifiedSolution
-    road: Road | None
-    surface: Surface | None
-    max_roll: float
-    max_interval: float
     interval: Interval | None
-    view: View | None = None
+    view: View | None
 
 
 def doubts_of(evidence: Evidence, tuning: DoubtTuning) -> list[str]:
@@ -181,7 +171,7 @@ def _near_minimum(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
 
 
 def _grows_upward(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
-    _, c1, c2 = evidence.energy.plane
+    _, c1, c2 = evidence.pixels.energy.plane
     theta = evidence.certified.solution.theta
     if c2 * math.cos(theta) - c1 * math.sin(theta) < 0:
         yield "the disparity grows upward, as it does in a depth map"
@@ -194,7 +184,7 @@ def _narrow_view(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
 
 
 def _little_filled(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
-    view, road = evidence.view, evidence.road
+    view, road = evidence.view, evidence.pixels.road
     if view is None or road is None:
         return
     if view.ground.filled < min(tuning.filled_by_horizon * road.horizon, tuning.most_filled):
@@ -215,32 +205,32 @@ def _closed_off(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
 
 
 def _rival_plane(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
-    road = evidence.road
+    road = evidence.pixels.road
     if road and road.rival > tuning.rival_share * road.score:
         yield "another plane, with another roll, explains the map nearly as well"
 
 
 def _fit_moved(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
-    moved = evidence.surface.moved if evidence.surface else 0.0
+    moved = evidence.pixels.surface.moved if evidence.pixels.surface else 0.0
     if moved > tuning.longest_move:
         yield f"the road's pixels moved the roll by {math.degrees(moved):.1f} degrees"
 
 
 def _at_bound(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
-    road, surface = evidence.road, evidence.surface
-    if road and surface and abs(surface.model.theta) > tuning.bound_share * evidence.max_roll:
+    road, surface = evidence.pixels.road, evidence.pixels.surface
+    if road and surface and abs(surface.model.theta) > tuning.bound_share * evidence.request.max_roll:
         yield "the roll is at its bound, --max-roll"
 
 
 def _uncertain(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
     interval = evidence.interval
-    if interval and interval.noise > tuning.noise_share * evidence.max_interval:
+    if interval and interval.noise > tuning.noise_share * evidence.request.max_interval:
         yield f"noise and unevenness leave the angle open: ±{math.degrees(interval.noise):.2f} degrees"
 
 
 def _wide_interval(evidence: Evidence, tuning: DoubtTuning) -> Iterator[str]:
     interval = evidence.interval
-    if interval and interval.half_width > evidence.max_interval:
+    if interval and interval.half_width > evidence.request.max_interval:
         yield f"the interval is wide: ±{math.degrees(interval.half_width):.2f} degrees"
 
 

@@ -104,19 +104,17 @@ class Energy:
         spread = s[2][0] * s[0][2] - s[1][1] ** 2
         if spread <= _SINGULAR * (s[2][0] + s[0][2]) ** 2:
             raise EstimationError("the valid pixels lie on one line: they do not determine a roll angle")
-        dc0 = t[0][0] / n
-        dc1 = (s[0][2] * t[1][0] - s[1][1] * t[0][1]) / spread
-        dc2 = (s[2][0] * t[0][1] - s[1][1] * t[1][0]) / spread
-        c0, c1, c2 = moments.plane
-        rest = max(0.0, float(moments.rr) - dc0 * t[0][0] - dc1 * t[1][0] - dc2 * t[0][1])
+        c0 = t[0][0] / n
+        c1 = (s[0][2] * t[1][0] - s[1][1] * t[0][1]) / spread
+        c2 = (s[2][0] * t[0][1] - s[1][1] * t[1][0]) / spread
+        rest = max(0.0, float(moments.dd) - c0 * t[0][0] - c1 * t[1][0] - c2 * t[0][1])
         sources = [s[i][j] for i, j in _monomials(2)]
-        residual = [t[i][j] - dc0 * s[i][j] - dc1 * s[i + 1][j] - dc2 * s[i][j + 1] for i, j in _monomials(2)]
+        residual = [t[i][j] - c0 * s[i][j] - c1 * s[i + 1][j] - c2 * s[i][j + 1] for i, j in _monomials(2)]
         higher = [s[i][j] for k in (3, 4) for i, j in _monomials(k)]
         grid = moments.grid
         centred = Grid(grid.centre_u + p * grid.scale, grid.centre_v + q * grid.scale, grid.scale)
-        plane = (float(c0 + c1 * p + c2 * q + dc0), float(c1 + dc1), float(c2 + dc2))
         forms = _rotations().dot(sources + residual + higher)
-        energy = cls(n, peak, parabolic, centred, plane, rest, forms)
+        energy = cls(n, peak, parabolic, centred, (c0, c1, c2), rest, forms)
         if energy.slope_energy + max(map(abs, residual)) ** 2 / n <= 1e-18 * n * peak**2:
             raise EstimationError(SAME_EVERYWHERE)
         return energy

@@ -238,10 +238,7 @@ def estimate_roll(
     view = None
     if pixels.road and surface:
         view = View(checked.values, checked.valid, surface, rmse, tuning.doubts.reach)
-    evidence = Evidence(
-        pixels.energy, certified, pixels.road, surface, max_roll, max_interval, interval, view
-    )
-    doubts = doubts_of(evidence, tuning.doubts)
+    doubts = doubts_of(Evidence(pixels, request, certified, interval, view), tuning.doubts)
     return RollEstimate(
         theta=theta,
         ci95=None if interval is None else interval.half_width,

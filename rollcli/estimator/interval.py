@@ -308,7 +308,6 @@ def _student(freedom: float) -> float:
     return _T975[below - 1] + part * (_T975[below] - _T975[below - 1])
 
 
-_SINGULAR = 1e-10  # a variance below this share of its square scale is rounding error
 _MOST_MOVED = 0.05  # of the slope: no road bends more, so what does is no bend of the road
 
 
@@ -428,18 +427,10 @@ def _errors(jackknife: Jackknife) -> Floats:
 
 
 def _roots(covariance: Floats) -> Floats:
-    """Return independent errors, shape (4, 4), whose squares add up to a covariance: its Cholesky factor.
-
-    Nothing for what is known exactly. NumPy's own refuses that.
-    """
-    wanted = covariance.tolist()
-    size = len(wanted)
-    roots: list[list[float]] = []
-    for k in range(size):
-        left = [wanted[k][j] - sum(root[k] * root[j] for root in roots) for j in range(size)]
-        known = left[k] <= _SINGULAR * wanted[k][k]
-        roots.append([0.0 if known or j < k else left[j] / math.sqrt(left[k]) for j in range(size)])
-    return np.array(roots)
+    """Return independent errors, shape (4, 4), whose squares add up to a covariance."""
+    sizes = np.sqrt(np.maximum(covariance.diagonal(), 0))
+    shares, ways = np.linalg.eigh(covariance / np.maximum(np.outer(sizes, sizes), 1e-300))
+    return np.asarray((ways * np.sqrt(np.maximum(shares, 0))).T * sizes)
 
 
 def _in_pixels(errors: Floats, centre: float, scale: float, turn: float) -> Floats:

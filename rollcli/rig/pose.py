@@ -3,14 +3,9 @@
 import math
 from dataclasses import dataclass, replace
 
-import numpy as np
-from numpy.typing import NDArray
-
 from rollcli.estimator.estimate import RollEstimate
 from rollcli.estimator.interval import Tangent
 from rollcli.rig.calibration import Calibration
-
-Floats = NDArray[np.float64]
 
 _AT_EDGE = "; its principal point lies near the edge: is it of images of this size?"
 
@@ -66,32 +61,18 @@ def pose_of(tangent: Tangent, calibration: Calibration) -> Pose:
     -------
     Pose
     """
-    q = _normal(tangent, calibration)
-    length = float(np.linalg.norm(q))
+    fx, fy, slope = calibration.fx, calibration.fy, tangent.slope
+    cosine, sine = math.cos(tangent.theta), math.sin(tangent.theta)
+    below = calibration.cy * cosine - calibration.cx * sine - tangent.row  # the principal point, rolled frame
+    # the plane's normal over its height, in baselines
+    right, down = -slope * sine, slope * cosine * fy / fx
+    ahead = (tangent.disparity + slope * below + calibration.doffs) / fx
+    level = math.hypot(right, down)
     return Pose(
-        roll=math.atan2(-q[0], q[1]),
-        pitch=math.asin(q[2] / length),
-        height=None if calibration.baseline is None else 1 / length,
+        roll=math.atan2(-right, down),
+        pitch=math.atan2(ahead, level),
+        height=None if calibration.baseline is None else calibration.baseline / math.hypot(level, ahead),
     )
-
-
-def pose_jacobian(tangent: Tangent, calibration: Calibration) -> Floats:
-    """Return the derivatives of (roll, pitch, height) by (disparity, slope, theta) of the tangent, (3, 3).
-
-    Radians and metres per px, px/px and radian; without a baseline the height is in baselines.
-    """
-    q = _normal(tangent, calibration)
-    square = float(q @ q)
-    length = math.sqrt(square)
-    level = q[0] ** 2 + q[1] ** 2
-    by_q = np.array(
-        [
-            [-q[1] / level, q[0] / level, 0],
-            (np.array([0, 0, 1]) - q * (q[2] / square)) / math.sqrt(level),
-            -q / (square * length),
-        ]
-    )
-    return by_q @ _normal_jacobian(tangent, calibration)
 
 
 def with_pose(estimate: RollEstimate, calibration: Calibration) -> RollEstimate:
@@ -124,8 +105,10 @@ def with_pose(estimate: RollEstimate, calibration: Calibration) -> RollEstimate:
     if why:
         return replace(estimate, message="; ".join(filter(None, [estimate.message, why])))
     pose = pose_of(tangent, calibration)
-    pitch_ci95, height_ci95 = _half_widths(tangent, calibration)
-    turns = float(pose_jacobian(tangent, calibration)[0, 2])  # 1 where fx = fy
+    pitch_ci95, height_ci95 = _half_widths(tangent, calibration, pose)
+    ratio = calibration.fy / calibration.fx
+    # the rig's roll turns by so much more than the image's: tan(roll) = tan(theta) / ratio
+    turns = ratio / (ratio**2 * math.cos(tangent.theta) ** 2 + math.sin(tangent.theta) ** 2)
     return replace(
         estimate,
         theta=pose.roll,
@@ -133,7 +116,7 @@ def with_pose(estimate: RollEstimate, calibration: Calibration) -> RollEstimate:
         pitch=pose.pitch,
         pitch_ci95=pitch_ci95,
         height_m=pose.height,
-        height_ci95_m=None if pose.height is None else height_ci95,
+        height_ci95_m=height_ci95,
     )
 
 
@@ -168,43 +151,23 @@ def taken_as_exact(calibration: Calibration, pitch: float, height: float | None)
     return f"{'pitch and height take' if calibration.baseline is not None else 'pitch takes'} {said}{edge}"
 
 
-def _half_widths(tangent: Tangent, calibration: Calibration) -> tuple[float | None, float | None]:
+def _half_widths(tangent: Tangent, calibration: Calibration, pose: Pose) -> tuple[float | None, float | None]:
+    """Return those of pitch and height: the poses over the tangents that the jackknife leaves."""
     changes = tangent.changes
     if changes is None:
         return None, None
-    moved = changes @ pose_jacobian(tangent, calibration)[1:].T
-    pitch, height = (TUNING.factor * np.sqrt(np.square(moved).sum(axis=0))).tolist()
-    return pitch, height
-
-
-def _at_principal_point(tangent: Tangent, calibration: Calibration) -> tuple[float, float]:
-    """Return x and y of the principal point in the rolled frame, y from the tangent's row, px."""
-    cosine, sine = math.cos(tangent.theta), math.sin(tangent.theta)
-    across = calibration.cx * cosine + calibration.cy * sine
-    return across, calibration.cy * cosine - calibration.cx * sine - tangent.row
-
-
-def _normal(tangent: Tangent, calibration: Calibration) -> Floats:
-    """Return q = n / h, 1/m; without a baseline, 1/baseline."""
-    fx, fy, baseline = calibration.fx, calibration.fy, calibration.baseline or 1.0
-    _, along = _at_principal_point(tangent, calibration)
-    disparity = tangent.disparity + tangent.slope * along + calibration.doffs
-    cosine, sine = math.cos(tangent.theta), math.sin(tangent.theta)
-    return np.array([-tangent.slope * sine, tangent.slope * cosine * fy / fx, disparity / fx]) / baseline
-
-
-def _normal_jacobian(tangent: Tangent, calibration: Calibration) -> Floats:
-    """Return the derivatives of q by (disparity, slope, theta), (3, 3)."""
-    fx, fy, baseline = calibration.fx, calibration.fy, calibration.baseline or 1.0
-    across, along = _at_principal_point(tangent, calibration)
-    cosine, sine, slope = math.cos(tangent.theta), math.sin(tangent.theta), tangent.slope
-    return (
-        np.array(
-            [
-                [0, -sine, -slope * cosine],
-                [0, cosine * fy / fx, -slope * sine * fy / fx],
-                [1 / fx, along / fx, -slope * across / fx],
-            ]
+    moved = [
+        pose_of(
+            replace(
+                tangent,
+                theta=tangent.theta + theta,
+                disparity=tangent.disparity + disparity,
+                slope=tangent.slope + slope,
+            ),
+            calibration,
         )
-        / baseline
-    )
+        for disparity, slope, theta in changes.tolist()
+    ]
+    pitch = TUNING.factor * math.hypot(*(each.pitch - pose.pitch for each in moved))
+    heights = [each.height - pose.height for each in moved if each.height and pose.height]
+    return pitch, TUNING.factor * math.hypot(*heights) if heights else None

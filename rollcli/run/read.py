@@ -308,16 +308,9 @@ def wanted_of(allowed: NDArray[np.bool_] | None, options: FrameOptions) -> "Want
     from rollcli.stereo.match import Wanted
 
     return Wanted(
-        rows=slice(None) if allowed is None else _used_rows(allowed),
         road=partial(_road, allowed, options.method) if options.method.road == "auto" else None,
         whole=bool(options.images.folders()),
     )
-
-
-def _used_rows(allowed: NDArray[np.bool_]) -> slice:
-    """Return the rows from the first to the last that has an allowed pixel."""
-    (used,) = np.nonzero(allowed.any(axis=1))
-    return slice(int(used[0]), int(used[-1]) + 1)
 
 
 def _road(

@@ -20,7 +20,7 @@ from rollcli.stereo.options import StereoOptions
 from rollcli.stereo.sgbm import (
     NARROWEST,
     SUBPIXELS,
-    match_rows,
+    match_below,
     match_views,
     usable_range,
     without_lag,
@@ -94,7 +94,6 @@ class Levelled:
         """Take views as given, how the right one lies, how to get its disparities, and what is looked for."""
         self.shape, self.search, self._find_road = views[0].shape, search, find_road
         self._views, self._lies, self._near = views, lies, near if lies.tilt else lambda: None
-        self._roads: dict[tuple[int, int], _Near | None] = {}
 
     @cached_property
     def whole(self) -> Views:
@@ -127,12 +126,11 @@ class Levelled:
         assert self._small is not None
         return resampled(self._small, self.shape)
 
-    def road(self, plane: Plane, rows: slice) -> "_Near | None":
-        """Match some rows along the road's plane; None where too little of it is found."""
-        key = rows.start, rows.stop
-        if key not in self._roads:
-            self._roads[key] = _match_along(self, plane, rows, self.coarse)
-        return self._roads[key]
+    @cached_property
+    def road(self) -> "_Near | None":
+        """The rows that the road's plane reaches, matched along it; None where too little of it is found."""
+        narrow = self.search.options.is_default and self.shape[0] >= _LEAST_HEIGHT
+        return _match_along(self, self.plane, self.coarse) if narrow and self.plane else None
 
     def along(self, plane: Map, middle: int, rows: slice) -> Views:
         """Return some rows of both views, the right one warped so that a plane lies at a disparity `middle`.
@@ -147,14 +145,12 @@ class Levelled:
         return smoothed_at_pixels(left[rows]), grey_along(right, u, np.broadcast_to(v, u.shape))
 
 
-def match_for_road(pair: Levelled, rows: slice, *, whole: bool = False) -> Map:
+def match_for_road(pair: Levelled, *, whole: bool = False) -> Map:
     """Match what an estimate needs: the road, and what lies beside and above it at a part of the size.
 
     Parameters
     ----------
     pair : Levelled
-    rows : slice
-        Rows that are needed; elsewhere the map may hold no data.
     whole : bool
         Whether what lies beside and above the road is matched at full size, too.
 
@@ -164,28 +160,18 @@ def match_for_road(pair: Levelled, rows: slice, *, whole: bool = False) -> Map:
         Pixels; no data is 0.
     """
     first, count, options = pair.search
-    plane = pair.plane
-
-    def match_all(rows: slice) -> Map:
-        return without_lag(match_rows(pair.whole, first, count, options, rows), options.mode)
-
-    if plane is None:
-        return match_all(rows)
-    start, stop, _ = rows.indices(pair.shape[0])
-    top = min(max(start, _first_row(plane, pair.shape)), stop)
-    narrow = options.is_default and pair.shape[0] >= _LEAST_HEIGHT
-    near = pair.road(plane, slice(top, stop)) if narrow else None
-    if whole:
-        disparity = match_all(rows)
-        if near is not None:
-            np.copyto(disparity[top:stop], near.disparity, where=near.found & near.lies_on)
+    if whole or pair.plane is None:
+        disparity = without_lag(match_views(pair.whole, first, count, options), options.mode)
+        if pair.plane is not None and pair.road is not None:
+            top, near = _first_row(pair.plane, pair.shape), pair.road
+            np.copyto(disparity[top:], near.disparity, where=near.found & near.lies_on)
         return disparity
-    disparity = np.zeros_like(pair.coarse)
-    disparity[start:top] = pair.coarse[start:top]
-    if near is None:
-        disparity[top:stop] = match_rows(pair.whole, first, count, options, slice(top, stop))[top:stop]
+    top = _first_row(pair.plane, pair.shape)
+    disparity = pair.coarse.copy()
+    if pair.road is None:
+        disparity[top:] = match_below(pair.whole, first, count, options, top)
         return without_lag(disparity, options.mode)
-    disparity[top:stop] = near.beside(pair.coarse[top:stop])
+    disparity[top:] = pair.road.beside(pair.coarse[top:])
     return disparity
 
 
@@ -226,20 +212,19 @@ class _Near(NamedTuple):
         return np.where(self.lies_on | (coarse <= 0), self.disparity * self.found, coarse)
 
 
-def _match_along(pair: Levelled, plane: Plane, rows: slice, coarse: Map) -> _Near | None:
-    """Match some rows along a plane; None where too little of the `coarse` map is found there again."""
+def _match_along(pair: Levelled, plane: Plane, coarse: Map) -> _Near | None:
+    """Match the rows that a plane reaches; None where too little of the `coarse` map is found there again."""
     height, width = pair.shape
-    beside = _BLOCK + 1
-    top, bottom = max(0, rows.start - beside), min(height, rows.stop + beside)
+    first = _first_row(plane, pair.shape)
+    top = max(0, first - _BLOCK - 1)
     count = NARROWEST * math.ceil(width / _WIDTH)
-    if bottom - top <= 2 * _BLOCK or width <= count + _BLOCK:
+    if height - top <= 2 * _BLOCK or width <= count + _BLOCK:
         return None
     at_origin, across, down = map(np.float32, plane)
     u = np.arange(width, dtype=np.float32)
-    straight = across * u + (at_origin + down * np.arange(top, bottom, dtype=np.float32)[:, None])
-    views = pair.along(np.maximum(straight, 0), count // 2, slice(top, bottom))
-    sixteenths = _match_blocks(views, count)[rows.start - top : rows.stop - top]
-    straight = straight[rows.start - top : rows.stop - top]
+    straight = across * u + (at_origin + down * np.arange(top, height, dtype=np.float32)[:, None])
+    views = pair.along(np.maximum(straight, 0), count // 2, slice(top, height))
+    sixteenths, straight = _match_blocks(views, count)[first - top :], straight[first - top :]
 
     end = round(_END * count * SUBPIXELS)
     known = (sixteenths > end) & (sixteenths < (count - 1) * SUBPIXELS - end)
@@ -247,7 +232,7 @@ def _match_along(pair: Levelled, plane: Plane, rows: slice, coarse: Map) -> _Nea
     # the plane is that of the pixel which the right view shows there
     disparity = np.maximum(straight - across * shift, 0) + (shift - np.float32(count // 2))
     known &= (disparity > 0) & (disparity <= u)
-    seen = coarse[rows]
+    seen = coarse[first:]
     lies_on = np.abs(seen - straight) < np.float32(_NEAR * count)
     lies_on &= seen > 0
     on = np.count_nonzero(lies_on)

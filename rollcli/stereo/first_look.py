@@ -24,7 +24,7 @@ from rollcli.stereo.options import StereoOptions
 from rollcli.stereo.sgbm import NARROWEST, match_views, usable_range
 from rollcli.stereo.views import Views, shrink_both
 
-Matcher = Callable[[float], NDArray[Any]]
+Matcher = Callable[[float], NDArray[np.float32]]
 """The disparity map, in pixels with 0 for no data, of a search as wide as given, pixels."""
 
 _RANGE_ROUNDS = 4
@@ -33,14 +33,26 @@ _BEYOND, _WITHIN = 1.4, 0.85
 _MIN_SHARE = 0.01  # of the pixels, to say anything
 
 
-class Range(NamedTuple):
-    """The largest disparity of a pair, outliers aside, and the map that shows it."""
+@dataclass(frozen=True)
+class SmallMatch:
+    """A match of small views; pixels of these.
+
+    Attributes
+    ----------
+    top : float
+        The largest disparity, outliers aside.
+    disparity : ndarray of float32
+        The map.
+    measured : Measured or None
+        How the right view lies; None where it was not measured, or cannot be told.
+    """
 
     top: float
-    disparity: NDArray[Any]
+    disparity: NDArray[np.float32]
+    measured: Measured | None = None
 
 
-def largest_disparity(match: Matcher, width: int, start: float | None = None) -> Range | None:
+def largest_disparity(match: Matcher, width: int, start: float | None = None) -> SmallMatch | None:
     """Find the largest disparity of a pair, and a map of what may be believed.
 
     Parameters
@@ -54,8 +66,8 @@ def largest_disparity(match: Matcher, width: int, start: float | None = None) ->
 
     Returns
     -------
-    Range or None
-        Pixels; None where nothing can be matched.
+    SmallMatch or None
+        None where nothing can be matched.
 
     Notes
     -----
@@ -71,9 +83,9 @@ def largest_disparity(match: Matcher, width: int, start: float | None = None) ->
             return None
         searched = _BEYOND * top + 4
         narrow, wide = match(searched), match(min(2 * searched, width / 2))
-        believed = np.where(np.abs(narrow - wide) < 1, narrow, 0)
+        believed = np.where(np.abs(narrow - wide) < 1, narrow, np.float32(0))
         top = _top(believed, 99)
-        found = None if top is None else Range(top, np.where(wide > 0, believed, narrow))
+        found = None if top is None else SmallMatch(top, np.where(wide > 0, believed, narrow))
         if top is not None and top < _WITHIN * searched:
             break
     return found
@@ -136,15 +148,6 @@ class FirstLook:
     disparity: NDArray[np.float32] | None = None
 
 
-@dataclass(frozen=True)
-class _Small:
-    """A small match: largest disparity, map, and how the right view lies; pixels of the small views."""
-
-    top: float
-    disparity: NDArray[np.float32]
-    measured: Measured | None
-
-
 class _Pair(NamedTuple):
     """Small views, and what is compared of them."""
 
@@ -181,7 +184,7 @@ def first_look(small: SmallViews) -> FirstLook:
     return look if clearest is first else _closer(small, clearest, factor)[0]
 
 
-def _plainly_level(found: _Small | None, factor: float, shape: tuple[int, ...]) -> FirstLook | None:
+def _plainly_level(found: SmallMatch | None, factor: float, shape: tuple[int, ...]) -> FirstLook | None:
     """Return what was found where small views say level, as far as they tell; the match decides."""
     if found is None or found.measured is None:
         return None
@@ -193,7 +196,7 @@ def _plainly_level(found: _Small | None, factor: float, shape: tuple[int, ...]) 
     return _seen(found, factor, replace(seen, misalignment=LEVEL))
 
 
-def _closer(small: SmallViews, found: _Small | None, factor: float) -> tuple[FirstLook, bool]:
+def _closer(small: SmallViews, found: SmallMatch | None, factor: float) -> tuple[FirstLook, bool]:
     """Measure at larger views, from where those that are `factor` times smaller have ended; is it sure?"""
     if found is None or found.measured is None:
         return _seen(found, factor, None), False
@@ -211,13 +214,13 @@ def _is_sure(coarse: Measured, measured: Measured | None, shape: tuple[int, ...]
     return measured.errors.offset < _UNSURE_ERROR and step < _UNSURE_STEP
 
 
-def _clearest(attempts: Iterable[_Small | None]) -> _Small | None:
+def _clearest(attempts: Iterable[SmallMatch | None]) -> SmallMatch | None:
     """Return the attempt that leaves the least unexplained, of those that tell anything."""
     some = [each for each in attempts if each is not None]
     return min(some, key=lambda each: each.measured.spread if each.measured else math.inf, default=None)
 
 
-def _climb(pair: _Pair, start: Misalignment, first: _Small | None = None) -> _Small | None:
+def _climb(pair: _Pair, start: Misalignment, first: SmallMatch | None = None) -> SmallMatch | None:
     """Level, match and measure in turn, until the right view lies still; `first` is what `start` gave."""
     shape = pair.views[0].shape
     found, at, approach = None, start, Approach(shape)
@@ -235,7 +238,7 @@ def _climb(pair: _Pair, start: Misalignment, first: _Small | None = None) -> _Sm
     return found
 
 
-def _look(pair: _Pair, at: Misalignment, before: _Small | None = None) -> _Small | None:
+def _look(pair: _Pair, at: Misalignment, before: SmallMatch | None = None) -> SmallMatch | None:
     """Level, match and measure once; `before` knows how far to search."""
     left, right = pair.views
     levelled = left, level(right, at)
@@ -245,18 +248,18 @@ def _look(pair: _Pair, at: Misalignment, before: _Small | None = None) -> _Small
     if matched is None:
         return None
     measured = measure_misalignment(pair.texture, matched.disparity, at)
-    return _Small(matched.top, matched.disparity, measured)
+    return replace(matched, measured=measured)
 
 
-def _match_again(pair: Views, top: float) -> _Small | None:
+def _match_again(pair: Views, top: float) -> SmallMatch | None:
     """Match over the range that was enough before the views lay otherwise; None where it is not now."""
     searched = _BEYOND * top + 4
     disparity = _match(pair, searched)
     found = _top(disparity, 99)
-    return None if found is None or found > _WITHIN * searched else _Small(found, disparity, None)
+    return None if found is None or found > _WITHIN * searched else SmallMatch(found, disparity)
 
 
-def _match_small(pair: Views) -> _Small | None:
+def _match_small(pair: Views) -> SmallMatch | None:
     """Match over the range that is found to be enough."""
     half = shrink_both(pair, 2)
     rough = rough_largest(lambda count: _match(half, count), half[0].shape[1])
@@ -270,10 +273,10 @@ def _match_small(pair: Views) -> _Small | None:
         found = largest_disparity(match, width, 2 * rough)
     if found is None:  # a near scene, or grain that is gone at half the size
         found = largest_disparity(match, width)
-    return None if found is None else _Small(found.top, found.disparity.astype(np.float32, copy=False), None)
+    return found
 
 
-def _seen(found: _Small | None, factor: float, measured: Measured | None) -> FirstLook:
+def _seen(found: SmallMatch | None, factor: float, measured: Measured | None) -> FirstLook:
     """Say what was found at views that are `factor` times smaller, and how the right one lies."""
     if found is None:
         return FirstLook(None, None)

@@ -31,7 +31,7 @@ from rollcli.stereo.misalignment import LEVEL, NOTHING_KNOWN, Misalignment
 from rollcli.stereo.misalignment_words import NOT_LEVELLED, NOT_TOLD_BY_ROWS, TOO_LITTLE
 from rollcli.stereo.options import StereoOptions as StereoOptions
 from rollcli.stereo.refinement import refined
-from rollcli.stereo.sgbm import ALL_ROWS, NARROWEST, usable_range
+from rollcli.stereo.sgbm import NARROWEST, usable_range
 from rollcli.stereo.views import Map, Views, prepare_views
 
 # Shares of the textured blocks that tell
@@ -81,7 +81,6 @@ def _share(measured: Measured | None) -> float:
 
 _MATCHES = 4  # until a pair counts as one that cannot be levelled
 _ROUNDS = 8  # of measuring; on empty roads with much noise each takes away a fifth of what is left
-_LEFT_IN_ROWS = 0.3  # px, where not all rows are matched
 # A scale that no rig in use has, in blocks that do not agree. Of 468 warped pairs 12 had both: three angles
 # of them were wrong by 0.3 degrees. Of the others two were wrong, by 0.11
 _UNUSUAL_SCALE = 0.003
@@ -103,16 +102,13 @@ class Wanted(NamedTuple):
 
     Attributes
     ----------
-    rows : slice
-        Rows that are used, of the size matched at; the others may hold no data.
     road : callable or None
         Finds the road's plane in a small map of the pair. The road is then matched along it, and what lies
         beside and above it at a third of the size.
     whole : bool
-        Whether a map with all rows at full size is wanted beside that, to be looked at.
+        Whether a map with all of it at full size is wanted beside that, to be looked at.
     """
 
-    rows: slice = ALL_ROWS
     road: FindRoad | None = None
     whole: bool = False
 
@@ -129,7 +125,7 @@ class StereoMatch:
     disparity : ndarray of float32, shape (H, W)
         Pixels of the size matched at; no data is 0.
     whole : ndarray of float32, shape (H, W), or None
-        The same with all rows at full size, if that was wanted and is another one.
+        The same with all of it at full size, if that was wanted and is another one.
     min_disparity, num_disparities : int
         The range searched.
     end_fraction : float
@@ -278,19 +274,19 @@ def match_pair(
     def levelled(lies: Misalignment) -> Levelled:
         return Levelled(views, lies, near, search, wanted.road)
 
-    def match(lies: Misalignment, rows: slice) -> Map:
-        return match_for_road(levelled(lies), rows)
+    def match(lies: Misalignment) -> Map:
+        return match_for_road(levelled(lies))
 
     given = None
     if small is None:
         corrected, given = options.given_alignment(width)
         measured, doubt = None, ""
-        matched = match(corrected, wanted.rows)
+        matched = match(corrected)
         if options.checks_alignment:
             measured = SmallViews(views).measure(matched, corrected)
             doubt = "" if measured is None or _agrees(measured, corrected, views[0].shape) else CONTRADICTS
     else:
-        matched, corrected, measured, doubt = _match_levelled(match, wanted.rows, small, look, first < 0)
+        matched, corrected, measured, doubt = _match_levelled(match, small, look, first < 0)
     support = NOTHING_KNOWN if measured is None or corrected == LEVEL else given or measured.support
     if support.error > _OPEN_COLUMNS and not doubt:
         doubt = NOT_TOLD_BY_ROWS
@@ -301,7 +297,7 @@ def match_pair(
     valid = cv2.countNonZero(matched)
     whole = None
     if wanted.whole and wanted != _EVERYTHING._replace(whole=True):
-        whole = finished(match_for_road(levelled(corrected), ALL_ROWS, whole=True))
+        whole = finished(match_for_road(levelled(corrected), whole=True))
     return StereoMatch(
         disparity=finished(matched),
         whole=whole,
@@ -328,26 +324,17 @@ def _look_as_given(views: Views, options: StereoOptions) -> FirstLook:
 
 
 def _match_levelled(
-    match: Callable[[Misalignment, slice], Map],
-    rows: slice,
-    small: SmallViews,
-    look: FirstLook,
-    any_scene: bool,
+    match: Callable[[Misalignment], Map], small: SmallViews, look: FirstLook, any_scene: bool
 ) -> tuple[Map, Misalignment, Measured | None, str]:
     """Match once the views are level; the map, what was corrected and measured, and why it may be wrong."""
     looked_at = _worth_correcting(look.measured, small.shape)
     wanted, approach = looked_at, Approach(small.shape)
     for matched in range(_MATCHES):
         at = wanted
-        disparity = match(at, rows)
+        disparity = match(at)
         measured = small.closer.measure(disparity, at, _ROUNDS)
         if not any_scene:
             check_same_scene(small, look, measured)
-        if rows != ALL_ROWS:
-            if look.measured is not None and _is_confirmed(measured, at, small.shape, rows):
-                return disparity, at, look.measured, _doubt(at, measured)
-            rows = ALL_ROWS  # a few rows say that something is wrong, but not what
-            continue
         if measured is None:
             return disparity, at, look.measured, TOO_LITTLE
         wanted = _wanted(measured, approach.next(at, measured.misalignment), small.shape)
@@ -358,15 +345,6 @@ def _match_levelled(
         if matched == 1 and looked_at != LEVEL:  # which may have led astray
             wanted, approach = LEVEL, Approach(small.shape)
     return disparity, at, measured, NOT_LEVELLED
-
-
-def _is_confirmed(measured: Measured | None, at: Misalignment, shape: tuple[int, ...], rows: slice) -> bool:
-    """Tell whether what is left in the rows that were matched is small, as far as they tell."""
-    if measured is None:
-        return True
-    height, width = shape
-    start, stop, _ = rows.indices(height)
-    return (measured.misalignment - at).reach_in_rows(height, width, start, stop) < _LEFT_IN_ROWS
 
 
 def _wanted(measured: Measured, reached: Misalignment, shape: tuple[int, ...]) -> Misalignment:

@@ -94,12 +94,6 @@ class Misalignment:
         middle = [offset + u * rotation for u in (-1, 1)]
         return max(abs(each + near) for each in edge + middle for near in (0.0, tilt))
 
-    def reach_in_rows(self, height: int, width: int, start: int, stop: int) -> float:
-        """Return the largest vertical shift in the middle half of some rows of such a view, pixels."""
-        x, rows = width / 4, (start - height / 2, stop - height / 2)
-        largest: float = max(abs(self.down(u, v)) for u in (-x, x) for v in rows)
-        return largest
-
     def values(self, height: int, width: int) -> tuple[float, float, float, float]:
         """Return the parts in the units of a result: px, degrees, per cent, and px in the corners."""
         twist = self.shifts(height, width)[3]

@@ -163,15 +163,6 @@ def test_behind_the_horizon_all_is_matched_as_a_whole(street):
     np.testing.assert_array_equal(found.disparity, whole.disparity)
 
 
-def test_rows_that_are_not_needed_hold_no_data(street, road):
-    found = match_pair(street.left, street.right, StereoOptions(), ROAD._replace(rows=slice(300, 420)))
-    assert not found.disparity[:300].any()
-    assert not found.disparity[420:].any()
-    both = (found.disparity > 0) & (road.disparity > 0)
-    assert both.sum() > 0.9 * (road.disparity[300:420] > 0).sum()
-    assert np.median(np.abs(found.disparity - road.disparity)[both]) < 0.05
-
-
 def test_a_wide_view_is_matched_over_a_wider_range():
     """Its road bends by more pixels: 9 px at its middle are found at 1,920 px, and not at a third of that."""
     height, width = 400, 1920

@@ -1,14 +1,12 @@
 """How often a pair is matched until its views are level, with matches and measurements that are known."""
 
 import numpy as np
-import pytest
 
 from rollcli.stereo import match as stereo
 from rollcli.stereo.alignment import Measured
 from rollcli.stereo.first_look import FirstLook
 from rollcli.stereo.misalignment import Misalignment
 from rollcli.stereo.misalignment_words import NOT_LEVELLED
-from rollcli.stereo.sgbm import ALL_ROWS
 
 SHAPE = (200, 300)
 
@@ -31,8 +29,8 @@ class Rig:
     def closer(self):
         return self
 
-    def match(self, at, rows):
-        self.matched.append((round(at.offset, 3), rows))
+    def match(self, at):
+        self.matched.append(round(at.offset, 3))
         return np.full(SHAPE, len(self.matched), np.float32)
 
     def measure(self, disparity, at, rounds):
@@ -40,7 +38,7 @@ class Rig:
         seen = self.offset(at.offset) if callable(self.offset) else self.offset
         return lies(seen - self.hidden * (seen - at.offset)) if self.tells else None
 
-    def run(self, monkeypatch, look=None, rows=ALL_ROWS, any_scene=False):
+    def run(self, monkeypatch, look=None, any_scene=False):
         self.checked = 0
 
         def check(*_):
@@ -48,7 +46,7 @@ class Rig:
 
         monkeypatch.setattr(stereo, "check_same_scene", check)
         disparity, corrected, self.told, doubt = stereo._match_levelled(
-            self.match, rows, self, FirstLook(20, look), any_scene
+            self.match, self, FirstLook(20, look), any_scene
         )
         assert disparity[0, 0] == len(self.matched)  # the map of the last match
         return round(corrected.offset, 3), doubt
@@ -59,22 +57,10 @@ def test_a_pair_that_runs_away_is_given_up_after_four_matches(monkeypatch):
     corrected, doubt = rig.run(monkeypatch, lies(0.0))
     assert doubt == NOT_LEVELLED
     assert len(rig.matched) == 4
-    assert corrected == rig.matched[-1][0]  # what was matched, not what would be tried next
+    assert corrected == rig.matched[-1]  # what was matched, not what would be tried next
 
 
 def test_a_pair_that_a_look_led_astray_is_matched_as_it_is_too(monkeypatch):
     rig = Rig(lambda at: at + 1.0 if at else 0.0)
     assert rig.run(monkeypatch, lies(3.0)) == (0, "")
-    assert [round(at) for at, _ in rig.matched] == [3, 4, 0]
-
-
-@pytest.mark.parametrize(
-    ("look", "offset", "whole"), [(3.0, 3.0, False), (3.0, 3.4, True), (None, 0.0, True)]
-)
-def test_a_few_rows_are_enough_where_they_confirm_the_look(monkeypatch, look, offset, whole):
-    rig, rows = Rig(offset), slice(100, 150)
-    found = rig.run(monkeypatch, None if look is None else lies(look), rows=rows)
-    assert rig.matched[0] == (look or 0, rows)
-    assert all(needed == ALL_ROWS for _, needed in rig.matched[1:])
-    assert (len(rig.matched) > 1) == whole
-    assert found == (offset, "")
+    assert rig.matched == [3, 4, 0]

@@ -3,7 +3,6 @@
 import itertools
 import math
 
-import numpy as np
 import pytest
 
 from rollcli.files.results import Row
@@ -123,15 +122,3 @@ def test_the_reach_is_the_largest_shift_of_the_four_corners(signs):
     assert Misalignment(offset, rotation, scale, twist).reach(200, 640) == pytest.approx(
         max(map(abs, shifts))
     )
-
-
-@pytest.mark.parametrize("signs", list(itertools.product((-1, 1), repeat=4)))
-@pytest.mark.parametrize("rows", [(0, 200), (0, 60), (120, 200)])
-def test_the_reach_in_rows_is_the_largest_shift_in_their_middle_half(rows, signs):
-    offset, rotation, scale, twist = (
-        sign * size for sign, size in zip(signs, (0.7, 2e-3, 5e-3, 4e-5), strict=True)
-    )
-    x, y = np.meshgrid(np.arange(-160, 161), np.arange(rows[0], rows[1] + 1) - 100)
-    shifts = offset + rotation * x + scale * y + twist * x * y
-    found = Misalignment(offset, rotation, scale, twist).reach_in_rows(200, 640, *rows)
-    assert found == pytest.approx(np.abs(shifts).max())

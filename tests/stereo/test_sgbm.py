@@ -10,7 +10,7 @@ from rollcli.simulate.options import SimulateOptions
 from rollcli.simulate.spec import draw_specs
 from rollcli.stereo.match import compute_disparity
 from rollcli.stereo.options import MODES, StereoOptions
-from rollcli.stereo.sgbm import LAGS, match_rows, match_views, without_lag
+from rollcli.stereo.sgbm import LAGS, match_below, match_views, without_lag
 from tests.slow import mostly_slow
 
 
@@ -51,33 +51,12 @@ def test_a_match_is_opencvs_own_in_pixels(views, mode, given):
     np.testing.assert_array_equal(disparity, np.where(sixteenths > 0, sixteenths / 16, 0))
 
 
-@pytest.mark.parametrize(
-    ("rows", "seen"),
-    [
-        (slice(60, 80), slice(44, 96)),
-        (slice(10, 20), slice(0, 36)),
-        (slice(100, 140), slice(84, 140)),
-        (slice(17, 24), slice(1, 40)),
-        (slice(60, 123), slice(44, 139)),
-    ],
-)
-def test_rows_that_are_needed_are_matched_with_16_beside_them(views, rows, seen):
-    options = StereoOptions()
-
-    disparity = match_rows(views, 0, 48, options, rows)
-
+@pytest.mark.parametrize(("top", "above"), [(60, 44), (17, 1), (10, 0), (0, 0)])
+def test_rows_from_one_on_are_matched_with_16_above_them(views, top, above):
+    found = match_below(views, 0, 48, StereoOptions(), top)
     left, right = views
-    alone = match_views((left[seen], right[seen]), 0, 48, options)
-    np.testing.assert_array_equal(disparity[seen], alone)
-    disparity[seen] = 0
-    assert not disparity.any()
-
-
-@pytest.mark.parametrize("rows", [slice(None), slice(16, 124), slice(5, 130), slice(0, 200)])
-def test_rows_that_need_all_are_matched_as_a_whole(views, rows):
-    options = StereoOptions()
-    whole = match_views(views, 0, 48, options)
-    np.testing.assert_array_equal(match_rows(views, 0, 48, options, rows), whole)
+    alone = match_views((left[above:], right[above:]), 0, 48, StereoOptions())
+    np.testing.assert_array_equal(found, alone[top - above :])
 
 
 @pytest.mark.parametrize(

@@ -98,9 +98,7 @@ def _find(checked: CheckedMap, request: Request) -> tuple[Road, Surface]:
 
 def _road_pixels(road: Road, surface: Surface) -> PixelSet:
     """Sum the road's pixels by their weights."""
-    moments = point_moments(
-        surface.x, surface.y, surface.d, surface.weights, surface.grid, surface.model.plane
-    )
+    moments = point_moments(surface.x, surface.y, surface.d, surface.weights, surface.grid)
     energy = Energy.of(moments, float(surface.d.max()), parabolic=surface.parabolic)
     return PixelSet(energy, surface, road, surface.share)
 

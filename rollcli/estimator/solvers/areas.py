@@ -114,47 +114,8 @@ def lower_centre_slices(height: int, width: int) -> tuple[slice, slice]:
     return rows, columns
 
 
-@dataclass(frozen=True)
-class Tiles:
-    """The sums of a map's tiles.
-
-    Attributes
-    ----------
-    grid : Grid
-        The coordinates p, q, those of the map's `Moments`.
-    side : int
-        Of a square tile, px; the last row and column of tiles reach over the edge of the map.
-    gram : ndarray, shape (R, C, 4, 4)
-        sum x x' per tile, x = (1, p, q, d): the moments up to degree 2, with d in px. They add: over all
-        tiles they give the entries of `Moments`.
-    """
-
-    grid: Grid
-    side: int
-    gram: Floats
-
-    def areas(self, size: int, step: int) -> Floats:
-        """Sum squares of tiles.
-
-        Parameters
-        ----------
-        size, step : int
-            Side of an area, and the distance from one to the next, in tiles.
-
-        Returns
-        -------
-        ndarray, shape (R', C', 4, 4)
-            Area [i, j] has its top-left tile at (i step, j step); none reaches over the last tile.
-        """
-        total = np.pad(self.gram, ((1, 0), (1, 0), (0, 0), (0, 0))).cumsum(axis=0).cumsum(axis=1)
-        summed: Floats = (
-            total[size:, size:] - total[:-size, size:] - total[size:, :-size] + total[:-size, :-size]
-        )
-        return summed[::step, ::step]
-
-
-def tile_sums(disparity: NDArray[Any], usable: NDArray[np.bool_], side: int) -> Tiles:
-    """Sum a map tile by tile.
+def tile_sums(disparity: NDArray[Any], usable: NDArray[np.bool_], side: int) -> Floats:
+    """Sum a map tile by tile; the last row and column of tiles reach over its edge.
 
     Parameters
     ----------
@@ -166,7 +127,9 @@ def tile_sums(disparity: NDArray[Any], usable: NDArray[np.bool_], side: int) -> 
 
     Returns
     -------
-    Tiles
+    ndarray, shape (R, C, 4, 4)
+        sum x x' per tile, x = (1, p, q, d), p and q as of the map's `Moments`, d in px. They add: over all
+        tiles they give the entries of `Moments`.
     """
     height, width = disparity.shape
     rows, columns = -(-height // side), -(-width // side)
@@ -185,7 +148,27 @@ def tile_sums(disparity: NDArray[Any], usable: NDArray[np.bool_], side: int) -> 
         np.multiply(terms[0], q[part, None], out=terms[2])
         by_tile = terms.reshape(4, side, columns, side).transpose(2, 0, 1, 3).reshape(columns, 4, -1)
         np.matmul(by_tile, by_tile.transpose(0, 2, 1), out=gram[row])
-    return Tiles(grid, side, gram)
+    return gram
+
+
+def area_sums(gram: Floats, size: int, step: int) -> Floats:
+    """Sum squares of tiles.
+
+    Parameters
+    ----------
+    gram : ndarray, shape (R, C, 4, 4)
+        Of the tiles.
+    size, step : int
+        Side of an area, and the distance from one to the next, in tiles.
+
+    Returns
+    -------
+    ndarray, shape (R', C', 4, 4)
+        Area [i, j] has its top-left tile at (i step, j step); none reaches over the last tile.
+    """
+    total = np.pad(gram, ((1, 0), (1, 0), (0, 0), (0, 0))).cumsum(axis=0).cumsum(axis=1)
+    summed: Floats = total[size:, size:] - total[:-size, size:] - total[size:, :-size] + total[:-size, :-size]
+    return summed[::step, ::step]
 
 
 _TILES = 100  # along the longer side of the map
@@ -224,7 +207,7 @@ def iterative(
     """
     require_pixels(usable)
     side = max(2, round(max(disparity.shape) / _TILES))
-    grams = tile_sums(disparity, usable, side).areas(_SIZE, _STEP)
+    grams = area_sums(tile_sums(disparity, usable, side), _SIZE, _STEP)
     across, grams = grams.shape[1], grams.reshape(-1, 4, 4)
     extent = _SIZE * side
     filled = np.flatnonzero(grams[:, 0, 0] >= _FILLED * extent**2)

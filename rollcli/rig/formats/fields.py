@@ -165,17 +165,13 @@ def require_one_pair(left: tuple[float, float, float], right: tuple[float, float
     ------
     InputError
     """
-    (fx, fy, cy), (other_fx, other_fy, other_cy) = left, right
-    for name, one, other, tolerance in (
-        ("focal lengths", fx, other_fx, _SAME_FOCAL * abs(fx)),
-        ("vertical focal lengths", fy, other_fy, _SAME_FOCAL * abs(fy)),
-        ("rows of the principal point", cy, other_cy, _SAME_ROW),
-    ):
-        if abs(one - other) > tolerance:
-            raise InputError(
-                f"{where} is contradictory: the {name} of the two views are {one:g} and {other:g} px, "
-                "and those of a rectified pair are equal"
-            )
+    tolerances = (_SAME_FOCAL * abs(left[0]), _SAME_FOCAL * abs(left[1]), _SAME_ROW)
+    if any(abs(a - b) > most for a, b, most in zip(left, right, tolerances, strict=True)):
+        one, other = (", ".join(f"{value:g}" for value in view) for view in (left, right))
+        raise InputError(
+            f"{where} is contradictory: fx, fy and cy of the two views are {one} and {other} px, "
+            "and those of a rectified pair are equal"
+        )
 
 
 def swapped(where: str) -> InputError:

@@ -18,12 +18,6 @@ _KEYS = re.compile(r"""(?:^|[\s<{,"])(?:P1|P2|Q|M1)(?:"?\s*:|[\s>])""")
 _MARKS = ("%YAML:1.0", "%YAML 1.0", "<opencv_storage>", "opencv-matrix")
 _METRES = (0.005, 5.0)  # no rig on a vehicle is smaller or larger: another number has another unit
 _SAME = 1e-3  # relative: P2 and Q are of one rig
-_IN_BOTH = (
-    ("focal length", 0),
-    ("principal point's column", 2),
-    ("principal point's row", 3),
-    ("baseline", 4),
-)
 
 
 def is_opencv(text: str) -> bool:
@@ -45,13 +39,13 @@ def read_opencv(file: File) -> Fields:
             "(often extrinsics.yml); camera matrices alone are those of the raw images"
         )
     if "P1" in matrices and "Q" in matrices:
-        other = _of_q(file, matrices["Q"])
-        for name, place in _IN_BOTH:
-            one, two = found[place], other[place]
-            if abs(one - two) > _SAME * abs(one):
-                raise InputError(
-                    f"{file.name}: is contradictory: the {name} is {one:g} in P1 and P2, and {two:g} in Q"
-                )
+        both = [(fx, cx, cy, length) for fx, _, cx, cy, length, _ in (found, _of_q(file, matrices["Q"]))]
+        if any(abs(one - two) > _SAME * abs(one) for one, two in zip(*both, strict=True)):
+            one, two = (", ".join(f"{value:g}" for value in values) for values in both)
+            raise InputError(
+                f"{file.name}: is contradictory: fx, cx, cy and the baseline are {one} in P1 and P2, "
+                f"and {two} in Q"
+            )
     return _with_unit(file, found)
 
 

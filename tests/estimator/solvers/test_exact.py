@@ -49,7 +49,7 @@ def test_on_noise_it_finds_every_minimum_of_a_dense_scan(seed):
     found, expected = minima(energy), dense_minima(energy)
     assert len(found) == len(expected)
     for one, (theta, value) in zip(found, expected, strict=True):
-        assert degrees_apart(one.theta, theta) < 1e-4
+        assert degrees_apart(one.theta, theta) < 2e-4  # the scan sees no finer where E hardly bends
         assert one.energy == pytest.approx(value, rel=1e-10)
 
 
