@@ -83,7 +83,7 @@ class PoolExecutor(Generic[Task, Result]):
         The system starts no further process.
     """
 
-    worker_died: tuple[type[BaseException], ...] = (WorkerDiedError,)
+    worker_died: tuple[type[BaseException], ...] = (WorkerDiedError,)  # what its futures raise
 
     def __init__(self, workers: int, work: Work[Task, Result], asked: Workers) -> None:
         self.workers, self.threads = workers, asked.threads

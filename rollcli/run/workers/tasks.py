@@ -3,69 +3,28 @@
 import contextlib
 import os
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence, Sized
+from collections.abc import Callable, Generator, Iterable, Iterator, Sized
 from dataclasses import replace
-from typing import Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any
 
-from rollcli.run.workers.chunks import Chunks, Done, Result, Span, Task, Work, Workers
+from rollcli.run.workers.chunks import Chunks, Result, Span, Task, Work, Workers
 from rollcli.run.workers.interrupt import Stop
-from rollcli.run.workers.pool import prepare_worker
+from rollcli.run.workers.pool import PoolExecutor, prepare_worker
 
-_Task = TypeVar("_Task", contravariant=True)
+if TYPE_CHECKING:
+    from rollcli.run.workers.cluster import ClusterExecutor  # the extra `cluster`
+
 # chunks that are not done: a worker's own, one that waits there, and one for whichever worker is fast
 _IN_FLIGHT = 3
 # and with those that are done, a few rows each, while the oldest is not: its worker may be slow, or its tasks
 _AHEAD = 12
 
 
-class Future(Protocol[Result]):
-    """A chunk that was submitted."""
-
-    def done(self) -> bool:
-        """Tell whether its result is there."""
-
-    def result(self) -> Done[Result]:
-        """Return what was done of it; raise an error that says that its worker died, once it is there."""
-
-
-class Executor(Protocol[_Task, Result]):
-    """Workers, wherever they run.
-
-    Attributes
-    ----------
-    workers : int
-        How many there are now.
-    threads : int
-        Tasks that each of them has in hand at once.
-    worker_died : tuple of exception types
-        What `Future.result` raises when the worker of the chunk has died.
-    """
-
-    threads: int
-    worker_died: tuple[type[BaseException], ...]
-
-    @property
-    def workers(self) -> int:
-        """The number may change while they work."""
-
-    def submit(self, chunk: Sequence[_Task], *, first: bool = False) -> Future[Result]:
-        """Queue a chunk; `first`: before those that wait."""
-
-    def wait(self, future: Future[Result]) -> None:
-        """Wait until a chunk is done, or for a fifth of a second."""
-
-    def retry(self, chunk: Sequence[_Task]) -> Done[Result]:
-        """Run a single task again that kills workers; if this one dies too, return that of a lost task."""
-
-    def stop(self) -> None:
-        """Let workers begin no further task."""
-
-    def close(self, *, at_once: bool) -> None:
-        """End the workers: after their current task, or at once."""
-
-
 def in_order(
-    tasks: Iterable[Task], work: Work[Task, Result], executor: Executor[Task, Result], stop: Stop
+    tasks: Iterable[Task],
+    work: Work[Task, Result],
+    executor: "PoolExecutor[Task, Result] | ClusterExecutor[Task, Result]",
+    stop: Stop,
 ) -> Generator[Any, None, None]:
     """Yield what `Work.join` made of the results of some tasks and of those after them, in the tasks' order.
 
@@ -74,10 +33,10 @@ def in_order(
     """
     chunks = Chunks(tasks, executor.threads, work.unit, work.prepare)
     ahead = _AHEAD if work.prepare is None else _IN_FLIGHT
-    in_flight = deque[tuple[Span[Task], Future[Result]]]()
-    undone: list[Future[Result]] = []
+    in_flight = deque[tuple[Span[Task], Any]]()  # each with its future
+    undone: list[Any] = []
 
-    def submit(chunk: Span[Task], *, first: bool = False) -> tuple[Span[Task], Future[Result]]:
+    def submit(chunk: Span[Task], *, first: bool = False) -> tuple[Span[Task], Any]:
         undone.append(executor.submit(chunk, first=first))
         return chunk, undone[-1]
 
@@ -221,8 +180,10 @@ def _run_here(tasks: Iterable[Task], work: Work[Task, Result], stop: Stop) -> Ge
         yield work.join(Span([task], position, work.tell()), [work.do(task)])
 
 
-def _executor(count: int | None, work: Work[Any, Any], workers: Workers) -> Any:
-    """Make the executor; None: this process does the tasks. Modules load only when they are used."""
+def _executor(
+    count: int | None, work: Work[Task, Result], workers: Workers
+) -> "PoolExecutor[Task, Result] | ClusterExecutor[Task, Result] | None":
+    """Make the executor; None: this process does the tasks. The cluster's loads only when it is used."""
     if workers.scheduler is not None:
         from rollcli.run.workers.cluster import ClusterExecutor
 
@@ -231,8 +192,6 @@ def _executor(count: int | None, work: Work[Any, Any], workers: Workers) -> Any:
     if count is not None:
         jobs = min(jobs, count)
     if jobs > 1 or (jobs and workers.threads > 1):
-        from rollcli.run.workers.pool import PoolExecutor
-
         return PoolExecutor(jobs, work, workers)
     return None
 
