@@ -13,7 +13,7 @@ from rollcli.files.containers import file_of
 from rollcli.files.stores.locations import is_url, tasks_in_hand
 from rollcli.run.batch import Batch, BatchOptions, Step, join_results, line_form
 from rollcli.run.find import calibration_files, calibration_notes
-from rollcli.run.frame import Frame, FrameResult, failed_frame
+from rollcli.run.frame import Frame, FrameResult, ReadAs, failed_frame
 from rollcli.run.options import EstimateOptions, FrameOptions
 from rollcli.run.outputs import every_path, image_paths, list_files, remove_image_leftovers, write_outputs
 from rollcli.run.plan import Plan, make_plan
@@ -116,7 +116,7 @@ def _run(plan: Plan, resume_command: str, started: list[Any]) -> ExitStatus:
             output.finish(progress.summary)
         progress.tell_end()
         if stop.asked and progress.stopped_early:
-            how = f"; continue with: {resume_command}" if output.resumable else ""
+            how = f"; continue with: {resume_command}" if output.record else ""
             progress.say(f"interrupted{how}")
             return ExitStatus.INTERRUPTED
         if not (progress.stopped_early or options.running.quiet):
@@ -187,7 +187,8 @@ def _run_steps(run: _Run) -> None:
 def _results(step: Step, run: _Run) -> Iterator[Iterator[Batch]]:
     """Open the results of a step from whichever workers were asked for; the output is complete afterwards."""
     options, output, frames, parts = run.plan.options, run.output, step.frames, step.parts
-    told = options.frame._replace(replaces=output.replaces, retry_of=step.retry_of, notes=output.notes)
+    record = output.record
+    told = options.frame._replace(replaces=output.replaces, retry_of=step.retry_of, notes=record is not None)
     rows = BatchOptions(
         line_form(options.result.form),
         run.plan.further,
@@ -201,7 +202,7 @@ def _results(step: Step, run: _Run) -> Iterator[Iterator[Batch]]:
         partial(lost_frame, options=told),
         partial(clear_frame, options=told),
         partial(join_results, options=rows),
-        lambda: output.read_as,
+        lambda: record.read_as if record else ReadAs(),
         parts.rows if parts else 1,
         partial(decode_frame, options=told) if any(frame.of_videos for frame in frames) else None,
     )

@@ -29,7 +29,7 @@ def append(output, frames):
     next(output.passes())
     for frame in frames:
         result = FrameResult(Row(frame.file, status="ok", roll_deg=1.0))
-        output.append([frame], join_results(Span([frame], 0, output.read_as), [result], told))
+        output.append([frame], join_results(Span([frame], 0, output.record.read_as), [result], told))
 
 
 @pytest.fixture
