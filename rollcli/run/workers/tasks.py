@@ -3,7 +3,7 @@
 import contextlib
 import os
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator, Sized
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +21,7 @@ _AHEAD = 12
 
 
 def in_order(
-    tasks: Iterable[Task],
+    tasks: Sequence[Task],
     work: Work[Task, Result],
     executor: "PoolExecutor[Task, Result] | ClusterExecutor[Task, Result]",
     stop: Stop,
@@ -90,7 +90,7 @@ _MOST_EARLY = 4  # of the workers: there may be fewer tasks, and those of a long
 
 
 def run_tasks(
-    tasks: Iterable[Task], work: Work[Task, Result], stop: Stop, workers: Workers
+    tasks: Sequence[Task], work: Work[Task, Result], stop: Stop, workers: Workers
 ) -> Generator[Result, None, None]:
     """Yield the result of each task, in the tasks' order; see `run_joined`."""
     with contextlib.closing(run_joined(tasks, work, stop, workers)) as chunks:
@@ -99,7 +99,7 @@ def run_tasks(
 
 
 def run_joined(
-    tasks: Iterable[Task], work: Work[Task, Result], stop: Stop, workers: Workers
+    tasks: Sequence[Task], work: Work[Task, Result], stop: Stop, workers: Workers
 ) -> Generator[Any, None, None]:
     """Yield what `Work.join` makes of the results of the first tasks, and then of those after them.
 
@@ -108,10 +108,9 @@ def run_joined(
     WorkerError
         This machine starts no further process; or the cluster cannot do the work, or its scheduler is lost.
     """
-    count = len(tasks) if isinstance(tasks, Sized) else None
     if workers.scheduler is not None:
         work = replace(work, prepare=None)
-    executor = _executor(count, work, workers)
+    executor = _executor(len(tasks), work, workers)
     if executor is None:
         yield from _run_here(tasks, work, stop)
         return
@@ -171,7 +170,7 @@ def require_scheduler(address: str | None) -> None:
         check_scheduler(address)
 
 
-def _run_here(tasks: Iterable[Task], work: Work[Task, Result], stop: Stop) -> Generator[Any, None, None]:
+def _run_here(tasks: Sequence[Task], work: Work[Task, Result], stop: Stop) -> Generator[Any, None, None]:
     """Do each task in this process, when its result is asked for."""
     prepare_worker()
     for position, task in enumerate(tasks):
@@ -181,16 +180,14 @@ def _run_here(tasks: Iterable[Task], work: Work[Task, Result], stop: Stop) -> Ge
 
 
 def _executor(
-    count: int | None, work: Work[Task, Result], workers: Workers
+    count: int, work: Work[Task, Result], workers: Workers
 ) -> "PoolExecutor[Task, Result] | ClusterExecutor[Task, Result] | None":
     """Make the executor; None: this process does the tasks. The cluster's loads only when it is used."""
     if workers.scheduler is not None:
         from rollcli.run.workers.cluster import ClusterExecutor
 
         return ClusterExecutor(workers.scheduler, work, workers)
-    jobs = workers.jobs or _usable_processors()
-    if count is not None:
-        jobs = min(jobs, count)
+    jobs = min(workers.jobs or _usable_processors(), count)
     if jobs > 1 or (jobs and workers.threads > 1):
         return PoolExecutor(jobs, work, workers)
     return None
