@@ -9,7 +9,7 @@ import itertools
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar, overload
 
 from rollcli.errors import RollcliError, raised_at
@@ -229,8 +229,6 @@ class Workers:
     threads : int
         Tasks that each worker has in hand at once: more than one where they wait for the network. One of
         them computes at a time.
-    started : list of pool.Worker
-        Processes that were started before the tasks were known; those that are used are taken out.
     """
 
     jobs: int | None = None
@@ -239,7 +237,6 @@ class Workers:
     folders: tuple[str, ...] = ()
     keep_open: int | None = None
     threads: int = 1
-    started: list[Any] = field(default_factory=list)
 
 
 class _Attempt(NamedTuple):

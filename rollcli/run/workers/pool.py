@@ -94,7 +94,7 @@ class PoolExecutor(Generic[Task, Result]):
         self._queue: deque[_Queued[Task, Result]] = deque()
         try:
             for _ in range(workers):
-                self._pool.append(self._begun(asked.started.pop() if asked.started else Worker()))
+                self._pool.append(self._begun(Worker()))
         except BaseException:
             self.close(at_once=True)
             raise
@@ -201,11 +201,6 @@ class Worker(Generic[Task, Result]):
     the parent has other threads, and on other systems, it is spawned: a fork copies locks that other threads
     hold.
 
-    Parameters
-    ----------
-    load : callable
-        Imports what the process needs.
-
     Raises
     ------
     WorkerError
@@ -219,15 +214,16 @@ class Worker(Generic[Task, Result]):
         The chunks that were sent and not answered, oldest first, each with its future.
     """
 
-    def __init__(self, load: Callable[[], None] = _load_decoders) -> None:
+    def __init__(self) -> None:
         # libraries may start threads when they load
-        fork = hasattr(os, "fork") and _has_one_thread() and _error_of(load) is None and _has_one_thread()
+        loads = _has_one_thread() and _error_of(_load_decoders) is None
+        fork = hasattr(os, "fork") and loads and _has_one_thread()
         start: Any = multiprocessing.get_context("fork" if fork else "spawn")
         self.in_hand: deque[_Queued[Task, Result]] = deque()
         try:
             self.pipe, far_end = start.Pipe()
             ends = (far_end, self.pipe if fork else None)
-            self._process = start.Process(target=_serve, args=(*ends, load), daemon=True)
+            self._process = start.Process(target=_serve, args=ends, daemon=True)
             with _stop_signals_blocked(fork):  # in the child, too: only the parent decides when work ends
                 self._process.start()
         except OSError as error:
@@ -273,9 +269,7 @@ def _has_one_thread() -> bool:
         return False
 
 
-def _serve(
-    pipe: "Connection[Any, Any]", near_end: "Connection[Any, Any] | None", load: Callable[[], None]
-) -> None:
+def _serve(pipe: "Connection[Any, Any]", near_end: "Connection[Any, Any] | None") -> None:
     """Do chunks, in a worker process, until it is stopped or the parent has died.
 
     A fork has the parent's end of its pipe, too, which would hide that the parent has died. It also has those
@@ -284,7 +278,7 @@ def _serve(
     ignore_signals()
     if near_end is not None:
         near_end.close()
-    start_error = _error_of(load) or _error_of(prepare_worker)
+    start_error = _error_of(prepare_worker)
     try:
         do, join, longest_s, threads, with_file = pipe.recv()
         if with_file:

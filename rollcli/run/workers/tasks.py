@@ -3,7 +3,7 @@
 import contextlib
 import os
 from collections import deque
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -86,9 +86,6 @@ def in_order(
             submit_first(*chunks.cut(rest, executor.workers))
 
 
-_MOST_EARLY = 4  # of the workers: there may be fewer tasks, and those of a longer run need not hurry
-
-
 def run_tasks(
     tasks: Sequence[Task], work: Work[Task, Result], stop: Stop, workers: Workers
 ) -> Generator[Result, None, None]:
@@ -122,36 +119,6 @@ def run_joined(
         except KeyboardInterrupt:  # the second Ctrl-C, while they end
             executor.close(at_once=True)
             raise
-
-
-@contextlib.contextmanager
-def started_early(jobs: int | None, load: Callable[[], None]) -> Iterator[list[Any]]:
-    """Start a few worker processes while the tasks are still looked for; those that nobody takes end.
-
-    Parameters
-    ----------
-    jobs : int or None
-        The workers that were asked for; None: one for each usable processor.
-    load : callable
-        What a worker loads, apart from what all of them load.
-
-    Raises
-    ------
-    WorkerError
-        This machine starts no further process.
-    """
-    from rollcli.run.workers.pool import Worker
-
-    most = min(jobs or _usable_processors(), _MOST_EARLY)
-    started: list[Worker[Any, Any]] = []
-    try:
-        for _ in range(most if most > 1 else 0):
-            started.append(Worker(load))
-        yield started
-    finally:
-        for worker in started:
-            worker.kill()
-            worker.join()
 
 
 def require_scheduler(address: str | None) -> None:

@@ -13,10 +13,9 @@ import pytest
 
 from rollcli.errors import InputError, UsageError, WorkerError
 from rollcli.run.workers import pool as pools
-from rollcli.run.workers import tasks as runs
 from rollcli.run.workers.chunks import Work, Workers
 from rollcli.run.workers.interrupt import Stop, stop_signals
-from rollcli.run.workers.pool import PoolExecutor, prepare_worker
+from rollcli.run.workers.pool import PoolExecutor
 from rollcli.run.workers.tasks import require_scheduler, run_tasks
 from tests.run.workers.tasks import lost, run
 from tests.run_cli import ended, environment, wait_until
@@ -201,19 +200,6 @@ def test_no_scheduler_is_asked_for_unless_one_is_named():
     require_scheduler(None)
     with pytest.raises(UsageError, match=r"^--scheduler"):
         require_scheduler("")
-
-
-def test_workers_that_were_started_early_do_the_tasks_and_those_too_many_end():
-    with runs.started_early(3, prepare_worker) as started:
-        processes = {worker._process.pid: worker._process for worker in started}
-        assert len(processes) == 3
-        tasks = [("signals",) for _ in range(20)]
-        used = {pid for pid, _, _ in run_tasks(tasks, WORK, Stop(), Workers(2, started=started))}
-        assert used <= processes.keys()
-        assert len(started) == 1
-    assert not any(process.is_alive() for process in processes.values())
-    with runs.started_early(1, prepare_worker) as none:
-        assert none == []
 
 
 HOW_IT_STARTS = """
