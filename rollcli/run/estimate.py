@@ -195,7 +195,6 @@ def _results(step: Step, run: _Run) -> Iterator[Iterator[Batch]]:
         options.running.scheduler,
         files,
         (*folders, parts.output) if parts else folders,
-        output.keep_open,
         tasks_in_hand((*files, *folders)),
     )
     try:

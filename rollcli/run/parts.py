@@ -42,8 +42,8 @@ class PartsOutput:
     Workers write the parts of which they have all rows. This process writes the others.
     """
 
-    def __init__(self, record: RunRecord, kept: KeptRows, keep_open: int | None) -> None:
-        self.kept, self.keep_open, self.replaces = kept, keep_open, record.replaces
+    def __init__(self, record: RunRecord, kept: KeptRows) -> None:
+        self.kept, self.replaces = kept, record.replaces
         self.record, self._plan = record, record.plan
         self._part_rows = record.plan.options.result.part_rows
         output = located(record.plan.options.running.root, record.plan.output)
@@ -173,13 +173,13 @@ def open_parts(plan: Plan) -> Iterator[PartsOutput]:
         require_parquet()
     check_parts(plan)
     if is_url(plan.output):
-        yield _begin(plan, None)
+        yield _begin(plan)
     else:
-        with locked_folder(plan.output) as descriptor:
-            yield _begin(plan, descriptor)
+        with locked_folder(plan.output):
+            yield _begin(plan)
 
 
-def _begin(plan: Plan, keep_open: int | None) -> PartsOutput:
+def _begin(plan: Plan) -> PartsOutput:
     options = plan.options
     # again, now that no other run can write it
     parts = check_parts(plan)
@@ -200,7 +200,7 @@ def _begin(plan: Plan, keep_open: int | None) -> PartsOutput:
     record.check_owned()  # another run may have begun in this very second
     for path, lines in renewed.items():
         write_bytes(path, lines, durable=True)
-    return PartsOutput(record, kept, keep_open)
+    return PartsOutput(record, kept)
 
 
 def _remove_leftovers(plan: Plan, parts: Sequence[str] = ()) -> None:

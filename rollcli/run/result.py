@@ -43,7 +43,6 @@ from rollcli.run.resume import (
 class StreamOutput:
     """Rows to stdout, a pipe or a device."""
 
-    keep_open: int | None = None
     record = None
 
     def __init__(self, write: Callable[[bytes], None], plan: Plan) -> None:
@@ -84,8 +83,6 @@ class FileOutput:
     ----------
     kept : KeptRows
         What is known of the rows of an interrupted run, which is resumed.
-    keep_open : int or None
-        A descriptor for workers to inherit.
     record : RunRecord or None
         FILE.run.json; a stream has none, and cannot be continued.
     replaces : bool
@@ -93,7 +90,7 @@ class FileOutput:
     """
 
     def __init__(self, file: ResultFile, inputs: ResultFile, record: RunRecord, kept: KeptRows) -> None:
-        self.kept, self.keep_open, self.replaces = kept, file.descriptor, record.replaces
+        self.kept, self.replaces = kept, record.replaces
         self._file, self.record, self._plan = file, record, record.plan
         self._images = record.plan.options.images
         self._inputs, self._rows = inputs, DurableRows(file, inputs)

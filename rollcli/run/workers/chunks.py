@@ -224,8 +224,6 @@ class Workers:
         does; those that do not exist are ignored.
     folders : tuple of str
         Where the tasks write; the same holds for them.
-    keep_open : int or None
-        A file descriptor that processes on this machine inherit and keep open until they end.
     threads : int
         Tasks that each worker has in hand at once: more than one where they wait for the network. One of
         them computes at a time.
@@ -235,7 +233,6 @@ class Workers:
     scheduler: str | None = None
     files: tuple[str, ...] = ()
     folders: tuple[str, ...] = ()
-    keep_open: int | None = None
     threads: int = 1
 
 

@@ -9,9 +9,9 @@ import signal
 import sys
 import threading
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence, Sized
 from concurrent.futures import Future
-from multiprocessing import connection, reduction
+from multiprocessing import connection
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, Generic
@@ -89,12 +89,12 @@ class PoolExecutor(Generic[Task, Result]):
 
     def __init__(self, workers: int, work: Work[Task, Result], asked: Workers) -> None:
         self.workers, self.threads = workers, asked.threads
-        self._work, self._keep_open, self._stopped = work, asked.keep_open, False
+        self._work, self._stopped = work, False
         self._pool: list[Worker[Task, Result]] = []
         self._queue: deque[_Queued[Task, Result]] = deque()
         try:
             for _ in range(workers):
-                self._pool.append(self._begun(Worker()))
+                self._pool.append(Worker(work, self.threads))
         except BaseException:
             self.close(at_once=True)
             raise
@@ -187,11 +187,7 @@ class PoolExecutor(Generic[Task, Result]):
         self._queue.extendleft(reversed(worker.in_hand))
         worker.join()
         if not self._stopped:
-            self._pool[index] = self._begun(Worker())
-
-    def _begun(self, worker: "Worker[Task, Result]") -> "Worker[Task, Result]":
-        worker.begin(self._work, self._keep_open, self.threads)
-        return worker
+            self._pool[index] = Worker(self._work, self.threads)
 
 
 class Worker(Generic[Task, Result]):
@@ -199,7 +195,14 @@ class Worker(Generic[Task, Result]):
 
     Linux forks it from a parent that has loaded them, which takes 3 ms where a new process takes 300. Where
     the parent has other threads, and on other systems, it is spawned: a fork copies locks that other threads
-    hold.
+    hold. A fork shares the lock of the result, too, until it ends.
+
+    Parameters
+    ----------
+    work : Work
+        What it does.
+    threads : int
+        Tasks that it has in hand at once.
 
     Raises
     ------
@@ -214,7 +217,7 @@ class Worker(Generic[Task, Result]):
         The chunks that were sent and not answered, oldest first, each with its future.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, work: Work[Task, Result], threads: int) -> None:
         # libraries may start threads when they load
         loads = _has_one_thread() and _error_of(_load_decoders) is None
         fork = hasattr(os, "fork") and loads and _has_one_thread()
@@ -222,8 +225,8 @@ class Worker(Generic[Task, Result]):
         self.in_hand: deque[_Queued[Task, Result]] = deque()
         try:
             self.pipe, far_end = start.Pipe()
-            ends = (far_end, self.pipe if fork else None)
-            self._process = start.Process(target=_serve, args=ends, daemon=True)
+            told = (far_end, self.pipe if fork else None, work.do, work.join, work.longest_s, threads)
+            self._process = start.Process(target=_serve, args=told, daemon=True)
             with _stop_signals_blocked(fork):  # in the child, too: only the parent decides when work ends
                 self._process.start()
         except OSError as error:
@@ -234,14 +237,6 @@ class Worker(Generic[Task, Result]):
     def tasks(self) -> int:
         """The number of tasks that it has in hand, or has done and not answered."""
         return sum(len(chunk) for chunk, _ in self.in_hand)
-
-    def begin(self, work: Work[Task, Result], keep_open: int | None, threads: int) -> None:
-        """Say what to do with tasks; see `PoolExecutor`."""
-        file = None if sys.platform == "win32" else keep_open
-        with contextlib.suppress(OSError):  # it died already, and is replaced
-            self.pipe.send((work.do, work.join, work.longest_s, threads, file is not None))
-            if file is not None:
-                reduction.send_handle(self.pipe, file, self._process.pid)
 
     def stop(self) -> None:
         """Let it begin no further task."""
@@ -269,7 +264,14 @@ def _has_one_thread() -> bool:
         return False
 
 
-def _serve(pipe: "Connection[Any, Any]", near_end: "Connection[Any, Any] | None") -> None:
+def _serve(
+    pipe: "Connection[Any, Any]",
+    near_end: "Connection[Any, Any] | None",
+    do: Callable[[Any], Any],
+    join: Callable[[Any, list[Any]], Sized],
+    longest_s: float,
+    threads: int,
+) -> None:
     """Do chunks, in a worker process, until it is stopped or the parent has died.
 
     A fork has the parent's end of its pipe, too, which would hide that the parent has died. It also has those
@@ -279,12 +281,6 @@ def _serve(pipe: "Connection[Any, Any]", near_end: "Connection[Any, Any] | None"
     if near_end is not None:
         near_end.close()
     start_error = _error_of(prepare_worker)
-    try:
-        do, join, longest_s, threads, with_file = pipe.recv()
-        if with_file:
-            reduction.recv_handle(pipe)  # nobody closes it: it is open until this process ends
-    except (EOFError, OSError):
-        os._exit(1)
     pool = None
     if threads > 1:
         from concurrent.futures import ThreadPoolExecutor  # only where tasks wait for the network
