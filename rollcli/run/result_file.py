@@ -336,14 +336,8 @@ class DurableRows:
         if not rows:
             return
         self._unsynced = True
-        try:
-            self._file.append(b"".join(rows))
-            self.written += len(rows)
-        except OutputError:
-            if len(rows) == 1:
-                raise
-            for row in rows:  # those that the disk still takes
-                self._write([row])
+        self._file.append(b"".join(rows))
+        self.written += len(rows)
 
 
 _PART_ENDING = "inputs"
