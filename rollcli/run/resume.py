@@ -280,7 +280,7 @@ class KeptRows:
         self.summary = RunSummary()
         self.mismatch: Mismatch | None = None
         self._frames, self._images = plan.frames, plan.options.images
-        self._following, self._at = iter(plan.frames), 0
+        self._following = iter(plan.frames)
         self._retries = plan.options.result.retry_failed
         self._made = Existing(filled=True)
         self.inputs = inputs
@@ -301,8 +301,7 @@ class KeptRows:
     def add(self, row: Row) -> bool:
         """Take in the next row; one that does not count is left out, and so are those behind it."""
         is_again = row.message == _NOT_YET or (row.status == "error" and self._retries)
-        if self.count < len(self._frames):
-            frame = self._frame(self.count)
+        if (frame := next(self._following, None)) is not None:
             self._compare(row, frame)
             if self.inputs is not None and self.mismatch is None:
                 if row.message == _NOT_YET:
@@ -334,19 +333,12 @@ class KeptRows:
         if self.gone:
             yield f"frames that are gone, whose rows leave the result and whose images stay: {self.gone}"
 
-    def _frame(self, position: int) -> Frame:
-        """Return the frame at a position; they increase: a sorted list reads a block of names for one."""
-        if position != self._at:
-            self._following = iter(self._frames[position:])
-        self._at = position + 1
-        return next(self._following)
-
     def skip_to(self, position: int) -> None:
         """Leave a hole before the row at a position."""
         if position > self.count:
             self.holes.append(range(self.count, position))
             self.summary.leave_places([frame.file for frame in self._frames[self.count : position]])
-            self.count = position
+            self.count, self._following = position, iter(self._frames[position:])
 
     def _compare(self, row: Row, frame: Frame) -> None:
         found = self.mismatch
