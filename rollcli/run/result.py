@@ -262,13 +262,10 @@ def _check_permitted(plan: Plan) -> None:
             )
         if not is_there(inputs_path(name)):
             raise not_resumable(name, f"there is no {base_name(inputs_path(name))}")
-    elif not is_inputs(inputs_path(name)):
-        raise UsageError(
-            f"{inputs_path(name)}: exists already and is not of a run; give another --output, or --overwrite "
-            "to replace it"
-        )
-    elif not is_replaceable_record(run_path(name)):
-        raise UsageError(
-            f"{run_path(name)}: exists already and is not the record of a run; give another --output, or "
-            "--overwrite to replace it"
-        )
+        return
+    for path, is_ours in ((inputs_path(name), is_inputs), (run_path(name), is_replaceable_record)):
+        if not is_ours(path):
+            raise UsageError(
+                f"{path}: exists already and is not of a run; give another --output, or --overwrite to "
+                "replace it"
+            )
