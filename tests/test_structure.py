@@ -41,7 +41,6 @@ DOOR_PACKAGES = {"rollcli.cli": "the command line's doors: help and version load
 CHANGING = {
     "rollcli.files.recordings.frames.BagFrames",
     "rollcli.files.search.Search",
-    "rollcli.run.progress._Cause",
     "rollcli.simulate.scene.Scene",
 }
 

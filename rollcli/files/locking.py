@@ -115,10 +115,8 @@ def locked(descriptor: int, name: str) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def locked_folder(name: str) -> Iterator[int | None]:
-    """Make a folder if there is none, and hold the lock on it; yield its descriptor, for workers to inherit.
-
-    None on Windows, where a folder cannot be opened.
+def locked_folder(name: str) -> Iterator[None]:
+    """Make a folder if there is none, and hold the lock on it; not on Windows, where none can be opened.
 
     Raises
     ------
@@ -133,11 +131,11 @@ def locked_folder(name: str) -> Iterator[int | None]:
     except OSError as error:
         raise OutputError(f"{name}: cannot be written: {cause_of(error)}") from error
     if descriptor is None:
-        yield None
+        yield
         return
     try:
         with locked(descriptor, name):
-            yield descriptor
+            yield
     finally:
         os.close(descriptor)
 

@@ -5,15 +5,14 @@ import os
 from collections.abc import Iterator
 from functools import partial
 from itertools import islice
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from rollcli.errors import ExitStatus, OutputError, WorkerError
-from rollcli.files.atomic import is_file
 from rollcli.files.containers import file_of
 from rollcli.files.stores.locations import is_url, tasks_in_hand
 from rollcli.run.batch import Batch, BatchOptions, Step, join_results, line_form
 from rollcli.run.find import calibration_files, calibration_notes
-from rollcli.run.frame import Frame, FrameResult, failed_frame
+from rollcli.run.frame import Frame, FrameResult, ReadAs, failed_frame
 from rollcli.run.options import EstimateOptions, FrameOptions
 from rollcli.run.outputs import every_path, image_paths, list_files, remove_image_leftovers, write_outputs
 from rollcli.run.plan import Plan, make_plan
@@ -21,12 +20,7 @@ from rollcli.run.progress import Progress
 from rollcli.run.result import Output, frames_to_do, open_output
 from rollcli.run.workers.chunks import Work, Workers
 from rollcli.run.workers.interrupt import Stop, stop_on_signals
-from rollcli.run.workers.tasks import require_scheduler, run_joined, started_early
-
-
-def load_estimator() -> None:
-    """Load what a worker needs for frames, before it gets one."""
-    import rollcli.run.estimate_frame  # noqa: F401 (to have loaded it)
+from rollcli.run.workers.tasks import require_scheduler, run_joined
 
 
 def estimate_frame(frame: Frame, options: FrameOptions) -> FrameResult:
@@ -81,22 +75,10 @@ def run_estimate(options: EstimateOptions, resume_command: str = "") -> ExitStat
         list_files((frame.reads(), (path for _, path in image_paths(frame, images))) for frame in frames)
         list_files([((), plan.files)])
         return ExitStatus.DONE
-    with contextlib.ExitStack() as early:
-        started: list[Any] = []
-        if _is_batch(options):
-            started = early.enter_context(started_early(options.running.jobs, load_estimator))
-        return _run(make_plan(options), resume_command, started)
+    return _run(make_plan(options), resume_command)
 
 
-def _is_batch(options: EstimateOptions) -> bool:
-    """Tell whether workers of this machine will be needed, as far as that is known before a plan is made."""
-    given, pairs, running = options.inputs, options.pairs, options.running
-    names = [*given.inputs, *filter(None, [pairs.left])]
-    one_by_one = given.files_from is None and all(map(is_file, names))
-    return running.scheduler is None and running.jobs != 1 and not one_by_one
-
-
-def _run(plan: Plan, resume_command: str, started: list[Any]) -> ExitStatus:
+def _run(plan: Plan, resume_command: str) -> ExitStatus:
     options = plan.options
     require_scheduler(options.running.scheduler)
     with open_output(plan) as output:
@@ -107,7 +89,7 @@ def _run(plan: Plan, resume_command: str, started: list[Any]) -> ExitStatus:
             progress.note(note)
         try:
             with stop_on_signals() as stop, progress:
-                _run_steps(_Run(plan, output, progress, stop, started))
+                _run_steps(_Run(plan, output, progress, stop))
         except KeyboardInterrupt:  # the second Ctrl-C: without waiting for the frames that have begun
             progress.stopped_early = True
         except (OutputError, WorkerError) as error:
@@ -116,7 +98,7 @@ def _run(plan: Plan, resume_command: str, started: list[Any]) -> ExitStatus:
             output.finish(progress.summary)
         progress.tell_end()
         if stop.asked and progress.stopped_early:
-            how = f"; continue with: {resume_command}" if output.resumable else ""
+            how = f"; continue with: {resume_command}" if output.record else ""
             progress.say(f"interrupted{how}")
             return ExitStatus.INTERRUPTED
         if not (progress.stopped_early or options.running.quiet):
@@ -128,13 +110,12 @@ def _run(plan: Plan, resume_command: str, started: list[Any]) -> ExitStatus:
 
 
 class _Run(NamedTuple):
-    """What every part of a run works with; `started` are workers that wait for it."""
+    """What every part of a run works with."""
 
     plan: Plan
     output: Output
     progress: Progress
     stop: Stop
-    started: list[Any]
 
 
 def _steps(run: _Run) -> Iterator[Step]:
@@ -187,7 +168,8 @@ def _run_steps(run: _Run) -> None:
 def _results(step: Step, run: _Run) -> Iterator[Iterator[Batch]]:
     """Open the results of a step from whichever workers were asked for; the output is complete afterwards."""
     options, output, frames, parts = run.plan.options, run.output, step.frames, step.parts
-    told = options.frame._replace(replaces=output.replaces, retry_of=step.retry_of, notes=output.notes)
+    record = output.record
+    told = options.frame._replace(replaces=output.replaces, retry_of=step.retry_of, notes=record is not None)
     rows = BatchOptions(
         line_form(options.result.form),
         run.plan.further,
@@ -201,7 +183,7 @@ def _results(step: Step, run: _Run) -> Iterator[Iterator[Batch]]:
         partial(lost_frame, options=told),
         partial(clear_frame, options=told),
         partial(join_results, options=rows),
-        lambda: output.read_as,
+        lambda: record.read_as if record else ReadAs(),
         parts.rows if parts else 1,
         partial(decode_frame, options=told) if any(frame.of_videos for frame in frames) else None,
     )
@@ -213,9 +195,7 @@ def _results(step: Step, run: _Run) -> Iterator[Iterator[Batch]]:
         options.running.scheduler,
         files,
         (*folders, parts.output) if parts else folders,
-        output.keep_open,
         tasks_in_hand((*files, *folders)),
-        run.started,
     )
     try:
         with contextlib.closing(run_joined(frames, work, run.stop, workers)) as results:

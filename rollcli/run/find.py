@@ -318,13 +318,6 @@ def pair_frames(named: Named) -> list[Frame]:
     has_inputs = bool(given.inputs or given.files_from)
     sides, views = (pairs.left, pairs.right), (topics.left_topic, topics.right_topic)
     ways = [any(sides), any(views), pairs.side_by_side is not None]
-    if has_inputs and ways == [True, False, False]:
-        raise UsageError("give either maps, or pairs by --left and --right")
-    if has_inputs and not any(ways):
-        raise UsageError(
-            f"{' '.join(given.inputs[:2])}: images are given by --left and --right; with --side-by-side, or "
-            "--left-topic and --right-topic, INPUTS are images, videos or bags"
-        )
     if sum(ways) != 1 or has_inputs is any(sides):
         raise UsageError(
             "name pairs in one way: --left and --right alone; or INPUTS, with --left-topic and --right-topic "

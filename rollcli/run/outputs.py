@@ -225,9 +225,9 @@ def check_inputs_are_kept(reads: Callable[[], Iterable[str]], writes: Iterable[s
     UsageError
         Names the file.
     """
-    folders = {_real_folder(_split(file_of(path))[0]) for path in reads()}
+    folders = {_real_folder(os.path.split(file_of(path))[0]) for path in reads()}
     # only what is written beside an input can replace one
-    written = {_place(path) for path in writes if _real_folder(_split(path)[0]) in folders}
+    written = {_place(path) for path in writes if _real_folder(os.path.split(path)[0]) in folders}
     for path in reads() if written else ():
         if _place(file_of(path)) in written:
             raise UsageError(f"{path}: would be replaced by an output; write somewhere else")
@@ -291,17 +291,9 @@ def list_files(frames: Iterable[tuple[Iterable[str], Iterable[str]]]) -> None:
 
 def _place(path: str) -> str:
     """Make one text of every spelling of a path."""
-    folder, name = _split(path)
+    folder, name = os.path.split(path)
     place = f"{_real_folder(folder)}/{os.path.normcase(name)}"
     return normalize("NFC", place).casefold() if _ignores_case(folder) else place
-
-
-def _split(path: str) -> tuple[str, str]:
-    """Split a path into its folder and its name; os.path.split takes four times as long."""
-    if os.sep != "/":
-        return os.path.split(path)
-    folder, slash, name = path.rpartition("/")
-    return folder + slash, name
 
 
 # cached: resolving links costs a system call for each part of a path, and files share folders

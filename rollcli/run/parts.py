@@ -26,7 +26,7 @@ from rollcli.files.results import (
 from rollcli.files.storage import list_names, read_bytes, remove, write_bytes
 from rollcli.files.stores.locations import base_name, is_url, located, public_name
 from rollcli.run.batch import Batch, Parts, Step, line_form, part_location
-from rollcli.run.frame import Frame, ReadAs
+from rollcli.run.frame import Frame
 from rollcli.run.outputs import local_images, remove_image_leftovers, remove_marks
 from rollcli.run.plan import Plan
 from rollcli.run.progress import RunSummary
@@ -42,11 +42,9 @@ class PartsOutput:
     Workers write the parts of which they have all rows. This process writes the others.
     """
 
-    resumable = notes = True
-
-    def __init__(self, record: RunRecord, kept: KeptRows, keep_open: int | None) -> None:
-        self.kept, self.keep_open, self.replaces = kept, keep_open, record.replaces
-        self._record, self._plan = record, record.plan
+    def __init__(self, record: RunRecord, kept: KeptRows) -> None:
+        self.kept, self.replaces = kept, record.replaces
+        self.record, self._plan = record, record.plan
         self._part_rows = record.plan.options.result.part_rows
         output = located(record.plan.options.running.root, record.plan.output)
         self._parts = Parts(
@@ -59,11 +57,6 @@ class PartsOutput:
         self._images: list[str] = []  # those of the part that is being filled
         self._checked = time.monotonic()
         self._written = kept.count - sum(map(len, kept.holes))
-
-    @property
-    def read_as(self) -> ReadAs:
-        """How frames were read, as the record says."""
-        return self._record.read_as
 
     def passes(self) -> Iterator[Step]:
         """Yield the frames of parts that are missing before others, then those after all of them."""
@@ -84,7 +77,7 @@ class PartsOutput:
         """Take the rows; every full part is written."""
         if time.monotonic() - self._checked > _CHECK_S:
             self._check_owned()
-        self._record.saw(batch.read_as)
+        self.record.saw(batch.read_as)
         for _ in range(_whole_parts(batch.in_parts, self._part_rows)):
             next(self._numbers)
         self._written += batch.in_parts
@@ -99,7 +92,7 @@ class PartsOutput:
         """Write the last part, and the summary into the record."""
         if self._waiting:
             self._write()
-        self._record.write(summary)
+        self.record.write(summary)
         _remove_leftovers(self._plan)  # of workers that have died
 
     def restore(self, frames: Sequence[Frame], batch: Batch) -> None:
@@ -115,7 +108,7 @@ class PartsOutput:
 
     def replace(self, positions: Sequence[int], frames: Sequence[Frame], batch: Batch) -> None:
         """Take rows; a part is written anew once its last such row is known."""
-        self._record.saw(batch.read_as)
+        self.record.saw(batch.read_as)
         for at, position in enumerate(positions):
             if position // self._part_rows != self._replaced_part:
                 self.commit()
@@ -152,7 +145,7 @@ class PartsOutput:
         return f"; {self._written} rows are kept, continue with --resume" if self._written else ""
 
     def _check_owned(self) -> None:
-        self._record.check_owned()
+        self.record.check_owned()
         self._checked = time.monotonic()
 
     def _write(self) -> None:
@@ -180,13 +173,13 @@ def open_parts(plan: Plan) -> Iterator[PartsOutput]:
         require_parquet()
     check_parts(plan)
     if is_url(plan.output):
-        yield _begin(plan, None)
+        yield _begin(plan)
     else:
-        with locked_folder(plan.output) as descriptor:
-            yield _begin(plan, descriptor)
+        with locked_folder(plan.output):
+            yield _begin(plan)
 
 
-def _begin(plan: Plan, keep_open: int | None) -> PartsOutput:
+def _begin(plan: Plan) -> PartsOutput:
     options = plan.options
     # again, now that no other run can write it
     parts = check_parts(plan)
@@ -207,7 +200,7 @@ def _begin(plan: Plan, keep_open: int | None) -> PartsOutput:
     record.check_owned()  # another run may have begun in this very second
     for path, lines in renewed.items():
         write_bytes(path, lines, durable=True)
-    return PartsOutput(record, kept, keep_open)
+    return PartsOutput(record, kept)
 
 
 def _remove_leftovers(plan: Plan, parts: Sequence[str] = ()) -> None:

@@ -119,10 +119,6 @@ def images_of(frames: Iterable[Frame], options: EstimateOptions) -> Iterator[str
 def _find_frames(options: EstimateOptions) -> Sequence[Frame]:
     given, quiet = options.inputs, options.running.quiet
     skip = [folder for _, folder in options.images.folders()]
-    if not (options.paired or given.inputs or given.files_from):
-        raise UsageError(
-            "no input: name maps (files, folders, patterns, or - for a list on stdin) or --left and --right"
-        )
     if options.paired and given.sorted:
         raise UsageError("--sorted takes a list of maps, not of pairs")
     named = Named(given, quiet, options.pairs, options.topics, options.region, options.calibration, skip)

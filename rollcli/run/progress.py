@@ -10,7 +10,6 @@ import time
 from array import array
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from statistics import median
 from types import TracebackType
 from typing import Any, NamedTuple
@@ -286,41 +285,26 @@ def _terminal_size() -> dict[str, Any]:
 _CAUSES = 5  # that are said; a batch where every frame fails differently is no list to read
 
 
-@dataclass
-class _Cause:
-    line: str
-    message: str
-    frames: int = 1
-    alike: bool = True  # whether all messages are the same, to the number
-
-
 class Causes:
     """Groups the messages of frames by the codes of their causes."""
 
     def __init__(self) -> None:
-        self._causes: dict[str, _Cause] = {}
+        self._lines: dict[str, str] = {}  # of the first frame that had it
+        self._frames: Counter[str] = Counter()
         self._others = 0
 
-    def add(self, code: str, line: str, message: str) -> str:
-        """Take the message of a frame, and the line that names it; return that if it is to be said now."""
-        cause = self._causes.get(code)
-        if cause is not None:
-            cause.frames += 1
-            cause.alike &= message == cause.message
-            return ""
-        if len(self._causes) == _CAUSES:
+    def add(self, code: str, line: str) -> str:
+        """Take the line that names a frame and says what it has; return it if it is to be said now."""
+        if code not in self._lines and len(self._lines) == _CAUSES:
             self._others += 1
             return ""
-        self._causes[code] = _Cause(line, message)
-        return line
+        self._frames[code] += 1
+        return self._lines.setdefault(code, line) if self._frames[code] == 1 else ""
 
     def repeated(self) -> list[str]:
         """Make a line of each cause that several frames had, and one of the causes that were not said."""
-        lines = [
-            f"{cause.frames} frames" + (f": {cause.message}" if cause.alike else f", such as {cause.line}")
-            for cause in self._causes.values()
-            if cause.frames > 1
-        ]
+        several = ((code, count) for code, count in self._frames.items() if count > 1)
+        lines = [f"{count} frames, such as {self._lines[code]}" for code, count in several]
         if self._others:
             frames = "frame" if self._others == 1 else "frames"
             lines.append(f"{self._others} further {frames}: other causes, which -v names")
@@ -394,7 +378,7 @@ class Progress(TaskProgress):
         for result in told:
             self._tell_input(result)
             if result.row.status == "error":
-                first = self._failures.add(result.cause, result.said, result.row.message)
+                first = self._failures.add(result.cause, result.said)
                 if first or self._verbose:
                     self.say(result.said)
             elif result.row.status == "suspect":
@@ -410,7 +394,7 @@ class Progress(TaskProgress):
         if warning := result.warning:
             code = " ".join(filter(result.warnings.get, result.warnings))
             line = f"{name}: warning: {warning}"
-            first = self._warnings.add(code, line, f"warning: {warning}")
+            first = self._warnings.add(code, line)
             if self._verbose:
                 self.detail(line)
             elif first:

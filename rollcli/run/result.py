@@ -13,7 +13,7 @@ from rollcli.files.results import format_header, parse_rows, run_path
 from rollcli.files.stores.locations import base_name
 from rollcli.files.stream import STDOUT, is_stream, open_stream
 from rollcli.run.batch import Batch, Step
-from rollcli.run.frame import Frame, ReadAs
+from rollcli.run.frame import Frame
 from rollcli.run.outputs import local_images, remove_image_leftovers, remove_marks
 from rollcli.run.parts import PartsOutput, kept_in_parts, open_parts
 from rollcli.run.plan import Plan
@@ -43,9 +43,7 @@ from rollcli.run.resume import (
 class StreamOutput:
     """Rows to stdout, a pipe or a device."""
 
-    keep_open: int | None = None
-    resumable = notes = False
-    read_as = ReadAs()
+    record = None
 
     def __init__(self, write: Callable[[bytes], None], plan: Plan) -> None:
         self.kept = KeptRows(plan)
@@ -85,21 +83,15 @@ class FileOutput:
     ----------
     kept : KeptRows
         What is known of the rows of an interrupted run, which is resumed.
-    keep_open : int or None
-        A descriptor for workers to inherit.
-    resumable : bool
-        Whether an interrupted run can be resumed.
-    notes : bool
-        Whether it keeps what each row was made from.
+    record : RunRecord or None
+        FILE.run.json; a stream has none, and cannot be continued.
     replaces : bool
         Whether images are replaced that were there before the run: it was begun with --overwrite.
     """
 
-    resumable = notes = True
-
     def __init__(self, file: ResultFile, inputs: ResultFile, record: RunRecord, kept: KeptRows) -> None:
-        self.kept, self.keep_open, self.replaces = kept, file.descriptor, record.replaces
-        self._file, self._record, self._plan = file, record, record.plan
+        self.kept, self.replaces = kept, record.replaces
+        self._file, self.record, self._plan = file, record, record.plan
         self._images = record.plan.options.images
         self._inputs, self._rows = inputs, DurableRows(file, inputs)
         self._replacing: dict[int, tuple[bytes, bytes]] = {}  # rows, and the lines of their inputs
@@ -111,7 +103,7 @@ class FileOutput:
 
     def append(self, frames: Sequence[Frame], batch: Batch) -> None:
         """Add the rows, after the record knows how their frames were read; they may wait for others."""
-        self._record.saw(batch.read_as)
+        self.record.saw(batch.read_as)
         self._rows.append(batch.lines, batch.notes, local_images(frames, batch.figures.status, self._images))
 
     def restore(self, frames: Sequence[Frame], batch: Batch) -> None:
@@ -130,7 +122,7 @@ class FileOutput:
 
         The file gets them all at once, in `commit`.
         """
-        self._record.saw(batch.read_as)
+        self.record.saw(batch.read_as)
         self._replacing.update(zip(positions, zip(batch.lines, batch.notes, strict=True), strict=True))
         self._rows.restore(local_images(frames, batch.figures.status, self._images))
 
@@ -151,14 +143,9 @@ class FileOutput:
             remove_marks([self._plan.frames[position] for position in self._replacing], self._images)
             self._replacing.clear()
 
-    @property
-    def read_as(self) -> ReadAs:
-        """How frames were read, as the record says; it knows more with every batch."""
-        return self._record.read_as
-
     def finish(self, summary: RunSummary) -> None:
         """Write it into the record."""
-        self._record.write(summary)
+        self.record.write(summary)
 
     def hint(self) -> str:
         """Say that --resume continues, if rows were written and their file still is there."""
@@ -275,13 +262,10 @@ def _check_permitted(plan: Plan) -> None:
             )
         if not is_there(inputs_path(name)):
             raise not_resumable(name, f"there is no {base_name(inputs_path(name))}")
-    elif not is_inputs(inputs_path(name)):
-        raise UsageError(
-            f"{inputs_path(name)}: exists already and is not of a run; give another --output, or --overwrite "
-            "to replace it"
-        )
-    elif not is_replaceable_record(run_path(name)):
-        raise UsageError(
-            f"{run_path(name)}: exists already and is not the record of a run; give another --output, or "
-            "--overwrite to replace it"
-        )
+        return
+    for path, is_ours in ((inputs_path(name), is_inputs), (run_path(name), is_replaceable_record)):
+        if not is_ours(path):
+            raise UsageError(
+                f"{path}: exists already and is not of a run; give another --output, or --overwrite to "
+                "replace it"
+            )

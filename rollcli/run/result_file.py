@@ -41,16 +41,10 @@ _MORE_THAN_A_HEADER = 1000  # bytes
 
 
 class ResultFile:
-    """A regular file that is open, locked, and grows by whole rows.
-
-    Attributes
-    ----------
-    descriptor : int
-        The open file. Workers inherit it, so that the lock outlasts a killed run until they have ended.
-    """
+    """A regular file that is open, locked, and grows by whole rows."""
 
     def __init__(self, descriptor: int, name: str) -> None:
-        self.descriptor, self._name = descriptor, name
+        self._descriptor, self._name = descriptor, name
 
     def read(self) -> bytes:
         """Read the whole file.
@@ -61,8 +55,8 @@ class ResultFile:
             The disk does not give it.
         """
         with writing(self._name):
-            os.lseek(self.descriptor, 0, os.SEEK_SET)  # locking moves the position on Windows
-            with open(self.descriptor, "rb", closefd=False) as file:
+            os.lseek(self._descriptor, 0, os.SEEK_SET)  # locking moves the position on Windows
+            with open(self._descriptor, "rb", closefd=False) as file:
                 return file.read()
 
     def truncate(self, size: int) -> None:
@@ -74,8 +68,8 @@ class ResultFile:
             The file system refuses.
         """
         with writing(self._name):
-            os.ftruncate(self.descriptor, size)
-            os.lseek(self.descriptor, 0, os.SEEK_END)
+            os.ftruncate(self._descriptor, size)
+            os.lseek(self._descriptor, 0, os.SEEK_END)
 
     def append(self, lines: bytes) -> None:
         """Write lines, all of them or none.
@@ -88,13 +82,13 @@ class ResultFile:
         if not self.is_there():
             raise OutputError(f"{self._name}: was moved or removed while this run was writing it")
         try:
-            before = os.lseek(self.descriptor, 0, os.SEEK_CUR)
+            before = os.lseek(self._descriptor, 0, os.SEEK_CUR)
             while lines:  # a full disk takes a part of it, and reports the error at the next call
-                lines = lines[os.write(self.descriptor, lines) :]
+                lines = lines[os.write(self._descriptor, lines) :]
         except OSError as error:
             with contextlib.suppress(OSError):
-                os.ftruncate(self.descriptor, before)
-                os.lseek(self.descriptor, before, os.SEEK_SET)
+                os.ftruncate(self._descriptor, before)
+                os.lseek(self._descriptor, before, os.SEEK_SET)
             raise output_error(self._name, error) from error
 
     def replace(self, rows: Mapping[int, bytes], form: Format) -> None:
@@ -120,11 +114,11 @@ class ResultFile:
         with contextlib.ExitStack() as held, writing(self._name):
             with atomic_file(target, durable=True) as new:
                 if hasattr(os, "fchmod"):
-                    os.fchmod(new.fileno(), stat.S_IMODE(os.fstat(self.descriptor).st_mode))
+                    os.fchmod(new.fileno(), stat.S_IMODE(os.fstat(self._descriptor).st_mode))
                 new.writelines(lines)
                 locked_file = os.dup(new.fileno())  # the lock is the open file's, and stays with it
                 held.callback(os.close, locked_file)
-            os.dup2(locked_file, self.descriptor, inheritable=False)
+            os.dup2(locked_file, self._descriptor, inheritable=False)
 
     def _old_lines(self) -> Iterator[bytes]:
         if _ON_WINDOWS:  # it renames onto no open file
@@ -139,13 +133,13 @@ class ResultFile:
         Another run may take it in this moment; then this one ends, and has lost nothing.
         """
         with writing(self._name):
-            _reopen(self.descriptor, os.devnull, os.O_RDONLY)
+            _reopen(self._descriptor, os.devnull, os.O_RDONLY)
             try:
                 write_atomic(target, data, durable=True)
             finally:
-                _reopen(self.descriptor, target, _FLAGS)
-        take_lock(self.descriptor, self._name)
-        os.lseek(self.descriptor, 0, os.SEEK_END)
+                _reopen(self._descriptor, target, _FLAGS)
+        take_lock(self._descriptor, self._name)
+        os.lseek(self._descriptor, 0, os.SEEK_END)
 
     def sync(self) -> None:
         """Force the rows to the disk, where its file system can.
@@ -156,7 +150,7 @@ class ResultFile:
             The disk fails to take them.
         """
         try:
-            os.fsync(self.descriptor)
+            os.fsync(self._descriptor)
         except OSError as error:
             if error.errno not in (errno.EINVAL, errno.ENOTSUP):
                 raise output_error(self._name, error) from error
@@ -164,7 +158,7 @@ class ResultFile:
     def is_there(self) -> bool:
         """Tell whether the open file still has its name."""
         try:
-            return os.path.samestat(look_at(self._name), os.fstat(self.descriptor))
+            return os.path.samestat(look_at(self._name), os.fstat(self._descriptor))
         except OSError:
             return False
 
@@ -342,14 +336,8 @@ class DurableRows:
         if not rows:
             return
         self._unsynced = True
-        try:
-            self._file.append(b"".join(rows))
-            self.written += len(rows)
-        except OutputError:
-            if len(rows) == 1:
-                raise
-            for row in rows:  # those that the disk still takes
-                self._write([row])
+        self._file.append(b"".join(rows))
+        self.written += len(rows)
 
 
 _PART_ENDING = "inputs"

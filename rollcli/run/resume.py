@@ -12,7 +12,7 @@ import uuid
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from itertools import islice
-from typing import Any, NamedTuple, TypeVar, get_args
+from typing import Any, TypeVar, get_args
 
 from rollcli import __version__
 from rollcli.errors import InputError, OutputError
@@ -238,14 +238,6 @@ def _kinds(name: str, default: Any) -> tuple[type, ...]:
     return {int: (int,), float: (int, float), tuple: (tuple,)}.get(type(default), (str,))
 
 
-class Mismatch(NamedTuple):
-    """The first row that is not of the frame in its place; and whether no row is of that frame."""
-
-    row_file: str
-    frame_file: str
-    frame_is_new: bool
-
-
 class KeptRows:
     """Takes in the rows in their order, and holds none of them: there may be a million.
 
@@ -268,7 +260,8 @@ class KeptRows:
     incomplete : list of Frame
         Frames whose images are missing or empty, whatever the cause.
     summary : RunSummary
-    mismatch : Mismatch or None
+    mismatch : str
+        Which row is the first that is not of the frame in its place; empty where there is none.
     """
 
     def __init__(self, plan: Plan, rows: Iterable[Row] = (), inputs: Inputs | None = None) -> None:
@@ -278,9 +271,9 @@ class KeptRows:
         self.again: list[int] = []
         self.incomplete: list[Frame] = []
         self.summary = RunSummary()
-        self.mismatch: Mismatch | None = None
+        self.mismatch = ""
         self._frames, self._images = plan.frames, plan.options.images
-        self._following, self._at = iter(plan.frames), 0
+        self._following = iter(plan.frames)
         self._retries = plan.options.result.retry_failed
         self._made = Existing(filled=True)
         self.inputs = inputs
@@ -301,10 +294,10 @@ class KeptRows:
     def add(self, row: Row) -> bool:
         """Take in the next row; one that does not count is left out, and so are those behind it."""
         is_again = row.message == _NOT_YET or (row.status == "error" and self._retries)
-        if self.count < len(self._frames):
-            frame = self._frame(self.count)
-            self._compare(row, frame)
-            if self.inputs is not None and self.mismatch is None:
+        if (frame := next(self._following, None)) is not None:
+            if not self.mismatch and (row.file, row.right_file) != (frame.file, frame.right_file):
+                self.mismatch = f"its row is of {row.file}, where now {frame.file} is"
+            if self.inputs is not None and not self.mismatch:
                 if row.message == _NOT_YET:
                     self.inputs.take_unknown(frame)
                 elif not self.inputs.take(frame):
@@ -334,29 +327,14 @@ class KeptRows:
         if self.gone:
             yield f"frames that are gone, whose rows leave the result and whose images stay: {self.gone}"
 
-    def _frame(self, position: int) -> Frame:
-        """Return the frame at a position; they increase: a sorted list reads a block of names for one."""
-        if position != self._at:
-            self._following = iter(self._frames[position:])
-        self._at = position + 1
-        return next(self._following)
-
     def skip_to(self, position: int) -> None:
         """Leave a hole before the row at a position."""
         if position > self.count:
             self.holes.append(range(self.count, position))
             self.summary.leave_places([frame.file for frame in self._frames[self.count : position]])
-            self.count = position
-
-    def _compare(self, row: Row, frame: Frame) -> None:
-        found = self.mismatch
-        if found is None and (row.file, row.right_file) != (frame.file, frame.right_file):
-            self.mismatch = Mismatch(row.file, frame.file, row.file != frame.file)
-        elif found is not None and row.file == found.frame_file:
-            self.mismatch = found._replace(frame_is_new=False)
+            self.count, self._following = position, iter(self._frames[position:])
 
 
-_SORT_LAST = "new frames must sort last, or be added by --update"
 _NOT_YET = "not estimated yet: the run that adds this frame is not over"  # in its row until then
 
 
@@ -485,19 +463,16 @@ def _differences(
     yield from differences(was, now)
     if was.get("calibration") != json.loads(json.dumps(now.get("calibration"))):
         yield "the calibration differs"
-    if found := kept.mismatch:
-        if added and found.frame_is_new:
-            yield f"{found.frame_file} has been added and sorts before {found.row_file}; {_SORT_LAST}"
-        yield f"the inputs differ: its row is of {found.row_file}, where now {found.frame_file} is"
+    hint = "; new frames must sort last, or be added by --update" if added else ""
+    if kept.mismatch:
+        yield f"the inputs differ: {kept.mismatch}{hint}"
     if kept.count > len(plan.frames):
         yield f"it has {kept.count} rows, and there are {len(plan.frames)} frames"
     inputs_was, inputs_now = was["inputs"], now["inputs"]
     if inputs_was.get("frames") != inputs_now["frames"]:
         yield f"it was begun with {inputs_was.get('frames')} frames, now there are {inputs_now['frames']}"
-    if added and inputs_was.get("names") != inputs_now["names"]:
-        yield f"frames have been added that sort before others of its frames; {_SORT_LAST}"
     if inputs_was.get("names") != inputs_now["names"]:
-        yield "the names of the inputs differ"
+        yield f"the names of the inputs differ{hint}"
     if kept.first_changed:
         how = "" if plan.in_parts else "; --update does again what has changed"
         yield f"{kept.first_changed} has changed since{how}"

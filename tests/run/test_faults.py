@@ -237,9 +237,9 @@ def test_a_worker_that_dies_while_it_writes_an_image_leaves_nothing_behind(maps,
     assert contents(maps / "out") == expected
 
 
-def cannot_start(maps, **how):
-    """The one line of a run whose two workers cannot start."""
-    done = ended(command(*ESTIMATE), maps, **how)
+def cannot_start(maps, jobs="2", **how):
+    """The one line of a run whose workers cannot start."""
+    done = ended(command(*ESTIMATE, "-j", jobs), maps, **how)
     assert done.returncode == 1
     assert done.stderr.startswith("rollcli: a worker process cannot start: ")
     assert done.stderr.endswith("; try fewer of them, with --jobs\n")
@@ -250,8 +250,8 @@ def cannot_start(maps, **how):
 
 
 def test_too_few_open_files_for_workers_end_the_run_in_one_line(maps):
-    limit = partial(resource.setrlimit, resource.RLIMIT_NOFILE, (10, 10))
-    assert "Too many open files" in cannot_start(maps, preexec_fn=limit)
+    limit = partial(resource.setrlimit, resource.RLIMIT_NOFILE, (24, 24))
+    assert "Too many open files" in cannot_start(maps, jobs="12", preexec_fn=limit)
 
 
 def test_a_worker_that_cannot_load_its_libraries_ends_the_run_in_one_line(maps):

@@ -29,7 +29,7 @@ def append(output, frames):
     next(output.passes())
     for frame in frames:
         result = FrameResult(Row(frame.file, status="ok", roll_deg=1.0))
-        output.append([frame], join_results(Span([frame], 0, output.read_as), [result], told))
+        output.append([frame], join_results(Span([frame], 0, output.record.read_as), [result], told))
 
 
 @pytest.fixture
@@ -100,8 +100,7 @@ def test_a_folder_of_parts_on_disk_is_locked_while_a_run_writes_it(tmp_path, mon
     monkeypatch.setattr("rollcli.files.locking._PATIENCE_S", 0.0)
     write_maps(tmp_path / "maps", 2)
     line = ("estimate", "maps", "-o", "rolls.parquet")
-    with locked_folder(str(tmp_path / "rolls.parquet")) as descriptor:
-        assert descriptor is not None
+    with locked_folder(str(tmp_path / "rolls.parquet")):
         assert "another run is writing this result" in rollcli(*line, cwd=tmp_path).refused()
         assert not contents(tmp_path / "rolls.parquet")
     assert rollcli(*line, cwd=tmp_path).status == 0

@@ -9,7 +9,7 @@ import itertools
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar, overload
 
 from rollcli.errors import RollcliError, raised_at
@@ -138,8 +138,8 @@ class Chunks(Generic[Task]):
 
     Parameters
     ----------
-    tasks : iterable
-        Chunks get smaller towards the end where their number is known.
+    tasks : sequence
+        Chunks get smaller towards the end.
     first : int
         The size of the first ones.
     unit : int
@@ -150,23 +150,21 @@ class Chunks(Generic[Task]):
 
     def __init__(
         self,
-        tasks: Iterable[Task],
+        tasks: Sequence[Task],
         first: int = 1,
         unit: int = 1,
         prepare: Callable[[Task], Task] | None = None,
     ) -> None:
-        self._left = len(tasks) if isinstance(tasks, Sized) else None
+        self._count = len(tasks)
         self._tasks = iter(tasks) if prepare is None else map(prepare, tasks)
         self._first, self._unit, self._one_by_one = first, unit, prepare is not None
         self._seconds, self._done, self._taken = _DOUBT_S, 0.0, 0
 
     def take(self, workers: int, told: Any = None) -> Span[Task]:
         """Take the next chunk, for one of so many workers; empty when there are no more tasks."""
-        size = self._size(self._taken, self._left, workers)
+        size = self._size(self._taken, self._count - self._taken, workers)
         chunk = Span(list(itertools.islice(self._tasks, size)), self._taken, told)
         self._taken += len(chunk)
-        if self._left is not None:
-            self._left -= len(chunk)
         return chunk
 
     def cut(self, rest: Span[Task], workers: int) -> Iterator[Span[Task]]:
@@ -177,19 +175,17 @@ class Chunks(Generic[Task]):
             yield rest[:size]
             rest = rest[size:]
 
-    def _size(self, first: int, left: int | None, workers: int) -> int:
+    def _size(self, first: int, left: int, workers: int) -> int:
         """Choose the size of a chunk from the position of its first task and the number of tasks to come."""
         if self._one_by_one:
             return 1
-        size, most = self._first, self._unit
+        size = self._first
         worth = self._done / self._seconds if self.measured else 0.0  # tasks that a second is worth
         if self.measured:
             size = int(worth * min(max(_CHUNK_S, workers / _CHUNKS_A_SECOND), _MOST_S))
-        if left is not None:
-            least_s = max(_LEAST_S, workers / _CHUNKS_A_SECOND / 2)
-            most = max(left // (_SHARES * workers), int(worth * least_s))
-            size = min(size, most)
-        size, begun = max(size, 1), first % self._unit
+        least_s = max(_LEAST_S, workers / _CHUNKS_A_SECOND / 2)
+        most = max(left // (_SHARES * workers), int(worth * least_s))
+        size, begun = max(min(size, most), 1), first % self._unit
         if begun == 0 and size >= self._unit:
             return size - size % self._unit
         if begun == 0 and self._unit <= min(most, int(worth * _MOST_S)):
@@ -228,22 +224,16 @@ class Workers:
         does; those that do not exist are ignored.
     folders : tuple of str
         Where the tasks write; the same holds for them.
-    keep_open : int or None
-        A file descriptor that processes on this machine inherit and keep open until they end.
     threads : int
         Tasks that each worker has in hand at once: more than one where they wait for the network. One of
         them computes at a time.
-    started : list of pool.Worker
-        Processes that were started before the tasks were known; those that are used are taken out.
     """
 
     jobs: int | None = None
     scheduler: str | None = None
     files: tuple[str, ...] = ()
     folders: tuple[str, ...] = ()
-    keep_open: int | None = None
     threads: int = 1
-    started: list[Any] = field(default_factory=list)
 
 
 class _Attempt(NamedTuple):

@@ -9,8 +9,9 @@ import signal
 import sys
 import threading
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
-from multiprocessing import connection, reduction
+from collections.abc import Callable, Iterator, Sequence, Sized
+from concurrent.futures import Future
+from multiprocessing import connection
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, Generic
@@ -55,6 +56,7 @@ def _keep_freed_memory() -> None:
     mallopt(_M_TRIM_THRESHOLD, 256 * _MIB)
 
 
+_Queued = tuple[Sequence[Task], Future[Done[Result]]]
 _STOP = None  # what a worker is sent in place of a chunk
 _POLL_S = 0.2
 _CHUNKS_IN_HAND = 2  # of a worker: the next one is there when it has done one
@@ -83,28 +85,28 @@ class PoolExecutor(Generic[Task, Result]):
         The system starts no further process.
     """
 
-    worker_died: tuple[type[BaseException], ...] = (WorkerDiedError,)
+    worker_died: tuple[type[BaseException], ...] = (WorkerDiedError,)  # what its futures raise
 
     def __init__(self, workers: int, work: Work[Task, Result], asked: Workers) -> None:
         self.workers, self.threads = workers, asked.threads
-        self._work, self._keep_open, self._stopped = work, asked.keep_open, False
+        self._work, self._stopped = work, False
         self._pool: list[Worker[Task, Result]] = []
-        self._queue: deque[PoolFuture[Task, Result]] = deque()
+        self._queue: deque[_Queued[Task, Result]] = deque()
         try:
             for _ in range(workers):
-                self._pool.append(self._begun(asked.started.pop() if asked.started else Worker()))
+                self._pool.append(Worker(work, self.threads))
         except BaseException:
             self.close(at_once=True)
             raise
 
-    def submit(self, chunk: Sequence[Task], *, first: bool = False) -> "PoolFuture[Task, Result]":
+    def submit(self, chunk: Sequence[Task], *, first: bool = False) -> Future[Done[Result]]:
         """Queue a chunk, and send it when a worker is free."""
-        future: PoolFuture[Task, Result] = PoolFuture(chunk)
-        (self._queue.appendleft if first else self._queue.append)(future)
+        future = Future[Done[Result]]()
+        (self._queue.appendleft if first else self._queue.append)((chunk, future))
         self._send_chunks()
         return future
 
-    def wait(self, future: "PoolFuture[Task, Result]") -> None:
+    def wait(self, future: Future[Done[Result]]) -> None:
         """Wait until a worker answers or dies, or for a fifth of a second."""
         self._receive(_POLL_S)
 
@@ -127,8 +129,8 @@ class PoolExecutor(Generic[Task, Result]):
         if self._stopped:
             return
         self._stopped = True
-        for future in self._queue:
-            future.settle(Done([], 0.0))
+        for _, future in self._queue:
+            future.set_result(Done([], 0.0))
         self._queue.clear()
         for worker in self._pool:
             worker.stop()
@@ -156,15 +158,15 @@ class PoolExecutor(Generic[Task, Result]):
         try:
             done = worker.pipe.recv()
         except (EOFError, OSError):
-            begun = [task for future in worker.in_hand for task in future.chunk]  # all of them, perhaps
-            worker.in_hand.popleft().settle(WorkerDiedError())
+            begun = [task for chunk, _ in worker.in_hand for task in chunk]  # all of them, perhaps
+            worker.in_hand.popleft()[1].set_exception(WorkerDiedError())
             while self._stopped and worker.in_hand:
-                worker.in_hand.popleft().settle(Done([], 0.0))
+                worker.in_hand.popleft()[1].set_result(Done([], 0.0))
             self._replace(index, worker)
             for task in begun:
                 self._work.clear(task)
         else:
-            worker.in_hand.popleft().settle(done)
+            worker.in_hand.popleft()[1].set_result(done)
 
     def _send_chunks(self) -> None:
         for most in range(_CHUNKS_IN_HAND):  # nobody gets a second chunk while another has none
@@ -172,10 +174,10 @@ class PoolExecutor(Generic[Task, Result]):
                 while self._queue and (len(worker.in_hand) <= most or worker.tasks < self.threads):
                     self._send(index, worker, self._queue.popleft())
 
-    def _send(self, index: int, worker: "Worker[Task, Result]", future: "PoolFuture[Task, Result]") -> None:
-        worker.in_hand.append(future)
+    def _send(self, index: int, worker: "Worker[Task, Result]", queued: "_Queued[Task, Result]") -> None:
+        worker.in_hand.append(queued)
         try:
-            worker.pipe.send(future.chunk)
+            worker.pipe.send(queued[0])
         except OSError:  # it died while it had nothing to do: no task is to blame
             if len(worker.in_hand) == 1:
                 self._replace(index, worker)
@@ -185,34 +187,7 @@ class PoolExecutor(Generic[Task, Result]):
         self._queue.extendleft(reversed(worker.in_hand))
         worker.join()
         if not self._stopped:
-            self._pool[index] = self._begun(Worker())
-
-    def _begun(self, worker: "Worker[Task, Result]") -> "Worker[Task, Result]":
-        worker.begin(self._work, self._keep_open, self.threads)
-        return worker
-
-
-class PoolFuture(Generic[Task, Result]):
-    """A chunk that was submitted to a pool."""
-
-    def __init__(self, chunk: Sequence[Task]) -> None:
-        self.chunk = chunk
-        self._outcome: Done[Result] | WorkerDiedError | None = None
-
-    def settle(self, outcome: "Done[Result] | WorkerDiedError") -> None:
-        """Store what was done, or that the worker has died."""
-        self._outcome = outcome
-
-    def done(self) -> bool:
-        """Tell whether the result is there."""
-        return self._outcome is not None
-
-    def result(self) -> Done[Result]:
-        """Return what was done; raise WorkerDiedError if the worker has died."""
-        if isinstance(self._outcome, WorkerDiedError):
-            raise self._outcome
-        assert self._outcome is not None
-        return self._outcome
+            self._pool[index] = Worker(self._work, self.threads)
 
 
 class Worker(Generic[Task, Result]):
@@ -220,12 +195,14 @@ class Worker(Generic[Task, Result]):
 
     Linux forks it from a parent that has loaded them, which takes 3 ms where a new process takes 300. Where
     the parent has other threads, and on other systems, it is spawned: a fork copies locks that other threads
-    hold.
+    hold. A fork shares the lock of the result, too, until it ends.
 
     Parameters
     ----------
-    load : callable
-        Imports what the process needs.
+    work : Work
+        What it does.
+    threads : int
+        Tasks that it has in hand at once.
 
     Raises
     ------
@@ -236,19 +213,20 @@ class Worker(Generic[Task, Result]):
     ----------
     pipe : Connection
         Chunks go in, what was done of them comes out.
-    in_hand : deque of PoolFuture
-        The chunks that were sent and not answered, oldest first.
+    in_hand : deque
+        The chunks that were sent and not answered, oldest first, each with its future.
     """
 
-    def __init__(self, load: Callable[[], None] = _load_decoders) -> None:
+    def __init__(self, work: Work[Task, Result], threads: int) -> None:
         # libraries may start threads when they load
-        fork = hasattr(os, "fork") and _has_one_thread() and _error_of(load) is None and _has_one_thread()
+        loads = _has_one_thread() and _error_of(_load_decoders) is None
+        fork = hasattr(os, "fork") and loads and _has_one_thread()
         start: Any = multiprocessing.get_context("fork" if fork else "spawn")
-        self.in_hand: deque[PoolFuture[Task, Result]] = deque()
+        self.in_hand: deque[_Queued[Task, Result]] = deque()
         try:
             self.pipe, far_end = start.Pipe()
-            ends = (far_end, self.pipe if fork else None)
-            self._process = start.Process(target=_serve, args=(*ends, load), daemon=True)
+            told = (far_end, self.pipe if fork else None, work.do, work.join, work.longest_s, threads)
+            self._process = start.Process(target=_serve, args=told, daemon=True)
             with _stop_signals_blocked(fork):  # in the child, too: only the parent decides when work ends
                 self._process.start()
         except OSError as error:
@@ -258,15 +236,7 @@ class Worker(Generic[Task, Result]):
     @property
     def tasks(self) -> int:
         """The number of tasks that it has in hand, or has done and not answered."""
-        return sum(len(future.chunk) for future in self.in_hand)
-
-    def begin(self, work: Work[Task, Result], keep_open: int | None, threads: int) -> None:
-        """Say what to do with tasks; see `PoolExecutor`."""
-        file = None if sys.platform == "win32" else keep_open
-        with contextlib.suppress(OSError):  # it died already, and is replaced
-            self.pipe.send((work.do, work.join, work.longest_s, threads, file is not None))
-            if file is not None:
-                reduction.send_handle(self.pipe, file, self._process.pid)
+        return sum(len(chunk) for chunk, _ in self.in_hand)
 
     def stop(self) -> None:
         """Let it begin no further task."""
@@ -295,7 +265,12 @@ def _has_one_thread() -> bool:
 
 
 def _serve(
-    pipe: "Connection[Any, Any]", near_end: "Connection[Any, Any] | None", load: Callable[[], None]
+    pipe: "Connection[Any, Any]",
+    near_end: "Connection[Any, Any] | None",
+    do: Callable[[Any], Any],
+    join: Callable[[Any, list[Any]], Sized],
+    longest_s: float,
+    threads: int,
 ) -> None:
     """Do chunks, in a worker process, until it is stopped or the parent has died.
 
@@ -305,13 +280,7 @@ def _serve(
     ignore_signals()
     if near_end is not None:
         near_end.close()
-    start_error = _error_of(load) or _error_of(prepare_worker)
-    try:
-        do, join, longest_s, threads, with_file = pipe.recv()
-        if with_file:
-            reduction.recv_handle(pipe)  # nobody closes it: it is open until this process ends
-    except (EOFError, OSError):
-        os._exit(1)
+    start_error = _error_of(prepare_worker)
     pool = None
     if threads > 1:
         from concurrent.futures import ThreadPoolExecutor  # only where tasks wait for the network

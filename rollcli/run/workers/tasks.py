@@ -3,69 +3,28 @@
 import contextlib
 import os
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence, Sized
+from collections.abc import Generator, Sequence
 from dataclasses import replace
-from typing import Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any
 
-from rollcli.run.workers.chunks import Chunks, Done, Result, Span, Task, Work, Workers
+from rollcli.run.workers.chunks import Chunks, Result, Span, Task, Work, Workers
 from rollcli.run.workers.interrupt import Stop
-from rollcli.run.workers.pool import prepare_worker
+from rollcli.run.workers.pool import PoolExecutor, prepare_worker
 
-_Task = TypeVar("_Task", contravariant=True)
+if TYPE_CHECKING:
+    from rollcli.run.workers.cluster import ClusterExecutor  # the extra `cluster`
+
 # chunks that are not done: a worker's own, one that waits there, and one for whichever worker is fast
 _IN_FLIGHT = 3
 # and with those that are done, a few rows each, while the oldest is not: its worker may be slow, or its tasks
 _AHEAD = 12
 
 
-class Future(Protocol[Result]):
-    """A chunk that was submitted."""
-
-    def done(self) -> bool:
-        """Tell whether its result is there."""
-
-    def result(self) -> Done[Result]:
-        """Return what was done of it; raise an error that says that its worker died, once it is there."""
-
-
-class Executor(Protocol[_Task, Result]):
-    """Workers, wherever they run.
-
-    Attributes
-    ----------
-    workers : int
-        How many there are now.
-    threads : int
-        Tasks that each of them has in hand at once.
-    worker_died : tuple of exception types
-        What `Future.result` raises when the worker of the chunk has died.
-    """
-
-    threads: int
-    worker_died: tuple[type[BaseException], ...]
-
-    @property
-    def workers(self) -> int:
-        """The number may change while they work."""
-
-    def submit(self, chunk: Sequence[_Task], *, first: bool = False) -> Future[Result]:
-        """Queue a chunk; `first`: before those that wait."""
-
-    def wait(self, future: Future[Result]) -> None:
-        """Wait until a chunk is done, or for a fifth of a second."""
-
-    def retry(self, chunk: Sequence[_Task]) -> Done[Result]:
-        """Run a single task again that kills workers; if this one dies too, return that of a lost task."""
-
-    def stop(self) -> None:
-        """Let workers begin no further task."""
-
-    def close(self, *, at_once: bool) -> None:
-        """End the workers: after their current task, or at once."""
-
-
 def in_order(
-    tasks: Iterable[Task], work: Work[Task, Result], executor: Executor[Task, Result], stop: Stop
+    tasks: Sequence[Task],
+    work: Work[Task, Result],
+    executor: "PoolExecutor[Task, Result] | ClusterExecutor[Task, Result]",
+    stop: Stop,
 ) -> Generator[Any, None, None]:
     """Yield what `Work.join` made of the results of some tasks and of those after them, in the tasks' order.
 
@@ -74,10 +33,10 @@ def in_order(
     """
     chunks = Chunks(tasks, executor.threads, work.unit, work.prepare)
     ahead = _AHEAD if work.prepare is None else _IN_FLIGHT
-    in_flight = deque[tuple[Span[Task], Future[Result]]]()
-    undone: list[Future[Result]] = []
+    in_flight = deque[tuple[Span[Task], Any]]()  # each with its future
+    undone: list[Any] = []
 
-    def submit(chunk: Span[Task], *, first: bool = False) -> tuple[Span[Task], Future[Result]]:
+    def submit(chunk: Span[Task], *, first: bool = False) -> tuple[Span[Task], Any]:
         undone.append(executor.submit(chunk, first=first))
         return chunk, undone[-1]
 
@@ -127,11 +86,8 @@ def in_order(
             submit_first(*chunks.cut(rest, executor.workers))
 
 
-_MOST_EARLY = 4  # of the workers: there may be fewer tasks, and those of a longer run need not hurry
-
-
 def run_tasks(
-    tasks: Iterable[Task], work: Work[Task, Result], stop: Stop, workers: Workers
+    tasks: Sequence[Task], work: Work[Task, Result], stop: Stop, workers: Workers
 ) -> Generator[Result, None, None]:
     """Yield the result of each task, in the tasks' order; see `run_joined`."""
     with contextlib.closing(run_joined(tasks, work, stop, workers)) as chunks:
@@ -140,7 +96,7 @@ def run_tasks(
 
 
 def run_joined(
-    tasks: Iterable[Task], work: Work[Task, Result], stop: Stop, workers: Workers
+    tasks: Sequence[Task], work: Work[Task, Result], stop: Stop, workers: Workers
 ) -> Generator[Any, None, None]:
     """Yield what `Work.join` makes of the results of the first tasks, and then of those after them.
 
@@ -149,10 +105,9 @@ def run_joined(
     WorkerError
         This machine starts no further process; or the cluster cannot do the work, or its scheduler is lost.
     """
-    count = len(tasks) if isinstance(tasks, Sized) else None
     if workers.scheduler is not None:
         work = replace(work, prepare=None)
-    executor = _executor(count, work, workers)
+    executor = _executor(len(tasks), work, workers)
     if executor is None:
         yield from _run_here(tasks, work, stop)
         return
@@ -164,36 +119,6 @@ def run_joined(
         except KeyboardInterrupt:  # the second Ctrl-C, while they end
             executor.close(at_once=True)
             raise
-
-
-@contextlib.contextmanager
-def started_early(jobs: int | None, load: Callable[[], None]) -> Iterator[list[Any]]:
-    """Start a few worker processes while the tasks are still looked for; those that nobody takes end.
-
-    Parameters
-    ----------
-    jobs : int or None
-        The workers that were asked for; None: one for each usable processor.
-    load : callable
-        What a worker loads, apart from what all of them load.
-
-    Raises
-    ------
-    WorkerError
-        This machine starts no further process.
-    """
-    from rollcli.run.workers.pool import Worker
-
-    most = min(jobs or _usable_processors(), _MOST_EARLY)
-    started: list[Worker[Any, Any]] = []
-    try:
-        for _ in range(most if most > 1 else 0):
-            started.append(Worker(load))
-        yield started
-    finally:
-        for worker in started:
-            worker.kill()
-            worker.join()
 
 
 def require_scheduler(address: str | None) -> None:
@@ -212,7 +137,7 @@ def require_scheduler(address: str | None) -> None:
         check_scheduler(address)
 
 
-def _run_here(tasks: Iterable[Task], work: Work[Task, Result], stop: Stop) -> Generator[Any, None, None]:
+def _run_here(tasks: Sequence[Task], work: Work[Task, Result], stop: Stop) -> Generator[Any, None, None]:
     """Do each task in this process, when its result is asked for."""
     prepare_worker()
     for position, task in enumerate(tasks):
@@ -221,18 +146,16 @@ def _run_here(tasks: Iterable[Task], work: Work[Task, Result], stop: Stop) -> Ge
         yield work.join(Span([task], position, work.tell()), [work.do(task)])
 
 
-def _executor(count: int | None, work: Work[Any, Any], workers: Workers) -> Any:
-    """Make the executor; None: this process does the tasks. Modules load only when they are used."""
+def _executor(
+    count: int, work: Work[Task, Result], workers: Workers
+) -> "PoolExecutor[Task, Result] | ClusterExecutor[Task, Result] | None":
+    """Make the executor; None: this process does the tasks. The cluster's loads only when it is used."""
     if workers.scheduler is not None:
         from rollcli.run.workers.cluster import ClusterExecutor
 
         return ClusterExecutor(workers.scheduler, work, workers)
-    jobs = workers.jobs or _usable_processors()
-    if count is not None:
-        jobs = min(jobs, count)
+    jobs = min(workers.jobs or _usable_processors(), count)
     if jobs > 1 or (jobs and workers.threads > 1):
-        from rollcli.run.workers.pool import PoolExecutor
-
         return PoolExecutor(jobs, work, workers)
     return None
 

@@ -13,10 +13,9 @@ import pytest
 
 from rollcli.errors import InputError, UsageError, WorkerError
 from rollcli.run.workers import pool as pools
-from rollcli.run.workers import tasks as runs
 from rollcli.run.workers.chunks import Work, Workers
 from rollcli.run.workers.interrupt import Stop, stop_signals
-from rollcli.run.workers.pool import PoolExecutor, prepare_worker
+from rollcli.run.workers.pool import PoolExecutor
 from rollcli.run.workers.tasks import require_scheduler, run_tasks
 from tests.run.workers.tasks import lost, run
 from tests.run_cli import ended, environment, wait_until
@@ -106,21 +105,6 @@ def test_a_worker_that_died_with_nothing_to_do_is_replaced_before_its_next_chunk
         assert settled(executor, executor.submit([("give", 2)])) == [2]
 
 
-def test_a_file_stays_open_in_the_workers(tmp_path):
-    fcntl = pytest.importorskip("fcntl", reason="this system has no flock")
-    path = tmp_path / "locked"
-    descriptor = os.open(path, os.O_RDWR | os.O_CREAT)
-    fcntl.flock(descriptor, fcntl.LOCK_EX)
-    executor = PoolExecutor(1, WORK, Workers(keep_open=descriptor))
-    try:
-        assert settled(executor, executor.submit([("give", 1)])) == [1]
-        os.close(descriptor)  # the lock stays, since the worker holds the same open file
-        with path.open() as other, pytest.raises(BlockingIOError):
-            fcntl.flock(other, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    finally:
-        executor.close(at_once=True)
-
-
 def test_what_a_dead_worker_left_is_cleared_before_its_chunk_is_known_to_be_lost(tmp_path):
     cleared = []
     with pool(1, Work(run, lost, cleared.append)) as executor:
@@ -203,26 +187,14 @@ def test_no_scheduler_is_asked_for_unless_one_is_named():
         require_scheduler("")
 
 
-def test_workers_that_were_started_early_do_the_tasks_and_those_too_many_end():
-    with runs.started_early(3, prepare_worker) as started:
-        processes = {worker._process.pid: worker._process for worker in started}
-        assert len(processes) == 3
-        tasks = [("signals",) for _ in range(20)]
-        used = {pid for pid, _, _ in run_tasks(tasks, WORK, Stop(), Workers(2, started=started))}
-        assert used <= processes.keys()
-        assert len(started) == 1
-    assert not any(process.is_alive() for process in processes.values())
-    with runs.started_early(1, prepare_worker) as none:
-        assert none == []
-
-
 HOW_IT_STARTS = """
 import sys, threading
+from rollcli.run.workers.chunks import Work
 from rollcli.run.workers.pool import Worker
 if __name__ == "__main__":
     if "threads" in sys.argv:
         threading.Thread(target=threading.Event().wait, daemon=True).start()
-    worker = Worker()
+    worker = Worker(Work(str, str), 1)
     print(type(worker._process).__name__)
     worker.kill()
     worker.join()
