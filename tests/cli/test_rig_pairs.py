@@ -31,10 +31,10 @@ def rolls(path):
 
 @pytest.fixture(scope="module")
 def pairs(tmp_path_factory):
-    """Eight pairs, the same with right views that are put off, and what was measured of these."""
+    """Twelve pairs, the same with right views that are put off, and what was measured of these."""
     folder = tmp_path_factory.mktemp("pairs")
     scene = ("--scene", "mixed", "--size", "480x360", "--roll=-3:3", "-q")
-    assert rollcli("simulate", ".", "--frames", "8", *scene, cwd=folder).status == 0
+    assert rollcli("simulate", ".", "--frames", "12", *scene, cwd=folder).status == 0
     (folder / "off").mkdir()
     for path in sorted((folder / "right").iterdir()):
         put_off(path, folder / "off")
