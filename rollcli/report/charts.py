@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from rollcli.files.results import Row
 from rollcli.pictures.overlay import round_step
-from rollcli.report.options import ALIGNED, HISTOGRAM, chart_names
 from rollcli.report.page import Chart, scatter
 from rollcli.report.summary import degrees, with_interval
 from rollcli.rig.drive.assess import RigAssessment, seconds_of
@@ -271,17 +270,18 @@ Values = Sequence[Value]
 
 
 def all_charts(rows: Sequence[Row], rig: RigAssessment | None = None) -> dict[str, Chart]:
-    """Return the charts of `chart_names` by their names."""
-    charts = {}
-    for name in chart_names(rows):
-        if name == HISTOGRAM:
-            charts[name] = histogram(rows)
-        elif name == ALIGNED:
-            charts[name] = alignment(rows, rig)
-        else:
-            quantity = next(each for each in QUANTITIES if each.name == name)
-            charts[name] = chart_over_frames(rows, quantity, rig)
-    return charts
+    """Return the charts by their names, `roll` first.
+
+    Pitch and height have charts where a calibration has given them, the histogram where more than one frame
+    has an angle, and how the right view lies where more than one pair was measured.
+    """
+    known = [each for each in QUANTITIES if any(getattr(row, each.column) is not None for row in rows)]
+    charts = [chart_over_frames(rows, each, rig) for each in dict.fromkeys([ROLL, *known])]
+    if sum(row.roll_deg is not None for row in rows) > 1:
+        charts.append(histogram(rows))
+    if sum(row.right_lower_px is not None for row in rows) > 1:
+        charts.append(alignment(rows, rig))
+    return {chart.name: chart for chart in charts}
 
 
 def alignment(rows: Sequence[Row], rig: RigAssessment | None = None) -> Chart:
@@ -334,7 +334,7 @@ def alignment(rows: Sequence[Row], rig: RigAssessment | None = None) -> Chart:
         "xaxis": axis.layout(),
         "yaxis": {"title": {"text": "shift of rows, px"}, "range": [-end, end], "zeroline": True},
     }
-    return Chart(ALIGNED, f"How the right view lies over {len(rows)} frames, px", data, layout)
+    return Chart("alignment", f"How the right view lies over {len(rows)} frames, px", data, layout)
 
 
 def _shift_of(place: int, row: Row) -> float:
@@ -525,7 +525,7 @@ def histogram(rows: Sequence[Row]) -> Chart:
         "xaxis": {"title": {"text": "roll, degrees"}, "range": _padded(edges, step), "zeroline": False},
         "yaxis": {"title": {"text": "frames"}, **_counted(int(np.histogram(shown, edges)[0].max()))},
     }
-    return Chart(HISTOGRAM, "How many frames have which roll", data, layout)
+    return Chart("histogram", "How many frames have which roll", data, layout)
 
 
 def _counted(highest: int) -> dict[str, Any]:

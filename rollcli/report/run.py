@@ -11,7 +11,9 @@ from rollcli.extras import require_extra
 from rollcli.files.naming import listed, natural_key
 from rollcli.files.results import Result, Row, read_result, run_path
 from rollcli.files.stream import is_stream, write_output
-from rollcli.report.options import ReportOptions, chart_names
+from rollcli.report.charts import all_charts
+from rollcli.report.options import ReportOptions
+from rollcli.report.page import Chart
 from rollcli.report.sources import Choice, Subject, choose, subjects
 from rollcli.report.summary import common_run, frame_count
 from rollcli.rig.drive.assess import RigAssessment, assess_rig
@@ -69,11 +71,11 @@ def run_report(options: ReportOptions) -> ExitStatus:
         *(path for each in found for path in (*each.frame.reads(), *each.images.values())),
     ]
     page = [] if options.output is None or is_stream(options.output) else [options.output]
-    charts = [path for name in chart_names(joined.rows) for path in options.chart_paths(name).values()]
-    writes = [*charts, *page]
+    charts = all_charts(joined.rows, rig)
+    writes = [*(path for name in charts for path in options.chart_paths(name).values()), *page]
     if listed_only(reads, writes, options.running):
         return ExitStatus.DONE
-    return _write(options, joined, chosen, found, rig)
+    return _write(options, joined, chosen, found, rig, charts)
 
 
 def _require_charts_alone(options: ReportOptions) -> None:
@@ -93,8 +95,8 @@ def _write(
     chosen: Sequence[Choice],
     found: Sequence[Subject],
     rig: RigAssessment,
+    charts: Mapping[str, Chart],
 ) -> ExitStatus:
-    from rollcli.report.charts import all_charts
     from rollcli.report.content import report_page
     from rollcli.report.figures import chart_file
 
@@ -104,7 +106,6 @@ def _write(
     if len(pictures) < len(found):
         progress.say("interrupted; nothing is written")
         return ExitStatus.INTERRUPTED
-    charts = all_charts(joined.rows, rig)
     files = {
         path: chart_file(chart, kind)
         for name, chart in charts.items()

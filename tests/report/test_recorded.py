@@ -20,7 +20,7 @@ from rollcli.files.results import Result
 from rollcli.pictures.figures import SLIDE, Size
 from rollcli.report import pictures, sources
 from rollcli.report.charts import all_charts, frame_axis, histogram, view
-from rollcli.report.options import ReportOptions, chart_names
+from rollcli.report.options import ReportOptions
 from rollcli.report.page import Chart
 from rollcli.report.pictures import Picture, Pictures
 from rollcli.report.sources import choose, subjects
@@ -404,7 +404,7 @@ def _words():
     return [
         [with_interval(2.3456, half) for half in (None, 0.5, 0.012, 0.0042)],
         [degrees(angle) for angle in (1.234, -1.235, -0.001, 0.0, None)],
-        [chart_names(each) for each in (*results, pairs, pairs[:1])],
+        [[*all_charts(each)] for each in (*results, pairs, pairs[:1])],
     ]
 
 
