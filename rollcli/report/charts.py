@@ -68,7 +68,7 @@ class FrameAxis:
         return {"title": {"text": "frame"}, "range": span, "zeroline": False, "tickformat": ",d", **few}
 
 
-def frame_axis(rows: Sequence[Row], rig: RigAssessment | None = None) -> FrameAxis:
+def frame_axis(rows: Sequence[Row], rig: RigAssessment) -> FrameAxis:
     """Return the axis of rows: time where all frames have stamps that ascend, and pauses do not fill it.
 
     What stands for the broken end of a recording has no stamp, and stands where the frame before it does.
@@ -79,8 +79,7 @@ def frame_axis(rows: Sequence[Row], rig: RigAssessment | None = None) -> FrameAx
     if not (len(rows) and known[0] and (known | ends).all()):
         return FrameAxis(len(rows))
     seconds = seconds[np.maximum.accumulate(np.where(known, np.arange(len(rows)), 0))]
-    drives = [seconds[drive.frames] for drive in rig.drives] if rig is not None else [seconds]
-    taken = sum(float(np.ptp(each)) for each in drives if len(each))
+    taken = sum(float(np.ptp(seconds[drive.frames])) for drive in rig.drives if len(drive.frames))
     whole = float(seconds[-1] - seconds[0])
     if (np.diff(seconds) < 0).any() or not taken > _LEAST_SHARE * whole:
         return FrameAxis(len(rows))
@@ -154,7 +153,6 @@ _LONGEST = 44  # characters in a line, so that a label fits a narrow screen
 _LINES = 5  # of a reason; the table and the gallery show all of it
 _BEYOND = 0.35  # a suspect value may widen the view by this share of the others' range, and by half a degree
 _WIDEST = 1.0  # degrees: a wider interval is seen to leave the view
-_DEGREE_IN_METRES = 0.1  # what of a height is as much as a degree of an angle
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,11 +179,10 @@ class Value:
     row: Row
 
 
-def values_of(rows: Sequence[Row], quantity: Quantity, axis: FrameAxis | None = None) -> list[Value]:
+def values_of(rows: Sequence[Row], quantity: Quantity, axis: FrameAxis) -> list[Value]:
     """Return the value of each frame."""
-    at = (axis or FrameAxis(len(rows))).at
     return [
-        Value(number, at(number), getattr(row, quantity.column), getattr(row, quantity.ci_column), row)
+        Value(number, axis.at(number), getattr(row, quantity.column), getattr(row, quantity.ci_column), row)
         for number, row in enumerate(rows, 1)
     ]
 
@@ -227,8 +224,8 @@ def view(rows: Sequence[Row], quantity: Quantity = ROLL) -> tuple[float, float]:
     tuple of float
         Degrees or metres, the lower end first.
     """
-    unit = _DEGREE_IN_METRES if quantity is HEIGHT else 1.0
-    there = [each for each in values_of(rows, quantity) if each.value is not None]
+    unit = quantity.scale
+    there = [each for each in values_of(rows, quantity, FrameAxis(len(rows))) if each.value is not None]
     if not there:
         return -unit, unit
     low, high = _span([each for each in there if each.row.status == "ok"] or there, unit)
@@ -239,10 +236,10 @@ def view(rows: Sequence[Row], quantity: Quantity = ROLL) -> tuple[float, float]:
     return round(low - margin, 3), round(high + margin, 3)
 
 
-def outside(rows: Sequence[Row], quantity: Quantity = ROLL) -> int:
-    """Return how many values lie outside of the view."""
-    low, high = view(rows, quantity)
-    return sum(each.value is not None and not low <= each.value <= high for each in values_of(rows, quantity))
+def outside(rows: Sequence[Row]) -> int:
+    """Return how many angles lie outside of the view."""
+    low, high = view(rows)
+    return sum(row.roll_deg is not None and not low <= row.roll_deg <= high for row in rows)
 
 
 def _span(values: Iterable[Value], unit: float) -> tuple[float, float]:
@@ -269,7 +266,7 @@ _VALUES = ("x", "y", "customdata")
 Values = Sequence[Value]
 
 
-def all_charts(rows: Sequence[Row], rig: RigAssessment | None = None) -> dict[str, Chart]:
+def all_charts(rows: Sequence[Row], rig: RigAssessment) -> dict[str, Chart]:
     """Return the charts by their names, `roll` first.
 
     Pitch and height have charts where a calibration has given them, the histogram where more than one frame
@@ -284,16 +281,16 @@ def all_charts(rows: Sequence[Row], rig: RigAssessment | None = None) -> dict[st
     return {chart.name: chart for chart in charts}
 
 
-def alignment(rows: Sequence[Row], rig: RigAssessment | None = None) -> Chart:
+def alignment(rows: Sequence[Row], rig: RigAssessment) -> Chart:
     """Return how the right view lies over the frames: the shift of rows by each part at its largest, px.
 
-    One unit for all parts tells at a glance which of them matters. Dots are pairs; with `rig`, lines are what
-    the drive says, with its drifts and jumps.
+    One unit for all parts tells at a glance which of them matters. Dots are pairs; lines are what the drive
+    says, with its drifts and jumps.
 
     Parameters
     ----------
     rows : sequence of Row
-    rig : RigAssessment, optional
+    rig : RigAssessment
 
     Returns
     -------
@@ -322,7 +319,7 @@ def alignment(rows: Sequence[Row], rig: RigAssessment | None = None) -> Chart:
             "hovertemplate": "%{customdata}<extra></extra>",
         }
         data.append(dots)
-        if rig is not None and scale:
+        if scale:
             line = _level_line(rig, quantity, float(np.median(scale)), axis)
             line |= {"name": f"{words}, over the drive", "showlegend": False}
             data.append({**line, "line": {"color": colour, "width": 2}})
@@ -357,19 +354,17 @@ def _level_line(rig: RigAssessment, quantity: Quantity, scale: float, axis: Fram
     return trace
 
 
-def chart_over_frames(
-    rows: Sequence[Row], quantity: Quantity = ROLL, rig: RigAssessment | None = None
-) -> Chart:
+def chart_over_frames(rows: Sequence[Row], quantity: Quantity, rig: RigAssessment) -> Chart:
     """Return the value of each frame: a line, its interval as a band, suspect and failed frames marked.
 
-    With `rig`, its segments, drifts and jumps too. A line neither bridges a suspect frame
+    The segments, drifts and jumps of the rig too. A line neither bridges a suspect frame
     nor leads from one drive to another.
 
     Parameters
     ----------
     rows : sequence of Row
     quantity : Quantity
-    rig : RigAssessment, optional
+    rig : RigAssessment
 
     Returns
     -------
@@ -382,7 +377,7 @@ def chart_over_frames(
     suspect = [each for each in values if each.row.status == "suspect" and each.value is not None]
     failed = [each for each in values if each.row.status == "error"]
     sure = [each for each in values if each.row.status == "ok" and each.value is not None]
-    starts = set() if rig is None else drive_starts(rig)
+    starts = drive_starts(rig)
     many = len(rows) > _MANY
     # what is sure lies on top: suspect marks of a long run would hide it
     data = [
@@ -394,7 +389,7 @@ def chart_over_frames(
     data = [trace for trace in data if trace["x"]]  # plotly's legend stumbles over what is empty
     for trace in data:
         trace["marker"] = {"size": 5 if many else 8, **trace.get("marker", {})}
-    data += [] if rig is None else rig_traces(rig, quantity, ends, axis)
+    data += rig_traces(rig, quantity, ends, axis)
     unit = _AXIS_UNITS[quantity.suffix]
     layout = {
         "hovermode": "closest",

@@ -100,7 +100,7 @@ def _others(rig: RigAssessment) -> list[str]:
     return others
 
 
-def _table(rows: Sequence[Row], rig: RigAssessment | None = None) -> Rows:
+def _table(rows: Sequence[Row], rig: RigAssessment) -> Rows:
     """Return what the table shows of each frame: number, file, status, roll, roll in words, reason."""
     return Rows(
         [

@@ -25,6 +25,7 @@ from rollcli.report.page import Chart
 from rollcli.report.pictures import Picture, Pictures
 from rollcli.report.sources import choose, subjects
 from rollcli.report.summary import common_run, degrees, option_lines, with_interval
+from rollcli.rig.drive.assess import assess_rig
 from rollcli.rig.quantities import ALIGNMENT, HEIGHT, ROLL, SIZE
 from rollcli.run.options import EncodingOptions, FrameOptions, ImageOptions
 from tests.recorded import check, made
@@ -157,12 +158,8 @@ def _shortened(value):
     return {"length": len(value), "numbers": len(numbers), "sum": float(sum(numbers)), "some": some}
 
 
-def _charts(name, *, assessed=True):
-    rows, found = RESULTS[name]()
-    return {
-        name: _shortened(asdict(chart))
-        for name, chart in all_charts(rows, found if assessed else None).items()
-    }
+def _charts(name):
+    return {each: _shortened(asdict(chart)) for each, chart in all_charts(*RESULTS[name]()).items()}
 
 
 NS = 10**9
@@ -174,8 +171,8 @@ def _axis(seconds, *, name="m.mcap#/left@{}", first=1_700_000_000 * NS, pause=No
     rows = [row(each) for each in files]
     counts = [len(rows)] if pause is None else [pause, len(rows) - pause]
     _, found = _assessed(rows, *({"roll": sequence(each)} for each in counts))
-    axes = [frame_axis(rows), frame_axis(rows, found)]
-    return [[each.places, each.unit, each.layout(), *map(each.at, (1, 1.5, len(rows)))] for each in axes]
+    axis = frame_axis(rows, found)
+    return [axis.places, axis.unit, axis.layout(), *map(axis.at, (1, 1.5, len(rows)))]
 
 
 AXES = {
@@ -291,7 +288,7 @@ def _drawn_result(name, size=SLIDE):
 def _thinned():
     """A line and a band of more points than any picture shows."""
     rows = [row(f"{place}.png", (place * 7919 % 2503) / 1024, 0.25) for place in range(2501)]
-    return {each: _drawn(chart) for each, chart in all_charts(rows).items()}
+    return {each: _drawn(chart) for each, chart in all_charts(rows, assess_rig(rows)).items()}
 
 
 _LOOK = re.compile(r' ((?:fill|stroke|font|text|class|view|aria)[\w-]*="[^"#]*")')
@@ -404,7 +401,7 @@ def _words():
     return [
         [with_interval(2.3456, half) for half in (None, 0.5, 0.012, 0.0042)],
         [degrees(angle) for angle in (1.234, -1.235, -0.001, 0.0, None)],
-        [[*all_charts(each)] for each in (*results, pairs, pairs[:1])],
+        [[*all_charts(each, assess_rig(each))] for each in (*results, pairs, pairs[:1])],
     ]
 
 
@@ -487,7 +484,6 @@ TAKEN = {
 }
 CASES = {
     **{f"charts: {name}": partial(_charts, name) for name in RESULTS},
-    "charts: pairs, alone": partial(_charts, "pairs", assessed=False),
     **{f"axis: {name}": make for name, make in AXES.items()},
     **{f"bars: {name}": make for name, make in BARS.items()},
     **{f"drawn: {name}": partial(_drawn_result, name) for name in RESULTS},
