@@ -16,8 +16,8 @@ from rollcli.pictures.overlay import round_step
 from rollcli.report.page import Chart, scatter
 from rollcli.report.summary import degrees, with_interval
 from rollcli.rig.drive.assess import RigAssessment, seconds_of
-from rollcli.rig.quantities import ALIGNMENT, HEIGHT, QUANTITIES, ROLL, Quantity
-from rollcli.rig.words import answer, decimals
+from rollcli.rig.quantities import ALIGNMENT, QUANTITIES, ROLL, Quantity
+from rollcli.rig.words import answer
 from rollcli.stereo.misalignment import Misalignment
 
 Trace = dict[str, Any]
@@ -185,17 +185,6 @@ def values_of(rows: Sequence[Row], quantity: Quantity, axis: FrameAxis) -> list[
         Value(number, axis.at(number), getattr(row, quantity.column), getattr(row, quantity.ci_column), row)
         for number, row in enumerate(rows, 1)
     ]
-
-
-def in_words(each: Value, quantity: Quantity) -> str:
-    """Return a value with its interval and unit; "" where there is none."""
-    if each.value is None:
-        return ""
-    if quantity is not HEIGHT:
-        return with_interval(each.value, each.half_width)
-    digits = decimals(each.half_width)
-    half = "" if each.half_width is None else f" ± {each.half_width:.{digits}f}"
-    return f"{each.value:.{digits}f}{half}{quantity.unit}"
 
 
 def label(row: Row, value: str) -> str:
@@ -451,16 +440,19 @@ def _suspect(values: Values, quantity: Quantity, *, bars: bool) -> Trace:
 def _failed(values: Values, quantity: Quantity) -> Trace:
     """Along the lower edge, since they have no value."""
     cross = {"color": "@error", "symbol": "x-thin", "line": {"color": "@error", "width": 2}}
-    points = {**_points(values, quantity), "y": [_FAILED_AT] * len(values), "yaxis": "y2"}
+    labels = [label(each.row, "") for each in values]
+    look = {"y": [_FAILED_AT] * len(values), "yaxis": "y2", "customdata": labels}
+    points = _points(values, quantity) | look
     return {"mode": "markers", "name": "failed", "legendrank": 1002, "marker": cross, **points}
 
 
 def _points(values: Values, quantity: Quantity) -> Trace:
+    said = [with_interval(each.value, each.half_width, quantity) for each in values]
     return {
         "type": "scatter",
         "x": [each.x for each in values],
         "y": [each.value for each in values],
-        "customdata": [label(each.row, in_words(each, quantity)) for each in values],
+        "customdata": [label(each.row, words) for each, words in zip(values, said, strict=True)],
         "hovertemplate": "%{customdata}<extra></extra>",
     }
 
