@@ -115,6 +115,7 @@ def rig_traces(
         As plotly takes them; empty ones are left out.
     """
     band, means, jumps = _trace("mounting, 95 %"), _trace("mounting"), _trace("jump")
+    name = quantity.name.replace("_", " ")
     band |= {"fill": "toself", "fillcolor": "@band", "line": {"width": 0}, "hoverinfo": "skip"}
     means["line"] = {"color": "@c3", "width": 2}
     jumps["line"] = {"color": "@error", "width": 1.5, "dash": "dash"}
@@ -124,7 +125,7 @@ def rig_traces(
             if segment.mean.value is None or segment.first == segment.last:  # a frame alone is its own mean
                 continue
             first, last = (axis.at(int(drive.frames[place]) + 1) for place in (segment.first, segment.last))
-            said = f"mounting {quantity.name} {answer(segment.end, quantity)}, of {segment.used:,} frames"
+            said = f"mounting {name} {answer(segment.end, quantity)}, of {segment.used:,} frames"
             level = [each.value or 0.0 for each in (segment.begin, segment.end)]
             _add(means, [first, last], level, said)
             if segment.begin.ci95 is not None and segment.end.ci95 is not None:
@@ -309,9 +310,13 @@ def alignment(rows: Sequence[Row], rig: RigAssessment) -> Chart:
         }
         data.append(dots)
         if scale:
-            line = _level_line(rig, quantity, float(np.median(scale)), axis)
-            line |= {"name": f"{words}, over the drive", "showlegend": False}
-            data.append({**line, "line": {"color": colour, "width": 2}})
+            factor, line = float(np.median(scale)), {"color": colour, "width": 2}
+            look = {"name": f"{words}, over the drive", "showlegend": False, "line": line}
+            data += [
+                {**trace, **look, "y": [each if each is None else factor * each for each in trace["y"]]}
+                for trace in rig_traces(rig, quantity, (0.0, 0.0), axis)
+                if trace["name"] == "mounting"
+            ]
     largest = max((abs(each) for trace in data for each in trace["y"] if each is not None), default=0.0)
     end = 1.1 * max(largest, 0.5)
     layout = {
@@ -328,19 +333,6 @@ def _shift_of(place: int, row: Row) -> float:
     unit = [float(each == place) for each in range(len(ALIGNMENT))]
     height, width = row.height or 0, row.width or 0
     return Misalignment.of_values(unit, height, width).shifts(height, width)[place]
-
-
-def _level_line(rig: RigAssessment, quantity: Quantity, scale: float, axis: FrameAxis) -> Trace:
-    """Return the level of each segment of each drive, from its first frame to its last."""
-    trace = _trace(quantity.name)
-    for drive in rig.drives:
-        found = drive.quantities.get(quantity.name)
-        for segment in found.segments if found is not None else ():
-            if segment.begin.value is not None and segment.end.value is not None:
-                ends = [axis.at(int(drive.frames[place]) + 1) for place in (segment.first, segment.last)]
-                said = f"{quantity.name.replace('_', ' ')} {answer(segment.end, quantity)}"
-                _add(trace, ends, [scale * segment.begin.value, scale * segment.end.value], said)
-    return trace
 
 
 def chart_over_frames(rows: Sequence[Row], quantity: Quantity, rig: RigAssessment) -> Chart:
