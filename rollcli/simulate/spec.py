@@ -1,10 +1,9 @@
 """What one simulated frame is, on which all of its bytes depend, and how frames are drawn from ranges."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from enum import IntEnum
-from typing import Any
 
 import numpy as np
 
@@ -28,7 +27,6 @@ MAX_BEND = 0.02
 MAX_CROSSFALL, MAX_GUTTER = 0.15, 0.5
 MAX_KERB = 0.5  # metres
 LEVEL = np.array([0.0, 1.0, 0.0])  # the normal of a level road
-_NONE = (0.0, 0.0)
 
 
 class Stream(IntEnum):
@@ -185,35 +183,26 @@ def draw_specs(options: SimulateOptions) -> list[FrameSpec]:
         dips=options.dips,
         seed=options.seed,
     )
-    spans = {
-        "roll": _both(math.radians, options.roll_deg),
-        "pitch": _both(math.radians, options.pitch_deg),
-        "curvature": options.curvature or _NONE,
-        "bend": options.bend or _NONE,
-        "crossfall": _both(_share, options.crossfall or CROSSFALL),
-        "gutter": _both(_share, options.gutter),
-        "height": options.height,
-        "principal offset": options.principal_offset,
-    }
     for end in (0, 1):  # what is not possible is refused, whatever would be drawn
-        values: dict[str, Any] = {name: span[end] for name, span in spans.items()}
-        offset = values.pop("principal offset")
-        _offset(replace(rig, **{**values, "height": spans["height"][0]}), offset, offset)
-    return [_drawn(replace(rig, index=index), options, spans) for index in range(options.frames)]
+        offset = options.principal_offset[end]
+        first = replace(
+            rig,
+            roll=math.radians(options.roll_deg[end]),
+            pitch=math.radians(options.pitch_deg[end]),
+            curvature=options.curvature[end] if options.curvature else 0.0,
+            bend=options.bend[end] if options.bend else None,
+            crossfall=(options.crossfall or CROSSFALL)[end] / 100,
+            gutter=options.gutter[end] / 100,
+            height=options.height[0],
+        )
+        _offset(first, offset, offset)
+    return [_drawn(replace(rig, index=index), options) for index in range(options.frames)]
 
 
-def _both(change: Callable[[float], float], span: Span) -> Span:
-    return change(span[0]), change(span[1])
-
-
-def _share(percent: float) -> float:
-    return percent / 100
-
-
-def _drawn(spec: FrameSpec, options: SimulateOptions, spans: dict[str, Span]) -> FrameSpec:
+def _drawn(spec: FrameSpec, options: SimulateOptions) -> FrameSpec:
     """Return the frame with its pose, its road and the place of its camera, each from a stream of its own."""
     rng = spec.rng(Stream.POSE)
-    roll, pitch = rng.uniform(*spans["roll"]), rng.uniform(*spans["pitch"])
+    roll, pitch = (math.radians(rng.uniform(*span)) for span in (options.roll_deg, options.pitch_deg))
     scene = SCENES[rng.integers(len(SCENES))] if options.scene == MIXED else options.scene
     curvature: float = rng.choice([0.0, 1.0]) * rng.uniform(-0.001, 0.001)
     if options.curvature is not None:
@@ -221,7 +210,8 @@ def _drawn(spec: FrameSpec, options: SimulateOptions, spans: dict[str, Span]) ->
     elif scene == "bare":
         curvature = 0.0
     rng = spec.rng(Stream.CROSS_SECTION)
-    crossfall, gutter = rng.uniform(*spans["crossfall"]), rng.uniform(*spans["gutter"])
+    spans = options.crossfall or CROSSFALL, options.gutter
+    crossfall, gutter = (float(rng.uniform(*span)) / 100 for span in spans)
     shape = options.cross_section
     if shape == MIXED:
         shape = CROSS_SECTIONS[rng.integers(len(CROSS_SECTIONS))]
@@ -230,12 +220,12 @@ def _drawn(spec: FrameSpec, options: SimulateOptions, spans: dict[str, Span]) ->
     spec = replace(
         spec,
         scene=scene,
-        roll=float(roll),
-        pitch=float(pitch),
+        roll=roll,
+        pitch=pitch,
         curvature=float(curvature),
         cross_section=shape,
-        crossfall=0.0 if shape == "flat" else float(crossfall),
-        gutter=float(gutter),
+        crossfall=0.0 if shape == "flat" else crossfall,
+        gutter=gutter,
         bend=bend,
         height=float(rng.uniform(*options.height)),
     )
