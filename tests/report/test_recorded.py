@@ -374,7 +374,8 @@ def _looked_for(rows, there="", images=None, derotated=None, result="rolls.csv",
         _folder_of(each for each in there.split() if "://" not in each),
     ):
         os.chdir(inside)
-        found = made(subjects, given, result, images, ImageOptions(derotated=derotated or None))
+        recorded = FrameOptions(images=ImageOptions(derotated=derotated or None))
+        found = made(subjects, given, result, images, recorded)
     if isinstance(found, str):
         return found
     paths = [[each.frame.path, each.frame.right_path.replace(os.sep, "/")] for each in found]
@@ -389,7 +390,9 @@ def _subjects():
     with _folder_of(f"out/{each}" for each in f"{there} road_mask/m_000002.png".split()):
         return [
             [each.theta, each.alpha, each.images_only, each.refused, sorted(each.images.items())]
-            for each in subjects(rows, "rolls.csv", "out/", ImageOptions(derotated="a/up"))
+            for each in subjects(
+                rows, "rolls.csv", "out/", FrameOptions(images=ImageOptions(derotated="a/up"))
+            )
         ]
 
 
@@ -424,7 +427,7 @@ def _views(quantity):
 def _refused():
     rows = [(replace(row(one), right_file=other), result) for one, other, result in INPUTS["remote"]]
     return [
-        [subjects([each], result, None, ImageOptions(), fetch=fetch)[0].refused for fetch in (False, True)]
+        [subjects([each], result, None, FrameOptions(), fetch=fetch)[0].refused for fetch in (False, True)]
         for each, result in rows
     ]
 
@@ -442,12 +445,12 @@ def _taken(images=(), disparity=ROAD, roll=5.75, camera=None, **options):
             np.save(f"{folder}/{name}.npy", disparity / (1 if name == "a" else 20))
         cv2.imwrite(f"{folder}/photo.png", np.random.default_rng(1).integers(0, 256, (60, 80, 3), np.uint8))
         given = replace(row(f"{folder}/a.npy", roll), alpha0=-8.0, alpha1=0.4, height_m=camera)
-        (subject,) = subjects([given], f"{folder}/rolls.csv", None, ImageOptions())
-        subject = replace(subject, images={kind: f"{folder}/{name}" for kind, name in images}, **options)
         drawn = ImageOptions(heights_range=(-0.3, 0.3))
         settings = FrameOptions(encoding=EncodingOptions("px"), images=drawn)
+        (subject,) = subjects([given], f"{folder}/rolls.csv", None, settings)
+        subject = replace(subject, images={kind: f"{folder}/{name}" for kind, name in images}, **options)
         with mock.patch.object(cv2, "putText", lambda picture, *_: picture):
-            found = pictures.take_pictures(subject, settings)
+            found = pictures.take_pictures(subject)
     shown = {name: each and _seen(each) for name, each in vars(found).items() if name != "missing"}
     return {**shown, "missing": found.missing.replace(folder, ""), "empty": found.empty}
 
