@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -324,7 +323,6 @@ def paper_page(
         iterations=_iterations(tables["table1_iterations"]),
         runtimes=_runtimes(tables["table2_runtime"]),
         methods=_methods(tables["methods_accuracy"]),
-        lowest=_lowest(tables["fig3_lambda0"]),
         maps=[_map(each) for each in found[:_SHOWN]],
         more_maps=max(0, len(found) - _SHOWN),
         failed=failed,
@@ -400,26 +398,6 @@ def _methods(table: Table) -> list[tuple[str, ...]]:
         )
         for method, *figures, _, missing in table.rows
     ]
-
-
-def _lowest(table: Table) -> list[tuple[str, str, str]]:
-    """Return delta, the fewest mean iterations and the rates with which every map takes them, those at 26."""
-    lines = []
-    for delta in DELTAS_DEG:
-        on_all = table.where(delta_deg=delta, short=0)
-        means = dict(zip(_numbers(on_all, "lambda0"), _numbers(on_all, "mean"), strict=True))
-        best = min(means.values(), default=None)
-        reach = [rate for rate, mean in means.items() if mean == best]
-        fewest = "–" if best is None else f"{best:.2f} at λ(0) = {_spans(reach)}"
-        lines.append((f"{delta:g}°", fewest, f"{means[LAMBDA0]:.2f}" if LAMBDA0 in means else "–"))
-    return lines
-
-
-def _spans(rates: Sequence[float]) -> str:
-    """Return runs of whole numbers, such as "8–26, 30"."""
-    runs = groupby(enumerate(map(int, rates)), key=lambda each: each[1] - each[0])
-    ends = [[each[0][1], each[-1][1]] for _, run in runs for each in [list(run)]]
-    return ", ".join(f"{first}" if first == last else f"{first}–{last}" for first, last in ends)
 
 
 def _map(found: Findings) -> dict[str, Any]:
