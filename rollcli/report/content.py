@@ -49,7 +49,7 @@ def report_page(
     return render_page(
         "rollcli.report",
         "report.html",
-        "frames",
+        *("page", "report", "frames"),
         title=options.title or f"Roll of {frame_count(len(rows))}",
         result=listed(map(public_name, options.results)),
         version=run.get("rollcli"),

@@ -21,7 +21,6 @@ from rollcli.pictures.figures import SLIDE, Size
 from rollcli.report import pictures, sources
 from rollcli.report.charts import all_charts, frame_axis, histogram, view
 from rollcli.report.options import ReportOptions
-from rollcli.report.page import Chart
 from rollcli.report.pictures import Picture, Pictures
 from rollcli.report.sources import choose, subjects
 from rollcli.report.summary import common_run, degrees, option_lines, with_interval
@@ -199,7 +198,7 @@ BARS = {
 }
 
 
-def _drawn(chart, size=SLIDE):
+def drawn(chart, size=SLIDE):
     """What stands in a figure, as matplotlib has it before it lays the figure out."""
     figures = pytest.importorskip("rollcli.report.figures", reason="matplotlib is not here")
     with mock.patch.object(figures, "figure_file", lambda figure, kind, title: (figure, kind, title)):
@@ -278,17 +277,14 @@ def _ticks(axis):
     return [places, axis.get_major_formatter().format_ticks(places), len(axis.get_minorticklocs())]
 
 
-HAND_MADE = {name: Chart(**given) for name, given in INPUTS["charts"].items()}
-
-
 def _drawn_result(name, size=SLIDE):
-    return {name: _drawn(chart, size) for name, chart in all_charts(*RESULTS[name]()).items()}
+    return {name: drawn(chart, size) for name, chart in all_charts(*RESULTS[name]()).items()}
 
 
 def _thinned():
     """A line and a band of more points than any picture shows."""
     rows = [row(f"{place}.png", (place * 7919 % 2503) / 1024, 0.25) for place in range(2501)]
-    return {each: _drawn(chart) for each, chart in all_charts(rows, assess_rig(rows)).items()}
+    return {each: drawn(chart) for each, chart in all_charts(rows, assess_rig(rows)).items()}
 
 
 _LOOK = re.compile(r' ((?:fill|stroke|font|text|class|view|aria)[\w-]*="[^"#]*")')
@@ -492,9 +488,7 @@ CASES = {
     **{f"drawn: {name}": partial(_drawn_result, name) for name in RESULTS},
     "drawn: small": partial(_drawn_result, "mixed", Size(240.0, 160.0, 26.0)),
     "drawn: thinned": _thinned,
-    **{f"drawn: {name}": partial(_drawn, chart) for name, chart in HAND_MADE.items()},
     "still": lambda: {name: _still(chart) for name, chart in all_charts(*_mixed()).items()},
-    "still: marked": lambda: _still(HAND_MADE["marked"]),
     **{f"page: {name}": make for name, make in PAGES.items()},
     "chosen": lambda: [
         _chosen(count, jumps) for count in (0, 1, 3, 8, 12) for jumps in ((), (20, 60), range(30, 450, 60))
