@@ -1,6 +1,6 @@
 """The charts of the paper's experiments, which matplotlib draws: for the page, and as figures for a paper."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -8,9 +8,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.ticker import EngFormatter, Formatter, NullLocator, StrMethodFormatter
+from numpy.typing import NDArray
 
 from rollcli.estimator.request import LAMBDA0
-from rollcli.evaluate.paper_page import DELTAS_DEG, METHOD_NAMES, SOLVER_NAMES, Table
+from rollcli.evaluate.paper_page import DELTAS_DEG, METHOD_NAMES, SOLVER_NAMES, Table, Value
 from rollcli.report.figures import Drawing, colour
 
 _COLOURS = {"gd": "c1", "gss": "c2", "exact": "c3"}
@@ -76,7 +77,7 @@ def _solvers(table: Table, axes: Axes, scale: float) -> None:
     for solver, name in SOLVER_NAMES.items():
         # two of them often coincide: the last is drawn open, around the other
         mark = _OPEN if solver == "exact" else {}
-        errors = table.where(solver=solver).column("mean_deg")
+        errors = _positive(table.where(solver=solver).column("mean_deg"))
         _line(axes, scale, _DEGREES, errors, name, _COLOURS[solver], **mark)
     axes.set(xlabel=_DELTA, yscale="log", ylabel="mean |Δθ|")
     _name_decades(axes.yaxis, StrMethodFormatter("{x:g}°"))
@@ -90,7 +91,7 @@ def _methods(table: Table, axes: Axes, scale: float) -> None:
         "worst_deg": ("worst", "c5", {"markersize": 12.0, "markerfacecolor": "none"}),
     }
     for column, (name, look, mark) in figures.items():
-        _line(axes, scale, table.column(column), names, name, look, linestyle="none", **mark)
+        _line(axes, scale, _positive(table.column(column)), names, name, look, linestyle="none", **mark)
     axes.set(xscale="log", xlabel="|Δθ|")
     axes.margins(y=0.15)
     axes.invert_yaxis()
@@ -104,6 +105,12 @@ def _line(
     width, edge = 2 * scale, 2 * scale if "markerfacecolor" in more else 0
     sizes = {"linewidth": width, "markersize": markersize * scale, "markeredgewidth": edge}
     axes.plot(x, y, label=name, color=colour(look), **{"marker": "o", **sizes, **more})
+
+
+def _positive(values: Sequence[Value]) -> NDArray[Any]:
+    """Return NaN for what a logarithmic axis has no place for: no value, and an error of nothing."""
+    numbers = np.array(values, float)
+    return np.where(numbers > 0, numbers, np.nan)
 
 
 def _name_decades(axis: Axis, names: Formatter) -> None:
