@@ -9,7 +9,6 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rollcli.files.results import Row
 from rollcli.pictures.overlay import round_step
@@ -498,22 +497,14 @@ def histogram(rows: Sequence[Row]) -> Chart:
             "hovertemplate": "%{customdata}<br>%{y} frames<extra></extra>",
         }
         data += [bars] if rolls else []
+    width, highest = float(np.ptp(edges)), int(np.histogram(shown, edges)[0].max())
+    margin = max(0.02 * width, (_FEW_BINS * step - width) / 2)  # a single bar would fill the chart
+    whole = {"dtick": 1} if highest <= _FEW_BINS else {}  # there are no half frames
+    ends = [float(edges[0]) - margin, float(edges[-1]) + margin]
     layout = {
         "barmode": "stack",
         "showlegend": [trace["name"] for trace in data] != ["ok"],
-        "xaxis": {"title": {"text": "roll, degrees"}, "range": _padded(edges, step), "zeroline": False},
-        "yaxis": {"title": {"text": "frames"}, **_counted(int(np.histogram(shown, edges)[0].max()))},
+        "xaxis": {"title": {"text": "roll, degrees"}, "range": ends, "zeroline": False},
+        "yaxis": {"title": {"text": "frames"}, "range": [0, 1.05 * max(highest, 1)], **whole},
     }
     return Chart("histogram", "How many frames have which roll", data, layout)
-
-
-def _counted(highest: int) -> dict[str, Any]:
-    """Let the axis begin at nothing, with ticks at whole frames where bars are low."""
-    return {"range": [0, 1.05 * max(highest, 1)], **({"dtick": 1} if highest <= _FEW_BINS else {})}
-
-
-def _padded(edges: NDArray[Any], step: float) -> list[float]:
-    """Widen the axis around a single bar, which would fill the chart."""
-    width = float(np.ptp(edges))
-    margin = max(0.02 * width, (_FEW_BINS * step - width) / 2)
-    return [float(edges[0]) - margin, float(edges[-1]) + margin]
