@@ -25,7 +25,7 @@ DOORS = {
     "rollcli.files.containers": "loads the reader of bags, an extra, and NumPy only for bags",
     "rollcli.run.find": "loads the reader of bags, an extra, only for them, and NumPy for an image's size",
     "rollcli.files.storage": "urllib loads only for URLs of web servers",
-    "rollcli.report.run": "loads NumPy and the charts once the request is checked",
+    "rollcli.report.run": "loads the page and its pictures once the request is checked",
     "rollcli.run.convert": "a worker's door",
     "rollcli.run.images": "matplotlib, an extra, loads only for figures",
     "rollcli.run.estimate": "a worker's door",

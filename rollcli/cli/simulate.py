@@ -7,7 +7,7 @@ import click
 from rollcli.cli.command import command, config_option, option, record
 from rollcli.cli.estimate import one_start, resume_command
 from rollcli.cli.options import running_options
-from rollcli.cli.types import DIR, FLAG, IMAGE_SIZE, POINT, SPAN, Choice, Number
+from rollcli.cli.types import DIR, FLAG, IMAGE_SIZE, POINT, Choice, Number, span
 from rollcli.run.options import RunningOptions
 from rollcli.simulate.options import (
     CROSS_SECTIONS,
@@ -35,23 +35,23 @@ simulate_options = record(
     ),
     option(
         "--roll",
-        SPAN,
+        span(-90, 90),
         "Roll of the rig against the road, degrees, drawn evenly from A to B; positive: its right end is up.",
     ),
     option(
         "--pitch",
-        SPAN,
+        span(-60, 60),
         "Pitch of the rig against the road, degrees, drawn evenly from A to B; positive: it looks down.",
     ),
     option(
         "--curvature",
-        SPAN,
+        span(-0.01, 0.01),
         "Curvature along the road, 1/m, drawn evenly from A to B; positive: a sag; negative: a crest.  "
         "[default: half of the frames flat, half within +-0.001; bare is flat]",
     ),
     option(
         "--bend",
-        SPAN,
+        span(-0.02, 0.02),
         "Horizontal curvature of the road, 1/m, drawn evenly from A to B; positive: to the right; 0: a "
         "straight road.  [default: half of the roads straight, half within +-0.004; bare is straight]",
     ),
@@ -64,19 +64,19 @@ simulate_options = record(
     ),
     option(
         "--crossfall",
-        SPAN,
+        span(0, 15),
         "Slope of a cross section that is not flat, per cent, drawn evenly from A to B; of a crown or "
         f"dish at its edges.  [default: {CROSSFALL[0]:g}:{CROSSFALL[1]:g}]",
     ),
     option(
         "--gutter",
-        SPAN,
+        span(0, 50),
         f"How much more the outer {100 * GUTTER_WIDTH:g} cm on each side fall outward, per cent, drawn "
         "evenly from A to B.",
     ),
     option(
         "--kerb",
-        SPAN,
+        span(0, 0.5),
         "Height of kerbs and pavements (open, street) above the road's edge, metres, drawn evenly from "
         f"A to B.  [default: {KERB[0]:g}:{KERB[1]:g}]",
     ),
@@ -107,11 +107,15 @@ simulate_options = record(
     ),
     option(
         "--principal-offset",
-        SPAN,
+        span(-16384, 16384),
         "Offset of the principal point in each direction, pixels, drawn evenly from A to B.",
     ),
     option("--baseline", Number("M", above=0), "Distance of the cameras, metres."),
-    option("--height", SPAN, "Height of the left camera above the road, metres, drawn evenly from A to B."),
+    option(
+        "--height",
+        span(0.01, 1000),
+        "Height of the left camera above the road, metres, drawn evenly from A to B.",
+    ),
     option(
         "--noise",
         Number("SIGMA", at_least=0),

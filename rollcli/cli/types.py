@@ -203,10 +203,15 @@ def _whole_numbers(value: Any, separators: str) -> tuple[int, ...]:
     return numbers
 
 
-def _span(value: Any) -> tuple[float, float]:
-    ends = _numbers(value, ":")
-    _require(len(ends) < 3 and ends[0] <= ends[-1])
-    return ends[0], ends[-1]
+def span(least: float, most: float) -> Parsed:
+    """Return the type of a range of numbers within bounds; one number is a range too."""
+
+    def parse(value: Any) -> tuple[float, float]:
+        ends = _numbers(value, ":")
+        _require(len(ends) < 3 and least <= ends[0] <= ends[-1] <= most)
+        return ends[0], ends[-1]
+
+    return Parsed("A:B", parse, f"A:B with {least:g} <= A <= B <= {most:g}, nor one such number", ":")
 
 
 def _wide_span(value: Any) -> tuple[float, float]:
@@ -251,11 +256,10 @@ def _turns(value: Any) -> tuple[float, float, float]:
 
 def _size(value: Any) -> tuple[int, int]:
     width, height = _whole_numbers(value, "xX×")
-    _require(max(width, height) < 10**6)
+    _require(min(width, height) >= 16 and max(width, height) <= 16384)
     return width, height
 
 
-SPAN = Parsed("A:B", _span, "A:B with A <= B, such as -5:5, nor a single number", ":")
 WIDE_SPAN = Parsed("A:B", _wide_span, "A:B with A < B, such as -0.1:0.1")
 ANY_NUMBER = Parsed("VALUE", _any_number, "a number")  # that a pixel may hold: also nan and inf
 ROI = Parsed("X0,Y0,X1,Y1", _roi, "X0,Y0,X1,Y1 in whole pixels with X0 < X1 and Y0 < Y1")
@@ -265,4 +269,4 @@ SHARD = Parsed("I/N", _shard, "I/N with I from 1 to N, such as 2/8", "/")
 TURNS = Parsed(  # at most 1000 angles
     "A:B:STEP", _turns, "A:B:STEP in degrees with -90 <= A <= B <= 90, such as -20:20:2", ":"
 )
-IMAGE_SIZE = Parsed("WxH", _size, "WxH in whole pixels, such as 640x480", "x")
+IMAGE_SIZE = Parsed("WxH", _size, "WxH in whole pixels, 16 to 16384 each way, such as 640x480", "x")

@@ -3,7 +3,7 @@
 import json
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -33,12 +33,12 @@ _MOST = 50_000  # pixels of a frame at a distance: more would not change the fig
 
 @dataclass(frozen=True)
 class Accuracy:
-    """How far one quantity of a result is from known values: roll and pitch, degrees, or height, metres.
+    """How far one quantity of a result is from known values: angles, degrees, or heights, metres.
 
     Attributes
     ----------
     count : int
-        Frames compared: they have a value, and a known one.
+        Frames compared: they have a value, and a known one. Of heights over the road each has many.
     median, p95, worst : float or None
         Of abs(error); None where nothing was compared.
     worst_file : str
@@ -65,29 +65,6 @@ class Accuracy:
 
 
 @dataclass(frozen=True)
-class HeightsAt:
-    """How far heights are from true ones at a distance, metres.
-
-    Attributes
-    ----------
-    distance : int
-        Of the pixels compared along the optical axis, give or take a fifth.
-    frames : int
-        How many have such pixels.
-    median, p95 : float
-        Of abs(error).
-    bias : float
-        The mean error.
-    """
-
-    distance: int
-    frames: int
-    median: float
-    p95: float
-    bias: float
-
-
-@dataclass(frozen=True)
 class Comparison:
     """A result against known values.
 
@@ -102,8 +79,9 @@ class Comparison:
         Rows of the result whose angle is not known.
     pitch, height : Accuracy or None
         None where the truth or the result has none.
-    heights : tuple of HeightsAt
-        Of the heights over the road at some distances; empty where the truth or the run has none.
+    heights : mapping of int to Accuracy
+        Of the heights over the road by their distance along the optical axis, metres, give or take a fifth;
+        empty where the truth or the run has none.
     """
 
     roll: Accuracy
@@ -113,7 +91,7 @@ class Comparison:
     no_truth: tuple[str, ...]
     pitch: Accuracy | None = None
     height: Accuracy | None = None
-    heights: tuple[HeightsAt, ...] = ()
+    heights: Mapping[int, Accuracy] = field(default_factory=dict)
 
 
 def assess(
@@ -174,25 +152,29 @@ def _accuracy(
     if not found:
         return Accuracy()
     errors = np.array([error for _, error, _ in found])
-    sizes = np.abs(errors)
-    worst = int(sizes.argmax())
+    worst = int(np.abs(errors).argmax())
     inside = [abs(error) <= half_width for _, error, half_width in found if half_width is not None]
+    coverage = float(np.mean(inside)) if inside else None
+    figures = _figures(errors, len(found))
+    return replace(figures, worst_file=found[worst][0], coverage_95=coverage, intervals=len(inside))
+
+
+def _figures(errors: NDArray[np.float64], count: int) -> Accuracy:
+    """Sum up errors of so many frames."""
+    sizes = np.abs(errors)
     return Accuracy(
-        count=len(found),
+        count=count,
         median=float(np.median(sizes)),
         p95=float(np.percentile(sizes, 95)),
-        worst=float(sizes[worst]),
-        worst_file=found[worst][0],
+        worst=float(sizes.max()),
         bias=float(errors.mean()),
         share_above_0_5_deg=float(np.mean(sizes > LARGE_ERROR_DEG)),
-        coverage_95=float(np.mean(inside)) if inside else None,
-        intervals=len(inside),
     )
 
 
 def assess_heights(
     rows: Sequence[Row], known: Mapping[str, KnownPose], heights: str, truth: str
-) -> tuple[HeightsAt, ...] | None:
+) -> dict[int, Accuracy] | None:
     """Compare the heights over the road with true ones at `DISTANCES_M`, matched by stem.
 
     Parameters
@@ -207,8 +189,9 @@ def assess_heights(
 
     Returns
     -------
-    tuple of HeightsAt, or None
-        A distance that no frame shows is left out. None where no frame has heights in metres and true ones.
+    dict of int to Accuracy, or None
+        By distance, metres. One that no frame shows is left out. None where no frame has heights in metres
+        and true ones.
 
     Raises
     ------
@@ -232,13 +215,7 @@ def assess_heights(
                 errors[distance].append(found)
     if not compared:
         return None
-    return tuple(_heights_at(distance, parts) for distance, parts in errors.items() if parts)
-
-
-def _heights_at(distance: int, parts: Sequence[NDArray[np.float64]]) -> HeightsAt:
-    off = np.concatenate(parts)
-    median, p95 = np.percentile(np.abs(off), (50, 95)).tolist()
-    return HeightsAt(distance, len(parts), median, p95, float(off.mean()))
+    return {at: _figures(np.concatenate(parts), len(parts)) for at, parts in errors.items() if parts}
 
 
 def _height_errors(
@@ -267,7 +244,6 @@ def _maps_of(folder: str) -> dict[str, str]:
 _NAMES = {"no_angle", "no_truth"}
 _DIGITS = 6
 _OF_POSE = ("count", "median", "p95", "worst", "bias", "coverage_95")
-_OF_HEIGHTS = ("frames", "median", "p95", "bias")
 _LENGTHS = {"median", "p95", "worst", "bias"}  # what has the unit of the quantity
 
 
@@ -289,15 +265,11 @@ def as_table(found: Comparison) -> str:
                 *_lines(f"{name}, ", part, unit),
                 (f"{name}, in its interval", _percent(part.coverage_95, part.intervals)),
             ]
-    for at in found.heights:
-        name = f"heights, {at.distance} m"
-        lines += [
-            (f"{name}, frames", str(at.frames)),
-            (f"{name}, median", f"{at.median:.4f} m"),
-            (f"{name}, 95 %", f"{at.p95:.4f} m"),
-            (f"{name}, signed", f"{at.bias:.4f} m"),
-        ]
-    return "".join(f"{name:26}{value}\n" for name, value in lines)
+    for distance, part in found.heights.items():
+        name = f"heights, {distance} m, "
+        lines += [(f"{name}frames compared", str(part.count)), *_lines(name, part, "m")]
+    width = 2 + max(len(name) for name, _ in lines)
+    return "".join(f"{name:{width}}{value}\n" for name, value in lines)
 
 
 def _lines(name: str, part: Accuracy, unit: str, worst: str = "") -> list[tuple[str, str]]:
@@ -335,7 +307,6 @@ FORMATS = {"table": as_table, "csv": as_csv, "json": as_json}
 
 def _values(found: Comparison) -> dict[str, Any]:
     """Return every figure by its column."""
-    heights = {at.distance: at for at in found.heights}
     values = {
         **_named(found.roll, [field.name for field in fields(Accuracy)], "", "deg"),
         **{name: getattr(found, name) for name in ("ok", "suspect", "no_angle", "no_truth")},
@@ -343,11 +314,13 @@ def _values(found: Comparison) -> dict[str, Any]:
         **_named(found.height, _OF_POSE, "height_", "m"),
     }
     for distance in DISTANCES_M:
-        values |= _named(heights.get(distance), _OF_HEIGHTS, f"over_road_at_{distance}_m_", "m")
+        part, before = found.heights.get(distance), f"over_road_at_{distance}_m_"
+        values[f"{before}frames"] = None if part is None else part.count
+        values |= _named(part, ("median", "p95", "bias"), before, "m")
     return {name: round(v, _DIGITS) if isinstance(v, float) else v for name, v in values.items()}
 
 
-def _named(part: Accuracy | HeightsAt | None, names: Iterable[str], before: str, unit: str) -> dict[str, Any]:
+def _named(part: Accuracy | None, names: Iterable[str], before: str, unit: str) -> dict[str, Any]:
     return {
         f"{before}{name}{f'_{unit}' if name in _LENGTHS else ''}": getattr(part, name, None) for name in names
     }
@@ -387,20 +360,22 @@ def run_accuracy(options: AccuracyOptions) -> ExitStatus:
     return ExitStatus.FRAMES_FAILED if found.no_angle else ExitStatus.DONE
 
 
-def _heights(read: Result, known: Mapping[str, KnownPose], options: AccuracyOptions) -> tuple[HeightsAt, ...]:
+def _heights(
+    read: Result, known: Mapping[str, KnownPose], options: AccuracyOptions
+) -> Mapping[int, Accuracy]:
     """Compare the heights over the road of a folder that was named, or of that of the run."""
     heights, beside = options.heights, options.truth.rpartition("/")[0] or "."
     if heights is None:
         heights = recorded_options(read.run, run_path(options.result)).images.heights
         if heights is None or not (is_folder(heights) and is_folder(f"{beside}/heights")):
-            return ()
+            return {}
     found = assess_heights(read.rows, known, heights, beside)
     if found is None and not options.running.quiet:
         say(
             f"{heights}: no heights are compared: they need metres (estimate --calib), and the truth columns "
             "focal_px and baseline_m"
         )
-    return found or ()
+    return found or {}
 
 
 def _name_unmatched(found: Comparison, options: AccuracyOptions) -> None:

@@ -24,14 +24,8 @@ if TYPE_CHECKING:
     from rollcli.evaluate.experiments import Findings, Times
 
 PAGE = "paper.html"
-FIGURES = {  # by the chart of the page
-    "iterations": "table1_iterations",
-    "runtime": "table2_runtime",
-    "lambda0": "fig3_lambda0",
-    "accuracy": "fig6_accuracy",
-    "methods": "methods_accuracy",
-}
-TABLES = ("maps", *FIGURES.values())
+FIGURES = ("table1_iterations", "table2_runtime", "fig3_lambda0", "fig6_accuracy", "methods_accuracy")
+TABLES = ("maps", *FIGURES)
 
 
 def run_paper(options: PaperOptions) -> ExitStatus:
@@ -60,7 +54,7 @@ def run_paper(options: PaperOptions) -> ExitStatus:
     frames = map_frames(Named(options.inputs, running.quiet, region=options.region, skip=[folder]))
     truth = _known_angles(frames, options)
     kind = options.experiments.figure
-    names = [f"{name}.{kind}" for name in FIGURES.values()] if kind is not None else []
+    names = [f"{name}.{kind}" for name in FIGURES] if kind is not None else []
     writes = [str(Path(folder, name)) for name in (*(f"{name}.csv" for name in TABLES), *names, PAGE)]
     reads = [path for frame in frames for path in frame.reads()]
     if listed_only(reads, writes, options.running):
@@ -125,16 +119,18 @@ def _time(
 def _write(
     found: "list[Findings]", failed: list[tuple[str, str]], times: "list[Times]", options: PaperOptions
 ) -> None:
-    from rollcli.evaluate.paper_page import all_tables, charts, paper_page
+    from rollcli.evaluate.paper_figures import paper_figures
+    from rollcli.evaluate.paper_page import all_tables, paper_page
     from rollcli.pictures.figures import PRINT
     from rollcli.report.figures import chart_file
 
     tables = all_tables(found, failed, times)
     folder = Path(options.experiments.output)
-    page = paper_page(tables, found, failed, times, options)
+    figures = paper_figures(tables)
+    page = paper_page(tables, figures, found, failed, times, options)
     written = {folder / f"{name}.csv": tables[name].csv() for name in TABLES} | {folder / PAGE: page}
     if (kind := options.experiments.figure) is not None:
-        for name, chart in charts(tables).items():
-            written[folder / f"{FIGURES[name]}.{kind}"] = chart_file(chart, kind, PRINT)
+        for name, figure in figures.items():
+            written[folder / f"{name}.{kind}"] = chart_file(figure, kind, PRINT)
     for path, data in written.items():
         write_output(str(path), data, overwrite=options.running.overwrite)

@@ -3,17 +3,18 @@
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import groupby
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rollcli import __version__
-from rollcli.estimator.request import LAMBDA0
 from rollcli.evaluate.experiments import DELTAS, FORMS, LAMBDAS, METHODS, SOLVERS, Findings, Times
 from rollcli.evaluate.options import PaperOptions
 from rollcli.files.results import csv_table
-from rollcli.report.page import Chart, render_page, scatter
+from rollcli.report.page import render_page
+
+if TYPE_CHECKING:
+    from rollcli.report.figures import Drawing
 
 Value = str | int | float | None
 
@@ -186,128 +187,12 @@ def all_tables(
     return {table.name: table for table in tables}
 
 
-_COLOURS = {"gd": "@c1", "gss": "@c2", "exact": "@c3"}
-_DEGREES = [f"{delta:g}°" for delta in DELTAS_DEG]
-_DECADES = ("10 µs", "100 µs", "1 ms", "10 ms", "100 ms", "1 s", "10 s")
-_DELTA_AXIS = {"title": {"text": "δ<sub>θ</sub>"}, "type": "category"}
-
-
-def charts(tables: Mapping[str, Table]) -> dict[str, Chart]:
-    """Return every chart of the page, by its name."""
-    made = (
-        _iterations_chart(tables["table1_iterations"]),
-        _runtime(tables["table2_runtime"]),
-        _sweep(tables["fig3_lambda0"]),
-        _solvers(tables["fig6_accuracy"]),
-        _methods_chart(tables["methods_accuracy"]),
-    )
-    return {chart.name: chart for chart in made}
-
-
-def _error_axis(title: str) -> dict[str, Any]:
-    return {"title": {"text": title}, "type": "log", "ticksuffix": "°", "exponentformat": "none", "dtick": 1}
-
-
-def _line(name: str, x: Any, y: Any, colour: str, **more: Any) -> dict[str, Any]:
-    look = {"line": {"color": colour, "width": 2}, "marker": {"color": colour, "size": 8}}
-    return scatter(name, "lines+markers", x, y, **look) | more
-
-
-def _mark(colour: str, size: int, symbol: str) -> dict[str, Any]:
-    return {"symbol": symbol, "size": size, "color": colour, "line": {"width": 2, "color": colour}}
-
-
-def _iterations_chart(table: Table) -> Chart:
-    data = []
-    for solver in ("gss", "gd"):
-        rows, colour, name = table.where(solver=solver), _COLOURS[solver], SOLVER_NAMES[solver]
-        ours, paper = rows.column("mean"), rows.column("paper")
-        data.append(_line(name, _DEGREES, ours, colour, hovertemplate="%{y:.2f} iterations"))
-        circles = {"mode": "markers", "marker": _mark(colour, 15, "circle-open"), "hovertemplate": "%{y}"}
-        data.append(_line(f"{name}, paper", _DEGREES, paper, colour, **circles))
-    layout = {"xaxis": _DELTA_AXIS, "yaxis": {"title": {"text": "iterations"}, "rangemode": "tozero"}}
-    return Chart(
-        "iterations", "Iterations of both solvers against the tolerance, beside the paper's", data, layout
-    )
-
-
-def _runtime(table: Table) -> Chart:
-    forms = {
-        "paper_s": ("paper (Matlab)", "@c6"),
-        "textbook_s": ("n × 3 form", "@c4"),
-        "with_pass_s": ("moments, with the pass over the map", "@c3"),
-        "moments_s": ("moments", "@c1"),
-    }
-    data = []
-    for column, (name, colour) in forms.items():
-        for solver in ("gss", "gd"):
-            where = [[SOLVER_NAMES[solver]] * len(_DEGREES), _DEGREES]
-            more = {"legendgroup": name, "showlegend": solver == "gss", "hovertemplate": "%{y:.3s}s"}
-            data.append(_line(name, where, table.where(solver=solver).column(column), colour, **more))
-    decades = {10.0**k: text for k, text in zip(range(-5, 2), _DECADES, strict=True)}
-    ticks = {"tickvals": list(decades), "ticktext": list(decades.values())}
-    seconds = {"title": {"text": "run time"}, "type": "log", **ticks}
-    label = "Run time of both solvers in three forms and in the paper, logarithmic"
-    return Chart("runtime", label, data, {"yaxis": seconds})
-
-
-def _sweep(table: Table) -> Chart:
-    data = []
-    for k, delta in enumerate(DELTAS_DEG):
-        rows = table.where(delta_deg=delta)
-        name = f"δ<sub>θ</sub> = {delta:g}°"
-        more = {"mode": "lines", "hovertemplate": "λ(0) = %{x}: %{y:.2f} iterations"}
-        data.append(_line(name, rows.column("lambda0"), rows.column("mean"), f"@c{k + 1}", **more))
-    dots = {"color": "@muted", "width": 1, "dash": "dot"}
-    ends = {"x0": LAMBDA0, "x1": LAMBDA0, "y0": 0, "y1": 1, "yref": "paper"}
-    papers = {"type": "line", **ends, "line": dots}
-    place = {"x": LAMBDA0, "y": 0, "yref": "paper", "xanchor": "left", "yanchor": "bottom"}
-    text = {**place, "text": "26", "showarrow": False, "font": {"color": "@muted"}}
-    layout = {
-        "xaxis": {"title": {"text": "λ(0)"}, "range": [0, 101]},
-        "yaxis": {"title": {"text": "iterations, mean over the maps"}, "rangemode": "tozero"},
-        "shapes": [papers],
-        "annotations": [text],
-    }
-    return Chart("lambda0", "Iterations of gradient descent against the first learning rate", data, layout)
-
-
-def _solvers(table: Table) -> Chart:
-    data = []
-    for solver, name in SOLVER_NAMES.items():
-        rows = table.where(solver=solver)
-        # two of them often coincide: the last is drawn open, around the other
-        marker = {"symbol": "circle-open", "size": 15, "color": _COLOURS[solver]} if solver == "exact" else {}
-        more = {"hovertemplate": "%{y:.5f}°"} | ({"marker": marker} if marker else {})
-        data.append(_line(name, _DEGREES, rows.column("mean_deg"), _COLOURS[solver], **more))
-    layout = {"xaxis": _DELTA_AXIS, "yaxis": _error_axis("mean |Δθ|")}
-    return Chart(
-        "accuracy", "Mean error of three solvers after known rotations, against the tolerance", data, layout
-    )
-
-
-def _methods_chart(table: Table) -> Chart:
-    names = [METHOD_NAMES[str(method)] for method in table.column("method")]
-    figures = {
-        "median_deg": ("median", "circle", "@c1"),
-        "p95_deg": ("95th percentile", "diamond", "@c2"),
-        "worst_deg": ("worst", "circle-open", "@c5"),
-    }
-    hover = {"hovertemplate": "%{x:.4f}°"}
-    data = [
-        scatter(name, "markers", table.column(column), names, marker=_mark(colour, 12, symbol), **hover)
-        for column, (name, symbol, colour) in figures.items()
-    ]
-    layout = {"xaxis": _error_axis("|Δθ|"), "yaxis": {"autorange": "reversed"}}
-    label = "Median, 95th percentile and worst error of five methods after known rotations"
-    return Chart("methods", label, data, layout)
-
-
 _SHOWN = 50  # maps in the page's own list; the CSV has all
 
 
 def paper_page(
     tables: Mapping[str, Table],
+    charts: "Mapping[str, Drawing]",
     found: Sequence[Findings],
     failed: Sequence[tuple[str, str]],
     times: Sequence[Times],
@@ -320,11 +205,10 @@ def paper_page(
         title=f"The paper's experiments on {_count(len(found), 'map')}",
         version=__version__,
         deltas=[f"{delta:g}°" for delta in DELTAS_DEG],
-        charts=charts(tables),
+        charts=charts,
         iterations=_iterations(tables["table1_iterations"]),
         runtimes=_runtimes(tables["table2_runtime"]),
         methods=_methods(tables["methods_accuracy"]),
-        lowest=_lowest(tables["fig3_lambda0"]),
         maps=[_map(each) for each in found[:_SHOWN]],
         more_maps=max(0, len(found) - _SHOWN),
         failed=failed,
@@ -400,26 +284,6 @@ def _methods(table: Table) -> list[tuple[str, ...]]:
         )
         for method, *figures, _, missing in table.rows
     ]
-
-
-def _lowest(table: Table) -> list[tuple[str, str, str]]:
-    """Return delta, the fewest mean iterations and the rates with which every map takes them, those at 26."""
-    lines = []
-    for delta in DELTAS_DEG:
-        on_all = table.where(delta_deg=delta, short=0)
-        means = dict(zip(_numbers(on_all, "lambda0"), _numbers(on_all, "mean"), strict=True))
-        best = min(means.values(), default=None)
-        reach = [rate for rate, mean in means.items() if mean == best]
-        fewest = "–" if best is None else f"{best:.2f} at λ(0) = {_spans(reach)}"
-        lines.append((f"{delta:g}°", fewest, f"{means[LAMBDA0]:.2f}" if LAMBDA0 in means else "–"))
-    return lines
-
-
-def _spans(rates: Sequence[float]) -> str:
-    """Return runs of whole numbers, such as "8–26, 30"."""
-    runs = groupby(enumerate(map(int, rates)), key=lambda each: each[1] - each[0])
-    ends = [[each[0][1], each[-1][1]] for _, run in runs for each in [list(run)]]
-    return ", ".join(f"{first}" if first == last else f"{first}–{last}" for first, last in ends)
 
 
 def _map(found: Findings) -> dict[str, Any]:

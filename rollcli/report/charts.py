@@ -9,16 +9,14 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rollcli.files.results import Row
 from rollcli.pictures.overlay import round_step
-from rollcli.report.options import ALIGNED, HISTOGRAM, chart_names
 from rollcli.report.page import Chart, scatter
 from rollcli.report.summary import degrees, with_interval
 from rollcli.rig.drive.assess import RigAssessment, seconds_of
-from rollcli.rig.quantities import ALIGNMENT, HEIGHT, QUANTITIES, ROLL, Quantity
-from rollcli.rig.words import answer, decimals
+from rollcli.rig.quantities import ALIGNMENT, QUANTITIES, ROLL, Quantity
+from rollcli.rig.words import answer
 from rollcli.stereo.misalignment import Misalignment
 
 Trace = dict[str, Any]
@@ -69,7 +67,7 @@ class FrameAxis:
         return {"title": {"text": "frame"}, "range": span, "zeroline": False, "tickformat": ",d", **few}
 
 
-def frame_axis(rows: Sequence[Row], rig: RigAssessment | None = None) -> FrameAxis:
+def frame_axis(rows: Sequence[Row], rig: RigAssessment) -> FrameAxis:
     """Return the axis of rows: time where all frames have stamps that ascend, and pauses do not fill it.
 
     What stands for the broken end of a recording has no stamp, and stands where the frame before it does.
@@ -80,8 +78,7 @@ def frame_axis(rows: Sequence[Row], rig: RigAssessment | None = None) -> FrameAx
     if not (len(rows) and known[0] and (known | ends).all()):
         return FrameAxis(len(rows))
     seconds = seconds[np.maximum.accumulate(np.where(known, np.arange(len(rows)), 0))]
-    drives = [seconds[drive.frames] for drive in rig.drives] if rig is not None else [seconds]
-    taken = sum(float(np.ptp(each)) for each in drives if len(each))
+    taken = sum(float(np.ptp(seconds[drive.frames])) for drive in rig.drives if len(drive.frames))
     whole = float(seconds[-1] - seconds[0])
     if (np.diff(seconds) < 0).any() or not taken > _LEAST_SHARE * whole:
         return FrameAxis(len(rows))
@@ -117,6 +114,7 @@ def rig_traces(
         As plotly takes them; empty ones are left out.
     """
     band, means, jumps = _trace("mounting, 95 %"), _trace("mounting"), _trace("jump")
+    name = quantity.name.replace("_", " ")
     band |= {"fill": "toself", "fillcolor": "@band", "line": {"width": 0}, "hoverinfo": "skip"}
     means["line"] = {"color": "@c3", "width": 2}
     jumps["line"] = {"color": "@error", "width": 1.5, "dash": "dash"}
@@ -126,7 +124,7 @@ def rig_traces(
             if segment.mean.value is None or segment.first == segment.last:  # a frame alone is its own mean
                 continue
             first, last = (axis.at(int(drive.frames[place]) + 1) for place in (segment.first, segment.last))
-            said = f"mounting {quantity.name} {answer(segment.end, quantity)}, of {segment.used:,} frames"
+            said = f"mounting {name} {answer(segment.end, quantity)}, of {segment.used:,} frames"
             level = [each.value or 0.0 for each in (segment.begin, segment.end)]
             _add(means, [first, last], level, said)
             if segment.begin.ci95 is not None and segment.end.ci95 is not None:
@@ -155,7 +153,6 @@ _LONGEST = 44  # characters in a line, so that a label fits a narrow screen
 _LINES = 5  # of a reason; the table and the gallery show all of it
 _BEYOND = 0.35  # a suspect value may widen the view by this share of the others' range, and by half a degree
 _WIDEST = 1.0  # degrees: a wider interval is seen to leave the view
-_DEGREE_IN_METRES = 0.1  # what of a height is as much as a degree of an angle
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,24 +179,12 @@ class Value:
     row: Row
 
 
-def values_of(rows: Sequence[Row], quantity: Quantity, axis: FrameAxis | None = None) -> list[Value]:
+def values_of(rows: Sequence[Row], quantity: Quantity, axis: FrameAxis) -> list[Value]:
     """Return the value of each frame."""
-    at = (axis or FrameAxis(len(rows))).at
     return [
-        Value(number, at(number), getattr(row, quantity.column), getattr(row, quantity.ci_column), row)
+        Value(number, axis.at(number), getattr(row, quantity.column), getattr(row, quantity.ci_column), row)
         for number, row in enumerate(rows, 1)
     ]
-
-
-def in_words(each: Value, quantity: Quantity) -> str:
-    """Return a value with its interval and unit; "" where there is none."""
-    if each.value is None:
-        return ""
-    if quantity is not HEIGHT:
-        return with_interval(each.value, each.half_width)
-    digits = decimals(each.half_width)
-    half = "" if each.half_width is None else f" ± {each.half_width:.{digits}f}"
-    return f"{each.value:.{digits}f}{half}{quantity.unit}"
 
 
 def label(row: Row, value: str) -> str:
@@ -228,8 +213,8 @@ def view(rows: Sequence[Row], quantity: Quantity = ROLL) -> tuple[float, float]:
     tuple of float
         Degrees or metres, the lower end first.
     """
-    unit = _DEGREE_IN_METRES if quantity is HEIGHT else 1.0
-    there = [each for each in values_of(rows, quantity) if each.value is not None]
+    unit = quantity.scale
+    there = [each for each in values_of(rows, quantity, FrameAxis(len(rows))) if each.value is not None]
     if not there:
         return -unit, unit
     low, high = _span([each for each in there if each.row.status == "ok"] or there, unit)
@@ -240,10 +225,10 @@ def view(rows: Sequence[Row], quantity: Quantity = ROLL) -> tuple[float, float]:
     return round(low - margin, 3), round(high + margin, 3)
 
 
-def outside(rows: Sequence[Row], quantity: Quantity = ROLL) -> int:
-    """Return how many values lie outside of the view."""
-    low, high = view(rows, quantity)
-    return sum(each.value is not None and not low <= each.value <= high for each in values_of(rows, quantity))
+def outside(rows: Sequence[Row]) -> int:
+    """Return how many angles lie outside of the view."""
+    low, high = view(rows)
+    return sum(row.roll_deg is not None and not low <= row.roll_deg <= high for row in rows)
 
 
 def _span(values: Iterable[Value], unit: float) -> tuple[float, float]:
@@ -270,30 +255,31 @@ _VALUES = ("x", "y", "customdata")
 Values = Sequence[Value]
 
 
-def all_charts(rows: Sequence[Row], rig: RigAssessment | None = None) -> dict[str, Chart]:
-    """Return the charts of `chart_names` by their names."""
-    charts = {}
-    for name in chart_names(rows):
-        if name == HISTOGRAM:
-            charts[name] = histogram(rows)
-        elif name == ALIGNED:
-            charts[name] = alignment(rows, rig)
-        else:
-            quantity = next(each for each in QUANTITIES if each.name == name)
-            charts[name] = chart_over_frames(rows, quantity, rig)
-    return charts
+def all_charts(rows: Sequence[Row], rig: RigAssessment) -> dict[str, Chart]:
+    """Return the charts by their names, `roll` first.
+
+    Pitch and height have charts where a calibration has given them, the histogram where more than one frame
+    has an angle, and how the right view lies where more than one pair was measured.
+    """
+    known = [each for each in QUANTITIES if any(getattr(row, each.column) is not None for row in rows)]
+    charts = [chart_over_frames(rows, each, rig) for each in dict.fromkeys([ROLL, *known])]
+    if sum(row.roll_deg is not None for row in rows) > 1:
+        charts.append(histogram(rows))
+    if sum(row.right_lower_px is not None for row in rows) > 1:
+        charts.append(alignment(rows, rig))
+    return {chart.name: chart for chart in charts}
 
 
-def alignment(rows: Sequence[Row], rig: RigAssessment | None = None) -> Chart:
+def alignment(rows: Sequence[Row], rig: RigAssessment) -> Chart:
     """Return how the right view lies over the frames: the shift of rows by each part at its largest, px.
 
-    One unit for all parts tells at a glance which of them matters. Dots are pairs; with `rig`, lines are what
-    the drive says, with its drifts and jumps.
+    One unit for all parts tells at a glance which of them matters. Dots are pairs; lines are what the drive
+    says, with its drifts and jumps.
 
     Parameters
     ----------
     rows : sequence of Row
-    rig : RigAssessment, optional
+    rig : RigAssessment
 
     Returns
     -------
@@ -322,10 +308,14 @@ def alignment(rows: Sequence[Row], rig: RigAssessment | None = None) -> Chart:
             "hovertemplate": "%{customdata}<extra></extra>",
         }
         data.append(dots)
-        if rig is not None and scale:
-            line = _level_line(rig, quantity, float(np.median(scale)), axis)
-            line |= {"name": f"{words}, over the drive", "showlegend": False}
-            data.append({**line, "line": {"color": colour, "width": 2}})
+        if scale:
+            factor, line = float(np.median(scale)), {"color": colour, "width": 2}
+            look = {"name": f"{words}, over the drive", "showlegend": False, "line": line}
+            data += [
+                {**trace, **look, "y": [each if each is None else factor * each for each in trace["y"]]}
+                for trace in rig_traces(rig, quantity, (0.0, 0.0), axis)
+                if trace["name"] == "mounting"
+            ]
     largest = max((abs(each) for trace in data for each in trace["y"] if each is not None), default=0.0)
     end = 1.1 * max(largest, 0.5)
     layout = {
@@ -334,7 +324,7 @@ def alignment(rows: Sequence[Row], rig: RigAssessment | None = None) -> Chart:
         "xaxis": axis.layout(),
         "yaxis": {"title": {"text": "shift of rows, px"}, "range": [-end, end], "zeroline": True},
     }
-    return Chart(ALIGNED, f"How the right view lies over {len(rows)} frames, px", data, layout)
+    return Chart("alignment", f"How the right view lies over {len(rows)} frames, px", data, layout)
 
 
 def _shift_of(place: int, row: Row) -> float:
@@ -344,32 +334,17 @@ def _shift_of(place: int, row: Row) -> float:
     return Misalignment.of_values(unit, height, width).shifts(height, width)[place]
 
 
-def _level_line(rig: RigAssessment, quantity: Quantity, scale: float, axis: FrameAxis) -> Trace:
-    """Return the level of each segment of each drive, from its first frame to its last."""
-    trace = _trace(quantity.name)
-    for drive in rig.drives:
-        found = drive.quantities.get(quantity.name)
-        for segment in found.segments if found is not None else ():
-            if segment.begin.value is not None and segment.end.value is not None:
-                ends = [axis.at(int(drive.frames[place]) + 1) for place in (segment.first, segment.last)]
-                said = f"{quantity.name.replace('_', ' ')} {answer(segment.end, quantity)}"
-                _add(trace, ends, [scale * segment.begin.value, scale * segment.end.value], said)
-    return trace
-
-
-def chart_over_frames(
-    rows: Sequence[Row], quantity: Quantity = ROLL, rig: RigAssessment | None = None
-) -> Chart:
+def chart_over_frames(rows: Sequence[Row], quantity: Quantity, rig: RigAssessment) -> Chart:
     """Return the value of each frame: a line, its interval as a band, suspect and failed frames marked.
 
-    With `rig`, its segments, drifts and jumps too. A line neither bridges a suspect frame
+    The segments, drifts and jumps of the rig too. A line neither bridges a suspect frame
     nor leads from one drive to another.
 
     Parameters
     ----------
     rows : sequence of Row
     quantity : Quantity
-    rig : RigAssessment, optional
+    rig : RigAssessment
 
     Returns
     -------
@@ -382,7 +357,7 @@ def chart_over_frames(
     suspect = [each for each in values if each.row.status == "suspect" and each.value is not None]
     failed = [each for each in values if each.row.status == "error"]
     sure = [each for each in values if each.row.status == "ok" and each.value is not None]
-    starts = set() if rig is None else drive_starts(rig)
+    starts = drive_starts(rig)
     many = len(rows) > _MANY
     # what is sure lies on top: suspect marks of a long run would hide it
     data = [
@@ -394,7 +369,7 @@ def chart_over_frames(
     data = [trace for trace in data if trace["x"]]  # plotly's legend stumbles over what is empty
     for trace in data:
         trace["marker"] = {"size": 5 if many else 8, **trace.get("marker", {})}
-    data += [] if rig is None else rig_traces(rig, quantity, ends, axis)
+    data += rig_traces(rig, quantity, ends, axis)
     unit = _AXIS_UNITS[quantity.suffix]
     layout = {
         "hovermode": "closest",
@@ -456,16 +431,19 @@ def _suspect(values: Values, quantity: Quantity, *, bars: bool) -> Trace:
 def _failed(values: Values, quantity: Quantity) -> Trace:
     """Along the lower edge, since they have no value."""
     cross = {"color": "@error", "symbol": "x-thin", "line": {"color": "@error", "width": 2}}
-    points = {**_points(values, quantity), "y": [_FAILED_AT] * len(values), "yaxis": "y2"}
+    labels = [label(each.row, "") for each in values]
+    look = {"y": [_FAILED_AT] * len(values), "yaxis": "y2", "customdata": labels}
+    points = _points(values, quantity) | look
     return {"mode": "markers", "name": "failed", "legendrank": 1002, "marker": cross, **points}
 
 
 def _points(values: Values, quantity: Quantity) -> Trace:
+    said = [with_interval(each.value, each.half_width, quantity) for each in values]
     return {
         "type": "scatter",
         "x": [each.x for each in values],
         "y": [each.value for each in values],
-        "customdata": [label(each.row, in_words(each, quantity)) for each in values],
+        "customdata": [label(each.row, words) for each, words in zip(values, said, strict=True)],
         "hovertemplate": "%{customdata}<extra></extra>",
     }
 
@@ -519,22 +497,14 @@ def histogram(rows: Sequence[Row]) -> Chart:
             "hovertemplate": "%{customdata}<br>%{y} frames<extra></extra>",
         }
         data += [bars] if rolls else []
+    width, highest = float(np.ptp(edges)), int(np.histogram(shown, edges)[0].max())
+    margin = max(0.02 * width, (_FEW_BINS * step - width) / 2)  # a single bar would fill the chart
+    whole = {"dtick": 1} if highest <= _FEW_BINS else {}  # there are no half frames
+    ends = [float(edges[0]) - margin, float(edges[-1]) + margin]
     layout = {
         "barmode": "stack",
         "showlegend": [trace["name"] for trace in data] != ["ok"],
-        "xaxis": {"title": {"text": "roll, degrees"}, "range": _padded(edges, step), "zeroline": False},
-        "yaxis": {"title": {"text": "frames"}, **_counted(int(np.histogram(shown, edges)[0].max()))},
+        "xaxis": {"title": {"text": "roll, degrees"}, "range": ends, "zeroline": False},
+        "yaxis": {"title": {"text": "frames"}, "range": [0, 1.05 * max(highest, 1)], **whole},
     }
-    return Chart(HISTOGRAM, "How many frames have which roll", data, layout)
-
-
-def _counted(highest: int) -> dict[str, Any]:
-    """Let the axis begin at nothing, with ticks at whole frames where bars are low."""
-    return {"range": [0, 1.05 * max(highest, 1)], **({"dtick": 1} if highest <= _FEW_BINS else {})}
-
-
-def _padded(edges: NDArray[Any], step: float) -> list[float]:
-    """Widen the axis around a single bar, which would fill the chart."""
-    width = float(np.ptp(edges))
-    margin = max(0.02 * width, (_FEW_BINS * step - width) / 2)
-    return [float(edges[0]) - margin, float(edges[-1]) + margin]
+    return Chart("histogram", "How many frames have which roll", data, layout)

@@ -12,7 +12,7 @@ from rollcli.report.figures import with_still
 from rollcli.report.options import ReportOptions
 from rollcli.report.page import Chart, Rows, render_page
 from rollcli.report.pictures import Pictures
-from rollcli.report.sources import JUMP, SPREAD, SUSPECT, WIDEST, Choice
+from rollcli.report.sources import Choice
 from rollcli.report.summary import (
     degrees,
     frame_count,
@@ -49,7 +49,7 @@ def report_page(
     return render_page(
         "rollcli.report",
         "report.html",
-        "frames",
+        *("page", "report", "frames"),
         title=options.title or f"Roll of {frame_count(len(rows))}",
         result=listed(map(public_name, options.results)),
         version=run.get("rollcli"),
@@ -77,7 +77,7 @@ def report_page(
         more_doubtful=max(0, len(doubtful) - _LISTED),
         rows=_table(rows, rig),
         gallery=[_card(rows, choice, pictures) for choice, pictures in shown],
-        chosen=_chosen_text(rows, [choice for choice, _ in shown]),
+        angled=frame_count(sum(row.roll_deg is not None for row in rows)),
     )
 
 
@@ -100,7 +100,7 @@ def _others(rig: RigAssessment) -> list[str]:
     return others
 
 
-def _table(rows: Sequence[Row], rig: RigAssessment | None = None) -> Rows:
+def _table(rows: Sequence[Row], rig: RigAssessment) -> Rows:
     """Return what the table shows of each frame: number, file, status, roll, roll in words, reason."""
     return Rows(
         [
@@ -116,25 +116,6 @@ def _table(rows: Sequence[Row], rig: RigAssessment | None = None) -> Rows:
         ],
         frame_axis(rows, rig).places,
     )
-
-
-def _chosen_text(rows: Sequence[Row], choices: Sequence[Choice]) -> str:
-    """Which frames the gallery shows, in words."""
-    angled = sum(row.roll_deg is not None for row in rows)
-    if len(choices) in (0, angled):
-        return "Every frame that has an angle."
-    counts = {
-        reason: sum(each.reason == reason for each in choices) for reason in (JUMP, WIDEST, SUSPECT, SPREAD)
-    }
-    parts = {
-        JUMP: "{} around a jump",
-        WIDEST: "the {} with the widest interval",
-        SUSPECT: "{} of the other suspect ones" if counts[WIDEST] else "{} of the suspect ones",
-        SPREAD: "{} evenly spread" + (" over the rest" if len(choices) > counts[SPREAD] else ""),
-    }
-    words = [parts[reason].format(count) for reason, count in counts.items() if count]
-    listed = " and ".join(filter(None, [", ".join(words[:-1]), words[-1]]))
-    return f"{len(choices)} of {frame_count(angled)} that have an angle: {listed}."
 
 
 def _card(rows: Sequence[Row], choice: Choice, pictures: Pictures) -> dict[str, Any]:

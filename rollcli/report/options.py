@@ -1,21 +1,10 @@
-"""What a report was asked to be, and which charts a result has.
+"""What a report was asked to be. Light, since the command line imports this to show its help."""
 
-Light, since the command line imports this to show its help, and files are checked before any chart is made.
-"""
-
-from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
-from rollcli.rig.quantities import QUANTITIES, ROLL
 from rollcli.run.options import RunningOptions
 
-if TYPE_CHECKING:
-    from rollcli.files.results import Row
-
 GALLERY = 12
-HISTOGRAM = "histogram"
-ALIGNED = "alignment"
 
 
 @dataclass(frozen=True)
@@ -42,16 +31,3 @@ class ReportOptions:
         """Return where a chart is written, by format."""
         folders = {"svg": self.svg, "pdf": self.pdf, "png": self.png}
         return {kind: f"{folder.rstrip('/')}/{name}.{kind}" for kind, folder in folders.items() if folder}
-
-
-def chart_names(rows: "Sequence[Row]") -> list[str]:
-    """Return the names of the charts, `roll` first.
-
-    Pitch and height have charts where a calibration has given them, the histogram where more than one frame
-    has an angle, and how the right view lies where more than one pair was measured.
-    """
-    there = {each.name: any(getattr(row, each.column) is not None for row in rows) for each in QUANTITIES}
-    over_frames = [name for name, some in there.items() if some or name == ROLL.name]
-    angles = sum(row.roll_deg is not None for row in rows)
-    pairs = sum(row.right_lower_px is not None for row in rows)
-    return [*over_frames, *([HISTOGRAM] if angles > 1 else []), *([ALIGNED] if pairs > 1 else [])]

@@ -88,7 +88,7 @@ class Rows:
         return f'<script type="application/json" id="rows">{content}</script>'
 
 
-def render_page(package: str, template: str, *more: str, **values: Any) -> bytes:
+def render_page(package: str, template: str, *scripts: str, **values: Any) -> bytes:
     """Fill a template that extends `page.html`; whatever it prints is escaped.
 
     Parameters
@@ -97,15 +97,15 @@ def render_page(package: str, template: str, *more: str, **values: Any) -> bytes
         Whose folder `templates` holds the template.
     template : str
         Its name.
-    *more : str
-        Further scripts beside it, without their ending.
+    *scripts : str
+        Those beside it that run, without their ending.
     **values
         What it prints; `title` is required by `page.html`.
 
     Returns
     -------
     bytes
-        The page, UTF-8, with plotly's script inside.
+        The page, UTF-8, with plotly's script inside if any runs.
     """
     from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
@@ -119,27 +119,23 @@ def render_page(package: str, template: str, *more: str, **values: Any) -> bytes
         lstrip_blocks=True,
     )
     stem = template.removesuffix(".html")
-    styles = [style_sheet(), *_texts("rollcli.report", "page.css"), *_texts(package, f"{stem}.css")]
-    plotly = get_plotlyjs()
-    scripts = [
-        *_texts("rollcli.report", "page.js"),
-        *(text for name in (stem, *more) for text in _texts(package, f"{name}.js")),
-    ]
+    styles = [style_sheet(), _text("rollcli.report", "page.css"), _text(package, f"{stem}.css")]
+    plotly = get_plotlyjs() if scripts else ""
+    texts = [_text(package, f"{name}.js") for name in scripts]
     page = environment.get_template(template).render(
         styles=map(Markup, styles),
-        scripts=map(Markup, scripts),
+        scripts=map(Markup, texts),
         plotly=Markup(plotly),
-        policy=_policy(styles, [*scripts, plotly]),
+        policy=_policy(styles, [*texts, plotly]),
         unused_styles=_STYLE_OF_MAPS.findall(plotly),
         **values,
     )
     return page.encode("utf-8", "replace")
 
 
-def _texts(package: str, name: str) -> list[str]:
-    """Return the text of a style or script beside the templates; nothing where a page has none."""
-    file = importlib.resources.files(package) / "templates" / name
-    return [file.read_text("utf-8")] if file.is_file() else []
+def _text(package: str, name: str) -> str:
+    """Return the text of a style or script beside the templates."""
+    return (importlib.resources.files(package) / "templates" / name).read_text("utf-8")
 
 
 def _policy(styles: Sequence[str], scripts: Sequence[str]) -> str:

@@ -19,7 +19,6 @@ from rollcli.pictures.heights import CAMERA_HEIGHTS, METRES, FittedRoad, heights
 from rollcli.pictures.overlay import draw_disparity, draw_heights, draw_road_on_photo
 from rollcli.pictures.vdisparity import draw_v_disparity, row_offset, v_disparity
 from rollcli.report.sources import Subject
-from rollcli.run.options import FrameOptions
 from rollcli.run.read import FRAME_ERRORS, Source, read_source
 
 # small enough that a page with a dozen frames opens at once, large enough to see a stripe of noise
@@ -61,14 +60,14 @@ class Pictures:
         return self.road is self.map is self.level is self.level_counts is self.heights is None
 
 
-def take_pictures(subject: Subject, options: FrameOptions) -> Pictures:
+def take_pictures(subject: Subject) -> Pictures:
     """Take what can be taken: from the images of the subject, else from its map or pair."""
-    source, missing = _attempt(lambda: _source(subject, options))
+    source, missing = _attempt(lambda: _source(subject))
     disparity = None if source is None else source.shown
-    road, _ = _attempt(lambda: _road(subject, source, options))
-    level, _ = _attempt(lambda: _level(subject, disparity, options))
+    road, _ = _attempt(lambda: _road(subject, source))
+    level, _ = _attempt(lambda: _level(subject, disparity))
     counts, _ = _attempt(lambda: _level_counts(subject, disparity, level))
-    heights, _ = _attempt(lambda: _heights(subject, source, options))
+    heights, _ = _attempt(lambda: _heights(subject, source))
     return Pictures(
         road=None if road is None else _encoded(road),
         map=None if disparity is None else _encoded(draw_disparity(disparity)),
@@ -92,7 +91,7 @@ def _attempt(make: Callable[[], Made]) -> tuple[Made | None, str]:
         return None, str(error) or type(error).__name__
 
 
-def _source(subject: Subject, options: FrameOptions) -> Source:
+def _source(subject: Subject) -> Source:
     if "disparity" in subject.images:
         return Source(read_disparity(subject.images["disparity"]))
     if subject.images_only:
@@ -100,16 +99,17 @@ def _source(subject: Subject, options: FrameOptions) -> Source:
     if subject.refused:
         raise InputError(subject.refused)
     # a pair's left image is kept where the road is to be drawn on it
-    return read_source(subject.frame, options._replace(images=options.images._replace(road_mask="")))
+    images = subject.options.images._replace(road_mask="")
+    return read_source(subject.frame, subject.options._replace(images=images))
 
 
-def _road(subject: Subject, source: Source | None, options: FrameOptions) -> NDArray[Any] | None:
+def _road(subject: Subject, source: Source | None) -> NDArray[Any] | None:
     """Draw the road on the left image of a pair: as `estimate` wrote it, else found again."""
     if "road_mask" in subject.images:
         return read_image(subject.images["road_mask"])
     if source is None or source.photo is None:
         return None
-    arguments = options.method.arguments()
+    arguments = subject.options.method.arguments()
     found = estimate_roll(source.disparity, mask=source.allowed, road_mask=True, **arguments)
     # where options that the record does not give back led to another angle, this is not its road
     if found.road_mask is None or abs(found.theta - subject.theta) > _SAME:
@@ -117,10 +117,10 @@ def _road(subject: Subject, source: Source | None, options: FrameOptions) -> NDA
     return draw_road_on_photo(source.photo, found.road_mask)
 
 
-def _level(subject: Subject, disparity: NDArray[Any] | None, options: FrameOptions) -> NDArray[Any]:
+def _level(subject: Subject, disparity: NDArray[Any] | None) -> NDArray[Any]:
     """Return the map de-rotated: as `estimate` wrote it, else made."""
     if "derotated" in subject.images:
-        stored, given = read_stored(subject.images["derotated"]), options.encoding
+        stored, given = read_stored(subject.images["derotated"]), subject.options.encoding
         encoding = "auto" if subject.frame.right_file else given.encoding
         return to_disparity(stored, encoding=encoding, scale=given.scale, invalid=given.invalid).disparity
     return derotate(_required(disparity), subject.theta)
@@ -137,14 +137,14 @@ def _level_counts(
     return _counts(level, scale, subject.alpha, row_offset(subject.theta, width, height))
 
 
-def _heights(subject: Subject, source: Source | None, options: FrameOptions) -> NDArray[Any]:
+def _heights(subject: Subject, source: Source | None) -> NDArray[Any]:
     """Draw the heights over the road: as `estimate` drew or wrote them, else those of the map.
 
     Of a map they are in metres where the row has the camera's height.
     """
     if "heights_preview" in subject.images:
         return read_image(subject.images["heights_preview"])
-    span, camera = options.images.heights_range, subject.row.height_m
+    span, camera = subject.options.images.heights_range, subject.row.height_m
     photo = None if source is None else source.photo
     unit = CAMERA_HEIGHTS if camera is None else METRES
     if "heights" in subject.images:

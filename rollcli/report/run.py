@@ -3,7 +3,6 @@
 import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from rollcli.errors import ExitStatus, InputError, UsageError
@@ -11,11 +10,13 @@ from rollcli.extras import require_extra
 from rollcli.files.naming import listed, natural_key
 from rollcli.files.results import Result, Row, read_result, run_path
 from rollcli.files.stream import is_stream, write_output
-from rollcli.report.options import ReportOptions, chart_names
+from rollcli.report.charts import all_charts
+from rollcli.report.options import ReportOptions
+from rollcli.report.page import Chart
 from rollcli.report.sources import Choice, Subject, choose, subjects
 from rollcli.report.summary import common_run, frame_count
 from rollcli.rig.drive.assess import RigAssessment, assess_rig
-from rollcli.run.options import EncodingOptions, FrameOptions
+from rollcli.run.options import EncodingOptions
 from rollcli.run.outputs import listed_only
 from rollcli.run.progress import Progress
 from rollcli.run.resume import recorded_options
@@ -69,11 +70,11 @@ def run_report(options: ReportOptions) -> ExitStatus:
         *(path for each in found for path in (*each.frame.reads(), *each.images.values())),
     ]
     page = [] if options.output is None or is_stream(options.output) else [options.output]
-    charts = [path for name in chart_names(joined.rows) for path in options.chart_paths(name).values()]
-    writes = [*charts, *page]
+    charts = all_charts(joined.rows, rig)
+    writes = [*(path for name in charts for path in options.chart_paths(name).values()), *page]
     if listed_only(reads, writes, options.running):
         return ExitStatus.DONE
-    return _write(options, joined, chosen, found, rig)
+    return _write(options, joined, chosen, found, rig, charts)
 
 
 def _require_charts_alone(options: ReportOptions) -> None:
@@ -93,18 +94,16 @@ def _write(
     chosen: Sequence[Choice],
     found: Sequence[Subject],
     rig: RigAssessment,
+    charts: Mapping[str, Chart],
 ) -> ExitStatus:
-    from rollcli.report.charts import all_charts
     from rollcli.report.content import report_page
     from rollcli.report.figures import chart_file
 
     progress = Progress(len(found), options.running, EncodingOptions())
-    recorded = [joined.recorded[joined.owners[each.place]] for each in chosen]
-    pictures = _take(found, recorded, options.running.jobs)
+    pictures = _take(found, options.running.jobs)
     if len(pictures) < len(found):
         progress.say("interrupted; nothing is written")
         return ExitStatus.INTERRUPTED
-    charts = all_charts(joined.rows, rig)
     files = {
         path: chart_file(chart, kind)
         for name, chart in charts.items()
@@ -133,19 +132,17 @@ def _write(
     return ExitStatus.FRAMES_FAILED if missing else ExitStatus.DONE
 
 
-def _take(found: Sequence[Subject], recorded: Sequence[FrameOptions], jobs: int | None) -> "list[Pictures]":
-    """Return the pictures of each subject, fewer when interrupted; those of one way to read go together."""
+def _take(found: Sequence[Subject], jobs: int | None) -> "list[Pictures]":
+    """Return the pictures of each subject, fewer when interrupted."""
     from rollcli.report.pictures import no_pictures, take_pictures
 
-    pictures: dict[int, Pictures] = {}
+    names = [each.frame.file for each in found]
+    places = sorted(range(len(names)), key=lambda place: natural_key(names[place]))  # as a video is decoded
+    work = Work(take_pictures, no_pictures)
     with stop_on_signals() as stop:
-        for given in (each for at, each in enumerate(recorded) if each not in recorded[:at]):
-            places = [place for place, each in enumerate(recorded) if each == given]
-            places.sort(key=lambda place: natural_key(found[place].frame.file))  # as a video is decoded
-            work = Work(partial(take_pictures, options=given), no_pictures)
-            tasks = run_tasks([found[place] for place in places], work, stop, Workers(jobs))
-            with contextlib.closing(tasks) as taken:
-                pictures |= dict(zip(places, taken, strict=False))
+        tasks = run_tasks([found[place] for place in places], work, stop, Workers(jobs))
+        with contextlib.closing(tasks) as taken:
+            pictures = dict(zip(places, taken, strict=False))
     return [pictures[place] for place in sorted(pictures)]
 
 
@@ -153,11 +150,10 @@ def _take(found: Sequence[Subject], recorded: Sequence[FrameOptions], jobs: int 
 class _Joined:
     """All rows in the order of the run, or one result after the other.
 
-    `recorded` is how each part was made; `owners` are the parts that the rows are of.
+    `owners` are the parts that the rows are of.
     """
 
     parts: Sequence[Result]
-    recorded: Sequence[FrameOptions]
     rows: tuple[Row, ...]
     owners: Sequence[int]
     origins: Sequence[str]
@@ -165,18 +161,16 @@ class _Joined:
 
 
 def _joined(paths: Sequence[str]) -> _Joined:
-    parts, recorded = list[Result](), list[FrameOptions]()
+    parts = list[Result]()
     for path in paths:
         parts.append(read_result(path))
         if not parts[-1].rows:
             raise InputError(f"{path}: has no rows: there is nothing to report")
-        recorded.append(recorded_options(parts[-1].run, run_path(path)))
     rows = [row for part in parts for row in part.rows]
     owners = [number for number, part in enumerate(parts) for _ in part.rows]
     order = order_of(parts).tolist() if len(parts) > 1 else range(len(rows))  # a shard alone may be shown
     return _Joined(
         parts,
-        recorded,
         tuple(rows[place] for place in order),
         [owners[place] for place in order],
         origins_of(parts),
@@ -188,10 +182,10 @@ def _subjects(joined: _Joined, chosen: Sequence[Choice], options: ReportOptions)
     """Find the files of the frames to show, each from where its own result lies."""
     found: dict[int, Subject] = {}
     for number, part in enumerate(joined.parts):
+        made = recorded_options(part.run, run_path(part.path))
         places = [each.place for each in chosen if joined.owners[each.place] == number]
         rows = [joined.rows[place] for place in places]
         if rows or len(joined.parts) == 1:
-            images = joined.recorded[number].images
-            of_part = subjects(rows, part.path, options.images, images, fetch=options.fetch)
+            of_part = subjects(rows, part.path, options.images, made, fetch=options.fetch)
             found |= dict(zip(places, of_part, strict=True))
     return [found[each.place] for each in chosen]

@@ -14,7 +14,7 @@ from rollcli.files.results import Row
 from rollcli.files.search import MAP_ENDINGS, objects_behind
 from rollcli.files.stores.locations import base_name, is_remote, is_url, store_of
 from rollcli.run.frame import Frame
-from rollcli.run.options import KINDS, ImageKind, ImageOptions
+from rollcli.run.options import KINDS, FrameOptions, ImageKind, ImageOptions
 from rollcli.run.result_rows import frame_of_row
 
 JUMP, WIDEST, SUSPECT, SPREAD = "around a jump", "widest interval", "suspect", "evenly spread"
@@ -89,6 +89,8 @@ class Subject:
         The files that `estimate` wrote for it, by kind.
     row : Row
         What the result says of it.
+    options : FrameOptions
+        How its result was made.
     images_only : bool
         Whether pictures come from these alone: a result from elsewhere may name any file.
     refused : str
@@ -100,12 +102,13 @@ class Subject:
     alpha: tuple[float, float, float] | None
     images: dict[str, str]
     row: Row
+    options: FrameOptions
     images_only: bool = False
     refused: str = ""
 
 
 def subjects(
-    rows: Sequence[Row], result: str, images: str | None, recorded: ImageOptions, *, fetch: bool = False
+    rows: Sequence[Row], result: str, images: str | None, options: FrameOptions, *, fetch: bool = False
 ) -> list[Subject]:
     """Find the files of rows that have an angle.
 
@@ -116,8 +119,8 @@ def subjects(
         The result's path: names that do not exist from here are looked for beside it.
     images : str or None
         The folder of images, or of folders of images, that `estimate` wrote.
-    recorded : ImageOptions
-        Which folders the run wrote them to.
+    options : FrameOptions
+        How the result was made, and which folders the run wrote images to.
     fetch : bool
         Whether inputs are asked for in whichever store a row names: a result from elsewhere may name a
         service of this network, or a bucket that the user's keys open. By default only in the result's own.
@@ -128,7 +131,7 @@ def subjects(
         There is no such folder, or there are no images of some rows in it.
     """
     there = None if images is None else _ImageFolder(images)
-    found = [_images(row, there, recorded) if there is not None else {} for row in rows]
+    found = [_images(row, there, options.images) if there is not None else {} for row in rows]
     without = [row.file for row, files in zip(rows, found, strict=True) if images is not None and not files]
     if without:
         raise UsageError(
@@ -143,6 +146,7 @@ def subjects(
             row.alpha,
             files,
             row,
+            options,
             images_only=only,
             refused="" if fetch else _refusal(row, result),
         )

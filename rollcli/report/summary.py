@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 
 from rollcli.files.results import STATUSES, Row
-from rollcli.rig.words import decimals
+from rollcli.rig.drive.posterior import Estimate
+from rollcli.rig.quantities import ROLL, Quantity
+from rollcli.rig.words import answer
 
 
 def summarize(rows: Sequence[Row]) -> dict[str, Any]:
@@ -35,11 +37,9 @@ def degrees(angle: float | None, digits: int = 2, *, sign: bool = True) -> str:
     return text.replace("-", "−") + "°"
 
 
-def with_interval(angle: float | None, half_width: float | None) -> str:
-    """Return an angle with the half-width of its interval, degrees, and as many decimals as that is worth."""
-    digits = decimals(half_width)
-    half = "" if half_width is None else f" ± {degrees(half_width, digits, sign=False)}"
-    return degrees(angle, digits) + half
+def with_interval(value: float | None, half_width: float | None, quantity: Quantity = ROLL) -> str:
+    """Return a value with the half-width of its interval, to read: with a true minus, and its unit."""
+    return "–" if value is None else answer(Estimate(value, half_width), quantity).replace("-", "−")
 
 
 def input_folders(rows: Sequence[Row]) -> list[str]:

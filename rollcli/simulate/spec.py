@@ -1,10 +1,8 @@
 """What one simulated frame is, on which all of its bytes depend, and how frames are drawn from ranges."""
 
 import math
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from enum import IntEnum
-from typing import Any
 
 import numpy as np
 
@@ -22,13 +20,7 @@ from rollcli.simulate.options import (
 from rollcli.simulate.vectors import Array
 from rollcli.simulate.views import Camera, rig_axes
 
-MAX_PITCH = math.radians(60)
-MAX_CURVATURE = 0.01
-MAX_BEND = 0.02
-MAX_CROSSFALL, MAX_GUTTER = 0.15, 0.5
-MAX_KERB = 0.5  # metres
 LEVEL = np.array([0.0, 1.0, 0.0])  # the normal of a level road
-_NONE = (0.0, 0.0)
 
 
 class Stream(IntEnum):
@@ -112,8 +104,14 @@ class FrameSpec:
     index: int = 0
 
     def __post_init__(self) -> None:
-        for problem in _problems(self):
-            raise UsageError(problem)
+        (column, row), (width, height) = self.centre, self.size
+        if not (0 <= column <= width - 1 and 0 <= row <= height - 1):
+            raise UsageError(f"the principal point {column:g},{row:g} lies outside of the image")
+        if self.height + self.baseline * math.sin(self.roll) * math.cos(self.pitch) <= 0:
+            raise UsageError(
+                f"at a roll of {math.degrees(self.roll):g} degrees the right camera is under the road: "
+                f"mount the rig higher than {self.height:g} m, or its cameras closer than {self.baseline:g} m"
+            )
 
     @property
     def centre(self) -> tuple[float, float]:
@@ -133,44 +131,13 @@ class FrameSpec:
         return np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(self.index, stream)))
 
 
-def _problems(spec: FrameSpec) -> Iterator[str]:
-    """Yield a message for each value that is not possible, of those that their option does not bound."""
-    width, height = spec.size
-    if not 0 <= spec.crossfall <= MAX_CROSSFALL:
-        yield f"a crossfall of {100 * spec.crossfall:g} % is not within 0 and {100 * MAX_CROSSFALL:g} %"
-    if not 0 <= spec.gutter <= MAX_GUTTER:
-        yield f"a gutter of {100 * spec.gutter:g} % is not within 0 and {100 * MAX_GUTTER:g} %"
-    if not 0 <= spec.kerb[0] <= spec.kerb[1] <= MAX_KERB:
-        low, high = spec.kerb
-        yield f"kerbs of {low:g} to {high:g} m do not lie within 0 and {MAX_KERB:g} m, the lower one first"
-    if not (16 <= width <= 16384 and 16 <= height <= 16384):
-        yield f"a size of {width}x{height} is not one of 16 to 16384 pixels each way"
-    if not (0 <= spec.centre[0] <= width - 1 and 0 <= spec.centre[1] <= height - 1):
-        yield f"the principal point {spec.centre[0]:g},{spec.centre[1]:g} lies outside of the image"
-    if abs(spec.roll) > math.pi / 2:
-        yield f"a roll of {math.degrees(spec.roll):g} degrees is beyond +-90"
-    if abs(spec.pitch) > MAX_PITCH:
-        yield f"a pitch of {math.degrees(spec.pitch):g} degrees is beyond +-60"
-    if abs(spec.curvature) > MAX_CURVATURE:
-        yield f"a curvature of {spec.curvature:g} per metre is beyond +-{MAX_CURVATURE:g} (a radius of 100 m)"
-    if abs(spec.bend or 0.0) > MAX_BEND:
-        yield f"a bend of {spec.bend:g} per metre is beyond +-{MAX_BEND:g} (a radius of 50 m)"
-    if spec.height <= 0:
-        yield f"at a height of {spec.height:g} m the camera is under the road: the height must be more than 0"
-    elif spec.height + spec.baseline * math.sin(spec.roll) * math.cos(spec.pitch) <= 0:
-        yield (
-            f"at a roll of {math.degrees(spec.roll):g} degrees the right camera is under the road: "
-            f"mount the rig higher than {spec.height:g} m, or its cameras closer than {spec.baseline:g} m"
-        )
-
-
 def draw_specs(options: SimulateOptions) -> list[FrameSpec]:
     """Draw the specs of the frames that are asked for; the i-th does not depend on their number.
 
     Raises
     ------
     UsageError
-        A value is not possible, or values contradict each other.
+        Values contradict each other.
     """
     rig = FrameSpec(
         size=options.size,
@@ -185,35 +152,17 @@ def draw_specs(options: SimulateOptions) -> list[FrameSpec]:
         dips=options.dips,
         seed=options.seed,
     )
-    spans = {
-        "roll": _both(math.radians, options.roll_deg),
-        "pitch": _both(math.radians, options.pitch_deg),
-        "curvature": options.curvature or _NONE,
-        "bend": options.bend or _NONE,
-        "crossfall": _both(_share, options.crossfall or CROSSFALL),
-        "gutter": _both(_share, options.gutter),
-        "height": options.height,
-        "principal offset": options.principal_offset,
-    }
     for end in (0, 1):  # what is not possible is refused, whatever would be drawn
-        values: dict[str, Any] = {name: span[end] for name, span in spans.items()}
-        offset = values.pop("principal offset")
-        _offset(replace(rig, **{**values, "height": spans["height"][0]}), offset, offset)
-    return [_drawn(replace(rig, index=index), options, spans) for index in range(options.frames)]
+        roll, pitch = math.radians(options.roll_deg[end]), math.radians(options.pitch_deg[end])
+        offset = options.principal_offset[end]
+        _offset(replace(rig, roll=roll, pitch=pitch, height=options.height[0]), offset, offset)
+    return [_drawn(replace(rig, index=index), options) for index in range(options.frames)]
 
 
-def _both(change: Callable[[float], float], span: Span) -> Span:
-    return change(span[0]), change(span[1])
-
-
-def _share(percent: float) -> float:
-    return percent / 100
-
-
-def _drawn(spec: FrameSpec, options: SimulateOptions, spans: dict[str, Span]) -> FrameSpec:
+def _drawn(spec: FrameSpec, options: SimulateOptions) -> FrameSpec:
     """Return the frame with its pose, its road and the place of its camera, each from a stream of its own."""
     rng = spec.rng(Stream.POSE)
-    roll, pitch = rng.uniform(*spans["roll"]), rng.uniform(*spans["pitch"])
+    roll, pitch = (math.radians(rng.uniform(*span)) for span in (options.roll_deg, options.pitch_deg))
     scene = SCENES[rng.integers(len(SCENES))] if options.scene == MIXED else options.scene
     curvature: float = rng.choice([0.0, 1.0]) * rng.uniform(-0.001, 0.001)
     if options.curvature is not None:
@@ -221,7 +170,8 @@ def _drawn(spec: FrameSpec, options: SimulateOptions, spans: dict[str, Span]) ->
     elif scene == "bare":
         curvature = 0.0
     rng = spec.rng(Stream.CROSS_SECTION)
-    crossfall, gutter = rng.uniform(*spans["crossfall"]), rng.uniform(*spans["gutter"])
+    spans = options.crossfall or CROSSFALL, options.gutter
+    crossfall, gutter = (float(rng.uniform(*span)) / 100 for span in spans)
     shape = options.cross_section
     if shape == MIXED:
         shape = CROSS_SECTIONS[rng.integers(len(CROSS_SECTIONS))]
@@ -230,12 +180,12 @@ def _drawn(spec: FrameSpec, options: SimulateOptions, spans: dict[str, Span]) ->
     spec = replace(
         spec,
         scene=scene,
-        roll=float(roll),
-        pitch=float(pitch),
+        roll=roll,
+        pitch=pitch,
         curvature=float(curvature),
         cross_section=shape,
-        crossfall=0.0 if shape == "flat" else float(crossfall),
-        gutter=float(gutter),
+        crossfall=0.0 if shape == "flat" else crossfall,
+        gutter=gutter,
         bend=bend,
         height=float(rng.uniform(*options.height)),
     )

@@ -2,7 +2,8 @@
 
 A surface computes where rays hit it (`intersect`) and, at these points, its normal and its texture
 coordinates (`sample`). The road rises, bends and is cambered as parabolas, so that each intersection is the
-root of a polynomial: exact, and without a step size. Only to uneven ground a ray is followed in steps.
+root of a quadratic: exact, and without a step size. Only to uneven ground, and to a camber in a bend, a ray
+is followed in steps.
 """
 
 from collections.abc import Callable
@@ -13,12 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.simulate.relief import Relief
-from rollcli.simulate.vectors import Array, Vectors, first_crossing
+from rollcli.simulate.vectors import Array, Vectors
 
 NEAR = 0.05  # metres: nearer surfaces are not hit
 _SEAM = 1e-9  # metres: adjacent grounds overlap by it, so that rounding lets no ray pass between them
 _FARTHEST = 1e6  # metres
 _STEPS, _BISECTIONS = 12, 12  # between the highest and the lowest ground that a ray may hit
+_PASSED = 1e-3  # metres: a ray that ends higher above the ground has passed over it
+_TO_ROUNDING = 36  # bisections: less than a nanometre, whatever the bend
 
 Indices = NDArray[np.intp]
 
@@ -134,13 +137,14 @@ class Ground(Surface):
         start = np.broadcast_to(origin, direction.shape)[:, reached]
         onward, near, far = direction[:, reached], first[reached], last[reached]
         hits = np.where(uneven, np.nan, self._first_smooth_hit(origin, direction))
-        hits[reached] = _first_descent(lambda t: self._above(start + t * onward), near, far)
+        hits[reached] = _first_descent(lambda t: self._above(start + t * onward), near, far, _BISECTIONS)
         return hits
 
     def _above(self, points: Array) -> Array:
-        """Return how far points (3, N) are above the uneven sheet, metres."""
+        """Return how far points (3, N) are above the uneven sheet, metres; beside it, its camber ends."""
         lateral = self.course.lateral(points)
-        smooth = self.offset + (self.slope + self.camber / 2 * lateral) * lateral
+        cambered = self.camber / 2 * np.clip(lateral, self.edges[0], self.edges[-1]) ** 2
+        smooth = self.offset + self.slope * lateral + cambered
         uneven = self.relief.height(lateral, points[2]) if self.relief else 0.0
         return np.asarray(self.course.elevation(points) - smooth - uneven)
 
@@ -153,19 +157,27 @@ class Ground(Surface):
         c = oy - self.slope * (ox - self.course.heading * oz) + lean / 2 * oz * oz - self.offset
         if not self.camber:
             return first_root(a, b, c)
-        # along a ray, lateral = l0 + l1 t + l2 t^2, and the camber adds its square
-        l0 = ox - oz * (self.course.heading + self.course.bend / 2 * oz)
-        l1 = rx - rz * (self.course.heading + self.course.bend * oz)
-        l2 = -self.course.bend / 2 * rz * rz
+        if self.course.bend:
+            return self._first_cambered_hit(origin, direction)
+        # along a ray, lateral = l0 + l1 t, and the camber adds its square
+        l0, l1 = ox - oz * self.course.heading, rx - rz * self.course.heading
         half = self.camber / 2
-        a, b, c = a - half * (l1 * l1 + 2 * l0 * l2), b - self.camber * l0 * l1, c - half * l0 * l0
-        if not self.course.bend:
-            return first_root(a, b, c)
-        terms = np.broadcast_arrays(c, b, a, -self.camber * l1 * l2, -half * l2 * l2)
+        return first_root(a - half * l1 * l1, b - self.camber * l0 * l1, c - half * l0 * l0)
+
+    def _first_cambered_hit(self, origin: Array, direction: Array) -> Array:
+        """Return the same where the road bends, too: between the sheets that touch the camber's ends."""
+        smooth, plain = replace(self, relief=None), replace(self, relief=None, camber=0.0)
+        laterals = np.clip([-np.inf, 0.0, np.inf], self.edges[0], self.edges[-1])
+        rises = (self.camber / 2 * laterals**2).tolist()
+        highest, lowest = (replace(plain, offset=self.offset + rise) for rise in (max(rises), min(rises)))
+        first = np.where(highest._above(origin) > 0, highest._first_smooth_hit(origin, direction), NEAR)
         with np.errstate(divide="ignore"):
-            end = np.where(rz > 0, (self.far - oz) / rz, _FARTHEST)
-        t = first_crossing(np.array(terms), np.minimum(end, _FARTHEST))
-        return np.where(t > NEAR, t, np.nan)
+            end = np.where(direction[2] > 0, (self.far - origin[2]) / direction[2], _FARTHEST)
+        # over a crest a ray may miss the lowest, and leaves the highest again: where it meets it backwards
+        left = end - highest._first_smooth_hit(origin + end * direction, -direction)
+        last = np.fmin(lowest._first_smooth_hit(origin, direction), left)
+        last = np.fmax(first, np.where(np.isnan(last), end, last))
+        return _first_descent(lambda t: smooth._above(origin + t * direction), first, last, _TO_ROUNDING)
 
     def sample(self, points: Array) -> SurfaceSample:
         z = points[2]
@@ -244,8 +256,8 @@ def first_root(a: Array, b: Array, c: Array) -> Array:
         return np.where((c > 0) & (t > NEAR) & (t < _FARTHEST), t, np.nan)
 
 
-def _first_descent(above: Callable[[Array], Array], first: Array, last: Array) -> Array:
-    """Return where rays first come below 0 between two of their parameters, by steps and bisection."""
+def _first_descent(above: Callable[[Array], Array], first: Array, last: Array, bisections: int) -> Array:
+    """Return where rays first come below 0 between two of their parameters, by bisection; else nan."""
     low, high, searched = first, last, np.ones(first.shape, bool)
     for step in range(1, _STEPS + 1):
         t = first + (last - first) * (step / _STEPS)
@@ -253,11 +265,11 @@ def _first_descent(above: Callable[[Array], Array], first: Array, last: Array) -
         low = np.where(searched & over, t, low)
         high = np.where(searched & ~over, t, high)
         searched &= over
-    for _ in range(_BISECTIONS):
+    for _ in range(bisections):
         middle = (low + high) / 2
         over = above(middle) > 0
         low, high = np.where(over, middle, low), np.where(over, high, middle)
-    return high
+    return np.where(above(high) > _PASSED, np.nan, high)
 
 
 # single precision: double precision would double the cost of shading

@@ -112,25 +112,24 @@ def expose(
 
 @dataclass(frozen=True)
 class PixelRays:
-    """Positions u, v (N,), pixels, and their rays; `rows` if they are whole rows of the image, else None."""
+    """Positions u, v (N,), pixels, and their rays."""
 
     camera: Camera
     u: Array
     v: Array
     rays: Rays
-    rows: range | None
 
     @staticmethod
     def of_rows(camera: Camera, rows: range) -> "PixelRays":
         """Take the centres of all pixels of these rows, row by row."""
         v, u = np.indices((len(rows), camera.width), float).reshape(2, -1)
         v += rows.start
-        return PixelRays(camera, u, v, camera.rays(u, v), rows)
+        return PixelRays(camera, u, v, camera.rays(u, v))
 
     @staticmethod
     def at(camera: Camera, u: Array, v: Array) -> "PixelRays":
         """Take any positions."""
-        return PixelRays(camera, u, v, camera.rays(u, v), None)
+        return PixelRays(camera, u, v, camera.rays(u, v))
 
     def window(self, corners: Array | None) -> Indices | None:
         """Return the indices of rays that can hit a box with these corners (3, 8); None: all of them can."""
@@ -141,14 +140,8 @@ class PixelRays:
             return np.empty(0, np.intp)
         if depth.min() <= 0.1:
             return None
-        low_u, high_u, low_v, high_v = u.min(), u.max(), v.min(), v.max()
-        if self.rows is None:
-            inside = (self.u >= low_u) & (self.u <= high_u) & (self.v >= low_v) & (self.v <= high_v)
-            return np.flatnonzero(inside)
-        first, width = self.rows.start, self.camera.width
-        columns = np.arange(max(int(np.ceil(low_u)), 0), min(int(high_u) + 1, width))
-        rows = np.arange(max(int(np.ceil(low_v)), first), min(int(high_v) + 1, self.rows.stop))
-        return ((rows[:, None] - first) * width + columns).ravel()
+        across = (self.u >= u.min()) & (self.u <= u.max())
+        return np.flatnonzero(across & (self.v >= v.min()) & (self.v <= v.max()))
 
 
 NONE = -1  # the material of the sky
@@ -189,16 +182,11 @@ def first_hits(scene: Scene, pixels: PixelRays) -> tuple[Array, NDArray[np.int16
     owner = np.full(len(pixels.u), -1, np.int16)
     for k, surface in enumerate(scene.surfaces):
         window = pixels.window(surface.bounds())
-        if window is None:
-            t = surface.intersect(rays.origin, rays.direction)
-            nearer = t < depth
-            np.copyto(depth, t, where=nearer)
-            owner[nearer] = k
-        elif len(window):
-            t = surface.intersect(rays.origin, rays.direction[:, window])
-            nearer = t < depth[window]
-            depth[window[nearer]] = t[nearer]
-            owner[window[nearer]] = k
+        at = slice(None) if window is None else window
+        t = surface.intersect(rays.origin, rays.direction[:, at])
+        nearer = t < depth[at]
+        depth[at] = np.where(nearer, t, depth[at])
+        owner[at] = np.where(nearer, k, owner[at])
     return depth, owner
 
 

@@ -27,6 +27,7 @@ KINDS = {
     "FILE": types.FilePath(),
     "OUTPUT": types.OutputFile((".csv",), "CSV"),
     "PX": types.Number("PX"),
+    "SPAN": types.span(-5, 5.5),
 }
 # what lies on a bound of some option, and hardly beyond it
 NUMBERS = (
@@ -67,6 +68,12 @@ def _bounded():
 CASES = {
     **{line: partial(_value, line) for line in filter(None, VALUES.split("\n"))},
     **{f"numbers of {name}": partial(_numbers, kind) for name, kind in _bounded()},
+    "ranges of simulate": lambda: {
+        each.opts[-1]: each.type.what
+        for name, context in commands()
+        for each in context.command.params
+        if name == "simulate" and isinstance(each.type, types.Parsed)
+    },
 }
 
 

@@ -27,12 +27,13 @@ from rollcli.evaluate.experiments import (
     rotate_nearest,
 )
 from rollcli.evaluate.options import ExperimentOptions, PaperOptions
-from rollcli.evaluate.paper_page import all_tables, charts, paper_page
+from rollcli.evaluate.paper_page import all_tables, paper_page
 from rollcli.evaluate.truth import KnownPose, read_truth
 from rollcli.files.results import Row
 from rollcli.run.options import EncodingOptions, InputOptions, RegionOptions, RunningOptions
 from tests.estimator.synthetic_maps import bent_road
 from tests.recorded import check, made
+from tests.report.test_recorded import drawn
 
 ANGLES = ((-1.0, 1.0, 0.3), (0.0, 5.0, 2.0), (0.0, 0.3, 0.1), (1.0, 2.95, 1.0), (-8.0, -8.0, 3.0))
 TURNS = [math.radians(turn) for turn in (-38, -3.5, 12)]
@@ -125,6 +126,11 @@ def _times(seconds):
     return Times(9, of_each)
 
 
+def _figures(tables):
+    module = pytest.importorskip("rollcli.evaluate.paper_figures", reason="matplotlib is not here")
+    return module.paper_figures(tables)
+
+
 def _page(count=1, seconds=(1.0,), region=None, **experiments):
     """What the page of these maps says."""
     pytest.importorskip("plotly", reason="plotly, of the extra report, is not here")
@@ -137,7 +143,8 @@ def _page(count=1, seconds=(1.0,), region=None, **experiments):
         ExperimentOptions("out", **experiments),
         RunningOptions(),
     )
-    page = paper_page(all_tables(found, [], timed), found, [], timed, options).decode()
+    tables = all_tables(found, [], timed)
+    page = paper_page(tables, _figures(tables), found, [], timed, options).decode()
     page = page.replace(f"rollcli {__version__}", "rollcli")
     shown = re.sub(r"<(script|style|svg).*?</\1>", "", page, flags=re.S)
     return " ".join(html.unescape(re.sub("<[^>]+>", "", shown)).split())
@@ -192,7 +199,7 @@ def _unlike(form):
 CASES = {
     "findings": _found,
     "tables": lambda: {name: table.rows for name, table in _tables().items()},
-    "charts": lambda: {name: dataclasses.asdict(chart) for name, chart in charts(_tables()).items()},
+    "figures": lambda: {name: drawn(each) for name, each in _figures(_tables()).items()},
     "textbook": _textbook,
     "turned": lambda: [
         rotate_nearest(np.arange(1.0, 71).reshape(7, 10), turn) for turn in (*TURNS, 0.0, math.pi / 2)

@@ -9,6 +9,8 @@ import pytest
 from rollcli.report.charts import chart_over_frames
 from rollcli.report.page import Chart, script_json
 from rollcli.report.summary import written_at
+from rollcli.rig.drive.assess import assess_rig
+from rollcli.rig.quantities import ROLL
 from tests.report.results import row
 
 
@@ -17,13 +19,14 @@ def traces_of(chart):
 
 
 def traces(rows):
-    return traces_of(chart_over_frames(rows))
+    return traces_of(chart_over_frames(rows, ROLL, assess_rig(rows)))
 
 
 @pytest.mark.parametrize(("frames", "bars"), [(400, True), (402, False)])
 def test_suspect_marks_lie_below_the_line_and_have_no_bars_in_long_runs(frames, bars):
     shown = traces([row("a.png"), row("b.png", 9.0, 1.0, "suspect")] * (frames // 2))
-    assert list(shown) == ["95 % interval", "suspect", "roll", *([] if bars else ["roll, alone"])]
+    alone = [] if bars else ["roll, alone"]
+    assert list(shown) == ["95 % interval", "suspect", "roll", *alone, "mounting, 95 %", "mounting"]
     assert ("error_y" in shown["suspect"]) == bars
 
 

@@ -46,7 +46,7 @@ def of_colour(shown, name):
 
 
 def drawn(rows, name="roll"):
-    return decoded(chart_file(all_charts(rows)[name], "png"))
+    return decoded(chart_file(all_charts(rows, assess_rig(rows))[name], "png"))
 
 
 def texts(svg):
@@ -100,11 +100,11 @@ def test_nothing_of_a_files_name_is_in_a_chart():
 def test_of_many_frames_those_are_drawn_that_make_the_same_picture(monkeypatch):
     rng = np.random.default_rng(6)
     rows = [row(f"{i}.png", float(v), 0.2) for i, v in enumerate(rng.normal(0, 1, 20_000))]
-    thinned, file = drawn(rows), chart_file(all_charts(rows)["roll"], "svg")
+    thinned, file = drawn(rows), chart_file(all_charts(rows, assess_rig(rows))["roll"], "svg")
     monkeypatch.setattr(figures, "_MOST_TO_KEEP", 10**9)
     whole = drawn(rows)
     assert np.mean(np.abs(thinned.astype(int) - whole).max(axis=2) > 40) < 0.01
-    assert len(file) < 0.5 * len(chart_file(all_charts(rows)["roll"], "svg"))
+    assert len(file) < 0.5 * len(chart_file(all_charts(rows, assess_rig(rows))["roll"], "svg"))
 
 
 @pytest.mark.slow

@@ -20,11 +20,11 @@ from rollcli.files.results import Result
 from rollcli.pictures.figures import SLIDE, Size
 from rollcli.report import pictures, sources
 from rollcli.report.charts import all_charts, frame_axis, histogram, view
-from rollcli.report.options import ReportOptions, chart_names
-from rollcli.report.page import Chart
+from rollcli.report.options import ReportOptions
 from rollcli.report.pictures import Picture, Pictures
 from rollcli.report.sources import choose, subjects
 from rollcli.report.summary import common_run, degrees, option_lines, with_interval
+from rollcli.rig.drive.assess import assess_rig
 from rollcli.rig.quantities import ALIGNMENT, HEIGHT, ROLL, SIZE
 from rollcli.run.options import EncodingOptions, FrameOptions, ImageOptions
 from tests.recorded import check, made
@@ -157,12 +157,8 @@ def _shortened(value):
     return {"length": len(value), "numbers": len(numbers), "sum": float(sum(numbers)), "some": some}
 
 
-def _charts(name, *, assessed=True):
-    rows, found = RESULTS[name]()
-    return {
-        name: _shortened(asdict(chart))
-        for name, chart in all_charts(rows, found if assessed else None).items()
-    }
+def _charts(name):
+    return {each: _shortened(asdict(chart)) for each, chart in all_charts(*RESULTS[name]()).items()}
 
 
 NS = 10**9
@@ -174,8 +170,8 @@ def _axis(seconds, *, name="m.mcap#/left@{}", first=1_700_000_000 * NS, pause=No
     rows = [row(each) for each in files]
     counts = [len(rows)] if pause is None else [pause, len(rows) - pause]
     _, found = _assessed(rows, *({"roll": sequence(each)} for each in counts))
-    axes = [frame_axis(rows), frame_axis(rows, found)]
-    return [[each.places, each.unit, each.layout(), *map(each.at, (1, 1.5, len(rows)))] for each in axes]
+    axis = frame_axis(rows, found)
+    return [axis.places, axis.unit, axis.layout(), *map(axis.at, (1, 1.5, len(rows)))]
 
 
 AXES = {
@@ -202,7 +198,7 @@ BARS = {
 }
 
 
-def _drawn(chart, size=SLIDE):
+def drawn(chart, size=SLIDE):
     """What stands in a figure, as matplotlib has it before it lays the figure out."""
     figures = pytest.importorskip("rollcli.report.figures", reason="matplotlib is not here")
     with mock.patch.object(figures, "figure_file", lambda figure, kind, title: (figure, kind, title)):
@@ -281,17 +277,14 @@ def _ticks(axis):
     return [places, axis.get_major_formatter().format_ticks(places), len(axis.get_minorticklocs())]
 
 
-HAND_MADE = {name: Chart(**given) for name, given in INPUTS["charts"].items()}
-
-
 def _drawn_result(name, size=SLIDE):
-    return {name: _drawn(chart, size) for name, chart in all_charts(*RESULTS[name]()).items()}
+    return {name: drawn(chart, size) for name, chart in all_charts(*RESULTS[name]()).items()}
 
 
 def _thinned():
     """A line and a band of more points than any picture shows."""
     rows = [row(f"{place}.png", (place * 7919 % 2503) / 1024, 0.25) for place in range(2501)]
-    return {each: _drawn(chart) for each, chart in all_charts(rows).items()}
+    return {each: drawn(chart) for each, chart in all_charts(rows, assess_rig(rows)).items()}
 
 
 _LOOK = re.compile(r' ((?:fill|stroke|font|text|class|view|aria)[\w-]*="[^"#]*")')
@@ -377,7 +370,8 @@ def _looked_for(rows, there="", images=None, derotated=None, result="rolls.csv",
         _folder_of(each for each in there.split() if "://" not in each),
     ):
         os.chdir(inside)
-        found = made(subjects, given, result, images, ImageOptions(derotated=derotated or None))
+        recorded = FrameOptions(images=ImageOptions(derotated=derotated or None))
+        found = made(subjects, given, result, images, recorded)
     if isinstance(found, str):
         return found
     paths = [[each.frame.path, each.frame.right_path.replace(os.sep, "/")] for each in found]
@@ -392,7 +386,9 @@ def _subjects():
     with _folder_of(f"out/{each}" for each in f"{there} road_mask/m_000002.png".split()):
         return [
             [each.theta, each.alpha, each.images_only, each.refused, sorted(each.images.items())]
-            for each in subjects(rows, "rolls.csv", "out/", ImageOptions(derotated="a/up"))
+            for each in subjects(
+                rows, "rolls.csv", "out/", FrameOptions(images=ImageOptions(derotated="a/up"))
+            )
         ]
 
 
@@ -404,7 +400,7 @@ def _words():
     return [
         [with_interval(2.3456, half) for half in (None, 0.5, 0.012, 0.0042)],
         [degrees(angle) for angle in (1.234, -1.235, -0.001, 0.0, None)],
-        [chart_names(each) for each in (*results, pairs, pairs[:1])],
+        [[*all_charts(each, assess_rig(each))] for each in (*results, pairs, pairs[:1])],
     ]
 
 
@@ -427,7 +423,7 @@ def _views(quantity):
 def _refused():
     rows = [(replace(row(one), right_file=other), result) for one, other, result in INPUTS["remote"]]
     return [
-        [subjects([each], result, None, ImageOptions(), fetch=fetch)[0].refused for fetch in (False, True)]
+        [subjects([each], result, None, FrameOptions(), fetch=fetch)[0].refused for fetch in (False, True)]
         for each, result in rows
     ]
 
@@ -445,12 +441,12 @@ def _taken(images=(), disparity=ROAD, roll=5.75, camera=None, **options):
             np.save(f"{folder}/{name}.npy", disparity / (1 if name == "a" else 20))
         cv2.imwrite(f"{folder}/photo.png", np.random.default_rng(1).integers(0, 256, (60, 80, 3), np.uint8))
         given = replace(row(f"{folder}/a.npy", roll), alpha0=-8.0, alpha1=0.4, height_m=camera)
-        (subject,) = subjects([given], f"{folder}/rolls.csv", None, ImageOptions())
-        subject = replace(subject, images={kind: f"{folder}/{name}" for kind, name in images}, **options)
         drawn = ImageOptions(heights_range=(-0.3, 0.3))
         settings = FrameOptions(encoding=EncodingOptions("px"), images=drawn)
+        (subject,) = subjects([given], f"{folder}/rolls.csv", None, settings)
+        subject = replace(subject, images={kind: f"{folder}/{name}" for kind, name in images}, **options)
         with mock.patch.object(cv2, "putText", lambda picture, *_: picture):
-            found = pictures.take_pictures(subject, settings)
+            found = pictures.take_pictures(subject)
     shown = {name: each and _seen(each) for name, each in vars(found).items() if name != "missing"}
     return {**shown, "missing": found.missing.replace(folder, ""), "empty": found.empty}
 
@@ -487,15 +483,12 @@ TAKEN = {
 }
 CASES = {
     **{f"charts: {name}": partial(_charts, name) for name in RESULTS},
-    "charts: pairs, alone": partial(_charts, "pairs", assessed=False),
     **{f"axis: {name}": make for name, make in AXES.items()},
     **{f"bars: {name}": make for name, make in BARS.items()},
     **{f"drawn: {name}": partial(_drawn_result, name) for name in RESULTS},
     "drawn: small": partial(_drawn_result, "mixed", Size(240.0, 160.0, 26.0)),
     "drawn: thinned": _thinned,
-    **{f"drawn: {name}": partial(_drawn, chart) for name, chart in HAND_MADE.items()},
     "still": lambda: {name: _still(chart) for name, chart in all_charts(*_mixed()).items()},
-    "still: marked": lambda: _still(HAND_MADE["marked"]),
     **{f"page: {name}": make for name, make in PAGES.items()},
     "chosen": lambda: [
         _chosen(count, jumps) for count in (0, 1, 3, 8, 12) for jumps in ((), (20, 60), range(30, 450, 60))

@@ -74,7 +74,7 @@ def test_the_summary_says_options_version_counts_and_the_sign(folder):
     assert "--max-roll 45" in text
     assert "nine in ten frames" in text
     assert "its right end is up" in text
-    assert "Every frame that has an angle." in text
+    assert "Shown: 3 of 3 frames with an angle." in text
     assert "inputs from maps" in text
     written = datetime.fromtimestamp((folder / "out" / "rolls.csv").stat().st_mtime, timezone.utc)
     assert f"result written {written:%Y-%m-%d %H:%M} UTC" in text

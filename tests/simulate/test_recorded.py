@@ -69,19 +69,8 @@ def _table(**options):
     return [truth_csv(zip(names, specs, strict=True)).decode(), calibration(specs[-1]).decode()]
 
 
-# at a limit of each kind and hardly beyond it
-LIMITS = {
-    "crossfall": (0.0, -0.001, 0.15, 0.151),
-    "gutter": (0.0, -0.001, 0.5, 0.501),
-    "kerb": ((0.0, 0.0), (0.2, 0.1), (0.0, 0.5), (0.0, 0.501), (-0.001, 0.0)),
-    "size": ((16, 16), (15, 16), (16, 15), (16384, 16), (16385, 16), (16, 16384), (16, 16385), (0, 0)),
-    "principal_point": ((0.0, 0.0), (95.0, 71.0), (95.1, 3.0), (3.0, 71.1), (-0.1, 3.0), (3.0, -0.1)),
-    "roll": (math.pi / 2, -math.pi / 2, -1.571, 1.571),
-    "pitch": (math.radians(60), -math.radians(60), -1.048, 1.048),
-    "curvature": (0.01, -0.01, 0.0101, -0.0101),
-    "bend": (0.02, -0.02, 0.0201, -0.0201),
-    "height": (0.0, -1.65, 0.01),
-}
+# at the edges of the image and hardly beyond them
+POINTS = ((0.0, 0.0), (95.0, 71.0), (95.1, 3.0), (3.0, 71.1), (-0.1, 3.0), (3.0, -0.1))
 
 
 def _possible(**values):
@@ -111,16 +100,12 @@ CASES = {
     "drawn beyond too": lambda: [
         _table(**options)
         for options in (
-            {"roll_deg": (-91.0, 1.0)},
-            {"pitch_deg": (0.0, 61.0)},
             {"height": (0.3, 0.3), "roll_deg": (-57.0, 57.0)},
-            {"height": (0.0, 1.6)},
             {"principal_offset": (0.0, 400.0)},
-            {"crossfall": (2.0, 20.0)},
         )
     ],
     "possible": lambda: [
-        *(_possible(**{name: value}) for name, values in LIMITS.items() for value in values),
+        *(_possible(principal_point=point) for point in POINTS),
         _possible(roll=-1.2, height=0.5),
         _possible(roll=-1.2, pitch=0.5, height=0.4),
     ],

@@ -15,6 +15,7 @@ from rollcli.simulate.views import PixelRays, first_hits
 COURSE = Course(heading=0.03, bend=1 / 300, curvature=0.001)
 ORIGIN = np.array([[0.3], [1.6], [0.1]])
 GROUND = Ground(COURSE, (-4.0, 1.0, 9.0), (0, 1), far=80.0, slope=0.1, offset=-0.2)
+DISH = Ground(COURSE, (-4.0, 1.0, 9.0), (0, 1), far=80.0, offset=-0.2, camber=0.03)
 WALL = Wall(COURSE, -6.0, 0.0, np.array([-5.0, 20.0, 50.0]), np.array([9.0, 4.0]), 0)
 BACKDROP = Backdrop(COURSE, 60.0, -5.0, np.full(200, 7.0), 0)
 CAR = vehicle(np.random.default_rng(3), COURSE, Piece(-5, 5), 1.0, 9.0, 0, oncoming=True)
@@ -34,6 +35,11 @@ def inside_post(points):
 def below_ground(points):
     lateral, elevation = COURSE.lateral(points), COURSE.elevation(points)
     return (elevation < -0.2 + 0.1 * lateral) & (lateral >= -4) & (lateral < 9) & (points[2] < 80)
+
+
+def below_dish(points):
+    lateral, elevation = COURSE.lateral(points), COURSE.elevation(points)
+    return (elevation < -0.2 + 0.015 * lateral**2) & (lateral >= -4) & (lateral < 9) & (points[2] < 80)
 
 
 def behind_wall(points):
@@ -56,6 +62,7 @@ def rays(count, toward, spread, seed=0):
 
 SURFACES = [
     pytest.param(GROUND, below_ground, (2, 0, 15), 6, id="ground"),
+    pytest.param(DISH, below_dish, (2, 0, 15), 6, id="dish in a bend"),
     pytest.param(WALL, behind_wall, (-6, 3, 18), 6, id="wall"),
     pytest.param(BACKDROP, beyond_backdrop, (0, 5, 60), 12, id="backdrop"),
     pytest.param(CAR, inside_car, COURSE.point(1.0, 9.0, 0.7), 1.6, id="car"),
