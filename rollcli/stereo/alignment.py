@@ -31,7 +31,7 @@ from rollcli.stereo.views import (
     sampled,
     seen_at,
     shrink_both,
-    smoothed_at_pixels,
+    smoothed,
     smoothed_between,
 )
 
@@ -108,7 +108,7 @@ class Texture(NamedTuple):
     @staticmethod
     def of(views: Views) -> "Texture":
         """Work it out; a pair that is measured again and again needs it once."""
-        left = smoothed_at_pixels(_smooth(views[0]))
+        left = smoothed(_smooth(views[0]))
         return Texture(left, smoothed_between(_smooth(views[1])), *_gradients(left))
 
 
@@ -165,7 +165,7 @@ def textured_share(view: View) -> float:
     """Return the share of a view's blocks that could tell a vertical disparity, were they matched."""
     if min(view.shape) < BLOCK:
         return 0.0
-    across, down = _gradients(smoothed_at_pixels(_smooth(view)))
+    across, down = _gradients(smoothed(_smooth(view)))
     along = block_means(across * across) + np.float32(_RIDGE)
     weight = block_means(down * down) - np.square(block_means(across * down)) / along
     return float(np.mean(weight > _LEAST))
@@ -285,7 +285,7 @@ def _smooth(view: View) -> Floats:
 
     More takes away the grain that tells on an empty road, less leaves the noise.
     """
-    return smoothed_at_pixels(view.astype(np.float32))
+    return smoothed(view)
 
 
 def _gradients(view: Floats) -> tuple[Floats, Floats]:

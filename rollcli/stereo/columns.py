@@ -9,7 +9,7 @@ q y^2.
 import numpy as np
 
 from rollcli.stereo.misalignment import NOTHING_KNOWN, ColumnSupport, Misalignment
-from rollcli.stereo.views import Map, strips
+from rollcli.stereo.views import Map
 
 
 def with_believed_columns(disparity: Map, matched: Misalignment, support: ColumnSupport) -> Map:
@@ -29,14 +29,11 @@ def with_believed_columns(disparity: Map, matched: Misalignment, support: Column
     height, width = disparity.shape
     u = np.arange(width, dtype=np.float32) - np.float32((width - 1) / 2)
     v = np.arange(height, dtype=np.float32)[:, None] - np.float32((height - 1) / 2)
-    result = np.empty_like(disparity)
-    for strip in strips(height):
-        known = disparity[strip]
-        x = u - known
-        moved = np.multiply(x, np.float32(support.twist), out=result[strip])
-        moved += np.float32(support.pitch) * v[strip] + np.float32(support.scale - matched.scale)
-        moved *= x
-        moved += known
-        np.maximum(moved, np.float32(1e-3), out=moved)
-        moved *= known > 0
-    return result
+    x = u - disparity
+    moved = x * np.float32(support.twist)
+    moved += np.float32(support.pitch) * v + np.float32(support.scale - matched.scale)
+    moved *= x
+    moved += disparity
+    np.maximum(moved, np.float32(1e-3), out=moved)
+    moved *= disparity > 0
+    return moved
