@@ -3,7 +3,7 @@
     python tests/benchmarks/bench_level.py [PAIRS] [SEED]
 
 PAIRS rendered pairs (12) of 640x480, half as many of 1242x375, as many of empty roads with much noise, which
-are hardest to measure, and every third real street where ../shared/streets is. OpenCV warps the right view in
+are hardest to measure, and every real street where ../shared/streets is. OpenCV warps the right view in
 twelve ways, by yaws and pitches of a camera, and bends the rows alone; each angle that is ok is compared with
 that of the untouched pair, where this is ok, too, and of rendered ones with the truth. To reach: within 0.1
 degrees, or suspect; no level rendered pair corrected; 0.95 and more of the warped ones in their intervals.
@@ -69,7 +69,7 @@ def main() -> None:
     for kind, more in (("rendered", {}), ("empty roads, much noise", {"scene": "bare", "noise": NOISE})):
         report(kind, [each for part in SIZES for each in rendered(pairs // part, SIZES[part], seed, **more)])
     if STREETS.is_dir():
-        named = sorted((STREETS / "left").iterdir())[::3]
+        named = sorted((STREETS / "left").iterdir())
         sides = [(path, STREETS / "right" / path.name) for path in named]
         report("real streets", [Views(*(read_image(str(path)) for path in pair)) for pair in sides])
 
