@@ -212,10 +212,12 @@ def map_moments(disparity: NDArray[Any], weights: NDArray[Any] | None = None) ->
     s, t, dd = np.zeros((5, 5)), np.zeros((3, 3)), 0.0
     for first in range(0, height, _ROWS):
         rows = slice(first, first + _ROWS)
-        used = (disparity[rows] > 0) & (disparity[rows] < np.inf)
-        block = np.where(used, disparity[rows], 0).astype(np.float64)
-        w = used.astype(np.float64) if weights is None else used * weights[rows]
-        pull = w * block
+        block = np.fmax(disparity[rows], 0).astype(np.float64)  # fmax: NaN gives way to 0
+        block[np.isinf(block)] = 0
+        w, pull = (block > 0).astype(np.float64), block
+        if weights is not None:
+            w *= weights[rows]
+            pull = w * block
         s += along @ (down[:, rows] @ w).T
         t += along[:3] @ (down[:3, rows] @ pull).T
         dd += float(np.vdot(pull, block))
