@@ -59,15 +59,22 @@ def shrink(view: NDArray[Any], factor: float) -> View:
     height, width = matched_shape(view.shape, factor)
     if factor >= _HALVED_FROM and not (view.shape[0] % 2 or view.shape[1] % 2):
         view = shrink(view, 2)
-    between = cv2.INTER_AREA
-    if round(factor) == 3:  # means of nine pixels about each point take a tenth of the time of areas
-        view, between = cv2.blur(view, (3, 3)), cv2.INTER_LINEAR_EXACT
-    return cv2.resize(view, (width, height), interpolation=between).astype(np.uint8, copy=False)
+    return cv2.resize(view, (width, height), interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
 
 
 def shrink_both(views: Views, factor: float) -> Views:
-    """Both views, `factor` times smaller."""
-    return shrink(views[0], factor), shrink(views[1], factor)
+    """Both views, `factor` times smaller, to be looked at."""
+    left, right = (_third(each, factor) if round(factor) == 3 else shrink(each, factor) for each in views)
+    return left, right
+
+
+def _third(view: View, factor: float) -> View:
+    """Shrink a view to about a third: means of nine pixels about each point take a quarter of areas' time."""
+    height, width = matched_shape(view.shape, factor)
+    means = cv2.blur(view, (3, 3))
+    return cv2.resize(means, (width, height), interpolation=cv2.INTER_LINEAR_EXACT).astype(
+        np.uint8, copy=False
+    )
 
 
 def half_the_rows(view: View) -> View:
