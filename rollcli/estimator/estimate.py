@@ -20,7 +20,7 @@ from rollcli.estimator.request import (
     SolverSettings,
 )
 from rollcli.estimator.road.pixels import PixelSet, load_solver, select_pixels
-from rollcli.estimator.solvers.exact import CertifiedSolution, certify, certify_near
+from rollcli.estimator.solvers.exact import CertifiedSolution, certify
 from rollcli.estimator.tuning import TUNING, Tuning
 
 
@@ -265,9 +265,8 @@ def _solve(pixels: PixelSet, request: Request) -> CertifiedSolution:
     if pixels.solution is not None:
         return certify(pixels.energy, pixels.solution)
     solution = load_solver(request.method)(pixels.energy, request.solver)
-    if pixels.road is None or pixels.surface is None:
-        return certify(pixels.energy, solution)
-    return certify_near(pixels.energy, solution, pixels.surface.model.theta, request.solver.tolerance)
+    road_theta = pixels.surface.model.theta if pixels.road and pixels.surface else None
+    return certify(pixels.energy, solution, road_theta, request.solver.tolerance)
 
 
 def _notes(certified: CertifiedSolution, request: Request) -> list[str]:
