@@ -11,12 +11,15 @@ import subprocess
 import sys
 import types
 from concurrent.futures import ThreadPoolExecutor
+from unittest.mock import Mock
 
 import cv2
 import numpy as np
 import pytest
 
 import rollcli
+from rollcli.estimator import estimate
+from rollcli.estimator.request import Request
 from rollcli.rig.calibration import Calibration
 from tests import typed_client
 from tests.reference_page import PAGE, page
@@ -109,6 +112,25 @@ def test_what_is_no_calibration_is_said(disparity):
             rollcli.RollcliError, match=r"no such file|no calibration: give rollcli\.read_cal"
         ):
             call()
+
+
+def test_each_setting_of_the_estimator_has_its_default_and_reaches_it(monkeypatch):
+    asked = vars(Request("gss", "line", "all", 3.0, 1e-3, 0.2, 0.1, 1e-4, 7))
+    view = np.random.default_rng(0).integers(0, 256, (120, 320), dtype=np.uint8)
+    refuse = Mock(side_effect=rollcli.EstimationError("refused"))
+    monkeypatch.setattr(estimate, "estimate_roll", refuse)
+    own = {"disparity", "left", "right", "stereo", "calibration", "mask", "road_mask"}
+    for call, *views in ((rollcli.estimate_roll, view), (rollcli.estimate_pair, view, np.roll(view, -10, 1))):
+        named = inspect.signature(call).parameters
+        given = {name: value for name, value in asked.items() if name in named}
+        assert asked.keys() - named.keys() - {"tuning"} == ({"slope_error"} if len(views) == 2 else set())
+        assert named.keys() - asked.keys() <= own
+        assert all(named[name].default == getattr(Request(), name) for name in given)
+        with pytest.raises(rollcli.EstimationError, match="refused"):
+            call(*views, **given)
+        assert given.items() <= vars(refuse.call_args.args[1]).items()
+    with pytest.raises(TypeError, match="metod"):
+        rollcli.estimate_roll(view, metod="exact")
 
 
 def test_an_image_that_was_not_read_is_said():

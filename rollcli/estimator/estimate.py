@@ -10,18 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 from rollcli.estimator.doubts import Evidence, View, doubts_of
 from rollcli.estimator.interval import Tangent, interval_of, jackknife, touch
 from rollcli.estimator.moments import CheckedMap, Grid
-from rollcli.estimator.request import (
-    AREAS,
-    DEFAULT_SOLVER,
-    MAX_INTERVAL_DEG,
-    MAX_ROLL_DEG,
-    LearningRate,
-    Request,
-    SolverSettings,
-)
+from rollcli.estimator.request import AREAS, DEFAULT_REQUEST, Request
 from rollcli.estimator.road.pixels import PixelSet, load_solver, select_pixels
-from rollcli.estimator.solvers.exact import CertifiedSolution, certify, certify_near
-from rollcli.estimator.tuning import TUNING, Tuning
+from rollcli.estimator.solvers.exact import CertifiedSolution, certify
 
 
 @dataclass(frozen=True)
@@ -155,19 +146,10 @@ def _degrees(angle: float | None) -> float | None:
 
 def estimate_roll(
     disparity: ArrayLike,
+    request: Request = DEFAULT_REQUEST,
     *,
     mask: ArrayLike | None = None,
-    method: str = "gd",
-    model: str = "parabola",
-    road: str = "auto",
-    lambda0: LearningRate = DEFAULT_SOLVER.lambda0,
-    tolerance: float = DEFAULT_SOLVER.tolerance,
-    max_roll: float = math.radians(MAX_ROLL_DEG),
-    max_interval: float = math.radians(MAX_INTERVAL_DEG),
-    slope_error: float = 0.0,
-    seed: int = 0,
     road_mask: bool = False,
-    tuning: Tuning = TUNING,
 ) -> RollEstimate:
     """Estimate the roll angle of the rig that a disparity map was taken with.
 
@@ -176,30 +158,11 @@ def estimate_roll(
     disparity : array_like, shape (H, W)
         Real numbers, px (any constant factor gives the same angle); <= 0, NaN and what is beyond
         1e15 are no data.
+    request : Request, optional
     mask : array_like, shape (H, W), optional
         Non-zero where a pixel may be used.
-    method : {"gd", "gss", "exact", "plane", "areas"}
-    model : {"parabola", "line"}
-    road : {"auto", "all"}
-        Find the road first, or use every valid pixel as the paper does.
-    lambda0 : float or "auto"
-        First learning rate of "gd".
-    tolerance : float
-        delta_theta of the paper, radians.
-    max_roll : float
-        The largest abs(roll) that road finding considers, radians.
-    max_interval : float
-        Half-width of the 95 % interval above which an angle is doubted, radians; so is one of which noise
-        and unevenness make more than 0.45 times that.
-    slope_error : float
-        Standard deviation of a slope along the rows, px per px, that all disparities may have beside the
-        road's: what is left of it where the views of a pair were levelled (`StereoMatch.slope_error`).
-    seed : int
-        Of road finding.
     road_mask : bool
         Whether to return which pixels were used as road.
-    tuning : Tuning
-        The estimator's tuned numbers; to study what they do.
 
     Returns
     -------
@@ -208,7 +171,7 @@ def estimate_roll(
     Raises
     ------
     UsageError
-        When an argument is out of range.
+        When these are no map, or no mask of its size.
     EstimationError
         When the pixels do not determine an angle.
 
@@ -222,8 +185,7 @@ def estimate_roll(
     >>> estimate.status, round(math.degrees(estimate.theta), 3)
     ('ok', 3.0)
     """
-    settings = SolverSettings(tolerance, lambda0)
-    request = Request(method, model, road, settings, max_roll, max_interval, slope_error, seed, tuning)
+    tuning = request.tuning
     checked = CheckedMap.of(disparity, mask)
     pixels = select_pixels(checked, request)
     certified = _solve(pixels, request)
@@ -232,7 +194,7 @@ def estimate_roll(
     alpha = pixels.energy.parabola(theta)
     height, width = checked.values.shape
     tangent = touch(alpha, theta, Grid.of_shape(height, width), surface, knife)
-    turned = tangent.turned_by(slope_error)
+    turned = tangent.turned_by(request.slope_error)
     interval = None if knife is None else interval_of(knife, theta, turned, tuning.interval)
     rmse = pixels.energy.rmse(certified.energy)
     view = None
@@ -244,10 +206,10 @@ def estimate_roll(
         ci95=None if interval is None else interval.half_width,
         status="suspect" if doubts else "ok",
         message="; ".join(doubts + _notes(certified, request)),
-        method=method,
+        method=request.method,
         iterations=certified.solution.iterations,
         converged=certified.solution.status.converged,
-        global_minimum=None if method in AREAS else certified.is_global,
+        global_minimum=None if request.method in AREAS else certified.is_global,
         rmse=rmse,
         alpha=alpha,
         valid_fraction=checked.count / checked.values.size,
@@ -265,9 +227,8 @@ def _solve(pixels: PixelSet, request: Request) -> CertifiedSolution:
     if pixels.solution is not None:
         return certify(pixels.energy, pixels.solution)
     solution = load_solver(request.method)(pixels.energy, request.solver)
-    if pixels.road is None or pixels.surface is None:
-        return certify(pixels.energy, solution)
-    return certify_near(pixels.energy, solution, pixels.surface.model.theta, request.solver.tolerance)
+    road_theta = pixels.surface.model.theta if pixels.road and pixels.surface else None
+    return certify(pixels.energy, solution, road_theta, request.tolerance)
 
 
 def _notes(certified: CertifiedSolution, request: Request) -> list[str]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 from rollcli.errors import UsageError
-from rollcli.estimator.tuning import Tuning
+from rollcli.estimator.tuning import TUNING, Tuning
 
 LAMBDA0 = 26.0  # the fewest iterations in [GD] Fig. 3
 TOLERANCE_DEG = 1e-4  # the finest of the paper's four
@@ -80,7 +80,32 @@ DEFAULT_AREA = AreaSettings()
 
 @dataclass(frozen=True)
 class Request:
-    """How a map is to be estimated; see `estimate_roll` for each field.
+    """How a map is to be estimated.
+
+    Attributes
+    ----------
+    method : str
+        One of `METHODS`.
+    model : str
+        Of the road: one of `MODELS`.
+    road : str
+        "auto": find the road first; "all": use every valid pixel as the paper does.
+    lambda0 : float or "auto"
+        First learning rate of gradient descent, rad^2 per unit of the normalised energy.
+    tolerance : float
+        delta_theta of the paper, radians.
+    max_roll : float
+        The largest abs(roll) that road finding considers, radians.
+    max_interval : float
+        Half-width of the 95 % interval above which an angle is doubted, radians; so is one of which noise
+        and unevenness make more than 0.45 times that.
+    slope_error : float
+        Standard deviation of a slope along the rows, px per px, that all disparities may have beside the
+        road's: what is left of it where the views of a pair were levelled (`StereoMatch.slope_error`).
+    seed : int
+        Of road finding.
+    tuning : Tuning
+        The estimator's tuned numbers; to study what they do.
 
     Raises
     ------
@@ -88,25 +113,27 @@ class Request:
         When a value is out of range.
     """
 
-    method: str
-    model: str
-    road: str
-    solver: SolverSettings
-    max_roll: float
-    max_interval: float
-    slope_error: float
-    seed: int
-    tuning: Tuning
+    method: str = "gd"
+    model: str = "parabola"
+    road: str = "auto"
+    lambda0: LearningRate = DEFAULT_SOLVER.lambda0
+    tolerance: float = DEFAULT_SOLVER.tolerance
+    max_roll: float = DEFAULT_AREA.max_roll
+    max_interval: float = math.radians(MAX_INTERVAL_DEG)
+    slope_error: float = 0.0
+    seed: int = 0
+    tuning: Tuning = TUNING
 
     def __post_init__(self) -> None:
         _check_name("method", self.method, METHODS)
         _check_name("model", self.model, MODELS)
         _check_name("road", self.road, ROADS)
-        lambda0, tolerance = self.solver.lambda0, self.solver.tolerance
-        if lambda0 != "auto" and not 0 < lambda0 < math.inf:
-            raise UsageError(f"lambda0 {lambda0}: give a positive number, or auto")
-        if not 0 < tolerance < math.inf:
-            raise UsageError(f"a tolerance of {math.degrees(tolerance):g} degrees: give a positive angle")
+        if self.lambda0 != "auto" and not 0 < self.lambda0 < math.inf:
+            raise UsageError(f"lambda0 {self.lambda0}: give a positive number, or auto")
+        if not 0 < self.tolerance < math.inf:
+            raise UsageError(
+                f"a tolerance of {math.degrees(self.tolerance):g} degrees: give a positive angle"
+            )
         if not 0 < self.max_roll <= math.radians(MAX_ROLL_LIMIT_DEG) * (1 + 1e-12):
             raise UsageError(
                 f"a largest roll of {math.degrees(self.max_roll):g} degrees: "
@@ -123,6 +150,11 @@ class Request:
             )
 
     @property
+    def solver(self) -> SolverSettings:
+        """The settings of a solver."""
+        return SolverSettings(self.tolerance, self.lambda0)
+
+    @property
     def parabolic(self) -> bool:
         """Whether the road is a parabola, not a line."""
         return self.model == "parabola"
@@ -131,3 +163,6 @@ class Request:
 def _check_name(kind: str, name: str, names: Collection[str]) -> None:
     if name not in names:
         raise UsageError(f"{kind} {name!r}: choose one of {', '.join(names)}")
+
+
+DEFAULT_REQUEST = Request()

@@ -14,7 +14,7 @@ from rollcli.errors import EstimationError
 from rollcli.estimator.energy import Energy
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.moments import CheckedMap, Floats, Grid, map_moments
-from rollcli.estimator.request import LAMBDA0, MAX_ROLL_DEG, MAX_ROLL_LIMIT_DEG, AreaSettings, SolverSettings
+from rollcli.estimator.request import LAMBDA0, MAX_ROLL_LIMIT_DEG, AreaSettings, Request, SolverSettings
 from rollcli.estimator.road.pixels import load_area_method, load_solver
 from rollcli.estimator.solvers.areas import fit_plane
 from rollcli.estimator.solvers.exact import exact, minima
@@ -190,7 +190,7 @@ def _solver_errors(
 
 def _methods(largest_turn: float, chosen: bool) -> dict[str, Callable[[NDArray[Any]], float]]:
     """Return each method as a function from a map to its angle."""
-    max_roll = min(_LARGEST_ROLL, math.radians(MAX_ROLL_DEG) + max(0.0, largest_turn - math.radians(20)))
+    max_roll = min(_LARGEST_ROLL, Request().max_roll + max(0.0, largest_turn - math.radians(20)))
     settings = AreaSettings(max_roll, chosen=chosen)
 
     def by_areas(name: str, disparity: NDArray[Any]) -> float:
@@ -203,7 +203,7 @@ def _methods(largest_turn: float, chosen: bool) -> dict[str, Callable[[NDArray[A
         "line": lambda disparity: exact(_energy(disparity, parabolic=False)).theta,
         "plane": partial(by_areas, "plane"),
         "areas": partial(by_areas, "areas"),
-        "auto": lambda disparity: estimate_roll(disparity, road="auto", max_roll=max_roll).theta,
+        "auto": lambda disparity: estimate_roll(disparity, Request(max_roll=max_roll)).theta,
     }
 
 

@@ -109,8 +109,8 @@ def _road(subject: Subject, source: Source | None) -> NDArray[Any] | None:
         return read_image(subject.images["road_mask"])
     if source is None or source.photo is None:
         return None
-    arguments = subject.options.method.arguments()
-    found = estimate_roll(source.disparity, mask=source.allowed, road_mask=True, **arguments)
+    request = subject.options.method.request()
+    found = estimate_roll(source.disparity, request, mask=source.allowed, road_mask=True)
     # where options that the record does not give back led to another angle, this is not its road
     if found.road_mask is None or abs(found.theta - subject.theta) > _SAME:
         return None

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from rollcli.errors import EstimationError, InputError
 from rollcli.estimator import tuning as estimator
 from rollcli.estimator.estimate import estimate_roll
+from rollcli.estimator.request import Request
 from rollcli.files.encodings import Encoding
 from rollcli.files.formats import Stored
 from rollcli.run.options import FrameOptions
@@ -211,9 +212,8 @@ def _inverse(values: NDArray[Any]) -> NDArray[Any]:
 
 def _has_road(disparity: NDArray[Any], options: FrameOptions) -> bool:
     """Tell whether a road is found that gives no reason for doubt, however uncertain its angle is."""
-    seed = options.method.seed
+    request = Request(max_interval=TUNING.wide, seed=options.method.seed, tuning=_ANY_ANGLE)
     try:
-        found = estimate_roll(disparity, max_interval=TUNING.wide, seed=seed, tuning=_ANY_ANGLE)
-        return found.status == "ok"
+        return estimate_roll(disparity, request).status == "ok"
     except EstimationError:
         return False

@@ -54,16 +54,10 @@ def _estimate(frame: Frame, options: FrameOptions, images: dict[str, bytes]) -> 
 
 def _estimate_roll(source: Source, options: FrameOptions) -> tuple[RollEstimate, str]:
     """Estimate the roll; where there is no sure angle, say what the map looks like instead."""
+    request = options.method.request(source.slope_error)
     wanted = options.images.road_mask is not None
-    arguments = options.method.arguments()
     try:
-        estimate = estimate_roll(
-            source.disparity,
-            mask=source.allowed,
-            slope_error=source.slope_error,
-            road_mask=wanted,
-            **arguments,
-        )
+        estimate = estimate_roll(source.disparity, request, mask=source.allowed, road_mask=wanted)
     except EstimationError as error:
         likeness = looks_like(source.disparity, source.stored, options)
         raise EstimationError(f"{likeness}; {error}" if likeness else str(error), likeness) from error

@@ -1,6 +1,5 @@
 """The roll of a map, and of a stereo pair, in one call: as `rollcli estimate` finds it."""
 
-import math
 import os
 from dataclasses import replace
 from typing import Any
@@ -12,13 +11,7 @@ from rollcli.errors import EstimationError, UsageError
 from rollcli.estimator import estimate as estimator
 from rollcli.estimator.estimate import RollEstimate
 from rollcli.estimator.moments import map_of
-from rollcli.estimator.request import (
-    DEFAULT_SOLVER,
-    MAX_INTERVAL_DEG,
-    MAX_ROLL_DEG,
-    MAX_ROLL_LIMIT_DEG,
-    LearningRate,
-)
+from rollcli.estimator.request import DEFAULT_REQUEST, LearningRate, Request
 from rollcli.files.encodings import to_disparity
 from rollcli.files.formats import Stored
 from rollcli.rig.calibration import Calibration
@@ -26,7 +19,7 @@ from rollcli.rig.pose import with_pose
 from rollcli.run.diagnosis import PYTHON, looks_like
 from rollcli.run.find import given_calibration
 from rollcli.run.options import FrameOptions, MethodOptions
-from rollcli.run.read import matched_source
+from rollcli.run.read import matched_source, wanted_of
 from rollcli.stereo.options import StereoOptions
 
 
@@ -38,10 +31,10 @@ def estimate_roll(
     method: str = "gd",
     model: str = "parabola",
     road: str = "auto",
-    lambda0: LearningRate = DEFAULT_SOLVER.lambda0,
-    tolerance: float = DEFAULT_SOLVER.tolerance,
-    max_roll: float = math.radians(MAX_ROLL_DEG),
-    max_interval: float = math.radians(MAX_INTERVAL_DEG),
+    lambda0: LearningRate = DEFAULT_REQUEST.lambda0,
+    tolerance: float = DEFAULT_REQUEST.tolerance,
+    max_roll: float = DEFAULT_REQUEST.max_roll,
+    max_interval: float = DEFAULT_REQUEST.max_interval,
     slope_error: float = 0.0,
     seed: int = 0,
     road_mask: bool = False,
@@ -111,6 +104,7 @@ def estimate_roll(
     >>> round(found.pitch, 4), round(found.height_m, 4)
     (0.2, 1.5)
     """
+    request = Request(method, model, road, lambda0, tolerance, max_roll, max_interval, slope_error, seed)
     rig = given_calibration(calibration)
     values = map_of(disparity)
     if values.ndim == 3 and values.shape[2] in (3, 4):
@@ -120,20 +114,7 @@ def estimate_roll(
         return "; ".join(filter(None, [_likeness(values, seed), reason]))
 
     try:
-        estimate = estimator.estimate_roll(
-            values,
-            mask=mask,
-            method=method,
-            model=model,
-            road=road,
-            lambda0=lambda0,
-            tolerance=tolerance,
-            max_roll=max_roll,
-            max_interval=max_interval,
-            slope_error=slope_error,
-            seed=seed,
-            road_mask=road_mask,
-        )
+        estimate = estimator.estimate_roll(values, request, mask=mask, road_mask=road_mask)
     except EstimationError as error:
         raise EstimationError(said(str(error))) from error
     if estimate.status != "ok":
@@ -160,10 +141,10 @@ def estimate_pair(
     method: str = "gd",
     model: str = "parabola",
     road: str = "auto",
-    lambda0: LearningRate = DEFAULT_SOLVER.lambda0,
-    tolerance: float = DEFAULT_SOLVER.tolerance,
-    max_roll: float = math.radians(MAX_ROLL_DEG),
-    max_interval: float = math.radians(MAX_INTERVAL_DEG),
+    lambda0: LearningRate = DEFAULT_REQUEST.lambda0,
+    tolerance: float = DEFAULT_REQUEST.tolerance,
+    max_roll: float = DEFAULT_REQUEST.max_roll,
+    max_interval: float = DEFAULT_REQUEST.max_interval,
     seed: int = 0,
     road_mask: bool = False,
 ) -> RollEstimate:
@@ -180,7 +161,7 @@ def estimate_pair(
     stereo : StereoOptions, optional
         How the pair is matched; by default as the command does.
     method, model, road, lambda0, tolerance, max_roll, max_interval, seed, road_mask
-        See `rollcli.estimator.estimate.estimate_roll`.
+        See `rollcli.estimate_roll`.
 
     Returns
     -------
@@ -201,33 +182,18 @@ def estimate_pair(
     >>> rng = np.random.default_rng(0)
     >>> right = rng.integers(0, 256, (120, 320), dtype=np.uint8)
     >>> rows = [np.roll(row, 10 + v // 8) for v, row in enumerate(right)]
-    >>> abs(math.degrees(estimate_pair(np.stack(rows), right, road="all").theta)) < 1
+    >>> abs(estimate_pair(np.stack(rows), right, road="all").roll_deg) < 1
     True
     """
-    if not 0 < max_roll <= math.radians(MAX_ROLL_LIMIT_DEG) * (1 + 1e-12):
-        raise UsageError(f"a largest roll of {math.degrees(max_roll):g} degrees: give more than 0")
-    asked = MethodOptions(road=road, max_roll_deg=math.degrees(max_roll), seed=seed)
-    options = FrameOptions(stereo=stereo or StereoOptions(), method=asked)
+    request = Request(method, model, road, lambda0, tolerance, max_roll, max_interval, seed=seed)
     rig = given_calibration(calibration)
     allowed = None if mask is None else np.asarray(mask) != 0
     if allowed is not None and not (allowed.ndim == 2 and allowed.any()):
         raise UsageError("the mask leaves no pixel of the map: give an array that is not all zero")
-    source = matched_source(left, right, allowed, options)
+    source = matched_source(left, right, stereo or StereoOptions(), wanted_of(allowed, request))
+    request = replace(request, slope_error=source.slope_error)
     height, width = left.shape[:2]
-    estimate = estimator.estimate_roll(
-        source.disparity,
-        mask=allowed,
-        slope_error=source.slope_error,
-        method=method,
-        model=model,
-        road=road,
-        lambda0=lambda0,
-        tolerance=tolerance,
-        max_roll=max_roll,
-        max_interval=max_interval,
-        seed=seed,
-        road_mask=road_mask,
-    )
+    estimate = estimator.estimate_roll(source.disparity, request, mask=allowed, road_mask=road_mask)
     if source.doubt:
         message = "; ".join(filter(None, [estimate.message, source.doubt]))
         estimate = replace(estimate, status="suspect", message=message)

@@ -6,7 +6,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
-from rollcli.estimator.request import LAMBDA0, MAX_INTERVAL_DEG, MAX_ROLL_DEG, TOLERANCE_DEG, LearningRate
+from rollcli.estimator.request import (
+    LAMBDA0,
+    MAX_INTERVAL_DEG,
+    MAX_ROLL_DEG,
+    TOLERANCE_DEG,
+    LearningRate,
+    Request,
+)
 from rollcli.rig.calibration import CalibrationOptions
 from rollcli.stereo.options import StereoOptions
 
@@ -130,12 +137,13 @@ class MethodOptions(NamedTuple):
     max_interval_deg: float = MAX_INTERVAL_DEG
     seed: int = 0
 
-    def arguments(self) -> dict[str, Any]:
-        """Return the arguments that `estimate_roll` takes: what is in degrees here is in radians there."""
-        return {
+    def request(self, slope_error: float = 0.0) -> Request:
+        """Return what is asked of the estimator, in radians; `slope_error`: of the map, px per px."""
+        given: dict[str, Any] = {
             name.removesuffix("_deg"): math.radians(value) if name.endswith("_deg") else value
             for name, value in self._asdict().items()
         }
+        return Request(**given, slope_error=slope_error)
 
 
 class ImageOptions(NamedTuple):

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import EstimationError, InputError, UsageError, raised_at
+from rollcli.estimator.request import Request
 from rollcli.estimator.road.find import road_plane
 from rollcli.files.codecs.pictures import views_of
 from rollcli.files.encodings import Encoding, read_mask, to_disparity
@@ -23,7 +24,8 @@ from rollcli.files.storage import noting, state_of
 from rollcli.messages import one_line
 from rollcli.run.diagnosis import require_positive, too_large
 from rollcli.run.frame import Decoded, Frame, FrameResult, failed_frame
-from rollcli.run.options import FrameOptions, MethodOptions, RegionOptions
+from rollcli.run.options import FrameOptions, RegionOptions
+from rollcli.stereo.options import StereoOptions
 
 if TYPE_CHECKING:
     from rollcli.stereo.match import StereoMatch, Wanted
@@ -249,8 +251,9 @@ def _match(frame: Frame, options: FrameOptions) -> Source:
 
     left, right = read_views(frame, options)
     allowed = region_mask(frame.mask, options, matched_shape(left.shape, options.stereo.downscale))
-    source = matched_source(left, right, allowed, options)
-    return replace(source, photo=left if options.images.needs_photo else None)
+    wanted = wanted_of(allowed, options.method.request(), whole=bool(options.images.folders()))
+    source = matched_source(left, right, options.stereo, wanted)
+    return replace(source, photo=left if options.images.needs_photo else None, allowed=allowed)
 
 
 def read_views(frame: Frame, options: FrameOptions) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -275,12 +278,12 @@ def decoded(frame: Frame, options: FrameOptions) -> Frame:
 
 
 def matched_source(
-    left: NDArray[Any], right: NDArray[Any], allowed: NDArray[np.bool_] | None, options: FrameOptions
+    left: NDArray[Any], right: NDArray[Any], options: StereoOptions, wanted: "Wanted"
 ) -> Source:
-    """Match a pair for the estimate; `allowed` has the shape that is matched at."""
+    """Match a pair for the estimate."""
     from rollcli.stereo.match import match_pair
 
-    match = match_pair(left, right, options.stereo, wanted_of(allowed, options))
+    match = match_pair(left, right, options, wanted)
     searched = (match.min_disparity, match.min_disparity + match.num_disparities - 1)
     height, width = left.shape[:2]
     return Source(
@@ -291,7 +294,6 @@ def matched_source(
         alignment=_alignment(match),
         size=(width, height),
         whole=match.whole,
-        allowed=allowed,
     )
 
 
@@ -303,24 +305,21 @@ def _alignment(match: "StereoMatch") -> dict[str, float]:
     return {name: round(each, 4) for name, each in zip(ALIGNMENT_COLUMNS, values, strict=True)}
 
 
-def wanted_of(allowed: NDArray[np.bool_] | None, options: FrameOptions) -> "Wanted":
-    """Say what of the map the estimate needs, and whether images show more."""
+def wanted_of(allowed: NDArray[np.bool_] | None, request: Request, *, whole: bool = False) -> "Wanted":
+    """Say what of a pair's map the estimate needs; `allowed` has the shape that is matched at."""
     from rollcli.stereo.match import Wanted
 
-    return Wanted(
-        road=partial(_road, allowed, options.method) if options.method.road == "auto" else None,
-        whole=bool(options.images.folders()),
-    )
+    return Wanted(road=partial(_road, allowed, request) if request.road == "auto" else None, whole=whole)
 
 
 def _road(
-    allowed: NDArray[np.bool_] | None, method: MethodOptions, small: NDArray[Any]
+    allowed: NDArray[np.bool_] | None, request: Request, small: NDArray[Any]
 ) -> tuple[float, float, float] | None:
     """Return the plane of the road that a small map shows in the region."""
     if allowed is not None:
         v, u = (np.arange(few) * many // few for few, many in zip(small.shape, allowed.shape, strict=True))
         allowed = allowed[v[:, None], u]
-    return road_plane(small, allowed, math.radians(method.max_roll_deg), method.seed)
+    return road_plane(small, allowed, request.max_roll, request.seed)
 
 
 def _doubt_of_range(match: "StereoMatch") -> str:

@@ -83,7 +83,7 @@ def _is_copy(frame: Frame, row: Row, options: FrameOptions) -> bool:
 
     try:
         source = read_source(frame, options)
-        found = estimate_roll(source.disparity, mask=source.allowed, **options.method.arguments())
+        found = estimate_roll(source.disparity, options.method.request(), mask=source.allowed)
     except (OSError, RollcliError):
         return False
     return abs(math.degrees(found.theta) - (row.map_roll_deg or 0.0)) < _SAME_DEG

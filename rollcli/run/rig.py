@@ -311,7 +311,8 @@ def columns_of_drive(rig: RigAssessment, results: Sequence[str]) -> ColumnSuppor
     for frame, options in _pairs(rig, results):
         try:
             left, right = read_views(frame, options)
-            measured = match_pair(left, right, options.stereo, wanted_of(None, options)).measured
+            wanted = wanted_of(None, options.method.request())
+            measured = match_pair(left, right, options.stereo, wanted).measured
         except FRAME_ERRORS:  # the pairs that are left may be enough
             continue
         if measured is not None:

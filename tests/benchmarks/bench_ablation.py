@@ -42,6 +42,7 @@ from numpy.typing import NDArray
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.estimate import estimate_roll
+from rollcli.estimator.request import Request
 from rollcli.estimator.tuning import TUNING, Tuning
 from rollcli.files.encodings import read_disparity
 
@@ -213,7 +214,7 @@ def estimate_one(case: Case, tuning: Tuning) -> tuple[float, float, float, bool]
     """Return angle, error and half-width, degrees, and whether the angle is called ok."""
     try:
         with np.errstate(all="ignore"):
-            found = estimate_roll(case.disparity, tuning=tuning)
+            found = estimate_roll(case.disparity, Request(tuning=tuning))
     except (EstimationError, np.linalg.LinAlgError, ValueError, IndexError):
         return NAN, 90.0, 0.0, False  # a number may be changed beyond what the code can bear
     ok = found.status == "ok"

@@ -25,6 +25,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from rollcli.errors import RollcliError
 from rollcli.estimator.estimate import RollEstimate, estimate_roll
+from rollcli.estimator.request import Request
 from rollcli.files.formats import read_image
 from rollcli.simulate.build import render_frame
 from rollcli.simulate.options import SimulateOptions
@@ -158,7 +159,7 @@ def bent(view: NDArray[Any], share: float) -> NDArray[Any]:
 
 def estimate_of(match: StereoMatch) -> RollEstimate:
     """The estimate of a matched pair."""
-    return estimate_roll(match.disparity, slope_error=match.slope_error)
+    return estimate_roll(match.disparity, Request(slope_error=match.slope_error))
 
 
 if __name__ == "__main__":

@@ -20,6 +20,7 @@ from matched import match_as_estimated
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from rollcli.estimator.estimate import RollEstimate, estimate_roll
+from rollcli.estimator.request import Request
 from rollcli.files.formats import read_image
 
 REALMAPS = Path(__file__).resolve().parents[3] / "shared" / "realmaps"
@@ -45,7 +46,7 @@ def estimate_of(file: str) -> RollEstimate:
     if path.parent.name == "left":
         right = path.parents[1] / "right" / path.name
         match = match_as_estimated(read_image(path), read_image(right))
-        return estimate_roll(match.disparity, slope_error=match.slope_error)
+        return estimate_roll(match.disparity, Request(slope_error=match.slope_error))
     stored = read_image(path)
     return estimate_roll(stored.astype(np.float32) / (256 if stored.dtype == np.uint16 else 1))
 

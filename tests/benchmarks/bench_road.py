@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.estimate import estimate_roll
+from rollcli.estimator.request import Request
 
 SEEDS = (901, 902)
 TIMED = {(1242, 375): 12, (3840, 2160): 1}  # size, maps
@@ -43,7 +44,7 @@ def ours(disparity: Map) -> float:
 
 def every_pixel(disparity: Map) -> float:
     """Least squares on every valid pixel, the global minimum."""
-    return estimate_roll(disparity, road="all", method="exact").theta
+    return estimate_roll(disparity, Request(road="all", method="exact")).theta
 
 
 def points(disparity: Map) -> NDArray[np.float64]:

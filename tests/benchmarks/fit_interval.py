@@ -20,23 +20,12 @@ from rollcli.errors import EstimationError
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.interval import jackknife, noise_of
 from rollcli.estimator.moments import CheckedMap
-from rollcli.estimator.request import DEFAULT_SOLVER, MAX_INTERVAL_DEG, MAX_ROLL_DEG, Request
+from rollcli.estimator.request import DEFAULT_REQUEST
 from rollcli.estimator.road.pixels import select_pixels
 from rollcli.estimator.tuning import TUNING
 from rollcli.simulate.dataset import lane_rolls_of
 
 FIT_SEEDS, JUDGE_SEEDS = (81, 82), (83, 84)
-REQUEST = Request(
-    "gd",
-    "parabola",
-    "auto",
-    DEFAULT_SOLVER,
-    max_roll=math.radians(MAX_ROLL_DEG),
-    max_interval=math.radians(MAX_INTERVAL_DEG),
-    slope_error=0.0,
-    seed=0,
-    tuning=TUNING,
-)
 
 
 def terms(frames: int, seeds: tuple[int, int], roughness: str | None) -> tuple[np.ndarray, list[str]]:
@@ -48,7 +37,7 @@ def terms(frames: int, seeds: tuple[int, int], roughness: str | None) -> tuple[n
         ):
             try:
                 theta = estimate_roll(disparity).theta
-                surface = select_pixels(CheckedMap.of(disparity, None), REQUEST).surface
+                surface = select_pixels(CheckedMap.of(disparity, None), DEFAULT_REQUEST).surface
             except EstimationError as error:
                 print(f"{scene} {math.degrees(spec.roll):.2f}: {error}")
                 continue

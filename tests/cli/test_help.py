@@ -1,14 +1,12 @@
 """Each command's manual page, and what is documented of options."""
 
-import inspect
-import math
 import re
 import shlex
 
 import click
 import pytest
 
-from rollcli.estimator.estimate import estimate_roll
+from rollcli.estimator.request import Request
 from rollcli.files.results import FURTHER, columns
 from rollcli.run.options import MethodOptions
 from tests.readme_tables import commands
@@ -73,12 +71,7 @@ def test_rig_and_report_tell_how_they_end_themselves():
 
 
 def test_the_defaults_of_the_method_are_those_of_the_library():
-    library = {name: p.default for name, p in inspect.signature(estimate_roll).parameters.items()}
-    given = MethodOptions()
-    for name in ("method", "model", "road", "lambda0", "seed"):
-        assert getattr(given, name) == library[name]
-    assert math.radians(given.tolerance_deg) == pytest.approx(library["tolerance"])
-    assert math.radians(given.max_roll_deg) == pytest.approx(library["max_roll"])
+    assert MethodOptions().request() == Request()
 
 
 def test_every_column_and_exit_status_is_documented_in_the_readme():

@@ -7,6 +7,7 @@ import pytest
 
 from rollcli.estimator.doubts import REASONS
 from rollcli.estimator.estimate import estimate_roll
+from rollcli.estimator.request import Request
 from tests.estimator.synthetic_maps import bent_road, flat_road
 
 V, U = np.mgrid[:480, :640].astype(float)
@@ -89,7 +90,7 @@ MAPS = {
 def test_a_map_made_for_a_reason_is_suspect_and_says_so(reason):
     make, options = MAPS[reason]
 
-    estimate = estimate_roll(make(), **options)
+    estimate = estimate_roll(make(), Request(**options))
 
     assert estimate.status == "suspect"
     assert reason in estimate.message

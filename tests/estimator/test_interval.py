@@ -11,6 +11,7 @@ from rollcli.errors import UsageError
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.interval import Interval, Jackknife, interval_of, jackknife, touch
 from rollcli.estimator.moments import Floats, Grid
+from rollcli.estimator.request import Request
 from rollcli.estimator.road.model import RoadModel
 from rollcli.estimator.road.sample import take_sample
 from rollcli.estimator.road.surface import Surface, whole_surface
@@ -49,7 +50,7 @@ def noisy_road(rng, roll_deg):
 def test_95_percent_of_the_intervals_hold_the_true_roll():
     rng = np.random.default_rng(2)
     rolls = rng.uniform(-60, 60, MAPS)
-    found = [estimate_roll(noisy_road(rng, roll), max_roll=math.radians(70)) for roll in rolls]
+    found = [estimate_roll(noisy_road(rng, roll), Request(max_roll=math.radians(70))) for roll in rolls]
     error = np.abs(np.degrees([each.theta for each in found]) - rolls)
     half_width = np.degrees([each.ci95 for each in found])
 
@@ -79,14 +80,13 @@ def test_a_slope_that_all_disparities_may_have_widens_it_by_what_it_would_turn(r
     """Maps that have such a slope show what it turns: that is the standard deviation that is added."""
     slope, columns = 1e-3, np.arange(SIZE["width"])
     road = noisy_road(np.random.default_rng(4), roll_deg)
-    settings = {"road": "all", "method": "exact", "max_roll": math.radians(70)}
+    request = Request(road="all", method="exact", max_roll=math.radians(70))
     turned = [
-        estimate_roll(np.where(road > 0, road + sign * slope * columns, 0), **settings).theta
-        for sign in (1, -1)
+        estimate_roll(np.where(road > 0, road + sign * slope * columns, 0), request).theta for sign in (1, -1)
     ]
 
-    without = estimate_roll(road, **settings)
-    found = estimate_roll(road, slope_error=slope, **settings)
+    without = estimate_roll(road, request)
+    found = estimate_roll(road, dataclasses.replace(request, slope_error=slope))
 
     added = math.sqrt(found.ci95**2 - without.ci95**2)
     assert found.theta == without.theta
@@ -96,7 +96,7 @@ def test_a_slope_that_all_disparities_may_have_widens_it_by_what_it_would_turn(r
 @pytest.mark.parametrize("slope_error", [-1e-4, math.nan, math.inf])
 def test_a_slope_error_that_is_none_is_refused(slope_error):
     with pytest.raises(UsageError, match=r"slope error of .*: give 0 or more px per px"):
-        estimate_roll(flat_road(3, **SIZE), slope_error=slope_error)
+        Request(slope_error=slope_error)
 
 
 def knife(bands=(0.0,), columns=(0.0,), white=0.0, freedom=(5.0, 5.0), **parts):

@@ -9,7 +9,7 @@ from hypothesis import given
 from rollcli.errors import EstimationError
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.moments import CheckedMap, map_moments, point_moments, require_pixels
-from rollcli.estimator.request import METHODS
+from rollcli.estimator.request import METHODS, Request
 from tests.estimator.synthetic_maps import bent_road, random_maps, repeatable
 
 DEGREES_4 = [(i, j) for i in range(5) for j in range(5 - i)]
@@ -87,14 +87,14 @@ def test_degenerate_pixels_are_refused_with_the_reason_by_every_method(kind, met
     if (kind, method) == ("a diagonal", "areas"):
         reason = "no area of 8x8 pixels is at least half valid"
     with pytest.raises(EstimationError, match=reason):
-        estimate_roll(bent_road(5, noise=0.1), mask=kept, method=method, road="all")
+        estimate_roll(bent_road(5, noise=0.1), Request(method=method, road="all"), mask=kept)
 
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("value", [7.0, 7.3, 0.1, 0.001, 300.0])
 def test_a_constant_map_is_refused_by_every_method(value, method):
     with pytest.raises(EstimationError, match="same everywhere"):
-        estimate_roll(np.full((90, 120), value, np.float32), method=method, road="all")
+        estimate_roll(np.full((90, 120), value, np.float32), Request(method=method, road="all"))
 
 
 def test_three_rows_and_columns_are_enough():

@@ -15,7 +15,6 @@ from rollcli.estimator.road.pixels import load_area_method, select_pixels
 from rollcli.estimator.solvers.exact import minima
 from rollcli.estimator.solvers.golden_section import golden_section
 from rollcli.estimator.solvers.gradient_descent import gradient_descent
-from rollcli.estimator.tuning import TUNING
 from tests.estimator.synthetic_maps import bent_road, energy_of, flat_road
 from tests.recorded import check, made
 
@@ -141,11 +140,11 @@ OTHER = {  # a map, and how it is estimated
 }
 
 
-def _estimate(name, **options):
+def _estimate(name, mask=None, **asked):
     """The estimate, the road behind it and its pixels; or why there is none."""
     disparity = MAPS[name]()
     try:
-        found = estimate_roll(disparity, road_mask=True, **options)
+        found = estimate_roll(disparity, Request(**asked), mask=mask, road_mask=True)
     except EstimationError as error:
         return str(error)
     tangent = found.tangent and [found.tangent.row, found.tangent.disparity, found.tangent.slope]
@@ -154,11 +153,8 @@ def _estimate(name, **options):
 
 def _behind(name):
     """What the estimate rests on: the plane that was found, its rivals, and the surface fitted to it."""
-    request = Request(
-        "gd", "parabola", "auto", SolverSettings(), math.radians(MAX_ROLL_DEG), 0.01, 0.0, 1, TUNING
-    )
     try:
-        pixels = select_pixels(CheckedMap.of(MAPS[name](), None), request)
+        pixels = select_pixels(CheckedMap.of(MAPS[name](), None), Request(seed=1))
     except EstimationError as error:
         return str(error)
     road, surface = pixels.road, pixels.surface
@@ -198,11 +194,14 @@ ASKED = (
 NO_MAPS = (np.ones(50), np.ones((5, 5, 3)), np.full((50, 50), "1"))
 
 
+def _angle(disparity, mask=None, **asked):
+    return estimate_roll(disparity, Request(**asked), mask=mask).roll_deg
+
+
 def _asked():
     """Which options are taken, and why others and what is no map are not."""
-    found = [made(estimate_roll, _road(5), **options) for options in ASKED]
-    found += [made(estimate_roll, each) for each in NO_MAPS]
-    return [each if isinstance(each, str) else math.degrees(each.theta) for each in found]
+    found = [made(_angle, _road(5), **options) for options in ASKED]
+    return found + [made(_angle, each) for each in NO_MAPS]
 
 
 CASES = {

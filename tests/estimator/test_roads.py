@@ -8,7 +8,7 @@ import pytest
 from rollcli.estimator.energy import Energy
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.moments import map_moments
-from rollcli.estimator.request import SolverSettings
+from rollcli.estimator.request import Request, SolverSettings
 from rollcli.estimator.solvers.gradient_descent import gradient_descent
 from rollcli.files.formats import read_image
 from rollcli.stereo.match import StereoOptions, match_pair
@@ -40,7 +40,7 @@ def stem(request):
 
 
 def test_gradient_descent_converges_within_6_iterations_to_the_known_angle(stem):
-    found = estimate_roll(disparity_of(stem), road="all")
+    found = estimate_roll(disparity_of(stem), Request(road="all"))
     assert found.converged
     assert found.global_minimum
     assert found.iterations <= 6
@@ -53,6 +53,6 @@ def test_gradient_descents_iterations_are_within_one_of_the_papers(stem):
 
 
 def test_agreeing_areas_give_the_angle_of_a_robust_fit(stem):
-    found = estimate_roll(disparity_of(stem), method="areas", road="all")
+    found = estimate_roll(disparity_of(stem), Request(method="areas", road="all"))
     robust = {"m1_L1": -3.41, "m1_L5": -1.53, "m2_L9": -2.53, "m2_L18": -4.27, "m3_L3": 2.39}[stem]
     assert math.degrees(found.theta) == pytest.approx(robust, abs=0.1)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from rollcli.estimator.estimate import estimate_roll
+from rollcli.estimator.request import Request
 from rollcli.pictures import vdisparity as vdisparity_module
 from rollcli.pictures.derotate import derotate
 from rollcli.pictures.vdisparity import row_offset, v_disparity
@@ -103,13 +104,12 @@ def test_the_estimate_on_the_result_is_zero(roll_deg):
     theta = math.radians(roll_deg)
     disparity = with_holes(road_map(theta, width=141, height=97, noise=0))
 
-    found = estimate_roll(disparity, road="all").theta
+    found = estimate_roll(disparity, Request(road="all")).theta
 
     assert found == pytest.approx(theta, abs=1e-6)
     # an interpolation between valid neighbours alone leans by a fraction of a pixel: evenly, over many holes
-    assert estimate_roll(derotate(disparity, found), road="all").theta == pytest.approx(
-        0, abs=math.radians(0.02)
-    )
+    level = estimate_roll(derotate(disparity, found), Request(road="all"))
+    assert level.theta == pytest.approx(0, abs=math.radians(0.02))
 
 
 @pytest.mark.parametrize("hole", [0.0, -1.0, np.nan, np.inf, -3.4e38])
@@ -131,7 +131,7 @@ def test_the_parabola_lies_on_the_road_of_the_derotated_map(roll_deg):
     v, u = np.mgrid[:200, :300]
     y = v * math.cos(theta) - u * math.sin(theta)
     disparity = 30 + 0.2 * y + 2e-4 * y**2
-    estimate = estimate_roll(disparity, road="all")
+    estimate = estimate_roll(disparity, Request(road="all"))
 
     level = derotate(disparity, estimate.theta)
     y = np.arange(200) + row_offset(estimate.theta, 300, 200)

@@ -1,12 +1,10 @@
 """Pitch and height against rigs whose planes are made by ray casting."""
 
-import inspect
 import math
 
 import numpy as np
 import pytest
 
-import rollcli
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.interval import Tangent
 from rollcli.rig.calibration import Calibration
@@ -118,13 +116,3 @@ def test_on_a_bent_road_the_pose_is_that_over_the_road_where_the_tangent_touches
     assert posed.pitch == pytest.approx(pitch + bend, abs=math.radians(0.03))
     over = (height + curvature * far**2 / 2) * math.cos(bend)
     assert posed.height_m == pytest.approx(over, rel=3e-3)
-
-
-def test_the_public_function_names_every_setting_of_the_estimator_with_its_default():
-    public, own = (inspect.signature(each).parameters for each in (rollcli.estimate_roll, estimate_roll))
-    assert {name: public[name].default for name in own if name != "tuning"} == {
-        name: each.default for name, each in own.items() if name != "tuning"
-    }
-    assert public.keys() - own.keys() == {"calibration"}
-    with pytest.raises(TypeError, match="metod"):
-        rollcli.estimate_roll(np.ones((50, 50)), metod="exact")

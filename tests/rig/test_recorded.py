@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from rollcli.estimator.estimate import estimate_roll
+from rollcli.estimator.request import Request
 from rollcli.rig.calibration import Calibration, CalibrationOptions
 from rollcli.rig.drive.assess import assess_rig, split_drives
 from rollcli.rig.drive.posterior import Estimate
@@ -227,7 +228,7 @@ POSED = {
 
 
 def _posed(name, calibration):
-    estimate = estimate_roll(POSED[name](), road="all" if name == "ceiling" else "auto")
+    estimate = estimate_roll(POSED[name](), Request(road="all" if name == "ceiling" else "auto"))
     found = made(with_pose, estimate, calibration)
     if isinstance(found, str):
         return found

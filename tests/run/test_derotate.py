@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from rollcli.estimator.estimate import estimate_roll
+from rollcli.estimator.request import Request
 from rollcli.files.encodings import read_disparity
 from rollcli.files.formats import encode_stored, read_stored
 from rollcli.run import images as work
@@ -69,7 +70,7 @@ def test_a_map_keeps_its_format_type_and_encoding(tmp_path, form, dtype, encodin
     assert stored.values.shape == read_stored(before).values.shape
     level = read_disparity(after, encoding=encoding)
     assert level.max() == pytest.approx(read_disparity(before, encoding=encoding).max(), rel=0.15)
-    roll = estimate_roll(level, road="all").theta
+    roll = estimate_roll(level, Request(road="all")).theta
     assert math.degrees(roll) == pytest.approx(0, abs=0.05 + 2 * STEPS[encoding])
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from rollcli.estimator.request import Request
 from rollcli.run.options import FrameOptions, RegionOptions
 from rollcli.run.read import region_mask, wanted_of
 
@@ -36,7 +37,7 @@ def test_a_slanted_side_that_reaches_far_keeps_its_place(far):
 
 def test_of_a_pair_the_road_is_found_in_the_region():
     options = FrameOptions(region=RegionOptions(roi=(81, 30, 160, 100)))
-    wanted = wanted_of(region_mask(None, options, SHAPE), options)
+    wanted = wanted_of(region_mask(None, options, SHAPE), Request())
     v, u = np.mgrid[:60, :80]
     left, right = 10 + 0.5 * v - 0.1 * u, 12 + 0.4 * v + 0.05 * u
     small = np.where(u < 41, left, right)

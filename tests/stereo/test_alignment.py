@@ -9,6 +9,7 @@ import pytest
 
 from rollcli.errors import InputError, UsageError
 from rollcli.estimator.estimate import estimate_roll
+from rollcli.estimator.request import Request
 from rollcli.files.formats import read_image
 from rollcli.files.inputs import pair_inputs
 from rollcli.simulate.build import render_frame
@@ -95,7 +96,7 @@ def test_the_interval_knows_that_levelling_errs():
         for larger_percent in (0.2, -0.4):
             right = seen_by(frame.right, larger_percent=larger_percent)
             match = match_pair(frame.left, right, StereoOptions())
-            found = estimate_roll(match.disparity, slope_error=match.slope_error)
+            found = estimate_roll(match.disparity, Request(slope_error=match.slope_error))
             reached.append(abs(found.theta - roll) <= found.ci95)
 
     assert sum(reached) >= 0.9 * len(reached)
@@ -179,7 +180,7 @@ def test_rows_that_are_bent_alone_are_seldom_taken_for_a_scale_without_a_word():
         bent = rows + np.float32(0.002) * np.maximum(rows - (height - 1) / 2, 0).astype(np.float32)
         right = cv2.remap(frame.right, columns, bent, cv2.INTER_LANCZOS4, borderMode=cv2.BORDER_REFLECT)
         match = match_pair(frame.left, right, StereoOptions())
-        found = estimate_roll(match.disparity, slope_error=match.slope_error)
+        found = estimate_roll(match.disparity, Request(slope_error=match.slope_error))
         told += bool(match.doubt) or abs(found.theta - math.radians(3)) <= found.ci95
     assert told >= 3
 

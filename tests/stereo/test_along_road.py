@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from rollcli.estimator.estimate import estimate_roll
+from rollcli.estimator.request import Request
 from rollcli.estimator.road.find import road_plane
 from rollcli.files.formats import read_image
 from rollcli.simulate.build import render_frame
@@ -64,7 +65,7 @@ def angles(left, right):
     """Both estimates: along the road, and from the whole match."""
     for wanted in (ROAD, Wanted()):
         match = match_pair(left, right, StereoOptions(), wanted)
-        yield estimate_roll(match.disparity, slope_error=match.slope_error)
+        yield estimate_roll(match.disparity, Request(slope_error=match.slope_error))
 
 
 def assert_agree(pairs):
@@ -96,8 +97,9 @@ def test_a_map_of_everything_gives_the_angle_of_the_pair():
     agree = []
     for frame in map(render_frame, draw_specs(asked)):
         match = match_pair(frame.left, frame.right, StereoOptions(), ROAD)
-        along = estimate_roll(match.disparity, slope_error=match.slope_error)
-        whole = estimate_roll(compute_disparity(frame.left, frame.right), slope_error=match.slope_error)
+        request = Request(slope_error=match.slope_error)
+        along = estimate_roll(match.disparity, request)
+        whole = estimate_roll(compute_disparity(frame.left, frame.right), request)
         agree.append(abs(along.theta - whole.theta) <= along.ci95 / 2)
     assert sum(agree) >= 7
 

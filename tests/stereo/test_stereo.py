@@ -9,6 +9,7 @@ import pytest
 
 from rollcli.errors import InputError, UsageError
 from rollcli.estimator.estimate import estimate_roll
+from rollcli.estimator.request import Request
 from rollcli.estimator.road.find import road_plane
 from rollcli.files.formats import read_image
 from rollcli.files.inputs import pair_inputs
@@ -214,7 +215,7 @@ def test_real_road_pairs_need_and_get_a_wide_range():
         assert 4 * match.num_disparities > 331
         assert match.end_fraction < 0.001
         assert (inside > 0).mean() > 0.9
-        roll_deg = math.degrees(estimate_roll(match.disparity, road="all").theta)
+        roll_deg = math.degrees(estimate_roll(match.disparity, Request(road="all")).theta)
         assert roll_deg == pytest.approx(ROADS[pair.left.path.stem], abs=0.15)
 
 

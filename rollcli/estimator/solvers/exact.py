@@ -184,15 +184,10 @@ class CertifiedSolution:
     replaced: float | None = None
 
 
-def certify(energy: Energy, solution: Solution) -> CertifiedSolution:
-    """Compare a solution with all minima of the energy."""
-    return _beside(minima(energy), energy, solution)
-
-
-def certify_near(
-    energy: Energy, solution: Solution, road_theta: float, tolerance: float
+def certify(
+    energy: Energy, solution: Solution, road_theta: float | None = None, tolerance: float = 0.0
 ) -> CertifiedSolution:
-    """Replace a solution that is not the road's minimum by the one that is, and compare it with all.
+    """Compare a solution with all minima of the energy; one that is not the road's minimum is replaced by it.
 
     A thin strip of road can have a deeper minimum elsewhere.
 
@@ -200,23 +195,17 @@ def certify_near(
     ----------
     energy : Energy
     solution : Solution
-    road_theta : float
-        The road's roll as found otherwise, radians.
+    road_theta : float or None
+        The road's roll as found otherwise, radians; None: the solution stays.
     tolerance : float
         Of the solver, radians.
     """
     found, replaced = minima(energy), None
-    meant = min(found, key=lambda minimum: angle_between(minimum.theta, road_theta)).theta
-    if angle_between(solution.theta, meant) > max(10 * tolerance, _SAME_BASIN):
-        replaced = solution.theta
-        solution = replace(solution, theta=meant)
-    return _beside(found, energy, solution, replaced)
-
-
-def _beside(
-    found: list[Minimum], energy: Energy, solution: Solution, replaced: float | None = None
-) -> CertifiedSolution:
-    """Put a solution beside the minima that were found."""
+    if road_theta is not None:
+        meant = min(found, key=lambda minimum: angle_between(minimum.theta, road_theta)).theta
+        if angle_between(solution.theta, meant) > max(10 * tolerance, _SAME_BASIN):
+            replaced = solution.theta
+            solution = replace(solution, theta=meant)
     value = float(energy.at(solution.theta).value)
     slack = 1e-9 * (energy.rest + energy.slope_energy)
     return CertifiedSolution(solution, value, found, value <= found[0].energy + slack, replaced)

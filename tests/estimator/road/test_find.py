@@ -10,6 +10,7 @@ import pytest
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.estimate import estimate_roll
+from rollcli.estimator.request import Request
 from rollcli.estimator.road.find import road_plane
 from rollcli.files.formats import read_image
 from rollcli.pictures.derotate import derotate
@@ -29,7 +30,7 @@ LIDAR_DEG = {"000151_10": (-0.51, -0.28), "000174_10": (-0.99, -0.34)}
 
 
 def error_deg(disparity, roll, **options):
-    return abs(math.degrees(estimate_roll(disparity, **options).theta - roll))
+    return abs(math.degrees(estimate_roll(disparity, Request(**options)).theta - roll))
 
 
 def verdict(disparity):
@@ -84,7 +85,7 @@ def test_the_answer_hardly_depends_on_the_seed(matched):
 def test_the_same_seed_gives_the_same_bits(matched):
     *_, disparity = matched[0]
 
-    assert estimate_roll(disparity, seed=5) == estimate_roll(disparity.copy(), seed=5)
+    assert estimate_roll(disparity, Request(seed=5)) == estimate_roll(disparity.copy(), Request(seed=5))
 
 
 @pytest.mark.parametrize("factor", [100, 1 / 256, 3.7, 1e6])
@@ -132,7 +133,7 @@ def test_a_road_rolled_beyond_the_bound_is_no_road():
     disparity, _ = true_disparity(spec)
 
     with pytest.raises(EstimationError, match="no road"):
-        estimate_roll(disparity, max_roll=math.radians(20))
+        estimate_roll(disparity, Request(max_roll=math.radians(20)))
 
 
 @functools.cache
@@ -303,7 +304,7 @@ def test_without_road_finding_every_valid_pixel_is_road():
     disparity = bent_road(4, noise=0.1)
     disparity[:30] = 0
 
-    found = estimate_roll(disparity, road="all", road_mask=True)
+    found = estimate_roll(disparity, Request(road="all"), road_mask=True)
 
     assert np.array_equal(found.road_mask, disparity > 0)
 
@@ -313,7 +314,7 @@ def test_nan_is_no_data_as_0_is_without_road_finding_too():
     with_zeros[:30] = 0
     with_nan = np.where(with_zeros > 0, with_zeros, np.nan)
 
-    one, other = (estimate_roll(disparity, road="all") for disparity in (with_zeros, with_nan))
+    one, other = (estimate_roll(disparity, Request(road="all")) for disparity in (with_zeros, with_nan))
 
     assert (one.theta, one.ci95, one.alpha) == (other.theta, other.ci95, other.alpha)
 
@@ -322,7 +323,7 @@ def test_a_map_with_pixels_at_its_border_alone_has_an_angle_and_no_interval():
     disparity = flat_road(5, width=40, height=40)
     disparity[2:-2, 2:-2] = 0
 
-    found = estimate_roll(disparity, road="all")
+    found = estimate_roll(disparity, Request(road="all"))
 
     assert math.isclose(math.degrees(found.theta), 5, abs_tol=1e-6)
     assert found.ci95 is None
@@ -330,7 +331,7 @@ def test_a_map_with_pixels_at_its_border_alone_has_an_angle_and_no_interval():
 
 @pytest.mark.parametrize("model", ["parabola", "line"])
 def test_a_road_without_road_finding_is_beyond_doubt(model):
-    found = estimate_roll(bent_road(4, bend=0, noise=0.1), road="all", model=model)
+    found = estimate_roll(bent_road(4, bend=0, noise=0.1), Request(road="all", model=model))
 
     assert (found.status, found.message) == ("ok", "")
     assert found.road_fraction == 1

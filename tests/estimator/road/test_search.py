@@ -20,8 +20,8 @@ def street(roll_deg=4.0, seed=8, scene="street"):
     return true_disparity(spec)[0].astype(np.float32)
 
 
-def angle_deg(disparity, **asked):
-    return math.degrees(estimate_roll(disparity, **asked).theta)
+def angle_deg(disparity, mask=None):
+    return estimate_roll(disparity, mask=mask).roll_deg
 
 
 def replaced(disparity, share, seed=0):

@@ -7,6 +7,7 @@ import pytest
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.estimate import estimate_roll
+from rollcli.estimator.request import Request
 from rollcli.estimator.solvers.areas import fit_plane, iterative, lower_centre, lower_centre_slices
 from rollcli.estimator.solvers.solution import SolverStatus
 from tests.estimator.synthetic_maps import bent_road, flat_road
@@ -43,7 +44,7 @@ def test_obstacles_are_left_out(roll_deg):
     found, used = areas(disparity)
     assert math.degrees(found.theta) == pytest.approx(roll_deg, abs=0.05)
     assert not used[150, 160]  # the box in the middle
-    assert abs(math.degrees(estimate_roll(disparity, method="exact", road="all").theta) - roll_deg) > 0.5
+    assert abs(estimate_roll(disparity, Request(method="exact", road="all")).roll_deg - roll_deg) > 0.5
 
 
 def test_walls_beside_a_road_are_no_candidates():
@@ -71,7 +72,7 @@ def test_masked_pixels_have_no_say():
 
 def test_estimate_says_which_pixels_it_used():
     disparity = road_with_obstacles(3)
-    found = estimate_roll(disparity, method="areas", road="all", road_mask=True)
+    found = estimate_roll(disparity, Request(method="areas", road="all"), road_mask=True)
     assert found.road_mask.sum() == pytest.approx(found.road_fraction * (disparity > 0).sum())
     assert found.iterations >= 1
     assert found.global_minimum is None
@@ -145,7 +146,7 @@ def test_a_mask_is_the_chosen_area():
     both = np.where(np.arange(160) < 80, rolled, level)
     left = np.zeros(both.shape, bool)
     left[:, :80] = True
-    found = estimate_roll(both, mask=left, method="plane", road="all", road_mask=True)
+    found = estimate_roll(both, Request(method="plane", road="all"), mask=left, road_mask=True)
     assert math.degrees(found.theta) == pytest.approx(9, abs=1e-6)
     assert found.road_mask.sum() == left.sum()
     assert (found.iterations, found.global_minimum) == (0, None)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rollcli.errors import EstimationError
-from rollcli.estimator.solvers.exact import certify, certify_near, exact, minima, zeros
+from rollcli.estimator.solvers.exact import certify, exact, minima, zeros
 from rollcli.estimator.solvers.solution import Solution
 from tests.estimator.synthetic_maps import bent_road, degrees_apart, energy_of, random_maps, repeatable
 
@@ -152,7 +152,7 @@ def test_a_solution_whose_energy_is_a_billionth_higher_is_still_the_lowest(times
 
 
 def test_the_minimum_nearest_to_the_road_replaces_another():
-    found = certify_near(ENERGY, Solution(LOWEST, 3), HIGHER + 0.05, 1e-6)
+    found = certify(ENERGY, Solution(LOWEST, 3), HIGHER + 0.05, 1e-6)
     assert (found.solution.theta, found.replaced, found.is_global) == (HIGHER, LOWEST, False)
 
 
@@ -162,6 +162,6 @@ def test_the_minimum_nearest_to_the_road_replaces_another():
 )
 def test_a_solution_within_ten_tolerances_of_the_minimum_stays(tolerance_deg, off_deg, replaced):
     solution = Solution(LOWEST + math.radians(off_deg), 3)
-    found = certify_near(ENERGY, solution, LOWEST, math.radians(tolerance_deg))
+    found = certify(ENERGY, solution, LOWEST, math.radians(tolerance_deg))
     assert found.replaced == (solution.theta if replaced else None)
     assert found.solution.theta == (LOWEST if replaced else solution.theta)
