@@ -27,7 +27,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rollcli.errors import UsageError
 from rollcli.estimator.estimate import RollEstimate
-from rollcli.estimator.moments import LARGEST, Grid, map_of
+from rollcli.estimator.moments import LARGEST, Grid, map_of, strips
 from rollcli.estimator.road.model import FARTHEST_SIDE
 from rollcli.files.results import Row
 from rollcli.rig.calibration import Calibration, require_calibration
@@ -168,10 +168,9 @@ def heights_over(disparity: NDArray[Any], road: FittedRoad, calibration: Calibra
     measured = calibration if unit_of(calibration) == METRES else None
     over = _Heights(road, profile.along(disparity, road), measured)
     columns = np.arange(road.width, dtype=np.float32)
-    step = max(1, _BLOCK // road.width)
-    for top in range(0, road.height, step):
-        rows = np.arange(top, min(top + step, road.height), dtype=np.float32)
-        over.fill(disparity[top : top + step], rows, columns, heights[top : top + step])
+    for some in strips(road.height, _BLOCK // road.width):
+        rows = np.arange(some.start, some.stop, dtype=np.float32)
+        over.fill(disparity[some], rows, columns, heights[some])
     return heights
 
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from rollcli.errors import EstimationError
 from rollcli.estimator.energy import Energy
 from rollcli.estimator.least_squares import solve_normal
-from rollcli.estimator.moments import Floats, Grid, powers
+from rollcli.estimator.moments import Floats, Grid, powers, strips
 from rollcli.estimator.road.find import HARDLY_A_PIXEL, Road, agreement
 from rollcli.estimator.road.model import Reals, RoadModel
 from rollcli.estimator.road.sample import Sample, Singles, count, quantile, reach_of, steps_to, tolerance_of
@@ -90,11 +90,10 @@ class Surface:
         height, width = disparity.shape
         reach = min(reach_of(height, width, tuning.sample), height - 1)
         covered = np.empty(disparity.shape, bool)
-        step = max(1, _BLOCK // width)  # a few rows at a time: a large map leaves no room for eight more
-        for top in range(0, height, step):
-            first, end = max(0, top - reach), min(height, top + step)
-            some = disparity[first : min(height, end + reach)]
-            covered[top:end] = self._covers(some, first, reach, tuning)[top - first : end - first]
+        for rows in strips(height, _BLOCK // width):  # a large map leaves no room for eight more
+            first = max(0, rows.start - reach)
+            some = self._covers(disparity[first : rows.stop + reach], first, reach, tuning)
+            covered[rows] = some[rows.start - first : rows.stop - first]
         return covered
 
     def _covers(self, disparity: NDArray[Any], first: int, reach: int, tuning: Tuning) -> NDArray[np.bool_]:
